@@ -1,0 +1,46 @@
+//! Null geodesics of the Kerr spacetime, traced backward from an observer's screen.
+//!
+//! Units G = c = M = 1; spin a ∈ \[−1, 1\]; Boyer–Lindquist coordinates, in equations that
+//! are regular at the poles, for every spin including 0 and ±1, for an observer at
+//! infinity and at every inclination.
+//!
+//! ```
+//! use kerrlight_geodesic::{Inclination, Kerr, Observer, Outcome, Path, Tracer, Want};
+//!
+//! let hole = Kerr::new(0.9)?;
+//! let observer = Observer::at_infinity(Inclination::from_degrees(60.0)?);
+//! let tracer = Tracer::new(1e-10)?;
+//! let mut path = Path::new();
+//! tracer.trace(&hole, &observer.ray(&hole, -6.0, 2.0)?, Want::ALL, &mut path);
+//!
+//! assert_eq!(path.outcome(), Outcome::Escaped);
+//! let hit = path.at(path.equatorial_crossings().next().unwrap());
+//! println!("meets the disc at r = {:.6} M, φ = {:.6}", hit.radius(), hit.azimuth);
+//! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+//! ```
+//!
+//! Data flow: [`Observer`] → [`Ray`] (constants of motion) → [`Tracer`] → [`Path`]
+//! (outcome, events, position at any Mino time) → [`Flow`](flow) (redshift factors).
+
+mod compensated;
+mod error;
+pub mod flow;
+mod hermite;
+mod kerr;
+mod mino;
+mod observer;
+pub mod orbits;
+mod path;
+pub mod quadrature;
+mod radial;
+mod runge_kutta;
+mod scalar;
+mod trace;
+
+pub use error::OutOfRange;
+pub use kerr::Kerr;
+pub use observer::{Inclination, Observer, Ray};
+pub use path::{Outcome, Path, PathPoint, Unresolved};
+pub use radial::{Barrier, RadialPotential};
+pub use scalar::Scalar;
+pub use trace::{Tracer, Want};

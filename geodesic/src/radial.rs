@@ -1,0 +1,203 @@
+//! The radial potential W(w) = (dw/dτ)², w = 1/r, and what it allows a ray to do.
+
+use crate::compensated::Double;
+use crate::kerr::Kerr;
+
+/// W(w) = 1 + A w² + B w³ + C w⁴ with A = a² − η − λ², B = 2\[η + (λ − a)²\], C = −a²η
+/// (the quartic R(r) of Gralla & Lupsasca 2020, arXiv:1910.12881, times w⁴).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RadialPotential {
+    /// A, B and C.
+    pub coefficients: [f64; 3],
+    /// w at the horizon.
+    pub horizon: f64,
+    /// The minimum of W between infinity and the horizon, if there is one.
+    pub barrier: Option<Barrier>,
+}
+
+/// The minimum of W outside the horizon: where it is negative the ray turns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Barrier {
+    /// Where W is smallest.
+    pub w: f64,
+    /// The smallest value, rounded from twice the working precision.
+    pub height: f64,
+    /// Coefficients of (w − w_min)², ³ and ⁴.
+    pub expansion: [f64; 3],
+}
+
+impl Barrier {
+    /// W at a distance x = w − w_min, without cancellation near the minimum.
+    fn value(&self, x: f64) -> f64 {
+        let [c2, c3, c4] = self.expansion;
+        self.height + x * x * (c2 + x * (c3 + x * c4))
+    }
+
+    /// The distance from the minimum at which W differs from its least value by as much
+    /// as that value itself: how closely the ray approaches the spherical photon orbit.
+    pub fn width(&self) -> f64 {
+        (self.height / self.expansion[0]).abs().sqrt()
+    }
+}
+
+impl RadialPotential {
+    pub(crate) fn new(hole: &Kerr, coefficients: [Double; 3]) -> Self {
+        let horizon = 1.0 / hole.horizon();
+        let barrier = barrier(&coefficients, horizon);
+        RadialPotential { coefficients: coefficients.map(Double::value), horizon, barrier }
+    }
+
+    /// W(w).
+    pub fn value(&self, w: f64) -> f64 {
+        if let Some(barrier) = &self.barrier {
+            let x = w - barrier.w;
+            // Near the barrier the terms cancel; far from it the expansion about it does.
+            if x.abs() < 0.25 * barrier.w {
+                return barrier.value(x);
+            }
+        }
+        let [a, b, c] = self.coefficients;
+        1.0 + w * w * (a + w * (b + w * c))
+    }
+
+    /// dW/dw.
+    pub fn slope(&self, w: f64) -> f64 {
+        if let Some(barrier) = &self.barrier {
+            let x = w - barrier.w;
+            if x.abs() < 0.25 * barrier.w {
+                let [c2, c3, c4] = barrier.expansion;
+                return x * (2.0 * c2 + x * (3.0 * c3 + x * 4.0 * c4));
+            }
+        }
+        let [a, b, c] = self.coefficients;
+        w * (2.0 * a + w * (3.0 * b + w * 4.0 * c))
+    }
+
+    /// Whether a ray from far away falls into the hole: W has no root outside the horizon.
+    pub fn captures(&self) -> bool {
+        self.barrier.is_none_or(|barrier| barrier.height >= 0.0)
+    }
+
+    /// w at the turning point of a ray that comes from outside, if it turns.
+    pub fn outer_turning_point(&self) -> Option<f64> {
+        self.barrier.filter(|b| b.height < 0.0).map(|b| self.root_between(0.0, b.w))
+    }
+
+    /// w at the turning point of a ray that comes from inside the barrier, if it turns.
+    pub fn inner_turning_point(&self) -> Option<f64> {
+        self.barrier.filter(|b| b.height < 0.0).map(|b| self.root_between(self.horizon, b.w))
+    }
+
+    /// The root of W between a point where W ≥ 0 and the barrier, where W < 0: Newton's
+    /// method inside a shrinking bracket.
+    fn root_between(&self, mut positive: f64, mut negative: f64) -> f64 {
+        // W is nearly a parabola about the barrier: its root is where Newton starts.
+        let mut w = negative;
+        if let Some(barrier) = &self.barrier {
+            let step = barrier.width().min((positive - negative).abs());
+            w = negative + step.copysign(positive - negative);
+        }
+        for _ in 0..100 {
+            let value = self.value(w);
+            if value == 0.0 {
+                break;
+            }
+            if value > 0.0 {
+                positive = w
+            } else {
+                negative = w
+            }
+            let newton = w - value / self.slope(w);
+            let inside = (newton - positive) * (newton - negative) < 0.0;
+            let next = if inside { newton } else { 0.5 * (positive + negative) };
+            let done = (next - w).abs() <= f64::EPSILON * w;
+            w = next;
+            if done {
+                break;
+            }
+        }
+        w
+    }
+}
+
+/// dW/dw = w (2A + 3B w + 4C w²): with W(0) = 1 and W ≥ 0 at the horizon, W has roots
+/// outside the horizon only if its first minimum lies there and is negative.
+fn barrier(coefficients: &[Double; 3], horizon: f64) -> Option<Barrier> {
+    let [a, b, c] = coefficients.map(Double::value);
+    if a >= 0.0 {
+        return None;
+    }
+    let discriminant = 9.0 * b * b - 32.0 * a * c;
+    if discriminant < 0.0 {
+        return None;
+    }
+    let w = -4.0 * a / (3.0 * b + discriminant.sqrt());
+    if w >= horizon || w.is_nan() {
+        return None;
+    }
+    let x = Double::from(w);
+    let [da, db, dc] = *coefficients;
+    let height = (Double::from(1.0) + x * x * (da + x * (db + x * dc))).value();
+    let expansion = [a + w * (3.0 * b + w * 6.0 * c), b + w * 4.0 * c, c];
+    Some(Barrier { w, height, expansion })
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Inclination, Kerr, Observer};
+
+    fn ray(spin: f64, degrees: f64, alpha: f64, beta: f64) -> crate::Ray {
+        let hole = Kerr::new(spin).unwrap();
+        let observer = Observer::at_infinity(Inclination::from_degrees(degrees).unwrap());
+        observer.ray(&hole, alpha, beta).unwrap()
+    }
+
+    /// The critical impact parameter of Schwarzschild is 3√3; 1e-15 is 5 units in its last place.
+    #[test]
+    fn exact_schwarzschild_fate_next_to_the_critical_curve() {
+        let critical = 27f64.sqrt();
+        for degrees in [0.0, 17.0, 60.0, 90.0] {
+            assert!(ray(0.0, degrees, 0.0, critical * (1.0 - 1e-15)).potential.captures());
+            assert!(!ray(0.0, degrees, 0.0, critical * (1.0 + 1e-15)).potential.captures());
+        }
+    }
+
+    /// Bardeen 1973: critical λ at 90° inclination (spin a → −a mirrors the screen).
+    #[test]
+    fn paper_critical_impact_parameters_of_equatorial_rays() {
+        let cases = [(0.9, 2.8444214035, -6.8323192304), (0.99, 2.2517243354, -6.9833234311)];
+        for (spin, prograde, retrograde) in cases {
+            for (lambda, outside) in [(prograde, 1.0), (retrograde, -1.0f64)] {
+                let alpha = -lambda;
+                let step = 2e-10f64.copysign(-outside);
+                assert!(!ray(spin, 90.0, alpha + step, 0.0).potential.captures());
+                assert!(ray(spin, 90.0, alpha - step, 0.0).potential.captures());
+                assert!(!ray(-spin, 90.0, -alpha - step, 0.0).potential.captures());
+                assert!(ray(-spin, 90.0, -alpha + step, 0.0).potential.captures());
+            }
+        }
+    }
+
+    #[test]
+    fn exact_turning_points_are_roots_from_far_to_near_critical() {
+        let cases = [
+            (0.0, 5.2, 1.0),
+            (0.0, 1e6, 0.0),
+            (0.94, 7.0, 3.0),
+            (0.5, -27f64.sqrt() + 1e-9, 2.0),
+            (-1.0, 1e3, -1e3),
+            (0.94, 0.5, 6.0),
+        ];
+        for (spin, alpha, beta) in cases {
+            let p = ray(spin, 60.0, alpha, beta).potential;
+            let w = p.outer_turning_point().expect("turns");
+            let scale = 1e-14 * (p.slope(w) * w).abs() + 1e-30;
+            assert!(p.value(w).abs() < scale, "{spin} {alpha} {beta}: W = {:e}", p.value(w));
+            assert!(w > 0.0 && w < p.horizon);
+        }
+        // b = r/√(1 − 2/r) of Schwarzschild at r = 10.
+        let b = 10.0 / (1.0f64 - 0.2).sqrt();
+        let w = ray(0.0, 30.0, b, 0.0).potential.outer_turning_point().unwrap();
+        assert!((w * 10.0 - 1.0).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,287 @@
+//! From a ray's initial data to its path.
+
+use crate::error::{OutOfRange, check};
+use crate::hermite::Quintic;
+use crate::kerr::Kerr;
+use crate::mino::{FULL, System, has_azimuth, has_time, index};
+use crate::observer::Ray;
+use crate::path::{Node, Outcome, Path, Unresolved, turn};
+use crate::runge_kutta::{Control, DORMAND_PRINCE_5, step};
+
+/// What a ray is asked for beyond r and θ. What is not asked for is not integrated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Want {
+    /// Azimuth, direction and angular velocity.
+    pub azimuth: bool,
+    /// Coordinate time.
+    pub time: bool,
+}
+
+impl Want {
+    /// r and θ alone.
+    pub const POLAR: Want = Want { azimuth: false, time: false };
+    /// Everything.
+    pub const ALL: Want = Want { azimuth: true, time: true };
+}
+
+/// The adaptive Runge–Kutta method of order 5(4) in Mino time (`rk45-mino`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tracer {
+    tolerance: f64,
+    max_steps: u32,
+}
+
+/// Longest step in scaled Mino time: short against half a polar or azimuthal period
+/// (at least 1.8), so that a step holds at most one crossing of the equator.
+const LONGEST_STEP: f64 = 0.8;
+
+impl Tracer {
+    /// A tracer whose local error per step stays below `tolerance`, in units in which
+    /// b·w, the direction, the azimuth and delay/b are of order one (b the impact
+    /// parameter). Next to the critical curve the error in w is held to that fraction of
+    /// the distance from the photon orbit.
+    ///
+    /// # Errors
+    /// If `tolerance` is not in \[1e-14, 1e-2\].
+    pub fn new(tolerance: f64) -> Result<Self, OutOfRange> {
+        let ok = (1e-14..=1e-2).contains(&tolerance);
+        check("tolerance", tolerance, ok, "a number in [1e-14, 1e-2]")?;
+        Ok(Tracer { tolerance, max_steps: 100_000 })
+    }
+
+    /// The same tracer with another limit on the number of steps of a ray.
+    pub fn with_max_steps(mut self, max_steps: u32) -> Self {
+        self.max_steps = max_steps;
+        self
+    }
+
+    /// The tolerance.
+    pub fn tolerance(&self) -> f64 {
+        self.tolerance
+    }
+
+    /// Follows `ray` backward to the horizon or to infinity, into `path`.
+    pub fn trace(&self, hole: &Kerr, ray: &Ray, want: Want, path: &mut Path) {
+        match (want.azimuth, want.time) {
+            (false, false) => Run::<4>::new(self, hole, ray, path).go(),
+            (false, true) => Run::<5>::new(self, hole, ray, path).go(),
+            (true, false) => Run::<9>::new(self, hole, ray, path).go(),
+            (true, true) => Run::<10>::new(self, hole, ray, path).go(),
+        }
+    }
+}
+
+/// One ray under way, with `N` variables.
+struct Run<'a, const N: usize> {
+    tracer: &'a Tracer,
+    ray: &'a Ray,
+    system: System<f64>,
+    path: &'a mut Path,
+    y: [f64; N],
+    f: [f64; N],
+    s: f64,
+    leg: f64,
+    constants: [f64; 2],
+    turned: f64,
+}
+
+impl<'a, const N: usize> Run<'a, N> {
+    fn new(tracer: &'a Tracer, hole: &Kerr, ray: &'a Ray, path: &'a mut Path) -> Self {
+        let system = System::new(hole, ray);
+        path.reset(hole, ray, system.scale);
+        path.has_azimuth = has_azimuth(N);
+        path.has_time = has_time(N);
+        let leg = if ray.inward { 1.0 } else { -1.0 };
+        let y = system.start::<N>(ray, leg);
+        let f = system.derivative(&y, leg);
+        let w = ray.inverse_radius;
+        let mut constants = [ray.azimuth - leg * hole.azimuth_closed_form(w), 0.0];
+        if w > 0.0 {
+            constants[1] = leg * hole.tortoise(w);
+        }
+        let turned = start_angle(ray);
+        Run { tracer, ray, system, path, y, f, s: 0.0, leg, constants, turned }
+    }
+
+    fn go(mut self) {
+        self.push_node();
+        let tolerance = self.tracer.tolerance;
+        let mut control = Control::new(DORMAND_PRINCE_5.order);
+        let mut h = (0.5 * tolerance.powf(0.2)).min(LONGEST_STEP);
+        for _ in 0..self.tracer.max_steps {
+            let trial = step(&DORMAND_PRINCE_5, &self.system, &self.y, &self.f, self.leg, h);
+            let error = self.error_norm(&trial.y, &trial.error);
+            let factor = control.factor(error);
+            if error <= 1.0 {
+                self.accept(trial.y, trial.f, h);
+                if self.handle_events() {
+                    return;
+                }
+            }
+            h = (h * factor).min(LONGEST_STEP);
+        }
+        self.path.end = self.s;
+        self.path.outcome = Outcome::Unresolved(Unresolved::StepLimit);
+    }
+
+    /// The largest local error in units of what the tolerance allows.
+    fn error_norm(&self, y: &[f64; N], error: &[f64; N]) -> f64 {
+        let mut radial = 1.0;
+        if let Some(barrier) = &self.ray.potential.barrier {
+            let b = self.system.scale;
+            let from =
+                (self.y[index::W] - b * barrier.w).abs().min((y[index::W] - b * barrier.w).abs());
+            radial = from.max(b * barrier.width()).min(1.0);
+        }
+        let rounding = 4.0 * f64::EPSILON;
+        let radial = (self.tracer.tolerance * radial).max(rounding);
+        let other = self.tracer.tolerance.max(rounding);
+        let mut norm = (error[index::W].abs().max(error[index::DW].abs())) / radial;
+        for e in &error[index::U..] {
+            norm = norm.max(e.abs() / other);
+        }
+        // A step that left the numbers' range is rejected like any other bad one.
+        if norm.is_nan() { f64::INFINITY } else { norm }
+    }
+
+    fn accept(&mut self, y: [f64; N], f: [f64; N], h: f64) {
+        let before = [self.y[index::X.min(N - 1)], self.y[index::Y.min(N - 1)]];
+        self.y = y;
+        self.f = f;
+        self.s += h;
+        self.path.steps += 1;
+        self.project();
+        if has_azimuth(N) {
+            let after = [self.y[index::X], self.y[index::Y]];
+            self.turned += turn(self.path.rotation_sign, before, after);
+        }
+        self.push_node();
+    }
+
+    /// Puts dw/dτ back on dw/dτ = ±√W wherever the root is well conditioned. Next to the
+    /// critical curve this is what keeps the ray on its own side of the barrier.
+    fn project(&mut self) {
+        let potential = &self.ray.potential;
+        let value = potential.value(self.y[index::W] / self.system.scale);
+        let rate = self.y[index::DW];
+        let floor = match &potential.barrier {
+            Some(barrier) if barrier.height < 0.0 => barrier.height.abs().min(0.25),
+            Some(_) => 0.0,
+            None => 0.25,
+        };
+        if value > floor {
+            let sign = if potential.captures() { self.leg } else { rate };
+            self.y[index::DW] = value.sqrt().copysign(sign);
+            self.f[index::W] = self.y[index::DW];
+        }
+    }
+
+    fn push_node(&mut self) {
+        let mut y = [0.0; FULL];
+        let mut f = [0.0; FULL];
+        let last = if has_time(N) { N - 1 } else { N };
+        y[..last].copy_from_slice(&self.y[..last]);
+        f[..last].copy_from_slice(&self.f[..last]);
+        if has_time(N) {
+            y[FULL - 1] = self.y[N - 1];
+            f[FULL - 1] = self.f[N - 1];
+        }
+        self.path.nodes.push(Node {
+            s: self.s,
+            y,
+            f,
+            second: self.system.second_derivative(&self.y, self.leg),
+            leg: self.leg,
+            constants: self.constants,
+            turned: self.turned,
+        });
+    }
+
+    /// Looks for events in the step just taken; true if the ray has ended in it.
+    fn handle_events(&mut self) -> bool {
+        let last = self.path.nodes.len() - 1;
+        let (a, b) = (self.path.nodes[last - 1], self.path.nodes[last]);
+        let ended = self.end_of_ray(&a, &b);
+        if side(&a) != side(&b) {
+            let s = locate(&a, &b, index::U, 0.0);
+            if ended.is_none_or(|(end, _)| s < end) {
+                self.path.crossings.push(s);
+            }
+        }
+        let turned = a.leg * b.y[index::DW] < 0.0;
+        if turned {
+            self.path.turning = Some(locate_turning(&a, &b));
+            let potential = &self.ray.potential;
+            self.path.turning_w = if a.leg > 0.0 {
+                potential.outer_turning_point()
+            } else {
+                potential.inner_turning_point()
+            };
+        }
+        if let Some((end, outcome)) = ended {
+            self.path.end = end;
+            self.path.outcome = outcome;
+            return true;
+        }
+        if turned {
+            self.change_leg();
+        }
+        false
+    }
+
+    fn end_of_ray(&self, a: &Node, b: &Node) -> Option<(f64, Outcome)> {
+        let horizon = self.system.scale * self.ray.potential.horizon;
+        if b.y[index::W] >= horizon && b.y[index::DW] > 0.0 {
+            return Some((locate(a, b, index::W, horizon), Outcome::Captured));
+        }
+        if b.y[index::W] <= 0.0 && b.y[index::DW] < 0.0 {
+            return Some((locate(a, b, index::W, 0.0), Outcome::Escaped));
+        }
+        None
+    }
+
+    /// On an outward leg g is written with −dw/dτ and the closed forms change sign; the
+    /// constants take up the difference.
+    fn change_leg(&mut self) {
+        let w = self.y[index::W] / self.system.scale;
+        let hole = self.path.hole;
+        self.constants[0] += 2.0 * self.leg * hole.azimuth_closed_form(w);
+        self.constants[1] -= 2.0 * self.leg * hole.tortoise(w);
+        self.leg = -self.leg;
+        self.f = self.system.derivative(&self.y, self.leg);
+        self.push_node();
+    }
+}
+
+/// atan2(y, x) at the start; on the axis the direction in which the ray leaves it.
+fn start_angle(ray: &Ray) -> f64 {
+    let [x, y, _] = ray.position;
+    if x == 0.0 && y == 0.0 { ray.velocity[1].atan2(ray.velocity[0]) } else { y.atan2(x) }
+}
+
+/// On which side of the equatorial plane a ray is, or is about to be.
+fn side(node: &Node) -> bool {
+    let (u, rate) = (node.y[index::U], node.y[index::DU]);
+    if u == 0.0 { rate > 0.0 } else { u > 0.0 }
+}
+
+/// Where in the step from `a` to `b` variable `k` takes the value `target`.
+fn locate(a: &Node, b: &Node, k: usize, target: f64) -> f64 {
+    let h = b.s - a.s;
+    let end = |node: &Node| [node.y[k], node.f[k], node.f[k + 1]];
+    a.s + h * Quintic::new(h, end(a), end(b)).solve(target, 0.0, 1.0)
+}
+
+/// Where dw/dτ changes sign: on the interpolant of w, whose slope is monotonic there.
+fn locate_turning(a: &Node, b: &Node) -> f64 {
+    let h = b.s - a.s;
+    let end = |node: &Node| [node.y[index::W], node.f[index::W], node.f[index::DW]];
+    let radial = Quintic::new(h, end(a), end(b));
+    let (mut lo, mut hi) = (0.0, 1.0);
+    let sign = radial.slope(0.0).signum();
+    while hi - lo > 1e-15 {
+        let mid = 0.5 * (lo + hi);
+        if radial.slope(mid) * sign > 0.0 { lo = mid } else { hi = mid }
+    }
+    a.s + h * 0.5 * (lo + hi)
+}

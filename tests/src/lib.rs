@@ -1,0 +1,1 @@
+//! Tests that touch two crates or the binary; see main.rs.
