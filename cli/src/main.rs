@@ -1,2 +1,52 @@
-//! k
-fn main() {}
+//! `kerrlight`: from scene files to lensed images of black holes.
+
+mod inspect;
+mod output;
+mod render;
+mod trace;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Lensed images of spinning black holes
+#[derive(Debug, Parser)]
+#[command(name = "kerrlight", version, propagate_version = true)]
+struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+    /// Threads to use [default: one for each core]; results do not depend on it
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// Render a scene to EXR and PNG
+    Render(render::Render),
+    /// Show what a file holds: channels, ranges, settings
+    Inspect(inspect::Inspect),
+    /// Trace single rays from a table to a table
+    Trace(trace::Trace),
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    match run(&arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    if let Some(threads) = arguments.threads {
+        rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
+    }
+    match &arguments.verb {
+        Verb::Render(render) => render.run(),
+        Verb::Inspect(inspect) => inspect.run(),
+        Verb::Trace(trace) => trace.run(),
+    }
+}

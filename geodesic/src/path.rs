@@ -190,6 +190,12 @@ impl Path {
         Some((self.turning? / self.scale, 1.0 / self.turning_w?))
     }
 
+    /// An upper bound of the angle by which the direction changes per Mino time, frame
+    /// dragging aside: √max(1, η + λ²) and a little.
+    pub fn angular_rate(&self) -> f64 {
+        (self.scale * self.scale + 1.0).sqrt()
+    }
+
     /// Number of accepted steps.
     pub fn steps(&self) -> u32 {
         self.steps

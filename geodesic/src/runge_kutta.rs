@@ -14,8 +14,19 @@ pub(crate) struct Tableau<const S: usize> {
     pub error: [f64; S],
 }
 
+/// A method whose coefficients the compiler knows, so that the loops over its stages unroll.
+pub(crate) trait Method<const S: usize> {
+    const TABLEAU: Tableau<S>;
+}
+
 /// Dormand & Prince 1980, J. Comp. Appl. Math. 6, 19: order 5(4), seven stages.
-pub(crate) const DORMAND_PRINCE_5: Tableau<7> = Tableau {
+pub(crate) struct DormandPrince5;
+
+impl Method<7> for DormandPrince5 {
+    const TABLEAU: Tableau<7> = DORMAND_PRINCE_5;
+}
+
+const DORMAND_PRINCE_5: Tableau<7> = Tableau {
     order: 5,
     stages: [
         [0.0; 7],
@@ -55,10 +66,28 @@ pub(crate) struct Step<const N: usize> {
     pub error: [f64; N],
 }
 
+/// `y` plus `h` times the slopes that stage `I` starts from.
+#[inline(always)]
+fn argument<M: Method<S>, const N: usize, const S: usize, const I: usize>(
+    y: &[f64; N],
+    k: &[[f64; N]; S],
+    h: f64,
+) -> [f64; N] {
+    let mut slope = [0.0; N];
+    for i in 0..I {
+        let weight = M::TABLEAU.stages[I][i];
+        if weight != 0.0 {
+            for n in 0..N {
+                slope[n] += weight * k[i][n];
+            }
+        }
+    }
+    core::array::from_fn(|n| y[n] + h * slope[n])
+}
+
 /// One step of length `h` from `y` with derivative `f`.
 #[inline(always)]
-pub(crate) fn step<const N: usize, const S: usize>(
-    method: &Tableau<S>,
+pub(crate) fn step<M: Method<S>, const N: usize, const S: usize>(
     system: &System<f64>,
     y: &[f64; N],
     f: &[f64; N],
@@ -68,21 +97,20 @@ pub(crate) fn step<const N: usize, const S: usize>(
     let mut k = [[0.0; N]; S];
     k[0] = *f;
     let mut end = *y;
-    for stage in 1..S {
-        end = *y;
-        for (slope, weight) in k.iter().zip(method.stages[stage]).take(stage) {
-            if weight != 0.0 {
-                for (value, slope) in end.iter_mut().zip(slope) {
-                    *value += h * weight * slope;
-                }
+    // Written out, so that each stage is compiled with its own coefficients.
+    macro_rules! stages {
+        ($($i:literal)*) => {$(
+            if $i < S {
+                end = argument::<M, N, S, $i>(y, &k, h);
+                k[$i] = system.derivative(&end, leg);
             }
-        }
-        k[stage] = system.derivative(&end, leg);
+        )*};
     }
+    stages!(1 2 3 4 5 6);
     let mut error = [0.0; N];
-    for (slope, weight) in k.iter().zip(method.error) {
-        for (value, slope) in error.iter_mut().zip(slope) {
-            *value += h * weight * slope;
+    for i in 0..S {
+        for n in 0..N {
+            error[n] += h * M::TABLEAU.error[i] * k[i][n];
         }
     }
     Step { y: end, f: k[S - 1], error }
@@ -93,7 +121,7 @@ pub(crate) fn step<const N: usize, const S: usize>(
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Control {
     exponent: f64,
-    memory: f64,
+    /// Logarithm of the last accepted error.
     last: f64,
 }
 
@@ -101,22 +129,18 @@ impl Control {
     const BETA: f64 = 0.04;
 
     pub fn new(order: u8) -> Self {
-        Control {
-            exponent: 1.0 / f64::from(order) - 0.75 * Self::BETA,
-            memory: Self::BETA,
-            last: 1e-4,
-        }
+        Control { exponent: 1.0 / f64::from(order) - 0.75 * Self::BETA, last: 1e-4f64.ln() }
     }
 
     /// Factor for the next step after one whose error, in units of the tolerance, was
     /// `error`; at most 1 after a rejected one.
     pub fn factor(&mut self, error: f64) -> f64 {
-        let error = error.max(1e-10);
+        let logarithm = error.max(1e-10).ln();
         if error > 1.0 {
-            return (0.9 * error.powf(-self.exponent)).max(0.2);
+            return (0.9 * (-self.exponent * logarithm).exp()).max(0.2);
         }
-        let factor = 0.9 * error.powf(-self.exponent) * self.last.powf(self.memory);
-        self.last = error.max(1e-4);
+        let factor = 0.9 * (Self::BETA * self.last - self.exponent * logarithm).exp();
+        self.last = logarithm.max(-9.2);
         factor.clamp(0.2, 6.0)
     }
 }

@@ -6,7 +6,7 @@ use crate::kerr::Kerr;
 use crate::mino::{FULL, System, has_azimuth, has_time, index};
 use crate::observer::Ray;
 use crate::path::{Node, Outcome, Path, Unresolved, turn};
-use crate::runge_kutta::{Control, DORMAND_PRINCE_5, step};
+use crate::runge_kutta::{Control, DormandPrince5, Method, step};
 
 /// What a ray is asked for beyond r and θ. What is not asked for is not integrated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -106,10 +106,10 @@ impl<'a, const N: usize> Run<'a, N> {
     fn go(mut self) {
         self.push_node();
         let tolerance = self.tracer.tolerance;
-        let mut control = Control::new(DORMAND_PRINCE_5.order);
+        let mut control = Control::new(DormandPrince5::TABLEAU.order);
         let mut h = (0.5 * tolerance.powf(0.2)).min(LONGEST_STEP);
         for _ in 0..self.tracer.max_steps {
-            let trial = step(&DORMAND_PRINCE_5, &self.system, &self.y, &self.f, self.leg, h);
+            let trial = step::<DormandPrince5, N, 7>(&self.system, &self.y, &self.f, self.leg, h);
             let error = self.error_norm(&trial.y, &trial.error);
             let factor = control.factor(error);
             if error <= 1.0 {
@@ -199,19 +199,18 @@ impl<'a, const N: usize> Run<'a, N> {
 
     /// Looks for events in the step just taken; true if the ray has ended in it.
     fn handle_events(&mut self) -> bool {
-        let last = self.path.nodes.len() - 1;
-        let (a, b) = (self.path.nodes[last - 1], self.path.nodes[last]);
-        let ended = self.end_of_ray(&a, &b);
-        if side(&a) != side(&b) {
-            let s = locate(&a, &b, index::U, 0.0);
+        let [.., a, b] = self.path.nodes.as_slice() else { return false };
+        let ended = end_of_ray(a, b, self.system.scale * self.ray.potential.horizon);
+        if side(a) != side(b) {
+            let s = locate(a, b, index::U, 0.0);
             if ended.is_none_or(|(end, _)| s < end) {
                 self.path.crossings.push(s);
             }
         }
         let turned = a.leg * b.y[index::DW] < 0.0;
         if turned {
-            self.path.turning = Some(locate_turning(&a, &b));
             let potential = &self.ray.potential;
+            self.path.turning = Some(locate_turning(a, b));
             self.path.turning_w = if a.leg > 0.0 {
                 potential.outer_turning_point()
             } else {
@@ -229,17 +228,6 @@ impl<'a, const N: usize> Run<'a, N> {
         false
     }
 
-    fn end_of_ray(&self, a: &Node, b: &Node) -> Option<(f64, Outcome)> {
-        let horizon = self.system.scale * self.ray.potential.horizon;
-        if b.y[index::W] >= horizon && b.y[index::DW] > 0.0 {
-            return Some((locate(a, b, index::W, horizon), Outcome::Captured));
-        }
-        if b.y[index::W] <= 0.0 && b.y[index::DW] < 0.0 {
-            return Some((locate(a, b, index::W, 0.0), Outcome::Escaped));
-        }
-        None
-    }
-
     /// On an outward leg g is written with −dw/dτ and the closed forms change sign; the
     /// constants take up the difference.
     fn change_leg(&mut self) {
@@ -251,6 +239,18 @@ impl<'a, const N: usize> Run<'a, N> {
         self.f = self.system.derivative(&self.y, self.leg);
         self.push_node();
     }
+}
+
+/// Where and how the ray ends in the step from `a` to `b`, if it does; `horizon` is b·w there.
+fn end_of_ray(a: &Node, b: &Node, horizon: f64) -> Option<(f64, Outcome)> {
+    let (w, rate) = (b.y[index::W], b.y[index::DW]);
+    if w >= horizon && rate > 0.0 {
+        return Some((locate(a, b, index::W, horizon), Outcome::Captured));
+    }
+    if w <= 0.0 && rate < 0.0 {
+        return Some((locate(a, b, index::W, 0.0), Outcome::Escaped));
+    }
+    None
 }
 
 /// atan2(y, x) at the start; on the axis the direction in which the ray leaves it.

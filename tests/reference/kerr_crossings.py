@@ -534,7 +534,7 @@ def rays():
 # --------------------------------------------------------------------------- independent checks (--check)
 
 
-def jacobi_r(a, lam, eta, rad, tau):
+def jacobi_r(rad, tau):
     """r(tau) of an escaping ray from its four real roots and Jacobi's sn (complete path, both legs)."""
     r1, r2, r3, r4 = rad.real
     m = (r3 - r2) * (r4 - r1) / ((r3 - r1) * (r4 - r2))
@@ -542,6 +542,13 @@ def jacobi_r(a, lam, eta, rad, tau):
     y = mp.sqrt((r3 - r1) * (r4 - r2)) / 2 * tau - mp.ellipf(mp.asin(x0), m)
     sn2 = mp.ellipfun('sn', y, m=m) ** 2
     return (r4 * (r3 - r1) - r3 * (r4 - r1) * sn2) / ((r3 - r1) - (r4 - r1) * sn2)
+
+
+def carlson_tau(rad, r):
+    """Mino time from infinity in to r, by Carlson's R_F and the four roots of R, complex or not."""
+    z = [mp.mpc(x) for x in rad.real] + [y for x in rad.cplx for y in (x, mp.conj(x))]
+    y = [mp.sqrt(r - x) for x in z]
+    return 2 * mp.elliprf(*[(y[i] * y[j] + y[k] * y[m]) ** 2 for i, j, k, m in ((0, 1, 2, 3), (0, 2, 1, 3), (0, 3, 1, 2))])
 
 
 def legendre_phi(pol, k):
@@ -571,7 +578,7 @@ def series_pow(p, e):
 
 def hamilton(ray, want, dps=44, w_start=mpf('0.001'), order=24):
     """Brute force: Hamilton's equations of the Kerr metric in Boyer-Lindquist coordinates, all six unseparated
-    (the Carter constant only fixes the initial momentum), by Gragg-Bulirsch-Stoer extrapolation, from r = 1000,
+    (the Carter constant only fixes the initial momentum), by Gragg-Bulirsch-Stoer extrapolation, from r >= 1000,
     where the state comes from power series in 1/r.  Returns `want` crossings (tau, r, phi, delay)."""
     with mp.workdps(dps):
         a, inc, alpha, beta = (mpf(x) for x in ray)
@@ -583,7 +590,7 @@ def hamilton(ray, want, dps=44, w_start=mpf('0.001'), order=24):
 
         def primitive(p, x):
             return mp.fsum(c * x ** (k + 1) / (k + 1) for k, c in enumerate(p))
-        ws = w_start * min(1, 5 / max(1, mp.hypot(alpha, beta)))
+        ws = w_start * min(1, 5 / max(1, mp.hypot(alpha, beta))) * min(1, 10 * si)
         # radial integrals from w = 0 to ws
         isw = series_pow(pad([1, 0, a * a - eta - lam ** 2, 2 * (eta + (lam - a) ** 2), -a * a * eta]), mpf(-1) / 2)
         iD = series_pow(pad([1, -2, a * a]), mpf(-1))
@@ -675,30 +682,33 @@ def hamilton(ray, want, dps=44, w_start=mpf('0.001'), order=24):
 
 
 def check():
-    worst = {'jacobi r': mpf(0), 'legendre phi': mpf(0)}
+    worst = {'jacobi r': mpf(0), 'carlson tau': mpf(0), 'legendre phi': mpf(0)}
     count = dict.fromkeys(worst, 0)
     brute = 0
     every = {}
+
+    def note(what, d, name, ray):
+        worst[what] = max(worst[what], d)
+        count[what] += 1
+        if d > 1e-27:
+            print(what, name, ray, mp.nstr(d, 3), flush=True)
+
     for name, *ray in rays():
         o = trace(ray, MAIN)
         with mp.workdps(MAIN[0]):
-            a = mpf(ray[0])
+            rad = o['rad']
+            d = abs(carlson_tau(rad, rad.r_min if o['escaped'] else rad.rp) / rad.half - 1)
             for k, (tau, r, phi, delay) in enumerate(o['cross'], 1):
-                pol, rad = o['pol'], o['rad']
+                pol = o['pol']
+                t = carlson_tau(rad, r)
+                d = max(d, min(abs(t - tau), abs(rad.mino_total - t - tau) if o['escaped'] else mp.inf) / tau)
                 if o['escaped'] and len(rad.real) == 4:
-                    d = abs(jacobi_r(a, o['lam'], o['eta'], rad, tau) / r - 1)
-                    worst['jacobi r'] = max(worst['jacobi r'], d)
-                    count['jacobi r'] += 1
-                    if d > 1e-27:
-                        print('jacobi r', name, ray, k, mp.nstr(d, 3), flush=True)
-                if 1 - pol.c < 1 and pol.c > 1e-14:
-                    d = abs(legendre_phi(pol, k) - pol.phi(k))
-                    worst['legendre phi'] = max(worst['legendre phi'], d)
-                    count['legendre phi'] += 1
-                    if d > 1e-27:
-                        print('legendre phi', name, ray, k, mp.nstr(d, 3), flush=True)
+                    note('jacobi r', abs(jacobi_r(rad, tau) / r - 1), name, ray)
+                if pol.c > 1e-14:
+                    note('legendre phi', abs(legendre_phi(pol, k) - pol.phi(k)), name, ray)
+            note('carlson tau', d, name, ray)
         every[name] = every.get(name, 0) + 1
-        if o['cross'] and (name == 'generic' and every[name] % 5 == 1 or name in
+        if o['cross'] and (name == 'generic' and every[name] % 7 == 1 or name in
                            ('beta_zero', 'inc_1e-3', 'spin_1', 'spin_-1', 'near_critical_-1e-6', 'near_critical_+1e-9') and every[name] % 3 == 2):
             cross = hamilton(ray, len(o['cross']))
             d = [max(abs(p[j] - q[j]) / max(1, abs(q[j])) for p, q in zip(cross, o['cross'])) for j in range(4)]

@@ -1,1 +1,13 @@
-//! tomo
+//! Emission around black holes: what a scene holds, how a pixel sums it up, and the files
+//! that pictures are kept in.
+//!
+//! Data flow: [`scene`] → rays ([`kerrlight_geodesic`]) → [`emission`] → [`transport`] →
+//! [`render`] → [`image`]. SI units enter in [`units`] only. Nothing here knows a path or
+//! a terminal: codecs work on bytes.
+
+pub mod emission;
+pub mod image;
+pub mod render;
+pub mod scene;
+pub mod transport;
+pub mod units;

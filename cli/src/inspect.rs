@@ -1,0 +1,54 @@
+//! `kerrlight inspect`: what a file holds.
+
+use crate::output;
+use anyhow::{Context, bail};
+use clap::Args;
+use kerrlight_tomo::image::{Picture, exr};
+use std::path::PathBuf;
+
+/// Arguments of `kerrlight inspect`.
+#[derive(Debug, Args)]
+pub struct Inspect {
+    /// An EXR file
+    file: PathBuf,
+}
+
+impl Inspect {
+    /// Prints what the file holds.
+    pub fn run(&self) -> anyhow::Result<()> {
+        let name = || self.file.display().to_string();
+        let bytes = output::read(&self.file)?;
+        if !bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+            bail!("{}: not an EXR file (its first bytes are not an EXR's)", name());
+        }
+        let (picture, attributes) =
+            exr::decode(&bytes).with_context(|| format!("{}: damaged or unusual EXR", name()))?;
+        println!("{}: EXR, {} x {} pixels", name(), picture.width, picture.height);
+        print_channels(&picture);
+        for (name, value) in &attributes {
+            if value.contains('\n') {
+                println!("\n{name}:");
+                value.trim_end().lines().for_each(|line| println!("    {line}"));
+            } else {
+                println!("\n{name}: {value}");
+            }
+        }
+        if attributes.is_empty() {
+            println!("\nno settings: not rendered by kerrlight, or stripped by another program");
+        }
+        Ok(())
+    }
+}
+
+fn print_channels(picture: &Picture) {
+    println!("\n{:<12}{:>15}{:>15}{:>15}{:>12}", "channel", "least", "most", "mean", "not finite");
+    for channel in &picture.channels {
+        let finite = || channel.values.iter().filter(|v| v.is_finite());
+        let (least, most) = finite()
+            .fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
+        let count = finite().count();
+        let mean = finite().map(|v| f64::from(*v)).sum::<f64>() / count.max(1) as f64;
+        let bad = channel.values.len() - count;
+        println!("{:<12}{least:>15.6e}{most:>15.6e}{mean:>15.6e}{bad:>12}", channel.name);
+    }
+}

@@ -1,0 +1,79 @@
+//! Files that appear whole or not at all.
+
+use anyhow::{Context, bail};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// A file to be written, checked before any work is done for it.
+#[derive(Debug, Clone)]
+pub struct Output {
+    path: PathBuf,
+    folder: PathBuf,
+}
+
+impl Output {
+    /// A place to write to, whose name must end in `.extension` (any, if empty).
+    pub fn new(path: &Path, extension: &str) -> anyhow::Result<Self> {
+        let shown = path.display();
+        if path.is_dir() {
+            bail!("output {shown} is a directory: give the name of a file in it");
+        }
+        let given = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+        if !extension.is_empty() && !given.eq_ignore_ascii_case(extension) {
+            bail!("output {shown} must end in .{extension}");
+        }
+        let folder = match path.parent() {
+            Some(parent) if parent != Path::new("") => parent.to_owned(),
+            _ => PathBuf::from("."),
+        };
+        if !folder.is_dir() {
+            bail!("output {shown}: there is no directory {}", folder.display());
+        }
+        let output = Output { path: path.to_owned(), folder };
+        // A read-only folder is better found out now than after the work.
+        output.beside()?;
+        Ok(output)
+    }
+
+    fn beside(&self) -> anyhow::Result<tempfile::NamedTempFile> {
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".kerrlight-");
+        // The permissions of any newly created file, which the process's mask narrows.
+        #[cfg(unix)]
+        let builder = {
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(std::fs::Permissions::from_mode(0o666))
+        };
+        builder
+            .tempfile_in(&self.folder)
+            .with_context(|| format!("cannot write to {}", self.folder.display()))
+    }
+
+    /// Writes the whole file beside its place and moves it there.
+    pub fn write(&self, bytes: &[u8]) -> anyhow::Result<()> {
+        let shown = self.path.display();
+        let mut file = self.beside()?;
+        file.write_all(bytes).with_context(|| format!("cannot write {shown}"))?;
+        file.as_file().sync_all().with_context(|| format!("cannot write {shown}"))?;
+        file.persist(&self.path).with_context(|| format!("cannot write {shown}"))?;
+        Ok(())
+    }
+
+    /// The place.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+/// The bytes of a file, with an error that names it.
+pub fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
+    if path.is_dir() {
+        bail!("{} is a directory, not a file", path.display());
+    }
+    std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))
+}
+
+/// The text of a file, with an error that names it.
+pub fn read_text(path: &Path) -> anyhow::Result<String> {
+    String::from_utf8(read(path)?).with_context(|| format!("{} is not UTF-8 text", path.display()))
+}

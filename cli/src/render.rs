@@ -1,0 +1,243 @@
+//! `kerrlight render`: from a scene to EXR and PNG.
+
+use crate::output::{self, Output};
+use anyhow::{Context, bail};
+use clap::{Args, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+use kerrlight_tomo::emission::sky::Panorama;
+use kerrlight_tomo::image::colormap::Colormap;
+use kerrlight_tomo::image::exr;
+use kerrlight_tomo::image::preview::{self, Look, Stretch};
+use kerrlight_tomo::render::{Rendered, render};
+use kerrlight_tomo::scene::{Scene, Sky, apply_override};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// The scene that is rendered when none is given.
+const BUILT_IN: &str = include_str!("built_in_scene.toml");
+
+/// Arguments of `kerrlight render`.
+#[derive(Debug, Args)]
+pub struct Render {
+    /// Scene file (TOML), or an EXR that kerrlight rendered, to render it again; without it
+    /// a built-in scene: Sgr A* with a flare and a disc
+    scene: Option<PathBuf>,
+    /// Where to write the EXR
+    #[arg(short, long, value_name = "FILE.exr")]
+    output: Option<PathBuf>,
+    /// Where to write a tone-mapped PNG
+    #[arg(long, value_name = "FILE.png")]
+    preview: Option<PathBuf>,
+    /// Change a value of the scene, e.g. hole.spin=0.5 or spot.0.phase_deg=90
+    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
+    overrides: Vec<String>,
+    /// Colours of the PNG: a map of the intensity, or `color` for the R, G, B channels
+    /// [default: afmhot-us, color where the scene has a sky]
+    #[arg(long, value_name = "MAP")]
+    colormap: Option<Colors>,
+    /// How intensity is stretched over the colour map
+    #[arg(long, default_value = "linear")]
+    stretch: StretchName,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Colors {
+    AfmhotUs,
+    Afmhot,
+    Inferno,
+    Magma,
+    Viridis,
+    Gray,
+    Color,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum StretchName {
+    Linear,
+    Sqrt,
+    Log,
+}
+
+/// A scene with where it came from.
+struct Source {
+    text: String,
+    name: String,
+    /// What relative paths in it are relative to.
+    folder: PathBuf,
+}
+
+impl Render {
+    /// Renders.
+    pub fn run(&self) -> anyhow::Result<()> {
+        let source = self.source()?;
+        let (text, scene) = self.scene(&source)?;
+        let (exr, png) = self.outputs(&source)?;
+        let picture = load_sky(&scene, &source.folder)?;
+        let start = Instant::now();
+        let bar = progress_bar(u64::from(scene.screen.height));
+        let rendered = render(&scene, picture, &|rows| {
+            bar.inc(rows as u64);
+            true
+        })
+        .with_context(|| source.name.clone())?;
+        bar.finish_and_clear();
+        if let Some(exr) = &exr {
+            let bytes = exr::encode(&rendered.picture, &attributes(&scene, &text, &rendered));
+            exr.write(&bytes.context("cannot encode the EXR")?)?;
+            println!("{}", exr.path().display());
+        }
+        if let Some(png) = &png {
+            let bytes = preview::encode_png(&rendered.picture, self.look(&scene));
+            png.write(&bytes.context("cannot encode the PNG")?)?;
+            println!("{}", png.path().display());
+        }
+        report(&scene, &rendered, start.elapsed().as_secs_f64());
+        Ok(())
+    }
+
+    fn source(&self) -> anyhow::Result<Source> {
+        let Some(path) = &self.scene else {
+            eprintln!("rendering the built-in scene: Sgr A* with a flare and a disc");
+            let name = "built-in scene".to_owned();
+            return Ok(Source { text: BUILT_IN.to_owned(), name, folder: PathBuf::from(".") });
+        };
+        let name = path.display().to_string();
+        let folder = path.parent().unwrap_or(Path::new(".")).to_owned();
+        let is_exr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
+        let text = if is_exr { scene_of_exr(path)? } else { output::read_text(path)? };
+        Ok(Source { text, name, folder })
+    }
+
+    /// The scene with all overrides, and its text.
+    fn scene(&self, source: &Source) -> anyhow::Result<(String, Scene)> {
+        // Without overrides first, so that an error in the file points at its own line.
+        let untouched = Scene::parse(&source.text);
+        if self.overrides.is_empty() {
+            return Ok((source.text.clone(), untouched.with_context(|| source.name.clone())?));
+        }
+        let mut text = source.text.clone();
+        for assignment in &self.overrides {
+            text = apply_override(&text, assignment).context("--set")?;
+        }
+        match Scene::parse(&text) {
+            Ok(scene) => Ok((text, scene)),
+            Err(error) => match untouched {
+                Err(_) => Err(error).with_context(|| source.name.clone()),
+                Ok(_) => Err(error).with_context(|| {
+                    format!("{} with --set {}", source.name, self.overrides.join(" --set "))
+                }),
+            },
+        }
+    }
+
+    fn outputs(&self, source: &Source) -> anyhow::Result<(Option<Output>, Option<Output>)> {
+        let check = |path: &Option<PathBuf>, extension| {
+            path.as_deref().map(|path| Output::new(path, extension)).transpose()
+        };
+        if self.output.is_some() || self.preview.is_some() {
+            return Ok((check(&self.output, "exr")?, check(&self.preview, "png")?));
+        }
+        // Beside the caller, named after the scene, and never over the scene itself.
+        let stem = match &self.scene {
+            Some(path) => path.file_stem().map(|s| s.to_string_lossy().into_owned()),
+            None => Some("kerrlight".to_owned()),
+        };
+        let stem = stem.unwrap_or_else(|| source.name.clone());
+        let exr = PathBuf::from(format!("{stem}.exr"));
+        if self.scene.as_ref().is_some_and(|scene| same_file(scene, &exr)) {
+            bail!("{} would be written over: give another name with -o", exr.display());
+        }
+        let png = PathBuf::from(format!("{stem}.png"));
+        Ok((check(&Some(exr), "exr")?, check(&Some(png), "png")?))
+    }
+
+    fn look(&self, scene: &Scene) -> Look {
+        let stretch = match self.stretch {
+            StretchName::Linear => Stretch::Linear,
+            StretchName::Sqrt => Stretch::Sqrt,
+            StretchName::Log => Stretch::Log,
+        };
+        let default = if scene.sky.is_some() { Colors::Color } else { Colors::AfmhotUs };
+        let map = match self.colormap.unwrap_or(default) {
+            Colors::Color => return Look::Color,
+            Colors::AfmhotUs => Colormap::AfmhotUs,
+            Colors::Afmhot => Colormap::Afmhot,
+            Colors::Inferno => Colormap::Inferno,
+            Colors::Magma => Colormap::Magma,
+            Colors::Viridis => Colormap::Viridis,
+            Colors::Gray => Colormap::Gray,
+        };
+        Look::Intensity(map, stretch)
+    }
+}
+
+fn same_file(a: &Path, b: &Path) -> bool {
+    match (a.canonicalize(), b.canonicalize()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => false,
+    }
+}
+
+fn scene_of_exr(path: &Path) -> anyhow::Result<String> {
+    let name = || path.display().to_string();
+    let (_, attributes) = exr::decode(&output::read(path)?).with_context(name)?;
+    let scene = attributes.into_iter().find(|(name, _)| name == "scene");
+    Ok(scene.with_context(|| format!("{} holds no scene of kerrlight", name()))?.1)
+}
+
+fn load_sky(scene: &Scene, folder: &Path) -> anyhow::Result<Option<Panorama>> {
+    let Some(Sky::Image(image)) = &scene.sky else { return Ok(None) };
+    let path = folder.join(&image.path);
+    let bytes = output::read(&path).context("`sky.image.path`")?;
+    let picture =
+        Panorama::decode(&bytes).with_context(|| format!("`sky.image.path` {}", path.display()))?;
+    Ok(Some(picture))
+}
+
+/// A bar with the time left on a terminal, nothing in a pipe.
+fn progress_bar(rows: u64) -> ProgressBar {
+    let style = "{bar:40} {percent:>3} %  {elapsed} gone, {eta} left";
+    let bar = ProgressBar::new(rows);
+    bar.with_style(ProgressStyle::with_template(style).unwrap_or(ProgressStyle::default_bar()))
+}
+
+/// What decided the picture.
+fn attributes(scene: &Scene, text: &str, rendered: &Rendered) -> exr::Attributes {
+    let entry = |name: &str, value: String| (name.to_owned(), value);
+    vec![
+        entry("version", env!("CARGO_PKG_VERSION").to_owned()),
+        entry("scene", text.to_owned()),
+        entry("scene_resolved", scene.to_toml()),
+        entry("intensity_unit", rendered.intensity_unit.to_owned()),
+        entry("intensity_per_scene_unit", rendered.unit_factor.to_string()),
+        entry("pixel_size_m", scene.pixel_size().to_string()),
+        entry("unresolved_rays", rendered.unresolved.to_string()),
+        entry("channels", CHANNELS.to_owned()),
+    ]
+}
+
+/// The legend of the channels, for whoever opens the file.
+const CHANNELS: &str = "R, G, B: linear light, emission in scene units and sky. \
+intensity: mean over the pixel, without the sky. \
+Of the pixel's central ray: redshift: intensity-weighted g = nu_obs/nu_em (0: no emission); \
+crossings: of the equatorial plane outside the horizon; \
+radius (M), azimuth (rad), delay (M): of the brightest contribution (radius 0: none); \
+outcome: 0 captured, 1 escaped, 2 opaque surface, 3 unresolved.";
+
+fn report(scene: &Scene, rendered: &Rendered, seconds: f64) {
+    let screen = &scene.screen;
+    let rays =
+        f64::from(screen.width) * f64::from(screen.height) * f64::from(screen.samples_per_pixel);
+    eprintln!(
+        "{} x {} pixels, {rays} rays in {seconds:.2} s ({:.0} rays/s)",
+        screen.width,
+        screen.height,
+        rays / seconds.max(1e-9)
+    );
+    if rendered.unresolved > 0 {
+        eprintln!(
+            "warning: {} rays unresolved (on the critical curve within rounding), shown as dark",
+            rendered.unresolved
+        );
+    }
+}

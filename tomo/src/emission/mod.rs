@@ -1,0 +1,7 @@
+//! What shines. A source knows its light in the gas frame and how its gas moves; how light
+//! adds up along a ray is the business of [`transport`](crate::transport).
+
+pub mod disc;
+pub mod page_thorne;
+pub mod sky;
+pub mod spot;

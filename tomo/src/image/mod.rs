@@ -1,0 +1,32 @@
+//! Pictures: columns of float channels, their EXR files, and tone-mapped previews.
+
+pub mod colormap;
+pub mod exr;
+pub mod preview;
+
+/// A named channel, row by row from the top.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channel {
+    /// Name as in the file.
+    pub name: String,
+    /// width × height values.
+    pub values: Vec<f32>,
+}
+
+/// A picture of float channels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// Pixels from left to right.
+    pub width: usize,
+    /// Pixels from top to bottom.
+    pub height: usize,
+    /// The channels.
+    pub channels: Vec<Channel>,
+}
+
+impl Picture {
+    /// The values of a channel.
+    pub fn channel(&self, name: &str) -> Option<&[f32]> {
+        self.channels.iter().find(|c| c.name == name).map(|c| c.values.as_slice())
+    }
+}

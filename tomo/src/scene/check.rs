@@ -1,0 +1,284 @@
+//! Ranges of a scene's values, and errors that point at the line.
+
+use super::{Disc, Scene, Sky, Spot};
+use kerrlight_geodesic::{Kerr, orbits};
+use toml_edit::{Document, Item};
+
+/// Why a scene text is not a scene.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SceneError {
+    /// Not TOML, an unknown or missing key, or a wrong type.
+    #[error("{0}")]
+    Syntax(String),
+    /// A value out of its range.
+    #[error("{}`{key}` = {value} is not allowed: {allowed}", line_prefix(*.line))]
+    Range {
+        /// Line of the text, counted from 1; `None` where the key is not written out.
+        line: Option<usize>,
+        /// Dotted path of the key.
+        key: String,
+        /// The value that was given.
+        value: String,
+        /// What would be allowed.
+        allowed: String,
+    },
+    /// An override that cannot be applied.
+    #[error("{0}")]
+    Override(String),
+}
+
+fn line_prefix(line: Option<usize>) -> String {
+    line.map(|line| format!("line {line}: ")).unwrap_or_default()
+}
+
+impl SceneError {
+    pub(super) fn syntax(error: &toml::de::Error) -> Self {
+        SceneError::Syntax(error.to_string().trim_end().to_owned())
+    }
+}
+
+/// A value out of range, not yet located.
+pub(super) struct Invalid {
+    key: String,
+    value: String,
+    allowed: String,
+}
+
+impl Invalid {
+    fn new(key: impl Into<String>, value: impl ToString, allowed: impl Into<String>) -> Self {
+        Invalid { key: key.into(), value: value.to_string(), allowed: allowed.into() }
+    }
+
+    pub(super) fn locate(self, text: &str) -> SceneError {
+        let line = line_of(text, &self.key);
+        SceneError::Range { line, key: self.key, value: self.value, allowed: self.allowed }
+    }
+}
+
+/// The line on which the value at a dotted path stands (or the nearest table around it).
+fn line_of(text: &str, key: &str) -> Option<usize> {
+    let document = Document::parse(text).ok()?;
+    let mut item: &Item = document.as_item();
+    let mut span = None;
+    for part in key.split('.') {
+        let next = match part.parse::<usize>() {
+            Ok(index) => match item {
+                Item::ArrayOfTables(tables) => {
+                    span = tables.get(index).and_then(|table| table.span()).or(span);
+                    let table = tables.get(index)?;
+                    return line_in_table(text, table, key, span);
+                }
+                _ => item.get(index),
+            },
+            Err(_) => item.get(part),
+        };
+        match next {
+            Some(next) => {
+                span = next.span().or(span);
+                item = next;
+            }
+            None => break,
+        }
+    }
+    span.map(|span| line_at(text, span.start))
+}
+
+fn line_in_table(
+    text: &str,
+    table: &toml_edit::Table,
+    key: &str,
+    around: Option<std::ops::Range<usize>>,
+) -> Option<usize> {
+    let last = key.rsplit('.').next()?;
+    let span = table.get(last).and_then(Item::span).or(around);
+    span.map(|span| line_at(text, span.start))
+}
+
+fn line_at(text: &str, offset: usize) -> usize {
+    text[..offset.min(text.len())].matches('\n').count() + 1
+}
+
+/// Refuses `value` unless `ok`.
+fn number(key: impl Into<String>, value: f64, ok: bool, allowed: &str) -> Result<(), Invalid> {
+    if ok { Ok(()) } else { Err(Invalid::new(key, value, allowed)) }
+}
+
+fn positive(key: impl Into<String>, value: f64) -> Result<(), Invalid> {
+    number(key, value, value > 0.0 && value.is_finite(), "a finite number above 0")
+}
+
+fn not_negative(key: impl Into<String>, value: f64) -> Result<(), Invalid> {
+    number(key, value, value >= 0.0 && value.is_finite(), "a finite number, 0 or above")
+}
+
+fn finite(key: impl Into<String>, value: f64) -> Result<(), Invalid> {
+    number(key, value, value.is_finite(), "a finite number")
+}
+
+/// Largest number of pixels of one picture: its channels stay below 3 GiB.
+const MOST_PIXELS: u64 = 1 << 26;
+
+pub(super) fn check(scene: &Scene) -> Result<(), Invalid> {
+    check_hole_and_observer(scene)?;
+    check_screen(scene)?;
+    check_effects(scene)?;
+    let tolerance = scene.tracer.tolerance;
+    number(
+        "tracer.tolerance",
+        tolerance,
+        (1e-14..=1e-2).contains(&tolerance),
+        "a number in [1e-14, 1e-2]",
+    )?;
+    // The spin was checked above.
+    let Ok(hole) = Kerr::new(scene.hole.spin) else { return Ok(()) };
+    if let Some(disc) = &scene.disc {
+        check_disc(disc, &hole)?;
+    }
+    for (k, spot) in scene.spot.iter().enumerate() {
+        check_spot(spot, k, &hole)?;
+    }
+    scene.sky.as_ref().map_or(Ok(()), check_sky)
+}
+
+fn check_hole_and_observer(scene: &Scene) -> Result<(), Invalid> {
+    let spin = scene.hole.spin;
+    number("hole.spin", spin, (-1.0..=1.0).contains(&spin), "a number in [-1, 1]")?;
+    positive("hole.mass_msun", scene.hole.mass_msun)?;
+    positive("hole.distance_kpc", scene.hole.distance_kpc)?;
+    let observer = &scene.observer;
+    let degrees = observer.inclination_deg;
+    let ok = (0.0..=180.0).contains(&degrees);
+    number("observer.inclination_deg", degrees, ok, "an angle in [0, 180]")?;
+    finite("observer.azimuth_deg", observer.azimuth_deg)?;
+    finite("observer.time", observer.time)?;
+    let allowed = "inf, or a radius of at least 10 (M)";
+    number("observer.radius", observer.radius, observer.radius >= 10.0, allowed)
+}
+
+fn check_screen(scene: &Scene) -> Result<(), Invalid> {
+    let screen = &scene.screen;
+    match (screen.field_of_view_m, screen.field_of_view_uas) {
+        (Some(m), None) => positive("screen.field_of_view_m", m)?,
+        (None, Some(angle)) => positive("screen.field_of_view_uas", angle)?,
+        (None, None) => {
+            let allowed = "give field_of_view_m or field_of_view_uas";
+            return Err(Invalid::new("screen.field_of_view_m", "(missing)", allowed));
+        }
+        (Some(_), Some(angle)) => {
+            let allowed = "give field_of_view_m or field_of_view_uas, not both";
+            return Err(Invalid::new("screen.field_of_view_uas", angle, allowed));
+        }
+    }
+    for (key, size) in [("screen.width", screen.width), ("screen.height", screen.height)] {
+        if !(1..=16_384).contains(&size) {
+            return Err(Invalid::new(key, size, "a whole number in [1, 16384]"));
+        }
+    }
+    if u64::from(screen.width) * u64::from(screen.height) > MOST_PIXELS {
+        let size = format!("{} (with width = {})", screen.height, screen.width);
+        return Err(Invalid::new("screen.height", size, "at most 67108864 pixels in all"));
+    }
+    let root = screen.samples_per_pixel.isqrt();
+    if root * root != screen.samples_per_pixel || !(1..=32).contains(&root) {
+        let allowed = "a square number in [1, 1024]: 1, 4, 9, 16, …";
+        return Err(Invalid::new("screen.samples_per_pixel", screen.samples_per_pixel, allowed));
+    }
+    check_reach(scene)?;
+    screen.total_flux_jy.map_or(Ok(()), |flux| positive("screen.total_flux_jy", flux))
+}
+
+/// Impact parameters so large that their squares lose the hole are no picture of it.
+fn check_reach(scene: &Scene) -> Result<(), Invalid> {
+    let m = scene.field_of_view_m();
+    let key = match scene.screen.field_of_view_m {
+        Some(_) => "screen.field_of_view_m",
+        None => "screen.field_of_view_uas",
+    };
+    let reach = m.max(scene.pixel_size() * f64::from(scene.screen.height));
+    number(key, m, reach <= 1e7, "a field of at most 1e7 M on either side")?;
+    let allowed = "a field inside the finite observer's sky: half its diagonal below 0.9 r";
+    let corner = 0.5 * m.hypot(scene.pixel_size() * f64::from(scene.screen.height));
+    number(key, m, corner < 0.9 * scene.observer.radius, allowed)
+}
+
+fn check_effects(scene: &Scene) -> Result<(), Invalid> {
+    let key = "effects.spectral_index";
+    match (scene.effects.redshift, scene.effects.spectral_index) {
+        (true, None) => {
+            let allowed = "needed with redshift = true (1 is the law of bolometric intensity)";
+            Err(Invalid::new(key, "(missing)", allowed))
+        }
+        (false, Some(index)) => {
+            Err(Invalid::new(key, index, "only with redshift = true: without it g is 1"))
+        }
+        (true, Some(index)) => {
+            number(key, index, (-10.0..=10.0).contains(&index), "a number in [-10, 10]")
+        }
+        (false, None) => Ok(()),
+    }
+}
+
+fn check_disc(disc: &Disc, hole: &Kerr) -> Result<(), Invalid> {
+    let isco = orbits::isco(hole);
+    if let Some(inner) = disc.inner_edge {
+        let ok = inner.is_finite() && inner >= isco;
+        let allowed = format!("a radius of at least the innermost stable orbit, {isco:.6}");
+        number("disc.inner_edge", inner, ok, &allowed)?;
+    }
+    let inner = disc.inner_edge.unwrap_or(isco);
+    let outer = disc.outer_edge;
+    let allowed = format!("a finite radius above the inner edge, {inner:.6}");
+    number("disc.outer_edge", outer, outer.is_finite() && outer > inner, &allowed)?;
+    not_negative("disc.peak_intensity", disc.peak_intensity)?;
+    check_color("disc.color", disc.color)
+}
+
+fn check_spot(spot: &Spot, k: usize, hole: &Kerr) -> Result<(), Invalid> {
+    let key = |name: &str| format!("spot.{k}.{name}");
+    let least = orbits::photon_orbit(hole).max(3.0);
+    let allowed = format!("a finite radius above {least:.4}, where circular orbits end");
+    let ok = spot.radius.is_finite() && spot.radius > least;
+    number(key("radius"), spot.radius, ok, &allowed)?;
+    finite(key("phase_deg"), spot.phase_deg)?;
+    let norm = spot.axis.iter().map(|x| x * x).sum::<f64>();
+    if !(norm.is_finite() && norm > 1e-30) {
+        let allowed = "three finite numbers that are not all 0";
+        return Err(Invalid::new(key("axis"), format!("{:?}", spot.axis), allowed));
+    }
+    let ok = spot.sigma >= 1e-3 && spot.sigma <= spot.radius;
+    number(key("sigma"), spot.sigma, ok, "a width in [0.001, radius]")?;
+    not_negative(key("peak_emissivity"), spot.peak_emissivity)?;
+    if let Some(since) = spot.sheared_since {
+        finite(key("sheared_since"), since)?;
+    }
+    check_color(&key("color"), spot.color)
+}
+
+fn check_color(key: &str, color: [f32; 3]) -> Result<(), Invalid> {
+    if color.iter().all(|c| (0.0..=1e6).contains(c)) {
+        return Ok(());
+    }
+    Err(Invalid::new(key, format!("{color:?}"), "three numbers in [0, 1e6]"))
+}
+
+fn check_sky(sky: &Sky) -> Result<(), Invalid> {
+    match sky {
+        Sky::Checker(checker) => {
+            let fields = 180.0 / checker.field_deg;
+            let ok = checker.field_deg > 0.5 && (fields - fields.round()).abs() < 1e-9;
+            let allowed = "an angle above 0.5 that divides 180";
+            number("sky.checker.field_deg", checker.field_deg, ok, allowed)?;
+            not_negative("sky.checker.brightness", checker.brightness)
+        }
+        Sky::Stars(stars) => {
+            if !(1..=10_000_000).contains(&stars.count) {
+                let allowed = "a whole number in [1, 10000000]";
+                return Err(Invalid::new("sky.stars.count", stars.count, allowed));
+            }
+            let ok = stars.radius_deg > 0.0 && stars.radius_deg <= 2.0;
+            number("sky.stars.radius_deg", stars.radius_deg, ok, "an angle in (0, 2]")?;
+            not_negative("sky.stars.brightness", stars.brightness)
+        }
+        Sky::Image(image) => not_negative("sky.image.brightness", image.brightness),
+    }
+}

@@ -1,0 +1,267 @@
+//! What is looked at: the hole, the observer, the screen, and what shines.
+//!
+//! A scene is a TOML text; [`Scene::parse`] checks every key, type and range, and
+//! [`Scene::to_toml`] writes the resolved scene with every default spelled out.
+
+mod check;
+mod overrides;
+
+pub use check::SceneError;
+pub use overrides::apply_override;
+
+use serde::{Deserialize, Serialize};
+
+/// A complete scene. Lengths and times in M = GM/c² unless a name says otherwise.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// The black hole.
+    pub hole: Hole,
+    /// Where it is seen from, and when.
+    pub observer: ObserverConfig,
+    /// What part of the sky is rendered, on which pixels.
+    pub screen: Screen,
+    /// Which effects are simulated.
+    #[serde(default)]
+    pub effects: Effects,
+    /// How rays are traced.
+    pub tracer: TracerConfig,
+    /// A thin equatorial disc.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub disc: Option<Disc>,
+    /// Hot spots on Keplerian orbits.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub spot: Vec<Spot>,
+    /// What the rays that escape see.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sky: Option<Sky>,
+}
+
+/// The black hole.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Hole {
+    /// Spin a/M ∈ \[−1, 1\]; negative: the hole turns against +z.
+    pub spin: f64,
+    /// Mass in solar masses.
+    pub mass_msun: f64,
+    /// Distance in kiloparsecs.
+    pub distance_kpc: f64,
+}
+
+/// Where the scene is seen from, and when.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObserverConfig {
+    /// Angle between +z (the spin axis for a > 0) and the line of sight, degrees in \[0, 180\].
+    pub inclination_deg: f64,
+    /// Azimuth of the observer in degrees.
+    #[serde(default)]
+    pub azimuth_deg: f64,
+    /// Boyer–Lindquist radius in M (screen coordinates stay constants of motion), or `inf`.
+    #[serde(default = "infinity")]
+    pub radius: f64,
+    /// Time of observation in M.
+    #[serde(default)]
+    pub time: f64,
+}
+
+fn infinity() -> f64 {
+    f64::INFINITY
+}
+
+/// What part of the sky is rendered. Exactly one of the two fields of view must be given.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Screen {
+    /// Width of the field of view in M.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub field_of_view_m: Option<f64>,
+    /// Width of the field of view in microarcseconds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub field_of_view_uas: Option<f64>,
+    /// Pixels from left to right.
+    pub width: u32,
+    /// Pixels from top to bottom; pixels are square.
+    pub height: u32,
+    /// Rays per pixel, a square number: a regular grid inside the pixel.
+    #[serde(default = "one")]
+    pub samples_per_pixel: u32,
+    /// Flux density to which the emission is scaled, in Jy.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub total_flux_jy: Option<f64>,
+}
+
+fn one() -> u32 {
+    1
+}
+
+/// Which effects are simulated. What is off is not computed.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Effects {
+    /// Gravitational redshift and Doppler shift: I = g^{3+α} I_em of a surface,
+    /// dI = g^{2+α} j ds of a volume, with the spectral index α.
+    #[serde(default)]
+    pub redshift: bool,
+    /// α of the emitted spectrum ν^{−α}; 1 is the law of bolometric intensity. Needed
+    /// when `redshift` is on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spectral_index: Option<f64>,
+    /// Emission at each point is that of the moment when the light passed it; off: of the
+    /// time of observation everywhere.
+    #[serde(default)]
+    pub slow_light: bool,
+}
+
+/// How rays are traced.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TracerConfig {
+    /// Which integrator.
+    pub integrator: Integrator,
+    /// Largest local error of a step.
+    pub tolerance: f64,
+}
+
+/// The integrators by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Integrator {
+    /// Adaptive Runge–Kutta 5(4) in Mino time.
+    Rk45Mino,
+}
+
+/// A thin disc in the equatorial plane with the flux profile of Page & Thorne (1974).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Disc {
+    /// Inner edge in M; without it the innermost stable circular orbit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inner_edge: Option<f64>,
+    /// Outer edge in M.
+    pub outer_edge: f64,
+    /// Intensity in the gas frame where the flux profile peaks.
+    pub peak_intensity: f64,
+    /// Whether the disc hides what is behind it.
+    pub opaque: bool,
+    /// Linear colour of its light in the R, G, B channels.
+    #[serde(default = "white")]
+    pub color: [f32; 3],
+}
+
+fn white() -> [f32; 3] {
+    [1.0; 3]
+}
+
+/// A Gaussian hot spot on a circular Keplerian orbit about any axis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spot {
+    /// Orbit radius in M.
+    pub radius: f64,
+    /// Angle along the orbit at time 0, in degrees from the image of the x axis when z is
+    /// tipped onto the orbit's axis along the shortest way.
+    pub phase_deg: f64,
+    /// Axis of the orbit; the spot turns about it right-handed.
+    #[serde(default = "up")]
+    pub axis: [f64; 3],
+    /// Standard deviation of the Gaussian in M.
+    pub sigma: f64,
+    /// Emissivity at the centre, in intensity per M.
+    pub peak_emissivity: f64,
+    /// Time since which differential rotation shears the spot; without it the spot keeps
+    /// its shape.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sheared_since: Option<f64>,
+    /// Linear colour of its light in the R, G, B channels.
+    #[serde(default = "white")]
+    pub color: [f32; 3],
+}
+
+fn up() -> [f64; 3] {
+    [0.0, 0.0, 1.0]
+}
+
+/// What the rays that escape see: `[sky.checker]`, `[sky.stars]` or `[sky.image]`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase", deny_unknown_fields)]
+pub enum Sky {
+    /// A checkered sphere with a colour per quadrant, to see how directions are bent.
+    Checker(Checker),
+    /// Random stars, the same for the same seed.
+    Stars(Stars),
+    /// An equirectangular picture as seen from inside with +z up: azimuth 0 at the centre
+    /// and growing to the left, +z along the upper edge.
+    Image(SkyImage),
+}
+
+/// A checkered sky.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Checker {
+    /// Side of a field in degrees; must divide 180.
+    pub field_deg: f64,
+    /// Factor on the linear colours.
+    pub brightness: f64,
+}
+
+/// Random stars.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stars {
+    /// Mean number of stars on the whole sphere.
+    pub count: u32,
+    /// Angular radius of a star's disc in degrees.
+    pub radius_deg: f64,
+    /// Factor on the linear colours.
+    pub brightness: f64,
+    /// Seed of the pattern.
+    pub seed: u64,
+}
+
+/// A picture as sky.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SkyImage {
+    /// PNG, JPEG or HDR file, relative to the scene file.
+    pub path: String,
+    /// Factor on the linear colours.
+    pub brightness: f64,
+}
+
+impl Scene {
+    /// The scene in a TOML text.
+    ///
+    /// # Errors
+    /// On syntax, unknown or missing keys, wrong types and values out of range: with the
+    /// line, the key and what is allowed.
+    pub fn parse(text: &str) -> Result<Self, SceneError> {
+        let scene: Scene = toml::from_str(text).map_err(|e| SceneError::syntax(&e))?;
+        check::check(&scene).map_err(|invalid| invalid.locate(text))?;
+        Ok(scene)
+    }
+
+    /// The resolved scene as TOML, defaults included.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("plain tables always serialise") // no maps with odd keys
+    }
+
+    /// Width of a pixel in M.
+    pub fn pixel_size(&self) -> f64 {
+        self.field_of_view_m() / f64::from(self.screen.width)
+    }
+
+    /// Width of the field of view in M.
+    pub fn field_of_view_m(&self) -> f64 {
+        let uas = crate::units::gravitational_angle(self.hole.mass_msun, self.hole.distance_kpc);
+        match (self.screen.field_of_view_m, self.screen.field_of_view_uas) {
+            (Some(m), _) => m,
+            (None, Some(angle)) => angle / uas,
+            (None, None) => f64::NAN, // excluded by `parse`
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

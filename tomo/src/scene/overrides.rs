@@ -1,0 +1,47 @@
+//! `key.path=value` overrides, applied to the text of a scene so that what ran can be
+//! written down.
+
+use super::SceneError;
+use toml_edit::{DocumentMut, Item, Table, Value};
+
+/// The scene text with `key.path=value` applied, e.g. `hole.spin=0.5`,
+/// `spot.0.phase_deg=90`. A value that is no TOML is taken as a string.
+///
+/// # Errors
+/// If the text is not TOML, or the override has no `=`, an empty key or leads through
+/// something that is not a table.
+pub fn apply_override(text: &str, assignment: &str) -> Result<String, SceneError> {
+    let fail = |why: &str| SceneError::Override(format!("`{assignment}`: {why}"));
+    let (path, value) =
+        assignment.split_once('=').ok_or_else(|| fail("is not of the form key.path=value"))?;
+    let keys: Vec<&str> = path.trim().split('.').map(str::trim).collect();
+    if keys.iter().any(|key| key.is_empty()) {
+        return Err(fail("has an empty key"));
+    }
+    let mut document: DocumentMut =
+        text.parse().map_err(|e: toml_edit::TomlError| SceneError::Syntax(e.to_string()))?;
+    let (last, parents) = keys.split_last().ok_or_else(|| fail("has no key"))?;
+    let mut table: &mut Table = document.as_table_mut();
+    let mut parts = parents.iter().peekable();
+    while let Some(key) = parts.next() {
+        let item = table.entry(key).or_insert_with(|| Item::Table(Table::new()));
+        table = match item {
+            Item::Table(table) => table,
+            Item::ArrayOfTables(tables) => {
+                let index = parts.next().and_then(|part| part.parse::<usize>().ok());
+                let count = tables.len();
+                index
+                    .and_then(|index| tables.get_mut(index))
+                    .ok_or_else(|| fail(&format!("`{key}` needs an index below {count}")))?
+            }
+            _ => return Err(fail(&format!("`{key}` is not a table"))),
+        };
+    }
+    let value = value.trim();
+    let parsed = value.parse::<Value>().unwrap_or_else(|_| Value::from(value));
+    if matches!(table.get(last), Some(Item::Table(_) | Item::ArrayOfTables(_))) {
+        return Err(fail("names a table, not a value"));
+    }
+    table.insert(last, Item::Value(parsed));
+    Ok(document.to_string())
+}
