@@ -23,25 +23,32 @@ impl Inspect {
         }
         let (picture, attributes) =
             exr::decode(&bytes).with_context(|| format!("{}: damaged or unusual EXR", name()))?;
-        println!("{}: EXR, {} x {} pixels", name(), picture.width, picture.height);
-        print_channels(&picture);
+        let mut text =
+            format!("{}: EXR, {} x {} pixels\n\n", name(), picture.width, picture.height);
+        text += &channel_table(&picture);
         for (name, value) in &attributes {
-            if value.contains('\n') {
-                println!("\n{name}:");
-                value.trim_end().lines().for_each(|line| println!("    {line}"));
-            } else {
-                println!("\n{name}: {value}");
-            }
+            text += &format!("\n{name}:{}\n", indented(value));
         }
         if attributes.is_empty() {
-            println!("\nno settings: not rendered by kerrlight, or stripped by another program");
+            text += "\nno settings: not rendered by kerrlight, or stripped by another program\n";
         }
-        Ok(())
+        output::print(&text)
     }
 }
 
-fn print_channels(picture: &Picture) {
-    println!("\n{:<12}{:>15}{:>15}{:>15}{:>12}", "channel", "least", "most", "mean", "not finite");
+/// A short value on the same line, a long one below, indented.
+fn indented(value: &str) -> String {
+    if !value.contains('\n') {
+        return format!(" {value}");
+    }
+    value.trim_end().lines().map(|line| format!("\n    {line}")).collect()
+}
+
+fn channel_table(picture: &Picture) -> String {
+    let mut table = format!(
+        "{:<12}{:>15}{:>15}{:>15}{:>12}\n",
+        "channel", "least", "most", "mean", "not finite"
+    );
     for channel in &picture.channels {
         let finite = || channel.values.iter().filter(|v| v.is_finite());
         let (least, most) = finite()
@@ -49,6 +56,8 @@ fn print_channels(picture: &Picture) {
         let count = finite().count();
         let mean = finite().map(|v| f64::from(*v)).sum::<f64>() / count.max(1) as f64;
         let bad = channel.values.len() - count;
-        println!("{:<12}{least:>15.6e}{most:>15.6e}{mean:>15.6e}{bad:>12}", channel.name);
+        let name = &channel.name;
+        table += &format!("{name:<12}{least:>15.6e}{most:>15.6e}{mean:>15.6e}{bad:>12}\n");
     }
+    table
 }

@@ -65,6 +65,14 @@ impl Output {
     }
 }
 
+/// Prints to standard output; a reader who has closed the pipe has seen enough.
+pub fn print(text: &str) -> anyhow::Result<()> {
+    match std::io::stdout().write_all(text.as_bytes()) {
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        result => result.context("cannot write to standard output"),
+    }
+}
+
 /// The bytes of a file, with an error that names it.
 pub fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
     if path.is_dir() {

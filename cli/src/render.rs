@@ -84,12 +84,12 @@ impl Render {
         if let Some(exr) = &exr {
             let bytes = exr::encode(&rendered.picture, &attributes(&scene, &text, &rendered));
             exr.write(&bytes.context("cannot encode the EXR")?)?;
-            println!("{}", exr.path().display());
+            output::print(&format!("{}\n", exr.path().display()))?;
         }
         if let Some(png) = &png {
             let bytes = preview::encode_png(&rendered.picture, self.look(&scene));
             png.write(&bytes.context("cannot encode the PNG")?)?;
-            println!("{}", png.path().display());
+            output::print(&format!("{}\n", png.path().display()))?;
         }
         report(&scene, &rendered, start.elapsed().as_secs_f64());
         Ok(())
@@ -181,8 +181,8 @@ fn same_file(a: &Path, b: &Path) -> bool {
 fn scene_of_exr(path: &Path) -> anyhow::Result<String> {
     let name = || path.display().to_string();
     let (_, attributes) = exr::decode(&output::read(path)?).with_context(name)?;
-    let scene = attributes.into_iter().find(|(name, _)| name == "scene");
-    Ok(scene.with_context(|| format!("{} holds no scene of kerrlight", name()))?.1)
+    let scene = attributes.get("scene").cloned();
+    scene.with_context(|| format!("{} holds no scene of kerrlight", name()))
 }
 
 fn load_sky(scene: &Scene, folder: &Path) -> anyhow::Result<Option<Panorama>> {
@@ -204,7 +204,7 @@ fn progress_bar(rows: u64) -> ProgressBar {
 /// What decided the picture.
 fn attributes(scene: &Scene, text: &str, rendered: &Rendered) -> exr::Attributes {
     let entry = |name: &str, value: String| (name.to_owned(), value);
-    vec![
+    [
         entry("version", env!("CARGO_PKG_VERSION").to_owned()),
         entry("scene", text.to_owned()),
         entry("scene_resolved", scene.to_toml()),
@@ -214,6 +214,7 @@ fn attributes(scene: &Scene, text: &str, rendered: &Rendered) -> exr::Attributes
         entry("unresolved_rays", rendered.unresolved.to_string()),
         entry("channels", CHANNELS.to_owned()),
     ]
+    .into()
 }
 
 /// The legend of the channels, for whoever opens the file.

@@ -74,7 +74,7 @@ impl Trace {
         let bytes = writer.into_inner().map_err(|e| e.into_error())?;
         match output {
             Some(output) => output.write(&bytes),
-            None => Ok(std::io::Write::write_all(&mut std::io::stdout(), &bytes)?),
+            None => output::print(core::str::from_utf8(&bytes)?),
         }
     }
 
@@ -139,10 +139,26 @@ fn digits(x: f64) -> String {
     format!("{x:.16e}")
 }
 
+/// The line of a record, counted from 1; the reader's own count leaves out skipped lines.
+fn line_of(bytes: &[u8], record: &csv::StringRecord) -> u64 {
+    let start = record.position().map_or(0, |p| p.byte() as usize).min(bytes.len());
+    let mut line = bytes[..start].iter().filter(|b| **b == b'\n').count();
+    for text in bytes[start..].split(|b| *b == b'\n') {
+        if !(text.starts_with(b"#") || text.trim_ascii().is_empty()) {
+            break;
+        }
+        line += 1;
+    }
+    line as u64 + 1
+}
+
 impl Table {
     fn parse(bytes: &[u8]) -> anyhow::Result<Self> {
-        let mut reader =
-            csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(bytes);
+        let mut reader = csv::ReaderBuilder::new()
+            .flexible(true)
+            .comment(Some(b'#'))
+            .trim(csv::Trim::All)
+            .from_reader(bytes);
         let header = reader.headers().context("no header line")?.clone();
         let find = |name: &str| header.iter().position(|column| column == name);
         let need = |name: &str| find(name).with_context(|| format!("there is no column `{name}`"));
@@ -156,7 +172,10 @@ impl Table {
         let mut rays = Vec::new();
         for record in reader.records() {
             let record = record?;
-            let line = record.position().map_or(0, csv::Position::line);
+            let line = line_of(bytes, &record);
+            if record.len() != header.len() {
+                bail!("line {line}: {} fields, but {} in the header", record.len(), header.len());
+            }
             let value = |column: usize| {
                 let text = record.get(column).unwrap_or_default();
                 text.parse::<f64>().with_context(|| {

@@ -1,6 +1,7 @@
 //! Matter on circular orbits, and the redshift factor g = ν_obs/ν_em of its light.
 
 use crate::kerr::Kerr;
+use crate::orbits;
 use crate::path::PathPoint;
 
 /// g = 1/(uᵗ(1 − Ωλ)) for a circular equatorial geodesic that turns about +z at radius r;
@@ -16,14 +17,13 @@ use crate::path::PathPoint;
 /// assert!((keplerian_redshift(&hole, 6.0, lambda).unwrap() - 2f64.sqrt()).abs() < 1e-14);
 /// ```
 pub fn keplerian_redshift(hole: &Kerr, r: f64, lambda: f64) -> Option<f64> {
-    let (a, root) = (hole.spin(), r.sqrt());
-    let cube = r * root;
-    let norm = r * r * r - 3.0 * r * r + 2.0 * a * cube;
+    let cube = r * r.sqrt();
+    let norm = cube * orbits::photon_orbit_distance(hole, r);
     if norm <= 0.0 || r <= hole.horizon() {
         return None;
     }
     // uᵗ = (r^{3/2} + a)/√norm and Ω = 1/(r^{3/2} + a).
-    Some(norm.sqrt() / (cube + a - lambda))
+    Some(norm.sqrt() / (cube + hole.spin() - lambda))
 }
 
 /// g of matter that moves rigidly at constant r with angular velocity vector `omega`
@@ -62,7 +62,7 @@ pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Inclination, Observer, Path, Tracer, Want, orbits};
+    use crate::{Inclination, Observer, Path, Tracer, Want};
 
     /// Edge-on extremes at the ISCO: the photon's turning point is the emitter's radius,
     /// where λ takes its largest magnitude.

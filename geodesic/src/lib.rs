@@ -30,6 +30,8 @@ mod kerr;
 mod mino;
 mod observer;
 pub mod orbits;
+#[cfg(feature = "rayon")]
+mod parallel;
 mod path;
 pub mod quadrature;
 mod radial;

@@ -140,6 +140,13 @@ impl<T: Scalar> System<T> {
         f
     }
 
+    /// How many roundings the denominator g is blurred by: its largest term over itself.
+    #[inline(always)]
+    pub fn blur<const N: usize>(&self, y: &[T; N], leg: T) -> T {
+        let (w, dw) = (y[index::W], y[index::DW]);
+        T::constant(1.0) / (T::constant(1.0) + self.gauge * w * w + leg * dw)
+    }
+
     /// Second derivatives of I_φ and I_t/b, for the dense output; zero where not asked for.
     #[inline(always)]
     pub fn second_derivative<const N: usize>(&self, y: &[T; N], leg: T) -> [T; 2] {

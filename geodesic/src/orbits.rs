@@ -27,7 +27,19 @@ pub fn keplerian_angular_velocity(hole: &Kerr, r: f64) -> f64 {
 /// photon orbit (Bardeen, Press & Teukolsky 1972, eq. 2.12).
 pub fn circular_energy(hole: &Kerr, r: f64) -> f64 {
     let (a, x) = (hole.spin(), r.sqrt());
-    (x * x * x - 2.0 * x + a) / (x.powf(1.5) * (x * x * x - 3.0 * x + 2.0 * a).sqrt())
+    if a == 1.0 {
+        // Both factors below share x − 1.
+        return (x * x + x - 1.0) / (x.powf(1.5) * (x + 2.0).sqrt());
+    }
+    let numerator = (x - 1.0) * (x * x + x - 1.0) - (1.0 - a);
+    numerator / (x.powf(1.5) * photon_orbit_distance(hole, r).sqrt())
+}
+
+/// x³ − 3x + 2a with x = √r, which vanishes on the photon orbit and is positive outside of
+/// it, without cancellation near x = 1 for a → 1.
+pub fn photon_orbit_distance(hole: &Kerr, r: f64) -> f64 {
+    let x = r.sqrt();
+    (x - 1.0) * (x - 1.0) * (x + 2.0) - 2.0 * (1.0 - hole.spin())
 }
 
 /// 1 − E at the innermost stable orbit: what a thin disc radiates of the mass it accretes.

@@ -20,8 +20,9 @@ pub enum Outcome {
 /// Why a ray was given up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Unresolved {
-    /// The step limit was reached: the ray circles at a spherical photon orbit, as one
-    /// does that lies on the critical curve within rounding.
+    /// It lies on the critical curve within rounding and circles on a photon orbit.
+    PhotonOrbit,
+    /// The limit on the number of steps was reached.
     StepLimit,
 }
 
@@ -308,6 +309,10 @@ fn rotate(v: [f64; 3], sin: f64, cos: f64) -> [f64; 3] {
 /// sense of `sign`: a step past a pole turns by up to π and a little, any other by little.
 pub(crate) fn turn(sign: f64, from: [f64; 2], to: [f64; 2]) -> f64 {
     use core::f64::consts::{FRAC_PI_2, TAU};
+    if from == [0.0, 0.0] {
+        // From the axis itself the direction of departure is the starting angle.
+        return 0.0;
+    }
     let cross = from[0] * to[1] - from[1] * to[0];
     let dot = from[0] * to[0] + from[1] * to[1];
     let angle = sign * cross.atan2(dot);

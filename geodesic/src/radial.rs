@@ -11,17 +11,22 @@ pub struct RadialPotential {
     pub coefficients: [f64; 3],
     /// w at the horizon.
     pub horizon: f64,
-    /// The minimum of W between infinity and the horizon, if there is one.
+    /// The minimum of W between infinity and the horizon, if there is one there or at most a
+    /// little behind the horizon.
     pub barrier: Option<Barrier>,
 }
 
-/// The minimum of W outside the horizon: where it is negative the ray turns.
+/// The minimum of W outside the horizon: where it is negative the ray turns. If the minimum
+/// lies a little behind the horizon, as for rays next to the straight part of an extremal
+/// hole's critical curve, it is the horizon itself, where W is a square.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Barrier {
     /// Where W is smallest.
     pub w: f64,
     /// The smallest value, rounded from twice the working precision.
     pub height: f64,
+    /// dW/dw there: 0, but at a horizon with the minimum behind it.
+    pub slope: f64,
     /// Coefficients of (w − w_min)², ³ and ⁴.
     pub expansion: [f64; 3],
 }
@@ -30,7 +35,7 @@ impl Barrier {
     /// W at a distance x = w − w_min, without cancellation near the minimum.
     fn value(&self, x: f64) -> f64 {
         let [c2, c3, c4] = self.expansion;
-        self.height + x * x * (c2 + x * (c3 + x * c4))
+        self.height + x * (self.slope + x * (c2 + x * (c3 + x * c4)))
     }
 
     /// The distance from the minimum at which W differs from its least value by as much
@@ -66,7 +71,7 @@ impl RadialPotential {
             let x = w - barrier.w;
             if x.abs() < 0.25 * barrier.w {
                 let [c2, c3, c4] = barrier.expansion;
-                return x * (2.0 * c2 + x * (3.0 * c3 + x * 4.0 * c4));
+                return barrier.slope + x * (2.0 * c2 + x * (3.0 * c3 + x * 4.0 * c4));
             }
         }
         let [a, b, c] = self.coefficients;
@@ -132,14 +137,21 @@ fn barrier(coefficients: &[Double; 3], horizon: f64) -> Option<Barrier> {
         return None;
     }
     let w = -4.0 * a / (3.0 * b + discriminant.sqrt());
-    if w >= horizon || w.is_nan() {
+    if w.is_nan() || w > 1.1 * horizon {
         return None;
     }
+    let behind = w > horizon * (1.0 - 8.0 * f64::EPSILON);
+    let w = if behind { horizon } else { w };
     let x = Double::from(w);
     let [da, db, dc] = *coefficients;
     let height = (Double::from(1.0) + x * x * (da + x * (db + x * dc))).value();
-    let expansion = [a + w * (3.0 * b + w * 6.0 * c), b + w * 4.0 * c, c];
-    Some(Barrier { w, height, expansion })
+    let slope = x * (da.scale(2.0) + x * (db + db.scale(2.0) + x * dc.scale(4.0)));
+    Some(Barrier {
+        w,
+        height: if behind { height.max(0.0) } else { height },
+        slope: if behind { slope.value() } else { 0.0 },
+        expansion: [a + w * (3.0 * b + w * 6.0 * c), b + w * 4.0 * c, c],
+    })
 }
 
 #[cfg(test)]

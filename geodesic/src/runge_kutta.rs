@@ -74,11 +74,10 @@ fn argument<M: Method<S>, const N: usize, const S: usize, const I: usize>(
     h: f64,
 ) -> [f64; N] {
     let mut slope = [0.0; N];
-    for i in 0..I {
-        let weight = M::TABLEAU.stages[I][i];
+    for (k, weight) in k.iter().zip(M::TABLEAU.stages[I]).take(I) {
         if weight != 0.0 {
-            for n in 0..N {
-                slope[n] += weight * k[i][n];
+            for (slope, k) in slope.iter_mut().zip(k) {
+                *slope += weight * k;
             }
         }
     }
@@ -108,9 +107,9 @@ pub(crate) fn step<M: Method<S>, const N: usize, const S: usize>(
     }
     stages!(1 2 3 4 5 6);
     let mut error = [0.0; N];
-    for i in 0..S {
-        for n in 0..N {
-            error[n] += h * M::TABLEAU.error[i] * k[i][n];
+    for (k, weight) in k.iter().zip(M::TABLEAU.error) {
+        for (error, k) in error.iter_mut().zip(k) {
+            *error += h * weight * k;
         }
     }
     Step { y: end, f: k[S - 1], error }

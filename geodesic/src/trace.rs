@@ -6,7 +6,7 @@ use crate::kerr::Kerr;
 use crate::mino::{FULL, System, has_azimuth, has_time, index};
 use crate::observer::Ray;
 use crate::path::{Node, Outcome, Path, Unresolved, turn};
-use crate::runge_kutta::{Control, DormandPrince5, Method, step};
+use crate::runge_kutta::{Control, DormandPrince5, Method, Step, step};
 
 /// What a ray is asked for beyond r and θ. What is not asked for is not integrated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -110,11 +110,16 @@ impl<'a, const N: usize> Run<'a, N> {
         let mut h = (0.5 * tolerance.powf(0.2)).min(LONGEST_STEP);
         for _ in 0..self.tracer.max_steps {
             let trial = step::<DormandPrince5, N, 7>(&self.system, &self.y, &self.f, self.leg, h);
-            let error = self.error_norm(&trial.y, &trial.error);
+            let error = self.error_norm(&trial, h);
             let factor = control.factor(error);
             if error <= 1.0 {
                 self.accept(trial.y, trial.f, h);
                 if self.handle_events() {
+                    return;
+                }
+                if let Some(outcome) = self.stalled(h) {
+                    self.path.end = self.s;
+                    self.path.outcome = outcome;
                     return;
                 }
             }
@@ -124,8 +129,21 @@ impl<'a, const N: usize> Run<'a, N> {
         self.path.outcome = Outcome::Unresolved(Unresolved::StepLimit);
     }
 
+    /// What becomes of a ray that no longer moves in radius within rounding.
+    fn stalled(&self, h: f64) -> Option<Outcome> {
+        let (w, rate) = (self.y[index::W], self.y[index::DW]);
+        if rate.abs() * h > 2.0 * f64::EPSILON * w || self.f[index::DW].abs() > 1e-12 {
+            return None;
+        }
+        let horizon = self.system.scale * self.ray.potential.horizon;
+        let at_horizon = w >= horizon * (1.0 - 1e-12);
+        let lost = Outcome::Unresolved(Unresolved::PhotonOrbit);
+        Some(if at_horizon { Outcome::Captured } else { lost })
+    }
+
     /// The largest local error in units of what the tolerance allows.
-    fn error_norm(&self, y: &[f64; N], error: &[f64; N]) -> f64 {
+    fn error_norm(&self, trial: &Step<N>, h: f64) -> f64 {
+        let (y, error) = (&trial.y, &trial.error);
         let mut radial = 1.0;
         if let Some(barrier) = &self.ray.potential.barrier {
             let b = self.system.scale;
@@ -137,8 +155,17 @@ impl<'a, const N: usize> Run<'a, N> {
         let radial = (self.tracer.tolerance * radial).max(rounding);
         let other = self.tracer.tolerance.max(rounding);
         let mut norm = (error[index::W].abs().max(error[index::DW].abs())) / radial;
-        for e in &error[index::U..] {
+        for e in error.iter().take(N.min(index::AZIMUTH)).skip(index::U) {
             norm = norm.max(e.abs() / other);
+        }
+        if has_azimuth(N) || has_time(N) {
+            // These grow without bound where g vanishes, at the horizon of an extremal hole,
+            // and cannot be better than g's own rounding.
+            let blur = rounding * h * self.system.blur(y, self.leg).abs();
+            for k in (if has_azimuth(N) { index::AZIMUTH } else { N - 1 })..N {
+                let allowed = other * y[k].abs().max(1.0) + blur * trial.f[k].abs();
+                norm = norm.max(error[k].abs() / allowed);
+            }
         }
         // A step that left the numbers' range is rejected like any other bad one.
         if norm.is_nan() { f64::INFINITY } else { norm }
@@ -244,8 +271,10 @@ impl<'a, const N: usize> Run<'a, N> {
 /// Where and how the ray ends in the step from `a` to `b`, if it does; `horizon` is b·w there.
 fn end_of_ray(a: &Node, b: &Node, horizon: f64) -> Option<(f64, Outcome)> {
     let (w, rate) = (b.y[index::W], b.y[index::DW]);
-    if w >= horizon && rate > 0.0 {
-        return Some((locate(a, b, index::W, horizon), Outcome::Captured));
+    // Within rounding: a ray on the straight part of an extremal hole's critical curve
+    // approaches the horizon but never reaches it.
+    if w >= horizon * (1.0 - 64.0 * f64::EPSILON) && rate >= 0.0 {
+        return Some((locate(a, b, index::W, horizon.min(w)), Outcome::Captured));
     }
     if w <= 0.0 && rate < 0.0 {
         return Some((locate(a, b, index::W, 0.0), Outcome::Escaped));
@@ -284,4 +313,93 @@ fn locate_turning(a: &Node, b: &Node) -> f64 {
         if radial.slope(mid) * sign > 0.0 { lo = mid } else { hi = mid }
     }
     a.s + h * 0.5 * (lo + hi)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Inclination, Observer};
+
+    fn trace(spin: f64, degrees: f64, alpha: f64, beta: f64, tolerance: f64) -> Path {
+        let hole = Kerr::new(spin).unwrap();
+        let observer = Observer::at_infinity(Inclination::from_degrees(degrees).unwrap());
+        let ray = observer.ray(&hole, alpha, beta).unwrap();
+        let mut path = Path::new();
+        Tracer::new(tolerance).unwrap().trace(&hole, &ray, Want::ALL, &mut path);
+        path
+    }
+
+    /// λ = 2a around an extremal hole: the straight part of the critical curve, |β| < √3.
+    /// Beside it rays fall or turn.
+    #[test]
+    fn exact_fates_on_the_straight_part_of_an_extremal_critical_curve() {
+        for tolerance in [1e-12, 1e-9, 1e-6] {
+            for beta in [0.0, 0.4, 0.8, 1.6] {
+                for (alpha, outcome) in [
+                    (2.0, Outcome::Captured),
+                    (2.0 * (1.0 + 1e-10), Outcome::Escaped),
+                    (2.0 * (1.0 - 1e-10), Outcome::Captured),
+                ] {
+                    for spin in [1.0, -1.0] {
+                        let path = trace(spin, 90.0, -spin * alpha, beta, tolerance);
+                        assert_eq!(path.outcome(), outcome, "a = {spin}: ({alpha}, {beta})");
+                        assert!(path.steps() < 20_000);
+                    }
+                }
+            }
+            assert_eq!(trace(1.0, 90.0, -2.0, 1.8, tolerance).outcome(), Outcome::Escaped);
+        }
+    }
+
+    /// A ray that leaves a finite observer returns to the observer's radius after twice the
+    /// Mino time of its turning point, and reaches infinity later.
+    #[test]
+    fn exact_symmetry_about_the_turning_point() {
+        let hole = Kerr::new(0.7).unwrap();
+        let inclination = Inclination::from_degrees(40.0).unwrap();
+        let observer = Observer::at_radius(inclination, 50.0).unwrap();
+        let ray = observer.ray(&hole, 7.0, 4.0).unwrap();
+        let mut path = Path::new();
+        Tracer::new(1e-12).unwrap().trace(&hole, &ray, Want::ALL, &mut path);
+        let (turning, r_min) = path.turning_point().unwrap();
+        assert!((path.at(turning).radius() / r_min - 1.0).abs() < 1e-12);
+        for part in [0.0, 0.3, 0.8] {
+            let (before, after) = (path.at(part * turning), path.at((2.0 - part) * turning));
+            assert!((before.radius() / after.radius() - 1.0).abs() < 1e-10);
+            // Rates repeat too: azimuth and time are odd about the turning point but for
+            // their polar parts, which a hole without spin does not have.
+        }
+        assert!((path.at(0.0).radius() / 50.0 - 1.0).abs() < 1e-14);
+        assert_eq!((path.at(0.0).azimuth, path.at(0.0).delay.abs() < 1e-12), (0.0, true));
+        let mut intervals = Vec::new();
+        path.intervals_within(10.0, 20.0, &mut intervals);
+        assert_eq!(intervals.len(), 2);
+        for (interval, radii) in intervals.iter().zip([[20.0, 10.0], [10.0, 20.0]]) {
+            for (mino_time, r) in interval.iter().zip(radii) {
+                assert!((path.at(*mino_time).radius() / r - 1.0).abs() < 1e-10);
+            }
+        }
+        path.intervals_within(0.5 * r_min, 20.0, &mut intervals);
+        assert_eq!(intervals.len(), 1);
+    }
+
+    /// What is asked for beside it does not change r and θ.
+    #[test]
+    fn exact_same_positions_whatever_is_wanted() {
+        let hole = Kerr::new(0.94).unwrap();
+        let observer = Observer::at_infinity(Inclination::from_degrees(60.0).unwrap());
+        let ray = observer.ray(&hole, -4.0, 5.0).unwrap();
+        let tracer = Tracer::new(1e-11).unwrap();
+        let positions = [(false, false), (false, true), (true, false), (true, true)].map(|w| {
+            let mut path = Path::new();
+            tracer.trace(&hole, &ray, Want { azimuth: w.0, time: w.1 }, &mut path);
+            path.at(0.4 * path.mino_total())
+        });
+        for p in &positions[1..] {
+            assert!((p.radius() / positions[0].radius() - 1.0).abs() < 1e-9);
+            assert!((p.cos_theta() - positions[0].cos_theta()).abs() < 1e-9);
+        }
+        assert_eq!((positions[0].azimuth, positions[0].delay), (0.0, 0.0));
+        assert!(positions[1].delay != 0.0 && positions[2].azimuth != 0.0);
+    }
 }

@@ -1,1 +1,10 @@
-//! t
+//! Tests that touch two crates or the binary, named by their authority: exact_ (closed
+//! form), paper_ (a published number), code_ (another code's number), regress_ (own past).
+
+mod bad_input;
+mod command_line;
+mod documents;
+mod kerr_references;
+mod lensing;
+mod pictures;
+mod support;

@@ -6,7 +6,7 @@ use kerrlight_geodesic::{Kerr, orbits};
 /// The flux profile around one hole, for a disc that turns about +z.
 #[derive(Debug, Clone)]
 pub struct PageThorne {
-    spin: f64,
+    hole: Kerr,
     isco: f64,
     /// Roots of x³ − 3x + 2a and the weights of their logarithms.
     logarithms: Vec<(f64, f64)>,
@@ -32,7 +32,7 @@ impl PageThorne {
             let merged = 1.0 - spin.abs() < EXTREMAL && (x.abs() - 1.0).abs() < 1e-6;
             (!merged).then_some((x, weight))
         });
-        PageThorne { spin, isco: orbits::isco(hole), logarithms: logarithms.collect() }
+        PageThorne { hole: *hole, isco: orbits::isco(hole), logarithms: logarithms.collect() }
     }
 
     /// Energy radiated per unit time and area by one face at radius r, in units G = c = M =
@@ -41,12 +41,13 @@ impl PageThorne {
         if r <= self.isco {
             return 0.0;
         }
-        let (x, x0, a) = (r.sqrt(), self.isco.sqrt(), self.spin);
+        let (x, x0, a) = (r.sqrt(), self.isco.sqrt(), self.hole.spin());
         let mut bracket = (x - x0) - 1.5 * a * (x / x0).ln();
         for (root, weight) in &self.logarithms {
             bracket -= weight * ((x - root) / (x0 - root)).ln();
         }
-        let flux = 3.0 * bracket / (r * r * (x * x * x - 3.0 * x + 2.0 * a));
+        let distance = orbits::photon_orbit_distance(&self.hole, r);
+        let flux = 3.0 * bracket / (r * r * distance);
         // Next to the inner edge the bracket is a difference of equals.
         flux.max(0.0) / (8.0 * core::f64::consts::PI)
     }

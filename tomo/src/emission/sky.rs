@@ -256,7 +256,7 @@ mod tests {
         let mut random = Hash(99);
         let (n, mut lit) = (200_000, [0.0f64; 2]);
         for _ in 0..n {
-            let (z, phi) = (2.0 * random.unit() - 1.0, 6.283_185 * random.unit());
+            let (z, phi) = (2.0 * random.unit() - 1.0, std::f64::consts::TAU * random.unit());
             let s = (1.0f64 - z * z).sqrt();
             let half = usize::from(z > 0.0);
             lit[half] += f64::from(u8::from(sky.look([s * phi.cos(), s * phi.sin(), z])[1] > 0.0));

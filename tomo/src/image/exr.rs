@@ -6,16 +6,22 @@ use exr::prelude::{
     Image, Layer, LayerAttributes, LineOrder, ReadChannels, ReadLayers, Text, Vec2, WritableImage,
     read,
 };
+use std::collections::BTreeMap;
 use std::io::Cursor;
 
-/// Prefix of kerrlight's own attributes.
-pub const PREFIX: &str = "kerrlight.";
+/// The name of the one attribute that holds all settings, as a TOML table. (The encoder
+/// writes several attributes in random order, and the same picture should be the same bytes.)
+const ATTRIBUTE: &str = "kerrlight";
 
-/// Text attributes by name.
-pub type Attributes = Vec<(String, String)>;
+/// Settings by name.
+pub type Attributes = BTreeMap<String, String>;
 
-/// The bytes of an EXR file with the channels of `picture` and text attributes (names are
-/// prefixed with [`PREFIX`]).
+/// OpenEXR keeps text as UTF-8; the crate's own conversion knows Latin-1 only.
+fn utf8(text: &str) -> Text {
+    Text::from_slice_unchecked(text.as_bytes())
+}
+
+/// The bytes of an EXR file with the channels of `picture` and settings.
 ///
 /// # Errors
 /// If the picture is empty, or on a failure of the encoder.
@@ -25,12 +31,13 @@ pub fn encode(picture: &Picture, attributes: &Attributes) -> exr::error::Result<
         .iter()
         .map(|c| AnyChannel::new(c.name.as_str(), FlatSamples::F32(c.values.clone())))
         .collect();
-    let mut layer = LayerAttributes::default();
-    layer.software_name = Some(Text::from(concat!("kerrlight ", env!("CARGO_PKG_VERSION"))));
-    for (name, value) in attributes {
-        let name = Text::from(format!("{PREFIX}{name}").as_str());
-        layer.other.insert(name, AttributeValue::Text(Text::from(value.as_str())));
-    }
+    let mut layer = LayerAttributes {
+        software_name: Some(Text::from(concat!("kerrlight ", env!("CARGO_PKG_VERSION")))),
+        ..LayerAttributes::default()
+    };
+    let settings =
+        toml::to_string_pretty(attributes).map_err(|e| Error::Invalid(e.to_string().into()))?;
+    layer.other.insert(Text::from(ATTRIBUTE), AttributeValue::Text(utf8(&settings)));
     let encoding = Encoding {
         compression: Compression::ZIP16,
         blocks: Blocks::ScanLines,
@@ -43,7 +50,7 @@ pub fn encode(picture: &Picture, attributes: &Attributes) -> exr::error::Result<
     Ok(bytes)
 }
 
-/// The channels and kerrlight's text attributes of the first layer of an EXR file.
+/// The channels and kerrlight's settings of the first layer of an EXR file.
 ///
 /// # Errors
 /// If the bytes are no EXR file, or a channel is subsampled.
@@ -66,19 +73,13 @@ pub fn decode(bytes: &[u8]) -> exr::error::Result<(Picture, Attributes)> {
         }
         channels.push(Channel { name: channel.name.to_string(), values });
     }
-    let mut attributes: Attributes = layer
-        .attributes
-        .other
-        .iter()
-        .filter_map(|(name, value)| match value {
-            AttributeValue::Text(text) => {
-                let name = name.to_string();
-                name.strip_prefix(PREFIX).map(|name| (name.to_owned(), text.to_string()))
-            }
-            _ => None,
-        })
-        .collect();
-    attributes.sort();
+    let attributes = match layer.attributes.other.get(&Text::from(ATTRIBUTE)) {
+        Some(AttributeValue::Text(text)) => {
+            let settings = String::from_utf8_lossy(text.as_slice());
+            toml::from_str(&settings).map_err(|e| Error::Invalid(e.to_string().into()))?
+        }
+        _ => Attributes::new(),
+    };
     Ok((Picture { width, height, channels }, attributes))
 }
 
@@ -96,7 +97,8 @@ mod tests {
             .map(|(k, name)| Channel { name: (*name).to_owned(), values: values(k) })
             .collect();
         let picture = Picture { width: 3, height: 2, channels: channels.clone() };
-        let attributes = vec![("scene".to_owned(), "[hole]\nspin = 0.9 # µ\n".to_owned())];
+        let scene = "[hole]\nspin = 0.9 # µ – Ω\n";
+        let attributes = Attributes::from([("scene".to_owned(), scene.to_owned())]);
         let bytes = encode(&picture, &attributes).unwrap();
         let (back, text) = decode(&bytes).unwrap();
         channels.sort_by(|a, b| a.name.cmp(&b.name));

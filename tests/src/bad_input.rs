@@ -1,0 +1,132 @@
+//! Bad input gets one clear message, exit code 2, and nothing written.
+
+use crate::support::{kerrlight, root};
+use std::path::Path;
+
+/// The message of a run that must fail, leaving `folder` as it was.
+fn fail(folder: &Path, arguments: &[&str]) -> String {
+    let list = || {
+        let mut files: Vec<_> =
+            std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name()).collect();
+        files.sort();
+        files
+    };
+    let before = list();
+    let output = kerrlight(folder, arguments);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+    assert_eq!(list(), before, "{arguments:?} left files");
+    assert!(output.stdout.is_empty(), "{arguments:?}");
+    assert!(!message.contains("panicked"), "{message}");
+    message
+}
+
+#[test]
+fn files_that_cannot_be_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let message = fail(path, &["render", "nowhere.toml"]);
+    assert!(message.contains("nowhere.toml") && message.contains("No such file"), "{message}");
+    assert!(fail(path, &["render", "."]).contains("directory"));
+    assert!(fail(path, &["inspect", "nowhere.exr"]).contains("nowhere.exr"));
+    std::fs::write(path.join("text.exr"), "no picture").unwrap();
+    assert!(fail(path, &["inspect", "text.exr"]).contains("not an EXR"));
+    std::fs::write(path.join("binary.toml"), [0xff, 0xfe, 0x00]).unwrap();
+    assert!(fail(path, &["render", "binary.toml"]).contains("UTF-8"));
+}
+
+#[test]
+fn outputs_that_cannot_be_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    std::fs::create_dir(path.join("folder.exr")).unwrap();
+    assert!(fail(path, &["render", "-o", "folder.exr"]).contains("is a directory"));
+    assert!(fail(path, &["render", "-o", "no/such/a.exr"]).contains("no directory no/such"));
+    assert!(fail(path, &["render", "-o", "a.jpg"]).contains("must end in .exr"));
+    assert!(fail(path, &["render", "--preview", "a.exr"]).contains("must end in .png"));
+}
+
+#[test]
+fn scenes_that_are_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let good = std::fs::read_to_string(root().join("scenes/disc_face_on.toml")).unwrap();
+    let run = |text: &str| {
+        std::fs::write(path.join("scene.toml"), text).unwrap();
+        fail(path, &["render", "scene.toml", "-o", "a.exr"])
+    };
+    let line = |find: &str| good.lines().position(|l| l.contains(find)).unwrap() + 1;
+    let message = run(&good.replace("spin = 0.0", "spin = 1.2"));
+    let expected =
+        format!("line {}: `hole.spin` = 1.2 is not allowed: a number in [-1, 1]", line("spin ="));
+    assert!(message.contains("scene.toml") && message.contains(&expected), "{message}");
+    assert!(run(&good.replace("width = 512", "width = 0")).contains("`screen.width` = 0"));
+    assert!(run(&good.replace("width = 512", "width = 1000000000")).contains("[1, 16384]"));
+    assert!(
+        run(&good
+            .replace("width = 512", "width = 16384")
+            .replace("height = 512", "height = 16384"))
+        .contains("67108864")
+    );
+    assert!(run(&good[..good.len() / 2 + 3]).contains("scene.toml"));
+    let message = run(&good.replace("opaque = true", "opake = true"));
+    assert!(
+        message.contains(&format!("line {}", line("opaque"))) && message.contains("opake"),
+        "{message}"
+    );
+    assert!(
+        run(&good.replace("outer_edge = 30.0", "outer_edge = \"wide\"")).contains("outer_edge")
+    );
+    // Truncated anywhere, a scene is an error or a scene, never a panic.
+    for end in (0..good.len()).step_by(17).filter(|end| good.is_char_boundary(*end)) {
+        let _ = kerrlight_tomo::scene::Scene::parse(&good[..end]);
+    }
+}
+
+#[test]
+fn skies_that_are_no_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let good = std::fs::read_to_string(root().join("scenes/sky_image.toml")).unwrap();
+    std::fs::write(path.join("scene.toml"), good).unwrap();
+    let message = fail(path, &["render", "scene.toml"]);
+    assert!(message.contains("sky.image.path") && message.contains("graticule.png"), "{message}");
+    std::fs::write(path.join("graticule.png"), b"\x89PNG\r\n\x1a\n garbage").unwrap();
+    let message = fail(path, &["render", "scene.toml"]);
+    assert!(message.contains("graticule.png") && message.contains("picture"), "{message}");
+}
+
+#[test]
+fn overrides_and_arguments_that_make_no_sense() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    assert!(fail(path, &["render", "--set", "hole.spin"]).contains("key.path=value"));
+    let message = fail(path, &["render", "--set", "hole.spin=2"]);
+    assert!(message.contains("--set hole.spin=2") && message.contains("[-1, 1]"), "{message}");
+    assert!(fail(path, &["render", "--set", "hole.color=2"]).contains("color"));
+    fail(path, &["render", "--colormap", "jet"]);
+    fail(path, &["paint"]);
+    fail(path, &["render", "--threads", "0"]);
+}
+
+#[test]
+fn tables_of_rays_that_are_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let run = |text: &str| {
+        std::fs::write(path.join("rays.csv"), text).unwrap();
+        fail(path, &["trace", "--rays", "rays.csv", "-o", "out.csv"])
+    };
+    assert!(run("spin,alpha,beta\n").contains("inclination_rad"));
+    assert!(run("spin,inclination_deg,alpha\n").contains("`beta`"));
+    let head = "spin,inclination_deg,alpha,beta\n# comment\n";
+    let message = run(&format!("{head}0.5,60,1,2\n0.5,60,x,2\n"));
+    assert!(message.contains("line 4") && message.contains("`alpha`"), "{message}");
+    let message = run(&format!("{head}1.5,60,1,2\n"));
+    assert!(message.contains("line 3") && message.contains("spin = 1.5"), "{message}");
+    assert!(run(&format!("{head}0.5,60,nan,2\n")).contains("alpha"));
+    assert!(run(&format!("{head}0.5,200,1,2\n")).contains("inclination"));
+    assert!(run(&format!("{head}0.5,60,1\n")).contains("line 3"));
+    std::fs::write(path.join("rays.csv"), head).unwrap();
+    assert!(fail(path, &["trace", "--rays", "rays.csv", "--tolerance", "1"]).contains("tolerance"));
+}

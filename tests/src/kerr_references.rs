@@ -1,0 +1,78 @@
+//! Rays against 25-digit references from the separated Boyer–Lindquist integrals (the
+//! recipe is tests/reference/kerr_crossings.py), which share no equation with the tracer.
+
+use crate::support::{root, succeed};
+use std::collections::HashMap;
+
+/// Rows of a CSV text as maps from column to text.
+fn rows(text: &str) -> Vec<HashMap<String, String>> {
+    let mut lines = text.lines().filter(|line| !line.starts_with('#') && !line.is_empty());
+    let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
+    lines
+        .map(|line| {
+            let cells = line.split(',').map(str::to_owned);
+            header.iter().map(|name| (*name).to_owned()).zip(cells).collect()
+        })
+        .collect()
+}
+
+fn number(row: &HashMap<String, String>, column: &str) -> Option<f64> {
+    row.get(column).filter(|text| !text.is_empty()).map(|text| text.parse().expect("a number"))
+}
+
+/// Largest errors over all rays: [relative r and r_min, Mino time, azimuth, delay].
+fn compare(tolerance: &str) -> [f64; 4] {
+    let reference = root().join("tests/reference/kerr_crossings.csv");
+    let expected = rows(&std::fs::read_to_string(&reference).expect("the references"));
+    let file = reference.to_str().expect("a UTF-8 path");
+    let arguments = ["trace", "--rays", file, "--crossings", "3", "--tolerance", tolerance];
+    let found = rows(&succeed(&root(), &arguments));
+    assert_eq!(expected.len(), found.len());
+    assert!(expected.len() > 250);
+    let mut worst = [0.0f64; 4];
+    for (expected, found) in expected.iter().zip(&found) {
+        for column in ["outcome", "crossings"] {
+            assert_eq!(expected[column], found[column], "{expected:?}");
+        }
+        // Where the input's own rounding moves the answer by more, it is no measure.
+        let rounding = 30.0 * number(expected, "cond").expect("cond");
+        let mut add = |kind: usize, error: f64| {
+            assert!(!error.is_nan(), "{expected:?}");
+            worst[kind] = worst[kind].max(error - rounding);
+        };
+        let pair = |column: &str| Some((number(expected, column)?, number(found, column)?));
+        assert_eq!(expected["r_min"].is_empty(), found["r_min"].is_empty(), "{expected:?}");
+        for k in 1..=3 {
+            let Some((r, r_found)) = pair(&format!("r_{k}")) else { continue };
+            add(0, (r_found / r - 1.0).abs());
+            let (tau, tau_found) = pair(&format!("mino_{k}")).expect("a Mino time");
+            add(1, (tau_found / tau - 1.0).abs());
+            let (phi, phi_found) = pair(&format!("phi_{k}")).expect("an azimuth");
+            let miss = phi_found - phi;
+            add(2, (miss - std::f64::consts::TAU * (miss / std::f64::consts::TAU).round()).abs());
+            let (delay, delay_found) = pair(&format!("delay_{k}")).expect("a delay");
+            add(3, (delay_found - delay).abs() / delay.abs().max(1.0));
+        }
+    }
+    worst
+}
+
+/// Bounds are twice to three times what was measured.
+#[test]
+fn code_mpmath_crossings_at_the_default_tolerance() {
+    let [r, mino_time, azimuth, delay] = compare("1e-12");
+    assert!(r < 5e-11, "{r:e}");
+    assert!(mino_time < 2e-13, "{mino_time:e}");
+    assert!(azimuth < 5e-12, "{azimuth:e}");
+    assert!(delay < 5e-11, "{delay:e}");
+}
+
+/// Local errors 10⁴ times larger: global errors follow.
+#[test]
+fn code_mpmath_crossings_follow_the_tolerance() {
+    let [r, mino_time, azimuth, delay] = compare("1e-8");
+    assert!(r < 5e-7, "{r:e}");
+    assert!(mino_time < 1e-9, "{mino_time:e}");
+    assert!(azimuth < 5e-8, "{azimuth:e}");
+    assert!(delay < 5e-7, "{delay:e}");
+}

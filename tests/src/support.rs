@@ -1,0 +1,81 @@
+//! What several tests need.
+
+use kerrlight_tomo::image::Picture;
+use kerrlight_tomo::scene::{Scene, apply_override};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+/// The root of the workspace.
+pub fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("a workspace member").to_owned()
+}
+
+/// The built binary, in the profile of the tests.
+fn binary() -> &'static Path {
+    static BINARY: OnceLock<PathBuf> = OnceLock::new();
+    BINARY.get_or_init(|| {
+        let mut cargo = Command::new(env!("CARGO"));
+        cargo.current_dir(root()).args(["build", "--quiet", "--package", "kerrlight"]);
+        if !cfg!(debug_assertions) {
+            cargo.arg("--release");
+        }
+        assert!(cargo.status().expect("cargo runs").success(), "the binary builds");
+        // This test is <target>/<profile>/deps/all-….
+        let test = std::env::current_exe().expect("the test's own path");
+        let profile = test.ancestors().nth(2).expect("a profile directory");
+        profile.join(format!("kerrlight{}", std::env::consts::EXE_SUFFIX))
+    })
+}
+
+/// Runs the binary in `folder`.
+pub fn kerrlight(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(binary()).current_dir(folder).args(arguments).output().expect("the binary runs")
+}
+
+/// Standard output of a run that must succeed.
+pub fn succeed(folder: &Path, arguments: &[&str]) -> String {
+    let output = kerrlight(folder, arguments);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {errors}");
+    String::from_utf8(output.stdout).expect("text")
+}
+
+/// All scene files of the repository with their texts.
+pub fn scenes() -> Vec<(PathBuf, String)> {
+    let mut files: Vec<PathBuf> = std::fs::read_dir(root().join("scenes"))
+        .expect("the folder of scenes")
+        .map(|entry| entry.expect("an entry").path())
+        .filter(|path| path.extension().is_some_and(|e| e == "toml"))
+        .collect();
+    files.sort();
+    assert!(files.len() >= 6, "scenes are found");
+    files
+        .into_iter()
+        .map(|path| {
+            let text = std::fs::read_to_string(&path).expect("a readable scene");
+            (path, text)
+        })
+        .collect()
+}
+
+/// A scene with overrides.
+pub fn scene(text: &str, overrides: &[&str]) -> Scene {
+    let text = overrides.iter().fold(text.to_owned(), |text, assignment| {
+        apply_override(&text, assignment).expect("an override that fits")
+    });
+    Scene::parse(&text).unwrap_or_else(|e| panic!("{overrides:?}: {e}"))
+}
+
+/// Renders a scene whose sky picture, if any, lies in the folder of scenes.
+pub fn render(scene: &Scene) -> Picture {
+    use kerrlight_tomo::scene::Sky;
+    let sky = match &scene.sky {
+        Some(Sky::Image(image)) => {
+            let bytes = std::fs::read(root().join("scenes").join(&image.path)).expect("sky");
+            Some(kerrlight_tomo::emission::sky::Panorama::decode(&bytes).expect("a picture"))
+        }
+        _ => None,
+    };
+    kerrlight_tomo::render::render(scene, sky, &|_| true).expect("a picture").picture
+}
