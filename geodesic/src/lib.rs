@@ -22,7 +22,10 @@
 //! Data flow: [`Observer`] → [`Ray`] (constants of motion) → [`Tracer`] → [`Path`]
 //! (outcome, events, position at any Mino time) → [`Flow`](flow) (redshift factors).
 
+#[cfg(feature = "affine")]
+mod affine;
 mod compensated;
+mod dual;
 mod error;
 pub mod flow;
 mod hermite;
@@ -39,6 +42,9 @@ mod runge_kutta;
 mod scalar;
 mod trace;
 
+#[cfg(feature = "affine")]
+pub use affine::{AffinePath, AffineTracer};
+pub use dual::Dual;
 pub use error::OutOfRange;
 pub use kerr::Kerr;
 pub use observer::{Inclination, Observer, Ray};

@@ -14,6 +14,9 @@ pub trait Scalar:
 {
     /// The constant `x`.
     fn constant(x: f64) -> Self;
+
+    /// The square root.
+    fn sqrt(self) -> Self;
 }
 
 impl Scalar for f64 {
@@ -21,11 +24,21 @@ impl Scalar for f64 {
     fn constant(x: f64) -> Self {
         x
     }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f64::sqrt(self)
+    }
 }
 
 impl Scalar for f32 {
     #[inline(always)]
     fn constant(x: f64) -> Self {
         x as f32
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f32::sqrt(self)
     }
 }
