@@ -41,6 +41,8 @@ impl<T: Scalar, const D: usize> Sub for Dual<T, D> {
     }
 }
 
+// The product and quotient rules have sums in them.
+#[allow(clippy::suspicious_arithmetic_impl)]
 impl<T: Scalar, const D: usize> Mul for Dual<T, D> {
     type Output = Self;
     fn mul(self, o: Self) -> Self {
@@ -49,6 +51,7 @@ impl<T: Scalar, const D: usize> Mul for Dual<T, D> {
     }
 }
 
+#[allow(clippy::suspicious_arithmetic_impl)]
 impl<T: Scalar, const D: usize> Div for Dual<T, D> {
     type Output = Self;
     fn div(self, o: Self) -> Self {
