@@ -24,6 +24,7 @@
 
 #[cfg(feature = "affine")]
 mod affine;
+mod camera;
 mod compensated;
 mod dual;
 mod error;
@@ -44,6 +45,7 @@ mod trace;
 
 #[cfg(feature = "affine")]
 pub use affine::{AffinePath, AffineTracer};
+pub use camera::{Camera, Motion};
 pub use dual::Dual;
 pub use error::OutOfRange;
 pub use kerr::Kerr;

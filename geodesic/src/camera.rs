@@ -1,0 +1,273 @@
+//! Observers at a finite radius with a local frame and a perspective lens.
+
+use crate::compensated::Double;
+use crate::error::{OutOfRange, check};
+use crate::kerr::Kerr;
+use crate::observer::{Inclination, Ray};
+use crate::radial::RadialPotential;
+
+/// How a local observer moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Motion {
+    /// At rest with respect to infinity; outside the ergosphere only.
+    Static,
+    /// Zero angular momentum (Bardeen 1970): carried along with the rotation of space.
+    Zamo,
+    /// Turning about +z with Ω = 1/(r^{3/2} + a), a geodesic in the equatorial plane.
+    Keplerian,
+    /// Falling from rest at infinity without angular momentum: E = 1, L = Q = 0.
+    FreeFall,
+}
+
+/// A camera at a finite radius.
+///
+/// Its frame is the orthonormal tetrad of the zero-angular-momentum observer at its place,
+/// e_r, e_θ, e_φ along the Boyer–Lindquist coordinates (Bardeen, Press & Teukolsky 1972,
+/// eq. 3.2), boosted without rotation to the camera's velocity. It looks towards the hole,
+/// along −e_r; `right` is +e_φ and `up` is −e_θ, as for Bardeen's screen at infinity. A
+/// pinhole lens maps the point (x, y) of the picture plane at distance 1 to the direction
+/// forward + x right + y up; a field of view ψ spans |x| ≤ tan(ψ/2).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Camera {
+    hole: Kerr,
+    inclination: Inclination,
+    radius: f64,
+    azimuth: f64,
+    /// Velocity in the tetrad of the zero-angular-momentum observer, along e_r and e_φ.
+    velocity: [f64; 2],
+    /// Its lapse, angular velocity ω, and √(A/Σ).
+    lapse: f64,
+    drag: f64,
+    girth: f64,
+}
+
+impl Camera {
+    /// A camera around `hole` at `radius` > r₊, polar angle `inclination` and azimuth 0.
+    ///
+    /// # Errors
+    /// If the radius is not finite or not outside the horizon, or if nothing can move as
+    /// asked for at this place (a static camera in the ergosphere, a Keplerian one inside
+    /// the photon orbit).
+    pub fn new(
+        hole: &Kerr,
+        inclination: Inclination,
+        radius: f64,
+        motion: Motion,
+    ) -> Result<Self, OutOfRange> {
+        let ok = radius.is_finite() && radius > hole.horizon();
+        check("camera radius", radius, ok, "a finite number outside the horizon")?;
+        let (a, r, s) = (hole.spin(), radius, inclination.sin());
+        let sigma = hole.sigma(r, inclination.cos());
+        let delta = hole.delta(r);
+        let area = (r * r + a * a).powi(2) - a * a * delta * s * s;
+        let lapse = (delta * sigma / area).sqrt();
+        let (drag, girth) = (2.0 * a * r / area, (area / sigma).sqrt());
+        let circular = |rate: f64| [0.0, girth * s * (rate - drag) / lapse];
+        let velocity = match motion {
+            Motion::Zamo => [0.0, 0.0],
+            Motion::Static => circular(0.0),
+            Motion::Keplerian => circular(1.0 / (r * r.sqrt() + a)),
+            Motion::FreeFall => [-((1.0 - lapse) * (1.0 + lapse)).sqrt(), 0.0],
+        };
+        let speed = velocity[0].hypot(velocity[1]);
+        let allowed = "a radius at which this motion is slower than light";
+        check("camera radius", radius, speed < 1.0, allowed)?;
+        Ok(Camera { hole: *hole, inclination, radius, azimuth: 0.0, velocity, lapse, drag, girth })
+    }
+
+    /// The same camera at azimuth `azimuth` (radians).
+    pub fn with_azimuth(mut self, azimuth: f64) -> Self {
+        self.azimuth = azimuth;
+        self
+    }
+
+    /// The photon that arrives at the point (x, y) of the picture plane.
+    ///
+    /// # Errors
+    /// If x or y is not finite, or if the photon has no positive energy at infinity (some
+    /// directions inside the ergosphere).
+    pub fn ray(&self, x: f64, y: f64) -> Result<Ray, OutOfRange> {
+        check("x", x, x.is_finite(), "a finite number")?;
+        check("y", y, y.is_finite(), "a finite number")?;
+        let norm = (1.0 + x * x + y * y).sqrt();
+        self.arriving_from([-1.0 / norm, -y / norm, x / norm])
+    }
+
+    /// The photon that arrives from the unit vector `direction` = (e_r, e_θ, e_φ) of the
+    /// camera's frame.
+    ///
+    /// # Errors
+    /// As for [`ray`](Self::ray).
+    pub fn arriving_from(&self, direction: [f64; 3]) -> Result<Ray, OutOfRange> {
+        let [k_r, k_theta, k_phi] = self.momentum(direction);
+        let a = self.hole.spin();
+        let (s, c) = (self.inclination.sin(), self.inclination.cos());
+        // p_φ/sin θ and p_θ, for unit energy in the frame of zero angular momentum.
+        let sigma = self.hole.sigma(self.radius, c);
+        let (around, polar) = (k_phi * self.girth, k_theta * sigma.sqrt());
+        let energy = self.lapse + self.drag * s * around;
+        let allowed = "a direction from which light of positive energy arrives";
+        check("energy at infinity", energy, energy > 0.0, allowed)?;
+        let (around, polar) = (around / energy, polar / energy);
+        let angular = around * around + polar * polar - a * a * c * c;
+        let carter = polar * polar + (around - a * s).powi(2);
+        let eta = polar * polar + c * c * (around - a) * (around + a);
+        let coefficients = [a * a - angular, 2.0 * carter, -a * a * eta].map(Double::from);
+        Ok(Ray {
+            lambda: s * around,
+            eta,
+            angular,
+            position: [s, 0.0, c],
+            // Backward: −(p_θ ê_θ + p_φ/sin θ ê_φ).
+            velocity: [-polar * c, -around, polar * s],
+            rotation_sign: if around > 0.0 { -1.0 } else { 1.0 },
+            azimuth: self.azimuth,
+            inverse_radius: 1.0 / self.radius,
+            inward: k_r > 0.0,
+            potential: RadialPotential::new(&self.hole, coefficients),
+        })
+    }
+
+    /// Spatial momentum of the arriving photon in the frame of zero angular momentum, for
+    /// unit energy there.
+    fn momentum(&self, direction: [f64; 3]) -> [f64; 3] {
+        let [v_r, v_phi] = self.velocity;
+        let square = v_r * v_r + v_phi * v_phi;
+        let p = direction.map(|d| -d);
+        if square == 0.0 {
+            return p;
+        }
+        let gamma = 1.0 / (1.0 - square).sqrt();
+        let along = v_r * p[0] + v_phi * p[2];
+        let energy = gamma * (1.0 + along);
+        // p + [(γ − 1)(v·p)/v² + γ] v for unit energy in the camera's frame.
+        let factor = (gamma - 1.0) * along / square + gamma;
+        [p[0] + factor * v_r, p[1], p[2] + factor * v_phi].map(|k| k / energy)
+    }
+
+    /// ν in the camera's frame over ν at infinity, for the photon that arrives from
+    /// `direction`: multiplies every redshift factor g that is written for infinity.
+    pub fn blueshift(&self, direction: [f64; 3]) -> f64 {
+        let [v_r, v_phi] = self.velocity;
+        let gamma = 1.0 / (1.0 - v_r * v_r - v_phi * v_phi).sqrt();
+        let zamo = gamma * (1.0 - v_r * direction[0] - v_phi * direction[2]);
+        let around = self.momentum(direction)[2] * self.girth;
+        1.0 / (zamo * (self.lapse + self.drag * self.inclination.sin() * around))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Observer, Outcome, Path, Tracer, Want};
+
+    fn camera(spin: f64, degrees: f64, radius: f64, motion: Motion) -> Camera {
+        let inclination = Inclination::from_degrees(degrees).unwrap();
+        Camera::new(&Kerr::new(spin).unwrap(), inclination, radius, motion).unwrap()
+    }
+
+    const MOTIONS: [Motion; 4] =
+        [Motion::Static, Motion::Zamo, Motion::Keplerian, Motion::FreeFall];
+
+    /// The constants of motion obey both potentials: u'² = U(u) and (dr/dτ)² = R(r) with
+    /// dr/dτ from the frame.
+    #[test]
+    fn exact_constraints_in_every_frame() {
+        for motion in MOTIONS {
+            for (spin, degrees, radius) in [(0.9, 60.0, 7.0), (0.0, 0.0, 20.0), (-0.5, 90.0, 12.0)]
+            {
+                let camera = camera(spin, degrees, radius, motion);
+                for (x, y) in [(0.0, 0.0), (0.3, -0.2), (-1.5, 2.0)] {
+                    let ray = camera.ray(x, y).unwrap();
+                    let (u, du, a2) = (ray.position[2], ray.velocity[2], spin * spin);
+                    let quad = a2 - ray.eta - ray.lambda.powi(2);
+                    let polar = ray.eta + quad * u * u - a2 * u.powi(4);
+                    assert!((du * du - polar).abs() < 1e-9 * (1.0 + polar.abs()));
+                    let n = (1.0 + x * x + y * y).sqrt();
+                    let k = camera.momentum([-1.0 / n, -y / n, x / n]);
+                    // dr/dτ = √(ΔΣ) k_r/E.
+                    let hole = camera.hole;
+                    let scale = (hole.delta(radius) * hole.sigma(radius, u)).sqrt();
+                    let around = k[2] * camera.girth;
+                    let energy = camera.lapse + camera.drag * ray.position[0] * around;
+                    let rate = scale * k[0] / energy / (radius * radius);
+                    let value = ray.potential.value(1.0 / radius);
+                    assert!((rate * rate / value - 1.0).abs() < 1e-9, "{motion:?} ({x}, {y})");
+                }
+            }
+        }
+    }
+
+    /// Synge 1966: a static observer at r sees the shadow of a hole without spin under the
+    /// half-angle ψ with sin²ψ = 27 (1 − 2/r)/r² (beyond 90° inside the photon sphere); an
+    /// observer in free fall sees it aberrated by v = √(2/r).
+    #[test]
+    fn paper_angular_size_of_the_shadow() {
+        for r in [2.5, 4.0, 10.0, 100.0f64] {
+            let sine = (27.0 * (1.0 - 2.0 / r)).sqrt() / r;
+            let at_rest = if r < 3.0 { std::f64::consts::PI - sine.asin() } else { sine.asin() };
+            // Aberration gathers directions ahead: cos ψ' = (cos ψ + v)/(1 + v cos ψ).
+            let v = (2.0 / r).sqrt();
+            let falling = ((at_rest.cos() + v) / (1.0 + v * at_rest.cos())).acos();
+            for (motion, expected) in [(Motion::Static, at_rest), (Motion::FreeFall, falling)] {
+                let camera = camera(0.0, 40.0, r, motion);
+                let captured = |psi: f64| {
+                    let direction = [-psi.cos(), 0.6 * psi.sin(), 0.8 * psi.sin()];
+                    let ray = camera.arriving_from(direction).unwrap();
+                    let mut path = Path::new();
+                    let tracer = Tracer::new(1e-12).unwrap();
+                    tracer.trace(&camera.hole, &ray, Want::POLAR, &mut path);
+                    path.outcome() == Outcome::Captured
+                };
+                let (mut lo, mut hi) = (0.0, std::f64::consts::PI - 1e-6);
+                for _ in 0..50 {
+                    let middle = 0.5 * (lo + hi);
+                    if captured(middle) { lo = middle } else { hi = middle }
+                }
+                assert!((lo - expected).abs() < 1e-10, "{motion:?} at {r}: {lo} {expected}");
+            }
+        }
+    }
+
+    /// Far away a static camera is Bardeen's screen: α = r x, β = r y.
+    #[test]
+    fn exact_bardeen_limit() {
+        let r = 1e7;
+        let camera = camera(0.9, 55.0, r, Motion::Static);
+        let hole = Kerr::new(0.9).unwrap();
+        let far = Observer::at_infinity(Inclination::from_degrees(55.0).unwrap());
+        for (alpha, beta) in [(3.0, 4.0), (-6.0, 0.5)] {
+            let (near, ideal) =
+                (camera.ray(alpha / r, beta / r).unwrap(), far.ray(&hole, alpha, beta).unwrap());
+            assert!((near.lambda - ideal.lambda).abs() < 1e-5);
+            assert!((near.eta - ideal.eta).abs() < 1e-5);
+            assert!(near.inward && near.velocity[2] * ideal.velocity[2] > 0.0);
+        }
+    }
+
+    /// A static observer sees light from infinity blueshifted by 1/√(−g_tt), whatever its
+    /// direction; one in free fall radially from rest, light from straight behind
+    /// by 1/(1 + √(2/r)).
+    #[test]
+    fn exact_blueshifts() {
+        let r = 8.0f64;
+        let still = camera(0.0, 70.0, r, Motion::Static);
+        for d in [[1.0, 0.0, 0.0], [0.0, 0.6, 0.8], [-0.6, 0.0, 0.8]] {
+            assert!((still.blueshift(d) - 1.0 / (1.0 - 2.0 / r).sqrt()).abs() < 1e-14);
+        }
+        let falling = camera(0.0, 70.0, r, Motion::FreeFall);
+        let behind = falling.blueshift([1.0, 0.0, 0.0]);
+        assert!((behind - 1.0 / (1.0 + (2.0 / r).sqrt())).abs() < 1e-14, "{behind}");
+    }
+
+    #[test]
+    fn impossible_cameras_are_refused() {
+        let hole = Kerr::new(0.9).unwrap();
+        let equator = Inclination::from_degrees(90.0).unwrap();
+        assert!(Camera::new(&hole, equator, 1.9, Motion::Static).is_err());
+        assert!(Camera::new(&hole, equator, 1.9, Motion::Zamo).is_ok());
+        assert!(Camera::new(&hole, equator, 1.3, Motion::Zamo).is_err());
+        assert!(Camera::new(&hole, equator, 1.5, Motion::Keplerian).is_err());
+        assert!(Camera::new(&hole, equator, f64::NAN, Motion::Zamo).is_err());
+    }
+}
