@@ -1,5 +1,6 @@
 //! `kerrlight`: from scene files to lensed images of black holes.
 
+mod columns;
 mod inspect;
 mod output;
 mod render;

@@ -1,9 +1,13 @@
 //! `kerrlight trace`: single rays, from a table to a table.
 
+use crate::columns::{self, Column};
 use crate::output::{self, Output};
 use anyhow::{Context, bail};
-use clap::Args;
-use kerrlight_geodesic::{Inclination, Kerr, Observer, Outcome, Path, Tracer, Want};
+use clap::{Args, ValueEnum};
+use kerrlight_geodesic::{
+    AffineTracer, Inclination, Kerr, Observer, OutOfRange, Outcome, Path, PathPoint, Tracer, Want,
+    quadrature,
+};
 use rayon::prelude::*;
 use std::path::PathBuf;
 
@@ -15,15 +19,42 @@ pub struct Trace {
     /// skipped
     #[arg(long, value_name = "FILE.csv")]
     rays: PathBuf,
-    /// How many equatorial crossings to write for each ray
-    #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1000))]
-    crossings: u16,
+    /// How rays are traced
+    #[arg(long, default_value = "rk45-mino")]
+    integrator: Integrator,
     /// Largest local error of a step, in [1e-14, 1e-2]
     #[arg(long, default_value_t = 1e-12)]
     tolerance: f64,
-    /// Where to write the table [default: standard output]
-    #[arg(short, long, value_name = "FILE.csv")]
+    /// Where the observer is: `infinity`, or a Boyer–Lindquist radius above 2 M
+    #[arg(long, default_value = "infinity", value_parser = parse_radius, value_name = "RADIUS")]
+    observer: f64,
+    /// How many equatorial crossings to write for each ray
+    #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1000))]
+    crossings: u16,
+    /// How many points equidistant in Mino time to write for each ray, from the observer to
+    /// the end (from infinity: without the points at infinity)
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    samples: u32,
+    /// Where to write the table, as .csv or .npz [default: CSV to standard output]
+    #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
+}
+
+/// How rays are traced.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Integrator {
+    /// Adaptive Runge–Kutta 5(4) in Mino time
+    Rk45Mino,
+    /// Adaptive Runge–Kutta 5(4) in the affine parameter on Kerr–Schild coordinates: an
+    /// independent referee, for an observer at a finite radius; azimuths in [−π, π]
+    Rk45Affine,
+}
+
+fn parse_radius(text: &str) -> Result<f64, String> {
+    if text == "infinity" {
+        return Ok(f64::INFINITY);
+    }
+    text.parse().map_err(|_| "give `infinity` or a number".to_owned())
 }
 
 /// One line of the input.
@@ -37,8 +68,18 @@ struct RayLine {
 
 /// The input table.
 struct Table {
-    inclination_name: &'static str,
+    in_degrees: bool,
     rays: Vec<RayLine>,
+}
+
+/// What is written about a ray.
+struct Traced {
+    outcome: Outcome,
+    count: usize,
+    mino_total: f64,
+    r_min: f64,
+    crossings: Vec<PathPoint>,
+    samples: Vec<PathPoint>,
 }
 
 const RADIANS: &str = "inclination_rad";
@@ -47,96 +88,195 @@ const DEGREES: &str = "inclination_deg";
 impl Trace {
     /// Traces all rays of the table.
     pub fn run(&self) -> anyhow::Result<()> {
-        let tracer = Tracer::new(self.tolerance).context("--tolerance")?;
-        let output = self.output.as_deref().map(|path| Output::new(path, "csv")).transpose()?;
+        // Names the argument now, rather than a line of the table later.
+        Tracer::new(self.tolerance).context("--tolerance")?;
+        if self.integrator == Integrator::Rk45Affine && self.observer.is_infinite() {
+            bail!(
+                "--integrator rk45-affine needs an observer at a finite radius: --observer RADIUS"
+            );
+        }
+        if !(self.observer > 2.0) {
+            bail!(
+                "--observer {} is not allowed: `infinity` or a radius above 2 (M)",
+                self.observer
+            );
+        }
+        let npz = self.output.as_deref().and_then(|p| p.extension()).is_some_and(|e| e == "npz");
+        let extension = if npz { "npz" } else { "csv" };
+        let output = self.output.as_deref().map(|path| Output::new(path, extension)).transpose()?;
         let name = self.rays.display().to_string();
-        let bytes = if self.rays.as_os_str() == "-" {
-            let mut bytes = Vec::new();
-            std::io::Read::read_to_end(&mut std::io::stdin(), &mut bytes)?;
-            bytes
-        } else {
-            output::read(&self.rays)?
-        };
-        let table = Table::parse(&bytes).with_context(|| name.clone())?;
-        let rows = table
+        let table = Table::parse(&self.read()?).with_context(|| name.clone())?;
+        let traced = table
             .rays
             .par_iter()
             .map_init(Path::new, |path, ray| {
-                self.row(&tracer, &table, ray, path).with_context(|| format!("line {}", ray.line))
+                self.trace(&table, ray, path).with_context(|| format!("line {}", ray.line))
             })
             .collect::<anyhow::Result<Vec<_>>>()
             .with_context(|| name.clone())?;
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        writer.write_record(self.header(&table))?;
-        for row in rows {
-            writer.write_record(row)?;
-        }
-        let bytes = writer.into_inner().map_err(|e| e.into_error())?;
+        let groups = self.columns(&table, &traced);
+        let bytes = if npz { columns::npz(&groups)? } else { columns::csv(&groups, traced.len())? };
         match output {
             Some(output) => output.write(&bytes),
             None => output::print(core::str::from_utf8(&bytes)?),
         }
     }
 
-    fn header(&self, table: &Table) -> Vec<String> {
-        let fixed = [
-            "spin",
-            table.inclination_name,
-            "alpha",
-            "beta",
-            "outcome",
-            "crossings",
-            "mino_total",
-            "r_min",
-        ];
-        let mut header: Vec<String> = fixed.map(str::to_owned).into();
-        for k in 1..=self.crossings {
-            header.extend(["mino", "r", "phi", "delay"].map(|name| format!("{name}_{k}")));
+    fn read(&self) -> anyhow::Result<Vec<u8>> {
+        if self.rays.as_os_str() != "-" {
+            return output::read(&self.rays);
         }
-        header.push("tolerance".to_owned());
-        header
+        let mut bytes = Vec::new();
+        std::io::Read::read_to_end(&mut std::io::stdin(), &mut bytes)?;
+        Ok(bytes)
     }
 
-    fn row(
-        &self,
-        tracer: &Tracer,
-        table: &Table,
-        ray: &RayLine,
-        path: &mut Path,
-    ) -> anyhow::Result<Vec<String>> {
+    fn trace(&self, table: &Table, ray: &RayLine, path: &mut Path) -> anyhow::Result<Traced> {
         let hole = Kerr::new(ray.spin)?;
-        let inclination = if table.inclination_name == DEGREES {
+        let inclination = if table.in_degrees {
             Inclination::from_degrees(ray.inclination)?
         } else {
             Inclination::from_radians(ray.inclination)?
         };
-        let observer = Observer::at_infinity(inclination);
-        tracer.trace(&hole, &observer.ray(&hole, ray.alpha, ray.beta)?, Want::ALL, path);
-        let mut row: Vec<String> =
-            [ray.spin, ray.inclination, ray.alpha, ray.beta].map(digits).into();
-        row.push(path.outcome().name().to_owned());
-        row.push(path.equatorial_crossings().len().to_string());
-        let resolved = !matches!(path.outcome(), Outcome::Unresolved(_));
-        row.push(if resolved { digits(path.mino_total()) } else { String::new() });
-        row.push(path.turning_point().map_or_else(String::new, |(_, r)| digits(r)));
-        let mut crossings = path.equatorial_crossings();
-        for _ in 0..self.crossings {
-            match crossings.next() {
-                Some(mino_time) => {
-                    let point = path.at(mino_time);
-                    row.extend([mino_time, point.radius(), point.azimuth, point.delay].map(digits));
-                }
-                None => row.extend([const { String::new() }; 4]),
-            }
+        let observer = if self.observer.is_finite() {
+            Observer::at_radius(inclination, self.observer)?
+        } else {
+            Observer::at_infinity(inclination)
+        };
+        Ok(match self.integrator {
+            Integrator::Rk45Mino => self.by_mino_time(&hole, &observer, ray, path)?,
+            Integrator::Rk45Affine => self.by_affine_parameter(&hole, &observer, ray)?,
+        })
+    }
+
+    fn by_mino_time(
+        &self,
+        hole: &Kerr,
+        observer: &Observer,
+        line: &RayLine,
+        path: &mut Path,
+    ) -> Result<Traced, OutOfRange> {
+        let ray = observer.ray(hole, line.alpha, line.beta)?;
+        Tracer::new(self.tolerance)?.trace(hole, &ray, Want::ALL, path);
+        // A finite observer's ray ends where it is back at the observer's radius.
+        let total = match path.turning_point() {
+            Some((turning, _)) if !observer.is_at_infinity() => 2.0 * turning,
+            _ => path.mino_total(),
+        };
+        let crossings: Vec<f64> = path.equatorial_crossings().filter(|t| *t <= total).collect();
+        Ok(Traced {
+            outcome: path.outcome(),
+            count: crossings.len(),
+            mino_total: if is_resolved(path.outcome()) { total } else { f64::NAN },
+            r_min: path.turning_point().map_or(f64::NAN, |(_, r)| r),
+            crossings: crossings
+                .into_iter()
+                .take(usize::from(self.crossings))
+                .map(|t| path.at(t))
+                .collect(),
+            samples: self.times(total, path.outcome()).map(|t| path.at(t)).collect(),
+        })
+    }
+
+    fn by_affine_parameter(
+        &self,
+        hole: &Kerr,
+        observer: &Observer,
+        line: &RayLine,
+    ) -> Result<Traced, OutOfRange> {
+        let tracer = AffineTracer::new(self.tolerance)?;
+        let path = tracer.trace(hole, observer, line.alpha, line.beta)?;
+        let crossings = path.equatorial_crossings();
+        let total = path.mino_total();
+        Ok(Traced {
+            outcome: path.outcome(),
+            count: crossings.len(),
+            mino_total: if is_resolved(path.outcome()) { total } else { f64::NAN },
+            r_min: path.closest_approach().unwrap_or(f64::NAN),
+            crossings: crossings
+                .into_iter()
+                .take(usize::from(self.crossings))
+                .map(|t| path.at(t))
+                .collect(),
+            samples: self.times(total, path.outcome()).map(|t| path.at(t)).collect(),
+        })
+    }
+
+    /// Mino times of the samples.
+    fn times(&self, total: f64, outcome: Outcome) -> impl Iterator<Item = f64> {
+        let n = if is_resolved(outcome) { self.samples as usize } else { 0 };
+        let at_infinity = self.observer.is_infinite();
+        let step = total / (n.max(1) + 1) as f64;
+        let to = match outcome {
+            Outcome::Captured => total,
+            _ if at_infinity => total - step,
+            _ => total,
+        };
+        quadrature::equidistant(if at_infinity { step } else { 0.0 }, to, n)
+    }
+
+    fn columns(&self, table: &Table, traced: &[Traced]) -> Vec<Vec<Column>> {
+        let number = |name: &str, value: &dyn Fn(usize) -> f64| {
+            Column::Numbers(name.to_owned(), (0..traced.len()).map(value).collect())
+        };
+        let rays = &table.rays;
+        let inclination_name = if table.in_degrees { DEGREES } else { RADIANS };
+        let outcomes = traced.iter().map(|t| t.outcome.name().to_owned()).collect();
+        let mut groups: Vec<Vec<Column>> = vec![
+            vec![number("spin", &|k| rays[k].spin)],
+            vec![number(inclination_name, &|k| rays[k].inclination)],
+            vec![number("alpha", &|k| rays[k].alpha)],
+            vec![number("beta", &|k| rays[k].beta)],
+            vec![Column::Words("outcome".to_owned(), outcomes)],
+            vec![Column::Counts(
+                "crossings".to_owned(),
+                traced.iter().map(|t| t.count as u64).collect(),
+            )],
+            vec![number("mino_total", &|k| traced[k].mino_total)],
+            vec![number("r_min", &|k| traced[k].r_min)],
+        ];
+        let block = |name: &str,
+                     points: &dyn Fn(&Traced) -> &[PathPoint],
+                     width: usize,
+                     value: &dyn Fn(&PathPoint) -> f64| {
+            let row = |t: &Traced| {
+                let mut row: Vec<f64> = points(t).iter().map(value).collect();
+                row.resize(width, f64::NAN);
+                row
+            };
+            Column::Blocks(name.to_owned(), traced.iter().map(row).collect())
+        };
+        let crossing = |name: &str, value: &dyn Fn(&PathPoint) -> f64| {
+            block(name, &|t| &t.crossings, usize::from(self.crossings), value)
+        };
+        groups.push(vec![
+            crossing("mino", &|p| p.mino_time),
+            crossing("r", &PathPoint::radius),
+            crossing("phi", &|p| p.azimuth),
+            crossing("delay", &|p| p.delay),
+        ]);
+        if self.samples > 0 {
+            let sample = |name: &str, value: &dyn Fn(&PathPoint) -> f64| {
+                block(name, &|t| &t.samples, self.samples as usize, value)
+            };
+            groups.push(vec![
+                sample("sample_mino", &|p| p.mino_time),
+                sample("sample_r", &PathPoint::radius),
+                sample("sample_theta", &PathPoint::theta),
+                sample("sample_phi", &|p| p.azimuth),
+                sample("sample_delay", &|p| p.delay),
+            ]);
         }
-        row.push(format!("{:e}", self.tolerance));
-        Ok(row)
+        let integrator = self.integrator.to_possible_value();
+        let integrator = integrator.map_or(String::new(), |v| v.get_name().to_owned());
+        groups.push(vec![Column::Words("integrator".to_owned(), vec![integrator; traced.len()])]);
+        groups.push(vec![number("tolerance", &|_| self.tolerance)]);
+        groups
     }
 }
 
-/// 17 significant digits: every double has its own.
-fn digits(x: f64) -> String {
-    format!("{x:.16e}")
+fn is_resolved(outcome: Outcome) -> bool {
+    !matches!(outcome, Outcome::Unresolved(_))
 }
 
 /// The line of a record, counted from 1; the reader's own count leaves out skipped lines.
@@ -162,9 +302,9 @@ impl Table {
         let header = reader.headers().context("no header line")?.clone();
         let find = |name: &str| header.iter().position(|column| column == name);
         let need = |name: &str| find(name).with_context(|| format!("there is no column `{name}`"));
-        let (inclination_name, inclination) = match (find(RADIANS), find(DEGREES)) {
-            (Some(column), None) => (RADIANS, column),
-            (None, Some(column)) => (DEGREES, column),
+        let (in_degrees, inclination) = match (find(RADIANS), find(DEGREES)) {
+            (Some(column), None) => (false, column),
+            (None, Some(column)) => (true, column),
             (None, None) => bail!("there is no column `{RADIANS}` or `{DEGREES}`"),
             (Some(_), Some(_)) => bail!("there are both `{RADIANS}` and `{DEGREES}`: give one"),
         };
@@ -191,6 +331,6 @@ impl Table {
                 beta: value(beta)?,
             });
         }
-        Ok(Table { inclination_name, rays })
+        Ok(Table { in_degrees, rays })
     }
 }

@@ -244,6 +244,25 @@ impl AffinePath {
         self.state(self.end)[MINO_TIME]
     }
 
+    /// Smallest radius of a ray that came back: where dr/ds = 0 on the dense output.
+    pub fn closest_approach(&self) -> Option<f64> {
+        if self.outcome != Outcome::Escaped {
+            return None;
+        }
+        let r = |s: f64| {
+            let y = self.state(s);
+            radius(self.hole.spin(), [y[0], y[1], y[2]])
+        };
+        // Golden-section search: the radius has one minimum.
+        let golden = 0.5 * (5f64.sqrt() - 1.0);
+        let (mut lo, mut hi) = (0.0, self.end);
+        for _ in 0..100 {
+            let (p, q) = (hi - golden * (hi - lo), lo + golden * (hi - lo));
+            if r(p) < r(q) { hi = q } else { lo = p }
+        }
+        Some(r(0.5 * (lo + hi)))
+    }
+
     /// Number of accepted steps.
     pub fn steps(&self) -> usize {
         self.nodes.len().saturating_sub(1)

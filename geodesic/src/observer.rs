@@ -117,6 +117,11 @@ impl Observer {
         self.azimuth
     }
 
+    /// Whether the observer is infinitely far away.
+    pub fn is_at_infinity(&self) -> bool {
+        self.inverse_radius == 0.0
+    }
+
     /// 1/r of the observer: 0 at infinity.
     pub fn inverse_radius(&self) -> f64 {
         self.inverse_radius
