@@ -9,6 +9,8 @@ use std::io::{Cursor, Write};
 pub enum Column {
     /// One number a row; NaN where there is none.
     Numbers(String, Vec<f64>),
+    /// One count a row.
+    Counts(String, Vec<u64>),
     /// One word a row.
     Words(String, Vec<String>),
     /// Several numbers a row, all of them named `name_k` from `first` on; NaN where there is
@@ -24,7 +26,9 @@ fn digits(x: f64) -> String {
 impl Column {
     fn names(&self) -> Vec<String> {
         match self {
-            Column::Numbers(name, _) | Column::Words(name, _) => vec![name.clone()],
+            Column::Numbers(name, _) | Column::Counts(name, _) | Column::Words(name, _) => {
+                vec![name.clone()]
+            }
             Column::Blocks(name, rows) => {
                 let width = rows.first().map_or(0, Vec::len);
                 (1..=width).map(|k| format!("{name}_{k}")).collect()
@@ -35,6 +39,7 @@ impl Column {
     fn cells(&self, row: usize) -> Vec<String> {
         match self {
             Column::Numbers(_, values) => vec![digits(values[row])],
+            Column::Counts(_, counts) => vec![counts[row].to_string()],
             Column::Words(_, words) => vec![words[row].clone()],
             Column::Blocks(_, rows) => rows[row].iter().map(|x| digits(*x)).collect(),
         }
@@ -66,11 +71,12 @@ pub fn npz(groups: &[Vec<Column>]) -> anyhow::Result<Vec<u8>> {
         zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
     for column in groups.iter().flatten() {
         let (name, bytes) = match column {
-            Column::Numbers(name, values) => (name, npy(&[values.len()], values.iter())?),
+            Column::Numbers(name, values) => (name, npy(&[values.len()], values.iter().copied())?),
             Column::Blocks(name, rows) => {
                 let width = rows.first().map_or(0, Vec::len);
-                (name, npy(&[rows.len(), width], rows.iter().flatten())?)
+                (name, npy(&[rows.len(), width], rows.iter().flatten().copied())?)
             }
+            Column::Counts(name, counts) => (name, npy(&[counts.len()], counts.iter().copied())?),
             Column::Words(name, words) => (name, npy_words(words)?),
         };
         archive.start_file(npyz::npz::file_name_from_array_name(name), options)?;
@@ -79,12 +85,15 @@ pub fn npz(groups: &[Vec<Column>]) -> anyhow::Result<Vec<u8>> {
     Ok(archive.finish()?.into_inner())
 }
 
-fn npy<'a>(shape: &[usize], values: impl Iterator<Item = &'a f64>) -> anyhow::Result<Vec<u8>> {
+fn npy<T: npyz::AutoSerialize>(
+    shape: &[usize],
+    values: impl Iterator<Item = T>,
+) -> anyhow::Result<Vec<u8>> {
     let shape: Vec<u64> = shape.iter().map(|n| *n as u64).collect();
     let mut bytes = Vec::new();
     let mut writer =
         npyz::WriteOptions::new().default_dtype().shape(&shape).writer(&mut bytes).begin_nd()?;
-    writer.extend(values.copied())?;
+    writer.extend(values)?;
     writer.finish()?;
     Ok(bytes)
 }

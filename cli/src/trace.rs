@@ -95,7 +95,7 @@ impl Trace {
                 "--integrator rk45-affine needs an observer at a finite radius: --observer RADIUS"
             );
         }
-        if !(self.observer > 2.0) {
+        if self.observer.is_nan() || self.observer <= 2.0 {
             bail!(
                 "--observer {} is not allowed: `infinity` or a radius above 2 (M)",
                 self.observer
