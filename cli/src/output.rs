@@ -4,9 +4,13 @@ use anyhow::{Context, bail};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+/// No input is as large as this.
+const LARGEST_INPUT: u64 = 4 << 30;
+
 /// A file to be written, checked before any work is done for it.
 #[derive(Debug, Clone)]
 pub struct Output {
+    given: PathBuf,
     path: PathBuf,
     folder: PathBuf,
 }
@@ -29,7 +33,17 @@ impl Output {
         if !folder.is_dir() {
             bail!("output {shown}: there is no directory {}", folder.display());
         }
-        let output = Output { path: path.to_owned(), folder };
+        // Through a symbolic link to the file it names, and never over a protected file.
+        let given = path.to_owned();
+        let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        if std::fs::metadata(&path).is_ok_and(|m| m.permissions().readonly() || !m.is_file()) {
+            bail!("output {shown} exists and is not a writable file");
+        }
+        let folder = match path.parent() {
+            Some(parent) if parent != Path::new("") => parent.to_owned(),
+            _ => folder,
+        };
+        let output = Output { given, path, folder };
         // A read-only folder is better found out now than after the work.
         output.beside()?;
         Ok(output)
@@ -49,6 +63,16 @@ impl Output {
             .with_context(|| format!("cannot write to {}", self.folder.display()))
     }
 
+    /// Refuses to take the place of a file that is read.
+    pub fn spares(&self, input: &Path) -> anyhow::Result<()> {
+        match (self.path.canonicalize(), input.canonicalize()) {
+            (Ok(output), Ok(input)) if output == input => {
+                bail!("output {} is an input and would be lost: give another name", input.display())
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Writes the whole file beside its place and moves it there.
     pub fn write(&self, bytes: &[u8]) -> anyhow::Result<()> {
         let shown = self.path.display();
@@ -59,9 +83,9 @@ impl Output {
         Ok(())
     }
 
-    /// The place.
-    pub fn path(&self) -> &Path {
-        &self.path
+    /// The place, as it was given.
+    pub fn shown(&self) -> &Path {
+        &self.given
     }
 }
 
@@ -75,10 +99,18 @@ pub fn print(text: &str) -> anyhow::Result<()> {
 
 /// The bytes of a file, with an error that names it.
 pub fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
-    if path.is_dir() {
-        bail!("{} is a directory, not a file", path.display());
+    let shown = path.display();
+    let metadata = std::fs::metadata(path).with_context(|| format!("cannot read {shown}"))?;
+    if metadata.is_dir() {
+        bail!("{shown} is a directory, not a file");
     }
-    std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))
+    if !metadata.is_file() {
+        bail!("{shown} is not a regular file");
+    }
+    if metadata.len() > LARGEST_INPUT {
+        bail!("{shown} is larger than {LARGEST_INPUT} bytes");
+    }
+    std::fs::read(path).with_context(|| format!("cannot read {shown}"))
 }
 
 /// The text of a file, with an error that names it.

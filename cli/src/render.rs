@@ -1,7 +1,7 @@
 //! `kerrlight render`: from a scene to EXR and PNG.
 
 use crate::output::{self, Output};
-use anyhow::{Context, bail};
+use anyhow::Context;
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use kerrlight_tomo::emission::sky::Panorama;
@@ -9,7 +9,7 @@ use kerrlight_tomo::image::colormap::Colormap;
 use kerrlight_tomo::image::exr;
 use kerrlight_tomo::image::preview::{self, Look, Stretch};
 use kerrlight_tomo::render::{Rendered, render};
-use kerrlight_tomo::scene::{Scene, Sky, apply_override};
+use kerrlight_tomo::scene::{Scene, SceneError, Sky, apply_override};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -22,7 +22,8 @@ pub struct Render {
     /// Scene file (TOML), or an EXR that kerrlight rendered, to render it again; without it
     /// a built-in scene: Sgr A* with a flare and a disc
     scene: Option<PathBuf>,
-    /// Where to write the EXR
+    /// Where to write the EXR [default, without --preview either: both, in the current folder
+    /// and named after the scene]
     #[arg(short, long, value_name = "FILE.exr")]
     output: Option<PathBuf>,
     /// Where to write a tone-mapped PNG
@@ -72,7 +73,13 @@ impl Render {
         let source = self.source()?;
         let (text, scene) = self.scene(&source)?;
         let (exr, png) = self.outputs(&source)?;
-        let picture = load_sky(&scene, &source.folder)?;
+        let sky = sky_path(&scene, &source.folder);
+        for output in [&exr, &png].into_iter().flatten() {
+            for input in self.scene.iter().chain(&sky) {
+                output.spares(input)?;
+            }
+        }
+        let picture = sky.as_deref().map(load_sky).transpose()?;
         let start = Instant::now();
         let bar = progress_bar(u64::from(scene.screen.height));
         let rendered = render(&scene, picture, &|rows| {
@@ -84,12 +91,12 @@ impl Render {
         if let Some(exr) = &exr {
             let bytes = exr::encode(&rendered.picture, &attributes(&scene, &text, &rendered));
             exr.write(&bytes.context("cannot encode the EXR")?)?;
-            output::print(&format!("{}\n", exr.path().display()))?;
+            output::print(&format!("{}\n", exr.shown().display()))?;
         }
         if let Some(png) = &png {
             let bytes = preview::encode_png(&rendered.picture, self.look(&scene));
             png.write(&bytes.context("cannot encode the PNG")?)?;
-            output::print(&format!("{}\n", png.path().display()))?;
+            output::print(&format!("{}\n", png.shown().display()))?;
         }
         report(&scene, &rendered, start.elapsed().as_secs_f64());
         Ok(())
@@ -110,24 +117,23 @@ impl Render {
 
     /// The scene with all overrides, and its text.
     fn scene(&self, source: &Source) -> anyhow::Result<(String, Scene)> {
-        // Without overrides first, so that an error in the file points at its own line.
-        let untouched = Scene::parse(&source.text);
-        if self.overrides.is_empty() {
-            return Ok((source.text.clone(), untouched.with_context(|| source.name.clone())?));
-        }
         let mut text = source.text.clone();
+        if self.overrides.is_empty() {
+            let scene = Scene::parse(&text).with_context(|| source.name.clone())?;
+            return Ok((text, scene));
+        }
         for assignment in &self.overrides {
-            text = apply_override(&text, assignment).context("--set")?;
+            text = apply_override(&text, assignment).map_err(|error| match error {
+                // Not the override's fault.
+                SceneError::Syntax(_) => anyhow::Error::new(error).context(source.name.clone()),
+                _ => anyhow::Error::new(error).context("--set"),
+            })?;
         }
-        match Scene::parse(&text) {
-            Ok(scene) => Ok((text, scene)),
-            Err(error) => match untouched {
-                Err(_) => Err(error).with_context(|| source.name.clone()),
-                Ok(_) => Err(error).with_context(|| {
-                    format!("{} with --set {}", source.name, self.overrides.join(" --set "))
-                }),
-            },
-        }
+        // Lines of the changed text are nobody's.
+        let scene = Scene::parse(&text).map_err(SceneError::without_line).with_context(|| {
+            format!("{} with --set {}", source.name, self.overrides.join(" --set "))
+        })?;
+        Ok((text, scene))
     }
 
     fn outputs(&self, source: &Source) -> anyhow::Result<(Option<Output>, Option<Output>)> {
@@ -137,16 +143,12 @@ impl Render {
         if self.output.is_some() || self.preview.is_some() {
             return Ok((check(&self.output, "exr")?, check(&self.preview, "png")?));
         }
-        // Beside the caller, named after the scene, and never over the scene itself.
         let stem = match &self.scene {
             Some(path) => path.file_stem().map(|s| s.to_string_lossy().into_owned()),
             None => Some("kerrlight".to_owned()),
         };
         let stem = stem.unwrap_or_else(|| source.name.clone());
         let exr = PathBuf::from(format!("{stem}.exr"));
-        if self.scene.as_ref().is_some_and(|scene| same_file(scene, &exr)) {
-            bail!("{} would be written over: give another name with -o", exr.display());
-        }
         let png = PathBuf::from(format!("{stem}.png"));
         Ok((check(&Some(exr), "exr")?, check(&Some(png), "png")?))
     }
@@ -171,13 +173,6 @@ impl Render {
     }
 }
 
-fn same_file(a: &Path, b: &Path) -> bool {
-    match (a.canonicalize(), b.canonicalize()) {
-        (Ok(a), Ok(b)) => a == b,
-        _ => false,
-    }
-}
-
 fn scene_of_exr(path: &Path) -> anyhow::Result<String> {
     let name = || path.display().to_string();
     let (_, attributes) = exr::decode(&output::read(path)?).with_context(name)?;
@@ -185,13 +180,17 @@ fn scene_of_exr(path: &Path) -> anyhow::Result<String> {
     scene.with_context(|| format!("{} holds no scene of kerrlight", name()))
 }
 
-fn load_sky(scene: &Scene, folder: &Path) -> anyhow::Result<Option<Panorama>> {
-    let Some(Sky::Image(image)) = &scene.sky else { return Ok(None) };
-    let path = folder.join(&image.path);
-    let bytes = output::read(&path).context("`sky.image.path`")?;
-    let picture =
-        Panorama::decode(&bytes).with_context(|| format!("`sky.image.path` {}", path.display()))?;
-    Ok(Some(picture))
+/// Where the picture of a `[sky.image]` lies.
+fn sky_path(scene: &Scene, folder: &Path) -> Option<PathBuf> {
+    match &scene.sky {
+        Some(Sky::Image(image)) => Some(folder.join(&image.path)),
+        _ => None,
+    }
+}
+
+fn load_sky(path: &Path) -> anyhow::Result<Panorama> {
+    let bytes = output::read(path).context("`sky.image.path`")?;
+    Panorama::decode(&bytes).with_context(|| format!("`sky.image.path` {}", path.display()))
 }
 
 /// A bar with the time left on a terminal, nothing in a pipe.

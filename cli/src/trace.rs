@@ -82,6 +82,7 @@ struct Traced {
     samples: Vec<PathPoint>,
 }
 
+const NAMES: [&str; 5] = ["spin", RADIANS, DEGREES, "alpha", "beta"];
 const RADIANS: &str = "inclination_rad";
 const DEGREES: &str = "inclination_deg";
 
@@ -104,6 +105,9 @@ impl Trace {
         let npz = self.output.as_deref().and_then(|p| p.extension()).is_some_and(|e| e == "npz");
         let extension = if npz { "npz" } else { "csv" };
         let output = self.output.as_deref().map(|path| Output::new(path, extension)).transpose()?;
+        if let Some(output) = &output {
+            output.spares(&self.rays)?;
+        }
         let name = self.rays.display().to_string();
         let table = Table::parse(&self.read()?).with_context(|| name.clone())?;
         let traced = table
@@ -299,7 +303,12 @@ impl Table {
             .comment(Some(b'#'))
             .trim(csv::Trim::All)
             .from_reader(bytes);
-        let header = reader.headers().context("no header line")?.clone();
+        let header = reader.headers().context("the header line cannot be read")?.clone();
+        for (k, name) in header.iter().enumerate() {
+            if NAMES.contains(&name) && header.iter().skip(k + 1).any(|other| other == name) {
+                bail!("there are two columns `{name}`");
+            }
+        }
         let find = |name: &str| header.iter().position(|column| column == name);
         let need = |name: &str| find(name).with_context(|| format!("there is no column `{name}`"));
         let (in_degrees, inclination) = match (find(RADIANS), find(DEGREES)) {

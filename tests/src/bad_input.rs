@@ -130,3 +130,45 @@ fn tables_of_rays_that_are_none() {
     std::fs::write(path.join("rays.csv"), head).unwrap();
     assert!(fail(path, &["trace", "--rays", "rays.csv", "--tolerance", "1"]).contains("tolerance"));
 }
+
+/// Nothing that is read is written over.
+#[test]
+fn outputs_spare_inputs() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    std::fs::write(path.join("rays.csv"), "spin,inclination_deg,alpha,beta\n0.5,60,1,2\n").unwrap();
+    let message = fail(path, &["trace", "--rays", "rays.csv", "-o", "rays.csv"]);
+    assert!(message.contains("rays.csv is an input"), "{message}");
+    for name in ["sky_image.toml", "graticule.png"] {
+        std::fs::copy(root().join("scenes").join(name), path.join(name)).unwrap();
+    }
+    let arguments = ["render", "sky_image.toml", "--preview", "graticule.png"];
+    assert!(fail(path, &arguments).contains("is an input"));
+    let small = ["--set", "screen.width=8", "--set", "screen.height=8", "-o", "a.exr"];
+    assert!(kerrlight(path, &[&["render"][..], &small[..]].concat()).status.success());
+    assert!(fail(path, &["render", "a.exr", "-o", "a.exr"]).contains("is an input"));
+    let mut permissions = std::fs::metadata(path.join("a.exr")).unwrap().permissions();
+    permissions.set_readonly(true);
+    std::fs::set_permissions(path.join("a.exr"), permissions).unwrap();
+    assert!(fail(path, &[&["render"][..], &small[..]].concat()).contains("not a writable file"));
+}
+
+/// Values that no 32-bit channel holds, and fluxes that cannot be had.
+#[test]
+fn pictures_that_cannot_be() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let run = |assignments: &[&str]| {
+        let mut arguments = vec!["render", "--set", "screen.width=8", "--set", "screen.height=8"];
+        assignments.iter().for_each(|a| arguments.extend(["--set", *a]));
+        fail(path, &arguments)
+    };
+    assert!(run(&["disc.peak_intensity=1e39"]).contains("[0, 1e12]"));
+    assert!(run(&["spot.0.sheared_since=-1e4"]).contains("wound up"));
+    let dark = ["disc.peak_intensity=0", "spot.0.peak_emissivity=0", "screen.total_flux_jy=1"];
+    assert!(run(&dark).contains("cannot be met"));
+    let bright = ["screen.total_flux_jy=1e30", "hole.distance_kpc=1e12"];
+    let field = ["screen.field_of_view_uas=", "screen.field_of_view_m=30"];
+    assert!(run(&[&bright[..], &field[..]].concat()).contains("32-bit"));
+    assert!(run(&["observer.radius=1e300"]).contains("[10, 1e9]"));
+}

@@ -167,7 +167,6 @@ fn exact_flux_of_a_distant_spot() {
         "observer.time=0",
     ];
     let text = text
-        .replace("spectral_index = 0.0", "")
         .replace("total_flux_jy = 2.4      # scales the intensity channel to Jy/uas^2", "")
         .replace("field_of_view_uas = 120.0", "field_of_view_m = 4700.0");
     let overrides = [&["screen.width=301", "screen.height=301"][..], &more[..]].concat();

@@ -17,6 +17,15 @@ pub enum RenderError {
     /// A value is out of range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
+    /// There is no light to scale.
+    #[error("`screen.total_flux_jy` cannot be met: the picture's own flux is {0:e} scene units")]
+    NoFlux(f64),
+    /// A value does not fit the picture's 32-bit channels.
+    #[error("channel {channel}: a value is too large for a 32-bit float; lower the brightness")]
+    NotFinite {
+        /// The channel.
+        channel: String,
+    },
     /// The caller asked to stop.
     #[error("stopped")]
     Stopped,
@@ -55,7 +64,7 @@ pub fn render(
             if progress(1) { Ok(pixels) } else { Err(RenderError::Stopped) }
         })
         .collect::<Result<_, RenderError>>()?;
-    Ok(assemble(scene, &stage, &grid, &rows))
+    assemble(scene, &stage, &grid, &rows)
 }
 
 /// Where rays go: pixel centres on a regular grid, rows from the top (largest β), square
@@ -131,9 +140,14 @@ impl Grid {
     }
 }
 
-fn assemble(scene: &Scene, stage: &Stage, grid: &Grid, rows: &[Vec<Pixel>]) -> Rendered {
+fn assemble(
+    scene: &Scene,
+    stage: &Stage,
+    grid: &Grid,
+    rows: &[Vec<Pixel>],
+) -> Result<Rendered, RenderError> {
     let pixels = || rows.iter().flatten();
-    let (unit_factor, intensity_unit) = intensity_unit(scene, pixels().map(|p| p.intensity).sum());
+    let (unit_factor, intensity_unit) = intensity_unit(scene, pixels().map(|p| p.intensity).sum())?;
     let mut channels = Vec::new();
     let mut add = |name: &str, value: &dyn Fn(&Pixel) -> f64| {
         let values = pixels().map(|p| value(p) as f32).collect();
@@ -151,24 +165,23 @@ fn assemble(scene: &Scene, stage: &Stage, grid: &Grid, rows: &[Vec<Pixel>]) -> R
     add("azimuth", &|p| p.center.azimuth);
     add("delay", &|p| p.center.delay);
     add("outcome", &|p| f64::from(p.center.fate as u8));
-    Rendered {
+    if let Some(bad) = channels.iter().find(|c| c.values.iter().any(|v| !v.is_finite())) {
+        return Err(RenderError::NotFinite { channel: bad.name.clone() });
+    }
+    Ok(Rendered {
         picture: Picture { width: grid.width, height: grid.height, channels },
         unresolved: pixels().map(|p| p.unresolved as usize).sum(),
         unit_factor,
         intensity_unit,
-    }
+    })
 }
 
 /// Factor and name of the unit of intensity: the scene's own, or Jy/µas² such that the
 /// picture holds the flux that was asked for.
-fn intensity_unit(scene: &Scene, sum: f64) -> (f64, &'static str) {
-    match scene.screen.total_flux_jy {
-        Some(flux) if sum > 0.0 => {
-            let hole = &scene.hole;
-            let angle = crate::units::gravitational_angle(hole.mass_msun, hole.distance_kpc);
-            let solid_angle = (scene.pixel_size() * angle).powi(2);
-            (flux / (sum * solid_angle), "Jy/uas^2")
-        }
-        _ => (1.0, "scene unit"),
-    }
+fn intensity_unit(scene: &Scene, sum: f64) -> Result<(f64, &'static str), RenderError> {
+    let Some(flux) = scene.screen.total_flux_jy else { return Ok((1.0, "scene unit")) };
+    let hole = &scene.hole;
+    let angle = crate::units::gravitational_angle(hole.mass_msun, hole.distance_kpc);
+    let factor = flux / (sum * (scene.pixel_size() * angle).powi(2));
+    if factor.is_normal() { Ok((factor, "Jy/uas^2")) } else { Err(RenderError::NoFlux(sum)) }
 }

@@ -22,6 +22,14 @@ pub enum SceneError {
         /// What would be allowed.
         allowed: String,
     },
+    /// A key that this scene needs.
+    #[error("`{key}` is missing: {why}")]
+    Missing {
+        /// Dotted path of the key.
+        key: String,
+        /// Why it is needed.
+        why: String,
+    },
     /// An override that cannot be applied.
     #[error("{0}")]
     Override(String),
@@ -33,25 +41,58 @@ fn line_prefix(line: Option<usize>) -> String {
 
 impl SceneError {
     pub(super) fn syntax(error: &toml::de::Error) -> Self {
-        SceneError::Syntax(error.to_string().trim_end().to_owned())
+        // The parser speaks of Rust's types.
+        let text = error.to_string();
+        let text = text.replace("expected f64", "expected a number");
+        let text = text.replace("expected f32", "expected a number");
+        let text = text.replace("expected u32", "expected a whole number");
+        let text = text.replace("expected u64", "expected a whole number");
+        SceneError::Syntax(text.trim_end().to_owned())
+    }
+
+    /// The same without a line: that of a text which the user never saw.
+    pub fn without_line(self) -> Self {
+        match self {
+            SceneError::Range { key, value, allowed, .. } => {
+                SceneError::Range { line: None, key, value, allowed }
+            }
+            other => other,
+        }
     }
 }
 
-/// A value out of range, not yet located.
+/// A value out of range or missing, not yet located.
 pub(super) struct Invalid {
     key: String,
-    value: String,
+    value: Option<String>,
     allowed: String,
+}
+
+/// A number as a person would write it.
+fn shown(value: f64) -> String {
+    let size = value.abs();
+    if size != 0.0 && size.is_finite() && !(1e-4..1e9).contains(&size) {
+        format!("{value:e}")
+    } else {
+        value.to_string()
+    }
 }
 
 impl Invalid {
     fn new(key: impl Into<String>, value: impl ToString, allowed: impl Into<String>) -> Self {
-        Invalid { key: key.into(), value: value.to_string(), allowed: allowed.into() }
+        Invalid { key: key.into(), value: Some(value.to_string()), allowed: allowed.into() }
+    }
+
+    fn missing(key: impl Into<String>, why: impl Into<String>) -> Self {
+        Invalid { key: key.into(), value: None, allowed: why.into() }
     }
 
     pub(super) fn locate(self, text: &str) -> SceneError {
+        let Some(value) = self.value else {
+            return SceneError::Missing { key: self.key, why: self.allowed };
+        };
         let line = line_of(text, &self.key);
-        SceneError::Range { line, key: self.key, value: self.value, allowed: self.allowed }
+        SceneError::Range { line, key: self.key, value, allowed: self.allowed }
     }
 }
 
@@ -100,15 +141,16 @@ fn line_at(text: &str, offset: usize) -> usize {
 
 /// Refuses `value` unless `ok`.
 fn number(key: impl Into<String>, value: f64, ok: bool, allowed: &str) -> Result<(), Invalid> {
-    if ok { Ok(()) } else { Err(Invalid::new(key, value, allowed)) }
+    if ok { Ok(()) } else { Err(Invalid::new(key, shown(value), allowed)) }
 }
 
 fn positive(key: impl Into<String>, value: f64) -> Result<(), Invalid> {
     number(key, value, value > 0.0 && value.is_finite(), "a finite number above 0")
 }
 
-fn not_negative(key: impl Into<String>, value: f64) -> Result<(), Invalid> {
-    number(key, value, value >= 0.0 && value.is_finite(), "a finite number, 0 or above")
+/// Brightness in any unit: the channels are 32-bit floats.
+fn brightness(key: impl Into<String>, value: f64) -> Result<(), Invalid> {
+    number(key, value, (0.0..=1e12).contains(&value), "a number in [0, 1e12]")
 }
 
 fn finite(key: impl Into<String>, value: f64) -> Result<(), Invalid> {
@@ -135,7 +177,7 @@ pub(super) fn check(scene: &Scene) -> Result<(), Invalid> {
         check_disc(disc, &hole)?;
     }
     for (k, spot) in scene.spot.iter().enumerate() {
-        check_spot(spot, k, &hole)?;
+        check_spot(spot, k, &hole, scene.observer.time)?;
     }
     scene.sky.as_ref().map_or(Ok(()), check_sky)
 }
@@ -149,10 +191,18 @@ fn check_hole_and_observer(scene: &Scene) -> Result<(), Invalid> {
     let degrees = observer.inclination_deg;
     let ok = (0.0..=180.0).contains(&degrees);
     number("observer.inclination_deg", degrees, ok, "an angle in [0, 180]")?;
-    finite("observer.azimuth_deg", observer.azimuth_deg)?;
-    finite("observer.time", observer.time)?;
-    let allowed = "inf, or a radius of at least 10 (M)";
-    number("observer.radius", observer.radius, observer.radius >= 10.0, allowed)
+    let azimuth = observer.azimuth_deg;
+    let ok = (-3600.0..=3600.0).contains(&azimuth);
+    number("observer.azimuth_deg", azimuth, ok, "an angle in [-3600, 3600]")?;
+    let ok = observer.time.abs() <= 1e9;
+    number("observer.time", observer.time, ok, "a time in [-1e9, 1e9] (M)")?;
+    let (radius, allowed) = (observer.radius, "inf, or a radius in [10, 1e9] (M)");
+    number(
+        "observer.radius",
+        radius,
+        radius == f64::INFINITY || (10.0..=1e9).contains(&radius),
+        allowed,
+    )
 }
 
 fn check_screen(scene: &Scene) -> Result<(), Invalid> {
@@ -161,12 +211,12 @@ fn check_screen(scene: &Scene) -> Result<(), Invalid> {
         (Some(m), None) => positive("screen.field_of_view_m", m)?,
         (None, Some(angle)) => positive("screen.field_of_view_uas", angle)?,
         (None, None) => {
-            let allowed = "give field_of_view_m or field_of_view_uas";
-            return Err(Invalid::new("screen.field_of_view_m", "(missing)", allowed));
+            let why = "give field_of_view_m or field_of_view_uas";
+            return Err(Invalid::missing("screen.field_of_view_m", why));
         }
         (Some(_), Some(angle)) => {
             let allowed = "give field_of_view_m or field_of_view_uas, not both";
-            return Err(Invalid::new("screen.field_of_view_uas", angle, allowed));
+            return Err(Invalid::new("screen.field_of_view_uas", shown(angle), allowed));
         }
     }
     for (key, size) in [("screen.width", screen.width), ("screen.height", screen.height)] {
@@ -184,34 +234,38 @@ fn check_screen(scene: &Scene) -> Result<(), Invalid> {
         return Err(Invalid::new("screen.samples_per_pixel", screen.samples_per_pixel, allowed));
     }
     check_reach(scene)?;
-    screen.total_flux_jy.map_or(Ok(()), |flux| positive("screen.total_flux_jy", flux))
+    screen.total_flux_jy.map_or(Ok(()), |flux| {
+        let ok = (1e-30..=1e30).contains(&flux);
+        number("screen.total_flux_jy", flux, ok, "a number in [1e-30, 1e30]")
+    })
 }
 
 /// Impact parameters so large that their squares lose the hole are no picture of it.
 fn check_reach(scene: &Scene) -> Result<(), Invalid> {
     let m = scene.field_of_view_m();
-    let key = match scene.screen.field_of_view_m {
-        Some(_) => "screen.field_of_view_m",
-        None => "screen.field_of_view_uas",
+    let (key, given) = match (scene.screen.field_of_view_m, scene.screen.field_of_view_uas) {
+        (Some(m), _) => ("screen.field_of_view_m", m),
+        (None, angle) => ("screen.field_of_view_uas", angle.unwrap_or(f64::NAN)),
     };
-    let reach = m.max(scene.pixel_size() * f64::from(scene.screen.height));
-    number(key, m, reach <= 1e7, "a field of at most 1e7 M on either side")?;
-    let allowed = "a field inside the finite observer's sky: half its diagonal below 0.9 r";
-    let corner = 0.5 * m.hypot(scene.pixel_size() * f64::from(scene.screen.height));
-    number(key, m, corner < 0.9 * scene.observer.radius, allowed)
+    let height = scene.pixel_size() * f64::from(scene.screen.height);
+    let ok = m.max(height) <= 1e7 && m.min(height) >= 1e-9;
+    number(key, given, ok, "a field between 1e-9 and 1e7 M on either side")?;
+    let radius = scene.observer.radius;
+    let allowed = format!(
+        "a field inside the sky of an observer at r = {radius}: half its diagonal, now {:.3} M, below 0.9 r",
+        0.5 * m.hypot(height)
+    );
+    number(key, given, 0.5 * m.hypot(height) < 0.9 * radius, &allowed)
 }
 
 fn check_effects(scene: &Scene) -> Result<(), Invalid> {
     let key = "effects.spectral_index";
     match (scene.effects.redshift, scene.effects.spectral_index) {
         (true, None) => {
-            let allowed = "needed with redshift = true (1 is the law of bolometric intensity)";
-            Err(Invalid::new(key, "(missing)", allowed))
+            let why = "needed with redshift = true (1 is the law of bolometric intensity)";
+            Err(Invalid::missing(key, why))
         }
-        (false, Some(index)) => {
-            Err(Invalid::new(key, index, "only with redshift = true: without it g is 1"))
-        }
-        (true, Some(index)) => {
+        (_, Some(index)) => {
             number(key, index, (-10.0..=10.0).contains(&index), "a number in [-10, 10]")
         }
         (false, None) => Ok(()),
@@ -227,29 +281,36 @@ fn check_disc(disc: &Disc, hole: &Kerr) -> Result<(), Invalid> {
     }
     let inner = disc.inner_edge.unwrap_or(isco);
     let outer = disc.outer_edge;
-    let allowed = format!("a finite radius above the inner edge, {inner:.6}");
-    number("disc.outer_edge", outer, outer.is_finite() && outer > inner, &allowed)?;
-    not_negative("disc.peak_intensity", disc.peak_intensity)?;
+    let allowed = format!("a radius above the inner edge, {inner:.6}, and at most 1e9");
+    number("disc.outer_edge", outer, outer <= 1e9 && outer > inner, &allowed)?;
+    brightness("disc.peak_intensity", disc.peak_intensity)?;
     check_color("disc.color", disc.color)
 }
 
-fn check_spot(spot: &Spot, k: usize, hole: &Kerr) -> Result<(), Invalid> {
+/// Differential rotation winds a spot up, and the work to follow it grows with the windings.
+const LONGEST_SHEAR: f64 = 2000.0;
+
+fn check_spot(spot: &Spot, k: usize, hole: &Kerr, time: f64) -> Result<(), Invalid> {
     let key = |name: &str| format!("spot.{k}.{name}");
     let least = orbits::photon_orbit(hole).max(3.0);
-    let allowed = format!("a finite radius above {least:.4}, where circular orbits end");
-    let ok = spot.radius.is_finite() && spot.radius > least;
+    let allowed = format!("a radius above {least:.4}, where circular orbits end, and at most 1e6");
+    let ok = spot.radius <= 1e6 && spot.radius > least;
     number(key("radius"), spot.radius, ok, &allowed)?;
     finite(key("phase_deg"), spot.phase_deg)?;
     let norm = spot.axis.iter().map(|x| x * x).sum::<f64>();
-    if !(norm.is_finite() && norm > 1e-30) {
-        let allowed = "three finite numbers that are not all 0";
+    if !(1e-30..=1e30).contains(&norm) {
+        let allowed = "three numbers that are not all 0, with a length in [1e-15, 1e15]";
         return Err(Invalid::new(key("axis"), format!("{:?}", spot.axis), allowed));
     }
     let ok = spot.sigma >= 1e-3 && spot.sigma <= spot.radius;
     number(key("sigma"), spot.sigma, ok, "a width in [0.001, radius]")?;
-    not_negative(key("peak_emissivity"), spot.peak_emissivity)?;
+    brightness(key("peak_emissivity"), spot.peak_emissivity)?;
     if let Some(since) = spot.sheared_since {
-        finite(key("sheared_since"), since)?;
+        let ok = since.is_finite() && time - since <= LONGEST_SHEAR;
+        let allowed = format!(
+            "at most {LONGEST_SHEAR} M before observer.time = {time}: it is wound up by then"
+        );
+        number(key("sheared_since"), since, ok, &allowed)?;
     }
     check_color(&key("color"), spot.color)
 }
@@ -268,7 +329,7 @@ fn check_sky(sky: &Sky) -> Result<(), Invalid> {
             let ok = checker.field_deg > 0.5 && (fields - fields.round()).abs() < 1e-9;
             let allowed = "an angle above 0.5 that divides 180";
             number("sky.checker.field_deg", checker.field_deg, ok, allowed)?;
-            not_negative("sky.checker.brightness", checker.brightness)
+            brightness("sky.checker.brightness", checker.brightness)
         }
         Sky::Stars(stars) => {
             if !(1..=10_000_000).contains(&stars.count) {
@@ -277,8 +338,8 @@ fn check_sky(sky: &Sky) -> Result<(), Invalid> {
             }
             let ok = stars.radius_deg > 0.0 && stars.radius_deg <= 2.0;
             number("sky.stars.radius_deg", stars.radius_deg, ok, "an angle in (0, 2]")?;
-            not_negative("sky.stars.brightness", stars.brightness)
+            brightness("sky.stars.brightness", stars.brightness)
         }
-        Sky::Image(image) => not_negative("sky.image.brightness", image.brightness),
+        Sky::Image(image) => brightness("sky.image.brightness", image.brightness),
     }
 }

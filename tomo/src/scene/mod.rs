@@ -9,6 +9,7 @@ mod overrides;
 pub use check::SceneError;
 pub use overrides::apply_override;
 
+use kerrlight_geodesic::{Kerr, orbits};
 use serde::{Deserialize, Serialize};
 
 /// A complete scene. Lengths and times in M = GM/c² unless a name says otherwise.
@@ -242,9 +243,13 @@ impl Scene {
         Ok(scene)
     }
 
-    /// The resolved scene as TOML, defaults included.
+    /// The resolved scene as TOML, defaults included: the disc's inner edge too.
     pub fn to_toml(&self) -> String {
-        toml::to_string(self).expect("plain tables always serialise") // no maps with odd keys
+        let mut scene = self.clone();
+        if let (Some(disc), Ok(hole)) = (&mut scene.disc, Kerr::new(self.hole.spin)) {
+            disc.inner_edge.get_or_insert_with(|| orbits::isco(&hole));
+        }
+        toml::to_string(&scene).expect("plain tables always serialise") // no maps with odd keys
     }
 
     /// Width of a pixel in M.

@@ -5,7 +5,8 @@ use super::SceneError;
 use toml_edit::{DocumentMut, Item, Table, Value};
 
 /// The scene text with `key.path=value` applied, e.g. `hole.spin=0.5`,
-/// `spot.0.phase_deg=90`. A value that is no TOML is taken as a string.
+/// `spot.0.phase_deg=90`. A value that is no TOML is taken as a string; an empty one removes
+/// the key.
 ///
 /// # Errors
 /// If the text is not TOML, or the override has no `=`, an empty key or leads through
@@ -38,6 +39,12 @@ pub fn apply_override(text: &str, assignment: &str) -> Result<String, SceneError
         };
     }
     let value = value.trim();
+    if value.is_empty() {
+        return match table.remove(last) {
+            Some(_) => Ok(document.to_string()),
+            None => Err(fail("there is no such key to remove")),
+        };
+    }
     let parsed = value.parse::<Value>().unwrap_or_else(|_| Value::from(value));
     if matches!(table.get(last), Some(Item::Table(_) | Item::ArrayOfTables(_))) {
         return Err(fail("names a table, not a value"));

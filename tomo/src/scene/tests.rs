@@ -46,7 +46,13 @@ fn error(find: &str, replace: &str) -> String {
 fn exact_round_trip_through_the_resolved_scene() {
     let scene = Scene::parse(SCENE).unwrap();
     assert_eq!(scene.observer.radius, f64::INFINITY);
-    assert_eq!(Scene::parse(&scene.to_toml()).unwrap(), scene);
+    let mut resolved = Scene::parse(&scene.to_toml()).unwrap();
+    assert_eq!(
+        resolved.disc.as_ref().unwrap().inner_edge.map(|r| (1e6 * r).round()),
+        Some(2320883.0)
+    );
+    resolved.disc.as_mut().unwrap().inner_edge = None;
+    assert_eq!(resolved, scene);
 }
 
 #[test]
@@ -98,6 +104,15 @@ fn overrides_change_the_text() {
     let scene = Scene::parse(&text).unwrap();
     assert_eq!((scene.hole.spin, scene.spot[1].phase_deg), (-0.5, 90.0));
     assert!(matches!(scene.sky, Some(Sky::Checker(_))));
+}
+
+#[test]
+fn empty_overrides_remove_a_key() {
+    let text = apply_override(SCENE, "screen.field_of_view_m=").unwrap();
+    assert!(Scene::parse(&text).unwrap_err().to_string().contains("is missing"));
+    let text = apply_override(&text, "screen.field_of_view_uas=100").unwrap();
+    assert!((Scene::parse(&text).unwrap().field_of_view_m() - 19.94).abs() < 0.01);
+    assert!(apply_override(SCENE, "hole.colour=").is_err());
 }
 
 #[test]
