@@ -283,17 +283,27 @@ fn is_resolved(outcome: Outcome) -> bool {
     !matches!(outcome, Outcome::Unresolved(_))
 }
 
-/// The line of a record, counted from 1; the reader's own count leaves out skipped lines.
-fn line_of(bytes: &[u8], record: &csv::StringRecord) -> u64 {
-    let start = record.position().map_or(0, |p| p.byte() as usize).min(bytes.len());
-    let mut line = bytes[..start].iter().filter(|b| **b == b'\n').count();
-    for text in bytes[start..].split(|b| *b == b'\n') {
-        if !(text.starts_with(b"#") || text.trim_ascii().is_empty()) {
-            break;
-        }
-        line += 1;
+/// Counts the lines up to each record, skipped ones included, which the reader's own count
+/// leaves out.
+struct LineCounter<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    line: u64,
+}
+
+impl LineCounter<'_> {
+    /// The line of a record, counted from 1; records must come in order.
+    fn line_of(&mut self, record: &csv::StringRecord) -> u64 {
+        let start = record.position().map_or(0, |p| p.byte() as usize).min(self.bytes.len());
+        let lines = |bytes: &[u8]| bytes.iter().filter(|b| **b == b'\n').count() as u64;
+        self.line += lines(&self.bytes[self.at.min(start)..start]);
+        self.at = start;
+        let skipped = self.bytes[start..]
+            .split(|b| *b == b'\n')
+            .take_while(|text| text.starts_with(b"#") || text.trim_ascii().is_empty())
+            .count();
+        self.line + skipped as u64
     }
-    line as u64 + 1
 }
 
 impl Table {
@@ -319,9 +329,10 @@ impl Table {
         };
         let columns = [need("spin")?, inclination, need("alpha")?, need("beta")?];
         let mut rays = Vec::new();
+        let mut counter = LineCounter { bytes, at: 0, line: 1 };
         for record in reader.records() {
             let record = record?;
-            let line = line_of(bytes, &record);
+            let line = counter.line_of(&record);
             if record.len() != header.len() {
                 bail!("line {line}: {} fields, but {} in the header", record.len(), header.len());
             }
