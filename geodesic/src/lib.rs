@@ -24,6 +24,11 @@
 
 #[cfg(feature = "affine")]
 mod affine;
+/// The examples of the README compile and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+mod readme {}
+
 mod camera;
 mod compensated;
 mod dual;
