@@ -24,6 +24,7 @@
 
 #[cfg(feature = "affine")]
 mod affine;
+pub mod analytic;
 mod camera;
 mod compensated;
 mod dual;

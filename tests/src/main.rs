@@ -3,6 +3,7 @@
 
 mod bad_input;
 mod command_line;
+mod critical_curve;
 mod documents;
 mod kerr_references;
 mod lensing;
