@@ -38,6 +38,7 @@ pub mod orbits;
 #[cfg(feature = "rayon")]
 mod parallel;
 mod path;
+pub mod plunge;
 pub mod quadrature;
 mod radial;
 mod runge_kutta;

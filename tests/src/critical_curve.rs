@@ -45,11 +45,11 @@ fn code_mpmath_critical_curves() {
     let mut worst = [const { (0.0f64, Vec::new()) }; 8];
     for row in rows {
         let found = values(&curve(row[0], row[1]).point(row[2]));
-        for column in 0..8 {
+        for (column, worst) in worst.iter_mut().enumerate() {
             let error = miss(column, &found, &row[3..]);
             assert!(!error.is_nan(), "{row:?} {found:?}");
-            if error > worst[column].0 {
-                worst[column] = (error, row[..3].to_vec());
+            if error > worst.0 {
+                *worst = (error, row[..3].to_vec());
             }
         }
     }

@@ -14,7 +14,8 @@ use super::elliptic::{agm, cel};
 use super::root::find_root;
 use crate::kerr::Kerr;
 use crate::observer::Inclination;
-use core::f64::consts::{FRAC_2_PI, FRAC_PI_3, PI, TAU};
+use crate::orbits::{equatorial_prograde, equatorial_retrograde};
+use core::f64::consts::{FRAC_2_PI, PI, TAU};
 
 /// The critical curve on the screen of a distant observer, parametrised by the angle on the
 /// screen: α = R cos(angle), β = R sin(angle) with R > 0. The screen's origin lies
@@ -230,16 +231,4 @@ impl Family {
 /// Where ρ is the better parameter.
 fn is_slow(spin: f64) -> bool {
     spin.abs() < 0.5
-}
-
-/// r − 1 of the prograde circular photon orbit, from √(1 − a²) and |a|: accurate for
-/// |a| → 1 (Bardeen, Press & Teukolsky 1972, eq. 2.18, rewritten).
-pub(crate) fn equatorial_prograde(root: f64, spin: f64) -> f64 {
-    let t = 2.0 / 3.0 * root.atan2(spin);
-    2.0 * (0.5 * t).sin().powi(2) + 2.0 * FRAC_PI_3.sin() * t.sin()
-}
-
-/// r − 1 of the retrograde circular photon orbit, likewise.
-pub(crate) fn equatorial_retrograde(root: f64, spin: f64) -> f64 {
-    1.0 + 2.0 * (2.0 / 3.0 * root.atan2(spin)).cos()
 }

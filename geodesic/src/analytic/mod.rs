@@ -2,6 +2,8 @@
 //! alone: none of it shares an integration with the [`Tracer`](crate::Tracer).
 //!
 //! - [`CriticalCurve`]: the edge of the shadow, with what half an orbit next to it does.
+//! - [`ClosedForm`]: radius at any Mino time, and the n-th equatorial crossing.
+//! - [`LensingBand`]: where on the screen how many images of the equatorial plane lie.
 //! - [`screen`]: (λ, η) ↔ (α, β).
 //!
 //! ```
@@ -14,9 +16,13 @@
 //! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
 //! ```
 
+mod bands;
+mod closed_form;
 mod critical_curve;
 mod elliptic;
 mod root;
 pub mod screen;
 
+pub use bands::LensingBand;
+pub use closed_form::{ClosedForm, Crossing};
 pub use critical_curve::{CriticalCurve, CriticalPoint, HalfOrbit};
