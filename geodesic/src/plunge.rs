@@ -57,10 +57,10 @@ impl Plunge {
         Some([time, self.radial_velocity(r), 0.0, (a * forward + rest) / r2])
     }
 
-    /// g = ν_obs/ν_em of light with λ = L/E and η = Q/E² that leaves the flow at radius r (in M),
-    /// `outward` or inward (towards smaller r first; a backward ray that still falls inward has
-    /// light that moves outward). `None` where [`velocity`](Self::velocity) is, and where no such light
-    /// can be.
+    /// g = ν_obs/ν_em of light with λ = L/E (in M) and η = Q/E² (in M²) that leaves the flow
+    /// at radius r (in M), `outward` or inward: where a backward ray still falls inward, its
+    /// light moves outward. `None` where [`velocity`](Self::velocity) is, and where no such
+    /// light can be.
     pub fn redshift(&self, r: f64, lambda: f64, eta: f64, outward: bool) -> Option<f64> {
         let (a, r2) = (self.hole.spin(), r * r);
         let delta = self.hole.delta(r);

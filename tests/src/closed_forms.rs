@@ -16,8 +16,8 @@ fn references() -> Vec<HashMap<String, String>> {
         .collect()
 }
 
-/// All 268 rays: numbers of crossings exactly, Mino times to a few roundings, radii to 1e-15 where the
-/// rounding of the input moves them by less, else to 30 times that (`cond`), as the tracer.
+/// All 268 rays: numbers of crossings exactly, Mino times to a few roundings, radii to 1e-15
+/// or 30 times what the input's own rounding moves them by (`cond`), as for the tracer.
 #[test]
 fn code_mpmath_crossings_in_closed_form() {
     for row in references() {
@@ -60,12 +60,12 @@ fn exact_radius_along_traced_rays() {
                     path.equatorial_crossings().len(),
                     "{context}"
                 );
-                assert!((form.mino_total() / total - 1.0).abs() < 1e-6, "{context}");
+                assert!((form.mino_total() / total - 1.0).abs() < 1e-13, "{context}");
                 for k in 1..8 {
                     let mino_time = total * f64::from(k) / 8.0;
                     let expected = path.at(mino_time).inverse_radius;
                     let miss = form.inverse_radius(mino_time) - expected;
-                    assert!(miss.abs() < 1e-10 * expected, "{miss:e} {context}");
+                    assert!(miss.abs() < 5e-13 * expected, "{miss:e} {context}");
                 }
             }
         }

@@ -6,8 +6,8 @@
 //!
 //! w = (B/4 − ℘')/\[2(s² − C/4)\] = −(4s + A)/\[2(℘' + B/4)\],  s = ℘(τ) − A/12,
 //!
-//! with g₂ = A²/12 + C and g₃ = AC/6 − A³/216 − B²/16. With B ≥ 0 the first form has no cancellation
-//! while ℘' < 0, the second afterwards. Next to the critical curve two roots of
+//! with g₂ = A²/12 + C and g₃ = AC/6 − A³/216 − B²/16. With B ≥ 0 the first form has no
+//! cancellation while ℘' < 0, the second afterwards. Next to the critical curve two roots of
 //! 4e³ = g₂e + g₃ nearly coincide; their difference comes from the height of W at its minimum,
 //! which [`RadialPotential`](crate::RadialPotential) has with twice the working precision.
 
@@ -235,6 +235,9 @@ impl Roots {
         }
         let d = split.sqrt();
         let span = 1.5 * e.abs() + d;
+        if span == 0.0 {
+            return Roots::Real { largest: 0.0, span, m1: 1.0 };
+        }
         if e < 0.0 {
             Roots::Real { largest: -0.5 * e + d, span, m1: 2.0 * d / span }
         } else {
@@ -245,6 +248,10 @@ impl Roots {
     /// ℘ − A/12 and ℘'.
     fn weierstrass(&self, tau: f64, a: f64) -> (f64, f64) {
         match *self {
+            // W = 1: a ray straight into a hole without spin.
+            Roots::Real { span: 0.0, .. } => {
+                ((tau * tau).recip() - a / 12.0, -2.0 / (tau * tau * tau))
+            }
             Roots::Real { largest, span, m1 } => {
                 let (sn, cs) = sn_cs(span.sqrt() * tau, m1);
                 let cn2 = (cs * sn).powi(2);

@@ -51,9 +51,9 @@ pub struct CriticalPoint {
 pub struct HalfOrbit {
     /// Lyapunov exponent γ: successive images are demagnified by e^−γ.
     pub gamma: f64,
-    /// Azimuth δ in the sense of +z, in radians, with 2π added where λ < 0: passing over the pole, the
-    /// azimuth jumps by ±π, and with this it is continuous along the curve. π without spin.
-    /// Infinite (with the spin's sign) where the orbit lies at the horizon.
+    /// Azimuth δ in the sense of +z, in radians, with 2π added where λ < 0: over the poles
+    /// the azimuth jumps by ±π, and with this δ is continuous along the curve. π without
+    /// spin. Infinite (with the spin's sign) where the orbit lies at the horizon.
     pub delta: f64,
     /// Boyer–Lindquist time τ, in M. Infinite where the orbit lies at the horizon.
     pub tau: f64,

