@@ -64,7 +64,9 @@ impl ClosedForm {
         } else {
             radial.time_to_return()
         };
-        ClosedForm { radial, polar: Polar::new(hole, ray), start, total: end - start }
+        // The tip of an extremal hole's critical curve has coinciding infinities.
+        let total = if end.is_nan() { f64::INFINITY } else { end - start };
+        ClosedForm { radial, polar: Polar::new(hole, ray), start, total }
     }
 
     /// Mino time from the observer to the end of the ray: the horizon, or infinity. Infinite
@@ -83,6 +85,9 @@ impl ClosedForm {
     pub fn crossing_time(&self, k: u32) -> f64 {
         if k == 0 {
             return f64::NEG_INFINITY;
+        }
+        if self.polar.first.is_infinite() {
+            return f64::INFINITY;
         }
         self.polar.first + f64::from(k - 1) * self.polar.half_period
     }
@@ -122,7 +127,7 @@ impl Polar {
         if eta < 0.0 {
             return never;
         }
-        let fast2 = (quadratic * quadratic - 4.0 * quartic).sqrt();
+        let fast2 = quadratic.hypot(2.0 * (-quartic).max(0.0).sqrt());
         let slow2 = if quadratic <= 0.0 {
             0.5 * (fast2 - quadratic)
         } else {
