@@ -1,6 +1,7 @@
 //! `kerrlight`: from scene files to lensed images of black holes.
 
 mod columns;
+mod critical_curve;
 mod inspect;
 mod output;
 mod render;
@@ -28,6 +29,8 @@ enum Verb {
     Inspect(inspect::Inspect),
     /// Trace single rays from a table to a table
     Trace(trace::Trace),
+    /// Write the critical curve, the edge of the shadow, as a table
+    CriticalCurve(critical_curve::CriticalCurveTable),
 }
 
 fn main() -> ExitCode {
@@ -49,5 +52,6 @@ fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Verb::Render(render) => render.run(),
         Verb::Inspect(inspect) => inspect.run(),
         Verb::Trace(trace) => trace.run(),
+        Verb::CriticalCurve(table) => table.run(),
     }
 }

@@ -29,6 +29,7 @@ mod affine;
 #[doc = include_str!("../README.md")]
 mod readme {}
 
+pub mod analytic;
 mod camera;
 mod compensated;
 mod dual;
@@ -42,6 +43,7 @@ pub mod orbits;
 #[cfg(feature = "rayon")]
 mod parallel;
 mod path;
+pub mod plunge;
 pub mod quadrature;
 mod radial;
 mod runge_kutta;

@@ -2,7 +2,9 @@
 //! form), paper_ (a published number), code_ (another code's number), regress_ (own past).
 
 mod bad_input;
+mod closed_forms;
 mod command_line;
+mod critical_curve;
 mod documents;
 mod kerr_references;
 mod lensing;

@@ -1,0 +1,58 @@
+//! `kerrlight critical-curve`: the edge of the shadow, as a table.
+
+use crate::columns::{self, Column};
+use crate::output::{self, Output};
+use anyhow::Context;
+use clap::Args;
+use kerrlight_geodesic::analytic::{CriticalCurve, CriticalPoint, HalfOrbit};
+use kerrlight_geodesic::{Inclination, Kerr};
+use std::path::PathBuf;
+
+/// Arguments of `kerrlight critical-curve`.
+#[derive(Debug, Args)]
+pub struct CriticalCurveTable {
+    /// Spin of the hole, in [-1, 1]
+    #[arg(long, value_name = "A", allow_negative_numbers = true)]
+    spin: f64,
+    /// Angle between the spin axis and the line of sight, in [0, 180] degrees
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    inclination: f64,
+    /// How many points, at equal steps of the angle around the screen's origin, the first on
+    /// the right (beta = 0), counterclockwise
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    points: u32,
+    /// Where to write the table [default: standard output]
+    #[arg(short, long, value_name = "FILE.csv")]
+    output: Option<PathBuf>,
+}
+
+const COLUMNS: [&str; 8] = ["r", "lambda", "eta", "alpha", "beta", "gamma", "delta", "tau"];
+
+impl CriticalCurveTable {
+    /// Computes and writes the curve.
+    pub fn run(&self) -> anyhow::Result<()> {
+        let hole = Kerr::new(self.spin).context("--spin")?;
+        let inclination = Inclination::from_degrees(self.inclination).context("--inclination")?;
+        let output = self.output.as_deref().map(|path| Output::new(path, "csv")).transpose()?;
+        let points: Vec<_> =
+            CriticalCurve::new(&hole, inclination).points(self.points).map(values).collect();
+        let column = |k: usize| points.iter().map(|point| point[k]).collect();
+        let table: Vec<_> = COLUMNS
+            .iter()
+            .enumerate()
+            .map(|(k, name)| Column::Numbers((*name).to_owned(), column(k)))
+            .collect();
+        let bytes = columns::csv(&[table], points.len())?;
+        match output {
+            Some(output) => output.write(&bytes),
+            None => output::print(core::str::from_utf8(&bytes)?),
+        }
+    }
+}
+
+/// What the columns hold of a point.
+fn values(point: CriticalPoint) -> [f64; 8] {
+    let CriticalPoint { radius, lambda, eta, alpha, beta, .. } = point;
+    let HalfOrbit { gamma, delta, tau } = point.half_orbit();
+    [radius, lambda, eta, alpha, beta, gamma, delta, tau]
+}
