@@ -30,6 +30,7 @@ mod affine;
 mod readme {}
 
 pub mod analytic;
+pub mod bundle;
 mod camera;
 mod compensated;
 mod dual;

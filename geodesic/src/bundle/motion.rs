@@ -1,0 +1,180 @@
+//! The observer, the constants of a ray's motion, and the Mino time it takes.
+
+use super::elliptic::{isolated_root, rf_pair};
+use super::lanes::Real;
+use crate::kerr::Kerr;
+use crate::observer::Observer;
+
+/// Captured rays are sampled down to where 1 − r₊/r is this: at the horizon itself azimuth
+/// and time are infinite.
+pub(super) const HORIZON_MARGIN: f64 = 1e-8;
+
+/// Black hole and observer.
+#[derive(Clone, Copy, Debug)]
+pub struct Camera {
+    /// Spin a, in units of M.
+    pub spin: f64,
+    /// Sine of the observer's inclination.
+    pub sin_i: f64,
+    /// Cosine of the observer's inclination.
+    pub cos_i: f64,
+    /// Inverse radius of the observer.
+    pub w_obs: f64,
+    /// Captured rays end where `1 − r₊/r` equals this.
+    pub margin: f64,
+}
+
+impl Camera {
+    /// `observer` around `hole`.
+    pub fn new(hole: &Kerr, observer: &Observer) -> Self {
+        Self {
+            spin: hole.spin(),
+            sin_i: observer.inclination().sin(),
+            cos_i: observer.inclination().cos(),
+            w_obs: observer.inverse_radius(),
+            margin: HORIZON_MARGIN,
+        }
+    }
+
+    /// `r₊ − r₋ = 2√((1 − a)(1 + a))`, kept positive so that ratios with it stay finite.
+    #[inline(always)]
+    pub fn horizon_gap(&self) -> f64 {
+        (2.0 * ((1.0 - self.spin) * (1.0 + self.spin)).max(0.0).sqrt()).max(1e-100)
+    }
+
+    /// Outer horizon.
+    #[inline(always)]
+    pub fn r_plus(&self) -> f64 {
+        1.0 + 0.5 * self.horizon_gap()
+    }
+
+    /// Inner horizon, `a²/r₊`.
+    #[inline(always)]
+    pub fn r_minus(&self) -> f64 {
+        self.spin * self.spin / self.r_plus()
+    }
+
+    /// Where captured rays end.
+    #[inline(always)]
+    pub fn w_end(&self) -> f64 {
+        (1.0 - self.margin) / self.r_plus()
+    }
+}
+
+/// Constants of the motion: `W(w) = 1 + A w² + B w³ + C w⁴`.
+#[derive(Clone, Copy)]
+pub struct Motion<V> {
+    /// Axial angular momentum per energy, λ.
+    pub lambda: V,
+    /// Carter's constant per energy squared, η.
+    pub eta: V,
+    /// `K = η + λ²`.
+    pub k: V,
+    /// `A = a² − K`.
+    pub a: V,
+    /// `B = 2[η + (λ − a)²]`.
+    pub b: V,
+    /// `C = −a² η`.
+    pub c: V,
+    /// `κ = a² − aλ`.
+    pub kappa: V,
+}
+
+impl<V: Real> Motion<V> {
+    /// The ray that arrives at (α, β).
+    #[inline(always)]
+    pub fn new(cam: &Camera, alpha: V, beta: V) -> Self {
+        let s = V::splat;
+        let a2 = cam.spin * cam.spin;
+        let lambda = alpha * s(-cam.sin_i);
+        let eta = alpha.mul_add(alpha, s(-a2)).mul_add(s(cam.cos_i * cam.cos_i), beta * beta);
+        let k = lambda.mul_add(lambda, eta);
+        let l = lambda - s(cam.spin);
+        let b = l.mul_add(l, eta);
+        Self {
+            lambda,
+            eta,
+            k,
+            a: s(a2) - k,
+            b: b + b,
+            c: eta * s(-a2),
+            kappa: s(cam.spin) * (s(cam.spin) - lambda),
+        }
+    }
+
+    /// `W(w)`.
+    #[inline(always)]
+    pub fn radial(&self, w: V) -> V {
+        let p = self.c.mul_add(w, self.b).mul_add(w, self.a);
+        (w * w).mul_add(p, V::splat(1.0))
+    }
+
+    /// Weierstrass invariants (g₂, g₃) of the radial motion.
+    #[inline(always)]
+    pub fn radial_invariants(&self) -> (V, V) {
+        let (a, b, c) = (self.a, self.b, self.c);
+        let g2 = (a * a).mul_add(V::splat(1.0 / 12.0), c);
+        let g3 = a * c * V::splat(1.0 / 6.0)
+            - b * b * V::splat(1.0 / 16.0)
+            - a * a * a * V::splat(1.0 / 216.0);
+        (g2, g3)
+    }
+
+    /// The scale of all frequencies, `max(1, K)`.
+    #[inline(always)]
+    pub fn stiffness(&self) -> V {
+        self.k.max(V::splat(1.0))
+    }
+}
+
+/// How long a ray lasts, and what becomes of it.
+#[derive(Clone, Copy)]
+pub struct Journey<V> {
+    /// Mino time from the observer to the end of the ray.
+    pub duration: V,
+    /// One if the ray turns and returns to the observer's radius, zero if it is captured.
+    pub escapes: V,
+}
+
+impl<V: Real> Journey<V> {
+    /// Classifies the ray and measures its Mino time.
+    ///
+    /// With observer-at-infinity time z the radial motion has
+    /// `℘(z) = (1 + w')/(2w²) + A/12`, so z follows from one `R_F` of the
+    /// end point and one of the starting point.
+    #[inline(always)]
+    pub fn new(cam: &Camera, m: &Motion<V>) -> Self {
+        let s = V::splat;
+        let (g2, g3) = m.radial_invariants();
+        let e = isolated_root(g2, g3, m.stiffness() * s(1.0 / 6.0));
+        // Half the difference of the other two roots, squared; their mean is −e/2.
+        let gap = (e * e).neg_mul_add(s(0.75), g2 * s(0.25));
+        let half = e * s(-0.5);
+        let smallest = V::select(gap.lt(s(0.0)), e, e.min(half - gap.max(s(0.0)).sqrt()));
+        // Ferrari: r = z ± √(−A/2 − z² − B/(4z)), z² = −A/6 − (the smallest root).
+        let z2 = m.a.mul_add(s(-1.0 / 6.0), -smallest).max(s(1e-30));
+        let z = z2.sqrt();
+        let turn = m.a.mul_add(s(-0.5), -z2) - m.b * s(0.25) / z;
+        let r_turn = z + turn.max(s(0.0)).sqrt();
+        let escapes = V::both(s(0.0).lt(turn), s(cam.r_plus()).lt(r_turn));
+        let shift = m.a * s(1.0 / 12.0);
+        let at_turn = (r_turn * r_turn).mul_add(s(0.5), shift);
+        let w_end = s(cam.w_end());
+        // W = (1 + κw²)² − (B/2) w² (1 − r₊w)(1 − r₋w): positive terms dominate at the horizon.
+        let p = m.kappa.mul_add(w_end * w_end, s(1.0));
+        let near =
+            s(cam.margin * (1.0 - cam.r_minus() * cam.w_end()) * cam.w_end() * cam.w_end() * 0.5);
+        let speed = p.mul_add(p, -(m.b * near)).max(s(0.0)).sqrt();
+        let at_end = (speed + s(1.0)) / (w_end * w_end * s(2.0)) + shift;
+        let w_obs = s(cam.w_obs);
+        let at_start = (m.radial(w_obs).sqrt() + s(1.0)) / (w_obs * w_obs * s(2.0)) + shift;
+        let p_end = V::select(escapes, at_turn, at_end);
+        let end = rf_pair(p_end - e, p_end - half, gap);
+        let start = rf_pair(at_start - e, at_start - half, gap);
+        let inward = end - start;
+        Self {
+            duration: V::select(escapes, inward + inward, inward),
+            escapes: V::select(escapes, s(1.0), s(0.0)),
+        }
+    }
+}

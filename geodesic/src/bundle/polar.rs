@@ -1,0 +1,149 @@
+//! Equidistant samples of the polar and azimuthal motion.
+//!
+//! The direction n = (x, y, u) moves as a point on the unit sphere with
+//! `n'' = −(K + 2a²u²) n + a² u ẑ`. In a frame that turns by a fixed angle δ
+//! about the axis per step h this motion has an exact three-term recurrence
+//! (X = x + iy):
+//!
+//! ```text
+//! X₊ + X₋ = c ρ X        u₊ + u₋ = 2S' ρ u        ρ = 1/(1 + a²S²u²)
+//! S'² = 1 + A S² + C S⁴,  S(0) = 0               c = 2S'/√(1 + a²S²)
+//! δ = −a²λ ∫₀ʰ S²/(1 + a²S²) dτ
+//! ```
+//!
+//! and `∫ a²u² dτ` over a step is `a² S u u₊ + a²η ∫₀ʰ S² dτ`.
+
+use super::lanes::Real;
+use super::motion::{Camera, Motion};
+
+/// Terms of the series in h².
+const TERMS: usize = 7;
+
+/// Where the direction is, and the step that led there, in the turning frame.
+#[derive(Clone, Copy)]
+pub struct PolarState<V> {
+    /// x in the turning frame.
+    pub x: V,
+    /// y in the turning frame.
+    pub y: V,
+    /// cos θ.
+    pub u: V,
+    dx: V,
+    dy: V,
+    du: V,
+}
+
+/// The addition theorem of the polar motion for one fixed step h.
+#[derive(Clone, Copy)]
+pub struct PolarStep<V> {
+    /// `2a²S²`.
+    bend: V,
+    /// `a²S²`.
+    half_bend: V,
+    /// `2(1 − S')`.
+    rate_u: V,
+    /// `2 − c`.
+    rate_x: V,
+    /// `a²S`.
+    cross: V,
+    /// Azimuth of the turning frame gained per step.
+    pub turn: V,
+    /// `a²η ∫₀ʰ S²`.
+    pub lift: V,
+    s: V,
+    root: V,
+    twist: V,
+}
+
+impl<V: Real> PolarStep<V> {
+    /// Coefficients for the step h.
+    ///
+    /// `Y = S²` obeys `Y'' = 2 + 4A Y + 6C Y²`; all is summed as series in h².
+    #[inline(always)]
+    pub fn new(cam: &Camera, m: &Motion<V>, h: V) -> Self {
+        let k = V::splat;
+        let a2 = k(cam.spin * cam.spin);
+        let h2 = h * h;
+        let (a4, c6) = (m.a * k(4.0) * h2, m.c * k(6.0) * h2);
+        let mut y = [h2; TERMS];
+        let mut z = [h2; TERMS];
+        for n in 1..TERMS {
+            let (mut square, mut quotient) = (k(0.0), k(0.0));
+            for i in 0..n {
+                quotient = y[i].mul_add(z[n - 1 - i], quotient);
+                if i + 1 < n {
+                    square = y[i].mul_add(y[n - 2 - i], square);
+                }
+            }
+            let nf = n as f64;
+            y[n] =
+                a4.mul_add(y[n - 1], c6 * square) * k(1.0 / ((2.0 * nf + 2.0) * (2.0 * nf + 1.0)));
+            z[n] = a2.neg_mul_add(quotient, y[n]);
+        }
+        let (mut sum, mut slope, mut area, mut angle) = (k(0.0), k(0.0), k(0.0), k(0.0));
+        for n in (0..TERMS).rev() {
+            let order = 2.0 * n as f64 + 2.0;
+            sum = sum + y[n];
+            slope = y[n].mul_add(k(order), slope);
+            area = y[n].mul_add(k(1.0 / (order + 1.0)), area);
+            angle = z[n].mul_add(k(1.0 / (order + 1.0)), angle);
+        }
+        let s = sum.sqrt();
+        let ds = slope / (s * h * k(2.0));
+        let fall = -(m.c.mul_add(sum, m.a) * sum);
+        let root = a2.mul_add(sum, k(1.0)).sqrt();
+        let inv_root = k(1.0) / root;
+        Self {
+            bend: a2 * sum * k(2.0),
+            half_bend: a2 * sum,
+            rate_u: fall * k(2.0) / (ds + k(1.0)),
+            rate_x: a2.mul_add(sum, fall) * k(2.0) / (root + ds) * inv_root,
+            cross: a2 * s,
+            turn: -(a2 * m.lambda * h * angle),
+            lift: a2 * m.eta * h * area,
+            s,
+            root,
+            twist: a2 * m.lambda * s * sum * inv_root,
+        }
+    }
+
+    /// The state one step after the observer.
+    #[inline(always)]
+    pub fn start(&self, cam: &Camera, alpha: V, beta: V) -> (V, V, PolarState<V>) {
+        let k = V::splat;
+        let (x, u) = (k(cam.sin_i), k(cam.cos_i));
+        let (vx, vy, vu) = (beta * k(-cam.cos_i), alpha, beta * k(cam.sin_i));
+        let e = self.half_bend * k(cam.cos_i * cam.cos_i);
+        let rho = (e + k(1.0)).recip();
+        let speed = self.s * self.root;
+        let du = (self.s * vu - u * self.rate_u.mul_add(k(0.5), e)) * rho;
+        let dx = (speed * vx - x * self.rate_x.mul_add(k(0.5), e)) * rho;
+        let dy = (speed * vy + self.twist * x) * rho;
+        (x, u, PolarState { x: x + dx, y: dy, u: u + du, dx, dy, du })
+    }
+
+    /// One step on.
+    #[inline(always)]
+    pub fn advance(&self, n: PolarState<V>) -> PolarState<V> {
+        // ρ is needed last, so that the chain from u to the next u stays short.
+        let u2 = n.u * n.u;
+        let rho = self.half_bend.mul_add(u2, V::splat(1.0)).recip();
+        let fu = self.bend.mul_add(u2, self.rate_u);
+        let fx = self.bend.mul_add(u2, self.rate_x);
+        let (px, py, pu) = (fx * n.x, fx * n.y, fu * n.u);
+        PolarState {
+            x: rho.neg_mul_add(px, n.x + n.dx),
+            y: rho.neg_mul_add(py, n.y + n.dy),
+            u: rho.neg_mul_add(pu, n.u + n.du),
+            dx: rho.neg_mul_add(px, n.dx),
+            dy: rho.neg_mul_add(py, n.dy),
+            du: rho.neg_mul_add(pu, n.du),
+        }
+    }
+
+    /// `∫ a²u² dτ` over the step between neighbouring u, less [`Self::lift`].
+    #[inline(always)]
+    pub fn gain(&self, u: V, next: V, sum: V) -> V {
+        (self.cross * u).mul_add(next, sum)
+    }
+}
