@@ -122,7 +122,7 @@ fn bundles(c: &mut Criterion) {
             continue;
         }
         let mut samples = Samples::default();
-        let mut run = |samples: &mut Samples| {
+        let run = |samples: &mut Samples| {
             samples.trace_at(width, &hole, &observer, &alpha, &beta, 100).expect("rays");
         };
         run(&mut samples);
