@@ -117,7 +117,7 @@ fn bundles(c: &mut Criterion) {
     let expected: f64 = alpha.iter().zip(&beta).map(&mut length).sum();
     let mut group = c.benchmark_group("4096 rays x 100 samples, bundle");
     group.throughput(Throughput::Elements(409_600));
-    for width in [Width::Scalar, Width::Portable, Width::Avx2, Width::Avx512] {
+    for width in [Width::Scalar, Width::Avx2, Width::Avx512] {
         if !width.available() {
             continue;
         }

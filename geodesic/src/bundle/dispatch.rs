@@ -1,6 +1,6 @@
 //! Chooses the widest lanes that the machine has, at run time.
 
-use super::lanes::{Array, Real};
+use super::lanes::Real;
 
 /// Something to be done with lanes of any width.
 ///
@@ -18,8 +18,6 @@ pub trait Task {
 pub enum Width {
     /// One number at a time.
     Scalar,
-    /// Four lanes in plain arrays.
-    Portable,
     /// Four lanes, AVX2 and FMA.
     Avx2,
     /// Eight lanes, AVX-512 F and DQ.
@@ -30,7 +28,7 @@ impl Width {
     /// Whether this machine can run it.
     pub fn available(self) -> bool {
         match self {
-            Self::Scalar | Self::Portable => true,
+            Self::Scalar => true,
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
             #[cfg(target_arch = "x86_64")]
@@ -45,7 +43,7 @@ impl Width {
     /// The widest one that this machine can run and that has been measured: AVX-512 has to be
     /// asked for.
     pub fn best() -> Self {
-        if Self::Avx2.available() { Self::Avx2 } else { Self::Portable }
+        if Self::Avx2.available() { Self::Avx2 } else { Self::Scalar }
     }
 }
 
@@ -61,7 +59,7 @@ fn run_avx512<T: Task>(task: T) -> T::Output {
     task.run::<super::lanes::avx512::F64x8>()
 }
 
-/// Runs the task at the given width, or with portable lanes if the machine lacks it.
+/// Runs the task at the given width, or one number at a time if the machine lacks it.
 pub fn dispatch<T: Task>(width: Width, task: T) -> T::Output {
     #[cfg(target_arch = "x86_64")]
     {
@@ -74,8 +72,5 @@ pub fn dispatch<T: Task>(width: Width, task: T) -> T::Output {
             return unsafe { run_avx2(task) };
         }
     }
-    match width {
-        Width::Scalar => task.run::<f64>(),
-        _ => task.run::<Array<4>>(),
-    }
+    task.run::<f64>()
 }

@@ -6,7 +6,7 @@
 //! constant coefficients (`radial`, `polar` in the source); azimuth and time are
 //! quadratures of smooth functions of them over the same nodes, ten points an interval. The
 //! length of a ray and its fate come from one Carlson integral of each end point. The
-//! instruction set is chosen at run time (AVX2 with FMA, or portable code; AVX-512 on request).
+//! instruction set is chosen at run time (AVX2 with FMA, else one ray at a time; AVX-512 on request).
 //!
 //! ```
 //! use kerrlight_geodesic::bundle::Samples;

@@ -8,7 +8,7 @@ use super::polar::{PolarState, PolarStep};
 use super::radial::RadialRun;
 
 /// Largest step in units of `1/√max(1, η + λ²)` that the quadrature is trusted with.
-const MAX_STEP: f64 = 0.1;
+const MAX_STEP: f64 = 0.08;
 
 /// Where the samples of a block of rays go, ray after ray.
 pub(super) struct Target<'a> {

@@ -82,7 +82,7 @@ fn exact_same_samples_at_every_width() {
     let (alpha, beta) = grid(16, 8.0);
     let mut scalar = Samples::default();
     scalar.trace_at(Width::Scalar, &hole, &observer, &alpha, &beta, 40).unwrap();
-    for width in [Width::Portable, Width::Avx2, Width::Avx512] {
+    for width in [Width::Avx2, Width::Avx512] {
         if !width.available() {
             continue;
         }

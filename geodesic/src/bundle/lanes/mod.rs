@@ -1,7 +1,7 @@
 //! The scalar trait [`Real`] and its lane types.
 //!
-//! One kernel source serves every width: `f64` itself, the portable
-//! [`Array`], and the hardware vectors of the x86-64 modules. The hardware
+//! One kernel source serves every width: `f64` itself and the hardware vectors of the x86-64
+//! modules. The hardware
 //! types are only ever constructed inside functions that carry the matching
 //! `#[target_feature]` and that are reached after run-time detection.
 
@@ -10,8 +10,6 @@ pub(crate) mod avx2;
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod avx512;
 mod portable;
-
-pub use portable::Array;
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
