@@ -168,18 +168,8 @@ impl Trace {
             _ => path.mino_total(),
         };
         let crossings: Vec<f64> = path.equatorial_crossings().filter(|t| *t <= total).collect();
-        Ok(Traced {
-            outcome: path.outcome(),
-            count: crossings.len(),
-            mino_total: if is_resolved(path.outcome()) { total } else { f64::NAN },
-            r_min: path.turning_point().map_or(f64::NAN, |(_, r)| r),
-            crossings: crossings
-                .into_iter()
-                .take(usize::from(self.crossings))
-                .map(|t| path.at(t))
-                .collect(),
-            samples: self.times(total, path.outcome()).map(|t| path.at(t)).collect(),
-        })
+        let r_min = path.turning_point().map_or(f64::NAN, |(_, r)| r);
+        Ok(self.collect(path.outcome(), total, r_min, &crossings, |t| path.at(t)))
     }
 
     fn by_affine_parameter(
@@ -192,18 +182,28 @@ impl Trace {
         let path = tracer.trace(hole, observer, line.alpha, line.beta)?;
         let crossings = path.equatorial_crossings();
         let total = path.mino_total();
-        Ok(Traced {
-            outcome: path.outcome(),
+        let r_min = path.closest_approach().unwrap_or(f64::NAN);
+        Ok(self.collect(path.outcome(), total, r_min, &crossings, |t| path.at(t)))
+    }
+
+    /// What is written about a ray whose position at any Mino time is `at`.
+    fn collect(
+        &self,
+        outcome: Outcome,
+        total: f64,
+        r_min: f64,
+        crossings: &[f64],
+        at: impl Fn(f64) -> PathPoint,
+    ) -> Traced {
+        let wanted = crossings.iter().take(usize::from(self.crossings));
+        Traced {
+            outcome,
             count: crossings.len(),
-            mino_total: if is_resolved(path.outcome()) { total } else { f64::NAN },
-            r_min: path.closest_approach().unwrap_or(f64::NAN),
-            crossings: crossings
-                .into_iter()
-                .take(usize::from(self.crossings))
-                .map(|t| path.at(t))
-                .collect(),
-            samples: self.times(total, path.outcome()).map(|t| path.at(t)).collect(),
-        })
+            mino_total: if is_resolved(outcome) { total } else { f64::NAN },
+            r_min,
+            crossings: wanted.map(|t| at(*t)).collect(),
+            samples: self.times(total, outcome).map(at).collect(),
+        }
     }
 
     /// Mino times of the samples.
