@@ -96,6 +96,9 @@ impl core::ops::Div for Double {
     fn div(self, o: Self) -> Self {
         // Two steps of long division, the remainder of each exact to twice the precision.
         let first = self.hi / o.hi;
+        if !first.is_finite() || !o.hi.is_finite() {
+            return Double::from(first);
+        }
         let rest = self - o * Double::from(first);
         let second = rest.hi / o.hi;
         let rest = rest - o * Double::from(second);

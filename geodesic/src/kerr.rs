@@ -71,14 +71,16 @@ impl<T: Elementary> Kerr<T> {
 
     /// w/(1 − r₋w) · ln[(r − r₊)/(r − r₋)] / x with x = (r₊ − r₋)w/(1 − r₋w), w = 1/r:
     /// the logarithm of both closed forms below, divided by the gap of the horizons so
-    /// that it stays regular for a → 1 and for r → ∞.
+    /// that it stays regular for a → 1 and for r → ∞. At the horizon, where it diverges, it
+    /// is that of the last double outside.
     fn horizon_log(&self, w: T) -> T {
         let inv = w / (T::constant(1.0) - self.inner_horizon() * w);
         let x = self.horizon_gap * inv;
         let ratio = if x.value() == 0.0 {
             T::constant(-1.0) - T::constant(0.5) * x
-        } else if x.value() >= 1.0 {
-            T::constant(f64::NEG_INFINITY)
+        } else if x.value() >= 1.0 - T::EPSILON {
+            // The last number outside the horizon.
+            T::constant((-1.0 + f64::EPSILON).ln_1p()) / x
         } else {
             (-x).ln_1p() / x
         };
@@ -88,10 +90,7 @@ impl<T: Elementary> Kerr<T> {
     /// ∫_r^∞ −a dr/Δ = \[a/(r₊ − r₋)\] ln\[(r − r₊)/(r − r₋)\] as a function of w = 1/r:
     /// the azimuth's term that is singular at the horizon. Zero at infinity.
     pub fn azimuth_closed_form(&self, w: T) -> T {
-        let log = self.horizon_log(w);
-        // Without spin nothing diverges at the horizon.
-        let nothing = self.spin.value() == 0.0 && log.value().is_infinite();
-        if nothing { T::constant(0.0) } else { self.spin * log }
+        self.spin * self.horizon_log(w)
     }
 
     /// The tortoise coordinate r* = r + 2 ln(r − r₋) + 2r₊/(r₊ − r₋) · ln\[(r − r₊)/(r − r₋)\]

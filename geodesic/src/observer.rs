@@ -40,6 +40,12 @@ impl Inclination {
         };
         Ok(Self::of(degrees.to_radians(), sin, cos))
     }
+
+    /// The same angle with all digits of its sine and cosine.
+    pub fn widen(self) -> Inclination<Double> {
+        let [sin, cos] = self.wide;
+        Inclination::of(Double::from(self.radians), sin, cos)
+    }
 }
 
 impl<T: Elementary> Inclination<T> {
@@ -88,6 +94,14 @@ pub struct Observer<T: Elementary = f64> {
     inclination: Inclination<T>,
     azimuth: f64,
     inverse_radius: f64,
+}
+
+impl Observer {
+    /// The same observer for numbers of twice the precision.
+    pub fn widen(self) -> Observer<Double> {
+        let Observer { inclination, azimuth, inverse_radius } = self;
+        Observer { inclination: inclination.widen(), azimuth, inverse_radius }
+    }
 }
 
 impl<T: Elementary> Observer<T> {

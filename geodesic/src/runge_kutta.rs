@@ -20,6 +20,9 @@ pub(crate) struct Tableau<const S: usize> {
 /// A method whose coefficients the compiler knows, so that the loops over its stages unroll.
 pub(crate) trait Method<const S: usize> {
     const TABLEAU: Tableau<S>;
+    /// How much larger the true local error may be than h times the estimate of it: measured
+    /// (docs/accuracy.md of the repository).
+    const CAUTION: f64;
 }
 
 /// Dormand & Prince 1980, J. Comp. Appl. Math. 6, 19: order 5(4), seven stages.
@@ -27,6 +30,7 @@ pub(crate) struct DormandPrince5;
 
 impl Method<7> for DormandPrince5 {
     const TABLEAU: Tableau<7> = DORMAND_PRINCE_5;
+    const CAUTION: f64 = 1.2;
 }
 
 const DORMAND_PRINCE_5: Tableau<7> = Tableau {
@@ -66,6 +70,7 @@ pub(crate) struct DormandPrince8;
 
 impl Method<13> for DormandPrince8 {
     const TABLEAU: Tableau<13> = DORMAND_PRINCE_8;
+    const CAUTION: f64 = 2.0;
 }
 
 #[rustfmt::skip]

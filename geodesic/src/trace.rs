@@ -2,7 +2,7 @@
 
 use crate::error::{OutOfRange, check};
 use crate::kerr::Kerr;
-use crate::mino::{System, has_azimuth, index};
+use crate::mino::{System, has_azimuth, has_time, index};
 use crate::observer::Ray;
 use crate::path::{Outcome, Path, Segment, Unresolved, turn};
 use crate::runge_kutta::{DormandPrince5, DormandPrince8};
@@ -243,7 +243,7 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
             return None;
         }
         let horizon = self.state.system.scale * self.state.ray.potential.horizon.value();
-        let at_horizon = w >= horizon * (1.0 - 1e-12);
+        let at_horizon = w >= horizon * (1.0 - 1e-12) && self.may_fall();
         let lost = Outcome::Unresolved(Unresolved::PhotonOrbit);
         Some(if at_horizon { Outcome::Captured } else { lost })
     }
@@ -251,8 +251,8 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
     /// Takes the step into the path; true if the ray has ended in it.
     fn accept(&mut self, made: Made<T, N>) -> bool {
         let Made { h, mut y, error } = made;
-        self.project(&mut y);
-        self.spend(&error, &y, h);
+        let projected = self.project(&mut y);
+        self.spend(&error, &y, h, projected);
         let before = [self.state.y[index::X.min(N - 1)], self.state.y[index::Y.min(N - 1)]];
         let path = &mut *self.path;
         self.stepper.dense(&self.state, &y, h, &mut path.series, &mut path.coefficients);
@@ -276,7 +276,7 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
     }
 
     /// Adds the errors of a step to the budget: see [`uncertainty`](crate::uncertainty).
-    fn spend(&mut self, error: &[f64; N], y: &[T; N], h: f64) {
+    fn spend(&mut self, error: &[f64; N], y: &[T; N], h: f64, projected: bool) {
         let eps = T::EPSILON;
         let [a, b, c] = self.state.system.radial().map(T::value);
         let (w, rate) = (y[index::W].value(), y[index::DW].value());
@@ -285,27 +285,47 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
         let rounding = eps * (w.abs() + h * rate.abs());
         let kick = eps * h * w.abs() * (a.abs() + w.abs() * (b.abs() + w.abs() * c.abs()));
         let speed = rate.hypot(pull).max(1e-300);
-        let miss = error[index::W].abs() + rounding + error[index::DW].abs() + kick;
-        self.budget.phase += miss / speed;
+        let truncation = (error[index::W].abs() + error[index::DW].abs()) / speed;
+        let blur = (rounding + kick) / speed;
+        self.budget.rounding += blur * blur;
+        // Off dw/dτ = ±√W the error of W stays, and speeds the ray up or slows it down.
+        let [slip, jerk] = [error[index::W].abs() + rounding, error[index::DW].abs() + kick];
+        let energy = 2.0 * (rate.abs() * jerk + pull.abs() * slip);
+        self.budget.energy = if projected { 0.0 } else { self.budget.energy + energy };
+        let truncation = truncation + 0.5 * h * self.budget.energy / (speed * speed);
+        self.budget.phase += truncation;
         self.budget.local = error[index::W].abs() / w.abs().max(1e-300);
         let mut turn = error[index::U].abs() + error[index::DU].abs();
         if has_azimuth(N) {
             for k in [index::X, index::DX, index::Y, index::DY] {
                 turn = turn.max(error[k].abs());
             }
-            let end = y[index::AZIMUTH].value().abs();
-            self.budget.azimuth += error[index::AZIMUTH].abs() + eps * (end + h);
         }
         self.budget.direction += turn + eps * (1.0 + h);
-        if crate::mino::has_time(N) {
-            let end = y[N - 1].value().abs();
-            self.budget.delay += error[N - 1].abs() + eps * (end + h);
+        if !has_azimuth(N) && !has_time(N) {
+            return;
+        }
+        // The quadratures dwell longer or shorter where the step's phase is wrong, and know
+        // their slope as well as the denominator g.
+        let way = T::constant(self.state.leg);
+        let g = self.state.system.blur(&self.state.y, way).value().abs();
+        let dwell = (truncation + blur) / h + 4.0 * eps * g;
+        let quadrature = |k: usize| {
+            let (start, end) = (self.state.y[k].value(), y[k].value());
+            error[k].abs() + (end - start).abs() * dwell + eps * (end.abs() + h)
+        };
+        if has_azimuth(N) {
+            self.budget.azimuth += quadrature(index::AZIMUTH);
+        }
+        if has_time(N) {
+            self.budget.delay += quadrature(N - 1);
         }
     }
 
     /// Puts dw/dτ back on dw/dτ = ±√W wherever the root is well conditioned. Next to the
-    /// critical curve this is what keeps the ray on its own side of the barrier.
-    fn project(&self, y: &mut [T; N]) {
+    /// critical curve this is what keeps the ray on its own side of the barrier. Whether it
+    /// did.
+    fn project(&self, y: &mut [T; N]) -> bool {
         let potential = &self.state.ray.potential;
         let value = potential.value(y[index::W] / T::constant(self.state.system.scale));
         let floor = match &potential.barrier {
@@ -313,10 +333,12 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
             Some(_) => 0.0,
             None => 0.25,
         };
-        if value.value() > floor {
-            let sign = if potential.captures() { self.state.leg } else { y[index::DW].value() };
-            y[index::DW] = value.sqrt() * T::constant(1f64.copysign(sign));
+        if value.value() <= floor {
+            return false;
         }
+        let sign = if potential.captures() { self.state.leg } else { y[index::DW].value() };
+        y[index::DW] = value.sqrt() * T::constant(1f64.copysign(sign));
+        true
     }
 
     /// Looks for events in the step just taken; true if the ray has ended in it.
@@ -359,7 +381,8 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
         let horizon = T::constant(self.state.system.scale) * self.state.ray.potential.horizon;
         // Within rounding: a ray on the straight part of an extremal hole's critical curve
         // approaches the horizon but never reaches it.
-        if w.value() >= horizon.value() * (1.0 - 64.0 * f64::EPSILON) && rate >= 0.0 {
+        let there = w.value() >= horizon.value() * (1.0 - 64.0 * f64::EPSILON);
+        if there && rate >= 0.0 && self.may_fall() {
             let target = if w.value() < horizon.value() { w } else { horizon };
             return Some((radial.solve(target, 0.0, 1.0), Outcome::Captured));
         }
@@ -367,6 +390,13 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
             return Some((radial.solve(T::constant(0.0), 0.0, 1.0), Outcome::Escaped));
         }
         None
+    }
+
+    /// Whether the potential lets the ray reach the horizon.
+    fn may_fall(&self) -> bool {
+        let potential = &self.state.ray.potential;
+        let outside = |w: f64| self.state.ray.inverse_radius < w;
+        potential.captures() || !potential.barrier.is_some_and(|barrier| outside(barrier.w))
     }
 
     /// On an outward leg g is written with −dw/dτ and the closed forms change sign; the

@@ -41,8 +41,12 @@ impl Uncertainty {
 /// The errors that the steps of a path have made so far, in scaled units.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Budget {
-    /// Error of the radial phase, a scaled time.
+    /// Error of the radial phase, a scaled time, from what the steps leave out.
     pub phase: f64,
+    /// Square of its rounding errors: of random signs, they add up like a random walk.
+    pub rounding: f64,
+    /// Error of W since the last time that dw/dτ was put on ±√W.
+    pub energy: f64,
     /// Relative error of b·w that a step's interpolation makes.
     pub local: f64,
     /// Error of the direction on the sphere.
@@ -52,6 +56,9 @@ pub(crate) struct Budget {
     /// Error of I_t/b.
     pub delay: f64,
 }
+
+/// Standard deviations that rounding is allowed.
+const ROUNDINGS: f64 = 6.0;
 
 impl Budget {
     /// What it means at a point of the path.
@@ -67,7 +74,7 @@ impl Budget {
         let [x, y, _] = point.direction.map(T::value);
         let a = hole.spin().value();
         // Mino time by which the ray may be early or late, and what the interpolation adds.
-        let late = self.phase / scale;
+        let late = (self.phase + ROUNDINGS * self.rounding.sqrt()) / scale;
         let speed = point.inverse_radius_rate.value().abs();
         let local = self.local * w;
         let radius = if w > 0.0 { (speed * late + local) / w + 4.0 * eps } else { 0.0 };
