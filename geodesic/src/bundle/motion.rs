@@ -166,12 +166,14 @@ impl<V: Real> Journey<V> {
             s(cam.margin * (1.0 - cam.r_minus() * cam.w_end()) * cam.w_end() * cam.w_end() * 0.5);
         let speed = p.mul_add(p, -(m.b * near)).max(s(0.0)).sqrt();
         let at_end = (speed + s(1.0)) / (w_end * w_end * s(2.0)) + shift;
-        let w_obs = s(cam.w_obs);
-        let at_start = (m.radial(w_obs).sqrt() + s(1.0)) / (w_obs * w_obs * s(2.0)) + shift;
         let p_end = V::select(escapes, at_turn, at_end);
         let end = rf_pair(p_end - e, p_end - half, gap);
-        let start = rf_pair(at_start - e, at_start - half, gap);
-        let inward = end - start;
+        let mut inward = end;
+        if cam.w_obs > 0.0 {
+            let w_obs = s(cam.w_obs);
+            let at_start = (m.radial(w_obs).sqrt() + s(1.0)) / (w_obs * w_obs * s(2.0)) + shift;
+            inward = end - rf_pair(at_start - e, at_start - half, gap);
+        }
         Self {
             duration: V::select(escapes, inward + inward, inward),
             escapes: V::select(escapes, s(1.0), s(0.0)),

@@ -1,14 +1,14 @@
 //! One block of rays, sampled equidistantly in Mino time.
 
 use super::dispatch::Task;
-use super::lanes::{CHUNK, MAX_LANES, Real, transpose_plain};
+use super::lanes::{CHUNK, MAX_LANES, Pair, Real, transpose_plain};
 use super::math::{SMALL_ANGLE, atan2, small_asin, small_atan};
 use super::motion::{Camera, Journey, Motion};
-use super::polar::{PolarState, PolarStep};
+use super::polar::{PolarState, PolarStep, unwrap};
 use super::radial::RadialRun;
 
 /// Largest step in units of `1/√max(1, η + λ²)` that the quadrature is trusted with.
-const MAX_STEP: f64 = 0.08;
+pub(super) const MAX_STEP: f64 = 0.08;
 
 /// Where the samples of a block of rays go, ray after ray.
 pub(super) struct Target<'a> {
@@ -44,13 +44,15 @@ impl Task for Block<'_, '_> {
     #[inline(always)]
     fn run<V: Real>(self) {
         let Self { rays, out } = self;
-        plan::<V>(&rays, out);
+        plan::<Pair<V>>(&rays, out);
         let order = arrange(&rays, out);
         let mut radial = vec![[V::splat(0.0); 3]; rays.per_ray];
         for group in order.chunk_by(|a, b| a.key == b.key) {
             for block in group.chunks(V::LANES) {
                 let Some(Item { key, .. }) = block.first() else { continue };
-                match (key.escapes, key.fine == 1) {
+                // Worth its own code where the arithmetic is fast.
+                let plain = V::LANES > 2 && key.fine == 1;
+                match (key.escapes, plain) {
                     (true, true) => sample_block::<V, true, true>(&rays, block, &mut radial, out),
                     (false, true) => sample_block::<V, false, true>(&rays, block, &mut radial, out),
                     (true, false) => sample_block::<V, true, false>(&rays, block, &mut radial, out),
@@ -245,6 +247,8 @@ fn radial_leg<V: Real, const ESCAPE: bool, const PLAIN: bool>(
 struct PolarRun<V> {
     step: PolarStep<V>,
     ahead: PolarState<V>,
+    /// The sign of −λ, in which azimuth grows.
+    sense: V,
     x: V,
     y: V,
     u: V,
@@ -258,7 +262,8 @@ struct PolarRun<V> {
 }
 
 impl<V: Real> PolarRun<V> {
-    /// `first` are the radial parts at the observer, where time and azimuth are zero.
+    /// `first` are the radial parts at the observer, where time and azimuth are zero; at infinity
+    /// the parts themselves are what is asked for.
     #[inline(always)]
     fn new(
         cam: &Camera,
@@ -271,18 +276,25 @@ impl<V: Real> PolarRun<V> {
         let step = PolarStep::new(cam, m, h);
         let (_, u, ahead) = step.start(cam, alpha, beta);
         let spin = s(cam.spin);
+        // Any length will do for the azimuth. From the axis a ray leaves in one direction.
+        let (mut x, mut y, mut start) = (s(1.0), s(0.0), s(0.0));
+        if cam.sin_i == 0.0 {
+            (x, y) = (beta * s(-cam.cos_i), alpha);
+            start = atan2(y, x);
+        }
+        let (t, phi) = if cam.w_obs > 0.0 { (-t, start - phi) } else { (s(0.0), start) };
         Self {
             step,
             ahead,
-            // Any length will do for the azimuth; this one also serves on the axis.
-            x: s(1.0),
-            y: s(0.0),
+            sense: s(1.0).copysign(alpha),
+            x,
+            y,
             u,
             s: s(cam.sin_i),
             theta: s(cam.sin_i.atan2(cam.cos_i)),
-            phi: -phi,
+            phi,
             phi_rate: spin.mul_add(h, step.turn),
-            t: -t,
+            t,
             t_rate: (spin * (m.lambda - spin)).mul_add(h, step.lift),
         }
     }
@@ -302,7 +314,7 @@ impl<V: Real> PolarRun<V> {
         let (d_theta, d_phi) = if V::all(small) {
             (small_asin(rise), small_atan(cross * dot.recip()))
         } else {
-            (atan2(rise, u.mul_add(self.u, s * self.s)), atan2(cross, dot))
+            (atan2(rise, u.mul_add(self.u, s * self.s)), unwrap(atan2(cross, dot), self.sense))
         };
         self.theta = self.theta + d_theta;
         self.phi = self.phi + (d_phi + self.phi_rate);
