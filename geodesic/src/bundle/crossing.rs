@@ -8,6 +8,7 @@
 
 use super::dispatch::Task;
 use super::elliptic::{agm, rf_from};
+use super::error::estimate;
 use super::lanes::{MAX_LANES, Real};
 use super::math::atan2;
 use super::motion::{Camera, Journey, Motion};
@@ -25,6 +26,7 @@ pub(super) struct Target<'a> {
     pub radius: &'a mut [f64],
     pub azimuth: &'a mut [f64],
     pub mino_time: &'a mut [f64],
+    pub error: &'a mut [f64],
 }
 
 /// The work of one block of rays, at any width of lanes.
@@ -48,9 +50,9 @@ impl Task for Block<'_, '_> {
             let to = alpha.len().min(from + V::LANES);
             let (alpha, beta) = (V::load(&alpha[from..to]), V::load(&beta[from..to]));
             let rays = Bundle::new(&camera, start, alpha, beta);
-            let columns =
-                [&mut *out.delay, &mut *out.radius, &mut *out.azimuth, &mut *out.mino_time]
-                    .map(|column| &mut column[from * count..to * count]);
+            let Target { delay, radius, azimuth, mino_time, error } = &mut *out;
+            let columns = [&mut **delay, radius, azimuth, mino_time, error]
+                .map(|column| &mut column[from * count..to * count]);
             let (point, polar) = rays.first();
             if count == 1 {
                 for (column, x) in columns.into_iter().zip(point) {
@@ -63,8 +65,12 @@ impl Task for Block<'_, '_> {
     }
 }
 
-/// Delay, radius, azimuth and Mino time of a crossing.
-type Point<V> = [V; 4];
+/// Delay, radius, azimuth, Mino time and error of a crossing.
+type Point<V> = [V; 5];
+
+/// Radius, the radial parts of time and azimuth, how much a phase error counts,
+/// and the greatest r₊/r on the way.
+type Radial<V> = [V; 5];
 
 /// Rays side by side.
 struct Bundle<'a, V> {
@@ -104,7 +110,7 @@ impl<'a, V: Real> Bundle<'a, V> {
         let exists = self.time.lt(self.journey.duration);
         if !V::any(exists) {
             let none = s(f64::NAN);
-            return ([none; 4], Polar { azimuth: none, time: none });
+            return ([none; 5], Polar { azimuth: none, time: none });
         }
         // Lanes without a crossing take the shortest of ways.
         let time = V::select(exists, self.time, self.journey.duration * s(1e-3));
@@ -125,7 +131,7 @@ impl<'a, V: Real> Bundle<'a, V> {
         &self,
         (point, first): (Point<V>, Polar<V>),
         count: usize,
-        mut columns: [&mut [f64]; 4],
+        mut columns: [&mut [f64]; 5],
     ) {
         for column in &mut columns {
             column.fill(f64::NAN);
@@ -192,7 +198,7 @@ impl<'a, V: Real> Bundle<'a, V> {
     /// r and the radial parts of time and azimuth at `time`. The polar motion goes along in the
     /// same loop: each waits for its own divisions.
     #[inline(always)]
-    fn radial(&self, time: V, steps: usize, mut polar: Option<&mut PolarSum<V>>) -> [V; 3] {
+    fn radial(&self, time: V, steps: usize, mut polar: Option<&mut PolarSum<V>>) -> Radial<V> {
         let s = V::splat;
         let (camera, m) = (self.camera, &self.motion);
         let turning = self.journey.duration * s(0.5);
@@ -219,8 +225,13 @@ impl<'a, V: Real> Bundle<'a, V> {
         let t = end.time + (self.start[0] - closed[0]);
         let phi = end.turn.neg_mul_add(spin, closed[1] - self.start[1]);
         let r = end.w.recip();
+        // aP/Δ, which is about a(1 + a²w²)/[(1 − r₊w)(1 − r₋w)], is large next to the horizon.
+        let delta = end.w.neg_mul_add(s(camera.r_plus()), s(1.0))
+            * end.w.neg_mul_add(s(camera.r_minus()), s(1.0));
+        let drag = s(2.0 * camera.spin.abs()) / delta.max(s(1e-16));
+        let speed = drag.max(s(3.0));
         if !V::any(outward) {
-            return [r, t, phi];
+            return [r, t, phi, speed, end.w * s(camera.r_plus())];
         }
         // From there to the turning point, and back.
         let rest = V::select(outward, turning - inner, inner);
@@ -238,15 +249,20 @@ impl<'a, V: Real> Bundle<'a, V> {
             r,
             V::select(outward, dt.mul_add(twice, t), t),
             V::select(outward, dphi.mul_add(twice, phi), phi),
+            V::select(outward, r, speed),
+            V::select(outward, turn.w, end.w) * s(camera.r_plus()),
         ]
     }
 
     #[inline(always)]
-    fn point(&self, time: V, exists: V::Mask, [r, t, phi]: [V; 3], polar: Polar<V>) -> Point<V> {
+    fn point(&self, time: V, exists: V::Mask, radial: Radial<V>, polar: Polar<V>) -> Point<V> {
+        let [r, t, phi, speed, depth] = radial;
         let s = V::splat;
         let spin = s(self.camera.spin);
         let delay = (spin * (self.motion.lambda - spin)).mul_add(time, t + polar.time);
         let azimuth = spin.mul_add(time, polar.azimuth + phi);
+        let b = self.motion.stiffness().sqrt();
+        let error = estimate(self.journey.condition, b, speed, s(MAX_STEP), depth);
         // No closures here: they would be compiled without the instruction set.
         let none = s(f64::NAN);
         [
@@ -254,6 +270,7 @@ impl<'a, V: Real> Bundle<'a, V> {
             V::select(exists, r, none),
             V::select(exists, azimuth, none),
             V::select(exists, time, none),
+            V::select(exists, error, none),
         ]
     }
 }
@@ -353,7 +370,7 @@ fn greatest<V: Real>(x: V) -> f64 {
 
 /// Crossing `number` of each ray, out of `count`.
 #[inline(always)]
-fn scatter<V: Real>(point: Point<V>, number: usize, count: usize, columns: &mut [&mut [f64]; 4]) {
+fn scatter<V: Real>(point: Point<V>, number: usize, count: usize, columns: &mut [&mut [f64]; 5]) {
     let mut lanes = [0.0; MAX_LANES];
     for (x, column) in point.into_iter().zip(columns) {
         x.store(&mut lanes);

@@ -1,9 +1,10 @@
 //! Equatorial crossings of many rays.
 
+use super::column::Column;
 use super::crossing::{Block, Target};
 use super::dispatch::{Width, dispatch};
 use super::motion::Camera;
-use super::{BLOCK, checked, resize};
+use super::{BLOCK, checked};
 use crate::error::{OutOfRange, check};
 use crate::kerr::Kerr;
 use crate::observer::Observer;
@@ -18,10 +19,11 @@ use crate::observer::Observer;
 #[derive(Clone, Debug, Default)]
 pub struct Crossings {
     per_ray: usize,
-    delay: Vec<f64>,
-    radius: Vec<f64>,
-    azimuth: Vec<f64>,
-    mino_time: Vec<f64>,
+    delay: Column,
+    radius: Column,
+    azimuth: Column,
+    mino_time: Column,
+    error: Column,
 }
 
 /// Where a ray crosses the equatorial plane.
@@ -35,6 +37,10 @@ pub struct Crossing {
     pub azimuth: f64,
     /// Mino time since the observer, in 1/M.
     pub mino_time: f64,
+    /// An estimate, rarely exceeded, of the error by rounding and quadrature: relative in the
+    /// radius, absolute in the azimuth. It grows in inverse proportion to the distance of the
+    /// ray from the critical curve.
+    pub error: f64,
 }
 
 impl Crossings {
@@ -68,6 +74,11 @@ impl Crossings {
         &self.mino_time
     }
 
+    /// Estimate of the error of each crossing, as in [`Crossing`].
+    pub fn error(&self) -> &[f64] {
+        &self.error
+    }
+
     /// The crossings of ray number `k`, in the order of the backward ray; none if there is no
     /// such ray.
     pub fn ray(&self, k: usize) -> impl Iterator<Item = Crossing> + '_ {
@@ -79,6 +90,7 @@ impl Crossings {
                 radius: self.radius[j],
                 azimuth: self.azimuth[j],
                 mino_time: self.mino_time[j],
+                error: self.error[j],
             };
             (!crossing.mino_time.is_nan()).then_some(crossing)
         })
@@ -118,7 +130,7 @@ impl Crossings {
         check("crossings per ray", per_ray as f64, per_ray >= 1, "at least 1")?;
         let camera = checked(hole, observer, alpha, beta)?;
         let count = alpha.len().checked_mul(per_ray);
-        let fits = self.columns().into_iter().try_for_each(|column| resize(column, count));
+        let fits = self.columns().into_iter().try_for_each(|column| column.resize(count));
         if let Err(error) = fits {
             *self = Self::default();
             return Err(error);
@@ -133,8 +145,9 @@ impl Crossings {
         Ok(())
     }
 
-    fn columns(&mut self) -> [&mut Vec<f64>; 4] {
-        [&mut self.delay, &mut self.radius, &mut self.azimuth, &mut self.mino_time]
+    fn columns(&mut self) -> [&mut Column; 5] {
+        let Self { delay, radius, azimuth, mino_time, error, .. } = self;
+        [delay, radius, azimuth, mino_time, error]
     }
 
     /// Blocks of rays, each on its own: neither the number of threads nor their order
@@ -148,8 +161,9 @@ impl Crossings {
             .zip(beta.chunks(BLOCK))
             .zip(self.delay.chunks_mut(long).zip(self.radius.chunks_mut(long)))
             .zip(self.azimuth.chunks_mut(long).zip(self.mino_time.chunks_mut(long)))
-            .map(|(((alpha, beta), (delay, radius)), (azimuth, mino_time))| {
-                (alpha, beta, Target { delay, radius, azimuth, mino_time })
+            .zip(self.error.chunks_mut(long))
+            .map(|((((alpha, beta), (delay, radius)), (azimuth, mino_time)), error)| {
+                (alpha, beta, Target { delay, radius, azimuth, mino_time, error })
             })
             .collect();
         let work = |(alpha, beta, mut out): (&[f64], &[f64], Target<'_>)| {

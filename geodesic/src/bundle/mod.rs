@@ -31,10 +31,12 @@
 //! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
 //! ```
 
+mod column;
 mod crossing;
 mod crossings;
 mod dispatch;
 mod elliptic;
+mod error;
 mod lanes;
 mod math;
 mod motion;
@@ -85,17 +87,6 @@ fn checked(
         check("alpha", *x, radial >= SLOWEST, inwards)?;
     }
     Ok(camera)
-}
-
-/// Makes room for `count` numbers.
-fn resize(column: &mut Vec<f64>, count: Option<usize>) -> Result<(), OutOfRange> {
-    let few = "few enough for the memory, with all rays";
-    let refused = OutOfRange { field: "points per ray", value: f64::INFINITY, allowed: few };
-    let count = count.ok_or_else(|| refused.clone())?;
-    let more = count.saturating_sub(column.len());
-    column.try_reserve_exact(more).map_err(|_| OutOfRange { value: count as f64, ..refused })?;
-    column.resize(count, 0.0);
-    Ok(())
 }
 
 #[cfg(test)]

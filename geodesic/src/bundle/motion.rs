@@ -134,6 +134,9 @@ pub struct Journey<V> {
     pub duration: V,
     /// One if the ray turns and returns to the observer's radius, zero if it is captured.
     pub escapes: V,
+    /// By how much the photon orbit amplifies errors: 1/(distance from the critical curve), up to
+    /// a factor of order 1; one for rays that pass it at a distance.
+    pub condition: V,
 }
 
 impl<V: Real> Journey<V> {
@@ -177,6 +180,17 @@ impl<V: Real> Journey<V> {
         Self {
             duration: V::select(escapes, inward + inward, inward),
             escapes: V::select(escapes, s(1.0), s(0.0)),
+            condition: V::select(e.lt(s(0.0)), near_critical(m.stiffness(), e, gap), s(1.0)),
         }
     }
+}
+
+/// [`Journey::condition`] of a ray from the isolated root e < 0 of the cubic. The two others
+/// nearly coincide next to the critical curve, and the Mino time is the logarithm of their
+/// difference over √(3|e|/2). Scaled to be 1/(distance) for a hole without spin.
+#[inline(always)]
+fn near_critical<V: Real>(b2: V, e: V, gap: V) -> V {
+    let s = V::splat;
+    let rate = (e.abs() / b2).max(s(1e-12)) * s(6.0);
+    b2 * b2 / (gap.abs().max(s(1e-300)) * rate.sqrt() * s(36.0))
 }

@@ -108,6 +108,40 @@ impl<V: Real> RadialStep<V> {
 /// Length of the ring of nodes, a power of two that holds the reach on both sides.
 const RING: usize = (2 * REACH).next_power_of_two();
 
+/// The nodes from `1 − REACH` to `REACH` around the current one. Apart from [`RadialRun`], which
+/// the compiler keeps in registers only if nothing in it is reached by a variable index.
+pub struct Ring<V> {
+    /// The integrands, in a ring that is there twice, so that they always lie in a row.
+    nodes: [[V; 2]; 2 * RING],
+    /// `w`, in a ring.
+    inverse: [V; RING],
+}
+
+impl<V: Real> Ring<V> {
+    /// Without nodes yet.
+    #[inline(always)]
+    pub fn new() -> Self {
+        let zero = V::splat(0.0);
+        Self { nodes: [[zero; 2]; 2 * RING], inverse: [zero; RING] }
+    }
+
+    /// Puts node number `at` in.
+    #[inline(always)]
+    fn put(&mut self, at: usize, Node { w, f0, f2 }: Node<V>) {
+        let at = at % RING;
+        self.nodes[at] = [f0, f2];
+        self.nodes[at + RING] = [f0, f2];
+        self.inverse[at] = w;
+    }
+
+    /// Integrands at `N` nodes from number `from` on.
+    #[inline(always)]
+    fn window<const N: usize>(&self, from: usize) -> [[V; 2]; N] {
+        // The length is there wherever it starts.
+        self.nodes[from % RING..].first_chunk().copied().unwrap_or([[V::splat(0.0); 2]; N])
+    }
+}
+
 /// `w`, `1/g`, `w²/g` at a node.
 #[derive(Clone, Copy)]
 struct Node<V> {
@@ -139,14 +173,15 @@ impl<V: Real> Node<V> {
 pub struct RadialRun<V> {
     step: RadialStep<V>,
     ahead: RadialState<V>,
-    /// The nodes from `1 − REACH` to `REACH − 1` around the current one.
-    nodes: [Node<V>; RING],
     /// Number of the current node.
     at: usize,
-    weights: [V; REACH],
-    g0: V,
-    g2: V,
+    /// The sums of the trapezoidal rule for ∫dτ/g and ∫w² dτ/g, in units of h, with the end
+    /// correction of the start.
+    sum: [V; 2],
+    /// `h B/2`.
+    scale: V,
     w: V,
+    r: V,
     p: V,
     q: V,
     /// F, from zero at an observer at finite radius.
@@ -163,37 +198,31 @@ pub struct RadialRun<V> {
 impl<V: Real> RadialRun<V> {
     /// Starts at the observer.
     #[inline(always)]
-    pub fn new(cam: &Camera, m: &Motion<V>, h: V) -> Self {
+    pub fn new(cam: &Camera, m: &Motion<V>, h: V, ring: &mut Ring<V>) -> Self {
         let step = RadialStep::new(m, h);
         let w = V::splat(cam.w_obs);
         let speed = m.radial(w).sqrt();
         let (mut ahead, mut behind) = step.start(w, speed);
         let zero = V::splat(0.0);
-        let mut nodes = [Node { w: zero, f0: zero, f2: zero }; RING];
-        nodes[0] = Node::new(w, speed, m.kappa);
+        ring.put(REACH - 1, Node::new(w, speed, m.kappa));
         for k in 1..REACH {
             let (before, back) = step.advance(behind);
             // Moving backwards, w' of the forward motion has the other sign.
-            nodes[RING - k] = Node::new(behind.w, -back, m.kappa);
+            let node = Node::new(behind.w, -back, m.kappa);
+            ring.put(REACH - 1 - k, node);
             behind = before;
             let (after, speed) = step.advance(ahead);
-            nodes[k] = Node::new(ahead.w, speed, m.kappa);
+            ring.put(REACH - 1 + k, Node::new(ahead.w, speed, m.kappa));
             ahead = after;
         }
-        let scale = h * m.b * V::splat(0.5);
-        let mut weights = [scale; REACH];
-        for (weight, c) in weights.iter_mut().zip(INTERVAL) {
-            *weight = scale * V::splat(c);
-        }
-        Self {
+        let mut run = Self {
             step,
             ahead,
-            nodes,
             at: 0,
-            weights,
-            g0: zero,
-            g2: zero,
+            sum: [zero; 2],
+            scale: h * m.b * V::splat(0.5),
             w,
+            r: w.recip(),
             p: V::splat(1.0 - cam.r_plus() * cam.w_obs),
             q: V::splat(1.0 - cam.r_minus() * cam.w_obs),
             far: zero,
@@ -203,39 +232,53 @@ impl<V: Real> RadialRun<V> {
             r_minus: cam.r_minus(),
             gap: cam.horizon_gap(),
             spin: cam.spin,
-        }
+        };
+        // Zero at the start.
+        let [g0, g2] = run.integrals(ring);
+        run.sum = [-g0, -g2];
+        run
     }
 
     /// Goes to the next node.
     #[inline(always)]
-    pub fn next(&mut self) {
-        self.integrate();
-        let w = self.nodes[self.at % RING].w;
+    pub fn next(&mut self, ring: &mut Ring<V>) {
+        self.integrate(ring);
+        let w = ring.inverse[(self.at + REACH - 1) % RING];
         self.grow(w, w.neg_mul_add(V::splat(self.r_plus), V::splat(1.0)));
     }
 
     /// Goes to the next node, whose `w` and `1 − r₊w` are known otherwise.
     #[inline(always)]
-    pub fn end_at(&mut self, w: f64, outer: f64) {
-        self.integrate();
+    pub fn end_at(&mut self, ring: &mut Ring<V>, w: f64, outer: f64) {
+        self.integrate(ring);
         self.grow(V::splat(w), V::splat(outer));
     }
 
     /// The integrals.
     #[inline(always)]
-    fn integrate(&mut self) {
+    fn integrate(&mut self, ring: &mut Ring<V>) {
         let (next, speed) = self.step.advance(self.ahead);
         let node = Node::new(self.ahead.w, speed, self.kappa);
         self.ahead = next;
-        let at = self.at;
-        self.nodes[(at + REACH) % RING] = node;
-        for k in (0..REACH).rev() {
-            let l = &self.nodes[at.wrapping_sub(k) % RING];
-            let r = &self.nodes[(at + 1 + k) % RING];
-            self.g0 = self.weights[k].mul_add(l.f0 + r.f0, self.g0);
-            self.g2 = self.weights[k].mul_add(l.f2 + r.f2, self.g2);
+        ring.put(self.at + 2 * REACH - 1, node);
+        let [here, there] = ring.window(self.at + REACH - 1);
+        let half = V::splat(0.5);
+        self.sum[0] = (here[0] + there[0]).mul_add(half, self.sum[0]);
+        self.sum[1] = (here[1] + there[1]).mul_add(half, self.sum[1]);
+        self.at += 1;
+    }
+
+    /// The integrals from an end correction to the current node.
+    #[inline(always)]
+    fn integrals(&self, ring: &Ring<V>) -> [V; 2] {
+        let [mut g0, mut g2] = self.sum;
+        let nodes = ring.window::<{ 2 * REACH - 1 }>(self.at);
+        for (k, d) in END.into_iter().enumerate().rev() {
+            let (after, before) = (nodes[REACH + k], nodes[REACH - 2 - k]);
+            g0 = V::splat(d).mul_add(after[0] - before[0], g0);
+            g2 = V::splat(d).mul_add(after[1] - before[1], g2);
         }
-        self.at = at + 1;
+        [g0, g2]
     }
 
     /// The logarithms.
@@ -244,15 +287,24 @@ impl<V: Real> RadialRun<V> {
         let s = V::splat;
         let q = w.neg_mul_add(s(self.r_minus), s(1.0));
         let fall = self.w - w;
-        let e = fall * p.mul_add(self.q, self.p * q).recip();
+        // Three reciprocals by one division.
+        let (outer, inner) = (p.mul_add(self.q, self.p * q), q.mul_add(self.w, self.q * w));
+        let near = inner * w;
+        let all = (outer * near).recip();
+        let e = fall * (all * near);
+        let rest = all * outer;
+        let y = fall * (rest * w);
+        self.r = rest * inner;
         let x = e * s(self.gap);
-        let y = fall * q.mul_add(self.w, self.q * w).recip();
         let mut lambda = e * small_log(x);
         let mut far = y * small_log(y);
         let small = x.abs().max(y.abs()).lt(s(SMALL_LOG));
         if !V::all(small) {
-            let large = ln((p * self.q) / (self.p * q)) * s(1.0 / self.gap);
-            lambda = V::select(x.abs().lt(s(SMALL_LOG)), lambda, large);
+            let near = x.abs().lt(s(SMALL_LOG));
+            if !V::all(near) {
+                let large = ln((p * self.q) / (self.p * q)) * s(1.0 / self.gap);
+                lambda = V::select(near, lambda, large);
+            }
             // At infinity F is infinite and starts from ln(r − r₋) itself.
             let before = V::select(s(0.0).lt(self.w), self.w, s(1.0));
             far = ln((q * before) / (self.q * w));
@@ -265,12 +317,13 @@ impl<V: Real> RadialRun<V> {
     /// At the current node: `r`, the radial part of time, `G₀ + a² G₂ − r − 2F − 2r₊Λ`, and
     /// that of azimuth, `−a G₂ + a Λ`, up to constants.
     #[inline(always)]
-    pub fn parts(&self) -> [V; 3] {
+    pub fn parts(&self, ring: &Ring<V>) -> [V; 3] {
         let s = V::splat;
-        let r = self.w.recip();
-        let t = self.g2.mul_add(s(self.spin * self.spin), self.g0) - r;
+        let [g0, g2] = self.integrals(ring);
+        let g2 = g2 * self.scale;
+        let t = g0.mul_add(self.scale, g2 * s(self.spin * self.spin)) - self.r;
         let t = self.lambda.mul_add(s(-2.0 * self.r_plus), self.far.mul_add(s(-2.0), t));
-        [r, t, (self.lambda - self.g2) * s(self.spin)]
+        [self.r, t, (self.lambda - g2) * s(self.spin)]
     }
 }
 

@@ -1,9 +1,10 @@
 //! Samples of whole rays.
 
+use super::column::Column;
 use super::dispatch::{Width, dispatch};
 use super::motion::Camera;
 use super::sample::{Block, Rays, Target};
-use super::{BLOCK, checked, resize};
+use super::{BLOCK, checked};
 use crate::error::{OutOfRange, check};
 use crate::kerr::Kerr;
 use crate::observer::Observer;
@@ -12,12 +13,13 @@ use crate::observer::Observer;
 #[derive(Clone, Debug, Default)]
 pub struct Samples {
     per_ray: usize,
-    delay: Vec<f64>,
-    radius: Vec<f64>,
-    theta: Vec<f64>,
-    azimuth: Vec<f64>,
-    duration: Vec<f64>,
-    escapes: Vec<f64>,
+    delay: Column,
+    radius: Column,
+    theta: Column,
+    azimuth: Column,
+    duration: Column,
+    escapes: Column,
+    error: Column,
 }
 
 /// The samples of one ray.
@@ -37,6 +39,11 @@ pub struct RaySamples<'a> {
     /// Whether the ray returns to the observer's radius, be that infinite; else it is captured,
     /// and its last sample lies a relative 1e-8 outside the horizon.
     pub escapes: bool,
+    /// An estimate, rarely exceeded, of the largest error of the positions by rounding and
+    /// quadrature: relative in the radius, absolute in θ and azimuth, at equal Mino time. It is
+    /// about 1e-13 for most rays and grows in inverse proportion to the distance from the
+    /// critical curve.
+    pub error: f64,
 }
 
 impl Samples {
@@ -83,6 +90,7 @@ impl Samples {
             azimuth: &self.azimuth[span],
             mino_total: self.duration[k],
             escapes: self.escapes[k] > 0.5,
+            error: self.error[k],
         }
     }
 
@@ -137,7 +145,7 @@ impl Samples {
     /// The samples at infinity itself.
     fn mark_infinity(&mut self) {
         let columns = self.delay.chunks_mut(self.per_ray).zip(self.radius.chunks_mut(self.per_ray));
-        for ((delay, radius), escapes) in columns.zip(&self.escapes) {
+        for ((delay, radius), escapes) in columns.zip(self.escapes.iter()) {
             if let (Some(delay), Some(radius)) = (delay.first_mut(), radius.first_mut()) {
                 (*delay, *radius) = (f64::NEG_INFINITY, f64::INFINITY);
             }
@@ -152,10 +160,10 @@ impl Samples {
     fn resize(&mut self, rays: usize, per_ray: usize) -> Result<(), OutOfRange> {
         let count = rays.checked_mul(per_ray);
         for column in [&mut self.delay, &mut self.radius, &mut self.theta, &mut self.azimuth] {
-            resize(column, count)?;
+            column.resize(count)?;
         }
-        for column in [&mut self.duration, &mut self.escapes] {
-            resize(column, Some(rays))?;
+        for column in [&mut self.duration, &mut self.escapes, &mut self.error] {
+            column.resize(Some(rays))?;
         }
         self.per_ray = per_ray;
         Ok(())
@@ -172,9 +180,11 @@ impl Samples {
             .zip(self.delay.chunks_mut(long).zip(self.radius.chunks_mut(long)))
             .zip(self.theta.chunks_mut(long).zip(self.azimuth.chunks_mut(long)))
             .zip(self.duration.chunks_mut(short).zip(self.escapes.chunks_mut(short)))
-            .map(|((((alpha, beta), (delay, radius)), (theta, azimuth)), (duration, escapes))| {
+            .zip(self.error.chunks_mut(short))
+            .map(|(((((alpha, beta), (delay, radius)), (theta, azimuth)), ends), error)| {
+                let (duration, escapes) = ends;
                 let rays = Rays { camera, alpha, beta, per_ray };
-                (rays, Target { delay, radius, theta, azimuth, duration, escapes })
+                (rays, Target { delay, radius, theta, azimuth, duration, escapes, error })
             })
             .collect();
         let work = |(rays, mut out): (Rays<'_>, Target<'_>)| {
