@@ -95,7 +95,7 @@ impl Trace {
     pub fn run(&self) -> anyhow::Result<()> {
         // Names the argument now, rather than a line of the table later.
         Tracer::new(self.tolerance).context("--tolerance")?;
-        if self.integrator.method().is_none() && self.observer.is_infinite() {
+        if self.integrator == Integrator::Rk45Affine && self.observer.is_infinite() {
             bail!(
                 "--integrator rk45-affine needs an observer at a finite radius: --observer RADIUS"
             );

@@ -35,6 +35,7 @@ mod camera;
 mod columns;
 mod compensated;
 mod dual;
+mod elliptic_rays;
 mod error;
 pub mod flow;
 mod integrator;
