@@ -100,7 +100,7 @@ impl Crossings {
     /// Memory is reused.
     ///
     /// # Errors
-    /// If the observer is nearer than 5 M, `per_ray` is 0 or too large for the memory, the
+    /// If the observer is nearer than 5 M or, at a finite radius, farther than 1e30 M, `per_ray` is 0 or too large for the memory, the
     /// columns differ in length, or α or β is not in \[−1e12, 1e12\] or belongs to a ray whose
     /// turning point is at or outside the observer (W(1/r_o) below 0.01).
     pub fn trace(

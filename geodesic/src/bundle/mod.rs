@@ -61,6 +61,9 @@ const BLOCK: usize = 512;
 /// barrier.
 const NEAREST: f64 = 5.0;
 
+/// The farthest one that is not at infinity: squares of squares of the radius have to be numbers.
+const FARTHEST: f64 = 1e30;
+
 /// The least W = (dw/dτ)² at the observer: rays that pass it nearly tangentially would lose
 /// digits in its root.
 const SLOWEST: f64 = 0.01;
@@ -73,8 +76,8 @@ fn checked(
     beta: &[f64],
 ) -> Result<motion::Camera, OutOfRange> {
     let w = observer.inverse_radius();
-    let near = "infinity, or a radius of at least 5 (M)";
-    check("observer radius", 1.0 / w, w <= 1.0 / NEAREST, near)?;
+    let within = w == 0.0 || (1.0 / FARTHEST..=1.0 / NEAREST).contains(&w);
+    check("observer radius", 1.0 / w, within, "infinity, or a number in [5, 1e30] (M)")?;
     let same = alpha.len() == beta.len();
     check("number of beta", beta.len() as f64, same, "as many as of alpha")?;
     let camera = motion::Camera::new(hole, observer);
