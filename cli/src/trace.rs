@@ -59,7 +59,7 @@ pub struct Trace {
 }
 
 /// The names of all integrators, as an argument.
-fn integrators() -> impl TypedValueParser<Value = Integrator> {
+pub fn integrators() -> impl TypedValueParser<Value = Integrator> {
     PossibleValuesParser::new(Integrator::ALL.iter().map(|integrator| integrator.name()))
         .map(|name| Integrator::named(&name).expect("one of the names above"))
 }

@@ -121,11 +121,16 @@ pub fn beside_critical_curve(
     Ok([point.alpha * factor, point.beta * factor])
 }
 
-/// A random ray of a class around a hole of this spin.
+/// `n` random rays of a class around a hole of this spin, all seen by one observer.
 ///
 /// # Errors
 /// If the spin is out of range.
-pub fn draw(rng: &mut impl Rng, class: Class, spin: f64) -> Result<Draw, OutOfRange> {
+pub fn draw(
+    rng: &mut impl Rng,
+    class: Class,
+    spin: f64,
+    n: usize,
+) -> Result<Vec<Draw>, OutOfRange> {
     let mut inclination = f64::acos(rng.random_range(-1.0..1.0));
     if class == Class::NearPolar {
         inclination = log_uniform(rng, -10.0, -1.0);
@@ -134,17 +139,21 @@ pub fn draw(rng: &mut impl Rng, class: Class, spin: f64) -> Result<Draw, OutOfRa
         }
     }
     let inclination = Angle::Radians(inclination);
-    let [alpha, beta] = match class {
-        Class::Generic | Class::NearPolar => in_disc(rng, 15.0),
-        Class::NearCritical => {
-            let distance = log_uniform(rng, -14.0, -1.0);
-            beside_critical_curve(rng, spin, inclination, distance)?
-        }
-        Class::NearHorizon => in_disc(rng, 1.8),
-        Class::Far => {
-            let (b, angle) = (log_uniform(rng, 2.0, 6.0), rng.random_range(0.0..TAU));
-            [b * angle.cos(), b * angle.sin()]
-        }
-    };
-    Ok(Draw { spin, inclination, radius: class.observer_radius(), alpha, beta })
+    (0..n)
+        .map(|_| {
+            let [alpha, beta] = match class {
+                Class::Generic | Class::NearPolar => in_disc(rng, 15.0),
+                Class::NearCritical => {
+                    let distance = log_uniform(rng, -14.0, -1.0);
+                    beside_critical_curve(rng, spin, inclination, distance)?
+                }
+                Class::NearHorizon => in_disc(rng, 1.8),
+                Class::Far => {
+                    let (b, angle) = (log_uniform(rng, 2.0, 6.0), rng.random_range(0.0..TAU));
+                    [b * angle.cos(), b * angle.sin()]
+                }
+            };
+            Ok(Draw { spin, inclination, radius: class.observer_radius(), alpha, beta })
+        })
+        .collect()
 }
