@@ -95,7 +95,8 @@ pub struct Bundle {
     pub crossings: Points,
     /// The samples.
     pub samples: Points,
-    /// For each ray the largest estimated errors of its crossings and samples, if asked for.
+    /// For each ray the largest estimated errors of its crossings and samples, if asked for; a
+    /// sample at the horizon itself, where azimuth and delay have no limit, does not count.
     pub uncertainty: Vec<Uncertainty>,
 }
 

@@ -138,20 +138,27 @@ fn samples(
         *next += 1;
         let first = usize::from(at_infinity);
         let step = ray.mino_total / (source.per_ray() - 1) as f64;
-        for j in first..first + n {
-            let points = &mut bundle.samples;
-            points.mino_time.push(step * j as f64);
-            points.radius.push(ray.radius[j]);
-            points.theta.push(ray.theta[j]);
-            angles(points, request, ray.azimuth[j], ray.delay[j]);
-            if request.weight {
-                let ends = !at_infinity && (j == 0 || j + 1 == source.per_ray());
-                let ends = ends || (falls && j + 1 == source.per_ray());
-                let share = if ends { 0.5 * step } else { step };
-                points.weight.push(share * hole.sigma(ray.radius[j], ray.theta[j].cos()));
-            }
-            widen(&mut bundle.uncertainty[k], ray.error, ray.radius[j]);
+        let span = first..first + n;
+        let points = &mut bundle.samples;
+        points.mino_time.extend(span.clone().map(|j| step * j as f64));
+        points.radius.extend_from_slice(&ray.radius[span.clone()]);
+        points.theta.extend_from_slice(&ray.theta[span.clone()]);
+        if request.azimuth {
+            points.azimuth.extend_from_slice(&ray.azimuth[span.clone()]);
         }
+        if request.time {
+            points.delay.extend_from_slice(&ray.delay[span.clone()]);
+        }
+        if request.weight {
+            let last = source.per_ray() - 1;
+            points.weight.extend(span.clone().map(|j| {
+                let ends = (!at_infinity && j == 0) || (j == last && (falls || !at_infinity));
+                let share = if ends { 0.5 * step } else { step };
+                share * hole.sigma(ray.radius[j], ray.theta[j].cos())
+            }));
+        }
+        let farthest = ray.radius[span].iter().fold(0.0, |far: f64, r| far.max(*r));
+        widen(&mut bundle.uncertainty[k], ray.error, farthest);
         bundle.samples.end_ray();
     }
     Ok(())

@@ -280,7 +280,10 @@ impl<T: Elementary> Path<T> {
         let (k, x) = self.find(s);
         let segment = &self.segments[k];
         let point = self.interpolate(k, x, s);
-        segment.budget.at(&self.hole, self.lambda, self.scale, &point)
+        // In the first step nothing has gone wrong yet at the observer.
+        let part = if k == 0 { x.value() } else { 1.0 };
+        let budget = Budget::default().towards(&segment.budget, part);
+        budget.at(&self.hole, self.lambda, self.scale, &point)
     }
 
     fn interpolate(&self, k: usize, x: T, s: T) -> PathPoint<T> {

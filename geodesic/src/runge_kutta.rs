@@ -30,7 +30,7 @@ pub(crate) struct DormandPrince5;
 
 impl Method<7> for DormandPrince5 {
     const TABLEAU: Tableau<7> = DORMAND_PRINCE_5;
-    const CAUTION: f64 = 1.2;
+    const CAUTION: f64 = 1.5;
 }
 
 const DORMAND_PRINCE_5: Tableau<7> = Tableau {
@@ -70,7 +70,7 @@ pub(crate) struct DormandPrince8;
 
 impl Method<13> for DormandPrince8 {
     const TABLEAU: Tableau<13> = DORMAND_PRINCE_8;
-    const CAUTION: f64 = 2.0;
+    const CAUTION: f64 = 5.0;
 }
 
 #[rustfmt::skip]

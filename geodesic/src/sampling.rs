@@ -93,7 +93,9 @@ impl<'a> Sampler<'a> {
         if let Some(weight) = weight.filter(|_| self.request.weight) {
             points.weight.push(weight * self.hole.sigma(point.radius(), point.cos_theta()));
         }
-        if self.request.uncertainty {
+        // At the horizon azimuth and delay have no limit, and no error.
+        let at_horizon = ray.outcome() == Outcome::Captured && mino_time >= ray.total();
+        if self.request.uncertainty && !at_horizon {
             *worst = worst.max(ray.uncertainty(mino_time));
         }
     }

@@ -253,6 +253,10 @@ impl Taylor {
     }
 }
 
+/// How much larger the rest of a series may be than its first term: measured (docs/accuracy.md
+/// of the repository).
+const CAUTION: f64 = 4.0;
+
 impl Taylor {
     /// Size of the first terms that are left out, by the ratio of the last two that are not:
     /// of the largest of all rows, since a row may have vanishing terms.
@@ -271,7 +275,7 @@ impl Taylor {
         let mut error = [0.0; N];
         for (_, variable) in variables::<N>() {
             let [before, last] = terms[variable];
-            let next = ratio * last.max(ratio * before);
+            let next = CAUTION * ratio * last.max(ratio * before);
             error[variable] = next;
             if variable < index::AZIMUTH && variable + 1 < N {
                 error[variable + 1] = next * (order + 1) as f64 / h;

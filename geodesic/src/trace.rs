@@ -285,12 +285,14 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
         let rounding = eps * (w.abs() + h * rate.abs());
         let kick = eps * h * w.abs() * (a.abs() + w.abs() * (b.abs() + w.abs() * c.abs()));
         let speed = rate.hypot(pull).max(1e-300);
-        let truncation = (error[index::W].abs() + error[index::DW].abs()) / speed;
+        // An error of dw/dτ that the projection has removed does no harm.
+        let jerk = if projected { 0.0 } else { error[index::DW].abs() };
+        let truncation = (error[index::W].abs() + jerk) / speed;
         let blur = (rounding + kick) / speed;
         self.budget.rounding += blur * blur;
         // Off dw/dτ = ±√W the error of W stays, and speeds the ray up or slows it down.
-        let [slip, jerk] = [error[index::W].abs() + rounding, error[index::DW].abs() + kick];
-        let energy = 2.0 * (rate.abs() * jerk + pull.abs() * slip);
+        let slip = error[index::W].abs() + rounding;
+        let energy = 2.0 * (rate.abs() * (jerk + kick) + pull.abs() * slip);
         self.budget.energy = if projected { 0.0 } else { self.budget.energy + energy };
         let truncation = truncation + 0.5 * h * self.budget.energy / (speed * speed);
         self.budget.phase += truncation;

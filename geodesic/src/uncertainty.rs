@@ -61,6 +61,20 @@ pub(crate) struct Budget {
 const ROUNDINGS: f64 = 6.0;
 
 impl Budget {
+    /// Part of the way from this budget to the next one.
+    pub fn towards(&self, next: &Self, part: f64) -> Self {
+        let between = |a: f64, b: f64| a + (b - a) * part;
+        Budget {
+            phase: between(self.phase, next.phase),
+            rounding: between(self.rounding, next.rounding),
+            energy: next.energy,
+            local: next.local,
+            direction: between(self.direction, next.direction),
+            azimuth: between(self.azimuth, next.azimuth),
+            delay: between(self.delay, next.delay),
+        }
+    }
+
     /// What it means at a point of the path.
     pub fn at<T: Elementary>(
         &self,
@@ -78,15 +92,15 @@ impl Budget {
         let speed = point.inverse_radius_rate.value().abs();
         let local = self.local * w;
         let radius = if w > 0.0 { (speed * late + local) / w + 4.0 * eps } else { 0.0 };
-        let direction = self.direction + 4.0 * eps;
+        let theta = self.direction + 4.0 * eps;
         // Δ/r² and (r² + a² − aλ)/r², the two factors of the radial motion's dφ/dτ and dt/dτ.
         let gap = (1.0 - w * (2.0 - a * a * w)).max(eps);
         let energy = 1.0 + a * (a - lambda) * w * w;
-        let azimuth = direction / x.hypot(y).max(direction)
+        let azimuth = self.direction / x.hypot(y).max(self.direction).max(1e-300)
             + self.azimuth
             + (a * (energy / gap - 1.0)).abs() * late
             + a.abs() * local / gap
-            + 4.0 * eps * point.azimuth.value().abs();
+            + 4.0 * eps * (1.0 + point.azimuth.value().abs());
         let lift = (1.0 + a * a * w * w) / gap;
         let delay = if w > 0.0 {
             self.delay * scale
@@ -95,6 +109,6 @@ impl Budget {
         } else {
             0.0
         };
-        Uncertainty { radius, theta: direction, azimuth, delay }
+        Uncertainty { radius, theta, azimuth, delay }
     }
 }
