@@ -1,25 +1,6 @@
 //! Bad input gets one clear message, exit code 2, and nothing written.
 
-use crate::support::{kerrlight, root};
-use std::path::Path;
-
-/// The message of a run that must fail, leaving `folder` as it was.
-fn fail(folder: &Path, arguments: &[&str]) -> String {
-    let list = || {
-        let mut files: Vec<_> =
-            std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name()).collect();
-        files.sort();
-        files
-    };
-    let before = list();
-    let output = kerrlight(folder, arguments);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
-    assert_eq!(list(), before, "{arguments:?} left files");
-    assert!(output.stdout.is_empty(), "{arguments:?}");
-    assert!(!message.contains("panicked"), "{message}");
-    message
-}
+use crate::support::{fail, kerrlight, root};
 
 #[test]
 fn files_that_cannot_be_read() {

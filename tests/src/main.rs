@@ -1,6 +1,7 @@
 //! Tests that touch two crates or the binary, named by their authority: exact_ (closed
 //! form), paper_ (a published number), code_ (another code's number), regress_ (own past).
 
+mod accuracy;
 mod bad_input;
 mod closed_forms;
 mod command_line;

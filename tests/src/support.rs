@@ -79,3 +79,21 @@ pub fn render(scene: &Scene) -> Picture {
     };
     kerrlight_tomo::render::render(scene, sky, &|_| true).expect("a picture").picture
 }
+
+/// The message of a run that must fail, leaving `folder` as it was.
+pub fn fail(folder: &Path, arguments: &[&str]) -> String {
+    let list = || {
+        let mut files: Vec<_> =
+            std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name()).collect();
+        files.sort();
+        files
+    };
+    let before = list();
+    let output = kerrlight(folder, arguments);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+    assert_eq!(list(), before, "{arguments:?} left files");
+    assert!(output.stdout.is_empty(), "{arguments:?}");
+    assert!(!message.contains("panicked"), "{message}");
+    message
+}
