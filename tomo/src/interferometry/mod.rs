@@ -1,0 +1,14 @@
+//! What an array of radio telescopes sees of an image, and the files that arrays left.
+//!
+//! Data flow: [`array`] (stations) → [`earth`] (sidereal time, projected baselines) →
+//! [`schedule`] (when, and which baselines) → [`observation`] (visibilities with errors).
+//! Units are those of the field: metres, Jy, hours of UTC, wavelengths, degrees where a name says
+//! so.
+
+pub mod array;
+pub mod earth;
+pub mod observation;
+pub mod schedule;
+
+/// Complex number of double precision, as visibilities are kept.
+pub type Complex64 = num_complex::Complex<f64>;
