@@ -6,6 +6,7 @@ mod closed_forms;
 mod command_line;
 mod critical_curve;
 mod documents;
+mod eht_data;
 mod kerr_references;
 mod lensing;
 mod pictures;

@@ -1,12 +1,13 @@
 //! What an array of radio telescopes sees of an image, and the files that arrays left.
 //!
 //! Data flow: [`array`] (stations) → [`earth`] (sidereal time, projected baselines) →
-//! [`schedule`] (when, and which baselines) → [`observation`] (visibilities with errors).
+//! [`schedule`] (when, and which baselines) → [`observation`] (visibilities with errors) ↔ [`files`].
 //! Units are those of the field: metres, Jy, hours of UTC, wavelengths, degrees where a name says
 //! so.
 
 pub mod array;
 pub mod earth;
+pub mod files;
 pub mod observation;
 pub mod schedule;
 

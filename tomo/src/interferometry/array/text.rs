@@ -59,7 +59,8 @@ pub(in crate::interferometry) fn station(cells: &[&str]) -> Result<Station, Stri
     })
 }
 
-/// The 13 columns of a station. Numbers have as many digits as they need.
+/// The 13 columns of a station. Numbers have as many digits as they need; one without position
+/// stands at the centre of the Earth, as if it were a spacecraft.
 pub(in crate::interferometry) fn columns(station: &Station) -> String {
     let [x, y, z] = station.position.unwrap_or_default();
     let [r, l] = station.sefd;
