@@ -91,6 +91,18 @@ impl Schedule {
         (0..self.scans).map(move |k| self.start_h + f64::from(k) * step)
     }
 
+    /// The same in hours of UTC, as rows of the observation have them.
+    ///
+    /// # Errors
+    /// If the day is out of range or its UT1 − UTC not known.
+    pub fn hours_utc(&self, ut1: Ut1) -> Result<Vec<f64>, EarthError> {
+        let utc = |hours| match self.clock {
+            Clock::Utc => Ok(hours),
+            Clock::Gmst => hours_utc_of_gmst(self.mjd, hours, ut1),
+        };
+        self.hours().map(utc).collect()
+    }
+
     fn check(&self) -> Result<(), ScheduleError> {
         let hours = "hours in [-48, 72]";
         check("start", self.start_h, (-48.0..=72.0).contains(&self.start_h), hours)?;
@@ -134,14 +146,8 @@ fn hand_sigmas(first: [f64; 2], second: [f64; 2], setup: &Setup) -> [f64; 4] {
         .map(|[a, b]| thermal_sigma([first[a], second[b]], setup.bandwidth_hz, setup.integration_s))
 }
 
-/// Errors of I, Q, U, V from those of RR, LL, RL, LR.
-fn stokes_sigmas([rr, ll, rl, lr]: [f64; 4]) -> [f64; 4] {
-    let (parallel, cross) = (0.5 * rr.hypot(ll), 0.5 * rl.hypot(lr));
-    [parallel, cross, cross, parallel]
-}
-
 /// The observation that a schedule makes: every baseline at every scan at which both of its
-/// stations see the source, with thermal errors and visibilities of zero.
+/// stations see the source, with visibilities of zero and the thermal errors of RR, LL, RL, LR.
 ///
 /// # Errors
 /// If a value is out of range, or a station's position or SEFD not known.
@@ -164,7 +170,7 @@ pub fn observe(
         frequency_hz: Some(setup.frequency_hz),
         bandwidth_hz: Some(setup.bandwidth_hz),
         stations: array.stations.clone(),
-        ..Observation::empty(Basis::Stokes)
+        ..Observation::empty(Basis::Circular)
     };
     for hours in schedule.hours() {
         let (time_h, view) = view_at(source, schedule, setup, hours)?;
@@ -230,7 +236,7 @@ fn scan(
                 stations: [i as u16, j as u16],
                 uv: view.uv(positions[i], positions[j], wavelength),
                 products: [Complex64::new(0.0, 0.0); 4],
-                noise_sigma: stokes_sigmas(hand_sigmas(sefds[0], sefds[1], setup)),
+                noise_sigma: hand_sigmas(sefds[0], sefds[1], setup),
                 opacity: [0.0; 2],
             });
         }
@@ -266,7 +272,7 @@ mod tests {
                 let names = observation.names(row);
                 names == pair || names == [pair[1], pair[0]]
             });
-            row.unwrap().noise_sigma[0]
+            row.unwrap().stokes_i(observation.basis).unwrap().noise_sigma
         };
         assert!((sigma(&eht, ["ALMA", "APEX"]) / 9.97171e-4 - 1.0).abs() < 5e-6);
         assert!((sigma(&eht, ["ALMA", "PV"]) / 8.54718e-4 - 1.0).abs() < 5e-6);
@@ -281,7 +287,8 @@ mod tests {
         let row = rows.iter().find(|row| row.stations == [0, 4]).unwrap();
         let hand = |sefd: f64| thermal_sigma([sefd, 70.0], 1.856e9, 60.0);
         let expected = 0.5 * hand(3600.0).hypot(hand(8100.0));
-        assert!((row.noise_sigma[0] / expected - 1.0).abs() < 1e-15);
+        let found = row.stokes_i(Basis::Circular).unwrap().noise_sigma;
+        assert!((found / expected - 1.0).abs() < 1e-15);
     }
 
     #[test]
