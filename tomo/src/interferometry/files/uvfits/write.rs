@@ -16,6 +16,8 @@ struct Facts {
     mjd: i32,
     frequency_hz: f64,
     bandwidth_hz: f64,
+    /// PSCAL of (u, v): what is stored is multiplied by it to become seconds.
+    uv_scale: f64,
 }
 
 /// The bytes of a UVFITS file. Stokes I alone is written as both parallel hands, each with σ√2.
@@ -26,13 +28,14 @@ struct Facts {
 /// If the source's position, date, frequency, bandwidth or a station's position is not known, or
 /// there are no rows or more than 255 stations.
 pub fn write(observation: &Observation) -> Result<Vec<u8>, FileError> {
-    let facts = Facts {
+    let mut facts = Facts {
         position: observation
             .position
             .ok_or(Unknown("the source's right ascension and declination"))?,
         mjd: observation.mjd.ok_or(Unknown("the date (MJD)"))?,
         frequency_hz: observation.frequency_hz.ok_or(Unknown("the frequency"))?,
         bandwidth_hz: observation.bandwidth_hz.ok_or(Unknown("the bandwidth"))?,
+        uv_scale: 1.0,
     };
     if observation.stations.iter().any(|station| station.position.is_none()) {
         return Err(Unknown("the stations' positions (an array)").into());
@@ -57,11 +60,20 @@ pub fn write(observation: &Observation) -> Result<Vec<u8>, FileError> {
         // The header promises order of time and baseline.
         observation.to_mut().sort();
     }
+    if observation.rows.iter().all(is_single_in_wavelengths) {
+        facts.uv_scale = facts.frequency_hz.recip();
+    }
     let mut bytes = primary_header(&observation, &facts);
     bytes.extend(groups(&observation, &facts));
     bytes.extend(antenna_table(&observation.stations, &facts));
     bytes.extend(frequency_table(&facts));
     Ok(bytes)
+}
+
+/// Whether (u, v) came from single precision numbers in wavelengths, as some files have them: then
+/// they are kept to the bit.
+fn is_single_in_wavelengths(row: &Row) -> bool {
+    row.uv.iter().all(|x| (f64::from(*x as f32) - x).abs() <= 1e-12 * x.abs())
 }
 
 fn primary_header(observation: &Observation, facts: &Facts) -> Vec<u8> {
@@ -96,7 +108,8 @@ fn primary_header(observation: &Observation, facts: &Facts) -> Vec<u8> {
     }
     for (k, name) in (1..).zip(PARAMETERS) {
         cards.text(&format!("PTYPE{k}"), name);
-        cards.number(&format!("PSCAL{k}"), 1.0).number(&format!("PZERO{k}"), 0.0);
+        let scale = if k <= 3 { facts.uv_scale } else { 1.0 };
+        cards.number(&format!("PSCAL{k}"), scale).number(&format!("PZERO{k}"), 0.0);
     }
     cards.history("AIPS SORT ORDER='TB'");
     observation.history.iter().for_each(|line| {
@@ -116,7 +129,7 @@ fn groups(observation: &Observation, facts: &Facts) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(observation.rows.len() * 84);
     for row in &observation.rows {
         let antennas = row.stations.map(|k| f64::from(k) + 1.0);
-        let [u, v] = row.uv.map(|x| x / facts.frequency_hz);
+        let [u, v] = row.uv.map(|x| x / facts.frequency_hz / facts.uv_scale);
         let baseline = 256.0 * antennas[0] + antennas[1];
         let day = 2_400_000.5 + f64::from(facts.mjd);
         let parameters = [u, v, 0.0, baseline, day, row.time_h / 24.0, row.integration_s];
