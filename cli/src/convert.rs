@@ -16,7 +16,7 @@ pub struct Convert {
     #[arg(value_name = "OUTPUT.uvfits|.txt|.csv")]
     output: PathBuf,
     /// Average coherently over this many seconds
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     average: Option<f64>,
     /// Merge the hands into Stokes I
     #[arg(long)]
@@ -28,10 +28,10 @@ pub struct Convert {
     #[arg(long, value_name = "FROM-TO", value_parser = arguments::range, allow_hyphen_values = true)]
     flag_utc: Vec<[f64; 2]>,
     /// Leave out baselines shorter than this many wavelengths
-    #[arg(long, value_name = "WAVELENGTHS")]
+    #[arg(long, value_name = "WAVELENGTHS", allow_negative_numbers = true)]
     uv_min: Option<f64>,
     /// Leave out baselines longer than this many wavelengths
-    #[arg(long, value_name = "WAVELENGTHS")]
+    #[arg(long, value_name = "WAVELENGTHS", allow_negative_numbers = true)]
     uv_max: Option<f64>,
     /// The source, where the input does not tell where it is: sgra, m87, or hours and degrees
     #[arg(long, value_name = "sgra|m87|RA,DEC", value_parser = arguments::source)]
@@ -40,13 +40,13 @@ pub struct Convert {
     #[arg(long, value_name = "ARRAY")]
     array: Option<String>,
     /// The day, where the input does not tell
-    #[arg(long, value_name = "DAY")]
+    #[arg(long, value_name = "DAY", allow_negative_numbers = true, value_parser = clap::value_parser!(i32).range(41317..=90000))]
     mjd: Option<i32>,
     /// Frequency in GHz, where the input does not tell
-    #[arg(long, value_name = "GHZ")]
+    #[arg(long, value_name = "GHZ", allow_negative_numbers = true)]
     frequency: Option<f64>,
     /// Bandwidth in GHz, where the input does not tell
-    #[arg(long, value_name = "GHZ")]
+    #[arg(long, value_name = "GHZ", allow_negative_numbers = true)]
     bandwidth: Option<f64>,
 }
 

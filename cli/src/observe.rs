@@ -19,7 +19,7 @@ pub struct Observe {
     /// movie (.npy, .npz: (frames,) height, width), a picture (.exr) or a scene (.toml)
     input: PathBuf,
     /// Width of the image on the sky in microarcseconds, for files that do not tell
-    #[arg(long, value_name = "UAS")]
+    #[arg(long, value_name = "UAS", allow_negative_numbers = true)]
     fov_uas: Option<f64>,
     /// EHT2017, ngEHT, or a file in eht-imaging's format
     #[arg(long, value_name = "ARRAY")]
@@ -36,10 +36,10 @@ pub struct Observe {
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Standard deviation of the logarithm of station gains, constant in time
-    #[arg(long, value_name = "SIGMA", default_value_t = 0.0)]
+    #[arg(long, value_name = "SIGMA", default_value_t = 0.0, allow_negative_numbers = true)]
     gain_constant: f64,
     /// Standard deviation of the logarithm of station gains, a new one each scan
-    #[arg(long, value_name = "SIGMA", default_value_t = 0.0)]
+    #[arg(long, value_name = "SIGMA", default_value_t = 0.0, allow_negative_numbers = true)]
     gain_scan: f64,
     /// Random phases of stations, new ones each scan
     #[arg(long)]

@@ -7,6 +7,8 @@ mod command_line;
 mod critical_curve;
 mod documents;
 mod eht_data;
+mod fuzz_corpus;
+mod interferometry;
 mod kerr_references;
 mod lensing;
 mod pictures;

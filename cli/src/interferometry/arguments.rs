@@ -87,13 +87,18 @@ pub struct Observing {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub frames: u32,
     /// Integration time of a scan in seconds
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub tint: f64,
     /// Frequency in GHz
-    #[arg(long, value_name = "GHZ", default_value_t = 226.191_789_062_5)]
+    #[arg(
+        long,
+        value_name = "GHZ",
+        default_value_t = 226.191_789_062_5,
+        allow_negative_numbers = true
+    )]
     pub frequency: f64,
     /// Bandwidth in GHz
-    #[arg(long, value_name = "GHZ", default_value_t = 1.856)]
+    #[arg(long, value_name = "GHZ", default_value_t = 1.856, allow_negative_numbers = true)]
     pub bandwidth: f64,
     /// Elevations in degrees between which stations observe
     #[arg(long, value_name = "FROM-TO", value_parser = range, default_value = "10-85",

@@ -1,6 +1,6 @@
 //! What an array of radio telescopes sees of an image, and the files that arrays left.
 //!
-//! Data flow: [`array`] (stations) → [`earth`] (sidereal time, projected baselines) →
+//! Data flow: [`mod@array`] (stations) → [`earth`] (sidereal time, projected baselines) →
 //! [`schedule`] (when, and which baselines) → [`observation`] (visibilities with errors) ↔ [`files`]. [`simulate`]
 //! fills them from images through an [`operator`], [`noise`] spoils them,
 //! [`products`] are what gains leave, [`data_terms`] compare them with a model.

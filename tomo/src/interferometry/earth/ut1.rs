@@ -91,7 +91,7 @@ mod tests {
     /// Across the leap second at the end of 2016 UT1 − UTC jumps, UT1 does not.
     #[test]
     fn exact_leap_second() {
-        let before = ut1_minus_utc(57753.999_999).unwrap();
+        let before = ut1_minus_utc(57_753.999_999).unwrap();
         let after = ut1_minus_utc(57754.0).unwrap();
         assert!((after - before - 1.0).abs() < 1e-5, "{before} {after}");
         assert!(before.abs() < 0.9 && after.abs() < 0.9);

@@ -125,6 +125,11 @@ impl Names {
     }
 }
 
+/// How many rows a text may hold: as many as lines, which are 16 bytes at least.
+fn rows_at_most(text: &str) -> usize {
+    text.lines().count().min(text.len() / 16)
+}
+
 /// A finite number, or what to call it in a complaint.
 fn number(cell: &str, name: &str) -> Result<f64, String> {
     let value =
@@ -145,4 +150,57 @@ fn sigma(cell: &str, name: &str) -> Result<f64, String> {
 /// At most 20 characters of a cell.
 fn shortened(cell: &str) -> String {
     cell.chars().take(20).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64Mcg;
+
+    fn texts() -> Vec<String> {
+        let small = uvfits::tests::small();
+        let eht = "#SRC:M87,DATE(MJD):57853,FREQ:229.0707GHz\n\
+            #time(UTC),T1,T2,U(lambda),V(lambda),Iamp(Jy),Iphase(d),Isigma(Jy)\n\
+            02.15138894,AA,LM,1868288384.0,-3689129984.0,0.01103669,-122.7523,0.00446794\n";
+        vec![to_obs_text(&small).unwrap(), to_csv(&small), eht.to_owned()]
+    }
+
+    #[test]
+    fn exact_formats_are_told_apart() {
+        let format = |bytes: &[u8]| decode(bytes).unwrap().0;
+        let [obs, csv, eht] = &texts()[..] else { unreachable!("three texts") };
+        assert_eq!(format(obs.as_bytes()), Format::ObsText);
+        assert_eq!(
+            (format(csv.as_bytes()), format(eht.as_bytes())),
+            (Format::Table, Format::Table)
+        );
+        let uvfits = write_uvfits(&uvfits::tests::small()).unwrap();
+        assert_eq!(format(&uvfits), Format::Uvfits);
+        let message = decode(&[0x89, b'P', b'N', b'G', 0xff]).unwrap_err().to_string();
+        assert!(message.contains("neither UVFITS"), "{message}");
+    }
+
+    /// Cut anywhere, or with bytes changed, a text is an error or data, never a panic.
+    #[test]
+    fn exact_damaged_texts_do_not_panic() {
+        let mut random = Pcg64Mcg::seed_from_u64(6);
+        for text in texts() {
+            assert!(decode(text.as_bytes()).is_ok());
+            for end in 0..text.len() {
+                let _ = decode(&text.as_bytes()[..end]);
+            }
+            let mut errors = 0;
+            for _ in 0..10_000 {
+                let mut bytes = text.clone().into_bytes();
+                for _ in 0..random.random_range(1..4) {
+                    let at = random.random_range(0..bytes.len());
+                    let characters = b"0-.,e# \n\tx9";
+                    bytes[at] = characters[random.random_range(0..characters.len())];
+                }
+                errors += usize::from(decode(&bytes).is_err());
+            }
+            assert!(errors > 500, "{errors}");
+        }
+    }
 }

@@ -49,7 +49,7 @@ pub fn parse(text: &str) -> Result<Observation, FileError> {
     let mut observation = Observation::empty(Basis::Stokes);
     let mut names = Names::new(Vec::new());
     let mut heading = None;
-    observation.rows = Vec::with_capacity(text.lines().filter(|l| !l.starts_with('#')).count());
+    observation.rows = Vec::with_capacity(super::rows_at_most(text));
     for (index, line) in text.lines().enumerate() {
         let located = |message: String| FileError::line(index + 1, message);
         let bare = line.trim_start_matches('#');

@@ -167,7 +167,7 @@ impl<T: Real> Dtft<T> {
 }
 
 /// A slice cut into consecutive pieces.
-fn cut<'a, D>(mut rest: &'a mut [D], lengths: impl Iterator<Item = usize>) -> Vec<&'a mut [D]> {
+fn cut<D>(mut rest: &mut [D], lengths: impl Iterator<Item = usize>) -> Vec<&mut [D]> {
     let mut pieces = Vec::new();
     for length in lengths {
         let (piece, after) = rest.split_at_mut(length);
