@@ -16,7 +16,8 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 pub struct Observe {
     /// What is seen: a grid of Jy/pixel (.csv, first line north, first column east), an array or
-    /// movie (.npy, .npz: (frames,) height, width), a picture (.exr) or a scene (.toml)
+    /// movie (.npy, .npz: (frames,) height, width), an image (.fits), a picture (.exr) or a scene
+    /// (.toml)
     input: PathBuf,
     /// Width of the image on the sky in microarcseconds, for files that do not tell
     #[arg(long, value_name = "UAS", allow_negative_numbers = true)]

@@ -1,9 +1,10 @@
-//! Images and movies to be observed: grids of numbers as CSV, arrays as npy or npz, pictures as
-//! EXR.
+//! Images and movies to be observed: grids of numbers as CSV, arrays as npy or npz, images as FITS,
+//! pictures as EXR.
 
 use crate::output;
 use anyhow::{Context, anyhow, bail};
 use kerrlight_tomo::image::exr;
+use kerrlight_tomo::interferometry::files;
 use kerrlight_tomo::interferometry::operator::ImageGrid;
 use kerrlight_tomo::interferometry::simulate::Movie;
 use kerrlight_tomo::scene::Scene;
@@ -24,12 +25,20 @@ pub fn read(path: &Path, fov_uas: Option<f64>) -> anyhow::Result<Movie> {
     let name = || path.display().to_string();
     let bytes = output::read(path)?;
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    if matches!(extension.to_ascii_lowercase().as_str(), "fits" | "fit") {
+        if fov_uas.is_some() {
+            bail!("--fov-uas is not for FITS images, which have a field of view");
+        }
+        return files::read_fits_image(&bytes).with_context(name);
+    }
     let (pixels, own_fov) = match extension.to_ascii_lowercase().as_str() {
         "csv" | "txt" => (csv_grid(&bytes).with_context(name)?, None),
         "npy" => (npy(&bytes).with_context(name)?, None),
         "npz" => (npz(&bytes).with_context(name)?, None),
         "exr" => exr_picture(&bytes, fov_uas).with_context(name)?,
-        _ => bail!("{}: an image ends in .csv, .npy, .npz or .exr, a scene in .toml", name()),
+        _ => {
+            bail!("{}: an image ends in .csv, .npy, .npz, .fits or .exr, a scene in .toml", name())
+        }
     };
     let fov = fov_uas.or(own_fov).ok_or_else(|| {
         anyhow!("{} does not tell how large it is on the sky: give --fov-uas", name())

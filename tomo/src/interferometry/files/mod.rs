@@ -1,11 +1,13 @@
-//! Files of visibilities: UVFITS, eht-imaging's text, and tables of total intensity. Codecs work
+//! Files of visibilities (UVFITS, eht-imaging's text, tables of total intensity) and FITS images. Codecs work
 //! on bytes; what they hold in memory is a small multiple of the file.
 
 mod fits;
+mod fits_image;
 mod obs_text;
 mod table;
 mod uvfits;
 
+pub use fits_image::read as read_fits_image;
 pub use obs_text::{parse as parse_obs_text, to_text as to_obs_text};
 pub use table::{COLUMNS as TABLE_COLUMNS, parse as parse_table, to_csv};
 pub use uvfits::{read as read_uvfits, write as write_uvfits};
