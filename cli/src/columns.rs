@@ -24,6 +24,16 @@ fn digits(x: f64) -> String {
 }
 
 impl Column {
+    /// Its name, without the numbers of a block.
+    pub fn name(&self) -> &str {
+        match self {
+            Column::Numbers(name, _)
+            | Column::Counts(name, _)
+            | Column::Words(name, _)
+            | Column::Blocks(name, _) => name,
+        }
+    }
+
     fn names(&self) -> Vec<String> {
         match self {
             Column::Numbers(name, _) | Column::Counts(name, _) | Column::Words(name, _) => {

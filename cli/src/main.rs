@@ -1,5 +1,6 @@
 //! `kerrlight`: from scene files to lensed images of black holes.
 
+mod accuracy;
 mod columns;
 mod convert;
 mod critical_curve;
@@ -41,6 +42,8 @@ enum Verb {
     Trace(trace::Trace),
     /// Write the critical curve, the edge of the shadow, as a table
     CriticalCurve(critical_curve::CriticalCurveTable),
+    /// Measure what a digit costs in time, or trace hard rays against 28 digits
+    Accuracy(accuracy::Accuracy),
 }
 
 fn main() -> ExitCode {
@@ -66,5 +69,6 @@ fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Verb::Convert(convert) => convert.run(),
         Verb::Trace(trace) => trace.run(),
         Verb::CriticalCurve(table) => table.run(),
+        Verb::Accuracy(accuracy) => accuracy.run(),
     }
 }

@@ -3,10 +3,12 @@
 use crate::columns::{self, Column};
 use crate::output::{self, Output};
 use anyhow::{Context, bail};
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::PossibleValuesParser;
+use clap::builder::TypedValueParser;
 use kerrlight_geodesic::{
-    AffineTracer, Inclination, Kerr, Observer, OutOfRange, Outcome, Path, PathPoint, Tracer, Want,
-    quadrature,
+    Bundle, Inclination, Integrator, Kerr, Observer, Placement, Points, Request, Tracer,
+    Uncertainty,
 };
 use rayon::prelude::*;
 use std::path::PathBuf;
@@ -20,7 +22,7 @@ pub struct Trace {
     #[arg(long, value_name = "FILE.csv")]
     rays: PathBuf,
     /// How rays are traced
-    #[arg(long, default_value = "rk45-mino")]
+    #[arg(long, default_value = "taylor-mino", value_parser = integrators())]
     integrator: Integrator,
     /// Largest local error of a step, in [1e-14, 1e-2]
     #[arg(long, default_value_t = 1e-12)]
@@ -35,19 +37,31 @@ pub struct Trace {
     /// the end (from infinity: without the points at infinity)
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=100_000))]
     samples: u32,
+    /// Place the samples at equal path lengths inside a sphere of this radius instead
+    #[arg(long, value_name = "RADIUS", requires = "samples", conflicts_with = "between")]
+    within: Option<f64>,
+    /// Place the samples at Gauss-Legendre nodes in Mino time on each piece of the ray
+    /// between two radii instead
+    #[arg(long, num_args = 2, value_names = ["FROM", "TO"], requires = "samples")]
+    between: Option<Vec<f64>>,
+    /// Also write covariant momenta (p_r, p_theta; p_t = -1 and p_phi = lambda never change)
+    #[arg(long)]
+    momentum: bool,
+    /// Also write each sample's weight in an integral over the affine parameter
+    #[arg(long)]
+    weights: bool,
+    /// Also write each ray's largest estimated errors: of r (relative), theta, phi and delay
+    #[arg(long)]
+    errors: bool,
     /// Where to write the table, as .csv or .npz [default: CSV to standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 }
 
-/// How rays are traced.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Integrator {
-    /// Adaptive Runge–Kutta 5(4) in Mino time
-    Rk45Mino,
-    /// Adaptive Runge–Kutta 5(4) in the affine parameter on Kerr–Schild coordinates: an
-    /// independent referee, for an observer at a finite radius; azimuths in [−π, π]
-    Rk45Affine,
+/// The names of all integrators, as an argument.
+pub fn integrators() -> impl TypedValueParser<Value = Integrator> {
+    PossibleValuesParser::new(Integrator::ALL.iter().map(|integrator| integrator.name()))
+        .map(|name| Integrator::named(&name).expect("one of the names above"))
 }
 
 fn parse_radius(text: &str) -> Result<f64, String> {
@@ -70,16 +84,6 @@ struct RayLine {
 struct Table {
     in_degrees: bool,
     rays: Vec<RayLine>,
-}
-
-/// What is written about a ray.
-struct Traced {
-    outcome: Outcome,
-    count: usize,
-    mino_total: f64,
-    r_min: f64,
-    crossings: Vec<PathPoint>,
-    samples: Vec<PathPoint>,
 }
 
 const NAMES: [&str; 5] = ["spin", RADIANS, DEGREES, "alpha", "beta"];
@@ -110,11 +114,12 @@ impl Trace {
         }
         let name = self.rays.display().to_string();
         let table = Table::parse(&self.read()?).with_context(|| name.clone())?;
+        let request = self.request();
         let traced = table
             .rays
             .par_iter()
-            .map_init(Path::new, |path, ray| {
-                self.trace(&table, ray, path).with_context(|| format!("line {}", ray.line))
+            .map(|ray| {
+                self.trace(&table, ray, &request).with_context(|| format!("line {}", ray.line))
             })
             .collect::<anyhow::Result<Vec<_>>>()
             .with_context(|| name.clone())?;
@@ -123,6 +128,25 @@ impl Trace {
         match output {
             Some(output) => output.write(&bytes),
             None => output::print(core::str::from_utf8(&bytes)?),
+        }
+    }
+
+    fn request(&self) -> Request {
+        let points = self.samples as usize;
+        let samples = match (&self.between, self.within) {
+            _ if points == 0 => Placement::None,
+            (Some(radii), _) => Placement::GaussLegendre { points, from: radii[0], to: radii[1] },
+            (None, Some(radius)) => Placement::PathLength { points, radius },
+            (None, None) => Placement::MinoTime(points),
+        };
+        Request {
+            crossings: usize::from(self.crossings),
+            samples,
+            azimuth: true,
+            time: true,
+            momentum: self.momentum,
+            weight: self.weights,
+            uncertainty: self.errors,
         }
     }
 
@@ -135,7 +159,7 @@ impl Trace {
         Ok(bytes)
     }
 
-    fn trace(&self, table: &Table, ray: &RayLine, path: &mut Path) -> anyhow::Result<Traced> {
+    fn trace(&self, table: &Table, ray: &RayLine, request: &Request) -> anyhow::Result<Bundle> {
         let hole = Kerr::new(ray.spin)?;
         let inclination = if table.in_degrees {
             Inclination::from_degrees(ray.inclination)?
@@ -147,140 +171,84 @@ impl Trace {
         } else {
             Observer::at_infinity(inclination)
         };
-        Ok(match self.integrator {
-            Integrator::Rk45Mino => self.by_mino_time(&hole, &observer, ray, path)?,
-            Integrator::Rk45Affine => self.by_affine_parameter(&hole, &observer, ray)?,
-        })
+        let screen = [[ray.alpha], [ray.beta]];
+        let [alpha, beta] = &screen;
+        Ok(self.integrator.trace(&hole, &observer, alpha, beta, self.tolerance, request)?)
     }
 
-    fn by_mino_time(
-        &self,
-        hole: &Kerr,
-        observer: &Observer,
-        line: &RayLine,
-        path: &mut Path,
-    ) -> Result<Traced, OutOfRange> {
-        let ray = observer.ray(hole, line.alpha, line.beta)?;
-        Tracer::new(self.tolerance)?.trace(hole, &ray, Want::ALL, path);
-        // A finite observer's ray ends where it is back at the observer's radius.
-        let total = match path.turning_point() {
-            Some((turning, _)) if !observer.is_at_infinity() => 2.0 * turning,
-            _ => path.mino_total(),
-        };
-        let crossings: Vec<f64> = path.equatorial_crossings().filter(|t| *t <= total).collect();
-        let r_min = path.turning_point().map_or(f64::NAN, |(_, r)| r);
-        Ok(self.collect(path.outcome(), total, r_min, &crossings, |t| path.at(t)))
-    }
-
-    fn by_affine_parameter(
-        &self,
-        hole: &Kerr,
-        observer: &Observer,
-        line: &RayLine,
-    ) -> Result<Traced, OutOfRange> {
-        let tracer = AffineTracer::new(self.tolerance)?;
-        let path = tracer.trace(hole, observer, line.alpha, line.beta)?;
-        let crossings = path.equatorial_crossings();
-        let total = path.mino_total();
-        let r_min = path.closest_approach().unwrap_or(f64::NAN);
-        Ok(self.collect(path.outcome(), total, r_min, &crossings, |t| path.at(t)))
-    }
-
-    /// What is written about a ray whose position at any Mino time is `at`.
-    fn collect(
-        &self,
-        outcome: Outcome,
-        total: f64,
-        r_min: f64,
-        crossings: &[f64],
-        at: impl Fn(f64) -> PathPoint,
-    ) -> Traced {
-        let wanted = crossings.iter().take(usize::from(self.crossings));
-        Traced {
-            outcome,
-            count: crossings.len(),
-            mino_total: if is_resolved(outcome) { total } else { f64::NAN },
-            r_min,
-            crossings: wanted.map(|t| at(*t)).collect(),
-            samples: self.times(total, outcome).map(at).collect(),
-        }
-    }
-
-    /// Mino times of the samples.
-    fn times(&self, total: f64, outcome: Outcome) -> impl Iterator<Item = f64> {
-        let n = if is_resolved(outcome) { self.samples as usize } else { 0 };
-        let at_infinity = self.observer.is_infinite();
-        let step = total / (n.max(1) + 1) as f64;
-        let to = match outcome {
-            Outcome::Captured => total,
-            _ if at_infinity => total - step,
-            _ => total,
-        };
-        quadrature::equidistant(if at_infinity { step } else { 0.0 }, to, n)
-    }
-
-    fn columns(&self, table: &Table, traced: &[Traced]) -> Vec<Vec<Column>> {
+    fn columns(&self, table: &Table, traced: &[Bundle]) -> Vec<Vec<Column>> {
         let number = |name: &str, value: &dyn Fn(usize) -> f64| {
             Column::Numbers(name.to_owned(), (0..traced.len()).map(value).collect())
         };
         let rays = &table.rays;
         let inclination_name = if table.in_degrees { DEGREES } else { RADIANS };
-        let outcomes = traced.iter().map(|t| t.outcome.name().to_owned()).collect();
+        let outcomes = traced.iter().map(|t| t.outcome[0].name().to_owned()).collect();
+        let counts = traced.iter().map(|t| u64::from(t.crossing_count[0])).collect();
         let mut groups: Vec<Vec<Column>> = vec![
             vec![number("spin", &|k| rays[k].spin)],
             vec![number(inclination_name, &|k| rays[k].inclination)],
             vec![number("alpha", &|k| rays[k].alpha)],
             vec![number("beta", &|k| rays[k].beta)],
             vec![Column::Words("outcome".to_owned(), outcomes)],
-            vec![Column::Counts(
-                "crossings".to_owned(),
-                traced.iter().map(|t| t.count as u64).collect(),
-            )],
-            vec![number("mino_total", &|k| traced[k].mino_total)],
-            vec![number("r_min", &|k| traced[k].r_min)],
+            vec![Column::Counts("crossings".to_owned(), counts)],
+            vec![number("mino_total", &|k| traced[k].mino_total[0])],
+            vec![number("r_min", &|k| traced[k].turning_radius[0])],
         ];
-        let block = |name: &str,
-                     points: &dyn Fn(&Traced) -> &[PathPoint],
-                     width: usize,
-                     value: &dyn Fn(&PathPoint) -> f64| {
-            let row = |t: &Traced| {
-                let mut row: Vec<f64> = points(t).iter().map(value).collect();
-                row.resize(width, f64::NAN);
-                row
-            };
-            Column::Blocks(name.to_owned(), traced.iter().map(row).collect())
-        };
-        let crossing = |name: &str, value: &dyn Fn(&PathPoint) -> f64| {
-            block(name, &|t| &t.crossings, usize::from(self.crossings), value)
-        };
-        groups.push(vec![
-            crossing("mino", &|p| p.mino_time),
-            crossing("r", &PathPoint::radius),
-            crossing("phi", &|p| p.azimuth),
-            crossing("delay", &|p| p.delay),
-        ]);
+        let crossings = points(traced, usize::from(self.crossings), "", |b| &b.crossings);
+        groups.push(crossings.into_iter().filter(|column| column.name() != "theta").collect());
         if self.samples > 0 {
-            let sample = |name: &str, value: &dyn Fn(&PathPoint) -> f64| {
-                block(name, &|t| &t.samples, self.samples as usize, value)
-            };
-            groups.push(vec![
-                sample("sample_mino", &|p| p.mino_time),
-                sample("sample_r", &PathPoint::radius),
-                sample("sample_theta", &PathPoint::theta),
-                sample("sample_phi", &|p| p.azimuth),
-                sample("sample_delay", &|p| p.delay),
-            ]);
+            let pieces = if self.between.is_some() { 2 } else { 1 };
+            let width = self.samples as usize * pieces;
+            groups.push(points(traced, width, "sample_", |b| &b.samples));
         }
-        let integrator = self.integrator.to_possible_value();
-        let integrator = integrator.map_or(String::new(), |v| v.get_name().to_owned());
+        if self.errors {
+            let error = |name: &str, value: &dyn Fn(&Uncertainty) -> f64| {
+                vec![number(name, &|k| value(&traced[k].uncertainty[0]))]
+            };
+            groups.push(error("error_r", &|u| u.radius));
+            groups.push(error("error_theta", &|u| u.theta));
+            groups.push(error("error_phi", &|u| u.azimuth));
+            groups.push(error("error_delay", &|u| u.delay));
+        }
+        let integrator = self.integrator.name().to_owned();
         groups.push(vec![Column::Words("integrator".to_owned(), vec![integrator; traced.len()])]);
         groups.push(vec![number("tolerance", &|_| self.tolerance)]);
         groups
     }
 }
 
-fn is_resolved(outcome: Outcome) -> bool {
-    !matches!(outcome, Outcome::Unresolved(_))
+/// The columns of each ray's first `width` points, filled up with NaN; those that were not
+/// asked for are left out.
+fn points(
+    traced: &[Bundle],
+    width: usize,
+    prefix: &str,
+    of: impl Fn(&Bundle) -> &Points,
+) -> Vec<Column> {
+    let block = |name: &str, row: &dyn Fn(&Points) -> Vec<f64>| {
+        let rows = traced.iter().map(|bundle| {
+            let mut row = row(of(bundle));
+            row.resize(width, f64::NAN);
+            row
+        });
+        Column::Blocks(format!("{prefix}{name}"), rows.collect())
+    };
+    let mut columns = vec![
+        block("mino", &|p| p.mino_time.clone()),
+        block("r", &|p| p.radius.clone()),
+        block("theta", &|p| p.theta.clone()),
+        block("phi", &|p| p.azimuth.clone()),
+        block("delay", &|p| p.delay.clone()),
+    ];
+    let has = |wanted: &dyn Fn(&Points) -> bool| traced.iter().any(|bundle| wanted(of(bundle)));
+    if has(&|p| !p.momentum.is_empty()) {
+        columns.push(block("p_r", &|p| p.momentum.iter().map(|m| m[1]).collect()));
+        columns.push(block("p_theta", &|p| p.momentum.iter().map(|m| m[2]).collect()));
+    }
+    if has(&|p| !p.weight.is_empty()) {
+        columns.push(block("weight", &|p| p.weight.clone()));
+    }
+    columns
 }
 
 /// Counts the lines up to each record, skipped ones included, which the reader's own count

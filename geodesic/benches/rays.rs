@@ -4,7 +4,7 @@
 //! `cargo bench -p kerrlight-geodesic --features affine`
 
 use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use kerrlight_geodesic::bundle::{Samples, Width};
+use kerrlight_geodesic::bundle::{Crossings, Samples, Width};
 use kerrlight_geodesic::{Inclination, Kerr, Observer, Path, Ray, Tracer, Want};
 use std::hint::black_box;
 
@@ -98,15 +98,24 @@ fn samples(c: &mut Criterion) {
     group.finish();
 }
 
-/// The whole of (t, r, θ, φ) at 100 points of every ray, from an observer at 1000 M, by
-/// number of lanes.
-fn bundles(c: &mut Criterion) {
+/// Instruction sets to be compared.
+const WIDTHS: [Width; 4] = [Width::Scalar, Width::Sse2, Width::Avx2, Width::Avx512];
+
+/// The hole, an observer at 1000 M, and `n` × `n` rays.
+fn picture(n: usize) -> (Kerr, Observer, Vec<f64>, Vec<f64>) {
     let hole = Kerr::new(0.94).expect("a spin");
     let inclination = Inclination::from_degrees(60.0).expect("an inclination");
     let observer = Observer::at_radius(inclination, 1000.0).expect("a radius");
-    let at = |k: usize| -8.0 + 16.0 * k as f64 / 63.0;
-    let (alpha, beta): (Vec<f64>, Vec<f64>) =
-        (0..64 * 64).map(|k| (at(k % 64), at(k / 64))).unzip();
+    let at = |k: usize| -8.0 + 16.0 * k as f64 / (n - 1) as f64;
+    let (alpha, beta) = (0..n * n).map(|k| (at(k % n), at(k / n))).unzip();
+    (hole, observer, alpha, beta)
+}
+
+/// The whole of (t, r, θ, φ) at 100 points of every ray, from an observer at 1000 M, by
+/// number of lanes and of rays. `tests.rs` of the module holds every point against the tracer;
+/// here the sum of all Mino times is.
+fn bundles(c: &mut Criterion) {
+    let (hole, observer, alpha, beta) = picture(64);
     let tracer = Tracer::new(1e-12).expect("a tolerance");
     let mut path = Path::new();
     let mut length = |(alpha, beta): (&f64, &f64)| {
@@ -117,10 +126,7 @@ fn bundles(c: &mut Criterion) {
     let expected: f64 = alpha.iter().zip(&beta).map(&mut length).sum();
     let mut group = c.benchmark_group("4096 rays x 100 samples, bundle");
     group.throughput(Throughput::Elements(409_600));
-    for width in [Width::Scalar, Width::Avx2, Width::Avx512] {
-        if !width.available() {
-            continue;
-        }
+    for width in WIDTHS.into_iter().filter(|width| width.available()) {
         let mut samples = Samples::default();
         let run = |samples: &mut Samples| {
             samples.trace_at(width, &hole, &observer, &alpha, &beta, 100).expect("rays");
@@ -131,7 +137,74 @@ fn bundles(c: &mut Criterion) {
         group.bench_function(format!("{width:?}"), |b| b.iter(|| run(&mut samples)));
     }
     group.finish();
+    let mut group = c.benchmark_group("rays x 100 samples, bundle");
+    for n in [16, 32, 64, 128] {
+        let (hole, observer, alpha, beta) = picture(n);
+        let mut samples = Samples::default();
+        group.throughput(Throughput::Elements(100 * (n * n) as u64));
+        group.bench_function(BenchmarkId::from_parameter(n * n), |b| {
+            b.iter(|| samples.trace(&hole, &observer, &alpha, &beta, 100).expect("rays"));
+        });
+        // All but a few rays next to the critical curve.
+        let lost = (0..n * n).filter(|k| samples.ray(*k).error > 1e-9).count();
+        assert!(lost * 1000 <= n * n, "{lost} of {}", n * n);
+    }
+    group.finish();
 }
 
-criterion_group!(benches, requests, tolerances, samples, bundles);
+/// First equatorial crossings, (t, r, φ), of the same rays, by number of lanes and of rays, each
+/// within 1e-9 of the tracer.
+fn crossings(c: &mut Criterion) {
+    let (hole, observer, alpha, beta) = picture(64);
+    let mut group = c.benchmark_group("first crossings of 4096 rays, bundle");
+    group.throughput(Throughput::Elements(4096));
+    for width in WIDTHS.into_iter().filter(|width| width.available()) {
+        let mut found = Crossings::default();
+        let run = |found: &mut Crossings| {
+            found.trace_at(width, &hole, &observer, &alpha, &beta, 1).expect("rays");
+        };
+        run(&mut found);
+        assert_crossings(&hole, &observer, (&alpha, &beta), &found);
+        group.bench_function(format!("{width:?}"), |b| b.iter(|| run(&mut found)));
+    }
+    group.finish();
+    let mut group = c.benchmark_group("first crossings, bundle");
+    for n in [16, 64, 256] {
+        let (hole, observer, alpha, beta) = picture(n);
+        let mut found = Crossings::default();
+        group.throughput(Throughput::Elements((n * n) as u64));
+        group.bench_function(BenchmarkId::from_parameter(n * n), |b| {
+            b.iter(|| found.trace(&hole, &observer, &alpha, &beta, 1).expect("rays"));
+        });
+        let lost = found.error().iter().filter(|error| **error > 1e-9).count();
+        assert!(lost * 1000 <= n * n, "{lost} of {}", n * n);
+    }
+    group.finish();
+}
+
+/// Compares every 7th ray with the tracer.
+fn assert_crossings(
+    hole: &Kerr,
+    observer: &Observer,
+    (alpha, beta): (&[f64], &[f64]),
+    found: &Crossings,
+) {
+    let tracer = Tracer::new(1e-13).expect("a tolerance");
+    let mut path = Path::new();
+    for k in (0..alpha.len()).step_by(7) {
+        let ray = observer.ray(hole, alpha[k], beta[k]).expect("a ray");
+        tracer.trace(hole, &ray, Want::ALL, &mut path);
+        let end = path.turning_point().map_or(f64::INFINITY, |(turning, _)| 2.0 * turning);
+        let time = path.equatorial_crossings().next().filter(|time| *time < end);
+        let crossing = found.ray(k).next();
+        assert_eq!(time.is_some(), crossing.is_some(), "ray {k}");
+        let (Some(time), Some(crossing)) = (time, crossing) else { continue };
+        let expected = path.at(time);
+        assert!((crossing.radius / expected.radius() - 1.0).abs() < 1e-9, "ray {k}");
+        assert!((crossing.azimuth - expected.azimuth).abs() < 1e-9, "ray {k}");
+        assert!((crossing.delay / expected.delay - 1.0).abs() < 1e-9, "ray {k}");
+    }
+}
+
+criterion_group!(benches, requests, tolerances, samples, bundles, crossings);
 criterion_main!(benches);

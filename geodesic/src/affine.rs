@@ -13,10 +13,10 @@
 
 use crate::dual::Dual;
 use crate::error::{OutOfRange, check};
-use crate::hermite::Quintic;
 use crate::kerr::Kerr;
 use crate::observer::Observer;
 use crate::path::{Outcome, PathPoint, Unresolved};
+use crate::polynomial::{Polynomial, hermite};
 use crate::scalar::Scalar;
 use nalgebra::SVector;
 use ode_solvers::{Dopri5, OutputType};
@@ -92,6 +92,14 @@ impl Node {
     fn end(&self, k: usize) -> [f64; 3] {
         [self.y[k], self.first[k], self.second[k]]
     }
+}
+
+/// The interpolant of value, first and second derivative at both ends of a step.
+fn quintic(h: f64, start: [f64; 3], end: [f64; 3]) -> [f64; 6] {
+    let scaled = |[y, first, second]: [f64; 3]| [y, h * first, 0.5 * h * h * second];
+    let mut out = [0.0; 6];
+    hermite::<3>(&scaled(start), &scaled(end), &mut out);
+    out
 }
 
 /// What the solver is told: the equations and when to stop.
@@ -244,8 +252,19 @@ impl AffinePath {
         self.state(self.end)[MINO_TIME]
     }
 
-    /// Smallest radius of a ray that came back: where dr/ds = 0 on the dense output.
+    /// Smallest radius of a ray that came back.
     pub fn closest_approach(&self) -> Option<f64> {
+        let y = self.state(self.closest_affine()?);
+        Some(radius(self.hole.spin(), [y[0], y[1], y[2]]))
+    }
+
+    /// Mino time of the smallest radius of a ray that came back.
+    fn closest_approach_time(&self) -> Option<f64> {
+        Some(self.state(self.closest_affine()?)[MINO_TIME])
+    }
+
+    /// Affine parameter of the smallest radius, where dr/ds = 0 on the dense output.
+    fn closest_affine(&self) -> Option<f64> {
         if self.outcome != Outcome::Escaped {
             return None;
         }
@@ -260,7 +279,7 @@ impl AffinePath {
             let (p, q) = (hi - golden * (hi - lo), lo + golden * (hi - lo));
             if r(p) < r(q) { hi = q } else { lo = p }
         }
-        Some(r(0.5 * (lo + hi)))
+        Some(0.5 * (lo + hi))
     }
 
     /// Number of accepted steps.
@@ -285,7 +304,7 @@ impl AffinePath {
         let k = self.nodes.partition_point(|node| node.s <= s).clamp(1, self.nodes.len() - 1);
         let (a, b) = (&self.nodes[k - 1], &self.nodes[k]);
         let h = b.s - a.s;
-        core::array::from_fn(|k| Quintic::new(h, a.end(k), b.end(k)).value((s - a.s) / h))
+        core::array::from_fn(|k| Polynomial(&quintic(h, a.end(k), b.end(k))).value((s - a.s) / h))
     }
 
     /// The affine parameter at a Mino time.
@@ -296,8 +315,8 @@ impl AffinePath {
             .clamp(1, self.nodes.len() - 1);
         let (a, b) = (&self.nodes[k - 1], &self.nodes[k]);
         let h = b.s - a.s;
-        let clock = Quintic::new(h, a.end(MINO_TIME), b.end(MINO_TIME));
-        a.s + h * clock.solve(mino_time, 0.0, 1.0)
+        let clock = quintic(h, a.end(MINO_TIME), b.end(MINO_TIME));
+        a.s + h * Polynomial(&clock).solve(mino_time, 0.0, 1.0)
     }
 
     /// The position at a Mino time in \[0, [`mino_total`](Self::mino_total)\]: r, θ, azimuth
@@ -329,6 +348,48 @@ impl AffinePath {
         }
     }
 
+    /// The pieces of the path with lo ≤ r ≤ hi as intervals of Mino time, in order: at most
+    /// two, since the radius has at most one minimum.
+    pub fn intervals_within(&self, lo: f64, hi: f64, intervals: &mut Vec<[f64; 2]>) {
+        intervals.clear();
+        let total = self.mino_total();
+        let turning = self.closest_approach_time();
+        let legs = match turning {
+            Some(turning) => vec![[0.0, turning], [turning, total]],
+            None => vec![[0.0, total]],
+        };
+        for [start, end] in legs {
+            let r = [start, end].map(|time| self.at(time).radius());
+            let (least, most) = (r[0].min(r[1]), r[0].max(r[1]));
+            if most < lo || least > hi {
+                continue;
+            }
+            let bound = |k: usize| {
+                let limit = r[k].clamp(lo, hi);
+                if limit == r[k] { [start, end][k] } else { self.time_at(limit, [start, end]) }
+            };
+            let piece = [bound(0), bound(1)];
+            match intervals.last_mut() {
+                Some(last) if piece[0] <= last[1] * (1.0 + 1e-14) => last[1] = piece[1],
+                _ if piece[1] > piece[0] => intervals.push(piece),
+                _ => {}
+            }
+        }
+    }
+
+    /// Where the radius takes a value between two Mino times of one leg: bisection.
+    fn time_at(&self, target: f64, [mut lo, mut hi]: [f64; 2]) -> f64 {
+        let rising = self.at(hi).radius() > self.at(lo).radius();
+        for _ in 0..100 {
+            let middle = 0.5 * (lo + hi);
+            if middle <= lo || middle >= hi {
+                break;
+            }
+            if (self.at(middle).radius() < target) == rising { lo = middle } else { hi = middle }
+        }
+        0.5 * (lo + hi)
+    }
+
     /// Mino times of the crossings of the equatorial plane.
     pub fn equatorial_crossings(&self) -> Vec<f64> {
         let mut crossings = Vec::new();
@@ -336,7 +397,8 @@ impl AffinePath {
             let (a, b) = (&pair[0], &pair[1]);
             if (a.y[2] > 0.0) != (b.y[2] > 0.0) && a.y[2] != 0.0 {
                 let h = b.s - a.s;
-                let s = a.s + h * Quintic::new(h, a.end(2), b.end(2)).solve(0.0, 0.0, 1.0);
+                let height = quintic(h, a.end(2), b.end(2));
+                let s = a.s + h * Polynomial(&height).solve(0.0, 0.0, 1.0);
                 if s < self.end {
                     crossings.push(self.state(s)[MINO_TIME]);
                 }

@@ -113,6 +113,7 @@ impl Camera {
         let carter = polar * polar + (around - a * s).powi(2);
         let eta = polar * polar + c * c * (around - a) * (around + a);
         let coefficients = [a * a - angular, 2.0 * carter, -a * a * eta].map(Double::from);
+        let horizon = Double::from(1.0 / self.hole.horizon());
         Ok(Ray {
             lambda: s * around,
             eta,
@@ -124,7 +125,7 @@ impl Camera {
             azimuth: self.azimuth,
             inverse_radius: 1.0 / self.radius,
             inward: k_r > 0.0,
-            potential: RadialPotential::new(&self.hole, coefficients),
+            potential: RadialPotential::new(coefficients, horizon).narrow(|x| x.hi),
         })
     }
 

@@ -1,7 +1,7 @@
 //! Dual numbers: values with exact first derivatives with respect to `D` parameters
 //! (forward-mode differentiation).
 
-use crate::scalar::Scalar;
+use crate::scalar::{Elementary, Scalar};
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A value and its derivatives with respect to `D` parameters.
@@ -76,6 +76,49 @@ impl<T: Scalar, const D: usize> Scalar for Dual<T, D> {
     fn sqrt(self) -> Self {
         let root = self.value.sqrt();
         self.chain(root, T::constant(0.5) / root)
+    }
+}
+
+impl<T: Elementary, const D: usize> Elementary for Dual<T, D> {
+    const EPSILON: f64 = T::EPSILON;
+
+    type Wide = Dual<T::Wide, D>;
+
+    fn widen(self) -> Self::Wide {
+        Dual { value: self.value.widen(), slope: self.slope.map(T::widen) }
+    }
+
+    fn narrow(wide: Self::Wide) -> Self {
+        Dual { value: T::narrow(wide.value), slope: wide.slope.map(T::narrow) }
+    }
+
+    fn pi() -> Self {
+        Dual { value: T::pi(), slope: [T::constant(0.0); D] }
+    }
+
+    fn value(self) -> f64 {
+        self.value.value()
+    }
+
+    fn ln_1p(self) -> Self {
+        let one = T::constant(1.0);
+        self.chain(self.value.ln_1p(), one / (one + self.value))
+    }
+
+    fn ln(self) -> Self {
+        self.chain(self.value.ln(), T::constant(1.0) / self.value)
+    }
+
+    fn sin_cos(self) -> (Self, Self) {
+        let (sin, cos) = self.value.sin_cos();
+        (self.chain(sin, cos), self.chain(cos, -sin))
+    }
+
+    fn atan2(self, x: Self) -> Self {
+        let inv = T::constant(1.0) / (self.value * self.value + x.value * x.value);
+        let (by_y, by_x) = (x.value * inv, self.value * inv);
+        let slope = core::array::from_fn(|k| self.slope[k] * by_y - x.slope[k] * by_x);
+        Dual { value: self.value.atan2(x.value), slope }
     }
 }
 

@@ -2,13 +2,15 @@
 //! the horizon integrates.
 
 use crate::error::{OutOfRange, check};
+use crate::scalar::Elementary;
 
-/// A Kerr black hole in units G = c = M = 1.
+/// A Kerr black hole in units G = c = M = 1; `T` is `f64`, or one of the numbers that carry
+/// derivatives or more digits ([`Kerr::from_spin`]).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Kerr {
-    spin: f64,
+pub struct Kerr<T = f64> {
+    spin: T,
     /// r₊ − r₋ = 2√((1 − a)(1 + a)), free of cancellation as |a| → 1.
-    horizon_gap: f64,
+    horizon_gap: T,
 }
 
 impl Kerr {
@@ -18,66 +20,89 @@ impl Kerr {
     /// # Errors
     /// If `spin` is not in \[−1, 1\] (NaN included).
     pub fn new(spin: f64) -> Result<Self, OutOfRange> {
-        check("spin", spin, (-1.0..=1.0).contains(&spin), "a number in [-1, 1]")?;
-        let horizon_gap = 2.0 * ((1.0 - spin) * (1.0 + spin)).sqrt();
+        Self::from_spin(spin)
+    }
+}
+
+impl<T: Elementary> Kerr<T> {
+    /// A hole whose spin is any kind of number. With derivatives |a| = 1 gives infinite
+    /// ones, since dr₊/da diverges there.
+    ///
+    /// # Errors
+    /// If the spin's value is not in \[−1, 1\] (NaN included).
+    pub fn from_spin(spin: T) -> Result<Self, OutOfRange> {
+        let a = spin.value();
+        check("spin", a, (-1.0..=1.0).contains(&a), "a number in [-1, 1]")?;
+        let one = T::constant(1.0);
+        let horizon_gap = T::constant(2.0) * ((one - spin) * (one + spin)).sqrt();
         Ok(Kerr { spin, horizon_gap })
     }
 
     /// Spin a, in units of M.
-    pub fn spin(&self) -> f64 {
+    pub fn spin(&self) -> T {
         self.spin
     }
 
     /// Radius of the outer horizon, r₊ = 1 + √(1 − a²).
-    pub fn horizon(&self) -> f64 {
-        1.0 + 0.5 * self.horizon_gap
+    pub fn horizon(&self) -> T {
+        T::constant(1.0) + T::constant(0.5) * self.horizon_gap
     }
 
     /// Radius of the inner horizon, r₋ = a²/r₊ (no cancellation as a → 0).
-    pub fn inner_horizon(&self) -> f64 {
+    pub fn inner_horizon(&self) -> T {
         self.spin * self.spin / self.horizon()
     }
 
     /// r₊ − r₋.
-    pub fn horizon_gap(&self) -> f64 {
+    pub fn horizon_gap(&self) -> T {
         self.horizon_gap
     }
 
     /// Δ = r² − 2r + a².
-    pub fn delta(&self, r: f64) -> f64 {
+    pub fn delta(&self, r: T) -> T {
         (r - self.horizon()) * (r - self.inner_horizon())
     }
 
     /// Σ = r² + a² cos²θ.
-    pub fn sigma(&self, r: f64, cos_theta: f64) -> f64 {
-        r * r + (self.spin * cos_theta).powi(2)
+    pub fn sigma(&self, r: T, cos_theta: T) -> T {
+        let polar = self.spin * cos_theta;
+        r * r + polar * polar
     }
 
     /// w/(1 − r₋w) · ln[(r − r₊)/(r − r₋)] / x with x = (r₊ − r₋)w/(1 − r₋w), w = 1/r:
     /// the logarithm of both closed forms below, divided by the gap of the horizons so
-    /// that it stays regular for a → 1 and for r → ∞.
-    fn horizon_log(&self, w: f64) -> f64 {
-        let inv = w / (1.0 - self.inner_horizon() * w);
+    /// that it stays regular for a → 1 and for r → ∞. At the horizon, where it diverges, it
+    /// is that of the last double outside.
+    fn horizon_log(&self, w: T) -> T {
+        let inv = w / (T::constant(1.0) - self.inner_horizon() * w);
         let x = self.horizon_gap * inv;
-        let ratio = if x == 0.0 { -1.0 } else { (-x).max(-1.0).ln_1p() / x };
+        let ratio = if x.value() == 0.0 {
+            T::constant(-1.0) - T::constant(0.5) * x
+        } else if x.value() >= 1.0 - T::EPSILON {
+            // The last number outside the horizon.
+            T::constant((-1.0 + f64::EPSILON).ln_1p()) / x
+        } else {
+            (-x).ln_1p() / x
+        };
         inv * ratio
     }
 
     /// ∫_r^∞ −a dr/Δ = \[a/(r₊ − r₋)\] ln\[(r − r₊)/(r − r₋)\] as a function of w = 1/r:
     /// the azimuth's term that is singular at the horizon. Zero at infinity.
-    pub fn azimuth_closed_form(&self, w: f64) -> f64 {
-        if self.spin == 0.0 { 0.0 } else { self.spin * self.horizon_log(w) }
+    pub fn azimuth_closed_form(&self, w: T) -> T {
+        self.spin * self.horizon_log(w)
     }
 
     /// The tortoise coordinate r* = r + 2 ln(r − r₋) + 2r₊/(r₊ − r₋) · ln\[(r − r₊)/(r − r₋)\]
     /// with dr*/dr = (r² + a²)/Δ, as a function of w = 1/r.
-    pub fn tortoise(&self, w: f64) -> f64 {
-        1.0 / w + self.tortoise_regular(w) - 2.0 * w.ln()
+    pub fn tortoise(&self, w: T) -> T {
+        T::constant(1.0) / w + self.tortoise_regular(w) - T::constant(2.0) * w.ln()
     }
 
     /// r* − r − 2 ln r: what is left of the tortoise coordinate at infinity (zero there).
-    pub fn tortoise_regular(&self, w: f64) -> f64 {
-        2.0 * (-self.inner_horizon() * w).ln_1p() + 2.0 * self.horizon() * self.horizon_log(w)
+    pub fn tortoise_regular(&self, w: T) -> T {
+        let two = T::constant(2.0);
+        two * (-(self.inner_horizon() * w)).ln_1p() + two * self.horizon() * self.horizon_log(w)
     }
 }
 

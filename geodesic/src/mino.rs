@@ -30,7 +30,7 @@
 
 use crate::kerr::Kerr;
 use crate::observer::Ray;
-use crate::scalar::Scalar;
+use crate::scalar::{Elementary, Scalar};
 
 /// Place of each variable in the state; the first four are always there.
 pub(crate) mod index {
@@ -53,9 +53,6 @@ pub(crate) mod index {
     /// I_φ, the regular part of the azimuth.
     pub const AZIMUTH: usize = 8;
 }
-
-/// Number of variables of the largest state.
-pub(crate) const FULL: usize = 10;
 
 /// Whether a state of `N` variables holds the azimuth.
 pub(crate) const fn has_azimuth(n: usize) -> bool {
@@ -85,28 +82,85 @@ pub(crate) struct System<T> {
     time: [T; 4],
 }
 
-impl System<f64> {
+impl<T: Elementary> System<T> {
     /// The equations of `ray` around `hole`.
-    pub fn new(hole: &Kerr, ray: &Ray) -> Self {
+    pub fn new(hole: &Kerr<T>, ray: &Ray<T>) -> Self {
         let [quad, cubic, quartic] = ray.potential.coefficients;
-        let (a, b2) = (hole.spin(), ray.angular.max(1.0));
+        let a = hole.spin();
+        let b2 = ray.angular.value().max(1.0);
         let b = b2.sqrt();
-        let half = 0.5 * cubic;
+        let half = T::constant(0.5) * cubic;
+        // The scale is a plain number: it may be any, so it carries no derivatives.
+        let over = |x: T, scale: f64| x / T::constant(scale);
         System {
             scale: b,
-            linear: quad / b2,
-            square: 1.5 * cubic / (b2 * b),
-            cubic: 2.0 * quartic / (b2 * b2),
-            angular: ray.angular / b2,
-            spin2: a * a / b2,
-            gauge: a * (a - ray.lambda) / b2,
-            azimuth: [a / b, a * half / (b2 * b)],
-            time: [half / b2, a * a / b2, a * (ray.lambda - a) / b2, a * a / b2],
+            linear: over(quad, b2),
+            square: over(T::constant(1.5) * cubic, b2 * b),
+            cubic: over(T::constant(2.0) * quartic, b2 * b2),
+            angular: over(ray.angular, b2),
+            spin2: over(a * a, b2),
+            gauge: over(a * (a - ray.lambda), b2),
+            azimuth: [over(a, b), over(a * half, b2 * b)],
+            time: [
+                over(half, b2),
+                over(a * a, b2),
+                over(a * (ray.lambda - a), b2),
+                over(a * a, b2),
+            ],
         }
+    }
+
+    /// The state in which `ray` starts; `leg` is +1 for an inward start.
+    pub fn start<const N: usize>(&self, ray: &Ray<T>, leg: f64) -> [T; N] {
+        use index::{DU, DW, DX, DY, U, W, X, Y};
+        let mut y = [T::constant(0.0); N];
+        let b = T::constant(self.scale);
+        let w = T::constant(ray.inverse_radius);
+        y[W] = b * w;
+        y[DW] = T::constant(leg) * root(ray.potential.value(w));
+        y[U] = ray.position[2];
+        y[DU] = ray.velocity[2] / b;
+        if has_azimuth(N) {
+            y[X] = ray.position[0];
+            y[DX] = ray.velocity[0] / b;
+            y[Y] = ray.position[1];
+            y[DY] = ray.velocity[1] / b;
+        }
+        y
     }
 }
 
+/// The square root of a potential that is not negative but for rounding.
+fn root<T: Elementary>(value: T) -> T {
+    if value.value() > 0.0 { value.sqrt() } else { T::constant(0.0) }
+}
+
 impl<T: Scalar> System<T> {
+    /// Coefficients of w, w² and w³ in w''.
+    pub fn radial(&self) -> [T; 3] {
+        [self.linear, self.square, self.cubic]
+    }
+
+    /// (η + λ²)/b² and a²/b².
+    pub fn polar(&self) -> (T, T) {
+        (self.angular, self.spin2)
+    }
+
+    /// (a² − aλ)/b².
+    pub fn gauge(&self) -> T {
+        self.gauge
+    }
+
+    /// Constant and factor of w²/g in I_φ'.
+    pub fn azimuth(&self) -> [T; 2] {
+        self.azimuth
+    }
+
+    /// B/2, a², a(λ − a) and a², scaled: the terms of (I_t/b)'.
+    pub fn time(&self) -> [T; 4] {
+        self.time
+    }
+
     /// dy/ds; `leg` is +1 on an inward leg and −1 on an outward one.
     #[inline(always)]
     pub fn derivative<const N: usize>(&self, y: &[T; N], leg: T) -> [T; N] {
@@ -145,49 +199,5 @@ impl<T: Scalar> System<T> {
     pub fn blur<const N: usize>(&self, y: &[T; N], leg: T) -> T {
         let (w, dw) = (y[index::W], y[index::DW]);
         T::constant(1.0) / (T::constant(1.0) + self.gauge * w * w + leg * dw)
-    }
-
-    /// Second derivatives of I_φ and I_t/b, for the dense output; zero where not asked for.
-    #[inline(always)]
-    pub fn second_derivative<const N: usize>(&self, y: &[T; N], leg: T) -> [T; 2] {
-        use index::{DU, DW, U, W};
-        let mut second = [T::constant(0.0); 2];
-        if has_azimuth(N) || has_time(N) {
-            let (w, dw) = (y[W], y[DW]);
-            let w2 = w * w;
-            let dw2 = (w + w) * dw;
-            let ddw = w * (self.linear + w * (self.square + w * self.cubic));
-            let g = T::constant(1.0) + self.gauge * w2 + leg * dw;
-            let dg = self.gauge * dw2 + leg * ddw;
-            let inv2 = T::constant(1.0) / (g * g);
-            if has_azimuth(N) {
-                second[0] = -(self.azimuth[1] * (dw2 * g - w2 * dg) * inv2);
-            }
-            if has_time(N) {
-                let [half, a2, _, tilt] = self.time;
-                let radial = half * (a2 * dw2 * g - (T::constant(1.0) + a2 * w2) * dg) * inv2;
-                second[1] = radial + tilt * (y[U] + y[U]) * y[DU];
-            }
-        }
-        second
-    }
-
-    /// The state in which `ray` starts; `w_sign` is +1 for an inward start.
-    #[inline(always)]
-    pub fn start<const N: usize>(&self, ray: &Ray, w_sign: f64) -> [T; N] {
-        use index::{DU, DW, DX, DY, U, W, X, Y};
-        let mut y = [T::constant(0.0); N];
-        let b = self.scale;
-        y[W] = T::constant(b * ray.inverse_radius);
-        y[DW] = T::constant(w_sign * ray.potential.value(ray.inverse_radius).max(0.0).sqrt());
-        y[U] = T::constant(ray.position[2]);
-        y[DU] = T::constant(ray.velocity[2] / b);
-        if has_azimuth(N) {
-            y[X] = T::constant(ray.position[0]);
-            y[DX] = T::constant(ray.velocity[0] / b);
-            y[Y] = T::constant(ray.position[1]);
-            y[DY] = T::constant(ray.velocity[1] / b);
-        }
-        y
     }
 }

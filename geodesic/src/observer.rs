@@ -4,13 +4,16 @@ use crate::compensated::Double;
 use crate::error::{OutOfRange, check};
 use crate::kerr::Kerr;
 use crate::radial::RadialPotential;
+use crate::scalar::Elementary;
 
 /// The angle between the spin axis and the line of sight.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Inclination {
-    radians: f64,
-    sin: f64,
-    cos: f64,
+pub struct Inclination<T: Elementary = f64> {
+    radians: T,
+    sin: T,
+    cos: T,
+    /// Sine and cosine with twice the digits: they decide the fate of near-critical rays.
+    wide: [T::Wide; 2],
 }
 
 impl Inclination {
@@ -19,53 +22,62 @@ impl Inclination {
     /// # Errors
     /// If `degrees` is outside the range.
     pub fn from_degrees(degrees: f64) -> Result<Self, OutOfRange> {
-        check(
-            "inclination",
-            degrees,
-            (0.0..=180.0).contains(&degrees),
-            "an angle in [0, 180] degrees",
-        )?;
+        let allowed = "an angle in [0, 180] degrees";
+        check("inclination", degrees, (0.0..=180.0).contains(&degrees), allowed)?;
         // Reduced to the nearest axis, so that the sine or cosine that vanishes is exactly 0.
+        let angle = |degrees: f64| {
+            let exact = Double::from(degrees) * Double::PI / Double::from(180.0);
+            exact.sin_cos()
+        };
         let (sin, cos) = if degrees < 45.0 {
-            degrees.to_radians().sin_cos()
+            angle(degrees)
         } else if degrees <= 135.0 {
-            let (s, c) = (90.0 - degrees).to_radians().sin_cos();
+            let (s, c) = angle(90.0 - degrees);
             (c, s)
         } else {
-            let (s, c) = (180.0 - degrees).to_radians().sin_cos();
+            let (s, c) = angle(180.0 - degrees);
             (s, -c)
         };
-        Ok(Inclination { radians: degrees.to_radians(), sin, cos })
+        Ok(Self::of(degrees.to_radians(), sin, cos))
     }
 
+    /// The same angle with all digits of its sine and cosine.
+    pub fn widen(self) -> Inclination<Double> {
+        let [sin, cos] = self.wide;
+        Inclination::of(Double::from(self.radians), sin, cos)
+    }
+}
+
+impl<T: Elementary> Inclination<T> {
     /// From radians in \[0, π\], taken at face value: the double nearest to π/2 is an
     /// inclination 6e-17 short of the equator.
     ///
     /// # Errors
     /// If `radians` is outside the range.
-    pub fn from_radians(radians: f64) -> Result<Self, OutOfRange> {
-        check(
-            "inclination",
-            radians,
-            (0.0..=core::f64::consts::PI).contains(&radians),
-            "an angle in [0, pi] radians",
-        )?;
-        let (sin, cos) = radians.sin_cos();
-        Ok(Inclination { radians, sin, cos })
+    pub fn from_radians(radians: T) -> Result<Self, OutOfRange> {
+        let angle = radians.value();
+        let ok = (0.0..=core::f64::consts::PI).contains(&angle);
+        check("inclination", angle, ok, "an angle in [0, pi] radians")?;
+        let (sin, cos) = radians.widen().sin_cos();
+        Ok(Self::of(radians, sin, cos))
+    }
+
+    fn of(radians: T, sin: T::Wide, cos: T::Wide) -> Self {
+        Inclination { radians, sin: T::narrow(sin), cos: T::narrow(cos), wide: [sin, cos] }
     }
 
     /// The angle in radians.
-    pub fn radians(&self) -> f64 {
+    pub fn radians(&self) -> T {
         self.radians
     }
 
     /// sin i.
-    pub fn sin(&self) -> f64 {
+    pub fn sin(&self) -> T {
         self.sin
     }
 
     /// cos i.
-    pub fn cos(&self) -> f64 {
+    pub fn cos(&self) -> T {
         self.cos
     }
 }
@@ -78,15 +90,23 @@ impl Inclination {
 /// sign of β (Bardeen 1973). At a finite radius (α, β) stay what they are at infinity:
 /// labels of the constants of motion, not angles of a local frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Observer {
-    inclination: Inclination,
+pub struct Observer<T: Elementary = f64> {
+    inclination: Inclination<T>,
     azimuth: f64,
     inverse_radius: f64,
 }
 
 impl Observer {
+    /// The same observer for numbers of twice the precision.
+    pub fn widen(self) -> Observer<Double> {
+        let Observer { inclination, azimuth, inverse_radius } = self;
+        Observer { inclination: inclination.widen(), azimuth, inverse_radius }
+    }
+}
+
+impl<T: Elementary> Observer<T> {
     /// An observer infinitely far away, at azimuth 0.
-    pub fn at_infinity(inclination: Inclination) -> Self {
+    pub fn at_infinity(inclination: Inclination<T>) -> Self {
         Observer { inclination, azimuth: 0.0, inverse_radius: 0.0 }
     }
 
@@ -95,7 +115,7 @@ impl Observer {
     ///
     /// # Errors
     /// If `radius` is not finite or not above 2 M.
-    pub fn at_radius(inclination: Inclination, radius: f64) -> Result<Self, OutOfRange> {
+    pub fn at_radius(inclination: Inclination<T>, radius: f64) -> Result<Self, OutOfRange> {
         let ok = radius > 2.0 && radius.is_finite();
         check("observer radius", radius, ok, "a finite number above 2 (M)")?;
         Ok(Observer { inclination, azimuth: 0.0, inverse_radius: 1.0 / radius })
@@ -108,7 +128,7 @@ impl Observer {
     }
 
     /// The inclination.
-    pub fn inclination(&self) -> Inclination {
+    pub fn inclination(&self) -> Inclination<T> {
         self.inclination
     }
 
@@ -132,27 +152,32 @@ impl Observer {
     /// # Errors
     /// If α or β is not in \[−1e12, 1e12\], or if no photon with these constants reaches the
     /// observer's radius (a finite observer inside the turning point).
-    pub fn ray(&self, hole: &Kerr, alpha: f64, beta: f64) -> Result<Ray, OutOfRange> {
-        check("alpha", alpha, alpha.abs() <= 1e12, "a number in [-1e12, 1e12] (M)")?;
-        check("beta", beta, beta.abs() <= 1e12, "a number in [-1e12, 1e12] (M)")?;
+    pub fn ray(&self, hole: &Kerr<T>, alpha: T, beta: T) -> Result<Ray<T>, OutOfRange> {
+        let (x, y) = (alpha.value(), beta.value());
+        check("alpha", x, x.abs() <= 1e12, "a number in [-1e12, 1e12] (M)")?;
+        check("beta", y, y.abs() <= 1e12, "a number in [-1e12, 1e12] (M)")?;
         let (sin, cos) = (self.inclination.sin, self.inclination.cos);
         let a = hole.spin();
-        let potential = RadialPotential::new(hole, screen_coefficients(a, sin, cos, alpha, beta));
+        let wide = [a, alpha, beta].map(T::widen);
+        let horizon = (T::constant(1.0) / hole.horizon()).widen();
+        let coefficients = screen_coefficients(wide, self.inclination.wide);
+        let potential = RadialPotential::new(coefficients, horizon).narrow(T::narrow);
         let w = self.inverse_radius;
-        if potential.value(w) < 0.0 {
+        if potential.value(T::constant(w)).value() < 0.0 {
             return Err(OutOfRange {
                 field: "observer radius",
                 value: 1.0 / w,
                 allowed: "outside the turning point of the ray (alpha, beta)",
             });
         }
+        let zero = T::constant(0.0);
         Ok(Ray {
-            lambda: -alpha * sin,
+            lambda: -(alpha * sin),
             eta: (alpha - a) * (alpha + a) * cos * cos + beta * beta,
             angular: alpha * alpha + beta * beta - a * a * cos * cos,
-            position: [sin, 0.0, cos],
-            velocity: [-beta * cos, alpha, beta * sin],
-            rotation_sign: if alpha.is_sign_negative() { -1.0 } else { 1.0 },
+            position: [sin, zero, cos],
+            velocity: [-(beta * cos), alpha, beta * sin],
+            rotation_sign: if x.is_sign_negative() { -1.0 } else { 1.0 },
             azimuth: self.azimuth,
             inverse_radius: w,
             inward: true,
@@ -163,30 +188,31 @@ impl Observer {
 
 /// A, B, C of the radial potential as sums of squares of the screen coordinates, with
 /// twice the working precision: near the critical curve they decide the ray's fate.
-fn screen_coefficients(a: f64, sin: f64, cos: f64, alpha: f64, beta: f64) -> [Double; 3] {
-    let sq = |x: f64| Double::product(x, x);
-    let (a2, cos2) = (sq(a), sq(cos));
-    let shifted = Double::from(alpha) + Double::product(a, sin);
-    let quad = a2 + a2 * cos2 - sq(alpha) - sq(beta);
-    let cubic = (shifted * shifted + sq(beta)).scale(2.0);
-    let quartic = -(a2 * ((sq(alpha) - a2) * cos2 + sq(beta)));
+fn screen_coefficients<W: Elementary>([a, alpha, beta]: [W; 3], [sin, cos]: [W; 2]) -> [W; 3] {
+    let two = W::constant(2.0);
+    let (a2, cos2) = (a * a, cos * cos);
+    let (alpha2, beta2) = (alpha * alpha, beta * beta);
+    let shifted = alpha + a * sin;
+    let quad = a2 + a2 * cos2 - alpha2 - beta2;
+    let cubic = two * (shifted * shifted + beta2);
+    let quartic = -(a2 * ((alpha2 - a2) * cos2 + beta2));
     [quad, cubic, quartic]
 }
 
 /// A photon's constants of motion and where the backward trace of it starts.
 #[derive(Debug, Clone, Copy)]
-pub struct Ray {
+pub struct Ray<T = f64> {
     /// λ = L/E.
-    pub lambda: f64,
+    pub lambda: T,
     /// η = Q/E².
-    pub eta: f64,
+    pub eta: T,
     /// η + λ², the conserved square of the angular velocity on the sphere but for a²u².
-    pub angular: f64,
+    pub angular: T,
     /// The starting point on the unit sphere, n = (sin θ cos φ, sin θ sin φ, cos θ), with
     /// the observer's azimuth left out.
-    pub position: [f64; 3],
+    pub position: [T; 3],
     /// dn/dτ of the backward ray without frame dragging.
-    pub velocity: [f64; 3],
+    pub velocity: [T; 3],
     /// Sense in which the backward ray turns about the axis (the sign of −λ; that of α,
     /// signed zeros included, where λ = 0).
     pub rotation_sign: f64,
@@ -197,7 +223,7 @@ pub struct Ray {
     /// Whether the backward ray starts towards the hole.
     pub inward: bool,
     /// The radial potential W(w).
-    pub potential: RadialPotential,
+    pub potential: RadialPotential<T>,
 }
 
 #[cfg(test)]

@@ -1,10 +1,13 @@
 //! A traced ray: what became of it, where its events lie, and its position at any Mino
 //! time. Positions come from dense output, so they owe nothing to the stepper's own steps.
 
-use crate::hermite::Quintic;
 use crate::kerr::Kerr;
-use crate::mino::{FULL, index};
+use crate::mino::{has_azimuth, has_time};
 use crate::observer::Ray;
+use crate::polynomial::Polynomial;
+use crate::scalar::Elementary;
+use crate::series::{Series, rows};
+use crate::uncertainty::{Budget, Uncertainty};
 
 /// What became of a ray followed backward from the observer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,137 +40,167 @@ impl Outcome {
     }
 }
 
-/// State at the end of a step, with what dense output needs.
+/// A step: a polynomial for each row of [`Series`], and what turns them into a position.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Node {
-    /// Scaled Mino time bτ.
+pub(crate) struct Segment<T> {
+    /// Scaled Mino time bτ where it starts.
     pub s: f64,
-    pub y: [f64; FULL],
-    pub f: [f64; FULL],
-    /// Second derivatives of I_φ and I_t/b.
-    pub second: [f64; 2],
-    /// +1 where the step that starts here goes inwards, −1 where it goes outwards.
+    /// Its length.
+    pub h: f64,
+    /// +1 on a step that goes inwards, −1 on one that goes outwards.
     pub leg: f64,
     /// Constants that keep azimuth and time continuous from leg to leg.
-    pub constants: [f64; 2],
-    /// Unwrapped atan2(y, x).
-    pub turned: f64,
-}
-
-impl Node {
-    /// Value, slope and curvature of a variable that has its own derivative in the state.
-    fn end(&self, k: usize) -> [f64; 3] {
-        [self.y[k], self.f[k], self.f[k + 1]]
-    }
-
-    fn azimuth_end(&self) -> [f64; 3] {
-        [self.y[index::AZIMUTH], self.f[index::AZIMUTH], self.second[0]]
-    }
-
-    fn time_end(&self) -> [f64; 3] {
-        [self.y[FULL - 1], self.f[FULL - 1], self.second[1]]
-    }
+    pub constants: [T; 2],
+    /// Unwrapped atan2(y, x) where it starts.
+    pub turned: T,
+    /// What the errors of all steps up to its end amount to.
+    pub budget: Budget,
 }
 
 /// A point of a path.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PathPoint {
+pub struct PathPoint<T = f64> {
     /// Mino time since the observer, growing backward in time.
-    pub mino_time: f64,
+    pub mino_time: T,
     /// w = 1/r.
-    pub inverse_radius: f64,
+    pub inverse_radius: T,
     /// dw/dτ of the backward ray: positive on the way in.
-    pub inverse_radius_rate: f64,
+    pub inverse_radius_rate: T,
     /// n = (sin θ cos φ, sin θ sin φ, cos θ). Without azimuth: (sin θ, 0, cos θ).
-    pub direction: [f64; 3],
+    pub direction: [T; 3],
     /// dn/dτ of the backward ray less its frame dragging, so that the photon's covariant
-    /// momentum on the sphere is p·v = −velocity·v. Zero without azimuth.
-    pub velocity: [f64; 3],
+    /// momentum on the sphere is p·v = −velocity·v. Without azimuth: (0, 0, d cos θ/dτ).
+    pub velocity: [T; 3],
     /// Azimuth, unwrapped from the observer on; 0 unless asked for.
-    pub azimuth: f64,
+    pub azimuth: T,
     /// How much earlier the photon was here: t_o − t for an observer at finite radius,
     /// lim \[(t_o − t) − r_o − 2 ln r_o\] for one at infinity; 0 unless asked for.
-    pub delay: f64,
+    pub delay: T,
 }
 
-impl PathPoint {
+impl<T: Elementary> PathPoint<T> {
     /// Boyer–Lindquist radius.
-    pub fn radius(&self) -> f64 {
-        1.0 / self.inverse_radius
+    pub fn radius(&self) -> T {
+        T::constant(1.0) / self.inverse_radius
     }
 
     /// cos θ.
-    pub fn cos_theta(&self) -> f64 {
+    pub fn cos_theta(&self) -> T {
         self.direction[2]
     }
 
     /// Polar angle θ, accurate at the poles.
-    pub fn theta(&self) -> f64 {
-        self.direction[0].hypot(self.direction[1]).atan2(self.direction[2])
+    pub fn theta(&self) -> T {
+        let [x, y, u] = self.direction;
+        // On the axis itself the square root has no derivative.
+        let square = x * x + y * y;
+        let sin = if square.value() == 0.0 { T::constant(0.0) } else { square.sqrt() };
+        sin.atan2(u)
+    }
+
+    /// Covariant Boyer–Lindquist momentum (p_t, p_r, p_θ, p_φ) of the photon on its way to
+    /// the observer, for unit energy at infinity; `lambda` is its angular momentum. p_r
+    /// diverges at the horizon.
+    pub fn momentum(&self, hole: &Kerr<T>, lambda: T) -> [T; 4] {
+        let (w, one) = (self.inverse_radius, T::constant(1.0));
+        // Δ/r², and p_r = (dr/dτ)/Δ.
+        let gap = one - w * (one + one - hole.spin() * hole.spin() * w);
+        let p_r = self.inverse_radius_rate / gap;
+        let [x, y, u] = self.direction;
+        let sin = (x * x + y * y).sqrt();
+        let [vx, vy, vz] = self.velocity;
+        let polar = if sin.value() > 0.0 {
+            // −v·ê_θ, with the horizontal part along the meridian.
+            vz * sin - u * (vx * x + vy * y) / sin
+        } else {
+            -((vx * vx + vy * vy).sqrt() * T::constant(u.value().signum()))
+        };
+        [-one, p_r, polar, lambda]
     }
 
     /// r n: the point in the coordinates in which a = 0 is flat-looking.
-    pub fn cartesian(&self) -> [f64; 3] {
+    pub fn cartesian(&self) -> [T; 3] {
         self.direction.map(|x| x / self.inverse_radius)
     }
 }
 
 /// A ray traced to its end. Reuse one for many rays: its memory stays.
 #[derive(Debug, Clone)]
-pub struct Path {
-    pub(crate) hole: Kerr,
-    pub(crate) nodes: Vec<Node>,
+pub struct Path<T = f64> {
+    pub(crate) hole: Kerr<T>,
+    pub(crate) segments: Vec<Segment<T>>,
+    /// Coefficients of all rows of all segments.
+    pub(crate) coefficients: Vec<T>,
+    /// Rows of a segment.
+    pub(crate) rows: usize,
+    /// Coefficients of a row.
+    pub(crate) width: usize,
+    pub(crate) series: Box<Series<T>>,
     pub(crate) outcome: Outcome,
-    pub(crate) crossings: Vec<f64>,
-    pub(crate) turning: Option<f64>,
-    pub(crate) turning_w: Option<f64>,
-    pub(crate) end: f64,
+    pub(crate) crossings: Vec<T>,
+    pub(crate) turning: Option<T>,
+    pub(crate) turning_w: Option<T>,
+    pub(crate) end: T,
     pub(crate) scale: f64,
     pub(crate) rotation_sign: f64,
     pub(crate) has_azimuth: bool,
     pub(crate) has_time: bool,
-    pub(crate) from_infinity: bool,
-    pub(crate) steps: u32,
+    pub(crate) lambda: f64,
 }
 
-impl Default for Path {
+impl<T: Elementary> Default for Path<T> {
     fn default() -> Self {
-        Path::new()
+        Path::empty()
     }
 }
 
 impl Path {
     /// An empty path, to be filled by [`Tracer::trace`](crate::Tracer::trace).
     pub fn new() -> Self {
+        Path::empty()
+    }
+}
+
+impl<T: Elementary> Path<T> {
+    /// An empty path for any kind of number, to be filled by
+    /// [`trace_series`](crate::trace_series).
+    pub fn empty() -> Self {
+        let zero = T::constant(0.0);
         Path {
-            hole: Kerr::new(0.0).expect("0 is a spin"), // constant, in range
-            nodes: Vec::new(),
+            hole: Kerr::from_spin(zero).expect("0 is a spin"), // constant, in range
+            segments: Vec::new(),
+            coefficients: Vec::new(),
+            rows: 0,
+            width: 0,
+            series: Box::new(Series::new()),
             outcome: Outcome::Unresolved(Unresolved::StepLimit),
             crossings: Vec::new(),
             turning: None,
             turning_w: None,
-            end: 0.0,
+            end: zero,
             scale: 1.0,
             rotation_sign: 1.0,
             has_azimuth: false,
             has_time: false,
-            from_infinity: true,
-            steps: 0,
+            lambda: 0.0,
         }
     }
 
-    pub(crate) fn reset(&mut self, hole: &Kerr, ray: &Ray, scale: f64) {
+    pub(crate) fn reset<const N: usize>(&mut self, hole: &Kerr<T>, ray: &Ray<T>, scale: f64) {
         self.hole = *hole;
-        self.nodes.clear();
+        self.segments.clear();
+        self.coefficients.clear();
         self.crossings.clear();
         self.turning = None;
         self.turning_w = None;
         self.outcome = Outcome::Unresolved(Unresolved::StepLimit);
-        self.end = 0.0;
+        self.end = T::constant(0.0);
         self.scale = scale;
         self.rotation_sign = ray.rotation_sign;
-        self.from_infinity = ray.inverse_radius == 0.0;
-        self.steps = 0;
+        self.lambda = ray.lambda.value();
+        self.has_azimuth = has_azimuth(N);
+        self.has_time = has_time(N);
+        self.rows = rows(N);
     }
 
     /// What became of the ray.
@@ -176,19 +209,19 @@ impl Path {
     }
 
     /// Mino time from the observer to the horizon or back to infinity.
-    pub fn mino_total(&self) -> f64 {
-        self.end / self.scale
+    pub fn mino_total(&self) -> T {
+        self.end / T::constant(self.scale)
     }
 
     /// Mino times of the crossings of the equatorial plane outside the horizon, in the
     /// order of the backward ray.
-    pub fn equatorial_crossings(&self) -> impl ExactSizeIterator<Item = f64> + '_ {
-        self.crossings.iter().map(|s| s / self.scale)
+    pub fn equatorial_crossings(&self) -> impl ExactSizeIterator<Item = T> + '_ {
+        self.crossings.iter().map(|s| *s / T::constant(self.scale))
     }
 
     /// Mino time and radius of the radial turning point, if the ray turned.
-    pub fn turning_point(&self) -> Option<(f64, f64)> {
-        Some((self.turning? / self.scale, 1.0 / self.turning_w?))
+    pub fn turning_point(&self) -> Option<(T, T)> {
+        Some((self.turning? / T::constant(self.scale), T::constant(1.0) / self.turning_w?))
     }
 
     /// An upper bound of the angle by which the direction changes per Mino time, frame
@@ -199,122 +232,176 @@ impl Path {
 
     /// Number of accepted steps.
     pub fn steps(&self) -> u32 {
-        self.steps
+        self.segments.len() as u32
+    }
+
+    /// Row number `row` of segment number `k`.
+    pub(crate) fn polynomial(&self, k: usize, row: usize) -> Polynomial<'_, T> {
+        let start = (k * self.rows + row) * self.width;
+        Polynomial(&self.coefficients[start..start + self.width])
+    }
+
+    /// The segment that holds the scaled time `s`, and where in it.
+    fn find(&self, s: T) -> (usize, T) {
+        let k = self.segments.partition_point(|segment| segment.s <= s.value()).max(1) - 1;
+        let segment = &self.segments[k];
+        (k, (s - T::constant(segment.s)) / T::constant(segment.h))
+    }
+
+    fn clamped(&self, mino_time: T) -> T {
+        let s = mino_time * T::constant(self.scale);
+        if s.value() <= 0.0 {
+            T::constant(0.0)
+        } else if s.value() >= self.end.value() {
+            self.end
+        } else {
+            s
+        }
     }
 
     /// The position at Mino time `mino_time` ∈ \[0, [`mino_total`](Self::mino_total)\]
     /// (clamped to it). At the horizon, where azimuth and time diverge logarithmically, it
     /// is that of the last float outside.
-    pub fn at(&self, mino_time: f64) -> PathPoint {
-        let s = (mino_time * self.scale).clamp(0.0, self.end);
-        let k = self.nodes.partition_point(|node| node.s <= s).clamp(1, self.nodes.len() - 1);
-        self.interpolate(k - 1, s)
+    ///
+    /// # Panics
+    /// If the path has not been traced yet.
+    pub fn at(&self, mino_time: T) -> PathPoint<T> {
+        let s = self.clamped(mino_time);
+        let (k, x) = self.find(s);
+        self.interpolate(k, x, s)
     }
 
-    fn interpolate(&self, k: usize, s: f64) -> PathPoint {
-        let (a, b) = (&self.nodes[k], &self.nodes[k + 1]);
-        let h = b.s - a.s;
-        let x = if h > 0.0 { (s - a.s) / h } else { 0.0 };
-        let value = |k: usize| Quintic::new(h, a.end(k), b.end(k));
-        let radial = value(index::W);
-        let horizon = (1.0 - f64::EPSILON) / self.hole.horizon();
-        let w = (radial.value(x) / self.scale).clamp(0.0, horizon);
+    /// The estimated errors of [`at`](Self::at): see [`Uncertainty`].
+    ///
+    /// # Panics
+    /// If the path has not been traced yet.
+    pub fn uncertainty_at(&self, mino_time: T) -> Uncertainty {
+        let s = self.clamped(mino_time);
+        let (k, x) = self.find(s);
+        let segment = &self.segments[k];
+        let point = self.interpolate(k, x, s);
+        segment.budget.at(&self.hole, self.lambda, self.scale, &point)
+    }
+
+    fn interpolate(&self, k: usize, x: T, s: T) -> PathPoint<T> {
+        let segment = &self.segments[k];
+        let scale = T::constant(self.scale);
+        let rate = T::constant(1.0 / segment.h);
+        let radial = self.polynomial(k, 0);
+        let horizon = (T::constant(1.0 - f64::EPSILON)) / self.hole.horizon();
+        let (value, slope) = radial.both(x);
+        let mut w = value / scale;
+        if w.value() <= 0.0 {
+            w = T::constant(0.0);
+        } else if w.value() > horizon.value() {
+            w = horizon;
+        }
+        let zero = T::constant(0.0);
         let mut point = PathPoint {
-            mino_time: s / self.scale,
+            mino_time: s / scale,
             inverse_radius: w,
-            inverse_radius_rate: radial.slope(x) / h,
-            direction: [0.0; 3],
-            velocity: [0.0; 3],
-            azimuth: 0.0,
-            delay: 0.0,
+            inverse_radius_rate: slope * rate,
+            direction: [zero; 3],
+            velocity: [zero; 3],
+            azimuth: zero,
+            delay: zero,
         };
-        let u = value(index::U);
-        let cos_theta = u.value(x).clamp(-1.0, 1.0);
+        let (u, v) = self.polynomial(k, 1).both(x);
+        let v = v * rate * scale;
+        let leg = T::constant(segment.leg);
         if self.has_azimuth {
-            let rate = self.scale / h;
-            let (px, py) = (value(index::X), value(index::Y));
-            let n = [px.value(x), py.value(x), cos_theta];
-            let v = [px.slope(x) * rate, py.slope(x) * rate, u.slope(x) * rate];
-            let regular = Quintic::new(h, a.azimuth_end(), b.azimuth_end()).value(x);
-            let dragged = regular + a.constants[0] + a.leg * self.hole.azimuth_closed_form(w);
+            let [px, py] = [2, 3].map(|row| self.polynomial(k, row));
+            let ((x1, v1), (y1, v2)) = (px.both(x), py.both(x));
+            let n = [x1, y1, u];
+            let velocity = [v1 * rate * scale, v2 * rate * scale, v];
+            let regular = self.polynomial(k, 4).value(x);
+            let dragged = regular + segment.constants[0] + leg * self.hole.azimuth_closed_form(w);
             let (sin, cos) = dragged.sin_cos();
             point.direction = rotate(n, sin, cos);
-            point.velocity = rotate(v, sin, cos);
-            let turned =
-                a.turned + turn(self.rotation_sign, [a.y[index::X], a.y[index::Y]], [n[0], n[1]]);
-            point.azimuth = turned + dragged;
+            point.velocity = rotate(velocity, sin, cos);
+            let start = [px.0[0], py.0[0]];
+            point.azimuth =
+                segment.turned + turn(self.rotation_sign, start, [n[0], n[1]]) + dragged;
         } else {
-            point.direction = [(1.0 - cos_theta * cos_theta).max(0.0).sqrt(), 0.0, cos_theta];
+            let square = T::constant(1.0) - u * u;
+            let sin = if square.value() > 0.0 { square.sqrt() } else { zero };
+            point.direction = [sin, zero, u];
+            point.velocity[2] = v;
         }
         if self.has_time {
-            let regular = Quintic::new(h, a.time_end(), b.time_end()).value(x) * self.scale;
-            point.delay = regular + a.constants[1] - a.leg * self.hole.tortoise(w);
+            let regular = self.polynomial(k, self.rows - 1).value(x) * scale;
+            point.delay = regular + segment.constants[1] - leg * self.hole.tortoise(w);
         }
         point
     }
 
     /// The pieces of the path with lo ≤ r ≤ hi as intervals of Mino time, in order.
-    pub fn intervals_within(&self, lo: f64, hi: f64, intervals: &mut Vec<[f64; 2]>) {
+    pub fn intervals_within(&self, lo: f64, hi: f64, intervals: &mut Vec<[T; 2]>) {
         intervals.clear();
-        let (outer, inner) = (self.scale / hi, self.scale / lo);
-        for k in 0..self.nodes.len().saturating_sub(1) {
-            let (a, b) = (&self.nodes[k], &self.nodes[k + 1]);
-            let stop = b.s.min(self.end);
-            if stop <= a.s {
+        let band = [self.scale / hi, self.scale / lo];
+        for (k, segment) in self.segments.iter().enumerate() {
+            let end = T::constant(1.0);
+            let whole = self.end - T::constant(segment.s);
+            if whole.value() <= 0.0 {
                 continue;
             }
-            match self.turning.filter(|t| (a.s..stop).contains(t)) {
+            let h = T::constant(segment.h);
+            let stop = if whole.value() < segment.h { whole / h } else { end };
+            let start = T::constant(0.0);
+            let inside = |t: &T| (0.0..stop.value()).contains(&t.value());
+            match self.turning.map(|t| (t - T::constant(segment.s)) / h).filter(inside) {
                 Some(turning) => {
-                    self.clip(k, [a.s, turning], [outer, inner], intervals);
-                    self.clip(k, [turning, stop], [outer, inner], intervals);
+                    self.clip(k, [start, turning], band, intervals);
+                    self.clip(k, [turning, stop], band, intervals);
                 }
-                None => self.clip(k, [a.s, stop], [outer, inner], intervals),
+                None => self.clip(k, [start, stop], band, intervals),
             }
         }
     }
 
     /// Adds the part of a monotonic piece of step `k` that lies between two (scaled)
     /// inverse radii.
-    fn clip(&self, k: usize, span: [f64; 2], band: [f64; 2], intervals: &mut Vec<[f64; 2]>) {
-        let (a, b) = (&self.nodes[k], &self.nodes[k + 1]);
-        let h = b.s - a.s;
-        let radial = Quintic::new(h, a.end(index::W), b.end(index::W));
-        let x = span.map(|s| ((s - a.s) / h).clamp(0.0, 1.0));
-        let w = x.map(|x| radial.value(x));
+    fn clip(&self, k: usize, x: [T; 2], band: [f64; 2], intervals: &mut Vec<[T; 2]>) {
+        let segment = &self.segments[k];
+        let radial = self.polynomial(k, 0);
+        let w = x.map(|x| radial.value(x).value());
         let (least, most) = (w[0].min(w[1]), w[0].max(w[1]));
         if most < band[0] || least > band[1] {
             return;
         }
         let bound = |end: usize| {
             let limit = w[end].clamp(band[0], band[1]);
-            let x = if limit == w[end] { x[end] } else { radial.solve(limit, x[0], x[1]) };
-            (a.s + h * x) / self.scale
+            let outside = limit != w[end];
+            let root = || radial.solve(T::constant(limit), x[0].value(), x[1].value());
+            let x = if outside { root() } else { x[end] };
+            (T::constant(segment.s) + T::constant(segment.h) * x) / T::constant(self.scale)
         };
         let piece = [bound(0), bound(1)];
-        if piece[1] <= piece[0] {
+        if piece[1].value() <= piece[0].value() {
             return;
         }
         match intervals.last_mut() {
-            Some(last) if piece[0] <= last[1] * (1.0 + 1e-14) => last[1] = piece[1],
+            Some(last) if piece[0].value() <= last[1].value() * (1.0 + 1e-14) => last[1] = piece[1],
             _ => intervals.push(piece),
         }
     }
 }
 
-fn rotate(v: [f64; 3], sin: f64, cos: f64) -> [f64; 3] {
+fn rotate<T: Elementary>(v: [T; 3], sin: T, cos: T) -> [T; 3] {
     [v[0] * cos - v[1] * sin, v[0] * sin + v[1] * cos, v[2]]
 }
 
 /// The angle by which a point turns about the axis from `from` to `to` in one step, in the
 /// sense of `sign`: a step past a pole turns by up to π and a little, any other by little.
-pub(crate) fn turn(sign: f64, from: [f64; 2], to: [f64; 2]) -> f64 {
-    use core::f64::consts::{FRAC_PI_2, TAU};
-    if from == [0.0, 0.0] {
+pub(crate) fn turn<T: Elementary>(sign: f64, from: [T; 2], to: [T; 2]) -> T {
+    use core::f64::consts::FRAC_PI_2;
+    if from.iter().chain(&to).all(|x| x.value() == 0.0) || from.map(T::value) == [0.0, 0.0] {
         // From the axis itself the direction of departure is the starting angle.
-        return 0.0;
+        return T::constant(0.0);
     }
     let cross = from[0] * to[1] - from[1] * to[0];
     let dot = from[0] * to[0] + from[1] * to[1];
-    let angle = sign * cross.atan2(dot);
-    sign * if angle < -FRAC_PI_2 { angle + TAU } else { angle }
+    let angle = T::constant(sign) * cross.atan2(dot);
+    let full = T::pi() + T::pi();
+    T::constant(sign) * if angle.value() < -FRAC_PI_2 { angle + full } else { angle }
 }

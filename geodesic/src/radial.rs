@@ -1,39 +1,38 @@
 //! The radial potential W(w) = (dw/dτ)², w = 1/r, and what it allows a ray to do.
 
-use crate::compensated::Double;
-use crate::kerr::Kerr;
+use crate::scalar::Elementary;
 
 /// W(w) = 1 + A w² + B w³ + C w⁴ with A = a² − η − λ², B = 2\[η + (λ − a)²\], C = −a²η
 /// (the quartic R(r) of Gralla & Lupsasca 2020, arXiv:1910.12881, times w⁴).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RadialPotential {
+pub struct RadialPotential<T = f64> {
     /// A, B and C.
-    pub coefficients: [f64; 3],
+    pub coefficients: [T; 3],
     /// w at the horizon.
-    pub horizon: f64,
+    pub horizon: T,
     /// The minimum of W between infinity and the horizon, if there is one there or at most a
     /// little behind the horizon.
-    pub barrier: Option<Barrier>,
+    pub barrier: Option<Barrier<T>>,
 }
 
 /// The minimum of W outside the horizon: where it is negative the ray turns. If the minimum
 /// lies a little behind the horizon, as for rays next to the straight part of an extremal
 /// hole's critical curve, it is the horizon itself, where W is a square.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Barrier {
-    /// Where W is smallest.
+pub struct Barrier<T = f64> {
+    /// Where W is smallest, to the nearest double.
     pub w: f64,
-    /// The smallest value, rounded from twice the working precision.
-    pub height: f64,
-    /// dW/dw there: 0, but at a horizon with the minimum behind it.
-    pub slope: f64,
+    /// W there, rounded from twice the working precision.
+    pub height: T,
+    /// dW/dw there: 0 within rounding, but at a horizon with the minimum behind it.
+    pub slope: T,
     /// Coefficients of (w − w_min)², ³ and ⁴.
-    pub expansion: [f64; 3],
+    pub expansion: [T; 3],
 }
 
-impl Barrier {
+impl<T: Elementary> Barrier<T> {
     /// W at a distance x = w − w_min, without cancellation near the minimum.
-    fn value(&self, x: f64) -> f64 {
+    fn value(&self, x: T) -> T {
         let [c2, c3, c4] = self.expansion;
         self.height + x * (self.slope + x * (c2 + x * (c3 + x * c4)))
     }
@@ -41,61 +40,81 @@ impl Barrier {
     /// The distance from the minimum at which W differs from its least value by as much
     /// as that value itself: how closely the ray approaches the spherical photon orbit.
     pub fn width(&self) -> f64 {
-        (self.height / self.expansion[0]).abs().sqrt()
+        (self.height.value() / self.expansion[0].value()).abs().sqrt()
+    }
+
+    fn narrow<N>(self, narrow: impl Fn(T) -> N) -> Barrier<N> {
+        let Barrier { w, height, slope, expansion } = self;
+        let height = narrow(height);
+        Barrier { w, height, slope: narrow(slope), expansion: expansion.map(narrow) }
     }
 }
 
-impl RadialPotential {
-    pub(crate) fn new(hole: &Kerr, coefficients: [Double; 3]) -> Self {
-        let horizon = 1.0 / hole.horizon();
-        let barrier = barrier(&coefficients, horizon);
-        RadialPotential { coefficients: coefficients.map(Double::value), horizon, barrier }
+impl<T: Elementary> RadialPotential<T> {
+    /// From A, B, C and w at the horizon.
+    pub(crate) fn new(coefficients: [T; 3], horizon: T) -> Self {
+        let barrier = barrier(&coefficients, horizon.value());
+        RadialPotential { coefficients, horizon, barrier }
+    }
+
+    /// The same with less precision.
+    pub(crate) fn narrow<N>(self, narrow: impl Fn(T) -> N) -> RadialPotential<N> {
+        RadialPotential {
+            coefficients: self.coefficients.map(&narrow),
+            horizon: narrow(self.horizon),
+            barrier: self.barrier.map(|barrier| barrier.narrow(&narrow)),
+        }
     }
 
     /// W(w).
-    pub fn value(&self, w: f64) -> f64 {
+    pub fn value(&self, w: T) -> T {
         if let Some(barrier) = &self.barrier {
-            let x = w - barrier.w;
+            let x = w - T::constant(barrier.w);
             // Near the barrier the terms cancel; far from it the expansion about it does.
-            if x.abs() < 0.25 * barrier.w {
+            if x.value().abs() < 0.25 * barrier.w {
                 return barrier.value(x);
             }
         }
         let [a, b, c] = self.coefficients;
-        1.0 + w * w * (a + w * (b + w * c))
+        T::constant(1.0) + w * w * (a + w * (b + w * c))
     }
 
     /// dW/dw.
-    pub fn slope(&self, w: f64) -> f64 {
+    pub fn slope(&self, w: T) -> T {
+        let [two, three, four] = [2.0, 3.0, 4.0].map(T::constant);
         if let Some(barrier) = &self.barrier {
-            let x = w - barrier.w;
-            if x.abs() < 0.25 * barrier.w {
+            let x = w - T::constant(barrier.w);
+            if x.value().abs() < 0.25 * barrier.w {
                 let [c2, c3, c4] = barrier.expansion;
-                return barrier.slope + x * (2.0 * c2 + x * (3.0 * c3 + x * 4.0 * c4));
+                return barrier.slope + x * (two * c2 + x * (three * c3 + x * four * c4));
             }
         }
         let [a, b, c] = self.coefficients;
-        w * (2.0 * a + w * (3.0 * b + w * 4.0 * c))
+        w * (two * a + w * (three * b + w * four * c))
     }
 
     /// Whether a ray from far away falls into the hole: W has no root outside the horizon.
     pub fn captures(&self) -> bool {
-        self.barrier.is_none_or(|barrier| barrier.height >= 0.0)
+        self.barrier.is_none_or(|barrier| barrier.height.value() >= 0.0)
     }
 
     /// w at the turning point of a ray that comes from outside, if it turns.
-    pub fn outer_turning_point(&self) -> Option<f64> {
-        self.barrier.filter(|b| b.height < 0.0).map(|b| self.root_between(0.0, b.w))
+    pub fn outer_turning_point(&self) -> Option<T> {
+        self.turning_barrier().map(|b| self.root_between(0.0, b.w))
     }
 
     /// w at the turning point of a ray that comes from inside the barrier, if it turns.
-    pub fn inner_turning_point(&self) -> Option<f64> {
-        self.barrier.filter(|b| b.height < 0.0).map(|b| self.root_between(self.horizon, b.w))
+    pub fn inner_turning_point(&self) -> Option<T> {
+        self.turning_barrier().map(|b| self.root_between(self.horizon.value(), b.w))
+    }
+
+    fn turning_barrier(&self) -> Option<Barrier<T>> {
+        self.barrier.filter(|b| b.height.value() < 0.0)
     }
 
     /// The root of W between a point where W ≥ 0 and the barrier, where W < 0: Newton's
-    /// method inside a shrinking bracket.
-    fn root_between(&self, mut positive: f64, mut negative: f64) -> f64 {
+    /// method inside a shrinking bracket, then two steps of it in full.
+    fn root_between(&self, mut positive: f64, mut negative: f64) -> T {
         // W is nearly a parabola about the barrier: its root is where Newton starts.
         let mut w = negative;
         if let Some(barrier) = &self.barrier {
@@ -103,7 +122,7 @@ impl RadialPotential {
             w = negative + step.copysign(positive - negative);
         }
         for _ in 0..100 {
-            let value = self.value(w);
+            let value = self.value(T::constant(w)).value();
             if value == 0.0 {
                 break;
             }
@@ -112,7 +131,7 @@ impl RadialPotential {
             } else {
                 negative = w
             }
-            let newton = w - value / self.slope(w);
+            let newton = w - value / self.slope(T::constant(w)).value();
             let inside = (newton - positive) * (newton - negative) < 0.0;
             let next = if inside { newton } else { 0.5 * (positive + negative) };
             let done = (next - w).abs() <= f64::EPSILON * w;
@@ -121,14 +140,23 @@ impl RadialPotential {
                 break;
             }
         }
-        w
+        self.polish(T::constant(w))
+    }
+
+    /// Brings the digits and derivatives of a number wider than a double to the root.
+    fn polish(&self, root: T) -> T {
+        if T::IS_PLAIN {
+            return root;
+        }
+        let once = root - self.value(root) / self.slope(root);
+        once - self.value(once) / self.slope(once)
     }
 }
 
 /// dW/dw = w (2A + 3B w + 4C w²): with W(0) = 1 and W ≥ 0 at the horizon, W has roots
 /// outside the horizon only if its first minimum lies there and is negative.
-fn barrier(coefficients: &[Double; 3], horizon: f64) -> Option<Barrier> {
-    let [a, b, c] = coefficients.map(Double::value);
+fn barrier<T: Elementary>(coefficients: &[T; 3], horizon: f64) -> Option<Barrier<T>> {
+    let [a, b, c] = coefficients.map(T::value);
     if a >= 0.0 {
         return None;
     }
@@ -142,15 +170,16 @@ fn barrier(coefficients: &[Double; 3], horizon: f64) -> Option<Barrier> {
     }
     let behind = w > horizon * (1.0 - 8.0 * f64::EPSILON);
     let w = if behind { horizon } else { w };
-    let x = Double::from(w);
+    let x = T::constant(w);
     let [da, db, dc] = *coefficients;
-    let height = (Double::from(1.0) + x * x * (da + x * (db + x * dc))).value();
-    let slope = x * (da.scale(2.0) + x * (db + db.scale(2.0) + x * dc.scale(4.0)));
+    let [one, two, three, four, six] = [1.0, 2.0, 3.0, 4.0, 6.0].map(T::constant);
+    let height = one + x * x * (da + x * (db + x * dc));
+    let zero = T::constant(0.0);
     Some(Barrier {
         w,
-        height: if behind { height.max(0.0) } else { height },
-        slope: if behind { slope.value() } else { 0.0 },
-        expansion: [a + w * (3.0 * b + w * 6.0 * c), b + w * 4.0 * c, c],
+        height: if behind && height.value() < 0.0 { zero } else { height },
+        slope: x * (two * da + x * (three * db + x * (four * dc))),
+        expansion: [da + x * (three * db + x * (six * dc)), db + x * (four * dc), dc],
     })
 }
 

@@ -1,12 +1,14 @@
 //! From a ray's initial data to its path.
 
 use crate::error::{OutOfRange, check};
-use crate::hermite::Quintic;
 use crate::kerr::Kerr;
-use crate::mino::{FULL, System, has_azimuth, has_time, index};
+use crate::mino::{System, has_azimuth, has_time, index};
 use crate::observer::Ray;
-use crate::path::{Node, Outcome, Path, Unresolved, turn};
-use crate::runge_kutta::{Control, DormandPrince5, Method, Step, step};
+use crate::path::{Outcome, Path, Segment, Unresolved, turn};
+use crate::runge_kutta::{DormandPrince5, DormandPrince8};
+use crate::scalar::Elementary;
+use crate::stepper::{LONGEST_STEP, Made, RungeKutta, State, Stepper, Taylor};
+use crate::uncertainty::Budget;
 
 /// What a ray is asked for beyond r and θ. What is not asked for is not integrated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -24,29 +26,72 @@ impl Want {
     pub const ALL: Want = Want { azimuth: true, time: true };
 }
 
-/// The adaptive Runge–Kutta method of order 5(4) in Mino time (`rk45-mino`).
+/// How a ray is followed in Mino time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+pub enum Method {
+    /// The adaptive Runge–Kutta method of order 5(4) of Dormand & Prince (1980), with quintic
+    /// dense output: `rk45-mino`.
+    Rk45,
+    /// The adaptive Runge–Kutta method of order 8(5,3) of Hairer, Nørsett & Wanner (1993),
+    /// with dense output of degree 9: `dop853-mino`.
+    Dop853,
+    /// Taylor series of an order that grows with the digits asked for, which are their own
+    /// dense output: `taylor-mino`. The fastest at every tolerance, and the default.
+    #[default]
+    Taylor,
+}
+
+impl Method {
+    /// All of them, in the order of their cost at low precision.
+    pub const ALL: [Method; 3] = [Method::Rk45, Method::Dop853, Method::Taylor];
+
+    /// The name that commands, files and documents use.
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::Rk45 => "rk45-mino",
+            Method::Dop853 => "dop853-mino",
+            Method::Taylor => "taylor-mino",
+        }
+    }
+}
+
+/// An adaptive tracer in Mino time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tracer {
+    method: Method,
     tolerance: f64,
     max_steps: u32,
 }
 
-/// Longest step in scaled Mino time: short against half a polar or azimuthal period
-/// (at least 1.8), so that a step holds at most one crossing of the equator.
-const LONGEST_STEP: f64 = 0.8;
+/// A local error that small keeps the sum over the many steps of order 5 near the tolerance.
+const RK45_MARGIN: f64 = 0.2;
+
+/// Digits are cheap in a Taylor series, and its error estimate has no safety of its own.
+const TAYLOR_MARGIN: f64 = 0.05;
+
+/// Steps after which a ray is given up unless the caller says otherwise.
+const MAX_STEPS: u32 = 100_000;
 
 impl Tracer {
-    /// A tracer whose local error per step stays below `tolerance`, in units in which
-    /// b·w, the direction, the azimuth and delay/b are of order one (b the impact
-    /// parameter). Next to the critical curve the error in w is held to that fraction of
-    /// the distance from the photon orbit.
+    /// A tracer by the default method whose local error per step stays below `tolerance`, in
+    /// units in which b·w, the direction, the azimuth and delay/b are of order one (b the
+    /// impact parameter). Next to the critical curve the error in w is held to that fraction
+    /// of the distance from the photon orbit.
     ///
     /// # Errors
     /// If `tolerance` is not in \[1e-14, 1e-2\].
     pub fn new(tolerance: f64) -> Result<Self, OutOfRange> {
+        Self::with_method(Method::default(), tolerance)
+    }
+
+    /// A tracer by a method of choice; see [`new`](Self::new).
+    ///
+    /// # Errors
+    /// If `tolerance` is not in \[1e-14, 1e-2\].
+    pub fn with_method(method: Method, tolerance: f64) -> Result<Self, OutOfRange> {
         let ok = (1e-14..=1e-2).contains(&tolerance);
         check("tolerance", tolerance, ok, "a number in [1e-14, 1e-2]")?;
-        Ok(Tracer { tolerance, max_steps: 100_000 })
+        Ok(Tracer { method, tolerance, max_steps: MAX_STEPS })
     }
 
     /// The same tracer with another limit on the number of steps of a ray.
@@ -60,185 +105,259 @@ impl Tracer {
         self.tolerance
     }
 
+    /// The method.
+    pub fn method(&self) -> Method {
+        self.method
+    }
+
     /// Follows `ray` backward to the horizon or to infinity, into `path`.
     pub fn trace(&self, hole: &Kerr, ray: &Ray, want: Want, path: &mut Path) {
         match (want.azimuth, want.time) {
-            (false, false) => Run::<4>::new(self, hole, ray, path).go(),
-            (false, true) => Run::<5>::new(self, hole, ray, path).go(),
-            (true, false) => Run::<9>::new(self, hole, ray, path).go(),
-            (true, true) => Run::<10>::new(self, hole, ray, path).go(),
+            (false, false) => self.run::<4>(hole, ray, path),
+            (false, true) => self.run::<5>(hole, ray, path),
+            (true, false) => self.run::<9>(hole, ray, path),
+            (true, true) => self.run::<10>(hole, ray, path),
         }
     }
+
+    fn run<const N: usize>(&self, hole: &Kerr, ray: &Ray, path: &mut Path) {
+        let (tolerance, limit) = (self.tolerance, self.max_steps);
+        match self.method {
+            Method::Rk45 => {
+                let tolerance = RK45_MARGIN * tolerance;
+                let stepper = RungeKutta::<DormandPrince5, N, 7, 3>::new(tolerance);
+                Run::<f64, _, N>::new(hole, ray, tolerance, path, stepper).go(limit);
+            }
+            Method::Dop853 => {
+                let stepper = RungeKutta::<DormandPrince8, N, 13, 5>::new(tolerance);
+                Run::<f64, _, N>::new(hole, ray, tolerance, path, stepper).go(limit);
+            }
+            Method::Taylor => {
+                let tolerance = TAYLOR_MARGIN * tolerance;
+                let stepper = Taylor::new::<f64>(tolerance);
+                Run::<f64, _, N>::new(hole, ray, tolerance, path, stepper).go(limit);
+            }
+        }
+    }
+}
+
+/// Follows a ray of any kind of number by its Taylor series ([`Method::Taylor`]): with
+/// [`Dual`](crate::Dual) numbers the path carries its exact derivatives, with
+/// [`Double`](crate::Double) ones about 28 digits.
+///
+/// ```
+/// use kerrlight_geodesic::{Dual, Inclination, Kerr, Observer, Path, Want, trace_series};
+/// // Derivatives with respect to spin (0), inclination (1), α (2) and β (3).
+/// let hole = Kerr::from_spin(Dual::<f64, 4>::parameter(0.9, 0))?;
+/// let observer = Observer::at_infinity(Inclination::from_radians(Dual::parameter(1.0, 1))?);
+/// let ray = observer.ray(&hole, Dual::parameter(-6.0, 2), Dual::parameter(2.0, 3))?;
+/// let mut path = Path::empty();
+/// trace_series(1e-13, &hole, &ray, Want::ALL, &mut path)?;
+/// let hit = path.at(path.equatorial_crossings().next().unwrap());
+/// println!("r = {}, dr/da = {}", hit.radius().value, hit.radius().slope[0]);
+/// # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+/// ```
+///
+/// # Errors
+/// If `tolerance` is not in \[1e-30, 1e-2\]; below the number's own rounding it counts as
+/// that.
+pub fn trace_series<T: Elementary>(
+    tolerance: f64,
+    hole: &Kerr<T>,
+    ray: &Ray<T>,
+    want: Want,
+    path: &mut Path<T>,
+) -> Result<(), OutOfRange> {
+    let ok = (1e-30..=1e-2).contains(&tolerance);
+    check("tolerance", tolerance, ok, "a number in [1e-30, 1e-2]")?;
+    let tolerance = TAYLOR_MARGIN * tolerance;
+    let stepper = || Taylor::new::<T>(tolerance);
+    match (want.azimuth, want.time) {
+        (false, false) => Run::<T, _, 4>::new(hole, ray, tolerance, path, stepper()).go(MAX_STEPS),
+        (false, true) => Run::<T, _, 5>::new(hole, ray, tolerance, path, stepper()).go(MAX_STEPS),
+        (true, false) => Run::<T, _, 9>::new(hole, ray, tolerance, path, stepper()).go(MAX_STEPS),
+        (true, true) => Run::<T, _, 10>::new(hole, ray, tolerance, path, stepper()).go(MAX_STEPS),
+    }
+    Ok(())
 }
 
 /// One ray under way, with `N` variables.
-struct Run<'a, const N: usize> {
-    tracer: &'a Tracer,
-    ray: &'a Ray,
-    system: System<f64>,
-    path: &'a mut Path,
-    y: [f64; N],
-    f: [f64; N],
+struct Run<'a, T, M, const N: usize> {
+    state: State<'a, T, N>,
+    stepper: M,
+    path: &'a mut Path<T>,
     s: f64,
-    leg: f64,
-    constants: [f64; 2],
-    turned: f64,
+    constants: [T; 2],
+    turned: T,
+    budget: Budget,
 }
 
-impl<'a, const N: usize> Run<'a, N> {
-    fn new(tracer: &'a Tracer, hole: &Kerr, ray: &'a Ray, path: &'a mut Path) -> Self {
+impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
+    fn new(
+        hole: &Kerr<T>,
+        ray: &'a Ray<T>,
+        tolerance: f64,
+        path: &'a mut Path<T>,
+        stepper: M,
+    ) -> Self {
         let system = System::new(hole, ray);
-        path.reset(hole, ray, system.scale);
-        path.has_azimuth = has_azimuth(N);
-        path.has_time = has_time(N);
+        path.reset::<N>(hole, ray, system.scale);
+        path.width = stepper.width();
         let leg = if ray.inward { 1.0 } else { -1.0 };
         let y = system.start::<N>(ray, leg);
-        let f = system.derivative(&y, leg);
-        let w = ray.inverse_radius;
-        let mut constants = [ray.azimuth - leg * hole.azimuth_closed_form(w), 0.0];
-        if w > 0.0 {
-            constants[1] = leg * hole.tortoise(w);
-        }
-        let turned = start_angle(ray);
-        Run { tracer, ray, system, path, y, f, s: 0.0, leg, constants, turned }
+        let (w, way) = (T::constant(ray.inverse_radius), T::constant(leg));
+        let azimuth = T::constant(ray.azimuth) - way * hole.azimuth_closed_form(w);
+        let time = if ray.inverse_radius > 0.0 { way * hole.tortoise(w) } else { T::constant(0.0) };
+        let state = State { ray, system, tolerance, y, leg };
+        let constants = [azimuth, time];
+        let budget = Budget::default();
+        Run { state, stepper, path, s: 0.0, constants, turned: start_angle(ray), budget }
     }
 
-    fn go(mut self) {
-        self.push_node();
-        let tolerance = self.tracer.tolerance;
-        let mut control = Control::new(DormandPrince5::TABLEAU.order);
-        let mut h = (0.5 * tolerance.powf(0.2)).min(LONGEST_STEP);
-        for _ in 0..self.tracer.max_steps {
-            let trial = step::<DormandPrince5, N, 7>(&self.system, &self.y, &self.f, self.leg, h);
-            let error = self.error_norm(&trial, h);
-            let factor = control.factor(error);
-            if error <= 1.0 {
-                self.accept(trial.y, trial.f, h);
-                if self.handle_events() {
-                    return;
-                }
-                if let Some(outcome) = self.stalled(h) {
-                    self.path.end = self.s;
-                    self.path.outcome = outcome;
-                    return;
-                }
+    fn go(mut self, max_steps: u32) {
+        self.stepper.restart(&self.state, &mut self.path.series);
+        for _ in 0..max_steps {
+            let made = self.stepper.step(&self.state, &mut self.path.series, LONGEST_STEP);
+            let Some(made) = made else { continue };
+            let h = made.h;
+            let ended = self.accept(made);
+            if ended {
+                return;
             }
-            h = (h * factor).min(LONGEST_STEP);
+            if let Some(outcome) = self.stalled(h) {
+                self.path.end = T::constant(self.s);
+                self.path.outcome = outcome;
+                return;
+            }
         }
-        self.path.end = self.s;
+        self.path.end = T::constant(self.s);
         self.path.outcome = Outcome::Unresolved(Unresolved::StepLimit);
     }
 
     /// What becomes of a ray that no longer moves in radius within rounding.
     fn stalled(&self, h: f64) -> Option<Outcome> {
-        let (w, rate) = (self.y[index::W], self.y[index::DW]);
-        if rate.abs() * h > 2.0 * f64::EPSILON * w || self.f[index::DW].abs() > 1e-12 {
+        let (w, rate) = (self.state.y[index::W].value(), self.state.y[index::DW].value());
+        let [a, b, c] = self.state.system.radial().map(T::value);
+        let pull = w * (a + w * (b + w * c));
+        if rate.abs() * h > 2.0 * T::EPSILON * w || pull.abs() > 1e4 * T::EPSILON {
             return None;
         }
-        let horizon = self.system.scale * self.ray.potential.horizon;
-        let at_horizon = w >= horizon * (1.0 - 1e-12);
+        let horizon = self.state.system.scale * self.state.ray.potential.horizon.value();
+        let at_horizon = w >= horizon * (1.0 - 1e-12) && self.may_fall();
         let lost = Outcome::Unresolved(Unresolved::PhotonOrbit);
         Some(if at_horizon { Outcome::Captured } else { lost })
     }
 
-    /// The largest local error in units of what the tolerance allows.
-    fn error_norm(&self, trial: &Step<N>, h: f64) -> f64 {
-        let (y, error) = (&trial.y, &trial.error);
-        let mut radial = 1.0;
-        if let Some(barrier) = &self.ray.potential.barrier {
-            let b = self.system.scale;
-            let from =
-                (self.y[index::W] - b * barrier.w).abs().min((y[index::W] - b * barrier.w).abs());
-            radial = from.max(b * barrier.width()).min(1.0);
+    /// Takes the step into the path; true if the ray has ended in it.
+    fn accept(&mut self, made: Made<T, N>) -> bool {
+        let Made { h, mut y, error } = made;
+        let projected = self.project(&mut y);
+        self.spend(&error, &y, h, projected);
+        let before = [self.state.y[index::X.min(N - 1)], self.state.y[index::Y.min(N - 1)]];
+        let path = &mut *self.path;
+        self.stepper.dense(&self.state, &y, h, &mut path.series, &mut path.coefficients);
+        path.segments.push(Segment {
+            s: self.s,
+            h,
+            leg: self.state.leg,
+            constants: self.constants,
+            turned: self.turned,
+            budget: self.budget,
+        });
+        let from = side(&self.state.y);
+        self.state.y = y;
+        if has_azimuth(N) {
+            let after = [self.state.y[index::X], self.state.y[index::Y]];
+            self.turned = self.turned + turn(self.path.rotation_sign, before, after);
         }
-        let rounding = 4.0 * f64::EPSILON;
-        let radial = (self.tracer.tolerance * radial).max(rounding);
-        let other = self.tracer.tolerance.max(rounding);
-        let mut norm = (error[index::W].abs().max(error[index::DW].abs())) / radial;
-        for e in error.iter().take(N.min(index::AZIMUTH)).skip(index::U) {
-            norm = norm.max(e.abs() / other);
-        }
-        if has_azimuth(N) || has_time(N) {
-            // These grow without bound where g vanishes, at the horizon of an extremal hole,
-            // and cannot be better than g's own rounding.
-            let blur = rounding * h * self.system.blur(y, self.leg).abs();
-            for k in (if has_azimuth(N) { index::AZIMUTH } else { N - 1 })..N {
-                let allowed = other * y[k].abs().max(1.0) + blur * trial.f[k].abs();
-                norm = norm.max(error[k].abs() / allowed);
-            }
-        }
-        // A step that left the numbers' range is rejected like any other bad one.
-        if norm.is_nan() { f64::INFINITY } else { norm }
+        let ended = self.handle_events(from);
+        self.s += h;
+        ended
     }
 
-    fn accept(&mut self, y: [f64; N], f: [f64; N], h: f64) {
-        let before = [self.y[index::X.min(N - 1)], self.y[index::Y.min(N - 1)]];
-        self.y = y;
-        self.f = f;
-        self.s += h;
-        self.path.steps += 1;
-        self.project();
+    /// Adds the errors of a step to the budget: see [`uncertainty`](crate::uncertainty).
+    fn spend(&mut self, error: &[f64; N], y: &[T; N], h: f64, projected: bool) {
+        let eps = T::EPSILON;
+        let [a, b, c] = self.state.system.radial().map(T::value);
+        let (w, rate) = (y[index::W].value(), y[index::DW].value());
+        let pull = w * (a + w * (b + w * c));
+        // What the terms of the equation are rounded by.
+        let rounding = eps * (w.abs() + h * rate.abs());
+        let kick = eps * h * w.abs() * (a.abs() + w.abs() * (b.abs() + w.abs() * c.abs()));
+        let speed = rate.hypot(pull).max(1e-300);
+        let truncation = (error[index::W].abs() + error[index::DW].abs()) / speed;
+        let blur = (rounding + kick) / speed;
+        self.budget.rounding += blur * blur;
+        // Off dw/dτ = ±√W the error of W stays, and speeds the ray up or slows it down.
+        let [slip, jerk] = [error[index::W].abs() + rounding, error[index::DW].abs() + kick];
+        let energy = 2.0 * (rate.abs() * jerk + pull.abs() * slip);
+        self.budget.energy = if projected { 0.0 } else { self.budget.energy + energy };
+        let truncation = truncation + 0.5 * h * self.budget.energy / (speed * speed);
+        self.budget.phase += truncation;
+        self.budget.local = error[index::W].abs() / w.abs().max(1e-300);
+        let mut turn = error[index::U].abs() + error[index::DU].abs();
         if has_azimuth(N) {
-            let after = [self.y[index::X], self.y[index::Y]];
-            self.turned += turn(self.path.rotation_sign, before, after);
+            for k in [index::X, index::DX, index::Y, index::DY] {
+                turn = turn.max(error[k].abs());
+            }
         }
-        self.push_node();
+        self.budget.direction += turn + eps * (1.0 + h);
+        if !has_azimuth(N) && !has_time(N) {
+            return;
+        }
+        // The quadratures dwell longer or shorter where the step's phase is wrong, and know
+        // their slope as well as the denominator g.
+        let way = T::constant(self.state.leg);
+        let g = self.state.system.blur(&self.state.y, way).value().abs();
+        let dwell = (truncation + blur) / h + 4.0 * eps * g;
+        let quadrature = |k: usize| {
+            let (start, end) = (self.state.y[k].value(), y[k].value());
+            error[k].abs() + (end - start).abs() * dwell + eps * (end.abs() + h)
+        };
+        if has_azimuth(N) {
+            self.budget.azimuth += quadrature(index::AZIMUTH);
+        }
+        if has_time(N) {
+            self.budget.delay += quadrature(N - 1);
+        }
     }
 
     /// Puts dw/dτ back on dw/dτ = ±√W wherever the root is well conditioned. Next to the
-    /// critical curve this is what keeps the ray on its own side of the barrier.
-    fn project(&mut self) {
-        let potential = &self.ray.potential;
-        let value = potential.value(self.y[index::W] / self.system.scale);
-        let rate = self.y[index::DW];
+    /// critical curve this is what keeps the ray on its own side of the barrier. Whether it
+    /// did.
+    fn project(&self, y: &mut [T; N]) -> bool {
+        let potential = &self.state.ray.potential;
+        let value = potential.value(y[index::W] / T::constant(self.state.system.scale));
         let floor = match &potential.barrier {
-            Some(barrier) if barrier.height < 0.0 => barrier.height.abs().min(0.25),
+            Some(barrier) if barrier.height.value() < 0.0 => barrier.height.value().abs().min(0.25),
             Some(_) => 0.0,
             None => 0.25,
         };
-        if value > floor {
-            let sign = if potential.captures() { self.leg } else { rate };
-            self.y[index::DW] = value.sqrt().copysign(sign);
-            self.f[index::W] = self.y[index::DW];
+        if value.value() <= floor {
+            return false;
         }
-    }
-
-    fn push_node(&mut self) {
-        let mut y = [0.0; FULL];
-        let mut f = [0.0; FULL];
-        let last = if has_time(N) { N - 1 } else { N };
-        y[..last].copy_from_slice(&self.y[..last]);
-        f[..last].copy_from_slice(&self.f[..last]);
-        if has_time(N) {
-            y[FULL - 1] = self.y[N - 1];
-            f[FULL - 1] = self.f[N - 1];
-        }
-        self.path.nodes.push(Node {
-            s: self.s,
-            y,
-            f,
-            second: self.system.second_derivative(&self.y, self.leg),
-            leg: self.leg,
-            constants: self.constants,
-            turned: self.turned,
-        });
+        let sign = if potential.captures() { self.state.leg } else { y[index::DW].value() };
+        y[index::DW] = value.sqrt() * T::constant(1f64.copysign(sign));
+        true
     }
 
     /// Looks for events in the step just taken; true if the ray has ended in it.
-    fn handle_events(&mut self) -> bool {
-        let [.., a, b] = self.path.nodes.as_slice() else { return false };
-        let ended = end_of_ray(a, b, self.system.scale * self.ray.potential.horizon);
-        if side(a) != side(b) {
-            let s = locate(a, b, index::U, 0.0);
-            if ended.is_none_or(|(end, _)| s < end) {
+    fn handle_events(&mut self, from: bool) -> bool {
+        let k = self.path.segments.len() - 1;
+        let (s, h) = (T::constant(self.s), T::constant(self.path.segments[k].h));
+        let ended = self.end_of_ray(k).map(|(x, outcome)| (s + h * x, outcome));
+        if from != side(&self.state.y) {
+            let zero = T::constant(0.0);
+            let s = s + h * self.path.polynomial(k, 1).solve(zero, 0.0, 1.0);
+            if ended.is_none_or(|(end, _)| s.value() < end.value()) {
                 self.path.crossings.push(s);
             }
         }
-        let turned = a.leg * b.y[index::DW] < 0.0;
+        let turned = self.state.leg * self.state.y[index::DW].value() < 0.0;
         if turned {
-            let potential = &self.ray.potential;
-            self.path.turning = Some(locate_turning(a, b));
-            self.path.turning_w = if a.leg > 0.0 {
+            let potential = &self.state.ray.potential;
+            self.path.turning = Some(s + h * self.path.polynomial(k, 0).solve_slope());
+            self.path.turning_w = if self.state.leg > 0.0 {
                 potential.outer_turning_point()
             } else {
                 potential.inner_turning_point()
@@ -255,64 +374,59 @@ impl<'a, const N: usize> Run<'a, N> {
         false
     }
 
+    /// Where and how the ray ends in segment `k`, if it does.
+    fn end_of_ray(&self, k: usize) -> Option<(T, Outcome)> {
+        let radial = self.path.polynomial(k, 0);
+        let (w, rate) = (self.state.y[index::W], self.state.y[index::DW].value());
+        let horizon = T::constant(self.state.system.scale) * self.state.ray.potential.horizon;
+        // Within rounding: a ray on the straight part of an extremal hole's critical curve
+        // approaches the horizon but never reaches it.
+        let there = w.value() >= horizon.value() * (1.0 - 64.0 * f64::EPSILON);
+        if there && rate >= 0.0 && self.may_fall() {
+            let target = if w.value() < horizon.value() { w } else { horizon };
+            return Some((radial.solve(target, 0.0, 1.0), Outcome::Captured));
+        }
+        if w.value() <= 0.0 && rate < 0.0 {
+            return Some((radial.solve(T::constant(0.0), 0.0, 1.0), Outcome::Escaped));
+        }
+        None
+    }
+
+    /// Whether the potential lets the ray reach the horizon.
+    fn may_fall(&self) -> bool {
+        let potential = &self.state.ray.potential;
+        let outside = |w: f64| self.state.ray.inverse_radius < w;
+        potential.captures() || !potential.barrier.is_some_and(|barrier| outside(barrier.w))
+    }
+
     /// On an outward leg g is written with −dw/dτ and the closed forms change sign; the
     /// constants take up the difference.
     fn change_leg(&mut self) {
-        let w = self.y[index::W] / self.system.scale;
+        let w = self.state.y[index::W] / T::constant(self.state.system.scale);
         let hole = self.path.hole;
-        self.constants[0] += 2.0 * self.leg * hole.azimuth_closed_form(w);
-        self.constants[1] -= 2.0 * self.leg * hole.tortoise(w);
-        self.leg = -self.leg;
-        self.f = self.system.derivative(&self.y, self.leg);
-        self.push_node();
+        let twice = T::constant(2.0 * self.state.leg);
+        self.constants[0] = self.constants[0] + twice * hole.azimuth_closed_form(w);
+        self.constants[1] = self.constants[1] - twice * hole.tortoise(w);
+        self.state.leg = -self.state.leg;
+        self.stepper.restart(&self.state, &mut self.path.series);
     }
-}
-
-/// Where and how the ray ends in the step from `a` to `b`, if it does; `horizon` is b·w there.
-fn end_of_ray(a: &Node, b: &Node, horizon: f64) -> Option<(f64, Outcome)> {
-    let (w, rate) = (b.y[index::W], b.y[index::DW]);
-    // Within rounding: a ray on the straight part of an extremal hole's critical curve
-    // approaches the horizon but never reaches it.
-    if w >= horizon * (1.0 - 64.0 * f64::EPSILON) && rate >= 0.0 {
-        return Some((locate(a, b, index::W, horizon.min(w)), Outcome::Captured));
-    }
-    if w <= 0.0 && rate < 0.0 {
-        return Some((locate(a, b, index::W, 0.0), Outcome::Escaped));
-    }
-    None
 }
 
 /// atan2(y, x) at the start; on the axis the direction in which the ray leaves it.
-fn start_angle(ray: &Ray) -> f64 {
+fn start_angle<T: Elementary>(ray: &Ray<T>) -> T {
     let [x, y, _] = ray.position;
-    if x == 0.0 && y == 0.0 { ray.velocity[1].atan2(ray.velocity[0]) } else { y.atan2(x) }
+    let on_axis = x.value() == 0.0 && y.value() == 0.0;
+    let [x, y] = if on_axis { [ray.velocity[0], ray.velocity[1]] } else { [x, y] };
+    if x.value() == 0.0 && y.value() == 0.0 {
+        return T::constant(y.value().atan2(x.value()));
+    }
+    y.atan2(x)
 }
 
 /// On which side of the equatorial plane a ray is, or is about to be.
-fn side(node: &Node) -> bool {
-    let (u, rate) = (node.y[index::U], node.y[index::DU]);
+fn side<T: Elementary, const N: usize>(y: &[T; N]) -> bool {
+    let (u, rate) = (y[index::U].value(), y[index::DU].value());
     if u == 0.0 { rate > 0.0 } else { u > 0.0 }
-}
-
-/// Where in the step from `a` to `b` variable `k` takes the value `target`.
-fn locate(a: &Node, b: &Node, k: usize, target: f64) -> f64 {
-    let h = b.s - a.s;
-    let end = |node: &Node| [node.y[k], node.f[k], node.f[k + 1]];
-    a.s + h * Quintic::new(h, end(a), end(b)).solve(target, 0.0, 1.0)
-}
-
-/// Where dw/dτ changes sign: on the interpolant of w, whose slope is monotonic there.
-fn locate_turning(a: &Node, b: &Node) -> f64 {
-    let h = b.s - a.s;
-    let end = |node: &Node| [node.y[index::W], node.f[index::W], node.f[index::DW]];
-    let radial = Quintic::new(h, end(a), end(b));
-    let (mut lo, mut hi) = (0.0, 1.0);
-    let sign = radial.slope(0.0).signum();
-    while hi - lo > 1e-15 {
-        let mid = 0.5 * (lo + hi);
-        if radial.slope(mid) * sign > 0.0 { lo = mid } else { hi = mid }
-    }
-    a.s + h * 0.5 * (lo + hi)
 }
 
 #[cfg(test)]

@@ -134,7 +134,7 @@ impl Stage {
         Ok(Stage {
             hole,
             observer: observer.with_azimuth(scene.observer.azimuth_deg.to_radians()),
-            tracer: Tracer::new(scene.tracer.tolerance)?,
+            tracer: Tracer::with_method(scene.tracer.integrator.method(), scene.tracer.tolerance)?,
             time: scene.observer.time,
             redshift: scene.effects.redshift.then_some(scene.effects.spectral_index).flatten(),
             slow_light: scene.effects.slow_light,

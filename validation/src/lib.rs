@@ -4,6 +4,7 @@
 //! `cargo run --release -p kerrlight-validation` runs all of them, writes
 //! `docs/validation.md`, and fails if one fails.
 
+pub mod accuracy;
 pub mod bardeen;
 pub mod hamilton;
 pub mod mpmath;

@@ -75,6 +75,11 @@ impl ClosedForm {
         self.total
     }
 
+    /// Mino time from the observer back to its radius, for a ray that turns.
+    pub(crate) fn time_back(&self) -> f64 {
+        self.total - self.start
+    }
+
     /// w = 1/r at a Mino time in \[0, [`mino_total`](Self::mino_total)\] since the observer.
     pub fn inverse_radius(&self, mino_time: f64) -> f64 {
         self.radial.inverse_radius(self.start + mino_time)

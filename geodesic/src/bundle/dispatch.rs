@@ -18,6 +18,8 @@ pub trait Task {
 pub enum Width {
     /// One number at a time.
     Scalar,
+    /// Two lanes, SSE2, which every x86-64 machine has.
+    Sse2,
     /// Four lanes, AVX2 and FMA.
     Avx2,
     /// Eight lanes, AVX-512 F and DQ.
@@ -29,6 +31,7 @@ impl Width {
     pub fn available(self) -> bool {
         match self {
             Self::Scalar => true,
+            Self::Sse2 => cfg!(target_arch = "x86_64"),
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
             #[cfg(target_arch = "x86_64")]
@@ -43,7 +46,8 @@ impl Width {
     /// The widest one that this machine can run and that has been measured: AVX-512 has to be
     /// asked for.
     pub fn best() -> Self {
-        if Self::Avx2.available() { Self::Avx2 } else { Self::Scalar }
+        let widths = [Self::Avx2, Self::Sse2];
+        widths.into_iter().find(|width| width.available()).unwrap_or(Self::Scalar)
     }
 }
 
@@ -59,7 +63,8 @@ fn run_avx512<T: Task>(task: T) -> T::Output {
     task.run::<super::lanes::avx512::F64x8>()
 }
 
-/// Runs the task at the given width, or one number at a time if the machine lacks it.
+/// Runs the task at the given width, or at the next narrower one that every machine of its kind
+/// has.
 pub fn dispatch<T: Task>(width: Width, task: T) -> T::Output {
     #[cfg(target_arch = "x86_64")]
     {
@@ -70,6 +75,10 @@ pub fn dispatch<T: Task>(width: Width, task: T) -> T::Output {
         if width == Width::Avx2 && width.available() {
             // SAFETY: the features were just detected.
             return unsafe { run_avx2(task) };
+        }
+        // A machine without what was asked for does what every one can.
+        if width != Width::Scalar {
+            return task.run::<super::lanes::sse2::F64x2>();
         }
     }
     task.run::<f64>()

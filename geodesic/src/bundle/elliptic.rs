@@ -50,16 +50,23 @@ pub fn isolated_root<V: Real>(g2: V, g3: V, scale: V) -> V {
 /// `√y√z = √(m² − D)`, `√y + √z = √(2m + 2√(m² − D))`.
 #[inline(always)]
 pub fn rf_pair<V: Real>(x: V, m: V, d: V) -> V {
-    let (mut x, mut m, mut d) = (x, m, d);
+    rf_from(x, m, d, m.mul_add(m, -d))
+}
+
+/// [`rf_pair`] where `m² − D` is known to be `product`, however much of it cancels.
+#[inline(always)]
+pub fn rf_from<V: Real>(x: V, m: V, d: V, product: V) -> V {
+    let (mut x, mut m, mut d, mut product) = (x, m, d, product);
     let zero = V::splat(0.0);
     let quarter = V::splat(0.25);
     for _ in 0..40 {
-        let pair = m.mul_add(m, -d).max(zero).sqrt();
+        let pair = product.max(zero).sqrt();
         let sum = (m + pair + m + pair).max(zero);
         let lambda = pair + (x * sum).max(zero).sqrt();
         x = (x + lambda) * quarter;
         m = (m + lambda) * quarter;
         d = d * V::splat(0.0625);
+        product = m.mul_add(m, -d);
         let dx = m - x;
         let size = (dx * dx).max(d.abs());
         let mean = x + m + m;
@@ -80,6 +87,23 @@ pub fn rf_pair<V: Real>(x: V, m: V, d: V) -> V {
     let c3 = e2.mul_add(V::splat(-3.0 / 44.0), c3);
     let series = e2.mul_add(c2, e3.mul_add(c3, V::splat(1.0)));
     series * inv.sqrt()
+}
+
+/// Arithmetic–geometric mean of positive numbers.
+#[inline(always)]
+pub fn agm<V: Real>(a: V, b: V) -> V {
+    let (mut a, mut b) = (a, b);
+    for _ in 0..40 {
+        let mean = (a + b) * V::splat(0.5);
+        let apart = (a - b).abs();
+        b = (a * b).sqrt();
+        a = mean;
+        // The means of numbers that agree to 1e-8 agree to rounding.
+        if !V::any((mean * V::splat(1e-8)).lt(apart)) {
+            break;
+        }
+    }
+    a
 }
 
 /// `V(h) = 1/℘(h)` and `V'(h)` for small h (h to a tenth of the nearest pole or less).

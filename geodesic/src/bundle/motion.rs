@@ -134,6 +134,9 @@ pub struct Journey<V> {
     pub duration: V,
     /// One if the ray turns and returns to the observer's radius, zero if it is captured.
     pub escapes: V,
+    /// By how much the photon orbit amplifies errors: 1/(distance from the critical curve), up to
+    /// a factor of order 1; one for rays that pass it at a distance.
+    pub condition: V,
 }
 
 impl<V: Real> Journey<V> {
@@ -166,15 +169,28 @@ impl<V: Real> Journey<V> {
             s(cam.margin * (1.0 - cam.r_minus() * cam.w_end()) * cam.w_end() * cam.w_end() * 0.5);
         let speed = p.mul_add(p, -(m.b * near)).max(s(0.0)).sqrt();
         let at_end = (speed + s(1.0)) / (w_end * w_end * s(2.0)) + shift;
-        let w_obs = s(cam.w_obs);
-        let at_start = (m.radial(w_obs).sqrt() + s(1.0)) / (w_obs * w_obs * s(2.0)) + shift;
         let p_end = V::select(escapes, at_turn, at_end);
         let end = rf_pair(p_end - e, p_end - half, gap);
-        let start = rf_pair(at_start - e, at_start - half, gap);
-        let inward = end - start;
+        let mut inward = end;
+        if cam.w_obs > 0.0 {
+            let w_obs = s(cam.w_obs);
+            let at_start = (m.radial(w_obs).sqrt() + s(1.0)) / (w_obs * w_obs * s(2.0)) + shift;
+            inward = end - rf_pair(at_start - e, at_start - half, gap);
+        }
         Self {
             duration: V::select(escapes, inward + inward, inward),
             escapes: V::select(escapes, s(1.0), s(0.0)),
+            condition: V::select(e.lt(s(0.0)), near_critical(m.stiffness(), e, gap), s(1.0)),
         }
     }
+}
+
+/// [`Journey::condition`] of a ray from the isolated root e < 0 of the cubic. The two others
+/// nearly coincide next to the critical curve, and the Mino time is the logarithm of their
+/// difference over √(3|e|/2). Scaled to be 1/(distance) for a hole without spin.
+#[inline(always)]
+fn near_critical<V: Real>(b2: V, e: V, gap: V) -> V {
+    let s = V::splat;
+    let rate = (e.abs() / b2).max(s(1e-12)) * s(6.0);
+    b2 * b2 / (gap.abs().max(s(1e-300)) * rate.sqrt() * s(36.0))
 }

@@ -15,6 +15,7 @@
 
 use super::lanes::Real;
 use super::motion::{Camera, Motion};
+use core::f64::consts::{FRAC_PI_2, TAU};
 
 /// Terms of the series in h².
 const TERMS: usize = 7;
@@ -112,14 +113,20 @@ impl<V: Real> PolarStep<V> {
     pub fn start(&self, cam: &Camera, alpha: V, beta: V) -> (V, V, PolarState<V>) {
         let k = V::splat;
         let (x, u) = (k(cam.sin_i), k(cam.cos_i));
-        let (vx, vy, vu) = (beta * k(-cam.cos_i), alpha, beta * k(cam.sin_i));
-        let e = self.half_bend * k(cam.cos_i * cam.cos_i);
+        (x, u, self.leave(x, u, [beta * k(-cam.cos_i), alpha, beta * k(cam.sin_i)]))
+    }
+
+    /// The state one step after the point (x, 0, u) that is left with the velocity v.
+    #[inline(always)]
+    pub fn leave(&self, x: V, u: V, [vx, vy, vu]: [V; 3]) -> PolarState<V> {
+        let k = V::splat;
+        let e = self.half_bend * u * u;
         let rho = (e + k(1.0)).recip();
         let speed = self.s * self.root;
         let du = (self.s * vu - u * self.rate_u.mul_add(k(0.5), e)) * rho;
         let dx = (speed * vx - x * self.rate_x.mul_add(k(0.5), e)) * rho;
         let dy = (speed * vy + self.twist * x) * rho;
-        (x, u, PolarState { x: x + dx, y: dy, u: u + du, dx, dy, du })
+        PolarState { x: x + dx, y: dy, u: u + du, dx, dy, du }
     }
 
     /// One step on.
@@ -146,4 +153,14 @@ impl<V: Real> PolarStep<V> {
     pub fn gain(&self, u: V, next: V, sum: V) -> V {
         (self.cross * u).mul_add(next, sum)
     }
+}
+
+/// An angle about the axis from atan2, in the sense ±1 in which the ray turns: between two points
+/// of a ray at most half a revolution of the sphere apart that is up to half a turn and a little,
+/// and never back.
+#[inline(always)]
+pub fn unwrap<V: Real>(angle: V, sense: V) -> V {
+    let angle = angle * sense;
+    let low = angle.lt(V::splat(-FRAC_PI_2));
+    sense * V::select(low, angle + V::splat(TAU), angle)
 }

@@ -108,6 +108,40 @@ impl<V: Real> RadialStep<V> {
 /// Length of the ring of nodes, a power of two that holds the reach on both sides.
 const RING: usize = (2 * REACH).next_power_of_two();
 
+/// The nodes from `1 − REACH` to `REACH` around the current one. Apart from [`RadialRun`], which
+/// the compiler keeps in registers only if nothing in it is reached by a variable index.
+pub struct Ring<V> {
+    /// The integrands, in a ring that is there twice, so that they always lie in a row.
+    nodes: [[V; 2]; 2 * RING],
+    /// `w`, in a ring.
+    inverse: [V; RING],
+}
+
+impl<V: Real> Ring<V> {
+    /// Without nodes yet.
+    #[inline(always)]
+    pub fn new() -> Self {
+        let zero = V::splat(0.0);
+        Self { nodes: [[zero; 2]; 2 * RING], inverse: [zero; RING] }
+    }
+
+    /// Puts node number `at` in.
+    #[inline(always)]
+    fn put(&mut self, at: usize, Node { w, f0, f2 }: Node<V>) {
+        let at = at % RING;
+        self.nodes[at] = [f0, f2];
+        self.nodes[at + RING] = [f0, f2];
+        self.inverse[at] = w;
+    }
+
+    /// Integrands at `N` nodes from number `from` on.
+    #[inline(always)]
+    fn window<const N: usize>(&self, from: usize) -> [[V; 2]; N] {
+        // The length is there wherever it starts.
+        self.nodes[from % RING..].first_chunk().copied().unwrap_or([[V::splat(0.0); 2]; N])
+    }
+}
+
 /// `w`, `1/g`, `w²/g` at a node.
 #[derive(Clone, Copy)]
 struct Node<V> {
@@ -139,17 +173,18 @@ impl<V: Real> Node<V> {
 pub struct RadialRun<V> {
     step: RadialStep<V>,
     ahead: RadialState<V>,
-    /// The nodes from `1 − REACH` to `REACH − 1` around the current one.
-    nodes: [Node<V>; RING],
     /// Number of the current node.
     at: usize,
-    weights: [V; REACH],
-    g0: V,
-    g2: V,
+    /// The sums of the trapezoidal rule for ∫dτ/g and ∫w² dτ/g, in units of h, with the end
+    /// correction of the start.
+    sum: [V; 2],
+    /// `h B/2`.
+    scale: V,
     w: V,
+    r: V,
     p: V,
     q: V,
-    /// F, from zero at the observer.
+    /// F, from zero at an observer at finite radius.
     far: V,
     /// Λ, from zero at the observer.
     lambda: V,
@@ -163,37 +198,31 @@ pub struct RadialRun<V> {
 impl<V: Real> RadialRun<V> {
     /// Starts at the observer.
     #[inline(always)]
-    pub fn new(cam: &Camera, m: &Motion<V>, h: V) -> Self {
+    pub fn new(cam: &Camera, m: &Motion<V>, h: V, ring: &mut Ring<V>) -> Self {
         let step = RadialStep::new(m, h);
         let w = V::splat(cam.w_obs);
         let speed = m.radial(w).sqrt();
         let (mut ahead, mut behind) = step.start(w, speed);
         let zero = V::splat(0.0);
-        let mut nodes = [Node { w: zero, f0: zero, f2: zero }; RING];
-        nodes[0] = Node::new(w, speed, m.kappa);
+        ring.put(REACH - 1, Node::new(w, speed, m.kappa));
         for k in 1..REACH {
             let (before, back) = step.advance(behind);
             // Moving backwards, w' of the forward motion has the other sign.
-            nodes[RING - k] = Node::new(behind.w, -back, m.kappa);
+            let node = Node::new(behind.w, -back, m.kappa);
+            ring.put(REACH - 1 - k, node);
             behind = before;
             let (after, speed) = step.advance(ahead);
-            nodes[k] = Node::new(ahead.w, speed, m.kappa);
+            ring.put(REACH - 1 + k, Node::new(ahead.w, speed, m.kappa));
             ahead = after;
         }
-        let scale = h * m.b * V::splat(0.5);
-        let mut weights = [scale; REACH];
-        for (weight, c) in weights.iter_mut().zip(INTERVAL) {
-            *weight = scale * V::splat(c);
-        }
-        Self {
+        let mut run = Self {
             step,
             ahead,
-            nodes,
             at: 0,
-            weights,
-            g0: zero,
-            g2: zero,
+            sum: [zero; 2],
+            scale: h * m.b * V::splat(0.5),
             w,
+            r: w.recip(),
             p: V::splat(1.0 - cam.r_plus() * cam.w_obs),
             q: V::splat(1.0 - cam.r_minus() * cam.w_obs),
             far: zero,
@@ -203,39 +232,53 @@ impl<V: Real> RadialRun<V> {
             r_minus: cam.r_minus(),
             gap: cam.horizon_gap(),
             spin: cam.spin,
-        }
+        };
+        // Zero at the start.
+        let [g0, g2] = run.integrals(ring);
+        run.sum = [-g0, -g2];
+        run
     }
 
     /// Goes to the next node.
     #[inline(always)]
-    pub fn next(&mut self) {
-        self.integrate();
-        let w = self.nodes[self.at % RING].w;
+    pub fn next(&mut self, ring: &mut Ring<V>) {
+        self.integrate(ring);
+        let w = ring.inverse[(self.at + REACH - 1) % RING];
         self.grow(w, w.neg_mul_add(V::splat(self.r_plus), V::splat(1.0)));
     }
 
     /// Goes to the next node, whose `w` and `1 − r₊w` are known otherwise.
     #[inline(always)]
-    pub fn end_at(&mut self, w: f64, outer: f64) {
-        self.integrate();
+    pub fn end_at(&mut self, ring: &mut Ring<V>, w: f64, outer: f64) {
+        self.integrate(ring);
         self.grow(V::splat(w), V::splat(outer));
     }
 
     /// The integrals.
     #[inline(always)]
-    fn integrate(&mut self) {
+    fn integrate(&mut self, ring: &mut Ring<V>) {
         let (next, speed) = self.step.advance(self.ahead);
         let node = Node::new(self.ahead.w, speed, self.kappa);
         self.ahead = next;
-        let at = self.at;
-        self.nodes[(at + REACH) % RING] = node;
-        for k in (0..REACH).rev() {
-            let l = &self.nodes[at.wrapping_sub(k) % RING];
-            let r = &self.nodes[(at + 1 + k) % RING];
-            self.g0 = self.weights[k].mul_add(l.f0 + r.f0, self.g0);
-            self.g2 = self.weights[k].mul_add(l.f2 + r.f2, self.g2);
+        ring.put(self.at + 2 * REACH - 1, node);
+        let [here, there] = ring.window(self.at + REACH - 1);
+        let half = V::splat(0.5);
+        self.sum[0] = (here[0] + there[0]).mul_add(half, self.sum[0]);
+        self.sum[1] = (here[1] + there[1]).mul_add(half, self.sum[1]);
+        self.at += 1;
+    }
+
+    /// The integrals from an end correction to the current node.
+    #[inline(always)]
+    fn integrals(&self, ring: &Ring<V>) -> [V; 2] {
+        let [mut g0, mut g2] = self.sum;
+        let nodes = ring.window::<{ 2 * REACH - 1 }>(self.at);
+        for (k, d) in END.into_iter().enumerate().rev() {
+            let (after, before) = (nodes[REACH + k], nodes[REACH - 2 - k]);
+            g0 = V::splat(d).mul_add(after[0] - before[0], g0);
+            g2 = V::splat(d).mul_add(after[1] - before[1], g2);
         }
-        self.at = at + 1;
+        [g0, g2]
     }
 
     /// The logarithms.
@@ -244,16 +287,27 @@ impl<V: Real> RadialRun<V> {
         let s = V::splat;
         let q = w.neg_mul_add(s(self.r_minus), s(1.0));
         let fall = self.w - w;
-        let e = fall * p.mul_add(self.q, self.p * q).recip();
+        // Three reciprocals by one division.
+        let (outer, inner) = (p.mul_add(self.q, self.p * q), q.mul_add(self.w, self.q * w));
+        let near = inner * w;
+        let all = (outer * near).recip();
+        let e = fall * (all * near);
+        let rest = all * outer;
+        let y = fall * (rest * w);
+        self.r = rest * inner;
         let x = e * s(self.gap);
-        let y = fall * q.mul_add(self.w, self.q * w).recip();
         let mut lambda = e * small_log(x);
         let mut far = y * small_log(y);
         let small = x.abs().max(y.abs()).lt(s(SMALL_LOG));
         if !V::all(small) {
-            let large = ln((p * self.q) / (self.p * q)) * s(1.0 / self.gap);
-            lambda = V::select(x.abs().lt(s(SMALL_LOG)), lambda, large);
-            far = ln((q * self.w) / (self.q * w));
+            let near = x.abs().lt(s(SMALL_LOG));
+            if !V::all(near) {
+                let large = ln((p * self.q) / (self.p * q)) * s(1.0 / self.gap);
+                lambda = V::select(near, lambda, large);
+            }
+            // At infinity F is infinite and starts from ln(r − r₋) itself.
+            let before = V::select(s(0.0).lt(self.w), self.w, s(1.0));
+            far = ln((q * before) / (self.q * w));
         }
         self.far = self.far + far;
         self.lambda = self.lambda + lambda;
@@ -263,11 +317,133 @@ impl<V: Real> RadialRun<V> {
     /// At the current node: `r`, the radial part of time, `G₀ + a² G₂ − r − 2F − 2r₊Λ`, and
     /// that of azimuth, `−a G₂ + a Λ`, up to constants.
     #[inline(always)]
-    pub fn parts(&self) -> [V; 3] {
+    pub fn parts(&self, ring: &Ring<V>) -> [V; 3] {
         let s = V::splat;
-        let r = self.w.recip();
-        let t = self.g2.mul_add(s(self.spin * self.spin), self.g0) - r;
+        let [g0, g2] = self.integrals(ring);
+        let g2 = g2 * self.scale;
+        let t = g0.mul_add(self.scale, g2 * s(self.spin * self.spin)) - self.r;
         let t = self.lambda.mul_add(s(-2.0 * self.r_plus), self.far.mul_add(s(-2.0), t));
-        [r, t, (self.lambda - self.g2) * s(self.spin)]
+        [self.r, t, (self.lambda - g2) * s(self.spin)]
     }
+}
+
+/// Weights of the trapezoidal rule's end corrections: `∫₀ᴺ f` is the sum of f at the nodes, half
+/// of it at the ends, plus `Σ dₖ (f(N + k) − f(N − k) − f(k) + f(−k))`. It is the sum of
+/// [`INTERVAL`] over all intervals, `d₁ = ½ − c₀`, `dₖ₊₁ = dₖ − cₖ`.
+const END: [f64; REACH - 1] = {
+    let mut d = [0.5 - INTERVAL[0]; REACH - 1];
+    let mut k = 1;
+    while k < REACH - 1 {
+        d[k] = d[k - 1] - INTERVAL[k];
+        k += 1;
+    }
+    d
+};
+
+/// The least number of steps of a [`RadialSum`].
+pub const LEAST_STEPS: usize = 2 * REACH - 1;
+
+/// `∫dτ/g` and `∫w² dτ/g` from one point of a ray to another, without what lies between.
+#[derive(Clone, Copy)]
+pub struct RadialSum<V> {
+    step: RadialStep<V>,
+    ahead: RadialState<V>,
+    kappa: V,
+    sum: [V; 2],
+    scale: V,
+}
+
+/// The end of a [`RadialSum`].
+#[derive(Clone, Copy)]
+pub struct RadialEnd<V> {
+    pub w: V,
+    /// `w'`.
+    pub speed: V,
+    /// `G₀ + a² G₂`, of the time.
+    pub time: V,
+    /// `G₂`, of the azimuth.
+    pub turn: V,
+}
+
+impl<V: Real> RadialSum<V> {
+    /// From the point (w, w'), in at least [`LEAST_STEPS`] steps h.
+    #[inline(always)]
+    pub fn new(m: &Motion<V>, h: V, w: V, speed: V) -> Self {
+        let step = RadialStep::new(m, h);
+        let (mut ahead, mut behind) = step.start(w, speed);
+        let first = Node::new(w, speed, m.kappa);
+        let half = V::splat(0.5);
+        let mut sum = [first.f0 * half, first.f2 * half];
+        for d in END {
+            let (before, back) = step.advance(behind);
+            let near = Node::new(behind.w, -back, m.kappa);
+            behind = before;
+            let (after, speed) = step.advance(ahead);
+            let far = Node::new(ahead.w, speed, m.kappa);
+            ahead = after;
+            let (d, rest) = (V::splat(d), V::splat(1.0 - d));
+            sum[0] = near.f0.mul_add(d, far.f0.mul_add(rest, sum[0]));
+            sum[1] = near.f2.mul_add(d, far.f2.mul_add(rest, sum[1]));
+        }
+        let scale = h * m.b * V::splat(0.5);
+        Self { step, ahead, kappa: m.kappa, sum, scale }
+    }
+
+    /// One step of all but the last [`LEAST_STEPS`].
+    #[inline(always)]
+    pub fn next(&mut self) {
+        let (next, speed) = self.step.advance(self.ahead);
+        let node = Node::new(self.ahead.w, speed, self.kappa);
+        self.ahead = next;
+        self.sum[0] = self.sum[0] + node.f0;
+        self.sum[1] = self.sum[1] + node.f2;
+    }
+
+    /// Adds the next node with a weight; its (w, w').
+    #[inline(always)]
+    fn weigh(&mut self, weight: f64) -> (V, V) {
+        let (next, speed) = self.step.advance(self.ahead);
+        let node = Node::new(self.ahead.w, speed, self.kappa);
+        self.ahead = next;
+        self.sum[0] = node.f0.mul_add(V::splat(weight), self.sum[0]);
+        self.sum[1] = node.f2.mul_add(V::splat(weight), self.sum[1]);
+        (node.w, speed)
+    }
+
+    /// The last steps.
+    #[inline(always)]
+    pub fn finish(mut self, cam: &Camera) -> RadialEnd<V> {
+        for d in END.into_iter().rev() {
+            self.weigh(1.0 - d);
+        }
+        let (w, speed) = self.weigh(0.5);
+        for d in END {
+            self.weigh(d);
+        }
+        let turn = self.sum[1] * self.scale;
+        let time = turn.mul_add(V::splat(cam.spin * cam.spin), self.sum[0] * self.scale);
+        RadialEnd { w, speed, time, turn }
+    }
+}
+
+/// The closed-form terms of time and azimuth at w, `r + 2F + 2r₊Λ` and `aΛ`; for w = 0, zero in
+/// place of the infinite one.
+#[inline(always)]
+pub fn closed_forms<V: Real>(cam: &Camera, w: V) -> [V; 2] {
+    let s = V::splat;
+    let one = s(1.0);
+    // At the horizon, what rounding leaves of it.
+    let p = w.neg_mul_add(s(cam.r_plus()), one).max(s(f64::EPSILON));
+    let q = w.neg_mul_add(s(cam.r_minus()), one);
+    let e = -(w * (p + q).recip());
+    let x = e * s(cam.horizon_gap());
+    let small = x.abs().lt(s(SMALL_LOG));
+    let mut lambda = e * small_log(x);
+    if !V::all(small) {
+        lambda = V::select(small, lambda, ln(p / q) * s(1.0 / cam.horizon_gap()));
+    }
+    let finite = s(0.0).lt(w);
+    let w = V::select(finite, w, one);
+    let time = lambda.mul_add(s(2.0 * cam.r_plus()), ln(q / w).mul_add(s(2.0), w.recip()));
+    [V::select(finite, time, s(0.0)), lambda * s(cam.spin)]
 }

@@ -1,14 +1,15 @@
 //! One block of rays, sampled equidistantly in Mino time.
 
 use super::dispatch::Task;
-use super::lanes::{CHUNK, MAX_LANES, Real, transpose_plain};
+use super::error::{estimate, speed_of_samples};
+use super::lanes::{CHUNK, MAX_LANES, Pair, Real, transpose_plain};
 use super::math::{SMALL_ANGLE, atan2, small_asin, small_atan};
 use super::motion::{Camera, Journey, Motion};
-use super::polar::{PolarState, PolarStep};
-use super::radial::RadialRun;
+use super::polar::{PolarState, PolarStep, unwrap};
+use super::radial::{RadialRun, Ring};
 
 /// Largest step in units of `1/√max(1, η + λ²)` that the quadrature is trusted with.
-const MAX_STEP: f64 = 0.08;
+pub(super) const MAX_STEP: f64 = 0.08;
 
 /// Where the samples of a block of rays go, ray after ray.
 pub(super) struct Target<'a> {
@@ -20,6 +21,8 @@ pub(super) struct Target<'a> {
     pub duration: &'a mut [f64],
     /// Whether each ray returns to the observer's radius (1) or is captured (0).
     pub escapes: &'a mut [f64],
+    /// First the condition of each ray, then an estimate of the error of its positions.
+    pub error: &'a mut [f64],
 }
 
 /// Rays to be sampled.
@@ -44,13 +47,15 @@ impl Task for Block<'_, '_> {
     #[inline(always)]
     fn run<V: Real>(self) {
         let Self { rays, out } = self;
-        plan::<V>(&rays, out);
+        plan::<Pair<V>>(&rays, out);
         let order = arrange(&rays, out);
         let mut radial = vec![[V::splat(0.0); 3]; rays.per_ray];
         for group in order.chunk_by(|a, b| a.key == b.key) {
             for block in group.chunks(V::LANES) {
                 let Some(Item { key, .. }) = block.first() else { continue };
-                match (key.escapes, key.fine == 1) {
+                // Worth its own code where the arithmetic is fast.
+                let plain = V::LANES > 2 && key.fine == 1;
+                match (key.escapes, plain) {
                     (true, true) => sample_block::<V, true, true>(&rays, block, &mut radial, out),
                     (false, true) => sample_block::<V, false, true>(&rays, block, &mut radial, out),
                     (true, false) => sample_block::<V, true, false>(&rays, block, &mut radial, out),
@@ -66,11 +71,13 @@ impl Task for Block<'_, '_> {
 fn plan<V: Real>(rays: &Rays<'_>, out: &mut Target<'_>) {
     let inputs = rays.alpha.chunks(V::LANES).zip(rays.beta.chunks(V::LANES));
     let outputs = out.duration.chunks_mut(V::LANES).zip(out.escapes.chunks_mut(V::LANES));
-    for ((alpha, beta), (duration, escapes)) in inputs.zip(outputs) {
+    let outputs = outputs.zip(out.error.chunks_mut(V::LANES));
+    for ((alpha, beta), ((duration, escapes), error)) in inputs.zip(outputs) {
         let motion = Motion::new(&rays.camera, V::load(alpha), V::load(beta));
         let journey = Journey::new(&rays.camera, &motion);
         journey.duration.store(duration);
         journey.escapes.store(escapes);
+        journey.condition.store(error);
     }
 }
 
@@ -88,17 +95,21 @@ struct Item {
     ray: usize,
 }
 
-/// The rays, those of one kind together, otherwise in their own order.
-fn arrange(rays: &Rays<'_>, out: &Target<'_>) -> Vec<Item> {
+/// The rays, those of one kind together, otherwise in their own order. Conditions become errors.
+fn arrange(rays: &Rays<'_>, out: &mut Target<'_>) -> Vec<Item> {
     let camera = &rays.camera;
-    let scale = 1.0 / (MAX_STEP * (rays.per_ray - 1) as f64);
+    let last = (rays.per_ray - 1) as f64;
     let screen = rays.alpha.iter().zip(rays.beta);
-    let fates = out.duration.iter().zip(out.escapes.iter());
+    let fates = out.duration.iter().zip(out.escapes.iter()).zip(out.error.iter_mut());
     let mut order = Vec::with_capacity(out.duration.len());
-    for (ray, ((alpha, beta), (duration, escapes))) in screen.zip(fates).enumerate() {
-        let b = Motion::new(camera, *alpha, *beta).stiffness().sqrt();
-        let fine = (b * duration * scale).ceil().clamp(1.0, 1e6) as u32;
-        order.push(Item { key: Key { escapes: *escapes > 0.5, fine }, ray });
+    for (ray, ((alpha, beta), ((duration, escapes), error))) in screen.zip(fates).enumerate() {
+        let motion = Motion::new(camera, *alpha, *beta);
+        let b = motion.stiffness().sqrt();
+        let (escapes, h) = (*escapes > 0.5, duration / last);
+        let fine = (b * h * (1.0 / MAX_STEP)).ceil().clamp(1.0, 1e6);
+        let speed = speed_of_samples(camera, &motion, h, escapes);
+        *error = estimate(*error, b, speed, b * h / fine, 1.0);
+        order.push(Item { key: Key { escapes, fine: fine as u32 }, ray });
     }
     order.sort_by_key(|item| item.key);
     order
@@ -205,34 +216,35 @@ fn radial_leg<V: Real, const ESCAPE: bool, const PLAIN: bool>(
 ) -> (V, V) {
     let camera = &rays.camera;
     let steps = (rays.per_ray - 1) * fine;
-    let mut run = RadialRun::new(camera, motion, h);
+    let mut ring = Ring::new();
+    let mut run = RadialRun::new(camera, motion, h, &mut ring);
     let direct = if ESCAPE { rays.per_ray.div_ceil(2) } else { rays.per_ray - 1 };
     let (first, rest) = radial.split_at_mut(1);
-    first[0] = run.parts();
+    first[0] = run.parts(&ring);
     for slot in rest.iter_mut().take(direct - 1) {
         for _ in 0..if PLAIN { 1 } else { fine } {
-            run.next();
+            run.next(&mut ring);
         }
-        *slot = run.parts();
+        *slot = run.parts(&ring);
     }
     if ESCAPE {
         // The nodes on either side of the turning point (or twice the one on it).
         for _ in (direct - 1) * fine..steps / 2 {
-            run.next();
+            run.next(&mut ring);
         }
-        let [_, t0, phi0] = run.parts();
+        let [_, t0, phi0] = run.parts(&ring);
         if steps % 2 == 1 {
-            run.next();
+            run.next(&mut ring);
         }
-        let [_, t1, phi1] = run.parts();
+        let [_, t1, phi1] = run.parts(&ring);
         (t0 + t1, phi0 + phi1)
     } else {
         for _ in 1..fine {
-            run.next();
+            run.next(&mut ring);
         }
-        run.end_at(camera.w_end(), camera.margin);
+        run.end_at(&mut ring, camera.w_end(), camera.margin);
         if let Some(slot) = radial.last_mut() {
-            *slot = run.parts();
+            *slot = run.parts(&ring);
         }
         (h, h)
     }
@@ -241,15 +253,21 @@ fn radial_leg<V: Real, const ESCAPE: bool, const PLAIN: bool>(
 /// The polar motion along a ray.
 ///
 /// Angles grow by those between neighbouring nodes, `sin Δθ = s₁u₀ − u₁s₀` and
-/// `tan Δφ = (x₀y₁ − y₀x₁)/(x₀x₁ + y₀y₁)`, which also counts the turns about the axis.
+/// `tan Δφ = (x₀y₁ − y₀x₁)/(x₀x₁ + y₀y₁)`, which also counts the turns about the axis. The
+/// direction is one node ahead of the angles, so that their polynomials find the results of its
+/// division and square root ready.
 struct PolarRun<V> {
     step: PolarStep<V>,
     ahead: PolarState<V>,
+    /// The sign of −λ, in which azimuth grows.
+    sense: V,
     x: V,
     y: V,
     u: V,
     /// sin θ.
     s: V,
+    turn: Turn<V>,
+    lift: V,
     theta: V,
     phi: V,
     phi_rate: V,
@@ -257,8 +275,20 @@ struct PolarRun<V> {
     t_rate: V,
 }
 
+/// Angles between two nodes.
+#[derive(Clone, Copy)]
+struct Turn<V> {
+    /// The angle in θ, or its sine.
+    theta: V,
+    /// The angle in φ, or its tangent.
+    phi: V,
+    /// Whether they are sine and tangent, all of them small.
+    small: bool,
+}
+
 impl<V: Real> PolarRun<V> {
-    /// `first` are the radial parts at the observer, where time and azimuth are zero.
+    /// `first` are the radial parts at the observer, where time and azimuth are zero; at infinity
+    /// the parts themselves are what is asked for.
     #[inline(always)]
     fn new(
         cam: &Camera,
@@ -270,42 +300,65 @@ impl<V: Real> PolarRun<V> {
         let s = V::splat;
         let step = PolarStep::new(cam, m, h);
         let (_, u, ahead) = step.start(cam, alpha, beta);
-        let spin = s(cam.spin);
-        Self {
+        let (zero, spin) = (s(0.0), s(cam.spin));
+        // Any length will do for the azimuth. From the axis a ray leaves in one direction.
+        let (mut x, mut y, mut start) = (s(1.0), zero, zero);
+        if cam.sin_i == 0.0 {
+            (x, y) = (beta * s(-cam.cos_i), alpha);
+            start = atan2(y, x);
+        }
+        let (t, phi) = if cam.w_obs > 0.0 { (-t, start - phi) } else { (zero, start) };
+        let mut run = Self {
             step,
             ahead,
-            // Any length will do for the azimuth; this one also serves on the axis.
-            x: s(1.0),
-            y: s(0.0),
+            sense: s(1.0).copysign(alpha),
+            x,
+            y,
             u,
             s: s(cam.sin_i),
+            turn: Turn { theta: zero, phi: zero, small: true },
+            lift: zero,
             theta: s(cam.sin_i.atan2(cam.cos_i)),
-            phi: -phi,
+            phi,
             phi_rate: spin.mul_add(h, step.turn),
-            t: -t,
+            t,
             t_rate: (spin * (m.lambda - spin)).mul_add(h, step.lift),
-        }
+        };
+        run.look_ahead();
+        run
     }
 
     /// Goes to the next node.
     #[inline(always)]
     fn next(&mut self) {
+        let Turn { theta, phi, small } = self.turn;
+        let lift = self.lift;
+        self.look_ahead();
+        let (d_theta, d_phi) =
+            if small { (small_asin(theta), small_atan(phi)) } else { (theta, phi) };
+        self.theta = self.theta + d_theta;
+        self.phi = self.phi + (d_phi + self.phi_rate);
+        self.t = self.t + (lift + self.t_rate);
+    }
+
+    /// The direction at the node ahead.
+    #[inline(always)]
+    fn look_ahead(&mut self) {
         let PolarState { x, y, u, .. } = self.ahead;
-        self.t = self.step.gain(self.u, u, self.t) + self.t_rate;
+        self.lift = self.step.gain(self.u, u, V::splat(0.0));
         self.ahead = self.step.advance(self.ahead);
         let s = x.mul_add(x, y * y).sqrt();
         let rise = u.neg_mul_add(self.s, s * self.u);
         let cross = self.y.neg_mul_add(x, self.x * y);
         let dot = self.y.mul_add(y, self.x * x);
         let limit = V::splat(SMALL_ANGLE);
-        let small = V::both(rise.abs().lt(limit), cross.abs().lt(dot * limit));
-        let (d_theta, d_phi) = if V::all(small) {
-            (small_asin(rise), small_atan(cross * dot.recip()))
+        let small = V::all(V::both(rise.abs().lt(limit), cross.abs().lt(dot * limit)));
+        self.turn = if small {
+            Turn { theta: rise, phi: cross * dot.recip(), small }
         } else {
-            (atan2(rise, u.mul_add(self.u, s * self.s)), atan2(cross, dot))
+            let theta = atan2(rise, u.mul_add(self.u, s * self.s));
+            Turn { theta, phi: unwrap(atan2(cross, dot), self.sense), small }
         };
-        self.theta = self.theta + d_theta;
-        self.phi = self.phi + (d_phi + self.phi_rate);
         (self.x, self.y, self.u, self.s) = (x, y, u, s);
     }
 }

@@ -9,7 +9,7 @@ mod overrides;
 pub use check::SceneError;
 pub use overrides::apply_override;
 
-use kerrlight_geodesic::{Kerr, orbits};
+use kerrlight_geodesic::{Kerr, Method, orbits};
 use serde::{Deserialize, Serialize};
 
 /// A complete scene. Lengths and times in M = GM/c² unless a name says otherwise.
@@ -131,6 +131,21 @@ pub struct TracerConfig {
 pub enum Integrator {
     /// Adaptive Runge–Kutta 5(4) in Mino time.
     Rk45Mino,
+    /// Adaptive Runge–Kutta 8(5,3) in Mino time.
+    Dop853Mino,
+    /// Taylor series in Mino time.
+    TaylorMino,
+}
+
+impl Integrator {
+    /// Its stepping method.
+    pub(crate) fn method(self) -> Method {
+        match self {
+            Integrator::Rk45Mino => Method::Rk45,
+            Integrator::Dop853Mino => Method::Dop853,
+            Integrator::TaylorMino => Method::Taylor,
+        }
+    }
 }
 
 /// A thin disc in the equatorial plane with the flux profile of Page & Thorne (1974).

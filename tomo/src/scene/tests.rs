@@ -15,7 +15,7 @@ width = 64
 height = 64
 
 [tracer]
-integrator = "rk45-mino"
+integrator = "taylor-mino"
 tolerance = 1e-8
 
 [disc]

@@ -1,15 +1,21 @@
 //! The scalar trait [`Real`] and its lane types.
 //!
-//! One kernel source serves every width: `f64` itself and the hardware vectors of the x86-64
-//! modules. The hardware
-//! types are only ever constructed inside functions that carry the matching
-//! `#[target_feature]` and that are reached after run-time detection.
+//! One kernel source serves every width: `f64` itself, the hardware vectors of the x86-64
+//! modules, and two of either side by side. Those beyond SSE2 are only ever constructed inside
+//! functions that carry the matching `#[target_feature]` and that are reached after run-time
+//! detection. (Plain arrays are no substitute: the compiler takes minutes over them, for half
+//! the speed of SSE2.)
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod avx2;
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod avx512;
+mod pair;
 mod portable;
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod sse2;
+
+pub(crate) use pair::Pair;
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 

@@ -1,0 +1,101 @@
+//! `kerrlight accuracy`: what a digit costs, and whether hard rays come out right.
+
+mod hard;
+mod picture;
+mod table;
+
+use crate::output::Output;
+use anyhow::{Context, bail};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use kerrlight_validation::accuracy::sweep::{self, Sweep};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Arguments of `kerrlight accuracy`.
+#[derive(Debug, Args)]
+pub struct Accuracy {
+    /// Folder for the results, made if it does not exist
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Rays of every class and spin in the sweep
+    #[arg(long, default_value_t = 128, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=100_000))]
+    rays: u32,
+    /// Seed of the random rays
+    #[arg(long, default_value_t = 1, value_name = "SEED")]
+    seed: u64,
+    /// Instead of the sweep, trace this many random rays that look for trouble, each held
+    /// against 28 digits: special spins and inclinations and their neighbours, impact
+    /// parameters from 1e-12 to 1e6 M, rays up to 1e-14 beside the critical curve
+    #[arg(long, num_args = 0..=1, default_missing_value = "10000000", value_name = "RAYS", value_parser = clap::value_parser!(u64).range(1..=10_000_000_000))]
+    hard: Option<u64>,
+    /// Integrator of the hard rays
+    #[arg(long, default_value = "taylor-mino", requires = "hard", value_parser = crate::trace::integrators())]
+    integrator: kerrlight_geodesic::Integrator,
+    /// Tolerance of the hard rays
+    #[arg(long, default_value_t = 1e-12, requires = "hard")]
+    tolerance: f64,
+}
+
+impl Accuracy {
+    /// Runs the sweep, or the hard rays.
+    pub fn run(&self) -> anyhow::Result<()> {
+        if self.hard.is_some() {
+            kerrlight_geodesic::Tracer::new(self.tolerance).context("--tolerance")?;
+        }
+        make_folder(&self.output)?;
+        let stop = on_interrupt()?;
+        match self.hard {
+            Some(rays) => hard::run(self, rays, &stop),
+            None => self.sweep(&stop),
+        }
+    }
+
+    fn sweep(&self, stop: &AtomicBool) -> anyhow::Result<()> {
+        let files =
+            ["csv", "json", "svg", "png"].map(|kind| self.place(&format!("accuracy.{kind}"), kind));
+        let [csv, json, svg, png] = files;
+        let (csv, json, svg, png) = (csv?, json?, svg?, png?);
+        let sweep = Sweep::full(self.rays as usize, self.seed);
+        let bar = progress_bar(1);
+        let rows = sweep::run(&sweep, |done, of| {
+            bar.set_length(of as u64);
+            bar.set_position(done as u64);
+            !stop.load(Ordering::Relaxed)
+        })?;
+        bar.finish_and_clear();
+        if stop.load(Ordering::Relaxed) {
+            bail!("interrupted: nothing was written");
+        }
+        csv.write(&table::csv(&rows)?)?;
+        json.write(&table::json(&rows, &sweep)?)?;
+        let figure = picture::figure(&rows);
+        svg.write(figure.svg.as_bytes())?;
+        png.write(&figure.png)?;
+        crate::output::print(&table::summary(&rows))
+    }
+
+    /// A file in the folder of the results.
+    fn place(&self, name: &str, extension: &str) -> anyhow::Result<Output> {
+        Output::new(&self.output.join(name), extension)
+    }
+}
+
+fn make_folder(path: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir_all(path).with_context(|| format!("cannot make {}", path.display()))
+}
+
+/// A flag that Ctrl-C raises.
+fn on_interrupt() -> anyhow::Result<Arc<AtomicBool>> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let raised = Arc::clone(&flag);
+    ctrlc::set_handler(move || raised.store(true, Ordering::Relaxed))?;
+    Ok(flag)
+}
+
+fn progress_bar(length: u64) -> ProgressBar {
+    let style = "{bar:40} {percent:>3} %  {elapsed} gone, {eta} left";
+    let bar = ProgressBar::new(length);
+    bar.with_style(ProgressStyle::with_template(style).unwrap_or(ProgressStyle::default_bar()))
+}

@@ -1,0 +1,54 @@
+//! Columns of results that start on a cache line.
+
+use crate::error::OutOfRange;
+use core::ops::{Deref, DerefMut};
+
+/// Doubles per cache line.
+const LINE: usize = 8;
+
+/// A column of doubles. Its first one lies on a 64-byte boundary, so that registers of rays with
+/// a multiple of four points are not written across two lines.
+#[derive(Debug, Default)]
+pub(super) struct Column {
+    data: Vec<f64>,
+    shift: usize,
+    len: usize,
+}
+
+impl Column {
+    /// Makes room for `len` numbers; what they are is unspecified.
+    pub fn resize(&mut self, len: Option<usize>) -> Result<(), OutOfRange> {
+        let few = "few enough for the memory, with all rays";
+        let refused = OutOfRange { field: "points per ray", value: f64::INFINITY, allowed: few };
+        let len = len.and_then(|len| len.checked_add(LINE)).ok_or_else(|| refused.clone())?;
+        if self.data.len() < len {
+            self.data = Vec::new();
+            let room = self.data.try_reserve_exact(len);
+            room.map_err(|_| OutOfRange { value: len as f64, ..refused })?;
+            self.data.resize(len, 0.0);
+            self.shift = (LINE - (self.data.as_ptr().addr() / size_of::<f64>()) % LINE) % LINE;
+        }
+        self.len = len - LINE;
+        Ok(())
+    }
+}
+
+impl Clone for Column {
+    fn clone(&self) -> Self {
+        Self { data: self.to_vec(), shift: 0, len: self.len }
+    }
+}
+
+impl Deref for Column {
+    type Target = [f64];
+
+    fn deref(&self) -> &[f64] {
+        &self.data[self.shift..self.shift + self.len]
+    }
+}
+
+impl DerefMut for Column {
+    fn deref_mut(&mut self) -> &mut [f64] {
+        &mut self.data[self.shift..self.shift + self.len]
+    }
+}

@@ -1,0 +1,384 @@
+//! Equatorial crossings of a block of rays.
+//!
+//! With `S` of the polar step, `u(τ) = 0` where `S'/S = −u₀'/u₀ = −c`. So `Q = 1/S²` solves
+//! `Q² + (A − c²) Q + C = 0`, and `τ = R_F(Q, Q + A/2 ± √(A²/4 − C))`, or that much short of
+//! a whole half-oscillation if the ray first moves away from the equator. From one crossing to
+//! the next the polar motion repeats itself: it is followed up to the first one and, if more are
+//! asked for, over one half-oscillation from there.
+
+use super::dispatch::Task;
+use super::elliptic::{agm, rf_from};
+use super::error::estimate;
+use super::lanes::{MAX_LANES, Real};
+use super::math::atan2;
+use super::motion::{Camera, Journey, Motion};
+use super::polar::{PolarState, PolarStep, unwrap};
+use super::radial::{LEAST_STEPS, RadialSum, closed_forms};
+use super::sample::MAX_STEP;
+use core::f64::consts::PI;
+
+/// The most steps to one crossing: a ray that circles longer than that has no digits left.
+const MOST_STEPS: f64 = 1e5;
+
+/// Errors compared with those of samples: there are few steps, and no sum of angles.
+const LESS: f64 = 0.4;
+
+/// Where the crossings of a block of rays go, ray after ray.
+pub(super) struct Target<'a> {
+    pub delay: &'a mut [f64],
+    pub radius: &'a mut [f64],
+    pub azimuth: &'a mut [f64],
+    pub mino_time: &'a mut [f64],
+    pub error: &'a mut [f64],
+}
+
+/// The work of one block of rays, at any width of lanes.
+pub(super) struct Block<'a, 'b> {
+    pub camera: Camera,
+    pub alpha: &'a [f64],
+    pub beta: &'a [f64],
+    /// Crossings per ray.
+    pub count: usize,
+    pub out: &'b mut Target<'a>,
+}
+
+impl Task for Block<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Real>(self) {
+        let Self { camera, alpha, beta, count, out } = self;
+        let start = closed_forms::<V>(&camera, V::splat(camera.w_obs));
+        for from in (0..alpha.len()).step_by(V::LANES) {
+            let to = alpha.len().min(from + V::LANES);
+            let (alpha, beta) = (V::load(&alpha[from..to]), V::load(&beta[from..to]));
+            let rays = Bundle::new(&camera, start, alpha, beta);
+            let Target { delay, radius, azimuth, mino_time, error } = &mut *out;
+            let columns = [&mut **delay, radius, azimuth, mino_time, error]
+                .map(|column| &mut column[from * count..to * count]);
+            let (point, polar) = rays.first();
+            if count == 1 {
+                for (column, x) in columns.into_iter().zip(point) {
+                    x.store(column);
+                }
+            } else {
+                rays.all((point, polar), count, columns);
+            }
+        }
+    }
+}
+
+/// Delay, radius, azimuth, Mino time and error of a crossing.
+type Point<V> = [V; 5];
+
+/// Radius, the radial parts of time and azimuth, how much a phase error counts,
+/// and the greatest r₊/r on the way.
+type Radial<V> = [V; 5];
+
+/// Rays side by side.
+struct Bundle<'a, V> {
+    camera: &'a Camera,
+    /// The closed forms of time and azimuth at the observer.
+    start: [V; 2],
+    motion: Motion<V>,
+    journey: Journey<V>,
+    alpha: V,
+    beta: V,
+    /// Mino time of the first crossing.
+    time: V,
+    /// Mino time from one crossing to the next, if that has been asked for.
+    half: V,
+}
+
+/// Azimuth and `∫ a²(u² − 1) dτ` with λ's part along a piece of the polar motion.
+#[derive(Clone, Copy)]
+struct Polar<V> {
+    azimuth: V,
+    time: V,
+}
+
+impl<'a, V: Real> Bundle<'a, V> {
+    #[inline(always)]
+    fn new(camera: &'a Camera, start: [V; 2], alpha: V, beta: V) -> Self {
+        let motion = Motion::new(camera, alpha, beta);
+        let journey = Journey::new(camera, &motion);
+        let (time, half) = polar_times(camera, &motion, beta);
+        Self { camera, start, motion, journey, alpha, beta, time, half }
+    }
+
+    /// The first crossing and the polar motion up to it; NaN where there is none.
+    #[inline(always)]
+    fn first(&self) -> (Point<V>, Polar<V>) {
+        let s = V::splat;
+        let exists = self.time.lt(self.journey.duration);
+        if !V::any(exists) {
+            let none = s(f64::NAN);
+            return ([none; 5], Polar { azimuth: none, time: none });
+        }
+        // Lanes without a crossing take the shortest of ways.
+        let time = V::select(exists, self.time, self.journey.duration * s(1e-3));
+        let steps = self.steps(time);
+        let h = time * s(1.0 / steps as f64);
+        let mut polar = PolarSum::at_observer(self.camera, &self.motion, h, self.alpha, self.beta);
+        let radial = self.radial(time, steps, Some(&mut polar));
+        let polar = Polar {
+            azimuth: self.unwrapped(polar.angle()) + polar.turned(steps),
+            time: polar.time(steps),
+        };
+        (self.point(time, exists, radial, polar), polar)
+    }
+
+    /// The first crossing and up to `count − 1` more into the columns, ray after ray.
+    #[inline(always)]
+    fn all(
+        &self,
+        (point, first): (Point<V>, Polar<V>),
+        count: usize,
+        mut columns: [&mut [f64]; 5],
+    ) {
+        for column in &mut columns {
+            column.fill(f64::NAN);
+        }
+        scatter(point, 0, count, &mut columns);
+        let mut time = self.time;
+        let mut polar = first;
+        let mut period = None;
+        for number in 1..count {
+            time = time + self.half;
+            let exists = time.lt(self.journey.duration);
+            if !V::any(exists) {
+                break;
+            }
+            let Polar { azimuth, time: lift } = match period {
+                Some(period) => period,
+                None => self.period(),
+            };
+            period = Some(Polar { azimuth, time: lift });
+            polar = Polar { azimuth: polar.azimuth + azimuth, time: polar.time + lift };
+            let safe = V::select(exists, time, self.journey.duration * V::splat(1e-3));
+            let radial = self.radial(safe, self.steps(safe), None);
+            scatter(self.point(safe, exists, radial, polar), number, count, &mut columns);
+        }
+    }
+
+    /// The polar motion from a crossing to the next.
+    #[inline(always)]
+    fn period(&self) -> Polar<V> {
+        let s = V::splat;
+        let half = V::select(self.half.lt(s(f64::MAX)), self.half, s(1e-3));
+        let steps = self.steps(half);
+        let h = half * s(1.0 / steps as f64);
+        let mut polar = PolarSum::at_equator(self.camera, &self.motion, h);
+        for _ in 0..steps {
+            polar.next();
+        }
+        let azimuth = unwrap(polar.angle(), self.sense()) + polar.turned(steps);
+        Polar { azimuth, time: polar.time(steps) }
+    }
+
+    #[inline(always)]
+    fn steps(&self, time: V) -> usize {
+        let length = greatest(self.motion.stiffness().sqrt() * time) / MAX_STEP;
+        length.ceil().clamp(LEAST_STEPS as f64, MOST_STEPS) as usize
+    }
+
+    /// The sign of −λ = α sin i; where it vanishes that of α counts.
+    #[inline(always)]
+    fn sense(&self) -> V {
+        V::splat(1.0).copysign(self.alpha)
+    }
+
+    /// The azimuth at the end of the polar motion from the observer.
+    #[inline(always)]
+    fn unwrapped(&self, angle: V) -> V {
+        if self.camera.sin_i == 0.0 {
+            // From the axis a ray leaves in one direction and keeps it.
+            return atan2(self.alpha, self.beta * V::splat(-self.camera.cos_i));
+        }
+        unwrap(angle, self.sense())
+    }
+
+    /// r and the radial parts of time and azimuth at `time`. The polar motion goes along in the
+    /// same loop: each waits for its own divisions.
+    #[inline(always)]
+    fn radial(&self, time: V, steps: usize, mut polar: Option<&mut PolarSum<V>>) -> Radial<V> {
+        let s = V::splat;
+        let (camera, m) = (self.camera, &self.motion);
+        let turning = self.journey.duration * s(0.5);
+        let outward = V::both(s(0.5).lt(self.journey.escapes), turning.lt(time));
+        // The outward leg mirrors the inward one.
+        let inner = V::select(outward, self.journey.duration - time, time);
+        let w_obs = s(camera.w_obs);
+        let h = inner * s(1.0 / steps as f64);
+        let mut run = RadialSum::new(m, h, w_obs, m.radial(w_obs).sqrt());
+        for _ in LEAST_STEPS..steps {
+            run.next();
+            if let Some(polar) = &mut polar {
+                polar.next();
+            }
+        }
+        if let Some(polar) = polar {
+            for _ in 0..LEAST_STEPS {
+                polar.next();
+            }
+        }
+        let end = run.finish(camera);
+        let closed = closed_forms(camera, end.w);
+        let spin = s(camera.spin);
+        let t = end.time + (self.start[0] - closed[0]);
+        let phi = end.turn.neg_mul_add(spin, closed[1] - self.start[1]);
+        let r = end.w.recip();
+        // aP/Δ, which is about a(1 + a²w²)/[(1 − r₊w)(1 − r₋w)], is large next to the horizon.
+        let delta = end.w.neg_mul_add(s(camera.r_plus()), s(1.0))
+            * end.w.neg_mul_add(s(camera.r_minus()), s(1.0));
+        let drag = s(2.0 * camera.spin.abs()) / delta.max(s(1e-16));
+        let speed = drag.max(s(3.0));
+        if !V::any(outward) {
+            return [r, t, phi, speed, end.w * s(camera.r_plus())];
+        }
+        // From there to the turning point, and back.
+        let rest = V::select(outward, turning - inner, inner);
+        let steps = self.steps(rest);
+        let mut run = RadialSum::new(m, rest * s(1.0 / steps as f64), end.w, end.speed);
+        for _ in LEAST_STEPS..steps {
+            run.next();
+        }
+        let turn = run.finish(camera);
+        let at_turn = closed_forms(camera, turn.w);
+        let dt = turn.time + (closed[0] - at_turn[0]);
+        let dphi = turn.turn.neg_mul_add(spin, at_turn[1] - closed[1]);
+        let twice = s(2.0);
+        [
+            r,
+            V::select(outward, dt.mul_add(twice, t), t),
+            V::select(outward, dphi.mul_add(twice, phi), phi),
+            V::select(outward, r, speed),
+            V::select(outward, turn.w, end.w) * s(camera.r_plus()),
+        ]
+    }
+
+    #[inline(always)]
+    fn point(&self, time: V, exists: V::Mask, radial: Radial<V>, polar: Polar<V>) -> Point<V> {
+        let [r, t, phi, speed, depth] = radial;
+        let s = V::splat;
+        let spin = s(self.camera.spin);
+        let delay = (spin * (self.motion.lambda - spin)).mul_add(time, t + polar.time);
+        let azimuth = spin.mul_add(time, polar.azimuth + phi);
+        let b = self.motion.stiffness().sqrt();
+        let error = estimate(self.journey.condition, b, speed, s(MAX_STEP), depth) * s(LESS);
+        // No closures here: they would be compiled without the instruction set.
+        let none = s(f64::NAN);
+        [
+            V::select(exists, delay, none),
+            V::select(exists, r, none),
+            V::select(exists, azimuth, none),
+            V::select(exists, time, none),
+            V::select(exists, error, none),
+        ]
+    }
+}
+
+/// The polar motion along equal steps, but for what is proportional to the number of them.
+struct PolarSum<V> {
+    step: PolarStep<V>,
+    ahead: PolarState<V>,
+    x: V,
+    y: V,
+    u: V,
+    sum: V,
+}
+
+impl<V: Real> PolarSum<V> {
+    #[inline(always)]
+    fn at_observer(cam: &Camera, m: &Motion<V>, h: V, alpha: V, beta: V) -> Self {
+        let zero = V::splat(0.0);
+        let step = PolarStep::new(cam, m, h);
+        let (x, u, ahead) = step.start(cam, alpha, beta);
+        Self { step, ahead, x, y: zero, u, sum: zero }
+    }
+
+    #[inline(always)]
+    fn at_equator(cam: &Camera, m: &Motion<V>, h: V) -> Self {
+        let (zero, one) = (V::splat(0.0), V::splat(1.0));
+        let step = PolarStep::new(cam, m, h);
+        let rise = m.eta.max(zero).sqrt();
+        let ahead = step.leave(one, zero, [zero, -m.lambda, rise]);
+        Self { step, ahead, x: one, y: zero, u: zero, sum: zero }
+    }
+
+    #[inline(always)]
+    fn next(&mut self) {
+        let PolarState { x, y, u, .. } = self.ahead;
+        self.sum = self.step.gain(self.u, u, self.sum);
+        self.ahead = self.step.advance(self.ahead);
+        (self.x, self.y, self.u) = (x, y, u);
+    }
+
+    /// Angle about the axis since the start, but for whole turns, in the turning frame.
+    #[inline(always)]
+    fn angle(&self) -> V {
+        atan2(self.y, self.x)
+    }
+
+    /// How far the frame has turned.
+    #[inline(always)]
+    fn turned(&self, steps: usize) -> V {
+        self.step.turn * V::splat(steps as f64)
+    }
+
+    /// `∫a²u² dτ`.
+    #[inline(always)]
+    fn time(&self, steps: usize) -> V {
+        self.step.lift.mul_add(V::splat(steps as f64), self.sum)
+    }
+}
+
+/// Mino times of the first zero of u after the start, and from there to the next; infinite if
+/// there is none. The latter only where it is needed for the former or where `u₀ = 0`.
+#[inline(always)]
+fn polar_times<V: Real>(cam: &Camera, m: &Motion<V>, beta: V) -> (V, V) {
+    let s = V::splat;
+    let (zero, never) = (s(0.0), s(f64::INFINITY));
+    let half_a = m.a * s(0.5);
+    let d = half_a.mul_add(half_a, -m.c);
+    let rd = d.max(zero).sqrt();
+    // u'² = (u₊ − u²)(Q₊ + a²u²), with Q₊ + a²u₊ = 2√d.
+    let slow = V::select(zero.lt(half_a), -m.c / (half_a + rd), rd - half_a);
+    let oscillates = V::both(zero.lt(m.eta), zero.lt(slow));
+    let safe = V::select(oscillates, slow, s(1.0));
+    let half = s(PI) / agm(safe.sqrt(), V::select(oscillates, rd + rd, s(1.0)).sqrt());
+    let half = V::select(oscillates, half, never);
+    if cam.cos_i == 0.0 {
+        return (half, half);
+    }
+    // Twice Q is b + √(b² − 4C), b = c² − A; C < 0 where u has zeros.
+    let c = beta * s(cam.sin_i / cam.cos_i);
+    let b = c.mul_add(c, -m.a);
+    let root = b.mul_add(b, m.c * s(-4.0)).max(zero).sqrt();
+    let sum = b.abs() + root;
+    let q = V::select(b.lt(zero), m.c * s(-2.0) / sum, sum * s(0.5));
+    // The product of the pair is Q² + A Q + C = c² Q, free of cancellation.
+    let near = rf_from(q, q + half_a, d, c * c * q);
+    let first = V::select(zero.lt(c), half - near, near);
+    (V::select(oscillates, first, never), half)
+}
+
+/// The greatest lane.
+#[inline(always)]
+fn greatest<V: Real>(x: V) -> f64 {
+    let mut lanes = [0.0; MAX_LANES];
+    x.store(&mut lanes);
+    lanes.iter().take(V::LANES).fold(0.0, |a, &b| if b > a { b } else { a })
+}
+
+/// Crossing `number` of each ray, out of `count`.
+#[inline(always)]
+fn scatter<V: Real>(point: Point<V>, number: usize, count: usize, columns: &mut [&mut [f64]; 5]) {
+    let mut lanes = [0.0; MAX_LANES];
+    for (x, column) in point.into_iter().zip(columns) {
+        x.store(&mut lanes);
+        for (x, slot) in lanes.iter().zip(column.iter_mut().skip(number).step_by(count)) {
+            *slot = *x;
+        }
+    }
+}

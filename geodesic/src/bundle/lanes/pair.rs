@@ -1,0 +1,123 @@
+//! Two bundles side by side.
+
+use super::Real;
+use core::ops::{Add, Div, Mul, Neg, Sub};
+
+/// Twice the lanes of `V`: every operation is issued twice in a row, which
+/// keeps the arithmetic units busy while long chains wait for results.
+#[derive(Clone, Copy)]
+pub(crate) struct Pair<V>(V, V);
+
+macro_rules! operator {
+    ($trait:ident, $method:ident) => {
+        impl<V: Real> $trait for Pair<V> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, o: Self) -> Self {
+                Self(self.0.$method(o.0), self.1.$method(o.1))
+            }
+        }
+    };
+}
+operator!(Add, add);
+operator!(Sub, sub);
+operator!(Mul, mul);
+operator!(Div, div);
+
+impl<V: Real> Neg for Pair<V> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(-self.0, -self.1)
+    }
+}
+
+impl<V: Real> Real for Pair<V> {
+    type Mask = (V::Mask, V::Mask);
+    const LANES: usize = 2 * V::LANES;
+
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        Self(V::splat(x), V::splat(x))
+    }
+    #[inline(always)]
+    fn load(x: &[f64]) -> Self {
+        match x.split_at_checked(V::LANES) {
+            Some((a, b)) if !b.is_empty() => Self(V::load(a), V::load(b)),
+            _ => Self(V::load(x), V::splat(x.last().copied().unwrap_or(0.0))),
+        }
+    }
+    #[inline(always)]
+    fn store(self, out: &mut [f64]) {
+        if let Some((a, b)) = out.split_at_mut_checked(V::LANES) {
+            self.0.store(a);
+            self.1.store(b);
+        } else {
+            self.0.store(out);
+        }
+    }
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        Self(self.0.mul_add(b.0, c.0), self.1.mul_add(b.1, c.1))
+    }
+    #[inline(always)]
+    fn neg_mul_add(self, b: Self, c: Self) -> Self {
+        Self(self.0.neg_mul_add(b.0, c.0), self.1.neg_mul_add(b.1, c.1))
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.sqrt(), self.1.sqrt())
+    }
+    #[inline(always)]
+    fn recip(self) -> Self {
+        Self(self.0.recip(), self.1.recip())
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.abs(), self.1.abs())
+    }
+    #[inline(always)]
+    fn min(self, o: Self) -> Self {
+        Self(self.0.min(o.0), self.1.min(o.1))
+    }
+    #[inline(always)]
+    fn max(self, o: Self) -> Self {
+        Self(self.0.max(o.0), self.1.max(o.1))
+    }
+    #[inline(always)]
+    fn copysign(self, o: Self) -> Self {
+        Self(self.0.copysign(o.0), self.1.copysign(o.1))
+    }
+    #[inline(always)]
+    fn lt(self, o: Self) -> Self::Mask {
+        (self.0.lt(o.0), self.1.lt(o.1))
+    }
+    #[inline(always)]
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
+        Self(V::select(mask.0, yes.0, no.0), V::select(mask.1, yes.1, no.1))
+    }
+    #[inline(always)]
+    fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask {
+        (V::both(a.0, b.0), V::both(a.1, b.1))
+    }
+    #[inline(always)]
+    fn all(mask: Self::Mask) -> bool {
+        V::all(mask.0) & V::all(mask.1)
+    }
+    #[inline(always)]
+    fn any(mask: Self::Mask) -> bool {
+        V::any(mask.0) | V::any(mask.1)
+    }
+    #[inline(always)]
+    fn split(self) -> (Self, Self) {
+        let (m0, k0) = self.0.split();
+        let (m1, k1) = self.1.split();
+        (Self(m0, m1), Self(k0, k1))
+    }
+    #[inline(always)]
+    fn transpose_into(rows: &[f64], stride: usize, out: &mut [f64], starts: &[usize]) {
+        V::transpose_into(rows, stride, out, starts);
+        let rows = rows.get(V::LANES..).unwrap_or(&[]);
+        V::transpose_into(rows, stride, out, starts.get(V::LANES..).unwrap_or(&[]));
+    }
+}

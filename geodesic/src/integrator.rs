@@ -1,0 +1,286 @@
+//! Every way to trace rays, behind one interface and with one kind of result.
+
+use crate::columns::Bundle;
+use crate::elliptic_rays;
+use crate::error::{OutOfRange, check};
+use crate::kerr::Kerr;
+use crate::observer::{Observer, Ray};
+use crate::path::{Outcome, Path, PathPoint};
+use crate::request::Request;
+use crate::sampling::{Sampler, Trajectory};
+use crate::trace::{Method, Tracer};
+use crate::uncertainty::Uncertainty;
+
+/// How rays are traced.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+pub enum Integrator {
+    /// `rk45-affine`: Runge–Kutta 5(4) in the affine parameter on Kerr–Schild coordinates, an
+    /// independent referee. Needs an observer at a finite radius.
+    #[cfg(feature = "affine")]
+    Rk45Affine,
+    /// `rk45-mino`: see [`Method::Rk45`].
+    Rk45Mino,
+    /// `dop853-mino`: see [`Method::Dop853`].
+    Dop853Mino,
+    /// `taylor-mino`: see [`Method::Taylor`].
+    #[default]
+    TaylorMino,
+    /// `elliptic`: the closed form in elliptic functions, several rays a SIMD register
+    /// ([`bundle`](crate::bundle)). By far the fastest for samples equidistant in Mino time and
+    /// for equatorial crossings, which is all that it does; its accuracy is what rounding
+    /// leaves, whatever the tolerance. For an observer at infinity or at 5 M and more.
+    Elliptic,
+}
+
+/// Rays that one task works on.
+const BLOCK: usize = 64;
+
+impl Integrator {
+    /// All of them.
+    pub const ALL: &'static [Integrator] = &[
+        #[cfg(feature = "affine")]
+        Integrator::Rk45Affine,
+        Integrator::Rk45Mino,
+        Integrator::Dop853Mino,
+        Integrator::TaylorMino,
+        Integrator::Elliptic,
+    ];
+
+    /// The name that commands, files and documents use.
+    pub fn name(self) -> &'static str {
+        match self {
+            #[cfg(feature = "affine")]
+            Integrator::Rk45Affine => "rk45-affine",
+            Integrator::Rk45Mino => "rk45-mino",
+            Integrator::Dop853Mino => "dop853-mino",
+            Integrator::TaylorMino => "taylor-mino",
+            Integrator::Elliptic => "elliptic",
+        }
+    }
+
+    /// The integrator with that name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|integrator| integrator.name() == name)
+    }
+
+    /// Its stepping method, for those in Mino time.
+    pub fn method(self) -> Option<Method> {
+        match self {
+            #[cfg(feature = "affine")]
+            Integrator::Rk45Affine => None,
+            Integrator::Rk45Mino => Some(Method::Rk45),
+            Integrator::Dop853Mino => Some(Method::Dop853),
+            Integrator::TaylorMino => Some(Method::Taylor),
+            Integrator::Elliptic => None,
+        }
+    }
+
+    /// Traces the rays that arrive at (`alpha[k]`, `beta[k]`) and takes from them what is
+    /// requested, on all cores with the feature `rayon`. A ray depends on nothing but itself:
+    /// the number of threads does not change a bit of the result.
+    ///
+    /// ```
+    /// use kerrlight_geodesic::{Inclination, Integrator, Kerr, Observer, Outcome, Request};
+    /// let hole = Kerr::new(0.94)?;
+    /// let observer = Observer::at_infinity(Inclination::from_degrees(60.0)?);
+    /// let (alpha, beta) = ([-6.0, 0.5], [2.0, 0.5]);
+    /// let request = Request::crossings(1);
+    /// let rays = Integrator::TaylorMino.trace(&hole, &observer, &alpha, &beta, 1e-10, &request)?;
+    /// assert_eq!(rays.outcome, [Outcome::Escaped, Outcome::Captured]);
+    /// println!("meets the disc at r = {}", rays.crossings.radius[rays.crossings.of(0)][0]);
+    /// # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+    /// ```
+    ///
+    /// # Errors
+    /// If the columns differ in length, a number is out of its range (the request's, the
+    /// tolerance's, those of [`Observer::ray`]), or the observer is at infinity where the
+    /// integrator cannot have it.
+    pub fn trace(
+        self,
+        hole: &Kerr,
+        observer: &Observer,
+        alpha: &[f64],
+        beta: &[f64],
+        tolerance: f64,
+        request: &Request,
+    ) -> Result<Bundle, OutOfRange> {
+        let same = alpha.len() == beta.len();
+        check("number of beta", beta.len() as f64, same, "as many as of alpha")?;
+        request.check()?;
+        if self == Integrator::Elliptic {
+            return elliptic_rays::trace(hole, observer, alpha, beta, request);
+        }
+        let block = |alpha: &[f64], beta: &[f64]| -> Result<Bundle, OutOfRange> {
+            let mut sampler = Sampler::new(request, hole, observer.is_at_infinity());
+            self.trace_block(hole, observer, alpha, beta, tolerance, request, &mut sampler)?;
+            Ok(sampler.bundle)
+        };
+        let pieces = in_blocks(alpha, beta, block);
+        let mut whole = Bundle::default();
+        for piece in pieces {
+            whole.append(piece?);
+        }
+        Ok(whole)
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn trace_block(
+        self,
+        hole: &Kerr,
+        observer: &Observer,
+        alpha: &[f64],
+        beta: &[f64],
+        tolerance: f64,
+        request: &Request,
+        sampler: &mut Sampler<'_>,
+    ) -> Result<(), OutOfRange> {
+        let rays = alpha.iter().zip(beta);
+        let Some(method) = self.method() else {
+            #[cfg(feature = "affine")]
+            for (alpha, beta) in rays {
+                let ray = observer.ray(hole, *alpha, *beta)?;
+                let pair = AffinePair::trace(hole, observer, [*alpha, *beta], tolerance, request)?;
+                sampler.take(&pair, ray.lambda);
+            }
+            return Ok(());
+        };
+        let tracer = Tracer::with_method(method, tolerance)?;
+        let mut path = Path::new();
+        for (alpha, beta) in rays {
+            let ray = observer.ray(hole, *alpha, *beta)?;
+            tracer.trace(hole, &ray, request.want(), &mut path);
+            sampler.take(&MinoPath { path: &path, ray: &ray }, ray.lambda);
+        }
+        Ok(())
+    }
+}
+
+/// `work` on blocks of rays, in their order.
+fn in_blocks<T: Send>(
+    alpha: &[f64],
+    beta: &[f64],
+    work: impl Fn(&[f64], &[f64]) -> T + Sync + Send,
+) -> Vec<T> {
+    #[cfg(feature = "rayon")]
+    {
+        use rayon::prelude::*;
+        let blocks = alpha.par_chunks(BLOCK).zip(beta.par_chunks(BLOCK));
+        blocks.map(|(alpha, beta)| work(alpha, beta)).collect()
+    }
+    #[cfg(not(feature = "rayon"))]
+    {
+        let blocks = alpha.chunks(BLOCK).zip(beta.chunks(BLOCK));
+        blocks.map(|(alpha, beta)| work(alpha, beta)).collect()
+    }
+}
+
+/// A path in Mino time, ended at the radius of a finite observer.
+struct MinoPath<'a> {
+    path: &'a Path,
+    ray: &'a Ray,
+}
+
+impl Trajectory for MinoPath<'_> {
+    fn outcome(&self) -> Outcome {
+        self.path.outcome()
+    }
+
+    fn total(&self) -> f64 {
+        match self.path.turning_point() {
+            // A ray that starts inwards is back where it started after twice the time.
+            Some((turning, _)) if self.ray.inverse_radius > 0.0 && self.ray.inward => 2.0 * turning,
+            _ => self.path.mino_total(),
+        }
+    }
+
+    fn turning_radius(&self) -> Option<f64> {
+        self.path.turning_point().map(|(_, r)| r)
+    }
+
+    fn crossings(&self, found: &mut Vec<f64>) {
+        let total = self.total();
+        found.extend(self.path.equatorial_crossings().filter(|time| *time <= total));
+    }
+
+    fn at(&self, mino_time: f64) -> PathPoint {
+        self.path.at(mino_time)
+    }
+
+    fn uncertainty(&self, mino_time: f64) -> Uncertainty {
+        self.path.uncertainty_at(mino_time)
+    }
+
+    fn within(&self, lo: f64, hi: f64, pieces: &mut Vec<[f64; 2]>) {
+        self.path.intervals_within(lo, hi, pieces);
+        let total = self.total();
+        for piece in pieces.iter_mut() {
+            piece[1] = piece[1].min(total);
+        }
+        pieces.retain(|[start, end]| start < end);
+    }
+}
+
+/// A ray in the affine parameter, and the same ray with ten times the tolerance: their
+/// difference is the estimate of its error.
+#[cfg(feature = "affine")]
+struct AffinePair {
+    fine: crate::affine::AffinePath,
+    coarse: Option<crate::affine::AffinePath>,
+}
+
+#[cfg(feature = "affine")]
+impl AffinePair {
+    fn trace(
+        hole: &Kerr,
+        observer: &Observer,
+        [alpha, beta]: [f64; 2],
+        tolerance: f64,
+        request: &Request,
+    ) -> Result<Self, OutOfRange> {
+        let with = |tolerance: f64| {
+            crate::affine::AffineTracer::new(tolerance)?.trace(hole, observer, alpha, beta)
+        };
+        let coarse = request.uncertainty.then(|| with((10.0 * tolerance).min(1e-2)));
+        Ok(AffinePair { fine: with(tolerance)?, coarse: coarse.transpose()? })
+    }
+}
+
+#[cfg(feature = "affine")]
+impl Trajectory for AffinePair {
+    fn outcome(&self) -> Outcome {
+        self.fine.outcome()
+    }
+
+    fn total(&self) -> f64 {
+        self.fine.mino_total()
+    }
+
+    fn turning_radius(&self) -> Option<f64> {
+        self.fine.closest_approach()
+    }
+
+    fn crossings(&self, found: &mut Vec<f64>) {
+        found.extend(self.fine.equatorial_crossings());
+    }
+
+    fn at(&self, mino_time: f64) -> PathPoint {
+        self.fine.at(mino_time)
+    }
+
+    fn uncertainty(&self, mino_time: f64) -> Uncertainty {
+        let Some(coarse) = &self.coarse else { return Uncertainty::default() };
+        let (a, b) = (self.fine.at(mino_time), coarse.at(mino_time.min(coarse.mino_total())));
+        let turn = (a.azimuth - b.azimuth).rem_euclid(core::f64::consts::TAU);
+        let floor = 16.0 * f64::EPSILON;
+        Uncertainty {
+            radius: (b.inverse_radius / a.inverse_radius - 1.0).abs() + floor,
+            theta: (a.theta() - b.theta()).abs() + floor,
+            azimuth: turn.min(core::f64::consts::TAU - turn) + floor,
+            delay: (a.delay - b.delay).abs() + floor * (a.delay.abs() + a.radius()),
+        }
+    }
+
+    fn within(&self, lo: f64, hi: f64, pieces: &mut Vec<[f64; 2]>) {
+        self.fine.intervals_within(lo, hi, pieces);
+    }
+}

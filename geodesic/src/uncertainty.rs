@@ -1,0 +1,100 @@
+//! What the errors of a path amount to.
+//!
+//! The radial motion obeys dw/dτ = ±√W, and every step is put back on it, so that an error of
+//! w is an error of phase: the ray is where it should have been a little earlier or later.
+//! Phase errors add up step by step and are carried on unchanged, through the turning point
+//! and past a photon orbit, where √W is small and a given error of w is a large one of phase.
+//! The direction on the sphere oscillates about the plane of the orbit; its errors add up as
+//! they are. Azimuth and time are quadratures: their own errors add up, and they follow the
+//! radial phase.
+
+use crate::kerr::Kerr;
+use crate::path::PathPoint;
+use crate::scalar::Elementary;
+
+/// Estimated errors of a position: each bounds the true one for at least 99 % of rays, and is
+/// usually a few times larger (docs/accuracy.md of the repository has the figures).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Uncertainty {
+    /// Of the radius, relative.
+    pub radius: f64,
+    /// Of the polar angle θ, in radians.
+    pub theta: f64,
+    /// Of the azimuth, in radians.
+    pub azimuth: f64,
+    /// Of the delay, in units of M.
+    pub delay: f64,
+}
+
+impl Uncertainty {
+    /// The larger of both in every component.
+    pub fn max(self, o: Self) -> Self {
+        Uncertainty {
+            radius: self.radius.max(o.radius),
+            theta: self.theta.max(o.theta),
+            azimuth: self.azimuth.max(o.azimuth),
+            delay: self.delay.max(o.delay),
+        }
+    }
+}
+
+/// The errors that the steps of a path have made so far, in scaled units.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Budget {
+    /// Error of the radial phase, a scaled time, from what the steps leave out.
+    pub phase: f64,
+    /// Square of its rounding errors: of random signs, they add up like a random walk.
+    pub rounding: f64,
+    /// Error of W since the last time that dw/dτ was put on ±√W.
+    pub energy: f64,
+    /// Relative error of b·w that a step's interpolation makes.
+    pub local: f64,
+    /// Error of the direction on the sphere.
+    pub direction: f64,
+    /// Error of I_φ.
+    pub azimuth: f64,
+    /// Error of I_t/b.
+    pub delay: f64,
+}
+
+/// Standard deviations that rounding is allowed.
+const ROUNDINGS: f64 = 6.0;
+
+impl Budget {
+    /// What it means at a point of the path.
+    pub fn at<T: Elementary>(
+        &self,
+        hole: &Kerr<T>,
+        lambda: f64,
+        scale: f64,
+        point: &PathPoint<T>,
+    ) -> Uncertainty {
+        let eps = T::EPSILON;
+        let w = point.inverse_radius.value();
+        let [x, y, _] = point.direction.map(T::value);
+        let a = hole.spin().value();
+        // Mino time by which the ray may be early or late, and what the interpolation adds.
+        let late = (self.phase + ROUNDINGS * self.rounding.sqrt()) / scale;
+        let speed = point.inverse_radius_rate.value().abs();
+        let local = self.local * w;
+        let radius = if w > 0.0 { (speed * late + local) / w + 4.0 * eps } else { 0.0 };
+        let direction = self.direction + 4.0 * eps;
+        // Δ/r² and (r² + a² − aλ)/r², the two factors of the radial motion's dφ/dτ and dt/dτ.
+        let gap = (1.0 - w * (2.0 - a * a * w)).max(eps);
+        let energy = 1.0 + a * (a - lambda) * w * w;
+        let azimuth = direction / x.hypot(y).max(direction)
+            + self.azimuth
+            + (a * (energy / gap - 1.0)).abs() * late
+            + a.abs() * local / gap
+            + 4.0 * eps * point.azimuth.value().abs();
+        let lift = (1.0 + a * a * w * w) / gap;
+        let delay = if w > 0.0 {
+            self.delay * scale
+                + lift * (energy.abs() * late + local) / (w * w)
+                + 4.0 * eps * (point.delay.value().abs() + 1.0 / w)
+        } else {
+            0.0
+        };
+        Uncertainty { radius, theta: direction, azimuth, delay }
+    }
+}

@@ -1,0 +1,95 @@
+//! The answers that traced rays are held against.
+
+use super::rays::Draw;
+use kerrlight_geodesic::{Double, Kerr, OutOfRange, Outcome, Path, PathPoint, Want, trace_series};
+use std::f64::consts::TAU;
+
+/// Tolerance of the oracle: far below what a double can hold.
+const TOLERANCE: f64 = 1e-22;
+
+/// Rays in numbers of twice the precision. Reuse one for many: its memory stays.
+#[derive(Debug, Default)]
+pub struct Oracle {
+    path: Path<Double>,
+}
+
+/// True errors of a position.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Truth {
+    /// Of the radius, relative.
+    pub radius: f64,
+    /// Of the polar angle, in radians.
+    pub theta: f64,
+    /// Of the azimuth, in radians; whole turns do not count.
+    pub azimuth: f64,
+    /// Of the delay, in M.
+    pub delay: f64,
+}
+
+impl Truth {
+    /// The larger of both in every component.
+    pub fn max(self, o: Self) -> Self {
+        Truth {
+            radius: self.radius.max(o.radius),
+            theta: self.theta.max(o.theta),
+            azimuth: self.azimuth.max(o.azimuth),
+            delay: self.delay.max(o.delay),
+        }
+    }
+
+    /// The largest of the errors of r (relative), θ and φ.
+    pub fn position(&self) -> f64 {
+        self.radius.max(self.theta).max(self.azimuth)
+    }
+}
+
+impl Oracle {
+    /// Traces the ray; the doubles of the draw count as exact.
+    ///
+    /// # Errors
+    /// If a value is out of its range.
+    pub fn trace(&mut self, ray: &Draw) -> Result<(), OutOfRange> {
+        let hole = Kerr::from_spin(Double::from(ray.spin))?;
+        let observer = ray.observer()?.widen();
+        let ray = observer.ray(&hole, Double::from(ray.alpha), Double::from(ray.beta))?;
+        trace_series(TOLERANCE, &hole, &ray, Want::ALL, &mut self.path)
+    }
+
+    /// What becomes of the ray.
+    pub fn outcome(&self) -> Outcome {
+        self.path.outcome()
+    }
+
+    /// Mino times of the crossings of the equatorial plane.
+    pub fn crossings(&self) -> Vec<f64> {
+        self.path.equatorial_crossings().map(|time| time.hi).collect()
+    }
+
+    /// Mino time of the end.
+    pub fn mino_total(&self) -> f64 {
+        self.path.mino_total().hi
+    }
+
+    /// How many times the ray crosses the equatorial plane up to a Mino time.
+    pub fn crossings_until(&self, mino_time: f64) -> usize {
+        self.crossings().iter().filter(|time| **time <= mino_time).count()
+    }
+
+    /// The position at a Mino time.
+    pub fn at(&self, mino_time: f64) -> PathPoint<Double> {
+        self.path.at(Double::from(mino_time))
+    }
+
+    /// The errors of a position (r, θ, φ, delay) at a Mino time.
+    pub fn judge(&self, mino_time: f64, [r, theta, azimuth, delay]: [f64; 4]) -> Truth {
+        let truth = self.at(mino_time);
+        let miss = |x: f64, truth: Double| (Double::from(x) - truth).hi;
+        let turn = miss(azimuth, truth.azimuth);
+        Truth {
+            radius: miss(r, truth.radius()).abs() / r,
+            theta: miss(theta, truth.theta()).abs(),
+            azimuth: (turn - TAU * (turn / TAU).round()).abs(),
+            delay: miss(delay, truth.delay).abs(),
+        }
+    }
+}
