@@ -1,25 +1,47 @@
 //! `kerrlight inspect`: what a file holds.
 
+use crate::interferometry::plots::{self, PlotFile};
 use crate::output;
 use anyhow::{Context, bail};
 use clap::Args;
 use kerrlight_tomo::image::{Picture, exr};
+use kerrlight_tomo::interferometry::files::{self, Format};
+use kerrlight_tomo::interferometry::observation::{Basis, Observation};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// Arguments of `kerrlight inspect`.
 #[derive(Debug, Args)]
 pub struct Inspect {
-    /// An EXR file
+    /// A picture (EXR), or visibilities (UVFITS, eht-imaging's text, tables of the EHT or of
+    /// kerrlight)
     file: PathBuf,
+    /// Of visibilities: where to draw amplitudes against baselines
+    #[arg(long, value_name = "FILE.png|.svg")]
+    plot: Option<PathBuf>,
 }
 
 impl Inspect {
     /// Prints what the file holds.
     pub fn run(&self) -> anyhow::Result<()> {
         let name = || self.file.display().to_string();
+        let plot = self.plot.as_deref().map(PlotFile::new).transpose()?;
         let bytes = output::read(&self.file)?;
         if !bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
-            bail!("{}: not an EXR file (its first bytes are not an EXR's)", name());
+            let is_exr = self.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
+            if is_exr {
+                bail!("{}: not an EXR file (its first bytes are not an EXR's)", name());
+            }
+            let (format, observation) = files::decode(&bytes).with_context(name)?;
+            output::print(&describe(&name(), format, &observation))?;
+            if let Some(plot) = plot {
+                plot.spares(&self.file)?;
+                plot.write(plots::amplitudes(&observation, &observation.source))?;
+            }
+            return Ok(());
+        }
+        if plot.is_some() {
+            bail!("--plot is for visibilities, {} is a picture", name());
         }
         let (picture, attributes) =
             exr::decode(&bytes).with_context(|| format!("{}: damaged or unusual EXR", name()))?;
@@ -34,6 +56,87 @@ impl Inspect {
         }
         output::print(&text)
     }
+}
+
+/// What there is to know about visibilities.
+fn describe(name: &str, format: Format, observation: &Observation) -> String {
+    let rows = &observation.rows;
+    let or_unknown = |value: Option<String>| value.unwrap_or_else(|| "not told".to_owned());
+    let position = observation.position;
+    let place = position.map(|p| format!("RA {} h, Dec {} deg", p.ra_hours, p.dec_deg));
+    let ghz = |hz: Option<f64>| or_unknown(hz.map(|hz| format!("{} GHz", hz / 1e9)));
+    let times = || rows.iter().map(|row| row.time_h);
+    let distinct: BTreeSet<u64> = times().map(f64::to_bits).collect();
+    let baselines: BTreeSet<[u16; 2]> = rows
+        .iter()
+        .map(|row| {
+            if row.stations[0] < row.stations[1] {
+                row.stations
+            } else {
+                row.swapped(observation.basis).stations
+            }
+        })
+        .collect();
+    let mut text = format!("{name}: {format}\n\n");
+    let mut line = |key: &str, value: String| text += &format!("{key:<12}{value}\n");
+    line("source", format!("{}, {}", observation.source, or_unknown(place)));
+    line("MJD", or_unknown(observation.mjd.map(|mjd| mjd.to_string())));
+    line(
+        "UTC",
+        format!(
+            "{:.6} to {:.6} h, {} times",
+            times().fold(f64::INFINITY, f64::min),
+            times().fold(f64::NEG_INFINITY, f64::max),
+            distinct.len()
+        ),
+    );
+    line("frequency", ghz(observation.frequency_hz));
+    line("bandwidth", ghz(observation.bandwidth_hz));
+    line("baselines", format!("{}, {} rows", baselines.len(), rows.len()));
+    line("products", products(observation));
+    text + &station_table(observation) + &history(observation)
+}
+
+/// How many of each product, and how large Stokes I is.
+fn products(observation: &Observation) -> String {
+    let names = match observation.basis {
+        Basis::Circular => ["RR", "LL", "RL", "LR"],
+        Basis::Stokes => ["I", "Q", "U", "V"],
+    };
+    let count = |k: usize| observation.rows.iter().filter(|row| row.product(k).is_some()).count();
+    let counts: Vec<String> = (0..4).map(|k| format!("{} {}", names[k], count(k))).collect();
+    let amplitudes = || observation.stokes_i().map(|(_, i)| i.visibility.norm());
+    let least = amplitudes().fold(f64::INFINITY, f64::min);
+    let most = amplitudes().fold(f64::NEG_INFINITY, f64::max);
+    format!("{}; |I| {least:.4e} to {most:.4e} Jy", counts.join(", "))
+}
+
+fn station_table(observation: &Observation) -> String {
+    let mut table = format!(
+        "\n{:<12}{:>16}{:>16}{:>16}{:>10}{:>10}{:>8}\n",
+        "station", "x (m)", "y (m)", "z (m)", "SEFD R", "SEFD L", "rows"
+    );
+    for (k, station) in observation.stations.iter().enumerate() {
+        let of_station = |row: &&_| row_has(row, k);
+        let rows = observation.rows.iter().filter(of_station).count();
+        let place = match station.position {
+            Some([x, y, z]) => format!("{x:>16.4}{y:>16.4}{z:>16.4}"),
+            None => format!("{:>48}", "not told"),
+        };
+        let [r, l] = station.sefd;
+        table += &format!("{:<12}{place}{r:>10}{l:>10}{rows:>8}\n", station.name);
+    }
+    table
+}
+
+fn row_has(row: &kerrlight_tomo::interferometry::observation::Row, station: usize) -> bool {
+    row.stations.iter().any(|k| usize::from(*k) == station)
+}
+
+fn history(observation: &Observation) -> String {
+    let lines = observation.history.iter().map(|line| format!("\n{line}"));
+    let text: String = lines.collect();
+    if text.is_empty() { text } else { text + "\n" }
 }
 
 /// A short value on the same line, a long one below, indented.

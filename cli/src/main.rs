@@ -2,11 +2,15 @@
 
 mod accuracy;
 mod columns;
+mod convert;
 mod critical_curve;
 mod inspect;
+mod interferometry;
+mod observe;
 mod output;
 mod render;
 mod trace;
+mod uv;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -26,8 +30,14 @@ struct Arguments {
 enum Verb {
     /// Render a scene to EXR and PNG
     Render(render::Render),
-    /// Show what a file holds: channels, ranges, settings
+    /// Show what a file holds: channels and settings of a picture, visibilities of an observation
     Inspect(inspect::Inspect),
+    /// See an image, a movie or a scene through an array of telescopes
+    Observe(observe::Observe),
+    /// Write the (u, v) coverage of an array, as a table and as a picture
+    Uv(uv::Uv),
+    /// Rewrite visibilities in another format; average, flag, merge hands
+    Convert(convert::Convert),
     /// Trace single rays from a table to a table
     Trace(trace::Trace),
     /// Write the critical curve, the edge of the shadow, as a table
@@ -54,6 +64,9 @@ fn run(arguments: &Arguments) -> anyhow::Result<()> {
     match &arguments.verb {
         Verb::Render(render) => render.run(),
         Verb::Inspect(inspect) => inspect.run(),
+        Verb::Observe(observe) => observe.run(),
+        Verb::Uv(uv) => uv.run(),
+        Verb::Convert(convert) => convert.run(),
         Verb::Trace(trace) => trace.run(),
         Verb::CriticalCurve(table) => table.run(),
         Verb::Accuracy(accuracy) => accuracy.run(),

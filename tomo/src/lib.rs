@@ -2,11 +2,12 @@
 //! that pictures are kept in.
 //!
 //! Data flow: [`scene`] → rays ([`kerrlight_geodesic`]) → [`emission`] → [`transport`] →
-//! [`render`] → [`image`]. SI units enter in [`units`] only. Nothing here knows a path or
+//! [`render`] → [`image`] → [`interferometry`]. SI units enter in [`units`] and [`interferometry`]. Nothing here knows a path or
 //! a terminal: codecs work on bytes.
 
 pub mod emission;
 pub mod image;
+pub mod interferometry;
 pub mod render;
 pub mod scene;
 pub mod transport;

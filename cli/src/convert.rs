@@ -1,0 +1,121 @@
+//! `kerrlight convert`: visibilities from one format to another.
+
+use crate::interferometry::arguments::{self, Source};
+use crate::interferometry::{self, ObservationFile};
+use anyhow::bail;
+use clap::Args;
+use kerrlight_tomo::interferometry::observation::{Flags, Observation};
+use std::path::PathBuf;
+
+/// Arguments of `kerrlight convert`.
+#[derive(Debug, Args)]
+pub struct Convert {
+    /// UVFITS, eht-imaging's text, the EHT's csv or txt, or kerrlight's CSV
+    input: PathBuf,
+    /// Where to write; the name's ending tells the format
+    #[arg(value_name = "OUTPUT.uvfits|.txt|.csv")]
+    output: PathBuf,
+    /// Average coherently over this many seconds
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    average: Option<f64>,
+    /// Merge the hands into Stokes I
+    #[arg(long)]
+    stokes_i: bool,
+    /// Leave out a station
+    #[arg(long, value_name = "NAME")]
+    flag_station: Vec<String>,
+    /// Leave out an interval of UTC hours
+    #[arg(long, value_name = "FROM-TO", value_parser = arguments::range, allow_hyphen_values = true)]
+    flag_utc: Vec<[f64; 2]>,
+    /// Leave out baselines shorter than this many wavelengths
+    #[arg(long, value_name = "WAVELENGTHS", allow_negative_numbers = true)]
+    uv_min: Option<f64>,
+    /// Leave out baselines longer than this many wavelengths
+    #[arg(long, value_name = "WAVELENGTHS", allow_negative_numbers = true)]
+    uv_max: Option<f64>,
+    /// The source, where the input does not tell where it is: sgra, m87, or hours and degrees
+    #[arg(long, value_name = "sgra|m87|RA,DEC", value_parser = arguments::source)]
+    source: Option<Source>,
+    /// The stations, where the input does not tell where they are: EHT2017, ngEHT or a file
+    #[arg(long, value_name = "ARRAY")]
+    array: Option<String>,
+    /// The day, where the input does not tell
+    #[arg(long, value_name = "DAY", allow_negative_numbers = true, value_parser = clap::value_parser!(i32).range(41317..=90000))]
+    mjd: Option<i32>,
+    /// Frequency in GHz, where the input does not tell
+    #[arg(long, value_name = "GHZ", allow_negative_numbers = true)]
+    frequency: Option<f64>,
+    /// Bandwidth in GHz, where the input does not tell
+    #[arg(long, value_name = "GHZ", allow_negative_numbers = true)]
+    bandwidth: Option<f64>,
+}
+
+impl Convert {
+    /// Converts.
+    pub fn run(&self) -> anyhow::Result<()> {
+        let output = ObservationFile::new(&self.output)?;
+        output.spares(&self.input)?;
+        if let Some(seconds) = self.average.filter(|s| !(*s > 0.0 && s.is_finite())) {
+            bail!("--average {seconds} is not allowed: positive seconds");
+        }
+        let (_, mut observation) = interferometry::read(&self.input)?;
+        self.complete(&mut observation)?;
+        let flags = Flags {
+            stations: self.flag_station.clone(),
+            times_h: self.flag_utc.clone(),
+            shorter_than: self.uv_min,
+            longer_than: self.uv_max,
+        };
+        if let Some(name) = flags.unknown_stations(&observation).first() {
+            bail!("--flag-station {name}: {} has no such station", self.input.display());
+        }
+        let selection = flags.apply(&observation);
+        let mut observation = selection.observation;
+        if self.stokes_i {
+            observation = observation.total_intensity();
+        }
+        if let Some(seconds) = self.average {
+            observation = observation.averaged(seconds);
+        }
+        if observation.rows.is_empty() {
+            bail!("{}: no visibilities are left", self.input.display());
+        }
+        output.write(&observation)?;
+        eprintln!("{} rows, {} flagged", observation.rows.len(), selection.dropped);
+        Ok(())
+    }
+
+    /// Adds what the input does not tell; what it tells stays.
+    fn complete(&self, observation: &mut Observation) -> anyhow::Result<()> {
+        if let Some(source) = &self.source {
+            observation.position.get_or_insert(source.position);
+            if observation.source.is_empty() {
+                observation.source.clone_from(&source.name);
+            }
+        }
+        if let Some(mjd) = self.mjd {
+            observation.mjd.get_or_insert(mjd);
+        }
+        for (name, value, field) in [
+            ("--frequency", self.frequency, &mut observation.frequency_hz),
+            ("--bandwidth", self.bandwidth, &mut observation.bandwidth_hz),
+        ] {
+            match value {
+                Some(ghz) if !(1e-9..=1e6).contains(&ghz) => {
+                    bail!("{name} {ghz} is not allowed: GHz in [1e-9, 1e6]")
+                }
+                Some(ghz) => field.get_or_insert(ghz * 1e9),
+                None => continue,
+            };
+        }
+        let Some(array) = &self.array else { return Ok(()) };
+        let array = arguments::array_of(array)?;
+        for station in observation.stations.iter_mut().filter(|s| s.position.is_none()) {
+            let known = array.stations.iter().find(|known| known.name == station.name);
+            if let Some(known) = known {
+                station.clone_from(known);
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,57 @@
+//! A scene, rendered at the times of scans.
+
+use crate::output;
+use anyhow::{Context, bail};
+use indicatif::{ProgressBar, ProgressStyle};
+use kerrlight_tomo::interferometry::operator::ImageGrid;
+use kerrlight_tomo::interferometry::simulate::Movie;
+use kerrlight_tomo::render::render;
+use kerrlight_tomo::scene::Scene;
+use kerrlight_tomo::units::{MICROARCSECOND, gravitational_angle, gravitational_time};
+use std::path::Path;
+
+/// Renders a scene at `times_h` (hours), the first being the scene's own time of observation.
+/// The factor to Jy is that of the first frame, in which the flux is `screen.total_flux_jy`.
+pub fn read(path: &Path, times_h: &[f64]) -> anyhow::Result<Movie> {
+    let name = || path.display().to_string();
+    let mut scene = Scene::parse(&output::read_text(path)?).with_context(name)?;
+    if scene.screen.total_flux_jy.is_none() {
+        bail!("{}: `screen.total_flux_jy` is missing: what is observed is in Jy", name());
+    }
+    if scene.sky.is_some() {
+        bail!("{}: a sky has no flux in Jy: remove `sky`", name());
+    }
+    let hole = scene.hole.clone();
+    let seconds = gravitational_time(hole.mass_msun);
+    let pixel_uas = scene.pixel_size() * gravitational_angle(hole.mass_msun, hole.distance_kpc);
+    let (width, height) = (scene.screen.width as usize, scene.screen.height as usize);
+    let field_rad = pixel_uas * width as f64 * MICROARCSECOND;
+    let grid = ImageGrid::new(width, height, field_rad).with_context(name)?;
+    // A disc does not change.
+    let frames = if scene.spot.is_empty() { &times_h[..1] } else { times_h };
+    if frames.len() > (1 << 30) / grid.pixels() {
+        bail!("{}: {} frames of {width} x {height} pixels are too many", name(), frames.len());
+    }
+    let start = scene.observer.time;
+    let bar = progress_bar(frames.len() as u64);
+    let mut pixels = Vec::with_capacity(frames.len() * grid.pixels());
+    let mut first_factor = None;
+    for time in frames {
+        scene.observer.time = start + (time - times_h[0]) * 3600.0 / seconds;
+        let rendered = render(&scene, None, &|_| true).with_context(name)?;
+        let factor = *first_factor.get_or_insert(rendered.unit_factor);
+        let channel = rendered.picture.channel("intensity").context("no intensity")?;
+        // Every picture has been scaled to the same flux: only the first is to be.
+        let scale = factor / rendered.unit_factor * pixel_uas * pixel_uas;
+        pixels.extend(channel.iter().map(|value| f64::from(*value) * scale));
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(Movie { grid, pixels })
+}
+
+fn progress_bar(frames: u64) -> ProgressBar {
+    let style = "{bar:40} frame {pos} of {len}  {elapsed} gone, {eta} left";
+    let bar = ProgressBar::new(frames);
+    bar.with_style(ProgressStyle::with_template(style).unwrap_or(ProgressStyle::default_bar()))
+}

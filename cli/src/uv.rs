@@ -1,0 +1,76 @@
+//! `kerrlight uv`: which Fourier components an array measures.
+
+use crate::columns::{self, Column};
+use crate::interferometry::arguments::{self, Observing};
+use crate::interferometry::plots::{self, PlotFile};
+use crate::output::{self, Output};
+use anyhow::bail;
+use clap::Args;
+use kerrlight_tomo::interferometry::observation::Observation;
+use kerrlight_tomo::interferometry::schedule;
+use std::path::PathBuf;
+
+/// Arguments of `kerrlight uv`.
+#[derive(Debug, Args)]
+pub struct Uv {
+    /// EHT2017, ngEHT, or a file in eht-imaging's format
+    array: String,
+    #[command(flatten)]
+    observing: Observing,
+    /// Where to write the table [default, without --plot either: standard output]
+    #[arg(short, long, value_name = "FILE.csv")]
+    output: Option<PathBuf>,
+    /// Where to write a picture, coloured by time
+    #[arg(long, value_name = "FILE.png|.svg")]
+    plot: Option<PathBuf>,
+}
+
+impl Uv {
+    /// Computes and writes the coverage.
+    pub fn run(&self) -> anyhow::Result<()> {
+        let output = self.output.as_deref().map(|path| Output::new(path, "csv")).transpose()?;
+        let plot = self.plot.as_deref().map(PlotFile::new).transpose()?;
+        let array = arguments::array_of(&self.array)?;
+        let (schedule, setup) = (self.observing.schedule()?, self.observing.setup()?);
+        let source = &self.observing.source;
+        let observation = schedule::observe(&array, source.position, &schedule, &setup)?;
+        if observation.rows.is_empty() {
+            bail!("no two stations see {} at any time", source.name);
+        }
+        let table = columns::csv(&[table(&observation)], observation.rows.len())?;
+        match &output {
+            Some(output) => {
+                output.write(&table)?;
+                output::print(&format!("{}\n", output.shown().display()))?;
+            }
+            None if plot.is_none() => output::print(core::str::from_utf8(&table)?)?,
+            None => {}
+        }
+        if let Some(plot) = plot {
+            let title = format!("{} and {}, MJD {}", self.array, source.name, self.observing.mjd);
+            plot.write(plots::coverage(&observation, &title))?;
+        }
+        let count = observation.rows.len();
+        eprintln!("{count} points; {}", self.observing.history(&self.array).join("; "));
+        Ok(())
+    }
+}
+
+fn table(observation: &Observation) -> Vec<Column> {
+    let rows = &observation.rows;
+    let numbers =
+        |name: &str, value: fn(&kerrlight_tomo::interferometry::observation::Row) -> f64| {
+            Column::Numbers(name.to_owned(), rows.iter().map(value).collect())
+        };
+    let station = |name: &str, k: usize| {
+        let names = rows.iter().map(|row| observation.names(row)[k].to_owned());
+        Column::Words(name.to_owned(), names.collect())
+    };
+    vec![
+        numbers("time_utc_h", |row| row.time_h),
+        station("t1", 0),
+        station("t2", 1),
+        numbers("u", |row| row.uv[0]),
+        numbers("v", |row| row.uv[1]),
+    ]
+}

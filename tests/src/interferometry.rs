@@ -1,0 +1,261 @@
+//! Observing from the command line, against eht-imaging 1.3.2 (the recipe is
+//! tests/reference/ehtim_visibilities.py) and against itself.
+
+use crate::support::{kerrlight, root, succeed};
+use kerrlight_tomo::interferometry::Complex64;
+use kerrlight_tomo::interferometry::files;
+use kerrlight_tomo::interferometry::observation::Observation;
+use kerrlight_tomo::interferometry::products::{ClosureKind, ClosureSet};
+use std::path::Path;
+
+const WHEN: [&str; 10] =
+    ["--source", "sgra", "--mjd", "57850", "--utc", "4.0-15.5", "--frames", "128", "--tint", "60"];
+
+/// The image of the recipe, as a grid of Jy/pixel.
+fn write_image(folder: &Path) {
+    let mut text = "# Jy/pixel\n".to_owned();
+    for row in 0..64 {
+        let cells: Vec<String> = (0..64)
+            .map(|column| {
+                let (x, y) = ((f64::from(column) - 31.5) / 31.5, (f64::from(row) - 31.5) / 31.5);
+                let ring = (-((x.hypot(y) - 0.4) / 0.1).powi(2)).exp();
+                let waves = 0.01 * f64::from((7 * row + 3 * column) % 5);
+                ((ring * (1.0 + 0.5 * x - 0.3 * y) + waves) / 150.0).to_string()
+            })
+            .collect();
+        text += &(cells.join(",") + "\n");
+    }
+    std::fs::write(folder.join("image.csv"), text).unwrap();
+}
+
+fn observe(folder: &Path, array: &str, output: &str, more: &[&str]) {
+    let start = ["observe", "image.csv", "--fov-uas", "160", "--array", array, "-o", output];
+    succeed(folder, &[&start[..], &WHEN[..], more].concat());
+}
+
+fn read(folder: &Path, name: &str) -> Observation {
+    files::decode(&std::fs::read(folder.join(name)).unwrap()).unwrap().1
+}
+
+/// The row of a baseline at a time, with the stations in this order: (u, v), V, σ.
+fn find(data: &Observation, time_h: f64, pair: [&str; 2]) -> ([f64; 2], Complex64, f64) {
+    let rows = data.stokes_i().filter(|(row, _)| (row.time_h - time_h).abs() < 1e-6);
+    for (row, i) in rows {
+        let names = data.names(row);
+        if names == pair {
+            return (row.uv, i.visibility, i.noise_sigma);
+        }
+        if names == [pair[1], pair[0]] {
+            return (row.uv.map(|x| -x), i.visibility.conj(), i.noise_sigma);
+        }
+    }
+    panic!("no {pair:?} at {time_h}");
+}
+
+/// (u, v) to 1e-6 of the longest baseline is asked for; both codes agree to 1e-10.
+#[test]
+fn code_ehtim_visibilities() {
+    let folder = tempfile::tempdir().unwrap();
+    write_image(folder.path());
+    let reference = root().join("tests/reference/ehtim_visibilities.csv");
+    let reference = std::fs::read_to_string(reference).unwrap();
+    for array in ["EHT2017", "ngEHT"] {
+        observe(folder.path(), array, "data.csv", &[]);
+        let data = read(folder.path(), "data.csv");
+        let mut seen = 0;
+        for line in reference.lines().filter(|line| line.starts_with(array)) {
+            let cells: Vec<&str> = line.split(',').collect();
+            let number = |k: usize| cells[k].parse::<f64>().unwrap();
+            assert_eq!(data.rows.len() as f64, number(1), "{array}");
+            let (uv, v, sigma) = find(&data, number(2), [cells[3], cells[4]]);
+            assert!((uv[0] - number(5)).hypot(uv[1] - number(6)) < 1.0, "{line}: {uv:?}");
+            assert!((v - Complex64::new(number(7), number(8))).norm() < 1e-9, "{line}: {v}");
+            assert!((sigma / number(9) - 1.0).abs() < 1e-12, "{line}: {sigma}");
+            seen += 1;
+        }
+        assert!(seen > 80, "{array}: {seen}");
+    }
+}
+
+#[test]
+fn code_ehtim_closure_phases() {
+    let folder = tempfile::tempdir().unwrap();
+    write_image(folder.path());
+    observe(folder.path(), "EHT2017", "data.uvfits", &[]);
+    observe(folder.path(), "EHT2017", "data.csv", &[]);
+    let reference = root().join("tests/reference/ehtim_closure_phases.csv");
+    let reference = std::fs::read_to_string(reference).unwrap();
+    let data = read(folder.path(), "data.csv");
+    let mut seen = 0;
+    for set in ClosureSet::of(&data, ClosureKind::Phase, 0.0) {
+        for closure in &set.closures {
+            let names: Vec<&str> = closure
+                .stations
+                .iter()
+                .map(|k| data.stations[usize::from(*k)].name.as_str())
+                .collect();
+            for line in reference.lines().skip(1) {
+                let cells: Vec<&str> = line.split(',').collect();
+                let time: f64 = cells[0].parse().unwrap();
+                if (time - set.time_h).abs() > 1e-6
+                    || !names.iter().all(|n| cells[1..4].contains(n))
+                {
+                    continue;
+                }
+                // A turned triangle has the opposite phase.
+                let place = |k: usize| cells[1..4].iter().position(|n| *n == names[k]).unwrap();
+                let even = (place(1) + 3 - place(0)) % 3 == 1;
+                let found = if even { closure.value } else { -closure.value }.to_degrees();
+                let expected: f64 = cells[4].parse().unwrap();
+                assert!((found - expected).abs() < 1e-6, "{line}: {found}");
+                seen += 1;
+            }
+        }
+    }
+    assert!(seen >= 6, "{seen} triangles");
+}
+
+/// All formats hold the same data, and noise is that of its seed.
+#[test]
+fn exact_formats_agree_and_seeds_repeat() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    write_image(path);
+    let noise = ["--noise", "thermal", "--seed", "3", "--random-phases", "--gain-scan", "0.1"];
+    for name in ["a.csv", "b.csv", "a.uvfits", "a.txt"] {
+        observe(path, "EHT2017", name, &noise);
+    }
+    let bytes = |name: &str| std::fs::read(path.join(name)).unwrap();
+    assert!(bytes("a.csv") == bytes("b.csv"));
+    let csv = read(path, "a.csv");
+    for name in ["a.uvfits", "a.txt"] {
+        let other = read(path, name);
+        for (row, i) in csv.stokes_i() {
+            let (uv, v, sigma) = find(&other, row.time_h, csv.names(row));
+            assert!((uv[0] - row.uv[0]).hypot(uv[1] - row.uv[1]) < 2e3, "{name}");
+            assert!((v - i.visibility).norm() < 3e-7 && (sigma / i.noise_sigma - 1.0).abs() < 1e-6);
+        }
+    }
+    let history = String::from_utf8_lossy(&bytes("a.uvfits")).into_owned();
+    assert!(history.contains("HISTORY  noise Thermal, seed 3"));
+    // Through the text and back into UVFITS: what is single precision already stays to the bit.
+    succeed(path, &["convert", "a.uvfits", "c.txt"]);
+    succeed(path, &["convert", "c.txt", "c.uvfits"]);
+    let groups =
+        |name: &str| read(path, name).rows.iter().map(|row| row.products).collect::<Vec<_>>();
+    for (a, c) in groups("a.uvfits").iter().zip(groups("c.uvfits")) {
+        assert!(a.iter().zip(c).all(|(a, c)| (a - c).norm() <= 1e-7 * a.norm()), "{a:?} {c:?}");
+    }
+}
+
+#[test]
+fn exact_convert_flags_and_averages() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    write_image(path);
+    observe(path, "EHT2017", "a.uvfits", &[]);
+    let flags =
+        ["--flag-station", "SPT", "--flag-utc", "4-6", "--uv-min", "1e8", "--uv-max", "8e9"];
+    succeed(path, &[&["convert", "a.uvfits", "b.uvfits"][..], &flags[..]].concat());
+    let b = read(path, "b.uvfits");
+    assert!(!b.rows.is_empty());
+    for row in &b.rows {
+        let length = row.uv[0].hypot(row.uv[1]);
+        assert!(!b.names(row).contains(&"SPT") && row.time_h > 6.0 && (1e8..8e9).contains(&length));
+    }
+    succeed(path, &["convert", "b.uvfits", "c.txt", "--average", "3600", "--stokes-i"]);
+    let c = read(path, "c.txt");
+    assert!(c.rows.len() * 5 < b.rows.len() && c.rows.len() * 14 > b.rows.len());
+    let tables = succeed(path, &["inspect", "c.txt"]);
+    assert!(tables.contains("eht-imaging text") && tables.contains("SPT"), "{tables}");
+}
+
+#[test]
+fn exact_uv_writes_table_and_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    let more = ["-o", "uv.csv", "--plot", "uv.png"];
+    succeed(folder.path(), &[&["uv", "EHT2017"][..], &WHEN[..], &more[..]].concat());
+    let table = std::fs::read_to_string(folder.path().join("uv.csv")).unwrap();
+    assert!(table.starts_with("time_utc_h,t1,t2,u,v\n") && table.lines().count() == 1706);
+    let png = image::load_from_memory(&std::fs::read(folder.path().join("uv.png")).unwrap());
+    let png = png.unwrap().to_rgb8();
+    // Tracks of many colours on white.
+    let colors: std::collections::HashSet<_> = png.pixels().map(|p| p.0).collect();
+    assert!(png.width() > 500 && colors.len() > 8, "{}", colors.len());
+}
+
+/// Frames of a scene: a movie whose first frame has the flux of the scene, and that moves.
+#[test]
+fn exact_scene_through_an_array() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = std::fs::read_to_string(root().join("scenes/hot_spots.toml")).unwrap();
+    let scene = [
+        "screen.width=24",
+        "screen.height=24",
+        "screen.samples_per_pixel=1",
+        "screen.total_flux_jy=2.5",
+    ]
+    .iter()
+    .fold(scene, |text, change| kerrlight_tomo::scene::apply_override(&text, change).unwrap());
+    std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    let arguments =
+        ["observe", "scene.toml", "--array", "EHT2017", "--source", "sgra", "--mjd", "57850"];
+    let more = ["--utc", "12.0-12.5", "--frames", "3", "--tint", "60", "-o", "scene.csv"];
+    succeed(folder.path(), &[&arguments[..], &more[..]].concat());
+    let data = read(folder.path(), "scene.csv");
+    let flux = |k: usize| {
+        let (_, v, _) = find(&data, 12.0 + k as f64 / 6.0, ["ALMA", "APEX"]);
+        v.norm()
+    };
+    assert!((flux(0) - 2.5).abs() < 1e-3, "{}", flux(0));
+    assert!((1..3).all(|k| (flux(k) - flux(0)).abs() > 1e-5));
+}
+
+#[test]
+fn bad_input_is_refused_and_nothing_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    write_image(path);
+    let fail = |arguments: &[&str]| {
+        let output = kerrlight(path, arguments);
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+        assert_eq!(std::fs::read_dir(path).unwrap().count(), 1, "{arguments:?} left files");
+        message
+    };
+    let observe = |change: &dyn Fn(&mut Vec<String>)| {
+        let start =
+            ["observe", "image.csv", "--fov-uas", "160", "--array", "EHT2017", "-o", "a.csv"];
+        let mut all: Vec<String> =
+            start.iter().chain(&WHEN).map(|argument| (*argument).to_owned()).collect();
+        change(&mut all);
+        fail(&all.iter().map(String::as_str).collect::<Vec<_>>())
+    };
+    let with = |name: &str, value: &str| {
+        let (name, value) = (name.to_owned(), value.to_owned());
+        observe(&move |all: &mut Vec<String>| match all
+            .iter()
+            .position(|argument| *argument == name)
+        {
+            Some(k) => all[k + 1].clone_from(&value),
+            None => all.extend([name.clone(), value.clone()]),
+        })
+    };
+    assert!(with("--array", "nowhere").contains("array nowhere"));
+    assert!(with("--source", "25,0").contains("right ascension = 25"));
+    assert!(with("--mjd", "7").contains("41317"));
+    assert!(with("--mjd", "45000").contains("UT1 - UTC at MJD 45000"));
+    assert!(with("--utc", "15-4").contains("stop = 4"));
+    assert!(
+        with("--tint", "-1").contains("-1") && with("--tint", "0").contains("integration time = 0")
+    );
+    assert!(with("--fov-uas", "-5").contains("--fov-uas"));
+    assert!(with("--noise", "thermal").contains("--seed"));
+    assert!(with("--frames", "0").contains("0"));
+    assert!(with("-o", "a.doc").contains("must end in .uvfits"));
+    assert!(with("-o", "image.csv").contains("is an input"));
+    assert!(with("--elevation", "89-90").contains("no two stations"));
+    assert!(fail(&["inspect", "image.csv"]).contains("image.csv"));
+    assert!(fail(&["convert", "image.csv", "b.uvfits"]).contains("time_utc_h"));
+    assert!(fail(&["convert", "nothing.uvfits", "b.uvfits"]).contains("No such file"));
+}

@@ -1,0 +1,142 @@
+//! Stations and arrays of them.
+
+mod built_in;
+mod text;
+
+pub use built_in::{BUILT_IN, built_in};
+pub(super) use text::{HEADING, columns, station};
+pub use text::{parse, to_text};
+
+use super::Complex64;
+
+/// Why there is no array, or it is not fit for use.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ArrayError {
+    /// A line of a text that is no station.
+    #[error("line {line}: {message}")]
+    Line {
+        /// Counted from 1.
+        line: usize,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// Fewer than two stations.
+    #[error("{0} stations are no array: at least 2 are needed")]
+    TooFew(usize),
+    /// More stations than a file can number.
+    #[error("{0} stations: at most {MOST_STATIONS} are supported")]
+    TooMany(usize),
+    /// The same name twice.
+    #[error("station {0} is listed twice")]
+    Twice(String),
+    /// A station that cannot observe.
+    #[error("station {name}: {message}")]
+    Unfit {
+        /// Its name.
+        name: String,
+        /// What is wrong with it.
+        message: String,
+    },
+}
+
+/// AIPS numbers the antennas of a baseline in 8 bits, 11 in its long form.
+pub const MOST_STATIONS: usize = 2047;
+
+/// How a feed turns on the sky: φ = parallactic·χ + elevation·el + offset.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FeedRotation {
+    /// Factor on the parallactic angle.
+    pub parallactic: f64,
+    /// Factor on the elevation.
+    pub elevation: f64,
+    /// Constant part in degrees.
+    pub offset_deg: f64,
+}
+
+/// A telescope.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Station {
+    /// Short name, without blanks.
+    pub name: String,
+    /// Geocentric ITRF position x, y, z in metres; `None` in files that do not hold it.
+    pub position: Option<[f64; 3]>,
+    /// System equivalent flux densities of the R and L feeds in Jy; 0 where a file holds none.
+    pub sefd: [f64; 2],
+    /// Least and greatest elevation in degrees at which it observes, where it has limits of its
+    /// own.
+    pub elevation_deg: Option<[f64; 2]>,
+    /// Carried along for files; not simulated.
+    pub feed_rotation: FeedRotation,
+    /// Leakage terms of the R and L feeds; carried along for files, not simulated.
+    pub leakage: [Complex64; 2],
+}
+
+impl Station {
+    /// A station with equal feeds at `position` (ITRF metres) and an SEFD in Jy.
+    pub fn new(name: &str, position: [f64; 3], sefd: f64) -> Self {
+        let position = Some(position);
+        Station { position, sefd: [sefd, sefd], ..Station::named(name) }
+    }
+
+    /// A station of which nothing but the name is known.
+    pub fn named(name: &str) -> Self {
+        Station {
+            name: name.to_owned(),
+            position: None,
+            sefd: [0.0; 2],
+            elevation_deg: None,
+            feed_rotation: FeedRotation::default(),
+            leakage: [Complex64::new(0.0, 0.0); 2],
+        }
+    }
+}
+
+/// Telescopes that observe together. Their order is that of baselines.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Array {
+    /// The stations, names distinct.
+    pub stations: Vec<Station>,
+}
+
+impl Array {
+    /// An array of two or more stations with distinct names.
+    ///
+    /// # Errors
+    /// If there are fewer, or too many, or names occur twice.
+    pub fn new(stations: Vec<Station>) -> Result<Self, ArrayError> {
+        if stations.len() < 2 {
+            return Err(ArrayError::TooFew(stations.len()));
+        }
+        if stations.len() > MOST_STATIONS {
+            return Err(ArrayError::TooMany(stations.len()));
+        }
+        let mut names: Vec<&str> = stations.iter().map(|s| s.name.as_str()).collect();
+        names.sort_unstable();
+        match names.windows(2).find(|pair| pair[0] == pair[1]) {
+            Some(pair) => Err(ArrayError::Twice(pair[0].to_owned())),
+            None => Ok(Array { stations }),
+        }
+    }
+
+    /// Geocentric positions in metres.
+    ///
+    /// # Errors
+    /// If a station has none or stands at the centre of the Earth, which is how eht-imaging marks
+    /// a spacecraft: orbits are not supported.
+    pub fn positions(&self) -> Result<Vec<[f64; 3]>, ArrayError> {
+        self.stations.iter().map(position).collect()
+    }
+}
+
+fn position(station: &Station) -> Result<[f64; 3], ArrayError> {
+    let unfit = |message: &str| {
+        Err(ArrayError::Unfit { name: station.name.clone(), message: message.to_owned() })
+    };
+    match station.position {
+        None => unfit("its position is not known"),
+        Some([0.0, 0.0, 0.0]) => {
+            unfit("position 0 0 0 marks a spacecraft: orbits are not supported")
+        }
+        Some(position) => Ok(position),
+    }
+}

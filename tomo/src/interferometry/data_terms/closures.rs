@@ -1,0 +1,132 @@
+//! Closure phases and log closure amplitudes, with the covariance of those that share baselines.
+
+use super::{DataTerm, DataTermError};
+use crate::interferometry::observation::Observation;
+use crate::interferometry::operator::Real;
+use crate::interferometry::products::{ClosureKind, ClosureSet};
+use core::f64::consts::{PI, TAU};
+use nalgebra::DMatrix;
+use num_complex::Complex;
+
+/// χ² = Σ over scans of rᵀ C⁻¹ r, with residuals r of closure quantities (phases in (−π, π]) and
+/// their covariance C.
+#[derive(Debug, Clone)]
+pub struct ClosureTerm<T> {
+    kind: ClosureKind,
+    visibilities: usize,
+    scans: Vec<Scan<T>>,
+}
+
+#[derive(Debug, Clone)]
+struct Scan<T> {
+    /// Visibilities and signs of each quantity.
+    legs: Vec<Vec<(usize, T)>>,
+    data: Vec<T>,
+    /// C⁻¹, row after row.
+    precision: Vec<T>,
+}
+
+impl<T: Real> ClosureTerm<T> {
+    /// Of an observation's Stokes I: in every scan a largest set of independent quantities, from
+    /// baselines stronger than `least_snr` times their noise.
+    ///
+    /// # Errors
+    /// If there are none.
+    pub fn new(
+        observation: &Observation,
+        kind: ClosureKind,
+        least_snr: f64,
+    ) -> Result<Self, DataTermError> {
+        let sets = ClosureSet::of(observation, kind, least_snr);
+        if sets.is_empty() {
+            return Err(DataTermError::Empty);
+        }
+        let scans = sets.iter().map(Scan::new).collect::<Result<_, _>>()?;
+        Ok(ClosureTerm { kind, visibilities: observation.stokes_i().count(), scans })
+    }
+}
+
+impl<T: Real> Scan<T> {
+    fn new(set: &ClosureSet) -> Result<Self, DataTermError> {
+        let n = set.closures.len();
+        let covariance = DMatrix::from_row_slice(n, n, &set.covariance);
+        let inverse = covariance.cholesky().ok_or(DataTermError::Singular(set.time_h))?.inverse();
+        let legs = |c: &crate::interferometry::products::Closure| {
+            c.legs.iter().map(|leg| (leg.visibility, T::of(leg.sign.into()))).collect()
+        };
+        Ok(Scan {
+            legs: set.closures.iter().map(legs).collect(),
+            data: set.closures.iter().map(|c| T::of(c.value)).collect(),
+            // Symmetric: columns are rows.
+            precision: inverse.iter().map(|x| T::of(*x)).collect(),
+        })
+    }
+
+    /// Residuals of the quantities.
+    fn residuals(&self, kind: ClosureKind, model: &[Complex<T>]) -> Vec<T> {
+        let of = |visibility: usize| match kind {
+            ClosureKind::Phase => model[visibility].arg(),
+            ClosureKind::LogAmplitude => model[visibility].norm().ln(),
+        };
+        self.legs
+            .iter()
+            .zip(&self.data)
+            .map(|(legs, datum)| {
+                let sum: T = legs.iter().map(|(v, sign)| *sign * of(*v)).sum();
+                match kind {
+                    ClosureKind::Phase => wrapped(sum - *datum),
+                    ClosureKind::LogAmplitude => sum - *datum,
+                }
+            })
+            .collect()
+    }
+}
+
+/// The same angle in [−π, π].
+fn wrapped<T: Real>(angle: T) -> T {
+    let turns = (angle / T::of(TAU)).round();
+    (angle - turns * T::of(TAU)).max(T::of(-PI)).min(T::of(PI))
+}
+
+impl<T: Real> DataTerm<T> for ClosureTerm<T> {
+    fn visibilities(&self) -> usize {
+        self.visibilities
+    }
+
+    fn degrees_of_freedom(&self) -> usize {
+        self.scans.iter().map(|scan| scan.data.len()).sum()
+    }
+
+    /// Where a visibility of the model is 0 its phase and logarithm mean nothing: the value is
+    /// then infinite or arbitrary, the gradient leaves that visibility out.
+    fn value_and_gradient(
+        &self,
+        model: &[Complex<T>],
+        weight: T,
+        gradient: &mut [Complex<T>],
+    ) -> f64 {
+        assert_eq!((model.len(), gradient.len()), (self.visibilities, self.visibilities));
+        let mut total = 0.0;
+        for scan in &self.scans {
+            let residuals = scan.residuals(self.kind, model);
+            let rows = scan.precision.chunks_exact(residuals.len());
+            for ((row, residual), legs) in rows.zip(&residuals).zip(&scan.legs) {
+                let pull: T = row.iter().zip(&residuals).map(|(p, r)| *p * *r).sum();
+                total += (*residual * pull).double();
+                for (v, sign) in legs {
+                    let squared = model[*v].norm_sqr();
+                    if squared > T::zero() {
+                        // d arg V = Re(conj(iV) dV)/|V|², d ln|V| = Re(conj(V) dV)/|V|².
+                        let direction = match self.kind {
+                            ClosureKind::Phase => Complex::new(-model[*v].im, model[*v].re),
+                            ClosureKind::LogAmplitude => model[*v],
+                        };
+                        let factor = (weight + weight) * pull * *sign / squared;
+                        gradient[*v] += direction.scale(factor);
+                    }
+                }
+            }
+        }
+        total
+    }
+}

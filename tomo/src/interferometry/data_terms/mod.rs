@@ -1,0 +1,63 @@
+//! How far model visibilities are from data: χ² and its gradient. A data term sees visibilities,
+//! never images; an [`Operator`](super::operator::Operator) carries the gradient on.
+
+mod closures;
+mod visibilities;
+
+pub use closures::ClosureTerm;
+pub use visibilities::{AmplitudeTerm, VisibilityTerm};
+
+use super::observation::{Measured, Observation};
+use super::operator::Real;
+use num_complex::Complex;
+
+/// Why data make no term.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DataTermError {
+    /// A datum without a positive finite error.
+    #[error("datum {index}: sigma = {sigma} Jy is not allowed: positive and finite")]
+    Sigma {
+        /// Which datum, counted from 0.
+        index: usize,
+        /// Its error.
+        sigma: f64,
+    },
+    /// Nothing to compare with.
+    #[error("there are no data for this term")]
+    Empty,
+    /// Closure quantities that depend on each other.
+    #[error("the covariance of closure quantities at {0} h UTC is singular")]
+    Singular(f64),
+}
+
+/// A χ² of model visibilities.
+pub trait DataTerm<T: Real>: Sync {
+    /// How many visibilities it expects.
+    fn visibilities(&self) -> usize;
+
+    /// How many real data it compares with: χ² of the true model has this mean.
+    fn degrees_of_freedom(&self) -> usize;
+
+    /// χ², and adds `weight` times its gradient g to `gradient`, where dχ² = Re Σ ḡ dV: what
+    /// [`Operator::adjoint`](super::operator::Operator::adjoint) takes.
+    fn value_and_gradient(
+        &self,
+        model: &[Complex<T>],
+        weight: T,
+        gradient: &mut [Complex<T>],
+    ) -> f64;
+}
+
+/// Stokes I of an observation, in order, with errors fit for a χ².
+fn checked(observation: &Observation) -> Result<Vec<Measured>, DataTermError> {
+    let data: Vec<Measured> = observation.stokes_i().map(|(_, i)| i).collect();
+    let bad = data.iter().position(|m| !(m.noise_sigma > 0.0 && m.noise_sigma.is_finite()));
+    match bad {
+        Some(index) => Err(DataTermError::Sigma { index, sigma: data[index].noise_sigma }),
+        None if data.is_empty() => Err(DataTermError::Empty),
+        None => Ok(data),
+    }
+}
+
+#[cfg(test)]
+mod tests;

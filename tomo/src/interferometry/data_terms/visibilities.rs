@@ -1,0 +1,108 @@
+//! Complex visibilities, and amplitudes.
+
+use super::{DataTerm, DataTermError, checked};
+use crate::interferometry::observation::Observation;
+use crate::interferometry::operator::Real;
+use crate::interferometry::products::debiased_amplitude;
+use num_complex::Complex;
+
+/// χ² = Σ |V − V_data|²/σ².
+#[derive(Debug, Clone)]
+pub struct VisibilityTerm<T> {
+    data: Vec<Complex<T>>,
+    inverse_variance: Vec<T>,
+}
+
+impl<T: Real> VisibilityTerm<T> {
+    /// Of the Stokes I of an observation, in its order.
+    ///
+    /// # Errors
+    /// If there are none, or an error is not positive.
+    pub fn new(observation: &Observation) -> Result<Self, DataTermError> {
+        let data = checked(observation)?;
+        let value = |v: Complex<f64>| Complex::new(T::of(v.re), T::of(v.im));
+        Ok(VisibilityTerm {
+            inverse_variance: data.iter().map(|m| T::of(m.noise_sigma.powi(-2))).collect(),
+            data: data.iter().map(|m| value(m.visibility)).collect(),
+        })
+    }
+}
+
+impl<T: Real> DataTerm<T> for VisibilityTerm<T> {
+    fn visibilities(&self) -> usize {
+        self.data.len()
+    }
+
+    fn degrees_of_freedom(&self) -> usize {
+        2 * self.data.len()
+    }
+
+    fn value_and_gradient(
+        &self,
+        model: &[Complex<T>],
+        weight: T,
+        gradient: &mut [Complex<T>],
+    ) -> f64 {
+        assert_eq!((model.len(), gradient.len()), (self.data.len(), self.data.len()));
+        let mut total = 0.0;
+        for (k, gradient) in gradient.iter_mut().enumerate() {
+            let residual = model[k] - self.data[k];
+            let scaled = residual.scale(self.inverse_variance[k]);
+            total += (residual.conj() * scaled).re.double();
+            *gradient += scaled.scale(weight + weight);
+        }
+        total
+    }
+}
+
+/// χ² = Σ (|V| − A)²/σ² with debiased amplitudes A.
+#[derive(Debug, Clone)]
+pub struct AmplitudeTerm<T> {
+    data: Vec<T>,
+    inverse_variance: Vec<T>,
+}
+
+impl<T: Real> AmplitudeTerm<T> {
+    /// Of the Stokes I of an observation, in its order.
+    ///
+    /// # Errors
+    /// If there are none, or an error is not positive.
+    pub fn new(observation: &Observation) -> Result<Self, DataTermError> {
+        let data = checked(observation)?;
+        Ok(AmplitudeTerm {
+            inverse_variance: data.iter().map(|m| T::of(m.noise_sigma.powi(-2))).collect(),
+            data: data.iter().map(|m| T::of(debiased_amplitude(m))).collect(),
+        })
+    }
+}
+
+impl<T: Real> DataTerm<T> for AmplitudeTerm<T> {
+    fn visibilities(&self) -> usize {
+        self.data.len()
+    }
+
+    fn degrees_of_freedom(&self) -> usize {
+        self.data.len()
+    }
+
+    /// At V = 0, where |V| has a kink, the gradient is 0.
+    fn value_and_gradient(
+        &self,
+        model: &[Complex<T>],
+        weight: T,
+        gradient: &mut [Complex<T>],
+    ) -> f64 {
+        assert_eq!((model.len(), gradient.len()), (self.data.len(), self.data.len()));
+        let mut total = 0.0;
+        for (k, gradient) in gradient.iter_mut().enumerate() {
+            let amplitude = model[k].norm();
+            let residual = amplitude - self.data[k];
+            let scaled = residual * self.inverse_variance[k];
+            total += (residual * scaled).double();
+            if amplitude > T::zero() {
+                *gradient += model[k].scale((weight + weight) * scaled / amplitude);
+            }
+        }
+        total
+    }
+}

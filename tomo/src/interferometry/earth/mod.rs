@@ -1,0 +1,39 @@
+//! The turning Earth: sidereal time, and baselines as a source sees them.
+
+mod sidereal;
+mod ut1;
+mod view;
+
+pub use sidereal::{Moment, gmst_hours, hours_utc_of_gmst};
+pub use ut1::{Ut1, ut1_minus_utc};
+pub use view::{Frame, SourcePosition, View};
+
+/// Why the Earth's attitude is not known.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum EarthError {
+    /// A day outside the built-in table of UT1 − UTC.
+    #[error(
+        "UT1 - UTC at MJD {mjd} is not in the built-in table (MJD {first} to {last}): give its value"
+    )]
+    Ut1Unknown {
+        /// The day asked for.
+        mjd: f64,
+        /// First day of the table.
+        first: i32,
+        /// Last day of the table.
+        last: i32,
+    },
+    /// A day for which leap seconds are not known.
+    #[error("MJD = {0} is not allowed: days from 41317 (1972) to 90000 (2105)")]
+    Day(f64),
+    /// A source that is nowhere on the sky.
+    #[error("{name} = {value} is not allowed: {allowed}")]
+    Source {
+        /// Right ascension or declination.
+        name: &'static str,
+        /// What was given.
+        value: f64,
+        /// What would be allowed.
+        allowed: &'static str,
+    },
+}

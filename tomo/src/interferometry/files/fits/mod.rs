@@ -1,0 +1,63 @@
+//! What UVFITS needs of the FITS standard (version 4.0, Pence et al. 2010 and the IAU FITS
+//! Working Group): headers, and binary tables. Written for files that may be damaged: every size
+//! is checked against the bytes that there are before anything is done with it.
+
+mod header;
+mod table;
+mod writer;
+
+pub use header::Header;
+pub use table::Table;
+pub use writer::{Cards, ColumnData, binary_table, padded};
+
+use super::FileError;
+
+/// FITS files are made of blocks of this many bytes.
+pub const BLOCK: usize = 2880;
+/// A line of a header.
+pub const CARD: usize = 80;
+
+/// A header and the data behind it.
+pub struct Unit<'a> {
+    /// The header.
+    pub header: Header<'a>,
+    /// Its data, without the padding.
+    pub data: &'a [u8],
+    /// Where the data start in the file.
+    pub offset: usize,
+    /// Where the next unit starts.
+    pub next: usize,
+}
+
+impl<'a> Unit<'a> {
+    /// The unit that starts at `offset`.
+    pub fn read(bytes: &'a [u8], offset: usize) -> Result<Self, FileError> {
+        let (header, start) = Header::read(bytes, offset)?;
+        let size = header.data_size()?;
+        let rest = bytes.len() - start;
+        let padded = size.checked_next_multiple_of(BLOCK).filter(|padded| *padded <= rest);
+        let Some(padded) = padded else {
+            return Err(FileError::byte(
+                start,
+                format!("the header tells of {size} bytes of data, the file has {rest}"),
+            ));
+        };
+        let data = &bytes[start..start + size];
+        Ok(Unit { header, data, offset: start, next: start + padded })
+    }
+}
+
+/// All units of a file.
+pub fn units(bytes: &[u8]) -> Result<Vec<Unit<'_>>, FileError> {
+    if bytes.is_empty() {
+        return Err(FileError::whole("the file is empty"));
+    }
+    let mut units = Vec::new();
+    let mut offset = 0;
+    while offset < bytes.len() {
+        let unit = Unit::read(bytes, offset)?;
+        offset = unit.next;
+        units.push(unit);
+    }
+    Ok(units)
+}

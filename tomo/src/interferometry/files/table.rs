@@ -1,0 +1,187 @@
+//! Tables of total intensity, a visibility a line, columns separated by commas or blanks and told
+//! by a line of names: kerrlight's CSV, and the csv and txt of the EHT's public releases.
+
+use super::{FileError, Names, number, sigma};
+use crate::interferometry::Complex64;
+use crate::interferometry::observation::{Basis, Measured, Observation, Row};
+use core::fmt::Write;
+
+/// Columns of kerrlight's CSV: hours of UTC, stations, (u, v) in wavelengths, real and imaginary
+/// part in Jy, and the standard deviation of each.
+pub const COLUMNS: [&str; 8] = ["time_utc_h", "t1", "t2", "u", "v", "re", "im", "sigma"];
+
+/// The same in the EHT's releases, with amplitude in Jy and phase in degrees.
+const EHT_COLUMNS: [&str; 8] =
+    ["time(UTC)", "T1", "T2", "U(lambda)", "V(lambda)", "Iamp(Jy)", "Iphase(d)", "Isigma(Jy)"];
+
+/// Cells of a line; more than anyone writes are not looked at.
+fn cells(line: &str) -> Vec<&str> {
+    let separate = |c: char| c == ',' || c.is_whitespace();
+    if line.contains(',') {
+        line.split(',').map(str::trim).take(64).collect()
+    } else {
+        line.split(separate).filter(|cell| !cell.is_empty()).take(64).collect()
+    }
+}
+
+/// Where the eight columns are, and whether visibilities are polar.
+struct Heading {
+    columns: [usize; 8],
+    polar: bool,
+}
+
+impl Heading {
+    fn find(names: &[&str]) -> Option<Self> {
+        [(COLUMNS, false), (EHT_COLUMNS, true)].into_iter().find_map(|(wanted, polar)| {
+            let at = |name: &str| names.iter().position(|n| n.eq_ignore_ascii_case(name));
+            let found: Option<Vec<usize>> = wanted.iter().map(|name| at(name)).collect();
+            Some(Heading { columns: found?.try_into().ok()?, polar })
+        })
+    }
+}
+
+/// Reads a table.
+///
+/// # Errors
+/// If no line names the columns of either kind, or a line of data has too few of them or no
+/// number where one belongs.
+pub fn parse(text: &str) -> Result<Observation, FileError> {
+    let mut observation = Observation::empty(Basis::Stokes);
+    let mut names = Names::new(Vec::new());
+    let mut heading = None;
+    observation.rows = Vec::with_capacity(super::rows_at_most(text));
+    for (index, line) in text.lines().enumerate() {
+        let located = |message: String| FileError::line(index + 1, message);
+        let bare = line.trim_start_matches('#');
+        if heading.is_none() && (bare.len() < line.len() || index == 0) {
+            heading = Heading::find(&cells(bare.trim()));
+            read_facts(bare, &mut observation).map_err(located)?;
+            if bare.len() < line.len() || heading.is_some() {
+                continue;
+            }
+        }
+        if line.starts_with('#') || line.trim().is_empty() {
+            continue;
+        }
+        let Some(heading) = &heading else {
+            return Err(located(format!("data before a line that names {}", COLUMNS.join(", "))));
+        };
+        let row = row(&cells(line), heading, &mut names).map_err(located)?;
+        observation.rows.push(row);
+    }
+    if heading.is_none() {
+        return Err(FileError::whole(format!("no line names the columns {}", COLUMNS.join(", "))));
+    }
+    if observation.rows.is_empty() {
+        return Err(FileError::whole("no visibilities"));
+    }
+    observation.stations = names.stations;
+    Ok(observation)
+}
+
+/// `SRC:M87 DATE(MJD):57853 FREQ:229.0707GHz` of the EHT's tables.
+fn read_facts(line: &str, observation: &mut Observation) -> Result<(), String> {
+    for cell in cells(line) {
+        if let Some(source) = cell.strip_prefix("SRC:") {
+            observation.source = source.to_owned();
+        } else if let Some(mjd) = cell.strip_prefix("DATE(MJD):") {
+            let value = number(mjd, "DATE(MJD)")?;
+            if !(0.0..=1e6).contains(&value) {
+                return Err(format!("DATE(MJD) = {value} is not allowed: [0, 1e6]"));
+            }
+            observation.mjd = Some(value.floor() as i32);
+        } else if let Some(frequency) = cell.strip_prefix("FREQ:") {
+            let value = number(frequency.trim_end_matches("GHz"), "FREQ")?;
+            observation.frequency_hz = Some(value * 1e9).filter(|f| *f > 0.0);
+        }
+    }
+    Ok(())
+}
+
+fn row(cells: &[&str], heading: &Heading, names: &mut Names) -> Result<Row, String> {
+    let cell = |k: usize| {
+        let column = heading.columns[k];
+        cells
+            .get(column)
+            .copied()
+            .ok_or_else(|| format!("{} columns: column {} is missing", cells.len(), column + 1))
+    };
+    let value = |k: usize| number(cell(k)?, COLUMNS[k]);
+    let stations = [names.number(cell(1)?)?, names.number(cell(2)?)?];
+    if stations[0] == stations[1] {
+        return Err(format!("a baseline of station {} with itself", cell(1)?));
+    }
+    let (first, second) = (value(5)?, value(6)?);
+    let visibility = if heading.polar {
+        Complex64::from_polar(first, second.to_radians())
+    } else {
+        Complex64::new(first, second)
+    };
+    let noise_sigma = sigma(cell(7)?, "sigma")?;
+    if noise_sigma.is_nan() {
+        return Err("sigma = nan is not allowed: 0 or positive".to_owned());
+    }
+    let i = Measured { visibility, noise_sigma };
+    Ok(Row::total_intensity(value(0)?, stations, [value(3)?, value(4)?], i))
+}
+
+/// Stokes I of every row that has it, as kerrlight's CSV, numbers with all their digits.
+pub fn to_csv(observation: &Observation) -> String {
+    let mut text = COLUMNS.join(",") + "\n";
+    for (row, i) in observation.stokes_i() {
+        let [t1, t2] = observation.names(row);
+        let Row { time_h, uv: [u, v], .. } = row;
+        let Measured { visibility, noise_sigma } = i;
+        // Writing into a string cannot fail.
+        let _ = writeln!(
+            text,
+            "{time_h},{t1},{t2},{u},{v},{},{},{noise_sigma}",
+            visibility.re, visibility.im
+        );
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EHT: &str = "# SRC:M87 DATE(MJD):57853 FREQ:229.0707GHz\n\
+        # time(UTC)  T1  T2  U(lambda)  V(lambda)  Iamp(Jy)  Iphase(d)  Isigma(Jy)\n\
+        02.15138894  AA  LM  1868288384.0000  -3689129984.0000  0.01103669  -122.7523  0.00446794\n";
+
+    #[test]
+    fn exact_txt_and_csv_of_the_eht() {
+        let csv = "#SRC:M87,DATE(MJD):57853,FREQ:229.0707GHz\n\
+            #time(UTC),T1,T2,U(lambda),V(lambda),Iamp(Jy),Iphase(d),Isigma(Jy)\n\
+            02.15138894,AA,LM,1868288384.0000,-3689129984.0000,0.01103669,-122.7523,0.00446794\n";
+        let observation = parse(EHT).unwrap();
+        // Products that are not there have an error of NaN, which is equal to nothing.
+        assert_eq!(format!("{:?}", parse(csv).unwrap()), format!("{observation:?}"));
+        assert_eq!((observation.source.as_str(), observation.mjd), ("M87", Some(57853)));
+        let i = observation.rows[0].product(0).unwrap();
+        assert!((i.visibility.arg().to_degrees() + 122.7523).abs() < 1e-12);
+        assert_eq!(observation.names(&observation.rows[0]), ["AA", "LM"]);
+    }
+
+    #[test]
+    fn exact_round_trip() {
+        let observation = parse(EHT).unwrap();
+        let back = parse(&to_csv(&observation)).unwrap();
+        assert_eq!(format!("{:?}", back.rows), format!("{:?}", observation.rows));
+    }
+
+    #[test]
+    fn exact_errors_name_the_line() {
+        let fail = |text: &str| parse(text).unwrap_err().to_string();
+        assert!(fail("").contains("time_utc_h"));
+        assert!(fail("a,b\n1,2\n").contains("time_utc_h"));
+        let head = COLUMNS.join(",");
+        assert!(fail(&head).contains("no visibilities"));
+        assert!(fail(&format!("{head}\n1,A,B,1,2,3,4\n")).starts_with("line 2: 7 columns"));
+        assert!(fail(&format!("{head}\n1,A,B,1,2,x,4,5\n")).contains("line 2: re `x`"));
+        assert!(fail(&format!("{head}\n1,A,A,1,2,3,4,5\n")).contains("with itself"));
+        assert!(fail(&format!("{head}\n1,A,B,1,2,3,4,-5\n")).contains("sigma = -5"));
+        assert!(fail(&format!("{head}\n1,A,B,inf,2,3,4,5\n")).contains("u = inf"));
+    }
+}

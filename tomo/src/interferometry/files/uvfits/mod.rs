@@ -1,0 +1,12 @@
+//! UVFITS: visibilities as random groups of a FITS file, stations in an `AIPS AN` table (AIPS
+//! memo 117, Greisen 2003/2020).
+
+mod antennas;
+mod layout;
+mod read;
+#[cfg(test)]
+pub(super) mod tests;
+mod write;
+
+pub use read::read;
+pub use write::write;

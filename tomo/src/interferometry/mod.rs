@@ -1,0 +1,22 @@
+//! What an array of radio telescopes sees of an image, and the files that arrays left.
+//!
+//! Data flow: [`mod@array`] (stations) → [`earth`] (sidereal time, projected baselines) →
+//! [`schedule`] (when, and which baselines) → [`observation`] (visibilities with errors) ↔ [`files`]. [`simulate`]
+//! fills them from images through an [`operator`], [`noise`] spoils them,
+//! [`products`] are what gains leave, [`data_terms`] compare them with a model.
+//! Units are those of the field: metres, Jy, hours of UTC, wavelengths, degrees where a name says
+//! so.
+
+pub mod array;
+pub mod data_terms;
+pub mod earth;
+pub mod files;
+pub mod noise;
+pub mod observation;
+pub mod operator;
+pub mod products;
+pub mod schedule;
+pub mod simulate;
+
+/// Complex number of double precision, as visibilities are kept.
+pub type Complex64 = num_complex::Complex<f64>;

@@ -1,0 +1,231 @@
+//! Visibilities with their errors: what an array has measured, or would.
+
+mod average;
+mod select;
+
+pub use select::{Flags, Selection};
+
+use super::Complex64;
+use super::array::Station;
+use super::earth::SourcePosition;
+
+/// What the four products of a row are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Basis {
+    /// Correlations of circular feeds: RR, LL, RL, LR.
+    Circular,
+    /// Stokes parameters: I, Q, U, V.
+    Stokes,
+}
+
+/// A baseline at one time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Row {
+    /// Hours of UTC since 0 h of the observation's day.
+    pub time_h: f64,
+    /// Integration time in seconds; 0 where a file does not tell.
+    pub integration_s: f64,
+    /// Indices of the two stations.
+    pub stations: [u16; 2],
+    /// (position₁ − position₂)/wavelength along east and north of the source.
+    pub uv: [f64; 2],
+    /// The four products in Jy, in the order of [`Basis`].
+    pub products: [Complex64; 4],
+    /// Standard deviation in Jy of each product's real part, and of its imaginary part; NaN where
+    /// there is no such product.
+    pub noise_sigma: [f64; 4],
+    /// Zenith opacities at the stations; 0 where a file does not tell.
+    pub opacity: [f32; 2],
+}
+
+/// A complex visibility with its error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured {
+    /// Visibility in Jy.
+    pub visibility: Complex64,
+    /// Standard deviation in Jy of its real part, and of its imaginary part.
+    pub noise_sigma: f64,
+}
+
+impl Row {
+    /// A row of Stokes I only.
+    pub fn total_intensity(time_h: f64, stations: [u16; 2], uv: [f64; 2], i: Measured) -> Self {
+        let none = Complex64::new(0.0, 0.0);
+        Row {
+            time_h,
+            integration_s: 0.0,
+            stations,
+            uv,
+            products: [i.visibility, none, none, none],
+            noise_sigma: [i.noise_sigma, f64::NAN, f64::NAN, f64::NAN],
+            opacity: [0.0; 2],
+        }
+    }
+
+    /// Product `k`, if there is one.
+    pub fn product(&self, k: usize) -> Option<Measured> {
+        let noise_sigma = self.noise_sigma[k];
+        let visibility = self.products[k];
+        (!noise_sigma.is_nan()).then_some(Measured { visibility, noise_sigma })
+    }
+
+    /// Stokes I: the mean of both parallel hands, or the one that there is.
+    pub fn stokes_i(&self, basis: Basis) -> Option<Measured> {
+        match (basis, self.product(0), self.product(1)) {
+            (Basis::Stokes, i, _) => i,
+            (Basis::Circular, Some(rr), Some(ll)) => Some(Measured {
+                visibility: 0.5 * (rr.visibility + ll.visibility),
+                noise_sigma: 0.5 * rr.noise_sigma.hypot(ll.noise_sigma),
+            }),
+            (Basis::Circular, rr, ll) => rr.or(ll),
+        }
+    }
+
+    /// The same measurement with the stations in the other order: (u, v) is negated, visibilities
+    /// are conjugated, and what was RL is LR, its error too.
+    #[must_use]
+    pub fn swapped(&self, basis: Basis) -> Self {
+        let mut row = *self;
+        row.stations.reverse();
+        row.opacity.reverse();
+        row.uv = row.uv.map(|x| -x);
+        row.products = row.products.map(|v| v.conj());
+        if basis == Basis::Circular {
+            row.products.swap(2, 3);
+            row.noise_sigma.swap(2, 3);
+        }
+        row
+    }
+}
+
+/// What an array has measured of a source. Text tables of visibilities do not hold everything:
+/// what is not known is `None`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Observation {
+    /// Name of the source.
+    pub source: String,
+    /// Where it is.
+    pub position: Option<SourcePosition>,
+    /// Modified Julian date whose 0 h UTC the rows' times count from.
+    pub mjd: Option<i32>,
+    /// Frequency in Hz that (u, v) are counted in wavelengths of.
+    pub frequency_hz: Option<f64>,
+    /// Bandwidth in Hz.
+    pub bandwidth_hz: Option<f64>,
+    /// What the rows' products are.
+    pub basis: Basis,
+    /// The stations that rows point to.
+    pub stations: Vec<Station>,
+    /// The measurements.
+    pub rows: Vec<Row>,
+    /// How the data came about, in lines of text.
+    pub history: Vec<String>,
+}
+
+/// A metadatum that an operation needs and the observation does not hold.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("the data do not hold {0}: it has to be given")]
+pub struct Unknown(pub &'static str);
+
+impl Observation {
+    /// No data of nothing.
+    pub fn empty(basis: Basis) -> Self {
+        Observation {
+            source: String::new(),
+            position: None,
+            mjd: None,
+            frequency_hz: None,
+            bandwidth_hz: None,
+            basis,
+            stations: Vec::new(),
+            rows: Vec::new(),
+            history: Vec::new(),
+        }
+    }
+
+    /// Names of a row's stations.
+    pub fn names(&self, row: &Row) -> [&str; 2] {
+        row.stations.map(|k| self.stations[usize::from(k)].name.as_str())
+    }
+
+    /// Rows of total intensity with their Stokes I.
+    pub fn stokes_i(&self) -> impl Iterator<Item = (&Row, Measured)> {
+        self.rows.iter().filter_map(|row| Some((row, row.stokes_i(self.basis)?)))
+    }
+
+    /// Puts rows in order of time and then of baseline, stations of each in the array's order.
+    pub fn sort(&mut self) {
+        for row in &mut self.rows {
+            if row.stations[0] > row.stations[1] {
+                *row = row.swapped(self.basis);
+            }
+        }
+        self.rows.sort_by(|a, b| a.time_h.total_cmp(&b.time_h).then(a.stations.cmp(&b.stations)));
+    }
+
+    /// The data as Stokes I only, of every row that has it.
+    #[must_use]
+    pub fn total_intensity(&self) -> Self {
+        let rows = self
+            .stokes_i()
+            .map(|(row, i)| Row {
+                integration_s: row.integration_s,
+                opacity: row.opacity,
+                ..Row::total_intensity(row.time_h, row.stations, row.uv, i)
+            })
+            .collect();
+        Observation { basis: Basis::Stokes, rows, ..self.clone_without_rows() }
+    }
+
+    pub(super) fn clone_without_rows(&self) -> Self {
+        Observation {
+            rows: Vec::new(),
+            source: self.source.clone(),
+            stations: self.stations.clone(),
+            history: self.history.clone(),
+            ..*self
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row() -> Row {
+        let c = Complex64::new;
+        Row {
+            products: [c(1.0, 2.0), c(3.0, -4.0), c(5.0, 6.0), c(7.0, 8.0)],
+            noise_sigma: [0.1, 0.2, 0.3, 0.4],
+            opacity: [0.5, 0.6],
+            ..Row::total_intensity(
+                4.0,
+                [0, 1],
+                [10.0, -20.0],
+                Measured { visibility: c(0.0, 0.0), noise_sigma: 1.0 },
+            )
+        }
+    }
+
+    #[test]
+    fn exact_swapping_keeps_errors_with_their_products() {
+        let swapped = row().swapped(Basis::Circular);
+        assert_eq!(swapped.products[2], Complex64::new(7.0, -8.0));
+        assert_eq!(swapped.noise_sigma, [0.1, 0.2, 0.4, 0.3]);
+        assert_eq!((swapped.uv, swapped.opacity), ([-10.0, 20.0], [0.6, 0.5]));
+        assert_eq!(swapped.swapped(Basis::Circular), row());
+        assert_eq!(row().swapped(Basis::Stokes).noise_sigma, row().noise_sigma);
+    }
+
+    #[test]
+    fn exact_stokes_i_of_one_hand_or_both() {
+        let both = row().stokes_i(Basis::Circular).unwrap();
+        assert_eq!(both.visibility, Complex64::new(2.0, -1.0));
+        assert!((both.noise_sigma - 0.05f64.sqrt() / 2.0).abs() < 1e-16);
+        let mut one = row();
+        one.noise_sigma[0] = f64::NAN;
+        assert_eq!(one.stokes_i(Basis::Circular), one.product(1));
+        one.noise_sigma[1] = f64::NAN;
+        assert_eq!(one.stokes_i(Basis::Circular), None);
+    }
+}

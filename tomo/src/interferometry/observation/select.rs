@@ -1,0 +1,82 @@
+//! What to keep of an observation.
+
+use super::{Observation, Row};
+
+/// What is thrown away.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Flags {
+    /// Stations by name, of which no baseline is kept.
+    pub stations: Vec<String>,
+    /// Intervals of UTC hours, ends included.
+    pub times_h: Vec<[f64; 2]>,
+    /// Baselines shorter than this many wavelengths.
+    pub shorter_than: Option<f64>,
+    /// Baselines longer than this many wavelengths.
+    pub longer_than: Option<f64>,
+}
+
+/// What was kept.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Selection {
+    /// The rest.
+    pub observation: Observation,
+    /// How many rows were thrown away.
+    pub dropped: usize,
+}
+
+impl Flags {
+    /// Names that no station of the observation has.
+    pub fn unknown_stations<'a>(&'a self, observation: &Observation) -> Vec<&'a str> {
+        let known = |name: &str| observation.stations.iter().any(|s| s.name == name);
+        self.stations.iter().map(String::as_str).filter(|name| !known(name)).collect()
+    }
+
+    /// The observation without what is flagged. Stations stay in its list.
+    pub fn apply(&self, observation: &Observation) -> Selection {
+        let kept: Vec<Row> =
+            observation.rows.iter().filter(|row| !self.hits(observation, row)).copied().collect();
+        let dropped = observation.rows.len() - kept.len();
+        let observation = Observation { rows: kept, ..observation.clone_without_rows() };
+        Selection { observation, dropped }
+    }
+
+    fn hits(&self, observation: &Observation, row: &Row) -> bool {
+        let length = row.uv[0].hypot(row.uv[1]);
+        observation
+            .names(row)
+            .iter()
+            .any(|name| self.stations.iter().any(|flagged| flagged == name))
+            || self.times_h.iter().any(|[from, to]| (*from..=*to).contains(&row.time_h))
+            || self.shorter_than.is_some_and(|least| length < least)
+            || self.longer_than.is_some_and(|most| length > most)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Basis, Measured};
+    use super::*;
+    use crate::interferometry::{Complex64, array::Station};
+
+    #[test]
+    fn exact_flags_of_every_kind() {
+        let mut all = Observation::empty(Basis::Stokes);
+        all.stations = ["A", "B", "C"].map(Station::named).to_vec();
+        let i = Measured { visibility: Complex64::new(1.0, 0.0), noise_sigma: 0.1 };
+        all.rows = [(1.0, [0, 1], 10.0), (2.0, [0, 2], 100.0), (3.0, [1, 2], 1000.0)]
+            .map(|(time, stations, u)| Row::total_intensity(time, stations, [u, 0.0], i))
+            .to_vec();
+        let kept = |flags: Flags| {
+            let selection = flags.apply(&all);
+            assert_eq!(selection.dropped + selection.observation.rows.len(), 3);
+            selection.observation.rows.iter().map(|row| row.time_h as i32).collect::<Vec<_>>()
+        };
+        assert_eq!(kept(Flags::default()), [1, 2, 3]);
+        assert_eq!(kept(Flags { stations: vec!["A".into()], ..Flags::default() }), [3]);
+        assert_eq!(kept(Flags { times_h: vec![[1.5, 2.0]], ..Flags::default() }), [1, 3]);
+        assert_eq!(kept(Flags { shorter_than: Some(50.0), ..Flags::default() }), [2, 3]);
+        assert_eq!(kept(Flags { longer_than: Some(500.0), ..Flags::default() }), [1, 2]);
+        let odd = Flags { stations: vec!["A".into(), "X".into()], ..Flags::default() };
+        assert_eq!(odd.unknown_stations(&all), ["X"]);
+    }
+}

@@ -1,0 +1,75 @@
+//! Linear measurements of images, each with its exact adjoint, in single and double precision.
+
+mod dtft;
+mod grid;
+mod matrix;
+mod plain;
+
+pub use dtft::Dtft;
+pub use grid::{ImageGrid, Pulse};
+pub use plain::{FullImage, LightCurve};
+
+/// The scalars that operators and data terms compute with.
+pub trait Real:
+    num_traits::Float
+    + num_traits::FromPrimitive
+    + num_traits::NumAssign
+    + core::iter::Sum
+    + core::fmt::Debug
+    + Send
+    + Sync
+    + 'static
+{
+    /// The nearest number of this kind.
+    fn of(x: f64) -> Self;
+    /// As double precision.
+    fn double(self) -> f64;
+}
+
+impl Real for f32 {
+    fn of(x: f64) -> Self {
+        x as f32
+    }
+
+    fn double(self) -> f64 {
+        self.into()
+    }
+}
+
+impl Real for f64 {
+    fn of(x: f64) -> Self {
+        x
+    }
+
+    fn double(self) -> f64 {
+        self
+    }
+}
+
+/// A linear map from movies to data.
+///
+/// A movie is `frames` images one after the other, each of `pixels` values in Jy/pixel, row by row
+/// from the top (north), each row from the left (east).
+pub trait Operator<T: Real>: Sync {
+    /// A number of the data: `T` or `Complex<T>`.
+    type Datum;
+
+    /// Images of a movie.
+    fn frames(&self) -> usize;
+
+    /// Pixels of an image.
+    fn pixels(&self) -> usize;
+
+    /// How many data.
+    fn data(&self) -> usize;
+
+    /// data = F movie; what was in `data` is overwritten.
+    fn forward(&self, movie: &[T], data: &mut [Self::Datum]);
+
+    /// movie += Fᵀ data, the adjoint under the inner products Σ x y of movies and Re Σ x̄ y of
+    /// data.
+    ///
+    /// With the gradient of a function of the data, defined by df = Re Σ ḡ dV, this adds its
+    /// gradient with respect to the pixels.
+    fn adjoint(&self, data: &[Self::Datum], movie: &mut [T]);
+}
