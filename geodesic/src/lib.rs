@@ -30,10 +30,12 @@ mod affine;
 mod readme {}
 
 pub mod analytic;
+mod blocks;
 pub mod bundle;
 mod camera;
 mod columns;
 mod compensated;
+pub mod derivatives;
 mod dual;
 mod error;
 pub mod flow;
