@@ -39,6 +39,7 @@ pub mod derivatives;
 mod dual;
 mod error;
 pub mod flow;
+pub mod footprint;
 mod integrator;
 mod kerr;
 mod mino;
