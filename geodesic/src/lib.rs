@@ -33,6 +33,8 @@ pub mod analytic;
 mod blocks;
 pub mod bundle;
 mod camera;
+#[cfg(feature = "capi")]
+pub mod capi;
 mod columns;
 mod compensated;
 pub mod derivatives;
