@@ -1,10 +1,10 @@
 //! Observers at a finite radius with a local frame and a perspective lens.
 
-use crate::compensated::Double;
 use crate::error::{OutOfRange, check};
 use crate::kerr::Kerr;
 use crate::observer::{Inclination, Ray};
 use crate::radial::RadialPotential;
+use crate::scalar::Elementary;
 
 /// How a local observer moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,69 +81,83 @@ impl Camera {
         self
     }
 
-    /// The photon that arrives at the point (x, y) of the picture plane.
+    /// The hole.
+    pub fn hole(&self) -> &Kerr {
+        &self.hole
+    }
+
+    /// The photon that arrives at the point (x, y) of the picture plane; of
+    /// [`Dual`](crate::Dual) numbers, with its derivatives with respect to them.
     ///
     /// # Errors
-    /// If x or y is not finite, or if the photon has no positive energy at infinity (some
+    /// If x or y is not in \[−1e12, 1e12\], or if the photon has no positive energy at infinity (some
     /// directions inside the ergosphere).
-    pub fn ray(&self, x: f64, y: f64) -> Result<Ray, OutOfRange> {
-        check("x", x, x.is_finite(), "a finite number")?;
-        check("y", y, y.is_finite(), "a finite number")?;
-        let norm = (1.0 + x * x + y * y).sqrt();
-        self.arriving_from([-1.0 / norm, -y / norm, x / norm])
+    pub fn ray<T: Elementary>(&self, x: T, y: T) -> Result<Ray<T>, OutOfRange> {
+        for (field, value) in [("x", x.value()), ("y", y.value())] {
+            check(field, value, value.abs() <= 1e12, "a number in [-1e12, 1e12]")?;
+        }
+        let one = T::constant(1.0);
+        let norm = (one + x * x + y * y).sqrt();
+        self.arriving_from([-one / norm, -y / norm, x / norm])
     }
 
     /// The photon that arrives from the unit vector `direction` = (e_r, e_θ, e_φ) of the
     /// camera's frame.
     ///
     /// # Errors
-    /// As for [`ray`](Self::ray).
-    pub fn arriving_from(&self, direction: [f64; 3]) -> Result<Ray, OutOfRange> {
+    /// If the vector's length is not 1 within 1e-6, or as for [`ray`](Self::ray).
+    pub fn arriving_from<T: Elementary>(&self, direction: [T; 3]) -> Result<Ray<T>, OutOfRange> {
+        let length = direction.iter().map(|d| d.value() * d.value()).sum::<f64>().sqrt();
+        let allowed = "1 (the direction is a unit vector)";
+        check("length of the direction", length, (length - 1.0).abs() < 1e-6, allowed)?;
         let [k_r, k_theta, k_phi] = self.momentum(direction);
-        let a = self.hole.spin();
-        let (s, c) = (self.inclination.sin(), self.inclination.cos());
+        let of = T::constant;
+        let a = of(self.hole.spin());
+        let (s, c) = (of(self.inclination.sin()), of(self.inclination.cos()));
         // p_φ/sin θ and p_θ, for unit energy in the frame of zero angular momentum.
-        let sigma = self.hole.sigma(self.radius, c);
-        let (around, polar) = (k_phi * self.girth, k_theta * sigma.sqrt());
-        let energy = self.lapse + self.drag * s * around;
+        let sigma = self.hole.sigma(self.radius, self.inclination.cos());
+        let (around, polar) = (k_phi * of(self.girth), k_theta * of(sigma.sqrt()));
+        let energy = of(self.lapse) + of(self.drag) * s * around;
         let allowed = "a direction from which light of positive energy arrives";
-        check("energy at infinity", energy, energy > 0.0, allowed)?;
+        check("energy at infinity", energy.value(), energy.value() > 0.0, allowed)?;
         let (around, polar) = (around / energy, polar / energy);
         let angular = around * around + polar * polar - a * a * c * c;
-        let carter = polar * polar + (around - a * s).powi(2);
+        let tilt = around - a * s;
+        let carter = polar * polar + tilt * tilt;
         let eta = polar * polar + c * c * (around - a) * (around + a);
-        let coefficients = [a * a - angular, 2.0 * carter, -a * a * eta].map(Double::from);
-        let horizon = Double::from(1.0 / self.hole.horizon());
+        let coefficients = [a * a - angular, of(2.0) * carter, -(a * a * eta)].map(T::widen);
+        let horizon = of(1.0 / self.hole.horizon()).widen();
         Ok(Ray {
             lambda: s * around,
             eta,
             angular,
-            position: [s, 0.0, c],
+            position: [s, of(0.0), c],
             // Backward: −(p_θ ê_θ + p_φ/sin θ ê_φ).
-            velocity: [-polar * c, -around, polar * s],
-            rotation_sign: if around > 0.0 { -1.0 } else { 1.0 },
+            velocity: [-(polar * c), -around, polar * s],
+            rotation_sign: if around.value() > 0.0 { -1.0 } else { 1.0 },
             azimuth: self.azimuth,
             inverse_radius: 1.0 / self.radius,
-            inward: k_r > 0.0,
-            potential: RadialPotential::new(coefficients, horizon).narrow(|x| x.hi),
+            inward: k_r.value() > 0.0,
+            potential: RadialPotential::new(coefficients, horizon).narrow(T::narrow),
         })
     }
 
     /// Spatial momentum of the arriving photon in the frame of zero angular momentum, for
     /// unit energy there.
-    fn momentum(&self, direction: [f64; 3]) -> [f64; 3] {
+    fn momentum<T: Elementary>(&self, direction: [T; 3]) -> [T; 3] {
         let [v_r, v_phi] = self.velocity;
         let square = v_r * v_r + v_phi * v_phi;
         let p = direction.map(|d| -d);
         if square == 0.0 {
             return p;
         }
+        let of = T::constant;
         let gamma = 1.0 / (1.0 - square).sqrt();
-        let along = v_r * p[0] + v_phi * p[2];
-        let energy = gamma * (1.0 + along);
+        let along = of(v_r) * p[0] + of(v_phi) * p[2];
+        let energy = of(gamma) * (of(1.0) + along);
         // p + [(γ − 1)(v·p)/v² + γ] v for unit energy in the camera's frame.
-        let factor = (gamma - 1.0) * along / square + gamma;
-        [p[0] + factor * v_r, p[1], p[2] + factor * v_phi].map(|k| k / energy)
+        let factor = of(gamma - 1.0) * along / of(square) + of(gamma);
+        [p[0] + factor * of(v_r), p[1], p[2] + factor * of(v_phi)].map(|k| k / energy)
     }
 
     /// ν in the camera's frame over ν at infinity, for the photon that arrives from

@@ -3,6 +3,7 @@
 use crate::kerr::Kerr;
 use crate::path::{Outcome, PathPoint};
 use crate::request::Request;
+use crate::sampling::{Sink, Summary};
 use crate::uncertainty::Uncertainty;
 
 /// Points of many rays in columns, ray after ray. Columns that were not asked for are empty.
@@ -27,13 +28,12 @@ pub struct Points {
 }
 
 impl Points {
-    /// The places in the columns of the points of ray number `ray`.
-    ///
-    /// # Panics
-    /// If there is no such ray.
+    /// The places in the columns of the points of ray number `ray`: none if there is no such
+    /// ray.
     pub fn of(&self, ray: usize) -> core::ops::Range<usize> {
-        let start = if ray == 0 { 0 } else { self.ends[ray - 1] };
-        start..self.ends[ray]
+        let end = |ray: usize| self.ends.get(ray).copied().unwrap_or(self.radius.len());
+        let start = ray.checked_sub(1).map_or(0, end);
+        start..end(ray)
     }
 
     /// Number of points of all rays.
@@ -119,5 +119,36 @@ impl Bundle {
         self.crossings.append(other.crossings);
         self.samples.append(other.samples);
         self.uncertainty.extend(other.uncertainty);
+    }
+}
+
+impl Sink<f64> for Bundle {
+    fn summary(&mut self, summary: Summary<f64>) {
+        self.outcome.push(summary.outcome);
+        self.mino_total.push(summary.total.unwrap_or(f64::NAN));
+        self.turning_radius.push(summary.turning_radius.unwrap_or(f64::NAN));
+        self.crossing_count.push(summary.crossing_count);
+    }
+
+    fn crossing(&mut self, request: &Request, hole: &Kerr, lambda: f64, point: &PathPoint) {
+        self.crossings.push(request, hole, lambda, point);
+    }
+
+    fn sample(
+        &mut self,
+        request: &Request,
+        hole: &Kerr,
+        lambda: f64,
+        point: &PathPoint,
+        weight: Option<f64>,
+    ) {
+        self.samples.push(request, hole, lambda, point);
+        self.samples.weight.extend(weight);
+    }
+
+    fn end(&mut self, worst: Option<Uncertainty>) {
+        self.crossings.end_ray();
+        self.samples.end_ray();
+        self.uncertainty.extend(worst);
     }
 }

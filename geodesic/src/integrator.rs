@@ -1,5 +1,6 @@
 //! Every way to trace rays, behind one interface and with one kind of result.
 
+use crate::blocks::in_blocks;
 use crate::columns::Bundle;
 use crate::elliptic_rays;
 use crate::error::{OutOfRange, check};
@@ -7,7 +8,8 @@ use crate::kerr::Kerr;
 use crate::observer::{Observer, Ray};
 use crate::path::{Outcome, Path, PathPoint};
 use crate::request::Request;
-use crate::sampling::{Sampler, Trajectory};
+use crate::sampling::{self, Sampler, Trajectory};
+use crate::scalar::Elementary;
 use crate::trace::{Method, Tracer};
 use crate::uncertainty::Uncertainty;
 
@@ -31,9 +33,6 @@ pub enum Integrator {
     /// leaves, whatever the tolerance. For an observer at infinity or at 5 M and more.
     Elliptic,
 }
-
-/// Rays that one task works on.
-const BLOCK: usize = 64;
 
 impl Integrator {
     /// All of them.
@@ -104,16 +103,17 @@ impl Integrator {
         tolerance: f64,
         request: &Request,
     ) -> Result<Bundle, OutOfRange> {
-        let same = alpha.len() == beta.len();
-        check("number of beta", beta.len() as f64, same, "as many as of alpha")?;
+        check_columns(alpha, beta)?;
         request.check()?;
         if self == Integrator::Elliptic {
             return elliptic_rays::trace(hole, observer, alpha, beta, request);
         }
+        let rule = sampling::rule(request);
+        let at_infinity = observer.is_at_infinity();
         let block = |alpha: &[f64], beta: &[f64]| -> Result<Bundle, OutOfRange> {
-            let mut sampler = Sampler::new(request, hole, observer.is_at_infinity());
+            let mut sampler = Sampler::new(request, hole, at_infinity, &rule, Bundle::default());
             self.trace_block(hole, observer, alpha, beta, tolerance, request, &mut sampler)?;
-            Ok(sampler.bundle)
+            Ok(sampler.sink)
         };
         let pieces = in_blocks(alpha, beta, block);
         let mut whole = Bundle::default();
@@ -132,7 +132,7 @@ impl Integrator {
         beta: &[f64],
         tolerance: f64,
         request: &Request,
-        sampler: &mut Sampler<'_>,
+        sampler: &mut Sampler<'_, f64, Bundle>,
     ) -> Result<(), OutOfRange> {
         let rays = alpha.iter().zip(beta);
         let Some(method) = self.method() else {
@@ -155,68 +155,60 @@ impl Integrator {
     }
 }
 
-/// `work` on blocks of rays, in their order.
-fn in_blocks<T: Send>(
-    alpha: &[f64],
-    beta: &[f64],
-    work: impl Fn(&[f64], &[f64]) -> T + Sync + Send,
-) -> Vec<T> {
-    #[cfg(feature = "rayon")]
-    {
-        use rayon::prelude::*;
-        let blocks = alpha.par_chunks(BLOCK).zip(beta.par_chunks(BLOCK));
-        blocks.map(|(alpha, beta)| work(alpha, beta)).collect()
-    }
-    #[cfg(not(feature = "rayon"))]
-    {
-        let blocks = alpha.chunks(BLOCK).zip(beta.chunks(BLOCK));
-        blocks.map(|(alpha, beta)| work(alpha, beta)).collect()
-    }
+/// Whether there is a β for every α.
+pub(crate) fn check_columns(alpha: &[f64], beta: &[f64]) -> Result<(), OutOfRange> {
+    let same = alpha.len() == beta.len();
+    check("number of beta", beta.len() as f64, same, "as many as of alpha")?;
+    Ok(())
 }
 
 /// A path in Mino time, ended at the radius of a finite observer.
-struct MinoPath<'a> {
-    path: &'a Path,
-    ray: &'a Ray,
+pub(crate) struct MinoPath<'a, T> {
+    pub path: &'a Path<T>,
+    pub ray: &'a Ray<T>,
 }
 
-impl Trajectory for MinoPath<'_> {
+impl<T: Elementary> Trajectory<T> for MinoPath<'_, T> {
     fn outcome(&self) -> Outcome {
         self.path.outcome()
     }
 
-    fn total(&self) -> f64 {
+    fn total(&self) -> T {
         match self.path.turning_point() {
             // A ray that starts inwards is back where it started after twice the time.
-            Some((turning, _)) if self.ray.inverse_radius > 0.0 && self.ray.inward => 2.0 * turning,
+            Some((turning, _)) if self.ray.inverse_radius > 0.0 && self.ray.inward => {
+                turning + turning
+            }
             _ => self.path.mino_total(),
         }
     }
 
-    fn turning_radius(&self) -> Option<f64> {
+    fn turning_radius(&self) -> Option<T> {
         self.path.turning_point().map(|(_, r)| r)
     }
 
-    fn crossings(&self, found: &mut Vec<f64>) {
+    fn crossings(&self, found: &mut Vec<T>) {
         let total = self.total();
-        found.extend(self.path.equatorial_crossings().filter(|time| *time <= total));
+        found.extend(self.path.equatorial_crossings().filter(|time| time.value() <= total.value()));
     }
 
-    fn at(&self, mino_time: f64) -> PathPoint {
+    fn at(&self, mino_time: T) -> PathPoint<T> {
         self.path.at(mino_time)
     }
 
-    fn uncertainty(&self, mino_time: f64) -> Uncertainty {
+    fn uncertainty(&self, mino_time: T) -> Uncertainty {
         self.path.uncertainty_at(mino_time)
     }
 
-    fn within(&self, lo: f64, hi: f64, pieces: &mut Vec<[f64; 2]>) {
+    fn within(&self, lo: f64, hi: f64, pieces: &mut Vec<[T; 2]>) {
         self.path.intervals_within(lo, hi, pieces);
         let total = self.total();
         for piece in pieces.iter_mut() {
-            piece[1] = piece[1].min(total);
+            if piece[1].value() > total.value() {
+                piece[1] = total;
+            }
         }
-        pieces.retain(|[start, end]| start < end);
+        pieces.retain(|[start, end]| start.value() < end.value());
     }
 }
 
@@ -246,7 +238,7 @@ impl AffinePair {
 }
 
 #[cfg(feature = "affine")]
-impl Trajectory for AffinePair {
+impl Trajectory<f64> for AffinePair {
     fn outcome(&self) -> Outcome {
         self.fine.outcome()
     }

@@ -1,6 +1,7 @@
 //! The hole: spin, horizons, and the closed forms in which what is singular at
 //! the horizon integrates.
 
+use crate::dual::Dual;
 use crate::error::{OutOfRange, check};
 use crate::scalar::Elementary;
 
@@ -21,6 +22,18 @@ impl Kerr {
     /// If `spin` is not in \[−1, 1\] (NaN included).
     pub fn new(spin: f64) -> Result<Self, OutOfRange> {
         Self::from_spin(spin)
+    }
+
+    /// The same hole, its spin a constant of another kind of number.
+    pub fn lift<T: Elementary>(&self) -> Kerr<T> {
+        Kerr { spin: T::constant(self.spin), horizon_gap: T::constant(self.horizon_gap) }
+    }
+}
+
+impl<const D: usize> Kerr<Dual<f64, D>> {
+    /// The hole without its derivatives.
+    pub(crate) fn values(&self) -> Kerr {
+        Kerr { spin: self.spin.value, horizon_gap: self.horizon_gap.value }
     }
 }
 

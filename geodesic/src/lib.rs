@@ -30,14 +30,19 @@ mod affine;
 mod readme {}
 
 pub mod analytic;
+mod blocks;
 pub mod bundle;
 mod camera;
+#[cfg(feature = "capi")]
+pub mod capi;
 mod columns;
 mod compensated;
+pub mod derivatives;
 mod dual;
 mod elliptic_rays;
 mod error;
 pub mod flow;
+pub mod footprint;
 mod integrator;
 mod kerr;
 mod mino;

@@ -87,8 +87,8 @@ impl<T: Elementary> System<T> {
     pub fn new(hole: &Kerr<T>, ray: &Ray<T>) -> Self {
         let [quad, cubic, quartic] = ray.potential.coefficients;
         let a = hole.spin();
-        let b2 = ray.angular.value().max(1.0);
-        let b = b2.sqrt();
+        let b = short(ray.angular.value().max(1.0).sqrt());
+        let b2 = b * b;
         let half = T::constant(0.5) * cubic;
         // The scale is a plain number: it may be any, so it carries no derivatives.
         let over = |x: T, scale: f64| x / T::constant(scale);
@@ -128,6 +128,13 @@ impl<T: Elementary> System<T> {
         }
         y
     }
+}
+
+/// `b` rounded up to 13 bits: its powers up to the fourth are exact, so that no digit of a wide
+/// number is lost in the scaling.
+fn short(b: f64) -> f64 {
+    const TAIL: u64 = (1 << 40) - 1;
+    f64::from_bits((b.to_bits() + TAIL) & !TAIL)
 }
 
 /// The square root of a potential that is not negative but for rounding.

@@ -1,10 +1,11 @@
 //! Where the observer sits and which photon arrives at a point of the screen.
 
 use crate::compensated::Double;
+use crate::dual::Dual;
 use crate::error::{OutOfRange, check};
 use crate::kerr::Kerr;
 use crate::radial::RadialPotential;
-use crate::scalar::Elementary;
+use crate::scalar::{Elementary, Scalar};
 
 /// The angle between the spin axis and the line of sight.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,6 +46,25 @@ impl Inclination {
     pub fn widen(self) -> Inclination<Double> {
         let [sin, cos] = self.wide;
         Inclination::of(Double::from(self.radians), sin, cos)
+    }
+
+    /// The same angle as parameter number `k` of dual numbers: what follows from it carries
+    /// derivatives per radian. Angles that are exact in degrees stay exact.
+    pub fn parameter<const D: usize>(self, k: usize) -> Inclination<Dual<f64, D>> {
+        let [sin, cos] = self.wide;
+        let with = |value, slope: Double| {
+            let mut number = Dual::parameter(value, k);
+            number.slope = number.slope.map(|unit| unit * slope);
+            number
+        };
+        Inclination::of(Dual::parameter(self.radians, k), with(sin, cos), with(cos, -sin))
+    }
+
+    /// The same angle as a constant of another kind of number.
+    pub fn lift<T: Elementary>(self) -> Inclination<T> {
+        let wide = |x: Double| T::Wide::constant(x.hi) + T::Wide::constant(x.lo);
+        let [sin, cos] = self.wide.map(wide);
+        Inclination::of(T::constant(self.radians), sin, cos)
     }
 }
 
@@ -125,6 +145,11 @@ impl<T: Elementary> Observer<T> {
     pub fn with_azimuth(mut self, azimuth: f64) -> Self {
         self.azimuth = azimuth;
         self
+    }
+
+    /// The same place seen under another inclination, or with one of another kind of number.
+    pub fn with_inclination<U: Elementary>(&self, inclination: Inclination<U>) -> Observer<U> {
+        Observer { inclination, azimuth: self.azimuth, inverse_radius: self.inverse_radius }
     }
 
     /// The inclination.

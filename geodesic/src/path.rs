@@ -43,8 +43,8 @@ impl Outcome {
 /// A step: a polynomial for each row of [`Series`], and what turns them into a position.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Segment<T> {
-    /// Scaled Mino time bτ where it starts.
-    pub s: f64,
+    /// Scaled Mino time bτ where it starts: a constant.
+    pub s: T,
     /// Its length.
     pub h: f64,
     /// +1 on a step that goes inwards, −1 on one that goes outwards.
@@ -116,6 +116,38 @@ impl<T: Elementary> PathPoint<T> {
             -((vx * vx + vy * vy).sqrt() * T::constant(u.value().signum()))
         };
         [-one, p_r, polar, lambda]
+    }
+
+    /// d(r, θ, φ, delay)/dτ of the backward ray with angular momentum `lambda`, from the
+    /// equations of motion (Carter 1968), for unit energy at infinity. Infinite at the
+    /// horizon and at infinity; dφ/dτ diverges on the axis. Needs the azimuth's direction for
+    /// the sign of dθ/dτ at the poles only.
+    pub fn rates(&self, hole: &Kerr<T>, lambda: T) -> [T; 4] {
+        let (w, a, one) = (self.inverse_radius, hole.spin(), T::constant(1.0));
+        let [_, _, p_theta, _] = self.momentum(hole, lambda);
+        let gap = one - w * (one + one - a * a * w);
+        // (r² + a² − aλ)/Δ.
+        let lift = (one + a * (a - lambda) * w * w) / gap;
+        let u = self.direction[2];
+        let sin2 = (one - u) * (one + u);
+        let orbital = if lambda.value() == 0.0 { T::constant(0.0) } else { lambda / sin2 };
+        let around = a * lift - a + orbital;
+        let time = (one + a * a * w * w) * lift / (w * w) + a * (lambda - a * sin2);
+        [-(self.inverse_radius_rate / (w * w)), -p_theta, -around, time]
+    }
+
+    /// Where a path without a step is.
+    fn nowhere() -> Self {
+        let nan = T::constant(f64::NAN);
+        PathPoint {
+            mino_time: nan,
+            inverse_radius: nan,
+            inverse_radius_rate: nan,
+            direction: [nan; 3],
+            velocity: [nan; 3],
+            azimuth: nan,
+            delay: nan,
+        }
     }
 
     /// r n: the point in the coordinates in which a = 0 is flat-looking.
@@ -243,9 +275,9 @@ impl<T: Elementary> Path<T> {
 
     /// The segment that holds the scaled time `s`, and where in it.
     fn find(&self, s: T) -> (usize, T) {
-        let k = self.segments.partition_point(|segment| segment.s <= s.value()).max(1) - 1;
+        let k = self.segments.partition_point(|segment| segment.s.value() <= s.value()).max(1) - 1;
         let segment = &self.segments[k];
-        (k, (s - T::constant(segment.s)) / T::constant(segment.h))
+        (k, (s - segment.s) / T::constant(segment.h))
     }
 
     fn clamped(&self, mino_time: T) -> T {
@@ -261,21 +293,23 @@ impl<T: Elementary> Path<T> {
 
     /// The position at Mino time `mino_time` ∈ \[0, [`mino_total`](Self::mino_total)\]
     /// (clamped to it). At the horizon, where azimuth and time diverge logarithmically, it
-    /// is that of the last float outside.
-    ///
-    /// # Panics
-    /// If the path has not been traced yet.
+    /// is that of the last float outside. All NaN on a path without a step: one that has not
+    /// been traced, or by a tracer that may make none.
     pub fn at(&self, mino_time: T) -> PathPoint<T> {
+        if self.segments.is_empty() {
+            return PathPoint::nowhere();
+        }
         let s = self.clamped(mino_time);
         let (k, x) = self.find(s);
         self.interpolate(k, x, s)
     }
 
-    /// The estimated errors of [`at`](Self::at): see [`Uncertainty`].
-    ///
-    /// # Panics
-    /// If the path has not been traced yet.
+    /// The estimated errors of [`at`](Self::at): see [`Uncertainty`]. Infinite on a path without
+    /// a step.
     pub fn uncertainty_at(&self, mino_time: T) -> Uncertainty {
+        if self.segments.is_empty() {
+            return Uncertainty::UNKNOWN;
+        }
         let s = self.clamped(mino_time);
         let (k, x) = self.find(s);
         let segment = &self.segments[k];
@@ -322,7 +356,7 @@ impl<T: Elementary> Path<T> {
             let (sin, cos) = dragged.sin_cos();
             point.direction = rotate(n, sin, cos);
             point.velocity = rotate(velocity, sin, cos);
-            let start = [px.0[0], py.0[0]];
+            let start = [px.0, py.0].map(|c| [c[0], c[1]]);
             point.azimuth =
                 segment.turned + turn(self.rotation_sign, start, [n[0], n[1]]) + dragged;
         } else {
@@ -338,13 +372,17 @@ impl<T: Elementary> Path<T> {
         point
     }
 
-    /// The pieces of the path with lo ≤ r ≤ hi as intervals of Mino time, in order.
+    /// The pieces of the path with lo ≤ r ≤ hi as intervals of Mino time, in order; none
+    /// unless 0 ≤ lo ≤ hi.
     pub fn intervals_within(&self, lo: f64, hi: f64, intervals: &mut Vec<[T; 2]>) {
         intervals.clear();
+        if !(0.0 <= lo && lo <= hi && hi > 0.0) {
+            return;
+        }
         let band = [self.scale / hi, self.scale / lo];
         for (k, segment) in self.segments.iter().enumerate() {
             let end = T::constant(1.0);
-            let whole = self.end - T::constant(segment.s);
+            let whole = self.end - segment.s;
             if whole.value() <= 0.0 {
                 continue;
             }
@@ -352,7 +390,7 @@ impl<T: Elementary> Path<T> {
             let stop = if whole.value() < segment.h { whole / h } else { end };
             let start = T::constant(0.0);
             let inside = |t: &T| (0.0..stop.value()).contains(&t.value());
-            match self.turning.map(|t| (t - T::constant(segment.s)) / h).filter(inside) {
+            match self.turning.map(|t| (t - segment.s) / h).filter(inside) {
                 Some(turning) => {
                     self.clip(k, [start, turning], band, intervals);
                     self.clip(k, [turning, stop], band, intervals);
@@ -377,7 +415,7 @@ impl<T: Elementary> Path<T> {
             let outside = limit != w[end];
             let root = || radial.solve(T::constant(limit), x[0].value(), x[1].value());
             let x = if outside { root() } else { x[end] };
-            (T::constant(segment.s) + T::constant(segment.h) * x) / T::constant(self.scale)
+            (segment.s + T::constant(segment.h) * x) / T::constant(self.scale)
         };
         let piece = [bound(0), bound(1)];
         if piece[1].value() <= piece[0].value() {
@@ -394,12 +432,22 @@ fn rotate<T: Elementary>(v: [T; 3], sin: T, cos: T) -> [T; 3] {
     [v[0] * cos - v[1] * sin, v[0] * sin + v[1] * cos, v[2]]
 }
 
-/// The angle by which a point turns about the axis from `from` to `to` in one step, in the
-/// sense of `sign`: a step past a pole turns by up to π and a little, any other by little.
-pub(crate) fn turn<T: Elementary>(sign: f64, from: [T; 2], to: [T; 2]) -> T {
+/// The angle by which a point turns about the axis in one step from `start` (x and y, each
+/// with its rate) to `to`, in the sense of `sign`: a step past a pole turns by up to π and a
+/// little, any other by little.
+pub(crate) fn turn<T: Elementary>(sign: f64, start: [[T; 2]; 2], to: [T; 2]) -> T {
     use core::f64::consts::FRAC_PI_2;
-    if from.iter().chain(&to).all(|x| x.value() == 0.0) || from.map(T::value) == [0.0, 0.0] {
-        // From the axis itself the direction of departure is the starting angle.
+    let mut from = start.map(|[x, _]| x);
+    if from.map(T::value) == [0.0, 0.0] {
+        // From the axis itself the direction of departure is the starting angle. Only the
+        // derivatives of the angle to it do not vanish: the axis may be left aside.
+        from = start.map(|[_, rate]| rate);
+        if T::IS_PLAIN || [from, to].iter().any(|v| v.map(T::value) == [0.0, 0.0]) {
+            return T::constant(0.0);
+        }
+    }
+    if to.map(T::value) == [0.0, 0.0] {
+        // On the axis itself an azimuth has no derivative.
         return T::constant(0.0);
     }
     let cross = from[0] * to[1] - from[1] * to[0];

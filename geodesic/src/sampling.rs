@@ -1,35 +1,62 @@
-//! Where the points of a traced ray lie, whichever tracer traced it.
+//! Where the points of a traced ray lie, whichever tracer traced it and whatever kind of
+//! number it is made of: with dual numbers every place carries its own derivatives.
 
-use crate::columns::{Bundle, Points};
 use crate::kerr::Kerr;
 use crate::path::{Outcome, PathPoint};
 use crate::quadrature::{equidistant, gauss_legendre};
 use crate::request::{Placement, Request};
+use crate::scalar::Elementary;
 use crate::uncertainty::Uncertainty;
 
 /// A traced ray whose position is known at every Mino time up to its end: the horizon,
 /// infinity, or back at a finite observer's radius.
-pub(crate) trait Trajectory {
+pub(crate) trait Trajectory<T> {
     fn outcome(&self) -> Outcome;
-    fn total(&self) -> f64;
-    fn turning_radius(&self) -> Option<f64>;
-    fn crossings(&self, found: &mut Vec<f64>);
-    fn at(&self, mino_time: f64) -> PathPoint;
-    fn uncertainty(&self, mino_time: f64) -> Uncertainty;
+    fn total(&self) -> T;
+    fn turning_radius(&self) -> Option<T>;
+    fn crossings(&self, found: &mut Vec<T>);
+    fn at(&self, mino_time: T) -> PathPoint<T>;
+    fn uncertainty(&self, mino_time: T) -> Uncertainty;
     /// The pieces with lo ≤ r ≤ hi.
-    fn within(&self, lo: f64, hi: f64, pieces: &mut Vec<[f64; 2]>);
+    fn within(&self, lo: f64, hi: f64, pieces: &mut Vec<[T; 2]>);
+}
+
+/// What is known about a ray as a whole.
+pub(crate) struct Summary<T> {
+    pub outcome: Outcome,
+    /// `None` where unresolved.
+    pub total: Option<T>,
+    pub turning_radius: Option<T>,
+    pub crossing_count: u32,
+}
+
+/// Takes what a [`Sampler`] finds: of each ray first its summary, then its crossings, then its
+/// samples, then its end.
+pub(crate) trait Sink<T> {
+    fn summary(&mut self, summary: Summary<T>);
+    fn crossing(&mut self, request: &Request, hole: &Kerr<T>, lambda: T, point: &PathPoint<T>);
+    /// `weight`: Σ dτ, if it was asked for.
+    fn sample(
+        &mut self,
+        request: &Request,
+        hole: &Kerr<T>,
+        lambda: T,
+        point: &PathPoint<T>,
+        weight: Option<T>,
+    );
+    fn end(&mut self, worst: Option<Uncertainty>);
 }
 
 /// Takes from rays what is requested.
-pub(crate) struct Sampler<'a> {
+pub(crate) struct Sampler<'a, T, S> {
     request: &'a Request,
-    hole: &'a Kerr,
+    hole: &'a Kerr<T>,
     at_infinity: bool,
-    /// The Gauss–Legendre rule of the request, or that of the path length.
-    rule: Vec<(f64, f64)>,
-    pub bundle: Bundle,
-    times: Vec<f64>,
-    pieces: Vec<[f64; 2]>,
+    rule: &'a [(f64, f64)],
+    pub sink: S,
+    times: Vec<T>,
+    pieces: Vec<[T; 2]>,
+    worst: Uncertainty,
 }
 
 /// Nodes of the rule that measures path length on each of [`PARTS`] parts of a ray.
@@ -37,84 +64,84 @@ const LENGTH_RULE: usize = 12;
 /// Parts of a ray whose lengths are measured by one rule each.
 const PARTS: usize = 16;
 
-impl<'a> Sampler<'a> {
-    pub fn new(request: &'a Request, hole: &'a Kerr, at_infinity: bool) -> Self {
-        let rule = match request.samples {
-            Placement::GaussLegendre { points, .. } => gauss_legendre(points),
-            Placement::PathLength { .. } => gauss_legendre(LENGTH_RULE),
-            _ => Vec::new(),
-        };
-        let (bundle, times, pieces) = (Bundle::default(), Vec::new(), Vec::new());
-        Sampler { request, hole, at_infinity, rule, bundle, times, pieces }
+/// The Gauss–Legendre rule that a request needs: its own, or that of the path length.
+pub(crate) fn rule(request: &Request) -> Vec<(f64, f64)> {
+    match request.samples {
+        Placement::GaussLegendre { points, .. } => gauss_legendre(points),
+        Placement::PathLength { .. } => gauss_legendre(LENGTH_RULE),
+        _ => Vec::new(),
+    }
+}
+
+impl<'a, T: Elementary, S: Sink<T>> Sampler<'a, T, S> {
+    /// `rule` is that of the request.
+    pub fn new(
+        request: &'a Request,
+        hole: &'a Kerr<T>,
+        at_infinity: bool,
+        rule: &'a [(f64, f64)],
+        sink: S,
+    ) -> Self {
+        let (times, pieces, worst) = (Vec::new(), Vec::new(), Uncertainty::default());
+        Sampler { request, hole, at_infinity, rule, sink, times, pieces, worst }
     }
 
     /// Takes a ray with angular momentum `lambda`.
-    pub fn take(&mut self, ray: &impl Trajectory, lambda: f64) {
+    pub fn take(&mut self, ray: &impl Trajectory<T>, lambda: T) {
         let outcome = ray.outcome();
-        let resolved = !matches!(outcome, Outcome::Unresolved(_));
-        let total = ray.total();
-        self.times.clear();
-        ray.crossings(&mut self.times);
-        let bundle = &mut self.bundle;
-        bundle.outcome.push(outcome);
-        bundle.mino_total.push(if resolved { total } else { f64::NAN });
-        bundle.turning_radius.push(ray.turning_radius().unwrap_or(f64::NAN));
-        bundle.crossing_count.push(self.times.len() as u32);
-        self.times.truncate(self.request.crossings);
-        let mut worst = Uncertainty::default();
-        for k in 0..self.times.len() {
-            self.push(ray, lambda, self.times[k], None, &mut worst);
+        let total = (!matches!(outcome, Outcome::Unresolved(_))).then(|| ray.total());
+        let mut times = core::mem::take(&mut self.times);
+        times.clear();
+        ray.crossings(&mut times);
+        self.sink.summary(Summary {
+            outcome,
+            total,
+            turning_radius: ray.turning_radius(),
+            crossing_count: times.len() as u32,
+        });
+        self.worst = Uncertainty::default();
+        for time in times.iter().take(self.request.crossings) {
+            self.sink.crossing(self.request, self.hole, lambda, &ray.at(*time));
+            self.doubt(ray, *time);
         }
-        self.bundle.crossings.end_ray();
-        if resolved {
-            self.samples(ray, lambda, total, &mut worst);
+        self.times = times;
+        if let Some(total) = total {
+            self.samples(ray, lambda, total);
         }
-        self.bundle.samples.end_ray();
-        if self.request.uncertainty {
-            self.bundle.uncertainty.push(worst);
-        }
+        self.sink.end(self.request.uncertainty.then_some(self.worst));
     }
 
-    /// Adds the point at a Mino time: a sample if it has a weight dτ, else a crossing.
-    fn push(
-        &mut self,
-        ray: &impl Trajectory,
-        lambda: f64,
-        mino_time: f64,
-        weight: Option<f64>,
-        worst: &mut Uncertainty,
-    ) {
-        let point = ray.at(mino_time);
-        let points: &mut Points = match weight {
-            Some(_) => &mut self.bundle.samples,
-            None => &mut self.bundle.crossings,
-        };
-        points.push(self.request, self.hole, lambda, &point);
-        if let Some(weight) = weight.filter(|_| self.request.weight) {
-            points.weight.push(weight * self.hole.sigma(point.radius(), point.cos_theta()));
-        }
+    fn doubt(&mut self, ray: &impl Trajectory<T>, mino_time: T) {
         // At the horizon azimuth and delay have no limit, and no error.
-        let at_horizon = ray.outcome() == Outcome::Captured && mino_time >= ray.total();
+        let at_horizon =
+            ray.outcome() == Outcome::Captured && mino_time.value() >= ray.total().value();
         if self.request.uncertainty && !at_horizon {
-            *worst = worst.max(ray.uncertainty(mino_time));
+            self.worst = self.worst.max(ray.uncertainty(mino_time));
         }
     }
 
-    fn samples(&mut self, ray: &impl Trajectory, lambda: f64, total: f64, worst: &mut Uncertainty) {
+    /// Adds the sample at a Mino time that stands for a piece `step` of it.
+    fn sample(&mut self, ray: &impl Trajectory<T>, lambda: T, mino_time: T, step: T) {
+        let point = ray.at(mino_time);
+        let weight =
+            self.request.weight.then(|| step * self.hole.sigma(point.radius(), point.cos_theta()));
+        self.sink.sample(self.request, self.hole, lambda, &point, weight);
+        self.doubt(ray, mino_time);
+    }
+
+    fn samples(&mut self, ray: &impl Trajectory<T>, lambda: T, total: T) {
         match self.request.samples {
             Placement::None => {}
-            Placement::MinoTime(n) => self.by_mino_time(ray, lambda, total, n, worst),
-            Placement::PathLength { points, radius } => {
-                self.by_length(ray, lambda, points, radius, worst)
-            }
+            Placement::MinoTime(n) => self.by_mino_time(ray, lambda, total, n),
+            Placement::PathLength { points, radius } => self.by_length(ray, lambda, points, radius),
             Placement::GaussLegendre { from, to, .. } => {
                 let mut pieces = core::mem::take(&mut self.pieces);
                 ray.within(from, to, &mut pieces);
                 for [start, end] in &pieces {
-                    for k in 0..self.rule.len() {
-                        let (x, weight) = self.rule[k];
-                        let (time, length) = (start + (end - start) * x, end - start);
-                        self.push(ray, lambda, time, Some(weight * length), worst);
+                    let length = *end - *start;
+                    for (x, weight) in self.rule {
+                        let time = *start + length * T::constant(*x);
+                        self.sample(ray, lambda, time, length * T::constant(*weight));
                     }
                 }
                 self.pieces = pieces;
@@ -122,90 +149,86 @@ impl<'a> Sampler<'a> {
         }
     }
 
-    fn by_mino_time(
-        &mut self,
-        ray: &impl Trajectory,
-        lambda: f64,
-        total: f64,
-        n: usize,
-        worst: &mut Uncertainty,
-    ) {
+    fn by_mino_time(&mut self, ray: &impl Trajectory<T>, lambda: T, total: T, n: usize) {
         let captured = ray.outcome() == Outcome::Captured;
         // At infinity the ends have no finite position; each other end counts half.
         let (from, to) = match (self.at_infinity, captured) {
-            (true, true) => (total / n as f64, total),
-            (true, false) => {
-                let step = total / (n + 1) as f64;
-                (step, total - step)
-            }
-            (false, _) => (0.0, total),
+            (true, true) => (1.0 / n as f64, 1.0),
+            (true, false) => (1.0 / (n + 1) as f64, n as f64 / (n + 1) as f64),
+            (false, _) => (0.0, 1.0),
         };
         let step = if n > 1 { (to - from) / (n - 1) as f64 } else { to - from };
-        for (k, time) in equidistant(from, to, n).enumerate() {
+        for (k, share) in equidistant(from, to, n).enumerate() {
             let first = k == 0 && !self.at_infinity;
             let last = k + 1 == n && (captured || !self.at_infinity);
-            let share = if first || last { 0.5 } else { 1.0 };
-            self.push(ray, lambda, time, Some(share * step), worst);
+            let part = if first || last { 0.5 * step } else { step };
+            self.sample(ray, lambda, total * T::constant(share), total * T::constant(part));
         }
     }
 
-    fn by_length(
-        &mut self,
-        ray: &impl Trajectory,
-        lambda: f64,
-        n: usize,
-        radius: f64,
-        worst: &mut Uncertainty,
-    ) {
+    fn by_length(&mut self, ray: &impl Trajectory<T>, lambda: T, n: usize, radius: f64) {
         let mut pieces = core::mem::take(&mut self.pieces);
-        ray.within(0.5 * self.hole.horizon(), radius, &mut pieces);
+        ray.within(0.5 * self.hole.horizon().value(), radius, &mut pieces);
         if let (Some([start, _]), Some([_, end])) = (pieces.first(), pieces.last()) {
-            self.equal_lengths(ray, lambda, [*start, *end], n, worst);
+            self.equal_lengths(ray, lambda, [*start, *end], n);
         }
         self.pieces = pieces;
     }
 
     fn equal_lengths(
         &mut self,
-        ray: &impl Trajectory,
-        lambda: f64,
-        [start, end]: [f64; 2],
+        ray: &impl Trajectory<T>,
+        lambda: T,
+        [start, end]: [T; 2],
         n: usize,
-        worst: &mut Uncertainty,
     ) {
         let hole = self.hole;
-        let density = |time: f64| {
+        let density = |time: T| {
             let point = ray.at(time);
             hole.sigma(point.radius(), point.cos_theta())
         };
-        let rule = core::mem::take(&mut self.rule);
-        let length = |from: f64, to: f64| -> f64 {
-            rule.iter().map(|(x, w)| w * (to - from) * density(from + (to - from) * x)).sum()
+        let rule = self.rule;
+        let length = |from: T, to: T| -> T {
+            let whole = to - from;
+            let sum = rule.iter().fold(T::constant(0.0), |sum, (x, weight)| {
+                sum + T::constant(*weight) * density(from + whole * T::constant(*x))
+            });
+            sum * whole
         };
-        let part = (end - start) / PARTS as f64;
-        let edge = |k: usize| start + part * k as f64;
-        let mut so_far = [0.0; PARTS + 1];
+        let part = (end - start) / T::constant(PARTS as f64);
+        let edge = |k: usize| start + part * T::constant(k as f64);
+        let mut so_far = [T::constant(0.0); PARTS + 1];
         for k in 0..PARTS {
             so_far[k + 1] = so_far[k] + length(edge(k), edge(k + 1));
         }
-        let piece = so_far[PARTS] / n as f64;
+        let piece = so_far[PARTS] / T::constant(n as f64);
         for k in 0..n {
-            let target = piece * (k as f64 + 0.5);
-            let at = so_far[1..PARTS].partition_point(|s| *s <= target);
+            let target = piece * T::constant(k as f64 + 0.5);
+            let at = so_far[1..PARTS].partition_point(|s| s.value() <= target.value());
+            let (lo, hi) = (edge(at), edge(at + 1));
             // Newton's method from a linear guess; the length grows monotonically.
             let share = (target - so_far[at]) / (so_far[at + 1] - so_far[at]);
-            let mut time = edge(at) + part * share;
+            let mut time = lo + part * share;
+            let newton = |time: T| (target - so_far[at] - length(lo, time)) / density(time);
             for _ in 0..6 {
-                let miss = target - so_far[at] - length(edge(at), time);
-                let step = miss / density(time);
-                time = (time + step).clamp(edge(at), edge(at + 1));
-                if step.abs() < 1e-15 * end {
+                let step = newton(time);
+                let next = time + step;
+                time = if next.value() < lo.value() {
+                    lo
+                } else if next.value() > hi.value() {
+                    hi
+                } else {
+                    next
+                };
+                if step.value().abs() < 1e-15 * end.value() {
                     break;
                 }
             }
-            let weight = piece / density(time);
-            self.push(ray, lambda, time, Some(weight), worst);
+            if !T::IS_PLAIN {
+                // Once more for the derivatives, which the first steps bring but roughly.
+                time = time + newton(time);
+            }
+            self.sample(ray, lambda, time, piece / density(time));
         }
-        self.rule = rule;
     }
 }

@@ -186,7 +186,7 @@ struct Run<'a, T, M, const N: usize> {
     state: State<'a, T, N>,
     stepper: M,
     path: &'a mut Path<T>,
-    s: f64,
+    s: T,
     constants: [T; 2],
     turned: T,
     budget: Budget,
@@ -211,7 +211,15 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
         let state = State { ray, system, tolerance, y, leg };
         let constants = [azimuth, time];
         let budget = Budget::default();
-        Run { state, stepper, path, s: 0.0, constants, turned: start_angle(ray), budget }
+        Run {
+            state,
+            stepper,
+            path,
+            s: T::constant(0.0),
+            constants,
+            turned: start_angle(ray),
+            budget,
+        }
     }
 
     fn go(mut self, max_steps: u32) {
@@ -225,12 +233,12 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
                 return;
             }
             if let Some(outcome) = self.stalled(h) {
-                self.path.end = T::constant(self.s);
+                self.path.end = self.s;
                 self.path.outcome = outcome;
                 return;
             }
         }
-        self.path.end = T::constant(self.s);
+        self.path.end = self.s;
         self.path.outcome = Outcome::Unresolved(Unresolved::StepLimit);
     }
 
@@ -253,7 +261,8 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
         let Made { h, mut y, error } = made;
         let projected = self.project(&mut y);
         self.spend(&error, &y, h, projected);
-        let before = [self.state.y[index::X.min(N - 1)], self.state.y[index::Y.min(N - 1)]];
+        let before = [index::X, index::Y]
+            .map(|k| [self.state.y[k.min(N - 1)], self.state.y[(k + 1).min(N - 1)]]);
         let path = &mut *self.path;
         self.stepper.dense(&self.state, &y, h, &mut path.series, &mut path.coefficients);
         path.segments.push(Segment {
@@ -271,7 +280,7 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
             self.turned = self.turned + turn(self.path.rotation_sign, before, after);
         }
         let ended = self.handle_events(from);
-        self.s += h;
+        self.s = self.s + T::constant(h);
         ended
     }
 
@@ -346,7 +355,7 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
     /// Looks for events in the step just taken; true if the ray has ended in it.
     fn handle_events(&mut self, from: bool) -> bool {
         let k = self.path.segments.len() - 1;
-        let (s, h) = (T::constant(self.s), T::constant(self.path.segments[k].h));
+        let (s, h) = (self.s, T::constant(self.path.segments[k].h));
         let ended = self.end_of_ray(k).map(|(x, outcome)| (s + h * x, outcome));
         if from != side(&self.state.y) {
             let zero = T::constant(0.0);
@@ -385,8 +394,14 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
         // approaches the horizon but never reaches it.
         let there = w.value() >= horizon.value() * (1.0 - 64.0 * f64::EPSILON);
         if there && rate >= 0.0 && self.may_fall() {
-            let target = if w.value() < horizon.value() { w } else { horizon };
-            return Some((radial.solve(target, 0.0, 1.0), Outcome::Captured));
+            let short = w.value() < horizon.value();
+            let target = if short { w } else { horizon };
+            let mut x = radial.solve(target, 0.0, 1.0);
+            if short && !T::IS_PLAIN && rate > 1e-3 {
+                // The end's derivatives are those of the horizon, not of where rounding stopped.
+                x = x + (horizon - w) / radial.slope(x);
+            }
+            return Some((x, Outcome::Captured));
         }
         if w.value() <= 0.0 && rate < 0.0 {
             return Some((radial.solve(T::constant(0.0), 0.0, 1.0), Outcome::Escaped));

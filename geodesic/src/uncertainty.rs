@@ -27,6 +27,14 @@ pub struct Uncertainty {
 }
 
 impl Uncertainty {
+    /// Nothing is known.
+    pub(crate) const UNKNOWN: Uncertainty = Uncertainty {
+        radius: f64::INFINITY,
+        theta: f64::INFINITY,
+        azimuth: f64::INFINITY,
+        delay: f64::INFINITY,
+    };
+
     /// The larger of both in every component.
     pub fn max(self, o: Self) -> Self {
         Uncertainty {
