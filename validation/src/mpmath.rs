@@ -61,9 +61,9 @@ pub fn cases() -> Vec<Case> {
         |name: &str, errors, allowed| Case::sample(AUTHORITY, name, "crossings", errors, allowed);
     vec![
         Case::sample(AUTHORITY, "wrong outcome or number of crossings", "rays", wrong, 0.0),
-        sample("radius", radius, 5e-11),
+        sample("radius", radius, 1e-11),
         sample("Mino time", time, 2e-13),
-        sample("azimuth (radians)", azimuth, 5e-12),
-        sample("delay (relative where above 1)", delay, 5e-11),
+        sample("azimuth (radians)", azimuth, 1e-11),
+        sample("delay (relative where above 1)", delay, 1e-11),
     ]
 }
