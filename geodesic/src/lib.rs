@@ -163,6 +163,7 @@ pub mod flow;
 pub mod footprint;
 mod integrator;
 mod kerr;
+mod length;
 mod mino;
 mod observer;
 pub mod orbits;
