@@ -3,64 +3,94 @@
 use crate::scalar::Elementary;
 
 /// Nodes of the Gauss–Legendre rule on each part of the piece.
-pub(crate) const NODES: usize = 12;
-/// Equal parts of Mino time whose lengths are series of their own.
-const PARTS: usize = 16;
+pub(crate) const NODES: usize = 16;
+/// Relative size that the last terms of a part's series may have; those left out are smaller still.
+const SMALL: f64 = 1e-10;
+/// How often a part is halved at most: from a light year to a hole of a stellar mass.
+const HALVINGS: i32 = 48;
 
 /// The length along a piece of a ray: on each part the Legendre series through the density at the
 /// nodes of the rule, integrated term by term, so that no more points of the ray are needed to
-/// find as many lengths as one likes.
+/// find as many lengths as one likes. Parts are halved until their series have converged: far
+/// out, where Σ dτ is dr and dτ is dr/r², all of the length is in the first instants.
 pub(crate) struct Length<T> {
     start: T,
-    /// Mino time of a part.
-    part: T,
-    /// Legendre coefficients of the density dL/dτ on each part.
-    density: [[T; NODES]; PARTS],
-    /// Length from the start of the piece to the start of each part, and to its end.
-    so_far: [T; PARTS + 1],
+    whole: T,
+    parts: Vec<Part<T>>,
+    total: T,
+}
+
+struct Part<T> {
+    /// Where it starts and how much of the piece it is, in shares of the Mino time.
+    from: f64,
+    width: f64,
+    /// Length from the start of the piece to its start.
+    so_far: T,
+    /// Legendre coefficients of the density dL/dτ.
+    density: [T; NODES],
 }
 
 impl<T: Elementary> Length<T> {
     /// Of the piece from `start` to `end`, by the rule with [`NODES`] nodes.
     pub fn new([start, end]: [T; 2], rule: &[(f64, f64)], density: impl Fn(T) -> T) -> Self {
         let zero = T::constant(0.0);
-        let part = (end - start) / T::constant(PARTS as f64);
-        let mut length =
-            Length { start, part, density: [[zero; NODES]; PARTS], so_far: [zero; PARTS + 1] };
-        for k in 0..PARTS {
-            let from = length.edge(k);
-            for (node, weight) in rule {
-                let value = density(from + part * T::constant(*node)) * T::constant(*weight);
-                let basis = legendre::<f64, NODES>(2.0 * node - 1.0);
-                for (n, (sum, p)) in length.density[k].iter_mut().zip(basis).enumerate() {
-                    *sum = *sum + value * T::constant(p * (2 * n + 1) as f64);
-                }
+        let mut length = Length { start, whole: end - start, parts: Vec::new(), total: zero };
+        let smallest = 0.5f64.powi(HALVINGS);
+        let mut next = vec![(0.5, 0.5), (0.0, 0.5)];
+        while let Some((from, width)) = next.pop() {
+            let series = length.series(from, width, rule, &density);
+            let size = |c: &T| c.value().abs();
+            let last = size(&series[NODES - 1]) + size(&series[NODES - 2]);
+            if last > SMALL * size(&series[0]) && width > smallest {
+                let half = 0.5 * width;
+                next.extend([(from + half, half), (from, half)]);
+                continue;
             }
+            length.parts.push(Part { from, width, so_far: length.total, density: series });
             // The higher terms integrate to 0 over the whole part.
-            length.so_far[k + 1] = length.so_far[k] + part * length.density[k][0];
+            length.total = length.total + length.whole * T::constant(width) * series[0];
         }
         length
     }
 
-    /// The whole.
-    pub fn total(&self) -> T {
-        self.so_far[PARTS]
+    fn series(
+        &self,
+        from: f64,
+        width: f64,
+        rule: &[(f64, f64)],
+        density: impl Fn(T) -> T,
+    ) -> [T; NODES] {
+        let mut series = [T::constant(0.0); NODES];
+        for (node, weight) in rule {
+            let time = self.start + self.whole * T::constant(from + width * node);
+            let value = density(time) * T::constant(*weight);
+            let basis = legendre::<f64, NODES>(2.0 * node - 1.0);
+            for (n, (sum, p)) in series.iter_mut().zip(basis).enumerate() {
+                *sum = *sum + value * T::constant(p * (2 * n + 1) as f64);
+            }
+        }
+        series
     }
 
-    fn edge(&self, k: usize) -> T {
-        self.start + self.part * T::constant(k as f64)
+    /// The whole.
+    pub fn total(&self) -> T {
+        self.total
     }
 
     /// The Mino time at which the length is `target`.
     pub fn find(&self, target: T) -> T {
-        let (k, one) = (self.part_of(target), T::constant(1.0));
-        let rest = target - self.so_far[k];
+        let later = self.parts[1..].partition_point(|part| part.so_far.value() <= target.value());
+        let part = &self.parts[later];
+        let (one, half) = (T::constant(1.0), self.whole * T::constant(0.5 * part.width));
+        let rest = (target - part.so_far) / half;
         // Newton's method on [−1, 1] from a linear guess; the length grows monotonically.
-        let half = T::constant(0.5) * self.part;
-        let mut x = rest / (half * self.density[k][0]) - one;
+        let mut x = rest / part.density[0] - one;
+        let newton = |x: T| {
+            let (length, density) = part.within(x);
+            (rest - length) / density
+        };
         for _ in 0..8 {
-            let (length, density) = self.within(k, x);
-            let step = (rest / half - length) / density;
+            let step = newton(x);
             let next = x + step;
             x = if next.value().abs() <= 1.0 { next } else { T::constant(next.value().signum()) };
             if step.value().abs() < 1e-15 {
@@ -69,21 +99,18 @@ impl<T: Elementary> Length<T> {
         }
         if !T::IS_PLAIN {
             // Once more for the derivatives, which the last step brings but roughly.
-            let (length, density) = self.within(k, x);
-            x = x + (rest / half - length) / density;
+            x = x + newton(x);
         }
-        self.edge(k) + half * (x + one)
+        self.start + self.whole * T::constant(part.from) + half * (x + one)
     }
+}
 
-    fn part_of(&self, target: T) -> usize {
-        self.so_far[1..PARTS].partition_point(|s| s.value() <= target.value())
-    }
-
-    /// ∫ from −1 to `x` of the density on part `k`, and the density at `x`.
-    fn within(&self, k: usize, x: T) -> (T, T) {
+impl<T: Elementary> Part<T> {
+    /// ∫ from −1 to `x` of the density, and the density at `x`.
+    fn within(&self, x: T) -> (T, T) {
         // ∫P_n = (P_{n+1} − P_{n−1})/(2n + 1).
         let basis = legendre::<T, { NODES + 1 }>(x);
-        let c = &self.density[k];
+        let c = &self.density;
         let mut length = c[0] * (x + T::constant(1.0));
         let mut density = c[0];
         for n in 1..NODES {
@@ -110,6 +137,20 @@ fn legendre<T: Elementary, const N: usize>(x: T) -> [T; N] {
 mod tests {
     use super::*;
     use crate::quadrature::gauss_legendre;
+
+    /// Light that comes straight in: L = r, dτ = dr/r².
+    #[test]
+    fn exact_lengths_from_far_away() {
+        let rule = gauss_legendre(NODES);
+        let radius = 1e9;
+        let length = Length::new([1.0 / radius, 0.5], &rule, |t: f64| t.powi(-2));
+        assert!((length.total() / (radius - 2.0) - 1.0).abs() < 1e-13);
+        assert!(length.parts.len() < 100);
+        for l in [1.0, 1e5, 0.5e9, 1e9 - 100.0] {
+            let r = 1.0 / length.find(l);
+            assert!((r - (radius - l)).abs() < 1e-12 * radius, "{r} after {l}");
+        }
+    }
 
     #[test]
     fn exact_lengths_of_a_known_density() {
