@@ -3,7 +3,8 @@
 
 use crate::kerr::Kerr;
 use crate::length::{self, Length};
-use crate::path::{Outcome, PathPoint};
+use crate::path::Outcome;
+use crate::point::PathPoint;
 use crate::quadrature::{equidistant, gauss_legendre};
 use crate::request::{Placement, Request};
 use crate::scalar::Elementary;
