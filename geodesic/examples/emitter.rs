@@ -4,7 +4,7 @@
 //! `cargo run --release -p kerrlight-geodesic --example emitter`
 
 use kerrlight_geodesic::flow::keplerian_redshift;
-use kerrlight_geodesic::{Inclination, Kerr, Observer, OutOfRange, Tracer, Want, orbits};
+use kerrlight_geodesic::{Inclination, Integrator, Kerr, Observer, OutOfRange, Request, orbits};
 
 /// Rest-frame intensity of the line at radius r: yours to change.
 fn emissivity(r: f64) -> f64 {
@@ -17,19 +17,22 @@ fn main() -> Result<(), OutOfRange> {
     let (inner, outer) = (orbits::isco(&hole), 20.0);
 
     let at = |k: u32| 0.2 * f64::from(k) - 25.0;
-    let screen = (0..250 * 250).map(|k| observer.ray(&hole, at(k % 250), at(k / 250)));
-    let rays = screen.collect::<Result<Vec<_>, _>>()?;
+    let (alpha, beta): (Vec<f64>, Vec<f64>) =
+        (0..250 * 250).map(|k| (at(k % 250), at(k / 250))).unzip();
     // r alone is asked for, so nothing else is integrated.
-    let radii = Tracer::new(1e-8)?.map(&hole, &rays, Want::POLAR, |path| {
-        path.equatorial_crossings().map(|time| path.at(time).radius()).next()
-    });
+    let request = Request { crossings: 1, ..Request::default() };
+    let rays = Integrator::TaylorMino.trace(&hole, &observer, &alpha, &beta, 1e-8, &request)?;
 
     let mut line = [0.0; 30];
-    for (ray, r) in rays.iter().zip(radii) {
-        let Some(r) = r.filter(|r| (inner..outer).contains(r)) else { continue };
-        let Some(g) = keplerian_redshift(&hole, r, ray.lambda) else { continue };
-        // Photons per frequency bin: g³ from the intensity, one more from the bin's width.
-        line[((g * 20.0) as usize).min(29)] += g.powi(4) * emissivity(r);
+    for (ray, alpha) in alpha.iter().enumerate() {
+        for r in rays.crossings.of(ray).map(|k| rays.crossings.radius[k]) {
+            let lambda = -alpha * observer.inclination().sin();
+            let Some(g) = keplerian_redshift(&hole, r, lambda) else { continue };
+            if (inner..outer).contains(&r) {
+                // Photons per frequency bin: g³ from the intensity, one more from its width.
+                line[((g * 20.0) as usize).min(29)] += g.powi(4) * emissivity(r);
+            }
+        }
     }
     let most = line.iter().copied().fold(0.0, f64::max);
     println!("  g    flux");

@@ -2,30 +2,30 @@
 //!
 //! `cargo run --release -p kerrlight-geodesic --example one_ray`
 
-use kerrlight_geodesic::{Inclination, Kerr, Observer, OutOfRange, Path, Tracer, Want};
+use kerrlight_geodesic::{Inclination, Integrator, Kerr, Observer, OutOfRange, Placement, Request};
 
 fn main() -> Result<(), OutOfRange> {
     let hole = Kerr::new(0.94)?;
     let observer = Observer::at_infinity(Inclination::from_degrees(60.0)?);
+    // Everything about the first three crossings of the equatorial plane, and ten points.
+    let request =
+        Request { samples: Placement::MinoTime(10), uncertainty: true, ..Request::crossings(3) };
     // 5.5 M to the left of the hole's centre on the sky, 1 M up.
-    let ray = observer.ray(&hole, -5.5, 1.0)?;
-    println!("λ = {:.6}, η = {:.6}", ray.lambda, ray.eta);
+    let rays = Integrator::default().trace(&hole, &observer, &[-5.5], &[1.0], 1e-12, &request)?;
 
-    let mut path = Path::new();
-    Tracer::new(1e-12)?.trace(&hole, &ray, Want::ALL, &mut path);
-    println!("{:?} after Mino time {:.9}", path.outcome(), path.mino_total());
-    if let Some((_, r)) = path.turning_point() {
-        println!("closest approach: r = {r:.9} M");
+    println!("{:?} after Mino time {:.9}", rays.outcome[0], rays.mino_total[0]);
+    println!("closest approach: r = {:.9} M", rays.turning_radius[0]);
+    let hits = &rays.crossings;
+    for k in hits.of(0) {
+        let (r, phi, t) = (hits.radius[k], hits.azimuth[k], hits.delay[k]);
+        println!("crossing {}: r = {r:.9} M, φ = {phi:+.9}, delay = {t:+.9} M", k + 1);
     }
-    for (k, time) in path.equatorial_crossings().enumerate() {
-        let p = path.at(time);
-        let (k, r, phi, t) = (k + 1, p.radius(), p.azimuth, p.delay);
-        println!("crossing {k}: r = {r:.9} M, φ = {phi:+.9}, delay = {t:+.9} M");
-    }
+    println!("relative error of r at most {:.0e}", rays.uncertainty[0].radius);
     println!("\n     τ         r         θ         φ");
-    for k in 0..=10 {
-        let p = path.at(path.mino_total() * f64::from(k) / 10.0);
-        println!("{:.5} {:>9.4} {:>9.5} {:>+9.5}", p.mino_time, p.radius(), p.theta(), p.azimuth);
+    let p = &rays.samples;
+    for k in p.of(0) {
+        let (time, r, theta, phi) = (p.mino_time[k], p.radius[k], p.theta[k], p.azimuth[k]);
+        println!("{time:.5} {r:>9.4} {theta:>9.5} {phi:>+9.5}");
     }
     Ok(())
 }

@@ -2,26 +2,27 @@
 //!
 //! `cargo run --release -p kerrlight-geodesic --example shadow`
 
-use kerrlight_geodesic::{Inclination, Kerr, Observer, OutOfRange, Outcome, Path, Tracer, Want};
+use kerrlight_geodesic::{Inclination, Integrator, Kerr, Observer, OutOfRange, Outcome, Request};
+
+const COLUMNS: usize = 60;
 
 fn main() -> Result<(), OutOfRange> {
     let hole = Kerr::new(0.998)?;
     let observer = Observer::at_infinity(Inclination::from_degrees(90.0)?);
-    let tracer = Tracer::new(1e-6)?;
-    let mut path = Path::new();
+    let place = |k: usize| (0.25 * (k % COLUMNS) as f64 - 5.5, 6.0 - 0.5 * (k / COLUMNS) as f64);
+    let (alpha, beta): (Vec<f64>, Vec<f64>) = (0..COLUMNS * 25).map(place).unzip();
+
+    // Fates and numbers of crossings come with every ray: nothing else is asked for.
+    let request = Request::default();
+    let rays = Integrator::TaylorMino.trace(&hole, &observer, &alpha, &beta, 1e-6, &request)?;
+    let letter = |k: usize| match rays.outcome[k] {
+        Outcome::Captured => ' ',
+        // Light that went through the equatorial plane more than once is lensed.
+        _ if rays.crossing_count[k] > 1 => 'o',
+        _ => '.',
+    };
     for row in 0..25 {
-        let mut line = String::new();
-        for column in 0..60 {
-            let (alpha, beta) = (0.25 * f64::from(column) - 5.5, 6.0 - 0.5 * f64::from(row));
-            tracer.trace(&hole, &observer.ray(&hole, alpha, beta)?, Want::POLAR, &mut path);
-            line.push(match path.outcome() {
-                Outcome::Captured => ' ',
-                // Light that went through the equatorial plane more than once is lensed.
-                _ if path.equatorial_crossings().len() > 1 => 'o',
-                _ => '.',
-            });
-        }
-        println!("{line}");
+        println!("{}", (0..COLUMNS).map(|k| letter(row * COLUMNS + k)).collect::<String>());
     }
     Ok(())
 }

@@ -1,7 +1,8 @@
 //! The product of every tracer: a bundle of rays in columns.
 
 use crate::kerr::Kerr;
-use crate::path::{Outcome, PathPoint};
+use crate::path::Outcome;
+use crate::point::PathPoint;
 use crate::request::Request;
 use crate::sampling::{Sink, Summary};
 use crate::uncertainty::Uncertainty;

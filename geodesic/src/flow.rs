@@ -2,7 +2,7 @@
 
 use crate::kerr::Kerr;
 use crate::orbits;
-use crate::path::PathPoint;
+use crate::point::PathPoint;
 
 /// g = 1/(uᵗ(1 − Ωλ)) for a circular equatorial geodesic that turns about +z at radius r;
 /// `None` at and inside the photon orbit, where there is none.

@@ -22,7 +22,8 @@ use crate::error::OutOfRange;
 use crate::integrator::check_columns;
 use crate::kerr::Kerr;
 use crate::observer::{Observer, Ray};
-use crate::path::{Outcome, Path, PathPoint};
+use crate::path::{Outcome, Path};
+use crate::point::PathPoint;
 use crate::trace::{Tracer, Want, trace_series};
 
 type Number = Dual<f64, 2>;

@@ -4,6 +4,11 @@
 //! are regular at the poles, for every spin including 0 and ±1, for an observer at
 //! infinity and at every inclination.
 //!
+//! # One ray
+//! An [`Observer`] turns a point of the screen into a [`Ray`] (constants of motion), a [`Tracer`]
+//! follows it into a [`Path`], which knows the outcome, the events, and the position at any Mino
+//! time.
+//!
 //! ```
 //! use kerrlight_geodesic::{Inclination, Kerr, Observer, Outcome, Path, Tracer, Want};
 //!
@@ -14,13 +19,127 @@
 //! tracer.trace(&hole, &observer.ray(&hole, -6.0, 2.0)?, Want::ALL, &mut path);
 //!
 //! assert_eq!(path.outcome(), Outcome::Escaped);
-//! let hit = path.at(path.equatorial_crossings().next().unwrap());
-//! println!("meets the disc at r = {:.6} M, φ = {:.6}", hit.radius(), hit.azimuth);
+//! for time in path.equatorial_crossings() {
+//!     let hit = path.at(time);
+//!     println!("meets the disc at r = {:.6} M, φ = {:.6}", hit.radius(), hit.azimuth);
+//! }
 //! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
 //! ```
 //!
-//! Data flow: [`Observer`] → [`Ray`] (constants of motion) → [`Tracer`] → [`Path`]
-//! (outcome, events, position at any Mino time) → [`Flow`](flow) (redshift factors).
+//! # Many rays
+//! An [`Integrator`] traces whole columns of rays, on all cores with the feature `rayon`, and hands
+//! back a [`Bundle`] of columns: the same from every integrator. A ray depends on nothing but
+//! itself, so the number of threads does not change a bit.
+//!
+//! ```
+//! use kerrlight_geodesic::{Inclination, Integrator, Kerr, Observer, Outcome, Request};
+//!
+//! let hole = Kerr::new(0.0)?;
+//! let observer = Observer::at_infinity(Inclination::from_degrees(30.0)?);
+//! let alpha: Vec<f64> = (0..100).map(|k| 0.1 * f64::from(k)).collect();
+//! let beta = vec![0.0; alpha.len()];
+//! let request = Request::default(); // fates alone
+//! let rays = Integrator::TaylorMino.trace(&hole, &observer, &alpha, &beta, 1e-8, &request)?;
+//! let shadow = rays.outcome.iter().filter(|o| **o == Outcome::Captured).count();
+//! assert_eq!(shadow, 52); // α < √27
+//! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+//! ```
+//!
+//! # Requests
+//! A [`Request`] says what is wanted of each ray: equatorial crossings, samples at a [`Placement`],
+//! azimuth, coordinate time, momentum, path weight, errors. What is not asked for is not
+//! integrated, and its column is empty.
+//!
+//! ```
+//! use kerrlight_geodesic::{Inclination, Integrator, Kerr, Observer, Placement, Request};
+//!
+//! let hole = Kerr::new(0.94)?;
+//! let observer = Observer::at_radius(Inclination::from_degrees(60.0)?, 1000.0)?;
+//! let request = Request {
+//!     samples: Placement::GaussLegendre { points: 8, from: 3.0, to: 20.0 },
+//!     weight: true,
+//!     uncertainty: true,
+//!     ..Request::default()
+//! };
+//! let rays = Integrator::TaylorMino.trace(&hole, &observer, &[-5.0], &[3.0], 1e-12, &request)?;
+//! // An emissivity r⁻² along the ray: ∫ j ds with ds = Σ dτ.
+//! let points = &rays.samples;
+//! let light: f64 = points.of(0).map(|k| points.weight[k] * points.radius[k].powi(-2)).sum();
+//! assert!(light > 0.0 && points.azimuth.is_empty());
+//! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+//! ```
+//!
+//! # Errors
+//! With `uncertainty` each ray carries a bound of the [`Uncertainty`] of its points. Misuse is an
+//! [`OutOfRange`] that names the field, its value and what is allowed; nothing panics. What becomes
+//! of a ray is data: an [`Outcome`], with the reason where it is unresolved.
+//!
+//! ```
+//! # use kerrlight_geodesic::{Inclination, Integrator, Kerr, Observer, Request};
+//! let error = Kerr::new(1.5).unwrap_err();
+//! assert_eq!(error.to_string(), "spin = 1.5 is not allowed: a number in [-1, 1]");
+//! # let hole = Kerr::new(0.5)?;
+//! # let observer = Observer::at_infinity(Inclination::from_degrees(60.0)?);
+//! let request = Request { uncertainty: true, ..Request::crossings(1) };
+//! let rays = Integrator::TaylorMino.trace(&hole, &observer, &[-6.0], &[2.0], 1e-12, &request)?;
+//! assert!(rays.uncertainty[0].radius < 1e-11);
+//! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+//! ```
+//!
+//! # Derivatives
+//! [`derivatives`] has exact slopes of all of it with respect to spin, inclination, α and β.
+//!
+//! ```
+//! use kerrlight_geodesic::{Inclination, Kerr, Observer, Request, derivatives};
+//!
+//! let hole = Kerr::new(0.9)?;
+//! let observer = Observer::at_infinity(Inclination::from_degrees(60.0)?);
+//! let request = Request::crossings(1);
+//! let rays = derivatives::trace(&hole, &observer, &[-6.0], &[2.0], 1e-12, &request)?;
+//! println!("dr/da = {} M", rays.crossings.radius[0].spin);
+//! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+//! ```
+//!
+//! # Cameras
+//! A [`Camera`] has a place, a [`Motion`] and a lens; its rays are traced like others, and
+//! [`Camera::blueshift`] is what its motion does to light.
+//!
+//! ```
+//! use kerrlight_geodesic::{Camera, Inclination, Kerr, Motion, Outcome, Path, Tracer, Want};
+//!
+//! let hole = Kerr::new(0.9)?;
+//! let camera = Camera::new(&hole, Inclination::from_degrees(85.0)?, 12.0, Motion::FreeFall)?;
+//! let mut path = Path::new();
+//! Tracer::new(1e-9)?.trace(&hole, &camera.ray(0.0, 0.0)?, Want::POLAR, &mut path);
+//! assert_eq!(path.outcome(), Outcome::Captured); // straight ahead is the hole
+//! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+//! ```
+//!
+//! # Beams
+//! [`footprint`] has what a small circle on the screen covers of the sky and of the equatorial
+//! plane, for filters and magnifications. (Whole pictures of samples at the highest speed are
+//! those of [`bundle`].)
+//!
+//! ```
+//! use kerrlight_geodesic::{Camera, Inclination, Kerr, Motion, footprint};
+//!
+//! let hole = Kerr::new(0.9)?;
+//! let camera = Camera::new(&hole, Inclination::from_degrees(85.0)?, 12.0, Motion::Static)?;
+//! let beams = footprint::of_camera(&camera, &[1.2], &[0.3], 1e-10, 0)?;
+//! if let Some(sky) = beams.sky[0] {
+//!     let [x, y, z] = sky.direction;
+//!     println!("from ({x:.3}, {y:.3}, {z:.3}), stretched {:.2} times", sky.ellipse().semi_major);
+//! }
+//! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+//! ```
+//!
+//! # Matter and closed forms
+//! [`flow`] and [`plunge`] have the redshift factors of orbiting and falling matter, [`orbits`] the
+//! special radii, [`analytic`] the critical curve, lensing bands and crossings in closed form.
+//!
+//! # Features
+//! `rayon` (default): all cores. `affine`: an independent tracer in the affine parameter. `capi`:
+//! the functions of `include/kerrlight.h` for C.
 
 #[cfg(feature = "affine")]
 mod affine;
@@ -45,6 +164,7 @@ pub mod flow;
 pub mod footprint;
 mod integrator;
 mod kerr;
+mod length;
 mod mino;
 mod observer;
 pub mod orbits;
@@ -52,10 +172,12 @@ pub mod orbits;
 mod parallel;
 mod path;
 pub mod plunge;
+mod point;
 mod polynomial;
 pub mod quadrature;
 mod radial;
 mod request;
+mod run;
 mod runge_kutta;
 mod sampling;
 mod scalar;
@@ -74,7 +196,8 @@ pub use error::OutOfRange;
 pub use integrator::Integrator;
 pub use kerr::Kerr;
 pub use observer::{Inclination, Observer, Ray};
-pub use path::{Outcome, Path, PathPoint, Unresolved};
+pub use path::{Outcome, Path, Unresolved};
+pub use point::PathPoint;
 pub use radial::{Barrier, RadialPotential};
 pub use request::{Placement, Request};
 pub use scalar::{Elementary, Scalar};

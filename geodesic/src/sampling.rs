@@ -2,7 +2,9 @@
 //! number it is made of: with dual numbers every place carries its own derivatives.
 
 use crate::kerr::Kerr;
-use crate::path::{Outcome, PathPoint};
+use crate::length::{self, Length};
+use crate::path::Outcome;
+use crate::point::PathPoint;
 use crate::quadrature::{equidistant, gauss_legendre};
 use crate::request::{Placement, Request};
 use crate::scalar::Elementary;
@@ -59,16 +61,11 @@ pub(crate) struct Sampler<'a, T, S> {
     worst: Uncertainty,
 }
 
-/// Nodes of the rule that measures path length on each of [`PARTS`] parts of a ray.
-const LENGTH_RULE: usize = 12;
-/// Parts of a ray whose lengths are measured by one rule each.
-const PARTS: usize = 16;
-
 /// The Gauss–Legendre rule that a request needs: its own, or that of the path length.
 pub(crate) fn rule(request: &Request) -> Vec<(f64, f64)> {
     match request.samples {
         Placement::GaussLegendre { points, .. } => gauss_legendre(points),
-        Placement::PathLength { .. } => gauss_legendre(LENGTH_RULE),
+        Placement::PathLength { .. } => gauss_legendre(length::NODES),
         _ => Vec::new(),
     }
 }
@@ -120,11 +117,17 @@ impl<'a, T: Elementary, S: Sink<T>> Sampler<'a, T, S> {
         }
     }
 
-    /// Adds the sample at a Mino time that stands for a piece `step` of it.
-    fn sample(&mut self, ray: &impl Trajectory<T>, lambda: T, mino_time: T, step: T) {
+    /// Adds the sample at a Mino time whose path weight is `weight` of Σ there.
+    fn sample(
+        &mut self,
+        ray: &impl Trajectory<T>,
+        lambda: T,
+        mino_time: T,
+        weight: impl Fn(T) -> T,
+    ) {
         let point = ray.at(mino_time);
-        let weight =
-            self.request.weight.then(|| step * self.hole.sigma(point.radius(), point.cos_theta()));
+        let sigma = || self.hole.sigma(point.radius(), point.cos_theta());
+        let weight = self.request.weight.then(|| weight(sigma()));
         self.sink.sample(self.request, self.hole, lambda, &point, weight);
         self.doubt(ray, mino_time);
     }
@@ -141,7 +144,8 @@ impl<'a, T: Elementary, S: Sink<T>> Sampler<'a, T, S> {
                     let length = *end - *start;
                     for (x, weight) in self.rule {
                         let time = *start + length * T::constant(*x);
-                        self.sample(ray, lambda, time, length * T::constant(*weight));
+                        let step = length * T::constant(*weight);
+                        self.sample(ray, lambda, time, |sigma| step * sigma);
                     }
                 }
                 self.pieces = pieces;
@@ -162,7 +166,8 @@ impl<'a, T: Elementary, S: Sink<T>> Sampler<'a, T, S> {
             let first = k == 0 && !self.at_infinity;
             let last = k + 1 == n && (captured || !self.at_infinity);
             let part = if first || last { 0.5 * step } else { step };
-            self.sample(ray, lambda, total * T::constant(share), total * T::constant(part));
+            let step = total * T::constant(part);
+            self.sample(ray, lambda, total * T::constant(share), |sigma| step * sigma);
         }
     }
 
@@ -183,52 +188,14 @@ impl<'a, T: Elementary, S: Sink<T>> Sampler<'a, T, S> {
         n: usize,
     ) {
         let hole = self.hole;
-        let density = |time: T| {
+        let length = Length::new([start, end], self.rule, |time| {
             let point = ray.at(time);
             hole.sigma(point.radius(), point.cos_theta())
-        };
-        let rule = self.rule;
-        let length = |from: T, to: T| -> T {
-            let whole = to - from;
-            let sum = rule.iter().fold(T::constant(0.0), |sum, (x, weight)| {
-                sum + T::constant(*weight) * density(from + whole * T::constant(*x))
-            });
-            sum * whole
-        };
-        let part = (end - start) / T::constant(PARTS as f64);
-        let edge = |k: usize| start + part * T::constant(k as f64);
-        let mut so_far = [T::constant(0.0); PARTS + 1];
-        for k in 0..PARTS {
-            so_far[k + 1] = so_far[k] + length(edge(k), edge(k + 1));
-        }
-        let piece = so_far[PARTS] / T::constant(n as f64);
+        });
+        let piece = length.total() / T::constant(n as f64);
         for k in 0..n {
-            let target = piece * T::constant(k as f64 + 0.5);
-            let at = so_far[1..PARTS].partition_point(|s| s.value() <= target.value());
-            let (lo, hi) = (edge(at), edge(at + 1));
-            // Newton's method from a linear guess; the length grows monotonically.
-            let share = (target - so_far[at]) / (so_far[at + 1] - so_far[at]);
-            let mut time = lo + part * share;
-            let newton = |time: T| (target - so_far[at] - length(lo, time)) / density(time);
-            for _ in 0..6 {
-                let step = newton(time);
-                let next = time + step;
-                time = if next.value() < lo.value() {
-                    lo
-                } else if next.value() > hi.value() {
-                    hi
-                } else {
-                    next
-                };
-                if step.value().abs() < 1e-15 * end.value() {
-                    break;
-                }
-            }
-            if !T::IS_PLAIN {
-                // Once more for the derivatives, which the first steps bring but roughly.
-                time = time + newton(time);
-            }
-            self.sample(ray, lambda, time, piece / density(time));
+            let time = length.find(piece * T::constant(k as f64 + 0.5));
+            self.sample(ray, lambda, time, |_| piece);
         }
     }
 }

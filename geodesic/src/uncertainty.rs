@@ -9,7 +9,7 @@
 //! radial phase.
 
 use crate::kerr::Kerr;
-use crate::path::PathPoint;
+use crate::point::PathPoint;
 use crate::scalar::Elementary;
 
 /// Estimated errors of a position: each bounds the true one for at least 99 % of rays, and is

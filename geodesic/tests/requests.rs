@@ -134,6 +134,12 @@ fn exact_path_length_samples_are_equidistant() {
         assert!((r - expected).abs() < 1e-9, "{r} {expected}");
         assert!((bundle.samples.weight[k] - step).abs() < 1e-10);
     }
+    let far = everything(Placement::PathLength { points: 4, radius: 1e6 });
+    let samples = trace(0.0, &at_infinity(30.0), [0.0, 0.0], &far).samples;
+    for (k, r) in samples.radius.iter().enumerate() {
+        let expected = 1e6 - (1e6 - 2.0) / 4.0 * (k as f64 + 0.5);
+        assert!((r / expected - 1.0).abs() < 1e-9, "{r} {expected}");
+    }
     // A bent ray around a spinning hole: the length between samples by a rule of 200 nodes.
     let hole = Kerr::new(0.95).unwrap();
     let bundle = trace(0.95, &at_infinity(70.0), [-6.0, 3.0], &request);
