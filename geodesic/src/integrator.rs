@@ -262,14 +262,19 @@ impl Trajectory<f64> for AffinePair {
 
     fn uncertainty(&self, mino_time: f64) -> Uncertainty {
         let Some(coarse) = &self.coarse else { return Uncertainty::default() };
-        let (a, b) = (self.fine.at(mino_time), coarse.at(mino_time.min(coarse.mino_total())));
+        let end = coarse.mino_total();
+        let (a, b) = (self.fine.at(mino_time), coarse.at(mino_time.min(end)));
         let turn = (a.azimuth - b.azimuth).rem_euclid(core::f64::consts::TAU);
         let floor = 16.0 * f64::EPSILON;
+        // Back at the observer, where a ray flies out with dr/dτ = r², the ray that ends
+        // earlier is as far behind as its time is short.
+        let r = a.radius();
+        let overrun = (mino_time - end).max(0.0) * r;
         Uncertainty {
-            radius: (b.inverse_radius / a.inverse_radius - 1.0).abs() + floor,
+            radius: (b.inverse_radius / a.inverse_radius - 1.0).abs() + overrun + floor,
             theta: (a.theta() - b.theta()).abs() + floor,
             azimuth: turn.min(core::f64::consts::TAU - turn) + floor,
-            delay: (a.delay - b.delay).abs() + floor * (a.delay.abs() + a.radius()),
+            delay: (a.delay - b.delay).abs() + overrun * r + floor * (a.delay.abs() + r),
         }
     }
 
