@@ -57,7 +57,10 @@ fn fates(hole: &Kerr, rays: &[Ray], bundle: &mut Bundle) {
         bundle.outcome.push(if captured { Outcome::Captured } else { Outcome::Escaped });
         bundle.mino_total.push(total);
         bundle.turning_radius.push(turning.map_or(f64::NAN, |w| 1.0 / w));
-        let count = form.crossings().take_while(|crossing| crossing.mino_time <= total).count();
+        // A ray that lies in the plane does not cross it.
+        let in_plane = ray.position[2] == 0.0 && ray.velocity[2] == 0.0;
+        let before_end = form.crossings().take_while(|crossing| crossing.mino_time <= total);
+        let count = if in_plane { 0 } else { before_end.count() };
         bundle.crossing_count.push(count as u32);
     }
 }
