@@ -70,11 +70,6 @@ impl Oracle {
         self.path.mino_total().hi
     }
 
-    /// How many times the ray crosses the equatorial plane up to a Mino time.
-    pub fn crossings_until(&self, mino_time: f64) -> usize {
-        self.crossings().iter().filter(|time| **time <= mino_time).count()
-    }
-
     /// The position at a Mino time.
     pub fn at(&self, mino_time: f64) -> PathPoint<Double> {
         self.path.at(Double::from(mino_time))
