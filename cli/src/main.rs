@@ -8,6 +8,7 @@ mod inspect;
 mod interferometry;
 mod observe;
 mod output;
+mod progress;
 mod render;
 mod trace;
 mod uv;

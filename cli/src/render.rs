@@ -1,9 +1,9 @@
 //! `kerrlight render`: from a scene to EXR and PNG.
 
 use crate::output::{self, Output};
+use crate::progress;
 use anyhow::Context;
 use clap::{Args, ValueEnum};
-use indicatif::{ProgressBar, ProgressStyle};
 use kerrlight_tomo::emission::sky::Panorama;
 use kerrlight_tomo::image::colormap::Colormap;
 use kerrlight_tomo::image::exr;
@@ -81,7 +81,7 @@ impl Render {
         }
         let picture = sky.as_deref().map(load_sky).transpose()?;
         let start = Instant::now();
-        let bar = progress_bar(u64::from(scene.screen.height));
+        let bar = progress::bar(u64::from(scene.screen.height));
         let rendered = render(&scene, picture, &|rows| {
             bar.inc(rows as u64);
             true
@@ -191,13 +191,6 @@ fn sky_path(scene: &Scene, folder: &Path) -> Option<PathBuf> {
 fn load_sky(path: &Path) -> anyhow::Result<Panorama> {
     let bytes = output::read(path).context("`sky.image.path`")?;
     Panorama::decode(&bytes).with_context(|| format!("`sky.image.path` {}", path.display()))
-}
-
-/// A bar with the time left on a terminal, nothing in a pipe.
-fn progress_bar(rows: u64) -> ProgressBar {
-    let style = "{bar:40} {percent:>3} %  {elapsed} gone, {eta} left";
-    let bar = ProgressBar::new(rows);
-    bar.with_style(ProgressStyle::with_template(style).unwrap_or(ProgressStyle::default_bar()))
 }
 
 /// What decided the picture.

@@ -5,7 +5,7 @@ use crate::mino::{System, has_azimuth, has_time, index};
 use crate::observer::Ray;
 use crate::path::{Outcome, Path, Segment, Unresolved, turn};
 use crate::scalar::Elementary;
-use crate::stepper::{LONGEST_STEP, Made, State, Stepper};
+use crate::stepper::{Made, State, Stepper};
 use crate::uncertainty::Budget;
 
 /// One ray under way, with `N` variables.
@@ -54,7 +54,7 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
     pub fn go(mut self, max_steps: u32) {
         self.stepper.restart(&self.state, &mut self.path.series);
         for _ in 0..max_steps {
-            let made = self.stepper.step(&self.state, &mut self.path.series, LONGEST_STEP);
+            let made = self.stepper.step(&self.state, &mut self.path.series);
             let Some(made) = made else { continue };
             let h = made.h;
             let ended = self.accept(made);

@@ -34,14 +34,9 @@ pub(crate) trait Stepper<T, const N: usize> {
     /// Coefficients of each polynomial.
     fn width(&self) -> usize;
 
-    /// Tries a step of at most `room`; `None` if its error was too large. The next one will
+    /// Tries a step; `None` if its error was too large. The next one will
     /// then be shorter.
-    fn step(
-        &mut self,
-        state: &State<'_, T, N>,
-        series: &mut Series<T>,
-        room: f64,
-    ) -> Option<Made<T, N>>;
+    fn step(&mut self, state: &State<'_, T, N>, series: &mut Series<T>) -> Option<Made<T, N>>;
 
     /// Appends the polynomials of the step of length `h` from `state` to `end`.
     fn dense(
@@ -166,13 +161,8 @@ impl<M: Method<S>, const N: usize, const S: usize, const D: usize> Stepper<f64, 
     }
 
     #[inline(always)]
-    fn step(
-        &mut self,
-        state: &State<'_, f64, N>,
-        _: &mut Series<f64>,
-        room: f64,
-    ) -> Option<Made<f64, N>> {
-        let h = self.h.min(room);
+    fn step(&mut self, state: &State<'_, f64, N>, _: &mut Series<f64>) -> Option<Made<f64, N>> {
+        let h = self.h;
         let mut trial = step::<M, N, S>(&state.system, &state.y, &self.slope, state.leg, h);
         let last = [trial.f[index::AZIMUTH.min(N - 1)], trial.f[N - 1]];
         let allowed = state.allowed(&trial.y, last, h);
@@ -301,18 +291,13 @@ impl<T: Elementary, const N: usize> Stepper<T, N> for Taylor {
     }
 
     #[inline(always)]
-    fn step(
-        &mut self,
-        state: &State<'_, T, N>,
-        series: &mut Series<T>,
-        room: f64,
-    ) -> Option<Made<T, N>> {
+    fn step(&mut self, state: &State<'_, T, N>, series: &mut Series<T>) -> Option<Made<T, N>> {
         series.expand(&state.system, &state.y, T::constant(state.leg), self.order);
         let slope = |k: usize| series.row(k, 1)[1].value();
         let slopes =
             if has_azimuth(N) { [slope(4), slope(rows(N) - 1)] } else { [slope(rows(N) - 1), 0.0] };
         let allowed = state.allowed(&state.y, slopes, LONGEST_STEP);
-        let h = (self.length(series, &allowed) * self.shrink).min(LONGEST_STEP).min(room);
+        let h = (self.length(series, &allowed) * self.shrink).min(LONGEST_STEP);
         let y: [T; N] = series.state(T::constant(h), self.order);
         if h.is_nan() || y.iter().any(|y| !y.value().is_finite()) {
             self.shrink *= 0.5;

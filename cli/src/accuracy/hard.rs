@@ -1,6 +1,7 @@
 //! Millions of random rays that look for trouble.
 
-use super::{Accuracy, progress_bar};
+use super::Accuracy;
+use crate::progress;
 use anyhow::bail;
 use kerrlight_validation::accuracy::hard::{self, Tally};
 use kerrlight_validation::accuracy::rays::{Angle, Draw};
@@ -70,7 +71,7 @@ fn describe(ray: &Draw) -> String {
 pub fn run(arguments: &Accuracy, rays: u64, stop: &AtomicBool) -> anyhow::Result<()> {
     let csv = arguments.place("hard.csv", "csv")?;
     let json = arguments.place("hard.json", "json")?;
-    let bar = progress_bar(rays);
+    let bar = progress::bar(rays);
     let (integrator, tolerance) = (arguments.integrator, arguments.tolerance);
     let tallies = hard::run(integrator, tolerance, rays, arguments.seed, |done| {
         bar.inc(done);

@@ -5,9 +5,9 @@ mod picture;
 mod table;
 
 use crate::output::Output;
+use crate::progress;
 use anyhow::{Context, bail};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use kerrlight_validation::accuracy::sweep::{self, Sweep};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -58,7 +58,7 @@ impl Accuracy {
         let [csv, json, svg, png] = files;
         let (csv, json, svg, png) = (csv?, json?, svg?, png?);
         let sweep = Sweep::full(self.rays as usize, self.seed);
-        let bar = progress_bar(1);
+        let bar = progress::bar(1);
         let rows = sweep::run(&sweep, |done, of| {
             bar.set_length(of as u64);
             bar.set_position(done as u64);
@@ -68,9 +68,9 @@ impl Accuracy {
         if stop.load(Ordering::Relaxed) {
             bail!("interrupted: nothing was written");
         }
+        let figure = picture::figure(&rows)?;
         csv.write(&table::csv(&rows)?)?;
         json.write(&table::json(&rows, &sweep)?)?;
-        let figure = picture::figure(&rows);
         svg.write(figure.svg.as_bytes())?;
         png.write(&figure.png)?;
         crate::output::print(&table::summary(&rows))
@@ -92,10 +92,4 @@ fn on_interrupt() -> anyhow::Result<Arc<AtomicBool>> {
     let raised = Arc::clone(&flag);
     ctrlc::set_handler(move || raised.store(true, Ordering::Relaxed))?;
     Ok(flag)
-}
-
-fn progress_bar(length: u64) -> ProgressBar {
-    let style = "{bar:40} {percent:>3} %  {elapsed} gone, {eta} left";
-    let bar = ProgressBar::new(length);
-    bar.with_style(ProgressStyle::with_template(style).unwrap_or(ProgressStyle::default_bar()))
 }

@@ -1,5 +1,6 @@
 //! What one more digit costs, in one picture.
 
+use anyhow::anyhow;
 use kerrlight_geodesic::Integrator;
 use kerrlight_validation::accuracy::rays::Class;
 use kerrlight_validation::accuracy::sweep::Row;
@@ -22,7 +23,10 @@ const SAMPLES: f64 = 100.0;
 const COLORS: [&str; 5] = ["#999999", "#E69F00", "#009E73", "#0072B2", "#D55E00"];
 
 /// Two panels: rays anywhere, and rays next to the critical curve.
-pub fn figure(rows: &[Row]) -> Picture {
+///
+/// # Errors
+/// If the bitmap cannot be drawn.
+pub fn figure(rows: &[Row]) -> anyhow::Result<Picture> {
     // Next to the critical curve one ray in a hundred has no digits left in any arithmetic.
     let panels = [(Class::Generic, 1, "99 % of rays"), (Class::NearCritical, 0, "the median ray")];
     let (plots, layouts) = panels.iter().map(|panel| self::panel(rows, *panel)).unzip();
@@ -34,7 +38,8 @@ pub fn figure(rows: &[Row]) -> Picture {
     let scene = figure.render();
     let svg = kuva::backend::svg::SvgBackend::new().render_scene(&scene);
     let png = kuva::backend::png::PngBackend::new().with_scale(1.5).render_scene(&scene);
-    Picture { svg, png: png.unwrap_or_default() }
+    let png = png.map_err(|error| anyhow!("cannot draw: {error}"))?;
+    Ok(Picture { svg, png })
 }
 
 /// Correct digits at a quantile of one class against time, a line an integrator.

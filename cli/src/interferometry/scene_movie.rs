@@ -1,8 +1,8 @@
 //! A scene, rendered at the times of scans.
 
 use crate::output;
+use crate::progress;
 use anyhow::{Context, bail};
-use indicatif::{ProgressBar, ProgressStyle};
 use kerrlight_tomo::interferometry::operator::ImageGrid;
 use kerrlight_tomo::interferometry::simulate::Movie;
 use kerrlight_tomo::render::render;
@@ -33,7 +33,7 @@ pub fn read(path: &Path, times_h: &[f64]) -> anyhow::Result<Movie> {
         bail!("{}: {} frames of {width} x {height} pixels are too many", name(), frames.len());
     }
     let start = scene.observer.time;
-    let bar = progress_bar(frames.len() as u64);
+    let bar = progress::frames(frames.len() as u64);
     let mut pixels = Vec::with_capacity(frames.len() * grid.pixels());
     let mut first_factor = None;
     for time in frames {
@@ -48,10 +48,4 @@ pub fn read(path: &Path, times_h: &[f64]) -> anyhow::Result<Movie> {
     }
     bar.finish_and_clear();
     Ok(Movie { grid, pixels })
-}
-
-fn progress_bar(frames: u64) -> ProgressBar {
-    let style = "{bar:40} frame {pos} of {len}  {elapsed} gone, {eta} left";
-    let bar = ProgressBar::new(frames);
-    bar.with_style(ProgressStyle::with_template(style).unwrap_or(ProgressStyle::default_bar()))
 }

@@ -2,7 +2,7 @@
 //! neighbours, tiny and huge impact parameters, the neighbourhood of the critical curve.
 
 use super::rays::{Angle, Draw, beside_critical_curve, in_disc, log_uniform};
-use super::{Oracle, Truth};
+use super::{Oracle, TrueError};
 use kerrlight_geodesic::{
     Bundle, Integrator, Kerr, OutOfRange, Outcome, Placement, Request, Uncertainty, Unresolved,
 };
@@ -250,7 +250,7 @@ fn same_crossings(hole: &Kerr, bundle: &Bundle, oracle: &Oracle) -> bool {
 }
 
 /// The largest of the errors over their estimates.
-fn ratio(truth: &Truth, estimate: &Uncertainty) -> f64 {
+fn ratio(truth: &TrueError, estimate: &Uncertainty) -> f64 {
     let pairs = [
         (truth.radius, estimate.radius),
         (truth.theta, estimate.theta),
@@ -265,8 +265,8 @@ fn ratio(truth: &Truth, estimate: &Uncertainty) -> f64 {
 }
 
 /// The largest errors of a ray's points, and whether all its numbers are finite.
-fn errors(bundle: &Bundle, oracle: &Oracle) -> (Truth, bool) {
-    let mut worst = Truth::default();
+fn errors(bundle: &Bundle, oracle: &Oracle) -> (TrueError, bool) {
+    let mut worst = TrueError::default();
     let mut finite = true;
     // Later crossings crowd at the horizon of a hole that turns as fast as it can.
     for (points, most) in [(&bundle.crossings, 2), (&bundle.samples, usize::MAX)] {

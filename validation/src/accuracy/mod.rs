@@ -14,4 +14,4 @@ mod oracle;
 pub mod rays;
 pub mod sweep;
 
-pub use oracle::{Oracle, Truth};
+pub use oracle::{Oracle, TrueError};

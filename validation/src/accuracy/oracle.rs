@@ -15,7 +15,7 @@ pub struct Oracle {
 
 /// True errors of a position.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Truth {
+pub struct TrueError {
     /// Of the radius, relative.
     pub radius: f64,
     /// Of the polar angle, in radians.
@@ -26,10 +26,10 @@ pub struct Truth {
     pub delay: f64,
 }
 
-impl Truth {
+impl TrueError {
     /// The larger of both in every component.
     pub fn max(self, o: Self) -> Self {
-        Truth {
+        TrueError {
             radius: self.radius.max(o.radius),
             theta: self.theta.max(o.theta),
             azimuth: self.azimuth.max(o.azimuth),
@@ -76,11 +76,11 @@ impl Oracle {
     }
 
     /// The errors of a position (r, θ, φ, delay) at a Mino time.
-    pub fn judge(&self, mino_time: f64, [r, theta, azimuth, delay]: [f64; 4]) -> Truth {
+    pub fn judge(&self, mino_time: f64, [r, theta, azimuth, delay]: [f64; 4]) -> TrueError {
         let truth = self.at(mino_time);
         let miss = |x: f64, truth: Double| (Double::from(x) - truth).hi;
         let turn = miss(azimuth, truth.azimuth);
-        Truth {
+        TrueError {
             radius: miss(r, truth.radius()).abs() / r,
             theta: miss(theta, truth.theta()).abs(),
             azimuth: (turn - TAU * (turn / TAU).round()).abs(),

@@ -1,7 +1,7 @@
 //! Integrator × tolerance × spin × class of ray.
 
 use super::rays::{Class, Draw, draw};
-use super::{Oracle, Truth};
+use super::{Oracle, TrueError};
 use kerrlight_geodesic::{Bundle, Integrator, Kerr, OutOfRange, Placement, Request, Uncertainty};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
@@ -127,7 +127,7 @@ pub fn run(sweep: &Sweep, progress: impl Fn(usize, usize) -> bool) -> Result<Vec
 /// One ray by one setting.
 struct Judged {
     right_fate: bool,
-    truth: Truth,
+    truth: TrueError,
     estimate: Uncertainty,
 }
 
@@ -160,7 +160,7 @@ fn judge(
 
 fn judged(bundle: &Bundle, class: Class, spin: f64, oracle: &Oracle) -> Judged {
     let samples = &bundle.samples;
-    let mut truth = Truth::default();
+    let mut truth = TrueError::default();
     for k in 0..samples.len() {
         if counts(class, spin, samples.radius[k]) {
             let at = [samples.radius[k], samples.theta[k], samples.azimuth[k], samples.delay[k]];
@@ -202,12 +202,15 @@ fn time(rays: &[Vec<Draw>], setting: (Integrator, f64)) -> Result<[f64; 2], OutO
         }
         Ok(1e9 * best / count)
     };
-    let one_core = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-    let one_core = one_core.expect("one thread can be started");
-    one_core.install(|| {
+    let measure = || {
         let (none, some) = (best(0)?, best(100)?);
         Ok([none, ((some - none) / 100.0).max(0.0)])
-    })
+    };
+    match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
+        Ok(one_core) => one_core.install(measure),
+        // No thread to be had: no time either.
+        Err(_) => Ok([f64::NAN; 2]),
+    }
 }
 
 /// Median, 99 % quantile and maximum.

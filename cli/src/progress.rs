@@ -1,0 +1,18 @@
+//! Bars with the time left on a terminal, nothing in a pipe.
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// A bar that shows how much of the work is done.
+pub fn bar(length: u64) -> ProgressBar {
+    styled(length, "{bar:40} {percent:>3} %  {elapsed} gone, {eta} left")
+}
+
+/// A bar that counts frames.
+pub fn frames(count: u64) -> ProgressBar {
+    styled(count, "{bar:40} frame {pos} of {len}  {elapsed} gone, {eta} left")
+}
+
+fn styled(length: u64, style: &str) -> ProgressBar {
+    let style = ProgressStyle::with_template(style).unwrap_or(ProgressStyle::default_bar());
+    ProgressBar::new(length).with_style(style)
+}
