@@ -1,0 +1,118 @@
+//! The only place where a pixel is a sum: light of every source along one ray.
+
+mod glimpse;
+mod spots;
+mod surface;
+
+pub use glimpse::{Fate, Glimpse};
+
+use crate::emission::disc::DiscModel;
+use crate::emission::sky::{Panorama, SkyModel};
+use crate::emission::spot::SpotModel;
+use crate::scene::Scene;
+use glimpse::Gather;
+use kerrlight_geodesic::{
+    Inclination, Kerr, Observer, OutOfRange, Outcome, Path, PathPoint, Tracer, Want,
+};
+
+/// A scene with everything computed that does not depend on the ray.
+#[derive(Debug, Clone)]
+pub struct Stage {
+    /// The hole.
+    pub hole: Kerr,
+    /// The observer.
+    pub observer: Observer,
+    tracer: Tracer,
+    time: f64,
+    /// Spectral index α, if redshift is simulated.
+    redshift: Option<f64>,
+    slow_light: bool,
+    disc: Option<DiscModel>,
+    spots: Vec<SpotModel>,
+    sky: Option<SkyModel>,
+}
+
+/// Memory that is reused from ray to ray.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    path: Path,
+    intervals: Vec<[f64; 2]>,
+}
+
+impl Stage {
+    /// The stage of a scene; `picture` is the decoded file of a `[sky.image]`.
+    ///
+    /// # Errors
+    /// If a value is outside its range (a parsed [`Scene`] never is).
+    pub fn new(scene: &Scene, picture: Option<Panorama>) -> Result<Self, OutOfRange> {
+        let hole = Kerr::new(scene.hole.spin)?;
+        let inclination = Inclination::from_degrees(scene.observer.inclination_deg)?;
+        let observer = if scene.observer.radius.is_finite() {
+            Observer::at_radius(inclination, scene.observer.radius)?
+        } else {
+            Observer::at_infinity(inclination)
+        };
+        Ok(Stage {
+            hole,
+            observer: observer.with_azimuth(scene.observer.azimuth_deg.to_radians()),
+            tracer: Tracer::with_method(scene.tracer.integrator.method(), scene.tracer.tolerance)?,
+            time: scene.observer.time,
+            redshift: scene.effects.redshift.then_some(scene.effects.spectral_index).flatten(),
+            slow_light: scene.effects.slow_light,
+            disc: scene.disc.as_ref().map(|disc| DiscModel::new(disc, &hole)),
+            spots: scene.spot.iter().map(|spot| SpotModel::new(spot, &hole)).collect(),
+            sky: scene.sky.as_ref().and_then(|sky| SkyModel::new(sky, picture)),
+        })
+    }
+
+    /// Whether g is computed.
+    pub fn has_redshift(&self) -> bool {
+        self.redshift.is_some()
+    }
+
+    /// What is seen at (α, β).
+    ///
+    /// # Errors
+    /// If no ray with these coordinates reaches the observer.
+    pub fn look(
+        &self,
+        alpha: f64,
+        beta: f64,
+        scratch: &mut Scratch,
+    ) -> Result<Glimpse, OutOfRange> {
+        let ray = self.observer.ray(&self.hole, alpha, beta)?;
+        self.tracer.trace(&self.hole, &ray, Want::ALL, &mut scratch.path);
+        let mut gather = Gather::new();
+        let surface = self.add_disc(&ray, &scratch.path, &mut gather);
+        let end = surface.unwrap_or_else(|| scratch.path.mino_total());
+        self.add_spots(scratch, end, &mut gather);
+        let path = &scratch.path;
+        let fate = match (surface, path.outcome()) {
+            (Some(_), _) => Fate::Surface,
+            (None, Outcome::Captured) => Fate::Captured,
+            (None, Outcome::Escaped) => Fate::Escaped,
+            (None, Outcome::Unresolved(_)) => Fate::Unresolved,
+        };
+        if let (Some(sky), Fate::Escaped) = (&self.sky, fate) {
+            let seen = sky.look(path.at(path.mino_total()).direction);
+            for (channel, light) in gather.rgb.iter_mut().zip(seen) {
+                *channel += light;
+            }
+        }
+        let mean = if gather.intensity > 0.0 { gather.shift / gather.intensity } else { 0.0 };
+        Ok(Glimpse {
+            intensity: gather.intensity,
+            rgb: gather.rgb,
+            redshift: mean,
+            crossings: path.equatorial_crossings().len() as u32,
+            radius: gather.radius,
+            azimuth: gather.azimuth,
+            delay: gather.delay,
+            fate,
+        })
+    }
+
+    fn emission_time(&self, point: &PathPoint) -> f64 {
+        if self.slow_light { self.time - point.delay } else { self.time }
+    }
+}
