@@ -3,7 +3,7 @@
 use kerrlight_geodesic::PathPoint;
 
 /// What became of a pixel's ray, as written into the `outcome` channel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Fate {
     /// Fell into the hole (0).
     Captured = 0,
@@ -12,11 +12,12 @@ pub enum Fate {
     /// Met an opaque surface (2).
     Surface = 2,
     /// Was given up (3).
+    #[default]
     Unresolved = 3,
 }
 
 /// What one ray sees.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Glimpse {
     /// Intensity of all emission (the sky left out), in the scene's unit.
     pub intensity: f64,
@@ -37,6 +38,7 @@ pub struct Glimpse {
 }
 
 /// Light gathered along one ray.
+#[derive(Clone)]
 pub(super) struct Gather {
     pub intensity: f64,
     pub shift: f64,

@@ -65,12 +65,17 @@ impl Stage {
         })
     }
 
+    /// The scene's own time of observation, in M.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
     /// Whether g is computed.
     pub fn has_redshift(&self) -> bool {
         self.redshift.is_some()
     }
 
-    /// What is seen at (α, β).
+    /// What is seen at (α, β) at the scene's own time.
     ///
     /// # Errors
     /// If no ray with these coordinates reaches the observer.
@@ -80,12 +85,49 @@ impl Stage {
         beta: f64,
         scratch: &mut Scratch,
     ) -> Result<Glimpse, OutOfRange> {
-        let ray = self.observer.ray(&self.hole, alpha, beta)?;
-        self.tracer.trace(&self.hole, &ray, Want::ALL, &mut scratch.path);
-        let mut gather = Gather::new();
-        let surface = self.add_disc(&ray, &scratch.path, &mut gather);
+        let mut seen = [Glimpse::default()];
+        self.look_many(&[alpha], &[beta], &[self.time], scratch, &mut seen)?;
+        let [seen] = seen;
+        Ok(seen)
+    }
+
+    /// What is seen at each (`alpha[k]`, `beta[k]`) at each of `times` (of observation, in M):
+    /// ray `k` at time `j` goes to `seen[j · rays + k]`. Rays are traced once for all times.
+    ///
+    /// # Errors
+    /// If no ray with these coordinates reaches the observer.
+    pub fn look_many(
+        &self,
+        alpha: &[f64],
+        beta: &[f64],
+        times: &[f64],
+        scratch: &mut Scratch,
+        seen: &mut [Glimpse],
+    ) -> Result<(), OutOfRange> {
+        let rays = alpha.len().max(1);
+        for (k, (alpha, beta)) in alpha.iter().zip(beta).enumerate() {
+            let ray = self.observer.ray(&self.hole, *alpha, *beta)?;
+            self.tracer.trace(&self.hole, &ray, Want::ALL, &mut scratch.path);
+            let mut still = Gather::new();
+            let surface = self.add_disc(&ray, &scratch.path, &mut still);
+            let places = seen.iter_mut().skip(k).step_by(rays);
+            for (time, place) in times.iter().zip(places) {
+                *place = self.glimpse(*time, still.clone(), surface, scratch);
+            }
+        }
+        Ok(())
+    }
+
+    /// What one traced ray sees at one time; `still` is what does not depend on it.
+    fn glimpse(
+        &self,
+        time: f64,
+        mut gather: Gather,
+        surface: Option<f64>,
+        scratch: &mut Scratch,
+    ) -> Glimpse {
         let end = surface.unwrap_or_else(|| scratch.path.mino_total());
-        self.add_spots(scratch, end, &mut gather);
+        self.add_spots(time, scratch, end, &mut gather);
         let path = &scratch.path;
         let fate = match (surface, path.outcome()) {
             (Some(_), _) => Fate::Surface,
@@ -100,7 +142,7 @@ impl Stage {
             }
         }
         let mean = if gather.intensity > 0.0 { gather.shift / gather.intensity } else { 0.0 };
-        Ok(Glimpse {
+        Glimpse {
             intensity: gather.intensity,
             rgb: gather.rgb,
             redshift: mean,
@@ -109,10 +151,11 @@ impl Stage {
             azimuth: gather.azimuth,
             delay: gather.delay,
             fate,
-        })
+        }
     }
 
-    fn emission_time(&self, point: &PathPoint) -> f64 {
-        if self.slow_light { self.time - point.delay } else { self.time }
+    /// When the light that is seen at `time` passed a point.
+    fn emission_time(&self, time: f64, point: &PathPoint) -> f64 {
+        if self.slow_light { time - point.delay } else { time }
     }
 }

@@ -9,11 +9,18 @@ use kerrlight_geodesic::{Path, PathPoint};
 
 impl Stage {
     /// Light of the spots between the observer and Mino time `end`: ∫ g^{2+α} j Σ dτ.
-    pub(super) fn add_spots(&self, scratch: &mut Scratch, end: f64, gather: &mut Gather) {
+    pub(super) fn add_spots(
+        &self,
+        time: f64,
+        scratch: &mut Scratch,
+        end: f64,
+        gather: &mut Gather,
+    ) {
         for spot in &self.spots {
             let [lo, hi] = spot.shell();
             let lo = lo.max(self.hole.horizon());
-            let mut total = SpotLight { spot, before: gather.intensity, brightest: None };
+            let mut total =
+                SpotLight { spot, observed: time, before: gather.intensity, brightest: None };
             scratch.path.intervals_within(lo, hi, &mut scratch.intervals);
             for &[from, to] in &scratch.intervals {
                 let to = to.min(end);
@@ -38,17 +45,17 @@ impl Stage {
     ) {
         let pieces = ((to - from) * path.angular_rate() / LARGEST_TURN).ceil().max(1.0);
         let step = (to - from) / pieces;
-        let mut start = self.node(light.spot, path.at(from));
+        let mut start = self.node(light, path.at(from));
         for k in 1..=pieces as usize {
-            let end = self.node(light.spot, path.at(from + step * k as f64));
+            let end = self.node(light, path.at(from + step * k as f64));
             self.add_piece(path, light, [&start, &end], 0, gather);
             start = end;
         }
     }
 
-    fn node(&self, spot: &SpotModel, point: PathPoint) -> SpotNode {
-        let (position, time) = (point.cartesian(), self.emission_time(&point));
-        SpotNode { point, position, time, carried: spot.comoving(position, time) }
+    fn node(&self, light: &SpotLight<'_>, point: PathPoint) -> SpotNode {
+        let (position, time) = (point.cartesian(), self.emission_time(light.observed, &point));
+        SpotNode { point, position, time, carried: light.spot.comoving(position, time) }
     }
 
     /// Halves a piece until it is short against the spot or lies outside of it, then sums.
@@ -67,13 +74,13 @@ impl Stage {
         }
         let (from, to) = (start.point.mino_time, end.point.mino_time);
         if length > light.spot.sigma() && depth < DEEPEST {
-            let middle = self.node(light.spot, path.at(0.5 * (from + to)));
+            let middle = self.node(light, path.at(0.5 * (from + to)));
             self.add_piece(path, light, [start, &middle], depth + 1, gather);
             self.add_piece(path, light, [&middle, end], depth + 1, gather);
             return;
         }
         for (mino_time, weight) in gauss_4(from, to) {
-            self.add_node(&self.node(light.spot, path.at(mino_time)), weight, light, gather);
+            self.add_node(&self.node(light, path.at(mino_time)), weight, light, gather);
         }
     }
 
@@ -110,6 +117,8 @@ impl Stage {
 /// One spot's light along one ray.
 struct SpotLight<'a> {
     spot: &'a SpotModel,
+    /// Time of observation.
+    observed: f64,
     /// Intensity gathered before this spot.
     before: f64,
     /// The brightest point, and its emission per length.
