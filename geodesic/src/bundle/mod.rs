@@ -38,8 +38,11 @@ mod dispatch;
 mod elliptic;
 mod error;
 mod lanes;
+mod march;
 mod math;
 mod motion;
+mod nodes;
+mod panel;
 mod polar;
 mod radial;
 mod sample;
@@ -47,6 +50,8 @@ mod samples;
 
 pub use crossings::{Crossing, Crossings};
 pub use dispatch::Width;
+pub use nodes::{NodeRequest, Nodes, RayNodes};
+pub use panel::PanelRule;
 pub use samples::{RaySamples, Samples};
 
 use crate::error::{OutOfRange, check};
