@@ -1,7 +1,7 @@
 //! Nodes of quadratures along many rays against the Taylor tracer and closed forms.
 
-use kerrlight_geodesic::bundle::{NodeRequest, Nodes, PanelRule};
-use kerrlight_geodesic::{Inclination, Kerr, Observer, Path, Tracer, Want};
+use kerrlight_geodesic::bundle::{Crossings, NodeRequest, Nodes, PanelRule};
+use kerrlight_geodesic::{Inclination, Kerr, Observer, Outcome, Path, Tracer, Want};
 
 fn request(radius: f64) -> NodeRequest {
     let rule = PanelRule::new(8);
@@ -121,4 +121,40 @@ fn exact_nodes_end_where_they_are_told_to() {
             }
         }
     }
+}
+
+#[test]
+fn code_ends_of_rays_are_those_of_the_tracer() {
+    let tracer = Tracer::new(1e-13).unwrap();
+    let (alpha, beta) = screen();
+    let (mut path, mut found, mut captured) = (Path::new(), Crossings::default(), 0);
+    for (spin, inclination, radius) in
+        [(0.0, 0.0, f64::INFINITY), (0.9, 60.0, 1000.0), (-0.5, 90.0, 30.0), (1.0, 17.0, 1e6)]
+    {
+        let hole = Kerr::new(spin).unwrap();
+        let inclination = Inclination::from_degrees(inclination).unwrap();
+        let observer = match radius {
+            f64::INFINITY => Observer::at_infinity(inclination),
+            radius => Observer::at_radius(inclination, radius).unwrap(),
+        };
+        found.trace(&hole, &observer, &alpha, &beta, 2).unwrap();
+        for k in 0..alpha.len() {
+            let ray = observer.ray(&hole, alpha[k], beta[k]).unwrap();
+            tracer.trace(&hole, &ray, Want::ALL, &mut path);
+            let ends = found.ends(k);
+            if ends.error > 1e-9 {
+                continue;
+            }
+            assert_eq!(ends.escapes, path.outcome() == Outcome::Escaped);
+            captured += u32::from(!ends.escapes);
+            let total = match path.turning_point() {
+                Some((turning, _)) if radius.is_finite() => 2.0 * turning,
+                _ => path.mino_total(),
+            };
+            assert!((ends.mino_total / total - 1.0).abs() < 1e-10, "{}", ends.mino_total);
+            let crossings = path.equatorial_crossings().filter(|time| *time <= total).count();
+            assert_eq!(ends.crossings as usize, crossings, "{} {}", alpha[k], beta[k]);
+        }
+    }
+    assert!(captured > 100);
 }

@@ -30,6 +30,33 @@ pub(super) struct Target<'a> {
     pub azimuth: &'a mut [f64],
     pub mino_time: &'a mut [f64],
     pub error: &'a mut [f64],
+    pub rays: Whole<'a>,
+}
+
+/// What is known about each ray as a whole.
+pub(super) struct Whole<'a> {
+    /// Mino time of the ray.
+    pub duration: &'a mut [f64],
+    /// Whether it returns to the observer's radius (1) or is captured (0).
+    pub escapes: &'a mut [f64],
+    /// How many times it crosses the plane.
+    pub count: &'a mut [f64],
+    /// Error of its phase, as an angle.
+    pub doubt: &'a mut [f64],
+}
+
+impl Whole<'_> {
+    /// Stores the lanes of the rays from number `from` to `to`.
+    #[inline(always)]
+    fn store<V: Real>(&mut self, from: usize, to: usize, [time, escapes, count, doubt]: [V; 4]) {
+        time.store(&mut self.duration[from..to]);
+        escapes.store(&mut self.escapes[from..to]);
+        count.store(&mut self.count[from..to]);
+        doubt.store(&mut self.doubt[from..to]);
+        for count in &mut self.count[from..to] {
+            *count = count.floor();
+        }
+    }
 }
 
 /// The work of one block of rays, at any width of lanes.
@@ -53,7 +80,8 @@ impl Task for Block<'_, '_> {
             let to = alpha.len().min(from + V::LANES);
             let (alpha, beta) = (V::load(&alpha[from..to]), V::load(&beta[from..to]));
             let rays = Bundle::new(&camera, start, alpha, beta);
-            let Target { delay, radius, azimuth, mino_time, error } = &mut *out;
+            out.rays.store(from, to, rays.whole());
+            let Target { delay, radius, azimuth, mino_time, error, .. } = &mut *out;
             let columns = [&mut **delay, radius, azimuth, mino_time, error]
                 .map(|column| &mut column[from * count..to * count]);
             let (point, polar) = rays.first();
@@ -104,6 +132,19 @@ impl<'a, V: Real> Bundle<'a, V> {
         let journey = Journey::new(camera, &motion);
         let (time, half) = polar_times(camera, &motion, beta);
         Self { camera, start, motion, journey, alpha, beta, time, half }
+    }
+
+    /// Mino time, fate, number of crossings with a fraction on top, and error of the phase.
+    #[inline(always)]
+    fn whole(&self) -> [V; 4] {
+        let s = V::splat;
+        let Journey { duration, escapes, condition, .. } = self.journey;
+        let crosses = self.time.lt(duration);
+        let safe = V::select(crosses, self.half, s(1.0));
+        let count = (duration - self.time) / safe + s(1.0);
+        let b = self.motion.stiffness().sqrt();
+        let doubt = estimate(condition, b, b, s(MAX_STEP), s(0.0));
+        [duration, escapes, V::select(crosses, count, s(0.0)), doubt]
     }
 
     /// The first crossing and the polar motion up to it; NaN where there is none.

@@ -48,7 +48,7 @@ mod radial;
 mod sample;
 mod samples;
 
-pub use crossings::{Crossing, Crossings};
+pub use crossings::{Crossing, Crossings, RayEnds};
 pub use dispatch::Width;
 pub use nodes::{NodeRequest, Nodes, RayNodes};
 pub use panel::PanelRule;
