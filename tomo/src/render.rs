@@ -179,7 +179,13 @@ fn assemble(
 /// Factor and name of the unit of intensity: the scene's own, or Jy/µas² such that the
 /// picture holds the flux that was asked for.
 fn intensity_unit(scene: &Scene, sum: f64) -> Result<(f64, &'static str), RenderError> {
-    let Some(flux) = scene.screen.total_flux_jy else { return Ok((1.0, "scene unit")) };
+    let Some(flux) = scene.screen.total_flux_jy else {
+        // Gas shines in physical units.
+        return Ok(match scene.gas {
+            Some(_) => (crate::units::JY_PER_SQUARE_UAS, "Jy/uas^2"),
+            None => (1.0, "scene unit"),
+        });
+    };
     let hole = &scene.hole;
     let angle = crate::units::gravitational_angle(hole.mass_msun, hole.distance_kpc);
     let factor = flux / (sum * (scene.pixel_size() * angle).powi(2));

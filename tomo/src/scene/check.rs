@@ -1,6 +1,6 @@
 //! Ranges of a scene's values, and errors that point at the line.
 
-use super::{Disc, Scene, Sky, Spot};
+use super::{Disc, Gas, GasMotion, GasProfile, Scene, Sky, Spot};
 use kerrlight_geodesic::{Kerr, orbits};
 use toml_edit::{Document, Item};
 
@@ -164,6 +164,7 @@ pub(super) fn check(scene: &Scene) -> Result<(), Invalid> {
     check_hole_and_observer(scene)?;
     check_screen(scene)?;
     check_effects(scene)?;
+    check_combinations(scene)?;
     let tolerance = scene.tracer.tolerance;
     number(
         "tracer.tolerance",
@@ -175,6 +176,9 @@ pub(super) fn check(scene: &Scene) -> Result<(), Invalid> {
     let Ok(hole) = Kerr::new(scene.hole.spin) else { return Ok(()) };
     if let Some(disc) = &scene.disc {
         check_disc(disc, &hole)?;
+    }
+    if let Some(gas) = &scene.gas {
+        check_gas(gas, &hole)?;
     }
     for (k, spot) in scene.spot.iter().enumerate() {
         check_spot(spot, k, &hole, scene.observer.time)?;
@@ -270,6 +274,47 @@ fn check_effects(scene: &Scene) -> Result<(), Invalid> {
         }
         (false, None) => Ok(()),
     }
+}
+
+/// Effects that have nothing to act upon, or that do not go together.
+fn check_combinations(scene: &Scene) -> Result<(), Invalid> {
+    let effects = &scene.effects;
+    if effects.absorption && scene.gas.as_ref().is_none_or(|gas| gas.absorptivity == 0.0) {
+        let allowed = "only with a [gas] whose absorptivity is above 0";
+        return Err(Invalid::new("effects.absorption", true, allowed));
+    }
+    if !effects.lensing && !scene.spot.is_empty() {
+        let allowed = "true with hot spots: straight rays see discs, gas and skies";
+        return Err(Invalid::new("effects.lensing", false, allowed));
+    }
+    match effects.half_orbits {
+        Some(n) if n > 100 => {
+            Err(Invalid::new("effects.half_orbits", n, "a whole number in [0, 100]"))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn check_gas(gas: &Gas, hole: &Kerr) -> Result<(), Invalid> {
+    positive("gas.scale_radius", gas.scale_radius)?;
+    let within = |key: &str, value: f64, most: f64| {
+        let allowed = format!("a number in [0, {most:e}]");
+        number(key, value, (0.0..=most).contains(&value), &allowed)
+    };
+    within("gas.flatness", gas.flatness, 1e4)?;
+    within("gas.emissivity", gas.emissivity, 1e12)?;
+    within("gas.absorptivity", gas.absorptivity, 1e30)?;
+    let (outer, least) = (gas.outer_radius, hole.horizon());
+    let allowed = format!("a radius above the horizon's, {least:.6}, and at most 1e6");
+    number("gas.outer_radius", outer, outer > least && outer <= 1e6, &allowed)?;
+    if let GasProfile::PowerLaw { slope } = gas.profile {
+        let ok = (0.0..=20.0).contains(&slope);
+        number("gas.profile.power-law.slope", slope, ok, "a number in [0, 20]")?;
+    }
+    if let GasMotion::AngularMomentum { l0 } = gas.motion {
+        number("gas.motion.angular-momentum.l0", l0, l0.abs() <= 10.0, "a number in [-10, 10]")?;
+    }
+    check_color("gas.color", gas.color)
 }
 
 fn check_disc(disc: &Disc, hole: &Kerr) -> Result<(), Invalid> {

@@ -1,6 +1,6 @@
 //! Light of the hot spots.
 
-use super::glimpse::Gather;
+use super::glimpse::{Gather, Place};
 use super::{Scratch, Stage};
 use crate::emission::spot::{Comoving, SpotModel};
 use kerrlight_geodesic::flow::rotating_redshift;
@@ -12,6 +12,7 @@ impl Stage {
     pub(super) fn add_spots(
         &self,
         time: f64,
+        path: &Path,
         scratch: &mut Scratch,
         end: f64,
         gather: &mut Gather,
@@ -21,15 +22,15 @@ impl Stage {
             let lo = lo.max(self.hole.horizon());
             let mut total =
                 SpotLight { spot, observed: time, before: gather.intensity, brightest: None };
-            scratch.path.intervals_within(lo, hi, &mut scratch.intervals);
+            path.intervals_within(lo, hi, &mut scratch.intervals);
             for &[from, to] in &scratch.intervals {
                 let to = to.min(end);
                 if from < to {
-                    self.add_stretch(&scratch.path, &mut total, from, to, gather);
+                    self.add_stretch(path, &mut total, from, to, gather);
                 }
             }
             if let Some((_, point)) = total.brightest {
-                gather.mark(gather.intensity - total.before, &point);
+                gather.mark(gather.intensity - total.before, Place::of_point(&point));
             }
         }
     }
