@@ -79,87 +79,113 @@ pub(super) struct Light {
 /// Beyond this optical depth nothing is seen.
 const DARK: f64 = 45.0;
 
+/// A quadrature rule with what sums over its panels need.
+#[derive(Debug, Clone)]
+pub(super) struct Quadrature {
+    pub rule: PanelRule,
+    /// Factors that take gains at the nodes to the first two and the last two Legendre
+    /// coefficients of the integrand.
+    spectrum: Vec<[f64; 4]>,
+}
+
+impl Quadrature {
+    /// The rule with `order` ≥ 4 nodes.
+    pub fn new(order: usize) -> Self {
+        let rule = PanelRule::new(order);
+        let row = |x: &f64| [0, 1, order - 2, order - 1].map(|k| legendre(k, 2.0 * x - 1.0));
+        let spectrum = rule.nodes().iter().map(row).collect();
+        Quadrature { rule, spectrum }
+    }
+
+    /// An estimate of what the rule of p nodes misses of a panel with these gains. It is about the
+    /// Legendre coefficient number 2p of the integrand, and coefficients of smooth functions fall
+    /// geometrically: from the first two to the last two of p by a factor x over p − 2 numbers,
+    /// and then by x^{3/2} over as many and half as many more.
+    fn missed(&self, gains: &[f64]) -> f64 {
+        let mut sums = [0.0; 4];
+        for (gain, row) in gains.iter().zip(&self.spectrum) {
+            for (sum, factor) in sums.iter_mut().zip(row) {
+                *sum += gain * factor;
+            }
+        }
+        let first = sums[0].abs().max(sums[1].abs());
+        let rest = sums[2].abs().max(sums[3].abs());
+        let x = if first > 0.0 { (rest / first).min(1.0) } else { 1.0 };
+        rest * x * x.sqrt()
+    }
+
+    /// Optical depths at the nodes of a panel and at its end, from the gains of each node.
+    fn absorb(&self, gains: &[f64], depth: &mut f64, depths: &mut Vec<f64>) {
+        let mut rates = [0.0; MOST_NODES];
+        for ((rate, gain), weight) in rates.iter_mut().zip(gains).zip(self.rule.weights()) {
+            *rate = gain / weight;
+        }
+        for i in 0..gains.len() {
+            let terms = self.rule.cumulative(i).iter().zip(&rates);
+            let part: f64 = terms.map(|(factor, rate)| factor * rate).sum();
+            depths.push(*depth + part.max(0.0));
+        }
+        *depth += gains.iter().sum::<f64>();
+    }
+}
+
+/// (2k + 1) P_k(z).
+fn legendre(k: usize, z: f64) -> f64 {
+    let (mut last, mut value) = (0.0, 1.0);
+    for j in 0..k {
+        let j = j as f64;
+        (last, value) = (value, ((2.0 * j + 1.0) * z * value - j * last) / (j + 1.0));
+    }
+    (2 * k + 1) as f64 * value
+}
+
 /// Sums emission up, front to back: I = ∫ j e^{−D} ds, D = ∫ κ ds. `depths` receives the optical
 /// depth at every node if there is absorption.
 pub(super) fn gather(
-    rule: &PanelRule,
+    quadrature: &Quadrature,
     nodes: &RayNodes<'_>,
     emission: &Emission,
     depths: &mut Vec<f64>,
 ) -> Light {
-    let order = rule.order();
+    let order = quadrature.rule.order();
     let mut light = Light::default();
     depths.clear();
-    let mut brightest = (0.0, None);
-    for start in (0..nodes.weight.len()).step_by(order) {
-        let panel = start..start + order;
-        let weights = &nodes.weight[panel.clone()];
-        if !emission.absorption.is_empty() {
-            absorb(rule, weights, &emission.absorption[panel.clone()], &mut light.depth, depths);
+    let (mut most, mut brightest) = (0.0, None);
+    let mut gains = [0.0; MOST_NODES];
+    let gains = &mut gains[..order];
+    let panels = nodes.weight.chunks_exact(order).zip(emission.emissivity.chunks_exact(order));
+    let panels = panels.zip(emission.redshift.chunks_exact(order));
+    for (number, ((weights, emissivity), redshift)) in panels.enumerate() {
+        let start = number * order;
+        for ((gain, weight), j) in gains.iter_mut().zip(weights).zip(emissivity) {
+            *gain = weight * j;
         }
-        let mut values = [0.0; MOST_NODES];
-        for (i, k) in panel.enumerate() {
-            let through = depths.get(k).map_or(1.0, |depth| (-depth).exp());
-            let density = emission.emissivity[k] * through;
-            let gain = density * weights[i];
-            light.intensity += gain;
-            light.shift += emission.redshift[k] * gain;
-            values[i] = gain / rule.weights()[i];
-            if density > brightest.0 {
-                brightest = (density, Some(k));
+        if !emission.absorption.is_empty() {
+            let absorption = &emission.absorption[start..start + order];
+            let mut thick = [0.0; MOST_NODES];
+            for ((thick, weight), k) in thick.iter_mut().zip(weights).zip(absorption) {
+                *thick = weight * k;
+            }
+            quadrature.absorb(&thick[..order], &mut light.depth, depths);
+            for (gain, depth) in gains.iter_mut().zip(&depths[start..]) {
+                *gain *= (-depth).exp();
             }
         }
-        light.error += tail(rule, &values[..order]);
+        for (i, (gain, g)) in gains.iter().zip(redshift).enumerate() {
+            light.intensity += gain;
+            light.shift += g * gain;
+            if *gain > most * weights[i] {
+                (most, brightest) = (gain / weights[i], Some(start + i));
+            }
+        }
+        light.error += quadrature.missed(gains);
         if light.depth > DARK {
             break;
         }
     }
-    light.place = brightest.1.map_or_else(Place::default, |k| Place::of_node(nodes, k));
+    light.place = brightest.map_or_else(Place::default, |k| Place::of_node(nodes, k));
     light
-}
-
-/// Optical depths at the nodes of a panel and at its end.
-fn absorb(
-    rule: &PanelRule,
-    weights: &[f64],
-    absorption: &[f64],
-    depth: &mut f64,
-    depths: &mut Vec<f64>,
-) {
-    let mut rates = [0.0; MOST_NODES];
-    for (i, rate) in rates.iter_mut().take(weights.len()).enumerate() {
-        *rate = absorption[i] * weights[i] / rule.weights()[i];
-    }
-    for i in 0..weights.len() {
-        let part: f64 = rule.cumulative(i).iter().zip(&rates).map(|(a, rate)| a * rate).sum();
-        depths.push(*depth + part.max(0.0));
-    }
-    *depth += rule.weights().iter().zip(&rates).map(|(w, rate)| w * rate).sum::<f64>();
 }
 
 /// The most nodes of a panel.
 const MOST_NODES: usize = 16;
-
-/// An estimate of what the rule misses of a panel: its error is about the Legendre coefficient
-/// number 2p of the integrand, and coefficients of smooth functions fall geometrically. The square
-/// of the last two of p over the first two is what number 2p − 2 would then be: on the safe side.
-fn tail(rule: &PanelRule, values: &[f64]) -> f64 {
-    let order = values.len();
-    if order < 4 {
-        return values.iter().zip(rule.weights()).map(|(f, w)| (f * w).abs()).sum();
-    }
-    let mut coefficients = [0.0f64; MOST_NODES];
-    for ((f, w), x) in values.iter().zip(rule.weights()).zip(rule.nodes()) {
-        let (z, fw) = (2.0 * x - 1.0, f * w);
-        let (mut last, mut value) = (0.0, 1.0);
-        for (k, c) in coefficients.iter_mut().take(order).enumerate() {
-            *c += fw * value;
-            let k = k as f64;
-            (last, value) = (value, ((2.0 * k + 1.0) * z * value - k * last) / (k + 1.0));
-        }
-    }
-    let size = |k: usize| (2 * k + 1) as f64 * coefficients[k].abs();
-    let first = size(0).max(size(1));
-    let rest = size(order - 1).max(size(order - 2));
-    if first > 0.0 { rest * (rest / first).min(1.0) } else { rest }
-}

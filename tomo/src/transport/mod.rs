@@ -99,7 +99,7 @@ impl Stage {
             tolerance: scene.tracer.tolerance,
             closed_form,
             steps_for_all: !scene.spot.is_empty(),
-            places: Needs { azimuth: true, time: true, velocity: false },
+            places: Needs { azimuth: false, time: false, velocity: false },
             gas,
             disc: scene.disc.as_ref().map(|disc| DiscModel::new(disc, &hole)),
             spots: scene.spot.iter().map(|spot| SpotModel::new(spot, &hole)).collect(),

@@ -1,6 +1,6 @@
 //! Light of what fills space, with as many nodes as it takes.
 
-use super::medium::{Emission, Light, Medium, Moment, gather};
+use super::medium::{Emission, Light, Medium, Moment, Quadrature, gather};
 use super::rays::{End, Sight};
 use super::surface::Hit;
 use super::{Scratch, Stage};
@@ -19,7 +19,7 @@ const FAINT: f64 = 1e-4;
 /// What a volume needs from ray to ray.
 #[derive(Debug)]
 pub(super) struct Workspace {
-    pub rule: PanelRule,
+    quadrature: Quadrature,
     emission: Emission,
     depths: Vec<f64>,
     columns: [Vec<f64>; 8],
@@ -32,7 +32,7 @@ pub(super) struct Workspace {
 impl Default for Workspace {
     fn default() -> Self {
         Workspace {
-            rule: PanelRule::new(ORDER),
+            quadrature: Quadrature::new(ORDER),
             emission: Emission::default(),
             depths: Vec::new(),
             columns: Default::default(),
@@ -110,7 +110,7 @@ impl Stage {
         while !pending.is_empty() {
             let pick = |column: &[f64]| pending.iter().map(|k| column[*k]).collect::<Vec<_>>();
             let until: Vec<f64> = pending.iter().map(|k| sights[*k].last_time()).collect();
-            let request = self.request(medium, &volume.rule, split);
+            let request = self.request(medium, &volume.quadrature.rule, split);
             let (alpha, beta) = (pick(alpha), pick(beta));
             nodes.trace(&self.hole, &self.observer, &alpha, &beta, Some(&until), &request)?;
             let last = split >= FINEST;
@@ -184,7 +184,7 @@ impl Stage {
         k: usize,
         volume: &mut Workspace,
     ) -> bool {
-        let Workspace { rule, emission, depths, lights, profile, .. } = volume;
+        let Workspace { quadrature, emission, depths, lights, profile, .. } = volume;
         let count = along.times.len();
         let lights = &mut lights[k * count..(k + 1) * count];
         let mut done = true;
@@ -197,7 +197,7 @@ impl Stage {
             emission.clear();
             let moment = Moment { observed: *observed, slow_light: self.slow_light };
             along.medium.fill(nodes, along.lambda, moment, emission);
-            let light = gather(rule, nodes, emission, depths);
+            let light = gather(quadrature, nodes, emission, depths);
             let enough = self.tolerance * (light.intensity + FAINT * along.medium.scale());
             done &= light.error <= enough;
             lights[j] = light;
@@ -232,7 +232,7 @@ impl Stage {
                     let pieces = (to - from) * path.angular_rate() / LONGEST;
                     let pieces = f64::from(split) * pieces.ceil().clamp(1.0, 1e4);
                     let piece = Piece { from, to, pieces: pieces as usize, falls: whole };
-                    self.place_piece(path, &piece, &volume.rule, columns);
+                    self.place_piece(path, &piece, &volume.quadrature.rule, columns);
                 }
             }
         }
