@@ -2,6 +2,7 @@
 
 pub mod arguments;
 pub mod image_files;
+pub mod movie_files;
 pub mod plots;
 pub mod scene_movie;
 
