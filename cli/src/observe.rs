@@ -85,7 +85,7 @@ enum PulseName {
 impl Observe {
     /// Observes.
     pub fn run(&self) -> anyhow::Result<()> {
-        let output = ObservationFile::new(&self.output)?;
+        let output = ObservationFile::new(&self.output, None)?;
         let files = self.files()?;
         files.iter().try_for_each(|file| output.spares(file))?;
         if let Some(FrameTimes::File(path)) = &self.frame_times {
