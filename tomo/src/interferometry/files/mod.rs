@@ -1,12 +1,14 @@
 //! Files of visibilities (UVFITS, eht-imaging's text, tables of total intensity) and FITS images. Codecs work
 //! on bytes; what they hold in memory is a small multiple of the file.
 
+mod eht_table;
 mod fits;
 mod fits_image;
 mod obs_text;
 mod table;
 mod uvfits;
 
+pub use eht_table::{EhtTable, to_eht_table};
 pub use fits_image::read as read_fits_image;
 pub use obs_text::{parse as parse_obs_text, to_text as to_obs_text};
 pub use table::{COLUMNS as TABLE_COLUMNS, parse as parse_table, to_csv};

@@ -11,7 +11,7 @@ use core::fmt::Write;
 pub const COLUMNS: [&str; 8] = ["time_utc_h", "t1", "t2", "u", "v", "re", "im", "sigma"];
 
 /// The same in the EHT's releases, with amplitude in Jy and phase in degrees.
-const EHT_COLUMNS: [&str; 8] =
+pub(super) const EHT_COLUMNS: [&str; 8] =
     ["time(UTC)", "T1", "T2", "U(lambda)", "V(lambda)", "Iamp(Jy)", "Iphase(d)", "Isigma(Jy)"];
 
 /// Cells of a line; more than anyone writes are not looked at.
