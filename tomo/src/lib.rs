@@ -8,6 +8,7 @@
 pub mod emission;
 pub mod image;
 pub mod interferometry;
+pub mod polarization;
 pub mod render;
 pub mod scene;
 pub mod transport;
