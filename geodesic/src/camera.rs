@@ -1,8 +1,10 @@
 //! Observers at a finite radius with a local frame and a perspective lens.
 
 use crate::error::{OutOfRange, check};
+use crate::frame::ZamoFrame;
 use crate::kerr::Kerr;
 use crate::observer::{Inclination, Ray};
+use crate::orbits;
 use crate::radial::RadialPotential;
 use crate::scalar::Elementary;
 
@@ -54,19 +56,18 @@ impl Camera {
         radius: f64,
         motion: Motion,
     ) -> Result<Self, OutOfRange> {
-        let ok = radius.is_finite() && radius > hole.horizon();
-        check("camera radius", radius, ok, "a finite number outside the horizon")?;
-        let (a, r, s) = (hole.spin(), radius, inclination.sin());
-        let sigma = hole.sigma(r, inclination.cos());
-        let delta = hole.delta(r);
-        let area = (r * r + a * a).powi(2) - a * a * delta * s * s;
-        let lapse = (delta * sigma / area).sqrt();
-        let (drag, girth) = (2.0 * a * r / area, (area / sigma).sqrt());
-        let circular = |rate: f64| [0.0, girth * s * (rate - drag) / lapse];
+        let frame = ZamoFrame::at(hole, radius, inclination.sin(), inclination.cos());
+        let frame = frame.ok_or(OutOfRange {
+            field: "camera radius",
+            value: radius,
+            allowed: "a finite number outside the horizon",
+        })?;
+        let ZamoFrame { lapse, drag, girth, .. } = frame;
+        let circular = |rate: f64| [0.0, frame.orbital_velocity(rate)];
         let velocity = match motion {
             Motion::Zamo => [0.0, 0.0],
             Motion::Static => circular(0.0),
-            Motion::Keplerian => circular(1.0 / (r * r.sqrt() + a)),
+            Motion::Keplerian => circular(orbits::keplerian_angular_velocity(hole, radius)),
             Motion::FreeFall => [-((1.0 - lapse) * (1.0 + lapse)).sqrt(), 0.0],
         };
         let speed = velocity[0].hypot(velocity[1]);

@@ -9,6 +9,7 @@ pub mod emission;
 pub mod image;
 pub mod interferometry;
 pub mod optimise;
+pub mod polarization;
 pub mod render;
 pub mod representation;
 pub mod scene;
