@@ -1,20 +1,21 @@
 //! `kerrlight render`: from a scene to EXR and PNG.
 
+mod partial;
 mod preview;
 mod report;
 mod source;
+mod work;
 
 use crate::output::{self, Output};
-use crate::progress;
 use anyhow::Context;
 use clap::Args;
-use kerrlight_tomo::image::exr;
 use kerrlight_tomo::image::preview::encode_png;
-use kerrlight_tomo::render::render;
+use kerrlight_tomo::render::Raster;
 use preview::PreviewOptions;
-use source::Source;
+use source::{SkyFile, Source};
 use std::path::PathBuf;
 use std::time::Instant;
+use work::Work;
 
 /// Arguments of `kerrlight render`.
 #[derive(Debug, Args)]
@@ -32,15 +33,24 @@ pub struct Render {
     /// Change a value of the scene, e.g. hole.spin=0.5 or spot.0.phase_deg=90
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     overrides: Vec<String>,
+    /// Refine pixels until the estimated relative error of the intensity image (sum of the
+    /// pixels' absolute errors by the sum of the pixels) is below this, in place of
+    /// screen.samples_per_pixel
+    #[arg(long, value_name = "ERROR")]
+    image_error: Option<f64>,
     #[command(flatten)]
     look: PreviewOptions,
+    /// Columns of pixels that are traced together; the picture does not depend on it
+    #[arg(long, value_name = "N", default_value = "64", hide_short_help = true)]
+    #[arg(value_parser = clap::value_parser!(u16).range(1..))]
+    tile: u16,
 }
 
 impl Render {
     /// Renders.
     pub fn run(&self) -> anyhow::Result<()> {
         let source = Source::new(self.scene.as_deref())?;
-        let (text, scene) = source.scene(&self.overrides)?;
+        let (text, scene) = source.scene(&self.all_overrides())?;
         let (exr, png) = self.outputs(&source)?;
         let sky = source::sky_path(&scene, &source.folder);
         for output in [&exr, &png].into_iter().flatten() {
@@ -48,28 +58,36 @@ impl Render {
                 output.spares(input)?;
             }
         }
-        let picture = sky.as_deref().map(source::load_sky).transpose()?;
+        let sky = sky.as_deref().map(SkyFile::read).transpose()?;
         let start = Instant::now();
-        let bar = progress::bar(u64::from(scene.screen.height));
-        let rendered = render(&scene, picture, &|rows| {
-            bar.inc(rows as u64);
-            true
-        })
-        .with_context(|| source.name.clone())?;
-        bar.finish_and_clear();
-        if let Some(exr) = &exr {
-            let bytes =
-                exr::encode(&rendered.picture, &report::attributes(&scene, &text, &rendered));
-            exr.write(&bytes.context("cannot encode the EXR")?)?;
-            output::print(&format!("{}\n", exr.shown().display()))?;
-        }
-        if let Some(png) = &png {
-            let bytes = encode_png(&rendered.picture, self.look.look(&scene));
+        let raster = Raster::new(&scene, sky.as_ref().map(SkyFile::decode).transpose()?);
+        let raster = raster.with_context(|| source.name.clone())?.with_tile(self.tile.into());
+        let look = png.is_some().then(|| self.look.reduction(&scene, &raster)).transpose()?;
+        let work = Work { raster: &raster, scene: &scene, text: &text, name: &source.name };
+        let (summary, picture) = match &exr {
+            Some(exr) => {
+                let identity =
+                    raster.identity() + &sky.map(|sky| sky.identity()).unwrap_or_default();
+                work.exr(exr, &identity, look)?
+            }
+            None => work.preview(look)?,
+        };
+        if let (Some(png), Some(picture)) = (&png, picture) {
+            let bytes = encode_png(&picture, self.look.look(&scene));
             png.write(&bytes.context("cannot encode the PNG")?)?;
             output::print(&format!("{}\n", png.shown().display()))?;
         }
-        report::print(&scene, &rendered, start.elapsed().as_secs_f64());
+        report::print(&scene, &summary, start.elapsed().as_secs_f64());
         Ok(())
+    }
+
+    fn all_overrides(&self) -> Vec<String> {
+        let mut overrides = self.overrides.clone();
+        if let Some(error) = self.image_error {
+            overrides.push("screen.samples_per_pixel=1".to_owned());
+            overrides.push(format!("screen.image_error={error:?}"));
+        }
+        overrides
     }
 
     fn outputs(&self, source: &Source) -> anyhow::Result<(Option<Output>, Option<Output>)> {

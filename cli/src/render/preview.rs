@@ -1,8 +1,11 @@
 //! How the PNG shows a picture.
 
+use anyhow::bail;
 use clap::{Args, ValueEnum};
 use kerrlight_tomo::image::colormap::Colormap;
 use kerrlight_tomo::image::preview::{Look, Stretch};
+use kerrlight_tomo::image::reduce::Reduction;
+use kerrlight_tomo::render::Raster;
 use kerrlight_tomo::scene::Scene;
 
 /// Options of the PNG.
@@ -35,7 +38,29 @@ enum StretchName {
     Log,
 }
 
+/// A preview has at most this many pixels: 4096 × 4096.
+const MOST_PIXELS: usize = 1 << 24;
+
 impl PreviewOptions {
+    /// What makes the picture small enough.
+    pub fn reduction(&self, scene: &Scene, raster: &Raster) -> anyhow::Result<Reduction> {
+        let wanted: &[&str] = match self.look(scene) {
+            Look::Intensity(..) => &["intensity"],
+            Look::Color => &["R", "G", "B"],
+        };
+        let names = raster.names();
+        if let Some(name) = wanted.iter().find(|name| !names.contains(name)) {
+            bail!("the PNG needs the channel {name}, which `screen.channels` leaves out");
+        }
+        let (width, height) = (scene.screen.width as usize, scene.screen.height as usize);
+        let reduction = Reduction::new(width, height, &names, wanted, MOST_PIXELS);
+        if reduction.factor() > 1 {
+            let factor = reduction.factor();
+            eprintln!("a pixel of the PNG is the mean of {factor} x {factor} of the picture");
+        }
+        Ok(reduction)
+    }
+
     /// What the PNG of `scene` shows.
     pub fn look(&self, scene: &Scene) -> Look {
         let stretch = match self.stretch {

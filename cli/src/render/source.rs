@@ -58,7 +58,8 @@ impl Source {
 
 fn scene_of_exr(path: &Path) -> anyhow::Result<String> {
     let name = || path.display().to_string();
-    let (_, attributes) = exr::decode(&output::read(path)?).with_context(name)?;
+    let file = output::open(path)?;
+    let attributes = exr::decode_attributes(file).with_context(name)?;
     let scene = attributes.get("scene").cloned();
     scene.with_context(|| format!("{} holds no scene of kerrlight", name()))
 }
@@ -71,7 +72,27 @@ pub fn sky_path(scene: &Scene, folder: &Path) -> Option<PathBuf> {
     }
 }
 
-pub fn load_sky(path: &Path) -> anyhow::Result<Panorama> {
-    let bytes = output::read(path).context("`sky.image.path`")?;
-    Panorama::decode(&bytes).with_context(|| format!("`sky.image.path` {}", path.display()))
+/// The file of a `[sky.image]`.
+pub struct SkyFile {
+    name: String,
+    bytes: Vec<u8>,
+}
+
+impl SkyFile {
+    /// Reads it.
+    pub fn read(path: &Path) -> anyhow::Result<Self> {
+        let bytes = output::read(path).context("`sky.image.path`")?;
+        Ok(SkyFile { name: path.display().to_string(), bytes })
+    }
+
+    /// The picture.
+    pub fn decode(&self) -> anyhow::Result<Panorama> {
+        let name = || format!("`sky.image.path` {}", self.name);
+        Panorama::decode(&self.bytes).with_context(name)
+    }
+
+    /// What tells it from another.
+    pub fn identity(&self) -> String {
+        format!("sky {} bytes, CRC-32 {:08x}\n", self.bytes.len(), crc32fast::hash(&self.bytes))
+    }
 }
