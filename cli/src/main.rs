@@ -6,6 +6,7 @@ mod convert;
 mod critical_curve;
 mod inspect;
 mod interferometry;
+mod interrupt;
 mod observe;
 mod output;
 mod progress;

@@ -13,4 +13,5 @@ mod interferometry;
 mod kerr_references;
 mod lensing;
 mod pictures;
+mod resume;
 mod support;

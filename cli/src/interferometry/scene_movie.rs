@@ -39,10 +39,10 @@ pub fn read(path: &Path, times_h: &[f64]) -> anyhow::Result<Movie> {
     for time in frames {
         scene.observer.time = start + (time - times_h[0]) * 3600.0 / seconds;
         let rendered = render(&scene, None, &|_| true).with_context(name)?;
-        let factor = *first_factor.get_or_insert(rendered.unit_factor);
+        let factor = *first_factor.get_or_insert(rendered.summary.unit_factor);
         let channel = rendered.picture.channel("intensity").context("no intensity")?;
         // Every picture has been scaled to the same flux: only the first is to be.
-        let scale = factor / rendered.unit_factor * pixel_uas * pixel_uas;
+        let scale = factor / rendered.summary.unit_factor * pixel_uas * pixel_uas;
         pixels.extend(channel.iter().map(|value| f64::from(*value) * scale));
         bar.inc(1);
     }

@@ -3,6 +3,7 @@
 pub mod colormap;
 pub mod exr;
 pub mod preview;
+pub mod reduce;
 
 /// A named channel, row by row from the top.
 #[derive(Debug, Clone, PartialEq)]

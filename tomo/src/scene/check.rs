@@ -157,9 +157,6 @@ fn finite(key: impl Into<String>, value: f64) -> Result<(), Invalid> {
     number(key, value, value.is_finite(), "a finite number")
 }
 
-/// Largest number of pixels of one picture: its channels stay below 3 GiB.
-const MOST_PIXELS: u64 = 1 << 26;
-
 pub(super) fn check(scene: &Scene) -> Result<(), Invalid> {
     check_hole_and_observer(scene)?;
     check_screen(scene)?;
@@ -228,14 +225,25 @@ fn check_screen(scene: &Scene) -> Result<(), Invalid> {
             return Err(Invalid::new(key, size, "a whole number in [1, 16384]"));
         }
     }
-    if u64::from(screen.width) * u64::from(screen.height) > MOST_PIXELS {
-        let size = format!("{} (with width = {})", screen.height, screen.width);
-        return Err(Invalid::new("screen.height", size, "at most 67108864 pixels in all"));
-    }
     let root = screen.samples_per_pixel.isqrt();
     if root * root != screen.samples_per_pixel || !(1..=32).contains(&root) {
         let allowed = "a square number in [1, 1024]: 1, 4, 9, 16, …";
         return Err(Invalid::new("screen.samples_per_pixel", screen.samples_per_pixel, allowed));
+    }
+    if let Some(error) = screen.image_error {
+        let ok = (1e-6..=0.5).contains(&error);
+        number("screen.image_error", error, ok, "a number in [1e-6, 0.5]")?;
+        if root != 1 {
+            let allowed = "1 with image_error, by which pixels are refined";
+            return Err(Invalid::new(
+                "screen.samples_per_pixel",
+                screen.samples_per_pixel,
+                allowed,
+            ));
+        }
+    }
+    if screen.channels.as_ref().is_some_and(Vec::is_empty) {
+        return Err(Invalid::new("screen.channels", "[]", "one name at least"));
     }
     check_reach(scene)?;
     screen.total_flux_jy.map_or(Ok(()), |flux| {

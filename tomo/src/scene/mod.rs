@@ -94,6 +94,13 @@ pub struct Screen {
     /// Flux density to which the emission is scaled, in Jy.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub total_flux_jy: Option<f64>,
+    /// Relative L1 error of the intensity image below which pixels are refined, in place of
+    /// `samples_per_pixel`; off without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub image_error: Option<f64>,
+    /// Names of the channels that are kept; without it all that the scene has.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub channels: Option<Vec<String>>,
 }
 
 fn one() -> u32 {

@@ -81,6 +81,10 @@ impl Stage {
         } else {
             Observer::at_infinity(inclination)
         };
+        let kept = |name: &str| {
+            let channels = scene.screen.channels.as_ref();
+            channels.is_none_or(|channels| channels.iter().any(|channel| channel == name))
+        };
         let redshift = scene.effects.redshift.then_some(scene.effects.spectral_index).flatten();
         let effects = GasEffects { redshift, absorption: scene.effects.absorption };
         let length = 100.0 * crate::units::SPEED_OF_LIGHT;
@@ -99,7 +103,7 @@ impl Stage {
             tolerance: scene.tracer.tolerance,
             closed_form,
             steps_for_all: !scene.spot.is_empty(),
-            places: Needs { azimuth: false, time: false, velocity: false },
+            places: Needs { azimuth: kept("azimuth"), time: kept("delay"), velocity: false },
             gas,
             disc: scene.disc.as_ref().map(|disc| DiscModel::new(disc, &hole)),
             spots: scene.spot.iter().map(|spot| SpotModel::new(spot, &hole)).collect(),
@@ -115,6 +119,11 @@ impl Stage {
     /// Whether g is computed.
     pub fn has_redshift(&self) -> bool {
         self.redshift.is_some()
+    }
+
+    /// Whether anything absorbs.
+    pub fn absorbs(&self) -> bool {
+        self.gas.as_ref().is_some_and(Medium::absorbs)
     }
 
     /// What is seen at (α, β) at the scene's own time.

@@ -1,0 +1,83 @@
+//! How the PNG shows a picture.
+
+use anyhow::bail;
+use clap::{Args, ValueEnum};
+use kerrlight_tomo::image::colormap::Colormap;
+use kerrlight_tomo::image::preview::{Look, Stretch};
+use kerrlight_tomo::image::reduce::Reduction;
+use kerrlight_tomo::render::Raster;
+use kerrlight_tomo::scene::Scene;
+
+/// Options of the PNG.
+#[derive(Debug, Args)]
+pub struct PreviewOptions {
+    /// Colours of the PNG: a map of the intensity, or `color` for the R, G, B channels
+    /// [default: afmhot-us, color where the scene has a sky]
+    #[arg(long, value_name = "MAP")]
+    colormap: Option<Colors>,
+    /// How intensity is stretched over the colour map
+    #[arg(long, default_value = "linear")]
+    stretch: StretchName,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Colors {
+    AfmhotUs,
+    Afmhot,
+    Inferno,
+    Magma,
+    Viridis,
+    Gray,
+    Color,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum StretchName {
+    Linear,
+    Sqrt,
+    Log,
+}
+
+/// A preview has at most this many pixels: 4096 × 4096.
+const MOST_PIXELS: usize = 1 << 24;
+
+impl PreviewOptions {
+    /// What makes the picture small enough.
+    pub fn reduction(&self, scene: &Scene, raster: &Raster) -> anyhow::Result<Reduction> {
+        let wanted: &[&str] = match self.look(scene) {
+            Look::Intensity(..) => &["intensity"],
+            Look::Color => &["R", "G", "B"],
+        };
+        let names = raster.names();
+        if let Some(name) = wanted.iter().find(|name| !names.contains(name)) {
+            bail!("the PNG needs the channel {name}, which `screen.channels` leaves out");
+        }
+        let (width, height) = (scene.screen.width as usize, scene.screen.height as usize);
+        let reduction = Reduction::new(width, height, &names, wanted, MOST_PIXELS);
+        if reduction.factor() > 1 {
+            let factor = reduction.factor();
+            eprintln!("a pixel of the PNG is the mean of {factor} x {factor} of the picture");
+        }
+        Ok(reduction)
+    }
+
+    /// What the PNG of `scene` shows.
+    pub fn look(&self, scene: &Scene) -> Look {
+        let stretch = match self.stretch {
+            StretchName::Linear => Stretch::Linear,
+            StretchName::Sqrt => Stretch::Sqrt,
+            StretchName::Log => Stretch::Log,
+        };
+        let default = if scene.sky.is_some() { Colors::Color } else { Colors::AfmhotUs };
+        let map = match self.colormap.unwrap_or(default) {
+            Colors::Color => return Look::Color,
+            Colors::AfmhotUs => Colormap::AfmhotUs,
+            Colors::Afmhot => Colormap::Afmhot,
+            Colors::Inferno => Colormap::Inferno,
+            Colors::Magma => Colormap::Magma,
+            Colors::Viridis => Colormap::Viridis,
+            Colors::Gray => Colormap::Gray,
+        };
+        Look::Intensity(map, stretch)
+    }
+}

@@ -1,0 +1,56 @@
+//! What is told about a picture: in the file and on the terminal.
+
+use super::work::Work;
+use kerrlight_tomo::image::exr::Attributes;
+use kerrlight_tomo::render::Summary;
+use kerrlight_tomo::scene::Scene;
+
+/// What decided the picture, and what it amounts to.
+pub fn attributes(work: &Work<'_>, summary: &Summary) -> Attributes {
+    let entry = |name: &str, value: String| (name.to_owned(), value);
+    [
+        entry("version", env!("CARGO_PKG_VERSION").to_owned()),
+        entry("scene", work.text.to_owned()),
+        entry("scene_resolved", work.scene.to_toml()),
+        entry("intensity_unit", summary.intensity_unit.to_owned()),
+        entry("intensity_per_scene_unit", summary.unit_factor.to_string()),
+        entry("pixel_size_m", work.scene.pixel_size().to_string()),
+        entry("flux", summary.flux.to_string()),
+        entry("flux_error", summary.flux_error.to_string()),
+        entry("flux_unit", summary.flux_unit.to_owned()),
+        entry("image_error", summary.image_error.to_string()),
+        entry("rays", summary.rays.to_string()),
+        entry("unresolved_rays", summary.unresolved.to_string()),
+        entry("channels", work.raster.legend()),
+    ]
+    .into()
+}
+
+/// What a user is told when the picture is there.
+pub fn print(scene: &Scene, summary: &Summary, seconds: f64) {
+    let (screen, rays) = (&scene.screen, summary.rays);
+    eprintln!(
+        "{} x {} pixels, {rays} rays in {seconds:.2} s ({:.0} rays/s)",
+        screen.width,
+        screen.height,
+        rays as f64 / seconds.max(1e-9)
+    );
+    let pixels = f64::from(screen.width) * f64::from(screen.height);
+    let Summary { flux, flux_error, flux_unit, .. } = summary;
+    if *flux > 0.0 {
+        eprintln!("flux {flux:.6} +- {flux_error:.1e} {flux_unit}");
+    }
+    if let Some(asked) = screen.image_error {
+        let error = summary.image_error;
+        eprintln!("image error {error:.1e}, {:.2} rays a pixel", rays as f64 / pixels);
+        if error > asked {
+            eprintln!("warning: the image error {error:.1e} is above the {asked:e} asked for");
+        }
+    }
+    if summary.unresolved > 0 {
+        eprintln!(
+            "warning: {} rays unresolved (on the critical curve within rounding), shown as dark",
+            summary.unresolved
+        );
+    }
+}

@@ -1,0 +1,114 @@
+//! Bands of rows on all cores. Tiles are handed out from the top; whoever ends the last tile of
+//! a band puts the band together, so that only a few bands are in memory at any time.
+
+use super::pixels::{Pixel, Workspace, uniform};
+use super::tally::Tally;
+use super::{Progress, Raster, RenderError, adaptive};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+/// A band of rows.
+#[derive(Debug, Clone)]
+pub(super) struct Band {
+    pub index: usize,
+    /// Row by row, of each channel; intensities in the scene's unit.
+    pub channels: Vec<Vec<f32>>,
+    pub tally: Tally,
+}
+
+/// Takes bands, in any order and from several threads.
+pub(super) type Sink<'a> = dyn Fn(Band) -> Result<(), RenderError> + Sync + 'a;
+
+/// The tiles of a band that are there.
+type Parts = Vec<Option<Vec<Pixel>>>;
+
+/// Adds a tile to its band; all of them if it was the last.
+fn put(band: &Mutex<Parts>, tiles: usize, tile: usize, pixels: Vec<Pixel>) -> Option<Parts> {
+    let mut parts = band.lock().unwrap_or_else(PoisonError::into_inner);
+    parts.resize(tiles, None);
+    parts[tile] = Some(pixels);
+    let complete = parts.iter().all(Option::is_some);
+    complete.then(|| std::mem::take(&mut *parts))
+}
+
+/// Renders the bands `todo` into `sink`. Where `progress` says so it stops after the bands
+/// that are under way.
+pub(super) fn render_bands(
+    raster: &Raster,
+    todo: &[usize],
+    sink: &Sink<'_>,
+    progress: &Progress<'_>,
+) -> Result<(), RenderError> {
+    let tiles = raster.tiles();
+    let tolerance = if todo.is_empty() { None } else { raster.tolerance()? };
+    let stop = AtomicBool::new(false);
+    let open: Vec<Mutex<Parts>> = todo.iter().map(|_| Mutex::default()).collect();
+    let stopped = |k: &usize| k.is_multiple_of(tiles) && stop.load(Ordering::Relaxed);
+    let order = (0..todo.len() * tiles).take_while(|k| !stopped(k)).par_bridge();
+    order.try_for_each_init(Workspace::default, |work, k| -> Result<(), RenderError> {
+        let (band, tile) = (todo[k / tiles], k % tiles);
+        let pixels = raster.tile(band, tile, tolerance, work)?;
+        let Some(parts) = put(&open[k / tiles], tiles, tile, pixels) else { return Ok(()) };
+        sink(raster.assemble(band, parts)?)?;
+        if !progress(raster.layout.rows(band).len()) {
+            stop.store(true, Ordering::Relaxed);
+        }
+        Ok(())
+    })?;
+    if stop.into_inner() { Err(RenderError::Stopped) } else { Ok(()) }
+}
+
+impl Raster {
+    /// Number of tiles in a band.
+    fn tiles(&self) -> usize {
+        self.grid.width.div_ceil(self.tile)
+    }
+
+    /// The error that each pixel may have, where pixels are refined.
+    fn tolerance(&self) -> Result<Option<f64>, RenderError> {
+        let Some(error) = self.scene.screen.image_error else { return Ok(None) };
+        let work = &mut Workspace::default();
+        Ok(Some(adaptive::tolerance(&self.stage, &self.grid, error, work)?))
+    }
+
+    fn tile(
+        &self,
+        band: usize,
+        tile: usize,
+        tolerance: Option<f64>,
+        work: &mut Workspace,
+    ) -> Result<Vec<Pixel>, RenderError> {
+        let end = ((tile + 1) * self.tile).min(self.grid.width);
+        let columns = tile * self.tile..end;
+        let (stage, grid, rows) = (&self.stage, &self.grid, self.layout.rows(band));
+        Ok(match tolerance {
+            Some(error) => adaptive::adaptive(stage, grid, rows, columns, error, work)?,
+            None => uniform(stage, grid, rows, columns, work)?,
+        })
+    }
+
+    /// The band from its tiles.
+    fn assemble(&self, index: usize, parts: Parts) -> Result<Band, RenderError> {
+        let (width, rows) = (self.grid.width, self.layout.rows(index).len());
+        let mut pixels = Vec::with_capacity(width * rows);
+        for row in 0..rows {
+            for part in parts.iter().flatten() {
+                let columns = part.len() / rows;
+                pixels.extend_from_slice(&part[row * columns..(row + 1) * columns]);
+            }
+        }
+        drop(parts);
+        let mut channels = Vec::with_capacity(self.channels.len());
+        for kind in &self.channels {
+            let values: Vec<f32> = pixels.iter().map(|pixel| kind.value(pixel)).collect();
+            if !values.iter().all(|value| value.is_finite()) {
+                return Err(RenderError::NotFinite { channel: kind.name });
+            }
+            channels.push(values);
+        }
+        let side = self.scene.screen.image_error.is_none().then_some(self.grid.side);
+        let tally = Tally::of_band(&pixels, width, side);
+        Ok(Band { index, channels, tally })
+    }
+}

@@ -1,0 +1,179 @@
+//! From a scene to a picture: bands of rows, tile by tile on all cores, kept in a journal until
+//! the whole picture is there. Every pixel is computed on its own, so the picture depends
+//! neither on the number of threads nor on the size of tiles nor on interruptions.
+
+mod adaptive;
+mod bands;
+mod channels;
+mod finish;
+mod grid;
+mod journal;
+mod pixels;
+mod tally;
+
+pub use channels::{CHANNELS, ChannelKind};
+pub use journal::{Found, Journal};
+pub use tally::Summary;
+
+use crate::emission::sky::Panorama;
+use crate::image::exr::Layout;
+use crate::image::{Channel, Picture};
+use crate::scene::Scene;
+use crate::transport::Stage;
+use grid::Grid;
+use kerrlight_geodesic::OutOfRange;
+use std::sync::{Mutex, PoisonError};
+use tally::Tally;
+
+/// Told how many more rows of pixels are done; returns whether to go on.
+pub type Progress<'a> = dyn Fn(usize) -> bool + Sync + 'a;
+
+/// Why there is no picture.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    /// A value is out of range.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
+    /// There is no light to scale.
+    #[error("`screen.total_flux_jy` cannot be met: the picture's own flux is {0:e} scene units")]
+    NoFlux(f64),
+    /// A value does not fit the picture's 32-bit channels.
+    #[error("channel {channel}: a value is too large for a 32-bit float; lower the brightness")]
+    NotFinite {
+        /// The channel.
+        channel: &'static str,
+    },
+    /// A channel that the scene does not have.
+    #[error("`screen.channels`: this scene has no channel `{name}`; it has {there}")]
+    Channel {
+        /// The name that was asked for.
+        name: String,
+        /// The channels that there are.
+        there: String,
+    },
+    /// Bands cannot be kept.
+    #[error(transparent)]
+    Keep(#[from] exr::error::Error),
+    /// The caller asked to stop.
+    #[error("stopped")]
+    Stopped,
+}
+
+/// A picture to be rendered: what is seen, where rays go, and what is kept of it.
+#[derive(Debug)]
+pub struct Raster {
+    scene: Scene,
+    stage: Stage,
+    grid: Grid,
+    channels: Vec<&'static ChannelKind>,
+    layout: Layout,
+    /// Columns of a tile.
+    tile: usize,
+}
+
+/// Columns of a tile: with the rows of a band a block of rays.
+const TILE: usize = 64;
+
+impl Raster {
+    /// The picture of `scene`; `sky` is the decoded file of a `[sky.image]`.
+    ///
+    /// # Errors
+    /// If a value is out of range.
+    pub fn new(scene: &Scene, sky: Option<Panorama>) -> Result<Self, RenderError> {
+        let stage = Stage::new(scene, sky)?;
+        let grid = Grid::new(scene);
+        let refined = scene.screen.image_error.is_some();
+        let channels = channels::chosen(&stage, refined, scene.screen.channels.as_deref())?;
+        let names: Vec<&str> = channels.iter().map(|kind| kind.name).collect();
+        let layout = Layout::new(grid.width, grid.height, &names)?;
+        Ok(Raster { scene: scene.clone(), stage, grid, channels, layout, tile: TILE })
+    }
+
+    /// The same with tiles of `columns` pixels; no pixel depends on it.
+    pub fn with_tile(self, columns: usize) -> Self {
+        Raster { tile: columns.max(1), ..self }
+    }
+
+    /// Number of bands.
+    pub fn bands(&self) -> usize {
+        self.layout.bands()
+    }
+
+    /// Everything about the scene that decides the picture, as a text. The contents of files
+    /// that the scene names are not in it.
+    pub fn identity(&self) -> String {
+        let version = env!("CARGO_PKG_VERSION");
+        format!("kerrlight {version}\n{}\n{:?}\n", self.scene.to_toml(), self.names())
+    }
+
+    /// Names of the channels.
+    pub fn names(&self) -> Vec<&'static str> {
+        self.channels.iter().map(|kind| kind.name).collect()
+    }
+
+    /// What the channels hold.
+    pub fn legend(&self) -> String {
+        channels::legend(&self.channels)
+    }
+
+    fn summarize(&self, tally: &Tally) -> Result<Summary, RenderError> {
+        let summary = Summary::new(&self.scene, tally).map_err(RenderError::NoFlux)?;
+        if (summary.largest as f32).is_finite() {
+            return Ok(summary);
+        }
+        Err(RenderError::NotFinite { channel: "intensity" })
+    }
+}
+
+/// The picture of a scene with what is worth knowing about it.
+#[derive(Debug, Clone)]
+pub struct Rendered {
+    /// The picture.
+    pub picture: Picture,
+    /// What is worth knowing.
+    pub summary: Summary,
+}
+
+/// Renders a picture that fits into memory.
+///
+/// # Errors
+/// If a value is out of range or does not fit, or `progress` returned false.
+pub fn render(
+    scene: &Scene,
+    sky: Option<Panorama>,
+    progress: &Progress<'_>,
+) -> Result<Rendered, RenderError> {
+    Raster::new(scene, sky)?.render(progress)
+}
+
+impl Raster {
+    /// Renders a picture that fits into memory.
+    ///
+    /// # Errors
+    /// If a value is out of range or does not fit, or `progress` returned false.
+    pub fn render(&self, progress: &Progress<'_>) -> Result<Rendered, RenderError> {
+        let all: Vec<usize> = (0..self.bands()).collect();
+        let done = Mutex::new(vec![None; all.len()]);
+        let keep = |band: bands::Band| {
+            let index = band.index;
+            done.lock().unwrap_or_else(PoisonError::into_inner)[index] = Some(band);
+            Ok(())
+        };
+        bands::render_bands(self, &all, &keep, progress)?;
+        let bands = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let tallies = bands.iter().flatten().map(|band| band.tally);
+        let summary = self.summarize(&tallies.fold(Tally::default(), Tally::plus))?;
+        let Grid { width, height, .. } = self.grid;
+        let mut values = vec![Vec::with_capacity(width * height); self.channels.len()];
+        for mut band in bands.into_iter().flatten() {
+            self.rescale(&mut band.channels, summary.unit_factor);
+            for (all, some) in values.iter_mut().zip(band.channels) {
+                all.extend(some);
+            }
+        }
+        let named = self.channels.iter().zip(values);
+        let channels =
+            named.map(|(kind, values)| Channel { name: kind.name.to_owned(), values }).collect();
+        Ok(Rendered { picture: Picture { width, height, channels }, summary })
+    }
+}
