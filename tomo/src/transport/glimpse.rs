@@ -37,6 +37,19 @@ pub struct Glimpse {
     pub fate: Fate,
 }
 
+impl Glimpse {
+    /// Light as it is received by someone in whose frame it has `shift` times the frequency that
+    /// it has at infinity: I_ν/ν³ is invariant, so that a spectrum ν^(−α) gains shift^(3 + α).
+    pub(super) fn receive(&mut self, shift: f64, index: f64) {
+        let boost = shift.powf(3.0 + index);
+        self.intensity *= boost;
+        self.redshift *= shift;
+        for channel in &mut self.rgb {
+            *channel *= boost as f32;
+        }
+    }
+}
+
 /// Light gathered along one ray.
 #[derive(Clone)]
 pub(super) struct Gather {

@@ -3,16 +3,18 @@
 mod glimpse;
 mod spots;
 mod surface;
+mod view;
 
 pub use glimpse::{Fate, Glimpse};
+pub use view::View;
 
 use crate::emission::disc::DiscModel;
-use crate::emission::sky::{Panorama, SkyModel};
+use crate::emission::sky::{Beam, Panorama, SkyModel};
 use crate::emission::spot::SpotModel;
 use crate::scene::Scene;
 use glimpse::Gather;
 use kerrlight_geodesic::{
-    Inclination, Kerr, Observer, OutOfRange, Outcome, Path, PathPoint, Tracer, Want,
+    Kerr, OutOfRange, Outcome, Path, PathPoint, Tracer, Want, footprint, footprint::Number,
 };
 
 /// A scene with everything computed that does not depend on the ray.
@@ -20,9 +22,10 @@ use kerrlight_geodesic::{
 pub struct Stage {
     /// The hole.
     pub hole: Kerr,
-    /// The observer.
-    pub observer: Observer,
+    /// Who looks.
+    pub view: View,
     tracer: Tracer,
+    tolerance: f64,
     time: f64,
     /// Spectral index α, if redshift is simulated.
     redshift: Option<f64>,
@@ -30,12 +33,15 @@ pub struct Stage {
     disc: Option<DiscModel>,
     spots: Vec<SpotModel>,
     sky: Option<SkyModel>,
+    /// Distance of neighbouring rays on the screen, if the sky is averaged over their beams.
+    beams: Option<f64>,
 }
 
 /// Memory that is reused from ray to ray.
 #[derive(Debug, Default)]
 pub struct Scratch {
     path: Path,
+    beam: Path<Number>,
     intervals: Vec<[f64; 2]>,
 }
 
@@ -46,22 +52,21 @@ impl Stage {
     /// If a value is outside its range (a parsed [`Scene`] never is).
     pub fn new(scene: &Scene, picture: Option<Panorama>) -> Result<Self, OutOfRange> {
         let hole = Kerr::new(scene.hole.spin)?;
-        let inclination = Inclination::from_degrees(scene.observer.inclination_deg)?;
-        let observer = if scene.observer.radius.is_finite() {
-            Observer::at_radius(inclination, scene.observer.radius)?
-        } else {
-            Observer::at_infinity(inclination)
-        };
+        let sky = scene.sky.as_ref().and_then(|sky| SkyModel::new(sky, picture));
+        let side = f64::from(scene.screen.samples_per_pixel.isqrt());
+        let spacing = scene.pixel_size() / side;
         Ok(Stage {
             hole,
-            observer: observer.with_azimuth(scene.observer.azimuth_deg.to_radians()),
+            view: View::new(scene, &hole)?,
             tracer: Tracer::with_method(scene.tracer.integrator.method(), scene.tracer.tolerance)?,
+            tolerance: scene.tracer.tolerance,
             time: scene.observer.time,
             redshift: scene.effects.redshift.then_some(scene.effects.spectral_index).flatten(),
             slow_light: scene.effects.slow_light,
             disc: scene.disc.as_ref().map(|disc| DiscModel::new(disc, &hole)),
             spots: scene.spot.iter().map(|spot| SpotModel::new(spot, &hole)).collect(),
-            sky: scene.sky.as_ref().and_then(|sky| SkyModel::new(sky, picture)),
+            sky: sky.map(|sky| if scene.effects.ray_bundles { sky.for_beams() } else { sky }),
+            beams: scene.effects.ray_bundles.then_some(spacing),
         })
     }
 
@@ -106,13 +111,21 @@ impl Stage {
     ) -> Result<(), OutOfRange> {
         let rays = alpha.len().max(1);
         for (k, (alpha, beta)) in alpha.iter().zip(beta).enumerate() {
-            let ray = self.observer.ray(&self.hole, *alpha, *beta)?;
+            let ray = self.view.ray(&self.hole, *alpha, *beta)?;
             self.tracer.trace(&self.hole, &ray, Want::ALL, &mut scratch.path);
             let mut still = Gather::new();
             let surface = self.add_disc(&ray, &scratch.path, &mut still);
+            let sky = self.sky_light(*alpha, *beta, surface, scratch)?;
+            let shift = self.redshift.and_then(|_| self.view.blueshift(*alpha, *beta));
             let places = seen.iter_mut().skip(k).step_by(rays);
             for (time, place) in times.iter().zip(places) {
                 *place = self.glimpse(*time, still.clone(), surface, scratch);
+                for (channel, light) in place.rgb.iter_mut().zip(sky) {
+                    *channel += light;
+                }
+                if let (Some(index), Some(shift)) = (self.redshift, shift) {
+                    place.receive(shift, index);
+                }
             }
         }
         Ok(())
@@ -135,12 +148,6 @@ impl Stage {
             (None, Outcome::Escaped) => Fate::Escaped,
             (None, Outcome::Unresolved(_)) => Fate::Unresolved,
         };
-        if let (Some(sky), Fate::Escaped) = (&self.sky, fate) {
-            let seen = sky.look(path.at(path.mino_total()).direction);
-            for (channel, light) in gather.rgb.iter_mut().zip(seen) {
-                *channel += light;
-            }
-        }
         let mean = if gather.intensity > 0.0 { gather.shift / gather.intensity } else { 0.0 };
         Glimpse {
             intensity: gather.intensity,
@@ -152,6 +159,29 @@ impl Stage {
             delay: gather.delay,
             fate,
         }
+    }
+
+    /// Light of the sky at the end of the traced ray, dark if it does not get there.
+    fn sky_light(
+        &self,
+        x: f64,
+        y: f64,
+        surface: Option<f64>,
+        scratch: &mut Scratch,
+    ) -> Result<[f32; 3], OutOfRange> {
+        let Some(sky) = &self.sky else { return Ok([0.0; 3]) };
+        if surface.is_some() || scratch.path.outcome() != Outcome::Escaped {
+            return Ok([0.0; 3]);
+        }
+        if let Some(spacing) = self.beams {
+            let ray = self.view.bundle(&self.hole, x, y)?;
+            let hole = self.hole.lift();
+            let end = footprint::of_ray(&hole, &ray, self.tolerance, &mut scratch.beam)?;
+            if let Some(end) = end {
+                return Ok(sky.gather(&Beam::new(&end, spacing)));
+            }
+        }
+        Ok(sky.look(scratch.path.at(scratch.path.mino_total()).direction))
     }
 
     /// When the light that is seen at `time` passed a point.
