@@ -6,6 +6,7 @@
 //! a terminal: codecs work on bytes.
 
 pub mod emission;
+pub mod film;
 pub mod image;
 pub mod interferometry;
 pub mod render;

@@ -69,24 +69,24 @@ pub fn render(
 
 /// Where rays go: pixel centres on a regular grid, rows from the top (largest β), square
 /// pixels, `side`² rays a pixel.
-struct Grid {
-    width: usize,
-    height: usize,
-    size: f64,
-    side: usize,
+pub(crate) struct Grid {
+    pub width: usize,
+    pub height: usize,
+    pub size: f64,
+    pub side: usize,
 }
 
 /// A pixel: averages of light, data of its most central ray.
 #[derive(Clone, Copy)]
-struct Pixel {
-    intensity: f64,
-    rgb: [f32; 3],
-    center: Glimpse,
-    unresolved: u32,
+pub(crate) struct Pixel {
+    pub intensity: f64,
+    pub rgb: [f32; 3],
+    pub center: Glimpse,
+    pub unresolved: u32,
 }
 
 impl Grid {
-    fn new(scene: &Scene) -> Self {
+    pub fn new(scene: &Scene) -> Self {
         Grid {
             width: scene.screen.width as usize,
             height: scene.screen.height as usize,
@@ -96,7 +96,7 @@ impl Grid {
     }
 
     /// Screen coordinates of ray (i, j) of a pixel, exactly antisymmetric about the centre.
-    fn screen(&self, column: usize, row: usize, i: usize, j: usize) -> (f64, f64) {
+    pub fn screen(&self, column: usize, row: usize, i: usize, j: usize) -> (f64, f64) {
         let along = |pixel: usize, sub: usize, count: usize| {
             // In units of 1/(2·side) of a pixel, so that the centre is an exact 0.
             let twice = 2 * (pixel * self.side + sub) + 1;
@@ -140,6 +140,26 @@ impl Grid {
     }
 }
 
+/// A channel: its name and what it holds of a pixel.
+pub(crate) type ChannelOf = (&'static str, fn(&Pixel) -> f64);
+
+/// The channels of a picture; `intensity` in the scene's own unit.
+pub(crate) fn channels(stage: &Stage) -> Vec<ChannelOf> {
+    let all: [ChannelOf; 10] = [
+        ("R", |p| f64::from(p.rgb[0])),
+        ("G", |p| f64::from(p.rgb[1])),
+        ("B", |p| f64::from(p.rgb[2])),
+        ("intensity", |p| p.intensity),
+        ("redshift", |p| p.center.redshift),
+        ("crossings", |p| f64::from(p.center.crossings)),
+        ("radius", |p| p.center.radius),
+        ("azimuth", |p| p.center.azimuth),
+        ("delay", |p| p.center.delay),
+        ("outcome", |p| f64::from(p.center.fate as u8)),
+    ];
+    all.into_iter().filter(|(name, _)| *name != "redshift" || stage.has_redshift()).collect()
+}
+
 fn assemble(
     scene: &Scene,
     stage: &Stage,
@@ -148,23 +168,12 @@ fn assemble(
 ) -> Result<Rendered, RenderError> {
     let pixels = || rows.iter().flatten();
     let (unit_factor, intensity_unit) = intensity_unit(scene, pixels().map(|p| p.intensity).sum())?;
-    let mut channels = Vec::new();
-    let mut add = |name: &str, value: &dyn Fn(&Pixel) -> f64| {
-        let values = pixels().map(|p| value(p) as f32).collect();
-        channels.push(Channel { name: name.to_owned(), values });
+    let channel = |(name, value): ChannelOf| {
+        let factor = if name == "intensity" { unit_factor } else { 1.0 };
+        let values = pixels().map(|p| (value(p) * factor) as f32).collect();
+        Channel { name: name.to_owned(), values }
     };
-    for (k, name) in ["R", "G", "B"].into_iter().enumerate() {
-        add(name, &|p| f64::from(p.rgb[k]));
-    }
-    add("intensity", &|p| p.intensity * unit_factor);
-    if stage.has_redshift() {
-        add("redshift", &|p| p.center.redshift);
-    }
-    add("crossings", &|p| f64::from(p.center.crossings));
-    add("radius", &|p| p.center.radius);
-    add("azimuth", &|p| p.center.azimuth);
-    add("delay", &|p| p.center.delay);
-    add("outcome", &|p| f64::from(p.center.fate as u8));
+    let channels: Vec<Channel> = channels(stage).into_iter().map(channel).collect();
     if let Some(bad) = channels.iter().find(|c| c.values.iter().any(|v| !v.is_finite())) {
         return Err(RenderError::NotFinite { channel: bad.name.clone() });
     }
@@ -178,7 +187,7 @@ fn assemble(
 
 /// Factor and name of the unit of intensity: the scene's own, or Jy/µas² such that the
 /// picture holds the flux that was asked for.
-fn intensity_unit(scene: &Scene, sum: f64) -> Result<(f64, &'static str), RenderError> {
+pub(crate) fn intensity_unit(scene: &Scene, sum: f64) -> Result<(f64, &'static str), RenderError> {
     let Some(flux) = scene.screen.total_flux_jy else { return Ok((1.0, "scene unit")) };
     let hole = &scene.hole;
     let angle = crate::units::gravitational_angle(hole.mass_msun, hole.distance_kpc);

@@ -53,8 +53,6 @@ impl Stage {
     pub fn new(scene: &Scene, picture: Option<Panorama>) -> Result<Self, OutOfRange> {
         let hole = Kerr::new(scene.hole.spin)?;
         let sky = scene.sky.as_ref().and_then(|sky| SkyModel::new(sky, picture));
-        let side = f64::from(scene.screen.samples_per_pixel.isqrt());
-        let spacing = scene.pixel_size() / side;
         Ok(Stage {
             hole,
             view: View::new(scene, &hole)?,
@@ -66,8 +64,20 @@ impl Stage {
             disc: scene.disc.as_ref().map(|disc| DiscModel::new(disc, &hole)),
             spots: scene.spot.iter().map(|spot| SpotModel::new(spot, &hole)).collect(),
             sky: sky.map(|sky| if scene.effects.ray_bundles { sky.for_beams() } else { sky }),
-            beams: scene.effects.ray_bundles.then_some(spacing),
+            beams: scene.effects.ray_bundles.then(|| ray_spacing(scene)),
         })
+    }
+
+    /// The same stage seen at another time by a camera that moves; `scene` is the one that it was
+    /// made of, but for its time of observation.
+    ///
+    /// # Errors
+    /// If the camera is impossible there.
+    pub fn move_to(&mut self, scene: &Scene) -> Result<(), OutOfRange> {
+        self.view = View::new(scene, &self.hole)?;
+        self.beams = self.beams.map(|_| ray_spacing(scene));
+        self.time = scene.observer.time;
+        Ok(())
     }
 
     /// The scene's own time of observation, in M.
@@ -188,4 +198,9 @@ impl Stage {
     fn emission_time(&self, time: f64, point: &PathPoint) -> f64 {
         if self.slow_light { time - point.delay } else { time }
     }
+}
+
+/// Distance of neighbouring rays on the screen.
+fn ray_spacing(scene: &Scene) -> f64 {
+    scene.pixel_size() / f64::from(scene.screen.samples_per_pixel.isqrt())
 }
