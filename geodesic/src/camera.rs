@@ -26,7 +26,8 @@ pub enum Motion {
 /// Its frame is the orthonormal tetrad of the zero-angular-momentum observer at its place,
 /// e_r, e_θ, e_φ along the Boyer–Lindquist coordinates (Bardeen, Press & Teukolsky 1972,
 /// eq. 3.2), boosted without rotation to the camera's velocity. It looks towards the hole,
-/// along −e_r; `right` is +e_φ and `up` is −e_θ, as for Bardeen's screen at infinity. A
+/// along −e_r; `right` is +e_φ and `up` is −e_θ, as for Bardeen's screen at infinity;
+/// [`with_pointing`](Self::with_pointing) turns it. A
 /// pinhole lens maps the point (x, y) of the picture plane at distance 1 to the direction
 /// forward + x right + y up; a field of view ψ spans |x| ≤ tan(ψ/2).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,8 +36,10 @@ pub struct Camera {
     inclination: Inclination,
     radius: f64,
     azimuth: f64,
-    /// Velocity in the tetrad of the zero-angular-momentum observer, along e_r and e_φ.
-    velocity: [f64; 2],
+    /// Velocity in the tetrad of the zero-angular-momentum observer, along e_r, e_θ, e_φ.
+    velocity: [f64; 3],
+    /// Right, up and forward in the camera's frame.
+    axes: [[f64; 3]; 3],
     /// Its lapse, angular velocity ω, and √(A/Σ).
     lapse: f64,
     drag: f64,
@@ -56,6 +59,41 @@ impl Camera {
         radius: f64,
         motion: Motion,
     ) -> Result<Self, OutOfRange> {
+        let at_rest = Self::at_rest(hole, inclination, radius)?;
+        let velocity = match motion {
+            Motion::Zamo => [0.0; 3],
+            Motion::Static => at_rest.local_velocity([0.0; 3]),
+            Motion::Keplerian => {
+                let rate = orbits::keplerian_angular_velocity(hole, radius);
+                at_rest.local_velocity([0.0, 0.0, rate])
+            }
+            Motion::FreeFall => [-((1.0 - at_rest.lapse) * (1.0 + at_rest.lapse)).sqrt(), 0.0, 0.0],
+        };
+        let allowed = "a radius at which this motion is slower than light";
+        check("camera radius", radius, square(velocity) < 1.0, allowed)?;
+        Ok(Camera { velocity, ..at_rest })
+    }
+
+    /// A camera that moves along a given path: `rates` are dr/dt, dθ/dt and dφ/dt, in units of
+    /// coordinate time.
+    ///
+    /// # Errors
+    /// As for [`new`](Self::new), or if the motion is not slower than light.
+    pub fn moving(
+        hole: &Kerr,
+        inclination: Inclination,
+        radius: f64,
+        rates: [f64; 3],
+    ) -> Result<Self, OutOfRange> {
+        let at_rest = Self::at_rest(hole, inclination, radius)?;
+        let velocity = at_rest.local_velocity(rates);
+        let speed = square(velocity).sqrt();
+        check("camera speed", speed, speed < 1.0, "slower than light, below 1")?;
+        Ok(Camera { velocity, ..at_rest })
+    }
+
+    /// The camera of zero angular momentum.
+    fn at_rest(hole: &Kerr, inclination: Inclination, radius: f64) -> Result<Self, OutOfRange> {
         let frame = ZamoFrame::at(hole, radius, inclination.sin(), inclination.cos());
         let frame = frame.ok_or(OutOfRange {
             field: "camera radius",
@@ -63,17 +101,48 @@ impl Camera {
             allowed: "a finite number outside the horizon",
         })?;
         let ZamoFrame { lapse, drag, girth, .. } = frame;
-        let circular = |rate: f64| [0.0, frame.orbital_velocity(rate)];
-        let velocity = match motion {
-            Motion::Zamo => [0.0, 0.0],
-            Motion::Static => circular(0.0),
-            Motion::Keplerian => circular(orbits::keplerian_angular_velocity(hole, radius)),
-            Motion::FreeFall => [-((1.0 - lapse) * (1.0 + lapse)).sqrt(), 0.0],
+        Ok(Camera {
+            hole: *hole,
+            inclination,
+            radius,
+            azimuth: 0.0,
+            velocity: [0.0; 3],
+            axes: [[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [-1.0, 0.0, 0.0]],
+            lapse,
+            drag,
+            girth,
+        })
+    }
+
+    /// Velocity in the frame of zero angular momentum of what moves with dr/dt, dθ/dt, dφ/dt:
+    /// (√(Σ/Δ) ṙ, √Σ θ̇, √(A/Σ) sin θ (φ̇ − ω))/lapse (Bardeen, Press & Teukolsky 1972, eq. 3.6).
+    fn local_velocity(&self, [radial, polar, around]: [f64; 3]) -> [f64; 3] {
+        let sigma = self.hole.sigma(self.radius, self.inclination.cos());
+        [
+            (sigma / self.hole.delta(self.radius)).sqrt() * radial / self.lapse,
+            sigma.sqrt() * polar / self.lapse,
+            self.girth * self.inclination.sin() * (around - self.drag) / self.lapse,
+        ]
+    }
+
+    /// The same camera turned away from the hole: by `yaw` to the right about its upward axis,
+    /// then by `pitch` upwards about the axis to its right, then by `roll` clockwise about its line
+    /// of sight (what it sees turns counterclockwise), in radians.
+    pub fn with_pointing(mut self, yaw: f64, pitch: f64, roll: f64) -> Self {
+        let turn = |from: [f64; 3], to: [f64; 3], angle: f64| {
+            let (sin, cos) = angle.sin_cos();
+            let mix = |p: f64, q: f64, k: usize| p * from[k] + q * to[k];
+            [
+                core::array::from_fn(|k| mix(cos, sin, k)),
+                core::array::from_fn(|k| mix(-sin, cos, k)),
+            ]
         };
-        let speed = velocity[0].hypot(velocity[1]);
-        let allowed = "a radius at which this motion is slower than light";
-        check("camera radius", radius, speed < 1.0, allowed)?;
-        Ok(Camera { hole: *hole, inclination, radius, azimuth: 0.0, velocity, lapse, drag, girth })
+        let [right, up, forward] = self.axes;
+        let [forward, right] = turn(forward, right, yaw);
+        let [forward, up] = turn(forward, up, pitch);
+        let [up, right] = turn(up, right, roll);
+        self.axes = [right, up, forward];
+        self
     }
 
     /// The same camera at azimuth `azimuth` (radians).
@@ -97,9 +166,20 @@ impl Camera {
         for (field, value) in [("x", x.value()), ("y", y.value())] {
             check(field, value, value.abs() <= 1e12, "a number in [-1e12, 1e12]")?;
         }
-        let one = T::constant(1.0);
-        let norm = (one + x * x + y * y).sqrt();
-        self.arriving_from([-one / norm, -y / norm, x / norm])
+        self.arriving_from(self.direction(x, y))
+    }
+
+    /// The unit vector (e_r, e_θ, e_φ) of the camera's frame that is seen at the point (x, y) of
+    /// the picture plane.
+    pub fn direction<T: Elementary>(&self, x: T, y: T) -> [T; 3] {
+        let norm = (T::constant(1.0) + x * x + y * y).sqrt();
+        let [right, up, forward] = self.axes.map(|axis| axis.map(T::constant));
+        core::array::from_fn(|k| (forward[k] + x * right[k] + y * up[k]) / norm)
+    }
+
+    /// Its Boyer–Lindquist radius, in M.
+    pub fn radius(&self) -> f64 {
+        self.radius
     }
 
     /// The photon that arrives from the unit vector `direction` = (e_r, e_θ, e_φ) of the
@@ -146,30 +226,35 @@ impl Camera {
     /// Spatial momentum of the arriving photon in the frame of zero angular momentum, for
     /// unit energy there.
     fn momentum<T: Elementary>(&self, direction: [T; 3]) -> [T; 3] {
-        let [v_r, v_phi] = self.velocity;
-        let square = v_r * v_r + v_phi * v_phi;
+        let [v_r, v_theta, v_phi] = self.velocity;
+        let square = square(self.velocity);
         let p = direction.map(|d| -d);
         if square == 0.0 {
             return p;
         }
         let of = T::constant;
         let gamma = 1.0 / (1.0 - square).sqrt();
-        let along = of(v_r) * p[0] + of(v_phi) * p[2];
+        let along = of(v_r) * p[0] + of(v_theta) * p[1] + of(v_phi) * p[2];
         let energy = of(gamma) * (of(1.0) + along);
         // p + [(γ − 1)(v·p)/v² + γ] v for unit energy in the camera's frame.
         let factor = of(gamma - 1.0) * along / of(square) + of(gamma);
-        [p[0] + factor * of(v_r), p[1], p[2] + factor * of(v_phi)].map(|k| k / energy)
+        let boosted =
+            [p[0] + factor * of(v_r), p[1] + factor * of(v_theta), p[2] + factor * of(v_phi)];
+        boosted.map(|k| k / energy)
     }
 
     /// ν in the camera's frame over ν at infinity, for the photon that arrives from
     /// `direction`: multiplies every redshift factor g that is written for infinity.
     pub fn blueshift(&self, direction: [f64; 3]) -> f64 {
-        let [v_r, v_phi] = self.velocity;
-        let gamma = 1.0 / (1.0 - v_r * v_r - v_phi * v_phi).sqrt();
-        let zamo = gamma * (1.0 - v_r * direction[0] - v_phi * direction[2]);
+        let along: f64 = self.velocity.iter().zip(direction).map(|(v, d)| v * d).sum();
+        let zamo = (1.0 - along) / (1.0 - square(self.velocity)).sqrt();
         let around = self.momentum(direction)[2] * self.girth;
         1.0 / (zamo * (self.lapse + self.drag * self.inclination.sin() * around))
     }
+}
+
+fn square(v: [f64; 3]) -> f64 {
+    v.iter().map(|x| x * x).sum()
 }
 
 #[cfg(test)]
@@ -274,6 +359,61 @@ mod tests {
         let falling = camera(0.0, 70.0, r, Motion::FreeFall);
         let behind = falling.blueshift([1.0, 0.0, 0.0]);
         assert!((behind - 1.0 / (1.0 + (2.0 / r).sqrt())).abs() < 1e-14, "{behind}");
+    }
+
+    /// The motions by name are those of their rates.
+    #[test]
+    fn exact_named_motions_by_their_rates() {
+        let (hole, place) = (Kerr::new(0.6).unwrap(), Inclination::from_degrees(90.0).unwrap());
+        let r = 9.0f64;
+        // Free fall from rest at infinity: dr/dt = −√(2r(r² + a²)) Δ/A, dφ/dt = ω.
+        let area = (r * r + 0.36).powi(2) - 0.36 * hole.delta(r);
+        let fall = -(2.0 * r * (r * r + 0.36)).sqrt() * hole.delta(r) / area;
+        for (motion, rates) in [
+            (Motion::Static, [0.0; 3]),
+            (Motion::Keplerian, [0.0, 0.0, 1.0 / (27.0 + 0.6)]),
+            (Motion::Zamo, [0.0, 0.0, 1.2 * r / area]),
+            (Motion::FreeFall, [fall, 0.0, 1.2 * r / area]),
+        ] {
+            let named = Camera::new(&hole, place, r, motion).unwrap().velocity;
+            let moving = Camera::moving(&hole, place, r, rates).unwrap().velocity;
+            for (a, b) in named.iter().zip(moving) {
+                assert!((a - b).abs() < 1e-14, "{motion:?} {named:?} {moving:?}");
+            }
+        }
+        assert!(Camera::moving(&hole, place, r, [0.0, 0.2, 0.0]).is_err());
+    }
+
+    /// Special relativity far from the hole, and a motion in θ as good as one in φ: light from
+    /// ahead is shifted by √((1 + v)/(1 − v)).
+    #[test]
+    fn exact_doppler_shift_of_a_polar_motion() {
+        let (hole, place) = (Kerr::new(0.9).unwrap(), Inclination::from_degrees(90.0).unwrap());
+        let (r, v) = (1e7, 0.5f64);
+        let camera = Camera::moving(&hole, place, r, [0.0, v / r, 0.0]).unwrap();
+        let ahead = camera.blueshift([0.0, 1.0, 0.0]);
+        assert!((ahead - ((1.0 + v) / (1.0 - v)).sqrt()).abs() < 1e-6, "{ahead}");
+        assert!((camera.blueshift([0.0, -1.0, 0.0]) * ahead - 1.0).abs() < 1e-6);
+    }
+
+    /// Turned to the right by 90° the camera looks along +e_φ, with the hole on its left; upwards,
+    /// along −e_θ; and clockwise by 90°, what was to its right is up.
+    #[test]
+    fn exact_pointing() {
+        use std::f64::consts::FRAC_PI_2;
+        let camera = camera(0.5, 80.0, 15.0, Motion::Static);
+        let close = |camera: Camera, x: f64, y: f64, expected: [f64; 3]| {
+            let d = camera.direction(x, y);
+            let off = d.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(off < 2e-9, "{d:?} {expected:?}");
+        };
+        close(camera.with_pointing(FRAC_PI_2, 0.0, 0.0), 0.0, 0.0, [0.0, 0.0, 1.0]);
+        close(camera.with_pointing(FRAC_PI_2, 0.0, 0.0), -1e9, 0.0, [-1.0, 0.0, 0.0]);
+        close(camera.with_pointing(0.0, FRAC_PI_2, 0.0), 0.0, 0.0, [0.0, -1.0, 0.0]);
+        close(camera.with_pointing(0.0, 0.0, FRAC_PI_2), 0.0, 1e9, [0.0, 0.0, 1.0]);
+        close(camera.with_pointing(0.3, 0.2, 0.1), 0.0, 0.0, {
+            [-0.3f64.cos() * 0.2f64.cos(), -0.2f64.sin(), 0.3f64.sin() * 0.2f64.cos()]
+        });
     }
 
     #[test]

@@ -26,7 +26,8 @@ use crate::path::{Outcome, Path};
 use crate::point::PathPoint;
 use crate::trace::{Tracer, Want, trace_series};
 
-type Number = Dual<f64, 2>;
+/// A number with its derivatives with respect to the two coordinates of the screen.
+pub type Number = Dual<f64, 2>;
 
 /// The image of the unit circle of the screen under a linear map to a plane: a circle of radius
 /// ε around a ray covers ε times this ellipse, as long as ε is small.
@@ -208,6 +209,23 @@ fn disc(point: &PathPoint<Number>) -> Disc {
         radius_by: radius.slope,
         azimuth_by: azimuth.slope,
     }
+}
+
+/// Where one ray ends on the sky, and how that changes with the two parameters of its dual numbers
+/// (see [`Observer::ray`] and [`Camera::ray`]); `None` if it does not escape. `path` is memory that
+/// is reused from ray to ray.
+///
+/// # Errors
+/// If `tolerance` is not in \[1e-14, 1e-2\].
+pub fn of_ray(
+    hole: &Kerr<Number>,
+    ray: &Ray<Number>,
+    tolerance: f64,
+    path: &mut Path<Number>,
+) -> Result<Option<Sky>, OutOfRange> {
+    trace_series(tolerance, hole, ray, Want { azimuth: true, time: false }, path)?;
+    let escaped = path.outcome() == Outcome::Escaped;
+    Ok(escaped.then(|| sky(&path.at(path.mino_total()))))
 }
 
 /// The beams around the points (`alpha[k]`, `beta[k]`) of an observer's screen, with at most

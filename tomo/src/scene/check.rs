@@ -79,11 +79,15 @@ fn shown(value: f64) -> String {
 }
 
 impl Invalid {
-    fn new(key: impl Into<String>, value: impl ToString, allowed: impl Into<String>) -> Self {
+    pub(super) fn new(
+        key: impl Into<String>,
+        value: impl ToString,
+        allowed: impl Into<String>,
+    ) -> Self {
         Invalid { key: key.into(), value: Some(value.to_string()), allowed: allowed.into() }
     }
 
-    fn missing(key: impl Into<String>, why: impl Into<String>) -> Self {
+    pub(super) fn missing(key: impl Into<String>, why: impl Into<String>) -> Self {
         Invalid { key: key.into(), value: None, allowed: why.into() }
     }
 
@@ -140,7 +144,12 @@ fn line_at(text: &str, offset: usize) -> usize {
 }
 
 /// Refuses `value` unless `ok`.
-fn number(key: impl Into<String>, value: f64, ok: bool, allowed: &str) -> Result<(), Invalid> {
+pub(super) fn number(
+    key: impl Into<String>,
+    value: f64,
+    ok: bool,
+    allowed: &str,
+) -> Result<(), Invalid> {
     if ok { Ok(()) } else { Err(Invalid::new(key, shown(value), allowed)) }
 }
 
@@ -189,14 +198,21 @@ fn check_hole_and_observer(scene: &Scene) -> Result<(), Invalid> {
     positive("hole.mass_msun", scene.hole.mass_msun)?;
     positive("hole.distance_kpc", scene.hole.distance_kpc)?;
     let observer = &scene.observer;
+    let ok = observer.time.abs() <= 1e9;
+    number("observer.time", observer.time, ok, "a time in [-1e9, 1e9] (M)")?;
+    if scene.camera.is_some() {
+        return super::camera::check(scene);
+    }
     let degrees = observer.inclination_deg;
+    if degrees.is_nan() {
+        let why = "give it, or a `[camera]`";
+        return Err(Invalid::missing("observer.inclination_deg", why));
+    }
     let ok = (0.0..=180.0).contains(&degrees);
     number("observer.inclination_deg", degrees, ok, "an angle in [0, 180]")?;
     let azimuth = observer.azimuth_deg;
     let ok = (-3600.0..=3600.0).contains(&azimuth);
     number("observer.azimuth_deg", azimuth, ok, "an angle in [-3600, 3600]")?;
-    let ok = observer.time.abs() <= 1e9;
-    number("observer.time", observer.time, ok, "a time in [-1e9, 1e9] (M)")?;
     let (radius, allowed) = (observer.radius, "inf, or a radius in [10, 1e9] (M)");
     number(
         "observer.radius",
@@ -209,6 +225,7 @@ fn check_hole_and_observer(scene: &Scene) -> Result<(), Invalid> {
 fn check_screen(scene: &Scene) -> Result<(), Invalid> {
     let screen = &scene.screen;
     match (screen.field_of_view_m, screen.field_of_view_uas) {
+        _ if scene.camera.is_some() => {}
         (Some(m), None) => positive("screen.field_of_view_m", m)?,
         (None, Some(angle)) => positive("screen.field_of_view_uas", angle)?,
         (None, None) => {
@@ -245,7 +262,9 @@ fn check_screen(scene: &Scene) -> Result<(), Invalid> {
     if screen.channels.as_ref().is_some_and(Vec::is_empty) {
         return Err(Invalid::new("screen.channels", "[]", "one name at least"));
     }
-    check_reach(scene)?;
+    if scene.camera.is_none() {
+        check_reach(scene)?;
+    }
     screen.total_flux_jy.map_or(Ok(()), |flux| {
         let ok = (1e-30..=1e30).contains(&flux);
         number("screen.total_flux_jy", flux, ok, "a number in [1e-30, 1e30]")

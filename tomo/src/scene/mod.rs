@@ -3,9 +3,11 @@
 //! A scene is a TOML text; [`Scene::parse`] checks every key, type and range, and
 //! [`Scene::to_toml`] writes the resolved scene with every default spelled out.
 
+mod camera;
 mod check;
 mod overrides;
 
+pub use camera::{CameraConfig, CameraKey, CameraMotion, Pose};
 pub use check::SceneError;
 pub use overrides::apply_override;
 
@@ -19,7 +21,11 @@ pub struct Scene {
     /// The black hole.
     pub hole: Hole,
     /// Where it is seen from, and when.
+    #[serde(default)]
     pub observer: ObserverConfig,
+    /// A camera at a finite radius, in place of the observer's screen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<CameraConfig>,
     /// What part of the sky is rendered, on which pixels.
     pub screen: Screen,
     /// Which effects are simulated.
@@ -57,7 +63,9 @@ pub struct Hole {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ObserverConfig {
-    /// Angle between +z (the spin axis for a > 0) and the line of sight, degrees in \[0, 180\].
+    /// Angle between +z (the spin axis for a > 0) and the line of sight, degrees in \[0, 180\];
+    /// NaN in a scene with a camera, which has a place of its own.
+    #[serde(default = "nowhere", skip_serializing_if = "is_nowhere")]
     pub inclination_deg: f64,
     /// Azimuth of the observer in degrees.
     #[serde(default)]
@@ -72,6 +80,22 @@ pub struct ObserverConfig {
 
 fn infinity() -> f64 {
     f64::INFINITY
+}
+
+fn nowhere() -> f64 {
+    f64::NAN
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde's signature
+fn is_nowhere(degrees: &f64) -> bool {
+    degrees.is_nan()
+}
+
+impl Default for ObserverConfig {
+    fn default() -> Self {
+        let (inclination_deg, radius) = (nowhere(), infinity());
+        ObserverConfig { inclination_deg, azimuth_deg: 0.0, radius, time: 0.0 }
+    }
 }
 
 /// What part of the sky is rendered. Exactly one of the two fields of view must be given.
@@ -135,6 +159,9 @@ pub struct Effects {
     /// number n + 1 and n + 2 of the equatorial plane. All of them without this key.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub half_orbits: Option<u32>,
+    /// The sky is averaged over what the bundle of rays between neighbouring rays covers of it.
+    #[serde(default)]
+    pub ray_bundles: bool,
 }
 
 impl Default for Effects {
@@ -146,6 +173,7 @@ impl Default for Effects {
             slow_light: false,
             absorption: false,
             half_orbits: None,
+            ray_bundles: false,
         }
     }
 }
@@ -364,9 +392,13 @@ impl Scene {
         toml::to_string(&scene).expect("plain tables always serialise") // no maps with odd keys
     }
 
-    /// Width of a pixel in M.
+    /// Width of a pixel in M; with a camera, on its picture plane at distance 1.
     pub fn pixel_size(&self) -> f64 {
-        self.field_of_view_m() / f64::from(self.screen.width)
+        let width = match &self.camera {
+            Some(camera) => camera.pose(self.observer.time).plane_width(),
+            None => self.field_of_view_m(),
+        };
+        width / f64::from(self.screen.width)
     }
 
     /// Width of the field of view in M.

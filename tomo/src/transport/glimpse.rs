@@ -41,6 +41,19 @@ pub struct Glimpse {
     pub fate: Fate,
 }
 
+impl Glimpse {
+    /// Light as it is received by someone in whose frame it has `shift` times the frequency that
+    /// it has at infinity: I_ν/ν³ is invariant, so that a spectrum ν^(−α) gains shift^(3 + α).
+    pub(super) fn receive(&mut self, shift: f64, index: f64) {
+        let boost = shift.powf(3.0 + index);
+        self.intensity *= boost;
+        self.redshift *= shift;
+        for channel in &mut self.rgb {
+            *channel *= boost as f32;
+        }
+    }
+}
+
 /// Light gathered along one ray.
 #[derive(Clone)]
 pub(super) struct Gather {
@@ -82,6 +95,14 @@ impl Gather {
             *channel += tint * light.intensity as f32;
         }
         self.mark(light.intensity, light.place);
+    }
+
+    /// Adds colour from behind everything.
+    pub fn add_behind(&mut self, color: [f32; 3]) {
+        let through = (-self.depth).exp() as f32;
+        for (channel, light) in self.rgb.iter_mut().zip(color) {
+            *channel += through * light;
+        }
     }
 
     /// Remembers where the brightest contribution comes from.

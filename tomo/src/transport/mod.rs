@@ -9,19 +9,23 @@ mod medium;
 mod rays;
 mod spots;
 mod surface;
+mod view;
 mod volume;
 
 pub use glimpse::{Fate, Glimpse};
 pub use medium::{Emission, Medium, Moment, Needs};
+pub use view::View;
 
 use crate::emission::disc::DiscModel;
 use crate::emission::gas::{GasEffects, GasModel};
-use crate::emission::sky::{Panorama, SkyModel};
+use crate::emission::sky::{Beam, Panorama, SkyModel};
 use crate::emission::spot::SpotModel;
 use crate::scene::{Integrator, Scene};
 use glimpse::{Gather, wrap};
 use kerrlight_geodesic::bundle::{Crossings, Nodes, Samples};
-use kerrlight_geodesic::{Inclination, Kerr, Observer, OutOfRange, Path, PathPoint, Tracer};
+use kerrlight_geodesic::{
+    Kerr, Observer, OutOfRange, Path, PathPoint, Tracer, footprint, footprint::Number,
+};
 use rays::{End, Sight};
 use surface::Hit;
 
@@ -30,16 +34,16 @@ use surface::Hit;
 pub struct Stage {
     /// The hole.
     pub hole: Kerr,
-    /// The observer.
-    pub observer: Observer,
+    /// Who looks.
+    pub view: View,
     tracer: Tracer,
+    tolerance: f64,
     time: f64,
     /// Spectral index α, if redshift is simulated.
     redshift: Option<f64>,
     slow_light: bool,
     /// The last number of half-orbits that is seen.
     half_orbits: Option<u32>,
-    tolerance: f64,
     /// Whether rays are traced in closed form where possible.
     closed_form: bool,
     /// Whether every ray needs its path for some source.
@@ -50,12 +54,15 @@ pub struct Stage {
     gas: Option<GasModel>,
     spots: Vec<SpotModel>,
     sky: Option<SkyModel>,
+    /// Distance of neighbouring rays on the screen, if the sky is averaged over their beams.
+    beams: Option<f64>,
 }
 
 /// Memory that is reused from block to block.
 #[derive(Debug, Default)]
 pub struct Scratch {
     path: Path,
+    beam: Path<Number>,
     intervals: Vec<[f64; 2]>,
     crossings: Crossings,
     nodes: Nodes,
@@ -75,12 +82,6 @@ impl Stage {
     /// If a value is outside its range (a parsed [`Scene`] never is).
     pub fn new(scene: &Scene, picture: Option<Panorama>) -> Result<Self, OutOfRange> {
         let hole = Kerr::new(scene.hole.spin)?;
-        let inclination = Inclination::from_degrees(scene.observer.inclination_deg)?;
-        let observer = if scene.observer.radius.is_finite() {
-            Observer::at_radius(inclination, scene.observer.radius)?
-        } else {
-            Observer::at_infinity(inclination)
-        };
         let kept = |name: &str| {
             let channels = scene.screen.channels.as_ref();
             channels.is_none_or(|channels| channels.iter().any(|channel| channel == name))
@@ -90,25 +91,38 @@ impl Stage {
         let length = 100.0 * crate::units::SPEED_OF_LIGHT;
         let length = length * crate::units::gravitational_time(scene.hole.mass_msun);
         let gas = scene.gas.as_ref().map(|gas| GasModel::new(gas, &hole, length, effects));
-        let closed_form = scene.tracer.integrator == Integrator::Elliptic
-            && 1.0 / observer.inverse_radius() >= NEAREST;
+        let view = View::new(scene, &hole)?;
+        let sky = scene.sky.as_ref().and_then(|sky| SkyModel::new(sky, picture));
         Ok(Stage {
             hole,
-            observer: observer.with_azimuth(scene.observer.azimuth_deg.to_radians()),
+            view,
             tracer: Tracer::with_method(scene.tracer.integrator.method(), scene.tracer.tolerance)?,
             time: scene.observer.time,
             redshift,
             slow_light: scene.effects.slow_light,
             half_orbits: scene.effects.half_orbits,
             tolerance: scene.tracer.tolerance,
-            closed_form,
+            closed_form: scene.tracer.integrator == Integrator::Elliptic,
             steps_for_all: !scene.spot.is_empty(),
             places: Needs { azimuth: kept("azimuth"), time: kept("delay"), velocity: false },
             gas,
             disc: scene.disc.as_ref().map(|disc| DiscModel::new(disc, &hole)),
             spots: scene.spot.iter().map(|spot| SpotModel::new(spot, &hole)).collect(),
-            sky: scene.sky.as_ref().and_then(|sky| SkyModel::new(sky, picture)),
+            sky: sky.map(|sky| if scene.effects.ray_bundles { sky.for_beams() } else { sky }),
+            beams: scene.effects.ray_bundles.then(|| ray_spacing(scene)),
         })
+    }
+
+    /// The same stage seen at another time by a camera that moves; `scene` is the one that it was
+    /// made of, but for its time of observation.
+    ///
+    /// # Errors
+    /// If the camera is impossible there.
+    pub fn move_to(&mut self, scene: &Scene) -> Result<(), OutOfRange> {
+        self.view = View::new(scene, &self.hole)?;
+        self.beams = self.beams.map(|_| ray_spacing(scene));
+        self.time = scene.observer.time;
+        Ok(())
     }
 
     /// The scene's own time of observation, in M.
@@ -158,45 +172,58 @@ impl Stage {
         let rays = alpha.len();
         scratch.sights.clear();
         scratch.hits.clear();
-        if self.closed_form {
-            self.trace_block(alpha, beta, scratch)?;
-        } else {
-            scratch.sights.resize(rays, Sight { by_steps: true, ..Sight::default() });
+        let observer = self.closed_form();
+        match observer {
+            Some(observer) => self.trace_block(observer, alpha, beta, scratch)?,
+            None => scratch.sights.resize(rays, Sight { by_steps: true, ..Sight::default() }),
         }
         let medium = self.gas.as_ref().map(|gas| gas as &dyn Medium);
         scratch.volume.reset(medium.map_or(0, |_| rays * times.len()));
-        if let (Some(medium), true) = (medium, self.closed_form) {
-            self.fill_block(medium, (alpha, beta), times, scratch)?;
+        if let (Some(medium), Some(observer)) = (medium, observer) {
+            self.fill_block(medium, observer, (alpha, beta), times, scratch)?;
         }
         let mut path = core::mem::take(&mut scratch.path);
         for k in 0..rays {
             if scratch.sights[k].by_steps {
-                let ray = self.observer.ray(&self.hole, alpha[k], beta[k])?;
+                let ray = self.view.ray(&self.hole, alpha[k], beta[k])?;
                 scratch.sights[k] = self.trace_steps(&ray, &mut path, &mut scratch.hits);
                 if let Some(medium) = medium {
                     self.fill_path(medium, &path, k, times, scratch);
                 }
             }
-            self.look_along(k, times, &path, scratch, seen);
+            self.look_along(k, (alpha[k], beta[k]), times, &path, scratch, seen)?;
         }
         scratch.path = path;
         Ok(())
     }
 
+    /// The observer, if it is one whose rays are to be had in closed form.
+    fn closed_form(&self) -> Option<&Observer> {
+        match &self.view {
+            View::Screen(observer) => {
+                Some(observer).filter(|o| self.closed_form && NEAREST * o.inverse_radius() <= 1.0)
+            }
+            View::Camera(_) => None,
+        }
+    }
+
     /// What is seen along ray number `k`, of which everything is known but the light of the
-    /// surfaces and the spots. `path` is its own if it was traced step by step.
+    /// surfaces, the spots and the sky. `path` is its own if it was traced step by step.
     fn look_along(
         &self,
         k: usize,
+        (x, y): (f64, f64),
         times: &[f64],
         path: &Path,
         scratch: &mut Scratch,
         seen: &mut [Glimpse],
-    ) {
+    ) -> Result<(), OutOfRange> {
         let sight = scratch.sights[k].clone();
         let mut still = Gather::new();
         let hits = &scratch.hits[sight.hits.clone()];
         self.add_disc(hits, sight.lambda, sight.last_time(), &mut still);
+        let sky = self.sky_light(x, y, &sight, scratch)?;
+        let shift = self.redshift.and_then(|_| self.view.blueshift(x, y));
         for (j, time) in times.iter().enumerate() {
             let mut gather = still.clone();
             if let (Some(gas), Some(light)) =
@@ -207,44 +234,70 @@ impl Stage {
             if sight.by_steps {
                 self.add_spots(*time, path, scratch, sight.last_time(), &mut gather);
             }
-            if let Some(place) = seen.get_mut(j * scratch.sights.len() + k) {
-                *place = self.glimpse(&sight, gather);
+            gather.add_behind(sky);
+            let Some(place) = seen.get_mut(j * scratch.sights.len() + k) else { continue };
+            *place = glimpse(&sight, gather);
+            if let (Some(index), Some(shift)) = (self.redshift, shift) {
+                place.receive(shift, index);
             }
         }
+        Ok(())
     }
 
-    /// The sum of everything and the sky.
-    fn glimpse(&self, sight: &Sight, mut gather: Gather) -> Glimpse {
-        let fate = match (sight.surface, sight.end) {
-            (Some(_), _) => Fate::Surface,
-            (None, End::Captured) => Fate::Captured,
-            (None, End::Escaped) => Fate::Escaped,
-            (None, End::Unresolved) => Fate::Unresolved,
+    /// Light of the sky at the end of a ray, dark if it does not get there.
+    fn sky_light(
+        &self,
+        x: f64,
+        y: f64,
+        sight: &Sight,
+        scratch: &mut Scratch,
+    ) -> Result<[f32; 3], OutOfRange> {
+        let (Some(sky), Some(direction), None) = (&self.sky, sight.exit, sight.surface) else {
+            return Ok([0.0; 3]);
         };
-        if let (Some(sky), Some(direction), None) = (&self.sky, sight.exit, sight.surface)
-            && sight.until >= sight.total
-        {
-            let through = (-gather.depth).exp() as f32;
-            for (channel, light) in gather.rgb.iter_mut().zip(sky.look(direction)) {
-                *channel += through * light;
+        if sight.until < sight.total {
+            return Ok([0.0; 3]);
+        }
+        if let Some(spacing) = self.beams {
+            let ray = self.view.bundle(&self.hole, x, y)?;
+            let hole = self.hole.lift();
+            let end = footprint::of_ray(&hole, &ray, self.tolerance, &mut scratch.beam)?;
+            if let Some(end) = end {
+                return Ok(sky.gather(&Beam::new(&end, spacing)));
             }
         }
-        let mean = if gather.intensity > 0.0 { gather.shift / gather.intensity } else { 0.0 };
-        Glimpse {
-            intensity: gather.intensity,
-            rgb: gather.rgb,
-            redshift: mean,
-            crossings: sight.crossings,
-            radius: gather.place.radius,
-            azimuth: wrap(gather.place.azimuth),
-            delay: gather.place.delay,
-            optical_depth: gather.depth,
-            fate,
-        }
+        Ok(sky.look(direction))
     }
 
     /// When the light that is seen at `time` passed a point.
     fn emission_time(&self, time: f64, point: &PathPoint) -> f64 {
         if self.slow_light { time - point.delay } else { time }
     }
+}
+
+/// The sum of everything along a ray.
+fn glimpse(sight: &Sight, gather: Gather) -> Glimpse {
+    let fate = match (sight.surface, sight.end) {
+        (Some(_), _) => Fate::Surface,
+        (None, End::Captured) => Fate::Captured,
+        (None, End::Escaped) => Fate::Escaped,
+        (None, End::Unresolved) => Fate::Unresolved,
+    };
+    let mean = if gather.intensity > 0.0 { gather.shift / gather.intensity } else { 0.0 };
+    Glimpse {
+        intensity: gather.intensity,
+        rgb: gather.rgb,
+        redshift: mean,
+        crossings: sight.crossings,
+        radius: gather.place.radius,
+        azimuth: wrap(gather.place.azimuth),
+        delay: gather.place.delay,
+        optical_depth: gather.depth,
+        fate,
+    }
+}
+
+/// Distance of neighbouring rays on the screen.
+fn ray_spacing(scene: &Scene) -> f64 {
+    scene.pixel_size() / f64::from(scene.screen.samples_per_pixel.isqrt())
 }

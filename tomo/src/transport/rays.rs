@@ -4,7 +4,7 @@ use super::surface::Hit;
 use super::{Scratch, Stage};
 use crate::transport::glimpse::Place;
 use kerrlight_geodesic::analytic::ClosedForm;
-use kerrlight_geodesic::{OutOfRange, Outcome, Path, Ray, Want};
+use kerrlight_geodesic::{Observer, OutOfRange, Outcome, Path, Ray, Want};
 
 /// A ray without its points.
 #[derive(Debug, Clone, Default)]
@@ -50,16 +50,17 @@ impl Stage {
     /// Traces a block of rays in closed form.
     pub(super) fn trace_block(
         &self,
+        observer: &Observer,
         alpha: &[f64],
         beta: &[f64],
         scratch: &mut Scratch,
     ) -> Result<(), OutOfRange> {
         let wanted = if self.disc.is_some() { MOST_HITS } else { 1 };
         let crossings = &mut scratch.crossings;
-        crossings.trace(&self.hole, &self.observer, alpha, beta, wanted)?;
+        crossings.trace(&self.hole, observer, alpha, beta, wanted)?;
         for k in 0..alpha.len() {
             let ends = scratch.crossings.ends(k);
-            let ray = self.observer.ray(&self.hole, alpha[k], beta[k])?;
+            let ray = observer.ray(&self.hole, alpha[k], beta[k])?;
             let first = scratch.hits.len();
             if self.disc.is_some() {
                 scratch.hits.extend(scratch.crossings.ray(k).map(|crossing| Hit {
@@ -90,12 +91,13 @@ impl Stage {
                 by_steps: self.steps_for_all || missing || doubtful(ends.error, self.tolerance),
             });
         }
-        if self.sky.is_some() { self.find_exits(alpha, beta, scratch) } else { Ok(()) }
+        if self.sky.is_some() { self.find_exits(observer, alpha, beta, scratch) } else { Ok(()) }
     }
 
     /// Where rays that escape go.
     fn find_exits(
         &self,
+        observer: &Observer,
         alpha: &[f64],
         beta: &[f64],
         scratch: &mut Scratch,
@@ -109,7 +111,7 @@ impl Stage {
         }
         let pick = |column: &[f64]| outward.iter().map(|k| column[*k]).collect::<Vec<_>>();
         let (alpha, beta) = (pick(alpha), pick(beta));
-        scratch.samples.trace(&self.hole, &self.observer, &alpha, &beta, 2)?;
+        scratch.samples.trace(&self.hole, observer, &alpha, &beta, 2)?;
         for (j, k) in outward.iter().enumerate() {
             let ray = scratch.samples.ray(j);
             let (sin, u) = ray.theta[1].sin_cos();

@@ -5,7 +5,7 @@ use super::rays::{End, Sight};
 use super::surface::Hit;
 use super::{Scratch, Stage};
 use kerrlight_geodesic::bundle::{NodeRequest, PanelRule, RayNodes};
-use kerrlight_geodesic::{OutOfRange, Path};
+use kerrlight_geodesic::{Observer, OutOfRange, Path};
 
 /// Nodes of a panel.
 const ORDER: usize = 8;
@@ -100,6 +100,7 @@ impl Stage {
     pub(super) fn fill_block(
         &self,
         medium: &dyn Medium,
+        observer: &Observer,
         (alpha, beta): (&[f64], &[f64]),
         times: &[f64],
         scratch: &mut Scratch,
@@ -112,7 +113,7 @@ impl Stage {
             let until: Vec<f64> = pending.iter().map(|k| sights[*k].last_time()).collect();
             let request = self.request(medium, &volume.quadrature.rule, split);
             let (alpha, beta) = (pick(alpha), pick(beta));
-            nodes.trace(&self.hole, &self.observer, &alpha, &beta, Some(&until), &request)?;
+            nodes.trace(&self.hole, observer, &alpha, &beta, Some(&until), &request)?;
             let last = split >= FINEST;
             let mut number = 0;
             pending.retain(|k| {
