@@ -87,10 +87,10 @@ fn turn(a: f64, place: [f64; 3], k: [f64; 4], v: [f64; 4]) -> [f64; 4] {
     let slope = |c: usize, i: usize, j: usize| if c == 0 { 0.0 } else { g[i][j].slope[c - 1] };
     let mut lower = [0.0; 4];
     for (nu, out) in lower.iter_mut().enumerate() {
-        for al in 0..4 {
-            for be in 0..4 {
+        for (al, k) in k.iter().enumerate() {
+            for (be, v) in v.iter().enumerate() {
                 let gamma = slope(al, nu, be) + slope(be, nu, al) - slope(nu, al, be);
-                *out -= 0.5 * gamma * k[al] * v[be];
+                *out -= 0.5 * gamma * k * v;
             }
         }
     }
