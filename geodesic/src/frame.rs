@@ -28,6 +28,7 @@ pub struct ZamoFrame {
 impl ZamoFrame {
     /// The frame at radius `r` (in M) and the polar angle with this sine and cosine; `None`
     /// where r is not finite or not outside the horizon.
+    #[inline]
     pub fn at(hole: &Kerr, r: f64, sin: f64, cos: f64) -> Option<Self> {
         let (a, delta, sigma) = (hole.spin(), hole.delta(r), hole.sigma(r, cos));
         if !(r.is_finite() && r > hole.horizon() && delta > 0.0) {
@@ -54,6 +55,7 @@ impl ZamoFrame {
     }
 
     /// The frame at a point of a ray; `None` at the horizon.
+    #[inline]
     pub fn of(hole: &Kerr, point: &PathPoint) -> Option<Self> {
         let [x, y, u] = point.direction;
         Self::at(hole, point.radius(), x.hypot(y), u)
@@ -65,12 +67,14 @@ impl ZamoFrame {
     }
 
     /// Sine and cosine of the polar angle.
+    #[inline]
     pub fn polar_angle(&self) -> [f64; 2] {
         [self.sin, self.cos]
     }
 
     /// A covariant Boyer–Lindquist vector (p_t, p_r, p_θ, p_φ) in this frame. On the axis
     /// p_φ must be 0.
+    #[inline]
     pub fn covariant(&self, p: [f64; 4]) -> [f64; 4] {
         let around = if p[3] == 0.0 { 0.0 } else { p[3] / (self.girth * self.sin) };
         let energy = -(p[0] + self.drag * p[3]) / self.lapse;
@@ -78,6 +82,7 @@ impl ZamoFrame {
     }
 
     /// A contravariant Boyer–Lindquist vector (uᵗ, uʳ, u^θ, u^φ) in this frame.
+    #[inline]
     pub fn contravariant(&self, u: [f64; 4]) -> [f64; 4] {
         let around = self.girth * self.sin * (u[3] - self.drag * u[0]);
         [self.lapse * u[0], u[1] / self.radial, self.length * u[2], around]
@@ -112,6 +117,7 @@ impl ZamoFrame {
     }
 
     /// In Carter's tetrad: (E_r, H_r) and (E_θ, E_φ) of the bivector k∧f, and kᵗ.
+    #[inline]
     fn carter_bivector(&self, k: [f64; 4], f: [f64; 4]) -> ([f64; 2], [f64; 2], f64) {
         let [boost, swift] = self.carter;
         let electric = |i: usize| k[0] * f[i] - k[i] * f[0];
@@ -131,6 +137,7 @@ impl ZamoFrame {
     ///
     /// A and −B are the radial components of the electric and magnetic parts of the bivector
     /// k∧f in Carter's tetrad, the one in which both principal null directions are radial.
+    #[inline]
     pub fn walker_penrose(&self, k: [f64; 4], f: [f64; 4]) -> [f64; 2] {
         let ([e, h], _, _) = self.carter_bivector(k, f);
         [e * self.radius + h * self.polar, h * self.radius - e * self.polar]
@@ -168,6 +175,7 @@ const PRINCIPAL: f64 = 1e-14;
 
 impl ScreenPoint {
     /// The point (α, β), in M, of a screen at `inclination` (`sin_inclination` = sin i).
+    #[inline]
     pub fn new(hole: &Kerr, sin_inclination: f64, alpha: f64, beta: f64) -> Self {
         let nu = -(alpha + hole.spin() * sin_inclination);
         let carter = beta * beta + nu * nu;
@@ -184,6 +192,7 @@ impl ScreenPoint {
     /// ray is a principal null one, κ vanishes, and the limit is
     /// −(f_θ − i f_φ)(r + ia cos θ)/√Σ in Carter's tetrad, without the last factor (a turn of
     /// the meridian) on the axis itself.
+    #[inline]
     pub fn transport(&self, frame: &ZamoFrame, k: [f64; 4], f: [f64; 4]) -> [f64; 2] {
         if self.principal {
             return frame.principal_transport(k, f);

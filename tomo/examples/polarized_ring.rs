@@ -5,15 +5,14 @@
 //! VERTICAL RADIAL TOROIDAL > ring.csv`: inclination and chi in degrees, SPEED and CHI of the gas in the
 //! frame of zero angular momentum (`boosted`), the field as the gas has it.
 
-use kerrlight_geodesic::{
-    Inclination, Kerr, Observer, Path, ScreenPoint, Tracer, Want, ZamoFrame,
-};
+use kerrlight_geodesic::{Inclination, Kerr, Observer, Path, ScreenPoint, Tracer, Want, ZamoFrame};
 use kerrlight_tomo::polarization::{Gas, MagneticField, PowerLaw, Stokes, view};
 use std::error::Error;
 
 const SIDE: u32 = 64;
 const FIELD_OF_VIEW: f64 = 24.0;
-const [INNER, OUTER]: [f64; 2] = [5.0, 7.0];
+const INNER: f64 = 5.0;
+const OUTER: f64 = 7.0;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let numbers: Result<Vec<f64>, _> = std::env::args().skip(1).map(|x| x.parse()).collect();
@@ -29,7 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let law = PowerLaw::new(1.0, Some(300.0))?;
     let tracer = Tracer::new(1e-11)?;
     let mut path = Path::new();
-    println!("alpha,beta,I,Q,U,V,radius,outward");
+    println!("alpha,beta,I,Q,U,V,layers,radius,outward");
     for k in 0..SIDE * SIDE {
         let at = |k: u32| FIELD_OF_VIEW * ((f64::from(k) + 0.5) / f64::from(SIDE) - 0.5);
         let (alpha, beta) = (at(k % SIDE), -at(k / SIDE));
@@ -37,7 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         tracer.trace(&hole, &ray, Want::ALL, &mut path);
         let screen = ScreenPoint::new(&hole, inclination.sin(), alpha, beta);
         let mut light = Stokes::default();
-        let (mut radius, mut outward) = (0.0, false);
+        let (mut layers, mut radius, mut outward) = (0, 0.0, false);
         for time in path.equatorial_crossings() {
             let point = path.at(time);
             if !(INNER..=OUTER).contains(&point.radius()) {
@@ -47,14 +46,15 @@ fn main() -> Result<(), Box<dyn Error>> {
             let photon = frame.covariant(point.momentum(&hole, ray.lambda));
             let seen = view(&frame, &screen, photon, gas, field.at(&frame));
             if let Some(layer) = seen.and_then(|seen| law.of_layer(&seen)) {
-                if light.i == 0.0 {
+                layers += 1;
+                if layers == 1 {
                     (radius, outward) = (point.radius(), photon[1] > 0.0);
                 }
                 light += layer;
             }
         }
         let Stokes { i, q, u, v } = light;
-        println!("{alpha},{beta},{i},{q},{u},{v},{radius},{outward}");
+        println!("{alpha},{beta},{i},{q},{u},{v},{layers},{radius},{outward}");
     }
     Ok(())
 }

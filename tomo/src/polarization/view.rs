@@ -30,6 +30,7 @@ pub struct SynchrotronView {
 /// In the gas frame the electric vector is along k × B. On the screen it is normal to the
 /// parallel-transported projection of B, h = b + (k·b)/ω u with ω = −k·u, a vector normal to k of
 /// length |B| sin θ_B: no cross product is needed.
+#[inline]
 pub fn view(
     frame: &ZamoFrame,
     screen: &ScreenPoint,
@@ -86,6 +87,7 @@ pub fn view_at(
 }
 
 /// The product of the spatial parts.
+#[inline]
 fn space(a: [f64; 4], b: [f64; 4]) -> f64 {
     a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
 }
