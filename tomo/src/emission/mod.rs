@@ -5,3 +5,4 @@ pub mod disc;
 pub mod page_thorne;
 pub mod sky;
 pub mod spot;
+pub mod spot_parts;

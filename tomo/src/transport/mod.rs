@@ -1,8 +1,12 @@
 //! The only place where a pixel is a sum: light of every source along one ray.
 
+mod chord;
 mod glimpse;
 mod spots;
 mod surface;
+#[cfg(test)]
+mod tests;
+mod tree;
 
 pub use glimpse::{Fate, Glimpse};
 
@@ -12,8 +16,11 @@ use crate::emission::spot::SpotModel;
 use crate::scene::Scene;
 use glimpse::Gather;
 use kerrlight_geodesic::{
-    Inclination, Kerr, Observer, OutOfRange, Outcome, Path, PathPoint, Tracer, Want,
+    Inclination, Kerr, Observer, OutOfRange, Outcome, Path, PathPoint, Ray, Tracer, Want,
 };
+use spots::{Met, SpotTree};
+use std::sync::{Arc, Mutex};
+use tree::WalkScratch;
 
 /// A scene with everything computed that does not depend on the ray.
 #[derive(Debug, Clone)]
@@ -29,14 +36,23 @@ pub struct Stage {
     slow_light: bool,
     disc: Option<DiscModel>,
     spots: Vec<SpotModel>,
+    /// Trees over the spots by time of observation, the latest last.
+    spot_trees: Arc<Mutex<Vec<(f64, Arc<SpotTree>)>>>,
+    one_by_one: bool,
     sky: Option<SkyModel>,
 }
+
+/// Trees that are kept: as many as a movie's block of frames may need at once.
+const MOST_TREES: usize = 256;
 
 /// Memory that is reused from ray to ray.
 #[derive(Debug, Default)]
 pub struct Scratch {
     path: Path,
     intervals: Vec<[f64; 2]>,
+    walk: WalkScratch,
+    met: Vec<Met>,
+    pieces: Vec<[f64; 2]>,
 }
 
 impl Stage {
@@ -61,8 +77,17 @@ impl Stage {
             slow_light: scene.effects.slow_light,
             disc: scene.disc.as_ref().map(|disc| DiscModel::new(disc, &hole)),
             spots: scene.spot.iter().map(|spot| SpotModel::new(spot, &hole)).collect(),
+            spot_trees: Arc::default(),
+            one_by_one: false,
             sky: scene.sky.as_ref().and_then(|sky| SkyModel::new(sky, picture)),
         })
+    }
+
+    /// The same stage, on which every spot and every triangle is asked along every ray, without
+    /// a hierarchy: for comparisons.
+    pub fn one_by_one(mut self) -> Self {
+        self.one_by_one = true;
+        self
     }
 
     /// The scene's own time of observation, in M.
@@ -105,14 +130,16 @@ impl Stage {
         seen: &mut [Glimpse],
     ) -> Result<(), OutOfRange> {
         let rays = alpha.len().max(1);
+        let trees: Vec<_> = times.iter().map(|time| self.spot_tree(*time)).collect();
         for (k, (alpha, beta)) in alpha.iter().zip(beta).enumerate() {
             let ray = self.observer.ray(&self.hole, *alpha, *beta)?;
             self.tracer.trace(&self.hole, &ray, Want::ALL, &mut scratch.path);
             let mut still = Gather::new();
             let surface = self.add_disc(&ray, &scratch.path, &mut still);
             let places = seen.iter_mut().skip(k).step_by(rays);
-            for (time, place) in times.iter().zip(places) {
-                *place = self.glimpse(*time, still.clone(), surface, scratch);
+            for ((time, tree), place) in times.iter().zip(&trees).zip(places) {
+                let tree = tree.as_deref();
+                *place = self.glimpse(*time, tree, &ray, still.clone(), surface, scratch);
             }
         }
         Ok(())
@@ -122,12 +149,17 @@ impl Stage {
     fn glimpse(
         &self,
         time: f64,
+        tree: Option<&SpotTree>,
+        ray: &Ray,
         mut gather: Gather,
         surface: Option<f64>,
         scratch: &mut Scratch,
     ) -> Glimpse {
         let end = surface.unwrap_or_else(|| scratch.path.mino_total());
-        self.add_spots(time, scratch, end, &mut gather);
+        match tree {
+            Some(tree) => self.add_spots(time, tree, ray, scratch, end, &mut gather),
+            None => self.add_every_spot(time, scratch, end, &mut gather),
+        }
         let path = &scratch.path;
         let fate = match (surface, path.outcome()) {
             (Some(_), _) => Fate::Surface,
@@ -152,6 +184,26 @@ impl Stage {
             delay: gather.delay,
             fate,
         }
+    }
+
+    /// The tree over the spots for a time of observation. With slow light one tree serves all;
+    /// without, each time has its own. It is made when it is first asked for.
+    fn spot_tree(&self, time: f64) -> Option<Arc<SpotTree>> {
+        if self.spots.is_empty() || self.one_by_one {
+            return None;
+        }
+        let (key, at) = if self.slow_light { (0.0, None) } else { (time, Some(time)) };
+        // Nothing that holds the lock can panic halfway through a change.
+        let mut trees = self.spot_trees.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some((_, tree)) = trees.iter().rev().find(|(of, _)| *of == key) {
+            return Some(tree.clone());
+        }
+        let tree = Arc::new(SpotTree::new(&self.spots, &self.hole, at, time));
+        if trees.len() >= MOST_TREES {
+            trees.remove(0);
+        }
+        trees.push((key, tree.clone()));
+        Some(tree)
     }
 
     /// When the light that is seen at `time` passed a point.
