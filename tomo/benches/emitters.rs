@@ -49,7 +49,11 @@ fn rays(side: u32) -> (Vec<f64>, Vec<f64>) {
     (0..side * side).map(|k| (along(k % side), along(k / side))).unzip()
 }
 
-fn look(stage: &Stage, (alpha, beta): &(Vec<f64>, Vec<f64>), scratch: &mut Scratch) -> Vec<Glimpse> {
+fn look(
+    stage: &Stage,
+    (alpha, beta): &(Vec<f64>, Vec<f64>),
+    scratch: &mut Scratch,
+) -> Vec<Glimpse> {
     let mut seen = vec![Glimpse::default(); alpha.len()];
     stage.look_many(alpha, beta, &[stage.time()], scratch, &mut seen).expect("rays of the scene");
     seen

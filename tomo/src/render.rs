@@ -1,10 +1,9 @@
 //! From a scene to a picture: rays over all pixels, in parallel. Every pixel is computed on
 //! its own, so the picture does not depend on the number of threads.
 
-use crate::emission::sky::Panorama;
 use crate::image::{Channel, Picture};
 use crate::scene::Scene;
-use crate::transport::{Fate, Glimpse, Scratch, Stage};
+use crate::transport::{Assets, Fate, Glimpse, Scratch, Stage};
 use kerrlight_geodesic::OutOfRange;
 use rayon::prelude::*;
 
@@ -44,16 +43,16 @@ pub struct Rendered {
     pub intensity_unit: &'static str,
 }
 
-/// Renders `scene`; `sky` is the decoded file of a `[sky.image]`.
+/// Renders `scene` with the decoded files that it names.
 ///
 /// # Errors
 /// If a value is out of range or `progress` returned false.
 pub fn render(
     scene: &Scene,
-    sky: Option<Panorama>,
+    assets: impl Into<Assets>,
     progress: &Progress<'_>,
 ) -> Result<Rendered, RenderError> {
-    let stage = Stage::new(scene, sky)?;
+    let stage = Stage::new(scene, assets)?;
     let grid = Grid::new(scene);
     let rows: Vec<Vec<Pixel>> = (0..grid.height)
         .into_par_iter()

@@ -2,6 +2,7 @@
 //! adds up along a ray is the business of [`transport`](crate::transport).
 
 pub mod disc;
+pub mod mesh;
 pub mod page_thorne;
 pub mod sky;
 pub mod spot;

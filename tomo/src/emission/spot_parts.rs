@@ -4,9 +4,9 @@
 //! A rigid spot is one shell of radii; of a sheared one every radius turns by its own angle, so it
 //! is cut into several.
 
-use super::spot::{CUT_OFF, SpotModel};
+use super::spot::{CUT_OFF, SpotModel, difference};
 use core::f64::consts::{PI, TAU};
-use kerrlight_geodesic::flow::cross;
+use kerrlight_geodesic::flow::{cross, dot};
 
 /// A part of the places that a spot can shine from.
 #[derive(Debug, Clone, Copy)]
@@ -43,7 +43,8 @@ impl SpotModel {
     ) {
         let [low, high] = self.shell();
         let low = low.max(horizon);
-        if low >= high || at.is_some_and(|at| self.sheared_since().is_some_and(|since| at < since)) {
+        if low >= high || at.is_some_and(|at| self.sheared_since().is_some_and(|since| at < since))
+        {
             return;
         }
         let around = at.unwrap_or(time);
@@ -102,9 +103,8 @@ impl SpotModel {
         let scale = self.middle(part.radii) / orbit;
         let swirl = cross(axis, start);
         let reach = self.thickness(part.radii) * (1.0 + ROUNDING) + ROUNDING * orbit;
-        let extremes: [[f64; 2]; 3] = core::array::from_fn(|k| {
-            arc_extremes(scale * start[k], scale * swirl[k], part.angles)
-        });
+        let extremes: [[f64; 2]; 3] =
+            core::array::from_fn(|k| arc_extremes(scale * start[k], scale * swirl[k], part.angles));
         [extremes.map(|[low, _]| low - reach), extremes.map(|[_, high]| high + reach)]
     }
 
@@ -119,7 +119,26 @@ impl SpotModel {
         let rounding = ROUNDING + 4.0 * f64::EPSILON * a.abs().max(b.abs());
         let (wide, own) = (b - a + rounding, d - c + rounding);
         // Not finite where rates are not: then it may.
-        wide.is_nan() || wide >= TAU || (c - a).rem_euclid(TAU) <= wide || (a - c).rem_euclid(TAU) <= own
+        wide.is_nan()
+            || wide >= TAU
+            || (c - a).rem_euclid(TAU) <= wide
+            || (a - c).rem_euclid(TAU) <= own
+    }
+
+    /// Whether it can come within `epsilon` of a chord between two times: a rigid spot's ball and
+    /// the way that its centre makes. (Of a sheared one its parts say all.)
+    pub fn comes_near(&self, [a, b]: [[f64; 3]; 2], epsilon: f64, [from, to]: [f64; 2]) -> bool {
+        if self.sheared_since().is_some() {
+            return true;
+        }
+        let way = 0.5 * self.speed() * (to - from);
+        let center = self.center(0.5 * (from + to));
+        let (along, offset) = (difference(b, a), difference(center, a));
+        let part = (dot(offset, along) / dot(along, along)).clamp(0.0, 1.0);
+        let part = if part.is_nan() { 0.0 } else { part };
+        let miss: [f64; 3] = core::array::from_fn(|k| offset[k] - part * along[k]);
+        let reach = CUT_OFF * self.sigma() + way + epsilon;
+        dot(miss, miss) <= reach * reach * (1.0 + ROUNDING)
     }
 }
 
@@ -140,7 +159,6 @@ mod tests {
     use crate::emission::spot::rotate;
     use crate::scene::Spot;
     use kerrlight_geodesic::Kerr;
-    use kerrlight_geodesic::flow::dot;
 
     fn spot(axis: [f64; 3], sigma: f64, sheared_since: Option<f64>) -> SpotModel {
         let config = Spot {
@@ -171,7 +189,8 @@ mod tests {
                         for k in 0..300 {
                             let x = f64::from(k);
                             let (start, _, orbit) = spot.orbit();
-                            let off = [x.sin(), (1.7 * x).cos(), (2.3 * x).sin()].map(|c| 2.9 * sigma * c);
+                            let off = [x.sin(), (1.7 * x).cos(), (2.3 * x).sin()]
+                                .map(|c| 2.9 * sigma * c);
                             let rest: [f64; 3] = core::array::from_fn(|k| start[k] + off[k]);
                             let r = dot(rest, rest).sqrt();
                             let [angle, _] = spot.turned_between([r, r], [time, time]);
@@ -184,10 +203,14 @@ mod tests {
                             for parts in [&now, &ever] {
                                 let holds = |part: &&SpotPart| {
                                     let [low, high] = spot.bounds(part);
-                                    let inside = (0..3).all(|k| (low[k]..=high[k]).contains(&point[k]));
+                                    let inside =
+                                        (0..3).all(|k| (low[k]..=high[k]).contains(&point[k]));
                                     inside && spot.shines_from(part, [time, time])
                                 };
-                                assert!(parts.iter().any(|p| holds(&p)), "{axis:?} {sigma} {since:?} {time} {orbit}");
+                                assert!(
+                                    parts.iter().any(|p| holds(&p)),
+                                    "{axis:?} {sigma} {since:?} {time} {orbit}"
+                                );
                             }
                         }
                     }
@@ -206,7 +229,9 @@ mod tests {
         assert_eq!(parts.len(), 1);
         let ([low, high], center) = (spot.bounds(&parts[0]), spot.center(25.0));
         for k in 0..3 {
-            assert!((high[k] - center[k] - 1.8).abs() < 1e-6 && (center[k] - low[k] - 1.8).abs() < 1e-6);
+            assert!(
+                (high[k] - center[k] - 1.8).abs() < 1e-6 && (center[k] - low[k] - 1.8).abs() < 1e-6
+            );
         }
     }
 }

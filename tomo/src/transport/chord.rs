@@ -82,10 +82,14 @@ impl ChordBound {
     /// Largest distance from the chord between two points of the ray; infinite next to the
     /// horizon of a spinning hole and at infinity.
     pub fn distance(&self, ends: [&PathPoint; 2]) -> f64 {
+        self.sagitta(ends) + self.error(self.reach(ends))
+    }
+
+    /// The same without what the tracer's error adds.
+    pub fn sagitta(&self, ends: [&PathPoint; 2]) -> f64 {
         let [least, most] = self.extent(ends);
-        let r = 1.0 / least;
-        let step = r * r * (ends[1].mino_time - ends[0].mino_time);
-        0.125 * self.curvature(most) * step * step + self.error(r)
+        let step = (ends[1].mino_time - ends[0].mino_time) / (least * least);
+        0.125 * self.curvature(most) * step * step
     }
 
     /// What the tracer's own error may amount to at radius r.
@@ -123,7 +127,8 @@ impl ChordBound {
         let speed = (1.0 + w2 * (2.0 * a2 + w * (self.cubic + w * self.quartic))).sqrt();
         let pull = 2.0 + self.drag * w;
         let f = self.spin * w2 * w * pull / gap;
-        let slope = self.spin * w2 * ((6.0 + 4.0 * self.drag * w) / gap + 2.0 * w * pull / (gap * gap));
+        let slope =
+            self.spin * w2 * ((6.0 + 4.0 * self.drag * w) / gap + 2.0 * w * pull / (gap * gap));
         flat + speed * (2.0 * f + w * slope) + f * f / w.max(f64::MIN_POSITIVE)
     }
 }
@@ -151,7 +156,9 @@ mod tests {
             let hole = Kerr::new(spin).unwrap();
             for degrees in [1.0, 60.0, 90.0] {
                 let observer = Observer::at_infinity(Inclination::from_degrees(degrees).unwrap());
-                for (alpha, beta) in [(3.0, 1.0), (-5.5, 0.5), (7.0, -2.0), (-2.0, 12.0), (0.1, 4.9)] {
+                for (alpha, beta) in
+                    [(3.0, 1.0), (-5.5, 0.5), (7.0, -2.0), (-2.0, 12.0), (0.1, 4.9)]
+                {
                     let ray = observer.ray(&hole, alpha, beta).unwrap();
                     let mut path = Path::new();
                     Tracer::new(1e-12).unwrap().trace(&hole, &ray, Want::ALL, &mut path);
@@ -159,12 +166,15 @@ mod tests {
                     let total = path.mino_total();
                     for pieces in [7u32, 25, 100, 400] {
                         for k in 1..pieces - 1 {
-                            let at = |x: f64| path.at(total * (f64::from(k) + x) / f64::from(pieces));
+                            let at =
+                                |x: f64| path.at(total * (f64::from(k) + x) / f64::from(pieces));
                             let (start, end) = (at(0.0), at(1.0));
                             let limit = bound.distance([&start, &end]);
                             let chord = [start.cartesian(), end.cartesian()];
                             let worst = (1..16)
-                                .map(|j| distance_to_chord(at(f64::from(j) / 16.0).cartesian(), chord))
+                                .map(|j| {
+                                    distance_to_chord(at(f64::from(j) / 16.0).cartesian(), chord)
+                                })
                                 .fold(0.0, f64::max);
                             let rounding = 1e-11 * bound.reach([&start, &end]).powi(2);
                             assert!(

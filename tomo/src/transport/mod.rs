@@ -2,6 +2,7 @@
 
 mod chord;
 mod glimpse;
+mod meshes;
 mod spots;
 mod surface;
 #[cfg(test)]
@@ -11,6 +12,7 @@ mod tree;
 pub use glimpse::{Fate, Glimpse};
 
 use crate::emission::disc::DiscModel;
+use crate::emission::mesh::{MeshFile, MeshModel};
 use crate::emission::sky::{Panorama, SkyModel};
 use crate::emission::spot::SpotModel;
 use crate::scene::Scene;
@@ -18,6 +20,7 @@ use glimpse::Gather;
 use kerrlight_geodesic::{
     Inclination, Kerr, Observer, OutOfRange, Outcome, Path, PathPoint, Ray, Tracer, Want,
 };
+use meshes::{Hit, MeshTree};
 use spots::{Met, SpotTree};
 use std::sync::{Arc, Mutex};
 use tree::WalkScratch;
@@ -37,10 +40,29 @@ pub struct Stage {
     disc: Option<DiscModel>,
     spots: Vec<SpotModel>,
     /// Trees over the spots by time of observation, the latest last.
-    spot_trees: Arc<Mutex<Vec<(f64, Arc<SpotTree>)>>>,
+    spot_trees: Arc<Mutex<SpotTrees>>,
+    meshes: Option<Arc<MeshTree>>,
     one_by_one: bool,
     sky: Option<SkyModel>,
 }
+
+/// The decoded files that a scene names.
+#[derive(Debug, Clone, Default)]
+pub struct Assets {
+    /// The picture of a `[sky.image]`.
+    pub sky: Option<Panorama>,
+    /// A file for each `[[mesh]]`, in their order.
+    pub meshes: Vec<MeshFile>,
+}
+
+impl From<Option<Panorama>> for Assets {
+    fn from(sky: Option<Panorama>) -> Self {
+        Assets { sky, meshes: Vec::new() }
+    }
+}
+
+/// Trees with the time that they are for.
+type SpotTrees = Vec<(f64, Arc<SpotTree>)>;
 
 /// Trees that are kept: as many as a movie's block of frames may need at once.
 const MOST_TREES: usize = 256;
@@ -53,14 +75,33 @@ pub struct Scratch {
     walk: WalkScratch,
     met: Vec<Met>,
     pieces: Vec<[f64; 2]>,
+    hits: Vec<Hit>,
+}
+
+fn mesh_tree(
+    scene: &Scene,
+    files: &[MeshFile],
+    hole: &Kerr,
+) -> Result<Option<Arc<MeshTree>>, OutOfRange> {
+    if files.len() != scene.mesh.len() {
+        let (value, allowed) = (files.len() as f64, "one file for each [[mesh]]");
+        return Err(OutOfRange { field: "number of mesh files", value, allowed });
+    }
+    if files.is_empty() {
+        return Ok(None);
+    }
+    let placed = scene.mesh.iter().zip(files).map(|(mesh, file)| MeshModel::new(mesh, file));
+    Ok(Some(Arc::new(MeshTree::new(placed.collect::<Result<_, _>>()?, hole))))
 }
 
 impl Stage {
-    /// The stage of a scene; `picture` is the decoded file of a `[sky.image]`.
+    /// The stage of a scene with the files that it names.
     ///
     /// # Errors
-    /// If a value is outside its range (a parsed [`Scene`] never is).
-    pub fn new(scene: &Scene, picture: Option<Panorama>) -> Result<Self, OutOfRange> {
+    /// If a value is outside its range (a parsed [`Scene`] never is), if there is not one file for
+    /// each mesh, or if a mesh's vertex comes to lie too far out.
+    pub fn new(scene: &Scene, assets: impl Into<Assets>) -> Result<Self, OutOfRange> {
+        let assets: Assets = assets.into();
         let hole = Kerr::new(scene.hole.spin)?;
         let inclination = Inclination::from_degrees(scene.observer.inclination_deg)?;
         let observer = if scene.observer.radius.is_finite() {
@@ -78,8 +119,9 @@ impl Stage {
             disc: scene.disc.as_ref().map(|disc| DiscModel::new(disc, &hole)),
             spots: scene.spot.iter().map(|spot| SpotModel::new(spot, &hole)).collect(),
             spot_trees: Arc::default(),
+            meshes: mesh_tree(scene, &assets.meshes, &hole)?,
             one_by_one: false,
-            sky: scene.sky.as_ref().and_then(|sky| SkyModel::new(sky, picture)),
+            sky: scene.sky.as_ref().and_then(|sky| SkyModel::new(sky, assets.sky)),
         })
     }
 
@@ -135,7 +177,10 @@ impl Stage {
             let ray = self.observer.ray(&self.hole, *alpha, *beta)?;
             self.tracer.trace(&self.hole, &ray, Want::ALL, &mut scratch.path);
             let mut still = Gather::new();
-            let surface = self.add_disc(&ray, &scratch.path, &mut still);
+            let hidden = self.meet_meshes(&ray, scratch);
+            let end = hidden.unwrap_or(f64::INFINITY);
+            let surface = self.add_disc(&ray, &scratch.path, end, &mut still).or(hidden);
+            self.add_meshes(scratch, surface.unwrap_or(f64::INFINITY), &mut still);
             let places = seen.iter_mut().skip(k).step_by(rays);
             for ((time, tree), place) in times.iter().zip(&trees).zip(places) {
                 let tree = tree.as_deref();

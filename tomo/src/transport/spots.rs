@@ -73,7 +73,8 @@ impl Stage {
         for same in met.chunk_by(|a, b| a.spot == b.spot) {
             pieces.clear();
             pieces.extend(same.iter().map(|met| met.piece));
-            self.add_spot(time, &self.spots[same[0].spot as usize], path, intervals, pieces, end, gather);
+            let spot = &self.spots[same[0].spot as usize];
+            self.add_spot(SpotLight::new(spot, time, pieces), path, intervals, end, gather);
         }
     }
 
@@ -81,20 +82,28 @@ impl Stage {
     fn meet_spots(&self, time: f64, tree: &SpotTree, ray: &Ray, scratch: &mut Scratch, end: f64) {
         let Scratch { path, walk, met, .. } = scratch;
         let bound = ChordBound::new(&self.hole, ray, path, self.tracer.tolerance());
-        let through = Walk { tree: &tree.tree, path, bound: &bound };
+        // With slow light short pieces tell much about the time.
+        let longest = if self.slow_light { 2.0 } else { 8.0 };
+        let through = Walk { tree: &tree.tree, path, bound: &bound, longest };
         let times = |ends: [&Node; 2]| {
-            let [early, late] = [ends[1], ends[0]].map(|node| self.emission_time(time, &node.point));
+            let [early, late] =
+                [ends[1], ends[0]].map(|node| self.emission_time(time, &node.point));
             let error = bound.error(bound.reach(ends.map(|node| &node.point)));
             [early - error, late + error]
         };
-        let shines = |leaf: u32, ends: [&Node; 2]| {
+        let shines = |leaf: u32, ends: [&Node; 2], epsilon: f64| {
             let part = &tree.parts[leaf as usize];
-            !self.slow_light || self.spots[part.spot as usize].shines_from(part, times(ends))
+            let spot = &self.spots[part.spot as usize];
+            let when = if self.slow_light { times(ends) } else { [time, time] };
+            (!self.slow_light || spot.shines_from(part, when))
+                && spot.comes_near(ends.map(|node| node.position), epsilon, when)
         };
         met.clear();
         through.go(end, walk, &shines, &mut |ends, leaves| {
             let piece = ends.map(|node| node.point.mino_time);
-            met.extend(leaves.iter().map(|leaf| Met { spot: tree.parts[*leaf as usize].spot, piece }));
+            met.extend(
+                leaves.iter().map(|leaf| Met { spot: tree.parts[*leaf as usize].spot, piece }),
+            );
             ControlFlow::Continue(())
         });
         met.sort_by(|a, b| a.spot.cmp(&b.spot).then(a.piece[0].total_cmp(&b.piece[0])));
@@ -110,34 +119,31 @@ impl Stage {
     ) {
         let Scratch { path, intervals, .. } = scratch;
         for spot in &self.spots {
-            self.add_spot(time, spot, path, intervals, &[[0.0, f64::INFINITY]], end, gather);
+            let light = SpotLight::new(spot, time, &[[0.0, f64::INFINITY]]);
+            self.add_spot(light, path, intervals, end, gather);
         }
     }
 
-    /// Light of one spot on pieces of the path.
+    /// Light of one spot on the pieces of the path where it may shine.
     fn add_spot(
         &self,
-        time: f64,
-        spot: &SpotModel,
+        mut light: SpotLight<'_>,
         path: &Path,
         intervals: &mut Vec<[f64; 2]>,
-        pieces: &[[f64; 2]],
         end: f64,
         gather: &mut Gather,
     ) {
-        let [lo, hi] = spot.shell();
-        let lo = lo.max(self.hole.horizon());
+        let [lo, hi] = light.spot.shell();
         let before = gather.intensity;
-        let mut total = SpotLight { spot, observed: time, pieces, before, brightest: None };
-        path.intervals_within(lo, hi, intervals);
+        path.intervals_within(lo.max(self.hole.horizon()), hi, intervals);
         for &[from, to] in intervals.iter() {
             let to = to.min(end);
             if from < to {
-                self.add_stretch(path, &mut total, from, to, gather);
+                self.add_stretch(path, &mut light, from, to, gather);
             }
         }
-        if let Some((_, point)) = total.brightest {
-            gather.mark(gather.intensity - total.before, &point);
+        if let Some((_, point)) = light.brightest {
+            gather.mark(gather.intensity - before, &point);
         }
     }
 
@@ -237,13 +243,15 @@ struct SpotLight<'a> {
     observed: f64,
     /// Where it may shine, as intervals of Mino time in order.
     pieces: &'a [[f64; 2]],
-    /// Intensity gathered before this spot.
-    before: f64,
     /// The brightest point, and its emission per length.
     brightest: Option<(f64, PathPoint)>,
 }
 
-impl SpotLight<'_> {
+impl<'a> SpotLight<'a> {
+    fn new(spot: &'a SpotModel, observed: f64, pieces: &'a [[f64; 2]]) -> Self {
+        SpotLight { spot, observed, pieces, brightest: None }
+    }
+
     fn can_shine(&self, from: f64, to: f64) -> bool {
         let behind = self.pieces.partition_point(|piece| piece[1] < from);
         self.pieces.get(behind).is_some_and(|piece| piece[0] <= to)

@@ -6,11 +6,17 @@ use kerrlight_geodesic::flow::keplerian_redshift;
 use kerrlight_geodesic::{Path, Ray};
 
 impl Stage {
-    /// Light of the disc: I = g^{3+α} I_em at every crossing up to the first that hides the
-    /// rest, whose Mino time is returned.
-    pub(super) fn add_disc(&self, ray: &Ray, path: &Path, gather: &mut Gather) -> Option<f64> {
+    /// Light of the disc: I = g^{3+α} I_em at every crossing up to Mino time `end` and the first
+    /// that hides the rest, whose Mino time is returned.
+    pub(super) fn add_disc(
+        &self,
+        ray: &Ray,
+        path: &Path,
+        end: f64,
+        gather: &mut Gather,
+    ) -> Option<f64> {
         let disc = self.disc.as_ref()?;
-        for mino_time in path.equatorial_crossings() {
+        for mino_time in path.equatorial_crossings().take_while(|time| *time <= end) {
             let point = path.at(mino_time);
             let r = point.radius();
             if !disc.covers(r) {

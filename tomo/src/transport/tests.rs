@@ -1,6 +1,8 @@
 use super::*;
 use crate::scene::Spot;
 
+mod meshes;
+
 const SCENE: &str = r#"
 [hole]
 spin = 0.9
@@ -69,14 +71,13 @@ fn exact_tree_against_every_spot() {
     for (count, since) in [(1, None), (30, None), (30, Some(-200.0)), (300, Some(0.0))] {
         for spin in ["0.0", "0.9", "-0.9"] {
             for slow in ["true", "false"] {
-                let mut scene = scene(&[
-                    &format!("hole.spin={spin}"),
-                    &format!("effects.slow_light={slow}"),
-                ]);
+                let mut scene =
+                    scene(&[&format!("hole.spin={spin}"), &format!("effects.slow_light={slow}")]);
                 scene.spot = spots(count, since);
                 let stage = Stage::new(&scene, None).unwrap();
                 let times = [30.0, 47.0];
-                let (found, expected) = (look(&stage, &times), look(&stage.clone().one_by_one(), &times));
+                let (found, expected) =
+                    (look(&stage, &times), look(&stage.clone().one_by_one(), &times));
                 lit += found.iter().filter(|seen| seen.intensity > 0.0).count();
                 let differ = found.iter().zip(&expected).filter(|(a, b)| a != b).count();
                 assert_eq!(differ, 0, "{count} spots, {since:?}, a = {spin}, slow light {slow}");
@@ -101,7 +102,15 @@ fn exact_rays_that_cannot_meet_a_spot() {
         lit += u32::from(seen.intensity > 0.0);
         if !tree.can_be_met(&ray) {
             out += 1;
-            assert_eq!(stage.clone().one_by_one().look(*alpha, *beta, &mut Scratch::default()).unwrap().intensity, 0.0);
+            assert_eq!(
+                stage
+                    .clone()
+                    .one_by_one()
+                    .look(*alpha, *beta, &mut Scratch::default())
+                    .unwrap()
+                    .intensity,
+                0.0
+            );
         }
     }
     assert!(out > 150 && lit > 20, "{out} {lit}");

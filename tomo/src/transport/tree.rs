@@ -26,7 +26,10 @@ pub struct Tree {
 
 impl std::fmt::Debug for Tree {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Tree").field("leaves", &self.sizes.len()).field("shell", &self.shell).finish()
+        f.debug_struct("Tree")
+            .field("leaves", &self.sizes.len())
+            .field("shell", &self.shell)
+            .finish()
     }
 }
 
@@ -43,9 +46,8 @@ impl Tree {
             Aabb::new(Vec3A::from(low), Vec3A::from(high))
         };
         let boxes_32: Vec<Aabb> = boxes.iter().map(outward).collect();
-        let sizes = boxes.iter().map(|[low, high]| {
-            (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max)
-        });
+        let sizes =
+            boxes.iter().map(|[low, high]| (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max));
         let far = boxes.iter().flatten().flatten().fold(0.0f64, |far, x| far.max(x.abs()));
         let hierarchy = if boxes.is_empty() {
             Bvh2::default()
@@ -69,9 +71,13 @@ impl Tree {
         // W falls from 1 to its least value at the barrier: if that is below 0, the ray turns
         // where W vanishes.
         let barrier = ray.potential.barrier.filter(|barrier| barrier.height < 0.0);
-        barrier.is_none_or(|barrier| {
-            barrier.w >= outermost && ray.potential.value(outermost) > -1e-9
-        })
+        barrier
+            .is_none_or(|barrier| barrier.w >= outermost && ray.potential.value(outermost) > -1e-9)
+    }
+
+    /// The radii between which all leaves lie.
+    pub fn shell(&self) -> [f64; 2] {
+        self.shell
     }
 
     /// Tells `found` every leaf whose box is within `epsilon` of the chord.
@@ -110,7 +116,8 @@ impl Tree {
                 continue;
             }
             if node.is_leaf() {
-                let range = node.first_index as usize..(node.first_index + node.prim_count) as usize;
+                let range =
+                    node.first_index as usize..(node.first_index + node.prim_count) as usize;
                 self.hierarchy.primitive_indices[range].iter().for_each(|leaf| found(*leaf));
                 continue;
             }
@@ -176,9 +183,6 @@ const DEEPEST: u32 = 40;
 /// once it stays within this part of the smallest box it met.
 const FINE: f64 = 0.25;
 
-/// Pieces are halved until they are at most this many times as long as the smallest box.
-const LONGEST: f64 = 8.0;
-
 /// The walk of one ray through a tree.
 pub struct Walk<'a> {
     /// The tree.
@@ -187,6 +191,8 @@ pub struct Walk<'a> {
     pub path: &'a Path,
     /// How far it can be from its chords.
     pub bound: &'a ChordBound,
+    /// Pieces are halved until they are at most this many times as long as the smallest box.
+    pub longest: f64,
 }
 
 /// Memory of walks.
@@ -198,12 +204,12 @@ pub struct WalkScratch {
 
 impl Walk<'_> {
     /// Tells `visit` of every piece of the path up to Mino time `end` that comes near leaves that
-    /// `keep` keeps, and of these leaves, in the order of Mino time, until `visit` breaks off.
+    /// `keep` keeps (it is told how far the piece can be from its chord), and of these leaves, in the order of Mino time, until `visit` breaks off.
     pub fn go(
         &self,
         end: f64,
         scratch: &mut WalkScratch,
-        keep: &impl Fn(u32, [&Node; 2]) -> bool,
+        keep: &impl Fn(u32, [&Node; 2], f64) -> bool,
         visit: &mut impl FnMut([&Node; 2], &[u32]) -> ControlFlow<()>,
     ) {
         let mut intervals = std::mem::take(&mut scratch.intervals);
@@ -227,7 +233,7 @@ impl Walk<'_> {
         [start, end]: [&Node; 2],
         depth: u32,
         scratch: &mut WalkScratch,
-        keep: &impl Fn(u32, [&Node; 2]) -> bool,
+        keep: &impl Fn(u32, [&Node; 2], f64) -> bool,
         visit: &mut impl FnMut([&Node; 2], &[u32]) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         let points = [&start.point, &end.point];
@@ -236,8 +242,10 @@ impl Walk<'_> {
         let last = depth >= DEEPEST || self.bound.winds(points);
         if last || epsilon <= FINE * length {
             self.collect([start, end], epsilon, scratch, keep);
-            let Some(size) = self.smallest(&scratch.leaves) else { return ControlFlow::Continue(()) };
-            if last || (epsilon <= FINE * size && length <= LONGEST * size) {
+            let Some(size) = self.smallest(&scratch.leaves) else {
+                return ControlFlow::Continue(());
+            };
+            if last || (epsilon <= FINE * size && length <= self.longest * size) {
                 return visit([start, end], &scratch.leaves);
             }
         }
@@ -252,11 +260,11 @@ impl Walk<'_> {
         ends: [&Node; 2],
         epsilon: f64,
         scratch: &mut WalkScratch,
-        keep: &impl Fn(u32, [&Node; 2]) -> bool,
+        keep: &impl Fn(u32, [&Node; 2], f64) -> bool,
     ) {
         scratch.leaves.clear();
         let mut found = |leaf| {
-            if keep(leaf, ends) {
+            if keep(leaf, ends, epsilon) {
                 scratch.leaves.push(leaf);
             }
         };
