@@ -3,6 +3,8 @@
 
 pub mod disc;
 pub mod gas;
+pub mod mesh;
 pub mod page_thorne;
 pub mod sky;
 pub mod spot;
+pub mod spot_parts;

@@ -1,6 +1,6 @@
 //! Ranges of a scene's values, and errors that point at the line.
 
-use super::{Disc, Gas, GasMotion, GasProfile, Scene, Sky, Spot};
+use super::{Disc, Gas, GasMotion, GasProfile, Mesh, Scene, Sky, Spot};
 use kerrlight_geodesic::{Kerr, orbits};
 use toml_edit::{Document, Item};
 
@@ -189,6 +189,9 @@ pub(super) fn check(scene: &Scene) -> Result<(), Invalid> {
     for (k, spot) in scene.spot.iter().enumerate() {
         check_spot(spot, k, &hole, scene.observer.time)?;
     }
+    for (k, mesh) in scene.mesh.iter().enumerate() {
+        check_mesh(mesh, k, scene.effects.redshift)?;
+    }
     scene.sky.as_ref().map_or(Ok(()), check_sky)
 }
 
@@ -310,8 +313,9 @@ fn check_combinations(scene: &Scene) -> Result<(), Invalid> {
         let allowed = "only with a [gas] whose absorptivity is above 0";
         return Err(Invalid::new("effects.absorption", true, allowed));
     }
-    if !effects.lensing && !scene.spot.is_empty() {
-        let allowed = "true with hot spots: straight rays see discs, gas and skies";
+    let bodies = !scene.spot.is_empty() || !scene.mesh.is_empty();
+    if bodies && !effects.lensing {
+        let allowed = "true with hot spots or meshes: straight rays see discs, gas and skies";
         return Err(Invalid::new("effects.lensing", false, allowed));
     }
     match effects.half_orbits {
@@ -385,6 +389,33 @@ fn check_spot(spot: &Spot, k: usize, hole: &Kerr, time: f64) -> Result<(), Inval
         number(key("sheared_since"), since, ok, &allowed)?;
     }
     check_color(&key("color"), spot.color)
+}
+
+fn check_mesh(mesh: &Mesh, k: usize, redshift: bool) -> Result<(), Invalid> {
+    let key = |name: &str| format!("mesh.{k}.{name}");
+    let ok = (1e-9..=1e9).contains(&mesh.scale);
+    number(key("scale"), mesh.scale, ok, "a number in [1e-9, 1e9] (M per unit of the file)")?;
+    if !mesh.position.iter().all(|x| x.abs() <= 1e6) {
+        let value = format!("{:?}", mesh.position);
+        return Err(Invalid::new(key("position"), value, "three numbers in [-1e6, 1e6] (M)"));
+    }
+    let norm = mesh.rotation_axis.iter().map(|x| x * x).sum::<f64>();
+    if !(1e-30..=1e30).contains(&norm) {
+        let allowed = "three numbers that are not all 0, with a length in [1e-15, 1e15]";
+        return Err(Invalid::new(
+            key("rotation_axis"),
+            format!("{:?}", mesh.rotation_axis),
+            allowed,
+        ));
+    }
+    let ok = mesh.rotation_deg.abs() <= 3600.0;
+    number(key("rotation_deg"), mesh.rotation_deg, ok, "an angle in [-3600, 3600]")?;
+    brightness(key("brightness"), mesh.brightness)?;
+    if redshift && mesh.velocity.is_none() {
+        let why = "needed with redshift = true: \"static\" or \"keplerian\"";
+        return Err(Invalid::missing(key("velocity"), why));
+    }
+    mesh.color.map_or(Ok(()), |color| check_color(&key("color"), color))
 }
 
 fn check_color(key: &str, color: [f32; 3]) -> Result<(), Invalid> {

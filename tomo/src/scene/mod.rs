@@ -42,6 +42,9 @@ pub struct Scene {
     /// Hot spots on Keplerian orbits.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub spot: Vec<Spot>,
+    /// Triangle meshes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub mesh: Vec<Mesh>,
     /// What the rays that escape see.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sky: Option<Sky>,
@@ -322,6 +325,46 @@ pub struct Spot {
 
 fn up() -> [f64; 3] {
     [0.0, 0.0, 1.0]
+}
+
+/// A triangle mesh as a surface. Its coordinates are r n in M: Boyer–Lindquist ones taken as
+/// Cartesian.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mesh {
+    /// OBJ, glTF or GLB file, relative to the scene file.
+    pub path: String,
+    /// M for one unit of the file.
+    pub scale: f64,
+    /// Where the file's origin comes to lie, in M.
+    #[serde(default)]
+    pub position: [f64; 3],
+    /// Axis about which it is turned first.
+    #[serde(default = "up")]
+    pub rotation_axis: [f64; 3],
+    /// By how much it is turned, right-handed, in degrees.
+    #[serde(default)]
+    pub rotation_deg: f64,
+    /// Whether it hides what is behind it.
+    pub opaque: bool,
+    /// Intensity in the surface's frame where its colour is 1; 0: black.
+    pub brightness: f64,
+    /// Linear colour of its light; without it that of its materials.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub color: Option<[f32; 3]>,
+    /// How its matter moves; needed when `effects.redshift` is on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<MeshVelocity>,
+}
+
+/// How the matter of a mesh moves, for its redshift: the surface itself stays where it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MeshVelocity {
+    /// At rest in Boyer–Lindquist coordinates.
+    Static,
+    /// About +z with Ω(r) = 1/(r^{3/2} + a).
+    Keplerian,
 }
 
 /// What the rays that escape see: `[sky.checker]`, `[sky.stars]` or `[sky.image]`.

@@ -4,11 +4,16 @@
 //! keeps its digits, else step by step. Surfaces come first, since they end rays; then what
 //! fills space, on quadrature nodes; then spots; then the sky.
 
+mod chord;
 mod glimpse;
 mod medium;
+mod meshes;
 mod rays;
 mod spots;
 mod surface;
+#[cfg(test)]
+mod tests;
+mod tree;
 mod view;
 mod volume;
 
@@ -18,16 +23,21 @@ pub use view::View;
 
 use crate::emission::disc::DiscModel;
 use crate::emission::gas::{GasEffects, GasModel};
+use crate::emission::mesh::{MeshFile, MeshModel};
 use crate::emission::sky::{Beam, Panorama, SkyModel};
 use crate::emission::spot::SpotModel;
 use crate::scene::{Integrator, Scene};
 use glimpse::{Gather, wrap};
 use kerrlight_geodesic::bundle::{Crossings, Nodes, Samples};
 use kerrlight_geodesic::{
-    Kerr, Observer, OutOfRange, Path, PathPoint, Tracer, footprint, footprint::Number,
+    Kerr, Observer, OutOfRange, Path, PathPoint, Ray, Tracer, footprint, footprint::Number,
 };
+use meshes::{Hit as MeshHit, MeshTree};
 use rays::{End, Sight};
+use spots::{Met, SpotTree};
+use std::sync::{Arc, Mutex};
 use surface::Hit;
+use tree::WalkScratch;
 
 /// A scene with everything computed that does not depend on the ray.
 #[derive(Debug, Clone)]
@@ -46,17 +56,40 @@ pub struct Stage {
     half_orbits: Option<u32>,
     /// Whether rays are traced in closed form where possible.
     closed_form: bool,
-    /// Whether every ray needs its path for some source.
-    steps_for_all: bool,
     /// What is told of the brightest contribution.
     places: Needs,
     disc: Option<DiscModel>,
     gas: Option<GasModel>,
     spots: Vec<SpotModel>,
+    /// Trees over the spots by time of observation, the latest last.
+    spot_trees: Arc<Mutex<SpotTrees>>,
+    meshes: Option<Arc<MeshTree>>,
+    one_by_one: bool,
     sky: Option<SkyModel>,
     /// Distance of neighbouring rays on the screen, if the sky is averaged over their beams.
     beams: Option<f64>,
 }
+
+/// The decoded files that a scene names.
+#[derive(Debug, Clone, Default)]
+pub struct Assets {
+    /// The picture of a `[sky.image]`.
+    pub sky: Option<Panorama>,
+    /// A file for each `[[mesh]]`, in their order.
+    pub meshes: Vec<MeshFile>,
+}
+
+impl From<Option<Panorama>> for Assets {
+    fn from(sky: Option<Panorama>) -> Self {
+        Assets { sky, meshes: Vec::new() }
+    }
+}
+
+/// Trees with the time that they are for.
+type SpotTrees = Vec<(f64, Arc<SpotTree>)>;
+
+/// Trees that are kept: as many as a movie's block of frames may need at once.
+const MOST_TREES: usize = 256;
 
 /// Memory that is reused from block to block.
 #[derive(Debug, Default)]
@@ -70,17 +103,39 @@ pub struct Scratch {
     sights: Vec<Sight>,
     hits: Vec<Hit>,
     volume: volume::Workspace,
+    walk: WalkScratch,
+    met: Vec<Met>,
+    pieces: Vec<[f64; 2]>,
+    mesh_hits: Vec<MeshHit>,
 }
 
 /// Where the SIMD kernels can have an observer, in M.
 const NEAREST: f64 = 10.0;
 
+fn mesh_tree(
+    scene: &Scene,
+    files: &[MeshFile],
+    hole: &Kerr,
+) -> Result<Option<Arc<MeshTree>>, OutOfRange> {
+    if files.len() != scene.mesh.len() {
+        let (value, allowed) = (files.len() as f64, "one file for each [[mesh]]");
+        return Err(OutOfRange { field: "number of mesh files", value, allowed });
+    }
+    if files.is_empty() {
+        return Ok(None);
+    }
+    let placed = scene.mesh.iter().zip(files).map(|(mesh, file)| MeshModel::new(mesh, file));
+    Ok(Some(Arc::new(MeshTree::new(placed.collect::<Result<_, _>>()?, hole))))
+}
+
 impl Stage {
-    /// The stage of a scene; `picture` is the decoded file of a `[sky.image]`.
+    /// The stage of a scene with the files that it names.
     ///
     /// # Errors
-    /// If a value is outside its range (a parsed [`Scene`] never is).
-    pub fn new(scene: &Scene, picture: Option<Panorama>) -> Result<Self, OutOfRange> {
+    /// If a value is outside its range (a parsed [`Scene`] never is), if there is not one file for
+    /// each mesh, or if a mesh's vertex comes to lie too far out.
+    pub fn new(scene: &Scene, assets: impl Into<Assets>) -> Result<Self, OutOfRange> {
+        let assets: Assets = assets.into();
         let hole = Kerr::new(scene.hole.spin)?;
         let kept = |name: &str| {
             let channels = scene.screen.channels.as_ref();
@@ -92,7 +147,7 @@ impl Stage {
         let length = length * crate::units::gravitational_time(scene.hole.mass_msun);
         let gas = scene.gas.as_ref().map(|gas| GasModel::new(gas, &hole, length, effects));
         let view = View::new(scene, &hole)?;
-        let sky = scene.sky.as_ref().and_then(|sky| SkyModel::new(sky, picture));
+        let sky = scene.sky.as_ref().and_then(|sky| SkyModel::new(sky, assets.sky));
         Ok(Stage {
             hole,
             view,
@@ -103,11 +158,13 @@ impl Stage {
             half_orbits: scene.effects.half_orbits,
             tolerance: scene.tracer.tolerance,
             closed_form: scene.tracer.integrator == Integrator::Elliptic,
-            steps_for_all: !scene.spot.is_empty(),
             places: Needs { azimuth: kept("azimuth"), time: kept("delay"), velocity: false },
             gas,
             disc: scene.disc.as_ref().map(|disc| DiscModel::new(disc, &hole)),
             spots: scene.spot.iter().map(|spot| SpotModel::new(spot, &hole)).collect(),
+            spot_trees: Arc::default(),
+            meshes: mesh_tree(scene, &assets.meshes, &hole)?,
+            one_by_one: false,
             sky: sky.map(|sky| if scene.effects.ray_bundles { sky.for_beams() } else { sky }),
             beams: scene.effects.ray_bundles.then(|| ray_spacing(scene)),
         })
@@ -123,6 +180,13 @@ impl Stage {
         self.beams = self.beams.map(|_| ray_spacing(scene));
         self.time = scene.observer.time;
         Ok(())
+    }
+
+    /// The same stage, on which every spot and every triangle is asked along every ray, without
+    /// a hierarchy: for comparisons.
+    pub fn one_by_one(mut self) -> Self {
+        self.one_by_one = true;
+        self
     }
 
     /// The scene's own time of observation, in M.
@@ -172,9 +236,10 @@ impl Stage {
         let rays = alpha.len();
         scratch.sights.clear();
         scratch.hits.clear();
+        let trees: Vec<_> = times.iter().map(|time| self.spot_tree(*time)).collect();
         let observer = self.closed_form();
         match observer {
-            Some(observer) => self.trace_block(observer, alpha, beta, scratch)?,
+            Some(observer) => self.trace_block(observer, (alpha, beta), &trees, scratch)?,
             None => scratch.sights.resize(rays, Sight { by_steps: true, ..Sight::default() }),
         }
         let medium = self.gas.as_ref().map(|gas| gas as &dyn Medium);
@@ -182,18 +247,16 @@ impl Stage {
         if let (Some(medium), Some(observer)) = (medium, observer) {
             self.fill_block(medium, observer, (alpha, beta), times, scratch)?;
         }
-        let mut path = core::mem::take(&mut scratch.path);
         for k in 0..rays {
+            let ray = self.view.ray(&self.hole, alpha[k], beta[k])?;
             if scratch.sights[k].by_steps {
-                let ray = self.view.ray(&self.hole, alpha[k], beta[k])?;
-                scratch.sights[k] = self.trace_steps(&ray, &mut path, &mut scratch.hits);
+                scratch.sights[k] = self.trace_steps(&ray, scratch);
                 if let Some(medium) = medium {
-                    self.fill_path(medium, &path, k, times, scratch);
+                    self.fill_path(medium, k, times, scratch);
                 }
             }
-            self.look_along(k, (alpha[k], beta[k]), times, &path, scratch, seen)?;
+            self.look_along(k, &ray, (alpha[k], beta[k]), (times, &trees), scratch, seen)?;
         }
-        scratch.path = path;
         Ok(())
     }
 
@@ -208,13 +271,14 @@ impl Stage {
     }
 
     /// What is seen along ray number `k`, of which everything is known but the light of the
-    /// surfaces, the spots and the sky. `path` is its own if it was traced step by step.
+    /// surfaces, the spots and the sky. The path of `scratch` is its own if it was traced step by
+    /// step.
     fn look_along(
         &self,
         k: usize,
+        ray: &Ray,
         (x, y): (f64, f64),
-        times: &[f64],
-        path: &Path,
+        (times, trees): (&[f64], &[Option<Arc<SpotTree>>]),
         scratch: &mut Scratch,
         seen: &mut [Glimpse],
     ) -> Result<(), OutOfRange> {
@@ -222,6 +286,9 @@ impl Stage {
         let mut still = Gather::new();
         let hits = &scratch.hits[sight.hits.clone()];
         self.add_disc(hits, sight.lambda, sight.last_time(), &mut still);
+        if sight.by_steps {
+            self.add_meshes(scratch, sight.last_time(), &mut still);
+        }
         let sky = self.sky_light(x, y, &sight, scratch)?;
         let shift = self.redshift.and_then(|_| self.view.blueshift(x, y));
         for (j, time) in times.iter().enumerate() {
@@ -231,8 +298,12 @@ impl Stage {
             {
                 gather.add_light(light, gas.color());
             }
-            if sight.by_steps {
-                self.add_spots(*time, path, scratch, sight.last_time(), &mut gather);
+            if let (Some(tree), true) = (trees.get(j), sight.by_steps) {
+                let end = sight.last_time();
+                match tree {
+                    Some(tree) => self.add_spots(*time, tree, ray, scratch, end, &mut gather),
+                    None => self.add_every_spot(*time, scratch, end, &mut gather),
+                }
             }
             gather.add_behind(sky);
             let Some(place) = seen.get_mut(j * scratch.sights.len() + k) else { continue };
@@ -267,6 +338,26 @@ impl Stage {
             }
         }
         Ok(sky.look(direction))
+    }
+
+    /// The tree over the spots for a time of observation. With slow light one tree serves all;
+    /// without, each time has its own. It is made when it is first asked for.
+    fn spot_tree(&self, time: f64) -> Option<Arc<SpotTree>> {
+        if self.spots.is_empty() || self.one_by_one {
+            return None;
+        }
+        let (key, at) = if self.slow_light { (0.0, None) } else { (time, Some(time)) };
+        // Nothing that holds the lock can panic halfway through a change.
+        let mut trees = self.spot_trees.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some((_, tree)) = trees.iter().rev().find(|(of, _)| *of == key) {
+            return Some(tree.clone());
+        }
+        let tree = Arc::new(SpotTree::new(&self.spots, &self.hole, at, time));
+        if trees.len() >= MOST_TREES {
+            trees.remove(0);
+        }
+        trees.push((key, tree.clone()));
+        Some(tree)
     }
 
     /// When the light that is seen at `time` passed a point.

@@ -1,10 +1,12 @@
 //! Rays of one observer, however they are traced, as the sources want them.
 
+use super::spots::SpotTree;
 use super::surface::Hit;
 use super::{Scratch, Stage};
 use crate::transport::glimpse::Place;
 use kerrlight_geodesic::analytic::ClosedForm;
-use kerrlight_geodesic::{Observer, OutOfRange, Outcome, Path, Ray, Want};
+use kerrlight_geodesic::{Observer, OutOfRange, Outcome, Ray, Want};
+use std::sync::Arc;
 
 /// A ray without its points.
 #[derive(Debug, Clone, Default)]
@@ -51,8 +53,8 @@ impl Stage {
     pub(super) fn trace_block(
         &self,
         observer: &Observer,
-        alpha: &[f64],
-        beta: &[f64],
+        (alpha, beta): (&[f64], &[f64]),
+        trees: &[Option<Arc<SpotTree>>],
         scratch: &mut Scratch,
     ) -> Result<(), OutOfRange> {
         let wanted = if self.disc.is_some() { MOST_HITS } else { 1 };
@@ -88,7 +90,9 @@ impl Stage {
                 until,
                 surface,
                 exit: None,
-                by_steps: self.steps_for_all || missing || doubtful(ends.error, self.tolerance),
+                by_steps: missing
+                    || doubtful(ends.error, self.tolerance)
+                    || self.needs_path(&ray, trees),
             });
         }
         if self.sky.is_some() { self.find_exits(observer, alpha, beta, scratch) } else { Ok(()) }
@@ -121,30 +125,48 @@ impl Stage {
         Ok(())
     }
 
-    /// Traces one ray step by step into `path`; its sight.
-    pub(super) fn trace_steps(&self, ray: &Ray, path: &mut Path, hits: &mut Vec<Hit>) -> Sight {
-        self.tracer.trace(&self.hole, ray, Want::ALL, path);
-        let first = hits.len();
+    /// Whether some source may want the path of a ray.
+    fn needs_path(&self, ray: &Ray, trees: &[Option<Arc<SpotTree>>]) -> bool {
+        let meets = |tree: &Option<Arc<SpotTree>>| match tree {
+            Some(tree) => tree.can_be_met(ray),
+            None => !self.spots.is_empty(),
+        };
+        self.meshes.as_ref().is_some_and(|meshes| self.one_by_one || meshes.can_be_met(ray))
+            || trees.iter().any(meets)
+    }
+
+    /// Traces one ray step by step into the path of `scratch`; its sight.
+    pub(super) fn trace_steps(&self, ray: &Ray, scratch: &mut Scratch) -> Sight {
+        self.tracer.trace(&self.hole, ray, Want::ALL, &mut scratch.path);
+        let (first, path, hits) = (scratch.hits.len(), &scratch.path, &mut scratch.hits);
         if self.disc.is_some() {
             hits.extend(path.equatorial_crossings().map(|mino_time| {
                 let place = Place::of_point(&path.at(mino_time));
                 Hit { mino_time, place, depth: 0.0 }
             }));
         }
-        let until = self.until(ray);
         let end = match path.outcome() {
             Outcome::Captured => End::Captured,
             Outcome::Escaped => End::Escaped,
             Outcome::Unresolved(_) => End::Unresolved,
         };
         let exit = self.sky.as_ref().map(|_| path.at(path.mino_total()).direction);
+        let (crossings, total) = (path.equatorial_crossings().len() as u32, path.mino_total());
+        let hits = first..hits.len();
+        let until = self.until(ray);
+        let hidden = self.meet_meshes(ray, scratch).filter(|time| *time <= until);
+        let disc = self.surface(&scratch.hits[hits.clone()], until);
+        let surface = match (disc, hidden) {
+            (Some(disc), Some(mesh)) => Some(disc.min(mesh)),
+            (one, other) => one.or(other),
+        };
         Sight {
             lambda: ray.lambda,
             end,
-            crossings: path.equatorial_crossings().len() as u32,
-            total: path.mino_total(),
-            surface: self.surface(&hits[first..], until),
-            hits: first..hits.len(),
+            crossings,
+            total,
+            surface,
+            hits,
             until,
             exit: exit.filter(|_| end == End::Escaped),
             by_steps: true,

@@ -132,12 +132,11 @@ impl Stage {
     pub(super) fn fill_path(
         &self,
         medium: &dyn Medium,
-        path: &Path,
         k: usize,
         times: &[f64],
         scratch: &mut Scratch,
     ) {
-        let Scratch { sights, hits, volume, .. } = scratch;
+        let Scratch { path, sights, hits, volume, .. } = scratch;
         let along = Along { medium, lambda: sights[k].lambda, times };
         let mut split = 1;
         loop {

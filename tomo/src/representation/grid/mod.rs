@@ -77,7 +77,7 @@ impl Grid {
     }
 
     fn check<T>(&self, parameters: &[T], at: &Coordinates<'_, T>, numbers: usize) {
-        assert!(parameters.len() == self.settings.nodes.iter().product());
+        assert!(parameters.len() == self.settings.nodes.iter().product::<usize>());
         assert!(at.dimension() == 3 && at.len() == numbers);
     }
 
@@ -188,7 +188,7 @@ impl<T: Scalar + Default> Representation<T> for Grid {
     }
 
     fn initialise(&self, _seed: u64, parameters: &mut [T]) {
-        assert!(parameters.len() == self.settings.nodes.iter().product());
+        assert!(parameters.len() == self.settings.nodes.iter().product::<usize>());
         parameters.fill(T::of(self.settings.initial));
     }
 
