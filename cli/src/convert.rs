@@ -18,9 +18,15 @@ pub struct Convert {
     /// Format to write [default: by the name's ending]
     #[arg(long, value_name = "FORMAT")]
     format: Option<Written>,
+    /// Tell source, date, frequency, stations and history in lines of a CSV that start with `#`
+    #[arg(long)]
+    comments: bool,
     /// Average coherently over this many seconds
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     average: Option<f64>,
+    /// Average coherently over all spectral channels and IFs
+    #[arg(long)]
+    average_channels: bool,
     /// Merge the hands into Stokes I
     #[arg(long)]
     stokes_i: bool,
@@ -56,7 +62,7 @@ pub struct Convert {
 impl Convert {
     /// Converts.
     pub fn run(&self) -> anyhow::Result<()> {
-        let output = ObservationFile::new(&self.output, self.format)?;
+        let output = ObservationFile::new(&self.output, self.format, self.comments)?;
         output.spares(&self.input)?;
         if let Some(seconds) = self.average.filter(|s| !(*s > 0.0 && s.is_finite())) {
             bail!("--average {seconds} is not allowed: positive seconds");
@@ -76,6 +82,9 @@ impl Convert {
         let mut observation = selection.observation;
         if self.stokes_i {
             observation = observation.total_intensity();
+        }
+        if self.average_channels {
+            observation = observation.averaged_over_channels();
         }
         if let Some(seconds) = self.average {
             observation = observation.averaged(seconds);

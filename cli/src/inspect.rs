@@ -105,6 +105,13 @@ fn describe(name: &str, format: Format, observation: &Observation) -> String {
     );
     line("frequency", ghz(observation.frequency_hz));
     line("bandwidth", ghz(observation.bandwidth_hz));
+    if !observation.channels.is_empty() {
+        let all = observation.channels.iter().map(|c| (c.frequency_hz / 1e9).to_string());
+        let shown: Vec<String> = all.take(16).collect();
+        let rest = if observation.channels.len() > 16 { ", ..." } else { "" };
+        let count = observation.channels.len();
+        line("channels", format!("{count}: {}{rest} GHz", shown.join(", ")));
+    }
     line("baselines", format!("{}, {} rows", baselines.len(), rows.len()));
     line("products", products(observation));
     text + &station_table(observation) + &history(observation)

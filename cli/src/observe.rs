@@ -9,7 +9,7 @@ use kerrlight_tomo::interferometry::noise::{
     GainErrors, ScatteringKernel, add_thermal_noise, apply_gains, scatter,
 };
 use kerrlight_tomo::interferometry::observation::Observation;
-use kerrlight_tomo::interferometry::operator::Pulse;
+use kerrlight_tomo::interferometry::operator::{Method, Pulse};
 use kerrlight_tomo::interferometry::schedule;
 use kerrlight_tomo::interferometry::simulate::{self, Movie};
 use std::path::PathBuf;
@@ -41,6 +41,13 @@ pub struct Observe {
     /// Shape of a pixel
     #[arg(long, value_name = "PULSE", default_value = "triangle")]
     pulse: PulseName,
+    /// Fourier transform: the sum over pixels, a fast transform, or which of them is expected to be
+    /// faster
+    #[arg(long, value_name = "TRANSFORM", default_value = "auto")]
+    transform: TransformName,
+    /// Bound of the fast transform's errors as a share of the flux
+    #[arg(long, value_name = "SHARE", default_value_t = 1e-10, allow_negative_numbers = true)]
+    accuracy: f64,
     /// Noise that is added; errors are those of thermal noise in any case
     #[arg(long, value_name = "NOISE", default_value = "none")]
     noise: Noise,
@@ -59,6 +66,9 @@ pub struct Observe {
     /// Blur by the scattering towards Sgr A*
     #[arg(long)]
     scatter_sgra: bool,
+    /// Tell source, date, frequency, stations and history in lines of a CSV that start with `#`
+    #[arg(long)]
+    comments: bool,
     /// Where to write the visibilities; the name's ending tells the format
     #[arg(short, long, value_name = "FILE.uvfits|.txt|.csv")]
     output: PathBuf,
@@ -70,6 +80,16 @@ enum Noise {
     None,
     /// From the stations' SEFDs, bandwidth and integration time
     Thermal,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum TransformName {
+    /// The faster one for these pixels and visibilities
+    Auto,
+    /// The sum over pixels
+    Direct,
+    /// Fast Fourier transform and a kernel, within --accuracy
+    Fast,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -85,7 +105,7 @@ enum PulseName {
 impl Observe {
     /// Observes.
     pub fn run(&self) -> anyhow::Result<()> {
-        let output = ObservationFile::new(&self.output, None)?;
+        let output = ObservationFile::new(&self.output, None, self.comments)?;
         let files = self.files()?;
         files.iter().try_for_each(|file| output.spares(file))?;
         if let Some(FrameTimes::File(path)) = &self.frame_times {
@@ -103,10 +123,10 @@ impl Observe {
         }
         let times_h = schedule.hours_utc(setup.ut1)?;
         let (movie, frames_h, said) = self.movie(&files, &times_h)?;
-        let fill = simulate::fill(&mut observation, &movie, self.pulse(), &frames_h);
-        fill.with_context(|| self.shown())?;
+        let fill = simulate::fill(&mut observation, &movie, self.pulse(), &frames_h, self.method());
+        let transform = fill.with_context(|| self.shown())?;
         self.spoil(&mut observation, seed)?;
-        observation.history = self.history(said);
+        observation.history = self.history(said, transform);
         output.write(&observation)?;
         let count = observation.rows.len();
         eprintln!("{count} visibilities; {}", observation.history.join("; "));
@@ -182,6 +202,14 @@ impl Observe {
         }
     }
 
+    fn method(&self) -> Method {
+        match self.transform {
+            TransformName::Auto => Method::Cheaper(self.accuracy),
+            TransformName::Direct => Method::Direct,
+            TransformName::Fast => Method::Fast(self.accuracy),
+        }
+    }
+
     fn pulse(&self) -> Pulse {
         match self.pulse {
             PulseName::Delta => Pulse::Delta,
@@ -205,7 +233,7 @@ impl Observe {
     }
 
     /// Every number that decided the data.
-    fn history(&self, images: String) -> Vec<String> {
+    fn history(&self, images: String, transform: String) -> Vec<String> {
         let mut lines = vec![
             concat!("kerrlight ", env!("CARGO_PKG_VERSION"), " observe").to_owned(),
             format!("input {}", self.shown()),
@@ -214,6 +242,7 @@ impl Observe {
         lines.extend(self.fov_uas.map(|fov| format!("field of view {fov} uas")));
         lines.extend(self.observing.history(&self.array));
         lines.push(format!("pulse {:?}", self.pulse));
+        lines.push(transform);
         if self.scatter_sgra {
             lines.push("scattering of Sgr A* (Johnson et al. 2018)".to_owned());
         }

@@ -37,12 +37,13 @@ pub enum Written {
 pub struct ObservationFile {
     output: Output,
     format: Written,
+    comments: bool,
 }
 
 impl ObservationFile {
     /// Checks the place before any work is done. The format is `format`, by default that of the
-    /// name's ending.
-    pub fn new(path: &Path, format: Option<Written>) -> anyhow::Result<Self> {
+    /// name's ending. With `comments` kerrlight's CSV tells settings.
+    pub fn new(path: &Path, format: Option<Written>, comments: bool) -> anyhow::Result<Self> {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
         let by_name = match extension.to_ascii_lowercase().as_str() {
             "uvfits" | "fits" => Written::Uvfits,
@@ -57,7 +58,10 @@ impl ObservationFile {
         if (format == Written::Uvfits) != (by_name == Written::Uvfits) {
             bail!("output {}: its ending is not that of the format asked for", path.display());
         }
-        Ok(ObservationFile { output: Output::new(path, "")?, format })
+        if comments && format != Written::Csv {
+            bail!("--comments is for kerrlight's CSV: output {} is not one", path.display());
+        }
+        Ok(ObservationFile { output: Output::new(path, "")?, format, comments })
     }
 
     /// Refuses to take the place of a file that is read.
@@ -71,7 +75,7 @@ impl ObservationFile {
         let bytes = match self.format {
             Written::Uvfits => files::write_uvfits(observation),
             Written::ObsText => files::to_obs_text(observation).map(text),
-            Written::Csv => Ok(text(files::to_csv(observation))),
+            Written::Csv => Ok(text(files::to_csv(observation, self.comments))),
             Written::EhtCsv => files::to_eht_table(observation, EhtTable::Csv).map(text),
             Written::EhtTxt => files::to_eht_table(observation, EhtTable::Txt).map(text),
         };

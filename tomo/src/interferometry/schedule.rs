@@ -238,6 +238,7 @@ fn scan(
                 products: [Complex64::new(0.0, 0.0); 4],
                 noise_sigma: hand_sigmas(sefds[0], sefds[1], setup),
                 opacity: [0.0; 2],
+                channel: 0,
             });
         }
     }

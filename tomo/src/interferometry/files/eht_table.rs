@@ -17,8 +17,9 @@ pub enum EhtTable {
 /// and σ to 8 decimals, (u, v) and phase (degrees) to 4, the frequency of the heading to 0.1 MHz.
 ///
 /// # Errors
-/// If the date or the frequency is not known.
+/// If the date or the frequency is not known, or there are several spectral channels.
 pub fn to_eht_table(observation: &Observation, style: EhtTable) -> Result<String, FileError> {
+    super::one_channel(observation)?;
     let mjd = observation.mjd.ok_or(Unknown("the date (MJD)"))?;
     let frequency = observation.frequency_hz.ok_or(Unknown("the frequency"))? / 1e9;
     let source = observation.source.replace([' ', ','], "_");
