@@ -2,14 +2,17 @@
 //! that pictures are kept in.
 //!
 //! Data flow: [`scene`] → rays ([`kerrlight_geodesic`]) → [`emission`] → [`transport`] →
-//! [`render`] → [`image`] → [`interferometry`]; fits: [`representation`] → [`optimise`]. SI units enter in [`units`] and [`interferometry`]. Nothing here knows a path or
-//! a terminal: codecs work on bytes.
+//! [`render`] → [`image`] → [`interferometry`]. Fits: [`points`] → [`dynamics`] →
+//! [`representation`] → [`optimise`], on [`simd`] lanes. SI units enter in [`units`] and
+//! [`interferometry`]. Nothing here knows a path or a terminal: codecs work on bytes.
 
+pub mod dynamics;
 pub mod emission;
 pub mod image;
 pub mod interferometry;
 pub mod optimise;
 pub mod polarization;
+pub mod points;
 pub mod render;
 pub mod representation;
 pub mod scene;

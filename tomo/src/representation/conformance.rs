@@ -291,26 +291,33 @@ fn threads(subject: &Subject<'_>) {
     }
 }
 
-/// Both at once are the same as one after the other.
+/// Both at once are the same as one after the other, with the gradient of coordinates and without.
 fn linked(subject: &Subject<'_>) {
     let draw = subject.draw(5_000, 7);
-    let groups: Vec<usize> = (0..).map(|k| 31 * k + k % 3).take_while(|p| *p < 5000).collect();
-    let starts = [groups, vec![5000, 5000]].concat();
-    let square = |_: core::ops::Range<usize>, values: &[f64], cotangents: &mut [f64]| {
+    let starts: Vec<usize> = (0..).map(|k| 31 * k + k % 3).take_while(|p| *p < 5000).collect();
+    let starts = [starts, vec![5000, 5000]].concat();
+    let link = |groups: core::ops::Range<usize>, values: &[f64], cotangents: &mut [f64]| {
+        assert!(starts[groups.end] - starts[groups.start] == values.len());
         cotangents.iter_mut().zip(values).for_each(|(c, v)| *c = v + 1.0);
     };
-    let groups = Groups { starts: &starts, link: &square };
-    let (mut product, mut values) = (draw.zeros(), vec![f64::NAN; 5000]);
-    let (parameters, at, workspace) =
-        (&draw.parameters, coordinates(&draw.columns), &mut Workspace::new());
-    let (gradient, values_too) = (product.gradient(), &mut values);
-    subject.representation.eval_vjp(parameters, at, groups, values_too, gradient, workspace);
-    same(&values, &subject.eval(parameters, &draw.columns), "values");
+    let groups = Groups { starts: &starts, link: &link };
+    let values = subject.eval(&draw.parameters, &draw.columns);
     let cotangents = values.iter().map(|v| v + 1.0).collect();
-    let expected = subject.vjp(&Draw { cotangents, ..draw });
-    close(&product.parameters, &expected.parameters, "the gradient of both at once");
-    for (a, b) in product.coordinates.iter().zip(&expected.coordinates) {
-        same(a, b, "gradients of coordinates of both at once");
+    let Draw { parameters, columns, .. } = draw;
+    let draw = Draw { parameters, columns, cotangents };
+    let expected = subject.vjp(&draw);
+    for wanted in [true, false] {
+        let (mut product, mut again) = (draw.zeros(), vec![f64::NAN; 5000]);
+        let (at, workspace) = (coordinates(&draw.columns), &mut Workspace::new());
+        let mut gradient = product.gradient();
+        gradient.coordinates = gradient.coordinates.filter(|_| wanted);
+        let (parameters, out) = (&draw.parameters, &mut again);
+        subject.representation.eval_vjp(parameters, at, groups, out, gradient, workspace);
+        same(&again, &values, "values");
+        close(&product.parameters, &expected.parameters, "the gradient of both at once");
+        for (a, b) in product.coordinates.iter().zip(&expected.coordinates).filter(|_| wanted) {
+            same(a, b, "gradients of coordinates of both at once");
+        }
     }
 }
 

@@ -10,14 +10,14 @@ mod activation;
 pub mod conformance;
 mod grid;
 mod network;
-mod points;
 mod workspace;
 
 pub use activation::Activation;
 pub use grid::{Grid, GridSettings};
 pub use network::{Initialisation, Network, NetworkSettings};
-pub use points::{Coordinates, CoordinatesMut};
 pub use workspace::Workspace;
+
+pub use crate::points::{Coordinates, CoordinatesMut};
 
 use crate::simd::Scalar;
 use core::ops::Range;

@@ -1,6 +1,7 @@
 //! Trilinear interpolation on lanes of points, and its derivatives.
 
-use super::super::{Activation, Coordinates, CoordinatesMut};
+use super::super::{Activation, Coordinates};
+use super::Share;
 use super::scatter::{Contribution, NOWHERE};
 use crate::simd::{Lanes, MAX_LANES, Scalar, Task, math};
 
@@ -121,31 +122,30 @@ fn keep_inside<T: Scalar, V: Lanes<T>>(inside: V, value: V) -> V {
     V::select_less(zero, inside, value, zero)
 }
 
-/// What each point adds to the nodes of its cell; and gradients with respect to coordinates, if
-/// wanted.
+/// What each point adds to the nodes of its cell for a cotangent of one; and what else is wanted.
 pub struct Products<'a, T> {
     pub geometry: Geometry<T>,
     pub activation: Activation,
-    pub parameters: &'a [T],
-    pub at: Coordinates<'a, T>,
-    pub cotangents: &'a [T],
-    pub contributions: &'a mut [Contribution<T>],
-    pub coordinates: Option<CoordinatesMut<'a, T>>,
+    pub share: Share<'a, T>,
 }
 
 impl<T: Scalar> Task<T> for Products<'_, T> {
     type Output = ();
     #[inline(always)]
-    fn run<V: Lanes<T>, const ROWS: usize>(mut self) {
-        for (k, contributions) in self.contributions.chunks_mut(V::LANES).enumerate() {
+    fn run<V: Lanes<T>, const ROWS: usize>(self) {
+        let Share { parameters, at, contributions, mut values, mut coordinates } = self.share;
+        for (k, contributions) in contributions.chunks_mut(V::LANES).enumerate() {
             let from = k * V::LANES;
-            let located = self.geometry.locate::<V>(&self.at, from);
-            let corners = self.geometry.corners::<V>(self.parameters, &located.corner);
+            let located = self.geometry.locate::<V>(&at, from);
+            let corners = self.geometry.corners::<V>(parameters, &located.corner);
             let (number, slopes) = interpolate(&corners, &located.within);
-            let (_, slope) = self.activation.apply::<T, V>(number);
-            let cotangent = V::load_front(&self.cotangents[from..], T::zero());
-            let weight = keep_inside(located.inside, slope * cotangent);
-            if let Some(coordinates) = &mut self.coordinates {
+            let (value, slope) = self.activation.apply::<T, V>(number);
+            if let Some(values) = &mut values {
+                keep_inside(located.inside, value).store_front(&mut values[from..]);
+            }
+            let weight = keep_inside(located.inside, slope);
+            if let Some((coordinates, cotangents)) = &mut coordinates {
+                let weight = weight * V::load_front(&cotangents[from..], T::zero());
                 let columns = coordinates.columns().iter_mut().zip(self.geometry.axes);
                 for ((column, axis), slope) in columns.zip(slopes) {
                     let out = &mut column[from..];
@@ -153,20 +153,24 @@ impl<T: Scalar> Task<T> for Products<'_, T> {
                     (weight * V::splat(axis.per_length)).mul_add(slope, sum).store_front(out);
                 }
             }
-            let mut lanes = [[T::zero(); MAX_LANES]; 4];
-            let [x, y, z] = located.within;
-            for (lanes, v) in lanes.iter_mut().zip([x, y, z, weight]) {
-                v.store_front(lanes);
-            }
-            for (lane, contribution) in contributions.iter_mut().enumerate() {
-                let weight = lanes[3][lane];
-                let corner = located.corner[lane] as u32;
-                *contribution = Contribution {
-                    corner: if weight == T::zero() { NOWHERE } else { corner },
-                    within: [lanes[0][lane], lanes[1][lane], lanes[2][lane]],
-                    weight,
-                };
-            }
+            located.contribute(weight, contributions);
+        }
+    }
+}
+
+impl<T: Scalar, V: Lanes<T>> Located<T, V> {
+    #[inline(always)]
+    fn contribute(&self, weight: V, contributions: &mut [Contribution<T>]) {
+        let mut lanes = [[T::zero(); MAX_LANES]; 4];
+        let [x, y, z] = self.within;
+        for (lanes, v) in lanes.iter_mut().zip([x, y, z, weight]) {
+            v.store_front(lanes);
+        }
+        for (lane, contribution) in contributions.iter_mut().enumerate() {
+            let (corner, weight) = (self.corner[lane] as u32, lanes[3][lane]);
+            let corner = if weight == T::zero() { NOWHERE } else { corner };
+            let within = [lanes[0][lane], lanes[1][lane], lanes[2][lane]];
+            *contribution = Contribution { corner, within, weight };
         }
     }
 }

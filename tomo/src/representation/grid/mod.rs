@@ -5,10 +5,9 @@ mod scatter;
 #[cfg(test)]
 mod tests;
 
-use super::{Activation, Coordinates, Gradient, Groups, Representation, Workspace};
+use super::{Activation, Coordinates, CoordinatesMut, Gradient, Groups, Representation, Workspace};
 use crate::simd::{InstructionSet, Scalar, dispatch};
 use cells::{Products, Values};
-use core::ops::Range;
 use kerrlight_geodesic::OutOfRange;
 use scatter::{Contribution, Scatter};
 
@@ -40,6 +39,8 @@ pub struct Grid {
 
 /// Points that one thread takes at a time.
 const SHARE: usize = 2048;
+/// Points whose contributions are sorted at a time: they stay in cache.
+const BLOCK: usize = if cfg!(test) { 1000 } else { 32_768 };
 
 impl Grid {
     /// A grid of this shape.
@@ -95,34 +96,13 @@ impl Grid {
     }
 
     fn products<T: Scalar>(&self, share: Share<'_, T>) {
-        let Share { parameters, at, cotangents, contributions, coordinates } = share;
-        if at.len() > SHARE {
-            let middle = halfway(at.len());
-            let (left, right) = contributions.split_at_mut(middle);
-            let half = |range: Range<usize>, contributions, coordinates| Share {
-                parameters,
-                at: at.range(range.clone()),
-                cotangents: &cotangents[range],
-                contributions,
-                coordinates,
-            };
-            let (of_left, of_right) = coordinates.map(|all| all.split_at(middle)).unzip();
-            let (left, right) =
-                (half(0..middle, left, of_left), half(middle..at.len(), right, of_right));
+        if share.at.len() > SHARE {
+            let (left, right) = share.halves();
             rayon::join(|| self.products(left), || self.products(right));
             return;
         }
         let (geometry, activation) = (self.geometry(), self.settings.activation);
-        let task = Products {
-            geometry,
-            activation,
-            parameters,
-            at,
-            cotangents,
-            contributions,
-            coordinates,
-        };
-        dispatch(self.instruction_set, task);
+        dispatch(self.instruction_set, Products { geometry, activation, share });
     }
 
     fn geometry<T: Scalar>(&self) -> cells::Geometry<T> {
@@ -141,13 +121,34 @@ fn halfway(points: usize) -> usize {
     (points / 2).next_multiple_of(crate::simd::MAX_LANES)
 }
 
-/// What one thread turns into contributions.
+/// What one thread turns into contributions to nodes.
 struct Share<'a, T> {
     parameters: &'a [T],
     at: Coordinates<'a, T>,
-    cotangents: &'a [T],
     contributions: &'a mut [Contribution<T>],
-    coordinates: Option<super::CoordinatesMut<'a, T>>,
+    /// Emission, if wanted.
+    values: Option<&'a mut [T]>,
+    /// Gradients with respect to coordinates, if wanted, and the cotangents that they need.
+    coordinates: Option<(CoordinatesMut<'a, T>, &'a [T])>,
+}
+
+impl<T> Share<'_, T> {
+    fn halves(self) -> (Self, Self) {
+        let Share { parameters, at, contributions, values, coordinates } = self;
+        let middle = halfway(at.len());
+        let (of_left, of_right) = (at.range(0..middle), at.range(middle..at.len()));
+        let (contributions, more) = contributions.split_at_mut(middle);
+        let (values, more_values) = values.map(|all| all.split_at_mut(middle)).unzip();
+        let both = coordinates.map(|(all, cotangents)| {
+            let (one, two) = all.split_at(middle);
+            let (first, second) = cotangents.split_at(middle);
+            ((one, first), (two, second))
+        });
+        let (coordinates, more_coordinates) = both.unzip();
+        let left = Share { parameters, at: of_left, contributions, values, coordinates };
+        let (values, coordinates) = (more_values, more_coordinates);
+        (left, Share { parameters, at: of_right, contributions: more, values, coordinates })
+    }
 }
 
 /// What is kept from batch to batch.
@@ -167,14 +168,50 @@ impl<T: Scalar + Default> Memory<T> {
         gradient: Gradient<'_, T>,
     ) {
         grid.check(parameters, &at, cotangents.len());
-        let Gradient { parameters: sums, coordinates } = gradient;
+        let Gradient { parameters: sums, mut coordinates } = gradient;
         assert!(sums.len() == parameters.len());
         assert!(
             coordinates.as_ref().is_none_or(|all| all.len() == at.len() && all.dimension() == 3)
         );
-        let contributions = self.scatter.contributions(at.len());
-        grid.products(Share { parameters, at, cotangents, contributions, coordinates });
-        self.scatter.add_to(sums, grid.settings.nodes);
+        for start in (0..at.len()).step_by(BLOCK) {
+            let range = start..(start + BLOCK).min(at.len());
+            let (at, cotangents) = (at.range(range.clone()), &cotangents[range.clone()]);
+            let (ours, rest) = coordinates.take().map(|all| all.split_at(range.len())).unzip();
+            coordinates = rest;
+            let coordinates = ours.map(|all| (all, cotangents));
+            let contributions = self.scatter.contributions(range.len());
+            grid.products(Share { parameters, at, contributions, values: None, coordinates });
+            self.scatter.add_to(cotangents, sums, grid.settings.nodes);
+        }
+    }
+
+    /// Values and products, the cell of each point found once.
+    fn eval_vjp(
+        &mut self,
+        grid: &Grid,
+        parameters: &[T],
+        at: Coordinates<'_, T>,
+        groups: Groups<'_, T>,
+        mut values: &mut [T],
+        sums: &mut [T],
+    ) {
+        let (starts, mut group) = (groups.starts, 0);
+        while group + 1 < starts.len() {
+            let after = starts.partition_point(|start| *start <= starts[group] + BLOCK) - 1;
+            let next = after.max(group + 1);
+            let range = starts[group]..starts[next];
+            let (ours, rest) = values.split_at_mut(range.len());
+            values = rest;
+            let at = at.range(range.clone());
+            let contributions = self.scatter.contributions(range.len());
+            let wanted = Some(&mut *ours);
+            let share = Share { parameters, at, contributions, values: wanted, coordinates: None };
+            grid.products(share);
+            self.cotangents.resize(range.len(), T::zero());
+            (groups.link)(group..next, ours, &mut self.cotangents);
+            self.scatter.add_to(&self.cotangents, sums, grid.settings.nodes);
+            group = next;
+        }
     }
 }
 
@@ -232,8 +269,12 @@ impl<T: Scalar + Default> Representation<T> for Grid {
         workspace: &mut Workspace,
     ) {
         self.check(parameters, &at, values.len());
-        self.values(parameters, at, values);
+        assert!(gradient.parameters.len() == parameters.len());
         let memory: &mut Memory<T> = workspace.of();
+        if gradient.coordinates.is_none() {
+            return memory.eval_vjp(self, parameters, at, groups, values, gradient.parameters);
+        }
+        self.values(parameters, at, values);
         let mut cotangents = core::mem::take(&mut memory.cotangents);
         cotangents.resize(at.len(), T::zero());
         (groups.link)(0..groups.starts.len().saturating_sub(1), values, &mut cotangents);

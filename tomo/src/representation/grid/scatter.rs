@@ -20,7 +20,7 @@ pub struct Contribution<T> {
     pub corner: u32,
     /// Position in the cell along x, y, z.
     pub within: [T; 3],
-    /// Cotangent times the activation's slope.
+    /// The activation's slope.
     pub weight: T,
 }
 
@@ -39,8 +39,8 @@ impl<T: Scalar + Default> Scatter<T> {
         &mut self.contributions
     }
 
-    /// Adds all contributions to the nodes.
-    pub fn add_to(&mut self, sums: &mut [T], nodes: [usize; 3]) {
+    /// Adds all contributions, times their cotangents, to the nodes.
+    pub fn add_to(&mut self, cotangents: &[T], sums: &mut [T], nodes: [usize; 3]) {
         let [nx, ny, nz] = nodes;
         let layers = (nx - 1).div_ceil(SLABS);
         let slab = layers * ny * nz;
@@ -51,7 +51,9 @@ impl<T: Scalar + Default> Scatter<T> {
                 let s = 2 * k + parity;
                 let Some([from, to]) = starts.get(s..s + 2) else { return };
                 for index in &self.order[*from..*to] {
-                    add(&self.contributions[*index as usize], sums, s * slab, ny, nz);
+                    let mut contribution = self.contributions[*index as usize];
+                    contribution.weight *= cotangents[*index as usize];
+                    add(&contribution, sums, s * slab, ny, nz);
                 }
             });
         }
