@@ -11,6 +11,7 @@ use super::grid::Grid;
 use super::pixels::{Pixel, Workspace};
 use crate::transport::{Fate, Glimpse, Stage};
 use kerrlight_geodesic::OutOfRange;
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// Cells are cut at most this often: the smallest are 1/128 of a pixel wide.
@@ -19,12 +20,11 @@ const DEEPEST: u32 = 6;
 /// A pixel that has got as many rays gets no more.
 const MOST_RAYS: u32 = 4096;
 
-/// The share of the allowed error for which the tolerance of a pixel is chosen; the rest is for
-/// what the sample of pixels it is chosen from has missed.
-const SAFETY: f64 = 0.5;
+/// The share of the allowed error for which the tolerance of a pixel is chosen.
+const SAFETY: f64 = 0.9;
 
-/// Pixels by which the tolerance is chosen, at most.
-const SAMPLE: usize = 2048;
+/// Pixels along a side of the picture by which the tolerance is chosen, at most.
+const COARSE: usize = 128;
 
 /// What a ray adds to its cell.
 #[derive(Debug, Clone, Copy, Default)]
@@ -293,39 +293,49 @@ fn estimate<'a>(at: impl Fn(isize, isize) -> &'a Light) -> (f64, bool) {
 }
 
 /// The error that each pixel may have so that the whole picture's relative L1 error stays below
-/// `image_error`, from a regular sample of pixels with their neighbours.
-pub(super) fn tolerance(
-    stage: &Stage,
-    grid: &Grid,
-    image_error: f64,
-    work: &mut Workspace,
-) -> Result<f64, OutOfRange> {
-    let pixels = grid.width * grid.height;
-    let stride = (1..).find(|s| pixels <= SAMPLE * s * s).unwrap_or(1);
-    let (mut errors, mut sum) = (Vec::new(), 0.0);
-    let from = |count: usize| ((stride - 1) / 2).min(count - 1);
-    for row in (from(grid.height)..grid.height).step_by(stride) {
-        for column in (from(grid.width)..grid.width).step_by(stride) {
-            let (some, _) =
-                first(stage, grid, row..row + 1, column..column + 1, f64::INFINITY, work)?;
-            sum += some.iter().map(|pixel| pixel.intensity).sum::<f64>();
-            errors.extend(some.iter().map(|pixel| pixel.error));
+/// `image_error`, from a picture of the same field with at most [`COARSE`] pixels a side.
+///
+/// From its pixels to k² smaller ones each, the error of smooth ones falls as k^−2; where an edge
+/// runs through, k of them have it, with the same error.
+pub(super) fn tolerance(stage: &Stage, grid: &Grid, image_error: f64) -> Result<f64, OutOfRange> {
+    let cut = grid.width.max(grid.height).div_ceil(COARSE);
+    let coarse = Grid {
+        width: grid.width.div_ceil(cut),
+        height: grid.height.div_ceil(cut),
+        size: grid.size * cut as f64,
+        side: 1,
+    };
+    let lines = (0..coarse.height).into_par_iter().map_init(Workspace::default, |work, row| {
+        let (rows, columns) = (row..row + 1, 0..coarse.width);
+        let (pixels, cuts) = first(stage, &coarse, rows, columns, f64::INFINITY, work)?;
+        let mut errors: Vec<(f64, f64)> = Vec::with_capacity(pixels.len());
+        let k = cut as f64;
+        errors.extend(pixels.iter().map(|pixel| (pixel.error / (k * k), k * k)));
+        // Those that are to be cut in any case are the ones with an edge.
+        for cut in cuts {
+            errors[cut.pixel] = (pixels[cut.pixel].error, k);
         }
-    }
+        let sum: f64 = pixels.iter().map(|pixel| pixel.intensity * k * k).sum();
+        Ok((errors, sum))
+    });
+    let lines = lines.collect::<Result<Vec<_>, OutOfRange>>()?;
+    let sum: f64 = lines.iter().map(|(_, sum)| sum).sum();
+    let errors = lines.into_iter().flat_map(|(errors, _)| errors).collect();
     Ok(allowed(errors, SAFETY * image_error * sum))
 }
 
-/// The largest t with Σ min(error, t) ≤ `sum`.
-fn allowed(mut errors: Vec<f64>, sum: f64) -> f64 {
-    errors.sort_by(f64::total_cmp);
+/// The largest t with Σ weight min(error, t) ≤ `sum`, of pairs of an error and its weight.
+fn allowed(mut errors: Vec<(f64, f64)>, sum: f64) -> f64 {
+    errors.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut left = sum;
-    let count = errors.len();
-    for (k, error) in errors.into_iter().enumerate() {
-        let share = left / (count - k) as f64;
+    let mut weights: f64 = errors.iter().map(|(_, weight)| weight).sum();
+    for (error, weight) in errors {
+        let share = left / weights;
         if error > share {
             return share;
         }
-        left -= error;
+        left -= weight * error;
+        weights -= weight;
     }
     f64::INFINITY
 }
@@ -336,10 +346,12 @@ mod tests {
 
     #[test]
     fn exact_allowed_errors() {
-        assert_eq!(allowed(vec![4.0, 1.0, 3.0], 8.0), f64::INFINITY);
-        assert_eq!(allowed(vec![4.0, 1.0, 3.0], 6.0), 2.5);
-        assert_eq!(allowed(vec![4.0, 1.0, 3.0], 1.5), 0.5);
-        assert_eq!(allowed(vec![0.0, 0.0], 0.0), f64::INFINITY);
+        let errors = vec![(4.0, 1.0), (1.0, 1.0), (3.0, 1.0)];
+        assert_eq!(allowed(errors.clone(), 8.0), f64::INFINITY);
+        assert_eq!(allowed(errors.clone(), 6.0), 2.5);
+        assert_eq!(allowed(errors, 1.5), 0.5);
+        assert_eq!(allowed(vec![(0.0, 4.0), (0.0, 1.0)], 0.0), f64::INFINITY);
+        assert_eq!(allowed(vec![(1.0, 2.0), (5.0, 4.0)], 10.0), 2.0);
     }
 
     /// Quarters cover the cell; a constant has no error, a linear function none either.

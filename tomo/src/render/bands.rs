@@ -68,8 +68,7 @@ impl Raster {
     /// The error that each pixel may have, where pixels are refined.
     fn tolerance(&self) -> Result<Option<f64>, RenderError> {
         let Some(error) = self.scene.screen.image_error else { return Ok(None) };
-        let work = &mut Workspace::default();
-        Ok(Some(adaptive::tolerance(&self.stage, &self.grid, error, work)?))
+        Ok(Some(adaptive::tolerance(&self.stage, &self.grid, error)?))
     }
 
     fn tile(
