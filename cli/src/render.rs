@@ -1,15 +1,15 @@
 //! `kerrlight render`: from a scene to EXR and PNG.
 
+use crate::assets;
 use crate::output::{self, Output};
 use crate::progress;
 use anyhow::Context;
 use clap::{Args, ValueEnum};
-use kerrlight_tomo::emission::sky::Panorama;
 use kerrlight_tomo::image::colormap::Colormap;
 use kerrlight_tomo::image::exr;
 use kerrlight_tomo::image::preview::{self, Look, Stretch};
 use kerrlight_tomo::render::{Rendered, render};
-use kerrlight_tomo::scene::{Scene, SceneError, Sky, apply_override};
+use kerrlight_tomo::scene::{Scene, SceneError, apply_override};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -33,7 +33,7 @@ pub struct Render {
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     overrides: Vec<String>,
     /// Colours of the PNG: a map of the intensity, or `color` for the R, G, B channels
-    /// [default: afmhot-us, color where the scene has a sky]
+    /// [default: afmhot-us, color where the scene has a sky or a mesh]
     #[arg(long, value_name = "MAP")]
     colormap: Option<Colors>,
     /// How intensity is stretched over the colour map
@@ -73,16 +73,16 @@ impl Render {
         let source = self.source()?;
         let (text, scene) = self.scene(&source)?;
         let (exr, png) = self.outputs(&source)?;
-        let sky = sky_path(&scene, &source.folder);
+        let files = assets::paths(&scene, &source.folder);
         for output in [&exr, &png].into_iter().flatten() {
-            for input in self.scene.iter().chain(&sky) {
+            for input in self.scene.iter().chain(&files) {
                 output.spares(input)?;
             }
         }
-        let picture = sky.as_deref().map(load_sky).transpose()?;
+        let assets = assets::load(&scene, &source.folder)?;
         let start = Instant::now();
         let bar = progress::bar(u64::from(scene.screen.height));
-        let rendered = render(&scene, picture, &|rows| {
+        let rendered = render(&scene, assets, &|rows| {
             bar.inc(rows as u64);
             true
         })
@@ -159,7 +159,8 @@ impl Render {
             StretchName::Sqrt => Stretch::Sqrt,
             StretchName::Log => Stretch::Log,
         };
-        let default = if scene.sky.is_some() { Colors::Color } else { Colors::AfmhotUs };
+        let colored = scene.sky.is_some() || !scene.mesh.is_empty();
+        let default = if colored { Colors::Color } else { Colors::AfmhotUs };
         let map = match self.colormap.unwrap_or(default) {
             Colors::Color => return Look::Color,
             Colors::AfmhotUs => Colormap::AfmhotUs,
@@ -178,19 +179,6 @@ fn scene_of_exr(path: &Path) -> anyhow::Result<String> {
     let (_, attributes) = exr::decode(&output::read(path)?).with_context(name)?;
     let scene = attributes.get("scene").cloned();
     scene.with_context(|| format!("{} holds no scene of kerrlight", name()))
-}
-
-/// Where the picture of a `[sky.image]` lies.
-fn sky_path(scene: &Scene, folder: &Path) -> Option<PathBuf> {
-    match &scene.sky {
-        Some(Sky::Image(image)) => Some(folder.join(&image.path)),
-        _ => None,
-    }
-}
-
-fn load_sky(path: &Path) -> anyhow::Result<Panorama> {
-    let bytes = output::read(path).context("`sky.image.path`")?;
-    Panorama::decode(&bytes).with_context(|| format!("`sky.image.path` {}", path.display()))
 }
 
 /// What decided the picture.
