@@ -6,13 +6,14 @@ mod report;
 mod source;
 mod work;
 
+use crate::assets;
 use crate::output::{self, Output};
 use anyhow::Context;
 use clap::Args;
 use kerrlight_tomo::image::preview::encode_png;
 use kerrlight_tomo::render::Raster;
 use preview::PreviewOptions;
-use source::{SkyFile, Source};
+use source::Source;
 use std::path::PathBuf;
 use std::time::Instant;
 use work::Work;
@@ -52,22 +53,21 @@ impl Render {
         let source = Source::new(self.scene.as_deref())?;
         let (text, scene) = source.scene(&self.all_overrides())?;
         let (exr, png) = self.outputs(&source)?;
-        let sky = source::sky_path(&scene, &source.folder);
+        let files = assets::paths(&scene, &source.folder);
         for output in [&exr, &png].into_iter().flatten() {
-            for input in self.scene.iter().chain(&sky) {
+            for input in self.scene.iter().chain(&files) {
                 output.spares(input)?;
             }
         }
-        let sky = sky.as_deref().map(SkyFile::read).transpose()?;
+        let files = assets::load(&scene, &source.folder)?;
         let start = Instant::now();
-        let raster = Raster::new(&scene, sky.as_ref().map(SkyFile::decode).transpose()?);
+        let raster = Raster::new(&scene, files.decoded);
         let raster = raster.with_context(|| source.name.clone())?.with_tile(self.tile.into());
         let look = png.is_some().then(|| self.look.reduction(&scene, &raster)).transpose()?;
         let work = Work { raster: &raster, scene: &scene, text: &text, name: &source.name };
         let (summary, picture) = match &exr {
             Some(exr) => {
-                let identity =
-                    raster.identity() + &sky.map(|sky| sky.identity()).unwrap_or_default();
+                let identity = raster.identity() + &files.identity;
                 work.exr(exr, &identity, look)?
             }
             None => work.preview(look)?,

@@ -12,7 +12,7 @@ use kerrlight_tomo::scene::Scene;
 #[derive(Debug, Args)]
 pub struct PreviewOptions {
     /// Colours of the PNG: a map of the intensity, or `color` for the R, G, B channels
-    /// [default: afmhot-us, color where the scene has a sky]
+    /// [default: afmhot-us, color where the scene has a sky or a mesh]
     #[arg(long, value_name = "MAP")]
     colormap: Option<Colors>,
     /// How intensity is stretched over the colour map
@@ -68,7 +68,8 @@ impl PreviewOptions {
             StretchName::Sqrt => Stretch::Sqrt,
             StretchName::Log => Stretch::Log,
         };
-        let default = if scene.sky.is_some() { Colors::Color } else { Colors::AfmhotUs };
+        let colored = scene.sky.is_some() || !scene.mesh.is_empty();
+        let default = if colored { Colors::Color } else { Colors::AfmhotUs };
         let map = match self.colormap.unwrap_or(default) {
             Colors::Color => return Look::Color,
             Colors::AfmhotUs => Colormap::AfmhotUs,

@@ -2,9 +2,8 @@
 
 use crate::output;
 use anyhow::Context;
-use kerrlight_tomo::emission::sky::Panorama;
 use kerrlight_tomo::image::exr;
-use kerrlight_tomo::scene::{Scene, SceneError, Sky, apply_override};
+use kerrlight_tomo::scene::{Scene, SceneError, apply_override};
 use std::path::{Path, PathBuf};
 
 /// The scene that is rendered when none is given.
@@ -62,37 +61,4 @@ fn scene_of_exr(path: &Path) -> anyhow::Result<String> {
     let attributes = exr::decode_attributes(file).with_context(name)?;
     let scene = attributes.get("scene").cloned();
     scene.with_context(|| format!("{} holds no scene of kerrlight", name()))
-}
-
-/// Where the picture of a `[sky.image]` lies.
-pub fn sky_path(scene: &Scene, folder: &Path) -> Option<PathBuf> {
-    match &scene.sky {
-        Some(Sky::Image(image)) => Some(folder.join(&image.path)),
-        _ => None,
-    }
-}
-
-/// The file of a `[sky.image]`.
-pub struct SkyFile {
-    name: String,
-    bytes: Vec<u8>,
-}
-
-impl SkyFile {
-    /// Reads it.
-    pub fn read(path: &Path) -> anyhow::Result<Self> {
-        let bytes = output::read(path).context("`sky.image.path`")?;
-        Ok(SkyFile { name: path.display().to_string(), bytes })
-    }
-
-    /// The picture.
-    pub fn decode(&self) -> anyhow::Result<Panorama> {
-        let name = || format!("`sky.image.path` {}", self.name);
-        Panorama::decode(&self.bytes).with_context(name)
-    }
-
-    /// What tells it from another.
-    pub fn identity(&self) -> String {
-        format!("sky {} bytes, CRC-32 {:08x}\n", self.bytes.len(), crc32fast::hash(&self.bytes))
-    }
 }

@@ -15,11 +15,10 @@ pub use channels::{CHANNELS, ChannelKind};
 pub use journal::{Found, Journal};
 pub use tally::Summary;
 
-use crate::emission::sky::Panorama;
 use crate::image::exr::Layout;
 use crate::image::{Channel, Picture};
 use crate::scene::Scene;
-use crate::transport::Stage;
+use crate::transport::{Assets, Stage};
 use grid::Grid;
 use kerrlight_geodesic::OutOfRange;
 use std::sync::{Mutex, PoisonError};
@@ -75,12 +74,12 @@ pub struct Raster {
 const TILE: usize = 64;
 
 impl Raster {
-    /// The picture of `scene`; `sky` is the decoded file of a `[sky.image]`.
+    /// The picture of `scene` with the decoded files that it names.
     ///
     /// # Errors
     /// If a value is out of range.
-    pub fn new(scene: &Scene, sky: Option<Panorama>) -> Result<Self, RenderError> {
-        let stage = Stage::new(scene, sky)?;
+    pub fn new(scene: &Scene, assets: impl Into<Assets>) -> Result<Self, RenderError> {
+        let stage = Stage::new(scene, assets)?;
         let grid = Grid::new(scene);
         let refined = scene.screen.image_error.is_some();
         let channels = channels::chosen(&stage, refined, scene.screen.channels.as_deref())?;
@@ -140,10 +139,10 @@ pub struct Rendered {
 /// If a value is out of range or does not fit, or `progress` returned false.
 pub fn render(
     scene: &Scene,
-    sky: Option<Panorama>,
+    assets: impl Into<Assets>,
     progress: &Progress<'_>,
 ) -> Result<Rendered, RenderError> {
-    Raster::new(scene, sky)?.render(progress)
+    Raster::new(scene, assets)?.render(progress)
 }
 
 impl Raster {

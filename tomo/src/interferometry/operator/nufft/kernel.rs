@@ -64,7 +64,7 @@ pub fn cells(pixels: usize, width: usize) -> usize {
     let least = (2 * pixels).max(2 * width + 6);
     let smooth = |mut n: usize| {
         for prime in [2, 3, 5] {
-            while n % prime == 0 {
+            while n.is_multiple_of(prime) {
                 n /= prime;
             }
         }
