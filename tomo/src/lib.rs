@@ -11,6 +11,7 @@ pub mod emission;
 pub mod image;
 pub mod interferometry;
 pub mod optimise;
+pub mod plan;
 pub mod points;
 pub mod polarization;
 pub mod render;

@@ -1,5 +1,6 @@
 //! `kerrlight render`: from a scene to EXR and PNG.
 
+mod explain;
 mod partial;
 mod preview;
 mod report;
@@ -39,6 +40,10 @@ pub struct Render {
     /// screen.samples_per_pixel
     #[arg(long, value_name = "ERROR")]
     image_error: Option<f64>,
+    /// Print what is computed for this scene and what is not, with the estimated cost of each
+    /// part before and the measured cost after
+    #[arg(long)]
+    explain: bool,
     #[command(flatten)]
     look: PreviewOptions,
     /// Columns of pixels that are traced together; the picture does not depend on it
@@ -62,7 +67,11 @@ impl Render {
         let files = assets::load(&scene, &source.folder)?;
         let start = Instant::now();
         let raster = Raster::new(&scene, files.decoded);
-        let raster = raster.with_context(|| source.name.clone())?.with_tile(self.tile.into());
+        let mut raster = raster.with_context(|| source.name.clone())?.with_tile(self.tile.into());
+        if self.explain {
+            explain::before(&scene, &raster)?;
+            raster = raster.with_meter();
+        }
         let look = png.is_some().then(|| self.look.reduction(&scene, &raster)).transpose()?;
         let work = Work { raster: &raster, scene: &scene, text: &text, name: &source.name };
         let (summary, picture) = match &exr {
@@ -78,6 +87,9 @@ impl Render {
             output::print(&format!("{}\n", png.shown().display()))?;
         }
         report::print(&scene, &summary, start.elapsed().as_secs_f64());
+        if self.explain {
+            explain::after(&raster.meter(), summary.rays);
+        }
         Ok(())
     }
 

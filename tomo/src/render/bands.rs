@@ -4,6 +4,7 @@
 use super::pixels::{Pixel, Workspace, uniform};
 use super::tally::Tally;
 use super::{Progress, Raster, RenderError, adaptive};
+use crate::transport::Meter;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -81,10 +82,17 @@ impl Raster {
         let end = ((tile + 1) * self.tile).min(self.grid.width);
         let columns = tile * self.tile..end;
         let (stage, grid, rows) = (&self.stage, &self.grid, self.layout.rows(band));
-        Ok(match tolerance {
+        if self.meter.is_some() {
+            work.scratch.meter = Meter::running();
+        }
+        let pixels = match tolerance {
             Some(error) => adaptive::adaptive(stage, grid, rows, columns, error, work)?,
             None => uniform(stage, grid, rows, columns, work)?,
-        })
+        };
+        if let Some(meter) = &self.meter {
+            meter.lock().unwrap_or_else(PoisonError::into_inner).add(&work.scratch.meter);
+        }
+        Ok(pixels)
     }
 
     /// The band from its tiles.

@@ -18,9 +18,10 @@ pub use tally::Summary;
 use crate::image::exr::Layout;
 use crate::image::{Channel, Picture};
 use crate::scene::Scene;
-use crate::transport::{Assets, Stage};
+use crate::transport::{Assets, Glimpse, Meter, Scratch, Stage};
 use grid::Grid;
 use kerrlight_geodesic::OutOfRange;
+use std::sync::{Mutex, PoisonError};
 use std::sync::{Mutex, PoisonError};
 use tally::Tally;
 
@@ -68,7 +69,12 @@ pub struct Raster {
     layout: Layout,
     /// Columns of a tile.
     tile: usize,
+    /// Where the time goes, if that is asked.
+    meter: Option<Mutex<Meter>>,
 }
+
+/// Rays of a block of a trial.
+const TRIAL: usize = 64;
 
 /// Columns of a tile: with the rows of a band a block of rays.
 const TILE: usize = 64;
@@ -85,12 +91,52 @@ impl Raster {
         let channels = channels::chosen(&stage, refined, scene.screen.channels.as_deref())?;
         let names: Vec<&str> = channels.iter().map(|kind| kind.name).collect();
         let layout = Layout::new(grid.width, grid.height, &names)?;
-        Ok(Raster { scene: scene.clone(), stage, grid, channels, layout, tile: TILE })
+        Ok(Raster { scene: scene.clone(), stage, grid, channels, layout, tile: TILE, meter: None })
     }
 
     /// The same with tiles of `columns` pixels; no pixel depends on it.
     pub fn with_tile(self, columns: usize) -> Self {
         Raster { tile: columns.max(1), ..self }
+    }
+
+    /// The same with a meter of the time that its parts take.
+    pub fn with_meter(self) -> Self {
+        Raster { meter: Some(Mutex::new(Meter::running())), ..self }
+    }
+
+    /// What the meter has read, over all threads; nothing without one.
+    pub fn meter(&self) -> Meter {
+        let read = |meter: &Mutex<Meter>| *meter.lock().unwrap_or_else(PoisonError::into_inner);
+        self.meter.as_ref().map(read).unwrap_or_default()
+    }
+
+    /// Time of all parts on one thread for `rays` rays spread over the picture.
+    ///
+    /// # Errors
+    /// If a value is out of range.
+    pub fn trial(&self, rays: usize) -> Result<Meter, RenderError> {
+        let mut scratch = Scratch { meter: Meter::running(), ..Scratch::default() };
+        let (width, height) = (self.grid.width, self.grid.height);
+        // Blocks of neighbours, as in the picture, on a sequence that fills the plane evenly
+        // (Roberts 2018: powers of the reciprocal of the plastic number).
+        let blocks = rays.div_ceil(TRIAL);
+        for k in 0..blocks {
+            let place =
+                |ratio: f64, size: usize| ((k as f64 * ratio).fract() * size as f64) as usize;
+            let (column, row) =
+                (place(0.754_877_666_246_692_7, width), place(0.569_840_290_998_053_2, height));
+            let points = (0..TRIAL).map(|j| {
+                self.grid.inside(
+                    (column + j % 8).min(width - 1),
+                    (row + j / 8).min(height - 1),
+                    [0.0; 2],
+                )
+            });
+            let (alpha, beta): (Vec<f64>, Vec<f64>) = points.unzip();
+            let mut seen = vec![Glimpse::default(); TRIAL];
+            self.stage.look_many(&alpha, &beta, &[self.stage.time()], &mut scratch, &mut seen)?;
+        }
+        Ok(scratch.meter)
     }
 
     /// Number of bands.

@@ -23,7 +23,7 @@ const BLOCK: usize = 1024;
 /// Memory that is reused from tile to tile.
 #[derive(Debug, Default)]
 pub(super) struct Workspace {
-    scratch: Scratch,
+    pub scratch: Scratch,
     alpha: Vec<f64>,
     beta: Vec<f64>,
     seen: Vec<Glimpse>,

@@ -318,6 +318,10 @@ fn check_combinations(scene: &Scene) -> Result<(), Invalid> {
         let allowed = "true with hot spots or meshes: straight rays see discs, gas and skies";
         return Err(Invalid::new("effects.lensing", false, allowed));
     }
+    if scene.camera.is_some() && !effects.lensing {
+        let allowed = "true with a [camera]: straight rays are those of a distant observer";
+        return Err(Invalid::new("effects.lensing", false, allowed));
+    }
     match effects.half_orbits {
         Some(n) if n > 100 => {
             Err(Invalid::new("effects.half_orbits", n, "a whole number in [0, 100]"))

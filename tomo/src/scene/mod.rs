@@ -414,6 +414,13 @@ pub struct SkyImage {
     pub brightness: f64,
 }
 
+impl Screen {
+    /// Whether the picture keeps a channel.
+    pub fn keeps(&self, channel: &str) -> bool {
+        self.channels.as_ref().is_none_or(|names| names.iter().any(|name| name == channel))
+    }
+}
+
 impl Scene {
     /// The scene in a TOML text.
     ///

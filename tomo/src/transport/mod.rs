@@ -8,8 +8,10 @@ mod chord;
 mod glimpse;
 mod medium;
 mod meshes;
+mod meter;
 mod rays;
 mod spots;
+mod straight;
 mod surface;
 #[cfg(test)]
 mod tests;
@@ -19,6 +21,7 @@ mod volume;
 
 pub use glimpse::{Fate, Glimpse};
 pub use medium::{Emission, Medium, Moment, Needs};
+pub use meter::{Meter, Part};
 pub use view::View;
 
 use crate::emission::disc::DiscModel;
@@ -36,6 +39,7 @@ use meshes::{Hit as MeshHit, MeshTree};
 use rays::{End, Sight};
 use spots::{Met, SpotTree};
 use std::sync::{Arc, Mutex};
+use straight::Line;
 use surface::Hit;
 use tree::WalkScratch;
 
@@ -52,6 +56,7 @@ pub struct Stage {
     /// Spectral index α, if redshift is simulated.
     redshift: Option<f64>,
     slow_light: bool,
+    lensing: bool,
     /// The last number of half-orbits that is seen.
     half_orbits: Option<u32>,
     /// Whether rays are traced in closed form where possible.
@@ -107,6 +112,8 @@ pub struct Scratch {
     met: Vec<Met>,
     pieces: Vec<[f64; 2]>,
     mesh_hits: Vec<MeshHit>,
+    /// Where the time goes; off unless it is replaced.
+    pub meter: Meter,
 }
 
 /// Where the SIMD kernels can have an observer, in M.
@@ -137,10 +144,7 @@ impl Stage {
     pub fn new(scene: &Scene, assets: impl Into<Assets>) -> Result<Self, OutOfRange> {
         let assets: Assets = assets.into();
         let hole = Kerr::new(scene.hole.spin)?;
-        let kept = |name: &str| {
-            let channels = scene.screen.channels.as_ref();
-            channels.is_none_or(|channels| channels.iter().any(|channel| channel == name))
-        };
+        let kept = |name: &str| scene.screen.keeps(name);
         let redshift = scene.effects.redshift.then_some(scene.effects.spectral_index).flatten();
         let effects = GasEffects { redshift, absorption: scene.effects.absorption };
         let length = 100.0 * crate::units::SPEED_OF_LIGHT;
@@ -155,6 +159,7 @@ impl Stage {
             time: scene.observer.time,
             redshift,
             slow_light: scene.effects.slow_light,
+            lensing: scene.effects.lensing,
             half_orbits: scene.effects.half_orbits,
             tolerance: scene.tracer.tolerance,
             closed_form: scene.tracer.integrator == Integrator::Elliptic,
@@ -236,26 +241,59 @@ impl Stage {
         let rays = alpha.len();
         scratch.sights.clear();
         scratch.hits.clear();
+        if let (View::Screen(observer), false) = (&self.view, self.lensing) {
+            return self.look_straight(observer, (alpha, beta), times, scratch, seen);
+        }
         let trees: Vec<_> = times.iter().map(|time| self.spot_tree(*time)).collect();
         let observer = self.closed_form();
+        let clock = scratch.meter.start();
         match observer {
             Some(observer) => self.trace_block(observer, (alpha, beta), &trees, scratch)?,
             None => scratch.sights.resize(rays, Sight { by_steps: true, ..Sight::default() }),
         }
+        scratch.meter.stop(Part::Rays, clock);
         let medium = self.gas.as_ref().map(|gas| gas as &dyn Medium);
         scratch.volume.reset(medium.map_or(0, |_| rays * times.len()));
         if let (Some(medium), Some(observer)) = (medium, observer) {
+            let clock = scratch.meter.start();
             self.fill_block(medium, observer, (alpha, beta), times, scratch)?;
+            scratch.meter.stop(Part::Gas, clock);
         }
         for k in 0..rays {
             let ray = self.view.ray(&self.hole, alpha[k], beta[k])?;
             if scratch.sights[k].by_steps {
+                let clock = scratch.meter.start();
                 scratch.sights[k] = self.trace_steps(&ray, scratch);
+                scratch.meter.stop(Part::Rays, clock);
                 if let Some(medium) = medium {
+                    let clock = scratch.meter.start();
                     self.fill_path(medium, k, times, scratch);
+                    scratch.meter.stop(Part::Gas, clock);
                 }
             }
             self.look_along(k, &ray, (alpha[k], beta[k]), (times, &trees), scratch, seen)?;
+        }
+        Ok(())
+    }
+
+    /// [`look_many`](Self::look_many) without gravitational lensing.
+    fn look_straight(
+        &self,
+        observer: &Observer,
+        (alpha, beta): (&[f64], &[f64]),
+        times: &[f64],
+        scratch: &mut Scratch,
+        seen: &mut [Glimpse],
+    ) -> Result<(), OutOfRange> {
+        let rays = alpha.len();
+        scratch.sights.resize(rays, Sight::default());
+        scratch.volume.reset(self.gas.as_ref().map_or(0, |_| rays * times.len()));
+        for k in 0..rays {
+            let ray = observer.ray(&self.hole, alpha[k], beta[k])?;
+            let line = Line::new(observer, self.hole.horizon(), alpha[k], beta[k]);
+            scratch.sights[k] = self.trace_line(&line, &ray, scratch);
+            self.fill_line(&line, k, times, scratch);
+            self.look_along(k, &ray, (alpha[k], beta[k]), (times, &[]), scratch, seen)?;
         }
         Ok(())
     }
@@ -282,6 +320,7 @@ impl Stage {
         scratch: &mut Scratch,
         seen: &mut [Glimpse],
     ) -> Result<(), OutOfRange> {
+        let clock = scratch.meter.start();
         let sight = scratch.sights[k].clone();
         let mut still = Gather::new();
         let hits = &scratch.hits[sight.hits.clone()];
@@ -289,8 +328,12 @@ impl Stage {
         if sight.by_steps {
             self.add_meshes(scratch, sight.last_time(), &mut still);
         }
+        scratch.meter.stop(Part::Surfaces, clock);
+        let clock = scratch.meter.start();
         let sky = self.sky_light(x, y, &sight, scratch)?;
+        scratch.meter.stop(Part::Sky, clock);
         let shift = self.redshift.and_then(|_| self.view.blueshift(x, y));
+        let clock = scratch.meter.start();
         for (j, time) in times.iter().enumerate() {
             let mut gather = still.clone();
             if let (Some(gas), Some(light)) =
@@ -312,6 +355,7 @@ impl Stage {
                 place.receive(shift, index);
             }
         }
+        scratch.meter.stop(Part::Spots, clock);
         Ok(())
     }
 
@@ -329,7 +373,7 @@ impl Stage {
         if sight.until < sight.total {
             return Ok([0.0; 3]);
         }
-        if let Some(spacing) = self.beams {
+        if let (Some(spacing), true) = (self.beams, self.lensing) {
             let ray = self.view.bundle(&self.hole, x, y)?;
             let hole = self.hole.lift();
             let end = footprint::of_ray(&hole, &ray, self.tolerance, &mut scratch.beam)?;

@@ -22,8 +22,7 @@ pub(super) struct Workspace {
     quadrature: Quadrature,
     emission: Emission,
     depths: Vec<f64>,
-    columns: [Vec<f64>; 8],
-    intervals: Vec<[f64; 2]>,
+    columns: Columns,
     /// Light of each ray at each time, as in the result.
     pub lights: Vec<Light>,
     pub profile: DepthProfile,
@@ -35,8 +34,7 @@ impl Default for Workspace {
             quadrature: Quadrature::new(ORDER),
             emission: Emission::default(),
             depths: Vec::new(),
-            columns: Default::default(),
-            intervals: Vec::new(),
+            columns: Columns::default(),
             lights: Vec::new(),
             profile: DepthProfile::default(),
         }
@@ -136,12 +134,28 @@ impl Stage {
         times: &[f64],
         scratch: &mut Scratch,
     ) {
+        let sight = scratch.sights[k].clone();
+        self.fill_ray(medium, k, times, scratch, |split, path, rule, columns| {
+            self.place(path, &sight, medium, split, rule, columns);
+        });
+    }
+
+    /// Light of the medium along ray number `k`, whose nodes are put into columns by `place`.
+    pub(super) fn fill_ray(
+        &self,
+        medium: &dyn Medium,
+        k: usize,
+        times: &[f64],
+        scratch: &mut Scratch,
+        place: impl Fn(u32, &Path, &PanelRule, &mut Columns),
+    ) {
         let Scratch { path, sights, hits, volume, .. } = scratch;
         let along = Along { medium, lambda: sights[k].lambda, times };
         let mut split = 1;
         loop {
             let mut columns = core::mem::take(&mut volume.columns);
-            self.place(path, &sights[k], medium, split, volume, &mut columns);
+            columns.iter_mut().for_each(Vec::clear);
+            place(split, path, &volume.quadrature.rule, &mut columns);
             let [radius, cos_theta, weight, mino_time, azimuth, delay, w_rate, u_rate] = &columns;
             let nodes = RayNodes {
                 radius,
@@ -216,66 +230,79 @@ impl Stage {
         sight: &Sight,
         medium: &dyn Medium,
         split: u32,
-        volume: &mut Workspace,
-        columns: &mut [Vec<f64>; 8],
+        rule: &PanelRule,
+        columns: &mut Columns,
     ) {
-        columns.iter_mut().for_each(Vec::clear);
-        path.intervals_within(0.5 * self.hole.horizon(), medium.sphere(), &mut volume.intervals);
+        let mut intervals = Vec::new();
+        path.intervals_within(0.5 * self.hole.horizon(), medium.sphere(), &mut intervals);
         let turning = path.turning_point().map_or(f64::INFINITY, |(time, _)| time);
         let captured = sight.end == End::Captured;
-        for [start, end] in &volume.intervals {
-            let whole = captured && *end >= path.mino_total() && sight.last_time() >= *end;
+        for [start, end] in intervals {
+            let falls = captured && end >= path.mino_total() && sight.last_time() >= end;
             let end = end.min(sight.last_time());
-            let middle = turning.clamp(*start, end.max(*start));
-            for [from, to] in [[*start, middle], [middle, end]] {
+            let middle = turning.clamp(start, end.max(start));
+            for [from, to] in [[start, middle], [middle, end]] {
                 if to > from {
-                    let pieces = (to - from) * path.angular_rate() / LONGEST;
-                    let pieces = f64::from(split) * pieces.ceil().clamp(1.0, 1e4);
-                    let piece = Piece { from, to, pieces: pieces as usize, falls: whole };
-                    self.place_piece(path, &piece, &volume.quadrature.rule, columns);
+                    let piece = Piece::new([from, to], path.angular_rate(), split, falls);
+                    piece.nodes(rule, |time, step| self.node_of(path, time, step), columns);
                 }
             }
         }
     }
 
-    fn place_piece(
-        &self,
-        path: &Path,
-        piece: &Piece,
-        rule: &PanelRule,
-        columns: &mut [Vec<f64>; 8],
-    ) {
-        let length = (piece.to - piece.from) / piece.pieces as f64;
-        for k in 0..piece.pieces {
-            let start = piece.from + length * k as f64;
-            let falls = piece.falls && k + 1 == piece.pieces;
-            for (s, weight) in rule.nodes().iter().zip(rule.weights()) {
-                // The pace of `PanelRule` before the horizon.
-                let (place, pace) =
-                    if falls { (s * (2.0 - s), 2.0 * (1.0 - s)) } else { (*s, 1.0) };
-                let point = path.at(start + length * place);
-                let (r, u) = (point.radius(), point.cos_theta());
-                let step = self.hole.sigma(r, u) * weight * pace * length;
-                let rates = [point.inverse_radius_rate, point.velocity[2]];
-                let row = [r, u, step, point.mino_time, point.azimuth, point.delay];
-                let row = row.into_iter().chain(rates);
-                columns.iter_mut().zip(row).for_each(|(column, x)| column.push(x));
-            }
-        }
+    fn node_of(&self, path: &Path, time: f64, step: f64) -> [f64; 8] {
+        let point = path.at(time);
+        let (r, u) = (point.radius(), point.cos_theta());
+        let weight = self.hole.sigma(r, u) * step;
+        let [w_rate, u_rate] = [point.inverse_radius_rate, point.velocity[2]];
+        [r, u, weight, time, point.azimuth, point.delay, w_rate, u_rate]
     }
 }
 
-/// A stretch of a path between the places where its integrand is not smooth.
-struct Piece {
+/// Columns of nodes, as in [`RayNodes`].
+pub(super) type Columns = [Vec<f64>; 8];
+
+/// A stretch of a ray between the places where its integrand is not smooth.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Piece {
     from: f64,
     to: f64,
-    pieces: usize,
+    panels: usize,
     /// Whether it ends at the horizon.
     falls: bool,
 }
 
 /// Longest panel of a path, as an angle.
 const LONGEST: f64 = 0.4;
+
+impl Piece {
+    /// A piece of a ray that turns at so many radians per unit of its parameter.
+    pub fn new([from, to]: [f64; 2], rate: f64, split: u32, falls: bool) -> Self {
+        let panels = ((to - from) * rate / LONGEST).ceil().clamp(1.0, 1e4);
+        Piece { from, to, panels: (f64::from(split) * panels) as usize, falls }
+    }
+
+    /// Puts the nodes of all panels into columns: `node` makes a row of a parameter and a step.
+    pub fn nodes(
+        &self,
+        rule: &PanelRule,
+        node: impl Fn(f64, f64) -> [f64; 8],
+        columns: &mut Columns,
+    ) {
+        let length = (self.to - self.from) / self.panels as f64;
+        for k in 0..self.panels {
+            let start = self.from + length * k as f64;
+            let falls = self.falls && k + 1 == self.panels;
+            for (s, weight) in rule.nodes().iter().zip(rule.weights()) {
+                // The pace of `PanelRule` before the horizon.
+                let (place, pace) =
+                    if falls { (s * (2.0 - s), 2.0 * (1.0 - s)) } else { (*s, 1.0) };
+                let row = node(start + length * place, length * weight * pace);
+                columns.iter_mut().zip(row).for_each(|(column, x)| column.push(x));
+            }
+        }
+    }
+}
 
 impl Workspace {
     /// Room for the light of so many rays at so many times.
