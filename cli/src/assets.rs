@@ -1,34 +1,41 @@
 //! The files that a scene names.
 
-use crate::output;
+use crate::output::{self, Output};
 use anyhow::Context;
 use kerrlight_tomo::emission::mesh::MeshFile;
 use kerrlight_tomo::emission::sky::Panorama;
 use kerrlight_tomo::scene::{Scene, Sky};
 use kerrlight_tomo::transport::Assets;
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
-/// Where the files of a scene lie; relative names are relative to `folder`. Nothing must be
-/// written over them.
-pub fn paths(scene: &Scene, folder: &Path) -> Vec<PathBuf> {
-    let meshes = scene.mesh.iter().map(|mesh| folder.join(&mesh.path));
-    sky_path(scene, folder).into_iter().chain(meshes).collect()
-}
-
-/// Reads and decodes the files of a scene.
-pub fn load(scene: &Scene, folder: &Path) -> anyhow::Result<Assets> {
-    let sky = sky_path(scene, folder).map(|path| load_sky(&path)).transpose()?;
-    let meshes = scene.mesh.iter().enumerate().map(|(k, mesh)| {
+/// Reads and decodes the files of a scene, whose names are relative to `folder`. None of them,
+/// nor what they refer to, may be one of `outputs`.
+pub fn load(scene: &Scene, folder: &Path, outputs: &[&Output]) -> anyhow::Result<Assets> {
+    let spare = |input: &Path| outputs.iter().try_for_each(|output| output.spares(input));
+    let sky = sky_path(scene, folder);
+    sky.as_deref().map_or(Ok(()), spare)?;
+    let sky = sky.map(|path| load_sky(&path)).transpose()?;
+    let mut meshes = Vec::new();
+    for (k, mesh) in scene.mesh.iter().enumerate() {
         let path = folder.join(&mesh.path);
-        let name = || format!("`mesh.{k}.path` {}", path.display());
+        spare(&path)?;
         let bytes = output::read(&path).with_context(|| format!("`mesh.{k}.path`"))?;
         // What a mesh refers to lies beside it.
-        let beside = path.parent().unwrap_or(Path::new(".")).to_owned();
-        let resources =
-            |name: &str| output::read(&beside.join(name)).map_err(|error| format!("{error:#}"));
-        MeshFile::decode(&bytes, &resources).with_context(name)
-    });
-    Ok(Assets { sky, meshes: meshes.collect::<anyhow::Result<_>>()? })
+        let beside = path.parent().unwrap_or(Path::new("."));
+        let referred = RefCell::new(Vec::new());
+        let resources = |name: &str| {
+            let path = beside.join(name);
+            let bytes = output::read(&path).map_err(|error| format!("{error:#}"))?;
+            referred.borrow_mut().push(path);
+            Ok(bytes)
+        };
+        let file = MeshFile::decode(&bytes, &resources)
+            .with_context(|| format!("`mesh.{k}.path` {}", path.display()))?;
+        referred.into_inner().iter().try_for_each(|path| spare(path))?;
+        meshes.push(file);
+    }
+    Ok(Assets { sky, meshes })
 }
 
 /// Where the picture of a `[sky.image]` lies.

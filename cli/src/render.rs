@@ -73,13 +73,11 @@ impl Render {
         let source = self.source()?;
         let (text, scene) = self.scene(&source)?;
         let (exr, png) = self.outputs(&source)?;
-        let files = assets::paths(&scene, &source.folder);
-        for output in [&exr, &png].into_iter().flatten() {
-            for input in self.scene.iter().chain(&files) {
-                output.spares(input)?;
-            }
+        let outputs: Vec<&Output> = [&exr, &png].into_iter().flatten().collect();
+        for input in &self.scene {
+            outputs.iter().try_for_each(|output| output.spares(input))?;
         }
-        let assets = assets::load(&scene, &source.folder)?;
+        let assets = assets::load(&scene, &source.folder, &outputs)?;
         let start = Instant::now();
         let bar = progress::bar(u64::from(scene.screen.height));
         let rendered = render(&scene, assets, &|rows| {
