@@ -74,7 +74,7 @@ impl Render {
         let (text, scene) = self.scene(&source)?;
         let (exr, png) = self.outputs(&source)?;
         let outputs: Vec<&Output> = [&exr, &png].into_iter().flatten().collect();
-        for input in &self.scene {
+        if let Some(input) = &self.scene {
             outputs.iter().try_for_each(|output| output.spares(input))?;
         }
         let assets = assets::load(&scene, &source.folder, &outputs)?;
