@@ -1,6 +1,6 @@
 //! The files that a scene names.
 
-use crate::output;
+use crate::output::{self, Output};
 use anyhow::Context;
 use kerrlight_tomo::emission::mesh::MeshFile;
 use kerrlight_tomo::emission::sky::Panorama;
@@ -10,13 +10,6 @@ use std::cell::RefCell;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// Where the files of a scene lie; relative names are relative to `folder`. Nothing must be
-/// written over them.
-pub fn paths(scene: &Scene, folder: &Path) -> Vec<PathBuf> {
-    let meshes = scene.mesh.iter().map(|mesh| folder.join(&mesh.path));
-    sky_path(scene, folder).into_iter().chain(meshes).collect()
-}
-
 /// The files of a scene.
 pub struct Files {
     /// What they hold.
@@ -25,10 +18,12 @@ pub struct Files {
     pub identity: String,
 }
 
-/// Reads and decodes the files of a scene.
-pub fn load(scene: &Scene, folder: &Path) -> anyhow::Result<Files> {
+/// Reads and decodes the files of a scene, whose names are relative to `folder`. None of them,
+/// nor what they refer to, may be one of `outputs`.
+pub fn load(scene: &Scene, folder: &Path, outputs: &[&Output]) -> anyhow::Result<Files> {
     let identity = RefCell::new(String::new());
     let read = |path: &Path| {
+        outputs.iter().try_for_each(|output| output.spares(path))?;
         let bytes = output::read(path)?;
         let checksum = crc32fast::hash(&bytes);
         // Writing to a string never fails.
@@ -41,8 +36,9 @@ pub fn load(scene: &Scene, folder: &Path) -> anyhow::Result<Files> {
         let name = || format!("`mesh.{k}.path` {}", path.display());
         let bytes = read(&path).with_context(|| format!("`mesh.{k}.path`"))?;
         // What a mesh refers to lies beside it.
-        let beside = path.parent().unwrap_or(Path::new(".")).to_owned();
-        let resources = |name: &str| read(&beside.join(name)).map_err(|error| format!("{error:#}"));
+        let beside = path.parent().unwrap_or(Path::new("."));
+        let resources =
+            |name: &str| read(&beside.join(name)).map_err(|error| format!("{error:#}"));
         MeshFile::decode(&bytes, &resources).with_context(name)
     });
     let decoded = Assets { sky, meshes: meshes.collect::<anyhow::Result<_>>()? };

@@ -22,8 +22,8 @@ pub fn read(path: &Path, times_h: &[f64]) -> anyhow::Result<Movie> {
     if scene.sky.is_some() {
         bail!("{}: a sky has no flux in Jy: remove `sky`", name());
     }
-    let assets =
-        assets::load(&scene, path.parent().unwrap_or(Path::new("."))).with_context(name)?.decoded;
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let assets = assets::load(&scene, folder, &[]).with_context(name)?.decoded;
     let hole = scene.hole.clone();
     let seconds = gravitational_time(hole.mass_msun);
     let pixel_uas = scene.pixel_size() * gravitational_angle(hole.mass_msun, hole.distance_kpc);

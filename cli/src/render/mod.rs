@@ -58,13 +58,11 @@ impl Render {
         let source = Source::new(self.scene.as_deref())?;
         let (text, scene) = source.scene(&self.all_overrides())?;
         let (exr, png) = self.outputs(&source)?;
-        let files = assets::paths(&scene, &source.folder);
-        for output in [&exr, &png].into_iter().flatten() {
-            for input in self.scene.iter().chain(&files) {
-                output.spares(input)?;
-            }
+        let outputs: Vec<&Output> = [&exr, &png].into_iter().flatten().collect();
+        if let Some(input) = &self.scene {
+            outputs.iter().try_for_each(|output| output.spares(input))?;
         }
-        let files = assets::load(&scene, &source.folder)?;
+        let files = assets::load(&scene, &source.folder, &outputs)?;
         let start = Instant::now();
         let raster = Raster::new(&scene, files.decoded);
         let mut raster = raster.with_context(|| source.name.clone())?.with_tile(self.tile.into());

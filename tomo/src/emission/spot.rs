@@ -104,6 +104,11 @@ impl SpotModel {
         [inner, outer]: [f64; 2],
         [from, to]: [f64; 2],
     ) -> [f64; 2] {
+        if self.sheared_since.is_none() {
+            let rate = self.rate(self.orbit);
+            let (a, b) = (rate * from, rate * to);
+            return [a.min(b), a.max(b)];
+        }
         let corners = [(inner, from), (inner, to), (outer, from), (outer, to)];
         let angles = corners.map(|(r, time)| self.turned(r, time));
         if angles.iter().any(|angle| !angle.is_finite()) {

@@ -122,9 +122,12 @@ struct Cut<'a> {
     leaf: u32,
 }
 
-/// A piece is halved at most this often. What is then undecided is a ray that grazes the plane
-/// within 1e-12 of the piece: it does not meet it unless its ends are on both sides.
+/// A piece is halved at most this often (next to the horizon, where it never gets straight).
 const DEEPEST: u32 = 40;
+
+/// Pieces that are this close to straight, in units of their radius, are not halved any further: a
+/// ray that stays closer to a plane than that, with both ends on one side, does not meet it.
+const GRAZING: f64 = 1e-7;
 
 /// Largest distance of an intersection from its triangle's plane, in units of its radius.
 const ON_PLANE: f64 = 1e-11;
@@ -142,10 +145,11 @@ impl Cut<'_> {
             return;
         }
         let once = (to - from).abs() > 4.0 * sagitta;
-        if changes && (once || depth >= DEEPEST) {
+        let straight = sagitta <= GRAZING * self.bound.reach([&start.point, &end.point]);
+        if changes && (once || straight || depth >= DEEPEST) {
             return self.root([start, end], [from, to], sagitta, hits);
         }
-        if depth >= DEEPEST {
+        if straight || depth >= DEEPEST {
             return;
         }
         let middle = Node::at(self.path, 0.5 * (start.point.mino_time + end.point.mino_time));

@@ -17,8 +17,9 @@ pub type Bounds = [[f64; 3]; 2];
 #[derive(Clone)]
 pub struct Tree {
     hierarchy: Bvh2,
-    /// Longest edge of each leaf's box.
+    /// Longest edge of each leaf's box, and the median of them.
     sizes: Vec<f64>,
+    typical: f64,
     shell: [f64; 2],
     /// What rounding to 32 bits may do to a distance.
     rounding: f32,
@@ -46,16 +47,19 @@ impl Tree {
             Aabb::new(Vec3A::from(low), Vec3A::from(high))
         };
         let boxes_32: Vec<Aabb> = boxes.iter().map(outward).collect();
-        let sizes =
-            boxes.iter().map(|[low, high]| (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max));
+        let edge = |[low, high]: &Bounds| (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
+        let sizes: Vec<f64> = boxes.iter().map(edge).collect();
         let far = boxes.iter().flatten().flatten().fold(0.0f64, |far, x| far.max(x.abs()));
         let hierarchy = if boxes.is_empty() {
             Bvh2::default()
         } else {
             build_bvh2(&boxes_32, BvhBuildParams::fast_build(), &mut Default::default())
         };
-        let rounding = (ROUNDING * far.max(shell[1].min(4.0 * far))) as f32;
-        Tree { hierarchy, sizes: sizes.collect(), shell, rounding }
+        let rounding = (2.0 * ROUNDING * far) as f32;
+        let mut sorted = sizes.clone();
+        sorted.sort_by(f64::total_cmp);
+        let typical = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+        Tree { hierarchy, sizes, typical, shell, rounding }
     }
 
     /// Whether a ray can come near any leaf at all: whether it enters the shell of radii that
@@ -80,8 +84,8 @@ impl Tree {
         self.shell
     }
 
-    /// Tells `found` every leaf whose box is within `epsilon` of the chord.
-    fn near(&self, [a, b]: [[f64; 3]; 2], epsilon: f64, mut found: impl FnMut(u32)) {
+    /// Tells `found` every leaf whose box is within `epsilon` of the chord, until it returns false.
+    fn near(&self, [a, b]: [[f64; 3]; 2], epsilon: f64, mut found: impl FnMut(u32) -> bool) {
         let single = |x: [f64; 3]| Vec3A::from(x.map(|x| x as f32));
         let (a, b) = (single(a), single(b));
         let chord = Chord {
@@ -92,14 +96,15 @@ impl Tree {
         self.descend(|aabb| chord.touches(aabb), &mut found);
     }
 
-    /// Tells `found` every leaf whose box meets the cube of half-edge `reach` about the origin.
-    fn inside(&self, reach: f64, mut found: impl FnMut(u32)) {
+    /// Tells `found` every leaf whose box meets the cube of half-edge `reach` about the origin,
+    /// until it returns false.
+    fn inside(&self, reach: f64, mut found: impl FnMut(u32) -> bool) {
         let reach = Vec3A::splat((reach as f32).next_up() + self.rounding);
         let cube = Aabb::new(-reach, reach);
         self.descend(|aabb| aabb.intersect_aabb(&cube), &mut found);
     }
 
-    fn descend(&self, touches: impl Fn(&Aabb) -> bool, found: &mut impl FnMut(u32)) {
+    fn descend(&self, touches: impl Fn(&Aabb) -> bool, found: &mut impl FnMut(u32) -> bool) {
         let nodes = &self.hierarchy.nodes;
         // Deeper trees than this do not come out of the builder; if one did, nothing is lost.
         let (mut stack, mut rest) = ([0u32; 64], Vec::new());
@@ -118,7 +123,9 @@ impl Tree {
             if node.is_leaf() {
                 let range =
                     node.first_index as usize..(node.first_index + node.prim_count) as usize;
-                self.hierarchy.primitive_indices[range].iter().for_each(|leaf| found(*leaf));
+                if !self.hierarchy.primitive_indices[range].iter().all(|leaf| found(*leaf)) {
+                    return;
+                }
                 continue;
             }
             for child in [node.first_index + 1, node.first_index] {
@@ -183,6 +190,9 @@ const DEEPEST: u32 = 40;
 /// once it stays within this part of the smallest box it met.
 const FINE: f64 = 0.25;
 
+/// A long piece that comes near more leaves than this is halved before they are looked at.
+const MANY: usize = 32;
+
 /// The walk of one ray through a tree.
 pub struct Walk<'a> {
     /// The tree.
@@ -237,16 +247,20 @@ impl Walk<'_> {
         visit: &mut impl FnMut([&Node; 2], &[u32]) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         let points = [&start.point, &end.point];
-        let epsilon = self.bound.distance(points);
+        // The tracer's error, which halving does not lessen, counts for the boxes only.
+        let sagitta = self.bound.sagitta(points);
         let length = distance(start.position, end.position);
         let last = depth >= DEEPEST || self.bound.winds(points);
-        if last || epsilon <= FINE * length {
-            self.collect([start, end], epsilon, scratch, keep);
-            let Some(size) = self.smallest(&scratch.leaves) else {
-                return ControlFlow::Continue(());
-            };
-            if last || (epsilon <= FINE * size && length <= self.longest * size) {
-                return visit([start, end], &scratch.leaves);
+        if last || sagitta <= FINE * length {
+            let short =
+                |size: f64| last || (sagitta <= FINE * size && length <= self.longest * size);
+            let most = if short(self.tree.typical) { usize::MAX } else { MANY };
+            if self.collect([start, end], most, scratch, keep) {
+                let size = self.smallest(&scratch.leaves);
+                let Some(size) = size else { return ControlFlow::Continue(()) };
+                if short(size) {
+                    return visit([start, end], &scratch.leaves);
+                }
             }
         }
         let middle = Node::at(self.path, 0.5 * (start.point.mino_time + end.point.mino_time));
@@ -254,27 +268,31 @@ impl Walk<'_> {
         self.piece([&middle, end], depth + 1, scratch, keep, visit)
     }
 
-    /// The leaves that the piece may meet.
+    /// The leaves that the piece may meet; false if it gave up because they are too many.
     fn collect(
         &self,
         ends: [&Node; 2],
-        epsilon: f64,
+        most: usize,
         scratch: &mut WalkScratch,
         keep: &impl Fn(u32, [&Node; 2], f64) -> bool,
-    ) {
+    ) -> bool {
         scratch.leaves.clear();
-        let mut found = |leaf| {
-            if keep(leaf, ends, epsilon) {
+        let points = ends.map(|node| &node.point);
+        let (epsilon, reach) = (self.bound.distance(points), self.bound.reach(points));
+        let mut count = 0;
+        let found = |leaf| {
+            count += 1;
+            if count <= most && keep(leaf, ends, epsilon) {
                 scratch.leaves.push(leaf);
             }
+            count <= most
         };
-        let points = ends.map(|node| &node.point);
-        let reach = self.bound.reach(points);
         if epsilon < reach {
             self.tree.near(ends.map(|node| node.position), epsilon, found);
         } else {
-            self.tree.inside(reach + self.bound.error(reach), &mut found);
+            self.tree.inside(reach + self.bound.error(reach), found);
         }
+        count <= most
     }
 
     fn smallest(&self, leaves: &[u32]) -> Option<f64> {

@@ -172,6 +172,20 @@ fn exact_tree_against_every_triangle() {
     assert!(lit > 150, "{lit}");
 }
 
+/// A ray that runs in the plane of a ring's triangles from end to end does not meet them, and
+/// finds out soon; a hair above it does.
+#[test]
+fn exact_ray_in_the_plane_of_a_mesh() {
+    for spin in ["0.0", "0.9"] {
+        let scene = scene(&["observer.inclination_deg=90", &format!("hole.spin={spin}")]);
+        let ring = (mesh(true, MeshVelocity::Static), annulus(5.0, 60.0, 64));
+        let stage = stage(scene, vec![ring]);
+        let look = |beta| stage.look(10.0, beta, &mut Scratch::default()).unwrap();
+        assert_ne!(look(0.0).fate, Fate::Surface);
+        assert_eq!(look(0.1).fate, Fate::Surface);
+    }
+}
+
 /// A dark sphere around everything lets no light through; in its absence there is some.
 #[test]
 fn exact_dark_surfaces_hide() {
