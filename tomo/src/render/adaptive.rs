@@ -23,6 +23,9 @@ const MOST_RAYS: u32 = 4096;
 /// The share of the allowed error for which the tolerance of a pixel is chosen.
 const SAFETY: f64 = 0.9;
 
+/// The light between two lensing bands that no ray has met, in terms of what is around.
+const HIDDEN: f64 = 1.0 / 16.0;
+
 /// Pixels along a side of the picture by which the tolerance is chosen, at most.
 const COARSE: usize = 128;
 
@@ -34,6 +37,13 @@ struct Light {
     /// Lensing band, fate and whether there is emission; u32::MAX is never one.
     kind: u32,
     unresolved: bool,
+}
+
+impl Light {
+    /// Whether a lensing band or the end of rays lies between two rays.
+    fn other_band(&self, other: &Light) -> bool {
+        self.kind >> 1 != other.kind >> 1
+    }
 }
 
 impl From<&Glimpse> for Light {
@@ -68,19 +78,30 @@ fn range(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 impl Cell {
-    /// `middle` is the ray at its centre.
+    /// `middle` is the ray at its centre, `bright` the largest intensity around.
     ///
     /// A smooth function's mean over the quarters is off by a third of d, the difference
     /// of the quarters' mean and the middle; where an edge runs through, d or the twist t of
     /// the quarters are of the order of its height, and where it is known to (other kinds of
-    /// rays), a quarter of the height is about twice the usual error.
-    fn new(center: [f64; 2], level: u32, middle: &Light, quarters: [Light; 4]) -> Self {
+    /// rays), a quarter of the height is about twice the usual error. Between lensing bands
+    /// there may be another image that no ray has met, about as bright as what is around, in
+    /// a small share of the cell: the next one is narrower by e^γ, 23 without spin.
+    fn new(
+        center: [f64; 2],
+        level: u32,
+        middle: &Light,
+        quarters: [Light; 4],
+        bright: f64,
+    ) -> Self {
         let [a, b, c, d] = quarters.map(|light| light.intensity);
         let off = (0.25 * (a + b + c + d) - middle.intensity).abs();
         let twist = (0.25 * (a - b - c + d)).abs();
         let mut error = 0.5 * (off + twist);
         if quarters.iter().any(|light| light.kind != middle.kind) {
             error = error.max(0.25 * range([a, b, c, d, middle.intensity].into_iter()));
+        }
+        if quarters.iter().any(|light| light.other_band(middle)) {
+            error = error.max(HIDDEN * bright);
         }
         Cell { center, level, quarters, error: error * area(level) }
     }
@@ -105,6 +126,8 @@ struct Cut {
     column: usize,
     row: usize,
     cells: Vec<Cell>,
+    /// Largest intensity of its rays and its neighbours' first ones.
+    bright: f64,
     rays: u32,
     unresolved: u32,
 }
@@ -133,9 +156,10 @@ impl Cut {
         for (place, seen) in quarters.iter_mut().zip(seen) {
             *place = Light::from(seen);
             self.unresolved += u32::from(place.unresolved);
+            self.bright = self.bright.max(place.intensity);
         }
         self.rays += 4;
-        self.cells.push(Cell::new(center, level, middle, quarters));
+        self.cells.push(Cell::new(center, level, middle, quarters, self.bright));
     }
 
     /// The pixel's light.
@@ -255,15 +279,16 @@ fn first(
     for row in rows {
         for column in columns.clone() {
             let center = seen[place(column, row)];
-            let (error, other) = estimate(|dx, dy| {
+            let Estimate { error, other, bright } = estimate(|dx, dy| {
                 let to = |k: usize, d: isize, range: &Range<usize>| {
                     k.saturating_add_signed(d).clamp(range.start, range.end - 1)
                 };
                 &light[place(to(column, dx, &wide), to(row, dy, &high))]
             });
             if other || error > tolerance {
-                let cells = Vec::new();
-                cuts.push(Cut { pixel: pixels.len(), column, row, cells, rays: 0, unresolved: 0 });
+                let (cells, rays, unresolved) = (Vec::new(), 0, 0);
+                let pixel = pixels.len();
+                cuts.push(Cut { pixel, column, row, cells, bright, rays, unresolved });
             }
             pixels.push(Pixel {
                 intensity: center.intensity,
@@ -278,18 +303,33 @@ fn first(
     Ok((pixels, cuts))
 }
 
-/// The estimated error of a pixel with one ray from its neighbours, and whether one of them is of
-/// another kind. Twice the midpoint rule's (D_xx + D_yy)/24 where all is smooth, a
-/// quarter of the range where it is not.
-fn estimate<'a>(at: impl Fn(isize, isize) -> &'a Light) -> (f64, bool) {
+/// What a pixel's first ray and those of its neighbours say.
+struct Estimate {
+    error: f64,
+    /// Whether a neighbour is of another kind.
+    other: bool,
+    /// Largest intensity.
+    bright: f64,
+}
+
+/// Twice the midpoint rule's (D_xx + D_yy)/24 where all is smooth, a quarter of the range where
+/// it is not, and what may hide between lensing bands.
+fn estimate<'a>(at: impl Fn(isize, isize) -> &'a Light) -> Estimate {
     let value = |dx, dy| at(dx, dy).intensity;
     let middle = at(0, 0);
     let second = |a: f64, b: f64| (a - 2.0 * middle.intensity + b).abs();
     let smooth = second(value(-1, 0), value(1, 0)) + second(value(0, -1), value(0, 1));
     let around = || (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy)));
+    let bright = around().map(|(dx, dy)| value(dx, dy)).fold(0.0, f64::max);
     let other = around().any(|(dx, dy)| at(dx, dy).kind != middle.kind);
-    let edge = if other { 0.25 * range(around().map(|(dx, dy)| value(dx, dy))) } else { 0.0 };
-    ((smooth / 12.0).max(edge), other)
+    let mut error = smooth / 12.0;
+    if other {
+        error = error.max(0.25 * range(around().map(|(dx, dy)| value(dx, dy))));
+    }
+    if around().any(|(dx, dy)| at(dx, dy).other_band(middle)) {
+        error = error.max(HIDDEN * bright);
+    }
+    Estimate { error, other, bright }
 }
 
 /// The error that each pixel may have so that the whole picture's relative L1 error stays below
@@ -361,10 +401,11 @@ mod tests {
         let places = Cell::places([0.25, -0.25], 1);
         assert_eq!(places[0], [0.125, -0.375]);
         let quarters = places.map(plane);
-        let cell = Cell::new([0.25, -0.25], 1, &plane([0.25, -0.25]), quarters);
+        let cell = Cell::new([0.25, -0.25], 1, &plane([0.25, -0.25]), quarters, 4.0);
         assert!(cell.error.abs() < 1e-15);
         let bent = |[x, y]: [f64; 2]| Light { intensity: x * x + y * y, ..Light::default() };
-        let cell = Cell::new([0.0; 2], 0, &bent([0.0; 2]), Cell::places([0.0; 2], 0).map(bent));
+        let quarters = Cell::places([0.0; 2], 0).map(bent);
+        let cell = Cell::new([0.0; 2], 0, &bent([0.0; 2]), quarters, 0.5);
         // The mean over the pixel is 1/6, that of the quarters' centres 1/8.
         assert!(cell.error >= 1.0 / 6.0 - 1.0 / 8.0);
     }
