@@ -46,7 +46,7 @@ pub struct Observe {
     #[arg(long, value_name = "TRANSFORM", default_value = "auto")]
     transform: TransformName,
     /// Bound of the fast transform's errors as a share of the flux
-    #[arg(long, value_name = "SHARE", default_value_t = 1e-10, allow_negative_numbers = true)]
+    #[arg(long, value_name = "SHARE", default_value_t = 1e-12, allow_negative_numbers = true)]
     accuracy: f64,
     /// Noise that is added; errors are those of thermal noise in any case
     #[arg(long, value_name = "NOISE", default_value = "none")]

@@ -71,9 +71,10 @@ fn check(movie: &Movie, times_h: &[f64]) -> Result<(), ScheduleError> {
     if frames == 0 || frames != times_h.len() {
         return range("number of images", frames as f64, "1 at least, and as many as times");
     }
-    if let Some(pair) =
-        times_h.windows(2).find(|pair| pair[0] >= pair[1] || pair[0].is_nan() || pair[1].is_nan())
-    {
+    if let Some(time) = times_h.iter().find(|time| !time.is_finite()) {
+        return range("time of an image", *time, "finite");
+    }
+    if let Some(pair) = times_h.windows(2).find(|pair| pair[0] >= pair[1]) {
         return range("time of an image", pair[1], "hours later than the image before");
     }
     Ok(())

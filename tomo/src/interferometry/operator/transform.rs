@@ -1,6 +1,6 @@
 //! The Fourier transform that suits the numbers of pixels and visibilities.
 
-use super::nufft::{cells, width_of};
+use super::nufft::{cells, check_accuracy, width_of};
 use super::{Dtft, ImageGrid, Nufft, Operator, Pulse, Real};
 use crate::interferometry::schedule::ScheduleError;
 use num_complex::Complex;
@@ -39,6 +39,9 @@ impl<T: Real + FftNum> Transform<T> {
         memory_budget: usize,
     ) -> Result<Self, ScheduleError> {
         let fast = |accuracy| Nufft::new(grid, pulse, frames, accuracy).map(Transform::Fast);
+        if let Method::Cheaper(accuracy) = method {
+            check_accuracy::<T>(accuracy)?;
+        }
         match method {
             Method::Fast(accuracy) => fast(accuracy),
             Method::Cheaper(accuracy) if is_fast_cheaper(grid, frames, accuracy) => fast(accuracy),
@@ -145,6 +148,13 @@ mod tests {
         let fast = "fast transform, errors below 1e-10 of the flux";
         assert_eq!(said(256, 5000, Method::Cheaper(1e-10)), fast);
         assert_eq!(said(8, 1, Method::Fast(1e-10)), fast);
+    }
+
+    #[test]
+    fn exact_accuracy_is_checked_even_where_it_is_not_used() {
+        let grid = ImageGrid::new(4, 4, 1e-9).unwrap();
+        let fail = Transform::<f64>::new(grid, Pulse::Delta, &[], Method::Cheaper(7.0), 0);
+        assert!(fail.err().unwrap().to_string().contains("accuracy = 7"));
     }
 
     #[test]

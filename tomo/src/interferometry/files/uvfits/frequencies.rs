@@ -27,14 +27,14 @@ pub fn channels(
     let table = unit.map(Table::new).transpose()?;
     let bands = places.iter().map(|place| place.band + 1).max().unwrap_or(1);
     let cell = |name: &str, band: usize| table.as_ref().and_then(|t| t.number(0, name, band));
-    if let (Some(table), Some(unit)) = (&table, unit) {
-        if table.rows() != 1 || (0..bands).any(|band| cell("IF FREQ", band).is_none()) {
-            let message = format!(
-                "AIPS FQ table: one row with IF FREQ of {bands} IFs is expected, {} rows found",
-                table.rows()
-            );
-            return Err(FileError::byte(unit.offset, message));
-        }
+    if let (Some(table), Some(unit)) = (&table, unit)
+        && (table.rows() != 1 || (0..bands).any(|band| cell("IF FREQ", band).is_none()))
+    {
+        let message = format!(
+            "AIPS FQ table: one row with IF FREQ of {bands} IFs is expected, {} rows found",
+            table.rows()
+        );
+        return Err(FileError::byte(unit.offset, message));
     }
     let channel = |place: &super::layout::Place| {
         let width = cell("CH WIDTH", place.band).filter(|width| *width != 0.0);

@@ -63,14 +63,14 @@ pub fn width_of(accuracy: f64) -> usize {
 pub fn cells(pixels: usize, width: usize) -> usize {
     let least = (2 * pixels).max(2 * width + 6);
     let smooth = |mut n: usize| {
-        for prime in [2, 3, 5] {
+        for prime in [2usize, 3, 5] {
             while n.is_multiple_of(prime) {
                 n /= prime;
             }
         }
         n == 1
     };
-    (least..).filter(|n| n % 2 == 0).find(|n| smooth(*n)).unwrap_or(least)
+    (least..).filter(|n| n.is_multiple_of(2)).find(|n| smooth(*n)).unwrap_or(least)
 }
 
 #[cfg(test)]

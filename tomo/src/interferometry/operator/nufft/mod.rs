@@ -55,6 +55,17 @@ pub struct Nufft<T: FftNum> {
     frames: Vec<Range<usize>>,
 }
 
+/// Refuses accuracies that kernels or rounding cannot reach.
+pub(super) fn check_accuracy<T: Real>(accuracy: f64) -> Result<(), ScheduleError> {
+    let single = T::epsilon().double() > 1e-10;
+    let least = if single { 1e-6 } else { 1e-13 };
+    if (least..=0.1).contains(&accuracy) {
+        return Ok(());
+    }
+    let allowed = "1e-13 to 0.1, in single precision 1e-6 to 0.1";
+    Err(ScheduleError::Range { name: "accuracy", value: accuracy, allowed })
+}
+
 impl<T: Real + FftNum> Nufft<T> {
     /// The transform to `frames[k]`, the (u, v) in wavelengths that see frame k; data are in the
     /// order of frames and of their (u, v).
@@ -67,12 +78,7 @@ impl<T: Real + FftNum> Nufft<T> {
         frames: &[Vec<[f64; 2]>],
         accuracy: f64,
     ) -> Result<Self, ScheduleError> {
-        let single = T::epsilon().double() > 1e-10;
-        let least = if single { 1e-6 } else { 1e-13 };
-        if !(least..=0.1).contains(&accuracy) {
-            let allowed = "1e-13 to 0.1, in single precision 1e-6 to 0.1";
-            return Err(ScheduleError::Range { name: "accuracy", value: accuracy, allowed });
-        }
+        check_accuracy::<T>(accuracy)?;
         let kernel = Kernel::of_accuracy(accuracy);
         let [across, rows] = [grid.width, grid.height].map(|pixels| cells(pixels, kernel.width));
         let margin = kernel.width / 2 + 1;
