@@ -1,10 +1,10 @@
-//! Recovers one orbiting hot spot from its movie: scene "1" of BH-NeRF (Levis et al. 2022), noise-free
-//! images, known axis. Prints PSNR against time.
+//! Recovers orbiting hot spots from their movie: scenes "1" and "4" of BH-NeRF (Levis et al. 2022),
+//! noise-free images, known axis. Prints PSNR against time.
 //!
 //! `cargo run --release -p kerrlight-tomo --example recover_spots -- bhnerf`
 //!
 //! Arguments, all optional: `bhnerf`, `grid`, `linear-grid` or `mlp4d`; steps; first learning rate (it falls
-//! linearly to a hundredth); pixels a step.
+//! linearly to a hundredth); pixels a step; spots (1 or 4).
 
 use kerrlight_geodesic::bundle::Samples;
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
@@ -72,10 +72,31 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
 }
 
-/// One Gaussian spot on its orbit at 3.5 M.
-fn truth(x: [f64; 3]) -> f64 {
-    let (sin, cos) = 60f64.to_radians().sin_cos();
-    (-distance(x, [3.5 * sin, 0.0, 3.5 * cos]).powi(2) / (2.0 * 0.4 * 0.4)).exp()
+/// Gaussian spots on one orbit at 3.5 M.
+struct Truth {
+    centres: Vec<[f64; 3]>,
+}
+
+impl Truth {
+    /// At these 127ths of a turn, against the sense of the axis.
+    fn new(axis: Axis, phases: &[u32]) -> Self {
+        let (sin, cos) = 60f64.to_radians().sin_cos();
+        let start = [[3.5 * sin], [0.0], [3.5 * cos]];
+        let centre = |phase: &u32| {
+            let angles = [-std::f64::consts::TAU * f64::from(*phase) / 127.0];
+            let [mut x, mut y, mut z] = [[0.0]; 3];
+            let points = Coordinates::xyz(&start[0], &start[1], &start[2]);
+            let pulled = CoordinatesMut::xyz(&mut x, &mut y, &mut z);
+            pull_back(axis, Turned { points, angles: &angles }, pulled);
+            [x[0], y[0], z[0]]
+        };
+        Self { centres: phases.iter().map(centre).collect() }
+    }
+
+    fn at(&self, x: [f64; 3]) -> f64 {
+        let spot = |c: &[f64; 3]| (-distance(x, *c).powi(2) / (2.0 * 0.4 * 0.4)).exp();
+        self.centres.iter().map(spot).sum()
+    }
 }
 
 /// A batch of pixels: (ray, frame) pairs and their points at the reference time.
@@ -129,7 +150,7 @@ fn time(frame: usize) -> f32 {
 }
 
 /// All pixels of all frames, frame after frame.
-fn movie(rays: &Rays, axis: Axis) -> Vec<f32> {
+fn movie(rays: &Rays, axis: Axis, truth: &Truth) -> Vec<f32> {
     let mut batch = Batch::default();
     let count = rays.starts.len() - 1;
     let mut pixels = Vec::with_capacity(FRAMES * count);
@@ -138,8 +159,9 @@ fn movie(rays: &Rays, axis: Axis) -> Vec<f32> {
         batch.gather(rays, axis);
         let [x, y, z] = &batch.pulled;
         for ends in batch.starts.windows(2) {
-            let light =
-                |k: usize| f64::from(batch.weights[k]) * truth([x[k], y[k], z[k]].map(f64::from));
+            let light = |k: usize| {
+                f64::from(batch.weights[k]) * truth.at([x[k], y[k], z[k]].map(f64::from))
+            };
             pixels.push((ends[0]..ends[1]).map(light).sum::<f64>() as f32);
         }
     }
@@ -154,7 +176,7 @@ struct Volume {
 }
 
 impl Volume {
-    fn new(region: [f64; 2]) -> Self {
+    fn new(region: [f64; 2], truth: &Truth) -> Self {
         let at = |k: usize| -5.0 + 10.0 * k as f64 / (NODES - 1) as f64;
         let node = |k: usize| [at(k / (NODES * NODES)), at(k / NODES % NODES), at(k % NODES)];
         let nodes: Vec<[f64; 3]> = (0..NODES.pow(3)).map(node).collect();
@@ -162,7 +184,7 @@ impl Volume {
         let counts = |x: &[f64; 3]| (region[0]..=region[1]).contains(&distance(*x, [0.0; 3]));
         Self {
             columns: [vec![0.0; nodes.len()], column(0), column(1), column(2)],
-            truth: nodes.iter().map(|x| truth(*x)).collect(),
+            truth: nodes.iter().map(|x| truth.at(*x)).collect(),
             counts: nodes.iter().map(counts).collect(),
         }
     }
@@ -266,6 +288,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let steps = words.next().map_or(Ok(300), |word| word.parse())?;
     let rate = words.next().map(|word| word.parse::<f64>()).transpose()?;
     let pixels = words.next().map_or(Ok(512), |word| word.parse())?;
+    let phases: &[u32] = match words.next().as_deref() {
+        None | Some("1") => &[0],
+        Some("4") => &[60, 75, 105, 0],
+        Some(other) => return Err(format!("{other} spots: 1 or 4").into()),
+    };
     let (low, high, activation) = ([-5.0; 3], [5.0; 3], Activation::Sigmoid);
     let nodes = [NODES; 3];
     let (representation, usual): (Box<dyn Representation<f32>>, f64) = match name.as_str() {
@@ -284,12 +311,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let (rays, axis) = (trace()?, Axis::new([0.5, 0.0, -0.75f64.sqrt()])?);
     println!("{} points on {} rays", rays.weights.len(), rays.starts.len() - 1);
-    let movie = movie(&rays, axis);
+    let truth = Truth::new(axis, phases);
+    let movie = movie(&rays, axis, &truth);
     let frame =
         |k: usize| movie.chunks(rays.starts.len() - 1).nth(k).map_or(0.0, |f| f.iter().sum());
     let sums: [f32; 2] = [frame(0), frame(64)];
     println!("frames 0 and 64 sum to {sums:?}");
-    let volume = Volume::new(rays.region);
+    let volume = Volume::new(rays.region, &truth);
     println!("an empty volume: {:.2} dB", volume.psnr(|_| 0.0));
     let from = rate.unwrap_or(usual);
     let schedule = Polynomial { from, to: from / 100.0, steps, power: 1.0 }.checked()?;
