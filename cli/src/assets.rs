@@ -37,8 +37,7 @@ pub fn load(scene: &Scene, folder: &Path, outputs: &[&Output]) -> anyhow::Result
         let bytes = read(&path).with_context(|| format!("`mesh.{k}.path`"))?;
         // What a mesh refers to lies beside it.
         let beside = path.parent().unwrap_or(Path::new("."));
-        let resources =
-            |name: &str| read(&beside.join(name)).map_err(|error| format!("{error:#}"));
+        let resources = |name: &str| read(&beside.join(name)).map_err(|error| format!("{error:#}"));
         MeshFile::decode(&bytes, &resources).with_context(name)
     });
     let decoded = Assets { sky, meshes: meshes.collect::<anyhow::Result<_>>()? };

@@ -104,7 +104,8 @@ fn exact_uniform_sphere_on_straight_rays() {
     let stage = Stage::new(&scene, None).unwrap();
     let mut scratch = Scratch::default();
     let thickness = 3e5 * 3e-18 * CENTIMETRES;
-    for (alpha, beta) in [(0.0, 0.0), (1.0, 0.5), (1.9, 0.0), (2.5, 1.0), (-6.0, 4.0), (0.0, 11.9)] {
+    for (alpha, beta) in [(0.0, 0.0), (1.0, 0.5), (1.9, 0.0), (2.5, 1.0), (-6.0, 4.0), (0.0, 11.9)]
+    {
         let b = f64::hypot(alpha, beta);
         let half = (144.0 - b * b).sqrt();
         let chord = if b < 2.0 { half - (4.0 - b * b).sqrt() } else { 2.0 * half };
@@ -160,8 +161,7 @@ fn exact_demagnification_of_further_images() {
         // Outside: image n ≥ 1 lies at offsets of about 300 e^{−nπ} from the critical curve.
         let steps = 4000;
         let offset = |k: f64| 30.0 * (-16.0 * k / f64::from(steps)).exp();
-        let alpha: Vec<f64> =
-            (0..steps).map(|k| critical + offset(f64::from(k) + 0.5)).collect();
+        let alpha: Vec<f64> = (0..steps).map(|k| critical + offset(f64::from(k) + 0.5)).collect();
         let beta = vec![0.0; alpha.len()];
         let mut seen = vec![Glimpse::default(); alpha.len()];
         stage.look_many(&alpha, &beta, &[0.0], &mut Scratch::default(), &mut seen).unwrap();
@@ -181,7 +181,8 @@ fn exact_demagnification_of_further_images() {
 #[test]
 fn exact_disc_without_lensing() {
     let changes = ["effects.lensing=false", "screen.width=33", "screen.height=33"];
-    let picture = rendered(&scene(FACE_ON, &[&changes[..], &["screen.samples_per_pixel=1"]].concat()));
+    let picture =
+        rendered(&scene(FACE_ON, &[&changes[..], &["screen.samples_per_pixel=1"]].concat()));
     let radius = picture.picture.channel("radius").unwrap();
     let size = 26.0 / 33.0;
     for (k, r) in radius.iter().enumerate() {

@@ -3,7 +3,7 @@
 //!
 //! Data flow: [`scene`] → rays ([`kerrlight_geodesic`]) → [`emission`] → [`transport`] →
 //! [`render`] → [`image`] → [`interferometry`]. Fits: [`points`] → [`dynamics`] →
-//! [`representation`] → [`optimise`], on [`simd`] lanes. SI units enter in [`units`] and
+//! [`representation`] → [`optimise`]. SI units enter in [`units`] and
 //! [`interferometry`]. Nothing here knows a path or a terminal: codecs work on bytes.
 
 pub mod dynamics;
@@ -17,6 +17,6 @@ pub mod polarization;
 pub mod render;
 pub mod representation;
 pub mod scene;
-pub mod simd;
+mod simd;
 pub mod transport;
 pub mod units;

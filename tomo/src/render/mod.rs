@@ -22,7 +22,6 @@ use crate::transport::{Assets, Glimpse, Meter, Scratch, Stage};
 use grid::Grid;
 use kerrlight_geodesic::OutOfRange;
 use std::sync::{Mutex, PoisonError};
-use std::sync::{Mutex, PoisonError};
 use tally::Tally;
 
 /// Told how many more rows of pixels are done; returns whether to go on.

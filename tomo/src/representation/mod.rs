@@ -18,8 +18,8 @@ pub use network::{Initialisation, Network, NetworkSettings};
 pub use workspace::Workspace;
 
 pub use crate::points::{Coordinates, CoordinatesMut};
+pub use crate::simd::{InstructionSet, Scalar};
 
-use crate::simd::Scalar;
 use core::ops::Range;
 
 /// Where a vector-Jacobian product goes; it is added to what is there.

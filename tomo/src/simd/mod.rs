@@ -3,6 +3,9 @@
 //! Kernels are written once, for [`Lanes`], and compiled anew inside functions that carry the
 //! instruction set's `#[target_feature]`; a build for any machine therefore uses what the machine
 //! at hand has.
+//!
+//! Private to the crate: a register of an instruction set that the machine lacks must not come into
+//! being.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -14,6 +17,7 @@ mod portable;
 mod scalar;
 
 pub use lanes::{Lanes, MAX_LANES};
+#[cfg(test)]
 pub use portable::Array;
 pub use scalar::Scalar;
 
@@ -39,7 +43,7 @@ impl InstructionSet {
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
             #[cfg(target_arch = "x86_64")]
-            Self::Avx512 => is_x86_feature_detected!("avx512f"),
+            Self::Avx512 => is_x86_feature_detected!("avx512f") && Self::Avx2.available(),
             #[cfg(not(target_arch = "x86_64"))]
             _ => false,
         }
