@@ -114,7 +114,8 @@ impl Raster {
     /// # Errors
     /// If a value is out of range.
     pub fn trial(&self, rays: usize) -> Result<Meter, RenderError> {
-        let mut scratch = Scratch { meter: Meter::running(), ..Scratch::default() };
+        let mut scratch = Scratch::default();
+        scratch.meter = Meter::running();
         let (width, height) = (self.grid.width, self.grid.height);
         // Blocks of neighbours, as in the picture, on a sequence that fills the plane evenly
         // (Roberts 2018: powers of the reciprocal of the plastic number).
