@@ -67,17 +67,22 @@ pub fn scene(text: &str, overrides: &[&str]) -> Scene {
     Scene::parse(&text).unwrap_or_else(|e| panic!("{overrides:?}: {e}"))
 }
 
-/// Renders a scene whose sky picture, if any, lies in the folder of scenes.
+/// Renders a scene whose files, if any, lie in the folder of scenes.
 pub fn render(scene: &Scene) -> Picture {
+    use kerrlight_tomo::emission::{mesh::MeshFile, sky::Panorama};
     use kerrlight_tomo::scene::Sky;
+    use kerrlight_tomo::transport::Assets;
+    let read = |path: &str| std::fs::read(root().join("scenes").join(path)).expect(path);
     let sky = match &scene.sky {
-        Some(Sky::Image(image)) => {
-            let bytes = std::fs::read(root().join("scenes").join(&image.path)).expect("sky");
-            Some(kerrlight_tomo::emission::sky::Panorama::decode(&bytes).expect("a picture"))
-        }
+        Some(Sky::Image(image)) => Some(Panorama::decode(&read(&image.path)).expect("a picture")),
         _ => None,
     };
-    kerrlight_tomo::render::render(scene, sky, &|_| true).expect("a picture").picture
+    let resource = |name: &str| Ok(read(name));
+    let mesh = |path: &str| MeshFile::decode(&read(path), &resource).expect("a mesh");
+    let meshes = scene.mesh.iter().map(|one| mesh(&one.path)).collect();
+    kerrlight_tomo::render::render(scene, Assets { sky, meshes }, &|_| true)
+        .expect("a picture")
+        .picture
 }
 
 /// The message of a run that must fail, leaving `folder` as it was.
