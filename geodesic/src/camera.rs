@@ -63,9 +63,7 @@ impl Camera {
             Motion::Zamo => [0.0; 3],
             Motion::Static => at_rest.local_velocity([0.0; 3]),
             Motion::Keplerian => at_rest.local_velocity([0.0, 0.0, 1.0 / (r * r.sqrt() + a)]),
-            Motion::FreeFall => {
-                [-((1.0 - at_rest.lapse) * (1.0 + at_rest.lapse)).sqrt(), 0.0, 0.0]
-            }
+            Motion::FreeFall => [-((1.0 - at_rest.lapse) * (1.0 + at_rest.lapse)).sqrt(), 0.0, 0.0],
         };
         let allowed = "a radius at which this motion is slower than light";
         check("camera radius", radius, square(velocity) < 1.0, allowed)?;
@@ -235,11 +233,8 @@ impl Camera {
         let energy = of(gamma) * (of(1.0) + along);
         // p + [(γ − 1)(v·p)/v² + γ] v for unit energy in the camera's frame.
         let factor = of(gamma - 1.0) * along / of(square) + of(gamma);
-        let boosted = [
-            p[0] + factor * of(v_r),
-            p[1] + factor * of(v_theta),
-            p[2] + factor * of(v_phi),
-        ];
+        let boosted =
+            [p[0] + factor * of(v_r), p[1] + factor * of(v_theta), p[2] + factor * of(v_phi)];
         boosted.map(|k| k / energy)
     }
 

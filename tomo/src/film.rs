@@ -99,11 +99,7 @@ impl Film {
         Ok(frames)
     }
 
-    fn together(
-        &self,
-        times: &[f64],
-        progress: &Progress<'_>,
-    ) -> Result<Vec<Frame>, RenderError> {
+    fn together(&self, times: &[f64], progress: &Progress<'_>) -> Result<Vec<Frame>, RenderError> {
         let grid = Grid::new(&self.scene);
         let rows: Vec<Vec<RowOfFrame>> = (0..grid.height)
             .into_par_iter()

@@ -1,15 +1,17 @@
 //! `kerrlight render`: from a scene to EXR and PNG.
 
-mod preview;
-mod report;
-mod source;
+pub mod preview;
+pub mod report;
+pub mod source;
 
 use crate::output::{self, Output};
+use crate::overlay::OverlayOptions;
 use crate::progress;
 use anyhow::Context;
 use clap::Args;
 use kerrlight_tomo::image::exr;
-use kerrlight_tomo::image::preview::encode_png;
+use kerrlight_tomo::image::preview as drawing;
+use kerrlight_tomo::image::sheet::sheet;
 use kerrlight_tomo::render::render;
 use preview::PreviewOptions;
 use source::Source;
@@ -22,7 +24,7 @@ pub struct Render {
     /// Scene file (TOML), or an EXR that kerrlight rendered, to render it again; without it
     /// a built-in scene: Sgr A* with a flare and a disc
     scene: Option<PathBuf>,
-    /// Where to write the EXR [default, without --preview either: both, in the current folder
+    /// Where to write the EXR [default, without --preview and --sheet either: EXR and PNG, in the current folder
     /// and named after the scene]
     #[arg(short, long, value_name = "FILE.exr")]
     output: Option<PathBuf>,
@@ -34,6 +36,11 @@ pub struct Render {
     overrides: Vec<String>,
     #[command(flatten)]
     look: PreviewOptions,
+    #[command(flatten)]
+    overlay: OverlayOptions,
+    /// Where to write a contact sheet: all channels with colour bars
+    #[arg(long, value_name = "FILE.png")]
+    sheet: Option<PathBuf>,
 }
 
 impl Render {
@@ -42,8 +49,10 @@ impl Render {
         let source = Source::new(self.scene.as_deref())?;
         let (text, scene) = source.scene(&self.overrides)?;
         let (exr, png) = self.outputs(&source)?;
+        let contact = self.sheet.as_deref().map(|path| Output::new(path, "png")).transpose()?;
+        self.overlay.check(&scene)?;
         let sky = source::sky_path(&scene, &source.folder);
-        for output in [&exr, &png].into_iter().flatten() {
+        for output in [&exr, &png, &contact].into_iter().flatten() {
             for input in self.scene.iter().chain(&sky) {
                 output.spares(input)?;
             }
@@ -64,9 +73,17 @@ impl Render {
             output::print(&format!("{}\n", exr.shown().display()))?;
         }
         if let Some(png) = &png {
-            let bytes = encode_png(&rendered.picture, self.look.look(&scene));
-            png.write(&bytes.context("cannot encode the PNG")?)?;
+            let look = self.look.look(&scene);
+            let white = drawing::white(&rendered.picture, look)?;
+            let drawn = self.overlay.draw(&scene, &rendered.picture, look, white)?;
+            let bytes = drawing::encode(&drawn).context("cannot encode the PNG")?;
+            png.write(&bytes)?;
             output::print(&format!("{}\n", png.shown().display()))?;
+        }
+        if let Some(contact) = &contact {
+            let drawn = sheet(&rendered.picture).context("cannot draw the sheet")?;
+            contact.write(&drawing::encode(&drawn).context("cannot encode the PNG")?)?;
+            output::print(&format!("{}\n", contact.shown().display()))?;
         }
         report::print(&scene, &rendered, start.elapsed().as_secs_f64());
         Ok(())
@@ -76,7 +93,7 @@ impl Render {
         let check = |path: &Option<PathBuf>, extension| {
             path.as_deref().map(|path| Output::new(path, extension)).transpose()
         };
-        if self.output.is_some() || self.preview.is_some() {
+        if self.output.is_some() || self.preview.is_some() || self.sheet.is_some() {
             return Ok((check(&self.output, "exr")?, check(&self.preview, "png")?));
         }
         let stem = match &self.scene {

@@ -13,15 +13,20 @@ pub fn attributes(scene: &Scene, text: &str, rendered: &Rendered) -> exr::Attrib
         entry("scene_resolved", scene.to_toml()),
         entry("intensity_unit", rendered.intensity_unit.to_owned()),
         entry("intensity_per_scene_unit", rendered.unit_factor.to_string()),
-        entry("pixel_size_m", scene.pixel_size().to_string()),
+        entry(pixel_unit(scene), scene.pixel_size().to_string()),
         entry("unresolved_rays", rendered.unresolved.to_string()),
         entry("channels", CHANNELS.to_owned()),
     ]
     .into()
 }
 
+/// What the size of a pixel is called: in M, or on the picture plane of a camera.
+pub fn pixel_unit(scene: &Scene) -> &'static str {
+    if scene.camera.is_some() { "pixel_size_plane" } else { "pixel_size_m" }
+}
+
 /// The legend of the channels, for whoever opens the file.
-const CHANNELS: &str = "R, G, B: linear light, emission in scene units and sky. \
+pub const CHANNELS: &str = "R, G, B: linear light, emission in scene units and sky. \
 intensity: mean over the pixel, without the sky. \
 Of the pixel's central ray: redshift: intensity-weighted g = nu_obs/nu_em (0: no emission); \
 crossings: of the equatorial plane outside the horizon; \

@@ -79,7 +79,11 @@ fn shown(value: f64) -> String {
 }
 
 impl Invalid {
-    pub(super) fn new(key: impl Into<String>, value: impl ToString, allowed: impl Into<String>) -> Self {
+    pub(super) fn new(
+        key: impl Into<String>,
+        value: impl ToString,
+        allowed: impl Into<String>,
+    ) -> Self {
         Invalid { key: key.into(), value: Some(value.to_string()), allowed: allowed.into() }
     }
 
@@ -140,7 +144,12 @@ fn line_at(text: &str, offset: usize) -> usize {
 }
 
 /// Refuses `value` unless `ok`.
-pub(super) fn number(key: impl Into<String>, value: f64, ok: bool, allowed: &str) -> Result<(), Invalid> {
+pub(super) fn number(
+    key: impl Into<String>,
+    value: f64,
+    ok: bool,
+    allowed: &str,
+) -> Result<(), Invalid> {
     if ok { Ok(()) } else { Err(Invalid::new(key, shown(value), allowed)) }
 }
 

@@ -84,8 +84,7 @@ impl Beam {
         let [x, y, _] = self.direction;
         let s = x.hypot(y);
         let right = if s > 0.0 { [y / s, -x / s, 0.0] } else { [0.0, -1.0, 0.0] };
-        let across: [f64; 2] =
-            core::array::from_fn(|k| dot(self.axes[k], right) * self.spread[k]);
+        let across: [f64; 2] = core::array::from_fn(|k| dot(self.axes[k], right) * self.spread[k]);
         let along: [f64; 2] = core::array::from_fn(|k| {
             (1.0 - dot(self.axes[k], right).powi(2)).max(0.0).sqrt() * self.spread[k]
         });

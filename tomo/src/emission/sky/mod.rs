@@ -51,9 +51,7 @@ impl SkyModel {
         match self {
             SkyModel::Checker(checker) => beam.mean(|n| look_checker(checker, n)),
             SkyModel::Stars(stars) => stars.gather(beam),
-            SkyModel::Picture(picture, brightness) => {
-                picture.gather(beam).map(|c| c * brightness)
-            }
+            SkyModel::Picture(picture, brightness) => picture.gather(beam).map(|c| c * brightness),
         }
     }
 

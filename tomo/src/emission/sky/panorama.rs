@@ -128,7 +128,8 @@ impl Panorama {
         let (polar, azimuth) = (x.hypot(y).atan2(z), y.atan2(x));
         let [across, along] = beam.reach();
         let row = |angle: f64| (angle / PI * self.height as f64 - 0.5).clamp(0.0, self.last_row());
-        let (top, bottom) = (row(polar - along).floor() as usize, row(polar + along).ceil() as usize);
+        let (top, bottom) =
+            (row(polar - along).floor() as usize, row(polar + along).ceil() as usize);
         let (mut sum, mut total) = ([0.0; 3], 0.0);
         for row in top..=bottom {
             let theta = PI * (row as f64 + 0.5) / self.height as f64;
@@ -166,7 +167,8 @@ impl Panorama {
             (x, y) = (x * turn_cos - y * turn_sin, x * turn_sin + y * turn_cos);
             if weight > 0.0 {
                 *total += weight;
-                let pixel = self.pixels[row * self.width + k.rem_euclid(self.width as i64) as usize];
+                let pixel =
+                    self.pixels[row * self.width + k.rem_euclid(self.width as i64) as usize];
                 for (sum, c) in sum.iter_mut().zip(pixel) {
                     *sum += weight * f64::from(c);
                 }
@@ -229,8 +231,7 @@ mod tests {
             [theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos()]
         };
         let of = |f: &dyn Fn([f64; 3]) -> [f64; 3]| {
-            let pixels =
-                (0..width * height).map(|k| f(direction(k)).map(|c| c as f32)).collect();
+            let pixels = (0..width * height).map(|k| f(direction(k)).map(|c| c as f32)).collect();
             Panorama { width, height, pixels, coarser: Vec::new() }.with_pyramid()
         };
         let square = of(&|d| d.map(|x| x * x));
