@@ -1,7 +1,7 @@
 //! `kerrlight convert`: visibilities from one format to another.
 
 use crate::interferometry::arguments::{self, Source};
-use crate::interferometry::{self, ObservationFile};
+use crate::interferometry::{self, ObservationFile, Written};
 use anyhow::bail;
 use clap::Args;
 use kerrlight_tomo::interferometry::observation::{Flags, Observation};
@@ -15,9 +15,18 @@ pub struct Convert {
     /// Where to write; the name's ending tells the format
     #[arg(value_name = "OUTPUT.uvfits|.txt|.csv")]
     output: PathBuf,
+    /// Format to write [default: by the name's ending]
+    #[arg(long, value_name = "FORMAT")]
+    format: Option<Written>,
+    /// Tell source, date, frequency, stations and history in lines of a CSV that start with `#`
+    #[arg(long)]
+    comments: bool,
     /// Average coherently over this many seconds
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     average: Option<f64>,
+    /// Average coherently over all spectral channels and IFs
+    #[arg(long)]
+    average_channels: bool,
     /// Merge the hands into Stokes I
     #[arg(long)]
     stokes_i: bool,
@@ -53,7 +62,7 @@ pub struct Convert {
 impl Convert {
     /// Converts.
     pub fn run(&self) -> anyhow::Result<()> {
-        let output = ObservationFile::new(&self.output)?;
+        let output = ObservationFile::new(&self.output, self.format, self.comments)?;
         output.spares(&self.input)?;
         if let Some(seconds) = self.average.filter(|s| !(*s > 0.0 && s.is_finite())) {
             bail!("--average {seconds} is not allowed: positive seconds");
@@ -73,6 +82,9 @@ impl Convert {
         let mut observation = selection.observation;
         if self.stokes_i {
             observation = observation.total_intensity();
+        }
+        if self.average_channels {
+            observation = observation.averaged_over_channels();
         }
         if let Some(seconds) = self.average {
             observation = observation.averaged(seconds);

@@ -4,11 +4,13 @@ use crate::interferometry::plots::{self, PlotFile};
 use crate::output;
 use anyhow::{Context, bail};
 use clap::Args;
-use kerrlight_tomo::image::{Picture, exr};
+use kerrlight_tomo::image::exr::{self, Attributes, ChannelSurvey, Survey};
 use kerrlight_tomo::interferometry::files::{self, Format};
 use kerrlight_tomo::interferometry::observation::{Basis, Observation};
+use kerrlight_tomo::render::CHANNELS;
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::io::{BufReader, Read};
+use std::path::{Path, PathBuf};
 
 /// Arguments of `kerrlight inspect`.
 #[derive(Debug, Args)]
@@ -26,36 +28,47 @@ impl Inspect {
     pub fn run(&self) -> anyhow::Result<()> {
         let name = || self.file.display().to_string();
         let plot = self.plot.as_deref().map(PlotFile::new).transpose()?;
-        let bytes = output::read(&self.file)?;
-        if !bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
-            let is_exr = self.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
-            if is_exr {
-                bail!("{}: not an EXR file (its first bytes are not an EXR's)", name());
+        if is_exr(&self.file)? {
+            if plot.is_some() {
+                bail!("--plot is for visibilities, {} is a picture", name());
             }
-            let (format, observation) = files::decode(&bytes).with_context(name)?;
-            output::print(&describe(&name(), format, &observation))?;
-            if let Some(plot) = plot {
-                plot.spares(&self.file)?;
-                plot.write(plots::amplitudes(&observation, &observation.source))?;
-            }
-            return Ok(());
+            return picture(&self.file);
         }
-        if plot.is_some() {
-            bail!("--plot is for visibilities, {} is a picture", name());
+        if self.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
+            bail!("{}: not an EXR file (its first bytes are not an EXR's)", name());
         }
-        let (picture, attributes) =
-            exr::decode(&bytes).with_context(|| format!("{}: damaged or unusual EXR", name()))?;
-        let mut text =
-            format!("{}: EXR, {} x {} pixels\n\n", name(), picture.width, picture.height);
-        text += &channel_table(&picture);
-        for (name, value) in &attributes {
-            text += &format!("\n{name}:{}\n", indented(value));
+        let (format, observation) = files::decode(&output::read(&self.file)?).with_context(name)?;
+        output::print(&describe(&name(), format, &observation))?;
+        if let Some(plot) = plot {
+            plot.spares(&self.file)?;
+            plot.write(plots::amplitudes(&observation, &observation.source))?;
         }
-        if attributes.is_empty() {
-            text += "\nno settings: not rendered by kerrlight, or stripped by another program\n";
-        }
-        output::print(&text)
+        Ok(())
     }
+}
+
+/// Whether a file starts as an EXR does.
+fn is_exr(path: &Path) -> anyhow::Result<bool> {
+    let mut start = Vec::new();
+    let mut file = output::open(path)?.take(4);
+    file.read_to_end(&mut start).with_context(|| format!("cannot read {}", path.display()))?;
+    Ok(start == [0x76, 0x2f, 0x31, 0x01])
+}
+
+/// Prints what a picture holds.
+fn picture(path: &Path) -> anyhow::Result<()> {
+    let name = path.display();
+    let file = BufReader::new(output::open(path)?);
+    let survey = exr::survey(file).with_context(|| format!("{name}: damaged or unusual EXR"))?;
+    let mut text = format!("{name}: EXR, {} x {} pixels\n\n", survey.width, survey.height);
+    text += &channel_table(&survey);
+    for (name, value) in &survey.attributes {
+        text += &format!("\n{name}:{}\n", indented(value));
+    }
+    if survey.attributes.is_empty() {
+        text += "\nno settings: not rendered by kerrlight, or stripped by another program\n";
+    }
+    output::print(&text)
 }
 
 /// What there is to know about visibilities.
@@ -92,6 +105,13 @@ fn describe(name: &str, format: Format, observation: &Observation) -> String {
     );
     line("frequency", ghz(observation.frequency_hz));
     line("bandwidth", ghz(observation.bandwidth_hz));
+    if !observation.channels.is_empty() {
+        let all = observation.channels.iter().map(|c| (c.frequency_hz / 1e9).to_string());
+        let shown: Vec<String> = all.take(16).collect();
+        let rest = if observation.channels.len() > 16 { ", ..." } else { "" };
+        let count = observation.channels.len();
+        line("channels", format!("{count}: {}{rest} GHz", shown.join(", ")));
+    }
     line("baselines", format!("{}, {} rows", baselines.len(), rows.len()));
     line("products", products(observation));
     text + &station_table(observation) + &history(observation)
@@ -147,20 +167,24 @@ fn indented(value: &str) -> String {
     value.trim_end().lines().map(|line| format!("\n    {line}")).collect()
 }
 
-fn channel_table(picture: &Picture) -> String {
+fn channel_table(survey: &Survey) -> String {
     let mut table = format!(
-        "{:<12}{:>15}{:>15}{:>15}{:>12}\n",
+        "{:<12}{:>15}{:>15}{:>15}{:>12}  unit\n",
         "channel", "least", "most", "mean", "not finite"
     );
-    for channel in &picture.channels {
-        let finite = || channel.values.iter().filter(|v| v.is_finite());
-        let (least, most) = finite()
-            .fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
-        let count = finite().count();
-        let mean = finite().map(|v| f64::from(*v)).sum::<f64>() / count.max(1) as f64;
-        let bad = channel.values.len() - count;
-        let name = &channel.name;
-        table += &format!("{name:<12}{least:>15.6e}{most:>15.6e}{mean:>15.6e}{bad:>12}\n");
+    for channel in &survey.channels {
+        let ChannelSurvey { name, least, most, mean, not_finite } = channel;
+        table += &format!("{name:<12}{least:>15.6e}{most:>15.6e}{mean:>15.6e}{not_finite:>12}");
+        table += &format!("  {}\n", unit(name, &survey.attributes));
     }
     table
+}
+
+/// The unit of a channel, where kerrlight wrote it.
+fn unit<'a>(name: &str, attributes: &'a Attributes) -> &'a str {
+    let kind = CHANNELS.iter().find(|kind| kind.name == name);
+    match kind.map(|kind| kind.unit) {
+        Some(unit) if !attributes.is_empty() => attributes.get(unit).map_or(unit, String::as_str),
+        _ => "",
+    }
 }

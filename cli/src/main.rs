@@ -1,6 +1,7 @@
 //! `kerrlight`: from scene files to lensed images of black holes.
 
 mod accuracy;
+mod assets;
 mod columns;
 mod convert;
 mod critical_curve;

@@ -1,24 +1,35 @@
 //! `kerrlight observe`: what an array of telescopes would see.
 
 use crate::interferometry::arguments::{self, Observing};
-use crate::interferometry::{ObservationFile, image_files, scene_movie};
+use crate::interferometry::movie_files::{self, FrameTimes};
+use crate::interferometry::{ObservationFile, scene_movie};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use kerrlight_tomo::interferometry::noise::{
     GainErrors, ScatteringKernel, add_thermal_noise, apply_gains, scatter,
 };
 use kerrlight_tomo::interferometry::observation::Observation;
-use kerrlight_tomo::interferometry::operator::Pulse;
-use kerrlight_tomo::interferometry::{schedule, simulate};
+use kerrlight_tomo::interferometry::operator::{Method, Pulse};
+use kerrlight_tomo::interferometry::schedule;
+use kerrlight_tomo::interferometry::simulate::{self, Movie};
 use std::path::PathBuf;
 
 /// Arguments of `kerrlight observe`.
 #[derive(Debug, Args)]
 pub struct Observe {
     /// What is seen: a grid of Jy/pixel (.csv, first line north, first column east), an array or
-    /// movie (.npy, .npz: (frames,) height, width), an image (.fits), a picture (.exr) or a scene
-    /// (.toml)
-    input: PathBuf,
+    /// movie (.npy, .npz: (frames,) height, width), an image (.fits), a picture (.exr), a movie of
+    /// pictures (a folder of .exr, a pattern such as 'frame_%04d.exr' or 'frames/*.exr', or several
+    /// files), or a scene (.toml)
+    #[arg(required = true, value_name = "INPUT")]
+    inputs: Vec<PathBuf>,
+    /// When the images of a movie show the source: `scans` (image k at scan k; needed only where the
+    /// images' own times disagree), `own` (EXR of kerrlight: the scene's times, the first being the
+    /// first scan; .npz: hours of UTC named `times`), hours of UTC of the first and of the last, or
+    /// a file with an hour a line. Between images the source changes linearly
+    #[arg(long, value_name = "scans|own|FROM-TO|FILE", value_parser = movie_files::frame_times,
+          allow_hyphen_values = true)]
+    frame_times: Option<FrameTimes>,
     /// Width of the image on the sky in microarcseconds, for files that do not tell
     #[arg(long, value_name = "UAS", allow_negative_numbers = true)]
     fov_uas: Option<f64>,
@@ -30,6 +41,13 @@ pub struct Observe {
     /// Shape of a pixel
     #[arg(long, value_name = "PULSE", default_value = "triangle")]
     pulse: PulseName,
+    /// Fourier transform: the sum over pixels, a fast transform, or which of them is expected to be
+    /// faster
+    #[arg(long, value_name = "TRANSFORM", default_value = "auto")]
+    transform: TransformName,
+    /// Bound of the fast transform's errors as a share of the flux
+    #[arg(long, value_name = "SHARE", default_value_t = 1e-12, allow_negative_numbers = true)]
+    accuracy: f64,
     /// Noise that is added; errors are those of thermal noise in any case
     #[arg(long, value_name = "NOISE", default_value = "none")]
     noise: Noise,
@@ -48,6 +66,9 @@ pub struct Observe {
     /// Blur by the scattering towards Sgr A*
     #[arg(long)]
     scatter_sgra: bool,
+    /// Tell source, date, frequency, stations and history in lines of a CSV that start with `#`
+    #[arg(long)]
+    comments: bool,
     /// Where to write the visibilities; the name's ending tells the format
     #[arg(short, long, value_name = "FILE.uvfits|.txt|.csv")]
     output: PathBuf,
@@ -59,6 +80,16 @@ enum Noise {
     None,
     /// From the stations' SEFDs, bandwidth and integration time
     Thermal,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum TransformName {
+    /// The faster one for these pixels and visibilities
+    Auto,
+    /// The sum over pixels
+    Direct,
+    /// Fast Fourier transform and a kernel, within --accuracy
+    Fast,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -74,8 +105,12 @@ enum PulseName {
 impl Observe {
     /// Observes.
     pub fn run(&self) -> anyhow::Result<()> {
-        let output = ObservationFile::new(&self.output)?;
-        output.spares(&self.input)?;
+        let output = ObservationFile::new(&self.output, None, self.comments)?;
+        let files = self.files()?;
+        files.iter().try_for_each(|file| output.spares(file))?;
+        if let Some(FrameTimes::File(path)) = &self.frame_times {
+            output.spares(path)?;
+        }
         output.spares(self.array.as_ref())?;
         let seed = self.seed()?;
         let array = arguments::array_of(&self.array)?;
@@ -87,20 +122,57 @@ impl Observe {
             bail!("no two stations see {} at any time", source.name);
         }
         let times_h = schedule.hours_utc(setup.ut1)?;
-        let is_scene = self.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
-        let movie = match (is_scene, self.fov_uas) {
-            (true, Some(_)) => bail!("--fov-uas is not for scenes, which have a field of view"),
-            (true, None) => scene_movie::read(&self.input, &times_h)?,
-            (false, fov_uas) => image_files::read(&self.input, fov_uas)?,
-        };
-        let fill = simulate::fill(&mut observation, &movie, self.pulse(), &times_h);
-        fill.with_context(|| self.input.display().to_string())?;
+        let (movie, frames_h, said) = self.movie(&files, &times_h)?;
+        let fill = simulate::fill(&mut observation, &movie, self.pulse(), &frames_h, self.method());
+        let transform = fill.with_context(|| self.shown())?;
         self.spoil(&mut observation, seed)?;
-        observation.history = self.history();
+        observation.history = self.history(said, transform);
         output.write(&observation)?;
         let count = observation.rows.len();
         eprintln!("{count} visibilities; {}", observation.history.join("; "));
         Ok(())
+    }
+
+    /// All files of the input.
+    fn files(&self) -> anyhow::Result<Vec<PathBuf>> {
+        let mut all = Vec::new();
+        for input in &self.inputs {
+            all.extend(movie_files::files(input)?);
+        }
+        Ok(all)
+    }
+
+    /// The inputs, in one line.
+    fn shown(&self) -> String {
+        let first = self.inputs[0].display();
+        match self.inputs.len() {
+            1 => first.to_string(),
+            n => format!("{first} and {} more", n - 1),
+        }
+    }
+
+    /// Images, the hours of UTC at which they show the source, and how these came about.
+    fn movie(
+        &self,
+        files: &[PathBuf],
+        scans_h: &[f64],
+    ) -> anyhow::Result<(Movie, Vec<f64>, String)> {
+        let is_scene =
+            |path: &PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+        if !files.iter().any(is_scene) {
+            let (movie, own) = movie_files::read(files, self.fov_uas)?;
+            let choice = self.frame_times.as_ref();
+            let (times, said) = movie_files::times(movie.frames(), &own, choice, scans_h)
+                .with_context(|| self.shown())?;
+            return Ok((movie, times, said));
+        }
+        if self.fov_uas.is_some() || self.frame_times.is_some() {
+            bail!("--fov-uas and --frame-times are not for scenes, which have field and times");
+        }
+        let [scene] = files else { bail!("a scene is observed alone, without other files") };
+        let movie = scene_movie::read(scene, scans_h)?;
+        let times = scans_h[..movie.frames()].to_vec();
+        Ok((movie, times, "rendered at the time of each scan".to_owned()))
     }
 
     fn gains(&self) -> GainErrors {
@@ -130,6 +202,14 @@ impl Observe {
         }
     }
 
+    fn method(&self) -> Method {
+        match self.transform {
+            TransformName::Auto => Method::Cheaper(self.accuracy),
+            TransformName::Direct => Method::Direct,
+            TransformName::Fast => Method::Fast(self.accuracy),
+        }
+    }
+
     fn pulse(&self) -> Pulse {
         match self.pulse {
             PulseName::Delta => Pulse::Delta,
@@ -153,14 +233,16 @@ impl Observe {
     }
 
     /// Every number that decided the data.
-    fn history(&self) -> Vec<String> {
+    fn history(&self, images: String, transform: String) -> Vec<String> {
         let mut lines = vec![
             concat!("kerrlight ", env!("CARGO_PKG_VERSION"), " observe").to_owned(),
-            format!("input {}", self.input.display()),
+            format!("input {}", self.shown()),
+            images,
         ];
         lines.extend(self.fov_uas.map(|fov| format!("field of view {fov} uas")));
         lines.extend(self.observing.history(&self.array));
         lines.push(format!("pulse {:?}", self.pulse));
+        lines.push(transform);
         if self.scatter_sgra {
             lines.push("scattering of Sgr A* (Johnson et al. 2018)".to_owned());
         }

@@ -1,7 +1,8 @@
 //! Files that appear whole or not at all.
 
 use anyhow::{Context, bail};
-use std::io::Write;
+use std::fs::File;
+use std::io::{BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// No input is as large as this.
@@ -75,12 +76,30 @@ impl Output {
 
     /// Writes the whole file beside its place and moves it there.
     pub fn write(&self, bytes: &[u8]) -> anyhow::Result<()> {
-        let shown = self.path.display();
-        let mut file = self.beside()?;
-        file.write_all(bytes).with_context(|| format!("cannot write {shown}"))?;
-        file.as_file().sync_all().with_context(|| format!("cannot write {shown}"))?;
-        file.persist(&self.path).with_context(|| format!("cannot write {shown}"))?;
+        self.write_with(|file| Ok(file.write_all(bytes)?))
+    }
+
+    /// The same for what is not in memory as a whole: `write` is given the file beside its place.
+    pub fn write_with(
+        &self,
+        write: impl FnOnce(&mut BufWriter<&File>) -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
+        let name = || format!("cannot write {}", self.path.display());
+        let file = self.beside()?;
+        let mut buffer = BufWriter::new(file.as_file());
+        write(&mut buffer).with_context(name)?;
+        buffer.flush().with_context(name)?;
+        drop(buffer);
+        file.as_file().sync_all().with_context(name)?;
+        file.persist(&self.path).with_context(name)?;
         Ok(())
+    }
+
+    /// Where what is needed to go on with an interrupted run is kept: beside the file itself.
+    pub fn partial(&self) -> PathBuf {
+        let mut name = self.path.clone().into_os_string();
+        name.push(".partial");
+        name.into()
     }
 
     /// The place, as it was given.
@@ -97,8 +116,8 @@ pub fn print(text: &str) -> anyhow::Result<()> {
     }
 }
 
-/// The bytes of a file, with an error that names it.
-pub fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
+/// A regular file to read, with an error that names it.
+pub fn open(path: &Path) -> anyhow::Result<File> {
     let shown = path.display();
     let metadata = std::fs::metadata(path).with_context(|| format!("cannot read {shown}"))?;
     if metadata.is_dir() {
@@ -107,10 +126,20 @@ pub fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
     if !metadata.is_file() {
         bail!("{shown} is not a regular file");
     }
-    if metadata.len() > LARGEST_INPUT {
-        bail!("{shown} is larger than {LARGEST_INPUT} bytes");
+    File::open(path).with_context(|| format!("cannot read {shown}"))
+}
+
+/// The bytes of a file, with an error that names it.
+pub fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
+    let mut file = open(path)?;
+    let name = || format!("cannot read {}", path.display());
+    let length = file.metadata().with_context(name)?.len();
+    if length > LARGEST_INPUT {
+        bail!("{} is larger than {LARGEST_INPUT} bytes", path.display());
     }
-    std::fs::read(path).with_context(|| format!("cannot read {shown}"))
+    let mut bytes = Vec::with_capacity(length as usize);
+    file.read_to_end(&mut bytes).with_context(name)?;
+    Ok(bytes)
 }
 
 /// The text of a file, with an error that names it.

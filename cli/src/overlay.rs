@@ -28,9 +28,12 @@ pub struct OverlayOptions {
 /// Ticks from left to right.
 const TICKS_ACROSS: usize = 28;
 
+/// The channels that ticks are drawn from.
+const POLARIZATION: [&str; 2] = ["Q", "U"];
+
 impl OverlayOptions {
-    /// Refuses what a scene does not have.
-    pub fn check(&self, scene: &Scene) -> anyhow::Result<()> {
+    /// Refuses what a scene does not have, whose channels are `names`.
+    pub fn check(&self, scene: &Scene, names: &[&str]) -> anyhow::Result<()> {
         for (given, name) in
             [(self.scale_bar, "--scale-bar"), (self.critical_curve, "--critical-curve")]
         {
@@ -38,25 +41,42 @@ impl OverlayOptions {
                 bail!("{name} needs a screen in M: the scene has a camera with angles");
             }
         }
+        if self.critical_curve && !scene.effects.lensing {
+            bail!("--critical-curve needs `effects.lensing`: straight rays have none");
+        }
+        if self.ticks && POLARIZATION.iter().any(|name| !names.contains(name)) {
+            bail!("--ticks: the picture has no channels Q and U");
+        }
         Ok(())
     }
 
-    /// The picture in colours with all marks; `white` is the brightest value.
+    /// Whether any mark is asked for.
+    pub fn any(&self) -> bool {
+        self.scale_bar || self.critical_curve || self.ticks
+    }
+
+    /// The channels that marks are drawn from.
+    pub fn channels(&self) -> &'static [&'static str] {
+        if self.ticks { &POLARIZATION } else { &[] }
+    }
+
+    /// The picture in colours with all marks; `white` is the brightest value. A pixel of the
+    /// picture may be the mean of `reduced` × `reduced` of the scene's.
     pub fn draw(
         &self,
         scene: &Scene,
-        picture: &Picture,
+        (picture, reduced): (&Picture, usize),
         look: Look,
         white: f32,
     ) -> anyhow::Result<RgbImage> {
         let drawn = preview::draw(picture, look, white).context("cannot draw the picture")?;
-        if !(self.scale_bar || self.critical_curve || self.ticks) {
+        if !self.any() {
             return Ok(drawn);
         }
         let mut canvas = Canvas::of(&drawn).context("the picture is too large to draw on")?;
-        let size = [picture.width, picture.height];
-        // The drawn picture may have fewer pixels than the scene's.
-        let pixel = scene.field_of_view_m() / picture.width as f64;
+        // The last boxes of a reduced picture may be cut: the field ends within their pixels.
+        let size = [scene.screen.width, scene.screen.height].map(|n| f64::from(n) / reduced as f64);
+        let pixel = scene.pixel_size() * reduced as f64;
         if self.critical_curve {
             let curve = [scene.hole.spin, scene.observer.inclination_deg];
             overlay::critical_curve(&mut canvas, size, pixel, curve);

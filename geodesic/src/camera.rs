@@ -1,8 +1,10 @@
 //! Observers at a finite radius with a local frame and a perspective lens.
 
 use crate::error::{OutOfRange, check};
+use crate::frame::ZamoFrame;
 use crate::kerr::Kerr;
 use crate::observer::{Inclination, Ray};
+use crate::orbits;
 use crate::radial::RadialPotential;
 use crate::scalar::Elementary;
 
@@ -58,11 +60,13 @@ impl Camera {
         motion: Motion,
     ) -> Result<Self, OutOfRange> {
         let at_rest = Self::at_rest(hole, inclination, radius)?;
-        let (a, r) = (hole.spin(), radius);
         let velocity = match motion {
             Motion::Zamo => [0.0; 3],
             Motion::Static => at_rest.local_velocity([0.0; 3]),
-            Motion::Keplerian => at_rest.local_velocity([0.0, 0.0, 1.0 / (r * r.sqrt() + a)]),
+            Motion::Keplerian => {
+                let rate = orbits::keplerian_angular_velocity(hole, radius);
+                at_rest.local_velocity([0.0, 0.0, rate])
+            }
             Motion::FreeFall => [-((1.0 - at_rest.lapse) * (1.0 + at_rest.lapse)).sqrt(), 0.0, 0.0],
         };
         let allowed = "a radius at which this motion is slower than light";
@@ -90,12 +94,13 @@ impl Camera {
 
     /// The camera of zero angular momentum.
     fn at_rest(hole: &Kerr, inclination: Inclination, radius: f64) -> Result<Self, OutOfRange> {
-        let ok = radius.is_finite() && radius > hole.horizon();
-        check("camera radius", radius, ok, "a finite number outside the horizon")?;
-        let (a, r, s) = (hole.spin(), radius, inclination.sin());
-        let sigma = hole.sigma(r, inclination.cos());
-        let delta = hole.delta(r);
-        let area = (r * r + a * a).powi(2) - a * a * delta * s * s;
+        let frame = ZamoFrame::at(hole, radius, inclination.sin(), inclination.cos());
+        let frame = frame.ok_or(OutOfRange {
+            field: "camera radius",
+            value: radius,
+            allowed: "a finite number outside the horizon",
+        })?;
+        let ZamoFrame { lapse, drag, girth, .. } = frame;
         Ok(Camera {
             hole: *hole,
             inclination,
@@ -103,9 +108,9 @@ impl Camera {
             azimuth: 0.0,
             velocity: [0.0; 3],
             axes: [[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [-1.0, 0.0, 0.0]],
-            lapse: (delta * sigma / area).sqrt(),
-            drag: 2.0 * a * r / area,
-            girth: (area / sigma).sqrt(),
+            lapse,
+            drag,
+            girth,
         })
     }
 

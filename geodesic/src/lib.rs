@@ -137,6 +137,10 @@
 //! [`flow`] and [`plunge`] have the redshift factors of orbiting and falling matter, [`orbits`] the
 //! special radii, [`analytic`] the critical curve, lensing bands and crossings in closed form.
 //!
+//! # Frames and polarisation
+//! A [`ZamoFrame`] has the components of momenta and velocities that a local observer measures, and the
+//! Walker–Penrose constant of a polarised photon; a [`ScreenPoint`] carries polarisation to the screen.
+//!
 //! # Features
 //! `rayon` (default): all cores. `affine`: an independent tracer in the affine parameter. `capi`:
 //! the functions of `include/kerrlight.h` for C.
@@ -162,6 +166,7 @@ mod elliptic_rays;
 mod error;
 pub mod flow;
 pub mod footprint;
+mod frame;
 mod integrator;
 mod kerr;
 mod length;
@@ -193,6 +198,7 @@ pub use columns::{Bundle, Points};
 pub use compensated::Double;
 pub use dual::Dual;
 pub use error::OutOfRange;
+pub use frame::{ScreenPoint, ZamoFrame};
 pub use integrator::Integrator;
 pub use kerr::Kerr;
 pub use observer::{Inclination, Observer, Ray};

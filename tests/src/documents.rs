@@ -49,3 +49,13 @@ fn regress_verbs_in_documents_exist() {
         }
     }
 }
+
+/// The table of channels in the documents is that of the program.
+#[test]
+fn regress_channels_are_documented() {
+    let text = std::fs::read_to_string(root().join("docs/scenes.md")).unwrap();
+    let table = text.split("## Channels of the EXR").nth(1).unwrap();
+    for channel in &kerrlight_tomo::render::CHANNELS {
+        assert!(table.contains(&format!("`{}`", channel.name)), "{}", channel.name);
+    }
+}

@@ -184,10 +184,8 @@ fn exact_uv_writes_table_and_pictures() {
     assert!(png.width() > 500 && colors.len() > 8, "{}", colors.len());
 }
 
-/// Frames of a scene: a movie whose first frame has the flux of the scene, and that moves.
-#[test]
-fn exact_scene_through_an_array() {
-    let folder = tempfile::tempdir().unwrap();
+/// A small scene with hot spots that has a flux in Jy.
+fn write_scene(folder: &Path) {
     let scene = std::fs::read_to_string(root().join("scenes/hot_spots.toml")).unwrap();
     let scene = [
         "screen.width=24",
@@ -197,18 +195,99 @@ fn exact_scene_through_an_array() {
     ]
     .iter()
     .fold(scene, |text, change| kerrlight_tomo::scene::apply_override(&text, change).unwrap());
-    std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
-    let arguments =
-        ["observe", "scene.toml", "--array", "EHT2017", "--source", "sgra", "--mjd", "57850"];
-    let more = ["--utc", "12.0-12.5", "--frames", "3", "--tint", "60", "-o", "scene.csv"];
-    succeed(folder.path(), &[&arguments[..], &more[..]].concat());
+    std::fs::write(folder.join("scene.toml"), scene).unwrap();
+}
+
+/// Three scans in half an hour.
+const SHORT: [&str; 12] = [
+    "--array",
+    "EHT2017",
+    "--source",
+    "sgra",
+    "--mjd",
+    "57850",
+    "--utc",
+    "12.0-12.5",
+    "--frames",
+    "3",
+    "--tint",
+    "60",
+];
+
+/// ALMA–`other` at scan k of `SHORT`.
+fn alma(data: &Observation, k: usize, other: &str) -> Complex64 {
+    find(data, 12.0 + k as f64 / 6.0, ["ALMA", other]).1
+}
+
+/// Frames of a scene: a movie whose first frame has the flux of the scene, and that moves.
+#[test]
+fn exact_scene_through_an_array() {
+    let folder = tempfile::tempdir().unwrap();
+    write_scene(folder.path());
+    succeed(folder.path(), &[&["observe", "scene.toml", "-o", "scene.csv"], &SHORT[..]].concat());
     let data = read(folder.path(), "scene.csv");
-    let flux = |k: usize| {
-        let (_, v, _) = find(&data, 12.0 + k as f64 / 6.0, ["ALMA", "APEX"]);
-        v.norm()
-    };
+    let flux = |k: usize| alma(&data, k, "APEX").norm();
     assert!((flux(0) - 2.5).abs() < 1e-3, "{}", flux(0));
     assert!((1..3).all(|k| (flux(k) - flux(0)).abs() > 1e-5));
+}
+
+/// The same scene rendered to one EXR a scan is the same movie, but that every picture has the flux
+/// of the scene; pictures know their times.
+#[test]
+fn exact_sequences_of_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    write_scene(path);
+    std::fs::create_dir(path.join("frames")).unwrap();
+    let text = std::fs::read_to_string(path.join("scene.toml")).unwrap();
+    let scene = kerrlight_tomo::scene::Scene::parse(&text).unwrap();
+    let seconds = kerrlight_tomo::units::gravitational_time(scene.hole.mass_msun);
+    for k in 0..3 {
+        let time = scene.observer.time + f64::from(k) * 600.0 / seconds;
+        let (set, name) = (format!("observer.time={time}"), format!("frames/f_{:03}.exr", 9 + k));
+        succeed(path, &["render", "scene.toml", "--set", &set, "-o", &name]);
+    }
+    let observe = |inputs: &[&str], more: &[&str], output: &str| {
+        let end = ["-o", output];
+        succeed(path, &[&["observe"], inputs, &SHORT[..], more, &end[..]].concat());
+        read(path, output)
+    };
+    let expected = observe(&["scene.toml"], &[], "scene.csv");
+    let found = observe(&["frames"], &[], "a.csv");
+    for k in 0..3 {
+        for other in ["LMT", "SPT", "SMT"] {
+            let shape = |data: &Observation| alma(data, k, other) / alma(data, k, "APEX");
+            let (a, b) = (shape(&expected), shape(&found));
+            assert!((a - b).norm() < 1e-6, "{k} {other}: {a} {b}");
+        }
+    }
+    let same = |other: Observation| {
+        let rows = other.rows.iter().zip(&found.rows);
+        other.rows.len() == found.rows.len() && rows.clone().all(|(a, b)| a.products == b.products)
+    };
+    assert!(same(observe(&["frames/f_%03d.exr"], &["--frame-times", "own"], "b.csv")));
+    assert!(same(observe(&["frames/*.exr"], &["--frame-times", "scans"], "b.csv")));
+    let each = ["frames/f_009.exr", "frames/f_010.exr", "frames/f_011.exr"];
+    std::fs::write(path.join("hours.txt"), "# UTC\n12\n12.166666666666666\n12.333333333333334\n")
+        .unwrap();
+    assert!(same(observe(&each, &["--frame-times", "hours.txt"], "b.csv")));
+    // Two pictures twice as long apart: the scan between sees the mean of both.
+    let two = observe(&[each[0], each[2]], &["--frame-times", "own"], "b.csv");
+    let alone = [each[0], each[2]].map(|name| alma(&observe(&[name], &[], "b.csv"), 1, "LMT"));
+    assert!((alma(&two, 1, "LMT") - (alone[0] + alone[1]) / 2.0).norm() < 1e-12);
+    let fail = |inputs: &[&str], more: &[&str]| {
+        let arguments = [&["observe"], inputs, &SHORT[..], more, &["-o", "c.csv"]].concat();
+        let output = kerrlight(path, &arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    assert!(fail(&each[..2], &[]).contains("--frame-times"));
+    assert!(fail(&each[..2], &["--frame-times", "own"]).contains("time of a scan = 12.33"));
+    assert!(fail(&each, &["--frame-times", "12-12.1"]).contains("time of a scan = 12.16"));
+    assert!(fail(&["frames/f_009.exr"], &["--frame-times", "own"]).contains("is for movies"));
+    assert!(fail(&["frames/g_%d.exr"], &[]).contains("there are no files g_*.exr"));
+    std::fs::remove_file(path.join("frames/f_010.exr")).unwrap();
+    assert!(fail(&["frames/f_%03d.exr"], &[]).contains("frame is missing"));
 }
 
 #[test]

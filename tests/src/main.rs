@@ -14,4 +14,6 @@ mod interferometry;
 mod kerr_references;
 mod lensing;
 mod pictures;
+mod radiative_transfer;
+mod resume;
 mod support;

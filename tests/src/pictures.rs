@@ -177,3 +177,58 @@ fn exact_flux_of_a_distant_spot() {
     let expected = (2.0 * std::f64::consts::PI).powf(1.5) * 40f64.powi(3);
     assert!((flux / expected - 1.0).abs() < 5e-3, "{flux} {expected}");
 }
+
+/// Relative L1 distance of two intensity images.
+fn distance(picture: &Picture, reference: &Picture) -> f64 {
+    let [a, b] = [picture, reference].map(|p| p.channel("intensity").expect("a channel"));
+    let off: f64 = a.iter().zip(b).map(|(a, b)| f64::from((a - b).abs())).sum();
+    off / b.iter().map(|b| f64::from(*b)).sum::<f64>()
+}
+
+/// Refined pixels are as good as was asked for, better than a regular grid of as many rays; the
+/// `error` channel adds up to what is stated.
+#[test]
+fn exact_image_error_is_met() {
+    let error = 0.01;
+    for name in ["disc_face_on.toml", "disc_edge_on.toml"] {
+        let text = file(name);
+        let sized = |more: &[&str]| {
+            let size = ["screen.width=64", "screen.height=64"];
+            scene(&text, &[&size, more].concat())
+        };
+        let reference = render(&sized(&["screen.samples_per_pixel=256"]));
+        let asked = format!("screen.image_error={error}");
+        let scene = sized(&["screen.samples_per_pixel=1", &asked]);
+        let rendered = kerrlight_tomo::render::render(&scene, None, &|_| true).expect("a picture");
+        let (picture, summary) = (rendered.picture, rendered.summary);
+        assert!(summary.image_error < error, "{name}: {}", summary.image_error);
+        let refined = distance(&picture, &reference);
+        assert!(refined < error, "{name}: {refined}");
+        // A regular grid of as many rays is worse.
+        let side = (summary.rays / (64 * 64)).isqrt();
+        let grid = format!("screen.samples_per_pixel={}", side * side);
+        let uniform = distance(&render(&sized(&[&grid])), &reference);
+        assert!(refined < uniform, "{name}: {refined}, {uniform} with {side}² rays");
+        let sum = |name: &str| {
+            picture.channel(name).expect("a channel").iter().map(|v| f64::from(*v)).sum::<f64>()
+        };
+        let stated = sum("error") / sum("intensity");
+        // The tracer's tolerance comes to it.
+        assert!((stated - summary.image_error).abs() < 1e-6, "{stated} {}", summary.image_error);
+    }
+}
+
+/// What is left out is left out, and what is there is the same.
+#[test]
+fn exact_chosen_channels() {
+    let text = file("disc_edge_on.toml");
+    let all = small(&text, &[]);
+    let some = small(&text, &["screen.channels=[\"delay\", \"intensity\"]"]);
+    assert_eq!(
+        some.channels.iter().map(|c| c.name.as_str()).collect::<Vec<_>>(),
+        ["intensity", "delay"]
+    );
+    for channel in &some.channels {
+        assert_eq!(all.channel(&channel.name), Some(&channel.values[..]));
+    }
+}

@@ -12,7 +12,7 @@ pub fn root() -> PathBuf {
 }
 
 /// The built binary, in the profile of the tests.
-fn binary() -> &'static Path {
+pub fn binary() -> &'static Path {
     static BINARY: OnceLock<PathBuf> = OnceLock::new();
     BINARY.get_or_init(|| {
         let mut cargo = Command::new(env!("CARGO"));

@@ -4,7 +4,7 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use kerrlight_tomo::interferometry::array::built_in;
 use kerrlight_tomo::interferometry::earth::{Frame, SourcePosition, Ut1};
-use kerrlight_tomo::interferometry::operator::{Dtft, ImageGrid, Operator, Pulse, Real};
+use kerrlight_tomo::interferometry::operator::{Dtft, ImageGrid, Nufft, Operator, Pulse, Real};
 use kerrlight_tomo::interferometry::schedule::{Clock, Schedule, Setup, observe};
 use kerrlight_tomo::units::MICROARCSECOND;
 use num_complex::Complex;
@@ -59,5 +59,37 @@ fn benches(criterion: &mut Criterion) {
     measure::<f64>(criterion, "ngEHT 64 x 64 x 64 frames, f64, nothing kept", 1e-12, 0);
 }
 
-criterion_group!(all, benches);
+/// One frame of `pixels`² and random (u, v): the direct transform against the fast one.
+fn single(criterion: &mut Criterion, pixels: usize, visibilities: usize) {
+    let grid = ImageGrid::new(pixels, pixels, 160.0 * MICROARCSECOND).expect("a grid");
+    let at = |k: usize| [(k as f64).sin() * 1e10, (k as f64 * 1.7).cos() * 1e10];
+    let uv = vec![(0..visibilities).map(at).collect::<Vec<_>>()];
+    let movie: Vec<f64> = (0..grid.pixels()).map(|k| (k as f64).sin() + 1.0).collect();
+    let mut back = vec![0.0; movie.len()];
+    let mut run = |name: &str, operator: &dyn Operator<f64, Datum = Complex<f64>>| {
+        let mut data = vec![Complex::new(0.0, 0.0); visibilities];
+        let name = format!("{pixels} x {pixels} pixels, {visibilities} visibilities, {name}");
+        criterion.bench_function(&name, |bencher| {
+            bencher.iter(|| {
+                operator.forward(black_box(&movie), &mut data);
+                operator.adjoint(&data, &mut back);
+            });
+        });
+    };
+    run("direct, kept", &Dtft::<f64>::new(grid, Pulse::Triangle, &uv, usize::MAX));
+    run("direct", &Dtft::<f64>::new(grid, Pulse::Triangle, &uv, 0));
+    for accuracy in [1e-6, 1e-10] {
+        let fast = Nufft::<f64>::new(grid, Pulse::Triangle, &uv, accuracy).expect("an accuracy");
+        run(&format!("fast, {accuracy:e}"), &fast);
+    }
+}
+
+fn sizes(criterion: &mut Criterion) {
+    for (pixels, visibilities) in [(64, 100), (256, 100), (256, 1000), (1024, 100), (1024, 10_000)]
+    {
+        single(criterion, pixels, visibilities);
+    }
+}
+
+criterion_group!(all, benches, sizes);
 criterion_main!(all);

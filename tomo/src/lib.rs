@@ -2,14 +2,22 @@
 //! that pictures are kept in.
 //!
 //! Data flow: [`scene`] → rays ([`kerrlight_geodesic`]) → [`emission`] → [`transport`] →
-//! [`render`] → [`image`] → [`interferometry`]. SI units enter in [`units`] and [`interferometry`]. Nothing here knows a path or
-//! a terminal: codecs work on bytes.
+//! [`render`] → [`image`] → [`interferometry`]. Fits: [`points`] → [`dynamics`] →
+//! [`representation`] → [`optimise`]. SI units enter in [`units`] and
+//! [`interferometry`]. Nothing here knows a path or a terminal: codecs work on bytes.
 
+pub mod dynamics;
 pub mod emission;
 pub mod film;
 pub mod image;
 pub mod interferometry;
+pub mod optimise;
+pub mod plan;
+pub mod points;
+pub mod polarization;
 pub mod render;
+pub mod representation;
 pub mod scene;
+mod simd;
 pub mod transport;
 pub mod units;

@@ -13,6 +13,9 @@ pub const KILOPARSEC: f64 = 1e3 * 648_000.0 / core::f64::consts::PI * 149_597_87
 /// A microarcsecond in radians.
 pub const MICROARCSECOND: f64 = core::f64::consts::PI / (180.0 * 3600.0 * 1e6);
 
+/// An erg s⁻¹ cm⁻² Hz⁻¹ sr⁻¹ in Jy/µas².
+pub const JY_PER_SQUARE_UAS: f64 = 1e23 * MICROARCSECOND * MICROARCSECOND;
+
 /// M = GM/c³ in seconds for a mass in solar masses.
 pub fn gravitational_time(mass_msun: f64) -> f64 {
     mass_msun * SOLAR_MASS_SECONDS

@@ -5,12 +5,11 @@ mod picture;
 mod table;
 
 use crate::output::Output;
-use crate::progress;
+use crate::{interrupt, progress};
 use anyhow::{Context, bail};
 use clap::Args;
 use kerrlight_validation::accuracy::sweep::{self, Sweep};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Arguments of `kerrlight accuracy`.
@@ -45,10 +44,10 @@ impl Accuracy {
             kerrlight_geodesic::Tracer::new(self.tolerance).context("--tolerance")?;
         }
         make_folder(&self.output)?;
-        let stop = on_interrupt()?;
+        let stop = interrupt::flag();
         match self.hard {
-            Some(rays) => hard::run(self, rays, &stop),
-            None => self.sweep(&stop),
+            Some(rays) => hard::run(self, rays, stop),
+            None => self.sweep(stop),
         }
     }
 
@@ -84,12 +83,4 @@ impl Accuracy {
 
 fn make_folder(path: &Path) -> anyhow::Result<()> {
     std::fs::create_dir_all(path).with_context(|| format!("cannot make {}", path.display()))
-}
-
-/// A flag that Ctrl-C raises.
-fn on_interrupt() -> anyhow::Result<Arc<AtomicBool>> {
-    let flag = Arc::new(AtomicBool::new(false));
-    let raised = Arc::clone(&flag);
-    ctrlc::set_handler(move || raised.store(true, Ordering::Relaxed))?;
-    Ok(flag)
 }

@@ -1,5 +1,5 @@
-//! Images and movies to be observed: grids of numbers as CSV, arrays as npy or npz, images as FITS,
-//! pictures as EXR.
+//! Images and movies of one file to be observed: grids of numbers as CSV, arrays as npy or npz,
+//! images as FITS, pictures as EXR.
 
 use crate::output;
 use anyhow::{Context, anyhow, bail};
@@ -8,60 +8,76 @@ use kerrlight_tomo::interferometry::files;
 use kerrlight_tomo::interferometry::operator::ImageGrid;
 use kerrlight_tomo::interferometry::simulate::Movie;
 use kerrlight_tomo::scene::Scene;
-use kerrlight_tomo::units::{MICROARCSECOND, gravitational_angle};
+use kerrlight_tomo::units::{MICROARCSECOND, gravitational_angle, gravitational_time};
 use std::io::Read;
 use std::path::Path;
 
 /// Numbers of a file before one knows how large they are on the sky: images of Jy/pixel.
+#[derive(Default)]
 struct Pixels {
     width: usize,
     height: usize,
     values: Vec<f64>,
+    /// Width of the field in µas, where the file tells.
+    field_uas: Option<f64>,
+    times: OwnTimes,
 }
 
-/// Reads an image or a movie; `fov_uas` is the width of the field in µas, which an EXR of
-/// kerrlight knows itself.
-pub fn read(path: &Path, fov_uas: Option<f64>) -> anyhow::Result<Movie> {
+/// When the images of a file show the source, as far as it tells.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub enum OwnTimes {
+    /// It does not tell.
+    #[default]
+    Unknown,
+    /// Hours of UTC.
+    Utc(Vec<f64>),
+    /// Hours since some moment.
+    Since(Vec<f64>),
+}
+
+/// Reads an image or a movie; `fov_uas` is the width of the field in µas, which FITS and an EXR of
+/// kerrlight know themselves.
+pub fn read(path: &Path, fov_uas: Option<f64>) -> anyhow::Result<(Movie, OwnTimes)> {
     let name = || path.display().to_string();
     let bytes = output::read(path)?;
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    if matches!(extension.to_ascii_lowercase().as_str(), "fits" | "fit") {
-        if fov_uas.is_some() {
-            bail!("--fov-uas is not for FITS images, which have a field of view");
+    let pixels = match extension.to_ascii_lowercase().as_str() {
+        "fits" | "fit" if fov_uas.is_some() => {
+            bail!("--fov-uas is not for FITS images, which have a field of view")
         }
-        return files::read_fits_image(&bytes).with_context(name);
-    }
-    let (pixels, own_fov) = match extension.to_ascii_lowercase().as_str() {
-        "csv" | "txt" => (csv_grid(&bytes).with_context(name)?, None),
-        "npy" => (npy(&bytes).with_context(name)?, None),
-        "npz" => (npz(&bytes).with_context(name)?, None),
-        "exr" => exr_picture(&bytes, fov_uas).with_context(name)?,
+        "fits" | "fit" => {
+            let movie = files::read_fits_image(&bytes).with_context(name)?;
+            return Ok((movie, OwnTimes::Unknown));
+        }
+        "csv" | "txt" => csv_grid(&bytes),
+        "npy" => npy(&bytes),
+        "npz" => npz(&bytes),
+        "exr" => exr_picture(&bytes, fov_uas),
         _ => {
             bail!("{}: an image ends in .csv, .npy, .npz, .fits or .exr, a scene in .toml", name())
         }
     };
-    let fov = fov_uas.or(own_fov).ok_or_else(|| {
+    let pixels = pixels.with_context(name)?;
+    let fov = fov_uas.or(pixels.field_uas).ok_or_else(|| {
         anyhow!("{} does not tell how large it is on the sky: give --fov-uas", name())
     })?;
     let grid = ImageGrid::new(pixels.width, pixels.height, fov * MICROARCSECOND);
     let grid = grid.context("--fov-uas")?;
-    if let Some(k) = pixels.values.iter().position(|value| !value.is_finite()) {
-        let (row, column) = (k / pixels.width % pixels.height, k % pixels.width);
-        bail!(
-            "{}: row {}, column {}: {} is not finite",
-            name(),
-            row + 1,
-            column + 1,
-            pixels.values[k]
-        );
-    }
-    Ok(Movie { grid, pixels: pixels.values })
+    all_finite(&pixels).with_context(name)?;
+    Ok((Movie { grid, pixels: pixels.values }, pixels.times))
+}
+
+fn all_finite(pixels: &Pixels) -> anyhow::Result<()> {
+    let bad = pixels.values.iter().position(|value| !value.is_finite());
+    let Some(k) = bad else { return Ok(()) };
+    let (row, column) = (k / pixels.width % pixels.height + 1, k % pixels.width + 1);
+    bail!("row {row}, column {column}: {} is not finite", pixels.values[k])
 }
 
 /// A row of pixels a line, separated by commas; lines that start with `#` are passed over.
 fn csv_grid(bytes: &[u8]) -> anyhow::Result<Pixels> {
     let text = core::str::from_utf8(bytes).context("not UTF-8 text")?;
-    let mut pixels = Pixels { width: 0, height: 0, values: Vec::new() };
+    let mut pixels = Pixels::default();
     for (index, line) in text.lines().enumerate() {
         let (number, line) = (index + 1, line.trim());
         if line.is_empty() || line.starts_with('#') {
@@ -90,20 +106,27 @@ fn csv_grid(bytes: &[u8]) -> anyhow::Result<Pixels> {
 
 /// An array of shape (height, width) or (frames, height, width).
 fn npy(bytes: &[u8]) -> anyhow::Result<Pixels> {
+    let (shape, values) = npy_array(bytes)?;
+    let [.., height, width] = shape[..] else { bail!("shape {shape:?}: {IMAGE_SHAPES}") };
+    if shape.len() > 3 {
+        bail!("shape {shape:?}: {IMAGE_SHAPES}");
+    }
+    Ok(Pixels { width: width as usize, height: height as usize, values, ..Pixels::default() })
+}
+
+const IMAGE_SHAPES: &str = "(height, width) or (frames, height, width) is expected";
+
+/// Shape and numbers of an array.
+fn npy_array(bytes: &[u8]) -> anyhow::Result<(Vec<u64>, Vec<f64>)> {
     let file = npyz::NpyFile::new(bytes).context("not an npy file")?;
     if file.order() != npyz::Order::C {
         bail!("the array is in Fortran's order: save it in C's");
     }
-    let (height, width) = match *file.shape() {
-        [height, width] | [_, height, width] => (height, width),
-        ref shape => {
-            bail!("shape {shape:?}: (height, width) or (frames, height, width) is expected")
-        }
-    };
-    let count = file.shape().iter().try_fold(1u64, |product, n| product.checked_mul(*n));
+    let shape = file.shape().to_vec();
+    let count = shape.iter().try_fold(1u64, |product, n| product.checked_mul(*n));
     // At least 4 bytes each, so that a header cannot ask for more memory than there is file.
     if count.is_none_or(|count| count == 0 || count > bytes.len() as u64 / 4) {
-        bail!("shape {:?} does not go with {} bytes", file.shape(), bytes.len());
+        bail!("shape {shape:?} does not go with {} bytes", bytes.len());
     }
     let values: Vec<f64> = match file.dtype() {
         npyz::DType::Plain(t) if t.type_char() == npyz::TypeChar::Float && t.size_field() == 4 => {
@@ -111,10 +134,10 @@ fn npy(bytes: &[u8]) -> anyhow::Result<Pixels> {
         }
         _ => file.into_vec::<f64>().context("an array of float32 or float64 is expected")?,
     };
-    Ok(Pixels { width: width as usize, height: height as usize, values })
+    Ok((shape, values))
 }
 
-/// The only array of an archive, or the one named `movie` or `image`.
+/// The only array of an archive, or the one named `movie` or `image`; `times` are hours of UTC.
 fn npz(bytes: &[u8]) -> anyhow::Result<Pixels> {
     let mut archive = zip::ZipArchive::new(std::io::Cursor::new(bytes)).context("not an npz")?;
     let names: Vec<String> = (0..archive.len())
@@ -126,37 +149,56 @@ fn npz(bytes: &[u8]) -> anyhow::Result<Pixels> {
         (_, Some(name)) => name,
         _ => bail!("holds {}: an array named movie or image is expected", names.join(", ")),
     };
-    let mut array = Vec::new();
-    // A deflated array of zeros is a thousand times smaller than the array.
-    let most = 20 * bytes.len() as u64 + 4096;
-    archive.by_name(name)?.take(most).read_to_end(&mut array)?;
-    npy(&array).with_context(|| name.clone())
+    let mut member = |name: &str| -> anyhow::Result<Vec<u8>> {
+        let mut array = Vec::new();
+        // A deflated array of zeros is a thousand times smaller than the array.
+        let most = 20 * bytes.len() as u64 + 4096;
+        archive.by_name(name)?.take(most).read_to_end(&mut array)?;
+        Ok(array)
+    };
+    let mut pixels = npy(&member(name)?).with_context(|| name.clone())?;
+    if name != TIMES && names.iter().any(|name| name == TIMES) {
+        let (_, times) = npy_array(&member(TIMES)?).context(TIMES)?;
+        pixels.times = OwnTimes::Utc(times);
+    }
+    Ok(pixels)
 }
+
+/// The array of an archive that holds the hours of UTC of a movie's images.
+const TIMES: &str = "times.npy";
 
 /// The channel `intensity` of a picture. One in Jy/µas² knows its scale; others are taken as
 /// Jy/pixel if the field of view is given.
-fn exr_picture(bytes: &[u8], fov_uas: Option<f64>) -> anyhow::Result<(Pixels, Option<f64>)> {
+fn exr_picture(bytes: &[u8], fov_uas: Option<f64>) -> anyhow::Result<Pixels> {
     let (picture, attributes) = exr::decode(bytes).context("damaged or unusual EXR")?;
     let channel = picture.channel("intensity").context("has no channel named intensity")?;
     let (width, height) = (picture.width, picture.height);
     let attribute = |name: &str| attributes.get(name).map(String::as_str);
-    let is_kerrlight = attribute("intensity_unit").is_some();
-    let mut factor = 1.0;
-    let mut own_fov = None;
-    if attribute("intensity_unit") == Some("Jy/uas^2") {
-        let scene = attribute("scene_resolved").context("holds no scene")?;
-        let scene = Scene::parse(scene).context("scene in the EXR")?;
-        let angle = gravitational_angle(scene.hole.mass_msun, scene.hole.distance_kpc);
-        let pixel_uas = scene.pixel_size() * angle;
-        factor = pixel_uas * pixel_uas;
-        own_fov = Some(pixel_uas * width as f64);
-    } else if is_kerrlight {
-        bail!("its intensity has no unit of the sky: render it with screen.total_flux_jy");
-    } else if fov_uas.is_none() {
-        bail!("is not of kerrlight: give --fov-uas, and its intensity counts as Jy/pixel");
+    let in_pixels = |factor: f64| Pixels {
+        width,
+        height,
+        values: channel.iter().map(|value| f64::from(*value) * factor).collect(),
+        ..Pixels::default()
+    };
+    match attribute("intensity_unit") {
+        Some("Jy/uas^2") => {
+            let scene = attribute("scene_resolved").context("holds no scene")?;
+            let scene = Scene::parse(scene).context("scene in the EXR")?;
+            let angle = gravitational_angle(scene.hole.mass_msun, scene.hole.distance_kpc);
+            let pixel_uas = scene.pixel_size() * angle;
+            let hours = scene.observer.time * gravitational_time(scene.hole.mass_msun) / 3600.0;
+            let field_uas = Some(pixel_uas * width as f64);
+            let times = OwnTimes::Since(vec![hours]);
+            Ok(Pixels { field_uas, times, ..in_pixels(pixel_uas * pixel_uas) })
+        }
+        Some(_) => {
+            bail!("its intensity has no unit of the sky: render it with screen.total_flux_jy")
+        }
+        None if fov_uas.is_none() => {
+            bail!("is not of kerrlight: give --fov-uas, and its intensity counts as Jy/pixel")
+        }
+        None => Ok(in_pixels(1.0)),
     }
-    let values = channel.iter().map(|value| f64::from(*value) * factor).collect();
-    Ok((Pixels { width, height, values }, own_fov))
 }
 
 #[cfg(test)]

@@ -2,12 +2,14 @@
 
 pub mod arguments;
 pub mod image_files;
+pub mod movie_files;
 pub mod plots;
 pub mod scene_movie;
 
 use crate::output::{self, Output};
 use anyhow::{Context, bail};
-use kerrlight_tomo::interferometry::files::{self, Format};
+use clap::ValueEnum;
+use kerrlight_tomo::interferometry::files::{self, EhtTable, Format};
 use kerrlight_tomo::interferometry::observation::Observation;
 use std::path::Path;
 
@@ -16,26 +18,50 @@ pub fn read(path: &Path) -> anyhow::Result<(Format, Observation)> {
     files::decode(&output::read(path)?).with_context(|| path.display().to_string())
 }
 
-/// A file of visibilities to be written, its format by the ending of its name.
+/// Formats in which visibilities are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Written {
+    /// UVFITS (.uvfits, .fits)
+    Uvfits,
+    /// eht-imaging's text (.txt)
+    ObsText,
+    /// kerrlight's CSV (.csv)
+    Csv,
+    /// The EHT's public csv, total intensity (only if asked for)
+    EhtCsv,
+    /// The EHT's public txt, total intensity (only if asked for)
+    EhtTxt,
+}
+
+/// A file of visibilities to be written.
 pub struct ObservationFile {
     output: Output,
-    format: Format,
+    format: Written,
+    comments: bool,
 }
 
 impl ObservationFile {
-    /// Checks the place before any work is done.
-    pub fn new(path: &Path) -> anyhow::Result<Self> {
+    /// Checks the place before any work is done. The format is `format`, by default that of the
+    /// name's ending. With `comments` kerrlight's CSV tells settings.
+    pub fn new(path: &Path, format: Option<Written>, comments: bool) -> anyhow::Result<Self> {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-        let format = match extension.to_ascii_lowercase().as_str() {
-            "uvfits" | "fits" => Format::Uvfits,
-            "txt" => Format::ObsText,
-            "csv" => Format::Table,
+        let by_name = match extension.to_ascii_lowercase().as_str() {
+            "uvfits" | "fits" => Written::Uvfits,
+            "txt" => Written::ObsText,
+            "csv" => Written::Csv,
             _ => bail!(
                 "output {} must end in .uvfits, .txt (eht-imaging's text) or .csv",
                 path.display()
             ),
         };
-        Ok(ObservationFile { output: Output::new(path, "")?, format })
+        let format = format.unwrap_or(by_name);
+        if (format == Written::Uvfits) != (by_name == Written::Uvfits) {
+            bail!("output {}: its ending is not that of the format asked for", path.display());
+        }
+        if comments && format != Written::Csv {
+            bail!("--comments is for kerrlight's CSV: output {} is not one", path.display());
+        }
+        Ok(ObservationFile { output: Output::new(path, "")?, format, comments })
     }
 
     /// Refuses to take the place of a file that is read.
@@ -45,10 +71,13 @@ impl ObservationFile {
 
     /// Writes.
     pub fn write(&self, observation: &Observation) -> anyhow::Result<()> {
+        let text = |text: String| text.into_bytes();
         let bytes = match self.format {
-            Format::Uvfits => files::write_uvfits(observation),
-            Format::ObsText => files::to_obs_text(observation).map(String::into_bytes),
-            Format::Table => Ok(files::to_csv(observation).into_bytes()),
+            Written::Uvfits => files::write_uvfits(observation),
+            Written::ObsText => files::to_obs_text(observation).map(text),
+            Written::Csv => Ok(text(files::to_csv(observation, self.comments))),
+            Written::EhtCsv => files::to_eht_table(observation, EhtTable::Csv).map(text),
+            Written::EhtTxt => files::to_eht_table(observation, EhtTable::Txt).map(text),
         };
         let shown = self.output.shown().display();
         self.output.write(&bytes.with_context(|| format!("cannot write {shown}"))?)?;

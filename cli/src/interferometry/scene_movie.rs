@@ -1,5 +1,6 @@
 //! A scene, rendered at the times of scans.
 
+use crate::assets;
 use crate::output;
 use crate::progress;
 use anyhow::{Context, bail};
@@ -21,6 +22,8 @@ pub fn read(path: &Path, times_h: &[f64]) -> anyhow::Result<Movie> {
     if scene.sky.is_some() {
         bail!("{}: a sky has no flux in Jy: remove `sky`", name());
     }
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let assets = assets::load(&scene, folder, &[]).with_context(name)?.decoded;
     let hole = scene.hole.clone();
     let seconds = gravitational_time(hole.mass_msun);
     let pixel_uas = scene.pixel_size() * gravitational_angle(hole.mass_msun, hole.distance_kpc);
@@ -38,11 +41,11 @@ pub fn read(path: &Path, times_h: &[f64]) -> anyhow::Result<Movie> {
     let mut first_factor = None;
     for time in frames {
         scene.observer.time = start + (time - times_h[0]) * 3600.0 / seconds;
-        let rendered = render(&scene, None, &|_| true).with_context(name)?;
-        let factor = *first_factor.get_or_insert(rendered.unit_factor);
+        let rendered = render(&scene, assets.clone(), &|_| true).with_context(name)?;
+        let factor = *first_factor.get_or_insert(rendered.summary.unit_factor);
         let channel = rendered.picture.channel("intensity").context("no intensity")?;
         // Every picture has been scaled to the same flux: only the first is to be.
-        let scale = factor / rendered.unit_factor * pixel_uas * pixel_uas;
+        let scale = factor / rendered.summary.unit_factor * pixel_uas * pixel_uas;
         pixels.extend(channel.iter().map(|value| f64::from(*value) * scale));
         bar.inc(1);
     }

@@ -6,6 +6,7 @@ use anyhow::{Context, bail};
 use kerrlight_tomo::film::{Film, Frame};
 use kerrlight_tomo::image::Picture;
 use kerrlight_tomo::image::exr::{self, Attributes};
+use kerrlight_tomo::render::Rendered;
 use kerrlight_tomo::scene::{Scene, SceneError, apply_override};
 use kerrlight_tomo::units::gravitational_time;
 use rayon::prelude::*;
@@ -17,8 +18,20 @@ pub struct Sequence {
     plans: Vec<Plan>,
     /// Which are there.
     done: Vec<bool>,
-    /// Factor and unit of the intensity, those of the first frame.
-    unit: Option<(f64, String)>,
+    /// Factor from the scene's unit of intensity, that of the first frame.
+    factor: Option<f64>,
+    /// Lengths and checksums of the files that the scene names.
+    files: String,
+}
+
+/// Where a film comes from.
+pub struct Origin<'a> {
+    /// What its scene is called in messages.
+    pub name: &'a str,
+    /// The scene's text.
+    pub text: &'a str,
+    /// Lengths and checksums of the files that the scene names.
+    pub files: &'a str,
 }
 
 /// A frame to be.
@@ -29,8 +42,9 @@ struct Plan {
 }
 
 impl Sequence {
-    /// The frames of a scene's text at `times`, in `folder`, which is made if it is not there.
-    pub fn new(folder: &Path, name: &str, text: &str, times: &[f64]) -> anyhow::Result<Self> {
+    /// The frames at `times`, in `folder`, which is made if it is not there.
+    pub fn new(folder: &Path, of: &Origin<'_>, times: &[f64]) -> anyhow::Result<Self> {
+        let Origin { name, text, files } = of;
         let plan = |time: &f64| -> anyhow::Result<Plan> {
             let text = apply_override(text, &format!("observer.time={time:?}"))?;
             let scene = Scene::parse(&text).map_err(SceneError::without_line);
@@ -42,7 +56,8 @@ impl Sequence {
             bail!("output {} is not a folder", folder.display());
         }
         let done = vec![false; plans.len()];
-        Ok(Sequence { folder: folder.to_owned(), plans, done, unit: None })
+        let (folder, files) = (folder.to_owned(), (*files).to_owned());
+        Ok(Sequence { folder, plans, done, factor: None, files })
     }
 
     /// Looks which frames are there. Frames with other settings, or beyond the last, are errors:
@@ -67,7 +82,7 @@ impl Sequence {
             }
             self.done[k] = true;
             if k == 0 {
-                self.unit = unit_of(&attributes);
+                self.factor = factor_of(&attributes);
             }
         }
         Ok(())
@@ -141,21 +156,17 @@ impl Sequence {
         batch: &[usize],
         frames: Vec<Frame>,
     ) -> anyhow::Result<()> {
-        if let (None, Some(first)) = (&self.unit, frames.first()) {
-            let (factor, unit) = film.unit(first)?;
-            self.unit = Some((factor, unit.to_owned()));
+        if let (None, Some(first)) = (self.factor, frames.first()) {
+            self.factor = Some(film.unit_factor(first)?);
         }
-        let (factor, unit) = self.unit.clone().context("the film has no unit of intensity")?;
+        let factor = self.factor.context("the film has no unit of intensity")?;
         let this: &Sequence = self;
-        batch.par_iter().zip(frames).try_for_each(|(k, mut frame)| -> anyhow::Result<()> {
-            scale(&mut frame.picture, factor);
-            let mut attributes = this.settings(*k);
-            let mut add = |name: &str, value: String| attributes.insert(name.to_owned(), value);
-            add("intensity_unit", unit.clone());
-            add("intensity_per_scene_unit", factor.to_string());
-            add("unresolved_rays", frame.unresolved.to_string());
-            let bytes =
-                exr::encode(&frame.picture, &attributes).context("cannot encode the EXR")?;
+        batch.par_iter().zip(frames).try_for_each(|(k, frame)| -> anyhow::Result<()> {
+            let Rendered { picture, summary } = film.rendered(frame, factor)?;
+            let Plan { scene, text } = &this.plans[*k];
+            let mut attributes = report::attributes(scene, text, film.legend(), &summary);
+            attributes.append(&mut this.settings(*k));
+            let bytes = exr::encode(&picture, &attributes).context("cannot encode the EXR")?;
             Output::new(&this.path(*k, "exr"), "exr")?.write(&bytes)
         })?;
         for k in batch {
@@ -166,40 +177,30 @@ impl Sequence {
 
     /// What decides a frame.
     fn settings(&self, k: usize) -> Attributes {
-        let Plan { scene, text } = &self.plans[k];
+        let scene = &self.plans[k].scene;
         let seconds = scene.observer.time * gravitational_time(scene.hole.mass_msun);
         let entry = |name: &str, value: String| (name.to_owned(), value);
-        [
+        let mut settings = Attributes::from([
             entry("version", env!("CARGO_PKG_VERSION").to_owned()),
-            entry("scene", text.clone()),
             entry("scene_resolved", scene.to_toml()),
-            entry(report::pixel_unit(scene), scene.pixel_size().to_string()),
-            entry("channels", report::CHANNELS.to_owned()),
             entry("frame", k.to_string()),
             entry("frames", self.plans.len().to_string()),
             entry("frame_time_m", scene.observer.time.to_string()),
             entry("frame_time_min", (seconds / 60.0).to_string()),
-        ]
-        .into()
+        ]);
+        if !self.files.is_empty() {
+            settings.insert("frame_files".to_owned(), self.files.clone());
+        }
+        settings
     }
 }
 
-/// The first setting that a file does not have or has otherwise. The text of a scene may have
-/// other comments.
+/// The first setting that a file does not have or has otherwise.
 fn differs(settings: &Attributes, attributes: &Attributes) -> Option<String> {
-    let decides = |name: &&String| !["scene", "channels"].contains(&name.as_str());
     let other = |name: &&String| attributes.get(*name) != settings.get(*name);
-    settings.keys().filter(decides).find(other).cloned()
+    settings.keys().find(other).cloned()
 }
 
-fn unit_of(attributes: &Attributes) -> Option<(f64, String)> {
-    let factor = attributes.get("intensity_per_scene_unit")?.parse().ok()?;
-    Some((factor, attributes.get("intensity_unit")?.clone()))
-}
-
-fn scale(picture: &mut Picture, factor: f64) {
-    let intensity = picture.channels.iter_mut().filter(|c| c.name == "intensity");
-    for value in intensity.flat_map(|channel| channel.values.iter_mut()) {
-        *value = (f64::from(*value) * factor) as f32;
-    }
+fn factor_of(attributes: &Attributes) -> Option<f64> {
+    attributes.get("intensity_per_scene_unit")?.parse().ok()
 }

@@ -7,13 +7,14 @@ mod viewing;
 use crate::output;
 use crate::overlay::OverlayOptions;
 use crate::render::preview::PreviewOptions;
-use crate::render::source::{self, Source};
-use crate::{interrupt, progress};
+use crate::render::source::Source;
+use crate::{assets, interrupt, progress};
 use anyhow::{Context, bail};
 use clap::Args;
-use frames::Sequence;
-use kerrlight_tomo::film::Film;
+use frames::{Origin, Sequence};
+use kerrlight_tomo::film::{Film, Frame};
 use kerrlight_tomo::render::RenderError;
+use std::iter;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -49,17 +50,22 @@ impl Movie {
     pub fn run(&self) -> anyhow::Result<()> {
         let source = Source::new(Some(&self.scene))?;
         let (text, scene) = source.scene(&self.overrides)?;
-        self.overlay.check(&scene)?;
         let times = self.span.times(self.frames, &scene)?;
-        let mut sequence = Sequence::new(&self.output, &source.name, &text, &times)?;
-        let sky = source::sky_path(&scene, &source.folder);
         let animations = self.viewing.outputs(self.frames)?;
-        for input in [Some(&self.scene), sky.as_ref()].into_iter().flatten() {
-            animations.spare(input)?;
+        let files = assets::load(&scene, &source.folder, &animations.files())?;
+        animations.files().iter().try_for_each(|output| output.spares(&self.scene))?;
+        let mut film = Film::new(&scene, files.decoded).with_context(|| source.name.clone())?;
+        if animations.any() {
+            self.look.channels(&scene, &film.names())?;
+            self.overlay.check(&scene, &film.names())?;
+        } else if self.overlay.any() {
+            bail!("marks are drawn into pictures to look at: give --gif, --apng or --png");
+        }
+        let of = Origin { name: &source.name, text: &text, files: &files.identity };
+        let mut sequence = Sequence::new(&self.output, &of, &times)?;
+        for input in iter::once(&self.scene).chain(&files.paths) {
             sequence.spare(input)?;
         }
-        let picture = sky.as_deref().map(source::load_sky).transpose()?;
-        let mut film = Film::new(&scene, picture).with_context(|| source.name.clone())?;
         if !film.changes() && self.frames > 1 {
             eprintln!("warning: nothing in this scene moves: all frames are the same");
         }
@@ -67,7 +73,7 @@ impl Movie {
         self.render(&mut film, &mut sequence).with_context(|| source.name.clone())?;
         output::print(&format!("{}\n", self.output.display()))?;
         animations.write(&sequence, self.look.look(&scene), |picture, look, white| {
-            self.overlay.draw(&scene, picture, look, white)
+            self.overlay.draw(&scene, (picture, 1), look, white)
         })
     }
 
@@ -97,7 +103,7 @@ impl Movie {
                 }
                 other => other?,
             };
-            unresolved += frames.iter().map(|frame| frame.unresolved).sum::<usize>();
+            unresolved += frames.iter().map(Frame::unresolved).sum::<u64>();
             sequence.write(film, batch, frames)?;
         }
         bar.finish_and_clear();

@@ -9,7 +9,7 @@ use image::RgbImage;
 use kerrlight_tomo::image::Picture;
 use kerrlight_tomo::image::animation::{Apng, Gif, Palette};
 use kerrlight_tomo::image::preview::{self, Look};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Options of what is made to be looked at.
 #[derive(Debug, Args)]
@@ -66,9 +66,14 @@ impl Viewing {
 }
 
 impl Animations {
-    /// Refuses to take the place of a file that is read.
-    pub fn spare(&self, input: &Path) -> anyhow::Result<()> {
-        [&self.gif, &self.apng].into_iter().flatten().try_for_each(|output| output.spares(input))
+    /// The files of their own.
+    pub fn files(&self) -> Vec<&Output> {
+        [&self.gif, &self.apng].into_iter().flatten().collect()
+    }
+
+    /// Whether anything is to be looked at.
+    pub fn any(&self) -> bool {
+        self.gif.is_some() || self.apng.is_some() || self.png
     }
 
     /// Draws all frames and writes what is asked for.
@@ -78,7 +83,7 @@ impl Animations {
         look: Look,
         draw: impl Fn(&Picture, Look, f32) -> anyhow::Result<RgbImage>,
     ) -> anyhow::Result<()> {
-        if self.gif.is_none() && self.apng.is_none() && !self.png {
+        if !self.any() {
             return Ok(());
         }
         let white = match self.white {

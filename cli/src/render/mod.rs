@@ -1,22 +1,29 @@
 //! `kerrlight render`: from a scene to EXR and PNG.
 
+mod explain;
+mod partial;
 pub mod preview;
 pub mod report;
 pub mod source;
+mod work;
 
+use crate::assets;
 use crate::output::{self, Output};
 use crate::overlay::OverlayOptions;
-use crate::progress;
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::Args;
-use kerrlight_tomo::image::exr;
+use image::RgbImage;
+use kerrlight_tomo::image::Picture;
 use kerrlight_tomo::image::preview as drawing;
+use kerrlight_tomo::image::reduce::Reduction;
 use kerrlight_tomo::image::sheet::sheet;
-use kerrlight_tomo::render::render;
+use kerrlight_tomo::render::Raster;
+use kerrlight_tomo::scene::Scene;
 use preview::PreviewOptions;
 use source::Source;
 use std::path::PathBuf;
 use std::time::Instant;
+use work::Work;
 
 /// Arguments of `kerrlight render`.
 #[derive(Debug, Args)]
@@ -34,6 +41,15 @@ pub struct Render {
     /// Change a value of the scene, e.g. hole.spin=0.5 or spot.0.phase_deg=90
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     overrides: Vec<String>,
+    /// Refine pixels until the estimated relative error of the intensity image (sum of the
+    /// pixels' absolute errors by the sum of the pixels) is below this, in place of
+    /// screen.samples_per_pixel
+    #[arg(long, value_name = "ERROR")]
+    image_error: Option<f64>,
+    /// Print what is computed for this scene and what is not, with the estimated cost of each
+    /// part before and the measured cost after
+    #[arg(long)]
+    explain: bool,
     #[command(flatten)]
     look: PreviewOptions,
     #[command(flatten)]
@@ -41,60 +57,110 @@ pub struct Render {
     /// Where to write a contact sheet: all channels with colour bars
     #[arg(long, value_name = "FILE.png")]
     sheet: Option<PathBuf>,
+    /// Columns of pixels that are traced together; the picture does not depend on it
+    #[arg(long, value_name = "N", default_value = "64", hide_short_help = true)]
+    #[arg(value_parser = clap::value_parser!(u16).range(1..))]
+    tile: u16,
 }
 
 impl Render {
     /// Renders.
     pub fn run(&self) -> anyhow::Result<()> {
         let source = Source::new(self.scene.as_deref())?;
-        let (text, scene) = source.scene(&self.overrides)?;
-        let (exr, png) = self.outputs(&source)?;
-        let contact = self.sheet.as_deref().map(|path| Output::new(path, "png")).transpose()?;
-        self.overlay.check(&scene)?;
-        let sky = source::sky_path(&scene, &source.folder);
-        for output in [&exr, &png, &contact].into_iter().flatten() {
-            for input in self.scene.iter().chain(&sky) {
-                output.spares(input)?;
-            }
+        let (text, scene) = source.scene(&self.all_overrides())?;
+        let outputs = self.outputs(&source)?;
+        if let Some(input) = &self.scene {
+            outputs.all().iter().try_for_each(|output| output.spares(input))?;
         }
-        let picture = sky.as_deref().map(source::load_sky).transpose()?;
+        if self.overlay.any() && outputs.png.is_none() {
+            bail!("marks are drawn into the PNG: give --preview");
+        }
+        let files = assets::load(&scene, &source.folder, &outputs.all())?;
         let start = Instant::now();
-        let bar = progress::bar(u64::from(scene.screen.height));
-        let rendered = render(&scene, picture, &|rows| {
-            bar.inc(rows as u64);
-            true
-        })
-        .with_context(|| source.name.clone())?;
-        bar.finish_and_clear();
-        if let Some(exr) = &exr {
-            let bytes =
-                exr::encode(&rendered.picture, &report::attributes(&scene, &text, &rendered));
-            exr.write(&bytes.context("cannot encode the EXR")?)?;
-            output::print(&format!("{}\n", exr.shown().display()))?;
+        let raster = Raster::new(&scene, files.decoded);
+        let mut raster = raster.with_context(|| source.name.clone())?.with_tile(self.tile.into());
+        let look = self.reduction(&scene, &raster, &outputs)?;
+        if self.explain {
+            explain::before(&scene, &raster)?;
+            raster = raster.with_meter();
         }
-        if let Some(png) = &png {
-            let look = self.look.look(&scene);
-            let white = drawing::white(&rendered.picture, look)?;
-            let drawn = self.overlay.draw(&scene, &rendered.picture, look, white)?;
-            let bytes = drawing::encode(&drawn).context("cannot encode the PNG")?;
-            png.write(&bytes)?;
-            output::print(&format!("{}\n", png.shown().display()))?;
+        let reduced = look.as_ref().map_or(1, Reduction::factor);
+        let work = Work { raster: &raster, scene: &scene, text: &text, name: &source.name };
+        let (summary, picture) = match &outputs.exr {
+            Some(exr) => {
+                let identity = raster.identity() + &files.identity;
+                work.exr(exr, &identity, look)?
+            }
+            None => work.preview(look)?,
+        };
+        if let Some(picture) = picture {
+            self.draw(&scene, (&picture, reduced), &outputs)?;
         }
-        if let Some(contact) = &contact {
-            let drawn = sheet(&rendered.picture).context("cannot draw the sheet")?;
-            contact.write(&drawing::encode(&drawn).context("cannot encode the PNG")?)?;
-            output::print(&format!("{}\n", contact.shown().display()))?;
+        report::print(&scene, &summary, start.elapsed().as_secs_f64());
+        if self.explain {
+            explain::after(&raster.meter(), summary.rays);
         }
-        report::print(&scene, &rendered, start.elapsed().as_secs_f64());
         Ok(())
     }
 
-    fn outputs(&self, source: &Source) -> anyhow::Result<(Option<Output>, Option<Output>)> {
+    /// What keeps the channels of the PNG and of the contact sheet, if there is one of them.
+    fn reduction(
+        &self,
+        scene: &Scene,
+        raster: &Raster,
+        outputs: &Outputs,
+    ) -> anyhow::Result<Option<Reduction>> {
+        let names = raster.names();
+        let mut wanted = Vec::new();
+        if outputs.png.is_some() {
+            self.overlay.check(scene, &names)?;
+            wanted = self.look.channels(scene, &names)?;
+            wanted.extend(self.overlay.channels());
+        }
+        if outputs.sheet.is_some() {
+            preview::check_sheet(scene)?;
+            wanted.clone_from(&names);
+        }
+        Ok((!wanted.is_empty()).then(|| preview::reduction(scene, &names, &wanted)))
+    }
+
+    /// Writes what is to be looked at. A pixel of the picture may be the mean of several.
+    fn draw(
+        &self,
+        scene: &Scene,
+        (picture, reduced): (&Picture, usize),
+        outputs: &Outputs,
+    ) -> anyhow::Result<()> {
+        if let Some(png) = &outputs.png {
+            let look = self.look.look(scene);
+            let white = drawing::white(picture, look).context("cannot draw the picture")?;
+            write_png(png, &self.overlay.draw(scene, (picture, reduced), look, white)?)?;
+        }
+        if let Some(output) = &outputs.sheet {
+            write_png(output, &sheet(picture).context("cannot draw the sheet")?)?;
+        }
+        Ok(())
+    }
+
+    fn all_overrides(&self) -> Vec<String> {
+        let mut overrides = self.overrides.clone();
+        if let Some(error) = self.image_error {
+            overrides.push("screen.samples_per_pixel=1".to_owned());
+            overrides.push(format!("screen.image_error={error:?}"));
+        }
+        overrides
+    }
+
+    fn outputs(&self, source: &Source) -> anyhow::Result<Outputs> {
         let check = |path: &Option<PathBuf>, extension| {
             path.as_deref().map(|path| Output::new(path, extension)).transpose()
         };
         if self.output.is_some() || self.preview.is_some() || self.sheet.is_some() {
-            return Ok((check(&self.output, "exr")?, check(&self.preview, "png")?));
+            return Ok(Outputs {
+                exr: check(&self.output, "exr")?,
+                png: check(&self.preview, "png")?,
+                sheet: check(&self.sheet, "png")?,
+            });
         }
         let stem = match &self.scene {
             Some(path) => path.file_stem().map(|s| s.to_string_lossy().into_owned()),
@@ -103,6 +169,24 @@ impl Render {
         let stem = stem.unwrap_or_else(|| source.name.clone());
         let exr = PathBuf::from(format!("{stem}.exr"));
         let png = PathBuf::from(format!("{stem}.png"));
-        Ok((check(&Some(exr), "exr")?, check(&Some(png), "png")?))
+        Ok(Outputs { exr: check(&Some(exr), "exr")?, png: check(&Some(png), "png")?, sheet: None })
     }
+}
+
+/// The files to be written.
+struct Outputs {
+    exr: Option<Output>,
+    png: Option<Output>,
+    sheet: Option<Output>,
+}
+
+impl Outputs {
+    fn all(&self) -> Vec<&Output> {
+        [&self.exr, &self.png, &self.sheet].into_iter().flatten().collect()
+    }
+}
+
+fn write_png(output: &Output, drawn: &RgbImage) -> anyhow::Result<()> {
+    output.write(&drawing::encode(drawn).context("cannot encode the PNG")?)?;
+    output::print(&format!("{}\n", output.shown().display()))
 }

@@ -1,15 +1,17 @@
 //! How the PNG shows a picture.
 
+use anyhow::bail;
 use clap::{Args, ValueEnum};
 use kerrlight_tomo::image::colormap::Colormap;
 use kerrlight_tomo::image::preview::{Look, Stretch};
+use kerrlight_tomo::image::reduce::Reduction;
 use kerrlight_tomo::scene::Scene;
 
 /// Options of the PNG.
 #[derive(Debug, Args)]
 pub struct PreviewOptions {
     /// Colours of the PNG: a map of the intensity, or `color` for the R, G, B channels
-    /// [default: afmhot-us, color where the scene has a sky]
+    /// [default: afmhot-us, color where the scene has a sky or a mesh]
     #[arg(long, value_name = "MAP")]
     colormap: Option<Colors>,
     /// How intensity is stretched over the colour map
@@ -35,7 +37,22 @@ enum StretchName {
     Log,
 }
 
+/// A preview has at most this many pixels: 4096 × 4096.
+const MOST_PIXELS: usize = 1 << 24;
+
 impl PreviewOptions {
+    /// The channels that the PNG shows, which must be among `names`.
+    pub fn channels(&self, scene: &Scene, names: &[&str]) -> anyhow::Result<Vec<&'static str>> {
+        let wanted: &[&str] = match self.look(scene) {
+            Look::Intensity(..) => &["intensity"],
+            Look::Color => &["R", "G", "B"],
+        };
+        if let Some(name) = wanted.iter().find(|name| !names.contains(name)) {
+            bail!("the PNG needs the channel {name}, which `screen.channels` leaves out");
+        }
+        Ok(wanted.to_vec())
+    }
+
     /// What the PNG of `scene` shows.
     pub fn look(&self, scene: &Scene) -> Look {
         let stretch = match self.stretch {
@@ -43,7 +60,8 @@ impl PreviewOptions {
             StretchName::Sqrt => Stretch::Sqrt,
             StretchName::Log => Stretch::Log,
         };
-        let default = if scene.sky.is_some() { Colors::Color } else { Colors::AfmhotUs };
+        let colored = scene.sky.is_some() || !scene.mesh.is_empty();
+        let default = if colored { Colors::Color } else { Colors::AfmhotUs };
         let map = match self.colormap.unwrap_or(default) {
             Colors::Color => return Look::Color,
             Colors::AfmhotUs => Colormap::AfmhotUs,
@@ -55,4 +73,26 @@ impl PreviewOptions {
         };
         Look::Intensity(map, stretch)
     }
+}
+
+/// Makes the picture small enough for a PNG with the channels `wanted`.
+pub fn reduction(scene: &Scene, names: &[&str], wanted: &[&str]) -> Reduction {
+    let (width, height) = (scene.screen.width as usize, scene.screen.height as usize);
+    let reduction = Reduction::new(width, height, names, wanted, MOST_PIXELS);
+    if reduction.factor() > 1 {
+        let factor = reduction.factor();
+        eprintln!("a pixel of the PNG is the mean of {factor} x {factor} of the picture");
+    }
+    reduction
+}
+
+/// Refuses a contact sheet of a picture that a PNG cannot show pixel by pixel.
+pub fn check_sheet(scene: &Scene) -> anyhow::Result<()> {
+    let (width, height) = (scene.screen.width, scene.screen.height);
+    if u64::from(width) * u64::from(height) > MOST_PIXELS as u64 {
+        bail!(
+            "--sheet: {width} x {height} pixels are too many, at most {MOST_PIXELS} (4096 x 4096)"
+        );
+    }
+    Ok(())
 }

@@ -2,9 +2,8 @@
 
 use crate::output;
 use anyhow::Context;
-use kerrlight_tomo::emission::sky::Panorama;
 use kerrlight_tomo::image::exr;
-use kerrlight_tomo::scene::{Scene, SceneError, Sky, apply_override};
+use kerrlight_tomo::scene::{Scene, SceneError, apply_override};
 use std::path::{Path, PathBuf};
 
 /// The scene that is rendered when none is given.
@@ -58,20 +57,8 @@ impl Source {
 
 fn scene_of_exr(path: &Path) -> anyhow::Result<String> {
     let name = || path.display().to_string();
-    let (_, attributes) = exr::decode(&output::read(path)?).with_context(name)?;
+    let file = output::open(path)?;
+    let attributes = exr::decode_attributes(file).with_context(name)?;
     let scene = attributes.get("scene").cloned();
     scene.with_context(|| format!("{} holds no scene of kerrlight", name()))
-}
-
-/// Where the picture of a `[sky.image]` lies.
-pub fn sky_path(scene: &Scene, folder: &Path) -> Option<PathBuf> {
-    match &scene.sky {
-        Some(Sky::Image(image)) => Some(folder.join(&image.path)),
-        _ => None,
-    }
-}
-
-pub fn load_sky(path: &Path) -> anyhow::Result<Panorama> {
-    let bytes = output::read(path).context("`sky.image.path`")?;
-    Panorama::decode(&bytes).with_context(|| format!("`sky.image.path` {}", path.display()))
 }

@@ -30,6 +30,33 @@ pub(super) struct Target<'a> {
     pub azimuth: &'a mut [f64],
     pub mino_time: &'a mut [f64],
     pub error: &'a mut [f64],
+    pub rays: Whole<'a>,
+}
+
+/// What is known about each ray as a whole.
+pub(super) struct Whole<'a> {
+    /// Mino time of the ray.
+    pub duration: &'a mut [f64],
+    /// Whether it returns to the observer's radius (1) or is captured (0).
+    pub escapes: &'a mut [f64],
+    /// How many times it crosses the plane.
+    pub count: &'a mut [f64],
+    /// Error of its phase, as an angle.
+    pub doubt: &'a mut [f64],
+}
+
+impl Whole<'_> {
+    /// Stores the lanes of the rays from number `from` to `to`.
+    #[inline(always)]
+    fn store<V: Real>(&mut self, from: usize, to: usize, [time, escapes, count, doubt]: [V; 4]) {
+        time.store(&mut self.duration[from..to]);
+        escapes.store(&mut self.escapes[from..to]);
+        count.store(&mut self.count[from..to]);
+        doubt.store(&mut self.doubt[from..to]);
+        for count in &mut self.count[from..to] {
+            *count = count.floor();
+        }
+    }
 }
 
 /// The work of one block of rays, at any width of lanes.
@@ -49,23 +76,73 @@ impl Task for Block<'_, '_> {
     fn run<V: Real>(self) {
         let Self { camera, alpha, beta, count, out } = self;
         let start = closed_forms::<V>(&camera, V::splat(camera.w_obs));
-        for from in (0..alpha.len()).step_by(V::LANES) {
-            let to = alpha.len().min(from + V::LANES);
-            let (alpha, beta) = (V::load(&alpha[from..to]), V::load(&beta[from..to]));
-            let rays = Bundle::new(&camera, start, alpha, beta);
-            let Target { delay, radius, azimuth, mino_time, error } = &mut *out;
-            let columns = [&mut **delay, radius, azimuth, mino_time, error]
-                .map(|column| &mut column[from * count..to * count]);
-            let (point, polar) = rays.first();
-            if count == 1 {
-                for (column, x) in columns.into_iter().zip(point) {
-                    x.store(column);
-                }
-            } else {
-                rays.all((point, polar), count, columns);
+        let order = arrange::<V>(&camera, start, alpha, beta, &mut out.rays);
+        let Target { delay, radius, azimuth, mino_time, error, .. } = out;
+        let mut columns = [&mut **delay, radius, azimuth, mino_time, error];
+        for group in order.chunk_by(|a, b| a.key == b.key) {
+            for block in group.chunks(V::LANES) {
+                let (alpha, beta) = (gather(alpha, block), gather(beta, block));
+                let rays = Bundle::new(&camera, start, alpha, beta).with_steps(group[0].key);
+                rays.all(rays.first(), count, block, &mut columns);
             }
         }
     }
+}
+
+/// Steps of the quadrature to a ray's first crossing and from one to the next. Rays are taken
+/// together with others that need as many, so that no result depends on what is beside it.
+#[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+struct Key {
+    first: u32,
+    next: u32,
+}
+
+#[derive(Clone, Copy)]
+struct Item {
+    key: Key,
+    ray: usize,
+}
+
+/// The rays in the order of their keys; what is known of each as a whole goes to `whole`.
+#[inline(always)]
+fn arrange<V: Real>(
+    camera: &Camera,
+    start: [V; 2],
+    alpha: &[f64],
+    beta: &[f64],
+    whole: &mut Whole<'_>,
+) -> Vec<Item> {
+    let mut order = Vec::with_capacity(alpha.len());
+    for from in (0..alpha.len()).step_by(V::LANES) {
+        let to = alpha.len().min(from + V::LANES);
+        let (alpha, beta) = (V::load(&alpha[from..to]), V::load(&beta[from..to]));
+        let rays = Bundle::new(camera, start, alpha, beta);
+        whole.store(from, to, rays.whole());
+        let rate = rays.motion.stiffness().sqrt() * V::splat(1.0 / MAX_STEP);
+        let (mut first, mut next) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
+        (rate * rays.time).store(&mut first);
+        (rate * rays.half).store(&mut next);
+        for ray in from..to {
+            let steps = |x: f64| x.ceil().clamp(LEAST_STEPS as f64, MOST_STEPS) as u32;
+            // A ray without a crossing takes what is left anyway.
+            let exists = whole.count[ray] > 0.0;
+            let key = Key { first: steps(first[ray - from]), next: steps(next[ray - from]) };
+            order.push(Item { key: if exists { key } else { Key::default() }, ray });
+        }
+    }
+    order.sort_by_key(|item| item.key);
+    order
+}
+
+/// What rays in a block have in `source`, the last one repeated.
+#[inline(always)]
+fn gather<V: Real>(source: &[f64], block: &[Item]) -> V {
+    let mut lanes = [0.0; MAX_LANES];
+    for (l, lane) in lanes.iter_mut().enumerate().take(V::LANES) {
+        let item = block.get(l).or(block.last());
+        *lane = item.and_then(|item| source.get(item.ray)).copied().unwrap_or(0.0);
+    }
+    V::load(&lanes)
 }
 
 /// Delay, radius, azimuth, Mino time and error of a crossing.
@@ -86,8 +163,9 @@ struct Bundle<'a, V> {
     beta: V,
     /// Mino time of the first crossing.
     time: V,
-    /// Mino time from one crossing to the next, if that has been asked for.
+    /// Mino time from one crossing to the next.
     half: V,
+    steps: Key,
 }
 
 /// Azimuth and `∫ a²(u² − 1) dτ` with λ's part along a piece of the polar motion.
@@ -103,7 +181,32 @@ impl<'a, V: Real> Bundle<'a, V> {
         let motion = Motion::new(camera, alpha, beta);
         let journey = Journey::new(camera, &motion);
         let (time, half) = polar_times(camera, &motion, beta);
-        Self { camera, start, motion, journey, alpha, beta, time, half }
+        Self { camera, start, motion, journey, alpha, beta, time, half, steps: Key::default() }
+    }
+
+    #[inline(always)]
+    fn with_steps(self, steps: Key) -> Self {
+        Self { steps, ..self }
+    }
+
+    /// Steps to crossing `number`.
+    #[inline(always)]
+    fn steps(&self, number: usize) -> usize {
+        let Key { first, next } = self.steps;
+        (first as usize + number * next as usize).clamp(LEAST_STEPS, MOST_STEPS as usize)
+    }
+
+    /// Mino time, fate, number of crossings with a fraction on top, and error of the phase.
+    #[inline(always)]
+    fn whole(&self) -> [V; 4] {
+        let s = V::splat;
+        let Journey { duration, escapes, condition, .. } = self.journey;
+        let crosses = self.time.lt(duration);
+        let safe = V::select(crosses, self.half, s(1.0));
+        let count = (duration - self.time) / safe + s(1.0);
+        let b = self.motion.stiffness().sqrt();
+        let doubt = estimate(condition, b, b, s(MAX_STEP), s(0.0));
+        [duration, escapes, V::select(crosses, count, s(0.0)), doubt]
     }
 
     /// The first crossing and the polar motion up to it; NaN where there is none.
@@ -117,7 +220,7 @@ impl<'a, V: Real> Bundle<'a, V> {
         }
         // Lanes without a crossing take the shortest of ways.
         let time = V::select(exists, self.time, self.journey.duration * s(1e-3));
-        let steps = self.steps(time);
+        let steps = self.steps(0);
         let h = time * s(1.0 / steps as f64);
         let mut polar = PolarSum::at_observer(self.camera, &self.motion, h, self.alpha, self.beta);
         let radial = self.radial(time, steps, Some(&mut polar));
@@ -134,12 +237,15 @@ impl<'a, V: Real> Bundle<'a, V> {
         &self,
         (point, first): (Point<V>, Polar<V>),
         count: usize,
-        mut columns: [&mut [f64]; 5],
+        block: &[Item],
+        columns: &mut [&mut [f64]; 5],
     ) {
-        for column in &mut columns {
-            column.fill(f64::NAN);
+        for item in block {
+            for column in columns.iter_mut() {
+                column[item.ray * count..(item.ray + 1) * count].fill(f64::NAN);
+            }
         }
-        scatter(point, 0, count, &mut columns);
+        scatter(point, 0, count, block, columns);
         let mut time = self.time;
         let mut polar = first;
         let mut period = None;
@@ -156,8 +262,8 @@ impl<'a, V: Real> Bundle<'a, V> {
             period = Some(Polar { azimuth, time: lift });
             polar = Polar { azimuth: polar.azimuth + azimuth, time: polar.time + lift };
             let safe = V::select(exists, time, self.journey.duration * V::splat(1e-3));
-            let radial = self.radial(safe, self.steps(safe), None);
-            scatter(self.point(safe, exists, radial, polar), number, count, &mut columns);
+            let radial = self.radial(safe, self.steps(number), None);
+            scatter(self.point(safe, exists, radial, polar), number, count, block, columns);
         }
     }
 
@@ -166,7 +272,7 @@ impl<'a, V: Real> Bundle<'a, V> {
     fn period(&self) -> Polar<V> {
         let s = V::splat;
         let half = V::select(self.half.lt(s(f64::MAX)), self.half, s(1e-3));
-        let steps = self.steps(half);
+        let steps = (self.steps.next as usize).clamp(LEAST_STEPS, MOST_STEPS as usize);
         let h = half * s(1.0 / steps as f64);
         let mut polar = PolarSum::at_equator(self.camera, &self.motion, h);
         for _ in 0..steps {
@@ -174,12 +280,6 @@ impl<'a, V: Real> Bundle<'a, V> {
         }
         let azimuth = unwrap(polar.angle(), self.sense()) + polar.turned(steps);
         Polar { azimuth, time: polar.time(steps) }
-    }
-
-    #[inline(always)]
-    fn steps(&self, time: V) -> usize {
-        let length = greatest(self.motion.stiffness().sqrt() * time) / MAX_STEP;
-        length.ceil().clamp(LEAST_STEPS as f64, MOST_STEPS) as usize
     }
 
     /// The sign of −λ = α sin i; where it vanishes that of α counts.
@@ -238,7 +338,6 @@ impl<'a, V: Real> Bundle<'a, V> {
         }
         // From there to the turning point, and back.
         let rest = V::select(outward, turning - inner, inner);
-        let steps = self.steps(rest);
         let mut run = RadialSum::new(m, rest * s(1.0 / steps as f64), end.w, end.speed);
         for _ in LEAST_STEPS..steps {
             run.next();
@@ -363,22 +462,20 @@ fn polar_times<V: Real>(cam: &Camera, m: &Motion<V>, beta: V) -> (V, V) {
     (V::select(oscillates, first, never), half)
 }
 
-/// The greatest lane.
+/// Crossing `number` of each ray of a block, out of `count`.
 #[inline(always)]
-fn greatest<V: Real>(x: V) -> f64 {
-    let mut lanes = [0.0; MAX_LANES];
-    x.store(&mut lanes);
-    lanes.iter().take(V::LANES).fold(0.0, |a, &b| if b > a { b } else { a })
-}
-
-/// Crossing `number` of each ray, out of `count`.
-#[inline(always)]
-fn scatter<V: Real>(point: Point<V>, number: usize, count: usize, columns: &mut [&mut [f64]; 5]) {
+fn scatter<V: Real>(
+    point: Point<V>,
+    number: usize,
+    count: usize,
+    block: &[Item],
+    columns: &mut [&mut [f64]; 5],
+) {
     let mut lanes = [0.0; MAX_LANES];
     for (x, column) in point.into_iter().zip(columns) {
         x.store(&mut lanes);
-        for (x, slot) in lanes.iter().zip(column.iter_mut().skip(number).step_by(count)) {
-            *slot = *x;
+        for (x, item) in lanes.iter().zip(block) {
+            column[item.ray * count + number] = *x;
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Equatorial crossings of many rays.
 
 use super::column::Column;
-use super::crossing::{Block, Target};
+use super::crossing::{Block, Target, Whole};
 use super::dispatch::{Width, dispatch};
 use super::motion::Camera;
 use super::{BLOCK, checked};
@@ -24,6 +24,22 @@ pub struct Crossings {
     azimuth: Column,
     mino_time: Column,
     error: Column,
+    rays: [Column; 4],
+}
+
+/// What is known about a ray as a whole.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayEnds {
+    /// Mino time of the whole ray.
+    pub mino_total: f64,
+    /// Whether it returns to the observer's radius, be that infinite; else it is captured.
+    pub escapes: bool,
+    /// How many times it crosses the plane, asked for or not.
+    pub crossings: u32,
+    /// An estimate, rarely exceeded, of the error of its phase by rounding, in radians: in
+    /// inverse proportion to its distance from the critical curve. Where that is not small
+    /// against the tolerance a ray is better traced by an integrator.
+    pub error: f64,
 }
 
 /// Where a ray crosses the equatorial plane.
@@ -96,6 +112,20 @@ impl Crossings {
         })
     }
 
+    /// Ray number `k` as a whole.
+    ///
+    /// # Panics
+    /// If there is no such ray.
+    pub fn ends(&self, k: usize) -> RayEnds {
+        let [duration, escapes, count, doubt] = &self.rays;
+        RayEnds {
+            mino_total: duration[k],
+            escapes: escapes[k] > 0.5,
+            crossings: count[k] as u32,
+            error: doubt[k],
+        }
+    }
+
     /// Finds the first `per_ray` crossings of the rays that arrive at (`alpha[k]`, `beta[k]`).
     /// Memory is reused.
     ///
@@ -131,6 +161,8 @@ impl Crossings {
         let camera = checked(hole, observer, alpha, beta)?;
         let count = alpha.len().checked_mul(per_ray);
         let fits = self.columns().into_iter().try_for_each(|column| column.resize(count));
+        let rays = self.rays.iter_mut().try_for_each(|column| column.resize(Some(alpha.len())));
+        let fits = fits.and(rays);
         if let Err(error) = fits {
             *self = Self::default();
             return Err(error);
@@ -156,14 +188,20 @@ impl Crossings {
         let count = self.per_ray;
         // The columns have that length times the number of rays.
         let long = BLOCK.saturating_mul(count);
+        let [duration, escapes, crossings, doubt] = &mut self.rays;
+        let rays = duration
+            .chunks_mut(BLOCK)
+            .zip(escapes.chunks_mut(BLOCK))
+            .zip(crossings.chunks_mut(BLOCK).zip(doubt.chunks_mut(BLOCK)))
+            .map(|((duration, escapes), (count, doubt))| Whole { duration, escapes, count, doubt });
         let blocks: Vec<_> = alpha
             .chunks(BLOCK)
             .zip(beta.chunks(BLOCK))
             .zip(self.delay.chunks_mut(long).zip(self.radius.chunks_mut(long)))
             .zip(self.azimuth.chunks_mut(long).zip(self.mino_time.chunks_mut(long)))
-            .zip(self.error.chunks_mut(long))
-            .map(|((((alpha, beta), (delay, radius)), (azimuth, mino_time)), error)| {
-                (alpha, beta, Target { delay, radius, azimuth, mino_time, error })
+            .zip(self.error.chunks_mut(long).zip(rays))
+            .map(|((((alpha, beta), (delay, radius)), (azimuth, mino_time)), (error, rays))| {
+                (alpha, beta, Target { delay, radius, azimuth, mino_time, error, rays })
             })
             .collect();
         let work = |(alpha, beta, mut out): (&[f64], &[f64], Target<'_>)| {

@@ -1,4 +1,5 @@
-//! The few elliptic functions that the sampler needs, on lanes.
+//! The few elliptic functions that the sampler needs, on lanes. Iterations leave a lane alone once
+//! it has converged, so that no result depends on what is in the other lanes.
 //!
 //! Everything here is written for Weierstrass' cubic
 //! `p'² = 4p³ − g₂p − g₃ = 4(p − e)(p² + e p + e² − g₂/4)`
@@ -30,13 +31,15 @@ pub fn isolated_root<V: Real>(g2: V, g3: V, scale: V) -> V {
         + c * V::splat(0.282) * (q / full.max(V::splat(1e-300)));
     let near = near.min(c + c);
     let mut s = V::select(q.lt(full), near, bound);
+    let (mut live, half) = (V::splat(1.0), V::splat(0.5));
     for _ in 0..60 {
         let s2 = s * s;
         let f = (s2 - p).mul_add(s, -q);
         let d = s2.mul_add(V::splat(3.0), -p).max(V::splat(1e-300));
         let step = f / d;
-        s = s - step;
-        if !V::any((s.abs() * V::splat(1e-15)).lt(step.abs())) {
+        s = V::select(half.lt(live), s - step, s);
+        live = V::select((s.abs() * V::splat(1e-15)).lt(step.abs()), live, V::splat(0.0));
+        if !V::any(half.lt(live)) {
             break;
         }
     }
@@ -57,20 +60,23 @@ pub fn rf_pair<V: Real>(x: V, m: V, d: V) -> V {
 #[inline(always)]
 pub fn rf_from<V: Real>(x: V, m: V, d: V, product: V) -> V {
     let (mut x, mut m, mut d, mut product) = (x, m, d, product);
-    let zero = V::splat(0.0);
+    let (zero, half) = (V::splat(0.0), V::splat(0.5));
     let quarter = V::splat(0.25);
+    let mut live = V::splat(1.0);
     for _ in 0..40 {
         let pair = product.max(zero).sqrt();
         let sum = (m + pair + m + pair).max(zero);
         let lambda = pair + (x * sum).max(zero).sqrt();
-        x = (x + lambda) * quarter;
-        m = (m + lambda) * quarter;
-        d = d * V::splat(0.0625);
+        let now = half.lt(live);
+        x = V::select(now, (x + lambda) * quarter, x);
+        m = V::select(now, (m + lambda) * quarter, m);
+        d = V::select(now, d * V::splat(0.0625), d);
         product = m.mul_add(m, -d);
         let dx = m - x;
         let size = (dx * dx).max(d.abs());
         let mean = x + m + m;
-        if !V::any((mean * mean * V::splat(4e-6)).lt(size)) {
+        live = V::select((mean * mean * V::splat(4e-6)).lt(size), live, zero);
+        if !V::any(half.lt(live)) {
             break;
         }
     }
@@ -93,13 +99,16 @@ pub fn rf_from<V: Real>(x: V, m: V, d: V, product: V) -> V {
 #[inline(always)]
 pub fn agm<V: Real>(a: V, b: V) -> V {
     let (mut a, mut b) = (a, b);
+    let (mut live, half) = (V::splat(1.0), V::splat(0.5));
     for _ in 0..40 {
-        let mean = (a + b) * V::splat(0.5);
+        let mean = (a + b) * half;
         let apart = (a - b).abs();
-        b = (a * b).sqrt();
-        a = mean;
+        let now = half.lt(live);
+        b = V::select(now, (a * b).sqrt(), b);
+        a = V::select(now, mean, a);
         // The means of numbers that agree to 1e-8 agree to rounding.
-        if !V::any((mean * V::splat(1e-8)).lt(apart)) {
+        live = V::select((mean * V::splat(1e-8)).lt(apart), live, V::splat(0.0));
+        if !V::any(half.lt(live)) {
             break;
         }
     }

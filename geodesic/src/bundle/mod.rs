@@ -38,15 +38,20 @@ mod dispatch;
 mod elliptic;
 mod error;
 mod lanes;
+mod march;
 mod math;
 mod motion;
+mod nodes;
+mod panel;
 mod polar;
 mod radial;
 mod sample;
 mod samples;
 
-pub use crossings::{Crossing, Crossings};
+pub use crossings::{Crossing, Crossings, RayEnds};
 pub use dispatch::Width;
+pub use nodes::{NodeRequest, Nodes, RayNodes};
+pub use panel::PanelRule;
 pub use samples::{RaySamples, Samples};
 
 use crate::error::{OutOfRange, check};

@@ -127,6 +127,43 @@ impl<V: Real> Motion<V> {
     }
 }
 
+/// Mino time of the radial motion as a function of the radius: with z the time since an observer
+/// at infinity, `℘(z) = (1 + w')/(2w²) + A/12`, so that z is one `R_F`.
+#[derive(Clone, Copy)]
+pub struct Clock<V> {
+    /// The isolated root of `4t³ − g₂t − g₃`.
+    e: V,
+    /// The mean of the others, `−e/2`.
+    half: V,
+    /// Half their difference, squared.
+    gap: V,
+    shift: V,
+}
+
+impl<V: Real> Clock<V> {
+    /// That of one motion.
+    #[inline(always)]
+    pub fn new(m: &Motion<V>) -> Self {
+        let s = V::splat;
+        let (g2, g3) = m.radial_invariants();
+        let e = isolated_root(g2, g3, m.stiffness() * s(1.0 / 6.0));
+        let gap = (e * e).neg_mul_add(s(0.75), g2 * s(0.25));
+        Self { e, half: e * s(-0.5), gap, shift: m.a * s(1.0 / 12.0) }
+    }
+
+    /// The time at which ℘ has the value p.
+    #[inline(always)]
+    fn read(&self, p: V) -> V {
+        rf_pair(p - self.e, p - self.half, self.gap)
+    }
+
+    /// From infinity inwards to the point w > 0 that is passed at the speed w'.
+    #[inline(always)]
+    pub fn until(&self, w: V, speed: V) -> V {
+        self.read((speed + V::splat(1.0)) / (w * w * V::splat(2.0)) + self.shift)
+    }
+}
+
 /// How long a ray lasts, and what becomes of it.
 #[derive(Clone, Copy)]
 pub struct Journey<V> {
@@ -137,22 +174,22 @@ pub struct Journey<V> {
     /// By how much the photon orbit amplifies errors: 1/(distance from the critical curve), up to
     /// a factor of order 1; one for rays that pass it at a distance.
     pub condition: V,
+    /// Where rays that escape turn.
+    pub r_turn: V,
 }
 
 impl<V: Real> Journey<V> {
     /// Classifies the ray and measures its Mino time.
-    ///
-    /// With observer-at-infinity time z the radial motion has
-    /// `℘(z) = (1 + w')/(2w²) + A/12`, so z follows from one `R_F` of the
-    /// end point and one of the starting point.
     #[inline(always)]
     pub fn new(cam: &Camera, m: &Motion<V>) -> Self {
+        Self::by(&Clock::new(m), cam, m)
+    }
+
+    /// [`new`](Self::new) with the ray's own clock.
+    #[inline(always)]
+    pub fn by(clock: &Clock<V>, cam: &Camera, m: &Motion<V>) -> Self {
         let s = V::splat;
-        let (g2, g3) = m.radial_invariants();
-        let e = isolated_root(g2, g3, m.stiffness() * s(1.0 / 6.0));
-        // Half the difference of the other two roots, squared; their mean is −e/2.
-        let gap = (e * e).neg_mul_add(s(0.75), g2 * s(0.25));
-        let half = e * s(-0.5);
+        let Clock { e, half, gap, .. } = *clock;
         let smallest = V::select(gap.lt(s(0.0)), e, e.min(half - gap.max(s(0.0)).sqrt()));
         // Ferrari: r = z ± √(−A/2 − z² − B/(4z)), z² = −A/6 − (the smallest root).
         let z2 = m.a.mul_add(s(-1.0 / 6.0), -smallest).max(s(1e-30));
@@ -160,27 +197,25 @@ impl<V: Real> Journey<V> {
         let turn = m.a.mul_add(s(-0.5), -z2) - m.b * s(0.25) / z;
         let r_turn = z + turn.max(s(0.0)).sqrt();
         let escapes = V::both(s(0.0).lt(turn), s(cam.r_plus()).lt(r_turn));
-        let shift = m.a * s(1.0 / 12.0);
-        let at_turn = (r_turn * r_turn).mul_add(s(0.5), shift);
+        let at_turn = (r_turn * r_turn).mul_add(s(0.5), clock.shift);
         let w_end = s(cam.w_end());
         // W = (1 + κw²)² − (B/2) w² (1 − r₊w)(1 − r₋w): positive terms dominate at the horizon.
         let p = m.kappa.mul_add(w_end * w_end, s(1.0));
         let near =
             s(cam.margin * (1.0 - cam.r_minus() * cam.w_end()) * cam.w_end() * cam.w_end() * 0.5);
         let speed = p.mul_add(p, -(m.b * near)).max(s(0.0)).sqrt();
-        let at_end = (speed + s(1.0)) / (w_end * w_end * s(2.0)) + shift;
-        let p_end = V::select(escapes, at_turn, at_end);
-        let end = rf_pair(p_end - e, p_end - half, gap);
+        let at_end = (speed + s(1.0)) / (w_end * w_end * s(2.0)) + clock.shift;
+        let end = clock.read(V::select(escapes, at_turn, at_end));
         let mut inward = end;
         if cam.w_obs > 0.0 {
             let w_obs = s(cam.w_obs);
-            let at_start = (m.radial(w_obs).sqrt() + s(1.0)) / (w_obs * w_obs * s(2.0)) + shift;
-            inward = end - rf_pair(at_start - e, at_start - half, gap);
+            inward = end - clock.until(w_obs, m.radial(w_obs).sqrt());
         }
         Self {
             duration: V::select(escapes, inward + inward, inward),
             escapes: V::select(escapes, s(1.0), s(0.0)),
             condition: V::select(e.lt(s(0.0)), near_critical(m.stiffness(), e, gap), s(1.0)),
+            r_turn,
         }
     }
 }

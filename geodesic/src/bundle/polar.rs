@@ -34,6 +34,15 @@ pub struct PolarState<V> {
     du: V,
 }
 
+/// A direction and its rate of change.
+#[derive(Clone, Copy)]
+pub struct Direction<V> {
+    /// The unit vector.
+    pub n: [V; 3],
+    /// dn/dτ.
+    pub velocity: [V; 3],
+}
+
 /// The addition theorem of the polar motion for one fixed step h.
 #[derive(Clone, Copy)]
 pub struct PolarStep<V> {
@@ -127,6 +136,51 @@ impl<V: Real> PolarStep<V> {
         let dx = (speed * vx - x * self.rate_x.mul_add(k(0.5), e)) * rho;
         let dy = (speed * vy + self.twist * x) * rho;
         PolarState { x: x + dx, y: dy, u: u + du, dx, dy, du }
+    }
+
+    /// The direction one step after `from`, in the frame that turns by [`turn`](Self::turn)
+    /// meanwhile.
+    #[inline(always)]
+    pub fn jump(&self, from: &Direction<V>) -> [V; 3] {
+        let [x, y, u] = from.n;
+        let [vx, vy, vu] = from.velocity;
+        let e = self.half_bend * u * u;
+        let rho = (e + V::splat(1.0)).recip();
+        let speed = self.s * self.root;
+        let fall = self.rate_x.mul_add(V::splat(0.5), e);
+        let dx = speed * vx - self.twist.mul_add(y, fall * x);
+        let dy = speed * vy + (self.twist * x - fall * y);
+        let du = self.s * vu - self.rate_u.mul_add(V::splat(0.5), e) * u;
+        [dx.mul_add(rho, x), dy.mul_add(rho, y), du.mul_add(rho, u)]
+    }
+
+    /// Its third component alone.
+    #[inline(always)]
+    pub fn jump_u(&self, u: V, speed: V) -> V {
+        let e = self.half_bend * u * u;
+        let du = self.s * speed - self.rate_u.mul_add(V::splat(0.5), e) * u;
+        du.mul_add((e + V::splat(1.0)).recip(), u)
+    }
+
+    /// du/dτ where a jump from `from` has led to u.
+    #[inline(always)]
+    pub fn arrive_u(&self, from: V, u: V) -> V {
+        let e = self.half_bend * u * u;
+        let rise = (u - from) * (e + V::splat(1.0));
+        self.rate_u.mul_add(V::splat(0.5), e).neg_mul_add(u, rise) / self.s
+    }
+
+    /// The velocity where a jump from `from` has led to `n`.
+    #[inline(always)]
+    pub fn arrive(&self, from: &Direction<V>, n: [V; 3]) -> [V; 3] {
+        let [x, y, u] = n;
+        let e = self.half_bend * u * u;
+        let weight = e + V::splat(1.0);
+        let fall = self.rate_x.mul_add(V::splat(0.5), e);
+        let over = (self.s * self.root).recip();
+        let vx = (x - from.n[0]) * weight + (self.twist * y - fall * x);
+        let vy = (y - from.n[1]) * weight - self.twist.mul_add(x, fall * y);
+        [vx * over, vy * over, self.arrive_u(from.n[2], u)]
     }
 
     /// One step on.

@@ -94,6 +94,20 @@ impl<V: Real> RadialStep<V> {
         (RadialState { w: w + up, dw: up }, RadialState { w: w + down, dw: down })
     }
 
+    /// `w` one step after the point (w, w').
+    #[inline(always)]
+    pub fn jump(&self, w: V, speed: V) -> V {
+        let up = self.slope.mul_add(speed, self.numerator(w));
+        up.mul_add((self.denominator(w) * V::splat(2.0)).recip(), w)
+    }
+
+    /// `w'` at the point w that a step from the point `from` has led to.
+    #[inline(always)]
+    pub fn arrive(&self, from: V, w: V) -> V {
+        let back = (from - w) * V::splat(2.0);
+        back.neg_mul_add(self.denominator(w), self.numerator(w)) * self.inv_slope
+    }
+
     /// One step on; also `w'` at the point that is left.
     #[inline(always)]
     pub fn advance(&self, now: RadialState<V>) -> (RadialState<V>, V) {

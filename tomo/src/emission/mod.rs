@@ -2,6 +2,9 @@
 //! adds up along a ray is the business of [`transport`](crate::transport).
 
 pub mod disc;
+pub mod gas;
+pub mod mesh;
 pub mod page_thorne;
 pub mod sky;
 pub mod spot;
+pub mod spot_parts;

@@ -96,6 +96,43 @@ impl SpotModel {
         if square > CUT_OFF * CUT_OFF { 0.0 } else { self.peak * (-0.5 * square).exp() }
     }
 
+    /// Angles by which matter has turned at the times from..to and at the radii of a shell: the
+    /// least and the largest. (At every radius the angle is linear in time, at every time it is
+    /// monotonic in radius: extremes are at the corners.)
+    pub(super) fn turned_between(
+        &self,
+        [inner, outer]: [f64; 2],
+        [from, to]: [f64; 2],
+    ) -> [f64; 2] {
+        if self.sheared_since.is_none() {
+            let rate = self.rate(self.orbit);
+            let (a, b) = (rate * from, rate * to);
+            return [a.min(b), a.max(b)];
+        }
+        let corners = [(inner, from), (inner, to), (outer, from), (outer, to)];
+        let angles = corners.map(|(r, time)| self.turned(r, time));
+        if angles.iter().any(|angle| !angle.is_finite()) {
+            return [f64::NEG_INFINITY, f64::INFINITY];
+        }
+        let most = angles.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        [angles.into_iter().fold(f64::INFINITY, f64::min), most]
+    }
+
+    /// Speed of the centre, in coordinates.
+    pub(super) fn speed(&self) -> f64 {
+        self.orbit * self.rate(self.orbit).abs()
+    }
+
+    /// Since when it is sheared.
+    pub(super) fn sheared_since(&self) -> Option<f64> {
+        self.sheared_since
+    }
+
+    /// Centre before it has turned, axis and radius of the orbit.
+    pub(super) fn orbit(&self) -> ([f64; 3], [f64; 3], f64) {
+        (self.start, self.axis, self.orbit)
+    }
+
     /// Whether a piece of path with these ends and this length, all in comoving
     /// coordinates, misses the spot.
     pub fn is_missed(&self, carried: [&Comoving; 2], length: f64) -> bool {
@@ -130,7 +167,8 @@ pub fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     dot(offset, offset).sqrt()
 }
 
-fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+/// The vector from b to a.
+pub(super) fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 

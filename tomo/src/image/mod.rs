@@ -6,6 +6,7 @@ pub mod colormap;
 pub mod exr;
 pub mod overlay;
 pub mod preview;
+pub mod reduce;
 pub mod sheet;
 pub mod ticks;
 

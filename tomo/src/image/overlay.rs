@@ -11,25 +11,25 @@ const CYAN: Rgb = [70, 220, 255];
 const POINTS: u32 = 720;
 
 /// Draws the critical curve of a hole seen at an inclination from infinity; `pixel` is the width
-/// of a pixel in M, the screen's origin is in the middle.
-pub fn critical_curve(canvas: &mut Canvas, size: [usize; 2], pixel: f64, curve: [f64; 2]) {
+/// of a pixel in M, `size` that of the field in pixels; the screen's origin is in its middle.
+pub fn critical_curve(canvas: &mut Canvas, size: [f64; 2], pixel: f64, curve: [f64; 2]) {
     let [spin, degrees] = curve;
     let (Ok(hole), Ok(place)) = (Kerr::new(spin), Inclination::from_degrees(degrees)) else {
         return;
     };
-    let [middle_x, middle_y] = size.map(|n| 0.5 * n as f64);
+    let [middle_x, middle_y] = size.map(|n| 0.5 * n);
     let points: Vec<[f64; 2]> = CriticalCurve::new(&hole, place)
         .points(POINTS)
         .map(|p| [middle_x + p.alpha / pixel, middle_y - p.beta / pixel])
         .collect();
-    canvas.line(&points, true, (size[0] as f64 / 400.0).max(1.0), CYAN);
+    canvas.line(&points, true, (size[0] / 400.0).max(1.0), CYAN);
 }
 
 /// Draws a scale bar in the lower left corner: a round length in M of about a quarter of the
 /// picture, and, for an observer at infinity, what that is in microarcseconds. `pixel` is the
-/// width of a pixel in M.
-pub fn scale_bar(canvas: &mut Canvas, size: [usize; 2], pixel: f64, uas_per_m: Option<f64>) {
-    let [width, height] = size.map(|n| n as f64);
+/// width of a pixel in M, `size` that of the field in pixels.
+pub fn scale_bar(canvas: &mut Canvas, size: [f64; 2], pixel: f64, uas_per_m: Option<f64>) {
+    let [width, height] = size;
     let length = round_length(0.25 * width * pixel);
     let angle = uas_per_m.map(|scale| format!(" = {} µas", digits(length * scale)));
     let text = format!("{} M{}", digits(length), angle.unwrap_or_default());
@@ -91,7 +91,7 @@ mod tests {
     #[test]
     fn exact_critical_curve_of_schwarzschild() {
         let mut canvas = Canvas::new(200, 200, [0; 3]).unwrap();
-        critical_curve(&mut canvas, [200, 200], 0.1, [0.0, 30.0]);
+        critical_curve(&mut canvas, [200.0; 2], 0.1, [0.0, 30.0]);
         let drawn = canvas.into_picture();
         let radius = 10.0 * 27f64.sqrt();
         for (x, y, pixel) in drawn.enumerate_pixels() {
@@ -107,7 +107,7 @@ mod tests {
     fn exact_length_of_the_scale_bar() {
         let mut canvas = Canvas::new(400, 300, [0; 3]).unwrap();
         // A quarter of the picture is 20 M.
-        scale_bar(&mut canvas, [400, 300], 0.2, Some(5.0));
+        scale_bar(&mut canvas, [400.0, 300.0], 0.2, Some(5.0));
         let drawn = canvas.into_picture();
         let row = |y: u32| (0..400).filter(|x| drawn.get_pixel(*x, y).0 == [255; 3]).count();
         assert_eq!(row(300 - 12 - 1), 100);

@@ -8,6 +8,8 @@
 //! so.
 
 pub mod array;
+#[cfg(test)]
+mod conformance;
 pub mod data_terms;
 pub mod earth;
 pub mod files;

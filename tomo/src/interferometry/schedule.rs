@@ -107,8 +107,8 @@ impl Schedule {
         let hours = "hours in [-48, 72]";
         check("start", self.start_h, (-48.0..=72.0).contains(&self.start_h), hours)?;
         check("stop", self.stop_h, (-48.0..=72.0).contains(&self.stop_h), hours)?;
-        let ok = self.stop_h >= self.start_h;
-        check("stop", self.stop_h, ok, "not before the start (add 24 h past midnight)")?;
+        let ok = self.stop_h > self.start_h || self.stop_h == self.start_h && self.scans < 2;
+        check("stop", self.stop_h, ok, "later than the start (add 24 h past midnight)")?;
         let ok = (1..=MOST_SCANS).contains(&self.scans);
         check("number of scans", self.scans.into(), ok, "1 to 1000000")
     }
@@ -238,6 +238,7 @@ fn scan(
                 products: [Complex64::new(0.0, 0.0); 4],
                 noise_sigma: hand_sigmas(sefds[0], sefds[1], setup),
                 opacity: [0.0; 2],
+                channel: 0,
             });
         }
     }

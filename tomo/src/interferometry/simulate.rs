@@ -1,8 +1,8 @@
 //! A movie through an array: what [`schedule::observe`](super::schedule::observe) lays out, filled
 //! with the visibilities of images.
 
-use super::observation::{Basis, Observation, Row};
-use super::operator::{Dtft, ImageGrid, Operator, Pulse};
+use super::observation::{Basis, Observation};
+use super::operator::{ImageGrid, Method, Operator, Pulse, Transform};
 use super::{Complex64, schedule::ScheduleError};
 
 /// Exponentials up to this many bytes are kept while a movie is transformed.
@@ -24,51 +24,85 @@ impl Movie {
     }
 }
 
-/// Sets the visibilities of unpolarised emission: image k is seen at the k-th of `times_h`, an
-/// only one always. Rows at no such time keep what they have.
+/// Sets the visibilities of unpolarised emission. Image k shows the source at `times_h[k]` (hours
+/// of UTC, increasing); between two images it is the linear interpolation of both, which is that of
+/// their visibilities. An only image is seen always, and its time does not matter. Says which
+/// transform it has taken.
 ///
 /// # Errors
-/// If the number of images is neither 1 nor that of times.
+/// If the accuracy of the transform is out of range, the number of images is not that of times, times do not increase, or a row lies before the
+/// first or after the last image.
 pub fn fill(
     observation: &mut Observation,
     movie: &Movie,
     pulse: Pulse,
     times_h: &[f64],
-) -> Result<(), ScheduleError> {
-    let frames = movie.frames();
-    if frames != 1 && frames != times_h.len() {
-        return Err(ScheduleError::Range {
-            name: "number of images",
-            value: frames as f64,
-            allowed: "1, or one for each scan",
-        });
-    }
-    let mut rows: Vec<Vec<&mut Row>> = (0..frames).map(|_| Vec::new()).collect();
-    for row in &mut observation.rows {
-        let frame = times_h.iter().position(|time| *time == row.time_h);
-        if let Some(frame) = frame {
-            rows[frame.min(frames - 1)].push(row);
+    method: Method,
+) -> Result<String, ScheduleError> {
+    check(movie, times_h)?;
+    let mut shares: Vec<Vec<(usize, f64)>> = vec![Vec::new(); movie.frames()];
+    for (index, row) in observation.rows.iter().enumerate() {
+        for (frame, weight) in neighbours(times_h, row.time_h)? {
+            shares[frame].push((index, weight));
         }
     }
-    let uv: Vec<Vec<[f64; 2]>> =
-        rows.iter().map(|rows| rows.iter().map(|row| row.uv).collect()).collect();
-    let operator = Dtft::<f64>::new(movie.grid, pulse, &uv, MEMORY);
-    let mut visibilities = vec![Complex64::new(0.0, 0.0); operator.data()];
-    operator.forward(&movie.pixels, &mut visibilities);
+    let uv_of = |shares: &Vec<(usize, f64)>| {
+        shares.iter().map(|(row, _)| observation.rows[*row].uv).collect()
+    };
+    let uv: Vec<Vec<[f64; 2]>> = shares.iter().map(uv_of).collect();
+    let operator = Transform::<f64>::new(movie.grid, pulse, &uv, method, MEMORY)?;
     let none = Complex64::new(0.0, 0.0);
-    for (row, v) in rows.into_iter().flatten().zip(visibilities) {
-        row.products = match observation.basis {
-            Basis::Circular => [v, v, none, none],
-            Basis::Stokes => [v, none, none, none],
-        };
+    let mut visibilities = vec![none; operator.data()];
+    operator.forward(&movie.pixels, &mut visibilities);
+    observation.rows.iter_mut().for_each(|row| row.products = [none; 4]);
+    for ((row, weight), v) in shares.iter().flatten().zip(visibilities) {
+        let products = &mut observation.rows[*row].products;
+        products[0] += v * weight;
+        if observation.basis == Basis::Circular {
+            products[1] += v * weight;
+        }
+    }
+    Ok(operator.describe())
+}
+
+fn check(movie: &Movie, times_h: &[f64]) -> Result<(), ScheduleError> {
+    let range = |name, value, allowed| Err(ScheduleError::Range { name, value, allowed });
+    let frames = movie.frames();
+    if frames == 0 || frames != times_h.len() {
+        return range("number of images", frames as f64, "1 at least, and as many as times");
+    }
+    if let Some(time) = times_h.iter().find(|time| !time.is_finite()) {
+        return range("time of an image", *time, "finite");
+    }
+    if let Some(pair) = times_h.windows(2).find(|pair| pair[0] >= pair[1]) {
+        return range("time of an image", pair[1], "hours later than the image before");
     }
     Ok(())
+}
+
+/// The images that a time lies between, with their weights; one where it is that of an image.
+fn neighbours(
+    times_h: &[f64],
+    time_h: f64,
+) -> Result<impl Iterator<Item = (usize, f64)>, ScheduleError> {
+    let after = times_h.partition_point(|time| *time <= time_h);
+    let weight = match (times_h.get(after.wrapping_sub(1)), times_h.get(after)) {
+        _ if times_h.len() == 1 => 0.0,
+        (Some(before), Some(after)) => (time_h - before) / (after - before),
+        (Some(last), None) if *last == time_h => 0.0,
+        _ => {
+            let allowed = "hours from the first image to the last";
+            return Err(ScheduleError::Range { name: "time of a scan", value: time_h, allowed });
+        }
+    };
+    let before = after.saturating_sub(1);
+    Ok([(before, 1.0 - weight), (before + 1, weight)].into_iter().filter(|(_, w)| *w > 0.0))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interferometry::observation::Measured;
+    use crate::interferometry::observation::{Measured, Row};
 
     #[test]
     fn exact_images_go_to_their_scans() {
@@ -78,10 +112,25 @@ mod tests {
         let mut observation =
             Observation { rows: rows.to_vec(), ..Observation::empty(Basis::Stokes) };
         let mut movie = Movie { grid, pixels: vec![3.0, 5.0] };
-        fill(&mut observation, &movie, Pulse::Delta, &[1.0, 2.0]).unwrap();
+        fill(&mut observation, &movie, Pulse::Delta, &[1.0, 2.0], Method::Direct).unwrap();
         let found: Vec<f64> = observation.rows.iter().map(|row| row.products[0].re).collect();
         assert_eq!(found, [5.0, 3.0, 5.0]);
-        movie.pixels.push(7.0);
-        assert!(fill(&mut observation, &movie, Pulse::Delta, &[1.0, 2.0]).is_err());
+        fill(&mut observation, &movie, Pulse::Delta, &[0.0, 4.0], Method::Fast(1e-12)).unwrap();
+        let found: Vec<f64> = observation.rows.iter().map(|row| row.products[0].re).collect();
+        let error = |(a, b): (&f64, f64)| (a - b).abs();
+        assert!(found.iter().zip([4.0, 3.5, 4.0]).map(error).all(|e| e < 1e-11), "{found:?}");
+        let mut fail = |times: &[f64]| {
+            fill(&mut observation, &movie, Pulse::Delta, times, Method::Direct)
+                .unwrap_err()
+                .to_string()
+        };
+        assert!(fail(&[1.0, 1.5]).contains("time of a scan = 2 "));
+        assert!(fail(&[1.5, 2.0]).contains("time of a scan = 1 "));
+        assert!(fail(&[2.0, 1.0]).contains("time of an image = 1 "));
+        assert!(fail(&[1.0, f64::NAN]).contains("time of an image = NaN"));
+        assert!(fail(&[1.0]).contains("number of images = 2"));
+        movie.pixels.truncate(1);
+        fill(&mut observation, &movie, Pulse::Delta, &[99.0], Method::Direct).unwrap();
+        assert_eq!(observation.rows[0].products[0].re, 3.0);
     }
 }

@@ -115,11 +115,11 @@ impl CameraConfig {
     pub fn pose(&self, time: f64) -> Pose {
         let fixed = self.given();
         let mut pose = Pose { values: [0.0; 7], rates: [0.0; 7] };
-        for k in 0..NAMES.len() {
+        for (k, given) in fixed.into_iter().enumerate() {
             let knots: Vec<[f64; 2]> =
                 self.key.iter().filter_map(|key| Some([key.time, key.given()[k]?])).collect();
             // The camera looks at the hole unless it is turned away.
-            let otherwise = fixed[k].unwrap_or(if k < 4 { f64::NAN } else { 0.0 });
+            let otherwise = given.unwrap_or(if k < 4 { f64::NAN } else { 0.0 });
             [pose.values[k], pose.rates[k]] = monotone_cubic(&knots, time, otherwise);
         }
         pose

@@ -1,6 +1,6 @@
 //! Ranges of a scene's values, and errors that point at the line.
 
-use super::{Disc, Scene, Sky, Spot};
+use super::{Disc, Gas, GasMotion, GasProfile, Mesh, Scene, Sky, Spot};
 use kerrlight_geodesic::{Kerr, orbits};
 use toml_edit::{Document, Item};
 
@@ -166,13 +166,11 @@ fn finite(key: impl Into<String>, value: f64) -> Result<(), Invalid> {
     number(key, value, value.is_finite(), "a finite number")
 }
 
-/// Largest number of pixels of one picture: its channels stay below 3 GiB.
-const MOST_PIXELS: u64 = 1 << 26;
-
 pub(super) fn check(scene: &Scene) -> Result<(), Invalid> {
     check_hole_and_observer(scene)?;
     check_screen(scene)?;
     check_effects(scene)?;
+    check_combinations(scene)?;
     let tolerance = scene.tracer.tolerance;
     number(
         "tracer.tolerance",
@@ -185,8 +183,14 @@ pub(super) fn check(scene: &Scene) -> Result<(), Invalid> {
     if let Some(disc) = &scene.disc {
         check_disc(disc, &hole)?;
     }
+    if let Some(gas) = &scene.gas {
+        check_gas(gas, &hole)?;
+    }
     for (k, spot) in scene.spot.iter().enumerate() {
         check_spot(spot, k, &hole, scene.observer.time)?;
+    }
+    for (k, mesh) in scene.mesh.iter().enumerate() {
+        check_mesh(mesh, k, scene.effects.redshift)?;
     }
     scene.sky.as_ref().map_or(Ok(()), check_sky)
 }
@@ -241,14 +245,25 @@ fn check_screen(scene: &Scene) -> Result<(), Invalid> {
             return Err(Invalid::new(key, size, "a whole number in [1, 16384]"));
         }
     }
-    if u64::from(screen.width) * u64::from(screen.height) > MOST_PIXELS {
-        let size = format!("{} (with width = {})", screen.height, screen.width);
-        return Err(Invalid::new("screen.height", size, "at most 67108864 pixels in all"));
-    }
     let root = screen.samples_per_pixel.isqrt();
     if root * root != screen.samples_per_pixel || !(1..=32).contains(&root) {
         let allowed = "a square number in [1, 1024]: 1, 4, 9, 16, …";
         return Err(Invalid::new("screen.samples_per_pixel", screen.samples_per_pixel, allowed));
+    }
+    if let Some(error) = screen.image_error {
+        let ok = (1e-6..=0.5).contains(&error);
+        number("screen.image_error", error, ok, "a number in [1e-6, 0.5]")?;
+        if root != 1 {
+            let allowed = "1 with image_error, by which pixels are refined";
+            return Err(Invalid::new(
+                "screen.samples_per_pixel",
+                screen.samples_per_pixel,
+                allowed,
+            ));
+        }
+    }
+    if screen.channels.as_ref().is_some_and(Vec::is_empty) {
+        return Err(Invalid::new("screen.channels", "[]", "one name at least"));
     }
     if scene.camera.is_none() {
         check_reach(scene)?;
@@ -289,6 +304,52 @@ fn check_effects(scene: &Scene) -> Result<(), Invalid> {
         }
         (false, None) => Ok(()),
     }
+}
+
+/// Effects that have nothing to act upon, or that do not go together.
+fn check_combinations(scene: &Scene) -> Result<(), Invalid> {
+    let effects = &scene.effects;
+    if effects.absorption && scene.gas.as_ref().is_none_or(|gas| gas.absorptivity == 0.0) {
+        let allowed = "only with a [gas] whose absorptivity is above 0";
+        return Err(Invalid::new("effects.absorption", true, allowed));
+    }
+    let bodies = !scene.spot.is_empty() || !scene.mesh.is_empty();
+    if bodies && !effects.lensing {
+        let allowed = "true with hot spots or meshes: straight rays see discs, gas and skies";
+        return Err(Invalid::new("effects.lensing", false, allowed));
+    }
+    if scene.camera.is_some() && !effects.lensing {
+        let allowed = "true with a [camera]: straight rays are those of a distant observer";
+        return Err(Invalid::new("effects.lensing", false, allowed));
+    }
+    match effects.half_orbits {
+        Some(n) if n > 100 => {
+            Err(Invalid::new("effects.half_orbits", n, "a whole number in [0, 100]"))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn check_gas(gas: &Gas, hole: &Kerr) -> Result<(), Invalid> {
+    positive("gas.scale_radius", gas.scale_radius)?;
+    let within = |key: &str, value: f64, most: f64| {
+        let allowed = format!("a number in [0, {most:e}]");
+        number(key, value, (0.0..=most).contains(&value), &allowed)
+    };
+    within("gas.flatness", gas.flatness, 1e4)?;
+    within("gas.emissivity", gas.emissivity, 1e12)?;
+    within("gas.absorptivity", gas.absorptivity, 1e30)?;
+    let (outer, least) = (gas.outer_radius, hole.horizon());
+    let allowed = format!("a radius above the horizon's, {least:.6}, and at most 1e6");
+    number("gas.outer_radius", outer, outer > least && outer <= 1e6, &allowed)?;
+    if let GasProfile::PowerLaw { slope } = gas.profile {
+        let ok = (0.0..=20.0).contains(&slope);
+        number("gas.profile.power-law.slope", slope, ok, "a number in [0, 20]")?;
+    }
+    if let GasMotion::AngularMomentum { l0 } = gas.motion {
+        number("gas.motion.angular-momentum.l0", l0, l0.abs() <= 10.0, "a number in [-10, 10]")?;
+    }
+    check_color("gas.color", gas.color)
 }
 
 fn check_disc(disc: &Disc, hole: &Kerr) -> Result<(), Invalid> {
@@ -332,6 +393,33 @@ fn check_spot(spot: &Spot, k: usize, hole: &Kerr, time: f64) -> Result<(), Inval
         number(key("sheared_since"), since, ok, &allowed)?;
     }
     check_color(&key("color"), spot.color)
+}
+
+fn check_mesh(mesh: &Mesh, k: usize, redshift: bool) -> Result<(), Invalid> {
+    let key = |name: &str| format!("mesh.{k}.{name}");
+    let ok = (1e-9..=1e9).contains(&mesh.scale);
+    number(key("scale"), mesh.scale, ok, "a number in [1e-9, 1e9] (M per unit of the file)")?;
+    if !mesh.position.iter().all(|x| x.abs() <= 1e6) {
+        let value = format!("{:?}", mesh.position);
+        return Err(Invalid::new(key("position"), value, "three numbers in [-1e6, 1e6] (M)"));
+    }
+    let norm = mesh.rotation_axis.iter().map(|x| x * x).sum::<f64>();
+    if !(1e-30..=1e30).contains(&norm) {
+        let allowed = "three numbers that are not all 0, with a length in [1e-15, 1e15]";
+        return Err(Invalid::new(
+            key("rotation_axis"),
+            format!("{:?}", mesh.rotation_axis),
+            allowed,
+        ));
+    }
+    let ok = mesh.rotation_deg.abs() <= 3600.0;
+    number(key("rotation_deg"), mesh.rotation_deg, ok, "an angle in [-3600, 3600]")?;
+    brightness(key("brightness"), mesh.brightness)?;
+    if redshift && mesh.velocity.is_none() {
+        let why = "needed with redshift = true: \"static\" or \"keplerian\"";
+        return Err(Invalid::missing(key("velocity"), why));
+    }
+    mesh.color.map_or(Ok(()), |color| check_color(&key("color"), color))
 }
 
 fn check_color(key: &str, color: [f32; 3]) -> Result<(), Invalid> {

@@ -36,9 +36,15 @@ pub struct Scene {
     /// A thin equatorial disc.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub disc: Option<Disc>,
+    /// A volumetric flow.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gas: Option<Gas>,
     /// Hot spots on Keplerian orbits.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub spot: Vec<Spot>,
+    /// Triangle meshes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub mesh: Vec<Mesh>,
     /// What the rays that escape see.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sky: Option<Sky>,
@@ -115,6 +121,13 @@ pub struct Screen {
     /// Flux density to which the emission is scaled, in Jy.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub total_flux_jy: Option<f64>,
+    /// Relative L1 error of the intensity image below which pixels are refined, in place of
+    /// `samples_per_pixel`; off without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub image_error: Option<f64>,
+    /// Names of the channels that are kept; without it all that the scene has.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub channels: Option<Vec<String>>,
 }
 
 fn one() -> u32 {
@@ -122,9 +135,13 @@ fn one() -> u32 {
 }
 
 /// Which effects are simulated. What is off is not computed.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Effects {
+    /// Gravitational lensing, the one effect that is on unless switched off: off, rays are
+    /// straight lines r n in the same coordinates, for comparison.
+    #[serde(default = "on")]
+    pub lensing: bool,
     /// Gravitational redshift and Doppler shift: I = g^{3+α} I_em of a surface,
     /// dI = g^{2+α} j ds of a volume, with the spectral index α.
     #[serde(default)]
@@ -137,9 +154,35 @@ pub struct Effects {
     /// time of observation everywhere.
     #[serde(default)]
     pub slow_light: bool,
+    /// Whether gas absorbs what is behind it.
+    #[serde(default)]
+    pub absorption: bool,
+    /// The last lensed image that is seen, by its number n of half-orbits: 0 leaves the direct
+    /// image alone. Light is taken from a ray up to half-way in Mino time between its crossings
+    /// number n + 1 and n + 2 of the equatorial plane. All of them without this key.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub half_orbits: Option<u32>,
     /// The sky is averaged over what the bundle of rays between neighbouring rays covers of it.
     #[serde(default)]
     pub ray_bundles: bool,
+}
+
+impl Default for Effects {
+    fn default() -> Self {
+        Effects {
+            lensing: true,
+            redshift: false,
+            spectral_index: None,
+            slow_light: false,
+            absorption: false,
+            half_orbits: None,
+            ray_bundles: false,
+        }
+    }
+}
+
+fn on() -> bool {
+    true
 }
 
 /// How rays are traced.
@@ -162,6 +205,9 @@ pub enum Integrator {
     Dop853Mino,
     /// Taylor series in Mino time.
     TaylorMino,
+    /// The closed form, many rays a SIMD register; rays next to the critical curve, whose digits
+    /// it loses, and those that meet spots by Taylor series.
+    Elliptic,
 }
 
 impl Integrator {
@@ -170,9 +216,64 @@ impl Integrator {
         match self {
             Integrator::Rk45Mino => Method::Rk45,
             Integrator::Dop853Mino => Method::Dop853,
-            Integrator::TaylorMino => Method::Taylor,
+            Integrator::TaylorMino | Integrator::Elliptic => Method::Taylor,
         }
     }
+}
+
+/// A volumetric flow with an analytic density and motion (Gold et al. 2020, ApJ 897, 148, section
+/// 3.2), in physical units: intensities of its scene are erg s⁻¹ cm⁻² Hz⁻¹ sr⁻¹. With redshift the
+/// emissivity goes like ν^−α and the absorption like ν^−(5/2 + α), α = `effects.spectral_index`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Gas {
+    /// How the density falls with the radius.
+    pub profile: GasProfile,
+    /// The radius x = 1 of the profile, in M.
+    pub scale_radius: f64,
+    /// h of the density's factor exp(−(h cos θ)²/2): 0 for a sphere.
+    pub flatness: f64,
+    /// How it moves.
+    pub motion: GasMotion,
+    /// Emissivity at density 1 and the observed frequency, in erg s⁻¹ cm⁻³ Hz⁻¹ sr⁻¹.
+    pub emissivity: f64,
+    /// Absorption coefficient in cm⁻¹ over the emissivity.
+    #[serde(default)]
+    pub absorptivity: f64,
+    /// Radius in M beyond which there is none.
+    pub outer_radius: f64,
+    /// Linear colour of its light in the R, G, B channels.
+    #[serde(default = "white")]
+    pub color: [f32; 3],
+}
+
+/// How the density of a gas falls with x = r/scale.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum GasProfile {
+    /// exp(−x²/2).
+    Gaussian,
+    /// x^−slope.
+    PowerLaw {
+        /// The slope.
+        slope: f64,
+    },
+}
+
+/// How a gas moves.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum GasMotion {
+    /// On circles with −u_φ/u_t = l₀ R^{3/2}/(1 + R), R = r sin θ, down to the horizon.
+    AngularMomentum {
+        /// l₀.
+        l0: f64,
+    },
+    /// On circles about +z with Ω = 1/(R^{3/2} + a), R = r sin θ; dark where that is not slower
+    /// than light.
+    Keplerian,
+    /// Falling from rest at infinity without angular momentum.
+    FreeFall,
 }
 
 /// A thin disc in the equatorial plane with the flux profile of Page & Thorne (1974).
@@ -226,6 +327,46 @@ fn up() -> [f64; 3] {
     [0.0, 0.0, 1.0]
 }
 
+/// A triangle mesh as a surface. Its coordinates are r n in M: Boyer–Lindquist ones taken as
+/// Cartesian.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mesh {
+    /// OBJ, glTF or GLB file, relative to the scene file.
+    pub path: String,
+    /// M for one unit of the file.
+    pub scale: f64,
+    /// Where the file's origin comes to lie, in M.
+    #[serde(default)]
+    pub position: [f64; 3],
+    /// Axis about which it is turned first.
+    #[serde(default = "up")]
+    pub rotation_axis: [f64; 3],
+    /// By how much it is turned, right-handed, in degrees.
+    #[serde(default)]
+    pub rotation_deg: f64,
+    /// Whether it hides what is behind it.
+    pub opaque: bool,
+    /// Intensity in the surface's frame where its colour is 1; 0: black.
+    pub brightness: f64,
+    /// Linear colour of its light; without it that of its materials.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub color: Option<[f32; 3]>,
+    /// How its matter moves; needed when `effects.redshift` is on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<MeshVelocity>,
+}
+
+/// How the matter of a mesh moves, for its redshift: the surface itself stays where it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MeshVelocity {
+    /// At rest in Boyer–Lindquist coordinates.
+    Static,
+    /// About +z with Ω(r) = 1/(r^{3/2} + a).
+    Keplerian,
+}
+
 /// What the rays that escape see: `[sky.checker]`, `[sky.stars]` or `[sky.image]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase", deny_unknown_fields)]
@@ -271,6 +412,13 @@ pub struct SkyImage {
     pub path: String,
     /// Factor on the linear colours.
     pub brightness: f64,
+}
+
+impl Screen {
+    /// Whether the picture keeps a channel.
+    pub fn keeps(&self, channel: &str) -> bool {
+        self.channels.as_ref().is_none_or(|names| names.iter().any(|name| name == channel))
+    }
 }
 
 impl Scene {

@@ -1,6 +1,8 @@
 //! What one ray sees, and how light adds up to it.
 
+use super::medium::Light;
 use kerrlight_geodesic::PathPoint;
+use kerrlight_geodesic::bundle::RayNodes;
 
 /// What became of a pixel's ray, as written into the `outcome` channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -33,6 +35,8 @@ pub struct Glimpse {
     pub azimuth: f64,
     /// Delay of the brightest contribution in M; 0 where there is none.
     pub delay: f64,
+    /// Optical depth of the way to the ray's end; 0 where nothing absorbs.
+    pub optical_depth: f64,
     /// What became of the ray.
     pub fate: Fate,
 }
@@ -57,9 +61,8 @@ pub(super) struct Gather {
     pub shift: f64,
     pub rgb: [f32; 3],
     pub brightest: f64,
-    pub radius: f64,
-    pub azimuth: f64,
-    pub delay: f64,
+    pub place: Place,
+    pub depth: f64,
 }
 
 impl Gather {
@@ -69,9 +72,8 @@ impl Gather {
             shift: 0.0,
             rgb: [0.0; 3],
             brightest: 0.0,
-            radius: 0.0,
-            azimuth: 0.0,
-            delay: 0.0,
+            place: Place::default(),
+            depth: 0.0,
         }
     }
 
@@ -84,19 +86,57 @@ impl Gather {
         }
     }
 
+    /// Adds the light of a medium.
+    pub fn add_light(&mut self, light: &Light, color: [f32; 3]) {
+        self.intensity += light.intensity;
+        self.shift += light.shift;
+        self.depth += light.depth;
+        for (channel, tint) in self.rgb.iter_mut().zip(color) {
+            *channel += tint * light.intensity as f32;
+        }
+        self.mark(light.intensity, light.place);
+    }
+
+    /// Adds colour from behind everything.
+    pub fn add_behind(&mut self, color: [f32; 3]) {
+        let through = (-self.depth).exp() as f32;
+        for (channel, light) in self.rgb.iter_mut().zip(color) {
+            *channel += through * light;
+        }
+    }
+
     /// Remembers where the brightest contribution comes from.
-    pub fn mark(&mut self, brightness: f64, point: &PathPoint) {
+    pub fn mark(&mut self, brightness: f64, place: Place) {
         if brightness > self.brightest {
-            self.brightest = brightness;
-            self.radius = point.radius();
-            self.azimuth = wrap(point.azimuth);
-            self.delay = point.delay;
+            (self.brightest, self.place) = (brightness, place);
         }
     }
 }
 
+/// Where light comes from; zeros where it has not been asked.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Place {
+    pub radius: f64,
+    pub azimuth: f64,
+    pub delay: f64,
+}
+
+impl Place {
+    /// A point of a path.
+    pub fn of_point(point: &PathPoint) -> Self {
+        Place { radius: point.radius(), azimuth: point.azimuth, delay: point.delay }
+    }
+
+    /// Node number `k` of a ray.
+    pub fn of_node(nodes: &RayNodes<'_>, k: usize) -> Self {
+        let of = |column: &[f64]| column.get(k).copied().unwrap_or(0.0);
+        let [radius, azimuth, delay] = [nodes.radius, nodes.azimuth, nodes.delay].map(of);
+        Place { radius, azimuth, delay }
+    }
+}
+
 /// Into \[−π, π\].
-fn wrap(angle: f64) -> f64 {
+pub(super) fn wrap(angle: f64) -> f64 {
     use core::f64::consts::TAU;
     angle - TAU * (angle / TAU).round()
 }

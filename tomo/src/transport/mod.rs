@@ -1,21 +1,47 @@
 //! The only place where a pixel is a sum: light of every source along one ray.
+//!
+//! Rays come in blocks ([`rays`](self)): in closed form on SIMD lanes where that is asked for and
+//! keeps its digits, else step by step. Surfaces come first, since they end rays; then what
+//! fills space, on quadrature nodes; then spots; then the sky.
 
+mod chord;
 mod glimpse;
+mod medium;
+mod meshes;
+mod meter;
+mod rays;
 mod spots;
+mod straight;
 mod surface;
+#[cfg(test)]
+mod tests;
+mod tree;
 mod view;
+mod volume;
 
 pub use glimpse::{Fate, Glimpse};
+pub use medium::{Emission, Medium, Moment, Needs};
+pub use meter::{Meter, Part};
 pub use view::View;
 
 use crate::emission::disc::DiscModel;
+use crate::emission::gas::{GasEffects, GasModel};
+use crate::emission::mesh::{MeshFile, MeshModel};
 use crate::emission::sky::{Beam, Panorama, SkyModel};
 use crate::emission::spot::SpotModel;
-use crate::scene::Scene;
-use glimpse::Gather;
+use crate::scene::{Integrator, Scene};
+use glimpse::{Gather, wrap};
+use kerrlight_geodesic::bundle::{Crossings, Nodes, Samples};
 use kerrlight_geodesic::{
-    Kerr, OutOfRange, Outcome, Path, PathPoint, Tracer, Want, footprint, footprint::Number,
+    Kerr, Observer, OutOfRange, Path, PathPoint, Ray, Tracer, footprint, footprint::Number,
 };
+use meshes::{Hit as MeshHit, MeshTree};
+use rays::{End, Sight};
+use spots::{Met, SpotTree};
+use std::sync::{Arc, Mutex};
+use straight::Line;
+use surface::Hit;
+use tree::WalkScratch;
 
 /// A scene with everything computed that does not depend on the ray.
 #[derive(Debug, Clone)]
@@ -30,39 +56,120 @@ pub struct Stage {
     /// Spectral index α, if redshift is simulated.
     redshift: Option<f64>,
     slow_light: bool,
+    lensing: bool,
+    /// The last number of half-orbits that is seen.
+    half_orbits: Option<u32>,
+    /// Whether rays are traced in closed form where possible.
+    closed_form: bool,
+    /// What is told of the brightest contribution.
+    places: Needs,
     disc: Option<DiscModel>,
+    gas: Option<GasModel>,
     spots: Vec<SpotModel>,
+    /// Trees over the spots by time of observation, the latest last.
+    spot_trees: Arc<Mutex<SpotTrees>>,
+    meshes: Option<Arc<MeshTree>>,
+    one_by_one: bool,
     sky: Option<SkyModel>,
     /// Distance of neighbouring rays on the screen, if the sky is averaged over their beams.
     beams: Option<f64>,
 }
 
-/// Memory that is reused from ray to ray.
+/// The decoded files that a scene names.
+#[derive(Debug, Clone, Default)]
+pub struct Assets {
+    /// The picture of a `[sky.image]`.
+    pub sky: Option<Panorama>,
+    /// A file for each `[[mesh]]`, in their order.
+    pub meshes: Vec<MeshFile>,
+}
+
+impl From<Option<Panorama>> for Assets {
+    fn from(sky: Option<Panorama>) -> Self {
+        Assets { sky, meshes: Vec::new() }
+    }
+}
+
+/// Trees with the time that they are for.
+type SpotTrees = Vec<(f64, Arc<SpotTree>)>;
+
+/// Trees that are kept: as many as a movie's block of frames may need at once.
+const MOST_TREES: usize = 256;
+
+/// Memory that is reused from block to block.
 #[derive(Debug, Default)]
 pub struct Scratch {
     path: Path,
     beam: Path<Number>,
     intervals: Vec<[f64; 2]>,
+    crossings: Crossings,
+    nodes: Nodes,
+    samples: Samples,
+    sights: Vec<Sight>,
+    hits: Vec<Hit>,
+    volume: volume::Workspace,
+    walk: WalkScratch,
+    met: Vec<Met>,
+    pieces: Vec<[f64; 2]>,
+    mesh_hits: Vec<MeshHit>,
+    /// Where the time goes; off unless it is replaced.
+    pub meter: Meter,
+}
+
+/// Where the SIMD kernels can have an observer, in M.
+const NEAREST: f64 = 10.0;
+
+fn mesh_tree(
+    scene: &Scene,
+    files: &[MeshFile],
+    hole: &Kerr,
+) -> Result<Option<Arc<MeshTree>>, OutOfRange> {
+    if files.len() != scene.mesh.len() {
+        let (value, allowed) = (files.len() as f64, "one file for each [[mesh]]");
+        return Err(OutOfRange { field: "number of mesh files", value, allowed });
+    }
+    if files.is_empty() {
+        return Ok(None);
+    }
+    let placed = scene.mesh.iter().zip(files).map(|(mesh, file)| MeshModel::new(mesh, file));
+    Ok(Some(Arc::new(MeshTree::new(placed.collect::<Result<_, _>>()?, hole))))
 }
 
 impl Stage {
-    /// The stage of a scene; `picture` is the decoded file of a `[sky.image]`.
+    /// The stage of a scene with the files that it names.
     ///
     /// # Errors
-    /// If a value is outside its range (a parsed [`Scene`] never is).
-    pub fn new(scene: &Scene, picture: Option<Panorama>) -> Result<Self, OutOfRange> {
+    /// If a value is outside its range (a parsed [`Scene`] never is), if there is not one file for
+    /// each mesh, or if a mesh's vertex comes to lie too far out.
+    pub fn new(scene: &Scene, assets: impl Into<Assets>) -> Result<Self, OutOfRange> {
+        let assets: Assets = assets.into();
         let hole = Kerr::new(scene.hole.spin)?;
-        let sky = scene.sky.as_ref().and_then(|sky| SkyModel::new(sky, picture));
+        let kept = |name: &str| scene.screen.keeps(name);
+        let redshift = scene.effects.redshift.then_some(scene.effects.spectral_index).flatten();
+        let effects = GasEffects { redshift, absorption: scene.effects.absorption };
+        let length = 100.0 * crate::units::SPEED_OF_LIGHT;
+        let length = length * crate::units::gravitational_time(scene.hole.mass_msun);
+        let gas = scene.gas.as_ref().map(|gas| GasModel::new(gas, &hole, length, effects));
+        let view = View::new(scene, &hole)?;
+        let sky = scene.sky.as_ref().and_then(|sky| SkyModel::new(sky, assets.sky));
         Ok(Stage {
             hole,
-            view: View::new(scene, &hole)?,
+            view,
             tracer: Tracer::with_method(scene.tracer.integrator.method(), scene.tracer.tolerance)?,
-            tolerance: scene.tracer.tolerance,
             time: scene.observer.time,
-            redshift: scene.effects.redshift.then_some(scene.effects.spectral_index).flatten(),
+            redshift,
             slow_light: scene.effects.slow_light,
+            lensing: scene.effects.lensing,
+            half_orbits: scene.effects.half_orbits,
+            tolerance: scene.tracer.tolerance,
+            closed_form: scene.tracer.integrator == Integrator::Elliptic,
+            places: Needs { azimuth: kept("azimuth"), time: kept("delay"), velocity: false },
+            gas,
             disc: scene.disc.as_ref().map(|disc| DiscModel::new(disc, &hole)),
             spots: scene.spot.iter().map(|spot| SpotModel::new(spot, &hole)).collect(),
+            spot_trees: Arc::default(),
+            meshes: mesh_tree(scene, &assets.meshes, &hole)?,
+            one_by_one: false,
             sky: sky.map(|sky| if scene.effects.ray_bundles { sky.for_beams() } else { sky }),
             beams: scene.effects.ray_bundles.then(|| ray_spacing(scene)),
         })
@@ -80,6 +187,13 @@ impl Stage {
         Ok(())
     }
 
+    /// The same stage, on which every spot and every triangle is asked along every ray, without
+    /// a hierarchy: for comparisons.
+    pub fn one_by_one(mut self) -> Self {
+        self.one_by_one = true;
+        self
+    }
+
     /// The scene's own time of observation, in M.
     pub fn time(&self) -> f64 {
         self.time
@@ -88,6 +202,11 @@ impl Stage {
     /// Whether g is computed.
     pub fn has_redshift(&self) -> bool {
         self.redshift.is_some()
+    }
+
+    /// Whether anything absorbs.
+    pub fn absorbs(&self) -> bool {
+        self.gas.as_ref().is_some_and(Medium::absorbs)
     }
 
     /// What is seen at (α, β) at the scene's own time.
@@ -119,71 +238,142 @@ impl Stage {
         scratch: &mut Scratch,
         seen: &mut [Glimpse],
     ) -> Result<(), OutOfRange> {
-        let rays = alpha.len().max(1);
-        for (k, (alpha, beta)) in alpha.iter().zip(beta).enumerate() {
-            let ray = self.view.ray(&self.hole, *alpha, *beta)?;
-            self.tracer.trace(&self.hole, &ray, Want::ALL, &mut scratch.path);
-            let mut still = Gather::new();
-            let surface = self.add_disc(&ray, &scratch.path, &mut still);
-            let sky = self.sky_light(*alpha, *beta, surface, scratch)?;
-            let shift = self.redshift.and_then(|_| self.view.blueshift(*alpha, *beta));
-            let places = seen.iter_mut().skip(k).step_by(rays);
-            for (time, place) in times.iter().zip(places) {
-                *place = self.glimpse(*time, still.clone(), surface, scratch);
-                for (channel, light) in place.rgb.iter_mut().zip(sky) {
-                    *channel += light;
-                }
-                if let (Some(index), Some(shift)) = (self.redshift, shift) {
-                    place.receive(shift, index);
+        let rays = alpha.len();
+        scratch.sights.clear();
+        scratch.hits.clear();
+        if let (View::Screen(observer), false) = (&self.view, self.lensing) {
+            return self.look_straight(observer, (alpha, beta), times, scratch, seen);
+        }
+        let trees: Vec<_> = times.iter().map(|time| self.spot_tree(*time)).collect();
+        let observer = self.closed_form();
+        let clock = scratch.meter.start();
+        match observer {
+            Some(observer) => self.trace_block(observer, (alpha, beta), &trees, scratch)?,
+            None => scratch.sights.resize(rays, Sight { by_steps: true, ..Sight::default() }),
+        }
+        scratch.meter.stop(Part::Rays, clock);
+        let medium = self.gas.as_ref().map(|gas| gas as &dyn Medium);
+        scratch.volume.reset(medium.map_or(0, |_| rays * times.len()));
+        if let (Some(medium), Some(observer)) = (medium, observer) {
+            let clock = scratch.meter.start();
+            self.fill_block(medium, observer, (alpha, beta), times, scratch)?;
+            scratch.meter.stop(Part::Gas, clock);
+        }
+        for k in 0..rays {
+            let ray = self.view.ray(&self.hole, alpha[k], beta[k])?;
+            if scratch.sights[k].by_steps {
+                let clock = scratch.meter.start();
+                scratch.sights[k] = self.trace_steps(&ray, scratch);
+                scratch.meter.stop(Part::Rays, clock);
+                if let Some(medium) = medium {
+                    let clock = scratch.meter.start();
+                    self.fill_path(medium, k, times, scratch);
+                    scratch.meter.stop(Part::Gas, clock);
                 }
             }
+            self.look_along(k, &ray, (alpha[k], beta[k]), (times, &trees), scratch, seen)?;
         }
         Ok(())
     }
 
-    /// What one traced ray sees at one time; `still` is what does not depend on it.
-    fn glimpse(
+    /// [`look_many`](Self::look_many) without gravitational lensing.
+    fn look_straight(
         &self,
-        time: f64,
-        mut gather: Gather,
-        surface: Option<f64>,
+        observer: &Observer,
+        (alpha, beta): (&[f64], &[f64]),
+        times: &[f64],
         scratch: &mut Scratch,
-    ) -> Glimpse {
-        let end = surface.unwrap_or_else(|| scratch.path.mino_total());
-        self.add_spots(time, scratch, end, &mut gather);
-        let path = &scratch.path;
-        let fate = match (surface, path.outcome()) {
-            (Some(_), _) => Fate::Surface,
-            (None, Outcome::Captured) => Fate::Captured,
-            (None, Outcome::Escaped) => Fate::Escaped,
-            (None, Outcome::Unresolved(_)) => Fate::Unresolved,
-        };
-        let mean = if gather.intensity > 0.0 { gather.shift / gather.intensity } else { 0.0 };
-        Glimpse {
-            intensity: gather.intensity,
-            rgb: gather.rgb,
-            redshift: mean,
-            crossings: path.equatorial_crossings().len() as u32,
-            radius: gather.radius,
-            azimuth: gather.azimuth,
-            delay: gather.delay,
-            fate,
+        seen: &mut [Glimpse],
+    ) -> Result<(), OutOfRange> {
+        let rays = alpha.len();
+        scratch.sights.resize(rays, Sight::default());
+        scratch.volume.reset(self.gas.as_ref().map_or(0, |_| rays * times.len()));
+        for k in 0..rays {
+            let ray = observer.ray(&self.hole, alpha[k], beta[k])?;
+            let line = Line::new(observer, self.hole.horizon(), alpha[k], beta[k]);
+            scratch.sights[k] = self.trace_line(&line, &ray, scratch);
+            self.fill_line(&line, k, times, scratch);
+            self.look_along(k, &ray, (alpha[k], beta[k]), (times, &[]), scratch, seen)?;
+        }
+        Ok(())
+    }
+
+    /// The observer, if it is one whose rays are to be had in closed form.
+    fn closed_form(&self) -> Option<&Observer> {
+        match &self.view {
+            View::Screen(observer) => {
+                Some(observer).filter(|o| self.closed_form && NEAREST * o.inverse_radius() <= 1.0)
+            }
+            View::Camera(_) => None,
         }
     }
 
-    /// Light of the sky at the end of the traced ray, dark if it does not get there.
+    /// What is seen along ray number `k`, of which everything is known but the light of the
+    /// surfaces, the spots and the sky. The path of `scratch` is its own if it was traced step by
+    /// step.
+    fn look_along(
+        &self,
+        k: usize,
+        ray: &Ray,
+        (x, y): (f64, f64),
+        (times, trees): (&[f64], &[Option<Arc<SpotTree>>]),
+        scratch: &mut Scratch,
+        seen: &mut [Glimpse],
+    ) -> Result<(), OutOfRange> {
+        let clock = scratch.meter.start();
+        let sight = scratch.sights[k].clone();
+        let mut still = Gather::new();
+        let hits = &scratch.hits[sight.hits.clone()];
+        self.add_disc(hits, sight.lambda, sight.last_time(), &mut still);
+        if sight.by_steps {
+            self.add_meshes(scratch, sight.last_time(), &mut still);
+        }
+        scratch.meter.stop(Part::Surfaces, clock);
+        let clock = scratch.meter.start();
+        let sky = self.sky_light(x, y, &sight, scratch)?;
+        scratch.meter.stop(Part::Sky, clock);
+        let shift = self.redshift.and_then(|_| self.view.blueshift(x, y));
+        let clock = scratch.meter.start();
+        for (j, time) in times.iter().enumerate() {
+            let mut gather = still.clone();
+            if let (Some(gas), Some(light)) =
+                (&self.gas, scratch.volume.lights.get(k * times.len() + j))
+            {
+                gather.add_light(light, gas.color());
+            }
+            if let (Some(tree), true) = (trees.get(j), sight.by_steps) {
+                let end = sight.last_time();
+                match tree {
+                    Some(tree) => self.add_spots(*time, tree, ray, scratch, end, &mut gather),
+                    None => self.add_every_spot(*time, scratch, end, &mut gather),
+                }
+            }
+            gather.add_behind(sky);
+            let Some(place) = seen.get_mut(j * scratch.sights.len() + k) else { continue };
+            *place = glimpse(&sight, gather);
+            if let (Some(index), Some(shift)) = (self.redshift, shift) {
+                place.receive(shift, index);
+            }
+        }
+        scratch.meter.stop(Part::Spots, clock);
+        Ok(())
+    }
+
+    /// Light of the sky at the end of a ray, dark if it does not get there.
     fn sky_light(
         &self,
         x: f64,
         y: f64,
-        surface: Option<f64>,
+        sight: &Sight,
         scratch: &mut Scratch,
     ) -> Result<[f32; 3], OutOfRange> {
-        let Some(sky) = &self.sky else { return Ok([0.0; 3]) };
-        if surface.is_some() || scratch.path.outcome() != Outcome::Escaped {
+        let (Some(sky), Some(direction), None) = (&self.sky, sight.exit, sight.surface) else {
+            return Ok([0.0; 3]);
+        };
+        if sight.until < sight.total {
             return Ok([0.0; 3]);
         }
-        if let Some(spacing) = self.beams {
+        if let (Some(spacing), true) = (self.beams, self.lensing) {
             let ray = self.view.bundle(&self.hole, x, y)?;
             let hole = self.hole.lift();
             let end = footprint::of_ray(&hole, &ray, self.tolerance, &mut scratch.beam)?;
@@ -191,12 +381,54 @@ impl Stage {
                 return Ok(sky.gather(&Beam::new(&end, spacing)));
             }
         }
-        Ok(sky.look(scratch.path.at(scratch.path.mino_total()).direction))
+        Ok(sky.look(direction))
+    }
+
+    /// The tree over the spots for a time of observation. With slow light one tree serves all;
+    /// without, each time has its own. It is made when it is first asked for.
+    fn spot_tree(&self, time: f64) -> Option<Arc<SpotTree>> {
+        if self.spots.is_empty() || self.one_by_one {
+            return None;
+        }
+        let (key, at) = if self.slow_light { (0.0, None) } else { (time, Some(time)) };
+        // Nothing that holds the lock can panic halfway through a change.
+        let mut trees = self.spot_trees.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some((_, tree)) = trees.iter().rev().find(|(of, _)| *of == key) {
+            return Some(tree.clone());
+        }
+        let tree = Arc::new(SpotTree::new(&self.spots, &self.hole, at, time));
+        if trees.len() >= MOST_TREES {
+            trees.remove(0);
+        }
+        trees.push((key, tree.clone()));
+        Some(tree)
     }
 
     /// When the light that is seen at `time` passed a point.
     fn emission_time(&self, time: f64, point: &PathPoint) -> f64 {
         if self.slow_light { time - point.delay } else { time }
+    }
+}
+
+/// The sum of everything along a ray.
+fn glimpse(sight: &Sight, gather: Gather) -> Glimpse {
+    let fate = match (sight.surface, sight.end) {
+        (Some(_), _) => Fate::Surface,
+        (None, End::Captured) => Fate::Captured,
+        (None, End::Escaped) => Fate::Escaped,
+        (None, End::Unresolved) => Fate::Unresolved,
+    };
+    let mean = if gather.intensity > 0.0 { gather.shift / gather.intensity } else { 0.0 };
+    Glimpse {
+        intensity: gather.intensity,
+        rgb: gather.rgb,
+        redshift: mean,
+        crossings: sight.crossings,
+        radius: gather.place.radius,
+        azimuth: wrap(gather.place.azimuth),
+        delay: gather.place.delay,
+        optical_depth: gather.depth,
+        fate,
     }
 }
 

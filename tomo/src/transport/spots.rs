@@ -1,36 +1,149 @@
 //! Light of the hot spots.
 
-use super::glimpse::Gather;
+use super::chord::ChordBound;
+use super::glimpse::{Gather, Place};
+use super::tree::{Node, Tree, Walk};
 use super::{Scratch, Stage};
 use crate::emission::spot::{Comoving, SpotModel};
+use crate::emission::spot_parts::SpotPart;
 use kerrlight_geodesic::flow::rotating_redshift;
 use kerrlight_geodesic::quadrature::gauss_4;
-use kerrlight_geodesic::{Path, PathPoint};
+use kerrlight_geodesic::{Kerr, Path, PathPoint, Ray};
+use std::ops::ControlFlow;
+
+/// Where all spots can shine from: at one time, or ever.
+#[derive(Debug)]
+pub(super) struct SpotTree {
+    tree: Tree,
+    parts: Vec<SpotPart>,
+}
+
+/// Parts of all spots together, about as many as can be held at once.
+const MOST_PARTS: f64 = 262_144.0;
+
+/// Parts of one turn of a spot.
+const PARTS_OF_A_TURN: f64 = 64.0;
+
+/// Light that one spot may send along a piece of path.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Met {
+    spot: u32,
+    piece: [f64; 2],
+}
+
+impl SpotTree {
+    /// The spots' places at time `at`, or all that they ever have, cut up as for `time`.
+    pub fn new(spots: &[SpotModel], hole: &Kerr, at: Option<f64>, time: f64) -> Self {
+        let most = (MOST_PARTS / spots.len().max(1) as f64).clamp(8.0, PARTS_OF_A_TURN);
+        let mut parts = Vec::new();
+        for (number, spot) in spots.iter().enumerate() {
+            spot.parts(number as u32, hole.horizon(), at, time, most, &mut parts);
+        }
+        let boxes: Vec<_> = parts.iter().map(|p| spots[p.spot as usize].bounds(p)).collect();
+        let shells = || spots.iter().map(SpotModel::shell);
+        let low = shells().map(|[low, _]| low).fold(f64::INFINITY, f64::min).max(hole.horizon());
+        let high = shells().map(|[_, high]| high).fold(0.0, f64::max);
+        SpotTree { tree: Tree::new(&boxes, [low, high]), parts }
+    }
+
+    /// Whether a ray can meet any spot at all.
+    pub fn can_be_met(&self, ray: &Ray) -> bool {
+        self.tree.can_be_met(ray)
+    }
+}
 
 impl Stage {
-    /// Light of the spots between the observer and Mino time `end`: ∫ g^{2+α} j Σ dτ.
+    /// Light of the spots between the observer and Mino time `end`: ∫ g^{2+α} j Σ dτ. Spots are
+    /// summed in their order and piece by piece as [`add_every_spot`](Self::add_every_spot) does,
+    /// less the pieces on which the tree shows that a spot does not shine: the same to the last bit.
     pub(super) fn add_spots(
+        &self,
+        time: f64,
+        tree: &SpotTree,
+        ray: &Ray,
+        scratch: &mut Scratch,
+        end: f64,
+        gather: &mut Gather,
+    ) {
+        if !tree.can_be_met(ray) {
+            return;
+        }
+        self.meet_spots(time, tree, ray, scratch, end);
+        let Scratch { path, intervals, met, pieces, .. } = scratch;
+        for same in met.chunk_by(|a, b| a.spot == b.spot) {
+            pieces.clear();
+            pieces.extend(same.iter().map(|met| met.piece));
+            let spot = &self.spots[same[0].spot as usize];
+            self.add_spot(SpotLight::new(spot, time, pieces), path, intervals, end, gather);
+        }
+    }
+
+    /// Fills `scratch.met`, by spots and along the ray.
+    fn meet_spots(&self, time: f64, tree: &SpotTree, ray: &Ray, scratch: &mut Scratch, end: f64) {
+        let Scratch { path, walk, met, .. } = scratch;
+        let bound = ChordBound::new(&self.hole, ray, path, self.tracer.tolerance());
+        // With slow light short pieces tell much about the time.
+        let longest = if self.slow_light { 2.0 } else { 8.0 };
+        let through = Walk { tree: &tree.tree, path, bound: &bound, longest };
+        let times = |ends: [&Node; 2]| {
+            let [early, late] =
+                [ends[1], ends[0]].map(|node| self.emission_time(time, &node.point));
+            let error = bound.error(bound.reach(ends.map(|node| &node.point)));
+            [early - error, late + error]
+        };
+        let shines = |leaf: u32, ends: [&Node; 2], epsilon: f64| {
+            let part = &tree.parts[leaf as usize];
+            let spot = &self.spots[part.spot as usize];
+            let when = if self.slow_light { times(ends) } else { [time, time] };
+            (!self.slow_light || spot.shines_from(part, when))
+                && spot.comes_near(ends.map(|node| node.position), epsilon, when)
+        };
+        met.clear();
+        through.go(end, walk, &shines, &mut |ends, leaves| {
+            let piece = ends.map(|node| node.point.mino_time);
+            met.extend(
+                leaves.iter().map(|leaf| Met { spot: tree.parts[*leaf as usize].spot, piece }),
+            );
+            ControlFlow::Continue(())
+        });
+        met.sort_by(|a, b| a.spot.cmp(&b.spot).then(a.piece[0].total_cmp(&b.piece[0])));
+    }
+
+    /// As [`add_spots`](Self::add_spots), with every spot asked along the whole ray.
+    pub(super) fn add_every_spot(
         &self,
         time: f64,
         scratch: &mut Scratch,
         end: f64,
         gather: &mut Gather,
     ) {
+        let Scratch { path, intervals, .. } = scratch;
         for spot in &self.spots {
-            let [lo, hi] = spot.shell();
-            let lo = lo.max(self.hole.horizon());
-            let mut total =
-                SpotLight { spot, observed: time, before: gather.intensity, brightest: None };
-            scratch.path.intervals_within(lo, hi, &mut scratch.intervals);
-            for &[from, to] in &scratch.intervals {
-                let to = to.min(end);
-                if from < to {
-                    self.add_stretch(&scratch.path, &mut total, from, to, gather);
-                }
+            let light = SpotLight::new(spot, time, &[[0.0, f64::INFINITY]]);
+            self.add_spot(light, path, intervals, end, gather);
+        }
+    }
+
+    /// Light of one spot on the pieces of the path where it may shine.
+    fn add_spot(
+        &self,
+        mut light: SpotLight<'_>,
+        path: &Path,
+        intervals: &mut Vec<[f64; 2]>,
+        end: f64,
+        gather: &mut Gather,
+    ) {
+        let [lo, hi] = light.spot.shell();
+        let before = gather.intensity;
+        path.intervals_within(lo.max(self.hole.horizon()), hi, intervals);
+        for &[from, to] in intervals.iter() {
+            let to = to.min(end);
+            if from < to {
+                self.add_stretch(path, &mut light, from, to, gather);
             }
-            if let Some((_, point)) = total.brightest {
-                gather.mark(gather.intensity - total.before, &point);
-            }
+        }
+        if let Some((_, point)) = light.brightest {
+            gather.mark(gather.intensity - before, Place::of_point(&point));
         }
     }
 
@@ -45,11 +158,17 @@ impl Stage {
     ) {
         let pieces = ((to - from) * path.angular_rate() / LARGEST_TURN).ceil().max(1.0);
         let step = (to - from) / pieces;
-        let mut start = self.node(light, path.at(from));
-        for k in 1..=pieces as usize {
-            let end = self.node(light, path.at(from + step * k as f64));
+        let mut last = None;
+        for k in 0..pieces as usize {
+            let [start, end] = [k, k + 1].map(|k| from + step * k as f64);
+            if !light.can_shine(start, end) {
+                last = None;
+                continue;
+            }
+            let start = last.unwrap_or_else(|| self.node(light, path.at(start)));
+            let end = self.node(light, path.at(end));
             self.add_piece(path, light, [&start, &end], 0, gather);
-            start = end;
+            last = Some(end);
         }
     }
 
@@ -67,12 +186,15 @@ impl Stage {
         depth: u32,
         gather: &mut Gather,
     ) {
+        let (from, to) = (start.point.mino_time, end.point.mino_time);
+        if !light.can_shine(from, to) {
+            return;
+        }
         let carried = [&start.carried, &end.carried];
         let length = light.spot.comoving_length([start.position, end.position], carried);
         if light.spot.is_missed(carried, length) {
             return;
         }
-        let (from, to) = (start.point.mino_time, end.point.mino_time);
         if length > light.spot.sigma() && depth < DEEPEST {
             let middle = self.node(light, path.at(0.5 * (from + to)));
             self.add_piece(path, light, [start, &middle], depth + 1, gather);
@@ -119,10 +241,21 @@ struct SpotLight<'a> {
     spot: &'a SpotModel,
     /// Time of observation.
     observed: f64,
-    /// Intensity gathered before this spot.
-    before: f64,
+    /// Where it may shine, as intervals of Mino time in order.
+    pieces: &'a [[f64; 2]],
     /// The brightest point, and its emission per length.
     brightest: Option<(f64, PathPoint)>,
+}
+
+impl<'a> SpotLight<'a> {
+    fn new(spot: &'a SpotModel, observed: f64, pieces: &'a [[f64; 2]]) -> Self {
+        SpotLight { spot, observed, pieces, brightest: None }
+    }
+
+    fn can_shine(&self, from: f64, to: f64) -> bool {
+        let behind = self.pieces.partition_point(|piece| piece[1] < from);
+        self.pieces.get(behind).is_some_and(|piece| piece[0] <= to)
+    }
 }
 
 /// A point of the path as a spot sees it.

@@ -1,33 +1,50 @@
 //! Light of the thin disc.
 
 use super::Stage;
-use super::glimpse::Gather;
+use super::glimpse::{Gather, Place, wrap};
+use crate::emission::disc::DiscModel;
 use kerrlight_geodesic::flow::keplerian_redshift;
-use kerrlight_geodesic::{Path, Ray};
+
+/// Where a ray crosses the equatorial plane.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Hit {
+    pub mino_time: f64,
+    pub place: Place,
+    /// Optical depth of the gas in front of it.
+    pub depth: f64,
+}
 
 impl Stage {
-    /// Light of the disc: I = g^{3+α} I_em at every crossing up to the first that hides the
-    /// rest, whose Mino time is returned.
-    pub(super) fn add_disc(&self, ray: &Ray, path: &Path, gather: &mut Gather) -> Option<f64> {
-        let disc = self.disc.as_ref()?;
-        for mino_time in path.equatorial_crossings() {
-            let point = path.at(mino_time);
-            let r = point.radius();
-            if !disc.covers(r) {
-                continue;
-            }
-            let g = match self.redshift {
-                Some(_) => keplerian_redshift(&self.hole, r, ray.lambda).unwrap_or(0.0),
-                None => 1.0,
-            };
-            let boost = self.redshift.map_or(1.0, |index| g.powf(3.0 + index));
-            let intensity = boost * disc.intensity(r);
-            gather.add(intensity, g, disc.color);
-            gather.mark(intensity, &point);
-            if disc.opaque {
-                return Some(mino_time);
+    /// The first of `hits` before Mino time `until` that hides the rest.
+    pub(super) fn surface(&self, hits: &[Hit], until: f64) -> Option<f64> {
+        let disc = self.disc.as_ref().filter(|disc| disc.opaque)?;
+        let mut times = hits.iter().filter(|hit| disc.covers(hit.place.radius));
+        times.next().map(|hit| hit.mino_time).filter(|time| *time <= until)
+    }
+
+    /// Light of the disc: I = g^{3+α} I_em at every crossing up to Mino time `end`.
+    pub(super) fn add_disc(&self, hits: &[Hit], lambda: f64, end: f64, gather: &mut Gather) {
+        let Some(disc) = &self.disc else { return };
+        for hit in hits.iter().take_while(|hit| hit.mino_time <= end) {
+            if disc.covers(hit.place.radius) {
+                self.add_hit(disc, hit, lambda, gather);
             }
         }
-        None
+    }
+
+    fn add_hit(&self, disc: &DiscModel, hit: &Hit, lambda: f64, gather: &mut Gather) {
+        let r = hit.place.radius;
+        let g = match self.redshift {
+            Some(_) => keplerian_redshift(&self.hole, r, lambda).unwrap_or(0.0),
+            None => 1.0,
+        };
+        let boost = self.redshift.map_or(1.0, |index| g.powf(3.0 + index));
+        let mut intensity = boost * disc.intensity(r);
+        if hit.depth > 0.0 {
+            intensity *= (-hit.depth).exp();
+        }
+        gather.add(intensity, g, disc.color);
+        let azimuth = wrap(hit.place.azimuth);
+        gather.mark(intensity, Place { azimuth, ..hit.place });
     }
 }

@@ -8,6 +8,7 @@ mod panorama;
 mod stars;
 
 pub use beam::Beam;
+pub(crate) use panorama::srgb_to_linear;
 pub use panorama::{Panorama, PanoramaError};
 pub use stars::StarField;
 

@@ -193,7 +193,7 @@ fn overlaps(k: usize, few: usize, many: usize) -> impl Iterator<Item = (usize, f
         .filter(|(_, share)| *share > 1e-9)
 }
 
-fn srgb_to_linear(c: f32) -> f32 {
+pub(crate) fn srgb_to_linear(c: f32) -> f32 {
     if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
 }
 

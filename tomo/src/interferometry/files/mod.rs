@@ -1,12 +1,15 @@
 //! Files of visibilities (UVFITS, eht-imaging's text, tables of total intensity) and FITS images. Codecs work
 //! on bytes; what they hold in memory is a small multiple of the file.
 
+mod comments;
+mod eht_table;
 mod fits;
 mod fits_image;
 mod obs_text;
 mod table;
 mod uvfits;
 
+pub use eht_table::{EhtTable, to_eht_table};
 pub use fits_image::read as read_fits_image;
 pub use obs_text::{parse as parse_obs_text, to_text as to_obs_text};
 pub use table::{COLUMNS as TABLE_COLUMNS, parse as parse_table, to_csv};
@@ -95,6 +98,16 @@ pub fn decode(bytes: &[u8]) -> Result<(Format, Observation), FileError> {
     Ok((Format::Table, parse_table(text)?))
 }
 
+/// Refuses several spectral channels, for which a format has no column.
+fn one_channel(observation: &Observation) -> Result<(), FileError> {
+    match observation.channels.len() {
+        0 | 1 => Ok(()),
+        n => Err(FileError::whole(format!(
+            "this format has no column for {n} spectral channels: average them first"
+        ))),
+    }
+}
+
 /// Numbers for station names, in order of appearance.
 struct Names {
     stations: Vec<Station>,
@@ -165,7 +178,8 @@ mod tests {
         let eht = "#SRC:M87,DATE(MJD):57853,FREQ:229.0707GHz\n\
             #time(UTC),T1,T2,U(lambda),V(lambda),Iamp(Jy),Iphase(d),Isigma(Jy)\n\
             02.15138894,AA,LM,1868288384.0,-3689129984.0,0.01103669,-122.7523,0.00446794\n";
-        vec![to_obs_text(&small).unwrap(), to_csv(&small), eht.to_owned()]
+        let csv = to_csv(&small, true);
+        vec![to_obs_text(&small).unwrap(), csv, eht.to_owned()]
     }
 
     #[test]

@@ -172,14 +172,17 @@ fn row(line: &str, names: &Names) -> Result<Row, String> {
         products,
         noise_sigma,
         opacity: [value(4, "tau1")? as f32, value(5, "tau2")? as f32],
+        channel: 0,
     })
 }
 
 /// The observation as eht-imaging's text, numbers with all their digits.
 ///
 /// # Errors
-/// If the source's position, the date or the frequency is not known.
+/// If the source's position, the date or the frequency is not known, or there are several spectral
+/// channels.
 pub fn to_text(observation: &Observation) -> Result<String, FileError> {
+    super::one_channel(observation)?;
     let position =
         observation.position.ok_or(Unknown("the source's right ascension and declination"))?;
     let mjd = observation.mjd.ok_or(Unknown("the date (MJD)"))?;

@@ -1,7 +1,7 @@
 //! Tables of total intensity, a visibility a line, columns separated by commas or blanks and told
 //! by a line of names: kerrlight's CSV, and the csv and txt of the EHT's public releases.
 
-use super::{FileError, Names, number, sigma};
+use super::{FileError, Names, comments, number, sigma};
 use crate::interferometry::Complex64;
 use crate::interferometry::observation::{Basis, Measured, Observation, Row};
 use core::fmt::Write;
@@ -10,8 +10,11 @@ use core::fmt::Write;
 /// part in Jy, and the standard deviation of each.
 pub const COLUMNS: [&str; 8] = ["time_utc_h", "t1", "t2", "u", "v", "re", "im", "sigma"];
 
+/// The column of a spectral channel's number, counted from 0 in the order of the comments.
+pub const CHANNEL: &str = "channel";
+
 /// The same in the EHT's releases, with amplitude in Jy and phase in degrees.
-const EHT_COLUMNS: [&str; 8] =
+pub(super) const EHT_COLUMNS: [&str; 8] =
     ["time(UTC)", "T1", "T2", "U(lambda)", "V(lambda)", "Iamp(Jy)", "Iphase(d)", "Isigma(Jy)"];
 
 /// Cells of a line; more than anyone writes are not looked at.
@@ -28,6 +31,7 @@ fn cells(line: &str) -> Vec<&str> {
 struct Heading {
     columns: [usize; 8],
     polar: bool,
+    channel: Option<usize>,
 }
 
 impl Heading {
@@ -35,7 +39,8 @@ impl Heading {
         [(COLUMNS, false), (EHT_COLUMNS, true)].into_iter().find_map(|(wanted, polar)| {
             let at = |name: &str| names.iter().position(|n| n.eq_ignore_ascii_case(name));
             let found: Option<Vec<usize>> = wanted.iter().map(|name| at(name)).collect();
-            Some(Heading { columns: found?.try_into().ok()?, polar })
+            let channel = at(CHANNEL);
+            Some(Heading { columns: found?.try_into().ok()?, polar, channel })
         })
     }
 }
@@ -53,20 +58,29 @@ pub fn parse(text: &str) -> Result<Observation, FileError> {
     for (index, line) in text.lines().enumerate() {
         let located = |message: String| FileError::line(index + 1, message);
         let bare = line.trim_start_matches('#');
-        if heading.is_none() && (bare.len() < line.len() || index == 0) {
-            heading = Heading::find(&cells(bare.trim()));
-            read_facts(bare, &mut observation).map_err(located)?;
-            if bare.len() < line.len() || heading.is_some() {
+        let is_comment = bare.len() < line.len();
+        if heading.is_none() && !bare.trim().is_empty() {
+            if is_comment && comments::read(bare, &mut observation, &mut names).map_err(located)? {
                 continue;
             }
+            heading = Heading::find(&cells(bare.trim()));
+            if heading.is_some() {
+                continue;
+            }
+            if is_comment {
+                read_facts(bare, &mut observation).map_err(located)?;
+            }
         }
-        if line.starts_with('#') || line.trim().is_empty() {
+        if is_comment || line.trim().is_empty() {
             continue;
         }
         let Some(heading) = &heading else {
             return Err(located(format!("data before a line that names {}", COLUMNS.join(", "))));
         };
         let row = row(&cells(line), heading, &mut names).map_err(located)?;
+        if usize::from(row.channel) >= observation.channels.len().max(1) {
+            return Err(located(format!("channel {} is not in the comments", row.channel)));
+        }
         observation.rows.push(row);
     }
     if heading.is_none() {
@@ -122,22 +136,33 @@ fn row(cells: &[&str], heading: &Heading, names: &mut Names) -> Result<Row, Stri
         return Err("sigma = nan is not allowed: 0 or positive".to_owned());
     }
     let i = Measured { visibility, noise_sigma };
-    Ok(Row::total_intensity(value(0)?, stations, [value(3)?, value(4)?], i))
+    let channel = match heading.channel.map(|column| cells.get(column).copied().unwrap_or_default())
+    {
+        None => 0,
+        Some(cell) => cell
+            .parse()
+            .map_err(|_| format!("channel `{}` is no channel's number", super::shortened(cell)))?,
+    };
+    let row = Row::total_intensity(value(0)?, stations, [value(3)?, value(4)?], i);
+    Ok(Row { channel, ..row })
 }
 
-/// Stokes I of every row that has it, as kerrlight's CSV, numbers with all their digits.
-pub fn to_csv(observation: &Observation) -> String {
-    let mut text = COLUMNS.join(",") + "\n";
+/// Stokes I of every row that has it, as kerrlight's CSV, numbers with all their digits. With
+/// `comments`, lines that start with `#` stand before it and tell source, date, frequencies,
+/// stations and history. Several spectral channels have a further column [`CHANNEL`], and comments
+/// in any case.
+pub fn to_csv(observation: &Observation, comments: bool) -> String {
+    let several = !observation.channels.is_empty();
+    let mut text = if comments || several { comments::write(observation) } else { String::new() };
+    text += &COLUMNS.join(",");
+    text += if several { ",channel\n" } else { "\n" };
     for (row, i) in observation.stokes_i() {
         let [t1, t2] = observation.names(row);
         let Row { time_h, uv: [u, v], .. } = row;
-        let Measured { visibility, noise_sigma } = i;
+        let Measured { visibility: Complex64 { re, im }, noise_sigma } = i;
         // Writing into a string cannot fail.
-        let _ = writeln!(
-            text,
-            "{time_h},{t1},{t2},{u},{v},{},{},{noise_sigma}",
-            visibility.re, visibility.im
-        );
+        let _ = write!(text, "{time_h},{t1},{t2},{u},{v},{re},{im},{noise_sigma}");
+        let _ = if several { writeln!(text, ",{}", row.channel) } else { writeln!(text) };
     }
     text
 }
@@ -145,6 +170,8 @@ pub fn to_csv(observation: &Observation) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::interferometry::files::uvfits::tests::small;
+    use crate::interferometry::observation::Channel;
 
     const EHT: &str = "# SRC:M87 DATE(MJD):57853 FREQ:229.0707GHz\n\
         # time(UTC)  T1  T2  U(lambda)  V(lambda)  Iamp(Jy)  Iphase(d)  Isigma(Jy)\n\
@@ -167,8 +194,31 @@ mod tests {
     #[test]
     fn exact_round_trip() {
         let observation = parse(EHT).unwrap();
-        let back = parse(&to_csv(&observation)).unwrap();
-        assert_eq!(format!("{:?}", back.rows), format!("{:?}", observation.rows));
+        let back = parse(&to_csv(&observation, true)).unwrap();
+        assert_eq!(format!("{back:?}"), format!("{observation:?}"));
+    }
+
+    /// All that a row of Stokes I and its observation know comes back, but for integration times and
+    /// opacities, for which there are no columns.
+    #[test]
+    fn exact_comments_keep_the_settings() {
+        let mut observation = small().total_intensity();
+        observation.history = vec!["seed 7, noise thermal".into(), "a, b: c".into()];
+        observation.channels =
+            [229e9, 231e9].map(|frequency_hz| Channel { frequency_hz, bandwidth_hz: 1e9 }).to_vec();
+        observation.rows[1].channel = 1;
+        for row in &mut observation.rows {
+            (row.integration_s, row.opacity) = (0.0, [0.0; 2]);
+        }
+        let text = to_csv(&observation, true);
+        let back = parse(&text).unwrap();
+        assert_eq!(format!("{back:?}"), format!("{observation:?}"));
+        assert!(text.contains("\ntime_utc_h,t1,t2,u,v,re,im,sigma,channel\n"), "{text}");
+        let fail = |from: &str, to: &str| parse(&text.replace(from, to)).unwrap_err().to_string();
+        assert!(fail("# ra_h: 17.76", "# ra_h: 27").contains("line 1: right ascension = 27"));
+        assert!(fail("# mjd: 57850", "# mjd: x").contains("mjd `x`"));
+        assert!(fail("# channel: 1 ", "# passed: 1 ").contains("channel 1 is not in the comments"));
+        assert!(fail("# station: BB", "# station: AA").contains("AA is listed twice"));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The interstellar medium towards Sgr A*.
 
-use crate::interferometry::observation::{Observation, Unknown};
+use crate::interferometry::observation::{Observation, Row, Unknown};
 use crate::units::{MICROARCSECOND, SPEED_OF_LIGHT};
 use core::f64::consts::PI;
 
@@ -42,9 +42,12 @@ impl ScatteringKernel {
 /// # Errors
 /// If the frequency is not known.
 pub fn scatter(observation: &mut Observation, kernel: &ScatteringKernel) -> Result<(), Unknown> {
-    let frequency_hz = observation.frequency_hz.ok_or(Unknown("the frequency"))?;
-    for row in &mut observation.rows {
-        let factor = kernel.transform(row.uv, frequency_hz);
+    let factor = |row: &Row| {
+        let frequency_hz = observation.frequency_of(row).ok_or(Unknown("the frequency"))?;
+        Ok(kernel.transform(row.uv, frequency_hz))
+    };
+    let factors = observation.rows.iter().map(factor).collect::<Result<Vec<f64>, Unknown>>()?;
+    for (row, factor) in observation.rows.iter_mut().zip(factors) {
         row.products.iter_mut().for_each(|product| *product *= factor);
     }
     Ok(())

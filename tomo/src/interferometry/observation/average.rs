@@ -5,7 +5,7 @@ use crate::interferometry::Complex64;
 use std::collections::BTreeMap;
 
 impl Observation {
-    /// Averages every baseline over intervals of `seconds`, which start at multiples of their
+    /// Averages every baseline and channel over intervals of `seconds`, which start at multiples of their
     /// length since 0 h UTC.
     ///
     /// Products are means weighted by 1/σ², so that σ of a mean is 1/√(Σ 1/σ²); times and (u, v)
@@ -14,17 +14,48 @@ impl Observation {
     /// √(Σσ²)/n.
     #[must_use]
     pub fn averaged(&self, seconds: f64) -> Self {
-        let mut bins: BTreeMap<(i64, [u16; 2]), Vec<Row>> = BTreeMap::new();
-        for row in &self.rows {
-            let ordered = row.stations[0] <= row.stations[1];
-            let row = if ordered { *row } else { row.swapped(self.basis) };
+        let mut bins: BTreeMap<(i64, [u16; 2], u16), Vec<Row>> = BTreeMap::new();
+        for row in self.rows.iter().map(|row| self.ordered(row)) {
             // Saturates for times beyond reason.
             let bin = (row.time_h * 3600.0 / seconds).floor() as i64;
-            bins.entry((bin, row.stations)).or_default().push(row);
+            bins.entry((bin, row.stations, row.channel)).or_default().push(row);
         }
         let mut observation = self.clone_without_rows();
         observation.rows = bins.values().map(|rows| mean(rows)).collect();
         observation.history.push(format!("coherent averages over {seconds} s"));
+        observation
+    }
+
+    /// A row with its stations in the array's order.
+    fn ordered(&self, row: &Row) -> Row {
+        if row.stations[0] <= row.stations[1] { *row } else { row.swapped(self.basis) }
+    }
+
+    /// Averages every baseline and time over all spectral channels, with the same weights; (u, v)
+    /// are those of `frequency_hz`, as in eht-imaging. Without channels nothing changes.
+    #[must_use]
+    pub fn averaged_over_channels(&self) -> Self {
+        let mut observation = self.clone_without_rows();
+        let (Some(reference), false) = (self.frequency_hz, self.channels.is_empty()) else {
+            return self.clone();
+        };
+        // Bits of positive doubles are ordered as they are, those of negative ones consistently.
+        let mut bins: BTreeMap<(u64, [u16; 2]), Vec<Row>> = BTreeMap::new();
+        for mut row in self.rows.iter().map(|row| self.ordered(row)) {
+            let scale = self.frequency_of(&row).map_or(1.0, |frequency| reference / frequency);
+            row.uv = row.uv.map(|x| x * scale);
+            row.channel = 0;
+            bins.entry((row.time_h.to_bits(), row.stations)).or_default().push(row);
+        }
+        let mean_of = |rows: &Vec<Row>| {
+            let Row { time_h, integration_s, .. } = rows[0];
+            Row { time_h, integration_s, ..mean(rows) }
+        };
+        observation.rows = bins.values().map(mean_of).collect();
+        observation.channels.clear();
+        let count = self.channels.len();
+        observation.history.push(format!("mean of {count} spectral channels"));
+        observation.sort();
         observation
     }
 

@@ -36,6 +36,17 @@ pub struct Row {
     pub noise_sigma: [f64; 4],
     /// Zenith opacities at the stations; 0 where a file does not tell.
     pub opacity: [f32; 2],
+    /// Which of [`Observation::channels`]; 0 where there are none.
+    pub channel: u16,
+}
+
+/// A spectral channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Channel {
+    /// Frequency in Hz, of which its (u, v) count wavelengths.
+    pub frequency_hz: f64,
+    /// Bandwidth in Hz; 0 where a file does not tell.
+    pub bandwidth_hz: f64,
 }
 
 /// A complex visibility with its error.
@@ -59,6 +70,7 @@ impl Row {
             products: [i.visibility, none, none, none],
             noise_sigma: [i.noise_sigma, f64::NAN, f64::NAN, f64::NAN],
             opacity: [0.0; 2],
+            channel: 0,
         }
     }
 
@@ -108,10 +120,13 @@ pub struct Observation {
     pub position: Option<SourcePosition>,
     /// Modified Julian date whose 0 h UTC the rows' times count from.
     pub mjd: Option<i32>,
-    /// Frequency in Hz that (u, v) are counted in wavelengths of.
+    /// Frequency in Hz that (u, v) are counted in wavelengths of, where there are no `channels`.
     pub frequency_hz: Option<f64>,
-    /// Bandwidth in Hz.
+    /// Bandwidth in Hz, of all channels together.
     pub bandwidth_hz: Option<f64>,
+    /// Spectral channels that rows belong to, each with (u, v) of its own frequency; none where all
+    /// rows are of `frequency_hz`.
+    pub channels: Vec<Channel>,
     /// What the rows' products are.
     pub basis: Basis,
     /// The stations that rows point to.
@@ -136,11 +151,18 @@ impl Observation {
             mjd: None,
             frequency_hz: None,
             bandwidth_hz: None,
+            channels: Vec::new(),
             basis,
             stations: Vec::new(),
             rows: Vec::new(),
             history: Vec::new(),
         }
+    }
+
+    /// Frequency in Hz of a row.
+    pub fn frequency_of(&self, row: &Row) -> Option<f64> {
+        let channel = self.channels.get(usize::from(row.channel));
+        channel.map_or(self.frequency_hz, |channel| Some(channel.frequency_hz))
     }
 
     /// Names of a row's stations.
@@ -153,14 +175,16 @@ impl Observation {
         self.rows.iter().filter_map(|row| Some((row, row.stokes_i(self.basis)?)))
     }
 
-    /// Puts rows in order of time and then of baseline, stations of each in the array's order.
+    /// Puts rows in order of time, then of baseline, then of channel; stations of each baseline in
+    /// the array's order.
     pub fn sort(&mut self) {
         for row in &mut self.rows {
             if row.stations[0] > row.stations[1] {
                 *row = row.swapped(self.basis);
             }
         }
-        self.rows.sort_by(|a, b| a.time_h.total_cmp(&b.time_h).then(a.stations.cmp(&b.stations)));
+        let place = |row: &Row| (row.stations, row.channel);
+        self.rows.sort_by(|a, b| a.time_h.total_cmp(&b.time_h).then(place(a).cmp(&place(b))));
     }
 
     /// The data as Stokes I only, of every row that has it.
@@ -171,6 +195,7 @@ impl Observation {
             .map(|(row, i)| Row {
                 integration_s: row.integration_s,
                 opacity: row.opacity,
+                channel: row.channel,
                 ..Row::total_intensity(row.time_h, row.stations, row.uv, i)
             })
             .collect();
@@ -183,6 +208,7 @@ impl Observation {
             source: self.source.clone(),
             stations: self.stations.clone(),
             history: self.history.clone(),
+            channels: self.channels.clone(),
             ..*self
         }
     }

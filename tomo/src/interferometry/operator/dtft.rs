@@ -233,6 +233,7 @@ impl<T: Real> Operator<T> for Dtft<T> {
 mod tests {
     use super::super::{FullImage, LightCurve};
     use super::*;
+    use crate::interferometry::conformance;
     use rand::{Rng, RngExt, SeedableRng};
     use rand_pcg::Pcg64Mcg;
 
@@ -282,29 +283,21 @@ mod tests {
         }
     }
 
-    fn dot_product_test<T: Real>(budget: usize, tolerance: f64) {
-        let mut random = Pcg64Mcg::seed_from_u64(2);
-        let operator = Dtft::<T>::new(GRID, Pulse::Triangle, &frames(&mut random), budget);
-        let movie = random_numbers::<T>(&mut random, 3 * GRID.pixels());
-        let parts = random_numbers::<T>(&mut random, 2 * operator.data());
-        let data: Vec<Complex<T>> = parts.chunks(2).map(|p| Complex::new(p[0], p[1])).collect();
-        let mut forward = vec![Complex::new(T::zero(), T::zero()); data.len()];
-        operator.forward(&movie, &mut forward);
-        // What is in the movie stays: the adjoint adds.
-        let mut adjoint = vec![T::one(); movie.len()];
-        operator.adjoint(&data, &mut adjoint);
-        let left: f64 = forward.iter().zip(&data).map(|(a, b)| (a.conj() * b).re.double()).sum();
-        let right: f64 =
-            adjoint.iter().zip(&movie).map(|(a, b)| (*a - T::one()).double() * b.double()).sum();
-        assert!((left - right).abs() < tolerance * left.abs(), "{left} {right}");
+    fn conforms<T: Real>(tolerance: f64) {
+        let frames = frames(&mut Pcg64Mcg::seed_from_u64(2));
+        for (name, budget) in [("prepared transform", usize::MAX), ("transform on the fly", 0)] {
+            let transform = Dtft::<T>::new(GRID, Pulse::Triangle, &frames, budget);
+            conformance::operator(name, &transform, tolerance);
+        }
+        let (frames, pixels) = (3, 200);
+        conformance::operator::<T, T>("full image", &FullImage { frames, pixels }, tolerance);
+        conformance::operator::<T, T>("light curve", &LightCurve { frames, pixels }, tolerance);
     }
 
     #[test]
-    fn exact_adjoint_in_both_precisions_kept_or_not() {
-        dot_product_test::<f64>(usize::MAX, 1e-12);
-        dot_product_test::<f64>(0, 1e-12);
-        dot_product_test::<f32>(usize::MAX, 1e-4);
-        dot_product_test::<f32>(0, 1e-4);
+    fn exact_adjoints_and_differences_in_both_precisions() {
+        conforms::<f64>(1e-14);
+        conforms::<f32>(1e-6);
     }
 
     #[test]

@@ -3,11 +3,15 @@
 mod dtft;
 mod grid;
 mod matrix;
+mod nufft;
 mod plain;
+mod transform;
 
 pub use dtft::Dtft;
 pub use grid::{ImageGrid, Pulse};
+pub use nufft::Nufft;
 pub use plain::{FullImage, LightCurve};
+pub use transform::{Method, Transform};
 
 /// The scalars that operators and data terms compute with.
 pub trait Real:

@@ -71,13 +71,13 @@ struct Candidate<const N: usize> {
 }
 
 impl ClosureSet {
-    /// For every scan of an observation (rows of the same time) a largest set of independent
+    /// For every scan of an observation (rows of the same time and channel) a largest set of independent
     /// closure quantities, chosen with the least noisy first, so that weak baselines are in as few
     /// of them as possible. Visibility indices count rows that have Stokes I, in the order of
     /// [`Observation::stokes_i`]. Baselines weaker than `least_snr` times their noise are left
     /// out, and those without error.
     pub fn of(observation: &Observation, kind: ClosureKind, least_snr: f64) -> Vec<ClosureSet> {
-        let mut scans: HashMap<u64, Vec<Baseline>> = HashMap::new();
+        let mut scans: HashMap<(u64, u16), Vec<Baseline>> = HashMap::new();
         for (visibility, (row, measured)) in observation.stokes_i().enumerate() {
             let strong = measured.visibility.norm() > least_snr * measured.noise_sigma;
             if !strong || measured.noise_sigma <= 0.0 {
@@ -87,15 +87,15 @@ impl ClosureSet {
             let [a, b] = row.stations;
             let (stations, sense) = if ascending { ([a, b], 1) } else { ([b, a], -1) };
             let baseline = Baseline { stations, visibility, sense, measured };
-            scans.entry(row.time_h.to_bits()).or_default().push(baseline);
+            scans.entry((row.time_h.to_bits(), row.channel)).or_default().push(baseline);
         }
-        let mut sets: Vec<ClosureSet> = scans
+        let mut sets: Vec<(u16, ClosureSet)> = scans
             .into_iter()
-            .map(|(time, baselines)| scan(f64::from_bits(time), &baselines, kind))
-            .filter(|set| !set.closures.is_empty())
+            .map(|((time, channel), rows)| (channel, scan(f64::from_bits(time), &rows, kind)))
+            .filter(|(_, set)| !set.closures.is_empty())
             .collect();
-        sets.sort_by(|a, b| a.time_h.total_cmp(&b.time_h));
-        sets
+        sets.sort_by(|(j, a), (k, b)| a.time_h.total_cmp(&b.time_h).then(j.cmp(k)));
+        sets.into_iter().map(|(_, set)| set).collect()
     }
 }
 

@@ -47,11 +47,23 @@ pub struct Layout {
     /// For each of the four products, where it is; `None` where there is none.
     pub products: [Option<usize>; 4],
     pub basis: Basis,
-    /// Where spectral channels of all IFs are, relative to the first.
-    pub channels: Vec<usize>,
-    /// Frequency in Hz at the reference channel, width of a channel, number of IFs × channels.
+    /// Where spectral channels of all IFs are.
+    pub channels: Vec<Place>,
+    /// Frequency in Hz at the reference channel, that channel (counted from 1), distance of channels.
     pub frequency_hz: f64,
+    pub reference_channel: f64,
     pub channel_width_hz: f64,
+}
+
+/// A spectral channel's place in a group.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Place {
+    /// Relative to the first one's.
+    pub offset: usize,
+    /// Its IF, counted from 0.
+    pub band: usize,
+    /// Its number in the IF, counted from 0.
+    pub channel: usize,
 }
 
 /// An axis of the data, with its position in memory.
@@ -90,7 +102,7 @@ impl Layout {
             float: bits < Some(0),
             group_size: numbers + parameters,
             parameters,
-            groups: header.count("GCOUNT", 0, usize::MAX)?,
+            groups: header.count("GCOUNT", 1, usize::MAX)?,
             u: parameter.one("UU")?,
             v: parameter.one("VV")?,
             antennas: parameter.antennas()?,
@@ -108,7 +120,8 @@ impl Layout {
             basis,
             channels: channels(&axes, header)?,
             frequency_hz: at("CRVAL")?.unwrap_or(0.0),
-            channel_width_hz: at("CDELT")?.unwrap_or(0.0).abs(),
+            reference_channel: at("CRPIX")?.unwrap_or(1.0),
+            channel_width_hz: at("CDELT")?.unwrap_or(0.0),
         })
     }
 
@@ -184,14 +197,21 @@ fn products(header: &Header<'_>, axis: &Axis) -> Result<([Option<usize>; 4], Bas
 }
 
 /// Where channels of all IFs are; other axes must not be longer than 1.
-fn channels(axes: &[Axis], header: &Header<'_>) -> Result<Vec<usize>, FileError> {
-    let mut channels = vec![0usize];
+fn channels(axes: &[Axis], header: &Header<'_>) -> Result<Vec<Place>, FileError> {
+    let mut channels = vec![Place::default()];
     for axis in axes {
         match axis.name.as_str() {
             "COMPLEX" | "STOKES" => {}
             "FREQ" | "IF" => {
+                let is_band = axis.name == "IF";
+                let at = |k: usize, place: &Place| Place {
+                    offset: place.offset + k * axis.stride,
+                    band: if is_band { k } else { place.band },
+                    channel: if is_band { place.channel } else { k },
+                };
+                // As many as a group has numbers at most, which the file has.
                 channels = (0..axis.length)
-                    .flat_map(|k| channels.iter().map(move |start| start + k * axis.stride))
+                    .flat_map(|k| channels.iter().map(move |place| at(k, place)))
                     .collect();
             }
             _ if axis.length == 1 => {}

@@ -2,6 +2,7 @@
 //! memo 117, Greisen 2003/2020).
 
 mod antennas;
+mod frequencies;
 mod layout;
 mod read;
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use super::super::FileError;
 use super::super::fits;
 use super::antennas::AntennaTables;
+use super::frequencies;
 use super::layout::{Antennas, Layout};
 use crate::interferometry::Complex64;
 use crate::interferometry::earth::SourcePosition;
@@ -13,37 +14,54 @@ const MJD_ZERO: f64 = 2_400_000.5;
 
 /// Reads UVFITS.
 ///
-/// Spectral channels of all IFs are averaged, weighted by 1/σ²; (u, v) are counted in wavelengths
-/// of the antenna table's frequency (both as eht-imaging does). σ = 1/√weight; a weight that is
-/// not positive, or a visibility that is no number, means no datum. Rows without any datum, and
-/// correlations of a station with itself, are left out; the history says how many.
+/// Several spectral channels or IFs are rows of their own, with (u, v) in wavelengths of their own
+/// frequency; (u, v) of a single one are counted in wavelengths of the antenna table's frequency (as
+/// in eht-imaging). σ = 1/√weight; a weight that is not positive, or a visibility that is no number,
+/// means no datum. Rows without any datum, and correlations of a station with itself, are left
+/// out; the history says how many groups have none but such.
 ///
 /// # Errors
-/// If the file is damaged, no UVFITS, or holds no datum.
+/// If the file is damaged, no UVFITS, or holds no datum; if rows of many channels would take more
+/// memory than [`MOST_MEMORY`] times the file.
 pub fn read(bytes: &[u8]) -> Result<Observation, FileError> {
     let units = fits::units(bytes)?;
     let header = &units[0].header;
     let layout = Layout::new(header)?;
+    let count = layout.channels.len();
+    let rows = layout.groups.checked_mul(count).and_then(|n| n.checked_mul(size_of::<Row>()));
+    if rows.is_none_or(|size| size > MOST_MEMORY * bytes.len()) {
+        let message = format!("{count} channels of so few bytes that rows would be too large");
+        return Err(header.error("BITPIX", message));
+    }
     let tables = AntennaTables::read(&units)?;
     let frequency_hz = tables.frequency_hz.unwrap_or(layout.frequency_hz);
     if !(1e6..=1e15).contains(&frequency_hz) {
         return Err(header.error("CRVAL4", "no frequency in [1e6, 1e15] Hz in AN table or header"));
     }
-    let reader = Reader { layout: &layout, tables: &tables, frequency_hz, offset: units[0].offset };
+    let (channels, unknown) = frequencies::channels(&units, &layout, frequency_hz)?;
+    let wavelengths = match channels.as_slice() {
+        [] => vec![frequency_hz],
+        channels => channels.iter().map(|c| c.frequency_hz).collect(),
+    };
+    let reader = Reader { layout: &layout, tables: &tables, wavelengths, offset: units[0].offset };
     let (mjd, rows, left_out) = reader.rows(units[0].data)?;
-    let channels = layout.channels.len();
-    let bandwidth = layout.channel_width_hz * channels as f64;
+    let bandwidth = match channels.as_slice() {
+        [] => layout.channel_width_hz.abs(),
+        channels => channels.iter().map(|c| c.bandwidth_hz).sum(),
+    };
     let mut observation = Observation {
         source: header.text("OBJECT").unwrap_or_default(),
         position: position(header)?,
         mjd: Some(mjd),
         frequency_hz: Some(frequency_hz),
         bandwidth_hz: Some(bandwidth).filter(|bandwidth| *bandwidth > 0.0),
+        channels,
         rows,
         ..Observation::empty(layout.basis)
     };
-    if channels > 1 {
-        observation.history.push(format!("mean of {channels} spectral channels"));
+    if unknown {
+        let line = "no AIPS FQ table: all IFs counted at the reference frequency";
+        observation.history.push(line.to_owned());
     }
     if left_out > 0 {
         observation.history.push(format!("{left_out} groups without valid data left out"));
@@ -51,6 +69,9 @@ pub fn read(bytes: &[u8]) -> Result<Observation, FileError> {
     observation.stations = tables.stations;
     Ok(observation)
 }
+
+/// Rows take at most this many times the bytes of the file.
+pub const MOST_MEMORY: usize = 16;
 
 /// Right ascension and declination from OBSRA and OBSDEC or the axes named so, in degrees.
 fn position(header: &fits::Header<'_>) -> Result<Option<SourcePosition>, FileError> {
@@ -73,7 +94,8 @@ fn position(header: &fits::Header<'_>) -> Result<Option<SourcePosition>, FileErr
 struct Reader<'a> {
     layout: &'a Layout,
     tables: &'a AntennaTables,
-    frequency_hz: f64,
+    /// Frequencies in Hz that (u, v) of each channel count wavelengths of.
+    wavelengths: Vec<f64>,
     /// Where the data start in the file.
     offset: usize,
 }
@@ -89,20 +111,22 @@ impl Reader<'_> {
             let message = format!("{} groups, none with a date near our time", self.layout.groups);
             return Err(FileError::byte(self.offset, message));
         }
-        // As many as there are bytes for, which `Unit` has seen to.
-        let mut rows = Vec::with_capacity(data.len() / size);
+        // As many as `read` has seen to be in proportion.
+        let mut rows = Vec::with_capacity(data.len() / size * self.wavelengths.len());
+        let mut left_out = 0;
         for (index, group) in groups() {
             let located = |message: String| {
                 let at = self.offset + index * size;
                 FileError::byte(at, format!("group {}: {message}", index + 1))
             };
-            rows.extend(self.row(group, day).map_err(located)?);
+            let before = rows.len();
+            self.group(group, day, &mut rows).map_err(located)?;
+            left_out += usize::from(rows.len() == before);
         }
         if rows.is_empty() {
             let message = format!("{} groups, none with valid data", self.layout.groups);
             return Err(FileError::byte(self.offset, message));
         }
-        let left_out = self.layout.groups - rows.len();
         Ok((day as i32, rows, left_out))
     }
 
@@ -136,19 +160,44 @@ impl Reader<'_> {
         Ok([station(numbers[0])?, station(numbers[1])?])
     }
 
-    /// The row of a group, if there is anything in it.
-    fn row(&self, group: &[u8], day: f64) -> Result<Option<Row>, String> {
+    /// The rows of a group: a channel each, where there is anything in it.
+    fn group(&self, group: &[u8], day: f64, rows: &mut Vec<Row>) -> Result<(), String> {
         let layout = self.layout;
-        let mut products = [Complex64::new(0.0, 0.0); 4];
-        let mut noise_sigma = [f64::NAN; 4];
-        for (k, start) in layout.products.iter().enumerate() {
-            if let Some(start) = start {
-                (products[k], noise_sigma[k]) = self.channel_mean(group, *start);
+        let before = rows.len();
+        for (channel, (place, frequency)) in
+            (0..).zip(layout.channels.iter().zip(&self.wavelengths))
+        {
+            let data = |start: &Option<usize>| match start {
+                Some(start) => self.datum(group, start + place.offset),
+                None => (Complex64::new(0.0, 0.0), f64::NAN),
+            };
+            let data = [0, 1, 2, 3].map(|k| data(&layout.products[k]));
+            if data.iter().all(|(_, sigma)| sigma.is_nan()) {
+                continue;
             }
+            let mut row = match rows.get(before..).and_then(<[Row]>::first) {
+                Some(first) => *first,
+                None => match self.empty_row(group, day)? {
+                    Some(row) => row,
+                    None => return Ok(()),
+                },
+            };
+            let seconds = [layout.u, layout.v].map(|p| layout.parameter(group, p));
+            row.uv = seconds.map(|x| x * frequency);
+            if row.uv.iter().any(|x| !x.is_finite()) {
+                return Err(format!("(u, v) {:?}: not finite", row.uv));
+            }
+            row.products = data.map(|(value, _)| value);
+            row.noise_sigma = data.map(|(_, sigma)| sigma);
+            row.channel = channel;
+            rows.push(row);
         }
-        if noise_sigma.iter().all(|sigma| sigma.is_nan()) {
-            return Ok(None);
-        }
+        Ok(())
+    }
+
+    /// What all channels of a group have in common, unless it is of a station with itself.
+    fn empty_row(&self, group: &[u8], day: f64) -> Result<Option<Row>, String> {
+        let layout = self.layout;
         let stations = self.stations(group)?;
         if stations[0] == stations[1] {
             return Ok(None);
@@ -156,58 +205,31 @@ impl Reader<'_> {
         let value = |parameter| layout.parameter(group, parameter);
         let [date, fraction] = self.date(group);
         let time_h = ((date - day) + fraction) * 24.0;
-        let uv = [value(layout.u) * self.frequency_hz, value(layout.v) * self.frequency_hz];
-        if !(time_h.is_finite() && uv.iter().all(|x| x.is_finite())) {
-            return Err(format!("time {time_h} h, (u, v) {uv:?}: not finite"));
+        if !time_h.is_finite() {
+            return Err(format!("time {time_h} h: not finite"));
         }
         let positive = |x: f64| if x.is_finite() && x > 0.0 { x } else { 0.0 };
+        let opacity = layout.opacity.map_or([0.0; 2], |both| both.map(|p| positive(value(p))));
         Ok(Some(Row {
             time_h,
             integration_s: positive(layout.integration.map_or(0.0, value)),
             stations,
-            uv,
-            products,
-            noise_sigma,
-            opacity: layout
-                .opacity
-                .map_or([0.0; 2], |both| both.map(|p| positive(value(p)) as f32)),
+            uv: [0.0; 2],
+            products: [Complex64::new(0.0, 0.0); 4],
+            noise_sigma: [f64::NAN; 4],
+            opacity: opacity.map(|tau| tau as f32),
+            channel: 0,
         }))
     }
 
-    /// Mean over channels weighted by 1/σ², and its σ. Infinite weights (σ = 0) beat all others.
-    fn channel_mean(&self, group: &[u8], start: usize) -> (Complex64, f64) {
-        let data = || {
-            self.layout.channels.iter().map(|channel| {
-                let [re, im, weight] = self.layout.datum(group, start + channel);
-                let weight = if re.is_finite() && im.is_finite() { weight } else { 0.0 };
-                (Complex64::new(re, im), weight)
-            })
-        };
-        let exact = data().filter(|(_, weight)| *weight == f64::INFINITY).count();
-        let weight_of = |weight: f64| match exact {
-            0 if weight > 0.0 => weight,
-            0 => 0.0,
-            n => {
-                if weight == f64::INFINITY {
-                    1.0 / n as f64
-                } else {
-                    0.0
-                }
-            }
-        };
-        let sum: f64 = data().map(|(_, weight)| weight_of(weight)).sum();
-        if sum <= 0.0 {
-            return (Complex64::new(0.0, 0.0), f64::NAN);
+    /// A visibility and its σ = 1/√weight; NaN where there is none.
+    fn datum(&self, group: &[u8], index: usize) -> (Complex64, f64) {
+        let [re, im, weight] = self.layout.datum(group, index);
+        if re.is_finite() && im.is_finite() && weight > 0.0 {
+            (Complex64::new(re, im), weight.sqrt().recip())
+        } else {
+            (Complex64::new(0.0, 0.0), f64::NAN)
         }
-        // Alone, a value keeps its digits.
-        let mean: Complex64 = match self.layout.channels.len() {
-            1 => data().map(|(value, _)| value).sum(),
-            _ => data()
-                .filter(|(_, w)| weight_of(*w) > 0.0)
-                .map(|(v, w)| v * (weight_of(w) / sum))
-                .sum(),
-        };
-        (mean, if exact > 0 { 0.0 } else { sum.sqrt().recip() })
     }
 }
 

@@ -5,7 +5,7 @@ use super::*;
 use crate::interferometry::Complex64;
 use crate::interferometry::array::Station;
 use crate::interferometry::earth::SourcePosition;
-use crate::interferometry::observation::{Basis, Measured, Observation, Row};
+use crate::interferometry::observation::{Basis, Channel, Measured, Observation, Row};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -107,6 +107,11 @@ fn exact_what_is_not_known_is_asked_for() {
     assert!(fail(|o| o.rows.clear()).contains("no visibilities"));
 }
 
+/// Without an `AIPS FQ` table IFs have no frequencies of their own; channels have.
+fn foreign_axes() -> &'static str {
+    "no AIPS FQ table: all IFs counted at the reference frequency"
+}
+
 /// A file as others write it: axes in another order, two IFs of two channels, dates with PZERO,
 /// (u, v) with PSCAL, integers with BSCALE, a subarray, a baseline of a station with itself.
 fn foreign() -> Vec<u8> {
@@ -162,25 +167,107 @@ fn foreign() -> Vec<u8> {
 #[test]
 fn exact_files_of_others() {
     let observation = read(&foreign()).unwrap();
-    assert_eq!(observation.rows.len(), 1);
+    // Two of four channels have positive weights.
+    assert_eq!(observation.rows.len(), 2);
     assert!(observation.history.iter().any(|line| line.contains("2 groups")));
-    let row = observation.rows[0];
-    assert_eq!(observation.names(&row), ["B", "C"]);
-    // The day of PZERO, a quarter of it in the second part.
-    assert_eq!((observation.mjd, row.time_h), (Some(57850), 6.0));
-    let [u, v] = row.uv;
-    assert!((u - 3e-3 * 1e11).abs() < 1e-3 && (v + 4e-3 * 1e11).abs() < 1e-3, "{u} {v}");
-    // LL only: the mean of 1 with weight 1 and of 2 with weight 4; the others have none.
-    let ll = row.product(1).unwrap();
-    assert!((ll.visibility - Complex64::new(1.8, -1.8)).norm() < 1e-12);
-    assert!((ll.noise_sigma - 0.2f64.sqrt()).abs() < 1e-12 && row.product(0).is_none());
+    assert!(observation.history.iter().any(|line| line == foreign_axes()));
+    for (row, (value, weight)) in observation.rows.iter().zip([(1.0, 1.0), (2.0, 4.0f64)]) {
+        assert_eq!(observation.names(row), ["B", "C"]);
+        // The day of PZERO, a quarter of it in the second part.
+        assert_eq!((observation.mjd, row.time_h), (Some(57850), 6.0));
+        let [u, v] = row.uv;
+        assert!((u - 3e-3 * 1e11).abs() < 1e-3 && (v + 4e-3 * 1e11).abs() < 1e-3, "{u} {v}");
+        let ll = row.product(1).unwrap();
+        assert_eq!(ll.visibility, Complex64::new(value, -value));
+        assert!((ll.noise_sigma - weight.sqrt().recip()).abs() < 1e-12 && row.product(0).is_none());
+    }
+    // Their mean has weight 5.
+    let mean = observation.averaged_over_channels();
+    let ll = mean.rows[0].product(1).unwrap();
+    assert!((ll.visibility - Complex64::new(1.8, -1.8)).norm() < 1e-12 && mean.rows.len() == 1);
+    assert!((ll.noise_sigma - 0.2f64.sqrt()).abs() < 1e-12 && mean.channels.is_empty());
     assert_eq!(observation.bandwidth_hz, Some(4e8));
+}
+
+/// `small` in two IFs of two channels: an IF of the upper and one of the lower sideband.
+fn channels() -> Observation {
+    let mut observation = small();
+    let frequencies = [229.0e9, 229.5e9, 232.0e9, 231.25e9];
+    let widths = [0.5e9, 0.5e9, 0.75e9, 0.75e9];
+    let channel = |(frequency_hz, bandwidth_hz)| Channel { frequency_hz, bandwidth_hz };
+    observation.channels = frequencies.into_iter().zip(widths).map(channel).collect();
+    observation.frequency_hz = Some(229e9);
+    observation.bandwidth_hz = Some(2.5e9);
+    let of_row = |row: &Row| {
+        let row = *row;
+        (0..4).map(move |channel: u16| {
+            let scale = frequencies[usize::from(channel)] / 230e9;
+            Row {
+                channel,
+                uv: row.uv.map(|x| x * scale),
+                products: row.products.map(|v| v * f64::from(channel + 1)),
+                ..row
+            }
+        })
+    };
+    observation.rows = observation.rows.iter().flat_map(of_row).collect();
+    // One channel of the last baseline is missing.
+    observation.rows.remove(9);
+    observation
+}
+
+/// Every channel keeps its own (u, v), through the file and back.
+#[test]
+fn exact_channels_are_rows_of_their_own() {
+    let observation = channels();
+    let back = read(&write(&observation).unwrap()).unwrap();
+    assert_eq!(back.rows.len(), 11);
+    assert!(
+        observation.rows.iter().zip(&back.rows).all(|(a, b)| same(a, b) && a.channel == b.channel)
+    );
+    assert_eq!(back.bandwidth_hz, Some(2.5e9));
+    for (a, b) in observation.channels.iter().zip(&back.channels) {
+        assert!((a.frequency_hz - b.frequency_hz).abs() < 1e-3, "{a:?} {b:?}");
+        assert_eq!(a.bandwidth_hz, b.bandwidth_hz);
+    }
+    assert_eq!(write(&back).unwrap(), write(&read(&write(&back).unwrap()).unwrap()).unwrap());
+    // Averaged in time every channel stays alone; over channels (u, v) are those of the reference.
+    assert_eq!(observation.averaged(60.0).rows.len(), 11);
+    let mean = back.averaged_over_channels();
+    assert_eq!((mean.rows.len(), mean.rows[0].uv), (3, mean.rows[1].uv));
+    assert!((mean.rows[0].uv[0] / (1.5e9 * 229.0 / 230.0) - 1.0).abs() < 1e-7);
+    assert!((mean.rows[0].products[0] - Complex64::new(2.5, 5.0)).norm() < 1e-12);
+    assert_eq!(mean.rows[0].noise_sigma[0], 0.25);
+    // The last baseline has channels 1, 3 and 4 only.
+    assert!((mean.rows[2].products[1] - Complex64::new(8.0, 2.0 / 3.0)).norm() < 1e-12);
+}
+
+/// Two IFs of two channels, frequencies by the FQ table: memo 117's axes, sidebands of both kinds.
+#[test]
+fn paper_aips_memo_117_frequencies() {
+    let mut bytes = foreign();
+    let columns = [
+        ("FRQSEL", "", ColumnData::Integers(1, vec![1])),
+        ("IF FREQ", "HZ", ColumnData::Doubles(2, vec![0.0, 5e9])),
+        ("CH WIDTH", "HZ", ColumnData::Singles(2, vec![1e8, 2e8])),
+        ("SIDEBAND", "", ColumnData::Integers(2, vec![1, -1])),
+    ];
+    bytes.extend(binary_table("AIPS FQ", 1, &columns, |_| ()));
+    let observation = read(&bytes).unwrap();
+    let found: Vec<f64> = observation.channels.iter().map(|c| c.frequency_hz / 1e9).collect();
+    // IF is the inner axis of that file.
+    assert_eq!(found, [100.0, 105.0, 100.1, 104.8]);
+    assert_eq!(observation.bandwidth_hz, Some(6e8));
+    let row = observation.rows[1];
+    assert_eq!(row.channel, 1);
+    assert!((row.uv[0] / (3e-3 * 105e9) - 1.0).abs() < 1e-12);
+    assert!(!observation.history.iter().any(|line| line == foreign_axes()));
 }
 
 /// Cut anywhere, a file is an error or, where its last table ends, still a file; never a panic.
 #[test]
 fn exact_truncated_at_every_byte() {
-    for bytes in [write(&small()).unwrap(), foreign()] {
+    for bytes in [write(&small()).unwrap(), write(&channels()).unwrap(), foreign()] {
         for end in 0..bytes.len() {
             if let Ok(rest) = read(&bytes[..end]) {
                 assert!(end % 2880 == 0 && end > 5760 && !rest.rows.is_empty(), "{end}");

@@ -1,10 +1,11 @@
-//! Writing: one IF, one channel, four products, as eht-imaging, AIPS and CASA read it.
+//! Writing: an IF a channel, four products, as eht-imaging, AIPS and CASA read it.
 
 use super::super::FileError;
 use super::super::fits::{Cards, ColumnData, binary_table, padded};
+use super::frequencies;
 use crate::interferometry::array::Station;
 use crate::interferometry::earth::{SourcePosition, ut1_minus_utc};
-use crate::interferometry::observation::{Basis, Observation, Row, Unknown};
+use crate::interferometry::observation::{Basis, Channel, Observation, Row, Unknown};
 use std::borrow::Cow;
 
 const PARAMETERS: [&str; 9] =
@@ -15,7 +16,8 @@ struct Facts {
     position: SourcePosition,
     mjd: i32,
     frequency_hz: f64,
-    bandwidth_hz: f64,
+    /// One at least.
+    channels: Vec<Channel>,
     /// PSCAL of (u, v): what is stored is multiplied by it to become seconds.
     uv_scale: f64,
 }
@@ -26,15 +28,19 @@ struct Facts {
 ///
 /// # Errors
 /// If the source's position, date, frequency, bandwidth or a station's position is not known, or
-/// there are no rows or more than 255 stations.
+/// there are no rows, more than 255 stations, or rows of a channel that is not listed.
 pub fn write(observation: &Observation) -> Result<Vec<u8>, FileError> {
+    let frequency_hz = observation.frequency_hz.ok_or(Unknown("the frequency"))?;
+    let bandwidth_hz = observation.bandwidth_hz.ok_or(Unknown("the bandwidth"))?;
+    let only = vec![Channel { frequency_hz, bandwidth_hz }];
+    let several = !observation.channels.is_empty();
     let mut facts = Facts {
         position: observation
             .position
             .ok_or(Unknown("the source's right ascension and declination"))?,
         mjd: observation.mjd.ok_or(Unknown("the date (MJD)"))?,
-        frequency_hz: observation.frequency_hz.ok_or(Unknown("the frequency"))?,
-        bandwidth_hz: observation.bandwidth_hz.ok_or(Unknown("the bandwidth"))?,
+        frequency_hz,
+        channels: if several { observation.channels.clone() } else { only },
         uv_scale: 1.0,
     };
     if observation.stations.iter().any(|station| station.position.is_none()) {
@@ -43,6 +49,10 @@ pub fn write(observation: &Observation) -> Result<Vec<u8>, FileError> {
     if observation.stations.len() > 255 {
         let count = observation.stations.len();
         return Err(FileError::whole(format!("{count} stations: UVFITS numbers 255")));
+    }
+    let listed = observation.channels.len().max(1);
+    if observation.rows.iter().any(|row| usize::from(row.channel) >= listed) {
+        return Err(FileError::whole("a row of a spectral channel that is not listed"));
     }
     let only_i = |row: &Row| row.noise_sigma[1..].iter().all(|sigma| sigma.is_nan());
     let mut observation = match observation.basis {
@@ -56,17 +66,18 @@ pub fn write(observation: &Observation) -> Result<Vec<u8>, FileError> {
     }
     let ordered = |row: &Row| row.stations[0] < row.stations[1];
     let sorted = observation.rows.is_sorted_by(|a, b| a.time_h <= b.time_h);
-    if !sorted || !observation.rows.iter().all(ordered) {
+    if several || !sorted || !observation.rows.iter().all(ordered) {
         // The header promises order of time and baseline.
         observation.to_mut().sort();
     }
-    if observation.rows.iter().all(is_single_in_wavelengths) {
+    if !several && observation.rows.iter().all(is_single_in_wavelengths) {
         facts.uv_scale = facts.frequency_hz.recip();
     }
-    let mut bytes = primary_header(&observation, &facts);
-    bytes.extend(groups(&observation, &facts));
+    let groups = groups(&observation.rows);
+    let mut bytes = primary_header(&observation, groups.len(), &facts);
+    bytes.extend(group_bytes(&groups, &facts));
     bytes.extend(antenna_table(&observation.stations, &facts));
-    bytes.extend(frequency_table(&facts));
+    bytes.extend(frequencies::table(&facts.channels, facts.frequency_hz));
     Ok(bytes)
 }
 
@@ -76,14 +87,15 @@ fn is_single_in_wavelengths(row: &Row) -> bool {
     row.uv.iter().all(|x| (f64::from(*x as f32) - x).abs() <= 1e-12 * x.abs())
 }
 
-fn primary_header(observation: &Observation, facts: &Facts) -> Vec<u8> {
+fn primary_header(observation: &Observation, groups: usize, facts: &Facts) -> Vec<u8> {
     let mut cards = Cards::default();
     cards.value("SIMPLE", "T").value("BITPIX", -32).value("NAXIS", 7).value("NAXIS1", 0);
-    for (axis, length) in [(2, 3), (3, 4), (4, 1), (5, 1), (6, 1), (7, 1)] {
+    let bands = facts.channels.len();
+    for (axis, length) in [(2, 3), (3, 4), (4, 1), (5, bands), (6, 1), (7, 1)] {
         cards.value(&format!("NAXIS{axis}"), length);
     }
     cards.value("EXTEND", "T").value("GROUPS", "T").value("PCOUNT", PARAMETERS.len());
-    cards.value("GCOUNT", observation.rows.len());
+    cards.value("GCOUNT", groups);
     let (ra, dec) = (facts.position.ra_hours * 15.0, facts.position.dec_deg);
     cards.number("OBSRA", ra).number("OBSDEC", dec).text("OBJECT", &observation.source);
     cards.number("MJD", facts.mjd.into()).text("DATE-OBS", &calendar_date(facts.mjd));
@@ -96,7 +108,7 @@ fn primary_header(observation: &Observation, facts: &Facts) -> Vec<u8> {
     let axes = [
         (2, "COMPLEX", 1.0, 1.0),
         (3, "STOKES", first, step),
-        (4, "FREQ", facts.frequency_hz, facts.bandwidth_hz),
+        (4, "FREQ", facts.frequency_hz, facts.channels[0].bandwidth_hz),
         (5, "IF", 1.0, 1.0),
         (6, "RA", ra, 1.0),
         (7, "DEC", dec, 1.0),
@@ -125,17 +137,32 @@ fn calendar_date(mjd: i32) -> String {
     }
 }
 
-fn groups(observation: &Observation, facts: &Facts) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(observation.rows.len() * 84);
-    for row in &observation.rows {
+/// Rows that belong to one group: of the same time and baseline, each of a channel of its own.
+fn groups(rows: &[Row]) -> Vec<&[Row]> {
+    let same = |a: &Row, b: &Row| {
+        a.time_h == b.time_h && a.stations == b.stations && a.channel < b.channel
+    };
+    rows.chunk_by(same).collect()
+}
+
+fn group_bytes(groups: &[&[Row]], facts: &Facts) -> Vec<u8> {
+    let numbers = PARAMETERS.len() + 12 * facts.channels.len();
+    let mut bytes = Vec::with_capacity(4 * numbers * groups.len());
+    for rows in groups {
+        let row = &rows[0];
         let antennas = row.stations.map(|k| f64::from(k) + 1.0);
-        let [u, v] = row.uv.map(|x| x / facts.frequency_hz / facts.uv_scale);
+        let frequency_hz = facts.channels[usize::from(row.channel)].frequency_hz;
+        let [u, v] = row.uv.map(|x| x / frequency_hz / facts.uv_scale);
         let baseline = 256.0 * antennas[0] + antennas[1];
         let day = 2_400_000.5 + f64::from(facts.mjd);
         let parameters = [u, v, 0.0, baseline, day, row.time_h / 24.0, row.integration_s];
         let opacity = row.opacity.map(f64::from);
-        let data = (0..4).flat_map(|k| datum(row, k));
-        for value in parameters.into_iter().chain(opacity).chain(data) {
+        let mut data = vec![[0.0; 3]; 4 * facts.channels.len()];
+        for row in *rows {
+            let cells = &mut data[4 * usize::from(row.channel)..][..4];
+            cells.iter_mut().enumerate().for_each(|(k, cell)| *cell = datum(row, k));
+        }
+        for value in parameters.into_iter().chain(opacity).chain(data.into_iter().flatten()) {
             bytes.extend((value as f32).to_be_bytes());
         }
     }
@@ -184,20 +211,7 @@ fn antenna_header(cards: &mut Cards, facts: &Facts) {
     cards.number("DEGPDY", 360.985_644_97).number("UT1UTC", ut1_utc).number("DATUTC", 0.0);
     cards.text("TIMESYS", "UTC").number("FREQ", facts.frequency_hz);
     cards.number("POLARX", 0.0).number("POLARY", 0.0).text("ARRNAM", "VLBA");
-    cards.text("XYZHAND", "RIGHT").text("FRAME", "????").value("NUMORB", 0).value("NO_IF", 1);
+    cards.text("XYZHAND", "RIGHT").text("FRAME", "????").value("NUMORB", 0);
+    cards.value("NO_IF", facts.channels.len());
     cards.value("NOPCAL", 0).text("POLTYPE", "VLBI").value("FREQID", 1);
-}
-
-fn frequency_table(facts: &Facts) -> Vec<u8> {
-    let width = || ColumnData::Singles(1, vec![facts.bandwidth_hz as f32]);
-    let columns = [
-        ("FRQSEL", "", ColumnData::Integers(1, vec![1])),
-        ("IF FREQ", "HZ", ColumnData::Doubles(1, vec![0.0])),
-        ("CH WIDTH", "HZ", width()),
-        ("TOTAL BANDWIDTH", "HZ", width()),
-        ("SIDEBAND", "", ColumnData::Integers(1, vec![1])),
-    ];
-    binary_table("AIPS FQ", 1, &columns, |cards| {
-        cards.value("NO_IF", 1);
-    })
 }

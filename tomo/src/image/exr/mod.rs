@@ -1,13 +1,19 @@
 //! One flat layer of 32-bit float channels, as every EXR viewer opens it.
 
+mod layout;
+mod survey;
+
+pub use layout::{BAND_ROWS, Layout};
+pub use survey::{ChannelSurvey, Survey, survey};
+
 use super::{Channel, Picture};
-use exr::prelude::{
-    AnyChannel, AnyChannels, AttributeValue, Blocks, Compression, Encoding, Error, FlatSamples,
-    Image, Layer, LayerAttributes, LineOrder, ReadChannels, ReadLayers, Text, Vec2, WritableImage,
-    read,
-};
+use exr::meta::MetaData;
+use exr::meta::header::LayerAttributes;
+use exr::prelude::{AttributeValue, Error, ReadChannels, ReadLayers, Text, Vec2, read};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::io::Cursor;
+use std::io::{Cursor, Read};
+use std::ops::Range;
 
 /// The name of the one attribute that holds all settings, as a TOML table. (The encoder
 /// writes several attributes in random order, and the same picture should be the same bytes.)
@@ -26,28 +32,46 @@ fn utf8(text: &str) -> Text {
 /// # Errors
 /// If the picture is empty, or on a failure of the encoder.
 pub fn encode(picture: &Picture, attributes: &Attributes) -> exr::error::Result<Vec<u8>> {
-    let list = picture
-        .channels
-        .iter()
-        .map(|c| AnyChannel::new(c.name.as_str(), FlatSamples::F32(c.values.clone())))
-        .collect();
-    let mut layer = LayerAttributes {
-        software_name: Some(Text::from(concat!("kerrlight ", env!("CARGO_PKG_VERSION")))),
-        ..LayerAttributes::default()
-    };
-    let settings =
-        toml::to_string_pretty(attributes).map_err(|e| Error::Invalid(e.to_string().into()))?;
-    layer.other.insert(Text::from(ATTRIBUTE), AttributeValue::Text(utf8(&settings)));
-    let encoding = Encoding {
-        compression: Compression::ZIP16,
-        blocks: Blocks::ScanLines,
-        line_order: LineOrder::Increasing,
-    };
-    let size = (picture.width, picture.height);
-    let layer = Layer::new(size, layer, encoding, AnyChannels::sort(list));
+    let names: Vec<&str> = picture.channels.iter().map(|c| c.name.as_str()).collect();
+    let layout = Layout::new(picture.width, picture.height, &names)?;
+    let bands = (0..layout.bands()).into_par_iter().map(|band| {
+        let Range { start, end } = layout.rows(band);
+        let values = start * picture.width..end * picture.width;
+        let part = |c: &'_ Channel| c.values.get(values.clone()).unwrap_or_default().to_vec();
+        layout.compress(band, &picture.channels.iter().map(part).collect::<Vec<_>>())
+    });
+    let bands = bands.collect::<exr::error::Result<Vec<_>>>()?;
     let mut bytes = Vec::new();
-    Image::from_layer(layer).write().to_buffered(Cursor::new(&mut bytes))?;
+    layout.write(Cursor::new(&mut bytes), attributes, |write| {
+        bands.into_iter().enumerate().try_for_each(|(band, bytes)| write(band, bytes))
+    })?;
     Ok(bytes)
+}
+
+/// The attribute that holds the settings.
+fn settings(attributes: &Attributes) -> exr::error::Result<(Text, AttributeValue)> {
+    let text =
+        toml::to_string_pretty(attributes).map_err(|e| Error::Invalid(e.to_string().into()))?;
+    Ok((Text::from(ATTRIBUTE), AttributeValue::Text(utf8(&text))))
+}
+
+/// kerrlight's settings from the beginning of an EXR file; no pixel is read.
+///
+/// # Errors
+/// If the bytes are no EXR file.
+pub fn decode_attributes(file: impl Read) -> exr::error::Result<Attributes> {
+    let data = MetaData::read_from_unbuffered(file, true)?;
+    data.headers.first().map_or(Ok(Attributes::new()), |header| attributes(&header.own_attributes))
+}
+
+fn attributes(layer: &LayerAttributes) -> exr::error::Result<Attributes> {
+    match layer.other.get(&Text::from(ATTRIBUTE)) {
+        Some(AttributeValue::Text(text)) => {
+            let settings = String::from_utf8_lossy(text.as_slice());
+            toml::from_str(&settings).map_err(|e| Error::Invalid(e.to_string().into()))
+        }
+        _ => Ok(Attributes::new()),
+    }
 }
 
 /// The channels and kerrlight's settings of the first layer of an EXR file.
@@ -73,13 +97,7 @@ pub fn decode(bytes: &[u8]) -> exr::error::Result<(Picture, Attributes)> {
         }
         channels.push(Channel { name: channel.name.to_string(), values });
     }
-    let attributes = match layer.attributes.other.get(&Text::from(ATTRIBUTE)) {
-        Some(AttributeValue::Text(text)) => {
-            let settings = String::from_utf8_lossy(text.as_slice());
-            toml::from_str(&settings).map_err(|e| Error::Invalid(e.to_string().into()))?
-        }
-        _ => Attributes::new(),
-    };
+    let attributes = attributes(&layer.attributes)?;
     Ok((Picture { width, height, channels }, attributes))
 }
 

@@ -1,0 +1,276 @@
+//! Movies of one file or of many, and when their images show the source.
+
+use super::arguments;
+use super::image_files::{self, OwnTimes};
+use crate::output;
+use anyhow::{Context, bail};
+use kerrlight_tomo::interferometry::simulate::Movie;
+use std::path::{Path, PathBuf};
+
+/// How the times of a movie's images are given.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FrameTimes {
+    /// Image k at scan k.
+    Scans,
+    /// As the files tell.
+    Own,
+    /// Hours of UTC of the first image and of the last, equal steps between.
+    Hours([f64; 2]),
+    /// A file with an hour of UTC a line.
+    File(PathBuf),
+}
+
+/// `scans`, `own`, `FROM-TO` or the name of a file.
+pub fn frame_times(text: &str) -> Result<FrameTimes, String> {
+    Ok(match (text, arguments::range(text)) {
+        ("scans", _) => FrameTimes::Scans,
+        ("own", _) => FrameTimes::Own,
+        (_, Ok(hours)) => FrameTimes::Hours(hours),
+        _ => FrameTimes::File(PathBuf::from(text)),
+    })
+}
+
+/// The files that an argument stands for: itself, the images in a folder, or those of a pattern
+/// with `%d`, `%04d` or one `*` in the file's name; in the order of the numbers in their names.
+pub fn files(argument: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let shown = argument.display();
+    let name = argument.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    let pattern = Pattern::parse(name);
+    if argument.exists() && !argument.is_dir() || !argument.is_dir() && pattern.is_none() {
+        return Ok(vec![argument.to_owned()]);
+    }
+    let (folder, pattern) = match pattern {
+        Some(pattern) if !argument.is_dir() => {
+            (argument.parent().filter(|p| *p != Path::new("")).unwrap_or(Path::new(".")), pattern)
+        }
+        _ => (argument, Pattern { start: "", end: ".exr", digits: false }),
+    };
+    let entries =
+        std::fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
+    let mut names = Vec::new();
+    for entry in entries {
+        let name = entry?.file_name();
+        names.extend(name.to_str().filter(|name| pattern.fits(name)).map(str::to_owned));
+    }
+    names.sort_by_cached_key(|name| numbered(name));
+    if pattern.digits {
+        pattern.no_gaps(&names)?;
+    }
+    if names.is_empty() {
+        bail!("{shown}: there are no files {}*{}", pattern.start, pattern.end);
+    }
+    Ok(names.iter().map(|name| folder.join(name)).collect())
+}
+
+/// What names of a sequence have in common.
+struct Pattern<'a> {
+    start: &'a str,
+    end: &'a str,
+    /// Whether only digits stand between.
+    digits: bool,
+}
+
+impl<'a> Pattern<'a> {
+    fn parse(name: &'a str) -> Option<Self> {
+        if let Some((start, end)) = name.split_once('*') {
+            return Some(Pattern { start, end, digits: false });
+        }
+        let (start, rest) = name.split_once('%')?;
+        let end = rest.trim_start_matches(|c: char| c.is_ascii_digit()).strip_prefix('d')?;
+        Some(Pattern { start, end, digits: true })
+    }
+
+    fn middle<'n>(&self, name: &'n str) -> Option<&'n str> {
+        name.strip_prefix(self.start)?.strip_suffix(self.end)
+    }
+
+    fn fits(&self, name: &str) -> bool {
+        let digits = |m: &str| !m.is_empty() && m.bytes().all(|b| b.is_ascii_digit());
+        !name.starts_with('.') && self.middle(name).is_some_and(|m| !self.digits || digits(m))
+    }
+
+    /// Refuses numbers that are missing or there twice.
+    fn no_gaps(&self, names: &[String]) -> anyhow::Result<()> {
+        let number = |name: &String| self.middle(name).and_then(|m| m.parse::<u64>().ok());
+        for pair in names.windows(2) {
+            if number(&pair[0]).and_then(|k| k.checked_add(1)) != number(&pair[1]) {
+                bail!("{} is followed by {}: a frame is missing or doubled", pair[0], pair[1]);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A name for sorting, runs of digits as numbers: `frame_9` comes before `frame_10`.
+fn numbered(name: &str) -> Vec<(u128, String)> {
+    let mut parts: Vec<(u128, String)> = vec![(0, String::new())];
+    let mut in_digits = false;
+    for c in name.chars() {
+        match (c.to_digit(10), in_digits) {
+            (Some(digit), true) => {
+                if let Some((number, _)) = parts.last_mut() {
+                    *number = number.saturating_mul(10).saturating_add(digit.into());
+                }
+            }
+            (Some(digit), false) => parts.push((digit.into(), String::new())),
+            (None, _) => {
+                if let Some((_, text)) = parts.last_mut() {
+                    text.push(c);
+                }
+            }
+        }
+        in_digits = c.is_ascii_digit();
+    }
+    parts
+}
+
+/// Reads a movie from its only file, or from one image a file.
+pub fn read(files: &[PathBuf], fov_uas: Option<f64>) -> anyhow::Result<(Movie, OwnTimes)> {
+    let [first, rest @ ..] = files else { bail!("no image is given") };
+    let (mut movie, mut times) = image_files::read(first, fov_uas)?;
+    for path in rest {
+        let (image, time) = image_files::read(path, fov_uas)?;
+        let (a, b) = (movie.grid, image.grid);
+        let same_field = (a.pixel_rad - b.pixel_rad).abs() <= 1e-9 * a.pixel_rad;
+        if (a.width, a.height) != (b.width, b.height) || !same_field {
+            bail!("{} differs from {} in pixels or field", path.display(), first.display());
+        }
+        if movie.frames() != 1 && movie.pixels.len() == a.pixels() || image.frames() != 1 {
+            bail!("{} is a movie: in a sequence every file is one image", path.display());
+        }
+        movie.pixels.extend(image.pixels);
+        times = match (times, time) {
+            (OwnTimes::Since(mut all), OwnTimes::Since(one)) => {
+                all.extend(one);
+                OwnTimes::Since(all)
+            }
+            _ => OwnTimes::Unknown,
+        };
+    }
+    if movie.frames() < files.len() {
+        bail!("{} is a movie: in a sequence every file is one image", first.display());
+    }
+    Ok((movie, times))
+}
+
+/// The hour of UTC of every image, and how to say it.
+pub fn times(
+    frames: usize,
+    own: &OwnTimes,
+    choice: Option<&FrameTimes>,
+    scans_h: &[f64],
+) -> anyhow::Result<(Vec<f64>, String)> {
+    if frames == 1 {
+        return match choice {
+            None => Ok((vec![0.0], "one image, seen by all scans".to_owned())),
+            Some(_) => bail!("--frame-times is for movies: there is one image"),
+        };
+    }
+    let times = match choice {
+        None => return at_scans(frames, own, scans_h),
+        Some(FrameTimes::Scans) if frames == scans_h.len() => scans_h.to_vec(),
+        Some(FrameTimes::Scans) => {
+            bail!("--frame-times scans: {frames} images, but {} scans (--frames)", scans_h.len())
+        }
+        Some(FrameTimes::Own) => own_hours(own, scans_h[0])?,
+        Some(FrameTimes::Hours([from, to])) => {
+            (0..frames).map(|k| from + (to - from) * k as f64 / (frames - 1) as f64).collect()
+        }
+        Some(FrameTimes::File(path)) => file_hours(path)?,
+    };
+    if times.len() != frames {
+        bail!("--frame-times: {} times for {frames} images", times.len());
+    }
+    let (from, to) = (times[0], times[frames - 1]);
+    Ok((times, format!("{frames} images from {from} to {to} h UTC, linear between")))
+}
+
+/// Image k at scan k, unless numbers or the images' own times speak against it.
+fn at_scans(frames: usize, own: &OwnTimes, scans_h: &[f64]) -> anyhow::Result<(Vec<f64>, String)> {
+    if frames != scans_h.len() {
+        let count = scans_h.len();
+        bail!("{frames} images, but {count} scans: say when images are, with --frame-times");
+    }
+    let step = (scans_h[frames - 1] - scans_h[0]) / (frames - 1) as f64;
+    let far = |(own, scan): (&f64, &f64)| (own - scan).abs() > 0.01 * step;
+    let own = own_hours(own, scans_h[0]);
+    if own.is_ok_and(|own| own.len() != frames || own.iter().zip(scans_h).any(far)) {
+        bail!(
+            "the images' own times are not those of the scans: say --frame-times own, or \
+             --frame-times scans for image k at scan k"
+        );
+    }
+    Ok((scans_h.to_vec(), format!("{frames} images, image k at scan k")))
+}
+
+/// What files tell; times that count from nowhere start with the first scan.
+fn own_hours(own: &OwnTimes, first_scan_h: f64) -> anyhow::Result<Vec<f64>> {
+    match own {
+        OwnTimes::Unknown => bail!("--frame-times own: the images do not tell their times"),
+        OwnTimes::Utc(hours) => Ok(hours.clone()),
+        OwnTimes::Since(hours) => {
+            let start = hours.first().copied().unwrap_or_default();
+            Ok(hours.iter().map(|hour| first_scan_h + (hour - start)).collect())
+        }
+    }
+}
+
+/// An hour of UTC a line; `#` begins a comment.
+fn file_hours(path: &Path) -> anyhow::Result<Vec<f64>> {
+    let text = output::read_text(path).context("--frame-times")?;
+    let lines = text.lines().enumerate().map(|(k, line)| (k + 1, line.trim()));
+    let lines = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+    let hour = |(number, line): (usize, &str)| {
+        let cell: String = line.chars().take(20).collect();
+        let hour = line.parse().ok().filter(|hour: &f64| hour.is_finite());
+        hour.with_context(|| format!("{}, line {number}: `{cell}` is no hour", path.display()))
+    };
+    lines.map(hour).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exact_sequences_of_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path();
+        for name in ["f_9.exr", "f_10.exr", "f_8.exr", "g.exr", "f_11.csv", ".f_12.exr"] {
+            std::fs::write(path.join(name), "").unwrap();
+        }
+        let names = |pattern: &str| -> Vec<String> {
+            let files = files(&path.join(pattern)).unwrap();
+            files.iter().map(|p| p.file_name().unwrap().to_str().unwrap().to_owned()).collect()
+        };
+        assert_eq!(names("f_%d.exr"), ["f_8.exr", "f_9.exr", "f_10.exr"]);
+        assert_eq!(names("f_*.exr"), ["f_8.exr", "f_9.exr", "f_10.exr"]);
+        assert_eq!(names(""), ["f_8.exr", "f_9.exr", "f_10.exr", "g.exr"]);
+        assert_eq!(names("absent.csv"), ["absent.csv"]);
+        assert!(files(&path.join("h_*.exr")).unwrap_err().to_string().contains("no files h_*.exr"));
+        std::fs::remove_file(path.join("f_9.exr")).unwrap();
+        let message = files(&path.join("f_%02d.exr")).unwrap_err().to_string();
+        assert!(message.contains("f_8.exr is followed by f_10.exr"), "{message}");
+    }
+
+    #[test]
+    fn exact_times_of_images() {
+        let scans = [4.0, 5.0, 6.0];
+        let run = |frames, own: &OwnTimes, choice: Option<&str>| {
+            let choice = choice.map(|text| frame_times(text).unwrap());
+            times(frames, own, choice.as_ref(), &scans).map(|(times, _)| times)
+        };
+        let unknown = OwnTimes::Unknown;
+        assert_eq!(run(3, &unknown, None).unwrap(), scans);
+        assert_eq!(run(2, &unknown, Some("4-6")).unwrap(), [4.0, 6.0]);
+        assert!(run(2, &unknown, None).unwrap_err().to_string().contains("--frame-times"));
+        assert!(run(2, &unknown, Some("scans")).is_err() && run(2, &unknown, Some("own")).is_err());
+        assert!(run(1, &unknown, Some("own")).is_err() && run(1, &unknown, None).is_ok());
+        let since = OwnTimes::Since(vec![7.0, 7.5, 9.0]);
+        assert_eq!(run(3, &since, Some("own")).unwrap(), [4.0, 4.5, 6.0]);
+        assert!(run(3, &since, None).unwrap_err().to_string().contains("own times are not"));
+        assert_eq!(run(3, &since, Some("scans")).unwrap(), scans);
+        assert_eq!(run(3, &OwnTimes::Since(vec![1.0, 2.0, 3.0]), None).unwrap(), scans);
+        assert!(run(3, &OwnTimes::Utc(vec![4.0, 5.0]), Some("own")).is_err());
+    }
+}

@@ -1,0 +1,57 @@
+//! The journal of a picture under way: beside the EXR, until that is whole.
+
+use crate::output::Output;
+use anyhow::{Context, bail};
+use kerrlight_tomo::render::{Found, Journal, Raster};
+use std::fs::{File, OpenOptions, TryLockError};
+use std::path::{Path, PathBuf};
+
+/// A journal with its file, which no other process may use.
+pub struct Partial {
+    path: PathBuf,
+    pub journal: Journal<File>,
+}
+
+impl Partial {
+    /// Goes on with what an earlier run of the same picture has left, or starts anew.
+    /// `identity` is all that decides the picture.
+    pub fn open(output: &Output, raster: &Raster, identity: &str) -> anyhow::Result<Self> {
+        let path = output.partial();
+        let shown = path.display();
+        let mut options = OpenOptions::new();
+        let file = options.read(true).write(true).create(true).truncate(false).open(&path);
+        let file = file.with_context(|| format!("cannot open {shown}"))?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                bail!("{shown} is in use: another kerrlight renders {}", output.shown().display())
+            }
+            // Not every file system has locks.
+            Err(TryLockError::Error(_)) => {}
+        }
+        let (journal, found) =
+            Journal::open(file, identity, raster.bands()).with_context(|| {
+                format!("{shown} (where an interrupted run goes on); remove it or write elsewhere")
+            })?;
+        match found {
+            Found::Bands(0) | Found::Nothing => {}
+            Found::Bands(there) => {
+                let all = raster.bands();
+                eprintln!("going on with {shown}: {there} of {all} bands are there");
+            }
+            Found::Other => eprintln!("starting anew: {shown} was of another picture or version"),
+        }
+        Ok(Partial { path, journal })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Removes it: the picture is whole, or will never be.
+    pub fn remove(self) {
+        // What is left behind does no harm.
+        let _ = std::fs::remove_file(&self.path);
+    }
+}

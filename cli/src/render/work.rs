@@ -1,0 +1,102 @@
+//! Rendering, with a journal beside the EXR or without one.
+
+use super::partial::Partial;
+use super::report;
+use crate::output::{self, Output};
+use crate::{interrupt, progress};
+use anyhow::{Context, anyhow};
+use kerrlight_tomo::image::Picture;
+use kerrlight_tomo::image::reduce::Reduction;
+use kerrlight_tomo::render::{Journal, Raster, RenderError, Summary};
+use kerrlight_tomo::scene::Scene;
+use std::io::{Cursor, Read, Seek, Write};
+use std::sync::atomic::Ordering;
+
+/// What is rendered.
+pub struct Work<'a> {
+    pub raster: &'a Raster,
+    pub scene: &'a Scene,
+    /// The scene as it was given.
+    pub text: &'a str,
+    /// What the scene is called in messages.
+    pub name: &'a str,
+}
+
+impl Work<'_> {
+    /// Renders into an EXR file, going on where an interrupted run has stopped.
+    pub fn exr(
+        &self,
+        exr: &Output,
+        identity: &str,
+        mut look: Option<Reduction>,
+    ) -> anyhow::Result<(Summary, Option<Picture>)> {
+        let mut partial = Partial::open(exr, self.raster, identity)?;
+        let summary = match self.fill(&mut partial.journal) {
+            Ok(summary) => summary,
+            Err(error) => return Err(self.failed(error, partial)),
+        };
+        let attributes = report::attributes(self.scene, self.text, self.raster.legend(), &summary);
+        exr.write_with(|file| {
+            let journal = &mut partial.journal;
+            let look = look.as_mut();
+            Ok(self.raster.write_exr(journal, &summary, &attributes, file, look)?)
+        })
+        .with_context(|| kept(&partial))?;
+        output::print(&format!("{}\n", exr.shown().display()))?;
+        partial.remove();
+        Ok((summary, look.map(Reduction::picture)))
+    }
+
+    /// Renders what a preview needs.
+    pub fn preview(&self, look: Option<Reduction>) -> anyhow::Result<(Summary, Option<Picture>)> {
+        let memory = Cursor::new(Vec::new());
+        let (mut journal, _) = Journal::open(memory, "", self.raster.bands())?;
+        let summary = self.fill(&mut journal).with_context(|| self.name.to_owned())?;
+        let Some(mut look) = look else { return Ok((summary, None)) };
+        self.raster.reduce(&mut journal, &summary, &mut look)?;
+        Ok((summary, Some(look.picture())))
+    }
+
+    /// Renders all bands that are missing.
+    fn fill<F: Read + Write + Seek + Send>(
+        &self,
+        journal: &mut Journal<F>,
+    ) -> Result<Summary, RenderError> {
+        let all = self.raster.bands();
+        let bar = progress::bar(all as u64);
+        bar.set_position((all - journal.missing().len()) as u64);
+        let interrupted = interrupt::flag();
+        let done = self.raster.fill(journal, &|_| {
+            bar.inc(1);
+            !interrupted.load(Ordering::Relaxed)
+        });
+        bar.finish_and_clear();
+        done?;
+        self.raster.summary(journal)
+    }
+
+    /// What to tell of a picture that has not been finished.
+    fn failed(&self, error: RenderError, partial: Partial) -> anyhow::Error {
+        match error {
+            RenderError::Stopped => anyhow!("stopped; {}", kept(&partial)),
+            RenderError::Keep(error) => {
+                let context =
+                    format!("cannot write {}; {}", partial.path().display(), kept(&partial));
+                anyhow::Error::new(error).context(context)
+            }
+            // The scene is at fault: the same picture will never be.
+            other => {
+                partial.remove();
+                anyhow::Error::new(other).context(self.name.to_owned())
+            }
+        }
+    }
+}
+
+/// How to go on.
+fn kept(partial: &Partial) -> String {
+    format!(
+        "what has been rendered is kept in {}: give the same command again to go on",
+        partial.path().display()
+    )
+}

@@ -1,0 +1,137 @@
+//! Pictures that are interrupted end in the same bytes.
+
+use crate::support::{binary, fail, kerrlight, root, succeed};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Ten bands of a scene whose rays are slow enough to be interrupted.
+const SIZE: [&str; 4] = ["--set", "screen.width=40", "--set", "screen.height=160"];
+
+fn arguments(scene: &Path) -> Vec<&str> {
+    let scene = scene.to_str().expect("a name");
+    [&["render", scene, "-o", "a.exr", "--preview", "a.png"][..], &SIZE[..]].concat()
+}
+
+fn start(folder: &Path, arguments: &[&str]) -> Child {
+    let mut command = Command::new(binary());
+    command.current_dir(folder).args(arguments).stdout(Stdio::null()).stderr(Stdio::piped());
+    command.spawn().expect("the binary runs")
+}
+
+/// The whole picture, and how long it takes.
+fn undisturbed(scene: &Path) -> (Vec<u8>, Duration) {
+    let folder = tempfile::tempdir().unwrap();
+    binary();
+    let clock = Instant::now();
+    succeed(folder.path(), &arguments(scene));
+    let taken = clock.elapsed();
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "nothing is left behind");
+    (std::fs::read(folder.path().join("a.exr")).unwrap(), taken)
+}
+
+#[test]
+fn exact_same_bytes_after_kills_at_twenty_moments() {
+    let scene = root().join("scenes/hot_spots.toml");
+    let (whole, taken) = undisturbed(&scene);
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("a.exr");
+    let mut resumed = 0;
+    for k in 0..20 {
+        // Multiples of the golden ratio fall everywhere.
+        let moment = taken.mul_f64((0.618_034 * f64::from(k)).fract() * 0.6);
+        resumed += usize::from(folder.path().join("a.exr.partial").exists());
+        let mut child = start(folder.path(), &arguments(&scene));
+        std::thread::sleep(moment);
+        child.kill().unwrap();
+        child.wait().unwrap();
+        if output.exists() {
+            assert!(std::fs::read(&output).unwrap() == whole, "a half file after kill {k}");
+            std::fs::remove_file(&output).unwrap();
+        }
+    }
+    assert!(resumed > 5, "{resumed} runs went on with another's work");
+    succeed(folder.path(), &arguments(&scene));
+    assert!(std::fs::read(&output).unwrap() == whole);
+}
+
+/// Ctrl-C keeps what is there and says how to go on; other scenes do not take it up.
+#[cfg(unix)]
+#[test]
+fn exact_same_bytes_after_an_interrupt() {
+    let scene = root().join("scenes/hot_spots.toml");
+    let (whole, taken) = undisturbed(&scene);
+    let folder = tempfile::tempdir().unwrap();
+    let partial = folder.path().join("a.exr.partial");
+    let child = start(folder.path(), &arguments(&scene));
+    // Its head alone is not yet a band.
+    let head = || std::fs::metadata(&partial).map_or(0, |m| m.len());
+    let clock = Instant::now();
+    while head() < 4096 && clock.elapsed() < 20 * taken + Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let pid = child.id().to_string();
+    assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
+    let ended = child.wait_with_output().unwrap();
+    let message = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!(ended.status.code(), Some(2), "{message}");
+    assert!(message.contains("a.exr.partial") && message.contains("same command"), "{message}");
+    let kept = std::fs::read(&partial).unwrap();
+
+    let changed = [&arguments(&scene)[..], &["--set", "hole.spin=0.4"]].concat();
+    let output = kerrlight(folder.path(), &changed);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("of another picture"));
+    assert!(std::fs::read(folder.path().join("a.exr")).unwrap() != whole);
+
+    std::fs::write(&partial, kept).unwrap();
+    let tiles = [&arguments(&scene)[..], &["--tile", "7", "--threads", "3"]].concat();
+    let output = kerrlight(folder.path(), &tiles);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("bands are there"));
+    assert!(std::fs::read(folder.path().join("a.exr")).unwrap() == whole);
+    assert!(!partial.exists());
+}
+
+/// A disk that is full (here: a limit on the size of files) loses nothing.
+#[cfg(unix)]
+#[test]
+fn exact_same_bytes_after_a_full_disk() {
+    let scene = root().join("scenes/hot_spots.toml");
+    let (whole, _) = undisturbed(&scene);
+    let folder = tempfile::tempdir().unwrap();
+    let limited = "trap '' XFSZ; ulimit -f 32; exec \"$0\" \"$@\"";
+    let mut command = Command::new("sh");
+    command.current_dir(folder.path()).arg("-c").arg(limited).arg(binary());
+    let output = command.args(arguments(&scene)).output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("cannot write") && message.contains("same command"), "{message}");
+    assert!(!folder.path().join("a.exr").exists());
+    succeed(folder.path(), &arguments(&scene));
+    assert!(std::fs::read(folder.path().join("a.exr")).unwrap() == whole);
+}
+
+#[test]
+fn a_file_in_the_way_of_the_journal_is_spared() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.exr.partial"), "somebody's notes").unwrap();
+    let message = fail(folder.path(), &["render", "-o", "a.exr"]);
+    assert!(message.contains("no journal of kerrlight"), "{message}");
+    let notes = std::fs::read_to_string(folder.path().join("a.exr.partial")).unwrap();
+    assert_eq!(notes, "somebody's notes");
+}
+
+/// Neither the number of threads nor the size of tiles changes a bit.
+#[test]
+fn exact_same_bytes_for_any_tile_and_any_number_of_threads() {
+    let scene = root().join("scenes/disc_edge_on.toml");
+    let folder = tempfile::tempdir().unwrap();
+    let base = ["render", scene.to_str().unwrap(), "--set", "screen.width=70"];
+    let base = [&base[..], &["--set", "screen.height=39"][..]].concat();
+    let mut files = Vec::new();
+    for [tile, threads] in [["64", "2"], ["1", "3"], ["13", "1"], ["100", "4"]] {
+        let more = ["-o", "a.exr", "--tile", tile, "--threads", threads];
+        succeed(folder.path(), &[&base[..], &more].concat());
+        files.push(std::fs::read(folder.path().join("a.exr")).unwrap());
+    }
+    assert!(files.windows(2).all(|pair| pair[0] == pair[1]));
+}

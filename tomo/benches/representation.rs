@@ -1,0 +1,212 @@
+//! What representations cost, forward and with the gradient and a step of Adam, over the size of the
+//! batch, beside the rate of a large matrix product in the same run. The gradient is checked first,
+//! so that nothing wrong is timed.
+//!
+//! The table printed first holds processor time a thread (Linux; elsewhere wall time), which other
+//! work on the machine disturbs least; criterion's own times follow. Threads are as many as
+//! `RAYON_NUM_THREADS` says.
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use kerrlight_tomo::optimise::{Adam, AdamState};
+use kerrlight_tomo::representation::{
+    Activation, Coordinates, Gradient, Grid, GridSettings, Network, NetworkSettings,
+    Representation, Workspace,
+};
+use rayon::prelude::*;
+use std::time::Instant;
+
+const BATCHES: [usize; 3] = [1_000, 57_344, 1_000_000];
+
+/// A representation with a batch and a state of Adam.
+struct Run<'a> {
+    representation: &'a dyn Representation<f32>,
+    columns: [Vec<f32>; 4],
+    parameters: Vec<f32>,
+    gradient: Vec<f32>,
+    values: Vec<f32>,
+    cotangents: Vec<f32>,
+    state: AdamState<f32>,
+    workspace: Workspace,
+}
+
+impl<'a> Run<'a> {
+    fn new(representation: &'a dyn Representation<f32>, points: usize) -> Self {
+        let wave = |step: f64| (0..points).map(move |k| (5.0 * (k as f64 * step).sin()) as f32);
+        let count = representation.parameters();
+        let mut parameters = vec![0.0; count];
+        representation.initialise(1, &mut parameters);
+        Self {
+            representation,
+            columns: [0.177, 0.655, 1.292, 0.911].map(|step| wave(step).collect()),
+            parameters,
+            gradient: vec![0.0; count],
+            values: vec![0.0; points],
+            cotangents: wave(2.3).collect(),
+            state: AdamState::new(count),
+            workspace: Workspace::new(),
+        }
+    }
+
+    fn eval(&mut self) {
+        let at = coordinates(&self.columns, self.representation.dimension());
+        let (values, workspace) = (&mut self.values, &mut self.workspace);
+        self.representation.eval(&self.parameters, at, values, workspace);
+    }
+
+    fn vjp(&mut self) {
+        let at = coordinates(&self.columns, self.representation.dimension());
+        self.gradient.fill(0.0);
+        let gradient = Gradient { parameters: &mut self.gradient, coordinates: None };
+        let (cotangents, workspace) = (&self.cotangents, &mut self.workspace);
+        self.representation.vjp(&self.parameters, at, cotangents, gradient, workspace);
+    }
+
+    fn step(&mut self) {
+        self.vjp();
+        Adam::default().step(1e-5, &self.gradient, &mut self.state, &mut self.parameters);
+        self.representation.project(&mut self.parameters);
+    }
+
+    /// Directional derivative of Σ cotangent · value along the gradient, by differences.
+    fn check(&mut self) {
+        self.vjp();
+        let dot = |a: &[f32], b: &[f32]| -> f64 {
+            a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
+        };
+        let size = dot(&self.gradient, &self.gradient);
+        let start = self.parameters.clone();
+        let mut sum = |scale: f64| {
+            let moved = start.iter().zip(&self.gradient).map(|(x, g)| x + scale as f32 * g);
+            self.parameters = moved.collect();
+            self.eval();
+            dot(&self.values, &self.cotangents)
+        };
+        let step = 1e-2 / size.sqrt();
+        let difference = (sum(step) - sum(-step)) / (2.0 * step);
+        self.parameters = start;
+        assert!((difference / size - 1.0).abs() < 0.02, "{difference:e} {size:e}");
+    }
+}
+
+fn coordinates(columns: &[Vec<f32>; 4], dimension: usize) -> Coordinates<'_, f32> {
+    let [x, y, z, t] = columns;
+    if dimension == 4 { Coordinates::txyz(t, x, y, z) } else { Coordinates::xyz(x, y, z) }
+}
+
+/// Seconds that the threads of this process have computed, on average; the wall clock where the
+/// system does not tell.
+fn clock(start: Instant) -> f64 {
+    let of = |entry: std::io::Result<std::fs::DirEntry>| -> Option<f64> {
+        let text = std::fs::read_to_string(entry.ok()?.path().join("schedstat")).ok()?;
+        text.split_whitespace().next()?.parse().ok()
+    };
+    let threads = std::fs::read_dir("/proc/self/task");
+    let total = threads.ok().map(|all| all.filter_map(of).sum::<f64>()).filter(|sum| *sum > 0.0);
+    let wall = start.elapsed().as_secs_f64();
+    total.map_or(wall, |sum| sum * 1e-9 / rayon::current_num_threads() as f64)
+}
+
+/// Seconds of one piece of work: the least of five means over a tenth of a second or more.
+fn least(mut work: impl FnMut()) -> f64 {
+    let zero = Instant::now();
+    let mut least = f64::INFINITY;
+    for _ in 0..5 {
+        // The clock is asked so rarely that asking costs nothing.
+        let (start, mut count, mut more) = (clock(zero), 0, 1);
+        let spent = loop {
+            (0..more).for_each(|_| work());
+            count += more;
+            more *= 2;
+            let spent = clock(zero) - start;
+            if spent > 0.1 {
+                break spent;
+            }
+        };
+        least = least.min(spent / f64::from(count));
+    }
+    least
+}
+
+/// GFLOP/s of a product of 2048 × 2048 matrices of f32, each thread with its share of columns.
+fn large_sgemm() -> f64 {
+    const N: usize = 2048;
+    let (a, b, mut c) = (vec![1.0f32; N * N], vec![0.5f32; N * N], vec![0.0f32; N * N]);
+    let share = N.div_ceil(rayon::current_num_threads());
+    let seconds = least(|| {
+        c.par_chunks_mut(N * share).zip(b.par_chunks(N * share)).for_each(|(c, b)| {
+            let (columns, stride) = (c.len() / N, N as isize);
+            // SAFETY: a is N × N; b and c are N × columns, column by column.
+            unsafe {
+                let (a, b, c) = (a.as_ptr(), b.as_ptr(), c.as_mut_ptr());
+                let serial = gemm::Parallelism::None;
+                gemm::gemm(
+                    N, columns, N, c, stride, 1, false, a, stride, 1, b, stride, 1, 0.0, 1.0,
+                    false, false, false, serial,
+                );
+            }
+        });
+    });
+    assert!(c.iter().all(|x| *x == 1024.0));
+    2.0 * (N as f64).powi(3) / seconds * 1e-9
+}
+
+/// A name, what it names, and its operations a point.
+type Entry<'a> = (&'a str, &'a dyn Representation<f32>, Option<[usize; 2]>);
+
+fn table((name, representation, operations): Entry<'_>) {
+    for points in BATCHES {
+        let mut run = Run::new(representation, points);
+        run.check();
+        let before = large_sgemm();
+        let [forward, step] = [least(|| run.eval()), least(|| run.step())];
+        let nanoseconds = |seconds: f64| seconds * 1e9 / points as f64;
+        let (f, s) = (nanoseconds(forward), nanoseconds(step));
+        print!("{name}, {points} points: eval {f:.1} ns, vjp and Adam {s:.1} ns a point");
+        if let Some([one, both]) = operations {
+            let [one, both] = [one as f64 / f, both as f64 / s];
+            let sgemm = before.max(large_sgemm());
+            let part = 100.0 * both / sgemm;
+            print!("; {one:.0} and {both:.0} GFLOP/s, large SGEMM {sgemm:.0} ({part:.0} %)");
+        }
+        println!();
+    }
+}
+
+fn measure(criterion: &mut Criterion, name: &str, representation: &dyn Representation<f32>) {
+    let mut group = criterion.benchmark_group(name);
+    group.sample_size(10);
+    for points in &BATCHES[..2] {
+        let mut run = Run::new(representation, *points);
+        run.check();
+        group.throughput(Throughput::Elements(*points as u64));
+        group.bench_function(format!("eval, {points}"), |bencher| bencher.iter(|| run.eval()));
+        group.bench_function(format!("step, {points}"), |bencher| bencher.iter(|| run.step()));
+    }
+}
+
+fn benches(criterion: &mut Criterion) {
+    println!("{} threads", rayon::current_num_threads());
+    let bhnerf = Network::new(NetworkSettings::bhnerf()).expect("the paper's sizes");
+    let mlp4d = Network::new(NetworkSettings::mlp4d()).expect("the paper's sizes");
+    let (nodes, low, high) = ([64; 3], [-5.0; 3], [5.0; 3]);
+    let grid = |activation| {
+        let settings = GridSettings { nodes, low, high, activation, initial: 0.1 };
+        Grid::new(settings).expect("a grid")
+    };
+    let (sigmoid, linear) = (grid(Activation::Sigmoid), grid(Activation::Linear));
+    let all: [Entry<'_>; 4] = [
+        ("bhnerf", &bhnerf, Some(bhnerf.operations())),
+        ("mlp4d", &mlp4d, Some(mlp4d.operations())),
+        ("grid 64³, sigmoid", &sigmoid, None),
+        ("grid 64³, linear", &linear, None),
+    ];
+    // The same filter as criterion's: the first word of the command line.
+    let filter = std::env::args().skip(1).find(|word| !word.starts_with('-')).unwrap_or_default();
+    all.into_iter().filter(|(name, ..)| name.contains(&filter)).for_each(table);
+    for (name, representation, _) in all {
+        measure(criterion, name, representation);
+    }
+}
+
+criterion_group!(representation, benches);
+criterion_main!(representation);

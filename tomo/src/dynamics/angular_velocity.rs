@@ -1,0 +1,135 @@
+//! How fast matter turns.
+
+use kerrlight_geodesic::OutOfRange;
+
+/// Angular velocity as a function of the (spherical) radius, in radians a unit of time; positive is
+/// right-handed about the axis.
+#[derive(Clone, Debug, PartialEq)]
+pub enum AngularVelocity {
+    /// 1/(r^{3/2} + drag), circular geodesics (Bardeen, Press & Teukolsky 1972): the drag is the spin for
+    /// orbits about it, spin · ξ_z for tilted ones, 0 in the paper.
+    Keplerian {
+        /// In M^{3/2}.
+        drag: f64,
+    },
+    /// rate · (radius/r)^exponent.
+    PowerLaw {
+        /// Where the rate is reached, M.
+        radius: f64,
+        /// Radians a unit of time.
+        rate: f64,
+        /// 1.5: Keplerian without spin.
+        exponent: f64,
+    },
+    /// Linear between tabulated radii, and held beyond the first and the last.
+    Table {
+        /// Growing, M.
+        radii: Vec<f64>,
+        /// Radians a unit of time.
+        rates: Vec<f64>,
+    },
+}
+
+impl AngularVelocity {
+    /// BH-NeRF's experiments of known velocity: e(t, x) = e₀(R(ξ, 2π t v(|x|)) x),
+    /// v = (3.5/r)^{3/2} turns a unit of time. The pattern turns left-handed about ξ.
+    pub fn bhnerf() -> Self {
+        Self::PowerLaw { radius: 3.5, rate: -core::f64::consts::TAU, exponent: 1.5 }
+    }
+
+    /// Itself, if its numbers are in their ranges.
+    ///
+    /// # Errors
+    /// Names the number that is not.
+    pub fn checked(self) -> Result<Self, OutOfRange> {
+        let finite = |field, value: f64| (field, value, value.is_finite(), "a finite number");
+        match &self {
+            Self::Keplerian { drag } => first_wrong([finite("drag", *drag)]),
+            Self::PowerLaw { radius, rate, exponent } => first_wrong([
+                ("radius", *radius, radius.is_finite() && *radius > 0.0, "above 0"),
+                finite("rate", *rate),
+                finite("exponent", *exponent),
+            ]),
+            Self::Table { radii, rates } => {
+                let (r, v) = (radii.len(), rates.len());
+                let length = ("rates", v as f64, r == v && v > 0, "as many as radii, 1 or more");
+                let positive = |x: &f64| x.is_finite() && *x > 0.0;
+                let grow = radii.windows(2).map(|pair| {
+                    ("radii", pair[1], positive(&pair[1]) && pair[1] > pair[0], "above 0, growing")
+                });
+                let first = radii.iter().take(1).map(|x| ("radii", *x, positive(x), "above 0"));
+                let rates = rates.iter().map(|x| finite("rates", *x));
+                first_wrong(core::iter::once(length).chain(first).chain(grow).chain(rates))
+            }
+        }?;
+        Ok(self)
+    }
+
+    /// At radius r.
+    pub fn rate(&self, r: f64) -> f64 {
+        match self {
+            Self::Keplerian { drag } => 1.0 / (r.powf(1.5) + drag),
+            Self::PowerLaw { radius, rate, exponent } => rate * (radius / r).powf(*exponent),
+            Self::Table { .. } => self.interpolated(r).0,
+        }
+    }
+
+    /// dΩ/dr at radius r.
+    pub fn slope(&self, r: f64) -> f64 {
+        match self {
+            Self::Keplerian { .. } => -1.5 * r.sqrt() * self.rate(r).powi(2),
+            Self::PowerLaw { exponent, .. } => -exponent / r * self.rate(r),
+            Self::Table { .. } => self.interpolated(r).1,
+        }
+    }
+
+    fn interpolated(&self, r: f64) -> (f64, f64) {
+        let Self::Table { radii, rates } = self else { return (0.0, 0.0) };
+        let above = radii.partition_point(|x| *x <= r);
+        let at = |k: usize| (radii.get(k).copied(), rates.get(k).copied());
+        match (at(above.wrapping_sub(1)), at(above)) {
+            ((Some(a), Some(left)), (Some(b), Some(right))) => {
+                let slope = (right - left) / (b - a);
+                (left + slope * (r - a), slope)
+            }
+            ((_, Some(end)), _) | (_, (_, Some(end))) => (end, 0.0),
+            _ => (0.0, 0.0),
+        }
+    }
+
+    /// Angle by which the point at (x, y, z) is turned at time t to where its matter was at
+    /// t₀ = `reference`: −Ω(r)(t − t₀).
+    pub fn angle(&self, point: [f64; 3], time: f64, reference: f64) -> f64 {
+        -self.rate(radius(point)) * (time - reference)
+    }
+
+    /// Derivative of [`Self::angle`] with respect to the radius.
+    pub fn angle_slope(&self, point: [f64; 3], time: f64, reference: f64) -> f64 {
+        -self.slope(radius(point)) * (time - reference)
+    }
+}
+
+fn radius([x, y, z]: [f64; 3]) -> f64 {
+    (x * x + y * y + z * z).sqrt()
+}
+
+type Range = (&'static str, f64, bool, &'static str);
+
+fn first_wrong(ranges: impl IntoIterator<Item = Range>) -> Result<(), OutOfRange> {
+    let wrong = ranges.into_iter().find(|(_, _, ok, _)| !ok);
+    wrong.map_or(Ok(()), |(field, value, _, allowed)| Err(OutOfRange { field, value, allowed }))
+}
+
+/// When matter begins to shine: nothing is seen of what left a point before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Injection {
+    /// Time of emission, in the points' own time (slow light: the frame's time less the delay).
+    pub time: f64,
+}
+
+impl Injection {
+    /// Whether a point shines at its time.
+    pub fn shines(self, time: f64) -> bool {
+        time >= self.time
+    }
+}

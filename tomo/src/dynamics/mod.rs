@@ -1,0 +1,16 @@
+//! Where matter that shines at a point sat at the reference time.
+//!
+//! Matter turns about one axis ξ on spheres, right-handed, with an angular velocity Ω(r) of the
+//! radius alone; emission is carried along: e(t, x) = e₀(R(ξ, angle) x) with angle = −Ω(|x|)(t − t₀).
+//! (Levis et al. 2022, Eqs. 1–3.) Angles are computed once for all; [`pull_back`] and its derivative are what a fit
+//! repeats.
+
+mod angular_velocity;
+mod pull_back;
+mod sphere;
+#[cfg(test)]
+mod tests;
+
+pub use angular_velocity::{AngularVelocity, Injection};
+pub use pull_back::{Cotangents, Turned, pull_back, pull_back_vjp};
+pub use sphere::{Axis, ZeroAxis};

@@ -1,0 +1,56 @@
+//! Unit vectors, and steps on the sphere.
+
+/// A unit vector.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Axis([f64; 3]);
+
+/// A vector without direction.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("axis = {0:?} is not allowed: finite numbers, not all zero")]
+pub struct ZeroAxis(pub [f64; 3]);
+
+impl Axis {
+    /// The direction of a vector.
+    ///
+    /// # Errors
+    /// If it has none.
+    pub fn new(vector: [f64; 3]) -> Result<Self, ZeroAxis> {
+        // Scaled, so that no square over- or underflows.
+        let largest = vector.iter().fold(0.0f64, |largest, x| largest.max(x.abs()));
+        let scaled = vector.map(|x| x / largest);
+        let norm = dot(scaled, scaled).sqrt();
+        let axis = scaled.map(|x| x / norm);
+        if axis.iter().all(|x| x.is_finite()) { Ok(Self(axis)) } else { Err(ZeroAxis(vector)) }
+    }
+
+    /// Its components.
+    pub fn vector(self) -> [f64; 3] {
+        self.0
+    }
+
+    /// The opposite direction.
+    pub fn antipode(self) -> Self {
+        Self(self.0.map(|x| -x))
+    }
+
+    /// Part of a gradient along the sphere.
+    pub fn tangent(self, gradient: [f64; 3]) -> [f64; 3] {
+        let along = dot(self.0, gradient);
+        core::array::from_fn(|k| gradient[k] - along * self.0[k])
+    }
+
+    /// The direction of self + step: a step on the sphere, to first order. A step that leads to the
+    /// centre or is not finite is not taken.
+    pub fn moved(self, step: [f64; 3]) -> Self {
+        Self::new(core::array::from_fn(|k| self.0[k] + step[k])).unwrap_or(self)
+    }
+
+    /// Cosine of the angle between two axes.
+    pub fn dot(self, other: Self) -> f64 {
+        dot(self.0, other.0)
+    }
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}

@@ -1,0 +1,125 @@
+//! What a mesh file holds, whatever its format.
+
+use super::texture::Texture;
+
+/// Reads what a mesh file refers to by a relative name: materials, buffers, pictures.
+pub type Resources<'a> = dyn Fn(&str) -> Result<Vec<u8>, String> + 'a;
+
+/// Why bytes are no mesh.
+#[derive(Debug, thiserror::Error)]
+pub enum MeshError {
+    /// Not an OBJ file.
+    #[error("not a readable OBJ file: {0}")]
+    Obj(#[from] tobj::LoadError),
+    /// Not a glTF or GLB file.
+    #[error("not a readable glTF file: {0}")]
+    Gltf(#[from] gltf::Error),
+    /// A file that it refers to cannot be read.
+    #[error("`{name}`, to which it refers, cannot be read: {why}")]
+    Resource {
+        /// The name as it stands in the file.
+        name: String,
+        /// What went wrong.
+        why: String,
+    },
+    /// It is no mesh of triangles.
+    #[error("{0}")]
+    Content(String),
+}
+
+/// A triangle of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RawTriangle {
+    /// Corners in the file's coordinates.
+    pub corners: [[f64; 3]; 3],
+    /// Texture coordinates of the corners, v growing downwards.
+    pub texture: [[f32; 2]; 3],
+    /// Number of its material; `u32::MAX` without one.
+    pub material: u32,
+}
+
+/// A linear colour and a picture that it multiplies.
+#[derive(Debug, Clone, Default)]
+pub struct Layer {
+    /// The colour.
+    pub color: [f32; 3],
+    /// The picture.
+    pub(super) texture: Option<Texture>,
+}
+
+impl Layer {
+    /// The colour where texture coordinates are `place()`.
+    pub fn at(&self, place: impl Fn() -> [f32; 2]) -> [f32; 3] {
+        let Some(texture) = &self.texture else { return self.color };
+        let shade = texture.look(place());
+        core::array::from_fn(|k| self.color[k] * shade[k])
+    }
+}
+
+/// What a surface looks like.
+#[derive(Debug, Clone, Default)]
+pub struct Material {
+    /// What it gives off: `Ke` of an OBJ file, `emissive…` of a glTF file.
+    pub emission: Layer,
+    /// Its colour under light: `Kd`, `baseColor…`.
+    pub base: Layer,
+}
+
+/// A decoded mesh file.
+#[derive(Debug, Clone, Default)]
+pub struct MeshFile {
+    /// Triangles; polygons are cut into them.
+    pub triangles: Vec<RawTriangle>,
+    /// Materials.
+    pub materials: Vec<Material>,
+}
+
+/// Most triangles of a file: 4 GiB of them.
+const MOST_TRIANGLES: usize = 10_000_000;
+
+impl MeshFile {
+    /// Decodes an OBJ, glTF or GLB file; `resources` reads what it refers to.
+    ///
+    /// # Errors
+    /// If the bytes are none of these, if something they refer to cannot be read, if there is no
+    /// triangle or a coordinate is no number.
+    pub fn decode(bytes: &[u8], resources: &Resources<'_>) -> Result<Self, MeshError> {
+        let first = bytes.iter().find(|byte| !byte.is_ascii_whitespace());
+        let file = if bytes.starts_with(b"glTF") || first == Some(&b'{') {
+            super::gltf_file::decode(bytes, resources)?
+        } else {
+            super::obj_file::decode(bytes, resources)?
+        };
+        file.check()?;
+        Ok(file)
+    }
+
+    fn check(&self) -> Result<(), MeshError> {
+        let fail = |why: String| Err(MeshError::Content(why));
+        if self.triangles.is_empty() {
+            return fail("it holds no triangles".to_owned());
+        }
+        if self.triangles.len() > MOST_TRIANGLES {
+            return fail(format!("it holds more than {MOST_TRIANGLES} triangles"));
+        }
+        let broken = |t: &RawTriangle| {
+            let corners = t.corners.iter().flatten().all(|x| x.is_finite());
+            !corners || !t.texture.iter().flatten().all(|x| x.is_finite())
+        };
+        if let Some(k) = self.triangles.iter().position(broken) {
+            return fail(format!(
+                "triangle {k} (counted from 0) has a coordinate that is no number"
+            ));
+        }
+        let is_color = |layer: &Layer| layer.color.iter().all(|c| (0.0..=1e6).contains(c));
+        match self.materials.iter().position(|m| !is_color(&m.emission) || !is_color(&m.base)) {
+            Some(k) => fail(format!("material {k} (counted from 0) has a colour outside [0, 1e6]")),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Asks for something the file refers to.
+pub(super) fn resource(resources: &Resources<'_>, name: &str) -> Result<Vec<u8>, MeshError> {
+    resources(name).map_err(|why| MeshError::Resource { name: name.to_owned(), why })
+}

@@ -1,0 +1,179 @@
+//! glTF 2.0, as text or binary. Node transforms are applied; skins, morph targets and animations
+//! are not.
+
+use super::file::{Layer, Material, MeshError, MeshFile, RawTriangle, Resources, resource};
+use super::texture::Texture;
+use gltf::mesh::Mode;
+
+type Matrix = [[f64; 4]; 4];
+
+pub(super) fn decode(bytes: &[u8], resources: &Resources<'_>) -> Result<MeshFile, MeshError> {
+    let gltf::Gltf { document, mut blob } = gltf::Gltf::from_slice(bytes)?;
+    let buffers = document
+        .buffers()
+        .map(|buffer| {
+            let bytes = match buffer.source() {
+                gltf::buffer::Source::Uri(uri) if !uri.starts_with("data:") => {
+                    resource(resources, uri)?
+                }
+                source => gltf::buffer::Data::from_source_and_blob(source, None, &mut blob)?.0,
+            };
+            if bytes.len() < buffer.length() {
+                let (index, expected, actual) = (buffer.index(), buffer.length(), bytes.len());
+                return Err(gltf::Error::BufferLength { buffer: index, expected, actual }.into());
+            }
+            Ok(bytes)
+        })
+        .collect::<Result<Vec<_>, MeshError>>()?;
+    check_views(&document, &buffers)?;
+    let materials = document
+        .materials()
+        .map(|m| material(&m, &buffers, resources))
+        .collect::<Result<_, _>>()?;
+    let mut file = MeshFile { triangles: Vec::new(), materials };
+    let scene = document.default_scene().or_else(|| document.scenes().next());
+    let Some(scene) = scene else {
+        return Err(MeshError::Content("it holds no scene".to_owned()));
+    };
+    for node in scene.nodes() {
+        add_node(&node, IDENTITY, &buffers, &mut file)?;
+    }
+    Ok(file)
+}
+
+const IDENTITY: Matrix =
+    [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+
+/// The crate's readers trust the sizes that the file states.
+fn check_views(document: &gltf::Document, buffers: &[Vec<u8>]) -> Result<(), MeshError> {
+    let fail = |what: &str, k: usize| {
+        Err(MeshError::Content(format!("{what} {k} (counted from 0) reaches beyond its buffer")))
+    };
+    for view in document.views() {
+        let size = buffers.get(view.buffer().index()).map_or(0, Vec::len);
+        if view.offset().checked_add(view.length()).is_none_or(|end| end > size) {
+            return fail("buffer view", view.index());
+        }
+    }
+    for accessor in document.accessors() {
+        let Some(view) = accessor.view() else { continue };
+        let step = view.stride().unwrap_or(accessor.size());
+        let reach = accessor.count().saturating_sub(1).checked_mul(step);
+        let end =
+            reach.and_then(|r| r.checked_add(accessor.offset())?.checked_add(accessor.size()));
+        if step < accessor.size() || end.is_none_or(|end| end > view.length()) {
+            return fail("accessor", accessor.index());
+        }
+    }
+    Ok(())
+}
+
+fn product(a: Matrix, b: Matrix) -> Matrix {
+    // Column-major, as in the file.
+    core::array::from_fn(|c| core::array::from_fn(|r| (0..4).map(|k| a[k][r] * b[c][k]).sum()))
+}
+
+fn add_node(
+    node: &gltf::Node<'_>,
+    parent: Matrix,
+    buffers: &[Vec<u8>],
+    file: &mut MeshFile,
+) -> Result<(), MeshError> {
+    let own = node.transform().matrix().map(|column| column.map(f64::from));
+    let matrix = product(parent, own);
+    for primitive in node.mesh().iter().flat_map(|mesh| mesh.primitives()) {
+        add_primitive(&primitive, matrix, buffers, file)?;
+    }
+    node.children().try_for_each(|child| add_node(&child, matrix, buffers, file))
+}
+
+fn add_primitive(
+    primitive: &gltf::Primitive<'_>,
+    matrix: Matrix,
+    buffers: &[Vec<u8>],
+    file: &mut MeshFile,
+) -> Result<(), MeshError> {
+    let fail = |why: &str| Err(MeshError::Content(why.to_owned()));
+    match primitive.mode() {
+        Mode::Triangles => {}
+        Mode::TriangleStrip | Mode::TriangleFan => {
+            return fail("strips and fans of triangles are not read: export plain triangles");
+        }
+        _ => return Ok(()), // points and lines have no surface
+    }
+    let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(Vec::as_slice));
+    let Some(positions) = reader.read_positions() else {
+        return fail("a primitive has no positions");
+    };
+    let place = |p: [f32; 3]| {
+        let [x, y, z] = p.map(f64::from);
+        core::array::from_fn(|r| {
+            matrix[0][r] * x + matrix[1][r] * y + matrix[2][r] * z + matrix[3][r]
+        })
+    };
+    let positions: Vec<[f64; 3]> = positions.map(place).collect();
+    let texture: Vec<[f32; 2]> =
+        reader.read_tex_coords(0).map_or_else(Vec::new, |t| t.into_f32().collect());
+    let indices: Vec<u32> = match reader.read_indices() {
+        Some(indices) => indices.into_u32().collect(),
+        None => (0..positions.len() as u32).collect(),
+    };
+    let material = primitive.material().index().map_or(u32::MAX, |k| k as u32);
+    for corners in indices.chunks_exact(3) {
+        let corners = [corners[0], corners[1], corners[2]].map(|k| k as usize);
+        if corners.iter().any(|k| *k >= positions.len()) {
+            return fail("an index points behind the last vertex");
+        }
+        let at = |k: usize| texture.get(k).copied().unwrap_or([0.0; 2]);
+        file.triangles.push(RawTriangle {
+            corners: corners.map(|k| positions[k]),
+            texture: corners.map(at),
+            material,
+        });
+    }
+    Ok(())
+}
+
+fn material(
+    material: &gltf::Material<'_>,
+    buffers: &[Vec<u8>],
+    resources: &Resources<'_>,
+) -> Result<Material, MeshError> {
+    let strength = material.emissive_strength().unwrap_or(1.0);
+    let surface = material.pbr_metallic_roughness();
+    let [r, g, b, _] = surface.base_color_factor();
+    let picture = |info: Option<gltf::texture::Info<'_>>| {
+        info.map(|info| picture(&info, buffers, resources)).transpose()
+    };
+    Ok(Material {
+        emission: Layer {
+            color: material.emissive_factor().map(|c| c * strength),
+            texture: picture(material.emissive_texture())?,
+        },
+        base: Layer { color: [r, g, b], texture: picture(surface.base_color_texture())? },
+    })
+}
+
+fn picture(
+    info: &gltf::texture::Info<'_>,
+    buffers: &[Vec<u8>],
+    resources: &Resources<'_>,
+) -> Result<Texture, MeshError> {
+    if info.tex_coord() != 0 {
+        let why = "a texture uses a second set of coordinates, which is not read".to_owned();
+        return Err(MeshError::Content(why));
+    }
+    match info.texture().source().source() {
+        gltf::image::Source::View { view, .. } => {
+            let bytes = buffers
+                .get(view.buffer().index())
+                .and_then(|b| b.get(view.offset()..view.offset() + view.length()));
+            Texture::decode(bytes.unwrap_or_default())
+        }
+        gltf::image::Source::Uri { uri, .. } if uri.starts_with("data:") => {
+            let source = gltf::buffer::Source::Uri(uri);
+            Texture::decode(&gltf::buffer::Data::from_source(source, None)?.0)
+        }
+        gltf::image::Source::Uri { uri, .. } => Texture::decode(&resource(resources, uri)?),
+    }
+}

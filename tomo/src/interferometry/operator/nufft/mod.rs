@@ -1,0 +1,460 @@
+//! The Fourier transform to any (u, v) by way of a fast transform: the image, divided by the
+//! transform of a kernel, is transformed on a grid twice as fine, and every visibility is a sum of
+//! the cells around it, weighted by the kernel.
+//!
+//! Images are real, V(−u, −v) is the conjugate of V(u, v): half the columns of the grid suffice.
+
+mod kernel;
+
+use super::{ImageGrid, Operator, Pulse, Real};
+use crate::interferometry::schedule::ScheduleError;
+use core::f64::consts::TAU;
+use core::ops::Range;
+use kernel::Kernel;
+use kernel::MOST_CELLS;
+pub(super) use kernel::{cells, width_of};
+use num_complex::Complex;
+use rayon::prelude::*;
+use rustfft::{Fft, FftNum, FftPlanner};
+use std::sync::Arc;
+
+/// Columns of the grid that a thread works on at a time.
+const STRIP: usize = 16;
+
+/// A visibility and the cells that it is a sum of.
+struct Site<T> {
+    /// First column among those kept, and first row.
+    cell: [usize; 2],
+    /// Values of the kernel: of columns, of rows.
+    weights: [[T; MOST_CELLS]; 2],
+    /// Pixel pulse and the phase of the image's centre.
+    factor: Complex<T>,
+    /// Whether the visibility is the conjugate of the sum.
+    conjugate: bool,
+    /// Where it is among the data.
+    datum: usize,
+}
+
+/// Fast Fourier transform of the frames of a movie, each to visibilities of its own, with an error
+/// of at most `accuracy` × Σ|I| Jy. The adjoint is the transpose of the same map, exactly.
+pub struct Nufft<T: FftNum> {
+    grid: ImageGrid,
+    kernel: Kernel,
+    accuracy: f64,
+    /// Rows of the finer grid; columns are kept from −`margin` as far as visibilities reach.
+    rows: usize,
+    columns: usize,
+    margin: usize,
+    /// What image columns and rows are multiplied with.
+    correction: [Vec<T>; 2],
+    /// Along a row and along a column, there and back.
+    along_row: [Arc<dyn Fft<T>>; 2],
+    along_column: [Arc<dyn Fft<T>>; 2],
+    /// In the order of frames and, within, of columns.
+    sites: Vec<Site<T>>,
+    frames: Vec<Range<usize>>,
+}
+
+/// Refuses accuracies that kernels or rounding cannot reach.
+pub(super) fn check_accuracy<T: Real>(accuracy: f64) -> Result<(), ScheduleError> {
+    let single = T::epsilon().double() > 1e-10;
+    let least = if single { 1e-6 } else { 1e-13 };
+    if (least..=0.1).contains(&accuracy) {
+        return Ok(());
+    }
+    let allowed = "1e-13 to 0.1, in single precision 1e-6 to 0.1";
+    Err(ScheduleError::Range { name: "accuracy", value: accuracy, allowed })
+}
+
+impl<T: Real + FftNum> Nufft<T> {
+    /// The transform to `frames[k]`, the (u, v) in wavelengths that see frame k; data are in the
+    /// order of frames and of their (u, v).
+    ///
+    /// # Errors
+    /// If the accuracy is not in [1e-13, 0.1] (in single precision [1e-6, 0.1]).
+    pub fn new(
+        grid: ImageGrid,
+        pulse: Pulse,
+        frames: &[Vec<[f64; 2]>],
+        accuracy: f64,
+    ) -> Result<Self, ScheduleError> {
+        check_accuracy::<T>(accuracy)?;
+        let kernel = Kernel::of_accuracy(accuracy);
+        let [across, rows] = [grid.width, grid.height].map(|pixels| cells(pixels, kernel.width));
+        let margin = kernel.width / 2 + 1;
+        let correction = |pixels: usize, cells: usize| {
+            kernel.transform(pixels, cells).into_iter().map(|x| T::of(x.recip())).collect()
+        };
+        let mut planner = FftPlanner::new();
+        let mut both = |n| [planner.plan_fft_forward(n), planner.plan_fft_inverse(n)];
+        let mut operator = Nufft {
+            grid,
+            kernel,
+            accuracy,
+            rows,
+            columns: 0,
+            margin,
+            correction: [correction(grid.width, across), correction(grid.height, rows)],
+            along_row: both(across),
+            along_column: both(rows),
+            sites: Vec::new(),
+            frames: Vec::new(),
+        };
+        let mut first = 0;
+        for uv in frames {
+            let site = |(k, uv): (usize, &[f64; 2])| operator.site(pulse, *uv, first + k);
+            let mut sites: Vec<Site<T>> = uv.par_iter().enumerate().map(site).collect();
+            sites.sort_by_key(|site| (site.cell, site.datum));
+            operator.sites.extend(sites);
+            operator.frames.push(first..first + uv.len());
+            first += uv.len();
+        }
+        let last = operator.sites.iter().map(|site| site.cell[0]).max();
+        operator.columns = last.unwrap_or(0) + operator.kernel.width;
+        Ok(operator)
+    }
+
+    /// Bound of the error in units of Σ|I|.
+    pub fn accuracy(&self) -> f64 {
+        self.accuracy
+    }
+
+    /// Bytes that are kept for the visibilities.
+    pub fn memory_kept(&self) -> usize {
+        self.sites.len() * size_of::<Site<T>>()
+    }
+
+    /// Bytes that are needed while it works: grids of one frame, whatever the number of threads.
+    pub fn memory_working(&self) -> usize {
+        self.columns * (self.column_length() + self.grid.height) * size_of::<Complex<T>>()
+    }
+
+    /// A column with its first cells repeated at its end.
+    fn column_length(&self) -> usize {
+        self.rows + self.kernel.width
+    }
+
+    fn site(&self, pulse: Pulse, uv: [f64; 2], datum: usize) -> Site<T> {
+        let ImageGrid { width, height, pixel_rad } = self.grid;
+        let turns = uv.map(|x| x * pixel_rad);
+        let whole = turns.map(|x| x - x.round());
+        let conjugate = whole[0] < 0.0;
+        let sign = if conjugate { -1.0 } else { 1.0 };
+        let across = self.along_row[0].len() as f64;
+        let mut weights = [[T::zero(); MOST_CELLS]; 2];
+        let mut first = [0.0; 2];
+        let places = [sign * whole[0] * across, sign * whole[1] * self.rows as f64];
+        for axis in 0..2 {
+            let (start, values) = self.kernel.values(places[axis]);
+            first[axis] = start;
+            weights[axis].iter_mut().zip(values).for_each(|(w, value)| *w = T::of(value));
+        }
+        // Pixel (width/2, height/2) is the origin of the fast transform.
+        let offset = [self.grid.east(width / 2) * uv[0], self.grid.north(height / 2) * uv[1]];
+        let factor = Complex::from_polar(
+            pulse.transform(uv, pixel_rad),
+            TAU * (offset[0] - offset[0].round() + offset[1] - offset[1].round()),
+        );
+        Site {
+            // From −margin on, and of rows modulo their number.
+            cell: [
+                (first[0] + self.margin as f64) as usize,
+                (first[1] as i64).rem_euclid(self.rows as i64) as usize,
+            ],
+            weights,
+            factor: Complex::new(T::of(factor.re), T::of(factor.im)),
+            conjugate,
+            datum,
+        }
+    }
+
+    /// The place along a row of the grid of the image's column `k`.
+    fn place(k: usize, pixels: usize, cells: usize) -> usize {
+        (k + cells - pixels / 2) % cells
+    }
+
+    /// Which cell of a transformed row is column `k` of those kept.
+    fn kept(&self, k: usize) -> usize {
+        let across = self.along_row[0].len();
+        (k + across - self.margin) % across
+    }
+
+    /// Rows of an image, corrected and transformed: the columns that are kept, row after row.
+    fn transform_rows(&self, image: &[T]) -> Vec<Complex<T>> {
+        let zero = Complex::new(T::zero(), T::zero());
+        let (width, fft) = (self.grid.width, &self.along_row[0]);
+        let mut result = vec![zero; self.columns * self.grid.height];
+        result
+            .par_chunks_mut(self.columns)
+            .zip(image.par_chunks(width))
+            .zip(&self.correction[1])
+            .for_each_init(
+                || (vec![zero; fft.len()], vec![zero; fft.get_inplace_scratch_len()]),
+                |(row, scratch), ((result, image), of_row)| {
+                    row.fill(zero);
+                    for (k, (pixel, of_column)) in image.iter().zip(&self.correction[0]).enumerate()
+                    {
+                        row[Self::place(k, width, fft.len())].re = *pixel * *of_column * *of_row;
+                    }
+                    fft.process_with_scratch(row, scratch);
+                    for (k, cell) in result.iter_mut().enumerate() {
+                        *cell = row[self.kept(k)];
+                    }
+                },
+            );
+        result
+    }
+
+    /// The transpose: adds to the image.
+    fn transform_rows_back(&self, rows: &[Complex<T>], image: &mut [T]) {
+        let zero = Complex::new(T::zero(), T::zero());
+        let (width, fft) = (self.grid.width, &self.along_row[1]);
+        image
+            .par_chunks_mut(width)
+            .zip(rows.par_chunks(self.columns))
+            .zip(&self.correction[1])
+            .for_each_init(
+                || (vec![zero; fft.len()], vec![zero; fft.get_inplace_scratch_len()]),
+                |(row, scratch), ((image, cells), of_row)| {
+                    row.fill(zero);
+                    for (k, cell) in cells.iter().enumerate() {
+                        row[self.kept(k)] += *cell;
+                    }
+                    fft.process_with_scratch(row, scratch);
+                    for (k, (pixel, of_column)) in
+                        image.iter_mut().zip(&self.correction[0]).enumerate()
+                    {
+                        *pixel += row[Self::place(k, width, fft.len())].re * *of_column * *of_row;
+                    }
+                },
+            );
+    }
+
+    /// Columns of the finer grid, one after the other, from the rows' transforms.
+    fn transform_columns(&self, rows: &[Complex<T>]) -> Vec<Complex<T>> {
+        let zero = Complex::new(T::zero(), T::zero());
+        let (height, fft, length) = (self.grid.height, &self.along_column[0], self.column_length());
+        let mut result = vec![zero; self.columns * length];
+        result.par_chunks_mut(STRIP * length).enumerate().for_each_init(
+            || vec![zero; fft.get_inplace_scratch_len()],
+            |scratch, (strip, columns)| {
+                for row in 0..height {
+                    let place = Self::place(row, height, self.rows);
+                    let cells = &rows[row * self.columns + strip * STRIP..];
+                    for (column, cell) in columns.chunks_exact_mut(length).zip(cells) {
+                        column[place] = *cell;
+                    }
+                }
+                for column in columns.chunks_exact_mut(length) {
+                    fft.process_with_scratch(&mut column[..self.rows], scratch);
+                    column.copy_within(..length - self.rows, self.rows);
+                }
+            },
+        );
+        result
+    }
+
+    /// The transpose; columns are used up.
+    fn transform_columns_back(&self, columns: &mut [Complex<T>]) -> Vec<Complex<T>> {
+        let zero = Complex::new(T::zero(), T::zero());
+        let (height, fft, length) = (self.grid.height, &self.along_column[1], self.column_length());
+        columns.par_chunks_mut(length).for_each_init(
+            || vec![zero; fft.get_inplace_scratch_len()],
+            |scratch, column| {
+                for k in self.rows..length {
+                    let end = column[k];
+                    column[k - self.rows] += end;
+                }
+                fft.process_with_scratch(&mut column[..self.rows], scratch);
+            },
+        );
+        let mut rows = vec![zero; self.columns * height];
+        rows.par_chunks_mut(self.columns).enumerate().for_each(|(row, cells)| {
+            let place = Self::place(row, height, self.rows);
+            for (k, cell) in cells.iter_mut().enumerate() {
+                *cell = columns[k * length + place];
+            }
+        });
+        rows
+    }
+
+    /// The sum of the cells around a visibility.
+    fn gather(&self, site: &Site<T>, columns: &[Complex<T>]) -> Complex<T> {
+        let (width, length) = (self.kernel.width, self.column_length());
+        let mut total = Complex::new(T::zero(), T::zero());
+        for (k, across) in site.weights[0][..width].iter().enumerate() {
+            let start = (site.cell[0] + k) * length + site.cell[1];
+            let mut sum = Complex::new(T::zero(), T::zero());
+            for (cell, weight) in columns[start..start + width].iter().zip(&site.weights[1]) {
+                sum += cell.scale(*weight);
+            }
+            total += sum.scale(*across);
+        }
+        site.factor * if site.conjugate { total.conj() } else { total }
+    }
+
+    /// The transpose: every strip of columns takes what the visibilities around it give, in order.
+    fn spread(&self, sites: &[Site<T>], data: &[Complex<T>]) -> Vec<Complex<T>> {
+        let (width, length) = (self.kernel.width, self.column_length());
+        let mut columns = vec![Complex::new(T::zero(), T::zero()); self.columns * length];
+        columns.par_chunks_mut(STRIP * length).enumerate().for_each(|(strip, cells)| {
+            let start = strip * STRIP;
+            let near = |column: usize| sites.partition_point(|site| site.cell[0] < column);
+            let sites = &sites[near((start + 1).saturating_sub(width))..near(start + STRIP)];
+            for site in sites {
+                let value = site.factor.conj() * data[site.datum];
+                let value = if site.conjugate { value.conj() } else { value };
+                for (k, across) in site.weights[0][..width].iter().enumerate() {
+                    let Some(column) = (site.cell[0] + k).checked_sub(start) else { continue };
+                    let first = column * length + site.cell[1];
+                    let Some(cells) = cells.get_mut(first..first + width) else { break };
+                    let value = value.scale(*across);
+                    for (cell, weight) in cells.iter_mut().zip(&site.weights[1]) {
+                        *cell += value.scale(*weight);
+                    }
+                }
+            }
+        });
+        columns
+    }
+}
+
+impl<T: Real + FftNum> Operator<T> for Nufft<T> {
+    type Datum = Complex<T>;
+
+    fn frames(&self) -> usize {
+        self.frames.len()
+    }
+
+    fn pixels(&self) -> usize {
+        self.grid.pixels()
+    }
+
+    fn data(&self) -> usize {
+        self.sites.len()
+    }
+
+    fn forward(&self, movie: &[T], data: &mut [Complex<T>]) {
+        assert_eq!(
+            (movie.len(), data.len()),
+            (self.frames.len() * self.pixels(), self.sites.len())
+        );
+        // Frame after frame, each on all threads: one grid is all the memory that is needed.
+        for (image, sites) in movie.chunks_exact(self.pixels()).zip(&self.frames) {
+            if sites.is_empty() {
+                continue;
+            }
+            let sites = &self.sites[sites.clone()];
+            let columns = self.transform_columns(&self.transform_rows(image));
+            let sums: Vec<Complex<T>> =
+                sites.par_iter().map(|site| self.gather(site, &columns)).collect();
+            sites.iter().zip(sums).for_each(|(site, sum)| data[site.datum] = sum);
+        }
+    }
+
+    fn adjoint(&self, data: &[Complex<T>], movie: &mut [T]) {
+        assert_eq!(
+            (movie.len(), data.len()),
+            (self.frames.len() * self.pixels(), self.sites.len())
+        );
+        for (image, sites) in movie.chunks_exact_mut(self.pixels()).zip(&self.frames) {
+            if sites.is_empty() {
+                continue;
+            }
+            let mut columns = self.spread(&self.sites[sites.clone()], data);
+            self.transform_rows_back(&self.transform_columns_back(&mut columns), image);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Dtft;
+    use super::*;
+    use crate::interferometry::conformance;
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64Mcg;
+
+    /// (u, v) of three frames: inside, none, and up to twice beyond what pixels resolve.
+    fn frames(grid: ImageGrid) -> Vec<Vec<[f64; 2]>> {
+        let mut random = Pcg64Mcg::seed_from_u64(21);
+        let mut uv = |n: usize, reach: f64| -> Vec<[f64; 2]> {
+            let reach = reach / grid.pixel_rad;
+            (0..n).map(|_| [0, 1].map(|_| random.random_range(-reach..reach))).collect()
+        };
+        let mut inside = uv(100, 0.5);
+        // Edges: the origin, the axes, the last frequency that pixels resolve.
+        let nyquist = 0.5 / grid.pixel_rad;
+        inside.extend([[0.0, 0.0], [nyquist, -nyquist], [-nyquist, 0.0], [0.0, nyquist]]);
+        vec![inside, Vec::new(), uv(300, 1.0)]
+    }
+
+    /// Images of both signs, and of one pixel alone in a corner, where the correction is largest: no
+    /// image errs more than its worst pixel.
+    fn movies(grid: ImageGrid) -> [Vec<f64>; 2] {
+        let mut random = Pcg64Mcg::seed_from_u64(22);
+        let mixed = (0..3 * grid.pixels()).map(|_| random.random_range(-1.0..1.0)).collect();
+        let corner = |k: usize| if k.is_multiple_of(grid.pixels()) { 2.5 } else { 0.0 };
+        [mixed, (0..3 * grid.pixels()).map(corner).collect()]
+    }
+
+    /// The largest error in units of accuracy × Σ|I|.
+    fn worst<T: Real + FftNum>(grid: ImageGrid, pulse: Pulse, accuracy: f64, movie: &[f64]) -> f64 {
+        let frames = frames(grid);
+        let single: Vec<T> = movie.iter().map(|x| T::of(*x)).collect();
+        let fast = Nufft::<T>::new(grid, pulse, &frames, accuracy).unwrap();
+        let direct = Dtft::<f64>::new(grid, pulse, &frames, 0);
+        let mut found = vec![Complex::new(T::zero(), T::zero()); fast.data()];
+        let mut expected = vec![Complex::new(0.0, 0.0); direct.data()];
+        fast.forward(&single, &mut found);
+        direct.forward(movie, &mut expected);
+        let flux = movie[..grid.pixels()].iter().map(|x| x.abs()).sum::<f64>();
+        let error = |(a, b): (&Complex<T>, &Complex<f64>)| {
+            (Complex::new(a.re.double(), a.im.double()) - b).norm()
+        };
+        found.iter().zip(&expected).map(error).fold(0.0, f64::max) / (accuracy * flux)
+    }
+
+    #[test]
+    fn exact_error_is_below_the_accuracy_asked_for() {
+        for (width, height) in [(64, 64), (1, 1), (3, 40), (37, 50)] {
+            let grid = ImageGrid::new(width, height, 1e-9).unwrap();
+            for movie in movies(grid) {
+                for accuracy in (1..=13).map(|exponent| 10f64.powi(-exponent)) {
+                    let found = worst::<f64>(grid, Pulse::Delta, accuracy, &movie);
+                    println!("{width} x {height} {accuracy} {found}");
+                    assert!(found <= 1.0, "{width} x {height}, {accuracy}: {found}");
+                }
+                for accuracy in (1..=6).map(|exponent| 10f64.powi(-exponent)) {
+                    let found = worst::<f32>(grid, Pulse::Triangle, accuracy, &movie);
+                    println!("f32 {width} x {height} {accuracy} {found}");
+                    assert!(found <= 1.0, "f32, {width} x {height}, {accuracy}: {found}");
+                }
+            }
+        }
+    }
+
+    fn conforms<T: Real + FftNum>(accuracy: f64, tolerance: f64) {
+        for (width, height) in [(13, 80), (64, 64)] {
+            let grid = ImageGrid::new(width, height, 1e-9).unwrap();
+            let fast = Nufft::<T>::new(grid, Pulse::Triangle, &frames(grid), accuracy).unwrap();
+            conformance::operator("fast transform", &fast, tolerance);
+        }
+    }
+
+    #[test]
+    fn exact_adjoint_in_both_precisions() {
+        conforms::<f64>(1e-3, 1e-14);
+        conforms::<f64>(1e-12, 1e-14);
+        conforms::<f32>(1e-3, 1e-6);
+    }
+
+    #[test]
+    fn exact_accuracies_out_of_range_are_refused() {
+        let grid = ImageGrid::new(4, 4, 1e-9).unwrap();
+        for accuracy in [0.0, 1e-14, 0.2, f64::NAN, -1.0] {
+            assert!(Nufft::<f64>::new(grid, Pulse::Delta, &[], accuracy).is_err(), "{accuracy}");
+        }
+        assert!(Nufft::<f32>::new(grid, Pulse::Delta, &[], 1e-7).is_err());
+    }
+}

@@ -1,0 +1,201 @@
+//! Adam (Kingma & Ba 2015, arXiv:1412.6980, algorithm 1).
+
+use crate::simd::{InstructionSet, Lanes, Scalar, Task, dispatch};
+use kerrlight_geodesic::OutOfRange;
+use rayon::prelude::*;
+
+/// Decay rates of the moments and the number that keeps the division safe.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Adam {
+    /// Of the mean gradient.
+    pub beta1: f64,
+    /// Of the mean square.
+    pub beta2: f64,
+    /// Added to the root of the mean square.
+    pub epsilon: f64,
+}
+
+impl Default for Adam {
+    /// β₁ = 0.9, β₂ = 0.999, ε = 1e-8, those of the paper and of BH-NeRF.
+    fn default() -> Self {
+        Self { beta1: 0.9, beta2: 0.999, epsilon: 1e-8 }
+    }
+}
+
+/// All that Adam remembers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AdamState<T> {
+    /// Steps taken.
+    pub steps: u64,
+    /// Mean gradient, one number a parameter.
+    pub first: Vec<T>,
+    /// Mean square, one number a parameter.
+    pub second: Vec<T>,
+}
+
+impl<T: Scalar> AdamState<T> {
+    /// Of no step yet.
+    pub fn new(parameters: usize) -> Self {
+        Self { steps: 0, first: vec![T::zero(); parameters], second: vec![T::zero(); parameters] }
+    }
+}
+
+/// Parameters that one thread takes at a time.
+const SHARE: usize = 16_384;
+
+impl Adam {
+    /// Itself, if its numbers are in their ranges.
+    ///
+    /// # Errors
+    /// Names the number that is not.
+    pub fn checked(self) -> Result<Self, OutOfRange> {
+        for (field, value) in [("beta1", self.beta1), ("beta2", self.beta2)] {
+            if !(0.0..1.0).contains(&value) {
+                return Err(OutOfRange { field, value, allowed: "0 ≤ β < 1" });
+            }
+        }
+        let ok = self.epsilon.is_finite() && self.epsilon > 0.0;
+        let allowed = "above 0";
+        if ok {
+            Ok(self)
+        } else {
+            Err(OutOfRange { field: "epsilon", value: self.epsilon, allowed })
+        }
+    }
+
+    /// One step with learning rate `rate`, by all threads.
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    pub fn step<T: Scalar>(
+        &self,
+        rate: f64,
+        gradient: &[T],
+        state: &mut AdamState<T>,
+        parameters: &mut [T],
+    ) {
+        let count = parameters.len();
+        assert!(gradient.len() == count);
+        assert!(state.first.len() == count && state.second.len() == count);
+        state.steps += 1;
+        let constants = self.constants(rate, state.steps);
+        let set = InstructionSet::best();
+        let moments = state.first.par_chunks_mut(SHARE).zip(state.second.par_chunks_mut(SHARE));
+        let all = parameters.par_chunks_mut(SHARE).zip(gradient.par_chunks(SHARE)).zip(moments);
+        all.for_each(|((parameters, gradient), (first, second))| {
+            dispatch(set, Update { constants, gradient, first, second, parameters });
+        });
+    }
+
+    fn constants<T: Scalar>(&self, rate: f64, steps: u64) -> Constants<T> {
+        let power = |beta: f64| beta.powf(steps as f64);
+        Constants {
+            beta: [self.beta1, self.beta2].map(T::of),
+            rest: [1.0 - self.beta1, 1.0 - self.beta2].map(T::of),
+            unbiased: [self.beta1, self.beta2].map(|beta| T::of(1.0 / (1.0 - power(beta)))),
+            rate: T::of(rate),
+            epsilon: T::of(self.epsilon),
+        }
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Constants<T> {
+    beta: [T; 2],
+    rest: [T; 2],
+    unbiased: [T; 2],
+    rate: T,
+    epsilon: T,
+}
+
+struct Update<'a, T> {
+    constants: Constants<T>,
+    gradient: &'a [T],
+    first: &'a mut [T],
+    second: &'a mut [T],
+    parameters: &'a mut [T],
+}
+
+impl<T: Scalar> Task<T> for Update<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes<T>, const ROWS: usize>(self) {
+        let Constants { beta, rest, unbiased, rate, epsilon } = self.constants;
+        let s = V::splat;
+        let load = |x: &[T]| V::load_front(x, T::zero());
+        let moments = self.first.chunks_mut(V::LANES).zip(self.second.chunks_mut(V::LANES));
+        let parameters = self.parameters.chunks_mut(V::LANES);
+        let all = parameters.zip(self.gradient.chunks(V::LANES)).zip(moments);
+        for ((parameters, gradient), (first, second)) in all {
+            let g = load(gradient);
+            let m = load(first).mul_add(s(beta[0]), g * s(rest[0]));
+            let v = load(second).mul_add(s(beta[1]), g * g * s(rest[1]));
+            let root = (v * s(unbiased[1])).sqrt() + s(epsilon);
+            let x = load(parameters) - s(rate) * (m * s(unbiased[0])) / root;
+            m.store_front(first);
+            v.store_front(second);
+            x.store_front(parameters);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ADAM: Adam = Adam { beta1: 0.9, beta2: 0.999, epsilon: 1e-8 };
+
+    #[test]
+    fn exact_steps_of_a_constant_gradient() {
+        // Both moments, freed of their bias, are g and g²: every step is rate · g/(|g| + ε).
+        let gradient: Vec<f64> = (0..77).map(|k| (f64::from(k) - 38.0) * 1e-7).collect();
+        let (mut x, mut state) = (vec![1.0; 77], AdamState::new(77));
+        for step in 1..=50 {
+            ADAM.step(0.01, &gradient, &mut state, &mut x);
+            for (x, g) in x.iter().zip(&gradient) {
+                let expected = 1.0 - 0.01 * f64::from(step) * g / (g.abs() + 1e-8);
+                assert!((x - expected).abs() < 1e-13, "{step}: {x} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn exact_third_step_of_three_gradients() {
+        let (gradients, mut x) = ([1.0, -3.0, 2.0], [0.5f64]);
+        let mut state = AdamState::new(1);
+        for (k, g) in gradients.iter().enumerate() {
+            let before = x[0];
+            ADAM.step(0.1, &[*g], &mut state, &mut x);
+            let (mut m, mut v) = (0.0, 0.0);
+            for (j, g) in gradients[..=k].iter().enumerate() {
+                let age = (k - j) as i32;
+                m += 0.1 * 0.9f64.powi(age) * g;
+                v += 0.001 * 0.999f64.powi(age) * g * g;
+            }
+            let t = k as i32 + 1;
+            let (m, v) = (m / (1.0 - 0.9f64.powi(t)), v / (1.0 - 0.999f64.powi(t)));
+            assert!((x[0] - (before - 0.1 * m / (v.sqrt() + 1e-8))).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn regress_same_bits_on_any_threads_and_after_a_break() {
+        let count = 3 * SHARE + 5;
+        let gradient = |step: usize| -> Vec<f32> {
+            (0..count).map(|k| ((k * 7 + step * 13) % 101) as f32 - 50.0).collect()
+        };
+        let run =
+            |threads: usize, steps: core::ops::Range<usize>, x: &mut Vec<f32>, state: &mut _| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                pool.install(|| steps.for_each(|step| ADAM.step(1e-3, &gradient(step), state, x)));
+            };
+        let (mut x, mut state) = (vec![1.0; count], AdamState::new(count));
+        run(1, 0..6, &mut x, &mut state);
+        let (mut y, mut first) = (vec![1.0; count], AdamState::new(count));
+        run(3, 0..2, &mut y, &mut first);
+        let AdamState { steps, first, second } = first;
+        let mut again = AdamState { steps, first, second };
+        run(2, 2..6, &mut y, &mut again);
+        assert!(x == y && state == again);
+    }
+}

@@ -1,0 +1,97 @@
+//! A step length that meets the strong Wolfe conditions (Nocedal & Wright 2006, algorithms 3.5, 3.6).
+
+/// Value and slope of the objective along the direction.
+#[derive(Clone, Copy, Debug)]
+pub struct Point {
+    pub length: f64,
+    pub value: f64,
+    pub slope: f64,
+}
+
+/// What a step must achieve, and how long to look for it.
+#[derive(Clone, Copy, Debug)]
+pub struct Wolfe {
+    /// Part of the linear decrease that is enough.
+    pub decrease: f64,
+    /// Part of the first slope that may be left.
+    pub curvature: f64,
+    pub evaluations: usize,
+}
+
+impl Wolfe {
+    fn decreases(&self, start: Point, at: Point) -> bool {
+        at.value <= start.value + self.decrease * at.length * start.slope
+    }
+
+    fn flat(&self, start: Point, at: Point) -> bool {
+        at.slope.abs() <= self.curvature * start.slope.abs()
+    }
+
+    /// From `start` (length 0, negative slope), trying `first` first. The last point that was evaluated is
+    /// the one returned.
+    pub fn search(
+        &self,
+        start: Point,
+        first: f64,
+        mut evaluate: impl FnMut(f64) -> Point,
+    ) -> Option<Point> {
+        let (mut before, mut length) = (start, first);
+        for used in 1..=self.evaluations {
+            let at = evaluate(length);
+            let left = self.evaluations - used;
+            if !at.value.is_finite() || !at.slope.is_finite() {
+                length = 0.5 * (before.length + at.length);
+                continue;
+            }
+            if !self.decreases(start, at) || (used > 1 && at.value >= before.value) {
+                return self.zoom(start, before, at, left, evaluate);
+            }
+            if self.flat(start, at) {
+                return Some(at);
+            }
+            if at.slope >= 0.0 {
+                return self.zoom(start, at, before, left, evaluate);
+            }
+            (before, length) = (at, 2.5 * at.length);
+        }
+        None
+    }
+
+    /// Between `low`, the better end, and `high`.
+    fn zoom(
+        &self,
+        start: Point,
+        mut low: Point,
+        mut high: Point,
+        evaluations: usize,
+        mut evaluate: impl FnMut(f64) -> Point,
+    ) -> Option<Point> {
+        for _ in 0..evaluations {
+            let at = evaluate(between(low, high));
+            if !self.decreases(start, at) || at.value >= low.value {
+                high = at;
+            } else {
+                if self.flat(start, at) {
+                    return Some(at);
+                }
+                if at.slope * (high.length - low.length) >= 0.0 {
+                    high = low;
+                }
+                low = at;
+            }
+        }
+        // Enough of a decrease will do, if it is the point at hand.
+        let last = evaluate(low.length);
+        (low.length > 0.0 && self.decreases(start, last)).then_some(last)
+    }
+}
+
+/// Minimum of the cubic through both ends, kept a tenth away from them.
+fn between(a: Point, b: Point) -> f64 {
+    let width = b.length - a.length;
+    let d1 = a.slope + b.slope - 3.0 * (a.value - b.value) / (a.length - b.length);
+    let d2 = (d1 * d1 - a.slope * b.slope).sqrt() * width.signum();
+    let part = 1.0 - (b.slope + d2 - d1) / (b.slope - a.slope + 2.0 * d2);
+    let part = if part.is_finite() { part.clamp(0.1, 0.9) } else { 0.5 };
+    a.length + part * width
+}

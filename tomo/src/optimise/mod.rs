@@ -1,0 +1,13 @@
+//! Steps towards smaller losses.
+//!
+//! What an optimiser remembers is plain slices and counters that the caller owns: written out and read
+//! back, a run goes on as if it had never stopped, to the last bit.
+
+mod adam;
+mod lbfgs;
+mod line_search;
+mod schedule;
+
+pub use adam::{Adam, AdamState};
+pub use lbfgs::{Lbfgs, LbfgsState, Objective, Step};
+pub use schedule::Polynomial;

@@ -1,0 +1,68 @@
+//! How the gas moves that radiates.
+
+use kerrlight_geodesic::flow::dot;
+use kerrlight_geodesic::{Kerr, PathPoint, ZamoFrame, orbits};
+
+/// The four-velocity of gas in the frame of zero angular momentum: γ, and γv along e_r, e_θ,
+/// e_φ.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gas(pub [f64; 4]);
+
+impl Gas {
+    /// Gas without angular momentum, at rest in the frame.
+    pub fn zamo() -> Self {
+        Gas([1.0, 0.0, 0.0, 0.0])
+    }
+
+    /// Gas with the contravariant Boyer–Lindquist four-velocity (uᵗ, uʳ, u^θ, u^φ).
+    ///
+    /// γ follows from the other three, so that its rounding does not become a mass.
+    pub fn of_velocity(frame: &ZamoFrame, u: [f64; 4]) -> Self {
+        let [_, x, y, z] = frame.contravariant(u);
+        Gas([(1.0 + x * x + y * y + z * z).sqrt(), x, y, z])
+    }
+
+    /// Gas with the velocity v (in units of c) along e_r, e_θ, e_φ; `None` unless it is slower than
+    /// light.
+    pub fn with_velocity(v: [f64; 3]) -> Option<Self> {
+        let square = dot(v, v);
+        (square < 1.0).then(|| {
+            let gamma = 1.0 / (1.0 - square).sqrt();
+            Gas([gamma, gamma * v[0], gamma * v[1], gamma * v[2]])
+        })
+    }
+
+    /// Gas that moves in the equatorial plane of the frame with `speed` (in units of c) in the
+    /// direction cos χ e_r + sin χ e_φ: the fluid of Narayan et al. 2021, eq. 8, and Gelles et
+    /// al. 2021. `None` unless it is slower than light.
+    pub fn boosted(speed: f64, chi: f64) -> Option<Self> {
+        let (sin, cos) = chi.sin_cos();
+        Self::with_velocity([speed * cos, 0.0, speed * sin])
+    }
+
+    /// Gas at rest with respect to infinity; `None` in the ergosphere.
+    pub fn at_rest(frame: &ZamoFrame) -> Option<Self> {
+        Self::with_velocity([0.0, 0.0, frame.velocity_at_rest()])
+    }
+
+    /// Gas that circles the axis with Ω = 1/(r^{3/2} + a), a geodesic in the equatorial plane;
+    /// `None` where that would not be slower than light.
+    pub fn keplerian(hole: &Kerr, frame: &ZamoFrame) -> Option<Self> {
+        let rate = orbits::keplerian_angular_velocity(hole, frame.radius());
+        Self::with_velocity([0.0, 0.0, frame.orbital_velocity(rate)])
+    }
+
+    /// Gas that turns rigidly at constant r with the angular velocity vector `omega`
+    /// (Cartesian, radians per M of coordinate time), as a hot spot about its axis; `None`
+    /// where that would not be slower than light. The point must have been traced with its
+    /// azimuth.
+    pub fn rotating(frame: &ZamoFrame, point: &PathPoint, omega: [f64; 3]) -> Option<Self> {
+        let [x, y, u] = point.direction;
+        let [sin, _] = frame.polar_angle();
+        let (cos_phi, sin_phi) = if sin > 0.0 { (x / sin, y / sin) } else { (1.0, 0.0) };
+        // dn/dt = ω × n along e_θ and e_φ.
+        let along_theta = omega[1] * cos_phi - omega[0] * sin_phi;
+        let along_phi = omega[2] * sin - u * (omega[0] * cos_phi + omega[1] * sin_phi);
+        Self::with_velocity(frame.sphere_velocity(along_theta, along_phi))
+    }
+}

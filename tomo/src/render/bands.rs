@@ -1,0 +1,127 @@
+//! Bands of rows on all cores. Tiles are handed out from the top; whoever ends the last tile of
+//! a band puts the band together, so that only a few bands are in memory at any time.
+
+use super::pixels::{Pixel, Workspace, uniform};
+use super::tally::Tally;
+use super::{Progress, Raster, RenderError, adaptive};
+use crate::transport::Meter;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+/// A band of rows.
+#[derive(Debug, Clone)]
+pub(super) struct Band {
+    pub index: usize,
+    /// Row by row, of each channel; intensities in the scene's unit.
+    pub channels: Vec<Vec<f32>>,
+    pub tally: Tally,
+}
+
+/// Takes a band at each time, in any order of bands and from several threads.
+pub(super) type Sink<'a> = dyn Fn(Vec<Band>) -> Result<(), RenderError> + Sync + 'a;
+
+/// The pixels of a tile at each time.
+type Tile = Vec<Vec<Pixel>>;
+
+/// The tiles of a band that are there.
+type Parts = Vec<Option<Tile>>;
+
+/// Adds a tile to its band; all of them if it was the last.
+fn put(band: &Mutex<Parts>, tiles: usize, tile: usize, pixels: Tile) -> Option<Parts> {
+    let mut parts = band.lock().unwrap_or_else(PoisonError::into_inner);
+    parts.resize(tiles, None);
+    parts[tile] = Some(pixels);
+    let complete = parts.iter().all(Option::is_some);
+    complete.then(|| std::mem::take(&mut *parts))
+}
+
+/// Renders the bands `todo` at each of `times` into `sink`. Where `progress` says so it stops
+/// after the bands that are under way. Where pixels are refined there is one time, the stage's.
+pub(super) fn render_bands(
+    raster: &Raster,
+    times: &[f64],
+    todo: &[usize],
+    sink: &Sink<'_>,
+    progress: &Progress<'_>,
+) -> Result<(), RenderError> {
+    let tiles = raster.tiles();
+    let tolerance = if todo.is_empty() { None } else { raster.tolerance()? };
+    let stop = AtomicBool::new(false);
+    let open: Vec<Mutex<Parts>> = todo.iter().map(|_| Mutex::default()).collect();
+    let stopped = |k: &usize| k.is_multiple_of(tiles) && stop.load(Ordering::Relaxed);
+    let order = (0..todo.len() * tiles).take_while(|k| !stopped(k)).par_bridge();
+    order.try_for_each_init(Workspace::default, |work, k| -> Result<(), RenderError> {
+        let (band, tile) = (todo[k / tiles], k % tiles);
+        let pixels = raster.tile((band, tile), times, tolerance, work)?;
+        let Some(parts) = put(&open[k / tiles], tiles, tile, pixels) else { return Ok(()) };
+        let at = |time: usize| raster.assemble(band, &parts, time);
+        sink((0..times.len()).map(at).collect::<Result<_, _>>()?)?;
+        if !progress(raster.layout.rows(band).len()) {
+            stop.store(true, Ordering::Relaxed);
+        }
+        Ok(())
+    })?;
+    if stop.into_inner() { Err(RenderError::Stopped) } else { Ok(()) }
+}
+
+impl Raster {
+    /// Number of tiles in a band.
+    fn tiles(&self) -> usize {
+        self.grid.width.div_ceil(self.tile)
+    }
+
+    /// The error that each pixel may have, where pixels are refined.
+    fn tolerance(&self) -> Result<Option<f64>, RenderError> {
+        let Some(error) = self.scene.screen.image_error else { return Ok(None) };
+        Ok(Some(adaptive::tolerance(&self.stage, &self.grid, error)?))
+    }
+
+    fn tile(
+        &self,
+        (band, tile): (usize, usize),
+        times: &[f64],
+        tolerance: Option<f64>,
+        work: &mut Workspace,
+    ) -> Result<Tile, RenderError> {
+        let end = ((tile + 1) * self.tile).min(self.grid.width);
+        let columns = tile * self.tile..end;
+        let (stage, grid, rows) = (&self.stage, &self.grid, self.layout.rows(band));
+        if self.meter.is_some() {
+            work.scratch.meter = Meter::running();
+        }
+        let pixels = match tolerance {
+            Some(error) => {
+                vec![adaptive::adaptive(stage, grid, rows, columns, error, work)?]
+            }
+            None => uniform(stage, grid, (rows, columns), times, work)?,
+        };
+        if let Some(meter) = &self.meter {
+            meter.lock().unwrap_or_else(PoisonError::into_inner).add(&work.scratch.meter);
+        }
+        Ok(pixels)
+    }
+
+    /// The band from its tiles at the time number `time`.
+    fn assemble(&self, index: usize, parts: &Parts, time: usize) -> Result<Band, RenderError> {
+        let (width, rows) = (self.grid.width, self.layout.rows(index).len());
+        let mut pixels = Vec::with_capacity(width * rows);
+        for row in 0..rows {
+            for part in parts.iter().flatten().filter_map(|tile| tile.get(time)) {
+                let columns = part.len() / rows;
+                pixels.extend_from_slice(&part[row * columns..(row + 1) * columns]);
+            }
+        }
+        let mut channels = Vec::with_capacity(self.channels.len());
+        for kind in &self.channels {
+            let values: Vec<f32> = pixels.iter().map(|pixel| kind.value(pixel)).collect();
+            if !values.iter().all(|value| value.is_finite()) {
+                return Err(RenderError::NotFinite { channel: kind.name });
+            }
+            channels.push(values);
+        }
+        let side = self.scene.screen.image_error.is_none().then_some(self.grid.side);
+        let tally = Tally::of_band(&pixels, width, side);
+        Ok(Band { index, channels, tally })
+    }
+}

@@ -1,0 +1,130 @@
+//! From bands to files.
+
+use super::bands::{Band, render_bands};
+use super::journal::Journal;
+use super::tally::Summary;
+use super::{Progress, Raster, RenderError};
+use crate::image::exr::Attributes;
+use crate::image::reduce::Reduction;
+use exr::error::Result;
+use rayon::prelude::*;
+use std::io::{Read, Seek, Write};
+use std::sync::{Mutex, PoisonError};
+
+/// Pixels that are in memory at once while a file is written.
+const WINDOW: usize = 1 << 20;
+
+impl Raster {
+    /// Renders what is missing in `journal` into it.
+    ///
+    /// # Errors
+    /// If a value is out of range or does not fit, the journal cannot be written, or
+    /// `progress` returned false ([`RenderError::Stopped`]). What is in the journal stays.
+    pub fn fill<F: Read + Write + Seek + Send>(
+        &self,
+        journal: &mut Journal<F>,
+        progress: &Progress<'_>,
+    ) -> std::result::Result<(), RenderError> {
+        let todo = journal.missing();
+        let journal = Mutex::new(journal);
+        let keep = |bands: Vec<Band>| {
+            bands.iter().try_for_each(|band| {
+                let bytes = self.layout.compress(band.index, &band.channels)?;
+                let mut journal = journal.lock().unwrap_or_else(PoisonError::into_inner);
+                journal.append(band.index, band.tally, &bytes).map_err(exr::error::Error::from)?;
+                Ok(())
+            })
+        };
+        render_bands(self, &[self.stage.time()], &todo, &keep, progress)
+    }
+
+    /// What is worth knowing about the whole picture.
+    ///
+    /// # Errors
+    /// If a flux is asked for and there is no light, or a value does not fit after scaling.
+    pub fn summary<F: Read + Write + Seek>(
+        &self,
+        journal: &Journal<F>,
+    ) -> std::result::Result<Summary, RenderError> {
+        self.summarize(&journal.tally())
+    }
+
+    /// Writes the EXR file.
+    ///
+    /// # Errors
+    /// If the journal is not complete, or on a failure to read or write.
+    pub fn write_exr<F: Read + Write + Seek>(
+        &self,
+        journal: &mut Journal<F>,
+        summary: &Summary,
+        attributes: &Attributes,
+        out: impl Write + Seek,
+        reduction: Option<&mut Reduction>,
+    ) -> Result<()> {
+        self.layout.write(out, attributes, |write| {
+            self.for_each_band(journal, summary, true, reduction, write)
+        })
+    }
+
+    /// Reduces the picture without writing an EXR file.
+    ///
+    /// # Errors
+    /// If the journal is not complete, or on a failure to read.
+    pub fn reduce<F: Read + Write + Seek>(
+        &self,
+        journal: &mut Journal<F>,
+        summary: &Summary,
+        reduction: &mut Reduction,
+    ) -> Result<()> {
+        self.for_each_band(journal, summary, false, Some(reduction), &mut |_, _| Ok(()))
+    }
+
+    /// Hands on the compressed bytes of each band in the file's units, from the top, and its
+    /// values to the reduction. Several bands are taken apart in parallel.
+    fn for_each_band<F: Read + Write + Seek>(
+        &self,
+        journal: &mut Journal<F>,
+        summary: &Summary,
+        write: bool,
+        mut reduction: Option<&mut Reduction>,
+        each: &mut dyn FnMut(usize, Vec<u8>) -> Result<()>,
+    ) -> Result<()> {
+        let rescale = summary.unit_factor != 1.0;
+        let values = reduction.is_some() || rescale;
+        let bands: Vec<usize> = (0..self.layout.bands()).collect();
+        let height = self.layout.rows(0).len();
+        for some in bands.chunks((WINDOW / (self.grid.width * height)).max(1)) {
+            let read: Vec<Vec<u8>> =
+                some.iter().map(|band| Ok(journal.read(*band)?)).collect::<Result<_>>()?;
+            let done = read.into_par_iter().zip(some).map(|(bytes, band)| {
+                if !values {
+                    return Ok((bytes, Vec::new()));
+                }
+                let mut channels = self.layout.expand(*band, bytes.clone())?;
+                if !rescale {
+                    return Ok((bytes, channels));
+                }
+                self.rescale(&mut channels, summary.unit_factor);
+                let bytes = if write { self.layout.compress(*band, &channels)? } else { bytes };
+                Ok((bytes, channels))
+            });
+            for ((bytes, channels), band) in done.collect::<Result<Vec<_>>>()?.into_iter().zip(some)
+            {
+                each(*band, bytes)?;
+                if let Some(reduction) = &mut reduction {
+                    reduction.add(&channels);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// From the scene's unit of intensity to that of the file.
+    pub(super) fn rescale(&self, channels: &mut [Vec<f32>], factor: f64) {
+        for (kind, values) in self.channels.iter().zip(channels) {
+            if kind.scales {
+                values.iter_mut().for_each(|value| *value = (f64::from(*value) * factor) as f32);
+            }
+        }
+    }
+}

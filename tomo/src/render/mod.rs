@@ -1,0 +1,205 @@
+//! From a scene to a picture: bands of rows, tile by tile on all cores, kept in a journal until
+//! the whole picture is there. Every pixel is computed on its own, so the picture depends
+//! neither on the number of threads nor on the size of tiles nor on interruptions.
+
+mod adaptive;
+mod bands;
+mod channels;
+mod finish;
+mod grid;
+mod journal;
+mod pixels;
+mod raw;
+mod tally;
+
+pub use channels::{CHANNELS, ChannelKind};
+pub use journal::{Found, Journal};
+pub(crate) use raw::Raw;
+pub use tally::Summary;
+
+use crate::image::Picture;
+use crate::image::exr::Layout;
+use crate::scene::Scene;
+use crate::transport::{Assets, Glimpse, Meter, Scratch, Stage};
+use grid::Grid;
+use kerrlight_geodesic::OutOfRange;
+use std::sync::{Mutex, PoisonError};
+use tally::Tally;
+
+/// Told how many more rows of pixels are done; returns whether to go on.
+pub type Progress<'a> = dyn Fn(usize) -> bool + Sync + 'a;
+
+/// Why there is no picture.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    /// A value is out of range.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
+    /// There is no light to scale.
+    #[error("`screen.total_flux_jy` cannot be met: the picture's own flux is {0:e} scene units")]
+    NoFlux(f64),
+    /// A value does not fit the picture's 32-bit channels.
+    #[error("channel {channel}: a value is too large for a 32-bit float; lower the brightness")]
+    NotFinite {
+        /// The channel.
+        channel: &'static str,
+    },
+    /// A channel that the scene does not have.
+    #[error("`screen.channels`: this scene has no channel `{name}`; it has {there}")]
+    Channel {
+        /// The name that was asked for.
+        name: String,
+        /// The channels that there are.
+        there: String,
+    },
+    /// Bands cannot be kept.
+    #[error(transparent)]
+    Keep(#[from] exr::error::Error),
+    /// The caller asked to stop.
+    #[error("stopped")]
+    Stopped,
+}
+
+/// A picture to be rendered: what is seen, where rays go, and what is kept of it.
+#[derive(Debug)]
+pub struct Raster {
+    scene: Scene,
+    stage: Stage,
+    grid: Grid,
+    channels: Vec<&'static ChannelKind>,
+    layout: Layout,
+    /// Columns of a tile.
+    tile: usize,
+    /// Where the time goes, if that is asked.
+    meter: Option<Mutex<Meter>>,
+}
+
+/// Rays of a block of a trial.
+const TRIAL: usize = 64;
+
+/// Columns of a tile: with the rows of a band a block of rays.
+const TILE: usize = 64;
+
+impl Raster {
+    /// The picture of `scene` with the decoded files that it names.
+    ///
+    /// # Errors
+    /// If a value is out of range.
+    pub fn new(scene: &Scene, assets: impl Into<Assets>) -> Result<Self, RenderError> {
+        let stage = Stage::new(scene, assets)?;
+        let grid = Grid::new(scene);
+        let refined = scene.screen.image_error.is_some();
+        let channels = channels::chosen(&stage, refined, scene.screen.channels.as_deref())?;
+        let names: Vec<&str> = channels.iter().map(|kind| kind.name).collect();
+        let layout = Layout::new(grid.width, grid.height, &names)?;
+        Ok(Raster { scene: scene.clone(), stage, grid, channels, layout, tile: TILE, meter: None })
+    }
+
+    /// The same with tiles of `columns` pixels; no pixel depends on it.
+    pub fn with_tile(self, columns: usize) -> Self {
+        Raster { tile: columns.max(1), ..self }
+    }
+
+    /// The same with a meter of the time that its parts take.
+    pub fn with_meter(self) -> Self {
+        Raster { meter: Some(Mutex::new(Meter::running())), ..self }
+    }
+
+    /// What the meter has read, over all threads; nothing without one.
+    pub fn meter(&self) -> Meter {
+        let read = |meter: &Mutex<Meter>| *meter.lock().unwrap_or_else(PoisonError::into_inner);
+        self.meter.as_ref().map(read).unwrap_or_default()
+    }
+
+    /// Time of all parts on one thread for `rays` rays spread over the picture.
+    ///
+    /// # Errors
+    /// If a value is out of range.
+    pub fn trial(&self, rays: usize) -> Result<Meter, RenderError> {
+        let mut scratch = Scratch::default();
+        scratch.meter = Meter::running();
+        let (width, height) = (self.grid.width, self.grid.height);
+        // Blocks of neighbours, as in the picture, on a sequence that fills the plane evenly
+        // (Roberts 2018: powers of the reciprocal of the plastic number).
+        let blocks = rays.div_ceil(TRIAL);
+        for k in 0..blocks {
+            let place =
+                |ratio: f64, size: usize| ((k as f64 * ratio).fract() * size as f64) as usize;
+            let (column, row) =
+                (place(0.754_877_666_246_692_7, width), place(0.569_840_290_998_053_2, height));
+            let points = (0..TRIAL).map(|j| {
+                self.grid.inside(
+                    (column + j % 8).min(width - 1),
+                    (row + j / 8).min(height - 1),
+                    [0.0; 2],
+                )
+            });
+            let (alpha, beta): (Vec<f64>, Vec<f64>) = points.unzip();
+            let mut seen = vec![Glimpse::default(); TRIAL];
+            self.stage.look_many(&alpha, &beta, &[self.stage.time()], &mut scratch, &mut seen)?;
+        }
+        Ok(scratch.meter)
+    }
+
+    /// Number of bands.
+    pub fn bands(&self) -> usize {
+        self.layout.bands()
+    }
+
+    /// Everything about the scene that decides the picture, as a text. The contents of files
+    /// that the scene names are not in it.
+    pub fn identity(&self) -> String {
+        let version = env!("CARGO_PKG_VERSION");
+        format!("kerrlight {version}\n{}\n{:?}\n", self.scene.to_toml(), self.names())
+    }
+
+    /// Names of the channels.
+    pub fn names(&self) -> Vec<&'static str> {
+        self.channels.iter().map(|kind| kind.name).collect()
+    }
+
+    /// What the channels hold.
+    pub fn legend(&self) -> String {
+        channels::legend(&self.channels)
+    }
+
+    fn summarize(&self, tally: &Tally) -> Result<Summary, RenderError> {
+        let factor = Summary::factor(&self.scene, tally).map_err(RenderError::NoFlux)?;
+        Summary::new(&self.scene, tally, factor)
+    }
+}
+
+/// The picture of a scene with what is worth knowing about it.
+#[derive(Debug, Clone)]
+pub struct Rendered {
+    /// The picture.
+    pub picture: Picture,
+    /// What is worth knowing.
+    pub summary: Summary,
+}
+
+/// Renders a picture that fits into memory.
+///
+/// # Errors
+/// If a value is out of range or does not fit, or `progress` returned false.
+pub fn render(
+    scene: &Scene,
+    assets: impl Into<Assets>,
+    progress: &Progress<'_>,
+) -> Result<Rendered, RenderError> {
+    Raster::new(scene, assets)?.render(progress)
+}
+
+impl Raster {
+    /// Renders a picture that fits into memory.
+    ///
+    /// # Errors
+    /// If a value is out of range or does not fit, or `progress` returned false.
+    pub fn render(&self, progress: &Progress<'_>) -> Result<Rendered, RenderError> {
+        let mut raw = self.raw(&[self.stage.time()], progress)?;
+        // One for each time.
+        let raw = raw.pop().unwrap_or_default();
+        let factor = self.unit_factor(&self.scene, &raw)?;
+        self.rendered(&self.scene, raw, factor)
+    }
+}

@@ -1,0 +1,114 @@
+//! The pixels of a tile, from blocks of rays.
+
+use super::grid::Grid;
+use crate::transport::{Fate, Glimpse, Scratch, Stage};
+use kerrlight_geodesic::OutOfRange;
+use std::ops::Range;
+
+/// A pixel: averages of light, data of its most central ray.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Pixel {
+    pub intensity: f64,
+    pub rgb: [f32; 3],
+    pub center: Glimpse,
+    pub unresolved: u32,
+    pub rays: u32,
+    /// Estimated absolute error of the intensity; 0 where it is not estimated pixel by pixel.
+    pub error: f64,
+}
+
+/// Rays that are asked for at once.
+const BLOCK: usize = 1024;
+
+/// Memory that is reused from tile to tile.
+#[derive(Debug, Default)]
+pub(super) struct Workspace {
+    pub scratch: Scratch,
+    alpha: Vec<f64>,
+    beta: Vec<f64>,
+    seen: Vec<Glimpse>,
+}
+
+impl Workspace {
+    /// Forgets the rays of before.
+    pub fn clear(&mut self) {
+        self.alpha.clear();
+        self.beta.clear();
+    }
+
+    /// One more ray.
+    pub fn push(&mut self, (alpha, beta): (f64, f64)) {
+        self.alpha.push(alpha);
+        self.beta.push(beta);
+    }
+
+    /// What all rays see, in their order.
+    pub fn look(&mut self, stage: &Stage) -> Result<&[Glimpse], OutOfRange> {
+        self.seen.clear();
+        self.seen.resize(self.alpha.len(), Glimpse::default());
+        let rays = self.alpha.chunks(BLOCK).zip(self.beta.chunks(BLOCK));
+        for ((alpha, beta), seen) in rays.zip(self.seen.chunks_mut(BLOCK)) {
+            stage.look_many(alpha, beta, &[stage.time()], &mut self.scratch, seen)?;
+        }
+        Ok(&self.seen)
+    }
+
+    /// What a block of rays sees at each of `times`: ray k at time j is `[j · rays + k]`.
+    fn look_at(&mut self, stage: &Stage, times: &[f64]) -> Result<&[Glimpse], OutOfRange> {
+        self.seen.clear();
+        self.seen.resize(self.alpha.len() * times.len(), Glimpse::default());
+        stage.look_many(&self.alpha, &self.beta, times, &mut self.scratch, &mut self.seen)?;
+        Ok(&self.seen)
+    }
+}
+
+/// The pixels of a rectangle at each of `times`, row by row, with `side`² rays each, which are
+/// traced once for all times.
+pub(super) fn uniform(
+    stage: &Stage,
+    grid: &Grid,
+    (rows, columns): (Range<usize>, Range<usize>),
+    times: &[f64],
+    work: &mut Workspace,
+) -> Result<Vec<Vec<Pixel>>, OutOfRange> {
+    let side = grid.side;
+    // Whole pixels, about a block's worth of rays: `side`² is at most that.
+    let together = (BLOCK / (side * side)).max(1);
+    let places: Vec<(usize, usize)> =
+        rows.flat_map(|row| columns.clone().map(move |column| (column, row))).collect();
+    let mut pixels = vec![Vec::with_capacity(places.len()); times.len()];
+    for some in places.chunks(together) {
+        work.clear();
+        for (column, row) in some {
+            for k in 0..side * side {
+                work.push(grid.screen(*column, *row, k % side, k / side));
+            }
+        }
+        let rays = some.len() * side * side;
+        let seen = work.look_at(stage, times)?.chunks_exact(rays);
+        for (pixels, seen) in pixels.iter_mut().zip(seen) {
+            pixels.extend(seen.chunks_exact(side * side).map(|rays| mean(rays, side)));
+        }
+    }
+    Ok(pixels)
+}
+
+/// One pixel from its rays, row by row.
+fn mean(rays: &[Glimpse], side: usize) -> Pixel {
+    let central = side / 2;
+    let mut pixel = Pixel {
+        center: rays.get(central * side + central).copied().unwrap_or_default(),
+        rays: rays.len() as u32,
+        ..Pixel::default()
+    };
+    for ray in rays {
+        pixel.intensity += ray.intensity;
+        for (sum, light) in pixel.rgb.iter_mut().zip(ray.rgb) {
+            *sum += light;
+        }
+        pixel.unresolved += u32::from(ray.fate == Fate::Unresolved);
+    }
+    pixel.intensity /= rays.len() as f64;
+    pixel.rgb = pixel.rgb.map(|c| c / rays.len() as f32);
+    pixel
+}

@@ -1,0 +1,30 @@
+//! From an unbounded number to an emissivity.
+
+use crate::simd::{Lanes, Scalar, math};
+
+/// The last function of a representation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Activation {
+    /// 1/(1 + e⁻ˣ): between 0 and 1.
+    Sigmoid,
+    /// ln(1 + eˣ): positive.
+    Softplus,
+    /// x itself. Emission stays non-negative where parameters do (a grid's are projected).
+    Linear,
+}
+
+impl Activation {
+    /// Value and slope.
+    #[inline(always)]
+    pub(super) fn apply<T: Scalar, V: Lanes<T>>(self, x: V) -> (V, V) {
+        let one = V::splat(T::one());
+        match self {
+            Self::Sigmoid => {
+                let value = math::sigmoid(x);
+                (value, value * (one - value))
+            }
+            Self::Softplus => (math::softplus(x), math::sigmoid(x)),
+            Self::Linear => (x, one),
+        }
+    }
+}

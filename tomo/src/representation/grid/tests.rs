@@ -1,0 +1,93 @@
+use super::*;
+use crate::representation::conformance::{Subject, check};
+
+/// Interpolation as a sum over all nodes of products of hat functions, and its derivative.
+fn plain(settings: &GridSettings, p: &[f64], dp: &[f64], at: &[f64], dat: &[f64]) -> (f64, f64) {
+    if (0..3).any(|k| at[k] < settings.low[k] || at[k] > settings.high[k]) {
+        return (0.0, 0.0);
+    }
+    let spacing = |k: usize| (settings.high[k] - settings.low[k]) / (settings.nodes[k] - 1) as f64;
+    let hat = |k: usize, node: usize| {
+        let u = (at[k] - settings.low[k]) / spacing(k) - node as f64;
+        let inside = u.abs() < 1.0;
+        let slope = if inside { -u.signum() * dat[k] / spacing(k) } else { 0.0 };
+        ((1.0 - u.abs()).max(0.0), slope)
+    };
+    let [nx, ny, nz] = settings.nodes;
+    let (mut sum, mut change) = (0.0, 0.0);
+    for node in 0..nx * ny * nz {
+        let (x, dx) = hat(0, node / (ny * nz));
+        let (y, dy) = hat(1, node / nz % ny);
+        let (z, dz) = hat(2, node % nz);
+        sum += p[node] * x * y * z;
+        change += dp[node] * x * y * z + p[node] * (dx * y * z + x * dy * z + x * y * dz);
+    }
+    let sigmoid = 1.0 / (1.0 + (-sum).exp());
+    match settings.activation {
+        Activation::Sigmoid => (sigmoid, change * sigmoid * (1.0 - sigmoid)),
+        Activation::Softplus => (sum.exp().ln_1p(), change * sigmoid),
+        Activation::Linear => (sum, change),
+    }
+}
+
+fn settings(activation: Activation) -> GridSettings {
+    let (low, high) = ([-5.0, -4.0, -3.5], [5.0, 4.5, 3.0]);
+    GridSettings { nodes: [40, 9, 6], low, high, activation, initial: 1.5 }
+}
+
+#[test]
+fn exact_grids_conform() {
+    for activation in [Activation::Sigmoid, Activation::Softplus, Activation::Linear] {
+        let settings = settings(activation);
+        let tangent =
+            |p: &[f64], dp: &[f64], at: &[f64], dat: &[f64]| plain(&settings, p, dp, at, dat);
+        for set in InstructionSet::ALL {
+            let grid = Grid::new(settings.clone()).unwrap().on(set);
+            let (representation, within) = (&grid, 5.5);
+            check(&Subject { representation, within, parameter_noise: 1.0, tangent: &tangent });
+        }
+    }
+}
+
+#[test]
+fn exact_linear_functions_are_kept() {
+    let settings =
+        GridSettings { nodes: [33, 20, 7], initial: 0.0, ..settings(Activation::Linear) };
+    let grid = Grid::new(settings).unwrap();
+    let of = |x: [f64; 3]| 20.0 + 0.5 * x[0] - 0.25 * x[1] + 2.0 * x[2];
+    let node = |k: usize, i: usize| {
+        let GridSettings { nodes, low, high, .. } = grid.settings();
+        low[k] + (high[k] - low[k]) * i as f64 / (nodes[k] - 1) as f64
+    };
+    let parameters: Vec<f32> = (0..33 * 20 * 7)
+        .map(|i| of([node(0, i / 140), node(1, i / 7 % 20), node(2, i % 7)]) as f32)
+        .collect();
+    // The corners of the box belong to it.
+    let (x, y, z) = ([-5.0, 5.0, 0.3, 5.1], [-4.0, 4.5, 1.7, 0.0], [-3.5, 3.0, -2.2, 0.0]);
+    let [a, b, c] = [x, y, z].map(|column| column.map(|x: f64| x as f32));
+    let mut values = [0.0f32; 4];
+    let at = Coordinates::xyz(&a, &b, &c);
+    grid.eval(&parameters, at, &mut values, &mut Workspace::new());
+    for k in 0..3 {
+        assert!((f64::from(values[k]) - of([x[k], y[k], z[k]])).abs() < 2e-5, "{values:?}");
+    }
+    assert_eq!(values[3], 0.0);
+}
+
+#[test]
+fn a_nan_stays_one() {
+    let grid = Grid::new(settings(Activation::Sigmoid)).unwrap();
+    let parameters = vec![0.0f32; 40 * 9 * 6];
+    let (x, nan, mut values) = ([0.0f32], [f32::NAN], [0.0]);
+    grid.eval(&parameters, Coordinates::xyz(&x, &nan, &x), &mut values, &mut Workspace::new());
+    assert!(values[0].is_nan());
+}
+
+#[test]
+fn shapes_out_of_range_are_named() {
+    let of = |settings| Grid::new(settings).unwrap_err().to_string();
+    let text = of(GridSettings { nodes: [4, 1, 4], ..settings(Activation::Sigmoid) });
+    assert_eq!(text, "nodes = 1 is not allowed: 2 to 2048 along each axis");
+    let text = of(GridSettings { initial: -1.0, ..settings(Activation::Linear) });
+    assert_eq!(text, "initial = -1 is not allowed: a finite number, not negative if linear");
+}

@@ -1,0 +1,101 @@
+//! Emission as a function of coordinates and parameters.
+//!
+//! A [`Representation`] gets coordinates: it sees no metric, camera, flow or telescope. Those of
+//! space alone get points that the dynamics have pulled back to the reference time. Parameters
+//! are one flat slice that the caller owns; batches are columns of coordinates.
+//!
+//! [`conformance`] holds what every representation must pass.
+
+mod activation;
+pub mod conformance;
+mod grid;
+mod network;
+mod workspace;
+
+pub use activation::Activation;
+pub use grid::{Grid, GridSettings};
+pub use network::{Initialisation, Network, NetworkSettings};
+pub use workspace::Workspace;
+
+pub use crate::points::{Coordinates, CoordinatesMut};
+pub use crate::simd::{InstructionSet, Scalar};
+
+use core::ops::Range;
+
+/// Where a vector-Jacobian product goes; it is added to what is there.
+#[derive(Debug)]
+pub struct Gradient<'a, T> {
+    /// With respect to the parameters.
+    pub parameters: &'a mut [T],
+    /// With respect to the coordinates, if wanted.
+    pub coordinates: Option<CoordinatesMut<'a, T>>,
+}
+
+/// Given a range of groups and the values of their points, writes dL/dvalue of each point. Called from
+/// several threads, for every group once.
+pub type Link<'a, T> = dyn Fn(Range<usize>, &[T], &mut [T]) + Sync + 'a;
+
+/// What ties values to cotangents inside a batch: the points of a ray to its pixel.
+#[derive(Clone, Copy)]
+pub struct Groups<'a, T> {
+    /// Group k holds the points `starts[k]..starts[k + 1]`, from 0 to the number of points.
+    pub starts: &'a [usize],
+    /// From values to cotangents.
+    pub link: &'a Link<'a, T>,
+}
+
+/// An emission field e(x; parameters), evaluated on batches of points by all threads of the current
+/// rayon pool.
+///
+/// Results do not depend on the number of threads, to the last bit; a point's value and its
+/// gradient with respect to the coordinates do not depend on its batch either. Nothing is
+/// allocated once the workspace has seen a batch of the size.
+///
+/// Lengths that do not fit together are bugs and panic.
+pub trait Representation<T: Scalar>: Send + Sync {
+    /// Coordinates of a point: 3 (x, y, z) or 4 (t, x, y, z).
+    fn dimension(&self) -> usize;
+
+    /// Number of parameters.
+    fn parameters(&self) -> usize;
+
+    /// Parameters to start from; the same for the same seed on every machine.
+    fn initialise(&self, seed: u64, parameters: &mut [T]);
+
+    /// Moves parameters to the nearest allowed ones, after each step of an optimiser.
+    fn project(&self, _parameters: &mut [T]) {}
+
+    /// values = e(x); what was in `values` is overwritten.
+    fn eval(
+        &self,
+        parameters: &[T],
+        at: Coordinates<'_, T>,
+        values: &mut [T],
+        workspace: &mut Workspace,
+    );
+
+    /// Adds Σ cotangent · de/dparameter, and cotangent · de/dcoordinate of each point where asked.
+    fn vjp(
+        &self,
+        parameters: &[T],
+        at: Coordinates<'_, T>,
+        cotangents: &[T],
+        gradient: Gradient<'_, T>,
+        workspace: &mut Workspace,
+    );
+
+    /// Both at once, for cotangents that depend on the values of the same group only (the pixel at
+    /// the end of a ray): overwrites `values`, and adds the product with the cotangents that the link
+    /// makes of them.
+    ///
+    /// A network goes through its layers once instead of twice.
+    fn eval_vjp(
+        &self,
+        parameters: &[T],
+        at: Coordinates<'_, T>,
+        groups: Groups<'_, T>,
+        values: &mut [T],
+        gradient: Gradient<'_, T>,
+        workspace: &mut Workspace,
+    );
+}

@@ -1,0 +1,75 @@
+//! Positional encoding of a tile of points, and its derivative.
+
+use super::super::{Coordinates, CoordinatesMut};
+use super::dense::{Matrix, MatrixMut};
+use crate::simd::{Lanes, MAX_LANES, Scalar, Task, math};
+
+/// Rows γ(x) = [x, sin 2ʲx, sin(2ʲx + π/2)] (for each j the coordinates one after the other), then a
+/// one.
+pub struct Encode<'a, T> {
+    pub at: Coordinates<'a, T>,
+    /// What coordinates are multiplied with, in their order.
+    pub scales: &'a [T],
+    pub degree: usize,
+    pub output: MatrixMut<'a, T>,
+}
+
+impl<T: Scalar> Task<T> for Encode<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes<T>, const ROWS: usize>(self) {
+        let (dimension, stride) = (self.at.dimension(), self.output.stride);
+        let columns = dimension * (1 + 2 * self.degree);
+        let rows = self.output.numbers.chunks_mut(stride * V::LANES);
+        for (block, rows) in rows.enumerate().take(self.at.len().div_ceil(V::LANES)) {
+            for (d, (column, scale)) in self.at.columns().iter().zip(self.scales).enumerate() {
+                let x = V::load_front(&column[block * V::LANES..], T::zero()) * V::splat(*scale);
+                put(x, rows, stride, d);
+                let mut x = x;
+                for j in 0..self.degree {
+                    let (sin, cos) = math::sin_cos::<T, V>(x);
+                    put(sin, rows, stride, dimension * (1 + j) + d);
+                    put(cos, rows, stride, dimension * (1 + self.degree + j) + d);
+                    x = x + x;
+                }
+            }
+            put(V::splat(T::one()), rows, stride, columns);
+        }
+    }
+}
+
+/// Lanes to one column of as many rows.
+#[inline(always)]
+fn put<T: Scalar, V: Lanes<T>>(x: V, rows: &mut [T], stride: usize, column: usize) {
+    let mut lanes = [T::zero(); MAX_LANES];
+    x.store_front(&mut lanes);
+    for (row, x) in rows.chunks_mut(stride).zip(lanes) {
+        row[column] = x;
+    }
+}
+
+/// Adds to the gradient with respect to coordinates what that with respect to the rows amounts to.
+pub fn encode_vjp<T: Scalar>(
+    rows: Matrix<'_, T>,
+    cotangents: Matrix<'_, T>,
+    scales: &[T],
+    degree: usize,
+    gradient: &mut CoordinatesMut<'_, T>,
+) {
+    let dimension = gradient.dimension();
+    let columns = gradient.columns().iter_mut().zip(scales).enumerate();
+    for (d, (gradient, scale)) in columns {
+        let points = rows.numbers.chunks(rows.stride);
+        let points = points.zip(cotangents.numbers.chunks(cotangents.stride));
+        for (out, (row, cotangent)) in gradient.iter_mut().zip(points) {
+            let (mut sum, mut factor) = (cotangent[d], T::one());
+            for j in 0..degree {
+                let sin = dimension * (1 + j) + d;
+                let cos = sin + dimension * degree;
+                sum += factor * (cotangent[sin] * row[cos] - cotangent[cos] * row[sin]);
+                factor += factor;
+            }
+            *out += *scale * sum;
+        }
+    }
+}

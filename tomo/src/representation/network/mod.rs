@@ -1,0 +1,131 @@
+//! Fully connected networks, fused: a tile of points goes through all layers, forward and backward,
+//! while its activations are in cache.
+
+mod batch;
+mod dense;
+mod encoding;
+mod initialise;
+mod layout;
+mod output;
+mod packed;
+mod settings;
+#[cfg(test)]
+mod tests;
+mod tile;
+
+pub use settings::{Initialisation, NetworkSettings};
+
+use super::{Coordinates, Gradient, Groups, Representation, Workspace};
+use crate::simd::{InstructionSet, Scalar};
+use batch::{Cotangents, Memory, Way};
+use kerrlight_geodesic::OutOfRange;
+use layout::Layout;
+
+/// A network with positional encoding: `bhnerf` of (x, y, z), `mlp4d` of (t, x, y, z).
+///
+/// Parameters are layer after layer, each its kernel (inputs × outputs, row by row) and then its
+/// biases; a layer after the skip has the encoded point behind the units of the layer before.
+#[derive(Clone, Debug)]
+pub struct Network {
+    settings: NetworkSettings,
+    layout: Layout,
+    instruction_set: InstructionSet,
+}
+
+impl Network {
+    /// A network of these sizes, on the widest instruction set of the machine.
+    ///
+    /// # Errors
+    /// If a size is out of its range.
+    pub fn new(settings: NetworkSettings) -> Result<Self, OutOfRange> {
+        settings.check()?;
+        let layout = Layout::new(&settings);
+        Ok(Self { settings, layout, instruction_set: InstructionSet::best() })
+    }
+
+    /// The same on another instruction set (the portable one where the machine lacks it): results differ
+    /// by rounding.
+    pub fn on(self, instruction_set: InstructionSet) -> Self {
+        let available = instruction_set.available();
+        let instruction_set = if available { instruction_set } else { InstructionSet::Portable };
+        Self { instruction_set, ..self }
+    }
+
+    /// The sizes.
+    pub fn settings(&self) -> &NetworkSettings {
+        &self.settings
+    }
+
+    /// Floating-point operations a point, of multiplying and adding weights alone: forward, and
+    /// forward with the gradient of the parameters.
+    pub fn operations(&self) -> [usize; 2] {
+        let of = |rows: usize, outputs: usize| 2 * rows * outputs;
+        let layers = &self.layout.layers;
+        let forward: usize = layers.iter().map(|layer| of(layer.inputs, layer.outputs)).sum();
+        let units = self.layout.rows.iter().zip(layers).skip(1);
+        let back: usize = units.map(|(rows, layer)| of(rows.units, layer.outputs)).sum();
+        [forward, 2 * forward + back]
+    }
+
+    fn scales<T: Scalar>(&self) -> [T; 4] {
+        let (length, time) = (1.0 / self.settings.length_scale, 1.0 / self.settings.time_scale);
+        let first = if self.settings.dimension == 4 { time } else { length };
+        [first, length, length, length].map(T::of)
+    }
+}
+
+impl<T: Scalar + Default> Representation<T> for Network {
+    fn dimension(&self) -> usize {
+        self.settings.dimension
+    }
+
+    fn parameters(&self) -> usize {
+        self.layout.parameters()
+    }
+
+    fn initialise(&self, seed: u64, parameters: &mut [T]) {
+        assert!(parameters.len() == self.layout.parameters());
+        let how = self.settings.initialisation;
+        initialise::initialise(&self.layout.layers, how, seed, parameters);
+    }
+
+    fn eval(
+        &self,
+        parameters: &[T],
+        at: Coordinates<'_, T>,
+        values: &mut [T],
+        workspace: &mut Workspace,
+    ) {
+        let memory: &mut Memory<T> = workspace.of();
+        memory.run(self, parameters, at, &[], Way::Forward { values });
+    }
+
+    fn vjp(
+        &self,
+        parameters: &[T],
+        at: Coordinates<'_, T>,
+        cotangents: &[T],
+        gradient: Gradient<'_, T>,
+        workspace: &mut Workspace,
+    ) {
+        let memory: &mut Memory<T> = workspace.of();
+        let cotangents = Cotangents::Given(cotangents);
+        let way = Way::Both { cotangents, values: None, gradient };
+        memory.run(self, parameters, at, &[], way);
+    }
+
+    fn eval_vjp(
+        &self,
+        parameters: &[T],
+        at: Coordinates<'_, T>,
+        groups: Groups<'_, T>,
+        values: &mut [T],
+        gradient: Gradient<'_, T>,
+        workspace: &mut Workspace,
+    ) {
+        let memory: &mut Memory<T> = workspace.of();
+        let cotangents = Cotangents::Linked(groups.link);
+        let way = Way::Both { cotangents, values: Some(values), gradient };
+        memory.run(self, parameters, at, groups.starts, way);
+    }
+}

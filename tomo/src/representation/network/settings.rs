@@ -1,0 +1,95 @@
+//! Sizes of a network.
+
+use super::super::Activation;
+use kerrlight_geodesic::OutOfRange;
+
+/// How kernels are drawn; biases start at zero.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Initialisation {
+    /// Uniform in ±√(6/inputs) (He et al. 2015), what the BH-NeRF code trains from.
+    HeUniform,
+    /// Normal with variance 1/inputs, truncated at two standard deviations (LeCun et al. 1998; the
+    /// default of Flax).
+    LecunNormal,
+}
+
+/// Shape of a fully connected ReLU network with positional encoding and one output.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NetworkSettings {
+    /// 3 for (x, y, z), 4 for (t, x, y, z).
+    pub dimension: usize,
+    /// Positional encoding degree L: γ(x) = [x, sin 2ʲx, sin(2ʲx + π/2)], j = 0..L − 1.
+    pub degree: usize,
+    /// Units of a hidden layer.
+    pub width: usize,
+    /// Hidden layers.
+    pub hidden_layers: usize,
+    /// γ(x) is appended to the output of this hidden layer, counted from 1.
+    pub skip_after: Option<usize>,
+    /// Lengths are divided by it (M) before they are encoded.
+    pub length_scale: f64,
+    /// Times are divided by it before they are encoded.
+    pub time_scale: f64,
+    /// The last function, of the output plus `shift`.
+    pub activation: Activation,
+    /// See `activation`.
+    pub shift: f64,
+    /// How parameters start.
+    pub initialisation: Initialisation,
+}
+
+impl NetworkSettings {
+    /// The network of BH-NeRF (Levis et al. 2022): 4 × 128, L = 3, the encoded point appended after the
+    /// third hidden layer, sigmoid(· − 10) of pulled-back (x, y, z) in M; 55,169 parameters.
+    pub fn bhnerf() -> Self {
+        Self {
+            dimension: 3,
+            degree: 3,
+            width: 128,
+            hidden_layers: 4,
+            skip_after: Some(3),
+            length_scale: 1.0,
+            time_scale: 1.0,
+            activation: Activation::Sigmoid,
+            shift: -10.0,
+            initialisation: Initialisation::HeUniform,
+        }
+    }
+
+    /// The same of (t, x, y, z), without dynamics: 56,961 parameters.
+    pub fn mlp4d() -> Self {
+        Self { dimension: 4, ..Self::bhnerf() }
+    }
+
+    /// Numbers of an encoded point.
+    pub fn encoded(&self) -> usize {
+        self.dimension * (1 + 2 * self.degree)
+    }
+
+    pub(super) fn check(&self) -> Result<(), OutOfRange> {
+        let whole = |field, value: usize, low, high, allowed| {
+            let ok = (low..=high).contains(&value);
+            check(field, value as f64, ok, allowed)
+        };
+        whole("dimension", self.dimension, 3, 4, "3 (x, y, z) or 4 (t, x, y, z)")?;
+        whole("degree", self.degree, 0, 16, "0 to 16")?;
+        whole("width", self.width, 1, 4096, "1 to 4096")?;
+        whole("hidden_layers", self.hidden_layers, 1, 64, "1 to 64")?;
+        if let Some(layer) = self.skip_after {
+            whole("skip_after", layer, 1, self.hidden_layers, "1 to hidden_layers")?;
+        }
+        let positive = |x: f64| x.is_finite() && x > 0.0;
+        check("length_scale", self.length_scale, positive(self.length_scale), "above 0")?;
+        check("time_scale", self.time_scale, positive(self.time_scale), "above 0")?;
+        check("shift", self.shift, self.shift.is_finite(), "a finite number")
+    }
+}
+
+fn check(
+    field: &'static str,
+    value: f64,
+    ok: bool,
+    allowed: &'static str,
+) -> Result<(), OutOfRange> {
+    if ok { Ok(()) } else { Err(OutOfRange { field, value, allowed }) }
+}

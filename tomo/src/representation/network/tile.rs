@@ -1,0 +1,205 @@
+//! A tile of points on its way through all layers and back, in cache.
+
+use super::super::workspace::Lines;
+use super::super::{Coordinates, CoordinatesMut};
+use super::Network;
+use super::batch::Cotangents;
+use super::dense::{Backward, Forward, Matrix, MatrixMut, Weights};
+use super::encoding::{Encode, encode_vjp};
+use super::layout::Rows;
+use super::output::{Output, OutputBackward};
+use super::packed::Packed;
+use crate::simd::{Scalar, dispatch};
+use core::ops::Range;
+
+/// Points of a tile. Activations of four layers of 128 and their gradients then take half a
+/// megabyte, the second-level cache of a core.
+pub const POINTS: usize = 120;
+
+/// A multiple of the rows of a block of every instruction set.
+const BLOCK: usize = 12;
+
+/// Memory of one tile.
+#[derive(Default)]
+pub struct Tile<T> {
+    points: usize,
+    /// Activations of each layer, the encoded points first.
+    rows: Vec<Lines<T>>,
+    /// Gradients with respect to what a layer gives and takes, in turns.
+    cotangents: [Lines<T>; 2],
+    /// Gradient with respect to the encoded points.
+    encoded: Lines<T>,
+    values: Lines<T>,
+    /// Of the activation; then times the cotangents.
+    slopes: Lines<T>,
+    /// Gradient of the output layer.
+    output: Lines<T>,
+}
+
+impl<T: Scalar + Default> Tile<T> {
+    /// Makes room for `points`; of a forward pass alone, or both ways.
+    pub fn resize(&mut self, network: &Network, points: usize, backward: bool) {
+        let points = points.next_multiple_of(BLOCK);
+        let layout = &network.layout;
+        self.rows.resize_with(layout.rows.len(), Lines::default);
+        for (lines, rows) in self.rows.iter_mut().zip(&layout.rows) {
+            lines.resize(points * rows.stride);
+        }
+        self.values.resize(points);
+        self.slopes.resize(points);
+        if backward {
+            let widest = layout.rows.iter().map(|rows| rows.stride).max().unwrap_or(0);
+            self.cotangents.iter_mut().for_each(|lines| lines.resize(points * widest));
+            self.encoded.resize(points * layout.rows[0].stride);
+            self.output.resize(layout.last_rows().stride);
+        }
+    }
+
+    /// Values of the points; slopes of the activation are kept if `backward`.
+    pub fn forward(
+        &mut self,
+        network: &Network,
+        packed: &Packed<T>,
+        at: Coordinates<'_, T>,
+        backward: bool,
+    ) -> &[T] {
+        let (set, layout, points) = (network.instruction_set, &network.layout, at.len());
+        self.points = points;
+        let output = MatrixMut { numbers: self.rows[0].all(), stride: layout.rows[0].stride };
+        let (scales, degree) = (&packed.scales()[..at.dimension()], network.settings.degree);
+        dispatch(set, Encode { at, scales, degree, output });
+        for (k, layer) in layout.hidden().iter().enumerate() {
+            let (before, after) = self.rows.split_at_mut(k + 1);
+            let input = matrix(&before[k], layout.rows[k]);
+            let output = MatrixMut { numbers: after[0].all(), stride: layout.rows[k + 1].stride };
+            let (inputs, outputs, panels) = (layer.inputs, layer.outputs, packed.kernel(k));
+            dispatch(set, Forward { points, input, inputs, panels, outputs, output });
+            append(matrix(&before[0], layout.rows[0]), after[0].all(), layout.rows[k + 1], points);
+        }
+        let input = matrix(&self.rows[layout.hidden().len()], layout.last_rows());
+        let slopes = if backward { &mut self.slopes.all()[..points] } else { &mut [] };
+        let (activation, shift) = (network.settings.activation, T::of(network.settings.shift));
+        let (weights, values) = (packed.output(), &mut self.values.all()[..points]);
+        dispatch(set, Output { input, weights, activation, shift, values, slopes });
+        &self.values.read()[..points]
+    }
+
+    /// After [`Self::forward`]: what the values are differentiated against.
+    pub fn cotangents(
+        &mut self,
+        cotangents: Cotangents<'_, T>,
+        groups: Range<usize>,
+        range: Range<usize>,
+    ) {
+        let slopes = &mut self.slopes.all()[..self.points];
+        let cotangents = match cotangents {
+            Cotangents::Given(all) => &all[range],
+            Cotangents::Linked(link) => {
+                let made = &mut self.cotangents[0].all()[..self.points];
+                link(groups, &self.values.read()[..self.points], made);
+                &*made
+            }
+        };
+        for (slope, cotangent) in slopes.iter_mut().zip(cotangents) {
+            *slope *= *cotangent;
+        }
+    }
+
+    /// After [`Self::cotangents`]: adds the gradient (or overwrites that of parameters).
+    pub fn backward(
+        &mut self,
+        network: &Network,
+        packed: &Packed<T>,
+        parameters: &mut [T],
+        overwrite: bool,
+        coordinates: Option<CoordinatesMut<'_, T>>,
+    ) {
+        let (set, layout, points) = (network.instruction_set, &network.layout, self.points);
+        let wanted = coordinates.is_some();
+        self.output_backward(network, packed, parameters, overwrite, wanted);
+        for (k, layer) in layout.hidden().iter().enumerate().rev() {
+            let [from, to] = &mut self.cotangents;
+            let cotangent = Matrix { numbers: from.read(), stride: layout.rows[k + 1].stride };
+            let input = matrix(&self.rows[k], layout.rows[k]);
+            let (inputs, outputs) = (layer.inputs, layer.outputs);
+            let gradient = &mut parameters[layer.offset..layer.offset + layer.size()];
+            dispatch(
+                set,
+                Weights { points, input, inputs, cotangent, outputs, gradient, overwrite },
+            );
+            let units = layer.outputs;
+            if wanted && (k == 0 || layout.skip == Some(k)) {
+                let (panels, outputs, activations) = (packed.encoded(k), layout.encoded, None);
+                let (numbers, stride) = (self.encoded.all(), layout.rows[0].stride);
+                let output = MatrixMut { numbers, stride };
+                dispatch(
+                    set,
+                    Backward { points, cotangent, units, panels, activations, outputs, output },
+                );
+            }
+            if k > 0 {
+                let (panels, outputs, activations) = (packed.transposed(k), units, Some(input));
+                let output = MatrixMut { numbers: to.all(), stride: layout.rows[k].stride };
+                dispatch(
+                    set,
+                    Backward { points, cotangent, units, panels, activations, outputs, output },
+                );
+                self.cotangents.swap(0, 1);
+            }
+        }
+        if let Some(mut gradient) = coordinates {
+            let rows = matrix(&self.rows[0], layout.rows[0]);
+            let cotangents = matrix(&self.encoded, layout.rows[0]);
+            let scales = &packed.scales()[..gradient.dimension()];
+            encode_vjp(rows, cotangents, scales, network.settings.degree, &mut gradient);
+        }
+    }
+
+    /// The output layer's part, and where the others start from.
+    fn output_backward(
+        &mut self,
+        network: &Network,
+        packed: &Packed<T>,
+        parameters: &mut [T],
+        overwrite: bool,
+        wanted: bool,
+    ) {
+        let (layout, last) = (&network.layout, network.layout.hidden().len());
+        let (weights, cotangents) = (packed.output(), &self.slopes.read()[..self.points]);
+        let gradient = &mut self.output.all()[..weights.len()];
+        gradient.fill(T::zero());
+        let input = matrix(&self.rows[last], layout.last_rows());
+        let output = MatrixMut { numbers: self.cotangents[0].all(), stride: input.stride };
+        let task = OutputBackward { cotangents, input, weights, output, gradient };
+        dispatch(network.instruction_set, task);
+        let layer = layout.output();
+        let to = &mut parameters[layer.offset..layer.offset + layer.size()];
+        for (to, x) in to.iter_mut().zip(self.output.read()) {
+            *to = if overwrite { *x } else { *to + *x };
+        }
+        if wanted {
+            self.encoded.all().fill(T::zero());
+        }
+        if wanted && layout.skip == Some(last) {
+            let weights = &weights[layout.last_rows().units..][..layout.encoded];
+            let rows = self.encoded.all().chunks_mut(layout.rows[0].stride);
+            for (row, cotangent) in rows.zip(&self.slopes.read()[..self.points]) {
+                row.iter_mut().zip(weights).for_each(|(x, w)| *x = *cotangent * *w);
+            }
+        }
+    }
+}
+
+fn matrix<T: Scalar + Default>(lines: &Lines<T>, rows: Rows) -> Matrix<'_, T> {
+    Matrix { numbers: lines.read(), stride: rows.stride }
+}
+
+/// What stands behind the units of a row: the encoded point after a skip, and a one.
+fn append<T: Scalar>(encoded: Matrix<'_, T>, rows: &mut [T], format: Rows, points: usize) {
+    let from = encoded.numbers.chunks(encoded.stride);
+    for (row, from) in rows.chunks_mut(format.stride).zip(from).take(points) {
+        let appended = format.columns - format.units;
+        row[format.units..format.columns].copy_from_slice(&from[..appended]);
+        row[format.columns] = T::one();
+    }
+}

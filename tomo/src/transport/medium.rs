@@ -1,0 +1,191 @@
+//! What fills space, and the light of it that one ray gathers.
+
+use super::glimpse::Place;
+use kerrlight_geodesic::bundle::{PanelRule, RayNodes};
+
+/// Something that shines, and may absorb, all over a sphere.
+pub trait Medium: core::fmt::Debug + Send + Sync {
+    /// Radius in M of the sphere outside of which there is nothing.
+    fn sphere(&self) -> f64;
+    /// What it has to be told of its nodes besides r and cos θ.
+    fn needs(&self) -> Needs;
+    /// Linear colour.
+    fn color(&self) -> [f32; 3];
+    /// Intensity that its brightest parts may reach: what errors of faint rays are measured by.
+    fn scale(&self) -> f64;
+    /// Whether it looks different at different times.
+    fn changes(&self) -> bool;
+    /// Whether [`fill`](Self::fill) gives absorption.
+    fn absorbs(&self) -> bool;
+    /// Appends emission and absorption at the nodes of a ray with angular momentum `lambda`.
+    fn fill(&self, nodes: &RayNodes<'_>, lambda: f64, moment: Moment, out: &mut Emission);
+}
+
+/// Columns of nodes that a medium needs.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Needs {
+    /// Azimuth.
+    pub azimuth: bool,
+    /// Delay.
+    pub time: bool,
+    /// Rates of 1/r and cos θ.
+    pub velocity: bool,
+}
+
+/// When a ray is seen.
+#[derive(Debug, Clone, Copy)]
+pub struct Moment {
+    /// Time of observation, in M.
+    pub observed: f64,
+    /// Whether light takes its time.
+    pub slow_light: bool,
+}
+
+/// A medium along a ray, node by node.
+#[derive(Debug, Clone, Default)]
+pub struct Emission {
+    /// Observed intensity gained per unit of the affine parameter: g² j.
+    pub emissivity: Vec<f64>,
+    /// Optical depth gained per unit of the affine parameter, κ/g; empty without absorption.
+    pub absorption: Vec<f64>,
+    /// g; 1 where redshift is off.
+    pub redshift: Vec<f64>,
+}
+
+impl Emission {
+    /// Empty, with its memory.
+    pub fn clear(&mut self) {
+        self.emissivity.clear();
+        self.absorption.clear();
+        self.redshift.clear();
+    }
+}
+
+/// Light of a medium along a ray.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Light {
+    /// What is seen of it.
+    pub intensity: f64,
+    /// ∫ g dI.
+    pub shift: f64,
+    /// Optical depth of the whole way.
+    pub depth: f64,
+    /// Its brightest node.
+    pub place: Place,
+    /// An estimate of the error of the intensity.
+    pub error: f64,
+}
+
+/// Beyond this optical depth nothing is seen.
+const DARK: f64 = 45.0;
+
+/// A quadrature rule with what sums over its panels need.
+#[derive(Debug, Clone)]
+pub(super) struct Quadrature {
+    pub rule: PanelRule,
+    /// Factors that take gains at the nodes to the first two and the last two Legendre
+    /// coefficients of the integrand.
+    spectrum: Vec<[f64; 4]>,
+}
+
+impl Quadrature {
+    /// The rule with `order` ≥ 4 nodes.
+    pub fn new(order: usize) -> Self {
+        let rule = PanelRule::new(order);
+        let row = |x: &f64| [0, 1, order - 2, order - 1].map(|k| legendre(k, 2.0 * x - 1.0));
+        let spectrum = rule.nodes().iter().map(row).collect();
+        Quadrature { rule, spectrum }
+    }
+
+    /// An estimate of what the rule of p nodes misses of a panel with these gains. It is about the
+    /// Legendre coefficient number 2p of the integrand, and coefficients of smooth functions fall
+    /// geometrically: from the first two to the last two of p by a factor x over p − 2 numbers,
+    /// and then by x^{3/2} over as many and half as many more.
+    fn missed(&self, gains: &[f64]) -> f64 {
+        let mut sums = [0.0; 4];
+        for (gain, row) in gains.iter().zip(&self.spectrum) {
+            for (sum, factor) in sums.iter_mut().zip(row) {
+                *sum += gain * factor;
+            }
+        }
+        let first = sums[0].abs().max(sums[1].abs());
+        let rest = sums[2].abs().max(sums[3].abs());
+        let x = if first > 0.0 { (rest / first).min(1.0) } else { 1.0 };
+        rest * x * x.sqrt()
+    }
+
+    /// Optical depths at the nodes of a panel and at its end, from the gains of each node.
+    fn absorb(&self, gains: &[f64], depth: &mut f64, depths: &mut Vec<f64>) {
+        let mut rates = [0.0; MOST_NODES];
+        for ((rate, gain), weight) in rates.iter_mut().zip(gains).zip(self.rule.weights()) {
+            *rate = gain / weight;
+        }
+        for i in 0..gains.len() {
+            let terms = self.rule.cumulative(i).iter().zip(&rates);
+            let part: f64 = terms.map(|(factor, rate)| factor * rate).sum();
+            depths.push(*depth + part.max(0.0));
+        }
+        *depth += gains.iter().sum::<f64>();
+    }
+}
+
+/// (2k + 1) P_k(z).
+fn legendre(k: usize, z: f64) -> f64 {
+    let (mut last, mut value) = (0.0, 1.0);
+    for j in 0..k {
+        let j = j as f64;
+        (last, value) = (value, ((2.0 * j + 1.0) * z * value - j * last) / (j + 1.0));
+    }
+    (2 * k + 1) as f64 * value
+}
+
+/// Sums emission up, front to back: I = ∫ j e^{−D} ds, D = ∫ κ ds. `depths` receives the optical
+/// depth at every node if there is absorption.
+pub(super) fn gather(
+    quadrature: &Quadrature,
+    nodes: &RayNodes<'_>,
+    emission: &Emission,
+    depths: &mut Vec<f64>,
+) -> Light {
+    let order = quadrature.rule.order();
+    let mut light = Light::default();
+    depths.clear();
+    let (mut most, mut brightest) = (0.0, None);
+    let mut gains = [0.0; MOST_NODES];
+    let gains = &mut gains[..order];
+    let panels = nodes.weight.chunks_exact(order).zip(emission.emissivity.chunks_exact(order));
+    let panels = panels.zip(emission.redshift.chunks_exact(order));
+    for (number, ((weights, emissivity), redshift)) in panels.enumerate() {
+        let start = number * order;
+        for ((gain, weight), j) in gains.iter_mut().zip(weights).zip(emissivity) {
+            *gain = weight * j;
+        }
+        if !emission.absorption.is_empty() {
+            let absorption = &emission.absorption[start..start + order];
+            let mut thick = [0.0; MOST_NODES];
+            for ((thick, weight), k) in thick.iter_mut().zip(weights).zip(absorption) {
+                *thick = weight * k;
+            }
+            quadrature.absorb(&thick[..order], &mut light.depth, depths);
+            for (gain, depth) in gains.iter_mut().zip(&depths[start..]) {
+                *gain *= (-depth).exp();
+            }
+        }
+        for (i, (gain, g)) in gains.iter().zip(redshift).enumerate() {
+            light.intensity += gain;
+            light.shift += g * gain;
+            if *gain > most * weights[i] {
+                (most, brightest) = (gain / weights[i], Some(start + i));
+            }
+        }
+        light.error += quadrature.missed(gains);
+        if light.depth > DARK {
+            break;
+        }
+    }
+    light.place = brightest.map_or_else(Place::default, |k| Place::of_node(nodes, k));
+    light
+}
+
+/// The most nodes of a panel.
+const MOST_NODES: usize = 16;

@@ -1,0 +1,240 @@
+//! Triangle meshes: where a curved ray meets them, and their light.
+
+use super::chord::ChordBound;
+use super::glimpse::{Gather, Place};
+use super::tree::{Node, Tree, Walk, WalkScratch};
+use super::{Scratch, Stage};
+use crate::emission::mesh::{MeshModel, Triangle};
+use crate::emission::spot::distance;
+use kerrlight_geodesic::{Kerr, Path, Ray};
+use std::ops::ControlFlow;
+
+/// All meshes of a scene in one hierarchy.
+#[derive(Debug)]
+pub(super) struct MeshTree {
+    meshes: Vec<MeshModel>,
+    tree: Tree,
+    /// Mesh and triangle of each leaf.
+    leaves: Vec<[u32; 2]>,
+}
+
+/// Where a ray meets a triangle.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Hit {
+    /// Mino time.
+    pub mino_time: f64,
+    leaf: u32,
+}
+
+impl MeshTree {
+    /// The hierarchy of the meshes' triangles.
+    pub fn new(meshes: Vec<MeshModel>, hole: &Kerr) -> Self {
+        let leaves: Vec<[u32; 2]> = (0u32..)
+            .zip(&meshes)
+            .flat_map(|(m, mesh)| (0..mesh.triangles.len() as u32).map(move |t| [m, t]))
+            .collect();
+        let triangles = || meshes.iter().flat_map(|mesh| &mesh.triangles);
+        let boxes: Vec<_> = triangles().map(Triangle::bounds).collect();
+        let nearest = |[low, high]: &[[f64; 3]; 2]| {
+            distance(core::array::from_fn(|k| 0f64.clamp(low[k], high[k])), [0.0; 3])
+        };
+        let low = boxes.iter().map(nearest).fold(f64::INFINITY, f64::min).max(hole.horizon());
+        let corners = triangles().flat_map(|triangle| triangle.corners);
+        let high = corners.map(|x| distance(x, [0.0; 3])).fold(0.0, f64::max);
+        // A little more, so that a corner is never left out by rounding.
+        MeshTree {
+            tree: Tree::new(&boxes, [low * (1.0 - 1e-9), high * (1.0 + 1e-9)]),
+            meshes,
+            leaves,
+        }
+    }
+
+    /// Whether a ray can meet any triangle at all.
+    pub fn can_be_met(&self, ray: &Ray) -> bool {
+        self.tree.can_be_met(ray)
+    }
+
+    fn at(&self, leaf: u32) -> (&MeshModel, &Triangle) {
+        let [mesh, triangle] = self.leaves[leaf as usize];
+        let mesh = &self.meshes[mesh as usize];
+        (mesh, &mesh.triangles[triangle as usize])
+    }
+
+    /// Fills `hits` with where the path meets triangles, in order, up to the first that hides
+    /// the rest, and returns the Mino time of that.
+    pub fn meet(
+        &self,
+        path: &Path,
+        bound: &ChordBound,
+        scratch: &mut WalkScratch,
+        hits: &mut Vec<Hit>,
+    ) -> Option<f64> {
+        hits.clear();
+        let walk = Walk { tree: &self.tree, path, bound, longest: 8.0 };
+        let mut end = None;
+        walk.go(f64::INFINITY, scratch, &|_, _, _| true, &mut |ends, leaves| {
+            let first = hits.len();
+            for leaf in leaves {
+                let cut = Cut { path, bound, triangle: self.at(*leaf).1, leaf: *leaf };
+                cut.piece(ends, 0, hits);
+            }
+            hits[first..].sort_by(|a, b| a.mino_time.total_cmp(&b.mino_time));
+            let hides = |hit: &Hit| self.at(hit.leaf).0.opaque;
+            let Some(last) = hits[first..].iter().position(hides) else {
+                return ControlFlow::Continue(());
+            };
+            hits.truncate(first + last + 1);
+            end = hits.last().map(|hit| hit.mino_time);
+            ControlFlow::Break(())
+        });
+        end
+    }
+
+    /// The same without the hierarchy: pieces that turn by little are held against every triangle.
+    pub fn meet_every(&self, path: &Path, bound: &ChordBound, hits: &mut Vec<Hit>) -> Option<f64> {
+        hits.clear();
+        let [low, high] = self.tree.shell();
+        let mut intervals = Vec::new();
+        path.intervals_within(low, high, &mut intervals);
+        for [from, to] in intervals {
+            let pieces = ((to - from) * path.angular_rate() / 0.1).ceil().max(1.0);
+            let at = |k: f64| Node::at(path, from + (to - from) * k / pieces);
+            for k in 0..pieces as u32 {
+                let ends = [at(f64::from(k)), at(f64::from(k + 1))];
+                for leaf in 0..self.leaves.len() as u32 {
+                    let cut = Cut { path, bound, triangle: self.at(leaf).1, leaf };
+                    cut.piece([&ends[0], &ends[1]], 0, hits);
+                }
+            }
+        }
+        hits.sort_by(|a, b| a.mino_time.total_cmp(&b.mino_time));
+        let last = hits.iter().position(|hit| self.at(hit.leaf).0.opaque)?;
+        hits.truncate(last + 1);
+        hits.last().map(|hit| hit.mino_time)
+    }
+}
+
+/// A curved piece of path against one triangle.
+struct Cut<'a> {
+    path: &'a Path,
+    bound: &'a ChordBound,
+    triangle: &'a Triangle,
+    leaf: u32,
+}
+
+/// A piece is halved at most this often (next to the horizon, where it never gets straight).
+const DEEPEST: u32 = 40;
+
+/// Pieces that are this close to straight, in units of their radius, are not halved any further: a
+/// ray that stays closer to a plane than that, with both ends on one side, does not meet it.
+const GRAZING: f64 = 1e-7;
+
+/// Largest distance of an intersection from its triangle's plane, in units of its radius.
+const ON_PLANE: f64 = 1e-11;
+
+impl Cut<'_> {
+    /// Adds the intersections with a piece: its height above the plane is within the sagitta of
+    /// linear, so that it has no root where both ends are farther than that on one side, and just
+    /// one where it changes sign and by more than four times that (the slope of the height
+    /// is within 4 sagittas per piece of the chord's).
+    fn piece(&self, [start, end]: [&Node; 2], depth: u32, hits: &mut Vec<Hit>) {
+        let sagitta = self.bound.sagitta([&start.point, &end.point]);
+        let (from, to) = (self.triangle.height(start.position), self.triangle.height(end.position));
+        let changes = (from >= 0.0) != (to >= 0.0);
+        if !changes && from.abs().min(to.abs()) > sagitta {
+            return;
+        }
+        let once = (to - from).abs() > 4.0 * sagitta;
+        let straight = sagitta <= GRAZING * self.bound.reach([&start.point, &end.point]);
+        if changes && (once || straight || depth >= DEEPEST) {
+            return self.root([start, end], [from, to], sagitta, hits);
+        }
+        if straight || depth >= DEEPEST {
+            return;
+        }
+        let middle = Node::at(self.path, 0.5 * (start.point.mino_time + end.point.mino_time));
+        self.piece([start, &middle], depth + 1, hits);
+        self.piece([&middle, end], depth + 1, hits);
+    }
+
+    /// The one root on a piece, if it lies inside the triangle.
+    fn root(
+        &self,
+        [start, end]: [&Node; 2],
+        [from, to]: [f64; 2],
+        sagitta: f64,
+        hits: &mut Vec<Hit>,
+    ) {
+        // Where the chord meets the plane the ray is not farther than this.
+        let steep = distance(start.position, end.position) / (to - from).abs();
+        let part = from / (from - to);
+        let guess: [f64; 3] = core::array::from_fn(|k| {
+            start.position[k] + part * (end.position[k] - start.position[k])
+        });
+        if !self.triangle.holds(guess, sagitta * (1.0 + steep)) {
+            return;
+        }
+        let node = self.refine([start.point.mino_time, end.point.mino_time], [from, to]);
+        if self.triangle.holds(node.position, 0.0) {
+            hits.push(Hit { mino_time: node.point.mino_time, leaf: self.leaf });
+        }
+    }
+
+    /// False position with the Illinois rule, on the ray itself.
+    fn refine(&self, [mut a, mut b]: [f64; 2], [mut from, mut to]: [f64; 2]) -> Node {
+        let mut node = Node::at(self.path, a);
+        for _ in 0..100 {
+            let time = if to == from { 0.5 * (a + b) } else { (a * to - b * from) / (to - from) };
+            let inside = time > a.min(b) && time < a.max(b);
+            node = Node::at(self.path, if inside { time } else { 0.5 * (a + b) });
+            let height = self.triangle.height(node.position);
+            let near = height.abs() <= ON_PLANE / node.point.inverse_radius;
+            if near || (b - a).abs() <= f64::EPSILON * b.abs() {
+                break;
+            }
+            if (height >= 0.0) == (to >= 0.0) {
+                from *= 0.5;
+            } else {
+                (a, from) = (b, to);
+            }
+            (b, to) = (node.point.mino_time, height);
+        }
+        node
+    }
+}
+
+impl Stage {
+    /// Fills `scratch.mesh_hits` and returns the Mino time of the first that hides the rest.
+    pub(super) fn meet_meshes(&self, ray: &Ray, scratch: &mut Scratch) -> Option<f64> {
+        scratch.mesh_hits.clear();
+        let meshes = self.meshes.as_ref()?;
+        let Scratch { path, walk, mesh_hits: hits, .. } = scratch;
+        let bound = ChordBound::new(&self.hole, ray, path, self.tracer.tolerance());
+        if self.one_by_one {
+            return meshes.meet_every(path, &bound, hits);
+        }
+        if meshes.can_be_met(ray) { meshes.meet(path, &bound, walk, hits) } else { None }
+    }
+
+    /// Light of the hits up to Mino time `end`: I = g^{3+α} I_em.
+    pub(super) fn add_meshes(&self, scratch: &Scratch, end: f64, gather: &mut Gather) {
+        let Some(meshes) = &self.meshes else { return };
+        for hit in scratch.mesh_hits.iter().take_while(|hit| hit.mino_time <= end) {
+            let (mesh, triangle) = meshes.at(hit.leaf);
+            if !mesh.shines() {
+                continue;
+            }
+            let point = scratch.path.at(hit.mino_time);
+            let (emitted, color) = mesh.light(triangle, point.cartesian());
+            let g = match self.redshift {
+                Some(_) => mesh.redshift(&self.hole, &point),
+                None => Some(1.0),
+            };
+            // Where matter cannot move like this there is none that shines.
+            let Some(g) = g else { continue };
+            let intensity = emitted * self.redshift.map_or(1.0, |index| g.powf(3.0 + index));
+            gather.add(intensity, g, color);
+            gather.mark(intensity, Place::of_point(&point));
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! Rays of one observer, however they are traced, as the sources want them.
+
+use super::spots::SpotTree;
+use super::surface::Hit;
+use super::{Scratch, Stage};
+use crate::transport::glimpse::Place;
+use kerrlight_geodesic::analytic::ClosedForm;
+use kerrlight_geodesic::{Observer, OutOfRange, Outcome, Ray, Want};
+use std::sync::Arc;
+
+/// A ray without its points.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Sight {
+    pub lambda: f64,
+    pub end: End,
+    /// Equatorial crossings of the whole ray.
+    pub crossings: u32,
+    /// Its crossings in [`Scratch::hits`]: as many as the sources need.
+    pub hits: core::ops::Range<usize>,
+    /// Mino time of the whole ray.
+    pub total: f64,
+    /// Mino time at which light stops to be taken.
+    pub until: f64,
+    /// Mino time of the first opaque surface.
+    pub surface: Option<f64>,
+    /// Direction in which it leaves, if it does and there is a sky.
+    pub exit: Option<[f64; 3]>,
+    /// Whether it is left to be traced by steps.
+    pub by_steps: bool,
+}
+
+impl Sight {
+    /// Mino time of the last light.
+    pub fn last_time(&self) -> f64 {
+        self.surface.unwrap_or(f64::INFINITY).min(self.until)
+    }
+}
+
+/// What becomes of a ray that meets no surface.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) enum End {
+    Captured,
+    Escaped,
+    #[default]
+    Unresolved,
+}
+
+/// Crossings that the SIMD kernel is asked for; rays with more go step by step.
+const MOST_HITS: usize = 4;
+
+impl Stage {
+    /// Traces a block of rays in closed form.
+    pub(super) fn trace_block(
+        &self,
+        observer: &Observer,
+        (alpha, beta): (&[f64], &[f64]),
+        trees: &[Option<Arc<SpotTree>>],
+        scratch: &mut Scratch,
+    ) -> Result<(), OutOfRange> {
+        let wanted = if self.disc.is_some() { MOST_HITS } else { 1 };
+        let crossings = &mut scratch.crossings;
+        crossings.trace(&self.hole, observer, alpha, beta, wanted)?;
+        for k in 0..alpha.len() {
+            let ends = scratch.crossings.ends(k);
+            let ray = observer.ray(&self.hole, alpha[k], beta[k])?;
+            let first = scratch.hits.len();
+            if self.disc.is_some() {
+                scratch.hits.extend(scratch.crossings.ray(k).map(|crossing| Hit {
+                    mino_time: crossing.mino_time,
+                    place: Place {
+                        radius: crossing.radius,
+                        azimuth: crossing.azimuth,
+                        delay: crossing.delay,
+                    },
+                    depth: 0.0,
+                }));
+            }
+            let found = scratch.hits.len() - first;
+            let until = self.until(&ray);
+            let surface = self.surface(&scratch.hits[first..], until);
+            let missing = self.disc.is_some()
+                && surface.is_none()
+                && found < (ends.crossings as usize).min(self.most_hits());
+            scratch.sights.push(Sight {
+                lambda: ray.lambda,
+                end: if ends.escapes { End::Escaped } else { End::Captured },
+                crossings: ends.crossings,
+                total: ends.mino_total,
+                hits: first..first + found,
+                until,
+                surface,
+                exit: None,
+                by_steps: missing
+                    || doubtful(ends.error, self.tolerance)
+                    || self.needs_path(&ray, trees),
+            });
+        }
+        if self.sky.is_some() { self.find_exits(observer, alpha, beta, scratch) } else { Ok(()) }
+    }
+
+    /// Where rays that escape go.
+    fn find_exits(
+        &self,
+        observer: &Observer,
+        alpha: &[f64],
+        beta: &[f64],
+        scratch: &mut Scratch,
+    ) -> Result<(), OutOfRange> {
+        let leaves =
+            |sight: &Sight| sight.end == End::Escaped && sight.surface.is_none() && !sight.by_steps;
+        let sights = &mut scratch.sights;
+        let outward: Vec<usize> = (0..sights.len()).filter(|k| leaves(&sights[*k])).collect();
+        if outward.is_empty() {
+            return Ok(());
+        }
+        let pick = |column: &[f64]| outward.iter().map(|k| column[*k]).collect::<Vec<_>>();
+        let (alpha, beta) = (pick(alpha), pick(beta));
+        scratch.samples.trace(&self.hole, observer, &alpha, &beta, 2)?;
+        for (j, k) in outward.iter().enumerate() {
+            let ray = scratch.samples.ray(j);
+            let (sin, u) = ray.theta[1].sin_cos();
+            let (y, x) = ray.azimuth[1].sin_cos();
+            sights[*k].exit = Some([sin * x, sin * y, u]);
+        }
+        Ok(())
+    }
+
+    /// Whether some source may want the path of a ray.
+    fn needs_path(&self, ray: &Ray, trees: &[Option<Arc<SpotTree>>]) -> bool {
+        let meets = |tree: &Option<Arc<SpotTree>>| match tree {
+            Some(tree) => tree.can_be_met(ray),
+            None => !self.spots.is_empty(),
+        };
+        self.meshes.as_ref().is_some_and(|meshes| self.one_by_one || meshes.can_be_met(ray))
+            || trees.iter().any(meets)
+    }
+
+    /// Traces one ray step by step into the path of `scratch`; its sight.
+    pub(super) fn trace_steps(&self, ray: &Ray, scratch: &mut Scratch) -> Sight {
+        self.tracer.trace(&self.hole, ray, Want::ALL, &mut scratch.path);
+        let (first, path, hits) = (scratch.hits.len(), &scratch.path, &mut scratch.hits);
+        if self.disc.is_some() {
+            hits.extend(path.equatorial_crossings().map(|mino_time| {
+                let place = Place::of_point(&path.at(mino_time));
+                Hit { mino_time, place, depth: 0.0 }
+            }));
+        }
+        let end = match path.outcome() {
+            Outcome::Captured => End::Captured,
+            Outcome::Escaped => End::Escaped,
+            Outcome::Unresolved(_) => End::Unresolved,
+        };
+        let exit = self.sky.as_ref().map(|_| path.at(path.mino_total()).direction);
+        let (crossings, total) = (path.equatorial_crossings().len() as u32, path.mino_total());
+        let hits = first..hits.len();
+        let until = self.until(ray);
+        let hidden = self.meet_meshes(ray, scratch).filter(|time| *time <= until);
+        let disc = self.surface(&scratch.hits[hits.clone()], until);
+        let surface = match (disc, hidden) {
+            (Some(disc), Some(mesh)) => Some(disc.min(mesh)),
+            (one, other) => one.or(other),
+        };
+        Sight {
+            lambda: ray.lambda,
+            end,
+            crossings,
+            total,
+            surface,
+            hits,
+            until,
+            exit: exit.filter(|_| end == End::Escaped),
+            by_steps: true,
+        }
+    }
+
+    /// How many crossings may be seen.
+    fn most_hits(&self) -> usize {
+        self.half_orbits.map_or(usize::MAX, |n| n as usize + 1)
+    }
+
+    /// The Mino time half-way between the last crossing that counts and the next.
+    fn until(&self, ray: &Ray) -> f64 {
+        let Some(n) = self.half_orbits else { return f64::INFINITY };
+        let form = ClosedForm::new(&self.hole, ray);
+        let mut times = form.crossings().skip(n as usize).map(|crossing| crossing.mino_time);
+        match (times.next(), times.next()) {
+            (Some(last), Some(next)) => 0.5 * (last + next),
+            _ => f64::INFINITY,
+        }
+    }
+}
+
+/// Whether a ray of the closed form has lost digits that the tolerance asks for.
+fn doubtful(error: f64, tolerance: f64) -> bool {
+    error.is_nan() || error > tolerance.max(1e-11)
+}

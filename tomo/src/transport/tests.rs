@@ -1,0 +1,117 @@
+use super::*;
+use crate::scene::Spot;
+
+mod meshes;
+
+const SCENE: &str = r#"
+[hole]
+spin = 0.9
+mass_msun = 4.154e6
+distance_kpc = 8.178
+[observer]
+inclination_deg = 70
+time = 30.0
+[screen]
+field_of_view_m = 24.0
+width = 16
+height = 16
+[effects]
+redshift = true
+spectral_index = 0.0
+[tracer]
+integrator = "taylor-mino"
+tolerance = 1e-7
+"#;
+
+pub(super) fn scene(set: &[&str]) -> Scene {
+    let text = set.iter().fold(SCENE.to_owned(), |text, assignment| {
+        crate::scene::apply_override(&text, assignment).unwrap()
+    });
+    Scene::parse(&text).unwrap()
+}
+
+/// Spots of many sizes on many orbits, spread evenly by the fractional parts of multiples of
+/// irrational numbers.
+fn spots(count: u32, sheared_since: Option<f64>) -> Vec<Spot> {
+    let part = |k: u32, number: f64| (f64::from(k) * number + 0.3).fract();
+    (0..count)
+        .map(|k| Spot {
+            radius: 4.5 + 6.0 * part(k, 2f64.sqrt()),
+            phase_deg: 360.0 * part(k, 3f64.sqrt()),
+            axis: match k % 3 {
+                0 => [0.0, 0.0, 1.0],
+                1 => [part(k, 5f64.sqrt()) - 0.5, part(k, 7f64.sqrt()) - 0.5, 0.4],
+                _ => [0.1, 0.3, -1.0],
+            },
+            sigma: 0.02 + 0.5 * part(k, 11f64.sqrt()).powi(3),
+            peak_emissivity: 1.0 + part(k, 13f64.sqrt()),
+            sheared_since: sheared_since.filter(|_| k % 2 == 0),
+            color: [1.0, 0.5, 0.1],
+        })
+        .collect()
+}
+
+fn screen(side: u32, width: f64) -> (Vec<f64>, Vec<f64>) {
+    let along = |k: u32| width * ((f64::from(k) + 0.5) / f64::from(side) - 0.5);
+    (0..side * side).map(|k| (along(k % side), along(k / side))).unzip()
+}
+
+fn look(stage: &Stage, times: &[f64]) -> Vec<Glimpse> {
+    let (alpha, beta) = screen(24, 24.0);
+    let mut seen = vec![Glimpse::default(); alpha.len() * times.len()];
+    stage.look_many(&alpha, &beta, times, &mut Scratch::default(), &mut seen).unwrap();
+    seen
+}
+
+/// The tree leaves out only what is dark: to the last bit the same light, from the same places,
+/// as when every spot is asked along every ray.
+#[test]
+fn exact_tree_against_every_spot() {
+    let mut lit = 0;
+    for (count, since) in [(1, None), (30, None), (30, Some(-200.0)), (300, Some(0.0))] {
+        for spin in ["0.0", "0.9", "-0.9"] {
+            for slow in ["true", "false"] {
+                let mut scene =
+                    scene(&[&format!("hole.spin={spin}"), &format!("effects.slow_light={slow}")]);
+                scene.spot = spots(count, since);
+                let stage = Stage::new(&scene, None).unwrap();
+                let times = [30.0, 47.0];
+                let (found, expected) =
+                    (look(&stage, &times), look(&stage.clone().one_by_one(), &times));
+                lit += found.iter().filter(|seen| seen.intensity > 0.0).count();
+                let differ = found.iter().zip(&expected).filter(|(a, b)| a != b).count();
+                assert_eq!(differ, 0, "{count} spots, {since:?}, a = {spin}, slow light {slow}");
+            }
+        }
+    }
+    assert!(lit > 2_000, "{lit}");
+}
+
+/// Rays that turn outside of all spots are known without a path; none that sees light is.
+#[test]
+fn exact_rays_that_cannot_meet_a_spot() {
+    let mut scene = scene(&[]);
+    scene.spot = spots(40, None);
+    let stage = Stage::new(&scene, None).unwrap();
+    let tree = stage.spot_tree(30.0).unwrap();
+    let (alpha, beta) = screen(24, 40.0);
+    let (mut out, mut lit) = (0, 0);
+    for (alpha, beta) in alpha.iter().zip(&beta) {
+        let ray = stage.view.ray(&stage.hole, *alpha, *beta).unwrap();
+        let seen = stage.look(*alpha, *beta, &mut Scratch::default()).unwrap();
+        lit += u32::from(seen.intensity > 0.0);
+        if !tree.can_be_met(&ray) {
+            out += 1;
+            assert_eq!(
+                stage
+                    .clone()
+                    .one_by_one()
+                    .look(*alpha, *beta, &mut Scratch::default())
+                    .unwrap()
+                    .intensity,
+                0.0
+            );
+        }
+    }
+    assert!(out > 150 && lit > 20, "{out} {lit}");
+}

@@ -1,0 +1,321 @@
+//! Light of what fills space, with as many nodes as it takes.
+
+use super::medium::{Emission, Light, Medium, Moment, Quadrature, gather};
+use super::rays::{End, Sight};
+use super::surface::Hit;
+use super::{Scratch, Stage};
+use kerrlight_geodesic::bundle::{NodeRequest, PanelRule, RayNodes};
+use kerrlight_geodesic::{Observer, OutOfRange, Path};
+
+/// Nodes of a panel.
+const ORDER: usize = 8;
+
+/// Panels are cut into at most so many times as many.
+const FINEST: u32 = 256;
+
+/// Errors of rays fainter than this share of what the medium can reach are measured by that.
+const FAINT: f64 = 1e-4;
+
+/// What a volume needs from ray to ray.
+#[derive(Debug)]
+pub(super) struct Workspace {
+    quadrature: Quadrature,
+    emission: Emission,
+    depths: Vec<f64>,
+    columns: Columns,
+    /// Light of each ray at each time, as in the result.
+    pub lights: Vec<Light>,
+    pub profile: DepthProfile,
+}
+
+impl Default for Workspace {
+    fn default() -> Self {
+        Workspace {
+            quadrature: Quadrature::new(ORDER),
+            emission: Emission::default(),
+            depths: Vec::new(),
+            columns: Columns::default(),
+            lights: Vec::new(),
+            profile: DepthProfile::default(),
+        }
+    }
+}
+
+/// Optical depth along a ray.
+#[derive(Debug, Default)]
+pub(super) struct DepthProfile {
+    times: Vec<f64>,
+    depths: Vec<f64>,
+    rates: Vec<f64>,
+}
+
+impl DepthProfile {
+    /// Forgets its ray: no absorption.
+    pub fn clear(&mut self) {
+        self.times.clear();
+    }
+
+    fn set(&mut self, spin: f64, nodes: &RayNodes<'_>, emission: &Emission, depths: &[f64]) {
+        let count = depths.len();
+        self.times.clear();
+        self.times.extend_from_slice(&nodes.mino_time[..count]);
+        self.depths.clear();
+        self.depths.extend_from_slice(depths);
+        self.rates.clear();
+        let places = nodes.radius.iter().zip(nodes.cos_theta).zip(&emission.absorption);
+        let rate = |((r, u), k): ((&f64, &f64), &f64)| k * (r * r + (spin * u).powi(2));
+        self.rates.extend(places.take(count).map(rate));
+    }
+
+    /// The depth in front of the point at a Mino time: cubic between nodes.
+    pub fn at(&self, time: f64) -> f64 {
+        let k = self.times.partition_point(|t| *t < time);
+        let (Some(last), true) = (self.times.len().checked_sub(1), k > 0) else { return 0.0 };
+        if k > last {
+            return self.depths[last];
+        }
+        let h = self.times[k] - self.times[k - 1];
+        let s = (time - self.times[k - 1]) / h;
+        let (d0, d1) = (self.depths[k - 1], self.depths[k]);
+        let (m0, m1) = (self.rates[k - 1] * h, self.rates[k] * h);
+        let (t2, t3) = (s * s, s * s * s);
+        d0 * (2.0 * t3 - 3.0 * t2 + 1.0)
+            + m0 * (t3 - 2.0 * t2 + s)
+            + d1 * (3.0 * t2 - 2.0 * t3)
+            + m1 * (t3 - t2)
+    }
+}
+
+/// What is summed up along a ray.
+struct Along<'a> {
+    medium: &'a dyn Medium,
+    lambda: f64,
+    times: &'a [f64],
+}
+
+impl Stage {
+    /// Light of the medium along all rays of a block that were traced in closed form.
+    pub(super) fn fill_block(
+        &self,
+        medium: &dyn Medium,
+        observer: &Observer,
+        (alpha, beta): (&[f64], &[f64]),
+        times: &[f64],
+        scratch: &mut Scratch,
+    ) -> Result<(), OutOfRange> {
+        let Scratch { sights, hits, nodes, volume, .. } = scratch;
+        let mut pending: Vec<usize> = (0..sights.len()).filter(|k| !sights[*k].by_steps).collect();
+        let mut split = 1;
+        while !pending.is_empty() {
+            let pick = |column: &[f64]| pending.iter().map(|k| column[*k]).collect::<Vec<_>>();
+            let until: Vec<f64> = pending.iter().map(|k| sights[*k].last_time()).collect();
+            let request = self.request(medium, &volume.quadrature.rule, split);
+            let (alpha, beta) = (pick(alpha), pick(beta));
+            nodes.trace(&self.hole, observer, &alpha, &beta, Some(&until), &request)?;
+            let last = split >= FINEST;
+            let mut number = 0;
+            pending.retain(|k| {
+                let along = Along { medium, lambda: sights[*k].lambda, times };
+                let done = self.radiate(&along, &nodes.ray(number), *k, volume);
+                number += 1;
+                volume.shade(&mut hits[sights[*k].hits.clone()]);
+                !done && !last
+            });
+            split *= 2;
+        }
+        Ok(())
+    }
+
+    /// Light of the medium along ray number `k`, which was traced step by step.
+    pub(super) fn fill_path(
+        &self,
+        medium: &dyn Medium,
+        k: usize,
+        times: &[f64],
+        scratch: &mut Scratch,
+    ) {
+        let sight = scratch.sights[k].clone();
+        self.fill_ray(medium, k, times, scratch, |split, path, rule, columns| {
+            self.place(path, &sight, medium, split, rule, columns);
+        });
+    }
+
+    /// Light of the medium along ray number `k`, whose nodes are put into columns by `place`.
+    pub(super) fn fill_ray(
+        &self,
+        medium: &dyn Medium,
+        k: usize,
+        times: &[f64],
+        scratch: &mut Scratch,
+        place: impl Fn(u32, &Path, &PanelRule, &mut Columns),
+    ) {
+        let Scratch { path, sights, hits, volume, .. } = scratch;
+        let along = Along { medium, lambda: sights[k].lambda, times };
+        let mut split = 1;
+        loop {
+            let mut columns = core::mem::take(&mut volume.columns);
+            columns.iter_mut().for_each(Vec::clear);
+            place(split, path, &volume.quadrature.rule, &mut columns);
+            let [radius, cos_theta, weight, mino_time, azimuth, delay, w_rate, u_rate] = &columns;
+            let nodes = RayNodes {
+                radius,
+                cos_theta,
+                weight,
+                mino_time,
+                azimuth,
+                delay,
+                radial_velocity: w_rate,
+                polar_velocity: u_rate,
+                error: 0.0,
+            };
+            let done = self.radiate(&along, &nodes, k, volume);
+            volume.columns = columns;
+            if done || split >= FINEST {
+                break;
+            }
+            split *= 2;
+        }
+        volume.shade(&mut hits[sights[k].hits.clone()]);
+    }
+
+    fn request(&self, medium: &dyn Medium, rule: &PanelRule, split: u32) -> NodeRequest {
+        let needs = medium.needs();
+        NodeRequest {
+            radius: medium.sphere(),
+            rule: rule.clone(),
+            split,
+            azimuth: needs.azimuth || self.places.azimuth,
+            time: needs.time || self.places.time,
+            velocity: needs.velocity,
+        }
+    }
+
+    /// Light along the nodes of ray number `k` at all times; whether they are enough.
+    fn radiate(
+        &self,
+        along: &Along<'_>,
+        nodes: &RayNodes<'_>,
+        k: usize,
+        volume: &mut Workspace,
+    ) -> bool {
+        let Workspace { quadrature, emission, depths, lights, profile, .. } = volume;
+        let count = along.times.len();
+        let lights = &mut lights[k * count..(k + 1) * count];
+        let mut done = true;
+        let steady = !along.medium.changes();
+        for (j, observed) in along.times.iter().enumerate() {
+            if steady && j > 0 {
+                lights[j] = lights[0];
+                continue;
+            }
+            emission.clear();
+            let moment = Moment { observed: *observed, slow_light: self.slow_light };
+            along.medium.fill(nodes, along.lambda, moment, emission);
+            let light = gather(quadrature, nodes, emission, depths);
+            let enough = self.tolerance * (light.intensity + FAINT * along.medium.scale());
+            done &= light.error <= enough;
+            lights[j] = light;
+        }
+        profile.clear();
+        if along.medium.absorbs() {
+            profile.set(self.hole.spin(), nodes, emission, depths);
+        }
+        done
+    }
+
+    /// The nodes of a path: panels between the medium's sphere, the turning point and the end.
+    fn place(
+        &self,
+        path: &Path,
+        sight: &Sight,
+        medium: &dyn Medium,
+        split: u32,
+        rule: &PanelRule,
+        columns: &mut Columns,
+    ) {
+        let mut intervals = Vec::new();
+        path.intervals_within(0.5 * self.hole.horizon(), medium.sphere(), &mut intervals);
+        let turning = path.turning_point().map_or(f64::INFINITY, |(time, _)| time);
+        let captured = sight.end == End::Captured;
+        for [start, end] in intervals {
+            let falls = captured && end >= path.mino_total() && sight.last_time() >= end;
+            let end = end.min(sight.last_time());
+            let middle = turning.clamp(start, end.max(start));
+            for [from, to] in [[start, middle], [middle, end]] {
+                if to > from {
+                    let piece = Piece::new([from, to], path.angular_rate(), split, falls);
+                    piece.nodes(rule, |time, step| self.node_of(path, time, step), columns);
+                }
+            }
+        }
+    }
+
+    fn node_of(&self, path: &Path, time: f64, step: f64) -> [f64; 8] {
+        let point = path.at(time);
+        let (r, u) = (point.radius(), point.cos_theta());
+        let weight = self.hole.sigma(r, u) * step;
+        let [w_rate, u_rate] = [point.inverse_radius_rate, point.velocity[2]];
+        [r, u, weight, time, point.azimuth, point.delay, w_rate, u_rate]
+    }
+}
+
+/// Columns of nodes, as in [`RayNodes`].
+pub(super) type Columns = [Vec<f64>; 8];
+
+/// A stretch of a ray between the places where its integrand is not smooth.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Piece {
+    from: f64,
+    to: f64,
+    panels: usize,
+    /// Whether it ends at the horizon.
+    falls: bool,
+}
+
+/// Longest panel of a path, as an angle.
+const LONGEST: f64 = 0.4;
+
+impl Piece {
+    /// A piece of a ray that turns at so many radians per unit of its parameter.
+    pub fn new([from, to]: [f64; 2], rate: f64, split: u32, falls: bool) -> Self {
+        let panels = ((to - from) * rate / LONGEST).ceil().clamp(1.0, 1e4);
+        Piece { from, to, panels: (f64::from(split) * panels) as usize, falls }
+    }
+
+    /// Puts the nodes of all panels into columns: `node` makes a row of a parameter and a step.
+    pub fn nodes(
+        &self,
+        rule: &PanelRule,
+        node: impl Fn(f64, f64) -> [f64; 8],
+        columns: &mut Columns,
+    ) {
+        let length = (self.to - self.from) / self.panels as f64;
+        for k in 0..self.panels {
+            let start = self.from + length * k as f64;
+            let falls = self.falls && k + 1 == self.panels;
+            for (s, weight) in rule.nodes().iter().zip(rule.weights()) {
+                // The pace of `PanelRule` before the horizon.
+                let (place, pace) =
+                    if falls { (s * (2.0 - s), 2.0 * (1.0 - s)) } else { (*s, 1.0) };
+                let row = node(start + length * place, length * weight * pace);
+                columns.iter_mut().zip(row).for_each(|(column, x)| column.push(x));
+            }
+        }
+    }
+}
+
+impl Workspace {
+    /// Room for the light of so many rays at so many times.
+    pub fn reset(&mut self, count: usize) {
+        self.lights.clear();
+        self.lights.resize(count, Light::default());
+        self.profile.clear();
+    }
+
+    /// The depths of the present ray's profile in front of surfaces.
+    fn shade(&self, hits: &mut [Hit]) {
+        for hit in hits {
+            hit.depth = self.profile.at(hit.mino_time);
+        }
+    }
+}
