@@ -248,8 +248,9 @@ fn photometry(text: &str, overrides: &[&str], frames: u32, most: f64) -> (Vec<f6
     for k in 0..frames {
         scene.observer.time = f64::from(k);
         let frame = film.frames(&[scene.observer.time], &|_| true).unwrap().remove(0);
-        let (width, height) = (frame.picture.width as f64, frame.picture.height as f64);
-        let light = frame.picture.channel("G").unwrap();
+        let picture = film.rendered(frame, 1.0).unwrap().picture;
+        let (width, height) = (picture.width as f64, picture.height as f64);
+        let light = picture.channel("G").unwrap();
         let all = images(&scene, &stars);
         let mut now = Vec::new();
         for (i, image) in all.iter().enumerate() {
@@ -265,7 +266,7 @@ fn photometry(text: &str, overrides: &[&str], frames: u32, most: f64) -> (Vec<f6
             let mut sum = 0.0;
             for row in (y.round() as usize - 3)..=(y.round() as usize + 3) {
                 for column in (x.round() as usize - 3)..=(x.round() as usize + 3) {
-                    sum += f64::from(light[row * frame.picture.width + column]) * size * size;
+                    sum += f64::from(light[row * picture.width + column]) * size * size;
                 }
             }
             let ratio = sum / image.flux;
