@@ -84,24 +84,84 @@ fn frame(folder: &Path, k: usize) -> Vec<u8> {
     std::fs::read(folder.join(format!("film/frame_{k:04}.exr"))).unwrap()
 }
 
-/// Rendered one by one from what the frames' files say, they are the same, bit for bit.
-#[test]
-fn exact_frames_are_renderings() {
+const GAS: &str = r#"
+[gas]
+profile = "gaussian"
+scale_radius = 6.0
+flatness = 0.0
+motion = { angular-momentum = { l0 = 1.0 } }
+emissivity = 3e-18
+outer_radius = 20.0
+"#;
+
+/// Rendered one by one from what the frames' files say, they are the same, bit for bit, and so is
+/// what is said about them, but for what only frames have.
+fn frames_are_renderings(text: &str, overrides: &[&str]) {
     let folder = folder();
-    succeed(folder.path(), &MOVIE);
+    std::fs::write(folder.path().join("spot.toml"), text).unwrap();
+    let set = overrides.iter().flat_map(|o| ["--set", o]);
+    succeed(folder.path(), &MOVIE.into_iter().chain(set).collect::<Vec<_>>());
     let mut lights = Vec::new();
     for k in 0..3 {
-        let (picture, attributes) = exr::decode(&frame(folder.path(), k)).unwrap();
+        let (picture, mut attributes) = exr::decode(&frame(folder.path(), k)).unwrap();
         // 60 minutes are 175.94 M of 20.4604 s.
         let time: f64 = attributes["frame_time_m"].parse().unwrap();
         assert!((time - k as f64 * 3600.0 / 20.460_4 / 3.0).abs() < 1e-2, "{time}");
         let name = format!("film/frame_{k:04}.exr");
         succeed(folder.path(), &["render", &name, "-o", "again.exr"]);
         let again = std::fs::read(folder.path().join("again.exr")).unwrap();
-        assert!(exr::decode(&again).unwrap().0 == picture, "frame {k}");
+        attributes.retain(|name, _| !name.starts_with("frame"));
+        let same = exr::encode(&picture, &attributes).unwrap() == again;
+        assert!(same, "frame {k}, {overrides:?}: {attributes:?}");
         lights.push(picture.channel("intensity").unwrap().to_vec());
     }
     assert!(lights[0] != lights[1] && lights[1] != lights[2]);
+}
+
+#[test]
+fn exact_frames_are_renderings() {
+    frames_are_renderings(SPOT, &[]);
+}
+
+/// Gas shines in physical units.
+#[test]
+fn exact_frames_with_gas_are_renderings() {
+    let text = format!("{SPOT}{GAS}");
+    frames_are_renderings(&text, &["tracer.integrator=\"elliptic\"", "effects.redshift=false"]);
+}
+
+/// Rays differ from frame to frame.
+#[test]
+fn exact_refined_frames_are_renderings() {
+    let refined = ["screen.samples_per_pixel=1", "screen.image_error=0.05"];
+    frames_are_renderings(SPOT, &refined);
+}
+
+/// The contact sheet is drawn from the same run and leaves EXR and PNG as they are; what cannot be
+/// drawn is refused before anything is rendered.
+#[test]
+fn exact_sheets_and_marks_of_renderings() {
+    let folder = folder();
+    let f = folder.path();
+    let read = |name: &str| std::fs::read(f.join(name)).unwrap();
+    let both = ["render", "spot.toml", "-o", "a.exr", "--preview", "a.png"];
+    succeed(f, &both);
+    let (exr, png) = (read("a.exr"), read("a.png"));
+    succeed(f, &[&both[..], &["--sheet", "sheet.png"]].concat());
+    assert!(read("a.exr") == exr && read("a.png") == png);
+    let with_exr = read("sheet.png");
+    assert!(with_exr.starts_with(b"\x89PNG"));
+    succeed(f, &["render", "spot.toml", "--sheet", "sheet.png"]);
+    assert!(read("sheet.png") == with_exr);
+    succeed(f, &[&both[..], &["--scale-bar", "--critical-curve"]].concat());
+    assert!(read("a.exr") == exr && read("a.png") != png);
+    let large = ["--set", "screen.width=8192", "--set", "screen.height=4096"];
+    let sheet = ["render", "spot.toml", "--sheet", "b.png"];
+    assert!(fail(f, &[&sheet[..], &large].concat()).contains("4096 x 4096"));
+    let message = fail(f, &["render", "spot.toml", "--preview", "b.png", "--ticks"]);
+    assert!(message.contains("no channels Q and U"), "{message}");
+    assert!(fail(f, &["render", "spot.toml", "-o", "b.exr", "--scale-bar"]).contains("--preview"));
+    assert!(fail(f, &[&MOVIE[..], &["--scale-bar"]].concat()).contains("--gif"));
 }
 
 /// A second run renders what is missing and nothing else; other settings are refused.
