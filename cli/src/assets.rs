@@ -16,13 +16,17 @@ pub struct Files {
     pub decoded: Assets,
     /// What tells them from others: a line for each, with its length and checksum.
     pub identity: String,
+    /// Where they and what they refer to lie.
+    pub paths: Vec<PathBuf>,
 }
 
 /// Reads and decodes the files of a scene, whose names are relative to `folder`. None of them,
 /// nor what they refer to, may be one of `outputs`.
 pub fn load(scene: &Scene, folder: &Path, outputs: &[&Output]) -> anyhow::Result<Files> {
     let identity = RefCell::new(String::new());
+    let paths = RefCell::new(Vec::new());
     let read = |path: &Path| {
+        paths.borrow_mut().push(path.to_owned());
         outputs.iter().try_for_each(|output| output.spares(path))?;
         let bytes = output::read(path)?;
         let checksum = crc32fast::hash(&bytes);
@@ -41,7 +45,7 @@ pub fn load(scene: &Scene, folder: &Path, outputs: &[&Output]) -> anyhow::Result
         MeshFile::decode(&bytes, &resources).with_context(name)
     });
     let decoded = Assets { sky, meshes: meshes.collect::<anyhow::Result<_>>()? };
-    Ok(Files { decoded, identity: identity.into_inner() })
+    Ok(Files { decoded, identity: identity.into_inner(), paths: paths.into_inner() })
 }
 
 /// Where the picture of a `[sky.image]` lies.

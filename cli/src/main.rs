@@ -8,8 +8,10 @@ mod critical_curve;
 mod inspect;
 mod interferometry;
 mod interrupt;
+mod movie;
 mod observe;
 mod output;
+mod overlay;
 mod progress;
 mod render;
 mod trace;
@@ -33,6 +35,8 @@ struct Arguments {
 enum Verb {
     /// Render a scene to EXR and PNG
     Render(render::Render),
+    /// Render many frames of a scene: numbered EXR files, and a GIF, APNG or PNGs to look at
+    Movie(movie::Movie),
     /// Show what a file holds: channels and settings of a picture, visibilities of an observation
     Inspect(inspect::Inspect),
     /// See an image, a movie or a scene through an array of telescopes
@@ -66,6 +70,7 @@ fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     match &arguments.verb {
         Verb::Render(render) => render.run(),
+        Verb::Movie(movie) => movie.run(),
         Verb::Inspect(inspect) => inspect.run(),
         Verb::Observe(observe) => observe.run(),
         Verb::Uv(uv) => uv.run(),

@@ -8,6 +8,7 @@ mod command_line;
 mod critical_curve;
 mod documents;
 mod eht_data;
+mod film;
 mod fuzz_corpus;
 mod interferometry;
 mod kerr_references;

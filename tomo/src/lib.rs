@@ -8,6 +8,7 @@
 
 pub mod dynamics;
 pub mod emission;
+pub mod film;
 pub mod image;
 pub mod interferometry;
 pub mod optimise;

@@ -2,17 +2,23 @@
 
 mod explain;
 mod partial;
-mod preview;
-mod report;
-mod source;
+pub mod preview;
+pub mod report;
+pub mod source;
 mod work;
 
 use crate::assets;
 use crate::output::{self, Output};
-use anyhow::Context;
+use crate::overlay::OverlayOptions;
+use anyhow::{Context, bail};
 use clap::Args;
-use kerrlight_tomo::image::preview::encode_png;
+use image::RgbImage;
+use kerrlight_tomo::image::Picture;
+use kerrlight_tomo::image::preview as drawing;
+use kerrlight_tomo::image::reduce::Reduction;
+use kerrlight_tomo::image::sheet::sheet;
 use kerrlight_tomo::render::Raster;
+use kerrlight_tomo::scene::Scene;
 use preview::PreviewOptions;
 use source::Source;
 use std::path::PathBuf;
@@ -25,7 +31,7 @@ pub struct Render {
     /// Scene file (TOML), or an EXR that kerrlight rendered, to render it again; without it
     /// a built-in scene: Sgr A* with a flare and a disc
     scene: Option<PathBuf>,
-    /// Where to write the EXR [default, without --preview either: both, in the current folder
+    /// Where to write the EXR [default, without --preview and --sheet either: EXR and PNG, in the current folder
     /// and named after the scene]
     #[arg(short, long, value_name = "FILE.exr")]
     output: Option<PathBuf>,
@@ -46,6 +52,11 @@ pub struct Render {
     explain: bool,
     #[command(flatten)]
     look: PreviewOptions,
+    #[command(flatten)]
+    overlay: OverlayOptions,
+    /// Where to write a contact sheet: all channels with colour bars
+    #[arg(long, value_name = "FILE.png")]
+    sheet: Option<PathBuf>,
     /// Columns of pixels that are traced together; the picture does not depend on it
     #[arg(long, value_name = "N", default_value = "64", hide_short_help = true)]
     #[arg(value_parser = clap::value_parser!(u16).range(1..))]
@@ -57,36 +68,76 @@ impl Render {
     pub fn run(&self) -> anyhow::Result<()> {
         let source = Source::new(self.scene.as_deref())?;
         let (text, scene) = source.scene(&self.all_overrides())?;
-        let (exr, png) = self.outputs(&source)?;
-        let outputs: Vec<&Output> = [&exr, &png].into_iter().flatten().collect();
+        let outputs = self.outputs(&source)?;
         if let Some(input) = &self.scene {
-            outputs.iter().try_for_each(|output| output.spares(input))?;
+            outputs.all().iter().try_for_each(|output| output.spares(input))?;
         }
-        let files = assets::load(&scene, &source.folder, &outputs)?;
+        if self.overlay.any() && outputs.png.is_none() {
+            bail!("marks are drawn into the PNG: give --preview");
+        }
+        let files = assets::load(&scene, &source.folder, &outputs.all())?;
         let start = Instant::now();
         let raster = Raster::new(&scene, files.decoded);
         let mut raster = raster.with_context(|| source.name.clone())?.with_tile(self.tile.into());
+        let look = self.reduction(&scene, &raster, &outputs)?;
         if self.explain {
             explain::before(&scene, &raster)?;
             raster = raster.with_meter();
         }
-        let look = png.is_some().then(|| self.look.reduction(&scene, &raster)).transpose()?;
+        let reduced = look.as_ref().map_or(1, Reduction::factor);
         let work = Work { raster: &raster, scene: &scene, text: &text, name: &source.name };
-        let (summary, picture) = match &exr {
+        let (summary, picture) = match &outputs.exr {
             Some(exr) => {
                 let identity = raster.identity() + &files.identity;
                 work.exr(exr, &identity, look)?
             }
             None => work.preview(look)?,
         };
-        if let (Some(png), Some(picture)) = (&png, picture) {
-            let bytes = encode_png(&picture, self.look.look(&scene));
-            png.write(&bytes.context("cannot encode the PNG")?)?;
-            output::print(&format!("{}\n", png.shown().display()))?;
+        if let Some(picture) = picture {
+            self.draw(&scene, (&picture, reduced), &outputs)?;
         }
         report::print(&scene, &summary, start.elapsed().as_secs_f64());
         if self.explain {
             explain::after(&raster.meter(), summary.rays);
+        }
+        Ok(())
+    }
+
+    /// What keeps the channels of the PNG and of the contact sheet, if there is one of them.
+    fn reduction(
+        &self,
+        scene: &Scene,
+        raster: &Raster,
+        outputs: &Outputs,
+    ) -> anyhow::Result<Option<Reduction>> {
+        let names = raster.names();
+        let mut wanted = Vec::new();
+        if outputs.png.is_some() {
+            self.overlay.check(scene, &names)?;
+            wanted = self.look.channels(scene, &names)?;
+            wanted.extend(self.overlay.channels());
+        }
+        if outputs.sheet.is_some() {
+            preview::check_sheet(scene)?;
+            wanted.clone_from(&names);
+        }
+        Ok((!wanted.is_empty()).then(|| preview::reduction(scene, &names, &wanted)))
+    }
+
+    /// Writes what is to be looked at. A pixel of the picture may be the mean of several.
+    fn draw(
+        &self,
+        scene: &Scene,
+        (picture, reduced): (&Picture, usize),
+        outputs: &Outputs,
+    ) -> anyhow::Result<()> {
+        if let Some(png) = &outputs.png {
+            let look = self.look.look(scene);
+            let white = drawing::white(picture, look).context("cannot draw the picture")?;
+            write_png(png, &self.overlay.draw(scene, (picture, reduced), look, white)?)?;
+        }
+        if let Some(output) = &outputs.sheet {
+            write_png(output, &sheet(picture).context("cannot draw the sheet")?)?;
         }
         Ok(())
     }
@@ -100,12 +151,16 @@ impl Render {
         overrides
     }
 
-    fn outputs(&self, source: &Source) -> anyhow::Result<(Option<Output>, Option<Output>)> {
+    fn outputs(&self, source: &Source) -> anyhow::Result<Outputs> {
         let check = |path: &Option<PathBuf>, extension| {
             path.as_deref().map(|path| Output::new(path, extension)).transpose()
         };
-        if self.output.is_some() || self.preview.is_some() {
-            return Ok((check(&self.output, "exr")?, check(&self.preview, "png")?));
+        if self.output.is_some() || self.preview.is_some() || self.sheet.is_some() {
+            return Ok(Outputs {
+                exr: check(&self.output, "exr")?,
+                png: check(&self.preview, "png")?,
+                sheet: check(&self.sheet, "png")?,
+            });
         }
         let stem = match &self.scene {
             Some(path) => path.file_stem().map(|s| s.to_string_lossy().into_owned()),
@@ -114,6 +169,24 @@ impl Render {
         let stem = stem.unwrap_or_else(|| source.name.clone());
         let exr = PathBuf::from(format!("{stem}.exr"));
         let png = PathBuf::from(format!("{stem}.png"));
-        Ok((check(&Some(exr), "exr")?, check(&Some(png), "png")?))
+        Ok(Outputs { exr: check(&Some(exr), "exr")?, png: check(&Some(png), "png")?, sheet: None })
     }
+}
+
+/// The files to be written.
+struct Outputs {
+    exr: Option<Output>,
+    png: Option<Output>,
+    sheet: Option<Output>,
+}
+
+impl Outputs {
+    fn all(&self) -> Vec<&Output> {
+        [&self.exr, &self.png, &self.sheet].into_iter().flatten().collect()
+    }
+}
+
+fn write_png(output: &Output, drawn: &RgbImage) -> anyhow::Result<()> {
+    output.write(&drawing::encode(drawn).context("cannot encode the PNG")?)?;
+    output::print(&format!("{}\n", output.shown().display()))
 }

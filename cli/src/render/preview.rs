@@ -5,7 +5,6 @@ use clap::{Args, ValueEnum};
 use kerrlight_tomo::image::colormap::Colormap;
 use kerrlight_tomo::image::preview::{Look, Stretch};
 use kerrlight_tomo::image::reduce::Reduction;
-use kerrlight_tomo::render::Raster;
 use kerrlight_tomo::scene::Scene;
 
 /// Options of the PNG.
@@ -42,23 +41,16 @@ enum StretchName {
 const MOST_PIXELS: usize = 1 << 24;
 
 impl PreviewOptions {
-    /// What makes the picture small enough.
-    pub fn reduction(&self, scene: &Scene, raster: &Raster) -> anyhow::Result<Reduction> {
+    /// The channels that the PNG shows, which must be among `names`.
+    pub fn channels(&self, scene: &Scene, names: &[&str]) -> anyhow::Result<Vec<&'static str>> {
         let wanted: &[&str] = match self.look(scene) {
             Look::Intensity(..) => &["intensity"],
             Look::Color => &["R", "G", "B"],
         };
-        let names = raster.names();
         if let Some(name) = wanted.iter().find(|name| !names.contains(name)) {
             bail!("the PNG needs the channel {name}, which `screen.channels` leaves out");
         }
-        let (width, height) = (scene.screen.width as usize, scene.screen.height as usize);
-        let reduction = Reduction::new(width, height, &names, wanted, MOST_PIXELS);
-        if reduction.factor() > 1 {
-            let factor = reduction.factor();
-            eprintln!("a pixel of the PNG is the mean of {factor} x {factor} of the picture");
-        }
-        Ok(reduction)
+        Ok(wanted.to_vec())
     }
 
     /// What the PNG of `scene` shows.
@@ -81,4 +73,26 @@ impl PreviewOptions {
         };
         Look::Intensity(map, stretch)
     }
+}
+
+/// Makes the picture small enough for a PNG with the channels `wanted`.
+pub fn reduction(scene: &Scene, names: &[&str], wanted: &[&str]) -> Reduction {
+    let (width, height) = (scene.screen.width as usize, scene.screen.height as usize);
+    let reduction = Reduction::new(width, height, names, wanted, MOST_PIXELS);
+    if reduction.factor() > 1 {
+        let factor = reduction.factor();
+        eprintln!("a pixel of the PNG is the mean of {factor} x {factor} of the picture");
+    }
+    reduction
+}
+
+/// Refuses a contact sheet of a picture that a PNG cannot show pixel by pixel.
+pub fn check_sheet(scene: &Scene) -> anyhow::Result<()> {
+    let (width, height) = (scene.screen.width, scene.screen.height);
+    if u64::from(width) * u64::from(height) > MOST_PIXELS as u64 {
+        bail!(
+            "--sheet: {width} x {height} pixels are too many, at most {MOST_PIXELS} (4096 x 4096)"
+        );
+    }
+    Ok(())
 }

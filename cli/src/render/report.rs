@@ -1,29 +1,34 @@
 //! What is told about a picture: in the file and on the terminal.
 
-use super::work::Work;
 use kerrlight_tomo::image::exr::Attributes;
 use kerrlight_tomo::render::Summary;
 use kerrlight_tomo::scene::Scene;
 
-/// What decided the picture, and what it amounts to.
-pub fn attributes(work: &Work<'_>, summary: &Summary) -> Attributes {
+/// What decided the picture, and what it amounts to: `text` is the scene as it was given,
+/// `legend` says what the channels hold.
+pub fn attributes(scene: &Scene, text: &str, legend: String, summary: &Summary) -> Attributes {
     let entry = |name: &str, value: String| (name.to_owned(), value);
     [
         entry("version", env!("CARGO_PKG_VERSION").to_owned()),
-        entry("scene", work.text.to_owned()),
-        entry("scene_resolved", work.scene.to_toml()),
+        entry("scene", text.to_owned()),
+        entry("scene_resolved", scene.to_toml()),
         entry("intensity_unit", summary.intensity_unit.to_owned()),
         entry("intensity_per_scene_unit", summary.unit_factor.to_string()),
-        entry("pixel_size_m", work.scene.pixel_size().to_string()),
+        entry(pixel_unit(scene), scene.pixel_size().to_string()),
         entry("flux", summary.flux.to_string()),
         entry("flux_error", summary.flux_error.to_string()),
         entry("flux_unit", summary.flux_unit.to_owned()),
         entry("image_error", summary.image_error.to_string()),
         entry("rays", summary.rays.to_string()),
         entry("unresolved_rays", summary.unresolved.to_string()),
-        entry("channels", work.raster.legend()),
+        entry("channels", legend),
     ]
     .into()
+}
+
+/// What the size of a pixel is called: in M, or on the picture plane of a camera.
+fn pixel_unit(scene: &Scene) -> &'static str {
+    if scene.camera.is_some() { "pixel_size_plane" } else { "pixel_size_m" }
 }
 
 /// What a user is told when the picture is there.

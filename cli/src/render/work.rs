@@ -35,7 +35,7 @@ impl Work<'_> {
             Ok(summary) => summary,
             Err(error) => return Err(self.failed(error, partial)),
         };
-        let attributes = report::attributes(self, &summary);
+        let attributes = report::attributes(self.scene, self.text, self.raster.legend(), &summary);
         exr.write_with(|file| {
             let journal = &mut partial.journal;
             let look = look.as_mut();

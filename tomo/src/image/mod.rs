@@ -1,9 +1,14 @@
 //! Pictures: columns of float channels, their EXR files, and tone-mapped previews.
 
+pub mod animation;
+pub mod canvas;
 pub mod colormap;
 pub mod exr;
+pub mod overlay;
 pub mod preview;
 pub mod reduce;
+pub mod sheet;
+pub mod ticks;
 
 /// A named channel, row by row from the top.
 #[derive(Debug, Clone, PartialEq)]

@@ -32,18 +32,50 @@ const UNCLIPPED: f64 = 0.998;
 /// # Errors
 /// If a channel that the look needs is missing, or on a failure of the encoder.
 pub fn encode_png(picture: &Picture, look: Look) -> image::ImageResult<Vec<u8>> {
-    let pixels = match look {
-        Look::Intensity(map, stretch) => mapped(channel(picture, "intensity")?, map, stretch),
-        Look::Color => colored(picture)?,
-    };
-    let (width, height) = (picture.width as u32, picture.height as u32);
-    let buffer = image::RgbImage::from_raw(width, height, pixels).ok_or_else(missing)?;
+    encode(&draw(picture, look, white(picture, look)?)?)
+}
+
+/// The bytes of a drawn picture as PNG.
+///
+/// # Errors
+/// On a failure of the encoder.
+pub fn encode(drawn: &image::RgbImage) -> image::ImageResult<Vec<u8>> {
     let mut bytes = Vec::new();
-    buffer.write_to(&mut Cursor::new(&mut bytes), image::ImageFormat::Png)?;
+    drawn.write_to(&mut Cursor::new(&mut bytes), image::ImageFormat::Png)?;
     Ok(bytes)
 }
 
-fn missing() -> image::ImageError {
+/// The value that a picture of its own would show as white.
+///
+/// # Errors
+/// If a channel that the look needs is missing.
+pub fn white(picture: &Picture, look: Look) -> image::ImageResult<f32> {
+    Ok(match look {
+        Look::Intensity(..) => white_point(channel(picture, "intensity")?.iter().copied()),
+        Look::Color => {
+            let [r, g, b] = ["R", "G", "B"].map(|name| channel(picture, name));
+            let (r, g, b) = (r?, g?, b?);
+            white_point((0..r.len()).map(|k| r[k].max(g[k]).max(b[k])))
+        }
+    })
+}
+
+/// The picture in 8-bit colours, with `white` as the brightest value: frames of a film share one.
+///
+/// # Errors
+/// If a channel that the look needs is missing.
+pub fn draw(picture: &Picture, look: Look, white: f32) -> image::ImageResult<image::RgbImage> {
+    let pixels = match look {
+        Look::Intensity(map, stretch) => {
+            mapped(channel(picture, "intensity")?, map, stretch, white)
+        }
+        Look::Color => colored(picture, white)?,
+    };
+    let (width, height) = (picture.width as u32, picture.height as u32);
+    image::RgbImage::from_raw(width, height, pixels).ok_or_else(missing)
+}
+
+pub(super) fn missing() -> image::ImageError {
     let kind = image::error::ParameterErrorKind::DimensionMismatch;
     image::ImageError::Parameter(image::error::ParameterError::from_kind(kind))
 }
@@ -62,9 +94,9 @@ fn white_point(values: impl Iterator<Item = f32>) -> f32 {
     *lit.select_nth_unstable_by(k, f32::total_cmp).1
 }
 
-fn mapped(values: &[f32], map: Colormap, stretch: Stretch) -> Vec<u8> {
+fn mapped(values: &[f32], map: Colormap, stretch: Stretch, white: f32) -> Vec<u8> {
     let table = map.table();
-    let white = f64::from(white_point(values.iter().copied()));
+    let white = f64::from(white);
     let shade = |value: &f32| {
         let x = f64::from(*value) / white;
         let x = match stretch {
@@ -79,11 +111,9 @@ fn mapped(values: &[f32], map: Colormap, stretch: Stretch) -> Vec<u8> {
 
 /// Linear colour through the sRGB transfer function, the brightest light kept below
 /// white by a common factor.
-fn colored(picture: &Picture) -> image::ImageResult<Vec<u8>> {
+fn colored(picture: &Picture, white: f32) -> image::ImageResult<Vec<u8>> {
     let [r, g, b] = ["R", "G", "B"].map(|name| channel(picture, name));
     let (r, g, b) = (r?, g?, b?);
-    let brightest = (0..r.len()).map(|k| r[k].max(g[k]).max(b[k]));
-    let white = white_point(brightest);
     let encode = |c: f32| {
         let c = (c / white).clamp(0.0, 1.0);
         let c = if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };

@@ -18,14 +18,17 @@ pub(super) struct Band {
     pub tally: Tally,
 }
 
-/// Takes bands, in any order and from several threads.
-pub(super) type Sink<'a> = dyn Fn(Band) -> Result<(), RenderError> + Sync + 'a;
+/// Takes a band at each time, in any order of bands and from several threads.
+pub(super) type Sink<'a> = dyn Fn(Vec<Band>) -> Result<(), RenderError> + Sync + 'a;
+
+/// The pixels of a tile at each time.
+type Tile = Vec<Vec<Pixel>>;
 
 /// The tiles of a band that are there.
-type Parts = Vec<Option<Vec<Pixel>>>;
+type Parts = Vec<Option<Tile>>;
 
 /// Adds a tile to its band; all of them if it was the last.
-fn put(band: &Mutex<Parts>, tiles: usize, tile: usize, pixels: Vec<Pixel>) -> Option<Parts> {
+fn put(band: &Mutex<Parts>, tiles: usize, tile: usize, pixels: Tile) -> Option<Parts> {
     let mut parts = band.lock().unwrap_or_else(PoisonError::into_inner);
     parts.resize(tiles, None);
     parts[tile] = Some(pixels);
@@ -33,10 +36,11 @@ fn put(band: &Mutex<Parts>, tiles: usize, tile: usize, pixels: Vec<Pixel>) -> Op
     complete.then(|| std::mem::take(&mut *parts))
 }
 
-/// Renders the bands `todo` into `sink`. Where `progress` says so it stops after the bands
-/// that are under way.
+/// Renders the bands `todo` at each of `times` into `sink`. Where `progress` says so it stops
+/// after the bands that are under way. Where pixels are refined there is one time, the stage's.
 pub(super) fn render_bands(
     raster: &Raster,
+    times: &[f64],
     todo: &[usize],
     sink: &Sink<'_>,
     progress: &Progress<'_>,
@@ -49,9 +53,10 @@ pub(super) fn render_bands(
     let order = (0..todo.len() * tiles).take_while(|k| !stopped(k)).par_bridge();
     order.try_for_each_init(Workspace::default, |work, k| -> Result<(), RenderError> {
         let (band, tile) = (todo[k / tiles], k % tiles);
-        let pixels = raster.tile(band, tile, tolerance, work)?;
+        let pixels = raster.tile((band, tile), times, tolerance, work)?;
         let Some(parts) = put(&open[k / tiles], tiles, tile, pixels) else { return Ok(()) };
-        sink(raster.assemble(band, parts)?)?;
+        let at = |time: usize| raster.assemble(band, &parts, time);
+        sink((0..times.len()).map(at).collect::<Result<_, _>>()?)?;
         if !progress(raster.layout.rows(band).len()) {
             stop.store(true, Ordering::Relaxed);
         }
@@ -74,11 +79,11 @@ impl Raster {
 
     fn tile(
         &self,
-        band: usize,
-        tile: usize,
+        (band, tile): (usize, usize),
+        times: &[f64],
         tolerance: Option<f64>,
         work: &mut Workspace,
-    ) -> Result<Vec<Pixel>, RenderError> {
+    ) -> Result<Tile, RenderError> {
         let end = ((tile + 1) * self.tile).min(self.grid.width);
         let columns = tile * self.tile..end;
         let (stage, grid, rows) = (&self.stage, &self.grid, self.layout.rows(band));
@@ -86,8 +91,10 @@ impl Raster {
             work.scratch.meter = Meter::running();
         }
         let pixels = match tolerance {
-            Some(error) => adaptive::adaptive(stage, grid, rows, columns, error, work)?,
-            None => uniform(stage, grid, rows, columns, work)?,
+            Some(error) => {
+                vec![adaptive::adaptive(stage, grid, rows, columns, error, work)?]
+            }
+            None => uniform(stage, grid, (rows, columns), times, work)?,
         };
         if let Some(meter) = &self.meter {
             meter.lock().unwrap_or_else(PoisonError::into_inner).add(&work.scratch.meter);
@@ -95,17 +102,16 @@ impl Raster {
         Ok(pixels)
     }
 
-    /// The band from its tiles.
-    fn assemble(&self, index: usize, parts: Parts) -> Result<Band, RenderError> {
+    /// The band from its tiles at the time number `time`.
+    fn assemble(&self, index: usize, parts: &Parts, time: usize) -> Result<Band, RenderError> {
         let (width, rows) = (self.grid.width, self.layout.rows(index).len());
         let mut pixels = Vec::with_capacity(width * rows);
         for row in 0..rows {
-            for part in parts.iter().flatten() {
+            for part in parts.iter().flatten().filter_map(|tile| tile.get(time)) {
                 let columns = part.len() / rows;
                 pixels.extend_from_slice(&part[row * columns..(row + 1) * columns]);
             }
         }
-        drop(parts);
         let mut channels = Vec::with_capacity(self.channels.len());
         for kind in &self.channels {
             let values: Vec<f32> = pixels.iter().map(|pixel| kind.value(pixel)).collect();

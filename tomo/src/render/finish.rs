@@ -1,6 +1,6 @@
 //! From bands to files.
 
-use super::bands::render_bands;
+use super::bands::{Band, render_bands};
 use super::journal::Journal;
 use super::tally::Summary;
 use super::{Progress, Raster, RenderError};
@@ -27,13 +27,15 @@ impl Raster {
     ) -> std::result::Result<(), RenderError> {
         let todo = journal.missing();
         let journal = Mutex::new(journal);
-        let keep = |band: super::bands::Band| {
-            let bytes = self.layout.compress(band.index, &band.channels)?;
-            let mut journal = journal.lock().unwrap_or_else(PoisonError::into_inner);
-            journal.append(band.index, band.tally, &bytes).map_err(exr::error::Error::from)?;
-            Ok(())
+        let keep = |bands: Vec<Band>| {
+            bands.iter().try_for_each(|band| {
+                let bytes = self.layout.compress(band.index, &band.channels)?;
+                let mut journal = journal.lock().unwrap_or_else(PoisonError::into_inner);
+                journal.append(band.index, band.tally, &bytes).map_err(exr::error::Error::from)?;
+                Ok(())
+            })
         };
-        render_bands(self, &todo, &keep, progress)
+        render_bands(self, &[self.stage.time()], &todo, &keep, progress)
     }
 
     /// What is worth knowing about the whole picture.

@@ -9,14 +9,16 @@ mod finish;
 mod grid;
 mod journal;
 mod pixels;
+mod raw;
 mod tally;
 
 pub use channels::{CHANNELS, ChannelKind};
 pub use journal::{Found, Journal};
+pub(crate) use raw::Raw;
 pub use tally::Summary;
 
+use crate::image::Picture;
 use crate::image::exr::Layout;
-use crate::image::{Channel, Picture};
 use crate::scene::Scene;
 use crate::transport::{Assets, Glimpse, Meter, Scratch, Stage};
 use grid::Grid;
@@ -162,11 +164,8 @@ impl Raster {
     }
 
     fn summarize(&self, tally: &Tally) -> Result<Summary, RenderError> {
-        let summary = Summary::new(&self.scene, tally).map_err(RenderError::NoFlux)?;
-        if (summary.largest as f32).is_finite() {
-            return Ok(summary);
-        }
-        Err(RenderError::NotFinite { channel: "intensity" })
+        let factor = Summary::factor(&self.scene, tally).map_err(RenderError::NoFlux)?;
+        Summary::new(&self.scene, tally, factor)
     }
 }
 
@@ -197,28 +196,10 @@ impl Raster {
     /// # Errors
     /// If a value is out of range or does not fit, or `progress` returned false.
     pub fn render(&self, progress: &Progress<'_>) -> Result<Rendered, RenderError> {
-        let all: Vec<usize> = (0..self.bands()).collect();
-        let done = Mutex::new(vec![None; all.len()]);
-        let keep = |band: bands::Band| {
-            let index = band.index;
-            done.lock().unwrap_or_else(PoisonError::into_inner)[index] = Some(band);
-            Ok(())
-        };
-        bands::render_bands(self, &all, &keep, progress)?;
-        let bands = done.into_inner().unwrap_or_else(PoisonError::into_inner);
-        let tallies = bands.iter().flatten().map(|band| band.tally);
-        let summary = self.summarize(&tallies.fold(Tally::default(), Tally::plus))?;
-        let Grid { width, height, .. } = self.grid;
-        let mut values = vec![Vec::with_capacity(width * height); self.channels.len()];
-        for mut band in bands.into_iter().flatten() {
-            self.rescale(&mut band.channels, summary.unit_factor);
-            for (all, some) in values.iter_mut().zip(band.channels) {
-                all.extend(some);
-            }
-        }
-        let named = self.channels.iter().zip(values);
-        let channels =
-            named.map(|(kind, values)| Channel { name: kind.name.to_owned(), values }).collect();
-        Ok(Rendered { picture: Picture { width, height, channels }, summary })
+        let mut raw = self.raw(&[self.stage.time()], progress)?;
+        // One for each time.
+        let raw = raw.pop().unwrap_or_default();
+        let factor = self.unit_factor(&self.scene, &raw)?;
+        self.rendered(&self.scene, raw, factor)
     }
 }

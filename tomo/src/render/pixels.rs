@@ -54,22 +54,31 @@ impl Workspace {
         }
         Ok(&self.seen)
     }
+
+    /// What a block of rays sees at each of `times`: ray k at time j is `[j · rays + k]`.
+    fn look_at(&mut self, stage: &Stage, times: &[f64]) -> Result<&[Glimpse], OutOfRange> {
+        self.seen.clear();
+        self.seen.resize(self.alpha.len() * times.len(), Glimpse::default());
+        stage.look_many(&self.alpha, &self.beta, times, &mut self.scratch, &mut self.seen)?;
+        Ok(&self.seen)
+    }
 }
 
-/// The pixels of a rectangle, row by row, with `side`² rays each.
+/// The pixels of a rectangle at each of `times`, row by row, with `side`² rays each, which are
+/// traced once for all times.
 pub(super) fn uniform(
     stage: &Stage,
     grid: &Grid,
-    rows: Range<usize>,
-    columns: Range<usize>,
+    (rows, columns): (Range<usize>, Range<usize>),
+    times: &[f64],
     work: &mut Workspace,
-) -> Result<Vec<Pixel>, OutOfRange> {
+) -> Result<Vec<Vec<Pixel>>, OutOfRange> {
     let side = grid.side;
-    // Whole pixels, about a block's worth of them, so that memory does not grow with `side`.
+    // Whole pixels, about a block's worth of rays: `side`² is at most that.
     let together = (BLOCK / (side * side)).max(1);
     let places: Vec<(usize, usize)> =
         rows.flat_map(|row| columns.clone().map(move |column| (column, row))).collect();
-    let mut pixels = Vec::with_capacity(places.len());
+    let mut pixels = vec![Vec::with_capacity(places.len()); times.len()];
     for some in places.chunks(together) {
         work.clear();
         for (column, row) in some {
@@ -77,7 +86,11 @@ pub(super) fn uniform(
                 work.push(grid.screen(*column, *row, k % side, k / side));
             }
         }
-        pixels.extend(work.look(stage)?.chunks_exact(side * side).map(|rays| mean(rays, side)));
+        let rays = some.len() * side * side;
+        let seen = work.look_at(stage, times)?.chunks_exact(rays);
+        for (pixels, seen) in pixels.iter_mut().zip(seen) {
+            pixels.extend(seen.chunks_exact(side * side).map(|rays| mean(rays, side)));
+        }
     }
     Ok(pixels)
 }

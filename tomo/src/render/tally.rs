@@ -1,8 +1,9 @@
 //! Sums over a picture, and what they say about it.
 
+use super::RenderError;
 use super::pixels::Pixel;
 use crate::scene::Scene;
-use crate::units::{JY_PER_SQUARE_UAS, gravitational_angle};
+use crate::units::{JY_PER_SQUARE_UAS, MICROARCSECOND, gravitational_angle};
 
 /// Sums over pixels; intensities in the scene's unit.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -119,7 +120,8 @@ pub struct Summary {
     pub unit_factor: f64,
     /// Unit of the `intensity` channel.
     pub intensity_unit: &'static str,
-    /// Sum of the `intensity` channel times the pixels' area in µas².
+    /// Sum of the `intensity` channel times the pixels' area in µas², for a camera that of the
+    /// pixel in the middle.
     pub flux: f64,
     /// Estimated bound of its error: of the means over pixels from so many rays, of the tracer's
     /// tolerance, and of rays that were given up. What lies outside the field is not in it.
@@ -129,23 +131,26 @@ pub struct Summary {
     /// Estimated error of the `intensity` image: sum of its pixels' absolute errors by the sum
     /// of the pixels; 0 for a dark one.
     pub image_error: f64,
-    /// Largest intensity of a pixel, in the unit of the `intensity` channel.
-    pub(super) largest: f64,
 }
 
 impl Summary {
-    /// From the sums over all pixels of a scene's picture; the sum itself where there is no
-    /// light to scale.
-    pub(super) fn new(scene: &Scene, tally: &Tally) -> Result<Self, f64> {
-        let hole = &scene.hole;
-        let angle = gravitational_angle(hole.mass_msun, hole.distance_kpc);
-        let area = (scene.pixel_size() * angle).powi(2);
+    /// Factor from the scene's unit of intensity to that of the file, for a picture with these
+    /// sums; the sum itself where there is no light to scale.
+    pub(super) fn factor(scene: &Scene, tally: &Tally) -> Result<f64, f64> {
         // Gas shines in physical units.
         let own = if scene.gas.is_some() { JY_PER_SQUARE_UAS } else { 1.0 };
-        let factor = scene.screen.total_flux_jy.map_or(own, |jy| jy / (tally.intensity * area));
-        if !factor.is_normal() {
-            return Err(tally.intensity);
+        let asked = |jy: f64| jy / (tally.intensity * pixel_area(scene));
+        let factor = scene.screen.total_flux_jy.map_or(own, asked);
+        if factor.is_normal() { Ok(factor) } else { Err(tally.intensity) }
+    }
+
+    /// From the sums over all pixels of a scene's picture that is scaled by `factor`.
+    pub(super) fn new(scene: &Scene, tally: &Tally, factor: f64) -> Result<Self, RenderError> {
+        let largest = tally.largest * factor;
+        if !(largest as f32).is_finite() {
+            return Err(RenderError::NotFinite { channel: "intensity" });
         }
+        let area = pixel_area(scene);
         let pixels = f64::from(scene.screen.width) * f64::from(scene.screen.height);
         let dark = tally.unresolved as f64 * pixels / (tally.rays as f64).max(1.0) * tally.largest;
         let relative = scene.tracer.tolerance + f64::from(f32::EPSILON);
@@ -160,7 +165,16 @@ impl Summary {
             flux_error: error * area * factor,
             flux_unit: if jansky { "Jy" } else { "scene unit uas^2" },
             image_error: if tally.intensity > 0.0 { error / tally.intensity } else { 0.0 },
-            largest: tally.largest * factor,
         })
     }
+}
+
+/// Of a pixel, in µas²; a camera's in the middle of the picture.
+fn pixel_area(scene: &Scene) -> f64 {
+    let hole = &scene.hole;
+    let angle = match scene.camera {
+        Some(_) => 1.0 / MICROARCSECOND,
+        None => gravitational_angle(hole.mass_msun, hole.distance_kpc),
+    };
+    (scene.pixel_size() * angle).powi(2)
 }

@@ -1,0 +1,206 @@
+//! The numbered files of a film: which are there, which are to be written.
+
+use crate::output::{self, Output};
+use crate::render::report;
+use anyhow::{Context, bail};
+use kerrlight_tomo::film::{Film, Frame};
+use kerrlight_tomo::image::Picture;
+use kerrlight_tomo::image::exr::{self, Attributes};
+use kerrlight_tomo::render::Rendered;
+use kerrlight_tomo::scene::{Scene, SceneError, apply_override};
+use kerrlight_tomo::units::gravitational_time;
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
+
+/// A film's frames.
+pub struct Sequence {
+    folder: PathBuf,
+    plans: Vec<Plan>,
+    /// Which are there.
+    done: Vec<bool>,
+    /// Factor from the scene's unit of intensity, that of the first frame.
+    factor: Option<f64>,
+    /// Lengths and checksums of the files that the scene names.
+    files: String,
+}
+
+/// Where a film comes from.
+pub struct Origin<'a> {
+    /// What its scene is called in messages.
+    pub name: &'a str,
+    /// The scene's text.
+    pub text: &'a str,
+    /// Lengths and checksums of the files that the scene names.
+    pub files: &'a str,
+}
+
+/// A frame to be.
+struct Plan {
+    scene: Scene,
+    /// The scene's text with the frame's time in it.
+    text: String,
+}
+
+impl Sequence {
+    /// The frames at `times`, in `folder`, which is made if it is not there.
+    pub fn new(folder: &Path, of: &Origin<'_>, times: &[f64]) -> anyhow::Result<Self> {
+        let Origin { name, text, files } = of;
+        let plan = |time: &f64| -> anyhow::Result<Plan> {
+            let text = apply_override(text, &format!("observer.time={time:?}"))?;
+            let scene = Scene::parse(&text).map_err(SceneError::without_line);
+            let scene = scene.with_context(|| format!("{name} at the time {time} of a frame"))?;
+            Ok(Plan { scene, text })
+        };
+        let plans: Vec<Plan> = times.iter().map(plan).collect::<Result<_, _>>()?;
+        if folder.exists() && !folder.is_dir() {
+            bail!("output {} is not a folder", folder.display());
+        }
+        let done = vec![false; plans.len()];
+        let (folder, files) = (folder.to_owned(), (*files).to_owned());
+        Ok(Sequence { folder, plans, done, factor: None, files })
+    }
+
+    /// Looks which frames are there. Frames with other settings, or beyond the last, are errors:
+    /// nothing is written over, and no film is made of two.
+    pub fn find(&mut self) -> anyhow::Result<()> {
+        let folder = self.folder.display().to_string();
+        std::fs::create_dir_all(&self.folder).with_context(|| format!("cannot make {folder}"))?;
+        self.refuse_others()?;
+        for k in 0..self.plans.len() {
+            let path = self.path(k, "exr");
+            if !path.exists() {
+                continue;
+            }
+            let shown = path.display().to_string();
+            let (_, attributes) =
+                exr::decode(&output::read(&path)?).with_context(|| shown.clone())?;
+            if let Some(name) = differs(&self.settings(k), &attributes) {
+                bail!(
+                    "{shown} is a frame with other settings ({name} differs): give another folder \
+                     or remove the frames in {folder}"
+                );
+            }
+            self.done[k] = true;
+            if k == 0 {
+                self.factor = factor_of(&attributes);
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses frames that this film does not have.
+    fn refuse_others(&self) -> anyhow::Result<()> {
+        let shown = || format!("cannot read {}", self.folder.display());
+        for entry in std::fs::read_dir(&self.folder).with_context(shown)? {
+            let name = entry.with_context(shown)?.file_name();
+            let number = name.to_str().and_then(|n| n.strip_prefix("frame_"));
+            let number = number.and_then(|n| n.strip_suffix(".exr")?.parse::<usize>().ok());
+            if number.is_some_and(|k| k >= self.plans.len()) {
+                bail!(
+                    "{} holds {}, but this film has {} frames: give another folder or remove it",
+                    self.folder.display(),
+                    name.display(),
+                    self.plans.len()
+                );
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses to take the place of a file that is read.
+    pub fn spare(&self, input: &Path) -> anyhow::Result<()> {
+        let Ok(input) = input.canonicalize() else { return Ok(()) };
+        let same = |k: usize| self.path(k, "exr").canonicalize().is_ok_and(|path| path == input);
+        if (0..self.plans.len()).any(same) {
+            bail!("{} is an input and would be lost: give another folder", input.display());
+        }
+        Ok(())
+    }
+
+    /// Where a frame lies.
+    pub fn path(&self, k: usize, extension: &str) -> PathBuf {
+        self.folder.join(format!("frame_{k:04}.{extension}"))
+    }
+
+    /// The frames that are not there yet.
+    pub fn missing(&self) -> Vec<usize> {
+        (0..self.done.len()).filter(|k| !self.done[*k]).collect()
+    }
+
+    /// Number of frames.
+    pub fn len(&self) -> usize {
+        self.plans.len()
+    }
+
+    /// Rows of a frame.
+    pub fn height(&self) -> usize {
+        self.plans.first().map_or(0, |plan| plan.scene.screen.height as usize)
+    }
+
+    /// Time of a frame in M.
+    pub fn time(&self, k: usize) -> f64 {
+        self.plans[k].scene.observer.time
+    }
+
+    /// A frame that is there.
+    pub fn read(&self, k: usize) -> anyhow::Result<Picture> {
+        let path = self.path(k, "exr");
+        let decoded = exr::decode(&output::read(&path)?);
+        Ok(decoded.with_context(|| path.display().to_string())?.0)
+    }
+
+    /// Writes a batch of frames. What is scaled to Jy is scaled by the first frame's factor.
+    pub fn write(
+        &mut self,
+        film: &Film,
+        batch: &[usize],
+        frames: Vec<Frame>,
+    ) -> anyhow::Result<()> {
+        if let (None, Some(first)) = (self.factor, frames.first()) {
+            self.factor = Some(film.unit_factor(first)?);
+        }
+        let factor = self.factor.context("the film has no unit of intensity")?;
+        let this: &Sequence = self;
+        batch.par_iter().zip(frames).try_for_each(|(k, frame)| -> anyhow::Result<()> {
+            let Rendered { picture, summary } = film.rendered(frame, factor)?;
+            let Plan { scene, text } = &this.plans[*k];
+            let mut attributes = report::attributes(scene, text, film.legend(), &summary);
+            attributes.append(&mut this.settings(*k));
+            let bytes = exr::encode(&picture, &attributes).context("cannot encode the EXR")?;
+            Output::new(&this.path(*k, "exr"), "exr")?.write(&bytes)
+        })?;
+        for k in batch {
+            self.done[*k] = true;
+        }
+        Ok(())
+    }
+
+    /// What decides a frame.
+    fn settings(&self, k: usize) -> Attributes {
+        let scene = &self.plans[k].scene;
+        let seconds = scene.observer.time * gravitational_time(scene.hole.mass_msun);
+        let entry = |name: &str, value: String| (name.to_owned(), value);
+        let mut settings = Attributes::from([
+            entry("version", env!("CARGO_PKG_VERSION").to_owned()),
+            entry("scene_resolved", scene.to_toml()),
+            entry("frame", k.to_string()),
+            entry("frames", self.plans.len().to_string()),
+            entry("frame_time_m", scene.observer.time.to_string()),
+            entry("frame_time_min", (seconds / 60.0).to_string()),
+        ]);
+        if !self.files.is_empty() {
+            settings.insert("frame_files".to_owned(), self.files.clone());
+        }
+        settings
+    }
+}
+
+/// The first setting that a file does not have or has otherwise.
+fn differs(settings: &Attributes, attributes: &Attributes) -> Option<String> {
+    let other = |name: &&String| attributes.get(*name) != settings.get(*name);
+    settings.keys().find(other).cloned()
+}
+
+fn factor_of(attributes: &Attributes) -> Option<f64> {
+    attributes.get("intensity_per_scene_unit")?.parse().ok()
+}

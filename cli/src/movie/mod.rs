@@ -1,0 +1,120 @@
+//! `kerrlight movie`: numbered EXR frames of a scene, and animations of them.
+
+mod frames;
+mod times;
+mod viewing;
+
+use crate::output;
+use crate::overlay::OverlayOptions;
+use crate::render::preview::PreviewOptions;
+use crate::render::source::Source;
+use crate::{assets, interrupt, progress};
+use anyhow::{Context, bail};
+use clap::Args;
+use frames::{Origin, Sequence};
+use kerrlight_tomo::film::{Film, Frame};
+use kerrlight_tomo::render::RenderError;
+use std::iter;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+use times::Span;
+
+/// Arguments of `kerrlight movie`.
+#[derive(Debug, Args)]
+pub struct Movie {
+    /// Scene file (TOML)
+    scene: PathBuf,
+    /// How many frames
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    frames: u32,
+    #[command(flatten)]
+    span: Span,
+    /// Folder for the frames frame_0000.exr, frame_0001.exr, …; a second run of the same command
+    /// goes on where the first was stopped
+    #[arg(short, long, value_name = "FOLDER")]
+    output: PathBuf,
+    /// Change a value of the scene, e.g. hole.spin=0.5 or spot.0.phase_deg=90
+    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
+    overrides: Vec<String>,
+    #[command(flatten)]
+    viewing: viewing::Viewing,
+    #[command(flatten)]
+    look: PreviewOptions,
+    #[command(flatten)]
+    overlay: OverlayOptions,
+}
+
+impl Movie {
+    /// Renders what is missing, then makes the animations.
+    pub fn run(&self) -> anyhow::Result<()> {
+        let source = Source::new(Some(&self.scene))?;
+        let (text, scene) = source.scene(&self.overrides)?;
+        let times = self.span.times(self.frames, &scene)?;
+        let animations = self.viewing.outputs(self.frames)?;
+        let files = assets::load(&scene, &source.folder, &animations.files())?;
+        animations.files().iter().try_for_each(|output| output.spares(&self.scene))?;
+        let mut film = Film::new(&scene, files.decoded).with_context(|| source.name.clone())?;
+        if animations.any() {
+            self.look.channels(&scene, &film.names())?;
+            self.overlay.check(&scene, &film.names())?;
+        } else if self.overlay.any() {
+            bail!("marks are drawn into pictures to look at: give --gif, --apng or --png");
+        }
+        let of = Origin { name: &source.name, text: &text, files: &files.identity };
+        let mut sequence = Sequence::new(&self.output, &of, &times)?;
+        for input in iter::once(&self.scene).chain(&files.paths) {
+            sequence.spare(input)?;
+        }
+        if !film.changes() && self.frames > 1 {
+            eprintln!("warning: nothing in this scene moves: all frames are the same");
+        }
+        sequence.find()?;
+        self.render(&mut film, &mut sequence).with_context(|| source.name.clone())?;
+        output::print(&format!("{}\n", self.output.display()))?;
+        animations.write(&sequence, self.look.look(&scene), |picture, look, white| {
+            self.overlay.draw(&scene, (picture, 1), look, white)
+        })
+    }
+
+    /// Renders the frames that are missing, batch by batch.
+    fn render(&self, film: &mut Film, sequence: &mut Sequence) -> anyhow::Result<()> {
+        let missing = sequence.missing();
+        let (count, start) = (missing.len(), Instant::now());
+        let rows = sequence.height();
+        let batches: Vec<&[usize]> = missing.chunks(film.batch()).collect();
+        let bar = progress::bar((batches.len() * rows) as u64);
+        let interrupted = interrupt::flag();
+        let mut unresolved = 0;
+        for batch in batches {
+            let times: Vec<f64> = batch.iter().map(|k| sequence.time(*k)).collect();
+            let frames = film.frames(&times, &|rows| {
+                bar.inc(rows as u64);
+                !interrupted.load(Ordering::Relaxed)
+            });
+            let frames = match frames {
+                Err(RenderError::Stopped) => {
+                    bar.finish_and_clear();
+                    let there = sequence.len() - sequence.missing().len();
+                    let (all, folder) = (sequence.len(), self.output.display());
+                    bail!(
+                        "stopped: {there} of {all} frames are in {folder}; the same command goes on"
+                    )
+                }
+                other => other?,
+            };
+            unresolved += frames.iter().map(Frame::unresolved).sum::<u64>();
+            sequence.write(film, batch, frames)?;
+        }
+        bar.finish_and_clear();
+        let seconds = start.elapsed().as_secs_f64();
+        eprintln!(
+            "{count} frames rendered in {seconds:.2} s, {} were there",
+            sequence.len() - count
+        );
+        if unresolved > 0 {
+            eprintln!("warning: {unresolved} rays unresolved, shown as dark");
+        }
+        Ok(())
+    }
+}

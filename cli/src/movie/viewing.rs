@@ -1,0 +1,153 @@
+//! Films to look at: 8-bit pictures of the frames with one common exposure.
+
+use super::frames::Sequence;
+use crate::output::{self, Output};
+use crate::progress;
+use anyhow::{Context, bail};
+use clap::Args;
+use image::RgbImage;
+use kerrlight_tomo::image::Picture;
+use kerrlight_tomo::image::animation::{Apng, Gif, Palette};
+use kerrlight_tomo::image::preview::{self, Look};
+use std::path::PathBuf;
+
+/// Options of what is made to be looked at.
+#[derive(Debug, Args)]
+pub struct Viewing {
+    /// Where to write a GIF: 256 colours, shown everywhere
+    #[arg(long, value_name = "FILE.gif")]
+    gif: Option<PathBuf>,
+    /// Where to write an animated PNG: all colours
+    #[arg(long, value_name = "FILE.png")]
+    apng: Option<PathBuf>,
+    /// Write a PNG beside each EXR
+    #[arg(long)]
+    png: bool,
+    /// Frames per second of the GIF and the APNG
+    #[arg(long, value_name = "N", default_value = "25", value_parser = clap::value_parser!(u16).range(1..=50))]
+    fps: u16,
+    /// The value that is white in all pictures [default: the largest of all frames, but for 0.2 %
+    /// of the lit pixels]
+    #[arg(long, value_name = "X")]
+    white: Option<f32>,
+}
+
+/// The files that are asked for, checked.
+pub struct Animations {
+    gif: Option<Output>,
+    apng: Option<Output>,
+    png: bool,
+    frames: u32,
+    per_second: u16,
+    white: Option<f32>,
+}
+
+/// A palette is made from at most this many frames.
+const PALETTE_FRAMES: usize = 12;
+
+impl Viewing {
+    /// Checks where files are to go.
+    pub fn outputs(&self, frames: u32) -> anyhow::Result<Animations> {
+        let check = |path: &Option<PathBuf>, extension| {
+            path.as_deref().map(|path| Output::new(path, extension)).transpose()
+        };
+        if self.white.is_some_and(|white| !(white.is_finite() && white > 0.0)) {
+            bail!("--white is not allowed: a finite number above 0");
+        }
+        Ok(Animations {
+            gif: check(&self.gif, "gif")?,
+            apng: check(&self.apng, "png")?,
+            png: self.png,
+            frames,
+            per_second: self.fps,
+            white: self.white,
+        })
+    }
+}
+
+impl Animations {
+    /// The files of their own.
+    pub fn files(&self) -> Vec<&Output> {
+        [&self.gif, &self.apng].into_iter().flatten().collect()
+    }
+
+    /// Whether anything is to be looked at.
+    pub fn any(&self) -> bool {
+        self.gif.is_some() || self.apng.is_some() || self.png
+    }
+
+    /// Draws all frames and writes what is asked for.
+    pub fn write(
+        &self,
+        sequence: &Sequence,
+        look: Look,
+        draw: impl Fn(&Picture, Look, f32) -> anyhow::Result<RgbImage>,
+    ) -> anyhow::Result<()> {
+        if !self.any() {
+            return Ok(());
+        }
+        let white = match self.white {
+            Some(white) => white,
+            None => common_white(sequence, look)?,
+        };
+        let draw = |k: usize| draw(&sequence.read(k)?, look, white);
+        let first = draw(0)?;
+        let size = [first.width(), first.height()];
+        let (mut gif_bytes, mut apng_bytes) = (Vec::new(), Vec::new());
+        let mut gif = match &self.gif {
+            Some(_) => {
+                let palette = palette(sequence.len(), draw)?;
+                Some(Gif::new(&mut gif_bytes, size, palette, self.per_second)?)
+            }
+            None => None,
+        };
+        let mut apng = match &self.apng {
+            Some(_) => Some(Apng::new(&mut apng_bytes, size, self.frames, self.per_second)?),
+            None => None,
+        };
+        let bar = progress::frames(sequence.len() as u64);
+        for k in 0..sequence.len() {
+            let drawn = draw(k)?;
+            gif.as_mut().map(|film| film.push(&drawn)).transpose()?;
+            apng.as_mut().map(|film| film.push(&drawn)).transpose()?;
+            if self.png {
+                let bytes = preview::encode(&drawn).context("cannot encode the PNG")?;
+                Output::new(&sequence.path(k, "png"), "png")?.write(&bytes)?;
+            }
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        drop(gif);
+        apng.map(Apng::finish).transpose()?;
+        for (output, bytes) in [(&self.gif, gif_bytes), (&self.apng, apng_bytes)] {
+            if let Some(output) = output {
+                output.write(&bytes)?;
+                output::print(&format!("{}\n", output.shown().display()))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// One exposure for all frames: that of the brightest.
+fn common_white(sequence: &Sequence, look: Look) -> anyhow::Result<f32> {
+    let mut white = 0.0f32;
+    for k in 0..sequence.len() {
+        let picture = sequence.read(k)?;
+        let lit = picture.channels.iter().any(|c| c.values.iter().any(|v| *v > 0.0));
+        // A dark frame has no exposure of its own.
+        if lit {
+            white = white.max(preview::white(&picture, look).context("cannot draw the frames")?);
+        }
+    }
+    Ok(if white > 0.0 { white } else { 1.0 })
+}
+
+fn palette(
+    frames: usize,
+    draw: impl Fn(usize) -> anyhow::Result<RgbImage>,
+) -> anyhow::Result<Palette> {
+    let step = frames.div_ceil(PALETTE_FRAMES).max(1);
+    let some: Vec<RgbImage> = (0..frames).step_by(step).map(draw).collect::<Result<_, _>>()?;
+    Ok(Palette::of(&some))
+}

@@ -1,0 +1,195 @@
+//! Animations for a quick look: animated PNG and GIF.
+
+use color_quant::NeuQuant;
+use image::RgbImage;
+use std::collections::{BTreeSet, HashMap};
+
+/// Why there is no animation.
+#[derive(Debug, thiserror::Error)]
+pub enum AnimationError {
+    /// The PNG encoder failed.
+    #[error(transparent)]
+    Png(#[from] png::EncodingError),
+    /// The GIF encoder failed.
+    #[error(transparent)]
+    Gif(#[from] gif::EncodingError),
+    /// A GIF has at most 65535 pixels a side.
+    #[error("a GIF has at most 65535 pixels a side, these frames have {0} x {1}")]
+    TooLarge(u32, u32),
+}
+
+/// An animated PNG in memory: all colours, but not shown by every viewer.
+pub struct Apng<'a>(png::Writer<&'a mut Vec<u8>>);
+
+impl<'a> Apng<'a> {
+    /// An animation of `frames` frames that repeats for ever.
+    ///
+    /// # Errors
+    /// If the encoder refuses the size.
+    pub fn new(
+        bytes: &'a mut Vec<u8>,
+        [width, height]: [u32; 2],
+        frames: u32,
+        per_second: u16,
+    ) -> Result<Self, AnimationError> {
+        let mut encoder = png::Encoder::new(bytes, width, height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_animated(frames, 0)?;
+        encoder.set_frame_delay(1, per_second)?;
+        Ok(Apng(encoder.write_header()?))
+    }
+
+    /// Appends a frame.
+    ///
+    /// # Errors
+    /// If it has another size, or is one too many.
+    pub fn push(&mut self, frame: &RgbImage) -> Result<(), AnimationError> {
+        Ok(self.0.write_image_data(frame.as_raw())?)
+    }
+
+    /// Ends the animation.
+    ///
+    /// # Errors
+    /// On a failure of the encoder.
+    pub fn finish(self) -> Result<(), AnimationError> {
+        Ok(self.0.finish()?)
+    }
+}
+
+/// 256 colours for all frames of a GIF: a palette for each frame would flicker.
+pub struct Palette {
+    /// R, G, B of each colour.
+    colors: Vec<u8>,
+    /// What finds the nearest of many; few are all there.
+    quantizer: Option<NeuQuant>,
+    known: HashMap<[u8; 3], u8>,
+}
+
+impl Palette {
+    /// Colours that suit these frames (Dekker 1994).
+    pub fn of(frames: &[RgbImage]) -> Self {
+        const MOST: usize = 1 << 20;
+        let all: usize = frames.iter().map(|frame| frame.as_raw().len() / 3).sum();
+        // An odd step does not follow columns.
+        let step = (all / MOST) | 1;
+        let pixels = frames.iter().flat_map(|frame| frame.pixels()).step_by(step);
+        let samples: Vec<u8> = pixels.flat_map(|p| [p.0[0], p.0[1], p.0[2], 255]).collect();
+        let all: BTreeSet<[u8; 3]> = samples.chunks_exact(4).map(|c| [c[0], c[1], c[2]]).collect();
+        if all.len() <= 256 {
+            let colors = all.into_iter().flatten().collect();
+            return Palette { colors, quantizer: None, known: HashMap::new() };
+        }
+        let quantizer = NeuQuant::new(3, 256, &samples);
+        let colors = quantizer.color_map_rgb();
+        Palette { colors, quantizer: Some(quantizer), known: HashMap::new() }
+    }
+
+    fn index(&mut self, color: [u8; 3]) -> u8 {
+        let Palette { colors, quantizer, known } = self;
+        let distance = |c: &[u8]| -> u32 {
+            c.iter().zip(color).map(|(a, b)| u32::from(a.abs_diff(b)).pow(2)).sum()
+        };
+        let nearest = || match quantizer {
+            Some(quantizer) => quantizer.index_of(&[color[0], color[1], color[2], 255]) as u8,
+            None => {
+                let all = colors.chunks_exact(3).enumerate();
+                all.min_by_key(|(_, c)| distance(c)).map_or(0, |(k, _)| k as u8)
+            }
+        };
+        *known.entry(color).or_insert_with(nearest)
+    }
+}
+
+/// A GIF in memory: 256 colours, shown everywhere.
+pub struct Gif<'a> {
+    encoder: gif::Encoder<&'a mut Vec<u8>>,
+    palette: Palette,
+    /// Hundredths of a second.
+    delay: u16,
+}
+
+impl<'a> Gif<'a> {
+    /// An animation that repeats for ever. GIF counts in hundredths of a second.
+    ///
+    /// # Errors
+    /// If the size is none of a GIF.
+    pub fn new(
+        bytes: &'a mut Vec<u8>,
+        [width, height]: [u32; 2],
+        palette: Palette,
+        per_second: u16,
+    ) -> Result<Self, AnimationError> {
+        let too_large = |_| AnimationError::TooLarge(width, height);
+        let size = [width, height].map(u16::try_from);
+        let [width, height] = [size[0].map_err(too_large)?, size[1].map_err(too_large)?];
+        let colors = palette.colors.clone();
+        let mut encoder = gif::Encoder::new(bytes, width, height, &colors)?;
+        encoder.set_repeat(gif::Repeat::Infinite)?;
+        let delay = (100.0 / f64::from(per_second.max(1))).round().max(2.0) as u16;
+        Ok(Gif { encoder, palette, delay })
+    }
+
+    /// Appends a frame.
+    ///
+    /// # Errors
+    /// If the encoder fails.
+    pub fn push(&mut self, frame: &RgbImage) -> Result<(), AnimationError> {
+        let pixels: Vec<u8> = frame.pixels().map(|p| self.palette.index(p.0)).collect();
+        // The size was checked when the animation began.
+        let (width, height) = (frame.width() as u16, frame.height() as u16);
+        let frame = gif::Frame {
+            delay: self.delay,
+            ..gif::Frame::from_indexed_pixels(width, height, pixels, None)
+        };
+        Ok(self.encoder.write_frame(&frame)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frames() -> Vec<RgbImage> {
+        let color = |x: u32, k: u8| image::Rgb([if x < 4 { 250 } else { 0 }, 10 * k, 7]);
+        (0..3).map(|k| RgbImage::from_fn(8, 5, |x, _| color(x, k))).collect()
+    }
+
+    #[test]
+    fn exact_apng_frames() {
+        let mut bytes = Vec::new();
+        let mut film = Apng::new(&mut bytes, [8, 5], 3, 25).unwrap();
+        for frame in &frames() {
+            film.push(frame).unwrap();
+        }
+        film.finish().unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().unwrap();
+        assert_eq!(reader.info().animation_control().unwrap().num_frames, 3);
+        let mut data = vec![0; 8 * 5 * 3];
+        for frame in &frames() {
+            reader.next_frame(&mut data).unwrap();
+            assert_eq!(&data, frame.as_raw());
+        }
+    }
+
+    #[test]
+    fn exact_gif_frames_with_one_palette() {
+        let frames = frames();
+        let mut bytes = Vec::new();
+        let mut film = Gif::new(&mut bytes, [8, 5], Palette::of(&frames), 20).unwrap();
+        for frame in &frames {
+            film.push(frame).unwrap();
+        }
+        drop(film);
+        let mut options = gif::DecodeOptions::new();
+        options.set_color_output(gif::ColorOutput::RGBA);
+        let mut reader = options.read_info(bytes.as_slice()).unwrap();
+        for frame in &frames {
+            let read = reader.read_next_frame().unwrap().unwrap();
+            assert_eq!((read.delay, read.palette.is_none()), (5, true));
+            for (a, b) in read.buffer.chunks(4).zip(frame.pixels()) {
+                assert_eq!(a[..3], b.0);
+            }
+        }
+        assert!(reader.read_next_frame().unwrap().is_none());
+    }
+}
