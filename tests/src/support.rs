@@ -67,17 +67,24 @@ pub fn scene(text: &str, overrides: &[&str]) -> Scene {
     Scene::parse(&text).unwrap_or_else(|e| panic!("{overrides:?}: {e}"))
 }
 
-/// Renders a scene whose sky picture, if any, lies in the folder of scenes.
+/// Renders a scene whose files, if any, lie in the folder of scenes.
 pub fn render(scene: &Scene) -> Picture {
+    use kerrlight_tomo::emission::mesh::MeshFile;
+    use kerrlight_tomo::emission::sky::Panorama;
     use kerrlight_tomo::scene::Sky;
+    let read = |name: &str| {
+        std::fs::read(root().join("scenes").join(name)).map_err(|error| format!("{name}: {error}"))
+    };
     let sky = match &scene.sky {
         Some(Sky::Image(image)) => {
-            let bytes = std::fs::read(root().join("scenes").join(&image.path)).expect("sky");
-            Some(kerrlight_tomo::emission::sky::Panorama::decode(&bytes).expect("a picture"))
+            Some(Panorama::decode(&read(&image.path).expect("sky")).expect("a picture"))
         }
         _ => None,
     };
-    kerrlight_tomo::render::render(scene, sky, &|_| true).expect("a picture").picture
+    let mesh = |path: &str| MeshFile::decode(&read(path).expect("a mesh"), &read).expect("a mesh");
+    let meshes = scene.mesh.iter().map(|m| mesh(&m.path)).collect();
+    let assets = kerrlight_tomo::transport::Assets { sky, meshes };
+    kerrlight_tomo::render::render(scene, assets, &|_| true).expect("a picture").picture
 }
 
 /// The message of a run that must fail, leaving `folder` as it was.
