@@ -69,22 +69,20 @@ pub fn scene(text: &str, overrides: &[&str]) -> Scene {
 
 /// Renders a scene whose files, if any, lie in the folder of scenes.
 pub fn render(scene: &Scene) -> Picture {
-    use kerrlight_tomo::emission::mesh::MeshFile;
-    use kerrlight_tomo::emission::sky::Panorama;
+    use kerrlight_tomo::emission::{mesh::MeshFile, sky::Panorama};
     use kerrlight_tomo::scene::Sky;
-    let read = |name: &str| {
-        std::fs::read(root().join("scenes").join(name)).map_err(|error| format!("{name}: {error}"))
-    };
+    use kerrlight_tomo::transport::Assets;
+    let read = |path: &str| std::fs::read(root().join("scenes").join(path)).expect(path);
     let sky = match &scene.sky {
-        Some(Sky::Image(image)) => {
-            Some(Panorama::decode(&read(&image.path).expect("sky")).expect("a picture"))
-        }
+        Some(Sky::Image(image)) => Some(Panorama::decode(&read(&image.path)).expect("a picture")),
         _ => None,
     };
-    let mesh = |path: &str| MeshFile::decode(&read(path).expect("a mesh"), &read).expect("a mesh");
-    let meshes = scene.mesh.iter().map(|m| mesh(&m.path)).collect();
-    let assets = kerrlight_tomo::transport::Assets { sky, meshes };
-    kerrlight_tomo::render::render(scene, assets, &|_| true).expect("a picture").picture
+    let resource = |name: &str| Ok(read(name));
+    let mesh = |path: &str| MeshFile::decode(&read(path), &resource).expect("a mesh");
+    let meshes = scene.mesh.iter().map(|one| mesh(&one.path)).collect();
+    kerrlight_tomo::render::render(scene, Assets { sky, meshes }, &|_| true)
+        .expect("a picture")
+        .picture
 }
 
 /// The message of a run that must fail, leaving `folder` as it was.

@@ -106,6 +106,42 @@ impl GasModel {
         if g > 0.0 { g } else { 0.0 }
     }
 
+    /// Contravariant four-velocity; `None` where nothing can move like this.
+    fn velocity(&self, r: f64, u: f64) -> Option<[f64; 4]> {
+        let a = self.hole.spin();
+        let sin2 = ((1.0 - u) * (1.0 + u)).max(1e-300);
+        let (delta, sigma) = (self.hole.delta(r), self.hole.sigma(r, u));
+        let across = r * r + a * a;
+        let area = across * across - a * a * delta * sin2;
+        // Inverse metric times ΔΣ.
+        let (tp, pp) = (-2.0 * a * r, delta / sin2 - a * a);
+        let big_r = r * sin2.sqrt();
+        let raised = |ut: f64, up: f64| {
+            let scale = 1.0 / (delta * sigma);
+            [(tp * up - area * ut) * scale, (tp * ut + pp * up) * scale]
+        };
+        match self.motion {
+            GasMotion::AngularMomentum { l0 } => {
+                let l = l0 * big_r * big_r.sqrt() / (1.0 + big_r);
+                let norm = area + 2.0 * l * tp - l * l * pp;
+                let size = (delta * sigma / norm).sqrt();
+                let [t, phi] = raised(-size, size * l);
+                (norm > 0.0).then_some([t, 0.0, 0.0, phi])
+            }
+            GasMotion::Keplerian => {
+                let omega = 1.0 / (big_r * big_r.sqrt() + a);
+                let lift = 1.0 - a * omega * sin2;
+                let norm = 1.0 - 2.0 * r / sigma * lift * lift - across * sin2 * omega * omega;
+                let t = 1.0 / norm.sqrt();
+                (norm > 0.0).then_some([t, 0.0, 0.0, t * omega])
+            }
+            GasMotion::FreeFall => {
+                let [t, phi] = raised(-1.0, 0.0);
+                Some([t, -(2.0 * r * across).sqrt() / sigma, 0.0, phi])
+            }
+        }
+    }
+
     /// g on circles with Ω = 1/(R^{3/2} + a).
     #[inline(always)]
     fn keplerian(&self, r: f64, u: f64, lambda: f64) -> f64 {
@@ -151,6 +187,10 @@ impl Medium for GasModel {
 
     fn scale(&self) -> f64 {
         self.emissivity * self.scale_radius
+    }
+
+    fn four_velocity(&self, r: f64, u: f64) -> Option<[f64; 4]> {
+        self.velocity(r, u)
     }
 
     fn changes(&self) -> bool {

@@ -34,6 +34,7 @@ const COARSE: usize = 128;
 struct Light {
     intensity: f64,
     rgb: [f32; 3],
+    stokes: [f64; 3],
     /// Lensing band, fate and whether there is emission; u32::MAX is never one.
     kind: u32,
     unresolved: bool,
@@ -52,6 +53,7 @@ impl From<&Glimpse> for Light {
         Light {
             intensity: seen.intensity,
             rgb: seen.rgb,
+            stokes: seen.stokes,
             kind: seen.crossings << 3 | (seen.fate as u32) << 1 | lit,
             unresolved: seen.fate == Fate::Unresolved,
         }
@@ -166,10 +168,14 @@ impl Cut {
     fn finish(&self, pixel: &mut Pixel) {
         pixel.intensity = 0.0;
         pixel.rgb = [0.0; 3];
+        pixel.stokes = [0.0; 3];
         for cell in &self.cells {
             let share = area(cell.level + 1);
             for light in &cell.quarters {
                 pixel.intensity += share * light.intensity;
+                for (sum, x) in pixel.stokes.iter_mut().zip(light.stokes) {
+                    *sum += share * x;
+                }
                 for (sum, light) in pixel.rgb.iter_mut().zip(light.rgb) {
                     *sum += share as f32 * light;
                 }
@@ -293,6 +299,7 @@ fn first(
             pixels.push(Pixel {
                 intensity: center.intensity,
                 rgb: center.rgb,
+                stokes: center.stokes,
                 center,
                 unresolved: u32::from(center.fate == Fate::Unresolved),
                 rays: 1,

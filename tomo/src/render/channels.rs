@@ -43,10 +43,18 @@ impl ChannelKind {
     }
 }
 
+const fn stokes(
+    name: &'static str,
+    meaning: &'static str,
+    value: fn(&Pixel) -> f64,
+) -> ChannelKind {
+    ChannelKind { scales: true, ..ChannelKind::new(name, "intensity_unit", meaning, value) }
+}
+
 const LIGHT: &str = "linear light: emission in scene units times its colour, plus the sky";
 
 /// Every channel, in the order in which they are listed.
-pub static CHANNELS: [ChannelKind; 12] = [
+pub static CHANNELS: [ChannelKind; 15] = [
     ChannelKind::new("R", "scene unit", LIGHT, |p| f64::from(p.rgb[0])),
     ChannelKind::new("G", "scene unit", LIGHT, |p| f64::from(p.rgb[1])),
     ChannelKind::new("B", "scene unit", LIGHT, |p| f64::from(p.rgb[2])),
@@ -58,6 +66,18 @@ pub static CHANNELS: [ChannelKind; 12] = [
             "mean over the pixel, without the sky",
             |p| p.intensity,
         )
+    },
+    ChannelKind {
+        present: |stage, _| stage.polarization()[0],
+        ..stokes("Q", "Stokes Q, positive for polarisation along north and south", |p| p.stokes[0])
+    },
+    ChannelKind {
+        present: |stage, _| stage.polarization()[0],
+        ..stokes("U", "Stokes U, positive along north-east and south-west", |p| p.stokes[1])
+    },
+    ChannelKind {
+        present: |stage, _| stage.polarization()[1],
+        ..stokes("V", "Stokes V, positive for right-handed light (IAU)", |p| p.stokes[2])
     },
     ChannelKind {
         present: |_, refined| refined,

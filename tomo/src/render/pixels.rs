@@ -10,6 +10,8 @@ use std::ops::Range;
 pub(super) struct Pixel {
     pub intensity: f64,
     pub rgb: [f32; 3],
+    /// Q, U, V.
+    pub stokes: [f64; 3],
     pub center: Glimpse,
     pub unresolved: u32,
     pub rays: u32,
@@ -106,9 +108,13 @@ fn mean(rays: &[Glimpse], side: usize) -> Pixel {
         for (sum, light) in pixel.rgb.iter_mut().zip(ray.rgb) {
             *sum += light;
         }
+        for (sum, x) in pixel.stokes.iter_mut().zip(ray.stokes) {
+            *sum += x;
+        }
         pixel.unresolved += u32::from(ray.fate == Fate::Unresolved);
     }
     pixel.intensity /= rays.len() as f64;
+    pixel.stokes = pixel.stokes.map(|x| x / rays.len() as f64);
     pixel.rgb = pixel.rgb.map(|c| c / rays.len() as f32);
     pixel
 }

@@ -1,7 +1,8 @@
 //! Ranges of a scene's values, and errors that point at the line.
 
 use super::{Disc, Gas, GasMotion, GasProfile, Mesh, Scene, Sky, Spot};
-use kerrlight_geodesic::{Kerr, orbits};
+use crate::polarization::PowerLaw;
+use kerrlight_geodesic::{Kerr, OutOfRange, orbits};
 use toml_edit::{Document, Item};
 
 /// Why a scene text is not a scene.
@@ -322,12 +323,37 @@ fn check_combinations(scene: &Scene) -> Result<(), Invalid> {
         let allowed = "true with a [camera]: straight rays are those of a distant observer";
         return Err(Invalid::new("effects.lensing", false, allowed));
     }
+    check_polarization(scene)?;
     match effects.half_orbits {
         Some(n) if n > 100 => {
             Err(Invalid::new("effects.half_orbits", n, "a whole number in [0, 100]"))
         }
         _ => Ok(()),
     }
+}
+
+fn check_polarization(scene: &Scene) -> Result<(), Invalid> {
+    let effects = &scene.effects;
+    let (key, circular) = ("effects.polarization", effects.circular_polarization_lorentz_factor);
+    if !effects.polarization {
+        let unused = if scene.magnetic_field.is_some() { "magnetic_field" } else { key };
+        if scene.magnetic_field.is_some() || circular.is_some() {
+            let allowed = format!("true with `{unused}`, or without it and what belongs to it");
+            return Err(Invalid::new(key, false, allowed));
+        }
+        return Ok(());
+    }
+    if !(effects.redshift && effects.lensing && scene.camera.is_none()) {
+        let allowed = "only with redshift = true, with lensing and without a [camera]";
+        return Err(Invalid::new(key, true, allowed));
+    }
+    let Some(field) = &scene.magnetic_field else {
+        return Err(Invalid::missing("magnetic_field", "needed with polarization = true"));
+    };
+    let wrong = |error: OutOfRange| Invalid::new(error.field, shown(error.value), error.allowed);
+    field.check().map_err(wrong)?;
+    let index = effects.spectral_index.unwrap_or(f64::NAN);
+    PowerLaw::new(index, circular).map(|_| ()).map_err(wrong)
 }
 
 fn check_gas(gas: &Gas, hole: &Kerr) -> Result<(), Invalid> {

@@ -11,6 +11,7 @@ pub use camera::{CameraConfig, CameraKey, CameraMotion, Pose};
 pub use check::SceneError;
 pub use overrides::apply_override;
 
+use crate::polarization::MagneticField;
 use kerrlight_geodesic::{Kerr, Method, orbits};
 use serde::{Deserialize, Serialize};
 
@@ -36,6 +37,9 @@ pub struct Scene {
     /// A thin equatorial disc.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub disc: Option<Disc>,
+    /// The field of the gas, for polarised light.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub magnetic_field: Option<MagneticField>,
     /// A volumetric flow.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gas: Option<Gas>,
@@ -162,6 +166,14 @@ pub struct Effects {
     /// number n + 1 and n + 2 of the equatorial plane. All of them without this key.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub half_orbits: Option<u32>,
+    /// Polarised synchrotron light of electrons with the power law of `spectral_index` in the
+    /// field `[magnetic_field]`: emissivities become those across a field of unit strength.
+    #[serde(default)]
+    pub polarization: bool,
+    /// Lorentz factor of the electrons that radiate at the observed frequency, by which circular
+    /// polarisation falls; without it V is 0 and not computed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub circular_polarization_lorentz_factor: Option<f64>,
     /// The sky is averaged over what the bundle of rays between neighbouring rays covers of it.
     #[serde(default)]
     pub ray_bundles: bool,
@@ -176,6 +188,8 @@ impl Default for Effects {
             slow_light: false,
             absorption: false,
             half_orbits: None,
+            polarization: false,
+            circular_polarization_lorentz_factor: None,
             ray_bundles: false,
         }
     }

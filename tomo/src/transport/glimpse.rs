@@ -35,6 +35,8 @@ pub struct Glimpse {
     pub azimuth: f64,
     /// Delay of the brightest contribution in M; 0 where there is none.
     pub delay: f64,
+    /// Stokes Q, U, V of the emission, in the unit of intensity; 0 without polarisation.
+    pub stokes: [f64; 3],
     /// Optical depth of the way to the ray's end; 0 where nothing absorbs.
     pub optical_depth: f64,
     /// What became of the ray.
@@ -63,6 +65,7 @@ pub(super) struct Gather {
     pub brightest: f64,
     pub place: Place,
     pub depth: f64,
+    pub stokes: [f64; 3],
 }
 
 impl Gather {
@@ -74,6 +77,7 @@ impl Gather {
             brightest: 0.0,
             place: Place::default(),
             depth: 0.0,
+            stokes: [0.0; 3],
         }
     }
 
@@ -86,11 +90,19 @@ impl Gather {
         }
     }
 
+    /// Adds Q, U, V of light of some intensity, for which they are `share` each.
+    pub fn add_stokes(&mut self, intensity: f64, share: [f64; 3]) {
+        for (sum, x) in self.stokes.iter_mut().zip(share) {
+            *sum += intensity * x;
+        }
+    }
+
     /// Adds the light of a medium.
     pub fn add_light(&mut self, light: &Light, color: [f32; 3]) {
         self.intensity += light.intensity;
         self.shift += light.shift;
         self.depth += light.depth;
+        self.add_stokes(1.0, light.stokes);
         for (channel, tint) in self.rgb.iter_mut().zip(color) {
             *channel += tint * light.intensity as f32;
         }

@@ -13,6 +13,9 @@ pub trait Medium: core::fmt::Debug + Send + Sync {
     fn color(&self) -> [f32; 3];
     /// Intensity that its brightest parts may reach: what errors of faint rays are measured by.
     fn scale(&self) -> f64;
+    /// Contravariant Boyer–Lindquist four-velocity of its matter, for polarised light; `None` where
+    /// there is none.
+    fn four_velocity(&self, r: f64, cos_theta: f64) -> Option<[f64; 4]>;
     /// Whether it looks different at different times.
     fn changes(&self) -> bool;
     /// Whether [`fill`](Self::fill) gives absorption.
@@ -50,6 +53,8 @@ pub struct Emission {
     pub absorption: Vec<f64>,
     /// g; 1 where redshift is off.
     pub redshift: Vec<f64>,
+    /// Q, U, V over I; empty without polarisation.
+    pub polarization: Vec<[f64; 3]>,
 }
 
 impl Emission {
@@ -58,6 +63,7 @@ impl Emission {
         self.emissivity.clear();
         self.absorption.clear();
         self.redshift.clear();
+        self.polarization.clear();
     }
 }
 
@@ -68,6 +74,8 @@ pub(super) struct Light {
     pub intensity: f64,
     /// ∫ g dI.
     pub shift: f64,
+    /// Q, U, V.
+    pub stokes: [f64; 3],
     /// Optical depth of the whole way.
     pub depth: f64,
     /// Its brightest node.
@@ -157,6 +165,7 @@ pub(super) fn gather(
     let panels = panels.zip(emission.redshift.chunks_exact(order));
     for (number, ((weights, emissivity), redshift)) in panels.enumerate() {
         let start = number * order;
+        let mut opaque = false;
         for ((gain, weight), j) in gains.iter_mut().zip(weights).zip(emissivity) {
             *gain = weight * j;
         }
@@ -166,9 +175,15 @@ pub(super) fn gather(
             for ((thick, weight), k) in thick.iter_mut().zip(weights).zip(absorption) {
                 *thick = weight * k;
             }
-            quadrature.absorb(&thick[..order], &mut light.depth, depths);
-            for (gain, depth) in gains.iter_mut().zip(&depths[start..]) {
-                *gain *= (-depth).exp();
+            let thick = &thick[..order];
+            if thick.iter().sum::<f64>() > OPAQUE {
+                light.error += shade_cells(thick, gains, &mut light.depth, depths);
+                opaque = true;
+            } else {
+                quadrature.absorb(thick, &mut light.depth, depths);
+                for (gain, depth) in gains.iter_mut().zip(&depths[start..]) {
+                    *gain *= (-depth).exp();
+                }
             }
         }
         for (i, (gain, g)) in gains.iter().zip(redshift).enumerate() {
@@ -178,13 +193,45 @@ pub(super) fn gather(
                 (most, brightest) = (gain / weights[i], Some(start + i));
             }
         }
-        light.error += quadrature.missed(gains);
+        if let Some(shares) = emission.polarization.get(start..start + order) {
+            for (gain, share) in gains.iter().zip(shares) {
+                for (sum, x) in light.stokes.iter_mut().zip(share) {
+                    *sum += gain * x;
+                }
+            }
+        }
+        if !opaque {
+            light.error += quadrature.missed(gains);
+        }
         if light.depth > DARK {
             break;
         }
     }
     light.place = brightest.map_or_else(Place::default, |k| Place::of_node(nodes, k));
     light
+}
+
+/// Optical depth of a panel beyond which e^{−D} is no polynomial over it.
+const OPAQUE: f64 = 2.0;
+
+/// What is seen of a panel that is optically thick: each node stands for a cell with a constant
+/// source function S = j/κ, of which S (1 − e^{−ΔD}) is seen. `gains` are those without
+/// absorption before and those that are seen after; the error is that of S taken from the
+/// neighbouring cell instead.
+fn shade_cells(thick: &[f64], gains: &mut [f64], depth: &mut f64, depths: &mut Vec<f64>) -> f64 {
+    let (mut error, mut last) = (0.0, None);
+    for (gain, thick) in gains.iter_mut().zip(thick) {
+        let seen = (-*depth).exp() * -(-thick).exp_m1();
+        depths.push(*depth + 0.5 * thick);
+        *depth += thick;
+        if *thick > 0.0 {
+            let source = *gain / thick;
+            *gain = source * seen;
+            error += (source - last.unwrap_or(source)).abs() * seen;
+            last = Some(source);
+        }
+    }
+    error
 }
 
 /// The most nodes of a panel.

@@ -9,6 +9,7 @@ mod glimpse;
 mod medium;
 mod meshes;
 mod meter;
+mod polarized;
 mod rays;
 mod spots;
 mod straight;
@@ -36,6 +37,7 @@ use kerrlight_geodesic::{
     Kerr, Observer, OutOfRange, Path, PathPoint, Ray, Tracer, footprint, footprint::Number,
 };
 use meshes::{Hit as MeshHit, MeshTree};
+use polarized::Polarization;
 use rays::{End, Sight};
 use spots::{Met, SpotTree};
 use std::sync::{Arc, Mutex};
@@ -57,6 +59,7 @@ pub struct Stage {
     redshift: Option<f64>,
     slow_light: bool,
     lensing: bool,
+    polarization: Option<Polarization>,
     /// The last number of half-orbits that is seen.
     half_orbits: Option<u32>,
     /// Whether rays are traced in closed form where possible.
@@ -160,6 +163,7 @@ impl Stage {
             redshift,
             slow_light: scene.effects.slow_light,
             lensing: scene.effects.lensing,
+            polarization: Polarization::new(scene)?,
             half_orbits: scene.effects.half_orbits,
             tolerance: scene.tracer.tolerance,
             closed_form: scene.tracer.integrator == Integrator::Elliptic,
@@ -202,6 +206,12 @@ impl Stage {
     /// Whether g is computed.
     pub fn has_redshift(&self) -> bool {
         self.redshift.is_some()
+    }
+
+    /// Whether light is polarised, and whether circularly too.
+    pub fn polarization(&self) -> [bool; 2] {
+        let circular = self.polarization.as_ref().map(Polarization::is_circular);
+        [circular.is_some(), circular == Some(true)]
     }
 
     /// Whether anything absorbs.
@@ -267,7 +277,8 @@ impl Stage {
                 scratch.meter.stop(Part::Rays, clock);
                 if let Some(medium) = medium {
                     let clock = scratch.meter.start();
-                    self.fill_path(medium, k, times, scratch);
+                    let screen = self.screen_point(alpha[k], beta[k]);
+                    self.fill_path(medium, k, screen, times, scratch);
                     scratch.meter.stop(Part::Gas, clock);
                 }
             }
@@ -324,7 +335,9 @@ impl Stage {
         let sight = scratch.sights[k].clone();
         let mut still = Gather::new();
         let hits = &scratch.hits[sight.hits.clone()];
-        self.add_disc(hits, sight.lambda, sight.last_time(), &mut still);
+        let screen = self.screen_point(x, y);
+        let light = (sight.lambda, screen.as_ref());
+        self.add_disc(hits, light, sight.last_time(), &mut still);
         if sight.by_steps {
             self.add_meshes(scratch, sight.last_time(), &mut still);
         }
@@ -344,8 +357,10 @@ impl Stage {
             if let (Some(tree), true) = (trees.get(j), sight.by_steps) {
                 let end = sight.last_time();
                 match tree {
-                    Some(tree) => self.add_spots(*time, tree, ray, scratch, end, &mut gather),
-                    None => self.add_every_spot(*time, scratch, end, &mut gather),
+                    Some(tree) => {
+                        self.add_spots(*time, tree, (ray, screen), scratch, end, &mut gather)
+                    }
+                    None => self.add_every_spot(*time, (ray, screen), scratch, end, &mut gather),
                 }
             }
             gather.add_behind(sky);
@@ -428,6 +443,7 @@ fn glimpse(sight: &Sight, gather: Gather) -> Glimpse {
         azimuth: wrap(gather.place.azimuth),
         delay: gather.place.delay,
         optical_depth: gather.depth,
+        stokes: gather.stokes,
         fate,
     }
 }

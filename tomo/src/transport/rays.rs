@@ -5,6 +5,7 @@ use super::surface::Hit;
 use super::{Scratch, Stage};
 use crate::transport::glimpse::Place;
 use kerrlight_geodesic::analytic::ClosedForm;
+use kerrlight_geodesic::bundle::{Crossing, RayEnds};
 use kerrlight_geodesic::{Observer, OutOfRange, Outcome, Ray, Want};
 use std::sync::Arc;
 
@@ -65,7 +66,10 @@ impl Stage {
             let ray = observer.ray(&self.hole, alpha[k], beta[k])?;
             let first = scratch.hits.len();
             if self.disc.is_some() {
-                scratch.hits.extend(scratch.crossings.ray(k).map(|crossing| Hit {
+                let motion = PlaneMotion::new(&ray, &ends);
+                let found = scratch.crossings.ray(k).enumerate();
+                scratch.hits.extend(found.map(|(number, crossing)| Hit {
+                    rates: motion.rates(number, &crossing),
                     mino_time: crossing.mino_time,
                     place: Place {
                         radius: crossing.radius,
@@ -141,8 +145,9 @@ impl Stage {
         let (first, path, hits) = (scratch.hits.len(), &scratch.path, &mut scratch.hits);
         if self.disc.is_some() {
             hits.extend(path.equatorial_crossings().map(|mino_time| {
-                let place = Place::of_point(&path.at(mino_time));
-                Hit { mino_time, place, depth: 0.0 }
+                let point = path.at(mino_time);
+                let rates = [point.inverse_radius_rate, point.velocity[2]];
+                Hit { mino_time, place: Place::of_point(&point), rates, depth: 0.0 }
             }));
         }
         let end = match path.outcome() {
@@ -187,6 +192,32 @@ impl Stage {
             (Some(last), Some(next)) => 0.5 * (last + next),
             _ => f64::INFINITY,
         }
+    }
+}
+
+/// How a ray goes through the equatorial plane.
+struct PlaneMotion<'a> {
+    ray: &'a Ray,
+    /// Mino time of the turning point.
+    turning: f64,
+    /// d cos θ/dτ at the first crossing.
+    fall: f64,
+}
+
+impl<'a> PlaneMotion<'a> {
+    fn new(ray: &'a Ray, ends: &RayEnds) -> Self {
+        let turning = if ends.escapes { 0.5 * ends.mino_total } else { f64::INFINITY };
+        // Towards the plane; from a place in it a ray comes back to it from the side it left to.
+        let side = if ray.position[2] == 0.0 { ray.velocity[2] } else { ray.position[2] };
+        let eta = ray.eta.max(0.0);
+        PlaneMotion { ray, turning, fall: -eta.sqrt().copysign(side) }
+    }
+
+    /// dw/dτ and d cos θ/dτ at a crossing.
+    fn rates(&self, number: usize, crossing: &Crossing) -> [f64; 2] {
+        let speed = self.ray.potential.value(1.0 / crossing.radius).max(0.0).sqrt();
+        let w_rate = if crossing.mino_time < self.turning { speed } else { -speed };
+        [w_rate, if number.is_multiple_of(2) { self.fall } else { -self.fall }]
     }
 }
 

@@ -2,13 +2,15 @@
 
 use super::chord::ChordBound;
 use super::glimpse::{Gather, Place};
+use super::polarized::share;
 use super::tree::{Node, Tree, Walk};
+use super::volume::DepthProfile;
 use super::{Scratch, Stage};
 use crate::emission::spot::{Comoving, SpotModel};
 use crate::emission::spot_parts::SpotPart;
 use kerrlight_geodesic::flow::rotating_redshift;
 use kerrlight_geodesic::quadrature::gauss_4;
-use kerrlight_geodesic::{Kerr, Path, PathPoint, Ray};
+use kerrlight_geodesic::{Kerr, Path, PathPoint, Ray, ScreenPoint};
 use std::ops::ControlFlow;
 
 /// Where all spots can shine from: at one time, or ever.
@@ -60,7 +62,7 @@ impl Stage {
         &self,
         time: f64,
         tree: &SpotTree,
-        ray: &Ray,
+        (ray, screen): (&Ray, Option<ScreenPoint>),
         scratch: &mut Scratch,
         end: f64,
         gather: &mut Gather,
@@ -69,12 +71,13 @@ impl Stage {
             return;
         }
         self.meet_spots(time, tree, ray, scratch, end);
-        let Scratch { path, intervals, met, pieces, .. } = scratch;
+        let Scratch { path, intervals, met, pieces, volume, .. } = scratch;
+        let along = AlongRay { lambda: ray.lambda, screen, depths: &volume.profile };
         for same in met.chunk_by(|a, b| a.spot == b.spot) {
             pieces.clear();
             pieces.extend(same.iter().map(|met| met.piece));
             let spot = &self.spots[same[0].spot as usize];
-            self.add_spot(SpotLight::new(spot, time, pieces), path, intervals, end, gather);
+            self.add_spot(SpotLight::new(spot, time, pieces, along), path, intervals, end, gather);
         }
     }
 
@@ -113,13 +116,15 @@ impl Stage {
     pub(super) fn add_every_spot(
         &self,
         time: f64,
+        (ray, screen): (&Ray, Option<ScreenPoint>),
         scratch: &mut Scratch,
         end: f64,
         gather: &mut Gather,
     ) {
-        let Scratch { path, intervals, .. } = scratch;
+        let Scratch { path, intervals, volume, .. } = scratch;
+        let along = AlongRay { lambda: ray.lambda, screen, depths: &volume.profile };
         for spot in &self.spots {
-            let light = SpotLight::new(spot, time, &[[0.0, f64::INFINITY]]);
+            let light = SpotLight::new(spot, time, &[[0.0, f64::INFINITY]], along);
             self.add_spot(light, path, intervals, end, gather);
         }
     }
@@ -226,14 +231,36 @@ impl Stage {
         };
         // Where matter cannot move like this there is none.
         let Some(g) = g else { return };
-        let boost = self.redshift.map_or(1.0, |index| g.powf(2.0 + index));
+        let mut boost = self.redshift.map_or(1.0, |index| g.powf(2.0 + index));
         let path_length = self.hole.sigma(r, point.cos_theta()) * weight;
+        let AlongRay { lambda, screen, depths } = &light.along;
+        // Gas in front of it.
+        let depth = depths.at(point.mino_time);
+        if depth > 0.0 {
+            boost *= (-depth).exp();
+        }
+        if let Some(screen) = screen {
+            let omega = light.spot.angular_velocity(r);
+            let stokes = self.polarized_spot(point, *lambda, omega, screen);
+            boost *= stokes.i;
+            gather.add_stokes(boost * emissivity * path_length, share(&stokes));
+        }
         gather.add(boost * emissivity * path_length, g, light.spot.color);
         let density = boost * emissivity;
         if light.brightest.is_none_or(|(most, _)| density > most) {
             light.brightest = Some((density, *point));
         }
     }
+}
+
+/// What is known of the ray that spots are seen along.
+#[derive(Clone, Copy)]
+struct AlongRay<'a> {
+    lambda: f64,
+    /// Its place on the screen, if light is polarised.
+    screen: Option<ScreenPoint>,
+    /// Optical depth of the gas.
+    depths: &'a DepthProfile,
 }
 
 /// One spot's light along one ray.
@@ -243,13 +270,19 @@ struct SpotLight<'a> {
     observed: f64,
     /// Where it may shine, as intervals of Mino time in order.
     pieces: &'a [[f64; 2]],
+    along: AlongRay<'a>,
     /// The brightest point, and its emission per length.
     brightest: Option<(f64, PathPoint)>,
 }
 
 impl<'a> SpotLight<'a> {
-    fn new(spot: &'a SpotModel, observed: f64, pieces: &'a [[f64; 2]]) -> Self {
-        SpotLight { spot, observed, pieces, brightest: None }
+    fn new(
+        spot: &'a SpotModel,
+        observed: f64,
+        pieces: &'a [[f64; 2]],
+        along: AlongRay<'a>,
+    ) -> Self {
+        SpotLight { spot, observed, pieces, along, brightest: None }
     }
 
     fn can_shine(&self, from: f64, to: f64) -> bool {

@@ -68,7 +68,7 @@ impl Line {
         let s = -self.origin[2] / self.direction[2];
         let inside = s.is_finite() && s < self.ends[0] && s > self.ends[1];
         let (_, place) = self.place(s);
-        inside.then(|| Hit { mino_time: self.parameter(s), place, depth: 0.0 })
+        inside.then(|| Hit { mino_time: self.parameter(s), place, rates: [0.0; 2], depth: 0.0 })
     }
 
     fn is_captured(&self) -> bool {
@@ -93,7 +93,9 @@ impl Line {
         let (end, middle) = (end.min(until), self.parameter(0.0));
         let middle = middle.clamp(from, end.max(from));
         let legs = [[from, middle], [middle, end]].into_iter().filter(|[from, to]| to > from);
-        legs.map(|[from, to]| Piece::new([from, to], self.impact.max(1.0), split, falls)).collect()
+        // r² has its pole at χ = 0.
+        let rate = self.impact.max(1.0 / from);
+        legs.map(|[from, to]| Piece::new([from, to], rate, split, falls)).collect()
     }
 
     /// Nodes of the quadrature.
@@ -141,7 +143,7 @@ impl Stage {
     pub(super) fn fill_line(&self, line: &Line, k: usize, times: &[f64], scratch: &mut Scratch) {
         let Some(gas) = &self.gas else { return };
         let until = scratch.sights[k].last_time();
-        self.fill_ray(gas, k, times, scratch, |split, _, rule, columns| {
+        self.fill_ray(gas, k, None, times, scratch, |split, _, rule, columns| {
             let pieces = line.pieces(crate::transport::Medium::sphere(gas), until, split);
             line.nodes(rule, &pieces, columns);
         });

@@ -2,7 +2,9 @@
 
 use super::Stage;
 use super::glimpse::{Gather, Place, wrap};
+use super::polarized::share;
 use crate::emission::disc::DiscModel;
+use kerrlight_geodesic::ScreenPoint;
 use kerrlight_geodesic::flow::keplerian_redshift;
 
 /// Where a ray crosses the equatorial plane.
@@ -10,6 +12,8 @@ use kerrlight_geodesic::flow::keplerian_redshift;
 pub(super) struct Hit {
     pub mino_time: f64,
     pub place: Place,
+    /// dw/dτ and d cos θ/dτ, for polarised light.
+    pub rates: [f64; 2],
     /// Optical depth of the gas in front of it.
     pub depth: f64,
 }
@@ -23,27 +27,46 @@ impl Stage {
     }
 
     /// Light of the disc: I = g^{3+α} I_em at every crossing up to Mino time `end`.
-    pub(super) fn add_disc(&self, hits: &[Hit], lambda: f64, end: f64, gather: &mut Gather) {
+    pub(super) fn add_disc(
+        &self,
+        hits: &[Hit],
+        (lambda, screen): (f64, Option<&ScreenPoint>),
+        end: f64,
+        gather: &mut Gather,
+    ) {
         let Some(disc) = &self.disc else { return };
         for hit in hits.iter().take_while(|hit| hit.mino_time <= end) {
             if disc.covers(hit.place.radius) {
-                self.add_hit(disc, hit, lambda, gather);
+                self.add_hit(disc, hit, (lambda, screen), gather);
             }
         }
     }
 
-    fn add_hit(&self, disc: &DiscModel, hit: &Hit, lambda: f64, gather: &mut Gather) {
+    fn add_hit(
+        &self,
+        disc: &DiscModel,
+        hit: &Hit,
+        (lambda, screen): (f64, Option<&ScreenPoint>),
+        gather: &mut Gather,
+    ) {
         let r = hit.place.radius;
         let g = match self.redshift {
             Some(_) => keplerian_redshift(&self.hole, r, lambda).unwrap_or(0.0),
             None => 1.0,
         };
-        let boost = self.redshift.map_or(1.0, |index| g.powf(3.0 + index));
+        let stokes = screen.map(|screen| self.polarized_hit(hit, lambda, screen));
+        let boost = match stokes {
+            Some(stokes) => stokes.i,
+            None => self.redshift.map_or(1.0, |index| g.powf(3.0 + index)),
+        };
         let mut intensity = boost * disc.intensity(r);
         if hit.depth > 0.0 {
             intensity *= (-hit.depth).exp();
         }
         gather.add(intensity, g, disc.color);
+        if let Some(stokes) = stokes {
+            gather.add_stokes(intensity, share(&stokes));
+        }
         let azimuth = wrap(hit.place.azimuth);
         gather.mark(intensity, Place { azimuth, ..hit.place });
     }

@@ -5,7 +5,7 @@ use super::rays::{End, Sight};
 use super::surface::Hit;
 use super::{Scratch, Stage};
 use kerrlight_geodesic::bundle::{NodeRequest, PanelRule, RayNodes};
-use kerrlight_geodesic::{Observer, OutOfRange, Path};
+use kerrlight_geodesic::{Observer, OutOfRange, Path, ScreenPoint};
 
 /// Nodes of a panel.
 const ORDER: usize = 8;
@@ -47,6 +47,8 @@ pub(super) struct DepthProfile {
     times: Vec<f64>,
     depths: Vec<f64>,
     rates: Vec<f64>,
+    /// That of the whole way.
+    total: f64,
 }
 
 impl DepthProfile {
@@ -72,7 +74,7 @@ impl DepthProfile {
         let k = self.times.partition_point(|t| *t < time);
         let (Some(last), true) = (self.times.len().checked_sub(1), k > 0) else { return 0.0 };
         if k > last {
-            return self.depths[last];
+            return self.total;
         }
         let h = self.times[k] - self.times[k - 1];
         let s = (time - self.times[k - 1]) / h;
@@ -90,6 +92,7 @@ impl DepthProfile {
 struct Along<'a> {
     medium: &'a dyn Medium,
     lambda: f64,
+    screen: Option<ScreenPoint>,
     times: &'a [f64],
 }
 
@@ -115,7 +118,8 @@ impl Stage {
             let last = split >= FINEST;
             let mut number = 0;
             pending.retain(|k| {
-                let along = Along { medium, lambda: sights[*k].lambda, times };
+                let screen = self.screen_point(alpha[number], beta[number]);
+                let along = Along { medium, lambda: sights[*k].lambda, screen, times };
                 let done = self.radiate(&along, &nodes.ray(number), *k, volume);
                 number += 1;
                 volume.shade(&mut hits[sights[*k].hits.clone()]);
@@ -131,11 +135,12 @@ impl Stage {
         &self,
         medium: &dyn Medium,
         k: usize,
+        screen: Option<ScreenPoint>,
         times: &[f64],
         scratch: &mut Scratch,
     ) {
         let sight = scratch.sights[k].clone();
-        self.fill_ray(medium, k, times, scratch, |split, path, rule, columns| {
+        self.fill_ray(medium, k, screen, times, scratch, |split, path, rule, columns| {
             self.place(path, &sight, medium, split, rule, columns);
         });
     }
@@ -145,12 +150,13 @@ impl Stage {
         &self,
         medium: &dyn Medium,
         k: usize,
+        screen: Option<ScreenPoint>,
         times: &[f64],
         scratch: &mut Scratch,
         place: impl Fn(u32, &Path, &PanelRule, &mut Columns),
     ) {
         let Scratch { path, sights, hits, volume, .. } = scratch;
-        let along = Along { medium, lambda: sights[k].lambda, times };
+        let along = Along { medium, lambda: sights[k].lambda, screen, times };
         let mut split = 1;
         loop {
             let mut columns = core::mem::take(&mut volume.columns);
@@ -186,7 +192,7 @@ impl Stage {
             split,
             azimuth: needs.azimuth || self.places.azimuth,
             time: needs.time || self.places.time,
-            velocity: needs.velocity,
+            velocity: needs.velocity || self.polarization.is_some(),
         }
     }
 
@@ -211,6 +217,9 @@ impl Stage {
             emission.clear();
             let moment = Moment { observed: *observed, slow_light: self.slow_light };
             along.medium.fill(nodes, along.lambda, moment, emission);
+            if let Some(screen) = &along.screen {
+                self.polarize(along.medium, nodes, along.lambda, screen, emission);
+            }
             let light = gather(quadrature, nodes, emission, depths);
             let enough = self.tolerance * (light.intensity + FAINT * along.medium.scale());
             done &= light.error <= enough;
@@ -219,6 +228,7 @@ impl Stage {
         profile.clear();
         if along.medium.absorbs() {
             profile.set(self.hole.spin(), nodes, emission, depths);
+            profile.total = lights.first().map_or(0.0, |light| light.depth);
         }
         done
     }

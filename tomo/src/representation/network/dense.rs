@@ -144,23 +144,32 @@ impl<T: Scalar> Task<T> for Backward<'_, T> {
                         (from, width),
                     );
                     for (m, sum) in sums.into_iter().enumerate() {
-                        let column = p * width;
-                        let at = (row + m) * self.output.stride + column;
-                        for (half, sum) in sum.into_iter().enumerate() {
-                            let to = self.output.numbers.as_mut_ptr().add(at + half * V::LANES);
-                            let sum = match self.activations {
-                                Some(h) => {
-                                    let at = (row + m) * h.stride + column + half * V::LANES;
-                                    let h = V::load(h.numbers.as_ptr().add(at));
-                                    V::select_less(zero, h, sum, zero)
-                                }
-                                None => V::load(to) + sum,
-                            };
-                            sum.store(to);
-                        }
+                        let at = (row + m) * self.output.stride + p * width;
+                        let to = self.output.numbers.as_mut_ptr().add(at);
+                        let h = self
+                            .activations
+                            .map(|h| h.numbers.as_ptr().add((row + m) * h.stride + p * width));
+                        pass(sum[0], h, to);
+                        pass(sum[1], h.map(|h| h.add(V::LANES)), to.add(V::LANES));
                     }
                 }
             }
+        }
+    }
+}
+
+/// Puts `sum` where the activations at `h` are positive and zero elsewhere; or adds it to what is there.
+///
+/// # Safety
+/// `h` is readable and `to` readable and writable for a register.
+#[inline(always)]
+unsafe fn pass<T: Scalar, V: Lanes<T>>(sum: V, h: Option<*const T>, to: *mut T) {
+    let zero = V::splat(T::zero());
+    // SAFETY: as the caller vouches.
+    unsafe {
+        match h {
+            Some(h) => V::select_less(zero, V::load(h), sum, zero).store(to),
+            None => (V::load(to) + sum).store(to),
         }
     }
 }

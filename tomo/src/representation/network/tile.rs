@@ -114,37 +114,23 @@ impl<T: Scalar + Default> Tile<T> {
         overwrite: bool,
         coordinates: Option<CoordinatesMut<'_, T>>,
     ) {
-        let (set, layout, points) = (network.instruction_set, &network.layout, self.points);
-        let wanted = coordinates.is_some();
+        let (layout, wanted) = (&network.layout, coordinates.is_some());
         self.output_backward(network, packed, parameters, overwrite, wanted);
-        for (k, layer) in layout.hidden().iter().enumerate().rev() {
-            let [from, to] = &mut self.cotangents;
-            let cotangent = Matrix { numbers: from.read(), stride: layout.rows[k + 1].stride };
-            let input = matrix(&self.rows[k], layout.rows[k]);
-            let (inputs, outputs) = (layer.inputs, layer.outputs);
-            let gradient = &mut parameters[layer.offset..layer.offset + layer.size()];
-            dispatch(
-                set,
-                Weights { points, input, inputs, cotangent, outputs, gradient, overwrite },
-            );
-            let units = layer.outputs;
+        for k in (0..layout.hidden().len()).rev() {
+            self.weights(network, k, parameters, overwrite);
             if wanted && (k == 0 || layout.skip == Some(k)) {
+                let stride = layout.rows[0].stride;
+                let output = MatrixMut { numbers: self.encoded.all(), stride };
+                let cotangent = matrix(&self.cotangents[0], layout.rows[k + 1]);
+                let (points, units) = (self.points, layout.hidden()[k].outputs);
                 let (panels, outputs, activations) = (packed.encoded(k), layout.encoded, None);
-                let (numbers, stride) = (self.encoded.all(), layout.rows[0].stride);
-                let output = MatrixMut { numbers, stride };
                 dispatch(
-                    set,
+                    network.instruction_set,
                     Backward { points, cotangent, units, panels, activations, outputs, output },
                 );
             }
             if k > 0 {
-                let (panels, outputs, activations) = (packed.transposed(k), units, Some(input));
-                let output = MatrixMut { numbers: to.all(), stride: layout.rows[k].stride };
-                dispatch(
-                    set,
-                    Backward { points, cotangent, units, panels, activations, outputs, output },
-                );
-                self.cotangents.swap(0, 1);
+                self.units(network, packed, k);
             }
         }
         if let Some(mut gradient) = coordinates {
@@ -153,6 +139,33 @@ impl<T: Scalar + Default> Tile<T> {
             let scales = &packed.scales()[..gradient.dimension()];
             encode_vjp(rows, cotangents, scales, network.settings.degree, &mut gradient);
         }
+    }
+
+    /// Gradient of a hidden layer's parameters.
+    fn weights(&mut self, network: &Network, k: usize, parameters: &mut [T], overwrite: bool) {
+        let (layout, layer) = (&network.layout, network.layout.hidden()[k]);
+        let (points, inputs, outputs) = (self.points, layer.inputs, layer.outputs);
+        let input = matrix(&self.rows[k], layout.rows[k]);
+        let cotangent = matrix(&self.cotangents[0], layout.rows[k + 1]);
+        let gradient = &mut parameters[layer.offset..layer.offset + layer.size()];
+        let task = Weights { points, input, inputs, cotangent, outputs, gradient, overwrite };
+        dispatch(network.instruction_set, task);
+    }
+
+    /// Gradient with respect to the units before a hidden layer, which is then the one at hand.
+    fn units(&mut self, network: &Network, packed: &Packed<T>, k: usize) {
+        let (layout, points) = (&network.layout, self.points);
+        let (units, outputs) = (layout.hidden()[k].outputs, layout.rows[k].units);
+        let activations = Some(matrix(&self.rows[k], layout.rows[k]));
+        let [from, to] = &mut self.cotangents;
+        let cotangent = matrix(from, layout.rows[k + 1]);
+        let output = MatrixMut { numbers: to.all(), stride: layout.rows[k].stride };
+        let panels = packed.transposed(k);
+        dispatch(
+            network.instruction_set,
+            Backward { points, cotangent, units, panels, activations, outputs, output },
+        );
+        self.cotangents.swap(0, 1);
     }
 
     /// The output layer's part, and where the others start from.
