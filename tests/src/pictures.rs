@@ -20,7 +20,9 @@ fn exact_no_special_rays() {
     for (path, text) in scenes() {
         for inclination in [0, 90, 180] {
             for spin in [0, 1, -1] {
-                let inclination = format!("observer.inclination_deg={inclination}");
+                let camera = text.contains("[camera]");
+                let key = if camera { "camera.theta_deg" } else { "observer.inclination_deg" };
+                let inclination = format!("{key}={inclination}");
                 let spin = format!("hole.spin={spin}");
                 // Edges and orbits that fit every spin.
                 let mut overrides = vec![inclination.as_str(), spin.as_str()];

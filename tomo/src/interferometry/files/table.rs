@@ -149,7 +149,7 @@ fn row(cells: &[&str], heading: &Heading, names: &mut Names) -> Result<Row, Stri
 
 /// Stokes I of every row that has it, as kerrlight's CSV, numbers with all their digits. With
 /// `comments`, lines that start with `#` stand before it and tell source, date, frequencies,
-/// stations and history. Several spectral channels have a further column [`CHANNEL`], and comments
+/// stations and history. Several spectral channels have a further column `channel`, and comments
 /// in any case.
 pub fn to_csv(observation: &Observation, comments: bool) -> String {
     let several = !observation.channels.is_empty();

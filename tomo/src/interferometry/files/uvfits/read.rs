@@ -22,7 +22,7 @@ const MJD_ZERO: f64 = 2_400_000.5;
 ///
 /// # Errors
 /// If the file is damaged, no UVFITS, or holds no datum; if rows of many channels would take more
-/// memory than [`MOST_MEMORY`] times the file.
+/// memory than `MOST_MEMORY` times the file.
 pub fn read(bytes: &[u8]) -> Result<Observation, FileError> {
     let units = fits::units(bytes)?;
     let header = &units[0].header;
