@@ -270,10 +270,11 @@ impl Stage {
             scratch.meter.stop(Part::Gas, clock);
         }
         for k in 0..rays {
-            let ray = self.view.ray(&self.hole, alpha[k], beta[k])?;
+            let mut ray = None;
             if scratch.sights[k].by_steps {
+                let ray = ray.insert(self.view.ray(&self.hole, alpha[k], beta[k])?);
                 let clock = scratch.meter.start();
-                scratch.sights[k] = self.trace_steps(&ray, scratch);
+                scratch.sights[k] = self.trace_steps(ray, scratch);
                 scratch.meter.stop(Part::Rays, clock);
                 if let Some(medium) = medium {
                     let clock = scratch.meter.start();
@@ -282,7 +283,8 @@ impl Stage {
                     scratch.meter.stop(Part::Gas, clock);
                 }
             }
-            self.look_along(k, &ray, (alpha[k], beta[k]), (times, &trees), scratch, seen)?;
+            let place = (alpha[k], beta[k]);
+            self.look_along(k, ray.as_ref(), place, (times, &trees), scratch, seen)?;
         }
         Ok(())
     }
@@ -304,7 +306,7 @@ impl Stage {
             let line = Line::new(observer, self.hole.horizon(), alpha[k], beta[k]);
             scratch.sights[k] = self.trace_line(&line, &ray, scratch);
             self.fill_line(&line, k, times, scratch);
-            self.look_along(k, &ray, (alpha[k], beta[k]), (times, &[]), scratch, seen)?;
+            self.look_along(k, None, (alpha[k], beta[k]), (times, &[]), scratch, seen)?;
         }
         Ok(())
     }
@@ -320,12 +322,12 @@ impl Stage {
     }
 
     /// What is seen along ray number `k`, of which everything is known but the light of the
-    /// surfaces, the spots and the sky. The path of `scratch` is its own if it was traced step by
-    /// step.
+    /// surfaces, the spots and the sky. `ray` is there and the path of `scratch` is its own if it was
+    /// traced step by step.
     fn look_along(
         &self,
         k: usize,
-        ray: &Ray,
+        ray: Option<&Ray>,
         (x, y): (f64, f64),
         (times, trees): (&[f64], &[Option<Arc<SpotTree>>]),
         scratch: &mut Scratch,
@@ -354,7 +356,7 @@ impl Stage {
             {
                 gather.add_light(light, gas.color());
             }
-            if let (Some(tree), true) = (trees.get(j), sight.by_steps) {
+            if let (Some(tree), Some(ray)) = (trees.get(j), ray) {
                 let end = sight.last_time();
                 match tree {
                     Some(tree) => {

@@ -61,15 +61,24 @@ impl Stage {
         let wanted = if self.disc.is_some() { MOST_HITS } else { 1 };
         let crossings = &mut scratch.crossings;
         crossings.trace(&self.hole, observer, alpha, beta, wanted)?;
+        let asked = self.polarization.is_some()
+            || self.half_orbits.is_some()
+            || self.meshes.is_some()
+            || !self.spots.is_empty();
         for k in 0..alpha.len() {
             let ends = scratch.crossings.ends(k);
-            let ray = observer.ray(&self.hole, alpha[k], beta[k])?;
+            // Its radial potential takes as long as all the rest.
+            let ray = asked.then(|| observer.ray(&self.hole, alpha[k], beta[k])).transpose()?;
             let first = scratch.hits.len();
             if self.disc.is_some() {
-                let motion = PlaneMotion::new(&ray, &ends);
+                let polarized = ray.as_ref().filter(|_| self.polarization.is_some());
+                let motion = polarized.map(|ray| PlaneMotion::new(ray, &ends));
+                let rates = |number: usize, crossing: &Crossing| {
+                    motion.as_ref().map_or([0.0; 2], |motion| motion.rates(number, crossing))
+                };
                 let found = scratch.crossings.ray(k).enumerate();
                 scratch.hits.extend(found.map(|(number, crossing)| Hit {
-                    rates: motion.rates(number, &crossing),
+                    rates: rates(number, &crossing),
                     mino_time: crossing.mino_time,
                     place: Place {
                         radius: crossing.radius,
@@ -80,13 +89,13 @@ impl Stage {
                 }));
             }
             let found = scratch.hits.len() - first;
-            let until = self.until(&ray);
+            let until = ray.as_ref().map_or(f64::INFINITY, |ray| self.until(ray));
             let surface = self.surface(&scratch.hits[first..], until);
             let missing = self.disc.is_some()
                 && surface.is_none()
                 && found < (ends.crossings as usize).min(self.most_hits());
             scratch.sights.push(Sight {
-                lambda: ray.lambda,
+                lambda: -alpha[k] * observer.inclination().sin(),
                 end: if ends.escapes { End::Escaped } else { End::Captured },
                 crossings: ends.crossings,
                 total: ends.mino_total,
@@ -96,7 +105,7 @@ impl Stage {
                 exit: None,
                 by_steps: missing
                     || doubtful(ends.error, self.tolerance)
-                    || self.needs_path(&ray, trees),
+                    || ray.as_ref().is_some_and(|ray| self.needs_path(ray, trees)),
             });
         }
         if self.sky.is_some() { self.find_exits(observer, alpha, beta, scratch) } else { Ok(()) }

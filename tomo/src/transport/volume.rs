@@ -13,6 +13,9 @@ const ORDER: usize = 8;
 /// Panels are cut into at most so many times as many.
 const FINEST: u32 = 256;
 
+/// Rays whose nodes are in memory at once: few enough for the second cache.
+const TOGETHER: usize = 128;
+
 /// Errors of rays fainter than this share of what the medium can reach are measured by that.
 const FAINT: f64 = 1e-4;
 
@@ -110,21 +113,24 @@ impl Stage {
         let mut pending: Vec<usize> = (0..sights.len()).filter(|k| !sights[*k].by_steps).collect();
         let mut split = 1;
         while !pending.is_empty() {
-            let pick = |column: &[f64]| pending.iter().map(|k| column[*k]).collect::<Vec<_>>();
-            let until: Vec<f64> = pending.iter().map(|k| sights[*k].last_time()).collect();
             let request = self.request(medium, &volume.quadrature.rule, split);
-            let (alpha, beta) = (pick(alpha), pick(beta));
-            nodes.trace(&self.hole, observer, &alpha, &beta, Some(&until), &request)?;
-            let last = split >= FINEST;
-            let mut number = 0;
-            pending.retain(|k| {
-                let screen = self.screen_point(alpha[number], beta[number]);
-                let along = Along { medium, lambda: sights[*k].lambda, screen, times };
-                let done = self.radiate(&along, &nodes.ray(number), *k, volume);
-                number += 1;
-                volume.shade(&mut hits[sights[*k].hits.clone()]);
-                !done && !last
-            });
+            let mut more = Vec::new();
+            for some in pending.chunks(TOGETHER) {
+                let pick = |column: &[f64]| some.iter().map(|k| column[*k]).collect::<Vec<_>>();
+                let until: Vec<f64> = some.iter().map(|k| sights[*k].last_time()).collect();
+                let (alpha, beta) = (pick(alpha), pick(beta));
+                nodes.trace(&self.hole, observer, &alpha, &beta, Some(&until), &request)?;
+                for (number, k) in some.iter().enumerate() {
+                    let screen = self.screen_point(alpha[number], beta[number]);
+                    let along = Along { medium, lambda: sights[*k].lambda, screen, times };
+                    let done = self.radiate(&along, &nodes.ray(number), *k, volume);
+                    volume.shade(&mut hits[sights[*k].hits.clone()]);
+                    if !done && split < FINEST {
+                        more.push(*k);
+                    }
+                }
+            }
+            pending = more;
             split *= 2;
         }
         Ok(())

@@ -30,7 +30,12 @@ const EFFECTS: [Effect; 7] = [
     Effect { name: "ray bundles", on: &["effects.ray_bundles=true"] },
     Effect {
         name: "polarisation",
-        on: &["effects.polarization=true", "magnetic_field.vertical=1.0"],
+        on: &[
+            "effects.polarization=true",
+            "magnetic_field.vertical=1.0",
+            "magnetic_field.radial=0.0",
+            "magnetic_field.toroidal=0.0",
+        ],
     },
 ];
 
