@@ -6,16 +6,15 @@
 //! the next the polar motion repeats itself: it is followed up to the first one and, if more are
 //! asked for, over one half-oscillation from there.
 
+use super::crossing_polar::{PolarSum, polar_times};
 use super::dispatch::Task;
-use super::elliptic::{agm, rf_from};
 use super::error::estimate;
 use super::lanes::{MAX_LANES, Real};
 use super::math::atan2;
 use super::motion::{Camera, Journey, Motion};
-use super::polar::{PolarState, PolarStep, unwrap};
-use super::radial::{LEAST_STEPS, RadialSum, closed_forms};
+use super::polar::unwrap;
+use super::radial_sum::{LEAST_STEPS, RadialSum, closed_forms};
 use super::sample::MAX_STEP;
-use core::f64::consts::PI;
 
 /// The most steps to one crossing: a ray that circles longer than that has no digits left.
 const MOST_STEPS: f64 = 1e5;
@@ -375,91 +374,6 @@ impl<'a, V: Real> Bundle<'a, V> {
             V::select(exists, error, none),
         ]
     }
-}
-
-/// The polar motion along equal steps, but for what is proportional to the number of them.
-struct PolarSum<V> {
-    step: PolarStep<V>,
-    ahead: PolarState<V>,
-    x: V,
-    y: V,
-    u: V,
-    sum: V,
-}
-
-impl<V: Real> PolarSum<V> {
-    #[inline(always)]
-    fn at_observer(cam: &Camera, m: &Motion<V>, h: V, alpha: V, beta: V) -> Self {
-        let zero = V::splat(0.0);
-        let step = PolarStep::new(cam, m, h);
-        let (x, u, ahead) = step.start(cam, alpha, beta);
-        Self { step, ahead, x, y: zero, u, sum: zero }
-    }
-
-    #[inline(always)]
-    fn at_equator(cam: &Camera, m: &Motion<V>, h: V) -> Self {
-        let (zero, one) = (V::splat(0.0), V::splat(1.0));
-        let step = PolarStep::new(cam, m, h);
-        let rise = m.eta.max(zero).sqrt();
-        let ahead = step.leave(one, zero, [zero, -m.lambda, rise]);
-        Self { step, ahead, x: one, y: zero, u: zero, sum: zero }
-    }
-
-    #[inline(always)]
-    fn next(&mut self) {
-        let PolarState { x, y, u, .. } = self.ahead;
-        self.sum = self.step.gain(self.u, u, self.sum);
-        self.ahead = self.step.advance(self.ahead);
-        (self.x, self.y, self.u) = (x, y, u);
-    }
-
-    /// Angle about the axis since the start, but for whole turns, in the turning frame.
-    #[inline(always)]
-    fn angle(&self) -> V {
-        atan2(self.y, self.x)
-    }
-
-    /// How far the frame has turned.
-    #[inline(always)]
-    fn turned(&self, steps: usize) -> V {
-        self.step.turn * V::splat(steps as f64)
-    }
-
-    /// `∫a²u² dτ`.
-    #[inline(always)]
-    fn time(&self, steps: usize) -> V {
-        self.step.lift.mul_add(V::splat(steps as f64), self.sum)
-    }
-}
-
-/// Mino times of the first zero of u after the start, and from there to the next; infinite if
-/// there is none. The latter only where it is needed for the former or where `u₀ = 0`.
-#[inline(always)]
-fn polar_times<V: Real>(cam: &Camera, m: &Motion<V>, beta: V) -> (V, V) {
-    let s = V::splat;
-    let (zero, never) = (s(0.0), s(f64::INFINITY));
-    let half_a = m.a * s(0.5);
-    let d = half_a.mul_add(half_a, -m.c);
-    let rd = d.max(zero).sqrt();
-    // u'² = (u₊ − u²)(Q₊ + a²u²), with Q₊ + a²u₊ = 2√d.
-    let slow = V::select(zero.lt(half_a), -m.c / (half_a + rd), rd - half_a);
-    let oscillates = V::both(zero.lt(m.eta), zero.lt(slow));
-    let safe = V::select(oscillates, slow, s(1.0));
-    let half = s(PI) / agm(safe.sqrt(), V::select(oscillates, rd + rd, s(1.0)).sqrt());
-    let half = V::select(oscillates, half, never);
-    if cam.cos_i == 0.0 {
-        return (half, half);
-    }
-    // Twice Q is b + √(b² − 4C), b = c² − A; C < 0 where u has zeros.
-    let c = beta * s(cam.sin_i / cam.cos_i);
-    let b = c.mul_add(c, -m.a);
-    let root = b.mul_add(b, m.c * s(-4.0)).max(zero).sqrt();
-    let sum = b.abs() + root;
-    let q = V::select(b.lt(zero), m.c * s(-2.0) / sum, sum * s(0.5));
-    // The product of the pair is Q² + A Q + C = c² Q, free of cancellation.
-    let near = rf_from(q, q + half_a, d, c * c * q);
-    let first = V::select(zero.lt(c), half - near, near);
-    (V::select(oscillates, first, never), half)
 }
 
 /// Crossing `number` of each ray of a block, out of `count`.

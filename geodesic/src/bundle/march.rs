@@ -11,7 +11,8 @@ use super::math::atan2;
 use super::motion::{Camera, Motion};
 use super::panel::PanelRule;
 use super::polar::{Direction, PolarStep};
-use super::radial::{RadialStep, closed_forms};
+use super::radial::RadialStep;
+use super::radial_sum::closed_forms;
 
 /// Columns of nodes.
 pub(super) const COLUMNS: usize = 8;

@@ -33,6 +33,7 @@
 
 mod column;
 mod crossing;
+mod crossing_polar;
 mod crossings;
 mod dispatch;
 mod elliptic;
@@ -45,6 +46,7 @@ mod nodes;
 mod panel;
 mod polar;
 mod radial;
+mod radial_sum;
 mod sample;
 mod samples;
 

@@ -24,6 +24,23 @@ pub struct GasModel {
     color: [f32; 3],
 }
 
+/// What the flows need of the metric at a point.
+struct Metric {
+    sin2: f64,
+    delta: f64,
+    sigma: f64,
+    /// r² + a².
+    across: f64,
+    /// −g^tt ΔΣ.
+    area: f64,
+    /// g^tφ ΔΣ.
+    tp: f64,
+    /// g^φφ ΔΣ.
+    pp: f64,
+    /// r sin θ.
+    big_r: f64,
+}
+
 /// What effects ask of a medium.
 #[derive(Debug, Clone, Copy)]
 pub struct GasEffects {
@@ -87,17 +104,22 @@ impl GasModel {
         }
     }
 
-    /// g with the angular momentum l = l₀ R^{3/2}/(1 + R), covariant u = U(−1, 0, 0, l).
+    /// The metric at a point.
     #[inline(always)]
-    fn on_circles(&self, r: f64, u: f64, lambda: f64, l0: f64) -> f64 {
+    fn metric(&self, r: f64, u: f64) -> Metric {
         let a = self.hole.spin();
         let sin2 = ((1.0 - u) * (1.0 + u)).max(1e-300);
         let (delta, sigma) = (self.hole.delta(r), self.hole.sigma(r, u));
-        // The inverse metric times ΔΣ.
         let across = r * r + a * a;
         let area = across * across - a * a * delta * sin2;
         let (tp, pp) = (-2.0 * a * r, delta / sin2 - a * a);
-        let big_r = r * sin2.sqrt();
+        Metric { sin2, delta, sigma, across, area, tp, pp, big_r: r * sin2.sqrt() }
+    }
+
+    /// g with the angular momentum l = l₀ R^{3/2}/(1 + R), covariant u = U(−1, 0, 0, l).
+    #[inline(always)]
+    fn on_circles(&self, r: f64, u: f64, lambda: f64, l0: f64) -> f64 {
+        let Metric { delta, sigma, area, tp, pp, big_r, .. } = self.metric(r, u);
         let l = l0 * big_r * big_r.sqrt() / (1.0 + big_r);
         let norm = area + 2.0 * l * tp - l * l * pp;
         let energy = area + tp * (l + lambda) - pp * l * lambda;
@@ -109,13 +131,7 @@ impl GasModel {
     /// Contravariant four-velocity; `None` where nothing can move like this.
     fn velocity(&self, r: f64, u: f64) -> Option<[f64; 4]> {
         let a = self.hole.spin();
-        let sin2 = ((1.0 - u) * (1.0 + u)).max(1e-300);
-        let (delta, sigma) = (self.hole.delta(r), self.hole.sigma(r, u));
-        let across = r * r + a * a;
-        let area = across * across - a * a * delta * sin2;
-        // Inverse metric times ΔΣ.
-        let (tp, pp) = (-2.0 * a * r, delta / sin2 - a * a);
-        let big_r = r * sin2.sqrt();
+        let Metric { sin2, delta, sigma, across, area, tp, pp, big_r } = self.metric(r, u);
         let raised = |ut: f64, up: f64| {
             let scale = 1.0 / (delta * sigma);
             [(tp * up - area * ut) * scale, (tp * ut + pp * up) * scale]

@@ -1,7 +1,7 @@
 //! A camera at a finite radius, at rest or on a path through keyframes.
 
 use super::Scene;
-use super::check::{Invalid, number};
+use super::invalid::{Invalid, number};
 use kerrlight_geodesic::{Camera, Inclination, Kerr, Motion, OutOfRange};
 use serde::{Deserialize, Serialize};
 

@@ -1,0 +1,165 @@
+//! Errors in a scene text that point at the line, and the simplest ranges.
+
+use toml_edit::{Document, Item};
+
+/// Why a scene text is not a scene.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SceneError {
+    /// Not TOML, an unknown or missing key, or a wrong type.
+    #[error("{0}")]
+    Syntax(String),
+    /// A value out of its range.
+    #[error("{}`{key}` = {value} is not allowed: {allowed}", line_prefix(*.line))]
+    Range {
+        /// Line of the text, counted from 1; `None` where the key is not written out.
+        line: Option<usize>,
+        /// Dotted path of the key.
+        key: String,
+        /// The value that was given.
+        value: String,
+        /// What would be allowed.
+        allowed: String,
+    },
+    /// A key that this scene needs.
+    #[error("`{key}` is missing: {why}")]
+    Missing {
+        /// Dotted path of the key.
+        key: String,
+        /// Why it is needed.
+        why: String,
+    },
+    /// An override that cannot be applied.
+    #[error("{0}")]
+    Override(String),
+}
+
+fn line_prefix(line: Option<usize>) -> String {
+    line.map(|line| format!("line {line}: ")).unwrap_or_default()
+}
+
+impl SceneError {
+    pub(super) fn syntax(error: &toml::de::Error) -> Self {
+        // The parser speaks of Rust's types.
+        let text = error.to_string();
+        let text = text.replace("expected f64", "expected a number");
+        let text = text.replace("expected f32", "expected a number");
+        let text = text.replace("expected u32", "expected a whole number");
+        let text = text.replace("expected u64", "expected a whole number");
+        SceneError::Syntax(text.trim_end().to_owned())
+    }
+
+    /// The same without a line: that of a text which the user never saw.
+    pub fn without_line(self) -> Self {
+        match self {
+            SceneError::Range { key, value, allowed, .. } => {
+                SceneError::Range { line: None, key, value, allowed }
+            }
+            other => other,
+        }
+    }
+}
+
+/// A value out of range or missing, not yet located.
+pub(super) struct Invalid {
+    key: String,
+    value: Option<String>,
+    allowed: String,
+}
+
+/// A number as a person would write it.
+pub(super) fn shown(value: f64) -> String {
+    let size = value.abs();
+    if size != 0.0 && size.is_finite() && !(1e-4..1e9).contains(&size) {
+        format!("{value:e}")
+    } else {
+        value.to_string()
+    }
+}
+
+impl Invalid {
+    pub(super) fn new(
+        key: impl Into<String>,
+        value: impl ToString,
+        allowed: impl Into<String>,
+    ) -> Self {
+        Invalid { key: key.into(), value: Some(value.to_string()), allowed: allowed.into() }
+    }
+
+    pub(super) fn missing(key: impl Into<String>, why: impl Into<String>) -> Self {
+        Invalid { key: key.into(), value: None, allowed: why.into() }
+    }
+
+    pub(super) fn locate(self, text: &str) -> SceneError {
+        let Some(value) = self.value else {
+            return SceneError::Missing { key: self.key, why: self.allowed };
+        };
+        let line = line_of(text, &self.key);
+        SceneError::Range { line, key: self.key, value, allowed: self.allowed }
+    }
+}
+
+/// The line on which the value at a dotted path stands (or the nearest table around it).
+fn line_of(text: &str, key: &str) -> Option<usize> {
+    let document = Document::parse(text).ok()?;
+    let mut item: &Item = document.as_item();
+    let mut span = None;
+    for part in key.split('.') {
+        let next = match part.parse::<usize>() {
+            Ok(index) => match item {
+                Item::ArrayOfTables(tables) => {
+                    span = tables.get(index).and_then(|table| table.span()).or(span);
+                    let table = tables.get(index)?;
+                    return line_in_table(text, table, key, span);
+                }
+                _ => item.get(index),
+            },
+            Err(_) => item.get(part),
+        };
+        match next {
+            Some(next) => {
+                span = next.span().or(span);
+                item = next;
+            }
+            None => break,
+        }
+    }
+    span.map(|span| line_at(text, span.start))
+}
+
+fn line_in_table(
+    text: &str,
+    table: &toml_edit::Table,
+    key: &str,
+    around: Option<std::ops::Range<usize>>,
+) -> Option<usize> {
+    let last = key.rsplit('.').next()?;
+    let span = table.get(last).and_then(Item::span).or(around);
+    span.map(|span| line_at(text, span.start))
+}
+
+fn line_at(text: &str, offset: usize) -> usize {
+    text[..offset.min(text.len())].matches('\n').count() + 1
+}
+
+/// Refuses `value` unless `ok`.
+pub(super) fn number(
+    key: impl Into<String>,
+    value: f64,
+    ok: bool,
+    allowed: &str,
+) -> Result<(), Invalid> {
+    if ok { Ok(()) } else { Err(Invalid::new(key, shown(value), allowed)) }
+}
+
+pub(super) fn positive(key: impl Into<String>, value: f64) -> Result<(), Invalid> {
+    number(key, value, value > 0.0 && value.is_finite(), "a finite number above 0")
+}
+
+/// Brightness in any unit: the channels are 32-bit floats.
+pub(super) fn brightness(key: impl Into<String>, value: f64) -> Result<(), Invalid> {
+    number(key, value, (0.0..=1e12).contains(&value), "a number in [0, 1e12]")
+}
+
+pub(super) fn finite(key: impl Into<String>, value: f64) -> Result<(), Invalid> {
+    number(key, value, value.is_finite(), "a finite number")
+}
