@@ -3,7 +3,7 @@
 //!
 //! Data flow: [`scene`] → rays ([`kerrlight_geodesic`]) → [`emission`] → [`transport`] →
 //! [`render`] → [`image`] → [`interferometry`]. Fits: [`points`] → [`dynamics`] →
-//! [`representation`] → [`optimise`]. SI units enter in [`units`] and
+//! [`representation`] → [`optimise`] → [`volume`]. SI units enter in [`units`] and
 //! [`interferometry`]. Nothing here knows a path or a terminal: codecs work on bytes.
 
 pub mod dynamics;
@@ -21,3 +21,4 @@ pub mod scene;
 mod simd;
 pub mod transport;
 pub mod units;
+pub mod volume;

@@ -1,0 +1,169 @@
+//! Emission on the nodes of a box: what a fit recovers, and what a scene may show.
+
+use kerrlight_geodesic::OutOfRange;
+
+/// Numbers on a regular grid of nodes, linear in between along each axis and zero outside.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Volume {
+    nodes: [usize; 3],
+    low: [f64; 3],
+    high: [f64; 3],
+    values: Vec<f32>,
+}
+
+/// Why there is no such volume.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum VolumeError {
+    /// A number of its shape.
+    #[error(transparent)]
+    Range(#[from] OutOfRange),
+    /// As many values as nodes are needed.
+    #[error("{found} values are not allowed: {wanted}, one a node")]
+    Length {
+        /// How many there are.
+        found: usize,
+        /// How many there should be.
+        wanted: usize,
+    },
+    /// A value that is not a finite number.
+    #[error("value = {value} of node ({}, {}, {}) is not allowed: finite", node[0], node[1], node[2])]
+    Value {
+        /// Which node, counted from 0 along x, y and z.
+        node: [usize; 3],
+        /// Its value.
+        value: f32,
+    },
+}
+
+impl Volume {
+    /// `values` on `nodes` along x, y and z, z fastest, from `low` to `high` in M, both included.
+    ///
+    /// # Errors
+    /// If a number is out of its range, a value is not finite, or there are too few or too many.
+    pub fn new(
+        nodes: [usize; 3],
+        low: [f64; 3],
+        high: [f64; 3],
+        values: Vec<f32>,
+    ) -> Result<Self, VolumeError> {
+        let range = |field, value, allowed| Err(OutOfRange { field, value, allowed });
+        for axis in 0..3 {
+            if !(2..=2048).contains(&nodes[axis]) {
+                range("nodes", nodes[axis] as f64, "2 to 2048 along each axis")?;
+            }
+            if !low[axis].is_finite() {
+                range("low", low[axis], "a finite number")?;
+            }
+            if !(high[axis].is_finite() && high[axis] > low[axis]) {
+                range("high", high[axis], "above low")?;
+            }
+        }
+        let volume = Self { nodes, low, high, values };
+        let (found, wanted) = (volume.values.len(), nodes.iter().product());
+        if found != wanted {
+            return Err(VolumeError::Length { found, wanted });
+        }
+        match volume.values.iter().position(|value| !value.is_finite()) {
+            Some(k) => Err(VolumeError::Value { node: volume.indices(k), value: volume.values[k] }),
+            None => Ok(volume),
+        }
+    }
+
+    /// Nodes along x, y and z.
+    pub fn nodes(&self) -> [usize; 3] {
+        self.nodes
+    }
+
+    /// Coordinates of the first node, M.
+    pub fn low(&self) -> [f64; 3] {
+        self.low
+    }
+
+    /// Coordinates of the last node, M.
+    pub fn high(&self) -> [f64; 3] {
+        self.high
+    }
+
+    /// Values of the nodes, z fastest, then y, then x.
+    pub fn values(&self) -> &[f32] {
+        &self.values
+    }
+
+    fn indices(&self, k: usize) -> [usize; 3] {
+        let [_, ny, nz] = self.nodes;
+        [k / (ny * nz), k / nz % ny, k % nz]
+    }
+
+    /// Where node number k is, M.
+    pub fn position(&self, k: usize) -> [f64; 3] {
+        let indices = self.indices(k);
+        core::array::from_fn(|axis| {
+            let part = indices[axis] as f64 / (self.nodes[axis] - 1) as f64;
+            self.low[axis] + (self.high[axis] - self.low[axis]) * part
+        })
+    }
+
+    /// The value at a point, linear between nodes; 0 outside, and where the point is not finite.
+    pub fn at(&self, point: [f64; 3]) -> f64 {
+        let (mut cell, mut part) = ([0; 3], [0.0; 3]);
+        for axis in 0..3 {
+            let last = (self.nodes[axis] - 1) as f64;
+            let extent = self.high[axis] - self.low[axis];
+            let place = (point[axis] - self.low[axis]) / extent * last;
+            if !(0.0..=last).contains(&place) {
+                return 0.0;
+            }
+            let first = place.floor().min(last - 1.0);
+            (cell[axis], part[axis]) = (first as usize, place - first);
+        }
+        let corner = |k: usize| -> f64 {
+            let bit = |axis: usize| k >> axis & 1;
+            let weight = |axis: usize| if bit(axis) == 1 { part[axis] } else { 1.0 - part[axis] };
+            let [i, j, l] = [0, 1, 2].map(|axis| cell[axis] + bit(axis));
+            let value = self.values[(i * self.nodes[1] + j) * self.nodes[2] + l];
+            f64::from(value) * weight(0) * weight(1) * weight(2)
+        };
+        (0..8).map(corner).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plane() -> Volume {
+        let empty =
+            Volume::new([3, 4, 5], [-1.0, 0.0, 2.0], [1.0, 3.0, 4.0], vec![0.0; 60]).unwrap();
+        let value = |k| {
+            let [x, y, z] = empty.position(k);
+            (2.0 * x - y + 0.5 * z) as f32
+        };
+        let values = (0..60).map(value).collect();
+        Volume::new(empty.nodes, empty.low, empty.high, values).unwrap()
+    }
+
+    #[test]
+    fn exact_linear_functions_are_kept_and_outside_is_empty() {
+        let volume = plane();
+        for point in [[0.3, 1.7, 3.1], [-1.0, 0.0, 2.0], [1.0, 3.0, 4.0], [1.0, 0.2, 4.0]] {
+            let [x, y, z] = point;
+            assert!((volume.at(point) - (2.0 * x - y + 0.5 * z)).abs() < 1e-6, "{point:?}");
+        }
+        for point in [[1.01, 1.0, 3.0], [0.0, -0.1, 3.0], [0.0, 1.0, f64::NAN]] {
+            assert_eq!(volume.at(point), 0.0);
+        }
+    }
+
+    #[test]
+    fn wrong_shapes_and_values_are_named() {
+        let new = |nodes, values: Vec<f32>| {
+            Volume::new(nodes, [0.0; 3], [1.0; 3], values).unwrap_err().to_string()
+        };
+        assert_eq!(new([2, 2, 2], vec![0.0; 7]), "7 values are not allowed: 8, one a node");
+        assert_eq!(new([1, 2, 2], vec![]), "nodes = 1 is not allowed: 2 to 2048 along each axis");
+        let mut values = vec![0.0; 8];
+        values[6] = f32::NAN;
+        let text = new([2, 2, 2], values);
+        assert_eq!(text, "value = NaN of node (1, 1, 0) is not allowed: finite");
+    }
+}
