@@ -49,7 +49,7 @@ impl<T: Real> ImageTerm<T> {
         if !(noise_sigma > 0.0 && noise_sigma.is_finite()) {
             return range("image sigma", noise_sigma, "above 0");
         }
-        if pixels == 0 || movie.is_empty() || movie.len() % pixels != 0 {
+        if pixels == 0 || movie.is_empty() || !movie.len().is_multiple_of(pixels) {
             return range("movie numbers", movie.len() as f64, "whole frames, 1 or more");
         }
         if let Some(bad) = movie.iter().find(|pixel| !pixel.is_finite()) {
