@@ -7,6 +7,7 @@ pub trait Real:
     + num_traits::NumAssign
     + core::iter::Sum
     + core::fmt::Debug
+    + Default
     + Send
     + Sync
     + 'static

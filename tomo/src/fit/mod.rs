@@ -12,6 +12,7 @@ mod sightlines;
 mod terms;
 #[cfg(test)]
 mod tests;
+mod train;
 
 pub use batch::{Batch, Columns};
 pub use chain::{Chain, Field, Motion, Redshift};
@@ -19,3 +20,4 @@ pub use objective::{Data, Gradients, Loss, Objective, Room, Selection, Weighted,
 pub use occupancy::{Occupancy, OccupancySettings};
 pub use sightlines::{Region, Sampling, SightlineRequest, Sightlines};
 pub use terms::{FrameTerm, ImageTerm, LightCurveTerm, Scan, ScanTerm};
+pub use train::{BatchSize, Diverged, OccupancyPlan, Outcome, Progress, State, Trainer, Training};

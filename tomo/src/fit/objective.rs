@@ -72,6 +72,24 @@ impl<T> Room<T> {
     }
 }
 
+impl<T: Scalar> Room<T> {
+    /// Emission at points (x, y, z) at the reference time.
+    pub fn emission(
+        &mut self,
+        representation: &dyn Representation<T>,
+        parameters: &[T],
+        [x, y, z]: [&[T]; 3],
+    ) -> Vec<T> {
+        let (time, mut values) = (vec![T::zero(); x.len()], vec![T::zero(); x.len()]);
+        let at = match representation.dimension() {
+            4 => Coordinates::txyz(&time, x, y, z),
+            _ => Coordinates::xyz(x, y, z),
+        };
+        representation.eval(parameters, at, &mut values, &mut self.workspace);
+        values
+    }
+}
+
 /// A chain with its data.
 pub struct Objective<T> {
     /// From emission to pixels.
@@ -231,9 +249,12 @@ impl<T: Scalar> Objective<T> {
         let shifted = gradients.axis.is_some() && self.chain.is_shifted();
         for (group, (ray, _)) in batch.pairs.iter().enumerate() {
             let slope = of_image[self.chain.pixel[*ray as usize] as usize];
-            for k in batch.starts[group]..batch.starts[group + 1] {
-                cotangents[k] = slope * batch.columns.weight[k];
-                if shifted {
+            let range = batch.starts[group]..batch.starts[group + 1];
+            let weights = &batch.columns.weight[range.clone()];
+            let into = cotangents[range.clone()].iter_mut();
+            into.zip(weights).for_each(|(cotangent, weight)| *cotangent = slope * *weight);
+            if shifted {
+                for k in range {
                     let node = batch.columns.node[k] as usize;
                     of_weights[node] += slope.double() * batch.values[k].double();
                 }
@@ -247,6 +268,17 @@ impl<T: Scalar> Objective<T> {
         if let Some(axis) = gradients.axis.as_deref_mut() {
             add_axis(field.axis, batch, of_points, dimension, axis);
         }
+    }
+
+    /// Images of these frames, one after the other.
+    pub fn movie(
+        &self,
+        field: Field<'_, T>,
+        frames: &[usize],
+        room: &mut Room<T>,
+        movie: &mut [T],
+    ) {
+        self.chain.movie(field, frames, &mut room.batch, &mut room.workspace, movie);
     }
 
     /// The loss of all data of these frames, without gradient.
