@@ -23,6 +23,15 @@ impl Axis {
         if axis.iter().all(|x| x.is_finite()) { Ok(Self(axis)) } else { Err(ZeroAxis(vector)) }
     }
 
+    /// A vector that is a unit vector already, bit for bit.
+    ///
+    /// # Errors
+    /// If its length is not 1 within rounding.
+    pub fn exact(vector: [f64; 3]) -> Result<Self, ZeroAxis> {
+        let ok = (dot(vector, vector) - 1.0).abs() < 1e-12;
+        if ok { Ok(Self(vector)) } else { Err(ZeroAxis(vector)) }
+    }
+
     /// Its components.
     pub fn vector(self) -> [f64; 3] {
         self.0

@@ -5,6 +5,7 @@
 
 mod batch;
 mod chain;
+pub mod checkpoint;
 mod objective;
 mod occupancy;
 mod shift;

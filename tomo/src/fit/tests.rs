@@ -1,12 +1,16 @@
 //! The chain from parameters and axis to the loss, in double precision.
 
 use super::*;
+
+mod training;
+
 use crate::dynamics::{AngularVelocity, Axis, Injection};
 use crate::interferometry::data_terms::DataTerm;
 use crate::interferometry::operator::{Dtft, ImageGrid, Pulse, Transform};
 use crate::representation::{
     Activation, Coordinates, Gradient, Grid, GridSettings, Groups, Representation, Workspace,
 };
+use crate::simd::Scalar;
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
 use num_complex::Complex;
 
@@ -24,7 +28,7 @@ fn lines(delay: bool, momentum: bool) -> (Kerr, Sightlines) {
     (hole, Sightlines::trace(&hole, &observer, &alpha, &beta, &request).unwrap())
 }
 
-fn chain(delay: bool, momentum: bool) -> Chain<f64> {
+fn chain<T: Scalar>(delay: bool, momentum: bool) -> Chain<T> {
     let (hole, lines) = lines(delay, momentum);
     let motion = Motion {
         velocity: AngularVelocity::Keplerian { drag: 0.6 },
@@ -293,7 +297,7 @@ fn exact_pixels_and_frames_agree() {
     let (one, whole) = (run(true), run(false));
     // Pixels without a ray have the same loss for ever: only whole frames count it.
     let dark = {
-        let chain = chain(true, true);
+        let chain = chain::<f64>(true, true);
         let mut seen = [false; SIDE * SIDE];
         chain.pixel().iter().for_each(|pixel| seen[*pixel as usize] = true);
         let dark = |(k, x): (usize, &f64)| if seen[k % (SIDE * SIDE)] { 0.0 } else { x * x };

@@ -1,0 +1,122 @@
+//! Steps: repeatable, resumable, and safe from divergence.
+
+use super::*;
+use crate::optimise::{Adam, Polynomial};
+use crate::representation::{Network, NetworkSettings};
+
+fn settings() -> Training {
+    let rate = Polynomial { from: 3e-2, to: 1e-3, steps: 40, power: 1.0 };
+    Training {
+        seed: 11,
+        adam: Adam::default(),
+        rate,
+        axis_rate: Some(rate),
+        batch: BatchSize::Pixels(30),
+        occupancy: Some(OccupancyPlan {
+            settings: OccupancySettings { cells: 6, threshold: 0.3, memory: 0.5 },
+            warm_up: 10,
+            every: 7,
+        }),
+        region: Region { r_min: 3.0, r_max: 6.0, z_width: 4.0 },
+        keep_every: 8,
+        divergence: 1e3,
+    }
+}
+
+fn objective() -> Objective<f32> {
+    let movie = movie().iter().map(|x| *x as f32).collect();
+    let term = Box::new(ImageTerm::new(movie, SIDE * SIDE, 0.5).unwrap());
+    let data = Data { image: Some(Weighted { weight: 1.0, term }), others: Vec::new() };
+    Objective { chain: chain(true, true), data }
+}
+
+fn network() -> Network {
+    let settings =
+        NetworkSettings { width: 16, shift: -1.0, length_scale: 6.0, ..NetworkSettings::bhnerf() };
+    Network::new(settings).unwrap()
+}
+
+fn start(training: &Training) -> State<f32> {
+    State::new(&network(), Axis::new([0.1, 0.5, 0.8]).unwrap(), training)
+}
+
+fn run(training: &Training, state: &mut State<f32>, until: u64) -> Vec<Outcome> {
+    let network = network();
+    let mut trainer = Trainer::new(objective(), &network, training.clone());
+    let mut outcomes = Vec::new();
+    while state.now.step < until {
+        outcomes.push(trainer.step(state).unwrap());
+    }
+    outcomes
+}
+
+#[test]
+fn regress_resumed_from_a_checkpoint_the_same_bits() {
+    for batch in [BatchSize::Pixels(30), BatchSize::Frames(2)] {
+        let training = Training { batch, ..settings() };
+        let (mut whole, mut broken) = (start(&training), start(&training));
+        let losses = run(&training, &mut whole, 40);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+        let first = pool.install(|| run(&training, &mut broken, 17));
+        let bytes = checkpoint::encode(&broken, "spin = 0.6").unwrap();
+        assert_eq!(checkpoint::header(&bytes).unwrap().settings, "spin = 0.6");
+        let mut broken = checkpoint::decode(&bytes, &start(&training)).unwrap();
+        let second = run(&training, &mut broken, 40);
+        assert!(broken == whole && [first, second].concat() == losses);
+        let (again, all) =
+            (checkpoint::encode(&broken, "").unwrap(), checkpoint::encode(&whole, "").unwrap());
+        assert!(again == all);
+    }
+}
+
+#[test]
+fn exact_the_loss_falls_and_the_mask_saves_work() {
+    let mut training = Training { batch: BatchSize::Frames(4), ..settings() };
+    let narrow = OccupancySettings { cells: 12, threshold: 0.95, memory: 0.5 };
+    training.occupancy = Some(OccupancyPlan { settings: narrow, warm_up: 10, every: 7 });
+    let mut state = start(&training);
+    let outcomes = run(&training, &mut state, 40);
+    let loss = |k: usize| match &outcomes[k] {
+        Outcome::Done(loss) => (loss.total, loss.points),
+        other => panic!("{other:?}"),
+    };
+    assert!(loss(39).0 < 0.9 * loss(0).0, "{:?} {:?}", loss(0), loss(39));
+    assert!(loss(39).1 < loss(0).1);
+    training.occupancy = None;
+    let all = run(&training, &mut start(&training), 1);
+    assert!(matches!(&all[0], Outcome::Done(first) if first.points == loss(0).1));
+}
+
+#[test]
+fn exact_a_divergence_is_stepped_back_from() {
+    let absurd = Polynomial { from: 1e30, to: 1e30, steps: 40, power: 1.0 };
+    let training = Training { rate: absurd, axis_rate: None, occupancy: None, ..settings() };
+    let network = network();
+    let mut trainer = Trainer::new(objective(), &network, training.clone());
+    let mut state = start(&training);
+    let fail = loop {
+        match trainer.step(&mut state) {
+            Ok(Outcome::SteppedBack { to, caution, .. }) => {
+                assert!(caution == 0.5f64.powi(state.setbacks as i32) && to == state.now.step);
+            }
+            Ok(Outcome::Done(_)) => {}
+            Err(fail) => break fail,
+        }
+        assert!(state.now.step < 40);
+    };
+    assert!(fail.setbacks == 12 && fail.to_string().contains("after 12 returns"), "{fail}");
+}
+
+#[test]
+fn damaged_checkpoints_are_refused() {
+    let training = settings();
+    let state = start(&training);
+    let bytes = checkpoint::encode(&state, "").unwrap();
+    for cut in [0, 7, 8, 100, bytes.len() / 2, bytes.len() - 1] {
+        assert!(checkpoint::decode(&bytes[..cut], &state).is_err());
+    }
+    let larger = Network::new(NetworkSettings { width: 17, ..NetworkSettings::bhnerf() }).unwrap();
+    let other = State::new(&larger, state.now.axis, &training);
+    let text = checkpoint::decode(&bytes, &other).unwrap_err().to_string();
+    assert!(text.contains("now.") && text.contains("wanted"), "{text}");
+}
