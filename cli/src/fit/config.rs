@@ -1,0 +1,468 @@
+//! What a fit's file may say. Numbers that decide the result have no default.
+
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// A fit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FitFile {
+    /// One line that says what is fitted.
+    pub title: String,
+    /// Seed of noise, of the first parameters and of all draws.
+    pub seed: u64,
+    /// The hole.
+    pub hole: Hole,
+    /// From where it is seen.
+    pub observer: Observer,
+    /// Pixels of the model.
+    pub screen: Screen,
+    /// Where emission is looked for, and how rays are sampled there.
+    pub region: Region,
+    /// What happens to light, each off unless asked.
+    #[serde(default)]
+    pub effects: Effects,
+    /// How matter turns.
+    pub motion: Motion,
+    /// Frames of a simulated movie, or of an observation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub movie: Option<Movie>,
+    /// What is simulated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub truth: Option<Truth>,
+    /// The array that sees the simulated movie.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub observation: Option<Observation>,
+    /// Files, instead of a simulation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub data: Option<DataFiles>,
+    /// What is compared with the data.
+    pub loss: Vec<Loss>,
+    /// What is recovered.
+    pub representation: Representation,
+    /// How.
+    pub training: Training,
+    /// What is known of the axis.
+    pub axis: AxisSearch,
+    /// The recovered volume.
+    pub output: Output,
+}
+
+/// The hole.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Hole {
+    /// a, M.
+    pub spin: f64,
+    /// Mass in solar masses; needed for hours and microarcseconds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mass_msun: Option<f64>,
+    /// Distance; needed for microarcseconds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub distance_kpc: Option<f64>,
+}
+
+/// From where it is seen.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Observer {
+    /// Angle to the spin axis.
+    pub inclination_deg: f64,
+    /// M; infinity without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius: Option<f64>,
+}
+
+/// Pixels of the model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Screen {
+    /// Along each side.
+    pub pixels: usize,
+    /// Width in M: of the outer edges, or from the first to the last pixel's centre.
+    pub width: f64,
+    /// What the width is of.
+    pub width_of: WidthOf,
+    /// Field of view on the sky, if it is not `width` in units of the hole's angular size.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub field_uas: Option<f64>,
+    /// Jy in a pixel of a sight line with 1 M of emission 1.
+    pub jy_per_pixel: f64,
+}
+
+/// What a width is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum WidthOf {
+    /// The pixels' outer edges.
+    Edges,
+    /// The centres of the first and the last pixel.
+    Centers,
+}
+
+/// Where emission is looked for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Region {
+    /// Least radius, M.
+    pub r_min: f64,
+    /// Largest radius, M.
+    pub r_max: f64,
+    /// Largest |z|, M.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub z_width: Option<f64>,
+    /// Nodes on rays.
+    pub nodes: Nodes,
+}
+
+/// Nodes on rays.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Nodes {
+    /// Gauss–Legendre panels in Mino time inside r_max.
+    Gauss {
+        /// Nodes of a panel.
+        order: usize,
+        /// Cuts of the coarsest panels.
+        split: u32,
+    },
+    /// Equidistant in Mino time with chords as weights, as BH-NeRF has them.
+    EqualMinoTime {
+        /// Nodes of a ray.
+        per_ray: usize,
+    },
+}
+
+/// What happens to light.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Effects {
+    /// Whether light takes its time.
+    #[serde(default)]
+    pub slow_light: bool,
+    /// Emission goes like g to this power; without it there is no redshift.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub redshift_power: Option<f64>,
+}
+
+/// How matter turns.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Motion {
+    /// Angular velocity about the axis.
+    pub velocity: Velocity,
+    /// The axis of the truth, or the known one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub axis: Option<[f64; 3]>,
+    /// When the volume is what it is.
+    pub reference_time: f64,
+    /// When it begins to shine.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub injection_time: Option<f64>,
+}
+
+/// Angular velocity.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Velocity {
+    /// 1/(r^{3/2} + drag).
+    Keplerian {
+        /// The spin, for orbits about it.
+        drag: f64,
+    },
+    /// rate · (radius/r)^exponent.
+    PowerLaw {
+        /// M.
+        radius: f64,
+        /// Radians a unit of time.
+        rate: f64,
+        /// 1.5 without spin.
+        exponent: f64,
+    },
+    /// Linear between these.
+    Table {
+        /// Growing, M.
+        radii: Vec<f64>,
+        /// Radians a unit of time.
+        rates: Vec<f64>,
+    },
+}
+
+/// Frames of a movie.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Movie {
+    /// How many.
+    pub frames: usize,
+    /// Time of the first.
+    pub from: f64,
+    /// Time of the last.
+    pub to: f64,
+}
+
+/// What is simulated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Truth {
+    /// Gaussian spots at the reference time.
+    pub spot: Vec<Spot>,
+}
+
+/// A Gaussian spot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spot {
+    /// Where it is, M.
+    pub center: [f64; 3],
+    /// Standard deviation, M.
+    pub sigma: f64,
+    /// Emission at its centre.
+    pub amplitude: f64,
+    /// For how long differential rotation has wound it up.
+    #[serde(default)]
+    pub wound_for: f64,
+}
+
+/// The array that sees the simulated movie.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Observation {
+    /// EHT2017, ngEHT, or a file in eht-imaging's format.
+    pub array: String,
+    /// sgra, m87, or RA,DEC.
+    pub source: String,
+    /// Modified Julian date.
+    pub mjd: i32,
+    /// Hours of UTC from the first scan to one after the last.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub utc: Option<[f64; 2]>,
+    /// The same in hours of Greenwich mean sidereal time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gmst: Option<[f64; 2]>,
+    /// Scans.
+    pub scans: u32,
+    /// Integration time of a scan, s.
+    pub integration_s: f64,
+    /// Frequency in GHz.
+    pub frequency_ghz: f64,
+    /// Bandwidth in GHz.
+    pub bandwidth_ghz: f64,
+    /// Elevations at which stations observe.
+    pub elevation_deg: [f64; 2],
+    /// Noise that is added to the data.
+    pub noise: Noise,
+    /// Time of the first scan, M.
+    pub first_time: f64,
+}
+
+/// Noise of simulated data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Noise {
+    /// None; errors are those of thermal noise.
+    None,
+    /// Thermal.
+    Thermal,
+}
+
+/// Measured data.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum DataFiles {
+    /// Visibilities: UVFITS, eht-imaging's text, the EHT's tables or CSV.
+    Visibilities {
+        /// The file, relative to the fit's.
+        path: PathBuf,
+        /// Rows this close in time are averaged and make a frame, s.
+        average_s: f64,
+        /// Time of the first frame, M.
+        first_time: f64,
+    },
+    /// A movie in Jy/pixel: .npz, .npy, .csv, .fits or .exr.
+    Movie {
+        /// The file, relative to the fit's.
+        path: PathBuf,
+    },
+}
+
+/// Data and their share.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Loss {
+    /// Which.
+    pub data: LossKind,
+    /// Factor on χ² a datum.
+    pub weight: f64,
+    /// Standard deviation of a pixel (image) or of the flux (light curve), Jy.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sigma: Option<f64>,
+    /// Least signal-to-noise ratio of baselines of closure quantities.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub least_snr: Option<f64>,
+}
+
+/// Kinds of data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LossKind {
+    /// Every pixel.
+    Image,
+    /// Complex visibilities.
+    Visibilities,
+    /// Debiased amplitudes.
+    Amplitudes,
+    /// Closure phases.
+    ClosurePhases,
+    /// Log closure amplitudes.
+    LogClosureAmplitudes,
+    /// Total flux.
+    LightCurve,
+}
+
+/// What is recovered.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Representation {
+    /// Which: the other numbers are those of its kind.
+    pub kind: Kind,
+    /// Nodes of a grid along each axis.
+    #[serde(default = "grid_nodes")]
+    pub nodes: usize,
+    /// Last function of a grid.
+    #[serde(default = "sigmoid")]
+    pub activation: Activation,
+    /// Units of a hidden layer.
+    #[serde(default = "width")]
+    pub width: usize,
+    /// Hidden layers.
+    #[serde(default = "hidden_layers")]
+    pub hidden_layers: usize,
+    /// Positional encoding degree.
+    #[serde(default = "degree")]
+    pub degree: usize,
+    /// Unit of length of a network, M.
+    #[serde(default = "one")]
+    pub length_scale: f64,
+    /// Unit of time of a network, M.
+    #[serde(default = "one")]
+    pub time_scale: f64,
+}
+
+/// Kinds of representations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// Network of the pulled-back point.
+    Bhnerf,
+    /// Network of the event.
+    Mlp4d,
+    /// Voxels.
+    Grid,
+}
+
+/// Last function.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Activation {
+    /// Between 0 and 1.
+    Sigmoid,
+    /// Above 0.
+    Softplus,
+    /// None; parameters are held at 0 or above.
+    Linear,
+}
+
+/// How it is recovered.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Training {
+    /// Steps of Adam.
+    pub steps: u64,
+    /// First rate.
+    pub rate: f64,
+    /// Last rate, reached linearly.
+    pub last_rate: f64,
+    /// What a step looks at.
+    pub batch: Batch,
+    /// Mask of what shines.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub occupancy: Option<Occupancy>,
+    /// Steps from one line of the log to the next.
+    pub log_every: u64,
+    /// Most seconds from one checkpoint to the next.
+    #[serde(default = "checkpoint_seconds")]
+    pub checkpoint_seconds: f64,
+}
+
+/// What a step looks at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Batch {
+    /// Random pixels of random frames: images only.
+    Pixels(usize),
+    /// Random frames, whole.
+    Frames(usize),
+}
+
+/// Mask of what shines.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Occupancy {
+    /// Cells along each axis.
+    pub cells: usize,
+    /// Part of the peak below which a cell is empty.
+    pub threshold: f64,
+    /// What is remembered from one look to the next.
+    pub memory: f64,
+    /// Steps without it.
+    pub warm_up: u64,
+    /// Steps from one look to the next.
+    pub every: u64,
+}
+
+/// What is known of the axis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum AxisSearch {
+    /// It is `motion.axis`.
+    Known {},
+    /// It is learnt from this start.
+    From {
+        /// Where it starts.
+        start: [f64; 3],
+        /// First rate.
+        rate: f64,
+        /// Last rate, reached linearly.
+        last_rate: f64,
+    },
+}
+
+/// The recovered volume.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Output {
+    /// Nodes of the volume along each axis.
+    pub nodes: usize,
+}
+
+fn grid_nodes() -> usize {
+    64
+}
+fn sigmoid() -> Activation {
+    Activation::Sigmoid
+}
+fn width() -> usize {
+    128
+}
+fn hidden_layers() -> usize {
+    4
+}
+fn degree() -> usize {
+    3
+}
+fn one() -> f64 {
+    1.0
+}
+fn checkpoint_seconds() -> f64 {
+    60.0
+}
