@@ -41,10 +41,10 @@ pub fn slices(
 ) -> anyhow::Result<Figure> {
     let last = shown.last().ok_or_else(|| anyhow!("there is nothing to draw"))?;
     let point = through.point(last.volume);
-    let [x, y, z] = point;
+    let [x, y, z] = point.map(|x| format!("{x:.2}").replace('-', "−"));
     let (all, from, name) = (names(shown), through.name(), last.name);
     let caption = format!(
-        "Emission ({all}) in the planes through ({x:.2}, {y:.2}, {z:.2}) M, the {from} of the volume \
+        "Emission ({all}) in the planes through ({x}, {y}, {z}) M, the {from} of the volume \
          \"{name}\". All panels have one colour scale; short marks at the edges show where the planes \
          cut each other, a circle is the hole's horizon in that plane."
     );

@@ -143,10 +143,18 @@ impl LinePlot {
             .with_title(&*self.title)
             .with_x_label(self.x.title())
             .with_y_label(self.y.title())
+            .with_tick_size(13)
+            .with_label_size(15)
             .with_width(640.0)
             .with_height(420.0);
         let layout = if self.x.log { layout.with_log_x() } else { layout };
-        if self.y.log { layout.with_log_y() } else { layout }
+        if !self.y.log {
+            return layout;
+        }
+        // Error bars that reach to 0 do not decide how far down the axis goes.
+        let values = self.series.iter().flat_map(|s| &s.points).map(|[_, y]| *y);
+        let least = values.filter(|y| self.y.shows(*y)).fold(f64::INFINITY, f64::min);
+        layout.with_log_y().with_y_axis_min(0.5 * least)
     }
 }
 

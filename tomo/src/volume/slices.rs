@@ -128,7 +128,7 @@ fn panel(
     for line in [[[0.0, y], [9.0, y]], [[size - 9.0, y], [size, y]]] {
         canvas.line(&line, false, 1.5, CROSS);
     }
-    let title = format!("{} = {:.2} M", NAMES[fixed], point[fixed]);
+    let title = format!("{} = {:.2} M", NAMES[fixed], point[fixed]).replace('-', "−");
     let axes = [right, up].map(|axis| format!("{} (M)", NAMES[axis]));
     Some(Panel { title, drawn: canvas.into_picture(), axes, ends })
 }
