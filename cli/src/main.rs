@@ -14,6 +14,9 @@ mod output;
 mod overlay;
 mod progress;
 mod render;
+// Called by no verb yet.
+#[allow(dead_code, unused_imports)]
+mod report;
 mod trace;
 mod uv;
 

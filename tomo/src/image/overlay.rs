@@ -57,7 +57,7 @@ fn round_length(length: f64) -> f64 {
 }
 
 /// Three digits, and no exponent where it can be helped.
-pub(super) fn digits(x: f64) -> String {
+pub fn digits(x: f64) -> String {
     if x == 0.0 || !x.is_finite() {
         return format!("{x}");
     }

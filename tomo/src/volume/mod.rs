@@ -1,6 +1,15 @@
 //! Emission on the nodes of a box: what a fit recovers, and what a scene may show.
 
+pub mod metrics;
+mod panels;
+#[cfg(test)]
+mod paper;
+pub mod projection;
+pub mod slices;
+pub mod vti;
+
 use kerrlight_geodesic::OutOfRange;
+pub use panels::Shown;
 
 /// Numbers on a regular grid of nodes, linear in between along each axis and zero outside.
 #[derive(Clone, Debug, PartialEq)]
@@ -92,6 +101,13 @@ impl Volume {
     fn indices(&self, k: usize) -> [usize; 3] {
         let [_, ny, nz] = self.nodes;
         [k / (ny * nz), k / nz % ny, k % nz]
+    }
+
+    /// Values of the nodes, x fastest, then y, then z: the order of VTK and of textures.
+    pub fn x_fastest(&self) -> impl Iterator<Item = f32> + '_ {
+        let [nx, ny, nz] = self.nodes;
+        let index = move |k: usize| (k % nx * ny + k / nx % ny) * nz + k / (nx * ny);
+        (0..self.values.len()).map(move |k| self.values[index(k)])
     }
 
     /// Where node number k is, M.

@@ -1,0 +1,137 @@
+//! The page around everything else. All text from outside goes through [`escape`].
+
+use super::{Figure, LinePlot, Outcome, Report, Setting};
+use std::fmt::Write;
+
+const PAGE: &str = include_str!("assets/page.html");
+const STYLE: &str = include_str!("assets/style.css");
+
+/// Text as it may stand between tags and in quoted attributes.
+pub fn escape(text: &str) -> String {
+    let mut safe = String::with_capacity(text.len());
+    for letter in text.chars() {
+        match letter {
+            '&' => safe.push_str("&amp;"),
+            '<' => safe.push_str("&lt;"),
+            '>' => safe.push_str("&gt;"),
+            '"' => safe.push_str("&quot;"),
+            '\'' => safe.push_str("&#39;"),
+            _ => safe.push(letter),
+        }
+    }
+    safe
+}
+
+pub fn page(report: &Report) -> anyhow::Result<String> {
+    let sections = [
+        summary(&report.summary),
+        section("results", "Results", &results(&report.results)),
+        report.view.as_ref().map(super::View3d::html).transpose()?.unwrap_or_default(),
+        section("pictures", "Pictures", &report.figures.iter().map(figure).collect::<String>()),
+        section("plots", "Plots", &plots(&report.plots)?),
+        section("settings", "Settings", &settings(&report.settings)),
+    ];
+    let parts = [
+        ("title", escape(&report.title)),
+        ("style", STYLE.to_owned()),
+        ("version", env!("CARGO_PKG_VERSION").to_owned()),
+        ("sections", sections.concat()),
+    ];
+    Ok(fill(PAGE, &parts))
+}
+
+/// Puts parts in the places `{{name}}` of a template, from left to right: what is put in is not looked
+/// at again.
+pub fn fill(template: &str, parts: &[(&str, String)]) -> String {
+    let mut page = String::new();
+    let mut rest = template;
+    while let Some((before, after)) = rest.split_once("{{") {
+        let (name, behind) = after.split_once("}}").unwrap_or((after, ""));
+        page.push_str(before);
+        let part = parts.iter().find(|(known, _)| *known == name);
+        debug_assert!(part.is_some(), "the template asks for {name}");
+        page.push_str(part.map_or("", |(_, text)| text.as_str()));
+        rest = behind;
+    }
+    page + rest
+}
+
+/// A part of the page with a heading, if there is anything in it.
+pub fn section(id: &str, heading: &str, content: &str) -> String {
+    if content.is_empty() {
+        return String::new();
+    }
+    format!("<section id=\"{id}\">\n<h2>{heading}</h2>\n{content}</section>\n")
+}
+
+fn summary(sentences: &[String]) -> String {
+    let paragraph = |sentence: &String| format!("<p>{}</p>\n", escape(sentence));
+    let text: String = sentences.iter().map(paragraph).collect();
+    if text.is_empty() { text } else { format!("<section id=\"summary\">\n{text}</section>\n") }
+}
+
+fn results(rows: &[Outcome]) -> String {
+    let cells = |row: &Outcome| {
+        [&row.name, &row.value, &row.unit, &row.meaning].map(String::as_str).map(escape)
+    };
+    table(&["Quantity", "Value", "Unit", "What it says"], rows.iter().map(cells))
+}
+
+fn settings(rows: &[Setting]) -> String {
+    let cells = |row: &Setting| [&row.key, &row.value, &row.unit].map(String::as_str).map(escape);
+    table(&["Setting", "Value", "Unit"], rows.iter().map(cells))
+}
+
+/// A table of cells that are safe already; nothing without rows.
+fn table<const N: usize>(head: &[&str; N], rows: impl Iterator<Item = [String; N]>) -> String {
+    let mut body = String::new();
+    for cells in rows {
+        let [first, rest @ ..] = cells.as_slice() else { continue };
+        let rest: String = rest.iter().map(|cell| format!("<td>{cell}</td>")).collect();
+        let _ = writeln!(body, "<tr><th scope=\"row\">{first}</th>{rest}</tr>");
+    }
+    if body.is_empty() {
+        return body;
+    }
+    let head: String = head.iter().map(|name| format!("<th scope=\"col\">{name}</th>")).collect();
+    format!(
+        "<div class=\"wide\"><table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody>\n</table></div>\n"
+    )
+}
+
+fn figure(figure: &Figure) -> String {
+    format!(
+        "<figure><div class=\"wide\"><img alt=\"{}\" src=\"data:image/png;base64,{}\"></div>\n\
+         <figcaption>{}</figcaption></figure>\n",
+        escape(&figure.alt),
+        base64::encode(&figure.png),
+        escape(&figure.caption)
+    )
+}
+
+fn plots(plots: &[LinePlot]) -> anyhow::Result<String> {
+    let mut all = String::new();
+    for (k, plot) in plots.iter().enumerate() {
+        let (svg, caption) = plot.draw(&format!("plot{k}-"))?;
+        let _ = write!(
+            all,
+            "<figure class=\"plot\"><div class=\"wide\" role=\"img\" aria-label=\"{}\">{svg}</div>\n\
+             <figcaption>{}</figcaption></figure>\n",
+            escape(&plot.title),
+            escape(&caption)
+        );
+    }
+    Ok(if all.is_empty() { all } else { format!("<div class=\"plots\">\n{all}</div>\n") })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exact_text_is_escaped_and_not_looked_at_twice() {
+        assert_eq!(escape("<a href='x'>\"&\""), "&lt;a href=&#39;x&#39;&gt;&quot;&amp;&quot;");
+        let parts = [("a", "{{b}}".to_owned()), ("b", "2".to_owned())];
+        assert_eq!(fill("1 {{a}} {{b}} }} {", &parts), "1 {{b}} 2 }} {");
+    }
+}

@@ -1,0 +1,76 @@
+//! One HTML page that says what a fit found: sentences, tables, pictures, plots and the emission in
+//! three dimensions. Nothing in it is loaded from anywhere else.
+
+mod html;
+mod pictures;
+mod plot;
+#[cfg(test)]
+mod tests;
+mod view;
+
+pub use pictures::{Figure, projections, slices};
+pub use plot::{Axis, LinePlot, Marks, Series};
+pub use view::{Motion, View3d};
+
+use crate::output::Output;
+
+/// What is on the page; empty lists are left out.
+#[derive(Debug, Default)]
+pub struct Report {
+    /// What was done, in a few words.
+    pub title: String,
+    /// Sentences: what was asked, what was measured, what it means.
+    pub summary: Vec<String>,
+    /// What was measured.
+    pub results: Vec<Outcome>,
+    /// The emission in three dimensions.
+    pub view: Option<View3d>,
+    /// Pictures.
+    pub figures: Vec<Figure>,
+    /// Curves and points with axes.
+    pub plots: Vec<LinePlot>,
+    /// What was asked for.
+    pub settings: Vec<Setting>,
+}
+
+/// A line of the table of settings.
+#[derive(Debug)]
+pub struct Setting {
+    /// As on the command line or in the file.
+    pub key: String,
+    /// Its value.
+    pub value: String,
+    /// Its unit, or nothing.
+    pub unit: String,
+}
+
+/// A line of the table of results.
+#[derive(Debug)]
+pub struct Outcome {
+    /// The quantity.
+    pub name: String,
+    /// Its value, with as many digits as are known.
+    pub value: String,
+    /// Its unit, or nothing.
+    pub unit: String,
+    /// What it says, for somebody who does not know the name.
+    pub meaning: String,
+}
+
+impl Report {
+    /// The page.
+    ///
+    /// # Errors
+    /// If a number of a plot or of the view is out of its range.
+    pub fn html(&self) -> anyhow::Result<String> {
+        html::page(self)
+    }
+
+    /// Writes the page, whole or not at all.
+    ///
+    /// # Errors
+    /// As for [`Self::html`], or if it cannot be written.
+    pub fn write(&self, output: &Output) -> anyhow::Result<()> {
+        output.write(self.html()?.as_bytes())
+    }
+}

@@ -1,0 +1,71 @@
+//! Pictures of volumes with the captions that belong to them.
+
+use anyhow::{Context, anyhow};
+use kerrlight_tomo::volume::Shown;
+use kerrlight_tomo::volume::projection::{self, Surroundings, VIEWS};
+use kerrlight_tomo::volume::slices::{self, Through};
+use std::io::Cursor;
+
+/// A picture of the page.
+#[derive(Debug)]
+pub struct Figure {
+    /// The bytes of its PNG file.
+    pub png: Vec<u8>,
+    /// What it shows and how it was made.
+    pub caption: String,
+    /// What somebody who does not see it should know.
+    pub alt: String,
+}
+
+fn png(drawn: Option<image::RgbImage>) -> anyhow::Result<Vec<u8>> {
+    let drawn = drawn.ok_or_else(|| anyhow!("there is nothing to draw"))?;
+    let mut bytes = Cursor::new(Vec::new());
+    drawn.write_to(&mut bytes, image::ImageFormat::Png).context("cannot encode a picture")?;
+    Ok(bytes.into_inner())
+}
+
+fn names(shown: &[Shown]) -> String {
+    shown.iter().map(|s| s.name).collect::<Vec<_>>().join(" and ")
+}
+
+/// Slices of volumes along three planes through one point, which is sought in the last of them (the
+/// truth, where there is one); `unit` is that of the emission, `hole_radius` in M.
+///
+/// # Errors
+/// If there is no volume.
+pub fn slices(
+    shown: &[Shown],
+    through: Through,
+    hole_radius: f64,
+    unit: &str,
+) -> anyhow::Result<Figure> {
+    let last = shown.last().ok_or_else(|| anyhow!("there is nothing to draw"))?;
+    let point = through.point(last.volume);
+    let [x, y, z] = point.map(|x| format!("{x:.2}").replace('-', "−"));
+    let (all, from, name) = (names(shown), through.name(), last.name);
+    let caption = format!(
+        "Emission ({all}) in the planes through ({x}, {y}, {z}) M, the {from} of the volume \
+         \"{name}\". All panels have one colour scale; short marks at the edges show where the planes \
+         cut each other, a circle is the hole's horizon in that plane."
+    );
+    let alt = format!("Three orthogonal slices of the emission: {all}.");
+    Ok(Figure { png: png(slices::sheet(shown, point, hole_radius, unit))?, caption, alt })
+}
+
+/// Volumes from four sides; `unit` is that of the emission.
+///
+/// # Errors
+/// If there is no volume.
+pub fn projections(shown: &[Shown], around: &Surroundings, unit: &str) -> anyhow::Result<Figure> {
+    let all = names(shown);
+    let (hole, ring) = (around.hole_radius, around.ring_radius);
+    let caption = format!(
+        "Emission ({all}) summed up along straight parallel rays, seen from four directions: a drawing \
+         of the volume in flat space, without lensing, delay or Doppler shift. All panels have one \
+         colour scale. The dark ball has the radius of the horizon, {hole:.3} M, and hides what is \
+         behind it; the blue line is the axis that matter turns about, the green circle has a radius \
+         of {ring:.2} M in the hole's equatorial plane."
+    );
+    let alt = format!("The emission seen from four directions: {all}.");
+    Ok(Figure { png: png(projection::sheet(shown, &VIEWS, around, unit))?, caption, alt })
+}

@@ -1,0 +1,184 @@
+//! A volume cut along the planes of its axes through one point.
+
+use super::Volume;
+use super::panels::{self, PANEL, Page, Panel, Shown};
+use crate::image::canvas::{Canvas, Rgb};
+use image::RgbImage;
+
+/// The point that slices go through.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Through {
+    /// The node with the largest value, the first of several.
+    Maximum,
+    /// Σ e x/Σ e over the nodes, of values above 0.
+    Centroid,
+    /// A place in M.
+    Point([f64; 3]),
+}
+
+impl Through {
+    /// Where that is in a volume, M; an empty volume has its middle for all of them.
+    pub fn point(self, volume: &Volume) -> [f64; 3] {
+        let middle = core::array::from_fn(|k| 0.5 * (volume.low[k] + volume.high[k]));
+        match self {
+            Self::Maximum => maximum(volume).unwrap_or(middle),
+            Self::Centroid => centroid(volume).unwrap_or(middle),
+            Self::Point(point) => point,
+        }
+    }
+
+    /// What it is called in a caption.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Maximum => "brightest node",
+            Self::Centroid => "centroid of the emission",
+            Self::Point(_) => "chosen point",
+        }
+    }
+}
+
+fn maximum(volume: &Volume) -> Option<[f64; 3]> {
+    let above = volume.values().iter().enumerate().filter(|(_, value)| **value > 0.0);
+    let best = above.reduce(|best, next| if next.1 > best.1 { next } else { best });
+    best.map(|(k, _)| volume.position(k))
+}
+
+fn centroid(volume: &Volume) -> Option<[f64; 3]> {
+    let mut sums = [0.0; 4];
+    for (k, value) in volume.values().iter().enumerate().filter(|(_, value)| **value > 0.0) {
+        let ([x, y, z], weight) = (volume.position(k), f64::from(*value));
+        for (sum, term) in sums.iter_mut().zip([x, y, z, 1.0]) {
+            *sum += weight * term;
+        }
+    }
+    let [x, y, z, total] = sums;
+    (total > 0.0).then(|| [x, y, z].map(|sum| sum / total))
+}
+
+/// Axes to the right, upward and along the line of sight of each slice.
+const PLANES: [[usize; 3]; 3] = [[0, 1, 2], [0, 2, 1], [1, 2, 0]];
+const NAMES: [&str; 3] = ["x", "y", "z"];
+const EDGE: Rgb = [120, 130, 150];
+const CROSS: Rgb = [70, 90, 110];
+
+/// Values on `pixels` × `pixels` points of a plane, row by row from the top, over the whole box.
+/// `plane` has the axes (0, 1, 2 for x, y, z) to the right, upward, and that of the fixed coordinate.
+pub fn slice(volume: &Volume, plane: [usize; 3], point: [f64; 3], pixels: usize) -> Vec<f32> {
+    let at = |axis: usize, k: usize| {
+        let part = (2 * k + 1) as f64 / (2 * pixels) as f64;
+        volume.low[axis] + (volume.high[axis] - volume.low[axis]) * part
+    };
+    let [right, up, _] = plane;
+    let value = |k: usize| {
+        let mut place = point;
+        place[right] = at(right, k % pixels);
+        place[up] = at(up, pixels - 1 - k / pixels);
+        volume.at(place) as f32
+    };
+    (0..pixels * pixels).map(value).collect()
+}
+
+/// Three slices of each volume through one point, a row each, in one scale of colours, with the hole's
+/// outline where a plane cuts it; `unit` is that of the emission. `None` if there is nothing to draw.
+pub fn sheet(shown: &[Shown], point: [f64; 3], hole_radius: f64, unit: &str) -> Option<RgbImage> {
+    let cuts = |s: &Shown| PLANES.map(|plane| slice(s.volume, plane, point, PANEL as usize));
+    let values: Vec<[Vec<f32>; 3]> = shown.iter().map(cuts).collect();
+    let most = panels::largest(values.iter().flatten());
+    let row = |(s, values): (&Shown, &[Vec<f32>; 3])| {
+        let drawn = |(plane, values): ([usize; 3], &Vec<f32>)| {
+            panel(s.volume, plane, values, point, (hole_radius, most))
+        };
+        let panels = PLANES.into_iter().zip(values).map(drawn).collect::<Option<Vec<Panel>>>()?;
+        Some((s.name.to_owned(), panels))
+    };
+    let rows = shown.iter().zip(&values).map(row).collect::<Option<_>>()?;
+    Page { rows, most, quantity: format!("emission ({unit})") }.draw()
+}
+
+fn panel(
+    volume: &Volume,
+    plane: [usize; 3],
+    values: &[f32],
+    point: [f64; 3],
+    (hole_radius, most): (f64, f64),
+) -> Option<Panel> {
+    let table = panels::colors();
+    let pixels = values.iter().flat_map(|value| panels::shade(&table, *value, most)).collect();
+    let mut canvas = Canvas::of(&RgbImage::from_raw(PANEL, PANEL, pixels)?)?;
+    let [right, up, fixed] = plane;
+    let ends = [right, up].map(|axis| [volume.low[axis], volume.high[axis]]);
+    let size = f64::from(PANEL);
+    let on_canvas = |[x, y]: [f64; 2]| {
+        let part = |k: usize, value: f64| (value - ends[k][0]) / (ends[k][1] - ends[k][0]) * size;
+        [part(0, x), size - part(1, y)]
+    };
+    let radius = (hole_radius.powi(2) - point[fixed].powi(2)).max(0.0).sqrt();
+    let circle = |k: u32| {
+        let (sin, cos) = (f64::from(k) * core::f64::consts::TAU / 120.0).sin_cos();
+        on_canvas([radius * cos, radius * sin])
+    };
+    if radius > 0.0 {
+        canvas.line(&(0..120).map(circle).collect::<Vec<_>>(), true, 1.2, EDGE);
+    }
+    // Short marks at the edges show where the other two slices cut this one.
+    let [x, y] = on_canvas([point[right], point[up]]);
+    for line in [[[x, 0.0], [x, 9.0]], [[x, size - 9.0], [x, size]]] {
+        canvas.line(&line, false, 1.5, CROSS);
+    }
+    for line in [[[0.0, y], [9.0, y]], [[size - 9.0, y], [size, y]]] {
+        canvas.line(&line, false, 1.5, CROSS);
+    }
+    let title = format!("{} = {:.2} M", NAMES[fixed], point[fixed]).replace('-', "−");
+    let axes = [right, up].map(|axis| format!("{} (M)", NAMES[axis]));
+    Some(Panel { title, drawn: canvas.into_picture(), axes, ends })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::paper;
+    use super::*;
+
+    /// e = 100 + x + 10 y + 100 z: every pixel is where it says.
+    #[test]
+    fn exact_slices_of_a_plane() {
+        let empty = Volume::new([4, 5, 6], [-1.0; 3], [1.0, 2.0, 3.0], vec![0.0; 120]).unwrap();
+        let value = |[x, y, z]: [f64; 3]| (100.0 + x + 10.0 * y + 100.0 * z) as f32;
+        let values = (0..120).map(|k| value(empty.position(k))).collect();
+        let volume = Volume::new(empty.nodes(), empty.low(), empty.high(), values).unwrap();
+        let point = [0.5, 0.25, 1.5];
+        // Pixels of 2 × 2: at a quarter and three quarters of the box, the upper ones first.
+        let [x, y, z] = [[-0.5, 0.5], [-0.25, 1.25], [0.0, 2.0]];
+        for (plane, corners) in [
+            ([0, 1, 2], [[x[0], y[1], 1.5], [x[1], y[0], 1.5]]),
+            ([0, 2, 1], [[x[0], 0.25, z[1]], [x[1], 0.25, z[0]]]),
+            ([1, 2, 0], [[0.5, y[0], z[1]], [0.5, y[1], z[0]]]),
+        ] {
+            let cut = slice(&volume, plane, point, 2);
+            for (found, corner) in [cut[0], cut[3]].into_iter().zip(corners) {
+                assert!((found - value(corner)).abs() < 1e-3, "{plane:?} {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn exact_points_to_cut_through() {
+        let scene = paper::scene_1(65);
+        let centre = [3.5 * 0.75f64.sqrt(), 0.0, 1.75];
+        let distance =
+            |p: [f64; 3]| p.iter().zip(centre).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+        assert!(distance(Through::Maximum.point(&scene)).sqrt() < 0.5 * 3f64.sqrt() * 10.0 / 64.0);
+        assert!(distance(Through::Centroid.point(&scene)).sqrt() < 1e-3);
+        let empty = Volume::new([2; 3], [0.0; 3], [1.0, 2.0, 4.0], vec![0.0; 8]).unwrap();
+        assert_eq!(Through::Centroid.point(&empty), [0.5, 1.0, 2.0]);
+        assert_eq!(Through::Maximum.point(&empty), [0.5, 1.0, 2.0]);
+    }
+
+    #[test]
+    fn exact_size_of_the_sheet() {
+        let scene = paper::scene_1(16);
+        let shown = [Shown { name: "truth", volume: &scene }; 2];
+        let drawn = sheet(&shown, Through::Maximum.point(&scene), 2.0, "unit").unwrap();
+        assert_eq!(drawn.dimensions(), (3 * (58 + 300 + 14) + 14, 2 * (30 + 28 + 300 + 46) + 74));
+        assert!(sheet(&[], [0.0; 3], 2.0, "unit").is_none());
+    }
+}
