@@ -16,6 +16,7 @@ mod progress;
 mod render;
 mod trace;
 mod uv;
+mod volume_files;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
