@@ -9,12 +9,14 @@
 pub mod dynamics;
 pub mod emission;
 pub mod film;
+pub mod fit;
 pub mod image;
 pub mod interferometry;
 pub mod optimise;
 pub mod plan;
 pub mod points;
 pub mod polarization;
+mod real;
 pub mod render;
 pub mod representation;
 pub mod scene;

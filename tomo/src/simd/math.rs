@@ -7,7 +7,7 @@
 
 use super::lanes::{Lanes, MAX_LANES};
 use super::scalar::Scalar;
-use crate::interferometry::operator::Real;
+use crate::real::Real;
 
 /// What the functions need to know of a scalar.
 pub trait Coefficients: Real {

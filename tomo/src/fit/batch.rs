@@ -1,0 +1,152 @@
+//! Nodes of some rays in some frames, pulled back to the reference time.
+
+use super::chain::Chain;
+use super::occupancy::Occupancy;
+use crate::dynamics::{Axis, Turned, pull_back};
+use crate::points::{Coordinates, CoordinatesMut};
+use crate::simd::Scalar;
+
+/// Columns of a batch's points.
+#[derive(Clone, Debug, Default)]
+pub struct Columns<T> {
+    /// Where the light was emitted.
+    pub position: [Vec<T>; 3],
+    /// When, since the reference time.
+    pub time: Vec<T>,
+    /// Angles to the reference time.
+    pub angle: Vec<T>,
+    /// What emission is multiplied by in its pixel.
+    pub weight: Vec<T>,
+    /// Where the matter was at the reference time.
+    pub pulled: [Vec<T>; 3],
+    /// Which node of the chain each is.
+    pub node: Vec<u32>,
+}
+
+/// (ray, frame) pairs and their nodes, pair after pair. Memory is kept from one batch to the next.
+#[derive(Clone, Debug, Default)]
+pub struct Batch<T> {
+    /// Ray and frame.
+    pub pairs: Vec<(u32, u32)>,
+    /// Pair k has the nodes `starts[k]..starts[k + 1]`.
+    pub starts: Vec<usize>,
+    /// The nodes.
+    pub columns: Columns<T>,
+    /// Room for the emission of each node.
+    pub values: Vec<T>,
+    kept: Vec<bool>,
+}
+
+impl<T: Scalar> Columns<T> {
+    fn all(&mut self) -> [&mut Vec<T>; 9] {
+        let [x, y, z] = &mut self.position;
+        let [a, b, c] = &mut self.pulled;
+        [x, y, z, &mut self.time, &mut self.angle, &mut self.weight, a, b, c]
+    }
+
+    fn clear(&mut self) {
+        self.all().into_iter().for_each(Vec::clear);
+        self.node.clear();
+    }
+
+    /// Moves node `from` to place `to`.
+    fn keep(&mut self, from: usize, to: usize) {
+        self.all().into_iter().for_each(|column| column[to] = column[from]);
+        self.node[to] = self.node[from];
+    }
+
+    fn truncate(&mut self, length: usize) {
+        self.all().into_iter().for_each(|column| column.truncate(length));
+        self.node.truncate(length);
+    }
+
+    fn pull_back(&mut self, axis: Axis) {
+        let length = self.weight.len();
+        self.pulled.iter_mut().for_each(|column| column.resize(length, T::zero()));
+        let [x, y, z] = &self.position;
+        let [a, b, c] = &mut self.pulled;
+        let turned = Turned { points: Coordinates::xyz(x, y, z), angles: &self.angle };
+        pull_back(axis, turned, CoordinatesMut::xyz(a, b, c));
+    }
+}
+
+impl<T: Scalar> Batch<T> {
+    /// The pairs of the batch.
+    pub fn set(&mut self, pairs: impl Iterator<Item = (u32, u32)>) {
+        self.pairs.clear();
+        self.pairs.extend(pairs);
+    }
+
+    /// Number of nodes.
+    pub fn points(&self) -> usize {
+        self.columns.weight.len()
+    }
+
+    /// Collects the nodes of the pairs and pulls them back; leaves out those that do not shine yet or
+    /// come to lie where nothing does.
+    pub fn gather(&mut self, chain: &Chain<T>, axis: Axis, occupancy: Option<&Occupancy>) {
+        self.columns.clear();
+        self.starts.clear();
+        self.starts.push(0);
+        for &(ray, frame) in &self.pairs {
+            let range = chain.starts[ray as usize]..chain.starts[ray as usize + 1];
+            self.columns.push(chain, range, chain.times[frame as usize]);
+            self.starts.push(self.columns.weight.len());
+        }
+        self.columns.pull_back(axis);
+        if occupancy.is_some() || chain.earliest.is_some() {
+            self.thin_out(chain.earliest, occupancy);
+        }
+    }
+
+    fn thin_out(&mut self, earliest: Option<T>, occupancy: Option<&Occupancy>) {
+        let columns = &mut self.columns;
+        self.kept.clear();
+        let [x, y, z] = &columns.pulled;
+        self.kept.extend((0..x.len()).map(|k| {
+            earliest.is_none_or(|earliest| columns.time[k] >= earliest)
+                && occupancy
+                    .is_none_or(|mask| mask.holds([x[k].double(), y[k].double(), z[k].double()]))
+        }));
+        let (mut to, mut from) = (0, 0);
+        for end in &mut self.starts[1..] {
+            while from < *end {
+                if self.kept[from] {
+                    columns.keep(from, to);
+                    to += 1;
+                }
+                from += 1;
+            }
+            *end = to;
+        }
+        columns.truncate(to);
+    }
+
+    /// What a representation of this dimension sees: points pulled back, or events.
+    pub fn coordinates(columns: &Columns<T>, dimension: usize) -> Coordinates<'_, T> {
+        let [x, y, z] = if dimension == 4 { &columns.position } else { &columns.pulled };
+        match dimension {
+            4 => Coordinates::txyz(&columns.time, x, y, z),
+            _ => Coordinates::xyz(x, y, z),
+        }
+    }
+}
+
+impl<T: Scalar> Columns<T> {
+    fn push(&mut self, chain: &Chain<T>, range: core::ops::Range<usize>, time: T) {
+        for (to, from) in self.position.iter_mut().zip(&chain.position) {
+            to.extend_from_slice(&from[range.clone()]);
+        }
+        self.weight.extend_from_slice(&chain.weight[range.clone()]);
+        self.node.extend(range.clone().map(|node| node as u32));
+        let rates = &chain.rate[range.clone()];
+        if chain.delay.is_empty() {
+            self.time.resize(self.weight.len(), time);
+            self.angle.extend(rates.iter().map(|rate| *rate * time));
+        } else {
+            self.time.extend(chain.delay[range.clone()].iter().map(|delay| time - *delay));
+            let phases = rates.iter().zip(&chain.phase[range]);
+            self.angle.extend(phases.map(|(rate, phase)| *rate * time + *phase));
+        }
+    }
+}

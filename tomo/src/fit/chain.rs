@@ -1,0 +1,203 @@
+//! From a field of emission at the reference time to pixels of a movie: what is common to all
+//! representations and data.
+
+use super::batch::Batch;
+use super::occupancy::Occupancy;
+use super::shift::Shift;
+use super::sightlines::Sightlines;
+use crate::dynamics::{AngularVelocity, Axis, Injection};
+use crate::representation::{Representation, Workspace};
+use crate::simd::Scalar;
+use kerrlight_geodesic::{Kerr, OutOfRange};
+
+/// How the matter moves, and when it is seen.
+#[derive(Clone, Debug)]
+pub struct Motion {
+    /// Angular velocity about the axis.
+    pub velocity: AngularVelocity,
+    /// Time at which the field of emission is what a representation says, M.
+    pub reference: f64,
+    /// When it begins to shine; always, without one.
+    pub injection: Option<Injection>,
+    /// Times of the frames, M.
+    pub times: Vec<f64>,
+}
+
+/// Redshift of the emission: j ∝ g^power a unit of affine parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Redshift {
+    /// 2 + spectral index; BH-NeRF's tutorials have 2.
+    pub power: f64,
+}
+
+/// Nodes with all that does not change in a fit, in the scalar that it runs in.
+#[derive(Clone, Debug)]
+pub struct Chain<T> {
+    pub(super) pixels: usize,
+    pub(super) pixel: Vec<u32>,
+    pub(super) starts: Vec<usize>,
+    pub(super) position: [Vec<T>; 3],
+    /// −Ω: by how much a point is turned back in a unit of time.
+    pub(super) rate: Vec<T>,
+    /// Ω · delay.
+    pub(super) phase: Vec<T>,
+    /// Times at which the light left, relative to the frame's.
+    pub(super) delay: Vec<T>,
+    pub(super) weight: Vec<T>,
+    pub(super) plain_weight: Vec<f64>,
+    pub(super) shift: Option<Shift>,
+    factors: Vec<f64>,
+    weighted_for: Option<Axis>,
+    /// Times of the frames since the reference time.
+    pub(super) times: Vec<T>,
+    /// Earliest time of emission since the reference time.
+    pub(super) earliest: Option<T>,
+}
+
+impl<T: Scalar> Chain<T> {
+    /// Of these nodes and this motion.
+    ///
+    /// # Errors
+    /// If a number is out of its range, or redshift is asked of nodes without momenta.
+    pub fn new(
+        lines: &Sightlines,
+        motion: &Motion,
+        hole: &Kerr,
+        redshift: Option<Redshift>,
+    ) -> Result<Self, OutOfRange> {
+        check(motion, redshift)?;
+        let velocity = &motion.velocity;
+        let rate = |k: usize| {
+            let [x, y, z] = &lines.position;
+            -velocity.rate((x[k] * x[k] + y[k] * y[k] + z[k] * z[k]).sqrt())
+        };
+        let rates: Vec<f64> = (0..lines.points()).map(rate).collect();
+        let column = |numbers: &[f64]| numbers.iter().map(|x| T::of(*x)).collect::<Vec<T>>();
+        let phase = lines.delay.iter().zip(&rates).map(|(delay, rate)| T::of(-rate * delay));
+        let since = |time: f64| T::of(time - motion.reference);
+        Ok(Self {
+            pixels: lines.pixels,
+            pixel: lines.pixel.clone(),
+            starts: lines.starts.clone(),
+            position: [0, 1, 2].map(|c| column(&lines.position[c])),
+            phase: phase.collect(),
+            rate: column(&rates),
+            delay: column(&lines.delay),
+            weight: column(&lines.weight),
+            plain_weight: lines.weight.clone(),
+            shift: redshift.map(|shift| Shift::new(lines, hole, velocity, shift.power)),
+            factors: Vec::new(),
+            weighted_for: None,
+            times: motion.times.iter().map(|time| since(*time)).collect(),
+            earliest: motion.injection.map(|injection| since(injection.time)),
+        })
+    }
+
+    /// Pixels of an image.
+    pub fn pixels(&self) -> usize {
+        self.pixels
+    }
+
+    /// Images of the movie.
+    pub fn frames(&self) -> usize {
+        self.times.len()
+    }
+
+    /// Rays that meet the region.
+    pub fn rays(&self) -> usize {
+        self.pixel.len()
+    }
+
+    /// Nodes of all rays.
+    pub fn points(&self) -> usize {
+        self.weight.len()
+    }
+
+    /// The pixel of each ray.
+    pub fn pixel(&self) -> &[u32] {
+        &self.pixel
+    }
+
+    /// Whether weights depend on the axis.
+    pub fn is_shifted(&self) -> bool {
+        self.shift.is_some()
+    }
+
+    /// Makes the weights those of gas that turns about this axis. Costs nothing without redshift, or for the
+    /// same axis again.
+    pub fn weigh(&mut self, axis: Axis) {
+        let Some(shift) = &self.shift else { return };
+        if self.weighted_for == Some(axis) {
+            return;
+        }
+        self.factors.resize(self.plain_weight.len(), 0.0);
+        shift.factors(axis, &mut self.factors);
+        for ((weight, plain), factor) in
+            self.weight.iter_mut().zip(&self.plain_weight).zip(&self.factors)
+        {
+            *weight = T::of(plain * factor);
+        }
+        self.weighted_for = Some(axis);
+    }
+
+    /// Images of these frames, one after the other: `movie` is overwritten. [`weigh`](Self::weigh) comes first.
+    pub fn movie(
+        &self,
+        field: Field<'_, T>,
+        frames: &[usize],
+        batch: &mut Batch<T>,
+        workspace: &mut Workspace,
+        movie: &mut [T],
+    ) {
+        assert_eq!(movie.len(), frames.len() * self.pixels);
+        movie.fill(T::zero());
+        for (frame, image) in frames.iter().zip(movie.chunks_exact_mut(self.pixels)) {
+            batch.set((0..self.rays()).map(|ray| (ray as u32, *frame as u32)));
+            batch.gather(self, field.axis, field.occupancy);
+            batch.values.resize(batch.points(), T::zero());
+            let at = Batch::coordinates(&batch.columns, field.representation.dimension());
+            field.representation.eval(field.parameters, at, &mut batch.values, workspace);
+            for (ray, range) in batch.starts.windows(2).enumerate() {
+                let range = range[0]..range[1];
+                let sum = batch.columns.weight[range.clone()].iter().zip(&batch.values[range]);
+                image[self.pixel[ray] as usize] = sum.map(|(w, e)| *w * *e).sum();
+            }
+        }
+    }
+}
+
+impl<T: Scalar> Chain<T> {
+    /// Gradient along the sphere of a loss with respect to the axis, by way of the weights alone:
+    /// `cotangents` holds dL/dweight of each node, summed over frames. Zero without redshift.
+    pub fn weights_vjp(&self, axis: Axis, cotangents: &[f64]) -> [f64; 3] {
+        let Some(shift) = &self.shift else { return [0.0; 3] };
+        let of_factor: Vec<f64> =
+            cotangents.iter().zip(&self.plain_weight).map(|(c, plain)| c * plain).collect();
+        shift.vjp(axis, &of_factor)
+    }
+}
+
+/// An emission field: a representation with its parameters, and where it is worth evaluating.
+#[derive(Clone, Copy)]
+pub struct Field<'a, T> {
+    /// e(x; parameters).
+    pub representation: &'a dyn Representation<T>,
+    /// Its parameters.
+    pub parameters: &'a [T],
+    /// The axis that matter turns about.
+    pub axis: Axis,
+    /// Outside of it nothing shines.
+    pub occupancy: Option<&'a Occupancy>,
+}
+
+fn check(motion: &Motion, redshift: Option<Redshift>) -> Result<(), OutOfRange> {
+    motion.velocity.clone().checked()?;
+    let finite = |field, value: f64| {
+        let allowed = "a finite number";
+        if value.is_finite() { Ok(()) } else { Err(OutOfRange { field, value, allowed }) }
+    };
+    finite("reference time", motion.reference)?;
+    motion.injection.map_or(Ok(()), |injection| finite("injection time", injection.time))?;
+    redshift.map_or(Ok(()), |shift| finite("redshift power", shift.power))?;
+    motion.times.iter().try_for_each(|time| finite("frame time", *time))
+}

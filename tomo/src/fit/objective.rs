@@ -1,0 +1,316 @@
+//! The loss of a field of emission, and its gradient with respect to parameters and axis.
+
+use super::batch::Batch;
+use super::chain::{Chain, Field};
+use super::terms::{FrameTerm, ImageTerm};
+use crate::dynamics::{Axis, Cotangents, Turned, pull_back_vjp};
+use crate::points::{Coordinates, CoordinatesMut};
+use crate::representation::{Gradient, Groups, Representation, Workspace};
+use crate::simd::Scalar;
+use core::ops::Range;
+
+/// Data with their share in the loss: weight · χ²/(number of data).
+pub struct Weighted<D: ?Sized> {
+    /// Factor on the mean square of the normalised residuals.
+    pub weight: f64,
+    /// The data.
+    pub term: Box<D>,
+}
+
+/// What a fit compares with.
+pub struct Data<T> {
+    /// Images: the only data whose pixels can be taken one by one.
+    pub image: Option<Weighted<ImageTerm<T>>>,
+    /// All others, which need whole frames.
+    pub others: Vec<Weighted<dyn FrameTerm<T>>>,
+}
+
+/// Which part of the data a step looks at.
+#[derive(Clone, Copy, Debug)]
+pub enum Selection<'a> {
+    /// (ray, frame) pairs of images.
+    Pixels(&'a [(u32, u32)]),
+    /// Whole frames, of all data.
+    Frames(&'a [usize]),
+}
+
+/// The loss of a selection, scaled to that of all data.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Loss {
+    /// Σ weight · χ²/data.
+    pub total: f64,
+    /// χ² a datum of each kind of data, the image first if there is one.
+    pub terms: Vec<f64>,
+    /// Nodes at which emission was evaluated.
+    pub points: usize,
+}
+
+/// Where gradients are added to.
+pub struct Gradients<'a, T> {
+    /// With respect to the parameters.
+    pub parameters: &'a mut [T],
+    /// With respect to the axis, along the sphere, if wanted.
+    pub axis: Option<&'a mut [f64; 3]>,
+}
+
+/// Room that is kept from one step to the next.
+#[derive(Default)]
+pub struct Room<T> {
+    batch: Batch<T>,
+    workspace: Workspace,
+    image: Vec<T>,
+    of_image: Vec<T>,
+    cotangents: Vec<T>,
+    of_points: [Vec<T>; 4],
+    of_weights: Vec<f64>,
+}
+
+impl<T> Room<T> {
+    /// The memory of the representation.
+    pub fn workspace(&mut self) -> &mut Workspace {
+        &mut self.workspace
+    }
+}
+
+/// A chain with its data.
+pub struct Objective<T> {
+    /// From emission to pixels.
+    pub chain: Chain<T>,
+    /// What pixels are compared with.
+    pub data: Data<T>,
+}
+
+impl<T: Scalar> Objective<T> {
+    /// Names of the kinds of data, in the order of [`Loss::terms`].
+    pub fn names(&self) -> Vec<&str> {
+        let image = self.data.image.iter().map(|image| FrameTerm::<T>::name(&*image.term));
+        image.chain(self.data.others.iter().map(|other| other.term.name())).collect()
+    }
+
+    /// Frames of which there are any data.
+    pub fn observed(&self) -> Vec<usize> {
+        let seen =
+            |frame: &usize| self.terms().any(|(term, _)| term.degrees_of_freedom(*frame) > 0);
+        (0..self.chain.frames()).filter(seen).collect()
+    }
+
+    fn terms(&self) -> impl Iterator<Item = (&dyn FrameTerm<T>, f64)> {
+        let image = self.data.image.iter().map(|w| (&*w.term as &dyn FrameTerm<T>, w.weight));
+        image.chain(self.data.others.iter().map(|w| (&*w.term, w.weight)))
+    }
+
+    /// Real data of each kind in a typical frame times `frames`: what χ² is divided by.
+    fn data_of(&self, term: &dyn FrameTerm<T>, frames: usize) -> f64 {
+        let all: usize = (0..term.frames()).map(|frame| term.degrees_of_freedom(frame)).sum();
+        let observed = self.observed().len().max(1);
+        (all as f64 / observed as f64 * frames as f64).max(1.0)
+    }
+
+    /// The loss of a selection; adds its gradient. [`Chain::weigh`] comes first.
+    pub fn value_and_gradient(
+        &self,
+        field: Field<'_, T>,
+        selection: Selection<'_>,
+        mut gradients: Gradients<'_, T>,
+        room: &mut Room<T>,
+    ) -> Loss {
+        if gradients.axis.is_some() && self.chain.is_shifted() {
+            room.of_weights.clear();
+            room.of_weights.resize(self.chain.points(), 0.0);
+        }
+        let loss = match selection {
+            Selection::Pixels(pairs) => self.pixels(field, pairs, &mut gradients, room),
+            Selection::Frames(frames) => self.frames(field, frames, &mut gradients, room),
+        };
+        if let Some(axis) = gradients.axis
+            && self.chain.is_shifted()
+        {
+            let slope = self.chain.weights_vjp(field.axis, &room.of_weights);
+            axis.iter_mut().zip(slope).for_each(|(axis, slope)| *axis += slope);
+        }
+        loss
+    }
+
+    fn pixels(
+        &self,
+        field: Field<'_, T>,
+        pairs: &[(u32, u32)],
+        gradients: &mut Gradients<'_, T>,
+        room: &mut Room<T>,
+    ) -> Loss {
+        let Some(Weighted { weight, term }) = &self.data.image else { return Loss::default() };
+        // A mean over the pixels of the screen, of which those without a ray are zero for ever.
+        let rays = self.chain.rays() as f64 / self.chain.pixels() as f64;
+        let scale = rays * term.inverse_variance().double() / pairs.len() as f64;
+        let slope = T::of(2.0 * weight * scale);
+        let Room { batch, workspace, of_points, of_weights, .. } = room;
+        batch.set(pairs.iter().copied());
+        batch.gather(&self.chain, field.axis, field.occupancy);
+        let mut values = core::mem::take(&mut batch.values);
+        values.resize(batch.points(), T::zero());
+        let residual = |group: usize, values: &[T]| {
+            let (ray, frame) = batch.pairs[group];
+            let weights = &batch.columns.weight[batch.starts[group]..batch.starts[group + 1]];
+            let pixel: T = weights.iter().zip(values).map(|(w, e)| *w * *e).sum();
+            pixel - term.pixel(frame as usize, self.chain.pixel[ray as usize] as usize)
+        };
+        let link = |groups: Range<usize>, values: &[T], out: &mut [T]| {
+            let first = batch.starts[groups.start];
+            for group in groups {
+                let range = batch.starts[group]..batch.starts[group + 1];
+                let here = range.start - first..range.end - first;
+                let slope = slope * residual(group, &values[here.clone()]);
+                let weights = &batch.columns.weight[range];
+                out[here].iter_mut().zip(weights).for_each(|(out, w)| *out = slope * *w);
+            }
+        };
+        let dimension = field.representation.dimension();
+        let coordinates = wanted(gradients.axis.is_some(), dimension, batch.points(), of_points);
+        let into = Gradient { parameters: gradients.parameters, coordinates };
+        let at = Batch::coordinates(&batch.columns, dimension);
+        let groups = Groups { starts: &batch.starts, link: &link };
+        field.representation.eval_vjp(field.parameters, at, groups, &mut values, into, workspace);
+        let (mut total, shifted) = (0.0, gradients.axis.is_some() && self.chain.is_shifted());
+        for group in 0..batch.pairs.len() {
+            let range = batch.starts[group]..batch.starts[group + 1];
+            let left = residual(group, &values[range.clone()]).double();
+            total += left * left;
+            if shifted {
+                for k in range {
+                    let node = batch.columns.node[k] as usize;
+                    of_weights[node] += slope.double() * left * values[k].double();
+                }
+            }
+        }
+        batch.values = values;
+        if let Some(axis) = gradients.axis.as_deref_mut() {
+            add_axis(field.axis, batch, of_points, dimension, axis);
+        }
+        let term = scale * total;
+        Loss { total: weight * term, terms: vec![term], points: batch.points() }
+    }
+
+    fn frames(
+        &self,
+        field: Field<'_, T>,
+        frames: &[usize],
+        gradients: &mut Gradients<'_, T>,
+        room: &mut Room<T>,
+    ) -> Loss {
+        let scales: Vec<f64> =
+            self.terms().map(|(term, _)| 1.0 / self.data_of(term, frames.len())).collect();
+        let mut loss = Loss { terms: vec![0.0; scales.len()], ..Loss::default() };
+        for &frame in frames {
+            self.image_of(field, frame, room);
+            loss.points += room.batch.points();
+            room.of_image.clear();
+            room.of_image.resize(self.chain.pixels(), T::zero());
+            for (k, (term, weight)) in self.terms().enumerate() {
+                let factor = T::of(weight * scales[k]);
+                let value = term.value_and_gradient(frame, &room.image, factor, &mut room.of_image);
+                loss.terms[k] += scales[k] * value;
+            }
+            self.back(field, gradients, room);
+        }
+        let weights = self.terms().map(|(_, weight)| weight);
+        loss.total = loss.terms.iter().zip(weights).map(|(term, weight)| term * weight).sum();
+        loss
+    }
+
+    /// One frame into `room.image`.
+    fn image_of(&self, field: Field<'_, T>, frame: usize, room: &mut Room<T>) {
+        room.image.resize(self.chain.pixels(), T::zero());
+        let Room { batch, workspace, image, .. } = room;
+        self.chain.movie(field, &[frame], batch, workspace, image);
+    }
+
+    /// From the gradient with respect to the last image to the others.
+    fn back(&self, field: Field<'_, T>, gradients: &mut Gradients<'_, T>, room: &mut Room<T>) {
+        let Room { batch, workspace, of_image, cotangents, of_points, of_weights, .. } = room;
+        cotangents.resize(batch.points(), T::zero());
+        let shifted = gradients.axis.is_some() && self.chain.is_shifted();
+        for (group, (ray, _)) in batch.pairs.iter().enumerate() {
+            let slope = of_image[self.chain.pixel[*ray as usize] as usize];
+            for k in batch.starts[group]..batch.starts[group + 1] {
+                cotangents[k] = slope * batch.columns.weight[k];
+                if shifted {
+                    let node = batch.columns.node[k] as usize;
+                    of_weights[node] += slope.double() * batch.values[k].double();
+                }
+            }
+        }
+        let dimension = field.representation.dimension();
+        let coordinates = wanted(gradients.axis.is_some(), dimension, batch.points(), of_points);
+        let into = Gradient { parameters: gradients.parameters, coordinates };
+        let at = Batch::coordinates(&batch.columns, dimension);
+        field.representation.vjp(field.parameters, at, cotangents, into, workspace);
+        if let Some(axis) = gradients.axis.as_deref_mut() {
+            add_axis(field.axis, batch, of_points, dimension, axis);
+        }
+    }
+
+    /// The loss of all data of these frames, without gradient.
+    pub fn value(&self, field: Field<'_, T>, frames: &[usize], room: &mut Room<T>) -> Loss {
+        let scales: Vec<f64> =
+            self.terms().map(|(term, _)| 1.0 / self.data_of(term, frames.len())).collect();
+        let mut loss = Loss { terms: vec![0.0; scales.len()], ..Loss::default() };
+        for &frame in frames {
+            self.image_of(field, frame, room);
+            loss.points += room.batch.points();
+            for (k, (term, _)) in self.terms().enumerate() {
+                let none = &mut room.of_image;
+                none.resize(self.chain.pixels(), T::zero());
+                let value = term.value_and_gradient(frame, &room.image, T::zero(), none);
+                loss.terms[k] += scales[k] * value;
+            }
+        }
+        let weights = self.terms().map(|(_, weight)| weight);
+        loss.total = loss.terms.iter().zip(weights).map(|(term, weight)| term * weight).sum();
+        loss
+    }
+}
+
+/// Room for gradients with respect to coordinates, cleared, where they are wanted.
+fn wanted<T: Scalar>(
+    wanted: bool,
+    dimension: usize,
+    points: usize,
+    columns: &mut [Vec<T>; 4],
+) -> Option<CoordinatesMut<'_, T>> {
+    if !wanted {
+        return None;
+    }
+    for column in columns.iter_mut() {
+        column.clear();
+        column.resize(points, T::zero());
+    }
+    let [x, y, z, t] = columns;
+    Some(match dimension {
+        4 => CoordinatesMut::txyz(t, x, y, z),
+        _ => CoordinatesMut::xyz(x, y, z),
+    })
+}
+
+/// Adds the gradient of the axis by way of the points; a field of events has none.
+fn add_axis<T: Scalar>(
+    axis: Axis,
+    batch: &Batch<T>,
+    of_points: &[Vec<T>; 4],
+    dimension: usize,
+    gradient: &mut [f64; 3],
+) {
+    if dimension == 4 {
+        return;
+    }
+    let [x, y, z] = &batch.columns.position;
+    let turned = Turned { points: Coordinates::xyz(x, y, z), angles: &batch.columns.angle };
+    let [a, b, c, _] = of_points;
+    let none = Cotangents { angles: None, points: None };
+    let slope = pull_back_vjp(axis, turned, Coordinates::xyz(a, b, c), none);
+    gradient.iter_mut().zip(slope).for_each(|(sum, slope)| *sum += slope);
+}
+
+/// Whether a representation knows of the axis.
+pub fn is_turned<T: Scalar>(representation: &dyn Representation<T>) -> bool {
+    representation.dimension() == 3
+}

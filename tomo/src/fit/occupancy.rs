@@ -1,0 +1,139 @@
+//! Where in co-rotating coordinates anything shines: what is empty is not evaluated.
+
+use super::sightlines::Region;
+use crate::points::Coordinates;
+use crate::representation::{Representation, Workspace};
+use crate::simd::Scalar;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+/// How a mask is kept.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OccupancySettings {
+    /// Cells along each axis of the cube that holds the region.
+    pub cells: usize,
+    /// A cell is empty if no emission above this part of the largest one was seen in it or in one of its
+    /// 26 neighbours.
+    pub threshold: f64,
+    /// What is remembered of the emission that a cell had, from one refreshment to the next.
+    pub memory: f64,
+}
+
+/// Cells of a cube about the hole that shine, or may.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Occupancy {
+    settings: OccupancySettings,
+    half_width: f64,
+    /// Largest emission of each cell that is remembered, z fastest.
+    pub(super) brightness: Vec<f32>,
+    occupied: Vec<bool>,
+}
+
+impl Occupancy {
+    /// A mask of a region in which everything counts until it has been refreshed.
+    pub fn new(settings: OccupancySettings, region: Region) -> Self {
+        let count = settings.cells.pow(3);
+        Self {
+            settings,
+            half_width: region.r_max,
+            brightness: vec![0.0; count],
+            occupied: vec![true; count],
+        }
+    }
+
+    /// Part of the cells that may shine.
+    pub fn fraction(&self) -> f64 {
+        self.occupied.iter().filter(|cell| **cell).count() as f64 / self.occupied.len() as f64
+    }
+
+    /// Whether a point lies in a cell that may shine; none does outside the cube.
+    pub fn holds(&self, point: [f64; 3]) -> bool {
+        let n = self.settings.cells;
+        let per_length = n as f64 / (2.0 * self.half_width);
+        let mut cell = 0;
+        for x in point {
+            let place = (x + self.half_width) * per_length;
+            if !(0.0..=n as f64).contains(&place) {
+                return false;
+            }
+            cell = cell * n + (place as usize).min(n - 1);
+        }
+        self.occupied[cell]
+    }
+
+    /// Looks at one random point of every cell, the same for the same seed.
+    pub fn refresh<T: Scalar>(
+        &mut self,
+        representation: &dyn Representation<T>,
+        parameters: &[T],
+        seed: u64,
+        workspace: &mut Workspace,
+    ) {
+        let mut random = Pcg64::seed_from_u64(seed);
+        let n = self.settings.cells;
+        let width = 2.0 * self.half_width / n as f64;
+        let mut points: [Vec<T>; 3] = Default::default();
+        for cell in 0..n.pow(3) {
+            for (column, k) in points.iter_mut().zip([cell / (n * n), cell / n % n, cell % n]) {
+                let within: f64 = random.random();
+                column.push(T::of((k as f64 + within) * width - self.half_width));
+            }
+        }
+        let [x, y, z] = &points;
+        let mut values = vec![T::zero(); n.pow(3)];
+        representation.eval(parameters, Coordinates::xyz(x, y, z), &mut values, workspace);
+        for (brightness, value) in self.brightness.iter_mut().zip(&values) {
+            let remembered = f64::from(*brightness) * self.settings.memory;
+            *brightness = remembered.max(value.double()) as f32;
+        }
+        self.mark();
+    }
+
+    /// Marks cells that are bright enough, and their neighbours.
+    pub(super) fn mark(&mut self) {
+        let n = self.settings.cells;
+        let peak = self.brightness.iter().fold(0.0f32, |peak, b| peak.max(*b));
+        let least = (f64::from(peak) * self.settings.threshold) as f32;
+        let mut bright: Vec<bool> = self.brightness.iter().map(|b| *b >= least).collect();
+        for stride in [1, n, n * n] {
+            let spread = |k: usize| {
+                let place = k / stride % n;
+                bright[k]
+                    || (place > 0 && bright[k - stride])
+                    || (place + 1 < n && bright[k + stride])
+            };
+            bright = (0..bright.len()).map(spread).collect();
+        }
+        self.occupied = bright;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::representation::{Activation, Grid, GridSettings};
+
+    /// One node of a grid shines: its cells and their neighbours are kept, nothing else.
+    #[test]
+    fn exact_cells_about_what_shines_are_kept() {
+        let settings = GridSettings {
+            nodes: [11; 3],
+            low: [-5.0; 3],
+            high: [5.0; 3],
+            activation: Activation::Linear,
+            initial: 0.0,
+        };
+        let grid = Grid::new(settings).unwrap();
+        let mut parameters = vec![0.0f32; 1331];
+        parameters[(8 * 11 + 5) * 11 + 2] = 1.0; // at (3, 0, −3)
+        let region = Region { r_min: 0.0, r_max: 5.0, z_width: f64::INFINITY };
+        let mut mask =
+            Occupancy::new(OccupancySettings { cells: 10, threshold: 1e-4, memory: 0.9 }, region);
+        assert!(mask.holds([-4.0, 4.0, 4.0]) && !mask.holds([5.1, 0.0, 0.0]));
+        mask.refresh(&grid, &parameters, 7, &mut Workspace::new());
+        // Two cells along each axis shine, four are kept.
+        assert!((mask.fraction() - 0.064).abs() < 1e-12, "{}", mask.fraction());
+        assert!(mask.holds([3.0, 0.0, -3.0]) && mask.holds([4.9, 1.9, -1.1]));
+        assert!(!mask.holds([0.9, 0.0, -3.0]) && !mask.holds([-3.0, 0.0, 3.0]));
+    }
+}

@@ -1,0 +1,145 @@
+//! The redshift factor of gas that turns about any axis, and its derivative with respect to the axis.
+
+use super::sightlines::{Sightlines, norm};
+use crate::dynamics::{AngularVelocity, Axis};
+use kerrlight_geodesic::Kerr;
+use rayon::prelude::*;
+
+/// What g of one node depends on: g = √N/(1 − Ω ξ·L), N = −u·u of the gas per (dt)².
+///
+/// With dφ/dt = −Ω ξ·θ̂/sin θ and dθ/dt = Ω ξ·φ̂ (a turn about ξ of the point r n),
+/// N = −g_tt − 2 g_tφ dφ/dt − g_φφ (dφ/dt)² − g_θθ (dθ/dt)².
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    /// −g_tt.
+    still: f64,
+    /// Vector whose product with ξ is −2 g_tφ dφ/dt.
+    drag: [f64; 3],
+    /// Vectors whose squared products with ξ are g_φφ (dφ/dt)² and g_θθ (dθ/dt)².
+    speeds: [[f64; 3]; 2],
+    /// Ω L.
+    boost: [f64; 3],
+}
+
+/// g^power of all nodes for any axis.
+#[derive(Clone, Debug)]
+pub(super) struct Shift {
+    nodes: Vec<Node>,
+    power: f64,
+}
+
+/// Nodes that one thread takes at a time.
+const SHARE: usize = 4096;
+
+impl Shift {
+    /// Of gas on the spheres of a hole; the sightlines must have momenta.
+    pub fn new(lines: &Sightlines, hole: &Kerr, velocity: &AngularVelocity, power: f64) -> Self {
+        let node = |k| {
+            let at = |columns: &[Vec<f64>; 3]| [0, 1, 2].map(|c| columns[c][k]);
+            Node::new(at(&lines.position), at(&lines.momentum), hole.spin(), velocity)
+        };
+        Self { nodes: (0..lines.points()).map(node).collect(), power }
+    }
+
+    /// factors[k] = g^power, 0 where the gas would be faster than light.
+    pub fn factors(&self, axis: Axis, factors: &mut [f64]) {
+        let axis = axis.vector();
+        let shares = factors.par_chunks_mut(SHARE).zip(self.nodes.par_chunks(SHARE));
+        shares.for_each(|(factors, nodes)| {
+            for (factor, node) in factors.iter_mut().zip(nodes) {
+                *factor = node.shift(axis).map_or(0.0, |(g, _)| g.powf(self.power));
+            }
+        });
+    }
+
+    /// Σ cotangent · dg^power/dξ, along the sphere.
+    pub fn vjp(&self, axis: Axis, cotangents: &[f64]) -> [f64; 3] {
+        let vector = axis.vector();
+        let of = |(cotangents, nodes): (&[f64], &[Node])| {
+            let mut sum = [0.0; 3];
+            for (cotangent, node) in cotangents.iter().zip(nodes).filter(|(c, _)| **c != 0.0) {
+                if let Some((g, slope)) = node.shift(vector) {
+                    let factor = cotangent * self.power * g.powf(self.power - 1.0);
+                    sum.iter_mut().zip(slope).for_each(|(sum, slope)| *sum += factor * slope);
+                }
+            }
+            sum
+        };
+        // Parts in their order: the same bits on any number of threads.
+        let parts: Vec<[f64; 3]> =
+            cotangents.par_chunks(SHARE).zip(self.nodes.par_chunks(SHARE)).map(of).collect();
+        axis.tangent(core::array::from_fn(|c| parts.iter().map(|part| part[c]).sum()))
+    }
+}
+
+impl Node {
+    fn new(x: [f64; 3], momentum: [f64; 3], spin: f64, velocity: &AngularVelocity) -> Self {
+        let r = norm(x);
+        let (u, flat) = (x[2] / r, x[0].hypot(x[1]));
+        let (s, rate) = (flat / r, velocity.rate(r));
+        let (cos, sin) = if flat > 0.0 { (x[0] / flat, x[1] / flat) } else { (1.0, 0.0) };
+        let (theta, phi) = ([u * cos, u * sin, -s], [-sin, cos, 0.0]);
+        let sigma_kerr = r * r + spin * spin * u * u;
+        // g_φφ/sin²θ.
+        let round = r * r + spin * spin + 2.0 * spin * spin * r * s * s / sigma_kerr;
+        let scaled = |vector: [f64; 3], by: f64| vector.map(|c| by * c);
+        Self {
+            still: 1.0 - 2.0 * r / sigma_kerr,
+            drag: scaled(theta, -4.0 * spin * r * s * rate / sigma_kerr),
+            speeds: [scaled(theta, rate * round.sqrt()), scaled(phi, rate * sigma_kerr.sqrt())],
+            boost: scaled(momentum, rate),
+        }
+    }
+
+    /// g and dg/dξ, unless faster than light.
+    fn shift(&self, axis: [f64; 3]) -> Option<(f64, [f64; 3])> {
+        let dot = |v: [f64; 3]| axis[0] * v[0] + axis[1] * v[1] + axis[2] * v[2];
+        let [round, polar] = self.speeds.map(dot);
+        let square = self.still + dot(self.drag) - round * round - polar * polar;
+        let boost = 1.0 - dot(self.boost);
+        if !(square > 0.0 && boost > 0.0) {
+            return None;
+        }
+        let (clock, [of_round, of_polar]) = (square.sqrt(), self.speeds);
+        let slope = |c: usize| {
+            let of_square = self.drag[c] - 2.0 * (round * of_round[c] + polar * of_polar[c]);
+            of_square / (2.0 * clock * boost) + clock * self.boost[c] / (boost * boost)
+        };
+        Some((clock / boost, core::array::from_fn(slope)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Extremes at a = 0, r = 6: √2/3 and √2.
+    #[test]
+    fn paper_redshift_extremes_of_an_orbit_seen_edge_on() {
+        let velocity = AngularVelocity::Keplerian { drag: 0.0 };
+        // Photons that leave along ±φ have k_φ = ±r/√(1 − 2/r).
+        let momentum = 6.0 / (1.0f64 - 2.0 / 6.0).sqrt();
+        for (sign, expected) in [(1.0, 2f64.sqrt()), (-1.0, 0.471404520791)] {
+            let node = Node::new([6.0, 0.0, 0.0], [0.0, 0.0, sign * momentum], 0.0, &velocity);
+            let (g, _) = node.shift([0.0, 0.0, 1.0]).unwrap();
+            assert!((g - expected).abs() < 1e-12, "{g}");
+        }
+    }
+
+    #[test]
+    fn exact_gradient_of_the_axis() {
+        let velocity = AngularVelocity::Keplerian { drag: 0.3 };
+        let node = Node::new([2.0, -3.5, 1.7], [1.0, 2.5, -3.0], 0.8, &velocity);
+        let axis = [0.5, 0.3, 0.81];
+        let (_, slope) = node.shift(axis).unwrap();
+        for c in 0..3 {
+            let moved = |h: f64| {
+                let mut moved = axis;
+                moved[c] += h;
+                node.shift(moved).unwrap().0
+            };
+            let difference = (moved(1e-6) - moved(-1e-6)) / 2e-6;
+            assert!((difference - slope[c]).abs() < 1e-9, "{difference} {}", slope[c]);
+        }
+    }
+}

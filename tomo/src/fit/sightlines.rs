@@ -1,0 +1,274 @@
+//! Where the light of a movie's pixels may come from: nodes on rays inside the region of recovery, and
+//! what each gives to its pixel. Computed once for a fit.
+
+use kerrlight_geodesic::bundle::{NodeRequest, Nodes, PanelRule, RayNodes, Samples};
+use kerrlight_geodesic::{Kerr, Observer, OutOfRange};
+
+/// Where emission is looked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Region {
+    /// Least radius, M.
+    pub r_min: f64,
+    /// Largest radius, M.
+    pub r_max: f64,
+    /// Largest |z|, M.
+    pub z_width: f64,
+}
+
+impl Region {
+    /// Itself, if its numbers are in their ranges.
+    ///
+    /// # Errors
+    /// Names the number that is not.
+    pub fn checked(self) -> Result<Self, OutOfRange> {
+        let Region { r_min, r_max, z_width } = self;
+        for (field, value, ok, allowed) in [
+            ("r_min", r_min, r_min.is_finite() && r_min >= 0.0, "0 or above"),
+            ("r_max", r_max, r_max.is_finite() && r_max > r_min, "above r_min"),
+            ("z_width", z_width, z_width > 0.0, "above 0"),
+        ] {
+            if !ok {
+                return Err(OutOfRange { field, value, allowed });
+            }
+        }
+        Ok(self)
+    }
+
+    /// Whether a point (r n, in M) lies in it; the outer sphere does not belong to it.
+    pub fn holds(&self, point: [f64; 3]) -> bool {
+        let r = norm(point);
+        r >= self.r_min && r < self.r_max && point[2].abs() <= self.z_width
+    }
+}
+
+/// Where nodes lie on a ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Sampling {
+    /// Gauss–Legendre panels in Mino time inside the sphere r_max, weights Σ dτ: the integral over
+    /// the affine parameter.
+    Gauss {
+        /// Nodes of a panel, at most 16.
+        order: usize,
+        /// Into how many panels each of the coarsest ones is cut.
+        split: u32,
+    },
+    /// Equidistant in Mino time over the whole ray, weights |x_i − x_{i−1}|: the sums of BH-NeRF
+    /// (Levis et al. 2022). Needs an observer at a finite radius.
+    EqualMinoTime {
+        /// Nodes of a ray.
+        per_ray: usize,
+    },
+}
+
+/// What is wanted of nodes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SightlineRequest {
+    /// Where they may lie.
+    pub region: Region,
+    /// How they are spread.
+    pub sampling: Sampling,
+    /// Delays, for slow light.
+    pub delay: bool,
+    /// Angular momenta, for redshift.
+    pub momentum: bool,
+}
+
+/// Nodes of the rays that meet the region, ray after ray.
+#[derive(Clone, Debug, Default)]
+pub struct Sightlines {
+    /// Pixels of the screen, those without a node included.
+    pub pixels: usize,
+    /// Which pixel each ray belongs to.
+    pub pixel: Vec<u32>,
+    /// Ray k has the nodes `starts[k]..starts[k + 1]`.
+    pub starts: Vec<usize>,
+    /// r n: x, y and z, M.
+    pub position: [Vec<f64>; 3],
+    /// What the node's emission is multiplied by in the sum that is the pixel, M.
+    pub weight: Vec<f64>,
+    /// t_o − t less r_o + 2 ln r_o, M; empty unless wanted.
+    pub delay: Vec<f64>,
+    /// Angular momentum (x, y and z) of the arriving photon per energy, M; empty unless wanted.
+    /// (k_θ φ̂ − k_φ θ̂/sin θ: its product with an axis is the momentum conjugate to turns about
+    /// it.)
+    pub momentum: [Vec<f64>; 3],
+}
+
+/// Rays traced at a time.
+const BLOCK: usize = 1024;
+
+impl Sightlines {
+    /// Traces the rays that arrive at (`alpha[k]`, `beta[k]`), pixel k.
+    ///
+    /// # Errors
+    /// If a number is out of its range, or momenta or delays are asked of a sampling that has none.
+    pub fn trace(
+        hole: &Kerr,
+        observer: &Observer,
+        alpha: &[f64],
+        beta: &[f64],
+        request: &SightlineRequest,
+    ) -> Result<Self, OutOfRange> {
+        request.region.checked()?;
+        let mut all = Self { pixels: alpha.len(), starts: vec![0], ..Self::default() };
+        let mut tracer = Tracer {
+            hole,
+            observer,
+            request,
+            samples: Samples::default(),
+            nodes: Nodes::default(),
+        };
+        for (block, (alpha, beta)) in alpha.chunks(BLOCK).zip(beta.chunks(BLOCK)).enumerate() {
+            tracer.block(block * BLOCK, alpha, beta, &mut all)?;
+        }
+        Ok(all)
+    }
+
+    /// Rays that meet the region.
+    pub fn rays(&self) -> usize {
+        self.pixel.len()
+    }
+
+    /// Nodes of all rays.
+    pub fn points(&self) -> usize {
+        self.weight.len()
+    }
+
+    fn push(&mut self, point: [f64; 3], weight: f64) {
+        self.position.iter_mut().zip(point).for_each(|(column, x)| column.push(x));
+        self.weight.push(weight);
+    }
+
+    fn end_ray(&mut self, pixel: usize) {
+        if self.weight.len() > *self.starts.last().unwrap_or(&0) {
+            self.starts.push(self.weight.len());
+            self.pixel.push(pixel as u32);
+        }
+    }
+}
+
+struct Tracer<'a> {
+    hole: &'a Kerr,
+    observer: &'a Observer,
+    request: &'a SightlineRequest,
+    samples: Samples,
+    nodes: Nodes,
+}
+
+impl Tracer<'_> {
+    fn block(
+        &mut self,
+        first: usize,
+        alpha: &[f64],
+        beta: &[f64],
+        all: &mut Sightlines,
+    ) -> Result<(), OutOfRange> {
+        match self.request.sampling {
+            Sampling::Gauss { order, split } => {
+                self.gauss([order, split as usize], first, alpha, beta, all)
+            }
+            Sampling::EqualMinoTime { per_ray } => self.equal(per_ray, first, alpha, beta, all),
+        }
+    }
+
+    fn gauss(
+        &mut self,
+        [order, split]: [usize; 2],
+        first: usize,
+        alpha: &[f64],
+        beta: &[f64],
+        all: &mut Sightlines,
+    ) -> Result<(), OutOfRange> {
+        let request = NodeRequest {
+            radius: self.request.region.r_max,
+            rule: PanelRule::new(order),
+            split: split as u32,
+            azimuth: true,
+            time: self.request.delay,
+            velocity: self.request.momentum,
+        };
+        self.nodes.trace(self.hole, self.observer, alpha, beta, None, &request)?;
+        for k in 0..self.nodes.rays() {
+            let ray = self.nodes.ray(k);
+            let lambda = self.observer.ray(self.hole, alpha[k], beta[k])?.lambda;
+            for i in 0..ray.weight.len() {
+                self.node(&ray, i, lambda, all);
+            }
+            all.end_ray(first + k);
+        }
+        Ok(())
+    }
+
+    fn node(&self, ray: &RayNodes<'_>, i: usize, lambda: f64, all: &mut Sightlines) {
+        let (r, u) = (ray.radius[i], ray.cos_theta[i]);
+        let (s, (sin, cos)) = (((1.0 - u) * (1.0 + u)).sqrt(), ray.azimuth[i].sin_cos());
+        let point = [r * s * cos, r * s * sin, r * u];
+        if !self.request.region.holds(point) {
+            return;
+        }
+        all.push(point, ray.weight[i]);
+        if self.request.delay {
+            all.delay.push(ray.delay[i] - self.flight());
+        }
+        if self.request.momentum {
+            // Backwards dθ/dτ = −u'/sin θ; the arriving photon has the opposite one.
+            let of_theta = if s > 0.0 { ray.polar_velocity[i] / s } else { 0.0 };
+            let of_phi = if s > 0.0 { lambda / s } else { 0.0 };
+            let [phi, theta] = [[-sin, cos, 0.0], [u * cos, u * sin, -s]];
+            for (c, column) in all.momentum.iter_mut().enumerate() {
+                column.push(of_theta * phi[c] - of_phi * theta[c]);
+            }
+        }
+    }
+
+    /// What the time of flight from a finite radius has in excess of its finite part.
+    fn flight(&self) -> f64 {
+        let w = self.observer.inverse_radius();
+        if w > 0.0 { 1.0 / w - 2.0 * w.ln() } else { 0.0 }
+    }
+
+    fn equal(
+        &mut self,
+        per_ray: usize,
+        first: usize,
+        alpha: &[f64],
+        beta: &[f64],
+        all: &mut Sightlines,
+    ) -> Result<(), OutOfRange> {
+        let refuse = |field, allowed| Err(OutOfRange { field, value: 1.0, allowed });
+        if self.observer.is_at_infinity() {
+            let allowed = "a finite radius with nodes equidistant in Mino time";
+            return Err(OutOfRange { field: "observer radius", value: f64::INFINITY, allowed });
+        }
+        if self.request.momentum {
+            return refuse("redshift", "off with nodes equidistant in Mino time");
+        }
+        self.samples.trace(self.hole, self.observer, alpha, beta, per_ray)?;
+        for k in 0..self.samples.rays() {
+            let ray = self.samples.ray(k);
+            let mut before = None;
+            for (i, r) in ray.radius.iter().enumerate() {
+                let ((sin, cos), (s, u)) = (ray.azimuth[i].sin_cos(), ray.theta[i].sin_cos());
+                let point = [r * s * cos, r * s * sin, r * u];
+                let chord = before.map_or(0.0, |before| distance(point, before));
+                before = Some(point);
+                if self.request.region.holds(point) {
+                    all.push(point, chord);
+                    if self.request.delay {
+                        all.delay.push(ray.delay[i] - self.flight());
+                    }
+                }
+            }
+            all.end_ray(first + k);
+        }
+        Ok(())
+    }
+}
+
+pub(super) fn norm(x: [f64; 3]) -> f64 {
+    (x[0] * x[0] + x[1] * x[1] + x[2] * x[2]).sqrt()
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    norm(core::array::from_fn(|c| a[c] - b[c]))
+}

@@ -1,0 +1,226 @@
+//! Data of a movie, frame by frame: χ² of an image, and its gradient with respect to pixels.
+
+use crate::interferometry::data_terms::DataTerm;
+use crate::interferometry::operator::{Operator, Transform};
+use crate::real::Real;
+use kerrlight_geodesic::OutOfRange;
+use num_complex::Complex;
+use rustfft::FftNum;
+
+/// χ² of the frames of a movie.
+///
+/// Images are rows of pixels from the north, each from the east, in Jy/pixel where data are
+/// radio ones.
+pub trait FrameTerm<T: Real>: Send + Sync {
+    /// What the data are, for logs and reports.
+    fn name(&self) -> &str;
+
+    /// Images of the movie.
+    fn frames(&self) -> usize;
+
+    /// Pixels of an image.
+    fn pixels(&self) -> usize;
+
+    /// Real data of a frame; 0 where there are none.
+    fn degrees_of_freedom(&self, frame: usize) -> usize;
+
+    /// Whether χ² is quadratic in the pixels.
+    fn is_quadratic(&self) -> bool;
+
+    /// χ² of a frame; adds `weight` times its gradient.
+    fn value_and_gradient(&self, frame: usize, image: &[T], weight: T, gradient: &mut [T]) -> f64;
+}
+
+/// Every pixel of every frame: Σ (I − data)²/σ².
+#[derive(Clone, Debug)]
+pub struct ImageTerm<T> {
+    movie: Vec<T>,
+    pixels: usize,
+    inverse_variance: T,
+}
+
+impl<T: Real> ImageTerm<T> {
+    /// Of a movie, frame after frame, all pixels with the same standard deviation.
+    ///
+    /// # Errors
+    /// If σ is not positive, or the movie is not whole frames of finite numbers.
+    pub fn new(movie: Vec<T>, pixels: usize, noise_sigma: f64) -> Result<Self, OutOfRange> {
+        let range = |field, value, allowed| Err(OutOfRange { field, value, allowed });
+        if !(noise_sigma > 0.0 && noise_sigma.is_finite()) {
+            return range("image sigma", noise_sigma, "above 0");
+        }
+        if pixels == 0 || movie.is_empty() || !movie.len().is_multiple_of(pixels) {
+            return range("movie numbers", movie.len() as f64, "whole frames, 1 or more");
+        }
+        if let Some(bad) = movie.iter().find(|pixel| !pixel.is_finite()) {
+            return range("movie pixel", bad.double(), "finite numbers");
+        }
+        Ok(Self { movie, pixels, inverse_variance: T::of(noise_sigma.powi(-2)) })
+    }
+
+    /// A datum.
+    pub fn pixel(&self, frame: usize, pixel: usize) -> T {
+        self.movie[frame * self.pixels + pixel]
+    }
+
+    /// 1/σ².
+    pub fn inverse_variance(&self) -> T {
+        self.inverse_variance
+    }
+}
+
+impl<T: Real> FrameTerm<T> for ImageTerm<T> {
+    fn name(&self) -> &str {
+        "image"
+    }
+
+    fn frames(&self) -> usize {
+        self.movie.len() / self.pixels
+    }
+
+    fn pixels(&self) -> usize {
+        self.pixels
+    }
+
+    fn degrees_of_freedom(&self, _frame: usize) -> usize {
+        self.pixels
+    }
+
+    fn is_quadratic(&self) -> bool {
+        true
+    }
+
+    fn value_and_gradient(&self, frame: usize, image: &[T], weight: T, gradient: &mut [T]) -> f64 {
+        let data = &self.movie[frame * self.pixels..(frame + 1) * self.pixels];
+        let (scale, slope) = (self.inverse_variance, (weight + weight) * self.inverse_variance);
+        let pixels = image.iter().zip(data).zip(gradient);
+        let square = |((image, datum), gradient): ((&T, &T), &mut T)| {
+            let residual = *image - *datum;
+            *gradient += slope * residual;
+            (residual * residual).double()
+        };
+        scale.double() * pixels.map(square).sum::<f64>()
+    }
+}
+
+/// The total flux of every frame: (Σ I − data)²/σ².
+#[derive(Clone, Debug)]
+pub struct LightCurveTerm {
+    pixels: usize,
+    flux: Vec<f64>,
+    inverse_variance: Vec<f64>,
+}
+
+impl LightCurveTerm {
+    /// Of fluxes with their standard deviations.
+    ///
+    /// # Errors
+    /// If a σ is not positive, a flux not finite, or their numbers differ.
+    pub fn new(flux: Vec<f64>, noise_sigma: &[f64], pixels: usize) -> Result<Self, OutOfRange> {
+        let range = |field, value, allowed| Err(OutOfRange { field, value, allowed });
+        if flux.len() != noise_sigma.len() || flux.is_empty() {
+            return range("light-curve sigmas", noise_sigma.len() as f64, "as many as fluxes");
+        }
+        if let Some(bad) = flux.iter().find(|flux| !flux.is_finite()) {
+            return range("light-curve flux", *bad, "finite numbers");
+        }
+        if let Some(bad) = noise_sigma.iter().find(|s| !(**s > 0.0 && s.is_finite())) {
+            return range("light-curve sigma", *bad, "above 0");
+        }
+        let inverse_variance = noise_sigma.iter().map(|sigma| sigma.powi(-2)).collect();
+        Ok(Self { pixels, flux, inverse_variance })
+    }
+}
+
+impl<T: Real> FrameTerm<T> for LightCurveTerm {
+    fn name(&self) -> &str {
+        "light curve"
+    }
+
+    fn frames(&self) -> usize {
+        self.flux.len()
+    }
+
+    fn pixels(&self) -> usize {
+        self.pixels
+    }
+
+    fn degrees_of_freedom(&self, _frame: usize) -> usize {
+        1
+    }
+
+    fn is_quadratic(&self) -> bool {
+        true
+    }
+
+    fn value_and_gradient(&self, frame: usize, image: &[T], weight: T, gradient: &mut [T]) -> f64 {
+        let residual = image.iter().map(|pixel| pixel.double()).sum::<f64>() - self.flux[frame];
+        let scaled = residual * self.inverse_variance[frame];
+        let slope = T::of(2.0 * scaled) * weight;
+        gradient.iter_mut().for_each(|pixel| *pixel += slope);
+        residual * scaled
+    }
+}
+
+/// What an array of telescopes measures of a frame.
+pub struct Scan<T: FftNum> {
+    /// From the frame to its visibilities.
+    pub transform: Transform<T>,
+    /// From visibilities to χ².
+    pub term: Box<dyn DataTerm<T> + Send>,
+}
+
+/// Visibilities, or what is made of them, of the frames that were observed.
+pub struct ScanTerm<T: FftNum> {
+    name: String,
+    pixels: usize,
+    quadratic: bool,
+    scans: Vec<Option<Scan<T>>>,
+}
+
+impl<T: Real + FftNum> ScanTerm<T> {
+    /// Of a scan a frame. `quadratic`: whether χ² is so in the visibilities.
+    ///
+    /// # Panics
+    /// If a transform and its term do not fit together.
+    pub fn new(name: &str, pixels: usize, quadratic: bool, scans: Vec<Option<Scan<T>>>) -> Self {
+        for scan in scans.iter().flatten() {
+            assert_eq!(scan.transform.data(), scan.term.visibilities());
+            assert_eq!((scan.transform.frames(), scan.transform.pixels()), (1, pixels));
+        }
+        Self { name: name.to_owned(), pixels, quadratic, scans }
+    }
+}
+
+impl<T: Real + FftNum> FrameTerm<T> for ScanTerm<T> {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn frames(&self) -> usize {
+        self.scans.len()
+    }
+
+    fn pixels(&self) -> usize {
+        self.pixels
+    }
+
+    fn degrees_of_freedom(&self, frame: usize) -> usize {
+        self.scans[frame].as_ref().map_or(0, |scan| scan.term.degrees_of_freedom())
+    }
+
+    fn is_quadratic(&self) -> bool {
+        self.quadratic
+    }
+
+    fn value_and_gradient(&self, frame: usize, image: &[T], weight: T, gradient: &mut [T]) -> f64 {
+        let Some(Scan { transform, term }) = &self.scans[frame] else { return 0.0 };
+        let zero = Complex::new(T::zero(), T::zero());
+        let mut model = vec![zero; transform.data()];
+        transform.forward(image, &mut model);
+        let mut of_model = vec![zero; model.len()];
+        let value = term.value_and_gradient(&model, weight, &mut of_model);
+        transform.adjoint(&of_model, gradient);
+        value
+    }
+}

@@ -1,0 +1,332 @@
+//! The chain from parameters and axis to the loss, in double precision.
+
+use super::*;
+use crate::dynamics::{AngularVelocity, Axis, Injection};
+use crate::interferometry::data_terms::DataTerm;
+use crate::interferometry::operator::{Dtft, ImageGrid, Pulse, Transform};
+use crate::representation::{
+    Activation, Coordinates, Gradient, Grid, GridSettings, Groups, Representation, Workspace,
+};
+use kerrlight_geodesic::{Inclination, Kerr, Observer};
+use num_complex::Complex;
+
+const SIDE: usize = 9;
+
+fn lines(delay: bool, momentum: bool) -> (Kerr, Sightlines) {
+    let hole = Kerr::new(0.6).unwrap();
+    let observer = Observer::at_infinity(Inclination::from_degrees(55.0).unwrap());
+    let at = |k: usize| -6.0 + 12.0 * k as f64 / (SIDE - 1) as f64;
+    let (alpha, beta): (Vec<f64>, Vec<f64>) =
+        (0..SIDE * SIDE).map(|k| (at(k % SIDE), -at(k / SIDE))).unzip();
+    let region = Region { r_min: 3.0, r_max: 6.0, z_width: 4.0 };
+    let sampling = Sampling::Gauss { order: 4, split: 1 };
+    let request = SightlineRequest { region, sampling, delay, momentum };
+    (hole, Sightlines::trace(&hole, &observer, &alpha, &beta, &request).unwrap())
+}
+
+fn chain(delay: bool, momentum: bool) -> Chain<f64> {
+    let (hole, lines) = lines(delay, momentum);
+    let motion = Motion {
+        velocity: AngularVelocity::Keplerian { drag: 0.6 },
+        reference: 3.0,
+        injection: Some(Injection { time: 1.0 }),
+        times: vec![0.0, 9.0, 17.0, 40.0],
+    };
+    Chain::new(&lines, &motion, &hole, momentum.then_some(Redshift { power: 2.5 })).unwrap()
+}
+
+/// Visibilities against fixed ones, all errors 1 Jy: `Observation`s need a schedule.
+struct Plain(Vec<Complex<f64>>);
+
+impl DataTerm<f64> for Plain {
+    fn visibilities(&self) -> usize {
+        self.0.len()
+    }
+    fn degrees_of_freedom(&self) -> usize {
+        2 * self.0.len()
+    }
+    fn value_and_gradient(
+        &self,
+        model: &[Complex<f64>],
+        weight: f64,
+        gradient: &mut [Complex<f64>],
+    ) -> f64 {
+        let pairs = model.iter().zip(&self.0).zip(gradient);
+        pairs
+            .map(|((model, datum), gradient)| {
+                *gradient += (model - datum).scale(2.0 * weight);
+                (model - datum).norm_sqr()
+            })
+            .sum()
+    }
+}
+
+fn scans() -> ScanTerm<f64> {
+    let grid = ImageGrid::new(SIDE, SIDE, 4e-10).unwrap();
+    let scan = |frame: usize| {
+        let uv = |k: usize| [(k * 7 + frame) as f64 * 1e8, (k * k) as f64 * -2e8];
+        let uv: Vec<[f64; 2]> = (0..5).map(uv).collect();
+        let data = (0..5).map(|k| Complex::new(0.3 * k as f64, 0.1 * frame as f64)).collect();
+        let transform = Transform::Direct(Dtft::new(grid, Pulse::Triangle, &[uv], usize::MAX));
+        (frame != 2).then(|| Scan { transform, term: Box::new(Plain(data)) })
+    };
+    ScanTerm::new("visibilities", SIDE * SIDE, true, (0..4).map(scan).collect())
+}
+
+fn movie() -> Vec<f64> {
+    (0..4 * SIDE * SIDE).map(|k| (k as f64 * 0.37).sin().abs()).collect()
+}
+
+fn objective(delay: bool, momentum: bool, others: bool) -> Objective<f64> {
+    let term = Box::new(ImageTerm::new(movie(), SIDE * SIDE, 0.5).unwrap());
+    let mut data = Data { image: Some(Weighted { weight: 0.7, term }), others: Vec::new() };
+    if others {
+        data.others.push(Weighted { weight: 1.3, term: Box::new(scans()) });
+        let (flux, sigma) = (vec![1.0, 3.0, 2.0, 5.0], [0.5, 1.0, 2.0, 0.7]);
+        let term = LightCurveTerm::new(flux, &sigma, SIDE * SIDE).unwrap();
+        data.others.push(Weighted { weight: 0.4, term: Box::new(term) });
+    }
+    Objective { chain: chain(delay, momentum), data }
+}
+
+fn grid() -> Grid {
+    let (low, high) = ([-6.0; 3], [6.0; 3]);
+    let activation = Activation::Softplus;
+    Grid::new(GridSettings { nodes: [7; 3], low, high, activation, initial: 0.0 }).unwrap()
+}
+
+/// A field without kinks, so that differences converge: Σ a exp(−|x − c|²/8), four parameters and, of
+/// events, one for the time a blob.
+struct Blobs {
+    dimension: usize,
+}
+
+const BLOBS: usize = 3;
+
+impl Blobs {
+    /// Value and gradients with respect to the parameters of one blob and the coordinates.
+    fn blob(&self, p: &[f64], x: &[f64]) -> (f64, [f64; 5], [f64; 4]) {
+        let offset = |c: usize| x[c] - 3.0 * p[c + 1];
+        let square: f64 = (0..self.dimension).map(|c| offset(c).powi(2)).sum();
+        let (shape, mut of_p, mut of_x) = ((-square / 8.0).exp(), [0.0; 5], [0.0; 4]);
+        of_p[0] = shape;
+        for c in 0..self.dimension {
+            of_x[c] = -p[0] * shape * offset(c) / 4.0;
+            of_p[c + 1] = -3.0 * of_x[c];
+        }
+        (p[0] * shape, of_p, of_x)
+    }
+
+    fn at(at: &Coordinates<'_, f64>, k: usize) -> Vec<f64> {
+        at.columns().iter().map(|column| column[k]).collect()
+    }
+}
+
+impl Representation<f64> for Blobs {
+    fn dimension(&self) -> usize {
+        self.dimension
+    }
+
+    fn parameters(&self) -> usize {
+        BLOBS * (self.dimension + 1)
+    }
+
+    fn initialise(&self, _seed: u64, parameters: &mut [f64]) {
+        parameters.iter_mut().enumerate().for_each(|(k, x)| *x = 0.4 + (k as f64).cos());
+    }
+
+    fn eval(&self, p: &[f64], at: Coordinates<'_, f64>, values: &mut [f64], _: &mut Workspace) {
+        for (k, value) in values.iter_mut().enumerate() {
+            let (x, of) = (Self::at(&at, k), p.chunks(self.dimension + 1));
+            *value = of.map(|p| self.blob(p, &x).0).sum();
+        }
+    }
+
+    fn vjp(
+        &self,
+        p: &[f64],
+        at: Coordinates<'_, f64>,
+        cotangents: &[f64],
+        gradient: Gradient<'_, f64>,
+        _: &mut Workspace,
+    ) {
+        let Gradient { parameters, mut coordinates } = gradient;
+        let size = self.dimension + 1;
+        for (k, cotangent) in cotangents.iter().enumerate() {
+            let x = Self::at(&at, k);
+            for (p, slopes) in p.chunks(size).zip(parameters.chunks_mut(size)) {
+                let (_, of_p, of_x) = self.blob(p, &x);
+                slopes.iter_mut().zip(of_p).for_each(|(slope, d)| *slope += cotangent * d);
+                if let Some(coordinates) = &mut coordinates {
+                    let columns = coordinates.columns().iter_mut();
+                    columns.zip(of_x).for_each(|(column, d)| column[k] += cotangent * d);
+                }
+            }
+        }
+    }
+
+    fn eval_vjp(
+        &self,
+        p: &[f64],
+        at: Coordinates<'_, f64>,
+        groups: Groups<'_, f64>,
+        values: &mut [f64],
+        gradient: Gradient<'_, f64>,
+        workspace: &mut Workspace,
+    ) {
+        self.eval(p, at, values, workspace);
+        let mut cotangents = vec![0.0; values.len()];
+        (groups.link)(0..groups.starts.len() - 1, values, &mut cotangents);
+        self.vjp(p, at, &cotangents, gradient, workspace);
+    }
+}
+
+fn start(representation: &dyn Representation<f64>) -> Vec<f64> {
+    let mut parameters = vec![0.0; representation.parameters()];
+    representation.initialise(5, &mut parameters);
+    for (k, x) in parameters.iter_mut().enumerate() {
+        *x += 0.1 * (k as f64 * 1.7).sin();
+    }
+    parameters
+}
+
+fn pairs(chain: &Chain<f64>) -> Vec<(u32, u32)> {
+    let rays = chain.rays() as u32;
+    (0..4).flat_map(|frame| (0..rays).map(move |ray| (ray, frame))).collect()
+}
+
+struct Case<'a> {
+    objective: Objective<f64>,
+    representation: &'a dyn Representation<f64>,
+    pixels: bool,
+}
+
+impl Case<'_> {
+    fn loss(&mut self, parameters: &[f64], axis: Axis, gradients: Gradients<'_, f64>) -> f64 {
+        self.objective.chain.weigh(axis);
+        let representation = self.representation;
+        let field = Field { representation, parameters, axis, occupancy: None };
+        let pairs = pairs(&self.objective.chain);
+        let selection =
+            if self.pixels { Selection::Pixels(&pairs) } else { Selection::Frames(&[0, 1, 3, 2]) };
+        self.objective.value_and_gradient(field, selection, gradients, &mut Room::default()).total
+    }
+
+    fn value(&mut self, parameters: &[f64], axis: Axis) -> f64 {
+        let mut unused = vec![0.0; parameters.len()];
+        self.loss(parameters, axis, Gradients { parameters: &mut unused, axis: None })
+    }
+
+    /// Central differences along a few directions of the parameters, and along the sphere.
+    fn check(&mut self) {
+        let (axis, parameters) = (Axis::new([0.3, -0.5, 0.8]).unwrap(), start(self.representation));
+        let (mut slopes, mut of_axis) = (vec![0.0; parameters.len()], [0.0; 3]);
+        let gradients = Gradients { parameters: &mut slopes, axis: Some(&mut of_axis) };
+        let value = self.loss(&parameters, axis, gradients);
+        assert!((value - self.value(&parameters, axis)).abs() < 1e-13 * value);
+        let h = 1e-5;
+        for seed in 1..4 {
+            let way: Vec<f64> =
+                (0..slopes.len()).map(|k| (k as f64 * 0.7 * f64::from(seed)).cos()).collect();
+            let at =
+                |h: f64| parameters.iter().zip(&way).map(|(x, d)| x + h * d).collect::<Vec<_>>();
+            let difference = (self.value(&at(h), axis) - self.value(&at(-h), axis)) / (2.0 * h);
+            let product: f64 = slopes.iter().zip(&way).map(|(s, d)| s * d).sum();
+            let size: f64 = slopes.iter().map(|s| s * s).sum::<f64>().sqrt();
+            assert!((difference - product).abs() < 1e-7 * size.max(1.0), "{difference} {product}");
+        }
+        for way in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.3]].map(|way| axis.tangent(way)) {
+            let at = |h: f64| axis.moved(way.map(|x| h * x));
+            let ends = [at(h), at(-h)].map(|axis| self.value(&parameters, axis));
+            let product: f64 = of_axis.iter().zip(way).map(|(s, d)| s * d).sum();
+            let difference = (ends[0] - ends[1]) / (2.0 * h);
+            let size = of_axis.iter().map(|s| s * s).sum::<f64>().sqrt();
+            assert!((difference - product).abs() < 1e-7 * size.max(1.0), "{difference} {product}");
+        }
+    }
+}
+
+#[test]
+fn exact_gradients_of_parameters_and_axis_by_differences() {
+    let (net, events) = (Blobs { dimension: 3 }, Blobs { dimension: 4 });
+    for (delay, momentum) in [(false, false), (true, true)] {
+        for (representation, pixels, others) in [
+            (&net, true, false),
+            (&net, false, true),
+            (&events, true, false),
+            (&events, false, true),
+        ] {
+            let objective = objective(delay, momentum, others);
+            Case { objective, representation, pixels }.check();
+        }
+    }
+}
+
+#[test]
+fn exact_gradient_of_a_grid_is_that_of_its_values() {
+    let grid = grid();
+    let mut case =
+        Case { objective: objective(true, true, true), representation: &grid, pixels: false };
+    let (axis, parameters) = (Axis::new([0.3, -0.5, 0.8]).unwrap(), start(&grid));
+    let mut slopes = vec![0.0; parameters.len()];
+    case.loss(&parameters, axis, Gradients { parameters: &mut slopes, axis: None });
+    let way: Vec<f64> = (0..slopes.len()).map(|k| (k as f64 * 0.7).cos()).collect();
+    let at = |h: f64| parameters.iter().zip(&way).map(|(x, d)| x + h * d).collect::<Vec<_>>();
+    let difference = (case.value(&at(1e-5), axis) - case.value(&at(-1e-5), axis)) / 2e-5;
+    let product: f64 = slopes.iter().zip(&way).map(|(s, d)| s * d).sum();
+    assert!((difference - product).abs() < 1e-7 * product.abs(), "{difference} {product}");
+}
+
+/// All pixels one by one are all frames as a whole, gradients included.
+#[test]
+fn exact_pixels_and_frames_agree() {
+    let net = Blobs { dimension: 3 };
+    let axis = Axis::new([-0.2, 0.4, -0.8]).unwrap();
+    let run = |pixels: bool| {
+        let objective = objective(true, true, false);
+        let mut case = Case { objective, representation: &net, pixels };
+        let parameters = start(&net);
+        let (mut slopes, mut of_axis) = (vec![0.0; parameters.len()], [0.0; 3]);
+        let gradients = Gradients { parameters: &mut slopes, axis: Some(&mut of_axis) };
+        (case.loss(&parameters, axis, gradients), slopes, of_axis)
+    };
+    let (one, whole) = (run(true), run(false));
+    // Pixels without a ray have the same loss for ever: only whole frames count it.
+    let dark = {
+        let chain = chain(true, true);
+        let mut seen = [false; SIDE * SIDE];
+        chain.pixel().iter().for_each(|pixel| seen[*pixel as usize] = true);
+        let dark = |(k, x): (usize, &f64)| if seen[k % (SIDE * SIDE)] { 0.0 } else { x * x };
+        0.7 * 4.0 * movie().iter().enumerate().map(dark).sum::<f64>() / (4 * SIDE * SIDE) as f64
+    };
+    assert!((one.0 + dark - whole.0).abs() < 1e-12 * whole.0, "{} {dark} {}", one.0, whole.0);
+    for (a, b) in one.1.iter().zip(&whole.1).chain(one.2.iter().zip(&whole.2)) {
+        assert!((a - b).abs() < 1e-11, "{a} {b}");
+    }
+}
+
+#[test]
+fn sightlines_lie_in_their_region_and_errors_are_named() {
+    let (hole, lines) = lines(true, true);
+    for k in 0..lines.points() {
+        let [x, y, z] = [0, 1, 2].map(|c| lines.position[c][k]);
+        let r = (x * x + y * y + z * z).sqrt();
+        assert!((3.0..6.0).contains(&r) && z.abs() <= 4.0);
+    }
+    assert!(lines.rays() > 20 && lines.rays() < SIDE * SIDE);
+    let observer = Observer::at_infinity(Inclination::from_degrees(30.0).unwrap());
+    let region = Region { r_min: 3.0, r_max: 2.0, z_width: 1.0 };
+    let mut request = SightlineRequest {
+        region,
+        sampling: Sampling::EqualMinoTime { per_ray: 10 },
+        delay: false,
+        momentum: false,
+    };
+    let mut say = |change: &dyn Fn(&mut SightlineRequest)| {
+        change(&mut request);
+        Sightlines::trace(&hole, &observer, &[1.0], &[1.0], &request).unwrap_err().to_string()
+    };
+    assert_eq!(say(&|_| ()), "r_max = 2 is not allowed: above r_min");
+    let text = say(&|request| request.region.r_max = 5.0);
+    assert!(text.starts_with("observer radius = inf is not allowed"), "{text}");
+}
