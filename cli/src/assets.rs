@@ -1,6 +1,7 @@
 //! The files that a scene names.
 
 use crate::output::{self, Output};
+use crate::volume_files;
 use anyhow::Context;
 use kerrlight_tomo::emission::mesh::MeshFile;
 use kerrlight_tomo::emission::sky::Panorama;
@@ -44,7 +45,15 @@ pub fn load(scene: &Scene, folder: &Path, outputs: &[&Output]) -> anyhow::Result
         let resources = |name: &str| read(&beside.join(name)).map_err(|error| format!("{error:#}"));
         MeshFile::decode(&bytes, &resources).with_context(name)
     });
-    let decoded = Assets { sky, meshes: meshes.collect::<anyhow::Result<_>>()? };
+    let meshes = meshes.collect::<anyhow::Result<_>>()?;
+    let volumes = scene.volume.iter().enumerate().map(|(k, volume)| {
+        let path = folder.join(&volume.path);
+        let bytes = read(&path).with_context(|| format!("`volume.{k}.path`"))?;
+        volume_files::read(&path, &bytes, volume)
+            .with_context(|| format!("`volume.{k}.path` {}", path.display()))
+    });
+    let volumes = volumes.collect::<anyhow::Result<_>>()?;
+    let decoded = Assets { sky, meshes, volumes };
     Ok(Files { decoded, identity: identity.into_inner(), paths: paths.into_inner() })
 }
 

@@ -19,6 +19,7 @@ mod render;
 mod report;
 mod trace;
 mod uv;
+mod volume_files;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;

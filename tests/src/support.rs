@@ -80,7 +80,7 @@ pub fn render(scene: &Scene) -> Picture {
     let resource = |name: &str| Ok(read(name));
     let mesh = |path: &str| MeshFile::decode(&read(path), &resource).expect("a mesh");
     let meshes = scene.mesh.iter().map(|one| mesh(&one.path)).collect();
-    kerrlight_tomo::render::render(scene, Assets { sky, meshes }, &|_| true)
+    kerrlight_tomo::render::render(scene, Assets { sky, meshes, ..Assets::default() }, &|_| true)
         .expect("a picture")
         .picture
 }

@@ -65,7 +65,7 @@ impl Film {
 
     /// Whether anything in the scene changes with time.
     pub fn changes(&self) -> bool {
-        self.camera_moves() || !self.raster.scene().spot.is_empty()
+        self.camera_moves() || self.raster.scene().changes()
     }
 
     /// Names of the channels.

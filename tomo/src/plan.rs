@@ -28,6 +28,7 @@ impl Plan {
         plan.rays(scene);
         plan.surfaces(scene);
         plan.gas(scene);
+        plan.volumes(scene);
         plan.spots(scene);
         plan.sky(scene);
         plan
@@ -101,6 +102,25 @@ impl Plan {
         let absorption = effects.absorption;
         let what = if absorption { "optical depth at the nodes" } else { "no optical depth" };
         self.say(Part::Gas, absorption, what);
+    }
+
+    fn volumes(&mut self, scene: &Scene) {
+        let part = Part::Volumes;
+        let count = scene.volume.len();
+        if count == 0 {
+            return self.say(part, false, "no volumes");
+        }
+        let what =
+            format!("{count} volumes: nodes of r, theta and phi inside their largest radius");
+        self.say(part, true, what);
+        self.say(part, true, "values where radius and height along the axis are occupied");
+        let slow = scene.effects.slow_light && scene.changes();
+        let what = if slow { "emission when the light passed" } else { "one time: no delays" };
+        self.say(part, slow, what);
+        let redshift = scene.effects.redshift;
+        let what =
+            if redshift { "g of circles about the axis" } else { "no redshift: no momentum" };
+        self.say(part, redshift, what);
     }
 
     fn spots(&mut self, scene: &Scene) {

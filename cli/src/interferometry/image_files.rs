@@ -117,7 +117,7 @@ fn npy(bytes: &[u8]) -> anyhow::Result<Pixels> {
 const IMAGE_SHAPES: &str = "(height, width) or (frames, height, width) is expected";
 
 /// Shape and numbers of an array.
-fn npy_array(bytes: &[u8]) -> anyhow::Result<(Vec<u64>, Vec<f64>)> {
+pub fn npy_array(bytes: &[u8]) -> anyhow::Result<(Vec<u64>, Vec<f64>)> {
     let file = npyz::NpyFile::new(bytes).context("not an npy file")?;
     if file.order() != npyz::Order::C {
         bail!("the array is in Fortran's order: save it in C's");

@@ -30,8 +30,7 @@ pub fn read(path: &Path, times_h: &[f64]) -> anyhow::Result<Movie> {
     let (width, height) = (scene.screen.width as usize, scene.screen.height as usize);
     let field_rad = pixel_uas * width as f64 * MICROARCSECOND;
     let grid = ImageGrid::new(width, height, field_rad).with_context(name)?;
-    // A disc does not change.
-    let frames = if scene.spot.is_empty() { &times_h[..1] } else { times_h };
+    let frames = if scene.changes() { times_h } else { &times_h[..1] };
     if frames.len() > (1 << 30) / grid.pixels() {
         bail!("{}: {} frames of {width} x {height} pixels are too many", name(), frames.len());
     }

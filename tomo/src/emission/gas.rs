@@ -2,7 +2,7 @@
 //! transfer use (Gold et al. 2020, ApJ 897, 148, section 3.2).
 
 use crate::scene::{Gas, GasMotion, GasProfile};
-use crate::transport::{Emission, Medium, Moment, Needs};
+use crate::transport::{Emission, Grain, Medium, Moment, Needs, Part};
 use kerrlight_geodesic::Kerr;
 use kerrlight_geodesic::bundle::RayNodes;
 
@@ -188,6 +188,14 @@ impl GasModel {
 }
 
 impl Medium for GasModel {
+    fn part(&self) -> Part {
+        Part::Gas
+    }
+
+    fn grain(&self) -> Option<Grain> {
+        None
+    }
+
     fn sphere(&self) -> f64 {
         self.outer
     }
@@ -205,7 +213,7 @@ impl Medium for GasModel {
         self.emissivity * self.scale_radius
     }
 
-    fn four_velocity(&self, r: f64, u: f64) -> Option<[f64; 4]> {
+    fn four_velocity(&self, r: f64, u: f64, _: f64) -> Option<[f64; 4]> {
         self.velocity(r, u)
     }
 

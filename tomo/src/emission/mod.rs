@@ -8,3 +8,4 @@ pub mod page_thorne;
 pub mod sky;
 pub mod spot;
 pub mod spot_parts;
+pub mod volume;

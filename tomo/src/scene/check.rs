@@ -1,5 +1,6 @@
 //! Ranges of a scene's values.
 
+use super::check_volume::check_volume;
 use super::invalid::{Invalid, brightness, finite, number, positive, shown};
 use super::{Disc, Gas, GasMotion, GasProfile, Mesh, Scene, Sky, Spot};
 use crate::polarization::PowerLaw;
@@ -30,6 +31,9 @@ pub(super) fn check(scene: &Scene) -> Result<(), Invalid> {
     }
     for (k, mesh) in scene.mesh.iter().enumerate() {
         check_mesh(mesh, k, scene.effects.redshift)?;
+    }
+    for (k, volume) in scene.volume.iter().enumerate() {
+        check_volume(volume, k)?;
     }
     scene.sky.as_ref().map_or(Ok(()), check_sky)
 }
@@ -152,9 +156,14 @@ fn check_combinations(scene: &Scene) -> Result<(), Invalid> {
         let allowed = "only with a [gas] whose absorptivity is above 0";
         return Err(Invalid::new("effects.absorption", true, allowed));
     }
+    if effects.absorption && !scene.volume.is_empty() {
+        let allowed = "false with a [[volume]]: only surfaces hide it";
+        return Err(Invalid::new("effects.absorption", true, allowed));
+    }
     let bodies = !scene.spot.is_empty() || !scene.mesh.is_empty();
     if bodies && !effects.lensing {
-        let allowed = "true with hot spots or meshes: straight rays see discs, gas and skies";
+        let allowed =
+            "true with hot spots or meshes: straight rays see discs, gas, volumes and skies";
         return Err(Invalid::new("effects.lensing", false, allowed));
     }
     if scene.camera.is_some() && !effects.lensing {
@@ -286,7 +295,7 @@ fn check_mesh(mesh: &Mesh, k: usize, redshift: bool) -> Result<(), Invalid> {
     mesh.color.map_or(Ok(()), |color| check_color(&key("color"), color))
 }
 
-fn check_color(key: &str, color: [f32; 3]) -> Result<(), Invalid> {
+pub(super) fn check_color(key: &str, color: [f32; 3]) -> Result<(), Invalid> {
     if color.iter().all(|c| (0.0..=1e6).contains(c)) {
         return Ok(());
     }

@@ -5,6 +5,7 @@
 
 mod camera;
 mod check;
+mod check_volume;
 mod invalid;
 mod overrides;
 mod sources;
@@ -13,7 +14,8 @@ pub use camera::{CameraConfig, CameraKey, CameraMotion, Pose};
 pub use invalid::SceneError;
 pub use overrides::apply_override;
 pub use sources::{
-    Checker, Disc, Gas, GasMotion, GasProfile, Mesh, MeshVelocity, Sky, SkyImage, Spot, Stars,
+    Checker, Disc, Gas, GasMotion, GasProfile, Mesh, MeshVelocity, Rotation, Sky, SkyImage, Spot,
+    Stars, VolumeSource,
 };
 
 use crate::polarization::MagneticField;
@@ -51,6 +53,9 @@ pub struct Scene {
     /// Hot spots on Keplerian orbits.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub spot: Vec<Spot>,
+    /// Emission on the nodes of boxes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub volume: Vec<VolumeSource>,
     /// Triangle meshes.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub mesh: Vec<Mesh>,
@@ -266,6 +271,14 @@ impl Scene {
             disc.inner_edge.get_or_insert_with(|| orbits::isco(&hole));
         }
         toml::to_string(&scene).expect("plain tables always serialise") // no maps with odd keys
+    }
+
+    /// Whether what shines changes with time.
+    pub fn changes(&self) -> bool {
+        let moves = |volume: &VolumeSource| {
+            volume.rotation != Rotation::None || volume.injection_time.is_some()
+        };
+        !self.spot.is_empty() || self.volume.iter().any(moves)
     }
 
     /// Width of a pixel in M; with a camera, on its picture plane at distance 1.

@@ -1,5 +1,7 @@
 //! What shines: gas, disc, hot spots, meshes and skies.
 
+use crate::dynamics::{AngularVelocity, Axis};
+use kerrlight_geodesic::Kerr;
 use serde::{Deserialize, Serialize};
 
 /// A volumetric flow with an analytic density and motion (Gold et al. 2020, ApJ 897, 148, section
@@ -146,6 +148,71 @@ pub enum MeshVelocity {
     Static,
     /// About +z with Ω(r) = 1/(r^{3/2} + a).
     Keplerian,
+}
+
+/// Emission on the nodes of a box that matter on circles about an axis carries along. Coordinates
+/// are r n in M: Boyer–Lindquist ones taken as Cartesian.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VolumeSource {
+    /// NPZ or NPY file, relative to the scene file.
+    pub path: String,
+    /// Emissivity where the file has 1, in intensity per M.
+    pub factor: f64,
+    /// Coordinates of the first node in M; without it those of the file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub low: Option<[f64; 3]>,
+    /// Coordinates of the last node in M; without it those of the file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub high: Option<[f64; 3]>,
+    /// Axis about which it turns right-handed; without it that of the file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axis: Option<[f64; 3]>,
+    /// How fast it turns.
+    pub rotation: Rotation,
+    /// Time in M at which it is as in the file; needed if it turns.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference_time: Option<f64>,
+    /// Time in M before which nothing of it shines.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub injection_time: Option<f64>,
+    /// Linear colour of its light in the R, G, B channels.
+    #[serde(default = "white")]
+    pub color: [f32; 3],
+}
+
+/// Angular velocity Ω(r) of matter on circles about an axis ξ.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Rotation {
+    /// At rest in Boyer–Lindquist coordinates.
+    None,
+    /// 1/(r^{3/2} + a ξ_z).
+    Keplerian,
+    /// rate (radius/r)^exponent.
+    PowerLaw {
+        /// Where the rate is reached, M.
+        radius: f64,
+        /// Radians per M.
+        rate: f64,
+        /// 1.5: Keplerian without spin, 0: like a rigid body.
+        exponent: f64,
+    },
+}
+
+impl Rotation {
+    /// About `axis` through `hole`; `None` if nothing turns.
+    pub fn about(self, hole: &Kerr, axis: Axis) -> Option<AngularVelocity> {
+        match self {
+            Rotation::None => None,
+            Rotation::Keplerian => {
+                Some(AngularVelocity::Keplerian { drag: hole.spin() * axis.vector()[2] })
+            }
+            Rotation::PowerLaw { radius, rate, exponent } => {
+                Some(AngularVelocity::PowerLaw { radius, rate, exponent })
+            }
+        }
+    }
 }
 
 /// What the rays that escape see: `[sky.checker]`, `[sky.stars]` or `[sky.image]`.

@@ -1,12 +1,17 @@
 //! What fills space, and the light of it that one ray gathers.
 
+use super::Part;
 use super::glimpse::Place;
 use kerrlight_geodesic::bundle::{PanelRule, RayNodes};
 
 /// Something that shines, and may absorb, all over a sphere.
 pub trait Medium: core::fmt::Debug + Send + Sync {
+    /// Whose cost it is part of.
+    fn part(&self) -> Part;
     /// Radius in M of the sphere outside of which there is nothing.
     fn sphere(&self) -> f64;
+    /// What it is made of, if its light is not smooth along panels of any length.
+    fn grain(&self) -> Option<Grain>;
     /// What it has to be told of its nodes besides r and cos θ.
     fn needs(&self) -> Needs;
     /// Linear colour.
@@ -14,14 +19,36 @@ pub trait Medium: core::fmt::Debug + Send + Sync {
     /// Intensity that its brightest parts may reach: what errors of faint rays are measured by.
     fn scale(&self) -> f64;
     /// Contravariant Boyer–Lindquist four-velocity of its matter, for polarised light; `None` where
-    /// there is none.
-    fn four_velocity(&self, r: f64, cos_theta: f64) -> Option<[f64; 4]>;
+    /// there is none. The azimuth is 0 where it is not among its needs.
+    fn four_velocity(&self, r: f64, cos_theta: f64, azimuth: f64) -> Option<[f64; 4]>;
     /// Whether it looks different at different times.
     fn changes(&self) -> bool;
     /// Whether [`fill`](Self::fill) gives absorption.
     fn absorbs(&self) -> bool;
     /// Appends emission and absorption at the nodes of a ray with angular momentum `lambda`.
     fn fill(&self, nodes: &RayNodes<'_>, lambda: f64, moment: Moment, out: &mut Emission);
+}
+
+/// Cells in which a medium is smooth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grain {
+    /// Shortest edge of a cell in M. Panels are never longer, and not cut any more once they are
+    /// shorter than a quarter of it.
+    pub size: f64,
+    /// Radius in M of the sphere inside of which there is nothing.
+    pub inner: f64,
+}
+
+impl Grain {
+    /// The part of a cell below which panels are not cut for the sake of the tolerance.
+    pub(super) const FINEST: f64 = 0.25;
+
+    /// The longest panel of a ray outside of the inner sphere, M.
+    pub(super) fn longest(&self, nodes: &RayNodes<'_>, order: usize) -> f64 {
+        let panels = nodes.weight.chunks_exact(order).zip(nodes.radius.chunks_exact(order));
+        let outside = panels.filter(|(_, radius)| radius.iter().any(|r| *r >= self.inner));
+        outside.map(|(weights, _)| weights.iter().sum()).fold(0.0, f64::max)
+    }
 }
 
 /// Columns of nodes that a medium needs.

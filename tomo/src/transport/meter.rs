@@ -9,6 +9,8 @@ pub enum Part {
     Rays,
     /// Nodes inside the gas, its emission and absorption.
     Gas,
+    /// Nodes inside volumes, and their emission.
+    Volumes,
     /// Light of the disc and of meshes where rays meet them.
     Surfaces,
     /// Hot spots.
@@ -19,13 +21,15 @@ pub enum Part {
 
 impl Part {
     /// All of them.
-    pub const ALL: [Part; 5] = [Part::Rays, Part::Gas, Part::Surfaces, Part::Spots, Part::Sky];
+    pub const ALL: [Part; 6] =
+        [Part::Rays, Part::Gas, Part::Volumes, Part::Surfaces, Part::Spots, Part::Sky];
 
     /// Its name.
     pub fn name(self) -> &'static str {
         match self {
             Part::Rays => "rays",
             Part::Gas => "gas",
+            Part::Volumes => "volumes",
             Part::Surfaces => "surfaces",
             Part::Spots => "spots",
             Part::Sky => "sky",
@@ -37,13 +41,13 @@ impl Part {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Meter {
     on: bool,
-    spent: [Duration; 5],
+    spent: [Duration; 6],
 }
 
 impl Meter {
     /// A meter that runs.
     pub fn running() -> Self {
-        Meter { on: true, spent: [Duration::ZERO; 5] }
+        Meter { on: true, spent: [Duration::ZERO; 6] }
     }
 
     /// Time spent on a part.

@@ -21,7 +21,7 @@ mod view;
 mod volume;
 
 pub use glimpse::{Fate, Glimpse};
-pub use medium::{Emission, Medium, Moment, Needs};
+pub use medium::{Emission, Grain, Medium, Moment, Needs};
 pub use meter::{Meter, Part};
 pub use view::View;
 
@@ -30,7 +30,9 @@ use crate::emission::gas::{GasEffects, GasModel};
 use crate::emission::mesh::{MeshFile, MeshModel};
 use crate::emission::sky::{Beam, Panorama, SkyModel};
 use crate::emission::spot::SpotModel;
+use crate::emission::volume::VolumeModel;
 use crate::scene::{Integrator, Scene};
+use crate::volume::VolumeFile;
 use glimpse::{Gather, wrap};
 use kerrlight_geodesic::bundle::{Crossings, Nodes, Samples};
 use kerrlight_geodesic::{
@@ -67,7 +69,8 @@ pub struct Stage {
     /// What is told of the brightest contribution.
     places: Needs,
     disc: Option<DiscModel>,
-    gas: Option<GasModel>,
+    /// What fills space.
+    media: Vec<Arc<dyn Medium>>,
     spots: Vec<SpotModel>,
     /// Trees over the spots by time of observation, the latest last.
     spot_trees: Arc<Mutex<SpotTrees>>,
@@ -85,11 +88,13 @@ pub struct Assets {
     pub sky: Option<Panorama>,
     /// A file for each `[[mesh]]`, in their order.
     pub meshes: Vec<MeshFile>,
+    /// A file for each `[[volume]]`, in their order.
+    pub volumes: Vec<VolumeFile>,
 }
 
 impl From<Option<Panorama>> for Assets {
     fn from(sky: Option<Panorama>) -> Self {
-        Assets { sky, meshes: Vec::new() }
+        Assets { sky, ..Assets::default() }
     }
 }
 
@@ -138,6 +143,30 @@ fn mesh_tree(
     Ok(Some(Arc::new(MeshTree::new(placed.collect::<Result<_, _>>()?, hole))))
 }
 
+fn media(
+    scene: &Scene,
+    files: &[VolumeFile],
+    hole: &Kerr,
+) -> Result<Vec<Arc<dyn Medium>>, OutOfRange> {
+    if files.len() != scene.volume.len() {
+        let (value, allowed) = (files.len() as f64, "one file for each [[volume]]");
+        return Err(OutOfRange { field: "number of volume files", value, allowed });
+    }
+    let redshift = scene.effects.redshift.then_some(scene.effects.spectral_index).flatten();
+    let effects = GasEffects { redshift, absorption: scene.effects.absorption };
+    let length = 100.0 * crate::units::SPEED_OF_LIGHT;
+    let length = length * crate::units::gravitational_time(scene.hole.mass_msun);
+    let mut media: Vec<Arc<dyn Medium>> = Vec::new();
+    if let Some(gas) = &scene.gas {
+        media.push(Arc::new(GasModel::new(gas, hole, length, effects)));
+    }
+    let effects = (redshift, scene.effects.slow_light);
+    for (source, file) in scene.volume.iter().zip(files) {
+        media.push(Arc::new(VolumeModel::new(source, file, hole, effects)?));
+    }
+    Ok(media)
+}
+
 impl Stage {
     /// The stage of a scene with the files that it names.
     ///
@@ -149,10 +178,6 @@ impl Stage {
         let hole = Kerr::new(scene.hole.spin)?;
         let kept = |name: &str| scene.screen.keeps(name);
         let redshift = scene.effects.redshift.then_some(scene.effects.spectral_index).flatten();
-        let effects = GasEffects { redshift, absorption: scene.effects.absorption };
-        let length = 100.0 * crate::units::SPEED_OF_LIGHT;
-        let length = length * crate::units::gravitational_time(scene.hole.mass_msun);
-        let gas = scene.gas.as_ref().map(|gas| GasModel::new(gas, &hole, length, effects));
         let view = View::new(scene, &hole)?;
         let sky = scene.sky.as_ref().and_then(|sky| SkyModel::new(sky, assets.sky));
         Ok(Stage {
@@ -168,7 +193,7 @@ impl Stage {
             tolerance: scene.tracer.tolerance,
             closed_form: scene.tracer.integrator == Integrator::Elliptic,
             places: Needs { azimuth: kept("azimuth"), time: kept("delay"), velocity: false },
-            gas,
+            media: media(scene, &assets.volumes, &hole)?,
             disc: scene.disc.as_ref().map(|disc| DiscModel::new(disc, &hole)),
             spots: scene.spot.iter().map(|spot| SpotModel::new(spot, &hole)).collect(),
             spot_trees: Arc::default(),
@@ -216,7 +241,7 @@ impl Stage {
 
     /// Whether anything absorbs.
     pub fn absorbs(&self) -> bool {
-        self.gas.as_ref().is_some_and(Medium::absorbs)
+        self.media.iter().any(|medium| medium.absorbs())
     }
 
     /// What is seen at (α, β) at the scene's own time.
@@ -262,12 +287,13 @@ impl Stage {
             None => scratch.sights.resize(rays, Sight { by_steps: true, ..Sight::default() }),
         }
         scratch.meter.stop(Part::Rays, clock);
-        let medium = self.gas.as_ref().map(|gas| gas as &dyn Medium);
-        scratch.volume.reset(medium.map_or(0, |_| rays * times.len()));
-        if let (Some(medium), Some(observer)) = (medium, observer) {
-            let clock = scratch.meter.start();
-            self.fill_block(medium, observer, (alpha, beta), times, scratch)?;
-            scratch.meter.stop(Part::Gas, clock);
+        scratch.volume.reset(self.media.len() * rays * times.len());
+        if let Some(observer) = observer {
+            for (m, medium) in self.media.iter().enumerate() {
+                let clock = scratch.meter.start();
+                self.fill_block(m, observer, (alpha, beta), times, scratch)?;
+                scratch.meter.stop(medium.part(), clock);
+            }
         }
         for k in 0..rays {
             let mut ray = None;
@@ -276,11 +302,11 @@ impl Stage {
                 let clock = scratch.meter.start();
                 scratch.sights[k] = self.trace_steps(ray, scratch);
                 scratch.meter.stop(Part::Rays, clock);
-                if let Some(medium) = medium {
+                for (m, medium) in self.media.iter().enumerate() {
                     let clock = scratch.meter.start();
                     let screen = self.screen_point(alpha[k], beta[k]);
-                    self.fill_path(medium, k, screen, times, scratch);
-                    scratch.meter.stop(Part::Gas, clock);
+                    self.fill_path((m, k), screen, times, scratch);
+                    scratch.meter.stop(medium.part(), clock);
                 }
             }
             let place = (alpha[k], beta[k]);
@@ -300,7 +326,7 @@ impl Stage {
     ) -> Result<(), OutOfRange> {
         let rays = alpha.len();
         scratch.sights.resize(rays, Sight::default());
-        scratch.volume.reset(self.gas.as_ref().map_or(0, |_| rays * times.len()));
+        scratch.volume.reset(self.media.len() * rays * times.len());
         for k in 0..rays {
             let ray = observer.ray(&self.hole, alpha[k], beta[k])?;
             let line = Line::new(observer, self.hole.horizon(), alpha[k], beta[k]);
@@ -351,10 +377,12 @@ impl Stage {
         let clock = scratch.meter.start();
         for (j, time) in times.iter().enumerate() {
             let mut gather = still.clone();
-            if let (Some(gas), Some(light)) =
-                (&self.gas, scratch.volume.lights.get(k * times.len() + j))
-            {
-                gather.add_light(light, gas.color());
+            let rays = scratch.sights.len();
+            for (m, medium) in self.media.iter().enumerate() {
+                let place = (m * rays + k) * times.len() + j;
+                if let Some(light) = scratch.volume.lights.get(place) {
+                    gather.add_light(light, medium.color());
+                }
             }
             if let (Some(tree), Some(ray)) = (trees.get(j), ray) {
                 let end = sight.last_time();

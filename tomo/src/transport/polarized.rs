@@ -59,7 +59,8 @@ impl Stage {
         for (k, emissivity) in out.emissivity.iter_mut().enumerate() {
             let (r, u) = (nodes.radius[k], nodes.cos_theta[k]);
             let rates = [nodes.radial_velocity[k], nodes.polar_velocity[k]];
-            let stokes = medium.four_velocity(r, u).and_then(|velocity| {
+            let azimuth = nodes.azimuth.get(k).copied().unwrap_or(0.0);
+            let stokes = medium.four_velocity(r, u, azimuth).and_then(|velocity| {
                 let momentum = momentum(&self.hole, [r, u], rates, lambda);
                 view_at(&self.hole, screen, [r, u], momentum, velocity, field)
             });

@@ -139,13 +139,14 @@ impl Stage {
         }
     }
 
-    /// Light of the gas along straight ray number `k`.
+    /// Light of all media along straight ray number `k`.
     pub(super) fn fill_line(&self, line: &Line, k: usize, times: &[f64], scratch: &mut Scratch) {
-        let Some(gas) = &self.gas else { return };
         let until = scratch.sights[k].last_time();
-        self.fill_ray(gas, k, None, times, scratch, |split, _, rule, columns| {
-            let pieces = line.pieces(crate::transport::Medium::sphere(gas), until, split);
-            line.nodes(rule, &pieces, columns);
-        });
+        for (m, medium) in self.media.iter().enumerate() {
+            self.fill_ray((m, k), None, times, scratch, |split, _, rule, columns| {
+                let pieces = line.pieces(medium.sphere(), until, split);
+                line.nodes(rule, &pieces, columns);
+            });
+        }
     }
 }

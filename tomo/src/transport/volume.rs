@@ -1,6 +1,6 @@
 //! Light of what fills space, with as many nodes as it takes.
 
-use super::medium::{Emission, Light, Medium, Moment, Quadrature, gather};
+use super::medium::{Emission, Grain, Light, Medium, Moment, Quadrature, gather};
 use super::rays::{End, Sight};
 use super::surface::Hit;
 use super::{Scratch, Stage};
@@ -12,6 +12,9 @@ const ORDER: usize = 8;
 
 /// Panels are cut into at most so many times as many.
 const FINEST: u32 = 256;
+
+/// The same where cells have to be resolved.
+const FINEST_OF_CELLS: u32 = 1024;
 
 /// Rays whose nodes are in memory at once: few enough for the second cache.
 const TOGETHER: usize = 128;
@@ -94,16 +97,18 @@ impl DepthProfile {
 /// What is summed up along a ray.
 struct Along<'a> {
     medium: &'a dyn Medium,
+    /// Place of the ray's light at the first time.
+    first: usize,
     lambda: f64,
     screen: Option<ScreenPoint>,
     times: &'a [f64],
 }
 
 impl Stage {
-    /// Light of the medium along all rays of a block that were traced in closed form.
+    /// Light of medium number `m` along all rays of a block that were traced in closed form.
     pub(super) fn fill_block(
         &self,
-        medium: &dyn Medium,
+        m: usize,
         observer: &Observer,
         (alpha, beta): (&[f64], &[f64]),
         times: &[f64],
@@ -111,21 +116,24 @@ impl Stage {
     ) -> Result<(), OutOfRange> {
         let Scratch { sights, hits, nodes, volume, .. } = scratch;
         let mut pending: Vec<usize> = (0..sights.len()).filter(|k| !sights[*k].by_steps).collect();
-        let mut split = 1;
+        let (medium, first) = (&*self.media[m], m * sights.len() * times.len());
+        let mut split = first_split(medium);
+        let together = (TOGETHER / split as usize).clamp(16, TOGETHER);
         while !pending.is_empty() {
             let request = self.request(medium, &volume.quadrature.rule, split);
             let mut more = Vec::new();
-            for some in pending.chunks(TOGETHER) {
+            for some in pending.chunks(together) {
                 let pick = |column: &[f64]| some.iter().map(|k| column[*k]).collect::<Vec<_>>();
                 let until: Vec<f64> = some.iter().map(|k| sights[*k].last_time()).collect();
                 let (alpha, beta) = (pick(alpha), pick(beta));
                 nodes.trace(&self.hole, observer, &alpha, &beta, Some(&until), &request)?;
                 for (number, k) in some.iter().enumerate() {
                     let screen = self.screen_point(alpha[number], beta[number]);
-                    let along = Along { medium, lambda: sights[*k].lambda, screen, times };
-                    let done = self.radiate(&along, &nodes.ray(number), *k, volume);
+                    let (first, lambda) = (first + k * times.len(), sights[*k].lambda);
+                    let along = Along { medium, first, lambda, screen, times };
+                    let done = self.radiate(&along, &nodes.ray(number), volume);
                     volume.shade(&mut hits[sights[*k].hits.clone()]);
-                    if !done && split < FINEST {
+                    if !done && split < finest(medium) {
                         more.push(*k);
                     }
                 }
@@ -136,33 +144,32 @@ impl Stage {
         Ok(())
     }
 
-    /// Light of the medium along ray number `k`, which was traced step by step.
+    /// Light of medium number `m` along ray number `k`, which was traced step by step.
     pub(super) fn fill_path(
         &self,
-        medium: &dyn Medium,
-        k: usize,
+        (m, k): (usize, usize),
         screen: Option<ScreenPoint>,
         times: &[f64],
         scratch: &mut Scratch,
     ) {
         let sight = scratch.sights[k].clone();
-        self.fill_ray(medium, k, screen, times, scratch, |split, path, rule, columns| {
-            self.place(path, &sight, medium, split, rule, columns);
+        self.fill_ray((m, k), screen, times, scratch, |split, path, rule, columns| {
+            self.place(path, &sight, &*self.media[m], split, rule, columns);
         });
     }
 
-    /// Light of the medium along ray number `k`, whose nodes are put into columns by `place`.
+    /// Light of medium number `m` along ray number `k`, whose nodes are put into columns by `place`.
     pub(super) fn fill_ray(
         &self,
-        medium: &dyn Medium,
-        k: usize,
+        (m, k): (usize, usize),
         screen: Option<ScreenPoint>,
         times: &[f64],
         scratch: &mut Scratch,
         place: impl Fn(u32, &Path, &PanelRule, &mut Columns),
     ) {
         let Scratch { path, sights, hits, volume, .. } = scratch;
-        let along = Along { medium, lambda: sights[k].lambda, screen, times };
+        let (medium, first) = (&*self.media[m], (m * sights.len() + k) * times.len());
+        let along = Along { medium, first, lambda: sights[k].lambda, screen, times };
         let mut split = 1;
         loop {
             let mut columns = core::mem::take(&mut volume.columns);
@@ -180,9 +187,9 @@ impl Stage {
                 polar_velocity: u_rate,
                 error: 0.0,
             };
-            let done = self.radiate(&along, &nodes, k, volume);
+            let done = self.radiate(&along, &nodes, volume);
             volume.columns = columns;
-            if done || split >= FINEST {
+            if done || split >= finest(medium) {
                 break;
             }
             split *= 2;
@@ -202,18 +209,22 @@ impl Stage {
         }
     }
 
-    /// Light along the nodes of ray number `k` at all times; whether they are enough.
-    fn radiate(
-        &self,
-        along: &Along<'_>,
-        nodes: &RayNodes<'_>,
-        k: usize,
-        volume: &mut Workspace,
-    ) -> bool {
+    /// Light along the nodes of a ray at all times; whether they are enough.
+    fn radiate(&self, along: &Along<'_>, nodes: &RayNodes<'_>, volume: &mut Workspace) -> bool {
         let Workspace { quadrature, emission, depths, lights, profile, .. } = volume;
-        let count = along.times.len();
-        let lights = &mut lights[k * count..(k + 1) * count];
+        let lights = &mut lights[along.first..along.first + along.times.len()];
         let mut done = true;
+        let grain = along.medium.grain();
+        let (mut resolved, mut finest) = (true, false);
+        if let Some(grain) = grain {
+            let longest = grain.longest(nodes, quadrature.rule.order());
+            resolved = longest <= ROUNDING * grain.size;
+            finest = longest <= ROUNDING * Grain::FINEST * grain.size;
+            if !resolved && along.times.len() > 1 {
+                // Not worth the light of all times.
+                return false;
+            }
+        }
         let steady = !along.medium.changes();
         for (j, observed) in along.times.iter().enumerate() {
             if steady && j > 0 {
@@ -228,7 +239,7 @@ impl Stage {
             }
             let light = gather(quadrature, nodes, emission, depths);
             let enough = self.tolerance * (light.intensity + FAINT * along.medium.scale());
-            done &= light.error <= enough;
+            done &= resolved && (finest || light.error <= enough);
             lights[j] = light;
         }
         profile.clear();
@@ -259,8 +270,10 @@ impl Stage {
             let middle = turning.clamp(start, end.max(start));
             for [from, to] in [[start, middle], [middle, end]] {
                 if to > from {
-                    let piece = Piece::new([from, to], path.angular_rate(), split, falls);
-                    piece.nodes(rule, |time, step| self.node_of(path, time, step), columns);
+                    let whole = Leg { ends: [from, to], falls };
+                    whole.pieces(path, medium.grain(), split, |piece| {
+                        piece.nodes(rule, |time, step| self.node_of(path, time, step), columns);
+                    });
                 }
             }
         }
@@ -272,6 +285,45 @@ impl Stage {
         let weight = self.hole.sigma(r, u) * step;
         let [w_rate, u_rate] = [point.inverse_radius_rate, point.velocity[2]];
         [r, u, weight, time, point.azimuth, point.delay, w_rate, u_rate]
+    }
+}
+
+/// Panels may be longer than cells by so much that rounding does not cut them once more.
+const ROUNDING: f64 = 1.05;
+
+/// By how much panels are cut from the beginning: those half-way to the centre resolve cells.
+fn first_split(medium: &dyn Medium) -> u32 {
+    let Some(grain) = medium.grain() else { return 1 };
+    let cells = (0.5 * LONGEST * medium.sphere() / grain.size).clamp(1.0, 256.0);
+    1 << cells.log2() as u32
+}
+
+fn finest(medium: &dyn Medium) -> u32 {
+    if medium.grain().is_some() { FINEST_OF_CELLS } else { FINEST }
+}
+
+/// A stretch of a path on one side of its turning point.
+struct Leg {
+    ends: [f64; 2],
+    falls: bool,
+}
+
+impl Leg {
+    /// Its pieces: itself, or as many as it takes to have panels shorter than the cells of a grain.
+    fn pieces(&self, path: &Path, grain: Option<Grain>, split: u32, mut found: impl FnMut(Piece)) {
+        let ([from, to], rate) = (self.ends, path.angular_rate());
+        let Some(grain) = grain else {
+            return found(Piece::new(self.ends, rate, split, self.falls));
+        };
+        let mut start = from;
+        while start < to {
+            // |dr/dτ| is at most about r² at the far end.
+            let reach = path.at(start).radius() + grain.size;
+            let step = (grain.size / (reach * reach)).min(LONGEST / rate).max(1e-6 * (to - from));
+            let end = if start + step < to { start + step } else { to };
+            found(Piece::new([start, end], rate, split, self.falls && end >= to));
+            start = end;
+        }
     }
 }
 

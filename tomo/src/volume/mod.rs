@@ -20,6 +20,15 @@ pub struct Volume {
     values: Vec<f32>,
 }
 
+/// A volume as a file has it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VolumeFile {
+    /// Its numbers.
+    pub volume: Volume,
+    /// The axis about which it turns, if the file tells.
+    pub axis: Option<[f64; 3]>,
+}
+
 /// Why there is no such volume.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum VolumeError {
@@ -96,6 +105,25 @@ impl Volume {
     /// Values of the nodes, z fastest, then y, then x.
     pub fn values(&self) -> &[f32] {
         &self.values
+    }
+
+    /// The shortest edge of a cell, M.
+    pub fn finest(&self) -> f64 {
+        let edge = |axis: usize| (self.high[axis] - self.low[axis]) / (self.nodes[axis] - 1) as f64;
+        (0..3).map(edge).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The lowest and the highest corner of every cell that is not 0 all over.
+    pub fn occupied(&self) -> impl Iterator<Item = [[f64; 3]; 2]> + '_ {
+        let [nx, ny, nz] = self.nodes;
+        let steps = [0, 1, nz, nz + 1, ny * nz, ny * nz + 1, ny * nz + nz, ny * nz + nz + 1];
+        (0..self.values.len()).filter_map(move |k| {
+            let [i, j, l] = self.indices(k);
+            let inside = i + 1 < nx && j + 1 < ny && l + 1 < nz;
+            let lit = || steps.iter().any(|step| self.values[k + step] != 0.0);
+            let far = k + steps[7];
+            (inside && lit()).then(|| [self.position(k), self.position(far)])
+        })
     }
 
     fn indices(&self, k: usize) -> [usize; 3] {

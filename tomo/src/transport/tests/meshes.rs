@@ -50,7 +50,7 @@ fn mesh(opaque: bool, velocity: MeshVelocity) -> Mesh {
 fn stage(mut scene: Scene, meshes: Vec<(Mesh, MeshFile)>) -> Stage {
     let (meshes, files) = meshes.into_iter().unzip();
     scene.mesh = meshes;
-    Stage::new(&scene, Assets { sky: None, meshes: files }).unwrap()
+    Stage::new(&scene, Assets { meshes: files, ..Assets::default() }).unwrap()
 }
 
 /// A ring of triangles in the plane of the disc is met where the disc is, with its redshift.
@@ -206,7 +206,7 @@ fn exact_misfits_are_errors() {
     let error = Stage::new(&scene, None).unwrap_err().to_string();
     assert!(error.contains("one file for each"), "{error}");
     scene.mesh[0].scale = 1e7;
-    let assets = Assets { sky: None, meshes: vec![annulus(5.0, 6.0, 8)] };
+    let assets = Assets { meshes: vec![annulus(5.0, 6.0, 8)], ..Assets::default() };
     let error = Stage::new(&scene, assets).unwrap_err().to_string();
     assert!(error.contains("within 1e7 M"), "{error}");
 }
