@@ -5,7 +5,9 @@
 
 mod batch;
 mod chain;
+pub mod linear;
 mod occupancy;
+mod regulariser;
 mod shift;
 mod sightlines;
 mod terms;
@@ -13,5 +15,6 @@ mod terms;
 pub use batch::{Batch, Columns};
 pub use chain::{Chain, Field, Motion, Redshift};
 pub use occupancy::{Occupancy, OccupancySettings};
+pub use regulariser::{Regulariser, Shape};
 pub use sightlines::{Region, Sampling, SightlineRequest, Sightlines};
 pub use terms::{FrameTerm, ImageTerm, LightCurveTerm, Scan, ScanTerm};
