@@ -1,14 +1,16 @@
 //! From a field of emission at the reference time to pixels of a movie: what is common to all
 //! representations and data.
 
-use super::batch::Batch;
+use super::batch::{Batch, Columns};
 use super::occupancy::Occupancy;
 use super::shift::Shift;
 use super::sightlines::Sightlines;
 use crate::dynamics::{AngularVelocity, Axis, Injection};
 use crate::representation::{Representation, Workspace};
+use crate::real::Real;
 use crate::simd::Scalar;
 use kerrlight_geodesic::{Kerr, OutOfRange};
+use rayon::prelude::*;
 
 /// How the matter moves, and when it is seen.
 #[derive(Clone, Debug)]
@@ -174,6 +176,30 @@ impl<T: Scalar> Chain<T> {
         let of_factor: Vec<f64> =
             cotangents.iter().zip(&self.plain_weight).map(|(c, plain)| c * plain).collect();
         shift.vjp(axis, &of_factor)
+    }
+}
+
+impl<T: Scalar> Chain<T> {
+    /// Images of a known field e₀(x) at the reference time, all frames one after the other.
+    pub fn movie_of(
+        &self,
+        axis: Axis,
+        field: &(dyn Fn([f64; 3]) -> f64 + Sync),
+        batch: &mut Batch<T>,
+    ) -> Vec<f64> {
+        let mut movie = vec![0.0; self.frames() * self.pixels];
+        for (frame, image) in movie.chunks_exact_mut(self.pixels).enumerate() {
+            batch.set((0..self.rays()).map(|ray| (ray as u32, frame as u32)));
+            batch.gather(self, axis, None);
+            let Columns { pulled: [x, y, z], weight, .. } = &batch.columns;
+            let light = |k: usize| weight[k].double() * field([x[k], y[k], z[k]].map(Real::double));
+            let sum = |range: &[usize]| (range[0]..range[1]).map(light).sum::<f64>();
+            let fluxes: Vec<f64> = batch.starts.par_windows(2).map(sum).collect();
+            for (pixel, flux) in self.pixel.iter().zip(fluxes) {
+                image[*pixel as usize] = flux;
+            }
+        }
+        movie
     }
 }
 

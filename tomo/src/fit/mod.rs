@@ -6,8 +6,10 @@
 mod batch;
 mod chain;
 pub mod checkpoint;
+pub mod linear;
 mod objective;
 mod occupancy;
+mod regulariser;
 mod shift;
 mod sightlines;
 mod terms;
@@ -19,6 +21,7 @@ pub use batch::{Batch, Columns};
 pub use chain::{Chain, Field, Motion, Redshift};
 pub use objective::{Data, Gradients, Loss, Objective, Room, Selection, Weighted, is_turned};
 pub use occupancy::{Occupancy, OccupancySettings};
+pub use regulariser::{Regulariser, Shape};
 pub use sightlines::{Region, Sampling, SightlineRequest, Sightlines};
 pub use terms::{FrameTerm, ImageTerm, LightCurveTerm, Scan, ScanTerm};
 pub use train::{BatchSize, Diverged, OccupancyPlan, Outcome, Progress, State, Trainer, Training};

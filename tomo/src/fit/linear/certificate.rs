@@ -1,0 +1,49 @@
+//! How far from the minimum a field can be.
+
+/// Bounds at a field x, from the gradient g with respect to every node of the grid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Certificate {
+    /// f(x).
+    pub value: f64,
+    /// f of nothing that shines.
+    pub dark: f64,
+    /// The Frank–Wolfe gap max ⟨g, x − s⟩ over the fields 0 ≤ s ≤ `upper` (Jaggi 2013): f(x) exceeds the least value
+    /// over that box by no more, as f is convex.
+    pub gap: f64,
+    /// The largest violation of the conditions for a minimum: |g| of nodes inside the box, the part of g that points
+    /// into it at nodes on its boundary.
+    pub violation: f64,
+    /// Largest |g| where nothing shines: what `violation` compares with.
+    pub dark_slope: f64,
+    /// Largest value of the box.
+    pub upper: f64,
+}
+
+impl Certificate {
+    /// The gap as a part of what nothing that shines leaves unexplained.
+    pub fn relative_gap(&self) -> f64 {
+        self.gap / self.dark
+    }
+
+    /// The violation as a part of the largest slope where nothing shines.
+    pub fn relative_violation(&self) -> f64 {
+        self.violation / self.dark_slope
+    }
+
+    /// Gap and largest violation.
+    pub(super) fn bounds(x: &[f64], gradient: &[f64], upper: f64) -> (f64, f64) {
+        let (mut gap, mut violation) = (0.0, 0.0f64);
+        for (x, g) in x.iter().zip(gradient) {
+            gap += g * x + upper * (-g).max(0.0);
+            let wrong = if *x <= 0.0 {
+                (-g).max(0.0)
+            } else if *x >= upper {
+                g.max(0.0)
+            } else {
+                g.abs()
+            };
+            violation = violation.max(wrong);
+        }
+        (gap, violation)
+    }
+}

@@ -1,0 +1,72 @@
+//! The data of a linear problem, and how they are weighted.
+
+use crate::fit::FrameTerm;
+use crate::simd::Scalar;
+use kerrlight_geodesic::OutOfRange;
+
+/// Data with the weight of their reduced χ².
+#[derive(Clone, Copy)]
+pub struct Weighted<'a, T: Scalar> {
+    /// What they count.
+    pub weight: f64,
+    /// The data.
+    pub term: &'a dyn FrameTerm<T>,
+}
+
+/// Terms over some frames: Σ weight · χ²/(number of real data in those frames).
+pub(super) struct Data<'a, T: Scalar> {
+    terms: Vec<Weighted<'a, T>>,
+    pub frames: &'a [usize],
+    pub pixels: usize,
+}
+
+impl<'a, T: Scalar> Data<'a, T> {
+    pub fn new(
+        terms: &[Weighted<'a, T>],
+        frames: &'a [usize],
+        pixels: usize,
+        of_movie: usize,
+    ) -> Result<Self, OutOfRange> {
+        let range = |field, value, allowed| Err(OutOfRange { field, value, allowed });
+        if frames.is_empty() {
+            return range("frames", 0.0, "1 or more");
+        }
+        if let Some(bad) = frames.iter().find(|frame| **frame >= of_movie) {
+            return range("frame", *bad as f64, "one of the movie");
+        }
+        for Weighted { weight, term } in terms {
+            if term.pixels() != pixels || term.frames() != of_movie {
+                return range("pixels of the data", term.pixels() as f64, "those of the rays");
+            }
+            if !(weight.is_finite() && *weight >= 0.0) {
+                return range("weight of the data", *weight, "0 or above");
+            }
+        }
+        let count =
+            |term: &dyn FrameTerm<T>| frames.iter().map(|f| term.degrees_of_freedom(*f)).sum();
+        let scaled = |data: &Weighted<'a, T>| -> Option<Weighted<'a, T>> {
+            let count: usize = count(data.term);
+            let weight = data.weight / count as f64;
+            (count > 0 && weight > 0.0).then_some(Weighted { weight, term: data.term })
+        };
+        let terms: Vec<_> = terms.iter().filter_map(scaled).collect();
+        if terms.is_empty() {
+            return range("data in the frames", 0.0, "1 or more");
+        }
+        Ok(Self { terms, frames, pixels })
+    }
+
+    pub fn is_quadratic(&self) -> bool {
+        self.terms.iter().all(|data| data.term.is_quadratic())
+    }
+
+    /// Value of a frame; overwrites the gradient with respect to its pixels.
+    pub fn value(&self, frame: usize, image: &[T], gradient: &mut [T]) -> f64 {
+        gradient.fill(T::zero());
+        let one = |data: &Weighted<'a, T>| {
+            let weight = T::of(data.weight);
+            data.weight * data.term.value_and_gradient(frame, image, weight, gradient)
+        };
+        self.terms.iter().map(one).sum()
+    }
+}

@@ -1,0 +1,136 @@
+//! What is minimised: data and penalties as a function of the values at the nodes that count.
+
+use super::data::Data;
+use super::operator::Operator;
+use crate::fit::regulariser::{Regulariser, Shape};
+use crate::simd::Scalar;
+
+/// A penalty with its weight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prior {
+    /// Which.
+    pub regulariser: Regulariser,
+    /// What it is multiplied by.
+    pub weight: f64,
+}
+
+/// A convex function of numbers in a box.
+pub(super) trait Convex {
+    /// Numbers.
+    fn count(&self) -> usize;
+    /// Its value; overwrites the gradient.
+    fn value_and_gradient(&mut self, x: &[f64], gradient: &mut Vec<f64>) -> f64;
+    /// Its second derivative times a direction, where it is quadratic.
+    fn curvature(&mut self, direction: &[f64], out: &mut Vec<f64>);
+    /// Positive numbers that are to the second derivatives as well as is known.
+    fn diagonal(&self) -> Vec<f64>;
+}
+
+/// The linear problem on the nodes that count.
+pub(super) struct Objective<'a, 'b, T: Scalar> {
+    pub operator: &'b Operator<'a, T>,
+    pub data: &'b Data<'a, T>,
+    pub priors: &'b [Prior],
+    pub shape: Shape,
+    dark: Vec<T>,
+    /// Values and gradients and products with second derivatives that were computed.
+    pub evaluations: usize,
+}
+
+impl<'a, 'b, T: Scalar + Default> Objective<'a, 'b, T> {
+    pub fn new(
+        operator: &'b Operator<'a, T>,
+        data: &'b Data<'a, T>,
+        priors: &'b [Prior],
+        shape: Shape,
+    ) -> Self {
+        let dark = if data.is_quadratic() { operator.dark(data) } else { Vec::new() };
+        Self { operator, data, priors, shape, dark, evaluations: 0 }
+    }
+
+    /// Whether second derivatives are the same everywhere.
+    pub fn is_quadratic(&self) -> bool {
+        self.data.is_quadratic() && self.priors.iter().all(|prior| prior.regulariser.is_quadratic())
+    }
+
+    /// Value, and the gradient with respect to all nodes of the grid.
+    pub fn everywhere(&mut self, x: &[f64]) -> (f64, Vec<f64>) {
+        self.evaluations += 1;
+        let (value, mut gradient) =
+            self.operator.value_and_gradient(self.data, &rounded::<T>(x, 1.0), true);
+        let more = self.penalties(x, |slopes: &[f64]| {
+            gradient.iter_mut().zip(slopes).for_each(|(g, s)| *g += s);
+        });
+        (value + more, gradient)
+    }
+
+    /// The value where nothing shines, and the largest slope there of the nodes that count.
+    pub fn nothing(&mut self) -> (f64, f64) {
+        let mut gradient = Vec::new();
+        let value = self.value_and_gradient(&vec![0.0; self.count()], &mut gradient);
+        (value, gradient.iter().fold(0.0f64, |most, g| most.max(g.abs())))
+    }
+
+    fn penalties(&self, x: &[f64], add: impl FnOnce(&[f64])) -> f64 {
+        if self.priors.is_empty() {
+            return 0.0;
+        }
+        let all = self.operator.active.expand(x);
+        let mut slopes = vec![0.0; all.len()];
+        let one = |prior: &Prior| {
+            prior.regulariser.value_and_gradient(&all, self.shape, prior.weight, &mut slopes)
+        };
+        let value = self.priors.iter().map(one).sum();
+        add(&slopes);
+        value
+    }
+}
+
+fn rounded<T: Scalar>(x: &[f64], scale: f64) -> Vec<T> {
+    x.iter().map(|x| T::of(scale * x)).collect()
+}
+
+impl<T: Scalar + Default> Convex for Objective<'_, '_, T> {
+    fn count(&self) -> usize {
+        self.operator.active.count()
+    }
+
+    fn value_and_gradient(&mut self, x: &[f64], gradient: &mut Vec<f64>) -> f64 {
+        self.evaluations += 1;
+        let (value, slopes) =
+            self.operator.value_and_gradient(self.data, &rounded::<T>(x, 1.0), false);
+        *gradient = slopes;
+        let active = &self.operator.active;
+        value + self.penalties(x, |slopes: &[f64]| {
+            gradient.iter_mut().zip(active.gather(slopes)).for_each(|(g, s)| *g += s);
+        })
+    }
+
+    fn curvature(&mut self, direction: &[f64], out: &mut Vec<f64>) {
+        self.evaluations += 1;
+        // As long as an emission of one, so that the data's own slopes, which are subtracted, cost no digits.
+        let largest = direction.iter().fold(0.0f64, |largest, x| largest.max(x.abs()));
+        let scale = if largest > 0.0 { 1.0 / largest } else { 1.0 };
+        *out = self.operator.curvature(self.data, &self.dark, &rounded::<T>(direction, scale));
+        out.iter_mut().for_each(|x| *x *= largest);
+        if self.priors.iter().any(|prior| prior.regulariser == Regulariser::Smoothness) {
+            let all = self.operator.active.expand(direction);
+            let mut slopes = vec![0.0; all.len()];
+            for prior in self.priors.iter().filter(|p| p.regulariser == Regulariser::Smoothness) {
+                let weight = prior.weight;
+                prior.regulariser.value_and_gradient(&all, self.shape, weight, &mut slopes);
+            }
+            let slopes = self.operator.active.gather(&slopes);
+            out.iter_mut().zip(slopes).for_each(|(x, slope)| *x += slope);
+        }
+    }
+
+    fn diagonal(&self) -> Vec<f64> {
+        let mut squares = self.operator.squares();
+        let largest = squares.iter().fold(0.0f64, |largest, x| largest.max(*x));
+        // Nodes that are hardly seen are not to be moved by more than the others can follow.
+        let least = if largest > 0.0 { 1e-4 * largest } else { 1.0 };
+        squares.iter_mut().for_each(|x| *x = x.max(least));
+        squares
+    }
+}

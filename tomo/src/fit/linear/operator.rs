@@ -1,0 +1,327 @@
+//! From values at some nodes of the grid to pixels, as a sparse matrix, and back.
+
+use super::data::Data;
+use super::walk::{Place, Room, Walk};
+use crate::simd::Scalar;
+use rayon::prelude::*;
+
+/// No column.
+const NONE: u32 = u32::MAX;
+/// Pieces that frames are cut into, whatever the number of threads: each adds up its own gradient.
+const PIECES: usize = 16;
+/// Frames whose rows are made at a time; between them memory is looked at.
+const AT_A_TIME: usize = 8;
+
+/// The nodes that count, in the order of the grid.
+#[derive(Clone, Debug)]
+pub(super) struct Active {
+    /// Node of each column.
+    pub node: Vec<u32>,
+    /// Column of each node, or [`NONE`].
+    column: Vec<u32>,
+    /// By its first node, whether any of a cell's nodes counts.
+    cells: Vec<bool>,
+}
+
+impl Active {
+    /// These nodes.
+    pub fn new(is_active: &[bool], corners: [usize; 8]) -> Self {
+        let mut column = vec![NONE; is_active.len()];
+        let mut cells = vec![false; is_active.len()];
+        let mut node = Vec::new();
+        for (k, _) in is_active.iter().enumerate().filter(|(_, active)| **active) {
+            column[k] = node.len() as u32;
+            node.push(k as u32);
+            for corner in corners.into_iter().filter(|corner| *corner <= k) {
+                cells[k - corner] = true;
+            }
+        }
+        Self { node, column, cells }
+    }
+
+    /// Number of columns.
+    pub fn count(&self) -> usize {
+        self.node.len()
+    }
+
+    /// Values at all nodes: 0 where they do not count.
+    pub fn expand<U: Copy + Default>(&self, x: &[U]) -> Vec<U> {
+        let mut all = vec![U::default(); self.column.len()];
+        self.node.iter().zip(x).for_each(|(node, x)| all[*node as usize] = *x);
+        all
+    }
+
+    /// Values at the nodes that count.
+    pub fn gather<U: Copy>(&self, all: &[U]) -> Vec<U> {
+        self.node.iter().map(|node| all[*node as usize]).collect()
+    }
+}
+
+/// The rows of a frame that are not empty.
+#[derive(Default)]
+struct Rows<T> {
+    pixel: Vec<u32>,
+    starts: Vec<u32>,
+    columns: Vec<u32>,
+    entries: Vec<T>,
+}
+
+impl<T: Scalar> Rows<T> {
+    /// Adds up what a ray's nodes take from each column; `place` remembers where in the row a column is.
+    fn push(
+        &mut self,
+        pixel: u32,
+        places: &[Place<T>],
+        active: &Active,
+        corners: &[usize; 8],
+        place: &mut [u32],
+    ) {
+        let start = self.columns.len();
+        for at in places {
+            for (corner, entry) in corners.iter().zip(at.weights()) {
+                let column = active.column[at.corner as usize + corner];
+                if column == NONE || entry == T::zero() {
+                    continue;
+                }
+                let known = place[column as usize] as usize;
+                if known >= start && self.columns.get(known) == Some(&column) {
+                    self.entries[known] += entry;
+                } else {
+                    place[column as usize] = self.columns.len() as u32;
+                    self.columns.push(column);
+                    self.entries.push(entry);
+                }
+            }
+        }
+        if self.columns.len() > start {
+            self.pixel.push(pixel);
+            self.starts.push(self.columns.len() as u32);
+        }
+    }
+
+    fn forward(&self, x: &[T], image: &mut [T]) {
+        for (pixel, ends) in self.pixel.iter().zip(self.starts.windows(2)) {
+            let range = ends[0] as usize..ends[1] as usize;
+            let (columns, entries) = (&self.columns[range.clone()], &self.entries[range]);
+            let sum = columns.iter().zip(entries).map(|(c, e)| *e * x[*c as usize]);
+            image[*pixel as usize] = sum.fold(T::zero(), |sum, x| sum + x);
+        }
+    }
+
+    fn adjoint(&self, gradient: &[T], sums: &mut [T]) {
+        for (pixel, ends) in self.pixel.iter().zip(self.starts.windows(2)) {
+            let slope = gradient[*pixel as usize];
+            if slope == T::zero() {
+                continue;
+            }
+            let range = ends[0] as usize..ends[1] as usize;
+            let (columns, entries) = (&self.columns[range.clone()], &self.entries[range]);
+            for (column, entry) in columns.iter().zip(entries) {
+                sums[*column as usize] += *entry * slope;
+            }
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        self.entries.len() * (size_of::<T>() + 4) + self.pixel.len() * 8
+    }
+}
+
+/// The movie as a function of the values at the nodes that count. Rows that fit into the memory are
+/// kept, those of other frames made anew each time.
+pub(super) struct Operator<'a, T> {
+    walk: Walk<'a, T>,
+    pub active: Active,
+    corners: [usize; 8],
+    frames: &'a [usize],
+    pixels: usize,
+    rows: Vec<Option<Rows<T>>>,
+}
+
+/// Memory of a thread.
+struct Scratch<T> {
+    room: Room<T>,
+    image: Vec<T>,
+    slopes: Vec<T>,
+}
+
+impl<'a, T: Scalar + Default> Operator<'a, T> {
+    /// Restricted to these nodes, with at most about `budget` bytes of rows (those of 8 frames more).
+    pub fn new(walk: Walk<'a, T>, active: Active, frames: &'a [usize], budget: usize) -> Self {
+        let (corners, pixels) = (walk.voxels.corners(), walk.chain.pixels());
+        let mut all = Self { walk, active, corners, frames, pixels, rows: Vec::new() };
+        let mut kept = 0;
+        for some in frames.chunks(AT_A_TIME) {
+            if kept > budget {
+                all.rows.extend(some.iter().map(|_| None));
+                continue;
+            }
+            let rows: Vec<_> = some.par_iter().map(|frame| all.rows_of(*frame)).collect();
+            kept += rows.iter().map(Rows::bytes).sum::<usize>();
+            all.rows.extend(rows.into_iter().map(Some));
+        }
+        all
+    }
+
+    fn rows_of(&self, frame: usize) -> Rows<T> {
+        let mut rows = Rows { starts: vec![0], ..Rows::default() };
+        let mut place = vec![NONE; self.active.count()];
+        let wanted = Some(self.active.cells.as_slice());
+        self.walk.frame(frame, wanted, &mut Room::default(), |pixel, places| {
+            rows.push(pixel, places, &self.active, &self.corners, &mut place);
+        });
+        rows.columns.shrink_to_fit();
+        rows.entries.shrink_to_fit();
+        rows
+    }
+
+    /// Bytes of the rows that are kept.
+    pub fn bytes(&self) -> usize {
+        self.rows.iter().flatten().map(Rows::bytes).sum()
+    }
+
+    /// Entries of the rows that are kept.
+    pub fn entries(&self) -> usize {
+        self.rows.iter().flatten().map(|rows| rows.entries.len()).sum()
+    }
+
+    fn image(&self, k: usize, x: &[T], scratch: &mut Scratch<T>) {
+        let Scratch { room, image, .. } = scratch;
+        image.fill(T::zero());
+        if let Some(rows) = &self.rows[k] {
+            return rows.forward(x, image);
+        }
+        let wanted = Some(self.active.cells.as_slice());
+        self.walk.frame(self.frames[k], wanted, room, |pixel, places| {
+            let mut sum = T::zero();
+            for at in places {
+                for (corner, entry) in self.corners.iter().zip(at.weights()) {
+                    let column = self.active.column[at.corner as usize + corner];
+                    if column != NONE {
+                        sum += entry * x[column as usize];
+                    }
+                }
+            }
+            image[pixel as usize] = sum;
+        });
+    }
+
+    fn back(&self, k: usize, scratch: &mut Scratch<T>, sums: &mut [T]) {
+        if let Some(rows) = &self.rows[k] {
+            return rows.adjoint(&scratch.slopes, sums);
+        }
+        let wanted = Some(self.active.cells.as_slice());
+        let Scratch { room, slopes, .. } = scratch;
+        self.walk.frame(self.frames[k], wanted, room, |pixel, places| {
+            let slope = slopes[pixel as usize];
+            for at in places.iter().filter(|_| slope != T::zero()) {
+                for (corner, entry) in self.corners.iter().zip(at.weights()) {
+                    let column = self.active.column[at.corner as usize + corner];
+                    if column != NONE {
+                        sums[column as usize] += entry * slope;
+                    }
+                }
+            }
+        });
+    }
+
+    /// The same for all nodes of the grid.
+    fn back_to_all(&self, k: usize, scratch: &mut Scratch<T>, sums: &mut [T]) {
+        let Scratch { room, slopes, .. } = scratch;
+        self.walk.frame(self.frames[k], None, room, |pixel, places| {
+            let slope = slopes[pixel as usize];
+            for at in places.iter().filter(|_| slope != T::zero()) {
+                for (corner, entry) in self.corners.iter().zip(at.weights()) {
+                    sums[at.corner as usize + corner] += entry * slope;
+                }
+            }
+        });
+    }
+
+    /// Images of `x`, what `link` (k-th frame, image, slopes) makes of them, and the sum over frames of what
+    /// that takes from the nodes. Frames are cut into pieces that do not depend on the number of threads, and
+    /// added up in their order.
+    fn through(
+        &self,
+        x: &[T],
+        all: bool,
+        link: impl Fn(usize, &[T], &mut [T]) -> f64 + Sync,
+    ) -> (f64, Vec<f64>) {
+        let count = if all { self.active.column.len() } else { self.active.count() };
+        let piece = self.frames.len().div_ceil(PIECES);
+        let indices: Vec<usize> = (0..self.frames.len()).collect();
+        let pixels = self.pixels;
+        let scratch = || Scratch {
+            room: Room::default(),
+            image: vec![T::zero(); pixels],
+            slopes: vec![T::zero(); pixels],
+        };
+        let of_piece = |scratch: &mut Scratch<T>, piece: &[usize]| {
+            let (mut value, mut sums) = (0.0, vec![T::zero(); count]);
+            for k in piece {
+                self.image(*k, x, scratch);
+                value += link(*k, &scratch.image, &mut scratch.slopes);
+                if all {
+                    self.back_to_all(*k, scratch, &mut sums);
+                } else {
+                    self.back(*k, scratch, &mut sums);
+                }
+            }
+            (value, sums)
+        };
+        let pieces: Vec<(f64, Vec<T>)> =
+            indices.par_chunks(piece).map_init(scratch, of_piece).collect();
+        let value = pieces.iter().map(|piece| piece.0).sum();
+        (value, total(pieces, count))
+    }
+
+    /// Value of the data at `x`, and the gradient with respect to the nodes that count, or to all.
+    pub fn value_and_gradient(&self, data: &Data<'_, T>, x: &[T], all: bool) -> (f64, Vec<f64>) {
+        self.through(x, all, |k, image, slopes| data.value(self.frames[k], image, slopes))
+    }
+
+    /// Gradients with respect to the pixels of all frames where nothing shines.
+    pub fn dark(&self, data: &Data<'_, T>) -> Vec<T> {
+        let (dark, mut slopes) = (vec![T::zero(); self.pixels], vec![T::zero(); self.pixels]);
+        let mut all = Vec::with_capacity(self.frames.len() * self.pixels);
+        for frame in self.frames {
+            data.value(*frame, &dark, &mut slopes);
+            all.extend_from_slice(&slopes);
+        }
+        all
+    }
+
+    /// Second derivative of quadratic data, times `direction`; `dark` are their slopes where nothing shines.
+    pub fn curvature(&self, data: &Data<'_, T>, dark: &[T], direction: &[T]) -> Vec<f64> {
+        let link = |k: usize, image: &[T], slopes: &mut [T]| {
+            data.value(self.frames[k], image, slopes);
+            let dark = &dark[k * self.pixels..(k + 1) * self.pixels];
+            slopes.iter_mut().zip(dark).for_each(|(slope, dark)| *slope -= *dark);
+            0.0
+        };
+        self.through(direction, false, link).1
+    }
+
+    /// Sum of squares of each column.
+    pub fn squares(&self) -> Vec<f64> {
+        let mut sums = vec![0.0; self.active.count()];
+        for rows in self.rows.iter().flatten() {
+            for (column, entry) in rows.columns.iter().zip(&rows.entries) {
+                sums[*column as usize] += entry.double() * entry.double();
+            }
+        }
+        sums
+    }
+}
+
+fn total<T: Scalar>(pieces: Vec<(f64, Vec<T>)>, count: usize) -> Vec<f64> {
+    let mut sums = vec![0.0; count];
+    const SHARE: usize = 8192;
+    sums.par_chunks_mut(SHARE).enumerate().for_each(|(k, sums)| {
+        for (_, piece) in &pieces {
+            let piece = &piece[k * SHARE..k * SHARE + sums.len()];
+            sums.iter_mut().zip(piece).for_each(|(sum, x)| *sum += x.double());
+        }
+    });
+    sums
+}

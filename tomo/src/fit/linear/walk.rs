@@ -1,0 +1,226 @@
+//! Where the nodes of a frame's rays come to lie in a grid of voxels.
+
+use crate::dynamics::{Axis, Turned, pull_back};
+use crate::fit::Chain;
+use crate::fit::regulariser::Shape;
+use crate::points::{Coordinates, CoordinatesMut};
+use crate::representation::{Activation, Grid, GridSettings};
+use crate::simd::Scalar;
+use kerrlight_geodesic::OutOfRange;
+
+/// A grid of voxels, trilinear in between, zero outside; nodes at both ends, z fastest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Voxels {
+    /// Nodes along x, y and z, at least two of each.
+    pub nodes: [usize; 3],
+    /// Coordinates of the first node, M.
+    pub low: [f64; 3],
+    /// Coordinates of the last node, M.
+    pub high: [f64; 3],
+}
+
+impl Voxels {
+    /// A cube about the hole.
+    pub fn cube(nodes: usize, half_width: f64) -> Self {
+        Self { nodes: [nodes; 3], low: [-half_width; 3], high: [half_width; 3] }
+    }
+
+    /// The same as a representation, whose parameters are the values at the nodes.
+    ///
+    /// # Errors
+    /// If a number is out of its range.
+    pub fn grid(&self) -> Result<Grid, OutOfRange> {
+        let Self { nodes, low, high } = *self;
+        Grid::new(GridSettings { nodes, low, high, activation: Activation::Linear, initial: 0.0 })
+    }
+
+    /// Number of nodes.
+    pub fn count(&self) -> usize {
+        self.nodes.iter().product()
+    }
+
+    /// As penalties see it.
+    pub fn shape(&self) -> Shape {
+        let spacing =
+            |k: usize| (self.high[k] - self.low[k]) / (self.nodes[k].max(2) - 1) as f64;
+        Shape { nodes: self.nodes, spacing: [0, 1, 2].map(spacing) }
+    }
+
+    /// Coordinates of a node, M.
+    pub fn position(&self, node: usize) -> [f64; 3] {
+        let [_, ny, nz] = self.nodes;
+        let at = [node / (ny * nz), node / nz % ny, node % nz];
+        let spacing = self.shape().spacing;
+        core::array::from_fn(|k| self.low[k] + spacing[k] * at[k] as f64)
+    }
+
+    /// From the first node of a cell to its eight nodes.
+    pub(super) fn corners(&self) -> [usize; 8] {
+        let [_, ny, nz] = self.nodes;
+        let (x, y) = (ny * nz, nz);
+        [0, 1, y, y + 1, x, x + 1, x + y, x + y + 1]
+    }
+}
+
+/// A ray's node in its cell.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place<T> {
+    /// First node of the cell.
+    pub corner: u32,
+    /// Position in the cell, 0 to 1 along each axis.
+    pub within: [T; 3],
+    /// What emission there is multiplied by in the pixel.
+    pub weight: T,
+}
+
+impl<T: Scalar> Place<T> {
+    /// What the eight nodes of the cell are multiplied by, x slowest.
+    #[inline(always)]
+    pub fn weights(&self) -> [T; 8] {
+        let [x, y, z] = self.within;
+        let (right, one) = (self.weight * x, T::one());
+        let left = self.weight - right;
+        let (b, d) = (left * y, right * y);
+        let rows = [left - b, b, right - d, d];
+        core::array::from_fn(|k| rows[k / 2] * if k % 2 == 0 { one - z } else { z })
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Geometry<T> {
+    low: [T; 3],
+    per_length: [T; 3],
+    cells: [T; 3],
+    nodes: [usize; 3],
+}
+
+impl<T: Scalar> Geometry<T> {
+    fn new(voxels: &Voxels) -> Self {
+        let cells = voxels.nodes.map(|n| (n - 1) as f64);
+        let width = |k: usize| voxels.high[k] - voxels.low[k];
+        Self {
+            low: voxels.low.map(T::of),
+            per_length: [0, 1, 2].map(|k| T::of(cells[k] / width(k))),
+            cells: cells.map(T::of),
+            nodes: voxels.nodes,
+        }
+    }
+
+    #[inline(always)]
+    fn locate(&self, point: [T; 3]) -> Option<(usize, [T; 3])> {
+        let (mut corner, mut within) = (0, [T::zero(); 3]);
+        for k in 0..3 {
+            let u = (point[k] - self.low[k]) * self.per_length[k];
+            if !(u >= T::zero() && u <= self.cells[k]) {
+                return None;
+            }
+            let cell = u.to_u32().map_or(0, |cell| cell as usize).min(self.nodes[k] - 2);
+            within[k] = u - T::of(cell as f64);
+            corner = corner * self.nodes[k] + cell;
+        }
+        Some((corner, within))
+    }
+}
+
+/// Rays of a frame as they meet the grid.
+pub(super) struct Walk<'a, T> {
+    pub chain: &'a Chain<T>,
+    pub voxels: Voxels,
+    axis: Axis,
+    geometry: Geometry<T>,
+}
+
+/// Memory of a thread.
+#[derive(Default)]
+pub(super) struct Room<T> {
+    angles: Vec<T>,
+    pulled: [Vec<T>; 3],
+    places: Vec<Place<T>>,
+}
+
+/// Nodes that are pulled back at a time: they stay in the first caches.
+const BLOCK: usize = 4096;
+
+impl<'a, T: Scalar> Walk<'a, T> {
+    /// Of rays with the weights that they have for the axis.
+    pub fn new(chain: &'a Chain<T>, axis: Axis, voxels: Voxels) -> Self {
+        Self { chain, axis, voxels, geometry: Geometry::new(&voxels) }
+    }
+
+    /// Hands over the pixel of every ray with those of its nodes that shine and lie in cells that are
+    /// wanted (all, without a mask), ray after ray.
+    pub fn frame(
+        &self,
+        frame: usize,
+        wanted: Option<&[bool]>,
+        room: &mut Room<T>,
+        mut ray: impl FnMut(u32, &[Place<T>]),
+    ) {
+        let starts = &self.chain.starts;
+        let mut first = 0;
+        while first < self.chain.rays() {
+            let after = starts.partition_point(|start| *start <= starts[first] + BLOCK) - 1;
+            let next = after.max(first + 1);
+            self.pull(starts[first]..starts[next], self.chain.times[frame], room);
+            for k in first..next {
+                let range = starts[k]..starts[k + 1];
+                self.places(range, starts[first], frame, wanted, room);
+                if !room.places.is_empty() {
+                    ray(self.chain.pixel[k], &room.places);
+                }
+            }
+            first = next;
+        }
+    }
+
+    fn pull(&self, range: core::ops::Range<usize>, time: T, room: &mut Room<T>) {
+        let Room { angles, pulled, .. } = room;
+        angles.clear();
+        let rates = &self.chain.rate[range.clone()];
+        if self.chain.delay.is_empty() {
+            angles.extend(rates.iter().map(|rate| *rate * time));
+        } else {
+            let phases = rates.iter().zip(&self.chain.phase[range.clone()]);
+            angles.extend(phases.map(|(rate, phase)| *rate * time + *phase));
+        }
+        pulled.iter_mut().for_each(|column| column.resize(range.len(), T::zero()));
+        let [x, y, z] = &self.chain.position;
+        let points =
+            Coordinates::xyz(&x[range.clone()], &y[range.clone()], &z[range.clone()]);
+        let [a, b, c] = pulled;
+        pull_back(self.axis, Turned { points, angles }, CoordinatesMut::xyz(a, b, c));
+    }
+
+    /// Whether a node shines in a frame.
+    #[inline(always)]
+    fn shines(&self, node: usize, frame: usize) -> bool {
+        self.chain.earliest.is_none_or(|earliest| {
+            let delay = self.chain.delay.get(node).copied().unwrap_or(T::zero());
+            self.chain.times[frame] - delay >= earliest
+        })
+    }
+
+    #[inline(always)]
+    fn places(
+        &self,
+        range: core::ops::Range<usize>,
+        first: usize,
+        frame: usize,
+        wanted: Option<&[bool]>,
+        room: &mut Room<T>,
+    ) {
+        room.places.clear();
+        for node in range {
+            let [x, y, z] = &room.pulled;
+            let k = node - first;
+            let Some((corner, within)) = self.geometry.locate([x[k], y[k], z[k]]) else {
+                continue;
+            };
+            let is_wanted = wanted.is_none_or(|mask| mask[corner]);
+            if is_wanted && self.shines(node, frame) {
+                let weight = self.chain.weight[node];
+                room.places.push(Place { corner: corner as u32, within, weight });
+            }
+        }
+    }
+}
