@@ -5,6 +5,7 @@ mod assets;
 mod columns;
 mod convert;
 mod critical_curve;
+mod fit;
 mod inspect;
 mod interferometry;
 mod interrupt;
@@ -49,6 +50,8 @@ enum Verb {
     Uv(uv::Uv),
     /// Rewrite visibilities in another format; average, flag, merge hands
     Convert(convert::Convert),
+    /// Recover the emission around a hole from movies or visibilities
+    Fit(fit::Fit),
     /// Trace single rays from a table to a table
     Trace(trace::Trace),
     /// Write the critical curve, the edge of the shadow, as a table
@@ -79,6 +82,7 @@ fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Verb::Observe(observe) => observe.run(),
         Verb::Uv(uv) => uv.run(),
         Verb::Convert(convert) => convert.run(),
+        Verb::Fit(fit) => fit.run(),
         Verb::Trace(trace) => trace.run(),
         Verb::CriticalCurve(table) => table.run(),
         Verb::Accuracy(accuracy) => accuracy.run(),

@@ -16,3 +16,8 @@ fn styled(length: u64, style: &str) -> ProgressBar {
     let style = ProgressStyle::with_template(style).unwrap_or(ProgressStyle::default_bar());
     ProgressBar::new(length).with_style(style)
 }
+
+/// A bar that counts steps, with a message.
+pub fn steps(count: u64) -> ProgressBar {
+    styled(count, "{bar:30} step {pos} of {len}  {msg}  {elapsed} gone, {eta} left")
+}

@@ -104,7 +104,6 @@ pub fn read(path: &Path, bytes: &[u8], source: &VolumeSource) -> anyhow::Result<
 }
 
 /// Writes an NPZ archive, whole or not at all.
-#[cfg_attr(not(test), expect(dead_code, reason = "scenes read volumes; fits will write them"))]
 pub fn write(output: &output::Output, file: &VolumeFile) -> anyhow::Result<()> {
     output.write(&encode(file)?)
 }
@@ -125,6 +124,26 @@ fn encode(file: &VolumeFile) -> anyhow::Result<Vec<u8>> {
             member(name, npy(&[3], vector.into_iter())?)?;
         }
     }
+    Ok(archive.finish()?.into_inner())
+}
+
+/// The bytes of an NPZ archive of movies of one shape (frames, rows from the top, columns), with the times of
+/// the frames.
+pub fn movie_archive(
+    shape: [usize; 3],
+    movies: &[(&str, Vec<f32>)],
+    times: &[f64],
+) -> anyhow::Result<Vec<u8>> {
+    let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    let options = zip::write::SimpleFileOptions::default();
+    let mut member = |name: &str, bytes: Vec<u8>| -> anyhow::Result<()> {
+        archive.start_file(npyz::npz::file_name_from_array_name(name), options)?;
+        Ok(archive.write_all(&bytes)?)
+    };
+    for (name, movie) in movies {
+        member(name, npy(&shape.map(|n| n as u64), movie.iter().copied())?)?;
+    }
+    member("time", npy(&[times.len() as u64], times.iter().copied())?)?;
     Ok(archive.finish()?.into_inner())
 }
 

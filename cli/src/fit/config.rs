@@ -212,13 +212,13 @@ pub struct Truth {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spot {
-    /// Where it is, M.
+    /// Where it was when it was round, M.
     pub center: [f64; 3],
     /// Standard deviation, M.
     pub sigma: f64,
     /// Emission at its centre.
     pub amplitude: f64,
-    /// For how long differential rotation has wound it up.
+    /// For how long differential rotation has wound it up until the reference time, in units of time.
     #[serde(default)]
     pub wound_for: f64,
 }

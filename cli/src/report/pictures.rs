@@ -1,6 +1,7 @@
 //! Pictures of volumes with the captions that belong to them.
 
 use anyhow::{Context, anyhow};
+use kerrlight_tomo::image::colormap::Colormap;
 use kerrlight_tomo::volume::Shown;
 use kerrlight_tomo::volume::projection::{self, Surroundings, VIEWS};
 use kerrlight_tomo::volume::slices::{self, Through};
@@ -68,4 +69,49 @@ pub fn projections(shown: &[Shown], around: &Surroundings, unit: &str) -> anyhow
     );
     let alt = format!("The emission seen from four directions: {all}.");
     Ok(Figure { png: png(projection::sheet(shown, &VIEWS, around, unit))?, caption, alt })
+}
+
+/// Frames of a strip of a movie.
+const STRIP: usize = 6;
+
+/// Some frames of movies of n × n pixels, a row each, on one scale of brightness; `times` in M.
+///
+/// # Errors
+/// If it cannot be encoded.
+pub fn frames(movies: &[(&str, Vec<f32>)], n: usize, times: &[f64]) -> anyhow::Result<Figure> {
+    let count = times.len().min(STRIP);
+    let chosen: Vec<usize> =
+        (0..count).map(|k| k * (times.len() - 1) / (count.max(2) - 1)).collect();
+    let most = movies.iter().flat_map(|(_, movie)| movie).fold(0.0f32, |most, x| most.max(*x));
+    let table = Colormap::Inferno.table();
+    let (zoom, gap) = ((160 / n).max(1), 4);
+    let side = n * zoom + gap;
+    let mut drawn = image::RgbImage::from_pixel(
+        (side * count) as u32,
+        (side * movies.len()) as u32,
+        image::Rgb([128; 3]),
+    );
+    for (row, (_, movie)) in movies.iter().enumerate() {
+        for (column, frame) in chosen.iter().enumerate() {
+            for (k, value) in movie[frame * n * n..(frame + 1) * n * n].iter().enumerate() {
+                let part = (value / most.max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+                let last = (table.len() - 1) as f32;
+                let color = table[(part * last).round() as usize];
+                for pixel in 0..zoom * zoom {
+                    let x = column * side + k % n * zoom + pixel % zoom;
+                    let y = row * side + k / n * zoom + pixel / zoom;
+                    drawn.put_pixel(x as u32, y as u32, image::Rgb(color));
+                }
+            }
+        }
+    }
+    let at: Vec<String> = chosen.iter().map(|k| format!("{:.1}", times[*k])).collect();
+    let names = movies.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", below it ");
+    let caption = format!(
+        "Lensed images as the observer sees them ({names}), at times {} GM/c³. All have one linear \
+         scale of brightness, from 0 to {most:.3e} Jy a pixel; north is up, east to the left.",
+        at.join(", ")
+    );
+    let alt = format!("Frames of the movie: {names}.");
+    Ok(Figure { png: png(Some(drawn))?, caption, alt })
 }

@@ -1,0 +1,323 @@
+//! The data of a fit: simulated, or from files.
+
+use super::config::{DataFiles, FitFile, Loss, LossKind, Noise, Spot};
+use super::setup::{self, Instrument};
+use crate::interferometry::arguments;
+use crate::interferometry::movie_files;
+use anyhow::{Context, anyhow, bail};
+use kerrlight_tomo::dynamics::{AngularVelocity, Axis};
+use kerrlight_tomo::emission::spot::{distance, rotate};
+use kerrlight_tomo::fit::{
+    Batch, Chain, Data, FrameTerm, ImageTerm, LightCurveTerm, Motion, Scan, ScanTerm, Weighted,
+};
+use kerrlight_tomo::interferometry::data_terms::{
+    AmplitudeTerm, ClosureTerm, DataTerm, DataTermError, VisibilityTerm,
+};
+use kerrlight_tomo::interferometry::earth::{Frame, Ut1};
+use kerrlight_tomo::interferometry::noise::add_thermal_noise;
+use kerrlight_tomo::interferometry::observation::Observation;
+use kerrlight_tomo::interferometry::operator::{ImageGrid, Method, Pulse, Transform};
+use kerrlight_tomo::interferometry::products::ClosureKind;
+use kerrlight_tomo::interferometry::schedule::{self, Clock, Schedule, Setup};
+use kerrlight_tomo::interferometry::simulate::{self, Movie};
+use std::path::Path;
+
+/// What is measured, and what is known to be true.
+pub struct Measured {
+    /// Times of the frames, M.
+    pub times: Vec<f64>,
+    /// The movie, where images are the data or are simulated.
+    pub movie: Option<Vec<f64>>,
+    /// Visibilities, with the frame of each row.
+    pub visibilities: Option<(Observation, Vec<usize>)>,
+    /// Where pixels are on the sky, where that matters.
+    pub sky: Option<ImageGrid>,
+    /// What is simulated.
+    pub truth: Option<Truth>,
+}
+
+/// The emission that is simulated.
+pub struct Truth {
+    spots: Vec<Spot>,
+    axis: Axis,
+    velocity: AngularVelocity,
+}
+
+impl Truth {
+    fn new(file: &FitFile, velocity: AngularVelocity) -> anyhow::Result<Option<Self>> {
+        let Some(truth) = &file.truth else { return Ok(None) };
+        for (k, spot) in truth.spot.iter().enumerate() {
+            let numbers = [spot.sigma, spot.amplitude, spot.wound_for];
+            let finite = numbers.iter().chain(&spot.center).all(|x| x.is_finite());
+            if !finite || spot.sigma <= 0.0 || spot.amplitude < 0.0 {
+                bail!("truth.spot {k}: finite numbers with sigma above 0 and amplitude 0 or above");
+            }
+        }
+        let missing = || anyhow!("motion.axis is missing: a simulation needs it");
+        let axis = setup::known_axis(file)?.ok_or_else(missing)?;
+        Ok(Some(Self { spots: truth.spot.clone(), axis, velocity }))
+    }
+
+    /// Emission at the reference time.
+    pub fn at(&self, x: [f64; 3]) -> f64 {
+        let rate = self.velocity.rate(distance(x, [0.0; 3]));
+        let light = |spot: &Spot| {
+            let when_round = rotate(self.axis.vector(), -rate * spot.wound_for, x);
+            let offset = distance(when_round, spot.center) / spot.sigma;
+            spot.amplitude * (-0.5 * offset * offset).exp()
+        };
+        self.spots.iter().map(light).sum()
+    }
+
+    /// Its axis.
+    pub fn axis(&self) -> Axis {
+        self.axis
+    }
+}
+
+/// Simulates or reads the data. `folder` is that of the fit's file.
+pub fn measure(file: &FitFile, instrument: &Instrument, folder: &Path) -> anyhow::Result<Measured> {
+    let velocity = setup::motion(file, Vec::new())?.velocity;
+    match (&file.data, Truth::new(file, velocity)?) {
+        (Some(_), Some(_)) => bail!("truth and data exclude each other: simulate, or read"),
+        (None, None) => bail!("there is neither truth (to simulate) nor data (to read)"),
+        (Some(data), None) => read(file, data, folder),
+        (None, Some(truth)) => simulate(file, instrument, truth),
+    }
+}
+
+fn frames(file: &FitFile) -> anyhow::Result<Vec<f64>> {
+    let missing = || anyhow!("movie is missing: frames of images need times");
+    let movie = file.movie.as_ref().ok_or_else(missing)?;
+    let n = movie.frames;
+    if !(1..=100_000).contains(&n) {
+        bail!("movie.frames = {n} is not allowed: 1 to 100000");
+    }
+    if !(movie.from.is_finite() && movie.to.is_finite() && (n == 1 || movie.to > movie.from)) {
+        bail!("movie: from = {}, to = {} are not allowed: growing", movie.from, movie.to);
+    }
+    let step = (movie.to - movie.from) / (n.max(2) - 1) as f64;
+    Ok((0..n).map(|k| movie.from + step * k as f64).collect())
+}
+
+fn simulate(file: &FitFile, instrument: &Instrument, truth: Truth) -> anyhow::Result<Measured> {
+    let Some(seen) = &file.observation else {
+        let times = frames(file)?;
+        let movie = Some(movie(file, instrument, &truth, &times)?);
+        return Ok(Measured {
+            times,
+            movie,
+            visibilities: None,
+            sky: setup::sky(file).ok(),
+            truth: Some(truth),
+        });
+    };
+    let sky = setup::sky(file)?;
+    let source =
+        arguments::source(&seen.source).map_err(|error| anyhow!("observation.source: {error}"))?;
+    let (clock, hours) = match (seen.utc, seen.gmst) {
+        (Some(hours), None) => (Clock::Utc, hours),
+        (None, Some(hours)) => (Clock::Gmst, hours),
+        _ => bail!("observation needs utc or gmst, not both"),
+    };
+    let schedule =
+        Schedule { mjd: seen.mjd, clock, start_h: hours[0], stop_h: hours[1], scans: seen.scans };
+    let setup = Setup {
+        frequency_hz: seen.frequency_ghz * 1e9,
+        bandwidth_hz: seen.bandwidth_ghz * 1e9,
+        integration_s: seen.integration_s,
+        elevation_deg: seen.elevation_deg,
+        ut1: Ut1::Table,
+        frame: Frame::Catalogue,
+    };
+    let array = arguments::array_of(&seen.array).context("observation")?;
+    let mut observation =
+        schedule::observe(&array, source.position, &schedule, &setup).context("observation")?;
+    observation.source = source.name;
+    let hours = schedule.hours_utc(setup.ut1).context("observation")?;
+    let per_m = setup::hours_per_m(file)?;
+    let times: Vec<f64> = hours.iter().map(|h| seen.first_time + (h - hours[0]) / per_m).collect();
+    let movie = movie(file, instrument, &truth, &times)?;
+    let images = Movie { grid: sky, pixels: movie.clone() };
+    simulate::fill(&mut observation, &images, Pulse::Triangle, &hours, Method::Direct)?;
+    if seen.noise == Noise::Thermal {
+        add_thermal_noise(&mut observation, file.seed);
+    }
+    let frame = |time: f64| hours.partition_point(|hour| *hour < time - 1e-9).min(hours.len() - 1);
+    let of_rows = observation.rows.iter().map(|row| frame(row.time_h)).collect();
+    Ok(Measured {
+        times,
+        movie: Some(movie),
+        visibilities: Some((observation, of_rows)),
+        sky: Some(sky),
+        truth: Some(truth),
+    })
+}
+
+/// The true movie, in double precision.
+fn movie(
+    file: &FitFile,
+    instrument: &Instrument,
+    truth: &Truth,
+    times: &[f64],
+) -> anyhow::Result<Vec<f64>> {
+    let motion = setup::motion(file, times.to_vec())?;
+    let Instrument { lines, hole, redshift, .. } = instrument;
+    let mut chain = Chain::<f64>::new(lines, &motion, hole, *redshift)?;
+    chain.weigh(truth.axis);
+    Ok(chain.movie_of(truth.axis, &|x| truth.at(x), &mut Batch::default()))
+}
+
+fn read(file: &FitFile, data: &DataFiles, folder: &Path) -> anyhow::Result<Measured> {
+    match data {
+        DataFiles::Movie { path } => {
+            let times = frames(file)?;
+            let path = folder.join(path);
+            let field = file.screen.field_uas.unwrap_or(1.0);
+            let (movie, _) = movie_files::read(std::slice::from_ref(&path), Some(field))
+                .or_else(|_| movie_files::read(std::slice::from_ref(&path), None))?;
+            let n = file.screen.pixels;
+            if (movie.grid.width, movie.grid.height) != (n, n) || movie.frames() != times.len() {
+                bail!(
+                    "{} has {} frames of {} x {} pixels: movie.frames and screen.pixels say {} of {n} x {n}",
+                    path.display(),
+                    movie.frames(),
+                    movie.grid.width,
+                    movie.grid.height,
+                    times.len()
+                );
+            }
+            let movie = Some(movie.pixels);
+            Ok(Measured {
+                times,
+                movie,
+                visibilities: None,
+                sky: setup::sky(file).ok(),
+                truth: None,
+            })
+        }
+        DataFiles::Visibilities { path, average_s, first_time } => {
+            let path = folder.join(path);
+            let (_, observation) = crate::interferometry::read(&path)?;
+            let mut observation = observation.averaged(*average_s).total_intensity();
+            observation.sort();
+            let mut hours: Vec<f64> = observation.rows.iter().map(|row| row.time_h).collect();
+            hours.dedup_by(|a, b| (*a - *b).abs() * 3600.0 < 0.5 * average_s.max(1.0));
+            if hours.is_empty() {
+                bail!("{}: there are no visibilities", path.display());
+            }
+            let nearest = |time: f64| hours.partition_point(|h| *h <= time + 1e-9).max(1) - 1;
+            let of_rows = observation.rows.iter().map(|row| nearest(row.time_h)).collect();
+            let per_m = setup::hours_per_m(file)?;
+            let times = hours.iter().map(|h| first_time + (h - hours[0]) / per_m).collect();
+            let sky = Some(setup::sky(file)?);
+            Ok(Measured {
+                times,
+                movie: None,
+                visibilities: Some((observation, of_rows)),
+                sky,
+                truth: None,
+            })
+        }
+    }
+}
+
+impl Measured {
+    /// The terms of the loss.
+    pub fn terms(&self, losses: &[Loss], pixels: usize) -> anyhow::Result<Data<f32>> {
+        let mut data = Data { image: None, others: Vec::new() };
+        if losses.is_empty() {
+            bail!("loss is empty: there is nothing to fit");
+        }
+        for (k, loss) in losses.iter().enumerate() {
+            let name = || format!("loss {k}");
+            if !(loss.weight > 0.0 && loss.weight.is_finite()) {
+                bail!("loss {k}: weight = {} is not allowed: above 0", loss.weight);
+            }
+            let weight = loss.weight;
+            match loss.data {
+                LossKind::Image if data.image.is_some() => bail!("loss {k}: image again"),
+                LossKind::Image => {
+                    let term = Box::new(self.image(loss, pixels).with_context(name)?);
+                    data.image = Some(Weighted { weight, term });
+                }
+                _ => {
+                    let term = self.other(loss, pixels).with_context(name)?;
+                    data.others.push(Weighted { weight, term });
+                }
+            }
+        }
+        Ok(data)
+    }
+
+    fn movie(&self) -> anyhow::Result<&[f64]> {
+        self.movie.as_deref().ok_or_else(|| anyhow!("there are no images, only visibilities"))
+    }
+
+    fn image(&self, loss: &Loss, pixels: usize) -> anyhow::Result<ImageTerm<f32>> {
+        let sigma = loss.sigma.ok_or_else(|| anyhow!("sigma of a pixel is missing"))?;
+        let movie = self.movie()?.iter().map(|x| *x as f32).collect();
+        Ok(ImageTerm::new(movie, pixels, sigma)?)
+    }
+
+    fn other(&self, loss: &Loss, pixels: usize) -> anyhow::Result<Box<dyn FrameTerm<f32>>> {
+        if loss.data == LossKind::LightCurve {
+            let sigma = loss.sigma.ok_or_else(|| anyhow!("sigma of the flux is missing"))?;
+            let flux: Vec<f64> = self.movie()?.chunks(pixels).map(|f| f.iter().sum()).collect();
+            let sigmas = vec![sigma; flux.len()];
+            return Ok(Box::new(LightCurveTerm::new(flux, &sigmas, pixels)?));
+        }
+        let (name, quadratic) = match loss.data {
+            LossKind::Visibilities => ("visibilities", true),
+            LossKind::Amplitudes => ("amplitudes", false),
+            LossKind::ClosurePhases => ("closure phases", false),
+            _ => ("log closure amplitudes", false),
+        };
+        let scans: Vec<Option<Scan<f32>>> = (0..self.times.len())
+            .map(|frame| self.scan(frame, loss))
+            .collect::<anyhow::Result<_>>()?;
+        if scans.iter().all(Option::is_none) {
+            bail!("no frame has any {name}");
+        }
+        Ok(Box::new(ScanTerm::new(name, pixels, quadratic, scans)))
+    }
+
+    fn scan(&self, frame: usize, loss: &Loss) -> anyhow::Result<Option<Scan<f32>>> {
+        let missing = || anyhow!("there are no visibilities: observation or data is missing");
+        let (observation, frames) = self.visibilities.as_ref().ok_or_else(missing)?;
+        let sky = self.sky.ok_or_else(missing)?;
+        let rows = observation.rows.iter().zip(frames).filter(|(_, of)| **of == frame);
+        let rows: Vec<_> = rows.map(|(row, _)| *row).collect();
+        let part = Observation { rows, ..observation.clone() };
+        if part.stokes_i().next().is_none() {
+            return Ok(None);
+        }
+        let uv: Vec<[f64; 2]> = part.stokes_i().map(|(row, _)| row.uv).collect();
+        let least = loss.least_snr.unwrap_or(0.0);
+        let term: Box<dyn DataTerm<f32> + Send> = match loss.data {
+            LossKind::Visibilities => Box::new(VisibilityTerm::new(&part)?),
+            LossKind::Amplitudes => Box::new(AmplitudeTerm::new(&part)?),
+            kind => {
+                let kind = match kind {
+                    LossKind::ClosurePhases => ClosureKind::Phase,
+                    _ => ClosureKind::LogAmplitude,
+                };
+                match ClosureTerm::new(&part, kind, least) {
+                    Err(DataTermError::Empty) => return Ok(None),
+                    term => Box::new(term?),
+                }
+            }
+        };
+        let transform = Transform::new(sky, Pulse::Triangle, &[uv], Method::Direct, MEMORY)?;
+        Ok(Some(Scan { transform, term }))
+    }
+}
+
+/// Exponentials of a frame up to this many bytes are kept.
+const MEMORY: usize = 8 << 20;
+
+/// The chain of a fit, in single precision.
+pub fn chain(instrument: &Instrument, motion: &Motion) -> anyhow::Result<Chain<f32>> {
+    let Instrument { lines, hole, redshift, .. } = instrument;
+    Ok(Chain::new(lines, motion, hole, *redshift)?)
+}

@@ -1,0 +1,117 @@
+//! `kerrlight fit`: recovers emission from movies and visibilities.
+
+mod config;
+mod data;
+mod folder;
+mod results;
+mod run;
+mod setup;
+
+use crate::output;
+use anyhow::{Context, bail};
+use clap::Args;
+use config::FitFile;
+use folder::Folder;
+use kerrlight_tomo::scene::apply_override;
+use std::path::{Path, PathBuf};
+
+/// The experiment that runs without a file.
+const BUILT_IN: &str = include_str!("built_in.toml");
+
+/// Arguments of `kerrlight fit`.
+#[derive(Debug, Args)]
+pub struct Fit {
+    /// What to fit; without it a built-in experiment: a flare of Sgr A* seen by the ngEHT
+    #[arg(value_name = "FIT.toml")]
+    file: Option<PathBuf>,
+    /// Folder of the run, which must not exist yet [default: kerrlight-fit, or -2, -3 …]
+    #[arg(short, long, value_name = "FOLDER")]
+    output: Option<PathBuf>,
+    /// Change a setting, e.g. training.steps=500; `representation=grid` is short for
+    /// representation.kind=grid
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Go on with the run in this folder
+    #[arg(long, value_name = "FOLDER", conflicts_with = "output")]
+    resume: Option<PathBuf>,
+    /// Write the settings that would be used and stop
+    #[arg(long)]
+    print: bool,
+}
+
+impl Fit {
+    /// Fits.
+    pub fn run(&self) -> anyhow::Result<()> {
+        if let Some(path) = &self.resume {
+            let (folder, text) = Folder::open(path)?;
+            self.same(&text)?;
+            let file = parse(&text).with_context(|| path.display().to_string())?;
+            let near = self.file.as_deref().and_then(Path::parent).unwrap_or(Path::new("."));
+            return run::run(&file, &text, &folder, near, true);
+        }
+        let (text, near) = self.settings()?;
+        if self.print {
+            return output::print(&text);
+        }
+        let file = parse(&text).with_context(|| self.name())?;
+        let folder = match &self.output {
+            Some(path) => path.clone(),
+            None => free_name(),
+        };
+        run::check(&file)?;
+        let folder = Folder::create(&folder, &text)?;
+        run::run(&file, &text, &folder, &near, false)
+    }
+
+    fn name(&self) -> String {
+        self.file.as_ref().map_or("built-in experiment".to_owned(), |f| f.display().to_string())
+    }
+
+    /// The text of the settings and the folder that paths in it start from.
+    fn settings(&self) -> anyhow::Result<(String, PathBuf)> {
+        let (mut text, near) = match &self.file {
+            None => (BUILT_IN.to_owned(), PathBuf::from(".")),
+            Some(path) => {
+                let near = path.parent().unwrap_or(Path::new(".")).to_owned();
+                (output::read_text(path)?, near)
+            }
+        };
+        for assignment in &self.set {
+            let long = match assignment.split_once('=') {
+                Some(("representation", kind)) => format!("representation.kind={kind}"),
+                _ => assignment.clone(),
+            };
+            text = apply_override(&text, &long).with_context(|| format!("--set {assignment}"))?;
+        }
+        Ok((text, near))
+    }
+
+    /// Refuses to go on with other settings than a run began with.
+    fn same(&self, text: &str) -> anyhow::Result<()> {
+        if !self.set.is_empty() {
+            bail!("--resume goes on with the settings of the run: --set is for a new one");
+        }
+        let Some(path) = &self.file else { return Ok(()) };
+        let given = output::read_text(path)?;
+        let (new, old) = (parse(&given)?, parse(text)?);
+        if new != old {
+            let at = text.lines().zip(given.lines()).position(|(a, b)| a != b);
+            let line = at.map_or(String::new(), |k| format!(", first in line {}", k + 1));
+            bail!("{} differs from the settings that the run began with{line}", path.display());
+        }
+        Ok(())
+    }
+}
+
+fn parse(text: &str) -> anyhow::Result<FitFile> {
+    Ok(toml::from_str(text)?)
+}
+
+/// A folder that does not exist yet.
+fn free_name() -> PathBuf {
+    let name = |k: u32| match k {
+        1 => PathBuf::from("kerrlight-fit"),
+        k => PathBuf::from(format!("kerrlight-fit-{k}")),
+    };
+    (1..).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(1))
+}

@@ -1,0 +1,255 @@
+//! From settings to the pieces of a fit.
+
+use super::config::{self, Activation, AxisSearch, FitFile, Kind, Nodes, Velocity, WidthOf};
+use anyhow::{Context, anyhow, bail};
+use kerrlight_geodesic::{Inclination, Kerr, Observer};
+use kerrlight_tomo::dynamics::{AngularVelocity, Axis, Injection};
+use kerrlight_tomo::fit::{
+    BatchSize, Motion, OccupancyPlan, OccupancySettings, Redshift, Region, Sampling,
+    SightlineRequest, Sightlines, Training,
+};
+use kerrlight_tomo::interferometry::operator::ImageGrid;
+use kerrlight_tomo::optimise::{Adam, Polynomial};
+use kerrlight_tomo::representation::{self, Grid, GridSettings, Network, NetworkSettings};
+use kerrlight_tomo::units::{MICROARCSECOND, gravitational_angle, gravitational_time};
+
+/// What a fit looks through: the same for all data and representations.
+pub struct Instrument {
+    /// The hole.
+    pub hole: Kerr,
+    /// Nodes on rays; weights in Jy a pixel for emission 1.
+    pub lines: Sightlines,
+    /// Where emission is looked for.
+    pub region: Region,
+    /// Emission goes like g to this power.
+    pub redshift: Option<Redshift>,
+}
+
+impl Instrument {
+    /// Traces the rays.
+    pub fn new(file: &FitFile) -> anyhow::Result<Self> {
+        let hole = Kerr::new(file.hole.spin).context("hole")?;
+        let region = region(&file.region);
+        let request = SightlineRequest {
+            region,
+            sampling: match file.region.nodes {
+                Nodes::Gauss { order, split } => {
+                    if !(1..=16).contains(&order) || split == 0 {
+                        bail!(
+                            "region.nodes: order = {order}, split = {split} are not allowed: 1 to 16, 1 or more"
+                        );
+                    }
+                    Sampling::Gauss { order, split }
+                }
+                Nodes::EqualMinoTime { per_ray } => {
+                    if !(2..=100_000).contains(&per_ray) {
+                        bail!("region.nodes: per_ray = {per_ray} is not allowed: 2 to 100000");
+                    }
+                    Sampling::EqualMinoTime { per_ray }
+                }
+            },
+            delay: file.effects.slow_light,
+            momentum: file.effects.redshift_power.is_some(),
+        };
+        let (alpha, beta) = pixels(&file.screen)?;
+        let observer = observer(&file.observer)?;
+        let mut lines = Sightlines::trace(&hole, &observer, &alpha, &beta, &request)
+            .context("region and screen")?;
+        if lines.rays() == 0 {
+            bail!("no ray meets the region: region.r_min to r_max lies outside the screen");
+        }
+        let jy = file.screen.jy_per_pixel;
+        if !(jy > 0.0 && jy.is_finite()) {
+            bail!("screen.jy_per_pixel = {jy} is not allowed: above 0");
+        }
+        lines.weight.iter_mut().for_each(|weight| *weight *= jy);
+        let redshift = file.effects.redshift_power.map(|power| Redshift { power });
+        Ok(Self { hole, lines, region, redshift })
+    }
+}
+
+/// The region of recovery.
+pub fn region(region: &config::Region) -> Region {
+    let z_width = region.z_width.unwrap_or(f64::INFINITY);
+    Region { r_min: region.r_min, r_max: region.r_max, z_width }
+}
+
+fn observer(observer: &config::Observer) -> anyhow::Result<Observer> {
+    let inclination = Inclination::from_degrees(observer.inclination_deg).context("observer")?;
+    match observer.radius {
+        None => Ok(Observer::at_infinity(inclination)),
+        Some(radius) => Observer::at_radius(inclination, radius).context("observer"),
+    }
+}
+
+/// (α, β) of all pixels, rows from the top, each from the left.
+fn pixels(screen: &config::Screen) -> anyhow::Result<(Vec<f64>, Vec<f64>)> {
+    let (n, step) = (screen.pixels, spacing(screen)?);
+    let at = |k: usize| (k as f64 - 0.5 * (n as f64 - 1.0)) * step;
+    Ok((0..n * n).map(|k| (at(k % n), -at(k / n))).unzip())
+}
+
+/// M from one pixel to the next.
+fn spacing(screen: &config::Screen) -> anyhow::Result<f64> {
+    let config::Screen { pixels, width, width_of, .. } = *screen;
+    if !(2..=4096).contains(&pixels) {
+        bail!("screen.pixels = {pixels} is not allowed: 2 to 4096");
+    }
+    if !(width > 0.0 && width.is_finite()) {
+        bail!("screen.width = {width} is not allowed: M above 0");
+    }
+    Ok(match width_of {
+        WidthOf::Edges => width / pixels as f64,
+        WidthOf::Centers => width / (pixels - 1) as f64,
+    })
+}
+
+/// Where the model's pixels are on the sky.
+pub fn sky(file: &FitFile) -> anyhow::Result<ImageGrid> {
+    let n = file.screen.pixels;
+    let field_uas = match (file.screen.field_uas, file.hole.mass_msun, file.hole.distance_kpc) {
+        (Some(field), ..) => field,
+        (None, Some(mass), Some(distance)) => {
+            spacing(&file.screen)? * n as f64 * gravitational_angle(mass, distance)
+        }
+        _ => bail!("visibilities need screen.field_uas, or hole.mass_msun and hole.distance_kpc"),
+    };
+    Ok(ImageGrid::new(n, n, field_uas * MICROARCSECOND)?)
+}
+
+/// Hours of one M.
+pub fn hours_per_m(file: &FitFile) -> anyhow::Result<f64> {
+    let missing = || anyhow!("hole.mass_msun is missing: times of an observation are hours");
+    let mass = file.hole.mass_msun.ok_or_else(missing)?;
+    if !(mass > 0.0 && mass.is_finite()) {
+        bail!("hole.mass_msun = {mass} is not allowed: above 0");
+    }
+    Ok(gravitational_time(mass) / 3600.0)
+}
+
+/// How matter turns, with the times of the frames in M.
+pub fn motion(file: &FitFile, times: Vec<f64>) -> anyhow::Result<Motion> {
+    let velocity = match file.motion.velocity.clone() {
+        Velocity::Keplerian { drag } => AngularVelocity::Keplerian { drag },
+        Velocity::PowerLaw { radius, rate, exponent } => {
+            AngularVelocity::PowerLaw { radius, rate, exponent }
+        }
+        Velocity::Table { radii, rates } => AngularVelocity::Table { radii, rates },
+    };
+    Ok(Motion {
+        velocity: velocity.checked().context("motion.velocity")?,
+        reference: file.motion.reference_time,
+        injection: file.motion.injection_time.map(|time| Injection { time }),
+        times,
+    })
+}
+
+/// The true or known axis.
+pub fn known_axis(file: &FitFile) -> anyhow::Result<Option<Axis>> {
+    file.motion.axis.map(Axis::new).transpose().context("motion")
+}
+
+/// Where the axis starts, and its rates if it is learnt.
+pub fn axis(file: &FitFile) -> anyhow::Result<(Axis, Option<Polynomial>)> {
+    match &file.axis {
+        AxisSearch::Known {} => {
+            let missing = || anyhow!("motion.axis is missing: it is said to be known");
+            Ok((known_axis(file)?.ok_or_else(missing)?, None))
+        }
+        AxisSearch::From { start, rate, last_rate } => {
+            let steps = file.training.steps;
+            let rate = Polynomial { from: *rate, to: *last_rate, steps, power: 1.0 };
+            let rate = rate.checked().context("axis.from")?;
+            Ok((Axis::new(*start).context("axis.from.start")?, Some(rate)))
+        }
+    }
+}
+
+/// What is recovered.
+pub fn representation(
+    file: &FitFile,
+) -> anyhow::Result<Box<dyn representation::Representation<f32>>> {
+    let chosen = &file.representation;
+    let network = |settings: NetworkSettings| {
+        Network::new(NetworkSettings {
+            degree: chosen.degree,
+            width: chosen.width,
+            hidden_layers: chosen.hidden_layers,
+            skip_after: settings.skip_after.filter(|layer| *layer <= chosen.hidden_layers),
+            length_scale: chosen.length_scale,
+            time_scale: chosen.time_scale,
+            ..settings
+        })
+        .context("representation")
+    };
+    Ok(match chosen.kind {
+        Kind::Bhnerf => Box::new(network(NetworkSettings::bhnerf())?),
+        Kind::Mlp4d => Box::new(network(NetworkSettings::mlp4d())?),
+        Kind::Grid => {
+            let r = file.region.r_max;
+            // As dark as a network starts, sigmoid(−10).
+            let (activation, initial) = match chosen.activation {
+                Activation::Sigmoid => (representation::Activation::Sigmoid, -10.0),
+                Activation::Softplus => (representation::Activation::Softplus, -10.0),
+                Activation::Linear => (representation::Activation::Linear, 0.0),
+            };
+            let settings = GridSettings {
+                nodes: [chosen.nodes; 3],
+                low: [-r; 3],
+                high: [r; 3],
+                activation,
+                initial,
+            };
+            Box::new(Grid::new(settings).context("representation")?)
+        }
+    })
+}
+
+/// How it is learnt.
+pub fn training(file: &FitFile, axis_rate: Option<Polynomial>) -> anyhow::Result<Training> {
+    let chosen = &file.training;
+    let rate =
+        Polynomial { from: chosen.rate, to: chosen.last_rate, steps: chosen.steps, power: 1.0 };
+    let batch = match chosen.batch {
+        config::Batch::Pixels(0) | config::Batch::Frames(0) => {
+            bail!("training.batch of 0 is not allowed: 1 or more")
+        }
+        config::Batch::Pixels(count) => BatchSize::Pixels(count),
+        config::Batch::Frames(count) => BatchSize::Frames(count),
+    };
+    if chosen.log_every == 0 {
+        bail!("training.log_every = 0 is not allowed: 1 or more");
+    }
+    let occupancy = chosen.occupancy.as_ref().map(occupancy).transpose()?;
+    if occupancy.is_some() && file.representation.kind == Kind::Mlp4d {
+        bail!("training.occupancy is not for mlp4d, which has no co-rotating coordinates");
+    }
+    Ok(Training {
+        seed: file.seed,
+        adam: Adam::default(),
+        rate: rate.checked().context("training.rate")?,
+        axis_rate,
+        batch,
+        occupancy,
+        region: region(&file.region),
+        keep_every: 50,
+        divergence: 1e3,
+    })
+}
+
+fn occupancy(chosen: &config::Occupancy) -> anyhow::Result<OccupancyPlan> {
+    let config::Occupancy { cells, threshold, memory, warm_up, every } = *chosen;
+    if !(2..=256).contains(&cells) {
+        bail!("training.occupancy.cells = {cells} is not allowed: 2 to 256");
+    }
+    for (name, value) in [("threshold", threshold), ("memory", memory)] {
+        if !(0.0..1.0).contains(&value) {
+            bail!("training.occupancy.{name} = {value} is not allowed: 0 to 1, 1 excluded");
+        }
+    }
+    Ok(OccupancyPlan {
+        settings: OccupancySettings { cells, threshold, memory },
+        warm_up,
+        every: every.max(1),
+    })
+}
