@@ -8,6 +8,7 @@ mod chain;
 pub mod linear;
 mod occupancy;
 mod regulariser;
+pub mod scan;
 mod shift;
 mod sightlines;
 mod terms;

@@ -9,6 +9,7 @@ mod data;
 mod descent;
 mod objective;
 mod operator;
+mod quasi_newton;
 mod scaled;
 mod solve;
 mod walk;
