@@ -43,19 +43,25 @@ const PEAK: f64 = 0.03;
 /// What the scan sees: rays and data.
 type Seen = (Chain<f32>, Box<dyn FrameTerm<f32>>);
 
-/// Every other pixel of the movie's rows and columns.
+/// Pixels of the scan's images along each axis.
+const SIDE: usize = 22;
+/// Nodes of a ray.
+const PER_RAY: usize = 32;
+
+/// Every third pixel of the movie's rows and columns.
 fn images(movie: &[f32]) -> Result<Seen, Box<dyn Error>> {
-    let places: Vec<f64> = screen(64).into_iter().step_by(2).collect();
-    let chain = chain(&lines(&places, 50)?, FRAMES)?;
+    let places: Vec<f64> = screen(64).into_iter().step_by(3).collect();
+    let chain = chain(&lines(&places, PER_RAY)?, FRAMES)?;
+    let count = SIDE * SIDE;
     let kept = |k: usize| {
-        let (frame, pixel) = (k / 1024, k % 1024);
-        movie[frame * 4096 + pixel / 32 * 128 + pixel % 32 * 2]
+        let (frame, pixel) = (k / count, k % count);
+        movie[frame * 4096 + pixel / SIDE * 3 * 64 + pixel % SIDE * 3]
     };
-    let pixels = (0..FRAMES * 1024).map(kept).collect();
-    Ok((chain, Box::new(ImageTerm::new(pixels, 1024, 1.0)?)))
+    let pixels = (0..FRAMES * count).map(kept).collect();
+    Ok((chain, Box::new(ImageTerm::new(pixels, count, 1.0)?)))
 }
 
-/// Visibilities of the movie with thermal noise, and rays of 32 × 32 pixels that are to explain them.
+/// Visibilities of the movie with thermal noise, and rays of few pixels that are to explain them.
 fn visibilities(movie: &[f32], array: &str) -> Result<Seen, Box<dyn Error>> {
     let array = built_in(array).ok_or_else(|| format!("{array}: images, ngEHT or EHT2017"))?;
     let mut observed = observe(&array, SourcePosition::SGR_A, &SCHEDULE, &SETUP)?;
@@ -67,8 +73,8 @@ fn visibilities(movie: &[f32], array: &str) -> Result<Seen, Box<dyn Error>> {
     let observed = observed.total_intensity();
     println!("{} visibilities", observed.rows.len());
     // As far from the first to the last pixel as in the picture of 64.
-    let wide = FIELD / 64.0 * 63.0 / 31.0 * 32.0;
-    let grid = ImageGrid::new(32, 32, wide)?;
+    let side = SIDE as f64;
+    let grid = ImageGrid::new(SIDE, SIDE, FIELD / 64.0 * 63.0 / (side - 1.0) * side)?;
     let empty = Observation { rows: Vec::new(), ..observed.clone() };
     let mut scans = Vec::new();
     for time in times {
@@ -83,8 +89,8 @@ fn visibilities(movie: &[f32], array: &str) -> Result<Seen, Box<dyn Error>> {
         let transform = Transform::new(grid, Pulse::Triangle, &uv, Method::Direct, 1 << 24)?;
         scans.push(Some(Scan { transform, term: Box::new(term) }));
     }
-    let chain = chain(&lines(&screen(32), 50)?, FRAMES)?;
-    Ok((chain, Box::new(ScanTerm::new("visibilities", 1024, true, scans))))
+    let chain = chain(&lines(&screen(SIDE), PER_RAY)?, FRAMES)?;
+    Ok((chain, Box::new(ScanTerm::new("visibilities", SIDE * SIDE, true, scans))))
 }
 
 fn same_time(row: &kerrlight_tomo::interferometry::observation::Row, time: f64) -> bool {

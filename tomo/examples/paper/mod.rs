@@ -2,9 +2,7 @@
 
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
 use kerrlight_tomo::dynamics::{AngularVelocity, Axis, Turned, pull_back};
-use kerrlight_tomo::fit::{
-    Batch, Chain, Motion, Region, Sampling, SightlineRequest, Sightlines,
-};
+use kerrlight_tomo::fit::{Batch, Chain, Motion, Region, Sampling, SightlineRequest, Sightlines};
 use kerrlight_tomo::points::{Coordinates, CoordinatesMut};
 use std::error::Error;
 

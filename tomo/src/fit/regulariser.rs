@@ -238,8 +238,7 @@ mod tests {
     #[test]
     fn exact_values_of_a_ramp() {
         let a = 0.7;
-        let ramp: Vec<f64> =
-            (0..SHAPE.count()).map(|k| a * 0.5 * (k / 24) as f64 + 1.0).collect();
+        let ramp: Vec<f64> = (0..SHAPE.count()).map(|k| a * 0.5 * (k / 24) as f64 + 1.0).collect();
         let (weight, sloped) = (2.0, 4.0 * 24.0 * SHAPE.cell());
         let value = |regulariser: Regulariser| {
             regulariser.value_and_gradient(&ramp, SHAPE, weight, &mut vec![0.0; ramp.len()])
@@ -249,8 +248,8 @@ mod tests {
         assert!((value(Regulariser::Smoothness) - weight * sloped * a * a).abs() < 1e-12);
         let sum: f64 = ramp.iter().sum();
         assert!((value(Regulariser::Sparsity) - weight * sum * SHAPE.cell()).abs() < 1e-10);
-        let flat = vec![0.4; ramp.len()];
-        let mut gradient = vec![0.0; flat.len()];
+        let flat = vec![0.4f64; ramp.len()];
+        let mut gradient = vec![0.0f64; flat.len()];
         let none = ALL[3].value_and_gradient(&flat, SHAPE, weight, &mut gradient);
         assert!(none.abs() < 1e-12 && gradient.iter().all(|g| g.abs() < 1e-12));
     }
@@ -262,8 +261,7 @@ mod tests {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let mut gradient = vec![0.0f32; values.len()];
             let out = &mut gradient;
-            let value =
-                pool.install(|| regulariser.value_and_gradient(&values, SHAPE, 0.3, out));
+            let value = pool.install(|| regulariser.value_and_gradient(&values, SHAPE, 0.3, out));
             (value, gradient)
         };
         for regulariser in ALL {

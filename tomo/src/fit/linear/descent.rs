@@ -171,7 +171,8 @@ impl<'a, 'b> Descent<'a, 'b> {
 
     fn conjugate(&mut self, stop: Stop) -> Ending {
         let mut parts = self.parts();
-        let size = |parts: &Parts| dot(&parts.free, &parts.free) + dot(&parts.leaving, &parts.leaving);
+        let size =
+            |parts: &Parts| dot(&parts.free, &parts.free) + dot(&parts.leaving, &parts.leaving);
         let enough = size(&parts) * stop.tolerance * stop.tolerance;
         let (mut p, mut product) = (parts.free.clone(), Vec::new());
         for iteration in 0..stop.iterations {
@@ -183,8 +184,7 @@ impl<'a, 'b> Descent<'a, 'b> {
                 parts = self.parts();
                 p.clone_from(&parts.free);
             }
-            let proportional =
-                dot(&parts.leaving, &parts.leaving) <= dot(&parts.free, &parts.free);
+            let proportional = dot(&parts.leaving, &parts.leaving) <= dot(&parts.free, &parts.free);
             let direction = if proportional { &p } else { &parts.leaving };
             self.problem.curvature(direction, &mut product);
             let (slope, bend) = (dot(&self.gradient, direction), dot(direction, &product));

@@ -12,6 +12,8 @@ mod operator;
 mod quasi_newton;
 mod scaled;
 mod solve;
+#[cfg(test)]
+pub(in crate::fit) mod tests;
 mod walk;
 
 pub use certificate::Certificate;

@@ -101,9 +101,10 @@ impl<T: Scalar + Default> Convex for Objective<'_, '_, T> {
             self.operator.value_and_gradient(self.data, &rounded::<T>(x, 1.0), false);
         *gradient = slopes;
         let active = &self.operator.active;
-        value + self.penalties(x, |slopes: &[f64]| {
-            gradient.iter_mut().zip(active.gather(slopes)).for_each(|(g, s)| *g += s);
-        })
+        value
+            + self.penalties(x, |slopes: &[f64]| {
+                gradient.iter_mut().zip(active.gather(slopes)).for_each(|(g, s)| *g += s);
+            })
     }
 
     fn curvature(&mut self, direction: &[f64], out: &mut Vec<f64>) {

@@ -339,8 +339,7 @@ impl<T: Scalar + Default> Run<'_, '_, '_, T> {
                 ..self.cancelled(Vec::new(), 0)
             });
         }
-        let shining: Vec<bool> =
-            x.iter().zip(&admitted).map(|(x, new)| *x > 0.0 || *new).collect();
+        let shining: Vec<bool> = x.iter().zip(&admitted).map(|(x, new)| *x > 0.0 || *new).collect();
         *is_active = dilated(shining, problem.voxels.nodes, 1);
         None
     }

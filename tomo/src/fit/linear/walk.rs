@@ -41,8 +41,7 @@ impl Voxels {
 
     /// As penalties see it.
     pub fn shape(&self) -> Shape {
-        let spacing =
-            |k: usize| (self.high[k] - self.low[k]) / (self.nodes[k].max(2) - 1) as f64;
+        let spacing = |k: usize| (self.high[k] - self.low[k]) / (self.nodes[k].max(2) - 1) as f64;
         Shape { nodes: self.nodes, spacing: [0, 1, 2].map(spacing) }
     }
 
@@ -185,8 +184,7 @@ impl<'a, T: Scalar> Walk<'a, T> {
         }
         pulled.iter_mut().for_each(|column| column.resize(range.len(), T::zero()));
         let [x, y, z] = &self.chain.position;
-        let points =
-            Coordinates::xyz(&x[range.clone()], &y[range.clone()], &z[range.clone()]);
+        let points = Coordinates::xyz(&x[range.clone()], &y[range.clone()], &z[range.clone()]);
         let [a, b, c] = pulled;
         pull_back(self.axis, Turned { points, angles }, CoordinatesMut::xyz(a, b, c));
     }

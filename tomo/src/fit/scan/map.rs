@@ -77,11 +77,17 @@ impl AxisScan {
         ring(&mut canvas, on(self.best.axis), 0.012 * f64::from(width));
         cross(&mut canvas, on(self.runner_up.axis), 0.008 * f64::from(width));
         let size = 0.02 * f64::from(width);
-        for (vector, name) in [([0.0, 0.0, 1.0], "+z"), ([0.0, 0.0, -1.0], "−z"), ([1.0, 0.0, 0.0], "+x")]
+        for (vector, name) in
+            [([0.0, 0.0, 1.0], "+z"), ([0.0, 0.0, -1.0], "−z"), ([1.0, 0.0, 0.0], "+x")]
         {
             if let Ok(axis) = Axis::new(vector) {
                 let [x, y] = on(axis);
-                canvas.label(name, [x, y.clamp(1.2 * size, f64::from(height) - 4.0)], size, Align::Center);
+                canvas.label(
+                    name,
+                    [x, y.clamp(1.2 * size, f64::from(height) - 4.0)],
+                    size,
+                    Align::Center,
+                );
             }
         }
         Ok(canvas.into_picture())

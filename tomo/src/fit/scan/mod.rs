@@ -8,8 +8,8 @@
 mod map;
 mod refine;
 
-use super::linear::{LinearProblem, Prior, Voxels, Weighted};
 use super::Chain;
+use super::linear::{LinearProblem, Prior, Voxels, Weighted};
 use crate::dynamics::Axis;
 use crate::simd::Scalar;
 use kerrlight_geodesic::OutOfRange;
@@ -61,10 +61,10 @@ pub struct AxisSettings {
 impl Default for AxisSettings {
     fn default() -> Self {
         Self {
-            directions: 192,
-            coarse: Effort { nodes: 18, iterations: 12 },
+            directions: 160,
+            coarse: Effort { nodes: 16, iterations: 10 },
             candidates: 3,
-            fine: Effort { nodes: 24, iterations: 25 },
+            fine: Effort { nodes: 20, iterations: 20 },
             halvings: 3,
         }
     }
@@ -236,4 +236,65 @@ fn candidates(map: &[AxisLoss], count: usize, distance: f64) -> Vec<Axis> {
         }
     }
     chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ImageTerm;
+    use super::super::linear::tests::{FRAMES, chain, movie_about};
+    use super::*;
+
+    #[test]
+    fn exact_lattice_covers_the_sphere() {
+        let points = lattice(500);
+        for target in lattice(77) {
+            let nearest = points.iter().map(|p| p.dot(target)).fold(-1.0, f64::max);
+            assert!(nearest > 0.09f64.cos(), "{target:?} {nearest}");
+        }
+        let mean: Vec<f64> =
+            (0..3).map(|c| points.iter().map(|p| p.vector()[c]).sum::<f64>() / 500.0).collect();
+        assert!(mean.iter().all(|m| m.abs() < 2e-3), "{mean:?}");
+    }
+
+    /// A spot that turns about a known axis, in the field that the fine grid can represent.
+    #[test]
+    fn exact_axis_of_its_own_movie_on_any_number_of_threads() {
+        let (chain, voxels) = (chain(), Voxels::cube(9, 5.0));
+        let truth = Axis::new([0.6, -0.3, -0.7]).unwrap();
+        let light = |k: usize| {
+            let [x, y, z] = voxels.position(k);
+            (-((x - 1.5).powi(2) + (y + 2.0).powi(2) + (z - 2.0).powi(2)) / 2.0).exp()
+        };
+        let field: Vec<f64> = (0..voxels.count()).map(light).collect();
+        let pixels = movie_about(truth, &chain, &voxels, &field);
+        let term = ImageTerm::new(pixels, chain.pixels(), 1.0).unwrap();
+        let problem = AxisProblem {
+            chain: &chain,
+            frames: &FRAMES,
+            terms: &[Weighted { weight: 1.0, term: &term }],
+            half_width: 5.0,
+            upper: 2.0,
+            priors: &[],
+        };
+        let settings = AxisSettings {
+            directions: 60,
+            coarse: Effort { nodes: 8, iterations: 10 },
+            fine: Effort { nodes: 9, iterations: 30 },
+            ..AxisSettings::default()
+        };
+        let run = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| scan_axis(&problem, &settings, &|_, _| true)).unwrap().unwrap()
+        };
+        let scan = run(1);
+        assert_eq!(scan, run(4));
+        assert_eq!(scan.map.len(), 60);
+        assert!(scan.best.axis.dot(truth) > 0.99, "{:?}", scan.best);
+        assert!(scan.runner_up.axis.dot(scan.best.axis) < 0.0);
+        assert!(scan.best.loss < scan.runner_up.loss);
+        assert_eq!(scan_axis(&problem, &settings, &|_, _| false), Ok(None));
+        let none = AxisSettings { directions: 2, ..settings };
+        let text = scan_axis(&problem, &none, &|_, _| true).unwrap_err().to_string();
+        assert!(text.contains("directions = 2 "), "{text}");
+    }
 }
