@@ -7,6 +7,7 @@
 mod certificate;
 mod data;
 mod descent;
+mod nodes;
 mod objective;
 mod operator;
 mod quasi_newton;

@@ -3,14 +3,13 @@
 use super::certificate::Certificate;
 use super::data::{Data, Weighted};
 use super::descent::{Descent, Each, Ending, Method, Stop};
+use super::nodes::{dilated, refined};
 use super::objective::{Objective, Prior};
 use super::operator::{Active, Operator};
 use super::scaled::Scaled;
 use super::walk::{Voxels, Walk};
 use crate::dynamics::Axis;
 use crate::fit::Chain;
-use crate::points::Coordinates;
-use crate::representation::{Representation, Workspace};
 use crate::simd::Scalar;
 use core::ops::ControlFlow;
 use kerrlight_geodesic::OutOfRange;
@@ -222,6 +221,9 @@ impl<T: Scalar + Default> LinearProblem<'_, T> {
     }
 }
 
+/// Values at the nodes, and which of them count.
+type Start = (Vec<f64>, Vec<bool>);
+
 /// A solution under way.
 struct Run<'a, 'p, 'w, T: Scalar> {
     problem: &'a LinearProblem<'p, T>,
@@ -272,7 +274,7 @@ impl<T: Scalar + Default> Run<'_, '_, '_, T> {
     }
 
     /// The coarse problem's solution at the nodes of the grid, and where they count.
-    fn coarse(&mut self, coarse: Coarse) -> Result<Option<(Vec<f64>, Vec<bool>)>, OutOfRange> {
+    fn coarse(&mut self, coarse: Coarse) -> Result<Option<Start>, OutOfRange> {
         let fine = self.problem.voxels;
         let voxels = Voxels { nodes: fine.nodes.map(|n| n.min(coarse.nodes)), ..fine };
         let frames: Vec<usize> =
@@ -343,34 +345,4 @@ impl<T: Scalar + Default> Run<'_, '_, '_, T> {
         *is_active = dilated(shining, problem.voxels.nodes, 1);
         None
     }
-}
-
-/// Values at the nodes of another grid.
-fn refined(from: &Voxels, x: &[f64], to: &Voxels) -> Result<Vec<f64>, OutOfRange> {
-    let nodes: Vec<[f64; 3]> = (0..to.count()).map(|k| to.position(k)).collect();
-    let column = |c: usize| {
-        let clamp = |at: &[f64; 3]| at[c].clamp(from.low[c], from.high[c]);
-        nodes.iter().map(clamp).collect::<Vec<f64>>()
-    };
-    let (a, b, c) = (column(0), column(1), column(2));
-    let mut values = vec![0.0; nodes.len()];
-    from.grid()?.eval(x, Coordinates::xyz(&a, &b, &c), &mut values, &mut Workspace::new());
-    Ok(values)
-}
-
-/// Marks what is not farther than this many nodes along each axis.
-fn dilated(mut marked: Vec<bool>, [_, ny, nz]: [usize; 3], steps: usize) -> Vec<bool> {
-    let count = marked.len();
-    for (stride, n) in [(1, nz), (nz, ny), (ny * nz, count / (ny * nz))] {
-        for _ in 0..steps {
-            let spread = |k: usize| {
-                let place = k / stride % n;
-                marked[k]
-                    || (place > 0 && marked[k - stride])
-                    || (place + 1 < n && marked[k + stride])
-            };
-            marked = (0..count).map(spread).collect();
-        }
-    }
-    marked
 }

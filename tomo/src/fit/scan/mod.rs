@@ -166,6 +166,28 @@ impl<T: Scalar + Default> Scanner<'_, T> {
     }
 }
 
+impl<T: Scalar + Default> Scanner<'_, T> {
+    /// The best refined axis of the opposite hemisphere; where all have come over to this one, the lattice's best
+    /// there, with the loss of the fine problem.
+    fn opposite(
+        &self,
+        axis: Axis,
+        found: &[AxisLoss],
+        map: &[AxisLoss],
+        effort: Effort,
+    ) -> Result<Option<AxisLoss>, OutOfRange> {
+        let best = |all: &[AxisLoss]| {
+            let there = all.iter().filter(|found| found.axis.dot(axis) < 0.0);
+            there.min_by(|a, b| a.loss.total_cmp(&b.loss)).copied()
+        };
+        if let Some(found) = best(found) {
+            return Ok(Some(found));
+        }
+        let other = best(map).map_or(axis.antipode(), |other| other.axis);
+        Ok(self.losses(&[other], effort)?.and_then(|losses| losses.first().copied()))
+    }
+}
+
 /// The axis of least loss on the whole sphere; none if the watch wanted no more.
 ///
 /// # Errors
@@ -198,20 +220,8 @@ pub fn scan_axis<T: Scalar + Default>(
     }
     found.sort_by(|a, b| a.loss.total_cmp(&b.loss));
     let best = found[0];
-    let opposite = |all: &[AxisLoss]| {
-        let there = all.iter().filter(|found| found.axis.dot(best.axis) < 0.0);
-        there.min_by(|a, b| a.loss.total_cmp(&b.loss)).copied()
-    };
-    let runner_up = match (opposite(&found), opposite(&map)) {
-        (Some(found), _) => found,
-        // What began there has crossed over: the lattice's best one, with the loss of the fine problem.
-        (None, other) => {
-            let axis = other.map_or(best.axis.antipode(), |other| other.axis);
-            match scanner.losses(&[axis], settings.fine)? {
-                Some(losses) => losses[0],
-                None => return Ok(None),
-            }
-        }
+    let Some(runner_up) = scanner.opposite(best.axis, &found, &map, settings.fine)? else {
+        return Ok(None);
     };
     let solved = scanner.solved.load(Ordering::Relaxed);
     Ok(Some(AxisScan { refinements: solved - map.len(), map, best, runner_up }))
@@ -229,11 +239,11 @@ fn candidates(map: &[AxisLoss], count: usize, distance: f64) -> Vec<Axis> {
         }
     }
     let Some(first) = chosen.first().copied() else { return chosen };
-    if chosen.iter().all(|axis| axis.dot(first) >= 0.0) {
-        if let Some(other) = order.iter().find(|point| point.axis.dot(first) < 0.0) {
-            chosen.pop();
-            chosen.push(other.axis);
-        }
+    let opposite = |axis: &Axis| axis.dot(first) < 0.0;
+    let other = order.iter().find(|point| opposite(&point.axis));
+    if let Some(other) = other.filter(|_| !chosen.iter().any(opposite)) {
+        chosen.pop();
+        chosen.push(other.axis);
     }
     chosen
 }
