@@ -10,6 +10,7 @@ pub mod linear;
 mod objective;
 mod occupancy;
 mod regulariser;
+pub mod scan;
 mod shift;
 mod sightlines;
 mod terms;

@@ -248,8 +248,8 @@ mod tests {
         assert!((value(Regulariser::Smoothness) - weight * sloped * a * a).abs() < 1e-12);
         let sum: f64 = ramp.iter().sum();
         assert!((value(Regulariser::Sparsity) - weight * sum * SHAPE.cell()).abs() < 1e-10);
-        let flat = vec![0.4; ramp.len()];
-        let mut gradient = vec![0.0; flat.len()];
+        let flat = vec![0.4f64; ramp.len()];
+        let mut gradient = vec![0.0f64; flat.len()];
         let none = ALL[3].value_and_gradient(&flat, SHAPE, weight, &mut gradient);
         assert!(none.abs() < 1e-12 && gradient.iter().all(|g| g.abs() < 1e-12));
     }

@@ -16,14 +16,12 @@ pub struct Weighted<'a, T: Scalar> {
 /// Terms over some frames: Σ weight · χ²/(number of real data in those frames).
 pub(super) struct Data<'a, T: Scalar> {
     terms: Vec<Weighted<'a, T>>,
-    pub frames: &'a [usize],
-    pub pixels: usize,
 }
 
 impl<'a, T: Scalar> Data<'a, T> {
     pub fn new(
         terms: &[Weighted<'a, T>],
-        frames: &'a [usize],
+        frames: &[usize],
         pixels: usize,
         of_movie: usize,
     ) -> Result<Self, OutOfRange> {
@@ -53,7 +51,7 @@ impl<'a, T: Scalar> Data<'a, T> {
         if terms.is_empty() {
             return range("data in the frames", 0.0, "1 or more");
         }
-        Ok(Self { terms, frames, pixels })
+        Ok(Self { terms })
     }
 
     pub fn is_quadratic(&self) -> bool {

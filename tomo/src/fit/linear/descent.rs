@@ -1,16 +1,20 @@
 //! Minimisation over a box.
 //!
-//! [`Method::ConjugateGradients`]: conjugate gradients on the free numbers, with proportioning where those
-//! on the boundary want to leave it (Dostál & Schöberl 2005, MPRGP), and a projected step where they
-//! would leave the box. [`Method::Fista`]: accelerated projected gradients (Beck & Teboulle 2009) with
-//! O'Donoghue & Candès's (2015) restart, for functions that are not quadratic.
+//! [`Method::QuasiNewton`]: L-BFGS steps of the numbers that are free to move, projected onto the box
+//! (Bertsekas 1982). [`Method::ConjugateGradients`]: conjugate gradients on the free numbers, with
+//! proportioning where those on the boundary want to leave it (Dostál & Schöberl 2005, MPRGP), and a projected
+//! step where they would leave the box. [`Method::Fista`]: accelerated projected gradients (Beck & Teboulle 2009) with
+//! O'Donoghue & Candès's (2015) restart.
 
+use super::quasi_newton::Pairs;
 use super::scaled::{Scaled, add, dot};
 use core::ops::ControlFlow;
 
 /// How the box-constrained problem is solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
+    /// For any convex and smooth function.
+    QuasiNewton,
     /// For quadratic functions.
     ConjugateGradients,
     /// For any convex and smooth one.
@@ -69,6 +73,7 @@ impl<'a, 'b> Descent<'a, 'b> {
 
     pub fn run(mut self, method: Method, stop: Stop) -> (Vec<f64>, Ending) {
         let ending = match method {
+            Method::QuasiNewton => self.quasi_newton(stop),
             Method::ConjugateGradients => self.conjugate(stop),
             Method::Fista => self.accelerated(stop),
         };
@@ -110,6 +115,58 @@ impl<'a, 'b> Descent<'a, 'b> {
 
     fn look(&mut self) {
         self.value = self.problem.value_and_gradient(&self.y, &mut self.gradient);
+    }
+
+    fn quasi_newton(&mut self, stop: Stop) -> Ending {
+        let mut pairs = Pairs::default();
+        let enough = stop.tolerance * self.violation();
+        for _ in 0..stop.iterations {
+            if self.violation() <= enough {
+                return Ending::Converged;
+            }
+            let Parts { free, leaving } = self.parts();
+            let steepest: Vec<f64> = free.iter().zip(&leaving).map(|(a, b)| a + b).collect();
+            let mut direction = pairs.direct(&steepest);
+            self.hold(&mut direction);
+            if dot(&direction, &steepest) <= 0.0 {
+                pairs.clear();
+                direction.clone_from(&steepest);
+            }
+            let step = if pairs.is_empty() { self.first_step(&direction) } else { 1.0 };
+            let (y, gradient) = (self.y.clone(), self.gradient.clone());
+            if !self.project(step, &direction) {
+                if pairs.is_empty() {
+                    return Ending::Rounding;
+                }
+                pairs.clear();
+                continue;
+            }
+            pairs.push(difference(&self.y, &y), difference(&self.gradient, &gradient));
+            if self.tell().is_break() {
+                return Ending::Cancelled;
+            }
+        }
+        Ending::Exhausted
+    }
+
+    /// Takes out of a direction what would lead out of the box at once.
+    fn hold(&self, direction: &mut [f64]) {
+        for (k, (d, y)) in direction.iter_mut().zip(&self.y).enumerate() {
+            if (*y <= 0.0 && *d > 0.0) || (*y >= self.problem.upper(k) && *d < 0.0) {
+                *d = 0.0;
+            }
+        }
+    }
+
+    /// The best step against a direction as far as the gradient a little way along it tells.
+    fn first_step(&mut self, direction: &[f64]) -> f64 {
+        let length = dot(direction, direction).sqrt();
+        let reach = 1e-2 * dot(&self.y, &self.y).sqrt().max(1.0) / length;
+        let (mut moved, mut there) = (self.y.clone(), Vec::new());
+        add(&mut moved, -reach, direction);
+        self.problem.value_and_gradient(&moved, &mut there);
+        let bend = difference(&self.gradient, &there);
+        reach * dot(&self.gradient, direction) / dot(&bend, direction)
     }
 
     fn conjugate(&mut self, stop: Stop) -> Ending {
@@ -252,4 +309,8 @@ impl<'a, 'b> Descent<'a, 'b> {
         let parts = self.parts();
         (dot(&parts.free, &parts.free) + dot(&parts.leaving, &parts.leaving)).sqrt()
     }
+}
+
+fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
 }

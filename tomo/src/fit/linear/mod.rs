@@ -7,10 +7,14 @@
 mod certificate;
 mod data;
 mod descent;
+mod nodes;
 mod objective;
 mod operator;
+mod quasi_newton;
 mod scaled;
 mod solve;
+#[cfg(test)]
+pub(in crate::fit) mod tests;
 mod walk;
 
 pub use certificate::Certificate;

@@ -3,14 +3,13 @@
 use super::certificate::Certificate;
 use super::data::{Data, Weighted};
 use super::descent::{Descent, Each, Ending, Method, Stop};
+use super::nodes::{dilated, refined};
 use super::objective::{Objective, Prior};
 use super::operator::{Active, Operator};
 use super::scaled::Scaled;
 use super::walk::{Voxels, Walk};
 use crate::dynamics::Axis;
 use crate::fit::Chain;
-use crate::points::Coordinates;
-use crate::representation::{Representation, Workspace};
 use crate::simd::Scalar;
 use core::ops::ControlFlow;
 use kerrlight_geodesic::OutOfRange;
@@ -48,8 +47,8 @@ pub struct Coarse {
 /// How a linear problem is solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinearSettings {
-    /// Conjugate gradients where the problem is quadratic and FISTA elsewhere, without one.
-    pub method: Option<Method>,
+    /// By which steps; quasi-Newton ones in place of conjugate gradients where the problem is not quadratic.
+    pub method: Method,
     /// The coarse problem whose solution says where to begin; all nodes of the grid count at once, without one.
     pub coarse: Option<Coarse>,
     /// Nodes count at first where the coarse solution exceeds this part of its maximum, or a node not farther than
@@ -63,7 +62,8 @@ pub struct LinearSettings {
     pub iterations: usize,
     /// A round ends where the projected gradient has fallen to this part of what it began with.
     pub tolerance: f64,
-    /// Nodes are admitted whose slope is below minus this part of the largest one where nothing shines.
+    /// Nodes are admitted whose slope is below minus this part of the largest one where nothing shines, and
+    /// that violate the conditions for a minimum more than any that counts already.
     pub admission: f64,
     /// Bytes of the sparse matrix; frames beyond are computed anew in each iteration.
     pub memory: usize,
@@ -72,12 +72,12 @@ pub struct LinearSettings {
 impl Default for LinearSettings {
     fn default() -> Self {
         Self {
-            method: None,
+            method: Method::QuasiNewton,
             coarse: Some(Coarse { nodes: 32, stride: 8, iterations: 20 }),
             threshold: 0.02,
             dilation: 2,
-            rounds: 4,
-            iterations: 150,
+            rounds: 8,
+            iterations: 80,
             tolerance: 1e-4,
             admission: 1e-4,
             memory: 768 << 20,
@@ -159,6 +159,36 @@ impl<T: Scalar + Default> LinearProblem<'_, T> {
         }
     }
 
+    /// The value that some iterations over all nodes reach from a dark field.
+    ///
+    /// # Errors
+    /// As those of [`solve`](Self::solve).
+    pub fn least(&self, iterations: usize) -> Result<f64, OutOfRange> {
+        let settings = LinearSettings { coarse: None, tolerance: 0.0, ..LinearSettings::default() };
+        self.check(&settings)?;
+        let data = self.data()?;
+        let active = Active::new(&vec![true; self.voxels.count()], self.voxels.corners());
+        let operator = Operator::new(self.walk(), active, self.frames, settings.memory);
+        let shape = self.voxels.shape();
+        let mut objective = Objective::new(&operator, &data, self.priors, shape);
+        let mut least = f64::INFINITY;
+        let mut watch = |progress: &LinearProgress<'_>| {
+            least = least.min(progress.value);
+            ControlFlow::Continue(())
+        };
+        let mut run = Run {
+            problem: self,
+            settings: &settings,
+            watch: &mut watch,
+            evaluations: 0,
+            bytes: 0,
+            round: 0,
+        };
+        run.minimise(&mut objective, &vec![0.0; self.voxels.count()], iterations);
+        // Nothing helps, where nothing was seen.
+        Ok(if least.is_finite() { least } else { objective.nothing().0 })
+    }
+
     fn data(&self) -> Result<Data<'_, T>, OutOfRange> {
         Data::new(self.terms, self.frames, self.chain.pixels(), self.chain.frames())
     }
@@ -191,6 +221,9 @@ impl<T: Scalar + Default> LinearProblem<'_, T> {
     }
 }
 
+/// Values at the nodes, and which of them count.
+type Start = (Vec<f64>, Vec<bool>);
+
 /// A solution under way.
 struct Run<'a, 'p, 'w, T: Scalar> {
     problem: &'a LinearProblem<'p, T>,
@@ -222,9 +255,8 @@ impl<T: Scalar + Default> Run<'_, '_, '_, T> {
         iterations: usize,
     ) -> (Vec<f64>, Ending) {
         let method = match self.settings.method {
-            Some(method) if method == Method::Fista || objective.is_quadratic() => method,
-            _ if objective.is_quadratic() => Method::ConjugateGradients,
-            _ => Method::Fista,
+            Method::ConjugateGradients if !objective.is_quadratic() => Method::QuasiNewton,
+            method => method,
         };
         let (active, entries) = (&objective.operator.active, objective.operator.entries());
         let (round, before) = (self.round, self.evaluations);
@@ -242,7 +274,7 @@ impl<T: Scalar + Default> Run<'_, '_, '_, T> {
     }
 
     /// The coarse problem's solution at the nodes of the grid, and where they count.
-    fn coarse(&mut self, coarse: Coarse) -> Result<Option<(Vec<f64>, Vec<bool>)>, OutOfRange> {
+    fn coarse(&mut self, coarse: Coarse) -> Result<Option<Start>, OutOfRange> {
         let fine = self.problem.voxels;
         let voxels = Voxels { nodes: fine.nodes.map(|n| n.min(coarse.nodes)), ..fine };
         let frames: Vec<usize> =
@@ -294,7 +326,9 @@ impl<T: Scalar + Default> Run<'_, '_, '_, T> {
         let upper = problem.upper;
         let (gap, violation) = Certificate::bounds(x, &gradient, upper);
         let certificate = Certificate { value, dark, gap, violation, dark_slope, upper };
-        let least = -settings.admission * dark_slope;
+        // As long as those that count violate the conditions, others need not satisfy them any better.
+        let inside = Certificate::bounds(&inner, &operator.active.gather(&gradient), upper).1;
+        let least = -inside.max(settings.admission * dark_slope);
         let outside = |k: &usize| !is_active[*k] && gradient[*k] < least;
         let admitted: Vec<bool> = (0..x.len()).map(|k| outside(&k)).collect();
         let none = !admitted.iter().any(|new| *new) && ending != Ending::Exhausted;
@@ -311,34 +345,4 @@ impl<T: Scalar + Default> Run<'_, '_, '_, T> {
         *is_active = dilated(shining, problem.voxels.nodes, 1);
         None
     }
-}
-
-/// Values at the nodes of another grid.
-fn refined(from: &Voxels, x: &[f64], to: &Voxels) -> Result<Vec<f64>, OutOfRange> {
-    let nodes: Vec<[f64; 3]> = (0..to.count()).map(|k| to.position(k)).collect();
-    let column = |c: usize| {
-        let clamp = |at: &[f64; 3]| at[c].clamp(from.low[c], from.high[c]);
-        nodes.iter().map(clamp).collect::<Vec<f64>>()
-    };
-    let (a, b, c) = (column(0), column(1), column(2));
-    let mut values = vec![0.0; nodes.len()];
-    from.grid()?.eval(x, Coordinates::xyz(&a, &b, &c), &mut values, &mut Workspace::new());
-    Ok(values)
-}
-
-/// Marks what is not farther than this many nodes along each axis.
-fn dilated(mut marked: Vec<bool>, [_, ny, nz]: [usize; 3], steps: usize) -> Vec<bool> {
-    let count = marked.len();
-    for (stride, n) in [(1, nz), (nz, ny), (ny * nz, count / (ny * nz))] {
-        for _ in 0..steps {
-            let spread = |k: usize| {
-                let place = k / stride % n;
-                marked[k]
-                    || (place > 0 && marked[k - stride])
-                    || (place + 1 < n && marked[k + stride])
-            };
-            marked = (0..count).map(spread).collect();
-        }
-    }
-    marked
 }

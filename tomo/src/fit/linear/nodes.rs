@@ -1,0 +1,36 @@
+//! Nodes of one grid and of another.
+
+use super::walk::Voxels;
+use crate::points::Coordinates;
+use crate::representation::{Representation, Workspace};
+use kerrlight_geodesic::OutOfRange;
+
+/// Values at the nodes of another grid.
+pub(super) fn refined(from: &Voxels, x: &[f64], to: &Voxels) -> Result<Vec<f64>, OutOfRange> {
+    let nodes: Vec<[f64; 3]> = (0..to.count()).map(|k| to.position(k)).collect();
+    let column = |c: usize| {
+        let clamp = |at: &[f64; 3]| at[c].clamp(from.low[c], from.high[c]);
+        nodes.iter().map(clamp).collect::<Vec<f64>>()
+    };
+    let (a, b, c) = (column(0), column(1), column(2));
+    let mut values = vec![0.0; nodes.len()];
+    from.grid()?.eval(x, Coordinates::xyz(&a, &b, &c), &mut values, &mut Workspace::new());
+    Ok(values)
+}
+
+/// Marks what is not farther than this many nodes along each axis.
+pub(super) fn dilated(mut marked: Vec<bool>, [_, ny, nz]: [usize; 3], steps: usize) -> Vec<bool> {
+    let count = marked.len();
+    for (stride, n) in [(1, nz), (nz, ny), (ny * nz, count / (ny * nz))] {
+        for _ in 0..steps {
+            let spread = |k: usize| {
+                let place = k / stride % n;
+                marked[k]
+                    || (place > 0 && marked[k - stride])
+                    || (place + 1 < n && marked[k + stride])
+            };
+            marked = (0..count).map(spread).collect();
+        }
+    }
+    marked
+}

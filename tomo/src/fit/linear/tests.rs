@@ -1,0 +1,233 @@
+use super::data::{Data, Weighted};
+use super::operator::{Active, Operator};
+use super::walk::Walk;
+use super::*;
+use crate::dynamics::{AngularVelocity, Axis};
+use crate::fit::{
+    Batch, Chain, Field, FrameTerm, ImageTerm, Motion, Region, Regulariser, Sampling,
+    SightlineRequest, Sightlines,
+};
+use crate::representation::Workspace;
+use core::ops::ControlFlow;
+use kerrlight_geodesic::{Inclination, Kerr, Observer};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+pub(in crate::fit) const FRAMES: [usize; 5] = [0, 1, 2, 3, 4];
+
+pub(in crate::fit) fn chain() -> Chain<f64> {
+    let hole = Kerr::new(0.0).unwrap();
+    let observer = Observer::at_radius(Inclination::from_degrees(60.0).unwrap(), 1000.0).unwrap();
+    let at = |k: usize| -5.0 + 10.0 * k as f64 / 8.0;
+    let (alpha, beta): (Vec<f64>, Vec<f64>) = (0..81).map(|k| (at(k % 9), at(k / 9))).unzip();
+    let request = SightlineRequest {
+        region: Region { r_min: 0.0, r_max: 5.0, z_width: f64::INFINITY },
+        sampling: Sampling::EqualMinoTime { per_ray: 40 },
+        delay: false,
+        momentum: false,
+    };
+    let lines = Sightlines::trace(&hole, &observer, &alpha, &beta, &request).unwrap();
+    let motion = Motion {
+        velocity: AngularVelocity::bhnerf(),
+        reference: 0.0,
+        injection: None,
+        times: vec![0.0, 0.2, 0.35, 0.6, 0.9],
+    };
+    Chain::new(&lines, &motion, &hole, None).unwrap()
+}
+
+fn axis() -> Axis {
+    Axis::new([0.3, -0.2, 0.9]).unwrap()
+}
+
+fn random(count: usize, seed: u64) -> Vec<f64> {
+    let mut random = Pcg64::seed_from_u64(seed);
+    (0..count).map(|_| random.random::<f64>()).collect()
+}
+
+fn movie(chain: &Chain<f64>, voxels: &Voxels, x: &[f64]) -> Vec<f64> {
+    movie_about(axis(), chain, voxels, x)
+}
+
+/// Images of values at the nodes by way of the representation.
+pub(in crate::fit) fn movie_about(
+    axis: Axis,
+    chain: &Chain<f64>,
+    voxels: &Voxels,
+    x: &[f64],
+) -> Vec<f64> {
+    let grid = voxels.grid().unwrap();
+    let field = Field { representation: &grid, parameters: x, axis, occupancy: None };
+    let mut movie = vec![0.0; FRAMES.len() * chain.pixels()];
+    chain.movie(field, &FRAMES, &mut Batch::default(), &mut Workspace::new(), &mut movie);
+    movie
+}
+
+fn operator<'a>(
+    chain: &'a Chain<f64>,
+    voxels: Voxels,
+    is_active: &[bool],
+    budget: usize,
+) -> Operator<'a, f64> {
+    let active = Active::new(is_active, voxels.corners());
+    Operator::new(Walk::new(chain, axis(), voxels), active, &FRAMES, budget)
+}
+
+/// ‖A x‖² and Aᵀ of twice the images, where the data are dark and all nodes or some count.
+#[test]
+fn exact_sparse_operator_is_the_grid_and_sums() {
+    let (chain, voxels) = (chain(), Voxels { nodes: [7, 6, 8], ..Voxels::cube(2, 5.0) });
+    let dark = ImageTerm::new(vec![0.0; FRAMES.len() * chain.pixels()], chain.pixels(), 1.0);
+    let dark = dark.unwrap();
+    let terms = [Weighted { weight: 1.0, term: &dark as &dyn FrameTerm<f64> }];
+    let data = Data::new(&terms, &FRAMES, chain.pixels(), 5).unwrap();
+    let count = (FRAMES.len() * chain.pixels()) as f64;
+    let all = vec![true; voxels.count()];
+    let some: Vec<bool> = random(all.len(), 4).iter().map(|x| *x < 0.4).collect();
+    for is_active in [all, some] {
+        let operator = operator(&chain, voxels, &is_active, usize::MAX);
+        assert!(operator.entries() > 1000 && operator.bytes() > 12 * operator.entries());
+        let x = random(operator.active.count(), 1);
+        let images = movie(&chain, &voxels, &operator.active.expand(&x));
+        let square: f64 = images.iter().map(|pixel| pixel * pixel).sum();
+        let (value, gradient) = operator.value_and_gradient(&data, &x, false);
+        assert!((value * count / square - 1.0).abs() < 1e-12);
+        // ⟨y, Aᵀ A x⟩ = ⟨A y, A x⟩.
+        let y = random(x.len(), 2);
+        let others = movie(&chain, &voxels, &operator.active.expand(&y));
+        let forward: f64 = others.iter().zip(&images).map(|(a, b)| a * b).sum();
+        let back: f64 = gradient.iter().zip(&y).map(|(g, y)| 0.5 * count * g * y).sum();
+        assert!((back / forward - 1.0).abs() < 1e-12, "{back} {forward}");
+        // Over all nodes, without the matrix, it is the same.
+        let (_, everywhere) = operator.value_and_gradient(&data, &x, true);
+        for (a, b) in operator.active.gather(&everywhere).iter().zip(&gradient) {
+            assert!((a - b).abs() < 1e-13);
+        }
+    }
+}
+
+/// The least value over the box by coordinate descent on the normal equations, run to the last digit: independent of
+/// operator, steps and scaling.
+fn reference(columns: &[Vec<f64>], data: &[f64], upper: f64) -> (Vec<f64>, f64) {
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let squares: Vec<f64> = columns.iter().map(|column| dot(column, column)).collect();
+    let (mut x, mut rest) = (vec![0.0f64; columns.len()], data.to_vec());
+    for _ in 0..20_000 {
+        let mut moved = 0.0f64;
+        for (k, column) in columns.iter().enumerate().filter(|(k, _)| squares[*k] > 0.0) {
+            let next = (x[k] + dot(column, &rest) / squares[k]).clamp(0.0, upper);
+            let step = next - x[k];
+            rest.iter_mut().zip(column).for_each(|(r, a)| *r -= step * a);
+            moved = moved.max(step.abs());
+            x[k] = next;
+        }
+        if moved < 1e-14 {
+            break;
+        }
+    }
+    let value = dot(&rest, &rest) / data.len() as f64;
+    (x, value)
+}
+
+/// A small problem whose data no field explains, with both bounds active.
+#[test]
+fn exact_solution_and_gap_of_a_dense_problem() {
+    let (chain, voxels, upper) = (chain(), Voxels::cube(5, 5.0), 0.8);
+    let unit = |k: usize| {
+        let mut x = vec![0.0; voxels.count()];
+        x[k] = 1.0;
+        movie(&chain, &voxels, &x)
+    };
+    let columns: Vec<Vec<f64>> = (0..voxels.count()).map(unit).collect();
+    let mut pixels = movie(&chain, &voxels, &random(voxels.count(), 7));
+    let noise = random(pixels.len(), 8);
+    pixels.iter_mut().zip(noise).for_each(|(pixel, n)| *pixel += 2.0 * (n - 0.5));
+    let (_, least) = reference(&columns, &pixels, upper);
+    let term = ImageTerm::new(pixels, chain.pixels(), 1.0).unwrap();
+    let problem = LinearProblem {
+        chain: &chain,
+        axis: axis(),
+        frames: &FRAMES,
+        terms: &[Weighted { weight: 1.0, term: &term }],
+        voxels,
+        upper,
+        priors: &[],
+    };
+    let solve = |method, iterations, coarse| {
+        let settings = LinearSettings {
+            method,
+            coarse,
+            iterations,
+            tolerance: 1e-9,
+            ..LinearSettings::default()
+        };
+        problem.solve(&settings, &mut |_| ControlFlow::Continue(())).unwrap()
+    };
+    let coarse = Some(Coarse { nodes: 4, stride: 2, iterations: 5 });
+    for method in [Method::QuasiNewton, Method::ConjugateGradients, Method::Fista] {
+        for coarse in [None, coarse] {
+            let solution = solve(method, 1500, coarse);
+            let certificate = solution.certificate.unwrap();
+            let excess = certificate.value - least;
+            assert!(excess.abs() < 1e-6 * certificate.dark, "{method:?}: {excess:e}");
+            assert!(excess <= certificate.gap + 1e-12, "{method:?}");
+            assert!(solution.emission.iter().all(|x| (0.0..=upper).contains(x)));
+            // Far from the minimum the gap still bounds what is missing.
+            let rough = solve(method, 3, coarse).certificate.unwrap();
+            assert!(rough.value - least <= rough.gap && rough.value > certificate.value);
+        }
+    }
+}
+
+#[test]
+fn exact_threads_change_no_bit() {
+    let (chain, voxels) = (chain(), Voxels::cube(8, 5.0));
+    let truth: Vec<f64> = random(voxels.count(), 3).iter().map(|x| (x - 0.7).max(0.0)).collect();
+    let term = ImageTerm::new(movie(&chain, &voxels, &truth), chain.pixels(), 0.1).unwrap();
+    let prior = Prior { regulariser: Regulariser::Smoothness, weight: 1e-3 };
+    let run = |threads, memory| {
+        let problem = LinearProblem {
+            chain: &chain,
+            axis: axis(),
+            frames: &FRAMES,
+            terms: &[Weighted { weight: 1.0, term: &term }],
+            voxels,
+            upper: 2.0,
+            priors: &[prior],
+        };
+        let settings = LinearSettings { coarse: None, memory, ..LinearSettings::default() };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| problem.solve(&settings, &mut |_| ControlFlow::Continue(()))).unwrap()
+    };
+    let (one, many) = (run(1, usize::MAX), run(5, usize::MAX));
+    assert_eq!(one.emission, many.emission);
+    assert_eq!(one.certificate, many.certificate);
+    assert!(one.certificate.unwrap().value < 1e-2 * one.certificate.unwrap().dark);
+}
+
+#[test]
+fn numbers_out_of_range_are_named_and_a_stop_is_heeded() {
+    let (chain, voxels) = (chain(), Voxels::cube(5, 5.0));
+    let pixels = vec![1.0; FRAMES.len() * chain.pixels()];
+    let term = ImageTerm::new(pixels, chain.pixels(), 1.0).unwrap();
+    let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
+    let problem = LinearProblem {
+        chain: &chain,
+        axis: axis(),
+        frames: &FRAMES,
+        terms: &terms,
+        voxels,
+        upper: 1.0,
+        priors: &[],
+    };
+    let fail = |problem: LinearProblem<'_, f64>| {
+        let go_on = &mut |_: &LinearProgress<'_>| ControlFlow::Continue(());
+        problem.solve(&LinearSettings::default(), go_on).unwrap_err().to_string()
+    };
+    assert!(fail(LinearProblem { upper: 0.0, ..problem }).contains("upper = 0 "));
+    assert!(fail(LinearProblem { frames: &[5], ..problem }).contains("frame = 5 "));
+    assert!(fail(LinearProblem { frames: &[], ..problem }).contains("frames = 0 "));
+    let stop = &mut |_: &LinearProgress<'_>| ControlFlow::Break(());
+    let solution = problem.solve(&LinearSettings::default(), stop).unwrap();
+    assert!(solution.ending == Ending::Cancelled && solution.certificate.is_none());
+}

@@ -1,0 +1,310 @@
+//! Which axis matter turns about: the linear problem of a coarse grid, solved for axes all over the
+//! sphere, and again with a finer grid where its loss is least.
+//!
+//! The loss of an axis is the least χ² of any field of emission that turns about it (variable
+//! projection, Golub & Pereyra 1973), so that no field has to be guessed before the axis is known and both
+//! hemispheres are looked at alike: a local minimum near the antipode of the axis is usual (Levis et al. 2022).
+
+mod map;
+mod refine;
+
+use super::Chain;
+use super::linear::{LinearProblem, Prior, Voxels, Weighted};
+use crate::dynamics::Axis;
+use crate::simd::Scalar;
+use kerrlight_geodesic::OutOfRange;
+use rayon::prelude::*;
+use refine::Refinement;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// The data of a scan, and what is looked for in them.
+#[derive(Clone, Copy)]
+pub struct AxisProblem<'a, T: Scalar> {
+    /// Nodes of the rays; few pixels are enough.
+    pub chain: &'a Chain<T>,
+    /// The frames of the movie that count; few are enough.
+    pub frames: &'a [usize],
+    /// The data.
+    pub terms: &'a [Weighted<'a, T>],
+    /// Half the width of the grid, M.
+    pub half_width: f64,
+    /// The largest emission that is allowed.
+    pub upper: f64,
+    /// Penalties; none is the usual.
+    pub priors: &'a [Prior],
+}
+
+/// A grid, and how long its problem is solved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Effort {
+    /// Nodes along each axis.
+    pub nodes: usize,
+    /// Iterations from a dark field.
+    pub iterations: usize,
+}
+
+/// How the sphere is searched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisSettings {
+    /// Points of the lattice over the whole sphere.
+    pub directions: usize,
+    /// What is solved at each.
+    pub coarse: Effort,
+    /// Local minima of the lattice that are refined, the best one of the hemisphere opposite to the best included.
+    pub candidates: usize,
+    /// What is solved in the refinement.
+    pub fine: Effort,
+    /// Times that the step of the refinement is halved; it begins with the distance of lattice points, √(4π/directions).
+    pub halvings: usize,
+}
+
+impl Default for AxisSettings {
+    fn default() -> Self {
+        Self {
+            directions: 160,
+            coarse: Effort { nodes: 16, iterations: 10 },
+            candidates: 3,
+            fine: Effort { nodes: 20, iterations: 20 },
+            halvings: 3,
+        }
+    }
+}
+
+/// An axis and its loss.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisLoss {
+    /// Direction.
+    pub axis: Axis,
+    /// Σ weight · χ²/data of the best field found.
+    pub loss: f64,
+}
+
+/// What a scan found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AxisScan {
+    /// The lattice with its losses, of the coarse problem.
+    pub map: Vec<AxisLoss>,
+    /// The best axis, with the loss of the fine problem.
+    pub best: AxisLoss,
+    /// The best one of the opposite hemisphere, with the loss of the fine problem.
+    pub runner_up: AxisLoss,
+    /// Fine problems that were solved.
+    pub refinements: usize,
+}
+
+/// Told how many problems are solved of about how many, by any thread; says whether to go on.
+pub type ScanWatch<'a> = dyn Fn(usize, usize) -> bool + Sync + 'a;
+
+/// Point k of n on a Fibonacci lattice (Swinbank & Purser 2006): z = 1 − (2k + 1)/n, successive points a golden
+/// angle apart in longitude. Every point stands for 4π/n of the sphere.
+pub fn lattice(directions: usize) -> Vec<Axis> {
+    let golden = core::f64::consts::PI * (3.0 - 5f64.sqrt());
+    let point = |k: usize| {
+        let z = 1.0 - (2 * k + 1) as f64 / directions as f64;
+        let (s, (sin, cos)) = ((1.0 - z * z).sqrt(), (golden * k as f64).sin_cos());
+        Axis::new([s * cos, s * sin, z]).ok()
+    };
+    (0..directions).filter_map(point).collect()
+}
+
+impl AxisSettings {
+    fn checked(self) -> Result<Self, OutOfRange> {
+        let check = |field, value: usize, ok, allowed| {
+            if ok { Ok(()) } else { Err(OutOfRange { field, value: value as f64, allowed }) }
+        };
+        check("directions", self.directions, self.directions >= 8, "8 or more")?;
+        check("candidates", self.candidates, self.candidates >= 2, "2 or more")?;
+        for Effort { nodes, iterations } in [self.coarse, self.fine] {
+            check("nodes", nodes, (4..=256).contains(&nodes), "4 to 256 along each axis")?;
+            check("iterations", iterations, iterations > 0, "1 or more")?;
+        }
+        Ok(self)
+    }
+
+    /// Distance of lattice points, rad.
+    fn distance(&self) -> f64 {
+        (4.0 * core::f64::consts::PI / self.directions as f64).sqrt()
+    }
+}
+
+/// A scan under way.
+struct Scanner<'a, T: Scalar> {
+    problem: &'a AxisProblem<'a, T>,
+    watch: &'a ScanWatch<'a>,
+    solved: AtomicUsize,
+    expected: usize,
+    cancelled: AtomicBool,
+}
+
+impl<T: Scalar + Default> Scanner<'_, T> {
+    /// The loss of each axis; none if the scan was cancelled. Axes are shared among threads, and each
+    /// has its own sums: their number does not change a bit.
+    fn losses(&self, axes: &[Axis], effort: Effort) -> Result<Option<Vec<AxisLoss>>, OutOfRange> {
+        let all: Vec<Option<AxisLoss>> =
+            axes.par_iter().map(|axis| self.loss(*axis, effort)).collect::<Result<_, _>>()?;
+        Ok(all.into_iter().collect())
+    }
+
+    fn loss(&self, axis: Axis, effort: Effort) -> Result<Option<AxisLoss>, OutOfRange> {
+        if self.cancelled.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
+        let mut own = None;
+        if self.problem.chain.is_shifted() {
+            own.insert(self.problem.chain.clone()).weigh(axis);
+        }
+        let AxisProblem { chain, frames, terms, half_width, upper, priors } = *self.problem;
+        let chain = own.as_ref().unwrap_or(chain);
+        let voxels = Voxels::cube(effort.nodes, half_width);
+        let problem = LinearProblem { chain, axis, frames, terms, voxels, upper, priors };
+        let loss = problem.least(effort.iterations)?;
+        let solved = self.solved.fetch_add(1, Ordering::Relaxed) + 1;
+        if !(self.watch)(solved, self.expected.max(solved)) {
+            self.cancelled.store(true, Ordering::Relaxed);
+        }
+        Ok(Some(AxisLoss { axis, loss }))
+    }
+}
+
+impl<T: Scalar + Default> Scanner<'_, T> {
+    /// The best refined axis of the opposite hemisphere; where all have come over to this one, the lattice's best
+    /// there, with the loss of the fine problem.
+    fn opposite(
+        &self,
+        axis: Axis,
+        found: &[AxisLoss],
+        map: &[AxisLoss],
+        effort: Effort,
+    ) -> Result<Option<AxisLoss>, OutOfRange> {
+        let best = |all: &[AxisLoss]| {
+            let there = all.iter().filter(|found| found.axis.dot(axis) < 0.0);
+            there.min_by(|a, b| a.loss.total_cmp(&b.loss)).copied()
+        };
+        if let Some(found) = best(found) {
+            return Ok(Some(found));
+        }
+        let other = best(map).map_or(axis.antipode(), |other| other.axis);
+        Ok(self.losses(&[other], effort)?.and_then(|losses| losses.first().copied()))
+    }
+}
+
+/// The axis of least loss on the whole sphere; none if the watch wanted no more.
+///
+/// # Errors
+/// If a number is out of its range, or data do not fit the rays.
+pub fn scan_axis<T: Scalar + Default>(
+    problem: &AxisProblem<'_, T>,
+    settings: &AxisSettings,
+    watch: &ScanWatch<'_>,
+) -> Result<Option<AxisScan>, OutOfRange> {
+    let settings = settings.checked()?;
+    let scanner = Scanner {
+        problem,
+        watch,
+        solved: AtomicUsize::new(0),
+        expected: settings.directions + settings.candidates * (7 + 6 * settings.halvings),
+        cancelled: AtomicBool::new(false),
+    };
+    let Some(map) = scanner.losses(&lattice(settings.directions), settings.coarse)? else {
+        return Ok(None);
+    };
+    let candidates = candidates(&map, settings.candidates, settings.distance());
+    let refinement =
+        Refinement { scanner: &scanner, effort: settings.fine, halvings: settings.halvings };
+    let mut found = Vec::new();
+    for candidate in candidates {
+        match refinement.run(candidate, 0.5 * settings.distance())? {
+            Some(refined) => found.push(refined),
+            None => return Ok(None),
+        }
+    }
+    found.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+    let best = found[0];
+    let Some(runner_up) = scanner.opposite(best.axis, &found, &map, settings.fine)? else {
+        return Ok(None);
+    };
+    let solved = scanner.solved.load(Ordering::Relaxed);
+    Ok(Some(AxisScan { refinements: solved - map.len(), map, best, runner_up }))
+}
+
+/// The best points that are not near better ones; one of the hemisphere opposite to the best is among them.
+fn candidates(map: &[AxisLoss], count: usize, distance: f64) -> Vec<Axis> {
+    let mut order = map.to_vec();
+    order.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+    let apart = (2.0 * distance).cos();
+    let mut chosen: Vec<Axis> = Vec::new();
+    for point in &order {
+        if chosen.len() < count && chosen.iter().all(|axis| axis.dot(point.axis) < apart) {
+            chosen.push(point.axis);
+        }
+    }
+    let Some(first) = chosen.first().copied() else { return chosen };
+    let opposite = |axis: &Axis| axis.dot(first) < 0.0;
+    let other = order.iter().find(|point| opposite(&point.axis));
+    if let Some(other) = other.filter(|_| !chosen.iter().any(opposite)) {
+        chosen.pop();
+        chosen.push(other.axis);
+    }
+    chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ImageTerm;
+    use super::super::linear::tests::{FRAMES, chain, movie_about};
+    use super::*;
+
+    #[test]
+    fn exact_lattice_covers_the_sphere() {
+        let points = lattice(500);
+        for target in lattice(77) {
+            let nearest = points.iter().map(|p| p.dot(target)).fold(-1.0, f64::max);
+            assert!(nearest > 0.09f64.cos(), "{target:?} {nearest}");
+        }
+        let mean: Vec<f64> =
+            (0..3).map(|c| points.iter().map(|p| p.vector()[c]).sum::<f64>() / 500.0).collect();
+        assert!(mean.iter().all(|m| m.abs() < 2e-3), "{mean:?}");
+    }
+
+    /// A spot that turns about a known axis, in the field that the fine grid can represent.
+    #[test]
+    fn exact_axis_of_its_own_movie_on_any_number_of_threads() {
+        let (chain, voxels) = (chain(), Voxels::cube(9, 5.0));
+        let truth = Axis::new([0.6, -0.3, -0.7]).unwrap();
+        let light = |k: usize| {
+            let [x, y, z] = voxels.position(k);
+            (-((x - 1.5).powi(2) + (y + 2.0).powi(2) + (z - 2.0).powi(2)) / 2.0).exp()
+        };
+        let field: Vec<f64> = (0..voxels.count()).map(light).collect();
+        let pixels = movie_about(truth, &chain, &voxels, &field);
+        let term = ImageTerm::new(pixels, chain.pixels(), 1.0).unwrap();
+        let problem = AxisProblem {
+            chain: &chain,
+            frames: &FRAMES,
+            terms: &[Weighted { weight: 1.0, term: &term }],
+            half_width: 5.0,
+            upper: 2.0,
+            priors: &[],
+        };
+        let settings = AxisSettings {
+            directions: 60,
+            coarse: Effort { nodes: 8, iterations: 10 },
+            fine: Effort { nodes: 9, iterations: 30 },
+            ..AxisSettings::default()
+        };
+        let run = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| scan_axis(&problem, &settings, &|_, _| true)).unwrap().unwrap()
+        };
+        let scan = run(1);
+        assert_eq!(scan, run(4));
+        assert_eq!(scan.map.len(), 60);
+        assert!(scan.best.axis.dot(truth) > 0.99, "{:?}", scan.best);
+        assert!(scan.runner_up.axis.dot(scan.best.axis) < 0.0);
+        assert!(scan.best.loss < scan.runner_up.loss);
+        assert_eq!(scan_axis(&problem, &settings, &|_, _| false), Ok(None));
+        let none = AxisSettings { directions: 2, ..settings };
+        let text = scan_axis(&problem, &none, &|_, _| true).unwrap_err().to_string();
+        assert!(text.contains("directions = 2 "), "{text}");
+    }
+}
