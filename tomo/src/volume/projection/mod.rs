@@ -204,10 +204,11 @@ mod tests {
     fn exact_frames_are_right_handed() {
         for view in VIEWS {
             let [a, b, c] = view.frame();
-            for k in 0..3 {
+            let cross = |k: usize| {
                 let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-                assert!((a[i] * b[j] - a[j] * b[i] - c[k]).abs() < 1e-15);
-            }
+                a[i] * b[j] - a[j] * b[i]
+            };
+            assert!((0..3).all(|k| (cross(k) - c[k]).abs() < 1e-15));
         }
         assert!((VIEWS[0].seen([0.0, 1.0, 0.0])[0] - 1.0).abs() < 1e-15);
     }
