@@ -10,7 +10,7 @@ mod view;
 
 pub use pictures::{Figure, frames, projections, slices};
 pub use plot::{Axis, LinePlot, Marks, Series};
-pub use view::{Motion, View3d};
+pub use view::{Motion, View3d, rates};
 
 use crate::output::Output;
 

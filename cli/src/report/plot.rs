@@ -1,6 +1,7 @@
 //! Curves and points as inline SVG.
 
 use anyhow::bail;
+use kuva::plot::LegendPosition;
 use kuva::plot::line::LinePlot as Line;
 use kuva::plot::scatter::ScatterPlot;
 use kuva::render::layout::Layout;
@@ -145,8 +146,9 @@ impl LinePlot {
             .with_y_label(self.y.title())
             .with_tick_size(13)
             .with_label_size(15)
-            .with_width(640.0)
-            .with_height(420.0);
+            .with_legend_position(LegendPosition::OutsideBottomColumns)
+            .with_width(540.0)
+            .with_height(400.0);
         let layout = if self.x.log { layout.with_log_x() } else { layout };
         if !self.y.log {
             return layout;

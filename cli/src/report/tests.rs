@@ -1,15 +1,13 @@
-//! Pages of spots that turn about a tilted axis, read as text and, where there is one, by a browser.
+//! Pages of spots that turn about a tilted axis, read as text.
+
+mod browser;
 
 use super::*;
 use kerrlight_tomo::dynamics::AngularVelocity;
 use kerrlight_tomo::volume::projection::Surroundings;
 use kerrlight_tomo::volume::slices::Through;
-use kerrlight_tomo::volume::vti::{self, Field};
 use kerrlight_tomo::volume::{Shown, Volume};
 use std::f64::consts::TAU;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
 
 const XI: [f64; 3] = [0.5, 0.0, -0.866_025_403_784_438_6];
 
@@ -33,8 +31,7 @@ fn spots(nodes: usize, sigma: f64, peak: f64) -> Volume {
 }
 
 fn motion() -> Motion {
-    let flow = AngularVelocity::bhnerf();
-    let rates = (0..40).map(|k| 2.0 + 0.08 * f64::from(k)).map(|r| [r, flow.rate(r)]).collect();
+    let rates = rates(&AngularVelocity::bhnerf(), [2.0, 5.0]);
     let time_unit = "orbits at 3.5 M".to_owned();
     Motion { axis: XI, rates, times: [0.0, 1.0], reference: 0.0, time_unit }
 }
@@ -235,74 +232,4 @@ fn wrong_numbers_of_the_view_are_named() {
     wrong(|view| view.motion.as_mut().unwrap().axis = [0.0; 3], "axis");
     wrong(|view| view.motion.as_mut().unwrap().times = [1.0, 1.0], "times");
     wrong(|view| view.motion.as_mut().unwrap().rates.clear(), "rates");
-}
-
-/// A browser that can be run without a screen, if there is one.
-fn browser() -> Option<PathBuf> {
-    let names = ["chromium", "chromium-browser", "google-chrome"];
-    let folders = std::env::var_os("PATH")?;
-    let all = std::env::split_paths(&folders).flat_map(|f| names.map(|name| f.join(name)));
-    all.into_iter().find(|path| path.is_file())
-}
-
-/// What the browser makes of a page, as HTML.
-fn dump(browser: &Path, folder: &Path, fragment: &str) -> String {
-    let out = folder.join("dump.html");
-    let page = format!("file://{}#{fragment}", folder.join("report.html").display());
-    let profile = format!("--user-data-dir={}", folder.join("profile").display());
-    let switches = ["--headless=new", "--no-sandbox", "--enable-unsafe-swiftshader", "--dump-dom"];
-    let mut child = Command::new(browser)
-        .args(switches)
-        .args(["--timeout=20000", &profile, &page])
-        .stdout(std::fs::File::create(&out).unwrap())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    let start = Instant::now();
-    while child.try_wait().unwrap().is_none() {
-        if start.elapsed() > Duration::from_secs(120) {
-            let _ = child.kill();
-            panic!("the browser has not ended after two minutes");
-        }
-        std::thread::sleep(Duration::from_millis(50));
-    }
-    std::fs::read_to_string(out).unwrap()
-}
-
-fn status(dump: &str) -> &str {
-    let found = dump.split_once("<span id=\"status\" role=\"status\">").unwrap().1;
-    found.split_once('<').unwrap().0
-}
-
-fn write(report: &Report, folder: &Path) {
-    report.write(&Output::new(&folder.join("report.html"), "html").unwrap()).unwrap();
-    let view = report.view.as_ref().unwrap();
-    let fields = [
-        Field { name: "emission", volume: &view.recovered },
-        Field { name: "emission_truth", volume: view.truth.as_ref().unwrap() },
-    ];
-    let output = Output::new(&folder.join("emission.vti"), "vti").unwrap();
-    output.write_with(|file| Ok(vti::write(file, &fields)?)).unwrap();
-}
-
-/// The page runs in a browser, with WebGL2 or without it. `KERRLIGHT_REPORT` is a folder to keep it in, with
-/// the volumes for tests/reference/read_vti.py.
-#[test]
-fn code_page_runs_in_a_browser() {
-    let folder = tempfile::tempdir().unwrap();
-    let report = report(64);
-    write(&report, folder.path());
-    if let Some(place) = std::env::var_os("KERRLIGHT_REPORT") {
-        write(&report, Path::new(&place));
-    }
-    let Some(browser) = browser() else {
-        eprintln!("no chromium in PATH: the page was made, but no browser has looked at it");
-        return;
-    };
-    let found = dump(&browser, folder.path(), "time=0.5&azimuth=70&volume=truth");
-    assert!(["ready: webgl2", "ready: fallback"].contains(&status(&found)), "{}", status(&found));
-    assert!(found.contains("<output id=\"time-text\">0.5 orbits at 3.5 M</output>"));
-    assert_eq!(found.matches("type=\"radio\"").count(), 2);
-    let found = dump(&browser, folder.path(), "renderer=fallback");
-    assert_eq!(status(&found), "ready: fallback");
 }

@@ -2,6 +2,7 @@
 
 use super::html::{escape, fill};
 use anyhow::bail;
+use kerrlight_tomo::dynamics::AngularVelocity;
 use kerrlight_tomo::image::colormap::Colormap;
 use kerrlight_tomo::volume::Volume;
 use serde_json::json;
@@ -32,6 +33,12 @@ pub struct Motion {
     pub reference: f64,
     /// The unit of time, for instance `GM/c³` or `h`.
     pub time_unit: String,
+}
+
+/// Angular velocities at 200 radii between two, for [`Motion::rates`]; 0 < first < last, in M.
+pub fn rates(flow: &AngularVelocity, [first, last]: [f64; 2]) -> Vec<[f64; 2]> {
+    let radius = |k: u32| first + (last - first) * f64::from(k) / 199.0;
+    (0..200).map(radius).map(|r| [r, flow.rate(r)]).collect()
 }
 
 /// What the viewer shows.
