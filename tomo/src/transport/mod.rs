@@ -469,6 +469,7 @@ fn glimpse(sight: &Sight, gather: Gather) -> Glimpse {
         rgb: gather.rgb,
         redshift: mean,
         crossings: sight.crossings,
+        disc_images: gather.disc_images,
         radius: gather.place.radius,
         azimuth: wrap(gather.place.azimuth),
         delay: gather.place.delay,

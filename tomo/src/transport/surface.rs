@@ -39,8 +39,9 @@ impl Stage {
     /// Light of the disc: I = g^{3+α} I_em at every crossing up to Mino time `end`.
     pub(super) fn add_disc(&self, hits: &[Hit], seen: Seen<'_>, end: f64, gather: &mut Gather) {
         let Some(disc) = &self.disc else { return };
-        for hit in hits.iter().take_while(|hit| hit.mino_time <= end) {
+        for (number, hit) in hits.iter().take_while(|hit| hit.mino_time <= end).enumerate() {
             if disc.covers(hit.place.radius) {
+                gather.disc_images |= 1 << number.min(31);
                 self.add_hit(disc, hit, seen, gather);
             }
         }

@@ -5,7 +5,7 @@ use crate::scene::{Rotation, VolumeSource};
 use crate::volume::Volume;
 use kerrlight_geodesic::bundle::RayNodes;
 
-/// `value` on the nodes of a cube, shrunk to what `lit` corners need.
+/// `value` on the nodes of a box.
 fn volume(nodes: usize, [low, high]: [[f64; 3]; 2], value: impl Fn([f64; 3]) -> f64) -> VolumeFile {
     let empty = Volume::new([nodes; 3], low, high, vec![0.0; nodes.pow(3)]).unwrap();
     let values = (0..nodes.pow(3)).map(|k| value(empty.position(k)) as f32).collect();
@@ -90,7 +90,7 @@ fn against_spot(nodes: usize, sheared: bool, axis: [f64; 3], set: &[&str]) -> [f
     let found = stage(with_spot.clone(), source, gaussian(center, 0.8, nodes));
     with_spot.spot = vec![one];
     let expected = look(&Stage::new(&with_spot, None).unwrap(), &TIMES);
-    assert!(expected.iter().filter(|seen| seen.intensity > 0.01).count() > 100);
+    assert!(expected.iter().filter(|seen| seen.intensity > 0.01).count() > 30);
     distances(&look(&found, &TIMES), &expected)
 }
 
@@ -179,7 +179,7 @@ fn exact_chords_of_uniform_bodies() {
             VolumeSource { reference_time: None, ..source(Rotation::None, [0.0, 0.0, 1.0], 0.0) };
         let stage = stage(scene.clone(), still, file);
         let (mut lit, mut sum, mut bias) = (0, 0.0, 0.0);
-        for k in 0..200 {
+        for k in 1..200 {
             let part = |f: f64| 6.0 * ((f64::from(k) * f).fract() - 0.5);
             let (alpha, beta) = (center[1] + part(0.754_877), sin - 2.0 * cos + part(0.569_840));
             let expected = exact(alpha, beta);
