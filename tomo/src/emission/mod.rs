@@ -1,6 +1,7 @@
 //! What shines. A source knows its light in the gas frame and how its gas moves; how light
 //! adds up along a ray is the business of [`transport`](crate::transport).
 
+pub mod black_body;
 pub mod disc;
 pub mod gas;
 pub mod mesh;

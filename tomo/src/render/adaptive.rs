@@ -2,8 +2,8 @@
 //! and again, where they are estimated to be off by most.
 //!
 //! A pixel starts with the ray at its centre. It is cut if one of its eight neighbours sees
-//! another lensing band (number of crossings of the equatorial plane), another fate of the ray
-//! or emission where it sees none, or if second differences say that its mean is off by more
+//! another lensing band (number of crossings of the equatorial plane), another image of the disc,
+//! another fate of the ray or emission where it sees none, or if second differences say that its mean is off by more
 //! than the tolerance. Neighbours beyond a tile are traced again, so that no pixel
 //! depends on the tiles.
 
@@ -35,26 +35,37 @@ struct Light {
     intensity: f64,
     rgb: [f32; 3],
     stokes: [f64; 3],
-    /// Lensing band, fate and whether there is emission; u32::MAX is never one.
-    kind: u32,
+    kind: Kind,
     unresolved: bool,
+}
+
+/// What rays of one smooth piece of the picture have in common.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+struct Kind {
+    /// Lensing band and fate.
+    band: (u32, Fate),
+    /// Images of the disc that are seen.
+    disc_images: u32,
+    /// Whether there is emission.
+    lit: bool,
 }
 
 impl Light {
     /// Whether a lensing band or the end of rays lies between two rays.
     fn other_band(&self, other: &Light) -> bool {
-        self.kind >> 1 != other.kind >> 1
+        self.kind.band != other.kind.band
     }
 }
 
 impl From<&Glimpse> for Light {
     fn from(seen: &Glimpse) -> Self {
-        let lit = u32::from(seen.radius > 0.0);
+        let band = (seen.crossings, seen.fate);
+        let (disc_images, lit) = (seen.disc_images, seen.radius > 0.0);
         Light {
             intensity: seen.intensity,
             rgb: seen.rgb,
             stokes: seen.stokes,
-            kind: seen.crossings << 3 | (seen.fate as u32) << 1 | lit,
+            kind: Kind { band, disc_images, lit },
             unresolved: seen.fate == Fate::Unresolved,
         }
     }
@@ -108,6 +119,12 @@ impl Cell {
         Cell { center, level, quarters, error: error * area(level) }
     }
 
+    /// Whether it touches the pixel's border.
+    fn is_at_border(&self) -> bool {
+        let half = 0.5 * 0.5f64.powi(self.level as i32);
+        self.center.iter().any(|x| x.abs() + half > 0.5 - 1e-9)
+    }
+
     /// Centres of the quarters of a cell.
     fn places(center: [f64; 2], level: u32) -> [[f64; 2]; 4] {
         let step = 0.25 * 0.5f64.powi(level as i32);
@@ -130,14 +147,32 @@ struct Cut {
     cells: Vec<Cell>,
     /// Largest intensity of its rays and its neighbours' first ones.
     bright: f64,
+    /// How much neighbours' first rays differ if some are of another kind than its own, and none
+    /// of its rays is: an edge may run through between its border and its outermost rays.
+    contrast: f64,
     rays: u32,
     unresolved: u32,
 }
 
 impl Cut {
     /// Root of the sum of squares: the errors of cells at an edge are independent.
-    fn error(&self) -> f64 {
+    fn inner_error(&self) -> f64 {
         self.cells.iter().map(|cell| cell.error * cell.error).sum::<f64>().sqrt()
+    }
+
+    /// What an edge that no ray has told of may do: a quarter of what lies between border and
+    /// rays, whose share is 2^−(2 + level).
+    fn border_error(&self) -> f64 {
+        HIDDEN * self.contrast * 0.5f64.powi(self.border_level() as i32)
+    }
+
+    fn border_level(&self) -> u32 {
+        let border = self.cells.iter().filter(|cell| cell.is_at_border());
+        border.map(|cell| cell.level).min().unwrap_or(0)
+    }
+
+    fn error(&self) -> f64 {
+        self.inner_error().hypot(self.border_error())
     }
 
     /// The cells to be cut next, the worst ones, moved to the end; how many.
@@ -147,7 +182,12 @@ impl Cut {
         }
         let may = |cell: &Cell| cell.level < DEEPEST;
         let most = self.cells.iter().filter(|cell| may(cell)).fold(0.0, |m, c| c.error.max(m));
-        let chosen = |cell: &Cell| may(cell) && most > 0.0 && cell.error >= 0.5 * most;
+        // The border first where it is what counts.
+        let (border, level) = (self.border_error() > self.inner_error(), self.border_level());
+        let chosen = |cell: &Cell| {
+            let worst = most > 0.0 && cell.error >= 0.5 * most;
+            may(cell) && if border { cell.is_at_border() && cell.level == level } else { worst }
+        };
         self.cells.sort_by_key(chosen);
         self.cells.iter().filter(|cell| chosen(cell)).count()
     }
@@ -158,6 +198,9 @@ impl Cut {
         for (place, seen) in quarters.iter_mut().zip(seen) {
             *place = Light::from(seen);
             self.unresolved += u32::from(place.unresolved);
+            if place.kind != middle.kind {
+                self.contrast = 0.0;
+            }
             self.bright = self.bright.max(place.intensity);
         }
         self.rays += 4;
@@ -285,16 +328,17 @@ fn first(
     for row in rows {
         for column in columns.clone() {
             let center = seen[place(column, row)];
-            let Estimate { error, other, bright } = estimate(|dx, dy| {
+            let Estimate { error, contrast, bright } = estimate(|dx, dy| {
                 let to = |k: usize, d: isize, range: &Range<usize>| {
                     k.saturating_add_signed(d).clamp(range.start, range.end - 1)
                 };
                 &light[place(to(column, dx, &wide), to(row, dy, &high))]
             });
-            if other || error > tolerance {
+            if contrast.is_some() || error > tolerance {
                 let (cells, rays, unresolved) = (Vec::new(), 0, 0);
                 let pixel = pixels.len();
-                cuts.push(Cut { pixel, column, row, cells, bright, rays, unresolved });
+                let contrast = contrast.unwrap_or(0.0);
+                cuts.push(Cut { pixel, column, row, cells, bright, contrast, rays, unresolved });
             }
             pixels.push(Pixel {
                 intensity: center.intensity,
@@ -313,8 +357,8 @@ fn first(
 /// What a pixel's first ray and those of its neighbours say.
 struct Estimate {
     error: f64,
-    /// Whether a neighbour is of another kind.
-    other: bool,
+    /// Range of intensities if a neighbour is of another kind.
+    contrast: Option<f64>,
     /// Largest intensity.
     bright: f64,
 }
@@ -329,14 +373,15 @@ fn estimate<'a>(at: impl Fn(isize, isize) -> &'a Light) -> Estimate {
     let around = || (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy)));
     let bright = around().map(|(dx, dy)| value(dx, dy)).fold(0.0, f64::max);
     let other = around().any(|(dx, dy)| at(dx, dy).kind != middle.kind);
+    let contrast = other.then(|| range(around().map(|(dx, dy)| value(dx, dy))));
     let mut error = smooth / 12.0;
-    if other {
-        error = error.max(0.25 * range(around().map(|(dx, dy)| value(dx, dy))));
+    if let Some(contrast) = contrast {
+        error = error.max(0.25 * contrast);
     }
     if around().any(|(dx, dy)| at(dx, dy).other_band(middle)) {
         error = error.max(HIDDEN * bright);
     }
-    Estimate { error, other, bright }
+    Estimate { error, contrast, bright }
 }
 
 /// The error that each pixel may have so that the whole picture's relative L1 error stays below

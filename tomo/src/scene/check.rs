@@ -160,6 +160,11 @@ fn check_combinations(scene: &Scene) -> Result<(), Invalid> {
         let allowed = "false with a [[volume]]: only surfaces hide it";
         return Err(Invalid::new("effects.absorption", true, allowed));
     }
+    let hot = scene.disc.as_ref().and_then(|disc| disc.peak_temperature_k);
+    if let (Some(t), true) = (hot, effects.redshift && effects.spectral_index != Some(1.0)) {
+        let allowed = "only with effects.spectral_index = 1: intensities of all wavelengths";
+        return Err(Invalid::new("disc.peak_temperature_k", shown(t), allowed));
+    }
     let bodies = !scene.spot.is_empty() || !scene.mesh.is_empty();
     if bodies && !effects.lensing {
         let allowed =
@@ -237,6 +242,10 @@ fn check_disc(disc: &Disc, hole: &Kerr) -> Result<(), Invalid> {
     let allowed = format!("a radius above the inner edge, {inner:.6}, and at most 1e9");
     number("disc.outer_edge", outer, outer <= 1e9 && outer > inner, &allowed)?;
     brightness("disc.peak_intensity", disc.peak_intensity)?;
+    if let Some(t) = disc.peak_temperature_k {
+        let ok = (300.0..=1e8).contains(&t);
+        number("disc.peak_temperature_k", t, ok, "a temperature in [300, 1e8] (K)")?;
+    }
     check_color("disc.color", disc.color)
 }
 

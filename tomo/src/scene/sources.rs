@@ -72,6 +72,10 @@ pub struct Disc {
     pub peak_intensity: f64,
     /// Whether the disc hides what is behind it.
     pub opaque: bool,
+    /// Temperature in K where the flux profile peaks, of a disc that shines like a black body: its
+    /// R, G, B are those of a black body, times its colour, which is white then unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub peak_temperature_k: Option<f64>,
     /// Linear colour of its light in the R, G, B channels.
     #[serde(default = "white")]
     pub color: [f32; 3],

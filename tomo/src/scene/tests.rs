@@ -56,6 +56,28 @@ fn exact_round_trip_through_the_resolved_scene() {
 }
 
 #[test]
+fn wrong_volumes_and_temperatures_name_key_and_range() {
+    let volume = |more: &str| {
+        let head = "[[volume]]\npath = \"v.npz\"\nfactor = 1.0\n";
+        let text = SCENE.replacen("[[spot]]", &format!("{head}{more}\n\n[[spot]]"), 1);
+        Scene::parse(&text).map_err(|error| error.to_string())
+    };
+    assert!(volume("rotation = \"none\"").is_ok());
+    let text = volume("rotation = \"keplerian\"").unwrap_err();
+    assert!(text.contains("`volume.0.reference_time` is missing"), "{text}");
+    let law = "rotation = { power-law = { radius = 0.0, rate = 1.0, exponent = 0.0 } }";
+    let text = volume(&format!("{law}\nreference_time = 0.0")).unwrap_err();
+    assert!(text.contains("`volume.0.rotation.power-law.radius` = 0"), "{text}");
+    let text = volume("rotation = \"none\"\nlow = [0.0, 0.0, 0.0]").unwrap_err();
+    assert!(text.contains("`volume.0.high` is missing"), "{text}");
+    let corners = "low = [0.0, 0.0, 0.0]\nhigh = [1.0, 0.0, 1.0]";
+    let text = volume(&format!("rotation = \"none\"\n{corners}")).unwrap_err();
+    assert!(text.contains("above low"), "{text}");
+    let text = error("opaque = true", "opaque = true\npeak_temperature_k = 10.0");
+    assert!(text.contains("[300, 1e8]"), "{text}");
+}
+
+#[test]
 fn values_out_of_range_name_line_key_and_range() {
     let text = error("spin = 0.9", "spin = 1.2");
     assert_eq!(text, "line 3: `hole.spin` = 1.2 is not allowed: a number in [-1, 1]");

@@ -29,6 +29,9 @@ pub struct Glimpse {
     pub redshift: f64,
     /// Number of crossings of the equatorial plane outside the horizon, along the whole ray.
     pub crossings: u32,
+    /// Which crossings of the equatorial plane are on the disc and seen: bit n for number n, counted
+    /// from 0 (the last bit for all from 31 on).
+    pub disc_images: u32,
     /// Radius of the brightest contribution; 0 where there is none.
     pub radius: f64,
     /// Azimuth of the brightest contribution in \[−π, π\]; 0 where there is none.
@@ -66,6 +69,7 @@ pub(super) struct Gather {
     pub place: Place,
     pub depth: f64,
     pub stokes: [f64; 3],
+    pub disc_images: u32,
 }
 
 impl Gather {
@@ -78,6 +82,7 @@ impl Gather {
             place: Place::default(),
             depth: 0.0,
             stokes: [0.0; 3],
+            disc_images: 0,
         }
     }
 

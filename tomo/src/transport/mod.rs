@@ -44,7 +44,7 @@ use rays::{End, Sight};
 use spots::{Met, SpotTree};
 use std::sync::{Arc, Mutex};
 use straight::Line;
-use surface::Hit;
+use surface::{Hit, Seen};
 use tree::WalkScratch;
 
 /// A scene with everything computed that does not depend on the ray.
@@ -364,8 +364,9 @@ impl Stage {
         let mut still = Gather::new();
         let hits = &scratch.hits[sight.hits.clone()];
         let screen = self.screen_point(x, y);
-        let light = (sight.lambda, screen.as_ref());
-        self.add_disc(hits, light, sight.last_time(), &mut still);
+        let shift = self.redshift.and_then(|_| self.view.blueshift(x, y));
+        let seen_as = Seen { lambda: sight.lambda, screen: screen.as_ref(), shift };
+        self.add_disc(hits, seen_as, sight.last_time(), &mut still);
         if sight.by_steps {
             self.add_meshes(scratch, sight.last_time(), &mut still);
         }
@@ -373,7 +374,6 @@ impl Stage {
         let clock = scratch.meter.start();
         let sky = self.sky_light(x, y, &sight, scratch)?;
         scratch.meter.stop(Part::Sky, clock);
-        let shift = self.redshift.and_then(|_| self.view.blueshift(x, y));
         let clock = scratch.meter.start();
         for (j, time) in times.iter().enumerate() {
             let mut gather = still.clone();
@@ -469,6 +469,7 @@ fn glimpse(sight: &Sight, gather: Gather) -> Glimpse {
         rgb: gather.rgb,
         redshift: mean,
         crossings: sight.crossings,
+        disc_images: gather.disc_images,
         radius: gather.place.radius,
         azimuth: wrap(gather.place.azimuth),
         delay: gather.place.delay,

@@ -18,6 +18,16 @@ pub(super) struct Hit {
     pub depth: f64,
 }
 
+/// How light of a surface reaches the eye.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Seen<'a> {
+    pub lambda: f64,
+    /// Its place on the screen, if light is polarised.
+    pub screen: Option<&'a ScreenPoint>,
+    /// What a camera adds to the redshift.
+    pub shift: Option<f64>,
+}
+
 impl Stage {
     /// The first of `hits` before Mino time `until` that hides the rest.
     pub(super) fn surface(&self, hits: &[Hit], until: f64) -> Option<f64> {
@@ -27,28 +37,18 @@ impl Stage {
     }
 
     /// Light of the disc: I = g^{3+α} I_em at every crossing up to Mino time `end`.
-    pub(super) fn add_disc(
-        &self,
-        hits: &[Hit],
-        (lambda, screen): (f64, Option<&ScreenPoint>),
-        end: f64,
-        gather: &mut Gather,
-    ) {
+    pub(super) fn add_disc(&self, hits: &[Hit], seen: Seen<'_>, end: f64, gather: &mut Gather) {
         let Some(disc) = &self.disc else { return };
-        for hit in hits.iter().take_while(|hit| hit.mino_time <= end) {
+        for (number, hit) in hits.iter().take_while(|hit| hit.mino_time <= end).enumerate() {
             if disc.covers(hit.place.radius) {
-                self.add_hit(disc, hit, (lambda, screen), gather);
+                gather.disc_images |= 1 << number.min(31);
+                self.add_hit(disc, hit, seen, gather);
             }
         }
     }
 
-    fn add_hit(
-        &self,
-        disc: &DiscModel,
-        hit: &Hit,
-        (lambda, screen): (f64, Option<&ScreenPoint>),
-        gather: &mut Gather,
-    ) {
+    fn add_hit(&self, disc: &DiscModel, hit: &Hit, seen: Seen<'_>, gather: &mut Gather) {
+        let Seen { lambda, screen, shift } = seen;
         let r = hit.place.radius;
         let g = match self.redshift {
             Some(_) => keplerian_redshift(&self.hole, r, lambda).unwrap_or(0.0),
@@ -63,7 +63,7 @@ impl Stage {
         if hit.depth > 0.0 {
             intensity *= (-hit.depth).exp();
         }
-        gather.add(intensity, g, disc.color);
+        gather.add(intensity, g, disc.color(r, g * shift.unwrap_or(1.0)));
         if let Some(stokes) = stokes {
             gather.add_stokes(intensity, share(&stokes));
         }

@@ -2,6 +2,7 @@ use super::*;
 use crate::scene::Spot;
 
 mod meshes;
+mod volumes;
 
 const SCENE: &str = r#"
 [hole]
