@@ -147,6 +147,8 @@ impl LinePlot {
             .with_tick_size(13)
             .with_label_size(15)
             .with_legend_position(LegendPosition::OutsideBottomColumns)
+            .with_legend_box(false)
+            .with_x_label_offset(0.0, -4.0)
             .with_width(540.0)
             .with_height(400.0);
         let layout = if self.x.log { layout.with_log_x() } else { layout };

@@ -130,14 +130,15 @@ impl<'a> Marcher<'a> {
     fn sum(&self, start: [f32; 3], stride: [f32; 3], steps: u32) -> f32 {
         let values = self.volume.values();
         let [_, ny, nz] = self.volume.nodes;
-        let last = self.volume.nodes.map(|n| (n - 2) as f32);
+        let last = self.volume.nodes.map(|n| n as i32 - 2);
         let mut sum = 0.0;
         for step in 0..steps {
             let mut part = [0.0; 3];
             let cell: [usize; 3] = core::array::from_fn(|k| {
                 let place = start[k] + step as f32 * stride[k];
-                let first = place.floor().clamp(0.0, last[k]);
-                part[k] = place - first;
+                // Rounded towards 0: without SSE4.1, floor is a call.
+                let first = (place as i32).clamp(0, last[k]);
+                part[k] = place - first as f32;
                 first as usize
             });
             let first = (cell[0] * ny + cell[1]) * nz + cell[2];
@@ -145,8 +146,12 @@ impl<'a> Marcher<'a> {
                 Some([a, b]) => a + (b - a) * part[2],
                 _ => 0.0,
             };
-            let side = |offset: usize| edge(offset) + (edge(offset + nz) - edge(offset)) * part[1];
-            sum += side(0) + (side(ny * nz) - side(0)) * part[0];
+            let side = |offset: usize| {
+                let (near, far) = (edge(offset), edge(offset + nz));
+                near + (far - near) * part[1]
+            };
+            let (near, far) = (side(0), side(ny * nz));
+            sum += near + (far - near) * part[0];
         }
         sum
     }
