@@ -21,3 +21,15 @@ fn styled(length: u64, style: &str) -> ProgressBar {
 pub fn steps(count: u64) -> ProgressBar {
     styled(count, "{bar:30} step {pos} of {len}  {msg}  {elapsed} gone, {eta} left")
 }
+
+/// A bar that counts axes.
+pub fn axes(count: u64) -> ProgressBar {
+    styled(count, "{bar:30} axis {pos} of {len}  {elapsed} gone, {eta} left")
+}
+
+/// A line for work of unknown length.
+pub fn waiting(what: &str) -> ProgressBar {
+    let style = ProgressStyle::with_template("{prefix}: {msg}  {elapsed} gone");
+    let style = style.unwrap_or(ProgressStyle::default_spinner());
+    ProgressBar::new_spinner().with_style(style).with_prefix(what.to_owned())
+}

@@ -42,6 +42,9 @@ pub struct FitFile {
     pub representation: Representation,
     /// How.
     pub training: Training,
+    /// The linear problem of voxels: needed for `linear-grid`, a start from it and a scan of axes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub linear: Option<Linear>,
     /// What is known of the axis.
     pub axis: AxisSearch,
     /// The recovered volume.
@@ -356,8 +359,10 @@ pub enum Kind {
     Bhnerf,
     /// Network of the event.
     Mlp4d,
-    /// Voxels.
+    /// Voxels, learnt step by step.
     Grid,
+    /// Voxels without activation, solved as the convex problem that they are.
+    LinearGrid,
 }
 
 /// Last function.
@@ -384,6 +389,9 @@ pub struct Training {
     pub last_rate: f64,
     /// What a step looks at.
     pub batch: Batch,
+    /// From where parameters start.
+    #[serde(default)]
+    pub start: Start,
     /// Mask of what shines.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub occupancy: Option<Occupancy>,
@@ -392,6 +400,42 @@ pub struct Training {
     /// Most seconds from one checkpoint to the next.
     #[serde(default = "checkpoint_seconds")]
     pub checkpoint_seconds: f64,
+}
+
+/// The linear problem of voxels.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Linear {
+    /// Largest emission that is allowed.
+    pub upper: f64,
+    /// Factor on ∫ |∇e|² dV.
+    #[serde(default)]
+    pub smoothness: f64,
+    /// Factor on ∫ e dV.
+    #[serde(default)]
+    pub sparsity: f64,
+    /// Times that nodes may be admitted again.
+    pub rounds: usize,
+    /// Iterations of each round.
+    pub iterations: usize,
+}
+
+/// From where parameters start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Start {
+    /// As the representation draws them.
+    #[default]
+    Drawn,
+    /// Fitted to the solution of the linear problem on a coarse grid.
+    Linear {
+        /// Nodes of that grid along each axis.
+        nodes: usize,
+        /// Every how many-eth frame it looks at.
+        stride: usize,
+        /// Steps of the fit to its solution.
+        steps: u64,
+    },
 }
 
 /// What a step looks at.
@@ -426,6 +470,17 @@ pub struct Occupancy {
 pub enum AxisSearch {
     /// It is `motion.axis`.
     Known {},
+    /// It is sought on the whole sphere with coarse linear grids, and learnt from there.
+    Scan {
+        /// Directions that are tried.
+        directions: usize,
+        /// Frames that are looked at, spread over all.
+        frames: usize,
+        /// First rate of what follows; 0: it stays where the scan has found it.
+        rate: f64,
+        /// Last rate, reached linearly.
+        last_rate: f64,
+    },
     /// It is learnt from this start.
     From {
         /// Where it starts.

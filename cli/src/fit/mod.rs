@@ -3,6 +3,7 @@
 mod config;
 mod data;
 mod folder;
+mod linear;
 mod results;
 mod run;
 mod setup;
@@ -46,8 +47,8 @@ impl Fit {
             let (folder, text) = Folder::open(path)?;
             self.same(&text)?;
             let file = parse(&text).with_context(|| path.display().to_string())?;
-            let near = self.file.as_deref().and_then(Path::parent).unwrap_or(Path::new("."));
-            return run::run(&file, &text, &folder, near, true);
+            let prepared = run::Prepared::new(file, near_of(&text))?;
+            return run::run(&prepared, &text, &folder, true);
         }
         let (text, near) = self.settings()?;
         if self.print {
@@ -58,9 +59,10 @@ impl Fit {
             Some(path) => path.clone(),
             None => free_name(),
         };
-        run::check(&file)?;
+        let prepared = run::Prepared::new(file, near.clone())?;
+        let text = format!("{NEAR}{}\n{text}", near.display());
         let folder = Folder::create(&folder, &text)?;
-        run::run(&file, &text, &folder, &near, false)
+        run::run(&prepared, &text, &folder, false)
     }
 
     fn name(&self) -> String {
@@ -72,7 +74,8 @@ impl Fit {
         let (mut text, near) = match &self.file {
             None => (BUILT_IN.to_owned(), PathBuf::from(".")),
             Some(path) => {
-                let near = path.parent().unwrap_or(Path::new(".")).to_owned();
+                let near = path.parent().unwrap_or(Path::new("."));
+                let near = std::path::absolute(near).with_context(|| path.display().to_string())?;
                 (output::read_text(path)?, near)
             }
         };
@@ -95,12 +98,21 @@ impl Fit {
         let given = output::read_text(path)?;
         let (new, old) = (parse(&given)?, parse(text)?);
         if new != old {
-            let at = text.lines().zip(given.lines()).position(|(a, b)| a != b);
+            let at = text.lines().skip(1).zip(given.lines()).position(|(a, b)| a != b);
             let line = at.map_or(String::new(), |k| format!(", first in line {}", k + 1));
             bail!("{} differs from the settings that the run began with{line}", path.display());
         }
         Ok(())
     }
+}
+
+/// The first line of a run's settings.
+const NEAR: &str = "# Paths start from ";
+
+/// The folder that paths in a run's settings start from.
+fn near_of(text: &str) -> PathBuf {
+    let first = text.lines().next().unwrap_or_default();
+    PathBuf::from(first.strip_prefix(NEAR).unwrap_or("."))
 }
 
 fn parse(text: &str) -> anyhow::Result<FitFile> {

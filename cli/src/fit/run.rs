@@ -1,26 +1,54 @@
 //! The run: steps, log, checkpoints, results.
 
-use super::config::{AxisSearch, FitFile, LossKind};
+use super::config::{AxisSearch, FitFile, Kind, LossKind, Start};
 use super::data::{self, Measured};
 use super::folder::Folder;
+use super::linear::{self, Linear};
 use super::results::{self, Estimate};
 use super::setup::{self, Instrument};
 use crate::{interrupt, output, progress};
 use anyhow::{Context, bail};
-use kerrlight_tomo::fit::{Objective, Outcome, State, Trainer, checkpoint};
+use kerrlight_tomo::fit::{BatchSize, Motion, Objective, Outcome, State, Trainer, checkpoint};
 use serde_json::{Value, json};
-use std::path::Path;
+use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-/// What can be seen to be wrong before any work is done.
-pub fn check(file: &FitFile) -> anyhow::Result<()> {
+/// A fit with its data: all that can be found wrong is, before anything is written.
+pub struct Prepared {
+    file: FitFile,
+    instrument: Instrument,
+    measured: Measured,
+    motion: Motion,
+}
+
+impl Prepared {
+    /// Checks settings, traces rays, simulates or reads data; paths start from `near`.
+    pub fn new(file: FitFile, near: PathBuf) -> anyhow::Result<Self> {
+        check(&file)?;
+        let instrument = Instrument::new(&file)?;
+        let measured = data::measure(&file, &instrument, &near)?;
+        let motion = setup::motion(&file, measured.times.clone())?;
+        Ok(Self { file, instrument, measured, motion })
+    }
+
+    fn objective(&self) -> anyhow::Result<Objective<f32>> {
+        let pixels = self.file.screen.pixels * self.file.screen.pixels;
+        let data = self.measured.terms(&self.file.loss, pixels)?;
+        Ok(Objective { chain: data::chain(&self.instrument, &self.motion)?, data })
+    }
+}
+
+fn check(file: &FitFile) -> anyhow::Result<()> {
     let (_, axis_rate) = setup::axis(file)?;
     setup::representation(file)?;
     let training = setup::training(file, axis_rate)?;
     let images_only = file.loss.iter().all(|loss| loss.data == LossKind::Image);
-    if matches!(training.batch, kerrlight_tomo::fit::BatchSize::Pixels(_)) && !images_only {
+    if matches!(training.batch, BatchSize::Pixels(_)) && !images_only {
         bail!("training.batch: pixels are for images alone; take frames = N");
+    }
+    if file.representation.kind == Kind::LinearGrid || file.training.start != Start::Drawn {
+        setup::linear(file)?;
     }
     if !(2..=512).contains(&file.output.nodes) {
         bail!("output.nodes = {} is not allowed: 2 to 512", file.output.nodes);
@@ -29,40 +57,33 @@ pub fn check(file: &FitFile) -> anyhow::Result<()> {
 }
 
 /// Runs a fit from its start or its last checkpoint to its end.
-pub fn run(
-    file: &FitFile,
-    text: &str,
-    folder: &Folder,
-    near: &Path,
-    resume: bool,
-) -> anyhow::Result<()> {
-    check(file)?;
+pub fn run(prepared: &Prepared, text: &str, folder: &Folder, resume: bool) -> anyhow::Result<()> {
+    let Prepared { file, instrument, measured, motion } = prepared;
     let begun = Instant::now();
-    let instrument = Instrument::new(file)?;
-    let measured = data::measure(file, &instrument, near)?;
-    let motion = setup::motion(file, measured.times.clone())?;
-    let pixels = file.screen.pixels * file.screen.pixels;
-    let data = measured.terms(&file.loss, pixels)?;
-    let objective = Objective { chain: data::chain(&instrument, &motion)?, data };
+    let objective = prepared.objective()?;
     let representation = setup::representation(file)?;
     let (axis, axis_rate) = setup::axis(file)?;
     let training = setup::training(file, axis_rate)?;
     let mut state = State::new(&*representation, axis, &training);
-    if resume && let Some(bytes) = folder.checkpoint()? {
-        let name = || format!("{}: checkpoint", folder.path().display());
-        state = checkpoint::decode(&bytes, &state).with_context(name)?;
-        folder.cut_log(state.now.step)?;
-    } else {
-        folder.cut_log(0)?;
-    }
     let trainer = Trainer::new(objective, &*representation, training);
-    let mut run = Run { file, text, folder, measured: &measured, trainer, begun };
-    eprintln!("{}", run.describe(&instrument));
-    if run.steps(&mut state)? {
+    let mut run = Run { file, text, folder, measured, trainer, begun };
+    eprintln!("{}", run.describe(instrument));
+    let checkpoint = if resume { folder.checkpoint()? } else { None };
+    match checkpoint {
+        Some(bytes) => {
+            let name = || format!("{}: checkpoint", folder.path().display());
+            state = checkpoint::decode(&bytes, &state).with_context(name)?;
+            folder.cut_log(state.now.step)?;
+        }
+        None => {
+            folder.cut_log(0)?;
+            run.start(&mut state, instrument, motion)?;
+        }
+    }
+    if file.representation.kind != Kind::LinearGrid && run.steps(&mut state)? {
         return Ok(());
     }
-    let estimate =
-        Estimate { file, folder, instrument: &instrument, motion: &motion, measured: &measured };
+    let estimate = Estimate { file, folder, instrument, motion, measured };
     estimate.write(&mut run.trainer, &state, begun)?;
     output::print(&format!("{}\n", folder.path().join("report.html").display()))
 }
@@ -89,6 +110,43 @@ impl Run<'_> {
             self.file.representation.kind,
             self.trainer.representation.parameters(),
         )
+    }
+
+    /// The axis and the parameters that a scan and the linear problem give to begin with.
+    fn start(
+        &mut self,
+        state: &mut State<f32>,
+        instrument: &Instrument,
+        motion: &Motion,
+    ) -> anyhow::Result<()> {
+        let linear = Linear { file: self.file, measured: self.measured, instrument, motion };
+        if let AxisSearch::Scan { directions, frames, .. } = self.file.axis {
+            let scan = linear.scan(directions, frames)?;
+            state.now.axis = scan.best.axis;
+            self.folder.file("axis_scan.csv")?.write(linear::table(&scan).as_bytes())?;
+            self.folder.file("axis_scan.png")?.write(&linear::picture(&scan)?)?;
+            self.folder.log(&linear::line(&scan))?;
+        }
+        let axis = state.now.axis;
+        let trainer = &mut self.trainer;
+        if self.file.representation.kind == Kind::LinearGrid {
+            let nodes = self.file.representation.nodes;
+            let solution = linear.solve(&mut trainer.objective, axis, nodes, 1)?;
+            self.folder.log(&linear::solved(&solution))?;
+            state.now.parameters = solution.emission;
+        } else if let Start::Linear { nodes, stride, steps } = self.file.training.start {
+            let solution = linear.solve(&mut trainer.objective, axis, nodes, stride)?;
+            self.folder.log(&linear::solved(&solution))?;
+            linear::imprint(
+                self.file,
+                trainer.representation,
+                &solution.emission,
+                nodes,
+                steps,
+                state,
+            )?;
+        }
+        Ok(())
     }
 
     /// Whether it was interrupted.

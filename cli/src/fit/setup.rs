@@ -4,8 +4,9 @@ use super::config::{self, Activation, AxisSearch, FitFile, Kind, Nodes, Velocity
 use anyhow::{Context, anyhow, bail};
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
 use kerrlight_tomo::dynamics::{AngularVelocity, Axis, Injection};
+use kerrlight_tomo::fit::linear::Prior;
 use kerrlight_tomo::fit::{
-    BatchSize, Motion, OccupancyPlan, OccupancySettings, Redshift, Region, Sampling,
+    BatchSize, Motion, OccupancyPlan, OccupancySettings, Redshift, Region, Regulariser, Sampling,
     SightlineRequest, Sightlines, Training,
 };
 use kerrlight_tomo::interferometry::operator::ImageGrid;
@@ -19,8 +20,6 @@ pub struct Instrument {
     pub hole: Kerr,
     /// Nodes on rays; weights in Jy a pixel for emission 1.
     pub lines: Sightlines,
-    /// Where emission is looked for.
-    pub region: Region,
     /// Emission goes like g to this power.
     pub redshift: Option<Redshift>,
 }
@@ -64,7 +63,7 @@ impl Instrument {
         }
         lines.weight.iter_mut().for_each(|weight| *weight *= jy);
         let redshift = file.effects.redshift_power.map(|power| Redshift { power });
-        Ok(Self { hole, lines, region, redshift })
+        Ok(Self { hole, lines, redshift })
     }
 }
 
@@ -127,6 +126,25 @@ pub fn hours_per_m(file: &FitFile) -> anyhow::Result<f64> {
     Ok(gravitational_time(mass) / 3600.0)
 }
 
+/// The linear problem's settings.
+pub fn linear(file: &FitFile) -> anyhow::Result<&config::Linear> {
+    let missing =
+        || anyhow!("linear is missing: {:?} and a scan of axes need it", Kind::LinearGrid);
+    let linear = file.linear.as_ref().ok_or_else(missing)?;
+    if !(linear.upper > 0.0 && linear.upper.is_finite()) {
+        bail!("linear.upper = {} is not allowed: above 0", linear.upper);
+    }
+    Ok(linear)
+}
+
+/// Penalties of the linear problem.
+pub fn priors(linear: &config::Linear) -> Vec<Prior> {
+    let of =
+        [(Regulariser::Smoothness, linear.smoothness), (Regulariser::Sparsity, linear.sparsity)];
+    let asked = of.into_iter().filter(|(_, weight)| *weight > 0.0);
+    asked.map(|(regulariser, weight)| Prior { regulariser, weight }).collect()
+}
+
 /// How matter turns, with the times of the frames in M.
 pub fn motion(file: &FitFile, times: Vec<f64>) -> anyhow::Result<Motion> {
     let velocity = match file.motion.velocity.clone() {
@@ -162,6 +180,19 @@ pub fn axis(file: &FitFile) -> anyhow::Result<(Axis, Option<Polynomial>)> {
             let rate = rate.checked().context("axis.from")?;
             Ok((Axis::new(*start).context("axis.from.start")?, Some(rate)))
         }
+        AxisSearch::Scan { directions, frames, rate, last_rate } => {
+            if !(12..=100_000).contains(directions) || *frames == 0 {
+                bail!(
+                    "axis.scan: directions = {directions}, frames = {frames} are not allowed: 12 to 100000, 1 or more"
+                );
+            }
+            linear(file)?;
+            let (from, to, steps) = (*rate, *last_rate, file.training.steps);
+            let rate = Polynomial { from, to, steps, power: 1.0 };
+            let rate = (from != 0.0).then(|| rate.checked()).transpose().context("axis.scan")?;
+            // Until the scan has found a better one.
+            Ok((Axis::new([0.0, 0.0, 1.0])?, rate))
+        }
     }
 }
 
@@ -185,10 +216,11 @@ pub fn representation(
     Ok(match chosen.kind {
         Kind::Bhnerf => Box::new(network(NetworkSettings::bhnerf())?),
         Kind::Mlp4d => Box::new(network(NetworkSettings::mlp4d())?),
-        Kind::Grid => {
+        Kind::Grid | Kind::LinearGrid => {
             let r = file.region.r_max;
             // As dark as a network starts, sigmoid(−10).
             let (activation, initial) = match chosen.activation {
+                _ if chosen.kind == Kind::LinearGrid => (representation::Activation::Linear, 0.0),
                 Activation::Sigmoid => (representation::Activation::Sigmoid, -10.0),
                 Activation::Softplus => (representation::Activation::Softplus, -10.0),
                 Activation::Linear => (representation::Activation::Linear, 0.0),

@@ -1,0 +1,236 @@
+//! What linear grids do for a fit: they are solved, scanned over axes, and started from.
+
+use super::config::FitFile;
+use super::data::{self, Measured};
+use super::setup::{self, Instrument};
+use crate::{interrupt, progress};
+use anyhow::{Context, bail};
+use kerrlight_tomo::dynamics::Axis;
+use kerrlight_tomo::fit::linear::{
+    Coarse, LinearProblem, LinearProgress, LinearSettings, LinearSolution, Voxels, Weighted,
+};
+use kerrlight_tomo::fit::scan::{AxisProblem, AxisScan, AxisSettings, scan_axis};
+use kerrlight_tomo::fit::{Data, FrameTerm, Motion, Objective, State};
+use kerrlight_tomo::image::colormap::Colormap;
+use kerrlight_tomo::optimise::{Adam, AdamState};
+use kerrlight_tomo::representation::{Coordinates, Gradient, Groups, Representation, Workspace};
+use kerrlight_tomo::volume::Volume;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use serde_json::{Value, json};
+use std::io::Cursor;
+use std::ops::{ControlFlow, Range};
+use std::sync::atomic::Ordering;
+
+/// A fit's linear problems.
+pub struct Linear<'a> {
+    /// Settings.
+    pub file: &'a FitFile,
+    /// Data.
+    pub measured: &'a Measured,
+    /// Rays.
+    pub instrument: &'a Instrument,
+    /// Motion.
+    pub motion: &'a Motion,
+}
+
+/// All terms of the data, the image first.
+fn terms(data: &Data<f32>) -> Vec<Weighted<'_, f32>> {
+    let image = data.image.iter().map(|w| (w.weight, &*w.term as &dyn FrameTerm<f32>));
+    let others = data.others.iter().map(|w| (w.weight, &*w.term));
+    image.chain(others).map(|(weight, term)| Weighted { weight, term }).collect()
+}
+
+impl Linear<'_> {
+    /// The grid of `nodes` along each axis that fits every `stride`-th frame best.
+    pub fn solve(
+        &self,
+        objective: &mut Objective<f32>,
+        axis: Axis,
+        nodes: usize,
+        stride: usize,
+    ) -> anyhow::Result<LinearSolution<f32>> {
+        let linear = setup::linear(self.file)?;
+        objective.chain.weigh(axis);
+        let (terms, priors) = (terms(&objective.data), setup::priors(linear));
+        let frames: Vec<usize> = objective.observed().into_iter().step_by(stride.max(1)).collect();
+        let problem = LinearProblem {
+            chain: &objective.chain,
+            axis,
+            frames: &frames,
+            terms: &terms,
+            voxels: Voxels::cube(nodes, self.file.region.r_max),
+            upper: linear.upper,
+            priors: &priors,
+        };
+        let usual = LinearSettings::default();
+        let coarse = usual.coarse.filter(|_| nodes >= 40).map(|coarse| Coarse {
+            stride: coarse.stride.min(frames.len().div_ceil(8)).max(1),
+            ..coarse
+        });
+        let settings = LinearSettings {
+            rounds: linear.rounds,
+            iterations: linear.iterations,
+            coarse,
+            ..usual
+        };
+        let (flag, bar) = (interrupt::flag(), progress::waiting("linear grid"));
+        let mut watch = |now: &LinearProgress<'_>| {
+            bar.set_message(format!(
+                "round {}, {} evaluations, {} nodes, value {:.4e}",
+                now.round, now.evaluations, now.nodes, now.value
+            ));
+            bar.tick();
+            if flag.load(Ordering::Relaxed) {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        };
+        let solution = problem.solve(&settings, &mut watch).context("linear")?;
+        bar.finish_and_clear();
+        if solution.certificate.is_none() {
+            bail!("stopped while the linear grid was being solved: nothing is kept of that");
+        }
+        Ok(solution)
+    }
+
+    /// The loss over the whole sphere of axes, and the best one.
+    pub fn scan(&self, directions: usize, frames: usize) -> anyhow::Result<AxisScan> {
+        let linear = setup::linear(self.file)?;
+        let chain = data::chain(self.instrument, self.motion)?;
+        let pixels = self.file.screen.pixels * self.file.screen.pixels;
+        let objective = Objective { chain, data: self.measured.terms(&self.file.loss, pixels)? };
+        if objective.chain.is_shifted() {
+            // Weights are those of one axis; the scan has many.
+            bail!(
+                "axis.scan is not to be had with effects.redshift_power yet: begin with axis.from"
+            );
+        }
+        let all = objective.observed();
+        let chosen: Vec<usize> = all.iter().copied().step_by((all.len() / frames).max(1)).collect();
+        let (terms, priors) = (terms(&objective.data), setup::priors(linear));
+        let problem = AxisProblem {
+            chain: &objective.chain,
+            frames: &chosen,
+            terms: &terms,
+            half_width: self.file.region.r_max,
+            upper: linear.upper,
+            priors: &priors,
+        };
+        let settings = AxisSettings { directions, ..AxisSettings::default() };
+        let (flag, bar) = (interrupt::flag(), progress::axes(directions as u64));
+        let watch = |solved: usize, expected: usize| {
+            bar.set_length(expected as u64);
+            bar.set_position(solved as u64);
+            !flag.load(Ordering::Relaxed)
+        };
+        let scan = scan_axis(&problem, &settings, &watch).context("axis.scan")?;
+        bar.finish_and_clear();
+        scan.context("stopped while axes were being scanned: nothing is kept of that")
+    }
+}
+
+/// The map of losses as a table.
+pub fn table(scan: &AxisScan) -> String {
+    let line = |at: &kerrlight_tomo::fit::scan::AxisLoss| {
+        let [x, y, z] = at.axis.vector();
+        format!("{x},{y},{z},{}\n", at.loss)
+    };
+    let rows: String = scan.map.iter().map(line).collect();
+    format!("x,y,z,loss\n{rows}")
+}
+
+/// The map as a PNG.
+pub fn picture(scan: &AxisScan) -> anyhow::Result<Vec<u8>> {
+    let mut bytes = Cursor::new(Vec::new());
+    scan.picture(720, Colormap::Viridis)?.write_to(&mut bytes, image::ImageFormat::Png)?;
+    Ok(bytes.into_inner())
+}
+
+/// A line of the log.
+pub fn line(scan: &AxisScan) -> Value {
+    json!({
+        "step": 0,
+        "axis_scan": {
+            "best": scan.best.axis.vector(), "loss": scan.best.loss,
+            "runner_up": scan.runner_up.axis.vector(), "runner_up_loss": scan.runner_up.loss,
+        },
+    })
+}
+
+/// A line of the log.
+pub fn solved(solution: &LinearSolution<f32>) -> Value {
+    let certificate = solution.certificate.map(|c| {
+        json!({
+            "value": c.value, "dark": c.dark, "gap": c.gap, "relative_gap": c.relative_gap(),
+            "relative_violation": c.relative_violation(), "upper": c.upper,
+        })
+    });
+    json!({
+        "step": 0,
+        "linear": {
+            "evaluations": solution.evaluations, "rounds": solution.rounds, "nodes": solution.nodes,
+            "bytes": solution.bytes, "ending": format!("{:?}", solution.ending), "certificate": certificate,
+        },
+    })
+}
+
+/// Points of a step of [`imprint`].
+const POINTS: usize = 4096;
+/// Its first rate, which falls to nothing.
+const RATE: f64 = 2e-3;
+
+/// Fits a representation to the solution of a linear problem, at random points of the region.
+pub fn imprint(
+    file: &FitFile,
+    representation: &dyn Representation<f32>,
+    emission: &[f32],
+    nodes: usize,
+    steps: u64,
+    state: &mut State<f32>,
+) -> anyhow::Result<()> {
+    let (r, region) = (file.region.r_max, setup::region(&file.region));
+    let volume = Volume::new([nodes; 3], [-r; 3], [r; 3], emission.to_vec())?;
+    let mut random = Pcg64::seed_from_u64(file.seed ^ 0x1157_a27e);
+    let (mut memory, mut workspace) =
+        (AdamState::new(state.now.parameters.len()), Workspace::new());
+    let mut gradient = vec![0.0; state.now.parameters.len()];
+    let (starts, mut values): (Vec<usize>, _) = ((0..=POINTS).collect(), vec![0.0; POINTS]);
+    for step in 0..steps {
+        let mut columns: [Vec<f32>; 3] = Default::default();
+        let mut wanted = Vec::with_capacity(POINTS);
+        while wanted.len() < POINTS {
+            let x: [f64; 3] = [0, 1, 2].map(|_| random.random_range(-r..r));
+            if region.holds(x) {
+                columns.iter_mut().zip(x).for_each(|(column, x)| column.push(x as f32));
+                wanted.push(volume.at(x) as f32);
+            }
+        }
+        let link = |groups: Range<usize>, values: &[f32], out: &mut [f32]| {
+            let pairs = values.iter().zip(&wanted[groups]).zip(out);
+            pairs.for_each(|((e, wanted), out)| *out = 2.0 * (e - wanted) / POINTS as f32);
+        };
+        gradient.fill(0.0);
+        let [x, y, z] = &columns;
+        let zero = vec![0.0; POINTS];
+        let at = match representation.dimension() {
+            4 => Coordinates::txyz(&zero, x, y, z),
+            _ => Coordinates::xyz(x, y, z),
+        };
+        let into = Gradient { parameters: &mut gradient, coordinates: None };
+        let groups = Groups { starts: &starts, link: &link };
+        representation.eval_vjp(
+            &state.now.parameters,
+            at,
+            groups,
+            &mut values,
+            into,
+            &mut workspace,
+        );
+        let rate = RATE * (1.0 - step as f64 / steps as f64);
+        Adam::default().step(rate, &gradient, &mut memory, &mut state.now.parameters);
+        representation.project(&mut state.now.parameters);
+    }
+    Ok(())
+}
