@@ -176,7 +176,7 @@ impl Estimate<'_> {
 
     fn report(&self, found: &Found<'_>, results: &Value) -> anyhow::Result<()> {
         let lines = self.folder.lines()?;
-        let mut plots = vec![loss_plot(&lines)];
+        let mut plots: Vec<LinePlot> = loss_plot(&lines).into_iter().collect();
         plots.extend(psnr_plot(&lines));
         plots.push(self.light_curve(&found.movie));
         plots.extend(self.amplitudes(&found.movie)?);
@@ -382,19 +382,22 @@ fn series(lines: &[Value], name: &str, of: impl Fn(&Value) -> Option<f64>) -> Se
     Series { name: name.to_owned(), points, errors: Vec::new(), marks: Marks::Line }
 }
 
-fn loss_plot(lines: &[Value]) -> LinePlot {
+fn loss_plot(lines: &[Value]) -> Option<LinePlot> {
     let mut all = vec![series(lines, "loss", |line| line["loss"].as_f64())];
+    if all[0].points.is_empty() {
+        return None;
+    }
     let names = lines.last().and_then(|line| line["chi2_per_datum"].as_object());
     for name in names.into_iter().flat_map(|names| names.keys()) {
         all.push(series(lines, name, |line| line["chi2_per_datum"][name].as_f64()));
     }
-    LinePlot {
+    Some(LinePlot {
         title: "Loss".to_owned(),
         caption: "What was minimised, of the part of the data that each step looked at, and χ² a datum of each kind of data.".to_owned(),
         x: Axis { label: "step".to_owned(), unit: String::new(), log: false },
         y: Axis { label: "loss".to_owned(), unit: String::new(), log: true },
         series: all,
-    }
+    })
 }
 
 fn psnr_plot(lines: &[Value]) -> Option<LinePlot> {
