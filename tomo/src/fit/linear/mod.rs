@@ -1,8 +1,8 @@
 //! A grid of voxels where the axis is known: pixels are linear in its values, so that the best field is
 //! the minimum of a convex function over a box, and how far one is from it can be told.
 //!
-//! [`walk`] (rays in the grid) → [`operator`] (sparse matrix over the nodes that count) → [`objective`] →
-//! [`descent`] → [`certificate`].
+//! `walk` (rays in the grid) → `operator` (sparse matrix over the nodes that count) → `objective` →
+//! `descent` → `certificate`.
 
 mod certificate;
 mod data;

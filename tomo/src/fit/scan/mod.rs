@@ -254,12 +254,14 @@ mod tests {
     use super::super::linear::tests::{FRAMES, chain, movie_about};
     use super::*;
 
+    /// No direction is farther from the lattice than its points are from each other: √(4π/500); the best
+    /// covering by hexagons has 0.0984.
     #[test]
     fn exact_lattice_covers_the_sphere() {
         let points = lattice(500);
         for target in lattice(77) {
             let nearest = points.iter().map(|p| p.dot(target)).fold(-1.0, f64::max);
-            assert!(nearest > 0.09f64.cos(), "{target:?} {nearest}");
+            assert!(nearest > 0.1585f64.cos(), "{target:?} {nearest}");
         }
         let mean: Vec<f64> =
             (0..3).map(|c| points.iter().map(|p| p.vector()[c]).sum::<f64>() / 500.0).collect();
