@@ -149,3 +149,20 @@ fn pictures_that_cannot_be() {
     assert!(run(&[&bright[..], &field[..]].concat()).contains("32-bit"));
     assert!(run(&["observer.radius=1e300"]).contains("[10, 1e9]"));
 }
+
+/// Volumes that are none: the key, the file, the array and what is wrong with it.
+#[test]
+fn volumes_that_are_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(root().join("scenes/volume.toml")).unwrap();
+    std::fs::write(folder.path().join("scene.toml"), text).unwrap();
+    let text = fail(folder.path(), &["render", "scene.toml"]);
+    assert!(text.contains("`volume.0.path`") && text.contains("volume.npz"), "{text}");
+    std::fs::write(folder.path().join("volume.npz"), b"no archive").unwrap();
+    let text = fail(folder.path(), &["render", "scene.toml"]);
+    assert!(text.contains("volume.npz") && text.contains("not an npz"), "{text}");
+    std::fs::copy(root().join("scenes/volume.npz"), folder.path().join("volume.npz")).unwrap();
+    let high = ["--set", "volume.0.low=[0.0, 0.0, 0.0]", "--set", "volume.0.high=[1.0, 0.0, 1.0]"];
+    let text = fail(folder.path(), &[&["render", "scene.toml"], &high[..]].concat());
+    assert!(text.contains("`volume.0.high`") && text.contains("above low"), "{text}");
+}

@@ -67,6 +67,30 @@ pub fn scene(text: &str, overrides: &[&str]) -> Scene {
     Scene::parse(&text).unwrap_or_else(|e| panic!("{overrides:?}: {e}"))
 }
 
+/// The volume of an NPZ archive with all its arrays.
+fn volume(bytes: &[u8]) -> kerrlight_tomo::volume::VolumeFile {
+    use std::io::Read;
+    let mut archive = zip::ZipArchive::new(std::io::Cursor::new(bytes)).expect("an archive");
+    let mut member = |name: &str| {
+        let mut array = Vec::new();
+        archive.by_name(name).expect(name).read_to_end(&mut array).expect(name);
+        array
+    };
+    let emission = member("emission.npy");
+    let array = npyz::NpyFile::new(&emission[..]).expect("an array");
+    let nodes: Vec<usize> = array.shape().iter().map(|n| *n as usize).collect();
+    let values = array.into_vec::<f32>().expect("32-bit floats");
+    let mut three = |name: &str| -> [f64; 3] {
+        let bytes = member(name);
+        let array = npyz::NpyFile::new(&bytes[..]).expect("an array");
+        array.into_vec::<f64>().expect("numbers").try_into().expect("three")
+    };
+    let (low, high) = (three("low.npy"), three("high.npy"));
+    let nodes = nodes.try_into().expect("three dimensions");
+    let volume = kerrlight_tomo::volume::Volume::new(nodes, low, high, values).expect("a volume");
+    kerrlight_tomo::volume::VolumeFile { volume, axis: Some(three("axis.npy")) }
+}
+
 /// Renders a scene whose files, if any, lie in the folder of scenes.
 pub fn render(scene: &Scene) -> Picture {
     use kerrlight_tomo::emission::{mesh::MeshFile, sky::Panorama};
@@ -80,7 +104,8 @@ pub fn render(scene: &Scene) -> Picture {
     let resource = |name: &str| Ok(read(name));
     let mesh = |path: &str| MeshFile::decode(&read(path), &resource).expect("a mesh");
     let meshes = scene.mesh.iter().map(|one| mesh(&one.path)).collect();
-    kerrlight_tomo::render::render(scene, Assets { sky, meshes, ..Assets::default() }, &|_| true)
+    let volumes = scene.volume.iter().map(|one| volume(&read(&one.path))).collect();
+    kerrlight_tomo::render::render(scene, Assets { sky, meshes, volumes }, &|_| true)
         .expect("a picture")
         .picture
 }

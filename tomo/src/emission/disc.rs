@@ -48,7 +48,8 @@ impl DiscModel {
     /// (I_ν/ν³ is invariant), and T⁴ goes like the flux.
     pub fn color(&self, r: f64, g: f64) -> [f32; 3] {
         let Some((peak, colors)) = &self.black_body else { return self.color };
-        let shade = colors.color(g * peak * (self.profile.flux(r) / self.peak).powf(0.25));
+        // Roots, since a power would be computed ahead of the question above.
+        let shade = colors.color(g * peak * (self.profile.flux(r) / self.peak).sqrt().sqrt());
         core::array::from_fn(|k| self.color[k] * shade[k])
     }
 
