@@ -153,8 +153,11 @@ impl Words {
     }
 }
 
-/// The representation and its usual first rate.
-fn representation(name: &str) -> Result<(Box<dyn Representation<f32>>, f64), Box<dyn Error>> {
+/// A representation and its usual first rate.
+type Chosen = (Box<dyn Representation<f32>>, f64);
+
+/// The representation of this name.
+fn representation(name: &str) -> Result<Chosen, Box<dyn Error>> {
     let grid = |activation, initial| {
         let (nodes, low, high) = ([NODES; 3], [-5.0; 3], [5.0; 3]);
         Grid::new(GridSettings { nodes, low, high, activation, initial })

@@ -17,8 +17,8 @@ use num_complex::Complex;
 use serde_json::{Value, json};
 use std::time::Instant;
 
-/// Emission in Jy/pixel a M would mean little: it is in units of `screen.jy_per_pixel`.
-const UNIT: &str = "units of screen.jy_per_pixel, per M";
+/// Emission in Jy/pixel a M would mean little: 1 M of emission 1 gives `screen.jy_per_pixel`.
+const UNIT: &str = "model units";
 
 /// The nodes of the volume.
 struct Box3 {

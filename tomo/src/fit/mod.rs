@@ -1,6 +1,6 @@
 //! Recovery of an emission field from movies and visibilities.
 //!
-//! [`sightlines`] (traced once) → [`chain`] (with the motion, once) → [`batch`] (pulled back) →
+//! [`Sightlines`] (traced once) → [`Chain`] (with the motion, once) → [`Batch`] (pulled back) →
 //! representation → pixels → data terms → gradient.
 
 mod batch;
