@@ -188,6 +188,7 @@ fn training(words: &Words, rate: f64) -> Result<Training, String> {
         adam: Adam::default(),
         rate: Polynomial { from, to: from * words.get("last", 0.01)?, steps, power: 1.0 },
         axis_rate: None,
+        ramp: 0,
         batch: BatchSize::Pixels(words.get("pixels", 512)?),
         occupancy: (warm_up > 0).then_some(plan),
         region: REGION,

@@ -387,6 +387,9 @@ pub struct Training {
     pub rate: f64,
     /// Last rate, reached linearly.
     pub last_rate: f64,
+    /// Steps over which rates grow to that.
+    #[serde(default)]
+    pub ramp: u64,
     /// What a step looks at.
     pub batch: Batch,
     /// From where parameters start.

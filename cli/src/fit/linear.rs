@@ -101,12 +101,6 @@ impl Linear<'_> {
         let chain = data::chain(self.instrument, self.motion)?;
         let pixels = self.file.screen.pixels * self.file.screen.pixels;
         let objective = Objective { chain, data: self.measured.terms(&self.file.loss, pixels)? };
-        if objective.chain.is_shifted() {
-            // Weights are those of one axis; the scan has many.
-            bail!(
-                "axis.scan is not to be had with effects.redshift_power yet: begin with axis.from"
-            );
-        }
         let all = objective.observed();
         let chosen: Vec<usize> = all.iter().copied().step_by((all.len() / frames).max(1)).collect();
         let (terms, priors) = (terms(&objective.data), setup::priors(linear));

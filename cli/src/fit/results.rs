@@ -59,6 +59,23 @@ fn recovered(
     nodes.volume(values)
 }
 
+/// Σ |masked − unmasked|/Σ |unmasked| over a few frames.
+fn mask_error(trainer: &mut Trainer<'_, f32>, state: &State<f32>, masked: &[f32]) -> Option<f64> {
+    state.now.occupancy.as_ref()?;
+    let chain = &trainer.objective.chain;
+    let (all, pixels) = (chain.frames(), chain.pixels());
+    let frames: Vec<usize> = [1, 3].map(|k| k * all / 4).to_vec();
+    let whole = trainer.movie(&state.now, &frames, false);
+    let mut sums = [0.0; 2];
+    for (frame, image) in frames.iter().zip(whole.chunks_exact(pixels)) {
+        for (pixel, masked) in image.iter().zip(&masked[frame * pixels..]) {
+            sums[0] += f64::from((pixel - masked).abs());
+            sums[1] += f64::from(pixel.abs());
+        }
+    }
+    (sums[1] > 0.0).then(|| sums[0] / sums[1])
+}
+
 fn true_volume(file: &FitFile, truth: &Truth) -> anyhow::Result<Volume> {
     let nodes = Box3::new(file);
     nodes.volume(nodes.positions().iter().map(|x| truth.at(*x) as f32).collect())
@@ -100,12 +117,13 @@ impl Estimate<'_> {
         let volume = recovered(self.file, trainer, state)?;
         let truth = self.measured.truth.as_ref();
         let true_volume = truth.map(|truth| true_volume(self.file, truth)).transpose()?;
-        let loss = trainer.loss_of_all(&state.now);
         let frames: Vec<usize> = (0..self.measured.times.len()).collect();
-        let movie = trainer.movie(&state.now, &frames);
+        let movie = trainer.movie(&state.now, &frames, true);
+        let loss = trainer.objective.loss_of(&frames, &movie);
+        let mask = mask_error(trainer, state, &movie);
         self.volumes(&volume, true_volume.as_ref(), state)?;
         self.movies(&movie)?;
-        let found = Found { volume, true_volume, loss, movie, state, begun };
+        let found = Found { volume, true_volume, loss, mask, movie, state, begun };
         let results = self.results(trainer, &found)?;
         self.folder.file("results.json")?.write(format!("{results:#}\n").as_bytes())?;
         self.report(&found, &results)
@@ -158,6 +176,9 @@ impl Estimate<'_> {
             "chi2_per_datum": chi2,
             "axis": now.axis.vector(),
         });
+        if let Some(mask) = found.mask {
+            results["mask_error"] = json!(mask);
+        }
         let (Some(truth), Some(volume)) = (&self.measured.truth, &found.true_volume) else {
             return Ok(results);
         };
@@ -371,6 +392,8 @@ struct Found<'a> {
     volume: Volume,
     true_volume: Option<Volume>,
     loss: Loss,
+    /// What the mask of what shines leaves out, of the flux; nothing without a mask.
+    mask: Option<f64>,
     movie: Vec<f32>,
     state: &'a State<f32>,
     begun: Instant,
@@ -412,7 +435,7 @@ fn psnr_plot(lines: &[Value]) -> Option<LinePlot> {
 }
 
 /// Key, digits after the point, unit and meaning of each result.
-const MEANINGS: [(&str, usize, &str, &str); 8] = [
+const MEANINGS: [(&str, usize, &str, &str); 9] = [
     ("loss", 6, "", "what was minimised, of all data"),
     (
         "psnr_db",
@@ -429,6 +452,12 @@ const MEANINGS: [(&str, usize, &str, &str); 8] = [
     ),
     ("correlation", 5, "", "normalised cross-correlation with the truth: 1 is perfect"),
     ("axis_dot_truth", 6, "", "cosine of the angle between the axis and the true one"),
+    (
+        "mask_error",
+        6,
+        "",
+        "light that the mask of what shines leaves out, as a part of all, in two frames",
+    ),
     ("steps", 0, "", "steps of the optimiser"),
     ("seconds", 1, "s", "wall time of this run"),
 ];

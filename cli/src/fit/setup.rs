@@ -261,6 +261,7 @@ pub fn training(file: &FitFile, axis_rate: Option<Polynomial>) -> anyhow::Result
         adam: Adam::default(),
         rate: rate.checked().context("training.rate")?,
         axis_rate,
+        ramp: chosen.ramp,
         batch,
         occupancy,
         region: region(&file.region),

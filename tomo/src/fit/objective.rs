@@ -281,23 +281,19 @@ impl<T: Scalar> Objective<T> {
         self.chain.movie(field, frames, &mut room.batch, &mut room.workspace, movie);
     }
 
-    /// The loss of all data of these frames, without gradient.
-    pub fn value(&self, field: Field<'_, T>, frames: &[usize], room: &mut Room<T>) -> Loss {
-        let scales: Vec<f64> =
-            self.terms().map(|(term, _)| 1.0 / self.data_of(term, frames.len())).collect();
-        let mut loss = Loss { terms: vec![0.0; scales.len()], ..Loss::default() };
-        for &frame in frames {
-            self.image_of(field, frame, room);
-            loss.points += room.batch.points();
-            for (k, (term, _)) in self.terms().enumerate() {
-                let none = &mut room.of_image;
-                none.resize(self.chain.pixels(), T::zero());
-                let value = term.value_and_gradient(frame, &room.image, T::zero(), none);
-                loss.terms[k] += scales[k] * value;
-            }
+    /// The loss of images of these frames, one after the other, without gradient.
+    pub fn loss_of(&self, frames: &[usize], movie: &[T]) -> Loss {
+        let mut none = vec![T::zero(); self.chain.pixels()];
+        let mut loss = Loss::default();
+        for (term, weight) in self.terms() {
+            let scale = 1.0 / self.data_of(term, frames.len());
+            let images = frames.iter().zip(movie.chunks_exact(self.chain.pixels()));
+            let chi2 = images
+                .map(|(frame, image)| term.value_and_gradient(*frame, image, T::zero(), &mut none));
+            let value = scale * chi2.sum::<f64>();
+            loss.terms.push(value);
+            loss.total += weight * value;
         }
-        let weights = self.terms().map(|(_, weight)| weight);
-        loss.total = loss.terms.iter().zip(weights).map(|(term, weight)| term * weight).sum();
         loss
     }
 }

@@ -43,6 +43,9 @@ pub struct Training {
     pub rate: Polynomial,
     /// Rates of the axis; without them it is held.
     pub axis_rate: Option<Polynomial>,
+    /// Steps over which rates grow to what they are: the first steps of Adam, whose memory is empty, are
+    /// as long as the rate allows, and would undo a good start.
+    pub ramp: u64,
     /// Part of the data of a step.
     pub batch: BatchSize,
     /// Mask of what shines, if any.
@@ -237,43 +240,32 @@ impl<'a, T: Scalar> Trainer<'a, T> {
     }
 
     fn learn(&mut self, now: &mut Progress<T>, of_axis: [f64; 3]) {
-        let Training { adam, rate, axis_rate, .. } = &self.training;
-        let rate = now.caution * rate.rate(now.step);
+        let Training { adam, rate, axis_rate, ramp, .. } = &self.training;
+        let part = ((now.step + 1) as f64 / (ramp + 1) as f64).min(1.0) * now.caution;
+        let rate = part * rate.rate(now.step);
         adam.step(rate, &self.gradient, &mut now.adam, &mut now.parameters);
         self.representation.project(&mut now.parameters);
         if let Some(axis_rate) = axis_rate {
             let mut moved = now.axis.vector();
-            let rate = now.caution * axis_rate.rate(now.step);
+            let rate = part * axis_rate.rate(now.step);
             adam.step(rate, &of_axis, &mut now.axis_adam, &mut moved);
             now.axis = Axis::new(moved).unwrap_or(now.axis);
         }
         now.step += 1;
     }
 
-    /// The loss of all data, without a mask.
-    pub fn loss_of_all(&mut self, now: &Progress<T>) -> Loss {
-        self.objective.chain.weigh(now.axis);
-        self.objective.value(self.field(now), &self.observed, &mut self.room)
-    }
-
-    /// The movie of these frames, without a mask.
-    pub fn movie(&mut self, now: &Progress<T>, frames: &[usize]) -> Vec<T> {
+    /// The movie of these frames, with the mask of what shines or without.
+    pub fn movie(&mut self, now: &Progress<T>, frames: &[usize], masked: bool) -> Vec<T> {
         self.objective.chain.weigh(now.axis);
         let mut movie = vec![T::zero(); frames.len() * self.objective.chain.pixels()];
-        self.objective.movie(self.field(now), frames, &mut self.room, &mut movie);
-        movie
-    }
-
-    fn field<'b>(&self, now: &'b Progress<T>) -> Field<'b, T>
-    where
-        'a: 'b,
-    {
-        Field {
+        let field = Field {
             representation: self.representation,
             parameters: &now.parameters,
             axis: now.axis,
-            occupancy: None,
-        }
+            occupancy: now.occupancy.as_ref().filter(|_| masked),
+        };
+        self.objective.movie(field, frames, &mut self.room, &mut movie);
+        movie
     }
 
     /// Emission at points at the reference time.

@@ -11,6 +11,7 @@ fn settings() -> Training {
         adam: Adam::default(),
         rate,
         axis_rate: Some(rate),
+        ramp: 3,
         batch: BatchSize::Pixels(30),
         occupancy: Some(OccupancyPlan {
             settings: OccupancySettings { cells: 6, threshold: 0.3, memory: 0.5 },
@@ -90,7 +91,8 @@ fn exact_the_loss_falls_and_the_mask_saves_work() {
 #[test]
 fn exact_a_divergence_is_stepped_back_from() {
     let absurd = Polynomial { from: 1e30, to: 1e30, steps: 40, power: 1.0 };
-    let training = Training { rate: absurd, axis_rate: None, occupancy: None, ..settings() };
+    let training =
+        Training { rate: absurd, ramp: 0, axis_rate: None, occupancy: None, ..settings() };
     let network = network();
     let mut trainer = Trainer::new(objective(), &network, training.clone());
     let mut state = start(&training);
