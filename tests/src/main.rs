@@ -9,6 +9,7 @@ mod critical_curve;
 mod documents;
 mod eht_data;
 mod film;
+mod fit;
 mod fuzz_corpus;
 mod interferometry;
 mod kerr_references;

@@ -331,7 +331,7 @@ pub struct Representation {
     /// Nodes of a grid along each axis.
     #[serde(default = "grid_nodes")]
     pub nodes: usize,
-    /// Last function of a grid.
+    /// Last function of a grid, or of a network's output − 10.
     #[serde(default = "sigmoid")]
     pub activation: Activation,
     /// Units of a hidden layer.
@@ -387,6 +387,12 @@ pub struct Training {
     pub rate: f64,
     /// Last rate, reached linearly.
     pub last_rate: f64,
+    /// First rate of a grid, whose parameters are of another size than a network's; `rate`, without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub grid_rate: Option<f64>,
+    /// Last rate of a grid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub grid_last_rate: Option<f64>,
     /// Steps over which rates grow to that.
     #[serde(default)]
     pub ramp: u64,

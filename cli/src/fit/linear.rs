@@ -1,6 +1,6 @@
 //! What linear grids do for a fit: they are solved, scanned over axes, and started from.
 
-use super::config::FitFile;
+use super::config::{Activation, FitFile, Kind};
 use super::data::{self, Measured};
 use super::setup::{self, Instrument};
 use crate::{interrupt, progress};
@@ -186,6 +186,10 @@ pub fn imprint(
 ) -> anyhow::Result<()> {
     let (r, region) = (file.region.r_max, setup::region(&file.region));
     let volume = Volume::new([nodes; 3], [-r; 3], [r; 3], emission.to_vec())?;
+    if file.representation.kind == Kind::Grid {
+        read_off(file, &volume, &mut state.now.parameters);
+        return Ok(());
+    }
     let mut random = Pcg64::seed_from_u64(file.seed ^ 0x1157_a27e);
     let (mut memory, mut workspace) =
         (AdamState::new(state.now.parameters.len()), Workspace::new());
@@ -227,4 +231,22 @@ pub fn imprint(
         representation.project(&mut state.now.parameters);
     }
     Ok(())
+}
+
+/// The parameters of a grid whose nodes have these values.
+fn read_off(file: &FitFile, volume: &Volume, parameters: &mut [f32]) {
+    let (n, r) = (file.representation.nodes, file.region.r_max);
+    let at = |k: usize| -r + 2.0 * r * k as f64 / (n - 1) as f64;
+    for (k, parameter) in parameters.iter_mut().enumerate() {
+        let value = volume.at([at(k / (n * n)), at(k / n % n), at(k % n)]);
+        *parameter = match file.representation.activation {
+            // As dark and as bright as a sigmoid is at ±10.
+            Activation::Sigmoid => {
+                let held = value.clamp(4.54e-5, 1.0 - 4.54e-5);
+                (held / (1.0 - held)).ln() as f32
+            }
+            Activation::Softplus => value.max(4.54e-5).exp_m1().ln() as f32,
+            Activation::Linear => value.max(0.0) as f32,
+        };
+    }
 }

@@ -74,7 +74,8 @@ impl Fit {
         let (mut text, near) = match &self.file {
             None => (BUILT_IN.to_owned(), PathBuf::from(".")),
             Some(path) => {
-                let near = path.parent().unwrap_or(Path::new("."));
+                let near = path.parent().filter(|near| *near != Path::new(""));
+                let near = near.unwrap_or(Path::new("."));
                 let near = std::path::absolute(near).with_context(|| path.display().to_string())?;
                 (output::read_text(path)?, near)
             }

@@ -29,7 +29,9 @@ impl Prepared {
         let instrument = Instrument::new(&file)?;
         let measured = data::measure(&file, &instrument, &near)?;
         let motion = setup::motion(&file, measured.times.clone())?;
-        Ok(Self { file, instrument, measured, motion })
+        let prepared = Self { file, instrument, measured, motion };
+        prepared.objective()?;
+        Ok(prepared)
     }
 
     fn objective(&self) -> anyhow::Result<Objective<f32>> {

@@ -209,6 +209,7 @@ pub fn representation(
             skip_after: settings.skip_after.filter(|layer| *layer <= chosen.hidden_layers),
             length_scale: chosen.length_scale,
             time_scale: chosen.time_scale,
+            activation: activation(chosen.activation),
             ..settings
         })
         .context("representation")
@@ -221,9 +222,8 @@ pub fn representation(
             // As dark as a network starts, sigmoid(−10).
             let (activation, initial) = match chosen.activation {
                 _ if chosen.kind == Kind::LinearGrid => (representation::Activation::Linear, 0.0),
-                Activation::Sigmoid => (representation::Activation::Sigmoid, -10.0),
-                Activation::Softplus => (representation::Activation::Softplus, -10.0),
                 Activation::Linear => (representation::Activation::Linear, 0.0),
+                other => (activation(other), -10.0),
             };
             let settings = GridSettings {
                 nodes: [chosen.nodes; 3],
@@ -235,6 +235,14 @@ pub fn representation(
             Box::new(Grid::new(settings).context("representation")?)
         }
     })
+}
+
+fn activation(chosen: Activation) -> representation::Activation {
+    match chosen {
+        Activation::Sigmoid => representation::Activation::Sigmoid,
+        Activation::Softplus => representation::Activation::Softplus,
+        Activation::Linear => representation::Activation::Linear,
+    }
 }
 
 /// How it is learnt.

@@ -1,0 +1,222 @@
+//! `kerrlight fit`, from settings to a report.
+
+use crate::support::{binary, fail, kerrlight, root, succeed};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// A fit of a file with fewer pixels, frames and nodes than BH-NeRF's scene 1 has, so that it takes a moment.
+fn small_of(file: &Path) -> Vec<String> {
+    let mut words = vec!["fit".to_owned(), file.to_str().expect("a name").to_owned()];
+    for change in [
+        "screen.pixels=20",
+        "region.nodes={equal-mino-time={per_ray=40}}",
+        "movie.frames=16",
+        "representation.width=32",
+        "training.steps=150",
+        "training.log_every=50",
+        "training.batch={pixels=200}",
+        "training.start={linear={nodes=16,stride=2,steps=300}}",
+        "output.nodes=24",
+    ] {
+        words.extend(["--set".to_owned(), change.to_owned()]);
+    }
+    words
+}
+
+fn small() -> Vec<String> {
+    small_of(&root().join("scenes/fits/scene_1.toml"))
+}
+
+/// The same of a file with another text.
+fn changed(folder: &Path, change: impl Fn(&str) -> String) -> Vec<String> {
+    let text = std::fs::read_to_string(root().join("scenes/fits/scene_1.toml")).unwrap();
+    let new = change(&text);
+    assert!(new != text);
+    std::fs::write(folder.join("changed.toml"), new).unwrap();
+    small_of(&folder.join("changed.toml"))
+}
+
+fn with<'a>(small: &'a [String], more: &[&'a str]) -> Vec<&'a str> {
+    small.iter().map(String::as_str).chain(more.iter().copied()).collect()
+}
+
+fn results(folder: &Path) -> serde_json::Value {
+    serde_json::from_slice(&std::fs::read(folder.join("results.json")).unwrap()).unwrap()
+}
+
+#[test]
+fn exact_every_representation_leaves_a_whole_run() {
+    let (small, folder) = (small(), tempfile::tempdir().unwrap());
+    for (kind, least) in [("bhnerf", 36.5), ("grid", 36.5), ("linear-grid", 36.5)] {
+        let kind_of = format!("representation={kind}");
+        let printed = succeed(folder.path(), &with(&small, &["-o", kind, "--set", &kind_of]));
+        assert!(printed.contains("report.html"), "{printed}");
+        let run = folder.path().join(kind);
+        for file in [
+            "fit.toml",
+            "log.jsonl",
+            "volume.npz",
+            "truth.npz",
+            "volume.vti",
+            "movie.npz",
+            "report.html",
+        ] {
+            assert!(run.join(file).is_file(), "{kind}: {file}");
+        }
+        let psnr = results(&run)["psnr_db"].as_f64().unwrap();
+        assert!(psnr > least, "{kind}: {psnr} dB");
+    }
+}
+
+/// A field of events has no co-rotating coordinates to mask.
+#[test]
+fn exact_a_field_of_events_is_fitted_without_a_mask() {
+    let (small, folder) = (small(), tempfile::tempdir().unwrap());
+    let events = ["-o", "run", "--set", "representation=mlp4d"];
+    let error = fail(folder.path(), &with(&small, &events));
+    assert!(error.contains("training.occupancy"), "{error}");
+    let words = changed(folder.path(), |text| {
+        let (before, rest) = text.split_once("[training.occupancy]").unwrap();
+        let (_, after) = rest.split_once("[linear]").unwrap();
+        format!("{before}[linear]{after}")
+    });
+    succeed(folder.path(), &with(&words, &events));
+    assert!(results(&folder.path().join("run"))["loss"].as_f64().unwrap().is_finite());
+}
+
+/// From the whole sphere.
+#[test]
+fn exact_an_unknown_axis_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let scan = "[axis.scan]\ndirections = 80\nframes = 8\nrate = 1e-3\nlast_rate = 1e-4\n";
+    let words = changed(folder.path(), |text| text.replace("[axis.known]\n", scan));
+    succeed(folder.path(), &with(&words, &["-o", "axis"]));
+    let run = folder.path().join("axis");
+    assert!(run.join("axis_scan.png").is_file() && run.join("axis_scan.csv").is_file());
+    let dot = results(&run)["axis_dot_truth"].as_f64().unwrap();
+    assert!(dot > 0.99, "{dot}");
+}
+
+#[test]
+fn exact_same_bytes_after_kills_at_twenty_moments() {
+    let (small, folder) = (small(), tempfile::tempdir().unwrap());
+    let often = ["--set", "training.checkpoint_seconds=0.02", "--set", "training.steps=200"];
+    let clock = Instant::now();
+    succeed(folder.path(), &with(&small, &[&often[..], &["-o", "whole"]].concat()));
+    let taken = clock.elapsed();
+    let begin = with(&small, &[&often[..], &["-o", "killed"]].concat());
+    let mut gone_on = 0;
+    for k in 0..20 {
+        let run = folder.path().join("killed");
+        let words = match run.join("fit.toml").exists() {
+            true => vec!["fit", "--resume", "killed"],
+            false => begin.clone(),
+        };
+        gone_on += usize::from(run.join("checkpoint.safetensors").exists());
+        let mut command = Command::new(binary());
+        command.current_dir(folder.path()).args(&words);
+        let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        std::thread::sleep(taken.mul_f64((0.618_034 * f64::from(k)).fract() * 0.6));
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+    assert!(gone_on > 5, "{gone_on} runs went on with another's work");
+    succeed(folder.path(), &["fit", "--resume", "killed"]);
+    for file in ["volume.npz", "volume.vti", "movie.npz", "checkpoint.safetensors"] {
+        let read = |run: &str| std::fs::read(folder.path().join(run).join(file)).unwrap();
+        assert!(read("whole") == read("killed"), "{file}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn exact_an_interrupt_says_how_to_go_on() {
+    let (small, folder) = (small(), tempfile::tempdir().unwrap());
+    let words = with(&small, &["-o", "run", "--set", "training.steps=100000"]);
+    let mut command = Command::new(binary());
+    command.current_dir(folder.path()).args(words).stdout(Stdio::null()).stderr(Stdio::piped());
+    let child = command.spawn().unwrap();
+    let (log, clock) = (folder.path().join("run/log.jsonl"), Instant::now());
+    while !std::fs::read_to_string(&log).is_ok_and(|text| text.contains("psnr_db")) {
+        assert!(clock.elapsed() < Duration::from_secs(120));
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert!(
+        Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success()
+    );
+    let ended = child.wait_with_output().unwrap();
+    let message = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert!(message.contains("go on with: kerrlight fit --resume run"), "{message}");
+    assert!(folder.path().join("run/checkpoint.safetensors").is_file());
+}
+
+#[test]
+fn bad_input_is_named_and_nothing_is_begun() {
+    let (small, folder) = (small(), tempfile::tempdir().unwrap());
+    for (change, said) in [
+        ("hole.spin=1.5", "spin = 1.5"),
+        ("region.r_max=1.0", "r_max = 1"),
+        ("training.rate=-1.0", "from = -1"),
+        ("training.batch={frames=0}", "1 or more"),
+        ("loss.0.sigma=0.0", "image sigma = 0"),
+        ("loss.0.data=visibilities", "pixels are for images alone"),
+        ("truth.spot.0.sigma=0.0", "truth.spot 0"),
+        ("output.nodes=1", "output.nodes = 1"),
+        ("movie.frames=0", "movie.frames = 0"),
+        ("nonsense=1", "unknown field `nonsense`"),
+        ("representation=cubes", "unknown variant `cubes`"),
+    ] {
+        let error = fail(folder.path(), &with(&small, &["-o", "run", "--set", change]));
+        assert!(error.contains(said), "{change}: {error}");
+        assert!(!folder.path().join("run").exists(), "{change}: nothing was begun");
+    }
+    std::fs::create_dir(folder.path().join("full")).unwrap();
+    std::fs::write(folder.path().join("full/mine.txt"), "mine").unwrap();
+    let refuse = |words: &[&str]| {
+        let output = kerrlight(folder.path(), words);
+        assert_eq!(output.status.code(), Some(2), "{words:?}");
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    let error = refuse(&with(&small, &["-o", "full"]));
+    assert!(error.contains("not an empty folder"), "{error}");
+    let error = refuse(&["fit", "--resume", "full"]);
+    assert!(error.contains("holds no run"), "{error}");
+    let text = std::fs::read_to_string(root().join("scenes/fits/scene_1.toml")).unwrap();
+    std::fs::write(folder.path().join("a.toml"), text.replace("seed = 1", "seed = 2")).unwrap();
+    succeed(folder.path(), &with(&small, &["-o", "run"]));
+    let error = refuse(&["fit", "a.toml", "--resume", "run"]);
+    assert!(error.contains("differs from the settings"), "{error}");
+    std::fs::write(folder.path().join("run/checkpoint.safetensors"), b"broken").unwrap();
+    let error = refuse(&["fit", "--resume", "run"]);
+    assert!(error.contains("checkpoint"), "{error}");
+}
+
+/// All data that an array gives, together, of the built-in experiment made small.
+#[test]
+fn exact_visibilities_and_closures_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = succeed(folder.path(), &["fit", "--print"]);
+    let more: String = ["amplitudes", "closure-phases", "log-closure-amplitudes"]
+        .map(|kind| format!("[[loss]]\ndata = \"{kind}\"\nweight = 0.1\nleast_snr = 3.0\n\n"))
+        .concat();
+    let curve = "[[loss]]\ndata = \"light-curve\"\nweight = 0.1\nsigma = 0.01\n\n";
+    let text = text.replace("[representation]", &format!("{more}{curve}[representation]"));
+    std::fs::write(folder.path().join("all.toml"), text).unwrap();
+    let set = [
+        "screen.pixels=24",
+        "observation.scans=8",
+        "representation.width=24",
+        "training.steps=40",
+        "training.log_every=20",
+        "training.start=drawn",
+        "output.nodes=20",
+    ];
+    let mut words = vec!["fit", "all.toml", "-o", "run"];
+    set.iter().for_each(|change| words.extend(["--set", change]));
+    succeed(folder.path(), &words);
+    let found = results(&folder.path().join("run"));
+    let chi2 = found["chi2_per_datum"].as_object().unwrap();
+    assert_eq!(chi2.len(), 5, "{chi2:?}");
+    assert!(chi2.values().all(|value| value.as_f64().is_some_and(f64::is_finite)));
+}
