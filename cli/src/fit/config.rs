@@ -278,6 +278,8 @@ pub enum DataFiles {
         path: PathBuf,
         /// Rows this close in time are averaged and make a frame, s.
         average_s: f64,
+        /// Part of each amplitude that is added to its error in quadrature: for what calibration has left.
+        systematic: f64,
         /// Time of the first frame, M.
         first_time: f64,
     },

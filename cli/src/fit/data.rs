@@ -196,7 +196,12 @@ fn read(file: &FitFile, data: &DataFiles, folder: &Path) -> anyhow::Result<Measu
                 truth: None,
             })
         }
-        DataFiles::Visibilities { path, average_s, first_time } => {
+        DataFiles::Visibilities { path, average_s, systematic, first_time } => {
+            for (name, value) in [("average_s", average_s), ("systematic", systematic)] {
+                if !(*value >= 0.0 && value.is_finite()) {
+                    bail!("data.visibilities.{name} = {value} is not allowed: 0 or above");
+                }
+            }
             let path = folder.join(path);
             let (_, observation) = crate::interferometry::read(&path)?;
             let mut observation = observation.averaged(*average_s).total_intensity();
@@ -207,7 +212,13 @@ fn read(file: &FitFile, data: &DataFiles, folder: &Path) -> anyhow::Result<Measu
                 bail!("{}: there are no visibilities", path.display());
             }
             let nearest = |time: f64| hours.partition_point(|h| *h <= time + 1e-9).max(1) - 1;
-            let of_rows = observation.rows.iter().map(|row| nearest(row.time_h)).collect();
+            let of_rows: Vec<usize> =
+                observation.rows.iter().map(|row| nearest(row.time_h)).collect();
+            for (row, frame) in observation.rows.iter_mut().zip(&of_rows) {
+                // Baselines that were averaged over different parts of a scan close all the same.
+                row.time_h = hours[*frame];
+                row.noise_sigma[0] = row.noise_sigma[0].hypot(systematic * row.products[0].norm());
+            }
             let per_m = setup::hours_per_m(file)?;
             let times = hours.iter().map(|h| first_time + (h - hours[0]) / per_m).collect();
             let sky = Some(setup::sky(file)?);
