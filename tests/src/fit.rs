@@ -106,8 +106,9 @@ fn exact_same_bytes_after_kills_at_twenty_moments() {
     succeed(folder.path(), &with(&small, &[&often[..], &["-o", "whole"]].concat()));
     let taken = clock.elapsed();
     let begin = with(&small, &[&often[..], &["-o", "killed"]].concat());
-    let mut gone_on = 0;
-    for k in 0..20 {
+    let (mut gone_on, mut kills) = (0, 0);
+    // A busy machine is slower than it was: more kills until enough of them hit a run that had gone on.
+    while kills < 20 || (gone_on < 10 && kills < 200) {
         let run = folder.path().join("killed");
         let words = match run.join("fit.toml").exists() {
             true => vec!["fit", "--resume", "killed"],
@@ -117,11 +118,12 @@ fn exact_same_bytes_after_kills_at_twenty_moments() {
         let mut command = Command::new(binary());
         command.current_dir(folder.path()).args(&words);
         let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-        std::thread::sleep(taken.mul_f64((0.618_034 * f64::from(k)).fract() * 0.6));
+        std::thread::sleep(taken.mul_f64((0.618_034 * f64::from(kills)).fract()));
         child.kill().unwrap();
         child.wait().unwrap();
+        kills += 1;
     }
-    assert!(gone_on > 5, "{gone_on} runs went on with another's work");
+    assert!(gone_on >= 10, "{gone_on} runs went on with another's work");
     succeed(folder.path(), &["fit", "--resume", "killed"]);
     for file in ["volume.npz", "volume.vti", "movie.npz", "checkpoint.safetensors"] {
         let read = |run: &str| std::fs::read(folder.path().join(run).join(file)).unwrap();
@@ -219,4 +221,62 @@ fn exact_visibilities_and_closures_together() {
     let chi2 = found["chi2_per_datum"].as_object().unwrap();
     assert_eq!(chi2.len(), 5, "{chi2:?}");
     assert!(chi2.values().all(|value| value.as_f64().is_some_and(f64::is_finite)));
+}
+
+/// A fit's pixels of a sheared spot on a tilted orbit, with slow light and redshift, are those of the renderer, which
+/// shares neither nodes nor sums with it.
+#[test]
+fn code_pixels_are_those_of_the_renderer() {
+    use kerrlight_geodesic::{Inclination, Kerr, Observer};
+    use kerrlight_tomo::dynamics::{AngularVelocity, Axis, Injection};
+    use kerrlight_tomo::emission::spot::{SpotModel, distance};
+    use kerrlight_tomo::fit::{
+        Batch, Chain, Motion, Redshift, Region, Sampling, SightlineRequest, Sightlines,
+    };
+    let text = std::fs::read_to_string(root().join("scenes/hot_spots.toml")).unwrap();
+    let text = text.split("[[spot]]").next().unwrap().to_owned()
+        + "[[spot]]\nradius = 7.0\nphase_deg = 200.0\naxis = [0.6, 0.0, 0.8]\nsigma = 0.6\npeak_emissivity = 1.0\nsheared_since = 0.0\n";
+    let changes = [
+        "screen.width=24",
+        "screen.height=24",
+        "screen.total_flux_jy=",
+        "screen.field_of_view_uas=",
+        "screen.field_of_view_m=24.0",
+        "screen.channels=[\"intensity\"]",
+        "observer.time=45.0",
+    ];
+    let scene = crate::support::scene(&text, &changes);
+    let seen = kerrlight_tomo::render::render(&scene, None, &|_| true).unwrap().picture;
+    let hole = Kerr::new(0.5).unwrap();
+    let observer = Observer::at_infinity(Inclination::from_degrees(60.0).unwrap());
+    let at = |k: usize| k as f64 - 11.5;
+    let (alpha, beta): (Vec<f64>, Vec<f64>) =
+        (0..24 * 24).map(|k| (at(k % 24), -at(k / 24))).unzip();
+    let request = SightlineRequest {
+        region: Region { r_min: 0.0, r_max: 11.0, z_width: f64::INFINITY },
+        sampling: Sampling::Gauss { order: 8, split: 3 },
+        delay: true,
+        momentum: true,
+    };
+    let lines = Sightlines::trace(&hole, &observer, &alpha, &beta, &request).unwrap();
+    let motion = Motion {
+        velocity: AngularVelocity::Keplerian { drag: 0.4 },
+        reference: 0.0,
+        injection: Some(Injection { time: 0.0 }),
+        times: vec![45.0],
+    };
+    let power = Redshift { power: 2.0 };
+    let mut chain = Chain::<f64>::new(&lines, &motion, &hole, Some(power)).unwrap();
+    let axis = Axis::new([0.6, 0.0, 0.8]).unwrap();
+    chain.weigh(axis);
+    let center = SpotModel::new(&scene.spot[0], &hole).center(0.0);
+    let light = |x: [f64; 3]| (-0.5 * (distance(x, center) / 0.6).powi(2)).exp();
+    let movie = chain.movie_of(axis, &light, &mut Batch::default());
+    let seen = seen.channel("intensity").unwrap();
+    let most = seen.iter().fold(0.0f32, |most, x| most.max(*x));
+    assert!(most > 0.1, "{most}");
+    for (k, (fitted, seen)) in movie.iter().zip(seen).enumerate() {
+        let difference = (fitted - f64::from(*seen)).abs() / f64::from(most);
+        assert!(difference < 1e-3, "pixel {k}: {fitted} {seen}");
+    }
 }

@@ -14,7 +14,7 @@ pub struct Folder {
 
 /// Names in it.
 pub const SETTINGS: &str = "fit.toml";
-const LOG: &str = "log.jsonl";
+pub const LOG: &str = "log.jsonl";
 const CHECKPOINT: &str = "checkpoint.safetensors";
 
 impl Folder {

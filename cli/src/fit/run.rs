@@ -2,7 +2,7 @@
 
 use super::config::{AxisSearch, FitFile, Kind, LossKind, Start};
 use super::data::{self, Measured};
-use super::folder::Folder;
+use super::folder::{self, Folder};
 use super::linear::{self, Linear};
 use super::results::{self, Estimate};
 use super::setup::{self, Instrument};
@@ -78,8 +78,9 @@ pub fn run(prepared: &Prepared, text: &str, folder: &Folder, resume: bool) -> an
             folder.cut_log(state.now.step)?;
         }
         None => {
-            folder.cut_log(0)?;
+            folder.file(folder::LOG)?.write(b"")?;
             run.start(&mut state, instrument, motion)?;
+            folder.save(&checkpoint::encode(&state, text)?)?;
         }
     }
     if file.representation.kind != Kind::LinearGrid && run.steps(&mut state)? {
