@@ -1,6 +1,7 @@
 //! `kerrlight fit`: recovers emission from movies and visibilities.
 
 mod config;
+mod curves;
 mod data;
 mod folder;
 mod linear;

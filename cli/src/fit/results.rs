@@ -1,6 +1,7 @@
 //! What a run leaves: the volume, the movie, pictures and the report.
 
 use super::config::{AxisSearch, FitFile};
+use super::curves::{loss_plot, psnr_plot};
 use super::data::{Measured, Truth};
 use super::folder::Folder;
 use super::setup::{self, Instrument};
@@ -397,41 +398,6 @@ struct Found<'a> {
     movie: Vec<f32>,
     state: &'a State<f32>,
     begun: Instant,
-}
-
-fn series(lines: &[Value], name: &str, of: impl Fn(&Value) -> Option<f64>) -> Series {
-    let point = |line: &Value| Some([line["step"].as_f64()?, of(line)?]);
-    let points = lines.iter().filter_map(point).collect();
-    Series { name: name.to_owned(), points, errors: Vec::new(), marks: Marks::Line }
-}
-
-fn loss_plot(lines: &[Value]) -> Option<LinePlot> {
-    let mut all = vec![series(lines, "loss", |line| line["loss"].as_f64())];
-    if all[0].points.is_empty() {
-        return None;
-    }
-    let names = lines.last().and_then(|line| line["chi2_per_datum"].as_object());
-    for name in names.into_iter().flat_map(|names| names.keys()) {
-        all.push(series(lines, name, |line| line["chi2_per_datum"][name].as_f64()));
-    }
-    Some(LinePlot {
-        title: "Loss".to_owned(),
-        caption: "What was minimised, of the part of the data that each step looked at, and χ² a datum of each kind of data.".to_owned(),
-        x: Axis { label: "step".to_owned(), unit: String::new(), log: false },
-        y: Axis { label: "loss".to_owned(), unit: String::new(), log: true },
-        series: all,
-    })
-}
-
-fn psnr_plot(lines: &[Value]) -> Option<LinePlot> {
-    let psnr = series(lines, "PSNR", |line| line["psnr_db"].as_f64());
-    (!psnr.points.is_empty()).then(|| LinePlot {
-        title: "Quality".to_owned(),
-        caption: "Peak signal-to-noise ratio of the volume beside the truth.".to_owned(),
-        x: Axis { label: "step".to_owned(), unit: String::new(), log: false },
-        y: Axis { label: "PSNR".to_owned(), unit: "dB".to_owned(), log: false },
-        series: vec![psnr],
-    })
 }
 
 /// Key, digits after the point, unit and meaning of each result.
