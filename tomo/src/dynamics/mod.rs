@@ -6,11 +6,13 @@
 //! repeats.
 
 mod angular_velocity;
+mod perturbed;
 mod pull_back;
 mod sphere;
 #[cfg(test)]
 mod tests;
 
 pub use angular_velocity::{AngularVelocity, Injection};
+pub use perturbed::Perturbation;
 pub use pull_back::{Cotangents, Turned, pull_back, pull_back_vjp};
 pub use sphere::{Axis, ZeroAxis};

@@ -4,6 +4,7 @@
 pub mod black_body;
 pub mod disc;
 pub mod gas;
+pub mod glyph;
 pub mod mesh;
 pub mod page_thorne;
 pub mod sky;

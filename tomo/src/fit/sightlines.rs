@@ -134,6 +134,25 @@ impl Sightlines {
         self.weight.len()
     }
 
+    /// Dims nodes by what lies between them and the observer: each weight times e^{−τ}, where τ adds up a grey
+    /// coefficient κ(x) along the nodes in front of it and half of its own. κ is per unit of the weights before this
+    /// call, and what is outside the region does not absorb.
+    pub fn absorb(&mut self, coefficient: impl Fn([f64; 3]) -> f64) {
+        for ends in self.starts.windows(2) {
+            let mut depth = 0.0;
+            for k in ends[0]..ends[1] {
+                let half = 0.5 * self.weight[k] * coefficient(self.point(k));
+                self.weight[k] *= (-depth - half).exp();
+                depth += 2.0 * half;
+            }
+        }
+    }
+
+    /// Node k: r n.
+    fn point(&self, k: usize) -> [f64; 3] {
+        [0, 1, 2].map(|c| self.position[c][k])
+    }
+
     fn push(&mut self, point: [f64; 3], weight: f64) {
         self.position.iter_mut().zip(point).for_each(|(column, x)| column.push(x));
         self.weight.push(weight);

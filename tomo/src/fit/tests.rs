@@ -334,3 +334,18 @@ fn sightlines_lie_in_their_region_and_errors_are_named() {
     let text = say(&|request| request.region.r_max = 5.0);
     assert!(text.starts_with("observer radius = inf is not allowed"), "{text}");
 }
+
+/// A uniform medium leaves (1 − e^{−κL})/κ of a path L, and nodes come from the observer on: the further, the later.
+#[test]
+fn exact_a_uniform_medium_dims_what_is_behind_it() {
+    let (_, plain) = lines(true, false);
+    let (mut dimmed, kappa) = (plain.clone(), 0.02);
+    dimmed.absorb(|_| kappa);
+    for ends in plain.starts.windows(2) {
+        let length: f64 = plain.weight[ends[0]..ends[1]].iter().sum();
+        let left: f64 = dimmed.weight[ends[0]..ends[1]].iter().sum();
+        let exact = (1.0 - (-kappa * length).exp()) / kappa;
+        assert!((left - exact).abs() < 1e-3 * exact, "{left} {exact}");
+        assert!(plain.delay[ends[0]..ends[1]].is_sorted());
+    }
+}

@@ -151,6 +151,15 @@ pub fn text_width(text: &str, size: f64) -> f64 {
     text.chars().map(|c| f64::from(font.metrics(c, size as f32).advance_width)).sum()
 }
 
+/// How much of each pixel a letter covers, 0 to 255, and the width of that picture, whose edges are the
+/// letter's; `None` without a font. A capital letter is about `size` pixels high.
+pub fn coverage(letter: char, size: usize) -> Option<(usize, Vec<u8>)> {
+    let font = font()?;
+    // Capitals of this font are seven tenths of its nominal size high.
+    let (metrics, covered) = font.rasterize(letter, size as f32 / 0.7);
+    (font.lookup_glyph_index(letter) != 0).then_some((metrics.width, covered))
+}
+
 fn paint([r, g, b]: Rgb) -> Paint<'static> {
     let mut paint = Paint::default();
     paint.set_color_rgba8(r, g, b, 255);

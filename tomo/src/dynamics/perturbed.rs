@@ -1,0 +1,125 @@
+//! Velocities that differ from a smooth law by chance.
+
+use super::AngularVelocity;
+use kerrlight_geodesic::OutOfRange;
+use nalgebra::{DMatrix, DVector};
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64;
+
+/// A Gaussian process over the radius: mean 0, covariance s² exp(−(r − r')²/(2 ℓ²)), as in the
+/// mismatch study of Levis et al. 2022 (their Fig. 7).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Perturbation {
+    /// s, radians a unit of time.
+    pub deviation: f64,
+    /// ℓ, M.
+    pub correlation_length: f64,
+    /// The first and the last radius of the table, M.
+    pub radii: [f64; 2],
+    /// Rows of the table.
+    pub rows: usize,
+}
+
+impl Perturbation {
+    fn checked(self) -> Result<Self, OutOfRange> {
+        let Self { deviation, correlation_length, radii: [first, last], rows } = self;
+        for (field, value, ok, allowed) in [
+            ("deviation", deviation, deviation >= 0.0 && deviation.is_finite(), "0 or above"),
+            (
+                "correlation_length",
+                correlation_length,
+                correlation_length > 0.0 && correlation_length.is_finite(),
+                "above 0",
+            ),
+            ("radii", first, first > 0.0 && first < last && last.is_finite(), "above 0, growing"),
+            ("rows", rows as f64, (2..=1000).contains(&rows), "2 to 1000"),
+        ] {
+            if !ok {
+                return Err(OutOfRange { field, value, allowed });
+            }
+        }
+        Ok(self)
+    }
+
+    /// Radii of the table.
+    fn table(&self) -> Vec<f64> {
+        let [first, last] = self.radii;
+        let step = (last - first) / (self.rows - 1) as f64;
+        (0..self.rows).map(|k| first + step * k as f64).collect()
+    }
+
+    /// What is added to the velocity at each radius. The square root of the covariance comes from its
+    /// eigenvectors: a process that is smooth on the scale of the table has hardly any of full rank.
+    fn draw(&self, radii: &[f64], seed: u64) -> Vec<f64> {
+        let covariance = |i: usize, k: usize| {
+            let apart = (radii[i] - radii[k]) / self.correlation_length;
+            (-0.5 * apart * apart).exp()
+        };
+        let parts = DMatrix::from_fn(radii.len(), radii.len(), covariance).symmetric_eigen();
+        let mut random = Pcg64::seed_from_u64(seed);
+        let along = DVector::from_fn(radii.len(), |k, _| {
+            let normal: f64 = random.sample(StandardNormal);
+            normal * parts.eigenvalues[k].max(0.0).sqrt()
+        });
+        let drawn = parts.eigenvectors * along;
+        drawn.iter().map(|x| self.deviation * x).collect()
+    }
+}
+
+impl AngularVelocity {
+    /// A table of this velocity with a perturbation, drawn from the seed, added to it.
+    ///
+    /// # Errors
+    /// If a number of the perturbation is out of its range.
+    pub fn perturbed(&self, by: Perturbation, seed: u64) -> Result<Self, OutOfRange> {
+        let radii = by.checked()?.table();
+        let drawn = by.draw(&radii, seed);
+        let rates = radii.iter().zip(drawn).map(|(r, by)| self.rate(*r) + by).collect();
+        Self::Table { radii, rates }.checked()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BY: Perturbation =
+        Perturbation { deviation: 0.3, correlation_length: 0.5, radii: [1.0, 10.0], rows: 100 };
+
+    /// Variance and correlations of many draws are those of the process.
+    #[test]
+    fn exact_moments_of_the_process() {
+        let radii = BY.table();
+        let draws: Vec<Vec<f64>> = (0..4000).map(|seed| BY.draw(&radii, seed)).collect();
+        let mean = |i: usize, k: usize| {
+            draws.iter().map(|d| d[i] * d[k]).sum::<f64>() / draws.len() as f64
+        };
+        for (i, k) in [(0, 0), (50, 50), (50, 55), (50, 60), (10, 90)] {
+            let apart = (radii[i] - radii[k]) / 0.5;
+            let exact = 0.09 * (-0.5 * apart * apart).exp();
+            // Three standard deviations of the mean of 4000 products.
+            assert!((mean(i, k) - exact).abs() < 3.0 * 0.09 * (2.0f64 / 4000.0).sqrt(), "{i} {k}");
+        }
+    }
+
+    #[test]
+    fn exact_no_deviation_is_the_velocity() {
+        let law = AngularVelocity::bhnerf();
+        let same = law.perturbed(Perturbation { deviation: 0.0, ..BY }, 3).unwrap();
+        let again = law.perturbed(BY, 3).unwrap();
+        assert_eq!(again, law.perturbed(BY, 3).unwrap());
+        assert_ne!(again, law.perturbed(BY, 4).unwrap());
+        for r in [1.0, 1.0 + 9.0 * 27.0 / 99.0, 10.0] {
+            assert!((same.rate(r) - law.rate(r)).abs() < 1e-12 * law.rate(r).abs());
+        }
+    }
+
+    #[test]
+    fn numbers_out_of_range_are_named() {
+        let law = AngularVelocity::bhnerf();
+        let text = |by| law.perturbed(by, 1).unwrap_err().to_string();
+        assert!(text(Perturbation { correlation_length: 0.0, ..BY }).contains("correlation_length"));
+        assert!(text(Perturbation { rows: 1, ..BY }).contains("rows = 1 "));
+    }
+}
