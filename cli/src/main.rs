@@ -3,6 +3,7 @@
 mod accuracy;
 mod assets;
 mod columns;
+mod compare;
 mod convert;
 mod critical_curve;
 mod fit;
@@ -15,10 +16,9 @@ mod output;
 mod overlay;
 mod progress;
 mod render;
-// Called by no verb yet.
-#[allow(dead_code, unused_imports)]
 mod report;
 mod trace;
+mod usage;
 mod uv;
 mod volume_files;
 
@@ -52,6 +52,8 @@ enum Verb {
     Convert(convert::Convert),
     /// Recover the emission around a hole from movies or visibilities
     Fit(fit::Fit),
+    /// Run many fits that differ in named factors: the comparisons of BH-NeRF's paper, or your own
+    Compare(compare::Compare),
     /// Trace single rays from a table to a table
     Trace(trace::Trace),
     /// Write the critical curve, the edge of the shadow, as a table
@@ -66,7 +68,8 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error:#}");
-            ExitCode::from(2)
+            let is_part = error.downcast_ref::<compare::Failed>().is_some();
+            ExitCode::from(if is_part { 1 } else { 2 })
         }
     }
 }
@@ -83,6 +86,7 @@ fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Verb::Uv(uv) => uv.run(),
         Verb::Convert(convert) => convert.run(),
         Verb::Fit(fit) => fit.run(),
+        Verb::Compare(compare) => compare.run(arguments.threads.map(usize::from)),
         Verb::Trace(trace) => trace.run(),
         Verb::CriticalCurve(table) => table.run(),
         Verb::Accuracy(accuracy) => accuracy.run(),

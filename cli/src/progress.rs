@@ -22,6 +22,11 @@ pub fn steps(count: u64) -> ProgressBar {
     styled(count, "{bar:30} step {pos} of {len}  {msg}  {elapsed} gone, {eta} left")
 }
 
+/// A bar that counts cases, with the name of the one that runs.
+pub fn cases(count: u64) -> ProgressBar {
+    styled(count, "{bar:30} {pos} of {len} done  {elapsed} gone, {eta} left  {msg}")
+}
+
 /// A bar that counts axes.
 pub fn axes(count: u64) -> ProgressBar {
     styled(count, "{bar:30} axis {pos} of {len}  {elapsed} gone, {eta} left")

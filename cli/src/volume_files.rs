@@ -103,6 +103,17 @@ pub fn read(path: &Path, bytes: &[u8], source: &VolumeSource) -> anyhow::Result<
     decode(path, bytes)?.placed(source)
 }
 
+/// Reads a volume that says itself where it is.
+pub fn load(path: &Path) -> anyhow::Result<VolumeFile> {
+    let name = || path.display().to_string();
+    let found = decode(path, &output::read(path)?).with_context(name)?;
+    let [Some(low), Some(high)] = found.corners else {
+        bail!("{}: arrays low and high are missing", name());
+    };
+    let volume = Volume::new(found.nodes, low, high, found.values).with_context(name)?;
+    Ok(VolumeFile { volume, axis: found.axis })
+}
+
 /// Writes an NPZ archive, whole or not at all.
 pub fn write(output: &output::Output, file: &VolumeFile) -> anyhow::Result<()> {
     output.write(&encode(file)?)

@@ -30,6 +30,10 @@ pub struct FitFile {
     /// What is simulated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub truth: Option<Truth>,
+    /// What data are simulated with where that differs from what the fit assumes: any part of `hole`,
+    /// `observer`, `region`, `effects` and `motion`.
+    #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
+    pub world: toml::Table,
     /// The array that sees the simulated movie.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub observation: Option<Observation>,
@@ -146,6 +150,21 @@ pub struct Effects {
     /// Emission goes like g to this power; without it there is no redshift.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub redshift_power: Option<f64>,
+    /// A grey medium at rest that dims what lies behind it; what shines does not absorb.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub absorption: Option<Absorption>,
+}
+
+/// κ = coefficient · exp(−½ [(r/radius)² + (z/height)²]).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Absorption {
+    /// Per M.
+    pub coefficient: f64,
+    /// M.
+    pub radius: f64,
+    /// M.
+    pub height: f64,
 }
 
 /// How matter turns.
@@ -189,6 +208,17 @@ pub enum Velocity {
         /// Radians a unit of time.
         rates: Vec<f64>,
     },
+    /// Another velocity, and a Gaussian process over the radius that is drawn from the fit's seed.
+    Perturbed {
+        /// The velocity without it.
+        of: Box<Velocity>,
+        /// Its standard deviation, radians a unit of time.
+        deviation: f64,
+        /// Its correlation length, M.
+        correlation_length: f64,
+        /// The first and the last radius of its table of 100 rows, M.
+        radii: [f64; 2],
+    },
 }
 
 /// Frames of a movie.
@@ -208,7 +238,29 @@ pub struct Movie {
 #[serde(deny_unknown_fields)]
 pub struct Truth {
     /// Gaussian spots at the reference time.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub spot: Vec<Spot>,
+    /// Letters and digits at the reference time, flat in the plane across the axis.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub glyph: Vec<Glyph>,
+}
+
+/// A letter that is extruded along the axis, its upper side away from the hole.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Glyph {
+    /// Which.
+    pub letter: char,
+    /// Its middle, M.
+    pub center: [f64; 3],
+    /// From its lower to its upper edge, M.
+    pub height: f64,
+    /// Along the axis, M.
+    pub thickness: f64,
+    /// Standard deviation of its blurred edges, M.
+    pub softness: f64,
+    /// Emission in the middle of broad strokes.
+    pub amplitude: f64,
 }
 
 /// A Gaussian spot.
@@ -254,6 +306,9 @@ pub struct Observation {
     pub elevation_deg: [f64; 2],
     /// Noise that is added to the data.
     pub noise: Noise,
+    /// Errors of station gains, none unless asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gains: Option<Gains>,
     /// Time of the first scan, M.
     pub first_time: f64,
 }
@@ -266,6 +321,18 @@ pub enum Noise {
     None,
     /// Thermal.
     Thermal,
+}
+
+/// Random errors of station gains.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Gains {
+    /// Standard deviation of ln |g|, one number a station for the whole observation.
+    pub constant_amplitude: f64,
+    /// Standard deviation of ln |g|, another number for every scan.
+    pub scan_amplitude: f64,
+    /// Whether phases are uniform on the circle, for every station and scan.
+    pub random_phases: bool,
 }
 
 /// Measured data.

@@ -1,20 +1,19 @@
 //! The data of a fit: simulated, or from files.
 
-use super::config::{DataFiles, FitFile, Loss, LossKind, Noise, Spot};
+use super::config::{DataFiles, FitFile, Gains, Loss, LossKind, Noise};
 use super::setup::{self, Instrument};
+use super::truth::Truth;
 use crate::interferometry::arguments;
 use crate::interferometry::movie_files;
 use anyhow::{Context, anyhow, bail};
-use kerrlight_tomo::dynamics::{AngularVelocity, Axis};
-use kerrlight_tomo::emission::spot::{distance, rotate};
 use kerrlight_tomo::fit::{
-    Batch, Chain, Data, FrameTerm, ImageTerm, LightCurveTerm, Motion, Scan, ScanTerm, Weighted,
+    Chain, Data, FrameTerm, ImageTerm, LightCurveTerm, Motion, Scan, ScanTerm, Weighted,
 };
 use kerrlight_tomo::interferometry::data_terms::{
     AmplitudeTerm, ClosureTerm, DataTerm, DataTermError, VisibilityTerm,
 };
 use kerrlight_tomo::interferometry::earth::{Frame, Ut1};
-use kerrlight_tomo::interferometry::noise::add_thermal_noise;
+use kerrlight_tomo::interferometry::noise::{GainErrors, add_thermal_noise, apply_gains};
 use kerrlight_tomo::interferometry::observation::Observation;
 use kerrlight_tomo::interferometry::operator::{ImageGrid, Method, Pulse, Transform};
 use kerrlight_tomo::interferometry::products::ClosureKind;
@@ -36,53 +35,21 @@ pub struct Measured {
     pub truth: Option<Truth>,
 }
 
-/// The emission that is simulated.
-pub struct Truth {
-    spots: Vec<Spot>,
-    axis: Axis,
-    velocity: AngularVelocity,
-}
-
-impl Truth {
-    fn new(file: &FitFile, velocity: AngularVelocity) -> anyhow::Result<Option<Self>> {
-        let Some(truth) = &file.truth else { return Ok(None) };
-        for (k, spot) in truth.spot.iter().enumerate() {
-            let numbers = [spot.sigma, spot.amplitude, spot.wound_for];
-            let finite = numbers.iter().chain(&spot.center).all(|x| x.is_finite());
-            if !finite || spot.sigma <= 0.0 || spot.amplitude < 0.0 {
-                bail!("truth.spot {k}: finite numbers with sigma above 0 and amplitude 0 or above");
-            }
-        }
-        let missing = || anyhow!("motion.axis is missing: a simulation needs it");
-        let axis = setup::known_axis(file)?.ok_or_else(missing)?;
-        Ok(Some(Self { spots: truth.spot.clone(), axis, velocity }))
-    }
-
-    /// Emission at the reference time.
-    pub fn at(&self, x: [f64; 3]) -> f64 {
-        let rate = self.velocity.rate(distance(x, [0.0; 3]));
-        let light = |spot: &Spot| {
-            let when_round = rotate(self.axis.vector(), -rate * spot.wound_for, x);
-            let offset = distance(when_round, spot.center) / spot.sigma;
-            spot.amplitude * (-0.5 * offset * offset).exp()
-        };
-        self.spots.iter().map(light).sum()
-    }
-
-    /// Its axis.
-    pub fn axis(&self) -> Axis {
-        self.axis
-    }
-}
-
 /// Simulates or reads the data. `folder` is that of the fit's file.
 pub fn measure(file: &FitFile, instrument: &Instrument, folder: &Path) -> anyhow::Result<Measured> {
-    let velocity = setup::motion(file, Vec::new())?.velocity;
-    match (&file.data, Truth::new(file, velocity)?) {
+    match (&file.data, &file.truth) {
         (Some(_), Some(_)) => bail!("truth and data exclude each other: simulate, or read"),
         (None, None) => bail!("there is neither truth (to simulate) nor data (to read)"),
+        (Some(_), None) if !file.world.is_empty() => {
+            bail!("world is for simulated data: there is no truth")
+        }
         (Some(data), None) => read(file, data, folder),
-        (None, Some(truth)) => simulate(file, instrument, truth),
+        (None, Some(_)) if file.world.is_empty() => simulate(file, instrument),
+        (None, Some(_)) => {
+            let world = file.simulated()?;
+            let instrument = Instrument::new(&world).context("world")?;
+            simulate(&world, &instrument)
+        }
     }
 }
 
@@ -100,10 +67,11 @@ fn frames(file: &FitFile) -> anyhow::Result<Vec<f64>> {
     Ok((0..n).map(|k| movie.from + step * k as f64).collect())
 }
 
-fn simulate(file: &FitFile, instrument: &Instrument, truth: Truth) -> anyhow::Result<Measured> {
+fn simulate(file: &FitFile, instrument: &Instrument) -> anyhow::Result<Measured> {
+    let truth = Truth::new(file)?;
     let Some(seen) = &file.observation else {
         let times = frames(file)?;
-        let movie = Some(movie(file, instrument, &truth, &times)?);
+        let movie = Some(truth.movie(file, instrument, &times)?);
         return Ok(Measured {
             times,
             movie,
@@ -137,9 +105,12 @@ fn simulate(file: &FitFile, instrument: &Instrument, truth: Truth) -> anyhow::Re
     let hours = schedule.hours_utc(setup.ut1).context("observation")?;
     let per_m = setup::hours_per_m(file)?;
     let times: Vec<f64> = hours.iter().map(|h| seen.first_time + (h - hours[0]) / per_m).collect();
-    let movie = movie(file, instrument, &truth, &times)?;
+    let movie = truth.movie(file, instrument, &times)?;
     let images = Movie { grid: sky, pixels: movie.clone() };
     simulate::fill(&mut observation, &images, Pulse::Triangle, &hours, Method::Direct)?;
+    if let Some(gains) = seen.gains {
+        apply_gains(&mut observation, gain_errors(gains)?, file.seed);
+    }
     if seen.noise == Noise::Thermal {
         add_thermal_noise(&mut observation, file.seed);
     }
@@ -154,18 +125,16 @@ fn simulate(file: &FitFile, instrument: &Instrument, truth: Truth) -> anyhow::Re
     })
 }
 
-/// The true movie, in double precision.
-fn movie(
-    file: &FitFile,
-    instrument: &Instrument,
-    truth: &Truth,
-    times: &[f64],
-) -> anyhow::Result<Vec<f64>> {
-    let motion = setup::motion(file, times.to_vec())?;
-    let Instrument { lines, hole, redshift, .. } = instrument;
-    let mut chain = Chain::<f64>::new(lines, &motion, hole, *redshift)?;
-    chain.weigh(truth.axis);
-    Ok(chain.movie_of(truth.axis, &|x| truth.at(x), &mut Batch::default()))
+fn gain_errors(gains: Gains) -> anyhow::Result<GainErrors> {
+    let Gains { constant_amplitude, scan_amplitude, random_phases } = gains;
+    for (name, value) in
+        [("constant_amplitude", constant_amplitude), ("scan_amplitude", scan_amplitude)]
+    {
+        if !(0.0..=10.0).contains(&value) {
+            bail!("observation.gains.{name} = {value} is not allowed: 0 to 10");
+        }
+    }
+    Ok(GainErrors { constant_amplitude, scan_amplitude, random_phases })
 }
 
 fn read(file: &FitFile, data: &DataFiles, folder: &Path) -> anyhow::Result<Measured> {

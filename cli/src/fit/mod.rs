@@ -5,16 +5,20 @@ mod curves;
 mod data;
 mod folder;
 mod linear;
+mod merge;
 mod results;
 mod run;
+mod seams;
 mod setup;
+mod truth;
 
 use crate::output;
 use anyhow::{Context, bail};
 use clap::Args;
 use config::FitFile;
 use folder::Folder;
-use kerrlight_tomo::scene::apply_override;
+pub use merge::merge;
+pub use seams::{assigned, check, coverage, sizes, velocities};
 use std::path::{Path, PathBuf};
 
 /// The experiment that runs without a file.
@@ -82,11 +86,7 @@ impl Fit {
             }
         };
         for assignment in &self.set {
-            let long = match assignment.split_once('=') {
-                Some(("representation", kind)) => format!("representation.kind={kind}"),
-                _ => assignment.clone(),
-            };
-            text = apply_override(&text, &long).with_context(|| format!("--set {assignment}"))?;
+            text = assigned(&text, assignment)?;
         }
         Ok((text, near))
     }

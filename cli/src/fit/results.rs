@@ -2,10 +2,12 @@
 
 use super::config::{AxisSearch, FitFile};
 use super::curves::{loss_plot, psnr_plot};
-use super::data::{Measured, Truth};
+use super::data::Measured;
 use super::folder::Folder;
 use super::setup::{self, Instrument};
+use super::truth::Truth;
 use crate::report::{self, Axis, LinePlot, Marks, Report, Series, View3d};
+use crate::usage::usage;
 use crate::volume_files;
 use anyhow::{Context, anyhow};
 use kerrlight_tomo::fit::{Loss, Motion, State, Trainer};
@@ -173,6 +175,8 @@ impl Estimate<'_> {
             "version": env!("CARGO_PKG_VERSION"),
             "steps": now.step,
             "seconds": found.begun.elapsed().as_secs_f64(),
+            "cpu_seconds": usage().map(|usage| usage.cpu_seconds),
+            "peak_memory_mib": usage().map(|usage| usage.peak_mib),
             "loss": found.loss.total,
             "chi2_per_datum": chi2,
             "axis": now.axis.vector(),
@@ -210,6 +214,7 @@ impl Estimate<'_> {
             figures: self.figures(found)?,
             plots,
             settings: self.settings()?,
+            ..Report::default()
         };
         for (figure, name) in report.figures.iter().zip(["views.png", "slices.png", "movie.png"]) {
             self.folder.file(name)?.write(&figure.png)?;
@@ -253,8 +258,7 @@ impl Estimate<'_> {
 
     fn view(&self, found: &Found<'_>) -> View3d {
         let (r_min, r_max) = (self.file.region.r_min, self.file.region.r_max);
-        let radius = |k: usize| (r_min + (r_max - r_min) * k as f64 / 63.0).max(1e-3);
-        let rate = |k: usize| [radius(k), self.motion.velocity.rate(radius(k))];
+        let rates = report::rates(&self.motion.velocity, [r_min.max(1e-3), r_max]);
         let times = &self.measured.times;
         let ends = [times.first(), times.last()].map(|time| time.copied().unwrap_or(0.0));
         View3d {
@@ -263,7 +267,7 @@ impl Estimate<'_> {
             unit: UNIT.to_owned(),
             motion: (ends[1] > ends[0]).then(|| report::Motion {
                 axis: found.state.now.axis.vector(),
-                rates: (0..64).map(rate).collect(),
+                rates,
                 times: ends,
                 reference: self.motion.reference,
                 time_unit: "GM/c³".to_owned(),

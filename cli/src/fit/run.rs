@@ -41,7 +41,8 @@ impl Prepared {
     }
 }
 
-fn check(file: &FitFile) -> anyhow::Result<()> {
+/// What can be told of settings without tracing rays.
+pub fn check(file: &FitFile) -> anyhow::Result<()> {
     let (_, axis_rate) = setup::axis(file)?;
     setup::representation(file)?;
     let training = setup::training(file, axis_rate)?;

@@ -3,7 +3,7 @@
 use super::config::{self, Activation, AxisSearch, FitFile, Kind, Nodes, Velocity, WidthOf};
 use anyhow::{Context, anyhow, bail};
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
-use kerrlight_tomo::dynamics::{AngularVelocity, Axis, Injection};
+use kerrlight_tomo::dynamics::{AngularVelocity, Axis, Injection, Perturbation};
 use kerrlight_tomo::fit::linear::Prior;
 use kerrlight_tomo::fit::{
     BatchSize, Motion, OccupancyPlan, OccupancySettings, Redshift, Region, Regulariser, Sampling,
@@ -61,10 +61,30 @@ impl Instrument {
         if !(jy > 0.0 && jy.is_finite()) {
             bail!("screen.jy_per_pixel = {jy} is not allowed: above 0");
         }
+        if let Some(medium) = file.effects.absorption {
+            lines.absorb(opacity(medium)?);
+        }
         lines.weight.iter_mut().for_each(|weight| *weight *= jy);
         let redshift = file.effects.redshift_power.map(|power| Redshift { power });
         Ok(Self { hole, lines, redshift })
     }
+}
+
+/// κ(x) of the medium.
+fn opacity(medium: config::Absorption) -> anyhow::Result<impl Fn([f64; 3]) -> f64> {
+    let config::Absorption { coefficient, radius, height } = medium;
+    if !(coefficient >= 0.0 && coefficient.is_finite()) {
+        bail!("effects.absorption.coefficient = {coefficient} is not allowed: 0 or above");
+    }
+    for (name, value) in [("radius", radius), ("height", height)] {
+        if !(value > 0.0 && value.is_finite()) {
+            bail!("effects.absorption.{name} = {value} is not allowed: above 0");
+        }
+    }
+    Ok(move |[x, y, z]: [f64; 3]| {
+        let square = (x * x + y * y + z * z) / (radius * radius) + z * z / (height * height);
+        coefficient * (-0.5 * square).exp()
+    })
 }
 
 /// The region of recovery.
@@ -147,19 +167,28 @@ pub fn priors(linear: &config::Linear) -> Vec<Prior> {
 
 /// How matter turns, with the times of the frames in M.
 pub fn motion(file: &FitFile, times: Vec<f64>) -> anyhow::Result<Motion> {
-    let velocity = match file.motion.velocity.clone() {
+    let velocity = velocity(&file.motion.velocity, file.seed).context("motion.velocity")?;
+    Ok(Motion {
+        velocity,
+        reference: file.motion.reference_time,
+        injection: file.motion.injection_time.map(|time| Injection { time }),
+        times,
+    })
+}
+
+fn velocity(chosen: &Velocity, seed: u64) -> anyhow::Result<AngularVelocity> {
+    let velocity = match chosen.clone() {
         Velocity::Keplerian { drag } => AngularVelocity::Keplerian { drag },
         Velocity::PowerLaw { radius, rate, exponent } => {
             AngularVelocity::PowerLaw { radius, rate, exponent }
         }
         Velocity::Table { radii, rates } => AngularVelocity::Table { radii, rates },
+        Velocity::Perturbed { of, deviation, correlation_length, radii } => {
+            let by = Perturbation { deviation, correlation_length, radii, rows: 100 };
+            velocity(&of, seed)?.perturbed(by, seed)?
+        }
     };
-    Ok(Motion {
-        velocity: velocity.checked().context("motion.velocity")?,
-        reference: file.motion.reference_time,
-        injection: file.motion.injection_time.map(|time| Injection { time }),
-        times,
-    })
+    Ok(velocity.checked()?)
 }
 
 /// The true or known axis.

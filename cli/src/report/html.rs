@@ -1,6 +1,6 @@
 //! The page around everything else. All text from outside goes through [`escape`].
 
-use super::{Figure, LinePlot, Outcome, Report, Setting};
+use super::{Figure, LinePlot, Outcome, Report, Setting, Table};
 use std::fmt::Write;
 
 const PAGE: &str = include_str!("assets/page.html");
@@ -26,6 +26,7 @@ pub fn page(report: &Report) -> anyhow::Result<String> {
     let sections = [
         summary(&report.summary),
         section("results", "Results", &results(&report.results)),
+        section("tables", "Tables", &report.tables.iter().map(one_table).collect::<String>()),
         report.view.as_ref().map(super::View3d::html).transpose()?.unwrap_or_default(),
         section("pictures", "Pictures", &report.figures.iter().map(figure).collect::<String>()),
         section("plots", "Plots", &plots(&report.plots)?),
@@ -70,20 +71,27 @@ fn summary(sentences: &[String]) -> String {
     if text.is_empty() { text } else { format!("<section id=\"summary\">\n{text}</section>\n") }
 }
 
+fn one_table(shown: &Table) -> String {
+    let head: Vec<String> = shown.head.iter().map(|name| escape(name)).collect();
+    let rows = shown.rows.iter().map(|row| row.iter().map(|cell| escape(cell)).collect());
+    let (title, caption) = (escape(&shown.title), escape(&shown.caption));
+    format!("<h3>{title}</h3>\n<p>{caption}</p>\n{}", table(&head, rows))
+}
+
 fn results(rows: &[Outcome]) -> String {
     let cells = |row: &Outcome| {
-        [&row.name, &row.value, &row.unit, &row.meaning].map(String::as_str).map(escape)
+        [&row.name, &row.value, &row.unit, &row.meaning].map(|cell| escape(cell)).to_vec()
     };
-    table(&["Quantity", "Value", "Unit", "What it says"], rows.iter().map(cells))
+    table(&["Quantity", "Value", "Unit", "What it says"].map(str::to_owned), rows.iter().map(cells))
 }
 
 fn settings(rows: &[Setting]) -> String {
-    let cells = |row: &Setting| [&row.key, &row.value, &row.unit].map(String::as_str).map(escape);
-    table(&["Setting", "Value", "Unit"], rows.iter().map(cells))
+    let cells = |row: &Setting| [&row.key, &row.value, &row.unit].map(|cell| escape(cell)).to_vec();
+    table(&["Setting", "Value", "Unit"].map(str::to_owned), rows.iter().map(cells))
 }
 
 /// A table of cells that are safe already; nothing without rows.
-fn table<const N: usize>(head: &[&str; N], rows: impl Iterator<Item = [String; N]>) -> String {
+fn table(head: &[String], rows: impl Iterator<Item = Vec<String>>) -> String {
     let mut body = String::new();
     for cells in rows {
         let [first, rest @ ..] = cells.as_slice() else { continue };

@@ -8,7 +8,7 @@ mod plot;
 mod tests;
 mod view;
 
-pub use pictures::{Figure, frames, projections, slices};
+pub use pictures::{Figure, encode, frames, projections, slices};
 pub use plot::{Axis, LinePlot, Marks, Series};
 pub use view::{Motion, View3d, rates};
 
@@ -23,6 +23,8 @@ pub struct Report {
     pub summary: Vec<String>,
     /// What was measured.
     pub results: Vec<Outcome>,
+    /// Further tables.
+    pub tables: Vec<Table>,
     /// The emission in three dimensions.
     pub view: Option<View3d>,
     /// Pictures.
@@ -31,6 +33,19 @@ pub struct Report {
     pub plots: Vec<LinePlot>,
     /// What was asked for.
     pub settings: Vec<Setting>,
+}
+
+/// A table.
+#[derive(Debug)]
+pub struct Table {
+    /// Its title.
+    pub title: String,
+    /// What it says, for somebody who does not know what is in it.
+    pub caption: String,
+    /// Names of the columns.
+    pub head: Vec<String>,
+    /// Its lines, as long as the head.
+    pub rows: Vec<Vec<String>>,
 }
 
 /// A line of the table of settings.

@@ -18,7 +18,11 @@ pub struct Figure {
     pub alt: String,
 }
 
-fn png(drawn: Option<image::RgbImage>) -> anyhow::Result<Vec<u8>> {
+/// The bytes of a picture's PNG file.
+///
+/// # Errors
+/// If there is no picture.
+pub fn encode(drawn: Option<image::RgbImage>) -> anyhow::Result<Vec<u8>> {
     let drawn = drawn.ok_or_else(|| anyhow!("there is nothing to draw"))?;
     let mut bytes = Cursor::new(Vec::new());
     drawn.write_to(&mut bytes, image::ImageFormat::Png).context("cannot encode a picture")?;
@@ -50,7 +54,7 @@ pub fn slices(
          cut each other, a circle is the hole's horizon in that plane."
     );
     let alt = format!("Three orthogonal slices of the emission: {all}.");
-    Ok(Figure { png: png(slices::sheet(shown, point, hole_radius, unit))?, caption, alt })
+    Ok(Figure { png: encode(slices::sheet(shown, point, hole_radius, unit))?, caption, alt })
 }
 
 /// Volumes from four sides; `unit` is that of the emission.
@@ -68,7 +72,7 @@ pub fn projections(shown: &[Shown], around: &Surroundings, unit: &str) -> anyhow
          of {ring:.2} M in the hole's equatorial plane."
     );
     let alt = format!("The emission seen from four directions: {all}.");
-    Ok(Figure { png: png(projection::sheet(shown, &VIEWS, around, unit))?, caption, alt })
+    Ok(Figure { png: encode(projection::sheet(shown, &VIEWS, around, unit))?, caption, alt })
 }
 
 /// Frames of a strip of a movie.
@@ -113,5 +117,5 @@ pub fn frames(movies: &[(&str, Vec<f32>)], n: usize, times: &[f64]) -> anyhow::R
         at.join(", ")
     );
     let alt = format!("Frames of the movie: {names}.");
-    Ok(Figure { png: png(Some(drawn))?, caption, alt })
+    Ok(Figure { png: encode(Some(drawn))?, caption, alt })
 }

@@ -115,6 +115,7 @@ fn report(nodes: usize) -> Report {
             outcome("PSNR", "36.2", "dB", "an empty volume has 28.48 dB"),
         ],
         settings: vec![setting("spin", "0", ""), setting("fov", "16", "M")],
+        tables: Vec::new(),
         figures,
         plots: vec![loss(), amplitudes()],
         view: Some(View3d {

@@ -22,7 +22,7 @@ pub enum Width {
     Sse2,
     /// Four lanes, AVX2 and FMA.
     Avx2,
-    /// Eight lanes, AVX-512 F and DQ.
+    /// Eight lanes, AVX-512 F and DQ; with the feature `avx512` only.
     Avx512,
 }
 
@@ -34,11 +34,11 @@ impl Width {
             Self::Sse2 => cfg!(target_arch = "x86_64"),
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
             Self::Avx512 => {
                 is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq")
             }
-            #[cfg(not(target_arch = "x86_64"))]
+            #[allow(unreachable_patterns)]
             _ => false,
         }
     }
@@ -57,7 +57,7 @@ fn run_avx2<T: Task>(task: T) -> T::Output {
     task.run::<super::lanes::avx2::F64x4>()
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", feature = "avx512"))]
 #[target_feature(enable = "avx512f,avx512dq")]
 fn run_avx512<T: Task>(task: T) -> T::Output {
     task.run::<super::lanes::avx512::F64x8>()
@@ -68,6 +68,7 @@ fn run_avx512<T: Task>(task: T) -> T::Output {
 pub fn dispatch<T: Task>(width: Width, task: T) -> T::Output {
     #[cfg(target_arch = "x86_64")]
     {
+        #[cfg(feature = "avx512")]
         if width == Width::Avx512 && width.available() {
             // SAFETY: the features were just detected.
             return unsafe { run_avx512(task) };

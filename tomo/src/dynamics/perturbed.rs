@@ -119,7 +119,9 @@ mod tests {
     fn numbers_out_of_range_are_named() {
         let law = AngularVelocity::bhnerf();
         let text = |by| law.perturbed(by, 1).unwrap_err().to_string();
-        assert!(text(Perturbation { correlation_length: 0.0, ..BY }).contains("correlation_length"));
+        assert!(
+            text(Perturbation { correlation_length: 0.0, ..BY }).contains("correlation_length")
+        );
         assert!(text(Perturbation { rows: 1, ..BY }).contains("rows = 1 "));
     }
 }

@@ -55,7 +55,12 @@ impl Glyph {
         for (field, value, ok, allowed) in [
             ("height", height, positive(height), "above 0"),
             ("thickness", thickness, positive(thickness), "above 0"),
-            ("softness", softness, positive(softness) && softness <= height, "above 0, at most height"),
+            (
+                "softness",
+                softness,
+                positive(softness) && softness <= height,
+                "above 0, at most height",
+            ),
             ("amplitude", amplitude, amplitude >= 0.0 && amplitude.is_finite(), "0 or above"),
             ("distance of center from the axis", 0.0, up.is_some(), "above 0"),
         ] {
@@ -115,8 +120,13 @@ impl Glyph {
         let (u, v) = (column - x, row - y);
         let (x, y) = (x as i64, y as i64);
         let at = |x: i64, y: i64| {
-            let inside = (0..self.columns as i64).contains(&x) && (0..self.rows as i64).contains(&y);
-            if inside { f64::from(self.values[y as usize * self.columns + x as usize]) } else { 0.0 }
+            let inside =
+                (0..self.columns as i64).contains(&x) && (0..self.rows as i64).contains(&y);
+            if inside {
+                f64::from(self.values[y as usize * self.columns + x as usize])
+            } else {
+                0.0
+            }
         };
         (1.0 - v) * ((1.0 - u) * at(x, y) + u * at(x + 1, y))
             + v * ((1.0 - u) * at(x, y + 1) + u * at(x + 1, y + 1))

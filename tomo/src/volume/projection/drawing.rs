@@ -3,6 +3,7 @@
 use super::super::panels::{self, PANEL, Page, Panel, Shown};
 use super::{Surroundings, View, project};
 use crate::image::canvas::{Canvas, Rgb};
+use crate::volume::Volume;
 use image::RgbImage;
 
 /// The ball, its edge, the axis, and the circle in the equatorial plane.
@@ -25,7 +26,10 @@ pub fn sheet(
     };
     let light: Vec<Vec<Vec<f32>>> = shown.iter().map(of).collect();
     let most = panels::largest(light.iter().flatten());
-    let panel = |(view, light): (&View, &Vec<f32>)| panel(*view, light, around, most);
+    let panel = |(view, light): (&View, &Vec<f32>)| {
+        let title = format!("azimuth {:.0}°, elevation {:.0}°", view.azimuth, view.elevation);
+        panel(*view, light, around, most, title)
+    };
     let row = |(s, light): (&Shown, &Vec<Vec<f32>>)| {
         let panels = views.iter().zip(light).map(panel).collect::<Option<Vec<Panel>>>()?;
         Some((s.name.to_owned(), panels))
@@ -35,7 +39,42 @@ pub fn sheet(
     Page { rows, most, quantity }.draw()
 }
 
-fn panel(view: View, light: &[f32], around: &Surroundings, most: f64) -> Option<Panel> {
+/// A volume of a mosaic.
+#[derive(Clone, Copy, Debug)]
+pub struct Tile<'a> {
+    /// What stands above it.
+    pub title: &'a str,
+    /// Its emission.
+    pub volume: &'a Volume,
+    /// What is around it.
+    pub around: Surroundings,
+}
+
+/// Rows of different volumes, each with its name, seen from one side. Every column has a scale of colours of its
+/// own, which ends at its first volume's brightest place. `None` if there is nothing to draw.
+pub fn mosaic(rows: &[(String, Vec<Tile>)], view: View) -> Option<RgbImage> {
+    let light = |tile: &Tile| project(tile.volume, view, &tile.around, PANEL as usize);
+    let firsts: Vec<f64> =
+        rows.first()?.1.iter().map(|tile| panels::largest([&light(tile)])).collect();
+    let row = |(name, tiles): &(String, Vec<Tile>)| {
+        let panel = |(tile, most): (&Tile, &f64)| {
+            panel(view, &light(tile), &tile.around, *most, tile.title.to_owned())
+        };
+        let panels = tiles.iter().zip(&firsts).map(panel).collect::<Option<Vec<Panel>>>()?;
+        Some((name.clone(), panels))
+    };
+    let rows = rows.iter().map(row).collect::<Option<_>>()?;
+    let quantity = "∫ emission ds, straight rays; 1 is the brightest place of the first row";
+    Page { rows, most: 1.0, quantity: quantity.to_owned() }.draw()
+}
+
+fn panel(
+    view: View,
+    light: &[f32],
+    around: &Surroundings,
+    most: f64,
+    title: String,
+) -> Option<Panel> {
     let table = panels::colors();
     let pixels = PANEL as usize;
     let at = |k: usize| around.half_width * ((2 * k + 1) as f64 / pixels as f64 - 1.0);
@@ -48,7 +87,6 @@ fn panel(view: View, light: &[f32], around: &Surroundings, most: f64) -> Option<
     let pixels = light.iter().enumerate().flat_map(pixel).collect();
     let mut canvas = Canvas::of(&RgbImage::from_raw(PANEL, PANEL, pixels)?)?;
     marks(&mut canvas, view, around);
-    let title = format!("azimuth {:.0}°, elevation {:.0}°", view.azimuth, view.elevation);
     let ends = [[-around.half_width, around.half_width]; 2];
     let axes = ["to the right (M)".to_owned(), "up (M)".to_owned()];
     Some(Panel { title, drawn: canvas.into_picture(), axes, ends })
@@ -115,7 +153,7 @@ fn visible(points: &[[f64; 3]], view: View, hole_radius: f64) -> Vec<(Vec<[f64; 
 mod tests {
     use super::super::VIEWS;
     use super::*;
-    use crate::volume::{Volume, paper};
+    use crate::volume::paper;
 
     /// A line behind the ball is seen on both sides of it, one in front of it as a whole.
     #[test]
@@ -131,6 +169,31 @@ mod tests {
         assert!((behind[1].0[0][0] - 2.0).abs() < 0.11);
         let front = visible(&line(3.0), view, 2.0);
         assert_eq!((front.len(), front[0].0.len(), front[0].1), (1, 101, false));
+    }
+
+    /// Each column is as bright as its own first row.
+    #[test]
+    fn exact_mosaics_scale_each_column() {
+        let scene = paper::scene_1(32);
+        let faint: Vec<f32> = scene.values().iter().map(|v| 0.01 * v).collect();
+        let faint = Volume::new(scene.nodes(), scene.low(), scene.high(), faint).unwrap();
+        let around =
+            Surroundings { axis: [0.0; 3], hole_radius: 2.0, ring_radius: 5.0, half_width: 5.5 };
+        let tile = |volume| Tile { title: "", volume, around };
+        let rows = [
+            ("a".to_owned(), vec![tile(&scene), tile(&faint)]),
+            ("b".to_owned(), vec![tile(&faint), tile(&scene)]),
+        ];
+        let drawn = mosaic(&rows, VIEWS[1]).unwrap();
+        let bright = |right: u32, below: u32| {
+            let (left, top) = (58 + right * 372, 58 + below * 404);
+            let inside =
+                |x: u32, y: u32| (left..left + 300).contains(&x) && (top..top + 300).contains(&y);
+            drawn.enumerate_pixels().filter(|(x, y, p)| inside(*x, *y) && p.0[1] > 200).count()
+        };
+        assert!(bright(0, 0) > 20);
+        assert_eq!(bright(0, 0), bright(1, 0));
+        assert_eq!(bright(0, 1), 0);
     }
 
     #[test]

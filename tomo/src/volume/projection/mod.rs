@@ -6,7 +6,7 @@
 mod drawing;
 
 use super::Volume;
-pub use drawing::sheet;
+pub use drawing::{Tile, mosaic, sheet};
 use rayon::prelude::*;
 
 /// From where a volume is seen, by a viewer far away.

@@ -1,0 +1,346 @@
+//! From an experiment to its cases: every combination of levels and seeds, with the settings of its fit.
+
+use super::experiment::{Experiment, Factor, Level, Source, put};
+use crate::fit;
+use anyhow::{Context, anyhow, bail};
+use toml::{Table, Value};
+
+/// One fit of an experiment.
+pub struct Case {
+    /// Factor and level.
+    pub levels: Vec<(String, String)>,
+    /// Where the levels are on axes of numbers.
+    pub numbers: Vec<Option<f64>>,
+    /// Its seed.
+    pub seed: u64,
+    /// Its settings, or what is wrong with them.
+    pub settings: Result<String, String>,
+    /// A name for a folder: levels, seed, and a checksum of the settings.
+    pub slug: String,
+}
+
+/// Which cases are run, and how.
+#[derive(Default)]
+pub struct Choice {
+    /// Seeds, in place of the experiment's.
+    pub seeds: Option<u64>,
+    /// `factor=level` that are kept.
+    pub only: Vec<String>,
+    /// Whether the experiment's quick settings are used.
+    pub quick: bool,
+    /// `key=value` for all cases.
+    pub set: Vec<String>,
+}
+
+impl Case {
+    /// Its level of a factor.
+    pub fn level(&self, factor: &str) -> Option<&str> {
+        self.levels.iter().find(|(name, _)| name == factor).map(|(_, level)| level.as_str())
+    }
+
+    /// Where its level of a factor is on an axis of numbers.
+    pub fn number(&self, factor: &str) -> Option<f64> {
+        let at = self.levels.iter().position(|(name, _)| name == factor)?;
+        *self.numbers.get(at)?
+    }
+
+    /// `scene 1, grid, seed 2`.
+    pub fn name(&self) -> String {
+        let levels: Vec<&str> = self.levels.iter().map(|(_, level)| level.as_str()).collect();
+        let levels = levels.join(", ");
+        if levels.is_empty() {
+            return format!("seed {}", self.seed);
+        }
+        format!("{levels}, seed {}", self.seed)
+    }
+}
+
+/// All cases, seed by seed, so that an interrupted experiment has some of everything.
+pub fn expand(
+    experiment: &Experiment,
+    source: &Source,
+    choice: &Choice,
+) -> anyhow::Result<Vec<Case>> {
+    let quick = choice.quick.then_some(&experiment.quick);
+    let seeds = choice.seeds.or(quick.and_then(|q| q.seeds)).unwrap_or(experiment.seeds);
+    if !(1..=1_000_000).contains(&seeds) {
+        bail!("--seeds {seeds} is not allowed: 1 to 1000000");
+    }
+    let asked = if choice.only.is_empty() {
+        quick.map(|quick| quick.only.clone()).unwrap_or_default()
+    } else {
+        choice.only.clone()
+    };
+    let only = kept(experiment, &asked)?;
+    let combinations = combinations(&experiment.factor);
+    let mut cases = Vec::new();
+    for seed in 1..=seeds {
+        for levels in &combinations {
+            let of = |factor: &str| {
+                let at = experiment.factor.iter().position(|f| f.name == factor);
+                at.map(|at| levels[at].name.as_str())
+            };
+            let skipped = |skip: &std::collections::BTreeMap<String, String>| {
+                skip.iter().all(|(factor, level)| of(factor) == Some(level))
+            };
+            let wanted = only.iter().all(|(factor, levels)| {
+                of(factor).is_some_and(|level| levels.iter().any(|l| l == level))
+            });
+            if !wanted || experiment.skip.iter().any(skipped) {
+                continue;
+            }
+            cases.push(case(experiment, source, choice, levels, seed));
+        }
+    }
+    if cases.is_empty() {
+        bail!("no case is left");
+    }
+    Ok(cases)
+}
+
+type Kept = Vec<(String, Vec<String>)>;
+
+/// `factor=level` by factors: levels of the same factor add up.
+fn kept(experiment: &Experiment, only: &[String]) -> anyhow::Result<Kept> {
+    let mut kept: Kept = Vec::new();
+    for choice in only {
+        let (factor, level) = choice
+            .split_once('=')
+            .ok_or_else(|| anyhow!("--only {choice:?} is not allowed: factor=level"))?;
+        let known = experiment.levels(factor);
+        if known.is_empty() {
+            let names: Vec<&str> = experiment.factor.iter().map(|f| f.name.as_str()).collect();
+            bail!("--only {choice:?}: there is no factor {factor:?}, only {}", names.join(", "));
+        }
+        if !known.iter().any(|l| l.name == level) {
+            let names: Vec<String> = known.into_iter().map(|l| l.name).collect();
+            bail!("--only {choice:?}: the levels of {factor} are {}", names.join(", "));
+        }
+        match kept.iter_mut().find(|(name, _)| name == factor) {
+            Some((_, levels)) => levels.push(level.to_owned()),
+            None => kept.push((factor.to_owned(), vec![level.to_owned()])),
+        }
+    }
+    Ok(kept)
+}
+
+/// Every combination of levels, the last factor fastest.
+fn combinations(factors: &[Factor]) -> Vec<Vec<Level>> {
+    factors.iter().fold(vec![Vec::new()], |all, factor| {
+        let levels = factor.levels();
+        let with = |before: &Vec<Level>| {
+            levels
+                .iter()
+                .map(|level| [before.as_slice(), std::slice::from_ref(level)].concat())
+                .collect()
+        };
+        all.iter().flat_map(|before| -> Vec<Vec<Level>> { with(before) }).collect()
+    })
+}
+
+fn case(
+    experiment: &Experiment,
+    source: &Source,
+    choice: &Choice,
+    levels: &[Level],
+    seed: u64,
+) -> Case {
+    let factors = experiment.factor.iter();
+    let named = factors.zip(levels).map(|(f, l)| (f.name.clone(), l.name.clone())).collect();
+    let settings = settings(experiment, source, choice, levels, seed);
+    let settings = settings.map_err(|error| format!("{error:#}"));
+    let sum = crc32fast::hash(settings.as_deref().unwrap_or_default().as_bytes());
+    let words: Vec<String> = levels.iter().map(|level| plain(&level.name)).collect();
+    let words = words.into_iter().chain([format!("seed{seed}"), format!("{sum:08x}")]);
+    Case {
+        levels: named,
+        numbers: levels.iter().map(|level| level.number).collect(),
+        seed,
+        settings,
+        slug: words.collect::<Vec<_>>().join("_"),
+    }
+}
+
+/// A name as a file system likes it.
+fn plain(name: &str) -> String {
+    let letter = |c: char| if c.is_ascii_alphanumeric() || c == '.' { c } else { '-' };
+    name.chars().take(40).map(letter).collect()
+}
+
+fn settings(
+    experiment: &Experiment,
+    source: &Source,
+    choice: &Choice,
+    levels: &[Level],
+    seed: u64,
+) -> anyhow::Result<String> {
+    let last = levels.iter().rev().find_map(|level| level.fit.as_ref());
+    let path = last
+        .or(experiment.fit.as_ref())
+        .ok_or_else(|| anyhow!("neither the experiment nor a level names a fit"))?;
+    let mut table = source.fit(path)?;
+    fit::merge(&mut table, &experiment.set);
+    for level in levels {
+        for key in &level.remove {
+            remove(&mut table, key).with_context(|| format!("level {:?}", level.name))?;
+        }
+        apply(&mut table, &level.set);
+    }
+    if choice.quick {
+        fit::merge(&mut table, &experiment.quick.set);
+    }
+    table.insert("seed".to_owned(), Value::Integer(seed as i64));
+    let mut text = toml::to_string(&table).context("settings")?;
+    for assignment in &choice.set {
+        text = fit::assigned(&text, assignment)?;
+    }
+    fit::check(&text)?;
+    Ok(text)
+}
+
+/// Puts settings with one leaf into their place, and merges others.
+fn apply(table: &mut Table, set: &Table) {
+    let (mut key, mut value) = (String::new(), None);
+    let mut at = set;
+    while at.len() == 1 {
+        let Some((name, inner)) = at.iter().next() else { break };
+        key = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
+        match inner {
+            Value::Table(inner) if !inner.is_empty() => at = inner,
+            leaf => {
+                value = Some(leaf.clone());
+                break;
+            }
+        }
+    }
+    match value {
+        Some(value) if is_inside(table, &key) => put(table, &key, value),
+        _ => fit::merge(table, set),
+    }
+}
+
+/// Whether all tables on the way to a key are there already: it is a leaf that is changed, and not a choice.
+fn is_inside(table: &Table, key: &str) -> bool {
+    match key.split_once('.') {
+        None => table.get(key).is_some_and(|old| !old.is_table()),
+        Some((first, rest)) => match table.get(first) {
+            Some(Value::Table(inner)) => is_inside(inner, rest),
+            _ => false,
+        },
+    }
+}
+
+fn remove(table: &mut Table, key: &str) -> anyhow::Result<()> {
+    let missing = || anyhow!("there is no {key} to remove");
+    match key.split_once('.') {
+        None => table.remove(key).map(drop).ok_or_else(missing),
+        Some((first, rest)) => match table.get_mut(first) {
+            Some(Value::Table(inner)) => remove(inner, rest),
+            _ => Err(missing()),
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    const TEXT: &str = r#"
+        title = "t"
+        question = "q"
+        seeds = 2
+        fit = "../scenes/fits/scene_1.toml"
+        [set.training]
+        steps = 7
+        [[factor]]
+        name = "what"
+        [[factor.level]]
+        name = "a grid"
+        set.representation.kind = "grid"
+        remove = ["training.occupancy"]
+        [[factor.level]]
+        name = "scan"
+        set.axis.scan = { directions = 50, frames = 4, rate = 0.0, last_rate = 0.0 }
+        [[factor]]
+        name = "rate"
+        key = "training.rate"
+        values = [1.0, 2]
+        scale = 1e-3
+        [[skip]]
+        what = "scan"
+        rate = "2"
+    "#;
+
+    fn cases(choice: &Choice) -> anyhow::Result<Vec<Case>> {
+        expand(&Experiment::parse(TEXT)?, &Source::BuiltIn, choice)
+    }
+
+    fn table(case: &Case) -> Table {
+        case.settings.as_ref().unwrap().parse().unwrap()
+    }
+
+    #[test]
+    fn exact_cases_are_all_combinations_but_those_left_out() {
+        let cases = cases(&Choice::default()).unwrap();
+        let names: Vec<String> = cases.iter().map(Case::name).collect();
+        let expected = ["a grid, 1.0", "a grid, 2", "scan, 1.0"];
+        let expected = [1, 2].map(|seed| expected.map(|n| format!("{n}, seed {seed}"))).concat();
+        assert_eq!(names, expected);
+        assert_eq!(cases[1].number("rate"), Some(2.0));
+        assert!(cases[0].slug.starts_with("a-grid_1.0_seed1_"));
+        assert_ne!(cases[0].slug, cases[1].slug);
+        let (grid, scan) = (table(&cases[1]), table(&cases[2]));
+        assert_eq!(grid["representation"]["kind"].as_str(), Some("grid"));
+        assert_eq!(grid["training"]["rate"].as_float(), Some(2e-3));
+        assert_eq!(grid["training"]["steps"].as_integer(), Some(7));
+        assert!(!grid["training"].as_table().unwrap().contains_key("occupancy"));
+        let axis = scan["axis"].as_table().unwrap();
+        assert!(
+            axis.len() == 1 && axis.contains_key("scan"),
+            "a choice takes the place of another"
+        );
+    }
+
+    #[test]
+    fn exact_choices_of_the_command_line() {
+        let only = vec!["what=scan".to_owned()];
+        let set = vec!["training.steps=9".to_owned()];
+        let choice = Choice { seeds: Some(3), only, quick: false, set };
+        let cases = cases(&choice).unwrap();
+        assert_eq!(cases.len(), 3);
+        assert_eq!(table(&cases[2])["training"]["steps"].as_integer(), Some(9));
+        assert_eq!(table(&cases[2])["seed"].as_integer(), Some(3));
+    }
+
+    #[test]
+    fn wrong_words_are_named() {
+        let text = |only: &str| {
+            let choice = Choice { only: vec![only.to_owned()], ..Choice::default() };
+            format!("{:#}", cases(&choice).map(|_| ()).unwrap_err())
+        };
+        assert!(text("what").contains("factor=level"));
+        assert!(text("rates=1").contains("there is no factor \"rates\", only what, rate"));
+        assert!(text("what=b").contains("a grid, scan"));
+        let wrong = TEXT.replace("kind = \"grid\"", "kind = \"gird\"");
+        let experiment = Experiment::parse(&wrong).unwrap();
+        let cases = expand(&experiment, &Source::BuiltIn, &Choice::default()).unwrap();
+        let error = cases[0].settings.as_ref().unwrap_err();
+        assert!(error.contains("gird"), "{error}");
+        assert!(cases[2].settings.is_ok());
+    }
+
+    #[test]
+    fn exact_all_experiments_are_whole() {
+        for (name, _) in super::super::experiment::built_in() {
+            let (source, text) = Source::find(Path::new(name)).unwrap();
+            let experiment = Experiment::parse(&text).unwrap();
+            for quick in [false, true] {
+                let choice = Choice { quick, ..Choice::default() };
+                for case in expand(&experiment, &source, &choice).unwrap() {
+                    assert!(case.settings.is_ok(), "{name}: {:?}", case.settings);
+                }
+            }
+        }
+    }
+}

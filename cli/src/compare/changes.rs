@@ -1,0 +1,94 @@
+//! What changed between two runs of an experiment.
+
+use super::summary::{described, result};
+use crate::output;
+use crate::report::Table;
+use anyhow::{Context, bail};
+use serde_json::Value;
+use std::path::Path;
+
+/// Results that are held beside each other.
+const SHOWN: [&str; 4] = ["psnr_db", "axis_dot_truth", "chi2", "seconds"];
+
+/// results.json of a run, or of the run in a folder.
+pub fn read(path: &Path) -> anyhow::Result<Value> {
+    let path = if path.is_dir() { path.join("results.json") } else { path.to_owned() };
+    let name = || format!("{} holds no results of kerrlight compare", path.display());
+    let all: Value = serde_json::from_str(&output::read_text(&path)?).with_context(name)?;
+    if !all["cases"].is_array() {
+        bail!("{}: there are no cases", name());
+    }
+    Ok(all)
+}
+
+fn cases(all: &Value) -> impl Iterator<Item = &Value> {
+    all["cases"].as_array().into_iter().flatten()
+}
+
+/// Cases that both have (same levels and seed), with old and new results.
+pub fn table(new: &Value, old: &Value) -> anyhow::Result<Table> {
+    let mut rows = Vec::new();
+    let (mut gone, mut added) = (0, 0);
+    let same = |a: &Value, b: &Value| a["levels"] == b["levels"] && a["seed"] == b["seed"];
+    for case in cases(old) {
+        gone += usize::from(!cases(new).any(|other| same(case, other)));
+    }
+    for case in cases(new) {
+        match cases(old).find(|other| same(case, other)) {
+            Some(before) => rows.push(row(case, before)),
+            None => added += 1,
+        }
+    }
+    if rows.is_empty() {
+        bail!("the two runs have no case in common");
+    }
+    let head = SHOWN.iter().map(|key| format!("{}: before → now", described(key).0));
+    Ok(Table {
+        title: "What changed".to_owned(),
+        caption: format!(
+            "Cases with the same levels and seed. Versions: {} before, {} now. {added} cases are new, {gone} are \
+             gone. A star marks cases whose settings differ.",
+            old["version"].as_str().unwrap_or("?"),
+            new["version"].as_str().unwrap_or("?"),
+        ),
+        head: std::iter::once("case".to_owned()).chain(head).collect(),
+        rows,
+    })
+}
+
+fn row(new: &Value, old: &Value) -> Vec<String> {
+    let levels = new["levels"].as_object().into_iter().flatten();
+    let mut name: Vec<String> =
+        levels.map(|(_, level)| level.as_str().unwrap_or_default().to_owned()).collect();
+    let star = if new["settings"] == old["settings"] { "" } else { "*" };
+    name.push(format!("seed {}{star}", new["seed"]));
+    let cell = |key: &&str| {
+        let digits = described(key).1;
+        let [before, now] = [old, new].map(|case| result(&case["results"], key));
+        let text = |x: Option<f64>| x.map_or("–".to_owned(), |x| format!("{x:.digits$}"));
+        match (before, now) {
+            (Some(a), Some(b)) => format!("{a:.digits$} → {b:.digits$} ({:+.digits$})", b - a),
+            (None, None) => "–".to_owned(),
+            _ => format!("{} → {}", text(before), text(now)),
+        }
+    };
+    std::iter::once(name.join(", ")).chain(SHOWN.iter().map(cell)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn exact_cases_are_matched_by_levels_and_seeds() {
+        let case = |level: &str, seed: u64, psnr: f64| json!({"levels": {"what": level}, "seed": seed, "settings": {"a": psnr > 40.0}, "results": {"psnr_db": psnr}});
+        let old = json!({"version": "1", "cases": [case("a", 1, 40.0), case("b", 1, 30.0)]});
+        let new = json!({"version": "2", "cases": [case("a", 1, 41.5), case("a", 2, 39.0)]});
+        let table = table(&new, &old).unwrap();
+        assert_eq!(table.rows.len(), 1);
+        assert_eq!(table.rows[0][..2], ["a, seed 1*", "40.00 → 41.50 (+1.50)"]);
+        assert!(table.caption.contains("1 cases are new, 1 are gone"));
+        assert!(super::table(&json!({"cases": []}), &old).is_err());
+    }
+}

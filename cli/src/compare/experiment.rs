@@ -1,0 +1,377 @@
+//! What an experiment's file may say.
+
+use crate::output;
+use anyhow::{Context, anyhow, bail};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use toml::{Table, Value};
+
+/// An experiment: fits that differ in named factors, and what is shown of them.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Experiment {
+    /// In a few words.
+    pub title: String,
+    /// What is asked.
+    pub question: String,
+    /// How to read what was measured, paragraph by paragraph.
+    #[serde(default)]
+    pub reading: Vec<String>,
+    /// Seeds 1 to this are run of every case.
+    pub seeds: u64,
+    /// The fit that all cases change, relative to this file; levels of factors may name others.
+    pub fit: Option<PathBuf>,
+    /// Settings of all cases.
+    #[serde(default)]
+    pub set: Table,
+    /// What `--quick` changes.
+    #[serde(default)]
+    pub quick: Quick,
+    /// What the cases differ in.
+    #[serde(default)]
+    pub factor: Vec<Factor>,
+    /// Combinations of levels, by the factors' names, that are left out.
+    #[serde(default)]
+    pub skip: Vec<BTreeMap<String, String>>,
+    /// Tables of the report.
+    #[serde(default)]
+    pub table: Vec<TableAsked>,
+    /// Pictures of the report.
+    #[serde(default)]
+    pub figure: Vec<FigureAsked>,
+}
+
+/// What `--quick` changes: a look at whether an experiment runs, not a measurement.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Quick {
+    /// Seeds.
+    pub seeds: Option<u64>,
+    /// Settings of all cases, after everything else.
+    #[serde(default)]
+    pub set: Table,
+    /// `factor=level` that are kept; all without any.
+    #[serde(default)]
+    pub only: Vec<String>,
+}
+
+/// Something that cases differ in.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Factor {
+    /// Its name.
+    pub name: String,
+    /// What it may be.
+    #[serde(default)]
+    pub level: Vec<Level>,
+    /// Instead of levels: a setting with dots ...
+    pub key: Option<String>,
+    /// ... and its values, which are also their names.
+    #[serde(default)]
+    pub values: Vec<Value>,
+    /// Values are multiplied by this before they become settings: for units.
+    pub scale: Option<f64>,
+}
+
+/// What a factor may be.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Level {
+    /// Its name.
+    pub name: String,
+    /// Where it is on an axis of numbers.
+    pub number: Option<f64>,
+    /// The fit that these cases change.
+    pub fit: Option<PathBuf>,
+    /// Settings.
+    #[serde(default)]
+    pub set: Table,
+    /// Settings with dots that are taken away.
+    #[serde(default)]
+    pub remove: Vec<String>,
+}
+
+/// A table of means and standard deviations over seeds.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TableAsked {
+    /// What it shows.
+    pub title: String,
+    /// What it says, for someone who has not read the paper.
+    pub caption: String,
+    /// Which result.
+    pub value: String,
+    /// Factors of the rows.
+    pub rows: Vec<String>,
+    /// Factors of the columns.
+    #[serde(default)]
+    pub columns: Vec<String>,
+    /// Levels of the other factors.
+    #[serde(default)]
+    pub r#where: BTreeMap<String, String>,
+}
+
+/// A picture.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FigureAsked {
+    /// Which.
+    pub kind: FigureKind,
+    /// What it shows.
+    pub title: String,
+    /// What it says.
+    pub caption: String,
+    /// Factors of the rows, or of the curves.
+    #[serde(default)]
+    pub rows: Vec<String>,
+    /// Factors of the columns; of a curve or map, of the axis to the right.
+    #[serde(default)]
+    pub columns: Vec<String>,
+    /// Which result.
+    pub value: Option<String>,
+    /// Azimuth and elevation from which volumes are seen, degrees.
+    pub view: Option<[f64; 2]>,
+    /// Levels of the other factors.
+    #[serde(default)]
+    pub r#where: BTreeMap<String, String>,
+}
+
+/// Kinds of pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FigureKind {
+    /// The truth and the recovered volumes.
+    Volumes,
+    /// A result while a fit runs, against seconds.
+    Time,
+    /// A result against a factor of numbers.
+    Curve,
+    /// Means of a result over two factors of numbers.
+    Map,
+    /// The loss over the sphere of axes.
+    Axes,
+    /// (u, v) coverage.
+    Coverage,
+    /// Angular velocities: what was simulated and what was assumed.
+    Velocities,
+}
+
+/// Where an experiment and the fits that it names are read from.
+pub enum Source {
+    /// Those that the program carries.
+    BuiltIn,
+    /// A folder.
+    Folder(PathBuf),
+}
+
+/// Experiments and fits that the program carries, by their paths in the repository.
+macro_rules! carried {
+    ($($path:literal),* $(,)?) => {
+        [$(($path, include_str!(concat!("../../../", $path)))),*]
+    };
+}
+
+const CARRIED: &[(&str, &str)] = &carried![
+    "experiments/representations.toml",
+    "experiments/sparsity.toml",
+    "experiments/axis-minimum.toml",
+    "experiments/velocity-mismatch.toml",
+    "experiments/coverage.toml",
+    "experiments/effects.toml",
+    "experiments/cost.toml",
+    "experiments/spin-mismatch.toml",
+    "experiments/fits/first_pattern.toml",
+    "experiments/fits/second_pattern.toml",
+    "experiments/fits/digits.toml",
+    "scenes/fits/scene_1.toml",
+    "scenes/fits/scene_4.toml",
+    "scenes/fits/scene_8.toml",
+    "cli/src/fit/built_in.toml",
+];
+
+/// Names and titles of the experiments that the program carries.
+pub fn built_in() -> impl Iterator<Item = (&'static str, String)> {
+    CARRIED.iter().filter_map(|(path, text)| {
+        let name = path.strip_prefix("experiments/")?.strip_suffix(".toml")?;
+        let title = text.parse::<Table>().ok()?.get("title")?.as_str()?.to_owned();
+        (!name.contains('/')).then_some((name, title))
+    })
+}
+
+impl Source {
+    /// The text of an experiment: one that the program carries, or a file.
+    pub fn find(name: &Path) -> anyhow::Result<(Self, String)> {
+        let path = format!("experiments/{}.toml", name.display());
+        if let Some((_, text)) = CARRIED.iter().find(|(known, _)| *known == path) {
+            return Ok((Self::BuiltIn, (*text).to_owned()));
+        }
+        if !name.exists() && name.extension().is_none() {
+            let all: Vec<&str> = built_in().map(|(name, _)| name).collect();
+            bail!(
+                "there is no experiment {}: give a file, or one of {}",
+                name.display(),
+                all.join(", ")
+            );
+        }
+        let folder = name.parent().filter(|folder| *folder != Path::new(""));
+        let folder = std::path::absolute(folder.unwrap_or(Path::new(".")))
+            .with_context(|| name.display().to_string())?;
+        Ok((Self::Folder(folder), output::read_text(name)?))
+    }
+
+    /// A fit's settings, with paths in them from anywhere.
+    pub fn fit(&self, path: &Path) -> anyhow::Result<Table> {
+        let name = || path.display().to_string();
+        match self {
+            Self::BuiltIn => {
+                let wanted = path.to_string_lossy();
+                let wanted = match wanted.strip_prefix("../") {
+                    Some(path) => path.to_owned(),
+                    None => format!("experiments/{wanted}"),
+                };
+                let known = CARRIED.iter().find(|(path, _)| *path == wanted);
+                let (_, text) = known.ok_or_else(|| anyhow!("the program carries no {wanted}"))?;
+                text.parse().with_context(name)
+            }
+            Self::Folder(folder) => {
+                let path = folder.join(path);
+                let mut table: Table = output::read_text(&path)?.parse().with_context(name)?;
+                anchor(&mut table, path.parent().unwrap_or(folder));
+                Ok(table)
+            }
+        }
+    }
+}
+
+/// Makes paths of data files start from the root.
+fn anchor(table: &mut Table, folder: &Path) {
+    let Some(Value::Table(data)) = table.get_mut("data") else { return };
+    for kind in data.iter_mut().filter_map(|(_, kind)| kind.as_table_mut()) {
+        if let Some(Value::String(path)) = kind.get_mut("path") {
+            *path = folder.join(&*path).display().to_string();
+        }
+    }
+}
+
+impl Experiment {
+    /// Reads and checks.
+    pub fn parse(text: &str) -> anyhow::Result<Self> {
+        let experiment: Self = toml::from_str(text)?;
+        experiment.check()?;
+        Ok(experiment)
+    }
+
+    fn check(&self) -> anyhow::Result<()> {
+        if self.seeds == 0 {
+            bail!("seeds = 0 is not allowed: 1 or more");
+        }
+        for (k, factor) in self.factor.iter().enumerate() {
+            factor.check()?;
+            if self.factor[..k].iter().any(|other| other.name == factor.name) {
+                bail!("factor {:?} is there twice", factor.name);
+            }
+        }
+        for skip in &self.skip {
+            self.known(skip).context("skip")?;
+        }
+        for table in &self.table {
+            let name = || format!("table {:?}", table.title);
+            self.shown(&table.rows, &table.columns, &table.r#where, true).with_context(name)?;
+        }
+        for figure in &self.figure {
+            let name = || format!("figure {:?}", figure.title);
+            self.shown(&figure.rows, &figure.columns, &figure.r#where, false).with_context(name)?;
+        }
+        Ok(())
+    }
+
+    /// Levels of one factor.
+    pub fn levels(&self, factor: &str) -> Vec<Level> {
+        self.factor.iter().find(|f| f.name == factor).map(Factor::levels).unwrap_or_default()
+    }
+
+    fn known(&self, levels: &BTreeMap<String, String>) -> anyhow::Result<()> {
+        for (factor, level) in levels {
+            let all = self.levels(factor);
+            if !all.iter().any(|l| l.name == *level) {
+                let names: Vec<String> = all.into_iter().map(|l| l.name).collect();
+                bail!("there is no {factor} = {level:?}: its levels are {}", names.join(", "));
+            }
+        }
+        Ok(())
+    }
+
+    /// A cell must not mix levels of a factor that nobody named.
+    fn shown(
+        &self,
+        rows: &[String],
+        columns: &[String],
+        fixed: &BTreeMap<String, String>,
+        all: bool,
+    ) -> anyhow::Result<()> {
+        self.known(fixed)?;
+        let named = |name: &String| rows.contains(name) || columns.contains(name);
+        for name in rows.iter().chain(columns) {
+            if !self.factor.iter().any(|factor| factor.name == *name) {
+                bail!("there is no factor {name:?}");
+            }
+        }
+        let free = |f: &&Factor| !named(&f.name) && !fixed.contains_key(&f.name);
+        match self.factor.iter().find(free) {
+            Some(factor) if all => {
+                bail!("factor {:?} is neither in rows nor in columns nor in where", factor.name)
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Factor {
+    fn check(&self) -> anyhow::Result<()> {
+        let name = &self.name;
+        match (&self.key, self.level.is_empty(), self.values.is_empty()) {
+            (None, false, true) | (Some(_), true, false) => {}
+            _ => bail!("factor {name:?} needs either levels, or a key with values"),
+        }
+        let levels = self.levels();
+        for (k, level) in levels.iter().enumerate() {
+            if levels[..k].iter().any(|other| other.name == level.name) {
+                bail!("factor {name:?}: level {:?} is there twice", level.name);
+            }
+        }
+        Ok(())
+    }
+
+    /// Its levels, those of values included.
+    pub fn levels(&self) -> Vec<Level> {
+        let Some(key) = &self.key else { return self.level.clone() };
+        let level = |value: &Value| {
+            let number = value.as_float().or(value.as_integer().map(|n| n as f64));
+            let scaled = match (number, self.scale) {
+                (Some(number), Some(scale)) => Value::Float(number * scale),
+                _ => value.clone(),
+            };
+            let name = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+            let mut set = Table::new();
+            put(&mut set, key, scaled);
+            Level { name, number, fit: None, set, remove: Vec::new() }
+        };
+        self.values.iter().map(level).collect()
+    }
+}
+
+/// Sets a key with dots.
+pub fn put(table: &mut Table, key: &str, value: Value) {
+    match key.split_once('.') {
+        None => {
+            table.insert(key.to_owned(), value);
+        }
+        Some((first, rest)) => {
+            let inner = table.entry(first.to_owned()).or_insert_with(|| Value::Table(Table::new()));
+            if let Value::Table(inner) = inner {
+                put(inner, rest, value);
+            }
+        }
+    }
+}

@@ -1,0 +1,234 @@
+//! `kerrlight compare`: many fits that differ in named factors, in one command.
+
+mod cases;
+mod changes;
+mod experiment;
+mod figures;
+mod map;
+mod runner;
+mod summary;
+mod tables;
+
+use crate::output::{self, Output};
+use crate::report::{Figure, Report, Table};
+use crate::{interrupt, progress};
+use anyhow::{Context, bail};
+use cases::{Case, Choice};
+use clap::Args;
+use experiment::{Experiment, Source};
+use runner::{Runner, Status};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+use summary::Summary;
+
+/// Arguments of `kerrlight compare`.
+#[derive(Debug, Args)]
+pub struct Compare {
+    /// An experiment that the program carries, an experiment's file (.toml), or the results of an earlier run
+    /// (results.json) to hold against others; without it, the experiments are listed
+    experiment: Option<PathBuf>,
+    /// Folder of the results [default: the experiment's name]
+    #[arg(short, long, value_name = "FOLDER")]
+    output: Option<PathBuf>,
+    /// Seeds of every case
+    #[arg(long, value_name = "N")]
+    seeds: Option<u64>,
+    /// Run these cases alone, e.g. scene=1; may be repeated
+    #[arg(long, value_name = "FACTOR=LEVEL")]
+    only: Vec<String>,
+    /// Change a setting of all fits, e.g. training.steps=100
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// A look at whether it runs: few steps, few cases
+    #[arg(long)]
+    quick: bool,
+    /// Go on in a folder that exists: what is done is not done again
+    #[arg(long)]
+    resume: bool,
+    /// Show what changed since an earlier run
+    #[arg(long, value_name = "RESULTS")]
+    against: Option<PathBuf>,
+    /// List the cases and stop
+    #[arg(long)]
+    list: bool,
+}
+
+/// Some cases failed: they are named, and the others are whole.
+#[derive(Debug, thiserror::Error)]
+#[error("{failed} of {all} cases failed: {names}")]
+pub struct Failed {
+    failed: usize,
+    all: usize,
+    names: String,
+}
+
+impl Compare {
+    /// Runs an experiment.
+    pub fn run(&self, threads: Option<usize>) -> anyhow::Result<()> {
+        let Some(name) = &self.experiment else { return list_experiments() };
+        let before = self.against.as_deref().map(changes::read).transpose()?;
+        if name.extension().is_some_and(|e| e == "json") || name.join("results.json").is_file() {
+            let Some(before) = before else {
+                bail!("{} are results: give others with --against", name.display());
+            };
+            let changed = changes::table(&changes::read(name)?, &before)?;
+            return output::print(&tables::markdown(&changed));
+        }
+        let (source, text) = Source::find(name)?;
+        let experiment = Experiment::parse(&text).with_context(|| name.display().to_string())?;
+        let choice = Choice {
+            seeds: self.seeds,
+            only: self.only.clone(),
+            quick: self.quick,
+            set: self.set.clone(),
+        };
+        let cases = cases::expand(&experiment, &source, &choice)?;
+        if self.list {
+            return list_cases(&cases);
+        }
+        let folder = self.folder(name, &text)?;
+        let runner = Runner::new(&folder, threads)?;
+        let summary = run(&cases, &runner);
+        write(&experiment, &summary, &runner, &folder, before.as_ref())?;
+        output::print(&format!("{}\n", folder.join("report.html").display()))?;
+        end(&summary, &folder)
+    }
+
+    /// The folder, new or to go on with.
+    fn folder(&self, name: &Path, text: &str) -> anyhow::Result<PathBuf> {
+        let stem =
+            name.file_stem().map_or("compare".into(), |stem| stem.to_string_lossy().into_owned());
+        let folder =
+            self.output.clone().unwrap_or_else(|| PathBuf::from(format!("kerrlight-{stem}")));
+        let shown = folder.display().to_string();
+        let is_full = std::fs::read_dir(&folder).is_ok_and(|mut all| all.next().is_some());
+        if is_full && !self.resume {
+            bail!(
+                "{shown} exists and is not an empty folder: go on with --resume, or give another with -o"
+            );
+        }
+        std::fs::create_dir_all(&folder)
+            .with_context(|| format!("cannot make the folder {shown}"))?;
+        Output::new(&folder.join("experiment.toml"), "toml")?.write(text.as_bytes())?;
+        Ok(folder)
+    }
+}
+
+fn list_experiments() -> anyhow::Result<()> {
+    let line = |(name, title): (&str, String)| format!("{name:20} {title}\n");
+    let all: String = experiment::built_in().map(line).collect();
+    output::print(&format!("{all}\nRun one with: kerrlight compare NAME\n"))
+}
+
+fn list_cases(cases: &[Case]) -> anyhow::Result<()> {
+    let line = |case: &Case| match &case.settings {
+        Ok(_) => format!("{}\n", case.name()),
+        Err(error) => format!("{}: {error}\n", case.name()),
+    };
+    output::print(&cases.iter().map(line).collect::<String>())
+}
+
+/// Runs what is not done yet, until Ctrl-C.
+fn run<'a>(cases: &'a [Case], runner: &Runner) -> Summary<'a> {
+    let flag = interrupt::flag();
+    let mut all: Vec<(&Case, Status)> =
+        cases.iter().map(|case| (case, runner.known(case))).collect();
+    let open = all.iter().filter(|(_, status)| *status == Status::Open).count();
+    eprintln!("{} cases, {open} of them to be run", cases.len());
+    let bar = progress::cases(open as u64);
+    for (case, status) in all.iter_mut().filter(|(_, status)| *status == Status::Open) {
+        if flag.load(Ordering::Relaxed) {
+            break;
+        }
+        bar.set_message(case.name());
+        bar.tick();
+        *status = runner.run(case);
+        // What stops because it is told to has not failed.
+        if flag.load(Ordering::Relaxed) && matches!(status, Status::Failed(_)) {
+            *status = Status::Open;
+        }
+        if let Status::Failed(why) = status {
+            bar.suspend(|| eprintln!("failed: {}: {why}", case.name()));
+        }
+        bar.inc(u64::from(*status != Status::Open));
+    }
+    bar.finish_and_clear();
+    Summary { all }
+}
+
+fn end(summary: &Summary, folder: &Path) -> anyhow::Result<()> {
+    if summary.open() > 0 {
+        let (open, folder) = (summary.open(), folder.display());
+        eprintln!(
+            "{open} cases are not done; go on with the same command, --resume and -o {folder}"
+        );
+    }
+    let failed: Vec<String> = summary.failed().map(|(case, _)| case.name()).collect();
+    if failed.is_empty() {
+        return Ok(());
+    }
+    Err(Failed { failed: failed.len(), all: summary.all.len(), names: failed.join("; ") }.into())
+}
+
+/// results.json, results.csv, tables.md, pictures and report.html.
+fn write(
+    experiment: &Experiment,
+    summary: &Summary,
+    runner: &Runner,
+    folder: &Path,
+    before: Option<&Value>,
+) -> anyhow::Result<()> {
+    let file = |name: &str| Output::new(&folder.join(name), "");
+    let results = summary.json(&experiment.title);
+    file("results.json")?.write(format!("{results:#}\n").as_bytes())?;
+    file("results.csv")?.write(&summary.csv()?)?;
+    let mut shown: Vec<Table> = experiment
+        .table
+        .iter()
+        .filter_map(|asked| tables::table(experiment, summary, asked))
+        .collect();
+    if let Some(before) = before {
+        shown.push(changes::table(&results, before)?);
+    }
+    let text: String = shown.iter().map(tables::markdown).collect();
+    file("tables.md")?.write(text.as_bytes())?;
+    output::print(&text)?;
+    shown.push(tables::all(summary));
+    let drawn = figures::Figures { experiment, summary, runner }.draw()?;
+    let mut figures: Vec<Figure> = Vec::new();
+    for (name, figure) in drawn.figures {
+        file(&format!("{name}.png"))?.write(&figure.png)?;
+        figures.push(figure);
+    }
+    let report = Report {
+        title: experiment.title.clone(),
+        summary: sentences(experiment, summary),
+        tables: shown,
+        figures,
+        plots: drawn.plots,
+        ..Report::default()
+    };
+    report.write(&file("report.html")?)
+}
+
+/// What was asked, what was measured, what it means.
+fn sentences(experiment: &Experiment, summary: &Summary) -> Vec<String> {
+    let mut lines = vec![format!("What was asked: {}", experiment.question)];
+    let (all, done, open) = (summary.all.len(), summary.done().count(), summary.open());
+    let failed = summary.failed().count();
+    let seconds: f64 = summary.done().filter_map(|(_, results)| results["seconds"].as_f64()).sum();
+    lines.push(format!(
+        "What was run: {all} fits, of which {done} ended well, {failed} failed and {open} were not run to their end; \
+         {:.1} minutes of fitting in all.",
+        seconds / 60.0
+    ));
+    for (case, why) in summary.failed() {
+        lines.push(format!("Failed: {}: {why}", case.name()));
+    }
+    let verdicts =
+        experiment.table.iter().flat_map(|asked| tables::verdict(experiment, summary, asked));
+    lines.extend(verdicts);
+    lines.extend(experiment.reading.iter().cloned());
+    lines
+}

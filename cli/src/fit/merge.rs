@@ -1,0 +1,76 @@
+//! Settings that take the place of others.
+
+use super::config::FitFile;
+use anyhow::{Context, bail};
+use toml::{Table, Value};
+
+/// Tables that say which of several things they are by their only key: another key takes their place.
+const CHOICES: [&str; 6] = ["axis", "batch", "data", "nodes", "start", "velocity"];
+
+/// Puts what `changes` holds into a table: tables are merged, all else is replaced.
+pub fn merge(into: &mut Table, changes: &Table) {
+    for (key, change) in changes {
+        match (into.get_mut(key), change) {
+            (Some(Value::Table(old)), Value::Table(new))
+                if !CHOICES.contains(&key.as_str()) || old.keys().eq(new.keys()) =>
+            {
+                merge(old, new);
+            }
+            _ => {
+                into.insert(key.clone(), change.clone());
+            }
+        }
+    }
+}
+
+/// What may differ between what is simulated and what a fit assumes.
+const WORLD: [&str; 5] = ["hole", "observer", "region", "effects", "motion"];
+
+impl FitFile {
+    /// The settings that data are simulated with.
+    pub fn simulated(&self) -> anyhow::Result<Self> {
+        if let Some(key) = self.world.keys().find(|key| !WORLD.contains(&key.as_str())) {
+            bail!("world.{key} is not allowed: {}", WORLD.join(", "));
+        }
+        let mut table = Table::try_from(self).context("settings")?;
+        merge(&mut table, &self.world);
+        table.remove("world");
+        table.try_into().context("world")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table(text: &str) -> Table {
+        text.parse().unwrap()
+    }
+
+    #[test]
+    fn exact_tables_are_merged_and_choices_replaced() {
+        let mut all = table("a = 1\n[hole]\nspin = 0.5\nmass = 2\n[axis.known]\n");
+        merge(&mut all, &table("[hole]\nspin = 0.9\n[axis.scan]\nframes = 3\n"));
+        let expected = "a = 1\n[hole]\nspin = 0.9\nmass = 2\n[axis.scan]\nframes = 3\n";
+        assert_eq!(all, table(expected));
+        merge(&mut all, &table("[axis.scan]\nrate = 1\n"));
+        let both = table("[scan]\nframes = 3\nrate = 1\n");
+        assert_eq!(all["axis"], Value::Table(both), "the same choice with another number");
+    }
+
+    #[test]
+    fn exact_a_world_changes_what_is_simulated() {
+        let mut file: FitFile = toml::from_str(include_str!("built_in.toml")).unwrap();
+        assert_eq!(file.simulated().unwrap(), file);
+        file.world = table("[hole]\nspin = 0.9\n[effects]\nslow_light = false");
+        let world = file.simulated().unwrap();
+        assert_eq!((world.hole.spin, world.hole.mass_msun), (0.9, file.hole.mass_msun));
+        assert!(!world.effects.slow_light && world.effects.redshift_power == Some(2.0));
+        file.world = table("[loss]\n");
+        let error = format!("{:#}", file.simulated().unwrap_err());
+        assert!(error.contains("world.loss is not allowed: hole"), "{error}");
+        file.world = table("[hole]\nspn = 0.9\n");
+        let error = format!("{:#}", file.simulated().unwrap_err());
+        assert!(error.contains("unknown field `spn`"), "{error}");
+    }
+}

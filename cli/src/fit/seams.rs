@@ -1,0 +1,51 @@
+//! What comparisons need of fits: settings as text in, checks and what follows from them without a run out.
+
+use super::config::FitFile;
+use super::data::{self, Measured};
+use super::setup::{self, Instrument};
+use super::{parse, run};
+use kerrlight_tomo::scene::apply_override;
+use std::path::Path;
+
+/// Settings with one `key=value` changed; `representation=grid` is short for representation.kind=grid.
+pub fn assigned(text: &str, assignment: &str) -> anyhow::Result<String> {
+    use anyhow::Context;
+    let long = match assignment.split_once('=') {
+        Some(("representation", kind)) => format!("representation.kind={kind}"),
+        _ => assignment.to_owned(),
+    };
+    apply_override(text, &long).with_context(|| format!("--set {assignment}"))
+}
+
+/// Whether settings make sense, as far as can be told without tracing rays.
+pub fn check(text: &str) -> anyhow::Result<()> {
+    let file = parse(text)?;
+    run::check(&file)?;
+    file.simulated().map(drop)
+}
+
+/// Radius of the horizon, and of the region of recovery, M.
+pub fn sizes(text: &str) -> anyhow::Result<(f64, f64)> {
+    let file = parse(text)?;
+    Ok((kerrlight_geodesic::Kerr::new(file.hole.spin)?.horizon(), file.region.r_max))
+}
+
+/// (u, v) of the data, wavelengths; none without visibilities.
+pub fn coverage(text: &str, near: &Path) -> anyhow::Result<Vec<[f64; 2]>> {
+    let file = parse(text)?;
+    let Measured { visibilities, .. } = data::measure(&file, &Instrument::new(&file)?, near)?;
+    let rows = visibilities.into_iter().flat_map(|(observation, _)| observation.rows);
+    Ok(rows.map(|row| row.uv).collect())
+}
+
+/// (r, angular velocity) that a fit assumes, and that its data were simulated with.
+pub fn velocities(text: &str) -> anyhow::Result<[Vec<[f64; 2]>; 2]> {
+    let file = parse(text)?;
+    let curve = |of: &FitFile| -> anyhow::Result<Vec<[f64; 2]>> {
+        let velocity = setup::motion(of, Vec::new())?.velocity;
+        let (low, high) = (file.region.r_min, file.region.r_max);
+        let radius = |k: usize| (low + (high - low) * k as f64 / 99.0).max(1e-3);
+        Ok((0..100).map(|k| [radius(k), velocity.rate(radius(k))]).collect())
+    };
+    Ok([curve(&file)?, curve(&file.simulated()?)?])
+}
