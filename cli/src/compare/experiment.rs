@@ -175,6 +175,7 @@ macro_rules! carried {
 const CARRIED: &[(&str, &str)] = &carried![
     "experiments/representations.toml",
     "experiments/sparsity.toml",
+    "experiments/axis.toml",
     "experiments/axis-minimum.toml",
     "experiments/velocity-mismatch.toml",
     "experiments/coverage.toml",

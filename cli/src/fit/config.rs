@@ -418,10 +418,13 @@ pub struct Representation {
     /// Unit of time of a network, M.
     #[serde(default = "one")]
     pub time_scale: f64,
+    /// Numbers of a representation that a program of one's own adds.
+    #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
+    pub own: toml::Table,
 }
 
 /// Kinds of representations.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
     /// Network of the pulled-back point.
@@ -432,6 +435,9 @@ pub enum Kind {
     Grid,
     /// Voxels without activation, solved as the convex problem that they are.
     LinearGrid,
+    /// One that a program of one's own adds.
+    #[serde(untagged)]
+    Own(String),
 }
 
 /// Last function.

@@ -1,5 +1,7 @@
 //! From settings to the pieces of a fit.
 
+use crate::program::{OwnSettings, own};
+
 use super::config::{self, Activation, AxisSearch, FitFile, Kind, Nodes, Velocity, WidthOf};
 use anyhow::{Context, anyhow, bail};
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
@@ -243,7 +245,8 @@ pub fn representation(
         })
         .context("representation")
     };
-    Ok(match chosen.kind {
+    Ok(match &chosen.kind {
+        Kind::Own(name) => own(name, &own_settings(file))?,
         Kind::Bhnerf => Box::new(network(NetworkSettings::bhnerf())?),
         Kind::Mlp4d => Box::new(network(NetworkSettings::mlp4d())?),
         Kind::Grid | Kind::LinearGrid => {
@@ -264,6 +267,11 @@ pub fn representation(
             Box::new(Grid::new(settings).context("representation")?)
         }
     })
+}
+
+fn own_settings(file: &FitFile) -> OwnSettings {
+    let Region { r_min, r_max, z_width } = region(&file.region);
+    OwnSettings { r_min, r_max, z_width, table: file.representation.own.clone() }
 }
 
 fn activation(chosen: Activation) -> representation::Activation {

@@ -88,7 +88,8 @@ pub trait Representation<T: Scalar>: Send + Sync {
     /// the end of a ray): overwrites `values`, and adds the product with the cotangents that the link
     /// makes of them.
     ///
-    /// A network goes through its layers once instead of twice.
+    /// Without a way of its own it does one after the other, and takes memory for the cotangents each time; a
+    /// network goes through its layers once instead of twice.
     fn eval_vjp(
         &self,
         parameters: &[T],
@@ -97,5 +98,10 @@ pub trait Representation<T: Scalar>: Send + Sync {
         values: &mut [T],
         gradient: Gradient<'_, T>,
         workspace: &mut Workspace,
-    );
+    ) {
+        self.eval(parameters, at, values, workspace);
+        let mut cotangents = vec![T::zero(); values.len()];
+        (groups.link)(0..groups.starts.len().saturating_sub(1), values, &mut cotangents);
+        self.vjp(parameters, at, &cotangents, gradient, workspace);
+    }
 }
