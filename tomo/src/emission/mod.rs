@@ -5,6 +5,7 @@ pub mod black_body;
 pub mod disc;
 pub mod gas;
 pub mod mesh;
+mod occupied;
 pub mod page_thorne;
 pub mod sky;
 pub mod spot;

@@ -4,6 +4,7 @@
 //! keeps its digits, else step by step. Surfaces come first, since they end rays; then what
 //! fills space, on quadrature nodes; then spots; then the sky.
 
+mod cells;
 mod chord;
 mod glimpse;
 mod medium;
@@ -21,7 +22,7 @@ mod view;
 mod volume;
 
 pub use glimpse::{Fate, Glimpse};
-pub use medium::{Emission, Grain, Medium, Moment, Needs};
+pub use medium::{Emission, Grain, Medium, Moment, Needs, Stretch};
 pub use meter::{Meter, Part};
 pub use view::View;
 
@@ -289,7 +290,7 @@ impl Stage {
         scratch.meter.stop(Part::Rays, clock);
         scratch.volume.reset(self.media.len() * rays * times.len());
         if let Some(observer) = observer {
-            for (m, medium) in self.media.iter().enumerate() {
+            for (m, medium) in self.media.iter().enumerate().filter(|(_, m)| m.grain().is_none()) {
                 let clock = scratch.meter.start();
                 self.fill_block(m, observer, (alpha, beta), times, scratch)?;
                 scratch.meter.stop(medium.part(), clock);
@@ -298,14 +299,19 @@ impl Stage {
         for k in 0..rays {
             let mut ray = None;
             if scratch.sights[k].by_steps {
-                let ray = ray.insert(self.view.ray(&self.hole, alpha[k], beta[k])?);
+                let ray = &*ray.insert(self.view.ray(&self.hole, alpha[k], beta[k])?);
                 let clock = scratch.meter.start();
                 scratch.sights[k] = self.trace_steps(ray, scratch);
                 scratch.meter.stop(Part::Rays, clock);
                 for (m, medium) in self.media.iter().enumerate() {
                     let clock = scratch.meter.start();
                     let screen = self.screen_point(alpha[k], beta[k]);
-                    self.fill_path((m, k), screen, times, scratch);
+                    match medium.grain() {
+                        Some(grain) => {
+                            self.fill_cells((m, k), ray, (screen, grain), times, scratch)
+                        }
+                        None => self.fill_path((m, k), screen, times, scratch),
+                    }
                     scratch.meter.stop(medium.part(), clock);
                 }
             }
@@ -365,7 +371,8 @@ impl Stage {
         let hits = &scratch.hits[sight.hits.clone()];
         let screen = self.screen_point(x, y);
         let shift = self.redshift.and_then(|_| self.view.blueshift(x, y));
-        let seen_as = Seen { lambda: sight.lambda, screen: screen.as_ref(), shift };
+        let Sight { lambda, eta, .. } = sight;
+        let seen_as = Seen { lambda, eta, screen: screen.as_ref(), shift };
         self.add_disc(hits, seen_as, sight.last_time(), &mut still);
         if sight.by_steps {
             self.add_meshes(scratch, sight.last_time(), &mut still);
