@@ -239,6 +239,18 @@ impl Walk<'_> {
         scratch.intervals = intervals;
     }
 
+    /// The same for the piece of the path between two points.
+    pub fn between(
+        &self,
+        ends: [&Node; 2],
+        scratch: &mut WalkScratch,
+        keep: &impl Fn(u32, [&Node; 2], f64) -> bool,
+        visit: &mut impl FnMut([&Node; 2], &[u32]) -> ControlFlow<()>,
+    ) {
+        // Broken off or not, it is at its end.
+        let _ = self.piece(ends, 0, scratch, keep, visit);
+    }
+
     fn piece(
         &self,
         [start, end]: [&Node; 2],
