@@ -1,6 +1,7 @@
 //! Pictures that are interrupted end in the same bytes.
 
 use crate::support::{binary, fail, kerrlight, root, succeed};
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -108,6 +109,49 @@ fn exact_same_bytes_after_a_full_disk() {
     assert!(!folder.path().join("a.exr").exists());
     succeed(folder.path(), &arguments(&scene));
     assert!(std::fs::read(folder.path().join("a.exr")).unwrap() == whole);
+}
+
+/// All files of a folder.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let entries = std::fs::read_dir(folder).unwrap().map(Result::unwrap);
+    let read = |entry: std::fs::DirEntry| std::fs::read(entry.path()).unwrap();
+    entries.map(|entry| (entry.file_name().into_string().unwrap(), read(entry))).collect()
+}
+
+/// A film of a volume with slow light that is killed again and again ends in the same frames, and
+/// leaves nothing else. (Refined pixels: its frames come one by one.)
+#[test]
+fn exact_same_film_of_a_volume_after_kills() {
+    let scene = root().join("scenes/volume.toml");
+    let size = ["--set", "screen.width=24", "--set", "screen.height=16"];
+    let refined = ["--set", "screen.image_error=0.1"];
+    let film = ["--frames", "9", "--from", "0", "--to", "80", "-o", "film"];
+    let movie = ["movie", scene.to_str().unwrap()];
+    let movie = [&movie[..], &film, &size, &refined].concat();
+    let undisturbed = tempfile::tempdir().unwrap();
+    succeed(undisturbed.path(), &movie);
+    let whole = files(&undisturbed.path().join("film"));
+    assert_eq!(whole.len(), 9);
+    let folder = tempfile::tempdir().unwrap();
+    let (film, mut kept) = (folder.path().join("film"), 0);
+    for k in [0, 2, 3, 6] {
+        let mut child = start(folder.path(), &movie);
+        let frame = film.join(format!("frame_{k:04}.exr"));
+        while !frame.exists() && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let there = files(&film);
+        let frames = there.iter().filter(|(name, _)| name.ends_with(".exr"));
+        for (name, bytes) in frames {
+            assert!(whole.get(name) == Some(bytes), "{name} after a kill at frame {k}");
+            kept += 1;
+        }
+    }
+    assert!((8..36).contains(&kept), "{kept}");
+    succeed(folder.path(), &movie);
+    assert!(files(&film) == whole);
 }
 
 #[test]

@@ -47,7 +47,7 @@ impl Plan {
             }
             Integrator::Elliptic => {
                 "closed form on SIMD lanes; step by step next to the critical curve and where a \
-                 spot or a mesh can be met"
+                 spot, a volume or a mesh can be met"
             }
             Integrator::TaylorMino => "step by step, Taylor series",
             Integrator::Dop853Mino => "step by step, Runge-Kutta 8(5,3)",
@@ -64,7 +64,10 @@ impl Plan {
         let effects = &scene.effects;
         if scene.disc.is_some() {
             self.say(Part::Surfaces, true, "disc: radius, azimuth and delay at its crossings");
-            let shift = if effects.redshift {
+            let plunges = scene.disc.as_ref().is_some_and(|disc| disc.plunging.is_some());
+            let shift = if effects.redshift && plunges {
+                "g of circular orbits and of matter that plunges, with the radial momentum"
+            } else if effects.redshift {
                 "g of circular orbits from r and lambda: no momentum"
             } else {
                 "no redshift"
@@ -110,10 +113,14 @@ impl Plan {
         if count == 0 {
             return self.say(part, false, "no volumes");
         }
-        let what =
-            format!("{count} volumes: nodes of r, theta and phi inside their largest radius");
+        let what = format!("{count} volumes: nodes of r, theta and phi, and their values");
         self.say(part, true, what);
-        self.say(part, true, "values where radius and height along the axis are occupied");
+        let what = if scene.effects.lensing {
+            "nodes in occupied bricks alone, which turn with the matter"
+        } else {
+            "nodes inside the largest radius"
+        };
+        self.say(part, true, what);
         let slow = scene.effects.slow_light && scene.changes();
         let what = if slow { "emission when the light passed" } else { "one time: no delays" };
         self.say(part, slow, what);

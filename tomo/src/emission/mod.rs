@@ -6,6 +6,7 @@ pub mod disc;
 pub mod gas;
 pub mod glyph;
 pub mod mesh;
+mod occupied;
 pub mod page_thorne;
 pub mod sky;
 pub mod spot;

@@ -119,7 +119,7 @@ impl SpotModel {
     }
 
     /// Speed of the centre, in coordinates.
-    pub(super) fn speed(&self) -> f64 {
+    pub fn speed(&self) -> f64 {
         self.orbit * self.rate(self.orbit).abs()
     }
 

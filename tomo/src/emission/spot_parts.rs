@@ -29,32 +29,32 @@ const MOST_SHELLS: f64 = 24.0;
 const ROUNDING: f64 = 1e-9;
 
 impl SpotModel {
-    /// Cuts spot number `number` into parts outside the horizon: at one time `at` where it is then,
-    /// without one its whole orbit. A turn is cut into at most `most` parts; shells are as thin as
+    /// Cuts spot number `number` into parts outside the horizon: where it is between two times, or
+    /// without them its whole orbit. A turn is cut into at most `most` parts; shells are as thin as
     /// they have to be around `time`.
     pub fn parts(
         &self,
         number: u32,
         horizon: f64,
-        at: Option<f64>,
+        when: Option<[f64; 2]>,
         time: f64,
         most: f64,
         parts: &mut Vec<SpotPart>,
     ) {
         let [low, high] = self.shell();
         let low = low.max(horizon);
-        if low >= high || at.is_some_and(|at| self.sheared_since().is_some_and(|since| at < since))
-        {
+        let since = self.sheared_since().unwrap_or(f64::NEG_INFINITY);
+        if low >= high || when.is_some_and(|[_, to]| to < since) {
             return;
         }
-        let around = at.unwrap_or(time);
+        let around = when.map_or(time, |[_, to]| to);
         let [least, largest] = self.turned_between([low, high], [around, around]);
         let shells = ((largest - least) / SPREAD).ceil().clamp(1.0, MOST_SHELLS);
         let width = (high - low) / shells;
         for k in 0..shells as u32 {
             let inner = low + width * f64::from(k);
             let radii = [inner, inner + width];
-            let turned = at.map(|at| self.turned_between(radii, [at, at]));
+            let turned = when.map(|[from, to]| self.turned_between(radii, [from.max(since), to]));
             self.cut(number, radii, turned, most, parts);
         }
     }
@@ -183,8 +183,16 @@ mod tests {
                 for since in [None, Some(-30.0), Some(-900.0)] {
                     let spot = spot(axis, sigma, since);
                     for time in [-500.0, -3.0, 11.0, 100.0] {
-                        let (mut now, mut ever) = (Vec::new(), Vec::new());
-                        spot.parts(0, horizon, Some(time), time, 64.0, &mut now);
+                        let [mut now, mut soon, mut ever] = [(); 3].map(|()| Vec::new());
+                        spot.parts(0, horizon, Some([time; 2]), time, 64.0, &mut now);
+                        spot.parts(
+                            0,
+                            horizon,
+                            Some([time - 2.0, time + 1.0]),
+                            time,
+                            64.0,
+                            &mut soon,
+                        );
                         spot.parts(0, horizon, None, 20.0, 64.0, &mut ever);
                         for k in 0..300 {
                             let x = f64::from(k);
@@ -200,7 +208,7 @@ mod tests {
                                 continue;
                             }
                             lit += 1;
-                            for parts in [&now, &ever] {
+                            for parts in [&now, &soon, &ever] {
                                 let holds = |part: &&SpotPart| {
                                     let [low, high] = spot.bounds(part);
                                     let inside =
@@ -225,7 +233,7 @@ mod tests {
     fn exact_rigid_spot_is_its_ball() {
         let spot = spot([0.1, 0.2, 1.0], 0.3, None);
         let mut parts = Vec::new();
-        spot.parts(3, 1.5, Some(25.0), 0.0, 64.0, &mut parts);
+        spot.parts(3, 1.5, Some([25.0; 2]), 0.0, 64.0, &mut parts);
         assert_eq!(parts.len(), 1);
         let ([low, high], center) = (spot.bounds(&parts[0]), spot.center(25.0));
         for k in 0..3 {

@@ -81,6 +81,8 @@ struct Cell {
     quarters: [Light; 4],
     /// Estimated error of its share in the pixel's intensity.
     error: f64,
+    /// The same of edges that pass between its rays and those of the next cells.
+    seam: f64,
 }
 
 /// Largest less least.
@@ -116,7 +118,16 @@ impl Cell {
         if quarters.iter().any(|light| light.other_band(middle)) {
             error = error.max(HIDDEN * bright);
         }
-        Cell { center, level, quarters, error: error * area(level) }
+        Cell { center, level, quarters, error: error * area(level), seam: 0.0 }
+    }
+
+    /// Its error, whatever the reason.
+    fn total(&self) -> f64 {
+        self.error.max(self.seam)
+    }
+
+    fn rays(&self) -> impl Iterator<Item = ([f64; 2], &Light)> {
+        Self::places(self.center, self.level).into_iter().zip(&self.quarters)
     }
 
     /// Whether it touches the pixel's border.
@@ -147,8 +158,10 @@ struct Cut {
     cells: Vec<Cell>,
     /// Largest intensity of its rays and its neighbours' first ones.
     bright: f64,
-    /// How much neighbours' first rays differ if some are of another kind than its own, and none
-    /// of its rays is: an edge may run through between its border and its outermost rays.
+    /// The first rays of its neighbours, row by row, its own in the middle.
+    around: [Light; 9],
+    /// How much neighbours' first rays differ from its rays on their side if none of these is of
+    /// their kind: an edge may run through between its border and its outermost rays.
     contrast: f64,
     rays: u32,
     unresolved: u32,
@@ -157,7 +170,7 @@ struct Cut {
 impl Cut {
     /// Root of the sum of squares: the errors of cells at an edge are independent.
     fn inner_error(&self) -> f64 {
-        self.cells.iter().map(|cell| cell.error * cell.error).sum::<f64>().sqrt()
+        self.cells.iter().map(|cell| cell.total().powi(2)).sum::<f64>().sqrt()
     }
 
     /// What an edge that no ray has told of may do: a quarter of what lies between border and
@@ -175,17 +188,54 @@ impl Cut {
         self.inner_error().hypot(self.border_error())
     }
 
+    /// Looks for edges between rays of neighbouring cells and of neighbouring pixels.
+    fn find_seams(&mut self) {
+        let sides = (0..9).map(|k| [k % 3 - 1, k / 3 - 1]).zip(&self.around);
+        let contrast = sides.map(|(side, light)| self.contrast_with(side, light));
+        self.contrast = contrast.fold(0.0, f64::max);
+        let mut lights = self.cells.iter().flat_map(|cell| &cell.quarters);
+        let Some(first) = lights.next() else { return };
+        if lights.all(|light| light.kind == first.kind) {
+            self.cells.iter_mut().for_each(|cell| cell.seam = 0.0);
+            return;
+        }
+        let raster = Raster::new(&self.cells);
+        for k in 0..self.cells.len() {
+            self.cells[k].seam = raster.seam(&self.cells, k);
+        }
+    }
+
+    /// How much the first ray of the neighbour on one side differs from the outermost rays on
+    /// that side, 0 if one of them is of its kind.
+    fn contrast_with(&self, side: [i32; 2], neighbor: &Light) -> f64 {
+        let mut contrast = 0.0f64;
+        for cell in self.cells.iter().filter(|cell| cell.is_at_border()) {
+            let reach = 0.5 - 0.25 * 0.5f64.powi(cell.level as i32) - 1e-9;
+            let outermost = |place: &[f64; 2]| {
+                place.iter().zip(side).all(|(x, d)| d == 0 || x * f64::from(d) >= reach)
+            };
+            for (_, light) in cell.rays().filter(|(place, _)| outermost(place)) {
+                if light.kind == neighbor.kind {
+                    return 0.0;
+                }
+                contrast = contrast.max((light.intensity - neighbor.intensity).abs());
+            }
+        }
+        contrast
+    }
+
     /// The cells to be cut next, the worst ones, moved to the end; how many.
     fn worst(&mut self, tolerance: f64) -> usize {
+        self.find_seams();
         if self.error() <= tolerance || self.rays >= MOST_RAYS {
             return 0;
         }
         let may = |cell: &Cell| cell.level < DEEPEST;
-        let most = self.cells.iter().filter(|cell| may(cell)).fold(0.0, |m, c| c.error.max(m));
+        let most = self.cells.iter().filter(|cell| may(cell)).fold(0.0, |m, c| c.total().max(m));
         // The border first where it is what counts.
         let (border, level) = (self.border_error() > self.inner_error(), self.border_level());
         let chosen = |cell: &Cell| {
-            let worst = most > 0.0 && cell.error >= 0.5 * most;
+            let worst = most > 0.0 && cell.total() >= 0.5 * most;
             may(cell) && if border { cell.is_at_border() && cell.level == level } else { worst }
         };
         self.cells.sort_by_key(chosen);
@@ -198,9 +248,6 @@ impl Cut {
         for (place, seen) in quarters.iter_mut().zip(seen) {
             *place = Light::from(seen);
             self.unresolved += u32::from(place.unresolved);
-            if place.kind != middle.kind {
-                self.contrast = 0.0;
-            }
             self.bright = self.bright.max(place.intensity);
         }
         self.rays += 4;
@@ -227,6 +274,62 @@ impl Cut {
         pixel.error = self.error();
         pixel.rays += self.rays;
         pixel.unresolved += self.unresolved;
+    }
+}
+
+/// Which cell lies where in a pixel.
+struct Raster(Vec<u16>);
+
+impl Raster {
+    /// Cells along a side, of the smallest kind.
+    const SIDE: usize = 1 << DEEPEST;
+
+    fn new(cells: &[Cell]) -> Self {
+        let mut raster = Raster(vec![0; Self::SIDE * Self::SIDE]);
+        for (number, cell) in cells.iter().enumerate() {
+            let size = Self::SIDE >> cell.level;
+            let first = |x: f64| ((x + 0.5) * Self::SIDE as f64) as usize - size / 2;
+            let [column, row] = cell.center.map(first);
+            for row in row..row + size {
+                let start = row * Self::SIDE + column;
+                // A pixel has at most MOST_RAYS cells.
+                raster.0[start..start + size].fill(number as u16);
+            }
+        }
+        raster
+    }
+
+    /// The light of the ray of the quarter that a place lies in, if it is in the pixel.
+    fn light<'a>(&self, cells: &'a [Cell], place: [f64; 2]) -> Option<&'a Light> {
+        if place.iter().any(|x| x.abs() >= 0.5) {
+            return None;
+        }
+        let [column, row] = place.map(|x| ((x + 0.5) * Self::SIDE as f64) as usize);
+        let cell = cells.get(usize::from(*self.0.get(row * Self::SIDE + column)?))?;
+        let [x, y] = [0, 1].map(|c| usize::from(place[c] > cell.center[c]));
+        cell.quarters.get(2 * y + x)
+    }
+
+    /// What edges may do that pass between the rays of cell number `k` and those of the cells
+    /// next to it. Between a ray and the border lies half of its quarter; the edge may be anywhere
+    /// between this ray and the next cell's, which is taken for a quarter of the quarter.
+    fn seam(&self, cells: &[Cell], k: usize) -> f64 {
+        let cell = &cells[k];
+        let size = 0.5f64.powi(cell.level as i32);
+        let quarter = 0.25 * area(cell.level);
+        let mut seam = 0.0;
+        for (place, light) in cell.rays() {
+            for axis in 0..2 {
+                let mut across = place;
+                // Just over the border, on the level of the ray.
+                across[axis] += (place[axis] - cell.center[axis]).signum() * 0.251 * size;
+                let next = self.light(cells, across).filter(|next| next.kind != light.kind);
+                if let Some(next) = next {
+                    seam += 0.25 * quarter * (next.intensity - light.intensity).abs();
+                }
+            }
+        }
+        seam
     }
 }
 
@@ -328,17 +431,27 @@ fn first(
     for row in rows {
         for column in columns.clone() {
             let center = seen[place(column, row)];
-            let Estimate { error, contrast, bright } = estimate(|dx, dy| {
+            let neighbor = |dx: isize, dy: isize| {
                 let to = |k: usize, d: isize, range: &Range<usize>| {
                     k.saturating_add_signed(d).clamp(range.start, range.end - 1)
                 };
                 &light[place(to(column, dx, &wide), to(row, dy, &high))]
-            });
+            };
+            let Estimate { error, contrast, bright } = estimate(neighbor);
             if contrast.is_some() || error > tolerance {
-                let (cells, rays, unresolved) = (Vec::new(), 0, 0);
-                let pixel = pixels.len();
-                let contrast = contrast.unwrap_or(0.0);
-                cuts.push(Cut { pixel, column, row, cells, bright, contrast, rays, unresolved });
+                let around =
+                    core::array::from_fn(|k| *neighbor(k as isize % 3 - 1, k as isize / 3 - 1));
+                cuts.push(Cut {
+                    pixel: pixels.len(),
+                    column,
+                    row,
+                    cells: Vec::new(),
+                    bright,
+                    around,
+                    contrast: 0.0,
+                    rays: 0,
+                    unresolved: 0,
+                });
             }
             pixels.push(Pixel {
                 intensity: center.intensity,

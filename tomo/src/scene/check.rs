@@ -2,7 +2,7 @@
 
 use super::check_volume::check_volume;
 use super::invalid::{Invalid, brightness, finite, number, positive, shown};
-use super::{Disc, Gas, GasMotion, GasProfile, Mesh, Scene, Sky, Spot};
+use super::{Disc, Gas, GasMotion, GasProfile, Mesh, Plunging, Scene, Sky, Spot};
 use crate::polarization::PowerLaw;
 use kerrlight_geodesic::{Kerr, OutOfRange, orbits};
 
@@ -175,6 +175,11 @@ fn check_combinations(scene: &Scene) -> Result<(), Invalid> {
         let allowed = "true with a [camera]: straight rays are those of a distant observer";
         return Err(Invalid::new("effects.lensing", false, allowed));
     }
+    let plunges = scene.disc.as_ref().is_some_and(|disc| disc.plunging.is_some());
+    if plunges && effects.redshift && !effects.lensing {
+        let allowed = "true with redshift and [disc.plunging]: straight rays have no momentum next to the hole";
+        return Err(Invalid::new("effects.lensing", false, allowed));
+    }
     check_polarization(scene)?;
     match effects.half_orbits {
         Some(n) if n > 100 => {
@@ -242,11 +247,28 @@ fn check_disc(disc: &Disc, hole: &Kerr) -> Result<(), Invalid> {
     let allowed = format!("a radius above the inner edge, {inner:.6}, and at most 1e9");
     number("disc.outer_edge", outer, outer <= 1e9 && outer > inner, &allowed)?;
     brightness("disc.peak_intensity", disc.peak_intensity)?;
+    if let Some(plunging) = &disc.plunging {
+        check_plunging(plunging, disc, isco)?;
+    }
     if let Some(t) = disc.peak_temperature_k {
         let ok = (300.0..=1e8).contains(&t);
         number("disc.peak_temperature_k", t, ok, "a temperature in [300, 1e8] (K)")?;
     }
     check_color("disc.color", disc.color)
+}
+
+fn check_plunging(plunging: &Plunging, disc: &Disc, isco: f64) -> Result<(), Invalid> {
+    brightness("disc.plunging.intensity", plunging.intensity)?;
+    let exponent = plunging.exponent;
+    let ok = exponent.abs() <= 20.0;
+    number("disc.plunging.exponent", exponent, ok, "a number in [-20, 20]")?;
+    if let Some(inner) = disc.inner_edge {
+        let allowed =
+            format!("the innermost stable orbit, {isco}, or left out: `plunging` starts there");
+        number("disc.inner_edge", inner, (inner / isco - 1.0).abs() < 1e-12, &allowed)?;
+    }
+    let (peak, allowed) = (disc.peak_intensity, "above 0 with `plunging` and `peak_temperature_k`");
+    number("disc.peak_intensity", peak, peak > 0.0 || disc.peak_temperature_k.is_none(), allowed)
 }
 
 /// Differential rotation winds a spot up, and the work to follow it grows with the windings.

@@ -14,8 +14,8 @@ pub use camera::{CameraConfig, CameraKey, CameraMotion, Pose};
 pub use invalid::SceneError;
 pub use overrides::apply_override;
 pub use sources::{
-    Checker, Disc, Gas, GasMotion, GasProfile, Mesh, MeshVelocity, Rotation, Sky, SkyImage, Spot,
-    Stars, VolumeSource,
+    Checker, Disc, Gas, GasMotion, GasProfile, Mesh, MeshVelocity, Plunging, Rotation, Sky,
+    SkyImage, Spot, Stars, VolumeSource,
 };
 
 use crate::polarization::MagneticField;

@@ -76,9 +76,25 @@ pub struct Disc {
     /// R, G, B are those of a black body, times its colour, which is white then unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub peak_temperature_k: Option<f64>,
+    /// Matter that falls in from the innermost stable orbit; without it all is dark inside.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plunging: Option<Plunging>,
     /// Linear colour of its light in the R, G, B channels.
     #[serde(default = "white")]
     pub color: [f32; 3],
+}
+
+/// Light of a disc's matter between the innermost stable orbit and the horizon, where it falls with
+/// the energy and angular momentum that it had there (Cunningham 1975, ApJ 202, 788). The flux of
+/// Page & Thorne (1974) is 0 from that orbit on inward, so that it says nothing about this light:
+/// I = intensity (r/r_isco)^exponent in the matter's frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plunging {
+    /// Intensity in the matter's frame at the innermost stable orbit.
+    pub intensity: f64,
+    /// Exponent of r.
+    pub exponent: f64,
 }
 
 fn white() -> [f32; 3] {

@@ -30,7 +30,7 @@ pub struct Glimpse {
     /// Number of crossings of the equatorial plane outside the horizon, along the whole ray.
     pub crossings: u32,
     /// Which crossings of the equatorial plane are on the disc and seen: bit n for number n, counted
-    /// from 0 (the last bit for all from 31 on).
+    /// from 0 (bit 15 for all from there on), and bit 16 + n where its matter plunges.
     pub disc_images: u32,
     /// Radius of the brightest contribution; 0 where there is none.
     pub radius: f64,

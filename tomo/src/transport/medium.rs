@@ -23,10 +23,28 @@ pub trait Medium: core::fmt::Debug + Send + Sync {
     fn four_velocity(&self, r: f64, cos_theta: f64, azimuth: f64) -> Option<[f64; 4]>;
     /// Whether it looks different at different times.
     fn changes(&self) -> bool;
+    /// `false` only if it is dark all along a stretch of a ray.
+    fn may_shine(&self, stretch: &Stretch, moment: Moment) -> bool {
+        let _ = (stretch, moment);
+        true
+    }
     /// Whether [`fill`](Self::fill) gives absorption.
     fn absorbs(&self) -> bool;
     /// Appends emission and absorption at the nodes of a ray with angular momentum `lambda`.
     fn fill(&self, nodes: &RayNodes<'_>, lambda: f64, moment: Moment, out: &mut Emission);
+}
+
+/// A short stretch of a ray.
+#[derive(Debug, Clone, Copy)]
+pub struct Stretch {
+    /// r n of its ends, in M.
+    pub positions: [[f64; 3]; 2],
+    /// Its least and its largest radius, in M.
+    pub radii: [f64; 2],
+    /// Its largest and its least delay, in M; 0 where delays are not asked for.
+    pub delays: [f64; 2],
+    /// How far it may lie from its chord, in M; infinite if that is not known.
+    pub off: f64,
 }
 
 /// Cells in which a medium is smooth.
@@ -174,17 +192,27 @@ fn legendre(k: usize, z: f64) -> f64 {
     (2 * k + 1) as f64 * value
 }
 
-/// Sums emission up, front to back: I = ∫ j e^{−D} ds, D = ∫ κ ds. `depths` receives the optical
-/// depth at every node if there is absorption.
+/// What is known of single nodes and panels of a sum.
+#[derive(Debug, Default)]
+pub(super) struct Sums {
+    /// Optical depth at each node; empty without absorption.
+    pub depths: Vec<f64>,
+    /// Estimated error of each panel's intensity.
+    pub misses: Vec<f64>,
+}
+
+/// Sums emission up, front to back: I = ∫ j e^{−D} ds, D = ∫ κ ds. The sums' depths are
+/// those of every node if there is absorption.
 pub(super) fn gather(
     quadrature: &Quadrature,
     nodes: &RayNodes<'_>,
     emission: &Emission,
-    depths: &mut Vec<f64>,
+    Sums { depths, misses }: &mut Sums,
 ) -> Light {
     let order = quadrature.rule.order();
     let mut light = Light::default();
     depths.clear();
+    misses.clear();
     let (mut most, mut brightest) = (0.0, None);
     let mut gains = [0.0; MOST_NODES];
     let gains = &mut gains[..order];
@@ -192,7 +220,7 @@ pub(super) fn gather(
     let panels = panels.zip(emission.redshift.chunks_exact(order));
     for (number, ((weights, emissivity), redshift)) in panels.enumerate() {
         let start = number * order;
-        let mut opaque = false;
+        let mut miss = None;
         for ((gain, weight), j) in gains.iter_mut().zip(weights).zip(emissivity) {
             *gain = weight * j;
         }
@@ -204,8 +232,7 @@ pub(super) fn gather(
             }
             let thick = &thick[..order];
             if thick.iter().sum::<f64>() > OPAQUE {
-                light.error += shade_cells(thick, gains, &mut light.depth, depths);
-                opaque = true;
+                miss = Some(shade_cells(thick, gains, &mut light.depth, depths));
             } else {
                 quadrature.absorb(thick, &mut light.depth, depths);
                 for (gain, depth) in gains.iter_mut().zip(&depths[start..]) {
@@ -227,9 +254,9 @@ pub(super) fn gather(
                 }
             }
         }
-        if !opaque {
-            light.error += quadrature.missed(gains);
-        }
+        let miss = miss.unwrap_or_else(|| quadrature.missed(gains));
+        misses.push(miss);
+        light.error += miss;
         if light.depth > DARK {
             break;
         }

@@ -4,6 +4,7 @@
 //! keeps its digits, else step by step. Surfaces come first, since they end rays; then what
 //! fills space, on quadrature nodes; then spots; then the sky.
 
+mod cells;
 mod chord;
 mod glimpse;
 mod medium;
@@ -21,7 +22,7 @@ mod view;
 mod volume;
 
 pub use glimpse::{Fate, Glimpse};
-pub use medium::{Emission, Grain, Medium, Moment, Needs};
+pub use medium::{Emission, Grain, Medium, Moment, Needs, Stretch};
 pub use meter::{Meter, Part};
 pub use view::View;
 
@@ -41,7 +42,7 @@ use kerrlight_geodesic::{
 use meshes::{Hit as MeshHit, MeshTree};
 use polarized::Polarization;
 use rays::{End, Sight};
-use spots::{Met, SpotTree};
+use spots::{Met, SpotSpans, SpotTree};
 use std::sync::{Arc, Mutex};
 use straight::Line;
 use surface::{Hit, Seen};
@@ -74,6 +75,8 @@ pub struct Stage {
     spots: Vec<SpotModel>,
     /// Trees over the spots by time of observation, the latest last.
     spot_trees: Arc<Mutex<SpotTrees>>,
+    /// Trees over the spots by time of emission, with slow light.
+    spot_spans: Option<Arc<SpotSpans>>,
     meshes: Option<Arc<MeshTree>>,
     one_by_one: bool,
     sky: Option<SkyModel>,
@@ -180,7 +183,11 @@ impl Stage {
         let redshift = scene.effects.redshift.then_some(scene.effects.spectral_index).flatten();
         let view = View::new(scene, &hole)?;
         let sky = scene.sky.as_ref().and_then(|sky| SkyModel::new(sky, assets.sky));
+        let spots: Vec<_> = scene.spot.iter().map(|spot| SpotModel::new(spot, &hole)).collect();
+        let slow_spots = scene.effects.slow_light.then_some(&spots[..]);
         Ok(Stage {
+            spot_spans: slow_spots.and_then(SpotSpans::new).map(Arc::new),
+            spots,
             hole,
             view,
             tracer: Tracer::with_method(scene.tracer.integrator.method(), scene.tracer.tolerance)?,
@@ -195,7 +202,6 @@ impl Stage {
             places: Needs { azimuth: kept("azimuth"), time: kept("delay"), velocity: false },
             media: media(scene, &assets.volumes, &hole)?,
             disc: scene.disc.as_ref().map(|disc| DiscModel::new(disc, &hole)),
-            spots: scene.spot.iter().map(|spot| SpotModel::new(spot, &hole)).collect(),
             spot_trees: Arc::default(),
             meshes: mesh_tree(scene, &assets.meshes, &hole)?,
             one_by_one: false,
@@ -289,7 +295,7 @@ impl Stage {
         scratch.meter.stop(Part::Rays, clock);
         scratch.volume.reset(self.media.len() * rays * times.len());
         if let Some(observer) = observer {
-            for (m, medium) in self.media.iter().enumerate() {
+            for (m, medium) in self.media.iter().enumerate().filter(|(_, m)| m.grain().is_none()) {
                 let clock = scratch.meter.start();
                 self.fill_block(m, observer, (alpha, beta), times, scratch)?;
                 scratch.meter.stop(medium.part(), clock);
@@ -298,14 +304,19 @@ impl Stage {
         for k in 0..rays {
             let mut ray = None;
             if scratch.sights[k].by_steps {
-                let ray = ray.insert(self.view.ray(&self.hole, alpha[k], beta[k])?);
+                let ray = &*ray.insert(self.view.ray(&self.hole, alpha[k], beta[k])?);
                 let clock = scratch.meter.start();
                 scratch.sights[k] = self.trace_steps(ray, scratch);
                 scratch.meter.stop(Part::Rays, clock);
                 for (m, medium) in self.media.iter().enumerate() {
                     let clock = scratch.meter.start();
                     let screen = self.screen_point(alpha[k], beta[k]);
-                    self.fill_path((m, k), screen, times, scratch);
+                    match medium.grain() {
+                        Some(grain) => {
+                            self.fill_cells((m, k), ray, (screen, grain), times, scratch)
+                        }
+                        None => self.fill_path((m, k), screen, times, scratch),
+                    }
                     scratch.meter.stop(medium.part(), clock);
                 }
             }
@@ -365,7 +376,8 @@ impl Stage {
         let hits = &scratch.hits[sight.hits.clone()];
         let screen = self.screen_point(x, y);
         let shift = self.redshift.and_then(|_| self.view.blueshift(x, y));
-        let seen_as = Seen { lambda: sight.lambda, screen: screen.as_ref(), shift };
+        let Sight { lambda, eta, .. } = sight;
+        let seen_as = Seen { lambda, eta, screen: screen.as_ref(), shift };
         self.add_disc(hits, seen_as, sight.last_time(), &mut still);
         if sight.by_steps {
             self.add_meshes(scratch, sight.last_time(), &mut still);
@@ -429,13 +441,14 @@ impl Stage {
         Ok(sky.look(direction))
     }
 
-    /// The tree over the spots for a time of observation. With slow light one tree serves all;
-    /// without, each time has its own. It is made when it is first asked for.
+    /// The tree over the spots for a time of observation. With slow light one tree serves all, of
+    /// which only the shell is asked where there are trees for spans of time; without, each time
+    /// has its own. It is made when it is first asked for.
     fn spot_tree(&self, time: f64) -> Option<Arc<SpotTree>> {
         if self.spots.is_empty() || self.one_by_one {
             return None;
         }
-        let (key, at) = if self.slow_light { (0.0, None) } else { (time, Some(time)) };
+        let (key, at) = if self.slow_light { (0.0, None) } else { (time, Some([time; 2])) };
         // Nothing that holds the lock can panic halfway through a change.
         let mut trees = self.spot_trees.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if let Some((_, tree)) = trees.iter().rev().find(|(of, _)| *of == key) {

@@ -3,6 +3,7 @@
 use super::Stage;
 use super::medium::{Emission, Medium};
 use super::surface::Hit;
+use crate::emission::disc::DiscModel;
 use crate::polarization::{Gas, MagneticField, PowerLaw, Stokes, view, view_at};
 use crate::scene::Scene;
 use kerrlight_geodesic::bundle::RayNodes;
@@ -71,13 +72,22 @@ impl Stage {
     }
 
     /// Light of the disc at a crossing for unit intensity in the gas frame: g^{3+α} j ℓ_p.
-    pub(super) fn polarized_hit(&self, hit: &Hit, lambda: f64, screen: &ScreenPoint) -> Stokes {
+    pub(super) fn polarized_hit(
+        &self,
+        disc: &DiscModel,
+        hit: &Hit,
+        lambda: f64,
+        screen: &ScreenPoint,
+    ) -> Stokes {
         let Some(Polarization { law, field, .. }) = &self.polarization else {
             return Stokes::default();
         };
         let r = hit.place.radius;
         let seen = ZamoFrame::at(&self.hole, r, 1.0, 0.0).and_then(|frame| {
-            let gas = Gas::keplerian(&self.hole, &frame)?;
+            let gas = match disc.plunging_velocity(r) {
+                Some(velocity) => Gas::of_velocity(&frame, velocity),
+                None => Gas::keplerian(&self.hole, &frame)?,
+            };
             let photon = frame.covariant(momentum(&self.hole, [r, 0.0], hit.rates, lambda));
             view(&frame, screen, photon, gas, field.at(&frame))
         });

@@ -2,7 +2,9 @@
 
 use super::spots::SpotTree;
 use super::surface::Hit;
+use super::tree::enters;
 use super::{Scratch, Stage};
+use crate::emission::disc::DiscModel;
 use crate::transport::glimpse::Place;
 use kerrlight_geodesic::analytic::ClosedForm;
 use kerrlight_geodesic::bundle::{Crossing, RayEnds};
@@ -13,6 +15,8 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Sight {
     pub lambda: f64,
+    /// Of matter that plunges, or of rays traced by steps; else NaN.
+    pub eta: f64,
     pub end: End,
     /// Equatorial crossings of the whole ray.
     pub crossings: u32,
@@ -61,9 +65,12 @@ impl Stage {
         let wanted = if self.disc.is_some() { MOST_HITS } else { 1 };
         let crossings = &mut scratch.crossings;
         crossings.trace(&self.hole, observer, alpha, beta, wanted)?;
+        let plunges = self.disc.as_ref().is_some_and(DiscModel::plunges);
         let asked = self.polarization.is_some()
+            || plunges
             || self.half_orbits.is_some()
             || self.meshes.is_some()
+            || self.media.iter().any(|medium| medium.grain().is_some())
             || !self.spots.is_empty();
         for k in 0..alpha.len() {
             let ends = scratch.crossings.ends(k);
@@ -71,8 +78,8 @@ impl Stage {
             let ray = asked.then(|| observer.ray(&self.hole, alpha[k], beta[k])).transpose()?;
             let first = scratch.hits.len();
             if self.disc.is_some() {
-                let polarized = ray.as_ref().filter(|_| self.polarization.is_some());
-                let motion = polarized.map(|ray| PlaneMotion::new(ray, &ends));
+                let moved = ray.as_ref().filter(|_| self.polarization.is_some() || plunges);
+                let motion = moved.map(|ray| PlaneMotion::new(ray, &ends));
                 let rates = |number: usize, crossing: &Crossing| {
                     motion.as_ref().map_or([0.0; 2], |motion| motion.rates(number, crossing))
                 };
@@ -96,6 +103,7 @@ impl Stage {
                 && found < (ends.crossings as usize).min(self.most_hits());
             scratch.sights.push(Sight {
                 lambda: -alpha[k] * observer.inclination().sin(),
+                eta: ray.as_ref().map_or(f64::NAN, |ray| ray.eta),
                 end: if ends.escapes { End::Escaped } else { End::Captured },
                 crossings: ends.crossings,
                 total: ends.mino_total,
@@ -145,6 +153,7 @@ impl Stage {
             None => !self.spots.is_empty(),
         };
         self.meshes.as_ref().is_some_and(|meshes| self.one_by_one || meshes.can_be_met(ray))
+            || self.media.iter().any(|m| m.grain().is_some() && enters(ray, m.sphere()))
             || trees.iter().any(meets)
     }
 
@@ -176,6 +185,7 @@ impl Stage {
         };
         Sight {
             lambda: ray.lambda,
+            eta: ray.eta,
             end,
             crossings,
             total,

@@ -128,6 +128,7 @@ impl Stage {
         let hits = first..scratch.hits.len();
         Sight {
             lambda: ray.lambda,
+            eta: ray.eta,
             end,
             crossings: hits.len() as u32,
             total: line.parameter(line.ends[1]),
@@ -143,10 +144,16 @@ impl Stage {
     pub(super) fn fill_line(&self, line: &Line, k: usize, times: &[f64], scratch: &mut Scratch) {
         let until = scratch.sights[k].last_time();
         for (m, medium) in self.media.iter().enumerate() {
-            self.fill_ray((m, k), None, times, scratch, |split, _, rule, columns| {
-                let pieces = line.pieces(medium.sphere(), until, split);
-                line.nodes(rule, &pieces, columns);
-            });
+            let first = (m * scratch.sights.len() + k) * times.len();
+            // What changes has nodes of its own at each time: no frame depends on another.
+            let together = if medium.changes() { 1 } else { times.len().max(1) };
+            for (number, times) in times.chunks(together).enumerate() {
+                let times = (times, first + number * together);
+                self.fill_ray((m, k), None, times, scratch, |split, _, rule, columns| {
+                    let pieces = line.pieces(medium.sphere(), until, split);
+                    line.nodes(rule, &pieces, columns);
+                });
+            }
         }
     }
 }

@@ -3,16 +3,15 @@
 use super::Stage;
 use super::glimpse::{Gather, Place, wrap};
 use super::polarized::share;
-use crate::emission::disc::DiscModel;
+use crate::emission::disc::{DiscModel, Photon};
 use kerrlight_geodesic::ScreenPoint;
-use kerrlight_geodesic::flow::keplerian_redshift;
 
 /// Where a ray crosses the equatorial plane.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Hit {
     pub mino_time: f64,
     pub place: Place,
-    /// dw/dτ and d cos θ/dτ, for polarised light.
+    /// dw/dτ and d cos θ/dτ, for polarised light and for matter that plunges.
     pub rates: [f64; 2],
     /// Optical depth of the gas in front of it.
     pub depth: f64,
@@ -22,6 +21,7 @@ pub(super) struct Hit {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Seen<'a> {
     pub lambda: f64,
+    pub eta: f64,
     /// Its place on the screen, if light is polarised.
     pub screen: Option<&'a ScreenPoint>,
     /// What a camera adds to the redshift.
@@ -41,20 +41,21 @@ impl Stage {
         let Some(disc) = &self.disc else { return };
         for (number, hit) in hits.iter().take_while(|hit| hit.mino_time <= end).enumerate() {
             if disc.covers(hit.place.radius) {
-                gather.disc_images |= 1 << number.min(31);
+                let kind = if disc.plunges_at(hit.place.radius) { 16 } else { 0 };
+                gather.disc_images |= 1 << (kind + number.min(15));
                 self.add_hit(disc, hit, seen, gather);
             }
         }
     }
 
     fn add_hit(&self, disc: &DiscModel, hit: &Hit, seen: Seen<'_>, gather: &mut Gather) {
-        let Seen { lambda, screen, shift } = seen;
+        let Seen { lambda, eta, screen, shift } = seen;
         let r = hit.place.radius;
         let g = match self.redshift {
-            Some(_) => keplerian_redshift(&self.hole, r, lambda).unwrap_or(0.0),
+            Some(_) => disc.redshift(r, &Photon { lambda, eta, outward: hit.rates[0] > 0.0 }),
             None => 1.0,
         };
-        let stokes = screen.map(|screen| self.polarized_hit(hit, lambda, screen));
+        let stokes = screen.map(|screen| self.polarized_hit(disc, hit, lambda, screen));
         let boost = match stokes {
             Some(stokes) => stokes.i,
             None => self.redshift.map_or(1.0, |index| g.powf(3.0 + index)),

@@ -1,6 +1,7 @@
 use super::*;
 use crate::scene::Spot;
 
+mod discs;
 mod meshes;
 mod volumes;
 

@@ -65,18 +65,7 @@ impl Tree {
     /// Whether a ray can come near any leaf at all: whether it enters the shell of radii that
     /// holds them. Needs neither a path nor a position.
     pub fn can_be_met(&self, ray: &Ray) -> bool {
-        let outermost = 1.0 / self.shell[1];
-        if self.sizes.is_empty() {
-            return false;
-        }
-        if ray.inverse_radius >= outermost || !ray.inward {
-            return true;
-        }
-        // W falls from 1 to its least value at the barrier: if that is below 0, the ray turns
-        // where W vanishes.
-        let barrier = ray.potential.barrier.filter(|barrier| barrier.height < 0.0);
-        barrier
-            .is_none_or(|barrier| barrier.w >= outermost && ray.potential.value(outermost) > -1e-9)
+        !self.sizes.is_empty() && enters(ray, self.shell[1])
     }
 
     /// The radii between which all leaves lie.
@@ -139,6 +128,18 @@ impl Tree {
             }
         }
     }
+}
+
+/// Whether a ray comes within a radius; `true` if that is not known.
+pub fn enters(ray: &Ray, radius: f64) -> bool {
+    let outermost = 1.0 / radius;
+    if ray.inverse_radius >= outermost || !ray.inward {
+        return true;
+    }
+    // W falls from 1 to its least value at the barrier: if that is below 0, the ray turns
+    // where W vanishes.
+    let barrier = ray.potential.barrier.filter(|barrier| barrier.height < 0.0);
+    barrier.is_none_or(|barrier| barrier.w >= outermost && ray.potential.value(outermost) > -1e-9)
 }
 
 /// A segment that is `wide` on all sides.
@@ -236,6 +237,18 @@ impl Walk<'_> {
             }
         }
         scratch.intervals = intervals;
+    }
+
+    /// The same for the piece of the path between two points.
+    pub fn between(
+        &self,
+        ends: [&Node; 2],
+        scratch: &mut WalkScratch,
+        keep: &impl Fn(u32, [&Node; 2], f64) -> bool,
+        visit: &mut impl FnMut([&Node; 2], &[u32]) -> ControlFlow<()>,
+    ) {
+        // Broken off or not, it is at its end.
+        let _ = self.piece(ends, 0, scratch, keep, visit);
     }
 
     fn piece(

@@ -1,6 +1,7 @@
 //! Light of what fills space, with as many nodes as it takes.
 
-use super::medium::{Emission, Grain, Light, Medium, Moment, Quadrature, gather};
+use super::cells::Panel;
+use super::medium::{Emission, Grain, Light, Medium, Moment, Quadrature, Sums, gather};
 use super::rays::{End, Sight};
 use super::surface::Hit;
 use super::{Scratch, Stage};
@@ -20,15 +21,20 @@ const FINEST_OF_CELLS: u32 = 1024;
 const TOGETHER: usize = 128;
 
 /// Errors of rays fainter than this share of what the medium can reach are measured by that.
-const FAINT: f64 = 1e-4;
+pub(super) const FAINT: f64 = 1e-4;
 
 /// What a volume needs from ray to ray.
 #[derive(Debug)]
 pub(super) struct Workspace {
-    quadrature: Quadrature,
-    emission: Emission,
-    depths: Vec<f64>,
-    columns: Columns,
+    pub quadrature: Quadrature,
+    pub emission: Emission,
+    pub sums: Sums,
+    pub columns: Columns,
+    /// Panels of one ray.
+    pub panels: Vec<Panel>,
+    /// Columns and emission before panels were halved, and emission of one panel.
+    pub before: (Columns, Emission),
+    pub fresh: Emission,
     /// Light of each ray at each time, as in the result.
     pub lights: Vec<Light>,
     pub profile: DepthProfile,
@@ -39,8 +45,11 @@ impl Default for Workspace {
         Workspace {
             quadrature: Quadrature::new(ORDER),
             emission: Emission::default(),
-            depths: Vec::new(),
+            sums: Sums::default(),
             columns: Columns::default(),
+            panels: Vec::new(),
+            before: Default::default(),
+            fresh: Emission::default(),
             lights: Vec::new(),
             profile: DepthProfile::default(),
         }
@@ -117,7 +126,7 @@ impl Stage {
         let Scratch { sights, hits, nodes, volume, .. } = scratch;
         let mut pending: Vec<usize> = (0..sights.len()).filter(|k| !sights[*k].by_steps).collect();
         let (medium, first) = (&*self.media[m], m * sights.len() * times.len());
-        let mut split = first_split(medium);
+        let mut split = 1;
         let together = (TOGETHER / split as usize).clamp(16, TOGETHER);
         while !pending.is_empty() {
             let request = self.request(medium, &volume.quadrature.rule, split);
@@ -133,7 +142,7 @@ impl Stage {
                     let along = Along { medium, first, lambda, screen, times };
                     let done = self.radiate(&along, &nodes.ray(number), volume);
                     volume.shade(&mut hits[sights[*k].hits.clone()]);
-                    if !done && split < finest(medium) {
+                    if !done && split < FINEST {
                         more.push(*k);
                     }
                 }
@@ -153,41 +162,31 @@ impl Stage {
         scratch: &mut Scratch,
     ) {
         let sight = scratch.sights[k].clone();
-        self.fill_ray((m, k), screen, times, scratch, |split, path, rule, columns| {
+        let first = (m * scratch.sights.len() + k) * times.len();
+        self.fill_ray((m, k), screen, (times, first), scratch, |split, path, rule, columns| {
             self.place(path, &sight, &*self.media[m], split, rule, columns);
         });
     }
 
-    /// Light of medium number `m` along ray number `k`, whose nodes are put into columns by `place`.
+    /// Light of medium number `m` along ray number `k`, whose nodes are put into columns by `place`,
+    /// to place `first` of the lights and the following.
     pub(super) fn fill_ray(
         &self,
         (m, k): (usize, usize),
         screen: Option<ScreenPoint>,
-        times: &[f64],
+        (times, first): (&[f64], usize),
         scratch: &mut Scratch,
         place: impl Fn(u32, &Path, &PanelRule, &mut Columns),
     ) {
         let Scratch { path, sights, hits, volume, .. } = scratch;
-        let (medium, first) = (&*self.media[m], (m * sights.len() + k) * times.len());
+        let medium = &*self.media[m];
         let along = Along { medium, first, lambda: sights[k].lambda, screen, times };
         let mut split = 1;
         loop {
             let mut columns = core::mem::take(&mut volume.columns);
             columns.iter_mut().for_each(Vec::clear);
             place(split, path, &volume.quadrature.rule, &mut columns);
-            let [radius, cos_theta, weight, mino_time, azimuth, delay, w_rate, u_rate] = &columns;
-            let nodes = RayNodes {
-                radius,
-                cos_theta,
-                weight,
-                mino_time,
-                azimuth,
-                delay,
-                radial_velocity: w_rate,
-                polar_velocity: u_rate,
-                error: 0.0,
-            };
-            let done = self.radiate(&along, &nodes, volume);
+            let done = self.radiate(&along, &ray_nodes(&columns, 0..usize::MAX), volume);
             volume.columns = columns;
             if done || split >= finest(medium) {
                 break;
@@ -211,7 +210,7 @@ impl Stage {
 
     /// Light along the nodes of a ray at all times; whether they are enough.
     fn radiate(&self, along: &Along<'_>, nodes: &RayNodes<'_>, volume: &mut Workspace) -> bool {
-        let Workspace { quadrature, emission, depths, lights, profile, .. } = volume;
+        let Workspace { quadrature, emission, sums, lights, profile, .. } = volume;
         let lights = &mut lights[along.first..along.first + along.times.len()];
         let mut done = true;
         let grain = along.medium.grain();
@@ -237,14 +236,14 @@ impl Stage {
             if let Some(screen) = &along.screen {
                 self.polarize(along.medium, nodes, along.lambda, screen, emission);
             }
-            let light = gather(quadrature, nodes, emission, depths);
+            let light = gather(quadrature, nodes, emission, sums);
             let enough = self.tolerance * (light.intensity + FAINT * along.medium.scale());
             done &= resolved && (finest || light.error <= enough);
             lights[j] = light;
         }
         profile.clear();
         if along.medium.absorbs() {
-            profile.set(self.hole.spin(), nodes, emission, depths);
+            profile.set(self.hole.spin(), nodes, emission, &sums.depths);
             profile.total = lights.first().map_or(0.0, |light| light.depth);
         }
         done
@@ -270,16 +269,14 @@ impl Stage {
             let middle = turning.clamp(start, end.max(start));
             for [from, to] in [[start, middle], [middle, end]] {
                 if to > from {
-                    let whole = Leg { ends: [from, to], falls };
-                    whole.pieces(path, medium.grain(), split, |piece| {
-                        piece.nodes(rule, |time, step| self.node_of(path, time, step), columns);
-                    });
+                    let piece = Piece::new([from, to], path.angular_rate(), split, falls);
+                    piece.nodes(rule, |time, step| self.node_of(path, time, step), columns);
                 }
             }
         }
     }
 
-    fn node_of(&self, path: &Path, time: f64, step: f64) -> [f64; 8] {
+    pub(super) fn node_of(&self, path: &Path, time: f64, step: f64) -> [f64; 8] {
         let point = path.at(time);
         let (r, u) = (point.radius(), point.cos_theta());
         let weight = self.hole.sigma(r, u) * step;
@@ -291,44 +288,31 @@ impl Stage {
 /// Panels may be longer than cells by so much that rounding does not cut them once more.
 const ROUNDING: f64 = 1.05;
 
-/// By how much panels are cut from the beginning: those half-way to the centre resolve cells.
-fn first_split(medium: &dyn Medium) -> u32 {
-    let Some(grain) = medium.grain() else { return 1 };
-    let cells = (0.5 * LONGEST * medium.sphere() / grain.size).clamp(1.0, 256.0);
-    1 << cells.log2() as u32
-}
-
 fn finest(medium: &dyn Medium) -> u32 {
     if medium.grain().is_some() { FINEST_OF_CELLS } else { FINEST }
 }
 
-/// A stretch of a path on one side of its turning point.
-struct Leg {
-    ends: [f64; 2],
-    falls: bool,
-}
-
-impl Leg {
-    /// Its pieces: itself, or as many as it takes to have panels shorter than the cells of a grain.
-    fn pieces(&self, path: &Path, grain: Option<Grain>, split: u32, mut found: impl FnMut(Piece)) {
-        let ([from, to], rate) = (self.ends, path.angular_rate());
-        let Some(grain) = grain else {
-            return found(Piece::new(self.ends, rate, split, self.falls));
-        };
-        let mut start = from;
-        while start < to {
-            // |dr/dτ| is at most about r² at the far end.
-            let reach = path.at(start).radius() + grain.size;
-            let step = (grain.size / (reach * reach)).min(LONGEST / rate).max(1e-6 * (to - from));
-            let end = if start + step < to { start + step } else { to };
-            found(Piece::new([start, end], rate, split, self.falls && end >= to));
-            start = end;
-        }
-    }
-}
-
 /// Columns of nodes, as in [`RayNodes`].
 pub(super) type Columns = [Vec<f64>; 8];
+
+/// Some nodes of a ray, or all that there are.
+pub(super) fn ray_nodes(columns: &Columns, range: core::ops::Range<usize>) -> RayNodes<'_> {
+    let part = |k: usize| -> &[f64] {
+        let end = range.end.min(columns[k].len());
+        columns[k].get(range.start..end).unwrap_or(&[])
+    };
+    RayNodes {
+        radius: part(0),
+        cos_theta: part(1),
+        weight: part(2),
+        mino_time: part(3),
+        azimuth: part(4),
+        delay: part(5),
+        radial_velocity: part(6),
+        polar_velocity: part(7),
+        error: 0.0,
+    }
+}
 
 /// A stretch of a ray between the places where its integrand is not smooth.
 #[derive(Debug, Clone, Copy)]
@@ -348,6 +332,11 @@ impl Piece {
     pub fn new([from, to]: [f64; 2], rate: f64, split: u32, falls: bool) -> Self {
         let panels = ((to - from) * rate / LONGEST).ceil().clamp(1.0, 1e4);
         Piece { from, to, panels: (f64::from(split) * panels) as usize, falls }
+    }
+
+    /// A piece of one panel.
+    pub fn single([from, to]: [f64; 2], falls: bool) -> Self {
+        Piece { from, to, panels: 1, falls }
     }
 
     /// Puts the nodes of all panels into columns: `node` makes a row of a parameter and a step.

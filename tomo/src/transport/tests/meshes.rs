@@ -64,6 +64,7 @@ fn exact_annulus_against_the_disc() {
         let with_mesh = stage(base.clone(), vec![(ring, annulus(9.0, 15.0, sides))]);
         base.disc = Some(Disc {
             peak_temperature_k: None,
+            plunging: None,
             inner_edge: Some(9.0),
             outer_edge: 15.0,
             peak_intensity: 1.0,

@@ -225,6 +225,9 @@ impl Medium for Finer {
     fn changes(&self) -> bool {
         self.0.changes()
     }
+    fn may_shine(&self, stretch: &Stretch, moment: Moment) -> bool {
+        self.0.may_shine(stretch, moment)
+    }
     fn absorbs(&self) -> bool {
         self.0.absorbs()
     }
