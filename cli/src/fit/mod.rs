@@ -5,9 +5,11 @@ mod curves;
 mod data;
 mod folder;
 mod linear;
+mod penalty;
 mod results;
 mod run;
 mod setup;
+mod words;
 
 use crate::output;
 use anyhow::{Context, bail};
