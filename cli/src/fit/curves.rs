@@ -5,8 +5,10 @@ use serde_json::Value;
 
 fn series(lines: &[Value], name: &str, of: impl Fn(&Value) -> Option<f64>) -> Series {
     let point = |line: &Value| Some([line["step"].as_f64()?, of(line)?]);
-    let points = lines.iter().filter_map(point).collect();
-    Series { name: name.to_owned(), points, errors: Vec::new(), marks: Marks::Line }
+    let points: Vec<[f64; 2]> = lines.iter().filter_map(point).collect();
+    // A line through one point cannot be seen.
+    let marks = if points.len() == 1 { Marks::Points } else { Marks::Line };
+    Series { name: name.to_owned(), points, errors: Vec::new(), marks }
 }
 
 /// Loss and χ² of each kind of data against steps, if any were logged.

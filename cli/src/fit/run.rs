@@ -107,8 +107,12 @@ impl Run<'_> {
     fn describe(&self, instrument: &Instrument) -> String {
         let chain = &self.trainer.objective.chain;
         let names = self.trainer.objective.names().join(", ");
+        let dark = match self.trainer.objective.observed().len() {
+            seen if seen < chain.frames() => format!(" ({seen} of them with data)"),
+            _ => String::new(),
+        };
         format!(
-            "{}: {names}; {} frames of {} rays, {} nodes; {} with {} parameters",
+            "{}: {names}; {} frames{dark} of {} rays, {} nodes; {} with {} parameters",
             self.file.title,
             chain.frames(),
             chain.rays(),
