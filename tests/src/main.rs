@@ -10,6 +10,7 @@ mod documents;
 mod eht_data;
 mod film;
 mod fit;
+mod fit_bad_luck;
 mod fuzz_corpus;
 mod interferometry;
 mod kerr_references;

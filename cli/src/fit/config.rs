@@ -42,6 +42,12 @@ pub struct FitFile {
     pub data: Option<DataFiles>,
     /// What is compared with the data.
     pub loss: Vec<Loss>,
+    /// Penalties on the emission beside the data; none unless asked.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub regulariser: Vec<super::penalty::Setting>,
+    /// Where regularisers look at a network; a grid has nodes of its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub probe: Option<super::penalty::ProbeSetting>,
     /// What is recovered.
     pub representation: Representation,
     /// How.
@@ -456,7 +462,10 @@ pub enum Activation {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Training {
-    /// Steps of Adam.
+    /// Rule of the steps.
+    #[serde(default)]
+    pub optimiser: Optimiser,
+    /// Steps.
     pub steps: u64,
     /// First rate.
     pub rate: f64,
@@ -530,6 +539,8 @@ pub enum Batch {
     Pixels(usize),
     /// Random frames, whole.
     Frames(usize),
+    /// All frames.
+    All,
 }
 
 /// Mask of what shines.
@@ -604,4 +615,15 @@ fn one() -> f64 {
 }
 fn checkpoint_seconds() -> f64 {
     60.0
+}
+
+/// Rules of steps.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Optimiser {
+    /// Steps along the mean gradient of random parts of the data.
+    #[default]
+    Adam,
+    /// Quasi-Newton steps on all data, for small problems.
+    Lbfgs,
 }

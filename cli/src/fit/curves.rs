@@ -5,8 +5,10 @@ use serde_json::Value;
 
 fn series(lines: &[Value], name: &str, of: impl Fn(&Value) -> Option<f64>) -> Series {
     let point = |line: &Value| Some([line["step"].as_f64()?, of(line)?]);
-    let points = lines.iter().filter_map(point).collect();
-    Series { name: name.to_owned(), points, errors: Vec::new(), marks: Marks::Line }
+    let points: Vec<[f64; 2]> = lines.iter().filter_map(point).collect();
+    // A line through one point cannot be seen.
+    let marks = if points.len() == 1 { Marks::Points } else { Marks::Line };
+    Series { name: name.to_owned(), points, errors: Vec::new(), marks }
 }
 
 /// Loss and χ² of each kind of data against steps, if any were logged.
@@ -21,7 +23,7 @@ pub fn loss_plot(lines: &[Value]) -> Option<LinePlot> {
     }
     Some(LinePlot {
         title: "Loss".to_owned(),
-        caption: "What was minimised, of the part of the data that each step looked at, and χ² a datum of each kind of data.".to_owned(),
+        caption: "What the fit makes smaller, step by step: the squared distance of model and data in units of the data's errors (χ²) a datum, and its weighted sum, the loss. Steps that look at a random part of the data see another value each time; a curve that has become flat has converged.".to_owned(),
         x: Axis { label: "step".to_owned(), unit: String::new(), log: false },
         y: Axis { label: "loss".to_owned(), unit: String::new(), log: true },
         series: all,
@@ -33,7 +35,7 @@ pub fn psnr_plot(lines: &[Value]) -> Option<LinePlot> {
     let psnr = series(lines, "PSNR", |line| line["psnr_db"].as_f64());
     (!psnr.points.is_empty()).then(|| LinePlot {
         title: "Quality".to_owned(),
-        caption: "Peak signal-to-noise ratio of the volume beside the truth.".to_owned(),
+        caption: "How close the volume is to the truth while the fit goes on: the peak signal-to-noise ratio of all nodes. The fit does not know the truth and does not use it.".to_owned(),
         x: Axis { label: "step".to_owned(), unit: String::new(), log: false },
         y: Axis { label: "PSNR".to_owned(), unit: "dB".to_owned(), log: false },
         series: vec![psnr],

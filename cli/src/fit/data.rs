@@ -143,8 +143,14 @@ fn read(file: &FitFile, data: &DataFiles, folder: &Path) -> anyhow::Result<Measu
             let times = frames(file)?;
             let path = folder.join(path);
             let field = file.screen.field_uas.unwrap_or(1.0);
-            let (movie, _) = movie_files::read(std::slice::from_ref(&path), Some(field))
-                .or_else(|_| movie_files::read(std::slice::from_ref(&path), None))?;
+            let (movie, _) =
+                movie_files::read(std::slice::from_ref(&path), Some(field)).or_else(|first| {
+                    // FITS files and pictures of kerrlight know their field; of all others the first error is the one.
+                    let knows =
+                        path.extension().is_some_and(|e| e != "csv" && e != "npz" && e != "npy");
+                    movie_files::read(std::slice::from_ref(&path), None)
+                        .map_err(|second| if knows { second } else { first })
+                })?;
             let n = file.screen.pixels;
             if (movie.grid.width, movie.grid.height) != (n, n) || movie.frames() != times.len() {
                 bail!(

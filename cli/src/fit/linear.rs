@@ -2,6 +2,7 @@
 
 use super::config::{Activation, FitFile, Kind};
 use super::data::{self, Measured};
+use super::penalty;
 use super::setup::{self, Instrument};
 use crate::{interrupt, progress};
 use anyhow::{Context, bail};
@@ -52,7 +53,10 @@ impl Linear<'_> {
     ) -> anyhow::Result<LinearSolution<f32>> {
         let linear = setup::linear(self.file)?;
         objective.chain.weigh(axis);
-        let (terms, priors) = (terms(&objective.data), setup::priors(linear));
+        let (terms, mut priors) = (terms(&objective.data), setup::priors(linear));
+        if self.file.representation.kind == Kind::LinearGrid {
+            priors.extend(penalty::priors(self.file)?);
+        }
         let frames: Vec<usize> = objective.observed().into_iter().step_by(stride.max(1)).collect();
         let problem = LinearProblem {
             chain: &objective.chain,

@@ -6,11 +6,13 @@ mod data;
 mod folder;
 mod linear;
 mod merge;
+mod penalty;
 mod results;
 mod run;
 mod seams;
 mod setup;
 mod truth;
+mod words;
 
 use crate::output;
 use anyhow::{Context, bail};

@@ -6,9 +6,12 @@ use super::folder::{self, Folder};
 use super::linear::{self, Linear};
 use super::results::{self, Estimate};
 use super::setup::{self, Instrument};
+use super::words;
 use crate::{interrupt, output, progress};
 use anyhow::{Context, bail};
-use kerrlight_tomo::fit::{BatchSize, Motion, Objective, Outcome, State, Trainer, checkpoint};
+use kerrlight_tomo::fit::{
+    BatchSize, Loss, Motion, Objective, Outcome, State, Trainer, checkpoint,
+};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -105,13 +108,17 @@ impl Run<'_> {
     fn describe(&self, instrument: &Instrument) -> String {
         let chain = &self.trainer.objective.chain;
         let names = self.trainer.objective.names().join(", ");
+        let dark = match self.trainer.objective.observed().len() {
+            seen if seen < chain.frames() => format!(" ({seen} of them with data)"),
+            _ => String::new(),
+        };
         format!(
-            "{}: {names}; {} frames of {} rays, {} nodes; {:?} with {} parameters",
+            "{}: {names}; {} frames{dark} of {} rays, {} nodes; {} with {} parameters",
             self.file.title,
             chain.frames(),
             chain.rays(),
             instrument.lines.points(),
-            self.file.representation.kind,
+            words::representation(&self.file.representation.kind),
             self.trainer.representation.parameters(),
         )
     }
@@ -164,11 +171,12 @@ impl Run<'_> {
             let step = state.now.step;
             bar.set_position(step);
             bar.set_message(format!("loss {:.4e}", state.now.loss));
+            let converged = outcome == Outcome::Converged;
             match outcome {
                 Outcome::Done(loss)
                     if step.is_multiple_of(self.file.training.log_every) || step == steps =>
                 {
-                    let line = self.line(state, &loss.terms, loss.points);
+                    let line = self.line(state, &loss);
                     self.folder.log(&line)?;
                 }
                 Outcome::Done(_) => {}
@@ -179,12 +187,20 @@ impl Run<'_> {
                     let line = json!({"step": step, "diverged_loss": loss.to_string(), "caution": caution});
                     self.folder.log(&line)?;
                 }
+                Outcome::Converged => {
+                    let line = json!({"step": step, "converged": true, "loss": state.now.loss});
+                    self.folder.log(&line)?;
+                }
             }
             let stop = flag.load(Ordering::Relaxed);
             let late = saved.elapsed().as_secs_f64() > self.file.training.checkpoint_seconds;
-            if stop || late || step == steps {
+            if stop || late || converged || step == steps {
                 self.folder.save(&checkpoint::encode(state, self.text)?)?;
                 saved = Instant::now();
+            }
+            if converged {
+                bar.println(format!("converged after step {step}: no step lowers the loss"));
+                break;
             }
             if stop && step < steps {
                 bar.abandon();
@@ -197,18 +213,23 @@ impl Run<'_> {
         Ok(false)
     }
 
-    fn line(&mut self, state: &State<f32>, terms: &[f64], points: usize) -> Value {
-        let names = self.trainer.objective.names().into_iter().map(str::to_owned);
-        let chi2: serde_json::Map<String, Value> =
-            names.zip(terms).map(|(name, value)| (name, json!(value))).collect();
+    fn line(&mut self, state: &State<f32>, loss: &Loss) -> Value {
+        let map = |names: Vec<&str>, values: &[f64]| -> serde_json::Map<String, Value> {
+            let pairs = names.into_iter().zip(values);
+            pairs.map(|(name, value)| (name.to_owned(), json!(value))).collect()
+        };
+        let chi2 = map(self.trainer.objective.names(), &loss.terms);
         let now = &state.now;
         let mut line = json!({
             "step": now.step,
             "seconds": self.begun.elapsed().as_secs_f64(),
             "loss": now.loss,
             "chi2_per_datum": chi2,
-            "evaluations": points,
+            "evaluations": loss.points,
         });
+        if let Some(penalties) = &self.trainer.training.penalties {
+            line["penalties"] = json!(map(penalties.names(), &loss.penalties));
+        }
         if !matches!(self.file.axis, AxisSearch::Known {}) {
             line["axis"] = json!(now.axis.vector());
         }

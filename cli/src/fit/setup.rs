@@ -12,7 +12,7 @@ use kerrlight_tomo::fit::{
     SightlineRequest, Sightlines, Training,
 };
 use kerrlight_tomo::interferometry::operator::ImageGrid;
-use kerrlight_tomo::optimise::{Adam, Polynomial};
+use kerrlight_tomo::optimise::{Adam, Lbfgs, Polynomial};
 use kerrlight_tomo::representation::{self, Grid, GridSettings, Network, NetworkSettings};
 use kerrlight_tomo::units::{MICROARCSECOND, gravitational_angle, gravitational_time};
 
@@ -95,7 +95,8 @@ pub fn region(region: &config::Region) -> Region {
     Region { r_min: region.r_min, r_max: region.r_max, z_width }
 }
 
-fn observer(observer: &config::Observer) -> anyhow::Result<Observer> {
+/// The observer.
+pub fn observer(observer: &config::Observer) -> anyhow::Result<Observer> {
     let inclination = Inclination::from_degrees(observer.inclination_deg).context("observer")?;
     match observer.radius {
         None => Ok(Observer::at_infinity(inclination)),
@@ -111,7 +112,7 @@ fn pixels(screen: &config::Screen) -> anyhow::Result<(Vec<f64>, Vec<f64>)> {
 }
 
 /// M from one pixel to the next.
-fn spacing(screen: &config::Screen) -> anyhow::Result<f64> {
+pub fn spacing(screen: &config::Screen) -> anyhow::Result<f64> {
     let config::Screen { pixels, width, width_of, .. } = *screen;
     if !(2..=4096).contains(&pixels) {
         bail!("screen.pixels = {pixels} is not allowed: 2 to 4096");
@@ -151,7 +152,7 @@ pub fn hours_per_m(file: &FitFile) -> anyhow::Result<f64> {
 /// The linear problem's settings.
 pub fn linear(file: &FitFile) -> anyhow::Result<&config::Linear> {
     let missing =
-        || anyhow!("linear is missing: {:?} and a scan of axes need it", Kind::LinearGrid);
+        || anyhow!("linear is missing: linear-grid, a linear start and a scan of axes need it");
     let linear = file.linear.as_ref().ok_or_else(missing)?;
     if !(linear.upper > 0.0 && linear.upper.is_finite()) {
         bail!("linear.upper = {} is not allowed: above 0", linear.upper);
@@ -293,7 +294,9 @@ pub fn training(file: &FitFile, axis_rate: Option<Polynomial>) -> anyhow::Result
         }
         config::Batch::Pixels(count) => BatchSize::Pixels(count),
         config::Batch::Frames(count) => BatchSize::Frames(count),
+        config::Batch::All => BatchSize::All,
     };
+    let lbfgs = lbfgs(file)?;
     if chosen.log_every == 0 {
         bail!("training.log_every = 0 is not allowed: 1 or more");
     }
@@ -304,11 +307,13 @@ pub fn training(file: &FitFile, axis_rate: Option<Polynomial>) -> anyhow::Result
     Ok(Training {
         seed: file.seed,
         adam: Adam::default(),
+        lbfgs,
         rate: rate.checked().context("training.rate")?,
         axis_rate,
         ramp: chosen.ramp,
         batch,
         occupancy,
+        penalties: super::penalty::penalties(file)?,
         region: region(&file.region),
         keep_every: 50,
         divergence: 1e3,
@@ -330,4 +335,23 @@ fn occupancy(chosen: &config::Occupancy) -> anyhow::Result<OccupancyPlan> {
         warm_up,
         every: every.max(1),
     })
+}
+
+/// Quasi-Newton steps, if they are asked for and the loss is the same at every step.
+fn lbfgs(file: &FitFile) -> anyhow::Result<Option<Lbfgs>> {
+    if file.training.optimiser == config::Optimiser::Adam {
+        return Ok(None);
+    }
+    if file.training.batch != config::Batch::All {
+        bail!(
+            "training.optimiser = lbfgs needs the same data at every step: give training.batch = \"all\" (pixels and frames are random)"
+        );
+    }
+    let linear = file.representation.activation == Activation::Linear;
+    if file.representation.kind == Kind::Grid && linear {
+        bail!(
+            "training.optimiser = lbfgs knows no bounds: a grid with activation linear is held at 0 or above; take representation = linear-grid, or activation sigmoid or softplus"
+        );
+    }
+    Ok(Some(Lbfgs::default()))
 }

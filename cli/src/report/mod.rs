@@ -8,7 +8,7 @@ mod plot;
 mod tests;
 mod view;
 
-pub use pictures::{Figure, encode, frames, projections, slices};
+pub use pictures::{Figure, encode, frames, projections, slices, still};
 pub use plot::{Axis, LinePlot, Marks, Series};
 pub use view::{Motion, View3d, rates};
 

@@ -49,8 +49,9 @@ pub fn slices(
     let [x, y, z] = point.map(|x| format!("{x:.2}").replace('-', "−"));
     let (all, from, name) = (names(shown), through.name(), last.name);
     let caption = format!(
-        "Emission ({all}) in the planes through ({x}, {y}, {z}) M, the {from} of the volume \
-         \"{name}\". All panels have one colour scale; short marks at the edges show where the planes \
+        "Emission ({all}) in three planes at right angles through one point, ({x}, {y}, {z}) M, the {from} \
+         of the volume \"{name}\": cuts through the volume at the reference time. 1 M is half the radius of \
+         a hole without spin. All panels have one colour scale; short marks at the edges show where the planes \
          cut each other, a circle is the hole's horizon in that plane."
     );
     let alt = format!("Three orthogonal slices of the emission: {all}.");
@@ -66,7 +67,7 @@ pub fn projections(shown: &[Shown], around: &Surroundings, unit: &str) -> anyhow
     let (hole, ring) = (around.hole_radius, around.ring_radius);
     let caption = format!(
         "Emission ({all}) summed up along straight parallel rays, seen from four directions: a drawing \
-         of the volume in flat space, without lensing, delay or Doppler shift. All panels have one \
+         of the volume in flat space, without lensing, delay or Doppler shift, not what a telescope sees. All panels have one \
          colour scale. The dark ball has the radius of the horizon, {hole:.3} M, and hides what is \
          behind it; the blue line is the axis that matter turns about, the green circle has a radius \
          of {ring:.2} M in the hole's equatorial plane."
@@ -78,6 +79,39 @@ pub fn projections(shown: &[Shown], around: &Surroundings, unit: &str) -> anyhow
 /// Frames of a strip of a movie.
 const STRIP: usize = 6;
 
+/// Images of n × n pixels on a sheet of equal cells, on one scale of brightness from 0 to `most`.
+struct Sheet {
+    drawn: image::RgbImage,
+    n: usize,
+    zoom: usize,
+    most: f32,
+}
+
+/// Grey lines between images, pixels.
+const GAP: usize = 4;
+
+impl Sheet {
+    fn new([columns, rows]: [usize; 2], n: usize, zoom: usize, most: f32) -> Self {
+        let side = n * zoom + GAP;
+        let [width, height] = [columns, rows].map(|count| (side * count) as u32);
+        let drawn = image::RgbImage::from_pixel(width, height, image::Rgb([128; 3]));
+        Self { drawn, n, zoom, most }
+    }
+
+    fn put(&mut self, [column, row]: [usize; 2], image: &[f32]) {
+        let (n, zoom, table) = (self.n, self.zoom, Colormap::Inferno.table());
+        let [left, top] = [column, row].map(|k| k * (n * zoom + GAP));
+        for (k, value) in image.iter().enumerate() {
+            let part = (value / self.most.max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+            let color = image::Rgb(table[(part * (table.len() - 1) as f32).round() as usize]);
+            for pixel in 0..zoom * zoom {
+                let (x, y) = (k % n * zoom + pixel % zoom, k / n * zoom + pixel / zoom);
+                self.drawn.put_pixel((left + x) as u32, (top + y) as u32, color);
+            }
+        }
+    }
+}
+
 /// Some frames of movies of n × n pixels, a row each, on one scale of brightness; `times` in M.
 ///
 /// # Errors
@@ -87,35 +121,46 @@ pub fn frames(movies: &[(&str, Vec<f32>)], n: usize, times: &[f64]) -> anyhow::R
     let chosen: Vec<usize> =
         (0..count).map(|k| k * (times.len() - 1) / (count.max(2) - 1)).collect();
     let most = movies.iter().flat_map(|(_, movie)| movie).fold(0.0f32, |most, x| most.max(*x));
-    let table = Colormap::Inferno.table();
-    let (zoom, gap) = ((160 / n).max(1), 4);
-    let side = n * zoom + gap;
-    let mut drawn = image::RgbImage::from_pixel(
-        (side * count) as u32,
-        (side * movies.len()) as u32,
-        image::Rgb([128; 3]),
-    );
+    let mut sheet = Sheet::new([count, movies.len()], n, (160 / n).max(1), most);
     for (row, (_, movie)) in movies.iter().enumerate() {
         for (column, frame) in chosen.iter().enumerate() {
-            for (k, value) in movie[frame * n * n..(frame + 1) * n * n].iter().enumerate() {
-                let part = (value / most.max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
-                let last = (table.len() - 1) as f32;
-                let color = table[(part * last).round() as usize];
-                for pixel in 0..zoom * zoom {
-                    let x = column * side + k % n * zoom + pixel % zoom;
-                    let y = row * side + k / n * zoom + pixel / zoom;
-                    drawn.put_pixel(x as u32, y as u32, image::Rgb(color));
-                }
-            }
+            sheet.put([column, row], &movie[frame * n * n..(frame + 1) * n * n]);
         }
     }
     let at: Vec<String> = chosen.iter().map(|k| format!("{:.1}", times[*k])).collect();
     let names = movies.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", below it ");
     let caption = format!(
-        "Lensed images as the observer sees them ({names}), at times {} GM/c³. All have one linear \
-         scale of brightness, from 0 to {most:.3e} Jy a pixel; north is up, east to the left.",
+        "Frames of the movie as the observer sees them, bent light included ({names}), at times {} GM/c³. \
+         These pixels are what is compared with the data. All have one linear scale of brightness, from \
+         black (0) to yellow ({most:.3e} Jy a pixel); north is up, east to the left.",
         at.join(", ")
     );
     let alt = format!("Frames of the movie: {names}.");
-    Ok(Figure { png: encode(Some(drawn))?, caption, alt })
+    Ok(Figure { png: encode(Some(sheet.drawn))?, caption, alt })
+}
+
+/// Sharp images of n × n rays beside each other, at a time in M; `with` says what of light is in them.
+///
+/// # Errors
+/// If it cannot be encoded.
+pub fn still(
+    images: &[(&str, &Vec<f32>)],
+    n: usize,
+    time: f64,
+    with: &str,
+) -> anyhow::Result<Figure> {
+    let most = images.iter().flat_map(|(_, image)| *image).fold(0.0f32, |most, x| most.max(*x));
+    let mut sheet = Sheet::new([images.len(), 1], n, 2, most);
+    images.iter().enumerate().for_each(|(k, (_, image))| sheet.put([k, 0], image));
+    let names = images.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", right of it ");
+    let caption = format!(
+        "The volume as the observer sees it at time {time:.1} GM/c³ ({names}), with {n} × {n} rays that are bent by \
+         the hole; {with}. Light that passes close to the hole goes around it: a spot has fainter second \
+         images on the other side, and what is behind the hole is seen around it. This is sharper than the pixels \
+         that are fitted to the data, which are shown further down; what is thinner than a ray's distance looks \
+         dotted. One linear scale of brightness, from black (0) to yellow \
+         ({most:.3e}: emission summed up along the ray, in M)."
+    );
+    let alt = format!("The lensed image of the volume: {names}.");
+    Ok(Figure { png: encode(Some(sheet.drawn))?, caption, alt })
 }

@@ -17,12 +17,21 @@ pub fn screen(side: usize) -> Vec<f64> {
 /// A hole without spin seen edge-on from 1000 M: rays at all pairs of these places on the screen, `per_ray`
 /// nodes each.
 pub fn lines(places: &[f64], per_ray: usize) -> Result<Sightlines, Box<dyn Error>> {
+    lines_in(Region { r_min: 0.0, r_max: 5.0, z_width: f64::INFINITY }, places, per_ray)
+}
+
+/// The same with nodes in a region.
+pub fn lines_in(
+    region: Region,
+    places: &[f64],
+    per_ray: usize,
+) -> Result<Sightlines, Box<dyn Error>> {
     let observer = Observer::at_radius(Inclination::from_degrees(90.0)?, 1000.0)?;
     let side = places.len();
     let (alpha, beta): (Vec<f64>, Vec<f64>) =
         (0..side * side).map(|k| (places[k % side], places[k / side])).unzip();
     let request = SightlineRequest {
-        region: Region { r_min: 0.0, r_max: 5.0, z_width: f64::INFINITY },
+        region,
         sampling: Sampling::EqualMinoTime { per_ray },
         delay: false,
         momentum: false,

@@ -37,10 +37,12 @@ pub enum Selection<'a> {
 /// The loss of a selection, scaled to that of all data.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Loss {
-    /// Σ weight · χ²/data.
+    /// Σ weight · χ²/data, and penalties.
     pub total: f64,
     /// χ² a datum of each kind of data, the image first if there is one.
     pub terms: Vec<f64>,
+    /// Weight · penalty of each, if there are any.
+    pub penalties: Vec<f64>,
     /// Nodes at which emission was evaluated.
     pub points: usize,
 }
@@ -205,7 +207,8 @@ impl<T: Scalar> Objective<T> {
             add_axis(field.axis, batch, of_points, dimension, axis);
         }
         let term = scale * total;
-        Loss { total: weight * term, terms: vec![term], points: batch.points() }
+        let (total, points) = (weight * term, batch.points());
+        Loss { total, terms: vec![term], points, ..Loss::default() }
     }
 
     fn frames(

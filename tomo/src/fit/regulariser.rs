@@ -80,6 +80,16 @@ impl Regulariser {
         matches!(self, Self::Smoothness | Self::Sparsity)
     }
 
+    /// What it is called in text.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::TotalVariation { .. } => "total variation",
+            Self::Smoothness => "smoothness",
+            Self::Sparsity => "sparsity",
+            Self::Entropy { .. } => "entropy",
+        }
+    }
+
     /// `weight` times the penalty; adds its gradient. By all threads, in an order that does not depend on
     /// their number.
     ///
@@ -92,21 +102,42 @@ impl Regulariser {
         weight: f64,
         gradient: &mut [T],
     ) -> f64 {
+        self.value_and_gradient_inside(values, shape, None, weight, gradient)
+    }
+
+    /// The same of the nodes inside a region alone: neither those outside count, nor differences across its edge,
+    /// where slopes are free.
+    ///
+    /// # Panics
+    /// If the lengths are not that of the shape.
+    pub fn value_and_gradient_inside<T: Scalar>(
+        &self,
+        values: &[T],
+        shape: Shape,
+        inside: Option<&[bool]>,
+        weight: f64,
+        gradient: &mut [T],
+    ) -> f64 {
         assert!(values.len() == shape.count() && gradient.len() == values.len());
+        assert!(inside.is_none_or(|inside| inside.len() == values.len()));
         let scale = weight * shape.cell();
         let plane = shape.nodes[1] * shape.nodes[2];
         let of_plane = |(i, out): (usize, &mut [T])| match self {
             Self::TotalVariation { epsilon } => {
                 let slope = |square: f64| (square + epsilon * epsilon).sqrt();
                 let norm = |square| (slope(square) - epsilon, 1.0 / slope(square));
-                Differences { values, shape, norm }.plane(i, scale, out)
+                Differences { values, inside, shape, norm }.plane(i, scale, out)
             }
             Self::Smoothness => {
-                Differences { values, shape, norm: |square| (square, 2.0) }.plane(i, scale, out)
+                let norm = |square| (square, 2.0);
+                Differences { values, inside, shape, norm }.plane(i, scale, out)
             }
-            Self::Sparsity => each(&values[i * plane..], scale, out, |e| (e.abs(), sign(e))),
+            Self::Sparsity => {
+                each(Counted { values, inside }, i * plane, scale, out, |e| (e.abs(), sign(e)))
+            }
             Self::Entropy { level, floor } => {
-                each(&values[i * plane..], scale, out, |e| entropy(e, *level, floor * level))
+                let of = |e| entropy(e, *level, floor * level);
+                each(Counted { values, inside }, i * plane, scale, out, of)
             }
         };
         let sums: Vec<f64> = gradient.par_chunks_mut(plane).enumerate().map(of_plane).collect();
@@ -128,32 +159,49 @@ fn entropy(e: f64, m: f64, floor: f64) -> (f64, f64) {
     (value + below * (slope + 0.5 * below / floor), slope + below / floor)
 }
 
-/// Sum of a function of each value; adds its slopes.
-fn each<T: Scalar>(values: &[T], scale: f64, out: &mut [T], f: impl Fn(f64) -> (f64, f64)) -> f64 {
-    let nodes = values.iter().zip(out);
-    let one = |(e, out): (&T, &mut T)| {
-        let (value, slope) = f(e.double());
-        *out += T::of(scale * slope);
-        value
-    };
-    nodes.map(one).sum()
+/// Values and which of them count, all if nothing is said.
+#[derive(Clone, Copy)]
+struct Counted<'a, T> {
+    values: &'a [T],
+    inside: Option<&'a [bool]>,
+}
+
+/// Sum of a function of each value from `first` on; adds its slopes.
+fn each<T: Scalar>(
+    Counted { values, inside }: Counted<'_, T>,
+    first: usize,
+    scale: f64,
+    out: &mut [T],
+    f: impl Fn(f64) -> (f64, f64),
+) -> f64 {
+    let mut sum = 0.0;
+    for (k, out) in (first..).zip(out) {
+        if inside.is_none_or(|inside| inside[k]) {
+            let (value, slope) = f(values[k].double());
+            *out += T::of(scale * slope);
+            sum += value;
+        }
+    }
+    sum
 }
 
 /// A function of the squared slope at each node: its value and twice its derivative.
 struct Differences<'a, T, F> {
     values: &'a [T],
+    inside: Option<&'a [bool]>,
     shape: Shape,
     norm: F,
 }
 
 impl<T: Scalar, F: Fn(f64) -> (f64, f64)> Differences<'_, T, F> {
-    /// Forward differences at a node along each axis, 0 beyond the last one.
+    /// Forward differences at a node along each axis, 0 beyond the last one and across an edge.
     #[inline]
     fn slopes(&self, at: [usize; 3], index: usize) -> [f64; 3] {
         let [nx, ny, nz] = self.shape.nodes;
         let here = self.values[index].double();
+        let counts = |index: usize| self.inside.is_none_or(|inside| inside[index]);
         let slope = |c: usize, n: usize, stride: usize| {
-            if at[c] + 1 < n {
+            if at[c] + 1 < n && counts(index) && counts(index + stride) {
                 (self.values[index + stride].double() - here) / self.shape.spacing[c]
             } else {
                 0.0
@@ -197,83 +245,4 @@ impl<T: Scalar, F: Fn(f64) -> (f64, f64)> Differences<'_, T, F> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use rand::{RngExt, SeedableRng};
-    use rand_pcg::Pcg64;
-
-    const SHAPE: Shape = Shape { nodes: [5, 4, 6], spacing: [0.5, 0.25, 0.75] };
-    const ALL: [Regulariser; 4] = [
-        Regulariser::TotalVariation { epsilon: 0.3 },
-        Regulariser::Smoothness,
-        Regulariser::Sparsity,
-        Regulariser::Entropy { level: 0.4, floor: 0.5 },
-    ];
-
-    fn random(seed: u64) -> Vec<f64> {
-        let mut random = Pcg64::seed_from_u64(seed);
-        (0..SHAPE.count()).map(|_| random.random::<f64>() + 0.05).collect()
-    }
-
-    #[test]
-    fn exact_gradients_are_central_differences() {
-        let (values, along) = (random(1), random(2));
-        for regulariser in ALL {
-            let at = |step: f64| -> f64 {
-                let moved: Vec<f64> =
-                    values.iter().zip(&along).map(|(x, d)| x + step * d).collect();
-                regulariser.value_and_gradient(&moved, SHAPE, 1.7, &mut vec![0.0; moved.len()])
-            };
-            let mut gradient = vec![0.0; values.len()];
-            regulariser.value_and_gradient(&values, SHAPE, 1.7, &mut gradient);
-            let slope: f64 = gradient.iter().zip(&along).map(|(g, d)| g * d).sum();
-            let step = 1e-5;
-            let difference = (at(step) - at(-step)) / (2.0 * step);
-            let error = (slope - difference).abs() / slope.abs();
-            assert!(error < 1e-7, "{regulariser:?}: {slope} {difference}");
-        }
-    }
-
-    /// A field that rises by a along x has |∇e| = |a| but on the last plane.
-    #[test]
-    fn exact_values_of_a_ramp() {
-        let a = 0.7;
-        let ramp: Vec<f64> = (0..SHAPE.count()).map(|k| a * 0.5 * (k / 24) as f64 + 1.0).collect();
-        let (weight, sloped) = (2.0, 4.0 * 24.0 * SHAPE.cell());
-        let value = |regulariser: Regulariser| {
-            regulariser.value_and_gradient(&ramp, SHAPE, weight, &mut vec![0.0; ramp.len()])
-        };
-        let tv = value(Regulariser::TotalVariation { epsilon: 0.3 });
-        assert!((tv - weight * sloped * (a.hypot(0.3) - 0.3)).abs() < 1e-12);
-        assert!((value(Regulariser::Smoothness) - weight * sloped * a * a).abs() < 1e-12);
-        let sum: f64 = ramp.iter().sum();
-        assert!((value(Regulariser::Sparsity) - weight * sum * SHAPE.cell()).abs() < 1e-10);
-        let flat = vec![0.4f64; ramp.len()];
-        let mut gradient = vec![0.0f64; flat.len()];
-        let none = ALL[3].value_and_gradient(&flat, SHAPE, weight, &mut gradient);
-        assert!(none.abs() < 1e-12 && gradient.iter().all(|g| g.abs() < 1e-12));
-    }
-
-    #[test]
-    fn exact_threads_change_no_bit() {
-        let values: Vec<f32> = random(3).iter().map(|x| *x as f32).collect();
-        let run = |threads, regulariser: Regulariser| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let mut gradient = vec![0.0f32; values.len()];
-            let out = &mut gradient;
-            let value = pool.install(|| regulariser.value_and_gradient(&values, SHAPE, 0.3, out));
-            (value, gradient)
-        };
-        for regulariser in ALL {
-            assert_eq!(run(1, regulariser), run(5, regulariser));
-        }
-    }
-
-    #[test]
-    fn numbers_out_of_range_are_named() {
-        let text = |r: Regulariser| r.checked().unwrap_err().to_string();
-        assert!(text(Regulariser::TotalVariation { epsilon: 0.0 }).contains("epsilon = 0 "));
-        let bad = Regulariser::Entropy { level: 1.0, floor: 1.5 };
-        assert!(text(bad).contains("entropy floor = 1.5"));
-    }
-}
+mod tests;

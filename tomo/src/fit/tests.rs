@@ -2,6 +2,8 @@
 
 use super::*;
 
+mod penalised;
+mod quasi_newton;
 mod training;
 
 use crate::dynamics::{AngularVelocity, Axis, Injection};

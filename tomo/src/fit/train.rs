@@ -1,16 +1,14 @@
-//! Steps of a fit: what is drawn, what is learnt, what is done when it goes wrong.
+//! How a fit is run, and what it remembers from step to step.
 
-use super::objective::{Gradients, Loss, Objective, Room, Selection};
+use super::objective::{Loss, Objective, Room};
 use super::occupancy::{Occupancy, OccupancySettings};
+use super::penalties::{Penalties, ProbeRoom};
 use super::sightlines::Region;
 use super::{Field, is_turned};
 use crate::dynamics::Axis;
-use crate::optimise::{Adam, AdamState, Polynomial};
+use crate::optimise::{Adam, AdamState, Lbfgs, LbfgsState, Polynomial};
 use crate::representation::Representation;
 use crate::simd::Scalar;
-use rand::seq::index;
-use rand::{RngExt, SeedableRng};
-use rand_pcg::Pcg64;
 
 /// What a step looks at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +17,8 @@ pub enum BatchSize {
     Pixels(usize),
     /// That many random frames, whole.
     Frames(usize),
+    /// All frames, whole: the same loss at every step.
+    All,
 }
 
 /// When a mask of what shines is used and renewed.
@@ -39,6 +39,9 @@ pub struct Training {
     pub seed: u64,
     /// Rule of the steps.
     pub adam: Adam,
+    /// Quasi-Newton steps instead of Adam's, for small problems: they have no rates, need [`BatchSize::All`], and their
+    /// draws are those of step 0, so that the loss is the same function at every step.
+    pub lbfgs: Option<Lbfgs>,
     /// Rates of the parameters.
     pub rate: Polynomial,
     /// Rates of the axis; without them it is held.
@@ -50,6 +53,8 @@ pub struct Training {
     pub batch: BatchSize,
     /// Mask of what shines, if any.
     pub occupancy: Option<OccupancyPlan>,
+    /// Penalties beside the data, if any.
+    pub penalties: Option<Penalties>,
     /// Where emission is looked for.
     pub region: Region,
     /// Steps from one good state that is kept to the next.
@@ -65,8 +70,10 @@ pub struct Progress<T> {
     pub step: u64,
     /// Parameters of the representation.
     pub parameters: Vec<T>,
-    /// What Adam remembers of them.
+    /// What Adam remembers of them; nothing, with quasi-Newton steps.
     pub adam: AdamState<T>,
+    /// What quasi-Newton steps remember of them, and of the axis behind them where it is learnt.
+    pub lbfgs: Option<LbfgsState<T>>,
     /// The axis.
     pub axis: Axis,
     /// What Adam remembers of it.
@@ -104,6 +111,8 @@ pub enum Outcome {
         /// The factor on the rates from there.
         caution: f64,
     },
+    /// No quasi-Newton step makes the loss smaller: it has come to a minimum within rounding.
+    Converged,
 }
 
 /// Why a fit cannot go on.
@@ -120,9 +129,6 @@ pub struct Diverged {
     pub setbacks: u32,
 }
 
-/// Most returns of a fit.
-const MOST_SETBACKS: u32 = 12;
-
 impl<T: Scalar> State<T> {
     /// The start of a fit.
     pub fn new(representation: &dyn Representation<T>, axis: Axis, training: &Training) -> Self {
@@ -130,10 +136,14 @@ impl<T: Scalar> State<T> {
         let mut parameters = vec![T::zero(); count];
         representation.initialise(training.seed, &mut parameters);
         let mask = |plan: OccupancyPlan| Occupancy::new(plan.settings, training.region);
+        let learnt = training.learns_axis(representation);
+        let numbers = count + if learnt { 3 } else { 0 };
+        let lbfgs = training.lbfgs.map(|rule| LbfgsState::new(numbers, rule.memory));
         let now = Progress {
             step: 0,
             parameters,
-            adam: AdamState::new(count),
+            adam: AdamState::new(if lbfgs.is_some() { 0 } else { count }),
+            lbfgs,
             axis,
             axis_adam: AdamState::new(3),
             occupancy: training.occupancy.map(mask),
@@ -152,10 +162,18 @@ pub struct Trainer<'a, T> {
     pub representation: &'a dyn Representation<T>,
     /// How it is run.
     pub training: Training,
-    observed: Vec<usize>,
-    room: Room<T>,
-    gradient: Vec<T>,
-    pairs: Vec<(u32, u32)>,
+    pub(super) observed: Vec<usize>,
+    pub(super) room: Room<T>,
+    pub(super) probe: ProbeRoom<T>,
+    pub(super) gradient: Vec<T>,
+    pub(super) pairs: Vec<(u32, u32)>,
+}
+
+impl Training {
+    /// Whether the axis is learnt, of a representation that knows of it.
+    pub fn learns_axis<T: Scalar>(&self, representation: &dyn Representation<T>) -> bool {
+        self.axis_rate.is_some() && is_turned(representation)
+    }
 }
 
 impl<'a, T: Scalar> Trainer<'a, T> {
@@ -167,91 +185,8 @@ impl<'a, T: Scalar> Trainer<'a, T> {
     ) -> Self {
         let (observed, gradient) =
             (objective.observed(), vec![T::zero(); representation.parameters()]);
-        let (room, pairs) = (Room::default(), Vec::new());
-        Self { objective, representation, training, observed, room, gradient, pairs }
-    }
-
-    /// One step. It depends on the state and the settings alone: not on threads, and not on what
-    /// this trainer did before.
-    ///
-    /// # Errors
-    /// If the loss keeps diverging.
-    pub fn step(&mut self, state: &mut State<T>) -> Result<Outcome, Diverged> {
-        let now = &mut state.now;
-        self.refresh(now);
-        let mut of_axis = [0.0; 3];
-        let loss = self.loss(now, &mut of_axis);
-        let calm = state.good.as_ref().map_or(f64::INFINITY, |good| good.loss);
-        let finite = loss.total.is_finite() && of_axis.iter().all(|slope| slope.is_finite());
-        if !finite || loss.total > self.training.divergence * calm {
-            return step_back(state, loss.total);
-        }
-        now.loss = loss.total;
-        if now.step.is_multiple_of(self.training.keep_every.max(1)) {
-            state.good = Some(Box::new(now.clone()));
-        }
-        self.learn(&mut state.now, of_axis);
-        Ok(Outcome::Done(loss))
-    }
-
-    fn refresh(&mut self, now: &mut Progress<T>) {
-        let Some(plan) = self.training.occupancy else { return };
-        let Some(mask) = &mut now.occupancy else { return };
-        if now.step >= plan.warm_up && (now.step - plan.warm_up).is_multiple_of(plan.every.max(1)) {
-            let seed = mix(self.training.seed, now.step, 1);
-            let (representation, parameters) = (self.representation, &now.parameters);
-            mask.refresh(representation, parameters, seed, self.room.workspace());
-        }
-    }
-
-    fn loss(&mut self, now: &Progress<T>, of_axis: &mut [f64; 3]) -> Loss {
-        self.objective.chain.weigh(now.axis);
-        self.gradient.fill(T::zero());
-        let learnt = self.training.axis_rate.is_some() && is_turned(self.representation);
-        let masked = self.training.occupancy.is_some_and(|plan| now.step >= plan.warm_up);
-        let field = Field {
-            representation: self.representation,
-            parameters: &now.parameters,
-            axis: now.axis,
-            occupancy: now.occupancy.as_ref().filter(|_| masked),
-        };
-        let gradients =
-            Gradients { parameters: &mut self.gradient, axis: learnt.then_some(of_axis) };
-        let mut random = Pcg64::seed_from_u64(mix(self.training.seed, now.step, 0));
-        match self.training.batch {
-            BatchSize::Pixels(count) => {
-                let (rays, frames) = (self.objective.chain.rays(), &self.observed);
-                self.pairs.clear();
-                self.pairs.extend((0..count).map(|_| {
-                    let frame = frames[random.random_range(0..frames.len())];
-                    (random.random_range(0..rays) as u32, frame as u32)
-                }));
-                let pixels = Selection::Pixels(&self.pairs);
-                self.objective.value_and_gradient(field, pixels, gradients, &mut self.room)
-            }
-            BatchSize::Frames(count) => {
-                let count = count.min(self.observed.len());
-                let chosen = index::sample(&mut random, self.observed.len(), count);
-                let frames: Vec<usize> = chosen.into_iter().map(|k| self.observed[k]).collect();
-                let frames = Selection::Frames(&frames);
-                self.objective.value_and_gradient(field, frames, gradients, &mut self.room)
-            }
-        }
-    }
-
-    fn learn(&mut self, now: &mut Progress<T>, of_axis: [f64; 3]) {
-        let Training { adam, rate, axis_rate, ramp, .. } = &self.training;
-        let part = ((now.step + 1) as f64 / (ramp + 1) as f64).min(1.0) * now.caution;
-        let rate = part * rate.rate(now.step);
-        adam.step(rate, &self.gradient, &mut now.adam, &mut now.parameters);
-        self.representation.project(&mut now.parameters);
-        if let Some(axis_rate) = axis_rate {
-            let mut moved = now.axis.vector();
-            let rate = part * axis_rate.rate(now.step);
-            adam.step(rate, &of_axis, &mut now.axis_adam, &mut moved);
-            now.axis = Axis::new(moved).unwrap_or(now.axis);
-        }
-        now.step += 1;
+        let (room, probe, pairs) = (Room::default(), ProbeRoom::default(), Vec::new());
+        Self { objective, representation, training, observed, room, probe, gradient, pairs }
     }
 
     /// The movie of these frames, with the mask of what shines or without.
@@ -272,25 +207,4 @@ impl<'a, T: Scalar> Trainer<'a, T> {
     pub fn emission(&mut self, now: &Progress<T>, points: [&[T]; 3]) -> Vec<T> {
         self.room.emission(self.representation, &now.parameters, points)
     }
-}
-
-fn step_back<T: Scalar>(state: &mut State<T>, loss: f64) -> Result<Outcome, Diverged> {
-    let diverged = Diverged { loss, step: state.now.step, setbacks: state.setbacks };
-    let Some(good) = &mut state.good else { return Err(diverged) };
-    if state.setbacks >= MOST_SETBACKS {
-        return Err(diverged);
-    }
-    state.setbacks += 1;
-    good.caution *= 0.5;
-    state.now = (**good).clone();
-    Ok(Outcome::SteppedBack { loss, to: good.step, caution: good.caution })
-}
-
-/// A seed for what a step draws.
-fn mix(seed: u64, step: u64, purpose: u64) -> u64 {
-    // SplitMix64's finaliser (Steele, Lea & Flood 2014).
-    let mut x = seed ^ step.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ purpose << 62;
-    x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    x ^ (x >> 31)
 }

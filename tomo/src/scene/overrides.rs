@@ -6,7 +6,7 @@ use toml_edit::{DocumentMut, Item, Table, Value};
 
 /// The scene text with `key.path=value` applied, e.g. `hole.spin=0.5`,
 /// `spot.0.phase_deg=90`. A value that is no TOML is taken as a string; an empty one removes
-/// the key.
+/// the key; `{a=1, b={c=2}}` takes the place of a whole table.
 ///
 /// # Errors
 /// If the text is not TOML, or the override has no `=`, an empty key or leads through
@@ -26,6 +26,9 @@ pub fn apply_override(text: &str, assignment: &str) -> Result<String, SceneError
     let mut parts = parents.iter().peekable();
     while let Some(key) = parts.next() {
         let item = table.entry(key).or_insert_with(|| Item::Table(Table::new()));
+        if item.is_inline_table() {
+            *item = spread(core::mem::take(item));
+        }
         table = match item {
             Item::Table(table) => table,
             Item::ArrayOfTables(tables) => {
@@ -46,9 +49,24 @@ pub fn apply_override(text: &str, assignment: &str) -> Result<String, SceneError
         };
     }
     let parsed = value.parse::<Value>().unwrap_or_else(|_| Value::from(value));
-    if matches!(table.get(last), Some(Item::Table(_) | Item::ArrayOfTables(_))) {
-        return Err(fail("names a table, not a value"));
-    }
-    table.insert(last, Item::Value(parsed));
+    let item = match (table.get(last), parsed) {
+        // As a table, so that the next override finds its way in.
+        (Some(Item::Table(_)) | None, parsed @ Value::InlineTable(_)) => {
+            spread(Item::Value(parsed))
+        }
+        (Some(Item::Table(_) | Item::ArrayOfTables(_)), _) => {
+            return Err(fail("names a table, not a value"));
+        }
+        (_, parsed) => Item::Value(parsed),
+    };
+    table.insert(last, item);
     Ok(document.to_string())
+}
+
+/// An inline table as one with a heading of its own.
+fn spread(item: Item) -> Item {
+    match item.into_table() {
+        Ok(table) => Item::Table(table),
+        Err(item) => item,
+    }
 }

@@ -4,11 +4,12 @@ use super::*;
 use crate::optimise::{Adam, Polynomial};
 use crate::representation::{Network, NetworkSettings};
 
-fn settings() -> Training {
+pub(super) fn settings() -> Training {
     let rate = Polynomial { from: 3e-2, to: 1e-3, steps: 40, power: 1.0 };
     Training {
         seed: 11,
         adam: Adam::default(),
+        lbfgs: None,
         rate,
         axis_rate: Some(rate),
         ramp: 3,
@@ -18,6 +19,7 @@ fn settings() -> Training {
             warm_up: 10,
             every: 7,
         }),
+        penalties: None,
         region: Region { r_min: 3.0, r_max: 6.0, z_width: 4.0 },
         keep_every: 8,
         divergence: 1e3,
@@ -101,7 +103,7 @@ fn exact_a_divergence_is_stepped_back_from() {
             Ok(Outcome::SteppedBack { to, caution, .. }) => {
                 assert!(caution == 0.5f64.powi(state.setbacks as i32) && to == state.now.step);
             }
-            Ok(Outcome::Done(_)) => {}
+            Ok(other) => assert!(matches!(other, Outcome::Done(_)), "{other:?}"),
             Err(fail) => break fail,
         }
         assert!(state.now.step < 40);

@@ -1,0 +1,112 @@
+//! Settings of penalties on the emission, and what they mean for each representation.
+
+use super::config::{FitFile, Kind};
+use super::setup;
+use anyhow::{Context, anyhow, bail};
+use kerrlight_tomo::fit::linear::Prior;
+use kerrlight_tomo::fit::{Penalties, Probe, Regulariser};
+use serde::{Deserialize, Serialize};
+
+/// A penalty.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Setting {
+    /// Which: the other numbers are those of its kind.
+    pub kind: PenaltyKind,
+    /// Factor on its integral over the region.
+    pub weight: f64,
+    /// Total variation: slope below which it is smoothed, emission per M.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub epsilon: Option<f64>,
+    /// Entropy: the emission where it is 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub level: Option<f64>,
+    /// Entropy: part of `level` below which it goes on as a parabola.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub floor: Option<f64>,
+}
+
+/// Kinds of penalties.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PenaltyKind {
+    /// ∫ |∇e| dV.
+    TotalVariation,
+    /// ∫ |∇e|² dV.
+    Smoothness,
+    /// ∫ |e| dV.
+    Sparsity,
+    /// ∫ (e ln(e/m) − e + m) dV.
+    Entropy,
+}
+
+/// Where penalties look at a network.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProbeSetting {
+    /// Nodes along each axis of the cube that holds the region.
+    pub nodes: usize,
+}
+
+impl Setting {
+    fn prior(&self) -> anyhow::Result<Prior> {
+        let Self { kind, weight, epsilon, level, floor } = *self;
+        if !(weight > 0.0 && weight.is_finite()) {
+            bail!("weight = {weight} is not allowed: above 0");
+        }
+        let given = [("epsilon", epsilon), ("level", level), ("floor", floor)];
+        let (name, needed): (_, &[&str]) = match kind {
+            PenaltyKind::TotalVariation => ("total-variation", &["epsilon"]),
+            PenaltyKind::Smoothness => ("smoothness", &[]),
+            PenaltyKind::Sparsity => ("sparsity", &[]),
+            PenaltyKind::Entropy => ("entropy", &["level", "floor"]),
+        };
+        if let Some((other, _)) = given.iter().find(|(k, x)| x.is_some() && !needed.contains(k)) {
+            bail!("{other} is not for {name}");
+        }
+        let get = |key: &str| {
+            let found = given.iter().find(|(name, _)| *name == key).and_then(|(_, value)| *value);
+            found.ok_or_else(|| anyhow!("{key} is missing: {name} needs it"))
+        };
+        let regulariser = match kind {
+            PenaltyKind::TotalVariation => Regulariser::TotalVariation { epsilon: get("epsilon")? },
+            PenaltyKind::Smoothness => Regulariser::Smoothness,
+            PenaltyKind::Sparsity => Regulariser::Sparsity,
+            PenaltyKind::Entropy => {
+                Regulariser::Entropy { level: get("level")?, floor: get("floor")? }
+            }
+        };
+        Ok(Prior { regulariser: regulariser.checked()?, weight })
+    }
+}
+
+/// Penalties that are asked for, with their weights.
+pub fn priors(file: &FitFile) -> anyhow::Result<Vec<Prior>> {
+    let one = |(k, setting): (usize, &Setting)| {
+        let same = |other: &Setting| other.kind == setting.kind;
+        if let Some(first) = file.regulariser[..k].iter().position(same) {
+            bail!("regulariser {k}: it has the kind of regulariser {first}, once is allowed");
+        }
+        setting.prior().with_context(|| format!("regulariser {k}"))
+    };
+    file.regulariser.iter().enumerate().map(one).collect()
+}
+
+/// Penalties of a representation that is learnt; none of them costs nothing.
+pub fn penalties(file: &FitFile) -> anyhow::Result<Option<Penalties>> {
+    let priors = priors(file)?;
+    if let Some(ProbeSetting { nodes }) = file.probe
+        && !(4..=256).contains(&nodes)
+    {
+        bail!("probe.nodes = {nodes} is not allowed: 4 to 256");
+    }
+    if priors.is_empty() {
+        return Ok(None);
+    }
+    let probe = match (&file.representation.kind, file.probe) {
+        (Kind::Grid | Kind::LinearGrid, _) => Probe::Fixed { nodes: file.representation.nodes },
+        (_, Some(ProbeSetting { nodes })) => Probe::Moved { nodes },
+        (..) => bail!("probe.nodes is missing: regularisers look at a network at nodes of a grid"),
+    };
+    Ok(Some(Penalties { priors, probe, region: setup::region(&file.region) }))
+}

@@ -1,0 +1,64 @@
+//! The recovered and the true emission on the nodes of a box, and what one is worth beside the other.
+
+use crate::fit::config::FitFile;
+use crate::fit::setup;
+use crate::fit::truth::Truth;
+use kerrlight_tomo::fit::{State, Trainer};
+use kerrlight_tomo::volume::Volume;
+use kerrlight_tomo::volume::metrics::{self, Comparison};
+
+/// The nodes of the volume.
+struct Box3 {
+    nodes: [usize; 3],
+    half: f64,
+}
+
+impl Box3 {
+    fn new(file: &FitFile) -> Self {
+        Self { nodes: [file.output.nodes; 3], half: file.region.r_max }
+    }
+
+    fn volume(&self, values: Vec<f32>) -> anyhow::Result<Volume> {
+        Ok(Volume::new(self.nodes, [-self.half; 3], [self.half; 3], values)?)
+    }
+
+    fn positions(&self) -> Vec<[f64; 3]> {
+        let n = self.nodes[0];
+        let at = |k: usize| -self.half + 2.0 * self.half * k as f64 / (n - 1) as f64;
+        (0..n.pow(3)).map(|k| [at(k / (n * n)), at(k / n % n), at(k % n)]).collect()
+    }
+}
+
+/// The field at the reference time, zero outside the region.
+pub fn recovered(
+    file: &FitFile,
+    trainer: &mut Trainer<'_, f32>,
+    state: &State<f32>,
+) -> anyhow::Result<Volume> {
+    let (nodes, region) = (Box3::new(file), setup::region(&file.region));
+    let positions = nodes.positions();
+    let inside: Vec<usize> = (0..positions.len()).filter(|k| region.holds(positions[*k])).collect();
+    let column = |c: usize| inside.iter().map(|k| positions[*k][c] as f32).collect::<Vec<f32>>();
+    let [x, y, z] = [0, 1, 2].map(column);
+    let found = trainer.emission(&state.now, [&x, &y, &z]);
+    let mut values = vec![0.0; positions.len()];
+    inside.iter().zip(found).for_each(|(k, value)| values[*k] = value);
+    nodes.volume(values)
+}
+
+/// The truth at the reference time.
+pub fn true_volume(file: &FitFile, truth: &Truth) -> anyhow::Result<Volume> {
+    let nodes = Box3::new(file);
+    nodes.volume(nodes.positions().iter().map(|x| truth.at(*x) as f32).collect())
+}
+
+/// What the field is worth beside the truth.
+pub fn compare(
+    file: &FitFile,
+    trainer: &mut Trainer<'_, f32>,
+    state: &State<f32>,
+    truth: &Truth,
+) -> Option<Comparison> {
+    let estimate = recovered(file, trainer, state).ok()?;
+    metrics::compare(&estimate, &true_volume(file, truth).ok()?, None).ok()
+}

@@ -1,0 +1,102 @@
+//! What a run leaves: the volume, the movie, numbers, pictures and the report.
+
+mod fields;
+mod lensed;
+mod numbers;
+mod page;
+mod plots;
+
+pub use fields::compare;
+
+use super::config::FitFile;
+use super::data::Measured;
+use super::folder::Folder;
+use super::setup::Instrument;
+use crate::volume_files;
+use kerrlight_tomo::fit::{Loss, Motion, State, Trainer};
+use kerrlight_tomo::volume::{Volume, VolumeFile, vti};
+use lensed::Still;
+use std::time::Instant;
+
+/// All that the results are made of.
+pub struct Estimate<'a> {
+    /// Settings.
+    pub file: &'a FitFile,
+    /// Where they go.
+    pub folder: &'a Folder,
+    /// Rays.
+    pub instrument: &'a Instrument,
+    /// Motion.
+    pub motion: &'a Motion,
+    /// Data.
+    pub measured: &'a Measured,
+}
+
+impl Estimate<'_> {
+    /// Writes all of them.
+    pub fn write(
+        &self,
+        trainer: &mut Trainer<'_, f32>,
+        state: &State<f32>,
+        begun: Instant,
+    ) -> anyhow::Result<()> {
+        let volume = fields::recovered(self.file, trainer, state)?;
+        let truth = self.measured.truth.as_ref();
+        let true_volume = truth.map(|truth| fields::true_volume(self.file, truth)).transpose()?;
+        let frames: Vec<usize> = (0..self.measured.times.len()).collect();
+        let movie = trainer.movie(&state.now, &frames, true);
+        let loss = trainer.objective.loss_of(&frames, &movie);
+        let mask = numbers::mask_error(trainer, state, &movie);
+        self.volumes(&volume, true_volume.as_ref(), state)?;
+        self.movies(&movie)?;
+        let still = self.still(trainer, state)?;
+        let found = Found { volume, true_volume, still, loss, mask, movie, state, begun };
+        let results = self.results(trainer, &found)?;
+        self.folder.file("results.json")?.write(format!("{results:#}\n").as_bytes())?;
+        self.report(&found, &results)
+    }
+
+    fn volumes(
+        &self,
+        volume: &Volume,
+        truth: Option<&Volume>,
+        state: &State<f32>,
+    ) -> anyhow::Result<()> {
+        let save = |name: &str, volume: &Volume, axis| {
+            let file = VolumeFile { volume: volume.clone(), axis: Some(axis) };
+            volume_files::write(&self.folder.file(name)?, &file)
+        };
+        save("volume.npz", volume, state.now.axis.vector())?;
+        let mut fields = vec![vti::Field { name: "emission", volume }];
+        if let (Some(volume), Some(truth)) = (truth, &self.measured.truth) {
+            save("truth.npz", volume, truth.axis().vector())?;
+            fields.push(vti::Field { name: "truth", volume });
+        }
+        let write = |out: &mut std::io::BufWriter<&std::fs::File>| Ok(vti::write(out, &fields)?);
+        self.folder.file("volume.vti")?.write_with(write)
+    }
+
+    fn movies(&self, movie: &[f32]) -> anyhow::Result<()> {
+        let n = self.file.screen.pixels;
+        let shape = [self.measured.times.len(), n, n];
+        let mut arrays = vec![("recovered", movie.to_vec())];
+        if let Some(truth) = &self.measured.movie {
+            arrays.push(("data", truth.iter().map(|x| *x as f32).collect()));
+        }
+        let bytes = volume_files::movie_archive(shape, &arrays, &self.measured.times)?;
+        self.folder.file("movie.npz")?.write(&bytes)
+    }
+}
+
+/// What was found.
+pub struct Found<'a> {
+    volume: Volume,
+    true_volume: Option<Volume>,
+    still: Still,
+    loss: Loss,
+    /// What the mask of what shines leaves out, of the flux; nothing without a mask.
+    mask: Option<f64>,
+    movie: Vec<f32>,
+    state: &'a State<f32>,
+    begun: Instant,
+}

@@ -1,0 +1,159 @@
+//! What was found, in numbers.
+
+use super::{Estimate, Found};
+use crate::report;
+use crate::usage::usage;
+use kerrlight_tomo::fit::{State, Trainer};
+use kerrlight_tomo::volume::metrics::{self, Mask};
+use serde_json::{Value, json};
+
+/// What is said of a truth without emission.
+pub const DARK: &str =
+    "the truth is dark on all nodes: PSNR, relative error and correlation are not defined";
+
+/// Σ |masked − unmasked|/Σ |unmasked| over a few frames.
+pub fn mask_error(
+    trainer: &mut Trainer<'_, f32>,
+    state: &State<f32>,
+    masked: &[f32],
+) -> Option<f64> {
+    state.now.occupancy.as_ref()?;
+    let chain = &trainer.objective.chain;
+    let (all, pixels) = (chain.frames(), chain.pixels());
+    let frames: Vec<usize> = [1, 3].map(|k| k * all / 4).to_vec();
+    let whole = trainer.movie(&state.now, &frames, false);
+    let mut sums = [0.0; 2];
+    for (frame, image) in frames.iter().zip(whole.chunks_exact(pixels)) {
+        for (pixel, masked) in image.iter().zip(&masked[frame * pixels..]) {
+            sums[0] += f64::from((pixel - masked).abs());
+            sums[1] += f64::from(pixel.abs());
+        }
+    }
+    (sums[1] > 0.0).then(|| sums[0] / sums[1])
+}
+
+impl Estimate<'_> {
+    /// All of them, as they are written.
+    pub fn results(&self, trainer: &Trainer<'_, f32>, found: &Found<'_>) -> anyhow::Result<Value> {
+        let names = trainer.objective.names();
+        let chi2: serde_json::Map<String, Value> = names
+            .iter()
+            .zip(&found.loss.terms)
+            .map(|(name, value)| ((*name).to_owned(), json!(value)))
+            .collect();
+        let now = &found.state.now;
+        let mut results = json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "steps": now.step,
+            "seconds": found.begun.elapsed().as_secs_f64(),
+            "cpu_seconds": usage().map(|usage| usage.cpu_seconds),
+            "peak_memory_mib": usage().map(|usage| usage.peak_mib),
+            "loss": found.loss.total,
+            "chi2_per_datum": chi2,
+            "axis": now.axis.vector(),
+        });
+        if let Some(mask) = found.mask {
+            results["mask_error"] = json!(mask);
+        }
+        let (Some(truth), Some(volume)) = (&self.measured.truth, &found.true_volume) else {
+            return Ok(results);
+        };
+        let region = &self.file.region;
+        let z_width = region.z_width.unwrap_or(f64::INFINITY);
+        let mask = Mask::new(region.r_min, region.r_max, z_width)?;
+        let all = metrics::compare(&found.volume, volume, None)?;
+        let inside = metrics::compare(&found.volume, volume, Some(&mask))?;
+        results["axis_dot_truth"] = json!(now.axis.dot(truth.axis()));
+        if all.psnr_db.is_none() {
+            results["note"] = json!(DARK);
+        }
+        results["psnr_db"] = json!(all.psnr_db);
+        results["psnr_inside_db"] = json!(inside.psnr_db);
+        results["nrmse"] = json!(all.nrmse);
+        results["correlation"] = json!(all.correlation);
+        Ok(results)
+    }
+}
+
+/// A line of the table of results.
+struct Meaning {
+    key: &'static str,
+    name: &'static str,
+    digits: usize,
+    unit: &'static str,
+    text: &'static str,
+}
+
+const fn meaning(
+    key: &'static str,
+    name: &'static str,
+    digits: usize,
+    unit: &'static str,
+    text: &'static str,
+) -> Meaning {
+    Meaning { key, name, digits, unit, text }
+}
+
+const MEANINGS: [Meaning; 11] = [
+    meaning("loss", "loss", 6, "", "what was minimised, of all data, without penalties"),
+    meaning(
+        "psnr_db",
+        "PSNR",
+        2,
+        "dB",
+        "peak signal-to-noise ratio of the volume: 10 log10(largest true value² / mean square error); 10 dB more is an \
+         error about a third as large. An empty volume has tens of dB already, as most of space is dark",
+    ),
+    meaning(
+        "psnr_inside_db",
+        "PSNR inside",
+        2,
+        "dB",
+        "the same, of the nodes inside the region of recovery alone",
+    ),
+    meaning(
+        "nrmse",
+        "relative error",
+        4,
+        "",
+        "root mean square error over that of the truth: 0 is perfect, 1 an empty volume",
+    ),
+    meaning(
+        "correlation",
+        "correlation",
+        5,
+        "",
+        "normalised cross-correlation with the truth: 1 is perfect, whatever the scale",
+    ),
+    meaning(
+        "axis_dot_truth",
+        "axis",
+        6,
+        "",
+        "cosine of the angle between the recovered axis and the true one: 1 is perfect",
+    ),
+    meaning(
+        "mask_error",
+        "masked light",
+        6,
+        "",
+        "light in places that were taken for empty and left out, as a part of all, in two frames",
+    ),
+    meaning("steps", "steps", 0, "", "steps of the optimiser"),
+    meaning("seconds", "time", 1, "s", "wall time of this run, from its start to these results"),
+    meaning("cpu_seconds", "processor time", 1, "s", "the same, of all threads together"),
+    meaning("peak_memory_mib", "memory", 0, "MiB", "most memory that the process held"),
+];
+
+/// The same as lines of a table; what is not defined is left out.
+pub fn outcomes(results: &Value) -> Vec<report::Outcome> {
+    let one = |meaning: &Meaning| {
+        Some(report::Outcome {
+            name: meaning.name.to_owned(),
+            value: format!("{:.*}", meaning.digits, results[meaning.key].as_f64()?),
+            unit: meaning.unit.to_owned(),
+            meaning: meaning.text.to_owned(),
+        })
+    };
+    MEANINGS.iter().filter_map(one).collect()
+}

@@ -1,0 +1,194 @@
+//! The report.
+
+use super::lensed::{self, Still};
+use super::numbers::outcomes;
+use super::{Estimate, Found};
+use crate::fit::config::AxisSearch;
+use crate::fit::curves::{loss_plot, psnr_plot};
+use crate::fit::words;
+use crate::output;
+use crate::report::{self, LinePlot, Report, View3d};
+use anyhow::Context;
+use kerrlight_tomo::volume::Shown;
+use kerrlight_tomo::volume::projection::Surroundings;
+use kerrlight_tomo::volume::slices::Through;
+use serde_json::Value;
+
+/// Emission in Jy/pixel a M would mean little: 1 M of emission 1 gives `screen.jy_per_pixel`.
+const UNIT: &str = "model units";
+
+impl Estimate<'_> {
+    /// Draws and writes it.
+    pub fn report(&self, found: &Found<'_>, results: &Value) -> anyhow::Result<()> {
+        let lines = self.folder.lines()?;
+        let mut plots: Vec<LinePlot> = loss_plot(&lines).into_iter().collect();
+        plots.extend(psnr_plot(&lines));
+        plots.push(self.light_curve(&found.movie));
+        plots.extend(self.amplitudes(&found.movie)?);
+        let report = Report {
+            title: self.file.title.clone(),
+            summary: self.summary(results),
+            results: outcomes(results),
+            view: Some(self.view(found)),
+            figures: self.figures(found)?,
+            plots,
+            settings: self.settings()?,
+            ..Report::default()
+        };
+        let names = ["views.png", "lensed.png", "slices.png", "movie.png"];
+        for (figure, name) in report.figures.iter().zip(names) {
+            self.folder.file(name)?.write(&figure.png)?;
+        }
+        report.write(&self.folder.file("report.html")?)
+    }
+
+    fn shown<'b>(&self, found: &'b Found<'_>) -> Vec<Shown<'b>> {
+        let mut shown = vec![Shown { name: "recovered", volume: &found.volume }];
+        shown.extend(found.true_volume.as_ref().map(|volume| Shown { name: "truth", volume }));
+        shown
+    }
+
+    fn figures(&self, found: &Found<'_>) -> anyhow::Result<Vec<report::Figure>> {
+        let shown = self.shown(found);
+        let hole_radius = self.instrument.hole.horizon();
+        let around = Surroundings {
+            hole_radius,
+            axis: found.state.now.axis.vector(),
+            ring_radius: self.file.region.r_max,
+            half_width: self.file.region.r_max,
+        };
+        let mut figures = vec![
+            report::projections(&shown, &around, UNIT)?,
+            self.lensed(&found.still)?,
+            report::slices(&shown, Through::Maximum, hole_radius, UNIT)?,
+        ];
+        let n = self.file.screen.pixels;
+        let rows: Vec<(&str, Vec<f32>)> = [
+            Some(("recovered", found.movie.clone())),
+            self.measured
+                .movie
+                .as_ref()
+                .map(|movie| ("truth", movie.iter().map(|x| *x as f32).collect())),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        figures.push(report::frames(&rows, n, &self.measured.times)?);
+        figures.extend(self.axes()?);
+        Ok(figures)
+    }
+
+    fn lensed(&self, still: &Still) -> anyhow::Result<report::Figure> {
+        let mut images = vec![("recovered", &still.recovered)];
+        images.extend(still.truth.as_ref().map(|truth| ("truth", truth)));
+        let (delay, shift) = (self.file.effects.slow_light, self.file.effects.redshift_power);
+        let with = match (delay, shift.is_some()) {
+            (true, true) => "delays and Doppler shifts included",
+            (true, false) => "delays included, Doppler shifts left out as in the fit",
+            (false, true) => "Doppler shifts included, delays left out as in the fit",
+            (false, false) => "delays and Doppler shifts left out as in the fit",
+        };
+        report::still(&images, lensed::SIDE, still.time, with)
+    }
+
+    /// The map of a scan of axes, if there was one.
+    fn axes(&self) -> anyhow::Result<Option<report::Figure>> {
+        let path = self.folder.path().join("axis_scan.png");
+        if !matches!(self.file.axis, AxisSearch::Scan { .. }) || !path.is_file() {
+            return Ok(None);
+        }
+        Ok(Some(report::Figure {
+            png: output::read(&path)?,
+            caption: "How well each axis that matter might turn about explains the data: the loss of a coarse volume that was fitted about that axis, over the whole sphere of directions. The smaller the better; the fit went on from the best one.".to_owned(),
+            alt: "Map of the loss over all directions of the axis.".to_owned(),
+        }))
+    }
+
+    fn view(&self, found: &Found<'_>) -> View3d {
+        let (r_min, r_max) = (self.file.region.r_min, self.file.region.r_max);
+        let rates = report::rates(&self.motion.velocity, [r_min.max(1e-3), r_max]);
+        let times = &self.measured.times;
+        let ends = [times.first(), times.last()].map(|time| time.copied().unwrap_or(0.0));
+        View3d {
+            recovered: found.volume.clone(),
+            truth: found.true_volume.clone(),
+            unit: UNIT.to_owned(),
+            motion: (ends[1] > ends[0]).then(|| report::Motion {
+                axis: found.state.now.axis.vector(),
+                rates,
+                times: ends,
+                reference: self.motion.reference,
+                time_unit: "GM/c³".to_owned(),
+            }),
+            hole_radius: self.instrument.hole.horizon(),
+            r_max,
+        }
+    }
+
+    fn summary(&self, results: &Value) -> Vec<String> {
+        let file = self.file;
+        let data: Vec<&str> = file.loss.iter().map(|l| words::data(l.data)).collect();
+        let number = |key: &str| results[key].as_f64();
+        let mut lines = vec![format!(
+            "Emission around a black hole of spin {}, seen at {}° from its spin axis, was recovered from {} frames of {}. It is described by {}.",
+            file.hole.spin,
+            file.observer.inclination_deg,
+            self.measured.times.len(),
+            data.join(", "),
+            words::described(&file.representation.kind)
+        )];
+        if let Some(chi2) = results["chi2_per_datum"].as_object() {
+            let each = chi2.iter().map(|(name, value)| {
+                format!("{name}: χ² a datum {:.4}", value.as_f64().unwrap_or(f64::NAN))
+            });
+            lines.push(format!(
+                "{}. χ² is the squared distance of model and data in units of the data's errors: about 1 a datum where the model is right and the errors are honest, less where data have no noise.",
+                each.collect::<Vec<_>>().join("; ")
+            ));
+        }
+        if let (Some(psnr), Some(nrmse)) = (number("psnr_db"), number("nrmse")) {
+            lines.push(format!(
+                "Beside the truth the volume has a peak signal-to-noise ratio of {psnr:.2} dB and a relative error of {nrmse:.3} (an empty volume has 1)."
+            ));
+        }
+        if let Some(note) = results["note"].as_str() {
+            lines.push(format!("Mind that {note}."));
+        }
+        if !matches!(file.axis, AxisSearch::Known {})
+            && let Some(dot) = number("axis_dot_truth")
+        {
+            let angle = dot.clamp(-1.0, 1.0).acos().to_degrees();
+            lines.push(format!("The axis that matter turns about was learnt: {angle:.2}° from the true one (cosine {dot:.5})."));
+        }
+        lines
+    }
+
+    fn settings(&self) -> anyhow::Result<Vec<report::Setting>> {
+        let table = toml::Table::try_from(self.file).context("settings")?;
+        let mut all = Vec::new();
+        flatten("", &toml::Value::Table(table), &mut all);
+        Ok(all)
+    }
+}
+
+/// `a.b = value` of every leaf.
+fn flatten(prefix: &str, value: &toml::Value, all: &mut Vec<report::Setting>) {
+    match value {
+        toml::Value::Table(table) => {
+            for (key, value) in table {
+                let path = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
+                flatten(&path, value, all);
+            }
+        }
+        toml::Value::Array(values) if values.iter().any(toml::Value::is_table) => {
+            for (k, value) in values.iter().enumerate() {
+                flatten(&format!("{prefix}.{k}"), value, all);
+            }
+        }
+        leaf => all.push(report::Setting {
+            key: prefix.to_owned(),
+            value: leaf.to_string(),
+            unit: String::new(),
+        }),
+    }
+}

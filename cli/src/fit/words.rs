@@ -1,0 +1,41 @@
+//! What things are called in sentences.
+
+use super::config::{Kind, LossKind};
+
+/// Kinds of data.
+pub fn data(kind: LossKind) -> &'static str {
+    match kind {
+        LossKind::Image => "images",
+        LossKind::Visibilities => "visibilities",
+        LossKind::Amplitudes => "amplitudes",
+        LossKind::ClosurePhases => "closure phases",
+        LossKind::LogClosureAmplitudes => "log closure amplitudes",
+        LossKind::LightCurve => "the light curve",
+    }
+}
+
+/// Kinds of representations, in a few words.
+pub fn representation(kind: &Kind) -> &str {
+    match kind {
+        Kind::Bhnerf => "network (BH-NeRF)",
+        Kind::Mlp4d => "network of space and time",
+        Kind::Grid => "grid of voxels",
+        Kind::LinearGrid => "linear grid of voxels",
+        Kind::Own(name) => name,
+    }
+}
+
+/// The same for somebody who does not know the names.
+pub fn described(kind: &Kind) -> &str {
+    match kind {
+        Kind::Bhnerf => {
+            "a neural network of the place that matter had at the reference time (BH-NeRF)"
+        }
+        Kind::Mlp4d => "a neural network of place and time, which knows nothing of orbits",
+        Kind::Grid => "values at the nodes of a grid that is carried along the orbits",
+        Kind::LinearGrid => {
+            "values at the nodes of a grid that is carried along the orbits, as the solution of a convex problem"
+        }
+        Kind::Own(name) => name,
+    }
+}

@@ -1,0 +1,233 @@
+//! `kerrlight fit` with bad input and bad luck: one clear message, and nothing lost or half-written.
+
+use crate::fit::{changed, results, small, with};
+use crate::support::{binary, fail, kerrlight, succeed};
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn message(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Files of a folder and below, sorted; temporary ones would show.
+fn files(folder: &Path) -> Vec<String> {
+    let mut all: Vec<String> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    all.sort();
+    all
+}
+
+/// A run whose files may not grow beyond a number of KiB, as on a disk that is full.
+#[cfg(unix)]
+fn cramped(folder: &Path, kib: u32, words: &[&str]) -> Output {
+    let script = format!("trap '' XFSZ; ulimit -f {kib}; exec \"$@\"");
+    let mut command = Command::new("bash");
+    command.current_dir(folder).args(["-c", &script, "bash"]).arg(binary()).args(words);
+    command.output().expect("bash runs")
+}
+
+/// At whatever file it strikes; what was there is still there, and the run goes on to the same bytes.
+#[cfg(unix)]
+#[test]
+fn exact_a_full_disk_loses_nothing() {
+    let (small, folder) = (small(), tempfile::tempdir().unwrap());
+    succeed(folder.path(), &with(&small, &["-o", "whole"]));
+    let whole = folder.path().join("whole");
+    let size =
+        |name: &str| std::fs::metadata(whole.join(name)).unwrap().len().div_ceil(1024) as u32;
+    assert!(size("fit.toml") + 4 < size("checkpoint.safetensors"));
+    let run = folder.path().join("run");
+    // No checkpoint; then no report.
+    let first = cramped(folder.path(), size("fit.toml") + 4, &with(&small, &["-o", "run"]));
+    assert_eq!(first.status.code(), Some(2), "{}", message(&first));
+    let said = message(&first);
+    assert!(said.contains("checkpoint.safetensors") && said.contains("File too large"), "{said}");
+    assert_eq!(files(&run), ["fit.toml", "log.jsonl"]);
+    let second = cramped(folder.path(), size("report.html") - 1, &["fit", "--resume", "run"]);
+    assert_eq!(second.status.code(), Some(2), "{}", message(&second));
+    assert!(message(&second).contains("report.html"), "{}", message(&second));
+    assert!(!run.join("report.html").exists() && run.join("checkpoint.safetensors").exists());
+    assert!(!files(&run).iter().any(|name| name.starts_with(".kerrlight")));
+    succeed(folder.path(), &["fit", "--resume", "run"]);
+    for file in ["volume.npz", "movie.npz", "checkpoint.safetensors"] {
+        let read = |run: &Path| std::fs::read(run.join(file)).unwrap();
+        assert!(read(&whole) == read(&run), "{file}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn exact_a_read_only_folder_is_named() {
+    use std::os::unix::fs::PermissionsExt;
+    let (small, folder) = (small(), tempfile::tempdir().unwrap());
+    let closed = folder.path().join("closed");
+    std::fs::create_dir(&closed).unwrap();
+    std::fs::set_permissions(&closed, std::fs::Permissions::from_mode(0o555)).unwrap();
+    if std::fs::write(closed.join("probe"), "").is_ok() {
+        eprintln!("this user may write everywhere: a read-only folder cannot be made");
+        return;
+    }
+    for name in ["closed", "closed/run"] {
+        let said = fail(folder.path(), &with(&small, &["-o", name]));
+        assert!(said.contains("closed"), "{said}");
+    }
+}
+
+/// Settings that cannot be meant, with the line they stand in.
+#[test]
+fn bad_settings_are_named_with_their_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let tv = "[[regulariser]]\nkind = \"total-variation\"\nweight = 1e-3\n\n[representation]";
+    for (from, to, said) in [
+        ("seed = 1", "seed = -1", "line 4"),
+        ("seed = 1", "seed = \"one\"", "line 4"),
+        ("seed = 1", "seed = 1\ncolour = 2", "unknown field `colour`"),
+        ("spin = 0.0", "spin = true", "line 7"),
+        ("weight = 1.0", "weight = -1.0", "loss 0: weight = -1 is not allowed: above 0"),
+        ("weight = 1.0", "weight = nan", "loss 0: weight = NaN"),
+        ("sigma = 1.0", "sigma = -0.5", "image sigma = -0.5 is not allowed: above 0"),
+        ("sigma = 0.4", "sigma = inf", "truth.spot 0"),
+        ("[representation]", tv, "regulariser 0: epsilon is missing"),
+        ("[[truth.spot]]", "[[truth.spots]]", "spot"),
+    ] {
+        let words = changed(folder.path(), |text| text.replacen(from, to, 1));
+        let words: Vec<String> = match to.contains("seed") || to.contains("spin") {
+            // Overrides would be laid out anew: the file as it is.
+            true => words[..2].to_vec(),
+            false => words,
+        };
+        let error = fail(folder.path(), &with(&words, &["-o", "run"]));
+        assert!(error.contains(said), "{to}: {error}");
+    }
+    let words = changed(folder.path(), |text| {
+        let (before, rest) = text.split_once("[[loss]]").unwrap();
+        let (_, after) = rest.split_once("[representation]").unwrap();
+        format!("loss = []\n{before}[representation]{after}")
+    });
+    let error = fail(folder.path(), &with(&words, &["-o", "run"]));
+    assert!(error.contains("loss is empty"), "{error}");
+}
+
+#[test]
+fn bad_regularisers_and_optimisers_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    for (setting, said) in [
+        ("kind = \"total-variation\"\nweight = 1.0\nepsilon = 0.0", "epsilon = 0 is not allowed"),
+        ("kind = \"smoothness\"\nweight = -1.0", "regulariser 0: weight = -1 is not allowed"),
+        ("kind = \"smoothness\"\nweight = 1.0\nlevel = 1.0", "level is not for smoothness"),
+        ("kind = \"entropy\"\nweight = 1.0\nlevel = 1.0", "floor is missing: entropy needs it"),
+        ("kind = \"sparsity\"\nweight = 1.0", "probe.nodes is missing"),
+        ("kind = \"order\"\nweight = 1.0", "unknown variant `order`"),
+    ] {
+        let words = changed(folder.path(), |text| {
+            text.replace(
+                "[representation]",
+                &format!("[[regulariser]]\n{setting}\n\n[representation]"),
+            )
+        });
+        let error = fail(folder.path(), &with(&words, &["-o", "run"]));
+        assert!(error.contains(said), "{setting}: {error}");
+    }
+    let small = small();
+    let error = fail(folder.path(), &with(&small, &["--set", "training.optimiser=lbfgs"]));
+    assert!(error.contains("training.batch = \"all\""), "{error}");
+    let bounded = ["training.optimiser=lbfgs", "training.batch=all", "representation=grid"];
+    let mut words = with(&small, &["--set", "representation.activation=linear"]);
+    bounded.iter().for_each(|change| words.extend(["--set", change]));
+    assert!(fail(folder.path(), &words).contains("knows no bounds"));
+}
+
+/// A movie in text, a row of numbers a line, with a change to one of its numbers.
+fn movie(folder: &Path, pixel: &str) -> Vec<String> {
+    let row = |k: usize| {
+        let flux = |c: usize| if k == 5 && c == 7 { pixel } else { "0.01" };
+        (0..20).map(flux).collect::<Vec<_>>().join(",") + "\n"
+    };
+    std::fs::write(folder.join("frame.csv"), (0..20).map(row).collect::<String>()).unwrap();
+    let mut words = changed(folder, |text| {
+        let (before, rest) = text.split_once("[[truth.spot]]").unwrap();
+        let (_, after) = rest.split_once("[[loss]]").unwrap();
+        format!("{before}[data.movie]\npath = \"frame.csv\"\n\n[[loss]]{after}")
+    });
+    words.extend(["--set", "movie.frames=1", "--set", "movie.to=0.0"].map(str::to_owned));
+    words
+}
+
+#[test]
+fn bad_movies_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    for pixel in ["nan", "inf", "-inf"] {
+        let error = fail(folder.path(), &with(&movie(folder.path(), pixel), &["-o", "run"]));
+        assert!(error.contains("finite"), "{pixel}: {error}");
+    }
+    let error = fail(
+        folder.path(),
+        &with(
+            &movie(folder.path(), "0.5"),
+            &["-o", "run", "--set", "movie.frames=3", "--set", "movie.to=1.0"],
+        ),
+    );
+    assert!(error.contains("movie.frames"), "{error}");
+}
+
+/// Numbers that are not defined are none and explained, in the results and on the page.
+#[test]
+fn exact_a_dark_truth_is_said_to_be_one() {
+    let (small, folder) = (small(), tempfile::tempdir().unwrap());
+    for kind in ["representation=bhnerf", "representation=grid", "representation=linear-grid"] {
+        let name = kind.split_once('=').unwrap().1;
+        let dark = ["-o", name, "--set", "truth.spot.0.amplitude=0.0", "--set", kind];
+        succeed(folder.path(), &with(&small, &dark));
+        let run = folder.path().join(name);
+        let found = results(&run);
+        assert!(found["psnr_db"].is_null() && found["loss"].as_f64().is_some(), "{found}");
+        assert!(found["note"].as_str().unwrap().contains("the truth is dark"), "{found}");
+        let page = std::fs::read_to_string(run.join("report.html")).unwrap();
+        assert!(page.contains("the truth is dark on all nodes"), "{name}");
+        let log = std::fs::read_to_string(run.join("log.jsonl")).unwrap();
+        assert!(!log.to_lowercase().contains("nan") && !log.contains("inf"), "{log}");
+    }
+}
+
+/// The source rises late: frames without visibilities are frames without data.
+#[test]
+fn exact_frames_without_visibilities_are_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let of = |elevation: &'static str, gmst: &'static str| {
+        vec![
+            "fit",
+            "--set",
+            "screen.pixels=24",
+            "--set",
+            "observation.scans=8",
+            "--set",
+            "representation.width=24",
+            "--set",
+            "training.steps=20",
+            "--set",
+            "training.start=drawn",
+            "--set",
+            "output.nodes=20",
+            "--set",
+            elevation,
+            "--set",
+            gmst,
+        ]
+    };
+    let day = of("observation.elevation_deg=[60.0,85.0]", "observation.gmst=[0.0,23.9]");
+    let output = kerrlight(folder.path(), &[&day[..], &["-o", "some"]].concat());
+    let said = message(&output);
+    assert!(output.status.success() && said.contains("of them with data)"), "{said}");
+    assert!(results(&folder.path().join("some"))["loss"].as_f64().unwrap().is_finite());
+    let never = of("observation.elevation_deg=[84.0,85.0]", "observation.gmst=[2.0,2.667]");
+    let none = [&never[..], &["-o", "none"]].concat();
+    let output = kerrlight(folder.path(), &none);
+    let said = message(&output);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(
+        said.contains("no frame has any visibilities") && !folder.path().join("none").exists(),
+        "{said}"
+    );
+}

@@ -1,0 +1,173 @@
+//! Steps of a fit: what is drawn, what is learnt, what is done when it goes wrong.
+
+use super::Field;
+use super::objective::{Gradients, Loss, Selection};
+use super::occupancy::Occupancy;
+use super::penalties::Draw;
+use super::train::{BatchSize, Diverged, Outcome, Progress, State, Trainer, Training};
+use crate::dynamics::Axis;
+use crate::simd::Scalar;
+use rand::seq::index;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+/// Most returns of a fit.
+const MOST_SETBACKS: u32 = 12;
+
+/// Where a loss is taken.
+#[derive(Clone, Copy)]
+pub struct Place<'a, T> {
+    /// Parameters of the representation.
+    pub parameters: &'a [T],
+    /// The axis that matter turns about.
+    pub axis: Axis,
+    /// Outside of it nothing shines.
+    pub occupancy: Option<&'a Occupancy>,
+    /// Step whose draws are taken.
+    pub step: u64,
+}
+
+impl<T: Scalar> Trainer<'_, T> {
+    /// One step. It depends on the state and the settings alone: not on threads, and not on what
+    /// this trainer did before.
+    ///
+    /// # Errors
+    /// If the loss keeps diverging.
+    pub fn step(&mut self, state: &mut State<T>) -> Result<Outcome, Diverged> {
+        let now = &mut state.now;
+        self.refresh(now);
+        if let Some(rule) = self.training.lbfgs {
+            let (step, setbacks) = (now.step, state.setbacks);
+            let diverged = |loss| Diverged { loss, step, setbacks };
+            return self.quasi_newton(rule, now).map_err(diverged);
+        }
+        let mut of_axis = [0.0; 3];
+        let (step, occupancy) = (now.step, self.mask(now));
+        let place = Place { parameters: &now.parameters, axis: now.axis, occupancy, step };
+        let loss = self.loss(place, &mut of_axis);
+        let calm = state.good.as_ref().map_or(f64::INFINITY, |good| good.loss);
+        let finite = loss.total.is_finite() && of_axis.iter().all(|slope| slope.is_finite());
+        if !finite || loss.total > self.training.divergence * calm {
+            return step_back(state, loss.total);
+        }
+        now.loss = loss.total;
+        if now.step.is_multiple_of(self.training.keep_every.max(1)) {
+            state.good = Some(Box::new(now.clone()));
+        }
+        self.learn(&mut state.now, of_axis);
+        Ok(Outcome::Done(loss))
+    }
+
+    fn refresh(&mut self, now: &mut Progress<T>) {
+        let Some(plan) = self.training.occupancy else { return };
+        let Some(mask) = &mut now.occupancy else { return };
+        if now.step >= plan.warm_up && (now.step - plan.warm_up).is_multiple_of(plan.every.max(1)) {
+            let seed = mix(self.training.seed, now.step, 1);
+            let (representation, parameters) = (self.representation, &now.parameters);
+            mask.refresh(representation, parameters, seed, self.room.workspace());
+            // The loss is another one now.
+            now.lbfgs.iter_mut().for_each(|memory| memory.value = None);
+        }
+    }
+
+    /// The mask, once it is used.
+    pub(super) fn mask<'b>(&self, now: &'b Progress<T>) -> Option<&'b Occupancy> {
+        let masked = self.training.occupancy.is_some_and(|plan| now.step >= plan.warm_up);
+        now.occupancy.as_ref().filter(|_| masked)
+    }
+
+    /// The loss of the part of the data that a step looks at, with penalties. The gradient with respect to the
+    /// parameters is [`gradient`](Self::gradient) then; that of the axis is added, if it is learnt.
+    pub fn loss(&mut self, place: Place<'_, T>, of_axis: &mut [f64; 3]) -> Loss {
+        self.objective.chain.weigh(place.axis);
+        self.gradient.fill(T::zero());
+        let Place { parameters, axis, occupancy, step } = place;
+        let field = Field { representation: self.representation, parameters, axis, occupancy };
+        let mut loss = self.of_data(field, step, of_axis);
+        if let Some(penalties) = &self.training.penalties {
+            let draw = self.draw(step);
+            let (room, workspace) = (&mut self.probe, self.room.workspace());
+            let found =
+                penalties.value_and_gradient(field, &draw, &mut self.gradient, room, workspace);
+            loss.total += found.iter().sum::<f64>();
+            loss.penalties = found;
+        }
+        loss
+    }
+
+    /// The gradient with respect to the parameters of the loss that was taken last.
+    pub fn gradient(&self) -> &[T] {
+        &self.gradient
+    }
+
+    fn of_data(&mut self, field: Field<'_, T>, step: u64, of_axis: &mut [f64; 3]) -> Loss {
+        let learnt = self.training.learns_axis(self.representation);
+        let gradients =
+            Gradients { parameters: &mut self.gradient, axis: learnt.then_some(of_axis) };
+        let mut random = Pcg64::seed_from_u64(mix(self.training.seed, step, 0));
+        let observed = &self.observed;
+        let selection = match self.training.batch {
+            BatchSize::Pixels(count) => {
+                let rays = self.objective.chain.rays();
+                self.pairs.clear();
+                self.pairs.extend((0..count).map(|_| {
+                    let frame = observed[random.random_range(0..observed.len())];
+                    (random.random_range(0..rays) as u32, frame as u32)
+                }));
+                Selection::Pixels(&self.pairs)
+            }
+            BatchSize::Frames(count) => {
+                let count = count.min(observed.len());
+                let chosen = index::sample(&mut random, observed.len(), count);
+                let frames: Vec<usize> = chosen.into_iter().map(|k| observed[k]).collect();
+                let frames = Selection::Frames(&frames);
+                return self.objective.value_and_gradient(field, frames, gradients, &mut self.room);
+            }
+            BatchSize::All => Selection::Frames(observed),
+        };
+        self.objective.value_and_gradient(field, selection, gradients, &mut self.room)
+    }
+
+    fn draw(&self, step: u64) -> Draw<T> {
+        let mut random = Pcg64::seed_from_u64(mix(self.training.seed, step, 2));
+        let offset = [0, 1, 2].map(|_| random.random());
+        let times = &self.objective.chain.times;
+        Draw { offset, time: times[self.observed[random.random_range(0..self.observed.len())]] }
+    }
+
+    fn learn(&mut self, now: &mut Progress<T>, of_axis: [f64; 3]) {
+        let Training { adam, rate, axis_rate, ramp, .. } = &self.training;
+        let part = ((now.step + 1) as f64 / (ramp + 1) as f64).min(1.0) * now.caution;
+        let rate = part * rate.rate(now.step);
+        adam.step(rate, &self.gradient, &mut now.adam, &mut now.parameters);
+        self.representation.project(&mut now.parameters);
+        if let Some(axis_rate) = axis_rate {
+            let mut moved = now.axis.vector();
+            let rate = part * axis_rate.rate(now.step);
+            adam.step(rate, &of_axis, &mut now.axis_adam, &mut moved);
+            now.axis = Axis::new(moved).unwrap_or(now.axis);
+        }
+        now.step += 1;
+    }
+}
+
+fn step_back<T: Scalar>(state: &mut State<T>, loss: f64) -> Result<Outcome, Diverged> {
+    let diverged = Diverged { loss, step: state.now.step, setbacks: state.setbacks };
+    let Some(good) = &mut state.good else { return Err(diverged) };
+    if state.setbacks >= MOST_SETBACKS {
+        return Err(diverged);
+    }
+    state.setbacks += 1;
+    good.caution *= 0.5;
+    state.now = (**good).clone();
+    Ok(Outcome::SteppedBack { loss, to: good.step, caution: good.caution })
+}
+
+/// A seed for what a step draws.
+fn mix(seed: u64, step: u64, purpose: u64) -> u64 {
+    // SplitMix64's finaliser (Steele, Lea & Flood 2014).
+    let mut x = seed ^ step.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ purpose << 62;
+    x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    x ^ (x >> 31)
+}
