@@ -1,0 +1,60 @@
+//! Files of data, and what of them is compared.
+
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// Measured data.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum DataFiles {
+    /// Visibilities: UVFITS, eht-imaging's text, the EHT's tables or CSV.
+    Visibilities {
+        /// The file, relative to the fit's.
+        path: PathBuf,
+        /// Rows this close in time are averaged and make a frame, s.
+        average_s: f64,
+        /// Part of each amplitude that is added to its error in quadrature: for what calibration has left.
+        systematic: f64,
+        /// Time of the first frame, M.
+        first_time: f64,
+    },
+    /// A movie in Jy/pixel: .npz, .npy, .csv, .fits or .exr.
+    Movie {
+        /// The file, relative to the fit's.
+        path: PathBuf,
+    },
+}
+
+/// Data and their share.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Loss {
+    /// Which.
+    pub data: LossKind,
+    /// Factor on χ² a datum.
+    pub weight: f64,
+    /// Standard deviation of a pixel (image) or of the flux (light curve), Jy.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sigma: Option<f64>,
+    /// Least signal-to-noise ratio of baselines of closure quantities.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub least_snr: Option<f64>,
+}
+
+/// Kinds of data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LossKind {
+    /// Every pixel.
+    Image,
+    /// Complex visibilities.
+    Visibilities,
+    /// Debiased amplitudes.
+    Amplitudes,
+    /// Closure phases.
+    ClosurePhases,
+    /// Log closure amplitudes.
+    LogClosureAmplitudes,
+    /// Total flux.
+    LightCurve,
+}

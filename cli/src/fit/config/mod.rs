@@ -1,0 +1,79 @@
+//! What a fit's file may say. Numbers that decide the result have no default.
+
+mod data;
+mod recovery;
+mod simulation;
+mod view;
+
+pub use data::*;
+pub use recovery::*;
+pub use simulation::*;
+pub use view::*;
+
+use serde::{Deserialize, Serialize};
+
+/// A fit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FitFile {
+    /// One line that says what is fitted.
+    pub title: String,
+    /// Seed of noise, of the first parameters and of all draws.
+    pub seed: u64,
+    /// The hole.
+    pub hole: Hole,
+    /// From where it is seen.
+    pub observer: Observer,
+    /// Pixels of the model.
+    pub screen: Screen,
+    /// Where emission is looked for, and how rays are sampled there.
+    pub region: Region,
+    /// What happens to light, each off unless asked.
+    #[serde(default)]
+    pub effects: Effects,
+    /// How matter turns.
+    pub motion: Motion,
+    /// Frames of a simulated movie, or of an observation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub movie: Option<Movie>,
+    /// What is simulated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub truth: Option<Truth>,
+    /// What data are simulated with where that differs from what the fit assumes: any part of `hole`,
+    /// `observer`, `region`, `effects` and `motion`.
+    #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
+    pub world: toml::Table,
+    /// The array that sees the simulated movie.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub observation: Option<Observation>,
+    /// Files, instead of a simulation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub data: Option<DataFiles>,
+    /// What is compared with the data.
+    pub loss: Vec<Loss>,
+    /// Penalties on the emission beside the data; none unless asked.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub regulariser: Vec<super::penalty::Setting>,
+    /// Where regularisers look at a network; a grid has nodes of its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub probe: Option<super::penalty::ProbeSetting>,
+    /// What is recovered.
+    pub representation: Representation,
+    /// How.
+    pub training: Training,
+    /// The linear problem of voxels: needed for `linear-grid`, a start from it and a scan of axes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub linear: Option<Linear>,
+    /// What is known of the axis.
+    pub axis: AxisSearch,
+    /// The recovered volume.
+    pub output: Output,
+}
+
+/// The recovered volume.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Output {
+    /// Nodes of the volume along each axis.
+    pub nodes: usize,
+}

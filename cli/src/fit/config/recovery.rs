@@ -1,0 +1,226 @@
+//! What is recovered, and how.
+
+use serde::{Deserialize, Serialize};
+
+/// What is recovered.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Representation {
+    /// Which: the other numbers are those of its kind.
+    pub kind: Kind,
+    /// Nodes of a grid along each axis.
+    #[serde(default = "grid_nodes")]
+    pub nodes: usize,
+    /// Last function of a grid, or of a network's output − 10.
+    #[serde(default = "sigmoid")]
+    pub activation: Activation,
+    /// Units of a hidden layer.
+    #[serde(default = "width")]
+    pub width: usize,
+    /// Hidden layers.
+    #[serde(default = "hidden_layers")]
+    pub hidden_layers: usize,
+    /// Positional encoding degree.
+    #[serde(default = "degree")]
+    pub degree: usize,
+    /// Unit of length of a network, M.
+    #[serde(default = "one")]
+    pub length_scale: f64,
+    /// Unit of time of a network, M.
+    #[serde(default = "one")]
+    pub time_scale: f64,
+    /// Numbers of a representation that a program of one's own adds.
+    #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
+    pub own: toml::Table,
+}
+
+/// Kinds of representations.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// Network of the pulled-back point.
+    Bhnerf,
+    /// Network of the event.
+    Mlp4d,
+    /// Voxels, learnt step by step.
+    Grid,
+    /// Voxels without activation, solved as the convex problem that they are.
+    LinearGrid,
+    /// One that a program of one's own adds.
+    #[serde(untagged)]
+    Own(String),
+}
+
+/// Last function.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Activation {
+    /// Between 0 and 1.
+    Sigmoid,
+    /// Above 0.
+    Softplus,
+    /// None; parameters are held at 0 or above.
+    Linear,
+}
+
+/// How it is recovered.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Training {
+    /// Rule of the steps.
+    #[serde(default)]
+    pub optimiser: Optimiser,
+    /// Steps.
+    pub steps: u64,
+    /// First rate.
+    pub rate: f64,
+    /// Last rate, reached linearly.
+    pub last_rate: f64,
+    /// First rate of a grid, whose parameters are of another size than a network's; `rate`, without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub grid_rate: Option<f64>,
+    /// Last rate of a grid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub grid_last_rate: Option<f64>,
+    /// Steps over which rates grow to that.
+    #[serde(default)]
+    pub ramp: u64,
+    /// What a step looks at.
+    pub batch: Batch,
+    /// From where parameters start.
+    #[serde(default)]
+    pub start: Start,
+    /// Mask of what shines.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub occupancy: Option<Occupancy>,
+    /// Steps from one line of the log to the next.
+    pub log_every: u64,
+    /// Most seconds from one checkpoint to the next.
+    #[serde(default = "checkpoint_seconds")]
+    pub checkpoint_seconds: f64,
+}
+
+/// The linear problem of voxels.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Linear {
+    /// Largest emission that is allowed.
+    pub upper: f64,
+    /// Factor on ∫ |∇e|² dV.
+    #[serde(default)]
+    pub smoothness: f64,
+    /// Factor on ∫ e dV.
+    #[serde(default)]
+    pub sparsity: f64,
+    /// Times that nodes may be admitted again.
+    pub rounds: usize,
+    /// Iterations of each round.
+    pub iterations: usize,
+}
+
+/// From where parameters start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Start {
+    /// As the representation draws them.
+    #[default]
+    Drawn,
+    /// Fitted to the solution of the linear problem on a coarse grid.
+    Linear {
+        /// Nodes of that grid along each axis.
+        nodes: usize,
+        /// Every how many-eth frame it looks at.
+        stride: usize,
+        /// Steps of the fit to its solution.
+        steps: u64,
+    },
+}
+
+/// What a step looks at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Batch {
+    /// Random pixels of random frames: images only.
+    Pixels(usize),
+    /// Random frames, whole.
+    Frames(usize),
+    /// All frames.
+    All,
+}
+
+/// Mask of what shines.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Occupancy {
+    /// Cells along each axis.
+    pub cells: usize,
+    /// Part of the peak below which a cell is empty.
+    pub threshold: f64,
+    /// What is remembered from one look to the next.
+    pub memory: f64,
+    /// Steps without it.
+    pub warm_up: u64,
+    /// Steps from one look to the next.
+    pub every: u64,
+}
+
+/// What is known of the axis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum AxisSearch {
+    /// It is `motion.axis`.
+    Known {},
+    /// It is sought on the whole sphere with coarse linear grids, and learnt from there.
+    Scan {
+        /// Directions that are tried.
+        directions: usize,
+        /// Frames that are looked at, spread over all.
+        frames: usize,
+        /// First rate of what follows; 0: it stays where the scan has found it.
+        rate: f64,
+        /// Last rate, reached linearly.
+        last_rate: f64,
+    },
+    /// It is learnt from this start.
+    From {
+        /// Where it starts.
+        start: [f64; 3],
+        /// First rate.
+        rate: f64,
+        /// Last rate, reached linearly.
+        last_rate: f64,
+    },
+}
+
+fn grid_nodes() -> usize {
+    64
+}
+fn sigmoid() -> Activation {
+    Activation::Sigmoid
+}
+fn width() -> usize {
+    128
+}
+fn hidden_layers() -> usize {
+    4
+}
+fn degree() -> usize {
+    3
+}
+fn one() -> f64 {
+    1.0
+}
+fn checkpoint_seconds() -> f64 {
+    60.0
+}
+
+/// Rules of steps.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Optimiser {
+    /// Steps along the mean gradient of random parts of the data.
+    #[default]
+    Adam,
+    /// Quasi-Newton steps on all data, for small problems.
+    Lbfgs,
+}

@@ -1,0 +1,117 @@
+//! What is simulated, and the array that sees it.
+
+use serde::{Deserialize, Serialize};
+
+/// Frames of a movie.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Movie {
+    /// How many.
+    pub frames: usize,
+    /// Time of the first.
+    pub from: f64,
+    /// Time of the last.
+    pub to: f64,
+}
+
+/// What is simulated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Truth {
+    /// Gaussian spots at the reference time.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub spot: Vec<Spot>,
+    /// Letters and digits at the reference time, flat in the plane across the axis.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub glyph: Vec<Glyph>,
+}
+
+/// A letter that is extruded along the axis, its upper side away from the hole.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Glyph {
+    /// Which.
+    pub letter: char,
+    /// Its middle, M.
+    pub center: [f64; 3],
+    /// From its lower to its upper edge, M.
+    pub height: f64,
+    /// Along the axis, M.
+    pub thickness: f64,
+    /// Standard deviation of its blurred edges, M.
+    pub softness: f64,
+    /// Emission in the middle of broad strokes.
+    pub amplitude: f64,
+}
+
+/// A Gaussian spot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spot {
+    /// Where it was when it was round, M.
+    pub center: [f64; 3],
+    /// Standard deviation, M.
+    pub sigma: f64,
+    /// Emission at its centre.
+    pub amplitude: f64,
+    /// For how long differential rotation has wound it up until the reference time, in units of time.
+    #[serde(default)]
+    pub wound_for: f64,
+}
+
+/// The array that sees the simulated movie.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Observation {
+    /// EHT2017, ngEHT, or a file in eht-imaging's format.
+    pub array: String,
+    /// sgra, m87, or RA,DEC.
+    pub source: String,
+    /// Modified Julian date.
+    pub mjd: i32,
+    /// Hours of UTC from the first scan to one after the last.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub utc: Option<[f64; 2]>,
+    /// The same in hours of Greenwich mean sidereal time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gmst: Option<[f64; 2]>,
+    /// Scans.
+    pub scans: u32,
+    /// Integration time of a scan, s.
+    pub integration_s: f64,
+    /// Frequency in GHz.
+    pub frequency_ghz: f64,
+    /// Bandwidth in GHz.
+    pub bandwidth_ghz: f64,
+    /// Elevations at which stations observe.
+    pub elevation_deg: [f64; 2],
+    /// Noise that is added to the data.
+    pub noise: Noise,
+    /// Errors of station gains, none unless asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gains: Option<Gains>,
+    /// Time of the first scan, M.
+    pub first_time: f64,
+}
+
+/// Noise of simulated data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Noise {
+    /// None; errors are those of thermal noise.
+    None,
+    /// Thermal.
+    Thermal,
+}
+
+/// Random errors of station gains.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Gains {
+    /// Standard deviation of ln |g|, one number a station for the whole observation.
+    pub constant_amplitude: f64,
+    /// Standard deviation of ln |g|, another number for every scan.
+    pub scan_amplitude: f64,
+    /// Whether phases are uniform on the circle, for every station and scan.
+    pub random_phases: bool,
+}

@@ -1,0 +1,169 @@
+//! The hole, the view of it, what happens to light, and how matter turns.
+
+use serde::{Deserialize, Serialize};
+
+/// The hole.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Hole {
+    /// a, M.
+    pub spin: f64,
+    /// Mass in solar masses; needed for hours and microarcseconds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mass_msun: Option<f64>,
+    /// Distance; needed for microarcseconds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub distance_kpc: Option<f64>,
+}
+
+/// From where it is seen.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Observer {
+    /// Angle to the spin axis.
+    pub inclination_deg: f64,
+    /// M; infinity without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius: Option<f64>,
+}
+
+/// Pixels of the model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Screen {
+    /// Along each side.
+    pub pixels: usize,
+    /// Width in M: of the outer edges, or from the first to the last pixel's centre.
+    pub width: f64,
+    /// What the width is of.
+    pub width_of: WidthOf,
+    /// Field of view on the sky, if it is not `width` in units of the hole's angular size.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub field_uas: Option<f64>,
+    /// Jy in a pixel of a sight line with 1 M of emission 1.
+    pub jy_per_pixel: f64,
+}
+
+/// What a width is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum WidthOf {
+    /// The pixels' outer edges.
+    Edges,
+    /// The centres of the first and the last pixel.
+    Centers,
+}
+
+/// Where emission is looked for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Region {
+    /// Least radius, M.
+    pub r_min: f64,
+    /// Largest radius, M.
+    pub r_max: f64,
+    /// Largest |z|, M.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub z_width: Option<f64>,
+    /// Nodes on rays.
+    pub nodes: Nodes,
+}
+
+/// Nodes on rays.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Nodes {
+    /// Gauss–Legendre panels in Mino time inside r_max.
+    Gauss {
+        /// Nodes of a panel.
+        order: usize,
+        /// Cuts of the coarsest panels.
+        split: u32,
+    },
+    /// Equidistant in Mino time with chords as weights, as BH-NeRF has them.
+    EqualMinoTime {
+        /// Nodes of a ray.
+        per_ray: usize,
+    },
+}
+
+/// What happens to light.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Effects {
+    /// Whether light takes its time.
+    #[serde(default)]
+    pub slow_light: bool,
+    /// Emission goes like g to this power; without it there is no redshift.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub redshift_power: Option<f64>,
+    /// A grey medium at rest that dims what lies behind it; what shines does not absorb.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub absorption: Option<Absorption>,
+}
+
+/// κ = coefficient · exp(−½ [(r/radius)² + (z/height)²]).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Absorption {
+    /// Per M.
+    pub coefficient: f64,
+    /// M.
+    pub radius: f64,
+    /// M.
+    pub height: f64,
+}
+
+/// How matter turns.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Motion {
+    /// Angular velocity about the axis.
+    pub velocity: Velocity,
+    /// The axis of the truth, or the known one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub axis: Option<[f64; 3]>,
+    /// When the volume is what it is.
+    pub reference_time: f64,
+    /// When it begins to shine.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub injection_time: Option<f64>,
+}
+
+/// Angular velocity.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Velocity {
+    /// 1/(r^{3/2} + drag).
+    Keplerian {
+        /// The spin, for orbits about it.
+        drag: f64,
+    },
+    /// rate · (radius/r)^exponent.
+    PowerLaw {
+        /// M.
+        radius: f64,
+        /// Radians a unit of time.
+        rate: f64,
+        /// 1.5 without spin.
+        exponent: f64,
+    },
+    /// Linear between these.
+    Table {
+        /// Growing, M.
+        radii: Vec<f64>,
+        /// Radians a unit of time.
+        rates: Vec<f64>,
+    },
+    /// Another velocity, and a Gaussian process over the radius that is drawn from the fit's seed.
+    Perturbed {
+        /// The velocity without it.
+        of: Box<Velocity>,
+        /// Its standard deviation, radians a unit of time.
+        deviation: f64,
+        /// Its correlation length, M.
+        correlation_length: f64,
+        /// The first and the last radius of its table of 100 rows, M.
+        radii: [f64; 2],
+    },
+}
