@@ -42,12 +42,14 @@ impl Clone for Column {
 impl Deref for Column {
     type Target = [f64];
 
+    #[inline]
     fn deref(&self) -> &[f64] {
         &self.data[self.shift..self.shift + self.len]
     }
 }
 
 impl DerefMut for Column {
+    #[inline]
     fn deref_mut(&mut self) -> &mut [f64] {
         &mut self.data[self.shift..self.shift + self.len]
     }

@@ -117,7 +117,8 @@ impl Occupied {
     /// Numbers of the bricks in a range of azimuths, in one piece or in two.
     fn around(&self, [from, to]: [f64; 2]) -> [Range<usize>; 2] {
         let count = self.count[2];
-        if !(to - from < TAU) {
+        let wide = to - from;
+        if wide >= TAU || wide.is_nan() {
             return [0..count, 0..0];
         }
         let turns = TAU * ((from + PI) / TAU).floor();
@@ -178,7 +179,7 @@ impl Occupied {
         let part = part.clamp(0.0, 1.0);
         let nearest = (a[0] + part * along[0]).hypot(a[1] + part * along[1]);
         let wide = stretch.off / nearest;
-        if !(wide < 1.0) {
+        if wide >= 1.0 || wide.is_nan() {
             return None;
         }
         let turn = (a[0] * b[1] - a[1] * b[0]).atan2(a[0] * b[0] + a[1] * b[1]);

@@ -49,6 +49,9 @@ pub struct Glimpse {
 impl Glimpse {
     /// Light as it is received by someone in whose frame it has `shift` times the frequency that
     /// it has at infinity: I_ν/ν³ is invariant, so that a spectrum ν^(−α) gains shift^(3 + α).
+    ///
+    /// Never inlined: its power would be computed ahead of the question whether there is a shift.
+    #[inline(never)]
     pub(super) fn receive(&mut self, shift: f64, index: f64) {
         let boost = shift.powf(3.0 + index);
         self.intensity *= boost;
