@@ -27,7 +27,16 @@ fn regress_paths_in_documents_exist() {
             seen += 1;
         }
         for word in text.split('`').skip(1).step_by(2) {
-            let tops = ["geodesic/", "tomo/", "cli/", "validation/", "tests/", "scenes/", "docs/"];
+            let tops = [
+                "geodesic/",
+                "tomo/",
+                "cli/",
+                "validation/",
+                "tests/",
+                "scenes/",
+                "docs/",
+                "experiments/",
+            ];
             if tops.iter().any(|top| word.starts_with(top)) && !word.contains([' ', '*']) {
                 assert!(root().join(word).exists(), "{name} names {word}");
                 seen += 1;

@@ -5,6 +5,7 @@ mod accuracy;
 mod bad_input;
 mod closed_forms;
 mod command_line;
+mod compare;
 mod critical_curve;
 mod documents;
 mod eht_data;

@@ -1,6 +1,7 @@
 //! From an experiment to its cases: every combination of levels and seeds, with the settings of its fit.
 
 use super::experiment::{Experiment, Factor, Level, Source, put};
+use super::summary::called;
 use crate::fit;
 use anyhow::{Context, anyhow, bail};
 use toml::{Table, Value};
@@ -46,8 +47,9 @@ impl Case {
 
     /// `scene 1, grid, seed 2`.
     pub fn name(&self) -> String {
-        let levels: Vec<&str> = self.levels.iter().map(|(_, level)| level.as_str()).collect();
-        let levels = levels.join(", ");
+        let levels: Vec<(&str, &str)> =
+            self.levels.iter().map(|(factor, level)| (factor.as_str(), level.as_str())).collect();
+        let levels = called(&levels);
         if levels.is_empty() {
             return format!("seed {}", self.seed);
         }
@@ -284,7 +286,7 @@ mod tests {
     fn exact_cases_are_all_combinations_but_those_left_out() {
         let cases = cases(&Choice::default()).unwrap();
         let names: Vec<String> = cases.iter().map(Case::name).collect();
-        let expected = ["a grid, 1.0", "a grid, 2", "scan, 1.0"];
+        let expected = ["a grid, rate 1.0", "a grid, rate 2", "scan, rate 1.0"];
         let expected = [1, 2].map(|seed| expected.map(|n| format!("{n}, seed {seed}"))).concat();
         assert_eq!(names, expected);
         assert_eq!(cases[1].number("rate"), Some(2.0));

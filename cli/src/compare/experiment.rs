@@ -130,7 +130,7 @@ pub struct FigureAsked {
     pub columns: Vec<String>,
     /// Which result.
     pub value: Option<String>,
-    /// Azimuth and elevation from which volumes are seen, degrees.
+    /// Azimuth and elevation from which volumes are seen, degrees; along the true axis without it.
     pub view: Option<[f64; 2]>,
     /// Levels of the other factors.
     #[serde(default)]

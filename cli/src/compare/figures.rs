@@ -120,22 +120,29 @@ impl Figures<'_> {
             .iter()
             .zip(&titles)
             .map(|((name, row), titles)| {
-                let tiles = row.iter().zip(titles).map(|((_, loaded), (title, around))| Tile {
-                    title,
-                    volume: &loaded.volume,
-                    around: *around,
+                let truths = loaded[0].1.iter().map(|(_, truth)| truth.around.axis);
+                let tiles = row.iter().zip(titles).zip(truths).map(|((shown, title), axis)| Tile {
+                    title: &title.0,
+                    volume: &shown.1.volume,
+                    around: title.1,
+                    view: view_of(asked, axis),
                 });
                 (name.clone(), tiles.collect())
             })
             .collect();
-        let [azimuth, elevation] = asked.view.unwrap_or([90.0, 20.0]);
-        let drawn = mosaic(&rows, View { azimuth, elevation });
+        let from = match asked.view {
+            Some([azimuth, elevation]) => {
+                format!("from azimuth {azimuth}° and elevation {elevation}°")
+            }
+            None => "from above the orbits, along the true axis".to_owned(),
+        };
         let caption = format!(
-            "{}. {} Emission along straight parallel rays, seen from azimuth {azimuth}° and elevation {elevation}°; \
-             the ball is the horizon, the blue line the axis that was used, the circle the edge of the region in the \
-             equatorial plane. Seed 1; the table of all cases has the others.",
+            "{}. {} Emission along straight parallel rays, seen {from}; the ball is the horizon, the blue line the axis \
+             that was used, the circle the edge of the region in the hole's equatorial plane. Seed 1; the table of all \
+             cases has the others.",
             asked.title, asked.caption
         );
+        let drawn = mosaic(&rows);
         Ok(Some(Figure { png: encode(drawn)?, caption, alt: asked.title.clone() }))
     }
 
@@ -342,10 +349,20 @@ struct Loaded {
     around: Surroundings,
 }
 
+/// From where a figure shows a volume that turns about an axis.
+fn view_of(asked: &FigureAsked, [x, y, z]: [f64; 3]) -> View {
+    match asked.view {
+        Some([azimuth, elevation]) => View { azimuth, elevation },
+        None => {
+            View { azimuth: y.atan2(x).to_degrees(), elevation: z.atan2(x.hypot(y)).to_degrees() }
+        }
+    }
+}
+
 /// What stands above a recovered volume.
 fn quality(results: &Value) -> String {
     let psnr = result(results, "psnr_db").map(|x| format!("{x:.1} dB"));
-    let axis = result(results, "axis_dot_truth").filter(|x| *x < 1.0);
+    let axis = result(results, "axis_dot_truth").filter(|x| *x < 1.0 - 1e-9);
     let axis = axis.map(|x| format!("axis {x:.4}"));
     [psnr, axis].into_iter().flatten().collect::<Vec<_>>().join(", ")
 }

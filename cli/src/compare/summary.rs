@@ -183,9 +183,13 @@ pub fn combinations<'e>(levels: &'e [(String, Vec<String>)]) -> Vec<Vec<(&'e str
     })
 }
 
-/// What a combination is called.
+/// What a combination is called: levels, with the factor's name before a number.
 pub fn called(levels: &[(&str, &str)]) -> String {
-    levels.iter().map(|(_, level)| *level).collect::<Vec<_>>().join(", ")
+    let one = |(factor, level): &(&str, &str)| match level.parse::<f64>() {
+        Ok(_) => format!("{factor} {level}"),
+        Err(_) => (*level).to_owned(),
+    };
+    levels.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
 /// Pairs of a map.
@@ -214,7 +218,7 @@ mod tests {
             ("b".to_owned(), vec!["x".to_owned(), "y".to_owned()]),
         ];
         let names: Vec<String> = combinations(&levels).iter().map(|c| called(c)).collect();
-        assert_eq!(names, ["1, x", "1, y", "2, x", "2, y"]);
+        assert_eq!(names, ["a 1, x", "a 1, y", "a 2, x", "a 2, y"]);
         assert_eq!(combinations(&[]), [Vec::new()]);
     }
 

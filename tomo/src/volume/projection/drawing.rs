@@ -48,17 +48,19 @@ pub struct Tile<'a> {
     pub volume: &'a Volume,
     /// What is around it.
     pub around: Surroundings,
+    /// From where it is seen.
+    pub view: View,
 }
 
-/// Rows of different volumes, each with its name, seen from one side. Every column has a scale of colours of its
+/// Rows of different volumes, each with its name. Every column has a scale of colours of its
 /// own, which ends at its first volume's brightest place. `None` if there is nothing to draw.
-pub fn mosaic(rows: &[(String, Vec<Tile>)], view: View) -> Option<RgbImage> {
-    let light = |tile: &Tile| project(tile.volume, view, &tile.around, PANEL as usize);
+pub fn mosaic(rows: &[(String, Vec<Tile>)]) -> Option<RgbImage> {
+    let light = |tile: &Tile| project(tile.volume, tile.view, &tile.around, PANEL as usize);
     let firsts: Vec<f64> =
         rows.first()?.1.iter().map(|tile| panels::largest([&light(tile)])).collect();
     let row = |(name, tiles): &(String, Vec<Tile>)| {
         let panel = |(tile, most): (&Tile, &f64)| {
-            panel(view, &light(tile), &tile.around, *most, tile.title.to_owned())
+            panel(tile.view, &light(tile), &tile.around, *most, tile.title.to_owned())
         };
         let panels = tiles.iter().zip(&firsts).map(panel).collect::<Option<Vec<Panel>>>()?;
         Some((name.clone(), panels))
@@ -179,12 +181,12 @@ mod tests {
         let faint = Volume::new(scene.nodes(), scene.low(), scene.high(), faint).unwrap();
         let around =
             Surroundings { axis: [0.0; 3], hole_radius: 2.0, ring_radius: 5.0, half_width: 5.5 };
-        let tile = |volume| Tile { title: "", volume, around };
+        let tile = |volume| Tile { title: "", volume, around, view: VIEWS[1] };
         let rows = [
             ("a".to_owned(), vec![tile(&scene), tile(&faint)]),
             ("b".to_owned(), vec![tile(&faint), tile(&scene)]),
         ];
-        let drawn = mosaic(&rows, VIEWS[1]).unwrap();
+        let drawn = mosaic(&rows).unwrap();
         let bright = |right: u32, below: u32| {
             let (left, top) = (58 + right * 372, 58 + below * 404);
             let inside =

@@ -1,0 +1,179 @@
+//! `kerrlight compare`: cases that are whole, cached, gone on with, or failed and named.
+
+use crate::support::{fail, kerrlight, root, succeed};
+use serde_json::Value;
+use std::path::Path;
+
+/// Two grids of different rates, and one that cannot be.
+fn experiment(folder: &Path) {
+    let fit = root().join("scenes/fits/scene_1.toml");
+    let text = format!(
+        r#"
+        title = "Two rates"
+        question = "Which rate?"
+        seeds = 2
+        fit = {fit:?}
+        [set]
+        screen.pixels = 16
+        movie.frames = 8
+        output.nodes = 16
+        representation = {{ kind = "grid", nodes = 16 }}
+        region.nodes = {{ equal-mino-time = {{ per_ray = 40 }} }}
+        training = {{ steps = 30, log_every = 10, start = "drawn" }}
+        [[factor]]
+        name = "rate"
+        key = "training.grid_rate"
+        values = [0.1, 0.4]
+        [[table]]
+        title = "Quality"
+        caption = "PSNR."
+        value = "psnr_db"
+        rows = ["rate"]
+        [[figure]]
+        kind = "volumes"
+        title = "Volumes"
+        caption = "Both rates."
+        rows = ["rate"]
+        [[figure]]
+        kind = "time"
+        title = "Time"
+        caption = "Both rates."
+        rows = ["rate"]
+        "#
+    );
+    std::fs::write(folder.join("rates.toml"), text).unwrap();
+}
+
+fn results(folder: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(folder.join("results.json")).unwrap()).unwrap()
+}
+
+fn cases(results: &Value) -> &Vec<Value> {
+    results["cases"].as_array().unwrap()
+}
+
+#[test]
+fn exact_cases_are_whole_and_not_done_twice() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    experiment(at);
+    let printed = succeed(at, &["compare", "rates.toml", "-o", "out"]);
+    assert!(printed.contains("| rate | PSNR (dB) |"), "{printed}");
+    let first = results(&at.join("out"));
+    assert_eq!(cases(&first).len(), 4);
+    for case in cases(&first) {
+        assert_eq!(case["status"], "done");
+        assert!(case["results"]["psnr_db"].as_f64().unwrap() > 20.0);
+        assert!(case["results"]["peak_memory_mib"].as_f64().unwrap() > 1.0);
+        assert_eq!(case["settings"]["training"]["steps"], 30);
+        assert!(at.join("out").join(case["folder"].as_str().unwrap()).join("report.html").exists());
+    }
+    let page = std::fs::read_to_string(at.join("out/report.html")).unwrap();
+    assert!(
+        page.contains("Which rate?") && page.contains("Mean ± standard deviation over 2 seeds")
+    );
+    assert!(page.contains("data:image/png") && page.contains("<svg"));
+    let table = std::fs::read_to_string(at.join("out/results.csv")).unwrap();
+    assert_eq!(table.lines().count(), 5);
+    // A full folder is not written to by accident; what is done is not done again.
+    let refused = fail(at, &["compare", "rates.toml", "-o", "out"]);
+    assert!(refused.contains("--resume"), "{refused}");
+    let output = kerrlight(at, &["compare", "rates.toml", "-o", "out", "--resume"]);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("4 cases, 0 of them to be run"));
+    assert_eq!(results(&at.join("out")), first);
+    // A case whose folder was lost half-way is done again, to the same numbers.
+    let lost = at.join("out").join(cases(&first)[2]["folder"].as_str().unwrap());
+    std::fs::remove_file(lost.join("report.html")).unwrap();
+    std::fs::remove_file(lost.join("results.json")).unwrap();
+    let output = kerrlight(at, &["compare", "rates.toml", "-o", "out", "--resume"]);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("4 cases, 1 of them to be run"));
+    let again = results(&at.join("out"));
+    for (a, b) in cases(&first).iter().zip(cases(&again)) {
+        assert_eq!(a["results"]["psnr_db"], b["results"]["psnr_db"]);
+    }
+    let changed = succeed(at, &["compare", "out", "--against", "out/results.json"]);
+    assert!(changed.contains("(+0.00)"), "{changed}");
+}
+
+#[test]
+fn a_case_that_fails_is_named_and_the_others_are_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    experiment(at);
+    let text = std::fs::read_to_string(at.join("rates.toml")).unwrap();
+    std::fs::write(at.join("rates.toml"), text.replace("[0.1, 0.4]", "[0.1, -0.4]")).unwrap();
+    let output = kerrlight(at, &["compare", "rates.toml", "-o", "out", "--seeds", "1"]);
+    assert_eq!(output.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("1 of 2 cases failed: rate -0.4, seed 1"), "{said}");
+    let results = results(&at.join("out"));
+    assert_eq!(cases(&results)[0]["status"], "done");
+    assert_eq!(cases(&results)[1]["status"], "failed");
+    assert!(cases(&results)[1]["error"].as_str().unwrap().contains("-0.4"));
+    let page = std::fs::read_to_string(at.join("out/report.html")).unwrap();
+    assert!(page.contains("Failed: rate -0.4, seed 1"));
+}
+
+/// A fit that is killed in the middle is a failed case; the next run goes on with it.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_killed_case_is_gone_on_with() {
+    use std::time::{Duration, Instant};
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    experiment(at);
+    let text = std::fs::read_to_string(at.join("rates.toml")).unwrap();
+    let slow = text.replace("steps = 30", "steps = 3000").replace("[0.1, 0.4]", "[0.1]");
+    std::fs::write(at.join("rates.toml"), slow).unwrap();
+    let words = ["compare", "rates.toml", "-o", "out", "--seeds", "1"];
+    let mut running = std::process::Command::new(crate::support::binary())
+        .current_dir(at)
+        .args(words)
+        .stderr(std::process::Stdio::null())
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let (begun, parent) = (Instant::now(), running.id());
+    let child = loop {
+        assert!(begun.elapsed() < Duration::from_secs(120), "no fit has begun");
+        std::thread::sleep(Duration::from_millis(20));
+        let path = format!("/proc/{parent}/task/{parent}/children");
+        let children = std::fs::read_to_string(path).unwrap_or_default();
+        let is_running = std::fs::read_dir(at.join("out/cases"))
+            .is_ok_and(|all| all.flatten().any(|case| case.path().join("log.jsonl").exists()));
+        if let (Some(child), true) = (children.split_whitespace().next(), is_running) {
+            break child.to_owned();
+        }
+    };
+    assert!(std::process::Command::new("kill").args(["-9", &child]).status().unwrap().success());
+    assert_eq!(running.wait().unwrap().code(), Some(1));
+    let killed = results(&at.join("out"));
+    assert_eq!(cases(&killed)[0]["error"], "killed by signal 9");
+    succeed(at, &[&words[..], &["--resume"]].concat());
+    assert_eq!(cases(&results(&at.join("out")))[0]["status"], "done");
+}
+
+#[test]
+fn experiments_are_listed_and_mistakes_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let listed = succeed(at, &["compare"]);
+    for name in ["representations", "sparsity", "axis-minimum", "velocity-mismatch", "coverage"] {
+        assert!(listed.contains(name), "{listed}");
+    }
+    assert!(fail(at, &["compare", "sparsty"]).contains("there is no experiment sparsty"));
+    experiment(at);
+    let text = std::fs::read_to_string(at.join("rates.toml")).unwrap();
+    for (old, new, expected) in [
+        ("seeds = 2", "seeds = 0", "seeds = 0 is not allowed"),
+        ("seeds = 2", "seed = 2", "unknown field `seed`"),
+        ("rows = [\"rate\"]", "rows = [\"rates\"]", "there is no factor \"rates\""),
+        ("kind = \"time\"", "kind = \"tim\"", "unknown variant `tim`"),
+    ] {
+        std::fs::write(at.join("wrong.toml"), text.replacen(old, new, 1)).unwrap();
+        let said = fail(at, &["compare", "wrong.toml", "-o", "wrong"]);
+        assert!(said.contains(expected), "{said}");
+        assert!(!at.join("wrong").exists());
+    }
+    assert!(fail(at, &["compare", "rates.toml", "--only", "rate=3"]).contains("levels of rate"));
+}
