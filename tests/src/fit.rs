@@ -207,7 +207,7 @@ fn bad_input_is_named_and_nothing_is_begun() {
     for (change, said) in [
         ("hole.spin=1.5", "spin = 1.5"),
         ("region.r_max=1.0", "r_max = 1"),
-        ("training.rate=-1.0", "from = -1"),
+        ("training.rate=-1.0", "training.rate: from = -1"),
         ("training.batch={frames=0}", "1 or more"),
         ("loss.0.sigma=0.0", "image sigma = 0"),
         ("loss.0.data=visibilities", "pixels are for images alone"),
@@ -215,7 +215,7 @@ fn bad_input_is_named_and_nothing_is_begun() {
         ("output.nodes=1", "output.nodes = 1"),
         ("movie.frames=0", "movie.frames = 0"),
         ("nonsense=1", "unknown field `nonsense`"),
-        ("representation=cubes", "unknown variant `cubes`"),
+        ("representation=cubes", "representation.kind = \"cubes\" is not allowed: bhnerf"),
     ] {
         let error = fail(folder.path(), &with(&small, &["-o", "run", "--set", change]));
         assert!(error.contains(said), "{change}: {error}");

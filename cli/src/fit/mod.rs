@@ -4,6 +4,7 @@ mod config;
 mod curves;
 mod data;
 mod folder;
+mod learning;
 mod linear;
 mod merge;
 mod penalty;

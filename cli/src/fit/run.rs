@@ -3,6 +3,7 @@
 use super::config::{AxisSearch, FitFile, Kind, LossKind, Start};
 use super::data::{self, Measured};
 use super::folder::{self, Folder};
+use super::learning;
 use super::linear::{self, Linear};
 use super::results::{self, Estimate};
 use super::setup::{self, Instrument};
@@ -47,8 +48,8 @@ impl Prepared {
 /// What can be told of settings without tracing rays.
 pub fn check(file: &FitFile) -> anyhow::Result<()> {
     let (_, axis_rate) = setup::axis(file)?;
-    setup::representation(file)?;
-    let training = setup::training(file, axis_rate)?;
+    learning::representation(file)?;
+    let training = learning::training(file, axis_rate)?;
     let images_only = file.loss.iter().all(|loss| loss.data == LossKind::Image);
     if matches!(training.batch, BatchSize::Pixels(_)) && !images_only {
         bail!("training.batch: pixels are for images alone; take frames = N");
@@ -67,9 +68,9 @@ pub fn run(prepared: &Prepared, text: &str, folder: &Folder, resume: bool) -> an
     let Prepared { file, instrument, measured, motion } = prepared;
     let begun = Instant::now();
     let objective = prepared.objective()?;
-    let representation = setup::representation(file)?;
+    let representation = learning::representation(file)?;
     let (axis, axis_rate) = setup::axis(file)?;
-    let training = setup::training(file, axis_rate)?;
+    let training = learning::training(file, axis_rate)?;
     let mut state = State::new(&*representation, axis, &training);
     let trainer = Trainer::new(objective, &*representation, training);
     let mut run = Run { file, text, folder, measured, trainer, begun };
