@@ -68,7 +68,10 @@ impl Compare {
     pub fn run(&self, threads: Option<usize>) -> anyhow::Result<()> {
         let Some(name) = &self.experiment else { return list_experiments() };
         let before = self.against.as_deref().map(changes::read).transpose()?;
-        if name.extension().is_some_and(|e| e == "json") || name.join("results.json").is_file() {
+        // A folder that is called like an experiment is meant by ./name.
+        let is_known = experiment::built_in().any(|(known, _)| Path::new(known) == name);
+        let is_file = name.extension().is_some_and(|e| e == "json");
+        if is_file || (!is_known && name.join("results.json").is_file()) {
             let Some(before) = before else {
                 bail!("{} are results: give others with --against", name.display());
             };

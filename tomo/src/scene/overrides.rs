@@ -54,6 +54,10 @@ pub fn apply_override(text: &str, assignment: &str) -> Result<String, SceneError
         (Some(Item::Table(_)) | None, parsed @ Value::InlineTable(_)) => {
             spread(Item::Value(parsed))
         }
+        (Some(Item::ArrayOfTables(_)), parsed @ Value::Array(_)) => Item::Value(parsed)
+            .into_array_of_tables()
+            .map(Item::ArrayOfTables)
+            .map_err(|_| fail("names a list of tables: give a list of tables"))?,
         (Some(Item::Table(_) | Item::ArrayOfTables(_)), _) => {
             return Err(fail("names a table, not a value"));
         }

@@ -139,14 +139,16 @@ fn empty_overrides_remove_a_key() {
 /// A table takes the place of another, and the next override finds its way into it.
 #[test]
 fn overrides_replace_tables() {
-    let text = "[axis.known]\n\n[output]\nnodes = 64\nstart = { linear = { nodes = 8 } }\n";
+    let text = "[[loss]]\nsigma = 1\n[axis.known]\n[output]\nnodes = 64\nstart = { linear = { nodes = 8 } }\n";
     let text = apply_override(text, "axis={scan={directions=400,rate=1e-2}}").unwrap();
     let text = apply_override(&text, "axis.scan.directions=8").unwrap();
     let text = apply_override(&text, "output.start.linear.nodes=9").unwrap();
     let text = apply_override(&text, "probe={nodes=5}").unwrap();
+    let text = apply_override(&text, "loss=[{sigma=2},{sigma=3}]").unwrap();
+    let text = apply_override(&text, "loss.1.sigma=4").unwrap();
     let found: toml::Table = text.parse().unwrap();
     let wanted = "[axis.scan]\ndirections = 8\nrate = 1e-2\n[output]\nnodes = 64\n\
-                  [output.start.linear]\nnodes = 9\n[probe]\nnodes = 5";
+                  [output.start.linear]\nnodes = 9\n[probe]\nnodes = 5\n[[loss]]\nsigma = 2\n[[loss]]\nsigma = 4";
     assert_eq!(found, wanted.parse::<toml::Table>().unwrap(), "{text}");
 }
 
