@@ -123,7 +123,7 @@ fn a_killed_case_is_gone_on_with() {
     let at = folder.path();
     experiment(at);
     let text = std::fs::read_to_string(at.join("rates.toml")).unwrap();
-    let slow = text.replace("steps = 30", "steps = 3000").replace("[0.1, 0.4]", "[0.1]");
+    let slow = text.replace("steps = 30", "steps = 1200").replace("[0.1, 0.4]", "[0.1]");
     std::fs::write(at.join("rates.toml"), slow).unwrap();
     let words = ["compare", "rates.toml", "-o", "out", "--seeds", "1"];
     let mut running = std::process::Command::new(crate::support::binary())
