@@ -1,0 +1,195 @@
+//! Pixels that get as many rays as their light needs: cells of a pixel are cut into four, again
+//! and again, where they are estimated to be off by most.
+//!
+//! A pixel starts with the ray at its centre. It is cut if one of its eight neighbours sees
+//! another lensing band (number of crossings of the equatorial plane), another image of the disc,
+//! another fate of the ray or emission where it sees none, or if second differences say that its mean is off by more
+//! than the tolerance. Neighbours beyond a tile are traced again, so that no pixel
+//! depends on the tiles.
+
+mod cell;
+mod cell_map;
+mod cut;
+mod light;
+mod tolerance;
+
+pub(super) use tolerance::tolerance;
+
+use super::grid::Grid;
+use super::pixels::{Pixel, Workspace};
+use crate::transport::{Fate, Stage};
+use cell::Cell;
+use cut::Cut;
+use kerrlight_geodesic::OutOfRange;
+use light::{Light, range};
+use std::ops::Range;
+
+/// Cells are cut at most this often: the smallest are 1/128 of a pixel wide.
+const DEEPEST: u32 = 6;
+
+/// The light between two lensing bands that no ray has met, in terms of what is around.
+const HIDDEN: f64 = 1.0 / 16.0;
+
+/// The pixels of a rectangle, row by row, each estimated to within `tolerance`.
+pub(super) fn adaptive(
+    stage: &Stage,
+    grid: &Grid,
+    rows: Range<usize>,
+    columns: Range<usize>,
+    tolerance: f64,
+    work: &mut Workspace,
+) -> Result<Vec<Pixel>, OutOfRange> {
+    let (mut pixels, mut cuts) = first(stage, grid, rows, columns, tolerance, work)?;
+    let middles: Vec<Light> =
+        cuts.iter().map(|cut| Light::from(&pixels[cut.pixel].center)).collect();
+    work.clear();
+    for cut in &cuts {
+        push_quarters(work, grid, cut, [0.0; 2], 0);
+    }
+    let seen = work.look(stage)?;
+    for ((cut, middle), seen) in cuts.iter_mut().zip(&middles).zip(seen.chunks_exact(4)) {
+        cut.add([0.0; 2], 0, middle, seen);
+    }
+    while !cuts.is_empty() {
+        let mut going = Vec::with_capacity(cuts.len());
+        for mut cut in cuts {
+            let worst = cut.worst(tolerance);
+            if worst == 0 {
+                cut.finish(&mut pixels[cut.pixel]);
+            } else {
+                let parents = cut.cells.split_off(cut.cells.len() - worst);
+                going.push((cut, parents));
+            }
+        }
+        cuts = deeper(stage, grid, going, work)?;
+    }
+    Ok(pixels)
+}
+
+/// Traces the quarters of the quarters of `parents`.
+fn deeper(
+    stage: &Stage,
+    grid: &Grid,
+    going: Vec<(Cut, Vec<Cell>)>,
+    work: &mut Workspace,
+) -> Result<Vec<Cut>, OutOfRange> {
+    work.clear();
+    for (cut, parents) in &going {
+        for parent in parents {
+            for center in Cell::places(parent.center, parent.level) {
+                push_quarters(work, grid, cut, center, parent.level + 1);
+            }
+        }
+    }
+    let mut seen = work.look(stage)?.chunks_exact(4);
+    let mut cuts = Vec::with_capacity(going.len());
+    for (mut cut, parents) in going {
+        for parent in parents {
+            let places = Cell::places(parent.center, parent.level);
+            for (center, middle) in places.into_iter().zip(&parent.quarters) {
+                cut.add(center, parent.level + 1, middle, seen.next().unwrap_or_default());
+            }
+        }
+        cuts.push(cut);
+    }
+    Ok(cuts)
+}
+
+fn push_quarters(work: &mut Workspace, grid: &Grid, cut: &Cut, center: [f64; 2], level: u32) {
+    for place in Cell::places(center, level) {
+        work.push(grid.inside(cut.column, cut.row, place));
+    }
+}
+
+/// One ray a pixel, and which pixels are to be cut.
+fn first(
+    stage: &Stage,
+    grid: &Grid,
+    rows: Range<usize>,
+    columns: Range<usize>,
+    tolerance: f64,
+    work: &mut Workspace,
+) -> Result<(Vec<Pixel>, Vec<Cut>), OutOfRange> {
+    // With the neighbours that there are.
+    let around = |range: &Range<usize>, count: usize| {
+        range.start.saturating_sub(1)..(range.end + 1).min(count)
+    };
+    let (wide, high) = (around(&columns, grid.width), around(&rows, grid.height));
+    work.clear();
+    for row in high.clone() {
+        for column in wide.clone() {
+            work.push(grid.inside(column, row, [0.0; 2]));
+        }
+    }
+    let seen = work.look(stage)?;
+    let light: Vec<Light> = seen.iter().map(Light::from).collect();
+    let place = |column: usize, row: usize| (row - high.start) * wide.len() + column - wide.start;
+    let (mut pixels, mut cuts) = (Vec::new(), Vec::new());
+    for row in rows {
+        for column in columns.clone() {
+            let center = seen[place(column, row)];
+            let neighbor = |dx: isize, dy: isize| {
+                let to = |k: usize, d: isize, range: &Range<usize>| {
+                    k.saturating_add_signed(d).clamp(range.start, range.end - 1)
+                };
+                &light[place(to(column, dx, &wide), to(row, dy, &high))]
+            };
+            let Estimate { error, contrast, bright } = estimate(neighbor);
+            if contrast.is_some() || error > tolerance {
+                let around =
+                    core::array::from_fn(|k| *neighbor(k as isize % 3 - 1, k as isize / 3 - 1));
+                cuts.push(Cut {
+                    pixel: pixels.len(),
+                    column,
+                    row,
+                    cells: Vec::new(),
+                    bright,
+                    around,
+                    contrast: 0.0,
+                    rays: 0,
+                    unresolved: 0,
+                });
+            }
+            pixels.push(Pixel {
+                intensity: center.intensity,
+                rgb: center.rgb,
+                stokes: center.stokes,
+                center,
+                unresolved: u32::from(center.fate == Fate::Unresolved),
+                rays: 1,
+                error,
+            });
+        }
+    }
+    Ok((pixels, cuts))
+}
+
+/// What a pixel's first ray and those of its neighbours say.
+struct Estimate {
+    error: f64,
+    /// Range of intensities if a neighbour is of another kind.
+    contrast: Option<f64>,
+    /// Largest intensity.
+    bright: f64,
+}
+
+/// Twice the midpoint rule's (D_xx + D_yy)/24 where all is smooth, a quarter of the range where
+/// it is not, and what may hide between lensing bands.
+fn estimate<'a>(at: impl Fn(isize, isize) -> &'a Light) -> Estimate {
+    let value = |dx, dy| at(dx, dy).intensity;
+    let middle = at(0, 0);
+    let second = |a: f64, b: f64| (a - 2.0 * middle.intensity + b).abs();
+    let smooth = second(value(-1, 0), value(1, 0)) + second(value(0, -1), value(0, 1));
+    let around = || (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy)));
+    let bright = around().map(|(dx, dy)| value(dx, dy)).fold(0.0, f64::max);
+    let other = around().any(|(dx, dy)| at(dx, dy).kind != middle.kind);
+    let contrast = other.then(|| range(around().map(|(dx, dy)| value(dx, dy))));
+    let mut error = smooth / 12.0;
+    if let Some(contrast) = contrast {
+        error = error.max(0.25 * contrast);
+    }
+    if around().any(|(dx, dy)| at(dx, dy).other_band(middle)) {
+        error = error.max(HIDDEN * bright);
+    }
+    Estimate { error, contrast, bright }
+}
