@@ -4,10 +4,10 @@ use crate::support::{fail, kerrlight, root, succeed};
 use serde_json::Value;
 use std::path::Path;
 
-/// Two grids of different rates, and one that cannot be.
-fn experiment(folder: &Path) {
+/// Two grids of different rates, with changes of the words.
+fn experiment(folder: &Path, changes: &[(&str, &str)]) {
     let fit = root().join("scenes/fits/scene_1.toml");
-    let text = format!(
+    let mut text = format!(
         r#"
         title = "Two rates"
         question = "Which rate?"
@@ -41,6 +41,10 @@ fn experiment(folder: &Path) {
         rows = ["rate"]
         "#
     );
+    for (old, new) in changes {
+        assert!(text.contains(old), "{old}");
+        text = text.replace(old, new);
+    }
     std::fs::write(folder.join("rates.toml"), text).unwrap();
 }
 
@@ -56,7 +60,7 @@ fn cases(results: &Value) -> &Vec<Value> {
 fn exact_cases_are_whole_and_not_done_twice() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    experiment(at);
+    experiment(at, &[]);
     let printed = succeed(at, &["compare", "rates.toml", "-o", "out"]);
     assert!(printed.contains("| rate | PSNR (dB) |"), "{printed}");
     let first = results(&at.join("out"));
@@ -91,6 +95,14 @@ fn exact_cases_are_whole_and_not_done_twice() {
     for (a, b) in cases(&first).iter().zip(cases(&again)) {
         assert_eq!(a["results"]["psnr_db"], b["results"]["psnr_db"]);
     }
+    // What is chosen to be run does not hide what is known.
+    succeed(
+        at,
+        &["compare", "rates.toml", "-o", "out", "--resume", "--only", "rate=0.1", "--seeds", "3"],
+    );
+    let more = results(&at.join("out"));
+    assert_eq!(cases(&more).len(), 5);
+    assert!(cases(&more).iter().all(|case| case["status"] == "done"));
     let changed = succeed(at, &["compare", "out", "--against", "out/results.json"]);
     assert!(changed.contains("(+0.00)"), "{changed}");
 }
@@ -99,9 +111,7 @@ fn exact_cases_are_whole_and_not_done_twice() {
 fn a_case_that_fails_is_named_and_the_others_are_whole() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    experiment(at);
-    let text = std::fs::read_to_string(at.join("rates.toml")).unwrap();
-    std::fs::write(at.join("rates.toml"), text.replace("[0.1, 0.4]", "[0.1, -0.4]")).unwrap();
+    experiment(at, &[("[0.1, 0.4]", "[0.1, -0.4]")]);
     let output = kerrlight(at, &["compare", "rates.toml", "-o", "out", "--seeds", "1"]);
     assert_eq!(output.status.code(), Some(1));
     let said = String::from_utf8_lossy(&output.stderr);
@@ -121,10 +131,7 @@ fn a_killed_case_is_gone_on_with() {
     use std::time::{Duration, Instant};
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    experiment(at);
-    let text = std::fs::read_to_string(at.join("rates.toml")).unwrap();
-    let slow = text.replace("steps = 30", "steps = 1200").replace("[0.1, 0.4]", "[0.1]");
-    std::fs::write(at.join("rates.toml"), slow).unwrap();
+    experiment(at, &[("steps = 30", "steps = 1200"), ("[0.1, 0.4]", "[0.1]")]);
     let words = ["compare", "rates.toml", "-o", "out", "--seeds", "1"];
     let mut running = std::process::Command::new(crate::support::binary())
         .current_dir(at)
@@ -162,18 +169,17 @@ fn experiments_are_listed_and_mistakes_are_named() {
         assert!(listed.contains(name), "{listed}");
     }
     assert!(fail(at, &["compare", "sparsty"]).contains("there is no experiment sparsty"));
-    experiment(at);
-    let text = std::fs::read_to_string(at.join("rates.toml")).unwrap();
     for (old, new, expected) in [
         ("seeds = 2", "seeds = 0", "seeds = 0 is not allowed"),
         ("seeds = 2", "seed = 2", "unknown field `seed`"),
         ("rows = [\"rate\"]", "rows = [\"rates\"]", "there is no factor \"rates\""),
         ("kind = \"time\"", "kind = \"tim\"", "unknown variant `tim`"),
     ] {
-        std::fs::write(at.join("wrong.toml"), text.replacen(old, new, 1)).unwrap();
-        let said = fail(at, &["compare", "wrong.toml", "-o", "wrong"]);
+        experiment(at, &[(old, new)]);
+        let said = fail(at, &["compare", "rates.toml", "-o", "wrong"]);
         assert!(said.contains(expected), "{said}");
         assert!(!at.join("wrong").exists());
     }
+    experiment(at, &[]);
     assert!(fail(at, &["compare", "rates.toml", "--only", "rate=3"]).contains("levels of rate"));
 }

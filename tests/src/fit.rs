@@ -123,7 +123,8 @@ fn exact_a_field_of_events_is_fitted_without_a_mask() {
 #[test]
 fn exact_an_unknown_axis_is_found() {
     let folder = tempfile::tempdir().unwrap();
-    let scan = "[axis.scan]\ndirections = 80\nframes = 8\nrate = 1e-3\nlast_rate = 1e-4\n";
+    let scan =
+        "[axis.scan]\ndirections = 80\nframes = 8\npixels = 12\nrate = 1e-3\nlast_rate = 1e-4\n";
     let words = changed(folder.path(), |text| text.replace("[axis.known]\n", scan));
     succeed(folder.path(), &with(&words, &["-o", "axis"]));
     let run = folder.path().join("axis");

@@ -1,6 +1,6 @@
 //! From an experiment to its cases: every combination of levels and seeds, with the settings of its fit.
 
-use super::experiment::{Experiment, Factor, Level, Source, put};
+use super::experiment::{Experiment, Factor, Level, Source};
 use super::summary::called;
 use crate::fit;
 use anyhow::{Context, anyhow, bail};
@@ -21,7 +21,7 @@ pub struct Case {
 }
 
 /// Which cases are run, and how.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Choice {
     /// Seeds, in place of the experiment's.
     pub seeds: Option<u64>,
@@ -31,6 +31,13 @@ pub struct Choice {
     pub quick: bool,
     /// `key=value` for all cases.
     pub set: Vec<String>,
+}
+
+impl Choice {
+    /// All cases, with the same settings.
+    pub fn unrestricted(&self) -> Self {
+        Self { seeds: None, only: Vec::new(), ..self.clone() }
+    }
 }
 
 impl Case {
@@ -186,7 +193,7 @@ fn settings(
         for key in &level.remove {
             remove(&mut table, key).with_context(|| format!("level {:?}", level.name))?;
         }
-        apply(&mut table, &level.set);
+        fit::merge(&mut table, &level.set);
     }
     if choice.quick {
         fit::merge(&mut table, &experiment.quick.set);
@@ -198,38 +205,6 @@ fn settings(
     }
     fit::check(&text)?;
     Ok(text)
-}
-
-/// Puts settings with one leaf into their place, and merges others.
-fn apply(table: &mut Table, set: &Table) {
-    let (mut key, mut value) = (String::new(), None);
-    let mut at = set;
-    while at.len() == 1 {
-        let Some((name, inner)) = at.iter().next() else { break };
-        key = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
-        match inner {
-            Value::Table(inner) if !inner.is_empty() => at = inner,
-            leaf => {
-                value = Some(leaf.clone());
-                break;
-            }
-        }
-    }
-    match value {
-        Some(value) if is_inside(table, &key) => put(table, &key, value),
-        _ => fit::merge(table, set),
-    }
-}
-
-/// Whether all tables on the way to a key are there already: it is a leaf that is changed, and not a choice.
-fn is_inside(table: &Table, key: &str) -> bool {
-    match key.split_once('.') {
-        None => table.get(key).is_some_and(|old| !old.is_table()),
-        Some((first, rest)) => match table.get(first) {
-            Some(Value::Table(inner)) => is_inside(inner, rest),
-            _ => false,
-        },
-    }
 }
 
 fn remove(table: &mut Table, key: &str) -> anyhow::Result<()> {

@@ -363,7 +363,7 @@ impl Factor {
 }
 
 /// Sets a key with dots.
-pub fn put(table: &mut Table, key: &str, value: Value) {
+fn put(table: &mut Table, key: &str, value: Value) {
     match key.split_once('.') {
         None => {
             table.insert(key.to_owned(), value);

@@ -86,12 +86,14 @@ impl Compare {
             quick: self.quick,
             set: self.set.clone(),
         };
-        let cases = cases::expand(&experiment, &source, &choice)?;
+        let chosen = cases::expand(&experiment, &source, &choice)?;
         if self.list {
-            return list_cases(&cases);
+            return list_cases(&chosen);
         }
+        let all = cases::expand(&experiment, &source, &choice.unrestricted())?;
         let folder = self.folder(name, &text)?;
         let runner = Runner::new(&folder, threads)?;
+        let cases = with_known(chosen, all, &runner);
         let summary = run(&cases, &runner);
         write(&experiment, &summary, &runner, &folder, before.as_ref())?;
         output::print(&format!("{}\n", folder.join("report.html").display()))?;
@@ -130,6 +132,21 @@ fn list_cases(cases: &[Case]) -> anyhow::Result<()> {
         Err(error) => format!("{}: {error}\n", case.name()),
     };
     output::print(&cases.iter().map(line).collect::<String>())
+}
+
+/// The chosen cases, and those that an earlier run of the same folder has done beside them.
+fn with_known(mut chosen: Vec<Case>, all: Vec<Case>, runner: &Runner) -> Vec<Case> {
+    let is_done = |case: &Case| matches!(runner.known(case), Status::Done(_));
+    let mut cases = Vec::with_capacity(all.len());
+    for case in all {
+        match chosen.iter().position(|other| other.slug == case.slug) {
+            Some(at) => cases.push(chosen.remove(at)),
+            None if is_done(&case) => cases.push(case),
+            None => {}
+        }
+    }
+    cases.extend(chosen);
+    cases
 }
 
 /// Runs what is not done yet, until Ctrl-C.

@@ -209,6 +209,17 @@ fn read(file: &FitFile, data: &DataFiles, folder: &Path) -> anyhow::Result<Measu
 }
 
 impl Measured {
+    /// The data alone.
+    pub fn untold(&self) -> Self {
+        Self {
+            times: self.times.clone(),
+            movie: self.movie.clone(),
+            visibilities: self.visibilities.clone(),
+            sky: self.sky,
+            truth: None,
+        }
+    }
+
     /// The terms of the loss.
     pub fn terms(&self, losses: &[Loss], pixels: usize) -> anyhow::Result<Data<f32>> {
         let mut data = Data { image: None, others: Vec::new() };
@@ -240,6 +251,12 @@ impl Measured {
         self.movie.as_deref().ok_or_else(|| anyhow!("there are no images, only visibilities"))
     }
 
+    /// Flux of every frame, Jy.
+    fn fluxes(&self) -> anyhow::Result<Vec<f64>> {
+        let movie = self.movie()?;
+        Ok(movie.chunks(movie.len() / self.times.len()).map(|f| f.iter().sum()).collect())
+    }
+
     fn image(&self, loss: &Loss, pixels: usize) -> anyhow::Result<ImageTerm<f32>> {
         let sigma = loss.sigma.ok_or_else(|| anyhow!("sigma of a pixel is missing"))?;
         let movie = self.movie()?.iter().map(|x| *x as f32).collect();
@@ -249,7 +266,7 @@ impl Measured {
     fn other(&self, loss: &Loss, pixels: usize) -> anyhow::Result<Box<dyn FrameTerm<f32>>> {
         if loss.data == LossKind::LightCurve {
             let sigma = loss.sigma.ok_or_else(|| anyhow!("sigma of the flux is missing"))?;
-            let flux: Vec<f64> = self.movie()?.chunks(pixels).map(|f| f.iter().sum()).collect();
+            let flux: Vec<f64> = self.fluxes()?;
             let sigmas = vec![sigma; flux.len()];
             return Ok(Box::new(LightCurveTerm::new(flux, &sigmas, pixels)?));
         }

@@ -99,6 +99,16 @@ pub fn training(file: &FitFile, axis_rate: Option<Polynomial>) -> anyhow::Result
     })
 }
 
+/// What is allowed and most probably not meant.
+pub fn caution(file: &FitFile) -> Option<&'static str> {
+    let training = &file.training;
+    let is_dark = file.representation.kind == Kind::Grid && training.start == config::Start::Drawn;
+    (is_dark && training.occupancy.is_some()).then_some(
+        "a grid that starts in the dark is lit node by node: the mask of training.occupancy takes what is still dark for \
+         empty, and holds it back; leave the mask out, or take a linear start",
+    )
+}
+
 /// Rates, and what they are called: voxels may have their own, as their parameters are of another size.
 fn rates(file: &FitFile) -> (&'static str, Polynomial) {
     let chosen = &file.training;

@@ -1,25 +1,21 @@
-//! What linear grids do for a fit: they are solved, scanned over axes, and started from.
+//! What linear grids do for a fit: they are solved, and started from.
 
 use super::config::{Activation, FitFile, Kind};
-use super::data::{self, Measured};
 use super::penalty;
-use super::setup::{self, Instrument};
+use super::setup;
 use crate::{interrupt, progress};
 use anyhow::{Context, bail};
 use kerrlight_tomo::dynamics::Axis;
 use kerrlight_tomo::fit::linear::{
     Coarse, LinearProblem, LinearProgress, LinearSettings, LinearSolution, Voxels, Weighted,
 };
-use kerrlight_tomo::fit::scan::{AxisProblem, AxisScan, AxisSettings, scan_axis};
-use kerrlight_tomo::fit::{Data, FrameTerm, Motion, Objective, State};
-use kerrlight_tomo::image::colormap::Colormap;
+use kerrlight_tomo::fit::{Data, FrameTerm, Objective, State};
 use kerrlight_tomo::optimise::{Adam, AdamState};
 use kerrlight_tomo::representation::{Coordinates, Gradient, Groups, Representation, Workspace};
 use kerrlight_tomo::volume::Volume;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde_json::{Value, json};
-use std::io::Cursor;
 use std::ops::{ControlFlow, Range};
 use std::sync::atomic::Ordering;
 
@@ -27,16 +23,10 @@ use std::sync::atomic::Ordering;
 pub struct Linear<'a> {
     /// Settings.
     pub file: &'a FitFile,
-    /// Data.
-    pub measured: &'a Measured,
-    /// Rays.
-    pub instrument: &'a Instrument,
-    /// Motion.
-    pub motion: &'a Motion,
 }
 
 /// All terms of the data, the image first.
-fn terms(data: &Data<f32>) -> Vec<Weighted<'_, f32>> {
+pub fn terms(data: &Data<f32>) -> Vec<Weighted<'_, f32>> {
     let image = data.image.iter().map(|w| (w.weight, &*w.term as &dyn FrameTerm<f32>));
     let others = data.others.iter().map(|w| (w.weight, &*w.term));
     image.chain(others).map(|(weight, term)| Weighted { weight, term }).collect()
@@ -98,63 +88,6 @@ impl Linear<'_> {
         }
         Ok(solution)
     }
-
-    /// The loss over the whole sphere of axes, and the best one.
-    pub fn scan(&self, directions: usize, frames: usize) -> anyhow::Result<AxisScan> {
-        let linear = setup::linear(self.file)?;
-        let chain = data::chain(self.instrument, self.motion)?;
-        let pixels = self.file.screen.pixels * self.file.screen.pixels;
-        let objective = Objective { chain, data: self.measured.terms(&self.file.loss, pixels)? };
-        let all = objective.observed();
-        let chosen: Vec<usize> = all.iter().copied().step_by((all.len() / frames).max(1)).collect();
-        let (terms, priors) = (terms(&objective.data), setup::priors(linear));
-        let problem = AxisProblem {
-            chain: &objective.chain,
-            frames: &chosen,
-            terms: &terms,
-            half_width: self.file.region.r_max,
-            upper: linear.upper,
-            priors: &priors,
-        };
-        let settings = AxisSettings { directions, ..AxisSettings::default() };
-        let (flag, bar) = (interrupt::flag(), progress::axes(directions as u64));
-        let watch = |solved: usize, expected: usize| {
-            bar.set_length(expected as u64);
-            bar.set_position(solved as u64);
-            !flag.load(Ordering::Relaxed)
-        };
-        let scan = scan_axis(&problem, &settings, &watch).context("axis.scan")?;
-        bar.finish_and_clear();
-        scan.context("stopped while axes were being scanned: nothing is kept of that")
-    }
-}
-
-/// The map of losses as a table.
-pub fn table(scan: &AxisScan) -> String {
-    let line = |at: &kerrlight_tomo::fit::scan::AxisLoss| {
-        let [x, y, z] = at.axis.vector();
-        format!("{x},{y},{z},{}\n", at.loss)
-    };
-    let rows: String = scan.map.iter().map(line).collect();
-    format!("x,y,z,loss\n{rows}")
-}
-
-/// The map as a PNG.
-pub fn picture(scan: &AxisScan) -> anyhow::Result<Vec<u8>> {
-    let mut bytes = Cursor::new(Vec::new());
-    scan.picture(720, Colormap::Viridis)?.write_to(&mut bytes, image::ImageFormat::Png)?;
-    Ok(bytes.into_inner())
-}
-
-/// A line of the log.
-pub fn line(scan: &AxisScan) -> Value {
-    json!({
-        "step": 0,
-        "axis_scan": {
-            "best": scan.best.axis.vector(), "loss": scan.best.loss,
-            "runner_up": scan.runner_up.axis.vector(), "runner_up_loss": scan.runner_up.loss,
-        },
-    })
 }
 
 /// A line of the log.

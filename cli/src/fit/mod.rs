@@ -1,5 +1,6 @@
 //! `kerrlight fit`: recovers emission from movies and visibilities.
 
+mod axis_scan;
 mod config;
 mod curves;
 mod data;

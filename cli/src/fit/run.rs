@@ -1,5 +1,6 @@
 //! The run: steps, log, checkpoints, results.
 
+use super::axis_scan;
 use super::config::{AxisSearch, FitFile, Kind, LossKind, Start};
 use super::data::{self, Measured};
 use super::folder::{self, Folder};
@@ -75,6 +76,9 @@ pub fn run(prepared: &Prepared, text: &str, folder: &Folder, resume: bool) -> an
     let trainer = Trainer::new(objective, &*representation, training);
     let mut run = Run { file, text, folder, measured, trainer, begun };
     eprintln!("{}", run.describe(instrument));
+    if let Some(note) = learning::caution(file) {
+        eprintln!("note: {note}");
+    }
     let checkpoint = if resume { folder.checkpoint()? } else { None };
     match checkpoint {
         Some(bytes) => {
@@ -84,7 +88,7 @@ pub fn run(prepared: &Prepared, text: &str, folder: &Folder, resume: bool) -> an
         }
         None => {
             folder.file(folder::LOG)?.write(b"")?;
-            run.start(&mut state, instrument, motion)?;
+            run.start(&mut state, motion)?;
             folder.save(&checkpoint::encode(&state, text)?)?;
         }
     }
@@ -125,19 +129,15 @@ impl Run<'_> {
     }
 
     /// The axis and the parameters that a scan and the linear problem give to begin with.
-    fn start(
-        &mut self,
-        state: &mut State<f32>,
-        instrument: &Instrument,
-        motion: &Motion,
-    ) -> anyhow::Result<()> {
-        let linear = Linear { file: self.file, measured: self.measured, instrument, motion };
-        if let AxisSearch::Scan { directions, frames, .. } = self.file.axis {
-            let scan = linear.scan(directions, frames)?;
+    fn start(&mut self, state: &mut State<f32>, motion: &Motion) -> anyhow::Result<()> {
+        let linear = Linear { file: self.file };
+        if let AxisSearch::Scan { directions, frames, pixels, .. } = self.file.axis {
+            let effort = axis_scan::Effort { directions, frames, pixels };
+            let scan = axis_scan::run(self.file, self.measured, motion, effort)?;
             state.now.axis = scan.best.axis;
-            self.folder.file("axis_scan.csv")?.write(linear::table(&scan).as_bytes())?;
-            self.folder.file("axis_scan.png")?.write(&linear::picture(&scan)?)?;
-            self.folder.log(&linear::line(&scan))?;
+            self.folder.file("axis_scan.csv")?.write(axis_scan::table(&scan).as_bytes())?;
+            self.folder.file("axis_scan.png")?.write(&axis_scan::picture(&scan)?)?;
+            self.folder.log(&axis_scan::line(&scan))?;
         }
         let axis = state.now.axis;
         let trainer = &mut self.trainer;

@@ -23,8 +23,14 @@ pub struct Instrument {
 }
 
 impl Instrument {
-    /// Traces the rays.
+    /// Traces the rays of all pixels.
     pub fn new(file: &FitFile) -> anyhow::Result<Self> {
+        let n = file.screen.pixels;
+        Self::of(file, &(0..n * n).collect::<Vec<_>>())
+    }
+
+    /// Traces the rays of some pixels, rows from the top, each from the left.
+    pub fn of(file: &FitFile, chosen: &[usize]) -> anyhow::Result<Self> {
         let hole = Kerr::new(file.hole.spin).context("hole")?;
         let region = region(&file.region);
         let request = SightlineRequest {
@@ -48,7 +54,7 @@ impl Instrument {
             delay: file.effects.slow_light,
             momentum: file.effects.redshift_power.is_some(),
         };
-        let (alpha, beta) = pixels(&file.screen)?;
+        let (alpha, beta) = pixels(&file.screen, chosen)?;
         let observer = observer(&file.observer)?;
         let mut lines = Sightlines::trace(&hole, &observer, &alpha, &beta, &request)
             .context("region and screen")?;
@@ -100,11 +106,11 @@ pub fn observer(observer: &config::Observer) -> anyhow::Result<Observer> {
     }
 }
 
-/// (α, β) of all pixels, rows from the top, each from the left.
-fn pixels(screen: &config::Screen) -> anyhow::Result<(Vec<f64>, Vec<f64>)> {
+/// (α, β) of pixels, rows from the top, each from the left.
+fn pixels(screen: &config::Screen, chosen: &[usize]) -> anyhow::Result<(Vec<f64>, Vec<f64>)> {
     let (n, step) = (screen.pixels, spacing(screen)?);
     let at = |k: usize| (k as f64 - 0.5 * (n as f64 - 1.0)) * step;
-    Ok((0..n * n).map(|k| (at(k % n), -at(k / n))).unzip())
+    Ok(chosen.iter().map(|k| (at(k % n), -at(k / n))).unzip())
 }
 
 /// M from one pixel to the next.
@@ -208,10 +214,10 @@ pub fn axis(file: &FitFile) -> anyhow::Result<(Axis, Option<Polynomial>)> {
             let rate = rate.checked().context("axis.from")?;
             Ok((Axis::new(*start).context("axis.from.start")?, Some(rate)))
         }
-        AxisSearch::Scan { directions, frames, rate, last_rate } => {
-            if !(12..=100_000).contains(directions) || *frames == 0 {
+        AxisSearch::Scan { directions, frames, pixels, rate, last_rate } => {
+            if !(12..=100_000).contains(directions) || *frames == 0 || *pixels < 8 {
                 bail!(
-                    "axis.scan: directions = {directions}, frames = {frames} are not allowed: 12 to 100000, 1 or more"
+                    "axis.scan: directions = {directions}, frames = {frames}, pixels = {pixels} are not allowed: 12 to 100000, 1 or more, 8 or more"
                 );
             }
             linear(file)?;

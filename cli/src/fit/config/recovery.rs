@@ -176,6 +176,8 @@ pub enum AxisSearch {
         directions: usize,
         /// Frames that are looked at, spread over all.
         frames: usize,
+        /// Pixels along a side of the model that is fitted to them; all that there are if it is more than half of them.
+        pixels: usize,
         /// First rate of what follows; 0: it stays where the scan has found it.
         rate: f64,
         /// Last rate, reached linearly.

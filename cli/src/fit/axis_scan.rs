@@ -1,0 +1,165 @@
+//! The scan of the whole sphere of axes with coarse linear grids, through few pixels.
+
+use super::config::{FitFile, LossKind, Nodes, Region, Screen, WidthOf};
+use super::data::{self, Measured};
+use super::linear::terms;
+use super::setup::{self, Instrument};
+use crate::{interrupt, progress};
+use anyhow::Context;
+use kerrlight_tomo::fit::scan::{AxisLoss, AxisProblem, AxisScan, AxisSettings, scan_axis};
+use kerrlight_tomo::fit::{Motion, Objective};
+use kerrlight_tomo::image::colormap::Colormap;
+use serde_json::{Value, json};
+use std::io::Cursor;
+use std::sync::atomic::Ordering;
+
+/// How much of the data a scan looks at.
+#[derive(Clone, Copy)]
+pub struct Effort {
+    /// Axes on the sphere.
+    pub directions: usize,
+    /// Frames, spread over all.
+    pub frames: usize,
+    /// Pixels along a side of the model.
+    pub pixels: usize,
+}
+
+/// What a fit is seen through by a scan.
+struct View {
+    file: FitFile,
+    instrument: Instrument,
+    measured: Measured,
+}
+
+impl View {
+    /// The same view with fewer pixels, and as many fewer nodes on rays. Images are known at every n-th pixel; visibilities are explained by pixels
+    /// n times as wide. A loss that has both is seen through all pixels, as is one of few.
+    fn new(file: &FitFile, measured: &Measured, pixels: usize) -> anyhow::Result<Self> {
+        let images = file.loss.iter().filter(|loss| loss.data == LossKind::Image).count();
+        let screen = &file.screen;
+        let every = screen.pixels / pixels.max(2);
+        if every < 2 || (images > 0 && images < file.loss.len()) {
+            let instrument = Instrument::new(file)?;
+            return Ok(Self { file: file.clone(), instrument, measured: measured.untold() });
+        }
+        if images > 0 {
+            Self::thinned(file, measured, every)
+        } else {
+            Self::wide(file, measured, pixels)
+        }
+    }
+
+    /// Every n-th row and column of images.
+    fn thinned(file: &FitFile, measured: &Measured, every: usize) -> anyhow::Result<Self> {
+        let n = file.screen.pixels;
+        let places: Vec<usize> = (every / 2..n).step_by(every).collect();
+        let kept: Vec<usize> = places
+            .iter()
+            .flat_map(|row| places.iter().map(move |column| row * n + column))
+            .collect();
+        let region = fewer_nodes(file, every);
+        let file = FitFile { region, ..file.clone() };
+        let instrument = Instrument::of(&file, &kept)?;
+        let thin = |movie: &Vec<f64>| -> Vec<f64> {
+            movie.chunks(n * n).flat_map(|frame| kept.iter().map(|k| frame[*k])).collect()
+        };
+        let measured = Measured { movie: measured.movie.as_ref().map(thin), ..measured.untold() };
+        let screen = Screen { pixels: places.len(), ..file.screen.clone() };
+        Ok(Self { file: FitFile { screen, ..file }, instrument, measured })
+    }
+
+    /// Wider pixels over the same field.
+    fn wide(file: &FitFile, measured: &Measured, pixels: usize) -> anyhow::Result<Self> {
+        let n = file.screen.pixels as f64;
+        let screen = Screen {
+            pixels,
+            width: setup::spacing(&file.screen)? * n,
+            width_of: WidthOf::Edges,
+            jy_per_pixel: file.screen.jy_per_pixel * (n / pixels as f64).powi(2),
+            ..file.screen.clone()
+        };
+        let region = fewer_nodes(file, file.screen.pixels / pixels);
+        let file = FitFile { screen, region, ..file.clone() };
+        let instrument = Instrument::new(&file)?;
+        let measured = Measured { sky: setup::sky(&file).ok(), ..measured.untold() };
+        Ok(Self { file, instrument, measured })
+    }
+}
+
+/// The fewest equidistant nodes that a ray is thinned to: a node for each of the grid's voxels that it crosses.
+const FEWEST: usize = 32;
+
+/// The region with every n-th node, or panels of half as many.
+fn fewer_nodes(file: &FitFile, every: usize) -> Region {
+    let nodes = match file.region.nodes {
+        Nodes::Gauss { order, split } => Nodes::Gauss { order: order.div_ceil(2), split },
+        Nodes::EqualMinoTime { per_ray } => {
+            Nodes::EqualMinoTime { per_ray: per_ray.min(FEWEST.max(per_ray / every)) }
+        }
+    };
+    Region { nodes, ..file.region.clone() }
+}
+
+/// The loss over the whole sphere of axes, and the best one.
+pub fn run(
+    file: &FitFile,
+    measured: &Measured,
+    motion: &Motion,
+    effort: Effort,
+) -> anyhow::Result<AxisScan> {
+    let Effort { directions, frames, pixels } = effort;
+    let linear = setup::linear(file)?;
+    let view = View::new(file, measured, pixels)?;
+    let chain = data::chain(&view.instrument, motion)?;
+    let count = view.file.screen.pixels * view.file.screen.pixels;
+    let objective = Objective { chain, data: view.measured.terms(&file.loss, count)? };
+    let all = objective.observed();
+    let chosen: Vec<usize> = all.iter().copied().step_by((all.len() / frames).max(1)).collect();
+    let (terms, priors) = (terms(&objective.data), setup::priors(linear));
+    let problem = AxisProblem {
+        chain: &objective.chain,
+        frames: &chosen,
+        terms: &terms,
+        half_width: file.region.r_max,
+        upper: linear.upper,
+        priors: &priors,
+    };
+    let settings = AxisSettings { directions, ..AxisSettings::default() };
+    let (flag, bar) = (interrupt::flag(), progress::axes(directions as u64));
+    let watch = |solved: usize, expected: usize| {
+        bar.set_length(expected as u64);
+        bar.set_position(solved as u64);
+        !flag.load(Ordering::Relaxed)
+    };
+    let scan = scan_axis(&problem, &settings, &watch).context("axis.scan")?;
+    bar.finish_and_clear();
+    scan.context("stopped while axes were being scanned: nothing is kept of that")
+}
+
+/// The map of losses as a table.
+pub fn table(scan: &AxisScan) -> String {
+    let line = |at: &AxisLoss| {
+        let [x, y, z] = at.axis.vector();
+        format!("{x},{y},{z},{}\n", at.loss)
+    };
+    let rows: String = scan.map.iter().map(line).collect();
+    format!("x,y,z,loss\n{rows}")
+}
+
+/// The map as a PNG.
+pub fn picture(scan: &AxisScan) -> anyhow::Result<Vec<u8>> {
+    let mut bytes = Cursor::new(Vec::new());
+    scan.picture(720, Colormap::Viridis)?.write_to(&mut bytes, image::ImageFormat::Png)?;
+    Ok(bytes.into_inner())
+}
+
+/// A line of the log.
+pub fn line(scan: &AxisScan) -> Value {
+    json!({
+        "step": 0,
+        "axis_scan": {
+            "best": scan.best.axis.vector(), "loss": scan.best.loss,
+            "runner_up": scan.runner_up.axis.vector(), "runner_up_loss": scan.runner_up.loss,
+        },
+    })
+}
