@@ -1,6 +1,7 @@
 //! From an experiment to its cases: every combination of levels and seeds, with the settings of its fit.
 
-use super::experiment::{Experiment, Factor, Level, Source};
+use super::experiment::{Experiment, Factor, Level};
+use super::source::Source;
 use super::summary::called;
 use crate::fit;
 use anyhow::{Context, anyhow, bail};
@@ -309,7 +310,7 @@ mod tests {
 
     #[test]
     fn exact_all_experiments_are_whole() {
-        for (name, _) in super::super::experiment::built_in() {
+        for (name, _) in super::super::source::built_in() {
             let (source, text) = Source::find(Path::new(name)).unwrap();
             let experiment = Experiment::parse(&text).unwrap();
             for quick in [false, true] {

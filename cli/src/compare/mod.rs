@@ -6,6 +6,7 @@ mod experiment;
 mod figures;
 mod map;
 mod runner;
+mod source;
 mod summary;
 mod tables;
 
@@ -15,9 +16,10 @@ use crate::{interrupt, progress};
 use anyhow::{Context, bail};
 use cases::{Case, Choice};
 use clap::Args;
-use experiment::{Experiment, Source};
+use experiment::Experiment;
 use runner::{Runner, Status};
 use serde_json::Value;
+use source::Source;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use summary::Summary;
@@ -69,7 +71,7 @@ impl Compare {
         let Some(name) = &self.experiment else { return list_experiments() };
         let before = self.against.as_deref().map(changes::read).transpose()?;
         // A folder that is called like an experiment is meant by ./name.
-        let is_known = experiment::built_in().any(|(known, _)| Path::new(known) == name);
+        let is_known = source::built_in().any(|(known, _)| Path::new(known) == name);
         let is_file = name.extension().is_some_and(|e| e == "json");
         if is_file || (!is_known && name.join("results.json").is_file()) {
             let Some(before) = before else {
@@ -122,7 +124,7 @@ impl Compare {
 
 fn list_experiments() -> anyhow::Result<()> {
     let line = |(name, title): (&str, String)| format!("{name:20} {title}\n");
-    let all: String = experiment::built_in().map(line).collect();
+    let all: String = source::built_in().map(line).collect();
     output::print(&format!("{all}\nRun one with: kerrlight compare NAME\n"))
 }
 

@@ -1,0 +1,114 @@
+//! Pictures of an experiment.
+
+mod plots;
+mod volumes;
+
+use super::cases::Case;
+use super::experiment::{Experiment, FigureAsked, FigureKind};
+use super::runner::Runner;
+use super::summary::{Summary, described, is_at, pairs};
+use super::tables::levels;
+use crate::output;
+use crate::report::{Figure, LinePlot, encode};
+use anyhow::Context;
+use serde_json::Value;
+
+/// Pictures and plots.
+#[derive(Default)]
+pub struct Drawn {
+    /// Pictures, with names of files.
+    pub figures: Vec<(String, Figure)>,
+    /// Plots.
+    pub plots: Vec<LinePlot>,
+}
+
+/// All that figures are made of.
+pub struct Figures<'a> {
+    /// What is shown.
+    pub experiment: &'a Experiment,
+    /// What was found.
+    pub summary: &'a Summary<'a>,
+    /// Where the runs are.
+    pub runner: &'a Runner,
+}
+
+impl Figures<'_> {
+    /// All that the experiment asks for and that there is something of.
+    pub fn draw(&self) -> anyhow::Result<Drawn> {
+        let mut drawn = Drawn::default();
+        for (k, asked) in self.experiment.figure.iter().enumerate() {
+            self.one(k, asked, &mut drawn).with_context(|| format!("figure {:?}", asked.title))?;
+        }
+        Ok(drawn)
+    }
+
+    fn one(&self, k: usize, asked: &FigureAsked, drawn: &mut Drawn) -> anyhow::Result<()> {
+        let name = |kind: &str| format!("{}-{kind}", k + 1);
+        match asked.kind {
+            FigureKind::Volumes => {
+                if let Some(figure) = self.volumes(asked)? {
+                    drawn.figures.push((name("volumes"), figure));
+                }
+            }
+            FigureKind::Axes => {
+                for (case, _) in self.chosen(asked) {
+                    let path = self.runner.run_of(case).join("axis_scan.png");
+                    if path.exists() {
+                        let caption =
+                            format!("{}: {}. {}", asked.title, case.name(), asked.caption);
+                        let alt = asked.title.clone();
+                        let figure = Figure { png: output::read(&path)?, caption, alt };
+                        drawn.figures.push((name(&case.slug), figure));
+                    }
+                }
+            }
+            FigureKind::Map => {
+                if let Some(figure) = self.map(asked)? {
+                    drawn.figures.push((name("map"), figure));
+                }
+            }
+            FigureKind::Time => drawn.plots.extend(self.times(asked)?),
+            FigureKind::Curve => drawn.plots.extend(self.curve(asked)),
+            FigureKind::Coverage => drawn.plots.extend(self.coverage(asked)?),
+            FigureKind::Velocities => drawn.plots.extend(self.velocities(asked)?),
+        }
+        Ok(())
+    }
+
+    /// Cases of a figure that have results.
+    fn chosen(&self, asked: &FigureAsked) -> impl Iterator<Item = (&Case, &Value)> {
+        let fixed = pairs(&asked.r#where);
+        self.summary.done().filter(move |(case, _)| is_at(case, &fixed))
+    }
+
+    /// Means over two factors as colours with their numbers.
+    fn map(&self, asked: &FigureAsked) -> anyhow::Result<Option<Figure>> {
+        let ([row], [column], Some(value)) =
+            (asked.rows.as_slice(), asked.columns.as_slice(), &asked.value)
+        else {
+            return Ok(None);
+        };
+        let fixed = pairs(&asked.r#where);
+        let names = |factor: &String| {
+            levels(self.experiment, self.summary, std::slice::from_ref(factor)).remove(0).1
+        };
+        let (rows, columns) = (names(row), names(column));
+        let cell = |r: &String, c: &String| {
+            let at =
+                [vec![(row.as_str(), r.as_str()), (column.as_str(), c.as_str())], fixed.clone()];
+            self.summary.spread(value, &at.concat()).map(|s| s.mean)
+        };
+        let means: Vec<Vec<Option<f64>>> =
+            rows.iter().map(|r| columns.iter().map(|c| cell(r, c)).collect()).collect();
+        let (unit, digits) = described(value);
+        let map = super::map::Map {
+            rows: [row.clone()].into_iter().chain(rows).collect(),
+            columns: [column.clone()].into_iter().chain(columns).collect(),
+            means,
+            digits,
+        };
+        let Some(picture) = map.draw() else { return Ok(None) };
+        let caption = format!("{}: mean {unit}. {}", asked.title, asked.caption);
+        Ok(Some(Figure { png: encode(Some(picture))?, caption, alt: asked.title.clone() }))
+    }
+}

@@ -1,0 +1,177 @@
+//! Curves and points.
+
+use super::Figures;
+use crate::compare::cases::Case;
+use crate::compare::experiment::FigureAsked;
+use crate::compare::summary::{called, combinations, described, is_at, result};
+use crate::compare::tables::levels;
+use crate::fit;
+use crate::output;
+use crate::report::{Axis, LinePlot, Marks, Series};
+use serde_json::Value;
+use std::path::Path;
+
+/// Most curves of a plot.
+const CURVES: usize = 6;
+
+impl Figures<'_> {
+    /// One plot for each combination of the columns, a curve for each of the rows; every seed's points.
+    pub(super) fn times(&self, asked: &FigureAsked) -> anyhow::Result<Vec<LinePlot>> {
+        let value = asked.value.as_deref().unwrap_or("psnr_db");
+        let columns = levels(self.experiment, self.summary, &asked.columns);
+        let rows = levels(self.experiment, self.summary, &asked.rows);
+        let mut plots = Vec::new();
+        for column in combinations(&columns) {
+            let mut series = Vec::new();
+            for row in combinations(&rows) {
+                let at = [row.as_slice(), &column].concat();
+                let mut points = Vec::new();
+                for (case, results) in self.chosen(asked).filter(|(case, _)| is_at(case, &at)) {
+                    points.extend(self.log(case, value)?);
+                    // A linear problem has its quality at its end alone.
+                    let last = (result(results, "seconds"), result(results, value));
+                    if let (Some(x), Some(y)) = last {
+                        points.push([x, y]);
+                    }
+                }
+                if !points.is_empty() {
+                    points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+                    series.push(Series {
+                        name: called(&row),
+                        points,
+                        errors: Vec::new(),
+                        marks: Marks::Points,
+                    });
+                }
+            }
+            let (unit, _) = described(value);
+            for part in series_of(series) {
+                plots.push(LinePlot {
+                    title: [asked.title.clone(), called(&column)].join(": "),
+                    caption: format!("{} All seeds.", asked.caption),
+                    x: Axis { label: "wall time".to_owned(), unit: "s".to_owned(), log: true },
+                    y: Axis { label: unit.clone(), unit: String::new(), log: false },
+                    series: part,
+                });
+            }
+        }
+        Ok(plots)
+    }
+
+    /// What a run has logged of a result, against seconds.
+    fn log(&self, case: &Case, value: &str) -> anyhow::Result<Vec<[f64; 2]>> {
+        let path = self.runner.run_of(case).join("log.jsonl");
+        let text = output::read_text(&path)?;
+        let line = |line: &str| {
+            let line: Value = serde_json::from_str(line).ok()?;
+            Some([line["seconds"].as_f64()?, result(&line, value)?])
+        };
+        Ok(text.lines().filter_map(line).collect())
+    }
+
+    /// A result against the numbers of the first column, a curve for each combination of rows.
+    pub(super) fn curve(&self, asked: &FigureAsked) -> Vec<LinePlot> {
+        let (Some(value), Some(factor)) = (&asked.value, asked.columns.first()) else {
+            return Vec::new();
+        };
+        let rows = levels(self.experiment, self.summary, &asked.rows);
+        let mut series = Vec::new();
+        for row in combinations(&rows) {
+            let at = self.chosen(asked).filter(|(case, _)| is_at(case, &row));
+            let point = |(case, results): (&Case, &Value)| {
+                Some([case.number(factor)?, result(results, value)?])
+            };
+            let mut points: Vec<[f64; 2]> = at.filter_map(point).collect();
+            points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+            if !points.is_empty() {
+                let name = if row.is_empty() { factor.clone() } else { called(&row) };
+                series.push(Series { name, points, errors: Vec::new(), marks: Marks::Points });
+            }
+        }
+        let (unit, _) = described(value);
+        let plot = |series| LinePlot {
+            title: asked.title.clone(),
+            caption: format!("{} All seeds.", asked.caption),
+            x: Axis { label: factor.clone(), unit: String::new(), log: false },
+            y: Axis { label: unit.clone(), unit: String::new(), log: false },
+            series,
+        };
+        series_of(series).into_iter().map(plot).collect()
+    }
+
+    /// (u, v) of the first seed of each combination of rows, a plot each.
+    pub(super) fn coverage(&self, asked: &FigureAsked) -> anyhow::Result<Vec<LinePlot>> {
+        let mut plots = Vec::new();
+        for (case, _) in self.chosen(asked).filter(|(case, _)| case.seed == 1) {
+            let uv = fit::coverage(case.settings.as_deref().unwrap_or_default(), Path::new("/"))?;
+            if uv.is_empty() {
+                continue;
+            }
+            let points = uv.iter().flat_map(|[u, v]| [[*u, *v], [-*u, -*v]]);
+            let series = vec![Series {
+                name: format!("{} visibilities", uv.len()),
+                points: points.map(|p| p.map(|x| x * 1e-9)).collect(),
+                errors: Vec::new(),
+                marks: Marks::Points,
+            }];
+            let axis = |label: &str| Axis {
+                label: label.to_owned(),
+                unit: "10⁹ wavelengths".to_owned(),
+                log: false,
+            };
+            plots.push(LinePlot {
+                title: format!("{}: {}", asked.title, case.name()),
+                caption: format!("{} Both ends of every baseline.", asked.caption),
+                x: axis("u"),
+                y: axis("v"),
+                series,
+            });
+        }
+        Ok(plots)
+    }
+
+    /// Velocities that were simulated, and the one that was assumed.
+    pub(super) fn velocities(&self, asked: &FigureAsked) -> anyhow::Result<Vec<LinePlot>> {
+        let rows = levels(self.experiment, self.summary, &asked.rows);
+        let mut series = Vec::new();
+        for row in combinations(&rows) {
+            let Some((case, _)) = self.chosen(asked).find(|(case, _)| is_at(case, &row)) else {
+                continue;
+            };
+            let [assumed, simulated] =
+                fit::velocities(case.settings.as_deref().unwrap_or_default())?;
+            let curve = |name: String, points| Series {
+                name,
+                points,
+                errors: Vec::new(),
+                marks: Marks::Line,
+            };
+            if series.is_empty() {
+                series.push(curve("assumed".to_owned(), assumed));
+            }
+            series.push(curve(called(&row), simulated));
+        }
+        let plot = |series| LinePlot {
+            title: asked.title.clone(),
+            caption: format!("{} Seed 1.", asked.caption),
+            x: Axis { label: "radius".to_owned(), unit: "M".to_owned(), log: false },
+            y: Axis {
+                label: "angular velocity".to_owned(),
+                unit: "rad/time unit".to_owned(),
+                log: false,
+            },
+            series,
+        };
+        Ok(series_of(series).into_iter().map(plot).collect())
+    }
+}
+
+/// As many plots as are needed for so many curves.
+fn series_of(series: Vec<Series>) -> Vec<Vec<Series>> {
+    let mut parts = Vec::new();
+    let mut rest = series.into_iter().peekable();
+    while rest.peek().is_some() {
+        parts.push(rest.by_ref().take(CURVES).collect());
+    }
+    parts
+}

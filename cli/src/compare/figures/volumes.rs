@@ -1,0 +1,114 @@
+//! Volumes in rows and columns.
+
+use super::Figures;
+use crate::compare::cases::Case;
+use crate::compare::experiment::FigureAsked;
+use crate::compare::summary::{called, combinations, is_at, result};
+use crate::compare::tables::levels;
+use crate::fit;
+use crate::report::{Figure, encode};
+use crate::volume_files;
+use kerrlight_tomo::volume::projection::{Surroundings, Tile, View, mosaic};
+use kerrlight_tomo::volume::{Volume, VolumeFile};
+use serde_json::Value;
+
+impl Figures<'_> {
+    /// Truths in the first row, recoveries of the first seed below.
+    pub(super) fn volumes(&self, asked: &FigureAsked) -> anyhow::Result<Option<Figure>> {
+        let rows = levels(self.experiment, self.summary, &asked.rows);
+        let columns = levels(self.experiment, self.summary, &asked.columns);
+        let (rows, columns) = (combinations(&rows), combinations(&columns));
+        let mut loaded: Vec<(String, Vec<(String, Loaded)>)> =
+            vec![("truth".to_owned(), Vec::new())];
+        loaded.extend(rows.iter().map(|row| (called(row), Vec::new())));
+        for column in &columns {
+            let at = |row: &[(&str, &str)]| {
+                let levels = [row, column].concat();
+                self.chosen(asked).find(|(case, _)| is_at(case, &levels))
+            };
+            let cells: Vec<Option<(&Case, &Value)>> = rows.iter().map(|row| at(row)).collect();
+            // A column with a gap would stand under the wrong truth.
+            let Some(cells) = cells.into_iter().collect::<Option<Vec<_>>>() else { continue };
+            let Some((first, _)) = cells.first() else { continue };
+            let Some(truth) = self.load(first, "truth.npz")? else { continue };
+            loaded[0].1.push((called(column), truth));
+            for (line, (case, results)) in loaded[1..].iter_mut().zip(cells) {
+                let Some(volume) = self.load(case, "volume.npz")? else { return Ok(None) };
+                line.1.push((quality(results), volume));
+            }
+        }
+        if loaded[0].1.is_empty() {
+            return Ok(None);
+        }
+        let tile = |(title, loaded): &'_ (String, Loaded)| (title.clone(), loaded.around);
+        let titles: Vec<Vec<(String, Surroundings)>> =
+            loaded.iter().map(|(_, row)| row.iter().map(tile).collect()).collect();
+        let rows: Vec<(String, Vec<Tile>)> = loaded
+            .iter()
+            .zip(&titles)
+            .map(|((name, row), titles)| {
+                let truths = loaded[0].1.iter().map(|(_, truth)| truth.around.axis);
+                let tiles = row.iter().zip(titles).zip(truths).map(|((shown, title), axis)| Tile {
+                    title: &title.0,
+                    volume: &shown.1.volume,
+                    around: title.1,
+                    view: view_of(asked, axis),
+                });
+                (name.clone(), tiles.collect())
+            })
+            .collect();
+        let from = match asked.view {
+            Some([azimuth, elevation]) => {
+                format!("from azimuth {azimuth}° and elevation {elevation}°")
+            }
+            None => "from above the orbits, along the true axis".to_owned(),
+        };
+        let caption = format!(
+            "{}. {} Emission along straight parallel rays, seen {from}; the ball is the horizon, the blue line the axis \
+             that was used, the circle the edge of the region in the hole's equatorial plane. Seed 1; the table of all \
+             cases has the others.",
+            asked.title, asked.caption
+        );
+        let drawn = mosaic(&rows);
+        Ok(Some(Figure { png: encode(drawn)?, caption, alt: asked.title.clone() }))
+    }
+
+    fn load(&self, case: &Case, name: &str) -> anyhow::Result<Option<Loaded>> {
+        let path = self.runner.run_of(case).join(name);
+        if !path.exists() {
+            return Ok(None);
+        }
+        let VolumeFile { volume, axis } = volume_files::load(&path)?;
+        let (hole_radius, ring_radius) = fit::sizes(case.settings.as_deref().unwrap_or_default())?;
+        let around = Surroundings {
+            hole_radius,
+            axis: axis.unwrap_or([0.0; 3]),
+            ring_radius,
+            half_width: ring_radius,
+        };
+        Ok(Some(Loaded { volume, around }))
+    }
+}
+
+struct Loaded {
+    volume: Volume,
+    around: Surroundings,
+}
+
+/// From where a figure shows a volume that turns about an axis.
+fn view_of(asked: &FigureAsked, [x, y, z]: [f64; 3]) -> View {
+    match asked.view {
+        Some([azimuth, elevation]) => View { azimuth, elevation },
+        None => {
+            View { azimuth: y.atan2(x).to_degrees(), elevation: z.atan2(x.hypot(y)).to_degrees() }
+        }
+    }
+}
+
+/// What stands above a recovered volume.
+fn quality(results: &Value) -> String {
+    let psnr = result(results, "psnr_db").map(|x| format!("{x:.1} dB"));
+    let axis = result(results, "axis_dot_truth").filter(|x| *x < 1.0 - 1e-9);
+    let axis = axis.map(|x| format!("axis {x:.4}"));
+    [psnr, axis].into_iter().flatten().collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,104 @@
+//! Experiments that the program carries, and those of files.
+
+use crate::output;
+use anyhow::{Context, anyhow, bail};
+use std::path::{Path, PathBuf};
+use toml::{Table, Value};
+
+/// Where an experiment and the fits that it names are read from.
+pub enum Source {
+    /// Those that the program carries.
+    BuiltIn,
+    /// A folder.
+    Folder(PathBuf),
+}
+
+/// Experiments and fits that the program carries, by their paths in the repository.
+macro_rules! carried {
+    ($($path:literal),* $(,)?) => {
+        [$(($path, include_str!(concat!("../../../", $path)))),*]
+    };
+}
+
+const CARRIED: &[(&str, &str)] = &carried![
+    "experiments/representations.toml",
+    "experiments/sparsity.toml",
+    "experiments/axis.toml",
+    "experiments/axis-minimum.toml",
+    "experiments/velocity-mismatch.toml",
+    "experiments/coverage.toml",
+    "experiments/effects.toml",
+    "experiments/cost.toml",
+    "experiments/spin-mismatch.toml",
+    "experiments/fits/first_pattern.toml",
+    "experiments/fits/second_pattern.toml",
+    "experiments/fits/digits.toml",
+    "scenes/fits/scene_1.toml",
+    "scenes/fits/scene_4.toml",
+    "scenes/fits/scene_8.toml",
+    "cli/src/fit/built_in.toml",
+];
+
+/// Names and titles of the experiments that the program carries.
+pub fn built_in() -> impl Iterator<Item = (&'static str, String)> {
+    CARRIED.iter().filter_map(|(path, text)| {
+        let name = path.strip_prefix("experiments/")?.strip_suffix(".toml")?;
+        let title = text.parse::<Table>().ok()?.get("title")?.as_str()?.to_owned();
+        (!name.contains('/')).then_some((name, title))
+    })
+}
+
+impl Source {
+    /// The text of an experiment: one that the program carries, or a file.
+    pub fn find(name: &Path) -> anyhow::Result<(Self, String)> {
+        let path = format!("experiments/{}.toml", name.display());
+        if let Some((_, text)) = CARRIED.iter().find(|(known, _)| *known == path) {
+            return Ok((Self::BuiltIn, (*text).to_owned()));
+        }
+        if !name.exists() && name.extension().is_none() {
+            let all: Vec<&str> = built_in().map(|(name, _)| name).collect();
+            bail!(
+                "there is no experiment {}: give a file, or one of {}",
+                name.display(),
+                all.join(", ")
+            );
+        }
+        let folder = name.parent().filter(|folder| *folder != Path::new(""));
+        let folder = std::path::absolute(folder.unwrap_or(Path::new(".")))
+            .with_context(|| name.display().to_string())?;
+        Ok((Self::Folder(folder), output::read_text(name)?))
+    }
+
+    /// A fit's settings, with paths in them from anywhere.
+    pub fn fit(&self, path: &Path) -> anyhow::Result<Table> {
+        let name = || path.display().to_string();
+        match self {
+            Self::BuiltIn => {
+                let wanted = path.to_string_lossy();
+                let wanted = match wanted.strip_prefix("../") {
+                    Some(path) => path.to_owned(),
+                    None => format!("experiments/{wanted}"),
+                };
+                let known = CARRIED.iter().find(|(path, _)| *path == wanted);
+                let (_, text) = known.ok_or_else(|| anyhow!("the program carries no {wanted}"))?;
+                text.parse().with_context(name)
+            }
+            Self::Folder(folder) => {
+                let path = folder.join(path);
+                let mut table: Table = output::read_text(&path)?.parse().with_context(name)?;
+                anchor(&mut table, path.parent().unwrap_or(folder));
+                Ok(table)
+            }
+        }
+    }
+}
+
+/// Makes paths of data files start from the root.
+fn anchor(table: &mut Table, folder: &Path) {
+    let Some(Value::Table(data)) = table.get_mut("data") else { return };
+    for kind in data.iter_mut().filter_map(|(_, kind)| kind.as_table_mut()) {
+        if let Some(Value::String(path)) = kind.get_mut("path") {
+            *path = folder.join(&*path).display().to_string();
+        }
+    }
+}
