@@ -1,7 +1,7 @@
 //! `kerrlight fit` with bad input and bad luck: one clear message, and nothing lost or half-written.
 
 use crate::fit::{changed, results, small, with};
-use crate::support::{binary, fail, kerrlight, succeed};
+use crate::support::{binary, fail, kerrlight, root, succeed};
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -230,4 +230,58 @@ fn exact_frames_without_visibilities_are_left_out() {
         said.contains("no frame has any visibilities") && !folder.path().join("none").exists(),
         "{said}"
     );
+}
+
+/// Measured visibilities: an error of zero is named with its place; without averaging every scan is a frame.
+#[test]
+fn exact_visibilities_without_errors_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let line = |hour: f64, sigma: f64| {
+        format!(
+            "{hour:.8}      AA     AZ   1900047104.0000  -4939025408.0000  0.14292954    141.7436  {sigma:.8}\n\
+             {hour:.8}      AA     LM   1868288384.0000  -3689129984.0000  0.21103669   -122.7523  0.00446794\n"
+        )
+    };
+    let head = "# SRC:SGRA DATE(MJD):57853 FREQ:229.0707GHz\n\
+                # time(UTC)      T1     T2   U(lambda)        V(lambda)         Iamp(Jy)    Iphase(d)   Isigma(Jy)\n";
+    let write = |sigma: f64| {
+        let rows: String = (0..4)
+            .map(|k| line(2.01 + 0.1 * f64::from(k), if k == 2 { sigma } else { 0.01 }))
+            .collect();
+        std::fs::write(at.join("data.txt"), format!("{head}{rows}")).unwrap();
+    };
+    let fit = root().join("scenes/fits/sgra_visibilities.toml");
+    let fit = fit.to_str().unwrap().to_owned();
+    let path = format!("data.visibilities.path={}", at.join("data.txt").display());
+    let words = |average: &'static str, out: &'static str| {
+        let set =
+            ["--set", &path, "--set", "loss=[{data=\"amplitudes\",weight=1.0}]", "--set", average];
+        let small = [
+            "--set",
+            "screen.pixels=12",
+            "--set",
+            "training.steps=2",
+            "--set",
+            "training.start=drawn",
+        ];
+        let all = [&["fit", &fit, "-o", out][..], &set, &small].concat();
+        all.into_iter().map(str::to_owned).collect::<Vec<_>>()
+    };
+    let run =
+        |words: &[String]| kerrlight(at, &words.iter().map(String::as_str).collect::<Vec<_>>());
+    write(0.0);
+    let output = run(&words("data.visibilities.average_s=0.0", "out"));
+    assert_eq!(output.status.code(), Some(2));
+    let said = message(&output);
+    assert!(said.contains("data.txt: visibility of AA-AZ at 2.210000 h: sigma = 0 Jy"), "{said}");
+    assert!(!at.join("out").exists());
+    write(0.02);
+    for (average, frames) in
+        [("data.visibilities.average_s=0.0", 4), ("data.visibilities.average_s=720.0", 2)]
+    {
+        let output = run(&words(average, if frames == 4 { "all" } else { "mean" }));
+        let said = message(&output);
+        assert!(output.status.success() && said.contains(&format!("; {frames} frames")), "{said}");
+    }
 }

@@ -6,6 +6,7 @@
 
 pub mod accuracy;
 pub mod bardeen;
+pub mod experiments;
 pub mod hamilton;
 pub mod mpmath;
 pub mod page_thorne;

@@ -9,12 +9,13 @@ use anyhow::{Context, anyhow, bail};
 use kerrlight_tomo::fit::{
     Chain, Data, FrameTerm, ImageTerm, LightCurveTerm, Motion, Scan, ScanTerm, Weighted,
 };
+use kerrlight_tomo::interferometry::array::Station;
 use kerrlight_tomo::interferometry::data_terms::{
     AmplitudeTerm, ClosureTerm, DataTerm, DataTermError, VisibilityTerm,
 };
 use kerrlight_tomo::interferometry::earth::{Frame, Ut1};
 use kerrlight_tomo::interferometry::noise::{GainErrors, add_thermal_noise, apply_gains};
-use kerrlight_tomo::interferometry::observation::Observation;
+use kerrlight_tomo::interferometry::observation::{Observation, Row};
 use kerrlight_tomo::interferometry::operator::{ImageGrid, Method, Pulse, Transform};
 use kerrlight_tomo::interferometry::products::ClosureKind;
 use kerrlight_tomo::interferometry::schedule::{self, Clock, Schedule, Setup};
@@ -137,6 +138,22 @@ fn gain_errors(gains: Gains) -> anyhow::Result<GainErrors> {
     Ok(GainErrors { constant_amplitude, scan_amplitude, random_phases })
 }
 
+/// A visibility without an error would count for more than all others together.
+fn certain(observation: &Observation) -> anyhow::Result<()> {
+    let is_exact = |row: &&Row| {
+        (0..4).any(|k| row.product(k).is_some_and(|measured| measured.noise_sigma <= 0.0))
+    };
+    let Some(row) = observation.rows.iter().find(is_exact) else { return Ok(()) };
+    let [a, b] = row.stations.map(|k| observation.stations.get(usize::from(k)));
+    let name = |station: Option<&Station>| station.map_or("?".to_owned(), |s| s.name.clone());
+    bail!(
+        "visibility of {}-{} at {:.6} h: sigma = 0 Jy is not allowed: above 0",
+        name(a),
+        name(b),
+        row.time_h
+    )
+}
+
 fn read(file: &FitFile, data: &DataFiles, folder: &Path) -> anyhow::Result<Measured> {
     match data {
         DataFiles::Movie { path } => {
@@ -179,7 +196,9 @@ fn read(file: &FitFile, data: &DataFiles, folder: &Path) -> anyhow::Result<Measu
             }
             let path = folder.join(path);
             let (_, observation) = crate::interferometry::read(&path)?;
-            let mut observation = observation.averaged(*average_s).total_intensity();
+            certain(&observation).with_context(|| path.display().to_string())?;
+            let averaged = (*average_s > 0.0).then(|| observation.averaged(*average_s));
+            let mut observation = averaged.unwrap_or(observation).total_intensity();
             observation.sort();
             let mut hours: Vec<f64> = observation.rows.iter().map(|row| row.time_h).collect();
             hours.dedup_by(|a, b| (*a - *b).abs() * 3600.0 < 0.5 * average_s.max(1.0));
