@@ -183,3 +183,24 @@ fn experiments_are_listed_and_mistakes_are_named() {
     experiment(at, &[]);
     assert!(fail(at, &["compare", "rates.toml", "--only", "rate=3"]).contains("levels of rate"));
 }
+
+/// A look at every experiment that the program carries: all cases are done, every table is filled, the page is whole.
+#[test]
+fn exact_quick_variants_of_all_experiments_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let listed = succeed(at, &["compare"]);
+    let names = listed.lines().take_while(|line| !line.is_empty());
+    let names: Vec<&str> = names.filter_map(|line| line.split_whitespace().next()).collect();
+    assert!(names.len() >= 9, "{listed}");
+    for name in names {
+        let printed = succeed(at, &["compare", name, "--quick", "-o", name]);
+        assert!(printed.contains("| ") && !printed.contains("NaN"), "{name}: {printed}");
+        let results = results(&at.join(name));
+        assert!(cases(&results).iter().all(|case| case["status"] == "done"), "{name}");
+        let page = std::fs::read_to_string(at.join(name).join("report.html")).unwrap();
+        for word in ["What was asked", "What was run", "</html>"] {
+            assert!(page.contains(word), "{name}: {word}");
+        }
+    }
+}

@@ -239,7 +239,7 @@ mod tests {
         remove = ["training.occupancy"]
         [[factor.level]]
         name = "scan"
-        set.axis.scan = { directions = 50, frames = 4, rate = 0.0, last_rate = 0.0 }
+        set.axis.scan = { directions = 50, frames = 4, pixels = 20, rate = 0.0, last_rate = 0.0 }
         [[factor]]
         name = "rate"
         key = "training.rate"

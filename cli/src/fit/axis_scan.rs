@@ -6,7 +6,10 @@ use super::linear::terms;
 use super::setup::{self, Instrument};
 use crate::{interrupt, progress};
 use anyhow::Context;
-use kerrlight_tomo::fit::scan::{AxisLoss, AxisProblem, AxisScan, AxisSettings, scan_axis};
+use kerrlight_geodesic::OutOfRange;
+use kerrlight_tomo::fit::scan::{
+    AxisLoss, AxisProblem, AxisScan, AxisSettings, Effort as SolveEffort, refine_axis, scan_axis,
+};
 use kerrlight_tomo::fit::{Motion, Objective};
 use kerrlight_tomo::image::colormap::Colormap;
 use serde_json::{Value, json};
@@ -22,6 +25,8 @@ pub struct Effort {
     pub frames: usize,
     /// Pixels along a side of the model.
     pub pixels: usize,
+    /// Nodes of the grid that looks again, near the best, through all pixels.
+    pub refine: Option<usize>,
 }
 
 /// What a fit is seen through by a scan.
@@ -100,18 +105,67 @@ fn fewer_nodes(file: &FitFile, every: usize) -> Region {
     Region { nodes, ..file.region.clone() }
 }
 
+/// What was found.
+pub struct Found {
+    /// On the whole sphere.
+    pub found: AxisScan,
+    /// Near the best one, with a finer grid.
+    pub refined: Option<AxisLoss>,
+}
+
 /// The loss over the whole sphere of axes, and the best one.
 pub fn run(
     file: &FitFile,
     measured: &Measured,
     motion: &Motion,
     effort: Effort,
-) -> anyhow::Result<AxisScan> {
-    let Effort { directions, frames, pixels } = effort;
-    let linear = setup::linear(file)?;
+) -> anyhow::Result<Found> {
+    let Effort { directions, frames, pixels, refine } = effort;
     let view = View::new(file, measured, pixels)?;
+    let settings = AxisSettings { directions, ..AxisSettings::default() };
+    let (flag, bar) = (interrupt::flag(), progress::axes(directions as u64));
+    let watch = |solved: usize, expected: usize| {
+        bar.set_length(expected as u64);
+        bar.set_position(solved as u64);
+        !flag.load(Ordering::Relaxed)
+    };
+    let scan = |problem: &AxisProblem<'_, f32>| scan_axis(problem, &settings, &watch);
+    let found = with_problem(&view, motion, frames, scan)?;
+    let found = found.context(STOPPED)?;
+    let refined = refine.map(|nodes| -> anyhow::Result<AxisLoss> {
+        let view = View::new(file, measured, file.screen.pixels)?;
+        let effort = (fine(nodes), HALVINGS);
+        let near = |problem: &AxisProblem<'_, f32>| {
+            refine_axis(problem, found.best.axis, STEP, effort, &watch)
+        };
+        with_problem(&view, motion, frames, near)?.context(STOPPED)
+    });
+    bar.finish_and_clear();
+    Ok(Found { refined: refined.transpose()?, found })
+}
+
+const STOPPED: &str = "stopped while axes were being scanned: nothing is kept of that";
+
+/// First step of the refinement: half of what lattice points of 200 are apart by, and its halvings.
+const STEP: f64 = 0.06;
+const HALVINGS: usize = 3;
+
+/// Iterations of the refinement's grids: with few, a wrong axis is as good as the right one.
+fn fine(nodes: usize) -> SolveEffort {
+    SolveEffort { nodes, iterations: 40 }
+}
+
+/// Hands the linear problem of all axes, seen through a view, to a search.
+fn with_problem<R>(
+    view: &View,
+    motion: &Motion,
+    frames: usize,
+    search: impl FnOnce(&AxisProblem<'_, f32>) -> Result<R, OutOfRange>,
+) -> anyhow::Result<R> {
+    let file = &view.file;
+    let linear = setup::linear(file)?;
     let chain = data::chain(&view.instrument, motion)?;
-    let count = view.file.screen.pixels * view.file.screen.pixels;
+    let count = file.screen.pixels * file.screen.pixels;
     let objective = Objective { chain, data: view.measured.terms(&file.loss, count)? };
     let all = objective.observed();
     let chosen: Vec<usize> = all.iter().copied().step_by((all.len() / frames).max(1)).collect();
@@ -124,16 +178,7 @@ pub fn run(
         upper: linear.upper,
         priors: &priors,
     };
-    let settings = AxisSettings { directions, ..AxisSettings::default() };
-    let (flag, bar) = (interrupt::flag(), progress::axes(directions as u64));
-    let watch = |solved: usize, expected: usize| {
-        bar.set_length(expected as u64);
-        bar.set_position(solved as u64);
-        !flag.load(Ordering::Relaxed)
-    };
-    let scan = scan_axis(&problem, &settings, &watch).context("axis.scan")?;
-    bar.finish_and_clear();
-    scan.context("stopped while axes were being scanned: nothing is kept of that")
+    search(&problem).context("axis.scan")
 }
 
 /// The map of losses as a table.
@@ -154,12 +199,15 @@ pub fn picture(scan: &AxisScan) -> anyhow::Result<Vec<u8>> {
 }
 
 /// A line of the log.
-pub fn line(scan: &AxisScan) -> Value {
+pub fn line(scan: &Found) -> Value {
+    let Found { found, refined } = scan;
+    let refined = refined.map(|at| json!({"best": at.axis.vector(), "loss": at.loss}));
     json!({
         "step": 0,
         "axis_scan": {
-            "best": scan.best.axis.vector(), "loss": scan.best.loss,
-            "runner_up": scan.runner_up.axis.vector(), "runner_up_loss": scan.runner_up.loss,
+            "best": found.best.axis.vector(), "loss": found.best.loss,
+            "runner_up": found.runner_up.axis.vector(), "runner_up_loss": found.runner_up.loss,
+            "refined": refined,
         },
     })
 }

@@ -131,12 +131,12 @@ impl Run<'_> {
     /// The axis and the parameters that a scan and the linear problem give to begin with.
     fn start(&mut self, state: &mut State<f32>, motion: &Motion) -> anyhow::Result<()> {
         let linear = Linear { file: self.file };
-        if let AxisSearch::Scan { directions, frames, pixels, .. } = self.file.axis {
-            let effort = axis_scan::Effort { directions, frames, pixels };
+        if let AxisSearch::Scan { directions, frames, pixels, refine, .. } = self.file.axis {
+            let effort = axis_scan::Effort { directions, frames, pixels, refine };
             let scan = axis_scan::run(self.file, self.measured, motion, effort)?;
-            state.now.axis = scan.best.axis;
-            self.folder.file("axis_scan.csv")?.write(axis_scan::table(&scan).as_bytes())?;
-            self.folder.file("axis_scan.png")?.write(&axis_scan::picture(&scan)?)?;
+            state.now.axis = scan.refined.unwrap_or(scan.found.best).axis;
+            self.folder.file("axis_scan.csv")?.write(axis_scan::table(&scan.found).as_bytes())?;
+            self.folder.file("axis_scan.png")?.write(&axis_scan::picture(&scan.found)?)?;
             self.folder.log(&axis_scan::line(&scan))?;
         }
         let axis = state.now.axis;

@@ -214,11 +214,14 @@ pub fn axis(file: &FitFile) -> anyhow::Result<(Axis, Option<Polynomial>)> {
             let rate = rate.checked().context("axis.from")?;
             Ok((Axis::new(*start).context("axis.from.start")?, Some(rate)))
         }
-        AxisSearch::Scan { directions, frames, pixels, rate, last_rate } => {
+        AxisSearch::Scan { directions, frames, pixels, refine, rate, last_rate } => {
             if !(12..=100_000).contains(directions) || *frames == 0 || *pixels < 8 {
                 bail!(
                     "axis.scan: directions = {directions}, frames = {frames}, pixels = {pixels} are not allowed: 12 to 100000, 1 or more, 8 or more"
                 );
+            }
+            if refine.is_some_and(|nodes| !(8..=128).contains(&nodes)) {
+                bail!("axis.scan.refine = {} is not allowed: 8 to 128", refine.unwrap_or(0));
             }
             linear(file)?;
             let (from, to, steps) = (*rate, *last_rate, file.training.steps);

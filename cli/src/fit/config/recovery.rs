@@ -178,6 +178,10 @@ pub enum AxisSearch {
         frames: usize,
         /// Pixels along a side of the model that is fitted to them; all that there are if it is more than half of them.
         pixels: usize,
+        /// Nodes along each axis of a grid with which all pixels are then looked at, for axes near the best one; without
+        /// it that is the scan's.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        refine: Option<usize>,
         /// First rate of what follows; 0: it stays where the scan has found it.
         rate: f64,
         /// Last rate, reached linearly.

@@ -227,6 +227,29 @@ pub fn scan_axis<T: Scalar + Default>(
     Ok(Some(AxisScan { refinements: solved - map.len(), map, best, runner_up }))
 }
 
+/// The axis of least loss near one that is nearly right, by steps that are halved `halvings` times; none if the
+/// watch wanted no more. A finer grid and more pixels than those of the scan tell axes apart that it could not.
+///
+/// # Errors
+/// If a number is out of its range, or data do not fit the rays.
+pub fn refine_axis<T: Scalar + Default>(
+    problem: &AxisProblem<'_, T>,
+    from: Axis,
+    step: f64,
+    (effort, halvings): (Effort, usize),
+    watch: &ScanWatch<'_>,
+) -> Result<Option<AxisLoss>, OutOfRange> {
+    let settings = AxisSettings { fine: effort, halvings, ..AxisSettings::default() }.checked()?;
+    let scanner = Scanner {
+        problem,
+        watch,
+        solved: AtomicUsize::new(0),
+        expected: 1 + 8 * (1 + settings.halvings),
+        cancelled: AtomicBool::new(false),
+    };
+    Refinement { scanner: &scanner, effort, halvings }.run(from, step)
+}
+
 /// The best points that are not near better ones; one of the hemisphere opposite to the best is among them.
 fn candidates(map: &[AxisLoss], count: usize, distance: f64) -> Vec<Axis> {
     let mut order = map.to_vec();
