@@ -51,11 +51,15 @@ impl Figures<'_> {
                 }
             }
             FigureKind::Axes => {
-                for (case, _) in self.chosen(asked) {
+                for (case, _) in self.chosen(asked).filter(|(case, _)| case.seed == 1) {
                     let path = self.runner.run_of(case).join("axis_scan.png");
                     if path.exists() {
-                        let caption =
-                            format!("{}: {}. {}", asked.title, case.name(), asked.caption);
+                        let caption = format!(
+                            "{}: {}. {} The folders of the other seeds have their own maps (axis_scan.png).",
+                            asked.title,
+                            case.name(),
+                            asked.caption
+                        );
                         let alt = asked.title.clone();
                         let figure = Figure { png: output::read(&path)?, caption, alt };
                         drawn.figures.push((name(&case.slug), figure));
