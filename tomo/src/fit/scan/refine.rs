@@ -5,7 +5,8 @@ use crate::dynamics::Axis;
 use crate::simd::Scalar;
 use kerrlight_geodesic::OutOfRange;
 
-/// A pattern search: six directions about the best one so far, half as far away when none is better.
+/// A pattern search: six directions about the best one so far, half as far away when none is better; at the end
+/// the lowest point of the paraboloid through the last seven.
 pub(super) struct Refinement<'a, 's, T: Scalar> {
     pub scanner: &'a Scanner<'s, T>,
     pub effort: Effort,
@@ -21,12 +22,16 @@ impl<T: Scalar + Default> Refinement<'_, '_, T> {
         let Some(losses) = self.scanner.losses(&[from], self.effort)? else { return Ok(None) };
         let mut best = losses[0];
         let mut step = step;
+        let mut lowest = None;
         for level in 0..=self.halvings {
             for _ in 0..MOVES {
                 let about = around(best.axis, step, level);
                 let Some(losses) = self.scanner.losses(&about, self.effort)? else {
                     return Ok(None);
                 };
+                let differences: Vec<f64> = losses.iter().map(|at| at.loss - best.loss).collect();
+                lowest =
+                    minimum(&differences, step.tan(), level).map(|along| moved(best.axis, along));
                 let least = losses.into_iter().min_by(|a, b| a.loss.total_cmp(&b.loss));
                 match least.filter(|least| least.loss < best.loss) {
                     Some(least) => best = least,
@@ -35,12 +40,29 @@ impl<T: Scalar + Default> Refinement<'_, '_, T> {
             }
             step *= 0.5;
         }
-        Ok(Some(best))
+        let Some(lowest) = lowest else { return Ok(Some(best)) };
+        let losses = self.scanner.losses(&[lowest], self.effort)?;
+        Ok(losses.map(|losses| if losses[0].loss < best.loss { losses[0] } else { best }))
     }
 }
 
-/// Six directions at an angle from an axis; every other level half a turn of the hexagon further.
+/// Directions of the hexagon of a level: every other one is turned by half a side.
+fn turn(k: usize, level: usize) -> f64 {
+    core::f64::consts::PI * (2 * k + level % 2) as f64 / 6.0
+}
+
+/// Six directions at an angle from an axis.
 fn around(axis: Axis, angle: f64, level: usize) -> Vec<Axis> {
+    let along = angle.tan();
+    let direction = |k: usize| {
+        let (sin, cos) = turn(k, level).sin_cos();
+        moved(axis, [along * cos, along * sin])
+    };
+    (0..6).map(direction).collect()
+}
+
+/// An axis moved on its tangent plane.
+fn moved(axis: Axis, [x, y]: [f64; 2]) -> Axis {
     let n = axis.vector();
     let least = (0..3).fold(0, |k, c| if n[c].abs() < n[k].abs() { c } else { k });
     let mut unit = [0.0; 3];
@@ -51,13 +73,28 @@ fn around(axis: Axis, angle: f64, level: usize) -> Vec<Axis> {
         n[2] * east[0] - n[0] * east[2],
         n[0] * east[1] - n[1] * east[0],
     ];
-    let direction = |k: usize| {
-        let turn = core::f64::consts::PI * (2 * k + level % 2) as f64 / 6.0;
-        let (sin, cos) = turn.sin_cos();
-        let along = angle.tan();
-        axis.moved(core::array::from_fn(|c| along * (cos * east[c] + sin * north[c])))
-    };
-    (0..6).map(direction).collect()
+    axis.moved(core::array::from_fn(|c| x * east[c] + y * north[c]))
+}
+
+/// Where g·u + u·H·u/2 is least, which has these values at the corners of a hexagon of radius `radius`; nothing if it
+/// has no minimum inside.
+fn minimum(values: &[f64], radius: f64, level: usize) -> Option<[f64; 2]> {
+    let (mut slope, mut mean, mut across) = ([0.0; 2], 0.0, [0.0; 2]);
+    for (k, value) in values.iter().enumerate() {
+        let (sin, cos) = turn(k, level).sin_cos();
+        let (sin_2, cos_2) = (2.0 * turn(k, level)).sin_cos();
+        slope = [slope[0] + value * cos / 3.0, slope[1] + value * sin / 3.0];
+        mean += value / 6.0;
+        across = [across[0] + value * cos_2 / 3.0, across[1] + value * sin_2 / 3.0];
+    }
+    let g = slope.map(|x| x / radius);
+    // u·H·u/2 = r²/2 [(Hxx + Hyy)/2 + (Hxx − Hyy)/2 cos 2φ + Hxy sin 2φ].
+    let [mean, difference, mixed] =
+        [mean, across[0], across[1]].map(|x| 2.0 * x / (radius * radius));
+    let (xx, yy) = (mean + difference, mean - difference);
+    let determinant = xx * yy - mixed * mixed;
+    let at = [(mixed * g[1] - yy * g[0]) / determinant, (mixed * g[0] - xx * g[1]) / determinant];
+    (xx > 0.0 && determinant > 0.0 && at[0].hypot(at[1]) < radius).then_some(at)
 }
 
 #[cfg(test)]
@@ -75,6 +112,27 @@ mod tests {
                 let expected = 0.2f64.cos().powi(2) + 0.5 * 0.2f64.sin().powi(2);
                 assert!((side.cos() - expected).abs() < 1e-14);
             }
+        }
+    }
+
+    #[test]
+    fn exact_lowest_point_of_a_paraboloid() {
+        let (h, lowest) = ([3.0, -0.7, 1.5], [0.021, -0.013]);
+        let value = |u: [f64; 2]| {
+            let d = [u[0] - lowest[0], u[1] - lowest[1]];
+            0.5 * (h[0] * d[0] * d[0] + 2.0 * h[1] * d[0] * d[1] + h[2] * d[1] * d[1])
+        };
+        for level in [0, 1] {
+            let corner = |k: usize| {
+                let (sin, cos) = turn(k, level).sin_cos();
+                value([0.1 * cos, 0.1 * sin]) - value([0.0; 2])
+            };
+            let values: Vec<f64> = (0..6).map(corner).collect();
+            let found = minimum(&values, 0.1, level).unwrap();
+            assert!((found[0] - lowest[0]).abs() < 1e-14 && (found[1] - lowest[1]).abs() < 1e-14);
+            let saddle: Vec<f64> = values.iter().map(|v| -v).collect();
+            assert_eq!(minimum(&saddle, 0.1, level), None);
+            assert_eq!(minimum(&values, 0.02, level).filter(|u| u[0].hypot(u[1]) > 0.02), None);
         }
     }
 }
