@@ -1,33 +1,21 @@
 //! The scan of the whole sphere of axes with coarse linear grids, through few pixels.
 
-use super::config::{FitFile, LossKind, Nodes, Region, Screen, WidthOf};
+use super::config::{FitFile, LossKind, Nodes, Region, Scan, Screen, WidthOf};
 use super::data::{self, Measured};
 use super::linear::terms;
 use super::setup::{self, Instrument};
 use crate::{interrupt, progress};
 use anyhow::Context;
 use kerrlight_geodesic::OutOfRange;
+use kerrlight_tomo::dynamics::Axis;
 use kerrlight_tomo::fit::scan::{
-    AxisLoss, AxisProblem, AxisScan, AxisSettings, Effort as SolveEffort, refine_axis, scan_axis,
+    AxisLoss, AxisProblem, AxisScan, AxisSettings, Effort, refine_axis, scan_axis,
 };
 use kerrlight_tomo::fit::{Motion, Objective};
 use kerrlight_tomo::image::colormap::Colormap;
 use serde_json::{Value, json};
 use std::io::Cursor;
 use std::sync::atomic::Ordering;
-
-/// How much of the data a scan looks at.
-#[derive(Clone, Copy)]
-pub struct Effort {
-    /// Axes on the sphere.
-    pub directions: usize,
-    /// Frames, spread over all.
-    pub frames: usize,
-    /// Pixels along a side of the model.
-    pub pixels: usize,
-    /// Nodes of the grid that looks again, near the best, through all pixels.
-    pub refine: Option<usize>,
-}
 
 /// What a fit is seen through by a scan.
 struct View {
@@ -37,15 +25,16 @@ struct View {
 }
 
 impl View {
-    /// The same view with fewer pixels, and as many fewer nodes on rays. Images are known at every n-th pixel; visibilities are explained by pixels
-    /// n times as wide. A loss that has both is seen through all pixels, as is one of few.
+    /// The same view with fewer pixels, and as many fewer nodes on rays. Images are known at every n-th
+    /// pixel; visibilities are explained by pixels n times as wide. A loss that has both is seen through
+    /// all pixels, as is one of few.
     fn new(file: &FitFile, measured: &Measured, pixels: usize) -> anyhow::Result<Self> {
         let images = file.loss.iter().filter(|loss| loss.data == LossKind::Image).count();
         let screen = &file.screen;
         let every = screen.pixels / pixels.max(2);
         if every < 2 || (images > 0 && images < file.loss.len()) {
             let instrument = Instrument::new(file)?;
-            return Ok(Self { file: file.clone(), instrument, measured: measured.untold() });
+            return Ok(Self { file: file.clone(), instrument, measured: measured.without_truth() });
         }
         if images > 0 {
             Self::thinned(file, measured, every)
@@ -68,7 +57,8 @@ impl View {
         let thin = |movie: &Vec<f64>| -> Vec<f64> {
             movie.chunks(n * n).flat_map(|frame| kept.iter().map(|k| frame[*k])).collect()
         };
-        let measured = Measured { movie: measured.movie.as_ref().map(thin), ..measured.untold() };
+        let measured =
+            Measured { movie: measured.movie.as_ref().map(thin), ..measured.without_truth() };
         let screen = Screen { pixels: places.len(), ..file.screen.clone() };
         Ok(Self { file: FitFile { screen, ..file }, instrument, measured })
     }
@@ -86,7 +76,7 @@ impl View {
         let region = fewer_nodes(file, file.screen.pixels / pixels);
         let file = FitFile { screen, region, ..file.clone() };
         let instrument = Instrument::new(&file)?;
-        let measured = Measured { sky: setup::sky(&file).ok(), ..measured.untold() };
+        let measured = Measured { sky: setup::sky(&file).ok(), ..measured.without_truth() };
         Ok(Self { file, instrument, measured })
     }
 }
@@ -108,9 +98,16 @@ fn fewer_nodes(file: &FitFile, every: usize) -> Region {
 /// What was found.
 pub struct Found {
     /// On the whole sphere.
-    pub found: AxisScan,
+    pub scan: AxisScan,
     /// Near the best one, with a finer grid.
     pub refined: Option<AxisLoss>,
+}
+
+impl Found {
+    /// The best axis.
+    pub fn axis(&self) -> Axis {
+        self.refined.unwrap_or(self.scan.best).axis
+    }
 }
 
 /// The loss over the whole sphere of axes, and the best one.
@@ -118,9 +115,9 @@ pub fn run(
     file: &FitFile,
     measured: &Measured,
     motion: &Motion,
-    effort: Effort,
+    settings: &Scan,
 ) -> anyhow::Result<Found> {
-    let Effort { directions, frames, pixels, refine } = effort;
+    let Scan { directions, frames, pixels, refine, .. } = *settings;
     let view = View::new(file, measured, pixels)?;
     let settings = AxisSettings { directions, ..AxisSettings::default() };
     let (flag, bar) = (interrupt::flag(), progress::axes(directions as u64));
@@ -129,19 +126,18 @@ pub fn run(
         bar.set_position(solved as u64);
         !flag.load(Ordering::Relaxed)
     };
-    let scan = |problem: &AxisProblem<'_, f32>| scan_axis(problem, &settings, &watch);
-    let found = with_problem(&view, motion, frames, scan)?;
-    let found = found.context(STOPPED)?;
+    let whole = |problem: &AxisProblem<'_, f32>| scan_axis(problem, &settings, &watch);
+    let scan = with_problem(&view, motion, frames, whole)?.context(STOPPED)?;
     let refined = refine.map(|nodes| -> anyhow::Result<AxisLoss> {
         let view = View::new(file, measured, file.screen.pixels)?;
         let effort = (fine(nodes), HALVINGS);
         let near = |problem: &AxisProblem<'_, f32>| {
-            refine_axis(problem, found.best.axis, STEP, effort, &watch)
+            refine_axis(problem, scan.best.axis, STEP, effort, &watch)
         };
         with_problem(&view, motion, frames, near)?.context(STOPPED)
     });
     bar.finish_and_clear();
-    Ok(Found { refined: refined.transpose()?, found })
+    Ok(Found { refined: refined.transpose()?, scan })
 }
 
 const STOPPED: &str = "stopped while axes were being scanned: nothing is kept of that";
@@ -151,8 +147,8 @@ const STEP: f64 = 0.06;
 const HALVINGS: usize = 3;
 
 /// Iterations of the refinement's grids: with few, a wrong axis is as good as the right one.
-fn fine(nodes: usize) -> SolveEffort {
-    SolveEffort { nodes, iterations: 40 }
+fn fine(nodes: usize) -> Effort {
+    Effort { nodes, iterations: 40 }
 }
 
 /// Hands the linear problem of all axes, seen through a view, to a search.
@@ -199,14 +195,14 @@ pub fn picture(scan: &AxisScan) -> anyhow::Result<Vec<u8>> {
 }
 
 /// A line of the log.
-pub fn line(scan: &Found) -> Value {
-    let Found { found, refined } = scan;
+pub fn line(found: &Found) -> Value {
+    let Found { scan, refined } = found;
     let refined = refined.map(|at| json!({"best": at.axis.vector(), "loss": at.loss}));
     json!({
         "step": 0,
         "axis_scan": {
-            "best": found.best.axis.vector(), "loss": found.best.loss,
-            "runner_up": found.runner_up.axis.vector(), "runner_up_loss": found.runner_up.loss,
+            "best": scan.best.axis.vector(), "loss": scan.best.loss,
+            "runner_up": scan.runner_up.axis.vector(), "runner_up_loss": scan.runner_up.loss,
             "refined": refined,
         },
     })

@@ -139,7 +139,7 @@ fn gain_errors(gains: Gains) -> anyhow::Result<GainErrors> {
 }
 
 /// A visibility without an error would count for more than all others together.
-fn certain(observation: &Observation) -> anyhow::Result<()> {
+fn check_errors(observation: &Observation) -> anyhow::Result<()> {
     let is_exact = |row: &&Row| {
         (0..4).any(|k| row.product(k).is_some_and(|measured| measured.noise_sigma <= 0.0))
     };
@@ -196,7 +196,7 @@ fn read(file: &FitFile, data: &DataFiles, folder: &Path) -> anyhow::Result<Measu
             }
             let path = folder.join(path);
             let (_, observation) = crate::interferometry::read(&path)?;
-            certain(&observation).with_context(|| path.display().to_string())?;
+            check_errors(&observation).with_context(|| path.display().to_string())?;
             let averaged = (*average_s > 0.0).then(|| observation.averaged(*average_s));
             let mut observation = averaged.unwrap_or(observation).total_intensity();
             observation.sort();
@@ -229,7 +229,7 @@ fn read(file: &FitFile, data: &DataFiles, folder: &Path) -> anyhow::Result<Measu
 
 impl Measured {
     /// The data alone.
-    pub fn untold(&self) -> Self {
+    pub fn without_truth(&self) -> Self {
         Self {
             times: self.times.clone(),
             movie: self.movie.clone(),

@@ -131,13 +131,12 @@ impl Run<'_> {
     /// The axis and the parameters that a scan and the linear problem give to begin with.
     fn start(&mut self, state: &mut State<f32>, motion: &Motion) -> anyhow::Result<()> {
         let linear = Linear { file: self.file };
-        if let AxisSearch::Scan { directions, frames, pixels, refine, .. } = self.file.axis {
-            let effort = axis_scan::Effort { directions, frames, pixels, refine };
-            let scan = axis_scan::run(self.file, self.measured, motion, effort)?;
-            state.now.axis = scan.refined.unwrap_or(scan.found.best).axis;
-            self.folder.file("axis_scan.csv")?.write(axis_scan::table(&scan.found).as_bytes())?;
-            self.folder.file("axis_scan.png")?.write(&axis_scan::picture(&scan.found)?)?;
-            self.folder.log(&axis_scan::line(&scan))?;
+        if let AxisSearch::Scan(settings) = &self.file.axis {
+            let found = axis_scan::run(self.file, self.measured, motion, settings)?;
+            state.now.axis = found.axis();
+            self.folder.file("axis_scan.csv")?.write(axis_scan::table(&found.scan).as_bytes())?;
+            self.folder.file("axis_scan.png")?.write(&axis_scan::picture(&found.scan)?)?;
+            self.folder.log(&axis_scan::line(&found))?;
         }
         let axis = state.now.axis;
         let trainer = &mut self.trainer;

@@ -1,6 +1,6 @@
 //! From settings to the pieces of a fit.
 
-use super::config::{self, AxisSearch, FitFile, Nodes, Velocity, WidthOf};
+use super::config::{self, AxisSearch, FitFile, Nodes, Scan, Velocity, WidthOf};
 use anyhow::{Context, anyhow, bail};
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
 use kerrlight_tomo::dynamics::{AngularVelocity, Axis, Injection, Perturbation};
@@ -214,7 +214,7 @@ pub fn axis(file: &FitFile) -> anyhow::Result<(Axis, Option<Polynomial>)> {
             let rate = rate.checked().context("axis.from")?;
             Ok((Axis::new(*start).context("axis.from.start")?, Some(rate)))
         }
-        AxisSearch::Scan { directions, frames, pixels, refine, rate, last_rate } => {
+        AxisSearch::Scan(Scan { directions, frames, pixels, refine, rate, last_rate }) => {
             if !(12..=100_000).contains(directions) || *frames == 0 || *pixels < 8 {
                 bail!(
                     "axis.scan: directions = {directions}, frames = {frames}, pixels = {pixels} are not allowed: 12 to 100000, 1 or more, 8 or more"

@@ -1,9 +1,10 @@
 //! Bands of rows on all cores. Tiles are handed out from the top; whoever ends the last tile of
 //! a band puts the band together, so that only a few bands are in memory at any time.
 
+use super::adaptive::{self, Adaptive};
 use super::pixels::{Pixel, Workspace, uniform};
 use super::tally::Tally;
-use super::{Progress, Raster, RenderError, adaptive};
+use super::{Progress, Raster, RenderError};
 use crate::transport::Meter;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -91,8 +92,8 @@ impl Raster {
             work.scratch.meter = Meter::running();
         }
         let pixels = match tolerance {
-            Some(error) => {
-                vec![adaptive::adaptive(stage, grid, rows, columns, error, work)?]
+            Some(tolerance) => {
+                vec![Adaptive { stage, grid, tolerance }.pixels((rows, columns), work)?]
             }
             None => uniform(stage, grid, (rows, columns), times, work)?,
         };

@@ -171,22 +171,7 @@ pub enum AxisSearch {
     /// It is `motion.axis`.
     Known {},
     /// It is sought on the whole sphere with coarse linear grids, and learnt from there.
-    Scan {
-        /// Directions that are tried.
-        directions: usize,
-        /// Frames that are looked at, spread over all.
-        frames: usize,
-        /// Pixels along a side of the model that is fitted to them; all that there are if it is more than half of them.
-        pixels: usize,
-        /// Nodes along each axis of a grid with which all pixels are then looked at, for axes near the best one; without
-        /// it that is the scan's.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        refine: Option<usize>,
-        /// First rate of what follows; 0: it stays where the scan has found it.
-        rate: f64,
-        /// Last rate, reached linearly.
-        last_rate: f64,
-    },
+    Scan(Scan),
     /// It is learnt from this start.
     From {
         /// Where it starts.
@@ -196,6 +181,26 @@ pub enum AxisSearch {
         /// Last rate, reached linearly.
         last_rate: f64,
     },
+}
+
+/// A search of the whole sphere of axes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scan {
+    /// Directions that are tried.
+    pub directions: usize,
+    /// Frames that are looked at, spread over all.
+    pub frames: usize,
+    /// Pixels along a side of the model that is fitted to them; all that there are if it is more than half of them.
+    pub pixels: usize,
+    /// Nodes along each axis of a grid with which all pixels are then looked at, for axes near the best one; without
+    /// it that is the scan's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub refine: Option<usize>,
+    /// First rate of what follows; 0: it stays where the scan has found it.
+    pub rate: f64,
+    /// Last rate, reached linearly.
+    pub last_rate: f64,
 }
 
 fn grid_nodes() -> usize {

@@ -30,138 +30,143 @@ const DEEPEST: u32 = 6;
 /// The light between two lensing bands that no ray has met, in terms of what is around.
 const HIDDEN: f64 = 1.0 / 16.0;
 
-/// The pixels of a rectangle, row by row, each estimated to within `tolerance`.
-pub(super) fn adaptive(
-    stage: &Stage,
-    grid: &Grid,
-    rows: Range<usize>,
-    columns: Range<usize>,
-    tolerance: f64,
-    work: &mut Workspace,
-) -> Result<Vec<Pixel>, OutOfRange> {
-    let (mut pixels, mut cuts) = first(stage, grid, rows, columns, tolerance, work)?;
-    let middles: Vec<Light> =
-        cuts.iter().map(|cut| Light::from(&pixels[cut.pixel].center)).collect();
-    work.clear();
-    for cut in &cuts {
-        push_quarters(work, grid, cut, [0.0; 2], 0);
-    }
-    let seen = work.look(stage)?;
-    for ((cut, middle), seen) in cuts.iter_mut().zip(&middles).zip(seen.chunks_exact(4)) {
-        cut.add([0.0; 2], 0, middle, seen);
-    }
-    while !cuts.is_empty() {
-        let mut going = Vec::with_capacity(cuts.len());
-        for mut cut in cuts {
-            let worst = cut.worst(tolerance);
-            if worst == 0 {
-                cut.finish(&mut pixels[cut.pixel]);
-            } else {
-                let parents = cut.cells.split_off(cut.cells.len() - worst);
-                going.push((cut, parents));
-            }
-        }
-        cuts = deeper(stage, grid, going, work)?;
-    }
-    Ok(pixels)
+/// What is seen, through which pixels, and by how much each may be off.
+pub(super) struct Adaptive<'a> {
+    pub stage: &'a Stage,
+    pub grid: &'a Grid,
+    pub tolerance: f64,
 }
 
-/// Traces the quarters of the quarters of `parents`.
-fn deeper(
-    stage: &Stage,
-    grid: &Grid,
-    going: Vec<(Cut, Vec<Cell>)>,
-    work: &mut Workspace,
-) -> Result<Vec<Cut>, OutOfRange> {
-    work.clear();
-    for (cut, parents) in &going {
-        for parent in parents {
-            for center in Cell::places(parent.center, parent.level) {
-                push_quarters(work, grid, cut, center, parent.level + 1);
+impl Adaptive<'_> {
+    /// The pixels of a rectangle, row by row.
+    pub fn pixels(
+        &self,
+        rectangle: (Range<usize>, Range<usize>),
+        work: &mut Workspace,
+    ) -> Result<Vec<Pixel>, OutOfRange> {
+        let (mut pixels, mut cuts) = self.first(rectangle, work)?;
+        let middles: Vec<Light> =
+            cuts.iter().map(|cut| Light::from(&pixels[cut.pixel].center)).collect();
+        work.clear();
+        for cut in &cuts {
+            push_quarters(work, self.grid, cut, [0.0; 2], 0);
+        }
+        let seen = work.look(self.stage)?;
+        for ((cut, middle), seen) in cuts.iter_mut().zip(&middles).zip(seen.chunks_exact(4)) {
+            cut.add([0.0; 2], 0, middle, seen);
+        }
+        while !cuts.is_empty() {
+            let mut going = Vec::with_capacity(cuts.len());
+            for mut cut in cuts {
+                let worst = cut.worst(self.tolerance);
+                if worst == 0 {
+                    cut.finish(&mut pixels[cut.pixel]);
+                } else {
+                    let parents = cut.cells.split_off(cut.cells.len() - worst);
+                    going.push((cut, parents));
+                }
+            }
+            cuts = self.deeper(going, work)?;
+        }
+        Ok(pixels)
+    }
+
+    /// Traces the quarters of the quarters of `parents`.
+    fn deeper(
+        &self,
+        going: Vec<(Cut, Vec<Cell>)>,
+        work: &mut Workspace,
+    ) -> Result<Vec<Cut>, OutOfRange> {
+        work.clear();
+        for (cut, parents) in &going {
+            for parent in parents {
+                for center in Cell::places(parent.center, parent.level) {
+                    push_quarters(work, self.grid, cut, center, parent.level + 1);
+                }
             }
         }
+        let mut seen = work.look(self.stage)?.chunks_exact(4);
+        let mut cuts = Vec::with_capacity(going.len());
+        for (mut cut, parents) in going {
+            for parent in parents {
+                let places = Cell::places(parent.center, parent.level);
+                for (center, middle) in places.into_iter().zip(&parent.quarters) {
+                    cut.add(center, parent.level + 1, middle, seen.next().unwrap_or_default());
+                }
+            }
+            cuts.push(cut);
+        }
+        Ok(cuts)
     }
-    let mut seen = work.look(stage)?.chunks_exact(4);
-    let mut cuts = Vec::with_capacity(going.len());
-    for (mut cut, parents) in going {
-        for parent in parents {
-            let places = Cell::places(parent.center, parent.level);
-            for (center, middle) in places.into_iter().zip(&parent.quarters) {
-                cut.add(center, parent.level + 1, middle, seen.next().unwrap_or_default());
+
+    /// One ray a pixel, and which pixels are to be cut.
+    fn first(
+        &self,
+        (rows, columns): (Range<usize>, Range<usize>),
+        work: &mut Workspace,
+    ) -> Result<(Vec<Pixel>, Vec<Cut>), OutOfRange> {
+        let Self { grid, tolerance, .. } = *self;
+        // With the neighbours that there are.
+        let around = |range: &Range<usize>, count: usize| {
+            range.start.saturating_sub(1)..(range.end + 1).min(count)
+        };
+        let (wide, high) = (around(&columns, grid.width), around(&rows, grid.height));
+        work.clear();
+        for row in high.clone() {
+            for column in wide.clone() {
+                work.push(grid.inside(column, row, [0.0; 2]));
             }
         }
-        cuts.push(cut);
+        let seen = work.look(self.stage)?;
+        let light: Vec<Light> = seen.iter().map(Light::from).collect();
+        let place =
+            |column: usize, row: usize| (row - high.start) * wide.len() + column - wide.start;
+        let (mut pixels, mut cuts) = (Vec::new(), Vec::new());
+        for row in rows {
+            for column in columns.clone() {
+                let center = seen[place(column, row)];
+                let neighbor = |dx: isize, dy: isize| {
+                    let to = |k: usize, d: isize, range: &Range<usize>| {
+                        k.saturating_add_signed(d).clamp(range.start, range.end - 1)
+                    };
+                    &light[place(to(column, dx, &wide), to(row, dy, &high))]
+                };
+                let Estimate { error, contrast, bright } = estimate(neighbor);
+                if contrast.is_some() || error > tolerance {
+                    let around =
+                        core::array::from_fn(|k| *neighbor(k as isize % 3 - 1, k as isize / 3 - 1));
+                    cuts.push(Cut {
+                        pixel: pixels.len(),
+                        column,
+                        row,
+                        cells: Vec::new(),
+                        bright,
+                        around,
+                        contrast: 0.0,
+                        rays: 0,
+                        unresolved: 0,
+                    });
+                }
+                pixels.push(Pixel {
+                    intensity: center.intensity,
+                    rgb: center.rgb,
+                    stokes: center.stokes,
+                    center,
+                    unresolved: u32::from(center.fate == Fate::Unresolved),
+                    rays: 1,
+                    error,
+                });
+            }
+        }
+        Ok((pixels, cuts))
     }
-    Ok(cuts)
 }
 
+/// One ray into each quarter of a cell.
 fn push_quarters(work: &mut Workspace, grid: &Grid, cut: &Cut, center: [f64; 2], level: u32) {
     for place in Cell::places(center, level) {
         work.push(grid.inside(cut.column, cut.row, place));
     }
-}
-
-/// One ray a pixel, and which pixels are to be cut.
-fn first(
-    stage: &Stage,
-    grid: &Grid,
-    rows: Range<usize>,
-    columns: Range<usize>,
-    tolerance: f64,
-    work: &mut Workspace,
-) -> Result<(Vec<Pixel>, Vec<Cut>), OutOfRange> {
-    // With the neighbours that there are.
-    let around = |range: &Range<usize>, count: usize| {
-        range.start.saturating_sub(1)..(range.end + 1).min(count)
-    };
-    let (wide, high) = (around(&columns, grid.width), around(&rows, grid.height));
-    work.clear();
-    for row in high.clone() {
-        for column in wide.clone() {
-            work.push(grid.inside(column, row, [0.0; 2]));
-        }
-    }
-    let seen = work.look(stage)?;
-    let light: Vec<Light> = seen.iter().map(Light::from).collect();
-    let place = |column: usize, row: usize| (row - high.start) * wide.len() + column - wide.start;
-    let (mut pixels, mut cuts) = (Vec::new(), Vec::new());
-    for row in rows {
-        for column in columns.clone() {
-            let center = seen[place(column, row)];
-            let neighbor = |dx: isize, dy: isize| {
-                let to = |k: usize, d: isize, range: &Range<usize>| {
-                    k.saturating_add_signed(d).clamp(range.start, range.end - 1)
-                };
-                &light[place(to(column, dx, &wide), to(row, dy, &high))]
-            };
-            let Estimate { error, contrast, bright } = estimate(neighbor);
-            if contrast.is_some() || error > tolerance {
-                let around =
-                    core::array::from_fn(|k| *neighbor(k as isize % 3 - 1, k as isize / 3 - 1));
-                cuts.push(Cut {
-                    pixel: pixels.len(),
-                    column,
-                    row,
-                    cells: Vec::new(),
-                    bright,
-                    around,
-                    contrast: 0.0,
-                    rays: 0,
-                    unresolved: 0,
-                });
-            }
-            pixels.push(Pixel {
-                intensity: center.intensity,
-                rgb: center.rgb,
-                stokes: center.stokes,
-                center,
-                unresolved: u32::from(center.fate == Fate::Unresolved),
-                rays: 1,
-                error,
-            });
-        }
-    }
-    Ok((pixels, cuts))
 }
 
 /// What a pixel's first ray and those of its neighbours say.

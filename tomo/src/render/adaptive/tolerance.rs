@@ -1,6 +1,6 @@
 //! What single pixels may be off by so that the picture is not off by more than asked.
 
-use super::first;
+use super::Adaptive;
 use crate::render::grid::Grid;
 use crate::render::pixels::Workspace;
 use crate::transport::Stage;
@@ -30,9 +30,9 @@ pub(in crate::render) fn tolerance(
         size: grid.size * cut as f64,
         side: 1,
     };
+    let uncut = Adaptive { stage, grid: &coarse, tolerance: f64::INFINITY };
     let lines = (0..coarse.height).into_par_iter().map_init(Workspace::default, |work, row| {
-        let (rows, columns) = (row..row + 1, 0..coarse.width);
-        let (pixels, cuts) = first(stage, &coarse, rows, columns, f64::INFINITY, work)?;
+        let (pixels, cuts) = uncut.first((row..row + 1, 0..coarse.width), work)?;
         let mut errors: Vec<(f64, f64)> = Vec::with_capacity(pixels.len());
         let k = cut as f64;
         errors.extend(pixels.iter().map(|pixel| (pixel.error / (k * k), k * k)));
