@@ -95,6 +95,15 @@ fn exact_cases_are_whole_and_not_done_twice() {
     for (a, b) in cases(&first).iter().zip(cases(&again)) {
         assert_eq!(a["results"]["psnr_db"], b["results"]["psnr_db"]);
     }
+    // What another version has found is found anew.
+    let file = lost.join("results.json");
+    let found = std::fs::read_to_string(&file).unwrap();
+    let version = format!("\"version\": \"{}\"", env!("CARGO_PKG_VERSION"));
+    assert!(found.contains(&version), "{found}");
+    std::fs::write(&file, found.replace(&version, "\"version\": \"0.0.1\"")).unwrap();
+    let output = kerrlight(at, &["compare", "rates.toml", "-o", "out", "--resume"]);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("4 cases, 1 of them to be run"));
+    assert!(std::fs::read_to_string(&file).unwrap().contains(&version));
     // What is chosen to be run does not hide what is known.
     succeed(
         at,
@@ -174,6 +183,8 @@ fn experiments_are_listed_and_mistakes_are_named() {
         ("seeds = 2", "seed = 2", "unknown field `seed`"),
         ("rows = [\"rate\"]", "rows = [\"rates\"]", "there is no factor \"rates\""),
         ("kind = \"time\"", "kind = \"tim\"", "unknown variant `tim`"),
+        ("scene_1.toml", "scene_0.toml", "scene_0.toml"),
+        ("[0.1, 0.4]", "[-0.1, -0.4]", "no case can be run; rate -0.1, seed 1"),
     ] {
         experiment(at, &[(old, new)]);
         let said = fail(at, &["compare", "rates.toml", "-o", "wrong"]);

@@ -53,6 +53,7 @@ pub fn table(new: &Value, old: &Value) -> anyhow::Result<Table> {
         ),
         head: std::iter::once("case".to_owned()).chain(head).collect(),
         rows,
+        links: Vec::new(),
     })
 }
 

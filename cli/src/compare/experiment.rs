@@ -14,6 +14,9 @@ pub struct Experiment {
     pub title: String,
     /// What is asked.
     pub question: String,
+    /// What was simulated, how it was fitted and where settings come from, paragraph by paragraph.
+    #[serde(default)]
+    pub setup: Vec<String>,
     /// How to read what was measured, paragraph by paragraph.
     #[serde(default)]
     pub reading: Vec<String>,
@@ -109,6 +112,19 @@ pub struct TableAsked {
     /// Levels of the other factors.
     #[serde(default)]
     pub r#where: BTreeMap<String, String>,
+    /// Rows of numbers from elsewhere.
+    #[serde(default)]
+    pub beside: Vec<Beside>,
+}
+
+/// A row of numbers from elsewhere, to hold the others against.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Beside {
+    /// What they are, and whose.
+    pub name: String,
+    /// One for each combination of the columns' levels, the last factor fastest; NaN where there is none.
+    pub values: Vec<f64>,
 }
 
 /// A picture.
@@ -180,6 +196,11 @@ impl Experiment {
         for table in &self.table {
             let name = || format!("table {:?}", table.title);
             self.shown(&table.rows, &table.columns, &table.r#where, true).with_context(name)?;
+            let columns: usize = table.columns.iter().map(|name| self.levels(name).len()).product();
+            if let Some(beside) = table.beside.iter().find(|row| row.values.len() != columns) {
+                let (what, count) = (&beside.name, beside.values.len());
+                bail!("table {:?}: {what:?} has {count} values for {columns} columns", table.title);
+            }
         }
         for figure in &self.figure {
             let name = || format!("figure {:?}", figure.title);

@@ -9,9 +9,10 @@ mod runner;
 mod source;
 mod summary;
 mod tables;
+mod verdicts;
 
 use crate::output::{self, Output};
-use crate::report::{Figure, Report, Table};
+use crate::report::{Figure, Part, Report, Table};
 use crate::{interrupt, progress};
 use anyhow::{Context, bail};
 use cases::{Case, Choice};
@@ -92,6 +93,12 @@ impl Compare {
         if self.list {
             return list_cases(&chosen);
         }
+        if let [first, ..] = &chosen[..]
+            && chosen.iter().all(|case| case.settings.is_err())
+        {
+            let why = first.settings.as_ref().err().map(String::as_str).unwrap_or_default();
+            bail!("{}: no case can be run; {}: {why}", name.display(), first.name());
+        }
         let all = cases::expand(&experiment, &source, &choice.unrestricted())?;
         let folder = self.folder(name, &text)?;
         let runner = Runner::new(&folder, threads)?;
@@ -158,6 +165,11 @@ fn run<'a>(cases: &'a [Case], runner: &Runner) -> Summary<'a> {
         cases.iter().map(|case| (case, runner.known(case))).collect();
     let open = all.iter().filter(|(_, status)| *status == Status::Open).count();
     eprintln!("{} cases, {open} of them to be run", cases.len());
+    for (case, status) in &all {
+        if let Status::Failed(why) = status {
+            eprintln!("failed: {}: {why}", case.name());
+        }
+    }
     let bar = progress::cases(open as u64);
     for (case, status) in all.iter_mut().filter(|(_, status)| *status == Status::Open) {
         if flag.load(Ordering::Relaxed) {
@@ -176,7 +188,7 @@ fn run<'a>(cases: &'a [Case], runner: &Runner) -> Summary<'a> {
         bar.inc(u64::from(*status != Status::Open));
     }
     bar.finish_and_clear();
-    Summary { all }
+    Summary::new(all)
 }
 
 fn end(summary: &Summary, folder: &Path) -> anyhow::Result<()> {
@@ -216,7 +228,6 @@ fn write(
     let text: String = shown.iter().map(tables::markdown).collect();
     file("tables.md")?.write(text.as_bytes())?;
     output::print(&text)?;
-    shown.push(tables::all(summary));
     let drawn = figures::Figures { experiment, summary, runner }.draw()?;
     let mut figures: Vec<Figure> = Vec::new();
     for (name, figure) in drawn.figures {
@@ -226,7 +237,9 @@ fn write(
     let report = Report {
         title: experiment.title.clone(),
         summary: sentences(experiment, summary),
+        parts: parts(experiment, summary),
         tables: shown,
+        details: vec![tables::all(summary), tables::levels_told(experiment)],
         figures,
         plots: drawn.plots,
         ..Report::default()
@@ -234,7 +247,21 @@ fn write(
     report.write(&file("report.html")?)
 }
 
-/// What was asked, what was measured, what it means.
+/// How it was measured, how to read it, what came out.
+fn parts(experiment: &Experiment, summary: &Summary) -> Vec<Part> {
+    let part = |heading: &str, text: Vec<String>| Part { heading: heading.to_owned(), text };
+    let orders =
+        experiment.table.iter().map(|asked| verdicts::of_table(experiment, summary, asked));
+    // The first table of qualities is the one that the experiment is about.
+    let orders = orders.into_iter().find(|all| !all.is_empty()).unwrap_or_default();
+    vec![
+        part("What came out", orders),
+        part("How to read it", experiment.reading.clone()),
+        part("How it was measured", experiment.setup.clone()),
+    ]
+}
+
+/// What was asked, what was run.
 fn sentences(experiment: &Experiment, summary: &Summary) -> Vec<String> {
     let mut lines = vec![format!("What was asked: {}", experiment.question)];
     let (all, done, open) = (summary.all.len(), summary.done().count(), summary.open());
@@ -242,15 +269,13 @@ fn sentences(experiment: &Experiment, summary: &Summary) -> Vec<String> {
     let seconds: f64 = summary.done().filter_map(|(_, results)| results["seconds"].as_f64()).sum();
     lines.push(format!(
         "What was run: {all} fits, of which {done} ended well, {failed} failed and {open} were not run to their end; \
-         {:.1} minutes of fitting in all.",
-        seconds / 60.0
+         {:.1} minutes of fitting in all, on {} threads. {}",
+        seconds / 60.0,
+        rayon::current_num_threads(),
+        summary.seeds()
     ));
     for (case, why) in summary.failed() {
         lines.push(format!("Failed: {}: {why}", case.name()));
     }
-    let verdicts =
-        experiment.table.iter().flat_map(|asked| tables::verdict(experiment, summary, asked));
-    lines.extend(verdicts);
-    lines.extend(experiment.reading.iter().cloned());
     lines
 }

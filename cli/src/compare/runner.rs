@@ -44,10 +44,9 @@ impl Runner {
         if let Err(error) = &case.settings {
             return Status::Failed(error.clone());
         }
-        let path = self.run_of(case).join("results.json");
-        let read = |text: String| serde_json::from_str(&text).ok();
-        match output::read_text(&path).ok().and_then(read) {
-            Some(results) if self.run_of(case).join("report.html").exists() => {
+        let run = self.run_of(case);
+        match results(&run) {
+            Some(results) if is_ours(&results) && run.join("report.html").exists() => {
                 Status::Done(results)
             }
             _ => Status::Open,
@@ -79,10 +78,11 @@ impl Runner {
         let program = std::env::current_exe().context("cannot find the program itself")?;
         let mut command = Command::new(program);
         command.arg("fit");
-        if run.join("fit.toml").is_file() {
+        // What another version has finished, or has not come so far as to have settings, is begun anew.
+        let is_foreign = results(&run).is_some_and(|results| !is_ours(&results));
+        if run.join("fit.toml").is_file() && !is_foreign {
             command.arg("--resume").arg(&run);
         } else {
-            // A run that has not come so far as to have settings holds nothing.
             if run.exists() {
                 std::fs::remove_dir_all(&run)
                     .with_context(|| format!("cannot clear {}", run.display()))?;
@@ -103,6 +103,17 @@ impl Runner {
             .context("cannot start the fit")?;
         Ok((status, output::read_text(&said).unwrap_or_default()))
     }
+}
+
+/// What a run has found, if it has come so far.
+fn results(run: &Path) -> Option<Value> {
+    let text = output::read_text(&run.join("results.json")).ok()?;
+    serde_json::from_str(&text).ok()
+}
+
+/// Whether results are of this version of the program: another may find something else.
+fn is_ours(results: &Value) -> bool {
+    results["version"] == env!("CARGO_PKG_VERSION")
 }
 
 /// What a process that did not succeed has said at last.

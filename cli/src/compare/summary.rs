@@ -9,6 +9,8 @@ use std::collections::BTreeMap;
 pub struct Summary<'a> {
     /// In the order of the cases.
     pub all: Vec<(&'a Case, Status)>,
+    /// How many seeds there are.
+    pub seeds: u64,
 }
 
 /// Mean and standard deviation over some cases.
@@ -38,10 +40,16 @@ impl Spread {
     /// `12.34 ± 0.56`.
     pub fn text(&self, digits: usize) -> String {
         if self.count < 2 {
-            return format!("{:.digits$}", self.mean);
+            return number(self.mean, digits);
         }
-        format!("{:.digits$} ± {:.digits$}", self.mean, self.deviation)
+        format!("{} ± {}", number(self.mean, digits), number(self.deviation, digits))
     }
+}
+
+/// A number with so many digits behind the point, or in powers of ten where none of them would tell.
+pub fn number(x: f64, digits: usize) -> String {
+    let tells = x == 0.0 || x.abs() >= 5.0 * 10f64.powi(-(digits as i32));
+    if tells { format!("{x:.digits$}") } else { format!("{x:.1e}") }
 }
 
 /// Results that are shown: their names in results.json, what they are called, their units and digits.
@@ -77,7 +85,18 @@ pub fn result(results: &Value, value: &str) -> Option<f64> {
     results[value].as_f64().filter(|x| x.is_finite())
 }
 
-impl Summary<'_> {
+impl<'a> Summary<'a> {
+    /// Of these cases.
+    pub fn new(all: Vec<(&'a Case, Status)>) -> Self {
+        let seeds = all.iter().map(|(case, _)| case.seed).max().unwrap_or(1);
+        Summary { all, seeds }
+    }
+
+    /// Which seeds a plot shows.
+    pub fn seeds(&self) -> String {
+        if self.seeds == 1 { "One seed.".to_owned() } else { format!("All {} seeds.", self.seeds) }
+    }
+
     /// Those that succeeded.
     pub fn done(&self) -> impl Iterator<Item = (&Case, &Value)> {
         self.all.iter().filter_map(|(case, status)| match status {
@@ -209,6 +228,10 @@ mod tests {
         let three = Spread::of(&[1.0, 2.0, 3.0]).unwrap();
         assert_eq!((three.mean, three.deviation), (2.0, 1.0));
         assert_eq!(three.text(2), "2.00 ± 1.00");
+        assert_eq!(
+            [number(0.0004, 3), number(0.0, 3), number(-0.25, 2)],
+            ["4.0e-4", "0.000", "-0.25"]
+        );
     }
 
     #[test]

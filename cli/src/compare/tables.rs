@@ -1,8 +1,9 @@
-//! Tables of means over seeds, and what they say in a sentence.
+//! Tables of means over seeds.
 
-use super::experiment::{Experiment, TableAsked};
-use super::summary::{Spread, Summary, called, combinations, described, pairs};
+use super::experiment::{Beside, Experiment, TableAsked};
+use super::summary::{Spread, Summary, called, combinations, described, number, pairs};
 use crate::report::Table;
+use toml::Value;
 
 /// Levels of factors, without those that no case is at.
 pub fn levels(
@@ -30,7 +31,7 @@ pub fn table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) -> 
     let cell = |row: &[(&str, &str)], column: &[(&str, &str)]| {
         summary.spread(&asked.value, &[row, column, &fixed].concat())
     };
-    let text = |spread: Option<Spread>| spread.map_or("–".to_owned(), |s| s.text(digits));
+    let text = |spread: Option<Spread>| spread.map_or(NONE.to_owned(), |s| s.text(digits));
     let mut lines = Vec::new();
     for row in &rows {
         let cells: Vec<Option<Spread>> = columns.iter().map(|column| cell(row, column)).collect();
@@ -42,22 +43,89 @@ pub fn table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) -> 
     if lines.is_empty() {
         return None;
     }
+    lines.extend(asked.beside.iter().map(|row| beside(experiment, asked, row, &columns, digits)));
+    let gaps = lines.iter().flatten().any(|cell| cell == NONE);
     let head = asked.rows.join(", ");
     let names = columns.iter().map(|column| match column.as_slice() {
         [] => unit.clone(),
         levels => called(levels),
     });
-    let seeds = summary.all.iter().map(|(case, _)| case.seed).max().unwrap_or(1);
-    let spread = match seeds {
+    let spread = match summary.seeds {
         1 => "One seed.".to_owned(),
         seeds => format!("Mean ± standard deviation over {seeds} seeds."),
     };
+    let gaps = if gaps { " –: not asked for, or not there." } else { "" };
     Some(Table {
         title: format!("{}: {unit}", asked.title),
-        caption: format!("{} {spread}", asked.caption),
+        caption: format!("{} {spread}{gaps}", asked.caption),
         head: std::iter::once(head).chain(names).collect(),
         rows: lines,
+        links: Vec::new(),
     })
+}
+
+/// What stands where there is no number.
+const NONE: &str = "–";
+
+/// A row of numbers from elsewhere, of the columns that are shown.
+fn beside(
+    experiment: &Experiment,
+    asked: &TableAsked,
+    row: &Beside,
+    columns: &[Vec<(&str, &str)>],
+    digits: usize,
+) -> Vec<String> {
+    let names = |factor: &String| {
+        let levels = experiment.levels(factor).into_iter().map(|level| level.name);
+        (factor.clone(), levels.collect::<Vec<String>>())
+    };
+    let every: Vec<(String, Vec<String>)> = asked.columns.iter().map(names).collect();
+    let every = combinations(&every);
+    let value = |column: &Vec<(&str, &str)>| {
+        let at = every.iter().position(|other| other == column);
+        at.and_then(|k| row.values.get(k)).copied().filter(|x| x.is_finite())
+    };
+    let cell = |column| value(column).map_or(NONE.to_owned(), |x| number(x, digits));
+    std::iter::once(row.name.clone()).chain(columns.iter().map(cell)).collect()
+}
+
+/// What the levels of each factor change.
+pub fn levels_told(experiment: &Experiment) -> Table {
+    let mut rows = Vec::new();
+    for factor in &experiment.factor {
+        for level in factor.levels() {
+            let mut changes = Vec::new();
+            if let Some(fit) = &level.fit {
+                changes.push(format!("the fit {}", fit.display()));
+            }
+            flatten("", &Value::Table(level.set), &mut changes);
+            changes.extend(level.remove.iter().map(|key| format!("no {key}")));
+            let changes =
+                if changes.is_empty() { "nothing".to_owned() } else { changes.join("; ") };
+            rows.push(vec![format!("{}: {}", factor.name, level.name), changes]);
+        }
+    }
+    Table {
+        title: "What the cases differ in".to_owned(),
+        caption: "Settings that each level changes; all others are those of its fit.".to_owned(),
+        head: vec!["level".to_owned(), "settings".to_owned()],
+        rows,
+        links: Vec::new(),
+    }
+}
+
+/// Keys with dots and their values.
+fn flatten(before: &str, value: &Value, into: &mut Vec<String>) {
+    match value {
+        Value::Table(table) if !table.is_empty() => {
+            for (key, value) in table {
+                let dot = if before.is_empty() { "" } else { "." };
+                flatten(&format!("{before}{dot}{key}"), value, into);
+            }
+        }
+        Value::Table(_) => into.push(before.to_owned()),
+        value => into.push(format!("{before} = {value}")),
+    }
 }
 
 /// All cases, those that failed and those still to be run included: nothing is left out.
@@ -71,8 +139,8 @@ pub fn all(summary: &Summary) -> Table {
         match status {
             super::runner::Status::Done(results) => {
                 let cell = |key: &&str| match super::summary::result(results, key) {
-                    Some(x) => format!("{x:.*}", described(key).1),
-                    None => "–".to_owned(),
+                    Some(x) => number(x, described(key).1),
+                    None => NONE.to_owned(),
                 };
                 row.extend(shown.iter().map(cell));
             }
@@ -84,42 +152,14 @@ pub fn all(summary: &Summary) -> Table {
     };
     Table {
         title: "All cases".to_owned(),
-        caption: "Every seed of every case; each has a page of its own in its folder under cases/."
+        caption: "Every seed of every case; the first column leads to its own page, while this page lies in its folder. \
+                  χ² is the mean square of the residuals in units of the errors that the loss assumes, also where \
+                  data are noise-free."
             .to_owned(),
         head,
         rows: summary.all.iter().map(row).collect(),
+        links: summary.all.iter().map(|(case, _)| format!("cases/{}/report.html", case.slug)).collect(),
     }
-}
-
-/// The order of the rows in each column of a table of qualities, in words.
-pub fn verdict(experiment: &Experiment, summary: &Summary, asked: &TableAsked) -> Vec<String> {
-    let larger_is_better = ["psnr_db", "psnr_inside_db", "correlation", "axis_dot_truth"];
-    if !larger_is_better.contains(&asked.value.as_str()) {
-        return Vec::new();
-    }
-    let (unit, digits) = described(&asked.value);
-    let rows = levels(experiment, summary, &asked.rows);
-    let columns = levels(experiment, summary, &asked.columns);
-    let fixed = pairs(&asked.r#where);
-    let mut sentences = Vec::new();
-    for column in combinations(&columns) {
-        let mut ranked: Vec<(String, Spread)> = combinations(&rows)
-            .into_iter()
-            .filter_map(|row| {
-                let at = [row.as_slice(), &column, &fixed].concat();
-                Some((called(&row), summary.spread(&asked.value, &at)?))
-            })
-            .collect();
-        if ranked.len() < 2 {
-            continue;
-        }
-        ranked.sort_by(|a, b| b.1.mean.total_cmp(&a.1.mean));
-        let order: Vec<String> =
-            ranked.iter().map(|(name, s)| format!("{name} ({})", s.text(digits))).collect();
-        let what = if column.is_empty() { String::new() } else { format!(", {}", called(&column)) };
-        sentences.push(format!("{}{what}, by {unit}: {}.", asked.title, order.join(" > ")));
-    }
-    sentences
 }
 
 /// The table in Markdown.

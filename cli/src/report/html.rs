@@ -1,6 +1,6 @@
 //! The page around everything else. All text from outside goes through [`escape`].
 
-use super::{Figure, LinePlot, Outcome, Report, Setting, Table};
+use super::{Figure, LinePlot, Outcome, Part, Report, Setting, Table};
 use std::fmt::Write;
 
 const PAGE: &str = include_str!("assets/page.html");
@@ -25,11 +25,13 @@ pub fn escape(text: &str) -> String {
 pub fn page(report: &Report) -> anyhow::Result<String> {
     let sections = [
         summary(&report.summary),
+        report.parts.iter().map(part).collect(),
         section("results", "Results", &results(&report.results)),
-        section("tables", "Tables", &report.tables.iter().map(one_table).collect::<String>()),
+        section("tables", "Tables", &tables(&report.tables)),
         report.view.as_ref().map(super::View3d::html).transpose()?.unwrap_or_default(),
         section("pictures", "Pictures", &report.figures.iter().map(figure).collect::<String>()),
         section("plots", "Plots", &plots(&report.plots)?),
+        section("details", "Details", &tables(&report.details)),
         section("settings", "Settings", &settings(&report.settings)),
     ];
     let parts = [
@@ -71,9 +73,29 @@ fn summary(sentences: &[String]) -> String {
     if text.is_empty() { text } else { format!("<section id=\"summary\">\n{text}</section>\n") }
 }
 
+fn part(part: &Part) -> String {
+    let paragraph = |sentence: &String| format!("<p>{}</p>\n", escape(sentence));
+    let text: String = part.text.iter().map(paragraph).collect();
+    if text.is_empty() {
+        text
+    } else {
+        format!("<section>\n<h2>{}</h2>\n{text}</section>\n", escape(&part.heading))
+    }
+}
+
+fn tables(all: &[Table]) -> String {
+    all.iter().map(one_table).collect()
+}
+
 fn one_table(shown: &Table) -> String {
     let head: Vec<String> = shown.head.iter().map(|name| escape(name)).collect();
-    let rows = shown.rows.iter().map(|row| row.iter().map(|cell| escape(cell)).collect());
+    let rows = shown.rows.iter().enumerate().map(|(k, row)| {
+        let mut cells: Vec<String> = row.iter().map(|cell| escape(cell)).collect();
+        if let (Some(first), Some(link)) = (cells.first_mut(), shown.links.get(k)) {
+            *first = format!("<a href=\"{}\">{first}</a>", escape(link));
+        }
+        cells
+    });
     let (title, caption) = (escape(&shown.title), escape(&shown.caption));
     format!("<h3>{title}</h3>\n<p>{caption}</p>\n{}", table(&head, rows))
 }

@@ -21,6 +21,8 @@ pub struct Report {
     pub title: String,
     /// Sentences: what was asked, what was measured, what it means.
     pub summary: Vec<String>,
+    /// Paragraphs under headings.
+    pub parts: Vec<Part>,
     /// What was measured.
     pub results: Vec<Outcome>,
     /// Further tables.
@@ -31,8 +33,19 @@ pub struct Report {
     pub figures: Vec<Figure>,
     /// Curves and points with axes.
     pub plots: Vec<LinePlot>,
+    /// Tables for whoever wants to know everything.
+    pub details: Vec<Table>,
     /// What was asked for.
     pub settings: Vec<Setting>,
+}
+
+/// Paragraphs under a heading.
+#[derive(Debug)]
+pub struct Part {
+    /// The heading.
+    pub heading: String,
+    /// What stands under it.
+    pub text: Vec<String>,
 }
 
 /// A table.
@@ -46,6 +59,8 @@ pub struct Table {
     pub head: Vec<String>,
     /// Its lines, as long as the head.
     pub rows: Vec<Vec<String>>,
+    /// Where the first cells of the rows lead; nowhere if there are fewer.
+    pub links: Vec<String>,
 }
 
 /// A line of the table of settings.

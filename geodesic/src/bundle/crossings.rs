@@ -59,6 +59,12 @@ pub struct Crossing {
     pub error: f64,
 }
 
+/// Some values of a column; none if they are not all there.
+#[inline]
+fn part(column: &Column, span: core::ops::Range<usize>) -> core::slice::Iter<'_, f64> {
+    column.get(span).unwrap_or_default().iter()
+}
+
 impl Crossings {
     /// The most crossings per ray that were asked for.
     pub fn per_ray(&self) -> usize {
@@ -97,18 +103,18 @@ impl Crossings {
 
     /// The crossings of ray number `k`, in the order of the backward ray; none if there is no
     /// such ray.
-    pub fn ray(&self, k: usize) -> impl Iterator<Item = Crossing> + '_ {
+    #[inline]
+    pub fn ray(&self, k: usize) -> impl Iterator<Item = Crossing> + Clone + '_ {
         let first = k.saturating_mul(self.per_ray);
-        let span = first..first.saturating_add(self.per_ray).min(self.radius.len());
-        span.map_while(|j| {
-            let crossing = Crossing {
-                delay: self.delay[j],
-                radius: self.radius[j],
-                azimuth: self.azimuth[j],
-                mino_time: self.mino_time[j],
-                error: self.error[j],
-            };
-            (!crossing.mino_time.is_nan()).then_some(crossing)
+        let span = first..first.saturating_add(self.per_ray);
+        let of = |column| part(column, span.clone());
+        let place = of(&self.delay).zip(of(&self.radius)).zip(of(&self.azimuth));
+        let all = place.zip(of(&self.mino_time)).zip(of(&self.error));
+        all.map_while(|((((delay, radius), azimuth), mino_time), error)| {
+            let (delay, radius, azimuth) = (*delay, *radius, *azimuth);
+            let crossing =
+                Crossing { delay, radius, azimuth, mino_time: *mino_time, error: *error };
+            (!mino_time.is_nan()).then_some(crossing)
         })
     }
 
@@ -116,6 +122,7 @@ impl Crossings {
     ///
     /// # Panics
     /// If there is no such ray.
+    #[inline]
     pub fn ends(&self, k: usize) -> RayEnds {
         let [duration, escapes, count, doubt] = &self.rays;
         RayEnds {

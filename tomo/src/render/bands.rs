@@ -14,8 +14,9 @@ use std::sync::{Mutex, PoisonError};
 #[derive(Debug, Clone)]
 pub(super) struct Band {
     pub index: usize,
-    /// Row by row, of each channel; intensities in the scene's unit.
+    /// Row by row, of each channel; intensities in the raster's unit.
     pub channels: Vec<Vec<f32>>,
+    /// In the scene's unit.
     pub tally: Tally,
 }
 
@@ -115,7 +116,8 @@ impl Raster {
         }
         let mut channels = Vec::with_capacity(self.channels.len());
         for kind in &self.channels {
-            let values: Vec<f32> = pixels.iter().map(|pixel| kind.value(pixel)).collect();
+            let unit = if kind.scales { self.unit } else { 1.0 };
+            let values: Vec<f32> = pixels.iter().map(|pixel| kind.value(pixel, unit)).collect();
             if !values.iter().all(|value| value.is_finite()) {
                 return Err(RenderError::NotFinite { channel: kind.name });
             }

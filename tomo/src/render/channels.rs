@@ -28,9 +28,9 @@ impl std::fmt::Debug for ChannelKind {
 }
 
 impl ChannelKind {
-    /// The value of a pixel as it is kept.
-    pub(super) fn value(&self, pixel: &Pixel) -> f32 {
-        (self.value)(pixel) as f32
+    /// The value of a pixel as it is kept, times `unit`.
+    pub(super) fn value(&self, pixel: &Pixel, unit: f64) -> f32 {
+        ((self.value)(pixel) * unit) as f32
     }
 
     const fn new(

@@ -89,7 +89,7 @@ impl Raster {
         mut reduction: Option<&mut Reduction>,
         each: &mut dyn FnMut(usize, Vec<u8>) -> Result<()>,
     ) -> Result<()> {
-        let rescale = summary.unit_factor != 1.0;
+        let rescale = summary.unit_factor != self.unit;
         let values = reduction.is_some() || rescale;
         let bands: Vec<usize> = (0..self.layout.bands()).collect();
         let height = self.layout.rows(0).len();
@@ -119,8 +119,12 @@ impl Raster {
         Ok(())
     }
 
-    /// From the scene's unit of intensity to that of the file.
+    /// From the raster's unit of intensity to that of the file, which is `factor` times the scene's.
     pub(super) fn rescale(&self, channels: &mut [Vec<f32>], factor: f64) {
+        let factor = factor / self.unit;
+        if factor == 1.0 {
+            return;
+        }
         for (kind, values) in self.channels.iter().zip(channels) {
             if kind.scales {
                 values.iter_mut().for_each(|value| *value = (f64::from(*value) * factor) as f32);

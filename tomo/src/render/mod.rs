@@ -24,7 +24,7 @@ use crate::transport::{Assets, Glimpse, Meter, Scratch, Stage};
 use grid::Grid;
 use kerrlight_geodesic::OutOfRange;
 use std::sync::{Mutex, PoisonError};
-use tally::Tally;
+use tally::{Tally, own_unit};
 
 /// Told how many more rows of pixels are done; returns whether to go on.
 pub type Progress<'a> = dyn Fn(usize) -> bool + Sync + 'a;
@@ -68,6 +68,9 @@ pub struct Raster {
     grid: Grid,
     channels: Vec<&'static ChannelKind>,
     layout: Layout,
+    /// Factor from the scene's unit of intensity to that in which bands are kept: the file's,
+    /// unless it is to be found from the whole picture.
+    unit: f64,
     /// Columns of a tile.
     tile: usize,
     /// Where the time goes, if that is asked.
@@ -92,7 +95,9 @@ impl Raster {
         let channels = channels::chosen(&stage, refined, scene.screen.channels.as_deref())?;
         let names: Vec<&str> = channels.iter().map(|kind| kind.name).collect();
         let layout = Layout::new(grid.width, grid.height, &names)?;
-        Ok(Raster { scene: scene.clone(), stage, grid, channels, layout, tile: TILE, meter: None })
+        let unit = if scene.screen.total_flux_jy.is_none() { own_unit(scene) } else { 1.0 };
+        let scene = scene.clone();
+        Ok(Raster { scene, stage, grid, channels, layout, unit, tile: TILE, meter: None })
     }
 
     /// The same with tiles of `columns` pixels; no pixel depends on it.
@@ -150,7 +155,8 @@ impl Raster {
     /// that the scene names are not in it.
     pub fn identity(&self) -> String {
         let version = env!("CARGO_PKG_VERSION");
-        format!("kerrlight {version}\n{}\n{:?}\n", self.scene.to_toml(), self.names())
+        let (scene, names) = (self.scene.to_toml(), self.names());
+        format!("kerrlight {version}\n{scene}\n{names:?}\nin {:e} scene units\n", self.unit)
     }
 
     /// Names of the channels.

@@ -8,7 +8,7 @@ use crate::image::{Channel, Picture};
 use crate::scene::Scene;
 use std::sync::{Mutex, PoisonError};
 
-/// A picture in the scene's own unit of intensity.
+/// A picture in its raster's unit of intensity.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Raw {
     /// Row by row, of each channel.

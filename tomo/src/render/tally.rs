@@ -137,8 +137,7 @@ impl Summary {
     /// Factor from the scene's unit of intensity to that of the file, for a picture with these
     /// sums; the sum itself where there is no light to scale.
     pub(super) fn factor(scene: &Scene, tally: &Tally) -> Result<f64, f64> {
-        // Gas shines in physical units.
-        let own = if scene.gas.is_some() { JY_PER_SQUARE_UAS } else { 1.0 };
+        let own = own_unit(scene);
         let asked = |jy: f64| jy / (tally.intensity * pixel_area(scene));
         let factor = scene.screen.total_flux_jy.map_or(own, asked);
         if factor.is_normal() { Ok(factor) } else { Err(tally.intensity) }
@@ -167,6 +166,12 @@ impl Summary {
             image_error: if tally.intensity > 0.0 { error / tally.intensity } else { 0.0 },
         })
     }
+}
+
+/// Factor from the scene's unit of intensity to that of a file whose flux is not asked for: gas
+/// shines in physical units.
+pub(super) fn own_unit(scene: &Scene) -> f64 {
+    if scene.gas.is_some() { JY_PER_SQUARE_UAS } else { 1.0 }
 }
 
 /// Of a pixel, in µas²; a camera's in the middle of the picture.

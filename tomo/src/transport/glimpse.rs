@@ -157,6 +157,9 @@ impl Place {
 
 /// Into \[−π, π\].
 pub(super) fn wrap(angle: f64) -> f64 {
-    use core::f64::consts::TAU;
+    use core::f64::consts::{PI, TAU};
+    if angle.abs() <= PI {
+        return angle;
+    }
     angle - TAU * (angle / TAU).round()
 }

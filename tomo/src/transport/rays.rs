@@ -7,7 +7,7 @@ use super::{Scratch, Stage};
 use crate::emission::disc::DiscModel;
 use crate::transport::glimpse::Place;
 use kerrlight_geodesic::analytic::ClosedForm;
-use kerrlight_geodesic::bundle::{Crossing, RayEnds};
+use kerrlight_geodesic::bundle::{Crossing, RayEnds, Samples};
 use kerrlight_geodesic::{Observer, OutOfRange, Outcome, Ray, Want};
 use std::sync::Arc;
 
@@ -51,7 +51,7 @@ pub(super) enum End {
 }
 
 /// Crossings that the SIMD kernel is asked for; rays with more go step by step.
-const MOST_HITS: usize = 4;
+pub(super) const MOST_HITS: usize = 4;
 
 impl Stage {
     /// Traces a block of rays in closed form.
@@ -86,18 +86,12 @@ impl Stage {
                 let found = scratch.crossings.ray(k).enumerate();
                 scratch.hits.extend(found.map(|(number, crossing)| Hit {
                     rates: rates(number, &crossing),
-                    mino_time: crossing.mino_time,
-                    place: Place {
-                        radius: crossing.radius,
-                        azimuth: crossing.azimuth,
-                        delay: crossing.delay,
-                    },
-                    depth: 0.0,
+                    ..Hit::new(&crossing)
                 }));
             }
             let found = scratch.hits.len() - first;
             let until = ray.as_ref().map_or(f64::INFINITY, |ray| self.until(ray));
-            let surface = self.surface(&scratch.hits[first..], until);
+            let surface = self.surface(scratch.hits[first..].iter().copied(), until);
             let missing = self.disc.is_some()
                 && surface.is_none()
                 && found < (ends.crossings as usize).min(self.most_hits());
@@ -116,32 +110,38 @@ impl Stage {
                     || ray.as_ref().is_some_and(|ray| self.needs_path(ray, trees)),
             });
         }
-        if self.sky.is_some() { self.find_exits(observer, alpha, beta, scratch) } else { Ok(()) }
-    }
-
-    /// Where rays that escape go.
-    fn find_exits(
-        &self,
-        observer: &Observer,
-        alpha: &[f64],
-        beta: &[f64],
-        scratch: &mut Scratch,
-    ) -> Result<(), OutOfRange> {
+        if self.sky.is_none() {
+            return Ok(());
+        }
         let leaves =
             |sight: &Sight| sight.end == End::Escaped && sight.surface.is_none() && !sight.by_steps;
-        let sights = &mut scratch.sights;
+        let Scratch { sights, samples, .. } = scratch;
         let outward: Vec<usize> = (0..sights.len()).filter(|k| leaves(&sights[*k])).collect();
+        self.find_exits(observer, (alpha, beta), &outward, samples, |k, exit| {
+            sights[k].exit = Some(exit);
+        })
+    }
+
+    /// Tells for the rays of `outward`, which escape, where they go.
+    pub(super) fn find_exits(
+        &self,
+        observer: &Observer,
+        (alpha, beta): (&[f64], &[f64]),
+        outward: &[usize],
+        samples: &mut Samples,
+        mut tell: impl FnMut(usize, [f64; 3]),
+    ) -> Result<(), OutOfRange> {
         if outward.is_empty() {
             return Ok(());
         }
         let pick = |column: &[f64]| outward.iter().map(|k| column[*k]).collect::<Vec<_>>();
         let (alpha, beta) = (pick(alpha), pick(beta));
-        scratch.samples.trace(&self.hole, observer, &alpha, &beta, 2)?;
+        samples.trace(&self.hole, observer, &alpha, &beta, 2)?;
         for (j, k) in outward.iter().enumerate() {
-            let ray = scratch.samples.ray(j);
+            let ray = samples.ray(j);
             let (sin, u) = ray.theta[1].sin_cos();
             let (y, x) = ray.azimuth[1].sin_cos();
-            sights[*k].exit = Some([sin * x, sin * y, u]);
+            tell(*k, [sin * x, sin * y, u]);
         }
         Ok(())
     }
@@ -178,7 +178,7 @@ impl Stage {
         let hits = first..hits.len();
         let until = self.until(ray);
         let hidden = self.meet_meshes(ray, scratch).filter(|time| *time <= until);
-        let disc = self.surface(&scratch.hits[hits.clone()], until);
+        let disc = self.surface(scratch.hits[hits.clone()].iter().copied(), until);
         let surface = match (disc, hidden) {
             (Some(disc), Some(mesh)) => Some(disc.min(mesh)),
             (one, other) => one.or(other),
@@ -241,6 +241,6 @@ impl<'a> PlaneMotion<'a> {
 }
 
 /// Whether a ray of the closed form has lost digits that the tolerance asks for.
-fn doubtful(error: f64, tolerance: f64) -> bool {
+pub(super) fn doubtful(error: f64, tolerance: f64) -> bool {
     error.is_nan() || error > tolerance.max(1e-11)
 }

@@ -133,7 +133,7 @@ impl Stage {
             crossings: hits.len() as u32,
             total: line.parameter(line.ends[1]),
             until: f64::INFINITY,
-            surface: self.surface(&scratch.hits[hits.clone()], f64::INFINITY),
+            surface: self.surface(scratch.hits[hits.clone()].iter().copied(), f64::INFINITY),
             hits,
             exit: Some(line.exit()).filter(|_| end == End::Escaped),
             by_steps: false,

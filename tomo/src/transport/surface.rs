@@ -1,10 +1,11 @@
 //! Light of the thin disc.
 
 use super::Stage;
-use super::glimpse::{Gather, Place, wrap};
+use super::glimpse::{Gather, Place};
 use super::polarized::share;
 use crate::emission::disc::{DiscModel, Photon};
 use kerrlight_geodesic::ScreenPoint;
+use kerrlight_geodesic::bundle::Crossing;
 
 /// Where a ray crosses the equatorial plane.
 #[derive(Debug, Clone, Copy)]
@@ -26,39 +27,59 @@ pub(super) struct Seen<'a> {
     pub screen: Option<&'a ScreenPoint>,
     /// What a camera adds to the redshift.
     pub shift: Option<f64>,
+    /// Spectral index α, if redshift is simulated.
+    pub redshift: Option<f64>,
+}
+
+impl Hit {
+    /// A crossing of the closed form, without its rates.
+    pub fn new(crossing: &Crossing) -> Self {
+        let Crossing { radius, azimuth, delay, mino_time, .. } = *crossing;
+        Hit { mino_time, place: Place { radius, azimuth, delay }, rates: [0.0; 2], depth: 0.0 }
+    }
 }
 
 impl Stage {
     /// The first of `hits` before Mino time `until` that hides the rest.
-    pub(super) fn surface(&self, hits: &[Hit], until: f64) -> Option<f64> {
+    pub(super) fn surface(&self, hits: impl Iterator<Item = Hit>, until: f64) -> Option<f64> {
         let disc = self.disc.as_ref().filter(|disc| disc.opaque)?;
-        let mut times = hits.iter().filter(|hit| disc.covers(hit.place.radius));
+        let mut times = hits.filter(|hit| disc.covers(hit.place.radius));
         times.next().map(|hit| hit.mino_time).filter(|time| *time <= until)
     }
 
     /// Light of the disc: I = g^{3+α} I_em at every crossing up to Mino time `end`.
-    pub(super) fn add_disc(&self, hits: &[Hit], seen: Seen<'_>, end: f64, gather: &mut Gather) {
+    ///
+    /// Always inlined: who knows that an effect is off asks nothing about it.
+    #[inline(always)]
+    pub(super) fn add_disc(
+        &self,
+        hits: impl Iterator<Item = Hit>,
+        seen: Seen<'_>,
+        end: f64,
+        gather: &mut Gather,
+    ) {
         let Some(disc) = &self.disc else { return };
-        for (number, hit) in hits.iter().take_while(|hit| hit.mino_time <= end).enumerate() {
+        for (number, hit) in hits.take_while(|hit| hit.mino_time <= end).enumerate() {
             if disc.covers(hit.place.radius) {
                 let kind = if disc.plunges_at(hit.place.radius) { 16 } else { 0 };
                 gather.disc_images |= 1 << (kind + number.min(15));
-                self.add_hit(disc, hit, seen, gather);
+                self.add_hit(disc, &hit, seen, gather);
             }
         }
     }
 
+    #[inline(always)]
     fn add_hit(&self, disc: &DiscModel, hit: &Hit, seen: Seen<'_>, gather: &mut Gather) {
-        let Seen { lambda, eta, screen, shift } = seen;
+        let Seen { lambda, eta, screen, shift, redshift } = seen;
         let r = hit.place.radius;
-        let g = match self.redshift {
+        let g = match redshift {
             Some(_) => disc.redshift(r, &Photon { lambda, eta, outward: hit.rates[0] > 0.0 }),
             None => 1.0,
         };
         let stokes = screen.map(|screen| self.polarized_hit(disc, hit, lambda, screen));
         let boost = match stokes {
             Some(stokes) => stokes.i,
-            None => self.redshift.map_or(1.0, |index| g.powf(3.0 + index)),
+            None => redshift.map_or(1.0, |index| g.powf(3.0 + index)),
         };
         let mut intensity = boost * disc.intensity(r);
         if hit.depth > 0.0 {
@@ -68,7 +89,6 @@ impl Stage {
         if let Some(stokes) = stokes {
             gather.add_stokes(intensity, share(&stokes));
         }
-        let azimuth = wrap(hit.place.azimuth);
-        gather.mark(intensity, Place { azimuth, ..hit.place });
+        gather.mark(intensity, hit.place);
     }
 }

@@ -1,6 +1,7 @@
 use super::*;
 use crate::scene::Spot;
 
+mod bare;
 mod discs;
 mod meshes;
 mod volumes;

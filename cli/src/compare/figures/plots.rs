@@ -34,21 +34,21 @@ impl Figures<'_> {
                         points.push([x, y]);
                     }
                 }
-                if !points.is_empty() {
-                    points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-                    series.push(Series {
-                        name: called(&row),
-                        points,
-                        errors: Vec::new(),
-                        marks: Marks::Points,
-                    });
-                }
+                points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+                // One without points keeps the colours of the others as they are in other plots.
+                let name = called(&row);
+                series.push(Series { name, points, errors: Vec::new(), marks: Marks::Points });
             }
             let (unit, _) = described(value);
+            let seeds = self.summary.seeds();
             for part in series_of(series) {
                 plots.push(LinePlot {
                     title: [asked.title.clone(), called(&column)].join(": "),
-                    caption: format!("{} All seeds.", asked.caption),
+                    caption: format!(
+                        "{} {seeds} The last point of each is the end of the whole process, with the simulation of the \
+                         data and the pictures; those before it count the fit alone.",
+                        asked.caption
+                    ),
                     x: Axis { label: "wall time".to_owned(), unit: "s".to_owned(), log: true },
                     y: Axis { label: unit.clone(), unit: String::new(), log: false },
                     series: part,
@@ -91,7 +91,7 @@ impl Figures<'_> {
         let (unit, _) = described(value);
         let plot = |series| LinePlot {
             title: asked.title.clone(),
-            caption: format!("{} All seeds.", asked.caption),
+            caption: format!("{} {}", asked.caption, self.summary.seeds()),
             x: Axis { label: factor.clone(), unit: String::new(), log: false },
             y: Axis { label: unit.clone(), unit: String::new(), log: false },
             series,
@@ -171,7 +171,8 @@ fn series_of(series: Vec<Series>) -> Vec<Vec<Series>> {
     let mut parts = Vec::new();
     let mut rest = series.into_iter().peekable();
     while rest.peek().is_some() {
-        parts.push(rest.by_ref().take(CURVES).collect());
+        parts.push(rest.by_ref().take(CURVES).collect::<Vec<Series>>());
     }
+    parts.retain(|part| part.iter().any(|series| !series.points.is_empty()));
     parts
 }

@@ -1,4 +1,8 @@
-//! Times a scene with each effect off and on, alone and together, and writes docs/effects.md.
+//! Times a scene with each effect off and on, alone and together, and a disc without effects against
+//! a loop that knows none, and writes docs/effects.md. `effects library N` and `effects loop N`
+//! run one of these two N times, for a profiler.
+
+mod off;
 
 use anyhow::Context;
 use kerrlight_tomo::scene::{Scene, apply_override};
@@ -9,10 +13,10 @@ use std::path::Path;
 use std::time::Instant;
 
 /// What is timed: a disc, gas, a hot spot and stars.
-const SCENE: &str = include_str!("effects.toml");
+const SCENE: &str = include_str!("scene.toml");
 
 /// The text around the table.
-const PAGE: &str = include_str!("effects.md");
+const PAGE: &str = include_str!("page.md");
 
 /// An effect: its name and the changes that switch it on.
 struct Effect {
@@ -21,11 +25,15 @@ struct Effect {
 }
 
 /// The order matters: polarisation needs the redshift.
-const EFFECTS: [Effect; 7] = [
+const EFFECTS: [Effect; 8] = [
     Effect { name: "lensing", on: &["effects.lensing=true"] },
     Effect { name: "redshift", on: &["effects.redshift=true"] },
     Effect { name: "slow light", on: &["effects.slow_light=true"] },
     Effect { name: "absorption", on: &["effects.absorption=true"] },
+    Effect {
+        name: "plunging matter",
+        on: &["disc.plunging.intensity=1.0", "disc.plunging.exponent=1.0"],
+    },
     Effect { name: "first half-orbit only", on: &["effects.half_orbits=1"] },
     Effect { name: "ray bundles", on: &["effects.ray_bundles=true"] },
     Effect {
@@ -46,6 +54,11 @@ const SIDE: usize = 64;
 const RUNS: usize = 5;
 
 fn main() -> anyhow::Result<()> {
+    let asked: Vec<String> = std::env::args().skip(1).collect();
+    if let [which, times] = &asked[..] {
+        return off::repeat(which, times.parse().context("a number of times")?);
+    }
+    let [library, plain] = off::compare()?;
     let mut table = String::new();
     let off = time(&[])?;
     writeln!(table, "| none, lensing apart | {off:.2} | | |")?;
@@ -69,9 +82,12 @@ fn main() -> anyhow::Result<()> {
     writeln!(table, "| no lensing, no spot | {straight:.2} | | |")?;
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
     let mut file = tempfile::NamedTempFile::new_in(&folder).context("docs")?;
-    file.write_all(PAGE.replace("TABLE\n", &table).as_bytes())?;
+    let dearer = 100.0 * (library / plain - 1.0);
+    let off = format!("{library:.3} µs against {plain:.3} µs a ray ({dearer:+.1} %)");
+    let page = PAGE.replace("TABLE\n", &table).replace("OFF", &off);
+    file.write_all(page.as_bytes())?;
     file.persist(folder.join("effects.md"))?;
-    print!("{table}");
+    print!("{table}\noff: {off}\n");
     Ok(())
 }
 

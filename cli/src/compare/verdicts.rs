@@ -1,0 +1,68 @@
+//! What tables of qualities say, in sentences.
+
+use super::experiment::{Experiment, TableAsked};
+use super::summary::{Summary, called, combinations, described, pairs};
+use super::tables::levels;
+
+/// Results of which more is better.
+const QUALITIES: [&str; 4] = ["psnr_db", "psnr_inside_db", "correlation", "axis_dot_truth"];
+
+/// Rows of a table in an order that some of its columns share.
+struct Order {
+    /// The best first.
+    rows: Vec<String>,
+    columns: Vec<String>,
+    /// Column by column, as the rows.
+    values: Vec<Vec<String>>,
+}
+
+impl Order {
+    fn sentence(&self, title: &str, unit: &str) -> String {
+        let of = |k: usize| {
+            let row: Vec<&str> = self.values.iter().map(|column| column[k].as_str()).collect();
+            row.join(" / ")
+        };
+        let rows: Vec<String> =
+            self.rows.iter().enumerate().map(|(k, name)| format!("{name} ({})", of(k))).collect();
+        let columns = self.columns.join(" / ");
+        let what = if columns.is_empty() { columns } else { format!(", {columns}") };
+        format!("{title}{what}, by {unit}: {}.", rows.join(" > "))
+    }
+}
+
+/// The order of the rows of a table of qualities: a sentence for columns of the same order.
+pub fn of_table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) -> Vec<String> {
+    if !QUALITIES.contains(&asked.value.as_str()) {
+        return Vec::new();
+    }
+    let (unit, digits) = described(&asked.value);
+    let rows = levels(experiment, summary, &asked.rows);
+    let columns = levels(experiment, summary, &asked.columns);
+    let fixed = pairs(&asked.r#where);
+    let mut orders: Vec<Order> = Vec::new();
+    for column in combinations(&columns) {
+        let mut ranked: Vec<_> = combinations(&rows)
+            .into_iter()
+            .filter_map(|row| {
+                let at = [row.as_slice(), &column, &fixed].concat();
+                Some((called(&row), summary.spread(&asked.value, &at)?))
+            })
+            .collect();
+        if ranked.len() < 2 {
+            continue;
+        }
+        ranked.sort_by(|a, b| b.1.mean.total_cmp(&a.1.mean));
+        let (rows, values): (Vec<_>, Vec<_>) =
+            ranked.into_iter().map(|(name, spread)| (name, spread.text(digits))).unzip();
+        match orders.iter_mut().find(|order| order.rows == rows) {
+            Some(order) => {
+                order.columns.push(called(&column));
+                order.values.push(values);
+            }
+            None => {
+                orders.push(Order { rows, columns: vec![called(&column)], values: vec![values] })
+            }
+        }
+    }
+    orders.iter().map(|order| order.sentence(&asked.title, &unit)).collect()
+}

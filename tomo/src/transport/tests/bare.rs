@@ -1,0 +1,62 @@
+//! Scenes of a disc and a sky alone have a shorter way to the same picture.
+
+use super::*;
+
+const DISC: [&str; 3] = ["disc.outer_edge=9.0", "disc.peak_intensity=2.0", "disc.opaque=true"];
+
+/// To the last bit the same as with every question asked, at several times, with rays that have
+/// to be traced by steps among them.
+#[test]
+fn exact_bare_scenes_against_the_general_way() {
+    let (clear, shift) = ("disc.opaque=false", "effects.redshift=false");
+    let sky = ["sky.checker.field_deg=15.0", "sky.checker.brightness=1.0"];
+    let hot = "disc.peak_temperature_k=9000.0";
+    let cases: [&[&str]; 7] = [
+        &DISC,
+        &[&DISC[..], &[shift]].concat(),
+        &[&DISC[..], &[clear, "tracer.tolerance=1e-13"]].concat(),
+        &[&DISC[..], &[clear, hot], &sky].concat(),
+        &[&DISC[..], &[shift], &sky].concat(),
+        &sky,
+        &[&DISC[..], &["observer.radius=40.0", "observer.azimuth_deg=20.0"]].concat(),
+    ];
+    let (mut lit, mut by_steps) = (0, 0);
+    for set in cases {
+        let scene = scene(&[set, &["tracer.integrator=\"elliptic\""]].concat());
+        let stage = Stage::new(&scene, None).unwrap();
+        assert!(stage.bare, "{set:?}");
+        let mut asked = stage.clone();
+        asked.bare = false;
+        let times = [30.0, 47.0];
+        let (found, expected) = (look(&stage, &times), look(&asked, &times));
+        let differ = found.iter().zip(&expected).filter(|(a, b)| a != b).count();
+        assert_eq!(differ, 0, "{set:?}");
+        lit += found.iter().filter(|seen| seen.rgb[0] > 0.0).count();
+        let mut scratch = Scratch::default();
+        let (alpha, beta) = screen(24, 24.0);
+        let mut seen = vec![Glimpse::default(); alpha.len()];
+        asked.look_many(&alpha, &beta, &[30.0], &mut scratch, &mut seen).unwrap();
+        by_steps += scratch.sights.iter().filter(|sight| sight.by_steps).count();
+    }
+    assert!(lit > 1_000 && by_steps > 10, "{lit} {by_steps}");
+}
+
+/// Whatever asks more of a ray takes the general way.
+#[test]
+fn exact_only_bare_scenes_are_bare() {
+    let field =
+        ["magnetic_field.vertical=1.0", "magnetic_field.radial=0.0", "magnetic_field.toroidal=0.0"];
+    let cases: [&[&str]; 4] = [
+        &["effects.half_orbits=1"],
+        &["effects.ray_bundles=true"],
+        &["disc.plunging.intensity=1.0", "disc.plunging.exponent=1.0"],
+        &[&["effects.polarization=true"], &field[..]].concat(),
+    ];
+    for set in cases {
+        let stage = Stage::new(&scene(&[&DISC[..], set].concat()), None).unwrap();
+        assert!(!stage.bare, "{set:?}");
+    }
+    let mut spotted = scene(&DISC);
+    spotted.spot = spots(1, None);
+    assert!(!Stage::new(&spotted, None).unwrap().bare);
+}
