@@ -145,7 +145,15 @@ fn values(cases: &[Value], levels: &Levels, value: &str) -> Vec<f64> {
     let is_at = |case: &&Value| {
         levels.iter().all(|(factor, level)| case["levels"][factor] == level.as_str())
     };
-    cases.iter().filter(is_at).filter_map(|case| case["results"][value].as_f64()).collect()
+    cases.iter().filter(is_at).filter_map(|case| result(&case["results"], value)).collect()
+}
+
+/// A result; `chi2` of a case with one kind of data is that of a datum.
+fn result(results: &Value, value: &str) -> Option<f64> {
+    match (value, results["chi2_per_datum"].as_object()) {
+        ("chi2", Some(each)) if each.len() == 1 => each.values().next()?.as_f64(),
+        _ => results[value].as_f64(),
+    }
 }
 
 fn named(levels: &Levels) -> String {
@@ -188,6 +196,8 @@ mod tests {
         assert!(expected.hold(&json!({})).is_err());
         let unbound = EXPECTED.replace("at_least = 50.0", "");
         assert!(Expected::parse(&unbound).is_err());
+        let fits = json!({"chi2_per_datum": {"image": 2.0}, "seconds": 3.0});
+        assert_eq!([result(&fits, "chi2"), result(&fits, "seconds")], [Some(2.0), Some(3.0)]);
     }
 
     /// The files that the program reads.

@@ -115,6 +115,9 @@ fn simulate(file: &FitFile, instrument: &Instrument) -> anyhow::Result<Measured>
     if seen.noise == Noise::Thermal {
         add_thermal_noise(&mut observation, file.seed);
     }
+    if let Some(systematic) = seen.systematic {
+        add_systematic("observation.systematic", systematic, &mut observation)?;
+    }
     let frame = |time: f64| hours.partition_point(|hour| *hour < time - 1e-9).min(hours.len() - 1);
     let of_rows = observation.rows.iter().map(|row| frame(row.time_h)).collect();
     Ok(Measured {
@@ -124,6 +127,17 @@ fn simulate(file: &FitFile, instrument: &Instrument) -> anyhow::Result<Measured>
         sky: Some(sky),
         truth: Some(truth),
     })
+}
+
+/// Adds a part of each amplitude to its error in quadrature.
+fn add_systematic(name: &str, part: f64, observation: &mut Observation) -> anyhow::Result<()> {
+    if !(part >= 0.0 && part.is_finite()) {
+        bail!("{name} = {part} is not allowed: 0 or above");
+    }
+    for row in &mut observation.rows {
+        row.noise_sigma[0] = row.noise_sigma[0].hypot(part * row.products[0].norm());
+    }
+    Ok(())
 }
 
 fn gain_errors(gains: Gains) -> anyhow::Result<GainErrors> {
@@ -189,10 +203,8 @@ fn read(file: &FitFile, data: &DataFiles, folder: &Path) -> anyhow::Result<Measu
             })
         }
         DataFiles::Visibilities { path, average_s, systematic, first_time } => {
-            for (name, value) in [("average_s", average_s), ("systematic", systematic)] {
-                if !(*value >= 0.0 && value.is_finite()) {
-                    bail!("data.visibilities.{name} = {value} is not allowed: 0 or above");
-                }
+            if !(*average_s >= 0.0 && average_s.is_finite()) {
+                bail!("data.visibilities.average_s = {average_s} is not allowed: 0 or above");
             }
             let path = folder.join(path);
             let (_, observation) = crate::interferometry::read(&path)?;
@@ -200,6 +212,7 @@ fn read(file: &FitFile, data: &DataFiles, folder: &Path) -> anyhow::Result<Measu
             let averaged = (*average_s > 0.0).then(|| observation.averaged(*average_s));
             let mut observation = averaged.unwrap_or(observation).total_intensity();
             observation.sort();
+            add_systematic("data.visibilities.systematic", *systematic, &mut observation)?;
             let mut hours: Vec<f64> = observation.rows.iter().map(|row| row.time_h).collect();
             hours.dedup_by(|a, b| (*a - *b).abs() * 3600.0 < 0.5 * average_s.max(1.0));
             if hours.is_empty() {
@@ -211,7 +224,6 @@ fn read(file: &FitFile, data: &DataFiles, folder: &Path) -> anyhow::Result<Measu
             for (row, frame) in observation.rows.iter_mut().zip(&of_rows) {
                 // Baselines that were averaged over different parts of a scan close all the same.
                 row.time_h = hours[*frame];
-                row.noise_sigma[0] = row.noise_sigma[0].hypot(systematic * row.products[0].norm());
             }
             let per_m = setup::hours_per_m(file)?;
             let times = hours.iter().map(|h| first_time + (h - hours[0]) / per_m).collect();

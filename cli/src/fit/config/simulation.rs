@@ -90,6 +90,10 @@ pub struct Observation {
     /// Errors of station gains, none unless asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gains: Option<Gains>,
+    /// Part of each amplitude that the fit adds to its error in quadrature, none unless asked for: for errors of gains,
+    /// or where errors are so small that a loss has minima everywhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub systematic: Option<f64>,
     /// Time of the first scan, M.
     pub first_time: f64,
 }
