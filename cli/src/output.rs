@@ -74,6 +74,15 @@ impl Output {
         }
     }
 
+    /// An error if it is the same file as another output.
+    pub fn differs(&self, other: &Path) -> anyhow::Result<()> {
+        let full = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        if full(&self.path) == full(other) {
+            bail!("{} is asked for twice: give different names", other.display());
+        }
+        Ok(())
+    }
+
     /// Writes the whole file beside its place and moves it there.
     pub fn write(&self, bytes: &[u8]) -> anyhow::Result<()> {
         self.write_with(|file| Ok(file.write_all(bytes)?))

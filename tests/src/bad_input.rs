@@ -166,3 +166,52 @@ fn volumes_that_are_none() {
     let text = fail(folder.path(), &[&["render", "scene.toml"], &high[..]].concat());
     assert!(text.contains("`volume.0.high`") && text.contains("above low"), "{text}");
 }
+
+/// A picture knows its files: rendered again with others, it says so.
+#[test]
+fn files_that_have_changed_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for name in ["mesh.toml", "ring_and_moon.obj", "ring_and_moon.mtl"] {
+        std::fs::copy(root().join("scenes").join(name), at.join(name)).unwrap();
+    }
+    let small = ["--set", "screen.width=16", "--set", "screen.height=10"];
+    let words = [&["render", "mesh.toml", "-o", "first.exr"][..], &small[..]].concat();
+    crate::support::succeed(at, &words);
+    let said = |name: &str| {
+        let output = kerrlight(at, &["render", "first.exr", "-o", name]);
+        assert!(output.status.success());
+        String::from_utf8_lossy(&output.stderr).contains("another picture")
+    };
+    assert!(!said("second.exr"));
+    let mesh = at.join("ring_and_moon.obj");
+    let text = std::fs::read_to_string(&mesh).unwrap();
+    std::fs::write(&mesh, text + "# changed\n").unwrap();
+    assert!(said("third.exr"));
+}
+
+#[test]
+fn one_file_is_not_two_outputs() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let text = fail(at, &["render", "--preview", "a.png", "--sheet", "./a.png"]);
+    assert!(text.contains("asked for twice"), "{text}");
+    let scene = root().join("scenes/hot_spots.toml").display().to_string();
+    let words = [
+        "movie",
+        &scene,
+        "--duration",
+        "10",
+        "--frames",
+        "2",
+        "-o",
+        "m",
+        "--png",
+        "--apng",
+        "m/frame_0000.png",
+    ];
+    std::fs::create_dir(at.join("m")).unwrap();
+    let text = fail(at, &words);
+    assert!(text.contains("asked for twice"), "{text}");
+    assert!(!at.join("a.png").exists() && !at.join("m/frame_0000.png").exists());
+}

@@ -58,6 +58,13 @@ impl Plan {
             Some(n) => self.say(Part::Rays, true, format!("light of the first {n} half-orbits")),
             None => self.say(Part::Rays, false, "no limit of half-orbits"),
         }
+        let polarized = effects.polarization;
+        let what = if polarized {
+            "Stokes parameters of all emission, carried by the Walker-Penrose constant; momentum, azimuth"
+        } else {
+            "no polarisation: no Stokes parameters but I"
+        };
+        self.say(Part::Rays, polarized, what);
     }
 
     fn surfaces(&mut self, scene: &Scene) {
@@ -73,6 +80,12 @@ impl Plan {
                 "no redshift"
             };
             self.say(Part::Surfaces, effects.redshift, shift);
+            let what = if plunges {
+                "light of matter that plunges inside the innermost stable orbit"
+            } else {
+                "dark inside its inner edge: no matter that plunges"
+            };
+            self.say(Part::Surfaces, plunges, what);
         } else {
             self.say(Part::Surfaces, false, "no disc: crossings are counted, not sought");
         }

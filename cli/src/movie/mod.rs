@@ -66,6 +66,9 @@ impl Movie {
         for input in iter::once(&self.scene).chain(&files.paths) {
             sequence.spare(input)?;
         }
+        for output in animations.files() {
+            sequence.avoid(output)?;
+        }
         if !film.changes() && self.frames > 1 {
             eprintln!("warning: nothing in this scene moves: all frames are the same");
         }

@@ -54,7 +54,7 @@ pub struct Render {
     look: PreviewOptions,
     #[command(flatten)]
     overlay: OverlayOptions,
-    /// Where to write a contact sheet: all channels with colour bars
+    /// Where to write a contact sheet: all channels with colour bars, in colours of their own
     #[arg(long, value_name = "FILE.png")]
     sheet: Option<PathBuf>,
     /// Columns of pixels that are traced together; the picture does not depend on it
@@ -75,7 +75,9 @@ impl Render {
         if self.overlay.any() && outputs.png.is_none() {
             bail!("marks are drawn into the PNG: give --preview");
         }
+        outputs.differ()?;
         let files = assets::load(&scene, &source.folder, &outputs.all())?;
+        source.compare(&files.identity);
         let start = Instant::now();
         let raster = Raster::new(&scene, files.decoded);
         let mut raster = raster.with_context(|| source.name.clone())?.with_tile(self.tile.into());
@@ -85,7 +87,13 @@ impl Render {
             raster = raster.with_meter();
         }
         let reduced = look.as_ref().map_or(1, Reduction::factor);
-        let work = Work { raster: &raster, scene: &scene, text: &text, name: &source.name };
+        let work = Work {
+            raster: &raster,
+            scene: &scene,
+            text: &text,
+            name: &source.name,
+            files: &files.identity,
+        };
         let (summary, picture) = match &outputs.exr {
             Some(exr) => {
                 let identity = raster.identity() + &files.identity;
@@ -181,6 +189,15 @@ struct Outputs {
 }
 
 impl Outputs {
+    /// No two may be one file.
+    fn differ(&self) -> anyhow::Result<()> {
+        let all = self.all();
+        for (k, one) in all.iter().enumerate() {
+            all[..k].iter().try_for_each(|other| one.differs(other.shown()))?;
+        }
+        Ok(())
+    }
+
     fn all(&self) -> Vec<&Output> {
         [&self.exr, &self.png, &self.sheet].into_iter().flatten().collect()
     }

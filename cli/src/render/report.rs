@@ -43,7 +43,9 @@ pub fn print(scene: &Scene, summary: &Summary, seconds: f64) {
     let pixels = f64::from(screen.width) * f64::from(screen.height);
     let Summary { flux, flux_error, flux_unit, .. } = summary;
     if *flux > 0.0 {
-        eprintln!("flux {flux:.6} +- {flux_error:.1e} {flux_unit}");
+        let shown =
+            if (1e-4..1e7).contains(flux) { format!("{flux:.6}") } else { format!("{flux:.6e}") };
+        eprintln!("flux {shown} +- {flux_error:.1e} {flux_unit}");
     }
     if let Some(asked) = screen.image_error {
         let error = summary.image_error;

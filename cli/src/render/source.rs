@@ -16,6 +16,8 @@ pub struct Source {
     pub name: String,
     /// What relative paths in it are relative to.
     pub folder: PathBuf,
+    /// What tells the files that it named from others, where it comes from a picture.
+    files: Option<String>,
 }
 
 impl Source {
@@ -24,13 +26,27 @@ impl Source {
         let Some(path) = path else {
             eprintln!("rendering the built-in scene: Sgr A* with a flare and a disc");
             let name = "built-in scene".to_owned();
-            return Ok(Source { text: BUILT_IN.to_owned(), name, folder: PathBuf::from(".") });
+            let (text, folder) = (BUILT_IN.to_owned(), PathBuf::from("."));
+            return Ok(Source { text, name, folder, files: None });
         };
         let name = path.display().to_string();
         let folder = path.parent().unwrap_or(Path::new(".")).to_owned();
         let is_exr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
-        let text = if is_exr { scene_of_exr(path)? } else { output::read_text(path)? };
-        Ok(Source { text, name, folder })
+        if !is_exr {
+            return Ok(Source { text: output::read_text(path)?, name, folder, files: None });
+        }
+        let (text, files) = scene_of_exr(path)?;
+        Ok(Source { text, name, folder, files })
+    }
+
+    /// Warns where files that the scene of a picture names are not those that the picture was made of.
+    pub fn compare(&self, identity: &str) {
+        if self.files.as_ref().is_some_and(|files| files != identity) {
+            eprintln!(
+                "warning: files that the scene names are not those that {} was rendered from: it will be another picture",
+                self.name
+            );
+        }
     }
 
     /// The scene with all overrides, and its text.
@@ -55,10 +71,13 @@ impl Source {
     }
 }
 
-fn scene_of_exr(path: &Path) -> anyhow::Result<String> {
+/// The scene of a picture or of a film's frame, and what tells the files that it named from others.
+fn scene_of_exr(path: &Path) -> anyhow::Result<(String, Option<String>)> {
     let name = || path.display().to_string();
     let file = output::open(path)?;
     let attributes = exr::decode_attributes(file).with_context(name)?;
     let scene = attributes.get("scene").cloned();
-    scene.with_context(|| format!("{} holds no scene of kerrlight", name()))
+    let scene = scene.with_context(|| format!("{} holds no scene of kerrlight", name()))?;
+    let files = attributes.get("files").or(attributes.get("frame_files"));
+    Ok((scene, files.cloned()))
 }

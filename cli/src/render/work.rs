@@ -20,6 +20,8 @@ pub struct Work<'a> {
     pub text: &'a str,
     /// What the scene is called in messages.
     pub name: &'a str,
+    /// What tells the files that the scene names from others.
+    pub files: &'a str,
 }
 
 impl Work<'_> {
@@ -35,7 +37,11 @@ impl Work<'_> {
             Ok(summary) => summary,
             Err(error) => return Err(self.failed(error, partial)),
         };
-        let attributes = report::attributes(self.scene, self.text, self.raster.legend(), &summary);
+        let mut attributes =
+            report::attributes(self.scene, self.text, self.raster.legend(), &summary);
+        if !self.files.is_empty() {
+            attributes.insert("files".to_owned(), self.files.to_owned());
+        }
         exr.write_with(|file| {
             let journal = &mut partial.journal;
             let look = look.as_mut();

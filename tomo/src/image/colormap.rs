@@ -15,6 +15,10 @@ pub enum Colormap {
     Viridis,
     /// Grey with even lightness.
     Gray,
+    /// ColorBrewer's red over white to blue, for values on both sides of 0.
+    RedBlue,
+    /// A circle of colours, for angles.
+    Sinebow,
 }
 
 /// The hot ramp of AFM images: three straight lines.
@@ -43,6 +47,8 @@ impl Colormap {
             Colormap::Inferno => of(colorous::INFERNO),
             Colormap::Magma => of(colorous::MAGMA),
             Colormap::Viridis => of(colorous::VIRIDIS),
+            Colormap::RedBlue => of(colorous::RED_BLUE),
+            Colormap::Sinebow => of(colorous::SINEBOW),
             Colormap::Gray => [even_lightness(|x| [x; 3], x); 3],
         }
     }

@@ -7,6 +7,7 @@ use super::preview::{self, Look};
 use super::{Channel, Picture};
 use image::RgbImage;
 use image::imageops::{FilterType, resize};
+use std::f64::consts::PI;
 
 /// Width of a small picture in pixels.
 const PANEL: u32 = 320;
@@ -25,7 +26,7 @@ struct Panel {
 }
 
 /// Draws the contact sheet: the R, G, B channels together, then each of the others. A colour bar
-/// spans all but the outermost 0.2 % of the values; where a quantity of the emission has none
+/// spans all but the outermost 0.2 % of the values (whole numbers and angles: all of them); where a quantity of the emission has none
 /// (`radius` is 0) the panel is grey.
 ///
 /// # Errors
@@ -47,8 +48,7 @@ pub fn sheet(picture: &Picture) -> image::ImageResult<RgbImage> {
 fn panel(picture: &Picture, channel: &Channel) -> image::ImageResult<Panel> {
     let there = mask(picture, &channel.name);
     let seen = channel.values.iter().zip(&there).filter(|(_, there)| **there);
-    let ends = range(seen.map(|(value, _)| *value).collect());
-    let map = if channel.name == "intensity" { Colormap::AfmhotUs } else { Colormap::Viridis };
+    let (map, ends) = scale(&channel.name, seen.map(|(value, _)| *value).collect());
     let table = map.table();
     let shade = |(value, there): (&f32, &bool)| {
         let part = (f64::from(*value) - ends[0]) / (ends[1] - ends[0]);
@@ -61,6 +61,24 @@ fn panel(picture: &Picture, channel: &Channel) -> image::ImageResult<Panel> {
     // Whole numbers and angles have no mean.
     let drawn = small(&drawn, FilterType::Nearest);
     Ok(Panel { title: channel.name.clone(), drawn, bar: Some((map, ends)) })
+}
+
+/// Colours of a channel, and the values at their ends: Stokes parameters about 0, angles all around,
+/// whole numbers up to the largest of them.
+fn scale(name: &str, values: Vec<f32>) -> (Colormap, [f64; 2]) {
+    let largest = |values: &[f32]| values.iter().copied().fold(0.0, f32::max);
+    match name {
+        "intensity" => (Colormap::AfmhotUs, range(values)),
+        "Q" | "U" | "V" => {
+            let [low, high] = range(values);
+            let most = low.abs().max(high.abs());
+            (Colormap::RedBlue, [-most, most])
+        }
+        "azimuth" => (Colormap::Sinebow, [-PI, PI]),
+        "crossings" => (Colormap::Viridis, [0.0, f64::from(largest(&values)).max(1.0)]),
+        "outcome" => (Colormap::Viridis, [0.0, 3.0]),
+        _ => (Colormap::Viridis, range(values)),
+    }
 }
 
 /// Where a channel has values.
@@ -144,5 +162,10 @@ mod tests {
         let viridis = Colormap::Viridis.table();
         assert_eq!((at(1, 0, 0), at(1, 1, 0), at(1, 1, 1)), (NOTHING, viridis[0], viridis[1023]));
         assert_eq!(range(vec![3.0; 5]), [3.0, 6.0]);
+        assert_eq!(scale("V", vec![-2.0, 1.0]), (Colormap::RedBlue, [-2.0, 2.0]));
+        assert_eq!(scale("azimuth", vec![0.1]), (Colormap::Sinebow, [-PI, PI]));
+        let mut counts = vec![0.0; 999];
+        counts.push(4.0);
+        assert_eq!(scale("crossings", counts).1, [0.0, 4.0]);
     }
 }
