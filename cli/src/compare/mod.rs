@@ -272,7 +272,7 @@ fn sentences(experiment: &Experiment, summary: &Summary) -> Vec<String> {
          {:.1} minutes of fitting in all, on {} threads. {}",
         seconds / 60.0,
         rayon::current_num_threads(),
-        summary.seeds()
+        summary.seeds_told()
     ));
     for (case, why) in summary.failed() {
         lines.push(format!("Failed: {}: {why}", case.name()));

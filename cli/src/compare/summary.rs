@@ -93,7 +93,7 @@ impl<'a> Summary<'a> {
     }
 
     /// Which seeds a plot shows.
-    pub fn seeds(&self) -> String {
+    pub fn seeds_told(&self) -> String {
         if self.seeds == 1 { "One seed.".to_owned() } else { format!("All {} seeds.", self.seeds) }
     }
 

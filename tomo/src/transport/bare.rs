@@ -3,7 +3,7 @@
 //! costs is what it would cost in a library that had no other effects.
 
 use super::glimpse::{Gather, Glimpse};
-use super::look::glimpse;
+use super::look::{Block, glimpse};
 use super::rays::{End, MOST_HITS, Sight, doubtful};
 use super::surface::{Hit, Seen};
 use super::{Fate, Part, Scratch, Stage};
@@ -31,11 +31,11 @@ impl Stage {
     pub(super) fn look_bare(
         &self,
         observer: &Observer,
-        (alpha, beta): (&[f64], &[f64]),
-        times: &[f64],
+        block: Block<'_>,
         scratch: &mut Scratch,
         seen: &mut [Glimpse],
     ) -> Result<(), OutOfRange> {
+        let Block { alpha, beta, times } = block;
         let rays = alpha.len();
         let Some(now) = seen.get_mut(..rays) else { return Ok(()) };
         let clock = scratch.meter.start();
@@ -57,7 +57,7 @@ impl Stage {
             scratch.volume.reset(0);
         }
         for k in strays {
-            let (place, times) = ((alpha[k], beta[k]), &[self.time]);
+            let (place, times) = (block.place(k), &[self.time]);
             let ray = self.step(k, place, times, scratch)?;
             self.look_along(k, Some(&ray), place, (times, &[]), scratch, now)?;
         }

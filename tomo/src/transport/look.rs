@@ -15,6 +15,21 @@ use crate::emission::sky::Beam;
 use kerrlight_geodesic::{Observer, OutOfRange, Ray, footprint};
 use std::sync::Arc;
 
+/// Rays of a block, and the times of observation at which they are asked.
+#[derive(Clone, Copy)]
+pub(super) struct Block<'a> {
+    pub alpha: &'a [f64],
+    pub beta: &'a [f64],
+    pub times: &'a [f64],
+}
+
+impl Block<'_> {
+    /// Where ray number `k` arrives.
+    pub fn place(&self, k: usize) -> (f64, f64) {
+        (self.alpha[k], self.beta[k])
+    }
+}
+
 impl Stage {
     /// What is seen at (α, β) at the scene's own time.
     ///
@@ -49,11 +64,11 @@ impl Stage {
         scratch.sights.clear();
         scratch.hits.clear();
         if let (View::Screen(observer), false) = (&self.view, self.lensing) {
-            return self.look_straight(observer, (alpha, beta), times, scratch, seen);
+            return self.look_straight(observer, Block { alpha, beta, times }, scratch, seen);
         }
         let observer = self.closed_form();
         if let (true, Some(observer)) = (self.bare, observer) {
-            return self.look_bare(observer, (alpha, beta), times, scratch, seen);
+            return self.look_bare(observer, Block { alpha, beta, times }, scratch, seen);
         }
         let trees: Vec<_> = times.iter().map(|time| self.spot_tree(*time)).collect();
         let clock = scratch.meter.start();
@@ -108,20 +123,20 @@ impl Stage {
     fn look_straight(
         &self,
         observer: &Observer,
-        (alpha, beta): (&[f64], &[f64]),
-        times: &[f64],
+        block: Block<'_>,
         scratch: &mut Scratch,
         seen: &mut [Glimpse],
     ) -> Result<(), OutOfRange> {
-        let rays = alpha.len();
+        let (rays, times) = (block.alpha.len(), block.times);
         scratch.sights.resize(rays, Sight::default());
         scratch.volume.reset(self.media.len() * rays * times.len());
         for k in 0..rays {
-            let ray = observer.ray(&self.hole, alpha[k], beta[k])?;
-            let line = Line::new(observer, self.hole.horizon(), alpha[k], beta[k]);
+            let (alpha, beta) = block.place(k);
+            let ray = observer.ray(&self.hole, alpha, beta)?;
+            let line = Line::new(observer, self.hole.horizon(), alpha, beta);
             scratch.sights[k] = self.trace_line(&line, &ray, scratch);
             self.fill_line(&line, k, times, scratch);
-            self.look_along(k, None, (alpha[k], beta[k]), (times, &[]), scratch, seen)?;
+            self.look_along(k, None, (alpha, beta), (times, &[]), scratch, seen)?;
         }
         Ok(())
     }

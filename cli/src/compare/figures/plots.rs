@@ -40,7 +40,7 @@ impl Figures<'_> {
                 series.push(Series { name, points, errors: Vec::new(), marks: Marks::Points });
             }
             let (unit, _) = described(value);
-            let seeds = self.summary.seeds();
+            let seeds = self.summary.seeds_told();
             for part in series_of(series) {
                 plots.push(LinePlot {
                     title: [asked.title.clone(), called(&column)].join(": "),
@@ -91,7 +91,7 @@ impl Figures<'_> {
         let (unit, _) = described(value);
         let plot = |series| LinePlot {
             title: asked.title.clone(),
-            caption: format!("{} {}", asked.caption, self.summary.seeds()),
+            caption: format!("{} {}", asked.caption, self.summary.seeds_told()),
             x: Axis { label: factor.clone(), unit: String::new(), log: false },
             y: Axis { label: unit.clone(), unit: String::new(), log: false },
             series,
