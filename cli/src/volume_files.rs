@@ -64,10 +64,14 @@ fn emission(bytes: &[u8]) -> anyhow::Result<([usize; 3], Vec<f32>)> {
     let nodes = [x, y, z].map(|n| n as usize);
     let single: Vec<f32> = values.iter().map(|value| *value as f32).collect();
     if let Some(k) = single.iter().position(|value| !value.is_finite()) {
-        let place = (k / (nodes[1] * nodes[2]), k / nodes[2] % nodes[1], k % nodes[2]);
-        bail!("value {:e} of node {place:?} is not finite in 32 bits", values[k]);
+        bail!("value {:e} of node {:?} is not finite in 32 bits", values[k], node(k, nodes));
     }
     Ok((nodes, single))
+}
+
+/// Where the k-th value of an array in C's order stands.
+fn node(k: usize, nodes: [usize; 3]) -> (usize, usize, usize) {
+    (k / (nodes[1] * nodes[2]), k / nodes[2] % nodes[1], k % nodes[2])
 }
 
 fn three(bytes: &[u8]) -> anyhow::Result<[f64; 3]> {
@@ -92,6 +96,10 @@ impl Arrays {
         let turns = source.rotation != kerrlight_tomo::scene::Rotation::None;
         if turns && source.axis.or(self.axis).is_none() {
             bail!("neither the file nor the scene gives `axis`, about which it turns");
+        }
+        if let Some(k) = self.values.iter().position(|value| *value < 0.0) {
+            let (place, value) = (node(k, self.nodes), self.values[k]);
+            bail!("value {value:e} of node {place:?} is not allowed: emission is 0 or more");
         }
         let volume = Volume::new(self.nodes, low, high, self.values)?;
         Ok(VolumeFile { volume, axis: self.axis })
@@ -248,6 +256,16 @@ mod tests {
         let bad = npy(&[2, 1, 2], [0.0, 1.0, 1e300, 0.0].into_iter()).unwrap();
         let text = of("v.npy", &bad, up);
         assert_eq!(text, "value 1e300 of node (1, 0, 0) is not finite in 32 bits");
+        let bad = npy(&[2, 2, 2], [0.0, 1.0, 0.0, 0.0, -0.25, 0.0, 0.0, 0.0].into_iter()).unwrap();
+        let placed = VolumeSource { low: Some([0.0; 3]), high: Some([1.0; 3]), ..source(None, up) };
+        let text = format!("{:#}", read(Path::new("v.npy"), &bad, &placed).unwrap_err());
+        assert_eq!(text, "value -2.5e-1 of node (1, 0, 0) is not allowed: emission is 0 or more");
+        let whole = npy(&[2, 2, 2], 0..8i64).unwrap();
+        let counts = read(Path::new("v.npy"), &whole, &placed).unwrap();
+        assert_eq!(counts.volume.values(), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+        let words = npy(&[2, 1, 2], [true; 4].into_iter()).unwrap();
+        let text = of("v.npy", &words, up);
+        assert!(text.contains("'|b1': whole numbers, float32 or float64 are expected"), "{text}");
         let text = of("v.npz", &encode(&file(None)).unwrap(), None);
         assert_eq!(text, "neither the file nor the scene gives `axis`, about which it turns");
         assert_eq!(of("v.txt", &[], up), "a volume ends in .npz or .npy");

@@ -124,17 +124,42 @@ pub fn npy_array(bytes: &[u8]) -> anyhow::Result<(Vec<u64>, Vec<f64>)> {
     }
     let shape = file.shape().to_vec();
     let count = shape.iter().try_fold(1u64, |product, n| product.checked_mul(*n));
-    // At least 4 bytes each, so that a header cannot ask for more memory than there is file.
-    if count.is_none_or(|count| count == 0 || count > bytes.len() as u64 / 4) {
+    // At least a byte each, so that a header cannot ask for more memory than there is file.
+    if count.is_none_or(|count| count == 0 || count > bytes.len() as u64) {
         bail!("shape {shape:?} does not go with {} bytes", bytes.len());
     }
-    let values: Vec<f64> = match file.dtype() {
-        npyz::DType::Plain(t) if t.type_char() == npyz::TypeChar::Float && t.size_field() == 4 => {
-            file.into_vec::<f32>()?.into_iter().map(f64::from).collect()
-        }
-        _ => file.into_vec::<f64>().context("an array of float32 or float64 is expected")?,
-    };
+    let values = numbers(file)?;
     Ok((shape, values))
+}
+
+/// The values of an array of any number type that does not depend on the machine.
+fn numbers(file: npyz::NpyFile<&[u8]>) -> anyhow::Result<Vec<f64>> {
+    use npyz::TypeChar::{Float, Int, Uint};
+    fn widened<T: npyz::Deserialize + Into<f64>>(
+        file: npyz::NpyFile<&[u8]>,
+    ) -> anyhow::Result<Vec<f64>> {
+        Ok(file.into_vec::<T>()?.into_iter().map(Into::into).collect())
+    }
+    let kind = match file.dtype() {
+        npyz::DType::Plain(plain) => Some((plain.type_char(), plain.size_field())),
+        _ => None,
+    };
+    match kind {
+        Some((Float, 4)) => widened::<f32>(file),
+        Some((Float, 8)) => widened::<f64>(file),
+        Some((Int, 1)) => widened::<i8>(file),
+        Some((Int, 2)) => widened::<i16>(file),
+        Some((Int, 4)) => widened::<i32>(file),
+        Some((Int, 8)) => Ok(file.into_vec::<i64>()?.into_iter().map(|n| n as f64).collect()),
+        Some((Uint, 1)) => widened::<u8>(file),
+        Some((Uint, 2)) => widened::<u16>(file),
+        Some((Uint, 4)) => widened::<u32>(file),
+        Some((Uint, 8)) => Ok(file.into_vec::<u64>()?.into_iter().map(|n| n as f64).collect()),
+        _ => bail!(
+            "values of type {}: whole numbers, float32 or float64 are expected",
+            file.dtype().descr()
+        ),
+    }
 }
 
 /// The only array of an archive, or the one named `movie` or `image`; `times` are hours of UTC.

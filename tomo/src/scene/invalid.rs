@@ -43,8 +43,8 @@ impl SceneError {
         let text = error.to_string();
         let text = text.replace("expected f64", "expected a number");
         let text = text.replace("expected f32", "expected a number");
-        let text = text.replace("expected u32", "expected a whole number");
-        let text = text.replace("expected u64", "expected a whole number");
+        let text = text.replace("expected u32", "expected a whole number, 0 or more");
+        let text = text.replace("expected u64", "expected a whole number, 0 or more");
         SceneError::Syntax(text.trim_end().to_owned())
     }
 

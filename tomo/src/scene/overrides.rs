@@ -25,6 +25,10 @@ pub fn apply_override(text: &str, assignment: &str) -> Result<String, SceneError
     let mut table: &mut Table = document.as_table_mut();
     let mut parts = parents.iter().peekable();
     while let Some(key) = parts.next() {
+        let number = parts.peek().and_then(|part| part.parse::<usize>().ok());
+        if let (Some(number), false) = (number, table.contains_key(key)) {
+            return Err(fail(&format!("there is no `{key}`, so none with number {number}")));
+        }
         let item = table.entry(key).or_insert_with(|| Item::Table(Table::new()));
         if item.is_inline_table() {
             *item = spread(core::mem::take(item));

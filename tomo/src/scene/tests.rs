@@ -157,6 +157,7 @@ fn overrides_that_lead_nowhere_say_so() {
     let error = |assignment| apply_override(SCENE, assignment).unwrap_err().to_string();
     assert!(error("hole.spin").contains("key.path=value"));
     assert!(error("spot.7.sigma=1").contains("index below 2"));
+    assert!(error("mesh.0.path=a.obj").contains("there is no `mesh`, so none with number 0"));
     assert!(error("hole.spin.x=1").contains("not a table"));
     assert!(error("hole=1").contains("names a table"));
     assert!(error(".=1").contains("empty key"));
