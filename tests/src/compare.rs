@@ -1,6 +1,6 @@
 //! `kerrlight compare`: cases that are whole, cached, gone on with, or failed and named.
 
-use crate::support::{fail, kerrlight, root, succeed};
+use crate::support::{cramped, fail, kerrlight, root, succeed};
 use serde_json::Value;
 use std::path::Path;
 
@@ -131,6 +131,35 @@ fn a_case_that_fails_is_named_and_the_others_are_whole() {
     assert!(cases(&results)[1]["error"].as_str().unwrap().contains("-0.4"));
     let page = std::fs::read_to_string(at.join("out/report.html")).unwrap();
     assert!(page.contains("Failed: rate -0.4, seed 1"));
+}
+
+/// A case whose files find no room is a failed case, which is done when there is room.
+#[cfg(unix)]
+#[test]
+fn a_case_that_fills_the_disk_is_named_and_done_later() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let nodes = [
+        ("\"rate\"", "\"nodes\""),
+        ("\"training.grid_rate\"", "\"output.nodes\""),
+        ("[0.1, 0.4]", "[128, 16]"),
+    ];
+    experiment(at, &nodes);
+    let words = ["compare", "rates.toml", "-o", "out", "--seeds", "1"];
+    let output = cramped(at, 1024, &words);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("1 of 2 cases failed: nodes 128, seed 1"), "{said}");
+    let found = results(&at.join("out"));
+    assert_eq!(
+        (&cases(&found)[0]["status"], &cases(&found)[1]["status"]),
+        (&"failed".into(), &"done".into())
+    );
+    let error = cases(&found)[0]["error"].as_str().unwrap();
+    assert!(error.contains("volume.npz") && error.contains("File too large"), "{error}");
+    let output = kerrlight(at, &[&words[..], &["--resume"]].concat());
+    assert!(String::from_utf8_lossy(&output.stderr).contains("2 cases, 1 of them to be run"));
+    assert!(cases(&results(&at.join("out"))).iter().all(|case| case["status"] == "done"));
 }
 
 /// A fit that is killed in the middle is a failed case; the next run goes on with it.

@@ -1,9 +1,9 @@
 //! `kerrlight fit` with bad input and bad luck: one clear message, and nothing lost or half-written.
 
 use crate::fit::{changed, results, small, with};
-use crate::support::{binary, fail, kerrlight, root, succeed};
+use crate::support::{cramped, fail, kerrlight, root, succeed};
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 fn message(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
@@ -17,15 +17,6 @@ fn files(folder: &Path) -> Vec<String> {
         .collect();
     all.sort();
     all
-}
-
-/// A run whose files may not grow beyond a number of KiB, as on a disk that is full.
-#[cfg(unix)]
-fn cramped(folder: &Path, kib: u32, words: &[&str]) -> Output {
-    let script = format!("trap '' XFSZ; ulimit -f {kib}; exec \"$@\"");
-    let mut command = Command::new("bash");
-    command.current_dir(folder).args(["-c", &script, "bash"]).arg(binary()).args(words);
-    command.output().expect("bash runs")
 }
 
 /// At whatever file it strikes; what was there is still there, and the run goes on to the same bytes.

@@ -33,6 +33,15 @@ pub fn kerrlight(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(binary()).current_dir(folder).args(arguments).output().expect("the binary runs")
 }
 
+/// A run whose files may not grow beyond a number of KiB, as on a disk that is full.
+#[cfg(unix)]
+pub fn cramped(folder: &Path, kib: u32, words: &[&str]) -> Output {
+    let script = format!("trap '' XFSZ; ulimit -f {kib}; exec \"$@\"");
+    let mut command = Command::new("bash");
+    command.current_dir(folder).args(["-c", &script, "bash"]).arg(binary()).args(words);
+    command.output().expect("bash runs")
+}
+
 /// Standard output of a run that must succeed.
 pub fn succeed(folder: &Path, arguments: &[&str]) -> String {
     let output = kerrlight(folder, arguments);
