@@ -35,6 +35,12 @@ fn experiment(folder: &Path, changes: &[(&str, &str)]) {
         caption = "Both rates."
         rows = ["rate"]
         [[figure]]
+        kind = "volumes"
+        title = "Volumes later"
+        caption = "Both rates."
+        rows = ["rate"]
+        later = 0.25
+        [[figure]]
         kind = "time"
         title = "Time"
         caption = "Both rates."
@@ -77,6 +83,7 @@ fn exact_cases_are_whole_and_not_done_twice() {
         page.contains("Which rate?") && page.contains("Mean ± standard deviation over 2 seeds")
     );
     assert!(page.contains("data:image/png") && page.contains("<svg"));
+    assert!(page.contains("carried along by the true motion"));
     let table = std::fs::read_to_string(at.join("out/results.csv")).unwrap();
     assert_eq!(table.lines().count(), 5);
     // A full folder is not written to by accident; what is done is not done again.
@@ -212,6 +219,7 @@ fn experiments_are_listed_and_mistakes_are_named() {
         ("seeds = 2", "seed = 2", "unknown field `seed`"),
         ("rows = [\"rate\"]", "rows = [\"rates\"]", "there is no factor \"rates\""),
         ("kind = \"time\"", "kind = \"tim\"", "unknown variant `tim`"),
+        ("later = 0.25", "later = -1.0", "\"Volumes later\": later = -1 is not allowed"),
         ("scene_1.toml", "scene_0.toml", "scene_0.toml"),
         ("[0.1, 0.4]", "[-0.1, -0.4]", "no case can be run; rate -0.1, seed 1"),
     ] {

@@ -147,6 +147,9 @@ pub struct FigureAsked {
     pub value: Option<String>,
     /// Azimuth and elevation from which volumes are seen, degrees; along the true axis without it.
     pub view: Option<[f64; 2]>,
+    /// Which part of the movie has passed when volumes are shown, carried along from the reference time; at the
+    /// reference time itself without it.
+    pub later: Option<f64>,
     /// Levels of the other factors.
     #[serde(default)]
     pub r#where: BTreeMap<String, String>,
@@ -205,6 +208,9 @@ impl Experiment {
         for figure in &self.figure {
             let name = || format!("figure {:?}", figure.title);
             self.shown(&figure.rows, &figure.columns, &figure.r#where, false).with_context(name)?;
+            if let Some(later) = figure.later.filter(|later| !(0.0..=1000.0).contains(later)) {
+                bail!("{}: later = {later} is not allowed: 0 to 1000 times the movie", name());
+            }
         }
         Ok(())
     }

@@ -22,7 +22,7 @@ use clap::Args;
 use config::FitFile;
 use folder::Folder;
 pub use merge::merge;
-pub use seams::{assigned, check, coverage, sizes, velocities};
+pub use seams::{assigned, check, coverage, sizes, turned, velocities};
 use std::path::{Path, PathBuf};
 
 /// The experiment that runs without a file.

@@ -4,12 +4,12 @@ use super::config::FitFile;
 use super::data::{self, Measured};
 use super::setup::{self, Instrument};
 use super::{parse, run};
+use anyhow::Context;
 use kerrlight_tomo::scene::apply_override;
 use std::path::Path;
 
 /// Settings with one `key=value` changed; `representation=grid` is short for representation.kind=grid.
 pub fn assigned(text: &str, assignment: &str) -> anyhow::Result<String> {
-    use anyhow::Context;
     let long = match assignment.split_once('=') {
         Some(("representation", kind)) => format!("representation.kind={kind}"),
         _ => assignment.to_owned(),
@@ -28,6 +28,19 @@ pub fn check(text: &str) -> anyhow::Result<()> {
 pub fn sizes(text: &str) -> anyhow::Result<(f64, f64)> {
     let file = parse(text)?;
     Ok((kerrlight_geodesic::Kerr::new(file.hole.spin)?.horizon(), file.region.r_max))
+}
+
+/// Angle (radians) by which matter at a radius (M) has turned since the reference time when the part `later` of the
+/// movie has passed: as a fit assumes it, and as its data were simulated.
+pub fn turned(text: &str, later: f64) -> anyhow::Result<[impl Fn(f64) -> f64; 2]> {
+    let file = parse(text)?;
+    let angle = |of: &FitFile| -> anyhow::Result<_> {
+        let movie = of.movie.as_ref().context("no [movie] says how long it lasts")?;
+        let motion = setup::motion(of, Vec::new())?;
+        let time = movie.from + later * (movie.to - movie.from) - motion.reference;
+        Ok(move |r| motion.velocity.rate(r) * time)
+    };
+    Ok([angle(&file)?, angle(&file.simulated()?)?])
 }
 
 /// (u, v) of the data, wavelengths; none without visibilities.

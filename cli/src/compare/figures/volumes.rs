@@ -8,6 +8,9 @@ use crate::compare::tables::levels;
 use crate::fit;
 use crate::report::{Figure, encode};
 use crate::volume_files;
+use anyhow::Context;
+use kerrlight_tomo::dynamics::Axis;
+use kerrlight_tomo::volume::metrics;
 use kerrlight_tomo::volume::projection::{Surroundings, Tile, View, mosaic};
 use kerrlight_tomo::volume::{Volume, VolumeFile};
 use serde_json::Value;
@@ -32,12 +35,16 @@ impl Figures<'_> {
             // A column with a gap would stand under the wrong truth.
             let Some(cells) = cells.into_iter().collect::<Option<Vec<_>>>() else { continue };
             let Some((first, _)) = cells.first() else { continue };
-            let Some(truth) = self.load(first, "truth.npz")? else { continue };
-            loaded[0].1.push((called(column), truth));
+            let Some(truth) = self.load(first, TRUTH, asked.later)? else { continue };
             for (line, (case, results)) in loaded[1..].iter_mut().zip(cells) {
-                let Some(volume) = self.load(case, "volume.npz")? else { return Ok(None) };
-                line.1.push((quality(results), volume));
+                let Some(volume) = self.load(case, FOUND, asked.later)? else { return Ok(None) };
+                let psnr = match asked.later {
+                    Some(_) => metrics::compare(&volume.volume, &truth.volume, None)?.psnr_db,
+                    None => result(results, "psnr_db"),
+                };
+                line.1.push((quality(psnr, results), volume));
             }
+            loaded[0].1.push((called(column), truth));
         }
         if loaded[0].1.is_empty() {
             return Ok(None);
@@ -65,8 +72,15 @@ impl Figures<'_> {
             }
             None => "from above the orbits, along the true axis".to_owned(),
         };
+        let when = match asked.later {
+            Some(_) => {
+                " The truth has been carried along by the true motion since the reference time, recovered volumes by the assumed \
+                 motion about the axis that was found; PSNR is that of this time."
+            }
+            None => "",
+        };
         let caption = format!(
-            "{}. {} Emission along straight parallel rays, seen {from}. The ball is the horizon, the blue line the axis \
+            "{}. {}{when} Emission along straight parallel rays, seen {from}. The ball is the horizon, the blue line the axis \
              that was used (a point where it is seen end on), the closed curve the edge of the region in the hole's \
              equatorial plane. The colours of a column end at its truth's brightest place: what is brighter is shown like \
              that. {}",
@@ -82,13 +96,25 @@ impl Figures<'_> {
         Ok(Some(Figure { png: encode(drawn)?, caption, alt: asked.title.clone() }))
     }
 
-    fn load(&self, case: &Case, name: &str) -> anyhow::Result<Option<Loaded>> {
+    /// A volume of a case: at its reference time, or carried along by its own motion.
+    fn load(
+        &self,
+        case: &Case,
+        (name, motion): (&str, usize),
+        later: Option<f64>,
+    ) -> anyhow::Result<Option<Loaded>> {
         let path = self.runner.run_of(case).join(name);
         if !path.exists() {
             return Ok(None);
         }
-        let VolumeFile { volume, axis } = volume_files::load(&path)?;
-        let (hole_radius, ring_radius) = fit::sizes(case.settings.as_deref().unwrap_or_default())?;
+        let VolumeFile { mut volume, axis } = volume_files::load(&path)?;
+        let settings = case.settings.as_deref().unwrap_or_default();
+        if let Some(later) = later {
+            let axis = axis.with_context(|| format!("{}: no axis", path.display()))?;
+            let turned = &fit::turned(settings, later).context("later")?[motion];
+            volume = volume.carried(Axis::new(axis)?, turned);
+        }
+        let (hole_radius, ring_radius) = fit::sizes(settings)?;
         let around = Surroundings {
             hole_radius,
             axis: axis.unwrap_or([0.0; 3]),
@@ -98,6 +124,10 @@ impl Figures<'_> {
         Ok(Some(Loaded { volume, around }))
     }
 }
+
+/// Files of a run, and whose motion carries them: the one that is assumed, or the true one.
+const FOUND: (&str, usize) = ("volume.npz", 0);
+const TRUTH: (&str, usize) = ("truth.npz", 1);
 
 struct Loaded {
     volume: Volume,
@@ -115,8 +145,8 @@ fn view_of(asked: &FigureAsked, [x, y, z]: [f64; 3]) -> View {
 }
 
 /// What stands above a recovered volume.
-fn quality(results: &Value) -> String {
-    let psnr = result(results, "psnr_db").map(|x| format!("{x:.1} dB"));
+fn quality(psnr: Option<f64>, results: &Value) -> String {
+    let psnr = psnr.map(|x| format!("{x:.1} dB"));
     let axis = result(results, "axis_dot_truth").filter(|x| *x < 1.0 - 1e-9);
     let axis = axis.map(|x| format!("axis {x:.4}"));
     [psnr, axis].into_iter().flatten().collect::<Vec<_>>().join(", ")
