@@ -48,7 +48,8 @@ pub fn results(folder: &Path) -> serde_json::Value {
 #[test]
 fn exact_every_representation_leaves_a_whole_run() {
     let (small, folder) = (small(), tempfile::tempdir().unwrap());
-    for (kind, least) in [("bhnerf", 36.5), ("grid", 36.5), ("linear-grid", 36.5)] {
+    let kinds = ["bhnerf", "feature-grid", "grid", "linear-grid"];
+    for (kind, least) in kinds.map(|kind| (kind, 36.5)) {
         let kind_of = format!("representation={kind}");
         let printed = succeed(folder.path(), &with(&small, &["-o", kind, "--set", &kind_of]));
         assert!(printed.contains("report.html"), "{printed}");
@@ -79,7 +80,7 @@ fn exact_penalties_are_terms_of_the_log() {
                [[regulariser]]\nkind = \"sparsity\"\nweight = 1e-6\n\n\
                [[regulariser]]\nkind = \"entropy\"\nweight = 1e-6\nlevel = 0.1\nfloor = 0.1\n\n[representation]";
     let words = changed(folder.path(), |text| text.replace("[representation]", all));
-    for kind in ["bhnerf", "grid", "linear-grid"] {
+    for kind in ["bhnerf", "feature-grid", "grid", "linear-grid"] {
         let kind_of = format!("representation={kind}");
         let few = ["-o", kind, "--set", &kind_of, "--set", "training.steps=40"];
         succeed(

@@ -2,8 +2,8 @@
 
 use kerrlight_tomo::optimise::{Adam, AdamState};
 use kerrlight_tomo::representation::{
-    Activation, Coordinates, CoordinatesMut, Gradient, Grid, GridSettings, Groups, Network,
-    NetworkSettings, Representation, Workspace,
+    Activation, Coordinates, CoordinatesMut, FeatureGrid, FeatureGridSettings, Gradient, Grid,
+    GridSettings, Groups, Network, NetworkSettings, Representation, Workspace,
 };
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -69,7 +69,11 @@ fn batches_of_a_known_size_allocate_nothing() {
     let grid = Grid::new(GridSettings { nodes, low, high, activation, initial: -10.0 });
     let grid = grid.expect("a grid");
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
-    for representation in [&network as &dyn Representation<f32>, &grid] {
+    let (coarsest, levels, initial) = (4, 3, -4.0);
+    let features =
+        FeatureGrid::new(FeatureGridSettings { coarsest, levels, low, high, activation, initial });
+    let features = features.expect("grids");
+    for representation in [&network as &dyn Representation<f32>, &grid, &features] {
         assert_eq!(pool.install(|| allocations(representation)), 0);
     }
 }

@@ -6,7 +6,9 @@ use crate::program::{OwnSettings, own};
 use anyhow::{Context, bail};
 use kerrlight_tomo::fit::{BatchSize, OccupancyPlan, OccupancySettings, Region, Training};
 use kerrlight_tomo::optimise::{Adam, Lbfgs, Polynomial};
-use kerrlight_tomo::representation::{self, Grid, GridSettings, Network, NetworkSettings};
+use kerrlight_tomo::representation::{
+    self, FeatureGrid, FeatureGridSettings, Grid, GridSettings, Network, NetworkSettings,
+};
 
 /// What is recovered.
 pub fn representation(
@@ -26,12 +28,23 @@ pub fn representation(
         })
         .context("representation")
     };
+    let r = file.region.r_max;
     Ok(match &chosen.kind {
         Kind::Own(name) => own(name, &own_settings(file))?,
         Kind::Bhnerf => Box::new(network(NetworkSettings::bhnerf())?),
         Kind::Mlp4d => Box::new(network(NetworkSettings::mlp4d())?),
+        Kind::FeatureGrid => {
+            let settings = FeatureGridSettings {
+                coarsest: chosen.coarsest,
+                levels: chosen.levels,
+                low: [-r; 3],
+                high: [r; 3],
+                activation: activation(chosen.activation),
+                initial: FAINT,
+            };
+            Box::new(FeatureGrid::new(settings).context("representation")?)
+        }
         Kind::Grid | Kind::LinearGrid => {
-            let r = file.region.r_max;
             // As dark as a network starts, sigmoid(−10).
             let (activation, initial) = match chosen.activation {
                 _ if chosen.kind == Kind::LinearGrid => (representation::Activation::Linear, 0.0),
@@ -49,6 +62,9 @@ pub fn representation(
         }
     })
 }
+
+/// A feature grid starts with a faint glow, 1/55: darker ones start late.
+const FAINT: f64 = -4.0;
 
 fn own_settings(file: &FitFile) -> OwnSettings {
     let Region { r_min, r_max, z_width } = region(&file.region);
@@ -116,6 +132,11 @@ fn rates(file: &FitFile) -> (&'static str, Polynomial) {
         (Kind::Grid, Some(from)) => {
             (from, chosen.grid_last_rate.unwrap_or(chosen.last_rate), "training.grid_rate")
         }
+        (Kind::FeatureGrid, _) if chosen.feature_rate.is_some() => (
+            chosen.feature_rate.unwrap_or(chosen.rate),
+            chosen.feature_last_rate.unwrap_or(chosen.last_rate),
+            "training.feature_rate",
+        ),
         _ => (chosen.rate, chosen.last_rate, "training.rate"),
     };
     (name, Polynomial { from, to, steps: chosen.steps, power: 1.0 })

@@ -19,6 +19,7 @@ pub fn representation(kind: &Kind) -> &str {
     match kind {
         Kind::Bhnerf => "network (BH-NeRF)",
         Kind::Mlp4d => "network of space and time",
+        Kind::FeatureGrid => "grids of features",
         Kind::Grid => "grid of voxels",
         Kind::LinearGrid => "linear grid of voxels",
         Kind::Own(name) => name,
@@ -32,6 +33,9 @@ pub fn described(kind: &Kind) -> &str {
             "a neural network of the place that matter had at the reference time (BH-NeRF)"
         }
         Kind::Mlp4d => "a neural network of place and time, which knows nothing of orbits",
+        Kind::FeatureGrid => {
+            "a small neural network of features on grids of several resolutions that are carried along the orbits"
+        }
         Kind::Grid => "values at the nodes of a grid that is carried along the orbits",
         Kind::LinearGrid => {
             "values at the nodes of a grid that is carried along the orbits, as the solution of a convex problem"

@@ -8,11 +8,13 @@
 
 mod activation;
 pub mod conformance;
+mod features;
 mod grid;
 mod network;
 mod workspace;
 
 pub use activation::Activation;
+pub use features::{FeatureGrid, FeatureGridSettings};
 pub use grid::{Grid, GridSettings};
 pub use network::{Initialisation, Network, NetworkSettings};
 pub use workspace::Workspace;

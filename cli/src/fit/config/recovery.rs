@@ -11,6 +11,12 @@ pub struct Representation {
     /// Nodes of a grid along each axis.
     #[serde(default = "grid_nodes")]
     pub nodes: usize,
+    /// Cells of the coarsest grid of features along each axis; each further one has twice as many.
+    #[serde(default = "coarsest")]
+    pub coarsest: usize,
+    /// Grids of features.
+    #[serde(default = "levels")]
+    pub levels: usize,
     /// Last function of a grid, or of a network's output − 10.
     #[serde(default = "sigmoid")]
     pub activation: Activation,
@@ -42,6 +48,8 @@ pub enum Kind {
     Bhnerf,
     /// Network of the event.
     Mlp4d,
+    /// Features on grids of several resolutions and a small network of them, at the pulled-back point.
+    FeatureGrid,
     /// Voxels, learnt step by step.
     Grid,
     /// Voxels without activation, solved as the convex problem that they are.
@@ -82,6 +90,12 @@ pub struct Training {
     /// Last rate of a grid.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub grid_last_rate: Option<f64>,
+    /// First rate of a feature grid; `rate`, without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub feature_rate: Option<f64>,
+    /// Last rate of a feature grid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub feature_last_rate: Option<f64>,
     /// Steps over which rates grow to that.
     #[serde(default)]
     pub ramp: u64,
@@ -215,6 +229,14 @@ fn width() -> usize {
 fn hidden_layers() -> usize {
     4
 }
+fn coarsest() -> usize {
+    8
+}
+
+fn levels() -> usize {
+    4
+}
+
 fn degree() -> usize {
     3
 }

@@ -22,19 +22,20 @@ pub struct Geometry<T> {
 }
 
 /// Where lanes of points lie.
-struct Located<T, V> {
+pub struct Located<T, V> {
     /// First corner of each lane's cell.
-    corner: [usize; MAX_LANES],
+    pub corner: [usize; MAX_LANES],
     /// Position in the cell, 0 to 1 along each axis.
-    within: [V; 3],
+    pub within: [V; 3],
     /// 1 inside the box, 0 outside.
-    inside: V,
+    pub inside: V,
     unit: core::marker::PhantomData<T>,
 }
 
 impl<T: Scalar> Geometry<T> {
+    /// Cells of lanes of points.
     #[inline(always)]
-    fn locate<V: Lanes<T>>(&self, at: &Coordinates<'_, T>, from: usize) -> Located<T, V> {
+    pub fn locate<V: Lanes<T>>(&self, at: &Coordinates<'_, T>, from: usize) -> Located<T, V> {
         let (zero, one) = (V::splat(T::zero()), V::splat(T::one()));
         let (mut corner, mut inside, mut within) = ([0; MAX_LANES], one, [zero; 3]);
         for ((axis, nodes), (column, within)) in
@@ -60,7 +61,7 @@ impl<T: Scalar> Geometry<T> {
 
     /// Numbers at the eight corners, x slowest.
     #[inline(always)]
-    fn corners<V: Lanes<T>>(&self, parameters: &[T], corner: &[usize; MAX_LANES]) -> [V; 8] {
+    pub fn corners<V: Lanes<T>>(&self, parameters: &[T], corner: &[usize; MAX_LANES]) -> [V; 8] {
         let [_, ny, nz] = self.nodes;
         let mut numbers = [[T::zero(); MAX_LANES]; 8];
         for (lane, corner) in corner.iter().enumerate().take(V::LANES) {
@@ -81,7 +82,7 @@ fn between<T: Scalar, V: Lanes<T>>(from: V, to: V, part: V) -> V {
 
 /// The interpolated number and its slopes along x, y and z in cells.
 #[inline(always)]
-fn interpolate<T: Scalar, V: Lanes<T>>(c: &[V; 8], within: &[V; 3]) -> (V, [V; 3]) {
+pub fn interpolate<T: Scalar, V: Lanes<T>>(c: &[V; 8], within: &[V; 3]) -> (V, [V; 3]) {
     let [x, y, z] = *within;
     let along_z: [V; 4] = core::array::from_fn(|k| between(c[2 * k], c[2 * k + 1], z));
     let along_y = [between(along_z[0], along_z[1], y), between(along_z[2], along_z[3], y)];
@@ -94,7 +95,7 @@ fn interpolate<T: Scalar, V: Lanes<T>>(c: &[V; 8], within: &[V; 3]) -> (V, [V; 3
 }
 
 /// Emission at points.
-pub struct Values<'a, T> {
+pub(super) struct Values<'a, T> {
     pub geometry: Geometry<T>,
     pub activation: Activation,
     pub parameters: &'a [T],
@@ -116,14 +117,15 @@ impl<T: Scalar> Task<T> for Values<'_, T> {
     }
 }
 
+/// Zero outside.
 #[inline(always)]
-fn keep_inside<T: Scalar, V: Lanes<T>>(inside: V, value: V) -> V {
+pub fn keep_inside<T: Scalar, V: Lanes<T>>(inside: V, value: V) -> V {
     let zero = V::splat(T::zero());
     V::select_less(zero, inside, value, zero)
 }
 
 /// What each point adds to the nodes of its cell for a cotangent of one; and what else is wanted.
-pub struct Products<'a, T> {
+pub(super) struct Products<'a, T> {
     pub geometry: Geometry<T>,
     pub activation: Activation,
     pub share: Share<'a, T>,
@@ -159,8 +161,9 @@ impl<T: Scalar> Task<T> for Products<'_, T> {
 }
 
 impl<T: Scalar, V: Lanes<T>> Located<T, V> {
+    /// What lanes add to their nodes.
     #[inline(always)]
-    fn contribute(&self, weight: V, contributions: &mut [Contribution<T>]) {
+    pub fn contribute(&self, weight: V, contributions: &mut [Contribution<T>]) {
         let mut lanes = [[T::zero(); MAX_LANES]; 4];
         let [x, y, z] = self.within;
         for (lanes, v) in lanes.iter_mut().zip([x, y, z, weight]) {

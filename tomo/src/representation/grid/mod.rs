@@ -1,7 +1,7 @@
 //! Voxels, trilinear in between.
 
-mod cells;
-mod scatter;
+pub(super) mod cells;
+pub(super) mod scatter;
 #[cfg(test)]
 mod tests;
 

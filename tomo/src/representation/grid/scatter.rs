@@ -29,6 +29,8 @@ pub struct Contribution<T> {
 pub struct Scatter<T> {
     contributions: Vec<Contribution<T>>,
     order: Vec<u32>,
+    /// Where each slab starts in the order.
+    starts: Vec<usize>,
 }
 
 impl<T: Scalar + Default> Scatter<T> {
@@ -41,26 +43,36 @@ impl<T: Scalar + Default> Scatter<T> {
 
     /// Adds all contributions, times their cotangents, to the nodes.
     pub fn add_to(&mut self, cotangents: &[T], sums: &mut [T], nodes: [usize; 3]) {
-        let [nx, ny, nz] = nodes;
-        let layers = (nx - 1).div_ceil(SLABS);
-        let slab = layers * ny * nz;
-        let starts = self.sort(slab);
+        self.sort(nodes);
+        self.add_sorted(|point| cotangents[point], sums, nodes);
+    }
+
+    /// The same for contributions that have been sorted.
+    pub fn add_sorted(
+        &self,
+        cotangent: impl Fn(usize) -> T + Sync,
+        sums: &mut [T],
+        nodes: [usize; 3],
+    ) {
+        let [_, ny, nz] = nodes;
+        let slab = slab(nodes);
         for parity in 0..2 {
             let Some(sums) = sums.get_mut(parity * slab..) else { return };
             sums.par_chunks_mut(2 * slab).enumerate().for_each(|(k, sums)| {
                 let s = 2 * k + parity;
-                let Some([from, to]) = starts.get(s..s + 2) else { return };
+                let Some([from, to]) = self.starts.get(s..s + 2) else { return };
                 for index in &self.order[*from..*to] {
                     let mut contribution = self.contributions[*index as usize];
-                    contribution.weight *= cotangents[*index as usize];
+                    contribution.weight *= cotangent(*index as usize);
                     add(&contribution, sums, s * slab, ny, nz);
                 }
             });
         }
     }
 
-    /// Indices by slab, in their order within; where each slab starts.
-    fn sort(&mut self, slab: usize) -> [usize; SLABS + 1] {
+    /// Sorts indices by slab, in their order within.
+    pub fn sort(&mut self, nodes: [usize; 3]) {
+        let slab = slab(nodes);
         let mut starts = [0; SLABS + 1];
         let of = |c: &Contribution<T>| (c.corner != NOWHERE).then(|| c.corner as usize / slab);
         for s in self.contributions.iter().filter_map(of) {
@@ -76,8 +88,14 @@ impl<T: Scalar + Default> Scatter<T> {
                 next[s] += 1;
             }
         }
-        starts
+        self.starts.clear();
+        self.starts.extend(starts);
     }
+}
+
+/// Nodes of a slab, but for the first layer of the next.
+fn slab([nx, ny, nz]: [usize; 3]) -> usize {
+    (nx - 1).div_ceil(SLABS) * ny * nz
 }
 
 #[inline(always)]
