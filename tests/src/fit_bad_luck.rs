@@ -82,6 +82,16 @@ fn bad_settings_are_named_with_their_line() {
         ("sigma = 0.4", "sigma = inf", "truth.spot 0"),
         ("[representation]", tv, "regulariser 0: epsilon is missing"),
         ("[[truth.spot]]", "[[truth.spots]]", "spot"),
+        (
+            "kind = \"bhnerf\"",
+            "kind = \"feature-grid\"\nactivation = \"linear\"",
+            "representation.activation = linear is not allowed",
+        ),
+        (
+            "kind = \"bhnerf\"",
+            "kind = \"feature-grid\"\nlevels = 0",
+            "representation: levels = 0 is not allowed: 1 to 6",
+        ),
     ] {
         let words = changed(folder.path(), |text| text.replacen(from, to, 1));
         let words: Vec<String> = match to.contains("seed") || to.contains("spin") {

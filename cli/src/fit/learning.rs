@@ -33,6 +33,9 @@ pub fn representation(
         Kind::Own(name) => own(name, &own_settings(file))?,
         Kind::Bhnerf => Box::new(network(NetworkSettings::bhnerf())?),
         Kind::Mlp4d => Box::new(network(NetworkSettings::mlp4d())?),
+        Kind::FeatureGrid if chosen.activation == Activation::Linear => bail!(
+            "representation.activation = linear is not allowed: sigmoid or softplus with feature-grid, whose network's output has any sign"
+        ),
         Kind::FeatureGrid => {
             let settings = FeatureGridSettings {
                 coarsest: chosen.coarsest,
