@@ -9,11 +9,12 @@
 #[path = "support/mod.rs"]
 mod support;
 
+use core::ops::Range;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use kerrlight_tomo::optimise::{Adam, AdamState};
 use kerrlight_tomo::representation::{
-    Activation, Coordinates, Gradient, Grid, GridSettings, Network, NetworkSettings,
-    Representation, Workspace,
+    Activation, Coordinates, FeatureGrid, FeatureGridSettings, Gradient, Grid, GridSettings,
+    Groups, Network, NetworkSettings, Representation, Workspace,
 };
 use support::{large_sgemm, least};
 
@@ -63,6 +64,21 @@ impl<'a> Run<'a> {
         self.representation.vjp(&self.parameters, at, cotangents, gradient, workspace);
     }
 
+    /// Values and the gradient at once, for cotangents that are known beforehand; 50 points a ray.
+    fn both(&mut self) {
+        let at = coordinates(&self.columns, self.representation.dimension());
+        self.gradient.fill(0.0);
+        let gradient = Gradient { parameters: &mut self.gradient, coordinates: None };
+        let (all, points) = (&self.cotangents, self.values.len());
+        let starts: Vec<usize> = (0..points).step_by(50).chain([points]).collect();
+        let link = |groups: Range<usize>, _: &[f32], cotangents: &mut [f32]| {
+            cotangents.copy_from_slice(&all[starts[groups.start]..starts[groups.end]]);
+        };
+        let groups = Groups { starts: &starts, link: &link };
+        let (values, workspace) = (&mut self.values, &mut self.workspace);
+        self.representation.eval_vjp(&self.parameters, at, groups, values, gradient, workspace);
+    }
+
     fn step(&mut self) {
         self.vjp();
         Adam::default().step(1e-5, &self.gradient, &mut self.state, &mut self.parameters);
@@ -104,9 +120,12 @@ fn table((name, representation, operations): Entry<'_>) {
         run.check();
         let before = large_sgemm();
         let [forward, step] = [least(|| run.eval()), least(|| run.step())];
+        let both = least(|| run.both());
         let nanoseconds = |seconds: f64| seconds * 1e9 / points as f64;
-        let (f, s) = (nanoseconds(forward), nanoseconds(step));
-        print!("{name}, {points} points: eval {f:.1} ns, vjp and Adam {s:.1} ns a point");
+        let [f, s, b] = [forward, step, both].map(nanoseconds);
+        print!(
+            "{name}, {points} points: eval {f:.1} ns, vjp and Adam {s:.1} ns, values and gradient at once {b:.1} ns a point"
+        );
         if let Some([one, both]) = operations {
             let [one, both] = [one as f64 / f, both as f64 / s];
             let sgemm = before.max(large_sgemm());
@@ -139,9 +158,19 @@ fn benches(criterion: &mut Criterion) {
         Grid::new(settings).expect("a grid")
     };
     let (sigmoid, linear) = (grid(Activation::Sigmoid), grid(Activation::Linear));
-    let all: [Entry<'_>; 4] = [
+    let features = FeatureGridSettings {
+        coarsest: 8,
+        levels: 4,
+        low,
+        high,
+        activation: Activation::Sigmoid,
+        initial: -1.0,
+    };
+    let features = FeatureGrid::new(features).expect("four grids");
+    let all: [Entry<'_>; 5] = [
         ("bhnerf", &bhnerf, Some(bhnerf.operations())),
         ("mlp4d", &mlp4d, Some(mlp4d.operations())),
+        ("feature-grid", &features, None),
         ("grid 64³, sigmoid", &sigmoid, None),
         ("grid 64³, linear", &linear, None),
     ];

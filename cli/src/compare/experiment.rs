@@ -94,6 +94,9 @@ pub struct Level {
     pub remove: Vec<String>,
 }
 
+/// Results of which more is better.
+pub const QUALITIES: [&str; 4] = ["psnr_db", "psnr_inside_db", "correlation", "axis_dot_truth"];
+
 /// A table of means and standard deviations over seeds.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -112,6 +115,8 @@ pub struct TableAsked {
     /// Levels of the other factors.
     #[serde(default)]
     pub r#where: BTreeMap<String, String>,
+    /// A factor of which each cell has its best level.
+    pub best_of: Option<String>,
     /// Rows of numbers from elsewhere.
     #[serde(default)]
     pub beside: Vec<Beside>,
@@ -198,7 +203,12 @@ impl Experiment {
         }
         for table in &self.table {
             let name = || format!("table {:?}", table.title);
-            self.shown(&table.rows, &table.columns, &table.r#where, true).with_context(name)?;
+            let rows: Vec<String> = table.rows.iter().chain(&table.best_of).cloned().collect();
+            self.shown(&rows, &table.columns, &table.r#where, true).with_context(name)?;
+            if table.best_of.is_some() && !QUALITIES.contains(&table.value.as_str()) {
+                let all = QUALITIES.join(", ");
+                bail!("table {:?}: best_of is for {all}, not for {:?}", table.title, table.value);
+            }
             let columns: usize = table.columns.iter().map(|name| self.levels(name).len()).product();
             if let Some(beside) = table.beside.iter().find(|row| row.values.len() != columns) {
                 let (what, count) = (&beside.name, beside.values.len());

@@ -22,6 +22,7 @@ macro_rules! carried {
 
 const CARRIED: &[(&str, &str)] = &carried![
     "experiments/representations.toml",
+    "experiments/tuning.toml",
     "experiments/sparse-representations.toml",
     "experiments/sparsity.toml",
     "experiments/axis.toml",

@@ -21,6 +21,40 @@ pub fn levels(
     factors.iter().map(of).collect()
 }
 
+/// What a table shows at some levels.
+pub struct Cell {
+    /// Over seeds.
+    pub spread: Spread,
+    /// The best level, where a table asks for it.
+    best: Option<String>,
+}
+
+impl Cell {
+    /// Nothing where no case has been run.
+    pub fn of(
+        experiment: &Experiment,
+        summary: &Summary,
+        asked: &TableAsked,
+        at: &[(&str, &str)],
+    ) -> Option<Self> {
+        let Some(factor) = &asked.best_of else {
+            return Some(Self { spread: summary.spread(&asked.value, at)?, best: None });
+        };
+        let cell = |level: super::experiment::Level| {
+            let here = [at, &[(factor.as_str(), level.name.as_str())]].concat();
+            Some(Self { spread: summary.spread(&asked.value, &here)?, best: Some(level.name) })
+        };
+        let all = experiment.levels(factor).into_iter().filter_map(cell);
+        all.max_by(|a, b| a.spread.mean.total_cmp(&b.spread.mean))
+    }
+
+    /// As it stands in a table.
+    pub fn text(&self, digits: usize) -> String {
+        let best = self.best.as_ref().map(|level| format!(" ({level})"));
+        [self.spread.text(digits), best.unwrap_or_default()].concat()
+    }
+}
+
 /// One table; nothing if it would be empty.
 pub fn table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) -> Option<Table> {
     let (unit, digits) = described(&asked.value);
@@ -29,12 +63,12 @@ pub fn table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) -> 
     let (rows, columns) = (combinations(&rows), combinations(&columns));
     let fixed = pairs(&asked.r#where);
     let cell = |row: &[(&str, &str)], column: &[(&str, &str)]| {
-        summary.spread(&asked.value, &[row, column, &fixed].concat())
+        Cell::of(experiment, summary, asked, &[row, column, &fixed].concat())
     };
-    let text = |spread: Option<Spread>| spread.map_or(NONE.to_owned(), |s| s.text(digits));
+    let text = |cell: Option<Cell>| cell.map_or(NONE.to_owned(), |cell| cell.text(digits));
     let mut lines = Vec::new();
     for row in &rows {
-        let cells: Vec<Option<Spread>> = columns.iter().map(|column| cell(row, column)).collect();
+        let cells: Vec<Option<Cell>> = columns.iter().map(|column| cell(row, column)).collect();
         if cells.iter().any(Option::is_some) {
             let name = if row.is_empty() { "all".to_owned() } else { called(row) };
             lines.push([vec![name], cells.into_iter().map(text).collect()].concat());
@@ -55,9 +89,12 @@ pub fn table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) -> 
         seeds => format!("Mean ± standard deviation over {seeds} seeds."),
     };
     let gaps = if gaps { " –: not asked for, or not there." } else { "" };
+    let best =
+        asked.best_of.as_ref().map(|name| format!(" In brackets: the best level of {name}."));
+    let best = best.unwrap_or_default();
     Some(Table {
         title: format!("{}: {unit}", asked.title),
-        caption: format!("{} {spread}{gaps}", asked.caption),
+        caption: format!("{} {spread}{best}{gaps}", asked.caption),
         head: std::iter::once(head).chain(names).collect(),
         rows: lines,
         links: Vec::new(),
@@ -168,4 +205,55 @@ pub fn markdown(table: &Table) -> String {
     let rule = format!("|{}\n", "---|".repeat(table.head.len()));
     let rows: String = table.rows.iter().map(|row| line(row)).collect();
     format!("### {}\n\n{}{rule}{rows}\n{}\n", table.title, line(&table.head), table.caption)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::compare::cases::{Choice, expand};
+    use crate::compare::runner::Status;
+    use crate::compare::source::Source;
+    use crate::compare::verdicts;
+
+    const TEXT: &str = r#"
+        title = "t"
+        question = "q"
+        seeds = 1
+        fit = "../scenes/fits/scene_1.toml"
+        [[factor]]
+        name = "what"
+        key = "representation.kind"
+        values = ["bhnerf", "grid"]
+        [[factor]]
+        name = "rate"
+        key = "training.rate"
+        values = [1e-3, 2e-3]
+        [[table]]
+        title = "Best"
+        caption = "Of two."
+        value = "psnr_db"
+        rows = ["what"]
+        best_of = "rate"
+    "#;
+
+    #[test]
+    fn exact_cells_have_their_best_level() {
+        let experiment = Experiment::parse(TEXT).unwrap();
+        let cases = expand(&experiment, &Source::BuiltIn, &Choice::default()).unwrap();
+        let results =
+            [30.0, 20.0, 21.0, 25.0].map(|x| Status::Done(serde_json::json!({"psnr_db": x})));
+        let summary = Summary::new(cases.iter().zip(results).collect());
+        let table = table(&experiment, &summary, &experiment.table[0]).unwrap();
+        assert_eq!(table.rows, [["bhnerf", "30.00 (0.001)"], ["grid", "25.00 (0.002)"]]);
+        assert_eq!(table.caption, "Of two. One seed. In brackets: the best level of rate.");
+        let said = verdicts::of_table(&experiment, &summary, &experiment.table[0]);
+        assert_eq!(said, ["Best, by PSNR (dB): bhnerf (30.00 (0.001)) > grid (25.00 (0.002))."]);
+        for (old, new, message) in [
+            ("\"psnr_db\"", "\"seconds\"", "best_of is for psnr_db"),
+            ("best_of = \"rate\"", "best_of = \"rates\"", "there is no factor \"rates\""),
+        ] {
+            let error = format!("{:#}", Experiment::parse(&TEXT.replace(old, new)).err().unwrap());
+            assert!(error.contains(message), "{error}");
+        }
+    }
 }

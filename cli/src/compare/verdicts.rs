@@ -1,11 +1,8 @@
 //! What tables of qualities say, in sentences.
 
-use super::experiment::{Experiment, TableAsked};
+use super::experiment::{Experiment, QUALITIES, TableAsked};
 use super::summary::{Summary, called, combinations, described, pairs};
-use super::tables::levels;
-
-/// Results of which more is better.
-const QUALITIES: [&str; 4] = ["psnr_db", "psnr_inside_db", "correlation", "axis_dot_truth"];
+use super::tables::{Cell, levels};
 
 /// Rows of a table in an order that some of its columns share.
 struct Order {
@@ -45,15 +42,15 @@ pub fn of_table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) 
             .into_iter()
             .filter_map(|row| {
                 let at = [row.as_slice(), &column, &fixed].concat();
-                Some((called(&row), summary.spread(&asked.value, &at)?))
+                Some((called(&row), Cell::of(experiment, summary, asked, &at)?))
             })
             .collect();
         if ranked.len() < 2 {
             continue;
         }
-        ranked.sort_by(|a, b| b.1.mean.total_cmp(&a.1.mean));
+        ranked.sort_by(|a, b| b.1.spread.mean.total_cmp(&a.1.spread.mean));
         let (rows, values): (Vec<_>, Vec<_>) =
-            ranked.into_iter().map(|(name, spread)| (name, spread.text(digits))).unzip();
+            ranked.into_iter().map(|(name, cell)| (name, cell.text(digits))).unzip();
         match orders.iter_mut().find(|order| order.rows == rows) {
             Some(order) => {
                 order.columns.push(called(&column));

@@ -46,6 +46,24 @@ pub struct Groups<'a, T> {
     pub link: &'a Link<'a, T>,
 }
 
+impl<T> Groups<'_, T> {
+    /// Groups, and their points, of which there are at most so many, or one group, at a time.
+    pub(crate) fn blocks(
+        &self,
+        points: usize,
+    ) -> impl Iterator<Item = (Range<usize>, Range<usize>)> {
+        let starts = self.starts;
+        let mut group = 0;
+        core::iter::from_fn(move || {
+            let first = *starts.get(..starts.len().saturating_sub(1))?.get(group)?;
+            let after = starts.partition_point(|start| *start <= first + points) - 1;
+            let (from, to) = (group, after.max(group + 1));
+            group = to;
+            Some((from..to, first..starts[to]))
+        })
+    }
+}
+
 /// An emission field e(x; parameters), evaluated on batches of points by all threads of the current
 /// rayon pool.
 ///

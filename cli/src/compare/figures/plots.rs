@@ -89,10 +89,13 @@ impl Figures<'_> {
             }
         }
         let (unit, _) = described(value);
+        let numbers = || series.iter().flat_map(|series| &series.points).map(|point| point[0]);
+        let (least, most) = (numbers().fold(f64::MAX, f64::min), numbers().fold(0.0, f64::max));
+        let log = least > 0.0 && most >= 30.0 * least;
         let plot = |series| LinePlot {
             title: asked.title.clone(),
             caption: format!("{} {}", asked.caption, self.summary.seeds_told()),
-            x: Axis { label: factor.clone(), unit: String::new(), log: false },
+            x: Axis { label: factor.clone(), unit: String::new(), log },
             y: Axis { label: unit.clone(), unit: String::new(), log: false },
             series,
         };

@@ -104,7 +104,7 @@ impl<V: Copy> Sums<V> {
         &mut self,
         network: &Network<'_, T>,
         inputs: &[V],
-        units: &Units<V>,
+        [first_units, second_units]: &[[V; WIDTH]; 2],
         slope: V,
     ) -> [V; MAX_INPUTS]
     where
@@ -114,7 +114,7 @@ impl<V: Copy> Sums<V> {
         self.last_bias = self.last_bias + slope;
         let mut second = [zero; WIDTH];
         let weights = network.last.iter().zip(&mut self.last);
-        let units_and_slopes = units.second.iter().zip(&mut second);
+        let units_and_slopes = second_units.iter().zip(&mut second);
         for ((weight, sum), (unit, out)) in weights.zip(units_and_slopes) {
             *sum = unit.mul_add(slope, *sum);
             *out = V::select_less(zero, *unit, V::splat(*weight) * slope, zero);
@@ -124,7 +124,7 @@ impl<V: Copy> Sums<V> {
         }
         let mut first = [zero; WIDTH];
         let rows = network.second.chunks_exact(WIDTH).zip(&mut self.second);
-        for ((weights, sums), (unit, out)) in rows.zip(units.first.iter().zip(&mut first)) {
+        for ((weights, sums), (unit, out)) in rows.zip(first_units.iter().zip(&mut first)) {
             let of_unit = row(weights, sums, *unit, &second);
             *out = V::select_less(zero, *unit, of_unit, zero);
         }
@@ -178,28 +178,37 @@ fn features<T: Scalar, V: Lanes<T>>(
     (inputs, inside)
 }
 
-/// Emission at points.
-pub struct Values<'a, T> {
+/// Emission at points, and what its derivatives need.
+pub struct Forward<'a, T> {
     pub layout: &'a Layout,
     pub geometries: &'a [Geometry<T>],
     pub activation: Activation,
     pub parameters: &'a [T],
     pub at: Coordinates<'a, T>,
     pub values: &'a mut [T],
+    /// Features, units and the activation's slope, [`Layout::kept`] lanes one after the other, if wanted.
+    pub kept: Option<&'a mut [T]>,
 }
 
-impl<T: Scalar> Task<T> for Values<'_, T> {
+impl<T: Scalar> Task<T> for Forward<'_, T> {
     type Output = ();
     #[inline(always)]
-    fn run<V: Lanes<T>, const ROWS: usize>(self) {
+    fn run<V: Lanes<T>, const ROWS: usize>(mut self) {
         let network = Network::of(self.layout, self.parameters);
-        let grids = (self.layout, self.geometries);
+        let (grids, count) = ((self.layout, self.geometries), self.layout.inputs());
         for (k, values) in self.values.chunks_mut(V::LANES).enumerate() {
             let from = k * V::LANES;
             let (inputs, inside) = features::<T, V>(grids, self.parameters, &self.at, from);
-            let units = network.forward(&inputs[..self.layout.inputs()]);
-            let (value, _) = self.activation.apply::<T, V>(units.output);
+            let inputs = &inputs[..count];
+            let units = network.forward(inputs);
+            let (value, slope) = self.activation.apply::<T, V>(units.output);
             keep_inside(inside, value).store_front(values);
+            if let Some(kept) = &mut self.kept {
+                let kept = kept[from * self.layout.kept()..].chunks_exact_mut(V::LANES);
+                let slope = keep_inside(inside, slope);
+                let all = inputs.iter().chain(&units.first).chain(&units.second).chain([&slope]);
+                kept.zip(all).for_each(|(kept, lanes)| lanes.store_front(kept));
+            }
         }
     }
 }
@@ -208,10 +217,11 @@ impl<T: Scalar> Task<T> for Values<'_, T> {
 pub struct Backward<'a, T> {
     pub layout: &'a Layout,
     pub geometries: &'a [Geometry<T>],
-    pub activation: Activation,
     pub parameters: &'a [T],
     pub at: Coordinates<'a, T>,
     pub cotangents: &'a [T],
+    /// As [`Forward`] has left it.
+    pub kept: &'a [T],
     /// dL/dfeature, all features of a point side by side.
     pub slopes: &'a mut [T],
     /// Of the network, overwritten.
@@ -226,16 +236,19 @@ impl<T: Scalar> Task<T> for Backward<'_, T> {
     fn run<V: Lanes<T>, const ROWS: usize>(mut self) {
         let network = Network::of(self.layout, self.parameters);
         let (grids, count) = ((self.layout, self.geometries), self.layout.inputs());
-        let mut sums = Sums::new(V::splat(T::zero()));
+        let zero = V::splat(T::zero());
+        let mut sums = Sums::new(zero);
         for (k, out) in self.slopes.chunks_mut(V::LANES * count).enumerate() {
             let from = k * V::LANES;
-            let (inputs, inside) = features::<T, V>(grids, self.parameters, &self.at, from);
-            let inputs = &inputs[..count];
-            let units = network.forward(inputs);
-            let (_, slope) = self.activation.apply::<T, V>(units.output);
-            let cotangent = V::load_front(&self.cotangents[from..], T::zero());
-            let slope = keep_inside(inside, cotangent * slope);
-            let slopes = sums.backward(&network, inputs, &units, slope);
+            let mut kept = self.kept[from * self.layout.kept()..]
+                .chunks_exact(V::LANES)
+                .map(|lanes| V::load_front(lanes, T::zero()));
+            let mut next = || kept.next().unwrap_or(zero);
+            let mut inputs = [zero; MAX_INPUTS];
+            inputs[..count].fill_with(&mut next);
+            let units = [(); 2].map(|()| [(); WIDTH].map(|()| next()));
+            let slope = V::load_front(&self.cotangents[from..], T::zero()) * next();
+            let slopes = sums.backward(&network, &inputs[..count], &units, slope);
             let mut lanes = [T::zero(); MAX_LANES];
             for (input, slopes) in slopes.iter().take(count).enumerate() {
                 slopes.store_front(&mut lanes);

@@ -56,6 +56,11 @@ impl Layout {
         WIDTH * (self.inputs() + 1) + WIDTH * (WIDTH + 1) + WIDTH + 1
     }
 
+    /// Numbers of a point that the way back needs: features, units, and the activation's slope.
+    pub fn kept(&self) -> usize {
+        self.inputs() + 2 * WIDTH + 1
+    }
+
     /// All parameters.
     pub fn parameters(&self) -> usize {
         self.network_start() + self.network()

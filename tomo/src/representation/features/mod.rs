@@ -5,11 +5,12 @@ mod layout;
 #[cfg(test)]
 mod tests;
 
-use super::grid::cells::{Axis, Geometry};
+use super::grid::cells::{Geometry, check_box};
 use super::grid::scatter::Scatter;
-use super::{Activation, Coordinates, Gradient, Groups, Representation, Workspace};
+use super::{Activation, Coordinates, CoordinatesMut, Gradient, Groups, Representation, Workspace};
 use crate::simd::{InstructionSet, Scalar, dispatch};
-use kernels::{Backward, Corners, Values};
+use core::ops::Range;
+use kernels::{Backward, Corners, Forward};
 use kerrlight_geodesic::OutOfRange;
 use layout::{FEATURES, Layout, MAX_LEVELS, WIDTH};
 use rand::{RngExt, SeedableRng};
@@ -69,11 +70,7 @@ impl FeatureGrid {
         let finest = coarsest.saturating_mul(1 << (levels - 1));
         check("coarsest", *coarsest as f64, *coarsest >= 1, "1 or more cells")?;
         check("coarsest", *coarsest as f64, finest <= 512, "at most 512 cells of the finest grid")?;
-        for axis in 0..3 {
-            check("low", low[axis], low[axis].is_finite(), "a finite number")?;
-            let above = high[axis].is_finite() && high[axis] > low[axis];
-            check("high", high[axis], above, "above low")?;
-        }
+        check_box(*low, *high)?;
         check("initial", settings.initial, settings.initial.is_finite(), "a finite number")?;
         let positive = settings.activation != Activation::Linear;
         check("activation", 0.0, positive, "sigmoid or softplus: a network's output has any sign")?;
@@ -97,56 +94,112 @@ impl FeatureGrid {
         assert!(at.dimension() == 3 && at.len() == numbers);
     }
 
+    fn check_gradient<T>(&self, at: &Coordinates<'_, T>, gradient: &Gradient<'_, T>) {
+        assert!(gradient.parameters.len() == self.layout.parameters());
+        let coordinates = gradient.coordinates.as_ref();
+        assert!(coordinates.is_none_or(|all| all.len() == at.len() && all.dimension() == 3));
+    }
+
     /// The grids, coarsest first, and places that are not used.
     fn geometries<T: Scalar>(&self) -> [Geometry<T>; MAX_LEVELS] {
         let FeatureGridSettings { low, high, .. } = &self.settings;
-        let geometry = |nodes: usize| {
-            let axis = |k: usize| Axis {
-                low: T::of(low[k]),
-                per_length: T::of((nodes - 1) as f64 / (high[k] - low[k])),
-                cells: T::of((nodes - 1) as f64),
-            };
-            Geometry { axes: [axis(0), axis(1), axis(2)], nodes: [nodes; 3] }
-        };
+        let geometry = |nodes: usize| Geometry::new([nodes; 3], *low, *high);
         core::array::from_fn(|level| geometry(self.layout.nodes(level)))
     }
+}
+
+/// What every part of a batch is computed with.
+#[derive(Clone, Copy)]
+struct Field<'a, T> {
+    grid: &'a FeatureGrid,
+    geometries: &'a [Geometry<T>],
+    parameters: &'a [T],
 }
 
 /// What is kept from batch to batch.
 #[derive(Default)]
 struct Memory<T> {
     scatter: Scatter<T>,
+    values: Vec<T>,
+    cotangents: Vec<T>,
+    /// What the way back needs, a share of points after the other.
+    kept: Vec<T>,
     /// dL/dfeature of each point, all features of a point side by side.
     slopes: Vec<T>,
     /// Gradients of the network, a share of points after the other.
     network: Vec<T>,
     /// dL/dx of each point.
     pulls: Vec<[T; 3]>,
-    cotangents: Vec<T>,
 }
 
 impl<T: Scalar + Default> Memory<T> {
     fn vjp(
         &mut self,
-        grid: &FeatureGrid,
-        parameters: &[T],
+        field: Field<'_, T>,
         at: Coordinates<'_, T>,
         cotangents: &[T],
         gradient: Gradient<'_, T>,
     ) {
         let Gradient { parameters: sums, mut coordinates } = gradient;
-        let geometries = &grid.geometries()[..grid.settings.levels];
+        let mut values = core::mem::take(&mut self.values);
         for start in (0..at.len()).step_by(BLOCK) {
             let range = start..(start + BLOCK).min(at.len());
-            let (here, cotangents) = (at.range(range.clone()), &cotangents[range.clone()]);
-            let wanted = coordinates.is_some();
-            self.through_network(grid, geometries, parameters, (here, wanted), cotangents, sums);
-            self.add_to_nodes(grid, geometries, here, sums);
-            if let Some(coordinates) = &mut coordinates {
-                for (k, column) in coordinates.columns().iter_mut().enumerate() {
-                    let column = column[range.clone()].iter_mut();
-                    column.zip(&self.pulls).for_each(|(sum, pull)| *sum += pull[k]);
-                }
+            let (ours, rest) = coordinates.take().map(|all| all.split_at(range.len())).unzip();
+            coordinates = rest;
+            values.resize(range.len(), T::zero());
+            self.forward(field, at.range(range.clone()), &mut values);
+            self.backward(field, at.range(range.clone()), &cotangents[range], sums, ours);
+        }
+        self.values = values;
+    }
+
+    /// Goes through the network once.
+    fn eval_vjp(
+        &mut self,
+        field: Field<'_, T>,
+        at: Coordinates<'_, T>,
+        groups: Groups<'_, T>,
+        values: &mut [T],
+        gradient: Gradient<'_, T>,
+    ) {
+        let Gradient { parameters: sums, mut coordinates } = gradient;
+        let mut cotangents = core::mem::take(&mut self.cotangents);
+        for (some, range) in groups.blocks(BLOCK) {
+            let (ours, rest) = coordinates.take().map(|all| all.split_at(range.len())).unzip();
+            coordinates = rest;
+            let (at, values) = (at.range(range.clone()), &mut values[range.clone()]);
+            self.forward(field, at, values);
+            cotangents.resize(range.len(), T::zero());
+            (groups.link)(some, values, &mut cotangents);
+            self.backward(field, at, &cotangents, sums, ours);
+        }
+        self.cotangents = cotangents;
+    }
+
+    /// Values of a block of points, and what the way back needs.
+    fn forward(&mut self, field: Field<'_, T>, at: Coordinates<'_, T>, values: &mut [T]) {
+        let each = SHARE * field.grid.layout.kept();
+        self.kept.resize(at.len().div_ceil(SHARE) * each, T::zero());
+        let shares = values.par_chunks_mut(SHARE).zip(self.kept.par_chunks_mut(each));
+        shares.enumerate().for_each(|(share, (values, kept))| {
+            field.values(at.range(share_of(share, values.len())), values, Some(kept));
+        });
+    }
+
+    /// Adds the gradients of the block that went forward last.
+    fn backward(
+        &mut self,
+        field: Field<'_, T>,
+        at: Coordinates<'_, T>,
+        cotangents: &[T],
+        sums: &mut [T],
+        coordinates: Option<CoordinatesMut<'_, T>>,
+    ) {
+        self.through_network(field, (at, coordinates.is_some()), cotangents, sums);
+        self.add_to_nodes(field, at, sums);
+        if let Some(mut coordinates) = coordinates {
+            for (k, column) in coordinates.columns().iter_mut().enumerate() {
+                column.iter_mut().zip(&self.pulls).for_each(|(sum, pull)| *sum += pull[k]);
             }
         }
     }
@@ -154,40 +207,39 @@ impl<T: Scalar + Default> Memory<T> {
     /// Gradients of features and of the network. The network's are summed share by share, always in the same order.
     fn through_network(
         &mut self,
-        grid: &FeatureGrid,
-        geometries: &[Geometry<T>],
-        parameters: &[T],
+        Field { grid, geometries, parameters }: Field<'_, T>,
         (at, wanted): (Coordinates<'_, T>, bool),
         cotangents: &[T],
         sums: &mut [T],
     ) {
-        let (inputs, each) = (grid.layout.inputs(), grid.layout.network());
+        let layout = &grid.layout;
+        let (inputs, each) = (layout.inputs(), layout.network());
         let shares = at.len().div_ceil(SHARE);
         self.slopes.resize(at.len() * inputs, T::zero());
         self.network.resize(shares * each, T::zero());
         self.pulls.resize(at.len(), [T::zero(); 3]);
         let outputs =
             self.slopes.par_chunks_mut(SHARE * inputs).zip(self.network.par_chunks_mut(each));
-        outputs.zip(self.pulls.par_chunks_mut(SHARE)).enumerate().for_each(
-            |(share, ((slopes, network), pulls))| {
-                let range = share * SHARE..((share + 1) * SHARE).min(at.len());
-                let (at, cotangents) = (at.range(range.clone()), &cotangents[range]);
-                let (layout, activation) = (&grid.layout, grid.settings.activation);
-                let task = Backward {
-                    layout,
-                    geometries,
-                    activation,
-                    parameters,
-                    at,
-                    cotangents,
-                    slopes,
-                    network,
-                    pulls: wanted.then_some(pulls),
-                };
-                dispatch(grid.instruction_set, task);
-            },
-        );
-        let sums = &mut sums[grid.layout.network_start()..];
+        let outputs = outputs.zip(self.pulls.par_chunks_mut(SHARE));
+        let shares = outputs.zip(self.kept.par_chunks(SHARE * layout.kept())).enumerate();
+        shares.for_each(|(share, (((slopes, network), pulls), kept))| {
+            let range = share_of(share, pulls.len());
+            let (at, cotangents) = (at.range(range.clone()), &cotangents[range]);
+            let pulls = wanted.then_some(pulls);
+            let task = Backward {
+                layout,
+                geometries,
+                parameters,
+                at,
+                cotangents,
+                kept,
+                slopes,
+                network,
+                pulls,
+            };
+            dispatch(grid.instruction_set, task);
+        });
+        let sums = &mut sums[layout.network_start()..];
         for share in self.network.chunks(each) {
             sums.iter_mut().zip(share).for_each(|(sum, part)| *sum += *part);
         }
@@ -196,8 +248,7 @@ impl<T: Scalar + Default> Memory<T> {
     /// Adds the gradients of features to the nodes around each point.
     fn add_to_nodes(
         &mut self,
-        grid: &FeatureGrid,
-        geometries: &[Geometry<T>],
+        Field { grid, geometries, .. }: Field<'_, T>,
         at: Coordinates<'_, T>,
         sums: &mut [T],
     ) {
@@ -205,8 +256,7 @@ impl<T: Scalar + Default> Memory<T> {
         for (level, geometry) in geometries.iter().enumerate() {
             let contributions = self.scatter.contributions(at.len());
             contributions.par_chunks_mut(SHARE).enumerate().for_each(|(share, contributions)| {
-                let from = share * SHARE;
-                let at = at.range(from..from + contributions.len());
+                let at = at.range(share_of(share, contributions.len()));
                 dispatch(grid.instruction_set, Corners { geometry, at, contributions });
             });
             self.scatter.sort(geometry.nodes);
@@ -217,6 +267,20 @@ impl<T: Scalar + Default> Memory<T> {
             }
         }
     }
+}
+
+impl<T: Scalar> Field<'_, T> {
+    fn values(&self, at: Coordinates<'_, T>, values: &mut [T], kept: Option<&mut [T]>) {
+        let Field { grid, geometries, parameters } = *self;
+        let (layout, activation) = (&grid.layout, grid.settings.activation);
+        let task = Forward { layout, geometries, activation, parameters, at, values, kept };
+        dispatch(grid.instruction_set, task);
+    }
+}
+
+/// The points of a share that has this many.
+fn share_of(share: usize, points: usize) -> Range<usize> {
+    share * SHARE..share * SHARE + points
 }
 
 impl<T: Scalar + Default> Representation<T> for FeatureGrid {
@@ -254,12 +318,9 @@ impl<T: Scalar + Default> Representation<T> for FeatureGrid {
     ) {
         self.check(parameters, &at, values.len());
         let geometries = &self.geometries()[..self.settings.levels];
+        let field = Field { grid: self, geometries, parameters };
         values.par_chunks_mut(SHARE).enumerate().for_each(|(share, values)| {
-            let from = share * SHARE;
-            let at = at.range(from..from + values.len());
-            let (layout, activation) = (&self.layout, self.settings.activation);
-            let task = Values { layout, geometries, activation, parameters, at, values };
-            dispatch(self.instruction_set, task);
+            field.values(at.range(share_of(share, values.len())), values, None);
         });
     }
 
@@ -272,11 +333,10 @@ impl<T: Scalar + Default> Representation<T> for FeatureGrid {
         workspace: &mut Workspace,
     ) {
         self.check(parameters, &at, cotangents.len());
-        assert!(gradient.parameters.len() == parameters.len());
-        let coordinates = gradient.coordinates.as_ref();
-        assert!(coordinates.is_none_or(|all| all.len() == at.len() && all.dimension() == 3));
-        let memory: &mut Memory<T> = workspace.of();
-        memory.vjp(self, parameters, at, cotangents, gradient);
+        self.check_gradient(&at, &gradient);
+        let geometries = &self.geometries()[..self.settings.levels];
+        let field = Field { grid: self, geometries, parameters };
+        workspace.of::<Memory<T>>().vjp(field, at, cotangents, gradient);
     }
 
     fn eval_vjp(
@@ -288,13 +348,10 @@ impl<T: Scalar + Default> Representation<T> for FeatureGrid {
         gradient: Gradient<'_, T>,
         workspace: &mut Workspace,
     ) {
-        self.eval(parameters, at, values, workspace);
-        let memory: &mut Memory<T> = workspace.of();
-        let mut cotangents = core::mem::take(&mut memory.cotangents);
-        cotangents.resize(at.len(), T::zero());
-        (groups.link)(0..groups.starts.len().saturating_sub(1), values, &mut cotangents);
-        self.vjp(parameters, at, &cotangents, gradient, workspace);
-        let memory: &mut Memory<T> = workspace.of();
-        memory.cotangents = cotangents;
+        self.check(parameters, &at, values.len());
+        self.check_gradient(&at, &gradient);
+        let geometries = &self.geometries()[..self.settings.levels];
+        let field = Field { grid: self, geometries, parameters };
+        workspace.of::<Memory<T>>().eval_vjp(field, at, groups, values, gradient);
     }
 }

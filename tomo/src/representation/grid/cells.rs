@@ -4,6 +4,7 @@ use super::super::{Activation, Coordinates};
 use super::Share;
 use super::scatter::{Contribution, NOWHERE};
 use crate::simd::{Lanes, MAX_LANES, Scalar, Task, math};
+use kerrlight_geodesic::OutOfRange;
 
 /// One axis of the box.
 #[derive(Clone, Copy)]
@@ -21,6 +22,19 @@ pub struct Geometry<T> {
     pub nodes: [usize; 3],
 }
 
+/// Whether a box has finite corners, the second above the first.
+pub fn check_box(low: [f64; 3], high: [f64; 3]) -> Result<(), OutOfRange> {
+    for (low, high) in low.into_iter().zip(high) {
+        if !low.is_finite() {
+            return Err(OutOfRange { field: "low", value: low, allowed: "a finite number" });
+        }
+        if !(high.is_finite() && high > low) {
+            return Err(OutOfRange { field: "high", value: high, allowed: "above low" });
+        }
+    }
+    Ok(())
+}
+
 /// Where lanes of points lie.
 pub struct Located<T, V> {
     /// First corner of each lane's cell.
@@ -33,6 +47,16 @@ pub struct Located<T, V> {
 }
 
 impl<T: Scalar> Geometry<T> {
+    /// Nodes from `low` to `high`, both included.
+    pub fn new(nodes: [usize; 3], low: [f64; 3], high: [f64; 3]) -> Self {
+        let axis = |k: usize| Axis {
+            low: T::of(low[k]),
+            per_length: T::of((nodes[k] - 1) as f64 / (high[k] - low[k])),
+            cells: T::of((nodes[k] - 1) as f64),
+        };
+        Self { axes: [axis(0), axis(1), axis(2)], nodes }
+    }
+
     /// Cells of lanes of points.
     #[inline(always)]
     pub fn locate<V: Lanes<T>>(&self, at: &Coordinates<'_, T>, from: usize) -> Located<T, V> {

@@ -7,7 +7,7 @@ mod tests;
 
 use super::{Activation, Coordinates, CoordinatesMut, Gradient, Groups, Representation, Workspace};
 use crate::simd::{InstructionSet, Scalar, dispatch};
-use cells::{Products, Values};
+use cells::{Geometry, Products, Values, check_box};
 use kerrlight_geodesic::OutOfRange;
 use scatter::{Contribution, Scatter};
 
@@ -51,13 +51,10 @@ impl Grid {
         let check = |field, value, ok, allowed| {
             if ok { Ok(()) } else { Err(OutOfRange { field, value, allowed }) }
         };
-        for axis in 0..3 {
-            let (nodes, low, high) =
-                (settings.nodes[axis], settings.low[axis], settings.high[axis]);
+        for nodes in settings.nodes {
             check("nodes", nodes as f64, (2..=2048).contains(&nodes), "2 to 2048 along each axis")?;
-            check("low", low, low.is_finite(), "a finite number")?;
-            check("high", high, high.is_finite() && high > low, "above low")?;
         }
+        check_box(settings.low, settings.high)?;
         let total: usize = settings.nodes.iter().product();
         check("nodes", total as f64, total <= 1 << 30, "2^30 in all")?;
         let linear = settings.activation == Activation::Linear;
@@ -105,14 +102,9 @@ impl Grid {
         dispatch(self.instruction_set, Products { geometry, activation, share });
     }
 
-    fn geometry<T: Scalar>(&self) -> cells::Geometry<T> {
+    fn geometry<T: Scalar>(&self) -> Geometry<T> {
         let GridSettings { nodes, low, high, .. } = &self.settings;
-        let axis = |k: usize| cells::Axis {
-            low: T::of(low[k]),
-            per_length: T::of((nodes[k] - 1) as f64 / (high[k] - low[k])),
-            cells: T::of((nodes[k] - 1) as f64),
-        };
-        cells::Geometry { axes: [axis(0), axis(1), axis(2)], nodes: *nodes }
+        Geometry::new(*nodes, *low, *high)
     }
 }
 
@@ -195,11 +187,7 @@ impl<T: Scalar + Default> Memory<T> {
         mut values: &mut [T],
         sums: &mut [T],
     ) {
-        let (starts, mut group) = (groups.starts, 0);
-        while group + 1 < starts.len() {
-            let after = starts.partition_point(|start| *start <= starts[group] + BLOCK) - 1;
-            let next = after.max(group + 1);
-            let range = starts[group]..starts[next];
+        for (some, range) in groups.blocks(BLOCK) {
             let (ours, rest) = values.split_at_mut(range.len());
             values = rest;
             let at = at.range(range.clone());
@@ -208,9 +196,8 @@ impl<T: Scalar + Default> Memory<T> {
             let share = Share { parameters, at, contributions, values: wanted, coordinates: None };
             grid.products(share);
             self.cotangents.resize(range.len(), T::zero());
-            (groups.link)(group..next, ours, &mut self.cotangents);
+            (groups.link)(some, ours, &mut self.cotangents);
             self.scatter.add_to(&self.cotangents, sums, grid.settings.nodes);
-            group = next;
         }
     }
 }
