@@ -34,6 +34,7 @@ fn experiment(folder: &Path, changes: &[(&str, &str)]) {
         title = "Volumes"
         caption = "Both rates."
         rows = ["rate"]
+        every_seed = true
         [[figure]]
         kind = "volumes"
         title = "Volumes later"
@@ -84,6 +85,10 @@ fn exact_cases_are_whole_and_not_done_twice() {
     );
     assert!(page.contains("data:image/png") && page.contains("<svg"));
     assert!(page.contains("carried along by the true motion"));
+    // The truth and a row for every rate: of both seeds, and of the first alone.
+    let height = |name: &str| f64::from(image::image_dimensions(at.join(name)).unwrap().1);
+    let ratio = height("out/1-volumes.png") / height("out/2-volumes.png");
+    assert!((1.4..1.8).contains(&ratio), "{ratio}");
     let table = std::fs::read_to_string(at.join("out/results.csv")).unwrap();
     assert_eq!(table.lines().count(), 5);
     // A full folder is not written to by accident; what is done is not done again.

@@ -150,6 +150,9 @@ pub struct FigureAsked {
     pub columns: Vec<String>,
     /// Which result.
     pub value: Option<String>,
+    /// Whether volumes have a row for every seed, not for the first one alone.
+    #[serde(default)]
+    pub every_seed: bool,
     /// Azimuth and elevation from which volumes are seen, degrees; along the true axis without it.
     pub view: Option<[f64; 2]>,
     /// Which part of the movie has passed when volumes are shown, carried along from the reference time; at the

@@ -30,8 +30,8 @@ impl Map {
         let least = values.iter().copied().fold(f64::INFINITY, f64::min);
         let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let table = Colormap::Inferno.table();
-        canvas.text(&format!("{} →", self.columns[0]), [LEFT, 20.0], 15.0, Align::Left, BLACK);
-        canvas.text(&format!("{} ↓", self.rows[0]), [8.0, TOP - 10.0], 15.0, Align::Left, BLACK);
+        canvas.text(&self.columns[0], [LEFT, 20.0], 15.0, Align::Left, BLACK);
+        canvas.text(&self.rows[0], [8.0, TOP - 10.0], 15.0, Align::Left, BLACK);
         for (k, name) in self.columns[1..].iter().enumerate() {
             let x = LEFT + CELL[0] * (k as f64 + 0.5);
             canvas.text(name, [x, TOP - 10.0], 15.0, Align::Center, BLACK);

@@ -16,22 +16,33 @@ use kerrlight_tomo::volume::{Volume, VolumeFile};
 use serde_json::Value;
 
 impl Figures<'_> {
-    /// Truths in the first row, recoveries of the first seed below.
+    /// Truths in the first row, recoveries of the first seed, or of every one, below.
     pub(super) fn volumes(&self, asked: &FigureAsked) -> anyhow::Result<Option<Figure>> {
         let rows = levels(self.experiment, self.summary, &asked.rows);
         let columns = levels(self.experiment, self.summary, &asked.columns);
-        let (mut rows, columns) = (combinations(&rows), combinations(&columns));
+        let (rows, columns) = (combinations(&rows), combinations(&columns));
+        let seeds = 1..=if asked.every_seed { self.summary.seeds } else { 1 };
+        let rows = rows.iter().flat_map(|row| seeds.clone().map(move |seed| (row, seed)));
+        let is_of = |case: &Case, levels: &[(&str, &str)], seed: u64| {
+            is_at(case, levels) && case.seed == seed
+        };
         // What was never asked for here, as a method that has no such settings.
-        rows.retain(|row| self.chosen(asked).any(|(case, _)| is_at(case, row)));
+        let is_there = |row: &[_], seed| self.chosen(asked).any(|(case, _)| is_of(case, row, seed));
+        let rows: Vec<_> = rows.filter(|(row, seed)| is_there(row, *seed)).collect();
+        let name = |(row, seed): &(&Vec<(&str, &str)>, u64)| {
+            let seed = asked.every_seed.then(|| format!("seed {seed}"));
+            let row = Some(called(row)).filter(|name| !name.is_empty());
+            row.into_iter().chain(seed).collect::<Vec<_>>().join(", ")
+        };
         let mut loaded: Vec<(String, Vec<(String, Loaded)>)> =
             vec![("truth".to_owned(), Vec::new())];
-        loaded.extend(rows.iter().map(|row| (called(row), Vec::new())));
+        loaded.extend(rows.iter().map(|row| (name(row), Vec::new())));
         for column in &columns {
-            let at = |row: &[(&str, &str)]| {
-                let levels = [row, column].concat();
-                self.chosen(asked).find(|(case, _)| is_at(case, &levels))
+            let at = |(row, seed): &(&Vec<(&str, &str)>, u64)| {
+                let levels = [row.as_slice(), column].concat();
+                self.chosen(asked).find(|(case, _)| is_of(case, &levels, *seed))
             };
-            let cells: Vec<Option<(&Case, &Value)>> = rows.iter().map(|row| at(row)).collect();
+            let cells: Vec<Option<(&Case, &Value)>> = rows.iter().map(at).collect();
             // A column with a gap would stand under the wrong truth.
             let Some(cells) = cells.into_iter().collect::<Option<Vec<_>>>() else { continue };
             let Some((first, _)) = cells.first() else { continue };
@@ -86,10 +97,10 @@ impl Figures<'_> {
              that. {}",
             asked.title,
             asked.caption,
-            if self.summary.seeds == 1 {
-                "One seed."
+            if asked.every_seed || self.summary.seeds == 1 {
+                self.summary.seeds_told()
             } else {
-                "Seed 1; the table of all cases has the others."
+                "Seed 1; the table of all cases has the others.".to_owned()
             }
         );
         let drawn = mosaic(&rows);
