@@ -14,6 +14,7 @@ use anyhow::{Context, bail};
 use kerrlight_tomo::fit::{
     BatchSize, Loss, Motion, Objective, Outcome, State, Trainer, checkpoint,
 };
+use kerrlight_tomo::volume::Volume;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -74,7 +75,9 @@ pub fn run(prepared: &Prepared, text: &str, folder: &Folder, resume: bool) -> an
     let training = learning::training(file, axis_rate)?;
     let mut state = State::new(&*representation, axis, &training);
     let trainer = Trainer::new(objective, &*representation, training);
-    let mut run = Run { file, text, folder, measured, trainer, begun };
+    let truth = measured.truth.as_ref();
+    let true_volume = truth.map(|truth| results::true_volume(file, truth)).transpose()?;
+    let mut run = Run { file, text, folder, measured, true_volume, trainer, begun };
     eprintln!("{}", run.describe(instrument));
     if let Some(note) = learning::caution(file) {
         eprintln!("note: {note}");
@@ -95,8 +98,9 @@ pub fn run(prepared: &Prepared, text: &str, folder: &Folder, resume: bool) -> an
     if file.representation.kind != Kind::LinearGrid && run.steps(&mut state)? {
         return Ok(());
     }
-    let estimate = Estimate { file, folder, instrument, motion, measured };
-    estimate.write(&mut run.trainer, &state, begun)?;
+    let Run { mut trainer, true_volume, .. } = run;
+    let estimate = Estimate { file, folder, instrument, motion, measured, true_volume };
+    estimate.write(&mut trainer, &state, begun)?;
     output::print(&format!("{}\n", folder.path().join("report.html").display()))
 }
 
@@ -105,6 +109,7 @@ struct Run<'a> {
     text: &'a str,
     folder: &'a Folder,
     measured: &'a Measured,
+    true_volume: Option<Volume>,
     trainer: Trainer<'a, f32>,
     begun: Instant,
 }
@@ -238,11 +243,13 @@ impl Run<'_> {
         }
         if let Some(truth) = &self.measured.truth {
             line["axis_dot_truth"] = json!(now.axis.dot(truth.axis()));
-            if let Some(found) = results::compare(self.file, &mut self.trainer, state, truth) {
-                line["psnr_db"] = json!(found.psnr_db);
-                line["nrmse"] = json!(found.nrmse);
-                line["correlation"] = json!(found.correlation);
-            }
+        }
+        if let Some(truth) = &self.true_volume
+            && let Some(found) = results::compare(self.file, &mut self.trainer, state, truth)
+        {
+            line["psnr_db"] = json!(found.psnr_db);
+            line["nrmse"] = json!(found.nrmse);
+            line["correlation"] = json!(found.correlation);
         }
         line
     }

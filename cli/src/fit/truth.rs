@@ -54,10 +54,15 @@ impl Truth {
 
     /// Emission at the reference time.
     pub fn at(&self, x: [f64; 3]) -> f64 {
-        let rate = self.velocity.rate(distance(x, [0.0; 3]));
+        // Spots that were wound up for the same time share the rotation.
+        let mut turned = (0.0, x);
         let light = |spot: &Spot| {
-            let when_round = rotate(self.axis.vector(), -rate * spot.wound_for, x);
-            let offset = distance(when_round, spot.center) / spot.sigma;
+            if spot.wound_for != turned.0 {
+                let rate = self.velocity.rate(distance(x, [0.0; 3]));
+                let back = rotate(self.axis.vector(), -rate * spot.wound_for, x);
+                turned = (spot.wound_for, back);
+            }
+            let offset = distance(turned.1, spot.center) / spot.sigma;
             spot.amplitude * (-0.5 * offset * offset).exp()
         };
         let of_glyphs: f64 = self.glyphs.iter().map(|glyph| glyph.at(x, 0.0)).sum();

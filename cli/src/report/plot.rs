@@ -25,6 +25,8 @@ pub enum Marks {
     Line,
     /// Points on their own.
     Points,
+    /// Points, and a line through the means of those at one x.
+    Joined,
 }
 
 /// One curve.
@@ -95,7 +97,7 @@ impl LinePlot {
             }
             let shown: Vec<Point> = shown.into_iter().step_by(every).collect();
             if !shown.is_empty() {
-                plots.push(self.curve(series, &shown, color));
+                plots.extend(self.curve(series, &shown, color));
             }
         }
         if plots.is_empty() {
@@ -123,12 +125,22 @@ impl LinePlot {
         Ok(all.filter(visible).collect())
     }
 
-    fn curve(&self, series: &Series, shown: &[Point], color: &str) -> Plot {
+    /// What is drawn of a series, one over another.
+    fn curve(&self, series: &Series, shown: &[Point], color: &str) -> Vec<Plot> {
         let points = shown.iter().map(|([x, y], _)| (*x, *y));
-        if series.marks == Marks::Line {
-            let line = Line::new().with_data(points).with_color(color).with_stroke_width(1.6);
-            return Plot::from(line.with_legend(&*series.name));
+        let line = |width| Line::new().with_color(color).with_stroke_width(width);
+        match series.marks {
+            Marks::Line => vec![line(1.6).with_data(points).with_legend(&*series.name).into()],
+            Marks::Points => vec![self.marks(series, shown, color)],
+            Marks::Joined => {
+                let through = line(1.0).with_data(means(shown));
+                vec![through.into(), self.marks(series, shown, color)]
+            }
         }
+    }
+
+    fn marks(&self, series: &Series, shown: &[Point], color: &str) -> Plot {
+        let points = shown.iter().map(|([x, y], _)| (*x, *y));
         let marks = ScatterPlot::new().with_data(points).with_color(color).with_size(2.5);
         let marks = marks.with_legend(&*series.name);
         if series.errors.is_empty() {
@@ -160,6 +172,15 @@ impl LinePlot {
         let least = values.filter(|y| self.y.shows(*y)).fold(f64::INFINITY, f64::min);
         layout.with_log_y().with_y_axis_min(0.5 * least)
     }
+}
+
+/// Means of y over points of one x, in their order.
+fn means(points: &[Point]) -> Vec<(f64, f64)> {
+    let of_one = points.chunk_by(|a, b| a.0[0] == b.0[0]);
+    let mean = |group: &[Point]| {
+        (group[0].0[0], group.iter().map(|(point, _)| point[1]).sum::<f64>() / group.len() as f64)
+    };
+    of_one.map(mean).collect()
 }
 
 /// The same drawing as wide as its place: the size in pixels becomes a view box. Names in it get a

@@ -20,6 +20,8 @@ impl Figures<'_> {
         let value = asked.value.as_deref().unwrap_or("psnr_db");
         let columns = levels(self.experiment, self.summary, &asked.columns);
         let rows = levels(self.experiment, self.summary, &asked.rows);
+        // Steps of several seeds have no order among each other.
+        let marks = if self.summary.seeds == 1 { Marks::Joined } else { Marks::Points };
         let mut plots = Vec::new();
         for column in combinations(&columns) {
             let mut series = Vec::new();
@@ -37,7 +39,7 @@ impl Figures<'_> {
                 points.sort_by(|a, b| a[0].total_cmp(&b[0]));
                 // One without points keeps the colours of the others as they are in other plots.
                 let name = called(&row);
-                series.push(Series { name, points, errors: Vec::new(), marks: Marks::Points });
+                series.push(Series { name, points, errors: Vec::new(), marks });
             }
             let (unit, _) = described(value);
             let seeds = self.summary.seeds_told();
@@ -85,7 +87,7 @@ impl Figures<'_> {
             points.sort_by(|a, b| a[0].total_cmp(&b[0]));
             if !points.is_empty() {
                 let name = if row.is_empty() { factor.clone() } else { called(&row) };
-                series.push(Series { name, points, errors: Vec::new(), marks: Marks::Points });
+                series.push(Series { name, points, errors: Vec::new(), marks: Marks::Joined });
             }
         }
         let (unit, _) = described(value);

@@ -57,8 +57,7 @@ pub fn compare(
     file: &FitFile,
     trainer: &mut Trainer<'_, f32>,
     state: &State<f32>,
-    truth: &Truth,
+    truth: &Volume,
 ) -> Option<Comparison> {
-    let estimate = recovered(file, trainer, state).ok()?;
-    metrics::compare(&estimate, &true_volume(file, truth).ok()?, None).ok()
+    metrics::compare(&recovered(file, trainer, state).ok()?, truth, None).ok()
 }

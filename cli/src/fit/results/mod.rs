@@ -6,7 +6,7 @@ mod numbers;
 mod page;
 mod plots;
 
-pub use fields::compare;
+pub use fields::{compare, true_volume};
 
 use super::config::FitFile;
 use super::data::Measured;
@@ -30,6 +30,8 @@ pub struct Estimate<'a> {
     pub motion: &'a Motion,
     /// Data.
     pub measured: &'a Measured,
+    /// Emission that was simulated.
+    pub true_volume: Option<Volume>,
 }
 
 impl Estimate<'_> {
@@ -41,34 +43,27 @@ impl Estimate<'_> {
         begun: Instant,
     ) -> anyhow::Result<()> {
         let volume = fields::recovered(self.file, trainer, state)?;
-        let truth = self.measured.truth.as_ref();
-        let true_volume = truth.map(|truth| fields::true_volume(self.file, truth)).transpose()?;
         let frames: Vec<usize> = (0..self.measured.times.len()).collect();
         let movie = trainer.movie(&state.now, &frames, true);
         let loss = trainer.objective.loss_of(&frames, &movie);
         let mask = numbers::mask_error(trainer, state, &movie);
-        self.volumes(&volume, true_volume.as_ref(), state)?;
+        self.volumes(&volume, state)?;
         self.movies(&movie)?;
         let still = self.still(trainer, state)?;
-        let found = Found { volume, true_volume, still, loss, mask, movie, state, begun };
+        let found = Found { volume, still, loss, mask, movie, state, begun };
         let results = self.results(trainer, &found)?;
         self.folder.file("results.json")?.write(format!("{results:#}\n").as_bytes())?;
         self.report(&found, &results)
     }
 
-    fn volumes(
-        &self,
-        volume: &Volume,
-        truth: Option<&Volume>,
-        state: &State<f32>,
-    ) -> anyhow::Result<()> {
+    fn volumes(&self, volume: &Volume, state: &State<f32>) -> anyhow::Result<()> {
         let save = |name: &str, volume: &Volume, axis| {
             let file = VolumeFile { volume: volume.clone(), axis: Some(axis) };
             volume_files::write(&self.folder.file(name)?, &file)
         };
         save("volume.npz", volume, state.now.axis.vector())?;
         let mut fields = vec![vti::Field { name: "emission", volume }];
-        if let (Some(volume), Some(truth)) = (truth, &self.measured.truth) {
+        if let (Some(volume), Some(truth)) = (&self.true_volume, &self.measured.truth) {
             save("truth.npz", volume, truth.axis().vector())?;
             fields.push(vti::Field { name: "truth", volume });
         }
@@ -91,7 +86,6 @@ impl Estimate<'_> {
 /// What was found.
 pub struct Found<'a> {
     volume: Volume,
-    true_volume: Option<Volume>,
     still: Still,
     loss: Loss,
     /// What the mask of what shines leaves out, of the flux; nothing without a mask.

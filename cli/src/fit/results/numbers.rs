@@ -55,7 +55,7 @@ impl Estimate<'_> {
         if let Some(mask) = found.mask {
             results["mask_error"] = json!(mask);
         }
-        let (Some(truth), Some(volume)) = (&self.measured.truth, &found.true_volume) else {
+        let (Some(truth), Some(volume)) = (&self.measured.truth, &self.true_volume) else {
             return Ok(results);
         };
         let region = &self.file.region;

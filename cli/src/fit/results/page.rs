@@ -42,9 +42,9 @@ impl Estimate<'_> {
         report.write(&self.folder.file("report.html")?)
     }
 
-    fn shown<'b>(&self, found: &'b Found<'_>) -> Vec<Shown<'b>> {
+    fn shown<'b>(&'b self, found: &'b Found<'_>) -> Vec<Shown<'b>> {
         let mut shown = vec![Shown { name: "recovered", volume: &found.volume }];
-        shown.extend(found.true_volume.as_ref().map(|volume| Shown { name: "truth", volume }));
+        shown.extend(self.true_volume.as_ref().map(|volume| Shown { name: "truth", volume }));
         shown
     }
 
@@ -111,7 +111,7 @@ impl Estimate<'_> {
         let ends = [times.first(), times.last()].map(|time| time.copied().unwrap_or(0.0));
         View3d {
             recovered: found.volume.clone(),
-            truth: found.true_volume.clone(),
+            truth: self.true_volume.clone(),
             unit: UNIT.to_owned(),
             motion: (ends[1] > ends[0]).then(|| report::Motion {
                 axis: found.state.now.axis.vector(),
