@@ -386,11 +386,6 @@ fn exact_unresolved_stars_over_100_frames() {
             let (ratios, changes) = photometry(STARS, &overrides, frames, most);
             let off: Vec<f64> = ratios.iter().map(|r| r - 1.0).collect();
             assert!(changes.len() > 20, "{}", changes.len());
-            if bundles.ends_with("true") {
-                assert!(largest(&changes) < 0.01 && rms(&off) < 0.01, "{name}");
-            } else {
-                assert!(rms(&changes) > 1.0, "{name}");
-            }
             println!(
                 "{name}, magnified up to {most}, {way} bundles: {} images, flux off by {:.2e} rms, \
                  {:.2e} at most; from frame to frame {:.2e} rms, {:.2e} at most",
@@ -400,6 +395,12 @@ fn exact_unresolved_stars_over_100_frames() {
                 rms(&changes),
                 largest(&changes)
             );
+            if bundles.ends_with("true") {
+                assert!(largest(&changes) < 0.01 && rms(&off) < 0.01, "{name}");
+            } else {
+                // Single rays miss a star an eighth of a pixel large, or hit it and make it far too bright.
+                assert!(rms(&off) > 0.99, "{name}");
+            }
         }
     }
 }
