@@ -38,6 +38,9 @@ impl<'a> Run<'a> {
         let count = representation.parameters();
         let mut parameters = vec![0.0; count];
         representation.initialise(1, &mut parameters);
+        // Away from the kinks of rectified units, where differences are no derivatives.
+        let jitter = |k: usize| (0.05 * (k as f64 * 1.618).sin()) as f32;
+        parameters.iter_mut().enumerate().for_each(|(k, parameter)| *parameter += jitter(k));
         Self {
             representation,
             columns: [0.177, 0.655, 1.292, 0.911].map(|step| wave(step).collect()),
@@ -99,7 +102,7 @@ impl<'a> Run<'a> {
             self.eval();
             dot(&self.values, &self.cotangents)
         };
-        let step = 1e-2 / size.sqrt();
+        let step = 1e-3 / size.sqrt();
         let difference = (sum(step) - sum(-step)) / (2.0 * step);
         self.parameters = start;
         assert!((difference / size - 1.0).abs() < 0.02, "{difference:e} {size:e}");
