@@ -1,6 +1,6 @@
 //! Tables of means over seeds.
 
-use super::experiment::{Beside, Experiment, TableAsked};
+use super::experiment::{Beside, Experiment, Level, TableAsked};
 use super::summary::{Spread, Summary, called, combinations, described, number, pairs};
 use crate::report::Table;
 use toml::Value;
@@ -40,7 +40,7 @@ impl Cell {
         let Some(factor) = &asked.best_of else {
             return Some(Self { spread: summary.spread(&asked.value, at)?, best: None });
         };
-        let cell = |level: super::experiment::Level| {
+        let cell = |level: Level| {
             let here = [at, &[(factor.as_str(), level.name.as_str())]].concat();
             Some(Self { spread: summary.spread(&asked.value, &here)?, best: Some(level.name) })
         };

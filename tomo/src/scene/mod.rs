@@ -265,6 +265,9 @@ impl Scene {
     }
 
     /// The resolved scene as TOML, defaults included: the disc's inner edge too.
+    ///
+    /// # Panics
+    /// If a program has set a seed above 2^63 − 1, which TOML cannot hold; a scene that was read has none.
     pub fn to_toml(&self) -> String {
         let mut scene = self.clone();
         if let (Some(disc), Ok(hole)) = (&mut scene.disc, Kerr::new(self.hole.spin)) {

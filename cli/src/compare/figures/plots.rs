@@ -93,6 +93,7 @@ impl Figures<'_> {
         let (unit, _) = described(value);
         let numbers = || series.iter().flat_map(|series| &series.points).map(|point| point[0]);
         let (least, most) = (numbers().fold(f64::MAX, f64::min), numbers().fold(0.0, f64::max));
+        // Factors of a few levels look best as they are, rates and steps over decades do not.
         let log = least > 0.0 && most >= 30.0 * least;
         let plot = |series| LinePlot {
             title: asked.title.clone(),
