@@ -20,6 +20,7 @@
 
 mod accuracy;
 mod assets;
+mod checksum;
 mod columns;
 mod compare;
 mod convert;
@@ -28,6 +29,7 @@ mod fit;
 mod inspect;
 mod interferometry;
 mod interrupt;
+mod lock;
 mod movie;
 mod observe;
 mod output;

@@ -1,9 +1,12 @@
 //! Files that appear whole or not at all.
 
+use crate::checksum::Sum;
 use anyhow::{Context, bail};
+use std::cell::RefCell;
 use std::fs::File;
 use std::io::{BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 /// No input is as large as this.
 const LARGEST_INPUT: u64 = 4 << 30;
@@ -95,6 +98,7 @@ impl Output {
     ) -> anyhow::Result<()> {
         let name = || format!("cannot write {}", self.path.display());
         let file = self.beside()?;
+        let _unfinished = Unfinished::new(file.path());
         let mut buffer = BufWriter::new(file.as_file());
         write(&mut buffer).with_context(name)?;
         buffer.flush().with_context(name)?;
@@ -114,6 +118,35 @@ impl Output {
     /// The place, as it was given.
     pub fn shown(&self) -> &Path {
         &self.given
+    }
+}
+
+/// Files that are being written.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// A file that is being written: for as long as this lives.
+struct Unfinished(PathBuf);
+
+impl Unfinished {
+    fn new(path: &Path) -> Self {
+        UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_owned());
+        Unfinished(path.to_owned())
+    }
+}
+
+impl Drop for Unfinished {
+    fn drop(&mut self) {
+        let mut all = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+        all.retain(|path| *path != self.0);
+    }
+}
+
+/// Removes what is being written, before the program ends in the middle of it.
+pub fn remove_unfinished() {
+    let all = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+    for path in all.iter() {
+        // It may have been moved to its place.
+        let _ = std::fs::remove_file(path);
     }
 }
 
@@ -148,7 +181,24 @@ pub fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
     }
     let mut bytes = Vec::with_capacity(length as usize);
     file.read_to_end(&mut bytes).with_context(name)?;
+    READ.with_borrow_mut(|read| {
+        if let Some(read) = read {
+            read.push((path.to_owned(), Sum::of(&bytes)));
+        }
+    });
     Ok(bytes)
+}
+
+thread_local! {
+    /// What this thread has read since somebody wants to know.
+    static READ: RefCell<Option<Vec<(PathBuf, Sum)>>> = const { RefCell::new(None) };
+}
+
+/// The result of some work on this thread, and all files that it has read.
+pub fn with_reads<R>(work: impl FnOnce() -> R) -> (R, Vec<(PathBuf, Sum)>) {
+    READ.set(Some(Vec::new()));
+    let result = work();
+    (result, READ.take().unwrap_or_default())
 }
 
 /// The text of a file, with an error that names it.

@@ -1,6 +1,6 @@
 //! The program with what others add to it.
 
-use super::{Arguments, compare, run};
+use super::{Arguments, compare, interrupt, run};
 use anyhow::{anyhow, bail};
 use clap::Parser;
 use kerrlight_tomo::representation::Representation;
@@ -62,13 +62,19 @@ impl Program {
         self
     }
 
-    /// Does what the command line says; 0 is success, 2 an error, 1 a comparison of which a part failed.
+    /// Does what the command line says; 0 is success, 2 an error, 1 a comparison of which a part failed, 128 and the
+    /// number of the signal what a signal has stopped: 130 after Ctrl-C, 143 after SIGTERM.
     pub fn run(self) -> ExitCode {
         let arguments = Arguments::parse();
+        interrupt::listen();
         // Only the first program of a process counts: there is one command line.
         let _ = OWN.set(self.representations);
         match run(&arguments) {
             Ok(()) => ExitCode::SUCCESS,
+            Err(error) if error.is::<interrupt::Interrupted>() => {
+                eprintln!("{error:#}");
+                ExitCode::from(interrupt::code())
+            }
             Err(error) => {
                 eprintln!("error: {error:#}");
                 let is_part = error.downcast_ref::<compare::Failed>().is_some();

@@ -199,7 +199,8 @@ fn exact_an_interrupt_says_how_to_go_on() {
     );
     let ended = child.wait_with_output().unwrap();
     let message = String::from_utf8_lossy(&ended.stderr).into_owned();
-    assert!(message.contains("go on with: kerrlight fit --resume run"), "{message}");
+    assert_eq!(ended.status.code(), Some(130), "{message}");
+    assert!(message.contains("resume with: kerrlight fit --resume run"), "{message}");
     assert!(folder.path().join("run/checkpoint.safetensors").is_file());
 }
 

@@ -35,7 +35,7 @@ fn exact_a_full_disk_loses_nothing() {
     assert_eq!(first.status.code(), Some(2), "{}", message(&first));
     let said = message(&first);
     assert!(said.contains("checkpoint.safetensors") && said.contains("File too large"), "{said}");
-    assert_eq!(files(&run), ["fit.toml", "log.jsonl"]);
+    assert_eq!(files(&run), ["fit.toml", "inputs.json", "lock", "log.jsonl"]);
     let second = cramped(folder.path(), size("report.html") - 1, &["fit", "--resume", "run"]);
     assert_eq!(second.status.code(), Some(2), "{}", message(&second));
     assert!(message(&second).contains("report.html"), "{}", message(&second));

@@ -19,4 +19,7 @@ mod lensing;
 mod pictures;
 mod radiative_transfer;
 mod resume;
+mod resumed_fits;
+#[cfg(unix)]
+mod signals;
 mod support;

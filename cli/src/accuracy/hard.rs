@@ -1,13 +1,13 @@
 //! Millions of random rays that look for trouble.
 
 use super::Accuracy;
+use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
 use anyhow::bail;
 use kerrlight_validation::accuracy::hard::{self, Tally};
 use kerrlight_validation::accuracy::rays::{Angle, Draw};
 use serde::Serialize;
 use std::fmt::Write;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A tally as it is written.
 #[derive(Serialize)]
@@ -68,14 +68,14 @@ fn describe(ray: &Draw) -> String {
 }
 
 /// Traces them, writes hard.json and hard.csv, and fails if a ray went wrong.
-pub fn run(arguments: &Accuracy, rays: u64, stop: &AtomicBool) -> anyhow::Result<()> {
+pub fn run(arguments: &Accuracy, rays: u64) -> anyhow::Result<()> {
     let csv = arguments.place("hard.csv", "csv")?;
     let json = arguments.place("hard.json", "json")?;
-    let bar = progress::bar(rays);
+    let (bar, keeper) = (progress::bar(rays), Keeper::saving("stopping"));
     let (integrator, tolerance) = (arguments.integrator, arguments.tolerance);
     let tallies = hard::run(integrator, tolerance, rays, arguments.seed, |done| {
         bar.inc(done);
-        !stop.load(Ordering::Relaxed)
+        !keeper.stopped()
     })?;
     bar.finish_and_clear();
     let done = tallies.iter().map(|tally| tally.rays).sum();
@@ -95,7 +95,8 @@ pub fn run(arguments: &Accuracy, rays: u64, stop: &AtomicBool) -> anyhow::Result
     csv.write(&writer.into_inner()?)?;
     crate::output::print(&table(&document))?;
     if done < rays {
-        bail!("interrupted after {done} of {rays} rays; what they gave is written");
+        let said = format!("interrupted after {done} of {rays} rays; what they gave is written");
+        return Err(Interrupted(said).into());
     }
     if !tallies.iter().all(Tally::passes) {
         bail!("some rays went wrong: see {}", json.shown().display());

@@ -5,12 +5,11 @@ mod picture;
 mod table;
 
 use crate::output::Output;
-use crate::{interrupt, progress};
-use anyhow::{Context, bail};
+use crate::progress;
+use anyhow::Context;
 use clap::Args;
 use kerrlight_validation::accuracy::sweep::{self, Sweep};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Arguments of `kerrlight accuracy`.
 #[derive(Debug, Args)]
@@ -44,14 +43,13 @@ impl Accuracy {
             kerrlight_geodesic::Tracer::new(self.tolerance).context("--tolerance")?;
         }
         make_folder(&self.output)?;
-        let stop = interrupt::flag();
         match self.hard {
-            Some(rays) => hard::run(self, rays, stop),
-            None => self.sweep(stop),
+            Some(rays) => hard::run(self, rays),
+            None => self.sweep(),
         }
     }
 
-    fn sweep(&self, stop: &AtomicBool) -> anyhow::Result<()> {
+    fn sweep(&self) -> anyhow::Result<()> {
         let files =
             ["csv", "json", "svg", "png"].map(|kind| self.place(&format!("accuracy.{kind}"), kind));
         let [csv, json, svg, png] = files;
@@ -61,12 +59,9 @@ impl Accuracy {
         let rows = sweep::run(&sweep, |done, of| {
             bar.set_length(of as u64);
             bar.set_position(done as u64);
-            !stop.load(Ordering::Relaxed)
+            true
         })?;
         bar.finish_and_clear();
-        if stop.load(Ordering::Relaxed) {
-            bail!("interrupted: nothing was written");
-        }
         let figure = picture::figure(&rows)?;
         csv.write(&table::csv(&rows)?)?;
         json.write(&table::json(&rows, &sweep)?)?;

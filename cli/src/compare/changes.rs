@@ -1,6 +1,7 @@
 //! What changed between two runs of an experiment.
 
 use super::summary::{described, result};
+use crate::checksum::is_whole;
 use crate::output;
 use crate::report::Table;
 use anyhow::{Context, bail};
@@ -14,7 +15,11 @@ const SHOWN: [&str; 4] = ["psnr_db", "axis_dot_truth", "chi2", "seconds"];
 pub fn read(path: &Path) -> anyhow::Result<Value> {
     let path = if path.is_dir() { path.join("results.json") } else { path.to_owned() };
     let name = || format!("{} holds no results of kerrlight compare", path.display());
-    let all: Value = serde_json::from_str(&output::read_text(&path)?).with_context(name)?;
+    let text = output::read_text(&path)?;
+    let all: Value = serde_json::from_str(&text).with_context(name)?;
+    if !all["checksum"].is_null() && !is_whole(&text) {
+        bail!("{} is damaged: its checksum is another", path.display());
+    }
     if !all["cases"].is_array() {
         bail!("{}: there are no cases", name());
     }

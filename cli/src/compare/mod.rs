@@ -11,9 +11,12 @@ mod summary;
 mod tables;
 mod verdicts;
 
+use crate::checksum::sealed;
+use crate::interrupt::{Interrupted, Keeper};
+use crate::lock::{self, Lock};
 use crate::output::{self, Output};
+use crate::progress;
 use crate::report::{Figure, Part, Report, Table};
-use crate::{interrupt, progress};
 use anyhow::{Context, bail};
 use cases::{Case, Choice};
 use clap::Args;
@@ -22,7 +25,7 @@ use runner::{Runner, Status};
 use serde_json::Value;
 use source::Source;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use std::time::Duration;
 use summary::Summary;
 
 /// Arguments of `kerrlight compare`.
@@ -100,9 +103,10 @@ impl Compare {
             bail!("{}: no case can be run; {}: {why}", name.display(), first.name());
         }
         let all = cases::expand(&experiment, &source, &choice.unrestricted())?;
-        let folder = self.folder(name, &text)?;
-        let runner = Runner::new(&folder, threads)?;
+        let (folder, lock) = self.folder(name, &text)?;
+        let runner = Runner::new(&folder, threads, lock)?;
         let cases = with_known(chosen, all, &runner);
+        runner.check_inputs(&cases)?;
         let summary = run(&cases, &runner);
         write(&experiment, &summary, &runner, &folder, before.as_ref())?;
         output::print(&format!("{}\n", folder.join("report.html").display()))?;
@@ -110,22 +114,22 @@ impl Compare {
     }
 
     /// The folder, new or to go on with.
-    fn folder(&self, name: &Path, text: &str) -> anyhow::Result<PathBuf> {
+    fn folder(&self, name: &Path, text: &str) -> anyhow::Result<(PathBuf, Lock)> {
         let stem =
             name.file_stem().map_or("compare".into(), |stem| stem.to_string_lossy().into_owned());
         let folder =
             self.output.clone().unwrap_or_else(|| PathBuf::from(format!("kerrlight-{stem}")));
         let shown = folder.display().to_string();
-        let is_full = std::fs::read_dir(&folder).is_ok_and(|mut all| all.next().is_some());
-        if is_full && !self.resume {
+        if !lock::is_free(&folder) && !self.resume {
             bail!(
-                "{shown} exists and is not an empty folder: go on with --resume, or give another with -o"
+                "{shown} exists and is not an empty folder: resume it with --resume, or give another with -o"
             );
         }
         std::fs::create_dir_all(&folder)
             .with_context(|| format!("cannot make the folder {shown}"))?;
+        let lock = Lock::take(&folder, "compares in", Duration::ZERO)?;
         Output::new(&folder.join("experiment.toml"), "toml")?.write(text.as_bytes())?;
-        Ok(folder)
+        Ok((folder, lock))
     }
 }
 
@@ -158,9 +162,9 @@ fn with_known(mut chosen: Vec<Case>, all: Vec<Case>, runner: &Runner) -> Vec<Cas
     cases
 }
 
-/// Runs what is not done yet, until Ctrl-C.
+/// Runs what is not done yet, until a signal.
 fn run<'a>(cases: &'a [Case], runner: &Runner) -> Summary<'a> {
-    let flag = interrupt::flag();
+    let keeper = Keeper::saving("stopping after the fit's step; a second signal ends at once");
     let mut all: Vec<(&Case, Status)> =
         cases.iter().map(|case| (case, runner.known(case))).collect();
     let open = all.iter().filter(|(_, status)| *status == Status::Open).count();
@@ -172,16 +176,12 @@ fn run<'a>(cases: &'a [Case], runner: &Runner) -> Summary<'a> {
     }
     let bar = progress::cases(open as u64);
     for (case, status) in all.iter_mut().filter(|(_, status)| *status == Status::Open) {
-        if flag.load(Ordering::Relaxed) {
+        if keeper.stopped() {
             break;
         }
         bar.set_message(case.name());
         bar.tick();
-        *status = runner.run(case);
-        // What stops because it is told to has not failed.
-        if flag.load(Ordering::Relaxed) && matches!(status, Status::Failed(_)) {
-            *status = Status::Open;
-        }
+        *status = runner.run(case, &keeper);
         if let Status::Failed(why) = status {
             bar.suspend(|| eprintln!("failed: {}: {why}", case.name()));
         }
@@ -194,9 +194,8 @@ fn run<'a>(cases: &'a [Case], runner: &Runner) -> Summary<'a> {
 fn end(summary: &Summary, folder: &Path) -> anyhow::Result<()> {
     if summary.open() > 0 {
         let (open, folder) = (summary.open(), folder.display());
-        eprintln!(
-            "{open} cases are not done; go on with the same command, --resume and -o {folder}"
-        );
+        let how = format!("resume with the same command, --resume and -o {folder}");
+        return Err(Interrupted(format!("stopped: {open} cases are not done; {how}")).into());
     }
     let failed: Vec<String> = summary.failed().map(|(case, _)| case.name()).collect();
     if failed.is_empty() {
@@ -215,7 +214,7 @@ fn write(
 ) -> anyhow::Result<()> {
     let file = |name: &str| Output::new(&folder.join(name), "");
     let results = summary.json(&experiment.title);
-    file("results.json")?.write(format!("{results:#}\n").as_bytes())?;
+    file("results.json")?.write(sealed(results.clone()).as_bytes())?;
     file("results.csv")?.write(&summary.csv()?)?;
     let mut shown: Vec<Table> = experiment
         .table

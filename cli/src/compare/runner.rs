@@ -1,12 +1,17 @@
 //! One case after the other, each a process of its own: what one does wrong, or takes of memory, is its own.
 
 use super::cases::Case;
+use crate::checksum::{Sums, is_whole};
+use crate::fit::Inputs;
+use crate::interrupt::Keeper;
+use crate::lock::Lock;
 use crate::output::{self, Output};
 use anyhow::Context;
 use serde_json::Value;
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitStatus, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::Duration;
 
 /// How a case ended.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,15 +28,16 @@ pub enum Status {
 pub struct Runner {
     folder: PathBuf,
     threads: Option<usize>,
+    _lock: Lock,
 }
 
 impl Runner {
-    /// In `cases` of this folder.
-    pub fn new(folder: &Path, threads: Option<usize>) -> anyhow::Result<Self> {
+    /// In `cases` of this folder, whose lock is held.
+    pub fn new(folder: &Path, threads: Option<usize>, lock: Lock) -> anyhow::Result<Self> {
         let folder = folder.join("cases");
         std::fs::create_dir_all(&folder)
             .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-        Ok(Self { folder, threads })
+        Ok(Self { folder, threads, _lock: lock })
     }
 
     /// The run's folder of a case.
@@ -46,40 +52,56 @@ impl Runner {
         }
         let run = self.run_of(case);
         match results(&run) {
-            Some(results) if is_ours(&results) && run.join("report.html").exists() => {
+            Some((results, true)) if is_ours(&results) && run.join("report.html").exists() => {
                 Status::Done(results)
             }
             _ => Status::Open,
         }
     }
 
-    /// Runs a case to its end, from where it is; `Open` if it was interrupted.
-    pub fn run(&self, case: &Case) -> Status {
+    /// Refuses cases that have read files which are no longer the same: others would be compared with them.
+    pub fn check_inputs(&self, cases: &[Case]) -> anyhow::Result<()> {
+        let mut sums = Sums::default();
+        for run in cases.iter().map(|case| self.run_of(case)) {
+            if let Ok(inputs) = Inputs::load(&run)
+                && inputs.version == env!("CARGO_PKG_VERSION")
+            {
+                inputs.check_files(&run, &mut sums)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Runs a case to its end, from where it is; `Open` if a signal has stopped it.
+    pub fn run(&self, case: &Case, keeper: &Keeper) -> Status {
         match self.known(case) {
             Status::Open => {}
             known => return known,
         }
-        match self.child(case) {
+        match self.child(case, keeper) {
             Ok((status, _)) if status.success() => match self.known(case) {
-                Status::Open => Status::Open,
+                Status::Open => Status::Failed("it ended without results".to_owned()),
                 known => known,
             },
+            // What stops because it is told to has not failed.
+            _ if keeper.stopped() => Status::Open,
             Ok((status, said)) => Status::Failed(failure(status, &said)),
             Err(error) => Status::Failed(format!("{error:#}")),
         }
     }
 
     /// The fit in a process of its own, and what it said.
-    fn child(&self, case: &Case) -> anyhow::Result<(ExitStatus, String)> {
+    fn child(&self, case: &Case, keeper: &Keeper) -> anyhow::Result<(ExitStatus, String)> {
         let run = self.run_of(case);
         let settings = self.folder.join(format!("{}.toml", case.slug));
         let text = case.settings.as_deref().unwrap_or_default();
         Output::new(&settings, "toml")?.write(text.as_bytes())?;
         let program = std::env::current_exe().context("cannot find the program itself")?;
         let mut command = Command::new(program);
-        command.arg("fit");
+        command.args(["fit", "--stop-with-input"]);
         // What another version has finished, or has not come so far as to have settings, is begun anew.
-        let is_foreign = results(&run).is_some_and(|results| !is_ours(&results));
+        let is_foreign = results(&run).is_some_and(|(results, _)| !is_ours(&results))
+            || !Inputs::load(&run).is_ok_and(|inputs| inputs.version == env!("CARGO_PKG_VERSION"));
         if run.join("fit.toml").is_file() && !is_foreign {
             command.arg("--resume").arg(&run);
         } else {
@@ -95,20 +117,31 @@ impl Runner {
         let said = self.folder.join(format!("{}.txt", case.slug));
         let file =
             File::create(&said).with_context(|| format!("cannot write {}", said.display()))?;
-        let status = command
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(file)
-            .status()
-            .context("cannot start the fit")?;
+        let child = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(file).spawn();
+        let status = wait(child.context("cannot start the fit")?, keeper)?;
         Ok((status, output::read_text(&said).unwrap_or_default()))
     }
 }
 
-/// What a run has found, if it has come so far.
-fn results(run: &Path) -> Option<Value> {
+/// The end of a fit, whose input is held open until a signal comes: it is closed then, or by the system if this
+/// process is killed, and the fit stops.
+fn wait(mut child: Child, keeper: &Keeper) -> anyhow::Result<ExitStatus> {
+    let mut input = child.stdin.take();
+    loop {
+        if let Some(status) = child.try_wait().context("cannot wait for the fit")? {
+            return Ok(status);
+        }
+        if keeper.stopped() {
+            drop(input.take());
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+/// What a run has found, if it has come so far, and whether that is as it was written.
+fn results(run: &Path) -> Option<(Value, bool)> {
     let text = output::read_text(&run.join("results.json")).ok()?;
-    serde_json::from_str(&text).ok()
+    Some((serde_json::from_str(&text).ok()?, is_whole(&text)))
 }
 
 /// Whether results are of this version of the program: another may find something else.

@@ -4,7 +4,8 @@ use super::config::{FitFile, LossKind, Nodes, Region, Scan, Screen, WidthOf};
 use super::data::{self, Measured};
 use super::linear::terms;
 use super::setup::{self, Instrument};
-use crate::{interrupt, progress};
+use crate::interrupt::{Interrupted, Keeper};
+use crate::progress;
 use anyhow::Context;
 use kerrlight_geodesic::OutOfRange;
 use kerrlight_tomo::dynamics::Axis;
@@ -15,7 +16,6 @@ use kerrlight_tomo::fit::{Motion, Objective};
 use kerrlight_tomo::image::colormap::Colormap;
 use serde_json::{Value, json};
 use std::io::Cursor;
-use std::sync::atomic::Ordering;
 
 /// What a fit is seen through by a scan.
 struct View {
@@ -120,27 +120,31 @@ pub fn run(
     let Scan { directions, frames, pixels, refine, .. } = *settings;
     let view = View::new(file, measured, pixels)?;
     let settings = AxisSettings { directions, ..AxisSettings::default() };
-    let (flag, bar) = (interrupt::flag(), progress::axes(directions as u64));
+    let (keeper, bar) = (Keeper::brief(STOPPED), progress::axes(directions as u64));
     let watch = |solved: usize, expected: usize| {
         bar.set_length(expected as u64);
         bar.set_position(solved as u64);
-        !flag.load(Ordering::Relaxed)
+        !keeper.stopped()
     };
     let whole = |problem: &AxisProblem<'_, f32>| scan_axis(problem, &settings, &watch);
-    let scan = with_problem(&view, motion, frames, whole)?.context(STOPPED)?;
+    let scan = with_problem(&view, motion, frames, whole)?.ok_or_else(stopped)?;
     let refined = refine.map(|nodes| -> anyhow::Result<AxisLoss> {
         let view = View::new(file, measured, file.screen.pixels)?;
         let effort = (fine(nodes), HALVINGS);
         let near = |problem: &AxisProblem<'_, f32>| {
             refine_axis(problem, scan.best.axis, STEP, effort, &watch)
         };
-        with_problem(&view, motion, frames, near)?.context(STOPPED)
+        with_problem(&view, motion, frames, near)?.ok_or_else(stopped)
     });
     bar.finish_and_clear();
     Ok(Found { refined: refined.transpose()?, scan })
 }
 
 const STOPPED: &str = "stopped while axes were being scanned: nothing is kept of that";
+
+fn stopped() -> anyhow::Error {
+    Interrupted(STOPPED.to_owned()).into()
+}
 
 /// First step of the refinement: half of what lattice points of 200 are apart by, and its halvings.
 const STEP: f64 = 0.06;

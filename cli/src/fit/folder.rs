@@ -1,49 +1,72 @@
 //! The folder of a run: settings, log, checkpoint, results.
 
+use super::inputs::{self, Inputs};
+use crate::checksum::Sums;
+use crate::lock::{self, Lock};
 use crate::output::{self, Output};
 use anyhow::{Context, bail};
 use serde_json::Value;
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
-/// A run's folder.
+/// A run's folder, which no other process may work in.
 pub struct Folder {
     path: PathBuf,
+    inputs: Inputs,
+    _lock: Lock,
 }
 
 /// Names in it.
 pub const SETTINGS: &str = "fit.toml";
 pub const LOG: &str = "log.jsonl";
-const CHECKPOINT: &str = "checkpoint.safetensors";
+pub const CHECKPOINT: &str = "checkpoint.safetensors";
+
+/// What another process does in a folder.
+const BUSY: &str = "fits in";
 
 impl Folder {
     /// A new folder.
-    pub fn create(path: &Path, settings: &str) -> anyhow::Result<Self> {
+    pub fn create(path: &Path, settings: &str, inputs: Inputs) -> anyhow::Result<Self> {
         let shown = path.display();
-        if path.exists() && std::fs::read_dir(path).map_or(true, |mut all| all.next().is_some()) {
+        if !lock::is_free(path) {
             bail!(
-                "{shown} exists and is not an empty folder: go on with --resume, or give another with -o"
+                "{shown} exists and is not an empty folder: resume it with --resume, or give another with -o"
             );
         }
         std::fs::create_dir_all(path).with_context(|| format!("cannot make the folder {shown}"))?;
-        let folder = Self { path: path.to_owned() };
+        let lock = Lock::take(path, BUSY, Duration::ZERO)?;
+        let folder = Self { path: path.to_owned(), inputs, _lock: lock };
+        let inputs = serde_json::to_string_pretty(&folder.inputs)?;
+        folder.file(inputs::FILE)?.write(format!("{inputs}\n").as_bytes())?;
+        // Last: with them it is a run.
         folder.file(SETTINGS)?.write(settings.as_bytes())?;
         Ok(folder)
     }
 
-    /// A folder that holds a run.
-    pub fn open(path: &Path) -> anyhow::Result<(Self, String)> {
+    /// A folder that holds a run, within `patience` if another process works in it; all that the run has read must be
+    /// what it was.
+    pub fn open(path: &Path, patience: Duration) -> anyhow::Result<(Self, String)> {
         let settings = path.join(SETTINGS);
         if !settings.is_file() {
             bail!("{} holds no run: there is no {SETTINGS} in it", path.display());
         }
-        Ok((Self { path: path.to_owned() }, output::read_text(&settings)?))
+        let lock = Lock::take(path, BUSY, patience)?;
+        let inputs = Inputs::load(path)?;
+        inputs.check(path, &mut Sums::default())?;
+        let text = output::read_text(&settings)?;
+        Ok((Self { path: path.to_owned(), inputs, _lock: lock }, text))
     }
 
     /// Where it is.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// What the run has read.
+    pub fn inputs(&self) -> &Inputs {
+        &self.inputs
     }
 
     /// A file in it, to be written whole.

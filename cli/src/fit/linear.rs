@@ -3,8 +3,9 @@
 use super::config::{Activation, FitFile, Kind};
 use super::penalty;
 use super::setup;
-use crate::{interrupt, progress};
-use anyhow::{Context, bail};
+use crate::interrupt::{Interrupted, Keeper};
+use crate::progress;
+use anyhow::Context;
 use kerrlight_tomo::dynamics::Axis;
 use kerrlight_tomo::fit::linear::{
     Coarse, LinearProblem, LinearProgress, LinearSettings, LinearSolution, Voxels, Weighted,
@@ -17,7 +18,6 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde_json::{Value, json};
 use std::ops::{ControlFlow, Range};
-use std::sync::atomic::Ordering;
 
 /// A fit's linear problems.
 pub struct Linear<'a> {
@@ -68,27 +68,25 @@ impl Linear<'_> {
             coarse,
             ..usual
         };
-        let (flag, bar) = (interrupt::flag(), progress::waiting("linear grid"));
+        let (keeper, bar) = (Keeper::brief(STOPPED), progress::waiting("linear grid"));
         let mut watch = |now: &LinearProgress<'_>| {
             bar.set_message(format!(
                 "round {}, {} evaluations, {} nodes, value {:.4e}",
                 now.round, now.evaluations, now.nodes, now.value
             ));
             bar.tick();
-            if flag.load(Ordering::Relaxed) {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            }
+            if keeper.stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let solution = problem.solve(&settings, &mut watch).context("linear")?;
         bar.finish_and_clear();
         if solution.certificate.is_none() {
-            bail!("stopped while the linear grid was being solved: nothing is kept of that");
+            return Err(Interrupted(STOPPED.to_owned()).into());
         }
         Ok(solution)
     }
 }
+
+const STOPPED: &str = "stopped while the linear grid was being solved: nothing is kept of that";
 
 /// A line of the log.
 pub fn solved(solution: &LinearSolution<f32>) -> Value {

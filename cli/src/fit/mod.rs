@@ -5,6 +5,7 @@ mod config;
 mod curves;
 mod data;
 mod folder;
+mod inputs;
 mod learning;
 mod linear;
 mod merge;
@@ -16,14 +17,16 @@ mod setup;
 mod truth;
 mod words;
 
-use crate::output;
+use crate::{interrupt, output};
 use anyhow::{Context, bail};
 use clap::Args;
 use config::FitFile;
 use folder::Folder;
+pub use inputs::Inputs;
 pub use merge::merge;
 pub use seams::{assigned, check, coverage, sizes, turned, velocities};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// The experiment that runs without a file.
 const BUILT_IN: &str = include_str!("built_in.toml");
@@ -34,7 +37,7 @@ pub struct Fit {
     /// What to fit; without it a built-in experiment: a flare of Sgr A* seen by the ngEHT
     #[arg(value_name = "FIT.toml")]
     file: Option<PathBuf>,
-    /// Folder of the run, which must not exist yet [default: kerrlight-fit, or -2, -3 …]
+    /// Folder of the run, new or empty [default: kerrlight-fit, or -2, -3 …]
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
     /// Change a setting, e.g. training.steps=500; `representation=grid` is short for
@@ -47,13 +50,19 @@ pub struct Fit {
     /// Write the settings that would be used and stop
     #[arg(long)]
     print: bool,
+    /// Stop, keeping what there is, when standard input ends: for programs that start fits
+    #[arg(long, hide = true)]
+    stop_with_input: bool,
 }
 
 impl Fit {
     /// Fits.
     pub fn run(&self) -> anyhow::Result<()> {
+        if self.stop_with_input {
+            interrupt::follow_parent();
+        }
         if let Some(path) = &self.resume {
-            let (folder, text) = Folder::open(path)?;
+            let (folder, text) = Folder::open(path, self.patience())?;
             self.same(&text)?;
             let file = parse(&text).with_context(|| path.display().to_string())?;
             let prepared = run::Prepared::new(file, near_of(&text))?;
@@ -68,10 +77,16 @@ impl Fit {
             Some(path) => path.clone(),
             None => free_name(),
         };
-        let prepared = run::Prepared::new(file, near.clone())?;
+        let (prepared, read) = output::with_reads(|| run::Prepared::new(file, near.clone()));
+        let prepared = prepared?;
         let text = format!("{NEAR}{}\n{text}", near.display());
-        let folder = Folder::create(&folder, &text)?;
+        let folder = Folder::create(&folder, &text, Inputs::new(&text, read))?;
         run::run(&prepared, &text, &folder, false)
+    }
+
+    /// For how long to wait for another process: the fit of a comparison that was killed a moment ago is about to end.
+    fn patience(&self) -> Duration {
+        Duration::from_secs(if self.stop_with_input { 60 } else { 0 })
     }
 
     fn name(&self) -> String {

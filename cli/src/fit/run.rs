@@ -9,7 +9,8 @@ use super::linear::{self, Linear};
 use super::results::{self, Estimate};
 use super::setup::{self, Instrument};
 use super::words;
-use crate::{interrupt, output, progress};
+use crate::interrupt::{Interrupted, Keeper};
+use crate::{output, progress};
 use anyhow::{Context, bail};
 use kerrlight_tomo::fit::{
     BatchSize, Loss, Motion, Objective, Outcome, State, Trainer, checkpoint,
@@ -17,7 +18,6 @@ use kerrlight_tomo::fit::{
 use kerrlight_tomo::volume::Volume;
 use serde_json::{Value, json};
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 /// A fit with its data: all that can be found wrong is, before anything is written.
@@ -85,8 +85,7 @@ pub fn run(prepared: &Prepared, text: &str, folder: &Folder, resume: bool) -> an
     let checkpoint = if resume { folder.checkpoint()? } else { None };
     match checkpoint {
         Some(bytes) => {
-            let name = || format!("{}: checkpoint", folder.path().display());
-            state = checkpoint::decode(&bytes, &state).with_context(name)?;
+            state = restored(&bytes, &state, text).with_context(|| unusable(folder))?;
             folder.cut_log(state.now.step)?;
         }
         None => {
@@ -95,13 +94,28 @@ pub fn run(prepared: &Prepared, text: &str, folder: &Folder, resume: bool) -> an
             folder.save(&checkpoint::encode(&state, text)?)?;
         }
     }
-    if file.representation.kind != Kind::LinearGrid && run.steps(&mut state)? {
-        return Ok(());
+    if file.representation.kind != Kind::LinearGrid {
+        run.steps(&mut state)?;
     }
     let Run { mut trainer, true_volume, .. } = run;
     let estimate = Estimate { file, folder, instrument, motion, measured, true_volume };
     estimate.write(&mut trainer, &state, begun)?;
     output::print(&format!("{}\n", folder.path().join("report.html").display()))
+}
+
+/// The state of a checkpoint of the same settings.
+fn restored(bytes: &[u8], start: &State<f32>, text: &str) -> anyhow::Result<State<f32>> {
+    let state = checkpoint::decode(bytes, start)?;
+    if checkpoint::header(bytes)?.settings != text {
+        bail!("it is of a run with other settings");
+    }
+    Ok(state)
+}
+
+/// What to do about a checkpoint that is of no use.
+fn unusable(folder: &Folder) -> String {
+    let path = folder.path().join(folder::CHECKPOINT);
+    format!("{} (restore it, or remove it to begin the run anew)", path.display())
 }
 
 struct Run<'a> {
@@ -165,10 +179,11 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Whether it was interrupted.
-    fn steps(&mut self, state: &mut State<f32>) -> anyhow::Result<bool> {
+    /// All steps; an error if a signal stops them, after a checkpoint.
+    fn steps(&mut self, state: &mut State<f32>) -> anyhow::Result<()> {
         let steps = self.file.training.steps;
-        let (flag, bar) = (interrupt::flag(), progress::steps(steps));
+        let keeper = Keeper::saving("stopping after this step; a second signal ends at once");
+        let bar = progress::steps(steps);
         bar.set_position(state.now.step);
         let mut saved = Instant::now();
         while state.now.step < steps {
@@ -197,7 +212,7 @@ impl Run<'_> {
                     self.folder.log(&line)?;
                 }
             }
-            let stop = flag.load(Ordering::Relaxed);
+            let stop = keeper.stopped();
             let late = saved.elapsed().as_secs_f64() > self.file.training.checkpoint_seconds;
             if stop || late || converged || step == steps {
                 self.folder.save(&checkpoint::encode(state, self.text)?)?;
@@ -205,17 +220,19 @@ impl Run<'_> {
             }
             if converged {
                 bar.println(format!("converged after step {step}: no step lowers the loss"));
-                break;
             }
-            if stop && step < steps {
+            if stop {
                 bar.abandon();
                 let path = self.folder.path().display();
-                eprintln!("stopped after step {step}; go on with: kerrlight fit --resume {path}");
-                return Ok(true);
+                let how = format!("resume with: kerrlight fit --resume {path}");
+                return Err(Interrupted(format!("stopped after step {step}; {how}")).into());
+            }
+            if converged {
+                break;
             }
         }
         bar.finish_and_clear();
-        Ok(false)
+        Ok(())
     }
 
     fn line(&mut self, state: &State<f32>, loss: &Loss) -> Value {

@@ -4,11 +4,12 @@ mod frames;
 mod times;
 mod viewing;
 
+use crate::interrupt::{Interrupted, Keeper};
 use crate::output;
 use crate::overlay::OverlayOptions;
 use crate::render::preview::PreviewOptions;
 use crate::render::source::Source;
-use crate::{assets, interrupt, progress};
+use crate::{assets, progress};
 use anyhow::{Context, bail};
 use clap::Args;
 use frames::{Origin, Sequence};
@@ -16,7 +17,6 @@ use kerrlight_tomo::film::{Film, Frame};
 use kerrlight_tomo::render::RenderError;
 use std::iter;
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
 use std::time::Instant;
 use times::Span;
 
@@ -87,22 +87,23 @@ impl Movie {
         let rows = sequence.height();
         let batches: Vec<&[usize]> = missing.chunks(film.batch()).collect();
         let bar = progress::bar((batches.len() * rows) as u64);
-        let interrupted = interrupt::flag();
+        let there = |sequence: &Sequence| {
+            let (done, all) = (sequence.len() - sequence.missing().len(), sequence.len());
+            let folder = self.output.display();
+            format!("stopped: {done} of {all} frames are in {folder}; the same command goes on")
+        };
         let mut unresolved = 0;
         for batch in batches {
+            let keeper = Keeper::brief(there(sequence));
             let times: Vec<f64> = batch.iter().map(|k| sequence.time(*k)).collect();
             let frames = film.frames(&times, &|rows| {
                 bar.inc(rows as u64);
-                !interrupted.load(Ordering::Relaxed)
+                !keeper.stopped()
             });
             let frames = match frames {
                 Err(RenderError::Stopped) => {
                     bar.finish_and_clear();
-                    let there = sequence.len() - sequence.missing().len();
-                    let (all, folder) = (sequence.len(), self.output.display());
-                    bail!(
-                        "stopped: {there} of {all} frames are in {folder}; the same command goes on"
-                    )
+                    return Err(Interrupted(there(sequence)).into());
                 }
                 other => other?,
             };

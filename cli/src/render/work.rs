@@ -2,15 +2,15 @@
 
 use super::partial::Partial;
 use super::report;
+use crate::interrupt::{Interrupted, Keeper};
 use crate::output::{self, Output};
-use crate::{interrupt, progress};
-use anyhow::{Context, anyhow};
+use crate::progress;
+use anyhow::Context;
 use kerrlight_tomo::image::Picture;
 use kerrlight_tomo::image::reduce::Reduction;
 use kerrlight_tomo::render::{Journal, Raster, RenderError, Summary};
 use kerrlight_tomo::scene::Scene;
 use std::io::{Cursor, Read, Seek, Write};
-use std::sync::atomic::Ordering;
 
 /// What is rendered.
 pub struct Work<'a> {
@@ -33,7 +33,8 @@ impl Work<'_> {
         mut look: Option<Reduction>,
     ) -> anyhow::Result<(Summary, Option<Picture>)> {
         let mut partial = Partial::open(exr, self.raster, identity)?;
-        let summary = match self.fill(&mut partial.journal) {
+        let stopped = format!("stopped; {}", kept(&partial));
+        let summary = match self.fill(&mut partial.journal, &stopped) {
             Ok(summary) => summary,
             Err(error) => return Err(self.failed(error, partial)),
         };
@@ -57,24 +58,28 @@ impl Work<'_> {
     pub fn preview(&self, look: Option<Reduction>) -> anyhow::Result<(Summary, Option<Picture>)> {
         let memory = Cursor::new(Vec::new());
         let (mut journal, _) = Journal::open(memory, "", self.raster.bands())?;
-        let summary = self.fill(&mut journal).with_context(|| self.name.to_owned())?;
+        let summary = self.fill(&mut journal, STOPPED).map_err(|error| match error {
+            RenderError::Stopped => Interrupted(STOPPED.to_owned()).into(),
+            other => anyhow::Error::new(other).context(self.name.to_owned()),
+        })?;
         let Some(mut look) = look else { return Ok((summary, None)) };
         self.raster.reduce(&mut journal, &summary, &mut look)?;
         Ok((summary, Some(look.picture())))
     }
 
-    /// Renders all bands that are missing.
+    /// Renders all bands that are missing; a signal ends that with `stopped`.
     fn fill<F: Read + Write + Seek + Send>(
         &self,
         journal: &mut Journal<F>,
+        stopped: &str,
     ) -> Result<Summary, RenderError> {
         let all = self.raster.bands();
         let bar = progress::bar(all as u64);
         bar.set_position((all - journal.missing().len()) as u64);
-        let interrupted = interrupt::flag();
+        let keeper = Keeper::brief(stopped);
         let done = self.raster.fill(journal, &|_| {
             bar.inc(1);
-            !interrupted.load(Ordering::Relaxed)
+            !keeper.stopped()
         });
         bar.finish_and_clear();
         done?;
@@ -84,7 +89,7 @@ impl Work<'_> {
     /// What to tell of a picture that has not been finished.
     fn failed(&self, error: RenderError, partial: Partial) -> anyhow::Error {
         match error {
-            RenderError::Stopped => anyhow!("stopped; {}", kept(&partial)),
+            RenderError::Stopped => Interrupted(format!("stopped; {}", kept(&partial))).into(),
             RenderError::Keep(error) => {
                 let context =
                     format!("cannot write {}; {}", partial.path().display(), kept(&partial));
@@ -98,6 +103,8 @@ impl Work<'_> {
         }
     }
 }
+
+const STOPPED: &str = "stopped; nothing is kept";
 
 /// How to go on.
 fn kept(partial: &Partial) -> String {

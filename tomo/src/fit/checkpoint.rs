@@ -8,6 +8,7 @@ use safetensors::tensor::{Dtype, SafeTensorError, TensorView};
 use safetensors::{SafeTensors, serialize};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
+use std::ops::Range;
 
 /// Why bytes are no checkpoint of this fit.
 #[derive(Debug, thiserror::Error)]
@@ -18,6 +19,14 @@ pub enum CheckpointError {
     /// Not by kerrlight, or damaged.
     #[error("it is no checkpoint of a fit: {0}")]
     Header(String),
+    /// Bytes that are not those that were written.
+    #[error("it is damaged: its checksum is {written:08x}, that of its bytes {found:08x}")]
+    Damaged {
+        /// As it was written.
+        written: u32,
+        /// Of the bytes.
+        found: u32,
+    },
     /// A tensor that does not fit.
     #[error("tensor {name} is not allowed: {found} numbers, {wanted} wanted")]
     Tensor {
@@ -64,7 +73,7 @@ pub fn encode(state: &State<f32>, settings: &str) -> Result<Vec<u8>, CheckpointE
     };
     let text =
         toml::to_string(&header).map_err(|error| CheckpointError::Header(error.to_string()))?;
-    let mut tensors = Vec::new();
+    let mut tensors = vec![(CHECKSUM.to_owned(), Dtype::U32, vec![0; 4])];
     push("now", &state.now, &mut tensors);
     if let Some(good) = &state.good {
         push("good", good, &mut tensors);
@@ -77,7 +86,46 @@ pub fn encode(state: &State<f32>, settings: &str) -> Result<Vec<u8>, CheckpointE
             Ok((name.as_str(), view))
         })
         .collect::<Result<Vec<_>, SafeTensorError>>()?;
-    Ok(serialize(views, Some(HashMap::from([(KEY.to_owned(), text)])))?)
+    let mut bytes = serialize(views, Some(HashMap::from([(KEY.to_owned(), text)])))?;
+    let at = checksum_place(&bytes)?;
+    let sum = checksum(&bytes, &at);
+    bytes[at].copy_from_slice(&sum.to_le_bytes());
+    Ok(bytes)
+}
+
+/// The tensor that holds the checksum of all other bytes.
+const CHECKSUM: &str = "checksum";
+
+/// Where the bytes of the checksum are.
+fn checksum_place(bytes: &[u8]) -> Result<Range<usize>, CheckpointError> {
+    let (length, metadata) = SafeTensors::read_metadata(bytes)?;
+    let missing = || CheckpointError::Header("its checksum is missing".to_owned());
+    let tensor = metadata.info(CHECKSUM).ok_or_else(missing)?;
+    // Behind eight bytes of the header's length.
+    let (from, to) = (8 + length + tensor.data_offsets.0, 8 + length + tensor.data_offsets.1);
+    if tensor.dtype != Dtype::U32 || to - from != 4 || to > bytes.len() {
+        return Err(missing());
+    }
+    Ok(from..to)
+}
+
+/// CRC-32 of all bytes but those of the checksum, which count as 0.
+fn checksum(bytes: &[u8], at: &Range<usize>) -> u32 {
+    let mut hasher = crc32fast::Hasher::new();
+    hasher.update(&bytes[..at.start]);
+    hasher.update(&[0; 4]);
+    hasher.update(&bytes[at.end..]);
+    hasher.finalize()
+}
+
+/// Refuses bytes that are not those that were written.
+fn check(bytes: &[u8]) -> Result<(), CheckpointError> {
+    let at = checksum_place(bytes)?;
+    let found = checksum(bytes, &at);
+    let mut written = [0; 4];
+    written.copy_from_slice(&bytes[at]);
+    let written = u32::from_le_bytes(written);
+    if written == found { Ok(()) } else { Err(CheckpointError::Damaged { written, found }) }
 }
 
 type Tensor = (String, Dtype, Vec<u8>);
@@ -125,8 +173,9 @@ pub fn header(bytes: &[u8]) -> Result<Header, CheckpointError> {
 /// The state of a checkpoint, for a fit that would start as `start`.
 ///
 /// # Errors
-/// If it is none, or one of another fit.
+/// If it is none, damaged, or one of another fit.
 pub fn decode(bytes: &[u8], start: &State<f32>) -> Result<State<f32>, CheckpointError> {
+    check(bytes)?;
     let header = header(bytes)?;
     let tensors = SafeTensors::deserialize(bytes)?;
     let read = |of: &str, step| progress(&tensors, of, step, &start.now);

@@ -108,8 +108,8 @@ impl Tally {
 /// Rays that share one seed and are done together.
 pub const BATCH: u64 = 2000;
 
-/// Traces `rays` random rays, held against the oracle; `progress` hears how many are done
-/// and says whether to go on.
+/// Traces `rays` random rays, held against the oracle; `progress` hears how many more are done
+/// and says whether to go on. What was traced before it says no counts.
 ///
 /// # Errors
 /// If the tolerance is out of its range.
@@ -131,12 +131,12 @@ pub fn run(
             let count = BATCH.min(rays - batch * BATCH);
             let mut rng = Pcg64Mcg::seed_from_u64(seed.wrapping_add(batch));
             let mut tallies = nothing();
-            for k in 0..count {
+            for k in (0..count).take_while(|_| progress(0)) {
                 let tally = &mut tallies[(k % Kind::ALL.len() as u64) as usize];
                 let ray = draw(&mut rng, tally.kind)?;
                 judge(&ray, integrator, tolerance, oracle, tally)?;
             }
-            progress(count);
+            progress(tallies.iter().map(|tally| tally.rays).sum());
             Ok(tallies)
         })
         .try_reduce(nothing, |a, b| Ok(a.into_iter().zip(&b).map(|(a, b)| a.add(b)).collect()))

@@ -12,6 +12,7 @@ use super::config::FitFile;
 use super::data::Measured;
 use super::folder::Folder;
 use super::setup::Instrument;
+use crate::checksum::sealed;
 use crate::volume_files;
 use kerrlight_tomo::fit::{Loss, Motion, State, Trainer};
 use kerrlight_tomo::volume::{Volume, VolumeFile, vti};
@@ -52,7 +53,7 @@ impl Estimate<'_> {
         let still = self.still(trainer, state)?;
         let found = Found { volume, still, loss, mask, movie, state, begun };
         let results = self.results(trainer, &found)?;
-        self.folder.file("results.json")?.write(format!("{results:#}\n").as_bytes())?;
+        self.folder.file("results.json")?.write(sealed(results.clone()).as_bytes())?;
         self.report(&found, &results)
     }
 

@@ -51,6 +51,7 @@ impl Estimate<'_> {
             "loss": found.loss.total,
             "chi2_per_datum": chi2,
             "axis": now.axis.vector(),
+            "inputs": self.folder.inputs().files,
         });
         if let Some(mask) = found.mask {
             results["mask_error"] = json!(mask);

@@ -119,6 +119,12 @@ fn damaged_checkpoints_are_refused() {
     for cut in [0, 7, 8, 100, bytes.len() / 2, bytes.len() - 1] {
         assert!(checkpoint::decode(&bytes[..cut], &state).is_err());
     }
+    // Every byte counts: lengths, names, numbers.
+    for at in (0..bytes.len()).filter(|at| *at < 2000 || at % 97 == 0) {
+        let mut flipped = bytes.clone();
+        flipped[at] ^= 1 << (at % 8);
+        assert!(checkpoint::decode(&flipped, &state).is_err(), "byte {at}");
+    }
     let larger = Network::new(NetworkSettings { width: 17, ..NetworkSettings::bhnerf() }).unwrap();
     let other = State::new(&larger, state.now.axis, &training);
     let text = checkpoint::decode(&bytes, &other).unwrap_err().to_string();

@@ -1,0 +1,81 @@
+//! Checksums: of files that are read, and of texts that carry their own.
+
+use crate::output;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What tells bytes from others.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Sum {
+    /// How many bytes.
+    pub bytes: u64,
+    /// Their CRC-32, as eight hexadecimal digits.
+    pub crc32: String,
+}
+
+impl Sum {
+    /// Of these bytes.
+    pub fn of(bytes: &[u8]) -> Self {
+        Sum { bytes: bytes.len() as u64, crc32: format!("{:08x}", crc32fast::hash(bytes)) }
+    }
+}
+
+/// Sums of files, each of which is read once.
+#[derive(Default)]
+pub struct Sums(BTreeMap<PathBuf, Sum>);
+
+impl Sums {
+    /// The sum of a file.
+    pub fn of(&mut self, path: &Path) -> anyhow::Result<Sum> {
+        if let Some(sum) = self.0.get(path) {
+            return Ok(sum.clone());
+        }
+        let sum = Sum::of(&output::read(path)?);
+        self.0.insert(path.to_owned(), sum.clone());
+        Ok(sum)
+    }
+}
+
+/// What stands before the checksum of an object (not of one inside it), and the eight digits until it is known.
+const KEY: &str = "\n  \"checksum\": \"";
+const NONE: &str = "00000000";
+
+/// An object as text, with the checksum of all the rest of it.
+pub fn sealed(mut object: serde_json::Value) -> String {
+    object["checksum"] = serde_json::json!(NONE);
+    let text = format!("{object:#}\n");
+    let sum = crc32fast::hash(text.as_bytes());
+    text.replacen(&format!("{KEY}{NONE}"), &format!("{KEY}{sum:08x}"), 1)
+}
+
+/// Whether a text is as [`sealed`] has written it.
+pub fn is_whole(text: &str) -> bool {
+    let Some(at) = text.find(KEY).map(|at| at + KEY.len()) else { return false };
+    let Some(digits) = text.get(at..at + NONE.len()) else { return false };
+    let blank = [&text[..at], NONE, &text[at + NONE.len()..]].concat();
+    format!("{:08x}", crc32fast::hash(blank.as_bytes())) == digits
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn exact_every_flipped_bit_of_a_sealed_text_is_found() {
+        let text = sealed(
+            json!({"psnr_db": 34.5, "axis": [0.1, 0.2], "name": "checksum", "inner": {"checksum": "00000000"}}),
+        );
+        assert!(is_whole(&text));
+        for at in 0..text.len() {
+            for bit in 0..7 {
+                let mut bytes = text.clone().into_bytes();
+                bytes[at] ^= 1 << bit;
+                let flipped = String::from_utf8(bytes).unwrap();
+                assert!(!is_whole(&flipped), "{flipped}");
+            }
+            assert!(!is_whole(&text[..at]));
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! What a run has read: one that is resumed reads the same, or is refused.
+
+use super::folder::SETTINGS;
+use crate::checksum::{Sum, Sums};
+use crate::output;
+use anyhow::{Context, bail};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Its name in the folder of a run.
+pub const FILE: &str = "inputs.json";
+
+/// What decides a run beside its seed: the version of the program, settings and files.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Inputs {
+    /// Version of the program.
+    pub version: String,
+    /// Of the settings in the run's folder.
+    settings: Sum,
+    /// All that was read.
+    pub files: Vec<InputFile>,
+}
+
+/// A file that was read.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct InputFile {
+    /// Where it lies.
+    path: PathBuf,
+    #[serde(flatten)]
+    sum: Sum,
+}
+
+impl Inputs {
+    /// Of a new run with these settings, which has read these files.
+    pub fn new(settings: &str, read: Vec<(PathBuf, Sum)>) -> Self {
+        let file = |(path, sum): (PathBuf, Sum)| {
+            let path = std::path::absolute(&path).unwrap_or(path);
+            InputFile { path, sum }
+        };
+        Inputs {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            settings: Sum::of(settings.as_bytes()),
+            files: read.into_iter().map(file).collect(),
+        }
+    }
+
+    /// Of the run in a folder.
+    pub fn load(run: &Path) -> anyhow::Result<Self> {
+        let path = run.join(FILE);
+        let name = || format!("{}: it is damaged; start a new run with -o", path.display());
+        serde_json::from_str(&output::read_text(&path)?).with_context(name)
+    }
+
+    /// Refuses what would make another run of it.
+    pub fn check(&self, run: &Path, sums: &mut Sums) -> anyhow::Result<()> {
+        let (shown, version) = (run.display(), env!("CARGO_PKG_VERSION"));
+        if self.version != version {
+            bail!(
+                "{shown} was begun by kerrlight {}, and this is {version}: resume it with that, or start a new run with -o",
+                self.version
+            );
+        }
+        self.check_files(run, sums)?;
+        if sums.of(&run.join(SETTINGS))? != self.settings {
+            bail!(
+                "{shown}/{SETTINGS} was changed or damaged since the run began: restore it, or start a new run with -o"
+            );
+        }
+        Ok(())
+    }
+
+    /// Refuses files that are not what they were.
+    pub fn check_files(&self, run: &Path, sums: &mut Sums) -> anyhow::Result<()> {
+        for InputFile { path, sum } in &self.files {
+            let shown = path.display();
+            let run = run.display();
+            let now = sums.of(path).with_context(|| format!("{run} has read {shown}"))?;
+            if now != *sum {
+                bail!(
+                    "{shown} has changed since {run} was begun ({} bytes, CRC-32 {}; now {} bytes, CRC-32 {}): restore it, or start a new run with -o",
+                    sum.bytes,
+                    sum.crc32,
+                    now.bytes,
+                    now.crc32
+                );
+            }
+        }
+        Ok(())
+    }
+}

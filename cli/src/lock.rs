@@ -1,0 +1,43 @@
+//! A folder that one process at a time works in.
+
+use anyhow::{Context, bail};
+use std::fs::{File, OpenOptions, TryLockError};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// The name of the file that is locked. It stays behind: the lock is the system's, and ends with its process.
+pub const NAME: &str = "lock";
+
+/// A folder's lock, for as long as this lives.
+pub struct Lock(#[expect(dead_code, reason = "it is held, not read")] File);
+
+impl Lock {
+    /// Takes the lock of a folder, within `patience`; `busy` is what another process does there.
+    pub fn take(folder: &Path, busy: &str, patience: Duration) -> anyhow::Result<Self> {
+        let path = folder.join(NAME);
+        let mut options = OpenOptions::new();
+        let file = options.read(true).write(true).create(true).truncate(false).open(&path);
+        let file = file.with_context(|| format!("cannot open {}", path.display()))?;
+        let clock = Instant::now();
+        loop {
+            match file.try_lock() {
+                Ok(()) => break,
+                // Not every file system has locks.
+                Err(TryLockError::Error(_)) => break,
+                Err(TryLockError::WouldBlock) if clock.elapsed() < patience => {
+                    std::thread::sleep(Duration::from_millis(20));
+                }
+                Err(TryLockError::WouldBlock) => {
+                    bail!("{} is in use: another kerrlight {busy} it", folder.display())
+                }
+            }
+        }
+        Ok(Lock(file))
+    }
+}
+
+/// Whether there is nothing in a folder but its lock; so it is if there is no folder.
+pub fn is_free(folder: &Path) -> bool {
+    let Ok(mut entries) = std::fs::read_dir(folder) else { return !folder.exists() };
+    entries.all(|entry| entry.is_ok_and(|entry| entry.file_name() == NAME))
+}

@@ -1,0 +1,241 @@
+//! Fits that are resumed: with the data, settings and state they had, alone, or not at all.
+
+use crate::fit::{results, small, with};
+use crate::support::{binary, fail, kerrlight, root, succeed};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// A fit of a movie that a simulation has left, stopped after its first checkpoint: its words and its folder `run`.
+fn of_a_movie(at: &Path) {
+    succeed(at, &with(&small(), &["-o", "source", "--set", "training.steps=5"]));
+    let text = std::fs::read_to_string(at.join("source/fit.toml")).unwrap();
+    let (before, rest) = text.split_once("[truth]").or(text.split_once("[[truth.spot]]")).unwrap();
+    let (_, after) = rest.split_once("[[loss]]").unwrap();
+    let data = "[data.movie]\npath = \"movie.csv\"\n\n[[loss]]";
+    std::fs::write(at.join("movie.toml"), format!("{before}{data}{after}")).unwrap();
+}
+
+/// An array of telescopes as a file, and the words of a fit of what it sees.
+fn of_an_array(at: &Path) -> Vec<String> {
+    let sites = "#Site X Y Z SEFDR SEFDL FR_PAR FR_ELEV FR_OFF DR_RE DR_IM DL_RE DL_IM\n\
+                 AA 2225061.164 -5440057.37 -2481681.15 90 90 1 0 0 0 0 0 0\n\
+                 LM -768713.9637 -5988541.7982 2063275.9472 600 600 1 0 0 0 0 0 0\n\
+                 AZ -1828796.2 -5054406.8 3427865.2 11000 11000 1 0 0 0 0 0 0\n\
+                 SP 0.01 0.01 -6359609.7 5000 5000 1 0 0 0 0 0 0\n";
+    std::fs::write(at.join("array.txt"), sites).unwrap();
+    let mut words: Vec<String> = vec!["fit".to_owned()];
+    for change in [
+        "observation.array=array.txt",
+        "screen.pixels=20",
+        "observation.scans=8",
+        "training.steps=300",
+        "training.log_every=10",
+        "training.checkpoint_seconds=0.0",
+        "training.start=drawn",
+        "output.nodes=16",
+    ] {
+        words.extend(["--set".to_owned(), change.to_owned()]);
+    }
+    words
+}
+
+/// Ends a fit by SIGKILL once it has a checkpoint.
+fn killed(at: &Path, words: &[&str], run: &str) {
+    let mut command = Command::new(binary());
+    command.current_dir(at).args(words).stdout(Stdio::null()).stderr(Stdio::null());
+    let mut child = command.spawn().unwrap();
+    let (log, clock) = (at.join(run).join("log.jsonl"), Instant::now());
+    while !std::fs::read_to_string(&log).is_ok_and(|text| text.contains("psnr_db")) {
+        assert!(clock.elapsed() < Duration::from_secs(120) && child.try_wait().unwrap().is_none());
+        std::thread::sleep(Duration::from_millis(3));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
+/// What a `fit --resume run` says that must be refused and must change nothing.
+fn refused(at: &Path) -> String {
+    let all = || {
+        let entries = std::fs::read_dir(at.join("run")).unwrap().flatten();
+        let mut files: Vec<_> =
+            entries.map(|entry| (entry.path(), std::fs::read(entry.path()).unwrap())).collect();
+        files.sort();
+        files
+    };
+    let before = all();
+    let message = fail(at, &["fit", "--resume", "run"]);
+    assert!(all() == before, "{message}");
+    message
+}
+
+#[cfg(unix)]
+#[test]
+fn exact_changed_inputs_and_damaged_state_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let words = of_an_array(at);
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    succeed(at, &[&words[..], &["-o", "whole"]].concat());
+    assert!(results(&at.join("whole"))["inputs"].to_string().contains("array.txt"));
+    killed(at, &[&words[..], &["-o", "run"]].concat(), "run");
+    // A bit of every file that decides what follows.
+    let restored = |name: &str, said: &str| {
+        let path = at.join(name);
+        let bytes = std::fs::read(&path).unwrap();
+        for place in [bytes.len() / 3, bytes.len() / 2, bytes.len() - 2] {
+            let mut flipped = bytes.clone();
+            flipped[place] ^= 1;
+            std::fs::write(&path, flipped).unwrap();
+            let message = refused(at);
+            assert!(message.contains(said), "{name}, byte {place}: {message}");
+        }
+        std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+        let message = refused(at);
+        assert!(message.contains(said), "{name}, cut: {message}");
+        std::fs::remove_file(&path).unwrap();
+        let gone = kerrlight(at, &["fit", "--resume", "run"]);
+        std::fs::write(&path, &bytes).unwrap();
+        gone.status.code()
+    };
+    assert_eq!(restored("array.txt", "array.txt has changed since run was begun"), Some(2));
+    assert_eq!(restored("run/fit.toml", "fit.toml was changed or damaged"), Some(2));
+    assert_eq!(restored("run/inputs.json", "run"), Some(2));
+    let path = at.join("run/checkpoint.safetensors");
+    let bytes = std::fs::read(&path).unwrap();
+    for place in [4, 40, 300, bytes.len() / 2, bytes.len() - 1] {
+        let mut flipped = bytes.clone();
+        flipped[place] ^= 4;
+        std::fs::write(&path, flipped).unwrap();
+        let message = refused(at);
+        assert!(message.contains("checkpoint.safetensors (restore it, or remove it"), "{message}");
+    }
+    std::fs::write(&path, &bytes[..bytes.len() - 9]).unwrap();
+    assert!(refused(at).contains("remove it to begin the run anew"));
+    // Of the same fit with other settings.
+    succeed(at, &[&words[..], &["-o", "other", "--set", "training.rate=2e-5"]].concat());
+    std::fs::copy(at.join("other/checkpoint.safetensors"), &path).unwrap();
+    assert!(refused(at).contains("of a run with other settings"));
+    std::fs::write(&path, &bytes).unwrap();
+    succeed(at, &["fit", "--resume", "run"]);
+    for file in ["volume.npz", "movie.npz", "checkpoint.safetensors"] {
+        let read = |run: &str| std::fs::read(at.join(run).join(file)).unwrap();
+        assert!(read("run") == read("whole") || file.starts_with("check"), "{file}");
+    }
+}
+
+/// A movie with one number changed is another movie.
+#[test]
+fn exact_a_changed_movie_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    of_a_movie(at);
+    let n = 20;
+    let row = (0..n).map(|k| format!("{}", k % 3)).collect::<Vec<_>>().join(",");
+    let image = format!("{row}\n").repeat(n);
+    std::fs::write(at.join("movie.csv"), &image).unwrap();
+    let words = ["fit", "movie.toml", "-o", "run", "--set", "movie.frames=1", "--set"];
+    succeed(at, &[&words[..], &["training.batch={pixels=100}"]].concat());
+    std::fs::write(at.join("movie.csv"), image.replacen('1', "7", 1)).unwrap();
+    let message = refused(at);
+    assert!(message.contains("movie.csv has changed since run was begun"), "{message}");
+    std::fs::remove_file(at.join("movie.csv")).unwrap();
+    assert!(refused(at).contains("movie.csv"));
+    std::fs::write(at.join("movie.csv"), &image).unwrap();
+    succeed(at, &["fit", "--resume", "run"]);
+}
+
+/// Two processes in one folder: the second is refused, and a lock does not survive a kill.
+#[test]
+fn exact_a_folder_belongs_to_one_process() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let words = of_an_array(at);
+    let mut words: Vec<&str> = words.iter().map(String::as_str).collect();
+    words.extend(["--set", "training.steps=1000000", "-o", "run"]);
+    let mut command = Command::new(binary());
+    command.current_dir(at).args(&words).stdout(Stdio::null()).stderr(Stdio::null());
+    let mut child = command.spawn().unwrap();
+    let clock = Instant::now();
+    while !at.join("run/checkpoint.safetensors").exists() {
+        assert!(clock.elapsed() < Duration::from_secs(120));
+        std::thread::sleep(Duration::from_millis(3));
+    }
+    let said = |words: &[&str]| {
+        let output = kerrlight(at, words);
+        assert_eq!(output.status.code(), Some(2));
+        String::from_utf8(output.stderr).unwrap()
+    };
+    assert!(said(&["fit", "--resume", "run"]).contains("run is in use: another kerrlight fits in it"));
+    assert!(said(&words).contains("is not an empty folder"));
+    child.kill().unwrap();
+    child.wait().unwrap();
+    // Not the lock is in the way now.
+    std::fs::write(at.join("array.txt"), "").unwrap();
+    assert!(said(&["fit", "--resume", "run"]).contains("array.txt has changed"));
+}
+
+/// `-o` takes an empty folder, as its help says.
+#[test]
+fn exact_an_empty_folder_is_free() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("run")).unwrap();
+    succeed(folder.path(), &with(&small(), &["-o", "run", "--set", "training.steps=5"]));
+    let help = succeed(folder.path(), &["fit", "--help"]);
+    assert!(help.contains("new or empty"), "{help}");
+    assert!(root().join("cli").is_dir());
+}
+
+/// The same of a comparison: one at a time, and cases of other data are not mixed with those that are there.
+#[cfg(unix)]
+#[test]
+fn exact_comparisons_are_resumed_alone_with_the_same_data() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    of_an_array(at);
+    let array = at.join("array.txt");
+    let text = format!(
+        r#"
+        title = "Rates"
+        question = "Which?"
+        seeds = 1
+        fit = {:?}
+        [set]
+        observation.array = {array:?}
+        observation.scans = 8
+        screen.pixels = 12
+        output.nodes = 12
+        training = {{ steps = 4, log_every = 2, start = "drawn" }}
+        [[factor]]
+        name = "rate"
+        key = "training.rate"
+        values = [1e-4, 2e-4]
+        "#,
+        root().join("cli/src/fit/built_in.toml")
+    );
+    std::fs::write(at.join("rates.toml"), &text).unwrap();
+    let only = ["compare", "rates.toml", "-o", "out", "--only"];
+    succeed(at, &[&only[..], &["rate=0.0001"]].concat());
+    let resume = ["compare", "rates.toml", "-o", "out", "--resume"];
+    let sites = std::fs::read_to_string(&array).unwrap();
+    std::fs::write(&array, sites.replace("11000", "12000")).unwrap();
+    let before = std::fs::read(at.join("out/results.json")).unwrap();
+    let message = fail(at, &resume);
+    assert!(message.contains("array.txt has changed since"), "{message}");
+    assert!(std::fs::read(at.join("out/results.json")).unwrap() == before);
+    std::fs::write(&array, sites).unwrap();
+    // Damaged results of a case are made again, from its checkpoint.
+    let cases = std::fs::read_dir(at.join("out/cases")).unwrap().flatten();
+    let case = cases.map(|entry| entry.path()).find(|path| path.is_dir()).unwrap();
+    let path = case.join("results.json");
+    let mut flipped = std::fs::read(&path).unwrap();
+    let at_digit = flipped.iter().rposition(u8::is_ascii_digit).unwrap();
+    flipped[at_digit] ^= 1;
+    std::fs::write(&path, flipped).unwrap();
+    let output = kerrlight(at, &resume);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success() && said.contains("2 cases, 2 of them to be run"), "{said}");
+    let lock = std::fs::File::open(at.join("out/lock")).unwrap();
+    lock.try_lock().unwrap();
+    assert!(fail(at, &resume).contains("another kerrlight compares in it"));
+}

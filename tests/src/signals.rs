@@ -1,0 +1,202 @@
+//! What Ctrl-C, SIGTERM and SIGKILL do to long runs: exit codes, what is kept, and that no process outlives its parent.
+
+use crate::fit::{small, with};
+use crate::support::{binary, kerrlight, root, succeed};
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+const PATIENCE: Duration = Duration::from_secs(120);
+
+fn start(folder: &Path, words: &[&str]) -> Child {
+    let mut command = Command::new(binary());
+    command.current_dir(folder).args(words).stdout(Stdio::null()).stderr(Stdio::piped());
+    command.spawn().unwrap()
+}
+
+fn signal(pid: u32, name: &str) {
+    assert!(Command::new("kill").args([name, &pid.to_string()]).status().unwrap().success());
+}
+
+fn until(what: &str, mut is_so: impl FnMut() -> bool) {
+    let clock = Instant::now();
+    while !is_so() {
+        assert!(clock.elapsed() < PATIENCE, "{what}");
+        std::thread::sleep(Duration::from_millis(3));
+    }
+}
+
+fn holds(path: &Path, text: &str) -> bool {
+    std::fs::read_to_string(path).is_ok_and(|all| all.contains(text))
+}
+
+fn message(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// The fit of a comparison: the only child of its process.
+fn child_of(parent: u32) -> Option<u32> {
+    let path = format!("/proc/{parent}/task/{parent}/children");
+    std::fs::read_to_string(path).ok()?.split_whitespace().next()?.parse().ok()
+}
+
+/// Whether a process is there and not merely waiting to be reaped.
+fn runs(pid: u32) -> bool {
+    let status = std::fs::read_to_string(format!("/proc/{pid}/stat"));
+    status.is_ok_and(|text| !text.rsplit(") ").next().unwrap_or_default().starts_with('Z'))
+}
+
+/// State is saved, the code is the signal's, and the run ends in the bytes of one that was left in peace.
+#[test]
+fn exact_fits_that_are_stopped_end_in_the_same_bytes() {
+    let (small, folder) = (small(), tempfile::tempdir().unwrap());
+    let steps = ["--set", "training.steps=400", "--set", "training.checkpoint_seconds=1000.0"];
+    let words = with(&small, &steps);
+    succeed(folder.path(), &[&words[..], &["-o", "whole"]].concat());
+    for (name, code) in [("-INT", 130), ("-TERM", 143), ("-HUP", 129)] {
+        let run = folder.path().join(name);
+        let child = start(folder.path(), &[&words[..], &["-o", &format!("./{name}")]].concat());
+        until("a logged step", || holds(&run.join("log.jsonl"), "\"step\":50"));
+        signal(child.id(), name);
+        let ended = child.wait_with_output().unwrap();
+        let said = message(&ended);
+        assert_eq!(ended.status.code(), Some(code), "{said}");
+        assert!(said.contains("stopped after step") && said.contains("fit --resume"), "{said}");
+        assert!(!run.join("results.json").exists());
+        let resumed = format!("./{name}");
+        succeed(folder.path(), &["fit", "--resume", &resumed]);
+        for file in ["volume.npz", "movie.npz", "checkpoint.safetensors"] {
+            let read = |run: &Path| std::fs::read(run.join(file)).unwrap();
+            assert!(read(&run) == read(&folder.path().join("whole")), "{name}: {file}");
+        }
+    }
+}
+
+/// What keeps nothing ends at once: a fit whose rays are traced, a scan, a linear grid, the sweep of accuracies.
+#[test]
+fn exact_what_keeps_nothing_ends_at_once() {
+    let fit = root().join("scenes/fits/scene_1.toml");
+    let fit = fit.to_str().unwrap();
+    let linear = ["--set", "representation=linear-grid", "--set", "linear.iterations=100000"];
+    for words in [
+        &["fit", fit, "-o", "run", "--set", "screen.pixels=512"][..],
+        &[&["fit", fit, "-o", "run"][..], &linear].concat(),
+        &["accuracy", "-o", "results"],
+        &["accuracy", "-o", "results", "--hard", "10000000"],
+        &["render", "--set", "screen.width=4000", "--preview", "a.png"],
+        &["trace", "--rays", "-"],
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut command = Command::new(binary());
+        command.current_dir(folder.path()).args(words).stdout(Stdio::null());
+        let child = command.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(1500));
+        let clock = Instant::now();
+        signal(child.id(), "-INT");
+        let ended = child.wait_with_output().unwrap();
+        assert_eq!(ended.status.code(), Some(130), "{words:?}: {}", message(&ended));
+        // A second when the machine has nothing else to do.
+        assert!(clock.elapsed() < Duration::from_secs(5), "{words:?}: {:?}", clock.elapsed());
+        assert!(!folder.path().join("run/results.json").exists());
+    }
+}
+
+/// A comparison of two long fits.
+fn experiment(folder: &Path) {
+    let fit = root().join("scenes/fits/scene_1.toml");
+    let text = format!(
+        r#"
+        title = "Two rates"
+        question = "Which rate?"
+        seeds = 1
+        fit = {fit:?}
+        [set]
+        screen.pixels = 16
+        movie.frames = 8
+        output.nodes = 16
+        representation = {{ kind = "grid", nodes = 16 }}
+        region.nodes = {{ equal-mino-time = {{ per_ray = 40 }} }}
+        training = {{ steps = 1000000, log_every = 10, start = "drawn" }}
+        [[factor]]
+        name = "rate"
+        key = "training.grid_rate"
+        values = [0.1, 0.4]
+        "#
+    );
+    std::fs::write(folder.join("rates.toml"), text).unwrap();
+}
+
+/// The folder of the first case.
+fn first_case(folder: &Path) -> Option<std::path::PathBuf> {
+    let entries = std::fs::read_dir(folder.join("out/cases")).ok()?.flatten();
+    entries.map(|entry| entry.path()).find(|path| path.is_dir())
+}
+
+/// Signals to the comparison alone: its fit saves its state and ends, whatever ended the comparison.
+#[cfg(target_os = "linux")]
+#[test]
+fn exact_no_fit_outlives_its_comparison() {
+    for (name, code) in [("-INT", Some(130)), ("-TERM", Some(143)), ("-KILL", None)] {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        experiment(at);
+        let parent = start(at, &["compare", "rates.toml", "-o", "out"]);
+        let log = || first_case(at).map(|case| case.join("log.jsonl"));
+        until("a step", || log().is_some_and(|log| holds(&log, "psnr_db")));
+        let child = child_of(parent.id()).expect("a fit");
+        signal(parent.id(), name);
+        let ended = parent.wait_with_output().unwrap();
+        assert_eq!(ended.status.code(), code, "{name}: {}", message(&ended));
+        until("the fit has ended", || !runs(child));
+        let step = |at: &Path| {
+            let text = std::fs::read_to_string(first_case(at).unwrap().join("log.jsonl")).unwrap();
+            text.lines().count()
+        };
+        let lines = step(at);
+        assert!(lines > 0 && first_case(at).unwrap().join("checkpoint.safetensors").is_file());
+        std::thread::sleep(Duration::from_millis(100));
+        assert_eq!(step(at), lines, "nobody writes");
+        if code.is_some() {
+            let said = message(&ended);
+            assert!(said.contains("stopped: 2 cases are not done"), "{said}");
+            assert!(holds(&at.join("out/results.json"), "\"open\""));
+        }
+    }
+}
+
+/// A second signal ends at once, and leaves no half-written file behind.
+#[test]
+fn exact_a_second_signal_ends_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let set = ["--set", "screen.width=3000", "--set", "screen.height=2000", "--tile", "3000"];
+    let child = start(folder.path(), &[&["render", "-o", "a.exr"][..], &set].concat());
+    let partial = folder.path().join("a.exr.partial");
+    until("rendering", || partial.exists());
+    let clock = Instant::now();
+    signal(child.id(), "-INT");
+    std::thread::sleep(Duration::from_millis(20));
+    // It may have ended in the meantime.
+    let _ = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    let ended = child.wait_with_output().unwrap();
+    assert_eq!(ended.status.code(), Some(130), "{}", message(&ended));
+    assert!(clock.elapsed() < Duration::from_secs(5));
+    let left = std::fs::read_dir(folder.path()).unwrap().count();
+    assert_eq!(left, 1, "the journal alone");
+}
+
+/// `nohup` works as everywhere.
+#[test]
+fn exact_a_hangup_that_is_ignored_stays_ignored() {
+    let folder = tempfile::tempdir().unwrap();
+    let script = format!("trap '' HUP; exec {:?} trace --rays -", binary());
+    let mut command = Command::new("sh");
+    command.current_dir(folder.path()).args(["-c", &script]).stdout(Stdio::null());
+    let mut child = command.stdin(Stdio::piped()).spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    signal(child.id(), "-HUP");
+    std::thread::sleep(Duration::from_millis(500));
+    assert!(child.try_wait().unwrap().is_none(), "still there");
+    signal(child.id(), "-TERM");
+    assert_eq!(child.wait().unwrap().code(), Some(143));
+    assert!(!kerrlight(folder.path(), &["trace", "--rays", "none"]).status.success());
+}
