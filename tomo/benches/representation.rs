@@ -16,7 +16,7 @@ use kerrlight_tomo::representation::{
     Activation, Coordinates, FeatureGrid, FeatureGridSettings, Gradient, Grid, GridSettings,
     Groups, Network, NetworkSettings, Representation, Workspace,
 };
-use support::{large_sgemm, least};
+use support::{large_sgemm, least, wanted};
 
 const BATCHES: [usize; 3] = [1_000, 57_344, 1_000_000];
 
@@ -177,9 +177,7 @@ fn benches(criterion: &mut Criterion) {
         ("grid 64³, sigmoid", &sigmoid, None),
         ("grid 64³, linear", &linear, None),
     ];
-    // The same filter as criterion's: the first word of the command line.
-    let filter = std::env::args().skip(1).find(|word| !word.starts_with('-')).unwrap_or_default();
-    all.into_iter().filter(|(name, ..)| name.contains(&filter)).for_each(table);
+    all.into_iter().filter(|(name, ..)| wanted(name)).for_each(table);
     for (name, representation, _) in all {
         measure(criterion, name, representation);
     }

@@ -16,6 +16,12 @@ fn clock(start: Instant) -> f64 {
     total.map_or(wall, |sum| sum * 1e-9 / rayon::current_num_threads() as f64)
 }
 
+/// Whether something is to be measured: the same filter as criterion's, the first word of the command line.
+pub fn wanted(name: &str) -> bool {
+    let filter = std::env::args().skip(1).find(|word| !word.starts_with('-')).unwrap_or_default();
+    name.contains(&filter)
+}
+
 /// Seconds of one piece of work: the least of five means over a tenth of a second or more.
 pub fn least(mut work: impl FnMut()) -> f64 {
     let zero = Instant::now();
