@@ -27,11 +27,13 @@ fn of_an_array(at: &Path) -> Vec<String> {
     let mut words: Vec<String> = vec!["fit".to_owned()];
     for change in [
         "observation.array=array.txt",
-        "screen.pixels=20",
-        "observation.scans=8",
-        "training.steps=300",
+        "representation=grid",
+        "representation.nodes=12",
+        "screen.pixels=12",
+        "observation.scans=6",
+        "training.steps=400",
         "training.log_every=10",
-        "training.checkpoint_seconds=0.0",
+        "training.checkpoint_seconds=0.02",
         "training.start=drawn",
         "output.nodes=16",
     ] {
@@ -113,7 +115,7 @@ fn exact_changed_inputs_and_damaged_state_are_refused() {
     std::fs::write(&path, &bytes[..bytes.len() - 9]).unwrap();
     assert!(refused(at).contains("remove it to begin the run anew"));
     // Of the same fit with other settings.
-    succeed(at, &[&words[..], &["-o", "other", "--set", "training.rate=2e-5"]].concat());
+    succeed(at, &[&words[..], &["-o", "other", "--set", "training.grid_rate=2e-3"]].concat());
     std::fs::copy(at.join("other/checkpoint.safetensors"), &path).unwrap();
     assert!(refused(at).contains("of a run with other settings"));
     std::fs::write(&path, &bytes).unwrap();
@@ -166,7 +168,9 @@ fn exact_a_folder_belongs_to_one_process() {
         assert_eq!(output.status.code(), Some(2));
         String::from_utf8(output.stderr).unwrap()
     };
-    assert!(said(&["fit", "--resume", "run"]).contains("run is in use: another kerrlight fits in it"));
+    assert!(
+        said(&["fit", "--resume", "run"]).contains("run is in use: another kerrlight fits in it")
+    );
     assert!(said(&words).contains("is not an empty folder"));
     child.kill().unwrap();
     child.wait().unwrap();

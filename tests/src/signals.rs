@@ -50,7 +50,7 @@ fn runs(pid: u32) -> bool {
 #[test]
 fn exact_fits_that_are_stopped_end_in_the_same_bytes() {
     let (small, folder) = (small(), tempfile::tempdir().unwrap());
-    let steps = ["--set", "training.steps=400", "--set", "training.checkpoint_seconds=1000.0"];
+    let steps = ["--set", "training.steps=200", "--set", "training.checkpoint_seconds=1000.0"];
     let words = with(&small, &steps);
     succeed(folder.path(), &[&words[..], &["-o", "whole"]].concat());
     for (name, code) in [("-INT", 130), ("-TERM", 143), ("-HUP", 129)] {
@@ -90,7 +90,7 @@ fn exact_what_keeps_nothing_ends_at_once() {
         let mut command = Command::new(binary());
         command.current_dir(folder.path()).args(words).stdout(Stdio::null());
         let child = command.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-        std::thread::sleep(Duration::from_millis(1500));
+        std::thread::sleep(Duration::from_millis(700));
         let clock = Instant::now();
         signal(child.id(), "-INT");
         let ended = child.wait_with_output().unwrap();
