@@ -60,6 +60,33 @@ fn scenes_that_are_none() {
     }
 }
 
+/// A picture of nothing is announced; masses and angles without meaning are refused.
+#[test]
+fn pictures_that_mean_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let render = |setting: &str| {
+        let small = ["--set", "screen.width=8", "--set", "screen.height=8", "-o", "a.exr"];
+        let output =
+            kerrlight(folder.path(), &[&["render", "--set", setting], &small[..]].concat());
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    for (setting, said) in [
+        (
+            "hole.mass_msun=1e300",
+            "`hole.mass_msun` = 1e300 is not allowed: 1e-20 to 1e15 solar masses",
+        ),
+        ("hole.distance_kpc=1e300", "1e-9 to 1e12 kpc"),
+        ("spot.0.phase_deg=1e300", "an angle in [-3600, 3600]"),
+    ] {
+        let (code, error) = render(setting);
+        assert!(code == Some(2) && error.contains(said), "{setting}: {error}");
+    }
+    let (code, error) = render("disc.peak_intensity=0");
+    assert!(code == Some(0) && !error.contains("no light"), "{error}");
+    let (code, error) = render("screen.field_of_view_uas=0.01");
+    assert!(code == Some(0) && error.contains("no light of the scene's disc"), "{error}");
+}
+
 #[test]
 fn skies_that_are_no_pictures() {
     let folder = tempfile::tempdir().unwrap();

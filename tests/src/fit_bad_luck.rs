@@ -76,10 +76,10 @@ fn bad_settings_are_named_with_their_line() {
         ("seed = 1", "seed = \"one\"", "line 4"),
         ("seed = 1", "seed = 1\ncolour = 2", "unknown field `colour`"),
         ("spin = 0.0", "spin = true", "line 7"),
-        ("weight = 1.0", "weight = -1.0", "loss 0: weight = -1 is not allowed: above 0"),
-        ("weight = 1.0", "weight = nan", "loss 0: weight = NaN"),
-        ("sigma = 1.0", "sigma = -0.5", "image sigma = -0.5 is not allowed: above 0"),
-        ("sigma = 0.4", "sigma = inf", "truth.spot 0"),
+        ("weight = 1.0", "weight = -1.0", "loss.0.weight = -1 is not allowed: 1e-12 to 1e12"),
+        ("weight = 1.0", "weight = nan", "loss.0.weight = NaN"),
+        ("sigma = 1.0", "sigma = -0.5", "loss.0.sigma = -0.5 is not allowed"),
+        ("sigma = 0.4", "sigma = inf", "truth.spot.0.sigma = inf"),
         ("[representation]", tv, "regulariser 0: epsilon is missing"),
         ("[[truth.spot]]", "[[truth.spots]]", "spot"),
         (
@@ -116,7 +116,7 @@ fn bad_regularisers_and_optimisers_are_named() {
     let folder = tempfile::tempdir().unwrap();
     for (setting, said) in [
         ("kind = \"total-variation\"\nweight = 1.0\nepsilon = 0.0", "epsilon = 0 is not allowed"),
-        ("kind = \"smoothness\"\nweight = -1.0", "regulariser 0: weight = -1 is not allowed"),
+        ("kind = \"smoothness\"\nweight = -1.0", "regulariser.0.weight = -1 is not allowed"),
         ("kind = \"smoothness\"\nweight = 1.0\nlevel = 1.0", "level is not for smoothness"),
         ("kind = \"entropy\"\nweight = 1.0\nlevel = 1.0", "floor is missing: entropy needs it"),
         ("kind = \"sparsity\"\nweight = 1.0", "probe.nodes is missing"),
@@ -189,6 +189,17 @@ fn exact_a_dark_truth_is_said_to_be_one() {
         assert!(page.contains("the truth is dark on all nodes"), "{name}");
         let log = std::fs::read_to_string(run.join("log.jsonl")).unwrap();
         assert!(!log.to_lowercase().contains("nan") && !log.contains("inf"), "{log}");
+    }
+}
+
+/// A spot outside of the region gives data of nothing, which a fit explains perfectly.
+#[test]
+fn exact_a_truth_that_nobody_sees_is_refused() {
+    let (small, folder) = (small(), tempfile::tempdir().unwrap());
+    for setting in ["truth.spot.0.center=[900.0, 0.0, 0.0]", "motion.injection_time=1e8"] {
+        let error = fail(folder.path(), &with(&small, &["-o", "run", "--set", setting]));
+        assert!(error.contains("the truth shines in no pixel of any frame"), "{setting}: {error}");
+        assert!(!folder.path().join("run").exists());
     }
 }
 

@@ -72,7 +72,7 @@ fn simulate(file: &FitFile, instrument: &Instrument) -> anyhow::Result<Measured>
     let truth = Truth::new(file)?;
     let Some(seen) = &file.observation else {
         let times = frames(file)?;
-        let movie = Some(truth.movie(file, instrument, &times)?);
+        let movie = Some(lit(&truth, truth.movie(file, instrument, &times)?)?);
         return Ok(Measured {
             times,
             movie,
@@ -106,7 +106,7 @@ fn simulate(file: &FitFile, instrument: &Instrument) -> anyhow::Result<Measured>
     let hours = schedule.hours_utc(setup.ut1).context("observation")?;
     let per_m = setup::hours_per_m(file)?;
     let times: Vec<f64> = hours.iter().map(|h| seen.first_time + (h - hours[0]) / per_m).collect();
-    let movie = truth.movie(file, instrument, &times)?;
+    let movie = lit(&truth, truth.movie(file, instrument, &times)?)?;
     let images = Movie { grid: sky, pixels: movie.clone() };
     simulate::fill(&mut observation, &images, Pulse::Triangle, &hours, Method::Direct)?;
     if let Some(gains) = seen.gains {
@@ -127,6 +127,19 @@ fn simulate(file: &FitFile, instrument: &Instrument) -> anyhow::Result<Measured>
         sky: Some(sky),
         truth: Some(truth),
     })
+}
+
+/// A simulated movie, if any of its pixels shines: a dark one would be recovered as nothing, perfectly.
+/// A truth of amplitude 0 is meant to be dark.
+fn lit(truth: &Truth, movie: Vec<f64>) -> anyhow::Result<Vec<f64>> {
+    let brightest = movie.iter().fold(0.0f64, |most, x| most.max(*x));
+    if brightest < 1e-30 && !truth.is_dark() {
+        bail!(
+            "the truth shines in no pixel of any frame (the brightest has {brightest:e} Jy): spots must lie in the region \
+             (region.r_min, r_max, z_width), be wide enough to meet rays, and shine during the movie (motion.injection_time)"
+        );
+    }
+    Ok(movie)
 }
 
 /// Adds a part of each amplitude to its error in quadrature.

@@ -137,7 +137,9 @@ fn near_of(text: &str) -> PathBuf {
 }
 
 fn parse(text: &str) -> anyhow::Result<FitFile> {
-    Ok(toml::from_str(text)?)
+    let file = toml::from_str(text)?;
+    config::check_ranges(text)?;
+    Ok(file)
 }
 
 /// A folder that does not exist yet.

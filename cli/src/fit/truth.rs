@@ -69,6 +69,12 @@ impl Truth {
         self.spots.iter().map(light).sum::<f64>() + of_glyphs
     }
 
+    /// Whether every amplitude is 0: data of noise alone.
+    pub fn is_dark(&self) -> bool {
+        self.spots.iter().all(|spot| spot.amplitude == 0.0)
+            && self.glyphs.iter().all(Glyph::is_dark)
+    }
+
     /// Its axis.
     pub fn axis(&self) -> Axis {
         self.axis

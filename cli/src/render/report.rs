@@ -46,6 +46,10 @@ pub fn print(scene: &Scene, summary: &Summary, seconds: f64) {
         let shown =
             if (1e-4..1e7).contains(flux) { format!("{flux:.6}") } else { format!("{flux:.6e}") };
         eprintln!("flux {shown} +- {flux_error:.1e} {flux_unit}");
+    } else if scene.has_emission() {
+        eprintln!(
+            "warning: no light of the scene's disc, gas, spots, volumes or meshes reaches the picture: flux 0 {flux_unit}"
+        );
     }
     if let Some(asked) = screen.image_error {
         let error = summary.image_error;

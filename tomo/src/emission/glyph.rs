@@ -98,6 +98,11 @@ impl Glyph {
         })
     }
 
+    /// Whether its amplitude is 0.
+    pub fn is_dark(&self) -> bool {
+        self.amplitude == 0.0
+    }
+
     /// Emission at a point; `turned` is the angle by which its matter has turned about the axis since it
     /// had this shape.
     pub fn at(&self, point: [f64; 3], turned: f64) -> f64 {

@@ -1,7 +1,7 @@
 //! Ranges of a scene's values.
 
 use super::check_volume::check_volume;
-use super::invalid::{Invalid, brightness, finite, number, positive, shown};
+use super::invalid::{Invalid, brightness, number, positive, shown};
 use super::{Disc, Gas, GasMotion, GasProfile, Mesh, Plunging, Scene, Sky, Spot};
 use crate::polarization::PowerLaw;
 use kerrlight_geodesic::{Kerr, OutOfRange, orbits};
@@ -41,8 +41,9 @@ pub(super) fn check(scene: &Scene) -> Result<(), Invalid> {
 fn check_hole_and_observer(scene: &Scene) -> Result<(), Invalid> {
     let spin = scene.hole.spin;
     number("hole.spin", spin, (-1.0..=1.0).contains(&spin), "a number in [-1, 1]")?;
-    positive("hole.mass_msun", scene.hole.mass_msun)?;
-    positive("hole.distance_kpc", scene.hole.distance_kpc)?;
+    let (mass, distance) = (scene.hole.mass_msun, scene.hole.distance_kpc);
+    number("hole.mass_msun", mass, (1e-20..=1e15).contains(&mass), "1e-20 to 1e15 solar masses")?;
+    number("hole.distance_kpc", distance, (1e-9..=1e12).contains(&distance), "1e-9 to 1e12 kpc")?;
     let observer = &scene.observer;
     let ok = observer.time.abs() <= 1e9;
     number("observer.time", observer.time, ok, "a time in [-1e9, 1e9] (M)")?;
@@ -280,7 +281,8 @@ fn check_spot(spot: &Spot, k: usize, hole: &Kerr, time: f64) -> Result<(), Inval
     let allowed = format!("a radius above {least:.4}, where circular orbits end, and at most 1e6");
     let ok = spot.radius <= 1e6 && spot.radius > least;
     number(key("radius"), spot.radius, ok, &allowed)?;
-    finite(key("phase_deg"), spot.phase_deg)?;
+    let ok = (-3600.0..=3600.0).contains(&spot.phase_deg);
+    number(key("phase_deg"), spot.phase_deg, ok, "an angle in [-3600, 3600]")?;
     let norm = spot.axis.iter().map(|x| x * x).sum::<f64>();
     if !(1e-30..=1e30).contains(&norm) {
         let allowed = "three numbers that are not all 0, with a length in [1e-15, 1e15]";

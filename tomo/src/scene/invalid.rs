@@ -66,8 +66,8 @@ pub(super) struct Invalid {
     allowed: String,
 }
 
-/// A number as a person would write it.
-pub(super) fn shown(value: f64) -> String {
+/// A number as a person would write it: `0.5`, `1e-12`.
+pub fn shown(value: f64) -> String {
     let size = value.abs();
     if size != 0.0 && size.is_finite() && !(1e-4..1e9).contains(&size) {
         format!("{value:e}")
@@ -98,8 +98,9 @@ impl Invalid {
     }
 }
 
-/// The line on which the value at a dotted path stands (or the nearest table around it).
-fn line_of(text: &str, key: &str) -> Option<usize> {
+/// The line of a TOML text, counted from 1, on which the value at a dotted path such as `spot.0.radius` stands, or
+/// the nearest table around it.
+pub fn line_of(text: &str, key: &str) -> Option<usize> {
     let document = Document::parse(text).ok()?;
     let mut item: &Item = document.as_item();
     let mut span = None;
@@ -158,8 +159,4 @@ pub(super) fn positive(key: impl Into<String>, value: f64) -> Result<(), Invalid
 /// Brightness in any unit: the channels are 32-bit floats.
 pub(super) fn brightness(key: impl Into<String>, value: f64) -> Result<(), Invalid> {
     number(key, value, (0.0..=1e12).contains(&value), "a number in [0, 1e12]")
-}
-
-pub(super) fn finite(key: impl Into<String>, value: f64) -> Result<(), Invalid> {
-    number(key, value, value.is_finite(), "a finite number")
 }

@@ -11,7 +11,7 @@ mod overrides;
 mod sources;
 
 pub use camera::{CameraConfig, CameraKey, CameraMotion, Pose};
-pub use invalid::SceneError;
+pub use invalid::{SceneError, line_of, shown};
 pub use overrides::apply_override;
 pub use sources::{
     Checker, Disc, Gas, GasMotion, GasProfile, Mesh, MeshVelocity, Plunging, Rotation, Sky,
@@ -262,6 +262,12 @@ impl Scene {
         let scene: Scene = toml::from_str(text).map_err(|e| SceneError::syntax(&e))?;
         check::check(&scene).map_err(|invalid| invalid.locate(text))?;
         Ok(scene)
+    }
+
+    /// Whether it has a source whose light counts for `intensity`: any but a sky.
+    pub fn has_emission(&self) -> bool {
+        let lists = [self.spot.is_empty(), self.volume.is_empty(), self.mesh.is_empty()];
+        self.disc.is_some() || self.gas.is_some() || lists.contains(&false)
     }
 
     /// The resolved scene as TOML, defaults included: the disc's inner edge too.

@@ -1,11 +1,13 @@
 //! What a fit's file may say. Numbers that decide the result have no default.
 
 mod data;
+mod ranges;
 mod recovery;
 mod simulation;
 mod view;
 
 pub use data::*;
+pub use ranges::check as check_ranges;
 pub use recovery::*;
 pub use simulation::*;
 pub use view::*;

@@ -1,0 +1,201 @@
+//! Ranges of a fit's numbers, by key: a number outside of them gives a fit that means nothing.
+
+use anyhow::bail;
+use kerrlight_tomo::scene::{line_of, shown};
+use toml::Value;
+
+/// Key (`*` stands for the number of a list's element), least and largest value, unit.
+type Range = (&'static str, f64, f64, &'static str);
+
+const TIME: f64 = 1e9;
+const LENGTH: f64 = 1e6;
+
+const RANGES: &[Range] = &[
+    ("hole.spin", -1.0, 1.0, "a/M"),
+    ("hole.mass_msun", 1e-20, 1e15, "solar masses"),
+    ("hole.distance_kpc", 1e-9, 1e12, "kpc"),
+    ("observer.inclination_deg", 0.0, 180.0, "degrees"),
+    ("screen.width", 1e-3, LENGTH, "M"),
+    ("screen.field_uas", 1e-6, 1e12, "microarcseconds"),
+    ("screen.jy_per_pixel", 1e-15, 1e15, "Jy per M of emission 1"),
+    ("region.r_min", 0.0, LENGTH, "M"),
+    ("region.r_max", 1e-3, LENGTH, "M"),
+    ("region.z_width", 1e-3, f64::INFINITY, "M"),
+    ("effects.redshift_power", -20.0, 20.0, "an exponent"),
+    ("effects.absorption.coefficient", 0.0, 1e6, "per M"),
+    ("effects.absorption.radius", 1e-3, LENGTH, "M"),
+    ("effects.absorption.height", 1e-3, LENGTH, "M"),
+    ("motion.velocity.keplerian.drag", -1.0, 1.0, "a/M, as Ω = 1/(r^{3/2} + drag)"),
+    ("motion.velocity.power-law.radius", 1e-3, LENGTH, "M"),
+    ("motion.velocity.power-law.rate", -1e3, 1e3, "radians per M"),
+    ("motion.velocity.power-law.exponent", -20.0, 20.0, "an exponent"),
+    ("motion.velocity.table.radii.*", 1e-3, LENGTH, "M"),
+    ("motion.velocity.table.rates.*", -1e3, 1e3, "radians per M"),
+    ("motion.reference_time", -TIME, TIME, "M"),
+    ("motion.injection_time", -TIME, TIME, "M"),
+    ("movie.from", -TIME, TIME, "M"),
+    ("movie.to", -TIME, TIME, "M"),
+    ("truth.spot.*.center.*", -LENGTH, LENGTH, "M"),
+    ("truth.spot.*.sigma", 1e-3, LENGTH, "M"),
+    ("truth.spot.*.amplitude", 0.0, 1e12, "emission at the centre"),
+    ("truth.spot.*.wound_for", -LENGTH, LENGTH, "M"),
+    ("truth.glyph.*.amplitude", 0.0, 1e12, "emission in the strokes"),
+    ("observation.first_time", -TIME, TIME, "M"),
+    ("data.visibilities.first_time", -TIME, TIME, "M"),
+    ("data.visibilities.systematic", 0.0, 10.0, "part of the amplitude"),
+    ("observation.systematic", 0.0, 10.0, "part of the amplitude"),
+    ("loss.*.weight", 1e-12, 1e12, "a factor"),
+    ("loss.*.sigma", 1e-15, 1e15, "Jy"),
+    ("loss.*.least_snr", 0.0, 1e9, "a signal-to-noise ratio"),
+    ("regulariser.*.weight", 0.0, 1e12, "a factor"),
+    ("representation.length_scale", 1e-3, LENGTH, "M"),
+    ("representation.time_scale", 1e-3, TIME, "M"),
+    ("training.rate", 0.0, 10.0, "a learning rate"),
+    ("training.last_rate", 0.0, 10.0, "a learning rate"),
+    ("training.grid_rate", 0.0, 10.0, "a learning rate"),
+    ("training.grid_last_rate", 0.0, 10.0, "a learning rate"),
+    ("training.feature_rate", 0.0, 10.0, "a learning rate"),
+    ("training.feature_last_rate", 0.0, 10.0, "a learning rate"),
+    ("training.checkpoint_seconds", 0.0, 1e9, "seconds"),
+    ("linear.upper", 1e-12, 1e12, "the largest emission"),
+    ("linear.smoothness", 0.0, 1e12, "a factor"),
+    ("linear.sparsity", 0.0, 1e12, "a factor"),
+    ("axis.from.rate", 0.0, 10.0, "a learning rate"),
+    ("axis.from.last_rate", 0.0, 10.0, "a learning rate"),
+    ("axis.scan.rate", 0.0, 10.0, "a learning rate"),
+    ("axis.scan.last_rate", 0.0, 10.0, "a learning rate"),
+];
+
+/// Numbers of these tables are a representation's own; whoever adds it checks them.
+const OWN: &str = "representation.own";
+
+/// Refuses the first number of a fit's text that is out of its range, or not a number at all.
+pub fn check(text: &str) -> anyhow::Result<()> {
+    let table: toml::Table = toml::from_str(text)?;
+    walk(&Value::Table(table), &mut String::new(), text)
+}
+
+fn walk(value: &Value, key: &mut String, text: &str) -> anyhow::Result<()> {
+    match value {
+        Value::Table(table) => {
+            table.iter().try_for_each(|(name, value)| below(value, key, name, text))
+        }
+        Value::Array(values) => values
+            .iter()
+            .enumerate()
+            .try_for_each(|(k, value)| below(value, key, &k.to_string(), text)),
+        Value::Float(number) => one(key, *number, text),
+        Value::Integer(number) => one(key, *number as f64, text),
+        _ => Ok(()),
+    }
+}
+
+fn below(value: &Value, key: &mut String, name: &str, text: &str) -> anyhow::Result<()> {
+    let length = key.len();
+    if !key.is_empty() {
+        key.push('.');
+    }
+    key.push_str(name);
+    let result = walk(value, key, text);
+    key.truncate(length);
+    result
+}
+
+fn one(key: &str, number: f64, text: &str) -> anyhow::Result<()> {
+    let (least, most, unit) = range_of(key);
+    if key.starts_with(OWN) || (least..=most).contains(&number) {
+        return Ok(());
+    }
+    let line = line_of(text, key).map_or(String::new(), |line| format!("line {line}: "));
+    let allowed = match (least, most) {
+        (f64::MIN, _) => "a finite number".to_owned(),
+        (_, f64::INFINITY) => format!("at least {}", shown(least)),
+        _ => format!("{} to {}", shown(least), shown(most)),
+    };
+    let unit = if unit.is_empty() { String::new() } else { format!(" ({unit})") };
+    bail!("{line}{key} = {} is not allowed: {allowed}{unit}", shown(number))
+}
+
+/// The range of a key; any finite number where the table has none. What data are simulated with has the
+/// ranges of what a fit assumes, and a perturbed velocity those of the one that it perturbs.
+fn range_of(key: &str) -> (f64, f64, &'static str) {
+    let key = key.strip_prefix("world.").unwrap_or(key);
+    let key = key.replace("velocity.perturbed.of.", "velocity.");
+    let of = |(pattern, least, most, unit): &Range| {
+        matches(pattern, &key).then_some((*least, *most, *unit))
+    };
+    RANGES.iter().find_map(of).unwrap_or((f64::MIN, f64::MAX, ""))
+}
+
+fn matches(pattern: &str, key: &str) -> bool {
+    let (mut wanted, mut given) = (pattern.split('.'), key.split('.'));
+    loop {
+        match (wanted.next(), given.next()) {
+            (None, None) => return true,
+            (Some("*"), Some(part)) if part.parse::<usize>().is_ok() => {}
+            (Some(name), Some(part)) if name == part => {}
+            _ => return false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use kerrlight_tomo::scene::apply_override;
+
+    const BUILT_IN: &str = include_str!("../built_in.toml");
+
+    fn refused(assignment: &str) -> String {
+        check(&apply_override(BUILT_IN, assignment).unwrap()).unwrap_err().to_string()
+    }
+
+    /// Each of these used to end in a report of nothing, with exit code 0.
+    #[test]
+    fn regress_numbers_that_mean_nothing_are_refused_by_name() {
+        for (assignment, says) in [
+            (
+                "hole.mass_msun=1e300",
+                "hole.mass_msun = 1e300 is not allowed: 1e-20 to 1e15 (solar masses)",
+            ),
+            ("screen.width=1e-300", "screen.width = 1e-300 is not allowed: 0.001 to 1000000 (M)"),
+            ("effects.redshift_power=-1e9", "effects.redshift_power = -1e9"),
+            ("motion.velocity.keplerian.drag=1e300", "motion.velocity.keplerian.drag = 1e300"),
+            ("motion.reference_time=inf", "motion.reference_time = inf"),
+            ("truth.spot.0.sigma=1e-300", "truth.spot.0.sigma = 1e-300"),
+            ("truth.spot.0.center=[0.0, nan, 0.0]", "truth.spot.0.center.1 = NaN"),
+            ("truth.spot.0.amplitude=-1", "truth.spot.0.amplitude = -1"),
+            ("loss.0.weight=1e-300", "loss.0.weight = 1e-300"),
+            ("representation.length_scale=nan", "representation.length_scale = NaN"),
+            ("training.rate=-1", "training.rate = -1 is not allowed: 0 to 10"),
+            ("world.hole.spin=2", "world.hole.spin = 2"),
+            ("output.nodes=nan", "output.nodes = NaN is not allowed: a finite number"),
+        ] {
+            let text = refused(assignment);
+            assert!(text.contains(says), "{assignment}: {text}");
+        }
+        assert!(
+            refused("hole.spin=1.5").starts_with("line 7: hole.spin = 1.5"),
+            "{}",
+            refused("hole.spin=1.5")
+        );
+    }
+
+    #[test]
+    fn exact_what_is_carried_along_is_allowed() {
+        check(BUILT_IN).unwrap();
+        let own = apply_override(BUILT_IN, "representation.own.width=1e20").unwrap();
+        check(&own).unwrap();
+        check(&apply_override(BUILT_IN, "region.z_width=inf").unwrap()).unwrap();
+    }
+
+    #[test]
+    fn exact_every_key_of_the_table_is_one_of_a_fit() {
+        let documents = include_str!("../../../../docs/fit.md");
+        for (pattern, least, most, _) in RANGES {
+            assert!(least < most, "{pattern}");
+            let name = pattern.trim_end_matches(".*").rsplit('.').next().unwrap_or_default();
+            assert!(documents.contains(name), "docs/fit.md does not know {pattern}");
+        }
+    }
+}
