@@ -1,6 +1,7 @@
 //! The program with what others add to it.
 
-use super::{Arguments, compare, interrupt, run};
+/// Does what the command line says; 0 is success, 2 an error, 1 a fit that failed while it ran or a comparison of which
+/// a part did, 128 and the number of the signal what a signal has stopped: 130 after Ctrl-C, 143 after SIGTERM.
 use anyhow::{anyhow, bail};
 use clap::Parser;
 use kerrlight_tomo::representation::Representation;
@@ -62,8 +63,8 @@ impl Program {
         self
     }
 
-    /// Does what the command line says; 0 is success, 2 an error, 1 a comparison of which a part failed, 128 and the
-    /// number of the signal what a signal has stopped: 130 after Ctrl-C, 143 after SIGTERM.
+    /// Does what the command line says; 0 is success, 2 an error, 1 a fit that failed while it ran or a comparison of which
+    /// a part did, 128 and the number of the signal what a signal has stopped: 130 after Ctrl-C, 143 after SIGTERM.
     pub fn run(self) -> ExitCode {
         let arguments = Arguments::parse();
         interrupt::listen();
@@ -77,8 +78,9 @@ impl Program {
             }
             Err(error) => {
                 eprintln!("error: {error:#}");
-                let is_part = error.downcast_ref::<compare::Failed>().is_some();
-                ExitCode::from(if is_part { 1 } else { 2 })
+                let failed = error.downcast_ref::<compare::Failed>().is_some()
+                    || error.downcast_ref::<fit::Failed>().is_some();
+                ExitCode::from(if failed { 1 } else { 2 })
             }
         }
     }

@@ -122,6 +122,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         terms: &[Weighted { weight: 1.0, term: term.as_ref() }],
         half_width: 5.0,
         upper: 2.0,
+        flux: None,
         priors: &[],
     };
     let (start, cpu) = (Instant::now(), processor_time());

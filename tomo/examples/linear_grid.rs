@@ -96,6 +96,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         terms: &[Weighted { weight: 1.0, term: &term }],
         voxels,
         upper: 2.0,
+        flux: None,
         priors: if weight > 0.0 { &smooth } else { &[] },
     };
 

@@ -2,13 +2,14 @@
 
 use super::config::{FitFile, LossKind, Nodes, Region, Scan, Screen, WidthOf};
 use super::data::{self, Measured};
+use super::failed;
 use super::linear::terms;
 use super::setup::{self, Instrument};
 use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
 use anyhow::Context;
-use kerrlight_geodesic::OutOfRange;
 use kerrlight_tomo::dynamics::Axis;
+use kerrlight_tomo::fit::linear::LinearError;
 use kerrlight_tomo::fit::scan::{
     AxisLoss, AxisProblem, AxisScan, AxisSettings, Effort, refine_axis, scan_axis,
 };
@@ -160,7 +161,7 @@ fn with_problem<R>(
     view: &View,
     motion: &Motion,
     frames: usize,
-    search: impl FnOnce(&AxisProblem<'_, f32>) -> Result<R, OutOfRange>,
+    search: impl FnOnce(&AxisProblem<'_, f32>) -> Result<R, LinearError>,
 ) -> anyhow::Result<R> {
     let file = &view.file;
     let linear = setup::linear(file)?;
@@ -176,9 +177,10 @@ fn with_problem<R>(
         terms: &terms,
         half_width: file.region.r_max,
         upper: linear.upper,
+        flux: linear.flux_jy,
         priors: &priors,
     };
-    search(&problem).context("axis.scan")
+    search(&problem).map_err(failed::linear).context("axis.scan")
 }
 
 /// The map of losses as a table.

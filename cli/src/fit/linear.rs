@@ -1,6 +1,7 @@
 //! What linear grids do for a fit: they are solved, and started from.
 
 use super::config::{Activation, FitFile, Kind};
+use super::failed;
 use super::penalty;
 use super::setup;
 use crate::interrupt::{Interrupted, Keeper};
@@ -8,7 +9,7 @@ use crate::progress;
 use anyhow::Context;
 use kerrlight_tomo::dynamics::Axis;
 use kerrlight_tomo::fit::linear::{
-    Coarse, LinearProblem, LinearProgress, LinearSettings, LinearSolution, Voxels, Weighted,
+    Coarse, Ending, LinearProblem, LinearProgress, LinearSettings, LinearSolution, Voxels, Weighted,
 };
 use kerrlight_tomo::fit::{Data, FrameTerm, Objective, State};
 use kerrlight_tomo::optimise::{Adam, AdamState};
@@ -55,6 +56,7 @@ impl Linear<'_> {
             terms: &terms,
             voxels: Voxels::cube(nodes, self.file.region.r_max),
             upper: linear.upper,
+            flux: linear.flux_jy,
             priors: &priors,
         };
         let usual = LinearSettings::default();
@@ -77,9 +79,10 @@ impl Linear<'_> {
             bar.tick();
             if keeper.stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        let solution = problem.solve(&settings, &mut watch).context("linear")?;
+        let solution =
+            problem.solve(&settings, &mut watch).map_err(failed::linear).context("linear")?;
         bar.finish_and_clear();
-        if solution.certificate.is_none() {
+        if solution.ending == Ending::Cancelled {
             return Err(Interrupted(STOPPED.to_owned()).into());
         }
         Ok(solution)
@@ -96,13 +99,49 @@ pub fn solved(solution: &LinearSolution<f32>) -> Value {
             "relative_violation": c.relative_violation(), "upper": c.upper,
         })
     });
+    let stationarity = solution.stationarity.map(|s| {
+        json!({
+            "value": s.value, "start": s.start, "relative_violation": s.relative_violation(), "upper": s.upper,
+        })
+    });
     json!({
         "step": 0,
         "linear": {
             "evaluations": solution.evaluations, "rounds": solution.rounds, "nodes": solution.nodes,
-            "bytes": solution.bytes, "ending": format!("{:?}", solution.ending), "certificate": certificate,
+            "bytes": solution.bytes, "ending": format!("{:?}", solution.ending), "statement": statement(solution),
+            "certificate": certificate, "stationarity": stationarity,
         },
     })
+}
+
+/// What may be claimed of a solution.
+pub fn statement(solution: &LinearSolution<f32>) -> String {
+    let stopped = matches!(solution.ending, Ending::Exhausted | Ending::Cancelled);
+    if let Some(certificate) = solution.certificate {
+        return format!(
+            "minimum of a convex problem, with a certificate: at most {:.1e} of the dark field's loss above the least",
+            certificate.relative_gap()
+        );
+    }
+    let slope = solution.stationarity.map_or(f64::NAN, |s| s.relative_violation());
+    let what = if stopped { "not yet a stationary point" } else { "stationary point" };
+    format!(
+        "{what}, no certificate: the data are not convex in the emission; largest slope {slope:.1e} of that at the start"
+    )
+}
+
+/// What results say of the linear grid, from the log of its run.
+pub fn outcome(file: &FitFile, lines: &[Value]) -> Option<Value> {
+    if file.representation.kind != Kind::LinearGrid {
+        return None;
+    }
+    let linear = &lines.iter().rev().find(|line| line["linear"].is_object())?["linear"];
+    let certificate = &linear["certificate"];
+    let flatness = if certificate.is_object() { certificate } else { &linear["stationarity"] };
+    Some(json!({
+        "statement": linear["statement"], "ending": linear["ending"],
+        "relative_gap": certificate["relative_gap"], "relative_violation": flatness["relative_violation"],
+    }))
 }
 
 /// Points of a step of [`imprint`].

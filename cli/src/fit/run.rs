@@ -3,11 +3,13 @@
 use super::axis_scan;
 use super::config::{AxisSearch, FitFile, Kind, LossKind, Start};
 use super::data::{self, Measured};
+use super::failed;
 use super::folder::{self, Folder};
 use super::learning;
 use super::linear::{self, Linear};
 use super::results::{self, Estimate};
 use super::setup::{self, Instrument};
+use super::unknowns;
 use super::words;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::{output, progress};
@@ -36,7 +38,10 @@ impl Prepared {
         let measured = data::measure(&file, &instrument, &near)?;
         let motion = setup::motion(&file, measured.times.clone())?;
         let prepared = Self { file, instrument, measured, motion };
-        prepared.objective()?;
+        let seen = prepared.objective()?.observed().len();
+        if matches!(prepared.file.axis, AxisSearch::Scan(_)) && seen < 2 {
+            bail!("axis.scan needs frames at 2 times or more: a single one tells no axes apart");
+        }
         Ok(prepared)
     }
 
@@ -51,6 +56,7 @@ impl Prepared {
 pub fn check(file: &FitFile) -> anyhow::Result<()> {
     let (_, axis_rate) = setup::axis(file)?;
     learning::representation(file)?;
+    unknowns::check(file)?;
     let training = learning::training(file, axis_rate)?;
     let images_only = file.loss.iter().all(|loss| loss.data == LossKind::Image);
     if matches!(training.batch, BatchSize::Pixels(_)) && !images_only {
@@ -80,6 +86,9 @@ pub fn run(prepared: &Prepared, text: &str, folder: &Folder, resume: bool) -> an
     let mut run = Run { file, text, folder, measured, true_volume, trainer, begun };
     eprintln!("{}", run.describe(instrument));
     if let Some(note) = learning::caution(file) {
+        eprintln!("note: {note}");
+    }
+    for note in unknowns::stated(file) {
         eprintln!("note: {note}");
     }
     let checkpoint = if resume { folder.checkpoint()? } else { None };
@@ -163,6 +172,7 @@ impl Run<'_> {
             let nodes = self.file.representation.nodes;
             let solution = linear.solve(&mut trainer.objective, axis, nodes, 1)?;
             self.folder.log(&linear::solved(&solution))?;
+            eprintln!("{}", linear::statement(&solution));
             state.now.parameters = solution.emission;
         } else if let Start::Linear { nodes, stride, steps } = self.file.training.start {
             let solution = linear.solve(&mut trainer.objective, axis, nodes, stride)?;
@@ -187,7 +197,10 @@ impl Run<'_> {
         bar.set_position(state.now.step);
         let mut saved = Instant::now();
         while state.now.step < steps {
-            let outcome = self.trainer.step(state)?;
+            let outcome = match self.trainer.step(state) {
+                Ok(outcome) => outcome,
+                Err(error) => return Err(failed::diverged(&mut self.trainer, state, error)),
+            };
             let step = state.now.step;
             bar.set_position(step);
             bar.set_message(format!("loss {:.4e}", state.now.loss));

@@ -215,9 +215,9 @@ pub fn axis(file: &FitFile) -> anyhow::Result<(Axis, Option<Polynomial>)> {
             Ok((Axis::new(*start).context("axis.from.start")?, Some(rate)))
         }
         AxisSearch::Scan(Scan { directions, frames, pixels, refine, rate, last_rate }) => {
-            if !(12..=100_000).contains(directions) || *frames == 0 || *pixels < 8 {
+            if !(12..=100_000).contains(directions) || *frames < 2 || *pixels < 8 {
                 bail!(
-                    "axis.scan: directions = {directions}, frames = {frames}, pixels = {pixels} are not allowed: 12 to 100000, 1 or more, 8 or more"
+                    "axis.scan: directions = {directions}, frames = {frames}, pixels = {pixels} are not allowed: 12 to 100000, 2 or more, 8 or more"
                 );
             }
             if refine.is_some_and(|nodes| !(8..=128).contains(&nodes)) {

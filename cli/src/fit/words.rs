@@ -1,6 +1,7 @@
 //! What things are called in sentences.
 
-use super::config::{Kind, LossKind};
+use super::config::{FitFile, Kind, LossKind};
+use super::unknowns;
 
 /// Kinds of data.
 pub fn data(kind: LossKind) -> &'static str {
@@ -27,8 +28,8 @@ pub fn representation(kind: &Kind) -> &str {
 }
 
 /// The same for somebody who does not know the names.
-pub fn described(kind: &Kind) -> &str {
-    match kind {
+pub fn described(file: &FitFile) -> &str {
+    match &file.representation.kind {
         Kind::Bhnerf => {
             "a neural network of the place that matter had at the reference time (BH-NeRF)"
         }
@@ -37,6 +38,9 @@ pub fn described(kind: &Kind) -> &str {
             "a small neural network of features on grids of several resolutions that are carried along the orbits"
         }
         Kind::Grid => "values at the nodes of a grid that is carried along the orbits",
+        Kind::LinearGrid if !unknowns::is_convex(file) => {
+            "values at the nodes of a grid that is carried along the orbits, found by descent from several lit starts, as such data are not convex in the emission"
+        }
         Kind::LinearGrid => {
             "values at the nodes of a grid that is carried along the orbits, as the solution of a convex problem"
         }

@@ -301,6 +301,22 @@ impl<T: Scalar> Objective<T> {
     }
 }
 
+impl<T: Scalar> Objective<T> {
+    /// The first data, with frame and χ², that are no finite number of images of these frames.
+    pub fn not_finite(&self, frames: &[usize], movie: &[T]) -> Option<(String, usize, f64)> {
+        let mut none = vec![T::zero(); self.chain.pixels()];
+        for (frame, image) in frames.iter().zip(movie.chunks_exact(self.chain.pixels())) {
+            for (term, _) in self.terms() {
+                let value = term.value_and_gradient(*frame, image, T::zero(), &mut none);
+                if !value.is_finite() {
+                    return Some((term.name().to_owned(), *frame, value));
+                }
+            }
+        }
+        None
+    }
+}
+
 /// Room for gradients with respect to coordinates, cleared, where they are wanted.
 fn wanted<T: Scalar>(
     wanted: bool,

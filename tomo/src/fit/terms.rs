@@ -27,6 +27,18 @@ pub trait FrameTerm<T: Real>: Send + Sync {
     /// Whether χ² is quadratic in the pixels.
     fn is_quadratic(&self) -> bool;
 
+    /// Whether χ² is convex in the pixels: quadratic ones are. Only then can a minimum be told from other stationary
+    /// points.
+    fn is_convex(&self) -> bool {
+        self.is_quadratic()
+    }
+
+    /// Whether χ² stays the same when all pixels are multiplied by one positive number: such data do not know the
+    /// flux.
+    fn is_scale_free(&self) -> bool {
+        false
+    }
+
     /// χ² of a frame; adds `weight` times its gradient.
     fn value_and_gradient(&self, frame: usize, image: &[T], weight: T, gradient: &mut [T]) -> f64;
 }
@@ -211,6 +223,10 @@ impl<T: Real + FftNum> FrameTerm<T> for ScanTerm<T> {
 
     fn is_quadratic(&self) -> bool {
         self.quadratic
+    }
+
+    fn is_scale_free(&self) -> bool {
+        self.scans.iter().flatten().all(|scan| scan.term.is_scale_free())
     }
 
     fn value_and_gradient(&self, frame: usize, image: &[T], weight: T, gradient: &mut [T]) -> f64 {

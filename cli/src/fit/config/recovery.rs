@@ -120,6 +120,9 @@ pub struct Training {
 pub struct Linear {
     /// Largest emission that is allowed.
     pub upper: f64,
+    /// Mean flux of a frame, Jy: what closure quantities alone do not know, and need.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flux_jy: Option<f64>,
     /// Factor on ∫ |∇e|² dV.
     #[serde(default)]
     pub smoothness: f64,

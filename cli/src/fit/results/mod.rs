@@ -10,6 +10,7 @@ pub use fields::{compare, true_volume};
 
 use super::config::FitFile;
 use super::data::Measured;
+use super::failed;
 use super::folder::Folder;
 use super::setup::Instrument;
 use crate::checksum::sealed;
@@ -46,6 +47,7 @@ impl Estimate<'_> {
         let volume = fields::recovered(self.file, trainer, state)?;
         let frames: Vec<usize> = (0..self.measured.times.len()).collect();
         let movie = trainer.movie(&state.now, &frames, true);
+        failed::check(self.file, &trainer.objective, &frames, &movie)?;
         let loss = trainer.objective.loss_of(&frames, &movie);
         let mask = numbers::mask_error(trainer, state, &movie);
         self.volumes(&volume, state)?;

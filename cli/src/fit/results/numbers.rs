@@ -1,6 +1,7 @@
 //! What was found, in numbers.
 
 use super::{Estimate, Found};
+use crate::fit::{linear, unknowns};
 use crate::report;
 use crate::usage::usage;
 use kerrlight_tomo::fit::{State, Trainer};
@@ -55,6 +56,13 @@ impl Estimate<'_> {
         });
         if let Some(mask) = found.mask {
             results["mask_error"] = json!(mask);
+        }
+        if let Some(linear) = linear::outcome(self.file, &self.folder.lines()?) {
+            results["linear"] = linear;
+        }
+        let unknown = unknowns::stated(self.file);
+        if !unknown.is_empty() {
+            results["unknown"] = json!(unknown);
         }
         let (Some(truth), Some(volume)) = (&self.measured.truth, &self.true_volume) else {
             return Ok(results);

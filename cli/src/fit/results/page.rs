@@ -135,8 +135,13 @@ impl Estimate<'_> {
             file.observer.inclination_deg,
             self.measured.times.len(),
             data.join(", "),
-            words::described(&file.representation.kind)
+            words::described(file)
         )];
+        if let Some(statement) = results["linear"]["statement"].as_str() {
+            lines.push(format!("The linear grid's solution: {statement}."));
+        }
+        let unknown = results["unknown"].as_array().into_iter().flatten();
+        lines.extend(unknown.filter_map(Value::as_str).map(|open| format!("Mind that {open}.")));
         if let Some(chi2) = results["chi2_per_datum"].as_object() {
             let each = chi2.iter().map(|(name, value)| {
                 format!("{name}: χ² a datum {:.4}", value.as_f64().unwrap_or(f64::NAN))

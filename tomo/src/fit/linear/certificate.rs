@@ -1,4 +1,4 @@
-//! How far from the minimum a field can be.
+//! How far from the minimum a field can be, or how flat it is there.
 
 /// Bounds at a field x, from the gradient g with respect to every node of the grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,5 +45,27 @@ impl Certificate {
             violation = violation.max(wrong);
         }
         (gap, violation)
+    }
+}
+
+/// How flat the function is at a field x, where it is not convex: there is no bound on how much less it could be elsewhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stationarity {
+    /// f(x).
+    pub value: f64,
+    /// f of the lit field that the descent began with.
+    pub start: f64,
+    /// The largest violation of the conditions for a stationary point, as in [`Certificate::violation`].
+    pub violation: f64,
+    /// Largest |g| at the start: what `violation` compares with.
+    pub start_slope: f64,
+    /// Largest value of the box.
+    pub upper: f64,
+}
+
+impl Stationarity {
+    /// The violation as a part of the largest slope at the start.
+    pub fn relative_violation(&self) -> f64 {
+        self.violation / self.start_slope
     }
 }

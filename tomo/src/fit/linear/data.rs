@@ -58,6 +58,35 @@ impl<'a, T: Scalar> Data<'a, T> {
         self.terms.iter().all(|data| data.term.is_quadratic())
     }
 
+    pub fn is_convex(&self) -> bool {
+        self.terms.iter().all(|data| data.term.is_convex())
+    }
+
+    /// Whether none of the data knows the flux.
+    pub fn is_scale_free(&self) -> bool {
+        self.terms.iter().all(|data| data.term.is_scale_free())
+    }
+
+    /// What the data are.
+    pub fn names(&self) -> String {
+        let names: Vec<&str> = self.terms.iter().map(|data| data.term.name()).collect();
+        names.join(", ")
+    }
+
+    /// The first data of a frame whose χ² is no finite number, with it.
+    pub fn not_finite(
+        &self,
+        frame: usize,
+        image: &[T],
+        gradient: &mut [T],
+    ) -> Option<(String, f64)> {
+        let value = |data: &Weighted<'a, T>| {
+            let value = data.term.value_and_gradient(frame, image, T::zero(), gradient);
+            (data.term.name().to_owned(), value)
+        };
+        self.terms.iter().map(value).find(|(_, value)| !value.is_finite())
+    }
+
     /// Value of a frame; overwrites the gradient with respect to its pixels.
     pub fn value(&self, frame: usize, image: &[T], gradient: &mut [T]) -> f64 {
         gradient.fill(T::zero());

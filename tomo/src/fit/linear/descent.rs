@@ -48,6 +48,13 @@ pub(super) type Each<'a> = dyn FnMut(f64, &[f64]) -> ControlFlow<()> + 'a;
 /// Steps between gradients that are computed anew.
 const ANEW: usize = 40;
 
+/// Where a descent ended.
+pub(super) struct Descended {
+    pub x: Vec<f64>,
+    pub value: f64,
+    pub ending: Ending,
+}
+
 pub(super) struct Descent<'a, 'b> {
     problem: Scaled<'a>,
     each: &'b mut Each<'b>,
@@ -71,13 +78,13 @@ impl<'a, 'b> Descent<'a, 'b> {
         Self { problem, each, y, gradient, value }
     }
 
-    pub fn run(mut self, method: Method, stop: Stop) -> (Vec<f64>, Ending) {
+    pub fn run(mut self, method: Method, stop: Stop) -> Descended {
         let ending = match method {
             Method::QuasiNewton => self.quasi_newton(stop),
             Method::ConjugateGradients => self.conjugate(stop),
             Method::Fista => self.accelerated(stop),
         };
-        (self.problem.to(&self.y), ending)
+        Descended { x: self.problem.to(&self.y), value: self.value, ending }
     }
 
     fn parts(&self) -> Parts {
@@ -166,7 +173,9 @@ impl<'a, 'b> Descent<'a, 'b> {
         add(&mut moved, -reach, direction);
         self.problem.value_and_gradient(&moved, &mut there);
         let bend = difference(&self.gradient, &there);
-        reach * dot(&self.gradient, direction) / dot(&bend, direction)
+        let step = reach * dot(&self.gradient, direction) / dot(&bend, direction);
+        // Where the function bends down, no step is best: one as long as was looked ahead.
+        if step.is_finite() && step > 0.0 { step } else { reach }
     }
 
     fn conjugate(&mut self, stop: Stop) -> Ending {

@@ -1,5 +1,7 @@
-//! A grid of voxels where the axis is known: pixels are linear in its values, so that the best field is
-//! the minimum of a convex function over a box, and how far one is from it can be told.
+//! A grid of voxels where the axis is known: pixels are linear in its values, so that for data that are convex in the
+//! pixels the best field is the minimum of a convex function over a box, and how far one is from it can be told.
+//! Amplitudes and closure quantities are not convex: several lit fields are started from (`lit`, `start`), and what
+//! comes out is a stationary point without a certificate.
 //!
 //! `walk` (rays in the grid) → `operator` (sparse matrix over the nodes that count) → `objective` →
 //! `descent` → `certificate`.
@@ -7,19 +9,24 @@
 mod certificate;
 mod data;
 mod descent;
+mod error;
+mod lit;
 mod nodes;
 mod objective;
 mod operator;
 mod quasi_newton;
+mod run;
 mod scaled;
 mod solve;
+mod start;
 #[cfg(test)]
 pub(in crate::fit) mod tests;
 mod walk;
 
-pub use certificate::Certificate;
+pub use certificate::{Certificate, Stationarity};
 pub use data::Weighted;
 pub use descent::{Ending, Method};
+pub use error::LinearError;
 pub use objective::Prior;
 pub use solve::{Coarse, LinearProblem, LinearProgress, LinearSettings, LinearSolution, Watch};
 pub use walk::Voxels;

@@ -1,6 +1,7 @@
 //! What is minimised: data and penalties as a function of the values at the nodes that count.
 
 use super::data::Data;
+use super::error::LinearError;
 use super::operator::Operator;
 use crate::fit::regulariser::{Regulariser, Shape};
 use crate::simd::Scalar;
@@ -51,6 +52,21 @@ impl<'a, 'b, T: Scalar + Default> Objective<'a, 'b, T> {
     /// Whether second derivatives are the same everywhere.
     pub fn is_quadratic(&self) -> bool {
         self.data.is_quadratic() && self.priors.iter().all(|prior| prior.regulariser.is_quadratic())
+    }
+
+    /// Refuses a value that is no finite number, and says which data have it.
+    pub fn finite(&self, value: f64, x: &[f64]) -> Result<f64, LinearError> {
+        if value.is_finite() {
+            return Ok(value);
+        }
+        let culprit = self.operator.not_finite(self.data, &rounded::<T>(x, 1.0));
+        let (frame, data, value) = culprit.unwrap_or_else(|| (0, "penalties".to_owned(), value));
+        Err(LinearError::NotFinite { data, frame, value })
+    }
+
+    /// Mean flux of the frames.
+    pub fn flux(&self, x: &[f64]) -> f64 {
+        self.operator.flux(&rounded::<T>(x, 1.0))
     }
 
     /// Value, and the gradient with respect to all nodes of the grid.

@@ -1,9 +1,10 @@
 //! From values at some nodes of the grid to pixels, as a sparse matrix, and back.
 
 use super::data::Data;
-use super::walk::{Place, Room, Walk};
+use super::walk::{Place, Room, Voxels, Walk};
 use crate::simd::Scalar;
 use rayon::prelude::*;
+use std::sync::{Mutex, PoisonError};
 
 /// No column.
 const NONE: u32 = u32::MAX;
@@ -300,6 +301,48 @@ impl<'a, T: Scalar + Default> Operator<'a, T> {
             0.0
         };
         self.through(direction, false, link).1
+    }
+
+    /// Mean over frames of the sum of an image's pixels.
+    pub fn flux(&self, x: &[T]) -> f64 {
+        let link = |_: usize, image: &[T], slopes: &mut [T]| {
+            slopes.fill(T::zero());
+            image.iter().map(|pixel| pixel.double()).sum()
+        };
+        self.through(x, false, link).0 / self.frames.len() as f64
+    }
+
+    /// Which of the nodes that count any ray meets.
+    pub fn seen(&self) -> Vec<bool> {
+        let link = |_: usize, _: &[T], slopes: &mut [T]| {
+            slopes.fill(T::one());
+            0.0
+        };
+        let sums = self.through(&vec![T::zero(); self.active.count()], false, link).1;
+        sums.iter().map(|sum| *sum != 0.0).collect()
+    }
+
+    /// The first data at `x` whose χ² is no finite number, with the frame.
+    pub fn not_finite(&self, data: &Data<'_, T>, x: &[T]) -> Option<(usize, String, f64)> {
+        let first: Mutex<Option<(usize, String, f64)>> = Mutex::new(None);
+        let link = |k: usize, image: &[T], slopes: &mut [T]| {
+            let frame = self.frames[k];
+            if let Some((name, value)) = data.not_finite(frame, image, slopes) {
+                let mut first = first.lock().unwrap_or_else(PoisonError::into_inner);
+                if first.as_ref().is_none_or(|(earlier, ..)| frame < *earlier) {
+                    *first = Some((frame, name, value));
+                }
+            }
+            slopes.fill(T::zero());
+            0.0
+        };
+        self.through(x, false, link);
+        first.into_inner().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The grid.
+    pub fn voxels(&self) -> Voxels {
+        self.walk.voxels
     }
 
     /// Sum of squares of each column.

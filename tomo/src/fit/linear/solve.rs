@@ -1,12 +1,13 @@
 //! The grid's values from movies and visibilities where the axis is known.
 
-use super::certificate::Certificate;
+use super::certificate::{Certificate, Stationarity};
 use super::data::{Data, Weighted};
-use super::descent::{Descent, Each, Ending, Method, Stop};
-use super::nodes::{dilated, refined};
+use super::descent::{Ending, Method};
+use super::error::LinearError;
 use super::objective::{Objective, Prior};
 use super::operator::{Active, Operator};
-use super::scaled::Scaled;
+use super::run::{FEW, LIT, Run};
+use super::start::Trials;
 use super::walk::{Voxels, Walk};
 use crate::dynamics::Axis;
 use crate::fit::Chain;
@@ -29,6 +30,8 @@ pub struct LinearProblem<'a, T: Scalar> {
     pub voxels: Voxels,
     /// The largest emission that is allowed; the certificate is about fields that are nowhere brighter.
     pub upper: f64,
+    /// Mean flux of a frame (the sum of its pixels), for data none of which knows it; others do not look at it.
+    pub flux: Option<f64>,
     /// Penalties; none is the usual.
     pub priors: &'a [Prior],
 }
@@ -97,8 +100,8 @@ pub struct LinearProgress<'a> {
     pub nodes: usize,
     /// Entries of the sparse matrix.
     pub entries: usize,
-    active: &'a Active,
-    x: &'a [f64],
+    pub(super) active: &'a Active,
+    pub(super) x: &'a [f64],
 }
 
 impl LinearProgress<'_> {
@@ -113,8 +116,10 @@ impl LinearProgress<'_> {
 pub struct LinearSolution<T> {
     /// Emission at the nodes, parameters of the linear grid.
     pub emission: Vec<T>,
-    /// How good it is; none if it was cancelled.
+    /// How far from the minimum it can be; none if it was cancelled, or the data are not convex in the pixels.
     pub certificate: Option<Certificate>,
+    /// How flat the function is there, if the data are not convex: all that can be said then.
+    pub stationarity: Option<Stationarity>,
     /// Why the last round ended.
     pub ending: Ending,
     /// Rounds, the coarse problem not counted.
@@ -134,36 +139,40 @@ impl<T: Scalar + Default> LinearProblem<'_, T> {
     /// Solves it. All threads take part; their number does not change a bit.
     ///
     /// # Errors
-    /// If a number is out of its range, data do not fit the rays, or none is in the frames.
+    /// If a number is out of its range, data do not fit the rays, or none is in the frames; if a χ² is not finite;
+    /// with data that are not convex, if they do not know the flux and none is given, or show no light.
     pub fn solve(
         &self,
         settings: &LinearSettings,
         watch: &mut Watch<'_>,
-    ) -> Result<LinearSolution<T>, OutOfRange> {
+    ) -> Result<LinearSolution<T>, LinearError> {
         self.check(settings)?;
-        let mut run = Run { problem: self, settings, watch, evaluations: 0, bytes: 0, round: 0 };
-        let (mut x, mut is_active) = match settings.coarse {
+        let data = self.data()?;
+        let mut run = Run::new(self, settings, watch);
+        let coarse = settings.coarse.or((!data.is_convex()).then_some(LIT));
+        let (mut x, mut is_active) = match coarse {
             Some(coarse) => match run.coarse(coarse)? {
                 Some(start) => start,
                 None => return Ok(run.cancelled(vec![0.0; self.voxels.count()], 0)),
             },
             None => (vec![0.0; self.voxels.count()], vec![true; self.voxels.count()]),
         };
-        let data = self.data()?;
+        run.reference(&data)?;
         loop {
             run.round += 1;
-            let done = run.round(&data, &mut x, &mut is_active);
+            let done = run.round(&data, &mut x, &mut is_active)?;
             if let Some(solution) = done {
                 return Ok(solution);
             }
         }
     }
 
-    /// The value that some iterations over all nodes reach from a dark field.
+    /// The value that some iterations over all nodes reach from a dark field, or from the best lit one where data are
+    /// not convex.
     ///
     /// # Errors
     /// As those of [`solve`](Self::solve).
-    pub fn least(&self, iterations: usize) -> Result<f64, OutOfRange> {
+    pub fn least(&self, iterations: usize) -> Result<f64, LinearError> {
         let settings = LinearSettings { coarse: None, tolerance: 0.0, ..LinearSettings::default() };
         self.check(&settings)?;
         let data = self.data()?;
@@ -171,39 +180,34 @@ impl<T: Scalar + Default> LinearProblem<'_, T> {
         let operator = Operator::new(self.walk(), active, self.frames, settings.memory);
         let shape = self.voxels.shape();
         let mut objective = Objective::new(&operator, &data, self.priors, shape);
-        let mut least = f64::INFINITY;
-        let mut watch = |progress: &LinearProgress<'_>| {
-            least = least.min(progress.value);
-            ControlFlow::Continue(())
-        };
-        let mut run = Run {
-            problem: self,
-            settings: &settings,
-            watch: &mut watch,
-            evaluations: 0,
-            bytes: 0,
-            round: 0,
-        };
-        run.minimise(&mut objective, &vec![0.0; self.voxels.count()], iterations);
-        // Nothing helps, where nothing was seen.
-        Ok(if least.is_finite() { least } else { objective.nothing().0 })
+        let mut watch = |_: &LinearProgress<'_>| ControlFlow::Continue(());
+        let mut run = Run::new(self, &settings, &mut watch);
+        if !data.is_convex() {
+            let lit = run.lit(&mut objective, Trials { iterations, ..FEW })?;
+            return Ok(lit.map_or(f64::INFINITY, |lit| lit.value));
+        }
+        let dark = vec![0.0; self.voxels.count()];
+        let found = run.minimise(&mut objective, &dark, iterations);
+        objective.finite(found.value, &found.x)
     }
 
-    fn data(&self) -> Result<Data<'_, T>, OutOfRange> {
+    pub(super) fn data(&self) -> Result<Data<'_, T>, OutOfRange> {
         Data::new(self.terms, self.frames, self.chain.pixels(), self.chain.frames())
     }
 
-    fn walk(&self) -> Walk<'_, T> {
+    pub(super) fn walk(&self) -> Walk<'_, T> {
         Walk::new(self.chain, self.axis, self.voxels)
     }
 
     fn check(&self, settings: &LinearSettings) -> Result<(), OutOfRange> {
+        let LinearProblem { upper, flux, .. } = *self;
         let check = |field, value: f64, ok, allowed| {
             if ok { Ok(()) } else { Err(OutOfRange { field, value, allowed }) }
         };
         self.voxels.grid()?;
         let positive = |x: f64| x.is_finite() && x > 0.0;
-        check("upper", self.upper, positive(self.upper), "above 0")?;
+        check("upper", upper, positive(upper), "above 0")?;
+        check("flux", flux.unwrap_or(1.0), flux.is_none_or(positive), "above 0")?;
         for Prior { regulariser, weight } in self.priors {
             regulariser.checked()?;
             check("prior weight", *weight, weight.is_finite() && *weight >= 0.0, "0 or above")?;
@@ -218,131 +222,5 @@ impl<T: Scalar + Default> LinearProblem<'_, T> {
             check("coarse stride", stride as f64, stride >= 1, "1 or more")?;
         }
         Ok(())
-    }
-}
-
-/// Values at the nodes, and which of them count.
-type Start = (Vec<f64>, Vec<bool>);
-
-/// A solution under way.
-struct Run<'a, 'p, 'w, T: Scalar> {
-    problem: &'a LinearProblem<'p, T>,
-    settings: &'a LinearSettings,
-    watch: &'a mut Watch<'w>,
-    evaluations: usize,
-    bytes: usize,
-    round: usize,
-}
-
-impl<T: Scalar + Default> Run<'_, '_, '_, T> {
-    fn cancelled(&self, x: Vec<f64>, nodes: usize) -> LinearSolution<T> {
-        LinearSolution {
-            emission: x.iter().map(|x| T::of(*x)).collect(),
-            certificate: None,
-            ending: Ending::Cancelled,
-            rounds: self.round,
-            nodes,
-            evaluations: self.evaluations,
-            bytes: self.bytes,
-        }
-    }
-
-    /// Minimises over the nodes that count.
-    fn minimise(
-        &mut self,
-        objective: &mut Objective<'_, '_, T>,
-        x: &[f64],
-        iterations: usize,
-    ) -> (Vec<f64>, Ending) {
-        let method = match self.settings.method {
-            Method::ConjugateGradients if !objective.is_quadratic() => Method::QuasiNewton,
-            method => method,
-        };
-        let (active, entries) = (&objective.operator.active, objective.operator.entries());
-        let (round, before) = (self.round, self.evaluations);
-        let mut iteration = 0;
-        let watch = &mut *self.watch;
-        let mut each = |value: f64, x: &[f64]| {
-            iteration += 1;
-            let (evaluations, nodes) = (before + iteration, active.count());
-            watch(&LinearProgress { round, evaluations, value, nodes, entries, active, x })
-        };
-        let each: &mut Each<'_> = &mut each;
-        let stop = Stop { iterations, tolerance: self.settings.tolerance };
-        let scaled = Scaled::new(objective, self.problem.upper);
-        Descent::new(scaled, x, each).run(method, stop)
-    }
-
-    /// The coarse problem's solution at the nodes of the grid, and where they count.
-    fn coarse(&mut self, coarse: Coarse) -> Result<Option<Start>, OutOfRange> {
-        let fine = self.problem.voxels;
-        let voxels = Voxels { nodes: fine.nodes.map(|n| n.min(coarse.nodes)), ..fine };
-        let frames: Vec<usize> =
-            self.problem.frames.iter().copied().step_by(coarse.stride).collect();
-        let problem = LinearProblem { voxels, frames: &frames, priors: &[], ..*self.problem };
-        let data = problem.data()?;
-        let active = Active::new(&vec![true; voxels.count()], voxels.corners());
-        let operator = Operator::new(problem.walk(), active, &frames, self.settings.memory);
-        self.bytes = self.bytes.max(operator.bytes());
-        let mut objective = Objective::new(&operator, &data, &[], voxels.shape());
-        let dark = vec![0.0; operator.active.count()];
-        let (x, ending) = self.minimise(&mut objective, &dark, coarse.iterations);
-        self.evaluations += objective.evaluations;
-        if ending == Ending::Cancelled {
-            return Ok(None);
-        }
-        let x = refined(&voxels, &operator.active.expand(&x), &fine)?;
-        let least = self.settings.threshold * x.iter().fold(0.0f64, |most, x| most.max(*x));
-        let bright: Vec<bool> = x.iter().map(|x| *x > least).collect();
-        let is_active = dilated(bright, fine.nodes, self.settings.dilation);
-        let x = x.iter().zip(&is_active).map(|(x, active)| if *active { *x } else { 0.0 });
-        Ok(Some((x.collect(), is_active)))
-    }
-
-    /// Minimises over the nodes that count, looks at all of them, and says which count next; the solution,
-    /// if nothing is to be added.
-    fn round(
-        &mut self,
-        data: &Data<'_, T>,
-        x: &mut Vec<f64>,
-        is_active: &mut Vec<bool>,
-    ) -> Option<LinearSolution<T>> {
-        let (problem, settings) = (self.problem, self.settings);
-        let active = Active::new(is_active, problem.voxels.corners());
-        let operator = Operator::new(problem.walk(), active, problem.frames, settings.memory);
-        self.bytes = self.bytes.max(operator.bytes());
-        let shape = problem.voxels.shape();
-        let mut objective = Objective::new(&operator, data, problem.priors, shape);
-        let (dark, dark_slope) = objective.nothing();
-        let start = operator.active.gather(x);
-        let (inner, ending) = self.minimise(&mut objective, &start, settings.iterations);
-        *x = operator.active.expand(&inner);
-        if ending == Ending::Cancelled {
-            self.evaluations += objective.evaluations;
-            return Some(self.cancelled(core::mem::take(x), operator.active.count()));
-        }
-        let (value, gradient) = objective.everywhere(&inner);
-        self.evaluations += objective.evaluations;
-        let upper = problem.upper;
-        let (gap, violation) = Certificate::bounds(x, &gradient, upper);
-        let certificate = Certificate { value, dark, gap, violation, dark_slope, upper };
-        // As long as those that count violate the conditions, others need not satisfy them any better.
-        let inside = Certificate::bounds(&inner, &operator.active.gather(&gradient), upper).1;
-        let least = -inside.max(settings.admission * dark_slope);
-        let outside = |k: &usize| !is_active[*k] && gradient[*k] < least;
-        let admitted: Vec<bool> = (0..x.len()).map(|k| outside(&k)).collect();
-        let none = !admitted.iter().any(|new| *new) && ending != Ending::Exhausted;
-        if none || self.round >= settings.rounds {
-            return Some(LinearSolution {
-                emission: x.iter().map(|x| T::of(*x)).collect(),
-                certificate: Some(certificate),
-                nodes: operator.active.count(),
-                ending,
-                ..self.cancelled(Vec::new(), 0)
-            });
-        }
-        let shining: Vec<bool> = x.iter().zip(&admitted).map(|(x, new)| *x > 0.0 || *new).collect();
-        *is_active = dilated(shining, problem.voxels.nodes, 1);
-        None
     }
 }

@@ -13,6 +13,8 @@ use kerrlight_geodesic::{Inclination, Kerr, Observer};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
+pub(in crate::fit) mod lit;
+
 pub(in crate::fit) const FRAMES: [usize; 5] = [0, 1, 2, 3, 4];
 
 pub(in crate::fit) fn chain() -> Chain<f64> {
@@ -151,6 +153,7 @@ fn exact_solution_and_gap_of_a_dense_problem() {
         terms: &[Weighted { weight: 1.0, term: &term }],
         voxels,
         upper,
+        flux: None,
         priors: &[],
     };
     let solve = |method, iterations, coarse| {
@@ -193,6 +196,7 @@ fn exact_threads_change_no_bit() {
             terms: &[Weighted { weight: 1.0, term: &term }],
             voxels,
             upper: 2.0,
+            flux: None,
             priors: &[prior],
         };
         let settings = LinearSettings { coarse: None, memory, ..LinearSettings::default() };
@@ -218,6 +222,7 @@ fn numbers_out_of_range_are_named_and_a_stop_is_heeded() {
         terms: &terms,
         voxels,
         upper: 1.0,
+        flux: None,
         priors: &[],
     };
     let fail = |problem: LinearProblem<'_, f64>| {

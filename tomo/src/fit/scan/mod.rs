@@ -9,7 +9,7 @@ mod map;
 mod refine;
 
 use super::Chain;
-use super::linear::{LinearProblem, Prior, Voxels, Weighted};
+use super::linear::{LinearError, LinearProblem, Prior, Voxels, Weighted};
 use crate::dynamics::Axis;
 use crate::simd::Scalar;
 use kerrlight_geodesic::OutOfRange;
@@ -30,6 +30,8 @@ pub struct AxisProblem<'a, T: Scalar> {
     pub half_width: f64,
     /// The largest emission that is allowed.
     pub upper: f64,
+    /// Mean flux of a frame, for data none of which knows it.
+    pub flux: Option<f64>,
     /// Penalties; none is the usual.
     pub priors: &'a [Prior],
 }
@@ -139,13 +141,13 @@ struct Scanner<'a, T: Scalar> {
 impl<T: Scalar + Default> Scanner<'_, T> {
     /// The loss of each axis; none if the scan was cancelled. Axes are shared among threads, and each
     /// has its own sums: their number does not change a bit.
-    fn losses(&self, axes: &[Axis], effort: Effort) -> Result<Option<Vec<AxisLoss>>, OutOfRange> {
+    fn losses(&self, axes: &[Axis], effort: Effort) -> Result<Option<Vec<AxisLoss>>, LinearError> {
         let all: Vec<Option<AxisLoss>> =
             axes.par_iter().map(|axis| self.loss(*axis, effort)).collect::<Result<_, _>>()?;
         Ok(all.into_iter().collect())
     }
 
-    fn loss(&self, axis: Axis, effort: Effort) -> Result<Option<AxisLoss>, OutOfRange> {
+    fn loss(&self, axis: Axis, effort: Effort) -> Result<Option<AxisLoss>, LinearError> {
         if self.cancelled.load(Ordering::Relaxed) {
             return Ok(None);
         }
@@ -153,10 +155,10 @@ impl<T: Scalar + Default> Scanner<'_, T> {
         if self.problem.chain.is_shifted() {
             own.insert(self.problem.chain.clone()).weigh(axis);
         }
-        let AxisProblem { chain, frames, terms, half_width, upper, priors } = *self.problem;
+        let AxisProblem { chain, frames, terms, half_width, upper, flux, priors } = *self.problem;
         let chain = own.as_ref().unwrap_or(chain);
         let voxels = Voxels::cube(effort.nodes, half_width);
-        let problem = LinearProblem { chain, axis, frames, terms, voxels, upper, priors };
+        let problem = LinearProblem { chain, axis, frames, terms, voxels, upper, flux, priors };
         let loss = problem.least(effort.iterations)?;
         let solved = self.solved.fetch_add(1, Ordering::Relaxed) + 1;
         if !(self.watch)(solved, self.expected.max(solved)) {
@@ -175,7 +177,7 @@ impl<T: Scalar + Default> Scanner<'_, T> {
         found: &[AxisLoss],
         map: &[AxisLoss],
         effort: Effort,
-    ) -> Result<Option<AxisLoss>, OutOfRange> {
+    ) -> Result<Option<AxisLoss>, LinearError> {
         let best = |all: &[AxisLoss]| {
             let there = all.iter().filter(|found| found.axis.dot(axis) < 0.0);
             there.min_by(|a, b| a.loss.total_cmp(&b.loss)).copied()
@@ -191,12 +193,12 @@ impl<T: Scalar + Default> Scanner<'_, T> {
 /// The axis of least loss on the whole sphere; none if the watch wanted no more.
 ///
 /// # Errors
-/// If a number is out of its range, or data do not fit the rays.
+/// If a number is out of its range, data do not fit the rays, a χ² is not finite, or all axes have the same loss.
 pub fn scan_axis<T: Scalar + Default>(
     problem: &AxisProblem<'_, T>,
     settings: &AxisSettings,
     watch: &ScanWatch<'_>,
-) -> Result<Option<AxisScan>, OutOfRange> {
+) -> Result<Option<AxisScan>, LinearError> {
     let settings = settings.checked()?;
     let scanner = Scanner {
         problem,
@@ -208,6 +210,7 @@ pub fn scan_axis<T: Scalar + Default>(
     let Some(map) = scanner.losses(&lattice(settings.directions), settings.coarse)? else {
         return Ok(None);
     };
+    told_apart(&map)?;
     let candidates = candidates(&map, settings.candidates, settings.distance());
     let refinement =
         Refinement { scanner: &scanner, effort: settings.fine, halvings: settings.halvings };
@@ -227,6 +230,19 @@ pub fn scan_axis<T: Scalar + Default>(
     Ok(Some(AxisScan { refinements: solved - map.len(), map, best, runner_up }))
 }
 
+/// Losses that differ by less than this part of them are the same in single precision.
+const SAME: f64 = 1e-6;
+
+/// Refuses a map whose losses are all the same.
+fn told_apart(map: &[AxisLoss]) -> Result<(), LinearError> {
+    let least = map.iter().fold(f64::INFINITY, |least, at| least.min(at.loss));
+    let most = map.iter().fold(f64::NEG_INFINITY, |most, at| most.max(at.loss));
+    if most - least > SAME * most.abs() {
+        return Ok(());
+    }
+    Err(LinearError::Alike { axes: map.len(), loss: least })
+}
+
 /// The axis of least loss near one that is nearly right, by steps that are halved `halvings` times; none if the
 /// watch wanted no more. A finer grid and more pixels than those of the scan tell axes apart that it could not.
 ///
@@ -238,7 +254,7 @@ pub fn refine_axis<T: Scalar + Default>(
     step: f64,
     (effort, halvings): (Effort, usize),
     watch: &ScanWatch<'_>,
-) -> Result<Option<AxisLoss>, OutOfRange> {
+) -> Result<Option<AxisLoss>, LinearError> {
     let settings = AxisSettings { fine: effort, halvings, ..AxisSettings::default() }.checked()?;
     let scanner = Scanner {
         problem,
@@ -273,8 +289,8 @@ fn candidates(map: &[AxisLoss], count: usize, distance: f64) -> Vec<Axis> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::ImageTerm;
     use super::super::linear::tests::{FRAMES, chain, movie_about};
+    use super::super::{FrameTerm, ImageTerm};
     use super::*;
 
     /// No direction is farther from the lattice than its points are from each other: √(4π/500); the best
@@ -289,6 +305,53 @@ mod tests {
         let mean: Vec<f64> =
             (0..3).map(|c| points.iter().map(|p| p.vector()[c]).sum::<f64>() / 500.0).collect();
         assert!(mean.iter().all(|m| m.abs() < 2e-3), "{mean:?}");
+    }
+
+    fn scan_of(
+        terms: &[Weighted<'_, f64>],
+        settings: &AxisSettings,
+    ) -> Result<Option<AxisScan>, LinearError> {
+        let problem = AxisProblem {
+            chain: &chain(),
+            frames: &FRAMES,
+            terms,
+            half_width: 5.0,
+            upper: 2.0,
+            flux: None,
+            priors: &[],
+        };
+        scan_axis(&problem, settings, &|_, _| true)
+    }
+
+    const SMALL: AxisSettings = AxisSettings {
+        directions: 40,
+        coarse: Effort { nodes: 7, iterations: 10 },
+        candidates: 2,
+        fine: Effort { nodes: 8, iterations: 15 },
+        halvings: 1,
+    };
+
+    /// Dark images are explained about every axis.
+    #[test]
+    fn exact_losses_that_are_all_the_same_are_refused() {
+        let term = ImageTerm::new(vec![0.0; 5 * 81], 81, 1.0).unwrap();
+        let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
+        let error = scan_of(&terms, &SMALL).unwrap_err();
+        assert_eq!(error, LinearError::Alike { axes: 40, loss: 0.0 });
+    }
+
+    /// Amplitudes and closure phases, from lit fields about every axis.
+    #[test]
+    fn exact_axis_of_amplitudes_and_closure_phases() {
+        use super::super::linear::tests::lit::{Seen, array, spot};
+        let (chain, voxels) = (chain(), Voxels::cube(9, 5.0));
+        let truth = Axis::new([0.6, -0.3, -0.7]).unwrap();
+        let movie = movie_about(truth, &chain, &voxels, &spot(&voxels));
+        let data = [Seen::Amplitudes, Seen::Phases].map(|seen| array(&movie, seen));
+        let terms = [0, 1].map(|k| Weighted { weight: 1.0, term: &data[k] as &dyn FrameTerm<f64> });
+        let scan = scan_of(&terms, &SMALL).unwrap().unwrap();
+        assert!(scan.map.iter().all(|at| at.loss.is_finite() && at.loss > 0.0));
+        assert!(scan.best.axis.dot(truth) > 0.9, "{:?}", scan.best);
     }
 
     /// A spot that turns about a known axis, in the field that the fine grid can represent.
@@ -309,6 +372,7 @@ mod tests {
             terms: &[Weighted { weight: 1.0, term: &term }],
             half_width: 5.0,
             upper: 2.0,
+            flux: None,
             priors: &[],
         };
         let settings = AxisSettings {

@@ -2,8 +2,8 @@
 
 use super::{AxisLoss, Effort, Scanner};
 use crate::dynamics::Axis;
+use crate::fit::linear::LinearError;
 use crate::simd::Scalar;
-use kerrlight_geodesic::OutOfRange;
 
 /// A pattern search: six directions about the best one so far, half as far away when none is better; at the end
 /// the lowest point of the paraboloid through the last seven.
@@ -18,7 +18,7 @@ const MOVES: usize = 6;
 
 impl<T: Scalar + Default> Refinement<'_, '_, T> {
     /// None if the scan was cancelled.
-    pub fn run(&self, from: Axis, step: f64) -> Result<Option<AxisLoss>, OutOfRange> {
+    pub fn run(&self, from: Axis, step: f64) -> Result<Option<AxisLoss>, LinearError> {
         let Some(losses) = self.scanner.losses(&[from], self.effort)? else { return Ok(None) };
         let mut best = losses[0];
         let mut step = step;

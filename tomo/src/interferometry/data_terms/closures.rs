@@ -1,6 +1,6 @@
 //! Closure phases and log closure amplitudes, with the covariance of those that share baselines.
 
-use super::{DataTerm, DataTermError};
+use super::{DataTerm, DataTermError, faintest};
 use crate::interferometry::observation::Observation;
 use crate::interferometry::operator::Real;
 use crate::interferometry::products::{ClosureKind, ClosureSet};
@@ -37,6 +37,10 @@ impl<T: Real> ClosureTerm<T> {
         kind: ClosureKind,
         least_snr: f64,
     ) -> Result<Self, DataTermError> {
+        let bad = observation.stokes_i().position(|(_, i)| !i.visibility.is_finite());
+        if let Some(index) = bad {
+            return Err(DataTermError::NotFinite(index));
+        }
         let sets = ClosureSet::of(observation, kind, least_snr);
         if sets.is_empty() {
             return Err(DataTermError::Empty);
@@ -54,15 +58,20 @@ impl<T: Real> Scan<T> {
         let legs = |c: &crate::interferometry::products::Closure| {
             c.legs.iter().map(|leg| (leg.visibility, T::of(leg.sign.into()))).collect()
         };
+        let precision: Vec<T> = inverse.iter().map(|x| T::of(*x)).collect();
+        if precision.iter().any(|x| !x.is_finite()) {
+            return Err(DataTermError::Singular(set.time_h));
+        }
         Ok(Scan {
             legs: set.closures.iter().map(legs).collect(),
             data: set.closures.iter().map(|c| T::of(c.value)).collect(),
             // Symmetric: columns are rows.
-            precision: inverse.iter().map(|x| T::of(*x)).collect(),
+            precision,
         })
     }
 
-    /// Residuals of the quantities.
+    /// Residuals of the quantities. Where the model has no visibility, its phase and logarithm are not defined: the
+    /// residual is then as large as one can be (phases), or that of an amplitude that is wrong by a factor of e¹⁰⁰.
     fn residuals(&self, kind: ClosureKind, model: &[Complex<T>]) -> Vec<T> {
         let of = |visibility: usize| match kind {
             ClosureKind::Phase => model[visibility].arg(),
@@ -72,6 +81,12 @@ impl<T: Real> Scan<T> {
             .iter()
             .zip(&self.data)
             .map(|(legs, datum)| {
+                if legs.iter().any(|(v, _)| is_dark(model[*v])) {
+                    return match kind {
+                        ClosureKind::Phase => T::of(PI),
+                        ClosureKind::LogAmplitude => T::of(DARK),
+                    };
+                }
                 let sum: T = legs.iter().map(|(v, sign)| *sign * of(*v)).sum();
                 match kind {
                     ClosureKind::Phase => wrapped(sum - *datum),
@@ -80,6 +95,13 @@ impl<T: Real> Scan<T> {
             })
             .collect()
     }
+}
+
+/// The residual of a log closure amplitude of a model without visibility.
+const DARK: f64 = 100.0;
+
+fn is_dark<T: Real>(visibility: Complex<T>) -> bool {
+    visibility.norm() <= faintest()
 }
 
 /// The same angle in [−π, π].
@@ -97,8 +119,12 @@ impl<T: Real> DataTerm<T> for ClosureTerm<T> {
         self.scans.iter().map(|scan| scan.data.len()).sum()
     }
 
-    /// Where a visibility of the model is 0 its phase and logarithm mean nothing: the value is
-    /// then infinite or arbitrary, the gradient leaves that visibility out.
+    fn is_scale_free(&self) -> bool {
+        true
+    }
+
+    /// Where a visibility of the model is 0 its phase and logarithm mean nothing: the residual is then π, or 100 for a
+    /// logarithm, so that a dark model is worse than one that shines, and the gradient leaves that quantity out.
     fn value_and_gradient(
         &self,
         model: &[Complex<T>],
@@ -112,18 +138,20 @@ impl<T: Real> DataTerm<T> for ClosureTerm<T> {
             let rows = scan.precision.chunks_exact(residuals.len());
             for ((row, residual), legs) in rows.zip(&residuals).zip(&scan.legs) {
                 let pull: T = row.iter().zip(&residuals).map(|(p, r)| *p * *r).sum();
-                total += (*residual * pull).double();
+                total += residual.double() * pull.double();
+                if legs.iter().any(|(v, _)| is_dark(model[*v])) {
+                    continue;
+                }
                 for (v, sign) in legs {
-                    let squared = model[*v].norm_sqr();
-                    if squared > T::zero() {
-                        // d arg V = Re(conj(iV) dV)/|V|², d ln|V| = Re(conj(V) dV)/|V|².
-                        let direction = match self.kind {
-                            ClosureKind::Phase => Complex::new(-model[*v].im, model[*v].re),
-                            ClosureKind::LogAmplitude => model[*v],
-                        };
-                        let factor = (weight + weight) * pull * *sign / squared;
-                        gradient[*v] += direction.scale(factor);
-                    }
+                    // d arg V = Re(conj(iV) dV)/|V|², d ln|V| = Re(conj(V) dV)/|V|².
+                    let direction = match self.kind {
+                        ClosureKind::Phase => Complex::new(-model[*v].im, model[*v].re),
+                        ClosureKind::LogAmplitude => model[*v],
+                    };
+                    // In two divisions, as the square of a faint visibility would leave single precision.
+                    let norm = model[*v].norm();
+                    let factor = (weight + weight) * pull * *sign / norm;
+                    gradient[*v] += direction.unscale(norm).scale(factor);
                 }
             }
         }

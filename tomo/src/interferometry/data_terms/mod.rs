@@ -22,6 +22,19 @@ pub enum DataTermError {
         /// Its error.
         sigma: f64,
     },
+    /// An error whose inverse square the precision of the fit cannot hold.
+    #[error(
+        "datum {index}: sigma = {sigma} Jy is not allowed: its inverse square overflows the fit's numbers"
+    )]
+    Overflow {
+        /// Which datum, counted from 0.
+        index: usize,
+        /// Its error.
+        sigma: f64,
+    },
+    /// A visibility that is not a finite number.
+    #[error("datum {0} is not a finite visibility")]
+    NotFinite(usize),
     /// Nothing to compare with.
     #[error("there are no data for this term")]
     Empty,
@@ -37,6 +50,12 @@ pub trait DataTerm<T: Real>: Sync {
 
     /// How many real data it compares with: χ² of the true model has this mean.
     fn degrees_of_freedom(&self) -> usize;
+
+    /// Whether χ² stays the same when all visibilities are multiplied by one positive number: such data do not
+    /// know the flux.
+    fn is_scale_free(&self) -> bool {
+        false
+    }
 
     /// χ², and adds `weight` times its gradient g to `gradient`, where dχ² = Re Σ ḡ dV: what
     /// [`Operator::adjoint`](super::operator::Operator::adjoint) takes.
@@ -55,8 +74,26 @@ fn checked(observation: &Observation) -> Result<Vec<Measured>, DataTermError> {
     match bad {
         Some(index) => Err(DataTermError::Sigma { index, sigma: data[index].noise_sigma }),
         None if data.is_empty() => Err(DataTermError::Empty),
-        None => Ok(data),
+        None => match data.iter().position(|m| !m.visibility.is_finite()) {
+            Some(index) => Err(DataTermError::NotFinite(index)),
+            None => Ok(data),
+        },
     }
+}
+
+/// 1/σ² of data in the fit's precision.
+fn inverse_variances<T: Real>(data: &[Measured]) -> Result<Vec<T>, DataTermError> {
+    let one = |(index, m): (usize, &Measured)| {
+        let inverse = T::of(m.noise_sigma.powi(-2));
+        let overflow = DataTermError::Overflow { index, sigma: m.noise_sigma };
+        inverse.is_finite().then_some(inverse).ok_or(overflow)
+    };
+    data.iter().enumerate().map(one).collect()
+}
+
+/// Amplitudes at or below this count as 0: their squares underflow, and phase and logarithm mean nothing.
+fn faintest<T: Real>() -> T {
+    T::min_positive_value().sqrt()
 }
 
 #[cfg(test)]

@@ -146,3 +146,50 @@ fn exact_data_without_errors_are_refused() {
     assert_eq!(AmplitudeTerm::<f32>::new(&data).unwrap_err(), DataTermError::Empty);
     assert!(ClosureTerm::<f32>::new(&data, ClosureKind::Phase, 0.0).is_err());
 }
+
+/// Models without visibility, of a hardly visible one, and data below their noise: finite values and slopes in both precisions, and no
+/// closure quantity is explained by what is dark.
+fn hard<T: Real>(data: &Observation) {
+    for (name, term) in terms::<T>(data) {
+        let count = term.visibilities();
+        let mut values = Vec::new();
+        for size in [1.0, 1e-6, 1e-15, 2e-19, 1e-30, 1e-40, 0.0] {
+            let model: Vec<Complex<T>> = of_precision(
+                &(0..count).map(|k| Complex64::from_polar(size, k as f64)).collect::<Vec<_>>(),
+            );
+            let mut gradient = vec![Complex::new(T::zero(), T::zero()); count];
+            let value = term.value_and_gradient(&model, T::of(1.0), &mut gradient);
+            assert!(value.is_finite() && value >= 0.0, "{name} of {size:e}: {value}");
+            let finite = gradient.iter().all(|g| g.re.is_finite() && g.im.is_finite());
+            assert!(finite, "{name} of {size:e}: {gradient:?}");
+            values.push(value);
+        }
+        assert!(!term.is_scale_free() || values[6] > values[0], "{name}: {values:?}");
+    }
+}
+
+#[test]
+fn exact_dark_models_and_faint_data_have_finite_chi_squared() {
+    let mut data = observation(2, 20.0);
+    // Below the noise, where debiased amplitudes are 0, and nothing at all.
+    data.rows[2].noise_sigma[0] = 2.0 * data.rows[2].products[0].norm();
+    data.rows[5].products[0] = Complex64::new(0.0, 0.0);
+    hard::<f64>(&data);
+    hard::<f32>(&data);
+}
+
+#[test]
+fn exact_data_that_overflow_or_are_no_numbers_are_refused() {
+    let mut data = observation(1, 20.0);
+    data.rows[3].noise_sigma[0] = 1e-25;
+    assert!(VisibilityTerm::<f64>::new(&data).is_ok());
+    let message = VisibilityTerm::<f32>::new(&data).unwrap_err().to_string();
+    assert!(message.contains("datum 3: sigma = 0.0000000000000000000000001 Jy"), "{message}");
+    assert!(AmplitudeTerm::<f32>::new(&data).is_err());
+    data.rows[3].products[0].re = f64::NAN;
+    let not_finite = DataTermError::NotFinite(3);
+    assert_eq!(VisibilityTerm::<f64>::new(&data).unwrap_err(), not_finite);
+    for kind in [ClosureKind::Phase, ClosureKind::LogAmplitude] {
+        assert_eq!(ClosureTerm::<f64>::new(&data, kind, 0.0).unwrap_err(), not_finite);
+    }
+}

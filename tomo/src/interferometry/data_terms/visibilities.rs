@@ -1,6 +1,6 @@
 //! Complex visibilities, and amplitudes.
 
-use super::{DataTerm, DataTermError, checked};
+use super::{DataTerm, DataTermError, checked, inverse_variances};
 use crate::interferometry::observation::Observation;
 use crate::interferometry::operator::Real;
 use crate::interferometry::products::debiased_amplitude;
@@ -22,7 +22,7 @@ impl<T: Real> VisibilityTerm<T> {
         let data = checked(observation)?;
         let value = |v: Complex<f64>| Complex::new(T::of(v.re), T::of(v.im));
         Ok(VisibilityTerm {
-            inverse_variance: data.iter().map(|m| T::of(m.noise_sigma.powi(-2))).collect(),
+            inverse_variance: inverse_variances(&data)?,
             data: data.iter().map(|m| value(m.visibility)).collect(),
         })
     }
@@ -70,7 +70,7 @@ impl<T: Real> AmplitudeTerm<T> {
     pub fn new(observation: &Observation) -> Result<Self, DataTermError> {
         let data = checked(observation)?;
         Ok(AmplitudeTerm {
-            inverse_variance: data.iter().map(|m| T::of(m.noise_sigma.powi(-2))).collect(),
+            inverse_variance: inverse_variances(&data)?,
             data: data.iter().map(|m| T::of(debiased_amplitude(m))).collect(),
         })
     }

@@ -1,0 +1,47 @@
+//! Why a linear problem has no solution.
+
+use kerrlight_geodesic::OutOfRange;
+
+/// What a linear problem or a scan of axes ends in instead of a result.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LinearError {
+    /// A number of the settings.
+    #[error(transparent)]
+    Range(#[from] OutOfRange),
+    /// A χ² that is no finite number.
+    #[error("{data} of frame {frame}: χ² is {value}, which is not a finite number")]
+    NotFinite {
+        /// Which data.
+        data: String,
+        /// Of which frame of the movie, counted from 0.
+        frame: usize,
+        /// Their χ².
+        value: f64,
+    },
+    /// Data that know no flux, and none is given.
+    #[error("{0} do not know the flux, and none is given")]
+    NoFlux(String),
+    /// A flux that emission within the bounds cannot have.
+    #[error(
+        "a mean flux of {flux} Jy needs an emission of {needed:.4}, above the largest allowed, {upper}"
+    )]
+    TooBright {
+        /// What was given, Jy.
+        flux: f64,
+        /// Largest emission.
+        needed: f64,
+        /// Largest one that is allowed.
+        upper: f64,
+    },
+    /// Data that no lit field explains better than a dark one.
+    #[error("no field that shines explains {0} better than a dark one: the data show no light")]
+    NoLight(String),
+    /// Axes that data cannot tell apart.
+    #[error("the losses of all {axes} axes are {loss:.6e}: the data do not tell them apart")]
+    Alike {
+        /// How many.
+        axes: usize,
+        /// Their loss.
+        loss: f64,
+    },
+}

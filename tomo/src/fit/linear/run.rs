@@ -1,0 +1,233 @@
+//! A solution under way: the coarse problem, then rounds over the nodes that count.
+
+use super::certificate::{Certificate, Stationarity};
+use super::data::Data;
+use super::descent::{Descended, Descent, Each, Ending, Method, Stop};
+use super::error::LinearError;
+use super::lit::Spots;
+use super::nodes::{dilated, refined};
+use super::objective::Objective;
+use super::operator::{Active, Operator};
+use super::scaled::Scaled;
+use super::solve::{Coarse, LinearProblem, LinearProgress, LinearSettings, LinearSolution, Watch};
+use super::start::{Lit, Trials};
+use super::walk::Voxels;
+use crate::simd::Scalar;
+
+/// Values at the nodes, and which of them count.
+type Start = (Vec<f64>, Vec<bool>);
+
+/// Where lit fields are looked at if no coarse problem is asked for.
+pub(super) const LIT: Coarse = Coarse { nodes: 32, stride: 1, iterations: 20 };
+/// Lit fields of a problem, and of one of the many problems of a scan.
+const MANY: Trials = Trials { spots: Spots { circles: 12, on_each: 16 }, best: 4, iterations: 0 };
+pub(super) const FEW: Trials =
+    Trials { spots: Spots { circles: 8, on_each: 12 }, best: 2, iterations: 0 };
+/// Iterations of the coarse problem from a lit field, for one from a dark field.
+const PATIENCE: usize = 3;
+
+/// A solution under way.
+pub(super) struct Run<'a, 'p, 'w, T: Scalar> {
+    pub problem: &'a LinearProblem<'p, T>,
+    settings: &'a LinearSettings,
+    watch: &'a mut Watch<'w>,
+    evaluations: usize,
+    bytes: usize,
+    pub round: usize,
+    /// The lit field that a problem began with, at all nodes; empty if it is convex.
+    lit: Vec<f64>,
+    /// Value and largest slope there.
+    at_lit: [f64; 2],
+}
+
+impl<'a, 'p, 'w, T: Scalar + Default> Run<'a, 'p, 'w, T> {
+    pub fn new(
+        problem: &'a LinearProblem<'p, T>,
+        settings: &'a LinearSettings,
+        watch: &'a mut Watch<'w>,
+    ) -> Self {
+        let (lit, at_lit) = (Vec::new(), [0.0; 2]);
+        Self { problem, settings, watch, evaluations: 0, bytes: 0, round: 0, lit, at_lit }
+    }
+
+    pub fn cancelled(&self, x: Vec<f64>, nodes: usize) -> LinearSolution<T> {
+        LinearSolution {
+            emission: x.iter().map(|x| T::of(*x)).collect(),
+            certificate: None,
+            stationarity: None,
+            ending: Ending::Cancelled,
+            rounds: self.round,
+            nodes,
+            evaluations: self.evaluations,
+            bytes: self.bytes,
+        }
+    }
+
+    /// Minimises over the nodes that count.
+    pub fn minimise(
+        &mut self,
+        objective: &mut Objective<'_, '_, T>,
+        x: &[f64],
+        iterations: usize,
+    ) -> Descended {
+        let method = match self.settings.method {
+            Method::ConjugateGradients if !objective.is_quadratic() => Method::QuasiNewton,
+            method => method,
+        };
+        let (active, entries) = (&objective.operator.active, objective.operator.entries());
+        let (round, before) = (self.round, self.evaluations);
+        let mut iteration = 0;
+        let watch = &mut *self.watch;
+        let mut each = |value: f64, x: &[f64]| {
+            iteration += 1;
+            let (evaluations, nodes) = (before + iteration, active.count());
+            watch(&LinearProgress { round, evaluations, value, nodes, entries, active, x })
+        };
+        let each: &mut Each<'_> = &mut each;
+        let stop = Stop { iterations, tolerance: self.settings.tolerance };
+        let scaled = Scaled::new(objective, self.problem.upper);
+        Descent::new(scaled, x, each).run(method, stop)
+    }
+
+    /// The coarse problem's solution at the nodes of the grid, and where they count.
+    pub fn coarse(&mut self, coarse: Coarse) -> Result<Option<Start>, LinearError> {
+        let fine = self.problem.voxels;
+        let voxels = Voxels { nodes: fine.nodes.map(|n| n.min(coarse.nodes)), ..fine };
+        let convex = self.problem.data()?.is_convex();
+        // Without phases more frames are needed to tell solutions apart.
+        let stride = if convex { coarse.stride } else { coarse.stride.div_ceil(2) };
+        let frames: Vec<usize> = self.problem.frames.iter().copied().step_by(stride).collect();
+        let problem = LinearProblem { voxels, frames: &frames, priors: &[], ..*self.problem };
+        let data = problem.data()?;
+        let active = Active::new(&vec![true; voxels.count()], voxels.corners());
+        let operator = Operator::new(problem.walk(), active, &frames, self.settings.memory);
+        self.bytes = self.bytes.max(operator.bytes());
+        let mut objective = Objective::new(&operator, &data, &[], voxels.shape());
+        let found = self.coarse_field(&mut objective, coarse.iterations)?;
+        self.evaluations += objective.evaluations;
+        let Some((x, lit)) = found else { return Ok(None) };
+        let refined = |x: &[f64]| refined(&voxels, &operator.active.expand(x), &fine);
+        self.lit = lit.map_or(Ok(Vec::new()), |lit| refined(&lit))?;
+        let x = refined(&x)?;
+        let least = self.settings.threshold * x.iter().fold(0.0f64, |most, x| most.max(*x));
+        let bright: Vec<bool> = x.iter().map(|x| *x > least).collect();
+        let is_active = dilated(bright, fine.nodes, self.settings.dilation);
+        let x = x.iter().zip(&is_active).map(|(x, active)| if *active { *x } else { 0.0 });
+        Ok(Some((x.collect(), is_active)))
+    }
+
+    /// From a dark field, or from lit ones where data are not convex: what was found, and where that began.
+    fn coarse_field(
+        &mut self,
+        objective: &mut Objective<'_, '_, T>,
+        iterations: usize,
+    ) -> Result<Option<(Vec<f64>, Option<Vec<f64>>)>, LinearError> {
+        if !objective.data.is_convex() {
+            let lit = self.lit(objective, Trials { iterations: PATIENCE * iterations, ..MANY })?;
+            return Ok(lit.map(|Lit { start, x, .. }| (x, Some(start))));
+        }
+        let dark = vec![0.0; objective.operator.active.count()];
+        let found = self.minimise(objective, &dark, iterations);
+        Ok((found.ending != Ending::Cancelled).then_some((found.x, None)))
+    }
+
+    /// Value and slope at the lit field, where there is one.
+    pub fn reference(&mut self, data: &Data<'_, T>) -> Result<(), LinearError> {
+        if data.is_convex() {
+            return Ok(());
+        }
+        let problem = self.problem;
+        let active = Active::new(&vec![true; problem.voxels.count()], problem.voxels.corners());
+        let operator = Operator::new(problem.walk(), active, problem.frames, 0);
+        let mut objective = Objective::new(&operator, data, problem.priors, problem.voxels.shape());
+        let (value, gradient) = objective.everywhere(&self.lit);
+        self.evaluations += 1;
+        let slope = gradient.iter().fold(0.0f64, |most, g| most.max(g.abs()));
+        self.at_lit = [objective.finite(value, &self.lit)?, slope];
+        Ok(())
+    }
+
+    /// Minimises over the nodes that count, looks at all of them, and says which count next; the solution,
+    /// if nothing is to be added.
+    pub fn round(
+        &mut self,
+        data: &Data<'_, T>,
+        x: &mut Vec<f64>,
+        is_active: &mut Vec<bool>,
+    ) -> Result<Option<LinearSolution<T>>, LinearError> {
+        let (problem, settings) = (self.problem, self.settings);
+        let active = Active::new(is_active, problem.voxels.corners());
+        let operator = Operator::new(problem.walk(), active, problem.frames, settings.memory);
+        self.bytes = self.bytes.max(operator.bytes());
+        let shape = problem.voxels.shape();
+        let mut objective = Objective::new(&operator, data, problem.priors, shape);
+        let (dark, dark_slope) = objective.nothing();
+        let start = operator.active.gather(x);
+        let Descended { x: mut inner, ending, .. } =
+            self.minimise(&mut objective, &start, settings.iterations);
+        if ending == Ending::Cancelled {
+            self.evaluations += objective.evaluations;
+            *x = operator.active.expand(&inner);
+            return Ok(Some(self.cancelled(core::mem::take(x), operator.active.count())));
+        }
+        self.rescale(&objective, &mut inner)?;
+        *x = operator.active.expand(&inner);
+        let (value, gradient) = objective.everywhere(&inner);
+        self.evaluations += objective.evaluations;
+        let (upper, value) = (problem.upper, objective.finite(value, &inner)?);
+        let (gap, violation) = Certificate::bounds(x, &gradient, upper);
+        let convex = data.is_convex();
+        let slope = if convex { dark_slope } else { self.at_lit[1] };
+        // As long as those that count violate the conditions, others need not satisfy them any better.
+        let inside = Certificate::bounds(&inner, &operator.active.gather(&gradient), upper).1;
+        let least = -inside.max(settings.admission * slope);
+        let outside = |k: &usize| !is_active[*k] && gradient[*k] < least;
+        let admitted: Vec<bool> = (0..x.len()).map(|k| outside(&k)).collect();
+        let none = !admitted.iter().any(|new| *new) && ending != Ending::Exhausted;
+        if none || self.round >= settings.rounds {
+            let certificate = Certificate { value, dark, gap, violation, dark_slope, upper };
+            return Ok(Some(self.solution(
+                x,
+                (convex, certificate),
+                ending,
+                operator.active.count(),
+            )));
+        }
+        let shining: Vec<bool> = x.iter().zip(&admitted).map(|(x, new)| *x > 0.0 || *new).collect();
+        *is_active = dilated(shining, problem.voxels.nodes, 1);
+        Ok(None)
+    }
+
+    /// A field with what can be said of it.
+    fn solution(
+        &self,
+        x: &[f64],
+        (convex, certificate): (bool, Certificate),
+        ending: Ending,
+        nodes: usize,
+    ) -> LinearSolution<T> {
+        let Certificate { value, violation, upper, .. } = certificate;
+        let [start, start_slope] = self.at_lit;
+        let flatness = Stationarity { value, start, violation, start_slope, upper };
+        LinearSolution {
+            certificate: convex.then_some(certificate),
+            stationarity: (!convex).then_some(flatness),
+            ending,
+            ..self.cancelled(x.to_vec(), nodes)
+        }
+    }
+
+    /// Brings a field whose data do not know the flux back to the one that was given: nothing else changes.
+    fn rescale(&self, objective: &Objective<'_, '_, T>, x: &mut [f64]) -> Result<(), LinearError> {
+        let Some(flux) = self.problem.flux.filter(|_| objective.data.is_scale_free()) else {
+            return Ok(());
+        };
+        let scale = flux / objective.flux(x);
+        x.iter_mut().for_each(|x| *x *= scale);
+        let (needed, upper) = (x.iter().fold(0.0f64, |most, x| most.max(*x)), self.problem.upper);
+        if needed > upper {
+            return Err(LinearError::TooBright { flux, needed, upper });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,132 @@
+//! Where a problem that is not convex begins: at lit fields, scaled to the data; the best after some iterations.
+
+use super::Ending;
+use super::error::LinearError;
+use super::lit::{Around, Spots};
+use super::objective::{Convex, Objective};
+use super::run::Run;
+use super::scaled::dot;
+use crate::simd::Scalar;
+
+/// A lit field and where the descent from it ended.
+pub(super) struct Lit {
+    /// The field that it began with, at the nodes that count.
+    pub start: Vec<f64>,
+    /// Where it ended.
+    pub x: Vec<f64>,
+    /// The value there.
+    pub value: f64,
+}
+
+/// How lit fields are tried.
+#[derive(Clone, Copy)]
+pub(super) struct Trials {
+    /// Spots that are looked at.
+    pub spots: Spots,
+    /// The best of them, from which descents begin, beside the wide fields.
+    pub best: usize,
+    /// Iterations of a descent.
+    pub iterations: usize,
+}
+
+/// Newton steps to the best scale: one is enough where χ² is quadratic in it, as that of amplitudes is.
+const SCALINGS: usize = 3;
+
+impl<T: Scalar + Default> Run<'_, '_, '_, T> {
+    /// The least of the descents from lit fields; none if the watch wanted no more.
+    pub fn lit(
+        &mut self,
+        objective: &mut Objective<'_, '_, T>,
+        trials: Trials,
+    ) -> Result<Option<Lit>, LinearError> {
+        let starts = self.starts(objective, trials)?;
+        let mut best: Option<Lit> = None;
+        for (_, start) in starts {
+            let end = self.minimise(objective, &start, trials.iterations);
+            if end.ending == Ending::Cancelled {
+                return Ok(None);
+            }
+            if best.as_ref().is_none_or(|best| end.value < best.value) {
+                best = Some(Lit { start, x: end.x, value: end.value });
+            }
+        }
+        best.map(Some).ok_or_else(|| LinearError::NoLight(objective.data.names()))
+    }
+
+    /// The best spots and the wide fields, each with its value; none that a dark field is better than.
+    fn starts(
+        &mut self,
+        objective: &mut Objective<'_, '_, T>,
+        trials: Trials,
+    ) -> Result<Vec<(f64, Vec<f64>)>, LinearError> {
+        let around = Around::new(&objective.operator.voxels(), self.problem.axis);
+        let seen = objective.operator.seen();
+        let dark = match objective.data.is_scale_free() {
+            true => f64::INFINITY,
+            false => objective.nothing().0,
+        };
+        let mut scaled = |shape: Vec<f64>| {
+            let mut shape = objective.operator.active.gather(&shape);
+            shape.iter_mut().zip(&seen).for_each(|(x, seen)| *x *= f64::from(u8::from(*seen)));
+            self.scaled(objective, &shape)
+        };
+        let wide = around.wide().into_iter().map(&mut scaled).collect::<Result<Vec<_>, _>>()?;
+        let spots = (0..trials.spots.count()).map(|k| scaled(around.spot(trials.spots, k)));
+        let spots = spots.collect::<Result<Vec<_>, _>>()?;
+        let lit = |start: &(f64, Vec<f64>)| start.0 < dark || dark.is_nan();
+        let mut spots: Vec<_> = spots.into_iter().flatten().filter(lit).collect();
+        spots.sort_by(|a, b| a.0.total_cmp(&b.0));
+        spots.truncate(trials.best);
+        spots.extend(wide.into_iter().flatten().filter(lit));
+        Ok(spots)
+    }
+
+    /// A field of this shape, as bright as explains the data best, or as the given flux says where data do not know
+    /// it, with its value; none if no ray sees it.
+    fn scaled(
+        &self,
+        objective: &mut Objective<'_, '_, T>,
+        shape: &[f64],
+    ) -> Result<Option<(f64, Vec<f64>)>, LinearError> {
+        let largest = shape.iter().fold(0.0f64, |most, x| most.max(*x));
+        let flux = if largest > 0.0 { objective.flux(shape) } else { 0.0 };
+        if flux <= 0.0 {
+            return Ok(None);
+        }
+        let times = |scale: f64| shape.iter().map(|x| scale * x).collect::<Vec<f64>>();
+        let top = self.problem.upper / largest;
+        let scale = if objective.data.is_scale_free() {
+            let missing = || LinearError::NoFlux(objective.data.names());
+            (self.problem.flux.ok_or_else(missing)? / flux).min(top)
+        } else {
+            let mut gradient = Vec::new();
+            newton(top, |scale| {
+                objective.value_and_gradient(&times(scale), &mut gradient);
+                dot(&gradient, shape)
+            })
+        };
+        let start = times(scale);
+        let value = objective.value_and_gradient(&start, &mut Vec::new());
+        Ok(Some((objective.finite(value, &start)?, start)))
+    }
+}
+
+/// Where a slope with respect to a scale of 0 to `top` vanishes, by secants.
+fn newton(top: f64, mut slope: impl FnMut(f64) -> f64) -> f64 {
+    let (mut before, mut scale) = (0.5 * top, top);
+    let (mut steep, mut flat) = (slope(before), slope(scale));
+    for _ in 0..SCALINGS {
+        let next = scale - flat * (scale - before) / (flat - steep);
+        if !next.is_finite() || next == scale {
+            break;
+        }
+        (before, steep) = (scale, flat);
+        // Never dark: there amplitudes have no slope.
+        scale = next.clamp(1e-9 * top, top);
+        flat = slope(scale);
+        if scale == before {
+            break;
+        }
+    }
+    scale
+}
