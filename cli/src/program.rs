@@ -1,7 +1,6 @@
 //! The program with what others add to it.
 
-/// Does what the command line says; 0 is success, 2 an error, 1 a fit that failed while it ran or a comparison of which
-/// a part did, 128 and the number of the signal what a signal has stopped: 130 after Ctrl-C, 143 after SIGTERM.
+use super::{Arguments, compare, fit, interrupt, run};
 use anyhow::{anyhow, bail};
 use clap::Parser;
 use kerrlight_tomo::representation::Representation;
