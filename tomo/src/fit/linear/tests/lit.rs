@@ -80,7 +80,9 @@ fn solve(
         flux,
         priors: &[],
     };
-    let settings = LinearSettings { iterations: 60, rounds: 3, ..LinearSettings::default() };
+    // All frames of these few are looked at from the first.
+    let settings =
+        LinearSettings { coarse: None, iterations: 60, rounds: 3, ..LinearSettings::default() };
     problem.solve(&settings, &mut |_| ControlFlow::Continue(()))
 }
 
