@@ -1,6 +1,6 @@
 //! Complex visibilities, and amplitudes.
 
-use super::{DataTerm, DataTermError, checked, inverse_variances};
+use super::{DataTerm, DataTermError, checked, faintest, inverse_variances};
 use crate::interferometry::observation::Observation;
 use crate::interferometry::operator::Real;
 use crate::interferometry::products::debiased_amplitude;
@@ -99,8 +99,9 @@ impl<T: Real> DataTerm<T> for AmplitudeTerm<T> {
             let residual = amplitude - self.data[k];
             let scaled = residual * self.inverse_variance[k];
             total += (residual * scaled).double();
-            if amplitude > T::zero() {
-                *gradient += model[k].scale((weight + weight) * scaled / amplitude);
+            // In two steps: the inverse of a faint amplitude would leave single precision.
+            if amplitude > faintest() {
+                *gradient += model[k].unscale(amplitude).scale((weight + weight) * scaled);
             }
         }
         total
