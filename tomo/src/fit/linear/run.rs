@@ -17,6 +17,9 @@ use crate::simd::Scalar;
 /// Values at the nodes, and which of them count.
 type Start = (Vec<f64>, Vec<bool>);
 
+/// What the coarse problem found, and the lit field that it began with if there was one.
+type Coarsely = (Vec<f64>, Option<Vec<f64>>);
+
 /// Where lit fields are looked at if no coarse problem is asked for.
 pub(super) const LIT: Coarse = Coarse { nodes: 32, stride: 1, iterations: 20 };
 /// Lit fields of a problem, and of one of the many problems of a scan.
@@ -121,7 +124,7 @@ impl<'a, 'p, 'w, T: Scalar + Default> Run<'a, 'p, 'w, T> {
         &mut self,
         objective: &mut Objective<'_, '_, T>,
         iterations: usize,
-    ) -> Result<Option<(Vec<f64>, Option<Vec<f64>>)>, LinearError> {
+    ) -> Result<Option<Coarsely>, LinearError> {
         if !objective.data.is_convex() {
             let lit = self.lit(objective, Trials { iterations: PATIENCE * iterations, ..MANY })?;
             return Ok(lit.map(|Lit { start, x, .. }| (x, Some(start))));
