@@ -201,6 +201,10 @@ impl<T: Elementary> Trajectory<T> for MinoPath<'_, T> {
         self.path.uncertainty_at(mino_time)
     }
 
+    fn uncertainty_at_crossing(&self, _: usize, mino_time: T) -> Uncertainty {
+        self.path.uncertainty_at_crossing(mino_time)
+    }
+
     fn within(&self, lo: f64, hi: f64, pieces: &mut Vec<[T; 2]>) {
         self.path.intervals_within(lo, hi, pieces);
         let total = self.total();
@@ -238,6 +242,20 @@ impl AffinePair {
     }
 }
 
+/// How far two positions are from each other.
+#[cfg(feature = "affine")]
+fn difference(a: &PathPoint, b: &PathPoint, observer: f64) -> Uncertainty {
+    let turn = (a.azimuth - b.azimuth).rem_euclid(core::f64::consts::TAU);
+    // Coordinates are rounded where they are largest, at the observer.
+    let floor = 16.0 * f64::EPSILON * (1.0 + observer / a.radius());
+    Uncertainty {
+        radius: (b.inverse_radius / a.inverse_radius - 1.0).abs() + floor,
+        theta: (a.theta() - b.theta()).abs() + floor,
+        azimuth: turn.min(core::f64::consts::TAU - turn) + floor,
+        delay: (a.delay - b.delay).abs() + floor * (a.delay.abs() + a.radius()),
+    }
+}
+
 #[cfg(feature = "affine")]
 impl Trajectory<f64> for AffinePair {
     fn outcome(&self) -> Outcome {
@@ -262,20 +280,28 @@ impl Trajectory<f64> for AffinePair {
 
     fn uncertainty(&self, mino_time: f64) -> Uncertainty {
         let Some(coarse) = &self.coarse else { return Uncertainty::default() };
+        if coarse.outcome() != self.fine.outcome() {
+            return Uncertainty::UNKNOWN;
+        }
         let end = coarse.mino_total();
         let (a, b) = (self.fine.at(mino_time), coarse.at(mino_time.min(end)));
-        let turn = (a.azimuth - b.azimuth).rem_euclid(core::f64::consts::TAU);
-        let floor = 16.0 * f64::EPSILON;
         // Back at the observer, where a ray flies out with dr/dτ = r², the ray that ends
         // earlier is as far behind as its time is short.
         let r = a.radius();
         let overrun = (mino_time - end).max(0.0) * r;
-        Uncertainty {
-            radius: (b.inverse_radius / a.inverse_radius - 1.0).abs() + overrun + floor,
-            theta: (a.theta() - b.theta()).abs() + floor,
-            azimuth: turn.min(core::f64::consts::TAU - turn) + floor,
-            delay: (a.delay - b.delay).abs() + overrun * r + floor * (a.delay.abs() + r),
-        }
+        let mut error = difference(&a, &b, self.fine.start_radius());
+        error.radius += overrun;
+        error.delay += overrun * r;
+        error
+    }
+
+    fn uncertainty_at_crossing(&self, k: usize, mino_time: f64) -> Uncertainty {
+        let Some(coarse) = &self.coarse else { return Uncertainty::default() };
+        let other = coarse.equatorial_crossings().get(k).copied();
+        let Some(other) = other.filter(|_| coarse.outcome() == self.fine.outcome()) else {
+            return Uncertainty::UNKNOWN;
+        };
+        difference(&self.fine.at(mino_time), &coarse.at(other), self.fine.start_radius())
     }
 
     fn within(&self, lo: f64, hi: f64, pieces: &mut Vec<[f64; 2]>) {

@@ -212,14 +212,29 @@ impl<T: Elementary> Path<T> {
         if self.segments.is_empty() {
             return Uncertainty::UNKNOWN;
         }
+        let (point, budget) = self.with_budget(mino_time);
+        budget.at(&self.hole, self.lambda, self.scale, &point)
+    }
+
+    /// The estimated errors of [`at`](Self::at) a Mino time of
+    /// [`equatorial_crossings`](Self::equatorial_crossings), as those of the crossing itself: its
+    /// Mino time has an error of its own, by which the ray goes on. Infinite on a path without a
+    /// step.
+    pub fn uncertainty_at_crossing(&self, mino_time: T) -> Uncertainty {
+        if self.segments.is_empty() {
+            return Uncertainty::UNKNOWN;
+        }
+        let (point, budget) = self.with_budget(mino_time);
+        budget.at_crossing(&self.hole, self.lambda, self.scale, &point)
+    }
+
+    fn with_budget(&self, mino_time: T) -> (PathPoint<T>, Budget) {
         let s = self.clamped(mino_time);
         let (k, x) = self.find(s);
-        let segment = &self.segments[k];
-        let point = self.interpolate(k, x, s);
         // In the first step nothing has gone wrong yet at the observer.
         let part = if k == 0 { x.value() } else { 1.0 };
-        let budget = Budget::default().towards(&segment.budget, part);
-        budget.at(&self.hole, self.lambda, self.scale, &point)
+        let budget = Budget::default().towards(&self.segments[k].budget, part);
+        (self.interpolate(k, x, s), budget)
     }
 
     fn interpolate(&self, k: usize, x: T, s: T) -> PathPoint<T> {

@@ -17,6 +17,8 @@ pub(crate) struct Run<'a, T, M, const N: usize> {
     constants: [T; 2],
     turned: T,
     budget: Budget,
+    /// Error of W since the last time that dw/dτ was put on ±√W.
+    energy: f64,
 }
 
 impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
@@ -38,7 +40,11 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
         let time = if ray.inverse_radius > 0.0 { way * hole.tortoise(w) } else { T::constant(0.0) };
         let state = State { ray, system, tolerance, y, leg };
         let constants = [azimuth, time];
-        let budget = Budget::default();
+        // At the start dw/dτ is √W, in which the terms of W cancel.
+        let [quad, cubic, quartic] = ray.potential.coefficients.map(|c| c.value().abs());
+        let at = ray.inverse_radius;
+        let terms = 1.0 + at * at * (quad + at * (cubic + at * quartic));
+        let (budget, energy) = (Budget::default(), 4.0 * T::EPSILON * terms);
         Run {
             state,
             stepper,
@@ -47,6 +53,7 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
             constants,
             turned: start_angle(ray),
             budget,
+            energy,
         }
     }
 
@@ -130,12 +137,19 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
         self.budget.rounding += blur * blur;
         // Off dw/dτ = ±√W the error of W stays, and speeds the ray up or slows it down.
         let slip = error[index::W].abs() + rounding;
-        let energy = 2.0 * (rate.abs() * (jerk + kick) + pull.abs() * slip);
-        self.budget.energy = if projected { 0.0 } else { self.budget.energy + energy };
-        let truncation = truncation + 0.5 * h * self.budget.energy / (speed * speed);
+        let energy = 2.0 * (rate.abs() * (error[index::DW].abs() + kick) + pull.abs() * slip);
+        self.budget.energy = self.energy + energy;
+        // The projection leaves w where an error of W has taken it.
+        let left = if projected { pull.abs() / rate.abs().max(1e-300) } else { 0.0 };
+        self.energy = if projected { 0.0 } else { self.budget.energy };
+        let wrong = if projected { self.budget.energy - energy } else { self.budget.energy };
+        let truncation = truncation + 0.5 * (h + left) * wrong / (speed * speed);
         self.budget.phase += truncation;
         self.budget.local = error[index::W].abs() / w.abs().max(1e-300);
+        self.budget.pull = pull.abs();
         let mut turn = error[index::U].abs() + error[index::DU].abs();
+        let (u, climb) = (y[index::U].value().abs(), y[index::DU].value().abs());
+        self.budget.polar += turn + eps * (1.0 + h) * (u + climb);
         if has_azimuth(N) {
             for k in [index::X, index::DX, index::Y, index::DY] {
                 turn = turn.max(error[k].abs());

@@ -19,6 +19,8 @@ pub(crate) trait Trajectory<T> {
     fn crossings(&self, found: &mut Vec<T>);
     fn at(&self, mino_time: T) -> PathPoint<T>;
     fn uncertainty(&self, mino_time: T) -> Uncertainty;
+    /// That of crossing number `k`, at `mino_time`.
+    fn uncertainty_at_crossing(&self, k: usize, mino_time: T) -> Uncertainty;
     /// The pieces with lo ≤ r ≤ hi.
     fn within(&self, lo: f64, hi: f64, pieces: &mut Vec<[T; 2]>);
 }
@@ -70,6 +72,11 @@ pub(crate) fn rule(request: &Request) -> Vec<(f64, f64)> {
     }
 }
 
+/// Whether a ray has reached the horizon, where azimuth and delay have no limit, and no error.
+fn at_horizon<T: Elementary>(ray: &impl Trajectory<T>, mino_time: T) -> bool {
+    ray.outcome() == Outcome::Captured && mino_time.value() >= ray.total().value()
+}
+
 impl<'a, T: Elementary, S: Sink<T>> Sampler<'a, T, S> {
     /// `rule` is that of the request.
     pub fn new(
@@ -97,9 +104,11 @@ impl<'a, T: Elementary, S: Sink<T>> Sampler<'a, T, S> {
             crossing_count: times.len() as u32,
         });
         self.worst = Uncertainty::default();
-        for time in times.iter().take(self.request.crossings) {
+        for (k, time) in times.iter().enumerate().take(self.request.crossings) {
             self.sink.crossing(self.request, self.hole, lambda, &ray.at(*time));
-            self.doubt(ray, *time);
+            if self.request.uncertainty && !at_horizon(ray, *time) {
+                self.worst = self.worst.max(ray.uncertainty_at_crossing(k, *time));
+            }
         }
         self.times = times;
         if let Some(total) = total {
@@ -109,10 +118,7 @@ impl<'a, T: Elementary, S: Sink<T>> Sampler<'a, T, S> {
     }
 
     fn doubt(&mut self, ray: &impl Trajectory<T>, mino_time: T) {
-        // At the horizon azimuth and delay have no limit, and no error.
-        let at_horizon =
-            ray.outcome() == Outcome::Captured && mino_time.value() >= ray.total().value();
-        if self.request.uncertainty && !at_horizon {
+        if self.request.uncertainty && !at_horizon(ray, mino_time) {
             self.worst = self.worst.max(ray.uncertainty(mino_time));
         }
     }

@@ -53,12 +53,16 @@ pub(crate) struct Budget {
     pub phase: f64,
     /// Square of its rounding errors: of random signs, they add up like a random walk.
     pub rounding: f64,
-    /// Error of W since the last time that dw/dτ was put on ±√W.
+    /// Error of W in the step: all since the last time that dw/dτ was put on ±√W.
     pub energy: f64,
     /// Relative error of b·w that a step's interpolation makes.
     pub local: f64,
+    /// d²(b·w)/ds² at the end of the step.
+    pub pull: f64,
     /// Error of the direction on the sphere.
     pub direction: f64,
+    /// Error of cos θ alone: all of it scales with how far the ray goes from the equator.
+    pub polar: f64,
     /// Error of I_φ.
     pub azimuth: f64,
     /// Error of I_t/b.
@@ -77,7 +81,9 @@ impl Budget {
             rounding: between(self.rounding, next.rounding),
             energy: next.energy,
             local: next.local,
+            pull: next.pull,
             direction: between(self.direction, next.direction),
+            polar: between(self.polar, next.polar),
             azimuth: between(self.azimuth, next.azimuth),
             delay: between(self.delay, next.delay),
         }
@@ -92,31 +98,87 @@ impl Budget {
         point: &PathPoint<T>,
     ) -> Uncertainty {
         let eps = T::EPSILON;
+        let rates = Rates::at(hole, lambda, point);
         let w = point.inverse_radius.value();
         let [x, y, _] = point.direction.map(T::value);
-        let a = hole.spin().value();
         // Mino time by which the ray may be early or late, and what the interpolation adds.
         let late = (self.phase + ROUNDINGS * self.rounding.sqrt()) / scale;
-        let speed = point.inverse_radius_rate.value().abs();
-        let local = self.local * w;
-        let radius = if w > 0.0 { (speed * late + local) / w + 4.0 * eps } else { 0.0 };
+        // An error of W takes w off the true orbit by δW/|∇W| in the plane of w and dw/dτ.
+        let steep = rates.w.hypot(self.pull).max(1e-300);
+        let off = 0.5 * self.energy * self.pull / (steep * steep * scale);
+        let local = self.local * w + off;
+        let radius = if w > 0.0 { (rates.w * late + local) / w + 4.0 * eps } else { 0.0 };
         let theta = self.direction + 4.0 * eps;
-        // Δ/r² and (r² + a² − aλ)/r², the two factors of the radial motion's dφ/dτ and dt/dτ.
-        let gap = (1.0 - w * (2.0 - a * a * w)).max(eps);
-        let energy = 1.0 + a * (a - lambda) * w * w;
         let azimuth = self.direction / x.hypot(y).max(self.direction).max(1e-300)
             + self.azimuth
-            + (a * (energy / gap - 1.0)).abs() * late
-            + a.abs() * local / gap
+            + rates.drag * late
+            + hole.spin().value().abs() * local / rates.gap
             + 4.0 * eps * (1.0 + point.azimuth.value().abs());
-        let lift = (1.0 + a * a * w * w) / gap;
         let delay = if w > 0.0 {
             self.delay * scale
-                + lift * (energy.abs() * late + local) / (w * w)
+                + rates.lift * (rates.energy * late + local) / (w * w)
                 + 4.0 * eps * (point.delay.value().abs() + 1.0 / w)
         } else {
             0.0
         };
         Uncertainty { radius, theta, azimuth, delay }
+    }
+
+    /// What it means where the path crosses the equatorial plane: there θ is known, but an error
+    /// of cos θ makes the ray cross earlier or later, at another radius, azimuth and time.
+    pub fn at_crossing<T: Elementary>(
+        &self,
+        hole: &Kerr<T>,
+        lambda: f64,
+        scale: f64,
+        point: &PathPoint<T>,
+    ) -> Uncertainty {
+        let eps = T::EPSILON;
+        let fixed = self.at(hole, lambda, scale, point);
+        let rates = Rates::at(hole, lambda, point);
+        let (w, a) = (point.inverse_radius.value(), hole.spin().value());
+        let polar = point.velocity[2].value().abs().max(1e-300);
+        let early = self.polar / polar + 2.0 * eps * point.mino_time.value();
+        Uncertainty {
+            radius: fixed.radius + if w > 0.0 { rates.w * early / w } else { 0.0 },
+            theta: 4.0 * eps * (1.0 + point.mino_time.value() * polar),
+            azimuth: fixed.azimuth + (rates.drag + lambda.abs()) * early,
+            delay: fixed.delay
+                + if w > 0.0 {
+                    (rates.lift * rates.energy / (w * w) + (a * (lambda - a)).abs()) * early
+                } else {
+                    0.0
+                },
+        }
+    }
+}
+
+/// How fast a ray moves at a point, per Mino time.
+struct Rates {
+    /// |dw/dτ|.
+    w: f64,
+    /// Δ/r².
+    gap: f64,
+    /// |r² + a² − aλ|/r²: with Δ/r² it makes the radial motion's dφ/dτ and dt/dτ.
+    energy: f64,
+    /// |a (r² + a² − aλ)/Δ − a|, the frame dragging's part of dφ/dτ.
+    drag: f64,
+    /// (r² + a²)/Δ.
+    lift: f64,
+}
+
+impl Rates {
+    fn at<T: Elementary>(hole: &Kerr<T>, lambda: f64, point: &PathPoint<T>) -> Self {
+        let w = point.inverse_radius.value();
+        let a = hole.spin().value();
+        let gap = (1.0 - w * (2.0 - a * a * w)).max(T::EPSILON);
+        let energy = 1.0 + a * (a - lambda) * w * w;
+        Rates {
+            w: point.inverse_radius_rate.value().abs(),
+            gap,
+            energy: energy.abs(),
+            drag: (a * (energy / gap - 1.0)).abs(),
+            lift: (1.0 + a * a * w * w) / gap,
+        }
     }
 }

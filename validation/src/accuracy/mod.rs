@@ -9,6 +9,7 @@
 //! [`trace_series`]: kerrlight_geodesic::trace_series
 //! [`Double`]: kerrlight_geodesic::Double
 
+pub mod estimates;
 pub mod hard;
 mod oracle;
 pub mod rays;

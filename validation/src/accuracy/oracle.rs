@@ -75,9 +75,27 @@ impl Oracle {
         self.path.at(Double::from(mino_time))
     }
 
+    /// Mino times of the crossings of the equatorial plane, with all digits.
+    pub fn exact_crossings(&self) -> Vec<Double> {
+        self.path.equatorial_crossings().collect()
+    }
+
+    /// The position at a Mino time with all its digits.
+    pub fn at_exactly(&self, mino_time: Double) -> PathPoint<Double> {
+        self.path.at(mino_time)
+    }
+
     /// The errors of a position (r, θ, φ, delay) at a Mino time.
-    pub fn judge(&self, mino_time: f64, [r, theta, azimuth, delay]: [f64; 4]) -> TrueError {
-        let truth = self.at(mino_time);
+    pub fn judge(&self, mino_time: f64, position: [f64; 4]) -> TrueError {
+        self.compare(&self.at(mino_time), position)
+    }
+
+    /// The errors of a position (r, θ, φ, delay) that should be `truth`.
+    pub fn compare(
+        &self,
+        truth: &PathPoint<Double>,
+        [r, theta, azimuth, delay]: [f64; 4],
+    ) -> TrueError {
         let miss = |x: f64, truth: Double| (Double::from(x) - truth).hi;
         let turn = miss(azimuth, truth.azimuth);
         TrueError {
