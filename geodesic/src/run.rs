@@ -172,7 +172,10 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
             self.budget.azimuth += quadrature(index::AZIMUTH);
         }
         if has_time(N) {
-            self.budget.delay += quadrature(N - 1);
+            // dI_t/ds holds a² cos²θ, and with it twice the error of cos θ.
+            let [.., tilt] = self.state.system.time().map(T::value);
+            let height = u.max(self.state.y[index::U].value().abs());
+            self.budget.delay += quadrature(N - 1) + 2.0 * h * tilt * height * self.budget.polar;
         }
     }
 

@@ -248,20 +248,23 @@ impl Taylor {
 const CAUTION: f64 = 4.0;
 
 impl Taylor {
-    /// Size of the first terms that are left out, by the ratio of the last two that are not:
-    /// of the largest of all rows, since a row may have vanishing terms.
+    /// Size of the first terms that are left out, by the ratio of the last two that are not to
+    /// the two before them: of the largest of all rows and of pairs of orders, since a row may
+    /// have vanishing terms, those of an odd or even function every other.
     fn error<T: Elementary, const N: usize>(&self, series: &Series<T>, h: f64) -> [f64; N] {
         let order = self.order;
-        let power = h.powi(order as i32 - 1);
+        let power = h.powi(order as i32 - 3);
         let mut terms = [[0.0; 2]; N];
         let mut largest = [0.0f64; 2];
         for (row, variable) in variables::<N>() {
             let row = series.row(row, order);
-            let pair = [row[order - 1].value().abs() * power, row[order].value().abs() * power * h];
-            largest = [largest[0].max(pair[0]), largest[1].max(pair[1])];
+            let size = |k: usize| row[order - k].value().abs();
+            let earlier = size(3).max(size(2) * h) * power;
+            let pair = [size(1) * power * h * h, size(0) * power * h * h * h];
+            largest = [largest[0].max(earlier), largest[1].max(pair[0].max(pair[1]))];
             terms[variable] = pair;
         }
-        let ratio = (largest[1] / largest[0]).clamp(0.02, 1.0);
+        let ratio = (largest[1] / largest[0]).sqrt().clamp(0.02, 1.0);
         let mut error = [0.0; N];
         for (_, variable) in variables::<N>() {
             let [before, last] = terms[variable];
