@@ -288,6 +288,12 @@ impl AffinePath {
         Some(0.5 * (lo + hi))
     }
 
+    /// Mino time at the start of the step before the one that holds `mino_time`.
+    pub(crate) fn step_before(&self, mino_time: f64) -> f64 {
+        let k = self.nodes.partition_point(|node| node.y[MINO_TIME] <= mino_time);
+        self.nodes.get(k.saturating_sub(2)).map_or(0.0, |node| node.y[MINO_TIME])
+    }
+
     /// Number of accepted steps.
     pub fn steps(&self) -> usize {
         self.nodes.len().saturating_sub(1)

@@ -2,7 +2,7 @@
 //! into the same columns as those of every other integrator.
 
 use crate::analytic::ClosedForm;
-use crate::bundle::{Crossings, Samples};
+use crate::bundle::{Crossings, LEAST_STEPS, MAX_STEP, Samples};
 use crate::columns::{Bundle, Points};
 use crate::error::{OutOfRange, check};
 use crate::kerr::Kerr;
@@ -32,9 +32,10 @@ pub(crate) fn trace(
     let mut bundle = Bundle::default();
     fates(hole, &rays, &mut bundle);
     bundle.uncertainty = vec![Uncertainty::default(); rays.len()];
-    crossings(hole, observer, alpha, beta, request, &mut bundle)?;
+    let clocks: Vec<Clock> = rays.iter().map(|ray| Clock::new(hole, ray)).collect();
+    crossings(hole, observer, alpha, beta, request, &clocks, &mut bundle)?;
     if let Placement::MinoTime(n) = request.samples {
-        samples(hole, observer, alpha, beta, request, n, &mut bundle)?;
+        samples(hole, observer, alpha, beta, request, n, &clocks, &mut bundle)?;
     } else {
         rays.iter().for_each(|_| bundle.samples.end_ray());
     }
@@ -71,6 +72,7 @@ fn crossings(
     alpha: &[f64],
     beta: &[f64],
     request: &Request,
+    clocks: &[Clock],
     bundle: &mut Bundle,
 ) -> Result<(), OutOfRange> {
     let mut found = Crossings::default();
@@ -84,7 +86,13 @@ fn crossings(
             points.radius.push(crossing.radius);
             points.theta.push(core::f64::consts::FRAC_PI_2);
             angles(points, request, crossing.azimuth, crossing.delay);
-            widen(&mut bundle.uncertainty[k], crossing.error, crossing.radius);
+            let turning = !bundle.turning_radius[k].is_nan();
+            let half = if turning { 0.5 * bundle.mino_total[k] } else { f64::INFINITY };
+            let (time, r) = (crossing.mino_time, crossing.radius);
+            let delay = clocks[k].rounding(crossing.delay, r)
+                + clocks[k].quadrature(clocks[k].step_to(time, half))
+                + crossing.error * clocks[k].reach(r);
+            widen(&mut bundle.uncertainty[k], crossing.error, delay);
         }
         bundle.crossings.end_ray();
     }
@@ -101,11 +109,59 @@ fn angles(points: &mut Points, request: &Request, azimuth: f64, delay: f64) {
     }
 }
 
-/// Takes the error of a position at radius `r` into the estimate of a ray: what is late by as
-/// much moves in time as in space, or r times as much.
-fn widen(worst: &mut Uncertainty, error: f64, r: f64) {
-    let each = Uncertainty { radius: error, theta: error, azimuth: error, delay: error * r };
-    *worst = worst.max(each);
+/// Takes the error of a position and that of its delay into the estimate of a ray. A relative
+/// error of 1/r of 1 or more leaves nothing known about r and the delay.
+fn widen(worst: &mut Uncertainty, error: f64, delay: f64) {
+    let lost = if error < 1.0 { 1.0 / (1.0 - error) } else { f64::INFINITY };
+    let (radius, delay) = (error * lost, delay * lost);
+    *worst = worst.max(Uncertainty { radius, theta: error, azimuth: error, delay });
+}
+
+/// The error of the delay over b, by quadrature at the largest step: of the derivatives of 1/g at
+/// both ends, the largest for rays that hardly bend. Measured (docs/accuracy.md of the
+/// repository).
+const QUADRATURE: f64 = 2e-10;
+
+/// What the error of a ray's delay depends on.
+struct Clock {
+    spin: f64,
+    /// The ray's fastest frequency.
+    b: f64,
+    /// Radius of the observer; 0 for one at infinity, where closed forms start from 0.
+    start: f64,
+}
+
+impl Clock {
+    fn new(hole: &Kerr, ray: &Ray) -> Self {
+        let w = ray.inverse_radius;
+        let start = if w > 0.0 { 1.0 / w } else { 0.0 };
+        Clock { spin: hole.spin(), b: ray.angular.max(1.0).sqrt(), start }
+    }
+
+    /// By quadrature with steps of bτ `step`: of order ten.
+    fn quadrature(&self, step: f64) -> f64 {
+        QUADRATURE * self.b * (step / MAX_STEP).powi(10)
+    }
+
+    /// The step, as a bτ, to a crossing at `time` of a ray that turns after `half`.
+    fn step_to(&self, time: f64, half: f64) -> f64 {
+        let steps = (self.b * time / MAX_STEP).ceil().max(LEAST_STEPS as f64);
+        // The outward leg mirrors the inward one: two sums, each of as many steps.
+        let outward = time > half;
+        let (inner, rest) = if outward { (2.0 * half - time, time - half) } else { (time, 0.0) };
+        self.b * inner.max(rest) / steps
+    }
+
+    /// By rounding, at radius `r`.
+    fn rounding(&self, delay: f64, r: f64) -> f64 {
+        16.0 * f64::EPSILON * (delay.abs() + r + self.start + self.b)
+    }
+
+    /// By how much the delay moves with a relative error of the radius: r dt/dr.
+    fn reach(&self, r: f64) -> f64 {
+        let a2 = self.spin * self.spin;
+        r * (r * r + a2) / (r * (r - 2.0) + a2).max(f64::EPSILON)
+    }
 }
 
 /// Samples equidistant in Mino time, without those at infinity: rays that fall have one of
@@ -117,6 +173,7 @@ fn samples(
     beta: &[f64],
     request: &Request,
     n: usize,
+    clocks: &[Clock],
     bundle: &mut Bundle,
 ) -> Result<(), OutOfRange> {
     let captured = |k: &usize| bundle.outcome[*k] == Outcome::Captured;
@@ -160,8 +217,16 @@ fn samples(
                 share * hole.sigma(ray.radius[j], ray.theta[j].cos())
             }));
         }
-        let farthest = ray.radius[span].iter().fold(0.0, |far: f64, r| far.max(*r));
-        widen(&mut bundle.uncertainty[k], ray.error, farthest);
+        let horizon = hole.horizon() * (1.0 + 2e-8);
+        let clock = &clocks[k];
+        let fine = (clock.b * step / MAX_STEP).ceil().max(1.0);
+        let quadrature = clock.quadrature(clock.b * step / fine);
+        let delays = ray.radius[span.clone()].iter().zip(&ray.delay[span]);
+        // At the horizon the delay has no limit.
+        let delay = delays.filter(|(r, _)| **r > horizon).map(|(r, delay)| {
+            quadrature + clock.rounding(*delay, *r) + ray.error * clock.reach(*r)
+        });
+        widen(&mut bundle.uncertainty[k], ray.error, delay.fold(0.0, f64::max));
         bundle.samples.end_ray();
     }
     Ok(())

@@ -256,6 +256,55 @@ fn difference(a: &PathPoint, b: &PathPoint, observer: f64) -> Uncertainty {
     }
 }
 
+/// How much larger the error may be than the difference from a run at ten times the tolerance,
+/// whose own error has the same sign or vanishes by chance: measured (docs/accuracy.md of the
+/// repository).
+#[cfg(feature = "affine")]
+const AFFINE_CAUTION: f64 = 2.0;
+
+#[cfg(feature = "affine")]
+impl AffinePair {
+    /// The coarse run, if it came to the same end.
+    fn comparable(&self) -> Option<&crate::affine::AffinePath> {
+        self.coarse.as_ref().filter(|coarse| coarse.outcome() == self.fine.outcome())
+    }
+
+    /// The estimate without a run to compare with: none was asked for, or it ended elsewhere.
+    fn unknown(&self) -> Uncertainty {
+        if self.coarse.is_some() { Uncertainty::UNKNOWN } else { Uncertainty::default() }
+    }
+
+    /// The largest difference at equal Mino time over the last two steps of the coarse run: at
+    /// one point alone it may vanish by chance, next to a node above all.
+    fn worst_up_to(&self, coarse: &crate::affine::AffinePath, mino_time: f64) -> Uncertainty {
+        let from = coarse.step_before(mino_time).min(mino_time);
+        let places = [0.25, 0.5, 0.75, 1.0].map(|part| from + (mino_time - from) * part);
+        let worst = places.into_iter().map(|time| self.at_equal_time(coarse, time));
+        worst.fold(Uncertainty::default(), Uncertainty::max)
+    }
+
+    fn at_equal_time(&self, coarse: &crate::affine::AffinePath, mino_time: f64) -> Uncertainty {
+        let end = coarse.mino_total();
+        let (a, b) = (self.fine.at(mino_time), coarse.at(mino_time.min(end)));
+        // Back at the observer, where a ray flies out with dr/dτ = r², the ray that ends
+        // earlier is as far behind as its time is short.
+        let r = a.radius();
+        let overrun = (mino_time - end).max(0.0) * r;
+        let mut error = difference(&a, &b, self.fine.start_radius());
+        error.radius += overrun;
+        error.delay += overrun * r;
+        error
+    }
+
+    /// By how much an error of θ moves a crossing.
+    fn early(&self, theta: f64, mino_time: f64) -> f64 {
+        let step = 1e-4 * self.fine.mino_total();
+        let [before, after] = [-step, step].map(|step| self.fine.at(mino_time + step).theta());
+        let rate = (after - before).abs() / (2.0 * step);
+        (theta / rate.max(1e-300)).min(self.fine.mino_total())
+    }
+}
+
 #[cfg(feature = "affine")]
 impl Trajectory<f64> for AffinePair {
     fn outcome(&self) -> Outcome {
@@ -279,29 +328,28 @@ impl Trajectory<f64> for AffinePair {
     }
 
     fn uncertainty(&self, mino_time: f64) -> Uncertainty {
-        let Some(coarse) = &self.coarse else { return Uncertainty::default() };
-        if coarse.outcome() != self.fine.outcome() {
-            return Uncertainty::UNKNOWN;
+        match self.comparable() {
+            Some(coarse) => self.worst_up_to(coarse, mino_time).rescaled(AFFINE_CAUTION),
+            None => self.unknown(),
         }
-        let end = coarse.mino_total();
-        let (a, b) = (self.fine.at(mino_time), coarse.at(mino_time.min(end)));
-        // Back at the observer, where a ray flies out with dr/dτ = r², the ray that ends
-        // earlier is as far behind as its time is short.
-        let r = a.radius();
-        let overrun = (mino_time - end).max(0.0) * r;
-        let mut error = difference(&a, &b, self.fine.start_radius());
-        error.radius += overrun;
-        error.delay += overrun * r;
-        error
     }
 
     fn uncertainty_at_crossing(&self, k: usize, mino_time: f64) -> Uncertainty {
-        let Some(coarse) = &self.coarse else { return Uncertainty::default() };
-        let other = coarse.equatorial_crossings().get(k).copied();
-        let Some(other) = other.filter(|_| coarse.outcome() == self.fine.outcome()) else {
-            return Uncertainty::UNKNOWN;
+        let other = self.comparable().map(|coarse| (coarse, coarse.equatorial_crossings()));
+        let Some((coarse, Some(other))) = other.map(|(c, times)| (c, times.get(k).copied())) else {
+            return self.unknown();
         };
-        difference(&self.fine.at(mino_time), &coarse.at(other), self.fine.start_radius())
+        let at_once = self.worst_up_to(coarse, mino_time);
+        let radius = self.fine.start_radius();
+        let apart = difference(&self.fine.at(mino_time), &coarse.at(other), radius);
+        // An error of θ that the two runs do not share moves the crossing too.
+        let early = (other - mino_time).abs().max(self.early(at_once.theta, mino_time));
+        let moved = |time: f64| {
+            let time = time.clamp(0.0, self.fine.mino_total());
+            difference(&self.fine.at(mino_time), &self.fine.at(time), radius)
+        };
+        let moved = moved(mino_time - early).max(moved(mino_time + early));
+        at_once.max(apart).max(moved).rescaled(AFFINE_CAUTION)
     }
 
     fn within(&self, lo: f64, hi: f64, pieces: &mut Vec<[f64; 2]>) {

@@ -35,6 +35,21 @@ impl Uncertainty {
         delay: f64::INFINITY,
     };
 
+    /// `factor` times as large, and no larger than what knowing nothing means: an azimuth is
+    /// within half a turn; a relative error of 1/r of 1 or more leaves r and the delay unknown.
+    #[cfg(feature = "affine")]
+    pub(crate) fn rescaled(self, factor: f64) -> Self {
+        let relative = factor * self.radius;
+        let lost = if relative < 1.0 { factor / (1.0 - relative) } else { f64::INFINITY };
+        let turn = core::f64::consts::PI;
+        Uncertainty {
+            radius: self.radius * lost,
+            theta: (factor * self.theta).min(turn),
+            azimuth: if factor * self.azimuth < 1.0 { factor * self.azimuth } else { turn },
+            delay: self.delay * lost,
+        }
+    }
+
     /// The larger of both in every component.
     pub fn max(self, o: Self) -> Self {
         Uncertainty {

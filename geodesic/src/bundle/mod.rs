@@ -54,6 +54,8 @@ pub use crossings::{Crossing, Crossings, RayEnds};
 pub use dispatch::Width;
 pub use nodes::{NodeRequest, Nodes, RayNodes};
 pub use panel::PanelRule;
+pub(crate) use radial_sum::LEAST_STEPS;
+pub(crate) use sample::MAX_STEP;
 pub use samples::{RaySamples, Samples};
 
 use crate::error::{OutOfRange, check};

@@ -19,7 +19,7 @@ pub(super) const END: [f64; REACH - 1] = {
 };
 
 /// The least number of steps of a [`RadialSum`].
-pub const LEAST_STEPS: usize = 2 * REACH - 1;
+pub(crate) const LEAST_STEPS: usize = 2 * REACH - 1;
 
 /// `∫dτ/g` and `∫w² dτ/g` from one point of a ray to another, without what lies between.
 #[derive(Clone, Copy)]

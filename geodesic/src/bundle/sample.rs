@@ -9,7 +9,7 @@ use super::polar::{PolarState, PolarStep, unwrap};
 use super::radial::{RadialRun, Ring};
 
 /// Largest step in units of `1/√max(1, η + λ²)` that the quadrature is trusted with.
-pub(super) const MAX_STEP: f64 = 0.08;
+pub(crate) const MAX_STEP: f64 = 0.08;
 
 /// Where the samples of a block of rays go, ray after ray.
 pub(super) struct Target<'a> {

@@ -299,9 +299,10 @@ fn held(pairs: impl Iterator<Item = (f64, f64)>) -> Held {
     let mut held = Held::default();
     let mut over = Vec::new();
     for (error, estimate) in pairs {
-        // A NaN is beyond any bound.
-        held.beyond += usize::from(!(error <= estimate));
-        held.worst = held.worst.max(if error > 0.0 { error / estimate } else { 0.0 });
+        // An infinite estimate says that nothing is known; a NaN is beyond any other.
+        let holds = error <= estimate || estimate == f64::INFINITY;
+        held.beyond += usize::from(!holds);
+        held.worst = held.worst.max(if holds && error == 0.0 { 0.0 } else { error / estimate });
         held.error = held.error.max(error);
         over.push(estimate / error.max(f64::EPSILON));
     }
