@@ -250,7 +250,9 @@ impl AffinePath {
 
     /// Radius of the observer.
     pub(crate) fn start_radius(&self) -> f64 {
-        self.nodes.first().map_or(0.0, |node| radius(self.hole.spin(), [node.y[0], node.y[1], node.y[2]]))
+        self.nodes
+            .first()
+            .map_or(0.0, |node| radius(self.hole.spin(), [node.y[0], node.y[1], node.y[2]]))
     }
 
     /// Mino time from the observer to the horizon or back to the observer's radius.

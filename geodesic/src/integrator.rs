@@ -260,7 +260,7 @@ fn difference(a: &PathPoint, b: &PathPoint, observer: f64) -> Uncertainty {
 /// whose own error has the same sign or vanishes by chance: measured (docs/accuracy.md of the
 /// repository).
 #[cfg(feature = "affine")]
-const AFFINE_CAUTION: f64 = 2.0;
+const AFFINE_CAUTION: f64 = 3.0;
 
 #[cfg(feature = "affine")]
 impl AffinePair {

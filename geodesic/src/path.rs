@@ -80,6 +80,8 @@ pub struct Path<T = f64> {
     pub(crate) has_azimuth: bool,
     pub(crate) has_time: bool,
     pub(crate) lambda: f64,
+    /// What the errors at the start amount to.
+    pub(crate) start: Budget,
 }
 
 impl<T: Elementary> Default for Path<T> {
@@ -117,6 +119,7 @@ impl<T: Elementary> Path<T> {
             has_azimuth: false,
             has_time: false,
             lambda: 0.0,
+            start: Budget::default(),
         }
     }
 
@@ -231,9 +234,9 @@ impl<T: Elementary> Path<T> {
     fn with_budget(&self, mino_time: T) -> (PathPoint<T>, Budget) {
         let s = self.clamped(mino_time);
         let (k, x) = self.find(s);
-        // In the first step nothing has gone wrong yet at the observer.
+        // In the first step little has gone wrong yet at the observer.
         let part = if k == 0 { x.value() } else { 1.0 };
-        let budget = Budget::default().towards(&self.segments[k].budget, part);
+        let budget = self.start.towards(&self.segments[k].budget, part);
         (self.interpolate(k, x, s), budget)
     }
 

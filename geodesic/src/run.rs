@@ -45,11 +45,9 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
         let time = if ray.inverse_radius > 0.0 { way * hole.tortoise(w) } else { T::constant(0.0) };
         let state = State { ray, system, tolerance, y, leg };
         let constants = [azimuth, time];
-        // At the start dw/dτ is √W, in which the terms of W cancel.
-        let [quad, cubic, quartic] = ray.potential.coefficients.map(|c| c.value().abs());
-        let at = ray.inverse_radius;
-        let terms = 1.0 + at * at * (quad + at * (cubic + at * quartic));
-        let (budget, energy) = (Budget::default(), 4.0 * T::EPSILON * terms);
+        let energy = start_error(ray);
+        let budget = start_budget(&y, &system, energy);
+        path.start = budget;
         Run {
             state,
             stepper,
@@ -278,6 +276,31 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
         self.state.leg = -self.state.leg;
         self.stepper.restart(&self.state, &mut self.path.series);
     }
+}
+
+/// Error of W at the start: its terms, made of constants of motion that are rounded, cancel in a
+/// ray that starts next to its turning point. At infinity W is 1.
+fn start_error<T: Elementary>(ray: &Ray<T>) -> f64 {
+    /// Roundings of a constant of motion that a camera's frame leaves.
+    const ROUNDINGS: f64 = 16.0;
+    let [quad, cubic, quartic] = ray.potential.coefficients.map(|c| c.value().abs());
+    let w = ray.inverse_radius;
+    ROUNDINGS * T::EPSILON * w * w * (quad + w * (cubic + w * quartic))
+}
+
+/// What an error of W at the start, one of dw/dτ = √W, amounts to: the ray is early or late, by the
+/// more the closer it starts to its turning point.
+fn start_budget<T: Elementary, const N: usize>(
+    y: &[T; N],
+    system: &System<T>,
+    energy: f64,
+) -> Budget {
+    let (w, rate) = (y[index::W].value(), y[index::DW].value().abs());
+    let [a, b, c] = system.radial().map(T::value);
+    let speed = rate.hypot(w * (a + w * (b + w * c)));
+    let slow = rate.max(energy.sqrt()) * speed;
+    let phase = if energy > 0.0 { 0.5 * energy / slow.max(1e-300) } else { 0.0 };
+    Budget { phase, ..Budget::default() }
 }
 
 /// atan2(y, x) at the start; on the axis the direction in which the ray leaves it.

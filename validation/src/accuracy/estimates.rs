@@ -215,8 +215,7 @@ fn judge(
     };
     let request = Request { uncertainty: true, ..request };
     let (Ok(hole), Ok(observer)) = (Kerr::new(ray.spin), ray.observer()) else { return Err(()) };
-    let traced =
-        integrator.trace(&hole, &observer, &[ray.alpha], &[ray.beta], tolerance, &request);
+    let traced = integrator.trace(&hole, &observer, &[ray.alpha], &[ray.beta], tolerance, &request);
     // What an integrator does not serve is no ray of it.
     let Ok(bundle) = traced else { return Ok(None) };
     if bundle.mino_total[0].is_nan() {
@@ -274,7 +273,9 @@ pub fn run(
     let rays = class.rays(n, seed)?;
     let of_ray = |oracle: &mut Oracle, ray: &Draw| -> Result<Vec<Result<Judged, ()>>, OutOfRange> {
         oracle.trace(ray)?;
-        let both = settings.iter().flat_map(|setting| [(At::Samples, *setting), (At::Crossings, *setting)]);
+        let both = settings
+            .iter()
+            .flat_map(|setting| [(At::Samples, *setting), (At::Crossings, *setting)]);
         Ok(both.map(|(at, setting)| judge(ray, at, setting, oracle)).collect())
     };
     let judged: Vec<_> =
