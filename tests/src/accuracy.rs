@@ -2,6 +2,7 @@
 
 use crate::support::{fail, kerrlight};
 use kerrlight_geodesic::Integrator;
+use kerrlight_validation::accuracy::estimates;
 use kerrlight_validation::accuracy::hard;
 use kerrlight_validation::accuracy::rays::Class;
 use kerrlight_validation::accuracy::sweep::{self, Sweep};
@@ -48,6 +49,37 @@ fn code_estimates_bound_errors() {
         assert!(row.bounded >= 0.97, "{row:?}");
         if row.class == Class::Generic && row.integrator != Integrator::Elliptic {
             assert!(row.overestimate < 100.0, "{row:?}");
+        }
+    }
+}
+
+/// Where estimates were too small: crossings, whose own Mino time has an error, next to the critical
+/// curve and elsewhere; observers close to the hole; rays that turn next to their observer; the
+/// delay of the closed form.
+#[test]
+fn code_estimates_bound_errors_of_every_class() {
+    use estimates::Class as Every;
+    let all = [
+        (Integrator::TaylorMino, 1e-6),
+        (Integrator::TaylorMino, 1e-12),
+        (Integrator::Dop853Mino, 1e-9),
+        (Integrator::Rk45Mino, 1e-6),
+        (Integrator::Elliptic, 1e-14),
+    ];
+    for class in Every::ALL {
+        for row in estimates::run(class, &all, 120, 11).expect("rays") {
+            assert!(row.holds(), "{}", row.line());
+            let [radius, ..] = row.held;
+            let loose = matches!(class, Every::Far | Every::Tangential)
+                || row.integrator == Integrator::Elliptic;
+            assert!(row.wrong == 0 && (loose || radius.overestimate < 250.0), "{}", row.line());
+        }
+    }
+    // Ten times slower than the others.
+    for class in [Every::From6, Every::From20] {
+        for row in estimates::run(class, &[(Integrator::Rk45Affine, 1e-6)], 100, 11).expect("rays")
+        {
+            assert!(row.holds(), "{}", row.line());
         }
     }
 }
