@@ -30,7 +30,7 @@ pub(crate) struct DormandPrince5;
 
 impl Method<7> for DormandPrince5 {
     const TABLEAU: Tableau<7> = DORMAND_PRINCE_5;
-    const CAUTION: f64 = 1.5;
+    const CAUTION: f64 = 2.0;
 }
 
 const DORMAND_PRINCE_5: Tableau<7> = Tableau {

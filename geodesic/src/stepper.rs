@@ -245,7 +245,7 @@ impl Taylor {
 
 /// How much larger the rest of a series may be than its first term: measured (docs/accuracy.md
 /// of the repository).
-const CAUTION: f64 = 2.5;
+const CAUTION: f64 = 3.0;
 
 impl Taylor {
     /// Size of the first terms that are left out, by the ratio of the last two that are not to
