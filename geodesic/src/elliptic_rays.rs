@@ -33,9 +33,10 @@ pub(crate) fn trace(
     fates(hole, &rays, &mut bundle);
     bundle.uncertainty = vec![Uncertainty::default(); rays.len()];
     let clocks: Vec<Clock> = rays.iter().map(|ray| Clock::new(hole, ray)).collect();
-    crossings(hole, observer, alpha, beta, request, &clocks, &mut bundle)?;
+    let job = Job { hole, observer, alpha, beta, request, clocks: &clocks };
+    crossings(&job, &mut bundle)?;
     if let Placement::MinoTime(n) = request.samples {
-        samples(hole, observer, alpha, beta, request, n, &clocks, &mut bundle)?;
+        samples(&job, n, &mut bundle)?;
     } else {
         rays.iter().for_each(|_| bundle.samples.end_ray());
     }
@@ -66,15 +67,18 @@ fn fates(hole: &Kerr, rays: &[Ray], bundle: &mut Bundle) {
     }
 }
 
-fn crossings(
-    hole: &Kerr,
-    observer: &Observer,
-    alpha: &[f64],
-    beta: &[f64],
-    request: &Request,
-    clocks: &[Clock],
-    bundle: &mut Bundle,
-) -> Result<(), OutOfRange> {
+/// Rays of one observer, and what is wanted of them.
+struct Job<'a> {
+    hole: &'a Kerr,
+    observer: &'a Observer,
+    alpha: &'a [f64],
+    beta: &'a [f64],
+    request: &'a Request,
+    clocks: &'a [Clock],
+}
+
+fn crossings(job: &Job<'_>, bundle: &mut Bundle) -> Result<(), OutOfRange> {
+    let Job { hole, observer, alpha, beta, request, clocks } = job;
     let mut found = Crossings::default();
     if request.crossings > 0 {
         found.trace(hole, observer, alpha, beta, request.crossings)?;
@@ -152,6 +156,17 @@ impl Clock {
         self.b * inner.max(rest) / steps
     }
 
+    /// At worst of samples a `step` of Mino time apart, whose positions have this error; without
+    /// those at the horizon, where the delay has no limit.
+    fn worst(&self, hole: &Kerr, [radii, delays]: [&[f64]; 2], step: f64, error: f64) -> f64 {
+        let horizon = hole.horizon() * (1.0 + 2e-8);
+        let fine = (self.b * step / MAX_STEP).ceil().max(1.0);
+        let quadrature = self.quadrature(self.b * step / fine);
+        let outside = radii.iter().zip(delays).filter(|(r, _)| **r > horizon);
+        let each = outside.map(|(r, delay)| self.rounding(*delay, *r) + error * self.reach(*r));
+        each.fold(0.0, f64::max) + quadrature
+    }
+
     /// By rounding, at radius `r`.
     fn rounding(&self, delay: f64, r: f64) -> f64 {
         16.0 * f64::EPSILON * (delay.abs() + r + self.start + self.b)
@@ -166,16 +181,8 @@ impl Clock {
 
 /// Samples equidistant in Mino time, without those at infinity: rays that fall have one of
 /// these, others two.
-fn samples(
-    hole: &Kerr,
-    observer: &Observer,
-    alpha: &[f64],
-    beta: &[f64],
-    request: &Request,
-    n: usize,
-    clocks: &[Clock],
-    bundle: &mut Bundle,
-) -> Result<(), OutOfRange> {
+fn samples(job: &Job<'_>, n: usize, bundle: &mut Bundle) -> Result<(), OutOfRange> {
+    let Job { hole, observer, alpha, beta, request, clocks } = job;
     let captured = |k: &usize| bundle.outcome[*k] == Outcome::Captured;
     let all = 0..alpha.len();
     let (falling, rising): (Vec<usize>, Vec<usize>) = all.partition(captured);
@@ -217,16 +224,9 @@ fn samples(
                 share * hole.sigma(ray.radius[j], ray.theta[j].cos())
             }));
         }
-        let horizon = hole.horizon() * (1.0 + 2e-8);
-        let clock = &clocks[k];
-        let fine = (clock.b * step / MAX_STEP).ceil().max(1.0);
-        let quadrature = clock.quadrature(clock.b * step / fine);
-        let delays = ray.radius[span.clone()].iter().zip(&ray.delay[span]);
-        // At the horizon the delay has no limit.
-        let delay = delays.filter(|(r, _)| **r > horizon).map(|(r, delay)| {
-            quadrature + clock.rounding(*delay, *r) + ray.error * clock.reach(*r)
-        });
-        widen(&mut bundle.uncertainty[k], ray.error, delay.fold(0.0, f64::max));
+        let points = [&ray.radius[span.clone()], &ray.delay[span]];
+        let delay = clocks[k].worst(hole, points, step, ray.error);
+        widen(&mut bundle.uncertainty[k], ray.error, delay);
         bundle.samples.end_ray();
     }
     Ok(())
