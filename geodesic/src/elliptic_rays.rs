@@ -96,7 +96,7 @@ fn crossings(job: &Job<'_>, bundle: &mut Bundle) -> Result<(), OutOfRange> {
             let delay = clocks[k].rounding(crossing.delay, r)
                 + clocks[k].quadrature(clocks[k].step_to(time, half))
                 + crossing.error * clocks[k].reach(r);
-            widen(&mut bundle.uncertainty[k], crossing.error, delay);
+            widen(&mut bundle.uncertainty[k], crossing.error, crossing.error, delay);
         }
         bundle.crossings.end_ray();
     }
@@ -115,10 +115,10 @@ fn angles(points: &mut Points, request: &Request, azimuth: f64, delay: f64) {
 
 /// Takes the error of a position and that of its delay into the estimate of a ray. A relative
 /// error of 1/r of 1 or more leaves nothing known about r and the delay.
-fn widen(worst: &mut Uncertainty, error: f64, delay: f64) {
+fn widen(worst: &mut Uncertainty, error: f64, azimuth: f64, delay: f64) {
     let lost = if error < 1.0 { 1.0 / (1.0 - error) } else { f64::INFINITY };
     let (radius, delay) = (error * lost, delay * lost);
-    *worst = worst.max(Uncertainty { radius, theta: error, azimuth: error, delay });
+    *worst = worst.max(Uncertainty { radius, theta: error, azimuth, delay });
 }
 
 /// The error of the delay over b, by quadrature at the largest step: of the derivatives of 1/g at
@@ -129,6 +129,7 @@ const QUADRATURE: f64 = 2e-10;
 /// What the error of a ray's delay depends on.
 struct Clock {
     spin: f64,
+    lambda: f64,
     /// The ray's fastest frequency.
     b: f64,
     /// Radius of the observer; 0 for one at infinity, where closed forms start from 0.
@@ -139,7 +140,7 @@ impl Clock {
     fn new(hole: &Kerr, ray: &Ray) -> Self {
         let w = ray.inverse_radius;
         let start = if w > 0.0 { 1.0 / w } else { 0.0 };
-        Clock { spin: hole.spin(), b: ray.angular.max(1.0).sqrt(), start }
+        Clock { spin: hole.spin(), lambda: ray.lambda, b: ray.angular.max(1.0).sqrt(), start }
     }
 
     /// By quadrature with steps of bτ `step`: of order ten.
@@ -170,6 +171,12 @@ impl Clock {
     /// By rounding, at radius `r`.
     fn rounding(&self, delay: f64, r: f64) -> f64 {
         16.0 * f64::EPSILON * (delay.abs() + r + self.start + self.b)
+    }
+
+    /// By how much faster the azimuth grows at radius `r` than bτ: frame dragging.
+    fn dragging(&self, r: f64) -> f64 {
+        let (a, delta) = (self.spin, (r * (r - 2.0) + self.spin * self.spin).max(f64::EPSILON));
+        1.0 + (a * ((r * r + a * (a - self.lambda)) / delta - 1.0)).abs() / self.b
     }
 
     /// By how much the delay moves with a relative error of the radius: r dt/dr.
@@ -226,7 +233,9 @@ fn samples(job: &Job<'_>, n: usize, bundle: &mut Bundle) -> Result<(), OutOfRang
         }
         let points = [&ray.radius[span.clone()], &ray.delay[span]];
         let delay = clocks[k].worst(hole, points, step, ray.error);
-        widen(&mut bundle.uncertainty[k], ray.error, delay);
+        // A ray that falls is dragged most at its end, which its error knows.
+        let dragged = if falls { 1.0 } else { clocks[k].dragging(bundle.turning_radius[k]) };
+        widen(&mut bundle.uncertainty[k], ray.error, ray.error * dragged, delay);
         bundle.samples.end_ray();
     }
     Ok(())
