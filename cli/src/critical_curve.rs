@@ -36,6 +36,13 @@ impl CriticalCurveTable {
         let output = self.output.as_deref().map(|path| Output::new(path, "csv")).transpose()?;
         let points: Vec<_> =
             CriticalCurve::new(&hole, inclination).points(self.points).map(values).collect();
+        let endless = points.iter().filter(|point| !point.iter().all(|x| x.is_finite())).count();
+        if endless > 0 {
+            eprintln!(
+                "note: {endless} of {} points are orbits on the horizon of a hole with |a| = M, where delta and tau are inf",
+                points.len()
+            );
+        }
         let column = |k: usize| points.iter().map(|point| point[k]).collect();
         let table: Vec<_> = COLUMNS
             .iter()

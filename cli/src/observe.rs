@@ -123,6 +123,9 @@ impl Observe {
         }
         let times_h = schedule.hours_utc(setup.ut1)?;
         let (movie, frames_h, said) = self.movie(&files, &times_h)?;
+        if let Some(warning) = odd(&movie.pixels) {
+            eprintln!("warning: {}: {warning}", self.shown());
+        }
         let fill = simulate::fill(&mut observation, &movie, self.pulse(), &frames_h, self.method());
         let transform = fill.with_context(|| self.shown())?;
         self.spoil(&mut observation, seed)?;
@@ -254,5 +257,18 @@ impl Observe {
             (noise, seed) => format!("noise {noise:?}, seed {}", seed.unwrap_or_default()),
         });
         lines
+    }
+}
+
+/// What is allowed of pixels and most probably not meant.
+fn odd(pixels: &[f64]) -> Option<String> {
+    let least = pixels.iter().fold(f64::INFINITY, |least, x| least.min(*x));
+    let most = pixels.iter().fold(f64::NEG_INFINITY, |most, x| most.max(*x));
+    match (least, most) {
+        (0.0, 0.0) => Some("every pixel is 0: so is every visibility, but for noise".to_owned()),
+        _ if least < 0.0 => {
+            Some(format!("pixels below 0 (down to {least:e} Jy): no total intensity"))
+        }
+        _ => None,
     }
 }

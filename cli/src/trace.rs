@@ -90,6 +90,9 @@ const NAMES: [&str; 5] = ["spin", RADIANS, DEGREES, "alpha", "beta"];
 const RADIANS: &str = "inclination_rad";
 const DEGREES: &str = "inclination_deg";
 
+/// Spheres beyond have path lengths in which steps near the hole are lost, M.
+const FARTHEST: f64 = 1e9;
+
 impl Trace {
     /// Traces all rays of the table.
     pub fn run(&self) -> anyhow::Result<()> {
@@ -112,6 +115,9 @@ impl Trace {
                 "--observer {} is not allowed: `infinity` or a radius above 2 (M)",
                 self.observer
             );
+        }
+        if let Some(radius) = self.within.filter(|radius| !(1.0..=FARTHEST).contains(radius)) {
+            bail!("--within {radius} is not allowed: 1 to {FARTHEST:e} (M)");
         }
         let npz = self.output.as_deref().and_then(|p| p.extension()).is_some_and(|e| e == "npz");
         let extension = if npz { "npz" } else { "csv" };
