@@ -294,6 +294,7 @@ fn code_pixels_are_those_of_the_renderer() {
         "screen.field_of_view_uas=",
         "screen.field_of_view_m=24.0",
         "screen.channels=[\"intensity\"]",
+        "screen.rings=\"regular-grid\"",
         "observer.time=45.0",
     ];
     let scene = crate::support::scene(&text, &changes);

@@ -11,14 +11,19 @@ const TRIAL: usize = 2048;
 /// Prints the plan with the estimated cost of each part.
 pub fn before(scene: &Scene, raster: &Raster) -> Result<(), RenderError> {
     let screen = &scene.screen;
-    let rays =
+    let grid =
         f64::from(screen.width) * f64::from(screen.height) * f64::from(screen.samples_per_pixel);
+    let rings = raster.ring_rays() as f64;
+    let rays = grid + rings;
     // The first rays warm caches up.
     raster.trial(TRIAL / 8)?;
     let trial = raster.trial(TRIAL)?;
     let refined = if screen.image_error.is_some() { " and those of refined pixels" } else { "" };
     let threads = rayon::current_num_threads();
-    eprintln!("plan: {rays} rays{refined} on {threads} threads, estimated from {TRIAL} rays");
+    let placed = if rings > 0.0 { format!(" ({rings} along photon rings)") } else { String::new() };
+    eprintln!(
+        "plan: {rays} rays{placed}{refined} on {threads} threads, estimated from {TRIAL} rays"
+    );
     let plan = Plan::new(scene);
     for part in Part::ALL {
         let each = trial.spent(part).as_secs_f64() / TRIAL as f64;

@@ -196,6 +196,14 @@ impl Medium for GasModel {
         None
     }
 
+    fn relative_size(&self) -> f64 {
+        let falls = match self.profile {
+            GasProfile::Gaussian => 1.0,
+            GasProfile::PowerLaw { slope } => slope.max(1.0),
+        };
+        1.0 / self.flatness.max(falls)
+    }
+
     fn sphere(&self) -> f64 {
         self.outer
     }

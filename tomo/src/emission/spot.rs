@@ -46,6 +46,11 @@ impl SpotModel {
         }
     }
 
+    /// 2σ over the radius of the orbit: samples of a Gaussian so far apart have its integral to 1.4 %.
+    pub fn relative_size(&self) -> f64 {
+        2.0 * self.sigma / self.orbit
+    }
+
     /// Angular velocity of the orbit at radius r.
     fn rate(&self, r: f64) -> f64 {
         1.0 / (r * r.sqrt() + self.drag)

@@ -94,9 +94,10 @@ impl Raster {
         }
         let pixels = match tolerance {
             Some(tolerance) => {
-                vec![Adaptive { stage, grid, tolerance }.pixels((rows, columns), work)?]
+                let rings = self.rings.as_ref();
+                vec![Adaptive { stage, grid, rings, tolerance }.pixels((rows, columns), work)?]
             }
-            None => uniform(stage, grid, (rows, columns), times, work)?,
+            None => uniform((stage, self.rings.as_ref()), grid, (rows, columns), times, work)?,
         };
         if let Some(meter) = &self.meter {
             meter.lock().unwrap_or_else(PoisonError::into_inner).add(&work.scratch.meter);

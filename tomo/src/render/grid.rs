@@ -1,5 +1,6 @@
 //! Where rays go.
 
+use super::rings::Square;
 use crate::scene::Scene;
 
 /// Pixel centres on a regular grid, rows from the top (largest β), square pixels, `side`² rays
@@ -31,6 +32,12 @@ impl Grid {
             (twice as f64 - (count * self.side) as f64) / (2 * self.side) as f64 * self.size
         };
         (along(column, i, self.width), -along(row, j, self.height))
+    }
+
+    /// The square about a point of a pixel (in pixels from its centre to the right and down), `width` of a
+    /// pixel wide.
+    pub fn square(&self, column: usize, row: usize, place: [f64; 2], width: f64) -> Square {
+        Square { center: self.inside(column, row, place), size: width * self.size }
     }
 
     /// Screen coordinates of a point of a pixel, in pixels from its centre to the right and down.

@@ -10,19 +10,23 @@ mod grid;
 mod journal;
 mod pixels;
 mod raw;
+mod rings;
 mod tally;
 
 pub use channels::{CHANNELS, ChannelKind};
 pub use journal::{Found, Journal};
 pub(crate) use raw::Raw;
+pub use rings::{RingStrata, Stratum};
 pub use tally::Summary;
 
 use crate::image::Picture;
 use crate::image::exr::Layout;
-use crate::scene::Scene;
+use crate::scene::{Rings, Scene};
 use crate::transport::{Assets, Glimpse, Meter, Scratch, Stage};
 use grid::Grid;
 use kerrlight_geodesic::OutOfRange;
+use rayon::prelude::*;
+use rings::{Resolver, Square};
 use std::sync::{Mutex, PoisonError};
 use tally::{Tally, own_unit};
 
@@ -66,6 +70,7 @@ pub struct Raster {
     scene: Scene,
     stage: Stage,
     grid: Grid,
+    rings: Option<Resolver>,
     channels: Vec<&'static ChannelKind>,
     layout: Layout,
     /// Factor from the scene's unit of intensity to that in which bands are kept: the file's,
@@ -83,6 +88,14 @@ const TRIAL: usize = 64;
 /// Columns of a tile: with the rows of a band a block of rays.
 const TILE: usize = 64;
 
+/// What resolves photon rings, if the scene has them resolved.
+fn resolver(scene: &Scene, stage: &Stage) -> Option<Resolver> {
+    match scene.screen.rings {
+        Rings::Resolved => Resolver::new(stage, scene.screen.image_error.is_some()),
+        Rings::RegularGrid => None,
+    }
+}
+
 impl Raster {
     /// The picture of `scene` with the decoded files that it names.
     ///
@@ -93,11 +106,12 @@ impl Raster {
         let grid = Grid::new(scene);
         let refined = scene.screen.image_error.is_some();
         let channels = channels::chosen(&stage, refined, scene.screen.channels.as_deref())?;
+        let rings = resolver(scene, &stage);
         let names: Vec<&str> = channels.iter().map(|kind| kind.name).collect();
         let layout = Layout::new(grid.width, grid.height, &names)?;
         let unit = if scene.screen.total_flux_jy.is_none() { own_unit(scene) } else { 1.0 };
         let scene = scene.clone();
-        Ok(Raster { scene, stage, grid, channels, layout, unit, tile: TILE, meter: None })
+        Ok(Raster { scene, stage, grid, rings, channels, layout, unit, tile: TILE, meter: None })
     }
 
     /// The same with tiles of `columns` pixels; no pixel depends on it.
@@ -144,6 +158,25 @@ impl Raster {
             self.stage.look_many(&alpha, &beta, &[self.stage.time()], &mut scratch, &mut seen)?;
         }
         Ok(scratch.meter)
+    }
+
+    /// About how many rays photon rings take besides those of the regular grid, what hides them left out
+    /// of account: counted in up to 256 rows.
+    pub fn ring_rays(&self) -> u64 {
+        let Some(rings) = &self.rings else { return 0 };
+        let Grid { width, height, side, size } = self.grid;
+        let step = height.div_ceil(256);
+        let of_row = |row: usize| {
+            let places = (0..width * side * side).map(|k| (k / (side * side), k % (side * side)));
+            let square = |(column, k): (usize, usize)| {
+                let center = self.grid.screen(column, row, k % side, k / side);
+                rings.count(Square { center, size: size / side as f64 }) as u64
+            };
+            places.map(square).sum::<u64>()
+        };
+        let rows: Vec<usize> = (0..height).step_by(step).collect();
+        let found: u64 = rows.par_iter().map(|row| of_row(*row)).sum();
+        found * height as u64 / rows.len() as u64
     }
 
     /// Number of bands.

@@ -1,6 +1,7 @@
 //! The pixels of a tile, from blocks of rays.
 
 use super::grid::Grid;
+use super::rings::{Counted, Resolver, Square};
 use crate::transport::{Fate, Glimpse, Scratch, Stage};
 use kerrlight_geodesic::OutOfRange;
 use std::ops::Range;
@@ -17,6 +18,8 @@ pub(super) struct Pixel {
     pub rays: u32,
     /// Estimated absolute error of the intensity; 0 where it is not estimated pixel by pixel.
     pub error: f64,
+    /// The share of the pixel whose error that is.
+    pub known: f64,
 }
 
 /// Rays that are asked for at once.
@@ -28,6 +31,7 @@ pub(super) struct Workspace {
     pub scratch: Scratch,
     alpha: Vec<f64>,
     beta: Vec<f64>,
+    squares: Vec<Square>,
     seen: Vec<Glimpse>,
 }
 
@@ -36,12 +40,25 @@ impl Workspace {
     pub fn clear(&mut self) {
         self.alpha.clear();
         self.beta.clear();
+        self.squares.clear();
     }
 
-    /// One more ray.
-    pub fn push(&mut self, (alpha, beta): (f64, f64)) {
-        self.alpha.push(alpha);
-        self.beta.push(beta);
+    /// One more ray, through the centre of a square.
+    pub fn push(&mut self, square: Square) {
+        self.alpha.push(square.center.0);
+        self.beta.push(square.center.1);
+        self.squares.push(square);
+    }
+
+    /// One more ray of a square.
+    pub fn push_ray(&mut self, (x, y): (f64, f64)) {
+        self.alpha.push(x);
+        self.beta.push(y);
+    }
+
+    /// The squares whose centres have been pushed.
+    pub fn squares(&self) -> &[Square] {
+        &self.squares
     }
 
     /// What all rays see, in their order.
@@ -55,8 +72,13 @@ impl Workspace {
         Ok(&self.seen)
     }
 
+    /// How many rays there are.
+    pub fn len(&self) -> usize {
+        self.alpha.len()
+    }
+
     /// What a block of rays sees at each of `times`: ray k at time j is `[j · rays + k]`.
-    fn look_at(&mut self, stage: &Stage, times: &[f64]) -> Result<&[Glimpse], OutOfRange> {
+    pub fn look_at(&mut self, stage: &Stage, times: &[f64]) -> Result<&[Glimpse], OutOfRange> {
         self.seen.clear();
         self.seen.resize(self.alpha.len() * times.len(), Glimpse::default());
         stage.look_many(&self.alpha, &self.beta, times, &mut self.scratch, &mut self.seen)?;
@@ -65,9 +87,9 @@ impl Workspace {
 }
 
 /// The pixels of a rectangle at each of `times`, row by row, with `side`² rays each, which are
-/// traced once for all times.
+/// traced once for all times, and more where `rings` says so.
 pub(super) fn uniform(
-    stage: &Stage,
+    (stage, rings): (&Stage, Option<&Resolver>),
     grid: &Grid,
     (rows, columns): (Range<usize>, Range<usize>),
     times: &[f64],
@@ -83,16 +105,44 @@ pub(super) fn uniform(
         work.clear();
         for (column, row) in some {
             for k in 0..side * side {
-                work.push(grid.screen(*column, *row, k % side, k / side));
+                let center = grid.screen(*column, *row, k % side, k / side);
+                work.push(Square { center, size: grid.size / side as f64 });
             }
         }
         let rays = some.len() * side * side;
-        let seen = work.look_at(stage, times)?.chunks_exact(rays);
-        for (pixels, seen) in pixels.iter_mut().zip(seen) {
-            pixels.extend(seen.chunks_exact(side * side).map(|rays| mean(rays, side)));
+        work.look_at(stage, times)?;
+        let mut seen = std::mem::take(&mut work.seen);
+        let counted = match rings {
+            Some(rings) => {
+                let squares = std::mem::take(&mut work.squares);
+                rings.resolve(stage, &squares, times, &mut seen, work)?
+            }
+            None => Vec::new(),
+        };
+        let mut counted = counted.chunks_exact(side * side);
+        for (pixels, seen) in pixels.iter_mut().zip(seen.chunks_exact(rays)) {
+            for rays in seen.chunks_exact(side * side) {
+                let more = counted.next().unwrap_or_default();
+                pixels.push(with_rings(mean(rays, side), more));
+            }
         }
+        work.seen = seen;
     }
     Ok(pixels)
+}
+
+/// A pixel with what is known of the squares around its rays.
+fn with_rings(mut pixel: Pixel, squares: &[Counted]) -> Pixel {
+    let share = 1.0 / (squares.len() as f64).max(1.0);
+    let mut error2 = 0.0;
+    for square in squares.iter().filter(|square| square.rays > 0) {
+        pixel.rays += square.rays;
+        pixel.unresolved += square.unresolved;
+        pixel.known += share;
+        error2 += (share * square.error).powi(2);
+    }
+    pixel.error = error2.sqrt();
+    pixel
 }
 
 /// One pixel from its rays, row by row.

@@ -3,7 +3,7 @@
 use super::bands::{Band, render_bands};
 use super::grid::Grid;
 use super::tally::{Summary, Tally};
-use super::{Progress, Raster, RenderError, Rendered};
+use super::{Progress, Raster, RenderError, Rendered, resolver};
 use crate::image::{Channel, Picture};
 use crate::scene::Scene;
 use std::sync::{Mutex, PoisonError};
@@ -96,6 +96,7 @@ impl Raster {
     pub(crate) fn move_to(&mut self, time: f64) -> Result<(), RenderError> {
         self.scene.observer.time = time;
         self.stage.move_to(&self.scene)?;
+        self.rings = resolver(&self.scene, &self.stage);
         self.grid = Grid::new(&self.scene);
         Ok(())
     }

@@ -83,7 +83,8 @@ impl Tally {
 /// With one ray at its centre a pixel of a smooth picture is off by (D_xx + D_yy)/24; one with an
 /// edge somewhere in it by up to half the edge's height, a quarter on average, where
 /// |D_xx| + |D_yy| is one to two heights. Hence (|D_xx| + |D_yy|)/8. `side`² rays see edges
-/// in `side` of their cells, whose errors are independent: a factor `side`^(−3/2).
+/// in `side` of their cells, whose errors are independent: a factor `side`^(−3/2). Where photon rings are
+/// resolved the rays along them know the error.
 fn sampling_error(pixels: &[Pixel], width: usize, side: usize) -> f64 {
     let rows = pixels.len() / width.max(1);
     let second = |k: usize, count: usize, at: &dyn Fn(usize) -> f64| {
@@ -93,20 +94,23 @@ fn sampling_error(pixels: &[Pixel], width: usize, side: usize) -> f64 {
         let middle = k.clamp(1, count - 2);
         Some((at(middle - 1) - 2.0 * at(middle) + at(middle + 1)).abs())
     };
-    let mut sum = 0.0;
+    let (mut sum, mut known) = (0.0, 0.0);
     for row in 0..rows {
         for column in 0..width {
             let across = second(column, width, &|k| pixels[row * width + k].intensity);
             let down = second(row, rows, &|k| pixels[k * width + column].intensity);
-            sum += match (across, down) {
+            let pixel = &pixels[row * width + column];
+            let unknown = match (across, down) {
                 (Some(x), Some(y)) => x + y,
                 // A picture or band this narrow says nothing across it.
                 (Some(x), None) | (None, Some(x)) => 2.0 * x,
-                (None, None) => pixels[row * width + column].intensity,
+                (None, None) => pixel.intensity,
             };
+            sum += (1.0 - pixel.known) * unknown / 8.0 / (side as f64).powf(1.5);
+            known += pixel.error;
         }
     }
-    sum / 8.0 / (side as f64).powf(1.5)
+    sum + known
 }
 
 /// What is worth knowing about a picture.

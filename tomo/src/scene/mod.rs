@@ -132,6 +132,9 @@ pub struct Screen {
     /// Rays per pixel, a square number: a regular grid inside the pixel.
     #[serde(default = "one")]
     pub samples_per_pixel: u32,
+    /// What becomes of photon rings that are narrower than a pixel.
+    #[serde(default)]
+    pub rings: Rings,
     /// Flux density to which the emission is scaled, in Jy.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub total_flux_jy: Option<f64>,
@@ -146,6 +149,17 @@ pub struct Screen {
 
 fn one() -> u32 {
     1
+}
+
+/// How images of higher order, next to the critical curve, are sampled.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rings {
+    /// Pixels next to the critical curve have more rays, placed along the images.
+    #[default]
+    Resolved,
+    /// Every pixel has `samples_per_pixel` rays on a regular grid.
+    RegularGrid,
 }
 
 /// Which effects are simulated. What is off is not computed.

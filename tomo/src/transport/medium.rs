@@ -12,6 +12,11 @@ pub trait Medium: core::fmt::Debug + Send + Sync {
     fn sphere(&self) -> f64;
     /// What it is made of, if its light is not smooth along panels of any length.
     fn grain(&self) -> Option<Grain>;
+    /// Size of its finest features by their radius, at most about 1: structure of cells is some of them
+    /// wide.
+    fn relative_size(&self) -> f64 {
+        self.grain().map_or(1.0, |grain| 2.0 * grain.size / self.sphere())
+    }
     /// What it has to be told of its nodes besides r and cos θ.
     fn needs(&self) -> Needs;
     /// Linear colour.

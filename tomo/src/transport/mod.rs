@@ -129,6 +129,14 @@ pub struct Scratch {
 /// Where the SIMD kernels can have an observer, in M.
 const NEAREST: f64 = 10.0;
 
+/// Relative size of features with sharp edges, as far as photon rings go: the error of a ring with two
+/// edges is a few hundredths of it.
+const SHARP: f64 = 0.1;
+
+/// Photon rings of what is smaller are sampled as if it were as large as this, of what is larger, as this.
+const FINEST: f64 = 0.03;
+const SMOOTH: f64 = 0.5;
+
 fn mesh_tree(
     scene: &Scene,
     files: &[MeshFile],
@@ -248,6 +256,24 @@ impl Stage {
     /// Whether anything absorbs.
     pub fn absorbs(&self) -> bool {
         self.media.iter().any(|medium| medium.absorbs())
+    }
+
+    /// Spacing of rays, in the logarithm of their distance from the critical curve, that resolves what
+    /// shines in its images of higher order; none where there are no such images.
+    pub fn ring_spacing(&self) -> Option<f64> {
+        if !self.lensing || self.half_orbits == Some(0) {
+            return None;
+        }
+        let edges = self.disc.is_some() || self.meshes.is_some();
+        let spots = self.spots.iter().map(SpotModel::relative_size);
+        let media = self.media.iter().map(|medium| medium.relative_size());
+        let finest = spots.chain(media).chain(edges.then_some(SHARP)).reduce(f64::min)?;
+        Some(finest.clamp(FINEST, SMOOTH))
+    }
+
+    /// Whether there is a disc that hides what is behind it.
+    pub fn has_opaque_disc(&self) -> bool {
+        self.disc.as_ref().is_some_and(|disc| disc.opaque)
     }
 
     /// The tree over the spots for a time of observation. With slow light one tree serves all, of

@@ -1,18 +1,24 @@
-//! One sharp image of the volume as the observer sees it, with more rays than the data have pixels.
+//! One sharp image of the volume as the observer sees it, with more rays than the data have pixels and as many
+//! along photon rings as these take.
 
 use super::Estimate;
 use crate::fit::setup::{self, Instrument};
 use kerrlight_tomo::fit::{
     Batch, Chain, Field, Motion, Sampling, SightlineRequest, Sightlines, State, Trainer,
 };
+use kerrlight_tomo::render::{RingStrata, Stratum};
 use kerrlight_tomo::representation::Workspace;
+use kerrlight_tomo::transport::View;
 
-/// Rays along each side.
+/// Pixels along each side.
 pub const SIDE: usize = 256;
 /// Rows that are traced at a time: what they need goes like their number.
 const ROWS: usize = 32;
+/// Of rays along photon rings, in the logarithm of their distance from the critical curve: less than a cell of
+/// a volume by its radius.
+const SPACING: f64 = 0.1;
 
-/// Images of SIDE × SIDE rays, rows from the top: Σ emission · path, in M.
+/// Images of SIDE × SIDE pixels, rows from the top: Σ emission · path, in M.
 pub struct Still {
     /// When it is seen, M.
     pub time: f64,
@@ -30,13 +36,14 @@ impl Estimate<'_> {
         let motion = Motion { times: vec![time], ..self.motion.clone() };
         let mut still = Still { time, recovered: Vec::new(), truth: None };
         for row in (0..SIDE).step_by(ROWS) {
-            let mut chain = self.rows(row, &motion)?;
-            still.recovered.extend(recovered(&mut chain, trainer, state));
+            let rays = self.rays(row)?;
+            let mut chain = self.chain(&rays, &motion)?;
+            still.recovered.extend(rays.pixels(&recovered(&mut chain, trainer, state)));
             if let Some(truth) = &self.measured.truth {
                 chain.weigh(truth.axis());
                 let image = chain.movie_of(truth.axis(), &|x| truth.at(x), &mut Batch::default());
-                let image = image.into_iter().map(|x| x as f32);
-                still.truth.get_or_insert_default().extend(image);
+                let image: Vec<f32> = image.into_iter().map(|x| x as f32).collect();
+                still.truth.get_or_insert_default().extend(rays.pixels(&image));
             }
         }
         Ok(still)
@@ -49,14 +56,29 @@ impl Estimate<'_> {
         if within { reference } else { times[times.len() / 2] }
     }
 
-    /// Nodes of some rows of rays, with the weights of integrals along them.
-    fn rows(&self, first: usize, motion: &Motion) -> anyhow::Result<Chain<f32>> {
+    /// The rays of some rows of pixels: one through the centre of each, or several along photon rings.
+    fn rays(&self, first: usize) -> anyhow::Result<Rays> {
         let screen = &self.file.screen;
         let step = setup::spacing(screen)? * screen.pixels as f64 / SIDE as f64;
         let at = |k: usize| (k as f64 - 0.5 * (SIDE as f64 - 1.0)) * step;
-        let rays = first * SIDE..(first + ROWS) * SIDE;
-        let (alpha, beta): (Vec<f64>, Vec<f64>) =
-            rays.map(|k| (at(k % SIDE), -at(k / SIDE))).unzip();
+        let view = View::Screen(setup::observer(&self.file.observer)?);
+        let strata = RingStrata::new(&self.instrument.hole, &view, SPACING);
+        let mut rays = Rays::default();
+        let mut ring = Vec::new();
+        for k in first * SIDE..(first + ROWS) * SIDE {
+            let (x, y) = (at(k % SIDE), -at(k / SIDE));
+            ring.clear();
+            strata.place((x, y), step, &mut ring);
+            if ring.is_empty() {
+                ring.push(Stratum { x, y, share: 1.0 });
+            }
+            rays.add(&ring);
+        }
+        Ok(rays)
+    }
+
+    /// Nodes of rays, with the weights of integrals along them.
+    fn chain(&self, rays: &Rays, motion: &Motion) -> anyhow::Result<Chain<f32>> {
         let Instrument { hole, redshift, .. } = self.instrument;
         let request = SightlineRequest {
             region: setup::region(&self.file.region),
@@ -65,8 +87,37 @@ impl Estimate<'_> {
             momentum: redshift.is_some(),
         };
         let observer = setup::observer(&self.file.observer)?;
-        let lines = Sightlines::trace(hole, &observer, &alpha, &beta, &request)?;
+        let lines = Sightlines::trace(hole, &observer, &rays.alpha, &rays.beta, &request)?;
         Ok(Chain::new(&lines, motion, hole, *redshift)?)
+    }
+}
+
+/// Rays of pixels, one pixel after the other.
+#[derive(Default)]
+struct Rays {
+    alpha: Vec<f64>,
+    beta: Vec<f64>,
+    /// Of their pixels' areas.
+    share: Vec<f64>,
+    /// How many each pixel has.
+    count: Vec<usize>,
+}
+
+impl Rays {
+    fn add(&mut self, pixel: &[Stratum]) {
+        self.alpha.extend(pixel.iter().map(|ray| ray.x));
+        self.beta.extend(pixel.iter().map(|ray| ray.y));
+        self.share.extend(pixel.iter().map(|ray| ray.share));
+        self.count.push(pixel.len());
+    }
+
+    /// Means over the pixels of what the rays see.
+    fn pixels(&self, seen: &[f32]) -> Vec<f32> {
+        let mut rays = seen.iter().zip(&self.share);
+        let mut mean = |count: &usize| {
+            rays.by_ref().take(*count).map(|(light, share)| f64::from(*light) * share).sum::<f64>()
+        };
+        self.count.iter().map(|count| mean(count) as f32).collect()
     }
 }
 

@@ -37,7 +37,12 @@ impl Cell {
         let off = (0.25 * (a + b + c + d) - middle.intensity).abs();
         let twist = (0.25 * (a - b - c + d)).abs();
         let mut error = 0.5 * (off + twist);
-        if quarters.iter().any(|light| light.kind != middle.kind) {
+        if middle.mean.is_some() {
+            // Two means over the same square: of the edges that remain the quarters know.
+            let own = quarters.iter().map(|light| light.mean.unwrap_or(0.0).powi(2)).sum::<f64>();
+            error = off.hypot(0.25 * own.sqrt());
+        }
+        if quarters.iter().any(|light| light.other_piece(middle)) {
             error = error.max(0.25 * range([a, b, c, d, middle.intensity].into_iter()));
         }
         if quarters.iter().any(|light| light.other_band(middle)) {

@@ -19,7 +19,7 @@ impl CellMap {
             let [column, row] = cell.center.map(first);
             for row in row..row + size {
                 let start = row * Self::SIDE + column;
-                // A pixel has at most MOST_RAYS cells.
+                // A pixel has at most MOST_SAMPLES cells.
                 map.0[start..start + size].fill(number as u16);
             }
         }
@@ -50,7 +50,7 @@ impl CellMap {
                 let mut across = place;
                 // Just over the border, on the level of the ray.
                 across[axis] += (place[axis] - cell.center[axis]).signum() * 0.251 * size;
-                let next = self.light(cells, across).filter(|next| next.kind != light.kind);
+                let next = self.light(cells, across).filter(|next| next.other_piece(light));
                 if let Some(next) = next {
                     seam += 0.25 * quarter * (next.intensity - light.intensity).abs();
                 }

@@ -5,10 +5,9 @@ use super::cell_map::CellMap;
 use super::light::Light;
 use super::{DEEPEST, HIDDEN};
 use crate::render::pixels::Pixel;
-use crate::transport::Glimpse;
 
-/// A pixel that has got as many rays gets no more.
-const MOST_RAYS: u32 = 4096;
+/// A pixel that has got as many samples, of a ray each or of several along photon rings, gets no more.
+const MOST_SAMPLES: u32 = 4096;
 
 /// A pixel that is being cut.
 pub(super) struct Cut {
@@ -24,6 +23,7 @@ pub(super) struct Cut {
     /// How much neighbours' first rays differ from its rays on their side if none of these is of
     /// their kind: an edge may run through between its border and its outermost rays.
     pub(super) contrast: f64,
+    pub(super) samples: u32,
     pub(super) rays: u32,
     pub(super) unresolved: u32,
 }
@@ -76,7 +76,7 @@ impl Cut {
                 place.iter().zip(side).all(|(x, d)| d == 0 || x * f64::from(d) >= reach)
             };
             for (_, light) in cell.rays().filter(|(place, _)| outermost(place)) {
-                if light.kind == neighbor.kind {
+                if !light.other_piece(neighbor) {
                     return 0.0;
                 }
                 contrast = contrast.max((light.intensity - neighbor.intensity).abs());
@@ -88,7 +88,7 @@ impl Cut {
     /// The cells to be cut next, the worst ones, moved to the end; how many.
     pub(super) fn worst(&mut self, tolerance: f64) -> usize {
         self.find_seams();
-        if self.error() <= tolerance || self.rays >= MOST_RAYS {
+        if self.error() <= tolerance || self.samples >= MOST_SAMPLES {
             return 0;
         }
         let may = |cell: &Cell| cell.level < DEEPEST;
@@ -104,14 +104,15 @@ impl Cut {
     }
 
     /// Takes the rays of the quarters of a cell.
-    pub(super) fn add(&mut self, center: [f64; 2], level: u32, middle: &Light, seen: &[Glimpse]) {
+    pub(super) fn add(&mut self, center: [f64; 2], level: u32, middle: &Light, seen: &[Light]) {
         let mut quarters = [Light::default(); 4];
         for (place, seen) in quarters.iter_mut().zip(seen) {
-            *place = Light::from(seen);
-            self.unresolved += u32::from(place.unresolved);
+            *place = *seen;
+            self.rays += place.rays;
+            self.unresolved += place.unresolved;
             self.bright = self.bright.max(place.intensity);
         }
-        self.rays += 4;
+        self.samples += 4;
         self.cells.push(Cell::new(center, level, middle, quarters, self.bright));
     }
 

@@ -1,15 +1,20 @@
 //! What single rays see, and whether two of them see the same piece of the picture.
 
+use crate::render::rings::Counted;
 use crate::transport::{Fate, Glimpse};
 
-/// What a ray adds to its cell.
+/// What a ray, or several along photon rings, adds to its cell.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Light {
     pub(super) intensity: f64,
     pub(super) rgb: [f32; 3],
     pub(super) stokes: [f64; 3],
     pub(super) kind: Kind,
-    pub(super) unresolved: bool,
+    /// Rays that it took, and those of them that were given up.
+    pub(super) rays: u32,
+    pub(super) unresolved: u32,
+    /// Estimated error of the intensity where it is a mean over rays along photon rings.
+    pub(super) mean: Option<f64>,
 }
 
 /// What rays of one smooth piece of the picture have in common.
@@ -26,12 +31,17 @@ pub(super) struct Kind {
 impl Light {
     /// Whether a lensing band or the end of rays lies between two rays.
     pub(super) fn other_band(&self, other: &Light) -> bool {
-        self.kind.band != other.kind.band
+        self.kind.band != other.kind.band && self.mean.is_none() && other.mean.is_none()
     }
-}
 
-impl From<&Glimpse> for Light {
-    fn from(seen: &Glimpse) -> Self {
+    /// Whether two rays see different pieces of the picture; a mean over the rays of a photon ring sees
+    /// all of them.
+    pub(super) fn other_piece(&self, other: &Light) -> bool {
+        self.kind != other.kind && self.mean.is_none() && other.mean.is_none()
+    }
+
+    /// What a ray sees.
+    pub(super) fn of_ray(seen: &Glimpse) -> Self {
         let band = (seen.crossings, seen.fate);
         let (disc_images, lit) = (seen.disc_images, seen.radius > 0.0);
         Light {
@@ -39,7 +49,20 @@ impl From<&Glimpse> for Light {
             rgb: seen.rgb,
             stokes: seen.stokes,
             kind: Kind { band, disc_images, lit },
-            unresolved: seen.fate == Fate::Unresolved,
+            rays: 1,
+            unresolved: u32::from(seen.fate == Fate::Unresolved),
+            mean: None,
+        }
+    }
+
+    /// What a ray sees, or the mean around it.
+    pub(super) fn new((seen, counted): (&Glimpse, &Counted)) -> Self {
+        let ray = Light::of_ray(seen);
+        Light {
+            rays: ray.rays + counted.rays,
+            unresolved: ray.unresolved + counted.unresolved,
+            mean: (counted.rays > 0).then_some(counted.error),
+            ..ray
         }
     }
 }

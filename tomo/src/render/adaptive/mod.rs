@@ -4,7 +4,8 @@
 //! A pixel starts with the ray at its centre. It is cut if one of its eight neighbours sees
 //! another lensing band (number of crossings of the equatorial plane), another image of the disc,
 //! another fate of the ray or emission where it sees none, or if second differences say that its mean is off by more
-//! than the tolerance. Neighbours beyond a tile are traced again, so that no pixel
+//! than the tolerance, or if photon rings run through it: then each part that they run through has rays along
+//! them in place of one ray. Neighbours beyond a tile are traced again, so that no pixel
 //! depends on the tiles.
 
 mod cell;
@@ -17,7 +18,8 @@ pub(super) use tolerance::tolerance;
 
 use super::grid::Grid;
 use super::pixels::{Pixel, Workspace};
-use crate::transport::{Fate, Stage};
+use super::rings::{Counted, Resolver, Square};
+use crate::transport::{Fate, Glimpse, Stage};
 use cell::Cell;
 use cut::Cut;
 use kerrlight_geodesic::OutOfRange;
@@ -34,6 +36,8 @@ const HIDDEN: f64 = 1.0 / 16.0;
 pub(super) struct Adaptive<'a> {
     pub stage: &'a Stage,
     pub grid: &'a Grid,
+    /// What resolves photon rings, in pixels and in parts of pixels.
+    pub rings: Option<&'a Resolver>,
     pub tolerance: f64,
 }
 
@@ -45,13 +49,12 @@ impl Adaptive<'_> {
         work: &mut Workspace,
     ) -> Result<Vec<Pixel>, OutOfRange> {
         let (mut pixels, mut cuts) = self.first(rectangle, work)?;
-        let middles: Vec<Light> =
-            cuts.iter().map(|cut| Light::from(&pixels[cut.pixel].center)).collect();
+        let middles = self.middles(&pixels, &mut cuts, work)?;
         work.clear();
         for cut in &cuts {
             push_quarters(work, self.grid, cut, [0.0; 2], 0);
         }
-        let seen = work.look(self.stage)?;
+        let seen = self.sample(work)?;
         for ((cut, middle), seen) in cuts.iter_mut().zip(&middles).zip(seen.chunks_exact(4)) {
             cut.add([0.0; 2], 0, middle, seen);
         }
@@ -71,6 +74,42 @@ impl Adaptive<'_> {
         Ok(pixels)
     }
 
+    /// What the first rays of pixels that are cut see, or the mean where photon rings run through them.
+    fn middles(
+        &self,
+        pixels: &[Pixel],
+        cuts: &mut [Cut],
+        work: &mut Workspace,
+    ) -> Result<Vec<Light>, OutOfRange> {
+        let mut seen: Vec<Glimpse> = cuts.iter().map(|cut| pixels[cut.pixel].center).collect();
+        let square = |cut: &Cut| self.grid.square(cut.column, cut.row, [0.0; 2], 1.0);
+        let squares: Vec<Square> = cuts.iter().map(square).collect();
+        let counted = self.resolve(&squares, &mut seen, work)?;
+        for (cut, counted) in cuts.iter_mut().zip(&counted) {
+            cut.rays += counted.rays;
+            cut.unresolved += counted.unresolved;
+        }
+        Ok(seen.iter().zip(&counted).map(Light::new).collect())
+    }
+
+    /// The light of the squares of `work`.
+    fn sample(&self, work: &mut Workspace) -> Result<Vec<Light>, OutOfRange> {
+        let mut seen = work.look(self.stage)?.to_vec();
+        let squares = work.squares().to_vec();
+        let counted = self.resolve(&squares, &mut seen, work)?;
+        Ok(seen.iter().zip(&counted).map(Light::new).collect())
+    }
+
+    fn resolve(
+        &self,
+        squares: &[Square],
+        seen: &mut [Glimpse],
+        work: &mut Workspace,
+    ) -> Result<Vec<Counted>, OutOfRange> {
+        let Some(rings) = self.rings else { return Ok(vec![Counted::default(); seen.len()]) };
+        rings.resolve(self.stage, squares, &[self.stage.time()], seen, work)
+    }
+
     /// Traces the quarters of the quarters of `parents`.
     fn deeper(
         &self,
@@ -85,7 +124,8 @@ impl Adaptive<'_> {
                 }
             }
         }
-        let mut seen = work.look(self.stage)?.chunks_exact(4);
+        let lights = self.sample(work)?;
+        let mut seen = lights.chunks_exact(4);
         let mut cuts = Vec::with_capacity(going.len());
         for (mut cut, parents) in going {
             for parent in parents {
@@ -105,7 +145,7 @@ impl Adaptive<'_> {
         (rows, columns): (Range<usize>, Range<usize>),
         work: &mut Workspace,
     ) -> Result<(Vec<Pixel>, Vec<Cut>), OutOfRange> {
-        let Self { grid, tolerance, .. } = *self;
+        let Self { grid, rings, tolerance, .. } = *self;
         // With the neighbours that there are.
         let around = |range: &Range<usize>, count: usize| {
             range.start.saturating_sub(1)..(range.end + 1).min(count)
@@ -114,11 +154,11 @@ impl Adaptive<'_> {
         work.clear();
         for row in high.clone() {
             for column in wide.clone() {
-                work.push(grid.inside(column, row, [0.0; 2]));
+                work.push(grid.square(column, row, [0.0; 2], 1.0));
             }
         }
         let seen = work.look(self.stage)?;
-        let light: Vec<Light> = seen.iter().map(Light::from).collect();
+        let light: Vec<Light> = seen.iter().map(Light::of_ray).collect();
         let place =
             |column: usize, row: usize| (row - high.start) * wide.len() + column - wide.start;
         let (mut pixels, mut cuts) = (Vec::new(), Vec::new());
@@ -132,7 +172,11 @@ impl Adaptive<'_> {
                     &light[place(to(column, dx, &wide), to(row, dy, &high))]
                 };
                 let Estimate { error, contrast, bright } = estimate(neighbor);
-                if contrast.is_some() || error > tolerance {
+                let ring = || {
+                    let square = grid.square(column, row, [0.0; 2], 1.0);
+                    rings.is_some_and(|rings| rings.count(square) > 0)
+                };
+                if contrast.is_some() || error > tolerance || ring() {
                     let around =
                         core::array::from_fn(|k| *neighbor(k as isize % 3 - 1, k as isize / 3 - 1));
                     cuts.push(Cut {
@@ -143,6 +187,7 @@ impl Adaptive<'_> {
                         bright,
                         around,
                         contrast: 0.0,
+                        samples: 0,
                         rays: 0,
                         unresolved: 0,
                     });
@@ -155,6 +200,7 @@ impl Adaptive<'_> {
                     unresolved: u32::from(center.fate == Fate::Unresolved),
                     rays: 1,
                     error,
+                    known: 1.0,
                 });
             }
         }
@@ -165,7 +211,7 @@ impl Adaptive<'_> {
 /// One ray into each quarter of a cell.
 fn push_quarters(work: &mut Workspace, grid: &Grid, cut: &Cut, center: [f64; 2], level: u32) {
     for place in Cell::places(center, level) {
-        work.push(grid.inside(cut.column, cut.row, place));
+        work.push(grid.square(cut.column, cut.row, place, 0.5f64.powi(level as i32 + 1)));
     }
 }
 

@@ -30,7 +30,7 @@ pub(in crate::render) fn tolerance(
         size: grid.size * cut as f64,
         side: 1,
     };
-    let uncut = Adaptive { stage, grid: &coarse, tolerance: f64::INFINITY };
+    let uncut = Adaptive { stage, grid: &coarse, rings: None, tolerance: f64::INFINITY };
     let lines = (0..coarse.height).into_par_iter().map_init(Workspace::default, |work, row| {
         let (pixels, cuts) = uncut.first((row..row + 1, 0..coarse.width), work)?;
         let mut errors: Vec<(f64, f64)> = Vec::with_capacity(pixels.len());

@@ -1,0 +1,174 @@
+//! What squares of a picture see, with the rays that photon rings need.
+
+use super::{RingStrata, Stratum};
+use crate::render::pixels::Workspace;
+use crate::transport::{Fate, Glimpse, Stage};
+use kerrlight_geodesic::OutOfRange;
+use std::ops::Range;
+
+/// Resolves the photon rings of a stage.
+#[derive(Debug, Clone)]
+pub struct Resolver {
+    strata: RingStrata,
+    /// Whether a disc may hide them.
+    hides: bool,
+}
+
+/// A square of the picture, in the view's coordinates.
+#[derive(Debug, Clone, Copy)]
+pub struct Square {
+    pub center: (f64, f64),
+    pub size: f64,
+}
+
+/// Rays that a square got besides the one at its centre, at one time.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Counted {
+    pub rays: u32,
+    pub unresolved: u32,
+    /// Estimated error of its mean intensity.
+    pub error: f64,
+}
+
+/// A square that is resolved, and its rays among those of all.
+struct Job {
+    square: usize,
+    rays: Range<usize>,
+}
+
+impl Resolver {
+    /// Of a stage, if what it shows has photon rings. Where pixels are refined the thin images beside the critical
+    /// curve are found by their light.
+    pub fn new(stage: &Stage, refined: bool) -> Option<Self> {
+        let spacing = stage.ring_spacing()?;
+        let strata = RingStrata::new(&stage.hole, &stage.view, spacing);
+        let strata = if refined { strata.on_curve() } else { strata };
+        Some(Resolver { strata, hides: stage.has_opaque_disc() })
+    }
+
+    /// How many rays a square gets, hidden or not, besides that at its centre.
+    pub fn count(&self, square: Square) -> usize {
+        let mut rays = Vec::new();
+        self.strata.place(square.center, square.size, &mut rays);
+        rays.len()
+    }
+
+    /// Replaces the light in `seen`, of rays at the centres of `squares` (square k at time j is `[j · squares
+    /// + k]`), by means over the squares where photon rings run through them.
+    pub fn resolve(
+        &self,
+        stage: &Stage,
+        squares: &[Square],
+        times: &[f64],
+        seen: &mut [Glimpse],
+        work: &mut Workspace,
+    ) -> Result<Vec<Counted>, OutOfRange> {
+        let mut counted = vec![Counted::default(); seen.len()];
+        let mut rays = Vec::new();
+        let mut jobs = Vec::new();
+        for (square, Square { center, size }) in squares.iter().enumerate() {
+            let first = rays.len();
+            self.strata.place(*center, *size, &mut rays);
+            if rays.len() > first {
+                jobs.push(Job { square, rays: first..rays.len() });
+            }
+        }
+        if self.hides {
+            self.drop_hidden(stage, squares, seen, &mut jobs, work)?;
+        }
+        for some in batches(&jobs) {
+            work.clear();
+            for ray in some.iter().flat_map(|job| &rays[job.rays.clone()]) {
+                work.push_ray((ray.x, ray.y));
+            }
+            let count = work.len();
+            let found = work.look_at(stage, times)?;
+            for (j, found) in found.chunks_exact(count.max(1)).enumerate() {
+                let mut rest = found;
+                for job in some {
+                    let (own, others) = rest.split_at(job.rays.len());
+                    rest = others;
+                    let place = j * squares.len() + job.square;
+                    counted[place] = mean(&rays[job.rays.clone()], own, &mut seen[place]);
+                }
+            }
+        }
+        Ok(counted)
+    }
+
+    /// Drops squares whose centre and corners all end on the direct image of an opaque disc.
+    fn drop_hidden(
+        &self,
+        stage: &Stage,
+        squares: &[Square],
+        seen: &[Glimpse],
+        jobs: &mut Vec<Job>,
+        work: &mut Workspace,
+    ) -> Result<(), OutOfRange> {
+        let hidden = |seen: &Glimpse| seen.fate == Fate::Surface && seen.disc_images == 1;
+        let asked = |job: &&Job| seen.get(job.square).is_some_and(hidden);
+        work.clear();
+        for Square { center: (x, y), size } in
+            jobs.iter().filter(asked).map(|job| squares[job.square])
+        {
+            let half = 0.5 * size;
+            for (dx, dy) in [(-half, -half), (half, -half), (-half, half), (half, half)] {
+                work.push_ray((x + dx, y + dy));
+            }
+        }
+        let corners = work.look(stage)?;
+        let mut all = corners.chunks_exact(4).map(|four| four.iter().all(hidden));
+        jobs.retain(|job| !(asked(&job) && all.next().unwrap_or(false)));
+        Ok(())
+    }
+}
+
+/// Rays that are traced together, about.
+const BLOCK: usize = 1024;
+
+/// Jobs with about a block's worth of rays.
+fn batches(jobs: &[Job]) -> impl Iterator<Item = &[Job]> {
+    let mut rest = jobs;
+    std::iter::from_fn(move || {
+        let mut sum = 0;
+        let fits = |job: &&Job| {
+            sum += job.rays.len();
+            sum <= BLOCK
+        };
+        let count = rest.iter().take_while(fits).count().max(1);
+        let (some, others) = rest.split_at_checked(count)?;
+        rest = others;
+        Some(some)
+    })
+}
+
+/// The mean over a square in place of what its central ray sees.
+fn mean(rays: &[Stratum], found: &[Glimpse], seen: &mut Glimpse) -> Counted {
+    (seen.intensity, seen.rgb, seen.stokes) = (0.0, [0.0; 3], [0.0; 3]);
+    let mut counted = Counted { rays: rays.len() as u32, ..Counted::default() };
+    for (Stratum { share, .. }, light) in rays.iter().zip(found) {
+        seen.intensity += share * light.intensity;
+        for (sum, x) in seen.rgb.iter_mut().zip(light.rgb) {
+            *sum += *share as f32 * x;
+        }
+        for (sum, x) in seen.stokes.iter_mut().zip(light.stokes) {
+            *sum += share * x;
+        }
+        counted.unresolved += u32::from(light.fate == Fate::Unresolved);
+    }
+    counted.error = error(rays, found);
+    counted
+}
+
+/// Of the mean: an edge between two strata is anywhere between their rays, so that a quarter of its height
+/// is the usual error of their common share; errors of edges are independent.
+fn error(rays: &[Stratum], found: &[Glimpse]) -> f64 {
+    let pairs = rays.windows(2).zip(found.windows(2));
+    let square = |(rays, found): (&[Stratum], &[Glimpse])| match (rays, found) {
+        ([a, b], [one, other]) => {
+            (0.125 * (a.share + b.share) * (one.intensity - other.intensity)).powi(2)
+        }
+        _ => 0.0,
+    };
+    pairs.map(square).sum::<f64>().sqrt()
+}
