@@ -30,7 +30,9 @@ mod inspect;
 mod interferometry;
 mod interrupt;
 mod lock;
+mod memory;
 mod movie;
+mod npz;
 mod observe;
 mod output;
 mod overlay;
@@ -43,6 +45,7 @@ mod usage;
 mod uv;
 mod volume_files;
 
+pub use memory::Bounded;
 pub use program::{BuildRepresentation, OwnSettings, Program};
 
 use clap::{Parser, Subcommand};
@@ -56,6 +59,10 @@ struct Arguments {
     /// Threads to use [default: one for each core]; results do not depend on it
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    /// Most memory to take, e.g. 4GiB: what would need more is refused [default: what the machine, the control group and
+    /// ulimit leave]
+    #[arg(long, global = true, value_name = "SIZE", value_parser = memory::parse)]
+    memory: Option<u64>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -85,6 +92,7 @@ enum Verb {
 }
 
 fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    memory::limit(arguments.memory)?;
     if let Some(threads) = arguments.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
     }
@@ -96,7 +104,7 @@ fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Verb::Uv(uv) => uv.run(),
         Verb::Convert(convert) => convert.run(),
         Verb::Fit(fit) => fit.run(),
-        Verb::Compare(compare) => compare.run(arguments.threads.map(usize::from)),
+        Verb::Compare(compare) => compare.run(arguments.threads, arguments.memory),
         Verb::Trace(trace) => trace.run(),
         Verb::CriticalCurve(table) => table.run(),
         Verb::Accuracy(accuracy) => accuracy.run(),

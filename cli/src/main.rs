@@ -2,6 +2,9 @@
 
 use std::process::ExitCode;
 
+#[global_allocator]
+static ALLOCATOR: kerrlight_cli::Bounded = kerrlight_cli::Bounded;
+
 fn main() -> ExitCode {
     kerrlight_cli::Program::new().run()
 }

@@ -2,14 +2,12 @@
 
 use crate::checksum::Sum;
 use anyhow::{Context, bail};
+use kerrlight_tomo::memory;
 use std::cell::RefCell;
 use std::fs::File;
 use std::io::{BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
-
-/// No input is as large as this.
-const LARGEST_INPUT: u64 = 4 << 30;
 
 /// A file to be written, checked before any work is done for it.
 #[derive(Debug, Clone)]
@@ -176,9 +174,7 @@ pub fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
     let mut file = open(path)?;
     let name = || format!("cannot read {}", path.display());
     let length = file.metadata().with_context(name)?.len();
-    if length > LARGEST_INPUT {
-        bail!("{} is larger than {LARGEST_INPUT} bytes", path.display());
-    }
+    memory::afford(|| path.display().to_string(), length as f64)?;
     let mut bytes = Vec::with_capacity(length as usize);
     file.read_to_end(&mut bytes).with_context(name)?;
     READ.with_borrow_mut(|read| {

@@ -10,6 +10,7 @@ use kerrlight_geodesic::{
     Bundle, Inclination, Integrator, Kerr, Observer, Placement, Points, Request, Tracer,
     Uncertainty,
 };
+use kerrlight_tomo::memory;
 use rayon::prelude::*;
 use std::path::PathBuf;
 
@@ -128,6 +129,9 @@ impl Trace {
         let name = self.rays.display().to_string();
         let table = Table::parse(&self.read()?).with_context(|| name.clone())?;
         let request = self.request();
+        let each = 4 * u32::from(self.crossings) + 5 * self.samples;
+        let what = || format!("{} rays with {each} numbers each", table.rays.len());
+        memory::afford(what, memory::table(table.rays.len() as f64, f64::from(each)))?;
         let traced = table
             .rays
             .par_iter()

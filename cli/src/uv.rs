@@ -7,7 +7,6 @@ use crate::output::{self, Output};
 use anyhow::bail;
 use clap::Args;
 use kerrlight_tomo::interferometry::observation::Observation;
-use kerrlight_tomo::interferometry::schedule;
 use std::path::PathBuf;
 
 /// Arguments of `kerrlight uv`.
@@ -33,7 +32,7 @@ impl Uv {
         let array = arguments::array_of(&self.array)?;
         let (schedule, setup) = (self.observing.schedule()?, self.observing.setup()?);
         let source = &self.observing.source;
-        let observation = schedule::observe(&array, source.position, &schedule, &setup)?;
+        let observation = arguments::observe(&array, source.position, &schedule, &setup)?;
         if observation.rows.is_empty() {
             bail!("no two stations see {} at any time", source.name);
         }

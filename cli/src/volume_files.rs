@@ -1,12 +1,12 @@
 //! Volumes of emission as NPZ or NPY.
 
 use crate::interferometry::image_files::npy_array;
-use crate::output;
+use crate::{npz, output};
 use anyhow::{Context, anyhow, bail};
 use kerrlight_tomo::scene::VolumeSource;
 use kerrlight_tomo::volume::{Volume, VolumeFile};
 use npyz::WriterBuilder;
-use std::io::{Cursor, Read, Write};
+use std::io::{Cursor, Write};
 use std::path::Path;
 
 /// What a file says of a volume.
@@ -33,16 +33,9 @@ pub fn decode(path: &Path, bytes: &[u8]) -> anyhow::Result<Arrays> {
 }
 
 fn archive(bytes: &[u8]) -> anyhow::Result<Arrays> {
-    let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).context("not an npz archive")?;
-    let mut member = |name: &str| -> anyhow::Result<Option<Vec<u8>>> {
-        let Ok(file) = archive.by_name(&npyz::npz::file_name_from_array_name(name)) else {
-            return Ok(None);
-        };
-        let mut array = Vec::new();
-        // No array is larger than that of the most nodes in double precision.
-        file.take(MOST_BYTES).read_to_end(&mut array).with_context(|| format!("array {name}"))?;
-        Ok(Some(array))
-    };
+    let mut archive = npz::open(bytes)?;
+    let mut member =
+        |name: &str| npz::member(&mut archive, &npyz::npz::file_name_from_array_name(name));
     let found = member("emission")?.context("holds no array named emission")?;
     let (nodes, values) = emission(&found).context("array emission")?;
     let mut vector = |name: &str| {
@@ -54,8 +47,6 @@ fn archive(bytes: &[u8]) -> anyhow::Result<Arrays> {
     let corners = [vector("low")?, vector("high")?];
     Ok(Arrays { nodes, values, corners, axis: vector("axis")? })
 }
-
-const MOST_BYTES: u64 = 4 << 30;
 
 /// Nodes along x, y and z and the values of an array of three dimensions.
 fn emission(bytes: &[u8]) -> anyhow::Result<([usize; 3], Vec<f32>)> {

@@ -3,6 +3,7 @@
 
 mod accuracy;
 mod bad_input;
+mod bounded;
 mod closed_forms;
 mod command_line;
 mod compare;

@@ -12,6 +12,7 @@ pub mod film;
 pub mod fit;
 pub mod image;
 pub mod interferometry;
+pub mod memory;
 pub mod optimise;
 pub mod plan;
 pub mod points;

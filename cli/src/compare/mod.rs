@@ -71,7 +71,7 @@ pub struct Failed {
 
 impl Compare {
     /// Runs an experiment.
-    pub fn run(&self, threads: Option<usize>) -> anyhow::Result<()> {
+    pub fn run(&self, threads: Option<u16>, memory: Option<u64>) -> anyhow::Result<()> {
         let Some(name) = &self.experiment else { return list_experiments() };
         let before = self.against.as_deref().map(changes::read).transpose()?;
         // A folder that is called like an experiment is meant by ./name.
@@ -104,7 +104,7 @@ impl Compare {
         }
         let all = cases::expand(&experiment, &source, &choice.unrestricted())?;
         let (folder, lock) = self.folder(name, &text)?;
-        let runner = Runner::new(&folder, threads, lock)?;
+        let runner = Runner::new(&folder, (threads, memory), lock)?;
         let cases = with_known(chosen, all, &runner);
         runner.check_inputs(&cases)?;
         let summary = run(&cases, &runner);

@@ -27,17 +27,22 @@ pub enum Status {
 /// The folders of the cases.
 pub struct Runner {
     folder: PathBuf,
-    threads: Option<usize>,
+    threads: Option<u16>,
+    memory: Option<u64>,
     _lock: Lock,
 }
 
 impl Runner {
     /// In `cases` of this folder, whose lock is held.
-    pub fn new(folder: &Path, threads: Option<usize>, lock: Lock) -> anyhow::Result<Self> {
+    pub fn new(
+        folder: &Path,
+        (threads, memory): (Option<u16>, Option<u64>),
+        lock: Lock,
+    ) -> anyhow::Result<Self> {
         let folder = folder.join("cases");
         std::fs::create_dir_all(&folder)
             .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-        Ok(Self { folder, threads, _lock: lock })
+        Ok(Self { folder, threads, memory, _lock: lock })
     }
 
     /// The run's folder of a case.
@@ -113,6 +118,9 @@ impl Runner {
         }
         if let Some(threads) = self.threads {
             command.args(["--threads", &threads.to_string()]);
+        }
+        if let Some(memory) = self.memory {
+            command.args(["--memory", &memory.to_string()]);
         }
         let said = self.folder.join(format!("{}.txt", case.slug));
         let file =

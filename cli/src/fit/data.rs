@@ -18,8 +18,9 @@ use kerrlight_tomo::interferometry::noise::{GainErrors, add_thermal_noise, apply
 use kerrlight_tomo::interferometry::observation::{Observation, Row};
 use kerrlight_tomo::interferometry::operator::{ImageGrid, Method, Pulse, Transform};
 use kerrlight_tomo::interferometry::products::ClosureKind;
-use kerrlight_tomo::interferometry::schedule::{self, Clock, Schedule, Setup};
+use kerrlight_tomo::interferometry::schedule::{Clock, Schedule, Setup};
 use kerrlight_tomo::interferometry::simulate::{self, Movie};
+use kerrlight_tomo::memory;
 use std::path::Path;
 
 /// What is measured, and what is known to be true.
@@ -68,10 +69,18 @@ fn frames(file: &FitFile) -> anyhow::Result<Vec<f64>> {
     Ok((0..n).map(|k| movie.from + step * k as f64).collect())
 }
 
+/// Refuses movies that there is no memory for: as they are simulated, as data, and as they are recovered.
+fn afford_movie(frames: usize, pixels: usize) -> anyhow::Result<()> {
+    let what = || format!("movies of {frames} frames of {pixels} x {pixels} pixels");
+    let one = memory::movie(frames as f64, (pixels * pixels) as f64);
+    Ok(memory::afford(what, 2.0 * one)?)
+}
+
 fn simulate(file: &FitFile, instrument: &Instrument) -> anyhow::Result<Measured> {
     let truth = Truth::new(file)?;
     let Some(seen) = &file.observation else {
         let times = frames(file)?;
+        afford_movie(times.len(), file.screen.pixels)?;
         let movie = Some(lit(&truth, truth.movie(file, instrument, &times)?)?);
         return Ok(Measured {
             times,
@@ -101,9 +110,10 @@ fn simulate(file: &FitFile, instrument: &Instrument) -> anyhow::Result<Measured>
     };
     let array = arguments::array_of(&seen.array).context("observation")?;
     let mut observation =
-        schedule::observe(&array, source.position, &schedule, &setup).context("observation")?;
+        arguments::observe(&array, source.position, &schedule, &setup).context("observation")?;
     observation.source = source.name;
     let hours = schedule.hours_utc(setup.ut1).context("observation")?;
+    afford_movie(hours.len(), file.screen.pixels)?;
     let per_m = setup::hours_per_m(file)?;
     let times: Vec<f64> = hours.iter().map(|h| seen.first_time + (h - hours[0]) / per_m).collect();
     let movie = lit(&truth, truth.movie(file, instrument, &times)?)?;

@@ -17,6 +17,7 @@ use anyhow::{Context, bail};
 use kerrlight_tomo::fit::{
     BatchSize, Loss, Motion, Objective, Outcome, State, Trainer, checkpoint,
 };
+use kerrlight_tomo::memory;
 use kerrlight_tomo::volume::Volume;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -55,7 +56,13 @@ impl Prepared {
 /// What can be told of settings without tracing rays.
 pub fn check(file: &FitFile) -> anyhow::Result<()> {
     let (_, axis_rate) = setup::axis(file)?;
-    learning::representation(file)?;
+    let parameters = learning::representation(file)?.parameters();
+    let what = || format!("{parameters} parameters of the representation");
+    memory::afford(what, memory::parameters(parameters as f64))?;
+    if let Start::Linear { nodes, .. } = file.training.start {
+        let what = || format!("training.start.linear.nodes = {nodes}: a grid");
+        memory::afford(what, memory::parameters((nodes as f64).powi(3)))?;
+    }
     unknowns::check(file)?;
     let training = learning::training(file, axis_rate)?;
     let images_only = file.loss.iter().all(|loss| loss.data == LossKind::Image);
@@ -68,6 +75,8 @@ pub fn check(file: &FitFile) -> anyhow::Result<()> {
     if !(2..=512).contains(&file.output.nodes) {
         bail!("output.nodes = {} is not allowed: 2 to 512", file.output.nodes);
     }
+    let nodes = file.output.nodes;
+    memory::afford(|| format!("output.nodes = {nodes}: volumes"), memory::volume(nodes as f64))?;
     Ok(())
 }
 

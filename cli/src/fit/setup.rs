@@ -9,6 +9,7 @@ use kerrlight_tomo::fit::{
     Motion, Redshift, Region, Regulariser, Sampling, SightlineRequest, Sightlines,
 };
 use kerrlight_tomo::interferometry::operator::ImageGrid;
+use kerrlight_tomo::memory;
 use kerrlight_tomo::optimise::Polynomial;
 use kerrlight_tomo::units::{MICROARCSECOND, gravitational_angle, gravitational_time};
 
@@ -22,11 +23,38 @@ pub struct Instrument {
     pub redshift: Option<Redshift>,
 }
 
+/// Rays of the trial by which the nodes of all are estimated.
+const TRIAL: usize = 512;
+
 impl Instrument {
     /// Traces the rays of all pixels.
     pub fn new(file: &FitFile) -> anyhow::Result<Self> {
         let n = file.screen.pixels;
+        Self::afford(file, n.saturating_mul(n))?;
         Self::of(file, &(0..n * n).collect::<Vec<_>>())
+    }
+
+    /// Refuses rays that there is no memory for, as estimated from a few of them.
+    fn afford(file: &FitFile, pixels: usize) -> anyhow::Result<()> {
+        spacing(&file.screen)?;
+        let each = match file.region.nodes {
+            Nodes::Gauss { order, split } => order as f64 * f64::from(split),
+            Nodes::EqualMinoTime { per_ray } => per_ray as f64,
+        };
+        let block = || format!("region.nodes: {each} nodes or more on each ray of a block");
+        memory::afford(block, memory::nodes(each * TRIAL.min(pixels) as f64, 0.0))?;
+        let chosen: Vec<usize> = (0..pixels).step_by(pixels.div_ceil(TRIAL).max(1)).collect();
+        // What is wrong with them is told by those of all pixels.
+        let Ok(few) = Self::of(file, &chosen) else { return Ok(()) };
+        let nodes = few.lines.points() as f64 * pixels as f64 / chosen.len() as f64;
+        let (momenta, delays) = (few.lines.momentum[0].len(), few.lines.delay.len());
+        let columns = [(momenta, 3.0), (delays, 2.0)];
+        let columns = columns.iter().map(|(count, n)| if *count > 0 { *n } else { 0.0 }).sum();
+        let n = file.screen.pixels;
+        let what = || {
+            format!("screen.pixels = {n}: about {nodes:.0} nodes on the rays of {pixels} pixels")
+        };
+        Ok(memory::afford(what, memory::nodes(nodes, columns))?)
     }
 
     /// Traces the rays of some pixels, rows from the top, each from the left.

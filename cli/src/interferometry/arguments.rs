@@ -5,7 +5,9 @@ use anyhow::{Context, anyhow, bail};
 use clap::{Args, ValueEnum};
 use kerrlight_tomo::interferometry::array::{self, Array};
 use kerrlight_tomo::interferometry::earth::{Frame, SourcePosition, Ut1};
-use kerrlight_tomo::interferometry::schedule::{Clock, Schedule, Setup};
+use kerrlight_tomo::interferometry::observation::Observation;
+use kerrlight_tomo::interferometry::schedule::{self, Clock, Schedule, Setup};
+use kerrlight_tomo::memory;
 use std::path::Path;
 
 /// A source by name or by place.
@@ -56,6 +58,26 @@ pub fn array_of(name: &str) -> anyhow::Result<Array> {
         bail!("array {name}: neither {} nor a file", array::BUILT_IN.join(" nor "));
     }
     array::parse(&output::read_text(path)?).with_context(|| format!("array {name}"))
+}
+
+/// Scans of the trial by which the rows of many are estimated.
+const TRIAL: u32 = 256;
+
+/// Rows of all scans, if there is memory for them.
+pub fn observe(
+    array: &Array,
+    source: SourcePosition,
+    schedule: &Schedule,
+    setup: &Setup,
+) -> anyhow::Result<Observation> {
+    if schedule.scans > TRIAL {
+        let trial = Schedule { scans: TRIAL, ..*schedule };
+        let few = schedule::observe(array, source, &trial, setup)?.rows.len() as f64;
+        let rows = few * f64::from(schedule.scans) / f64::from(TRIAL);
+        let what = || format!("about {rows:.0} visibilities of {} scans", schedule.scans);
+        memory::afford(what, memory::visibilities(rows))?;
+    }
+    Ok(schedule::observe(array, source, schedule, setup)?)
 }
 
 /// How the Earth's attitude is taken.

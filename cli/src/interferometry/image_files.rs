@@ -1,15 +1,15 @@
 //! Images and movies of one file to be observed: grids of numbers as CSV, arrays as npy or npz,
 //! images as FITS, pictures as EXR.
 
-use crate::output;
+use crate::{npz, output};
 use anyhow::{Context, anyhow, bail};
 use kerrlight_tomo::image::exr;
 use kerrlight_tomo::interferometry::files;
 use kerrlight_tomo::interferometry::operator::ImageGrid;
 use kerrlight_tomo::interferometry::simulate::Movie;
+use kerrlight_tomo::memory;
 use kerrlight_tomo::scene::Scene;
 use kerrlight_tomo::units::{MICROARCSECOND, gravitational_angle, gravitational_time};
-use std::io::Read;
 use std::path::Path;
 
 /// Numbers of a file before one knows how large they are on the sky: images of Jy/pixel.
@@ -51,7 +51,7 @@ pub fn read(path: &Path, fov_uas: Option<f64>) -> anyhow::Result<(Movie, OwnTime
         }
         "csv" | "txt" => csv_grid(&bytes),
         "npy" => npy(&bytes),
-        "npz" => npz(&bytes),
+        "npz" => npz_movie(&bytes),
         "exr" => exr_picture(&bytes, fov_uas),
         _ => {
             bail!("{}: an image ends in .csv, .npy, .npz, .fits or .exr, a scene in .toml", name())
@@ -128,6 +128,8 @@ pub fn npy_array(bytes: &[u8]) -> anyhow::Result<(Vec<u64>, Vec<f64>)> {
     if count.is_none_or(|count| count == 0 || count > bytes.len() as u64) {
         bail!("shape {shape:?} does not go with {} bytes", bytes.len());
     }
+    let values = 8.0 * count.unwrap_or_default() as f64;
+    memory::afford(|| format!("the array of shape {shape:?}"), values)?;
     let values = numbers(file)?;
     Ok((shape, values))
 }
@@ -163,8 +165,8 @@ fn numbers(file: npyz::NpyFile<&[u8]>) -> anyhow::Result<Vec<f64>> {
 }
 
 /// The only array of an archive, or the one named `movie` or `image`; `times` are hours of UTC.
-fn npz(bytes: &[u8]) -> anyhow::Result<Pixels> {
-    let mut archive = zip::ZipArchive::new(std::io::Cursor::new(bytes)).context("not an npz")?;
+fn npz_movie(bytes: &[u8]) -> anyhow::Result<Pixels> {
+    let mut archive = npz::open(bytes)?;
     let names: Vec<String> = (0..archive.len())
         .map(|k| Ok(archive.by_index(k)?.name()?.into_owned()))
         .collect::<anyhow::Result<_>>()?;
@@ -175,11 +177,7 @@ fn npz(bytes: &[u8]) -> anyhow::Result<Pixels> {
         _ => bail!("holds {}: an array named movie or image is expected", names.join(", ")),
     };
     let mut member = |name: &str| -> anyhow::Result<Vec<u8>> {
-        let mut array = Vec::new();
-        // A deflated array of zeros is a thousand times smaller than the array.
-        let most = 20 * bytes.len() as u64 + 4096;
-        archive.by_name(name)?.take(most).read_to_end(&mut array)?;
-        Ok(array)
+        npz::member(&mut archive, name)?.with_context(|| format!("holds no {name}"))
     };
     let mut pixels = npy(&member(name)?).with_context(|| name.clone())?;
     if name != TIMES && names.iter().any(|name| name == TIMES) {

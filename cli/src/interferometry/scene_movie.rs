@@ -6,6 +6,7 @@ use crate::progress;
 use anyhow::{Context, bail};
 use kerrlight_tomo::interferometry::operator::ImageGrid;
 use kerrlight_tomo::interferometry::simulate::Movie;
+use kerrlight_tomo::memory;
 use kerrlight_tomo::render::render;
 use kerrlight_tomo::scene::Scene;
 use kerrlight_tomo::units::{MICROARCSECOND, gravitational_angle, gravitational_time};
@@ -31,9 +32,8 @@ pub fn read(path: &Path, times_h: &[f64]) -> anyhow::Result<Movie> {
     let field_rad = pixel_uas * width as f64 * MICROARCSECOND;
     let grid = ImageGrid::new(width, height, field_rad).with_context(name)?;
     let frames = if scene.changes() { times_h } else { &times_h[..1] };
-    if frames.len() > (1 << 30) / grid.pixels() {
-        bail!("{}: {} frames of {width} x {height} pixels are too many", name(), frames.len());
-    }
+    let movie = || format!("{}: {} frames of {width} x {height} pixels", name(), frames.len());
+    memory::afford(movie, memory::movie(frames.len() as f64, grid.pixels() as f64))?;
     let start = scene.observer.time;
     let bar = progress::frames(frames.len() as u64);
     let mut pixels = Vec::with_capacity(frames.len() * grid.pixels());

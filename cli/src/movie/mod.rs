@@ -14,7 +14,9 @@ use anyhow::{Context, bail};
 use clap::Args;
 use frames::{Origin, Sequence};
 use kerrlight_tomo::film::{Film, Frame};
+use kerrlight_tomo::memory;
 use kerrlight_tomo::render::RenderError;
+use kerrlight_tomo::scene::Scene;
 use std::iter;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -45,11 +47,22 @@ pub struct Movie {
     overlay: OverlayOptions,
 }
 
+/// Refuses frames that there is no memory for.
+fn afford(film: &Film, scene: &Scene) -> anyhow::Result<()> {
+    let (width, height) = (scene.screen.width, scene.screen.height);
+    let (count, channels) = (film.batch(), film.names().len());
+    let what = || format!("{count} frames at once of {width} x {height} pixels");
+    let pixels = f64::from(width) * f64::from(height);
+    Ok(memory::afford(what, memory::frames(count as f64, pixels, channels as f64))?)
+}
+
 impl Movie {
     /// Renders what is missing, then makes the animations.
     pub fn run(&self) -> anyhow::Result<()> {
         let source = Source::new(Some(&self.scene))?;
         let (text, scene) = source.scene(&self.overrides)?;
+        let plans = f64::from(self.frames) * (2 * text.len() + 4096) as f64;
+        memory::afford(|| format!("the settings of {} frames", self.frames), plans)?;
         let times = self.span.times(self.frames, &scene)?;
         let animations = self.viewing.outputs(self.frames)?;
         let files = assets::load(&scene, &source.folder, &animations.files())?;
@@ -61,6 +74,7 @@ impl Movie {
         } else if self.overlay.any() {
             bail!("marks are drawn into pictures to look at: give --gif, --apng or --png");
         }
+        afford(&film, &scene)?;
         let of = Origin { name: &source.name, text: &text, files: &files.identity };
         let mut sequence = Sequence::new(&self.output, &of, &times)?;
         for input in iter::once(&self.scene).chain(&files.paths) {

@@ -17,6 +17,7 @@ use kerrlight_tomo::image::Picture;
 use kerrlight_tomo::image::preview as drawing;
 use kerrlight_tomo::image::reduce::Reduction;
 use kerrlight_tomo::image::sheet::sheet;
+use kerrlight_tomo::memory;
 use kerrlight_tomo::render::Raster;
 use kerrlight_tomo::scene::Scene;
 use preview::PreviewOptions;
@@ -47,9 +48,12 @@ pub struct Render {
     #[arg(long, value_name = "ERROR")]
     image_error: Option<f64>,
     /// Print what is computed for this scene and what is not, with the estimated cost of each
-    /// part before and the measured cost after
-    #[arg(long)]
+    /// part, and render nothing
+    #[arg(long, visible_alias = "dry-run", conflicts_with = "measure")]
     explain: bool,
+    /// Print the measured cost of each part after rendering
+    #[arg(long)]
+    measure: bool,
     #[command(flatten)]
     look: PreviewOptions,
     #[command(flatten)]
@@ -78,12 +82,17 @@ impl Render {
         outputs.differ()?;
         let files = assets::load(&scene, &source.folder, &outputs.all())?;
         source.compare(&files.identity);
+        let width = scene.screen.width;
+        let bands = memory::bands(width.into(), rayon::current_num_threads() as f64);
+        memory::afford(|| format!("screen.width = {width}: the rows under way"), bands)?;
         let start = Instant::now();
         let raster = Raster::new(&scene, files.decoded);
         let mut raster = raster.with_context(|| source.name.clone())?.with_tile(self.tile.into());
         let look = self.reduction(&scene, &raster, &outputs)?;
         if self.explain {
-            explain::before(&scene, &raster)?;
+            return Ok(explain::before(&scene, &raster)?);
+        }
+        if self.measure {
             raster = raster.with_meter();
         }
         let reduced = look.as_ref().map_or(1, Reduction::factor);
@@ -105,7 +114,7 @@ impl Render {
             self.draw(&scene, (&picture, reduced), &outputs)?;
         }
         report::print(&scene, &summary, start.elapsed().as_secs_f64());
-        if self.explain {
+        if self.measure {
             explain::after(&raster.meter(), summary.rays);
         }
         Ok(())

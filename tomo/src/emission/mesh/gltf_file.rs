@@ -3,6 +3,7 @@
 
 use super::file::{Layer, Material, MeshError, MeshFile, RawTriangle, Resources, resource};
 use super::texture::Texture;
+use crate::memory;
 use gltf::mesh::Mode;
 
 type Matrix = [[f64; 4]; 4];
@@ -56,7 +57,14 @@ fn check_views(document: &gltf::Document, buffers: &[Vec<u8>]) -> Result<(), Mes
         }
     }
     for accessor in document.accessors() {
-        let Some(view) = accessor.view() else { continue };
+        let Some(view) = accessor.view() else {
+            // Zeros, as many as it states, of which some are replaced.
+            let count = accessor.count();
+            let what = || format!("accessor {} of {count} points", accessor.index());
+            memory::afford(what, 64.0 * count as f64)
+                .map_err(|error| MeshError::Content(error.to_string()))?;
+            continue;
+        };
         let step = view.stride().unwrap_or(accessor.size());
         let reach = accessor.count().saturating_sub(1).checked_mul(step);
         let end =

@@ -1,7 +1,8 @@
 //! Pictures on surfaces.
 
 use super::MeshError;
-use crate::emission::sky::srgb_to_linear;
+use crate::emission::sky::{dimensions, srgb_to_linear};
+use crate::memory;
 
 /// A picture in linear colour that repeats in both directions.
 #[derive(Debug, Clone)]
@@ -14,9 +15,14 @@ pub struct Texture {
 impl Texture {
     /// Decodes a PNG or JPEG picture in sRGB.
     pub fn decode(bytes: &[u8]) -> Result<Self, MeshError> {
-        let picture = image::load_from_memory(bytes)
-            .map_err(|why| MeshError::Content(format!("a texture is no readable picture: {why}")))?
-            .into_rgb32f();
+        let unreadable = |why: image::ImageError| {
+            MeshError::Content(format!("a texture is no readable picture: {why}"))
+        };
+        let (width, height) = dimensions(bytes).map_err(unreadable)?;
+        let what = || format!("a texture of {width} x {height} pixels");
+        memory::afford(what, memory::colours(width.into(), height.into()))
+            .map_err(|error| MeshError::Content(error.to_string()))?;
+        let picture = image::load_from_memory(bytes).map_err(unreadable)?.into_rgb32f();
         let (width, height) = (picture.width() as usize, picture.height() as usize);
         if width == 0 || height == 0 {
             return Err(MeshError::Content("a texture has no pixels".to_owned()));

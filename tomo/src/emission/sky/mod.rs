@@ -8,8 +8,8 @@ mod panorama;
 mod stars;
 
 pub use beam::Beam;
-pub(crate) use panorama::srgb_to_linear;
 pub use panorama::{Panorama, PanoramaError};
+pub(crate) use panorama::{dimensions, srgb_to_linear};
 pub use stars::StarField;
 
 use crate::scene::{Checker, Sky};

@@ -1,6 +1,7 @@
 //! An equirectangular picture of the whole sky.
 
 use super::beam::Beam;
+use crate::memory;
 use core::f64::consts::{PI, TAU};
 
 /// A decoded equirectangular picture in linear colour.
@@ -20,9 +21,17 @@ pub enum PanoramaError {
     /// The bytes are no picture that can be read.
     #[error("not a readable PNG, JPEG or HDR picture: {0}")]
     Decode(#[from] image::ImageError),
+    /// There is no memory for it.
+    #[error(transparent)]
+    Memory(#[from] memory::TooLarge),
     /// The picture is empty or has a value that is no colour.
     #[error("{0}")]
     Content(&'static str),
+}
+
+/// Columns and rows of a picture, as its header states them.
+pub(crate) fn dimensions(bytes: &[u8]) -> image::ImageResult<(u32, u32)> {
+    image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format()?.into_dimensions()
 }
 
 impl Panorama {
@@ -31,6 +40,9 @@ impl Panorama {
     /// # Errors
     /// If the bytes are no such picture.
     pub fn decode(bytes: &[u8]) -> Result<Self, PanoramaError> {
+        let (width, height) = dimensions(bytes)?;
+        let what = || format!("a sky of {width} x {height} pixels");
+        memory::afford(what, memory::colours(width.into(), height.into()))?;
         let picture = image::load_from_memory(bytes)?;
         let linear = matches!(
             picture,

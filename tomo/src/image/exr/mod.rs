@@ -7,6 +7,7 @@ pub use layout::{BAND_ROWS, Layout};
 pub use survey::{ChannelSurvey, Survey, survey};
 
 use super::{Channel, Picture};
+use crate::memory;
 use exr::meta::MetaData;
 use exr::meta::header::LayerAttributes;
 use exr::prelude::{AttributeValue, Error, ReadChannels, ReadLayers, Text, Vec2, read};
@@ -79,6 +80,7 @@ fn attributes(layer: &LayerAttributes) -> exr::error::Result<Attributes> {
 /// # Errors
 /// If the bytes are no EXR file, or a channel is subsampled.
 pub fn decode(bytes: &[u8]) -> exr::error::Result<(Picture, Attributes)> {
+    check_size(bytes)?;
     let image = read()
         .no_deep_data()
         .largest_resolution_level()
@@ -99,6 +101,19 @@ pub fn decode(bytes: &[u8]) -> exr::error::Result<(Picture, Attributes)> {
     }
     let attributes = attributes(&layer.attributes)?;
     Ok((Picture { width, height, channels }, attributes))
+}
+
+/// Refuses a picture that there is no memory for: its header may state any size.
+fn check_size(bytes: &[u8]) -> exr::error::Result<()> {
+    let data = MetaData::read_from_unbuffered(Cursor::new(bytes), false)?;
+    for header in &data.headers {
+        let Vec2(width, height) = header.layer_size;
+        let count = header.channels.list.len();
+        let what = || format!("its picture of {width} x {height} pixels with {count} channels");
+        let needed = memory::channels(width as f64, height as f64, count as f64);
+        memory::afford(what, needed).map_err(|error| Error::Invalid(error.to_string().into()))?;
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -1,0 +1,134 @@
+//! Memory is estimated before it is taken: numbers of users and of headers that cannot be meant end in a message that says
+//! what would be needed and what there is, never in a signal.
+
+use crate::support::{fail, kerrlight, succeed};
+use std::io::Write;
+use std::path::Path;
+
+/// A deflated archive of a float32 array of zeros, a thousand times smaller than that.
+fn bomb(path: &Path, name: &str, shape: [usize; 3]) {
+    let mut archive = zip::ZipWriter::new(std::fs::File::create(path).unwrap());
+    let options = zip::write::SimpleFileOptions::default();
+    archive.start_file(name, options).unwrap();
+    let [a, b, c] = shape;
+    let header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({a}, {b}, {c}), }}");
+    let header = format!("{header:<117}\n");
+    archive.write_all(b"\x93NUMPY\x01\x00\x76\x00").unwrap();
+    archive.write_all(header.as_bytes()).unwrap();
+    let zeros = vec![0; 4 << 20];
+    let mut left = 4 * a * b * c;
+    while left > 0 {
+        let some = left.min(zeros.len());
+        archive.write_all(&zeros[..some]).unwrap();
+        left -= some;
+    }
+    archive.finish().unwrap();
+}
+
+/// The message names what is too large, what it would take and what there is.
+fn refused(at: &Path, memory: &str, words: &[&str], said: &str) {
+    let message = fail(at, &[&["--memory", memory][..], words].concat());
+    assert!(message.contains(said), "{words:?}: {message}");
+    let [needs, has] = [" would take ", " may be taken"].map(|text| message.contains(text));
+    assert!(needs && has && message.contains("iB"), "{words:?}: {message}");
+}
+
+#[test]
+fn exact_numbers_that_would_take_too_much_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let set = |change: &'static str| ["fit", "-o", "run", "--set", change];
+    for (change, said) in [
+        ("screen.pixels=4000", "screen.pixels = 4000: about"),
+        ("observation.scans=1000000", "visibilities of 1000000 scans"),
+        ("region.nodes={gauss={order=16,split=4000000}}", "region.nodes"),
+        ("output.nodes=512", "output.nodes = 512"),
+        ("training.start={linear={nodes=3000,stride=2,steps=10}}", "nodes = 3000"),
+    ] {
+        refused(at, "2GiB", &set(change), said);
+    }
+    let nodes = [&set("representation=grid")[..], &["--set", "representation.nodes=1000"]].concat();
+    refused(at, "2GiB", &nodes, "1000000000 parameters");
+    refused(at, "64MiB", &["render", "--set", "screen.width=16384"], "screen.width = 16384");
+    let scene = crate::support::root().join("scenes/disc_face_on.toml");
+    let scene = scene.to_str().unwrap();
+    let movie = ["movie", scene, "--frames", "1000000", "--from", "0", "--to", "9", "-o", "m"];
+    refused(at, "1GiB", &movie, "1000000 frames");
+    let large = ["--set", "screen.width=16384", "--set", "screen.height=16384"];
+    let movie = ["movie", scene, "--frames", "2", "--from", "0", "--to", "9", "-o", "m"];
+    refused(at, "1GiB", &[&movie[..], &large].concat(), "16384 x 16384 pixels");
+    let rays = "spin,inclination_deg,alpha,beta\n".to_owned() + &"0.5,60,5,1\n".repeat(500);
+    std::fs::write(at.join("rays.csv"), rays).unwrap();
+    let trace = ["trace", "--rays", "rays.csv", "--samples", "100000", "-o", "out.csv"];
+    refused(at, "1GiB", &trace, "500 rays with");
+    let uv = ["--source", "sgra", "--mjd", "57850", "--utc", "4-15", "--frames", "1000000"];
+    let uv = [&["uv", "ngEHT", "--tint", "30", "-o", "uv.csv"][..], &uv].concat();
+    refused(at, "256MiB", &uv, "1000000 scans");
+}
+
+#[test]
+fn exact_files_that_unpack_to_too_much_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    bomb(&at.join("movie.npz"), "movie.npy", [100, 600, 600]);
+    bomb(&at.join("volume.npz"), "emission.npy", [330, 330, 330]);
+    assert!(std::fs::metadata(at.join("movie.npz")).unwrap().len() < 1 << 20);
+    let array = ["--array", "ngEHT", "--source", "sgra", "--mjd", "57850", "--utc", "4-15"];
+    let more = ["--frames", "100", "--tint", "30", "--fov-uas", "160", "-o", "a.uvfits"];
+    let observe = |file| [&["observe", file][..], &array, &more].concat();
+    refused(at, "200MiB", &observe("movie.npz"), "movie.npz");
+    let scene = "[hole]\nspin = 0.5\nmass_msun = 4e6\ndistance_kpc = 8.0\n[observer]\ninclination_deg = 60.0\n\
+                 [screen]\nwidth = 8\nheight = 8\nfield_of_view_m = 20.0\n[tracer]\nintegrator = \"elliptic\"\ntolerance = 1e-6\n\
+                 [[volume]]\npath = \"volume.npz\"\nfactor = 1.0\nrotation = \"none\"\nlow = [-5, -5, -5]\nhigh = [5, 5, 5]\n";
+    std::fs::write(at.join("scene.toml"), scene).unwrap();
+    let message = fail(at, &["--memory", "200MiB", "render", "scene.toml", "-o", "a.exr"]);
+    assert!(message.contains("volume") && message.contains("would take"), "{message}");
+    let picture = kerrlight_tomo::image::Picture {
+        width: 3000,
+        height: 3000,
+        channels: vec![kerrlight_tomo::image::Channel {
+            name: "intensity".to_owned(),
+            values: vec![0.0; 9_000_000],
+        }],
+    };
+    let bytes = kerrlight_tomo::image::exr::encode(&picture, &Default::default()).unwrap();
+    std::fs::write(at.join("large.exr"), bytes).unwrap();
+    refused(at, "64MiB", &observe("large.exr"), "3000 x 3000 pixels");
+    image::GrayImage::new(6000, 6000).save(at.join("sky.png")).unwrap();
+    let sky = "[sky.image]\npath = \"sky.png\"\nbrightness = 1.0\n";
+    let text = scene.split("[[volume]]").next().unwrap().to_owned() + sky;
+    std::fs::write(at.join("sky.toml"), text).unwrap();
+    refused(at, "512MiB", &["render", "sky.toml", "-o", "a.exr"], "a sky of 6000 x 6000 pixels");
+}
+
+/// What no estimate has foreseen ends in a message as well, and no half file stays.
+#[test]
+fn exact_what_was_not_foreseen_ends_in_a_message() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let curve = ["critical-curve", "--spin", "0.9", "--inclination", "60", "--points", "1000000"];
+    let message = fail(at, &[&["--memory", "64MiB"][..], &curve, &["-o", "c.csv"]].concat());
+    assert!(message.contains("out of memory") && message.contains("--memory"), "{message}");
+    for wrong in ["--memory=0", "--memory=much", "--memory=-4GiB", "--memory=4 XiB"] {
+        let output = kerrlight(at, &[wrong, "critical-curve"]);
+        assert_eq!(output.status.code(), Some(2), "{wrong}");
+    }
+    let small = ["critical-curve", "--spin", "0.9", "--inclination", "60", "--points", "10"];
+    let printed = succeed(at, &[&["--memory", "64MiB"][..], &small].concat());
+    assert_eq!(printed.lines().count(), 11);
+}
+
+/// A limit of the address space counts too.
+#[cfg(target_os = "linux")]
+#[test]
+fn exact_a_limit_of_the_shell_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    let script = "ulimit -v 3000000; exec \"$@\"";
+    let mut command = std::process::Command::new("bash");
+    command.current_dir(folder.path()).args(["-c", script, "bash"]);
+    command.arg(crate::support::binary()).args(["fit", "--set", "screen.pixels=4000"]);
+    let output = command.output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("screen.pixels = 4000"), "{message}");
+}
