@@ -100,7 +100,7 @@ impl Plane {
         if narrow != 0.0 {
             let crossed = [(rest - 0.5 * wide) / narrow, (rest + 0.5 * wide) / narrow];
             let [low, high] = [crossed[0].min(crossed[1]), crossed[0].max(crossed[1])];
-            ends = [low.max(-0.5).min(0.5), high.min(0.5).max(-0.5)];
+            ends = [low, high].map(|end| end.clamp(-0.5, 0.5));
         }
         let along = 0.5 * (ends[0] + ends[1]);
         let mut place = [along; 2];
