@@ -48,7 +48,8 @@ mod tests {
     /// No flipped bit changes an array: it is an error, or in what nobody reads (dates, attributes).
     #[test]
     fn exact_every_flipped_bit_is_found() {
-        let content: Vec<u8> = (0..600u32).map(|k| (k * k % 251) as u8).collect();
+        let content: Vec<u8> =
+            (0..600u32).map(|k| (k.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
         let whole = archive(&content);
         let read = |bytes: &[u8]| member(&mut open(bytes)?, "a.npy");
         assert_eq!(read(&whole).unwrap(), Some(content.clone()));
@@ -63,7 +64,7 @@ mod tests {
                 }
             }
         }
-        assert!(refused > 8 * 500, "{refused}");
+        assert!(refused > 8 * 300, "{refused}");
     }
 
     /// Sizes in the archive that are not those of its members.
