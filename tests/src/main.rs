@@ -13,6 +13,7 @@ mod eht_data;
 mod film;
 mod fit;
 mod fit_bad_luck;
+mod fit_without_phases;
 mod fuzz_corpus;
 mod interferometry;
 mod kerr_references;

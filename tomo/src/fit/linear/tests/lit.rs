@@ -41,7 +41,7 @@ pub(in crate::fit) fn array(movie: &[f64], seen: Seen) -> ScanTerm<f64> {
         let pairs: Vec<[u16; 2]> = (0..7).flat_map(|a| (a + 1..7).map(move |b| [a, b])).collect();
         let uv: Vec<[f64; 2]> =
             pairs.iter().map(|[a, b]| [0, 1].map(|c| place(*b)[c] - place(*a)[c])).collect();
-        let transform = Dtft::new(grid, Pulse::Triangle, &[uv.clone()], usize::MAX);
+        let transform = Dtft::new(grid, Pulse::Triangle, core::slice::from_ref(&uv), usize::MAX);
         let mut visibilities = vec![Complex::new(0.0, 0.0); uv.len()];
         crate::interferometry::operator::Operator::forward(&transform, image, &mut visibilities);
         let largest = visibilities.iter().map(|v| v.norm()).fold(1e-3, f64::max);

@@ -1,0 +1,135 @@
+//! `kerrlight fit` with data that are not convex in the emission: amplitudes and closure quantities.
+
+use crate::fit::{results, with};
+use crate::support::{fail, kerrlight, succeed};
+use std::path::Path;
+
+const AMPLITUDES: &str = r#"loss=[{data="amplitudes",weight=1.0}]"#;
+const CLOSURES: &str =
+    r#"loss=[{data="closure-phases",weight=1.0},{data="log-closure-amplitudes",weight=1.0}]"#;
+const SCAN: &str = "axis={scan={directions=20,frames=6,pixels=10,rate=0.0,last_rate=0.0}}";
+
+/// The built-in experiment with fewer pixels, frames and nodes.
+fn small(sets: &[&str]) -> Vec<String> {
+    let usual = [
+        "screen.pixels=20",
+        "screen.jy_per_pixel=0.32",
+        "observation.scans=12",
+        "representation.nodes=20",
+        "output.nodes=24",
+        "training.steps=60",
+        "training.start={linear={nodes=20,stride=1,steps=200}}",
+    ];
+    let sets = usual.iter().chain(sets).flat_map(|set| ["--set", set]);
+    ["fit"].into_iter().chain(sets).map(str::to_owned).collect()
+}
+
+fn text(folder: &Path, name: &str) -> String {
+    std::fs::read_to_string(folder.join(name)).unwrap()
+}
+
+/// From a dark field amplitudes led nowhere: χ² was that of nothing, and called converged.
+#[test]
+fn exact_amplitudes_light_every_representation_and_claim_no_certificate() {
+    let folder = tempfile::tempdir().unwrap();
+    for kind in ["linear-grid", "grid", "bhnerf"] {
+        let words =
+            small(&[AMPLITUDES, &format!("representation.kind={kind}"), "representation.width=32"]);
+        succeed(folder.path(), &with(&words, &["-o", kind]));
+        let run = folder.path().join(kind);
+        let found = results(&run);
+        let number = |key: &str| found[key].as_f64().unwrap();
+        let chi2 = found["chi2_per_datum"]["amplitudes"].as_f64().unwrap();
+        assert!(chi2 < 100.0 && number("correlation") > 0.8, "{kind}: {found}");
+        assert!(found["unknown"][0].as_str().unwrap().contains("know no phases"), "{found}");
+        let log = text(&run, "log.jsonl");
+        let line: serde_json::Value = serde_json::from_str(log.lines().next().unwrap()).unwrap();
+        assert!(line["linear"]["certificate"].is_null(), "{line}");
+        assert!(line["linear"]["stationarity"]["relative_violation"].as_f64().is_some(), "{line}");
+        if kind == "linear-grid" {
+            let statement = found["linear"]["statement"].as_str().unwrap();
+            assert!(statement.contains("no certificate"), "{statement}");
+            assert!(found["linear"]["relative_gap"].is_null(), "{found}");
+            assert!(text(&run, "report.html").contains("no certificate"));
+        }
+    }
+}
+
+/// They do not know the flux: it is given, and the volume has it.
+#[test]
+fn exact_closures_alone_take_the_flux_that_is_given() {
+    let folder = tempfile::tempdir().unwrap();
+    let sets = [CLOSURES, "representation=linear-grid"];
+    let error = fail(folder.path(), &with(&small(&sets), &["-o", "none"]));
+    assert!(error.contains("linear.flux_jy is missing"), "{error}");
+    let pulled = [&sets[..], &["linear.flux_jy=1.0", "linear.smoothness=1e-3"]].concat();
+    let error = fail(folder.path(), &with(&small(&pulled), &["-o", "none"]));
+    assert!(error.contains("linear.smoothness"), "{error}");
+    let known = [AMPLITUDES, "representation=linear-grid", "linear.flux_jy=1.0"];
+    let error = fail(folder.path(), &with(&small(&known), &["-o", "none"]));
+    assert!(error.contains("linear.flux_jy = 1 is not allowed"), "{error}");
+    assert!(!folder.path().join("none").exists());
+    let given = [&sets[..], &["linear.flux_jy=1.5"]].concat();
+    succeed(folder.path(), &with(&small(&given), &["-o", "run"]));
+    let found = results(&folder.path().join("run"));
+    assert!(found["correlation"].as_f64().unwrap() > 0.8, "{found}");
+    assert!(found["unknown"][0].as_str().unwrap().contains("do not know the flux"), "{found}");
+}
+
+/// A grid whose nodes are dark has no slope.
+#[test]
+fn exact_a_dark_start_without_slope_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let sets = [
+        AMPLITUDES,
+        "representation=grid",
+        "representation.activation=linear",
+        "training.start=drawn",
+    ];
+    let error = fail(folder.path(), &with(&small(&sets), &["-o", "none"]));
+    assert!(error.contains("starts in the dark"), "{error}");
+    assert!(!folder.path().join("none").exists());
+}
+
+/// A dark truth without noise shows no light; images of it are explained about every axis alike.
+#[test]
+fn exact_data_without_light_and_axes_that_are_all_alike_fail() {
+    let folder = tempfile::tempdir().unwrap();
+    let dark = r#"truth={spot=[{center=[5.5,0.0,0.0],sigma=0.7,amplitude=0.0}]}"#;
+    let failed = |sets: &[&str], name: &str| {
+        let output = kerrlight(folder.path(), &with(&small(sets), &["-o", name]));
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(!folder.path().join(name).join("results.json").exists());
+        said
+    };
+    let none = [AMPLITUDES, dark, "observation.noise=none", "representation=linear-grid"];
+    let said = failed(&none, "dark");
+    assert!(said.contains("show no light"), "{said}");
+    let images = r#"loss=[{data="image",weight=1.0,sigma=0.01}]"#;
+    let said = failed(&[images, dark, SCAN, "training.batch={pixels=50}"], "alike");
+    assert!(said.contains("axis.scan") && said.contains("do not tell them apart"), "{said}");
+    let error = fail(
+        folder.path(),
+        &with(&small(&[images, SCAN, "observation.scans=1"]), &["-o", "single"]),
+    );
+    assert!(error.contains("axis.scan needs frames at 2 times"), "{error}");
+    assert!(!folder.path().join("single").exists());
+}
+
+/// Every axis from lit fields.
+#[test]
+fn exact_amplitudes_find_an_axis() {
+    let folder = tempfile::tempdir().unwrap();
+    let both = r#"loss=[{data="amplitudes",weight=1.0},{data="closure-phases",weight=1.0}]"#;
+    let words = small(&[both, SCAN, "representation=linear-grid"]);
+    succeed(folder.path(), &with(&words, &["-o", "run"]));
+    let table = text(&folder.path().join("run"), "axis_scan.csv");
+    let losses: Vec<f64> = table
+        .lines()
+        .skip(1)
+        .map(|line| line.rsplit(',').next().unwrap().parse().unwrap())
+        .collect();
+    assert!(losses.len() == 20 && losses.iter().all(|loss| loss.is_finite()), "{table}");
+    assert!(losses.iter().any(|loss| *loss > 1.5 * losses[0] || *loss < 0.5 * losses[0]));
+}
