@@ -257,3 +257,65 @@ fn exact_quick_variants_of_all_experiments_run() {
         }
     }
 }
+
+/// A quick look says that it is one, shows what ran and not what should have, and concludes nothing.
+#[test]
+fn exact_a_quick_look_claims_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let texts = "seeds = 2\nsetup = [\"30 steps of 16 x 16 pixels.\"]\nreading = [\"The first rate wins.\"]";
+    let quick = "[quick.set]\ntraining.steps = 5\nscreen.pixels = 12\n[set]";
+    let beside = "caption = \"PSNR.\"\nbeside = [{ name = \"theirs\", values = [77.0] }]";
+    experiment(at, &[("seeds = 2", texts), ("[set]", quick), ("caption = \"PSNR.\"", beside)]);
+    let words = ["compare", "rates.toml", "--quick", "--seeds", "1"];
+    let printed = succeed(at, &[&words[..], &["-o", "quick"]].concat());
+    let all = results(&at.join("quick"));
+    assert_eq!(all["quick"], true);
+    let page = std::fs::read_to_string(at.join("quick/report.html")).unwrap();
+    assert!(page.contains("<h1>Two rates (quick look, not a result)</h1>"));
+    assert!(page.contains("<strong>Quick look, not a result.</strong>"));
+    let tables = std::fs::read_to_string(at.join("quick/tables.md")).unwrap();
+    for text in [&page, &tables, &printed] {
+        assert!(text.contains("quick look, not a result"), "{text}");
+        for claim in ["30 steps", "The first rate wins", "What came out", "theirs", "explained?"] {
+            assert!(!text.contains(claim), "{claim}: {text}");
+        }
+    }
+    assert!(tables.contains("| steps that were taken |  | 5 |"), "{tables}");
+    assert!(tables.contains("| pixels along each side of an image | screen.pixels | 12 |"));
+    // The whole experiment, changed by the command line, has its texts, and says what they are.
+    let words =
+        ["compare", "rates.toml", "--seeds", "1", "--set", "training.steps=6", "-o", "whole"];
+    succeed(at, &words);
+    let page = std::fs::read_to_string(at.join("whole/report.html")).unwrap();
+    assert!(
+        page.contains("30 steps")
+            && page.contains("this run has changed it: --set training.steps=6")
+    );
+    assert!(page.contains("What came out") && page.contains("Do the fits explain their data?"));
+    assert_eq!(results(&at.join("whole"))["quick"], false);
+    let changed = succeed(at, &["compare", "whole", "--against", "quick/results.json"]);
+    assert!(changed.contains("The run before is a quick look, not a result."), "{changed}");
+}
+
+/// What no case can have is refused before anything runs.
+#[test]
+fn wrong_results_are_named_before_anything_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let two = "[set]\nloss = [{ data = \"image\", weight = 1.0, sigma = 1.0 }, \
+               { data = \"light-curve\", weight = 1.0, sigma = 1.0 }]";
+    let value = "value = \"psnr_db\"";
+    for (changes, message) in [
+        (vec![(value, "value = \"nosuch\"")], "value = \"nosuch\" is not allowed: psnr_db, "),
+        (
+            vec![(value, "value = \"chi2\""), ("[set]", two)],
+            "chi2 is one of several losses: take chi2.image or chi2.light-curve",
+        ),
+        (vec![(value, "value = \"chi2.amplitudes\"")], "no loss has data = \"amplitudes\""),
+    ] {
+        experiment(at, &changes);
+        let said = fail(at, &["compare", "rates.toml", "-o", "out"]);
+        assert!(said.contains("table \"Quality\"") && said.contains(message), "{said}");
+    }
+}

@@ -25,3 +25,4 @@ mod resumed_fits;
 #[cfg(unix)]
 mod signals;
 mod support;
+mod verdict;

@@ -315,7 +315,9 @@ mod tests {
             let experiment = Experiment::parse(&text).unwrap();
             for quick in [false, true] {
                 let choice = Choice { quick, ..Choice::default() };
-                for case in expand(&experiment, &source, &choice).unwrap() {
+                let cases = expand(&experiment, &source, &choice).unwrap();
+                super::super::ran::check(&experiment, &cases).unwrap();
+                for case in cases {
                     assert!(case.settings.is_ok(), "{name}: {:?}", case.settings);
                 }
             }

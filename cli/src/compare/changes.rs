@@ -47,12 +47,19 @@ pub fn table(new: &Value, old: &Value) -> anyhow::Result<Table> {
     if rows.is_empty() {
         bail!("the two runs have no case in common");
     }
+    let is_quick = |all: &Value| all["quick"].as_bool().unwrap_or(false);
+    let quick = match (is_quick(old), is_quick(new)) {
+        (false, false) => "",
+        (true, true) => " Both runs are quick looks, not results.",
+        (true, false) => " The run before is a quick look, not a result.",
+        (false, true) => " The run now is a quick look, not a result.",
+    };
     let head = SHOWN.iter().map(|key| format!("{}: before → now", described(key).0));
     Ok(Table {
         title: "What changed".to_owned(),
         caption: format!(
             "Cases with the same levels and seed. Versions: {} before, {} now. {added} cases are new, {gone} are \
-             gone. A star marks cases whose settings differ.",
+             gone. A star marks cases whose settings differ.{quick}",
             old["version"].as_str().unwrap_or("?"),
             new["version"].as_str().unwrap_or("?"),
         ),

@@ -1,5 +1,6 @@
 //! What an experiment's file may say.
 
+use super::summary::{ONE_CHI2, RESULTS};
 use anyhow::{Context, bail};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -206,6 +207,7 @@ impl Experiment {
         }
         for table in &self.table {
             let name = || format!("table {:?}", table.title);
+            known_result(&table.value).with_context(name)?;
             let rows: Vec<String> = table.rows.iter().chain(&table.best_of).cloned().collect();
             self.shown(&rows, &table.columns, &table.r#where, true).with_context(name)?;
             if table.best_of.is_some() && !QUALITIES.contains(&table.value.as_str()) {
@@ -220,6 +222,7 @@ impl Experiment {
         }
         for figure in &self.figure {
             let name = || format!("figure {:?}", figure.title);
+            figure.value.as_deref().map(known_result).transpose().with_context(name)?;
             self.shown(&figure.rows, &figure.columns, &figure.r#where, false).with_context(name)?;
             if let Some(later) = figure.later.filter(|later| !(0.0..=1000.0).contains(later)) {
                 bail!("{}: later = {later} is not allowed: 0 to 1000 times the movie", name());
@@ -267,6 +270,19 @@ impl Experiment {
             _ => Ok(()),
         }
     }
+}
+
+/// Refuses a result that no fit has.
+fn known_result(value: &str) -> anyhow::Result<()> {
+    let of_one = value.strip_prefix(ONE_CHI2).is_some_and(|name| !name.is_empty());
+    if of_one || RESULTS.iter().any(|(key, ..)| *key == value) {
+        return Ok(());
+    }
+    let all: Vec<&str> = RESULTS.iter().map(|(key, ..)| *key).collect();
+    bail!(
+        "value = {value:?} is not allowed: {}, or {ONE_CHI2}closure-phases and the like",
+        all.join(", ")
+    )
 }
 
 impl Factor {

@@ -5,24 +5,25 @@ mod changes;
 mod experiment;
 mod figures;
 mod map;
+mod page;
+mod quick;
+mod ran;
 mod runner;
 mod source;
 mod summary;
 mod tables;
 mod verdicts;
 
-use crate::checksum::sealed;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::lock::{self, Lock};
 use crate::output::{self, Output};
 use crate::progress;
-use crate::report::{Figure, Part, Report, Table};
 use anyhow::{Context, bail};
 use cases::{Case, Choice};
 use clap::Args;
 use experiment::Experiment;
+use page::Page;
 use runner::{Runner, Status};
-use serde_json::Value;
 use source::Source;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -96,6 +97,7 @@ impl Compare {
         if self.list {
             return list_cases(&chosen);
         }
+        ran::check(&experiment, &chosen).with_context(|| name.display().to_string())?;
         if let [first, ..] = &chosen[..]
             && chosen.iter().all(|case| case.settings.is_err())
         {
@@ -108,7 +110,8 @@ impl Compare {
         let cases = with_known(chosen, all, &runner);
         runner.check_inputs(&cases)?;
         let summary = run(&cases, &runner);
-        write(&experiment, &summary, &runner, &folder, before.as_ref())?;
+        let page = Page { experiment: &experiment, choice: &choice, summary: &summary };
+        page.write(&runner, &folder, before.as_ref())?;
         output::print(&format!("{}\n", folder.join("report.html").display()))?;
         end(&summary, &folder)
     }
@@ -202,79 +205,4 @@ fn end(summary: &Summary, folder: &Path) -> anyhow::Result<()> {
         return Ok(());
     }
     Err(Failed { failed: failed.len(), all: summary.all.len(), names: failed.join("; ") }.into())
-}
-
-/// results.json, results.csv, tables.md, pictures and report.html.
-fn write(
-    experiment: &Experiment,
-    summary: &Summary,
-    runner: &Runner,
-    folder: &Path,
-    before: Option<&Value>,
-) -> anyhow::Result<()> {
-    let file = |name: &str| Output::new(&folder.join(name), "");
-    let results = summary.json(&experiment.title);
-    file("results.json")?.write(sealed(results.clone()).as_bytes())?;
-    file("results.csv")?.write(&summary.csv()?)?;
-    let mut shown: Vec<Table> = experiment
-        .table
-        .iter()
-        .filter_map(|asked| tables::table(experiment, summary, asked))
-        .collect();
-    if let Some(before) = before {
-        shown.push(changes::table(&results, before)?);
-    }
-    let text: String = shown.iter().map(tables::markdown).collect();
-    file("tables.md")?.write(text.as_bytes())?;
-    output::print(&text)?;
-    let drawn = figures::Figures { experiment, summary, runner }.draw()?;
-    let mut figures: Vec<Figure> = Vec::new();
-    for (name, figure) in drawn.figures {
-        file(&format!("{name}.png"))?.write(&figure.png)?;
-        figures.push(figure);
-    }
-    let report = Report {
-        title: experiment.title.clone(),
-        summary: sentences(experiment, summary),
-        parts: parts(experiment, summary),
-        tables: shown,
-        details: vec![tables::all(summary), tables::levels_told(experiment)],
-        figures,
-        plots: drawn.plots,
-        ..Report::default()
-    };
-    report.write(&file("report.html")?)
-}
-
-/// How it was measured, how to read it, what came out.
-fn parts(experiment: &Experiment, summary: &Summary) -> Vec<Part> {
-    let part = |heading: &str, text: Vec<String>| Part { heading: heading.to_owned(), text };
-    let orders =
-        experiment.table.iter().map(|asked| verdicts::of_table(experiment, summary, asked));
-    // The first table of qualities is the one that the experiment is about.
-    let orders = orders.into_iter().find(|all| !all.is_empty()).unwrap_or_default();
-    vec![
-        part("What came out", orders),
-        part("How to read it", experiment.reading.clone()),
-        part("How it was measured", experiment.setup.clone()),
-    ]
-}
-
-/// What was asked, what was run.
-fn sentences(experiment: &Experiment, summary: &Summary) -> Vec<String> {
-    let mut lines = vec![format!("What was asked: {}", experiment.question)];
-    let (all, done, open) = (summary.all.len(), summary.done().count(), summary.open());
-    let failed = summary.failed().count();
-    let seconds: f64 = summary.done().filter_map(|(_, results)| results["seconds"].as_f64()).sum();
-    lines.push(format!(
-        "What was run: {all} fits, of which {done} ended well, {failed} failed and {open} were not run to their end; \
-         {:.1} minutes of fitting in all, on {} threads. {}",
-        seconds / 60.0,
-        rayon::current_num_threads(),
-        summary.seeds_told()
-    ));
-    for (case, why) in summary.failed() {
-        lines.push(format!("Failed: {}: {why}", case.name()));
-    }
-    lines
 }

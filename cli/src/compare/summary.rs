@@ -67,12 +67,18 @@ pub const RESULTS: [(&str, &str, &str, usize); 11] = [
     ("steps", "steps", "", 0),
 ];
 
+/// χ² of one kind of data among several: `chi2.closure-phases`.
+pub const ONE_CHI2: &str = "chi2.";
+
 /// What a result is called with its unit, and its digits.
 pub fn described(value: &str) -> (String, usize) {
     match RESULTS.iter().find(|(key, ..)| *key == value) {
         Some((_, name, "", digits)) => ((*name).to_owned(), *digits),
         Some((_, name, unit, digits)) => (format!("{name} ({unit})"), *digits),
-        None => (value.to_owned(), 4),
+        None => match value.strip_prefix(ONE_CHI2) {
+            Some(name) => (format!("χ² a datum of {}", name.replace('-', " ")), 3),
+            None => (value.to_owned(), 4),
+        },
     }
 }
 
@@ -81,6 +87,11 @@ pub fn result(results: &Value, value: &str) -> Option<f64> {
     if value == "chi2" {
         let each = results["chi2_per_datum"].as_object()?;
         return (each.len() == 1).then(|| each.values().next()?.as_f64()).flatten();
+    }
+    if let Some(name) = value.strip_prefix(ONE_CHI2) {
+        return results["chi2_per_datum"][name.replace('-', " ")]
+            .as_f64()
+            .filter(|x| x.is_finite());
     }
     results[value].as_f64().filter(|x| x.is_finite())
 }
@@ -125,7 +136,7 @@ impl<'a> Summary<'a> {
     }
 
     /// Everything, for other programs.
-    pub fn json(&self, title: &str) -> Value {
+    pub fn json(&self, title: &str, quick: bool) -> Value {
         let case = |(case, status): &(&Case, Status)| {
             let levels: Map<String, Value> =
                 case.levels.iter().map(|(factor, level)| (factor.clone(), json!(level))).collect();
@@ -151,7 +162,8 @@ impl<'a> Summary<'a> {
             line
         };
         let cases: Vec<Value> = self.all.iter().map(case).collect();
-        json!({"title": title, "version": env!("CARGO_PKG_VERSION"), "cases": cases})
+        let version = env!("CARGO_PKG_VERSION");
+        json!({"title": title, "version": version, "quick": quick, "cases": cases})
     }
 
     /// The same as a table, a line a case.
@@ -252,6 +264,10 @@ mod tests {
         assert_eq!(result(&results, "psnr_db"), Some(3.5));
         assert_eq!(result(&results, "nrmse"), None);
         assert_eq!(result(&results, "chi2"), Some(1.5));
+        let two = json!({"chi2_per_datum": {"amplitudes": 1.5, "closure phases": 2.5}});
+        assert_eq!(result(&two, "chi2"), None);
+        assert_eq!(result(&two, "chi2.closure-phases"), Some(2.5));
+        assert_eq!(described("chi2.closure-phases").0, "χ² a datum of closure phases");
         assert_eq!(described("psnr_db"), ("PSNR (dB)".to_owned(), 2));
     }
 }

@@ -2,6 +2,7 @@
 
 use super::experiment::{Beside, Experiment, Level, TableAsked};
 use super::summary::{Spread, Summary, called, combinations, described, number, pairs};
+use super::verdicts;
 use crate::report::Table;
 use toml::Value;
 
@@ -55,8 +56,8 @@ impl Cell {
     }
 }
 
-/// One table; nothing if it would be empty.
-pub fn table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) -> Option<Table> {
+/// One table; a note in its place if it would be empty.
+pub fn table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) -> Table {
     let (unit, digits) = described(&asked.value);
     let rows = levels(experiment, summary, &asked.rows);
     let columns = levels(experiment, summary, &asked.columns);
@@ -75,7 +76,13 @@ pub fn table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) -> 
         }
     }
     if lines.is_empty() {
-        return None;
+        return Table {
+            title: format!("{}: {unit}", asked.title),
+            caption: format!("Nothing to show: no case that was run to its end has a {unit}."),
+            head: Vec::new(),
+            rows: Vec::new(),
+            links: Vec::new(),
+        };
     }
     lines.extend(asked.beside.iter().map(|row| beside(experiment, asked, row, &columns, digits)));
     let gaps = lines.iter().flatten().any(|cell| cell == NONE);
@@ -92,13 +99,13 @@ pub fn table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) -> 
     let best =
         asked.best_of.as_ref().map(|name| format!(" In brackets: the best level of {name}."));
     let best = best.unwrap_or_default();
-    Some(Table {
+    Table {
         title: format!("{}: {unit}", asked.title),
-        caption: format!("{} {spread}{best}{gaps}", asked.caption),
+        caption: format!("{} {spread}{best}{gaps}", asked.caption).trim_start().to_owned(),
         head: std::iter::once(head).chain(names).collect(),
         rows: lines,
         links: Vec::new(),
-    })
+    }
 }
 
 /// What stands where there is no number.
@@ -166,11 +173,15 @@ fn flatten(before: &str, value: &Value, into: &mut Vec<String>) {
 }
 
 /// All cases, those that failed and those still to be run included: nothing is left out.
-pub fn all(summary: &Summary) -> Table {
+pub fn all(summary: &Summary, with_verdicts: bool) -> Table {
     let shown =
         ["psnr_db", "nrmse", "correlation", "axis_dot_truth", "chi2", "seconds", "peak_memory_mib"];
     let mut head = vec!["case".to_owned()];
     head.extend(shown.iter().map(|key| described(key).0));
+    if with_verdicts {
+        head.push("data explained?".to_owned());
+    }
+    let columns = head.len();
     let row = |(case, status): &(&super::cases::Case, super::runner::Status)| {
         let mut row = vec![case.name()];
         match status {
@@ -180,11 +191,14 @@ pub fn all(summary: &Summary) -> Table {
                     None => NONE.to_owned(),
                 };
                 row.extend(shown.iter().map(cell));
+                if with_verdicts {
+                    row.push(verdicts::of_case(results).to_owned());
+                }
             }
             super::runner::Status::Failed(why) => row.push(format!("failed: {why}")),
             super::runner::Status::Open => row.push("not run".to_owned()),
         }
-        row.resize(shown.len() + 1, String::new());
+        row.resize(columns, String::new());
         row
     };
     Table {
@@ -202,6 +216,9 @@ pub fn all(summary: &Summary) -> Table {
 /// The table in Markdown.
 pub fn markdown(table: &Table) -> String {
     let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
+    if table.rows.is_empty() {
+        return format!("### {}\n\n{}\n\n", table.title, table.caption);
+    }
     let rule = format!("|{}\n", "---|".repeat(table.head.len()));
     let rows: String = table.rows.iter().map(|row| line(row)).collect();
     format!("### {}\n\n{}{rule}{rows}\n{}\n", table.title, line(&table.head), table.caption)
@@ -213,7 +230,6 @@ mod tests {
     use crate::compare::cases::{Choice, expand};
     use crate::compare::runner::Status;
     use crate::compare::source::Source;
-    use crate::compare::verdicts;
 
     const TEXT: &str = r#"
         title = "t"
@@ -243,11 +259,16 @@ mod tests {
         let results =
             [30.0, 20.0, 21.0, 25.0].map(|x| Status::Done(serde_json::json!({"psnr_db": x})));
         let summary = Summary::new(cases.iter().zip(results).collect());
-        let table = table(&experiment, &summary, &experiment.table[0]).unwrap();
+        let table = table(&experiment, &summary, &experiment.table[0]);
         assert_eq!(table.rows, [["bhnerf", "30.00 (0.001)"], ["grid", "25.00 (0.002)"]]);
         assert_eq!(table.caption, "Of two. One seed. In brackets: the best level of rate.");
         let said = verdicts::of_table(&experiment, &summary, &experiment.table[0]);
         assert_eq!(said, ["Best, by PSNR (dB): bhnerf (30.00 (0.001)) > grid (25.00 (0.002))."]);
+        // What no case has leaves a note.
+        let none = cases.iter().map(|case| (case, Status::Done(serde_json::json!({})))).collect();
+        let empty = super::table(&experiment, &Summary::new(none), &experiment.table[0]);
+        assert!(empty.rows.is_empty() && empty.caption.contains("no case that was run to its end"));
+        assert!(markdown(&empty).contains(&empty.caption), "{}", markdown(&empty));
         for (old, new, message) in [
             ("\"psnr_db\"", "\"seconds\"", "best_of is for psnr_db"),
             ("best_of = \"rate\"", "best_of = \"rates\"", "there is no factor \"rates\""),

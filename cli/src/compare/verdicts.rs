@@ -3,6 +3,7 @@
 use super::experiment::{Experiment, QUALITIES, TableAsked};
 use super::summary::{Summary, called, combinations, described, pairs};
 use super::tables::{Cell, levels};
+use serde_json::Value;
 
 /// Rows of a table in an order that some of its columns share.
 struct Order {
@@ -25,6 +26,35 @@ impl Order {
         let what = if columns.is_empty() { columns } else { format!(", {columns}") };
         format!("{title}{what}, by {unit}: {}.", rows.join(" > "))
     }
+}
+
+/// Whether a case explains its data, in a word or two.
+pub fn of_case(results: &Value) -> &'static str {
+    match results["verdict"]["outcome"].as_str() {
+        Some("explained") => "yes",
+        Some("reproduced") => "yes, without noise",
+        Some("fits-noise") => "fits noise",
+        Some("unexplained") => "no",
+        _ => "not judged",
+    }
+}
+
+/// How many cases explain their data.
+pub fn of_all(summary: &Summary) -> Option<String> {
+    let words: Vec<&str> = summary.done().map(|(_, results)| of_case(results)).collect();
+    let count = |word: &str| words.iter().filter(|other| **other == word).count();
+    let kinds = ["yes", "yes, without noise", "fits noise", "no", "not judged"];
+    let told: Vec<String> = kinds
+        .iter()
+        .filter(|word| count(word) > 0)
+        .map(|word| format!("{word}: {}", count(word)))
+        .collect();
+    (!told.is_empty()).then(|| {
+        format!(
+            "Do the fits explain their data? {}. The table of all cases says which, the page of each case why.",
+            told.join("; ")
+        )
+    })
 }
 
 /// The order of the rows of a table of qualities: a sentence for columns of the same order.

@@ -117,8 +117,8 @@ pub fn run(prepared: &Prepared, text: &str, folder: &Folder, resume: bool) -> an
     }
     let Run { mut trainer, true_volume, .. } = run;
     let estimate = Estimate { file, folder, instrument, motion, measured, true_volume };
-    estimate.write(&mut trainer, &state, begun)?;
-    output::print(&format!("{}\n", folder.path().join("report.html").display()))
+    let worth = estimate.write(&mut trainer, &state, begun)?;
+    output::print(&format!("{worth}\n{}\n", folder.path().join("report.html").display()))
 }
 
 /// The state of a checkpoint of the same settings.

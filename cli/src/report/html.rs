@@ -1,6 +1,6 @@
 //! The page around everything else. All text from outside goes through [`escape`].
 
-use super::{Figure, LinePlot, Outcome, Part, Report, Setting, Table};
+use super::{Figure, LinePlot, Notice, Outcome, Part, Report, Setting, Table, Tone};
 use std::fmt::Write;
 
 const PAGE: &str = include_str!("assets/page.html");
@@ -24,6 +24,7 @@ pub fn escape(text: &str) -> String {
 
 pub fn page(report: &Report) -> anyhow::Result<String> {
     let sections = [
+        report.notice.as_ref().map(notice).unwrap_or_default(),
         summary(&report.summary),
         report.parts.iter().map(part).collect(),
         section("results", "Results", &results(&report.results)),
@@ -65,6 +66,20 @@ pub fn section(id: &str, heading: &str, content: &str) -> String {
         return String::new();
     }
     format!("<section id=\"{id}\">\n<h2>{heading}</h2>\n{content}</section>\n")
+}
+
+fn notice(notice: &Notice) -> String {
+    let class = match notice.tone {
+        Tone::Good => "good",
+        Tone::Plain => "plain",
+        Tone::Bad => "bad",
+    };
+    let text: String =
+        notice.text.iter().map(|text| format!("<p>{}</p>\n", escape(text))).collect();
+    let headline = escape(&notice.headline);
+    format!(
+        "<section id=\"notice\" class=\"{class}\" role=\"note\">\n<p><strong>{headline}</strong></p>\n{text}</section>\n"
+    )
 }
 
 fn summary(sentences: &[String]) -> String {

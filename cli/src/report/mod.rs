@@ -19,6 +19,8 @@ use crate::output::Output;
 pub struct Report {
     /// What was done, in a few words.
     pub title: String,
+    /// What has to be read before all else.
+    pub notice: Option<Notice>,
     /// Sentences: what was asked, what was measured, what it means.
     pub summary: Vec<String>,
     /// Paragraphs under headings.
@@ -37,6 +39,28 @@ pub struct Report {
     pub details: Vec<Table>,
     /// What was asked for.
     pub settings: Vec<Setting>,
+}
+
+/// What has to be read before all else.
+#[derive(Debug)]
+pub struct Notice {
+    /// How it is meant.
+    pub tone: Tone,
+    /// One sentence.
+    pub headline: String,
+    /// Paragraphs below it.
+    pub text: Vec<String>,
+}
+
+/// How a notice is meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tone {
+    /// All is well.
+    Good,
+    /// Something to know.
+    Plain,
+    /// What follows is not to be trusted.
+    Bad,
 }
 
 /// Paragraphs under a heading.

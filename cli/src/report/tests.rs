@@ -104,6 +104,11 @@ fn report(nodes: usize) -> Report {
     };
     Report {
         title: text("Four spots around a hole without spin"),
+        notice: Some(Notice {
+            tone: Tone::Plain,
+            headline: text("A test <of> itself."),
+            text: vec![text("Nothing was fitted.")],
+        }),
         summary: vec![
             text(
                 "Which emission around the hole explains the movie? This page is a test of itself.",
@@ -160,7 +165,15 @@ fn exact_page_needs_nothing_else() {
     assert_eq!(unique.len(), names.len());
     assert_eq!(page.matches("src=").count(), page.matches("src=\"data:image/png;base64,").count());
     assert_eq!(page.matches("<svg").count(), 2);
-    for id in ["summary", "results", "three-dimensions", "pictures", "plots", "settings"] {
+    for id in [
+        "notice\" class=\"plain\" role=\"note",
+        "summary",
+        "results",
+        "three-dimensions",
+        "pictures",
+        "plots",
+        "settings",
+    ] {
         assert_eq!(page.matches(&format!("<section id=\"{id}\">")).count(), 1, "{id}");
     }
 }
@@ -172,6 +185,8 @@ fn exact_all_text_is_escaped() {
     let mut page = report(8);
     page.title = text(bad);
     page.summary = vec![text(bad)];
+    let notice = page.notice.as_mut().unwrap();
+    (notice.headline, notice.text) = (text(bad), vec![text(bad)]);
     let [setting, outcome] = [&mut page.settings[0].key, &mut page.results[0].meaning];
     (*setting, *outcome) = (text(bad), text(bad));
     (page.parts[0].heading, page.details[0].links[0]) = (text(bad), text(bad));
@@ -189,7 +204,7 @@ fn exact_all_text_is_escaped() {
     let html = page.html().unwrap();
     assert!(!html.contains("<b a="));
     assert_eq!(html.matches("</script>").count(), 2);
-    assert!(html.matches("&lt;/script&gt;&lt;b a=").count() >= 14);
+    assert!(html.matches("&lt;/script&gt;&lt;b a=").count() >= 16);
 }
 
 #[test]

@@ -1,10 +1,12 @@
 //! The emission in three dimensions: data for the page's own viewer.
 
 use super::html::{escape, fill};
+use super::pictures::encode;
 use anyhow::bail;
 use kerrlight_tomo::dynamics::AngularVelocity;
 use kerrlight_tomo::image::colormap::Colormap;
-use kerrlight_tomo::volume::Volume;
+use kerrlight_tomo::volume::projection::{self, Surroundings, View};
+use kerrlight_tomo::volume::{Shown, Volume};
 use serde_json::json;
 
 const VIEWER: &str = include_str!("assets/viewer.html");
@@ -132,11 +134,27 @@ impl View3d {
         });
         let parts = [
             ("caption", escape(&self.caption(scale))),
+            ("still", base64::encode(self.still()?)),
+            ("stillalt", escape("The emission from two sides, for print")),
             // Inside a script element nothing may look like its end.
             ("scene", scene.to_string().replace('<', "\\u003c")),
             ("script", SCRIPTS.concat()),
         ];
         Ok(fill(VIEWER, &parts))
+    }
+
+    /// What a printed page has in place of the viewer: its first view, and the one from the other side.
+    fn still(&self) -> anyhow::Result<Vec<u8>> {
+        let mut shown = vec![Shown { name: "recovered", volume: &self.recovered }];
+        shown.extend(self.truth.as_ref().map(|volume| Shown { name: "truth", volume }));
+        let around = Surroundings {
+            hole_radius: self.hole_radius,
+            axis: self.motion.as_ref().map_or([0.0; 3], |motion| motion.axis),
+            ring_radius: self.r_max,
+            half_width: 1.1 * self.r_max,
+        };
+        let views = [40.0, 220.0].map(|azimuth| View { azimuth, elevation: 20.0 });
+        encode(projection::sheet(&shown, &views, &around, &self.unit))
     }
 
     fn caption(&self, scale: f64) -> String {

@@ -20,6 +20,7 @@ mod terms;
 #[cfg(test)]
 mod tests;
 mod train;
+pub mod verdict;
 
 pub use batch::{Batch, Columns};
 pub use chain::{Chain, Field, Motion, Redshift};

@@ -3,6 +3,7 @@
 use super::batch::Batch;
 use super::chain::{Chain, Field};
 use super::terms::{FrameTerm, ImageTerm};
+use super::verdict::Statistics;
 use crate::dynamics::{Axis, Cotangents, Turned, pull_back_vjp};
 use crate::points::{Coordinates, CoordinatesMut};
 use crate::representation::{Gradient, Groups, Representation, Workspace};
@@ -282,6 +283,18 @@ impl<T: Scalar> Objective<T> {
         movie: &mut [T],
     ) {
         self.chain.movie(field, frames, &mut room.batch, &mut room.workspace, movie);
+    }
+
+    /// What the residuals of images of all frames, one after the other, are like: for each kind of data, in the order of
+    /// [`Self::names`].
+    pub fn statistics(&self, movie: &[T]) -> Vec<Statistics> {
+        let pixels = self.chain.pixels();
+        let of = |(term, _): (&dyn FrameTerm<T>, f64)| {
+            let images = movie.chunks_exact(pixels).enumerate();
+            let frames = images.map(|(frame, image)| term.residuals(frame, image));
+            Statistics::of(frames, pixels.isqrt())
+        };
+        self.terms().map(of).collect()
     }
 
     /// The loss of images of these frames, one after the other, without gradient.

@@ -1,6 +1,6 @@
 //! Data of a movie, frame by frame: χ² of an image, and its gradient with respect to pixels.
 
-use crate::interferometry::data_terms::DataTerm;
+use crate::interferometry::data_terms::{DataTerm, Residual};
 use crate::interferometry::operator::{Operator, Transform};
 use crate::real::Real;
 use kerrlight_geodesic::OutOfRange;
@@ -41,6 +41,14 @@ pub trait FrameTerm<T: Real>: Send + Sync {
 
     /// χ² of a frame; adds `weight` times its gradient.
     fn value_and_gradient(&self, frame: usize, image: &[T], weight: T, gradient: &mut [T]) -> f64;
+
+    /// [`Self::degrees_of_freedom`] residuals of a frame, whose squares add up to χ²; pixels in their order.
+    fn residuals(&self, frame: usize, image: &[T]) -> Vec<Residual>;
+}
+
+/// A residual of something that no stations measured.
+fn plain(model: f64, datum: f64, weight: f64) -> Residual {
+    Residual { value: weight * (model - datum), datum: weight * datum, stations: Vec::new() }
 }
 
 /// Every pixel of every frame: Σ (I − data)²/σ².
@@ -113,6 +121,13 @@ impl<T: Real> FrameTerm<T> for ImageTerm<T> {
         };
         scale.double() * pixels.map(square).sum::<f64>()
     }
+
+    fn residuals(&self, frame: usize, image: &[T]) -> Vec<Residual> {
+        let data = &self.movie[frame * self.pixels..(frame + 1) * self.pixels];
+        let weight = self.inverse_variance.double().sqrt();
+        let pixels = image.iter().zip(data);
+        pixels.map(|(image, datum)| plain(image.double(), datum.double(), weight)).collect()
+    }
 }
 
 /// The total flux of every frame: (Σ I − data)²/σ².
@@ -171,6 +186,11 @@ impl<T: Real> FrameTerm<T> for LightCurveTerm {
         let slope = T::of(2.0 * scaled) * weight;
         gradient.iter_mut().for_each(|pixel| *pixel += slope);
         residual * scaled
+    }
+
+    fn residuals(&self, frame: usize, image: &[T]) -> Vec<Residual> {
+        let flux = image.iter().map(|pixel| pixel.double()).sum();
+        vec![plain(flux, self.flux[frame], self.inverse_variance[frame].sqrt())]
     }
 }
 
@@ -238,5 +258,12 @@ impl<T: Real + FftNum> FrameTerm<T> for ScanTerm<T> {
         let value = term.value_and_gradient(&model, weight, &mut of_model);
         transform.adjoint(&of_model, gradient);
         value
+    }
+
+    fn residuals(&self, frame: usize, image: &[T]) -> Vec<Residual> {
+        let Some(Scan { transform, term }) = &self.scans[frame] else { return Vec::new() };
+        let mut model = vec![Complex::new(T::zero(), T::zero()); transform.data()];
+        transform.forward(image, &mut model);
+        term.residuals(&model)
     }
 }

@@ -7,7 +7,7 @@ mod quasi_newton;
 mod training;
 
 use crate::dynamics::{AngularVelocity, Axis, Injection};
-use crate::interferometry::data_terms::DataTerm;
+use crate::interferometry::data_terms::{DataTerm, Residual};
 use crate::interferometry::operator::{Dtft, ImageGrid, Pulse, Transform};
 use crate::representation::{
     Activation, Coordinates, Gradient, Grid, GridSettings, Groups, Representation, Workspace,
@@ -64,6 +64,11 @@ impl DataTerm<f64> for Plain {
                 (model - datum).norm_sqr()
             })
             .sum()
+    }
+    fn residuals(&self, model: &[Complex<f64>]) -> Vec<Residual> {
+        let pairs = model.iter().zip(&self.0).map(|(model, datum)| (model - datum, datum));
+        let parts = pairs.flat_map(|(left, datum)| [(left.re, datum.re), (left.im, datum.im)]);
+        parts.map(|(value, datum)| Residual { value, datum, stations: vec![0, 1] }).collect()
     }
 }
 

@@ -20,6 +20,8 @@ pub struct Drawn {
     pub figures: Vec<(String, Figure)>,
     /// Plots.
     pub plots: Vec<LinePlot>,
+    /// What could not be drawn, in sentences.
+    pub missing: Vec<String>,
 }
 
 /// All that figures are made of.
@@ -37,7 +39,14 @@ impl Figures<'_> {
     pub fn draw(&self) -> anyhow::Result<Drawn> {
         let mut drawn = Drawn::default();
         for (k, asked) in self.experiment.figure.iter().enumerate() {
+            let before = drawn.figures.len() + drawn.plots.len();
             self.one(k, asked, &mut drawn).with_context(|| format!("figure {:?}", asked.title))?;
+            if drawn.figures.len() + drawn.plots.len() == before {
+                drawn.missing.push(format!(
+                    "Figure {:?}: no case that was run to its end has what it shows.",
+                    asked.title
+                ));
+            }
         }
         Ok(drawn)
     }

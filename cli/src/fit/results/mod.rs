@@ -5,6 +5,8 @@ mod lensed;
 mod numbers;
 mod page;
 mod plots;
+mod units;
+mod verdict;
 
 pub use fields::{compare, true_volume};
 
@@ -19,6 +21,7 @@ use kerrlight_tomo::fit::{Loss, Motion, State, Trainer};
 use kerrlight_tomo::volume::{Volume, VolumeFile, vti};
 use lensed::Still;
 use std::time::Instant;
+use verdict::{Evidence, Judged};
 
 /// All that the results are made of.
 pub struct Estimate<'a> {
@@ -37,13 +40,13 @@ pub struct Estimate<'a> {
 }
 
 impl Estimate<'_> {
-    /// Writes all of them.
+    /// Writes all of them; a line that says what the fit is worth.
     pub fn write(
         &self,
         trainer: &mut Trainer<'_, f32>,
         state: &State<f32>,
         begun: Instant,
-    ) -> anyhow::Result<()> {
+    ) -> anyhow::Result<String> {
         let volume = fields::recovered(self.file, trainer, state)?;
         let frames: Vec<usize> = (0..self.measured.times.len()).collect();
         let movie = trainer.movie(&state.now, &frames, true);
@@ -53,10 +56,16 @@ impl Estimate<'_> {
         self.volumes(&volume, state)?;
         self.movies(&movie)?;
         let still = self.still(trainer, state)?;
-        let found = Found { volume, still, loss, mask, movie, state, begun };
+        let judged = self.evidence().judged(&trainer.objective, &movie)?;
+        let found = Found { volume, still, loss, mask, judged, movie, state, begun };
         let results = self.results(trainer, &found)?;
         self.folder.file("results.json")?.write(sealed(results.clone()).as_bytes())?;
-        self.report(&found, &results)
+        self.report(&found, &results)?;
+        Ok(numbers::last_line(&found.judged.headline(), &results))
+    }
+
+    fn evidence(&self) -> Evidence<'_> {
+        Evidence { file: self.file, measured: self.measured }
     }
 
     fn volumes(&self, volume: &Volume, state: &State<f32>) -> anyhow::Result<()> {
@@ -93,6 +102,7 @@ pub struct Found<'a> {
     loss: Loss,
     /// What the mask of what shines leaves out, of the flux; nothing without a mask.
     mask: Option<f64>,
+    judged: Judged,
     movie: Vec<f32>,
     state: &'a State<f32>,
     begun: Instant,

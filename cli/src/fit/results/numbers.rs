@@ -53,6 +53,7 @@ impl Estimate<'_> {
             "chi2_per_datum": chi2,
             "axis": now.axis.vector(),
             "inputs": self.folder.inputs().files,
+            "verdict": found.judged.json(),
         });
         if let Some(mask) = found.mask {
             results["mask_error"] = json!(mask);
@@ -81,6 +82,19 @@ impl Estimate<'_> {
         results["nrmse"] = json!(all.nrmse);
         results["correlation"] = json!(all.correlation);
         Ok(results)
+    }
+}
+
+/// The verdict and, beside a truth, PSNR with that of an empty volume.
+pub fn last_line(headline: &str, results: &Value) -> String {
+    match (results["psnr_db"].as_f64(), results["nrmse"].as_f64()) {
+        (Some(psnr), Some(nrmse)) => {
+            let empty = psnr + 20.0 * nrmse.log10();
+            format!(
+                "{headline} PSNR beside the truth: {psnr:.2} dB (an empty volume: {empty:.2} dB)."
+            )
+        }
+        _ => headline.to_owned(),
     }
 }
 

@@ -27,8 +27,10 @@ impl Estimate<'_> {
         plots.extend(self.amplitudes(&found.movie)?);
         let report = Report {
             title: self.file.title.clone(),
+            notice: Some(found.judged.notice()),
             summary: self.summary(results),
             results: outcomes(results),
+            details: vec![found.judged.table()],
             view: Some(self.view(found)),
             figures: self.figures(found)?,
             plots,
@@ -68,7 +70,7 @@ impl Estimate<'_> {
             self.measured
                 .movie
                 .as_ref()
-                .map(|movie| ("truth", movie.iter().map(|x| *x as f32).collect())),
+                .map(|movie| (self.known_movie(), movie.iter().map(|x| *x as f32).collect())),
         ]
         .into_iter()
         .flatten()
@@ -76,6 +78,11 @@ impl Estimate<'_> {
         figures.push(report::frames(&rows, n, &self.measured.times)?);
         figures.extend(self.axes()?);
         Ok(figures)
+    }
+
+    /// What the movie beside the recovered one is.
+    pub fn known_movie(&self) -> &'static str {
+        if self.measured.truth.is_some() { "truth" } else { "data" }
     }
 
     fn lensed(&self, still: &Still) -> anyhow::Result<report::Figure> {
@@ -193,7 +200,7 @@ fn flatten(prefix: &str, value: &toml::Value, all: &mut Vec<report::Setting>) {
         leaf => all.push(report::Setting {
             key: prefix.to_owned(),
             value: leaf.to_string(),
-            unit: String::new(),
+            unit: super::units::unit(prefix).to_owned(),
         }),
     }
 }

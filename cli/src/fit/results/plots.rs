@@ -2,9 +2,6 @@
 
 use super::Estimate;
 use crate::report::{Axis, LinePlot, Marks, Series};
-use anyhow::anyhow;
-use kerrlight_tomo::interferometry::operator::{Method, Operator, Pulse, Transform};
-use num_complex::Complex;
 
 impl Estimate<'_> {
     /// Total flux of the model and of the true movie.
@@ -21,15 +18,20 @@ impl Estimate<'_> {
         }];
         if let Some(truth) = &self.measured.movie {
             series.push(Series {
-                name: "truth".to_owned(),
+                name: self.known_movie().to_owned(),
                 points: points(truth.chunks(n * n).map(|image| image.iter().sum()).collect()),
                 errors: Vec::new(),
                 marks: Marks::Points,
             });
         }
+        let points = match (&self.measured.movie, &self.measured.truth) {
+            (Some(_), Some(_)) => " Points are the true movie, the line is the recovered one.",
+            (Some(_), None) => " Points are the data, the line is the recovered movie.",
+            (None, _) => " The data are no images: the line is the recovered movie.",
+        };
         LinePlot {
             title: "Light curve".to_owned(),
-            caption: "Total flux of each frame: all light of the movie, added up. Points are the true movie, the line is the recovered one.".to_owned(),
+            caption: format!("Total flux of each frame: all light of the movie, added up.{points}"),
             x: Axis { label: "time".to_owned(), unit: "GM/c³".to_owned(), log: false },
             y: Axis { label: "flux".to_owned(), unit: "Jy".to_owned(), log: false },
             series,
@@ -38,30 +40,17 @@ impl Estimate<'_> {
 
     /// Amplitudes of the data and of the model, with the data's errors.
     pub fn amplitudes(&self, movie: &[f32]) -> anyhow::Result<Option<LinePlot>> {
-        let Some((observation, frames)) = &self.measured.visibilities else { return Ok(None) };
-        let sky = self.measured.sky.ok_or_else(|| anyhow!("no sky"))?;
-        let rows = || {
-            observation.rows.iter().zip(frames).filter_map(|(row, frame)| {
-                row.stokes_i(observation.basis).map(|i| (row, *frame, i))
-            })
-        };
-        let mut uv = vec![Vec::new(); self.measured.times.len()];
-        rows().for_each(|(row, frame, _)| uv[frame].push(row.uv));
-        let transform = Transform::<f32>::new(sky, Pulse::Triangle, &uv, Method::Direct, 64 << 20)?;
-        let mut model = vec![Complex::new(0.0, 0.0); transform.data()];
-        transform.forward(movie, &mut model);
-        // The model is in the order of frames.
-        let mut order: Vec<_> = rows().collect();
-        order.sort_by_key(|(_, frame, _)| *frame);
+        let Some((observation, _)) = &self.measured.visibilities else { return Ok(None) };
+        let model = self.evidence().model_visibilities(movie)?.unwrap_or_default();
+        let rows: Vec<_> = observation.stokes_i().collect();
         let length = |uv: [f64; 2]| uv[0].hypot(uv[1]) * 1e-9;
-        let data = order.iter().map(|(row, _, i)| [length(row.uv), i.visibility.norm()]);
-        let fitted =
-            order.iter().zip(&model).map(|((row, ..), v)| [length(row.uv), f64::from(v.norm())]);
+        let data = rows.iter().map(|(row, i)| [length(row.uv), i.visibility.norm()]);
+        let fitted = rows.iter().zip(&model).map(|((row, _), v)| [length(row.uv), v.norm()]);
         let series = vec![
             Series {
                 name: "data".to_owned(),
                 points: data.collect(),
-                errors: order.iter().map(|(_, _, i)| i.noise_sigma).collect(),
+                errors: rows.iter().map(|(_, i)| i.noise_sigma).collect(),
                 marks: Marks::Points,
             },
             Series {

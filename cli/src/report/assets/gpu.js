@@ -73,6 +73,17 @@ function link(gl) {
   return program;
 }
 
+// Who draws, in the browser's words.
+function rendererName(gl) {
+  const info = gl.getExtension("WEBGL_debug_renderer_info");
+  return String(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER) ?? "");
+}
+
+// Whose work the processor does in place of a graphics unit; nothing if there is one.
+function softwareName(name) {
+  return name.match(/swiftshader|llvmpipe|softpipe|software|basic render/i)?.[0] ?? "";
+}
+
 function bindTexture(gl, target, slot, filter) {
   gl.activeTexture(gl.TEXTURE0 + slot);
   gl.bindTexture(target, gl.createTexture());
@@ -142,7 +153,7 @@ function gpuRenderer(canvas, scene) {
   for (const [name, slot] of [["colors", 0], ["rates", 1]]) {
     gl.uniform1i(gl.getUniformLocation(program, name), slot);
   }
-  return (state, white) => {
+  const draw = (state, white) => {
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.uniform1i(gl.getUniformLocation(program, "volume"), 2 + state.volume);
     setUniforms(gl, program, gpuUniforms(scene, state, white));
@@ -150,4 +161,7 @@ function gpuRenderer(canvas, scene) {
     const error = gl.getError();
     if (error !== gl.NO_ERROR && !gl.isContextLost()) throw new Error(`WebGL error ${error}`);
   };
+  // Returns when all that was drawn is there.
+  const finish = () => gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+  return { draw, finish, by: rendererName(gl) };
 }

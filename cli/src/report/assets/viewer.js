@@ -54,20 +54,48 @@ function brightest(scene) {
   return most > 0 ? most : scene.scale;
 }
 
+function softwareChoice(canvas, scene) {
+  return { name: "fallback", canvas, draw: softwareRenderer(canvas, scene), finish: () => {}, first: 128, most: 256 };
+}
+
+// `first` and `most`: pixels along a side of the first picture and of the largest one.
 function chooseRenderer(stage, scene) {
   const forced = new URLSearchParams(location.hash.slice(1)).get("renderer") === "fallback";
   const canvas = addCanvas(stage);
-  const draw = forced ? null : gpuRenderer(canvas, scene);
-  if (draw) return { name: "webgl2", canvas, draw };
+  const gpu = forced ? null : gpuRenderer(canvas, scene);
+  if (gpu) return { name: "webgl2", canvas, ...gpu, first: softwareName(gpu.by) ? 192 : 4096, most: 4096 };
   canvas.remove();
-  const plain = addCanvas(stage);
-  return { name: "fallback", canvas: plain, draw: softwareRenderer(plain, scene) };
+  return softwareChoice(addCanvas(stage), scene);
 }
 
-const NOTES = {
-  webgl2: "(drawn by the graphics unit)",
-  fallback: "(drawn by the processor, coarser: WebGL2 is not used)",
-};
+function noteOf({ name, by }) {
+  if (name === "fallback") return "(drawn by the processor: WebGL2 is not used)";
+  const software = softwareName(by);
+  return software ? `(drawn by the processor: ${software}, no graphics unit)` : "(drawn by the graphics unit)";
+}
+
+// Milliseconds that a picture may take while it moves, and at rest.
+const MOVING = 50;
+const RESTING = 700;
+
+// Pixels along a side: as many as were seen to be drawn in the time that there is, or as the fragment says.
+class Quality {
+  constructor({ first, most }) {
+    const fixed = Number.parseInt(new URLSearchParams(location.hash.slice(1)).get("pixels"), 10);
+    Object.assign(this, { first, most, fixed, perPixel: null });
+  }
+
+  measured(milliseconds, size) {
+    const now = milliseconds / (size * size);
+    this.perPixel = this.perPixel === null ? now : 0.5 * (this.perPixel + now);
+  }
+
+  size(full, budget) {
+    if (this.fixed > 0) return Math.min(this.fixed, this.most);
+    const able = this.perPixel === null ? this.first : Math.floor(Math.sqrt(budget / this.perPixel));
+    return Math.min(full, this.most, Math.max(able, 96));
+  }
+}
 
 class Viewer {
   constructor(scene) {
@@ -82,40 +110,53 @@ class Viewer {
 
   useRenderer(renderer) {
     this.renderer = renderer;
+    this.quality = new Quality(renderer);
     this.marks = addCanvas(this.stage);
     renderer.canvas.addEventListener("webglcontextlost", () => this.fallBack());
   }
 
   fallBack() {
     this.stage.replaceChildren();
-    const canvas = addCanvas(this.stage);
-    const draw = softwareRenderer(canvas, this.scene);
-    this.useRenderer({ name: "fallback", canvas, draw });
+    this.useRenderer(softwareChoice(addCanvas(this.stage), this.scene));
     this.ask();
   }
 
-  resize() {
+  // Canvases as large as the place, or as can be drawn in time.
+  resize(budget) {
     const size = Math.max(this.stage.clientWidth, 1);
-    const ratio = Math.min(window.devicePixelRatio || 1, 2);
-    const pixels = this.renderer.name === "webgl2" ? Math.round(size * ratio) : 128;
-    for (const [canvas, wanted] of [[this.renderer.canvas, pixels], [this.marks, Math.round(size * ratio)]]) {
+    const full = Math.round(size * Math.min(window.devicePixelRatio || 1, 2));
+    const pixels = this.quality.size(full, budget);
+    for (const [canvas, wanted] of [[this.renderer.canvas, pixels], [this.marks, full]]) {
       if (canvas.width !== wanted) canvas.width = canvas.height = wanted;
     }
-    return size;
+    return { size, full };
   }
 
-  draw() {
+  draw(budget) {
     this.asked = false;
-    const size = this.resize();
+    const { size, full } = this.resize(budget);
     const white = this.white / 2 ** this.state.brightness;
+    const begun = performance.now();
     this.renderer.draw(this.state, white);
+    this.renderer.finish();
+    this.quality.measured(performance.now() - begun, this.renderer.canvas.width);
     drawMarks(this.marks, this.scene, this.state, white, size);
     this.showState();
-    setStatus(`ready: ${this.renderer.name}`, NOTES[this.renderer.name]);
+    setStatus(`ready: ${this.renderer.name}`, noteOf(this.renderer));
+    this.sharpen(full);
+  }
+
+  // Once it rests, as sharp as can be.
+  sharpen(full) {
+    clearTimeout(this.rest);
+    const drawn = this.renderer.canvas.width;
+    if (this.quality.size(full, RESTING) > 1.2 * drawn) {
+      this.rest = setTimeout(() => this.draw(RESTING), 250);
+    }
   }
 
   ask() {
-    if (!this.asked) requestAnimationFrame(() => this.draw());
+    if (!this.asked) requestAnimationFrame(() => this.draw(MOVING));
     this.asked = true;
   }
 
@@ -242,7 +283,7 @@ function start() {
     applyFragment(viewer.scene, viewer.state);
     viewer.ask();
   });
-  viewer.draw();
+  viewer.draw(MOVING);
 }
 
 start();

@@ -92,8 +92,10 @@ fn code_page_runs_in_a_browser() {
     assert!(["ready: webgl2", "ready: fallback"].contains(&status(&found)), "{}", status(&found));
     assert!(found.contains("<output id=\"time-text\">0.5 orbits at 3.5 M</output>"));
     assert_eq!(found.matches("type=\"radio\"").count(), 2);
+    assert!(found.contains("drawn by the ") && found.contains("class=\"still\""));
     let found = dump(&browser, folder.path(), "renderer=fallback");
     assert_eq!(status(&found), "ready: fallback");
+    assert!(found.contains("drawn by the processor: WebGL2 is not used"));
 }
 
 /// Emission at a time, from that of the reference time.
@@ -130,7 +132,8 @@ fn code_viewer_moves_matter_as_the_fit_does() {
         let sum: f64 = a.iter().zip(b).map(|(a, b)| f64::from(a.abs_diff(*b))).sum();
         sum / a.len() as f64
     };
-    for renderer in ["renderer=fallback", ""] {
+    // As many rays for all pictures, however fast they are drawn.
+    for renderer in ["renderer=fallback&pixels=160", "pixels=160"] {
         let known = picture(&format!("volume=truth&{renderer}"));
         let turned = picture(&format!("volume=recovered&time=0.4&{renderer}"));
         let still = picture(&format!("volume=recovered&time=0&{renderer}"));

@@ -1,6 +1,6 @@
 //! Closure phases and log closure amplitudes, with the covariance of those that share baselines.
 
-use super::{DataTerm, DataTermError, faintest};
+use super::{DataTerm, DataTermError, Residual, faintest};
 use crate::interferometry::observation::Observation;
 use crate::interferometry::operator::Real;
 use crate::interferometry::products::{ClosureKind, ClosureSet};
@@ -24,6 +24,9 @@ struct Scan<T> {
     data: Vec<T>,
     /// C⁻¹, row after row.
     precision: Vec<T>,
+    /// Lower triangle F of C⁻¹ = F Fᵀ, column after column: Fᵀ r are independent.
+    factor: Vec<f64>,
+    stations: Vec<Vec<u16>>,
 }
 
 impl<T: Real> ClosureTerm<T> {
@@ -54,7 +57,9 @@ impl<T: Real> Scan<T> {
     fn new(set: &ClosureSet) -> Result<Self, DataTermError> {
         let n = set.closures.len();
         let covariance = DMatrix::from_row_slice(n, n, &set.covariance);
-        let inverse = covariance.cholesky().ok_or(DataTermError::Singular(set.time_h))?.inverse();
+        let singular = || DataTermError::Singular(set.time_h);
+        let inverse = covariance.cholesky().ok_or_else(singular)?.inverse();
+        let factor = inverse.clone().cholesky().ok_or_else(singular)?.unpack();
         let legs = |c: &crate::interferometry::products::Closure| {
             c.legs.iter().map(|leg| (leg.visibility, T::of(leg.sign.into()))).collect()
         };
@@ -67,6 +72,8 @@ impl<T: Real> Scan<T> {
             data: set.closures.iter().map(|c| T::of(c.value)).collect(),
             // Symmetric: columns are rows.
             precision,
+            factor: factor.iter().copied().collect(),
+            stations: set.closures.iter().map(|c| c.stations.clone()).collect(),
         })
     }
 
@@ -94,6 +101,20 @@ impl<T: Real> Scan<T> {
                 }
             })
             .collect()
+    }
+
+    /// The same, combined such that their errors are independent and 1.
+    fn independent(&self, kind: ClosureKind, model: &[Complex<T>]) -> Vec<Residual> {
+        let residuals = self.residuals(kind, model);
+        let columns = self.factor.chunks_exact(residuals.len());
+        let pull =
+            |column: &[f64]| column.iter().zip(&residuals).map(|(f, r)| f * r.double()).sum();
+        let of = |(column, stations): (&[f64], &Vec<u16>)| Residual {
+            value: pull(column),
+            datum: 0.0,
+            stations: stations.clone(),
+        };
+        columns.zip(&self.stations).map(of).collect()
     }
 }
 
@@ -156,5 +177,10 @@ impl<T: Real> DataTerm<T> for ClosureTerm<T> {
             }
         }
         total
+    }
+
+    /// Combinations of the quantities of a scan, each under the stations of its least noisy one.
+    fn residuals(&self, model: &[Complex<T>]) -> Vec<Residual> {
+        self.scans.iter().flat_map(|scan| scan.independent(self.kind, model)).collect()
     }
 }

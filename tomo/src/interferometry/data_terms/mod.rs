@@ -43,6 +43,18 @@ pub enum DataTermError {
     Singular(f64),
 }
 
+/// A datum beside a model, in units of its error.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Residual {
+    /// (model − datum)/σ. Where data share errors, as closure quantities do, a combination of them whose error is 1 and
+    /// independent of the others: squares add up to χ².
+    pub value: f64,
+    /// The datum in the same units; 0 for closure quantities, which have no natural zero.
+    pub datum: f64,
+    /// Indices of the stations of the baseline, triangle or quadrangle; none for data that no stations measured.
+    pub stations: Vec<u16>,
+}
+
 /// A χ² of model visibilities.
 pub trait DataTerm<T: Real>: Sync {
     /// How many visibilities it expects.
@@ -65,6 +77,14 @@ pub trait DataTerm<T: Real>: Sync {
         weight: T,
         gradient: &mut [Complex<T>],
     ) -> f64;
+
+    /// [`Self::degrees_of_freedom`] residuals, in the same order for every model.
+    fn residuals(&self, model: &[Complex<T>]) -> Vec<Residual>;
+}
+
+/// Stations of the rows that have Stokes I, in order.
+fn stations_of(observation: &Observation) -> Vec<[u16; 2]> {
+    observation.stokes_i().map(|(row, _)| row.stations).collect()
 }
 
 /// Stokes I of an observation, in order, with errors fit for a χ².

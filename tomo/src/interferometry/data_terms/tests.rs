@@ -136,6 +136,24 @@ fn exact_mean_of_chi_squared() {
     }
 }
 
+/// Residuals are χ² datum by datum, closure quantities with their covariance.
+#[test]
+fn exact_squares_of_residuals_add_up_to_chi_squared() {
+    let data = observation(3, 20.0);
+    let model = model(&data);
+    for (name, term) in terms::<f64>(&data) {
+        let residuals = term.residuals(&model);
+        let mut gradient = vec![Complex64::new(0.0, 0.0); model.len()];
+        let value = term.value_and_gradient(&model, 1.0, &mut gradient);
+        let sum: f64 = residuals.iter().map(|residual| residual.value.powi(2)).sum();
+        assert_eq!(residuals.len(), term.degrees_of_freedom(), "{name}");
+        assert!((sum / value - 1.0).abs() < 1e-10, "{name}: {sum} {value}");
+        let stations = if name.starts_with("closure") { 3 } else { 2 };
+        let stations = if name.starts_with("log") { 4 } else { stations };
+        assert!(residuals.iter().all(|r| r.stations.len() == stations), "{name}");
+    }
+}
+
 #[test]
 fn exact_data_without_errors_are_refused() {
     let mut data = observation(1, 20.0);

@@ -1,6 +1,6 @@
 //! Complex visibilities, and amplitudes.
 
-use super::{DataTerm, DataTermError, checked, faintest, inverse_variances};
+use super::{DataTerm, DataTermError, Residual, checked, faintest, inverse_variances, stations_of};
 use crate::interferometry::observation::Observation;
 use crate::interferometry::operator::Real;
 use crate::interferometry::products::debiased_amplitude;
@@ -9,6 +9,7 @@ use num_complex::Complex;
 /// χ² = Σ |V − V_data|²/σ².
 #[derive(Debug, Clone)]
 pub struct VisibilityTerm<T> {
+    stations: Vec<[u16; 2]>,
     data: Vec<Complex<T>>,
     inverse_variance: Vec<T>,
 }
@@ -22,6 +23,7 @@ impl<T: Real> VisibilityTerm<T> {
         let data = checked(observation)?;
         let value = |v: Complex<f64>| Complex::new(T::of(v.re), T::of(v.im));
         Ok(VisibilityTerm {
+            stations: stations_of(observation),
             inverse_variance: inverse_variances(&data)?,
             data: data.iter().map(|m| value(m.visibility)).collect(),
         })
@@ -53,11 +55,27 @@ impl<T: Real> DataTerm<T> for VisibilityTerm<T> {
         }
         total
     }
+
+    /// Real and imaginary part of every visibility.
+    fn residuals(&self, model: &[Complex<T>]) -> Vec<Residual> {
+        let one = |k: usize| {
+            let weight = self.inverse_variance[k].double().sqrt();
+            let (residual, stations) = (model[k] - self.data[k], self.stations[k].to_vec());
+            let part = |value: T, datum: T| Residual {
+                value: weight * value.double(),
+                datum: weight * datum.double(),
+                stations: stations.clone(),
+            };
+            [part(residual.re, self.data[k].re), part(residual.im, self.data[k].im)]
+        };
+        (0..self.data.len()).flat_map(one).collect()
+    }
 }
 
 /// χ² = Σ (|V| − A)²/σ² with debiased amplitudes A.
 #[derive(Debug, Clone)]
 pub struct AmplitudeTerm<T> {
+    stations: Vec<[u16; 2]>,
     data: Vec<T>,
     inverse_variance: Vec<T>,
 }
@@ -70,6 +88,7 @@ impl<T: Real> AmplitudeTerm<T> {
     pub fn new(observation: &Observation) -> Result<Self, DataTermError> {
         let data = checked(observation)?;
         Ok(AmplitudeTerm {
+            stations: stations_of(observation),
             inverse_variance: inverse_variances(&data)?,
             data: data.iter().map(|m| T::of(debiased_amplitude(m))).collect(),
         })
@@ -105,5 +124,17 @@ impl<T: Real> DataTerm<T> for AmplitudeTerm<T> {
             }
         }
         total
+    }
+
+    fn residuals(&self, model: &[Complex<T>]) -> Vec<Residual> {
+        let one = |k: usize| {
+            let weight = self.inverse_variance[k].double().sqrt();
+            Residual {
+                value: weight * (model[k].norm() - self.data[k]).double(),
+                datum: weight * self.data[k].double(),
+                stations: self.stations[k].to_vec(),
+            }
+        };
+        (0..self.data.len()).map(one).collect()
     }
 }

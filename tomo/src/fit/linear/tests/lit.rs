@@ -3,7 +3,9 @@
 use super::super::objective::{Convex, Objective};
 use super::*;
 use crate::fit::{Scan, ScanTerm};
-use crate::interferometry::data_terms::{AmplitudeTerm, ClosureTerm, DataTerm, VisibilityTerm};
+use crate::interferometry::data_terms::{
+    AmplitudeTerm, ClosureTerm, DataTerm, Residual, VisibilityTerm,
+};
 use crate::interferometry::observation::{Basis, Measured, Observation, Row};
 use crate::interferometry::operator::{Dtft, ImageGrid, Pulse, Transform};
 use crate::interferometry::products::ClosureKind;
@@ -171,6 +173,10 @@ impl FrameTerm<f64> for Broken {
     }
     fn value_and_gradient(&self, frame: usize, _: &[f64], _: f64, _: &mut [f64]) -> f64 {
         if frame == 4 { f64::NAN } else { 1.0 }
+    }
+    fn residuals(&self, frame: usize, _: &[f64]) -> Vec<Residual> {
+        let value = if frame == 4 { f64::NAN } else { 1.0 };
+        vec![Residual { value, datum: 0.0, stations: Vec::new() }]
     }
 }
 

@@ -1,0 +1,156 @@
+//! What a comparison leaves: results, tables, pictures and one page of them.
+
+use super::cases::Choice;
+use super::experiment::Experiment;
+use super::runner::Runner;
+use super::summary::Summary;
+use super::{changes, figures, quick, ran, tables, verdicts};
+use crate::checksum::sealed;
+use crate::output::{self, Output};
+use crate::report::{Figure, Part, Report, Table};
+use serde_json::Value;
+use std::path::Path;
+
+/// All that a page is made of.
+pub struct Page<'a> {
+    /// What was asked.
+    pub experiment: &'a Experiment,
+    /// What of it was run, and how.
+    pub choice: &'a Choice,
+    /// What was found.
+    pub summary: &'a Summary<'a>,
+}
+
+impl Page<'_> {
+    /// results.json, results.csv, tables.md, pictures and report.html.
+    pub fn write(
+        &self,
+        runner: &Runner,
+        folder: &Path,
+        before: Option<&Value>,
+    ) -> anyhow::Result<()> {
+        if !self.choice.quick {
+            return self.files(runner, folder, before, Vec::new());
+        }
+        let (look, left_out) = quick::look(self.experiment);
+        Page { experiment: &look, ..*self }.files(runner, folder, before, left_out)
+    }
+
+    fn files(
+        &self,
+        runner: &Runner,
+        folder: &Path,
+        before: Option<&Value>,
+        mut left_out: Vec<String>,
+    ) -> anyhow::Result<()> {
+        let Page { experiment, choice, summary } = self;
+        let file = |name: &str| Output::new(&folder.join(name), "");
+        let results = summary.json(&experiment.title, choice.quick);
+        file("results.json")?.write(sealed(results.clone()).as_bytes())?;
+        file("results.csv")?.write(&summary.csv()?)?;
+        let shown = self.tables(before, &results)?;
+        let text: String = shown.iter().map(tables::markdown).collect();
+        let text = [self.heading(), text].concat();
+        file("tables.md")?.write(text.as_bytes())?;
+        output::print(&text)?;
+        let drawn = figures::Figures { experiment, summary, runner }.draw()?;
+        left_out.extend(drawn.missing);
+        let mut figures: Vec<Figure> = Vec::new();
+        for (name, figure) in drawn.figures {
+            file(&format!("{name}.png"))?.write(&figure.png)?;
+            figures.push(figure);
+        }
+        let report = Report {
+            title: experiment.title.clone(),
+            notice: choice.quick.then(quick::notice),
+            summary: self.sentences(),
+            parts: self.parts(left_out),
+            tables: shown,
+            details: vec![tables::all(summary, !choice.quick), tables::levels_told(experiment)],
+            figures,
+            plots: drawn.plots,
+            ..Report::default()
+        };
+        report.write(&file("report.html")?)
+    }
+
+    /// What ran, what the experiment asks for, and what has changed.
+    fn tables(&self, before: Option<&Value>, results: &Value) -> anyhow::Result<Vec<Table>> {
+        let Page { experiment, summary, .. } = self;
+        let asked = experiment.table.iter();
+        let asked = asked.map(|asked| tables::table(experiment, summary, asked));
+        let mut shown: Vec<Table> = std::iter::once(ran::table(summary)).chain(asked).collect();
+        if let Some(before) = before {
+            shown.push(changes::table(results, before)?);
+        }
+        Ok(shown)
+    }
+
+    /// What tables.md and the terminal say of a quick look.
+    fn heading(&self) -> String {
+        if !self.choice.quick {
+            return String::new();
+        }
+        let notice = quick::notice();
+        format!("# {}\n\n{}\n\n", self.experiment.title, notice.text.join("\n\n"))
+    }
+
+    /// What came out, how to read it, how it was measured.
+    fn parts(&self, left_out: Vec<String>) -> Vec<Part> {
+        let Page { experiment, choice, summary } = self;
+        let part = |heading: &str, text: Vec<String>| Part { heading: heading.to_owned(), text };
+        let orders =
+            experiment.table.iter().map(|asked| verdicts::of_table(experiment, summary, asked));
+        // The first table of qualities is the one that the experiment is about.
+        let orders = orders.into_iter().find(|all| !all.is_empty()).unwrap_or_default();
+        let out = match choice.quick {
+            true => Vec::new(),
+            false => orders.into_iter().chain(verdicts::of_all(summary)).collect(),
+        };
+        vec![
+            part("What came out", out),
+            part("Not shown", left_out),
+            part("How to read it", experiment.reading.clone()),
+            part("How it was measured", self.setup()),
+        ]
+    }
+
+    /// The experiment's own text, which knows nothing of the command line.
+    fn setup(&self) -> Vec<String> {
+        let Page { experiment, choice, .. } = self;
+        let changed = !choice.set.is_empty() || choice.seeds.is_some() || !choice.only.is_empty();
+        if experiment.setup.is_empty() || !changed {
+            return experiment.setup.clone();
+        }
+        let set = choice.set.iter().map(|set| format!("--set {set}"));
+        let seeds = choice.seeds.iter().map(|seeds| format!("--seeds {seeds}"));
+        let only = choice.only.iter().map(|only| format!("--only {only}"));
+        let all: Vec<String> = set.chain(seeds).chain(only).collect();
+        let caution = format!(
+            "This is how the experiment is meant; this run has changed it: {}. The table \"What ran\" has what was used.",
+            all.join(", ")
+        );
+        std::iter::once(caution).chain(experiment.setup.iter().cloned()).collect()
+    }
+
+    /// What was asked, what was run.
+    fn sentences(&self) -> Vec<String> {
+        let Page { experiment, summary, .. } = self;
+        let mut lines = vec![format!("What was asked: {}", experiment.question)];
+        let (all, done, open) = (summary.all.len(), summary.done().count(), summary.open());
+        let failed = summary.failed().count();
+        let seconds: f64 =
+            summary.done().filter_map(|(_, results)| results["seconds"].as_f64()).sum();
+        lines.push(format!(
+            "What was run: {all} fits, of which {done} ended well, {failed} failed and {open} were not run to their end; \
+             {:.1} minutes of fitting in all, on {} threads. {}",
+            seconds / 60.0,
+            rayon::current_num_threads(),
+            summary.seeds_told()
+        ));
+        for (case, why) in summary.failed() {
+            lines.push(format!("Failed: {}: {why}", case.name()));
+        }
+        lines
+    }
+}

@@ -1,0 +1,117 @@
+//! What really ran, from the settings of the cases, and what that can give.
+
+use super::cases::Case;
+use super::experiment::{Experiment, FigureKind, QUALITIES};
+use super::summary::{ONE_CHI2, Summary, is_at, pairs};
+use crate::report::Table;
+use anyhow::bail;
+use toml::Value;
+
+/// Settings that decide how much is computed, and what they are called.
+const SHOWN: [(&str, &str); 9] = [
+    ("training.steps", "steps of the optimiser, at most"),
+    ("screen.pixels", "pixels along each side of an image"),
+    ("movie.frames", "frames of the movie"),
+    ("observation.scans", "scans of the observation"),
+    ("observation.noise", "noise"),
+    ("representation.nodes", "nodes along each side of a grid, where the representation is one"),
+    ("linear.rounds", "rounds of the linear problem"),
+    ("linear.iterations", "iterations of a round"),
+    ("output.nodes", "nodes along each side of the volume that is judged"),
+];
+
+/// The value of a key with dots.
+fn at(settings: &toml::Table, key: &str) -> Option<String> {
+    let mut words = key.split('.');
+    let first = settings.get(words.next()?)?;
+    let value = words.try_fold(first, |value, word| value.as_table()?.get(word))?;
+    Some(value.as_str().map_or_else(|| value.to_string(), str::to_owned))
+}
+
+fn settings(case: &Case) -> Option<toml::Table> {
+    case.settings.as_ref().ok()?.parse().ok()
+}
+
+/// Different values with the number of cases that have them, in the order of the cases.
+fn counted(values: impl Iterator<Item = String>) -> String {
+    let mut all: Vec<(String, usize)> = Vec::new();
+    for value in values {
+        match all.iter_mut().find(|(known, _)| *known == value) {
+            Some((_, count)) => *count += 1,
+            None => all.push((value, 1)),
+        }
+    }
+    match all.as_slice() {
+        [(value, _)] => value.clone(),
+        many => {
+            let told = many.iter().map(|(value, count)| format!("{value} ({count} cases)"));
+            told.collect::<Vec<_>>().join(", ")
+        }
+    }
+}
+
+/// What the cases that came to their end ran with; of all cases, where there are none.
+pub fn table(summary: &Summary) -> Table {
+    let done: Vec<&Case> = summary.done().map(|(case, _)| case).collect();
+    let cases: Vec<&Case> =
+        if done.is_empty() { summary.all.iter().map(|(case, _)| *case).collect() } else { done };
+    let all: Vec<toml::Table> = cases.iter().filter_map(|case| settings(case)).collect();
+    let row = |(key, name): &(&str, &str)| {
+        let values: Vec<String> = all.iter().filter_map(|settings| at(settings, key)).collect();
+        let told = || vec![(*name).to_owned(), (*key).to_owned(), counted(values.iter().cloned())];
+        (!values.is_empty()).then(told)
+    };
+    let mut rows: Vec<Vec<String>> = SHOWN.iter().filter_map(row).collect();
+    let line = |name: &str, key: &str, value: String| vec![name.to_owned(), key.to_owned(), value];
+    let steps = summary.done().filter_map(|(_, results)| results["steps"].as_u64());
+    let steps = counted(steps.map(|steps| steps.to_string()));
+    if !steps.is_empty() {
+        rows.insert(0, line("steps that were taken", "", steps));
+    }
+    rows.push(line("seeds", "seed", summary.seeds.to_string()));
+    rows.push(line("cases", "", cases.len().to_string()));
+    Table {
+        title: "What ran".to_owned(),
+        caption: "Settings of the cases themselves; results.json has all of them, case by case."
+            .to_owned(),
+        head: ["", "setting", "value"].map(str::to_owned).to_vec(),
+        rows,
+        links: Vec::new(),
+    }
+}
+
+/// Why a fit with these settings has no such result.
+fn missing(settings: &toml::Table, value: &str) -> Option<String> {
+    let losses = settings.get("loss").and_then(Value::as_array);
+    let kinds = || losses.into_iter().flatten().filter_map(|loss| loss.get("data")?.as_str());
+    let is_beside_truth = QUALITIES.contains(&value) || value == "nrmse";
+    if is_beside_truth && !settings.contains_key("truth") {
+        return Some(format!("{value} needs a truth, and data are measured"));
+    }
+    if value == "chi2" && kinds().count() > 1 {
+        let all: Vec<String> = kinds().map(|kind| format!("{ONE_CHI2}{kind}")).collect();
+        return Some(format!("chi2 is one of several losses: take {}", all.join(" or ")));
+    }
+    let name = value.strip_prefix(ONE_CHI2)?;
+    (!kinds().any(|kind| kind == name)).then(|| format!("no loss has data = {name:?}"))
+}
+
+/// Refuses tables and figures of results that none of their cases can have.
+pub fn check(experiment: &Experiment, cases: &[Case]) -> anyhow::Result<()> {
+    let tables = experiment.table.iter().map(|t| ("table", &t.title, t.value.as_str(), &t.r#where));
+    let figures = experiment.figure.iter().filter_map(|f| {
+        let default = (f.kind == FigureKind::Time).then_some("psnr_db");
+        Some(("figure", &f.title, f.value.as_deref().or(default)?, &f.r#where))
+    });
+    for (what, title, value, fixed) in tables.chain(figures) {
+        let chosen = cases.iter().filter(|case| is_at(case, &pairs(fixed)));
+        let found: Vec<Option<String>> =
+            chosen.filter_map(settings).map(|settings| missing(&settings, value)).collect();
+        if let Some(Some(why)) = found.first()
+            && found.iter().all(Option::is_some)
+        {
+            bail!("{what} {title:?}: value = {value:?} is not allowed: {why}");
+        }
+    }
+    Ok(())
+}

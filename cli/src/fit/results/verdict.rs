@@ -1,0 +1,191 @@
+//! Whether a fit explains its data: from the residuals of its last state, in words and for other programs.
+
+mod expected;
+#[cfg(test)]
+mod tests;
+mod words;
+
+use crate::fit::config::{DataFiles, FitFile, Loss, LossKind, Noise};
+use crate::fit::data::Measured;
+use kerrlight_tomo::fit::Objective;
+use kerrlight_tomo::fit::verdict::{Errors, Outcome, Tested, Verdict, ZeroSpacing, judge, worst};
+use kerrlight_tomo::interferometry::products::debiased_amplitude;
+use serde_json::{Value, json};
+
+/// A verdict with all that it is made of.
+pub struct Judged {
+    /// What came out.
+    pub verdict: Verdict,
+    /// The kinds of data with their names.
+    pub terms: Vec<(String, Tested)>,
+    /// Flux at zero spacing, where short baselines have measured it.
+    pub flux: Option<ZeroSpacing>,
+    /// Names of the stations.
+    stations: Vec<String>,
+    /// Times of the frames, M.
+    times: Vec<f64>,
+}
+
+/// Baselines shorter than this part of 1/(field of view) see the whole flux: within 0.3 % for a source whose standard
+/// deviation is a quarter of the field.
+const SHORT: f64 = 0.05;
+
+/// Losses in the order of the objective's terms: the image first.
+fn ordered(file: &FitFile) -> impl Iterator<Item = &Loss> {
+    let of = |image: bool| file.loss.iter().filter(move |l| (l.data == LossKind::Image) == image);
+    of(true).chain(of(false))
+}
+
+/// What σ of a kind of data is.
+fn errors(file: &FitFile, kind: LossKind) -> Errors {
+    let of_pixels = matches!(kind, LossKind::Image | LossKind::LightCurve);
+    match (&file.data, &file.observation) {
+        (Some(DataFiles::Movie { .. }), _) => Errors::Assumed,
+        (Some(DataFiles::Visibilities { .. }), _) => Errors::Stated,
+        (None, Some(seen)) if !of_pixels && seen.noise == Noise::Thermal => match seen.systematic {
+            Some(part) if part > 0.0 => Errors::Stated,
+            _ => Errors::Known,
+        },
+        _ => Errors::Weight,
+    }
+}
+
+/// Data, and what they are to the fit.
+#[derive(Clone, Copy)]
+pub struct Evidence<'a> {
+    /// Settings.
+    pub file: &'a FitFile,
+    /// Data.
+    pub measured: &'a Measured,
+}
+
+impl Evidence<'_> {
+    /// Of images of all frames.
+    pub fn judged(&self, objective: &Objective<f32>, movie: &[f32]) -> anyhow::Result<Judged> {
+        let (names, statistics) = (objective.names(), objective.statistics(movie));
+        let model = self.model_visibilities(movie)?;
+        let mut terms = Vec::new();
+        for ((loss, name), statistics) in ordered(self.file).zip(names).zip(statistics) {
+            let mut tested = Tested::gaussian(statistics, errors(self.file, loss.data));
+            if tested.errors != Errors::Weight
+                && let Some(model) = &model
+                && let Some(draws) = self.draws(loss, model)
+            {
+                tested = tested.among(&draws);
+            }
+            terms.push((name.to_owned(), tested));
+        }
+        let tested: Vec<Tested> = terms.iter().map(|(_, tested)| tested.clone()).collect();
+        let flux = self.zero_spacing(movie);
+        let knows_flux =
+            |loss: &Loss| matches!(loss.data, LossKind::Visibilities | LossKind::Amplitudes);
+        let judged = flux.filter(|_| self.file.loss.iter().any(knows_flux));
+        let observation = self.measured.visibilities.as_ref().map(|(observation, _)| observation);
+        let stations = observation.map(|o| o.stations.iter().map(|s| s.name.clone()).collect());
+        Ok(Judged {
+            verdict: judge(&tested, judged),
+            terms,
+            flux,
+            stations: stations.unwrap_or_default(),
+            times: self.measured.times.clone(),
+        })
+    }
+
+    /// What baselines have measured that resolve nothing of the field of view.
+    fn zero_spacing(&self, movie: &[f32]) -> Option<ZeroSpacing> {
+        let (observation, frames) = self.measured.visibilities.as_ref()?;
+        let sky = self.measured.sky?;
+        let shortest = SHORT / (sky.pixel_rad * sky.width as f64);
+        let flux: Vec<f64> = movie
+            .chunks_exact(sky.width * sky.height)
+            .map(|f| f.iter().copied().map(f64::from).sum())
+            .collect();
+        let (mut count, mut weights, mut sums) = (0, 0.0, [0.0; 2]);
+        for (row, frame) in observation.rows.iter().zip(frames) {
+            let Some(i) = row.stokes_i(observation.basis) else { continue };
+            if row.uv[0].hypot(row.uv[1]) > shortest || i.noise_sigma <= 0.0 {
+                continue;
+            }
+            let weight = i.noise_sigma.powi(-2);
+            count += 1;
+            weights += weight;
+            sums[0] += weight * debiased_amplitude(&i);
+            sums[1] += weight * flux.get(*frame)?;
+        }
+        let [measured_jy, model_jy] = sums.map(|sum| sum / weights);
+        let error_jy = weights.powf(-0.5);
+        (count > 0).then_some(ZeroSpacing { measured_jy, error_jy, model_jy, count })
+    }
+}
+
+impl Judged {
+    /// For results.json.
+    pub fn json(&self) -> Value {
+        let outcome = match self.verdict.outcome {
+            Outcome::Explained => "explained",
+            Outcome::Reproduced => "reproduced",
+            Outcome::FitsNoise => "fits-noise",
+            Outcome::Unexplained => "unexplained",
+        };
+        let reasons: Vec<String> = self.reasons();
+        let mut all = json!({
+            "outcome": outcome,
+            "text": self.headline(),
+            "reasons": reasons,
+            "data": self.terms.iter().map(|(name, tested)| self.term(name, tested)).collect::<Vec<_>>(),
+        });
+        if let Some(flux) = &self.flux {
+            all["zero_spacing"] = json!({
+                "measured_jy": flux.measured_jy,
+                "error_jy": flux.error_jy,
+                "model_jy": flux.model_jy,
+                "visibilities": flux.count,
+            });
+        }
+        all
+    }
+
+    fn term(&self, name: &str, tested: &Tested) -> Value {
+        let Tested { statistics, errors, expected } = tested;
+        let errors = match errors {
+            Errors::Known => "noise",
+            Errors::Stated => "stated",
+            Errors::Assumed => "assumed",
+            Errors::Weight => "weight",
+        };
+        let mut term = json!({
+            "data": name,
+            "count": statistics.all.count,
+            "chi2_per_datum": statistics.chi2(),
+            "sigma_is": errors,
+            "mean": statistics.mean(),
+            "misfit": statistics.misfit(),
+            "correlation_in_time": statistics.in_time.correlation(),
+            "correlation_in_space": statistics.in_space.correlation(),
+        });
+        if tested.errors != Errors::Weight {
+            term["expected"] = json!({ "mean": expected.chi2, "deviation": expected.spread });
+        }
+        if let Some((frame, part, chi2)) = worst(statistics.frames.iter().enumerate()) {
+            let time = self.times.get(frame);
+            term["worst_frame"] = json!({ "frame": frame, "time": time, "chi2_per_datum": chi2, "count": part.count });
+        }
+        if let Some((stations, part, chi2)) = worst(statistics.groups.iter()) {
+            let names = self.names(stations);
+            term["worst_group"] =
+                json!({ "stations": names, "chi2_per_datum": chi2, "count": part.count });
+        }
+        if let Some((station, part, chi2)) = worst(statistics.stations.iter()) {
+            let name = self.names(&[*station]);
+            term["worst_station"] =
+                json!({ "station": name, "chi2_per_datum": chi2, "count": part.count });
+        }
+        term
+    }
+
+    /// `AA–LM`.
+    fn names(&self, stations: &[u16]) -> String {
+        let name = |k: &u16| self.stations.get(usize::from(*k)).map_or("?", String::as_str);
+        stations.iter().map(name).collect::<Vec<_>>().join("–")
+    }
+}

@@ -1,0 +1,178 @@
+//! The verdict in sentences.
+
+use super::Judged;
+use crate::report::{Notice, Table, Tone};
+use kerrlight_tomo::fit::verdict::{Errors, Expected, Fault, Outcome, Reason, Tested, worst};
+
+impl Judged {
+    /// One sentence.
+    pub fn headline(&self) -> String {
+        let terms = || {
+            let noisy = self.terms.iter().filter(|(_, tested)| tested.errors != Errors::Weight);
+            noisy.map(|(name, tested)| chi2_of(name, tested)).collect::<Vec<_>>().join("; ")
+        };
+        match self.verdict.outcome {
+            Outcome::Explained => format!("The model explains its data: {}.", terms()),
+            Outcome::Reproduced => format!(
+                "The model reproduces its noise-free data{}: σ is only a weight, χ² is no test.",
+                self.left_over()
+            ),
+            Outcome::FitsNoise => format!(
+                "The model fits noise, or the errors are overestimated: {}.",
+                self.reasons().join("; ")
+            ),
+            Outcome::Unexplained => {
+                format!("The model does not explain its data: {}.", self.reasons().join("; "))
+            }
+        }
+    }
+
+    /// ` to 1.3 %`.
+    fn left_over(&self) -> String {
+        let parts = self.terms.iter().filter_map(|(_, tested)| tested.statistics.misfit());
+        parts.reduce(f64::max).map_or(String::new(), |part| format!(" to {}", percent(part)))
+    }
+
+    /// All that is wrong.
+    pub fn reasons(&self) -> Vec<String> {
+        self.verdict.reasons.iter().map(|reason| self.reason(reason)).collect()
+    }
+
+    fn reason(&self, Reason { term, fault }: &Reason) -> String {
+        let of = term.and_then(|term| self.terms.get(term));
+        let name = of.map_or("", |(name, _)| name.as_str());
+        match fault {
+            Fault::NotFinite => format!("χ² of {name} is not a number"),
+            Fault::Large | Fault::Small => {
+                of.map_or(String::new(), |(n, tested)| chi2_of(n, tested))
+            }
+            Fault::Misfit(part) => {
+                format!("residuals of the noise-free {name} are {} of the data", percent(*part))
+            }
+            Fault::Mean(mean) => format!("residuals of {name} have a mean of {mean:.2} σ"),
+            Fault::InTime(r) => {
+                format!("residuals of {name} are correlated from frame to frame ({r:.2})")
+            }
+            Fault::InSpace(r) => {
+                format!("residuals of {name} are correlated from pixel to pixel ({r:.2})")
+            }
+            Fault::Group(stations, chi2) => {
+                format!(
+                    "{name} of {} alone have χ² {} per datum",
+                    self.names(stations),
+                    short(*chi2)
+                )
+            }
+            Fault::Frame(frame, chi2) => {
+                format!("{name} of frame {} alone have χ² {} per datum", frame + 1, short(*chi2))
+            }
+            Fault::Flux => self.flux.map_or(String::new(), |flux| {
+                format!(
+                    "short baselines measure {:.3} Jy, the model has {:.3} Jy",
+                    flux.measured_jy, flux.model_jy
+                )
+            }),
+        }
+    }
+
+    /// What stands first on the page.
+    pub fn notice(&self) -> Notice {
+        let tone = match self.verdict.outcome {
+            Outcome::Explained => Tone::Good,
+            Outcome::Reproduced => Tone::Plain,
+            Outcome::FitsNoise | Outcome::Unexplained => Tone::Bad,
+        };
+        let mut text = Vec::new();
+        if self.verdict.outcome == Outcome::Unexplained {
+            text.push(
+                "What is shown below is the best that this fit has found, not what emitted the data: its settings (spin, \
+                 inclination, motion, region), its errors or its training are not right."
+                    .to_owned(),
+            );
+        }
+        if self.terms.iter().any(|(_, tested)| tested.errors == Errors::Assumed) {
+            text.push("σ is a number of the settings: χ² is worth as much as that.".to_owned());
+        }
+        Notice { tone, headline: self.headline(), text }
+    }
+
+    /// Residuals of all kinds of data.
+    pub fn table(&self) -> Table {
+        let head = [
+            "data",
+            "number",
+            "χ² per datum",
+            "expected",
+            "mean, σ",
+            "correlation in time",
+            "worst",
+        ];
+        let row = |(name, tested): &(String, Tested)| {
+            let Tested { statistics, errors, expected: Expected { chi2: mean, spread, .. } } =
+                tested;
+            let number = |x: Option<f64>| x.map_or("–".to_owned(), |x| format!("{x:.2}"));
+            let expected = match errors {
+                Errors::Weight => "no noise".to_owned(),
+                _ => format!("{mean:.2} ± {spread:.2}"),
+            };
+            vec![
+                name.clone(),
+                statistics.all.count.to_string(),
+                statistics.chi2().map_or("–".to_owned(), short),
+                expected,
+                number(statistics.mean()),
+                number(statistics.in_time.correlation()),
+                self.worst(tested),
+            ]
+        };
+        Table {
+            title: "Residuals".to_owned(),
+            caption: "Model minus data in units of σ, over all frames. χ² per datum of a right model with honest errors is as \
+                      expected, mean and correlation from frame to frame are 0; where parameters have used up data, χ² is \
+                      smaller."
+                .to_owned(),
+            head: head.map(str::to_owned).to_vec(),
+            rows: self.terms.iter().map(row).collect(),
+            links: Vec::new(),
+        }
+    }
+
+    /// The worst station, group of stations and frame with their χ² per datum.
+    fn worst(&self, tested: &Tested) -> String {
+        let statistics = &tested.statistics;
+        let station = worst(statistics.stations.iter())
+            .map(|(station, _, chi2)| format!("{} {}", self.names(&[*station]), short(chi2)));
+        let group = worst(statistics.groups.iter())
+            .map(|(stations, _, chi2)| format!("{} {}", self.names(stations), short(chi2)));
+        let frame = worst(statistics.frames.iter().enumerate())
+            .map(|(frame, _, chi2)| format!("frame {} {}", frame + 1, short(chi2)));
+        [station, group, frame].into_iter().flatten().collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// `χ² 1.68 per datum of visibilities (1.00 ± 0.02 expected)`.
+fn chi2_of(name: &str, tested: &Tested) -> String {
+    let Expected { chi2: mean, spread, .. } = tested.expected;
+    let chi2 = tested.statistics.chi2().map_or("–".to_owned(), short);
+    let assumed = if tested.errors == Errors::Assumed { " with the assumed σ" } else { "" };
+    format!("χ² {chi2} per datum of {name} ({mean:.2} ± {spread:.2} expected{assumed})")
+}
+
+/// Three digits.
+fn short(x: f64) -> String {
+    match x.abs() {
+        size if !(1e-3..1e5).contains(&size) => format!("{x:.2e}"),
+        size if size >= 100.0 => format!("{x:.0}"),
+        size if size >= 10.0 => format!("{x:.1}"),
+        _ => format!("{x:.2}"),
+    }
+}
+
+/// Two digits.
+fn percent(part: f64) -> String {
+    match 100.0 * part {
+        percent if percent >= 10.0 => format!("{percent:.0} %"),
+        percent if percent >= 0.1 => format!("{percent:.1} %"),
+        percent => format!("{percent:.1e} %"),
+    }
+}

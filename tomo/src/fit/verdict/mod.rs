@@ -1,0 +1,270 @@
+//! Whether a fit explains its data: a function of the residuals of its last state.
+//!
+//! For N independent data with Gaussian errors about a model that is right, χ² per datum is 1 ± √(2/N). How many of the
+//! data a network's parameters have used up nobody knows, so that 1 is where χ² may begin, not where it has to end:
+//! too large is judged closely, too small generously.
+
+mod statistics;
+#[cfg(test)]
+mod tests;
+
+pub use statistics::{Pairs, Part, Statistics};
+
+/// Standard deviations of χ² that chance is granted: 5 of them come about once in a million.
+pub const CHANCE: f64 = 5.0;
+/// Excess of χ² per datum that is let pass however many data show it: an error of the model of 0.3 σ, smaller than
+/// anything that single data can tell.
+pub const EXCESS: f64 = 0.1;
+/// Lack of χ² per datum that is let pass: the share of data that parameters may use up.
+pub const LACK: f64 = 0.2;
+/// Mean residual in σ, or correlation of neighbours, that is let pass: what an error of the model as large as
+/// [`EXCESS`] allows makes, if it is the same all over.
+pub const STRUCTURE: f64 = 0.3;
+/// Excess of a single baseline, station or frame that is let pass.
+pub const GROUP_EXCESS: f64 = 1.0;
+/// Real data of a baseline, station or frame that is judged on its own.
+pub const GROUP_COUNT: usize = 30;
+/// Part of noise-free data that may be left over.
+pub const MISFIT: f64 = 0.1;
+/// Part of the flux at zero spacing that may be missing.
+pub const FLUX: f64 = 0.1;
+
+/// What σ of the data is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Errors {
+    /// The noise that was added to a simulation.
+    Known,
+    /// Errors that measured data state, with whatever was added for calibration.
+    Stated,
+    /// A number that the settings give.
+    Assumed,
+    /// A weight: the data have no noise.
+    Weight,
+}
+
+/// What residuals are like if the model is right.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Expected {
+    /// Mean of χ² per datum.
+    pub chi2: f64,
+    /// Its standard deviation.
+    pub spread: f64,
+    /// Mean residual, in σ.
+    pub mean: f64,
+    /// Correlation of the same datum in consecutive frames.
+    pub in_time: f64,
+}
+
+/// One kind of data.
+#[derive(Clone, Debug)]
+pub struct Tested {
+    /// Its residuals.
+    pub statistics: Statistics,
+    /// What σ is.
+    pub errors: Errors,
+    /// What they are like if the model is right.
+    pub expected: Expected,
+}
+
+impl Tested {
+    /// With the χ² of independent Gaussian data.
+    pub fn gaussian(statistics: Statistics, errors: Errors) -> Self {
+        let spread = (2.0 / statistics.all.count.max(1) as f64).sqrt();
+        let expected = Expected { chi2: 1.0, spread, mean: 0.0, in_time: 0.0 };
+        Self { statistics, errors, expected }
+    }
+
+    /// With what residuals of drawn data about the same model are like; Gaussian if that is no number.
+    #[must_use]
+    pub fn among(self, draws: &[Statistics]) -> Self {
+        let count = draws.len() as f64;
+        let all: Option<Vec<f64>> = draws.iter().map(Statistics::chi2).collect();
+        let Some(all) = all.filter(|all| all.len() > 1) else { return self };
+        let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / count;
+        let chi2 = mean(&mut all.iter().copied());
+        let square: f64 = all.iter().map(|x| (x - chi2).powi(2)).sum();
+        let expected = Expected {
+            chi2,
+            spread: (square / (count - 1.0)).sqrt().max(self.expected.spread),
+            mean: mean(&mut draws.iter().filter_map(Statistics::mean)),
+            in_time: mean(&mut draws.iter().filter_map(|draw| draw.in_time.correlation())),
+        };
+        let numbers = [expected.chi2, expected.spread, expected.mean, expected.in_time];
+        if numbers.iter().all(|x| x.is_finite()) { Self { expected, ..self } } else { self }
+    }
+}
+
+/// Total flux where baselines are too short to resolve anything: mean over the frames that have them, Jy.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ZeroSpacing {
+    /// Of the data.
+    pub measured_jy: f64,
+    /// Its standard deviation.
+    pub error_jy: f64,
+    /// Of the model in the same frames.
+    pub model_jy: f64,
+    /// Visibilities that it is a mean of.
+    pub count: usize,
+}
+
+/// What a fit is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Outcome {
+    /// All residuals are as expected.
+    Explained,
+    /// The data have no noise, and are reproduced.
+    Reproduced,
+    /// Residuals are smaller than noise can be.
+    FitsNoise,
+    /// Residuals are too large, or not random.
+    Unexplained,
+}
+
+/// Why it is not [`Outcome::Explained`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reason {
+    /// Of which kind of data, counted from 0; none of what all of them show.
+    pub term: Option<usize>,
+    /// What is wrong.
+    pub fault: Fault,
+}
+
+/// What is wrong with residuals.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Fault {
+    /// χ² is not a number.
+    NotFinite,
+    /// χ² per datum is too large.
+    Large,
+    /// χ² per datum is too small.
+    Small,
+    /// This part of noise-free data is left over.
+    Misfit(f64),
+    /// Residuals have a mean of so many σ.
+    Mean(f64),
+    /// Residuals of consecutive frames are alike, with this correlation.
+    InTime(f64),
+    /// Residuals of neighbouring pixels are alike, with this correlation.
+    InSpace(f64),
+    /// The stations of a baseline, triangle or quadrangle, with its χ² per datum, which is too large.
+    Group(Vec<u16>, f64),
+    /// A frame, with its χ² per datum, which is too large.
+    Frame(usize, f64),
+    /// The model has another flux than short baselines have measured.
+    Flux,
+}
+
+/// A verdict with its reasons.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Verdict {
+    /// The worst of all that was found.
+    pub outcome: Outcome,
+    /// Why, the kinds of data in their order.
+    pub reasons: Vec<Reason>,
+}
+
+impl Verdict {
+    fn add(&mut self, outcome: Outcome, term: Option<usize>, fault: Fault) {
+        self.outcome = self.outcome.max(outcome);
+        self.reasons.push(Reason { term, fault });
+    }
+}
+
+/// The verdict of a fit to some kinds of data, of which `flux` is seen by those that know amplitudes.
+pub fn judge(terms: &[Tested], flux: Option<ZeroSpacing>) -> Verdict {
+    let noisy = terms.iter().any(|tested| tested.errors != Errors::Weight);
+    let outcome = if noisy { Outcome::Explained } else { Outcome::Reproduced };
+    let mut verdict = Verdict { outcome, reasons: Vec::new() };
+    for (term, tested) in terms.iter().enumerate() {
+        let chi2 = tested.statistics.chi2().unwrap_or(f64::NAN);
+        match tested.errors {
+            _ if !chi2.is_finite() => {
+                verdict.add(Outcome::Unexplained, Some(term), Fault::NotFinite)
+            }
+            Errors::Weight => judge_noise_free(term, tested, &mut verdict),
+            _ => judge_noisy(term, tested, chi2, &mut verdict),
+        }
+    }
+    if flux.is_some_and(|flux| is_missed(&flux)) {
+        verdict.add(Outcome::Unexplained, None, Fault::Flux);
+    }
+    verdict
+}
+
+fn is_missed(flux: &ZeroSpacing) -> bool {
+    let allowed = (CHANCE * flux.error_jy).max(FLUX * flux.measured_jy.abs());
+    let missing = (flux.model_jy - flux.measured_jy).abs();
+    missing > allowed || missing.is_nan()
+}
+
+fn judge_noise_free(term: usize, tested: &Tested, verdict: &mut Verdict) {
+    if let Some(part) = tested.statistics.misfit().filter(|part| *part > MISFIT) {
+        verdict.add(Outcome::Unexplained, Some(term), Fault::Misfit(part));
+    }
+}
+
+fn judge_noisy(term: usize, tested: &Tested, chi2: f64, verdict: &mut Verdict) {
+    let Expected { chi2: mean, spread, .. } = tested.expected;
+    if chi2 > mean + (CHANCE * spread).max(EXCESS * mean) {
+        verdict.add(Outcome::Unexplained, Some(term), Fault::Large);
+    } else {
+        judge_structure(term, tested, verdict);
+    }
+    if chi2 < mean - (CHANCE * spread).max(LACK * mean) {
+        verdict.add(Outcome::FitsNoise, Some(term), Fault::Small);
+    }
+}
+
+/// What χ² as a whole does not show.
+fn judge_structure(term: usize, tested: &Tested, verdict: &mut Verdict) {
+    let Statistics { all, in_time, in_space, .. } = &tested.statistics;
+    let beyond = |value: Option<f64>, expected: f64, count: usize| {
+        let allowed = (CHANCE / (count.max(1) as f64).sqrt()).max(STRUCTURE);
+        value.filter(|value| (value - expected).abs() > allowed)
+    };
+    let expected = tested.expected;
+    if let Some(mean) = beyond(tested.statistics.mean(), expected.mean, all.count) {
+        verdict.add(Outcome::Unexplained, Some(term), Fault::Mean(mean));
+    }
+    // Errors of calibration last for longer than a frame: only noise has to be new in every one.
+    if tested.errors == Errors::Stated {
+        return;
+    }
+    if let Some(correlation) = beyond(in_time.correlation(), expected.in_time, in_time.count) {
+        verdict.add(Outcome::Unexplained, Some(term), Fault::InTime(correlation));
+    }
+    if let Some(correlation) = beyond(in_space.correlation(), 0.0, in_space.count) {
+        verdict.add(Outcome::Unexplained, Some(term), Fault::InSpace(correlation));
+    }
+    judge_groups(term, tested, verdict);
+}
+
+fn judge_groups(term: usize, tested: &Tested, verdict: &mut Verdict) {
+    let is_bad = |part: &Part, chi2: f64| {
+        let chance = CHANCE * (2.0 / part.count as f64).sqrt();
+        part.count >= GROUP_COUNT && chi2 > tested.expected.chi2 + chance.max(GROUP_EXCESS)
+    };
+    if let Some((stations, part, chi2)) = worst(tested.statistics.groups.iter())
+        && is_bad(part, chi2)
+    {
+        let stations = stations.clone();
+        verdict.add(Outcome::Unexplained, Some(term), Fault::Group(stations, chi2));
+    }
+    if let Some((frame, part, chi2)) = worst(tested.statistics.frames.iter().enumerate())
+        && is_bad(part, chi2)
+    {
+        verdict.add(Outcome::Unexplained, Some(term), Fault::Frame(frame, chi2));
+    }
+}
+
+/// The part with the largest χ² per datum, of those with [`GROUP_COUNT`] data or, where there are none, of all.
+pub fn worst<'a, K>(
+    parts: impl Iterator<Item = (K, &'a Part)> + Clone,
+) -> Option<(K, &'a Part, f64)> {
+    let largest = |least: usize| {
+        let chosen = parts.clone().filter(move |(_, part)| part.count >= least);
+        let chosen = chosen.filter_map(|(key, part)| Some((key, part, part.per_datum()?)));
+        chosen.max_by(|a, b| a.2.total_cmp(&b.2))
+    };
+    largest(GROUP_COUNT).or_else(|| largest(1))
+}

@@ -1,0 +1,139 @@
+//! What the residuals of one kind of data are like.
+
+use crate::interferometry::data_terms::Residual;
+use std::collections::{BTreeMap, HashMap};
+
+/// Sums over some residuals.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Part {
+    /// Real data.
+    pub count: usize,
+    /// χ².
+    pub chi2: f64,
+}
+
+impl Part {
+    fn add(&mut self, value: f64) {
+        self.count += 1;
+        self.chi2 += value * value;
+    }
+
+    /// χ² per datum; none without data.
+    pub fn per_datum(&self) -> Option<f64> {
+        (self.count > 0).then(|| self.chi2 / self.count as f64)
+    }
+}
+
+/// Sums over pairs of residuals that are neighbours.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Pairs {
+    /// How many.
+    pub count: usize,
+    product: f64,
+    squares: [f64; 2],
+}
+
+impl Pairs {
+    fn add(&mut self, a: f64, b: f64) {
+        self.count += 1;
+        self.product += a * b;
+        self.squares[0] += a * a;
+        self.squares[1] += b * b;
+    }
+
+    /// Σ ab/√(Σ a² Σ b²); none where one of the sums is 0.
+    pub fn correlation(&self) -> Option<f64> {
+        let scale = (self.squares[0] * self.squares[1]).sqrt();
+        (scale > 0.0).then(|| self.product / scale)
+    }
+}
+
+/// Residuals of one kind of data, added up frame by frame.
+#[derive(Clone, Debug, Default)]
+pub struct Statistics {
+    /// All of them.
+    pub all: Part,
+    /// By frame; without data where nothing was observed.
+    pub frames: Vec<Part>,
+    /// By the stations of a baseline, triangle or quadrangle.
+    pub groups: BTreeMap<Vec<u16>, Part>,
+    /// By station, each in all groups that it is part of.
+    pub stations: BTreeMap<u16, Part>,
+    /// The same datum in consecutive frames.
+    pub in_time: Pairs,
+    /// Neighbouring pixels of a row.
+    pub in_space: Pairs,
+    sum: f64,
+    signal: f64,
+    before: Frame,
+}
+
+/// What is remembered of a frame: residuals of stations by what they are of, all others in their order.
+#[derive(Clone, Debug, Default)]
+struct Frame {
+    plain: Vec<f64>,
+    named: HashMap<(Vec<u16>, usize), f64>,
+}
+
+impl Statistics {
+    /// Of all frames, one after the other; images have rows of `width` pixels.
+    pub fn of(frames: impl IntoIterator<Item = Vec<Residual>>, width: usize) -> Self {
+        let mut all = Self::default();
+        frames.into_iter().for_each(|frame| all.add(frame, width));
+        all.before = Frame::default();
+        all
+    }
+
+    fn add(&mut self, residuals: Vec<Residual>, width: usize) {
+        let mut frame = Part::default();
+        let mut now = Frame::default();
+        let mut seen: HashMap<Vec<u16>, usize> = HashMap::new();
+        for Residual { value, datum, stations } in residuals {
+            frame.add(value);
+            self.all.add(value);
+            self.sum += value;
+            self.signal += datum * datum;
+            if stations.is_empty() {
+                self.add_plain(value, &mut now, width);
+                continue;
+            }
+            stations.iter().for_each(|k| self.stations.entry(*k).or_default().add(value));
+            self.groups.entry(stations.clone()).or_default().add(value);
+            let repeat = seen.entry(stations.clone()).or_default();
+            let key = (stations, *repeat);
+            *repeat += 1;
+            if let Some(before) = self.before.named.get(&key) {
+                self.in_time.add(*before, value);
+            }
+            now.named.insert(key, value);
+        }
+        self.frames.push(frame);
+        self.before = now;
+    }
+
+    fn add_plain(&mut self, value: f64, now: &mut Frame, width: usize) {
+        let at = now.plain.len();
+        if let Some(before) = self.before.plain.get(at) {
+            self.in_time.add(*before, value);
+        }
+        if !at.is_multiple_of(width.max(1)) {
+            self.in_space.add(now.plain[at - 1], value);
+        }
+        now.plain.push(value);
+    }
+
+    /// χ² per datum; none without data.
+    pub fn chi2(&self) -> Option<f64> {
+        self.all.per_datum()
+    }
+
+    /// Mean residual, in σ; none without data.
+    pub fn mean(&self) -> Option<f64> {
+        (self.all.count > 0).then(|| self.sum / self.all.count as f64)
+    }
+
+    /// Root mean square of the residuals over that of the data; none for data without a natural zero.
+    pub fn misfit(&self) -> Option<f64> {
+        (self.signal > 0.0).then(|| (self.all.chi2 / self.signal).sqrt())
+    }
+}

@@ -1,0 +1,130 @@
+//! Residuals whose law is known.
+
+use super::*;
+use crate::interferometry::data_terms::Residual;
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64Mcg;
+
+/// Baselines of four stations, real and imaginary part, in so many frames: (frame, number, noise) to a residual.
+fn baselines(frames: usize, of: impl Fn(usize, usize, f64) -> f64) -> Statistics {
+    let mut random = Pcg64Mcg::seed_from_u64(3);
+    let mut frame = |k: usize| -> Vec<Residual> {
+        let pairs = (0..4u16).flat_map(|a| (a + 1..4).flat_map(move |b| [vec![a, b], vec![a, b]]));
+        let noise = pairs.enumerate().map(|(at, stations)| {
+            let value = of(k, at, StandardNormal.sample(&mut random));
+            Residual { value, datum: 10.0, stations }
+        });
+        noise.collect()
+    };
+    let frames: Vec<_> = (0..frames).map(&mut frame).collect();
+    Statistics::of(frames, 1)
+}
+
+fn verdict(statistics: Statistics, errors: Errors) -> Verdict {
+    judge(&[Tested::gaussian(statistics, errors)], None)
+}
+
+#[test]
+fn exact_noise_about_the_truth_is_explained() {
+    for errors in [Errors::Known, Errors::Stated, Errors::Assumed] {
+        for frames in [1, 3, 40, 2000] {
+            let found = verdict(baselines(frames, |_, _, noise| noise), errors);
+            assert_eq!(found, Verdict { outcome: Outcome::Explained, reasons: vec![] });
+        }
+    }
+    let pixels = (0..20).map(|k| {
+        let mut random = Pcg64Mcg::seed_from_u64(k);
+        let value = |_| StandardNormal.sample(&mut random);
+        let plain = |value| Residual { value, datum: 1.0, stations: vec![] };
+        (0..256).map(value).map(plain).collect()
+    });
+    let found = verdict(Statistics::of(pixels, 16), Errors::Assumed);
+    assert_eq!(found.outcome, Outcome::Explained, "{:?}", found.reasons);
+}
+
+/// Sums by hand: two frames of three baselines, one of them not there in the second.
+#[test]
+fn exact_statistics_are_sums() {
+    let one = |value: f64, stations: [u16; 2]| Residual {
+        value,
+        datum: 2.0,
+        stations: stations.to_vec(),
+    };
+    let frames = [
+        vec![one(1.0, [0, 1]), one(2.0, [0, 2]), one(-3.0, [1, 2])],
+        vec![one(4.0, [0, 1]), one(-1.0, [1, 2])],
+    ];
+    let found = Statistics::of(frames, 1);
+    assert_eq!((found.all.count, found.chi2()), (5, Some(31.0 / 5.0)));
+    assert_eq!(found.mean(), Some(0.6));
+    assert_eq!(found.misfit(), Some((31.0f64 / 20.0).sqrt()));
+    assert_eq!(found.groups[&vec![0, 1]], Part { count: 2, chi2: 17.0 });
+    assert_eq!(found.stations[&2], Part { count: 3, chi2: 14.0 });
+    assert_eq!(found.frames[1], Part { count: 2, chi2: 17.0 });
+    // (1, 4) and (−3, −1).
+    assert_eq!(found.in_time.correlation(), Some(7.0 / (10.0f64 * 17.0).sqrt()));
+    let plain = |value| Residual { value, datum: 0.0, stations: vec![] };
+    let image = Statistics::of([[1.0, 2.0, 3.0, 4.0].map(plain).to_vec()], 2);
+    assert_eq!((image.in_space.count, image.misfit()), (2, None));
+    assert_eq!(image.in_space.correlation(), Some(14.0 / (10.0f64 * 20.0).sqrt()));
+}
+
+#[test]
+fn exact_what_is_wrong_is_named() {
+    let of = |f: fn(usize, usize, f64) -> f64| verdict(baselines(60, f), Errors::Known);
+    let only = |found: Verdict, outcome: Outcome| {
+        assert_eq!(found.outcome, outcome, "{:?}", found.reasons);
+        found.reasons[0].fault.clone()
+    };
+    let large = only(of(|_, _, noise| 1.5 * noise), Outcome::Unexplained);
+    assert_eq!(large, Fault::Large);
+    let small = only(of(|_, _, noise| 0.7 * noise), Outcome::FitsNoise);
+    assert_eq!(small, Fault::Small);
+    let mean = only(of(|_, _, noise| 0.85 * noise + 0.5), Outcome::Unexplained);
+    assert!(matches!(mean, Fault::Mean(mean) if (mean - 0.5).abs() < 0.1), "{mean:?}");
+    let slow = only(
+        of(|frame, at, noise| 0.7 * (noise + (0.3 * frame as f64 + at as f64).sin() * 1.3)),
+        Outcome::Unexplained,
+    );
+    assert!(matches!(slow, Fault::InTime(_)), "{slow:?}");
+    let one = only(
+        of(|_, at, noise| if at == 3 { 2.0 * noise } else { 0.85 * noise }),
+        Outcome::Unexplained,
+    );
+    assert!(matches!(&one, Fault::Group(stations, _) if stations[..] == [0, 2]), "{one:?}");
+    let nan = only(of(|_, _, _| f64::NAN), Outcome::Unexplained);
+    assert_eq!(nan, Fault::NotFinite);
+    assert_eq!(verdict(Statistics::default(), Errors::Known).outcome, Outcome::Unexplained);
+}
+
+/// Errors of calibration last: only their size is judged.
+#[test]
+fn exact_calibration_may_be_correlated_in_time() {
+    let slow = baselines(60, |frame, at, noise| {
+        0.6 * (noise + (0.3 * frame as f64 + at as f64).sin() * 1.6)
+    });
+    assert_eq!(verdict(slow.clone(), Errors::Stated).outcome, Outcome::Explained);
+    assert_eq!(verdict(slow, Errors::Known).outcome, Outcome::Unexplained);
+}
+
+/// σ of noise-free data is a weight: how much of the data is left over is what counts.
+#[test]
+fn exact_noise_free_data_are_judged_by_what_is_left_over() {
+    let of = |size: f64| verdict(baselines(9, move |_, _, noise| size * noise), Errors::Weight);
+    assert_eq!(of(1e-3).outcome, Outcome::Reproduced);
+    assert_eq!(of(0.9).outcome, Outcome::Reproduced);
+    let left = of(3.0);
+    assert_eq!(left.outcome, Outcome::Unexplained);
+    assert!(matches!(left.reasons[0].fault, Fault::Misfit(part) if (part - 0.3).abs() < 0.05));
+}
+
+#[test]
+fn exact_flux_at_zero_spacing_has_to_be_there() {
+    let right = Tested::gaussian(baselines(60, |_, _, noise| noise), Errors::Stated);
+    let of = |model_jy| ZeroSpacing { measured_jy: 2.3, error_jy: 0.02, model_jy, count: 30 };
+    assert_eq!(judge(std::slice::from_ref(&right), Some(of(2.15))).outcome, Outcome::Explained);
+    let missing = judge(&[right], Some(of(1.6)));
+    assert_eq!(missing.reasons, [Reason { term: None, fault: Fault::Flux }]);
+    assert_eq!(missing.outcome, Outcome::Unexplained);
+}
