@@ -33,7 +33,7 @@ pub struct Convert {
     /// Leave out a station
     #[arg(long, value_name = "NAME")]
     flag_station: Vec<String>,
-    /// Leave out an interval of UTC hours
+    /// Leave out an interval of UTC hours; 20-10 goes over midnight: from 20 h to 10 h by the clock
     #[arg(long, value_name = "FROM-TO", value_parser = arguments::range, allow_hyphen_values = true)]
     flag_utc: Vec<[f64; 2]>,
     /// Leave out baselines shorter than this many wavelengths
@@ -78,6 +78,7 @@ impl Convert {
         if let Some(name) = flags.unknown_stations(&observation).first() {
             bail!("--flag-station {name}: {} has no such station", self.input.display());
         }
+        self.check_intervals(&observation)?;
         let selection = flags.apply(&observation);
         let mut observation = selection.observation;
         if self.stokes_i {
@@ -94,6 +95,23 @@ impl Convert {
         }
         output.write(&observation)?;
         eprintln!("{} rows, {} flagged", observation.rows.len(), selection.dropped);
+        Ok(())
+    }
+
+    /// Refuses hours over midnight that no clock shows; tells of intervals without visibilities.
+    fn check_intervals(&self, observation: &Observation) -> anyhow::Result<()> {
+        for &[from, to] in &self.flag_utc {
+            let on_a_clock = (0.0..=24.0).contains(&from) && (0.0..=24.0).contains(&to);
+            if from > to && !on_a_clock {
+                bail!(
+                    "--flag-utc {from}-{to} is not allowed: over midnight, both are hours in [0, 24]"
+                );
+            }
+            let alone = Flags { times_h: vec![[from, to]], ..Flags::default() };
+            if alone.apply(observation).dropped == 0 {
+                eprintln!("--flag-utc {from}-{to}: no visibility lies in it");
+            }
+        }
         Ok(())
     }
 

@@ -36,6 +36,7 @@ mod npz;
 mod observe;
 mod output;
 mod overlay;
+mod paths;
 mod program;
 mod progress;
 mod render;
@@ -71,7 +72,8 @@ enum Verb {
     Render(render::Render),
     /// Render many frames of a scene: numbered EXR files, and a GIF, APNG or PNGs to look at
     Movie(movie::Movie),
-    /// Show what a file holds: channels and settings of a picture, visibilities of an observation
+    /// Show what a file holds: channels and settings of a picture, arrays, visibilities of an
+    /// observation, the state of a fit
     Inspect(inspect::Inspect),
     /// See an image, a movie or a scene through an array of telescopes
     Observe(observe::Observe),

@@ -20,13 +20,21 @@ pub struct Output {
 impl Output {
     /// A place to write to, whose name must end in `.extension` (any, if empty).
     pub fn new(path: &Path, extension: &str) -> anyhow::Result<Self> {
+        let any = [extension];
+        Self::ending_in(path, if extension.is_empty() { &[] } else { &any })
+    }
+
+    /// A place to write to, whose name must end in one of `extensions` (any, if there are none).
+    pub fn ending_in(path: &Path, extensions: &[&str]) -> anyhow::Result<Self> {
         let shown = path.display();
         if path.is_dir() {
             bail!("output {shown} is a directory: give the name of a file in it");
         }
         let given = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-        if !extension.is_empty() && !given.eq_ignore_ascii_case(extension) {
-            bail!("output {shown} must end in .{extension}");
+        if !extensions.is_empty() && !extensions.iter().any(|e| given.eq_ignore_ascii_case(e)) {
+            let ending = if given.is_empty() { "nothing".to_owned() } else { format!(".{given}") };
+            let allowed: Vec<String> = extensions.iter().map(|e| format!(".{e}")).collect();
+            bail!("output {shown} must end in {}, not in {ending}", allowed.join(" or "));
         }
         let folder = match path.parent() {
             Some(parent) if parent != Path::new("") => parent.to_owned(),
@@ -156,8 +164,17 @@ pub fn print(text: &str) -> anyhow::Result<()> {
     }
 }
 
-/// A regular file to read, with an error that names it.
+/// A regular file to read that is not empty, with an error that names it.
 pub fn open(path: &Path) -> anyhow::Result<File> {
+    let file = open_any(path)?;
+    let shown = path.display();
+    if file.metadata().with_context(|| format!("cannot read {shown}"))?.len() == 0 {
+        bail!("{shown} is empty (0 bytes)");
+    }
+    Ok(file)
+}
+
+fn open_any(path: &Path) -> anyhow::Result<File> {
     let shown = path.display();
     let metadata = std::fs::metadata(path).with_context(|| format!("cannot read {shown}"))?;
     if metadata.is_dir() {
@@ -169,9 +186,12 @@ pub fn open(path: &Path) -> anyhow::Result<File> {
     File::open(path).with_context(|| format!("cannot read {shown}"))
 }
 
-/// The bytes of a file, with an error that names it.
+/// The bytes of a file that is not empty, with an error that names it.
 pub fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
-    let mut file = open(path)?;
+    bytes_of(path, open(path)?)
+}
+
+fn bytes_of(path: &Path, mut file: File) -> anyhow::Result<Vec<u8>> {
     let name = || format!("cannot read {}", path.display());
     let length = file.metadata().with_context(name)?.len();
     memory::afford(|| path.display().to_string(), length as f64)?;
@@ -197,7 +217,17 @@ pub fn with_reads<R>(work: impl FnOnce() -> R) -> (R, Vec<(PathBuf, Sum)>) {
     (result, READ.take().unwrap_or_default())
 }
 
-/// The text of a file, with an error that names it.
+/// The text of a file that is not empty, with an error that names it.
 pub fn read_text(path: &Path) -> anyhow::Result<String> {
-    String::from_utf8(read(path)?).with_context(|| format!("{} is not UTF-8 text", path.display()))
+    text_of(path, open(path)?)
+}
+
+/// The text of a log, which may have no line yet.
+pub fn read_log(path: &Path) -> anyhow::Result<String> {
+    text_of(path, open_any(path)?)
+}
+
+fn text_of(path: &Path, file: File) -> anyhow::Result<String> {
+    let text = String::from_utf8(bytes_of(path, file)?);
+    text.with_context(|| format!("{} is not UTF-8 text", path.display()))
 }

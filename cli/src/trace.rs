@@ -120,9 +120,10 @@ impl Trace {
         if let Some(radius) = self.within.filter(|radius| !(1.0..=FARTHEST).contains(radius)) {
             bail!("--within {radius} is not allowed: 1 to {FARTHEST:e} (M)");
         }
-        let npz = self.output.as_deref().and_then(|p| p.extension()).is_some_and(|e| e == "npz");
-        let extension = if npz { "npz" } else { "csv" };
-        let output = self.output.as_deref().map(|path| Output::new(path, extension)).transpose()?;
+        let ending = self.output.as_deref().and_then(|path| path.extension());
+        let npz = ending.is_some_and(|ending| ending.eq_ignore_ascii_case("npz"));
+        let place = |path| Output::ending_in(path, &["csv", "npz"]);
+        let output = self.output.as_deref().map(place).transpose()?;
         if let Some(output) = &output {
             output.spares(&self.rays)?;
         }
@@ -173,6 +174,9 @@ impl Trace {
         }
         let mut bytes = Vec::new();
         std::io::Read::read_to_end(&mut std::io::stdin(), &mut bytes)?;
+        if bytes.is_empty() {
+            bail!("standard input is empty (0 bytes): a table of rays is expected");
+        }
         Ok(bytes)
     }
 

@@ -21,6 +21,7 @@ N, FIELD_UAS = 64, 160.0
 def arrays():
     """The tables of the Rust source, so that both sides use the same digits."""
     source = open(os.path.join(HERE, "../../tomo/src/interferometry/array/built_in.rs")).read()
+    source = re.sub(r"\bboth\(([\d.]+)\)", r"[\1, \1]", source)
     number = r"(-?[\d.]+)"
     single = dict(re.findall(r"const (\w+): \[f64; 3\] = \[(.*?)\];", source))
     shared = dict(re.findall(r"const (\w+): Row =\s*\((.*?)\);", source, re.S))
@@ -31,7 +32,7 @@ def arrays():
             body = re.sub(r"(?<![\"\w])%s(?![\"\w])" % word, "(%s)" % value, body)
         for word, value in single.items():
             body = re.sub(r"(?<![\"\w])%s(?![\"\w])" % word, "[%s]" % value, body)
-        row = r'"(\w+)",\s*\[%s,\s*%s,\s*%s,?\s*\],\s*%s' % ((number,) * 4)
+        row = r'"(\w+)",\s*\[%s,\s*%s,\s*%s,?\s*\],\s*\[%s,\s*%s\]' % ((number,) * 5)
         tables[name] = re.findall(row, body)
     assert [len(t) for t in tables.values()] == [8, 23]
     return tables
@@ -47,7 +48,8 @@ def image():
 
 def observe(table):
     with tempfile.NamedTemporaryFile("w", suffix=".txt") as file:
-        file.write("\n".join(" ".join(row) for row in table))
+        # SEFDs of both feeds; no rotation of feeds, no leakage.
+        file.write("\n".join(" ".join(row) + 7 * " 0" for row in table))
         file.flush()
         array = ehtim.array.load_txt(file.name)
     pixel = FIELD_UAS * ehtim.RADPERUAS / N

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Pairs of UVFITS and text; says so where there are none.
+/// Pairs of UVFITS and text, of files that have both; says so where there are none.
 pub fn pairs() -> Vec<(PathBuf, PathBuf)> {
     let folder = std::env::var_os("KERRLIGHT_EHT_DATA")
         .map_or_else(|| root().join("../shared/data/eht"), PathBuf::from);
@@ -20,8 +20,9 @@ pub fn pairs() -> Vec<(PathBuf, PathBuf)> {
     let uvfits = entries
         .map(|entry| entry.expect("an entry").path())
         .filter(|path| path.extension().is_some_and(|e| e == "uvfits"));
-    let pairs: Vec<_> = uvfits.map(|path| (path.clone(), path.with_extension("txt"))).collect();
-    assert!(!pairs.is_empty(), "no .uvfits in {}", folder.display());
+    let pairs = uvfits.map(|path| (path.clone(), path.with_extension("txt")));
+    let pairs: Vec<_> = pairs.filter(|(_, text)| text.exists()).collect();
+    assert!(!pairs.is_empty(), "no .uvfits with .txt in {}", folder.display());
     pairs
 }
 

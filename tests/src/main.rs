@@ -8,6 +8,7 @@ mod closed_forms;
 mod command_line;
 mod compare;
 mod critical_curve;
+mod data_files;
 mod documents;
 mod eht_data;
 mod film;

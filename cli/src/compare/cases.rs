@@ -4,6 +4,7 @@ use super::experiment::{Experiment, Factor, Level};
 use super::source::Source;
 use super::summary::called;
 use crate::fit;
+use crate::paths;
 use anyhow::{Context, anyhow, bail};
 use toml::{Table, Value};
 
@@ -189,20 +190,20 @@ fn settings(
         .or(experiment.fit.as_ref())
         .ok_or_else(|| anyhow!("neither the experiment nor a level names a fit"))?;
     let mut table = source.fit(path)?;
-    fit::merge(&mut table, &experiment.set);
+    fit::merge(&mut table, &source.anchored(&experiment.set));
     for level in levels {
         for key in &level.remove {
             remove(&mut table, key).with_context(|| format!("level {:?}", level.name))?;
         }
-        fit::merge(&mut table, &level.set);
+        fit::merge(&mut table, &source.anchored(&level.set));
     }
     if choice.quick {
-        fit::merge(&mut table, &experiment.quick.set);
+        fit::merge(&mut table, &source.anchored(&experiment.quick.set));
     }
     table.insert("seed".to_owned(), Value::Integer(seed as i64));
     let mut text = toml::to_string(&table).context("settings")?;
     for assignment in &choice.set {
-        text = fit::assigned(&text, assignment)?;
+        text = fit::assigned(&text, &paths::from_here(assignment, None)?)?;
     }
     fit::check(&text)?;
     Ok(text)

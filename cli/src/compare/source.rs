@@ -1,9 +1,10 @@
 //! Experiments that the program carries, and those of files.
 
 use crate::output;
+use crate::paths;
 use anyhow::{Context, anyhow, bail};
 use std::path::{Path, PathBuf};
-use toml::{Table, Value};
+use toml::Table;
 
 /// Where an experiment and the fits that it names are read from.
 pub enum Source {
@@ -71,6 +72,15 @@ impl Source {
         Ok((Self::Folder(folder), output::read_text(name)?))
     }
 
+    /// Settings of the experiment's own file, with paths in them from anywhere.
+    pub fn anchored(&self, settings: &Table) -> Table {
+        let mut settings = settings.clone();
+        if let Self::Folder(folder) = self {
+            paths::anchor(&mut settings, folder);
+        }
+        settings
+    }
+
     /// A fit's settings, with paths in them from anywhere.
     pub fn fit(&self, path: &Path) -> anyhow::Result<Table> {
         let name = || path.display().to_string();
@@ -88,19 +98,9 @@ impl Source {
             Self::Folder(folder) => {
                 let path = folder.join(path);
                 let mut table: Table = output::read_text(&path)?.parse().with_context(name)?;
-                anchor(&mut table, path.parent().unwrap_or(folder));
+                paths::anchor(&mut table, path.parent().unwrap_or(folder));
                 Ok(table)
             }
-        }
-    }
-}
-
-/// Makes paths of data files start from the root.
-fn anchor(table: &mut Table, folder: &Path) {
-    let Some(Value::Table(data)) = table.get_mut("data") else { return };
-    for kind in data.iter_mut().filter_map(|(_, kind)| kind.as_table_mut()) {
-        if let Some(Value::String(path)) = kind.get_mut("path") {
-            *path = folder.join(&*path).display().to_string();
         }
     }
 }

@@ -3,19 +3,19 @@
 use super::config::{DataFiles, FitFile, Gains, Loss, LossKind, Noise};
 use super::setup::{self, Instrument};
 use super::truth::Truth;
+use super::visibility_file;
 use crate::interferometry::arguments;
 use crate::interferometry::movie_files;
 use anyhow::{Context, anyhow, bail};
 use kerrlight_tomo::fit::{
     Chain, Data, FrameTerm, ImageTerm, LightCurveTerm, Motion, Scan, ScanTerm, Weighted,
 };
-use kerrlight_tomo::interferometry::array::Station;
 use kerrlight_tomo::interferometry::data_terms::{
     AmplitudeTerm, ClosureTerm, DataTerm, DataTermError, VisibilityTerm,
 };
 use kerrlight_tomo::interferometry::earth::{Frame, Ut1};
 use kerrlight_tomo::interferometry::noise::{GainErrors, add_thermal_noise, apply_gains};
-use kerrlight_tomo::interferometry::observation::{Observation, Row};
+use kerrlight_tomo::interferometry::observation::Observation;
 use kerrlight_tomo::interferometry::operator::{ImageGrid, Method, Pulse, Transform};
 use kerrlight_tomo::interferometry::products::ClosureKind;
 use kerrlight_tomo::interferometry::schedule::{Clock, Schedule, Setup};
@@ -46,11 +46,11 @@ pub fn measure(file: &FitFile, instrument: &Instrument, folder: &Path) -> anyhow
             bail!("world is for simulated data: there is no truth")
         }
         (Some(data), None) => read(file, data, folder),
-        (None, Some(_)) if file.world.is_empty() => simulate(file, instrument),
+        (None, Some(_)) if file.world.is_empty() => simulate(file, instrument, folder),
         (None, Some(_)) => {
             let world = file.simulated()?;
             let instrument = Instrument::new(&world).context("world")?;
-            simulate(&world, &instrument)
+            simulate(&world, &instrument, folder)
         }
     }
 }
@@ -76,7 +76,7 @@ fn afford_movie(frames: usize, pixels: usize) -> anyhow::Result<()> {
     Ok(memory::afford(what, 2.0 * one)?)
 }
 
-fn simulate(file: &FitFile, instrument: &Instrument) -> anyhow::Result<Measured> {
+fn simulate(file: &FitFile, instrument: &Instrument, folder: &Path) -> anyhow::Result<Measured> {
     let truth = Truth::new(file)?;
     let Some(seen) = &file.observation else {
         let times = frames(file)?;
@@ -108,7 +108,7 @@ fn simulate(file: &FitFile, instrument: &Instrument) -> anyhow::Result<Measured>
         ut1: Ut1::Table,
         frame: Frame::Catalogue,
     };
-    let array = arguments::array_of(&seen.array).context("observation")?;
+    let array = arguments::array_near(&seen.array, folder).context("observation.array")?;
     let mut observation =
         arguments::observe(&array, source.position, &schedule, &setup).context("observation")?;
     observation.source = source.name;
@@ -175,22 +175,6 @@ fn gain_errors(gains: Gains) -> anyhow::Result<GainErrors> {
     Ok(GainErrors { constant_amplitude, scan_amplitude, random_phases })
 }
 
-/// A visibility without an error would count for more than all others together.
-fn check_errors(observation: &Observation) -> anyhow::Result<()> {
-    let is_exact = |row: &&Row| {
-        (0..4).any(|k| row.product(k).is_some_and(|measured| measured.noise_sigma <= 0.0))
-    };
-    let Some(row) = observation.rows.iter().find(is_exact) else { return Ok(()) };
-    let [a, b] = row.stations.map(|k| observation.stations.get(usize::from(k)));
-    let name = |station: Option<&Station>| station.map_or("?".to_owned(), |s| s.name.clone());
-    bail!(
-        "visibility of {}-{} at {:.6} h: sigma = 0 Jy is not allowed: above 0",
-        name(a),
-        name(b),
-        row.time_h
-    )
-}
-
 fn read(file: &FitFile, data: &DataFiles, folder: &Path) -> anyhow::Result<Measured> {
     match data {
         DataFiles::Movie { path } => {
@@ -225,29 +209,11 @@ fn read(file: &FitFile, data: &DataFiles, folder: &Path) -> anyhow::Result<Measu
                 truth: None,
             })
         }
-        DataFiles::Visibilities { path, average_s, systematic, first_time } => {
-            if !(*average_s >= 0.0 && average_s.is_finite()) {
-                bail!("data.visibilities.average_s = {average_s} is not allowed: 0 or above");
-            }
-            let path = folder.join(path);
-            let (_, observation) = crate::interferometry::read(&path)?;
-            check_errors(&observation).with_context(|| path.display().to_string())?;
-            let averaged = (*average_s > 0.0).then(|| observation.averaged(*average_s));
-            let mut observation = averaged.unwrap_or(observation).total_intensity();
-            observation.sort();
+        DataFiles::Visibilities { path, average_s, systematic, first_time, uv_min } => {
+            let settings = visibility_file::Settings { average_s: *average_s, uv_min: *uv_min };
+            let mut observation = visibility_file::read(&folder.join(path), &settings)?;
             add_systematic("data.visibilities.systematic", *systematic, &mut observation)?;
-            let mut hours: Vec<f64> = observation.rows.iter().map(|row| row.time_h).collect();
-            hours.dedup_by(|a, b| (*a - *b).abs() * 3600.0 < 0.5 * average_s.max(1.0));
-            if hours.is_empty() {
-                bail!("{}: there are no visibilities", path.display());
-            }
-            let nearest = |time: f64| hours.partition_point(|h| *h <= time + 1e-9).max(1) - 1;
-            let of_rows: Vec<usize> =
-                observation.rows.iter().map(|row| nearest(row.time_h)).collect();
-            for (row, frame) in observation.rows.iter_mut().zip(&of_rows) {
-                // Baselines that were averaged over different parts of a scan close all the same.
-                row.time_h = hours[*frame];
-            }
+            let (hours, of_rows) = visibility_file::frames(&mut observation);
             let per_m = setup::hours_per_m(file)?;
             let times = hours.iter().map(|h| first_time + (h - hours[0]) / per_m).collect();
             let sky = Some(setup::sky(file)?);

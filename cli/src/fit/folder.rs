@@ -105,7 +105,7 @@ impl Folder {
         }
         // A line that a kill has cut short is none.
         let whole = |line: &str| serde_json::from_str(line).ok();
-        Ok(output::read_text(&path)?.lines().filter_map(whole).collect())
+        Ok(output::read_log(&path)?.lines().filter_map(whole).collect())
     }
 
     /// Drops what was logged after a step: it will be done again.

@@ -17,9 +17,10 @@ mod seams;
 mod setup;
 mod truth;
 mod unknowns;
+mod visibility_file;
 mod words;
 
-use crate::{interrupt, output};
+use crate::{interrupt, output, paths};
 use anyhow::{Context, bail};
 use clap::Args;
 use config::FitFile;
@@ -107,8 +108,10 @@ impl Fit {
                 (output::read_text(path)?, near)
             }
         };
+        // The built-in experiment has no folder of its own.
+        let folder = self.file.is_some().then_some(near.as_path());
         for assignment in &self.set {
-            text = assigned(&text, assignment)?;
+            text = assigned(&text, &paths::from_here(assignment, folder)?)?;
         }
         Ok((text, near))
     }

@@ -50,14 +50,20 @@ pub fn range(text: &str) -> Result<[f64; 2], String> {
 
 /// A built-in array, or one of a file in eht-imaging's format.
 pub fn array_of(name: &str) -> anyhow::Result<Array> {
+    array_near(name, Path::new(""))
+}
+
+/// The same, with a file that lies in a folder.
+pub fn array_near(name: &str, folder: &Path) -> anyhow::Result<Array> {
     if let Some(array) = array::built_in(name) {
         return Ok(array);
     }
-    let path = Path::new(name);
+    let path = folder.join(name);
+    let shown = path.display();
     if !path.exists() {
-        bail!("array {name}: neither {} nor a file", array::BUILT_IN.join(" nor "));
+        bail!("array {name}: neither {} nor a file ({shown})", array::BUILT_IN.join(" nor "));
     }
-    array::parse(&output::read_text(path)?).with_context(|| format!("array {name}"))
+    array::parse(&output::read_text(&path)?).with_context(|| format!("array {shown}"))
 }
 
 /// Scans of the trial by which the rows of many are estimated.

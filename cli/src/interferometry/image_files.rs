@@ -119,9 +119,7 @@ const IMAGE_SHAPES: &str = "(height, width) or (frames, height, width) is expect
 /// Shape and numbers of an array.
 pub fn npy_array(bytes: &[u8]) -> anyhow::Result<(Vec<u64>, Vec<f64>)> {
     let file = npyz::NpyFile::new(bytes).context("not an npy file")?;
-    if file.order() != npyz::Order::C {
-        bail!("the array is in Fortran's order: save it in C's");
-    }
+    let in_fortran = file.order() == npyz::Order::Fortran;
     let shape = file.shape().to_vec();
     let count = shape.iter().try_fold(1u64, |product, n| product.checked_mul(*n));
     // At least a byte each, so that a header cannot ask for more memory than there is file.
@@ -131,7 +129,27 @@ pub fn npy_array(bytes: &[u8]) -> anyhow::Result<(Vec<u64>, Vec<f64>)> {
     let values = 8.0 * count.unwrap_or_default() as f64;
     memory::afford(|| format!("the array of shape {shape:?}"), values)?;
     let values = numbers(file)?;
+    let values = if in_fortran { in_c_order(&shape, &values) } else { values };
     Ok((shape, values))
+}
+
+/// Values whose first index runs fastest, with the last running fastest.
+fn in_c_order(shape: &[u64], values: &[f64]) -> Vec<f64> {
+    let shape: Vec<usize> = shape.iter().map(|n| *n as usize).collect();
+    let mut index = vec![0; shape.len()];
+    let mut ordered = Vec::with_capacity(values.len());
+    for _ in 0..values.len() {
+        let at = index.iter().zip(&shape).rev().fold(0, |at, (k, n)| at * n + k);
+        ordered.push(values[at]);
+        for (k, n) in index.iter_mut().zip(&shape).rev() {
+            *k += 1;
+            if *k < *n {
+                break;
+            }
+            *k = 0;
+        }
+    }
+    ordered
 }
 
 /// The values of an array of any number type that does not depend on the machine.
@@ -227,6 +245,27 @@ fn exr_picture(bytes: &[u8], fov_uas: Option<f64>) -> anyhow::Result<Pixels> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// An array and its transpose in the other order are the same bytes of numbers.
+    #[test]
+    fn exact_fortran_order() {
+        let write = |order, values: &[f64]| {
+            use npyz::WriterBuilder;
+            let mut bytes = Vec::new();
+            let options = npyz::WriteOptions::new().default_dtype().order(order);
+            let mut writer = options.shape(&[2, 3, 4]).writer(&mut bytes).begin_nd().unwrap();
+            writer.extend(values.iter().copied()).unwrap();
+            writer.finish().unwrap();
+            bytes
+        };
+        let value = |i: usize, j: usize, k: usize| (100 * i + 10 * j + k) as f64;
+        let in_c: Vec<f64> = (0..24).map(|n| value(n / 12, n / 4 % 3, n % 4)).collect();
+        let in_fortran: Vec<f64> = (0..24).map(|n| value(n % 2, n / 2 % 3, n / 6)).collect();
+        let c = npy_array(&write(npyz::Order::C, &in_c)).unwrap();
+        let fortran = npy_array(&write(npyz::Order::Fortran, &in_fortran)).unwrap();
+        assert_eq!(c, (vec![2, 3, 4], in_c));
+        assert_eq!(fortran, c);
+    }
 
     #[test]
     fn exact_grids_of_numbers() {

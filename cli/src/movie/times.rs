@@ -4,6 +4,7 @@ use anyhow::bail;
 use clap::Args;
 use kerrlight_tomo::scene::Scene;
 use kerrlight_tomo::units::gravitational_time;
+use std::fmt;
 use std::str::FromStr;
 
 /// Which time a film shows.
@@ -29,18 +30,28 @@ struct Moment {
     unit: Option<f64>,
 }
 
+/// Units of time with their seconds.
+const UNITS: [(&str, Option<f64>); 5] =
+    [("min", Some(60.0)), ("s", Some(1.0)), ("h", Some(3600.0)), ("M", None), ("", None)];
+
 impl FromStr for Moment {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let units =
-            [("min", Some(60.0)), ("s", Some(1.0)), ("h", Some(3600.0)), ("M", None), ("", None)];
-        let split = units.iter().find_map(|(name, unit)| Some((text.strip_suffix(name)?, *unit)));
+        let split = UNITS.iter().find_map(|(name, unit)| Some((text.strip_suffix(name)?, *unit)));
         let (number, unit) = split.unwrap_or((text, None));
         match number.trim().parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(Moment { value, unit }),
             _ => Err("a number, in M or with one of the units s, min, h".to_owned()),
         }
+    }
+}
+
+impl fmt::Display for Moment {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { value, unit } = self;
+        let name = UNITS.iter().find(|(_, of)| of == unit).map_or("M", |(name, _)| name);
+        write!(f, "{value}{name}")
     }
 }
 
@@ -60,15 +71,19 @@ impl Span {
             (Some(duration), _, _) => {
                 let (start, length) = (scene.observer.time, duration.in_m(scene));
                 if length <= 0.0 {
-                    bail!("--duration is not allowed: a time above 0");
+                    bail!("--duration {duration} is not allowed: a time above 0");
                 }
                 Ok(count.map(|k| start + length * (k / n)).collect())
             }
             (None, Some(from), Some(to)) => {
-                let (from, to) = (from.in_m(scene), to.in_m(scene));
-                if frames < 2 || to <= from {
-                    bail!("--to is not allowed: later than --from, with at least two frames");
+                if frames < 2 {
+                    bail!("--frames {frames} is not allowed with --from and --to: 2 or more");
                 }
+                let (start, end) = (from.in_m(scene), to.in_m(scene));
+                if end <= start {
+                    bail!("--to {to} is not allowed: later than --from {from}");
+                }
+                let (from, to) = (start, end);
                 Ok(count.map(|k| from + (to - from) * (k / (n - 1.0))).collect())
             }
             _ => {

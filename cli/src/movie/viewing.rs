@@ -51,8 +51,8 @@ impl Viewing {
         let check = |path: &Option<PathBuf>, extension| {
             path.as_deref().map(|path| Output::new(path, extension)).transpose()
         };
-        if self.white.is_some_and(|white| !(white.is_finite() && white > 0.0)) {
-            bail!("--white is not allowed: a finite number above 0");
+        if let Some(white) = self.white.filter(|white| !(white.is_finite() && *white > 0.0)) {
+            bail!("--white {white} is not allowed: a finite number above 0");
         }
         Ok(Animations {
             gif: check(&self.gif, "gif")?,

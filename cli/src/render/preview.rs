@@ -11,7 +11,8 @@ use kerrlight_tomo::scene::Scene;
 #[derive(Debug, Args)]
 pub struct PreviewOptions {
     /// Colours of the PNG: a map of the intensity, or `color` for the R, G, B channels
-    /// [default: afmhot-us, color where the scene has a sky or a mesh]
+    /// [default: afmhot-us; color where the scene has a sky, a mesh or a disc with the colours of a
+    /// black body]
     #[arg(long, value_name = "MAP")]
     colormap: Option<Colors>,
     /// How intensity is stretched over the colour map
@@ -60,7 +61,9 @@ impl PreviewOptions {
             StretchName::Sqrt => Stretch::Sqrt,
             StretchName::Log => Stretch::Log,
         };
-        let colored = scene.sky.is_some() || !scene.mesh.is_empty();
+        let disc = scene.disc.as_ref();
+        let is_black_body = disc.is_some_and(|disc| disc.peak_temperature_k.is_some());
+        let colored = scene.sky.is_some() || !scene.mesh.is_empty() || is_black_body;
         let default = if colored { Colors::Color } else { Colors::AfmhotUs };
         let map = match self.colormap.unwrap_or(default) {
             Colors::Color => return Look::Color,
@@ -95,4 +98,25 @@ pub fn check_sheet(scene: &Scene) -> anyhow::Result<()> {
         );
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use kerrlight_tomo::scene::apply_override;
+
+    /// Black bodies have colours of their own, which a map of the intensity would hide.
+    #[test]
+    fn exact_a_disc_with_a_temperature_is_shown_in_its_colors() {
+        let options = PreviewOptions { colormap: None, stretch: StretchName::Linear };
+        let look = |text: &str| options.look(&Scene::parse(text).unwrap());
+        let cold = include_str!("../../../scenes/disc_face_on.toml");
+        let hot = apply_override(cold, "disc.peak_temperature_k=8000").unwrap();
+        let hot = apply_override(&hot, "effects.redshift=false").unwrap();
+        assert_eq!(look(cold), Look::Intensity(Colormap::AfmhotUs, Stretch::Linear));
+        assert_eq!(look(&hot), Look::Color);
+        let mapped = PreviewOptions { colormap: Some(Colors::Gray), ..options };
+        let gray = Look::Intensity(Colormap::Gray, Stretch::Linear);
+        assert_eq!(mapped.look(&Scene::parse(&hot).unwrap()), gray);
+    }
 }

@@ -1,6 +1,7 @@
 //! Where a scene comes from.
 
 use crate::output;
+use crate::paths;
 use anyhow::Context;
 use kerrlight_tomo::image::exr;
 use kerrlight_tomo::scene::{Scene, SceneError, apply_override};
@@ -57,7 +58,8 @@ impl Source {
             return Ok((text, scene));
         }
         for assignment in overrides {
-            text = apply_override(&text, assignment).map_err(|error| match error {
+            let assignment = paths::from_here(assignment, Some(&self.folder))?;
+            text = apply_override(&text, &assignment).map_err(|error| match error {
                 // Not the override's fault.
                 SceneError::Syntax(_) => anyhow::Error::new(error).context(self.name.clone()),
                 _ => anyhow::Error::new(error).context("--set"),

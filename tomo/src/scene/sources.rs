@@ -276,7 +276,7 @@ pub struct Stars {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SkyImage {
-    /// PNG, JPEG or HDR file, relative to the scene file.
+    /// PNG, JPEG, HDR or EXR file, relative to the scene file.
     pub path: String,
     /// Factor on the linear colours.
     pub brightness: f64,

@@ -17,6 +17,9 @@ pub enum DataFiles {
         systematic: f64,
         /// Time of the first frame, M.
         first_time: f64,
+        /// Baselines shorter than this many wavelengths are left out: those within a site see extended emission too.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        uv_min: Option<f64>,
     },
     /// A movie in Jy/pixel: .npz, .npy, .csv, .fits or .exr.
     Movie {

@@ -1,6 +1,7 @@
 //! An equirectangular picture of the whole sky.
 
 use super::beam::Beam;
+use crate::image::exr;
 use crate::memory;
 use core::f64::consts::{PI, TAU};
 
@@ -15,18 +16,44 @@ pub struct Panorama {
     coarser: Vec<Panorama>,
 }
 
+/// How an OpenEXR file begins.
+const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
+
+/// Width, height and linear colours of an EXR.
+fn exr_colors(bytes: &[u8]) -> Result<(usize, usize, Vec<[f32; 3]>), PanoramaError> {
+    if !exr::is_whole(bytes)? {
+        let message = "an EXR of part of its display window, which would not fit the sky";
+        return Err(PanoramaError::Content(message.to_owned()));
+    }
+    let (picture, _) = exr::decode(bytes)?;
+    let named = |names: [&str; 3]| {
+        let [r, g, b] = names.map(|name| picture.channel(name));
+        Some([r?, g?, b?])
+    };
+    let Some([r, g, b]) = named(["R", "G", "B"]).or_else(|| named(["Y"; 3])) else {
+        let names: Vec<&str> = picture.channels.iter().map(|c| c.name.as_str()).collect();
+        let message = format!("channels {}: R, G, B or Y are expected", names.join(", "));
+        return Err(PanoramaError::Content(message));
+    };
+    let pixels = r.iter().zip(g).zip(b).map(|((r, g), b)| [*r, *g, *b]).collect();
+    Ok((picture.width, picture.height, pixels))
+}
+
 /// Why a picture cannot be the sky.
 #[derive(Debug, thiserror::Error)]
 pub enum PanoramaError {
     /// The bytes are no picture that can be read.
-    #[error("not a readable PNG, JPEG or HDR picture: {0}")]
+    #[error("not a readable PNG, JPEG, HDR or EXR picture: {0}")]
     Decode(#[from] image::ImageError),
     /// There is no memory for it.
     #[error(transparent)]
     Memory(#[from] memory::TooLarge),
+    /// An EXR that cannot be read.
+    #[error("damaged or unusual EXR: {0}")]
+    Exr(#[from] ::exr::error::Error),
     /// The picture is empty or has a value that is no colour.
     #[error("{0}")]
-    Content(&'static str),
+    Content(String),
 }
 
 /// Columns and rows of a picture, as its header states them.
@@ -35,14 +62,20 @@ pub(crate) fn dimensions(bytes: &[u8]) -> image::ImageResult<(u32, u32)> {
 }
 
 impl Panorama {
-    /// Decodes a PNG, JPEG or Radiance HDR picture; 8- and 16-bit colours are taken as sRGB.
+    /// Decodes a PNG, JPEG, Radiance HDR or OpenEXR picture; 8- and 16-bit colours are taken as sRGB,
+    /// those of HDR and EXR (channels R, G, B, or Y) as linear.
     ///
     /// # Errors
     /// If the bytes are no such picture.
     pub fn decode(bytes: &[u8]) -> Result<Self, PanoramaError> {
-        let (width, height) = dimensions(bytes)?;
+        let is_exr = bytes.starts_with(&EXR_MAGIC);
+        let (width, height) = if is_exr { exr::dimensions(bytes)? } else { dimensions(bytes)? };
         let what = || format!("a sky of {width} x {height} pixels");
         memory::afford(what, memory::colours(width.into(), height.into()))?;
+        if is_exr {
+            let (width, height, pixels) = exr_colors(bytes)?;
+            return Self::new(width, height, pixels);
+        }
         let picture = image::load_from_memory(bytes)?;
         let linear = matches!(
             picture,
@@ -50,13 +83,22 @@ impl Panorama {
         );
         let picture = picture.into_rgb32f();
         let (width, height) = (picture.width() as usize, picture.height() as usize);
-        if width == 0 || height == 0 {
-            return Err(PanoramaError::Content("the picture has no pixels"));
-        }
         let decode = |c: f32| if linear { c } else { srgb_to_linear(c) };
         let pixels: Vec<[f32; 3]> = picture.pixels().map(|p| p.0.map(decode)).collect();
-        if pixels.iter().flatten().any(|c| !c.is_finite() || *c < 0.0) {
-            return Err(PanoramaError::Content("the picture has values that are no colours"));
+        Self::new(width, height, pixels)
+    }
+
+    fn new(width: usize, height: usize, pixels: Vec<[f32; 3]>) -> Result<Self, PanoramaError> {
+        if width == 0 || height == 0 {
+            return Err(PanoramaError::Content("the picture has no pixels".to_owned()));
+        }
+        let is_color = |c: &f32| c.is_finite() && *c >= 0.0;
+        if let Some(k) = pixels.iter().position(|pixel| !pixel.iter().all(is_color)) {
+            let (row, column, pixel) = (k / width + 1, k % width + 1, pixels[k]);
+            let message = format!(
+                "row {row}, column {column}: R, G, B = {pixel:?} are not allowed: finite, 0 or more"
+            );
+            return Err(PanoramaError::Content(message));
         }
         Ok(Panorama { width, height, pixels, coarser: Vec::new() })
     }
@@ -212,6 +254,34 @@ pub(crate) fn srgb_to_linear(c: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Values of an EXR are light itself, those of a PNG are sRGB.
+    #[test]
+    fn exact_exr_values_are_linear() {
+        use crate::image::{Channel, Picture};
+        let picture = |names: &[&str], value: f32| {
+            let channel = |name: &&str| Channel {
+                name: (*name).to_owned(),
+                values: vec![value * f32::from(name.as_bytes()[0]); 8],
+            };
+            let channels = names.iter().map(channel).collect();
+            let picture = Picture { width: 4, height: 2, channels };
+            exr::encode(&picture, &exr::Attributes::new()).unwrap()
+        };
+        let look = |bytes: &[u8]| Panorama::decode(bytes).unwrap().look([1.0, 0.0, 0.0]);
+        assert_eq!(
+            look(&picture(&["R", "G", "B"], 2.0)),
+            [b'R', b'G', b'B'].map(|c| 2.0 * f32::from(c))
+        );
+        assert_eq!(look(&picture(&["Y"], 0.25)), [0.25 * f32::from(b'Y'); 3]);
+        let fail = |bytes: &[u8]| Panorama::decode(bytes).unwrap_err().to_string();
+        let said = fail(&picture(&["depth", "intensity"], 1.0));
+        assert_eq!(said, "channels depth, intensity: R, G, B or Y are expected");
+        let said = fail(&picture(&["R", "G", "B"], f32::NAN));
+        assert!(said.starts_with("row 1, column 1: R, G, B = [NaN, NaN, NaN]"), "{said}");
+        let whole = picture(&["Y"], 1.0);
+        assert!(fail(&whole[..whole.len() - 9]).contains("damaged"));
+    }
 
     /// Seen from inside, facing −x (azimuth 180°) is at the left and right edges, azimuth 90°
     /// is a quarter from the left.

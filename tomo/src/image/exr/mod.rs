@@ -75,6 +75,29 @@ fn attributes(layer: &LayerAttributes) -> exr::error::Result<Attributes> {
     }
 }
 
+/// Columns and rows of the first layer, as the header states them.
+///
+/// # Errors
+/// If the bytes are no EXR file.
+pub fn dimensions(bytes: &[u8]) -> exr::error::Result<(u32, u32)> {
+    let data = MetaData::read_from_unbuffered(Cursor::new(bytes), true)?;
+    let size = data.headers.first().map_or(Vec2(0, 0), |header| header.layer_size);
+    let number = |n: usize| u32::try_from(n).map_err(|_| Error::Invalid("size".into()));
+    Ok((number(size.0)?, number(size.1)?))
+}
+
+/// Whether the pixels of the first layer fill the display window.
+///
+/// # Errors
+/// If the bytes are no EXR file.
+pub fn is_whole(bytes: &[u8]) -> exr::error::Result<bool> {
+    let data = MetaData::read_from_unbuffered(Cursor::new(bytes), true)?;
+    Ok(data.headers.first().is_none_or(|header| {
+        let window = header.shared_attributes.display_window;
+        (window.position, window.size) == (header.own_attributes.layer_position, header.layer_size)
+    }))
+}
+
 /// The channels and kerrlight's settings of the first layer of an EXR file.
 ///
 /// # Errors

@@ -27,8 +27,13 @@ pub fn read(bytes: &[u8]) -> Result<Movie, FileError> {
     }
     let (east_to_west, pixel_rad) = pixel(header)?;
     let field_rad = pixel_rad * width as f64;
+    if !(field_rad > 0.0 && field_rad < 1.0) {
+        let degrees = field_rad.to_degrees();
+        let message = format!("{width} pixels span {degrees} degrees, in (0, 57.29) is expected");
+        return Err(header.error("CDELT1", message));
+    }
     let grid =
-        ImageGrid::new(width, height, field_rad).map_err(|error| header.error("CDELT1", error))?;
+        ImageGrid::new(width, height, field_rad).map_err(|error| header.error("NAXIS1", error))?;
     let values = values(&unit, grid.pixels())?;
     let pixels = (0..height)
         .rev()

@@ -49,11 +49,13 @@ impl Heading {
 ///
 /// # Errors
 /// If no line names the columns of either kind, or a line of data has too few of them or no
-/// number where one belongs.
+/// number where one belongs. Lines whose visibility or error is `nan` are left out; the history says how
+/// many.
 pub fn parse(text: &str) -> Result<Observation, FileError> {
     let mut observation = Observation::empty(Basis::Stokes);
     let mut names = Names::new(Vec::new());
     let mut heading = None;
+    let mut left_out = 0;
     observation.rows = Vec::with_capacity(super::rows_at_most(text));
     for (index, line) in text.lines().enumerate() {
         let located = |message: String| FileError::line(index + 1, message);
@@ -77,7 +79,10 @@ pub fn parse(text: &str) -> Result<Observation, FileError> {
         let Some(heading) = &heading else {
             return Err(located(format!("data before a line that names {}", COLUMNS.join(", "))));
         };
-        let row = row(&cells(line), heading, &mut names).map_err(located)?;
+        let Some(row) = row(&cells(line), heading, &mut names).map_err(located)? else {
+            left_out += 1;
+            continue;
+        };
         if usize::from(row.channel) >= observation.channels.len().max(1) {
             return Err(located(format!("channel {} is not in the comments", row.channel)));
         }
@@ -88,6 +93,9 @@ pub fn parse(text: &str) -> Result<Observation, FileError> {
     }
     if observation.rows.is_empty() {
         return Err(FileError::whole("no visibilities"));
+    }
+    if left_out > 0 {
+        observation.history.push(format!("{left_out} lines without a visibility (nan) left out"));
     }
     observation.stations = names.stations;
     Ok(observation)
@@ -112,7 +120,8 @@ fn read_facts(line: &str, observation: &mut Observation) -> Result<(), String> {
     Ok(())
 }
 
-fn row(cells: &[&str], heading: &Heading, names: &mut Names) -> Result<Row, String> {
+/// The row of a line; none where `nan` stands for the visibility or its error.
+fn row(cells: &[&str], heading: &Heading, names: &mut Names) -> Result<Option<Row>, String> {
     let cell = |k: usize| {
         let column = heading.columns[k];
         cells
@@ -125,6 +134,11 @@ fn row(cells: &[&str], heading: &Heading, names: &mut Names) -> Result<Row, Stri
     if stations[0] == stations[1] {
         return Err(format!("a baseline of station {} with itself", cell(1)?));
     }
+    for k in 5..8 {
+        if cell(k)?.parse::<f64>().is_ok_and(f64::is_nan) {
+            return Ok(None);
+        }
+    }
     let (first, second) = (value(5)?, value(6)?);
     let visibility = if heading.polar {
         Complex64::from_polar(first, second.to_radians())
@@ -132,9 +146,6 @@ fn row(cells: &[&str], heading: &Heading, names: &mut Names) -> Result<Row, Stri
         Complex64::new(first, second)
     };
     let noise_sigma = sigma(cell(7)?, "sigma")?;
-    if noise_sigma.is_nan() {
-        return Err("sigma = nan is not allowed: 0 or positive".to_owned());
-    }
     let i = Measured { visibility, noise_sigma };
     let channel = match heading.channel.map(|column| cells.get(column).copied().unwrap_or_default())
     {
@@ -144,7 +155,7 @@ fn row(cells: &[&str], heading: &Heading, names: &mut Names) -> Result<Row, Stri
             .map_err(|_| format!("channel `{}` is no channel's number", super::shortened(cell)))?,
     };
     let row = Row::total_intensity(value(0)?, stations, [value(3)?, value(4)?], i);
-    Ok(Row { channel, ..row })
+    Ok(Some(Row { channel, ..row }))
 }
 
 /// Stokes I of every row that has it, as kerrlight's CSV, numbers with all their digits. With
@@ -233,5 +244,19 @@ mod tests {
         assert!(fail(&format!("{head}\n1,A,A,1,2,3,4,5\n")).contains("with itself"));
         assert!(fail(&format!("{head}\n1,A,B,1,2,3,4,-5\n")).contains("sigma = -5"));
         assert!(fail(&format!("{head}\n1,A,B,inf,2,3,4,5\n")).contains("u = inf"));
+        assert!(fail(&format!("{head}\n1,A,B,1,2,3,4,-nan\n")).contains("no visibilities"));
+        assert!(fail(&format!("{head}\n1,A,B,nan,2,3,4,5\n")).contains("u = NaN"));
+    }
+
+    /// As in UVFITS, a value that is no number means that there is no such datum.
+    #[test]
+    fn exact_lines_without_a_visibility_are_left_out() {
+        let line = "1,A,B,1,2,3,4,5\n";
+        let text = COLUMNS.join(",") + "\n" + &line.replace('3', "nan") + line;
+        let observation = parse(&(text.clone() + &line.replace('5', "NaN"))).unwrap();
+        assert_eq!((observation.rows.len(), observation.stations.len()), (1, 2));
+        assert_eq!(observation.history, ["2 lines without a visibility (nan) left out"]);
+        let none = text.strip_suffix(line).unwrap();
+        assert!(parse(none).unwrap_err().to_string().contains("no visibilities"));
     }
 }

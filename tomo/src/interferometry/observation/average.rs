@@ -9,9 +9,9 @@ impl Observation {
     /// length since 0 h UTC.
     ///
     /// Products are means weighted by 1/σ², so that σ of a mean is 1/√(Σ 1/σ²); times and (u, v)
-    /// are means weighted by integration time, which adds up. Where some errors are zero (files
-    /// that make Stokes I of both hands write such cross hands), means are plain and σ is
-    /// √(Σσ²)/n.
+    /// are means weighted by integration time, which adds up. Products that were not measured
+    /// ([`Measured::is_placeholder`](super::Measured::is_placeholder)) do not count; where other errors are zero, means are plain and
+    /// σ is √(Σσ²)/n.
     #[must_use]
     pub fn averaged(&self, seconds: f64) -> Self {
         let mut bins: BTreeMap<(i64, [u16; 2], u16), Vec<Row>> = BTreeMap::new();
@@ -23,6 +23,20 @@ impl Observation {
         let mut observation = self.clone_without_rows();
         observation.rows = bins.values().map(|rows| mean(rows)).collect();
         observation.history.push(format!("coherent averages over {seconds} s"));
+        observation
+    }
+
+    /// The same, with one time for all rows of an interval, the mean of theirs: baselines that were
+    /// measured in different parts of an interval belong to one scan, and close.
+    #[must_use]
+    pub fn averaged_in_scans(&self, seconds: f64) -> Self {
+        let mut observation = self.averaged(seconds);
+        // Means lie in their interval but for rounding, which must not tear a scan.
+        let bin = |row: &Row| (row.time_h * 3600.0 / seconds + 1e-6).floor() as i64;
+        for scan in observation.rows.chunk_by_mut(|a, b| bin(a) == bin(b)) {
+            let time_h = scan.iter().map(|row| row.time_h).sum::<f64>() / scan.len() as f64;
+            scan.iter_mut().for_each(|row| row.time_h = time_h);
+        }
         observation
     }
 
@@ -101,7 +115,10 @@ fn mean(rows: &[Row]) -> Row {
 }
 
 fn mean_product(rows: &[Row], k: usize) -> (Complex64, f64) {
-    let present = || rows.iter().filter_map(|row| row.product(k));
+    let all = || rows.iter().filter_map(|row| row.product(k));
+    // A mean of nothing but placeholders is one.
+    let only_placeholders = all().all(|m| m.is_placeholder());
+    let present = || all().filter(|m| only_placeholders || !m.is_placeholder());
     let count = present().count();
     if count == 0 {
         return (Complex64::new(0.0, 0.0), f64::NAN);
@@ -147,6 +164,52 @@ mod tests {
         assert!((rows[0].time_h - 1.002).abs() < 1e-15 && (rows[0].uv[0] - 1.002).abs() < 1e-15);
         assert_eq!((rows[0].integration_s, rows[0].stations), (20.0, [0, 1]));
         assert!(rows[0].noise_sigma[1].is_nan());
+    }
+
+    /// Of two scans, whose baselines were measured in different parts of them.
+    #[test]
+    fn exact_one_time_a_scan() {
+        let i = Measured { visibility: Complex64::new(1.0, 0.0), noise_sigma: 0.1 };
+        let row = |seconds: f64, stations| {
+            Row::total_intensity(seconds / 3600.0, stations, [1.0, 0.0], i)
+        };
+        let mut observation = Observation::empty(Basis::Stokes);
+        observation.rows =
+            vec![row(301.0, [0, 1]), row(590.0, [0, 2]), row(599.0, [1, 2]), row(601.0, [0, 1])];
+        let rows = observation.averaged_in_scans(300.0).rows;
+        let seconds: Vec<f64> = rows.iter().map(|row| row.time_h * 3600.0).collect();
+        let mean = (301.0 + 590.0 + 599.0) / 3.0;
+        for (found, expected) in seconds.iter().zip([mean, mean, mean, 601.0]) {
+            assert!((found - expected).abs() < 1e-9, "{seconds:?}");
+        }
+        assert!(rows[..3].iter().all(|row| row.time_h == rows[0].time_h));
+    }
+
+    /// Hands that were not measured change neither Stokes I nor a mean.
+    #[test]
+    fn exact_placeholders_do_not_count() {
+        let hand = |re: f64| Complex64::new(re, 0.0);
+        let row = |time_h: f64, rr: (f64, f64), ll: (f64, f64)| Row {
+            products: [hand(rr.0), hand(ll.0), hand(0.0), hand(0.0)],
+            noise_sigma: [rr.1, ll.1, 0.0, f64::NAN],
+            ..Row::total_intensity(
+                time_h,
+                [0, 1],
+                [1.0, 0.0],
+                Measured { visibility: hand(0.0), noise_sigma: 1.0 },
+            )
+        };
+        let one = row(1.001, (3.0, 0.3), (0.0, 0.0)).stokes_i(Basis::Circular).unwrap();
+        assert_eq!((one.visibility.re, one.noise_sigma), (3.0, 0.3));
+        assert!(row(1.0, (0.0, 0.0), (0.0, 0.0)).stokes_i(Basis::Circular).is_none());
+        let mut observation = Observation::empty(Basis::Circular);
+        observation.rows =
+            vec![row(1.001, (3.0, 0.3), (0.0, 0.0)), row(1.002, (3.0, 0.3), (1.0, 0.4))];
+        let mean = observation.averaged(60.0).rows[0];
+        let [rr, ll] = mean.parts_of_i(Basis::Circular).map(Option::unwrap);
+        assert!((rr.noise_sigma - 0.3 / 2f64.sqrt()).abs() < 1e-15);
+        assert_eq!((ll.visibility.re, ll.noise_sigma), (1.0, 0.4));
+        assert!(mean.product(2).unwrap().is_placeholder() && mean.product(3).is_none());
     }
 
     #[test]

@@ -58,6 +58,14 @@ pub struct Measured {
     pub noise_sigma: f64,
 }
 
+impl Measured {
+    /// Whether it stands for a product that was not measured: exactly 0 with an error of 0, which
+    /// eht-imaging writes for the cross hands of Stokes I alone.
+    pub fn is_placeholder(&self) -> bool {
+        self.noise_sigma == 0.0 && self.visibility == Complex64::new(0.0, 0.0)
+    }
+}
+
 impl Row {
     /// A row of Stokes I only.
     pub fn total_intensity(time_h: f64, stations: [u16; 2], uv: [f64; 2], i: Measured) -> Self {
@@ -81,15 +89,25 @@ impl Row {
         (!noise_sigma.is_nan()).then_some(Measured { visibility, noise_sigma })
     }
 
-    /// Stokes I: the mean of both parallel hands, or the one that there is.
+    /// The products that Stokes I is made of: itself, or the parallel hands that were measured.
+    pub fn parts_of_i(&self, basis: Basis) -> [Option<Measured>; 2] {
+        let hand = |k: usize| self.product(k).filter(|hand| !hand.is_placeholder());
+        match basis {
+            Basis::Stokes => [self.product(0), None],
+            Basis::Circular => [hand(0), hand(1)],
+        }
+    }
+
+    /// Stokes I: the mean of both parallel hands, with the error ½√(σ²(RR) + σ²(LL)). Where one hand
+    /// was measured, it is that hand with its own error, which holds for a source without circular
+    /// polarisation (RR = I + V, LL = I − V).
     pub fn stokes_i(&self, basis: Basis) -> Option<Measured> {
-        match (basis, self.product(0), self.product(1)) {
-            (Basis::Stokes, i, _) => i,
-            (Basis::Circular, Some(rr), Some(ll)) => Some(Measured {
+        match self.parts_of_i(basis) {
+            [Some(rr), Some(ll)] => Some(Measured {
                 visibility: 0.5 * (rr.visibility + ll.visibility),
                 noise_sigma: 0.5 * rr.noise_sigma.hypot(ll.noise_sigma),
             }),
-            (Basis::Circular, rr, ll) => rr.or(ll),
+            [one, other] => one.or(other),
         }
     }
 

@@ -7,7 +7,8 @@ use super::{Observation, Row};
 pub struct Flags {
     /// Stations by name, of which no baseline is kept.
     pub stations: Vec<String>,
-    /// Intervals of UTC hours, ends included.
+    /// Intervals of UTC hours, ends included. One that ends before it starts goes over midnight, of every
+    /// day: [20, 10] is from 20 h to 24 h and from 0 h to 10 h by the clock.
     pub times_h: Vec<[f64; 2]>,
     /// Baselines shorter than this many wavelengths.
     pub shorter_than: Option<f64>,
@@ -46,10 +47,19 @@ impl Flags {
             .names(row)
             .iter()
             .any(|name| self.stations.iter().any(|flagged| flagged == name))
-            || self.times_h.iter().any(|[from, to]| (*from..=*to).contains(&row.time_h))
+            || self.times_h.iter().any(|interval| is_within(row.time_h, *interval))
             || self.shorter_than.is_some_and(|least| length < least)
             || self.longer_than.is_some_and(|most| length > most)
     }
+}
+
+/// Whether an hour is in an interval of [`Flags::times_h`].
+fn is_within(time_h: f64, [from, to]: [f64; 2]) -> bool {
+    if from <= to {
+        return (from..=to).contains(&time_h);
+    }
+    let clock = time_h.rem_euclid(24.0);
+    clock >= from || clock <= to
 }
 
 #[cfg(test)]
@@ -76,6 +86,18 @@ mod tests {
         assert_eq!(kept(Flags { times_h: vec![[1.5, 2.0]], ..Flags::default() }), [1, 3]);
         assert_eq!(kept(Flags { shorter_than: Some(50.0), ..Flags::default() }), [2, 3]);
         assert_eq!(kept(Flags { longer_than: Some(500.0), ..Flags::default() }), [1, 2]);
+        assert_eq!(kept(Flags { times_h: vec![[22.0, 2.0]], ..Flags::default() }), [3]);
+        for (time, interval, expected) in [
+            (23.0, [20.0, 10.0], true),
+            (26.0, [20.0, 10.0], true),
+            (-2.0, [20.0, 10.0], true),
+            (15.0, [20.0, 10.0], false),
+            (35.0, [20.0, 10.0], false),
+            (26.0, [25.0, 27.0], true),
+            (2.0, [25.0, 27.0], false),
+        ] {
+            assert_eq!(is_within(time, interval), expected, "{time} h in {interval:?}");
+        }
         let odd = Flags { stations: vec!["A".into(), "X".into()], ..Flags::default() };
         assert_eq!(odd.unknown_stations(&all), ["X"]);
     }

@@ -1,6 +1,7 @@
 //! Where pixels are on the sky, and what a pixel looks like.
 
 use crate::interferometry::schedule::ScheduleError;
+use crate::units::MICROARCSECOND;
 use core::f64::consts::PI;
 
 /// A regular grid of square pixels.
@@ -38,7 +39,12 @@ impl ImageGrid {
             }
         }
         if !(field_rad > 0.0 && field_rad < 1.0) {
-            return range("field of view", field_rad, "radians between 0 and 1");
+            let field_uas = field_rad / MICROARCSECOND;
+            return range(
+                "field of view",
+                field_uas,
+                "microarcseconds in (0, 2.06e11), below 1 rad",
+            );
         }
         Ok(ImageGrid { width, height, pixel_rad: field_rad / width as f64 })
     }

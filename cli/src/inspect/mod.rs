@@ -1,5 +1,8 @@
 //! `kerrlight inspect`: what a file holds.
 
+mod arrays;
+mod run_folder;
+
 use crate::interferometry::plots::{self, PlotFile};
 use crate::output;
 use anyhow::{Context, bail};
@@ -15,8 +18,8 @@ use std::path::{Path, PathBuf};
 /// Arguments of `kerrlight inspect`.
 #[derive(Debug, Args)]
 pub struct Inspect {
-    /// A picture (EXR), or visibilities (UVFITS, eht-imaging's text, tables of the EHT or of
-    /// kerrlight)
+    /// A picture (EXR), arrays (NPZ, NPY: movies, volumes, tables), visibilities (UVFITS, eht-imaging's
+    /// text, tables of the EHT or of kerrlight), or the folder of a fit
     file: PathBuf,
     /// Of visibilities: where to draw amplitudes against baselines
     #[arg(long, value_name = "FILE.png|.svg")]
@@ -28,11 +31,22 @@ impl Inspect {
     pub fn run(&self) -> anyhow::Result<()> {
         let name = || self.file.display().to_string();
         let plot = self.plot.as_deref().map(PlotFile::new).transpose()?;
-        if is_exr(&self.file)? {
-            if plot.is_some() {
-                bail!("--plot is for visibilities, {} is a picture", name());
-            }
+        let refuse_plot = |what: &str| match &self.plot {
+            Some(_) => bail!("--plot is for visibilities, {} is {what}", name()),
+            None => Ok(()),
+        };
+        if self.file.is_dir() {
+            refuse_plot("a folder")?;
+            return output::print(&run_folder::describe(&self.file)?);
+        }
+        let start = first_bytes(&self.file)?;
+        if start.starts_with(&EXR_MAGIC) {
+            refuse_plot("a picture")?;
             return picture(&self.file);
+        }
+        if arrays::begins(&start) {
+            refuse_plot("an archive of arrays")?;
+            return output::print(&arrays::describe(&self.file, &start).with_context(name)?);
         }
         if self.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
             bail!("{}: not an EXR file (its first bytes are not an EXR's)", name());
@@ -47,12 +61,15 @@ impl Inspect {
     }
 }
 
-/// Whether a file starts as an EXR does.
-fn is_exr(path: &Path) -> anyhow::Result<bool> {
+/// How an EXR begins.
+const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
+
+/// The first bytes of a file, which tell what it is.
+fn first_bytes(path: &Path) -> anyhow::Result<Vec<u8>> {
     let mut start = Vec::new();
-    let mut file = output::open(path)?.take(4);
+    let mut file = output::open(path)?.take(8);
     file.read_to_end(&mut start).with_context(|| format!("cannot read {}", path.display()))?;
-    Ok(start == [0x76, 0x2f, 0x31, 0x01])
+    Ok(start)
 }
 
 /// Prints what a picture holds.

@@ -1,0 +1,84 @@
+//! Measured visibilities from a file, as a fit takes them.
+
+use anyhow::{Context, bail};
+use kerrlight_tomo::interferometry::observation::{Flags, Observation, Row};
+use std::path::Path;
+
+/// What a fit does with the rows of a file.
+pub struct Settings {
+    /// Rows of an interval of this many seconds are averaged; 0 keeps all.
+    pub average_s: f64,
+    /// Baselines shorter than this many wavelengths are left out.
+    pub uv_min: Option<f64>,
+}
+
+/// Stokes I of a file, averaged, in order of time. All rows of a frame have the same time.
+pub fn read(path: &Path, settings: &Settings) -> anyhow::Result<Observation> {
+    let &Settings { average_s, uv_min } = settings;
+    if !(average_s >= 0.0 && average_s.is_finite()) {
+        bail!("data.visibilities.average_s = {average_s} is not allowed: 0 or above");
+    }
+    if uv_min.is_some_and(|least| !(least >= 0.0 && least.is_finite())) {
+        let least = uv_min.unwrap_or_default();
+        bail!("data.visibilities.uv_min = {least} is not allowed: 0 or above");
+    }
+    let name = || path.display().to_string();
+    let (_, observation) = crate::interferometry::read(path)?;
+    check_errors(&observation).with_context(name)?;
+    let without = observation.rows.len() - observation.stokes_i().count();
+    if without > 0 {
+        let all = observation.rows.len();
+        eprintln!("{}: {without} of {all} rows have no parallel hand and are left out", name());
+    }
+    let observation = long_enough(observation, uv_min).with_context(name)?;
+    let mut observation = if average_s > 0.0 {
+        observation.averaged_in_scans(average_s).total_intensity()
+    } else {
+        observation.total_intensity()
+    };
+    observation.sort();
+    Ok(observation)
+}
+
+fn long_enough(observation: Observation, uv_min: Option<f64>) -> anyhow::Result<Observation> {
+    let flags = Flags { shorter_than: uv_min, ..Flags::default() };
+    let kept = flags.apply(&observation).observation;
+    let has_any = |data: &Observation| data.stokes_i().next().is_some();
+    match uv_min {
+        _ if has_any(&kept) => Ok(kept),
+        Some(least) if has_any(&observation) => {
+            bail!("data.visibilities.uv_min = {least} leaves no visibilities")
+        }
+        _ => bail!("there are no visibilities of Stokes I"),
+    }
+}
+
+/// A visibility without an error would count for more than all others together. Products that do not
+/// enter Stokes I may have any.
+fn check_errors(observation: &Observation) -> anyhow::Result<()> {
+    let is_exact = |row: &&Row| {
+        let parts = row.parts_of_i(observation.basis);
+        parts.iter().flatten().any(|part| part.noise_sigma <= 0.0)
+    };
+    let Some(row) = observation.rows.iter().find(is_exact) else { return Ok(()) };
+    let [a, b] = observation.names(row);
+    bail!("visibility of {a}-{b} at {:.6} h: sigma = 0 Jy is not allowed: above 0", row.time_h)
+}
+
+/// Times closer than this many seconds are one.
+const SAME_S: f64 = 0.5;
+
+/// Hours of the frames and the frame of every row; rows of a frame get its time, so that closure
+/// quantities find each other.
+pub fn frames(observation: &mut Observation) -> (Vec<f64>, Vec<usize>) {
+    let mut hours: Vec<f64> = Vec::new();
+    let mut of_rows = Vec::with_capacity(observation.rows.len());
+    for row in &mut observation.rows {
+        match hours.last() {
+            Some(last) if (row.time_h - last) * 3600.0 < SAME_S => row.time_h = *last,
+            _ => hours.push(row.time_h),
+        }
+        of_rows.push(hours.len() - 1);
+    }
+    (hours, of_rows)
+}

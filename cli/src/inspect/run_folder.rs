@@ -1,0 +1,107 @@
+//! What a fit has left in its folder.
+
+use crate::output;
+use anyhow::{Context, bail};
+use serde_json::Value;
+use std::path::Path;
+use toml::Table;
+
+/// Title, data, representation, how far it came, results and files.
+pub fn describe(folder: &Path) -> anyhow::Result<String> {
+    let shown = folder.display();
+    let settings = folder.join("fit.toml");
+    if !settings.is_file() {
+        bail!("{shown} is a folder without fit.toml: a file, or the folder of a fit is expected");
+    }
+    let name = || settings.display().to_string();
+    let table: Table = output::read_text(&settings)?.parse().with_context(name)?;
+    let log = log(&folder.join("log.jsonl"))?;
+    let results = results(&folder.join("results.json"))?;
+    let mut text = format!("{shown}: a fit\n\n");
+    let mut line = |key: &str, value: String| text += &format!("{key:<16}{value}\n");
+    line("title", string(&table, &["title"]));
+    line("data", data(&table));
+    line("representation", string(&table, &["representation", "kind"]));
+    line("steps", steps(&table, log.as_ref(), results.is_some()));
+    for (key, value) in results.iter().flatten().filter(|(key, _)| *key != "steps") {
+        line(key, short(value));
+    }
+    if results.is_none() {
+        line("results", "none yet: the run has not ended".to_owned());
+    }
+    Ok(text + &files(folder)?)
+}
+
+fn string(table: &Table, keys: &[&str]) -> String {
+    let (last, parents) = keys.split_last().unwrap_or((&"", &[]));
+    let inner = parents.iter().try_fold(table, |table, key| table.get(*key)?.as_table());
+    let value = inner.and_then(|table| table.get(*last));
+    value.map_or("not told".to_owned(), |value| match value.as_str() {
+        Some(text) => text.to_owned(),
+        None => value.to_string(),
+    })
+}
+
+fn data(table: &Table) -> String {
+    let file = ["visibilities", "movie"].into_iter().find_map(|kind| {
+        let path = table.get("data")?.get(kind)?.get("path")?;
+        Some(format!("{kind} of {}", path.as_str().unwrap_or_default()))
+    });
+    let simulated = || match table.get("observation").and_then(|seen| seen.get("array")) {
+        Some(array) => format!("simulated, seen by {}", array.as_str().unwrap_or_default()),
+        None => "simulated images".to_owned(),
+    };
+    file.unwrap_or_else(simulated)
+}
+
+/// The last whole line of the log.
+fn log(path: &Path) -> anyhow::Result<Option<Value>> {
+    if !path.exists() {
+        return Ok(None);
+    }
+    let text = output::read_log(path)?;
+    Ok(text.lines().rev().find_map(|line| serde_json::from_str(line).ok()))
+}
+
+fn results(path: &Path) -> anyhow::Result<Option<serde_json::Map<String, Value>>> {
+    if !path.exists() {
+        return Ok(None);
+    }
+    let name = || format!("{} holds no results of a fit", path.display());
+    serde_json::from_str(&output::read_text(path)?).map(Some).with_context(name)
+}
+
+fn steps(table: &Table, log: Option<&Value>, ended: bool) -> String {
+    let asked = string(table, &["training", "steps"]);
+    let done = log.and_then(|line| line["step"].as_u64());
+    match (done, ended) {
+        (Some(done), true) => format!("{done} of {asked}"),
+        (Some(done), false) => format!("{done} of {asked}, as far as the log tells"),
+        (None, _) => format!("none logged, of {asked}"),
+    }
+}
+
+/// A value in one line; long lists are not shown.
+fn short(value: &Value) -> String {
+    let text = match value {
+        Value::String(text) => text.clone(),
+        other => other.to_string(),
+    };
+    let mut start: String = text.chars().take(100).collect();
+    if start.len() < text.len() {
+        start += " …";
+    }
+    start
+}
+
+fn files(folder: &Path) -> anyhow::Result<String> {
+    let name = || format!("cannot read {}", folder.display());
+    let mut lines = Vec::new();
+    for entry in std::fs::read_dir(folder).with_context(name)? {
+        let entry = entry.with_context(name)?;
+        let size = entry.metadata().with_context(name)?.len();
+        lines.push(format!("{:<28}{size:>12} bytes\n", entry.file_name().to_string_lossy()));
+    }
+    lines.sort();
+    Ok(format!("\n{}", lines.concat()))
+}

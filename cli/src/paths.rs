@@ -1,0 +1,89 @@
+//! Paths in settings that are given on the command line start from the current folder; those in a file
+//! start from the file's.
+
+use anyhow::Context;
+use std::path::Path;
+use toml::{Table, Value};
+
+/// An assignment `key.path=value` whose relative paths start from the current folder, as one for settings
+/// whose paths start from `folder` (from the root without one). Everything else stays as it is.
+pub fn from_here(assignment: &str, folder: Option<&Path>) -> anyhow::Result<String> {
+    let Some((keys, text)) = assignment.split_once('=') else { return Ok(assignment.to_owned()) };
+    let text = text.trim();
+    let parsed = format!("value = {text}").parse::<Table>().ok();
+    let parsed = parsed.and_then(|mut table| table.remove("value"));
+    let mut value = parsed.unwrap_or_else(|| Value::String(text.to_owned()));
+    let before = value.clone();
+    let key = keys.trim().rsplit('.').next().unwrap_or_default();
+    let here = std::path::absolute(".").context("the current folder")?;
+    let folder = folder.map(|folder| here.join(folder));
+    move_paths(key.trim(), &mut value, &|path| moved(path, &here, folder.as_deref()));
+    Ok(if value == before { assignment.to_owned() } else { format!("{keys}={value}") })
+}
+
+/// Makes the paths in a table start from the root.
+pub fn anchor(table: &mut Table, folder: &Path) {
+    for (key, value) in table.iter_mut() {
+        move_paths(key, value, &|path| folder.join(path).display().to_string());
+    }
+}
+
+/// Keys that name files.
+fn is_path(key: &str, value: &str) -> bool {
+    let is_array =
+        key == "array" && kerrlight_tomo::interferometry::array::built_in(value).is_none();
+    key == "path" || is_array
+}
+
+fn move_paths(key: &str, value: &mut Value, moved: &dyn Fn(&str) -> String) {
+    match value {
+        Value::String(path) if !path.is_empty() && is_path(key, path) => *path = moved(path),
+        Value::Table(table) => {
+            table.iter_mut().for_each(|(key, value)| move_paths(key, value, moved));
+        }
+        Value::Array(values) => {
+            values.iter_mut().for_each(|value| move_paths(key, value, moved));
+        }
+        _ => {}
+    }
+}
+
+/// A path from `here` as one from `folder`: short where the file lies below it.
+fn moved(path: &str, here: &Path, folder: Option<&Path>) -> String {
+    if Path::new(path).is_absolute() {
+        return path.to_owned();
+    }
+    let full = here.join(path);
+    let below = folder.and_then(|folder| full.strip_prefix(folder).ok());
+    below.unwrap_or(&full).display().to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exact_paths_start_from_the_current_folder() {
+        let here = std::path::absolute(".").unwrap();
+        let of = |assignment: &str, folder: &str| {
+            from_here(assignment, Some(Path::new(folder))).unwrap()
+        };
+        // Below the file's folder, beside it, and in it.
+        assert_eq!(of("sky.image.path=a/b.png", "a"), "sky.image.path=\"b.png\"");
+        let full = here.join("b.png").display().to_string();
+        assert_eq!(of("data.movie.path=b.png", "a"), format!("data.movie.path=\"{full}\""));
+        assert_eq!(of("mesh.0.path=b.obj", "."), "mesh.0.path=b.obj");
+        assert_eq!(of("mesh.0.path=b.obj", ""), "mesh.0.path=b.obj");
+        assert_eq!(of("mesh.0.path=/b.obj", "a"), "mesh.0.path=/b.obj");
+        let table = of("data={visibilities={path=\"a/b.txt\", average_s=1.0}}", "a");
+        assert!(table.contains("path = \"b.txt\"") && table.contains("average_s"), "{table}");
+        // Names of arrays are no paths, other settings are nothing of the kind.
+        assert_eq!(of("observation.array=ngEHT", "a"), "observation.array=ngEHT");
+        assert_eq!(of("observation.array=a/b.txt", "a"), "observation.array=\"b.txt\"");
+        assert_eq!(of("hole.spin=0.5", "a"), "hole.spin=0.5");
+        assert_eq!(of("sky.image.path=", "a"), "sky.image.path=");
+        assert_eq!(of("nonsense", "a"), "nonsense");
+        let whole = from_here("mesh.0.path=b.png", None).unwrap();
+        assert_eq!(whole, format!("mesh.0.path=\"{full}\""));
+    }
+}
