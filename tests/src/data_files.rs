@@ -193,7 +193,7 @@ fn exact_single_scans_and_tables_are_fitted() {
     let csv = files::to_eht_table(&data, EhtTable::Csv).unwrap();
     assert_eq!(of("data.csv", csv.as_bytes()), Ok(()));
     let mut lines: Vec<String> = csv.lines().map(str::to_owned).collect();
-    lines[4] = lines[4].replacen(",0.8", ",nan", 1);
+    lines[4] = lines[4].replacen(",0.80000000", ",nan", 1);
     assert!(lines[4].contains("nan"), "{}", lines[4]);
     assert_eq!(of("nan.csv", lines.join("\n").as_bytes()), Ok(()));
     data.rows.retain(|row| row.time_h == first);
