@@ -261,7 +261,7 @@ fn exact_paths_start_where_they_are_given() {
     };
     assert!(render(".", "scenes/sky.toml", "sky.image.path=skies/sky.png"));
     assert!(render("below", "../scenes/sky.toml", "sky.image.path=../skies/sky.png"));
-    assert!(render("skies", "../scenes/sky.toml", "sky={image={path=\"sky.png\"}}"));
+    assert!(render("skies", "../scenes/sky.toml", "sky={image={path=\"sky.png\",brightness=1.0}}"));
     assert!(!render(".", "scenes/sky.toml", "sky.image.path=../skies/sky.png"));
     std::fs::copy(path.join("skies/sky.png"), path.join("scenes/graticule.png")).unwrap();
     assert!(render(".", "scenes/sky.toml", "screen.samples_per_pixel=1"), "the file's own path");
