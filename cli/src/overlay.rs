@@ -8,7 +8,6 @@ use kerrlight_tomo::image::canvas::Canvas;
 use kerrlight_tomo::image::preview::{self, Look};
 use kerrlight_tomo::image::{overlay, ticks};
 use kerrlight_tomo::scene::Scene;
-use kerrlight_tomo::units::gravitational_angle;
 
 /// Options of what is drawn over a picture.
 #[derive(Debug, Args)]
@@ -75,7 +74,7 @@ impl OverlayOptions {
         }
         let mut canvas = Canvas::of(&drawn).context("the picture is too large to draw on")?;
         // The last boxes of a reduced picture may be cut: the field ends within their pixels.
-        let size = [scene.screen.width, scene.screen.height].map(|n| f64::from(n) / reduced as f64);
+        let size = [scene.screen.width, scene.screen.rows()].map(|n| f64::from(n) / reduced as f64);
         let pixel = scene.pixel_size() * reduced as f64;
         if self.critical_curve {
             let curve = [scene.hole.spin, scene.observer.inclination_deg];
@@ -88,10 +87,9 @@ impl OverlayOptions {
             ticks::draw(&mut canvas, &found, longest);
         }
         if self.scale_bar {
-            let hole = &scene.hole;
-            let angle = gravitational_angle(hole.mass_msun, hole.distance_kpc);
             let far = scene.observer.radius.is_infinite();
-            overlay::scale_bar(&mut canvas, size, pixel, far.then_some(angle));
+            let angle = scene.hole.angle_uas().filter(|_| far);
+            overlay::scale_bar(&mut canvas, size, pixel, angle);
         }
         Ok(canvas.into_picture())
     }

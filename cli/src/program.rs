@@ -30,7 +30,14 @@ impl OwnSettings {
     /// # Errors
     /// If it is missing, no number, or out of range.
     pub fn number(&self, key: &str, allowed: RangeInclusive<f64>) -> anyhow::Result<f64> {
-        let missing = || anyhow!("representation.own.{key} is missing: a number is needed");
+        let missing = || {
+            anyhow!(
+                "representation.own.{key} is missing: add `own = {{ {key} = … }}`, a number from {} to {}, to \
+                 [representation]",
+                allowed.start(),
+                allowed.end()
+            )
+        };
         let value = self.table.get(key).ok_or_else(missing)?;
         let number = value.as_float().or(value.as_integer().map(|n| n as f64));
         let (low, high) = (allowed.start(), allowed.end());
@@ -92,5 +99,5 @@ pub fn own(name: &str, settings: &OwnSettings) -> anyhow::Result<Box<dyn Represe
         return build(settings);
     }
     let own: String = all.iter().map(|(name, _)| format!(", {name}")).collect();
-    bail!("representation.kind = {name:?} is not allowed: bhnerf, mlp4d, grid, linear-grid{own}")
+    bail!("representation.kind = {name:?} is not allowed: {}{own}", crate::fit::representations())
 }

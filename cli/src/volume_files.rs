@@ -137,12 +137,12 @@ fn encode(file: &VolumeFile) -> anyhow::Result<Vec<u8>> {
     Ok(archive.finish()?.into_inner())
 }
 
-/// The bytes of an NPZ archive of movies of one shape (frames, rows from the top, columns), with the times of
-/// the frames.
+/// The bytes of an NPZ archive of movies of one shape (frames, rows from the top, columns), with lists of numbers
+/// such as the times of the frames.
 pub fn movie_archive(
     shape: [usize; 3],
     movies: &[(&str, Vec<f32>)],
-    times: &[f64],
+    lists: &[(&str, Vec<f64>)],
 ) -> anyhow::Result<Vec<u8>> {
     let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
     let options = zip::write::SimpleFileOptions::default();
@@ -153,7 +153,9 @@ pub fn movie_archive(
     for (name, movie) in movies {
         member(name, npy(&shape.map(|n| n as u64), movie.iter().copied())?)?;
     }
-    member("time", npy(&[times.len() as u64], times.iter().copied())?)?;
+    for (name, list) in lists {
+        member(name, npy(&[list.len() as u64], list.iter().copied())?)?;
+    }
     Ok(archive.finish()?.into_inner())
 }
 
@@ -184,6 +186,7 @@ mod tests {
             rotation: Rotation::Keplerian,
             reference_time: Some(0.0),
             injection_time: None,
+            region: None,
             color: [1.0; 3],
         }
     }

@@ -238,7 +238,7 @@ fn images(scene: &Scene, stars: &[([f64; 3], f64)]) -> Vec<Image> {
     let hole = Kerr::new(scene.hole.spin).unwrap();
     let config = scene.camera.as_ref().unwrap();
     let camera = config.camera(&hole, scene.observer.time).unwrap();
-    let (width, height) = (scene.screen.width as usize, scene.screen.height as usize);
+    let (width, height) = (scene.screen.width as usize, scene.screen.rows() as usize);
     let size = scene.pixel_size();
     let middle = [0.5 * width as f64, 0.5 * height as f64];
     let beams = |places: &[Plane]| {

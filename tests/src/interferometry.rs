@@ -241,7 +241,7 @@ fn exact_sequences_of_pictures() {
     std::fs::create_dir(path.join("frames")).unwrap();
     let text = std::fs::read_to_string(path.join("scene.toml")).unwrap();
     let scene = kerrlight_tomo::scene::Scene::parse(&text).unwrap();
-    let seconds = kerrlight_tomo::units::gravitational_time(scene.hole.mass_msun);
+    let seconds = scene.hole.seconds().unwrap();
     for k in 0..3 {
         let time = scene.observer.time + f64::from(k) * 600.0 / seconds;
         let (set, name) = (format!("observer.time={time}"), format!("frames/f_{:03}.exr", 9 + k));

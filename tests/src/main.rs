@@ -14,6 +14,7 @@ mod eht_data;
 mod film;
 mod fit;
 mod fit_bad_luck;
+mod fit_start;
 mod fit_without_phases;
 mod fuzz_corpus;
 mod interferometry;
@@ -21,6 +22,7 @@ mod kerr_references;
 mod lensing;
 mod pictures;
 mod radiative_transfer;
+mod readme;
 mod resume;
 mod resumed_fits;
 #[cfg(unix)]

@@ -49,7 +49,7 @@ impl Film {
             return 1;
         }
         let screen = &self.raster.scene().screen;
-        let pixels = screen.width as usize * screen.height as usize;
+        let pixels = screen.width as usize * screen.rows() as usize;
         (MOST_VALUES / (pixels * self.names().len().max(1))).clamp(1, MOST_FRAMES)
     }
 

@@ -41,7 +41,9 @@ pub struct Measured {
 pub fn measure(file: &FitFile, instrument: &Instrument, folder: &Path) -> anyhow::Result<Measured> {
     match (&file.data, &file.truth) {
         (Some(_), Some(_)) => bail!("truth and data exclude each other: simulate, or read"),
-        (None, None) => bail!("there is neither truth (to simulate) nor data (to read)"),
+        (None, None) => {
+            bail!("there is neither truth (to simulate) nor data (to read): {SPOT}; or {FILE}")
+        }
         (Some(_), None) if !file.world.is_empty() => {
             bail!("world is for simulated data: there is no truth")
         }
@@ -56,7 +58,12 @@ pub fn measure(file: &FitFile, instrument: &Instrument, folder: &Path) -> anyhow
 }
 
 fn frames(file: &FitFile) -> anyhow::Result<Vec<f64>> {
-    let missing = || anyhow!("movie is missing: frames of images need times");
+    let missing = || {
+        anyhow!(
+            "movie is missing: frames of images need times; add a table [movie] with `frames = …`, their number, and \
+             `from = …` and `to = …`, the times of the first and the last in M"
+        )
+    };
     let movie = file.movie.as_ref().ok_or_else(missing)?;
     let n = movie.frames;
     if !(1..=100_000).contains(&n) {
@@ -96,7 +103,13 @@ fn simulate(file: &FitFile, instrument: &Instrument, folder: &Path) -> anyhow::R
     let (clock, hours) = match (seen.utc, seen.gmst) {
         (Some(hours), None) => (Clock::Utc, hours),
         (None, Some(hours)) => (Clock::Gmst, hours),
-        _ => bail!("observation needs utc or gmst, not both"),
+        (Some(_), Some(_)) => bail!(
+            "observation.gmst is not allowed: observation.utc is given too, and one is enough"
+        ),
+        (None, None) => bail!(
+            "observation.utc is missing: give `utc = [FROM, TO]`, hours of UTC of the first scan and of one after the last, \
+             or `gmst = [FROM, TO]`, the same in sidereal time, in [observation]"
+        ),
     };
     let schedule =
         Schedule { mjd: seen.mjd, clock, start_h: hours[0], stop_h: hours[1], scans: seen.scans };
@@ -244,7 +257,10 @@ impl Measured {
     pub fn terms(&self, losses: &[Loss], pixels: usize) -> anyhow::Result<Data<f32>> {
         let mut data = Data { image: None, others: Vec::new() };
         if losses.is_empty() {
-            bail!("loss is empty: there is nothing to fit");
+            bail!(
+                "loss is empty: there is nothing to fit; add a table [[loss]] with `data = …` ({}) and `weight = 1.0`",
+                super::words::all::<LossKind>()
+            );
         }
         for (k, loss) in losses.iter().enumerate() {
             let name = || format!("loss {k}");
@@ -278,14 +294,17 @@ impl Measured {
     }
 
     fn image(&self, loss: &Loss, pixels: usize) -> anyhow::Result<ImageTerm<f32>> {
-        let sigma = loss.sigma.ok_or_else(|| anyhow!("sigma of a pixel is missing"))?;
+        let sigma = loss.sigma.ok_or_else(|| anyhow!("sigma is missing: give `sigma = …`, the standard deviation of a pixel in Jy, beside `data = \"image\"`"))?;
         let movie = self.movie()?.iter().map(|x| *x as f32).collect();
         Ok(ImageTerm::new(movie, pixels, sigma)?)
     }
 
     fn other(&self, loss: &Loss, pixels: usize) -> anyhow::Result<Box<dyn FrameTerm<f32>>> {
         if loss.data == LossKind::LightCurve {
-            let sigma = loss.sigma.ok_or_else(|| anyhow!("sigma of the flux is missing"))?;
+            let sigma = loss.sigma.ok_or_else(|| anyhow!(
+                    "sigma is missing: give `sigma = …`, the standard deviation of the total flux in Jy, beside \
+                     `data = \"light-curve\"`"
+                ))?;
             let flux: Vec<f64> = self.fluxes()?;
             let sigmas = vec![sigma; flux.len()];
             return Ok(Box::new(LightCurveTerm::new(flux, &sigmas, pixels)?));
@@ -306,7 +325,12 @@ impl Measured {
     }
 
     fn scan(&self, frame: usize, loss: &Loss) -> anyhow::Result<Option<Scan<f32>>> {
-        let missing = || anyhow!("there are no visibilities: observation or data is missing");
+        let missing = || {
+            anyhow!(
+                "there are no visibilities: give {FILE}, or a truth and an [observation] of it (`kerrlight fit --init` \
+                     writes an example)"
+            )
+        };
         let (observation, frames) = self.visibilities.as_ref().ok_or_else(missing)?;
         let sky = self.sky.ok_or_else(missing)?;
         let rows = observation.rows.iter().zip(frames).filter(|(_, of)| **of == frame);
@@ -335,6 +359,13 @@ impl Measured {
         Ok(Some(Scan { transform, term }))
     }
 }
+
+/// What to write where there is no truth.
+pub const SPOT: &str = "add a table [[truth.spot]] with `center = [x, y, z]` and `sigma = …` in M and `amplitude = 1.0`";
+
+/// What to write where there are no data.
+const FILE: &str = "a table [data.visibilities] or [data.movie] with `path = \"FILE\"` (`kerrlight fit --init FILE` writes \
+     all of it)";
 
 /// Exponentials of a frame up to this many bytes are kept.
 const MEMORY: usize = 8 << 20;

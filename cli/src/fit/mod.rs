@@ -6,6 +6,7 @@ mod curves;
 mod data;
 mod failed;
 mod folder;
+mod init;
 mod inputs;
 mod learning;
 mod linear;
@@ -31,6 +32,7 @@ pub use merge::merge;
 pub use seams::{assigned, check, coverage, sizes, turned, velocities};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+pub use words::representations;
 
 /// The experiment that runs without a file.
 const BUILT_IN: &str = include_str!("built_in.toml");
@@ -41,7 +43,8 @@ pub struct Fit {
     /// What to fit; without it a built-in experiment: a flare of Sgr A* seen by the ngEHT
     #[arg(value_name = "FIT.toml")]
     file: Option<PathBuf>,
-    /// Folder of the run, new or empty [default: kerrlight-fit, or -2, -3 …]
+    /// Folder of the run, new or empty [default: kerrlight-fit, or -2, -3 …]; with --init the file
+    /// [default: my_fit.toml]
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
     /// Change a setting, e.g. training.steps=500; `representation=grid` is short for
@@ -57,6 +60,10 @@ pub struct Fit {
     /// Stop, keeping what there is, when standard input ends: for programs that start fits
     #[arg(long, hide = true)]
     stop_with_input: bool,
+    /// Write a commented file to start from, for a fit of these data (visibilities or images), or of the built-in
+    /// experiment
+    #[arg(long, value_name = "DATA", num_args = 0..=1, conflicts_with_all = ["file", "set", "resume", "print"])]
+    init: Option<Option<PathBuf>>,
 }
 
 impl Fit {
@@ -64,6 +71,9 @@ impl Fit {
     pub fn run(&self) -> anyhow::Result<()> {
         if self.stop_with_input {
             interrupt::follow_parent();
+        }
+        if let Some(data) = &self.init {
+            return init::write(data.as_deref(), self.output.as_deref());
         }
         if let Some(path) = &self.resume {
             let (folder, text) = Folder::open(path, self.patience())?;
@@ -143,7 +153,7 @@ fn near_of(text: &str) -> PathBuf {
 }
 
 fn parse(text: &str) -> anyhow::Result<FitFile> {
-    let file = toml::from_str(text)?;
+    let file = toml::from_str(text).map_err(|error| init::explained(&error))?;
     config::check_ranges(text)?;
     Ok(file)
 }

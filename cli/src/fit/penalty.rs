@@ -66,7 +66,10 @@ impl Setting {
         }
         let get = |key: &str| {
             let found = given.iter().find(|(name, _)| *name == key).and_then(|(_, value)| *value);
-            found.ok_or_else(|| anyhow!("{key} is missing: {name} needs it"))
+            found.ok_or_else(|| anyhow!(
+                "{key} is missing: {name} needs it; give `{key} = …` beside `kind = \"{name}\"`: {}",
+                meaning(key)
+            ))
         };
         let regulariser = match kind {
             PenaltyKind::TotalVariation => Regulariser::TotalVariation { epsilon: get("epsilon")? },
@@ -77,6 +80,15 @@ impl Setting {
             }
         };
         Ok(Prior { regulariser: regulariser.checked()?, weight })
+    }
+}
+
+/// What a number of a penalty is.
+fn meaning(key: &str) -> &'static str {
+    match key {
+        "epsilon" => "the slope below which it is smoothed, emission per M, above 0",
+        "level" => "the emission where the penalty is 0, above 0",
+        _ => "the part of level below which it goes on as a parabola, above 0",
     }
 }
 
@@ -106,7 +118,10 @@ pub fn penalties(file: &FitFile) -> anyhow::Result<Option<Penalties>> {
     let probe = match (&file.representation.kind, file.probe) {
         (Kind::Grid | Kind::LinearGrid, _) => Probe::Fixed { nodes: file.representation.nodes },
         (_, Some(ProbeSetting { nodes })) => Probe::Moved { nodes },
-        (..) => bail!("probe.nodes is missing: regularisers look at a network at nodes of a grid"),
+        (..) => bail!(
+            "probe.nodes is missing: regularisers look at a network at nodes of a grid; add a table [probe] with \
+             `nodes = 32`, nodes along each axis, 4 to 256"
+        ),
     };
     Ok(Some(Penalties { priors, probe, region: setup::region(&file.region) }))
 }

@@ -11,7 +11,9 @@ use std::path::Path;
 /// Settings with one `key=value` changed; `representation=grid` is short for representation.kind=grid.
 pub fn assigned(text: &str, assignment: &str) -> anyhow::Result<String> {
     let long = match assignment.split_once('=') {
-        Some(("representation", kind)) => format!("representation.kind={kind}"),
+        Some(("representation", kind)) if !kind.trim_start().starts_with('{') => {
+            format!("representation.kind={kind}")
+        }
         _ => assignment.to_owned(),
     };
     apply_override(text, &long).with_context(|| format!("--set {assignment}"))

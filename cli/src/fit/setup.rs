@@ -3,7 +3,7 @@
 use super::config::{self, AxisSearch, FitFile, Nodes, Scan, Velocity, WidthOf};
 use anyhow::{Context, anyhow, bail};
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
-use kerrlight_tomo::dynamics::{AngularVelocity, Axis, Injection, Perturbation};
+use kerrlight_tomo::dynamics::{Axis, Injection};
 use kerrlight_tomo::fit::linear::Prior;
 use kerrlight_tomo::fit::{
     Motion, Redshift, Region, Regulariser, Sampling, SightlineRequest, Sightlines,
@@ -11,6 +11,7 @@ use kerrlight_tomo::fit::{
 use kerrlight_tomo::interferometry::operator::ImageGrid;
 use kerrlight_tomo::memory;
 use kerrlight_tomo::optimise::Polynomial;
+use kerrlight_tomo::scene;
 use kerrlight_tomo::units::{MICROARCSECOND, gravitational_angle, gravitational_time};
 
 /// What a fit looks through: the same for all data and representations.
@@ -164,14 +165,31 @@ pub fn sky(file: &FitFile) -> anyhow::Result<ImageGrid> {
         (None, Some(mass), Some(distance)) => {
             spacing(&file.screen)? * n as f64 * gravitational_angle(mass, distance)
         }
-        _ => bail!("visibilities need screen.field_uas, or hole.mass_msun and hole.distance_kpc"),
+        (None, None, _) => bail!("hole.mass_msun is missing: visibilities need angles; {MASS}"),
+        _ => bail!(
+            "hole.distance_kpc is missing: visibilities need angles; give `distance_kpc = …` in [hole], e.g. 8.178 for \
+             Sgr A*, 16800.0 for M87*, or `field_uas = …`, the width of the field on the sky, in [screen]"
+        ),
     };
     Ok(ImageGrid::new(n, n, field_uas * MICROARCSECOND)?)
 }
 
+/// What to write where the mass is missing.
+const MASS: &str =
+    "give `mass_msun = …`, in solar masses, in [hole], e.g. 4.154e6 for Sgr A*, 6.5e9 for M87*";
+
+/// What to write where the axis is missing.
+pub const AXIS: &str = "give `axis = [0.0, 0.0, 1.0]`, the direction that matter turns about right-handed (this one: \
+     the hole's), in [motion]";
+
+/// What to write where the linear problem is missing.
+const LINEAR: &str = "add a table [linear] with `upper = 3.0` (the largest emission that is allowed: a few times what \
+     you expect), `rounds = 4` and `iterations = 40`";
+
 /// Hours of one M.
 pub fn hours_per_m(file: &FitFile) -> anyhow::Result<f64> {
-    let missing = || anyhow!("hole.mass_msun is missing: times of an observation are hours");
+    let missing =
+        || anyhow!("hole.mass_msun is missing: times of an observation are hours; {MASS}");
     let mass = file.hole.mass_msun.ok_or_else(missing)?;
     if !(mass > 0.0 && mass.is_finite()) {
         bail!("hole.mass_msun = {mass} is not allowed: above 0");
@@ -181,8 +199,11 @@ pub fn hours_per_m(file: &FitFile) -> anyhow::Result<f64> {
 
 /// The linear problem's settings.
 pub fn linear(file: &FitFile) -> anyhow::Result<&config::Linear> {
-    let missing =
-        || anyhow!("linear is missing: linear-grid, a linear start and a scan of axes need it");
+    let missing = || {
+        anyhow!(
+            "linear is missing: linear-grid, a linear start and a scan of axes need it; {LINEAR}"
+        )
+    };
     let linear = file.linear.as_ref().ok_or_else(missing)?;
     if !(linear.upper > 0.0 && linear.upper.is_finite()) {
         bail!("linear.upper = {} is not allowed: above 0", linear.upper);
@@ -200,7 +221,7 @@ pub fn priors(linear: &config::Linear) -> Vec<Prior> {
 
 /// How matter turns, with the times of the frames in M.
 pub fn motion(file: &FitFile, times: Vec<f64>) -> anyhow::Result<Motion> {
-    let velocity = velocity(&file.motion.velocity, file.seed).context("motion.velocity")?;
+    let velocity = law(&file.motion.velocity, file.seed).angular().context("motion.velocity")?;
     Ok(Motion {
         velocity,
         reference: file.motion.reference_time,
@@ -209,19 +230,20 @@ pub fn motion(file: &FitFile, times: Vec<f64>) -> anyhow::Result<Motion> {
     })
 }
 
-fn velocity(chosen: &Velocity, seed: u64) -> anyhow::Result<AngularVelocity> {
-    let velocity = match chosen.clone() {
-        Velocity::Keplerian { drag } => AngularVelocity::Keplerian { drag },
+/// The law of the velocity, as scenes have it; what is drawn is drawn from `seed`.
+pub fn law(chosen: &Velocity, seed: u64) -> scene::Velocity {
+    match chosen.clone() {
+        Velocity::Keplerian { drag } => scene::Velocity::Keplerian { drag },
         Velocity::PowerLaw { radius, rate, exponent } => {
-            AngularVelocity::PowerLaw { radius, rate, exponent }
+            scene::Velocity::PowerLaw { radius, rate, exponent }
         }
-        Velocity::Table { radii, rates } => AngularVelocity::Table { radii, rates },
+        Velocity::Table { radii, rates } => scene::Velocity::Table { radii, rates },
         Velocity::Perturbed { of, deviation, correlation_length, radii } => {
-            let by = Perturbation { deviation, correlation_length, radii, rows: 100 };
-            velocity(&of, seed)?.perturbed(by, seed)?
+            let of = Box::new(law(&of, seed));
+            let by = scene::Perturbed { of, deviation, correlation_length, radii, seed };
+            scene::Velocity::Perturbed(by)
         }
-    };
-    Ok(velocity.checked()?)
+    }
 }
 
 /// The true or known axis.
@@ -233,7 +255,8 @@ pub fn known_axis(file: &FitFile) -> anyhow::Result<Option<Axis>> {
 pub fn axis(file: &FitFile) -> anyhow::Result<(Axis, Option<Polynomial>)> {
     match &file.axis {
         AxisSearch::Known {} => {
-            let missing = || anyhow!("motion.axis is missing: it is said to be known");
+            let missing =
+                || anyhow!("motion.axis is missing: [axis.known] says that it is known; {AXIS}");
             Ok((known_axis(file)?.ok_or_else(missing)?, None))
         }
         AxisSearch::From { start, rate, last_rate } => {

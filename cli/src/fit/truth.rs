@@ -19,10 +19,11 @@ pub struct Truth {
 impl Truth {
     /// Of settings that have a truth and an axis.
     pub fn new(file: &FitFile) -> anyhow::Result<Self> {
-        let missing = || anyhow!("there is no truth to simulate");
+        let missing =
+            || anyhow!("truth is missing: there is nothing to simulate; {}", super::data::SPOT);
         let truth = file.truth.as_ref().ok_or_else(missing)?;
         if truth.spot.is_empty() && truth.glyph.is_empty() {
-            bail!("truth is empty: give it a spot or a glyph");
+            bail!("truth is empty; {}", super::data::SPOT);
         }
         for (k, spot) in truth.spot.iter().enumerate() {
             let numbers = [spot.sigma, spot.amplitude, spot.wound_for];
@@ -31,7 +32,7 @@ impl Truth {
                 bail!("truth.spot {k}: finite numbers with sigma above 0 and amplitude 0 or above");
             }
         }
-        let missing = || anyhow!("motion.axis is missing: a simulation needs it");
+        let missing = || anyhow!("motion.axis is missing: a simulation needs it; {}", setup::AXIS);
         let axis = setup::known_axis(file)?.ok_or_else(missing)?;
         let glyph = |(k, of): (usize, &super::config::Glyph)| {
             let shape = GlyphShape {

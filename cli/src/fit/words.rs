@@ -2,6 +2,18 @@
 
 use super::config::{FitFile, Kind, LossKind};
 use super::unknowns;
+use clap::ValueEnum;
+
+/// All words that a setting may be, as they are written.
+pub fn all<T: ValueEnum>() -> String {
+    let words = T::value_variants().iter().filter_map(ValueEnum::to_possible_value);
+    words.map(|word| word.get_name().to_owned()).collect::<Vec<_>>().join(", ")
+}
+
+/// Kinds of representations that kerrlight has itself.
+pub fn representations() -> String {
+    all::<Kind>()
+}
 
 /// Kinds of data.
 pub fn data(kind: LossKind) -> &'static str {
@@ -45,5 +57,26 @@ pub fn described(file: &FitFile) -> &str {
             "values at the nodes of a grid that is carried along the orbits, as the solution of a convex problem"
         }
         Kind::Own(name) => name,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde::Serialize;
+
+    /// What messages list is what settings are read as.
+    #[test]
+    fn exact_words_are_those_of_the_settings() {
+        fn check<T: ValueEnum + Serialize>() {
+            for value in T::value_variants() {
+                let word = value.to_possible_value().unwrap();
+                let written = toml::Value::try_from(value.clone()).unwrap();
+                assert_eq!(written.as_str(), Some(word.get_name()));
+            }
+        }
+        check::<Kind>();
+        check::<LossKind>();
+        assert_eq!(representations(), "bhnerf, mlp4d, feature-grid, grid, linear-grid");
     }
 }

@@ -9,7 +9,7 @@ use kerrlight_tomo::interferometry::operator::ImageGrid;
 use kerrlight_tomo::interferometry::simulate::Movie;
 use kerrlight_tomo::memory;
 use kerrlight_tomo::scene::Scene;
-use kerrlight_tomo::units::{MICROARCSECOND, gravitational_angle, gravitational_time};
+use kerrlight_tomo::units::MICROARCSECOND;
 use std::path::Path;
 
 /// Numbers of a file before one knows how large they are on the sky: images of Jy/pixel.
@@ -182,31 +182,45 @@ fn numbers(file: npyz::NpyFile<&[u8]>) -> anyhow::Result<Vec<f64>> {
     }
 }
 
-/// The only array of an archive, or the one named `movie` or `image`; `times` are hours of UTC.
+/// The only array of an archive, or the one named `movie`, `image` or `recovered` (of a fit); `times` are hours of
+/// UTC, `hours` those since some moment, `field_uas` is the width of the field.
 fn npz_movie(bytes: &[u8]) -> anyhow::Result<Pixels> {
     let mut archive = npz::open(bytes)?;
     let names: Vec<String> = (0..archive.len())
         .map(|k| Ok(archive.by_index(k)?.name()?.into_owned()))
         .collect::<anyhow::Result<_>>()?;
-    let wanted = |name: &&String| matches!(name.as_str(), "movie.npy" | "image.npy");
-    let name = match (names.as_slice(), names.iter().find(wanted)) {
+    let there = |wanted: &str| names.iter().find(|name| *name == wanted);
+    let name = match (names.as_slice(), IMAGES.iter().find_map(|name| there(name))) {
         ([only], _) => only,
         (_, Some(name)) => name,
-        _ => bail!("holds {}: an array named movie or image is expected", names.join(", ")),
+        _ => bail!(
+            "holds {}: an array named movie, image or recovered is expected",
+            names.join(", ").replace(".npy", "")
+        ),
     };
     let mut member = |name: &str| -> anyhow::Result<Vec<u8>> {
         npz::member(&mut archive, name)?.with_context(|| format!("holds no {name}"))
     };
     let mut pixels = npy(&member(name)?).with_context(|| name.clone())?;
-    if name != TIMES && names.iter().any(|name| name == TIMES) {
-        let (_, times) = npy_array(&member(TIMES)?).context(TIMES)?;
-        pixels.times = OwnTimes::Utc(times);
+    let mut numbers = |of: &str| -> anyhow::Result<Option<Vec<f64>>> {
+        let bytes = there(of).filter(|of| *of != name).map(|of| member(of)).transpose()?;
+        Ok(bytes
+            .map(|bytes| npy_array(&bytes).context(of.to_owned()))
+            .transpose()?
+            .map(|(_, all)| all))
+    };
+    if let Some(hours) = numbers("hours.npy")? {
+        pixels.times = OwnTimes::Since(hours);
     }
+    if let Some(hours) = numbers("times.npy")? {
+        pixels.times = OwnTimes::Utc(hours);
+    }
+    pixels.field_uas = numbers("field_uas.npy")?.and_then(|all| all.first().copied());
     Ok(pixels)
 }
 
-/// The array of an archive that holds the hours of UTC of a movie's images.
-const TIMES: &str = "times.npy";
+/// Names of arrays that are images, the first that is there counts.
+const IMAGES: [&str; 3] = ["movie.npy", "image.npy", "recovered.npy"];
 
 /// The channel `intensity` of a picture. One in Jy/µas² knows its scale; others are taken as
 /// Jy/pixel if the field of view is given.
@@ -225,9 +239,10 @@ fn exr_picture(bytes: &[u8], fov_uas: Option<f64>) -> anyhow::Result<Pixels> {
         Some("Jy/uas^2") => {
             let scene = attribute("scene_resolved").context("holds no scene")?;
             let scene = Scene::parse(scene).context("scene in the EXR")?;
-            let angle = gravitational_angle(scene.hole.mass_msun, scene.hole.distance_kpc);
+            let angle = scene.hole.angle_uas().context("its scene has no mass or distance")?;
+            let seconds = scene.hole.seconds().context("its scene has no mass")?;
             let pixel_uas = scene.pixel_size() * angle;
-            let hours = scene.observer.time * gravitational_time(scene.hole.mass_msun) / 3600.0;
+            let hours = scene.observer.time * seconds / 3600.0;
             let field_uas = Some(pixel_uas * width as f64);
             let times = OwnTimes::Since(vec![hours]);
             Ok(Pixels { field_uas, times, ..in_pixels(pixel_uas * pixel_uas) })

@@ -9,7 +9,7 @@ use kerrlight_tomo::interferometry::simulate::Movie;
 use kerrlight_tomo::memory;
 use kerrlight_tomo::render::render;
 use kerrlight_tomo::scene::Scene;
-use kerrlight_tomo::units::{MICROARCSECOND, gravitational_angle, gravitational_time};
+use kerrlight_tomo::units::MICROARCSECOND;
 use std::path::Path;
 
 /// Renders a scene at `times_h` (hours), the first being the scene's own time of observation.
@@ -18,17 +18,22 @@ pub fn read(path: &Path, times_h: &[f64]) -> anyhow::Result<Movie> {
     let name = || path.display().to_string();
     let mut scene = Scene::parse(&output::read_text(path)?).with_context(name)?;
     if scene.screen.total_flux_jy.is_none() {
-        bail!("{}: `screen.total_flux_jy` is missing: what is observed is in Jy", name());
+        bail!(
+            "{}: `screen.total_flux_jy` is missing: what is observed is in Jy; give `total_flux_jy = …`, the flux \
+             density of the first scan, in [screen]",
+            name()
+        );
     }
     if scene.sky.is_some() {
         bail!("{}: a sky has no flux in Jy: remove `sky`", name());
     }
     let folder = path.parent().unwrap_or(Path::new("."));
     let assets = assets::load(&scene, folder, &[]).with_context(name)?.decoded;
-    let hole = scene.hole.clone();
-    let seconds = gravitational_time(hole.mass_msun);
-    let pixel_uas = scene.pixel_size() * gravitational_angle(hole.mass_msun, hole.distance_kpc);
-    let (width, height) = (scene.screen.width as usize, scene.screen.height as usize);
+    // A scene with a flux in Jy has both.
+    let seconds = scene.hole.seconds().context("`hole.mass_msun` is missing")?;
+    let angle = scene.hole.angle_uas().context("`hole.distance_kpc` is missing")?;
+    let pixel_uas = scene.pixel_size() * angle;
+    let (width, height) = (scene.screen.width as usize, scene.screen.rows() as usize);
     let field_rad = pixel_uas * width as f64 * MICROARCSECOND;
     let grid = ImageGrid::new(width, height, field_rad).with_context(name)?;
     let frames = if scene.changes() { times_h } else { &times_h[..1] };

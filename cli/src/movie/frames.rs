@@ -8,7 +8,6 @@ use kerrlight_tomo::image::Picture;
 use kerrlight_tomo::image::exr::{self, Attributes};
 use kerrlight_tomo::render::Rendered;
 use kerrlight_tomo::scene::{Scene, SceneError, apply_override};
-use kerrlight_tomo::units::gravitational_time;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
@@ -134,7 +133,7 @@ impl Sequence {
 
     /// Rows of a frame.
     pub fn height(&self) -> usize {
-        self.plans.first().map_or(0, |plan| plan.scene.screen.height as usize)
+        self.plans.first().map_or(0, |plan| plan.scene.screen.rows() as usize)
     }
 
     /// Time of a frame in M.
@@ -186,7 +185,7 @@ impl Sequence {
     /// What decides a frame.
     fn settings(&self, k: usize) -> Attributes {
         let scene = &self.plans[k].scene;
-        let seconds = scene.observer.time * gravitational_time(scene.hole.mass_msun);
+        let minutes = scene.hole.seconds().map(|unit| scene.observer.time * unit / 60.0);
         let entry = |name: &str, value: String| (name.to_owned(), value);
         let mut settings = Attributes::from([
             entry("version", env!("CARGO_PKG_VERSION").to_owned()),
@@ -194,8 +193,8 @@ impl Sequence {
             entry("frame", k.to_string()),
             entry("frames", self.plans.len().to_string()),
             entry("frame_time_m", scene.observer.time.to_string()),
-            entry("frame_time_min", (seconds / 60.0).to_string()),
         ]);
+        settings.extend(minutes.map(|minutes| entry("frame_time_min", minutes.to_string())));
         if !self.files.is_empty() {
             settings.insert("frame_files".to_owned(), self.files.clone());
         }

@@ -49,7 +49,7 @@ pub struct Movie {
 
 /// Refuses frames that there is no memory for.
 fn afford(film: &Film, scene: &Scene) -> anyhow::Result<()> {
-    let (width, height) = (scene.screen.width, scene.screen.height);
+    let (width, height) = (scene.screen.width, scene.screen.rows());
     let (count, channels) = (film.batch(), film.names().len());
     let what = || format!("{count} frames at once of {width} x {height} pixels");
     let pixels = f64::from(width) * f64::from(height);

@@ -1,9 +1,8 @@
 //! When the frames of a film are.
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use clap::Args;
 use kerrlight_tomo::scene::Scene;
-use kerrlight_tomo::units::gravitational_time;
 use std::fmt;
 use std::str::FromStr;
 
@@ -56,9 +55,13 @@ impl fmt::Display for Moment {
 }
 
 impl Moment {
-    fn in_m(self, scene: &Scene) -> f64 {
-        let second = 1.0 / gravitational_time(scene.hole.mass_msun);
-        self.unit.map_or(self.value, |unit| self.value * unit * second)
+    fn in_m(self, scene: &Scene) -> anyhow::Result<f64> {
+        let Some(unit) = self.unit else { return Ok(self.value) };
+        let seconds = scene.hole.seconds().context(
+            "`hole.mass_msun` is missing: times in s, min or h need it; give times in M, or \
+             `mass_msun = …` in [hole]",
+        )?;
+        Ok(self.value * unit / seconds)
     }
 }
 
@@ -69,7 +72,7 @@ impl Span {
         let count = (0..frames).map(f64::from);
         match (self.duration, self.from, self.to) {
             (Some(duration), _, _) => {
-                let (start, length) = (scene.observer.time, duration.in_m(scene));
+                let (start, length) = (scene.observer.time, duration.in_m(scene)?);
                 if length <= 0.0 {
                     bail!("--duration {duration} is not allowed: a time above 0");
                 }
@@ -79,7 +82,7 @@ impl Span {
                 if frames < 2 {
                     bail!("--frames {frames} is not allowed with --from and --to: 2 or more");
                 }
-                let (start, end) = (from.in_m(scene), to.in_m(scene));
+                let (start, end) = (from.in_m(scene)?, to.in_m(scene)?);
                 if end <= start {
                     bail!("--to {to} is not allowed: later than --from {from}");
                 }

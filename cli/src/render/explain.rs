@@ -15,7 +15,7 @@ const ENOUGH: Duration = Duration::from_millis(500);
 pub fn before(scene: &Scene, raster: &Raster) -> Result<(), RenderError> {
     let screen = &scene.screen;
     let grid =
-        f64::from(screen.width) * f64::from(screen.height) * f64::from(screen.samples_per_pixel);
+        f64::from(screen.width) * f64::from(screen.rows()) * f64::from(screen.samples_per_pixel);
     let rings = raster.ring_rays() as f64;
     let rays = grid + rings;
     let (trial, tried) = trial(raster)?;

@@ -80,7 +80,7 @@ impl PreviewOptions {
 
 /// Makes the picture small enough for a PNG with the channels `wanted`.
 pub fn reduction(scene: &Scene, names: &[&str], wanted: &[&str]) -> Reduction {
-    let (width, height) = (scene.screen.width as usize, scene.screen.height as usize);
+    let (width, height) = (scene.screen.width as usize, scene.screen.rows() as usize);
     let reduction = Reduction::new(width, height, names, wanted, MOST_PIXELS);
     if reduction.factor() > 1 {
         let factor = reduction.factor();
@@ -91,7 +91,7 @@ pub fn reduction(scene: &Scene, names: &[&str], wanted: &[&str]) -> Reduction {
 
 /// Refuses a contact sheet of a picture that a PNG cannot show pixel by pixel.
 pub fn check_sheet(scene: &Scene) -> anyhow::Result<()> {
-    let (width, height) = (scene.screen.width, scene.screen.height);
+    let (width, height) = (scene.screen.width, scene.screen.rows());
     if u64::from(width) * u64::from(height) > MOST_PIXELS as u64 {
         bail!(
             "--sheet: {width} x {height} pixels are too many, at most {MOST_PIXELS} (4096 x 4096)"

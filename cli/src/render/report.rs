@@ -37,10 +37,10 @@ pub fn print(scene: &Scene, summary: &Summary, seconds: f64) {
     eprintln!(
         "{} x {} pixels, {rays} rays in {seconds:.2} s ({:.0} rays/s)",
         screen.width,
-        screen.height,
+        screen.rows(),
         rays as f64 / seconds.max(1e-9)
     );
-    let pixels = f64::from(screen.width) * f64::from(screen.height);
+    let pixels = f64::from(screen.width) * f64::from(screen.rows());
     let Summary { flux, flux_error, flux_unit, .. } = summary;
     if *flux > 0.0 {
         let shown =

@@ -4,7 +4,7 @@
 use super::occupied::Occupied;
 use super::spot::rotate;
 use crate::dynamics::{AngularVelocity, Axis, Injection};
-use crate::scene::{Rotation, VolumeSource};
+use crate::scene::{Rotation, VolumeRegion, VolumeSource};
 use crate::transport::{Emission, Grain, Medium, Moment, Needs, Part, Stretch};
 use crate::volume::{Volume, VolumeFile};
 use kerrlight_geodesic::bundle::RayNodes;
@@ -23,6 +23,8 @@ pub struct VolumeModel {
     rotation: Option<AngularVelocity>,
     reference: f64,
     injection: Option<Injection>,
+    /// `None`: it shines wherever the file has light.
+    region: Option<VolumeRegion>,
     /// Spectral index, if redshift is simulated.
     redshift: Option<f64>,
     slow_light: bool,
@@ -61,13 +63,10 @@ impl VolumeModel {
             factor: source.factor,
             largest: source.factor * largest,
             axis: axis.vector(),
-            rotation: source
-                .rotation
-                .about(hole, axis)
-                .map(AngularVelocity::checked)
-                .transpose()?,
+            rotation: source.rotation.about(hole, axis)?,
             reference: source.reference_time.unwrap_or(0.0),
             injection: source.injection_time.map(|time| Injection { time }),
+            region: source.region,
             redshift,
             slow_light,
             occupied: Occupied::new(&file.volume, axis.vector()),
@@ -123,6 +122,9 @@ impl VolumeModel {
         }
         let n = direction(u, nodes.azimuth[k]);
         let x = n.map(|c| r * c);
+        if self.region.is_some_and(|region| !region.holds(x[2], r)) {
+            return None;
+        }
         // No delays are asked for where nothing changes.
         let delay = nodes.delay.get(k).filter(|_| moment.slow_light).copied().unwrap_or(0.0);
         let time = moment.observed - delay;
@@ -152,11 +154,13 @@ impl Medium for VolumeModel {
 
     fn sphere(&self) -> f64 {
         // Somewhere outside of the horizon even where all is inside.
-        self.occupied.radii[1].max(1.01 * self.hole.horizon())
+        let outer = self.region.map_or(f64::INFINITY, |region| region.r_max);
+        self.occupied.radii[1].min(outer).max(1.01 * self.hole.horizon())
     }
 
     fn grain(&self) -> Option<Grain> {
-        Some(Grain { size: self.volume.finest(), inner: self.occupied.radii[0] })
+        let inner = self.region.map_or(0.0, |region| region.r_min);
+        Some(Grain { size: self.volume.finest(), inner: self.occupied.radii[0].max(inner) })
     }
 
     fn needs(&self) -> Needs {

@@ -18,7 +18,7 @@ impl Grid {
     pub fn new(scene: &Scene) -> Self {
         Grid {
             width: scene.screen.width as usize,
-            height: scene.screen.height as usize,
+            height: scene.screen.rows() as usize,
             size: scene.pixel_size(),
             side: scene.screen.samples_per_pixel.isqrt() as usize,
         }

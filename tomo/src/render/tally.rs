@@ -3,7 +3,7 @@
 use super::RenderError;
 use super::pixels::Pixel;
 use crate::scene::Scene;
-use crate::units::{JY_PER_SQUARE_UAS, MICROARCSECOND, gravitational_angle};
+use crate::units::{JY_PER_SQUARE_UAS, MICROARCSECOND};
 
 /// Sums over pixels; intensities in the scene's unit.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -154,7 +154,7 @@ impl Summary {
             return Err(RenderError::NotFinite { channel: "intensity" });
         }
         let area = pixel_area(scene);
-        let pixels = f64::from(scene.screen.width) * f64::from(scene.screen.height);
+        let pixels = f64::from(scene.screen.width) * f64::from(scene.screen.rows());
         let dark = tally.unresolved as f64 * pixels / (tally.rays as f64).max(1.0) * tally.largest;
         let relative = scene.tracer.tolerance + f64::from(f32::EPSILON);
         let error = tally.error + dark + relative * tally.intensity;
@@ -166,7 +166,11 @@ impl Summary {
             intensity_unit: if jansky { "Jy/uas^2" } else { "scene unit" },
             flux: tally.intensity * area * factor,
             flux_error: error * area * factor,
-            flux_unit: if jansky { "Jy" } else { "scene unit uas^2" },
+            flux_unit: match (jansky, pixel_angle(scene)) {
+                (true, _) => "Jy",
+                (false, Some(_)) => "scene unit uas^2",
+                (false, None) => "scene unit M^2",
+            },
             image_error: if tally.intensity > 0.0 { error / tally.intensity } else { 0.0 },
         })
     }
@@ -178,12 +182,13 @@ pub(super) fn own_unit(scene: &Scene) -> f64 {
     if scene.gas.is_some() { JY_PER_SQUARE_UAS } else { 1.0 }
 }
 
-/// Of a pixel, in µas²; a camera's in the middle of the picture.
+/// The angle in µas of 1 M, or of 1 on a camera's picture plane; `None` where it is not known.
+fn pixel_angle(scene: &Scene) -> Option<f64> {
+    scene.camera.as_ref().map_or_else(|| scene.hole.angle_uas(), |_| Some(1.0 / MICROARCSECOND))
+}
+
+/// Of a pixel, in µas²; a camera's in the middle of the picture. In M² where the hole's angular size is not
+/// known, which a scene with a flux in Jy never leaves out.
 fn pixel_area(scene: &Scene) -> f64 {
-    let hole = &scene.hole;
-    let angle = match scene.camera {
-        Some(_) => 1.0 / MICROARCSECOND,
-        None => gravitational_angle(hole.mass_msun, hole.distance_kpc),
-    };
-    (scene.pixel_size() * angle).powi(2)
+    (scene.pixel_size() * pixel_angle(scene).unwrap_or(1.0)).powi(2)
 }

@@ -41,9 +41,7 @@ pub(super) fn check(scene: &Scene) -> Result<(), Invalid> {
 fn check_hole_and_observer(scene: &Scene) -> Result<(), Invalid> {
     let spin = scene.hole.spin;
     number("hole.spin", spin, (-1.0..=1.0).contains(&spin), "a number in [-1, 1]")?;
-    let (mass, distance) = (scene.hole.mass_msun, scene.hole.distance_kpc);
-    number("hole.mass_msun", mass, (1e-20..=1e15).contains(&mass), "1e-20 to 1e15 solar masses")?;
-    number("hole.distance_kpc", distance, (1e-9..=1e12).contains(&distance), "1e-9 to 1e12 kpc")?;
+    check_scales(scene)?;
     let observer = &scene.observer;
     let ok = observer.time.abs() <= 1e9;
     number("observer.time", observer.time, ok, "a time in [-1e9, 1e9] (M)")?;
@@ -69,6 +67,39 @@ fn check_hole_and_observer(scene: &Scene) -> Result<(), Invalid> {
     )
 }
 
+/// Mass and distance of the hole, and that they are given where anything depends on them.
+fn check_scales(scene: &Scene) -> Result<(), Invalid> {
+    let (hole, screen) = (&scene.hole, &scene.screen);
+    let on_sky = [
+        (screen.field_of_view_uas.is_some(), "screen.field_of_view_uas"),
+        (screen.total_flux_jy.is_some(), "screen.total_flux_jy"),
+    ];
+    let on_sky = || on_sky.iter().find_map(|(given, key)| given.then_some(*key));
+    let in_units = || scene.gas.is_some().then_some("[gas]");
+    let asks = on_sky().or_else(in_units);
+    let scales = [
+        ("mass_msun", hole.mass_msun, [1e-20, 1e15], "4.154e6", "mass in solar masses"),
+        ("distance_kpc", hole.distance_kpc, [1e-9, 1e12], "8.178", "distance in kpc"),
+    ];
+    for (name, value, [low, high], such_as, what) in scales {
+        let key = format!("hole.{name}");
+        match (value, asks) {
+            (Some(value), _) => {
+                let allowed = format!("{low:e} to {high:e}, the {what}");
+                number(key, value, (low..=high).contains(&value), &allowed)?;
+            }
+            (None, Some(asks)) => {
+                let why = format!(
+                    "{asks} needs the {what}; give `{name} = …` in [hole], e.g. {such_as} for Sgr A*"
+                );
+                return Err(Invalid::missing(key, why));
+            }
+            (None, None) => {}
+        }
+    }
+    Ok(())
+}
+
 fn check_screen(scene: &Scene) -> Result<(), Invalid> {
     let screen = &scene.screen;
     match (screen.field_of_view_m, screen.field_of_view_uas) {
@@ -84,7 +115,7 @@ fn check_screen(scene: &Scene) -> Result<(), Invalid> {
             return Err(Invalid::new("screen.field_of_view_uas", shown(angle), allowed));
         }
     }
-    for (key, size) in [("screen.width", screen.width), ("screen.height", screen.height)] {
+    for (key, size) in [("screen.width", screen.width), ("screen.height", screen.rows())] {
         if !(1..=16_384).contains(&size) {
             return Err(Invalid::new(key, size, "a whole number in [1, 16384]"));
         }
@@ -125,7 +156,7 @@ fn check_reach(scene: &Scene) -> Result<(), Invalid> {
         (Some(m), _) => ("screen.field_of_view_m", m),
         (None, angle) => ("screen.field_of_view_uas", angle.unwrap_or(f64::NAN)),
     };
-    let height = scene.pixel_size() * f64::from(scene.screen.height);
+    let height = scene.pixel_size() * f64::from(scene.screen.rows());
     let ok = m.max(height) <= 1e7 && m.min(height) >= 1e-9;
     number(key, given, ok, "a field between 1e-9 and 1e7 M on either side")?;
     let radius = scene.observer.radius;
@@ -138,6 +169,17 @@ fn check_reach(scene: &Scene) -> Result<(), Invalid> {
 
 fn check_effects(scene: &Scene) -> Result<(), Invalid> {
     let key = "effects.spectral_index";
+    if let Some(power) = scene.effects.redshift_power {
+        let (key, value) = ("effects.redshift_power", shown(power));
+        if scene.effects.spectral_index.is_some() {
+            let allowed = "redshift_power or spectral_index, which is 2 less, not both";
+            return Err(Invalid::new(key, value, allowed));
+        }
+        if !scene.effects.redshift {
+            return Err(Invalid::new(key, value, "only with redshift = true"));
+        }
+        return number(key, power, (-8.0..=12.0).contains(&power), "a number in [-8, 12]");
+    }
     match (scene.effects.redshift, scene.effects.spectral_index) {
         (true, None) => {
             let why = "needed with redshift = true (1 is the law of bolometric intensity)";
@@ -162,7 +204,7 @@ fn check_combinations(scene: &Scene) -> Result<(), Invalid> {
         return Err(Invalid::new("effects.absorption", true, allowed));
     }
     let hot = scene.disc.as_ref().and_then(|disc| disc.peak_temperature_k);
-    if let (Some(t), true) = (hot, effects.redshift && effects.spectral_index != Some(1.0)) {
+    if let (Some(t), true) = (hot, effects.redshift && effects.index() != Some(1.0)) {
         let allowed = "only with effects.spectral_index = 1: intensities of all wavelengths";
         return Err(Invalid::new("disc.peak_temperature_k", shown(t), allowed));
     }
@@ -210,7 +252,7 @@ fn check_polarization(scene: &Scene) -> Result<(), Invalid> {
     };
     let wrong = |error: OutOfRange| Invalid::new(error.field, shown(error.value), error.allowed);
     field.check().map_err(wrong)?;
-    let index = effects.spectral_index.unwrap_or(f64::NAN);
+    let index = effects.index().unwrap_or(f64::NAN);
     PowerLaw::new(index, circular).map(|_| ()).map_err(wrong)
 }
 

@@ -2,13 +2,14 @@
 
 use super::check::check_color;
 use super::invalid::{Invalid, brightness, number};
-use super::{Rotation, VolumeSource};
+use super::{Rotation, VolumeRegion, VolumeSource};
 
 pub(super) fn check_volume(volume: &VolumeSource, k: usize) -> Result<(), Invalid> {
     let key = |name: &str| format!("volume.{k}.{name}");
     brightness(key("factor"), volume.factor)?;
     check_box(volume, &key)?;
     check_rotation(volume, &key)?;
+    check_region(volume, &key)?;
     if let Some(axis) = volume.axis {
         let norm = axis.iter().map(|x| x * x).sum::<f64>();
         if !(1e-30..=1e30).contains(&norm) {
@@ -49,12 +50,17 @@ fn check_rotation(volume: &VolumeSource, key: &impl Fn(&str) -> String) -> Resul
         let why = "needed if it turns: the time (M) at which it is as in the file";
         return Err(Invalid::missing(key("reference_time"), why));
     }
-    let Rotation::PowerLaw { radius, rate, exponent } = volume.rotation else { return Ok(()) };
-    let key = |name: &str| key(&format!("rotation.power-law.{name}"));
-    let ok = (1e-6..=1e6).contains(&radius);
-    number(key("radius"), radius, ok, "a radius in [1e-6, 1e6] (M)")?;
-    let ok = rate.abs() <= 1e3;
-    number(key("rate"), rate, ok, "a number in [-1000, 1000] (radians per M)")?;
-    let ok = (-10.0..=10.0).contains(&exponent);
-    number(key("exponent"), exponent, ok, "a number in [-10, 10]")
+    let Rotation::Law(law) = &volume.rotation else { return Ok(()) };
+    law.check(&key("rotation"))
+}
+
+fn check_region(volume: &VolumeSource, key: &impl Fn(&str) -> String) -> Result<(), Invalid> {
+    let Some(VolumeRegion { r_min, r_max, z_width }) = volume.region else { return Ok(()) };
+    let ok = (0.0..=1e6).contains(&r_min);
+    number(key("region.r_min"), r_min, ok, "a radius in [0, 1e6] (M)")?;
+    let ok = r_max > r_min && r_max <= 1e6;
+    number(key("region.r_max"), r_max, ok, "a radius above r_min and at most 1e6 (M)")?;
+    let width = z_width.unwrap_or(1.0);
+    let ok = width > 0.0 && width <= 1e6;
+    number(key("region.z_width"), width, ok, "a height above 0 and at most 1e6 (M)")
 }

@@ -8,14 +8,16 @@ mod check;
 mod check_volume;
 mod invalid;
 mod overrides;
+mod rotation;
 mod sources;
 
 pub use camera::{CameraConfig, CameraKey, CameraMotion, Pose};
 pub use invalid::{SceneError, line_of, shown};
 pub use overrides::apply_override;
+pub use rotation::{Perturbed, Rotation, Velocity};
 pub use sources::{
-    Checker, Disc, Gas, GasMotion, GasProfile, Mesh, MeshVelocity, Plunging, Rotation, Sky,
-    SkyImage, Spot, Stars, VolumeSource,
+    Checker, Disc, Gas, GasMotion, GasProfile, Mesh, MeshVelocity, Plunging, Sky, SkyImage, Spot,
+    Stars, VolumeRegion, VolumeSource,
 };
 
 use crate::polarization::MagneticField;
@@ -70,10 +72,24 @@ pub struct Scene {
 pub struct Hole {
     /// Spin a/M ∈ \[−1, 1\]; negative: the hole turns against +z.
     pub spin: f64,
-    /// Mass in solar masses.
-    pub mass_msun: f64,
-    /// Distance in kiloparsecs.
-    pub distance_kpc: f64,
+    /// Mass in solar masses; needed where anything is in seconds, µas, Jy or physical units.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mass_msun: Option<f64>,
+    /// Distance in kiloparsecs; needed where anything is in µas or Jy.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distance_kpc: Option<f64>,
+}
+
+impl Hole {
+    /// GM/c³ in seconds, where the mass is known.
+    pub fn seconds(&self) -> Option<f64> {
+        self.mass_msun.map(crate::units::gravitational_time)
+    }
+
+    /// The angle of 1 M in µas, where mass and distance are known.
+    pub fn angle_uas(&self) -> Option<f64> {
+        Some(crate::units::gravitational_angle(self.mass_msun?, self.distance_kpc?))
+    }
 }
 
 /// Where the scene is seen from, and when.
@@ -127,8 +143,9 @@ pub struct Screen {
     pub field_of_view_uas: Option<f64>,
     /// Pixels from left to right.
     pub width: u32,
-    /// Pixels from top to bottom; pixels are square.
-    pub height: u32,
+    /// Pixels from top to bottom, which are square; as many as from left to right without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub height: Option<u32>,
     /// Rays per pixel, a square number: a regular grid inside the pixel.
     #[serde(default = "one")]
     pub samples_per_pixel: u32,
@@ -178,6 +195,9 @@ pub struct Effects {
     /// when `redshift` is on.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spectral_index: Option<f64>,
+    /// 2 + α, as fits have it, in place of α: dI = g^power j ds of a volume.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub redshift_power: Option<f64>,
     /// Emission at each point is that of the moment when the light passed it; off: of the
     /// time of observation everywhere.
     #[serde(default)]
@@ -209,6 +229,7 @@ impl Default for Effects {
             lensing: true,
             redshift: false,
             spectral_index: None,
+            redshift_power: None,
             slow_light: false,
             absorption: false,
             half_orbits: None,
@@ -221,6 +242,14 @@ impl Default for Effects {
 
 fn on() -> bool {
     true
+}
+
+impl Effects {
+    /// α of the emitted spectrum, if redshift is simulated.
+    pub fn index(&self) -> Option<f64> {
+        let given = self.spectral_index.or(self.redshift_power.map(|power| power - 2.0));
+        self.redshift.then_some(given).flatten()
+    }
 }
 
 /// How rays are traced.
@@ -260,6 +289,11 @@ impl Integrator {
 }
 
 impl Screen {
+    /// Pixels from top to bottom.
+    pub fn rows(&self) -> u32 {
+        self.height.unwrap_or(self.width)
+    }
+
     /// Whether the picture keeps a channel.
     pub fn keeps(&self, channel: &str) -> bool {
         self.channels.as_ref().is_none_or(|names| names.iter().any(|name| name == channel))
@@ -293,6 +327,7 @@ impl Scene {
         if let (Some(disc), Ok(hole)) = (&mut scene.disc, Kerr::new(self.hole.spin)) {
             disc.inner_edge.get_or_insert_with(|| orbits::isco(&hole));
         }
+        scene.screen.height = Some(scene.screen.rows());
         toml::to_string(&scene).expect("plain tables always serialise") // no maps with odd keys
     }
 
@@ -315,12 +350,8 @@ impl Scene {
 
     /// Width of the field of view in M.
     pub fn field_of_view_m(&self) -> f64 {
-        let uas = crate::units::gravitational_angle(self.hole.mass_msun, self.hole.distance_kpc);
-        match (self.screen.field_of_view_m, self.screen.field_of_view_uas) {
-            (Some(m), _) => m,
-            (None, Some(angle)) => angle / uas,
-            (None, None) => f64::NAN, // excluded by `parse`
-        }
+        let of_angle = || Some(self.screen.field_of_view_uas? / self.hole.angle_uas()?);
+        self.screen.field_of_view_m.or_else(of_angle).unwrap_or(f64::NAN) // excluded by `parse`
     }
 }
 

@@ -1,7 +1,6 @@
 //! What shines: gas, disc, hot spots, meshes and skies.
 
-use crate::dynamics::{AngularVelocity, Axis};
-use kerrlight_geodesic::Kerr;
+use super::rotation::Rotation;
 use serde::{Deserialize, Serialize};
 
 /// A volumetric flow with an analytic density and motion (Gold et al. 2020, ApJ 897, 148, section
@@ -188,7 +187,8 @@ pub struct VolumeSource {
     /// Axis about which it turns right-handed; without it that of the file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axis: Option<[f64; 3]>,
-    /// How fast it turns.
+    /// How fast it turns; `velocity` means the same, as fits call it.
+    #[serde(alias = "velocity")]
     pub rotation: Rotation,
     /// Time in M at which it is as in the file; needed if it turns.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -196,42 +196,31 @@ pub struct VolumeSource {
     /// Time in M before which nothing of it shines.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub injection_time: Option<f64>,
+    /// Where it shines, at rest while matter passes through; wherever the file has light without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub region: Option<VolumeRegion>,
     /// Linear colour of its light in the R, G, B channels.
     #[serde(default = "white")]
     pub color: [f32; 3],
 }
 
-/// Angular velocity Ω(r) of matter on circles about an axis ξ.
+/// Where a volume shines: r_min ≤ r < r_max, |z| ≤ z_width, as the region of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Rotation {
-    /// At rest in Boyer–Lindquist coordinates.
-    None,
-    /// 1/(r^{3/2} + a ξ_z).
-    Keplerian,
-    /// rate (radius/r)^exponent.
-    PowerLaw {
-        /// Where the rate is reached, M.
-        radius: f64,
-        /// Radians per M.
-        rate: f64,
-        /// 1.5: Keplerian without spin, 0: like a rigid body.
-        exponent: f64,
-    },
+#[serde(deny_unknown_fields)]
+pub struct VolumeRegion {
+    /// Least radius, M.
+    pub r_min: f64,
+    /// Largest radius, M.
+    pub r_max: f64,
+    /// Largest |z|, M; any without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub z_width: Option<f64>,
 }
 
-impl Rotation {
-    /// About `axis` through `hole`; `None` if nothing turns.
-    pub fn about(self, hole: &Kerr, axis: Axis) -> Option<AngularVelocity> {
-        match self {
-            Rotation::None => None,
-            Rotation::Keplerian => {
-                Some(AngularVelocity::Keplerian { drag: hole.spin() * axis.vector()[2] })
-            }
-            Rotation::PowerLaw { radius, rate, exponent } => {
-                Some(AngularVelocity::PowerLaw { radius, rate, exponent })
-            }
-        }
+impl VolumeRegion {
+    /// Whether a point at height z and radius r lies in it.
+    pub fn holds(&self, z: f64, r: f64) -> bool {
+        r >= self.r_min && r < self.r_max && self.z_width.is_none_or(|width| z.abs() <= width)
     }
 }
 

@@ -156,9 +156,118 @@ fn overrides_replace_tables() {
 fn overrides_that_lead_nowhere_say_so() {
     let error = |assignment| apply_override(SCENE, assignment).unwrap_err().to_string();
     assert!(error("hole.spin").contains("key.path=value"));
-    assert!(error("spot.7.sigma=1").contains("index below 2"));
-    assert!(error("mesh.0.path=a.obj").contains("there is no `mesh`, so none with number 0"));
+    assert!(error("spot.7.sigma=1").contains("`spot` needs a number from 0 to 2"));
+    assert!(error("spot.sigma=1").contains("`spot` needs a number from 0 to 2"));
+    assert!(error("spot.2=").contains("no such one to remove"));
+    assert!(error("spot.1=3").contains("names a table of `spot`"));
+    assert!(error("mesh.1.path=a.obj").contains("there is no `mesh`, so none with number 1"));
     assert!(error("hole.spin.x=1").contains("not a table"));
     assert!(error("hole=1").contains("names a table"));
     assert!(error(".=1").contains("empty key"));
+}
+
+/// The element after the last one of a list of tables adds one, as a whole or number by number.
+#[test]
+fn overrides_add_to_lists() {
+    let text = "[[loss]]\nsigma = 1\n";
+    let text = apply_override(text, "loss.1.sigma=2").unwrap();
+    let text = apply_override(&text, "loss.1.weight=3").unwrap();
+    let text = apply_override(&text, "loss.2={sigma=4, at={x=1}}").unwrap();
+    let text = apply_override(&text, "loss.2.at.x=5").unwrap();
+    let text = apply_override(&text, "regulariser.0.kind=entropy").unwrap();
+    let text = apply_override(&text, "inline=[{a=1},{a=2}]").unwrap();
+    let text = apply_override(&text, "inline.1.a=3").unwrap();
+    let text = apply_override(&text, "loss.0=").unwrap();
+    let wanted = "inline = [{ a = 1 }, { a = 3 }]\n[[loss]]\nsigma = 2\nweight = 3\n\
+                  [[loss]]\nsigma = 4\nat = { x = 5 }\n[[regulariser]]\nkind = \"entropy\"\n";
+    let found: toml::Table = text.parse().unwrap();
+    assert_eq!(found, wanted.parse::<toml::Table>().unwrap(), "{text}");
+}
+
+#[test]
+fn exact_a_screen_is_square_without_a_height() {
+    let square = SCENE.replacen("height = 64\n", "", 1);
+    assert_eq!(Scene::parse(&square).unwrap().screen.rows(), 64);
+    let smaller = apply_override(&square, "screen.width=32").unwrap();
+    let scene = Scene::parse(&smaller).unwrap();
+    assert_eq!(scene.screen.rows(), 32);
+    assert!(scene.to_toml().contains("height = 32"), "{}", scene.to_toml());
+    assert!(error("height = 64", "height = 0").contains("`screen.height` = 0"));
+}
+
+/// What is in M needs neither mass nor distance; what is not says what to write.
+#[test]
+fn exact_mass_and_distance_are_needed_where_they_matter() {
+    let bare = SCENE.replacen("mass_msun = 4.154e6\ndistance_kpc = 8.178\n", "", 1);
+    let scene = Scene::parse(&bare).unwrap();
+    assert_eq!((scene.hole.seconds(), scene.hole.angle_uas()), (None, None));
+    assert_eq!(Scene::parse(&scene.to_toml()).unwrap().hole, scene.hole);
+    for more in ["total_flux_jy = 2.0\nwidth", "width"] {
+        let field =
+            if more == "width" { "field_of_view_uas = 90.0" } else { "field_of_view_m = 20.0" };
+        let text = bare.replacen("width", more, 1).replacen("field_of_view_m = 20.0", field, 1);
+        let text = Scene::parse(&text).unwrap_err().to_string();
+        assert!(text.contains("`hole.mass_msun` is missing") && text.contains("4.154e6"), "{text}");
+    }
+    assert!(error("mass_msun = 4.154e6", "mass_msun = 0").contains("`hole.mass_msun` = 0"));
+}
+
+/// The laws of fits under the names of fits, and what is wrong with their numbers.
+#[test]
+fn exact_volumes_turn_as_fits_let_them() {
+    let volume = |key: &str, law: &str| {
+        let head = "[[volume]]\npath = \"v.npz\"\nfactor = 1.0\nreference_time = 0.0\n";
+        let text = SCENE.replacen("[[spot]]", &format!("{head}{key} = {law}\n\n[[spot]]"), 1);
+        Scene::parse(&text).map_err(|error| error.to_string())
+    };
+    let hole = Kerr::new(0.9).unwrap();
+    let rate = |law: &str, r: f64| {
+        let scene = volume("rotation", law).unwrap();
+        let again = Scene::parse(&scene.to_toml()).unwrap();
+        assert_eq!(again.volume, scene.volume, "{law}");
+        assert_eq!(volume("velocity", law).unwrap().volume, scene.volume);
+        let axis = crate::dynamics::Axis::new([0.0, 0.0, 1.0]).unwrap();
+        scene.volume[0].rotation.about(&hole, axis).unwrap().map_or(0.0, |law| law.rate(r))
+    };
+    assert_eq!(rate("\"none\"", 4.0), 0.0);
+    assert_eq!(rate("\"keplerian\"", 4.0), 1.0 / 8.9);
+    assert_eq!(rate("{ keplerian = { drag = 0.5 } }", 4.0), 1.0 / 8.5);
+    assert_eq!(rate("{ power-law = { radius = 8.0, rate = 0.25, exponent = 2.0 } }", 4.0), 1.0);
+    assert_eq!(rate("{ table = { radii = [2.0, 6.0], rates = [0.5, 0.25] } }", 4.0), 0.375);
+    let of = "of = { keplerian = { drag = 0.5 } }, correlation_length = 0.5, radii = [2.0, 9.0]";
+    let still = rate(&format!("{{ perturbed = {{ {of}, deviation = 0.0, seed = 3 }} }}"), 2.0);
+    assert!((still - rate("{ keplerian = { drag = 0.5 } }", 2.0)).abs() < 1e-15);
+    let drawn = |seed: u32| {
+        rate(&format!("{{ perturbed = {{ {of}, deviation = 0.1, seed = {seed} }} }}"), 4.0)
+    };
+    assert_eq!(drawn(3), drawn(3));
+    assert_ne!(drawn(3), drawn(4));
+    for (law, says) in [
+        ("\"rigid\"", "expected `none` or `keplerian`"),
+        ("{ table = { radii = [2.0], rates = [] } }", "`volume.0.rotation.table.rates` = 0"),
+        ("{ keplerian = { drag = 1e9 } }", "`volume.0.rotation.keplerian.drag` = 1e9"),
+        (
+            &format!("{{ perturbed = {{ {of}, deviation = -1.0, seed = 3 }} }}"),
+            "rotation.perturbed.deviation` = -1",
+        ),
+        (&format!("{{ perturbed = {{ {of}, deviation = 1.0 }} }}"), "missing field `seed`"),
+    ] {
+        let text = volume("rotation", law).unwrap_err();
+        assert!(text.contains(says), "{law}: {text}");
+    }
+}
+
+#[test]
+fn exact_a_power_of_the_redshift_is_a_spectral_index_and_2() {
+    let with = |effects: &str| {
+        let effects = format!("[effects]\n{effects}\n\n[tracer]");
+        Scene::parse(&SCENE.replacen("[tracer]", &effects, 1)).map_err(|error| error.to_string())
+    };
+    let index = |effects: &str| with(effects).unwrap().effects.index();
+    assert_eq!(index("redshift = true\nredshift_power = 3.0"), Some(1.0));
+    assert_eq!(index("redshift = true\nspectral_index = 1.0"), Some(1.0));
+    assert_eq!(index("spectral_index = 1.0"), None);
+    assert!(with("redshift_power = 2.0").unwrap_err().contains("only with redshift = true"));
+    let both = with("redshift = true\nredshift_power = 2.0\nspectral_index = 0.0").unwrap_err();
+    assert!(both.contains("not both"), "{both}");
 }

@@ -162,10 +162,10 @@ fn media(
         let (value, allowed) = (files.len() as f64, "one file for each [[volume]]");
         return Err(OutOfRange { field: "number of volume files", value, allowed });
     }
-    let redshift = scene.effects.redshift.then_some(scene.effects.spectral_index).flatten();
+    let redshift = scene.effects.index();
     let effects = GasEffects { redshift, absorption: scene.effects.absorption };
     let length = 100.0 * crate::units::SPEED_OF_LIGHT;
-    let length = length * crate::units::gravitational_time(scene.hole.mass_msun);
+    let length = length * scene.hole.seconds().unwrap_or(f64::NAN); // of gas, which needs it
     let mut media: Vec<Arc<dyn Medium>> = Vec::new();
     if let Some(gas) = &scene.gas {
         media.push(Arc::new(GasModel::new(gas, hole, length, effects)));
@@ -187,7 +187,7 @@ impl Stage {
         let assets: Assets = assets.into();
         let hole = Kerr::new(scene.hole.spin)?;
         let kept = |name: &str| scene.screen.keeps(name);
-        let redshift = scene.effects.redshift.then_some(scene.effects.spectral_index).flatten();
+        let redshift = scene.effects.index();
         let view = View::new(scene, &hole)?;
         let sky = scene.sky.as_ref().and_then(|sky| SkyModel::new(sky, assets.sky));
         let spots: Vec<_> = scene.spot.iter().map(|spot| SpotModel::new(spot, &hole)).collect();

@@ -24,7 +24,7 @@ impl Polarization {
         let (Some(field), true) = (scene.magnetic_field, effects.polarization) else {
             return Ok(None);
         };
-        let index = effects.spectral_index.unwrap_or(f64::NAN);
+        let index = effects.index().unwrap_or(f64::NAN);
         let law = PowerLaw::new(index, effects.circular_polarization_lorentz_factor)?;
         let circular = effects.circular_polarization_lorentz_factor.is_some();
         Ok(Some(Polarization { law, circular, field }))

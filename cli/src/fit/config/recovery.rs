@@ -1,5 +1,6 @@
 //! What is recovered, and how.
 
+use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
 /// What is recovered.
@@ -41,7 +42,7 @@ pub struct Representation {
 }
 
 /// Kinds of representations.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
     /// Network of the pulled-back point.
@@ -56,6 +57,7 @@ pub enum Kind {
     LinearGrid,
     /// One that a program of one's own adds.
     #[serde(untagged)]
+    #[value(skip)]
     Own(String),
 }
 

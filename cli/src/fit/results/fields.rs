@@ -3,6 +3,7 @@
 use crate::fit::config::FitFile;
 use crate::fit::setup;
 use crate::fit::truth::Truth;
+use kerrlight_tomo::emission::spot::distance;
 use kerrlight_tomo::fit::{State, Trainer};
 use kerrlight_tomo::volume::Volume;
 use kerrlight_tomo::volume::metrics::{self, Comparison};
@@ -35,9 +36,42 @@ pub fn recovered(
     trainer: &mut Trainer<'_, f32>,
     state: &State<f32>,
 ) -> anyhow::Result<Volume> {
-    let (nodes, region) = (Box3::new(file), setup::region(&file.region));
+    let region = setup::region(&file.region);
+    on_nodes(file, trainer, state, &|x| region.holds(x))
+}
+
+/// The field at the reference time at all nodes whose matter passes the region at some time, or next to it: what a
+/// scene needs that carries it along.
+pub fn carried(
+    file: &FitFile,
+    trainer: &mut Trainer<'_, f32>,
+    state: &State<f32>,
+) -> anyhow::Result<Volume> {
+    let (region, axis) = (setup::region(&file.region), state.now.axis.vector());
+    let nodes = Box3::new(file);
+    // The diagonal of a cell: values between nodes of the region need their neighbours.
+    let margin = 2.0 * nodes.half / (nodes.nodes[0] - 1) as f64 * 3f64.sqrt();
+    let passes = |x: [f64; 3]| {
+        let r = distance(x, [0.0; 3]);
+        let along: f64 = x.iter().zip(axis).map(|(x, axis)| x * axis).sum();
+        let across = (r * r - along * along).max(0.0).sqrt();
+        let reach = across * (1.0 - axis[2] * axis[2]).max(0.0).sqrt();
+        let least = (along * axis[2]).abs() - reach;
+        r > region.r_min - margin && r < region.r_max + margin && least <= region.z_width + margin
+    };
+    on_nodes(file, trainer, state, &passes)
+}
+
+/// The field at the reference time, zero where nothing is wanted.
+fn on_nodes(
+    file: &FitFile,
+    trainer: &mut Trainer<'_, f32>,
+    state: &State<f32>,
+    wanted: &dyn Fn([f64; 3]) -> bool,
+) -> anyhow::Result<Volume> {
+    let nodes = Box3::new(file);
     let positions = nodes.positions();
-    let inside: Vec<usize> = (0..positions.len()).filter(|k| region.holds(positions[*k])).collect();
+    let inside: Vec<usize> = (0..positions.len()).filter(|k| wanted(positions[*k])).collect();
     let column = |c: usize| inside.iter().map(|k| positions[*k][c] as f32).collect::<Vec<f32>>();
     let [x, y, z] = [0, 1, 2].map(column);
     let found = trainer.emission(&state.now, [&x, &y, &z]);

@@ -49,7 +49,8 @@ impl Estimate<'_> {
         Ok(still)
     }
 
-    fn time_of_still(&self) -> f64 {
+    /// When it is seen, M.
+    pub(super) fn time_of_still(&self) -> f64 {
         let (times, reference) = (&self.measured.times, self.motion.reference);
         let within = times.first().is_some_and(|first| reference >= *first)
             && times.last().is_some_and(|last| reference <= *last);

@@ -5,6 +5,7 @@ mod lensed;
 mod numbers;
 mod page;
 mod plots;
+mod scene;
 mod units;
 mod verdict;
 
@@ -14,10 +15,11 @@ use super::config::FitFile;
 use super::data::Measured;
 use super::failed;
 use super::folder::Folder;
-use super::setup::Instrument;
+use super::setup::{self, Instrument};
 use crate::checksum::sealed;
 use crate::volume_files;
 use kerrlight_tomo::fit::{Loss, Motion, State, Trainer};
+use kerrlight_tomo::units::MICROARCSECOND;
 use kerrlight_tomo::volume::{Volume, VolumeFile, vti};
 use lensed::Still;
 use std::time::Instant;
@@ -55,6 +57,7 @@ impl Estimate<'_> {
         let mask = numbers::mask_error(trainer, state, &movie);
         self.volumes(&volume, state)?;
         self.movies(&movie)?;
+        self.scene(trainer, state, &movie)?;
         let still = self.still(trainer, state)?;
         let judged = self.evidence().judged(&trainer.objective, &movie)?;
         let found = Found { volume, still, loss, mask, judged, movie, state, begun };
@@ -90,7 +93,16 @@ impl Estimate<'_> {
         if let Some(truth) = &self.measured.movie {
             arrays.push(("data", truth.iter().map(|x| *x as f32).collect()));
         }
-        let bytes = volume_files::movie_archive(shape, &arrays, &self.measured.times)?;
+        let times = &self.measured.times;
+        let mut lists = vec![("time", times.clone())];
+        // What `observe` needs to see it, where it is known.
+        if let Ok(hours) = setup::hours_per_m(self.file) {
+            lists.push(("hours", times.iter().map(|time| (time - times[0]) * hours).collect()));
+        }
+        if let Ok(sky) = setup::sky(self.file) {
+            lists.push(("field_uas", vec![sky.pixel_rad / MICROARCSECOND * n as f64]));
+        }
+        let bytes = volume_files::movie_archive(shape, &arrays, &lists)?;
         self.folder.file("movie.npz")?.write(&bytes)
     }
 }

@@ -1,7 +1,7 @@
 //! Volumes against hot spots, closed forms and themselves with finer panels.
 
 use super::*;
-use crate::scene::{Rotation, VolumeSource};
+use crate::scene::{Rotation, Velocity, VolumeSource};
 use crate::volume::Volume;
 use kerrlight_geodesic::bundle::RayNodes;
 
@@ -33,6 +33,7 @@ fn source(rotation: Rotation, axis: [f64; 3], since: f64) -> VolumeSource {
         rotation,
         reference_time: Some(since),
         injection_time: None,
+        region: None,
         color: [1.0, 0.5, 0.25],
     }
 }
@@ -82,7 +83,7 @@ fn against_spot(nodes: usize, sheared: bool, axis: [f64; 3], set: &[&str]) -> [f
         let omega = model.angular_velocity(7.0);
         let rate = omega.iter().zip(axis).map(|(a, b)| a * b).sum::<f64>();
         let rate = rate / axis.iter().map(|x| x * x).sum::<f64>().sqrt();
-        (0.0, Rotation::PowerLaw { radius: 7.0, rate, exponent: 0.0 })
+        (0.0, Rotation::Law(Velocity::PowerLaw { radius: 7.0, rate, exponent: 0.0 }))
     };
     let center = model.center(reference);
     let mut source = source(rotation, axis, reference);

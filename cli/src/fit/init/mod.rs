@@ -1,0 +1,295 @@
+//! `kerrlight fit --init`: a commented file to start from, for given data or for the built-in experiment.
+
+mod annotate;
+mod keys;
+
+use super::{BUILT_IN, parse};
+use crate::interferometry::image_files::OwnTimes;
+use crate::interferometry::movie_files;
+use crate::output::{self, Output};
+use annotate::annotate;
+use anyhow::{Context, bail};
+use kerrlight_tomo::interferometry::data_terms::ClosureTerm;
+use kerrlight_tomo::interferometry::earth::SourcePosition;
+use kerrlight_tomo::interferometry::observation::Observation;
+use kerrlight_tomo::interferometry::products::ClosureKind;
+use kerrlight_tomo::interferometry::simulate::Movie;
+use kerrlight_tomo::units::{MICROARCSECOND, gravitational_angle};
+use keys::{KEYS, TABLES};
+use std::path::{Path, PathBuf};
+
+/// An error in settings; of what is missing, with what to write.
+pub fn explained(error: &toml::de::Error) -> anyhow::Error {
+    let text = error.to_string();
+    let missing = text.split_once("missing field `").and_then(|(_, rest)| rest.split('`').next());
+    let advice = missing.map_or(String::new(), advice);
+    anyhow::anyhow!("{}{advice}", text.trim_end())
+}
+
+fn advice(missing: &str) -> String {
+    let one = |(table, text): &(&str, &str)| {
+        (*table == missing).then(|| {
+            format!("\nadd a table [{table}]: {text} `kerrlight fit --init` writes an example")
+        })
+    };
+    let found: Vec<String> = TABLES.iter().filter_map(one).collect();
+    let key = |key: &&keys::Key| key.name == missing && key.example.is_empty();
+    let of = |key: &keys::Key| match key.table {
+        "" => format!("\ngive `{missing} = …`: {}", key.note),
+        table => format!("\ngive `{missing} = …` in [{table}]: {}", key.note),
+    };
+    found.into_iter().chain(KEYS.iter().filter(key).map(of)).collect()
+}
+
+/// Where it goes unless the user says.
+const NAME: &str = "my_fit.toml";
+
+/// A source whose mass and distance are known.
+struct Source {
+    name: &'static str,
+    words: [&'static str; 2],
+    position: SourcePosition,
+    mass_msun: f64,
+    distance_kpc: f64,
+    inclination_deg: f64,
+    /// Where the numbers come from.
+    mass: &'static str,
+    inclination: &'static str,
+}
+
+const SOURCES: [Source; 2] = [
+    Source {
+        name: "Sgr A*",
+        words: ["SGRA", "SGR_A"],
+        position: SourcePosition::SGR_A,
+        mass_msun: 4.154e6,
+        distance_kpc: 8.178,
+        inclination_deg: 30.0,
+        mass: "Sgr A* (GRAVITY Collaboration 2019, A&A 625, L10)",
+        inclination: "the EHT's models prefer views of Sgr A* near face-on, 30 degrees or less from an axis (2022, ApJL 930, L16)",
+    },
+    Source {
+        name: "M87*",
+        words: ["M87", "VIRGOA"],
+        position: SourcePosition::M87,
+        mass_msun: 6.5e9,
+        distance_kpc: 16_800.0,
+        inclination_deg: 163.0,
+        mass: "M87* (EHT Collaboration 2019, ApJL 875, L1)",
+        inclination: "17 degrees from the jet's axis, with the hole turned away (EHT Collaboration 2019, ApJL 875, L5)",
+    },
+];
+
+/// Writes the file and says what is left to the user.
+pub fn write(data: Option<&Path>, to: Option<&Path>) -> anyhow::Result<()> {
+    let path = to.unwrap_or(Path::new(NAME));
+    if path.exists() {
+        bail!("{} exists: give another name with -o", path.display());
+    }
+    let output = Output::new(path, "toml")?;
+    let plain = match data {
+        None => BUILT_IN.to_owned(),
+        Some(data) => of_data(data, path)?,
+    };
+    let text = format!("{}{}", head(path, &plain), annotate(&plain));
+    output.write(text.as_bytes())?;
+    let left = plain.lines().filter(|line| line.starts_with("#? ")).count();
+    let assumed = plain.matches(" #! ").count();
+    eprintln!("{assumed} numbers are ASSUMED, {left} are left to FILL IN: see its comments");
+    output::print(&format!("{}\n", path.display()))
+}
+
+fn head(path: &Path, plain: &str) -> String {
+    let run = format!("#   kerrlight fit {}\n", path.display());
+    let left = if plain.contains("#? ") {
+        "# Lines with FILL IN above them decide the result and cannot be told from the data: the fit names the first that\n# is missing until all are there.\n"
+    } else {
+        ""
+    };
+    let assumed = if plain.contains(" #! ") {
+        "# Lines with ASSUMED above them decide the result and are not told by the data: change them as you know better.\n"
+    } else {
+        ""
+    };
+    format!(
+        "# Settings of a fit. Run it with\n{run}{left}{assumed}# Lengths and times are in M (GM/c^2, GM/c^3) where nothing else is said; docs/fit.md tells more.\n"
+    )
+}
+
+/// The plain settings of a fit of this file, for annotation.
+fn of_data(data: &Path, toml: &Path) -> anyhow::Result<String> {
+    let path = toml::Value::String(seen_from(toml, data)?).to_string();
+    let extension = data.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    if matches!(extension.to_ascii_lowercase().as_str(), "npz" | "npy" | "exr") {
+        return of_movie(&read_movie(data)?, &path);
+    }
+    match crate::interferometry::read(data) {
+        Ok((_, observation)) => of_visibilities(&observation, &path),
+        // A FITS file or a table may hold an image, too.
+        Err(first) => match read_movie(data) {
+            Ok(movie) => of_movie(&movie, &path),
+            Err(_) => Err(first),
+        },
+    }
+}
+
+/// The data's path as the file that names it has to say it.
+fn seen_from(toml: &Path, data: &Path) -> anyhow::Result<String> {
+    let beside = toml.parent().is_none_or(|folder| folder == Path::new(""));
+    let path: PathBuf = match beside {
+        true => data.to_owned(),
+        false => std::path::absolute(data).with_context(|| data.display().to_string())?,
+    };
+    let text = path.to_str().with_context(|| format!("{} is not UTF-8", path.display()))?;
+    Ok(text.to_owned())
+}
+
+/// Images, their times and the width of their field in µas, as far as the file tells.
+struct Images {
+    movie: Movie,
+    times: OwnTimes,
+    field_uas: Option<f64>,
+}
+
+fn read_movie(path: &Path) -> anyhow::Result<Images> {
+    let files = [path.to_owned()];
+    let of = |(movie, times): (Movie, OwnTimes), known: bool| {
+        let field = movie.grid.pixel_rad * movie.grid.width as f64 / MICROARCSECOND;
+        Images { movie, times, field_uas: known.then_some(field) }
+    };
+    movie_files::read(&files, None).map(|read| of(read, true)).or_else(|first| {
+        movie_files::read(&files, Some(1.0)).map(|read| of(read, false)).map_err(|_| first)
+    })
+}
+
+fn known(observation: &Observation) -> Option<&'static Source> {
+    let word: String = observation.source.to_ascii_uppercase().split_whitespace().collect();
+    SOURCES.iter().find(|source| {
+        let near = observation.position.is_some_and(|at| {
+            let hours = (at.ra_hours - source.position.ra_hours).abs();
+            hours < 0.01 && (at.dec_deg - source.position.dec_deg).abs() < 0.1
+        });
+        near || source.words.iter().any(|name| word.starts_with(name))
+    })
+}
+
+fn of_visibilities(observation: &Observation, path: &str) -> anyhow::Result<String> {
+    let flux = short_baselines(observation)?;
+    let source = known(observation);
+    let name = source.map_or(observation.source.trim(), |source| source.name);
+    let name = if name.is_empty() { "unnamed source" } else { name };
+    let day = observation.mjd.map_or(String::new(), |mjd| format!(", MJD {mjd}"));
+    let (mass, inclination, field) = match source {
+        Some(of) => (
+            format!(
+                "mass_msun = {:?} #! {}\ndistance_kpc = {:?} #! {}",
+                of.mass_msun, of.mass, of.distance_kpc, of.mass
+            ),
+            format!("inclination_deg = {:?} #! {}", of.inclination_deg, of.inclination),
+            format!(
+                "{:.0} microarcseconds",
+                24.0 * gravitational_angle(of.mass_msun, of.distance_kpc)
+            ),
+        ),
+        None => (
+            format!(
+                "#? mass_msun = 4.154e6 # nothing is known here of {name}\n#? distance_kpc = 8.178 # the same"
+            ),
+            "#? inclination_deg = 60.0 # the data do not tell from where the hole is seen"
+                .to_owned(),
+            "as wide as mass and distance make it".to_owned(),
+        ),
+    };
+    let mut losses = "[[loss]]\ndata = \"amplitudes\"\nweight = 1.0".to_owned();
+    if ClosureTerm::<f64>::new(observation, ClosureKind::Phase, 3.0).is_ok() {
+        losses += "\n[[loss]]\ndata = \"closure-phases\"\nweight = 1.0\nleast_snr = 3.0 #! weaker ones are not Gaussian";
+    }
+    // Pixels of the region, 8 M deep, with emission 0.02.
+    let per_pixel = flux / (core::f64::consts::PI * (10.0f64 / 24.0 * 32.0).powi(2) * 8.0 * 0.02);
+    let fields = [
+        ("title", format!("{}{day}: measured visibilities", plain_words(name))),
+        ("mass", mass),
+        ("inclination", inclination),
+        ("field", field),
+        ("jy", digits(per_pixel)),
+        ("flux", digits(flux)),
+        ("losses", losses),
+        ("path", path.to_owned()),
+    ];
+    complete(include_str!("visibilities.toml"), &fields)
+}
+
+/// Median amplitude of the shortest tenth of the baselines, Jy.
+fn short_baselines(observation: &Observation) -> anyhow::Result<f64> {
+    let mut all: Vec<[f64; 2]> = observation
+        .rows
+        .iter()
+        .filter_map(|row| {
+            let i = row.stokes_i(observation.basis)?;
+            Some([row.uv[0].hypot(row.uv[1]), i.visibility.norm()])
+        })
+        .filter(|pair| pair.iter().all(|x| x.is_finite()))
+        .collect();
+    all.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    all.truncate(all.len().div_ceil(10));
+    all.sort_by(|a, b| a[1].total_cmp(&b[1]));
+    match all.get(all.len() / 2) {
+        Some([_, flux]) if *flux > 0.0 => Ok(*flux),
+        _ => bail!("there are no visibilities of total intensity with light in them"),
+    }
+}
+
+fn of_movie(images: &Images, path: &str) -> anyhow::Result<String> {
+    let Images { movie, times, field_uas } = images;
+    let (grid, frames) = (movie.grid, movie.frames());
+    if grid.width != grid.height {
+        bail!("images of {} x {} pixels: a fit's are square", grid.width, grid.height);
+    }
+    let flux =
+        movie.pixels.chunks(grid.pixels()).map(|image| image.iter().sum()).fold(0.0, f64::max);
+    let peak = movie.pixels.iter().copied().fold(0.0, f64::max);
+    if flux <= 0.0 {
+        bail!("there is no light in the images");
+    }
+    let span = field_uas
+        .map_or(String::new(), |field| format!("; on the sky it is {field:.1} microarcseconds"));
+    let hours = match times {
+        OwnTimes::Unknown => String::new(),
+        OwnTimes::Utc(hours) | OwnTimes::Since(hours) => match hours[..] {
+            [first, .., last] => format!("; they span {:.4} hours", last - first),
+            _ => String::new(),
+        },
+    };
+    let fields = [
+        ("title", "Images".to_owned()),
+        ("pixels", grid.width.to_string()),
+        ("frames", frames.to_string()),
+        ("jy", digits(flux / (grid.pixels() as f64 * 4.0 * 0.02))),
+        ("flux", digits(flux)),
+        ("peak", digits(peak)),
+        ("span", span),
+        ("hours", hours),
+        ("path", path.to_owned()),
+    ];
+    complete(include_str!("movie.toml"), &fields)
+}
+
+/// A number with three digits, as TOML has it.
+fn digits(value: f64) -> String {
+    let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
+    format!("{rounded:?}")
+}
+
+/// A name without what would end a string.
+fn plain_words(name: &str) -> String {
+    name.chars().filter(|c| !c.is_control() && !matches!(c, '"' | '\\')).collect()
+}
+
+/// The template with its fields; what comes out is a fit's file once all is filled in.
+fn complete(template: &str, fields: &[(&str, String)]) -> anyhow::Result<String> {
+    let text = fields.iter().fold(template.to_owned(), |text, (name, value)| {
+        text.replace(&format!("{{{name}}}"), value)
+    });
+    parse(&text.replace("#? ", "")).context("the starter file")?;
+    Ok(text)
+}

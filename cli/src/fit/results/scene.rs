@@ -1,0 +1,155 @@
+//! A scene of what was recovered, with its motion: `kerrlight render` and `kerrlight movie` show it.
+
+use super::{Estimate, fields};
+use crate::fit::config::Nodes;
+use crate::fit::setup;
+use crate::volume_files;
+use anyhow::Context;
+use kerrlight_tomo::fit::{State, Trainer};
+use kerrlight_tomo::scene::{Scene, VolumeRegion};
+use kerrlight_tomo::volume::VolumeFile;
+
+/// The scene, and the volume that it names.
+const SCENE: &str = "scene.toml";
+const VOLUME: &str = "scene.npz";
+/// Pixels along each side of its picture.
+const SIDE: usize = 256;
+
+impl Estimate<'_> {
+    /// Writes both; none for a field of events, which is not carried along by matter.
+    pub fn scene(
+        &self,
+        trainer: &mut Trainer<'_, f32>,
+        state: &State<f32>,
+        movie: &[f32],
+    ) -> anyhow::Result<()> {
+        if trainer.representation.dimension() != 3 {
+            return Ok(());
+        }
+        let text = self.scene_text(state, movie)?;
+        // A fit may see from where a scene cannot.
+        if let Err(error) = Scene::parse(&text) {
+            eprintln!("note: no {SCENE} is written: {error}");
+            return Ok(());
+        }
+        let axis = state.now.axis;
+        let volume = fields::carried(self.file, trainer, state)?;
+        let file = VolumeFile { volume, axis: Some(axis.vector()) };
+        volume_files::write(&self.folder.file(VOLUME)?, &file)?;
+        self.folder.file(SCENE)?.write(text.as_bytes())
+    }
+
+    fn scene_text(&self, state: &State<f32>, movie: &[f32]) -> anyhow::Result<String> {
+        let frame = self.frame_of_still();
+        let parts = [
+            self.heading(),
+            self.place(frame)?,
+            self.screen(&movie[frame * self.pixels()..][..self.pixels()])?,
+            self.light(),
+            self.volume(state)?,
+        ];
+        Ok(parts.join("\n"))
+    }
+
+    fn pixels(&self) -> usize {
+        self.file.screen.pixels * self.file.screen.pixels
+    }
+
+    /// The frame whose time is nearest to that of the still image.
+    fn frame_of_still(&self) -> usize {
+        let (times, wanted) = (&self.measured.times, self.time_of_still());
+        let far = |k: &usize| (times[*k] - wanted).abs();
+        (0..times.len()).min_by(|a, b| far(a).total_cmp(&far(b))).unwrap_or(0)
+    }
+
+    fn heading(&self) -> String {
+        let (folder, times) = (self.folder.path().display(), &self.measured.times);
+        let mut text = format!(
+            "# The emission that a fit recovered, with its motion. The fit: {}\n#   kerrlight render {folder}/{SCENE}\n",
+            self.file.title.replace('\n', " ")
+        );
+        if let [first, .., last] = times[..] {
+            let span = format!("--frames {} --from {first:?} --to {last:?}", times.len());
+            text += &format!(
+                "#   kerrlight movie {folder}/{SCENE} {span} --set screen.width=128 -o {folder}/frames --gif {folder}/movie.gif\n"
+            );
+        }
+        text += "# Emission is linear between the nodes of the volume (output.nodes of the fit).\n";
+        text += match self.file.region.nodes {
+            Nodes::Gauss { .. } => {
+                "# Rays are integrated adaptively: where the picture differs from movie.npz, region.nodes of the fit are too few.\n"
+            }
+            Nodes::EqualMinoTime { .. } => {
+                "# The fit's pixels are sums over chords (region.nodes = equal-mino-time), this scene's are integrals.\n"
+            }
+        };
+        if self.file.effects.absorption.is_some() {
+            text += "# The medium of the fit's effects.absorption is not part of scenes: this one is without it.\n";
+        }
+        text
+    }
+
+    /// Hole and observer.
+    fn place(&self, frame: usize) -> anyhow::Result<String> {
+        let (hole, observer) = (&self.file.hole, &self.file.observer);
+        let time = self.measured.times.get(frame).context("no frame")?;
+        let mut text = format!("[hole]\nspin = {:?}\n", hole.spin);
+        text += &line("mass_msun", hole.mass_msun);
+        text += &line("distance_kpc", hole.distance_kpc);
+        text += &format!("\n[observer]\ninclination_deg = {:?}\n", observer.inclination_deg);
+        text += &line("radius", observer.radius);
+        Ok(format!("{text}time = {time:?}               # of frame {frame}, M\n"))
+    }
+
+    /// The field of the fit; `image` is what the fit has at the time of the picture.
+    fn screen(&self, image: &[f32]) -> anyhow::Result<String> {
+        let screen = &self.file.screen;
+        let field = setup::spacing(screen)? * screen.pixels as f64;
+        let mut text = format!(
+            "[screen]\nfield_of_view_m = {field:?}\nwidth = {SIDE}                # {} in the fit\n",
+            screen.pixels
+        );
+        let flux: f64 = image.iter().map(|x| f64::from(*x)).sum();
+        let hole = &self.file.hole;
+        let on_sky = hole.mass_msun.is_some() && hole.distance_kpc.is_some();
+        if on_sky && screen.field_uas.is_none() && flux > 0.0 {
+            text += &format!(
+                "total_flux_jy = {flux:?}    # of the fit's frame; without this line intensities are Jy in a pixel of the fit\n"
+            );
+        }
+        Ok(text)
+    }
+
+    fn light(&self) -> String {
+        let effects = &self.file.effects;
+        let shift = effects.redshift_power;
+        let shift = shift.map(|power| format!("redshift = true\nredshift_power = {power:?}\n"));
+        format!(
+            "[effects]\n{}slow_light = {}\n\n[tracer]\nintegrator = \"elliptic\"\ntolerance = 1e-4          # cells of the volume are larger than what a finer one would show\n",
+            shift.unwrap_or_default(),
+            effects.slow_light
+        )
+    }
+
+    fn volume(&self, state: &State<f32>) -> anyhow::Result<String> {
+        let (motion, region) = (&self.file.motion, &self.file.region);
+        let law = setup::law(&motion.velocity, self.file.seed);
+        let law = toml::Value::try_from(&law).context("motion.velocity")?;
+        let region =
+            VolumeRegion { r_min: region.r_min, r_max: region.r_max, z_width: region.z_width };
+        let region = toml::Value::try_from(region).context("region")?;
+        let mut text = format!(
+            "[[volume]]\npath = \"{VOLUME}\"\nfactor = {:?}              # Jy in a pixel of the fit for 1 M of emission 1\naxis = {:?}\nrotation = {law}\nreference_time = {:?}\n",
+            self.file.screen.jy_per_pixel,
+            state.now.axis.vector(),
+            motion.reference_time
+        );
+        text += &line("injection_time", motion.injection_time);
+        Ok(format!("{text}region = {region}\n"))
+    }
+}
+
+/// `key = value`, if there is one.
+fn line(key: &str, value: Option<f64>) -> String {
+    value.map_or(String::new(), |value| format!("{key} = {value:?}\n"))
+}

@@ -1,0 +1,193 @@
+//! What a fit starts from (`--init`) and what it leaves for other verbs: a scene, and a movie that telescopes see.
+
+use crate::support::{fail, root, succeed};
+use kerrlight_tomo::image::exr;
+use std::path::Path;
+
+/// A fit of few rays with many nodes on each, so that its own sums are as good as a scene's; the axis is tilted, light
+/// takes its time, matter moves at a drawn velocity and shines from some time on.
+fn fit(folder: &Path) {
+    let file = root().join("scenes/fits/flare_images.toml");
+    let law = "{perturbed={of={keplerian={drag=0.3}},deviation=0.01,correlation_length=2.0,radii=[2.0,10.0]}}";
+    let law = format!("motion.velocity={law}");
+    let mut words = vec!["fit", file.to_str().unwrap(), "-o", "run"];
+    for change in [
+        "screen.pixels=16",
+        "region.nodes={gauss={order=8,split=24}}",
+        "region.z_width=2.5",
+        "effects.redshift_power=2.5",
+        &law,
+        "motion.axis=[0.5,0.3,0.8]",
+        "motion.injection_time=-8.0",
+        "movie={frames=5,from=-5.0,to=60.0}",
+        "representation=linear-grid",
+        "representation.nodes=24",
+        "training.start=drawn",
+        "linear={upper=3.0,rounds=1,iterations=8}",
+        "output.nodes=24",
+    ] {
+        words.extend(["--set", change]);
+    }
+    succeed(folder, &words);
+}
+
+fn array(path: &Path, name: &str) -> Vec<f64> {
+    let file = std::fs::File::open(path).unwrap();
+    let mut archive = zip::ZipArchive::new(file).unwrap();
+    let mut bytes = Vec::new();
+    std::io::Read::read_to_end(&mut archive.by_name(name).unwrap(), &mut bytes).unwrap();
+    let array = npyz::NpyFile::new(&bytes[..]).unwrap();
+    match array.dtype().descr().contains("f4") {
+        true => array.into_vec::<f32>().unwrap().into_iter().map(f64::from).collect(),
+        false => array.into_vec::<f64>().unwrap(),
+    }
+}
+
+/// The picture of a run's scene is the frame of its movie, and its film the others.
+#[test]
+fn exact_scene_of_a_run_is_its_movie() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    fit(path);
+    let movie = path.join("run/movie.npz");
+    let (frames, times) = (array(&movie, "recovered.npy"), array(&movie, "time.npy"));
+    let intensity = |name: &str| -> Vec<f64> {
+        let (picture, _) = exr::decode(&std::fs::read(path.join(name)).unwrap()).unwrap();
+        picture.channel("intensity").unwrap().iter().map(|x| f64::from(*x)).collect()
+    };
+    // Without the line that scales it to Jy/uas^2 the picture is in Jy a pixel of the fit.
+    // One ray in the middle of each pixel, as the fit has it.
+    let small = [
+        "--set",
+        "screen.width=16",
+        "--set",
+        "screen.total_flux_jy=",
+        "--set",
+        "screen.rings=regular-grid",
+    ];
+    let span = ["--frames", "5", "--from=-5", "--to=60", "-o", "film"];
+    succeed(path, &[&["movie", "run/scene.toml"][..], &small, &span].concat());
+    let mean = frames.iter().sum::<f64>() / 5.0;
+    for (k, frame) in frames.chunks(256).enumerate() {
+        let picture = intensity(&format!("film/frame_{k:04}.exr"));
+        let off: f64 = picture.iter().zip(frame).map(|(a, b)| (a - b).abs()).sum();
+        // What is left is the sums of the fit at the edges of cells and of the region.
+        assert!(mean > 0.0 && off < 0.005 * mean, "frame {k}: {} of the light", off / mean);
+    }
+    succeed(path, &[&["render", "run/scene.toml", "-o", "a.exr"][..], &small].concat());
+    let scene = std::fs::read_to_string(path.join("run/scene.toml")).unwrap();
+    let shown =
+        times.iter().position(|time| scene.contains(&format!("\ntime = {time:?}"))).unwrap();
+    assert_eq!(intensity("a.exr"), intensity(&format!("film/frame_{shown:04}.exr")));
+}
+
+/// Telescopes see a fit's movie with the field and the times that it has.
+#[test]
+fn exact_movie_of_a_run_is_observed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    fit(path);
+    fn see<'a>(more: &[&'a str]) -> Vec<&'a str> {
+        let words = [
+            "observe",
+            "run/movie.npz",
+            "--array",
+            "EHT2017",
+            "--source",
+            "sgra",
+            "--mjd",
+            "57851",
+        ];
+        let times = ["--frames", "3", "--tint", "30", "--elevation", "10-85"];
+        [&words[..], &times, more].concat()
+    }
+    // 65 M of Sgr A* are 22.16 minutes.
+    let hours = array(&path.join("run/movie.npz"), "hours.npy");
+    assert!((hours[4] - 65.0 * 20.4604 / 3600.0).abs() < 1e-4, "{hours:?}");
+    succeed(path, &see(&["--utc", "12.9-13.2", "--frame-times", "own", "-o", "a.csv"]));
+    let field = array(&path.join("run/movie.npz"), "field_uas.npy")[0].to_string();
+    succeed(
+        path,
+        &see(&["--utc", "12.9-13.2", "--frame-times", "own", "--fov-uas", &field, "-o", "b.csv"]),
+    );
+    let read = |name: &str| std::fs::read_to_string(path.join(name)).unwrap();
+    assert_eq!(read("a.csv"), read("b.csv"));
+    let message = fail(path, &see(&["--utc", "12.9-13.2", "-o", "c.csv"]));
+    assert!(message.contains("--frame-times"), "{message}");
+}
+
+/// The starter file of the built-in experiment is the built-in experiment.
+#[test]
+fn exact_starter_of_the_built_in_experiment() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    succeed(path, &["fit", "--init"]);
+    let table = |text: &str| text.parse::<toml::Table>().unwrap();
+    let text = std::fs::read_to_string(path.join("my_fit.toml")).unwrap();
+    assert_eq!(table(&text), table(&succeed(path, &["fit", "--print"])));
+    assert!(fail(path, &["fit", "--init"]).contains("my_fit.toml exists"));
+    assert!(
+        fail(path, &["fit", "--init", "nowhere.uvfits", "-o", "x.toml"]).contains("nowhere.uvfits")
+    );
+}
+
+const SEEN: &str = "observe image.csv --fov-uas 100 --array EHT2017 --mjd 57850 --utc 5-7 --frames 6 --tint 60 --noise thermal --seed 1";
+
+/// Data of a source that is known here are fitted at once; of another one when the user has filled in what is missing.
+#[test]
+fn exact_starters_of_visibilities_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let row = "0.1,0.2,0.1\n".repeat(3);
+    std::fs::write(path.join("image.csv"), row).unwrap();
+    let few = ["--set", "training.steps=2", "--set", "screen.pixels=8", "--set", "output.nodes=8"];
+    for (source, name) in [("sgra", "a"), ("12.5,12.4", "b")] {
+        let (data, toml) = (format!("{name}.uvfits"), format!("{name}.toml"));
+        let words: Vec<&str> = SEEN.split(' ').chain(["--source", source, "-o", &data]).collect();
+        succeed(path, &words);
+        succeed(path, &["fit", "--init", &data, "-o", &toml]);
+        let fit = [&["fit", &toml, "-o", name][..], &few].concat();
+        if source == "sgra" {
+            succeed(path, &fit);
+            continue;
+        }
+        for (line, missing) in [
+            ("# inclination_deg = 60.0", "inclination_deg"),
+            ("# mass_msun = 4.154e6", "hole.mass_msun is missing"),
+            ("# distance_kpc = 8.178", "hole.distance_kpc is missing"),
+        ] {
+            let message = fail(path, &fit);
+            assert!(message.contains(missing), "{message}");
+            let text = std::fs::read_to_string(path.join(&toml)).unwrap();
+            assert!(text.contains(line), "{text}");
+            std::fs::write(path.join(&toml), text.replacen(line, &line[2..], 1)).unwrap();
+        }
+        succeed(path, &fit);
+    }
+}
+
+/// Images: what they do not tell is asked for, key by key.
+#[test]
+fn exact_starters_of_images_ask_for_what_is_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    fit(path);
+    succeed(path, &["fit", "--init", "run/movie.npz", "-o", "images.toml"]);
+    let few =
+        ["--set", "training.steps=2", "--set", "output.nodes=8", "--set", "training.start=drawn"];
+    let fit = [&["fit", "images.toml", "-o", "again"][..], &few].concat();
+    let mut filled = 0;
+    loop {
+        let text = std::fs::read_to_string(path.join("images.toml")).unwrap();
+        let Some((before, rest)) = text.split_once("# FILL IN") else { break };
+        let (reason, rest) = rest.split_once('\n').unwrap();
+        let key = rest.split_whitespace().nth(1).unwrap();
+        let message = fail(path, &fit);
+        assert!(message.contains("missing"), "{key}: {message}");
+        let rest = rest.strip_prefix("# ").unwrap();
+        std::fs::write(path.join("images.toml"), format!("{before}#{reason}\n{rest}")).unwrap();
+        filled += 1;
+    }
+    assert_eq!(filled, 10);
+    succeed(path, &fit);
+}
