@@ -99,5 +99,5 @@ pub fn own(name: &str, settings: &OwnSettings) -> anyhow::Result<Box<dyn Represe
         return build(settings);
     }
     let own: String = all.iter().map(|(name, _)| format!(", {name}")).collect();
-    bail!("representation.kind = {name:?} is not allowed: {}{own}", crate::fit::representations())
+    bail!("representation.kind = {name:?} is not allowed: {}{own}", fit::representations())
 }
