@@ -309,7 +309,11 @@ fn wrong_results_are_named_before_anything_runs() {
     for (changes, message) in [
         (vec![(value, "value = \"nosuch\"")], "value = \"nosuch\" is not allowed: psnr_db, "),
         (
-            vec![(value, "value = \"chi2\""), ("[set]", two)],
+            vec![
+                (value, "value = \"chi2\""),
+                ("[set]", two),
+                ("start = \"drawn\"", "start = \"drawn\", batch = { frames = 2 }"),
+            ],
             "chi2 is one of several losses: take chi2.image or chi2.light-curve",
         ),
         (vec![(value, "value = \"chi2.amplitudes\"")], "no loss has data = \"amplitudes\""),

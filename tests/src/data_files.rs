@@ -280,7 +280,9 @@ fn exact_inspect_knows_arrays_and_runs() {
     std::fs::write(&data, files::write_uvfits(&measured()).unwrap()).unwrap();
     assert_eq!(fit(path, "sgra_visibilities.toml", &data, "run"), Ok(()));
     let said = succeed(path, &["inspect", "run"]);
-    for part in ["run: a fit", "bhnerf", "data.uvfits", "2 of 2", "chi2_per_datum", "volume.npz"] {
+    for part in
+        ["run: a fit", "feature-grid", "data.uvfits", "2 of 2", "chi2_per_datum", "volume.npz"]
+    {
         assert!(said.contains(part), "{part}: {said}");
     }
     let said = succeed(path, &["inspect", "run/volume.npz"]);

@@ -175,7 +175,9 @@ fn exact_a_folder_belongs_to_one_process() {
     child.kill().unwrap();
     child.wait().unwrap();
     // Not the lock is in the way now.
-    std::fs::write(at.join("array.txt"), "").unwrap();
+    let mut array = std::fs::read_to_string(at.join("array.txt")).unwrap();
+    array.push_str("# changed\n");
+    std::fs::write(at.join("array.txt"), array).unwrap();
     assert!(said(&["fit", "--resume", "run"]).contains("array.txt has changed"));
 }
 

@@ -118,6 +118,9 @@ pub fn solved(solution: &LinearSolution<f32>) -> Value {
 pub fn statement(solution: &LinearSolution<f32>) -> String {
     let stopped = matches!(solution.ending, Ending::Exhausted | Ending::Cancelled);
     if let Some(certificate) = solution.certificate {
+        if !certificate.relative_gap().is_finite() {
+            return "minimum of a convex problem: the dark field explains the data".to_owned();
+        }
         return format!(
             "minimum of a convex problem, with a certificate: at most {:.1e} of the dark field's loss above the least",
             certificate.relative_gap()

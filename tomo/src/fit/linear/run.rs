@@ -220,15 +220,17 @@ impl<'a, 'p, 'w, T: Scalar + Default> Run<'a, 'p, 'w, T> {
         }
     }
 
-    /// Brings a field whose data do not know the flux back to the one that was given: nothing else changes.
+    /// Brings a field whose data do not know the flux back to the one that was given, within the bound. The bound
+    /// acted on another scale before, so that it may cut off some of the peak; it must leave nine tenths of the flux.
     fn rescale(&self, objective: &Objective<'_, '_, T>, x: &mut [f64]) -> Result<(), LinearError> {
         let Some(flux) = self.problem.flux.filter(|_| objective.data.is_scale_free()) else {
             return Ok(());
         };
         let scale = flux / objective.flux(x);
-        x.iter_mut().for_each(|x| *x *= scale);
-        let (needed, upper) = (x.iter().fold(0.0f64, |most, x| most.max(*x)), self.problem.upper);
-        if needed > upper {
+        let upper = self.problem.upper;
+        let needed = x.iter().fold(0.0f64, |most, x| most.max(scale * *x));
+        x.iter_mut().for_each(|x| *x = (scale * *x).min(upper));
+        if needed > upper && objective.flux(x) < 0.9 * flux {
             return Err(LinearError::TooBright { flux, needed, upper });
         }
         Ok(())

@@ -15,7 +15,7 @@ use num_complex::Complex;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DataTermError {
     /// A datum with an error of 0, infinity, or so small that its weight is none in single precision.
-    #[error("datum {index}: sigma = {sigma} Jy is not allowed: 1e-18 or above, and finite")]
+    #[error("datum {index}: sigma = {sigma} Jy is not allowed: above 0 and finite")]
     Sigma {
         /// Which datum, counted from 0.
         index: usize,
@@ -90,7 +90,7 @@ fn stations_of(observation: &Observation) -> Vec<[u16; 2]> {
 /// Stokes I of an observation, in order, with errors fit for a χ².
 fn checked(observation: &Observation) -> Result<Vec<Measured>, DataTermError> {
     let data: Vec<Measured> = observation.stokes_i().map(|(_, i)| i).collect();
-    let bad = data.iter().position(|m| !(m.noise_sigma >= 1e-18 && m.noise_sigma.is_finite()));
+    let bad = data.iter().position(|m| !(m.noise_sigma > 0.0 && m.noise_sigma.is_finite()));
     match bad {
         Some(index) => Err(DataTermError::Sigma { index, sigma: data[index].noise_sigma }),
         None if data.is_empty() => Err(DataTermError::Empty),
