@@ -94,15 +94,15 @@ impl Compare {
             set: self.set.clone(),
         };
         let chosen = cases::expand(&experiment, &source, &choice)?;
-        if self.list {
-            return list_cases(&chosen);
-        }
         ran::check(&experiment, &chosen).with_context(|| name.display().to_string())?;
         if let [first, ..] = &chosen[..]
             && chosen.iter().all(|case| case.settings.is_err())
         {
             let why = first.settings.as_ref().err().map(String::as_str).unwrap_or_default();
             bail!("{}: no case can be run; {}: {why}", name.display(), first.name());
+        }
+        if self.list {
+            return list_cases(&chosen);
         }
         let all = cases::expand(&experiment, &source, &choice.unrestricted())?;
         let (folder, lock) = self.folder(name, &text)?;

@@ -43,9 +43,13 @@ impl Judged {
         let name = of.map_or("", |(name, _)| name.as_str());
         match fault {
             Fault::NotFinite => format!("χ² of {name} is not a number"),
-            Fault::Large | Fault::Small => {
-                of.map_or(String::new(), |(n, tested)| chi2_of(n, tested))
-            }
+            Fault::Large => of.map_or(String::new(), |(name, tested)| {
+                let part = tested.statistics.misfit().map(percent);
+                let part = part
+                    .map_or(String::new(), |part| format!("; residuals are {part} of the data"));
+                format!("{}{part}", chi2_of(name, tested))
+            }),
+            Fault::Small => of.map_or(String::new(), |(n, tested)| chi2_of(n, tested)),
             Fault::Misfit(part) => {
                 format!("residuals of the noise-free {name} are {} of the data", percent(*part))
             }
