@@ -157,8 +157,7 @@ pub fn still(
         "The volume as the observer sees it at time {time:.1} GM/c³ ({names}), with {n} × {n} rays that are bent by \
          the hole; {with}. Light that passes close to the hole goes around it: a spot has fainter second \
          images on the other side, and what is behind the hole is seen around it. This is sharper than the pixels \
-         that are fitted to the data, which are shown further down; what is thinner than a ray's distance looks \
-         dotted. One linear scale of brightness, from black (0) to yellow \
+         that are fitted to the data, which are shown further down; photon rings have as many more rays as they need. One linear scale of brightness, from black (0) to yellow \
          ({most:.3e}: emission summed up along the ray, in M)."
     );
     let alt = format!("The lensed image of the volume: {names}.");
