@@ -48,6 +48,21 @@ impl Axis {
         core::array::from_fn(|k| gradient[k] - along * self.0[k])
     }
 
+    /// Itself and two unit vectors across it, right-handed.
+    pub fn basis(self) -> [[f64; 3]; 3] {
+        let n = self.0;
+        let least = (0..3).fold(0, |k, c| if n[c].abs() < n[k].abs() { c } else { k });
+        let mut unit = [0.0; 3];
+        unit[least] = 1.0;
+        let east = Self::new(self.tangent(unit)).unwrap_or(self).0;
+        let north = [
+            n[1] * east[2] - n[2] * east[1],
+            n[2] * east[0] - n[0] * east[2],
+            n[0] * east[1] - n[1] * east[0],
+        ];
+        [n, east, north]
+    }
+
     /// The direction of self + step: a step on the sphere, to first order. A step that leads to the
     /// centre or is not finite is not taken.
     pub fn moved(self, step: [f64; 3]) -> Self {

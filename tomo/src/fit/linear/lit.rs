@@ -30,7 +30,7 @@ impl Around {
     /// Nodes of a grid about the hole.
     pub fn new(voxels: &Voxels, axis: Axis) -> Self {
         let nodes = (0..voxels.count()).map(|k| voxels.position(k)).collect();
-        Self { basis: basis(axis), nodes, half: 0.5 * (voxels.high[0] - voxels.low[0]) }
+        Self { basis: axis.basis(), nodes, half: 0.5 * (voxels.high[0] - voxels.low[0]) }
     }
 
     fn field(&self, light: impl Fn([f64; 3]) -> f64) -> Vec<f64> {
@@ -69,19 +69,4 @@ impl Spots {
 
 fn bell(u: f64) -> f64 {
     (-0.5 * u * u).exp()
-}
-
-/// The axis and two directions across it.
-fn basis(axis: Axis) -> [[f64; 3]; 3] {
-    let n = axis.vector();
-    let least = (0..3).fold(0, |k, c| if n[c].abs() < n[k].abs() { c } else { k });
-    let mut unit = [0.0; 3];
-    unit[least] = 1.0;
-    let east = Axis::new(axis.tangent(unit)).unwrap_or(axis).vector();
-    let north = [
-        n[1] * east[2] - n[2] * east[1],
-        n[2] * east[0] - n[0] * east[2],
-        n[0] * east[1] - n[1] * east[0],
-    ];
-    [n, east, north]
 }

@@ -63,16 +63,7 @@ fn around(axis: Axis, angle: f64, level: usize) -> Vec<Axis> {
 
 /// An axis moved on its tangent plane.
 fn moved(axis: Axis, [x, y]: [f64; 2]) -> Axis {
-    let n = axis.vector();
-    let least = (0..3).fold(0, |k, c| if n[c].abs() < n[k].abs() { c } else { k });
-    let mut unit = [0.0; 3];
-    unit[least] = 1.0;
-    let east = Axis::new(axis.tangent(unit)).unwrap_or(axis).vector();
-    let north = [
-        n[1] * east[2] - n[2] * east[1],
-        n[2] * east[0] - n[0] * east[2],
-        n[0] * east[1] - n[1] * east[0],
-    ];
+    let [_, east, north] = axis.basis();
     axis.moved(core::array::from_fn(|c| x * east[c] + y * north[c]))
 }
 
