@@ -7,7 +7,7 @@ use clap::Args;
 use clap::builder::PossibleValuesParser;
 use clap::builder::TypedValueParser;
 use kerrlight_geodesic::{
-    Bundle, Inclination, Integrator, Kerr, Observer, Placement, Points, Request, Tracer,
+    Inclination, Integrator, Kerr, Observer, Placement, Points, RayTable, Request, Tracer,
     Uncertainty,
 };
 use kerrlight_tomo::memory;
@@ -180,7 +180,7 @@ impl Trace {
         Ok(bytes)
     }
 
-    fn trace(&self, table: &Table, ray: &RayLine, request: &Request) -> anyhow::Result<Bundle> {
+    fn trace(&self, table: &Table, ray: &RayLine, request: &Request) -> anyhow::Result<RayTable> {
         let hole = Kerr::new(ray.spin)?;
         let inclination = if table.in_degrees {
             Inclination::from_degrees(ray.inclination)?
@@ -197,7 +197,7 @@ impl Trace {
         Ok(self.integrator.trace(&hole, &observer, alpha, beta, self.tolerance, request)?)
     }
 
-    fn columns(&self, table: &Table, traced: &[Bundle]) -> Vec<Vec<Column>> {
+    fn columns(&self, table: &Table, traced: &[RayTable]) -> Vec<Vec<Column>> {
         let number = |name: &str, value: &dyn Fn(usize) -> f64| {
             Column::Numbers(name.to_owned(), (0..traced.len()).map(value).collect())
         };
@@ -241,14 +241,14 @@ impl Trace {
 /// The columns of each ray's first `width` points, filled up with NaN; those that were not
 /// asked for are left out.
 fn points(
-    traced: &[Bundle],
+    traced: &[RayTable],
     width: usize,
     prefix: &str,
-    of: impl Fn(&Bundle) -> &Points,
+    of: impl Fn(&RayTable) -> &Points,
 ) -> Vec<Column> {
     let block = |name: &str, row: &dyn Fn(&Points) -> Vec<f64>| {
-        let rows = traced.iter().map(|bundle| {
-            let mut row = row(of(bundle));
+        let rows = traced.iter().map(|table| {
+            let mut row = row(of(table));
             row.resize(width, f64::NAN);
             row
         });
@@ -261,7 +261,7 @@ fn points(
         block("phi", &|p| p.azimuth.clone()),
         block("delay", &|p| p.delay.clone()),
     ];
-    let has = |wanted: &dyn Fn(&Points) -> bool| traced.iter().any(|bundle| wanted(of(bundle)));
+    let has = |wanted: &dyn Fn(&Points) -> bool| traced.iter().any(|table| wanted(of(table)));
     if has(&|p| !p.momentum.is_empty()) {
         columns.push(block("p_r", &|p| p.momentum.iter().map(|m| m[1]).collect()));
         columns.push(block("p_theta", &|p| p.momentum.iter().map(|m| m[2]).collect()));

@@ -4,8 +4,8 @@
 //! `cargo bench -p kerrlight-geodesic --features affine`
 
 use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use kerrlight_geodesic::bundle::{Crossings, Samples, Width};
-use kerrlight_geodesic::{Inclination, Kerr, Observer, Path, Ray, Tracer, Want};
+use kerrlight_geodesic::simd::{Crossings, Samples, Width};
+use kerrlight_geodesic::{Inclination, Kerr, Observer, Path, Quantities, Ray, Tracer};
 use std::hint::black_box;
 
 /// Sum of the Mino times of all rays, by the tracer at a tolerance of 1e-13.
@@ -20,7 +20,7 @@ fn rays() -> (Kerr, Vec<Ray>) {
     (hole, rays.collect())
 }
 
-fn trace_all(tracer: &Tracer, hole: &Kerr, rays: &[Ray], want: Want, path: &mut Path) -> f64 {
+fn trace_all(tracer: &Tracer, hole: &Kerr, rays: &[Ray], want: Quantities, path: &mut Path) -> f64 {
     let mut total = 0.0;
     for ray in rays {
         tracer.trace(hole, ray, want, path);
@@ -29,11 +29,11 @@ fn trace_all(tracer: &Tracer, hole: &Kerr, rays: &[Ray], want: Want, path: &mut 
     total
 }
 
-const WANTS: [(&str, Want); 4] = [
-    ("r, theta", Want::POLAR),
-    ("and time", Want { azimuth: false, time: true }),
-    ("and azimuth", Want { azimuth: true, time: false }),
-    ("everything", Want::ALL),
+const WANTS: [(&str, Quantities); 4] = [
+    ("r, theta", Quantities::POLAR),
+    ("and time", Quantities { azimuth: false, time: true, velocity: false }),
+    ("and azimuth", Quantities { azimuth: true, time: false, velocity: false }),
+    ("everything", Quantities::ALL),
 ];
 
 fn requests(c: &mut Criterion) {
@@ -60,10 +60,10 @@ fn tolerances(c: &mut Criterion) {
         let tolerance = 10f64.powi(-exponent);
         let tracer = Tracer::new(tolerance).expect("a tolerance");
         let mut path = Path::new();
-        let total = trace_all(&tracer, &hole, &rays, Want::ALL, &mut path);
+        let total = trace_all(&tracer, &hole, &rays, Quantities::ALL, &mut path);
         assert!((total / MINO_TOTAL - 1.0).abs() < 0.1 * tolerance.max(1e-11), "{total}");
         group.bench_function(BenchmarkId::from_parameter(tolerance), |b| {
-            b.iter(|| black_box(trace_all(&tracer, &hole, &rays, Want::ALL, &mut path)));
+            b.iter(|| black_box(trace_all(&tracer, &hole, &rays, Quantities::ALL, &mut path)));
         });
     }
     group.finish();
@@ -74,7 +74,7 @@ fn samples(c: &mut Criterion) {
     let tracer = Tracer::new(1e-9).expect("a tolerance");
     let mut paths = vec![Path::new(); 64];
     for (path, ray) in paths.iter_mut().zip(rays.iter().step_by(64)) {
-        tracer.trace(&hole, ray, Want::ALL, path);
+        tracer.trace(&hole, ray, Quantities::ALL, path);
         let end = path.at(path.mino_total());
         assert!(end.radius() < 2.0 || end.radius() > 1e6);
     }
@@ -120,11 +120,11 @@ fn bundles(c: &mut Criterion) {
     let mut path = Path::new();
     let mut length = |(alpha, beta): (&f64, &f64)| {
         let ray = observer.ray(&hole, *alpha, *beta).expect("a ray");
-        tracer.trace(&hole, &ray, Want::POLAR, &mut path);
+        tracer.trace(&hole, &ray, Quantities::POLAR, &mut path);
         path.turning_point().map_or(path.mino_total(), |(turning, _)| 2.0 * turning)
     };
     let expected: f64 = alpha.iter().zip(&beta).map(&mut length).sum();
-    let mut group = c.benchmark_group("4096 rays x 100 samples, bundle");
+    let mut group = c.benchmark_group("4096 rays x 100 samples, simd");
     group.throughput(Throughput::Elements(409_600));
     for width in WIDTHS.into_iter().filter(|width| width.available()) {
         let mut samples = Samples::default();
@@ -137,7 +137,7 @@ fn bundles(c: &mut Criterion) {
         group.bench_function(format!("{width:?}"), |b| b.iter(|| run(&mut samples)));
     }
     group.finish();
-    let mut group = c.benchmark_group("rays x 100 samples, bundle");
+    let mut group = c.benchmark_group("rays x 100 samples, simd");
     for n in [16, 32, 64, 128] {
         let (hole, observer, alpha, beta) = picture(n);
         let mut samples = Samples::default();
@@ -159,7 +159,7 @@ fn bundles(c: &mut Criterion) {
 /// within 1e-9 of the tracer.
 fn crossings(c: &mut Criterion) {
     let (hole, observer, alpha, beta) = picture(64);
-    let mut group = c.benchmark_group("first crossings of 4096 rays, bundle");
+    let mut group = c.benchmark_group("first crossings of 4096 rays, simd");
     group.throughput(Throughput::Elements(4096));
     for width in WIDTHS.into_iter().filter(|width| width.available()) {
         let mut found = Crossings::default();
@@ -171,7 +171,7 @@ fn crossings(c: &mut Criterion) {
         group.bench_function(format!("{width:?}"), |b| b.iter(|| run(&mut found)));
     }
     group.finish();
-    let mut group = c.benchmark_group("first crossings, bundle");
+    let mut group = c.benchmark_group("first crossings, simd");
     for n in [16, 64, 256] {
         let (hole, observer, alpha, beta) = picture(n);
         let mut found = Crossings::default();
@@ -198,7 +198,7 @@ fn assert_crossings(
     let mut path = Path::new();
     for k in (0..alpha.len()).step_by(7) {
         let ray = observer.ray(hole, alpha[k], beta[k]).expect("a ray");
-        tracer.trace(hole, &ray, Want::ALL, &mut path);
+        tracer.trace(hole, &ray, Quantities::ALL, &mut path);
         let end = path.turning_point().map_or(f64::INFINITY, |(turning, _)| 2.0 * turning);
         let time = path.equatorial_crossings().next().filter(|time| *time < end);
         let crossing = found.ray(k).next();

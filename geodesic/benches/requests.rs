@@ -5,7 +5,7 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use kerrlight_geodesic::{
-    Bundle, Inclination, Integrator, Kerr, Observer, Placement, Request, derivatives, footprint,
+    Inclination, Integrator, Kerr, Observer, Placement, RayTable, Request, derivatives, footprint,
 };
 use std::hint::black_box;
 
@@ -28,7 +28,7 @@ impl Screen {
         Screen { hole, observer: Observer::at_infinity(inclination), alpha, beta }
     }
 
-    fn trace(&self, tolerance: f64, request: &Request) -> Bundle {
+    fn trace(&self, tolerance: f64, request: &Request) -> RayTable {
         let Screen { hole, observer, alpha, beta } = self;
         let traced = Integrator::TaylorMino.trace(hole, observer, alpha, beta, tolerance, request);
         traced.expect("rays")
@@ -58,7 +58,7 @@ fn ladder(first: Request) -> [(&'static str, Request); 6] {
 }
 
 /// Radii, and what else there is, agree with a trace at 1e-13 within what the tolerance allows.
-fn agree(found: &Bundle, exact: &Bundle) {
+fn agree(found: &RayTable, exact: &RayTable) {
     assert_eq!(found.outcome, exact.outcome);
     for (points, exact) in [(&found.crossings, &exact.crossings), (&found.samples, &exact.samples)]
     {
@@ -89,7 +89,7 @@ fn run(c: &mut Criterion, name: &str, first: Request) {
     // Derivatives of positions, azimuth and time.
     let request = Request { azimuth: true, time: true, ..first };
     let exact = screen.trace(1e-13, &request);
-    agree(&screen.differentiate(&request).bundle, &exact);
+    agree(&screen.differentiate(&request).values, &exact);
     group.bench_function("derivatives of (time, r, theta, azimuth)", |b| {
         b.iter(|| black_box(screen.differentiate(&request)));
     });

@@ -29,7 +29,7 @@ fn main() -> Result<(), OutOfRange> {
         // The normal equations of the linear problem, two by two.
         let (mut square, mut side, mut rest) = ([0.0; 3], [0.0; 2], 0.0);
         for (k, by) in rays.crossings.radius.iter().enumerate() {
-            let miss = measured[k] - rays.bundle.crossings.radius[k];
+            let miss = measured[k] - rays.values.crossings.radius[k];
             let (a, i) = (by.spin, by.inclination);
             square = [square[0] + a * a, square[1] + a * i, square[2] + i * i];
             side = [side[0] + a * miss, side[1] + i * miss];

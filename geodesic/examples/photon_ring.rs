@@ -3,7 +3,9 @@
 //!
 //! `cargo run --release -p kerrlight-geodesic --example photon_ring`
 
-use kerrlight_geodesic::{Inclination, Kerr, Observer, OutOfRange, Path, PathPoint, Tracer, Want};
+use kerrlight_geodesic::{
+    Inclination, Kerr, Observer, OutOfRange, Path, PathPoint, Quantities, Tracer,
+};
 
 const CIRCLE: f64 = 10.0;
 
@@ -16,7 +18,7 @@ fn main() -> Result<(), OutOfRange> {
     // The n-th crossing of the disc by the ray with impact parameter b.
     let crossing = |b: f64, n: usize| -> Result<Option<PathPoint>, OutOfRange> {
         let mut path = Path::new();
-        tracer.trace(&hole, &face_on.ray(&hole, b, 0.0)?, Want::ALL, &mut path);
+        tracer.trace(&hole, &face_on.ray(&hole, b, 0.0)?, Quantities::ALL, &mut path);
         let time = path.equatorial_crossings().nth(n);
         Ok(time.map(|time| path.at(time)))
     };

@@ -8,13 +8,13 @@
 //!
 //! (or `cdylib`), and `examples/c/shadow.c` uses it. Rust programs have no need of this module.
 
-use crate::columns::{Bundle, Points};
 use crate::error::{OutOfRange, check};
-use crate::integrator::Integrator;
-use crate::kerr::Kerr;
-use crate::observer::{Inclination, Observer};
-use crate::path::{Outcome, Unresolved};
-use crate::request::{Placement, Request};
+use crate::integrate::path::{Outcome, Unresolved};
+use crate::rays::columns::{Points, RayTable};
+use crate::rays::integrator::Integrator;
+use crate::rays::request::{Placement, Request};
+use crate::screen::observer::{Inclination, Observer};
+use crate::spacetime::kerr::Kerr;
 use std::cell::RefCell;
 use std::ffi::{c_char, c_int};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -189,10 +189,10 @@ unsafe fn trace(
         Observer::at_radius(inclination, scene.observer_radius)?
     };
     let request = request(out, placement);
-    let bundle =
+    let table =
         integrator(*scene)?.trace(&hole, &observer, alpha, beta, scene.tolerance, &request)?;
     // SAFETY: the arrays of `out` are null or have the lengths that the header says.
-    unsafe { fill(out, &bundle, rays) };
+    unsafe { fill(out, &table, rays) };
     Ok(())
 }
 
@@ -301,23 +301,23 @@ unsafe fn put<T>(column: *mut T, values: impl Iterator<Item = T>) {
 
 /// # Safety
 /// The columns are null or have the lengths that the header says.
-unsafe fn fill(out: &RayColumns, bundle: &Bundle, rays: usize) {
+unsafe fn fill(out: &RayColumns, table: &RayTable, rays: usize) {
     let code = |outcome: &Outcome| match outcome {
         Outcome::Captured => 0,
         Outcome::Escaped => 1,
         Outcome::Unresolved(Unresolved::PhotonOrbit) => 2,
         Outcome::Unresolved(Unresolved::StepLimit) => 3,
     };
-    let errors = bundle.uncertainty.iter().flat_map(|u| [u.radius, u.theta, u.azimuth, u.delay]);
+    let errors = table.uncertainty.iter().flat_map(|u| [u.radius, u.theta, u.azimuth, u.delay]);
     // SAFETY: the caller's promise, for each column.
     unsafe {
-        put(out.outcome, bundle.outcome.iter().map(code));
-        put(out.mino_total, bundle.mino_total.iter().copied());
-        put(out.turning_radius, bundle.turning_radius.iter().copied());
-        put(out.crossing_count, bundle.crossing_count.iter().copied());
+        put(out.outcome, table.outcome.iter().map(code));
+        put(out.mino_total, table.mino_total.iter().copied());
+        put(out.turning_radius, table.turning_radius.iter().copied());
+        put(out.crossing_count, table.crossing_count.iter().copied());
         put(out.uncertainty, errors);
-        fill_points(&out.crossings, &bundle.crossings, rays);
-        fill_points(&out.samples, &bundle.samples, rays);
+        fill_points(&out.crossings, &table.crossings, rays);
+        fill_points(&out.samples, &table.samples, rays);
     }
 }
 

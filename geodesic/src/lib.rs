@@ -10,13 +10,13 @@
 //! time.
 //!
 //! ```
-//! use kerrlight_geodesic::{Inclination, Kerr, Observer, Outcome, Path, Tracer, Want};
+//! use kerrlight_geodesic::{Inclination, Kerr, Observer, Outcome, Path, Tracer, Quantities};
 //!
 //! let hole = Kerr::new(0.9)?;
 //! let observer = Observer::at_infinity(Inclination::from_degrees(60.0)?);
 //! let tracer = Tracer::new(1e-10)?;
 //! let mut path = Path::new();
-//! tracer.trace(&hole, &observer.ray(&hole, -6.0, 2.0)?, Want::ALL, &mut path);
+//! tracer.trace(&hole, &observer.ray(&hole, -6.0, 2.0)?, Quantities::ALL, &mut path);
 //!
 //! assert_eq!(path.outcome(), Outcome::Escaped);
 //! for time in path.equatorial_crossings() {
@@ -28,7 +28,7 @@
 //!
 //! # Many rays
 //! An [`Integrator`] traces whole columns of rays, on all cores with the feature `rayon`, and hands
-//! back a [`Bundle`] of columns: the same from every integrator. A ray depends on nothing but
+//! back a [`RayTable`]: the same from every integrator. A ray depends on nothing but
 //! itself, so the number of threads does not change a bit.
 //!
 //! ```
@@ -105,12 +105,12 @@
 //! [`Camera::blueshift`] is what its motion does to light.
 //!
 //! ```
-//! use kerrlight_geodesic::{Camera, Inclination, Kerr, Motion, Outcome, Path, Tracer, Want};
+//! use kerrlight_geodesic::{Camera, Inclination, Kerr, Motion, Outcome, Path, Tracer, Quantities};
 //!
 //! let hole = Kerr::new(0.9)?;
 //! let camera = Camera::new(&hole, Inclination::from_degrees(85.0)?, 12.0, Motion::FreeFall)?;
 //! let mut path = Path::new();
-//! Tracer::new(1e-9)?.trace(&hole, &camera.ray(0.0, 0.0)?, Want::POLAR, &mut path);
+//! Tracer::new(1e-9)?.trace(&hole, &camera.ray(0.0, 0.0)?, Quantities::POLAR, &mut path);
 //! assert_eq!(path.outcome(), Outcome::Captured); // straight ahead is the hole
 //! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
 //! ```
@@ -118,7 +118,7 @@
 //! # Beams
 //! [`footprint`] has what a small circle on the screen covers of the sky and of the equatorial
 //! plane, for filters and magnifications. (Whole pictures of samples at the highest speed are
-//! those of [`bundle`].)
+//! those of [`simd`].)
 //!
 //! ```
 //! use kerrlight_geodesic::{Camera, Inclination, Kerr, Motion, footprint};
@@ -145,67 +145,54 @@
 //! `rayon` (default): all cores. `affine`: an independent tracer in the affine parameter. `capi`:
 //! the functions of `include/kerrlight.h` for C.
 
-#[cfg(feature = "affine")]
-mod affine;
 /// The examples of the README compile and run.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 mod readme {}
 
+// In the order of the flow of data: a module imports from those above it.
+mod error;
+
+mod numbers;
+
+mod spacetime;
+
+mod screen;
+
+mod integrate;
+
 pub mod analytic;
-mod blocks;
-pub mod bundle;
-mod camera;
+
+pub mod simd;
+
+mod matter;
+
+mod rays;
+
 #[cfg(feature = "capi")]
 pub mod capi;
-mod columns;
-mod compensated;
-pub mod derivatives;
-mod dual;
-mod elliptic_rays;
-mod error;
-pub mod flow;
-pub mod footprint;
-mod frame;
-mod integrator;
-mod kerr;
-mod length;
-mod mino;
-mod observer;
-pub mod orbits;
-#[cfg(feature = "rayon")]
-mod parallel;
-mod path;
-pub mod plunge;
-mod point;
-mod polynomial;
-pub mod quadrature;
-mod radial;
-mod request;
-mod run;
-mod runge_kutta;
-mod sampling;
-mod scalar;
-mod series;
-mod stepper;
-mod trace;
-mod uncertainty;
 
-#[cfg(feature = "affine")]
-pub use affine::{AffinePath, AffineTracer};
-pub use camera::{Camera, Motion};
-pub use columns::{Bundle, Points};
-pub use compensated::Double;
-pub use dual::Dual;
+pub use matter::{flow, plunge};
+pub use numbers::quadrature;
+pub use rays::{derivatives, footprint};
+pub use spacetime::orbits;
+
 pub use error::OutOfRange;
-pub use frame::{ScreenPoint, ZamoFrame};
-pub use integrator::Integrator;
-pub use kerr::Kerr;
-pub use observer::{Inclination, Observer, Ray};
-pub use path::{Outcome, Path, Unresolved};
-pub use point::PathPoint;
-pub use radial::{Barrier, RadialPotential};
-pub use request::{Placement, Request};
-pub use scalar::{Elementary, Scalar};
-pub use trace::{Method, Tracer, Want, trace_series};
-pub use uncertainty::Uncertainty;
+#[cfg(feature = "affine")]
+pub use integrate::affine::{AffinePath, AffineTracer};
+pub use integrate::path::{Outcome, Path, Unresolved};
+pub use integrate::trace::{Method, Tracer, trace_series};
+pub use integrate::uncertainty::Uncertainty;
+pub use numbers::compensated::Double;
+pub use numbers::dual::Dual;
+pub use numbers::scalar::{Elementary, Scalar};
+pub use rays::columns::{Points, RayTable};
+pub use rays::integrator::Integrator;
+pub use rays::request::{Placement, Request};
+pub use screen::camera::{Camera, Motion};
+pub use screen::observer::{Inclination, Observer, Ray};
+pub use spacetime::frame::{ScreenPoint, ZamoFrame};
+pub use spacetime::kerr::Kerr;
+pub use spacetime::point::PathPoint;
+pub use spacetime::quantities::Quantities;
+pub use spacetime::radial::{Barrier, RadialPotential};

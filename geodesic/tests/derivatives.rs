@@ -3,7 +3,7 @@
 use kerrlight_geodesic::derivatives::{self, Gradient};
 use kerrlight_geodesic::{
     Double, Dual, Elementary, Inclination, Integrator, Kerr, Observer, Outcome, Path, PathPoint,
-    Placement, Request, Scalar, Want, trace_series,
+    Placement, Quantities, Request, Scalar, trace_series,
 };
 
 type Number = Dual<f64, 4>;
@@ -62,7 +62,7 @@ fn dual_path(case: &Case) -> Path<Number> {
     let [alpha, beta] = [Number::parameter(case.alpha, 2), Number::parameter(case.beta, 3)];
     let ray = observer(case, inclination).ray(&hole, alpha, beta).unwrap();
     let mut path = Path::empty();
-    trace_series(1e-14, &hole, &ray, Want::ALL, &mut path).unwrap();
+    trace_series(1e-14, &hole, &ray, Quantities::ALL, &mut path).unwrap();
     path
 }
 
@@ -76,7 +76,7 @@ fn moved_path(case: &Case, k: usize, step: f64) -> Path<Double> {
     let inclination = Inclination::from_radians(angle).unwrap();
     let ray = observer(case, inclination).ray(&hole, alpha, beta).unwrap();
     let mut path = Path::empty();
-    trace_series(1e-29, &hole, &ray, Want::ALL, &mut path).unwrap();
+    trace_series(1e-29, &hole, &ray, Quantities::ALL, &mut path).unwrap();
     path
 }
 
@@ -194,7 +194,7 @@ fn exact_derivatives_next_to_the_critical_curve() {
 }
 
 /// Everything that the columns hold, values first.
-fn columns(rays: &kerrlight_geodesic::Bundle, crossings: bool) -> Vec<[f64; 7]> {
+fn columns(rays: &kerrlight_geodesic::RayTable, crossings: bool) -> Vec<[f64; 7]> {
     let points = if crossings { &rays.crossings } else { &rays.samples };
     let column = |column: &[f64], k: usize| column.get(k).copied().unwrap_or(0.0);
     let row = |k: usize| {
@@ -225,7 +225,7 @@ fn gradients(rays: &derivatives::Differentiated, crossings: bool) -> Vec<[[f64; 
     (0..g.radius.len()).map(row).collect()
 }
 
-fn traced(case: &Case, place: Place, request: &Request) -> kerrlight_geodesic::Bundle {
+fn traced(case: &Case, place: Place, request: &Request) -> kerrlight_geodesic::RayTable {
     let [spin, angle, alpha, beta] = place;
     let hole = Kerr::new(spin).unwrap();
     let observer = observer(case, Inclination::from_radians(angle).unwrap());
@@ -264,9 +264,9 @@ fn exact_columns_of_derivatives_on_every_placement() {
         let observer = observer(case, Inclination::from_radians(place[1]).unwrap());
         let (alpha, beta) = ([case.alpha], [case.beta]);
         let found = derivatives::trace(&hole, &observer, &alpha, &beta, 1e-14, &request).unwrap();
-        assert_eq!(found.bundle.uncertainty.len(), 1);
+        assert_eq!(found.values.uncertainty.len(), 1);
         for crossings in [true, false] {
-            let mut expected = vec![[[0.0; 4]; 7]; columns(&found.bundle, crossings).len()];
+            let mut expected = vec![[[0.0; 4]; 7]; columns(&found.values, crossings).len()];
             assert!(crossings || !expected.is_empty());
             for k in 0..4 {
                 let h = 2e-3;
@@ -282,7 +282,7 @@ fn exact_columns_of_derivatives_on_every_placement() {
                     }
                 }
             }
-            let values = columns(&found.bundle, crossings);
+            let values = columns(&found.values, crossings);
             let plain = columns(&traced(case, place, &request), crossings);
             for ((value, plain), (found, expected)) in
                 values.iter().zip(&plain).zip(gradients(&found, crossings).iter().zip(&expected))
@@ -329,7 +329,7 @@ fn exact_rates_and_derivatives_at_fixed_mino_time() {
         derivatives::trace(&hole, &place, &[case.alpha], &[case.beta], 1e-14, &request).unwrap();
     let path = dual_path(&case);
     for k in 0..6 {
-        let time = rays.bundle.samples.mino_time[k];
+        let time = rays.values.samples.mino_time[k];
         let (rate, h) = (rays.samples.rate[k], 1e-4);
         let at = [1.0, -1.0, 2.0, -2.0]
             .map(|steps| quantities(&path.at(Number::constant(time + steps * h))));

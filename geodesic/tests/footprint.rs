@@ -3,7 +3,7 @@
 use kerrlight_geodesic::footprint::{self, Disc, Ellipse, Sky};
 use kerrlight_geodesic::quadrature::gauss_legendre;
 use kerrlight_geodesic::{
-    Camera, Inclination, Kerr, Motion, Observer, Outcome, Path, Ray, Tracer, Want,
+    Camera, Inclination, Kerr, Motion, Observer, Outcome, Path, Quantities, Ray, Tracer,
 };
 
 fn inclination(degrees: f64) -> Inclination {
@@ -13,7 +13,7 @@ fn inclination(degrees: f64) -> Inclination {
 /// Direction at infinity (0 if captured), then r and φ of the first crossing (0 if none).
 fn ends(hole: &Kerr, ray: &Ray) -> [f64; 5] {
     let mut path = Path::new();
-    Tracer::new(1e-14).unwrap().trace(hole, ray, Want::ALL, &mut path);
+    Tracer::new(1e-14).unwrap().trace(hole, ray, Quantities::ALL, &mut path);
     let escaped = path.outcome() == Outcome::Escaped;
     let n = if escaped { path.at(path.mino_total()).direction } else { [0.0; 3] };
     let hit = path.equatorial_crossings().next().map(|time| path.at(time));

@@ -59,14 +59,14 @@ fn exact_derivatives_are_numbers_everywhere() {
                     count[1] += defined(column);
                 }
             }
-            for (ray, outcome) in rays.bundle.outcome.iter().enumerate() {
+            for (ray, outcome) in rays.values.outcome.iter().enumerate() {
                 let place = format!("a {spin} i {degrees} ({}, {})", alpha[ray], beta[ray]);
-                for k in rays.bundle.samples.of(ray) {
+                for k in rays.values.samples.of(ray) {
                     let g = &rays.samples;
                     let all = [g.mino_time[k], g.radius[k], g.theta[k], g.azimuth[k], g.delay[k]];
                     assert_eq!(defined(&all), 5, "{place} {outcome:?}: sample {k} {all:?}");
                 }
-                for k in rays.bundle.crossings.of(ray) {
+                for k in rays.values.crossings.of(ray) {
                     let g = &rays.crossings;
                     let all = [g.mino_time[k], g.radius[k], g.theta[k], g.azimuth[k], g.delay[k]];
                     assert_eq!(defined(&all), 5, "{place} {outcome:?}: crossing {k} {all:?}");

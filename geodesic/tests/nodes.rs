@@ -1,11 +1,11 @@
 //! Nodes of quadratures along many rays against the Taylor tracer and closed forms.
 
-use kerrlight_geodesic::bundle::{Crossings, NodeRequest, Nodes, PanelRule};
-use kerrlight_geodesic::{Inclination, Kerr, Observer, Outcome, Path, Tracer, Want};
+use kerrlight_geodesic::simd::{Crossings, NodeRequest, Nodes, PanelRule};
+use kerrlight_geodesic::{Inclination, Kerr, Observer, Outcome, Path, Quantities, Tracer};
 
 fn request(radius: f64) -> NodeRequest {
     let rule = PanelRule::new(8);
-    NodeRequest { radius, rule, split: 1, azimuth: true, time: true, velocity: true }
+    NodeRequest { radius, rule, split: 1, quantities: Quantities::ALL }
 }
 
 fn screen() -> (Vec<f64>, Vec<f64>) {
@@ -33,7 +33,7 @@ fn misses(spin: f64, inclination: f64, observer: Option<f64>) -> [f64; 5] {
     let (mut path, mut worst) = (Path::new(), [0.0f64; 5]);
     for k in 0..alpha.len() {
         let ray = observer.ray(&hole, alpha[k], beta[k]).unwrap();
-        tracer.trace(&hole, &ray, Want::ALL, &mut path);
+        tracer.trace(&hole, &ray, Quantities::ALL, &mut path);
         let found = nodes.ray(k);
         if found.error > 1e-10 {
             continue;
@@ -106,7 +106,7 @@ fn exact_nodes_end_where_they_are_told_to() {
             let (ray, whole) = (cut.ray(k), all.ray(k));
             assert!(ray.mino_time.iter().all(|time| time < end));
             // ∫dτ is the way from the sphere to the end.
-            let sum = |ray: &kerrlight_geodesic::bundle::RayNodes<'_>| -> f64 {
+            let sum = |ray: &kerrlight_geodesic::simd::RayNodes<'_>| -> f64 {
                 let sigma = |j: usize| ray.radius[j].powi(2) + (0.7 * ray.cos_theta[j]).powi(2);
                 (0..ray.radius.len()).map(|j| ray.weight[j] / sigma(j)).sum()
             };
@@ -140,7 +140,7 @@ fn code_ends_of_rays_are_those_of_the_tracer() {
         found.trace(&hole, &observer, &alpha, &beta, 2).unwrap();
         for k in 0..alpha.len() {
             let ray = observer.ray(&hole, alpha[k], beta[k]).unwrap();
-            tracer.trace(&hole, &ray, Want::ALL, &mut path);
+            tracer.trace(&hole, &ray, Quantities::ALL, &mut path);
             let ends = found.ends(k);
             if ends.error > 1e-9 {
                 continue;

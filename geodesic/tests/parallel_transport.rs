@@ -2,8 +2,8 @@
 //! that is integrated step by step, closed forms and published numbers.
 
 use kerrlight_geodesic::{
-    Dual, Inclination, Kerr, Observer, Path, PathPoint, Ray, Scalar, ScreenPoint, Tracer, Want,
-    ZamoFrame,
+    Dual, Inclination, Kerr, Observer, Path, PathPoint, Quantities, Ray, Scalar, ScreenPoint,
+    Tracer, ZamoFrame,
 };
 
 const SPINS: [f64; 5] = [0.0, 0.5, 0.94, -0.94, 1.0];
@@ -12,7 +12,7 @@ fn trace(hole: &Kerr, degrees: f64, alpha: f64, beta: f64) -> (Ray, Path, Screen
     let inclination = Inclination::from_degrees(degrees).unwrap();
     let ray = Observer::at_infinity(inclination).ray(hole, alpha, beta).unwrap();
     let mut path = Path::new();
-    Tracer::new(1e-13).unwrap().trace(hole, &ray, Want::ALL, &mut path);
+    Tracer::new(1e-13).unwrap().trace(hole, &ray, Quantities::ALL, &mut path);
     (ray, path, ScreenPoint::new(hole, inclination.sin(), alpha, beta))
 }
 

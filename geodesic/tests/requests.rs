@@ -2,7 +2,7 @@
 //! nothing that was not asked for.
 
 use kerrlight_geodesic::{
-    Bundle, Inclination, Integrator, Kerr, Observer, OutOfRange, Outcome, Placement, Points,
+    Inclination, Integrator, Kerr, Observer, OutOfRange, Outcome, Placement, Points, RayTable,
     Request,
 };
 
@@ -26,7 +26,7 @@ fn everything(samples: Placement) -> Request {
     }
 }
 
-fn trace(spin: f64, observer: &Observer, at: [f64; 2], request: &Request) -> Bundle {
+fn trace(spin: f64, observer: &Observer, at: [f64; 2], request: &Request) -> RayTable {
     let hole = Kerr::new(spin).unwrap();
     let ([alpha], [beta]) = ([[at[0]]], [[at[1]]]);
     Integrator::TaylorMino.trace(&hole, observer, &alpha, &beta, 1e-13, request).unwrap()
@@ -45,9 +45,9 @@ fn exact_gauss_legendre_weights_on_radial_rays() {
     let (from, to) = (3.0, 30.0);
     let misses = [4, 8, 16, 24].map(|points| {
         let request = everything(Placement::GaussLegendre { points, from, to });
-        let bundle = trace(0.0, &at_infinity(50.0), [0.0, 0.0], &request);
-        let samples = &bundle.samples;
-        assert_eq!((bundle.outcome[0], samples.len()), (Outcome::Captured, points));
+        let table = trace(0.0, &at_infinity(50.0), [0.0, 0.0], &request);
+        let samples = &table.samples;
+        assert_eq!((table.outcome[0], samples.len()), (Outcome::Captured, points));
         let length = integral(samples, |_| 1.0) - (to - from);
         let square = integral(samples, |k| samples.radius[k].powi(-2)) - (1.0 / from - 1.0 / to);
         [length, square]
@@ -66,8 +66,8 @@ fn exact_gauss_legendre_weights_on_radial_rays() {
 fn exact_gauss_legendre_weights_on_both_legs() {
     let (b, to) = (8.0f64, 20.0);
     let request = everything(Placement::GaussLegendre { points: 40, from: 1.0, to });
-    let bundle = trace(0.0, &at_infinity(90.0), [b, 0.0], &request);
-    let turning = bundle.turning_radius[0];
+    let table = trace(0.0, &at_infinity(90.0), [b, 0.0], &request);
+    let turning = table.turning_radius[0];
     // r = r₀ + x² takes the root away: dr = 2x dx.
     let slope = |x: f64| {
         let r = turning + x * x;
@@ -76,7 +76,7 @@ fn exact_gauss_legendre_weights_on_both_legs() {
     let top = (to - turning).sqrt();
     let rule = kerrlight_geodesic::quadrature::gauss_legendre(60);
     let leg: f64 = rule.iter().map(|(x, w)| w * top * slope(top * x)).sum();
-    let found = integral(&bundle.samples, |_| 1.0);
+    let found = integral(&table.samples, |_| 1.0);
     assert!((found / (2.0 * leg) - 1.0).abs() < 1e-11, "{found} {leg}");
 }
 
@@ -104,9 +104,9 @@ fn exact_mino_time_weights_are_the_trapezoidal_rule() {
     let (r, hole) = (12.0, Kerr::new(0.0).unwrap());
     let miss = [51, 101, 201, 401].map(|points| {
         let request = everything(Placement::MinoTime(points));
-        let bundle = trace(0.0, &at_radius(50.0, r), [0.0, 0.0], &request);
-        assert!((bundle.samples.radius[0] / r - 1.0).abs() < 1e-13);
-        integral(&bundle.samples, |_| 1.0) - (r - hole.horizon())
+        let table = trace(0.0, &at_radius(50.0, r), [0.0, 0.0], &request);
+        assert!((table.samples.radius[0] / r - 1.0).abs() < 1e-13);
+        integral(&table.samples, |_| 1.0) - (r - hole.horizon())
     });
     for pair in miss.windows(2) {
         assert!((pair[0] / pair[1] - 4.0).abs() < 0.05, "{miss:?}");
@@ -114,10 +114,10 @@ fn exact_mino_time_weights_are_the_trapezoidal_rule() {
     // Mino time itself, whatever the number of samples: ∫ds/Σ.
     for (spin, observer) in [(0.9, at_radius(60.0, 30.0)), (-0.5, at_radius(10.0, 8.0))] {
         let hole = Kerr::new(spin).unwrap();
-        let bundle = trace(spin, &observer, [4.0, 2.0], &everything(Placement::MinoTime(7)));
-        let samples = &bundle.samples;
+        let table = trace(spin, &observer, [4.0, 2.0], &everything(Placement::MinoTime(7)));
+        let samples = &table.samples;
         let inverse = |k: usize| 1.0 / hole.sigma(samples.radius[k], samples.theta[k].cos());
-        assert!((integral(samples, inverse) / bundle.mino_total[0] - 1.0).abs() < 1e-13);
+        assert!((integral(samples, inverse) / table.mino_total[0] - 1.0).abs() < 1e-13);
     }
 }
 
@@ -127,12 +127,12 @@ fn exact_mino_time_weights_are_the_trapezoidal_rule() {
 fn exact_path_length_samples_are_equidistant() {
     let (n, radius) = (9, 20.0);
     let request = everything(Placement::PathLength { points: n, radius });
-    let bundle = trace(0.0, &at_infinity(30.0), [0.0, 0.0], &request);
+    let table = trace(0.0, &at_infinity(30.0), [0.0, 0.0], &request);
     let step = (radius - 2.0) / n as f64;
-    for (k, r) in bundle.samples.radius.iter().enumerate() {
+    for (k, r) in table.samples.radius.iter().enumerate() {
         let expected = radius - step * (k as f64 + 0.5);
         assert!((r - expected).abs() < 1e-9, "{r} {expected}");
-        assert!((bundle.samples.weight[k] - step).abs() < 1e-10);
+        assert!((table.samples.weight[k] - step).abs() < 1e-10);
     }
     let far = everything(Placement::PathLength { points: 4, radius: 1e6 });
     let samples = trace(0.0, &at_infinity(30.0), [0.0, 0.0], &far).samples;
@@ -142,20 +142,20 @@ fn exact_path_length_samples_are_equidistant() {
     }
     // A bent ray around a spinning hole: the length between samples by a rule of 200 nodes.
     let hole = Kerr::new(0.95).unwrap();
-    let bundle = trace(0.95, &at_infinity(70.0), [-6.0, 3.0], &request);
+    let table = trace(0.95, &at_infinity(70.0), [-6.0, 3.0], &request);
     let dense = everything(Placement::GaussLegendre { points: 200, from: 1.0, to: radius });
     let whole = integral(&trace(0.95, &at_infinity(70.0), [-6.0, 3.0], &dense).samples, |_| 1.0);
-    assert_eq!(bundle.samples.len(), n);
-    for weight in &bundle.samples.weight {
+    assert_eq!(table.samples.len(), n);
+    for weight in &table.samples.weight {
         assert!((weight * n as f64 / whole - 1.0).abs() < 1e-10, "{weight} {whole}");
     }
     let inclination = Inclination::from_degrees(70.0).unwrap();
     let ray = Observer::at_infinity(inclination).ray(&hole, -6.0, 3.0).unwrap();
     let mut path = kerrlight_geodesic::Path::new();
     let tracer = kerrlight_geodesic::Tracer::new(1e-13).unwrap();
-    tracer.trace(&hole, &ray, kerrlight_geodesic::Want::POLAR, &mut path);
+    tracer.trace(&hole, &ray, kerrlight_geodesic::Quantities::POLAR, &mut path);
     let rule = kerrlight_geodesic::quadrature::gauss_legendre(40);
-    for pair in bundle.samples.mino_time.windows(2) {
+    for pair in table.samples.mino_time.windows(2) {
         let length: f64 = rule
             .iter()
             .map(|(x, w)| {
@@ -192,12 +192,11 @@ fn exact_null_momenta() {
             let beta = [2.0, 2.5, -3.0, -0.2, 6.0, 10.0];
             let request = everything(Placement::GaussLegendre { points: 6, from: 3.0, to: 60.0 });
             let observer = at_infinity(degrees);
-            let bundle =
-                integrator.trace(&hole, &observer, &alpha, &beta, 1e-12, &request).unwrap();
-            assert!(bundle.samples.len() >= 36);
+            let table = integrator.trace(&hole, &observer, &alpha, &beta, 1e-12, &request).unwrap();
+            assert!(table.samples.len() >= 36);
             for (ray, alpha) in alpha.iter().enumerate() {
-                for k in bundle.samples.of(ray) {
-                    let (points, p) = (&bundle.samples, bundle.samples.momentum[k]);
+                for k in table.samples.of(ray) {
+                    let (points, p) = (&table.samples, table.samples.momentum[k]);
                     let (sum, size) = norm(&hole, points.radius[k], points.theta[k], p);
                     assert!(sum.abs() < 1e-9 * size, "{integrator:?} {sum:e} of {size}");
                     assert_eq!(p[0], -1.0);
@@ -215,12 +214,12 @@ fn exact_null_momenta() {
 fn paper_signs_of_momenta() {
     for (beta, degrees) in [(3.0, 60.0), (-3.0, 60.0), (3.0, 90.0), (-3.0, 120.0)] {
         let request = everything(Placement::MinoTime(6));
-        let bundle = trace(0.9, &at_radius(degrees, 100.0), [7.0, beta], &request);
-        assert_eq!(bundle.outcome[0], Outcome::Escaped);
-        for (k, p) in bundle.samples.momentum.iter().enumerate() {
+        let table = trace(0.9, &at_radius(degrees, 100.0), [7.0, beta], &request);
+        assert_eq!(table.outcome[0], Outcome::Escaped);
+        for (k, p) in table.samples.momentum.iter().enumerate() {
             assert_eq!(p[1] > 0.0, k < 3, "p_r of sample {k}");
         }
-        let p_theta = bundle.samples.momentum[0][2];
+        let p_theta = table.samples.momentum[0][2];
         assert!((p_theta - beta).abs() < 1e-12, "p_θ = {p_theta}");
     }
     let request = everything(Placement::MinoTime(5));
@@ -244,17 +243,17 @@ fn exact_columns_that_were_not_asked_for_are_empty() {
         ("uncertainty", Request { uncertainty: true, ..bare }),
     ];
     for (name, request) in switches {
-        let bundle = trace(0.9, &observer, [-6.0, 2.0], &request);
-        let (points, n) = (&bundle.samples, 4);
+        let table = trace(0.9, &observer, [-6.0, 2.0], &request);
+        let (points, n) = (&table.samples, 4);
         let has = |on: bool| if on { n } else { 0 };
         assert_eq!((points.len(), points.theta.len(), points.mino_time.len()), (n, n, n));
         assert_eq!(points.azimuth.len(), has(request.azimuth), "{name}");
         assert_eq!(points.delay.len(), has(request.time), "{name}");
         assert_eq!(points.momentum.len(), has(request.momentum), "{name}");
         assert_eq!(points.weight.len(), has(request.weight), "{name}");
-        assert_eq!(bundle.uncertainty.len(), usize::from(request.uncertainty), "{name}");
-        assert!(bundle.crossings.weight.is_empty(), "a crossing stands for no piece of path");
-        assert!(bundle.crossings.len() <= 2);
+        assert_eq!(table.uncertainty.len(), usize::from(request.uncertainty), "{name}");
+        assert!(table.crossings.weight.is_empty(), "a crossing stands for no piece of path");
+        assert!(table.crossings.len() <= 2);
         for k in 0..n {
             assert!((points.radius[k] / full.samples.radius[k] - 1.0).abs() < 1e-11);
             assert!((points.theta[k] - full.samples.theta[k]).abs() < 1e-11);
@@ -298,9 +297,9 @@ fn regress_empty_pieces_and_paths() {
         Placement::GaussLegendre { points: 3, from: 0.1, to: 0.2 },
         Placement::GaussLegendre { points: 3, from: 2.0, to: 3.0 },
     ] {
-        let bundle = trace(0.5, &at_infinity(20.0), [50.0, 1.0], &Request::samples(samples));
-        assert!(bundle.samples.is_empty() && bundle.samples.of(0).is_empty());
-        assert!(bundle.samples.of(1).is_empty() && bundle.samples.of(99).is_empty());
+        let table = trace(0.5, &at_infinity(20.0), [50.0, 1.0], &Request::samples(samples));
+        assert!(table.samples.is_empty() && table.samples.of(0).is_empty());
+        assert!(table.samples.of(1).is_empty() && table.samples.of(99).is_empty());
     }
     let path = kerrlight_geodesic::Path::new();
     assert!(path.at(0.3).radius().is_nan() && path.uncertainty_at(0.3).radius.is_infinite());
@@ -308,9 +307,9 @@ fn regress_empty_pieces_and_paths() {
     let hole = Kerr::new(0.5).unwrap();
     let ray = at_infinity(20.0).ray(&hole, 5.0, 5.0).unwrap();
     let tracer = kerrlight_geodesic::Tracer::new(1e-9).unwrap();
-    tracer.with_max_steps(0).trace(&hole, &ray, kerrlight_geodesic::Want::ALL, &mut path);
+    tracer.with_max_steps(0).trace(&hole, &ray, kerrlight_geodesic::Quantities::ALL, &mut path);
     assert!(path.at(0.0).radius().is_nan());
-    tracer.trace(&hole, &ray, kerrlight_geodesic::Want::ALL, &mut path);
+    tracer.trace(&hole, &ray, kerrlight_geodesic::Quantities::ALL, &mut path);
     let mut pieces = Vec::new();
     for [lo, hi] in [[3.0, 2.0], [f64::NAN, 2.0], [1.0, f64::NAN], [-1.0, 5.0], [0.0, 0.0]] {
         path.intervals_within(lo, hi, &mut pieces);

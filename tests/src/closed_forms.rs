@@ -3,7 +3,7 @@
 
 use crate::support::root;
 use kerrlight_geodesic::analytic::{ClosedForm, LensingBand};
-use kerrlight_geodesic::{Inclination, Kerr, Observer, Path, Tracer, Want};
+use kerrlight_geodesic::{Inclination, Kerr, Observer, Path, Quantities, Tracer};
 use std::collections::HashMap;
 
 fn references() -> Vec<HashMap<String, String>> {
@@ -51,7 +51,7 @@ fn exact_radius_along_traced_rays() {
             let near = Observer::at_radius(inclination, 50.0).unwrap();
             for ((alpha, beta), observer) in screen.iter().flat_map(|p| [(p, far), (p, near)]) {
                 let ray = observer.ray(&hole, *alpha, *beta).unwrap();
-                tracer.trace(&hole, &ray, Want::POLAR, &mut path);
+                tracer.trace(&hole, &ray, Quantities::POLAR, &mut path);
                 let form = ClosedForm::new(&hole, &ray);
                 let total = path.mino_total();
                 let context = format!("{spin} {degrees} {alpha} {beta} {observer:?}");
@@ -108,7 +108,7 @@ fn exact_edges_of_lensing_bands() {
             for angle in (0..12).map(|k| 0.05 + f64::from(k) * std::f64::consts::TAU / 12.0) {
                 let mut belongs = |(alpha, beta): (f64, f64), scale: f64| {
                     let ray = observer.ray(&hole, alpha * scale, beta * scale).unwrap();
-                    tracer.trace(&hole, &ray, Want::POLAR, &mut path);
+                    tracer.trace(&hole, &ray, Quantities::POLAR, &mut path);
                     path.equatorial_crossings().len() > usize::from(n)
                 };
                 let context = format!("{spin} {degrees} {n} {angle}");

@@ -1,9 +1,9 @@
 //! Published numbers of lensing by Schwarzschild and Kerr holes, from traced rays. The
 //! extent of the critical curve pins signs, which no conservation law sees.
 
-use kerrlight_geodesic::{Inclination, Kerr, Observer, Outcome, Path, Tracer, Want};
+use kerrlight_geodesic::{Inclination, Kerr, Observer, Outcome, Path, Quantities, Tracer};
 
-fn trace(spin: f64, degrees: f64, alpha: f64, beta: f64, want: Want) -> Path {
+fn trace(spin: f64, degrees: f64, alpha: f64, beta: f64, want: Quantities) -> Path {
     let hole = Kerr::new(spin).unwrap();
     let observer = Observer::at_infinity(Inclination::from_degrees(degrees).unwrap());
     let mut path = Path::new();
@@ -29,11 +29,12 @@ fn paper_extent_of_the_shadow() {
     let cases = [(0.9, -2.8444214035, 6.8323192304), (0.99, -2.2517243354, 6.9833234311)];
     for (spin, left, right) in cases {
         let captured =
-            |alpha| trace(spin, 90.0, alpha, 0.0, Want::POLAR).outcome() == Outcome::Captured;
+            |alpha| trace(spin, 90.0, alpha, 0.0, Quantities::POLAR).outcome() == Outcome::Captured;
         assert!((edge(2.0, -10.0, captured) - left).abs() < 2e-10);
         assert!((edge(2.0, 10.0, captured) - right).abs() < 2e-10);
-        let mirrored =
-            |alpha| trace(-spin, 90.0, alpha, 0.0, Want::POLAR).outcome() == Outcome::Captured;
+        let mirrored = |alpha| {
+            trace(-spin, 90.0, alpha, 0.0, Quantities::POLAR).outcome() == Outcome::Captured
+        };
         assert!((edge(-2.0, 10.0, mirrored) + left).abs() < 2e-10);
     }
 }
@@ -48,8 +49,9 @@ fn paper_lensing_bands() {
         (4, 5.1957902930, 5.1975054871),
     ];
     for (count, inner, outer) in bands {
-        let crosses =
-            |b: f64| trace(0.0, 0.0, b, 0.0, Want::POLAR).equatorial_crossings().len() >= count;
+        let crosses = |b: f64| {
+            trace(0.0, 0.0, b, 0.0, Quantities::POLAR).equatorial_crossings().len() >= count
+        };
         let middle = 27f64.sqrt() + 1e-6;
         assert!((edge(middle, 4.0, crosses) - inner).abs() < 2e-10, "{count}");
         // Beyond the outer edge the ray still crosses, but at r → ∞: the crossing is lost
@@ -71,11 +73,11 @@ fn exact_deflection_angles() {
         (1000.0, 0.004011823809925),
     ];
     for (b, deflection) in cases {
-        let path = trace(0.0, 90.0, b, 0.0, Want::ALL);
+        let path = trace(0.0, 90.0, b, 0.0, Quantities::ALL);
         let end = path.at(path.mino_total());
         let found = end.azimuth.abs() - std::f64::consts::PI;
         assert!((found - deflection).abs() < 1e-10, "b = {b}: {found}");
-        let over_the_pole = trace(0.0, 90.0, 0.0, b, Want::ALL);
+        let over_the_pole = trace(0.0, 90.0, 0.0, b, Quantities::ALL);
         let end = over_the_pole.at(over_the_pole.mino_total()).direction;
         // It starts at +x and climbs towards +z.
         let turned = end[2].atan2(end[0]).rem_euclid(std::f64::consts::TAU);
@@ -92,7 +94,7 @@ fn exact_strong_deflection_limit() {
     for distance in [1e-4, 1e-6, 1e-8] {
         let b = 27f64.sqrt() * (1.0 + distance);
         let actual = b / 27f64.sqrt() - 1.0;
-        let path = trace(0.0, 90.0, b, 0.0, Want::ALL);
+        let path = trace(0.0, 90.0, b, 0.0, Quantities::ALL);
         let deflection = path.at(path.mino_total()).azimuth.abs() - std::f64::consts::PI;
         let miss = deflection - (limit - actual.ln());
         // The next term is of order distance · ln(distance); b's rounding adds 1e-16/distance.
@@ -107,7 +109,7 @@ fn exact_delay_far_from_the_hole() {
     // From the point of closest approach at r₀ = b − 1, t_o − t = √(r_o² − r₀²) +
     // 2 ln[(r_o + √(r_o² − r₀²))/r₀] + √[(r_o − r₀)/(r_o + r₀)] (Shapiro). The ray has been
     // bent by 2/b by then, so that point lies 2 M beyond the equatorial plane.
-    let path = trace(0.0, 0.0, 1e4, 0.0, Want::ALL);
+    let path = trace(0.0, 0.0, 1e4, 0.0, Quantities::ALL);
     let hit = path.at(path.equatorial_crossings().next().unwrap());
     let expected = 2.0 * (2.0f64 / 1e4).ln() + 1.0 - 2.0;
     assert!((hit.delay - expected).abs() < 2e-3, "{} {expected}", hit.delay);

@@ -2,6 +2,7 @@
 //! form), paper_ (a published number), code_ (another code's number), regress_ (own past).
 
 mod accuracy;
+mod architecture;
 mod bad_input;
 mod bounded;
 mod closed_forms;

@@ -1,7 +1,9 @@
 //! Cost of the polarisation at a point of a ray: `cargo bench -p kerrlight-tomo -- polarization`.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use kerrlight_geodesic::{Inclination, Kerr, Observer, Path, ScreenPoint, Tracer, Want, ZamoFrame};
+use kerrlight_geodesic::{
+    Inclination, Kerr, Observer, Path, Quantities, ScreenPoint, Tracer, ZamoFrame,
+};
 use kerrlight_tomo::polarization::{Gas, MagneticField, PowerLaw, view, view_at};
 use std::hint::black_box;
 
@@ -10,7 +12,7 @@ fn polarization(c: &mut Criterion) {
     let inclination = Inclination::from_degrees(60.0).unwrap();
     let ray = Observer::at_infinity(inclination).ray(&hole, -6.0, 2.0).unwrap();
     let mut path = Path::new();
-    Tracer::new(1e-12).unwrap().trace(&hole, &ray, Want::ALL, &mut path);
+    Tracer::new(1e-12).unwrap().trace(&hole, &ray, Quantities::ALL, &mut path);
     let point = path.at(0.4 * path.mino_total());
     let screen = ScreenPoint::new(&hole, inclination.sin(), -6.0, 2.0);
     let momentum = point.momentum(&hole, ray.lambda);

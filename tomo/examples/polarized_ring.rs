@@ -5,7 +5,9 @@
 //! VERTICAL RADIAL TOROIDAL > ring.csv`: inclination and chi in degrees, SPEED and CHI of the gas in the
 //! frame of zero angular momentum (`boosted`), the field as the gas has it.
 
-use kerrlight_geodesic::{Inclination, Kerr, Observer, Path, ScreenPoint, Tracer, Want, ZamoFrame};
+use kerrlight_geodesic::{
+    Inclination, Kerr, Observer, Path, Quantities, ScreenPoint, Tracer, ZamoFrame,
+};
 use kerrlight_tomo::polarization::{Gas, MagneticField, PowerLaw, Stokes, view};
 use std::error::Error;
 
@@ -33,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let at = |k: u32| FIELD_OF_VIEW * ((f64::from(k) + 0.5) / f64::from(SIDE) - 0.5);
         let (alpha, beta) = (at(k % SIDE), -at(k / SIDE));
         let ray = observer.ray(&hole, alpha, beta)?;
-        tracer.trace(&hole, &ray, Want::ALL, &mut path);
+        tracer.trace(&hole, &ray, Quantities::ALL, &mut path);
         let screen = ScreenPoint::new(&hole, inclination.sin(), alpha, beta);
         let mut light = Stokes::default();
         let (mut layers, mut radius, mut outward) = (0, 0.0, false);

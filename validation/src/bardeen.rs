@@ -3,7 +3,7 @@
 
 use crate::report::Case;
 use crate::search::{edge, trace};
-use kerrlight_geodesic::{Outcome, Want};
+use kerrlight_geodesic::{Outcome, Quantities};
 
 const AUTHORITY: &str = "Bardeen 1973";
 
@@ -26,7 +26,8 @@ fn screen(a: f64, degrees: f64, r: f64) -> Option<(f64, f64)> {
 /// traced rays begin to escape.
 fn miss(a: f64, degrees: f64, (alpha, beta): (f64, f64)) -> f64 {
     let captured = |factor: f64| {
-        trace(a, degrees, factor * alpha, factor * beta, Want::POLAR).outcome() == Outcome::Captured
+        trace(a, degrees, factor * alpha, factor * beta, Quantities::POLAR).outcome()
+            == Outcome::Captured
     };
     if !captured(0.99) || captured(1.01) {
         return f64::INFINITY;
@@ -53,8 +54,9 @@ pub fn cases() -> Vec<Case> {
     let extents = [(0.9, -2.8444214035, 6.8323192304), (0.99, -2.2517243354, 6.9833234311)];
     for (a, left, right) in extents {
         for (expected, far) in [(left, -10.0), (right, 10.0)] {
-            let captured =
-                |alpha| trace(a, 90.0, alpha, 0.0, Want::POLAR).outcome() == Outcome::Captured;
+            let captured = |alpha| {
+                trace(a, 90.0, alpha, 0.0, Quantities::POLAR).outcome() == Outcome::Captured
+            };
             let name = format!("extent of the shadow of a = {a} at 90°");
             cases.push(Case::number(AUTHORITY, name, expected, edge(2.0, far, captured), 5e-11));
         }

@@ -3,7 +3,7 @@
 
 use crate::report::Case;
 use kerrlight_geodesic::{
-    AffineTracer, Inclination, Kerr, Observer, OutOfRange, Path, Tracer, Want,
+    AffineTracer, Inclination, Kerr, Observer, OutOfRange, Path, Quantities, Tracer,
 };
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -29,7 +29,7 @@ fn compare(seed: u64) -> Result<Option<[f64; 5]>, OutOfRange> {
         return Ok(None);
     }
     let mut path = Path::new();
-    Tracer::new(1e-13)?.trace(&hole, &ray, Want::ALL, &mut path);
+    Tracer::new(1e-13)?.trace(&hole, &ray, Quantities::ALL, &mut path);
     if referee.outcome() != path.outcome() {
         return Ok(Some([f64::INFINITY; 5]));
     }

@@ -2,7 +2,7 @@
 //! Boyer–Lindquist integrals with mpmath (tests/reference/kerr_crossings.py).
 
 use crate::report::Case;
-use kerrlight_geodesic::{Inclination, Kerr, Observer, OutOfRange, Path, Tracer, Want};
+use kerrlight_geodesic::{Inclination, Kerr, Observer, OutOfRange, Path, Quantities, Tracer};
 use std::collections::HashMap;
 
 const AUTHORITY: &str = "mpmath, 25 digits";
@@ -23,7 +23,7 @@ fn trace(row: &Row) -> Option<Path> {
         let hole = Kerr::new(spin)?;
         let observer = Observer::at_infinity(Inclination::from_radians(inclination)?);
         let ray = observer.ray(&hole, alpha, beta)?;
-        Tracer::new(1e-12)?.trace(&hole, &ray, Want::ALL, &mut path);
+        Tracer::new(1e-12)?.trace(&hole, &ray, Quantities::ALL, &mut path);
         Ok(())
     };
     traced().ok()?;

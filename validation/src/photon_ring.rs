@@ -5,7 +5,7 @@
 
 use crate::report::Case;
 use crate::search::{edge, trace};
-use kerrlight_geodesic::{PathPoint, Want};
+use kerrlight_geodesic::{PathPoint, Quantities};
 
 const AUTHORITY: &str = "Gralla & Lupsasca 2020";
 
@@ -13,7 +13,7 @@ const AUTHORITY: &str = "Gralla & Lupsasca 2020";
 /// outside the critical curve.
 fn image(spin: f64, critical: f64, r: f64, n: usize) -> (f64, PathPoint) {
     let nth = |b: f64| {
-        let path = trace(spin, 0.0, b, 0.0, Want::ALL);
+        let path = trace(spin, 0.0, b, 0.0, Quantities::ALL);
         path.equatorial_crossings().nth(n - 1).map(|time| path.at(time))
     };
     // Further out the n-th crossing is farther away, then missing.

@@ -4,7 +4,7 @@
 
 use crate::report::Case;
 use crate::search::{edge, trace};
-use kerrlight_geodesic::Want;
+use kerrlight_geodesic::Quantities;
 use std::f64::consts::PI;
 
 const DARWIN: &str = "Darwin 1959";
@@ -29,14 +29,14 @@ fn deflection(b: f64) -> Option<f64> {
 }
 
 fn traced_deflection(b: f64) -> f64 {
-    let path = trace(0.0, 90.0, b, 0.0, Want::ALL);
+    let path = trace(0.0, 90.0, b, 0.0, Quantities::ALL);
     path.at(path.mino_total()).azimuth.abs() - PI
 }
 
 /// All cases of this file.
 pub fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
-    let captured = |b: f64| trace(0.0, 17.0, b, 0.0, Want::POLAR).turning_point().is_none();
+    let captured = |b: f64| trace(0.0, 17.0, b, 0.0, Quantities::POLAR).turning_point().is_none();
     let critical = edge(5.0, 6.0, captured);
     cases.push(Case::number(
         DARWIN,
@@ -71,8 +71,9 @@ pub fn cases() -> Vec<Case> {
         (4, 5.1957902930, 5.1975054871),
     ];
     for (count, inner, outer) in bands {
-        let crosses =
-            |b: f64| trace(0.0, 0.0, b, 0.0, Want::POLAR).equatorial_crossings().len() >= count;
+        let crosses = |b: f64| {
+            trace(0.0, 0.0, b, 0.0, Quantities::POLAR).equatorial_crossings().len() >= count
+        };
         let middle = 27f64.sqrt() + 1e-6;
         for (name, expected, far) in [("inner", inner, 4.0), ("outer", outer, 7.0)] {
             let name = format!("{name} edge of the band of {count} crossings, face-on");

@@ -1,9 +1,9 @@
 //! Rays by their screen coordinates, and where on the screen something changes.
 
-use kerrlight_geodesic::{Inclination, Kerr, Observer, Path, Tracer, Want};
+use kerrlight_geodesic::{Inclination, Kerr, Observer, Path, Quantities, Tracer};
 
 /// The path of the ray (α, β) to an observer at infinity, at the tightest useful tolerance.
-pub fn trace(spin: f64, degrees: f64, alpha: f64, beta: f64, want: Want) -> Path {
+pub fn trace(spin: f64, degrees: f64, alpha: f64, beta: f64, want: Quantities) -> Path {
     let mut path = Path::new();
     let mut traced = || -> Result<(), kerrlight_geodesic::OutOfRange> {
         let hole = Kerr::new(spin)?;

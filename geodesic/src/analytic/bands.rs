@@ -3,8 +3,8 @@
 use super::closed_form::ClosedForm;
 use super::critical_curve::CriticalCurve;
 use super::root::find_root;
-use crate::kerr::Kerr;
-use crate::observer::{Inclination, Observer};
+use crate::screen::observer::{Inclination, Observer};
+use crate::spacetime::kerr::Kerr;
 
 /// The region of the screen whose rays cross the equatorial plane outside the horizon at
 /// least n + 1 times: the n-th image of a disc without edges (Gralla, Holz & Wald 2019,

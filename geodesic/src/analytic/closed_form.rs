@@ -12,9 +12,9 @@
 //! which [`RadialPotential`](crate::RadialPotential) has with twice the working precision.
 
 use super::elliptic::{agm, rf, rf_pair, sn_cs};
-use crate::kerr::Kerr;
-use crate::observer::Ray;
-use crate::radial::{Barrier, RadialPotential};
+use crate::screen::observer::Ray;
+use crate::spacetime::kerr::Kerr;
+use crate::spacetime::radial::{Barrier, RadialPotential};
 use core::f64::consts::{FRAC_PI_2, PI};
 
 /// A ray's radial motion and its equatorial crossings in closed form.

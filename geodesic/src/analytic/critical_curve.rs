@@ -12,9 +12,9 @@
 
 use super::elliptic::{agm, cel};
 use super::root::find_root;
-use crate::kerr::Kerr;
-use crate::observer::Inclination;
-use crate::orbits::{equatorial_prograde, equatorial_retrograde};
+use crate::screen::observer::Inclination;
+use crate::spacetime::kerr::Kerr;
+use crate::spacetime::orbits::{equatorial_prograde, equatorial_retrograde};
 use core::f64::consts::{FRAC_2_PI, PI, TAU};
 
 /// The critical curve on the screen of a distant observer, parametrised by the angle on the

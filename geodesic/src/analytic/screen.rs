@@ -1,8 +1,8 @@
 //! Bardeen's screen coordinates and a photon's constants of motion, both ways.
 
 use crate::error::{OutOfRange, check};
-use crate::kerr::Kerr;
-use crate::observer::Inclination;
+use crate::screen::observer::Inclination;
+use crate::spacetime::kerr::Kerr;
 
 /// λ = L/E (in M) and η = Q/E² (in M²) of the photon that arrives at (α, β), in M
 /// (Bardeen 1973).

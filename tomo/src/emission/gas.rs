@@ -2,9 +2,9 @@
 //! transfer use (Gold et al. 2020, ApJ 897, 148, section 3.2).
 
 use crate::scene::{Gas, GasMotion, GasProfile};
-use crate::transport::{Emission, Grain, Medium, Moment, Needs, Part};
-use kerrlight_geodesic::Kerr;
-use kerrlight_geodesic::bundle::RayNodes;
+use crate::transport::{Emission, Grain, Medium, Moment, Part};
+use kerrlight_geodesic::simd::RayNodes;
+use kerrlight_geodesic::{Kerr, Quantities};
 
 /// A flow around one hole, ready to be evaluated.
 #[derive(Debug, Clone)]
@@ -208,9 +208,9 @@ impl Medium for GasModel {
         self.outer
     }
 
-    fn needs(&self) -> Needs {
+    fn quantities(&self) -> Quantities {
         let velocity = self.redshift.is_some() && self.motion == GasMotion::FreeFall;
-        Needs { azimuth: false, time: false, velocity }
+        Quantities { azimuth: false, time: false, velocity }
     }
 
     fn color(&self) -> [f32; 3] {

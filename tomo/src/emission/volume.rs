@@ -5,11 +5,11 @@ use super::occupied::Occupied;
 use super::spot::rotate;
 use crate::dynamics::{AngularVelocity, Axis, Injection};
 use crate::scene::{Rotation, VolumeRegion, VolumeSource};
-use crate::transport::{Emission, Grain, Medium, Moment, Needs, Part, Stretch};
+use crate::transport::{Emission, Grain, Medium, Moment, Part, Stretch};
 use crate::volume::{Volume, VolumeFile};
-use kerrlight_geodesic::bundle::RayNodes;
 use kerrlight_geodesic::flow::{cross, rotating_redshift_at};
-use kerrlight_geodesic::{Kerr, OutOfRange};
+use kerrlight_geodesic::simd::RayNodes;
+use kerrlight_geodesic::{Kerr, OutOfRange, Quantities};
 
 /// A volume around one hole, ready to be evaluated.
 #[derive(Debug, Clone)]
@@ -163,10 +163,10 @@ impl Medium for VolumeModel {
         Some(Grain { size: self.volume.finest(), inner: self.occupied.radii[0].max(inner) })
     }
 
-    fn needs(&self) -> Needs {
+    fn quantities(&self) -> Quantities {
         let tilted = self.axis[0] != 0.0 || self.axis[1] != 0.0;
         let velocity = self.redshift.is_some() && tilted && self.rotation.is_some();
-        Needs { azimuth: true, time: self.slow_light && self.changes(), velocity }
+        Quantities { azimuth: true, time: self.slow_light && self.changes(), velocity }
     }
 
     fn color(&self) -> [f32; 3] {

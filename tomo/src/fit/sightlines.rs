@@ -1,8 +1,8 @@
 //! Where the light of a movie's pixels may come from: nodes on rays inside the region of recovery, and
 //! what each gives to its pixel. Computed once for a fit.
 
-use kerrlight_geodesic::bundle::{NodeRequest, Nodes, PanelRule, RayNodes, Samples};
-use kerrlight_geodesic::{Kerr, Observer, OutOfRange};
+use kerrlight_geodesic::simd::{NodeRequest, Nodes, PanelRule, RayNodes, Samples};
+use kerrlight_geodesic::{Kerr, Observer, OutOfRange, Quantities};
 
 /// Where emission is looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -202,9 +202,11 @@ impl Tracer<'_> {
             radius: self.request.region.r_max,
             rule: PanelRule::new(order),
             split: split as u32,
-            azimuth: true,
-            time: self.request.delay,
-            velocity: self.request.momentum,
+            quantities: Quantities {
+                azimuth: true,
+                time: self.request.delay,
+                velocity: self.request.momentum,
+            },
         };
         self.nodes.trace(self.hole, self.observer, alpha, beta, None, &request)?;
         for k in 0..self.nodes.rays() {

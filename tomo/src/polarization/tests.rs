@@ -3,7 +3,7 @@
 use super::*;
 use kerrlight_geodesic::flow::{cross, dot, keplerian_redshift, rotating_redshift};
 use kerrlight_geodesic::{
-    Inclination, Kerr, Observer, Path, PathPoint, Ray, ScreenPoint, Tracer, Want, ZamoFrame,
+    Inclination, Kerr, Observer, Path, PathPoint, Quantities, Ray, ScreenPoint, Tracer, ZamoFrame,
 };
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -24,7 +24,7 @@ fn hit_at(spin: f64, degrees: f64, alpha: f64, beta: f64, part: Option<f64>) -> 
     let inclination = Inclination::from_degrees(degrees).unwrap();
     let ray = Observer::at_infinity(inclination).ray(&hole, alpha, beta).unwrap();
     let mut path = Path::new();
-    Tracer::new(1e-13).unwrap().trace(&hole, &ray, Want::ALL, &mut path);
+    Tracer::new(1e-13).unwrap().trace(&hole, &ray, Quantities::ALL, &mut path);
     let time = match part {
         Some(part) => part * path.mino_total(),
         None => path.equatorial_crossings().next().unwrap(),

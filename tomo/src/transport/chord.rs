@@ -136,7 +136,7 @@ impl ChordBound {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kerrlight_geodesic::{Inclination, Observer, Tracer, Want};
+    use kerrlight_geodesic::{Inclination, Observer, Quantities, Tracer};
 
     fn distance_to_chord(x: [f64; 3], [a, b]: [[f64; 3]; 2]) -> f64 {
         let d: [f64; 3] = core::array::from_fn(|k| b[k] - a[k]);
@@ -161,7 +161,7 @@ mod tests {
                 {
                     let ray = observer.ray(&hole, alpha, beta).unwrap();
                     let mut path = Path::new();
-                    Tracer::new(1e-12).unwrap().trace(&hole, &ray, Want::ALL, &mut path);
+                    Tracer::new(1e-12).unwrap().trace(&hole, &ray, Quantities::ALL, &mut path);
                     let bound = ChordBound::new(&hole, &ray, &path, 0.0);
                     let total = path.mino_total();
                     for pieces in [7u32, 25, 100, 400] {

@@ -2,7 +2,7 @@
 
 use super::medium::Light;
 use kerrlight_geodesic::PathPoint;
-use kerrlight_geodesic::bundle::RayNodes;
+use kerrlight_geodesic::simd::RayNodes;
 
 /// What became of a pixel's ray, as written into the `outcome` channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

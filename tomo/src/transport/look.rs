@@ -225,7 +225,7 @@ impl Stage {
             return Ok([0.0; 3]);
         }
         if let (Some(spacing), true) = (self.beams, self.lensing) {
-            let ray = self.view.bundle(&self.hole, x, y)?;
+            let ray = self.view.beam(&self.hole, x, y)?;
             let hole = self.hole.lift();
             let end = footprint::of_ray(&hole, &ray, self.tolerance, &mut scratch.beam)?;
             if let Some(end) = end {

@@ -2,7 +2,8 @@
 
 use super::Part;
 use super::glimpse::Place;
-use kerrlight_geodesic::bundle::{PanelRule, RayNodes};
+use kerrlight_geodesic::Quantities;
+use kerrlight_geodesic::simd::{PanelRule, RayNodes};
 
 /// Something that shines, and may absorb, all over a sphere.
 pub trait Medium: core::fmt::Debug + Send + Sync {
@@ -18,7 +19,7 @@ pub trait Medium: core::fmt::Debug + Send + Sync {
         self.grain().map_or(1.0, |grain| 2.0 * grain.size / self.sphere())
     }
     /// What it has to be told of its nodes besides r and cos θ.
-    fn needs(&self) -> Needs;
+    fn quantities(&self) -> Quantities;
     /// Linear colour.
     fn color(&self) -> [f32; 3];
     /// Intensity that its brightest parts may reach: what errors of faint rays are measured by.
@@ -72,17 +73,6 @@ impl Grain {
         let outside = panels.filter(|(_, radius)| radius.iter().any(|r| *r >= self.inner));
         outside.map(|(weights, _)| weights.iter().sum()).fold(0.0, f64::max)
     }
-}
-
-/// Columns of nodes that a medium needs.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Needs {
-    /// Azimuth.
-    pub azimuth: bool,
-    /// Delay.
-    pub time: bool,
-    /// Rates of 1/r and cos θ.
-    pub velocity: bool,
 }
 
 /// When a ray is seen.

@@ -23,7 +23,7 @@ mod view;
 mod volume;
 
 pub use glimpse::{Fate, Glimpse};
-pub use medium::{Emission, Grain, Medium, Moment, Needs, Stretch};
+pub use medium::{Emission, Grain, Medium, Moment, Stretch};
 pub use meter::{Meter, Part};
 pub use view::View;
 
@@ -35,8 +35,10 @@ use crate::emission::spot::SpotModel;
 use crate::emission::volume::VolumeModel;
 use crate::scene::{Integrator, Scene};
 use crate::volume::VolumeFile;
-use kerrlight_geodesic::bundle::{Crossings, Nodes, Samples};
-use kerrlight_geodesic::{Kerr, OutOfRange, Path, PathPoint, Tracer, footprint::Number};
+use kerrlight_geodesic::simd::{Crossings, Nodes, Samples};
+use kerrlight_geodesic::{
+    Kerr, OutOfRange, Path, PathPoint, Quantities, Tracer, footprint::Number,
+};
 use meshes::{Hit as MeshHit, MeshTree};
 use polarized::Polarization;
 use rays::Sight;
@@ -65,7 +67,7 @@ pub struct Stage {
     /// Whether rays are traced in closed form where possible.
     closed_form: bool,
     /// What is told of the brightest contribution.
-    places: Needs,
+    places: Quantities,
     disc: Option<DiscModel>,
     /// What fills space.
     media: Vec<Arc<dyn Medium>>,
@@ -207,7 +209,7 @@ impl Stage {
             half_orbits: scene.effects.half_orbits,
             tolerance: scene.tracer.tolerance,
             closed_form: scene.tracer.integrator == Integrator::Elliptic,
-            places: Needs { azimuth: kept("azimuth"), time: kept("delay"), velocity: false },
+            places: Quantities { azimuth: kept("azimuth"), time: kept("delay"), velocity: false },
             media: media(scene, &assets.volumes, &hole)?,
             disc: scene.disc.as_ref().map(|disc| DiscModel::new(disc, &hole)),
             spot_trees: Arc::default(),

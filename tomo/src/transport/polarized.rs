@@ -6,7 +6,7 @@ use super::surface::Hit;
 use crate::emission::disc::DiscModel;
 use crate::polarization::{Gas, MagneticField, PowerLaw, Stokes, view, view_at};
 use crate::scene::Scene;
-use kerrlight_geodesic::bundle::RayNodes;
+use kerrlight_geodesic::simd::RayNodes;
 use kerrlight_geodesic::{Kerr, OutOfRange, PathPoint, ScreenPoint, ZamoFrame};
 
 /// The field of the gas and its electrons.

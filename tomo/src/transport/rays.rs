@@ -7,8 +7,8 @@ use super::{Scratch, Stage};
 use crate::emission::disc::DiscModel;
 use crate::transport::glimpse::Place;
 use kerrlight_geodesic::analytic::ClosedForm;
-use kerrlight_geodesic::bundle::{Crossing, RayEnds, Samples};
-use kerrlight_geodesic::{Observer, OutOfRange, Outcome, Ray, Want};
+use kerrlight_geodesic::simd::{Crossing, RayEnds, Samples};
+use kerrlight_geodesic::{Observer, OutOfRange, Outcome, Quantities, Ray};
 use std::sync::Arc;
 
 /// A ray without its points.
@@ -159,7 +159,7 @@ impl Stage {
 
     /// Traces one ray step by step into the path of `scratch`; its sight.
     pub(super) fn trace_steps(&self, ray: &Ray, scratch: &mut Scratch) -> Sight {
-        self.tracer.trace(&self.hole, ray, Want::ALL, &mut scratch.path);
+        self.tracer.trace(&self.hole, ray, Quantities::ALL, &mut scratch.path);
         let (first, path, hits) = (scratch.hits.len(), &scratch.path, &mut scratch.hits);
         if self.disc.is_some() {
             hits.extend(path.equatorial_crossings().map(|mino_time| {

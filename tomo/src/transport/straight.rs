@@ -6,7 +6,7 @@ use super::rays::{End, Sight};
 use super::surface::Hit;
 use super::volume::{Columns, Piece};
 use super::{Scratch, Stage};
-use kerrlight_geodesic::bundle::PanelRule;
+use kerrlight_geodesic::simd::PanelRule;
 use kerrlight_geodesic::{Observer, Ray};
 
 /// A straight ray. Its parameter χ takes the place of Mino time: dχ = −ds/r², so that χ times the

@@ -5,7 +5,7 @@ use super::glimpse::{Gather, Place};
 use super::polarized::share;
 use crate::emission::disc::{DiscModel, Photon};
 use kerrlight_geodesic::ScreenPoint;
-use kerrlight_geodesic::bundle::Crossing;
+use kerrlight_geodesic::simd::Crossing;
 
 /// Where a ray crosses the equatorial plane.
 #[derive(Debug, Clone, Copy)]

@@ -44,7 +44,7 @@ impl View {
     }
 
     /// The same with derivatives with respect to x and y.
-    pub(super) fn bundle(&self, hole: &Kerr, x: f64, y: f64) -> Result<Ray<Number>, OutOfRange> {
+    pub(super) fn beam(&self, hole: &Kerr, x: f64, y: f64) -> Result<Ray<Number>, OutOfRange> {
         let (x, y) = (Number::parameter(x, 0), Number::parameter(y, 1));
         match self {
             View::Screen(observer) => {

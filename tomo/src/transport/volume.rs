@@ -5,8 +5,8 @@ use super::medium::{Emission, Grain, Light, Medium, Moment, Quadrature, Sums, ga
 use super::rays::{End, Sight};
 use super::surface::Hit;
 use super::{Scratch, Stage};
-use kerrlight_geodesic::bundle::{NodeRequest, PanelRule, RayNodes};
-use kerrlight_geodesic::{Observer, OutOfRange, Path, ScreenPoint};
+use kerrlight_geodesic::simd::{NodeRequest, PanelRule, RayNodes};
+use kerrlight_geodesic::{Observer, OutOfRange, Path, Quantities, ScreenPoint};
 
 /// Nodes of a panel.
 const ORDER: usize = 8;
@@ -197,14 +197,13 @@ impl Stage {
     }
 
     fn request(&self, medium: &dyn Medium, rule: &PanelRule, split: u32) -> NodeRequest {
-        let needs = medium.needs();
+        let polarized =
+            Quantities { velocity: self.polarization.is_some(), ..Quantities::default() };
         NodeRequest {
             radius: medium.sphere(),
             rule: rule.clone(),
             split,
-            azimuth: needs.azimuth || self.places.azimuth,
-            time: needs.time || self.places.time,
-            velocity: needs.velocity || self.polarization.is_some(),
+            quantities: medium.quantities().or(self.places).or(polarized),
         }
     }
 

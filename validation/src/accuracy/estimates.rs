@@ -6,7 +6,7 @@
 
 use super::rays::{Angle, Draw, beside_critical_curve, in_disc, log_uniform};
 use super::{Oracle, TrueError};
-use kerrlight_geodesic::{Bundle, Integrator, Kerr, OutOfRange, Placement, Points, Request};
+use kerrlight_geodesic::{Integrator, Kerr, OutOfRange, Placement, Points, RayTable, Request};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
@@ -251,18 +251,18 @@ fn judge(
     let (Ok(hole), Ok(observer)) = (Kerr::new(ray.spin), ray.observer()) else { return Err(()) };
     let traced = integrator.trace(&hole, &observer, &[ray.alpha], &[ray.beta], tolerance, &request);
     // What an integrator does not serve is no ray of it.
-    let Ok(bundle) = traced else { return Ok(None) };
-    if bundle.mino_total[0].is_nan() {
+    let Ok(table) = traced else { return Ok(None) };
+    if table.mino_total[0].is_nan() {
         return Ok(None);
     }
-    if bundle.outcome[0] != oracle.outcome() {
+    if table.outcome[0] != oracle.outcome() {
         return Err(());
     }
     let truth = match at {
-        At::Samples => samples(&bundle, hole.horizon(), oracle),
-        At::Crossings => crossings(&bundle, oracle)?,
+        At::Samples => samples(&table, hole.horizon(), oracle),
+        At::Crossings => crossings(&table, oracle)?,
     };
-    let estimate = bundle.uncertainty[0];
+    let estimate = table.uncertainty[0];
     let estimate = [estimate.radius, estimate.theta, estimate.azimuth, estimate.delay];
     let columns = |t: TrueError| ([t.radius, t.theta, t.azimuth, t.delay], estimate);
     Ok(truth.map(columns))
@@ -272,8 +272,8 @@ fn point(points: &Points, k: usize) -> [f64; 4] {
     [points.radius[k], points.theta[k], points.azimuth[k], points.delay[k]]
 }
 
-fn samples(bundle: &Bundle, horizon: f64, oracle: &Oracle) -> Option<TrueError> {
-    let points = &bundle.samples;
+fn samples(table: &RayTable, horizon: f64, oracle: &Oracle) -> Option<TrueError> {
+    let points = &table.samples;
     // Azimuth and delay have no limit at the horizon itself.
     let counts = |k: &usize| points.radius[*k] > horizon * (1.0 + 2e-8);
     (0..points.len())
@@ -282,12 +282,12 @@ fn samples(bundle: &Bundle, horizon: f64, oracle: &Oracle) -> Option<TrueError> 
         .reduce(TrueError::max)
 }
 
-fn crossings(bundle: &Bundle, oracle: &Oracle) -> Result<Option<TrueError>, ()> {
+fn crossings(table: &RayTable, oracle: &Oracle) -> Result<Option<TrueError>, ()> {
     let times = oracle.exact_crossings();
-    let points = &bundle.crossings;
-    let end = bundle.mino_total[0];
+    let points = &table.crossings;
+    let end = table.mino_total[0];
     let before_end = times.iter().filter(|time| time.hi <= end).count();
-    if before_end.abs_diff(bundle.crossing_count[0] as usize) > 0 {
+    if before_end.abs_diff(table.crossing_count[0] as usize) > 0 {
         return Err(());
     }
     let judged = |k: usize| oracle.compare(&oracle.at_exactly(times[k]), point(points, k));

@@ -4,7 +4,7 @@
 use super::rays::{Angle, Draw, beside_critical_curve, in_disc, log_uniform};
 use super::{Oracle, TrueError};
 use kerrlight_geodesic::{
-    Bundle, Integrator, Kerr, OutOfRange, Outcome, Placement, Request, Uncertainty, Unresolved,
+    Integrator, Kerr, OutOfRange, Outcome, Placement, RayTable, Request, Uncertainty, Unresolved,
 };
 use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -205,21 +205,21 @@ fn judge(
         ..Request::samples(Placement::MinoTime(5))
     };
     let (hole, observer) = (Kerr::new(ray.spin)?, ray.observer()?);
-    let bundle =
+    let table =
         integrator.trace(&hole, &observer, &[ray.alpha], &[ray.beta], tolerance, &request)?;
     oracle.trace(ray)?;
     tally.rays += 1;
-    match bundle.outcome[0] {
+    match table.outcome[0] {
         Outcome::Captured => tally.fates[0] += 1,
         Outcome::Escaped => tally.fates[1] += 1,
         Outcome::Unresolved(Unresolved::PhotonOrbit) => tally.unresolved[0] += 1,
         Outcome::Unresolved(Unresolved::StepLimit) => tally.unresolved[1] += 1,
     }
-    let unresolved = matches!(bundle.outcome[0], Outcome::Unresolved(_));
-    let wrong_fate = !unresolved && bundle.outcome[0] != oracle.outcome();
-    let wrong_count = !unresolved && !wrong_fate && !same_crossings(&hole, &bundle, oracle);
-    let estimate = bundle.uncertainty[0];
-    let (truth, finite) = errors(&bundle, oracle);
+    let unresolved = matches!(table.outcome[0], Outcome::Unresolved(_));
+    let wrong_fate = !unresolved && table.outcome[0] != oracle.outcome();
+    let wrong_count = !unresolved && !wrong_fate && !same_crossings(&hole, &table, oracle);
+    let estimate = table.uncertainty[0];
+    let (truth, finite) = errors(&table, oracle);
     tally.wrong_fates += u64::from(wrong_fate);
     tally.wrong_crossings += u64::from(wrong_count);
     tally.not_finite += u64::from(!finite);
@@ -240,10 +240,10 @@ const MOST_CROSSINGS: usize = 64;
 
 /// Whether a ray has as many crossings as the oracle's, up to its end. Those closer to the horizon
 /// than 64 roundings of its radius do not count: no double tells on which side they are.
-fn same_crossings(hole: &Kerr, bundle: &Bundle, oracle: &Oracle) -> bool {
+fn same_crossings(hole: &Kerr, table: &RayTable, oracle: &Oracle) -> bool {
     let outside = |r: f64| r > hole.horizon() * (1.0 + 64.0 * f64::EPSILON);
-    let found = bundle.crossings.radius.iter().filter(|r| outside(**r)).count();
-    let before_end = |time: &f64| *time <= bundle.mino_total[0];
+    let found = table.crossings.radius.iter().filter(|r| outside(**r)).count();
+    let before_end = |time: &f64| *time <= table.mino_total[0];
     let crossings = oracle.crossings();
     let expected = crossings.into_iter().filter(before_end).take(MOST_CROSSINGS);
     found == expected.filter(|time| outside(oracle.at(*time).radius().hi)).count()
@@ -265,16 +265,16 @@ fn ratio(truth: &TrueError, estimate: &Uncertainty) -> f64 {
 }
 
 /// The largest errors of a ray's points, and whether all its numbers are finite.
-fn errors(bundle: &Bundle, oracle: &Oracle) -> (TrueError, bool) {
+fn errors(table: &RayTable, oracle: &Oracle) -> (TrueError, bool) {
     let mut worst = TrueError::default();
     let mut finite = true;
     // Later crossings crowd at the horizon of a hole that turns as fast as it can.
-    for (points, most) in [(&bundle.crossings, 2), (&bundle.samples, usize::MAX)] {
+    for (points, most) in [(&table.crossings, 2), (&table.samples, usize::MAX)] {
         for k in 0..points.len().min(most) {
             let at = [points.radius[k], points.theta[k], points.azimuth[k], points.delay[k]];
             finite &= at.iter().all(|x| x.is_finite());
             // Azimuth and delay have no limit at the horizon, where the last sample lies.
-            let last = points.mino_time[k] >= bundle.mino_total[0] * (1.0 - 1e-12);
+            let last = points.mino_time[k] >= table.mino_total[0] * (1.0 - 1e-12);
             if !last && finite {
                 worst = worst.max(oracle.judge(points.mino_time[k], at));
             }

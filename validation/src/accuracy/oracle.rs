@@ -1,7 +1,9 @@
 //! The answers that traced rays are held against.
 
 use super::rays::Draw;
-use kerrlight_geodesic::{Double, Kerr, OutOfRange, Outcome, Path, PathPoint, Want, trace_series};
+use kerrlight_geodesic::{
+    Double, Kerr, OutOfRange, Outcome, Path, PathPoint, Quantities, trace_series,
+};
 use std::f64::consts::TAU;
 
 /// Tolerance of the oracle: far below what a double can hold.
@@ -52,7 +54,7 @@ impl Oracle {
         let hole = Kerr::from_spin(Double::from(ray.spin))?;
         let observer = ray.observer()?.widen();
         let ray = observer.ray(&hole, Double::from(ray.alpha), Double::from(ray.beta))?;
-        trace_series(TOLERANCE, &hole, &ray, Want::ALL, &mut self.path)
+        trace_series(TOLERANCE, &hole, &ray, Quantities::ALL, &mut self.path)
     }
 
     /// What becomes of the ray.

@@ -2,7 +2,7 @@
 
 use super::rays::{Class, Draw, draw};
 use super::{Oracle, TrueError};
-use kerrlight_geodesic::{Bundle, Integrator, Kerr, OutOfRange, Placement, Request, Uncertainty};
+use kerrlight_geodesic::{Integrator, Kerr, OutOfRange, Placement, RayTable, Request, Uncertainty};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
@@ -145,8 +145,8 @@ fn judge(
             oracle.trace(ray)?;
             let one = std::slice::from_ref(ray);
             let judge = |setting: &(Integrator, f64)| {
-                let bundle = trace(one, *setting, &request)?;
-                Ok(judged(&bundle, class, ray.spin, oracle))
+                let table = trace(one, *setting, &request)?;
+                Ok(judged(&table, class, ray.spin, oracle))
             };
             settings.iter().map(judge).collect::<Result<Vec<_>, OutOfRange>>()
         })
@@ -158,8 +158,8 @@ fn judge(
     Ok(columns)
 }
 
-fn judged(bundle: &Bundle, class: Class, spin: f64, oracle: &Oracle) -> Judged {
-    let samples = &bundle.samples;
+fn judged(table: &RayTable, class: Class, spin: f64, oracle: &Oracle) -> Judged {
+    let samples = &table.samples;
     let mut truth = TrueError::default();
     for k in 0..samples.len() {
         if counts(class, spin, samples.radius[k]) {
@@ -167,8 +167,8 @@ fn judged(bundle: &Bundle, class: Class, spin: f64, oracle: &Oracle) -> Judged {
             truth = truth.max(oracle.judge(samples.mino_time[k], at));
         }
     }
-    let right_fate = bundle.outcome[0] == oracle.outcome();
-    Judged { right_fate, truth, estimate: bundle.uncertainty[0] }
+    let right_fate = table.outcome[0] == oracle.outcome();
+    Judged { right_fate, truth, estimate: table.uncertainty[0] }
 }
 
 /// Rays of one observer.
@@ -176,7 +176,7 @@ fn trace(
     rays: &[Draw],
     (integrator, tolerance): (Integrator, f64),
     request: &Request,
-) -> Result<Bundle, OutOfRange> {
+) -> Result<RayTable, OutOfRange> {
     let (hole, observer) = (Kerr::new(rays[0].spin)?, rays[0].observer()?);
     let column = |value: fn(&Draw) -> f64| rays.iter().map(value).collect::<Vec<_>>();
     let (alpha, beta) = (column(|ray| ray.alpha), column(|ray| ray.beta));

@@ -3,7 +3,8 @@
 use super::*;
 use crate::scene::{Rotation, Velocity, VolumeSource};
 use crate::volume::Volume;
-use kerrlight_geodesic::bundle::RayNodes;
+use kerrlight_geodesic::Quantities;
+use kerrlight_geodesic::simd::RayNodes;
 
 /// `value` on the nodes of a box.
 fn volume(nodes: usize, [low, high]: [[f64; 3]; 2], value: impl Fn([f64; 3]) -> f64) -> VolumeFile {
@@ -211,8 +212,8 @@ impl Medium for Finer {
     fn grain(&self) -> Option<Grain> {
         self.0.grain().map(|grain| Grain { size: self.1 * grain.size, ..grain })
     }
-    fn needs(&self) -> Needs {
-        self.0.needs()
+    fn quantities(&self) -> Quantities {
+        self.0.quantities()
     }
     fn color(&self) -> [f32; 3] {
         self.0.color()

@@ -1,7 +1,7 @@
 //! What effects cost that are off: rays of a disc through the library, which has every effect, and
 //! through a loop over the same traced rays that knows none.
 
-use kerrlight_geodesic::bundle::Crossings;
+use kerrlight_geodesic::simd::Crossings;
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
 use kerrlight_tomo::emission::disc::DiscModel;
 use kerrlight_tomo::scene::Scene;

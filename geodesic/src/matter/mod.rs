@@ -1,0 +1,4 @@
+//! Redshift factors of matter that orbits or plunges.
+
+pub mod flow;
+pub mod plunge;

@@ -1,0 +1,8 @@
+//! Numbers and what is done with them: the scalars that the equations are generic over, dual and
+//! compensated numbers, polynomials, quadrature.
+
+pub(crate) mod compensated;
+pub(crate) mod dual;
+pub(crate) mod polynomial;
+pub mod quadrature;
+pub(crate) mod scalar;

@@ -1,0 +1,155 @@
+//! The product of every tracer: a table of rays in columns.
+
+use crate::integrate::path::Outcome;
+use crate::integrate::uncertainty::Uncertainty;
+use crate::rays::request::Request;
+use crate::rays::sampling::{Sink, Summary};
+use crate::spacetime::kerr::Kerr;
+use crate::spacetime::point::PathPoint;
+
+/// Points of many rays in columns, ray after ray. Columns that were not asked for are empty.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Points {
+    /// Where each ray's points end; the first ray's start at 0.
+    ends: Vec<usize>,
+    /// Mino time since the observer, growing backward in time.
+    pub mino_time: Vec<f64>,
+    /// Boyer–Lindquist radius, in M.
+    pub radius: Vec<f64>,
+    /// Polar angle, in radians.
+    pub theta: Vec<f64>,
+    /// Azimuth, continuous along the ray from the observer's on, in radians.
+    pub azimuth: Vec<f64>,
+    /// t_o − t (see [`PathPoint::delay`]), in M.
+    pub delay: Vec<f64>,
+    /// Covariant momentum (p_t, p_r, p_θ, p_φ) of the photon for unit energy at infinity.
+    pub momentum: Vec<[f64; 4]>,
+    /// Weights of the points in an integral over the affine parameter, in M.
+    pub weight: Vec<f64>,
+}
+
+impl Points {
+    /// The places in the columns of the points of ray number `ray`: none if there is no such
+    /// ray.
+    pub fn of(&self, ray: usize) -> core::ops::Range<usize> {
+        let end = |ray: usize| self.ends.get(ray).copied().unwrap_or(self.radius.len());
+        let start = ray.checked_sub(1).map_or(0, end);
+        start..end(ray)
+    }
+
+    /// Number of points of all rays.
+    pub fn len(&self) -> usize {
+        self.radius.len()
+    }
+
+    /// Whether there is no point at all.
+    pub fn is_empty(&self) -> bool {
+        self.radius.is_empty()
+    }
+
+    /// Closes the ray to which the points pushed last belong.
+    pub(crate) fn end_ray(&mut self) {
+        self.ends.push(self.radius.len());
+    }
+
+    pub(crate) fn push(&mut self, request: &Request, hole: &Kerr, lambda: f64, point: &PathPoint) {
+        self.mino_time.push(point.mino_time);
+        self.radius.push(point.radius());
+        self.theta.push(point.theta());
+        if request.azimuth {
+            self.azimuth.push(point.azimuth);
+        }
+        if request.time {
+            self.delay.push(point.delay);
+        }
+        if request.momentum {
+            self.momentum.push(point.momentum(hole, lambda));
+        }
+    }
+
+    pub(crate) fn append(&mut self, other: Self) {
+        let before = self.radius.len();
+        self.ends.extend(other.ends.iter().map(|end| end + before));
+        self.mino_time.extend(other.mino_time);
+        self.radius.extend(other.radius);
+        self.theta.extend(other.theta);
+        self.azimuth.extend(other.azimuth);
+        self.delay.extend(other.delay);
+        self.momentum.extend(other.momentum);
+        self.weight.extend(other.weight);
+    }
+}
+
+/// Traced rays in columns: the same from every [`Integrator`](crate::Integrator).
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct RayTable {
+    /// What became of each ray.
+    pub outcome: Vec<Outcome>,
+    /// Mino time of each whole ray: to the horizon, to infinity, or back to a finite
+    /// observer's radius. NaN where unresolved.
+    pub mino_total: Vec<f64>,
+    /// Smallest radius of each ray that turns; NaN of others.
+    pub turning_radius: Vec<f64>,
+    /// How many times each ray crosses the equatorial plane.
+    pub crossing_count: Vec<u32>,
+    /// The first crossings, as many as were asked for.
+    pub crossings: Points,
+    /// The samples.
+    pub samples: Points,
+    /// For each ray the largest estimated errors of its crossings and samples, if asked for; a
+    /// sample at the horizon itself, where azimuth and delay have no limit, does not count.
+    pub uncertainty: Vec<Uncertainty>,
+}
+
+impl RayTable {
+    /// Number of rays.
+    pub fn len(&self) -> usize {
+        self.outcome.len()
+    }
+
+    /// Whether there is no ray.
+    pub fn is_empty(&self) -> bool {
+        self.outcome.is_empty()
+    }
+
+    pub(crate) fn append(&mut self, other: Self) {
+        self.outcome.extend(other.outcome);
+        self.mino_total.extend(other.mino_total);
+        self.turning_radius.extend(other.turning_radius);
+        self.crossing_count.extend(other.crossing_count);
+        self.crossings.append(other.crossings);
+        self.samples.append(other.samples);
+        self.uncertainty.extend(other.uncertainty);
+    }
+}
+
+impl Sink<f64> for RayTable {
+    fn summary(&mut self, summary: Summary<f64>) {
+        self.outcome.push(summary.outcome);
+        self.mino_total.push(summary.total.unwrap_or(f64::NAN));
+        self.turning_radius.push(summary.turning_radius.unwrap_or(f64::NAN));
+        self.crossing_count.push(summary.crossing_count);
+    }
+
+    fn crossing(&mut self, request: &Request, hole: &Kerr, lambda: f64, point: &PathPoint) {
+        self.crossings.push(request, hole, lambda, point);
+    }
+
+    fn sample(
+        &mut self,
+        request: &Request,
+        hole: &Kerr,
+        lambda: f64,
+        point: &PathPoint,
+        weight: Option<f64>,
+    ) {
+        self.samples.push(request, hole, lambda, point);
+        self.samples.weight.extend(weight);
+    }
+
+    fn end(&mut self, worst: Option<Uncertainty>) {
+        self.crossings.end_ray();
+        self.samples.end_ray();
+        self.uncertainty.extend(worst);
+    }
+}

@@ -1,0 +1,13 @@
+//! Many rays: what is requested of them, every way to trace them, and the columns that come back.
+
+mod blocks;
+pub(crate) mod columns;
+pub mod derivatives;
+mod elliptic_rays;
+pub mod footprint;
+pub(crate) mod integrator;
+mod length;
+#[cfg(feature = "rayon")]
+mod parallel;
+pub(crate) mod request;
+mod sampling;

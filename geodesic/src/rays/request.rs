@@ -1,0 +1,107 @@
+//! What a caller asks of its rays. What is not asked for is not integrated.
+
+use crate::error::{OutOfRange, check};
+use crate::spacetime::quantities::Quantities;
+
+/// Where a ray is sampled, from the observer on.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Placement {
+    /// Nowhere.
+    #[default]
+    None,
+    /// At this many points equidistant in Mino time, from the observer to the ray's end: the
+    /// horizon, or back at the observer's radius. For an observer at infinity the points at
+    /// infinity are left out.
+    MinoTime(usize),
+    /// At the middles of this many pieces of equal length ∫Σ dτ (the affine parameter, for unit
+    /// energy) of the part inside a sphere.
+    PathLength {
+        /// Number of pieces.
+        points: usize,
+        /// Boyer–Lindquist radius of the sphere, in M.
+        radius: f64,
+    },
+    /// At the nodes of the Gauss–Legendre rule in Mino time on each of the one or two pieces of
+    /// the ray between two radii.
+    GaussLegendre {
+        /// Nodes on each piece.
+        points: usize,
+        /// Smaller radius, in M.
+        from: f64,
+        /// Larger radius, in M.
+        to: f64,
+    },
+}
+
+/// What is wanted of every ray. r, θ and Mino time come with every point.
+///
+/// ```
+/// use kerrlight_geodesic::{Placement, Request};
+/// // Positions on the equatorial plane with azimuths, and nothing else:
+/// let request = Request { crossings: 3, azimuth: true, ..Request::default() };
+/// assert!(request.samples == Placement::None && !request.time);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Request {
+    /// How many equatorial crossings at most.
+    pub crossings: usize,
+    /// Where else.
+    pub samples: Placement,
+    /// Azimuth.
+    pub azimuth: bool,
+    /// Coordinate time.
+    pub time: bool,
+    /// Covariant four-momentum; brings the azimuth with it.
+    pub momentum: bool,
+    /// The path weight of samples: what an integral over the affine parameter
+    /// s = ∫Σ dτ gives to each.
+    pub weight: bool,
+    /// Estimates of the errors of positions.
+    pub uncertainty: bool,
+}
+
+impl Request {
+    /// Everything about this many crossings.
+    pub fn crossings(n: usize) -> Self {
+        Request { crossings: n, azimuth: true, time: true, ..Request::default() }
+    }
+
+    /// Everything about samples placed like this.
+    pub fn samples(placement: Placement) -> Self {
+        Request { samples: placement, azimuth: true, time: true, ..Request::default() }
+    }
+
+    pub(crate) fn quantities(&self) -> Quantities {
+        Quantities {
+            azimuth: self.azimuth || self.momentum,
+            time: self.time,
+            velocity: self.momentum,
+        }
+    }
+
+    pub(crate) fn check(&self) -> Result<(), OutOfRange> {
+        let count = |field, n: usize| {
+            check(field, n as f64, (1..=1_000_000).contains(&n), "a number in [1, 1000000]")
+        };
+        match self.samples {
+            Placement::None => {}
+            Placement::MinoTime(points) => {
+                count("samples", points)?;
+            }
+            Placement::PathLength { points, radius } => {
+                count("samples", points)?;
+                let ok = radius > 0.0 && radius.is_finite();
+                check("radius of the sphere", radius, ok, "a positive finite number (M)")?;
+            }
+            Placement::GaussLegendre { points, from, to } => {
+                // Finding the nodes takes a time that grows with the square of their number.
+                let ok = (1..=10_000).contains(&points);
+                check("samples", points as f64, ok, "a number of nodes in [1, 10000]")?;
+                check("from", from, from > 0.0 && from.is_finite(), "a positive number (M)")?;
+                let ok = to > from && to.is_finite();
+                check("to", to, ok, "a finite number above `from` (M)")?;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,207 @@
+//! Where the points of a traced ray lie, whichever tracer traced it and whatever kind of
+//! number it is made of: with dual numbers every place carries its own derivatives.
+
+use crate::integrate::path::Outcome;
+use crate::integrate::uncertainty::Uncertainty;
+use crate::numbers::quadrature::{equidistant, gauss_legendre};
+use crate::numbers::scalar::Elementary;
+use crate::rays::length::{self, Length};
+use crate::rays::request::{Placement, Request};
+use crate::spacetime::kerr::Kerr;
+use crate::spacetime::point::PathPoint;
+
+/// A traced ray whose position is known at every Mino time up to its end: the horizon,
+/// infinity, or back at a finite observer's radius.
+pub(crate) trait Trajectory<T> {
+    fn outcome(&self) -> Outcome;
+    fn total(&self) -> T;
+    fn turning_radius(&self) -> Option<T>;
+    fn crossings(&self, found: &mut Vec<T>);
+    fn at(&self, mino_time: T) -> PathPoint<T>;
+    fn uncertainty(&self, mino_time: T) -> Uncertainty;
+    /// That of crossing number `k`, at `mino_time`.
+    fn uncertainty_at_crossing(&self, k: usize, mino_time: T) -> Uncertainty;
+    /// The pieces with lo ≤ r ≤ hi.
+    fn within(&self, lo: f64, hi: f64, pieces: &mut Vec<[T; 2]>);
+}
+
+/// What is known about a ray as a whole.
+pub(crate) struct Summary<T> {
+    pub outcome: Outcome,
+    /// `None` where unresolved.
+    pub total: Option<T>,
+    pub turning_radius: Option<T>,
+    pub crossing_count: u32,
+}
+
+/// Takes what a [`Sampler`] finds: of each ray first its summary, then its crossings, then its
+/// samples, then its end.
+pub(crate) trait Sink<T> {
+    fn summary(&mut self, summary: Summary<T>);
+    fn crossing(&mut self, request: &Request, hole: &Kerr<T>, lambda: T, point: &PathPoint<T>);
+    /// `weight`: Σ dτ, if it was asked for.
+    fn sample(
+        &mut self,
+        request: &Request,
+        hole: &Kerr<T>,
+        lambda: T,
+        point: &PathPoint<T>,
+        weight: Option<T>,
+    );
+    fn end(&mut self, worst: Option<Uncertainty>);
+}
+
+/// Takes from rays what is requested.
+pub(crate) struct Sampler<'a, T, S> {
+    request: &'a Request,
+    hole: &'a Kerr<T>,
+    at_infinity: bool,
+    rule: &'a [(f64, f64)],
+    pub sink: S,
+    times: Vec<T>,
+    pieces: Vec<[T; 2]>,
+    worst: Uncertainty,
+}
+
+/// The Gauss–Legendre rule that a request needs: its own, or that of the path length.
+pub(crate) fn rule(request: &Request) -> Vec<(f64, f64)> {
+    match request.samples {
+        Placement::GaussLegendre { points, .. } => gauss_legendre(points),
+        Placement::PathLength { .. } => gauss_legendre(length::NODES),
+        _ => Vec::new(),
+    }
+}
+
+/// Whether a ray has reached the horizon, where azimuth and delay have no limit, and no error.
+fn at_horizon<T: Elementary>(ray: &impl Trajectory<T>, mino_time: T) -> bool {
+    ray.outcome() == Outcome::Captured && mino_time.value() >= ray.total().value()
+}
+
+impl<'a, T: Elementary, S: Sink<T>> Sampler<'a, T, S> {
+    /// `rule` is that of the request.
+    pub fn new(
+        request: &'a Request,
+        hole: &'a Kerr<T>,
+        at_infinity: bool,
+        rule: &'a [(f64, f64)],
+        sink: S,
+    ) -> Self {
+        let (times, pieces, worst) = (Vec::new(), Vec::new(), Uncertainty::default());
+        Sampler { request, hole, at_infinity, rule, sink, times, pieces, worst }
+    }
+
+    /// Takes a ray with angular momentum `lambda`.
+    pub fn take(&mut self, ray: &impl Trajectory<T>, lambda: T) {
+        let outcome = ray.outcome();
+        let total = (!matches!(outcome, Outcome::Unresolved(_))).then(|| ray.total());
+        let mut times = core::mem::take(&mut self.times);
+        times.clear();
+        ray.crossings(&mut times);
+        self.sink.summary(Summary {
+            outcome,
+            total,
+            turning_radius: ray.turning_radius(),
+            crossing_count: times.len() as u32,
+        });
+        self.worst = Uncertainty::default();
+        for (k, time) in times.iter().enumerate().take(self.request.crossings) {
+            self.sink.crossing(self.request, self.hole, lambda, &ray.at(*time));
+            if self.request.uncertainty && !at_horizon(ray, *time) {
+                self.worst = self.worst.max(ray.uncertainty_at_crossing(k, *time));
+            }
+        }
+        self.times = times;
+        if let Some(total) = total {
+            self.samples(ray, lambda, total);
+        }
+        self.sink.end(self.request.uncertainty.then_some(self.worst));
+    }
+
+    fn doubt(&mut self, ray: &impl Trajectory<T>, mino_time: T) {
+        if self.request.uncertainty && !at_horizon(ray, mino_time) {
+            self.worst = self.worst.max(ray.uncertainty(mino_time));
+        }
+    }
+
+    /// Adds the sample at a Mino time whose path weight is `weight` of Σ there.
+    fn sample(
+        &mut self,
+        ray: &impl Trajectory<T>,
+        lambda: T,
+        mino_time: T,
+        weight: impl Fn(T) -> T,
+    ) {
+        let point = ray.at(mino_time);
+        let sigma = || self.hole.sigma(point.radius(), point.cos_theta());
+        let weight = self.request.weight.then(|| weight(sigma()));
+        self.sink.sample(self.request, self.hole, lambda, &point, weight);
+        self.doubt(ray, mino_time);
+    }
+
+    fn samples(&mut self, ray: &impl Trajectory<T>, lambda: T, total: T) {
+        match self.request.samples {
+            Placement::None => {}
+            Placement::MinoTime(n) => self.by_mino_time(ray, lambda, total, n),
+            Placement::PathLength { points, radius } => self.by_length(ray, lambda, points, radius),
+            Placement::GaussLegendre { from, to, .. } => {
+                let mut pieces = core::mem::take(&mut self.pieces);
+                ray.within(from, to, &mut pieces);
+                for [start, end] in &pieces {
+                    let length = *end - *start;
+                    for (x, weight) in self.rule {
+                        let time = *start + length * T::constant(*x);
+                        let step = length * T::constant(*weight);
+                        self.sample(ray, lambda, time, |sigma| step * sigma);
+                    }
+                }
+                self.pieces = pieces;
+            }
+        }
+    }
+
+    fn by_mino_time(&mut self, ray: &impl Trajectory<T>, lambda: T, total: T, n: usize) {
+        let captured = ray.outcome() == Outcome::Captured;
+        // At infinity the ends have no finite position; each other end counts half.
+        let (from, to) = match (self.at_infinity, captured) {
+            (true, true) => (1.0 / n as f64, 1.0),
+            (true, false) => (1.0 / (n + 1) as f64, n as f64 / (n + 1) as f64),
+            (false, _) => (0.0, 1.0),
+        };
+        let step = if n > 1 { (to - from) / (n - 1) as f64 } else { to - from };
+        for (k, share) in equidistant(from, to, n).enumerate() {
+            let first = k == 0 && !self.at_infinity;
+            let last = k + 1 == n && (captured || !self.at_infinity);
+            let part = if first || last { 0.5 * step } else { step };
+            let step = total * T::constant(part);
+            self.sample(ray, lambda, total * T::constant(share), |sigma| step * sigma);
+        }
+    }
+
+    fn by_length(&mut self, ray: &impl Trajectory<T>, lambda: T, n: usize, radius: f64) {
+        let mut pieces = core::mem::take(&mut self.pieces);
+        ray.within(0.5 * self.hole.horizon().value(), radius, &mut pieces);
+        if let (Some([start, _]), Some([_, end])) = (pieces.first(), pieces.last()) {
+            self.equal_lengths(ray, lambda, [*start, *end], n);
+        }
+        self.pieces = pieces;
+    }
+
+    fn equal_lengths(
+        &mut self,
+        ray: &impl Trajectory<T>,
+        lambda: T,
+        [start, end]: [T; 2],
+        n: usize,
+    ) {
+        let hole = self.hole;
+        let length = Length::new([start, end], self.rule, |time| {
+            let point = ray.at(time);
+            hole.sigma(point.radius(), point.cos_theta())
+        });
+        let piece = length.total() / T::constant(n as f64);
+        for k in 0..n {
+            let time = length.find(piece * T::constant(k as f64 + 0.5));
+            self.sample(ray, lambda, time, |_| piece);
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! Many rays of one observer at once, several rays a SIMD register: the fastest way to
+//! (t, r, θ, φ) along whole pictures ([`Samples`]) and to their equatorial crossings
+//! ([`Crossings`]).
+//!
+//! Nothing is integrated step by step. r(τ) and the direction are elliptic functions of Mino
+//! time, and their addition theorems for a fixed step h are rational recurrences with
+//! constant coefficients (`radial`, `polar` in the source); azimuth and time are
+//! quadratures of smooth functions of them over the same nodes, ten points an interval. The
+//! length of a ray and its fate come from one Carlson integral of each end point, and so does
+//! the time of a crossing. The instruction set is chosen at run time (AVX2 with FMA, else SSE2,
+//! else one ray at a time; AVX-512 on request).
+//!
+//! ```
+//! use kerrlight_geodesic::simd::{Crossings, Samples};
+//! use kerrlight_geodesic::{Inclination, Kerr, Observer};
+//!
+//! let hole = Kerr::new(0.94)?;
+//! let observer = Observer::at_radius(Inclination::from_degrees(60.0)?, 1000.0)?;
+//! let (alpha, beta) = ([-6.0, 2.0], [1.0, 0.5]);
+//!
+//! let mut samples = Samples::default();
+//! samples.trace(&hole, &observer, &alpha, &beta, 100)?;
+//! let first = samples.ray(0);
+//! assert!(first.escapes && (first.radius[99] - 1000.0).abs() < 1e-6);
+//! assert!(!samples.ray(1).escapes);
+//!
+//! let mut crossings = Crossings::default();
+//! crossings.trace(&hole, &observer, &alpha, &beta, 1)?;
+//! let disc = crossings.ray(0).next().expect("this ray meets the equatorial plane");
+//! assert!(disc.radius > 5.0 && disc.radius < 15.0);
+//! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+//! ```
+
+mod column;
+mod crossing;
+mod crossing_polar;
+mod crossings;
+mod dispatch;
+mod elliptic;
+mod error;
+mod lanes;
+mod march;
+mod math;
+mod motion;
+mod nodes;
+mod panel;
+mod polar;
+mod radial;
+mod radial_sum;
+mod sample;
+mod samples;
+
+pub use crossings::{Crossing, Crossings, RayEnds};
+pub use dispatch::Width;
+pub(crate) use error::MAX_STEP;
+pub use nodes::{NodeRequest, Nodes, RayNodes};
+pub use panel::PanelRule;
+pub(crate) use radial_sum::LEAST_STEPS;
+pub use samples::{RaySamples, Samples};
+
+use crate::error::{OutOfRange, check};
+use crate::screen::observer::Observer;
+use crate::spacetime::kerr::Kerr;
+use motion::Motion;
+
+/// Rays that one task works on: enough for many registers, few enough for the cache.
+const BLOCK: usize = 512;
+
+/// The nearest observer, in M: outside every photon orbit, so that rays come from outside the
+/// barrier.
+const NEAREST: f64 = 5.0;
+
+/// The farthest one that is not at infinity: squares of squares of the radius have to be numbers.
+const FARTHEST: f64 = 1e30;
+
+/// The least W = (dw/dτ)² at the observer: rays that pass it nearly tangentially would lose
+/// digits in its root.
+const SLOWEST: f64 = 0.01;
+
+/// The kernels' view of the observer, if all rays are within their reach.
+fn checked(
+    hole: &Kerr,
+    observer: &Observer,
+    alpha: &[f64],
+    beta: &[f64],
+) -> Result<motion::Camera, OutOfRange> {
+    let w = observer.inverse_radius();
+    let within = w == 0.0 || (1.0 / FARTHEST..=1.0 / NEAREST).contains(&w);
+    check("observer radius", 1.0 / w, within, "infinity, or a number in [5, 1e30] (M)")?;
+    let same = alpha.len() == beta.len();
+    check("number of beta", beta.len() as f64, same, "as many as of alpha")?;
+    let camera = motion::Camera::new(hole, observer);
+    for (x, y) in alpha.iter().zip(beta) {
+        check("alpha", *x, x.abs() <= 1e12, "a number in [-1e12, 1e12] (M)")?;
+        check("beta", *y, y.abs() <= 1e12, "a number in [-1e12, 1e12] (M)")?;
+        let radial = Motion::<f64>::new(&camera, *x, *y).radial(w);
+        let inwards = "with beta a ray that reaches the observer from well inside \
+                       (W(1/r) = (dr/dtau)^2/r^4 at least 0.01)";
+        check("alpha", *x, radial >= SLOWEST, inwards)?;
+    }
+    Ok(camera)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,28 @@
+//! Which quantities are computed at the points of a ray.
+
+/// What is computed at the points of a ray besides r, θ and Mino time. What is off costs nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Quantities {
+    /// Azimuth.
+    pub azimuth: bool,
+    /// Coordinate time.
+    pub time: bool,
+    /// Rates of 1/r and cos θ with Mino time. Rays traced step by step always have them.
+    pub velocity: bool,
+}
+
+impl Quantities {
+    /// r and θ alone.
+    pub const POLAR: Quantities = Quantities { azimuth: false, time: false, velocity: false };
+    /// Everything.
+    pub const ALL: Quantities = Quantities { azimuth: true, time: true, velocity: true };
+
+    /// What one or the other wants.
+    pub fn or(self, other: Self) -> Self {
+        Quantities {
+            azimuth: self.azimuth || other.azimuth,
+            time: self.time || other.time,
+            velocity: self.velocity || other.velocity,
+        }
+    }
+}
