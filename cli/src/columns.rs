@@ -2,6 +2,7 @@
 
 use anyhow::Context;
 use npyz::WriterBuilder;
+use serde_json::json;
 use std::io::{Cursor, Write};
 
 /// A named column of a table.
@@ -93,6 +94,20 @@ pub fn npz(groups: &[Vec<Column>]) -> anyhow::Result<Vec<u8>> {
         archive.write_all(&bytes)?;
     }
     Ok(archive.finish()?.into_inner())
+}
+
+/// An object of columns: an array a column, of arrays where a row has several numbers. What is not finite is null.
+pub fn json(groups: &[Vec<Column>]) -> serde_json::Value {
+    let columns = groups.iter().flatten().map(|column| {
+        let values = match column {
+            Column::Numbers(_, values) => json!(values),
+            Column::Counts(_, counts) => json!(counts),
+            Column::Words(_, words) => json!(words),
+            Column::Blocks(_, rows) => json!(rows),
+        };
+        (column.name().to_owned(), values)
+    });
+    serde_json::Value::Object(columns.collect())
 }
 
 fn npy<T: npyz::AutoSerialize>(

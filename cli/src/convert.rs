@@ -1,7 +1,9 @@
 //! `kerrlight convert`: visibilities from one format to another.
 
+use crate::answer::Answer;
 use crate::interferometry::arguments::{self, Source};
 use crate::interferometry::{self, ObservationFile, Written};
+use crate::output;
 use anyhow::bail;
 use clap::Args;
 use kerrlight_tomo::interferometry::observation::{Flags, Observation};
@@ -12,7 +14,7 @@ use std::path::PathBuf;
 pub struct Convert {
     /// UVFITS, eht-imaging's text, the EHT's csv or txt, or kerrlight's CSV
     input: PathBuf,
-    /// Where to write; the name's ending tells the format
+    /// Where to write; the name's ending tells the format, `-` is CSV on standard output
     #[arg(value_name = "OUTPUT.uvfits|.txt|.csv")]
     output: PathBuf,
     /// Format to write [default: by the name's ending]
@@ -61,7 +63,7 @@ pub struct Convert {
 
 impl Convert {
     /// Converts.
-    pub fn run(&self) -> anyhow::Result<()> {
+    pub fn run(&self) -> anyhow::Result<Answer> {
         let output = ObservationFile::new(&self.output, self.format, self.comments)?;
         output.spares(&self.input)?;
         if let Some(seconds) = self.average.filter(|s| !(*s > 0.0 && s.is_finite())) {
@@ -94,8 +96,14 @@ impl Convert {
             bail!("{}: no visibilities are left", self.input.display());
         }
         output.write(&observation)?;
-        eprintln!("{} rows, {} flagged", observation.rows.len(), selection.dropped);
-        Ok(())
+        let (rows, flagged) = (observation.rows.len(), selection.dropped);
+        eprintln!("{rows} rows, {flagged} flagged");
+        Ok(output.answer().with("rows", rows).with("flagged", flagged))
+    }
+
+    /// Whether standard output carries the visibilities.
+    pub fn pipes(&self) -> bool {
+        output::is_pipe(&self.output)
     }
 
     /// Refuses hours over midnight that no clock shows; tells of intervals without visibilities.

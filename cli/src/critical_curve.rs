@@ -1,5 +1,6 @@
 //! `kerrlight critical-curve`: the edge of the shadow, as a table.
 
+use crate::answer::Answer;
 use crate::columns::{self, Column};
 use crate::output::{self, Output};
 use anyhow::Context;
@@ -21,7 +22,7 @@ pub struct CriticalCurveTable {
     /// the right (beta = 0), counterclockwise
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     points: u32,
-    /// Where to write the table [default: standard output]
+    /// Where to write the table; `-` is standard output [default: -]
     #[arg(short, long, value_name = "FILE.csv")]
     output: Option<PathBuf>,
 }
@@ -30,10 +31,11 @@ const COLUMNS: [&str; 8] = ["r", "lambda", "eta", "alpha", "beta", "gamma", "del
 
 impl CriticalCurveTable {
     /// Computes and writes the curve.
-    pub fn run(&self) -> anyhow::Result<()> {
+    pub fn run(&self) -> anyhow::Result<Answer> {
         let hole = Kerr::new(self.spin).context("--spin")?;
         let inclination = Inclination::from_degrees(self.inclination).context("--inclination")?;
-        let output = self.output.as_deref().map(|path| Output::new(path, "csv")).transpose()?;
+        let output =
+            self.output.as_deref().map(|path| Output::or_pipe(path, &["csv"])).transpose()?;
         let points: Vec<_> =
             CriticalCurve::new(&hole, inclination).points(self.points).map(values).collect();
         let endless = points.iter().filter(|point| !point.iter().all(|x| x.is_finite())).count();
@@ -49,11 +51,16 @@ impl CriticalCurveTable {
             .enumerate()
             .map(|(k, name)| Column::Numbers((*name).to_owned(), column(k)))
             .collect();
-        let bytes = columns::csv(&[table], points.len())?;
-        match output {
-            Some(output) => output.write(&bytes),
-            None => output::print(core::str::from_utf8(&bytes)?),
-        }
+        let Some(output) = output else {
+            return Ok(Answer::table("points", vec![table], points.len()));
+        };
+        output.write(&columns::csv(&[table], points.len())?)?;
+        Ok(Answer::default().with("count", points.len()).outputs([&output]))
+    }
+
+    /// Whether standard output carries the table because `-o -` says so.
+    pub fn pipes(&self) -> bool {
+        self.output.as_deref().is_some_and(output::is_pipe)
     }
 }
 

@@ -19,6 +19,7 @@
 //! comparison of that program.
 
 mod accuracy;
+mod answer;
 mod assets;
 mod checksum;
 mod columns;
@@ -26,6 +27,7 @@ mod compare;
 mod convert;
 mod critical_curve;
 mod fit;
+mod help;
 mod inspect;
 mod interferometry;
 mod interrupt;
@@ -49,48 +51,55 @@ mod volume_files;
 pub use memory::Bounded;
 pub use program::{BuildRepresentation, OwnSettings, Program};
 
+use answer::{Answer, Form};
+use anyhow::bail;
 use clap::{Parser, Subcommand};
 
-/// Lensed images of spinning black holes
+/// Black holes: lensed images, simulated interferometry, 3D emission tomography
 #[derive(Debug, Parser)]
 #[command(name = "kerrlight", version, propagate_version = true)]
 struct Arguments {
     #[command(subcommand)]
     verb: Verb,
-    /// Threads to use [default: one for each core]; results do not depend on it
+    /// Threads, which change no result [default: one a core]
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Most memory to take, e.g. 4GiB: what would need more is refused [default: what the machine, the control group and
-    /// ulimit leave]
+    /// Memory limit, e.g. 4GiB [default: what the system leaves]
     #[arg(long, global = true, value_name = "SIZE", value_parser = memory::parse)]
     memory: Option<u64>,
+    /// Print the result as one JSON object
+    #[arg(long, global = true)]
+    json: bool,
 }
 
 #[derive(Debug, Subcommand)]
 enum Verb {
     /// Render a scene to EXR and PNG
     Render(render::Render),
-    /// Render many frames of a scene: numbered EXR files, and a GIF, APNG or PNGs to look at
+    /// Render a sequence of EXR frames, a GIF or an APNG
     Movie(movie::Movie),
-    /// Show what a file holds: channels and settings of a picture, arrays, visibilities of an
-    /// observation, the state of a fit
-    Inspect(inspect::Inspect),
-    /// See an image, a movie or a scene through an array of telescopes
-    Observe(observe::Observe),
-    /// Write the (u, v) coverage of an array, as a table and as a picture
-    Uv(uv::Uv),
-    /// Rewrite visibilities in another format; average, flag, merge hands
-    Convert(convert::Convert),
-    /// Recover the emission around a hole from movies or visibilities
-    Fit(fit::Fit),
-    /// Run many fits that differ in named factors: the comparisons of BH-NeRF's paper, or your own
-    Compare(compare::Compare),
-    /// Trace single rays from a table to a table
+    /// Trace the rays of a table
     Trace(trace::Trace),
-    /// Write the critical curve, the edge of the shadow, as a table
+    /// Tabulate the critical curve, the edge of the shadow
     CriticalCurve(critical_curve::CriticalCurveTable),
-    /// Measure what a digit costs in time, or trace hard rays against 28 digits
+    /// Benchmark integrators: error against time, or hard rays
     Accuracy(accuracy::Accuracy),
+    /// Simulate visibilities of an image, a movie or a scene
+    Observe(observe::Observe),
+    /// Tabulate and plot the (u, v) coverage of an array
+    Uv(uv::Uv),
+    /// Convert visibilities between formats; average, flag
+    Convert(convert::Convert),
+    /// Reconstruct emission in 3D from visibilities or movies
+    Fit(fit::Fit),
+    /// Run a grid of fits and compare their results
+    Compare(compare::Compare),
+    /// Show what a file or the folder of a fit contains
+    Inspect(inspect::Inspect),
+    /// Print a completion script for a shell
+    Completions(help::Completions),
+    /// Write manual pages
+    Man(help::ManPages),
 }
 
 fn run(arguments: &Arguments) -> anyhow::Result<()> {
@@ -98,17 +107,44 @@ fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if let Some(threads) = arguments.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
     }
-    match &arguments.verb {
-        Verb::Render(render) => render.run(),
-        Verb::Movie(movie) => movie.run(),
-        Verb::Inspect(inspect) => inspect.run(),
-        Verb::Observe(observe) => observe.run(),
-        Verb::Uv(uv) => uv.run(),
-        Verb::Convert(convert) => convert.run(),
-        Verb::Fit(fit) => fit.run(),
-        Verb::Compare(compare) => compare.run(arguments.threads, arguments.memory),
-        Verb::Trace(trace) => trace.run(),
-        Verb::CriticalCurve(table) => table.run(),
-        Verb::Accuracy(accuracy) => accuracy.run(),
+    let form = match (arguments.json, arguments.verb.pipes()) {
+        (true, true) => bail!("--json and `-` both ask for standard output: give a file's name"),
+        (true, false) => Form::Json,
+        (false, true) => Form::Aside,
+        (false, false) => Form::Text,
+    };
+    arguments.verb.run(arguments)?.print(form)
+}
+
+impl Verb {
+    /// Whether standard output carries a file, because a path is `-`.
+    fn pipes(&self) -> bool {
+        match self {
+            Verb::Render(render) => render.pipes(),
+            Verb::Trace(trace) => trace.pipes(),
+            Verb::CriticalCurve(table) => table.pipes(),
+            Verb::Observe(observe) => observe.pipes(),
+            Verb::Uv(uv) => uv.pipes(),
+            Verb::Convert(convert) => convert.pipes(),
+            _ => false,
+        }
+    }
+
+    fn run(&self, arguments: &Arguments) -> anyhow::Result<Answer> {
+        match self {
+            Verb::Render(render) => render.run(),
+            Verb::Movie(movie) => movie.run(),
+            Verb::Trace(trace) => trace.run(),
+            Verb::CriticalCurve(table) => table.run(),
+            Verb::Accuracy(accuracy) => accuracy.run(),
+            Verb::Observe(observe) => observe.run(),
+            Verb::Uv(uv) => uv.run(),
+            Verb::Convert(convert) => convert.run(),
+            Verb::Fit(fit) => fit.run(),
+            Verb::Compare(compare) => compare.run(arguments.threads, arguments.memory),
+            Verb::Inspect(inspect) => inspect.run(),
+            Verb::Completions(completions) => completions.run(),
+            Verb::Man(pages) => pages.run(),
+        }
     }
 }

@@ -1,8 +1,10 @@
 //! `kerrlight observe`: what an array of telescopes would see.
 
+use crate::answer::Answer;
 use crate::interferometry::arguments::{self, Observing};
 use crate::interferometry::movie_files::{self, FrameTimes};
 use crate::interferometry::{ObservationFile, scene_movie};
+use crate::output;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use kerrlight_tomo::interferometry::noise::{
@@ -68,7 +70,7 @@ pub struct Observe {
     /// Tell source, date, frequency, stations and history in lines of a CSV that start with `#`
     #[arg(long)]
     comments: bool,
-    /// Where to write the visibilities; the name's ending tells the format
+    /// Where to write the visibilities; the name's ending tells the format, `-` is CSV on standard output
     #[arg(short, long, value_name = "FILE.uvfits|.txt|.csv")]
     output: PathBuf,
 }
@@ -103,7 +105,7 @@ enum PulseName {
 
 impl Observe {
     /// Observes.
-    pub fn run(&self) -> anyhow::Result<()> {
+    pub fn run(&self) -> anyhow::Result<Answer> {
         let output = ObservationFile::new(&self.output, None, self.comments)?;
         let files = self.files()?;
         files.iter().try_for_each(|file| output.spares(file))?;
@@ -132,7 +134,12 @@ impl Observe {
         output.write(&observation)?;
         let count = observation.rows.len();
         eprintln!("{count} visibilities; {}", observation.history.join("; "));
-        Ok(())
+        Ok(output.answer().with("visibilities", count).with("history", observation.history))
+    }
+
+    /// Whether standard output carries the visibilities.
+    pub fn pipes(&self) -> bool {
+        output::is_pipe(&self.output)
     }
 
     /// All files of the input.

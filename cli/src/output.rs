@@ -5,7 +5,7 @@ use anyhow::{Context, bail};
 use kerrlight_tomo::memory;
 use std::cell::RefCell;
 use std::fs::File;
-use std::io::{BufWriter, Read, Write};
+use std::io::{BufWriter, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -15,6 +15,16 @@ pub struct Output {
     given: PathBuf,
     path: PathBuf,
     folder: PathBuf,
+    /// Whether the bytes go to standard output once they are whole.
+    piped: bool,
+}
+
+/// The name of standard output and of standard input.
+pub const PIPE: &str = "-";
+
+/// Whether a path stands for standard output or standard input.
+pub fn is_pipe(path: &Path) -> bool {
+    path == Path::new(PIPE)
 }
 
 impl Output {
@@ -53,10 +63,25 @@ impl Output {
             Some(parent) if parent != Path::new("") => parent.to_owned(),
             _ => folder,
         };
-        let output = Output { given, path, folder };
+        let output = Output { given, path, folder, piped: false };
         // A read-only folder is better found out now than after the work.
         output.beside()?;
         Ok(output)
+    }
+
+    /// The same, where `-` is standard output.
+    pub fn or_pipe(path: &Path, extensions: &[&str]) -> anyhow::Result<Self> {
+        if !is_pipe(path) {
+            return Self::ending_in(path, extensions);
+        }
+        // The bytes are kept in a temporary file until they are whole.
+        let (given, folder) = (path.to_owned(), std::env::temp_dir());
+        Ok(Output { path: given.clone(), given, folder, piped: true })
+    }
+
+    /// Whether it is standard output.
+    pub fn is_pipe(&self) -> bool {
+        self.piped
     }
 
     fn beside(&self) -> anyhow::Result<tempfile::NamedTempFile> {
@@ -76,7 +101,7 @@ impl Output {
     /// Refuses to take the place of a file that is read.
     pub fn spares(&self, input: &Path) -> anyhow::Result<()> {
         match (self.path.canonicalize(), input.canonicalize()) {
-            (Ok(output), Ok(input)) if output == input => {
+            (Ok(output), Ok(input)) if output == input && !self.piped => {
                 bail!("output {} is an input and would be lost: give another name", input.display())
             }
             _ => Ok(()),
@@ -109,16 +134,20 @@ impl Output {
         write(&mut buffer).with_context(name)?;
         buffer.flush().with_context(name)?;
         drop(buffer);
+        if self.piped {
+            return pour(file.as_file());
+        }
         file.as_file().sync_all().with_context(name)?;
         file.persist(&self.path).with_context(name)?;
         Ok(())
     }
 
-    /// Where what is needed to go on with an interrupted run is kept: beside the file itself.
-    pub fn partial(&self) -> PathBuf {
+    /// Where an interrupted run keeps what it needs to be resumed: beside the file itself. Standard output has no such
+    /// place.
+    pub fn partial(&self) -> Option<PathBuf> {
         let mut name = self.path.clone().into_os_string();
         name.push(".partial");
-        name.into()
+        (!self.piped).then(|| name.into())
     }
 
     /// The place, as it was given.
@@ -158,7 +187,18 @@ pub fn remove_unfinished() {
 
 /// Prints to standard output; a reader who has closed the pipe has seen enough.
 pub fn print(text: &str) -> anyhow::Result<()> {
-    match std::io::stdout().write_all(text.as_bytes()) {
+    printed(std::io::stdout().write_all(text.as_bytes()))
+}
+
+/// Copies a whole file to standard output.
+fn pour(mut file: &File) -> anyhow::Result<()> {
+    file.rewind().context("cannot read the temporary file")?;
+    let mut out = std::io::stdout();
+    printed(std::io::copy(&mut file, &mut out).and_then(|_| out.flush()))
+}
+
+fn printed(result: std::io::Result<()>) -> anyhow::Result<()> {
+    match result {
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         result => result.context("cannot write to standard output"),
     }

@@ -1,8 +1,8 @@
 //! The program with what others add to it.
 
-use super::{Arguments, compare, fit, interrupt, run};
+use super::{Arguments, compare, fit, help, interrupt, run};
 use anyhow::{anyhow, bail};
-use clap::Parser;
+use clap::FromArgMatches;
 use kerrlight_tomo::representation::Representation;
 use std::ops::RangeInclusive;
 use std::process::ExitCode;
@@ -72,7 +72,8 @@ impl Program {
     /// Does what the command line says; 0 is success, 2 an error, 1 a fit that failed while it ran or a comparison of which
     /// a part did, 128 and the number of the signal what a signal has stopped: 130 after Ctrl-C, 143 after SIGTERM.
     pub fn run(self) -> ExitCode {
-        let arguments = Arguments::parse();
+        let matches = help::command().get_matches();
+        let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
         interrupt::listen();
         // Only the first program of a process counts: there is one command line.
         let _ = OWN.set(self.representations);

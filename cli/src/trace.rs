@@ -1,5 +1,6 @@
 //! `kerrlight trace`: single rays, from a table to a table.
 
+use crate::answer::Answer;
 use crate::columns::{self, Column};
 use crate::output::{self, Output};
 use anyhow::{Context, bail};
@@ -54,7 +55,7 @@ pub struct Trace {
     /// Also write each ray's largest estimated errors: of r (relative), theta, phi and delay
     #[arg(long)]
     errors: bool,
-    /// Where to write the table, as .csv or .npz [default: CSV to standard output]
+    /// Where to write the table, as .csv or .npz; `-` is CSV on standard output [default: -]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 }
@@ -96,7 +97,7 @@ const FARTHEST: f64 = 1e9;
 
 impl Trace {
     /// Traces all rays of the table.
-    pub fn run(&self) -> anyhow::Result<()> {
+    pub fn run(&self) -> anyhow::Result<Answer> {
         // Names the argument now, rather than a line of the table later.
         Tracer::new(self.tolerance).context("--tolerance")?;
         if self.integrator == Integrator::Rk45Affine && self.observer.is_infinite() {
@@ -122,7 +123,7 @@ impl Trace {
         }
         let ending = self.output.as_deref().and_then(|path| path.extension());
         let npz = ending.is_some_and(|ending| ending.eq_ignore_ascii_case("npz"));
-        let place = |path| Output::ending_in(path, &["csv", "npz"]);
+        let place = |path| Output::or_pipe(path, &["csv", "npz"]);
         let output = self.output.as_deref().map(place).transpose()?;
         if let Some(output) = &output {
             output.spares(&self.rays)?;
@@ -142,11 +143,17 @@ impl Trace {
             .collect::<anyhow::Result<Vec<_>>>()
             .with_context(|| name.clone())?;
         let groups = self.columns(&table, &traced);
-        let bytes = if npz { columns::npz(&groups)? } else { columns::csv(&groups, traced.len())? };
-        match output {
-            Some(output) => output.write(&bytes),
-            None => output::print(core::str::from_utf8(&bytes)?),
-        }
+        let rows = traced.len();
+        let Some(output) = output else { return Ok(Answer::table("rays", groups, rows)) };
+        let bytes = if npz { columns::npz(&groups)? } else { columns::csv(&groups, rows)? };
+        output.write(&bytes)?;
+        let answer = Answer::default().with("count", rows).outputs([&output]);
+        Ok(answer.with("integrator", self.integrator.name()).with("tolerance", self.tolerance))
+    }
+
+    /// Whether standard output carries the table because `-o -` says so.
+    pub fn pipes(&self) -> bool {
+        self.output.as_deref().is_some_and(output::is_pipe)
     }
 
     fn request(&self) -> Request {
@@ -169,7 +176,7 @@ impl Trace {
     }
 
     fn read(&self) -> anyhow::Result<Vec<u8>> {
-        if self.rays.as_os_str() != "-" {
+        if !output::is_pipe(&self.rays) {
             return output::read(&self.rays);
         }
         let mut bytes = Vec::new();

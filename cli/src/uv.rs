@@ -1,5 +1,6 @@
 //! `kerrlight uv`: which Fourier components an array measures.
 
+use crate::answer::{self, Answer};
 use crate::columns::{self, Column};
 use crate::interferometry::arguments::{self, Observing};
 use crate::interferometry::plots::{self, PlotFile};
@@ -16,7 +17,7 @@ pub struct Uv {
     array: String,
     #[command(flatten)]
     observing: Observing,
-    /// Where to write the table [default, without --plot either: standard output]
+    /// Where to write the table; `-` is standard output [default, without --plot: -]
     #[arg(short, long, value_name = "FILE.csv")]
     output: Option<PathBuf>,
     /// Where to write a picture, coloured by time
@@ -26,8 +27,9 @@ pub struct Uv {
 
 impl Uv {
     /// Computes and writes the coverage.
-    pub fn run(&self) -> anyhow::Result<()> {
-        let output = self.output.as_deref().map(|path| Output::new(path, "csv")).transpose()?;
+    pub fn run(&self) -> anyhow::Result<Answer> {
+        let output =
+            self.output.as_deref().map(|path| Output::or_pipe(path, &["csv"])).transpose()?;
         let plot = self.plot.as_deref().map(PlotFile::new).transpose()?;
         let array = arguments::array_of(&self.array)?;
         let (schedule, setup) = (self.observing.schedule()?, self.observing.setup()?);
@@ -36,22 +38,29 @@ impl Uv {
         if observation.rows.is_empty() {
             bail!("no two stations see {} at any time", source.name);
         }
-        let table = columns::csv(&[table(&observation)], observation.rows.len())?;
-        match &output {
-            Some(output) => {
-                output.write(&table)?;
-                output::print(&format!("{}\n", output.shown().display()))?;
-            }
-            None if plot.is_none() => output::print(core::str::from_utf8(&table)?)?,
-            None => {}
+        let (table, count) = (vec![table(&observation)], observation.rows.len());
+        if let Some(output) = &output {
+            output.write(&columns::csv(&table, count)?)?;
         }
-        if let Some(plot) = plot {
+        if let Some(plot) = &plot {
             let title = format!("{} and {}, MJD {}", self.array, source.name, self.observing.mjd);
             plot.write(plots::coverage(&observation, &title))?;
         }
-        let count = observation.rows.len();
         eprintln!("{count} points; {}", self.observing.history(&self.array).join("; "));
-        Ok(())
+        let outputs = output.iter().chain(plot.as_ref().map(PlotFile::output));
+        let files = answer::written(outputs);
+        let answer = match files[..] {
+            [] if !self.pipes() => Answer::table("points", table, count),
+            _ => {
+                Answer::text(files.iter().map(|f| format!("{}\n", f.display())).collect::<String>())
+            }
+        };
+        Ok(answer.with("count", count).files(files))
+    }
+
+    /// Whether standard output carries the table because `-o -` says so.
+    pub fn pipes(&self) -> bool {
+        self.output.as_deref().is_some_and(output::is_pipe)
     }
 }
 

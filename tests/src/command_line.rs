@@ -11,7 +11,11 @@ fn render_without_a_scene_says_so_and_writes_both_files() {
     let output = kerrlight(folder.path(), &[&["render"][..], &SIZE[..]].concat());
     assert!(output.status.success());
     assert!(String::from_utf8_lossy(&output.stderr).contains("built-in scene"));
-    assert_eq!(String::from_utf8_lossy(&output.stdout), "kerrlight.exr\nkerrlight.png\n");
+    let told = String::from_utf8_lossy(&output.stdout).into_owned();
+    let lines: Vec<&str> = told.lines().collect();
+    assert_eq!(lines.len(), 2, "{told}");
+    assert!(lines[0].starts_with("flux ") && lines[0].contains("48 x 40 pixels"), "{told}");
+    assert_eq!(lines[1], "kerrlight.exr, kerrlight.png");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
     let bytes = std::fs::read(folder.path().join("kerrlight.exr")).unwrap();
     let (picture, attributes) = exr::decode(&bytes).unwrap();

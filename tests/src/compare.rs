@@ -70,6 +70,10 @@ fn exact_cases_are_whole_and_not_done_twice() {
     experiment(at, &[]);
     let printed = succeed(at, &["compare", "rates.toml", "-o", "out"]);
     assert!(printed.contains("| rate | PSNR (dB) |"), "{printed}");
+    let lines: Vec<&str> = printed.lines().collect();
+    let [worth, look_at] = lines[lines.len() - 2..] else { panic!("{printed}") };
+    assert!(worth.starts_with("4 of 4 cases done; PSNR (dB) from "), "{worth}");
+    assert_eq!(look_at, "out/report.html");
     let first = results(&at.join("out"));
     assert_eq!(cases(&first).len(), 4);
     for case in cases(&first) {

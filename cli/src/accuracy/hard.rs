@@ -1,9 +1,10 @@
 //! Millions of random rays that look for trouble.
 
 use super::Accuracy;
+use crate::answer::Answer;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
-use anyhow::bail;
+use anyhow::anyhow;
 use kerrlight_validation::accuracy::hard::{self, Tally};
 use kerrlight_validation::accuracy::rays::{Angle, Draw};
 use serde::Serialize;
@@ -68,7 +69,7 @@ fn describe(ray: &Draw) -> String {
 }
 
 /// Traces them, writes hard.json and hard.csv, and fails if a ray went wrong.
-pub fn run(arguments: &Accuracy, rays: u64) -> anyhow::Result<()> {
+pub fn run(arguments: &Accuracy, rays: u64) -> anyhow::Result<Answer> {
     let csv = arguments.place("hard.csv", "csv")?;
     let json = arguments.place("hard.json", "json")?;
     let (bar, keeper) = (progress::bar(rays), Keeper::saving("stopping"));
@@ -93,15 +94,16 @@ pub fn run(arguments: &Accuracy, rays: u64) -> anyhow::Result<()> {
         writer.serialize(line)?;
     }
     csv.write(&writer.into_inner()?)?;
-    crate::output::print(&table(&document))?;
+    let answer = Answer::text(table(&document)).outputs([&csv, &json]);
+    let answer = answer.with_all(serde_json::to_value(&document)?);
     if done < rays {
         let said = format!("interrupted after {done} of {rays} rays; what they gave is written");
-        return Err(Interrupted(said).into());
+        return Ok(answer.failing(Interrupted(said)));
     }
     if !tallies.iter().all(Tally::passes) {
-        bail!("some rays went wrong: see {}", json.shown().display());
+        return Ok(answer.failing(anyhow!("some rays went wrong: see {}", json.shown().display())));
     }
-    Ok(())
+    Ok(answer)
 }
 
 fn table(document: &Document) -> String {

@@ -4,6 +4,7 @@ mod hard;
 mod picture;
 mod table;
 
+use crate::answer::Answer;
 use crate::output::Output;
 use crate::progress;
 use anyhow::Context;
@@ -38,7 +39,7 @@ pub struct Accuracy {
 
 impl Accuracy {
     /// Runs the sweep, or the hard rays.
-    pub fn run(&self) -> anyhow::Result<()> {
+    pub fn run(&self) -> anyhow::Result<Answer> {
         if self.hard.is_some() {
             kerrlight_geodesic::Tracer::new(self.tolerance).context("--tolerance")?;
         }
@@ -49,7 +50,7 @@ impl Accuracy {
         }
     }
 
-    fn sweep(&self) -> anyhow::Result<()> {
+    fn sweep(&self) -> anyhow::Result<Answer> {
         let files =
             ["csv", "json", "svg", "png"].map(|kind| self.place(&format!("accuracy.{kind}"), kind));
         let [csv, json, svg, png] = files;
@@ -64,10 +65,12 @@ impl Accuracy {
         bar.finish_and_clear();
         let figure = picture::figure(&rows)?;
         csv.write(&table::csv(&rows)?)?;
-        json.write(&table::json(&rows, &sweep)?)?;
+        let document = table::json(&rows, &sweep);
+        json.write(&serde_json::to_vec_pretty(&document)?)?;
         svg.write(figure.svg.as_bytes())?;
         png.write(&figure.png)?;
-        crate::output::print(&table::summary(&rows))
+        let answer = Answer::text(table::summary(&rows)).outputs([&csv, &json, &svg, &png]);
+        Ok(answer.with_all(serde_json::to_value(&document)?))
     }
 
     /// A file in the folder of the results.

@@ -50,8 +50,9 @@ impl From<&Row> for Line {
     }
 }
 
+/// The whole sweep as it is written.
 #[derive(Serialize)]
-struct Document {
+pub struct Document {
     version: &'static str,
     seed: u64,
     rows: Vec<Line>,
@@ -67,10 +68,9 @@ pub fn csv(rows: &[Row]) -> anyhow::Result<Vec<u8>> {
 }
 
 /// The same with what decided it.
-pub fn json(rows: &[Row], sweep: &Sweep) -> anyhow::Result<Vec<u8>> {
+pub fn json(rows: &[Row], sweep: &Sweep) -> Document {
     let rows = rows.iter().map(Line::from).collect();
-    let document = Document { version: env!("CARGO_PKG_VERSION"), seed: sweep.seed, rows };
-    Ok(serde_json::to_vec_pretty(&document)?)
+    Document { version: env!("CARGO_PKG_VERSION"), seed: sweep.seed, rows }
 }
 
 /// What a reader wants to know first: all spins together.

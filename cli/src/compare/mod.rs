@@ -14,9 +14,10 @@ mod summary;
 mod tables;
 mod verdicts;
 
+use crate::answer::Answer;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::lock::{self, Lock};
-use crate::output::{self, Output};
+use crate::output::Output;
 use crate::progress;
 use anyhow::{Context, bail};
 use cases::{Case, Choice};
@@ -24,6 +25,7 @@ use clap::Args;
 use experiment::Experiment;
 use page::Page;
 use runner::{Runner, Status};
+use serde_json::{Value, json};
 use source::Source;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -72,8 +74,8 @@ pub struct Failed {
 
 impl Compare {
     /// Runs an experiment.
-    pub fn run(&self, threads: Option<u16>, memory: Option<u64>) -> anyhow::Result<()> {
-        let Some(name) = &self.experiment else { return list_experiments() };
+    pub fn run(&self, threads: Option<u16>, memory: Option<u64>) -> anyhow::Result<Answer> {
+        let Some(name) = &self.experiment else { return Ok(list_experiments()) };
         let before = self.against.as_deref().map(changes::read).transpose()?;
         // A folder that is called like an experiment is meant by ./name.
         let is_known = source::built_in().any(|(known, _)| Path::new(known) == name);
@@ -83,7 +85,8 @@ impl Compare {
                 bail!("{} are results: give others with --against", name.display());
             };
             let changed = changes::table(&changes::read(name)?, &before)?;
-            return output::print(&tables::markdown(&changed));
+            let answer = Answer::text(tables::markdown(&changed)).with("note", changed.caption);
+            return Ok(answer.with("head", changed.head).with("rows", changed.rows));
         }
         let (source, text) = Source::find(name)?;
         let experiment = Experiment::parse(&text).with_context(|| name.display().to_string())?;
@@ -102,7 +105,7 @@ impl Compare {
             bail!("{}: no case can be run; {}: {why}", name.display(), first.name());
         }
         if self.list {
-            return list_cases(&chosen);
+            return Ok(list_cases(&chosen));
         }
         let all = cases::expand(&experiment, &source, &choice.unrestricted())?;
         let (folder, lock) = self.folder(name, &text)?;
@@ -111,9 +114,8 @@ impl Compare {
         runner.check_inputs(&cases)?;
         let summary = run(&cases, &runner);
         let page = Page { experiment: &experiment, choice: &choice, summary: &summary };
-        page.write(&runner, &folder, before.as_ref())?;
-        output::print(&format!("{}\n", folder.join("report.html").display()))?;
-        end(&summary, &folder)
+        let tables = page.write(&runner, &folder, before.as_ref())?;
+        Ok(end(&tables, &summary, &folder))
     }
 
     /// The folder, new or to go on with.
@@ -136,18 +138,22 @@ impl Compare {
     }
 }
 
-fn list_experiments() -> anyhow::Result<()> {
+fn list_experiments() -> Answer {
     let line = |(name, title): (&str, String)| format!("{name:20} {title}\n");
     let all: String = source::built_in().map(line).collect();
-    output::print(&format!("{all}\nRun one with: kerrlight compare NAME\n"))
+    let entries = source::built_in().map(|(name, title)| json!({"name": name, "title": title}));
+    Answer::text(format!("{all}\nRun one with: kerrlight compare NAME\n"))
+        .with("experiments", entries.collect::<Vec<_>>())
 }
 
-fn list_cases(cases: &[Case]) -> anyhow::Result<()> {
+fn list_cases(cases: &[Case]) -> Answer {
     let line = |case: &Case| match &case.settings {
         Ok(_) => format!("{}\n", case.name()),
         Err(error) => format!("{}: {error}\n", case.name()),
     };
-    output::print(&cases.iter().map(line).collect::<String>())
+    let entry = |case: &Case| json!({"name": case.name(), "error": case.settings.as_ref().err()});
+    Answer::text(cases.iter().map(line).collect::<String>())
+        .with("cases", cases.iter().map(entry).collect::<Vec<_>>())
 }
 
 /// The chosen cases, and those that an earlier run of the same folder has done beside them.
@@ -194,15 +200,35 @@ fn run<'a>(cases: &'a [Case], runner: &Runner) -> Summary<'a> {
     Summary::new(all)
 }
 
-fn end(summary: &Summary, folder: &Path) -> anyhow::Result<()> {
+/// The tables, how many cases are done and which of them are best and worst, and where to look.
+fn end(tables: &str, summary: &Summary, folder: &Path) -> Answer {
+    let files = ["report.html", "results.json", "results.csv", "tables.md"];
+    let files = files.map(|name| folder.join(name));
+    let failed = summary.failed().map(|(case, why)| json!({"name": case.name(), "error": why}));
+    let answer = Answer::text(format!("{tables}{}\n{}\n", summary.worth(), files[0].display()))
+        .with("folder", folder.display().to_string())
+        .files(files.iter().map(PathBuf::as_path))
+        .with("cases", summary.all.len())
+        .with("done", summary.done().count())
+        .with("failed", failed.collect::<Vec<_>>())
+        .with_all(summary.extremes().map_or(Value::Null, |extremes| extremes.json()));
+    match failure(summary, folder) {
+        Some(error) => answer.failing(error),
+        None => answer,
+    }
+}
+
+/// Why the command fails, where cases are not done or failed.
+fn failure(summary: &Summary, folder: &Path) -> Option<anyhow::Error> {
     if summary.open() > 0 {
         let (open, folder) = (summary.open(), folder.display());
         let how = format!("resume with the same command, --resume and -o {folder}");
-        return Err(Interrupted(format!("stopped: {open} cases are not done; {how}")).into());
+        return Some(Interrupted(format!("stopped: {open} cases are not done; {how}")).into());
     }
     let failed: Vec<String> = summary.failed().map(|(case, _)| case.name()).collect();
     if failed.is_empty() {
-        return Ok(());
+        return None;
     }
-    Err(Failed { failed: failed.len(), all: summary.all.len(), names: failed.join("; ") }.into())
+    let (count, all) = (failed.len(), summary.all.len());
+    Some(Failed { failed: count, all, names: failed.join("; ") }.into())
 }

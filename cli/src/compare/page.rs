@@ -6,7 +6,7 @@ use super::runner::Runner;
 use super::summary::Summary;
 use super::{changes, figures, quick, ran, tables, verdicts};
 use crate::checksum::sealed;
-use crate::output::{self, Output};
+use crate::output::Output;
 use crate::report::{Figure, Part, Report, Table};
 use serde_json::Value;
 use std::path::Path;
@@ -22,13 +22,13 @@ pub struct Page<'a> {
 }
 
 impl Page<'_> {
-    /// results.json, results.csv, tables.md, pictures and report.html.
+    /// Writes results.json, results.csv, tables.md, pictures and report.html; the text of the tables.
     pub fn write(
         &self,
         runner: &Runner,
         folder: &Path,
         before: Option<&Value>,
-    ) -> anyhow::Result<()> {
+    ) -> anyhow::Result<String> {
         if !self.choice.quick {
             return self.files(runner, folder, before, Vec::new());
         }
@@ -42,7 +42,7 @@ impl Page<'_> {
         folder: &Path,
         before: Option<&Value>,
         mut left_out: Vec<String>,
-    ) -> anyhow::Result<()> {
+    ) -> anyhow::Result<String> {
         let Page { experiment, choice, summary } = self;
         let file = |name: &str| Output::new(&folder.join(name), "");
         let results = summary.json(&experiment.title, choice.quick);
@@ -52,7 +52,6 @@ impl Page<'_> {
         let text: String = shown.iter().map(tables::markdown).collect();
         let text = [self.heading(), text].concat();
         file("tables.md")?.write(text.as_bytes())?;
-        output::print(&text)?;
         let drawn = figures::Figures { experiment, summary, runner }.draw()?;
         left_out.extend(drawn.missing);
         let mut figures: Vec<Figure> = Vec::new();
@@ -71,7 +70,8 @@ impl Page<'_> {
             plots: drawn.plots,
             ..Report::default()
         };
-        report.write(&file("report.html")?)
+        report.write(&file("report.html")?)?;
+        Ok(text)
     }
 
     /// What ran, what the experiment asks for, and what has changed.

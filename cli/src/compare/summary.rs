@@ -13,6 +13,35 @@ pub struct Summary<'a> {
     pub seeds: u64,
 }
 
+/// The best and the worst case by one result.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Extremes {
+    /// The result's name in results.json.
+    value: &'static str,
+    /// The best case with its result.
+    best: (String, f64),
+    /// The worst case with its result.
+    worst: (String, f64),
+}
+
+impl Extremes {
+    /// `PSNR (dB) from 57.10 (axis scan, seed 1) to 41.20 (axis known, seed 2)`.
+    fn sentence(&self) -> String {
+        let (name, digits) = described(self.value);
+        let one = |(case, x): &(String, f64)| format!("{} ({case})", number(*x, digits));
+        if self.best == self.worst {
+            return format!("{name} {}", one(&self.best));
+        }
+        format!("{name} from {} to {}", one(&self.best), one(&self.worst))
+    }
+
+    /// `by`, `best` and `worst` for other programs.
+    pub fn json(&self) -> Value {
+        let one = |(case, x): &(String, f64)| json!({"name": case, "value": x});
+        json!({"by": self.value, "best": one(&self.best), "worst": one(&self.worst)})
+    }
+}
+
 /// Mean and standard deviation over some cases.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spread {
@@ -127,6 +156,29 @@ impl<'a> Summary<'a> {
     /// How many have not been run to their end.
     pub fn open(&self) -> usize {
         self.all.iter().filter(|(_, status)| *status == Status::Open).count()
+    }
+
+    /// How many cases are done, and what the best and the worst of them have reached.
+    pub fn worth(&self) -> String {
+        let done = format!("{} of {} cases done", self.done().count(), self.all.len());
+        self.extremes().map_or(done.clone(), |extremes| format!("{done}; {}", extremes.sentence()))
+    }
+
+    /// The best and the worst case by the first result that cases have: PSNR, χ² or loss.
+    pub fn extremes(&self) -> Option<Extremes> {
+        let of = |value: &'static str| {
+            let all = self
+                .done()
+                .filter_map(|(case, results)| Some((case.name(), result(results, value)?)));
+            let mut all: Vec<(String, f64)> = all.collect();
+            all.sort_by(|(_, a), (_, b)| a.total_cmp(b));
+            if value == "psnr_db" {
+                all.reverse();
+            }
+            let (best, worst) = (all.first()?.clone(), all.last()?.clone());
+            Some(Extremes { value, best, worst })
+        };
+        ["psnr_db", "chi2", "loss"].into_iter().find_map(of)
     }
 
     /// One result of all cases that are at these levels.

@@ -21,6 +21,7 @@ mod unknowns;
 mod visibility_file;
 mod words;
 
+use crate::answer::Answer;
 use crate::{interrupt, output, paths};
 use anyhow::{Context, bail};
 use clap::Args;
@@ -68,7 +69,7 @@ pub struct Fit {
 
 impl Fit {
     /// Fits.
-    pub fn run(&self) -> anyhow::Result<()> {
+    pub fn run(&self) -> anyhow::Result<Answer> {
         if self.stop_with_input {
             interrupt::follow_parent();
         }
@@ -84,7 +85,8 @@ impl Fit {
         }
         let (text, near) = self.settings()?;
         if self.print {
-            return output::print(&text);
+            let settings = serde_json::to_value(text.parse::<toml::Table>()?)?;
+            return Ok(Answer::text(text).with("settings", settings));
         }
         let file = parse(&text).with_context(|| self.name())?;
         let folder = match &self.output {

@@ -11,8 +11,9 @@ use super::results::{self, Estimate};
 use super::setup::{self, Instrument};
 use super::unknowns;
 use super::words;
+use crate::answer::Answer;
 use crate::interrupt::{Interrupted, Keeper};
-use crate::{output, progress};
+use crate::progress;
 use anyhow::{Context, bail};
 use kerrlight_tomo::fit::{
     BatchSize, Loss, Motion, Objective, Outcome, State, Trainer, checkpoint,
@@ -22,6 +23,9 @@ use kerrlight_tomo::volume::Volume;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::Instant;
+
+/// The page that shows what was found.
+const REPORT: &str = "report.html";
 
 /// A fit with its data: all that can be found wrong is, before anything is written.
 pub struct Prepared {
@@ -81,7 +85,12 @@ pub fn check(file: &FitFile) -> anyhow::Result<()> {
 }
 
 /// Runs a fit from its start or its last checkpoint to its end.
-pub fn run(prepared: &Prepared, text: &str, folder: &Folder, resume: bool) -> anyhow::Result<()> {
+pub fn run(
+    prepared: &Prepared,
+    text: &str,
+    folder: &Folder,
+    resume: bool,
+) -> anyhow::Result<Answer> {
     let Prepared { file, instrument, measured, motion } = prepared;
     let begun = Instant::now();
     let objective = prepared.objective()?;
@@ -117,8 +126,18 @@ pub fn run(prepared: &Prepared, text: &str, folder: &Folder, resume: bool) -> an
     }
     let Run { mut trainer, true_volume, .. } = run;
     let estimate = Estimate { file, folder, instrument, motion, measured, true_volume };
-    let worth = estimate.write(&mut trainer, &state, begun)?;
-    output::print(&format!("{worth}\n{}\n", folder.path().join("report.html").display()))
+    let results = estimate.write(&mut trainer, &state, begun)?;
+    Ok(answer(folder, results))
+}
+
+/// The verdict and where to read it; the results for a script.
+fn answer(folder: &Folder, (worth, results): (String, Value)) -> Answer {
+    let path = folder.path();
+    let files = [REPORT, "results.json", "volume.npz", "movie.npz"].map(|name| path.join(name));
+    Answer::lines(&worth, &files[0].display().to_string())
+        .with_all(results)
+        .with("folder", path.display().to_string())
+        .files(files.iter().map(PathBuf::as_path))
 }
 
 /// The state of a checkpoint of the same settings.

@@ -1,8 +1,10 @@
 //! What arrays of NumPy hold: movies, volumes, tables.
 
+use crate::answer::Answer;
 use crate::output;
 use anyhow::Context;
 use npyz::{DType, NpyFile, Order, TypeChar};
+use serde_json::{Value, json};
 use std::io::{BufReader, Read};
 use std::path::Path;
 
@@ -16,12 +18,10 @@ fn is_npy(start: &[u8]) -> bool {
 }
 
 /// The arrays of a file that starts with `start`: a line each.
-pub fn describe(path: &Path, start: &[u8]) -> anyhow::Result<String> {
-    let name = path.display();
+pub fn describe(path: &Path, start: &[u8]) -> anyhow::Result<Answer> {
     let file = BufReader::new(output::open(path)?);
     if is_npy(start) {
-        let line = array("array", file)?;
-        return Ok(format!("{name}: NPY\n\n{HEAD}{}", line.text));
+        return Ok(answer(path, "NPY", &[array("array", file)?]));
     }
     let mut archive = zip::ZipArchive::new(file).context("damaged NPZ archive")?;
     let mut lines = Vec::new();
@@ -31,9 +31,20 @@ pub fn describe(path: &Path, start: &[u8]) -> anyhow::Result<String> {
         let called = name.strip_suffix(".npy").unwrap_or(&name).to_owned();
         lines.push(array(&called, member).with_context(|| format!("array {called}"))?);
     }
-    let what = kind(&lines).map_or(String::new(), |what| format!(", {what}"));
-    let text: String = lines.into_iter().map(|line| line.text).collect();
-    Ok(format!("{name}: NPZ{what}\n\n{HEAD}{text}"))
+    Ok(answer(path, "NPZ", &lines))
+}
+
+fn answer(path: &Path, format: &str, lines: &[Line]) -> Answer {
+    let name = path.display();
+    let holds = if format == "NPZ" { kind(lines) } else { None };
+    let what = holds.as_ref().map_or(String::new(), |what| format!(", {what}"));
+    let text: String = lines.iter().map(|line| line.text.as_str()).collect();
+    let arrays: Vec<Value> = lines.iter().map(|line| line.json.clone()).collect();
+    Answer::text(format!("{name}: {format}{what}\n\n{HEAD}{text}"))
+        .with("file", name.to_string())
+        .with("format", format)
+        .with("holds", holds)
+        .with("arrays", arrays)
 }
 
 const HEAD: &str = "array           shape                 type              least           most           mean  not finite\n";
@@ -43,6 +54,7 @@ struct Line {
     name: String,
     shape: Vec<u64>,
     text: String,
+    json: Value,
 }
 
 /// What kerrlight takes an archive for.
@@ -76,6 +88,11 @@ struct Survey {
 const SHOWN: usize = 4;
 
 impl Survey {
+    /// Of the finite numbers.
+    fn mean(&self) -> Option<f64> {
+        (self.finite > 0).then(|| self.sum / self.finite as f64)
+    }
+
     fn add(&mut self, value: f64) {
         if self.first.len() <= SHOWN {
             self.first.push(value);
@@ -100,17 +117,22 @@ fn array(name: &str, file: impl Read) -> anyhow::Result<Line> {
     let lengths: Vec<String> = shape.iter().map(u64::to_string).collect();
     let lengths = format!("({})", lengths.join(", "));
     let head = format!("{name:<16}{lengths:<22}{kind:<10}");
-    let rest = match survey(file)? {
-        None => "    no numbers".to_owned(),
-        Some(found) => numbers(&found),
-    };
-    Ok(Line { name: name.to_owned(), shape, text: format!("{head}{rest}{order}\n") })
+    let found = survey(file)?;
+    let rest = found.as_ref().map_or("    no numbers".to_owned(), numbers);
+    let mut json = json!({"name": name, "shape": shape, "type": kind});
+    if let Some(found) = &found {
+        json["least"] = json!(found.least);
+        json["most"] = json!(found.most);
+        json["mean"] = json!(found.mean());
+        json["not_finite"] = json!(found.not_finite);
+    }
+    let text = format!("{head}{rest}{order}\n");
+    Ok(Line { name: name.to_owned(), shape, text, json })
 }
 
 fn numbers(found: &Survey) -> String {
     let cell = |x: Option<f64>| x.map_or(format!("{:>15}", "-"), |x| format!("{x:>15.6e}"));
-    let mean = (found.finite > 0).then(|| found.sum / found.finite as f64);
-    let [least, most, mean] = [found.least, found.most, mean].map(cell);
+    let [least, most, mean] = [found.least, found.most, found.mean()].map(cell);
     let all =
         if found.first.len() <= SHOWN { format!("  {:?}", found.first) } else { String::new() };
     format!("{least}{most}{mean}{:>12}{all}", found.not_finite)

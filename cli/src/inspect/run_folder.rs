@@ -1,13 +1,15 @@
 //! What a fit has left in its folder.
 
+use crate::answer::Answer;
 use crate::output;
 use anyhow::{Context, bail};
-use serde_json::Value;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::path::Path;
 use toml::Table;
 
 /// Title, data, representation, how far it came, results and files.
-pub fn describe(folder: &Path) -> anyhow::Result<String> {
+pub fn describe(folder: &Path) -> anyhow::Result<Answer> {
     let shown = folder.display();
     let settings = folder.join("fit.toml");
     if !settings.is_file() {
@@ -29,7 +31,18 @@ pub fn describe(folder: &Path) -> anyhow::Result<String> {
     if results.is_none() {
         line("results", "none yet: the run has not ended".to_owned());
     }
-    Ok(text + &files(folder)?)
+    text.push('\n');
+    let files = files(folder)?;
+    for (name, size) in &files {
+        text += &format!("{name:<28}{size:>12} bytes\n");
+    }
+    Ok(Answer::text(text)
+        .with("folder", shown.to_string())
+        .with("format", "fit")
+        .with("settings", serde_json::to_value(&table)?)
+        .with("last_step", log.map(|line| line["step"].clone()))
+        .with("results", results.map(Value::Object))
+        .with("contents", json!(files)))
 }
 
 fn string(table: &Table, keys: &[&str]) -> String {
@@ -94,14 +107,14 @@ fn short(value: &Value) -> String {
     start
 }
 
-fn files(folder: &Path) -> anyhow::Result<String> {
+/// Names and sizes in bytes of what lies in a folder.
+fn files(folder: &Path) -> anyhow::Result<BTreeMap<String, u64>> {
     let name = || format!("cannot read {}", folder.display());
-    let mut lines = Vec::new();
+    let mut files = BTreeMap::new();
     for entry in std::fs::read_dir(folder).with_context(name)? {
         let entry = entry.with_context(name)?;
         let size = entry.metadata().with_context(name)?.len();
-        lines.push(format!("{:<28}{size:>12} bytes\n", entry.file_name().to_string_lossy()));
+        files.insert(entry.file_name().to_string_lossy().into_owned(), size);
     }
-    lines.sort();
-    Ok(format!("\n{}", lines.concat()))
+    Ok(files)
 }

@@ -6,6 +6,7 @@ pub mod movie_files;
 pub mod plots;
 pub mod scene_movie;
 
+use crate::answer::{self, Answer};
 use crate::output::{self, Output};
 use anyhow::{Context, bail};
 use clap::ValueEnum;
@@ -33,17 +34,9 @@ pub enum Written {
     EhtTxt,
 }
 
-/// A file of visibilities to be written.
-pub struct ObservationFile {
-    output: Output,
-    format: Written,
-    comments: bool,
-}
-
-impl ObservationFile {
-    /// Checks the place before any work is done. The format is `format`, by default that of the
-    /// name's ending. With `comments` kerrlight's CSV tells settings.
-    pub fn new(path: &Path, format: Option<Written>, comments: bool) -> anyhow::Result<Self> {
+impl Written {
+    /// The format of a file: `asked`, or what the name's ending says.
+    fn of(path: &Path, asked: Option<Self>) -> anyhow::Result<Self> {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
         let by_name = match extension.to_ascii_lowercase().as_str() {
             "uvfits" | "fits" => Written::Uvfits,
@@ -54,14 +47,33 @@ impl ObservationFile {
                 path.display()
             ),
         };
-        let format = format.unwrap_or(by_name);
+        let format = asked.unwrap_or(by_name);
         if (format == Written::Uvfits) != (by_name == Written::Uvfits) {
             bail!("output {}: its ending is not that of the format asked for", path.display());
         }
+        Ok(format)
+    }
+}
+
+/// A file of visibilities to be written.
+pub struct ObservationFile {
+    output: Output,
+    format: Written,
+    comments: bool,
+}
+
+impl ObservationFile {
+    /// Checks the place before any work is done. The format is `format`, by default that of the
+    /// name's ending, and CSV on standard output. With `comments` kerrlight's CSV tells settings.
+    pub fn new(path: &Path, format: Option<Written>, comments: bool) -> anyhow::Result<Self> {
+        let format = match (output::is_pipe(path), format) {
+            (true, format) => format.unwrap_or(Written::Csv),
+            (false, format) => Written::of(path, format)?,
+        };
         if comments && format != Written::Csv {
             bail!("--comments is for kerrlight's CSV: output {} is not one", path.display());
         }
-        Ok(ObservationFile { output: Output::new(path, "")?, format, comments })
+        Ok(ObservationFile { output: Output::or_pipe(path, &[])?, format, comments })
     }
 
     /// Refuses to take the place of a file that is read.
@@ -80,7 +92,13 @@ impl ObservationFile {
             Written::EhtTxt => files::to_eht_table(observation, EhtTable::Txt).map(text),
         };
         let shown = self.output.shown().display();
-        self.output.write(&bytes.with_context(|| format!("cannot write {shown}"))?)?;
-        output::print(&format!("{shown}\n"))
+        self.output.write(&bytes.with_context(|| format!("cannot write {shown}"))?)
+    }
+
+    /// What is told of the file once it is written.
+    pub fn answer(&self) -> Answer {
+        let files = answer::written([&self.output]);
+        let text: String = files.iter().map(|file| format!("{}\n", file.display())).collect();
+        Answer::text(text).files(files)
     }
 }

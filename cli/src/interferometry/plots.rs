@@ -1,6 +1,6 @@
 //! The usual pictures of an observation, as PNG or SVG.
 
-use crate::output::{self, Output};
+use crate::output::Output;
 use anyhow::{anyhow, bail};
 use kerrlight_tomo::image::colormap::Colormap;
 use kerrlight_tomo::interferometry::observation::Observation;
@@ -42,8 +42,12 @@ impl PlotFile {
         } else {
             kuva::render_to_png(plots, layout, 1.5).map_err(|e| anyhow!("cannot draw: {e}"))?
         };
-        self.output.write(&bytes)?;
-        output::print(&format!("{}\n", self.output.shown().display()))
+        self.output.write(&bytes)
+    }
+
+    /// Where it goes.
+    pub fn output(&self) -> &Output {
+        &self.output
     }
 }
 

@@ -17,6 +17,8 @@ pub struct Sequence {
     plans: Vec<Plan>,
     /// Which are there.
     done: Vec<bool>,
+    /// Fluxes of those that are there, with their unit.
+    fluxes: Vec<Option<(f64, String)>>,
     /// Factor from the scene's unit of intensity, that of the first frame.
     factor: Option<f64>,
     /// Lengths and checksums of the files that the scene names.
@@ -56,7 +58,8 @@ impl Sequence {
         }
         let done = vec![false; plans.len()];
         let (folder, files) = (folder.to_owned(), (*files).to_owned());
-        Ok(Sequence { folder, plans, done, factor: None, files })
+        let fluxes = vec![None; plans.len()];
+        Ok(Sequence { folder, plans, done, fluxes, factor: None, files })
     }
 
     /// Looks which frames are there. Frames with other settings, or beyond the last, are errors:
@@ -80,6 +83,7 @@ impl Sequence {
                 );
             }
             self.done[k] = true;
+            self.fluxes[k] = flux_of(&attributes);
             if k == 0 {
                 self.factor = factor_of(&attributes);
             }
@@ -131,6 +135,15 @@ impl Sequence {
         self.plans.len()
     }
 
+    /// Least and largest flux of the frames, with their unit.
+    pub fn fluxes(&self) -> Option<(f64, f64, &str)> {
+        let mut known = self.fluxes.iter().flatten();
+        let (first, unit) = known.next()?;
+        let (least, most) =
+            known.fold((*first, *first), |(least, most), (x, _)| (least.min(*x), most.max(*x)));
+        Some((least, most, unit))
+    }
+
     /// Rows of a frame.
     pub fn height(&self) -> usize {
         self.plans.first().map_or(0, |plan| plan.scene.screen.rows() as usize)
@@ -168,16 +181,19 @@ impl Sequence {
         }
         let factor = self.factor.context("the film has no unit of intensity")?;
         let this: &Sequence = self;
-        batch.par_iter().zip(frames).try_for_each(|(k, frame)| -> anyhow::Result<()> {
+        let written = batch.par_iter().zip(frames).map(|(k, frame)| -> anyhow::Result<_> {
             let Rendered { picture, summary } = film.rendered(frame, factor)?;
             let Plan { scene, text } = &this.plans[*k];
             let mut attributes = report::attributes(scene, text, film.legend(), &summary);
             attributes.append(&mut this.settings(*k));
             let bytes = exr::encode(&picture, &attributes).context("cannot encode the EXR")?;
-            Output::new(&this.path(*k, "exr"), "exr")?.write(&bytes)
-        })?;
-        for k in batch {
+            Output::new(&this.path(*k, "exr"), "exr")?.write(&bytes)?;
+            Ok((summary.flux, summary.flux_unit.to_owned()))
+        });
+        let fluxes = written.collect::<anyhow::Result<Vec<_>>>()?;
+        for (k, flux) in batch.iter().zip(fluxes) {
             self.done[*k] = true;
+            self.fluxes[*k] = Some(flux);
         }
         Ok(())
     }
@@ -206,6 +222,10 @@ impl Sequence {
 fn differs(settings: &Attributes, attributes: &Attributes) -> Option<String> {
     let other = |name: &&String| attributes.get(*name) != settings.get(*name);
     settings.keys().find(other).cloned()
+}
+
+fn flux_of(attributes: &Attributes) -> Option<(f64, String)> {
+    Some((attributes.get("flux")?.parse().ok()?, attributes.get("flux_unit")?.clone()))
 }
 
 fn factor_of(attributes: &Attributes) -> Option<f64> {

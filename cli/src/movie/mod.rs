@@ -4,10 +4,12 @@ mod frames;
 mod times;
 mod viewing;
 
+use crate::answer::{self, Answer};
 use crate::interrupt::{Interrupted, Keeper};
-use crate::output;
+use crate::output::Output;
 use crate::overlay::OverlayOptions;
 use crate::render::preview::PreviewOptions;
+use crate::render::report;
 use crate::render::source::Source;
 use crate::{assets, progress};
 use anyhow::{Context, bail};
@@ -58,7 +60,7 @@ fn afford(film: &Film, scene: &Scene) -> anyhow::Result<()> {
 
 impl Movie {
     /// Renders what is missing, then makes the animations.
-    pub fn run(&self) -> anyhow::Result<()> {
+    pub fn run(&self) -> anyhow::Result<Answer> {
         let source = Source::new(Some(&self.scene))?;
         let (text, scene) = source.scene(&self.overrides)?;
         let plans = f64::from(self.frames) * (2 * text.len() + 4096) as f64;
@@ -87,15 +89,49 @@ impl Movie {
             eprintln!("warning: nothing in this scene moves: all frames are the same");
         }
         sequence.find()?;
-        self.render(&mut film, &mut sequence).with_context(|| source.name.clone())?;
-        output::print(&format!("{}\n", self.output.display()))?;
+        let start = Instant::now();
+        let rendered =
+            self.render(&mut film, &mut sequence).with_context(|| source.name.clone())?;
         animations.write(&sequence, self.look.look(&scene), |picture, look, white| {
             self.overlay.draw(&scene, (picture, 1), look, white)
-        })
+        })?;
+        Ok(self.answer(&sequence, rendered, start.elapsed().as_secs_f64(), &animations.files()))
     }
 
-    /// Renders the frames that are missing, batch by batch.
-    fn render(&self, film: &mut Film, sequence: &mut Sequence) -> anyhow::Result<()> {
+    /// How many frames there are, how bright they are, and where they lie.
+    fn answer(
+        &self,
+        sequence: &Sequence,
+        rendered: usize,
+        seconds: f64,
+        animations: &[&Output],
+    ) -> Answer {
+        let fluxes = sequence.fluxes();
+        let flux = fluxes.map_or(String::new(), |(least, most, unit)| {
+            format!("; flux {} to {} {unit}", report::shown(least), report::shown(most))
+        });
+        let worth = format!(
+            "{} frames, {rendered} of them rendered in {seconds:.2} s{flux}",
+            sequence.len()
+        );
+        let files = answer::written(animations.iter().copied());
+        let places = iter::once(self.output.as_path()).chain(files.iter().copied());
+        let answer = Answer::lines(&worth, &answer::listed(places)).files(files);
+        let answer = match fluxes {
+            Some((least, most, unit)) => {
+                answer.with("flux", vec![least, most]).with("flux_unit", unit)
+            }
+            None => answer,
+        };
+        answer
+            .with("folder", self.output.display().to_string())
+            .with("frames", sequence.len())
+            .with("rendered", rendered)
+            .with("seconds", seconds)
+    }
+
+    /// Renders the frames that are missing, batch by batch, and counts them.
+    fn render(&self, film: &mut Film, sequence: &mut Sequence) -> anyhow::Result<usize> {
         let missing = sequence.missing();
         let (count, start) = (missing.len(), Instant::now());
         let rows = sequence.height();
@@ -133,6 +169,6 @@ impl Movie {
         if unresolved > 0 {
             eprintln!("warning: {unresolved} rays unresolved, shown as dark");
         }
-        Ok(())
+        Ok(count)
     }
 }

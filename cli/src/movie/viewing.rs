@@ -1,7 +1,7 @@
 //! Films to look at: 8-bit pictures of the frames with one common exposure.
 
 use super::frames::Sequence;
-use crate::output::{self, Output};
+use crate::output::Output;
 use crate::progress;
 use anyhow::{Context, bail};
 use clap::Args;
@@ -122,7 +122,6 @@ impl Animations {
         for (output, bytes) in [(&self.gif, gif_bytes), (&self.apng, apng_bytes)] {
             if let Some(output) = output {
                 output.write(&bytes)?;
-                output::print(&format!("{}\n", output.shown().display()))?;
             }
         }
         Ok(())

@@ -1,9 +1,11 @@
 //! What a scene calls for, what that is going to cost, and what it did cost.
 
+use crate::answer::Answer;
 use kerrlight_tomo::plan::Plan;
 use kerrlight_tomo::render::{Raster, RenderError};
 use kerrlight_tomo::scene::Scene;
 use kerrlight_tomo::transport::{Meter, Part};
+use serde_json::json;
 use std::time::{Duration, Instant};
 
 /// Most rays of the trial by which costs are estimated.
@@ -11,8 +13,8 @@ const TRIAL: usize = 2048;
 /// Longer than that no more rays are tried.
 const ENOUGH: Duration = Duration::from_millis(500);
 
-/// Prints the plan with the estimated cost of each part.
-pub fn before(scene: &Scene, raster: &Raster) -> Result<(), RenderError> {
+/// The plan with the estimated cost of each part.
+pub fn before(scene: &Scene, raster: &Raster) -> anyhow::Result<Answer> {
     let screen = &scene.screen;
     let grid =
         f64::from(screen.width) * f64::from(screen.rows()) * f64::from(screen.samples_per_pixel);
@@ -22,19 +24,30 @@ pub fn before(scene: &Scene, raster: &Raster) -> Result<(), RenderError> {
     let refined = if screen.image_error.is_some() { " and those of refined pixels" } else { "" };
     let threads = rayon::current_num_threads();
     let placed = if rings > 0.0 { format!(" ({rings} along photon rings)") } else { String::new() };
-    eprintln!(
-        "plan: {rays} rays{placed}{refined} on {threads} threads, estimated from {tried} rays"
+    let mut text = format!(
+        "plan: {rays} rays{placed}{refined} on {threads} threads, estimated from {tried} rays\n"
     );
     let plan = Plan::new(scene);
+    let mut parts = Vec::new();
     for part in Part::ALL {
         let each = trial.spent(part).as_secs_f64() / tried as f64;
         let whole = each * rays / threads as f64;
-        eprintln!("  {:<9}{:>9.3} us a ray {:>9.2} s", part.name(), each * 1e6, whole);
-        for step in plan.steps.iter().filter(|step| step.part == part) {
-            eprintln!("    {} {}", if step.done { "+" } else { "-" }, step.what);
+        text += &line(part, each, whole);
+        let steps: Vec<_> = plan.steps.iter().filter(|step| step.part == part).collect();
+        for step in &steps {
+            text += &format!("    {} {}\n", if step.done { "+" } else { "-" }, step.what);
         }
+        let steps: Vec<_> =
+            steps.iter().map(|step| json!({"what": step.what, "done": step.done})).collect();
+        let name = part.name();
+        parts.push(json!({"part": name, "us_a_ray": each * 1e6, "seconds": whole, "steps": steps}));
     }
-    Ok(())
+    let answer = Answer::text(text).with("rays", rays).with("ring_rays", rings);
+    Ok(answer.with("threads", threads).with("estimated_from", tried).with("parts", parts))
+}
+
+fn line(part: Part, each: f64, whole: f64) -> String {
+    format!("  {:<9}{:>9.3} us a ray {whole:>9.2} s\n", part.name(), each * 1e6)
 }
 
 /// The costs of some rays, and how many these are: fewer where rays are slow.
@@ -58,7 +71,7 @@ pub fn after(meter: &Meter, rays: u64) {
     eprintln!("measured:");
     for part in Part::ALL {
         let spent = meter.spent(part).as_secs_f64();
-        let each = spent / rays.max(1) as f64 * 1e6;
-        eprintln!("  {:<9}{each:>9.3} us a ray {:>9.2} s", part.name(), spent / threads);
+        let each = spent / rays.max(1) as f64;
+        eprint!("{}", line(part, each, spent / threads));
     }
 }

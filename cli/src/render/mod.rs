@@ -7,6 +7,7 @@ pub mod report;
 pub mod source;
 mod work;
 
+use crate::answer::{self, Answer};
 use crate::assets;
 use crate::output::{self, Output};
 use crate::overlay::OverlayOptions;
@@ -32,11 +33,11 @@ pub struct Render {
     /// Scene file (TOML), or an EXR that kerrlight rendered, to render it again; without it
     /// a built-in scene: Sgr A* with a flare and a disc
     scene: Option<PathBuf>,
-    /// Where to write the EXR [default, without --preview and --sheet either: EXR and PNG, in the current folder
-    /// and named after the scene]
+    /// Where to write the EXR, `-` for standard output [default, without --preview and --sheet either: EXR and PNG in
+    /// the current folder, named after the scene]
     #[arg(short, long, value_name = "FILE.exr")]
     output: Option<PathBuf>,
-    /// Where to write a tone-mapped PNG
+    /// Where to write a tone-mapped PNG, `-` for standard output
     #[arg(long, value_name = "FILE.png")]
     preview: Option<PathBuf>,
     /// Change a value of the scene, e.g. hole.spin=0.5 or spot.0.phase_deg=90
@@ -58,7 +59,7 @@ pub struct Render {
     look: PreviewOptions,
     #[command(flatten)]
     overlay: OverlayOptions,
-    /// Where to write a contact sheet: all channels with colour bars, in colours of their own
+    /// Where to write a contact sheet, a PNG of all channels with colour bars; `-` for standard output
     #[arg(long, value_name = "FILE.png")]
     sheet: Option<PathBuf>,
     /// Columns of pixels that are traced together; the picture does not depend on it
@@ -69,7 +70,7 @@ pub struct Render {
 
 impl Render {
     /// Renders.
-    pub fn run(&self) -> anyhow::Result<()> {
+    pub fn run(&self) -> anyhow::Result<Answer> {
         let source = Source::new(self.scene.as_deref())?;
         let (text, scene) = source.scene(&self.all_overrides())?;
         let outputs = self.outputs(&source)?;
@@ -90,7 +91,7 @@ impl Render {
         let mut raster = raster.with_context(|| source.name.clone())?.with_tile(self.tile.into());
         let look = self.reduction(&scene, &raster, &outputs)?;
         if self.explain {
-            return Ok(explain::before(&scene, &raster)?);
+            return explain::before(&scene, &raster);
         }
         if self.measure {
             raster = raster.with_meter();
@@ -113,11 +114,22 @@ impl Render {
         if let Some(picture) = picture {
             self.draw(&scene, (&picture, reduced), &outputs)?;
         }
-        report::print(&scene, &summary, start.elapsed().as_secs_f64());
+        let seconds = start.elapsed().as_secs_f64();
+        report::warn(&scene, &summary);
         if self.measure {
             explain::after(&raster.meter(), summary.rays);
         }
-        Ok(())
+        let worth = report::worth(&scene, &summary, seconds);
+        let files = answer::written(outputs.all());
+        Ok(Answer::lines(&worth, &answer::listed(files.iter().copied()))
+            .files(files)
+            .with_all(report::figures(&scene, &summary, seconds)))
+    }
+
+    /// Whether standard output carries one of the files.
+    pub fn pipes(&self) -> bool {
+        let all = [&self.output, &self.preview, &self.sheet];
+        all.into_iter().flatten().any(|path| output::is_pipe(path))
     }
 
     /// What keeps the channels of the PNG and of the contact sheet, if there is one of them.
@@ -170,7 +182,7 @@ impl Render {
 
     fn outputs(&self, source: &Source) -> anyhow::Result<Outputs> {
         let check = |path: &Option<PathBuf>, extension| {
-            path.as_deref().map(|path| Output::new(path, extension)).transpose()
+            path.as_deref().map(|path| Output::or_pipe(path, &[extension])).transpose()
         };
         if self.output.is_some() || self.preview.is_some() || self.sheet.is_some() {
             return Ok(Outputs {
@@ -213,6 +225,5 @@ impl Outputs {
 }
 
 fn write_png(output: &Output, drawn: &RgbImage) -> anyhow::Result<()> {
-    output.write(&drawing::encode(drawn).context("cannot encode the PNG")?)?;
-    output::print(&format!("{}\n", output.shown().display()))
+    output.write(&drawing::encode(drawn).context("cannot encode the PNG")?)
 }

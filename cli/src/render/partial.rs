@@ -4,11 +4,12 @@ use crate::output::Output;
 use anyhow::{Context, bail};
 use kerrlight_tomo::render::{Found, Journal, Raster};
 use std::fs::{File, OpenOptions, TryLockError};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// A journal with its file, which no other process may use.
 pub struct Partial {
-    path: PathBuf,
+    /// None where the picture goes to standard output, whose journal is a temporary file.
+    path: Option<PathBuf>,
     pub journal: Journal<File>,
 }
 
@@ -16,7 +17,11 @@ impl Partial {
     /// Goes on with what an earlier run of the same picture has left, or starts anew.
     /// `identity` is all that decides the picture.
     pub fn open(output: &Output, raster: &Raster, identity: &str) -> anyhow::Result<Self> {
-        let path = output.partial();
+        let Some(path) = output.partial() else {
+            let file = tempfile::tempfile().context("cannot make a temporary file")?;
+            let (journal, _) = Journal::open(file, identity, raster.bands())?;
+            return Ok(Partial { path: None, journal });
+        };
         let shown = path.display();
         let mut options = OpenOptions::new();
         let file = options.read(true).write(true).create(true).truncate(false).open(&path);
@@ -41,17 +46,28 @@ impl Partial {
             }
             Found::Other => eprintln!("starting anew: {shown} was of another picture or version"),
         }
-        Ok(Partial { path, journal })
+        Ok(Partial { path: Some(path), journal })
     }
 
-    /// Where it is.
-    pub fn path(&self) -> &Path {
-        &self.path
+    /// Where it is, in messages.
+    pub fn shown(&self) -> String {
+        self.path.as_ref().map_or("a temporary file".to_owned(), |path| path.display().to_string())
+    }
+
+    /// What is left of an interrupted run, and how to resume it.
+    pub fn kept(&self) -> String {
+        match &self.path {
+            Some(path) => format!(
+                "what has been rendered is kept in {}: give the same command again to go on",
+                path.display()
+            ),
+            None => "nothing is kept".to_owned(),
+        }
     }
 
     /// Removes it: the picture is whole, or will never be.
     pub fn remove(self) {
         // What is left behind does no harm.
-        let _ = std::fs::remove_file(&self.path);
+        let _ = self.path.map(std::fs::remove_file);
     }
 }

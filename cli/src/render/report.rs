@@ -3,6 +3,7 @@
 use kerrlight_tomo::image::exr::Attributes;
 use kerrlight_tomo::render::Summary;
 use kerrlight_tomo::scene::Scene;
+use serde_json::{Value, json};
 
 /// What decided the picture, and what it amounts to: `text` is the scene as it was given,
 /// `legend` says what the channels hold.
@@ -31,24 +32,51 @@ fn pixel_unit(scene: &Scene) -> &'static str {
     if scene.camera.is_some() { "pixel_size_plane" } else { "pixel_size_m" }
 }
 
-/// What a user is told when the picture is there.
-pub fn print(scene: &Scene, summary: &Summary, seconds: f64) {
+/// What a picture is worth, in one line: flux, size and time.
+pub fn worth(scene: &Scene, summary: &Summary, seconds: f64) -> String {
     let (screen, rays) = (&scene.screen, summary.rays);
-    eprintln!(
-        "{} x {} pixels, {rays} rays in {seconds:.2} s ({:.0} rays/s)",
+    let Summary { flux, flux_error, flux_unit, .. } = summary;
+    let flux = match flux {
+        flux if *flux > 0.0 => format!("flux {} ± {flux_error:.1e} {flux_unit}", shown(*flux)),
+        _ => format!("flux 0 {flux_unit}"),
+    };
+    format!(
+        "{flux}; {} x {} pixels, {rays} rays in {seconds:.2} s ({:.0} rays/s)",
         screen.width,
         screen.rows(),
         rays as f64 / seconds.max(1e-9)
-    );
+    )
+}
+
+/// A flux with seven digits or so.
+pub fn shown(flux: f64) -> String {
+    if (1e-4..1e7).contains(&flux) { format!("{flux:.6}") } else { format!("{flux:.6e}") }
+}
+
+/// The same for other programs.
+pub fn figures(scene: &Scene, summary: &Summary, seconds: f64) -> Value {
+    json!({
+        "width": scene.screen.width,
+        "height": scene.screen.rows(),
+        "flux": summary.flux,
+        "flux_error": summary.flux_error,
+        "flux_unit": summary.flux_unit,
+        "intensity_unit": summary.intensity_unit,
+        "image_error": summary.image_error,
+        "rays": summary.rays,
+        "unresolved_rays": summary.unresolved,
+        "seconds": seconds,
+    })
+}
+
+/// Tells of what a user may not expect of a picture.
+pub fn warn(scene: &Scene, summary: &Summary) {
+    let (screen, rays) = (&scene.screen, summary.rays);
     let pixels = f64::from(screen.width) * f64::from(screen.rows());
-    let Summary { flux, flux_error, flux_unit, .. } = summary;
-    if *flux > 0.0 {
-        let shown =
-            if (1e-4..1e7).contains(flux) { format!("{flux:.6}") } else { format!("{flux:.6e}") };
-        eprintln!("flux {shown} +- {flux_error:.1e} {flux_unit}");
-    } else if scene.has_emission() {
+    if summary.flux <= 0.0 && scene.has_emission() {
         eprintln!(
-            "warning: no light of the scene's disc, gas, spots, volumes or meshes reaches the picture: flux 0 {flux_unit}"
+            "warning: no light of the scene's disc, gas, spots, volumes or meshes reaches the picture: flux 0 {}",
+            summary.flux_unit
         );
     }
     if let Some(asked) = screen.image_error {

@@ -3,7 +3,7 @@
 use super::partial::Partial;
 use super::report;
 use crate::interrupt::{Interrupted, Keeper};
-use crate::output::{self, Output};
+use crate::output::Output;
 use crate::progress;
 use anyhow::Context;
 use kerrlight_tomo::image::Picture;
@@ -33,7 +33,7 @@ impl Work<'_> {
         mut look: Option<Reduction>,
     ) -> anyhow::Result<(Summary, Option<Picture>)> {
         let mut partial = Partial::open(exr, self.raster, identity)?;
-        let stopped = format!("stopped; {}", kept(&partial));
+        let stopped = format!("stopped; {}", partial.kept());
         let summary = match self.fill(&mut partial.journal, &stopped) {
             Ok(summary) => summary,
             Err(error) => return Err(self.failed(error, partial)),
@@ -48,8 +48,7 @@ impl Work<'_> {
             let look = look.as_mut();
             Ok(self.raster.write_exr(journal, &summary, &attributes, file, look)?)
         })
-        .with_context(|| kept(&partial))?;
-        output::print(&format!("{}\n", exr.shown().display()))?;
+        .with_context(|| partial.kept())?;
         partial.remove();
         Ok((summary, look.map(Reduction::picture)))
     }
@@ -89,10 +88,9 @@ impl Work<'_> {
     /// What to tell of a picture that has not been finished.
     fn failed(&self, error: RenderError, partial: Partial) -> anyhow::Error {
         match error {
-            RenderError::Stopped => Interrupted(format!("stopped; {}", kept(&partial))).into(),
+            RenderError::Stopped => Interrupted(format!("stopped; {}", partial.kept())).into(),
             RenderError::Keep(error) => {
-                let context =
-                    format!("cannot write {}; {}", partial.path().display(), kept(&partial));
+                let context = format!("cannot write {}; {}", partial.shown(), partial.kept());
                 anyhow::Error::new(error).context(context)
             }
             // The scene is at fault: the same picture will never be.
@@ -105,11 +103,3 @@ impl Work<'_> {
 }
 
 const STOPPED: &str = "stopped; nothing is kept";
-
-/// How to go on.
-fn kept(partial: &Partial) -> String {
-    format!(
-        "what has been rendered is kept in {}: give the same command again to go on",
-        partial.path().display()
-    )
-}

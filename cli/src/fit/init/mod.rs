@@ -4,9 +4,10 @@ mod annotate;
 mod keys;
 
 use super::{BUILT_IN, parse};
+use crate::answer::Answer;
 use crate::interferometry::image_files::OwnTimes;
 use crate::interferometry::movie_files;
-use crate::output::{self, Output};
+use crate::output::Output;
 use annotate::annotate;
 use anyhow::{Context, bail};
 use kerrlight_tomo::interferometry::data_terms::ClosureTerm;
@@ -81,7 +82,7 @@ const SOURCES: [Source; 2] = [
 ];
 
 /// Writes the file and says what is left to the user.
-pub fn write(data: Option<&Path>, to: Option<&Path>) -> anyhow::Result<()> {
+pub fn write(data: Option<&Path>, to: Option<&Path>) -> anyhow::Result<Answer> {
     let path = to.unwrap_or(Path::new(NAME));
     if path.exists() {
         bail!("{} exists: give another name with -o", path.display());
@@ -96,7 +97,8 @@ pub fn write(data: Option<&Path>, to: Option<&Path>) -> anyhow::Result<()> {
     let left = plain.lines().filter(|line| line.starts_with("#? ")).count();
     let assumed = plain.matches(" #! ").count();
     eprintln!("{assumed} numbers are ASSUMED, {left} are left to FILL IN: see its comments");
-    output::print(&format!("{}\n", path.display()))
+    let answer = Answer::text(format!("{}\n", path.display())).outputs([&output]);
+    Ok(answer.with("assumed", assumed).with("to_fill_in", left))
 }
 
 fn head(path: &Path, plain: &str) -> String {

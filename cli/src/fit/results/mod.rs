@@ -22,6 +22,7 @@ use kerrlight_tomo::fit::{Loss, Motion, State, Trainer};
 use kerrlight_tomo::units::MICROARCSECOND;
 use kerrlight_tomo::volume::{Volume, VolumeFile, vti};
 use lensed::Still;
+use serde_json::Value;
 use std::time::Instant;
 use verdict::{Evidence, Judged};
 
@@ -42,13 +43,13 @@ pub struct Estimate<'a> {
 }
 
 impl Estimate<'_> {
-    /// Writes all of them; a line that says what the fit is worth.
+    /// Writes all of them; a line that says what the fit is worth, and results.json.
     pub fn write(
         &self,
         trainer: &mut Trainer<'_, f32>,
         state: &State<f32>,
         begun: Instant,
-    ) -> anyhow::Result<String> {
+    ) -> anyhow::Result<(String, Value)> {
         let volume = fields::recovered(self.file, trainer, state)?;
         let frames: Vec<usize> = (0..self.measured.times.len()).collect();
         let movie = trainer.movie(&state.now, &frames, true);
@@ -64,7 +65,7 @@ impl Estimate<'_> {
         let results = self.results(trainer, &found)?;
         self.folder.file("results.json")?.write(sealed(results.clone()).as_bytes())?;
         self.report(&found, &results)?;
-        Ok(numbers::last_line(&found.judged.headline(), &results))
+        Ok((numbers::last_line(&found.judged.worth(), &results), results))
     }
 
     fn evidence(&self) -> Evidence<'_> {

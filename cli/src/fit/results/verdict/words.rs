@@ -5,14 +5,25 @@ use crate::report::{Notice, Table, Tone};
 use kerrlight_tomo::fit::verdict::{Errors, Expected, Fault, Outcome, Reason, Tested, worst};
 
 impl Judged {
+    /// The verdict with χ² of all data that have errors, whatever the verdict rests on.
+    pub fn worth(&self) -> String {
+        let (headline, chi2) = (self.headline(), self.chi2());
+        if chi2.is_empty() || headline.contains(&chi2) {
+            return headline;
+        }
+        format!("{headline} In all, {chi2}.")
+    }
+
+    /// χ² of the data that have errors, with what is expected of it.
+    fn chi2(&self) -> String {
+        let noisy = self.terms.iter().filter(|(_, tested)| tested.errors != Errors::Weight);
+        noisy.map(|(name, tested)| chi2_of(name, tested)).collect::<Vec<_>>().join("; ")
+    }
+
     /// One sentence.
     pub fn headline(&self) -> String {
-        let terms = || {
-            let noisy = self.terms.iter().filter(|(_, tested)| tested.errors != Errors::Weight);
-            noisy.map(|(name, tested)| chi2_of(name, tested)).collect::<Vec<_>>().join("; ")
-        };
         match self.verdict.outcome {
-            Outcome::Explained => format!("The model explains its data: {}.", terms()),
+            Outcome::Explained => format!("The model explains its data: {}.", self.chi2()),
             Outcome::Reproduced => format!(
                 "The model reproduces its noise-free data{}: σ is only a weight, χ² is no test.",
                 self.left_over()

@@ -1,0 +1,136 @@
+//! What a verb hands back: text for a person, or one JSON object for a script.
+
+use crate::columns::{self, Column};
+use crate::output::{self, Output};
+use serde_json::{Map, Value};
+use std::path::Path;
+
+/// The result of a verb. Progress and messages are not part of it: they go to standard error.
+#[derive(Default)]
+pub struct Answer {
+    text: Body,
+    json: Map<String, Value>,
+    failure: Option<anyhow::Error>,
+}
+
+/// What a person reads.
+enum Body {
+    Text(String),
+    /// A table of so many rows: CSV for a person, an object of columns called `name` for a script.
+    Table {
+        name: &'static str,
+        groups: Vec<Vec<Column>>,
+        rows: usize,
+    },
+}
+
+impl Default for Body {
+    fn default() -> Self {
+        Body::Text(String::new())
+    }
+}
+
+/// The form in which a result is printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// Text on standard output.
+    Text,
+    /// One JSON object on standard output.
+    Json,
+    /// Text on standard error: standard output carries the file that was asked for.
+    Aside,
+}
+
+impl Answer {
+    /// Text, with its line ends.
+    pub fn text(text: impl Into<String>) -> Self {
+        Answer { text: Body::Text(text.into()), ..Self::default() }
+    }
+
+    /// The two lines with which work ends: what it is worth, and where to look.
+    pub fn lines(worth: &str, look_at: &str) -> Self {
+        Self::text(format!("{worth}\n{look_at}\n"))
+    }
+
+    /// A table that goes to standard output itself.
+    pub fn table(name: &'static str, groups: Vec<Vec<Column>>, rows: usize) -> Self {
+        Answer { text: Body::Table { name, groups, rows }, ..Self::default() }
+    }
+
+    /// With an entry more in the JSON object. A number that is not finite becomes null.
+    #[must_use]
+    pub fn with(mut self, key: &str, value: impl Into<Value>) -> Self {
+        self.json.insert(key.to_owned(), value.into());
+        self
+    }
+
+    /// With all entries of an object.
+    #[must_use]
+    pub fn with_all(mut self, object: Value) -> Self {
+        if let Value::Object(mut entries) = object {
+            self.json.append(&mut entries);
+        }
+        self
+    }
+
+    /// With the files that were written, as `files`.
+    #[must_use]
+    pub fn files<'a>(self, paths: impl IntoIterator<Item = &'a Path>) -> Self {
+        let files: Vec<String> = paths.into_iter().map(|path| path.display().to_string()).collect();
+        self.with("files", files)
+    }
+
+    /// The same for outputs, of which standard output is no file.
+    #[must_use]
+    pub fn outputs<'a>(self, outputs: impl IntoIterator<Item = &'a Output>) -> Self {
+        self.files(written(outputs))
+    }
+
+    /// With an error: the result is printed, and the program fails nevertheless.
+    #[must_use]
+    pub fn failing(mut self, error: impl Into<anyhow::Error>) -> Self {
+        self.failure = Some(error.into());
+        self
+    }
+
+    /// Prints the result.
+    ///
+    /// # Errors
+    /// The failure it carries, or what standard output refuses.
+    pub fn print(mut self, form: Form) -> anyhow::Result<()> {
+        let failure = self.failure.take();
+        match form {
+            Form::Json => output::print(&format!("{:#}\n", self.into_json()))?,
+            Form::Text => output::print(&self.into_text()?)?,
+            Form::Aside => eprint!("{}", self.into_text()?),
+        }
+        failure.map_or(Ok(()), Err)
+    }
+
+    fn into_text(self) -> anyhow::Result<String> {
+        match self.text {
+            Body::Text(text) => Ok(text),
+            Body::Table { groups, rows, .. } => {
+                Ok(String::from_utf8(columns::csv(&groups, rows)?)?)
+            }
+        }
+    }
+
+    fn into_json(mut self) -> Value {
+        if let Body::Table { name, groups, .. } = self.text {
+            self.json.insert(name.to_owned(), columns::json(&groups));
+        }
+        Value::Object(self.json)
+    }
+}
+
+/// Those of the outputs that are files.
+pub fn written<'a>(outputs: impl IntoIterator<Item = &'a Output>) -> Vec<&'a Path> {
+    outputs.into_iter().filter(|output| !output.is_pipe()).map(Output::shown).collect()
+}
+
+/// Paths in one line.
+pub fn listed<'a>(paths: impl IntoIterator<Item = &'a Path>) -> String {
+    let all: Vec<String> = paths.into_iter().map(|path| path.display().to_string()).collect();
+    all.join(", ")
+}
