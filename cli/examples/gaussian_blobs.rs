@@ -5,7 +5,7 @@
 //! cargo run --release -p kerrlight --example gaussian_blobs -- compare cli/examples/gaussian_blobs.toml
 //! ```
 //!
-//! docs/your-own-representation.md walks through it.
+//! docs/tutorials/your-own-representation.md walks through it.
 
 use kerrlight_cli::{OwnSettings, Program};
 use kerrlight_tomo::representation::{Coordinates, Gradient, Representation, Scalar, Workspace};

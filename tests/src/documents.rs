@@ -1,69 +1,199 @@
-//! Documents that cannot rot: paths and commands they name exist.
+//! Documents that cannot rot: the links, paths, verbs, flags and settings that they name exist, and the reference
+//! leaves none out.
 
 use crate::support::{kerrlight, root};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
-fn documents() -> Vec<(String, String)> {
-    let mut files = vec![root().join("README.md"), root().join("CHANGELOG.md")];
-    let docs = std::fs::read_dir(root().join("docs")).expect("docs");
-    files.extend(
-        docs.map(|e| e.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "md")),
-    );
-    files
-        .into_iter()
-        .map(|p| (p.display().to_string(), std::fs::read_to_string(&p).unwrap()))
-        .collect()
+/// All pages: the READMEs, the changelog and docs/ with its folders.
+pub fn pages() -> Vec<(PathBuf, String)> {
+    let mut files =
+        ["README.md", "CHANGELOG.md", "geodesic/README.md"].map(|p| root().join(p)).to_vec();
+    collect(&root().join("docs"), &mut files);
+    files.into_iter().map(|path| (path.clone(), read(&path))).collect()
 }
 
-/// Relative links, and words in backticks that look like paths of this repository.
+fn collect(folder: &Path, files: &mut Vec<PathBuf>) {
+    let entries = std::fs::read_dir(folder).expect("a folder of docs/");
+    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    for path in paths {
+        if path.is_dir() {
+            collect(&path, files);
+        } else if path.extension().is_some_and(|e| e == "md") {
+            files.push(path);
+        }
+    }
+}
+
+fn read(path: &Path) -> String {
+    std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// Lines of a page outside its fenced blocks of code.
+fn prose(text: &str) -> impl Iterator<Item = &str> {
+    let mut in_code = false;
+    text.lines().filter(move |line| {
+        let is_fence = line.starts_with("```");
+        in_code ^= is_fence;
+        !in_code && !is_fence
+    })
+}
+
+/// The fenced blocks of code in a language.
+pub fn blocks<'a>(text: &'a str, language: &str) -> Vec<&'a str> {
+    let start = format!("```{language}\n");
+    text.split(start.as_str()).skip(1).map(|rest| rest.split("\n```").next().unwrap()).collect()
+}
+
+/// Targets of the links of a page that stay in the repository.
+fn links(text: &str) -> Vec<&str> {
+    let of_line = |line| str::split(line, "](").skip(1).filter_map(|rest| rest.split(')').next());
+    prose(text).flat_map(of_line).filter(|link| !link.contains("://")).collect()
+}
+
+/// The anchors of a page's headings, as GitHub and mdBook derive them.
+fn anchors(text: &str) -> BTreeSet<String> {
+    let mut seen = BTreeSet::new();
+    for line in prose(text).filter(|line| line.starts_with('#')) {
+        let anchor = anchor(line.trim_start_matches('#').trim());
+        let repeated = (1..).map(|k| format!("{anchor}-{k}"));
+        let mut names = std::iter::once(anchor.clone()).chain(repeated);
+        seen.insert(names.find(|name| !seen.contains(name)).unwrap());
+    }
+    seen
+}
+
+fn anchor(heading: &str) -> String {
+    let kept = heading.chars().filter(|c| c.is_alphanumeric() || [' ', '-', '_'].contains(c));
+    kept.flat_map(char::to_lowercase).map(|c| if c == ' ' { '-' } else { c }).collect()
+}
+
 #[test]
-fn regress_paths_in_documents_exist() {
+fn exact_anchors_are_those_of_github() {
+    let text =
+        "# A fit's file\n```sh\n# no heading\n```\n## `--set` & co\n## Results\n## Results\n";
+    let expected = ["a-fits-file", "--set--co", "results", "results-1"];
+    assert_eq!(anchors(text), expected.map(str::to_owned).into());
+}
+
+/// Links between pages and within them; those of docs/ stay there, as the site has nothing else.
+#[test]
+fn regress_links_in_documents_exist() {
     let mut seen = 0;
-    for (name, text) in documents() {
-        let folder = std::path::Path::new(&name).parent().unwrap().to_owned();
-        let links = text.split("](").skip(1).filter_map(|rest| rest.split(')').next());
-        for link in links.filter(|link| !link.contains("://") && !link.starts_with('#')) {
-            let target = link.split('#').next().unwrap();
-            assert!(folder.join(target).exists(), "{name} links to {target}");
+    for (path, text) in pages() {
+        let name = path.display();
+        for link in links(&text) {
+            let (file, anchor) = link.split_once('#').unwrap_or((link, ""));
+            let target =
+                if file.is_empty() { path.clone() } else { path.parent().unwrap().join(file) };
+            assert!(target.exists(), "{name} links to {link}");
+            let docs = root().join("docs");
+            let target = target.canonicalize().unwrap();
+            let leaves =
+                path.starts_with(&docs) && !target.starts_with(docs.canonicalize().unwrap());
+            assert!(!leaves, "{name} links to {link}, which the site does not have");
+            let known = anchor.is_empty() || anchors(&read(&target)).contains(anchor);
+            assert!(known, "{name} links to {link}: no such heading");
             seen += 1;
         }
+    }
+    assert!(seen > 100, "only {seen} links found");
+}
+
+/// Words in backticks that look like paths of this repository.
+#[test]
+fn regress_paths_in_documents_exist() {
+    const TOPS: [&str; 8] =
+        ["geodesic/", "tomo/", "cli/", "validation/", "tests/", "scenes/", "docs/", "experiments/"];
+    let mut seen = 0;
+    for (path, text) in pages() {
         for word in text.split('`').skip(1).step_by(2) {
-            let tops = [
-                "geodesic/",
-                "tomo/",
-                "cli/",
-                "validation/",
-                "tests/",
-                "scenes/",
-                "docs/",
-                "experiments/",
-            ];
-            if tops.iter().any(|top| word.starts_with(top)) && !word.contains([' ', '*']) {
-                assert!(root().join(word).exists(), "{name} names {word}");
+            if TOPS.iter().any(|top| word.starts_with(top)) && !word.contains([' ', '*']) {
+                assert!(root().join(word).exists(), "{} names {word}", path.display());
                 seen += 1;
             }
         }
     }
-    assert!(seen > 10, "only {seen} paths found");
+    assert!(seen > 50, "only {seen} paths found");
 }
 
-/// Every verb that the documents run has a help page.
+/// Every page of docs/ is in the table of contents, once.
 #[test]
-fn regress_verbs_in_documents_exist() {
-    for (name, text) in documents() {
-        for rest in text.split("cargo run --release -- ").skip(1) {
-            let verb: String =
-                rest.chars().take_while(|c| c.is_alphanumeric() || *c == '-').collect();
-            let output = kerrlight(&root(), &[verb.as_str(), "--help"]);
-            assert!(output.status.success(), "{name} runs {verb}");
+fn regress_all_pages_are_in_the_contents() {
+    let docs = root().join("docs");
+    let summary = read(&docs.join("SUMMARY.md"));
+    let mut listed: Vec<PathBuf> =
+        links(&summary).into_iter().map(|link| docs.join(link)).collect();
+    listed.sort();
+    let mut there: Vec<PathBuf> = pages().into_iter().map(|(path, _)| path).collect();
+    there.retain(|path| path.starts_with(&docs) && !path.ends_with("SUMMARY.md"));
+    there.sort();
+    assert_eq!(listed, there);
+}
+
+/// The verbs of the program, as its help lists them.
+fn verbs() -> Vec<String> {
+    let help = String::from_utf8(kerrlight(&root(), &["--help"]).stdout).expect("text");
+    let named = |line: &str| {
+        let (verb, about) = line.strip_prefix("  ")?.split_once("  ")?;
+        let is_verb =
+            verb.chars().all(|c| c.is_ascii_lowercase() || c == '-') && !verb.starts_with('-');
+        (is_verb && !verb.is_empty() && !about.trim().is_empty()).then(|| verb.to_owned())
+    };
+    help.lines().filter_map(named).filter(|verb| verb != "help").collect()
+}
+
+/// The long options that a line of a help page or of a table introduces.
+fn options(line: &str) -> impl Iterator<Item = &str> {
+    let introduced = line.split("  ").find(|part| !part.is_empty()).unwrap_or("");
+    let words = introduced.split(|c: char| !c.is_ascii_alphanumeric() && c != '-');
+    words.filter(|word| word.starts_with("--") && word.len() > 2)
+}
+
+/// Each verb has a page of the reference, whose tables have its options, all of them and no others.
+#[test]
+fn regress_the_reference_has_every_option() {
+    const COMMON: [&str; 5] = ["--help", "--version", "--threads", "--memory", "--json"];
+    let verbs = verbs();
+    assert!(verbs.len() > 8, "only {verbs:?}");
+    for verb in verbs {
+        let page = read(&root().join(format!("docs/reference/{verb}.md")));
+        let help = kerrlight(&root(), &[verb.as_str(), "--help"]);
+        let help = String::from_utf8(help.stdout).expect("text");
+        let introduces = |line: &&str| line.trim_start().starts_with('-');
+        let known: BTreeSet<&str> = help.lines().filter(introduces).flat_map(options).collect();
+        let rows = page.lines().filter(|line| line.starts_with("| `-"));
+        let described: BTreeSet<&str> =
+            rows.flat_map(|row| options(row.split(" | ").next().unwrap())).collect();
+        for option in &known {
+            let has = described.contains(option) || COMMON.contains(option);
+            assert!(has, "docs/reference/{verb}.md does not describe {option}");
+        }
+        for option in described {
+            assert!(known.contains(option), "docs/reference/{verb}.md describes {option}");
         }
     }
+}
+
+/// Blocks of settings are TOML.
+#[test]
+fn regress_settings_in_documents_are_toml() {
+    let mut seen = 0;
+    for (path, text) in pages() {
+        for block in blocks(&text, "toml") {
+            let table = block.parse::<toml::Table>();
+            assert!(table.is_ok(), "{}: {}: {block}", path.display(), table.unwrap_err());
+            seen += 1;
+        }
+    }
+    assert!(seen > 3, "only {seen} blocks found");
 }
 
 /// The table of channels in the documents is that of the program.
 #[test]
 fn regress_channels_are_documented() {
-    let text = std::fs::read_to_string(root().join("docs/scenes.md")).unwrap();
-    let table = text.split("## Channels of the EXR").nth(1).unwrap();
+    let table = read(&root().join("docs/reference/exr.md"));
     for channel in &kerrlight_tomo::render::CHANNELS {
         assert!(table.contains(&format!("`{}`", channel.name)), "{}", channel.name);
     }

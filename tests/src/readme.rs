@@ -1,12 +1,14 @@
-//! The commands of the documents: those of README.md run as they stand, in their order, in a fresh copy of the
-//! repository; those of docs/ are known to the program.
+//! The commands of the documents: those of README.md and of the tutorials run as they stand, page by page in a fresh
+//! copy of the repository; those of the other pages are known to the program.
 
+use crate::documents::{blocks, pages};
 use crate::support::{binary, kerrlight, root};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
-const RUN: &str = "cargo run --release -- ";
+/// Two ways to call the program.
+const RUNS: [&str; 2] = ["cargo run --release -- ", "kerrlight "];
 
 /// A command with what its comment says that it writes.
 struct Shown {
@@ -16,9 +18,10 @@ struct Shown {
 
 /// The commands of all ```sh blocks, lines that end in a backslash joined.
 fn commands(text: &str) -> Vec<Shown> {
-    let blocks = text.split("```sh\n").skip(1).map(|rest| rest.split("\n```").next().unwrap());
-    let joined: Vec<String> = blocks.map(|block| block.replace("\\\n", " ")).collect();
-    joined.iter().flat_map(|block| block.lines()).map(shown).collect()
+    let joined = |block: &&str| block.replace("\\\n", " ");
+    let lines: Vec<String> = blocks(text, "sh").iter().map(joined).collect();
+    let lines = lines.iter().flat_map(|block| block.lines());
+    lines.filter(|line| !line.trim().is_empty() && !line.starts_with('#')).map(shown).collect()
 }
 
 fn shown(line: &str) -> Shown {
@@ -37,6 +40,11 @@ fn shown(line: &str) -> Shown {
         }
     }
     Shown { line: line.trim().to_owned(), writes }
+}
+
+/// What a command gives to the program, whichever way it calls it.
+fn arguments(line: &str) -> Option<&str> {
+    RUNS.iter().find_map(|run| line.strip_prefix(run))
 }
 
 /// A copy of all files that git tracks.
@@ -62,9 +70,9 @@ fn shorter(line: &str) -> &'static str {
 }
 
 fn run(folder: &Path, shown: &Shown) {
-    let Some(rest) = shown.line.strip_prefix(RUN) else {
-        if shown.line.starts_with("cargo test") {
-            return eprintln!("skipped, as it is what runs now: {}", shown.line);
+    let Some(rest) = arguments(&shown.line) else {
+        if ["cargo test", "cargo install", "cargo run"].iter().any(|c| shown.line.starts_with(c)) {
+            return eprintln!("skipped, as it compiles: {}", shown.line);
         }
         assert!(!shown.line.starts_with("cargo"), "{}: no way to run it here", shown.line);
         return check(folder, shown, &shown.line, "");
@@ -91,48 +99,46 @@ fn check(folder: &Path, shown: &Shown, script: &str, more: &str) {
     }
 }
 
-#[test]
-fn exact_readme_runs_as_written() {
+fn run_page(path: &Path, text: &str) -> usize {
+    let all = commands(text);
+    eprintln!("{}: {} commands", path.display(), all.len());
     let folder = tempfile::tempdir().unwrap();
     fresh(folder.path());
-    let all = commands(&std::fs::read_to_string(root().join("README.md")).unwrap());
-    assert!(all.len() > 20, "only {} commands are found", all.len());
     all.iter().for_each(|shown| run(folder.path(), shown));
+    all.len()
 }
 
-/// Commands of docs/, in blocks of code: with ` cargo run --release -- ` or `kerrlight` in front.
-fn documented() -> Vec<(String, Vec<String>)> {
-    let mut all = Vec::new();
-    for entry in std::fs::read_dir(root().join("docs")).expect("docs") {
-        let path = entry.unwrap().path();
-        if path.extension().is_none_or(|e| e != "md") {
-            continue;
-        }
-        let text = std::fs::read_to_string(&path).unwrap().replace("\\\n", " ");
-        for line in text.lines() {
-            let indented = line.strip_prefix("    ");
-            let command = indented.and_then(|line| line.strip_prefix("kerrlight "));
-            let command = command.or(indented.unwrap_or(line).strip_prefix(RUN));
-            let Some(command) = command else { continue };
-            let command = command.split(" # ").next().unwrap();
-            let words = command.split_whitespace().map(str::to_owned).collect();
-            all.push((path.display().to_string(), words));
-        }
-    }
-    all
+#[test]
+fn exact_readme_and_tutorials_run_as_written() {
+    let tutorials = root().join("docs/tutorials");
+    let is_run = |path: &Path| path == root().join("README.md") || path.starts_with(&tutorials);
+    let all = pages().into_iter().filter(|(path, _)| is_run(path));
+    let count: usize = all.map(|(path, text)| run_page(&path, &text)).sum();
+    assert!(count > 20, "only {count} commands are found");
+}
+
+/// Commands of all pages, in ```sh blocks.
+fn documented() -> Vec<(PathBuf, String)> {
+    let of_page = |(path, text): (PathBuf, String)| {
+        let lines = commands(&text).into_iter().map(|shown| shown.line);
+        let known = lines.filter_map(|line| arguments(&line).map(str::to_owned));
+        known.map(move |line| (path.clone(), line)).collect::<Vec<_>>()
+    };
+    pages().into_iter().flat_map(of_page).collect()
 }
 
 /// Verbs, flags and values of the documents' commands are the program's, and files of the repository are there.
 #[test]
 fn exact_commands_of_documents_are_known() {
     let all = documented();
-    assert!(all.len() > 10, "only {} commands are found", all.len());
-    for (name, words) in all {
-        let mut arguments: Vec<&str> = words.iter().map(String::as_str).collect();
-        arguments.push("--help");
-        let output = kerrlight(&root(), &arguments);
+    assert!(all.len() > 40, "only {} commands are found", all.len());
+    for (path, line) in all {
+        let name = path.display();
+        let words = line.split_whitespace().take_while(|word| ![">", "|"].contains(word));
+        let words: Vec<&str> = words.chain(["--help"]).collect();
+        let output = kerrlight(&root(), &words);
         let errors = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{name}: {}: {errors}", words.join(" "));
+        assert!(output.status.success(), "{name}: {line}: {errors}");
         for word in words
             .iter()
             .filter(|word| word.starts_with("scenes/") || word.starts_with("experiments/"))

@@ -2,7 +2,7 @@
 //! shares a formula with what it judges.
 //!
 //! `cargo run --release -p kerrlight-validation` runs all of them, writes
-//! `docs/validation.md`, and fails if one fails.
+//! `docs/measurements/validation.md`, and fails if one fails.
 
 pub mod accuracy;
 pub mod bardeen;

@@ -1,4 +1,4 @@
-//! Runs all oracles and writes docs/validation.md.
+//! Runs all oracles and writes docs/measurements/validation.md.
 
 use anyhow::{Context, bail};
 use kerrlight_validation::{report, run_all};
@@ -8,8 +8,8 @@ use std::path::Path;
 fn main() -> anyhow::Result<()> {
     let cases = run_all();
     let text = report::markdown(&cases);
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
-    let mut file = tempfile::NamedTempFile::new_in(&folder).context("docs")?;
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/measurements");
+    let mut file = tempfile::NamedTempFile::new_in(&folder).context("docs/measurements")?;
     file.write_all(text.as_bytes())?;
     file.persist(folder.join("validation.md"))?;
     let failed: Vec<_> = cases.iter().filter(|case| !case.passed()).collect();

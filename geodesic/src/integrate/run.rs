@@ -23,7 +23,7 @@ pub(crate) struct Run<'a, T, M, const N: usize> {
 
 /// How much smaller than their estimates the truncation errors of cos θ are: its motion is nearly
 /// harmonic, for which every method is better than for the radial motion. Measured
-/// (docs/accuracy.md of the repository).
+/// (docs/measurements/geodesics.md of the repository).
 const HARMONIC: f64 = 0.3;
 
 impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {

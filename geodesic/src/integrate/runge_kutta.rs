@@ -21,7 +21,7 @@ pub(crate) struct Tableau<const S: usize> {
 pub(crate) trait Method<const S: usize> {
     const TABLEAU: Tableau<S>;
     /// How much larger the true local error may be than h times the estimate of it: measured
-    /// (docs/accuracy.md of the repository).
+    /// (docs/measurements/geodesics.md of the repository).
     const CAUTION: f64;
 }
 

@@ -243,7 +243,7 @@ impl Taylor {
     }
 }
 
-/// How much larger the rest of a series may be than its first term: measured (docs/accuracy.md
+/// How much larger the rest of a series may be than its first term: measured (docs/measurements/geodesics.md
 /// of the repository).
 const CAUTION: f64 = 3.0;
 

@@ -13,7 +13,7 @@ use crate::spacetime::kerr::Kerr;
 use crate::spacetime::point::PathPoint;
 
 /// Estimated errors of a position: each bounds the true one for at least 99 % of rays, and is
-/// usually a few times larger (docs/accuracy.md of the repository has the figures).
+/// usually a few times larger (docs/measurements/geodesics.md of the repository has the figures).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Uncertainty {
     /// Of the radius, relative.

@@ -122,7 +122,7 @@ fn widen(worst: &mut Uncertainty, error: f64, azimuth: f64, delay: f64) {
 }
 
 /// The error of the delay over b, by quadrature at the largest step: of the derivatives of 1/g at
-/// both ends, the largest for rays that hardly bend. Measured (docs/accuracy.md of the
+/// both ends, the largest for rays that hardly bend. Measured (docs/measurements/geodesics.md of the
 /// repository).
 const QUADRATURE: f64 = 2e-10;
 

@@ -258,7 +258,7 @@ fn difference(a: &PathPoint, b: &PathPoint, observer: f64) -> Uncertainty {
 }
 
 /// How much larger the error may be than the difference from a run at ten times the tolerance,
-/// whose own error has the same sign or vanishes by chance: measured (docs/accuracy.md of the
+/// whose own error has the same sign or vanishes by chance: measured (docs/measurements/geodesics.md of the
 /// repository).
 #[cfg(feature = "affine")]
 const AFFINE_CAUTION: f64 = 3.0;

@@ -5,7 +5,7 @@
 //! angle between ray and field, and the position angle on the screen; a [`PowerLaw`] makes
 //! [`Stokes`] parameters of them.
 //!
-//! Conventions (docs/polarization.md): position angles χ are of the electric vector, from north
+//! Conventions (docs/method/polarization.md): position angles χ are of the electric vector, from north
 //! (+β) towards east (−α); Q = P cos 2χ, U = P sin 2χ; V > 0 is right-handed (IAU 1973): the
 //! electric vector turns from north to east. Nothing is absorbed, and Faraday rotation and
 //! conversion are left out.

@@ -1,4 +1,4 @@
-//! Prints the table of docs/accuracy.md: whether estimates bound errors, for every integrator,
+//! Prints the table of docs/measurements/geodesics.md: whether estimates bound errors, for every integrator,
 //! tolerance and class of rays. The argument is the number of rays of each class.
 
 use anyhow::{Context, bail};

@@ -191,11 +191,11 @@ mod tests {
 
     #[test]
     fn exact_every_key_of_the_table_is_one_of_a_fit() {
-        let documents = include_str!("../../../../docs/fit.md");
+        let documents = include_str!("../../../../docs/reference/fit-file.md");
         for (pattern, least, most, _) in RANGES {
             assert!(least < most, "{pattern}");
             let name = pattern.trim_end_matches(".*").rsplit('.').next().unwrap_or_default();
-            assert!(documents.contains(name), "docs/fit.md does not know {pattern}");
+            assert!(documents.contains(name), "docs/reference/fit-file.md does not know {pattern}");
         }
     }
 }

@@ -45,7 +45,7 @@ pub const TABLES: [(&str, &str); 21] = [
     ),
     (
         "axis.known",
-        "The axis of the motion is motion.axis. It can be learnt: see docs/fit.md, [axis.from] and [axis.scan].",
+        "The axis of the motion is motion.axis. It can be learnt: see docs/reference/fit-file.md, [axis.from] and [axis.scan].",
     ),
     ("regulariser", "A penalty on the emission."),
     ("probe", "Where penalties look at a network."),

@@ -114,7 +114,7 @@ fn head(path: &Path, plain: &str) -> String {
         ""
     };
     format!(
-        "# Settings of a fit. Run it with\n{run}{left}{assumed}# Lengths and times are in M (GM/c^2, GM/c^3) where nothing else is said; docs/fit.md tells more.\n"
+        "# Settings of a fit. Run it with\n{run}{left}{assumed}# Lengths and times are in M (GM/c^2, GM/c^3) where nothing else is said; docs/reference/fit-file.md tells more.\n"
     )
 }
 

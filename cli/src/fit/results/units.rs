@@ -1,4 +1,4 @@
-//! Units of settings, as docs/fit.md gives them.
+//! Units of settings, as docs/reference/fit-file.md gives them.
 
 /// Keys as they end, without the numbers of lists, and their units; the first that fits counts.
 const UNITS: [(&str, &str); 47] = [

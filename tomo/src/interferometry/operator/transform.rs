@@ -68,7 +68,7 @@ impl<T: Real + FftNum> Transform<T> {
     }
 }
 
-/// Time of both transform and adjoint, measured (docs/interferometry.md), whose ratios matter: a pixel
+/// Time of both transform and adjoint, measured (docs/measurements/interferometry.md), whose ratios matter: a pixel
 /// and visibility of the direct transform, N log₂ N of a fast one, a cell of a kernel.
 const DIRECT_NS: f64 = 0.6;
 const FAST_NS: f64 = 5.0;

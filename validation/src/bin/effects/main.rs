@@ -1,5 +1,5 @@
 //! Times a scene with each effect off and on, alone and together, and a disc without effects against
-//! a loop that knows none, and writes docs/effects.md. `effects library N` and `effects loop N`
+//! a loop that knows none, and writes docs/measurements/effects.md. `effects library N` and `effects loop N`
 //! run one of these two N times, for a profiler.
 
 mod off;
@@ -80,8 +80,8 @@ fn main() -> anyhow::Result<()> {
     writeln!(table, "| all of them | {all:.2} | {:+.0} % | |", 100.0 * (all / off - 1.0))?;
     let straight = straight()?;
     writeln!(table, "| no lensing, no spot | {straight:.2} | | |")?;
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
-    let mut file = tempfile::NamedTempFile::new_in(&folder).context("docs")?;
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/measurements");
+    let mut file = tempfile::NamedTempFile::new_in(&folder).context("docs/measurements")?;
     let dearer = 100.0 * (library / plain - 1.0);
     let off = format!("{library:.3} µs against {plain:.3} µs a ray ({dearer:+.1} %)");
     let page = PAGE.replace("TABLE\n", &table).replace("OFF", &off);
