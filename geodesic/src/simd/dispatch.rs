@@ -22,7 +22,7 @@ pub enum Width {
     Sse2,
     /// Four lanes, AVX2 and FMA.
     Avx2,
-    /// Eight lanes, AVX-512 F and DQ; with the feature `avx512` only.
+    /// Eight lanes, AVX-512 F and DQ.
     Avx512,
 }
 
@@ -34,7 +34,7 @@ impl Width {
             Self::Sse2 => cfg!(target_arch = "x86_64"),
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
-            #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
+            #[cfg(target_arch = "x86_64")]
             Self::Avx512 => {
                 is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq")
             }
@@ -43,10 +43,9 @@ impl Width {
         }
     }
 
-    /// The widest one that this machine can run and that has been measured: AVX-512 has to be
-    /// asked for.
+    /// The widest one that this machine can run.
     pub fn best() -> Self {
-        let widths = [Self::Avx2, Self::Sse2];
+        let widths = [Self::Avx512, Self::Avx2, Self::Sse2];
         widths.into_iter().find(|width| width.available()).unwrap_or(Self::Scalar)
     }
 }
@@ -57,7 +56,7 @@ fn run_avx2<T: Task>(task: T) -> T::Output {
     task.run::<super::lanes::avx2::F64x4>()
 }
 
-#[cfg(all(target_arch = "x86_64", feature = "avx512"))]
+#[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq")]
 fn run_avx512<T: Task>(task: T) -> T::Output {
     task.run::<super::lanes::avx512::F64x8>()
@@ -68,7 +67,6 @@ fn run_avx512<T: Task>(task: T) -> T::Output {
 pub fn dispatch<T: Task>(width: Width, task: T) -> T::Output {
     #[cfg(target_arch = "x86_64")]
     {
-        #[cfg(feature = "avx512")]
         if width == Width::Avx512 && width.available() {
             // SAFETY: the features were just detected.
             return unsafe { run_avx512(task) };

@@ -9,7 +9,7 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
-#[cfg(all(target_arch = "x86_64", feature = "avx512"))]
+#[cfg(target_arch = "x86_64")]
 mod avx512;
 mod lanes;
 pub mod math;
@@ -28,7 +28,7 @@ pub enum InstructionSet {
     Portable,
     /// AVX2 and FMA.
     Avx2,
-    /// AVX-512 F; with the feature `avx512` only.
+    /// AVX-512 F.
     Avx512,
 }
 
@@ -42,7 +42,7 @@ impl InstructionSet {
             Self::Portable => true,
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
-            #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
+            #[cfg(target_arch = "x86_64")]
             Self::Avx512 => is_x86_feature_detected!("avx512f") && Self::Avx2.available(),
             #[allow(unreachable_patterns)]
             _ => false,
@@ -88,7 +88,7 @@ fn run_avx2<T: Scalar, K: Task<T>>(task: K) -> K::Output {
     task.run::<T::Avx2, 6>()
 }
 
-#[cfg(all(target_arch = "x86_64", feature = "avx512"))]
+#[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx2,fma")]
 fn run_avx512<T: Scalar, K: Task<T>>(task: K) -> K::Output {
     task.run::<T::Avx512, 12>()
@@ -98,7 +98,6 @@ fn run_avx512<T: Scalar, K: Task<T>>(task: K) -> K::Output {
 pub fn dispatch<T: Scalar, K: Task<T>>(set: InstructionSet, task: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
     {
-        #[cfg(feature = "avx512")]
         if set == InstructionSet::Avx512 && set.available() {
             // SAFETY: the features were just detected.
             return unsafe { run_avx512(task) };

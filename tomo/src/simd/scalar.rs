@@ -24,11 +24,11 @@ impl Scalar for f32 {
     type Portable = Array<f32, 4>;
     #[cfg(target_arch = "x86_64")]
     type Avx2 = super::avx2::F32x8;
-    #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
+    #[cfg(target_arch = "x86_64")]
     type Avx512 = super::avx512::F32x16;
     #[cfg(not(target_arch = "x86_64"))]
     type Avx2 = Array<f32, 4>;
-    #[cfg(not(all(target_arch = "x86_64", feature = "avx512")))]
+    #[cfg(not(target_arch = "x86_64"))]
     type Avx512 = Array<f32, 4>;
 
     const ROUNDER: f32 = 12_582_912.0;
@@ -43,11 +43,11 @@ impl Scalar for f64 {
     type Portable = Array<f64, 2>;
     #[cfg(target_arch = "x86_64")]
     type Avx2 = super::avx2::F64x4;
-    #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
+    #[cfg(target_arch = "x86_64")]
     type Avx512 = super::avx512::F64x8;
     #[cfg(not(target_arch = "x86_64"))]
     type Avx2 = Array<f64, 2>;
-    #[cfg(not(all(target_arch = "x86_64", feature = "avx512")))]
+    #[cfg(not(target_arch = "x86_64"))]
     type Avx512 = Array<f64, 2>;
 
     const ROUNDER: f64 = 6_755_399_441_055_744.0;
