@@ -301,7 +301,7 @@ fn exact_regular_grid_is_one_ray_a_pixel() {
     let grid = of("screen.rings=\"regular-grid\"");
     let resolved = of("screen.rings=\"resolved\"");
     let scene = scene(&text, &[&SMALL[..], &flux].concat());
-    let stage = kerrlight_tomo::transport::Stage::new(&scene, None).unwrap();
+    let prepared = kerrlight_tomo::transport::PreparedScene::new(&scene, None).unwrap();
     let at = |k: usize| (k as f64 - 32.0) * 24.0 / 65.0;
     for name in ["redshift", "crossings", "radius", "azimuth", "delay", "outcome"] {
         assert_eq!(grid.channel(name), resolved.channel(name), "{name}");
@@ -311,7 +311,7 @@ fn exact_regular_grid_is_one_ray_a_pixel() {
     let mut changed = 0;
     for k in (0..65 * 65).step_by(7) {
         let (x, y) = (at(k % 65), -at(k / 65));
-        let seen = stage.look(x, y, &mut scratch).unwrap();
+        let seen = prepared.observe(x, y, &mut scratch).unwrap();
         assert_eq!(seen.intensity as f32, one[k], "pixel {k}");
         changed += usize::from(one[k] != many[k]);
         assert!(x.hypot(y) < 12.0 || one[k] == many[k], "pixel {k}");

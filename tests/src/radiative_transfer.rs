@@ -4,7 +4,7 @@ use crate::support::{root, scene};
 use kerrlight_tomo::image::Picture;
 use kerrlight_tomo::render::{Rendered, render};
 use kerrlight_tomo::scene::Scene;
-use kerrlight_tomo::transport::{Glimpse, Scratch, Stage};
+use kerrlight_tomo::transport::{PreparedScene, RayResult, Scratch};
 
 fn gold(test: u32, overrides: &[&str]) -> Scene {
     let path = root().join(format!("scenes/gold2020/test{test}.toml"));
@@ -106,7 +106,7 @@ const CENTIMETRES: f64 = 6.00121818e11;
 fn exact_uniform_sphere_on_straight_rays() {
     let changes = ["effects.lensing=false", "gas.absorptivity=3e5", "hole.spin=0.0"];
     let scene = gold(4, &[SPHERE, &changes].concat());
-    let stage = Stage::new(&scene, None).unwrap();
+    let prepared = PreparedScene::new(&scene, None).unwrap();
     let mut scratch = Scratch::default();
     let thickness = 3e5 * 3e-18 * CENTIMETRES;
     for (alpha, beta) in [(0.0, 0.0), (1.0, 0.5), (1.9, 0.0), (2.5, 1.0), (-6.0, 4.0), (0.0, 11.9)]
@@ -115,11 +115,11 @@ fn exact_uniform_sphere_on_straight_rays() {
         let half = (144.0 - b * b).sqrt();
         let chord = if b < 2.0 { half - (4.0 - b * b).sqrt() } else { 2.0 * half };
         let expected = -(-thickness * chord).exp_m1() / 3e5;
-        let seen = stage.look(alpha, beta, &mut scratch).unwrap();
+        let seen = prepared.observe(alpha, beta, &mut scratch).unwrap();
         assert!((seen.intensity / expected - 1.0).abs() < 1e-7, "b = {b}: {}", seen.intensity);
         assert!((seen.optical_depth / (thickness * chord) - 1.0).abs() < 1e-7, "b = {b}");
     }
-    assert_eq!(stage.look(0.0, 12.1, &mut scratch).unwrap().intensity, 0.0);
+    assert_eq!(prepared.observe(0.0, 12.1, &mut scratch).unwrap().intensity, 0.0);
 }
 
 /// A furnace: where emission and absorption have one ratio S, every ray sees S (1 − e^{−D}),
@@ -129,7 +129,7 @@ fn exact_furnace_on_bent_rays() {
     for absorptivity in [1e4, 1e6, 3e7] {
         let value = format!("gas.absorptivity={absorptivity}");
         let scene = gold(4, &[SPHERE, &[&value]].concat());
-        let stage = Stage::new(&scene, None).unwrap();
+        let prepared = PreparedScene::new(&scene, None).unwrap();
         let mut scratch = Scratch::default();
         let (mut alpha, mut beta) = (Vec::new(), Vec::new());
         for k in 0..400 {
@@ -137,11 +137,11 @@ fn exact_furnace_on_bent_rays() {
             alpha.push(radius * angle.cos());
             beta.push(radius * angle.sin());
         }
-        let mut seen = vec![Glimpse::default(); alpha.len()];
-        stage.look_many(&alpha, &beta, &[0.0], &mut scratch, &mut seen).unwrap();
-        for (k, glimpse) in seen.iter().enumerate() {
-            let expected = -(-glimpse.optical_depth).exp_m1() / absorptivity;
-            let miss = (glimpse.intensity / expected - 1.0).abs();
+        let mut seen = vec![RayResult::default(); alpha.len()];
+        prepared.observe_block(&alpha, &beta, &[0.0], &mut scratch, &mut seen).unwrap();
+        for (k, result) in seen.iter().enumerate() {
+            let expected = -(-result.optical_depth).exp_m1() / absorptivity;
+            let miss = (result.intensity / expected - 1.0).abs();
             assert!(miss < 1e-6, "A = {absorptivity}, ray {k}: {miss:e}");
         }
     }
@@ -162,17 +162,17 @@ fn exact_demagnification_of_further_images() {
             "tracer.integrator=\"elliptic\"".to_owned(),
         ];
         let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
-        let stage = Stage::new(&scene(FACE_ON, &changes), None).unwrap();
+        let prepared = PreparedScene::new(&scene(FACE_ON, &changes), None).unwrap();
         // Outside: image n ≥ 1 lies at offsets of about 300 e^{−nπ} from the critical curve.
         let steps = 4000;
         let offset = |k: f64| 30.0 * (-16.0 * k / f64::from(steps)).exp();
         let alpha: Vec<f64> = (0..steps).map(|k| critical + offset(f64::from(k) + 0.5)).collect();
         let beta = vec![0.0; alpha.len()];
-        let mut seen = vec![Glimpse::default(); alpha.len()];
-        stage.look_many(&alpha, &beta, &[0.0], &mut Scratch::default(), &mut seen).unwrap();
+        let mut seen = vec![RayResult::default(); alpha.len()];
+        prepared.observe_block(&alpha, &beta, &[0.0], &mut Scratch::default(), &mut seen).unwrap();
         let rings = seen.iter().zip(0..steps);
         let width = |k: u32| offset(f64::from(k)) - offset(f64::from(k + 1));
-        rings.map(|(glimpse, k)| glimpse.intensity * width(k as u32)).sum::<f64>()
+        rings.map(|(result, k)| result.intensity * width(k as u32)).sum::<f64>()
     };
     let up_to: Vec<f64> = (0..5).map(flux).collect();
     let images: Vec<f64> = up_to.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -203,14 +203,14 @@ fn exact_disc_without_lensing() {
 #[test]
 fn exact_blocks_do_not_matter() {
     for scene in [gold(3, &[]), gold(5, &[]), scene(FACE_ON, &["tracer.integrator=\"elliptic\""])] {
-        let stage = Stage::new(&scene, None).unwrap();
+        let prepared = PreparedScene::new(&scene, None).unwrap();
         let alpha: Vec<f64> = (0..150).map(|k| f64::from(k) * 0.17 - 12.7).collect();
         let beta: Vec<f64> = (0..150).map(|k| (f64::from(k) * 0.7).sin() * 6.0).collect();
         let look = |block: usize| {
             let (mut scratch, mut all) = (Scratch::default(), Vec::new());
             for (alpha, beta) in alpha.chunks(block).zip(beta.chunks(block)) {
-                let mut seen = vec![Glimpse::default(); alpha.len()];
-                stage.look_many(alpha, beta, &[0.0], &mut scratch, &mut seen).unwrap();
+                let mut seen = vec![RayResult::default(); alpha.len()];
+                prepared.observe_block(alpha, beta, &[0.0], &mut scratch, &mut seen).unwrap();
                 all.extend(seen);
             }
             all
@@ -268,12 +268,13 @@ fn exact_face_on_pattern_turns_with_the_place() {
         let off = "magnetic_field.vertical=0.0".to_owned();
         let on = format!("magnetic_field.{field}=1.0");
         let all = [FIELD, &changes, &[off.as_str(), on.as_str()]].concat();
-        let stage = Stage::new(&scene(FACE_ON, &all), None).unwrap();
+        let prepared = PreparedScene::new(&scene(FACE_ON, &all), None).unwrap();
         let mut scratch = Scratch::default();
         let mut turned = Vec::new();
         for k in 0..12 {
             let angle = 0.3 + 0.5 * f64::from(k);
-            let seen = stage.look(9.0 * angle.cos(), 9.0 * angle.sin(), &mut scratch).unwrap();
+            let seen =
+                prepared.observe(9.0 * angle.cos(), 9.0 * angle.sin(), &mut scratch).unwrap();
             let [q, u, _] = seen.stokes;
             // χ runs from north towards east, −α: a place at angle φ from +α has north at φ = 90°.
             let chi = 0.5 * u.atan2(q);
@@ -320,11 +321,11 @@ fn exact_spot_behind_gas() {
     let seen = |absorptivity: &str, emissivity: &str| {
         let small = ["gas.outer_radius=18.0", "effects.redshift=false", absorptivity, emissivity];
         let scene = scene(&(text.clone() + spot), &small);
-        let stage = Stage::new(&scene, None).unwrap();
+        let prepared = PreparedScene::new(&scene, None).unwrap();
         // Straight over the hole to a spot behind it, all gas in front.
         let mut scratch = Scratch::default();
         (0..40)
-            .map(|k| stage.look(0.0, 9.0 + 0.15 * f64::from(k), &mut scratch).unwrap())
+            .map(|k| prepared.observe(0.0, 9.0 + 0.15 * f64::from(k), &mut scratch).unwrap())
             .max_by(|a, b| a.intensity.total_cmp(&b.intensity))
             .unwrap()
     };

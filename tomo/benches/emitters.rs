@@ -3,7 +3,7 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use kerrlight_tomo::scene::{Scene, Spot};
-use kerrlight_tomo::transport::{Glimpse, Scratch, Stage};
+use kerrlight_tomo::transport::{PreparedScene, RayResult, Scratch};
 
 const SCENE: &str = r#"
 [hole]
@@ -50,12 +50,14 @@ fn rays(side: u32) -> (Vec<f64>, Vec<f64>) {
 }
 
 fn look(
-    stage: &Stage,
+    prepared: &PreparedScene,
     (alpha, beta): &(Vec<f64>, Vec<f64>),
     scratch: &mut Scratch,
-) -> Vec<Glimpse> {
-    let mut seen = vec![Glimpse::default(); alpha.len()];
-    stage.look_many(alpha, beta, &[stage.time()], scratch, &mut seen).expect("rays of the scene");
+) -> Vec<RayResult> {
+    let mut seen = vec![RayResult::default(); alpha.len()];
+    prepared
+        .observe_block(alpha, beta, &[prepared.time()], scratch, &mut seen)
+        .expect("rays of the scene");
     seen
 }
 
@@ -67,17 +69,18 @@ fn emitters(criterion: &mut Criterion) {
         group.warm_up_time(std::time::Duration::from_millis(500));
         group.measurement_time(std::time::Duration::from_secs(2));
         for count in [0, 1, 100, 10_000] {
-            let stage = Stage::new(&scene(count, slow_light), None).expect("a scene in range");
-            let plain = stage.clone().one_by_one();
+            let prepared =
+                PreparedScene::new(&scene(count, slow_light), None).expect("a scene in range");
+            let plain = prepared.clone().one_by_one();
             let few = rays(if count > 1000 { 6 } else { 16 });
             let mut scratch = Scratch::default();
-            let seen = look(&stage, &few, &mut scratch);
+            let seen = look(&prepared, &few, &mut scratch);
             assert_eq!(seen, look(&plain, &few, &mut scratch), "{count} spots");
             assert!(count < 100 || seen.iter().any(|ray| ray.intensity > 0.0));
             let many = rays(32);
             group.throughput(Throughput::Elements(many.0.len() as u64));
             group.bench_function(BenchmarkId::new("tree", count), |bench| {
-                bench.iter(|| look(&stage, &many, &mut scratch));
+                bench.iter(|| look(&prepared, &many, &mut scratch));
             });
             group.throughput(Throughput::Elements(few.0.len() as u64));
             group.bench_function(BenchmarkId::new("one by one", count), |bench| {

@@ -2,7 +2,7 @@
 //! transfer use (Gold et al. 2020, ApJ 897, 148, section 3.2).
 
 use crate::scene::{Gas, GasMotion, GasProfile};
-use crate::transport::{Emission, Grain, Medium, Moment, Part};
+use crate::transport::{CellSize, Emission, Medium, Moment, Part};
 use kerrlight_geodesic::simd::RayNodes;
 use kerrlight_geodesic::{Kerr, Quantities};
 
@@ -19,7 +19,7 @@ pub struct GasModel {
     /// Absorption coefficient at density 1 and g = 1, per M; 0 where absorption is off.
     absorption: f64,
     /// Spectral index, if redshift is simulated.
-    redshift: Option<f64>,
+    spectral_index: Option<f64>,
     outer: f64,
     color: [f32; 3],
 }
@@ -45,7 +45,7 @@ struct Metric {
 #[derive(Debug, Clone, Copy)]
 pub struct GasEffects {
     /// Spectral index α, if redshift is simulated.
-    pub redshift: Option<f64>,
+    pub spectral_index: Option<f64>,
     /// Whether it absorbs.
     pub absorption: bool,
 }
@@ -62,7 +62,7 @@ impl GasModel {
             motion: gas.motion,
             emissivity,
             absorption: if effects.absorption { gas.absorptivity * emissivity } else { 0.0 },
-            redshift: effects.redshift,
+            spectral_index: effects.spectral_index,
             outer: gas.outer_radius,
             color: gas.color,
         }
@@ -89,7 +89,7 @@ impl GasModel {
     fn redshifts(&self, nodes: &RayNodes<'_>, lambda: f64, out: &mut Vec<f64>) {
         out.clear();
         let places = nodes.radius.iter().zip(nodes.cos_theta);
-        match (self.redshift, self.motion) {
+        match (self.spectral_index, self.motion) {
             (None, _) => out.resize(nodes.radius.len(), 1.0),
             (_, GasMotion::AngularMomentum { l0 }) => {
                 out.extend(places.map(|(r, u)| self.on_circles(*r, *u, lambda, l0)));
@@ -192,7 +192,7 @@ impl Medium for GasModel {
         Part::Gas
     }
 
-    fn grain(&self) -> Option<Grain> {
+    fn cell_size(&self) -> Option<CellSize> {
         None
     }
 
@@ -209,7 +209,7 @@ impl Medium for GasModel {
     }
 
     fn quantities(&self) -> Quantities {
-        let velocity = self.redshift.is_some() && self.motion == GasMotion::FreeFall;
+        let velocity = self.spectral_index.is_some() && self.motion == GasMotion::FreeFall;
         Quantities { azimuth: false, time: false, velocity }
     }
 
@@ -236,7 +236,7 @@ impl Medium for GasModel {
     fn fill(&self, nodes: &RayNodes<'_>, lambda: f64, _: Moment, out: &mut Emission) {
         self.redshifts(nodes, lambda, &mut out.redshift);
         self.densities(nodes, &mut out.emissivity);
-        let index = self.redshift.unwrap_or(0.0);
+        let index = self.spectral_index.unwrap_or(0.0);
         if index != 0.0 {
             // j ∝ g^α at the emitted frequency.
             let pairs = out.emissivity.iter_mut().zip(&out.redshift);

@@ -1,7 +1,7 @@
 //! Where a volume on the nodes of a box shines, in coordinates in which matter on circles about
 //! an axis stays where it is but for its azimuth: the bricks that a ray is asked for.
 
-use crate::transport::Stretch;
+use crate::transport::PathSegment;
 use crate::volume::Volume;
 use core::f64::consts::{PI, TAU};
 use core::ops::Range;
@@ -144,41 +144,41 @@ impl Occupied {
         self.around(extent[2]).iter().any(some)
     }
 
-    /// Whether there may be light along a stretch of a ray: `turned(radii)` is the range of angles
+    /// Whether there may be light along a segment of a ray: `turned(radii)` is the range of angles
     /// by which matter between two radii has turned by the time.
     pub fn may_shine(
         &self,
-        stretch: &Stretch,
+        segment: &PathSegment,
         turned: impl Fn([f64; 2]) -> Option<[f64; 2]>,
     ) -> bool {
         if self.sums.is_empty()
-            || stretch.radii[1] < self.radii[0]
-            || stretch.radii[0] > self.radii[1]
+            || segment.radii[1] < self.radii[0]
+            || segment.radii[0] > self.radii[1]
         {
             return false;
         }
-        let heights = stretch.positions.map(|x| dot(self.axis, x));
-        let farthest = stretch.radii[1];
+        let heights = segment.positions.map(|x| dot(self.axis, x));
+        let farthest = segment.radii[1];
         let heights = [
-            (heights[0].min(heights[1]) - stretch.off).max(-farthest),
-            (heights[0].max(heights[1]) + stretch.off).min(farthest),
+            (heights[0].min(heights[1]) - segment.off).max(-farthest),
+            (heights[0].max(heights[1]) + segment.off).min(farthest),
         ];
-        let azimuths = match (self.azimuths(stretch), turned(stretch.radii)) {
+        let azimuths = match (self.azimuths(segment), turned(segment.radii)) {
             (Some([low, high]), Some([least, most])) => [low - most, high - least],
             _ => [-PI, PI],
         };
-        self.shines(&[stretch.radii, heights, azimuths])
+        self.shines(&[segment.radii, heights, azimuths])
     }
 
-    /// Azimuths about the axis along a stretch; `None` if it may meet the axis.
-    fn azimuths(&self, stretch: &Stretch) -> Option<[f64; 2]> {
-        let [a, b] = stretch.positions.map(|x| self.across.map(|e| dot(e, x)));
+    /// Azimuths about the axis along a segment; `None` if it may meet the axis.
+    fn azimuths(&self, segment: &PathSegment) -> Option<[f64; 2]> {
+        let [a, b] = segment.positions.map(|x| self.across.map(|e| dot(e, x)));
         let along = [b[0] - a[0], b[1] - a[1]];
         let square = along[0] * along[0] + along[1] * along[1];
         let part = -(a[0] * along[0] + a[1] * along[1]) / square.max(f64::MIN_POSITIVE);
         let part = part.clamp(0.0, 1.0);
         let nearest = (a[0] + part * along[0]).hypot(a[1] + part * along[1]);
-        let wide = stretch.off / nearest;
+        let wide = segment.off / nearest;
         if wide >= 1.0 || wide.is_nan() {
             return None;
         }
@@ -246,7 +246,7 @@ mod tests {
         Volume::new(nodes, low, high, values).unwrap()
     }
 
-    /// Wherever the turned volume shines on a stretch the bricks say so, for stretches of all
+    /// Wherever the turned volume shines on a segment the bricks say so, for stretches of all
     /// lengths, also where the ray may be off its chord; and they say no to most short ones.
     #[test]
     fn exact_nothing_shines_outside_the_bricks() {
@@ -271,9 +271,9 @@ mod tests {
                 let least = radii.into_iter().fold(f64::INFINITY, f64::min);
                 let most = radii.into_iter().fold(0.0, f64::max);
                 let angle = 0.1 * f64::from(k);
-                let stretch =
-                    Stretch { positions: [x, y], radii: [least, most], delays: [0.0; 2], off };
-                let holds = occupied.may_shine(&stretch, |_| Some([angle, angle + 0.02]));
+                let segment =
+                    PathSegment { positions: [x, y], radii: [least, most], delays: [0.0; 2], off };
+                let holds = occupied.may_shine(&segment, |_| Some([angle, angle + 0.02]));
                 if long < 0.2 {
                     (held, all) = (held + i32::from(holds), all + 1);
                 }
@@ -294,8 +294,8 @@ mod tests {
         assert!((occupied.count.iter().product::<usize>() as f64) < 1.2 * MOST_BRICKS);
         let empty = Volume::new([2; 3], [0.0; 3], [1.0; 3], vec![0.0; 8]).unwrap();
         let empty = Occupied::new(&empty, [0.0, 0.0, 1.0]);
-        let stretch =
-            Stretch { positions: [[0.5; 3]; 2], radii: [0.8, 0.9], delays: [0.0; 2], off: 0.0 };
-        assert!(!empty.may_shine(&stretch, |_| None));
+        let segment =
+            PathSegment { positions: [[0.5; 3]; 2], radii: [0.8, 0.9], delays: [0.0; 2], off: 0.0 };
+        assert!(!empty.may_shine(&segment, |_| None));
     }
 }

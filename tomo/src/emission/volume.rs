@@ -5,7 +5,7 @@ use super::occupied::Occupied;
 use super::spot::rotate;
 use crate::dynamics::{AngularVelocity, Axis, Injection};
 use crate::scene::{Rotation, VolumeRegion, VolumeSource};
-use crate::transport::{Emission, Grain, Medium, Moment, Part, Stretch};
+use crate::transport::{CellSize, Emission, Medium, Moment, Part, PathSegment};
 use crate::volume::{Volume, VolumeFile};
 use kerrlight_geodesic::flow::{cross, rotating_redshift_at};
 use kerrlight_geodesic::simd::RayNodes;
@@ -26,14 +26,14 @@ pub struct VolumeModel {
     /// `None`: it shines wherever the file has light.
     region: Option<VolumeRegion>,
     /// Spectral index, if redshift is simulated.
-    redshift: Option<f64>,
+    spectral_index: Option<f64>,
     slow_light: bool,
     occupied: Occupied,
     color: [f32; 3],
 }
 
 impl VolumeModel {
-    /// The volume of a scene around `hole`; `redshift` is the spectral index, if it is simulated.
+    /// The volume of a scene around `hole`; `spectral_index` is there if redshift is simulated.
     ///
     /// # Errors
     /// If a value is negative or there is no axis to turn about.
@@ -41,7 +41,7 @@ impl VolumeModel {
         source: &VolumeSource,
         file: &VolumeFile,
         hole: &Kerr,
-        (redshift, slow_light): (Option<f64>, bool),
+        (spectral_index, slow_light): (Option<f64>, bool),
     ) -> Result<Self, OutOfRange> {
         let range = |field, value, allowed| OutOfRange { field, value, allowed };
         let axis = match (source.axis.or(file.axis), &source.rotation) {
@@ -67,7 +67,7 @@ impl VolumeModel {
             reference: source.reference_time.unwrap_or(0.0),
             injection: source.injection_time.map(|time| Injection { time }),
             region: source.region,
-            redshift,
+            spectral_index,
             slow_light,
             occupied: Occupied::new(&file.volume, axis.vector()),
             color: source.color,
@@ -132,7 +132,7 @@ impl VolumeModel {
         if emissivity <= 0.0 {
             return None;
         }
-        let Some(index) = self.redshift else { return Some([emissivity, 1.0]) };
+        let Some(index) = self.spectral_index else { return Some([emissivity, 1.0]) };
         let polar = nodes.polar_velocity.get(k).copied().unwrap_or(0.0);
         let omega = self.angular_velocity(r);
         let g = rotating_redshift_at(&self.hole, (r, n), (lambda, polar), omega)?;
@@ -158,14 +158,14 @@ impl Medium for VolumeModel {
         self.occupied.radii[1].min(outer).max(1.01 * self.hole.horizon())
     }
 
-    fn grain(&self) -> Option<Grain> {
+    fn cell_size(&self) -> Option<CellSize> {
         let inner = self.region.map_or(0.0, |region| region.r_min);
-        Some(Grain { size: self.volume.finest(), inner: self.occupied.radii[0].max(inner) })
+        Some(CellSize { size: self.volume.finest(), inner: self.occupied.radii[0].max(inner) })
     }
 
     fn quantities(&self) -> Quantities {
         let tilted = self.axis[0] != 0.0 || self.axis[1] != 0.0;
-        let velocity = self.redshift.is_some() && tilted && self.rotation.is_some();
+        let velocity = self.spectral_index.is_some() && tilted && self.rotation.is_some();
         Quantities { azimuth: true, time: self.slow_light && self.changes(), velocity }
     }
 
@@ -195,14 +195,14 @@ impl Medium for VolumeModel {
         false
     }
 
-    fn may_shine(&self, stretch: &Stretch, moment: Moment) -> bool {
+    fn may_shine(&self, segment: &PathSegment, moment: Moment) -> bool {
         let [early, late] = match moment.slow_light {
-            true => stretch.delays.map(|delay| moment.observed - delay),
+            true => segment.delays.map(|delay| moment.observed - delay),
             false => [moment.observed; 2],
         };
         let before = |injection: Injection| !injection.shines(late);
         !self.injection.is_some_and(before)
-            && self.occupied.may_shine(stretch, |radii| self.turned(radii, [early, late]))
+            && self.occupied.may_shine(segment, |radii| self.turned(radii, [early, late]))
     }
 
     fn fill(&self, nodes: &RayNodes<'_>, lambda: f64, moment: Moment, out: &mut Emission) {

@@ -39,7 +39,7 @@ fn put(band: &Mutex<Parts>, tiles: usize, tile: usize, pixels: Tile) -> Option<P
 }
 
 /// Renders the bands `todo` at each of `times` into `sink`. Where `progress` says so it stops
-/// after the bands that are under way. Where pixels are refined there is one time, the stage's.
+/// after the bands that are under way. Where pixels are refined there is one time, the prepared scene's.
 pub(super) fn render_bands(
     raster: &Raster,
     times: &[f64],
@@ -76,7 +76,7 @@ impl Raster {
     /// The error that each pixel may have, where pixels are refined.
     fn tolerance(&self) -> Result<Option<f64>, RenderError> {
         let Some(error) = self.scene.screen.image_error else { return Ok(None) };
-        Ok(Some(adaptive::tolerance(&self.stage, &self.grid, error)?))
+        Ok(Some(adaptive::tolerance(&self.prepared, &self.grid, error)?))
     }
 
     fn tile(
@@ -88,16 +88,16 @@ impl Raster {
     ) -> Result<Tile, RenderError> {
         let end = ((tile + 1) * self.tile).min(self.grid.width);
         let columns = tile * self.tile..end;
-        let (stage, grid, rows) = (&self.stage, &self.grid, self.layout.rows(band));
+        let (prepared, grid, rows) = (&self.prepared, &self.grid, self.layout.rows(band));
         if self.meter.is_some() {
             work.scratch.meter = Meter::running();
         }
         let pixels = match tolerance {
             Some(tolerance) => {
                 let rings = self.rings.as_ref();
-                vec![Adaptive { stage, grid, rings, tolerance }.pixels((rows, columns), work)?]
+                vec![Adaptive { prepared, grid, rings, tolerance }.pixels((rows, columns), work)?]
             }
-            None => uniform((stage, self.rings.as_ref()), grid, (rows, columns), times, work)?,
+            None => uniform((prepared, self.rings.as_ref()), grid, (rows, columns), times, work)?,
         };
         if let Some(meter) = &self.meter {
             meter.lock().unwrap_or_else(PoisonError::into_inner).add(&work.scratch.meter);

@@ -3,7 +3,7 @@
 
 use super::RenderError;
 use super::pixels::Pixel;
-use crate::transport::Stage;
+use crate::transport::PreparedScene;
 
 /// A channel of a picture.
 pub struct ChannelKind {
@@ -14,7 +14,7 @@ pub struct ChannelKind {
     /// What it holds.
     pub meaning: &'static str,
     /// Whether a scene has it, with pixels refined or not.
-    present: fn(&Stage, bool) -> bool,
+    present: fn(&PreparedScene, bool) -> bool,
     /// How it is taken from a pixel.
     value: fn(&Pixel) -> f64,
     /// Whether it is in the unit of intensity.
@@ -68,15 +68,15 @@ pub static CHANNELS: [ChannelKind; 15] = [
         )
     },
     ChannelKind {
-        present: |stage, _| stage.polarization()[0],
+        present: |prepared, _| prepared.polarization()[0],
         ..stokes("Q", "Stokes Q, positive for polarisation along north and south", |p| p.stokes[0])
     },
     ChannelKind {
-        present: |stage, _| stage.polarization()[0],
+        present: |prepared, _| prepared.polarization()[0],
         ..stokes("U", "Stokes U, positive along north-east and south-west", |p| p.stokes[1])
     },
     ChannelKind {
-        present: |stage, _| stage.polarization()[1],
+        present: |prepared, _| prepared.polarization()[1],
         ..stokes("V", "Stokes V, positive for right-handed light (IAU)", |p| p.stokes[2])
     },
     ChannelKind {
@@ -90,7 +90,7 @@ pub static CHANNELS: [ChannelKind; 15] = [
         )
     },
     ChannelKind {
-        present: |stage, _| stage.has_redshift(),
+        present: |prepared, _| prepared.has_redshift(),
         ..ChannelKind::new(
             "redshift",
             "",
@@ -117,7 +117,7 @@ pub static CHANNELS: [ChannelKind; 15] = [
         p.center.delay
     }),
     ChannelKind {
-        present: |stage, _| stage.absorbs(),
+        present: |prepared, _| prepared.absorbs(),
         ..ChannelKind::new(
             "optical_depth",
             "",
@@ -133,14 +133,14 @@ pub static CHANNELS: [ChannelKind; 15] = [
     ),
 ];
 
-/// The channels of a picture of `stage`: all that it has, or those asked for.
+/// The channels of a picture of `prepared`: all that it has, or those asked for.
 pub(super) fn chosen(
-    stage: &Stage,
+    prepared: &PreparedScene,
     refined: bool,
     asked: Option<&[String]>,
 ) -> Result<Vec<&'static ChannelKind>, RenderError> {
     let all: Vec<&ChannelKind> =
-        CHANNELS.iter().filter(|kind| (kind.present)(stage, refined)).collect();
+        CHANNELS.iter().filter(|kind| (kind.present)(prepared, refined)).collect();
     let Some(asked) = asked else { return Ok(all) };
     let find = |name: &String| all.iter().find(|kind| kind.name == name).copied();
     if let Some(name) = asked.iter().find(|name| find(name).is_none()) {

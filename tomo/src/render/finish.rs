@@ -35,7 +35,7 @@ impl Raster {
                 Ok(())
             })
         };
-        render_bands(self, &[self.stage.time()], &todo, &keep, progress)
+        render_bands(self, &[self.prepared.time()], &todo, &keep, progress)
     }
 
     /// What is worth knowing about the whole picture.

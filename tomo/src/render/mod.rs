@@ -22,7 +22,7 @@ pub use tally::Summary;
 use crate::image::Picture;
 use crate::image::exr::Layout;
 use crate::scene::{Rings, Scene};
-use crate::transport::{Assets, Glimpse, Meter, Scratch, Stage};
+use crate::transport::{Assets, Meter, PreparedScene, RayResult, Scratch};
 use grid::Grid;
 use kerrlight_geodesic::OutOfRange;
 use rayon::prelude::*;
@@ -68,7 +68,7 @@ pub enum RenderError {
 #[derive(Debug)]
 pub struct Raster {
     scene: Scene,
-    stage: Stage,
+    prepared: PreparedScene,
     grid: Grid,
     rings: Option<Resolver>,
     channels: Vec<&'static ChannelKind>,
@@ -89,9 +89,9 @@ const TRIAL: usize = 64;
 const TILE: usize = 64;
 
 /// What resolves photon rings, if the scene has them resolved.
-fn resolver(scene: &Scene, stage: &Stage) -> Option<Resolver> {
+fn resolver(scene: &Scene, prepared: &PreparedScene) -> Option<Resolver> {
     match scene.screen.rings {
-        Rings::Resolved => Resolver::new(stage, scene.screen.image_error.is_some()),
+        Rings::Resolved => Resolver::new(prepared, scene.screen.image_error.is_some()),
         Rings::RegularGrid => None,
     }
 }
@@ -102,16 +102,16 @@ impl Raster {
     /// # Errors
     /// If a value is out of range.
     pub fn new(scene: &Scene, assets: impl Into<Assets>) -> Result<Self, RenderError> {
-        let stage = Stage::new(scene, assets)?;
+        let prepared = PreparedScene::new(scene, assets)?;
         let grid = Grid::new(scene);
         let refined = scene.screen.image_error.is_some();
-        let channels = channels::chosen(&stage, refined, scene.screen.channels.as_deref())?;
-        let rings = resolver(scene, &stage);
+        let channels = channels::chosen(&prepared, refined, scene.screen.channels.as_deref())?;
+        let rings = resolver(scene, &prepared);
         let names: Vec<&str> = channels.iter().map(|kind| kind.name).collect();
         let layout = Layout::new(grid.width, grid.height, &names)?;
         let unit = if scene.screen.total_flux_jy.is_none() { own_unit(scene) } else { 1.0 };
         let scene = scene.clone();
-        Ok(Raster { scene, stage, grid, rings, channels, layout, unit, tile: TILE, meter: None })
+        Ok(Raster { scene, prepared, grid, rings, channels, layout, unit, tile: TILE, meter: None })
     }
 
     /// The same with tiles of `columns` pixels; no pixel depends on it.
@@ -154,8 +154,14 @@ impl Raster {
                 )
             });
             let (alpha, beta): (Vec<f64>, Vec<f64>) = points.unzip();
-            let mut seen = vec![Glimpse::default(); TRIAL];
-            self.stage.look_many(&alpha, &beta, &[self.stage.time()], &mut scratch, &mut seen)?;
+            let mut seen = vec![RayResult::default(); TRIAL];
+            self.prepared.observe_block(
+                &alpha,
+                &beta,
+                &[self.prepared.time()],
+                &mut scratch,
+                &mut seen,
+            )?;
         }
         Ok(scratch.meter)
     }
@@ -235,7 +241,7 @@ impl Raster {
     /// # Errors
     /// If a value is out of range or does not fit, or `progress` returned false.
     pub fn render(&self, progress: &Progress<'_>) -> Result<Rendered, RenderError> {
-        let mut raw = self.raw(&[self.stage.time()], progress)?;
+        let mut raw = self.raw(&[self.prepared.time()], progress)?;
         // One for each time.
         let raw = raw.pop().unwrap_or_default();
         let factor = self.unit_factor(&self.scene, &raw)?;

@@ -2,7 +2,7 @@
 
 use super::grid::Grid;
 use super::rings::{Counted, Resolver, Square};
-use crate::transport::{Fate, Glimpse, Scratch, Stage};
+use crate::transport::{Fate, PreparedScene, RayResult, Scratch};
 use kerrlight_geodesic::OutOfRange;
 use std::ops::Range;
 
@@ -13,7 +13,7 @@ pub(super) struct Pixel {
     pub rgb: [f32; 3],
     /// Q, U, V.
     pub stokes: [f64; 3],
-    pub center: Glimpse,
+    pub center: RayResult,
     pub unresolved: u32,
     pub rays: u32,
     /// Estimated absolute error of the intensity; 0 where it is not estimated pixel by pixel.
@@ -32,7 +32,7 @@ pub(super) struct Workspace {
     alpha: Vec<f64>,
     beta: Vec<f64>,
     squares: Vec<Square>,
-    seen: Vec<Glimpse>,
+    seen: Vec<RayResult>,
 }
 
 impl Workspace {
@@ -62,12 +62,12 @@ impl Workspace {
     }
 
     /// What all rays see, in their order.
-    pub fn look(&mut self, stage: &Stage) -> Result<&[Glimpse], OutOfRange> {
+    pub fn observe(&mut self, prepared: &PreparedScene) -> Result<&[RayResult], OutOfRange> {
         self.seen.clear();
-        self.seen.resize(self.alpha.len(), Glimpse::default());
+        self.seen.resize(self.alpha.len(), RayResult::default());
         let rays = self.alpha.chunks(BLOCK).zip(self.beta.chunks(BLOCK));
         for ((alpha, beta), seen) in rays.zip(self.seen.chunks_mut(BLOCK)) {
-            stage.look_many(alpha, beta, &[stage.time()], &mut self.scratch, seen)?;
+            prepared.observe_block(alpha, beta, &[prepared.time()], &mut self.scratch, seen)?;
         }
         Ok(&self.seen)
     }
@@ -78,10 +78,20 @@ impl Workspace {
     }
 
     /// What a block of rays sees at each of `times`: ray k at time j is `[j · rays + k]`.
-    pub fn look_at(&mut self, stage: &Stage, times: &[f64]) -> Result<&[Glimpse], OutOfRange> {
+    pub fn observe_at(
+        &mut self,
+        prepared: &PreparedScene,
+        times: &[f64],
+    ) -> Result<&[RayResult], OutOfRange> {
         self.seen.clear();
-        self.seen.resize(self.alpha.len() * times.len(), Glimpse::default());
-        stage.look_many(&self.alpha, &self.beta, times, &mut self.scratch, &mut self.seen)?;
+        self.seen.resize(self.alpha.len() * times.len(), RayResult::default());
+        prepared.observe_block(
+            &self.alpha,
+            &self.beta,
+            times,
+            &mut self.scratch,
+            &mut self.seen,
+        )?;
         Ok(&self.seen)
     }
 }
@@ -89,7 +99,7 @@ impl Workspace {
 /// The pixels of a rectangle at each of `times`, row by row, with `side`² rays each, which are
 /// traced once for all times, and more where `rings` says so.
 pub(super) fn uniform(
-    (stage, rings): (&Stage, Option<&Resolver>),
+    (prepared, rings): (&PreparedScene, Option<&Resolver>),
     grid: &Grid,
     (rows, columns): (Range<usize>, Range<usize>),
     times: &[f64],
@@ -110,12 +120,12 @@ pub(super) fn uniform(
             }
         }
         let rays = some.len() * side * side;
-        work.look_at(stage, times)?;
+        work.observe_at(prepared, times)?;
         let mut seen = std::mem::take(&mut work.seen);
         let counted = match rings {
             Some(rings) => {
                 let squares = std::mem::take(&mut work.squares);
-                rings.resolve(stage, &squares, times, &mut seen, work)?
+                rings.resolve(prepared, &squares, times, &mut seen, work)?
             }
             None => Vec::new(),
         };
@@ -146,7 +156,7 @@ fn with_rings(mut pixel: Pixel, squares: &[Counted]) -> Pixel {
 }
 
 /// One pixel from its rays, row by row.
-fn mean(rays: &[Glimpse], side: usize) -> Pixel {
+fn mean(rays: &[RayResult], side: usize) -> Pixel {
     let central = side / 2;
     let mut pixel = Pixel {
         center: rays.get(central * side + central).copied().unwrap_or_default(),

@@ -37,7 +37,7 @@ impl Raw {
 
 impl Raster {
     /// The pictures at `times` of observation (in M), with rays that are traced once for all.
-    /// Where pixels are refined there is one time, the stage's.
+    /// Where pixels are refined there is one time, the prepared scene's.
     pub(crate) fn raw(
         &self,
         times: &[f64],
@@ -95,8 +95,8 @@ impl Raster {
     /// If the camera is impossible there.
     pub(crate) fn move_to(&mut self, time: f64) -> Result<(), RenderError> {
         self.scene.observer.time = time;
-        self.stage.move_to(&self.scene)?;
-        self.rings = resolver(&self.scene, &self.stage);
+        self.prepared.move_to(&self.scene)?;
+        self.rings = resolver(&self.scene, &self.prepared);
         self.grid = Grid::new(&self.scene);
         Ok(())
     }

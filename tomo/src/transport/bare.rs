@@ -2,11 +2,11 @@
 //! the cheapest rays, of which nothing is asked that such a scene does not have. What such a block
 //! costs is what it would cost in a library that had no other effects.
 
-use super::glimpse::{Gather, Glimpse};
-use super::look::{Block, glimpse};
-use super::rays::{End, MOST_HITS, Sight, doubtful};
+use super::ray::{Block, ray_result};
+use super::rays::{End, MOST_HITS, TracedRay, needs_stepping};
+use super::result::{Accumulator, RayResult};
 use super::surface::{Hit, Seen};
-use super::{Fate, Part, Scratch, Stage};
+use super::{Fate, Part, PreparedScene, Scratch};
 use crate::scene::Scene;
 use kerrlight_geodesic::{Observer, OutOfRange};
 
@@ -26,14 +26,14 @@ pub(super) fn is_bare(scene: &Scene) -> bool {
     !asked && !there
 }
 
-impl Stage {
-    /// [`look_many`](Self::look_many) of a bare scene, which looks alike at all times.
-    pub(super) fn look_bare(
+impl PreparedScene {
+    /// [`observe_block`](Self::observe_block) of a bare scene, which looks alike at all times.
+    pub(super) fn observe_bare(
         &self,
         observer: &Observer,
         block: Block<'_>,
         scratch: &mut Scratch,
-        seen: &mut [Glimpse],
+        seen: &mut [RayResult],
     ) -> Result<(), OutOfRange> {
         let Block { alpha, beta, times } = block;
         let rays = alpha.len();
@@ -44,22 +44,22 @@ impl Stage {
         scratch.meter.stop(Part::Rays, clock);
         let clock = scratch.meter.start();
         // The question is asked once a block.
-        let strays = match self.redshift {
-            None => self.look_at_disc(observer, alpha, None, scratch, now),
-            Some(index) => self.look_at_disc(observer, alpha, Some(index), scratch, now),
+        let fallback = match self.spectral_index {
+            None => self.shade_disc(observer, alpha, None, scratch, now),
+            Some(index) => self.shade_disc(observer, alpha, Some(index), scratch, now),
         };
         scratch.meter.stop(Part::Surfaces, clock);
         let clock = scratch.meter.start();
         self.add_sky(observer, (alpha, beta), scratch, now)?;
         scratch.meter.stop(Part::Sky, clock);
-        if !strays.is_empty() {
-            scratch.sights.resize(rays, Sight::default());
+        if !fallback.is_empty() {
+            scratch.traced.resize(rays, TracedRay::default());
             scratch.volume.reset(0);
         }
-        for k in strays {
+        for k in fallback {
             let (place, times) = (block.place(k), &[self.time]);
             let ray = self.step(k, place, times, scratch)?;
-            self.look_along(k, Some(&ray), place, (times, &[]), scratch, now)?;
+            self.shade(k, Some(&ray), place, (times, &[]), scratch, now)?;
         }
         for later in 1..times.len() {
             seen.copy_within(..rays, later * rays);
@@ -70,15 +70,15 @@ impl Stage {
     /// Light of the disc along the rays of a block, and what becomes of them; the numbers of those
     /// that have to be traced by steps, which are left unresolved.
     #[inline(always)]
-    fn look_at_disc(
+    fn shade_disc(
         &self,
         observer: &Observer,
         alpha: &[f64],
-        redshift: Option<f64>,
+        spectral_index: Option<f64>,
         scratch: &Scratch,
-        seen: &mut [Glimpse],
+        seen: &mut [RayResult],
     ) -> Vec<usize> {
-        let mut strays = Vec::new();
+        let mut fallback = Vec::new();
         let sin = observer.inclination().sin();
         for (k, (seen, alpha)) in seen.iter_mut().zip(alpha).enumerate() {
             let ends = scratch.crossings.ends(k);
@@ -87,20 +87,26 @@ impl Stage {
             let all = self.disc.is_none()
                 || surface.is_some()
                 || hits.clone().count() >= ends.crossings as usize;
-            if !all || doubtful(ends.error, self.tolerance) {
-                *seen = Glimpse::default();
-                strays.push(k);
+            if !all || needs_stepping(ends.error, self.tolerance) {
+                *seen = RayResult::default();
+                fallback.push(k);
                 continue;
             }
-            let light =
-                Seen { lambda: -alpha * sin, eta: f64::NAN, screen: None, shift: None, redshift };
-            let mut gather = Gather::new();
-            self.add_disc(hits, light, surface.unwrap_or(f64::INFINITY), &mut gather);
+            let light = Seen {
+                lambda: -alpha * sin,
+                eta: f64::NAN,
+                screen: None,
+                shift: None,
+                spectral_index,
+            };
+            let mut gathered = Accumulator::new();
+            self.add_disc(hits, light, surface.unwrap_or(f64::INFINITY), &mut gathered);
             let end = if ends.escapes { End::Escaped } else { End::Captured };
-            let sight = Sight { end, surface, crossings: ends.crossings, ..Sight::default() };
-            *seen = glimpse(&sight, gather);
+            let traced =
+                TracedRay { end, surface, crossings: ends.crossings, ..TracedRay::default() };
+            *seen = ray_result(&traced, gathered);
         }
-        strays
+        fallback
     }
 
     /// Light of the sky along the rays of a block that escape.
@@ -109,13 +115,13 @@ impl Stage {
         observer: &Observer,
         place: (&[f64], &[f64]),
         scratch: &mut Scratch,
-        seen: &mut [Glimpse],
+        seen: &mut [RayResult],
     ) -> Result<(), OutOfRange> {
         let Some(sky) = &self.sky else { return Ok(()) };
         let escaped = |k: &usize| seen[*k].fate == Fate::Escaped;
         let outward: Vec<usize> = (0..seen.len()).filter(escaped).collect();
         self.find_exits(observer, place, &outward, &mut scratch.samples, |k, exit| {
-            for (channel, light) in seen[k].rgb.iter_mut().zip(sky.look(exit)) {
+            for (channel, light) in seen[k].rgb.iter_mut().zip(sky.color(exit)) {
                 *channel += light;
             }
         })

@@ -6,11 +6,11 @@
 //! are halved again, down to a part of a cell.
 
 use super::chord::ChordBound;
-use super::medium::{Emission, Grain, Light, Medium, Moment, Stretch, gather};
-use super::rays::{End, Sight};
+use super::medium::{CellSize, Emission, Light, Medium, Moment, PathSegment, integrate};
+use super::rays::{End, TracedRay};
 use super::tree::Node;
 use super::volume::{Columns, FAINT, Piece, Workspace, ray_nodes};
-use super::{Scratch, Stage};
+use super::{PreparedScene, Scratch};
 use kerrlight_geodesic::{Path, Ray, ScreenPoint};
 
 /// A panel of one ray.
@@ -31,9 +31,9 @@ const DEEPEST: u32 = 40;
 
 /// Light of cells that one ray meets at one time.
 struct Cells<'a> {
-    stage: &'a Stage,
+    prepared: &'a PreparedScene,
     medium: &'a dyn Medium,
-    grain: Grain,
+    cell: CellSize,
     path: &'a Path,
     bound: ChordBound,
     moment: Moment,
@@ -41,35 +41,35 @@ struct Cells<'a> {
     screen: Option<ScreenPoint>,
 }
 
-impl Stage {
+impl PreparedScene {
     /// Light of medium number `m`, made of cells, along ray number `k`, which was traced step by
     /// step. Each time has nodes of its own, so that no time's light depends on another's.
     pub(super) fn fill_cells(
         &self,
         (m, k): (usize, usize),
         ray: &Ray,
-        (screen, grain): (Option<ScreenPoint>, Grain),
+        (screen, cell): (Option<ScreenPoint>, CellSize),
         times: &[f64],
         scratch: &mut Scratch,
     ) {
-        let Scratch { path, sights, intervals, volume, .. } = scratch;
-        let (medium, first) = (&*self.media[m], (m * sights.len() + k) * times.len());
+        let Scratch { path, traced, intervals, volume, .. } = scratch;
+        let (medium, first) = (&*self.media[m], (m * traced.len() + k) * times.len());
         for (j, observed) in times.iter().enumerate() {
             if j > 0 && !medium.changes() {
                 volume.lights[first + j] = volume.lights[first];
                 continue;
             }
             let cells = Cells {
-                stage: self,
+                prepared: self,
                 medium,
-                grain,
+                cell,
                 path,
                 bound: ChordBound::new(&self.hole, ray, path, self.tracer.tolerance()),
                 moment: Moment { observed: *observed, slow_light: self.slow_light },
                 lambda: ray.lambda,
                 screen,
             };
-            cells.find(&sights[k], intervals, &mut volume.panels);
+            cells.find(&traced[k], intervals, &mut volume.panels);
             volume.lights[first + j] = cells.light(volume);
         }
     }
@@ -77,15 +77,15 @@ impl Stage {
 
 impl Cells<'_> {
     /// The panels on which there may be light.
-    fn find(&self, sight: &Sight, intervals: &mut Vec<[f64; 2]>, panels: &mut Vec<Panel>) {
+    fn find(&self, traced: &TracedRay, intervals: &mut Vec<[f64; 2]>, panels: &mut Vec<Panel>) {
         panels.clear();
-        let (outer, last) = (self.medium.sphere(), sight.last_time());
-        let inner = self.grain.inner.min(outer).max(0.5 * self.stage.hole.horizon());
+        let (outer, last) = (self.medium.sphere(), traced.last_time());
+        let inner = self.cell.inner.min(outer).max(0.5 * self.prepared.hole.horizon());
         self.path.intervals_within(inner, outer, intervals);
         let turning = self.path.turning_point().map_or(f64::INFINITY, |(time, _)| time);
         let whole = self.path.mino_total();
         for [start, end] in intervals.iter().copied() {
-            let falls = sight.end == End::Captured && end >= whole && last >= end;
+            let falls = traced.end == End::Captured && end >= whole && last >= end;
             let end = end.min(last);
             let middle = turning.clamp(start, end.max(start));
             for [from, to] in [[start, middle], [middle, end]] {
@@ -98,14 +98,14 @@ impl Cells<'_> {
     }
 
     fn search(&self, [start, end]: [&Node; 2], falls: bool, depth: u32, panels: &mut Vec<Panel>) {
-        if !self.medium.may_shine(&self.stretch([start, end]), self.moment) {
+        if !self.medium.may_shine(&self.segment([start, end]), self.moment) {
             return;
         }
         let ends = [start.point.mino_time, end.point.mino_time];
         let reach = 1.0 / (start.point.inverse_radius * end.point.inverse_radius);
         // ∫ Σ dτ: on a straight line to the centre Δτ is the difference of 1/r.
-        let length = (ends[1] - ends[0]) * (reach + self.stage.hole.spin().powi(2));
-        if length <= self.grain.size || depth >= DEEPEST {
+        let length = (ends[1] - ends[0]) * (reach + self.prepared.hole.spin().powi(2));
+        if length <= self.cell.size || depth >= DEEPEST {
             return panels.push(Panel { ends, length, falls, known: None });
         }
         let middle = Node::at(self.path, 0.5 * (ends[0] + ends[1]));
@@ -113,12 +113,12 @@ impl Cells<'_> {
         self.search([&middle, end], falls, depth + 1, panels);
     }
 
-    fn stretch(&self, nodes: [&Node; 2]) -> Stretch {
+    fn segment(&self, nodes: [&Node; 2]) -> PathSegment {
         let points = nodes.map(|node| &node.point);
         let error = self.bound.error(self.bound.reach(points));
         let radii = points.map(|point| point.radius());
         let winds = self.bound.winds(points);
-        Stretch {
+        PathSegment {
             positions: nodes.map(|node| node.position),
             radii: [radii[0].min(radii[1]) - error, radii[0].max(radii[1]) + error],
             delays: [points[1].delay + error, points[0].delay - error],
@@ -135,9 +135,9 @@ impl Cells<'_> {
         loop {
             self.fill(volume);
             let Workspace { quadrature, columns, emission, sums, panels, .. } = volume;
-            let light = gather(quadrature, &ray_nodes(columns, 0..all), emission, sums);
+            let light = integrate(quadrature, &ray_nodes(columns, 0..all), emission, sums);
             let scale = light.intensity + FAINT * self.medium.scale();
-            let enough = self.stage.tolerance * scale;
+            let enough = self.prepared.tolerance * scale;
             let share = enough / panels.len() as f64;
             if light.error <= enough || !self.halve(panels, &sums.misses, share) {
                 return light;
@@ -148,7 +148,7 @@ impl Cells<'_> {
     /// Halves the panels that are off by more than `share`; whether there are any.
     fn halve(&self, panels: &mut Vec<Panel>, misses: &[f64], share: f64) -> bool {
         let before = panels.len();
-        let finest = Grain::FINEST * self.grain.size;
+        let finest = CellSize::FINEST * self.cell.size;
         let mut halved = Vec::with_capacity(2 * before);
         for (panel, miss) in panels.iter().zip(misses) {
             if *miss <= share || panel.length <= finest {
@@ -180,13 +180,13 @@ impl Cells<'_> {
                 emission.append(&before.1, range);
                 continue;
             }
-            let place = |time, step| self.stage.node_of(self.path, time, step);
+            let place = |time, step| self.prepared.node_of(self.path, time, step);
             Piece::single(panel.ends, panel.falls).nodes(rule, place, columns);
             fresh.clear();
             let nodes = ray_nodes(columns, number * order..(number + 1) * order);
             self.medium.fill(&nodes, self.lambda, self.moment, fresh);
             if let Some(screen) = &self.screen {
-                self.stage.polarize(self.medium, &nodes, self.lambda, screen, fresh);
+                self.prepared.polarize(self.medium, &nodes, self.lambda, screen, fresh);
             }
             emission.append(fresh, 0..order);
         }

@@ -1,7 +1,7 @@
 //! What fills space, and the light of it that one ray gathers.
 
 use super::Part;
-use super::glimpse::Place;
+use super::result::Place;
 use kerrlight_geodesic::Quantities;
 use kerrlight_geodesic::simd::{PanelRule, RayNodes};
 
@@ -12,11 +12,11 @@ pub trait Medium: core::fmt::Debug + Send + Sync {
     /// Radius in M of the sphere outside of which there is nothing.
     fn sphere(&self) -> f64;
     /// What it is made of, if its light is not smooth along panels of any length.
-    fn grain(&self) -> Option<Grain>;
+    fn cell_size(&self) -> Option<CellSize>;
     /// Size of its finest features by their radius, at most about 1: structure of cells is some of them
     /// wide.
     fn relative_size(&self) -> f64 {
-        self.grain().map_or(1.0, |grain| 2.0 * grain.size / self.sphere())
+        self.cell_size().map_or(1.0, |cell| 2.0 * cell.size / self.sphere())
     }
     /// What it has to be told of its nodes besides r and cos θ.
     fn quantities(&self) -> Quantities;
@@ -29,9 +29,9 @@ pub trait Medium: core::fmt::Debug + Send + Sync {
     fn four_velocity(&self, r: f64, cos_theta: f64, azimuth: f64) -> Option<[f64; 4]>;
     /// Whether it looks different at different times.
     fn changes(&self) -> bool;
-    /// `false` only if it is dark all along a stretch of a ray.
-    fn may_shine(&self, stretch: &Stretch, moment: Moment) -> bool {
-        let _ = (stretch, moment);
+    /// `false` only if it is dark all along a segment of a ray.
+    fn may_shine(&self, segment: &PathSegment, moment: Moment) -> bool {
+        let _ = (segment, moment);
         true
     }
     /// Whether [`fill`](Self::fill) gives absorption.
@@ -40,9 +40,9 @@ pub trait Medium: core::fmt::Debug + Send + Sync {
     fn fill(&self, nodes: &RayNodes<'_>, lambda: f64, moment: Moment, out: &mut Emission);
 }
 
-/// A short stretch of a ray.
+/// A short piece of a ray.
 #[derive(Debug, Clone, Copy)]
-pub struct Stretch {
+pub struct PathSegment {
     /// r n of its ends, in M.
     pub positions: [[f64; 3]; 2],
     /// Its least and its largest radius, in M.
@@ -55,7 +55,7 @@ pub struct Stretch {
 
 /// Cells in which a medium is smooth.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Grain {
+pub struct CellSize {
     /// Shortest edge of a cell in M. Panels are never longer, and not cut any more once they are
     /// shorter than a quarter of it.
     pub size: f64,
@@ -63,7 +63,7 @@ pub struct Grain {
     pub inner: f64,
 }
 
-impl Grain {
+impl CellSize {
     /// The part of a cell below which panels are not cut for the sake of the tolerance.
     pub(super) const FINEST: f64 = 0.25;
 
@@ -198,7 +198,7 @@ pub(super) struct Sums {
 
 /// Sums emission up, front to back: I = ∫ j e^{−D} ds, D = ∫ κ ds. The sums' depths are
 /// those of every node if there is absorption.
-pub(super) fn gather(
+pub(super) fn integrate(
     quadrature: &Quadrature,
     nodes: &RayNodes<'_>,
     emission: &Emission,
@@ -227,7 +227,7 @@ pub(super) fn gather(
             }
             let thick = &thick[..order];
             if thick.iter().sum::<f64>() > OPAQUE {
-                miss = Some(shade_cells(thick, gains, &mut light.depth, depths));
+                miss = Some(shade_opaque(thick, gains, &mut light.depth, depths));
             } else {
                 quadrature.absorb(thick, &mut light.depth, depths);
                 for (gain, depth) in gains.iter_mut().zip(&depths[start..]) {
@@ -267,7 +267,7 @@ const OPAQUE: f64 = 2.0;
 /// source function S = j/κ, of which S (1 − e^{−ΔD}) is seen. `gains` are those without
 /// absorption before and those that are seen after; the error is that of S taken from the
 /// neighbouring cell instead.
-fn shade_cells(thick: &[f64], gains: &mut [f64], depth: &mut f64, depths: &mut Vec<f64>) -> f64 {
+fn shade_opaque(thick: &[f64], gains: &mut [f64], depth: &mut f64, depths: &mut Vec<f64>) -> f64 {
     let (mut error, mut last) = (0.0, None);
     for (gain, thick) in gains.iter_mut().zip(thick) {
         let seen = (-*depth).exp() * -(-thick).exp_m1();

@@ -1,9 +1,9 @@
 //! Triangle meshes: where a curved ray meets them, and their light.
 
 use super::chord::ChordBound;
-use super::glimpse::{Gather, Place};
+use super::result::{Accumulator, Place};
 use super::tree::{Node, Tree, Walk, WalkScratch};
-use super::{Scratch, Stage};
+use super::{PreparedScene, Scratch};
 use crate::emission::mesh::{MeshModel, Triangle};
 use crate::emission::spot::distance;
 use kerrlight_geodesic::{Kerr, Path, Ray};
@@ -203,7 +203,7 @@ impl Cut<'_> {
     }
 }
 
-impl Stage {
+impl PreparedScene {
     /// Fills `scratch.mesh_hits` and returns the Mino time of the first that hides the rest.
     pub(super) fn meet_meshes(&self, ray: &Ray, scratch: &mut Scratch) -> Option<f64> {
         scratch.mesh_hits.clear();
@@ -217,7 +217,7 @@ impl Stage {
     }
 
     /// Light of the hits up to Mino time `end`: I = g^{3+α} I_em.
-    pub(super) fn add_meshes(&self, scratch: &Scratch, end: f64, gather: &mut Gather) {
+    pub(super) fn add_meshes(&self, scratch: &Scratch, end: f64, gathered: &mut Accumulator) {
         let Some(meshes) = &self.meshes else { return };
         for hit in scratch.mesh_hits.iter().take_while(|hit| hit.mino_time <= end) {
             let (mesh, triangle) = meshes.at(hit.leaf);
@@ -226,15 +226,15 @@ impl Stage {
             }
             let point = scratch.path.at(hit.mino_time);
             let (emitted, color) = mesh.light(triangle, point.cartesian());
-            let g = match self.redshift {
+            let g = match self.spectral_index {
                 Some(_) => mesh.redshift(&self.hole, &point),
                 None => Some(1.0),
             };
             // Where matter cannot move like this there is none that shines.
             let Some(g) = g else { continue };
-            let intensity = emitted * self.redshift.map_or(1.0, |index| g.powf(3.0 + index));
-            gather.add(intensity, g, color);
-            gather.mark(intensity, Place::of_point(&point));
+            let intensity = emitted * self.spectral_index.map_or(1.0, |index| g.powf(3.0 + index));
+            gathered.add(intensity, g, color);
+            gathered.mark(intensity, Place::of_point(&point));
         }
     }
 }

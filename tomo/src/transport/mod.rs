@@ -6,13 +6,13 @@
 mod bare;
 mod cells;
 mod chord;
-mod glimpse;
-mod look;
 mod medium;
 mod meshes;
 mod meter;
 mod polarized;
+mod ray;
 mod rays;
+mod result;
 mod spots;
 mod straight;
 mod surface;
@@ -22,9 +22,9 @@ mod tree;
 mod view;
 mod volume;
 
-pub use glimpse::{Fate, Glimpse};
-pub use medium::{Emission, Grain, Medium, Moment, Stretch};
+pub use medium::{CellSize, Emission, Medium, Moment, PathSegment};
 pub use meter::{Meter, Part};
+pub use result::{Fate, RayResult};
 pub use view::View;
 
 use crate::emission::disc::DiscModel;
@@ -41,7 +41,7 @@ use kerrlight_geodesic::{
 };
 use meshes::{Hit as MeshHit, MeshTree};
 use polarized::Polarization;
-use rays::Sight;
+use rays::TracedRay;
 use spots::{Met, SpotSpans, SpotTree};
 use std::sync::{Arc, Mutex};
 use surface::Hit;
@@ -49,16 +49,16 @@ use tree::WalkScratch;
 
 /// A scene with everything computed that does not depend on the ray.
 #[derive(Debug, Clone)]
-pub struct Stage {
+pub struct PreparedScene {
     /// The hole.
     pub hole: Kerr,
-    /// Who looks.
+    /// The observer or the camera.
     pub view: View,
     tracer: Tracer,
     tolerance: f64,
     time: f64,
     /// Spectral index α, if redshift is simulated.
-    redshift: Option<f64>,
+    spectral_index: Option<f64>,
     slow_light: bool,
     lensing: bool,
     polarization: Option<Polarization>,
@@ -117,7 +117,7 @@ pub struct Scratch {
     crossings: Crossings,
     nodes: Nodes,
     samples: Samples,
-    sights: Vec<Sight>,
+    traced: Vec<TracedRay>,
     hits: Vec<Hit>,
     volume: volume::Workspace,
     walk: WalkScratch,
@@ -164,23 +164,23 @@ fn media(
         let (value, allowed) = (files.len() as f64, "one file for each [[volume]]");
         return Err(OutOfRange { field: "number of volume files", value, allowed });
     }
-    let redshift = scene.effects.index();
-    let effects = GasEffects { redshift, absorption: scene.effects.absorption };
+    let spectral_index = scene.effects.index();
+    let effects = GasEffects { spectral_index, absorption: scene.effects.absorption };
     let length = 100.0 * crate::units::SPEED_OF_LIGHT;
     let length = length * scene.hole.seconds().unwrap_or(f64::NAN); // of gas, which needs it
     let mut media: Vec<Arc<dyn Medium>> = Vec::new();
     if let Some(gas) = &scene.gas {
         media.push(Arc::new(GasModel::new(gas, hole, length, effects)));
     }
-    let effects = (redshift, scene.effects.slow_light);
+    let effects = (spectral_index, scene.effects.slow_light);
     for (source, file) in scene.volume.iter().zip(files) {
         media.push(Arc::new(VolumeModel::new(source, file, hole, effects)?));
     }
     Ok(media)
 }
 
-impl Stage {
-    /// The stage of a scene with the files that it names.
+impl PreparedScene {
+    /// The prepared scene of a scene with the files that it names.
     ///
     /// # Errors
     /// If a value is outside its range (a parsed [`Scene`] never is), if there is not one file for
@@ -189,12 +189,12 @@ impl Stage {
         let assets: Assets = assets.into();
         let hole = Kerr::new(scene.hole.spin)?;
         let kept = |name: &str| scene.screen.keeps(name);
-        let redshift = scene.effects.index();
+        let spectral_index = scene.effects.index();
         let view = View::new(scene, &hole)?;
         let sky = scene.sky.as_ref().and_then(|sky| SkyModel::new(sky, assets.sky));
         let spots: Vec<_> = scene.spot.iter().map(|spot| SpotModel::new(spot, &hole)).collect();
         let slow_spots = scene.effects.slow_light.then_some(&spots[..]);
-        Ok(Stage {
+        Ok(PreparedScene {
             bare: bare::is_bare(scene),
             spot_spans: slow_spots.and_then(SpotSpans::new).map(Arc::new),
             spots,
@@ -202,7 +202,7 @@ impl Stage {
             view,
             tracer: Tracer::with_method(scene.tracer.integrator.method(), scene.tracer.tolerance)?,
             time: scene.observer.time,
-            redshift,
+            spectral_index,
             slow_light: scene.effects.slow_light,
             lensing: scene.effects.lensing,
             polarization: Polarization::new(scene)?,
@@ -220,7 +220,7 @@ impl Stage {
         })
     }
 
-    /// The same stage seen at another time by a camera that moves; `scene` is the one that it was
+    /// The same prepared scene seen at another time by a camera that moves; `scene` is the one that it was
     /// made of, but for its time of observation.
     ///
     /// # Errors
@@ -232,7 +232,7 @@ impl Stage {
         Ok(())
     }
 
-    /// The same stage, on which every spot and every triangle is asked along every ray, without
+    /// The same prepared scene, on which every spot and every triangle is asked along every ray, without
     /// a hierarchy: for comparisons.
     pub fn one_by_one(mut self) -> Self {
         self.one_by_one = true;
@@ -246,7 +246,7 @@ impl Stage {
 
     /// Whether g is computed.
     pub fn has_redshift(&self) -> bool {
-        self.redshift.is_some()
+        self.spectral_index.is_some()
     }
 
     /// Whether light is polarised, and whether circularly too.

@@ -1,6 +1,6 @@
 //! Polarised light: what a scene's field and electrons make of the light of its sources.
 
-use super::Stage;
+use super::PreparedScene;
 use super::medium::{Emission, Medium};
 use super::surface::Hit;
 use crate::emission::disc::DiscModel;
@@ -36,7 +36,7 @@ impl Polarization {
     }
 }
 
-impl Stage {
+impl PreparedScene {
     /// The screen of a ray, if light is polarised.
     pub(super) fn screen_point(&self, x: f64, y: f64) -> Option<ScreenPoint> {
         let (Some(_), super::View::Screen(observer)) = (&self.polarization, &self.view) else {

@@ -3,9 +3,9 @@
 use super::spots::SpotTree;
 use super::surface::Hit;
 use super::tree::enters;
-use super::{Scratch, Stage};
+use super::{PreparedScene, Scratch};
 use crate::emission::disc::DiscModel;
-use crate::transport::glimpse::Place;
+use crate::transport::result::Place;
 use kerrlight_geodesic::analytic::ClosedForm;
 use kerrlight_geodesic::simd::{Crossing, RayEnds, Samples};
 use kerrlight_geodesic::{Observer, OutOfRange, Outcome, Quantities, Ray};
@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 /// A ray without its points.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Sight {
+pub(super) struct TracedRay {
     pub lambda: f64,
     /// Of matter that plunges, or of rays traced by steps; else NaN.
     pub eta: f64,
@@ -34,7 +34,7 @@ pub(super) struct Sight {
     pub by_steps: bool,
 }
 
-impl Sight {
+impl TracedRay {
     /// Mino time of the last light.
     pub fn last_time(&self) -> f64 {
         self.surface.unwrap_or(f64::INFINITY).min(self.until)
@@ -53,7 +53,7 @@ pub(super) enum End {
 /// Crossings that the SIMD kernel is asked for; rays with more go step by step.
 pub(super) const MOST_HITS: usize = 4;
 
-impl Stage {
+impl PreparedScene {
     /// Traces a block of rays in closed form.
     pub(super) fn trace_block(
         &self,
@@ -70,7 +70,7 @@ impl Stage {
             || plunges
             || self.half_orbits.is_some()
             || self.meshes.is_some()
-            || self.media.iter().any(|medium| medium.grain().is_some())
+            || self.media.iter().any(|medium| medium.cell_size().is_some())
             || !self.spots.is_empty();
         for k in 0..alpha.len() {
             let ends = scratch.crossings.ends(k);
@@ -95,7 +95,7 @@ impl Stage {
             let missing = self.disc.is_some()
                 && surface.is_none()
                 && found < (ends.crossings as usize).min(self.most_hits());
-            scratch.sights.push(Sight {
+            scratch.traced.push(TracedRay {
                 lambda: -alpha[k] * observer.inclination().sin(),
                 eta: ray.as_ref().map_or(f64::NAN, |ray| ray.eta),
                 end: if ends.escapes { End::Escaped } else { End::Captured },
@@ -106,19 +106,20 @@ impl Stage {
                 surface,
                 exit: None,
                 by_steps: missing
-                    || doubtful(ends.error, self.tolerance)
+                    || needs_stepping(ends.error, self.tolerance)
                     || ray.as_ref().is_some_and(|ray| self.needs_path(ray, trees)),
             });
         }
         if self.sky.is_none() {
             return Ok(());
         }
-        let leaves =
-            |sight: &Sight| sight.end == End::Escaped && sight.surface.is_none() && !sight.by_steps;
-        let Scratch { sights, samples, .. } = scratch;
-        let outward: Vec<usize> = (0..sights.len()).filter(|k| leaves(&sights[*k])).collect();
+        let leaves = |traced: &TracedRay| {
+            traced.end == End::Escaped && traced.surface.is_none() && !traced.by_steps
+        };
+        let Scratch { traced, samples, .. } = scratch;
+        let outward: Vec<usize> = (0..traced.len()).filter(|k| leaves(&traced[*k])).collect();
         self.find_exits(observer, (alpha, beta), &outward, samples, |k, exit| {
-            sights[k].exit = Some(exit);
+            traced[k].exit = Some(exit);
         })
     }
 
@@ -153,12 +154,12 @@ impl Stage {
             None => !self.spots.is_empty(),
         };
         self.meshes.as_ref().is_some_and(|meshes| self.one_by_one || meshes.can_be_met(ray))
-            || self.media.iter().any(|m| m.grain().is_some() && enters(ray, m.sphere()))
+            || self.media.iter().any(|m| m.cell_size().is_some() && enters(ray, m.sphere()))
             || trees.iter().any(meets)
     }
 
-    /// Traces one ray step by step into the path of `scratch`; its sight.
-    pub(super) fn trace_steps(&self, ray: &Ray, scratch: &mut Scratch) -> Sight {
+    /// Traces one ray step by step into the path of `scratch`; what is known of it.
+    pub(super) fn trace_steps(&self, ray: &Ray, scratch: &mut Scratch) -> TracedRay {
         self.tracer.trace(&self.hole, ray, Quantities::ALL, &mut scratch.path);
         let (first, path, hits) = (scratch.hits.len(), &scratch.path, &mut scratch.hits);
         if self.disc.is_some() {
@@ -183,7 +184,7 @@ impl Stage {
             (Some(disc), Some(mesh)) => Some(disc.min(mesh)),
             (one, other) => one.or(other),
         };
-        Sight {
+        TracedRay {
             lambda: ray.lambda,
             eta: ray.eta,
             end,
@@ -241,6 +242,6 @@ impl<'a> PlaneMotion<'a> {
 }
 
 /// Whether a ray of the closed form has lost digits that the tolerance asks for.
-pub(super) fn doubtful(error: f64, tolerance: f64) -> bool {
+pub(super) fn needs_stepping(error: f64, tolerance: f64) -> bool {
     error.is_nan() || error > tolerance.max(1e-11)
 }

@@ -1,11 +1,11 @@
 //! Rays without gravity, for comparison: straight lines x = α ê_α + β ê_β + s ô in the coordinates
 //! x = r n, that end where they meet the horizon's radius.
 
-use super::glimpse::Place;
-use super::rays::{End, Sight};
+use super::rays::{End, TracedRay};
+use super::result::Place;
 use super::surface::Hit;
 use super::volume::{Columns, Piece};
-use super::{Scratch, Stage};
+use super::{PreparedScene, Scratch};
 use kerrlight_geodesic::simd::PanelRule;
 use kerrlight_geodesic::{Observer, Ray};
 
@@ -119,14 +119,14 @@ impl Line {
 /// The least impact parameter: through the centre itself χ is no parameter.
 const SMALLEST: f64 = 1e-6;
 
-impl Stage {
-    /// The sight along a straight ray.
-    pub(super) fn trace_line(&self, line: &Line, ray: &Ray, scratch: &mut Scratch) -> Sight {
+impl PreparedScene {
+    /// A straight ray, traced, along a straight ray.
+    pub(super) fn trace_line(&self, line: &Line, ray: &Ray, scratch: &mut Scratch) -> TracedRay {
         let first = scratch.hits.len();
         scratch.hits.extend(line.hit());
         let end = if line.is_captured() { End::Captured } else { End::Escaped };
         let hits = first..scratch.hits.len();
-        Sight {
+        TracedRay {
             lambda: ray.lambda,
             eta: ray.eta,
             end,
@@ -142,9 +142,9 @@ impl Stage {
 
     /// Light of all media along straight ray number `k`.
     pub(super) fn fill_line(&self, line: &Line, k: usize, times: &[f64], scratch: &mut Scratch) {
-        let until = scratch.sights[k].last_time();
+        let until = scratch.traced[k].last_time();
         for (m, medium) in self.media.iter().enumerate() {
-            let first = (m * scratch.sights.len() + k) * times.len();
+            let first = (m * scratch.traced.len() + k) * times.len();
             // What changes has nodes of its own at each time: no frame depends on another.
             let together = if medium.changes() { 1 } else { times.len().max(1) };
             for (number, times) in times.chunks(together).enumerate() {

@@ -1,8 +1,8 @@
 //! Light of the thin disc.
 
-use super::Stage;
-use super::glimpse::{Gather, Place};
+use super::PreparedScene;
 use super::polarized::share;
+use super::result::{Accumulator, Place};
 use crate::emission::disc::{DiscModel, Photon};
 use kerrlight_geodesic::ScreenPoint;
 use kerrlight_geodesic::simd::Crossing;
@@ -28,7 +28,7 @@ pub(super) struct Seen<'a> {
     /// What a camera adds to the redshift.
     pub shift: Option<f64>,
     /// Spectral index α, if redshift is simulated.
-    pub redshift: Option<f64>,
+    pub spectral_index: Option<f64>,
 }
 
 impl Hit {
@@ -39,7 +39,7 @@ impl Hit {
     }
 }
 
-impl Stage {
+impl PreparedScene {
     /// The first of `hits` before Mino time `until` that hides the rest.
     pub(super) fn surface(&self, hits: impl Iterator<Item = Hit>, until: f64) -> Option<f64> {
         let disc = self.disc.as_ref().filter(|disc| disc.opaque)?;
@@ -56,39 +56,39 @@ impl Stage {
         hits: impl Iterator<Item = Hit>,
         seen: Seen<'_>,
         end: f64,
-        gather: &mut Gather,
+        gathered: &mut Accumulator,
     ) {
         let Some(disc) = &self.disc else { return };
         for (number, hit) in hits.take_while(|hit| hit.mino_time <= end).enumerate() {
             if disc.covers(hit.place.radius) {
                 let kind = if disc.plunges_at(hit.place.radius) { 16 } else { 0 };
-                gather.disc_images |= 1 << (kind + number.min(15));
-                self.add_hit(disc, &hit, seen, gather);
+                gathered.disc_images |= 1 << (kind + number.min(15));
+                self.add_hit(disc, &hit, seen, gathered);
             }
         }
     }
 
     #[inline(always)]
-    fn add_hit(&self, disc: &DiscModel, hit: &Hit, seen: Seen<'_>, gather: &mut Gather) {
-        let Seen { lambda, eta, screen, shift, redshift } = seen;
+    fn add_hit(&self, disc: &DiscModel, hit: &Hit, seen: Seen<'_>, gathered: &mut Accumulator) {
+        let Seen { lambda, eta, screen, shift, spectral_index } = seen;
         let r = hit.place.radius;
-        let g = match redshift {
+        let g = match spectral_index {
             Some(_) => disc.redshift(r, &Photon { lambda, eta, outward: hit.rates[0] > 0.0 }),
             None => 1.0,
         };
         let stokes = screen.map(|screen| self.polarized_hit(disc, hit, lambda, screen));
         let boost = match stokes {
             Some(stokes) => stokes.i,
-            None => redshift.map_or(1.0, |index| g.powf(3.0 + index)),
+            None => spectral_index.map_or(1.0, |index| g.powf(3.0 + index)),
         };
         let mut intensity = boost * disc.intensity(r);
         if hit.depth > 0.0 {
             intensity *= (-hit.depth).exp();
         }
-        gather.add(intensity, g, disc.color(r, g * shift.unwrap_or(1.0)));
+        gathered.add(intensity, g, disc.color(r, g * shift.unwrap_or(1.0)));
         if let Some(stokes) = stokes {
-            gather.add_stokes(intensity, share(&stokes));
+            gathered.add_stokes(intensity, share(&stokes));
         }
-        gather.mark(intensity, hit.place);
+        gathered.mark(intensity, hit.place);
     }
 }

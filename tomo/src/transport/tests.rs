@@ -59,10 +59,10 @@ fn screen(side: u32, width: f64) -> (Vec<f64>, Vec<f64>) {
     (0..side * side).map(|k| (along(k % side), along(k / side))).unzip()
 }
 
-fn look(stage: &Stage, times: &[f64]) -> Vec<Glimpse> {
+fn observe(prepared: &PreparedScene, times: &[f64]) -> Vec<RayResult> {
     let (alpha, beta) = screen(24, 24.0);
-    let mut seen = vec![Glimpse::default(); alpha.len() * times.len()];
-    stage.look_many(&alpha, &beta, times, &mut Scratch::default(), &mut seen).unwrap();
+    let mut seen = vec![RayResult::default(); alpha.len() * times.len()];
+    prepared.observe_block(&alpha, &beta, times, &mut Scratch::default(), &mut seen).unwrap();
     seen
 }
 
@@ -77,10 +77,10 @@ fn exact_tree_against_every_spot() {
                 let mut scene =
                     scene(&[&format!("hole.spin={spin}"), &format!("effects.slow_light={slow}")]);
                 scene.spot = spots(count, since);
-                let stage = Stage::new(&scene, None).unwrap();
+                let prepared = PreparedScene::new(&scene, None).unwrap();
                 let times = [30.0, 47.0];
                 let (found, expected) =
-                    (look(&stage, &times), look(&stage.clone().one_by_one(), &times));
+                    (observe(&prepared, &times), observe(&prepared.clone().one_by_one(), &times));
                 lit += found.iter().filter(|seen| seen.intensity > 0.0).count();
                 let differ = found.iter().zip(&expected).filter(|(a, b)| a != b).count();
                 assert_eq!(differ, 0, "{count} spots, {since:?}, a = {spin}, slow light {slow}");
@@ -95,21 +95,21 @@ fn exact_tree_against_every_spot() {
 fn exact_rays_that_cannot_meet_a_spot() {
     let mut scene = scene(&[]);
     scene.spot = spots(40, None);
-    let stage = Stage::new(&scene, None).unwrap();
-    let tree = stage.spot_tree(30.0).unwrap();
+    let prepared = PreparedScene::new(&scene, None).unwrap();
+    let tree = prepared.spot_tree(30.0).unwrap();
     let (alpha, beta) = screen(24, 40.0);
     let (mut out, mut lit) = (0, 0);
     for (alpha, beta) in alpha.iter().zip(&beta) {
-        let ray = stage.view.ray(&stage.hole, *alpha, *beta).unwrap();
-        let seen = stage.look(*alpha, *beta, &mut Scratch::default()).unwrap();
+        let ray = prepared.view.ray(&prepared.hole, *alpha, *beta).unwrap();
+        let seen = prepared.observe(*alpha, *beta, &mut Scratch::default()).unwrap();
         lit += u32::from(seen.intensity > 0.0);
         if !tree.can_be_met(&ray) {
             out += 1;
             assert_eq!(
-                stage
+                prepared
                     .clone()
                     .one_by_one()
-                    .look(*alpha, *beta, &mut Scratch::default())
+                    .observe(*alpha, *beta, &mut Scratch::default())
                     .unwrap()
                     .intensity,
                 0.0

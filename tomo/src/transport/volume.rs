@@ -1,10 +1,10 @@
 //! Light of what fills space, with as many nodes as it takes.
 
 use super::cells::Panel;
-use super::medium::{Emission, Grain, Light, Medium, Moment, Quadrature, Sums, gather};
-use super::rays::{End, Sight};
+use super::medium::{CellSize, Emission, Light, Medium, Moment, Quadrature, Sums, integrate};
+use super::rays::{End, TracedRay};
 use super::surface::Hit;
-use super::{Scratch, Stage};
+use super::{PreparedScene, Scratch};
 use kerrlight_geodesic::simd::{NodeRequest, PanelRule, RayNodes};
 use kerrlight_geodesic::{Observer, OutOfRange, Path, Quantities, ScreenPoint};
 
@@ -113,7 +113,7 @@ struct Along<'a> {
     times: &'a [f64],
 }
 
-impl Stage {
+impl PreparedScene {
     /// Light of medium number `m` along all rays of a block that were traced in closed form.
     pub(super) fn fill_block(
         &self,
@@ -123,9 +123,9 @@ impl Stage {
         times: &[f64],
         scratch: &mut Scratch,
     ) -> Result<(), OutOfRange> {
-        let Scratch { sights, hits, nodes, volume, .. } = scratch;
-        let mut pending: Vec<usize> = (0..sights.len()).filter(|k| !sights[*k].by_steps).collect();
-        let (medium, first) = (&*self.media[m], m * sights.len() * times.len());
+        let Scratch { traced, hits, nodes, volume, .. } = scratch;
+        let mut pending: Vec<usize> = (0..traced.len()).filter(|k| !traced[*k].by_steps).collect();
+        let (medium, first) = (&*self.media[m], m * traced.len() * times.len());
         let mut split = 1;
         let together = (TOGETHER / split as usize).clamp(16, TOGETHER);
         while !pending.is_empty() {
@@ -133,15 +133,15 @@ impl Stage {
             let mut more = Vec::new();
             for some in pending.chunks(together) {
                 let pick = |column: &[f64]| some.iter().map(|k| column[*k]).collect::<Vec<_>>();
-                let until: Vec<f64> = some.iter().map(|k| sights[*k].last_time()).collect();
+                let until: Vec<f64> = some.iter().map(|k| traced[*k].last_time()).collect();
                 let (alpha, beta) = (pick(alpha), pick(beta));
                 nodes.trace(&self.hole, observer, &alpha, &beta, Some(&until), &request)?;
                 for (number, k) in some.iter().enumerate() {
                     let screen = self.screen_point(alpha[number], beta[number]);
-                    let (first, lambda) = (first + k * times.len(), sights[*k].lambda);
+                    let (first, lambda) = (first + k * times.len(), traced[*k].lambda);
                     let along = Along { medium, first, lambda, screen, times };
                     let done = self.radiate(&along, &nodes.ray(number), volume);
-                    volume.shade(&mut hits[sights[*k].hits.clone()]);
+                    volume.shade(&mut hits[traced[*k].hits.clone()]);
                     if !done && split < FINEST {
                         more.push(*k);
                     }
@@ -161,10 +161,10 @@ impl Stage {
         times: &[f64],
         scratch: &mut Scratch,
     ) {
-        let sight = scratch.sights[k].clone();
-        let first = (m * scratch.sights.len() + k) * times.len();
+        let traced = scratch.traced[k].clone();
+        let first = (m * scratch.traced.len() + k) * times.len();
         self.fill_ray((m, k), screen, (times, first), scratch, |split, path, rule, columns| {
-            self.place(path, &sight, &*self.media[m], split, rule, columns);
+            self.place(path, &traced, &*self.media[m], split, rule, columns);
         });
     }
 
@@ -178,9 +178,9 @@ impl Stage {
         scratch: &mut Scratch,
         place: impl Fn(u32, &Path, &PanelRule, &mut Columns),
     ) {
-        let Scratch { path, sights, hits, volume, .. } = scratch;
+        let Scratch { path, traced, hits, volume, .. } = scratch;
         let medium = &*self.media[m];
-        let along = Along { medium, first, lambda: sights[k].lambda, screen, times };
+        let along = Along { medium, first, lambda: traced[k].lambda, screen, times };
         let mut split = 1;
         loop {
             let mut columns = core::mem::take(&mut volume.columns);
@@ -193,7 +193,7 @@ impl Stage {
             }
             split *= 2;
         }
-        volume.shade(&mut hits[sights[k].hits.clone()]);
+        volume.shade(&mut hits[traced[k].hits.clone()]);
     }
 
     fn request(&self, medium: &dyn Medium, rule: &PanelRule, split: u32) -> NodeRequest {
@@ -212,12 +212,12 @@ impl Stage {
         let Workspace { quadrature, emission, sums, lights, profile, .. } = volume;
         let lights = &mut lights[along.first..along.first + along.times.len()];
         let mut done = true;
-        let grain = along.medium.grain();
+        let cell = along.medium.cell_size();
         let (mut resolved, mut finest) = (true, false);
-        if let Some(grain) = grain {
-            let longest = grain.longest(nodes, quadrature.rule.order());
-            resolved = longest <= ROUNDING * grain.size;
-            finest = longest <= ROUNDING * Grain::FINEST * grain.size;
+        if let Some(cell) = cell {
+            let longest = cell.longest(nodes, quadrature.rule.order());
+            resolved = longest <= ROUNDING * cell.size;
+            finest = longest <= ROUNDING * CellSize::FINEST * cell.size;
             if !resolved && along.times.len() > 1 {
                 // Not worth the light of all times.
                 return false;
@@ -235,7 +235,7 @@ impl Stage {
             if let Some(screen) = &along.screen {
                 self.polarize(along.medium, nodes, along.lambda, screen, emission);
             }
-            let light = gather(quadrature, nodes, emission, sums);
+            let light = integrate(quadrature, nodes, emission, sums);
             let enough = self.tolerance * (light.intensity + FAINT * along.medium.scale());
             done &= resolved && (finest || light.error <= enough);
             lights[j] = light;
@@ -252,7 +252,7 @@ impl Stage {
     fn place(
         &self,
         path: &Path,
-        sight: &Sight,
+        traced: &TracedRay,
         medium: &dyn Medium,
         split: u32,
         rule: &PanelRule,
@@ -261,10 +261,10 @@ impl Stage {
         let mut intervals = Vec::new();
         path.intervals_within(0.5 * self.hole.horizon(), medium.sphere(), &mut intervals);
         let turning = path.turning_point().map_or(f64::INFINITY, |(time, _)| time);
-        let captured = sight.end == End::Captured;
+        let captured = traced.end == End::Captured;
         for [start, end] in intervals {
-            let falls = captured && end >= path.mino_total() && sight.last_time() >= end;
-            let end = end.min(sight.last_time());
+            let falls = captured && end >= path.mino_total() && traced.last_time() >= end;
+            let end = end.min(traced.last_time());
             let middle = turning.clamp(start, end.max(start));
             for [from, to] in [[start, middle], [middle, end]] {
                 if to > from {
@@ -288,7 +288,7 @@ impl Stage {
 const ROUNDING: f64 = 1.05;
 
 fn finest(medium: &dyn Medium) -> u32 {
-    if medium.grain().is_some() { FINEST_OF_CELLS } else { FINEST }
+    if medium.cell_size().is_some() { FINEST_OF_CELLS } else { FINEST }
 }
 
 /// Columns of nodes, as in [`RayNodes`].
@@ -313,7 +313,7 @@ pub(super) fn ray_nodes(columns: &Columns, range: core::ops::Range<usize>) -> Ra
     }
 }
 
-/// A stretch of a ray between the places where its integrand is not smooth.
+/// A segment of a ray between the places where its integrand is not smooth.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Piece {
     from: f64,

@@ -51,7 +51,7 @@ impl Layer {
     /// The colour where texture coordinates are `place()`.
     pub fn at(&self, place: impl Fn() -> [f32; 2]) -> [f32; 3] {
         let Some(texture) = &self.texture else { return self.color };
-        let shade = texture.look(place());
+        let shade = texture.color_at(place());
         core::array::from_fn(|k| self.color[k] * shade[k])
     }
 }

@@ -32,7 +32,7 @@ impl Texture {
     }
 
     /// Bilinear look-up at texture coordinates, v growing downwards.
-    pub fn look(&self, [u, v]: [f32; 2]) -> [f32; 3] {
+    pub fn color_at(&self, [u, v]: [f32; 2]) -> [f32; 3] {
         let split = |x: f32, size: usize| {
             let at = f64::from(x).rem_euclid(1.0) * size as f64 - 0.5;
             let cell = at.floor();

@@ -92,7 +92,7 @@ impl Beam {
     }
 
     /// Mean over the beam of what is seen in single directions, on a net of points.
-    pub fn mean(&self, look: impl Fn([f64; 3]) -> [f32; 3]) -> [f32; 3] {
+    pub fn mean(&self, color: impl Fn([f64; 3]) -> [f32; 3]) -> [f32; 3] {
         const SIDE: i32 = 7;
         let (mut sum, mut total) = ([0.0; 3], 0.0);
         for (i, j) in (-SIDE..=SIDE).flat_map(|i| (-SIDE..=SIDE).map(move |j| (i, j))) {
@@ -104,7 +104,7 @@ impl Beam {
             });
             let length = dot(n, n).sqrt();
             total += weight;
-            for (sum, c) in sum.iter_mut().zip(look(n.map(|c| c / length))) {
+            for (sum, c) in sum.iter_mut().zip(color(n.map(|c| c / length))) {
                 *sum += weight * f64::from(c);
             }
         }

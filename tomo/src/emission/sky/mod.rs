@@ -37,7 +37,7 @@ impl SkyModel {
         }
     }
 
-    /// The same, ready for [`gather`](Self::gather).
+    /// The same, ready for [`mean_color`](Self::mean_color).
     pub fn for_beams(self) -> Self {
         match self {
             SkyModel::Picture(picture, brightness) => {
@@ -48,28 +48,30 @@ impl SkyModel {
     }
 
     /// Mean linear colour over a beam.
-    pub fn gather(&self, beam: &Beam) -> [f32; 3] {
+    pub fn mean_color(&self, beam: &Beam) -> [f32; 3] {
         match self {
-            SkyModel::Checker(checker) => beam.mean(|n| look_checker(checker, n)),
-            SkyModel::Stars(stars) => stars.gather(beam),
-            SkyModel::Picture(picture, brightness) => picture.gather(beam).map(|c| c * brightness),
+            SkyModel::Checker(checker) => beam.mean(|n| checker_color(checker, n)),
+            SkyModel::Stars(stars) => stars.mean_color(beam),
+            SkyModel::Picture(picture, brightness) => {
+                picture.mean_color(beam).map(|c| c * brightness)
+            }
         }
     }
 
     /// Linear colour in a direction.
-    pub fn look(&self, direction: [f64; 3]) -> [f32; 3] {
+    pub fn color(&self, direction: [f64; 3]) -> [f32; 3] {
         match self {
-            SkyModel::Checker(checker) => look_checker(checker, direction),
-            SkyModel::Stars(stars) => stars.look(direction),
+            SkyModel::Checker(checker) => checker_color(checker, direction),
+            SkyModel::Stars(stars) => stars.color(direction),
             SkyModel::Picture(picture, brightness) => {
-                picture.look(direction).map(|c| c * brightness)
+                picture.color(direction).map(|c| c * brightness)
             }
         }
     }
 }
 
 /// Light and dark fields; a colour for each quadrant of azimuth, paler below the equator.
-fn look_checker(checker: &Checker, [x, y, z]: [f64; 3]) -> [f32; 3] {
+fn checker_color(checker: &Checker, [x, y, z]: [f64; 3]) -> [f32; 3] {
     let azimuth = y.atan2(x).to_degrees().rem_euclid(360.0);
     let polar = x.hypot(y).atan2(z).to_degrees();
     let field = |angle: f64| (angle / checker.field_deg).floor() as i64;
@@ -102,7 +104,7 @@ mod tests {
                 [-1.0, 0.0, 0.0],
                 [-1.0, -0.0, 0.0],
             ] {
-                assert!(sky.look(d).iter().all(|c| c.is_finite() && *c >= 0.0), "{d:?}");
+                assert!(sky.color(d).iter().all(|c| c.is_finite() && *c >= 0.0), "{d:?}");
             }
         }
     }

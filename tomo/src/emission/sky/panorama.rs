@@ -104,7 +104,7 @@ impl Panorama {
     }
 
     /// Bilinear look-up; azimuth wraps around.
-    pub(super) fn look(&self, direction: [f64; 3]) -> [f32; 3] {
+    pub(super) fn color(&self, direction: [f64; 3]) -> [f32; 3] {
         let [x, y, z] = direction;
         // Seen from inside with +z up, azimuth grows to the left.
         let u = 0.5 - y.atan2(x) / TAU;
@@ -123,7 +123,7 @@ impl Panorama {
         })
     }
 
-    /// The picture with its coarser versions, for [`gather`](Self::gather).
+    /// The picture with its coarser versions, for [`mean_color`](Self::mean_color).
     pub(super) fn with_pyramid(mut self) -> Self {
         let mut level = self.halved();
         while level.height >= SMALLEST {
@@ -166,7 +166,7 @@ impl Panorama {
 
     /// Mean over a beam: an elliptical weighted average (Heckbert 1989) of the pixels of that
     /// level whose pixels are just smaller than the beam is wide.
-    pub(super) fn gather(&self, beam: &Beam) -> [f32; 3] {
+    pub(super) fn mean_color(&self, beam: &Beam) -> [f32; 3] {
         // A needle of a beam is made broader: its cost grows with its length over its width.
         let [long, wide] = beam.spread();
         let wide = wide.max(long / LONGEST_BEAM);
@@ -192,7 +192,7 @@ impl Panorama {
             let half = if sin > 1.2 * across { (across / sin).asin() * 1.2 } else { PI };
             self.average_row(beam, row, [azimuth - half, azimuth + half], &mut sum, &mut total);
         }
-        if total > 0.0 { sum.map(|c| (c / total) as f32) } else { self.look(beam.direction()) }
+        if total > 0.0 { sum.map(|c| (c / total) as f32) } else { self.color(beam.direction()) }
     }
 
     fn last_row(&self) -> f64 {
@@ -268,12 +268,12 @@ mod tests {
             let picture = Picture { width: 4, height: 2, channels };
             exr::encode(&picture, &exr::Attributes::new()).unwrap()
         };
-        let look = |bytes: &[u8]| Panorama::decode(bytes).unwrap().look([1.0, 0.0, 0.0]);
+        let color = |bytes: &[u8]| Panorama::decode(bytes).unwrap().color([1.0, 0.0, 0.0]);
         assert_eq!(
-            look(&picture(&["R", "G", "B"], 2.0)),
+            color(&picture(&["R", "G", "B"], 2.0)),
             [b'R', b'G', b'B'].map(|c| 2.0 * f32::from(c))
         );
-        assert_eq!(look(&picture(&["Y"], 0.25)), [0.25 * f32::from(b'Y'); 3]);
+        assert_eq!(color(&picture(&["Y"], 0.25)), [0.25 * f32::from(b'Y'); 3]);
         let fail = |bytes: &[u8]| Panorama::decode(bytes).unwrap_err().to_string();
         let said = fail(&picture(&["depth", "intensity"], 1.0));
         assert_eq!(said, "channels depth, intensity: R, G, B or Y are expected");
@@ -295,7 +295,7 @@ mod tests {
         picture.write_to(&mut cursor, image::ImageFormat::Png).unwrap();
         let sky = Panorama::decode(&bytes).unwrap();
         let up = 3f64.to_radians().sin();
-        let red = |d: [f64; 3]| sky.look(d)[0];
+        let red = |d: [f64; 3]| sky.color(d)[0];
         assert!(red([0.0, 0.9, 0.3 + up]) > 0.3);
         assert_eq!(red([0.0, -1.0, 0.3]), 0.0);
         assert_eq!(red([1.0, 0.0, 0.0]), 0.0);
@@ -328,7 +328,7 @@ mod tests {
         let linear = of(&|d| d.map(|x| 2.0 + x));
         for n in [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [-0.6, -0.0, 0.8], [0.0, 0.06, -0.998]] {
             let beam = Beam::of_circle(n, 0.05);
-            for (seen, x) in linear.gather(&beam).iter().zip(n) {
+            for (seen, x) in linear.mean_color(&beam).iter().zip(n) {
                 assert!((f64::from(*seen) - 2.0 - x).abs() < 6e-3, "{n:?}: {seen}");
             }
         }

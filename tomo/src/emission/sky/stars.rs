@@ -36,7 +36,7 @@ impl StarField {
         }
     }
 
-    pub(super) fn look(&self, direction: [f64; 3]) -> [f32; 3] {
+    pub(super) fn color(&self, direction: [f64; 3]) -> [f32; 3] {
         let mut color = [0.0; 3];
         self.near(direction, [self.radius; 2], |star| {
             let cos_distance = dot(direction, star.direction);
@@ -50,7 +50,7 @@ impl StarField {
 
     /// Mean brightness over a beam. A star is taken for a Gaussian with the flux,
     /// 2π(1 − cos R)/3 times its peak, and the variance, R²/8, of its disc.
-    pub(super) fn gather(&self, beam: &Beam) -> [f32; 3] {
+    pub(super) fn mean_color(&self, beam: &Beam) -> [f32; 3] {
         let beam = beam.widened(self.radius / 8f64.sqrt());
         let flux = core::f64::consts::TAU * (1.0 - self.cos_radius) / 3.0;
         let peak = flux * beam.peak_density();
@@ -170,7 +170,7 @@ mod tests {
             let (z, phi) = (2.0 * random.unit() - 1.0, std::f64::consts::TAU * random.unit());
             let s = (1.0f64 - z * z).sqrt();
             let half = usize::from(z > 0.0);
-            lit[half] += f64::from(u8::from(sky.look([s * phi.cos(), s * phi.sin(), z])[1] > 0.0));
+            lit[half] += f64::from(u8::from(sky.color([s * phi.cos(), s * phi.sin(), z])[1] > 0.0));
         }
         let expected = 3000.0 * 0.5 * (1.0 - 0.5f64.to_radians().cos());
         let found = (lit[0] + lit[1]) / f64::from(n);
@@ -178,7 +178,7 @@ mod tests {
         assert!((lit[0] / lit[1] - 1.0).abs() < 0.1, "{lit:?}");
     }
 
-    /// Beams that lie side by side gather all light of all stars: the sum over a fine net of
+    /// Beams that lie side by side mean_color all light of all stars: the sum over a fine net of
     /// directions is the catalogue's, here on a patch and at a pole.
     #[test]
     fn exact_flux_of_gathered_stars() {
@@ -194,7 +194,7 @@ mod tests {
                 // Solid angle of a field of this plane; the beam is that of a field, too.
                 let area = step * step / length.powi(3);
                 let beam = Beam::of_circle(n.map(|c| c / length), 0.65 * step);
-                sum += area * f64::from(field.gather(&beam)[1]);
+                sum += area * f64::from(field.mean_color(&beam)[1]);
             }
             let inside = |d: [f64; 3]| {
                 let depth = dot(d, turned);

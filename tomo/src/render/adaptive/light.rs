@@ -1,7 +1,7 @@
 //! What single rays see, and whether two of them see the same piece of the picture.
 
 use crate::render::rings::Counted;
-use crate::transport::{Fate, Glimpse};
+use crate::transport::{Fate, RayResult};
 
 /// What a ray, or several along photon rings, adds to its cell.
 #[derive(Debug, Clone, Copy, Default)]
@@ -41,7 +41,7 @@ impl Light {
     }
 
     /// What a ray sees.
-    pub(super) fn of_ray(seen: &Glimpse) -> Self {
+    pub(super) fn of_ray(seen: &RayResult) -> Self {
         let band = (seen.crossings, seen.fate);
         let (disc_images, lit) = (seen.disc_images, seen.radius > 0.0);
         Light {
@@ -56,7 +56,7 @@ impl Light {
     }
 
     /// What a ray sees, or the mean around it.
-    pub(super) fn new((seen, counted): (&Glimpse, &Counted)) -> Self {
+    pub(super) fn new((seen, counted): (&RayResult, &Counted)) -> Self {
         let ray = Light::of_ray(seen);
         Light {
             rays: ray.rays + counted.rays,

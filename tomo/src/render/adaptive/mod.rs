@@ -19,7 +19,7 @@ pub(super) use tolerance::tolerance;
 use super::grid::Grid;
 use super::pixels::{Pixel, Workspace};
 use super::rings::{Counted, Resolver, Square};
-use crate::transport::{Fate, Glimpse, Stage};
+use crate::transport::{Fate, PreparedScene, RayResult};
 use cell::Cell;
 use cut::Cut;
 use kerrlight_geodesic::OutOfRange;
@@ -34,7 +34,7 @@ const HIDDEN: f64 = 1.0 / 16.0;
 
 /// What is seen, through which pixels, and by how much each may be off.
 pub(super) struct Adaptive<'a> {
-    pub stage: &'a Stage,
+    pub prepared: &'a PreparedScene,
     pub grid: &'a Grid,
     /// What resolves photon rings, in pixels and in parts of pixels.
     pub rings: Option<&'a Resolver>,
@@ -81,7 +81,7 @@ impl Adaptive<'_> {
         cuts: &mut [Cut],
         work: &mut Workspace,
     ) -> Result<Vec<Light>, OutOfRange> {
-        let mut seen: Vec<Glimpse> = cuts.iter().map(|cut| pixels[cut.pixel].center).collect();
+        let mut seen: Vec<RayResult> = cuts.iter().map(|cut| pixels[cut.pixel].center).collect();
         let square = |cut: &Cut| self.grid.square(cut.column, cut.row, [0.0; 2], 1.0);
         let squares: Vec<Square> = cuts.iter().map(square).collect();
         let counted = self.resolve(&squares, &mut seen, work)?;
@@ -94,7 +94,7 @@ impl Adaptive<'_> {
 
     /// The light of the squares of `work`.
     fn sample(&self, work: &mut Workspace) -> Result<Vec<Light>, OutOfRange> {
-        let mut seen = work.look(self.stage)?.to_vec();
+        let mut seen = work.observe(self.prepared)?.to_vec();
         let squares = work.squares().to_vec();
         let counted = self.resolve(&squares, &mut seen, work)?;
         Ok(seen.iter().zip(&counted).map(Light::new).collect())
@@ -103,11 +103,11 @@ impl Adaptive<'_> {
     fn resolve(
         &self,
         squares: &[Square],
-        seen: &mut [Glimpse],
+        seen: &mut [RayResult],
         work: &mut Workspace,
     ) -> Result<Vec<Counted>, OutOfRange> {
         let Some(rings) = self.rings else { return Ok(vec![Counted::default(); seen.len()]) };
-        rings.resolve(self.stage, squares, &[self.stage.time()], seen, work)
+        rings.resolve(self.prepared, squares, &[self.prepared.time()], seen, work)
     }
 
     /// Traces the quarters of the quarters of `parents`.
@@ -157,7 +157,7 @@ impl Adaptive<'_> {
                 work.push(grid.square(column, row, [0.0; 2], 1.0));
             }
         }
-        let seen = work.look(self.stage)?;
+        let seen = work.observe(self.prepared)?;
         let light: Vec<Light> = seen.iter().map(Light::of_ray).collect();
         let place =
             |column: usize, row: usize| (row - high.start) * wide.len() + column - wide.start;

@@ -3,7 +3,7 @@
 use super::Adaptive;
 use crate::render::grid::Grid;
 use crate::render::pixels::Workspace;
-use crate::transport::Stage;
+use crate::transport::PreparedScene;
 use kerrlight_geodesic::OutOfRange;
 use rayon::prelude::*;
 
@@ -19,7 +19,7 @@ const COARSE: usize = 128;
 /// From its pixels to k² smaller ones each, the error of smooth ones falls as k^−2; where an edge
 /// runs through, k of them have it, with the same error.
 pub(in crate::render) fn tolerance(
-    stage: &Stage,
+    prepared: &PreparedScene,
     grid: &Grid,
     image_error: f64,
 ) -> Result<f64, OutOfRange> {
@@ -30,7 +30,7 @@ pub(in crate::render) fn tolerance(
         size: grid.size * cut as f64,
         side: 1,
     };
-    let uncut = Adaptive { stage, grid: &coarse, rings: None, tolerance: f64::INFINITY };
+    let uncut = Adaptive { prepared, grid: &coarse, rings: None, tolerance: f64::INFINITY };
     let lines = (0..coarse.height).into_par_iter().map_init(Workspace::default, |work, row| {
         let (pixels, cuts) = uncut.first((row..row + 1, 0..coarse.width), work)?;
         let mut errors: Vec<(f64, f64)> = Vec::with_capacity(pixels.len());

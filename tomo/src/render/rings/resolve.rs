@@ -2,11 +2,11 @@
 
 use super::{RingStrata, Stratum};
 use crate::render::pixels::Workspace;
-use crate::transport::{Fate, Glimpse, Stage};
+use crate::transport::{Fate, PreparedScene, RayResult};
 use kerrlight_geodesic::OutOfRange;
 use std::ops::Range;
 
-/// Resolves the photon rings of a stage.
+/// Resolves the photon rings of a prepared scene.
 #[derive(Debug, Clone)]
 pub struct Resolver {
     strata: RingStrata,
@@ -37,13 +37,13 @@ struct Job {
 }
 
 impl Resolver {
-    /// Of a stage, if what it shows has photon rings. Where pixels are refined the thin images beside the critical
+    /// Of a prepared scene, if what it shows has photon rings. Where pixels are refined the thin images beside the critical
     /// curve are found by their light.
-    pub fn new(stage: &Stage, refined: bool) -> Option<Self> {
-        let spacing = stage.ring_spacing()?;
-        let strata = RingStrata::new(&stage.hole, &stage.view, spacing);
+    pub fn new(prepared: &PreparedScene, refined: bool) -> Option<Self> {
+        let spacing = prepared.ring_spacing()?;
+        let strata = RingStrata::new(&prepared.hole, &prepared.view, spacing);
         let strata = if refined { strata.on_curve() } else { strata };
-        Some(Resolver { strata, hides: stage.has_opaque_disc() })
+        Some(Resolver { strata, hides: prepared.has_opaque_disc() })
     }
 
     /// How many rays a square gets, hidden or not, besides that at its centre.
@@ -57,10 +57,10 @@ impl Resolver {
     /// + k]`), by means over the squares where photon rings run through them.
     pub fn resolve(
         &self,
-        stage: &Stage,
+        prepared: &PreparedScene,
         squares: &[Square],
         times: &[f64],
-        seen: &mut [Glimpse],
+        seen: &mut [RayResult],
         work: &mut Workspace,
     ) -> Result<Vec<Counted>, OutOfRange> {
         let mut counted = vec![Counted::default(); seen.len()];
@@ -74,7 +74,7 @@ impl Resolver {
             }
         }
         if self.hides {
-            self.drop_hidden(stage, squares, seen, &mut jobs, work)?;
+            self.drop_hidden(prepared, squares, seen, &mut jobs, work)?;
         }
         for some in batches(&jobs) {
             work.clear();
@@ -82,7 +82,7 @@ impl Resolver {
                 work.push_ray((ray.x, ray.y));
             }
             let count = work.len();
-            let found = work.look_at(stage, times)?;
+            let found = work.observe_at(prepared, times)?;
             for (j, found) in found.chunks_exact(count.max(1)).enumerate() {
                 let mut rest = found;
                 for job in some {
@@ -99,13 +99,13 @@ impl Resolver {
     /// Drops squares whose centre and corners all end on the direct image of an opaque disc.
     fn drop_hidden(
         &self,
-        stage: &Stage,
+        prepared: &PreparedScene,
         squares: &[Square],
-        seen: &[Glimpse],
+        seen: &[RayResult],
         jobs: &mut Vec<Job>,
         work: &mut Workspace,
     ) -> Result<(), OutOfRange> {
-        let hidden = |seen: &Glimpse| seen.fate == Fate::Surface && seen.disc_images == 1;
+        let hidden = |seen: &RayResult| seen.fate == Fate::Surface && seen.disc_images == 1;
         let asked = |job: &&Job| seen.get(job.square).is_some_and(hidden);
         work.clear();
         for Square { center: (x, y), size } in
@@ -116,7 +116,7 @@ impl Resolver {
                 work.push_ray((x + dx, y + dy));
             }
         }
-        let corners = work.look(stage)?;
+        let corners = work.observe(prepared)?;
         let mut all = corners.chunks_exact(4).map(|four| four.iter().all(hidden));
         jobs.retain(|job| !(asked(&job) && all.next().unwrap_or(false)));
         Ok(())
@@ -143,7 +143,7 @@ fn batches(jobs: &[Job]) -> impl Iterator<Item = &[Job]> {
 }
 
 /// The mean over a square in place of what its central ray sees.
-fn mean(rays: &[Stratum], found: &[Glimpse], seen: &mut Glimpse) -> Counted {
+fn mean(rays: &[Stratum], found: &[RayResult], seen: &mut RayResult) -> Counted {
     (seen.intensity, seen.rgb, seen.stokes) = (0.0, [0.0; 3], [0.0; 3]);
     let mut counted = Counted { rays: rays.len() as u32, ..Counted::default() };
     for (Stratum { share, .. }, light) in rays.iter().zip(found) {
@@ -162,9 +162,9 @@ fn mean(rays: &[Stratum], found: &[Glimpse], seen: &mut Glimpse) -> Counted {
 
 /// Of the mean: an edge between two strata is anywhere between their rays, so that a quarter of its height
 /// is the usual error of their common share; errors of edges are independent.
-fn error(rays: &[Stratum], found: &[Glimpse]) -> f64 {
+fn error(rays: &[Stratum], found: &[RayResult]) -> f64 {
     let pairs = rays.windows(2).zip(found.windows(2));
-    let square = |(rays, found): (&[Stratum], &[Glimpse])| match (rays, found) {
+    let square = |(rays, found): (&[Stratum], &[RayResult])| match (rays, found) {
         ([a, b], [one, other]) => {
             (0.125 * (a.share + b.share) * (one.intensity - other.intensity)).powi(2)
         }

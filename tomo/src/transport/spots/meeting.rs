@@ -4,7 +4,7 @@ use super::DEEPEST;
 use super::trees::{SpotSpans, SpotTree};
 use crate::transport::chord::ChordBound;
 use crate::transport::tree::{Node, Walk, WalkScratch};
-use crate::transport::{Scratch, Stage};
+use crate::transport::{PreparedScene, Scratch};
 use kerrlight_geodesic::{Path, Ray};
 use std::ops::ControlFlow;
 
@@ -15,7 +15,7 @@ pub(in crate::transport) struct Met {
     piece: [f64; 2],
 }
 
-impl Stage {
+impl PreparedScene {
     /// Fills `scratch.met`, by spots and along the ray.
     pub(super) fn meet_spots(
         &self,
@@ -27,7 +27,7 @@ impl Stage {
     ) {
         let Scratch { path, walk, met, intervals, .. } = scratch;
         let bound = ChordBound::new(&self.hole, ray, path, self.tracer.tolerance());
-        let meeting = Meeting { stage: self, time, path, bound };
+        let meeting = Meeting { prepared: self, time, path, bound };
         let [low, high] = tree.tree.shell();
         path.intervals_within(low, high, intervals);
         met.clear();
@@ -48,7 +48,7 @@ impl Stage {
 
 /// A ray on its way through the trees, seen at one time.
 struct Meeting<'a> {
-    stage: &'a Stage,
+    prepared: &'a PreparedScene,
     time: f64,
     path: &'a Path,
     bound: ChordBound,
@@ -58,7 +58,7 @@ impl Meeting<'_> {
     /// The first and the last time at which light that is seen passed a piece.
     fn times(&self, ends: [&Node; 2]) -> [f64; 2] {
         let [early, late] =
-            [ends[1], ends[0]].map(|node| self.stage.emission_time(self.time, &node.point));
+            [ends[1], ends[0]].map(|node| self.prepared.emission_time(self.time, &node.point));
         let error = self.bound.error(self.bound.reach(ends.map(|node| &node.point)));
         [early - error, late + error]
     }
@@ -71,12 +71,12 @@ impl Meeting<'_> {
         walk: &mut WalkScratch,
         met: &mut Vec<Met>,
     ) {
-        let slow = self.stage.slow_light;
+        let slow = self.prepared.slow_light;
         // With slow light short pieces tell much about the time.
         let longest = if slow { 2.0 } else { 8.0 };
         let shines = |leaf: u32, ends: [&Node; 2], epsilon: f64| {
             let part = &tree.parts[leaf as usize];
-            let spot = &self.stage.spots[part.spot as usize];
+            let spot = &self.prepared.spots[part.spot as usize];
             let when = if slow { self.times(ends) } else { [self.time; 2] };
             (!slow || spot.shines_from(part, when))
                 && spot.comes_near(ends.map(|node| node.position), epsilon, when)
@@ -102,7 +102,7 @@ impl Meeting<'_> {
         let [first, last] = self.times([start, end]).map(|time| spans.number(time));
         if last.saturating_sub(first) <= 1 {
             for number in first..=last {
-                let tree = spans.tree(&self.stage.spots, &self.stage.hole, number);
+                let tree = spans.tree(&self.prepared.spots, &self.prepared.hole, number);
                 self.through(&tree, [start, end], walk, met);
             }
             return;

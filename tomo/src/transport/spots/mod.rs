@@ -6,17 +6,17 @@ mod trees;
 pub(super) use meeting::Met;
 pub(super) use trees::{SpotSpans, SpotTree};
 
-use super::glimpse::{Gather, Place};
 use super::polarized::share;
+use super::result::{Accumulator, Place};
 use super::volume::DepthProfile;
-use super::{Scratch, Stage};
+use super::{PreparedScene, Scratch};
 use crate::emission::spot::{Comoving, SpotModel};
 use kerrlight_geodesic::flow::rotating_redshift;
 use kerrlight_geodesic::quadrature::gauss_4;
 use kerrlight_geodesic::{Path, PathPoint, Ray, ScreenPoint};
 use meeting::join;
 
-impl Stage {
+impl PreparedScene {
     /// Light of the spots between the observer and Mino time `end`: ∫ g^{2+α} j Σ dτ. Spots are
     /// summed in their order and piece by piece as [`add_every_spot`](Self::add_every_spot) does,
     /// less the pieces on which the tree shows that a spot does not shine: the same to the last bit.
@@ -27,7 +27,7 @@ impl Stage {
         (ray, screen): (&Ray, Option<ScreenPoint>),
         scratch: &mut Scratch,
         end: f64,
-        gather: &mut Gather,
+        gathered: &mut Accumulator,
     ) {
         if !tree.can_be_met(ray) {
             return;
@@ -38,7 +38,13 @@ impl Stage {
         for same in met.chunk_by(|a, b| a.spot == b.spot) {
             join(same, pieces);
             let spot = &self.spots[same[0].spot as usize];
-            self.add_spot(SpotLight::new(spot, time, pieces, along), path, intervals, end, gather);
+            self.add_spot(
+                SpotLight::new(spot, time, pieces, along),
+                path,
+                intervals,
+                end,
+                gathered,
+            );
         }
     }
 
@@ -49,13 +55,13 @@ impl Stage {
         (ray, screen): (&Ray, Option<ScreenPoint>),
         scratch: &mut Scratch,
         end: f64,
-        gather: &mut Gather,
+        gathered: &mut Accumulator,
     ) {
         let Scratch { path, intervals, volume, .. } = scratch;
         let along = AlongRay { lambda: ray.lambda, screen, depths: &volume.profile };
         for spot in &self.spots {
             let light = SpotLight::new(spot, time, &[[0.0, f64::INFINITY]], along);
-            self.add_spot(light, path, intervals, end, gather);
+            self.add_spot(light, path, intervals, end, gathered);
         }
     }
 
@@ -66,30 +72,30 @@ impl Stage {
         path: &Path,
         intervals: &mut Vec<[f64; 2]>,
         end: f64,
-        gather: &mut Gather,
+        gathered: &mut Accumulator,
     ) {
         let [lo, hi] = light.spot.shell();
-        let before = gather.intensity;
+        let before = gathered.intensity;
         path.intervals_within(lo.max(self.hole.horizon()), hi, intervals);
         for &[from, to] in intervals.iter() {
             let to = to.min(end);
             if from < to {
-                self.add_stretch(path, &mut light, from, to, gather);
+                self.add_stretch(path, &mut light, from, to, gathered);
             }
         }
         if let Some((_, point)) = light.brightest {
-            gather.mark(gather.intensity - before, Place::of_point(&point));
+            gathered.mark(gathered.intensity - before, Place::of_point(&point));
         }
     }
 
-    /// A stretch of the path inside the spot's shell, cut so that no piece turns by much.
+    /// A segment of the path inside the spot's shell, cut so that no piece turns by much.
     fn add_stretch(
         &self,
         path: &Path,
         light: &mut SpotLight<'_>,
         from: f64,
         to: f64,
-        gather: &mut Gather,
+        gathered: &mut Accumulator,
     ) {
         let pieces = ((to - from) * path.angular_rate() / LARGEST_TURN).ceil().max(1.0);
         let step = (to - from) / pieces;
@@ -102,7 +108,7 @@ impl Stage {
             }
             let start = last.unwrap_or_else(|| self.node(light, path.at(start)));
             let end = self.node(light, path.at(end));
-            self.add_piece(path, light, [&start, &end], 0, gather);
+            self.add_piece(path, light, [&start, &end], 0, gathered);
             last = Some(end);
         }
     }
@@ -119,7 +125,7 @@ impl Stage {
         light: &mut SpotLight<'_>,
         [start, end]: [&SpotNode; 2],
         depth: u32,
-        gather: &mut Gather,
+        gathered: &mut Accumulator,
     ) {
         let (from, to) = (start.point.mino_time, end.point.mino_time);
         if !light.can_shine(from, to) {
@@ -132,12 +138,12 @@ impl Stage {
         }
         if length > light.spot.sigma() && depth < DEEPEST {
             let middle = self.node(light, path.at(0.5 * (from + to)));
-            self.add_piece(path, light, [start, &middle], depth + 1, gather);
-            self.add_piece(path, light, [&middle, end], depth + 1, gather);
+            self.add_piece(path, light, [start, &middle], depth + 1, gathered);
+            self.add_piece(path, light, [&middle, end], depth + 1, gathered);
             return;
         }
         for (mino_time, weight) in gauss_4(from, to) {
-            self.add_node(&self.node(light, path.at(mino_time)), weight, light, gather);
+            self.add_node(&self.node(light, path.at(mino_time)), weight, light, gathered);
         }
     }
 
@@ -147,7 +153,7 @@ impl Stage {
         node: &SpotNode,
         weight: f64,
         light: &mut SpotLight<'_>,
-        gather: &mut Gather,
+        gathered: &mut Accumulator,
     ) {
         let emissivity = light.spot.emissivity(&node.carried, node.time);
         if emissivity <= 0.0 {
@@ -155,13 +161,13 @@ impl Stage {
         }
         let point = &node.point;
         let r = point.radius();
-        let g = match self.redshift {
+        let g = match self.spectral_index {
             Some(_) => rotating_redshift(&self.hole, point, light.spot.angular_velocity(r)),
             None => Some(1.0),
         };
         // Where matter cannot move like this there is none.
         let Some(g) = g else { return };
-        let mut boost = self.redshift.map_or(1.0, |index| g.powf(2.0 + index));
+        let mut boost = self.spectral_index.map_or(1.0, |index| g.powf(2.0 + index));
         let path_length = self.hole.sigma(r, point.cos_theta()) * weight;
         let AlongRay { lambda, screen, depths } = &light.along;
         // Gas in front of it.
@@ -173,9 +179,9 @@ impl Stage {
             let omega = light.spot.angular_velocity(r);
             let stokes = self.polarized_spot(point, *lambda, omega, screen);
             boost *= stokes.i;
-            gather.add_stokes(boost * emissivity * path_length, share(&stokes));
+            gathered.add_stokes(boost * emissivity * path_length, share(&stokes));
         }
-        gather.add(boost * emissivity * path_length, g, light.spot.color);
+        gathered.add(boost * emissivity * path_length, g, light.spot.color);
         let density = boost * emissivity;
         if light.brightest.is_none_or(|(most, _)| density > most) {
             light.brightest = Some((density, *point));

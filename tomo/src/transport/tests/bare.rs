@@ -34,21 +34,21 @@ fn exact_bare_scenes_against_the_general_way() {
     for (set, spin) in cases.iter().flat_map(|set| [(set, "hole.spin=0.9"), (set, "hole.spin=0.0")])
     {
         let scene = scene(&[*set, &["tracer.integrator=\"elliptic\"", spin]].concat());
-        let stage = Stage::new(&scene, None).unwrap();
-        assert!(stage.bare, "{set:?}");
-        let mut asked = stage.clone();
+        let prepared = PreparedScene::new(&scene, None).unwrap();
+        assert!(prepared.bare, "{set:?}");
+        let mut asked = prepared.clone();
         asked.bare = false;
         let mut scratch = Scratch::default();
-        let mut look = |stage: &Stage| {
-            let mut seen = vec![Glimpse::default(); 2 * rays];
-            stage.look_many(&alpha, &beta, &times, &mut scratch, &mut seen).unwrap();
+        let mut observe = |prepared: &PreparedScene| {
+            let mut seen = vec![RayResult::default(); 2 * rays];
+            prepared.observe_block(&alpha, &beta, &times, &mut scratch, &mut seen).unwrap();
             seen
         };
-        let (found, expected) = (look(&stage), look(&asked));
+        let (found, expected) = (observe(&prepared), observe(&asked));
         let differ = found.iter().zip(&expected).filter(|(a, b)| a != b).count();
         assert_eq!(differ, 0, "{set:?} {spin}");
         lit += found.iter().filter(|seen| seen.rgb[0] > 0.0).count();
-        by_steps += scratch.sights.iter().filter(|sight| sight.by_steps).count();
+        by_steps += scratch.traced.iter().filter(|traced| traced.by_steps).count();
     }
     assert!(lit > 1_000 && by_steps > 50, "{lit} {by_steps}");
 }
@@ -65,10 +65,10 @@ fn exact_only_bare_scenes_are_bare() {
         &[&["effects.polarization=true"], &field[..]].concat(),
     ];
     for set in cases {
-        let stage = Stage::new(&scene(&[&DISC[..], set].concat()), None).unwrap();
-        assert!(!stage.bare, "{set:?}");
+        let prepared = PreparedScene::new(&scene(&[&DISC[..], set].concat()), None).unwrap();
+        assert!(!prepared.bare, "{set:?}");
     }
     let mut spotted = scene(&DISC);
     spotted.spot = spots(1, None);
-    assert!(!Stage::new(&spotted, None).unwrap().bare);
+    assert!(!PreparedScene::new(&spotted, None).unwrap().bare);
 }

@@ -98,12 +98,12 @@ fn exact_redshift_is_the_product_of_momentum_and_velocity() {
 #[test]
 fn exact_picture_of_plunging_matter() {
     let set = ["hole.spin=0.0", "effects.spectral_index=1.0", "tracer.integrator=\"elliptic\""];
-    let stage = Stage::new(&with_disc(&set, Some(LAW)), None).unwrap();
+    let prepared = PreparedScene::new(&with_disc(&set, Some(LAW)), None).unwrap();
     let sin = 70f64.to_radians().sin();
     let (alpha, beta) = screen(24, 14.0);
     let mut checked = 0;
     for (alpha, beta) in alpha.iter().zip(&beta) {
-        let seen = stage.look(*alpha, *beta, &mut Scratch::default()).unwrap();
+        let seen = prepared.observe(*alpha, *beta, &mut Scratch::default()).unwrap();
         let (r, b) = (seen.radius, alpha.hypot(*beta));
         if !(2.05..6.0).contains(&r) || b > 5.1 {
             continue;
@@ -133,7 +133,7 @@ fn exact_plunging_matter_on_both_ways_to_trace() {
             let set = [&[&tracer[..], &spin, "tracer.tolerance=1e-10"], more].concat();
             let mut scene = with_disc(&set, plunging);
             scene.disc.as_mut().unwrap().opaque = false;
-            look(&Stage::new(&scene, None).unwrap(), &[0.0])
+            observe(&PreparedScene::new(&scene, None).unwrap(), &[0.0])
         };
         let [closed, steps] = ["elliptic", "taylor-mino"].map(|how| look_by(how, Some(LAW)));
         let mut plunging = 0;

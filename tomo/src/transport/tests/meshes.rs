@@ -47,10 +47,10 @@ fn mesh(opaque: bool, velocity: MeshVelocity) -> Mesh {
     }
 }
 
-fn stage(mut scene: Scene, meshes: Vec<(Mesh, MeshFile)>) -> Stage {
+fn prepared(mut scene: Scene, meshes: Vec<(Mesh, MeshFile)>) -> PreparedScene {
     let (meshes, files) = meshes.into_iter().unzip();
     scene.mesh = meshes;
-    Stage::new(&scene, Assets { meshes: files, ..Assets::default() }).unwrap()
+    PreparedScene::new(&scene, Assets { meshes: files, ..Assets::default() }).unwrap()
 }
 
 /// A ring of triangles in the plane of the disc is met where the disc is, with its redshift.
@@ -61,7 +61,7 @@ fn exact_annulus_against_the_disc() {
     for spin in ["0.0", "0.9", "-0.9"] {
         let mut base = scene(&[&format!("hole.spin={spin}")]);
         let ring = mesh(true, MeshVelocity::Keplerian);
-        let with_mesh = stage(base.clone(), vec![(ring, annulus(9.0, 15.0, sides))]);
+        let with_mesh = prepared(base.clone(), vec![(ring, annulus(9.0, 15.0, sides))]);
         base.disc = Some(Disc {
             peak_temperature_k: None,
             plunging: None,
@@ -71,10 +71,10 @@ fn exact_annulus_against_the_disc() {
             opaque: true,
             color: [1.0; 3],
         });
-        let with_disc = Stage::new(&base, None).unwrap();
+        let with_disc = PreparedScene::new(&base, None).unwrap();
         // Chords of the rings cut off this much.
         let flat = (PI / f64::from(sides)).cos();
-        let seen = look(&with_mesh, &[0.0]).into_iter().zip(look(&with_disc, &[0.0]));
+        let seen = observe(&with_mesh, &[0.0]).into_iter().zip(observe(&with_disc, &[0.0]));
         for (mesh, disc) in seen {
             let near_edge =
                 |r: f64| (9.0 * flat..9.0).contains(&r) || (15.0 * flat..=15.0).contains(&r);
@@ -98,13 +98,14 @@ fn exact_silhouette_of_a_sphere() {
     let rings = 48;
     for radius in [4.0, 6.0, 30.0] {
         let scene = scene(&["hole.spin=0.0"]);
-        let stage = stage(scene, vec![(mesh(true, MeshVelocity::Static), sphere(radius, rings))]);
+        let prepared =
+            prepared(scene, vec![(mesh(true, MeshVelocity::Static), sphere(radius, rings))]);
         let edge = |r: f64| r / (1.0f64 - 2.0 / r).sqrt();
         let inside = radius * (0.5 * PI / f64::from(rings)).cos().powi(2);
         for k in 0..12 {
             let (sin, cos) = (0.4 + f64::from(k)).sin_cos();
             let hit = |b: f64| {
-                let seen = stage.look(b * cos, b * sin, &mut Scratch::default()).unwrap();
+                let seen = prepared.observe(b * cos, b * sin, &mut Scratch::default()).unwrap();
                 if seen.fate == Fate::Surface {
                     let g = (1.0 - 2.0 / seen.radius).sqrt();
                     assert!((seen.redshift - g).abs() < 1e-9, "{} {g}", seen.redshift);
@@ -124,7 +125,7 @@ fn exact_silhouette_of_a_sphere() {
     }
 }
 
-/// Far from the hole rays are straight: a wall through its place across the line of sight is met
+/// Far from the hole rays are straight: a wall through its place across the line of traced is met
 /// at (α, β), but for the deflection of about 4 M / b.
 #[test]
 fn exact_straight_rays_far_out() {
@@ -132,15 +133,15 @@ fn exact_straight_rays_far_out() {
     let corner = |y: f64, z: f64| [0.0, size * y, size * z];
     let wall = quad([corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)]);
     let scene = scene(&["observer.inclination_deg=90"]);
-    let stage = stage(scene, vec![(mesh(true, MeshVelocity::Static), file(wall))]);
+    let prepared = prepared(scene, vec![(mesh(true, MeshVelocity::Static), file(wall))]);
     for (alpha, beta) in [(1e6, 3e5), (-2e6, -1e6), (4e5, -2e6)] {
-        let seen = stage.look(alpha, beta, &mut Scratch::default()).unwrap();
+        let seen = prepared.observe(alpha, beta, &mut Scratch::default()).unwrap();
         let b = f64::hypot(alpha, beta);
         assert!((seen.radius / b - 1.0).abs() < 10.0 / b, "{} {b}", seen.radius);
         assert!((seen.azimuth.abs() - FRAC_PI_2).abs() < 1e-9);
         assert!((seen.redshift - 1.0).abs() < 10.0 / b && seen.fate == Fate::Surface);
     }
-    let past = stage.look(3.01e6, 0.0, &mut Scratch::default()).unwrap();
+    let past = prepared.observe(3.01e6, 0.0, &mut Scratch::default()).unwrap();
     assert_eq!(past.fate, Fate::Escaped);
 }
 
@@ -162,8 +163,10 @@ fn exact_tree_against_every_triangle() {
         let scene = scene(&[&format!("hole.spin={spin}")]);
         let (thin, solid) =
             (mesh(false, MeshVelocity::Static), mesh(true, MeshVelocity::Keplerian));
-        let stage = stage(scene, vec![(thin, soup(0, 300, 20.0)), (solid, soup(300, 300, 16.0))]);
-        let (found, expected) = (look(&stage, &[0.0]), look(&stage.clone().one_by_one(), &[0.0]));
+        let prepared =
+            prepared(scene, vec![(thin, soup(0, 300, 20.0)), (solid, soup(300, 300, 16.0))]);
+        let (found, expected) =
+            (observe(&prepared, &[0.0]), observe(&prepared.clone().one_by_one(), &[0.0]));
         for (a, b) in found.iter().zip(&expected) {
             let same = |x: f64, y: f64| (x - y).abs() < 1e-7 * (1.0 + y.abs());
             assert_eq!(a.fate, b.fate);
@@ -181,10 +184,10 @@ fn exact_ray_in_the_plane_of_a_mesh() {
     for spin in ["0.0", "0.9"] {
         let scene = scene(&["observer.inclination_deg=90", &format!("hole.spin={spin}")]);
         let ring = (mesh(true, MeshVelocity::Static), annulus(5.0, 60.0, 64));
-        let stage = stage(scene, vec![ring]);
-        let look = |beta| stage.look(10.0, beta, &mut Scratch::default()).unwrap();
-        assert_ne!(look(0.0).fate, Fate::Surface);
-        assert_eq!(look(0.1).fate, Fate::Surface);
+        let prepared = prepared(scene, vec![ring]);
+        let observe = |beta| prepared.observe(10.0, beta, &mut Scratch::default()).unwrap();
+        assert_ne!(observe(0.0).fate, Fate::Surface);
+        assert_eq!(observe(0.1).fate, Fate::Surface);
     }
 }
 
@@ -194,10 +197,12 @@ fn exact_dark_surfaces_hide() {
     let mut base = scene(&[]);
     base.spot = spots(40, None);
     let dark = Mesh { brightness: 0.0, ..mesh(true, MeshVelocity::Static) };
-    let hidden = stage(base.clone(), vec![(dark, sphere(18.0, 16))]);
-    assert!(look(&hidden, &[30.0]).iter().all(|s| s.intensity == 0.0 && s.fate == Fate::Surface));
-    let open = Stage::new(&base, None).unwrap();
-    assert!(look(&open, &[30.0]).iter().any(|seen| seen.intensity > 0.0));
+    let hidden = prepared(base.clone(), vec![(dark, sphere(18.0, 16))]);
+    assert!(
+        observe(&hidden, &[30.0]).iter().all(|s| s.intensity == 0.0 && s.fate == Fate::Surface)
+    );
+    let open = PreparedScene::new(&base, None).unwrap();
+    assert!(observe(&open, &[30.0]).iter().any(|seen| seen.intensity > 0.0));
 }
 
 /// Files and scene must fit.
@@ -205,10 +210,10 @@ fn exact_dark_surfaces_hide() {
 fn exact_misfits_are_errors() {
     let mut scene = scene(&[]);
     scene.mesh = vec![mesh(true, MeshVelocity::Static)];
-    let error = Stage::new(&scene, None).unwrap_err().to_string();
+    let error = PreparedScene::new(&scene, None).unwrap_err().to_string();
     assert!(error.contains("one file for each"), "{error}");
     scene.mesh[0].scale = 1e7;
     let assets = Assets { meshes: vec![annulus(5.0, 6.0, 8)], ..Assets::default() };
-    let error = Stage::new(&scene, assets).unwrap_err().to_string();
+    let error = PreparedScene::new(&scene, assets).unwrap_err().to_string();
     assert!(error.contains("within 1e7 M"), "{error}");
 }

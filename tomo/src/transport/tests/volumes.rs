@@ -39,9 +39,9 @@ fn source(rotation: Rotation, axis: [f64; 3], since: f64) -> VolumeSource {
     }
 }
 
-fn stage(mut scene: Scene, source: VolumeSource, file: VolumeFile) -> Stage {
+fn prepared(mut scene: Scene, source: VolumeSource, file: VolumeFile) -> PreparedScene {
     scene.volume = vec![source];
-    Stage::new(&scene, Assets { volumes: vec![file], ..Assets::default() }).unwrap()
+    PreparedScene::new(&scene, Assets { volumes: vec![file], ..Assets::default() }).unwrap()
 }
 
 fn spot(axis: [f64; 3], sheared_since: Option<f64>) -> Spot {
@@ -57,11 +57,12 @@ fn spot(axis: [f64; 3], sheared_since: Option<f64>) -> Spot {
 }
 
 /// Relative L1 distance of intensities, of intensity-weighted redshifts, and of colours and Q.
-fn distances(found: &[Glimpse], expected: &[Glimpse]) -> [f64; 4] {
+fn distances(found: &[RayResult], expected: &[RayResult]) -> [f64; 4] {
     let mut sums = [[0.0; 2]; 4];
     for (a, b) in found.iter().zip(expected) {
-        let row =
-            |x: &Glimpse| [x.intensity, x.intensity * x.redshift, f64::from(x.rgb[1]), x.stokes[0]];
+        let row = |x: &RayResult| {
+            [x.intensity, x.intensity * x.redshift, f64::from(x.rgb[1]), x.stokes[0]]
+        };
         for (sum, (a, b)) in sums.iter_mut().zip(row(a).into_iter().zip(row(b))) {
             *sum = [sum[0] + (a - b).abs(), sum[1] + b.abs()];
         }
@@ -89,11 +90,11 @@ fn against_spot(nodes: usize, sheared: bool, axis: [f64; 3], set: &[&str]) -> [f
     let center = model.center(reference);
     let mut source = source(rotation, axis, reference);
     source.injection_time = sheared.then_some(since);
-    let found = stage(with_spot.clone(), source, gaussian(center, 0.8, nodes));
+    let found = prepared(with_spot.clone(), source, gaussian(center, 0.8, nodes));
     with_spot.spot = vec![one];
-    let expected = look(&Stage::new(&with_spot, None).unwrap(), &TIMES);
+    let expected = observe(&PreparedScene::new(&with_spot, None).unwrap(), &TIMES);
     assert!(expected.iter().filter(|seen| seen.intensity > 0.01).count() > 30);
-    distances(&look(&found, &TIMES), &expected)
+    distances(&observe(&found, &TIMES), &expected)
 }
 
 /// A Gaussian on the nodes of a cube is the spot, but for linear interpolation: (h/σ)²/12 of its
@@ -179,7 +180,7 @@ fn exact_chords_of_uniform_bodies() {
     ] {
         let still =
             VolumeSource { reference_time: None, ..source(Rotation::None, [0.0, 0.0, 1.0], 0.0) };
-        let stage = stage(scene.clone(), still, file);
+        let prepared = prepared(scene.clone(), still, file);
         let (mut lit, mut sum, mut bias) = (0, 0.0, 0.0);
         for k in 1..200 {
             let part = |f: f64| 6.0 * ((f64::from(k) * f).fract() - 0.5);
@@ -189,7 +190,7 @@ fn exact_chords_of_uniform_bodies() {
                 // A grazing ray's chord is as uncertain as the steps.
                 continue;
             }
-            let found = stage.look(alpha, beta, &mut Scratch::default()).unwrap().intensity;
+            let found = prepared.observe(alpha, beta, &mut Scratch::default()).unwrap().intensity;
             assert!((found - expected).abs() < allowed, "({alpha}, {beta}): {found} {expected}");
             lit += u32::from(expected > 0.0);
             (sum, bias) = (sum + expected, bias + found - expected);
@@ -209,8 +210,8 @@ impl Medium for Finer {
     fn sphere(&self) -> f64 {
         self.0.sphere()
     }
-    fn grain(&self) -> Option<Grain> {
-        self.0.grain().map(|grain| Grain { size: self.1 * grain.size, ..grain })
+    fn cell_size(&self) -> Option<CellSize> {
+        self.0.cell_size().map(|cell| CellSize { size: self.1 * cell.size, ..cell })
     }
     fn quantities(&self) -> Quantities {
         self.0.quantities()
@@ -227,8 +228,8 @@ impl Medium for Finer {
     fn changes(&self) -> bool {
         self.0.changes()
     }
-    fn may_shine(&self, stretch: &Stretch, moment: Moment) -> bool {
-        self.0.may_shine(stretch, moment)
+    fn may_shine(&self, segment: &PathSegment, moment: Moment) -> bool {
+        self.0.may_shine(segment, moment)
     }
     fn absorbs(&self) -> bool {
         self.0.absorbs()
@@ -249,11 +250,11 @@ fn regress_panels_resolve_cells() {
             let tolerance = format!("tracer.tolerance={tolerance}");
             let scene = scene(&[&tolerance, &tracer, "effects.slow_light=true"]);
             let source = source(Rotation::Keplerian, [0.0, 0.6, 0.8], 0.0);
-            let coarse = stage(scene, source, gaussian(center, 0.8, 33));
+            let coarse = prepared(scene, source, gaussian(center, 0.8, 33));
             let mut fine = coarse.clone();
             fine.media = vec![Arc::new(Finer(coarse.media[0].clone(), 0.125))];
             fine.tolerance = 1e-9;
-            let [miss, ..] = distances(&look(&coarse, &[60.0]), &look(&fine, &[60.0]));
+            let [miss, ..] = distances(&observe(&coarse, &[60.0]), &observe(&fine, &[60.0]));
             println!("{integrator}, {tolerance}: {miss:e}");
             assert!(miss < allowed, "{integrator}, {tolerance}: {miss:e}");
         }
@@ -268,17 +269,17 @@ fn exact_darkness_and_refusals() {
         ..source(Rotation::Keplerian, [0.0, 0.0, 1.0], 0.0)
     };
     let dark =
-        stage(scene(&["effects.slow_light=true"]), early, gaussian([6.0, 0.0, 0.0], 0.8, 17));
-    assert!(look(&dark, &TIMES).iter().all(|seen| seen.intensity == 0.0));
+        prepared(scene(&["effects.slow_light=true"]), early, gaussian([6.0, 0.0, 0.0], 0.8, 17));
+    assert!(observe(&dark, &TIMES).iter().all(|seen| seen.intensity == 0.0));
     let still = || source(Rotation::None, [0.0, 0.0, 1.0], 0.0);
-    let empty = stage(scene(&[]), still(), volume(3, around([0.0; 3], 8.0), |_| 0.0));
-    assert!(look(&empty, &TIMES).iter().all(|seen| seen.intensity == 0.0));
+    let empty = prepared(scene(&[]), still(), volume(3, around([0.0; 3], 8.0), |_| 0.0));
+    assert!(observe(&empty, &TIMES).iter().all(|seen| seen.intensity == 0.0));
     let mut wrong = scene(&[]);
     wrong.volume = vec![still()];
     let negative = volume(3, around([0.0; 3], 8.0), |x| x[0]);
-    let error = Stage::new(&wrong, Assets { volumes: vec![negative], ..Assets::default() });
+    let error = PreparedScene::new(&wrong, Assets { volumes: vec![negative], ..Assets::default() });
     let text = error.unwrap_err().to_string();
     assert_eq!(text, "least value of the volume = -8 is not allowed: 0 or more");
-    let text = Stage::new(&wrong, None).unwrap_err().to_string();
+    let text = PreparedScene::new(&wrong, None).unwrap_err().to_string();
     assert!(text.contains("one file for each [[volume]]"), "{text}");
 }

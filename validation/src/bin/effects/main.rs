@@ -6,7 +6,7 @@ mod off;
 
 use anyhow::Context;
 use kerrlight_tomo::scene::{Scene, apply_override};
-use kerrlight_tomo::transport::{Glimpse, Scratch, Stage};
+use kerrlight_tomo::transport::{PreparedScene, RayResult, Scratch};
 use std::fmt::Write as _;
 use std::io::Write;
 use std::path::Path;
@@ -109,17 +109,17 @@ fn time(on: &[usize]) -> anyhow::Result<f64> {
 
 /// Microseconds a ray of the fastest of several runs, on one thread.
 fn seconds(scene: &Scene) -> anyhow::Result<f64> {
-    let stage = Stage::new(scene, None)?;
+    let prepared = PreparedScene::new(scene, None)?;
     let size = scene.pixel_size();
     let place = |k: usize| (k as f64 + 0.5 - 0.5 * SIDE as f64) * size;
     let points = (0..SIDE * SIDE).map(|k| (place(k % SIDE), -place(k / SIDE)));
     let (alpha, beta): (Vec<f64>, Vec<f64>) = points.unzip();
     let mut scratch = Scratch::default();
-    let mut seen = vec![Glimpse::default(); alpha.len()];
+    let mut seen = vec![RayResult::default(); alpha.len()];
     let mut least = f64::INFINITY;
     for _ in 0..RUNS {
         let start = Instant::now();
-        stage.look_many(&alpha, &beta, &[stage.time()], &mut scratch, &mut seen)?;
+        prepared.observe_block(&alpha, &beta, &[prepared.time()], &mut scratch, &mut seen)?;
         least = least.min(start.elapsed().as_secs_f64());
     }
     Ok(least / alpha.len() as f64 * 1e6)

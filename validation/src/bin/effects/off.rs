@@ -5,7 +5,7 @@ use kerrlight_geodesic::simd::Crossings;
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
 use kerrlight_tomo::emission::disc::DiscModel;
 use kerrlight_tomo::scene::Scene;
-use kerrlight_tomo::transport::{Fate, Glimpse, Scratch, Stage};
+use kerrlight_tomo::transport::{Fate, PreparedScene, RayResult, Scratch};
 use std::time::Instant;
 
 /// An opaque disc and nothing else.
@@ -33,9 +33,9 @@ struct Seen {
 
 /// Both ways to the same picture.
 pub struct Off {
-    stage: Stage,
+    prepared: PreparedScene,
     scratch: Scratch,
-    glimpses: Vec<Glimpse>,
+    results: Vec<RayResult>,
     observer: Observer,
     hole: Kerr,
     disc: DiscModel,
@@ -57,9 +57,9 @@ impl Off {
         let disc = scene.disc.as_ref().ok_or_else(|| anyhow::anyhow!("a disc"))?;
         let inclination = Inclination::from_degrees(scene.observer.inclination_deg)?;
         Ok(Off {
-            stage: Stage::new(&scene, None)?,
+            prepared: PreparedScene::new(&scene, None)?,
             scratch: Scratch::default(),
-            glimpses: vec![Glimpse::default(); alpha.len()],
+            results: vec![RayResult::default(); alpha.len()],
             observer: Observer::at_infinity(inclination),
             hole,
             disc: DiscModel::new(disc, &hole),
@@ -79,9 +79,9 @@ impl Off {
     /// With the library.
     pub fn library(&mut self) -> anyhow::Result<()> {
         let rays = self.alpha.chunks(BLOCK).zip(self.beta.chunks(BLOCK));
-        for ((alpha, beta), seen) in rays.zip(self.glimpses.chunks_mut(BLOCK)) {
-            let times = [self.stage.time()];
-            self.stage.look_many(alpha, beta, &times, &mut self.scratch, seen)?;
+        for ((alpha, beta), seen) in rays.zip(self.results.chunks_mut(BLOCK)) {
+            let times = [self.prepared.time()];
+            self.prepared.observe_block(alpha, beta, &times, &mut self.scratch, seen)?;
         }
         Ok(())
     }
@@ -133,16 +133,16 @@ impl Off {
 
     /// Whether both see the same.
     pub fn agree(&self) -> bool {
-        let same = |(seen, glimpse): (&Seen, &Glimpse)| {
+        let same = |(seen, result): (&Seen, &RayResult)| {
             let unmet = seen.fate == Fate::Unresolved;
-            let light = seen.intensity == glimpse.intensity && seen.rgb == glimpse.rgb;
+            let light = seen.intensity == result.intensity && seen.rgb == result.rgb;
             let place = [seen.radius, seen.azimuth, seen.delay];
-            let place = place == [glimpse.radius, glimpse.azimuth, glimpse.delay];
-            let rest = seen.crossings == glimpse.crossings && seen.images == glimpse.disc_images;
-            unmet || (light && place && rest && seen.fate == glimpse.fate)
+            let place = place == [result.radius, result.azimuth, result.delay];
+            let rest = seen.crossings == result.crossings && seen.images == result.disc_images;
+            unmet || (light && place && rest && seen.fate == result.fate)
         };
         let unmet = self.seen.iter().filter(|seen| seen.fate == Fate::Unresolved).count();
-        unmet * 1000 < self.seen.len() && self.seen.iter().zip(&self.glimpses).all(same)
+        unmet * 1000 < self.seen.len() && self.seen.iter().zip(&self.results).all(same)
     }
 }
 

@@ -3,14 +3,14 @@
 //! Surfaces come first, since they end rays; then what fills space, on quadrature nodes; then spots;
 //! then the sky.
 
-use super::glimpse::{Fate, Gather, Glimpse, wrap};
 use super::meter::Part;
-use super::rays::{End, Sight};
+use super::rays::{End, TracedRay};
+use super::result::{Accumulator, Fate, RayResult, wrap};
 use super::spots::SpotTree;
 use super::straight::Line;
 use super::surface::Seen;
 use super::view::View;
-use super::{NEAREST, Scratch, Stage};
+use super::{NEAREST, PreparedScene, Scratch};
 use crate::emission::sky::Beam;
 use kerrlight_geodesic::{Observer, OutOfRange, Ray, footprint};
 use std::sync::Arc;
@@ -30,19 +30,19 @@ impl Block<'_> {
     }
 }
 
-impl Stage {
+impl PreparedScene {
     /// What is seen at (α, β) at the scene's own time.
     ///
     /// # Errors
     /// If no ray with these coordinates reaches the observer.
-    pub fn look(
+    pub fn observe(
         &self,
         alpha: f64,
         beta: f64,
         scratch: &mut Scratch,
-    ) -> Result<Glimpse, OutOfRange> {
-        let mut seen = [Glimpse::default()];
-        self.look_many(&[alpha], &[beta], &[self.time], scratch, &mut seen)?;
+    ) -> Result<RayResult, OutOfRange> {
+        let mut seen = [RayResult::default()];
+        self.observe_block(&[alpha], &[beta], &[self.time], scratch, &mut seen)?;
         let [seen] = seen;
         Ok(seen)
     }
@@ -52,45 +52,49 @@ impl Stage {
     ///
     /// # Errors
     /// If no ray with these coordinates reaches the observer.
-    pub fn look_many(
+    pub fn observe_block(
         &self,
         alpha: &[f64],
         beta: &[f64],
         times: &[f64],
         scratch: &mut Scratch,
-        seen: &mut [Glimpse],
+        seen: &mut [RayResult],
     ) -> Result<(), OutOfRange> {
         let rays = alpha.len();
-        scratch.sights.clear();
+        scratch.traced.clear();
         scratch.hits.clear();
         if let (View::Screen(observer), false) = (&self.view, self.lensing) {
-            return self.look_straight(observer, Block { alpha, beta, times }, scratch, seen);
+            return self.observe_straight(observer, Block { alpha, beta, times }, scratch, seen);
         }
         let observer = self.closed_form();
         if let (true, Some(observer)) = (self.bare, observer) {
-            return self.look_bare(observer, Block { alpha, beta, times }, scratch, seen);
+            return self.observe_bare(observer, Block { alpha, beta, times }, scratch, seen);
         }
         let trees: Vec<_> = times.iter().map(|time| self.spot_tree(*time)).collect();
         let clock = scratch.meter.start();
         match observer {
             Some(observer) => self.trace_block(observer, (alpha, beta), &trees, scratch)?,
-            None => scratch.sights.resize(rays, Sight { by_steps: true, ..Sight::default() }),
+            None => {
+                scratch.traced.resize(rays, TracedRay { by_steps: true, ..TracedRay::default() })
+            }
         }
         scratch.meter.stop(Part::Rays, clock);
         scratch.volume.reset(self.media.len() * rays * times.len());
         if let Some(observer) = observer {
-            for (m, medium) in self.media.iter().enumerate().filter(|(_, m)| m.grain().is_none()) {
+            for (m, medium) in
+                self.media.iter().enumerate().filter(|(_, m)| m.cell_size().is_none())
+            {
                 let clock = scratch.meter.start();
                 self.fill_block(m, observer, (alpha, beta), times, scratch)?;
                 scratch.meter.stop(medium.part(), clock);
             }
         }
         for k in 0..rays {
-            let by_steps = scratch.sights[k].by_steps;
+            let by_steps = scratch.traced[k].by_steps;
             let ray = by_steps.then(|| self.step(k, (alpha[k], beta[k]), times, scratch));
             let ray = ray.transpose()?;
             let place = (alpha[k], beta[k]);
-            self.look_along(k, ray.as_ref(), place, (times, &trees), scratch, seen)?;
+            self.shade(k, ray.as_ref(), place, (times, &trees), scratch, seen)?;
         }
         Ok(())
     }
@@ -105,13 +109,13 @@ impl Stage {
     ) -> Result<Ray, OutOfRange> {
         let ray = self.view.ray(&self.hole, x, y)?;
         let clock = scratch.meter.start();
-        scratch.sights[k] = self.trace_steps(&ray, scratch);
+        scratch.traced[k] = self.trace_steps(&ray, scratch);
         scratch.meter.stop(Part::Rays, clock);
         let screen = self.screen_point(x, y);
         for (m, medium) in self.media.iter().enumerate() {
             let clock = scratch.meter.start();
-            match medium.grain() {
-                Some(grain) => self.fill_cells((m, k), &ray, (screen, grain), times, scratch),
+            match medium.cell_size() {
+                Some(cell) => self.fill_cells((m, k), &ray, (screen, cell), times, scratch),
                 None => self.fill_path((m, k), screen, times, scratch),
             }
             scratch.meter.stop(medium.part(), clock);
@@ -119,24 +123,24 @@ impl Stage {
         Ok(ray)
     }
 
-    /// [`look_many`](Self::look_many) without gravitational lensing.
-    fn look_straight(
+    /// [`observe_block`](Self::observe_block) without gravitational lensing.
+    fn observe_straight(
         &self,
         observer: &Observer,
         block: Block<'_>,
         scratch: &mut Scratch,
-        seen: &mut [Glimpse],
+        seen: &mut [RayResult],
     ) -> Result<(), OutOfRange> {
         let (rays, times) = (block.alpha.len(), block.times);
-        scratch.sights.resize(rays, Sight::default());
+        scratch.traced.resize(rays, TracedRay::default());
         scratch.volume.reset(self.media.len() * rays * times.len());
         for k in 0..rays {
             let (alpha, beta) = block.place(k);
             let ray = observer.ray(&self.hole, alpha, beta)?;
             let line = Line::new(observer, self.hole.horizon(), alpha, beta);
-            scratch.sights[k] = self.trace_line(&line, &ray, scratch);
+            scratch.traced[k] = self.trace_line(&line, &ray, scratch);
             self.fill_line(&line, k, times, scratch);
-            self.look_along(k, None, (alpha, beta), (times, &[]), scratch, seen)?;
+            self.shade(k, None, (alpha, beta), (times, &[]), scratch, seen)?;
         }
         Ok(())
     }
@@ -154,55 +158,55 @@ impl Stage {
     /// What is seen along ray number `k`, of which everything is known but the light of the
     /// surfaces, the spots and the sky. `ray` is there and the path of `scratch` is its own if it was
     /// traced step by step.
-    pub(super) fn look_along(
+    pub(super) fn shade(
         &self,
         k: usize,
         ray: Option<&Ray>,
         (x, y): (f64, f64),
         (times, trees): (&[f64], &[Option<Arc<SpotTree>>]),
         scratch: &mut Scratch,
-        seen: &mut [Glimpse],
+        seen: &mut [RayResult],
     ) -> Result<(), OutOfRange> {
         let clock = scratch.meter.start();
-        let sight = scratch.sights[k].clone();
-        let mut still = Gather::new();
-        let hits = scratch.hits[sight.hits.clone()].iter().copied();
+        let traced = scratch.traced[k].clone();
+        let mut still = Accumulator::new();
+        let hits = scratch.hits[traced.hits.clone()].iter().copied();
         let screen = self.screen_point(x, y);
-        let shift = self.redshift.and_then(|_| self.view.blueshift(x, y));
-        let Sight { lambda, eta, .. } = sight;
-        let redshift = self.redshift;
-        let seen_as = Seen { lambda, eta, screen: screen.as_ref(), shift, redshift };
-        self.add_disc(hits, seen_as, sight.last_time(), &mut still);
-        if sight.by_steps {
-            self.add_meshes(scratch, sight.last_time(), &mut still);
+        let shift = self.spectral_index.and_then(|_| self.view.blueshift(x, y));
+        let TracedRay { lambda, eta, .. } = traced;
+        let spectral_index = self.spectral_index;
+        let seen_as = Seen { lambda, eta, screen: screen.as_ref(), shift, spectral_index };
+        self.add_disc(hits, seen_as, traced.last_time(), &mut still);
+        if traced.by_steps {
+            self.add_meshes(scratch, traced.last_time(), &mut still);
         }
         scratch.meter.stop(Part::Surfaces, clock);
         let clock = scratch.meter.start();
-        let sky = self.sky_light(x, y, &sight, scratch)?;
+        let sky = self.sky_light(x, y, &traced, scratch)?;
         scratch.meter.stop(Part::Sky, clock);
         let clock = scratch.meter.start();
         for (j, time) in times.iter().enumerate() {
-            let mut gather = still.clone();
-            let rays = scratch.sights.len();
+            let mut gathered = still.clone();
+            let rays = scratch.traced.len();
             for (m, medium) in self.media.iter().enumerate() {
                 let place = (m * rays + k) * times.len() + j;
                 if let Some(light) = scratch.volume.lights.get(place) {
-                    gather.add_light(light, medium.color());
+                    gathered.add_light(light, medium.color());
                 }
             }
             if let (Some(tree), Some(ray)) = (trees.get(j), ray) {
-                let end = sight.last_time();
+                let end = traced.last_time();
                 match tree {
                     Some(tree) => {
-                        self.add_spots(*time, tree, (ray, screen), scratch, end, &mut gather)
+                        self.add_spots(*time, tree, (ray, screen), scratch, end, &mut gathered)
                     }
-                    None => self.add_every_spot(*time, (ray, screen), scratch, end, &mut gather),
+                    None => self.add_every_spot(*time, (ray, screen), scratch, end, &mut gathered),
                 }
             }
-            gather.add_behind(sky);
-            let Some(place) = seen.get_mut(j * scratch.sights.len() + k) else { continue };
-            *place = glimpse(&sight, gather);
-            if let (Some(index), Some(shift)) = (self.redshift, shift) {
+            gathered.add_behind(sky);
+            let Some(place) = seen.get_mut(j * scratch.traced.len() + k) else { continue };
+            *place = ray_result(&traced, gathered);
+            if let (Some(index), Some(shift)) = (self.spectral_index, shift) {
                 place.receive(shift, index);
             }
         }
@@ -215,13 +219,13 @@ impl Stage {
         &self,
         x: f64,
         y: f64,
-        sight: &Sight,
+        traced: &TracedRay,
         scratch: &mut Scratch,
     ) -> Result<[f32; 3], OutOfRange> {
-        let (Some(sky), Some(direction), None) = (&self.sky, sight.exit, sight.surface) else {
+        let (Some(sky), Some(direction), None) = (&self.sky, traced.exit, traced.surface) else {
             return Ok([0.0; 3]);
         };
-        if sight.until < sight.total {
+        if traced.until < traced.total {
             return Ok([0.0; 3]);
         }
         if let (Some(spacing), true) = (self.beams, self.lensing) {
@@ -229,34 +233,34 @@ impl Stage {
             let hole = self.hole.lift();
             let end = footprint::of_ray(&hole, &ray, self.tolerance, &mut scratch.beam)?;
             if let Some(end) = end {
-                return Ok(sky.gather(&Beam::new(&end, spacing)));
+                return Ok(sky.mean_color(&Beam::new(&end, spacing)));
             }
         }
-        Ok(sky.look(direction))
+        Ok(sky.color(direction))
     }
 }
 
 /// The sum of everything along a ray.
 #[inline]
-pub(super) fn glimpse(sight: &Sight, gather: Gather) -> Glimpse {
-    let fate = match (sight.surface, sight.end) {
+pub(super) fn ray_result(traced: &TracedRay, gathered: Accumulator) -> RayResult {
+    let fate = match (traced.surface, traced.end) {
         (Some(_), _) => Fate::Surface,
         (None, End::Captured) => Fate::Captured,
         (None, End::Escaped) => Fate::Escaped,
         (None, End::Unresolved) => Fate::Unresolved,
     };
-    let mean = if gather.intensity > 0.0 { gather.shift / gather.intensity } else { 0.0 };
-    Glimpse {
-        intensity: gather.intensity,
-        rgb: gather.rgb,
+    let mean = if gathered.intensity > 0.0 { gathered.shift / gathered.intensity } else { 0.0 };
+    RayResult {
+        intensity: gathered.intensity,
+        rgb: gathered.rgb,
         redshift: mean,
-        crossings: sight.crossings,
-        disc_images: gather.disc_images,
-        radius: gather.place.radius,
-        azimuth: wrap(gather.place.azimuth),
-        delay: gather.place.delay,
-        optical_depth: gather.depth,
-        stokes: gather.stokes,
+        crossings: traced.crossings,
+        disc_images: gathered.disc_images,
+        radius: gathered.place.radius,
+        azimuth: wrap(gathered.place.azimuth),
+        delay: gathered.place.delay,
+        optical_depth: gathered.depth,
+        stokes: gathered.stokes,
         fate,
     }
 }

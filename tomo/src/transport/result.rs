@@ -20,7 +20,7 @@ pub enum Fate {
 
 /// What one ray sees.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Glimpse {
+pub struct RayResult {
     /// Intensity of all emission (the sky left out), in the scene's unit.
     pub intensity: f64,
     /// Linear colour: emission and sky.
@@ -46,7 +46,7 @@ pub struct Glimpse {
     pub fate: Fate,
 }
 
-impl Glimpse {
+impl RayResult {
     /// Light as it is received by someone in whose frame it has `shift` times the frequency that
     /// it has at infinity: I_ν/ν³ is invariant, so that a spectrum ν^(−α) gains shift^(3 + α).
     ///
@@ -64,7 +64,7 @@ impl Glimpse {
 
 /// Light gathered along one ray.
 #[derive(Clone)]
-pub(super) struct Gather {
+pub(super) struct Accumulator {
     pub intensity: f64,
     pub shift: f64,
     pub rgb: [f32; 3],
@@ -75,9 +75,9 @@ pub(super) struct Gather {
     pub disc_images: u32,
 }
 
-impl Gather {
+impl Accumulator {
     pub fn new() -> Self {
-        Gather {
+        Accumulator {
             intensity: 0.0,
             shift: 0.0,
             rgb: [0.0; 3],
