@@ -173,7 +173,7 @@ mod rays;
 pub mod capi;
 
 pub use matter::{flow, plunge};
-pub use numbers::quadrature;
+pub use numbers::{legendre, quadrature, vector};
 pub use rays::{derivatives, footprint};
 pub use spacetime::orbits;
 

@@ -1,7 +1,7 @@
 //! Films: frames that are those of `render`, that are kept, and that do not flicker.
 
 use crate::support::{fail, kerrlight, root, scene, succeed};
-use kerrlight_geodesic::flow::dot;
+use kerrlight_geodesic::vector::dot;
 use kerrlight_geodesic::{Kerr, footprint};
 use kerrlight_tomo::emission::sky::SkyModel;
 use kerrlight_tomo::film::Film;

@@ -278,9 +278,10 @@ fn exact_visibilities_and_closures_together() {
 /// shares neither nodes nor sums with it.
 #[test]
 fn code_pixels_are_those_of_the_renderer() {
+    use kerrlight_geodesic::vector::distance;
     use kerrlight_geodesic::{Inclination, Kerr, Observer};
     use kerrlight_tomo::dynamics::{AngularVelocity, Axis, Injection};
-    use kerrlight_tomo::emission::spot::{SpotModel, distance};
+    use kerrlight_tomo::emission::spot::SpotModel;
     use kerrlight_tomo::fit::{
         Batch, Chain, Motion, Redshift, Region, Sampling, SightlineRequest, Sightlines,
     };

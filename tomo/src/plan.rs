@@ -1,7 +1,7 @@
 //! What a scene calls for: which quantities are traced and which are not, and why.
 
+use crate::emission::medium::Part;
 use crate::scene::{GasMotion, Integrator, Scene, Sky};
-use crate::transport::Part;
 
 /// A line of a plan.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -3,9 +3,9 @@
 use super::config::{FitFile, Spot};
 use super::setup::{self, Instrument};
 use anyhow::{Context, anyhow, bail};
+use kerrlight_geodesic::vector::{distance, rotate};
 use kerrlight_tomo::dynamics::{AngularVelocity, Axis};
 use kerrlight_tomo::emission::glyph::{Glyph, GlyphShape};
-use kerrlight_tomo::emission::spot::{distance, rotate};
 use kerrlight_tomo::fit::{Batch, Chain};
 
 /// The emission that is simulated.

@@ -1,10 +1,11 @@
 //! What a scene calls for, what that is going to cost, and what it did cost.
 
 use crate::answer::Answer;
+use kerrlight_tomo::emission::medium::Part;
 use kerrlight_tomo::plan::Plan;
 use kerrlight_tomo::render::{Raster, RenderError};
 use kerrlight_tomo::scene::Scene;
-use kerrlight_tomo::transport::{Meter, Part};
+use kerrlight_tomo::transport::Meter;
 use serde_json::json;
 use std::time::{Duration, Instant};
 

@@ -1,5 +1,6 @@
 //! Matter on circular orbits, and the redshift factor g = ν_obs/ν_em of its light.
 
+use crate::numbers::vector::{cross, dot};
 use crate::spacetime::kerr::Kerr;
 use crate::spacetime::orbits;
 use crate::spacetime::point::PathPoint;
@@ -69,16 +70,6 @@ pub fn rotation_norm(hole: &Kerr, r: f64, n: [f64; 3], v: [f64; 3]) -> f64 {
     let swirl = n[0] * v[1] - n[1] * v[0];
     1.0 - 2.0 * r / sigma * (1.0 - 2.0 * a * swirl) - area * dot(v, v)
         + a * a * (sigma + 2.0 * r) / sigma * v[2] * v[2]
-}
-
-/// The cross product of two vectors.
-pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-/// The scalar product of two vectors.
-pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[cfg(test)]

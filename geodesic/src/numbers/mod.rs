@@ -1,8 +1,10 @@
 //! Numbers and what is done with them: the scalars that the equations are generic over, dual and
-//! compensated numbers, polynomials, quadrature.
+//! compensated numbers, polynomials, quadrature, vectors.
 
 pub(crate) mod compensated;
 pub(crate) mod dual;
+pub mod legendre;
 pub(crate) mod polynomial;
 pub mod quadrature;
 pub(crate) mod scalar;
+pub mod vector;

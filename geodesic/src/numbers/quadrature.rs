@@ -1,6 +1,8 @@
 //! Nodes and weights for integrals along a path, placed by the caller's intervals and
 //! never by the stepper.
 
+use crate::numbers::legendre::with_slope;
+
 /// Nodes and weights of the four-point Gauss–Legendre rule on [−1, 1]: exact to degree 7.
 const GAUSS_4: [(f64, f64); 4] = [
     (-0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
@@ -25,6 +27,7 @@ pub fn equidistant(from: f64, to: f64, n: usize) -> impl ExactSizeIterator<Item 
     let step = (to - from) / (n.max(2) - 1) as f64;
     (0..n).map(move |k| if k + 1 == n { to } else { from + step * k as f64 })
 }
+
 /// Nodes in (0, 1), in order, and weights of the Gauss–Legendre rule with `n` ≥ 1 points:
 /// exact to degree 2n − 1.
 ///
@@ -40,26 +43,16 @@ pub fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
         let angle = core::f64::consts::PI * (k as f64 + 0.75) / (n as f64 + 0.5);
         let mut x = angle.cos();
         for _ in 0..8 {
-            let (value, slope) = legendre(n, x);
+            let (value, slope) = with_slope(n, x);
             x -= value / slope;
         }
         if 2 * k + 1 == n {
             x = 0.0;
         }
-        let slope = legendre(n, x).1;
+        let slope = with_slope(n, x).1;
         let weight = 1.0 / ((1.0 - x * x) * slope * slope);
         rule[k] = (0.5 * (1.0 - x), weight);
         rule[n - 1 - k] = (0.5 * (1.0 + x), weight);
     }
     rule
-}
-
-/// P_n and its derivative at |x| < 1.
-fn legendre(n: usize, x: f64) -> (f64, f64) {
-    let (mut last, mut value) = (0.0, 1.0);
-    for k in 0..n {
-        let k = k as f64;
-        (last, value) = (value, ((2.0 * k + 1.0) * x * value - k * last) / (k + 1.0));
-    }
-    (value, n as f64 * (x * value - last) / (x * x - 1.0))
 }

@@ -19,6 +19,7 @@ use crate::error::OutOfRange;
 use crate::integrate::path::{Outcome, Path};
 use crate::integrate::trace::{Tracer, trace_series};
 use crate::numbers::dual::Dual;
+use crate::numbers::vector::dot;
 use crate::rays::blocks::in_blocks;
 use crate::rays::integrator::check_columns;
 use crate::screen::camera::Camera;
@@ -110,7 +111,7 @@ impl Sky {
     /// observer is farther away than the lens can focus.)
     pub fn ellipse(&self) -> Ellipse {
         let [right, up] = self.frame();
-        let in_frame = |v: &[f64; 3]| [dot(&right, v), dot(&up, v)];
+        let in_frame = |v: &[f64; 3]| [dot(right, *v), dot(up, *v)];
         Ellipse::of_map([in_frame(&self.by_first), in_frame(&self.by_second)])
     }
 
@@ -120,10 +121,6 @@ impl Sky {
         let (sin, cos) = self.ellipse().orientation.sin_cos();
         core::array::from_fn(|k| cos * right[k] + sin * up[k])
     }
-}
-
-fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Where a ray meets the equatorial plane, and how that changes with the screen.

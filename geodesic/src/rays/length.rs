@@ -1,5 +1,6 @@
 //! Path length ∫Σ dτ along a piece of a ray, and where it has a given value.
 
+use crate::numbers::legendre;
 use crate::numbers::scalar::Elementary;
 
 /// Nodes of the Gauss–Legendre rule on each part of the piece.
@@ -68,7 +69,7 @@ impl<T: Elementary> Length<T> {
         for (node, weight) in rule {
             let time = self.start + self.whole * T::constant(from + width * node);
             let value = density(time) * T::constant(*weight);
-            let basis = legendre::<f64, NODES>(2.0 * node - 1.0);
+            let basis = basis::<f64, NODES>(2.0 * node - 1.0);
             for (n, (sum, p)) in series.iter_mut().zip(basis).enumerate() {
                 *sum = *sum + value * T::constant(p * (2 * n + 1) as f64);
             }
@@ -113,7 +114,7 @@ impl<T: Elementary> Part<T> {
     /// ∫ from −1 to `x` of the density, and the density at `x`.
     fn within(&self, x: T) -> (T, T) {
         // ∫P_n = (P_{n+1} − P_{n−1})/(2n + 1).
-        let basis = legendre::<T, { NODES + 1 }>(x);
+        let basis = basis::<T, { NODES + 1 }>(x);
         let c = &self.density;
         let mut length = c[0] * (x + T::constant(1.0));
         let mut density = c[0];
@@ -127,14 +128,9 @@ impl<T: Elementary> Part<T> {
 }
 
 /// P₀(x) to P_{N−1}(x).
-fn legendre<T: Elementary, const N: usize>(x: T) -> [T; N] {
-    let mut p = [T::constant(1.0); N];
-    p[1] = x;
-    for n in 2..N {
-        let [a, b] = [(2 * n - 1) as f64 / n as f64, (n - 1) as f64 / n as f64];
-        p[n] = T::constant(a) * x * p[n - 1] - T::constant(b) * p[n - 2];
-    }
-    p
+fn basis<T: Elementary, const N: usize>(x: T) -> [T; N] {
+    let mut values = legendre::values(x);
+    core::array::from_fn(|_| values.next().unwrap_or(x)) // there is no end to them
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! A quadrature rule on panels that also integrates up to each of its own nodes.
 
+use crate::numbers::legendre;
 use crate::numbers::quadrature::gauss_legendre;
 
 /// The Gauss–Legendre rule on [0, 1] with the integrals from 0 to its nodes.
@@ -56,14 +57,7 @@ impl PanelRule {
 
 /// P_k(2x − 1) for k < n.
 fn legendre_values(n: usize, x: f64) -> Vec<f64> {
-    let z = 2.0 * x - 1.0;
-    let mut values = vec![1.0, z];
-    for k in 1..n {
-        let k_ = k as f64;
-        values.push(((2.0 * k_ + 1.0) * z * values[k] - k_ * values[k - 1]) / (k_ + 1.0));
-    }
-    values.truncate(n);
-    values
+    legendre::values(2.0 * x - 1.0).take(n).collect()
 }
 
 /// ∫₀ˣ P_k(2t − 1) dt for k < n.

@@ -1,5 +1,7 @@
 //! Unit vectors, and steps on the sphere.
 
+use kerrlight_geodesic::vector::dot;
+
 /// A unit vector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axis([f64; 3]);
@@ -73,8 +75,4 @@ impl Axis {
     pub fn dot(self, other: Self) -> f64 {
         dot(self.0, other.0)
     }
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

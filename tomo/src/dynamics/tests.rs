@@ -1,6 +1,6 @@
 use super::*;
-use crate::emission::spot::rotate;
 use crate::points::{Coordinates, CoordinatesMut};
+use kerrlight_geodesic::vector::rotate;
 
 const COUNT: usize = 20_003;
 

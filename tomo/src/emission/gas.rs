@@ -1,8 +1,8 @@
 //! A volumetric flow with an analytic density and motion, such as the EHT's tests of radiative
 //! transfer use (Gold et al. 2020, ApJ 897, 148, section 3.2).
 
+use super::medium::{CellSize, Emission, Medium, Moment, Part};
 use crate::scene::{Gas, GasMotion, GasProfile};
-use crate::transport::{CellSize, Emission, Medium, Moment, Part};
 use kerrlight_geodesic::simd::RayNodes;
 use kerrlight_geodesic::{Kerr, Quantities};
 

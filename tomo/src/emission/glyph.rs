@@ -1,8 +1,8 @@
 //! Letters and digits that shine: emission whose shape everybody can judge.
 
-use super::spot::rotate;
 use crate::image::canvas::coverage;
 use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::vector::{cross, dot, rotate};
 
 /// Pixels of a letter's height.
 const RESOLUTION: usize = 96;
@@ -144,14 +144,6 @@ fn across(point: [f64; 3], axis: [f64; 3]) -> Option<[f64; 3]> {
     let across: [f64; 3] = core::array::from_fn(|c| point[c] - along * axis[c]);
     let length = dot(across, across).sqrt();
     (length > 0.0 && length.is_finite()).then(|| across.map(|x| x / length))
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// A picture with a margin of four standard deviations, blurred along both sides; and its new width.

@@ -5,6 +5,7 @@ pub mod black_body;
 pub mod disc;
 pub mod gas;
 pub mod glyph;
+pub mod medium;
 pub mod mesh;
 mod occupied;
 pub mod page_thorne;

@@ -1,11 +1,11 @@
 //! Where a volume on the nodes of a box shines, in coordinates in which matter on circles about
 //! an axis stays where it is but for its azimuth: the bricks that a ray is asked for.
 
-use crate::transport::PathSegment;
+use super::medium::PathSegment;
 use crate::volume::Volume;
 use core::f64::consts::{PI, TAU};
 use core::ops::Range;
-use kerrlight_geodesic::flow::{cross, dot};
+use kerrlight_geodesic::vector::{cross, dot};
 
 /// Bricks of radius, height along an axis, and azimuth about it, in the frame that turns with the
 /// matter. How many of them shine in a range of each is known from sums over all bricks below.
@@ -233,7 +233,7 @@ fn angles([low, high]: [[f64; 3]; 2], across: [[f64; 3]; 2]) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::emission::spot::rotate;
+    use kerrlight_geodesic::vector::rotate;
 
     fn ball(nodes: [usize; 3]) -> Volume {
         let (low, high) = ([-4.0, -5.0, -3.0], [6.0, 5.0, 3.0]);

@@ -6,7 +6,7 @@
 
 use crate::scene::Spot;
 use kerrlight_geodesic::Kerr;
-use kerrlight_geodesic::flow::{cross, dot};
+use kerrlight_geodesic::vector::{cross, distance, dot, rotate};
 
 /// Where a spot's light is cut off, in units of its σ: exp(−6²/2) = 1.5e-8.
 pub const CUT_OFF: f64 = 6.0;
@@ -166,24 +166,6 @@ pub struct Comoving {
     angle: f64,
 }
 
-/// The Euclidean distance of two points.
-pub fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
-    let offset = difference(a, b);
-    dot(offset, offset).sqrt()
-}
-
-/// The vector from b to a.
-pub(super) fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-/// `x` turned about the unit vector `axis`, right-handed (Rodrigues).
-pub fn rotate(axis: [f64; 3], angle: f64, x: [f64; 3]) -> [f64; 3] {
-    let (sin, cos) = angle.sin_cos();
-    let (along, swirl) = (dot(axis, x), cross(axis, x));
-    core::array::from_fn(|k| cos * x[k] + sin * swirl[k] + (1.0 - cos) * along * axis[k])
-}
-
 /// `x` under the shortest rotation that takes z to the unit vector `axis`; for −z the half
 /// turn about x.
 fn tip(axis: [f64; 3], x: [f64; 3]) -> [f64; 3] {
@@ -198,6 +180,7 @@ fn tip(axis: [f64; 3], x: [f64; 3]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use kerrlight_geodesic::vector::difference;
 
     fn spot(axis: [f64; 3], sheared_since: Option<f64>) -> SpotModel {
         let config = Spot {

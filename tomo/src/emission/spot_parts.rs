@@ -4,9 +4,9 @@
 //! A rigid spot is one shell of radii; of a sheared one every radius turns by its own angle, so it
 //! is cut into several.
 
-use super::spot::{CUT_OFF, SpotModel, difference};
+use super::spot::{CUT_OFF, SpotModel};
 use core::f64::consts::{PI, TAU};
-use kerrlight_geodesic::flow::{cross, dot};
+use kerrlight_geodesic::vector::{cross, difference, dot};
 
 /// A part of the places that a spot can shine from.
 #[derive(Debug, Clone, Copy)]
@@ -156,9 +156,9 @@ fn arc_extremes(p: f64, q: f64, [from, to]: [f64; 2]) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::emission::spot::rotate;
     use crate::scene::Spot;
     use kerrlight_geodesic::Kerr;
+    use kerrlight_geodesic::vector::rotate;
 
     fn spot(axis: [f64; 3], sigma: f64, sheared_since: Option<f64>) -> SpotModel {
         let config = Spot {

@@ -1,14 +1,14 @@
 //! Emission on the nodes of a box, carried along by matter on circles about an axis
 //! (Levis et al. 2022): e(t, x) = e₀(R(ξ, −Ω(|x|)(t − t₀)) x), in positions r n.
 
+use super::medium::{CellSize, Emission, Medium, Moment, Part, PathSegment};
 use super::occupied::Occupied;
-use super::spot::rotate;
 use crate::dynamics::{AngularVelocity, Axis, Injection};
 use crate::scene::{Rotation, VolumeRegion, VolumeSource};
-use crate::transport::{CellSize, Emission, Medium, Moment, Part, PathSegment};
 use crate::volume::{Volume, VolumeFile};
-use kerrlight_geodesic::flow::{cross, rotating_redshift_at};
+use kerrlight_geodesic::flow::rotating_redshift_at;
 use kerrlight_geodesic::simd::RayNodes;
+use kerrlight_geodesic::vector::{cross, rotate};
 use kerrlight_geodesic::{Kerr, OutOfRange, Quantities};
 
 /// A volume around one hole, ready to be evaluated.

@@ -2,6 +2,7 @@
 //! what each gives to its pixel. Computed once for a fit.
 
 use kerrlight_geodesic::simd::{NodeRequest, Nodes, PanelRule, RayNodes, Samples};
+use kerrlight_geodesic::vector::{distance, norm};
 use kerrlight_geodesic::{Kerr, Observer, OutOfRange, Quantities};
 
 /// Where emission is looked for.
@@ -284,12 +285,4 @@ impl Tracer<'_> {
         }
         Ok(())
     }
-}
-
-pub(super) fn norm(x: [f64; 3]) -> f64 {
-    (x[0] * x[0] + x[1] * x[1] + x[2] * x[2]).sqrt()
-}
-
-fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
-    norm(core::array::from_fn(|c| a[c] - b[c]))
 }

@@ -1,6 +1,6 @@
 //! How the gas moves that radiates.
 
-use kerrlight_geodesic::flow::dot;
+use kerrlight_geodesic::vector::dot;
 use kerrlight_geodesic::{Kerr, PathPoint, ZamoFrame, orbits};
 
 /// The four-velocity of gas in the frame of zero angular momentum: γ, and γv along e_r, e_θ,

@@ -1,7 +1,8 @@
 //! Polarised light against closed forms, published formulas and other codes.
 
 use super::*;
-use kerrlight_geodesic::flow::{cross, dot, keplerian_redshift, rotating_redshift};
+use kerrlight_geodesic::flow::{keplerian_redshift, rotating_redshift};
+use kerrlight_geodesic::vector::{cross, dot};
 use kerrlight_geodesic::{
     Inclination, Kerr, Observer, Path, PathPoint, Quantities, Ray, ScreenPoint, Tracer, ZamoFrame,
 };

@@ -6,11 +6,12 @@
 //! are halved again, down to a part of a cell.
 
 use super::chord::ChordBound;
-use super::medium::{CellSize, Emission, Light, Medium, Moment, PathSegment, integrate};
+use super::quadrature::{Light, integrate};
 use super::rays::{End, TracedRay};
 use super::tree::Node;
 use super::volume::{Columns, FAINT, Piece, Workspace, ray_nodes};
 use super::{PreparedScene, Scratch};
+use crate::emission::medium::{CellSize, Medium, Moment, PathSegment};
 use kerrlight_geodesic::{Path, Ray, ScreenPoint};
 
 /// A panel of one ray.
@@ -196,20 +197,5 @@ impl Cells<'_> {
 fn copy(columns: &mut Columns, from: &Columns, range: core::ops::Range<usize>) {
     for (column, old) in columns.iter_mut().zip(from) {
         column.extend_from_slice(&old[range.clone()]);
-    }
-}
-
-impl Emission {
-    /// Adds nodes of another.
-    fn append(&mut self, other: &Emission, range: core::ops::Range<usize>) {
-        let pairs = [
-            (&mut self.emissivity, &other.emissivity),
-            (&mut self.absorption, &other.absorption),
-            (&mut self.redshift, &other.redshift),
-        ];
-        for (column, more) in pairs {
-            column.extend_from_slice(more.get(range.clone()).unwrap_or(&[]));
-        }
-        self.polarization.extend_from_slice(other.polarization.get(range).unwrap_or(&[]));
     }
 }

@@ -5,7 +5,7 @@ use super::result::{Accumulator, Place};
 use super::tree::{Node, Tree, Walk, WalkScratch};
 use super::{PreparedScene, Scratch};
 use crate::emission::mesh::{MeshModel, Triangle};
-use crate::emission::spot::distance;
+use kerrlight_geodesic::vector::distance;
 use kerrlight_geodesic::{Kerr, Path, Ray};
 use std::ops::ControlFlow;
 

@@ -6,10 +6,10 @@
 mod bare;
 mod cells;
 mod chord;
-mod medium;
 mod meshes;
 mod meter;
 mod polarized;
+mod quadrature;
 mod ray;
 mod rays;
 mod result;
@@ -22,13 +22,13 @@ mod tree;
 mod view;
 mod volume;
 
-pub use medium::{CellSize, Emission, Medium, Moment, PathSegment};
-pub use meter::{Meter, Part};
+pub use meter::Meter;
 pub use result::{Fate, RayResult};
 pub use view::View;
 
 use crate::emission::disc::DiscModel;
 use crate::emission::gas::{GasEffects, GasModel};
+use crate::emission::medium::{Medium, Part};
 use crate::emission::mesh::{MeshFile, MeshModel};
 use crate::emission::sky::{Panorama, SkyModel};
 use crate::emission::spot::SpotModel;

@@ -1,9 +1,9 @@
 //! Polarised light: what a scene's field and electrons make of the light of its sources.
 
 use super::PreparedScene;
-use super::medium::{Emission, Medium};
 use super::surface::Hit;
 use crate::emission::disc::DiscModel;
+use crate::emission::medium::{Emission, Medium};
 use crate::polarization::{Gas, MagneticField, PowerLaw, Stokes, view, view_at};
 use crate::scene::Scene;
 use kerrlight_geodesic::simd::RayNodes;

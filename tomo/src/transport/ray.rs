@@ -3,7 +3,6 @@
 //! Surfaces come first, since they end rays; then what fills space, on quadrature nodes; then spots;
 //! then the sky.
 
-use super::meter::Part;
 use super::rays::{End, TracedRay};
 use super::result::{Accumulator, Fate, RayResult, wrap};
 use super::spots::SpotTree;
@@ -11,6 +10,7 @@ use super::straight::Line;
 use super::surface::Seen;
 use super::view::View;
 use super::{NEAREST, PreparedScene, Scratch};
+use crate::emission::medium::Part;
 use crate::emission::sky::Beam;
 use kerrlight_geodesic::{Observer, OutOfRange, Ray, footprint};
 use std::sync::Arc;

@@ -1,6 +1,6 @@
 //! What one ray sees, and how light adds up to it.
 
-use super::medium::Light;
+use super::quadrature::Light;
 use kerrlight_geodesic::PathPoint;
 use kerrlight_geodesic::simd::RayNodes;
 

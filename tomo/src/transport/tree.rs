@@ -2,8 +2,8 @@
 //! through them. The hierarchy is built by `obvhs`; its boxes are those of points r n.
 
 use super::chord::ChordBound;
-use crate::emission::spot::distance;
 use glam::Vec3A;
+use kerrlight_geodesic::vector::distance;
 use kerrlight_geodesic::{Path, PathPoint, Ray};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;

@@ -1,10 +1,11 @@
 //! Light of what fills space, with as many nodes as it takes.
 
 use super::cells::Panel;
-use super::medium::{CellSize, Emission, Light, Medium, Moment, Quadrature, Sums, integrate};
+use super::quadrature::{Light, Quadrature, Sums, integrate};
 use super::rays::{End, TracedRay};
 use super::surface::Hit;
 use super::{PreparedScene, Scratch};
+use crate::emission::medium::{CellSize, Emission, Medium, Moment};
 use kerrlight_geodesic::simd::{NodeRequest, PanelRule, RayNodes};
 use kerrlight_geodesic::{Observer, OutOfRange, Path, Quantities, ScreenPoint};
 

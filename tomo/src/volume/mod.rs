@@ -9,8 +9,8 @@ pub mod slices;
 pub mod vti;
 
 use crate::dynamics::Axis;
-use crate::emission::spot::rotate;
 use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::vector::rotate;
 pub use panels::Shown;
 
 /// Numbers on a regular grid of nodes, linear in between along each axis and zero outside.

@@ -3,7 +3,7 @@
 use crate::fit::config::FitFile;
 use crate::fit::setup;
 use crate::fit::truth::Truth;
-use kerrlight_tomo::emission::spot::distance;
+use kerrlight_geodesic::vector::distance;
 use kerrlight_tomo::fit::{State, Trainer};
 use kerrlight_tomo::volume::Volume;
 use kerrlight_tomo::volume::metrics::{self, Comparison};

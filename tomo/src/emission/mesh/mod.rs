@@ -8,9 +8,9 @@ mod texture;
 
 pub use file::{Material, MeshError, MeshFile, RawTriangle, Resources};
 
-use super::spot::rotate;
 use crate::scene::{Mesh, MeshVelocity};
-use kerrlight_geodesic::flow::{cross, dot, rotating_redshift};
+use kerrlight_geodesic::flow::rotating_redshift;
+use kerrlight_geodesic::vector::{cross, difference, dot, rotate};
 use kerrlight_geodesic::{Kerr, OutOfRange, PathPoint};
 
 /// A triangle with what a test against it needs.
@@ -28,10 +28,6 @@ pub struct Triangle {
     material: u32,
 }
 
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
 fn unit(a: [f64; 3]) -> Option<[f64; 3]> {
     let length = dot(a, a).sqrt();
     (length > 0.0 && length.is_finite()).then(|| a.map(|x| x / length))
@@ -45,7 +41,7 @@ impl Triangle {
     /// `None` if it has no area.
     fn new(corners: [[f64; 3]; 3], texture: [[f32; 2]; 3], material: u32) -> Option<Self> {
         let edges: [[f64; 3]; 3] =
-            core::array::from_fn(|k| minus(corners[(k + 1) % 3], corners[k]));
+            core::array::from_fn(|k| difference(corners[(k + 1) % 3], corners[k]));
         let normal = unit(cross(edges[0], edges[1]))?;
         let inward = edges.map(|edge| unit(cross(normal, edge)));
         let [Some(a), Some(b), Some(c)] = inward else { return None };
@@ -55,13 +51,13 @@ impl Triangle {
 
     /// Signed distance of a point from its plane.
     pub fn height(&self, x: [f64; 3]) -> f64 {
-        dot(self.normal, minus(x, self.corners[0]))
+        dot(self.normal, difference(x, self.corners[0]))
     }
 
     /// Whether a point of its plane is inside, or outside by at most `margin`.
     pub fn holds(&self, x: [f64; 3], margin: f64) -> bool {
         let margin = margin + SEAM * self.size;
-        (0..3).all(|k| dot(self.inward[k], minus(x, self.corners[k])) >= -margin)
+        (0..3).all(|k| dot(self.inward[k], difference(x, self.corners[k])) >= -margin)
     }
 
     /// Longest edge.
@@ -81,7 +77,7 @@ impl Triangle {
     fn texture_at(&self, x: [f64; 3]) -> [f32; 2] {
         let area = |k: usize| {
             let (p, q) = (self.corners[(k + 1) % 3], self.corners[(k + 2) % 3]);
-            dot(self.normal, cross(minus(p, x), minus(q, x))).max(0.0)
+            dot(self.normal, cross(difference(p, x), difference(q, x))).max(0.0)
         };
         let areas = [area(0), area(1), area(2)];
         let whole: f64 = areas.iter().sum();

@@ -1,7 +1,7 @@
 //! What a bundle of rays covers of the sky.
 
-use kerrlight_geodesic::flow::dot;
 use kerrlight_geodesic::footprint::Sky;
+use kerrlight_geodesic::vector::dot;
 
 /// A small elliptical patch of the sky with Gaussian weights: the image on the sky of a Gaussian
 /// on the screen, by the differential of the lens map (Heckbert 1989).

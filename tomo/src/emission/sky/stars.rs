@@ -2,7 +2,7 @@
 
 use super::beam::Beam;
 use crate::scene::Stars;
-use kerrlight_geodesic::flow::dot;
+use kerrlight_geodesic::vector::dot;
 
 /// Stars strewn over cells of equal area: rings of constant width in z, each cut into as
 /// many cells. A cell holds at most one star, whose place, colour and brightness are a

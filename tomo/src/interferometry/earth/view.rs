@@ -2,6 +2,7 @@
 
 use super::{EarthError, Moment, Ut1};
 use core::f64::consts::PI;
+use kerrlight_geodesic::vector::dot;
 
 /// Where a source is: catalogue coordinates (ICRS, J2000).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -112,10 +113,6 @@ impl View {
         let sine = dot(position, self.towards) / dot(position, position).sqrt();
         sine.clamp(-1.0, 1.0).asin() * 180.0 / PI
     }
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::*;
 use crate::emission::disc::Photon;
 use crate::polarization::Gas;
 use crate::scene::{Disc, Plunging};
-use kerrlight_geodesic::{ZamoFrame, flow::dot, orbits, plunge::Plunge};
+use kerrlight_geodesic::{ZamoFrame, orbits, plunge::Plunge, vector::dot};
 
 const LAW: Plunging = Plunging { intensity: 0.7, exponent: 1.5 };
 

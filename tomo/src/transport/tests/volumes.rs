@@ -1,6 +1,7 @@
 //! Volumes against hot spots, closed forms and themselves with finer panels.
 
 use super::*;
+use crate::emission::medium::{CellSize, Emission, Moment, PathSegment};
 use crate::scene::{Rotation, Velocity, VolumeSource};
 use crate::volume::Volume;
 use kerrlight_geodesic::Quantities;
