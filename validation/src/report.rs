@@ -67,9 +67,9 @@ impl Case {
 /// All cases as a document.
 pub fn markdown(cases: &[Case]) -> String {
     let mut text = String::from(
-        "# Validation\n\nWritten by `cargo run --release -p kerrlight-validation`; not edited by hand.\n\
-         Errors are relative unless the case says otherwise; of a sample, the largest.\n\n\
-         | authority | case | expected | found | error | allowed | |\n|---|---|---|---|---|---|---|\n",
+        "# Validation\n\n`cargo run --release -p kerrlight-validation` writes this page in 20 seconds. Do not edit it.\n\
+         Errors are relative unless the case says otherwise; for a sample, the largest error is given.\n\n\
+         | source | case | expected | found | error | allowed | |\n|---|---|---|---|---|---|---|\n",
     );
     for case in cases {
         let verdict = if case.passed() { "pass" } else { "**FAIL**" };
