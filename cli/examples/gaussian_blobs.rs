@@ -8,7 +8,7 @@
 //! docs/tutorials/your-own-representation.md walks through it.
 
 use kerrlight_cli::{OwnSettings, Program};
-use kerrlight_tomo::representation::{Coordinates, Gradient, Representation, Scalar, Workspace};
+use kerrlight_tomo::representation::{Coordinates, Float, Gradient, Representation, Workspace};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
@@ -54,7 +54,7 @@ struct Lit<T> {
 
 impl GaussianBlobs {
     /// Nothing where it is dark.
-    fn lit<T: Scalar>(&self, blob: &[T], point: [T; 3]) -> Option<Lit<T>> {
+    fn lit<T: Float>(&self, blob: &[T], point: [T; 3]) -> Option<Lit<T>> {
         let unit = T::of(1.0 / self.sigma);
         let offset = [0, 1, 2].map(|c| point[c] * unit - blob[c]);
         let inverse = (T::of(-2.0) * blob[3]).exp();
@@ -63,7 +63,7 @@ impl GaussianBlobs {
         (depth < T::of(DARK)).then(|| Lit { offset, inverse, light: (-depth).exp() })
     }
 
-    fn value<T: Scalar>(&self, parameters: &[T], point: [T; 3]) -> T {
+    fn value<T: Float>(&self, parameters: &[T], point: [T; 3]) -> T {
         let light = |blob: &[T]| {
             self.lit(blob, point).map_or(T::zero(), |lit| blob[4] * blob[4] * lit.light)
         };
@@ -71,7 +71,7 @@ impl GaussianBlobs {
     }
 
     /// Adds cotangent · de/dparameter; returns cotangent · de/dx.
-    fn pull<T: Scalar>(
+    fn pull<T: Float>(
         &self,
         parameters: &[T],
         point: [T; 3],
@@ -96,12 +96,12 @@ impl GaussianBlobs {
     }
 }
 
-fn point<T: Scalar>(at: &Coordinates<'_, T>, k: usize) -> [T; 3] {
+fn point<T: Float>(at: &Coordinates<'_, T>, k: usize) -> [T; 3] {
     let columns = at.columns();
     [columns[0][k], columns[1][k], columns[2][k]]
 }
 
-impl<T: Scalar> Representation<T> for GaussianBlobs {
+impl<T: Float> Representation<T> for GaussianBlobs {
     fn dimension(&self) -> usize {
         3
     }

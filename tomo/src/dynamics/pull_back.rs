@@ -2,7 +2,7 @@
 
 use super::Axis;
 use crate::points::{Coordinates, CoordinatesMut};
-use crate::simd::{InstructionSet, Lanes, Scalar, Task, dispatch, math};
+use crate::simd::{Float, InstructionSet, Lanes, Task, dispatch, math};
 use core::ops::Range;
 
 /// Points that one thread takes at a time.
@@ -34,7 +34,7 @@ impl<'a, T> Turned<'a, T> {
 ///
 /// # Panics
 /// If lengths differ or points are not in space.
-pub fn pull_back<T: Scalar>(axis: Axis, turned: Turned<'_, T>, pulled: CoordinatesMut<'_, T>) {
+pub fn pull_back<T: Float>(axis: Axis, turned: Turned<'_, T>, pulled: CoordinatesMut<'_, T>) {
     check(&turned, pulled.len(), pulled.dimension());
     if turned.angles.len() > SHARE {
         let (left, right, middle) = turned.halves();
@@ -79,7 +79,7 @@ impl<T> Cotangents<'_, T> {
 ///
 /// # Panics
 /// If lengths differ or points are not in space.
-pub fn pull_back_vjp<T: Scalar>(
+pub fn pull_back_vjp<T: Float>(
     axis: Axis,
     turned: Turned<'_, T>,
     gradient: Coordinates<'_, T>,
@@ -96,7 +96,7 @@ pub fn pull_back_vjp<T: Scalar>(
 }
 
 /// The gradient in the space around the sphere, by halves.
-fn sum<T: Scalar>(
+fn sum<T: Float>(
     axis: [T; 3],
     turned: Turned<'_, T>,
     gradient: Coordinates<'_, T>,
@@ -115,25 +115,25 @@ fn sum<T: Scalar>(
 }
 
 #[inline(always)]
-fn dot<T: Scalar, V: Lanes<T>>(a: [V; 3], b: [V; 3]) -> V {
+fn dot<T: Float, V: Lanes<T>>(a: [V; 3], b: [V; 3]) -> V {
     a[2].mul_add(b[2], a[1].mul_add(b[1], a[0] * b[0]))
 }
 
 #[inline(always)]
-fn cross<T: Scalar, V: Lanes<T>>(a: [V; 3], b: [V; 3]) -> [V; 3] {
+fn cross<T: Float, V: Lanes<T>>(a: [V; 3], b: [V; 3]) -> [V; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// R(axis) x for an angle of this sine and cosine (Rodrigues).
 #[inline(always)]
-fn rotate<T: Scalar, V: Lanes<T>>(axis: [V; 3], sin: V, cos: V, x: [V; 3]) -> [V; 3] {
+fn rotate<T: Float, V: Lanes<T>>(axis: [V; 3], sin: V, cos: V, x: [V; 3]) -> [V; 3] {
     let along = (V::splat(T::one()) - cos) * dot(axis, x);
     let swirl = cross(axis, x);
     core::array::from_fn(|k| cos.mul_add(x[k], sin.mul_add(swirl[k], along * axis[k])))
 }
 
 #[inline(always)]
-fn load<T: Scalar, V: Lanes<T>>(points: &Coordinates<'_, T>, from: usize) -> [V; 3] {
+fn load<T: Float, V: Lanes<T>>(points: &Coordinates<'_, T>, from: usize) -> [V; 3] {
     let columns = points.columns();
     core::array::from_fn(|k| V::load_front(&columns[k][from..], T::zero()))
 }
@@ -144,7 +144,7 @@ struct Forward<'a, T> {
     pulled: CoordinatesMut<'a, T>,
 }
 
-impl<T: Scalar> Task<T> for Forward<'_, T> {
+impl<T: Float> Task<T> for Forward<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<T>, const ROWS: usize>(mut self) {
@@ -167,7 +167,7 @@ struct Backward<'a, T> {
     wanted: Cotangents<'a, T>,
 }
 
-impl<T: Scalar> Task<T> for Backward<'_, T> {
+impl<T: Float> Task<T> for Backward<'_, T> {
     type Output = [f64; 3];
     #[inline(always)]
     fn run<V: Lanes<T>, const ROWS: usize>(mut self) -> [f64; 3] {
@@ -199,6 +199,6 @@ impl<T: Scalar> Task<T> for Backward<'_, T> {
 }
 
 #[inline(always)]
-fn add<T: Scalar, V: Lanes<T>>(x: V, to: &mut [T]) {
+fn add<T: Float, V: Lanes<T>>(x: V, to: &mut [T]) {
     (V::load_front(to, T::zero()) + x).store_front(to);
 }

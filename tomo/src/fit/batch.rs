@@ -4,7 +4,7 @@ use super::chain::Chain;
 use super::occupancy::Occupancy;
 use crate::dynamics::{Axis, Turned, pull_back};
 use crate::points::{Coordinates, CoordinatesMut};
-use crate::simd::Scalar;
+use crate::simd::Float;
 
 /// Columns of a batch's points.
 #[derive(Clone, Debug, Default)]
@@ -37,7 +37,7 @@ pub struct Batch<T> {
     kept: Vec<bool>,
 }
 
-impl<T: Scalar> Columns<T> {
+impl<T: Float> Columns<T> {
     fn all(&mut self) -> [&mut Vec<T>; 9] {
         let [x, y, z] = &mut self.position;
         let [a, b, c] = &mut self.pulled;
@@ -70,7 +70,7 @@ impl<T: Scalar> Columns<T> {
     }
 }
 
-impl<T: Scalar> Batch<T> {
+impl<T: Float> Batch<T> {
     /// The pairs of the batch.
     pub fn set(&mut self, pairs: impl Iterator<Item = (u32, u32)>) {
         self.pairs.clear();
@@ -132,7 +132,7 @@ impl<T: Scalar> Batch<T> {
     }
 }
 
-impl<T: Scalar> Columns<T> {
+impl<T: Float> Columns<T> {
     fn push(&mut self, chain: &Chain<T>, range: core::ops::Range<usize>, time: T) {
         for (to, from) in self.position.iter_mut().zip(&chain.position) {
             to.extend_from_slice(&from[range.clone()]);

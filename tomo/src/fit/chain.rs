@@ -8,7 +8,7 @@ use super::sightlines::Sightlines;
 use crate::dynamics::{AngularVelocity, Axis, Injection};
 use crate::real::Real;
 use crate::representation::{Representation, Workspace};
-use crate::simd::Scalar;
+use crate::simd::Float;
 use kerrlight_geodesic::{Kerr, OutOfRange};
 use rayon::prelude::*;
 
@@ -56,7 +56,7 @@ pub struct Chain<T> {
     pub(super) earliest: Option<T>,
 }
 
-impl<T: Scalar> Chain<T> {
+impl<T: Float> Chain<T> {
     /// Of these nodes and this motion.
     ///
     /// # Errors
@@ -168,7 +168,7 @@ impl<T: Scalar> Chain<T> {
     }
 }
 
-impl<T: Scalar> Chain<T> {
+impl<T: Float> Chain<T> {
     /// Gradient along the sphere of a loss with respect to the axis, by way of the weights alone:
     /// `cotangents` holds dL/dweight of each node, summed over frames. Zero without redshift.
     pub fn weights_vjp(&self, axis: Axis, cotangents: &[f64]) -> [f64; 3] {
@@ -179,7 +179,7 @@ impl<T: Scalar> Chain<T> {
     }
 }
 
-impl<T: Scalar> Chain<T> {
+impl<T: Float> Chain<T> {
     /// Images of a known field e₀(x) at the reference time, all frames one after the other.
     pub fn movie_of(
         &self,

@@ -5,17 +5,17 @@ use super::steps::Place;
 use super::train::{Outcome, Progress, Trainer};
 use crate::dynamics::Axis;
 use crate::optimise::{Lbfgs, LbfgsState, Step};
-use crate::simd::Scalar;
+use crate::simd::Float;
 
 /// The axis of a vector behind the parameters, and the vector's length.
-fn axis_of<T: Scalar>(vector: &[T]) -> Option<(Axis, f64)> {
+fn axis_of<T: Float>(vector: &[T]) -> Option<(Axis, f64)> {
     let [x, y, z] = *vector else { return None };
     let vector = [x, y, z].map(T::double);
     let length = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
     Some((Axis::new(vector).ok()?, length))
 }
 
-impl<T: Scalar> Trainer<'_, T> {
+impl<T: Float> Trainer<'_, T> {
     /// One step. The axis is learnt as a vector of any length behind the parameters: the loss does not depend on
     /// the length.
     ///

@@ -7,7 +7,7 @@ use super::verdict::Statistics;
 use crate::dynamics::{Axis, Cotangents, Turned, pull_back_vjp};
 use crate::points::{Coordinates, CoordinatesMut};
 use crate::representation::{Gradient, Groups, Representation, Workspace};
-use crate::simd::Scalar;
+use crate::simd::Float;
 use core::ops::Range;
 
 /// Data with their share in the loss: weight · χ²/(number of data).
@@ -75,7 +75,7 @@ impl<T> Room<T> {
     }
 }
 
-impl<T: Scalar> Room<T> {
+impl<T: Float> Room<T> {
     /// Emission at points (x, y, z) at the reference time.
     pub fn emission(
         &mut self,
@@ -101,7 +101,7 @@ pub struct Objective<T> {
     pub data: Data<T>,
 }
 
-impl<T: Scalar> Objective<T> {
+impl<T: Float> Objective<T> {
     /// Names of the kinds of data, in the order of [`Loss::terms`].
     pub fn names(&self) -> Vec<&str> {
         let image = self.data.image.iter().map(|image| FrameTerm::<T>::name(&*image.term));
@@ -314,7 +314,7 @@ impl<T: Scalar> Objective<T> {
     }
 }
 
-impl<T: Scalar> Objective<T> {
+impl<T: Float> Objective<T> {
     /// The first data, with frame and χ², that are no finite number of images of these frames.
     pub fn not_finite(&self, frames: &[usize], movie: &[T]) -> Option<(String, usize, f64)> {
         let mut none = vec![T::zero(); self.chain.pixels()];
@@ -331,7 +331,7 @@ impl<T: Scalar> Objective<T> {
 }
 
 /// Room for gradients with respect to coordinates, cleared, where they are wanted.
-fn wanted<T: Scalar>(
+fn wanted<T: Float>(
     wanted: bool,
     dimension: usize,
     points: usize,
@@ -352,7 +352,7 @@ fn wanted<T: Scalar>(
 }
 
 /// Adds the gradient of the axis by way of the points; a field of events has none.
-fn add_axis<T: Scalar>(
+fn add_axis<T: Float>(
     axis: Axis,
     batch: &Batch<T>,
     of_points: &[Vec<T>; 4],
@@ -371,6 +371,6 @@ fn add_axis<T: Scalar>(
 }
 
 /// Whether a representation knows of the axis.
-pub fn is_turned<T: Scalar>(representation: &dyn Representation<T>) -> bool {
+pub fn is_turned<T: Float>(representation: &dyn Representation<T>) -> bool {
     representation.dimension() == 3
 }

@@ -3,7 +3,7 @@
 use super::sightlines::Region;
 use crate::points::Coordinates;
 use crate::representation::{Representation, Workspace};
-use crate::simd::Scalar;
+use crate::simd::Float;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -62,7 +62,7 @@ impl Occupancy {
     }
 
     /// Looks at one random point of every cell, the same for the same seed.
-    pub fn refresh<T: Scalar>(
+    pub fn refresh<T: Float>(
         &mut self,
         representation: &dyn Representation<T>,
         parameters: &[T],

@@ -7,7 +7,7 @@ use super::regulariser::Shape;
 use super::sightlines::Region;
 use crate::points::Coordinates;
 use crate::representation::{Gradient, Workspace};
-use crate::simd::Scalar;
+use crate::simd::Float;
 
 /// Where a field is looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,7 +78,7 @@ impl Penalties {
     }
 
     /// Collects the nodes that count.
-    fn place<T: Scalar>(&self, draw: &Draw<T>, room: &mut ProbeRoom<T>) {
+    fn place<T: Float>(&self, draw: &Draw<T>, room: &mut ProbeRoom<T>) {
         let (n, half) = (self.probe.nodes(), self.region.r_max);
         let (spacing, moved) = match self.probe {
             Probe::Moved { .. } => (self.probe.spacing(half), draw.offset),
@@ -100,7 +100,7 @@ impl Penalties {
     }
 
     /// Weight · penalty of each; adds the gradient with respect to the parameters.
-    pub fn value_and_gradient<T: Scalar>(
+    pub fn value_and_gradient<T: Float>(
         &self,
         field: Field<'_, T>,
         draw: &Draw<T>,

@@ -4,7 +4,7 @@
 //! Every penalty is an integral over the volume (a sum over nodes times the volume of a cell), so that a weight means
 //! the same on a finer grid.
 
-use crate::simd::Scalar;
+use crate::simd::Float;
 use kerrlight_geodesic::OutOfRange;
 use rayon::prelude::*;
 
@@ -95,7 +95,7 @@ impl Regulariser {
     ///
     /// # Panics
     /// If the lengths are not that of the shape.
-    pub fn value_and_gradient<T: Scalar>(
+    pub fn value_and_gradient<T: Float>(
         &self,
         values: &[T],
         shape: Shape,
@@ -110,7 +110,7 @@ impl Regulariser {
     ///
     /// # Panics
     /// If the lengths are not that of the shape.
-    pub fn value_and_gradient_inside<T: Scalar>(
+    pub fn value_and_gradient_inside<T: Float>(
         &self,
         values: &[T],
         shape: Shape,
@@ -167,7 +167,7 @@ struct Counted<'a, T> {
 }
 
 /// Sum of a function of each value from `first` on; adds its slopes.
-fn each<T: Scalar>(
+fn each<T: Float>(
     Counted { values, inside }: Counted<'_, T>,
     first: usize,
     scale: f64,
@@ -193,7 +193,7 @@ struct Differences<'a, T, F> {
     norm: F,
 }
 
-impl<T: Scalar, F: Fn(f64) -> (f64, f64)> Differences<'_, T, F> {
+impl<T: Float, F: Fn(f64) -> (f64, f64)> Differences<'_, T, F> {
     /// Forward differences at a node along each axis, 0 beyond the last one and across an edge.
     #[inline]
     fn slopes(&self, at: [usize; 3], index: usize) -> [f64; 3] {

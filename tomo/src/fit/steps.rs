@@ -6,7 +6,7 @@ use super::occupancy::Occupancy;
 use super::penalties::Draw;
 use super::train::{BatchSize, Diverged, Outcome, Progress, State, Trainer, Training};
 use crate::dynamics::Axis;
-use crate::simd::Scalar;
+use crate::simd::Float;
 use rand::seq::index;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -27,7 +27,7 @@ pub struct Place<'a, T> {
     pub step: u64,
 }
 
-impl<T: Scalar> Trainer<'_, T> {
+impl<T: Float> Trainer<'_, T> {
     /// One step. It depends on the state and the settings alone: not on threads, and not on what
     /// this trainer did before.
     ///
@@ -151,7 +151,7 @@ impl<T: Scalar> Trainer<'_, T> {
     }
 }
 
-fn step_back<T: Scalar>(state: &mut State<T>, loss: f64) -> Result<Outcome, Diverged> {
+fn step_back<T: Float>(state: &mut State<T>, loss: f64) -> Result<Outcome, Diverged> {
     let diverged = Diverged { loss, step: state.now.step, setbacks: state.setbacks };
     let Some(good) = &mut state.good else { return Err(diverged) };
     if state.setbacks >= MOST_SETBACKS {

@@ -12,7 +12,7 @@ use crate::interferometry::operator::{Dtft, ImageGrid, Pulse, Transform};
 use crate::representation::{
     Activation, Coordinates, Gradient, Grid, GridSettings, Groups, Representation, Workspace,
 };
-use crate::simd::Scalar;
+use crate::simd::Float;
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
 use num_complex::Complex;
 
@@ -30,7 +30,7 @@ fn lines(delay: bool, momentum: bool) -> (Kerr, Sightlines) {
     (hole, Sightlines::trace(&hole, &observer, &alpha, &beta, &request).unwrap())
 }
 
-fn chain<T: Scalar>(delay: bool, momentum: bool) -> Chain<T> {
+fn chain<T: Float>(delay: bool, momentum: bool) -> Chain<T> {
     let (hole, lines) = lines(delay, momentum);
     let motion = Motion {
         velocity: AngularVelocity::Keplerian { drag: 0.6 },

@@ -8,7 +8,7 @@ use super::{Field, is_turned};
 use crate::dynamics::Axis;
 use crate::optimise::{Adam, AdamState, Lbfgs, LbfgsState, Polynomial};
 use crate::representation::Representation;
-use crate::simd::Scalar;
+use crate::simd::Float;
 
 /// What a step looks at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,7 +129,7 @@ pub struct Diverged {
     pub setbacks: u32,
 }
 
-impl<T: Scalar> State<T> {
+impl<T: Float> State<T> {
     /// The start of a fit.
     pub fn new(representation: &dyn Representation<T>, axis: Axis, training: &Training) -> Self {
         let count = representation.parameters();
@@ -171,12 +171,12 @@ pub struct Trainer<'a, T> {
 
 impl Training {
     /// Whether the axis is learnt, of a representation that knows of it.
-    pub fn learns_axis<T: Scalar>(&self, representation: &dyn Representation<T>) -> bool {
+    pub fn learns_axis<T: Float>(&self, representation: &dyn Representation<T>) -> bool {
         self.axis_rate.is_some() && is_turned(representation)
     }
 }
 
-impl<'a, T: Scalar> Trainer<'a, T> {
+impl<'a, T: Float> Trainer<'a, T> {
     /// A fit of a representation.
     pub fn new(
         objective: Objective<T>,

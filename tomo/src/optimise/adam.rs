@@ -1,6 +1,6 @@
 //! Adam (Kingma & Ba 2015, arXiv:1412.6980, algorithm 1).
 
-use crate::simd::{InstructionSet, Lanes, Scalar, Task, dispatch};
+use crate::simd::{Float, InstructionSet, Lanes, Task, dispatch};
 use kerrlight_geodesic::OutOfRange;
 use rayon::prelude::*;
 
@@ -33,7 +33,7 @@ pub struct AdamState<T> {
     pub second: Vec<T>,
 }
 
-impl<T: Scalar> AdamState<T> {
+impl<T: Float> AdamState<T> {
     /// Of no step yet.
     pub fn new(parameters: usize) -> Self {
         Self { steps: 0, first: vec![T::zero(); parameters], second: vec![T::zero(); parameters] }
@@ -67,7 +67,7 @@ impl Adam {
     ///
     /// # Panics
     /// If the slices differ in length.
-    pub fn step<T: Scalar>(
+    pub fn step<T: Float>(
         &self,
         rate: f64,
         gradient: &[T],
@@ -87,7 +87,7 @@ impl Adam {
         });
     }
 
-    fn constants<T: Scalar>(&self, rate: f64, steps: u64) -> Constants<T> {
+    fn constants<T: Float>(&self, rate: f64, steps: u64) -> Constants<T> {
         let power = |beta: f64| beta.powf(steps as f64);
         Constants {
             beta: [self.beta1, self.beta2].map(T::of),
@@ -116,7 +116,7 @@ struct Update<'a, T> {
     parameters: &'a mut [T],
 }
 
-impl<T: Scalar> Task<T> for Update<'_, T> {
+impl<T: Float> Task<T> for Update<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<T>, const ROWS: usize>(self) {

@@ -4,7 +4,7 @@
 //! f64, and none can be stopped and continued with the same bits.
 
 use super::line_search::{Point, Wolfe};
-use crate::simd::Scalar;
+use crate::simd::Float;
 
 /// Value at the parameters; overwrites the gradient.
 pub type Objective<'a, T> = dyn FnMut(&[T], &mut [T]) -> f64 + 'a;
@@ -52,19 +52,19 @@ pub struct LbfgsState<T> {
     pub value: Option<f64>,
 }
 
-impl<T: Scalar> LbfgsState<T> {
+impl<T: Float> LbfgsState<T> {
     /// Of no step yet.
     pub fn new(parameters: usize, memory: usize) -> Self {
         Self { numbers: vec![T::zero(); (1 + 2 * memory) * parameters], pairs: 0, value: None }
     }
 }
 
-fn dot<T: Scalar>(a: &[T], b: &[T]) -> f64 {
+fn dot<T: Float>(a: &[T], b: &[T]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.double() * b.double()).sum()
 }
 
 /// y += a x.
-fn add<T: Scalar>(y: &mut [T], a: f64, x: &[T]) {
+fn add<T: Float>(y: &mut [T], a: f64, x: &[T]) {
     let a = T::of(a);
     y.iter_mut().zip(x).for_each(|(y, x)| *y += a * *x);
 }
@@ -78,7 +78,7 @@ struct Pairs<'a, T> {
     pairs: u64,
 }
 
-impl<T: Scalar> Pairs<'_, T> {
+impl<T: Float> Pairs<'_, T> {
     /// The pair of `age` (0: newest).
     fn pair(&self, age: usize) -> (&[T], &[T]) {
         let slot = (self.pairs as usize + self.memory - 1 - age) % self.memory;
@@ -142,7 +142,7 @@ impl Lbfgs {
     ///
     /// # Panics
     /// If the state is not of as many parameters and this memory.
-    pub fn step<T: Scalar>(
+    pub fn step<T: Float>(
         &self,
         objective: &mut Objective<'_, T>,
         state: &mut LbfgsState<T>,
@@ -188,7 +188,7 @@ mod tests {
 
     const LBFGS: Lbfgs = Lbfgs { memory: 10, evaluations: 20 };
 
-    fn rosenbrock<T: Scalar>(x: &[T], gradient: &mut [T]) -> f64 {
+    fn rosenbrock<T: Float>(x: &[T], gradient: &mut [T]) -> f64 {
         gradient.fill(T::zero());
         let (mut value, hundred, two) = (T::zero(), T::of(100.0), T::of(2.0));
         for k in 0..x.len() - 1 {
@@ -201,7 +201,7 @@ mod tests {
     }
 
     /// Steps until the loss is below `enough` or none helps, and how many.
-    fn minimise<T: Scalar>(objective: &mut Objective<'_, T>, x: &mut [T], enough: f64) -> usize {
+    fn minimise<T: Float>(objective: &mut Objective<'_, T>, x: &mut [T], enough: f64) -> usize {
         let mut state = LbfgsState::new(x.len(), 10);
         let mut last = f64::INFINITY;
         for step in 0..2000 {

@@ -1,6 +1,6 @@
 //! From an unbounded number to an emissivity.
 
-use crate::simd::{Lanes, Scalar, math};
+use crate::simd::{Float, Lanes, math};
 
 /// The last function of a representation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,7 +16,7 @@ pub enum Activation {
 impl Activation {
     /// Value and slope.
     #[inline(always)]
-    pub(super) fn apply<T: Scalar, V: Lanes<T>>(self, x: V) -> (V, V) {
+    pub(super) fn apply<T: Float, V: Lanes<T>>(self, x: V) -> (V, V) {
         let one = V::splat(T::one());
         match self {
             Self::Sigmoid => {

@@ -20,7 +20,7 @@ pub use network::{Initialisation, Network, NetworkSettings};
 pub use workspace::Workspace;
 
 pub use crate::points::{Coordinates, CoordinatesMut};
-pub use crate::simd::{InstructionSet, Scalar};
+pub use crate::simd::{Float, InstructionSet};
 
 use core::ops::Range;
 
@@ -72,7 +72,7 @@ impl<T> Groups<'_, T> {
 /// allocated once the workspace has seen a batch of the size.
 ///
 /// Lengths that do not fit together are bugs and panic.
-pub trait Representation<T: Scalar>: Send + Sync {
+pub trait Representation<T: Float>: Send + Sync {
     /// Coordinates of a point: 3 (x, y, z) or 4 (t, x, y, z).
     fn dimension(&self) -> usize;
 

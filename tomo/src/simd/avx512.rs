@@ -10,7 +10,7 @@
 )]
 
 use super::lanes::Lanes;
-use super::scalar::Scalar;
+use super::scalar::Float;
 use core::arch::x86_64::*;
 use core::ops::{Add, Div, Mul, Sub};
 

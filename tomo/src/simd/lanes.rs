@@ -1,6 +1,6 @@
 //! The interface of a vector register.
 
-use super::scalar::Scalar;
+use super::scalar::Float;
 use core::ops::{Add, Div, Mul, Sub};
 
 /// The most lanes that any register has.
@@ -10,7 +10,7 @@ pub const MAX_LANES: usize = 16;
 ///
 /// Values of a hardware type may only come into being where its instruction set has been found
 /// (see [`dispatch`](super::dispatch)).
-pub trait Lanes<T: Scalar>:
+pub trait Lanes<T: Float>:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
     /// How many.

@@ -6,7 +6,7 @@
 #![allow(clippy::excessive_precision, reason = "coefficients as the fit printed them")]
 
 use super::lanes::{Lanes, MAX_LANES};
-use super::scalar::Scalar;
+use super::scalar::Float;
 use crate::real::Real;
 
 /// What the functions need to know of a scalar.
@@ -121,27 +121,27 @@ impl Coefficients for f64 {
 
 /// `Σ cᵢ xⁱ`.
 #[inline(always)]
-fn polynomial<T: Scalar, V: Lanes<T>>(c: &[T], x: V) -> V {
+fn polynomial<T: Float, V: Lanes<T>>(c: &[T], x: V) -> V {
     let Some((last, rest)) = c.split_last() else { return V::splat(T::zero()) };
     rest.iter().rev().fold(V::splat(*last), |sum, c| sum.mul_add(x, V::splat(*c)))
 }
 
 /// The nearest integer, for |x| below 2^22 (f32), 2^51 (f64).
 #[inline(always)]
-pub fn round<T: Scalar, V: Lanes<T>>(x: V) -> V {
+pub fn round<T: Float, V: Lanes<T>>(x: V) -> V {
     (x + V::splat(T::ROUNDER)) - V::splat(T::ROUNDER)
 }
 
 /// ⌊n/2⌋ of integers and the remainder.
 #[inline(always)]
-fn halve<T: Scalar, V: Lanes<T>>(n: V) -> (V, V) {
+fn halve<T: Float, V: Lanes<T>>(n: V) -> (V, V) {
     let half = round((n - V::splat(T::of(0.5))) * V::splat(T::of(0.5)));
     (half, n - (half + half))
 }
 
 /// Sine and cosine for |x| ≤ `FAR`; a bounded number beyond.
 #[inline(always)]
-fn near_sin_cos<T: Scalar, V: Lanes<T>>(x: V) -> (V, V) {
+fn near_sin_cos<T: Float, V: Lanes<T>>(x: V) -> (V, V) {
     let s = V::splat;
     let far = s(T::FAR);
     let x = far.min(s(-T::FAR).max(x));
@@ -162,7 +162,7 @@ fn near_sin_cos<T: Scalar, V: Lanes<T>>(x: V) -> (V, V) {
 
 /// Sine and cosine of every lane.
 #[inline(always)]
-pub fn sin_cos<T: Scalar, V: Lanes<T>>(x: V) -> (V, V) {
+pub fn sin_cos<T: Float, V: Lanes<T>>(x: V) -> (V, V) {
     let (sin, cos) = near_sin_cos::<T, V>(x);
     let zero = V::splat(T::zero());
     let size = x.max(zero - x);
@@ -173,7 +173,7 @@ pub fn sin_cos<T: Scalar, V: Lanes<T>>(x: V) -> (V, V) {
 /// The lanes beyond `FAR` replaced by what the standard library says.
 #[cold]
 #[inline(never)]
-fn patch<T: Scalar, V: Lanes<T>>(x: V, sin: V, cos: V) -> (V, V) {
+fn patch<T: Float, V: Lanes<T>>(x: V, sin: V, cos: V) -> (V, V) {
     let mut lanes = [[T::zero(); MAX_LANES]; 3];
     for (lanes, v) in lanes.iter_mut().zip([x, sin, cos]) {
         v.store_front(lanes);
@@ -189,7 +189,7 @@ fn patch<T: Scalar, V: Lanes<T>>(x: V, sin: V, cos: V) -> (V, V) {
 
 /// eˣ, held beyond |x| = 87 (f32), 708 (f64).
 #[inline(always)]
-pub fn exp<T: Scalar, V: Lanes<T>>(x: V) -> V {
+pub fn exp<T: Float, V: Lanes<T>>(x: V) -> V {
     let s = V::splat;
     let x = s(T::HELD).min(s(-T::HELD).max(x)); // a NaN stays one
     let n = round(x * s(T::LOG2_E));
@@ -200,14 +200,14 @@ pub fn exp<T: Scalar, V: Lanes<T>>(x: V) -> V {
 
 /// 1/(1 + e⁻ˣ).
 #[inline(always)]
-pub fn sigmoid<T: Scalar, V: Lanes<T>>(x: V) -> V {
+pub fn sigmoid<T: Float, V: Lanes<T>>(x: V) -> V {
     let one = V::splat(T::one());
     one / (one + exp(V::splat(T::zero()) - x))
 }
 
 /// ln(1 + eˣ).
 #[inline(always)]
-pub fn softplus<T: Scalar, V: Lanes<T>>(x: V) -> V {
+pub fn softplus<T: Float, V: Lanes<T>>(x: V) -> V {
     let zero = V::splat(T::zero());
     let e = exp((zero - x).min(x)); // −|x|
     let s = e / (e + V::splat(T::of(2.0)));

@@ -19,7 +19,7 @@ mod scalar;
 pub use lanes::{Lanes, MAX_LANES};
 #[cfg(test)]
 pub use portable::Array;
-pub use scalar::Scalar;
+pub use scalar::Float;
 
 /// Instruction sets that kernels are compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,14 +56,14 @@ impl InstructionSet {
     }
 
     /// Numbers `T` in two registers, the width of a panel of the matrix kernels.
-    pub fn panel<T: Scalar>(self) -> usize {
+    pub fn panel<T: Float>(self) -> usize {
         dispatch::<T, _>(self, PanelWidth)
     }
 }
 
 struct PanelWidth;
 
-impl<T: Scalar> Task<T> for PanelWidth {
+impl<T: Float> Task<T> for PanelWidth {
     type Output = usize;
     #[inline(always)]
     fn run<V: Lanes<T>, const ROWS: usize>(self) -> usize {
@@ -75,7 +75,7 @@ impl<T: Scalar> Task<T> for PanelWidth {
 ///
 /// `run` and all that it calls must be `#[inline(always)]`, so that it is compiled anew inside each
 /// function with its own instruction set.
-pub trait Task<T: Scalar> {
+pub trait Task<T: Float> {
     /// Result.
     type Output;
     /// Does it. `ROWS` × 2 registers of sums leave room for the operands of a matrix product.
@@ -84,18 +84,18 @@ pub trait Task<T: Scalar> {
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn run_avx2<T: Scalar, K: Task<T>>(task: K) -> K::Output {
+fn run_avx2<T: Float, K: Task<T>>(task: K) -> K::Output {
     task.run::<T::Avx2, 6>()
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx2,fma")]
-fn run_avx512<T: Scalar, K: Task<T>>(task: K) -> K::Output {
+fn run_avx512<T: Float, K: Task<T>>(task: K) -> K::Output {
     task.run::<T::Avx512, 12>()
 }
 
 /// Runs the task with the instruction set `set`, or with the portable one where the machine lacks it.
-pub fn dispatch<T: Scalar, K: Task<T>>(set: InstructionSet, task: K) -> K::Output {
+pub fn dispatch<T: Float, K: Task<T>>(set: InstructionSet, task: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
     {
         if set == InstructionSet::Avx512 && set.available() {

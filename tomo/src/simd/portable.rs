@@ -1,7 +1,7 @@
 //! Lanes that every machine has: short arrays, which the compiler turns into its base registers.
 
 use super::lanes::Lanes;
-use super::scalar::Scalar;
+use super::scalar::Float;
 use core::ops::{Add, Div, Mul, Sub};
 
 /// `N` numbers.
@@ -9,7 +9,7 @@ use core::ops::{Add, Div, Mul, Sub};
 #[repr(transparent)]
 pub struct Array<T, const N: usize>([T; N]);
 
-impl<T: Scalar, const N: usize> Array<T, N> {
+impl<T: Float, const N: usize> Array<T, N> {
     #[inline(always)]
     fn zip(self, other: Self, f: impl Fn(T, T) -> T) -> Self {
         let mut out = self.0;
@@ -22,7 +22,7 @@ impl<T: Scalar, const N: usize> Array<T, N> {
 
 macro_rules! operator {
     ($trait:ident, $method:ident, $symbol:tt) => {
-        impl<T: Scalar, const N: usize> $trait for Array<T, N> {
+        impl<T: Float, const N: usize> $trait for Array<T, N> {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
@@ -38,7 +38,7 @@ operator!(Div, div, /);
 
 /// `a · b + c`, fused only where that is one instruction on every machine of the target.
 #[inline(always)]
-fn fma<T: Scalar>(a: T, b: T, c: T) -> T {
+fn fma<T: Float>(a: T, b: T, c: T) -> T {
     if cfg!(any(target_arch = "aarch64", target_feature = "fma")) {
         a.mul_add(b, c)
     } else {
@@ -46,7 +46,7 @@ fn fma<T: Scalar>(a: T, b: T, c: T) -> T {
     }
 }
 
-impl<T: Scalar, const N: usize> Lanes<T> for Array<T, N> {
+impl<T: Float, const N: usize> Lanes<T> for Array<T, N> {
     const LANES: usize = N;
 
     #[inline(always)]

@@ -5,7 +5,7 @@ use super::math::Coefficients;
 use super::portable::Array;
 
 /// f32 (to run) or f64 (to test), with its lanes on each instruction set.
-pub trait Scalar: Coefficients {
+pub trait Float: Coefficients {
     /// Lanes that every machine has.
     type Portable: Lanes<Self>;
     /// Lanes of AVX2.
@@ -20,7 +20,7 @@ pub trait Scalar: Coefficients {
     fn two_to_the(n: Self) -> Self;
 }
 
-impl Scalar for f32 {
+impl Float for f32 {
     type Portable = Array<f32, 4>;
     #[cfg(target_arch = "x86_64")]
     type Avx2 = super::avx2::F32x8;
@@ -39,7 +39,7 @@ impl Scalar for f32 {
     }
 }
 
-impl Scalar for f64 {
+impl Float for f64 {
     type Portable = Array<f64, 2>;
     #[cfg(target_arch = "x86_64")]
     type Avx2 = super::avx2::F64x4;

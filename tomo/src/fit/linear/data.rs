@@ -1,12 +1,12 @@
 //! The data of a linear problem, and how they are weighted.
 
 use crate::fit::FrameTerm;
-use crate::simd::Scalar;
+use crate::simd::Float;
 use kerrlight_geodesic::OutOfRange;
 
 /// Data with the weight of their reduced χ².
 #[derive(Clone, Copy)]
-pub struct Weighted<'a, T: Scalar> {
+pub struct Weighted<'a, T: Float> {
     /// What they count.
     pub weight: f64,
     /// The data.
@@ -14,11 +14,11 @@ pub struct Weighted<'a, T: Scalar> {
 }
 
 /// Terms over some frames: Σ weight · χ²/(number of real data in those frames).
-pub(super) struct Data<'a, T: Scalar> {
+pub(super) struct Data<'a, T: Float> {
     terms: Vec<Weighted<'a, T>>,
 }
 
-impl<'a, T: Scalar> Data<'a, T> {
+impl<'a, T: Float> Data<'a, T> {
     pub fn new(
         terms: &[Weighted<'a, T>],
         frames: &[usize],

@@ -4,7 +4,7 @@ use super::data::Data;
 use super::error::LinearError;
 use super::operator::Operator;
 use crate::fit::regulariser::{Regulariser, Shape};
-use crate::simd::Scalar;
+use crate::simd::Float;
 
 /// A penalty with its weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,7 +28,7 @@ pub(super) trait Convex {
 }
 
 /// The linear problem on the nodes that count.
-pub(super) struct Objective<'a, 'b, T: Scalar> {
+pub(super) struct Objective<'a, 'b, T: Float> {
     pub operator: &'b Operator<'a, T>,
     pub data: &'b Data<'a, T>,
     pub priors: &'b [Prior],
@@ -38,7 +38,7 @@ pub(super) struct Objective<'a, 'b, T: Scalar> {
     pub evaluations: usize,
 }
 
-impl<'a, 'b, T: Scalar + Default> Objective<'a, 'b, T> {
+impl<'a, 'b, T: Float + Default> Objective<'a, 'b, T> {
     pub fn new(
         operator: &'b Operator<'a, T>,
         data: &'b Data<'a, T>,
@@ -102,11 +102,11 @@ impl<'a, 'b, T: Scalar + Default> Objective<'a, 'b, T> {
     }
 }
 
-fn rounded<T: Scalar>(x: &[f64], scale: f64) -> Vec<T> {
+fn rounded<T: Float>(x: &[f64], scale: f64) -> Vec<T> {
     x.iter().map(|x| T::of(scale * x)).collect()
 }
 
-impl<T: Scalar + Default> Convex for Objective<'_, '_, T> {
+impl<T: Float + Default> Convex for Objective<'_, '_, T> {
     fn count(&self) -> usize {
         self.operator.active.count()
     }

@@ -2,7 +2,7 @@
 
 use super::data::Data;
 use super::walk::{Place, Room, Voxels, Walk};
-use crate::simd::Scalar;
+use crate::simd::Float;
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
 
@@ -67,7 +67,7 @@ struct Rows<T> {
     entries: Vec<T>,
 }
 
-impl<T: Scalar> Rows<T> {
+impl<T: Float> Rows<T> {
     /// Adds up what a ray's nodes take from each column; `place` remembers where in the row a column is.
     fn push(
         &mut self,
@@ -146,7 +146,7 @@ struct Scratch<T> {
     slopes: Vec<T>,
 }
 
-impl<'a, T: Scalar + Default> Operator<'a, T> {
+impl<'a, T: Float + Default> Operator<'a, T> {
     /// Restricted to these nodes, with at most about `budget` bytes of rows (those of 8 frames more).
     pub fn new(walk: Walk<'a, T>, active: Active, frames: &'a [usize], budget: usize) -> Self {
         let (corners, pixels) = (walk.voxels.corners(), walk.chain.pixels());
@@ -357,7 +357,7 @@ impl<'a, T: Scalar + Default> Operator<'a, T> {
     }
 }
 
-fn total<T: Scalar>(pieces: Vec<(f64, Vec<T>)>, count: usize) -> Vec<f64> {
+fn total<T: Float>(pieces: Vec<(f64, Vec<T>)>, count: usize) -> Vec<f64> {
     let mut sums = vec![0.0; count];
     const SHARE: usize = 8192;
     sums.par_chunks_mut(SHARE).enumerate().for_each(|(k, sums)| {

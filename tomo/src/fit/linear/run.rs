@@ -12,7 +12,7 @@ use super::scaled::Scaled;
 use super::solve::{Coarse, LinearProblem, LinearProgress, LinearSettings, LinearSolution, Watch};
 use super::start::{Lit, Trials};
 use super::walk::Voxels;
-use crate::simd::Scalar;
+use crate::simd::Float;
 
 /// Values at the nodes, and which of them count.
 type Start = (Vec<f64>, Vec<bool>);
@@ -30,7 +30,7 @@ pub(super) const FEW: Trials =
 const PATIENCE: usize = 3;
 
 /// A solution under way.
-pub(super) struct Run<'a, 'p, 'w, T: Scalar> {
+pub(super) struct Run<'a, 'p, 'w, T: Float> {
     pub problem: &'a LinearProblem<'p, T>,
     settings: &'a LinearSettings,
     watch: &'a mut Watch<'w>,
@@ -43,7 +43,7 @@ pub(super) struct Run<'a, 'p, 'w, T: Scalar> {
     at_lit: [f64; 2],
 }
 
-impl<'a, 'p, 'w, T: Scalar + Default> Run<'a, 'p, 'w, T> {
+impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
     pub fn new(
         problem: &'a LinearProblem<'p, T>,
         settings: &'a LinearSettings,

@@ -11,13 +11,13 @@ use super::start::Trials;
 use super::walk::{Voxels, Walk};
 use crate::dynamics::Axis;
 use crate::fit::Chain;
-use crate::simd::Scalar;
+use crate::simd::Float;
 use core::ops::ControlFlow;
 use kerrlight_geodesic::OutOfRange;
 
 /// min Σ weight · χ²/data + priors over 0 ≤ e ≤ `upper` at the nodes of a grid.
 #[derive(Clone, Copy)]
-pub struct LinearProblem<'a, T: Scalar> {
+pub struct LinearProblem<'a, T: Float> {
     /// Nodes of the rays, weighed for the axis ([`Chain::weigh`]).
     pub chain: &'a Chain<T>,
     /// The axis that matter turns about.
@@ -135,7 +135,7 @@ pub struct LinearSolution<T> {
 /// Told how it goes, says whether to go on.
 pub type Watch<'a> = dyn FnMut(&LinearProgress<'_>) -> ControlFlow<()> + 'a;
 
-impl<T: Scalar + Default> LinearProblem<'_, T> {
+impl<T: Float + Default> LinearProblem<'_, T> {
     /// Solves it. All threads take part; their number does not change a bit.
     ///
     /// # Errors

@@ -6,7 +6,7 @@ use super::lit::{Around, Spots};
 use super::objective::{Convex, Objective};
 use super::run::Run;
 use super::scaled::dot;
-use crate::simd::Scalar;
+use crate::simd::Float;
 
 /// A lit field and where the descent from it ended.
 pub(super) struct Lit {
@@ -32,7 +32,7 @@ pub(super) struct Trials {
 /// Newton steps to the best scale: one is enough where χ² is quadratic in it, as that of amplitudes is.
 const SCALINGS: usize = 3;
 
-impl<T: Scalar + Default> Run<'_, '_, '_, T> {
+impl<T: Float + Default> Run<'_, '_, '_, T> {
     /// The least of the descents from lit fields; none if the watch wanted no more.
     pub fn lit(
         &mut self,

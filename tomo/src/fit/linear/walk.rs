@@ -5,7 +5,7 @@ use crate::fit::Chain;
 use crate::fit::regulariser::Shape;
 use crate::points::{Coordinates, CoordinatesMut};
 use crate::representation::{Activation, Grid, GridSettings};
-use crate::simd::Scalar;
+use crate::simd::Float;
 use kerrlight_geodesic::OutOfRange;
 
 /// A grid of voxels, trilinear in between, zero outside; nodes at both ends, z fastest.
@@ -72,7 +72,7 @@ pub(super) struct Place<T> {
     pub weight: T,
 }
 
-impl<T: Scalar> Place<T> {
+impl<T: Float> Place<T> {
     /// What the eight nodes of the cell are multiplied by, x slowest.
     #[inline(always)]
     pub fn weights(&self) -> [T; 8] {
@@ -93,7 +93,7 @@ struct Geometry<T> {
     nodes: [usize; 3],
 }
 
-impl<T: Scalar> Geometry<T> {
+impl<T: Float> Geometry<T> {
     fn new(voxels: &Voxels) -> Self {
         let cells = voxels.nodes.map(|n| (n - 1) as f64);
         let width = |k: usize| voxels.high[k] - voxels.low[k];
@@ -140,7 +140,7 @@ pub(super) struct Room<T> {
 /// Nodes that are pulled back at a time: they stay in the first caches.
 const BLOCK: usize = 4096;
 
-impl<'a, T: Scalar> Walk<'a, T> {
+impl<'a, T: Float> Walk<'a, T> {
     /// Of rays with the weights that they have for the axis.
     pub fn new(chain: &'a Chain<T>, axis: Axis, voxels: Voxels) -> Self {
         Self { chain, axis, voxels, geometry: Geometry::new(&voxels) }

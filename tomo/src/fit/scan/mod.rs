@@ -11,7 +11,7 @@ mod refine;
 use super::Chain;
 use super::linear::{LinearError, LinearProblem, Prior, Voxels, Weighted};
 use crate::dynamics::Axis;
-use crate::simd::Scalar;
+use crate::simd::Float;
 use kerrlight_geodesic::OutOfRange;
 use rayon::prelude::*;
 use refine::Refinement;
@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// The data of a scan, and what is looked for in them.
 #[derive(Clone, Copy)]
-pub struct AxisProblem<'a, T: Scalar> {
+pub struct AxisProblem<'a, T: Float> {
     /// Nodes of the rays; few pixels are enough.
     pub chain: &'a Chain<T>,
     /// The frames of the movie that count; few are enough.
@@ -130,7 +130,7 @@ impl AxisSettings {
 }
 
 /// A scan under way.
-struct Scanner<'a, T: Scalar> {
+struct Scanner<'a, T: Float> {
     problem: &'a AxisProblem<'a, T>,
     watch: &'a ScanWatch<'a>,
     solved: AtomicUsize,
@@ -138,7 +138,7 @@ struct Scanner<'a, T: Scalar> {
     cancelled: AtomicBool,
 }
 
-impl<T: Scalar + Default> Scanner<'_, T> {
+impl<T: Float + Default> Scanner<'_, T> {
     /// The loss of each axis; none if the scan was cancelled. Axes are shared among threads, and each
     /// has its own sums: their number does not change a bit.
     fn losses(&self, axes: &[Axis], effort: Effort) -> Result<Option<Vec<AxisLoss>>, LinearError> {
@@ -168,7 +168,7 @@ impl<T: Scalar + Default> Scanner<'_, T> {
     }
 }
 
-impl<T: Scalar + Default> Scanner<'_, T> {
+impl<T: Float + Default> Scanner<'_, T> {
     /// The best refined axis of the opposite hemisphere; where all have come over to this one, the lattice's best
     /// there, with the loss of the fine problem.
     fn opposite(
@@ -194,7 +194,7 @@ impl<T: Scalar + Default> Scanner<'_, T> {
 ///
 /// # Errors
 /// If a number is out of its range, data do not fit the rays, a χ² is not finite, or all axes have the same loss.
-pub fn scan_axis<T: Scalar + Default>(
+pub fn scan_axis<T: Float + Default>(
     problem: &AxisProblem<'_, T>,
     settings: &AxisSettings,
     watch: &ScanWatch<'_>,
@@ -248,7 +248,7 @@ fn told_apart(map: &[AxisLoss]) -> Result<(), LinearError> {
 ///
 /// # Errors
 /// If a number is out of its range, or data do not fit the rays.
-pub fn refine_axis<T: Scalar + Default>(
+pub fn refine_axis<T: Float + Default>(
     problem: &AxisProblem<'_, T>,
     from: Axis,
     step: f64,

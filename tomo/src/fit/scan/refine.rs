@@ -3,11 +3,11 @@
 use super::{AxisLoss, Effort, Scanner};
 use crate::dynamics::Axis;
 use crate::fit::linear::LinearError;
-use crate::simd::Scalar;
+use crate::simd::Float;
 
 /// A pattern search: six directions about the best one so far, half as far away when none is better; at the end
 /// the lowest point of the paraboloid through the last seven.
-pub(super) struct Refinement<'a, 's, T: Scalar> {
+pub(super) struct Refinement<'a, 's, T: Float> {
     pub scanner: &'a Scanner<'s, T>,
     pub effort: Effort,
     pub halvings: usize,
@@ -16,7 +16,7 @@ pub(super) struct Refinement<'a, 's, T: Scalar> {
 /// Steps of one length.
 const MOVES: usize = 6;
 
-impl<T: Scalar + Default> Refinement<'_, '_, T> {
+impl<T: Float + Default> Refinement<'_, '_, T> {
     /// None if the scan was cancelled.
     pub fn run(&self, from: Axis, step: f64) -> Result<Option<AxisLoss>, LinearError> {
         let Some(losses) = self.scanner.losses(&[from], self.effort)? else { return Ok(None) };

@@ -4,7 +4,7 @@ use super::super::grid::cells::{Geometry, Located, interpolate, keep_inside};
 use super::super::grid::scatter::Contribution;
 use super::super::{Activation, Coordinates};
 use super::layout::{FEATURES, Layout, MAX_INPUTS, WIDTH};
-use crate::simd::{Lanes, MAX_LANES, Scalar, Task};
+use crate::simd::{Float, Lanes, MAX_LANES, Task};
 
 /// Weights and biases of the network.
 struct Network<'a, T> {
@@ -16,7 +16,7 @@ struct Network<'a, T> {
     last_bias: T,
 }
 
-impl<'a, T: Scalar> Network<'a, T> {
+impl<'a, T: Float> Network<'a, T> {
     #[inline(always)]
     fn of(layout: &Layout, parameters: &'a [T]) -> Self {
         let all = &parameters[layout.network_start()..];
@@ -88,7 +88,7 @@ impl<V: Copy> Sums<V> {
 
     /// Overwrites parameters in their order with the sums over lanes.
     #[inline(always)]
-    fn store<T: Scalar>(&self, inputs: usize, out: &mut [T])
+    fn store<T: Float>(&self, inputs: usize, out: &mut [T])
     where
         V: Lanes<T>,
     {
@@ -100,7 +100,7 @@ impl<V: Copy> Sums<V> {
 
     /// Adds a gradient of the output; returns that of the inputs.
     #[inline(always)]
-    fn backward<T: Scalar>(
+    fn backward<T: Float>(
         &mut self,
         network: &Network<'_, T>,
         inputs: &[V],
@@ -142,7 +142,7 @@ impl<V: Copy> Sums<V> {
 
 /// One input of a layer: adds its part to the gradients of its weights, returns its own.
 #[inline(always)]
-fn row<T: Scalar, V: Lanes<T>>(
+fn row<T: Float, V: Lanes<T>>(
     weights: &[T],
     sums: &mut [V; WIDTH],
     input: V,
@@ -158,7 +158,7 @@ fn row<T: Scalar, V: Lanes<T>>(
 
 /// Features of lanes of points, and whether they are inside.
 #[inline(always)]
-fn features<T: Scalar, V: Lanes<T>>(
+fn features<T: Float, V: Lanes<T>>(
     (layout, geometries): (&Layout, &[Geometry<T>]),
     parameters: &[T],
     at: &Coordinates<'_, T>,
@@ -190,7 +190,7 @@ pub struct Forward<'a, T> {
     pub kept: Option<&'a mut [T]>,
 }
 
-impl<T: Scalar> Task<T> for Forward<'_, T> {
+impl<T: Float> Task<T> for Forward<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<T>, const ROWS: usize>(mut self) {
@@ -230,7 +230,7 @@ pub struct Backward<'a, T> {
     pub pulls: Option<&'a mut [[T; 3]]>,
 }
 
-impl<T: Scalar> Task<T> for Backward<'_, T> {
+impl<T: Float> Task<T> for Backward<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<T>, const ROWS: usize>(mut self) {
@@ -265,7 +265,7 @@ impl<T: Scalar> Task<T> for Backward<'_, T> {
 
 /// dL/dx of lanes of points.
 #[inline(always)]
-fn pull<T: Scalar, V: Lanes<T>>(
+fn pull<T: Float, V: Lanes<T>>(
     (layout, geometries): (&Layout, &[Geometry<T>]),
     parameters: &[T],
     at: &Coordinates<'_, T>,
@@ -303,7 +303,7 @@ pub struct Corners<'a, T> {
     pub contributions: &'a mut [Contribution<T>],
 }
 
-impl<T: Scalar> Task<T> for Corners<'_, T> {
+impl<T: Float> Task<T> for Corners<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<T>, const ROWS: usize>(self) {

@@ -8,7 +8,7 @@ mod tests;
 use super::grid::cells::{Geometry, check_box};
 use super::grid::scatter::Scatter;
 use super::{Activation, Coordinates, CoordinatesMut, Gradient, Groups, Representation, Workspace};
-use crate::simd::{InstructionSet, Scalar, dispatch};
+use crate::simd::{Float, InstructionSet, dispatch};
 use core::ops::Range;
 use kernels::{Backward, Corners, Forward};
 use kerrlight_geodesic::OutOfRange;
@@ -101,7 +101,7 @@ impl FeatureGrid {
     }
 
     /// The grids, coarsest first, and places that are not used.
-    fn geometries<T: Scalar>(&self) -> [Geometry<T>; MAX_LEVELS] {
+    fn geometries<T: Float>(&self) -> [Geometry<T>; MAX_LEVELS] {
         let FeatureGridSettings { low, high, .. } = &self.settings;
         let geometry = |nodes: usize| Geometry::new([nodes; 3], *low, *high);
         core::array::from_fn(|level| geometry(self.layout.nodes(level)))
@@ -132,7 +132,7 @@ struct Memory<T> {
     pulls: Vec<[T; 3]>,
 }
 
-impl<T: Scalar + Default> Memory<T> {
+impl<T: Float + Default> Memory<T> {
     fn vjp(
         &mut self,
         field: Field<'_, T>,
@@ -269,7 +269,7 @@ impl<T: Scalar + Default> Memory<T> {
     }
 }
 
-impl<T: Scalar> Field<'_, T> {
+impl<T: Float> Field<'_, T> {
     fn values(&self, at: Coordinates<'_, T>, values: &mut [T], kept: Option<&mut [T]>) {
         let Field { grid, geometries, parameters } = *self;
         let (layout, activation) = (&grid.layout, grid.settings.activation);
@@ -283,7 +283,7 @@ fn share_of(share: usize, points: usize) -> Range<usize> {
     share * SHARE..share * SHARE + points
 }
 
-impl<T: Scalar + Default> Representation<T> for FeatureGrid {
+impl<T: Float + Default> Representation<T> for FeatureGrid {
     fn dimension(&self) -> usize {
         3
     }

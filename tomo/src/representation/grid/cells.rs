@@ -3,7 +3,7 @@
 use super::super::{Activation, Coordinates};
 use super::Share;
 use super::scatter::{Contribution, NOWHERE};
-use crate::simd::{Lanes, MAX_LANES, Scalar, Task, math};
+use crate::simd::{Float, Lanes, MAX_LANES, Task, math};
 use kerrlight_geodesic::OutOfRange;
 
 /// One axis of the box.
@@ -46,7 +46,7 @@ pub struct Located<T, V> {
     unit: core::marker::PhantomData<T>,
 }
 
-impl<T: Scalar> Geometry<T> {
+impl<T: Float> Geometry<T> {
     /// Nodes from `low` to `high`, both included.
     pub fn new(nodes: [usize; 3], low: [f64; 3], high: [f64; 3]) -> Self {
         let axis = |k: usize| Axis {
@@ -100,13 +100,13 @@ impl<T: Scalar> Geometry<T> {
 }
 
 #[inline(always)]
-fn between<T: Scalar, V: Lanes<T>>(from: V, to: V, part: V) -> V {
+fn between<T: Float, V: Lanes<T>>(from: V, to: V, part: V) -> V {
     part.mul_add(to - from, from)
 }
 
 /// The interpolated number and its slopes along x, y and z in cells.
 #[inline(always)]
-pub fn interpolate<T: Scalar, V: Lanes<T>>(c: &[V; 8], within: &[V; 3]) -> (V, [V; 3]) {
+pub fn interpolate<T: Float, V: Lanes<T>>(c: &[V; 8], within: &[V; 3]) -> (V, [V; 3]) {
     let [x, y, z] = *within;
     let along_z: [V; 4] = core::array::from_fn(|k| between(c[2 * k], c[2 * k + 1], z));
     let along_y = [between(along_z[0], along_z[1], y), between(along_z[2], along_z[3], y)];
@@ -127,7 +127,7 @@ pub(super) struct Values<'a, T> {
     pub values: &'a mut [T],
 }
 
-impl<T: Scalar> Task<T> for Values<'_, T> {
+impl<T: Float> Task<T> for Values<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<T>, const ROWS: usize>(self) {
@@ -143,7 +143,7 @@ impl<T: Scalar> Task<T> for Values<'_, T> {
 
 /// Zero outside.
 #[inline(always)]
-pub fn keep_inside<T: Scalar, V: Lanes<T>>(inside: V, value: V) -> V {
+pub fn keep_inside<T: Float, V: Lanes<T>>(inside: V, value: V) -> V {
     let zero = V::splat(T::zero());
     V::select_less(zero, inside, value, zero)
 }
@@ -155,7 +155,7 @@ pub(super) struct Products<'a, T> {
     pub share: Share<'a, T>,
 }
 
-impl<T: Scalar> Task<T> for Products<'_, T> {
+impl<T: Float> Task<T> for Products<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<T>, const ROWS: usize>(self) {
@@ -184,7 +184,7 @@ impl<T: Scalar> Task<T> for Products<'_, T> {
     }
 }
 
-impl<T: Scalar, V: Lanes<T>> Located<T, V> {
+impl<T: Float, V: Lanes<T>> Located<T, V> {
     /// What lanes add to their nodes.
     #[inline(always)]
     pub fn contribute(&self, weight: V, contributions: &mut [Contribution<T>]) {

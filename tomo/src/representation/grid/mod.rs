@@ -6,7 +6,7 @@ pub(super) mod scatter;
 mod tests;
 
 use super::{Activation, Coordinates, CoordinatesMut, Gradient, Groups, Representation, Workspace};
-use crate::simd::{InstructionSet, Scalar, dispatch};
+use crate::simd::{Float, InstructionSet, dispatch};
 use cells::{Geometry, Products, Values, check_box};
 use kerrlight_geodesic::OutOfRange;
 use scatter::{Contribution, Scatter};
@@ -79,7 +79,7 @@ impl Grid {
         assert!(at.dimension() == 3 && at.len() == numbers);
     }
 
-    fn values<T: Scalar>(&self, parameters: &[T], at: Coordinates<'_, T>, values: &mut [T]) {
+    fn values<T: Float>(&self, parameters: &[T], at: Coordinates<'_, T>, values: &mut [T]) {
         if at.len() > SHARE {
             let middle = halfway(at.len());
             let (left, right) = values.split_at_mut(middle);
@@ -92,7 +92,7 @@ impl Grid {
         dispatch(self.instruction_set, Values { geometry, activation, parameters, at, values });
     }
 
-    fn products<T: Scalar>(&self, share: Share<'_, T>) {
+    fn products<T: Float>(&self, share: Share<'_, T>) {
         if share.at.len() > SHARE {
             let (left, right) = share.halves();
             rayon::join(|| self.products(left), || self.products(right));
@@ -102,7 +102,7 @@ impl Grid {
         dispatch(self.instruction_set, Products { geometry, activation, share });
     }
 
-    fn geometry<T: Scalar>(&self) -> Geometry<T> {
+    fn geometry<T: Float>(&self) -> Geometry<T> {
         let GridSettings { nodes, low, high, .. } = &self.settings;
         Geometry::new(*nodes, *low, *high)
     }
@@ -150,7 +150,7 @@ struct Memory<T> {
     cotangents: Vec<T>,
 }
 
-impl<T: Scalar + Default> Memory<T> {
+impl<T: Float + Default> Memory<T> {
     fn vjp(
         &mut self,
         grid: &Grid,
@@ -202,7 +202,7 @@ impl<T: Scalar + Default> Memory<T> {
     }
 }
 
-impl<T: Scalar + Default> Representation<T> for Grid {
+impl<T: Float + Default> Representation<T> for Grid {
     fn dimension(&self) -> usize {
         3
     }

@@ -4,7 +4,7 @@
 //! next; so the even slabs can be worked on at the same time, and then the odd ones, straight into the
 //! gradient.
 
-use crate::simd::Scalar;
+use crate::simd::Float;
 use rayon::prelude::*;
 
 /// The most slabs.
@@ -33,7 +33,7 @@ pub struct Scatter<T> {
     starts: Vec<usize>,
 }
 
-impl<T: Scalar + Default> Scatter<T> {
+impl<T: Float + Default> Scatter<T> {
     /// Room for a batch.
     pub fn contributions(&mut self, points: usize) -> &mut [Contribution<T>] {
         self.contributions.resize(points, Contribution::default());
@@ -99,7 +99,7 @@ fn slab([nx, ny, nz]: [usize; 3]) -> usize {
 }
 
 #[inline(always)]
-fn add<T: Scalar>(c: &Contribution<T>, sums: &mut [T], first: usize, ny: usize, nz: usize) {
+fn add<T: Float>(c: &Contribution<T>, sums: &mut [T], first: usize, ny: usize, nz: usize) {
     let corner = c.corner as usize - first;
     let [x, y, z] = c.within;
     let one = T::one();

@@ -8,7 +8,7 @@ use super::super::{Coordinates, CoordinatesMut, Gradient, Link};
 use super::Network;
 use super::packed::Packed;
 use super::tile::{POINTS, Tile};
-use crate::simd::Scalar;
+use crate::simd::Float;
 use core::ops::Range;
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
@@ -42,13 +42,13 @@ pub struct Memory<T> {
     partial: Vec<Lines<T>>,
 }
 
-impl<T: Scalar + Default> Default for Memory<T> {
+impl<T: Float + Default> Default for Memory<T> {
     fn default() -> Self {
         Self { packed: Packed::default(), tiles: Mutex::default(), partial: Vec::new() }
     }
 }
 
-impl<T: Scalar + Default> Memory<T> {
+impl<T: Float + Default> Memory<T> {
     /// Runs a batch; `groups` are tied to the points as in `eval_vjp`, or empty.
     pub fn run(
         &mut self,
@@ -121,7 +121,7 @@ fn check<T>(
 }
 
 /// sums += all partial sums, each number in the order of the chunks.
-fn add_up<T: Scalar + Default>(partial: &[Lines<T>], sums: &mut [T]) {
+fn add_up<T: Float + Default>(partial: &[Lines<T>], sums: &mut [T]) {
     sums.par_chunks_mut(SUMMED).enumerate().for_each(|(k, sums)| {
         for partial in partial {
             let partial = &partial.read()[k * SUMMED..];
@@ -202,7 +202,7 @@ struct Batch<'a, T> {
     cuts: &'a Cuts<'a>,
 }
 
-impl<T: Scalar + Default> Batch<'_, T> {
+impl<T: Float + Default> Batch<'_, T> {
     fn split(&self, job: Job<'_, T>) {
         let Job { chunks, values, coordinates, partial } = job;
         if chunks.len() == 1 {

@@ -4,7 +4,7 @@
 //! sums runs over the common index, with one operand broadcast and the other loaded from a panel two
 //! registers wide. ReLU, its derivative and the biases are part of loading and storing a block.
 
-use crate::simd::{Lanes, Scalar, Task};
+use crate::simd::{Float, Lanes, Task};
 
 /// Numbers row by row with a distance between rows.
 #[derive(Clone, Copy)]
@@ -24,7 +24,7 @@ pub struct MatrixMut<'a, T> {
 /// # Safety
 /// a + m·rows + k·columns is readable for m < ROWS, k < count, and b + k·step for two registers.
 #[inline(always)]
-unsafe fn block<T: Scalar, V: Lanes<T>, const ROWS: usize>(
+unsafe fn block<T: Float, V: Lanes<T>, const ROWS: usize>(
     start: [V; 2],
     count: usize,
     (a, rows, columns): (*const T, usize, usize),
@@ -59,7 +59,7 @@ pub struct Forward<'a, T> {
     pub output: MatrixMut<'a, T>,
 }
 
-impl<T: Scalar> Task<T> for Forward<'_, T> {
+impl<T: Float> Task<T> for Forward<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<T>, const ROWS: usize>(self) {
@@ -114,7 +114,7 @@ pub struct Backward<'a, T> {
     pub output: MatrixMut<'a, T>,
 }
 
-impl<T: Scalar> Task<T> for Backward<'_, T> {
+impl<T: Float> Task<T> for Backward<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<T>, const ROWS: usize>(self) {
@@ -163,7 +163,7 @@ impl<T: Scalar> Task<T> for Backward<'_, T> {
 /// # Safety
 /// `h` is readable and `to` readable and writable for a register.
 #[inline(always)]
-unsafe fn pass<T: Scalar, V: Lanes<T>>(sum: V, h: Option<*const T>, to: *mut T) {
+unsafe fn pass<T: Float, V: Lanes<T>>(sum: V, h: Option<*const T>, to: *mut T) {
     let zero = V::splat(T::zero());
     // SAFETY: as the caller vouches.
     unsafe {
@@ -187,7 +187,7 @@ pub struct Weights<'a, T> {
     pub overwrite: bool,
 }
 
-impl<T: Scalar> Task<T> for Weights<'_, T> {
+impl<T: Float> Task<T> for Weights<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<T>, const ROWS: usize>(self) {
@@ -222,7 +222,7 @@ impl<T: Scalar> Task<T> for Weights<'_, T> {
 
 /// Adds two registers to what is there, or puts them there.
 #[inline(always)]
-fn put<T: Scalar, V: Lanes<T>>(sum: [V; 2], to: &mut [T], overwrite: bool) {
+fn put<T: Float, V: Lanes<T>>(sum: [V; 2], to: &mut [T], overwrite: bool) {
     let (left, right) = to.split_at_mut(V::LANES.min(to.len()));
     for (sum, to) in sum.into_iter().zip([left, right]) {
         let sum = if overwrite { sum } else { V::load_front(to, T::zero()) + sum };
@@ -237,7 +237,7 @@ pub fn packed_kernel(inputs: usize, outputs: usize, width: usize) -> usize {
 
 /// A kernel and its bias (`inputs + 1` rows) as panels of `width` columns, the last one padded with
 /// zeros.
-pub fn pack_kernel<T: Scalar>(rows: &[T], outputs: usize, width: usize, panels: &mut [T]) {
+pub fn pack_kernel<T: Float>(rows: &[T], outputs: usize, width: usize, panels: &mut [T]) {
     let inputs = rows.len() / outputs;
     for (p, panel) in panels.chunks_mut(inputs * width).enumerate() {
         let columns = (outputs - p * width).min(width);
@@ -249,7 +249,7 @@ pub fn pack_kernel<T: Scalar>(rows: &[T], outputs: usize, width: usize, panels: 
 }
 
 /// Rows `kernel` (one an input) of a kernel, transposed, as panels of `width` columns.
-pub fn pack_transposed<T: Scalar>(kernel: &[T], outputs: usize, width: usize, panels: &mut [T]) {
+pub fn pack_transposed<T: Float>(kernel: &[T], outputs: usize, width: usize, panels: &mut [T]) {
     panels.fill(T::zero());
     for (p, panel) in panels.chunks_mut(outputs * width).enumerate() {
         let rows = kernel.chunks(outputs).skip(p * width).take(width);

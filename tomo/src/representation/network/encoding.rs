@@ -2,7 +2,7 @@
 
 use super::super::{Coordinates, CoordinatesMut};
 use super::dense::{Matrix, MatrixMut};
-use crate::simd::{Lanes, MAX_LANES, Scalar, Task, math};
+use crate::simd::{Float, Lanes, MAX_LANES, Task, math};
 
 /// Rows γ(x) = [x, sin 2ʲx, sin(2ʲx + π/2)] (for each j the coordinates one after the other), then a
 /// one.
@@ -14,7 +14,7 @@ pub struct Encode<'a, T> {
     pub output: MatrixMut<'a, T>,
 }
 
-impl<T: Scalar> Task<T> for Encode<'_, T> {
+impl<T: Float> Task<T> for Encode<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<T>, const ROWS: usize>(self) {
@@ -40,7 +40,7 @@ impl<T: Scalar> Task<T> for Encode<'_, T> {
 
 /// Lanes to one column of as many rows.
 #[inline(always)]
-fn put<T: Scalar, V: Lanes<T>>(x: V, rows: &mut [T], stride: usize, column: usize) {
+fn put<T: Float, V: Lanes<T>>(x: V, rows: &mut [T], stride: usize, column: usize) {
     let mut lanes = [T::zero(); MAX_LANES];
     x.store_front(&mut lanes);
     for (row, x) in rows.chunks_mut(stride).zip(lanes) {
@@ -49,7 +49,7 @@ fn put<T: Scalar, V: Lanes<T>>(x: V, rows: &mut [T], stride: usize, column: usiz
 }
 
 /// Adds to the gradient with respect to coordinates what that with respect to the rows amounts to.
-pub fn encode_vjp<T: Scalar>(
+pub fn encode_vjp<T: Float>(
     rows: Matrix<'_, T>,
     cotangents: Matrix<'_, T>,
     scales: &[T],

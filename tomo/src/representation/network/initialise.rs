@@ -2,7 +2,7 @@
 
 use super::layout::Layer;
 use super::settings::Initialisation;
-use crate::simd::Scalar;
+use crate::simd::Float;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
@@ -11,7 +11,7 @@ use rand_pcg::Pcg64;
 const TRUNCATED: f64 = 0.879_625_661_034_239_8;
 
 /// Draws all kernels, layer by layer and row by row; biases are zero.
-pub fn initialise<T: Scalar>(
+pub fn initialise<T: Float>(
     layers: &[Layer],
     how: Initialisation,
     seed: u64,

@@ -16,7 +16,7 @@ mod tile;
 pub use settings::{Initialisation, NetworkSettings};
 
 use super::{Coordinates, Gradient, Groups, Representation, Workspace};
-use crate::simd::{InstructionSet, Scalar};
+use crate::simd::{Float, InstructionSet};
 use batch::{Cotangents, Memory, Way};
 use kerrlight_geodesic::OutOfRange;
 use layout::Layout;
@@ -67,14 +67,14 @@ impl Network {
         [forward, 2 * forward + back]
     }
 
-    fn scales<T: Scalar>(&self) -> [T; 4] {
+    fn scales<T: Float>(&self) -> [T; 4] {
         let (length, time) = (1.0 / self.settings.length_scale, 1.0 / self.settings.time_scale);
         let first = if self.settings.dimension == 4 { time } else { length };
         [first, length, length, length].map(T::of)
     }
 }
 
-impl<T: Scalar + Default> Representation<T> for Network {
+impl<T: Float + Default> Representation<T> for Network {
     fn dimension(&self) -> usize {
         self.settings.dimension
     }

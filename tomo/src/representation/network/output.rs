@@ -2,7 +2,7 @@
 
 use super::super::Activation;
 use super::dense::{Matrix, MatrixMut};
-use crate::simd::{Lanes, Scalar, Task};
+use crate::simd::{Float, Lanes, Task};
 
 /// values = activation(rows · weights + shift), and the activation's slopes.
 pub struct Output<'a, T> {
@@ -16,7 +16,7 @@ pub struct Output<'a, T> {
     pub slopes: &'a mut [T],
 }
 
-impl<T: Scalar> Task<T> for Output<'_, T> {
+impl<T: Float> Task<T> for Output<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<T>, const ROWS: usize>(self) {
@@ -54,7 +54,7 @@ pub struct OutputBackward<'a, T> {
     pub gradient: &'a mut [T],
 }
 
-impl<T: Scalar> Task<T> for OutputBackward<'_, T> {
+impl<T: Float> Task<T> for OutputBackward<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<T>, const ROWS: usize>(self) {

@@ -4,7 +4,7 @@ use super::super::workspace::Lines;
 use super::Network;
 use super::dense::{pack_kernel, pack_transposed, packed_kernel};
 use super::layout::LINE;
-use crate::simd::Scalar;
+use crate::simd::Float;
 
 /// Packed weights of all layers.
 #[derive(Default)]
@@ -21,7 +21,7 @@ struct Panels<T> {
     encoded: Lines<T>,
 }
 
-impl<T: Scalar + Default> Packed<T> {
+impl<T: Float + Default> Packed<T> {
     /// Packs what a forward pass needs; what the way back needs if `backward`, as far as the
     /// coordinates if `coordinates`.
     pub fn pack(&mut self, network: &Network, parameters: &[T], backward: bool, coordinates: bool) {
@@ -76,7 +76,7 @@ impl<T: Scalar + Default> Packed<T> {
     }
 }
 
-fn transpose<T: Scalar + Default>(kernel: &[T], outputs: usize, width: usize, to: &mut Lines<T>) {
+fn transpose<T: Float + Default>(kernel: &[T], outputs: usize, width: usize, to: &mut Lines<T>) {
     let inputs = kernel.len() / outputs;
     to.resize(inputs.div_ceil(width) * width * outputs);
     pack_transposed(kernel, outputs, width, to.all());

@@ -9,7 +9,7 @@ use super::encoding::{Encode, encode_vjp};
 use super::layout::Rows;
 use super::output::{Output, OutputBackward};
 use super::packed::Packed;
-use crate::simd::{Scalar, dispatch};
+use crate::simd::{Float, dispatch};
 use core::ops::Range;
 
 /// Points of a tile. Activations of four layers of 128 and their gradients then take half a
@@ -36,7 +36,7 @@ pub struct Tile<T> {
     output: Lines<T>,
 }
 
-impl<T: Scalar + Default> Tile<T> {
+impl<T: Float + Default> Tile<T> {
     /// Makes room for `points`; of a forward pass alone, or both ways.
     pub fn resize(&mut self, network: &Network, points: usize, backward: bool) {
         let points = points.next_multiple_of(BLOCK);
@@ -203,12 +203,12 @@ impl<T: Scalar + Default> Tile<T> {
     }
 }
 
-fn matrix<T: Scalar + Default>(lines: &Lines<T>, rows: Rows) -> Matrix<'_, T> {
+fn matrix<T: Float + Default>(lines: &Lines<T>, rows: Rows) -> Matrix<'_, T> {
     Matrix { numbers: lines.read(), stride: rows.stride }
 }
 
 /// What stands behind the units of a row: the encoded point after a skip, and a one.
-fn append<T: Scalar>(encoded: Matrix<'_, T>, rows: &mut [T], format: Rows, points: usize) {
+fn append<T: Float>(encoded: Matrix<'_, T>, rows: &mut [T], format: Rows, points: usize) {
     let from = encoded.numbers.chunks(encoded.stride);
     for (row, from) in rows.chunks_mut(format.stride).zip(from).take(points) {
         let appended = format.columns - format.units;

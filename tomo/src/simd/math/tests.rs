@@ -15,7 +15,7 @@ macro_rules! function {
         struct $name;
         impl Function for $name {
             #[inline(always)]
-            fn call<T: Scalar, V: Lanes<T>>(&self, x: V) -> V {
+            fn call<T: Float, V: Lanes<T>>(&self, x: V) -> V {
                 $call(x)
             }
         }
@@ -23,7 +23,7 @@ macro_rules! function {
 }
 
 trait Function {
-    fn call<T: Scalar, V: Lanes<T>>(&self, x: V) -> V;
+    fn call<T: Float, V: Lanes<T>>(&self, x: V) -> V;
 }
 function!(Sin, |x| sin_cos::<T, V>(x).0);
 function!(Cos, |x| sin_cos::<T, V>(x).1);
@@ -31,7 +31,7 @@ function!(Exp, exp::<T, V>);
 function!(Sigmoid, sigmoid::<T, V>);
 function!(Softplus, softplus::<T, V>);
 
-impl<T: Scalar, F: Function> Task<T> for Errors<'_, T, F> {
+impl<T: Float, F: Function> Task<T> for Errors<'_, T, F> {
     type Output = f64;
     #[inline(always)]
     fn run<V: Lanes<T>, const ROWS: usize>(self) -> f64 {
@@ -51,7 +51,7 @@ impl<T: Scalar, F: Function> Task<T> for Errors<'_, T, F> {
     }
 }
 
-fn worst<T: Scalar>(
+fn worst<T: Float>(
     arguments: &[f64],
     compute: impl Function + Copy,
     exact: fn(f64) -> f64,
@@ -70,7 +70,7 @@ fn points(limit: f64) -> Vec<f64> {
 
 impl<F: Function> Function for &F {
     #[inline(always)]
-    fn call<T: Scalar, V: Lanes<T>>(&self, x: V) -> V {
+    fn call<T: Float, V: Lanes<T>>(&self, x: V) -> V {
         F::call(self, x)
     }
 }
