@@ -24,7 +24,7 @@ struct Effect {
     on: &'static [&'static str],
 }
 
-/// The order matters: polarisation needs the redshift.
+/// The order matters: polarization needs the redshift.
 const EFFECTS: [Effect; 8] = [
     Effect { name: "lensing", on: &["effects.lensing=true"] },
     Effect { name: "redshift", on: &["effects.redshift=true"] },
@@ -37,7 +37,7 @@ const EFFECTS: [Effect; 8] = [
     Effect { name: "first half-orbit only", on: &["effects.half_orbits=1"] },
     Effect { name: "ray bundles", on: &["effects.ray_bundles=true"] },
     Effect {
-        name: "polarisation",
+        name: "polarization",
         on: &[
             "effects.polarization=true",
             "magnetic_field.vertical=1.0",
@@ -65,13 +65,13 @@ fn main() -> anyhow::Result<()> {
     let everything: Vec<usize> = (0..EFFECTS.len()).collect();
     let all = time(&everything)?;
     for (k, effect) in EFFECTS.iter().enumerate().skip(1) {
-        let needed: &[usize] = if effect.name == "polarisation" { &[1, k] } else { &[k] };
+        let needed: &[usize] = if effect.name == "polarization" { &[1, k] } else { &[k] };
         let alone = time(needed)?;
         let without: Vec<usize> = everything
             .iter()
             .copied()
             // What needs it goes with it.
-            .filter(|j| *j != k && !(k == 1 && EFFECTS[*j].name == "polarisation"))
+            .filter(|j| *j != k && !(k == 1 && EFFECTS[*j].name == "polarization"))
             .collect();
         let others = time(&without)?;
         let dearer = 100.0 * (alone / off - 1.0);
@@ -83,7 +83,7 @@ fn main() -> anyhow::Result<()> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/measurements");
     let mut file = tempfile::NamedTempFile::new_in(&folder).context("docs/measurements")?;
     let dearer = 100.0 * (library / plain - 1.0);
-    let off = format!("{library:.3} µs against {plain:.3} µs a ray ({dearer:+.1} %)");
+    let off = format!("{library:.3} µs against {plain:.3} µs per ray ({dearer:+.1} %)");
     let page = PAGE.replace("TABLE\n", &table).replace("OFF", &off);
     file.write_all(page.as_bytes())?;
     file.persist(folder.join("effects.md"))?;
