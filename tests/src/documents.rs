@@ -1,7 +1,6 @@
-//! Documents that cannot rot: the links, paths, verbs, flags and settings that they name exist, and the reference
-//! leaves none out.
+//! Documents that cannot rot: the links, anchors and paths that they name exist, and their settings are TOML.
 
-use crate::support::{kerrlight, root};
+use crate::support::root;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -26,7 +25,8 @@ fn collect(folder: &Path, files: &mut Vec<PathBuf>) {
     }
 }
 
-fn read(path: &Path) -> String {
+/// The text of a page.
+pub fn read(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
@@ -132,50 +132,6 @@ fn regress_all_pages_are_in_the_contents() {
     assert_eq!(listed, there);
 }
 
-/// The verbs of the program, as its help lists them.
-fn verbs() -> Vec<String> {
-    let help = String::from_utf8(kerrlight(&root(), &["--help"]).stdout).expect("text");
-    let named = |line: &str| {
-        let (verb, about) = line.strip_prefix("  ")?.split_once("  ")?;
-        let is_verb =
-            verb.chars().all(|c| c.is_ascii_lowercase() || c == '-') && !verb.starts_with('-');
-        (is_verb && !verb.is_empty() && !about.trim().is_empty()).then(|| verb.to_owned())
-    };
-    help.lines().filter_map(named).filter(|verb| verb != "help").collect()
-}
-
-/// The long options that a line of a help page or of a table introduces.
-fn options(line: &str) -> impl Iterator<Item = &str> {
-    let introduced = line.split("  ").find(|part| !part.is_empty()).unwrap_or("");
-    let words = introduced.split(|c: char| !c.is_ascii_alphanumeric() && c != '-');
-    words.filter(|word| word.starts_with("--") && word.len() > 2)
-}
-
-/// Each verb has a page of the reference, whose tables have its options, all of them and no others.
-#[test]
-fn regress_the_reference_has_every_option() {
-    const COMMON: [&str; 5] = ["--help", "--version", "--threads", "--memory", "--json"];
-    let verbs = verbs();
-    assert!(verbs.len() > 8, "only {verbs:?}");
-    for verb in verbs {
-        let page = read(&root().join(format!("docs/reference/{verb}.md")));
-        let help = kerrlight(&root(), &[verb.as_str(), "--help"]);
-        let help = String::from_utf8(help.stdout).expect("text");
-        let introduces = |line: &&str| line.trim_start().starts_with('-');
-        let known: BTreeSet<&str> = help.lines().filter(introduces).flat_map(options).collect();
-        let rows = page.lines().filter(|line| line.starts_with("| `-"));
-        let described: BTreeSet<&str> =
-            rows.flat_map(|row| options(row.split(" | ").next().unwrap())).collect();
-        for option in &known {
-            let has = described.contains(option) || COMMON.contains(option);
-            assert!(has, "docs/reference/{verb}.md does not describe {option}");
-        }
-        for option in described {
-            assert!(known.contains(option), "docs/reference/{verb}.md describes {option}");
-        }
-    }
-}
-
 /// Blocks of settings are TOML.
 #[test]
 fn regress_settings_in_documents_are_toml() {
@@ -188,13 +144,4 @@ fn regress_settings_in_documents_are_toml() {
         }
     }
     assert!(seen > 3, "only {seen} blocks found");
-}
-
-/// The table of channels in the documents is that of the program.
-#[test]
-fn regress_channels_are_documented() {
-    let table = read(&root().join("docs/reference/exr.md"));
-    for channel in &kerrlight_tomo::render::CHANNELS {
-        assert!(table.contains(&format!("`{}`", channel.name)), "{}", channel.name);
-    }
 }

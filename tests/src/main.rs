@@ -24,6 +24,7 @@ mod lensing;
 mod pictures;
 mod radiative_transfer;
 mod readme;
+mod reference;
 mod results;
 mod resume;
 mod resumed_fits;

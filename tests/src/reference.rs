@@ -1,0 +1,183 @@
+//! The reference is complete: it has every verb, option, key and channel of the program, and no options that the
+//! program does not have.
+
+use crate::documents::read;
+use crate::support::{kerrlight, root};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// The verbs of the program, as its help lists them.
+fn verbs() -> Vec<String> {
+    let help = String::from_utf8(kerrlight(&root(), &["--help"]).stdout).expect("text");
+    let named = |line: &str| {
+        let (verb, about) = line.strip_prefix("  ")?.split_once("  ")?;
+        let is_verb =
+            verb.chars().all(|c| c.is_ascii_lowercase() || c == '-') && !verb.starts_with('-');
+        (is_verb && !verb.is_empty() && !about.trim().is_empty()).then(|| verb.to_owned())
+    };
+    help.lines().filter_map(named).filter(|verb| verb != "help").collect()
+}
+
+/// The long options that a line of a help page or of a table introduces.
+fn options(line: &str) -> impl Iterator<Item = &str> {
+    let introduced = line.split("  ").find(|part| !part.is_empty()).unwrap_or("");
+    let words = introduced.split(|c: char| !c.is_ascii_alphanumeric() && c != '-');
+    words.filter(|word| word.starts_with("--") && word.len() > 2)
+}
+
+/// Each verb has a page of the reference, whose tables have its options, all of them and no others.
+#[test]
+fn regress_the_reference_has_every_option() {
+    const COMMON: [&str; 5] = ["--help", "--version", "--threads", "--memory", "--json"];
+    let verbs = verbs();
+    assert!(verbs.len() > 8, "only {verbs:?}");
+    for verb in verbs {
+        let page = read(&root().join(format!("docs/reference/{verb}.md")));
+        let help = kerrlight(&root(), &[verb.as_str(), "--help"]);
+        let help = String::from_utf8(help.stdout).expect("text");
+        let introduces = |line: &&str| line.trim_start().starts_with('-');
+        let known: BTreeSet<&str> = help.lines().filter(introduces).flat_map(options).collect();
+        let rows = page.lines().filter(|line| line.starts_with("| `-"));
+        let described: BTreeSet<&str> =
+            rows.flat_map(|row| options(row.split(" | ").next().unwrap())).collect();
+        for option in &known {
+            let has = described.contains(option) || COMMON.contains(option);
+            assert!(has, "docs/reference/{verb}.md does not describe {option}");
+        }
+        for option in described {
+            assert!(known.contains(option), "docs/reference/{verb}.md describes {option}");
+        }
+    }
+}
+
+/// The table of channels is that of the program.
+#[test]
+fn regress_channels_are_documented() {
+    let table = read(&root().join("docs/reference/exr.md"));
+    for channel in &kerrlight_tomo::render::CHANNELS {
+        assert!(table.contains(&format!("`{}`", channel.name)), "{}", channel.name);
+    }
+}
+
+/// Words of the spans of code of a page, or of one of its sections.
+fn code_words(text: &str) -> BTreeSet<&str> {
+    let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    let spans = text.split('`').skip(1).step_by(2);
+    spans.flat_map(|span| span.split(move |c| !is_word(c))).collect()
+}
+
+/// The section of a page under a heading; the whole page without one.
+fn section<'a>(page: &'a str, heading: &str) -> &'a str {
+    if heading.is_empty() {
+        return page;
+    }
+    let start = page.find(&format!("\n## {heading}\n")).unwrap_or_else(|| panic!("no {heading}"));
+    let rest = &page[start + 4..];
+    &rest[..rest.find("\n## ").unwrap_or(rest.len())]
+}
+
+/// The keys that a table may have, as the refusal of an unknown one lists them behind its name.
+fn allowed(folder: &Path, arguments: &[&str]) -> Vec<String> {
+    const AROUND: [&str; 6] = ["expected", "one", "of", "or", "available", "keys"];
+    let output = kerrlight(folder, arguments);
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!output.status.success() && errors.contains("nonsense"), "{arguments:?}: {errors}");
+    let list = errors.rsplit("nonsense").next().unwrap();
+    let words = list.split(|c: char| !c.is_ascii_alphanumeric() && c != '_' && c != '-');
+    words.filter(|word| !word.is_empty() && !AROUND.contains(word)).map(str::to_owned).collect()
+}
+
+fn check(page: &str, text: &str, keys: &[String]) {
+    assert!(!keys.is_empty());
+    let words = code_words(text);
+    for key in keys {
+        assert!(words.contains(key.as_str()), "docs/reference/{page} does not describe {key}");
+    }
+}
+
+#[test]
+fn regress_the_reference_has_every_key_of_a_scene() {
+    let page = read(&root().join("docs/reference/scene-file.md"));
+    for (scene, table, heading) in [
+        ("hot_spots", "hole", "[hole]"),
+        ("hot_spots", "observer", "[observer]"),
+        ("camera_orbit", "camera", "[camera]"),
+        ("camera_orbit", "camera.key.0", "[camera]"),
+        ("hot_spots", "screen", "[screen]"),
+        ("hot_spots", "effects", "[effects]"),
+        ("hot_spots", "tracer", "[tracer]"),
+        ("hot_spots", "magnetic_field", "[magnetic_field]"),
+        ("gold2020/test1", "gas", "[gas]"),
+        ("disc_plunging", "disc", "[disc]"),
+        ("disc_plunging", "disc.plunging", "[disc]"),
+        ("hot_spots", "spot.0", "[[spot]]"),
+        ("volume", "volume.0", "[[volume]]"),
+        ("volume", "volume.0.region", "[[volume]]"),
+        ("mesh", "mesh.0", "[[mesh]]"),
+        ("sky_checker", "sky.checker", "[sky]"),
+        ("sky_stars", "sky.stars", "[sky]"),
+        ("sky_image", "sky.image", "[sky]"),
+    ] {
+        let file = format!("scenes/{scene}.toml");
+        let unknown = format!("{table}.nonsense=1");
+        let keys = allowed(&root(), &["render", &file, "--set", &unknown]);
+        check("scene-file.md", section(&page, heading), &keys);
+    }
+}
+
+#[test]
+fn regress_the_reference_has_every_key_of_a_fit() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = read(&root().join("docs/reference/fit-file.md"));
+    for (table, heading) in [
+        ("hole", "[hole], [observer]"),
+        ("observer", "[hole], [observer]"),
+        ("screen", "[screen]"),
+        ("region", "[region]"),
+        ("region.nodes.gauss", "[region]"),
+        ("effects", "[effects]"),
+        ("motion", "[motion]"),
+        ("motion.velocity.keplerian", "[motion]"),
+        ("movie", "Data"),
+        ("truth", "Data"),
+        ("truth.spot.0", "Data"),
+        ("observation", "Data"),
+        ("loss.0", "[[loss]]"),
+        ("representation", "[representation]"),
+        ("training", "[training]"),
+        ("training.occupancy", "[training]"),
+        ("linear", "[linear]"),
+        ("output", "[output]"),
+    ] {
+        let unknown = format!("{table}.nonsense=1");
+        let keys = allowed(folder.path(), &["fit", "--set", &unknown]);
+        check("fit-file.md", section(&page, heading), &keys);
+    }
+    for unknown in [
+        "axis={scan={nonsense=1}}",
+        "axis={from={nonsense=1}}",
+        "data={visibilities={nonsense=1}}",
+        "data={movie={nonsense=1}}",
+        "observation.gains={nonsense=1}",
+        "truth.glyph=[{nonsense=1}]",
+        "regulariser=[{nonsense=1}]",
+        "probe={nonsense=1}",
+    ] {
+        let keys = allowed(folder.path(), &["fit", "--set", unknown]);
+        check("fit-file.md", &page, &keys);
+    }
+}
+
+#[test]
+fn regress_the_reference_has_every_key_of_an_experiment() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = read(&root().join("docs/reference/experiment-file.md"));
+    let text = read(&root().join("experiments/cost.toml"));
+    for heading in ["[quick]", "[[factor]]", "[[factor.level]]", "[[table]]", "[[figure]]"] {
+        let unknown =
+            text.replacen(&format!("\n{heading}\n"), &format!("\n{heading}\nnonsense = 1\n"), 1);
+        std::fs::write(folder.path().join("unknown.toml"), unknown).unwrap();
+        let keys = allowed(folder.path(), &["compare", "unknown.toml", "--list"]);
+        check("experiment-file.md", &page, &keys);
+    }
+}
