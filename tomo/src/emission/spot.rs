@@ -91,6 +91,54 @@ impl SpotModel {
         distance(ends[0], ends[1]) + reach[0].max(reach[1]) * wound
     }
 
+    /// What differential rotation adds to the length of a piece of path in comoving coordinates. The
+    /// angles by which time and by which radius make matter turn do not cancel.
+    pub fn sheared_length(&self, [a, b]: [MatterPoint; 2]) -> f64 {
+        let by_time = (a.rate * (a.time - b.time)).abs();
+        let by_radius =
+            self.sheared_since.map_or(0.0, |since| (a.rate - b.rate) * (b.time - since));
+        a.radius.max(b.radius) * (by_time + by_radius.abs())
+    }
+
+    /// Matter at radius r and at `time`.
+    pub fn matter_at(&self, radius: f64, time: f64) -> MatterPoint {
+        let rate = self.rate(if self.sheared_since.is_some() { radius } else { self.orbit });
+        MatterPoint { radius, time, rate }
+    }
+
+    /// The point `x` carried along with its matter, as in [`comoving`](Self::comoving).
+    pub fn carried(&self, x: [f64; 3], at: &MatterPoint) -> [f64; 3] {
+        let angle = match self.sheared_since {
+            None => at.rate * at.time,
+            Some(since) => at.rate * (at.time - since) + self.rate(self.orbit) * since,
+        };
+        rotate(self.axis, -angle, x)
+    }
+
+    /// Distance of a point carried along with the matter from the spot's centre.
+    pub fn offset(&self, carried: [f64; 3]) -> f64 {
+        distance(carried, self.start)
+    }
+
+    /// A lower bound of that distance at a radius and a height z.
+    pub fn least_offset(&self, radius: f64, z: f64) -> f64 {
+        let above = if self.axis[0] == 0.0 && self.axis[1] == 0.0 { z.abs() } else { 0.0 };
+        (radius - self.orbit).abs().max(above)
+    }
+
+    /// How many times as long as in the affine parameter a piece of a ray within the spot's shell is
+    /// at most in the coordinates r n: infinite next to the hole. (|dx/dσ|² = 1 + B w³ + … of
+    /// `transport::chord`, where B w² ≤ 2/(1 − 2w) next to the turning point, and frame dragging.)
+    pub fn stretch(&self) -> f64 {
+        let w = 1.0 / self.shell()[0];
+        if w < 0.25 { 1.2 * (1.0 + 2.0 * w / (1.0 - 2.0 * w)).sqrt() } else { f64::INFINITY }
+    }
+
+    /// Distance from its centre at which its light is cut off.
+    pub fn reach(&self) -> f64 {
+        CUT_OFF * self.sigma
+    }
+
     /// Emissivity in the gas frame at a point carried along with the matter, at `time`.
     pub fn emissivity(&self, carried: &Comoving, time: f64) -> f64 {
         if self.sheared_since.is_some_and(|since| time < since) {
@@ -164,6 +212,17 @@ pub struct Comoving {
     position: [f64; 3],
     /// The angle by which it was carried.
     angle: f64,
+}
+
+/// Matter at a radius and a time.
+#[derive(Debug, Clone, Copy)]
+pub struct MatterPoint {
+    /// In M.
+    pub radius: f64,
+    /// In M.
+    pub time: f64,
+    /// Angular velocity of a spot's matter there.
+    rate: f64,
 }
 
 /// `x` under the shortest rotation that takes z to the unit vector `axis`; for −z the half

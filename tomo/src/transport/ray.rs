@@ -73,7 +73,9 @@ impl PreparedScene {
         let trees: Vec<_> = times.iter().map(|time| self.spot_tree(*time)).collect();
         let clock = scratch.meter.start();
         match observer {
-            Some(observer) => self.trace_block(observer, (alpha, beta), &trees, scratch)?,
+            Some(observer) => {
+                self.trace_block(observer, (alpha, beta), (times, &trees), scratch)?
+            }
             None => {
                 scratch.traced.resize(rays, TracedRay { by_steps: true, ..TracedRay::default() })
             }

@@ -59,9 +59,11 @@ impl PreparedScene {
         &self,
         observer: &Observer,
         (alpha, beta): (&[f64], &[f64]),
-        trees: &[Option<Arc<SpotTree>>],
+        (times, trees): (&[f64], &[Option<Arc<SpotTree>>]),
         scratch: &mut Scratch,
     ) -> Result<(), OutOfRange> {
+        let sighted = self.sights_spots(times);
+        let trees = if sighted { &[] } else { trees };
         let wanted = if self.disc.is_some() { MOST_HITS } else { 1 };
         let crossings = &mut scratch.crossings;
         crossings.trace(&self.hole, observer, alpha, beta, wanted)?;
@@ -71,7 +73,7 @@ impl PreparedScene {
             || self.half_orbits.is_some()
             || self.meshes.is_some()
             || self.media.iter().any(|medium| medium.cell_size().is_some())
-            || !self.spots.is_empty();
+            || !trees.is_empty() && !self.spots.is_empty();
         for k in 0..alpha.len() {
             let ends = scratch.crossings.ends(k);
             // Its radial potential takes as long as all the rest.
@@ -109,6 +111,9 @@ impl PreparedScene {
                     || needs_stepping(ends.error, self.tolerance)
                     || ray.as_ref().is_some_and(|ray| self.needs_path(ray, trees)),
             });
+        }
+        if sighted {
+            self.sight_spots(observer, (alpha, beta), times, scratch)?;
         }
         if self.sky.is_none() {
             return Ok(());

@@ -1,6 +1,7 @@
 //! Light of the hot spots.
 
 mod meeting;
+mod sighting;
 mod trees;
 
 pub(super) use meeting::Met;

@@ -1,0 +1,149 @@
+//! Which rays of the closed form may meet a spot, found from their positions alone.
+//!
+//! A spot's light is summed along a path that is traced step by step, which costs several times as
+//! much as all else of a ray. Most rays that pass the spot's radii miss it: their positions in
+//! closed form, a few per radian, show that in coordinates carried along with the matter they stay
+//! farther from its centre than its light reaches.
+
+use crate::emission::spot::{MatterPoint, SpotModel};
+use crate::transport::rays::End;
+use crate::transport::{PreparedScene, Scratch};
+use kerrlight_geodesic::simd::{NodeRequest, PanelRule, RayNodes};
+use kerrlight_geodesic::vector::distance;
+use kerrlight_geodesic::{Observer, OutOfRange, Quantities};
+use std::sync::LazyLock;
+
+/// Pairs of a spot and a time of observation beyond which asking each of them on each node would
+/// cost more than stepping.
+const MOST_PAIRS: usize = 4;
+
+/// The positions on a panel: panels are at most 0.4 radians long.
+static RULE: LazyLock<PanelRule> = LazyLock::new(|| PanelRule::new(4));
+
+/// From the last node of a panel to its end, over the distance of the last two nodes: 0.27.
+const END_GAP: f64 = 0.3;
+
+/// What a piece of path may be longer than its chord, in coordinates that are sheared.
+const SLACK: f64 = 1.25;
+
+/// Positions are asked for as far outside of the spots as the gap at the end of a panel, in M.
+const MARGIN: f64 = 0.5;
+
+impl PreparedScene {
+    /// Whether rays are asked one by one if they meet spots before they are traced step by step.
+    pub(in crate::transport) fn sights_spots(&self, times: &[f64]) -> bool {
+        let pairs = self.spots.len() * times.len();
+        !self.one_by_one && (1..=MOST_PAIRS).contains(&pairs)
+    }
+
+    /// Leaves the rays of a block that may meet spots to be traced step by step.
+    pub(in crate::transport) fn sight_spots(
+        &self,
+        observer: &Observer,
+        (alpha, beta): (&[f64], &[f64]),
+        times: &[f64],
+        scratch: &mut Scratch,
+    ) -> Result<(), OutOfRange> {
+        let Scratch { traced, nodes, .. } = scratch;
+        let open: Vec<usize> = (0..traced.len()).filter(|k| !traced[*k].by_steps).collect();
+        let pick = |column: &[f64]| open.iter().map(|k| column[*k]).collect::<Vec<_>>();
+        let until: Vec<f64> = open.iter().map(|k| traced[*k].last_time()).collect();
+        let reach = self.spots.iter().map(|spot| spot.shell()[1]).fold(0.0, f64::max);
+        let request = NodeRequest {
+            radius: reach + MARGIN,
+            rule: RULE.clone(),
+            split: 1,
+            quantities: Quantities { azimuth: true, time: self.slow_light, velocity: false },
+        };
+        nodes.trace(&self.hole, observer, &pick(alpha), &pick(beta), Some(&until), &request)?;
+        for (number, k) in open.into_iter().enumerate() {
+            let falls = traced[k].end == End::Captured;
+            let nodes = nodes.ray(number);
+            traced[k].by_steps = times.iter().any(|observed| {
+                let (observed, slow_light) = (*observed, self.slow_light);
+                let sees = |spot| Sighting { spot, observed, slow_light, nodes, falls }.may_meet();
+                self.spots.iter().any(sees)
+            });
+        }
+        Ok(())
+    }
+}
+
+/// One ray asked about one spot at one time of observation.
+struct Sighting<'a> {
+    spot: &'a SpotModel,
+    observed: f64,
+    slow_light: bool,
+    nodes: RayNodes<'a>,
+    /// Whether the ray ends at the horizon.
+    falls: bool,
+}
+
+/// A node as a spot sees it.
+struct Seen {
+    node: usize,
+    at: MatterPoint,
+    /// A lower bound of its distance from the spot's centre.
+    least: f64,
+    /// The position, carried along with the matter and as it is, once it is needed.
+    positions: Option<[[f64; 3]; 2]>,
+}
+
+impl Sighting<'_> {
+    fn may_meet(&self) -> bool {
+        let count = self.nodes.radius.len();
+        if count < 2 {
+            return count == 1;
+        }
+        let mut before = self.seen(0);
+        for k in 1..count {
+            let mut now = self.seen(k);
+            if self.may_meet_between(&mut before, &mut now, k + 1 == count) {
+                return true;
+            }
+            before = now;
+        }
+        false
+    }
+
+    /// Whether the spot may shine between two nodes that follow each other, or before the first or
+    /// after the last node of the ray.
+    fn may_meet_between(&self, before: &mut Seen, now: &mut Seen, last: bool) -> bool {
+        let [low, high] = self.spot.shell();
+        let starts = before.node == 0 && before.at.radius < high;
+        let ends = last && now.at.radius < high && !(self.falls && now.at.radius <= low);
+        let may = |apart: [f64; 2], length: f64| {
+            let (gap, reach) = (END_GAP * length, self.spot.reach());
+            apart[0] + apart[1] <= 2.0 * reach + length
+                || starts && apart[0] - gap <= reach
+                || ends && apart[1] - gap <= reach
+        };
+        let sheared = self.spot.sheared_length([before.at, now.at]);
+        let weights = self.nodes.weight[before.node] + self.nodes.weight[now.node];
+        let longest = 0.5 * weights * self.spot.stretch();
+        if !may([before.least, now.least], SLACK * (longest + sheared)) {
+            return false;
+        }
+        let [a, b] = [before, now].map(|seen| self.positions(seen));
+        let apart = [a, b].map(|[carried, _]| self.spot.offset(carried));
+        may(apart, SLACK * (distance(a[1], b[1]) + sheared))
+    }
+
+    fn seen(&self, node: usize) -> Seen {
+        let radius = self.nodes.radius[node];
+        let delay = if self.slow_light { self.nodes.delay[node] } else { 0.0 };
+        let at = self.spot.matter_at(radius, self.observed - delay);
+        let least = self.spot.least_offset(radius, radius * self.nodes.cos_theta[node]);
+        Seen { node, at, least, positions: None }
+    }
+
+    fn positions(&self, seen: &mut Seen) -> [[f64; 3]; 2] {
+        *seen.positions.get_or_insert_with(|| {
+            let (radius, u) = (seen.at.radius, self.nodes.cos_theta[seen.node]);
+            let (sin, cos) = self.nodes.azimuth[seen.node].sin_cos();
+            let s = ((1.0 - u) * (1.0 + u)).sqrt();
+            let position = [radius * s * cos, radius * s * sin, radius * u];
+            [self.spot.carried(position, &seen.at), position]
+        })
+    }
+}
