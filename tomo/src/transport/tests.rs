@@ -118,3 +118,40 @@ fn exact_rays_that_cannot_meet_a_spot() {
     }
     assert!(out > 150 && lit > 20, "{out} {lit}");
 }
+
+/// Rays of the closed form that pass a spot's radii are traced by steps only where they may meet its
+/// light: to the last bit the same light as when all of them are, and most of them are not.
+#[test]
+fn exact_sighting_of_single_spots() {
+    let (mut lit, mut stepped, mut all) = (0, 0, 0);
+    for k in 0..24 {
+        let since = Some([-20.0, -200.0, 0.0][k % 3]);
+        for (spin, inclination) in [("0.0", 20), ("0.9", 70), ("-0.98", 88)] {
+            let mut scene = scene(&[
+                &format!("hole.spin={spin}"),
+                &format!("observer.inclination_deg={inclination}"),
+                &format!("effects.slow_light={}", k % 4 < 2),
+                "tracer.integrator=\"elliptic\"",
+            ]);
+            scene.spot = vec![spots(24, since).swap_remove(k)];
+            scene.spot[0].sigma = scene.spot[0].sigma.max(0.15);
+            scene.spot[0].radius -= if k % 5 == 0 { 2.0 } else { 0.0 };
+            let prepared = PreparedScene::new(&scene, None).unwrap();
+            let times = [30.0, 47.0];
+            let (found, expected) =
+                (observe(&prepared, &times), observe(&prepared.clone().one_by_one(), &times));
+            for (found, expected) in found.iter().zip(&expected) {
+                let light = |seen: &RayResult| (seen.intensity, seen.redshift, seen.radius);
+                assert_eq!(light(found), light(expected), "spot {k}, a = {spin}, {inclination}");
+                lit += u32::from(found.intensity > 0.0);
+            }
+            let mut scratch = Scratch::default();
+            let (alpha, beta) = screen(24, 24.0);
+            let mut seen = vec![RayResult::default(); alpha.len() * times.len()];
+            prepared.observe_block(&alpha, &beta, &times, &mut scratch, &mut seen).unwrap();
+            stepped += scratch.traced.iter().filter(|ray| ray.by_steps).count();
+            all += alpha.len();
+        }
+    }
+    assert!(lit > 2_000 && 3 * stepped < all, "{lit} lit, {stepped} of {all} stepped");
+}
