@@ -4,7 +4,7 @@
 //! `cargo bench -p kerrlight-geodesic --features affine`
 
 use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use kerrlight_geodesic::simd::{Crossings, Samples, Width};
+use kerrlight_geodesic::simd::{Crossings, InstructionSet, Samples};
 use kerrlight_geodesic::{Inclination, Kerr, Observer, Path, Quantities, Ray, Tracer};
 use std::hint::black_box;
 
@@ -98,9 +98,6 @@ fn samples(c: &mut Criterion) {
     group.finish();
 }
 
-/// Instruction sets to be compared.
-const WIDTHS: [Width; 4] = [Width::Scalar, Width::Sse2, Width::Avx2, Width::Avx512];
-
 /// The hole, an observer at 1000 M, and `n` × `n` rays.
 fn picture(n: usize) -> (Kerr, Observer, Vec<f64>, Vec<f64>) {
     let hole = Kerr::new(0.94).expect("a spin");
@@ -112,7 +109,7 @@ fn picture(n: usize) -> (Kerr, Observer, Vec<f64>, Vec<f64>) {
 }
 
 /// The whole of (t, r, θ, φ) at 100 points of every ray, from an observer at 1000 M, by
-/// number of lanes and of rays. `tests.rs` of the module holds every point against the tracer;
+/// instruction set and number of rays. `tests.rs` of the module holds every point against the tracer;
 /// here the sum of all Mino times is.
 fn bundles(c: &mut Criterion) {
     let (hole, observer, alpha, beta) = picture(64);
@@ -126,15 +123,15 @@ fn bundles(c: &mut Criterion) {
     let expected: f64 = alpha.iter().zip(&beta).map(&mut length).sum();
     let mut group = c.benchmark_group("4096 rays x 100 samples, simd");
     group.throughput(Throughput::Elements(409_600));
-    for width in WIDTHS.into_iter().filter(|width| width.available()) {
+    for set in InstructionSet::ALL.into_iter().filter(|set| set.available()) {
         let mut samples = Samples::default();
         let run = |samples: &mut Samples| {
-            samples.trace_at(width, &hole, &observer, &alpha, &beta, 100).expect("rays");
+            samples.trace_at(set, &hole, &observer, &alpha, &beta, 100).expect("rays");
         };
         run(&mut samples);
         let total: f64 = (0..4096).map(|k| samples.ray(k).mino_total).sum();
         assert!((total / expected - 1.0).abs() < 1e-7, "{total} {expected}");
-        group.bench_function(format!("{width:?}"), |b| b.iter(|| run(&mut samples)));
+        group.bench_function(format!("{set:?}"), |b| b.iter(|| run(&mut samples)));
     }
     group.finish();
     let mut group = c.benchmark_group("rays x 100 samples, simd");
@@ -155,20 +152,20 @@ fn bundles(c: &mut Criterion) {
     group.finish();
 }
 
-/// First equatorial crossings, (t, r, φ), of the same rays, by number of lanes and of rays, each
+/// First equatorial crossings, (t, r, φ), of the same rays, by instruction set and number of rays, each
 /// within 1e-9 of the tracer.
 fn crossings(c: &mut Criterion) {
     let (hole, observer, alpha, beta) = picture(64);
     let mut group = c.benchmark_group("first crossings of 4096 rays, simd");
     group.throughput(Throughput::Elements(4096));
-    for width in WIDTHS.into_iter().filter(|width| width.available()) {
+    for set in InstructionSet::ALL.into_iter().filter(|set| set.available()) {
         let mut found = Crossings::default();
         let run = |found: &mut Crossings| {
-            found.trace_at(width, &hole, &observer, &alpha, &beta, 1).expect("rays");
+            found.trace_at(set, &hole, &observer, &alpha, &beta, 1).expect("rays");
         };
         run(&mut found);
         assert_crossings(&hole, &observer, (&alpha, &beta), &found);
-        group.bench_function(format!("{width:?}"), |b| b.iter(|| run(&mut found)));
+        group.bench_function(format!("{set:?}"), |b| b.iter(|| run(&mut found)));
     }
     group.finish();
     let mut group = c.benchmark_group("first crossings, simd");

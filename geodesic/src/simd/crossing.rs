@@ -7,9 +7,9 @@
 //! asked for, over one half-oscillation from there.
 
 use super::crossing_polar::{PolarSum, polar_times};
-use super::dispatch::Task;
+
 use super::error::{MAX_STEP, estimate};
-use super::lanes::{MAX_LANES, Real};
+use super::lanes::{Lanes, MAX_LANES, Task};
 use super::math::atan2;
 use super::motion::{Camera, Journey, Motion};
 use super::polar::unwrap;
@@ -46,7 +46,12 @@ pub(super) struct Whole<'a> {
 impl Whole<'_> {
     /// Stores the lanes of the rays from number `from` to `to`.
     #[inline(always)]
-    fn store<V: Real>(&mut self, from: usize, to: usize, [time, escapes, count, doubt]: [V; 4]) {
+    fn store<V: Lanes<f64>>(
+        &mut self,
+        from: usize,
+        to: usize,
+        [time, escapes, count, doubt]: [V; 4],
+    ) {
         time.store(&mut self.duration[from..to]);
         escapes.store(&mut self.escapes[from..to]);
         count.store(&mut self.count[from..to]);
@@ -67,11 +72,11 @@ pub(super) struct Block<'a, 'b> {
     pub out: &'b mut Target<'a>,
 }
 
-impl Task for Block<'_, '_> {
+impl Task<f64> for Block<'_, '_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<V: Real>(self) {
+    fn run<V: Lanes<f64>>(self) {
         let Self { camera, alpha, beta, count, out } = self;
         let start = closed_forms::<V>(&camera, V::splat(camera.w_obs));
         let order = arrange::<V>(&camera, start, alpha, beta, &mut out.rays);
@@ -103,7 +108,7 @@ struct Item {
 
 /// The rays in the order of their keys; what is known of each as a whole goes to `whole`.
 #[inline(always)]
-fn arrange<V: Real>(
+fn arrange<V: Lanes<f64>>(
     camera: &Camera,
     start: [V; 2],
     alpha: &[f64],
@@ -134,7 +139,7 @@ fn arrange<V: Real>(
 
 /// What rays in a block have in `source`, the last one repeated.
 #[inline(always)]
-fn gather<V: Real>(source: &[f64], block: &[Item]) -> V {
+fn gather<V: Lanes<f64>>(source: &[f64], block: &[Item]) -> V {
     let mut lanes = [0.0; MAX_LANES];
     for (l, lane) in lanes.iter_mut().enumerate().take(V::LANES) {
         let item = block.get(l).or(block.last());
@@ -173,7 +178,7 @@ struct Polar<V> {
     time: V,
 }
 
-impl<'a, V: Real> LaneRays<'a, V> {
+impl<'a, V: Lanes<f64>> LaneRays<'a, V> {
     #[inline(always)]
     fn new(camera: &'a Camera, start: [V; 2], alpha: V, beta: V) -> Self {
         let motion = Motion::new(camera, alpha, beta);
@@ -377,7 +382,7 @@ impl<'a, V: Real> LaneRays<'a, V> {
 
 /// Crossing `number` of each ray of a block, out of `count`.
 #[inline(always)]
-fn scatter<V: Real>(
+fn scatter<V: Lanes<f64>>(
     point: Point<V>,
     number: usize,
     count: usize,

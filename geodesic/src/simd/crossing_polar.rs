@@ -1,7 +1,7 @@
 //! The polar motion to a ray's equatorial crossings.
 
 use super::elliptic::{agm, rf_from};
-use super::lanes::Real;
+use super::lanes::Lanes;
 use super::math::atan2;
 use super::motion::{Camera, Motion};
 use super::polar::{PolarState, PolarStep};
@@ -17,7 +17,7 @@ pub(super) struct PolarSum<V> {
     sum: V,
 }
 
-impl<V: Real> PolarSum<V> {
+impl<V: Lanes<f64>> PolarSum<V> {
     #[inline(always)]
     pub fn at_observer(cam: &Camera, m: &Motion<V>, h: V, alpha: V, beta: V) -> Self {
         let zero = V::splat(0.0);
@@ -65,7 +65,7 @@ impl<V: Real> PolarSum<V> {
 /// Mino times of the first zero of u after the start, and from there to the next; infinite if
 /// there is none. The latter only where it is needed for the former or where `u₀ = 0`.
 #[inline(always)]
-pub(super) fn polar_times<V: Real>(cam: &Camera, m: &Motion<V>, beta: V) -> (V, V) {
+pub(super) fn polar_times<V: Lanes<f64>>(cam: &Camera, m: &Motion<V>, beta: V) -> (V, V) {
     let s = V::splat;
     let (zero, never) = (s(0.0), s(f64::INFINITY));
     let half_a = m.a * s(0.5);

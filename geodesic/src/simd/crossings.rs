@@ -2,7 +2,7 @@
 
 use super::column::Column;
 use super::crossing::{Block, Target, Whole};
-use super::dispatch::{Width, dispatch};
+use super::lanes::{InstructionSet, dispatch};
 use super::motion::Camera;
 use super::{BLOCK, checked};
 use crate::error::{OutOfRange, check};
@@ -148,16 +148,16 @@ impl Crossings {
         beta: &[f64],
         per_ray: usize,
     ) -> Result<(), OutOfRange> {
-        self.trace_at(Width::best(), hole, observer, alpha, beta, per_ray)
+        self.trace_at(InstructionSet::best(), hole, observer, alpha, beta, per_ray)
     }
 
-    /// [`trace`](Self::trace) with lanes of a given width.
+    /// [`trace`](Self::trace) on a given instruction set.
     ///
     /// # Errors
     /// As for [`trace`](Self::trace).
     pub fn trace_at(
         &mut self,
-        width: Width,
+        set: InstructionSet,
         hole: &Kerr,
         observer: &Observer,
         alpha: &[f64],
@@ -176,7 +176,7 @@ impl Crossings {
         }
         self.per_ray = per_ray;
         // The horizon itself is the end: no sample has to lie short of it.
-        self.run(width, Camera { margin: 0.0, ..camera }, alpha, beta);
+        self.run(set, Camera { margin: 0.0, ..camera }, alpha, beta);
         let origin = observer.azimuth();
         if origin != 0.0 {
             self.azimuth.iter_mut().for_each(|phi| *phi += origin);
@@ -191,7 +191,7 @@ impl Crossings {
 
     /// Blocks of rays, each on its own: neither the number of threads nor their order
     /// changes a bit.
-    fn run(&mut self, width: Width, camera: Camera, alpha: &[f64], beta: &[f64]) {
+    fn run(&mut self, set: InstructionSet, camera: Camera, alpha: &[f64], beta: &[f64]) {
         let count = self.per_ray;
         // The columns have that length times the number of rays.
         let long = BLOCK.saturating_mul(count);
@@ -212,7 +212,7 @@ impl Crossings {
             })
             .collect();
         let work = |(alpha, beta, mut out): (&[f64], &[f64], Target<'_>)| {
-            dispatch(width, Block { camera, alpha, beta, count, out: &mut out });
+            dispatch(set, Block { camera, alpha, beta, count, out: &mut out });
         };
         #[cfg(feature = "rayon")]
         {

@@ -6,7 +6,7 @@
 //! with one real root e split off, so that three real roots and one real root
 //! with a complex pair need no separate treatment.
 
-use super::lanes::Real;
+use super::lanes::Lanes;
 
 /// A real root of `4t³ − g₂ t − g₃` that is far from the other two: the
 /// largest if g₃ ≥ 0, else the smallest. `scale > 0` is its order of magnitude.
@@ -16,7 +16,7 @@ use super::lanes::Real;
 /// the split cubic is the given one up to rounding of g₃ even when the other
 /// two roots nearly coincide.
 #[inline(always)]
-pub fn isolated_root<V: Real>(g2: V, g3: V, scale: V) -> V {
+pub fn isolated_root<V: Lanes<f64>>(g2: V, g3: V, scale: V) -> V {
     let zero = V::splat(0.0);
     let p = g2 * V::splat(0.25);
     let q = g3.abs() * V::splat(0.25);
@@ -52,13 +52,13 @@ pub fn isolated_root<V: Real>(g2: V, g3: V, scale: V) -> V {
 /// The duplication needs only the product and the sum of the pair:
 /// `√y√z = √(m² − D)`, `√y + √z = √(2m + 2√(m² − D))`.
 #[inline(always)]
-pub fn rf_pair<V: Real>(x: V, m: V, d: V) -> V {
+pub fn rf_pair<V: Lanes<f64>>(x: V, m: V, d: V) -> V {
     rf_from(x, m, d, m.mul_add(m, -d))
 }
 
 /// [`rf_pair`] where `m² − D` is known to be `product`, however much of it cancels.
 #[inline(always)]
-pub fn rf_from<V: Real>(x: V, m: V, d: V, product: V) -> V {
+pub fn rf_from<V: Lanes<f64>>(x: V, m: V, d: V, product: V) -> V {
     let (mut x, mut m, mut d, mut product) = (x, m, d, product);
     let (zero, half) = (V::splat(0.0), V::splat(0.5));
     let quarter = V::splat(0.25);
@@ -97,7 +97,7 @@ pub fn rf_from<V: Real>(x: V, m: V, d: V, product: V) -> V {
 
 /// Arithmetic–geometric mean of positive numbers.
 #[inline(always)]
-pub fn agm<V: Real>(a: V, b: V) -> V {
+pub fn agm<V: Lanes<f64>>(a: V, b: V) -> V {
     let (mut a, mut b) = (a, b);
     let (mut live, half) = (V::splat(1.0), V::splat(0.5));
     for _ in 0..40 {
@@ -120,7 +120,7 @@ pub fn agm<V: Real>(a: V, b: V) -> V {
 /// `℘ = h⁻² + Σ_{k≥2} c_k h^{2k−2}`, `c₂ = g₂/20`, `c₃ = g₃/28`,
 /// `c_k = 3/((2k+1)(k−3)) Σ_{m=2}^{k−2} c_m c_{k−m}`.
 #[inline(always)]
-pub fn reciprocal_weierstrass<V: Real>(g2: V, g3: V, h: V) -> (V, V) {
+pub fn reciprocal_weierstrass<V: Lanes<f64>>(g2: V, g3: V, h: V) -> (V, V) {
     let h2 = h * h;
     // cₖ h^{2k}
     let c2 = g2 * V::splat(1.0 / 20.0) * h2 * h2;

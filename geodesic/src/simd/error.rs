@@ -8,7 +8,7 @@
 //! the misses of 12,000 rays, half of them close to the critical curve, from the Runge–Kutta tracer
 //! at its tightest, with a factor to spare.
 
-use super::lanes::Real;
+use super::lanes::Lanes;
 use super::motion::{Camera, Motion};
 
 /// Largest step in units of `1/√max(1, η + λ²)` that the quadrature is trusted with.
@@ -23,7 +23,7 @@ const QUADRATURE: f64 = 3e-11;
 /// Error of positions at which a phase error counts `speed` times, for steps of `step/b` and a
 /// ray that has come down to r₊/r = `depth`: the integrands are the smoother the farther out.
 #[inline(always)]
-pub fn estimate<V: Real>(condition: V, b: V, speed: V, step: V, depth: V) -> V {
+pub fn estimate<V: Lanes<f64>>(condition: V, b: V, speed: V, step: V, depth: V) -> V {
     let s = V::splat;
     let [position, phase, per_condition] = ROUNDING;
     let phase = condition.mul_add(s(per_condition), s(phase)) / b;

@@ -6,7 +6,7 @@
 //! again or, for rays that fall, one last panel with a pace of its own (see [`PanelRule`]). From the start of a panel every node is one application of the addition theorems
 //! (`radial`, `polar`); the rates of azimuth and time are integrated over the same nodes.
 
-use super::lanes::{MAX_LANES, Real, transpose_plain};
+use super::lanes::{Lanes, MAX_LANES, transpose_plain};
 use super::math::atan2;
 use super::motion::{Camera, Motion};
 use super::panel::PanelRule;
@@ -50,7 +50,7 @@ pub(super) const GROWTH: f64 = 3.0;
 
 /// Rays side by side.
 #[derive(Clone, Copy)]
-pub(super) struct Lanes<V> {
+pub(super) struct RayLanes<V> {
     pub alpha: V,
     pub beta: V,
     /// Mino time from the observer to the sphere.
@@ -74,7 +74,7 @@ pub(super) struct Jump<V> {
     polar: PolarStep<V>,
 }
 
-impl<V: Real> Jump<V> {
+impl<V: Lanes<f64>> Jump<V> {
     #[inline(always)]
     fn new(cam: &Camera, motion: &Motion<V>, h: V) -> Self {
         Jump { h, radial: RadialStep::new(motion, h), polar: PolarStep::new(cam, motion, h) }
@@ -97,7 +97,7 @@ struct Panels<V> {
     falls: bool,
 }
 
-impl<V: Real> Panels<V> {
+impl<V: Lanes<f64>> Panels<V> {
     /// Mino time since the start of the panel, over its length, at the rule's variable s.
     fn place(&self, s: f64) -> f64 {
         if self.falls { s * (2.0 - s) } else { s }
@@ -147,7 +147,7 @@ struct Known<V> {
     depths: [V; MAX_ORDER],
 }
 
-impl<V: Real> March<'_, V> {
+impl<V: Lanes<f64>> March<'_, V> {
     /// Whether more than the polar angle is needed of the direction.
     #[inline(always)]
     fn turns(&self) -> bool {
@@ -159,7 +159,7 @@ impl<V: Real> March<'_, V> {
     #[inline(always)]
     pub fn run(
         &mut self,
-        lanes: &Lanes<V>,
+        lanes: &RayLanes<V>,
         key: Key,
         mut starts: [usize; MAX_LANES],
         columns: &mut [&mut [f64]; COLUMNS],
@@ -215,7 +215,7 @@ impl<V: Real> March<'_, V> {
     }
 
     #[inline(always)]
-    fn start(&self, lanes: &Lanes<V>) -> State<V> {
+    fn start(&self, lanes: &RayLanes<V>) -> State<V> {
         let (s, cam) = (V::splat, self.cam);
         let (sin, cos, zero) = (s(cam.sin_i), s(cam.cos_i), s(0.0));
         let (alpha, beta) = (lanes.alpha, lanes.beta);
@@ -391,7 +391,7 @@ impl<V: Real> March<'_, V> {
 
 /// `sum + length Σ factors · rates`.
 #[inline(always)]
-fn integral<V: Real>(
+fn integral<V: Lanes<f64>>(
     factors: &[f64],
     rates: &[[V; 2]; MAX_ORDER],
     length: V,

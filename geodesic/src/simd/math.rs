@@ -2,12 +2,12 @@
 
 #![allow(clippy::excessive_precision, reason = "coefficients as the fit printed them")]
 
-use super::lanes::Real;
+use super::lanes::Lanes;
 use core::f64::consts::{FRAC_PI_2, LN_2, PI};
 
 /// `Σ cᵢ xⁱ` as two interleaved Horner chains in x².
 #[inline(always)]
-pub fn poly<V: Real, const N: usize>(c: &[f64; N], x: V) -> V {
+pub fn poly<V: Lanes<f64>, const N: usize>(c: &[f64; N], x: V) -> V {
     let x2 = x * x;
     let mut a = V::splat(c[N - 1]);
     let mut b = V::splat(c[N - 2]);
@@ -87,25 +87,25 @@ pub const SMALL_LOG: f64 = 0.1715;
 
 /// Arcus tangent for `|x| ≤ SMALL_ANGLE`.
 #[inline(always)]
-pub fn small_atan<V: Real>(x: V) -> V {
+pub fn small_atan<V: Lanes<f64>>(x: V) -> V {
     x * poly(&SMALL_ATAN, x * x)
 }
 
 /// Arcus sine for `|x| ≤ SMALL_ANGLE`.
 #[inline(always)]
-pub fn small_asin<V: Real>(x: V) -> V {
+pub fn small_asin<V: Lanes<f64>>(x: V) -> V {
     x * poly(&SMALL_ASIN, x * x)
 }
 
 /// `2 atanh(x)/x = ln[(1 + x)/(1 − x)]/x` for `|x| ≤ SMALL_LOG`.
 #[inline(always)]
-pub fn small_log<V: Real>(x: V) -> V {
+pub fn small_log<V: Lanes<f64>>(x: V) -> V {
     poly(&ATANH2, x * x)
 }
 
 /// Angle of the point (x, y), in [−π, π]; zero at the origin.
 #[inline(always)]
-pub fn atan2<V: Real>(y: V, x: V) -> V {
+pub fn atan2<V: Lanes<f64>>(y: V, x: V) -> V {
     let (ax, ay) = (x.abs(), y.abs());
     let far = ax.max(ay).max(V::splat(1e-300));
     let t = ax.min(ay) * far.recip();
@@ -117,7 +117,7 @@ pub fn atan2<V: Real>(y: V, x: V) -> V {
 
 /// Natural logarithm of a positive normal number.
 #[inline(always)]
-pub fn ln<V: Real>(x: V) -> V {
+pub fn ln<V: Lanes<f64>>(x: V) -> V {
     let (m, k) = x.split();
     let one = V::splat(1.0);
     let s = (m - one) * (m + one).recip();

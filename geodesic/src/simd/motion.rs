@@ -1,7 +1,7 @@
 //! The observer, the constants of a ray's motion, and the Mino time it takes.
 
 use super::elliptic::{isolated_root, rf_pair};
-use super::lanes::Real;
+use super::lanes::Lanes;
 use crate::screen::observer::Observer;
 use crate::spacetime::kerr::Kerr;
 
@@ -80,7 +80,7 @@ pub struct Motion<V> {
     pub kappa: V,
 }
 
-impl<V: Real> Motion<V> {
+impl<V: Lanes<f64>> Motion<V> {
     /// The ray that arrives at (α, β).
     #[inline(always)]
     pub fn new(cam: &Camera, alpha: V, beta: V) -> Self {
@@ -140,7 +140,7 @@ pub struct Clock<V> {
     shift: V,
 }
 
-impl<V: Real> Clock<V> {
+impl<V: Lanes<f64>> Clock<V> {
     /// That of one motion.
     #[inline(always)]
     pub fn new(m: &Motion<V>) -> Self {
@@ -178,7 +178,7 @@ pub struct Journey<V> {
     pub r_turn: V,
 }
 
-impl<V: Real> Journey<V> {
+impl<V: Lanes<f64>> Journey<V> {
     /// Classifies the ray and measures its Mino time.
     #[inline(always)]
     pub fn new(cam: &Camera, m: &Motion<V>) -> Self {
@@ -224,7 +224,7 @@ impl<V: Real> Journey<V> {
 /// nearly coincide next to the critical curve, and the Mino time is the logarithm of their
 /// difference over √(3|e|/2). Scaled to be 1/(distance) for a hole without spin.
 #[inline(always)]
-fn near_critical<V: Real>(b2: V, e: V, gap: V) -> V {
+fn near_critical<V: Lanes<f64>>(b2: V, e: V, gap: V) -> V {
     let s = V::splat;
     let rate = (e.abs() / b2).max(s(1e-12)) * s(6.0);
     b2 * b2 / (gap.abs().max(s(1e-300)) * rate.sqrt() * s(36.0))

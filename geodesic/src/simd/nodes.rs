@@ -1,10 +1,10 @@
 //! Nodes of a quadrature along many rays, inside a sphere.
 
 use super::checked;
-use super::dispatch::{Task, Width, dispatch};
+
 use super::error::{MAX_STEP, estimate};
-use super::lanes::{MAX_LANES, Real};
-use super::march::{COLUMNS, GROWTH, Jump, Key, Lanes, MAX_ORDER, March};
+use super::lanes::{InstructionSet, Lanes, MAX_LANES, Task, dispatch};
+use super::march::{COLUMNS, GROWTH, Jump, Key, MAX_ORDER, March, RayLanes};
 use super::motion::{Camera, Clock, Journey, Motion};
 use super::panel::PanelRule;
 use crate::error::{OutOfRange, check};
@@ -121,17 +121,17 @@ impl Nodes {
         until: Option<&[f64]>,
         request: &NodeRequest,
     ) -> Result<(), OutOfRange> {
-        self.trace_at(Width::best(), hole, observer, alpha, beta, until, request)
+        self.trace_at(InstructionSet::best(), hole, observer, alpha, beta, until, request)
     }
 
-    /// [`trace`](Self::trace) with lanes of a given width.
+    /// [`trace`](Self::trace) on a given instruction set.
     ///
     /// # Errors
     /// As for [`trace`](Self::trace).
     #[allow(clippy::too_many_arguments)]
     pub fn trace_at(
         &mut self,
-        width: Width,
+        set: InstructionSet,
         hole: &Kerr,
         observer: &Observer,
         alpha: &[f64],
@@ -150,9 +150,9 @@ impl Nodes {
         let same = until.is_none_or(|until| until.len() == alpha.len());
         check("number of end times", 0.0, same, "as many as of alpha")?;
         let rays = Rays { camera, alpha, beta, until, request };
-        dispatch(width, Planning { rays: &rays, nodes: self });
+        dispatch(set, Planning { rays: &rays, nodes: self });
         self.lay_out(&rays);
-        dispatch(width, Marching { rays: &rays, nodes: self });
+        dispatch(set, Marching { rays: &rays, nodes: self });
         let origin = observer.azimuth();
         if origin != 0.0 {
             self.columns[4].iter_mut().for_each(|phi| *phi += origin);
@@ -198,11 +198,11 @@ struct Planning<'a> {
     nodes: &'a mut Nodes,
 }
 
-impl Task for Planning<'_> {
+impl Task<f64> for Planning<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<V: Real>(self) {
+    fn run<V: Lanes<f64>>(self) {
         let Self { rays, nodes } = self;
         nodes.plan.clear();
         nodes.error.clear();
@@ -232,7 +232,7 @@ impl Task for Planning<'_> {
 /// whole ray, whether it escapes, the turning radius, the scale of its frequencies, and the error
 /// of its positions.
 #[inline(always)]
-fn times<V: Real>(rays: &Rays<'_>, alpha: V, beta: V) -> [V; 7] {
+fn times<V: Lanes<f64>>(rays: &Rays<'_>, alpha: V, beta: V) -> [V; 7] {
     let s = V::splat;
     let cam = &rays.camera;
     let motion = Motion::new(cam, alpha, beta);
@@ -318,11 +318,11 @@ struct Marching<'a> {
     nodes: &'a mut Nodes,
 }
 
-impl Task for Marching<'_> {
+impl Task<f64> for Marching<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<V: Real>(self) {
+    fn run<V: Lanes<f64>>(self) {
         let Self { rays, nodes } = self;
         let request = rays.request;
         let entry =
@@ -356,12 +356,12 @@ impl Task for Marching<'_> {
 
 /// Rays into lanes, the last one repeated, and where their nodes go.
 #[inline(always)]
-fn gather<V: Real>(
+fn gather<V: Lanes<f64>>(
     rays: &Rays<'_>,
     nodes: &Nodes,
     block: &[Plan],
     entry: f64,
-) -> (Lanes<V>, [usize; MAX_LANES]) {
+) -> (RayLanes<V>, [usize; MAX_LANES]) {
     let mut values = [[0.0; MAX_LANES]; 6];
     let mut starts = [0; MAX_LANES];
     for l in 0..V::LANES {
@@ -374,7 +374,7 @@ fn gather<V: Real>(
         starts[l] = nodes.start_of(ray);
     }
     let [alpha, beta, approach, since, inward, last] = &values;
-    let lanes = Lanes {
+    let lanes = RayLanes {
         alpha: V::load(alpha),
         beta: V::load(beta),
         approach: V::load(approach),

@@ -13,7 +13,7 @@
 //!
 //! and `∫ a²u² dτ` over a step is `a² S u u₊ + a²η ∫₀ʰ S² dτ`.
 
-use super::lanes::Real;
+use super::lanes::Lanes;
 use super::motion::{Camera, Motion};
 use core::f64::consts::{FRAC_PI_2, TAU};
 
@@ -65,7 +65,7 @@ pub struct PolarStep<V> {
     twist: V,
 }
 
-impl<V: Real> PolarStep<V> {
+impl<V: Lanes<f64>> PolarStep<V> {
     /// Coefficients for the step h.
     ///
     /// `Y = S²` obeys `Y'' = 2 + 4A Y + 6C Y²`; all is summed as series in h².
@@ -213,7 +213,7 @@ impl<V: Real> PolarStep<V> {
 /// of a ray at most half a revolution of the sphere apart that is up to half a turn and a little,
 /// and never back.
 #[inline(always)]
-pub fn unwrap<V: Real>(angle: V, sense: V) -> V {
+pub fn unwrap<V: Lanes<f64>>(angle: V, sense: V) -> V {
     let angle = angle * sense;
     let low = angle.lt(V::splat(-FRAC_PI_2));
     sense * V::select(low, angle + V::splat(TAU), angle)

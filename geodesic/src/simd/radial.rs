@@ -10,7 +10,7 @@
 //! ```
 
 use super::elliptic::reciprocal_weierstrass;
-use super::lanes::Real;
+use super::lanes::Lanes;
 use super::math::{SMALL_LOG, ln, small_log};
 use super::motion::{Camera, Motion};
 
@@ -57,7 +57,7 @@ pub struct RadialState<V> {
     pub dw: V,
 }
 
-impl<V: Real> RadialStep<V> {
+impl<V: Lanes<f64>> RadialStep<V> {
     /// Coefficients for the step h.
     #[inline(always)]
     pub fn new(m: &Motion<V>, h: V) -> Self {
@@ -144,7 +144,7 @@ pub struct Ring<V> {
     inverse: [V; RING],
 }
 
-impl<V: Real> Ring<V> {
+impl<V: Lanes<f64>> Ring<V> {
     /// Without nodes yet.
     #[inline(always)]
     pub fn new() -> Self {
@@ -177,7 +177,7 @@ pub(super) struct Node<V> {
     pub f2: V,
 }
 
-impl<V: Real> Node<V> {
+impl<V: Lanes<f64>> Node<V> {
     #[inline(always)]
     pub fn new(w: V, speed: V, kappa: V) -> Self {
         let w2 = w * w;
@@ -222,7 +222,7 @@ pub struct RadialRun<V> {
     spin: f64,
 }
 
-impl<V: Real> RadialRun<V> {
+impl<V: Lanes<f64>> RadialRun<V> {
     /// Starts at the observer.
     #[inline(always)]
     pub fn new(cam: &Camera, m: &Motion<V>, h: V, ring: &mut Ring<V>) -> Self {

@@ -1,6 +1,6 @@
 //! Radial integrals from one point of a ray to another.
 
-use super::lanes::Real;
+use super::lanes::Lanes;
 use super::math::{SMALL_LOG, ln, small_log};
 use super::motion::{Camera, Motion};
 use super::radial::{END, Node, REACH, RadialState, RadialStep};
@@ -30,7 +30,7 @@ pub struct RadialEnd<V> {
     pub turn: V,
 }
 
-impl<V: Real> RadialSum<V> {
+impl<V: Lanes<f64>> RadialSum<V> {
     /// From the point (w, w'), in at least [`LEAST_STEPS`] steps h.
     #[inline(always)]
     pub fn new(m: &Motion<V>, h: V, w: V, speed: V) -> Self {
@@ -94,7 +94,7 @@ impl<V: Real> RadialSum<V> {
 /// The closed-form terms of time and azimuth at w, `r + 2F + 2r₊Λ` and `aΛ`; for w = 0, zero in
 /// place of the infinite one.
 #[inline(always)]
-pub fn closed_forms<V: Real>(cam: &Camera, w: V) -> [V; 2] {
+pub fn closed_forms<V: Lanes<f64>>(cam: &Camera, w: V) -> [V; 2] {
     let s = V::splat;
     let one = s(1.0);
     // At the horizon, what rounding leaves of it.

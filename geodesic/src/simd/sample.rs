@@ -1,8 +1,7 @@
 //! One block of rays, sampled equidistantly in Mino time.
 
-use super::dispatch::Task;
 use super::error::{MAX_STEP, estimate, speed_of_samples};
-use super::lanes::{CHUNK, MAX_LANES, Pair, Real, transpose_plain};
+use super::lanes::{CHUNK, Lanes, MAX_LANES, Pair, Task, transpose_plain};
 use super::math::{SMALL_ANGLE, atan2, small_asin, small_atan};
 use super::motion::{Camera, Journey, Motion};
 use super::polar::{PolarState, PolarStep, unwrap};
@@ -38,11 +37,11 @@ pub(super) struct Block<'a, 'b> {
     pub out: &'b mut Target<'a>,
 }
 
-impl Task for Block<'_, '_> {
+impl Task<f64> for Block<'_, '_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<V: Real>(self) {
+    fn run<V: Lanes<f64>>(self) {
         let Self { rays, out } = self;
         plan::<Pair<V>>(&rays, out);
         let order = arrange(&rays, out);
@@ -65,7 +64,7 @@ impl Task for Block<'_, '_> {
 
 /// Durations and fates of all rays.
 #[inline(always)]
-fn plan<V: Real>(rays: &Rays<'_>, out: &mut Target<'_>) {
+fn plan<V: Lanes<f64>>(rays: &Rays<'_>, out: &mut Target<'_>) {
     let inputs = rays.alpha.chunks(V::LANES).zip(rays.beta.chunks(V::LANES));
     let outputs = out.duration.chunks_mut(V::LANES).zip(out.escapes.chunks_mut(V::LANES));
     let outputs = outputs.zip(out.error.chunks_mut(V::LANES));
@@ -133,7 +132,7 @@ fn prefetch(v: &[f64], index: usize) {
 
 /// One lane's worth of `source` for every ray of the block, the last one repeated.
 #[inline(always)]
-fn gather<V: Real>(source: &[f64], block: &[Item]) -> V {
+fn gather<V: Lanes<f64>>(source: &[f64], block: &[Item]) -> V {
     let mut lanes = [0.0; 16];
     let mut last = 0.0;
     for (i, slot) in lanes.iter_mut().take(V::LANES).enumerate() {
@@ -146,7 +145,7 @@ fn gather<V: Real>(source: &[f64], block: &[Item]) -> V {
 }
 
 #[inline(always)]
-fn sample_block<V: Real, const ESCAPE: bool, const PLAIN: bool>(
+fn sample_block<V: Lanes<f64>, const ESCAPE: bool, const PLAIN: bool>(
     rays: &Rays<'_>,
     block: &[Item],
     radial: &mut [Radial<V>],
@@ -204,7 +203,7 @@ fn sample_block<V: Real, const ESCAPE: bool, const PLAIN: bool>(
 /// Radial parts at the samples of the inward leg, and the sums of the parts at
 /// mirrored samples: the outward leg of a ray mirrors its inward leg.
 #[inline(always)]
-fn radial_leg<V: Real, const ESCAPE: bool, const PLAIN: bool>(
+fn radial_leg<V: Lanes<f64>, const ESCAPE: bool, const PLAIN: bool>(
     rays: &Rays<'_>,
     motion: &Motion<V>,
     h: V,
@@ -283,7 +282,7 @@ struct Turn<V> {
     small: bool,
 }
 
-impl<V: Real> PolarRun<V> {
+impl<V: Lanes<f64>> PolarRun<V> {
     /// `first` are the radial parts at the observer, where time and azimuth are zero; at infinity
     /// the parts themselves are what is asked for.
     #[inline(always)]
@@ -370,7 +369,7 @@ struct Parts<'a, V> {
     outward: bool,
 }
 
-impl<V: Real> Parts<'_, V> {
+impl<V: Lanes<f64>> Parts<'_, V> {
     #[inline(always)]
     fn get(&self, j: usize) -> Radial<V> {
         let n = self.radial.len();

@@ -1,7 +1,7 @@
 //! Samples of whole rays.
 
 use super::column::Column;
-use super::dispatch::{Width, dispatch};
+use super::lanes::{InstructionSet, dispatch};
 use super::motion::Camera;
 use super::sample::{Block, Rays, Target};
 use super::{BLOCK, checked};
@@ -109,16 +109,16 @@ impl Samples {
         beta: &[f64],
         per_ray: usize,
     ) -> Result<(), OutOfRange> {
-        self.trace_at(Width::best(), hole, observer, alpha, beta, per_ray)
+        self.trace_at(InstructionSet::best(), hole, observer, alpha, beta, per_ray)
     }
 
-    /// [`trace`](Self::trace) with lanes of a given width.
+    /// [`trace`](Self::trace) on a given instruction set.
     ///
     /// # Errors
     /// As for [`trace`](Self::trace).
     pub fn trace_at(
         &mut self,
-        width: Width,
+        set: InstructionSet,
         hole: &Kerr,
         observer: &Observer,
         alpha: &[f64],
@@ -131,7 +131,7 @@ impl Samples {
             *self = Self::default();
             return Err(error);
         }
-        self.run(width, camera, alpha, beta);
+        self.run(set, camera, alpha, beta);
         if observer.is_at_infinity() {
             self.mark_infinity();
         }
@@ -171,7 +171,7 @@ impl Samples {
 
     /// Blocks of rays, each on its own: neither the number of threads nor their order
     /// changes a bit.
-    fn run(&mut self, width: Width, camera: Camera, alpha: &[f64], beta: &[f64]) {
+    fn run(&mut self, set: InstructionSet, camera: Camera, alpha: &[f64], beta: &[f64]) {
         let per_ray = self.per_ray;
         let (long, short) = (BLOCK * per_ray, BLOCK);
         let blocks: Vec<_> = alpha
@@ -188,7 +188,7 @@ impl Samples {
             })
             .collect();
         let work = |(rays, mut out): (Rays<'_>, Target<'_>)| {
-            dispatch(width, Block { rays, out: &mut out });
+            dispatch(set, Block { rays, out: &mut out });
         };
         #[cfg(feature = "rayon")]
         {

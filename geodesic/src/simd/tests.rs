@@ -95,20 +95,20 @@ fn code_samples_agree_with_the_runge_kutta_tracer() {
     }
 }
 
-/// Every width computes the same, to rounding.
+/// Every set computes the same, to rounding.
 #[test]
 fn exact_same_samples_at_every_width() {
     let hole = Kerr::new(0.94).unwrap();
     let observer = observer(60.0, 1000.0);
     let (alpha, beta) = grid(16, 8.0);
     let mut scalar = Samples::default();
-    scalar.trace_at(Width::Scalar, &hole, &observer, &alpha, &beta, 40).unwrap();
-    for width in [Width::Sse2, Width::Avx2, Width::Avx512] {
-        if !width.available() {
+    scalar.trace_at(InstructionSet::Scalar, &hole, &observer, &alpha, &beta, 40).unwrap();
+    for set in InstructionSet::ALL {
+        if !set.available() {
             continue;
         }
         let mut wide = Samples::default();
-        wide.trace_at(width, &hole, &observer, &alpha, &beta, 40).unwrap();
+        wide.trace_at(set, &hole, &observer, &alpha, &beta, 40).unwrap();
         for (a, b) in [
             (scalar.radius(), wide.radius()),
             (scalar.theta(), wide.theta()),
@@ -116,7 +116,7 @@ fn exact_same_samples_at_every_width() {
             (scalar.delay(), wide.delay()),
         ] {
             for (x, y) in a.iter().zip(b) {
-                assert!((x - y).abs() < 1e-10 * x.abs().max(1.0), "{width:?}: {x} {y}");
+                assert!((x - y).abs() < 1e-10 * x.abs().max(1.0), "{set:?}: {x} {y}");
             }
         }
     }
@@ -305,30 +305,30 @@ fn code_error_estimates_bound_the_misses() {
     }
 }
 
-/// The first crossing has a way of its own, and so has every width.
+/// The first crossing has a way of its own, and so has every set.
 #[test]
 fn exact_same_crossings_however_they_are_found() {
     let hole = Kerr::new(0.94).unwrap();
     let observer = observer(60.0, 1000.0);
     let (alpha, beta) = grid(15, 8.0);
     let mut all = Crossings::default();
-    all.trace_at(Width::Scalar, &hole, &observer, &alpha, &beta, 3).unwrap();
-    for width in [Width::Scalar, Width::Sse2, Width::Avx2, Width::Avx512] {
-        if !width.available() {
+    all.trace_at(InstructionSet::Scalar, &hole, &observer, &alpha, &beta, 3).unwrap();
+    for set in [InstructionSet::Scalar].into_iter().chain(InstructionSet::ALL) {
+        if !set.available() {
             continue;
         }
         for per_ray in [1, 3] {
             let mut some = Crossings::default();
-            some.trace_at(width, &hole, &observer, &alpha, &beta, per_ray).unwrap();
+            some.trace_at(set, &hole, &observer, &alpha, &beta, per_ray).unwrap();
             assert_eq!((some.rays(), some.per_ray()), (225, per_ray));
             for k in 0..225 {
                 let expected = all.ray(k).take(per_ray);
                 assert_eq!(some.ray(k).count(), expected.count());
                 for (x, y) in some.ray(k).zip(all.ray(k)) {
-                    assert!((x.radius - y.radius).abs() < 1e-10 * y.radius, "{width:?}: {k}");
-                    assert!((x.azimuth - y.azimuth).abs() < 1e-10, "{width:?}: {k}");
-                    assert!((x.delay - y.delay).abs() < 1e-10 * y.delay, "{width:?}: {k}");
-                    assert!((x.mino_time - y.mino_time).abs() < 1e-12, "{width:?}: {k}");
+                    assert!((x.radius - y.radius).abs() < 1e-10 * y.radius, "{set:?}: {k}");
+                    assert!((x.azimuth - y.azimuth).abs() < 1e-10, "{set:?}: {k}");
+                    assert!((x.delay - y.delay).abs() < 1e-10 * y.delay, "{set:?}: {k}");
+                    assert!((x.mino_time - y.mino_time).abs() < 1e-12, "{set:?}: {k}");
                 }
             }
         }

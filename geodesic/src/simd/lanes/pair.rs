@@ -1,16 +1,18 @@
-//! Two bundles side by side.
+//! Two registers side by side.
 
-use super::Real;
+use super::register::{Element, Lanes, Sealed};
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// Twice the lanes of `V`: every operation is issued twice in a row, which
-/// keeps the arithmetic units busy while long chains wait for results.
+/// Twice the lanes of `V`: every operation is issued twice in a row, which keeps the arithmetic
+/// units busy while long chains wait for results.
 #[derive(Clone, Copy)]
 pub(crate) struct Pair<V>(V, V);
 
+impl<V> Sealed for Pair<V> {}
+
 macro_rules! operator {
     ($trait:ident, $method:ident) => {
-        impl<V: Real> $trait for Pair<V> {
+        impl<V: $trait<Output = V>> $trait for Pair<V> {
             type Output = Self;
             #[inline(always)]
             fn $method(self, o: Self) -> Self {
@@ -24,7 +26,7 @@ operator!(Sub, sub);
 operator!(Mul, mul);
 operator!(Div, div);
 
-impl<V: Real> Neg for Pair<V> {
+impl<V: Neg<Output = V>> Neg for Pair<V> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -32,28 +34,26 @@ impl<V: Real> Neg for Pair<V> {
     }
 }
 
-impl<V: Real> Real for Pair<V> {
+impl<T: Element, V: Lanes<T>> Lanes<T> for Pair<V> {
     type Mask = (V::Mask, V::Mask);
     const LANES: usize = 2 * V::LANES;
+    const REGISTERS: usize = V::REGISTERS / 2;
 
     #[inline(always)]
-    fn splat(x: f64) -> Self {
+    fn splat(x: T) -> Self {
         Self(V::splat(x), V::splat(x))
     }
     #[inline(always)]
-    fn load(x: &[f64]) -> Self {
-        match x.split_at_checked(V::LANES) {
-            Some((a, b)) if !b.is_empty() => Self(V::load(a), V::load(b)),
-            _ => Self(V::load(x), V::splat(x.last().copied().unwrap_or(0.0))),
-        }
+    unsafe fn read(x: *const T) -> Self {
+        // SAFETY: the caller vouches for both.
+        unsafe { Self(V::read(x), V::read(x.add(V::LANES))) }
     }
     #[inline(always)]
-    fn store(self, out: &mut [f64]) {
-        if let Some((a, b)) = out.split_at_mut_checked(V::LANES) {
-            self.0.store(a);
-            self.1.store(b);
-        } else {
-            self.0.store(out);
+    unsafe fn write(self, x: *mut T) {
+        // SAFETY: the caller vouches for both.
+        unsafe {
+            self.0.write(x);
+            self.1.write(x.add(V::LANES));
         }
     }
     #[inline(always)]
@@ -115,7 +115,11 @@ impl<V: Real> Real for Pair<V> {
         (Self(m0, m1), Self(k0, k1))
     }
     #[inline(always)]
-    fn transpose_into(rows: &[f64], stride: usize, out: &mut [f64], starts: &[usize]) {
+    fn two_to_the(n: Self) -> Self {
+        Self(V::two_to_the(n.0), V::two_to_the(n.1))
+    }
+    #[inline(always)]
+    fn transpose_into(rows: &[T], stride: usize, out: &mut [T], starts: &[usize]) {
         V::transpose_into(rows, stride, out, starts);
         let rows = rows.get(V::LANES..).unwrap_or(&[]);
         V::transpose_into(rows, stride, out, starts.get(V::LANES..).unwrap_or(&[]));
