@@ -135,7 +135,7 @@ fn rotate<T: Float, V: Lanes<T>>(axis: [V; 3], sin: V, cos: V, x: [V; 3]) -> [V;
 #[inline(always)]
 fn load<T: Float, V: Lanes<T>>(points: &Coordinates<'_, T>, from: usize) -> [V; 3] {
     let columns = points.columns();
-    core::array::from_fn(|k| V::load_front(&columns[k][from..], T::zero()))
+    core::array::from_fn(|k| V::load_or(&columns[k][from..], T::zero()))
 }
 
 struct Forward<'a, T> {
@@ -147,14 +147,14 @@ struct Forward<'a, T> {
 impl<T: Float> Task<T> for Forward<'_, T> {
     type Output = ();
     #[inline(always)]
-    fn run<V: Lanes<T>, const ROWS: usize>(mut self) {
+    fn run<V: Lanes<T>>(mut self) {
         let axis = self.axis.map(V::splat);
         for (k, angles) in self.turned.angles.chunks(V::LANES).enumerate() {
             let from = k * V::LANES;
-            let (sin, cos) = math::sin_cos(V::load_front(angles, T::zero()));
+            let (sin, cos) = math::sin_cos(V::load_or(angles, T::zero()));
             let pulled = rotate(axis, sin, cos, load(&self.turned.points, from));
             for (column, x) in self.pulled.columns().iter_mut().zip(pulled) {
-                x.store_front(&mut column[from..]);
+                x.store(&mut column[from..]);
             }
         }
     }
@@ -170,12 +170,12 @@ struct Backward<'a, T> {
 impl<T: Float> Task<T> for Backward<'_, T> {
     type Output = [f64; 3];
     #[inline(always)]
-    fn run<V: Lanes<T>, const ROWS: usize>(mut self) -> [f64; 3] {
+    fn run<V: Lanes<T>>(mut self) -> [f64; 3] {
         let (axis, zero, one) = (self.axis.map(V::splat), V::splat(T::zero()), V::splat(T::one()));
         let mut sum = [0.0; 3];
         for (k, angles) in self.turned.angles.chunks(V::LANES).enumerate() {
             let from = k * V::LANES;
-            let (sin, cos) = math::sin_cos(V::load_front(angles, T::zero()));
+            let (sin, cos) = math::sin_cos(V::load_or(angles, T::zero()));
             let (x, g) = (load(&self.turned.points, from), load(&self.gradient, from));
             let (rest, swirl) = (one - cos, cross(x, g));
             let (along_x, along_g) = (rest * dot(axis, x), rest * dot(axis, g));
@@ -200,5 +200,5 @@ impl<T: Float> Task<T> for Backward<'_, T> {
 
 #[inline(always)]
 fn add<T: Float, V: Lanes<T>>(x: V, to: &mut [T]) {
-    (V::load_front(to, T::zero()) + x).store_front(to);
+    (V::load_or(to, T::zero()) + x).store(to);
 }

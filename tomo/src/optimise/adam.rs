@@ -119,10 +119,10 @@ struct Update<'a, T> {
 impl<T: Float> Task<T> for Update<'_, T> {
     type Output = ();
     #[inline(always)]
-    fn run<V: Lanes<T>, const ROWS: usize>(self) {
+    fn run<V: Lanes<T>>(self) {
         let Constants { beta, rest, unbiased, rate, epsilon } = self.constants;
         let s = V::splat;
-        let load = |x: &[T]| V::load_front(x, T::zero());
+        let load = |x: &[T]| V::load_or(x, T::zero());
         let moments = self.first.chunks_mut(V::LANES).zip(self.second.chunks_mut(V::LANES));
         let parameters = self.parameters.chunks_mut(V::LANES);
         let all = parameters.zip(self.gradient.chunks(V::LANES)).zip(moments);
@@ -132,9 +132,9 @@ impl<T: Float> Task<T> for Update<'_, T> {
             let v = load(second).mul_add(s(beta[1]), g * g * s(rest[1]));
             let root = (v * s(unbiased[1])).sqrt() + s(epsilon);
             let x = load(parameters) - s(rate) * (m * s(unbiased[0])) / root;
-            m.store_front(first);
-            v.store_front(second);
-            x.store_front(parameters);
+            m.store(first);
+            v.store(second);
+            x.store(parameters);
         }
     }
 }

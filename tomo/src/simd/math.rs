@@ -5,8 +5,8 @@
 
 #![allow(clippy::excessive_precision, reason = "coefficients as the fit printed them")]
 
-use super::lanes::{Lanes, MAX_LANES};
-use super::scalar::Float;
+use super::float::Float;
+use super::{Lanes, MAX_LANES};
 use crate::real::Real;
 
 /// What the functions need to know of a scalar.
@@ -155,8 +155,8 @@ fn near_sin_cos<T: Float, V: Lanes<T>>(x: V) -> (V, V) {
     let (zero, one, two) = (s(T::zero()), s(T::one()), s(T::of(2.0)));
     let sign = one - two * negative;
     let turn = sign * (one - two * odd);
-    let of_sin = V::select_less(zero, odd, cos, sin);
-    let of_cos = V::select_less(zero, odd, sin, cos);
+    let of_sin = V::select(zero.lt(odd), cos, sin);
+    let of_cos = V::select(zero.lt(odd), sin, cos);
     (of_sin * sign, of_cos * turn)
 }
 
@@ -166,7 +166,7 @@ pub fn sin_cos<T: Float, V: Lanes<T>>(x: V) -> (V, V) {
     let (sin, cos) = near_sin_cos::<T, V>(x);
     let zero = V::splat(T::zero());
     let size = x.max(zero - x);
-    let beyond = V::select_less(V::splat(T::FAR), size, V::splat(T::one()), zero).sum();
+    let beyond = V::select(V::splat(T::FAR).lt(size), V::splat(T::one()), zero).sum();
     if beyond > T::zero() { patch::<T, V>(x, sin, cos) } else { (sin, cos) }
 }
 
@@ -176,7 +176,7 @@ pub fn sin_cos<T: Float, V: Lanes<T>>(x: V) -> (V, V) {
 fn patch<T: Float, V: Lanes<T>>(x: V, sin: V, cos: V) -> (V, V) {
     let mut lanes = [[T::zero(); MAX_LANES]; 3];
     for (lanes, v) in lanes.iter_mut().zip([x, sin, cos]) {
-        v.store_front(lanes);
+        v.store(lanes);
     }
     let [x, mut sin, mut cos] = lanes;
     for k in 0..V::LANES {
@@ -184,7 +184,7 @@ fn patch<T: Float, V: Lanes<T>>(x: V, sin: V, cos: V) -> (V, V) {
             (sin[k], cos[k]) = x[k].sin_cos();
         }
     }
-    (V::load_front(&sin, T::zero()), V::load_front(&cos, T::zero()))
+    (V::load_or(&sin, T::zero()), V::load_or(&cos, T::zero()))
 }
 
 /// eˣ, held beyond |x| = 87 (f32), 708 (f64).

@@ -117,7 +117,7 @@ impl<V: Copy> Sums<V> {
         let units_and_slopes = second_units.iter().zip(&mut second);
         for ((weight, sum), (unit, out)) in weights.zip(units_and_slopes) {
             *sum = unit.mul_add(slope, *sum);
-            *out = V::select_less(zero, *unit, V::splat(*weight) * slope, zero);
+            *out = V::select(zero.lt(*unit), V::splat(*weight) * slope, zero);
         }
         for (sum, slope) in self.second_biases.iter_mut().zip(second) {
             *sum = *sum + slope;
@@ -126,7 +126,7 @@ impl<V: Copy> Sums<V> {
         let rows = network.second.chunks_exact(WIDTH).zip(&mut self.second);
         for ((weights, sums), (unit, out)) in rows.zip(first_units.iter().zip(&mut first)) {
             let of_unit = row(weights, sums, *unit, &second);
-            *out = V::select_less(zero, *unit, of_unit, zero);
+            *out = V::select(zero.lt(*unit), of_unit, zero);
         }
         for (sum, slope) in self.first_biases.iter_mut().zip(first) {
             *sum = *sum + slope;
@@ -193,7 +193,7 @@ pub struct Forward<'a, T> {
 impl<T: Float> Task<T> for Forward<'_, T> {
     type Output = ();
     #[inline(always)]
-    fn run<V: Lanes<T>, const ROWS: usize>(mut self) {
+    fn run<V: Lanes<T>>(mut self) {
         let network = Network::of(self.layout, self.parameters);
         let (grids, count) = ((self.layout, self.geometries), self.layout.inputs());
         for (k, values) in self.values.chunks_mut(V::LANES).enumerate() {
@@ -202,12 +202,12 @@ impl<T: Float> Task<T> for Forward<'_, T> {
             let inputs = &inputs[..count];
             let units = network.forward(inputs);
             let (value, slope) = self.activation.apply::<T, V>(units.output);
-            keep_inside(inside, value).store_front(values);
+            keep_inside(inside, value).store(values);
             if let Some(kept) = &mut self.kept {
                 let kept = kept[from * self.layout.kept()..].chunks_exact_mut(V::LANES);
                 let slope = keep_inside(inside, slope);
                 let all = inputs.iter().chain(&units.first).chain(&units.second).chain([&slope]);
-                kept.zip(all).for_each(|(kept, lanes)| lanes.store_front(kept));
+                kept.zip(all).for_each(|(kept, lanes)| lanes.store(kept));
             }
         }
     }
@@ -233,7 +233,7 @@ pub struct Backward<'a, T> {
 impl<T: Float> Task<T> for Backward<'_, T> {
     type Output = ();
     #[inline(always)]
-    fn run<V: Lanes<T>, const ROWS: usize>(mut self) {
+    fn run<V: Lanes<T>>(mut self) {
         let network = Network::of(self.layout, self.parameters);
         let (grids, count) = ((self.layout, self.geometries), self.layout.inputs());
         let zero = V::splat(T::zero());
@@ -242,16 +242,16 @@ impl<T: Float> Task<T> for Backward<'_, T> {
             let from = k * V::LANES;
             let mut kept = self.kept[from * self.layout.kept()..]
                 .chunks_exact(V::LANES)
-                .map(|lanes| V::load_front(lanes, T::zero()));
+                .map(|lanes| V::load_or(lanes, T::zero()));
             let mut next = || kept.next().unwrap_or(zero);
             let mut inputs = [zero; MAX_INPUTS];
             inputs[..count].fill_with(&mut next);
             let units = [(); 2].map(|()| [(); WIDTH].map(|()| next()));
-            let slope = V::load_front(&self.cotangents[from..], T::zero()) * next();
+            let slope = V::load_or(&self.cotangents[from..], T::zero()) * next();
             let slopes = sums.backward(&network, &inputs[..count], &units, slope);
             let mut lanes = [T::zero(); MAX_LANES];
             for (input, slopes) in slopes.iter().take(count).enumerate() {
-                slopes.store_front(&mut lanes);
+                slopes.store(&mut lanes);
                 let out = out.iter_mut().skip(input).step_by(count);
                 out.zip(&lanes).for_each(|(out, lane)| *out = *lane);
             }
@@ -289,7 +289,7 @@ fn pull<T: Float, V: Lanes<T>>(
     }
     let mut lanes = [[T::zero(); MAX_LANES]; 3];
     for (lanes, sum) in lanes.iter_mut().zip(sum) {
-        sum.store_front(lanes);
+        sum.store(lanes);
     }
     for (lane, out) in out.iter_mut().take(V::LANES).enumerate() {
         *out = [lanes[0][lane], lanes[1][lane], lanes[2][lane]];
@@ -306,7 +306,7 @@ pub struct Corners<'a, T> {
 impl<T: Float> Task<T> for Corners<'_, T> {
     type Output = ();
     #[inline(always)]
-    fn run<V: Lanes<T>, const ROWS: usize>(self) {
+    fn run<V: Lanes<T>>(self) {
         for (k, contributions) in self.contributions.chunks_mut(V::LANES).enumerate() {
             let located: Located<T, V> = self.geometry.locate(&self.at, k * V::LANES);
             located.contribute(keep_inside(located.inside, V::splat(T::one())), contributions);

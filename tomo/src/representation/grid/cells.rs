@@ -65,17 +65,17 @@ impl<T: Float> Geometry<T> {
         for ((axis, nodes), (column, within)) in
             self.axes.iter().zip(self.nodes).zip(at.columns().iter().zip(&mut within))
         {
-            let x = V::load_front(&column[from..], axis.low);
+            let x = V::load_or(&column[from..], axis.low);
             let u = (x - V::splat(axis.low)) * V::splat(axis.per_length);
-            inside = V::select_less(u, zero, zero, inside);
-            inside = V::select_less(V::splat(axis.cells), u, zero, inside);
+            inside = V::select(u.lt(zero), zero, inside);
+            inside = V::select(V::splat(axis.cells).lt(u), zero, inside);
             // A NaN is neither here nor there: it stays inside and makes the value one.
             let u = V::splat(axis.cells).min(zero.max(u));
             let cell = math::round(u - V::splat(T::of(0.5)));
             let cell = V::splat(axis.cells - T::one()).min(zero.max(cell));
             *within = u - cell;
             let mut cells = [T::zero(); MAX_LANES];
-            cell.store_front(&mut cells);
+            cell.store(&mut cells);
             for (corner, cell) in corner.iter_mut().zip(cells) {
                 *corner = *corner * nodes + (cell.to_usize().unwrap_or(0)).min(nodes - 2);
             }
@@ -95,7 +95,7 @@ impl<T: Float> Geometry<T> {
                 numbers[2 * k + 1][lane] = pair[1];
             }
         }
-        numbers.map(|lanes| V::load_front(&lanes, T::zero()))
+        numbers.map(|lanes| V::load_or(&lanes, T::zero()))
     }
 }
 
@@ -130,13 +130,13 @@ pub(super) struct Values<'a, T> {
 impl<T: Float> Task<T> for Values<'_, T> {
     type Output = ();
     #[inline(always)]
-    fn run<V: Lanes<T>, const ROWS: usize>(self) {
+    fn run<V: Lanes<T>>(self) {
         for (k, values) in self.values.chunks_mut(V::LANES).enumerate() {
             let located = self.geometry.locate::<V>(&self.at, k * V::LANES);
             let corners = self.geometry.corners::<V>(self.parameters, &located.corner);
             let (number, _) = interpolate(&corners, &located.within);
             let (value, _) = self.activation.apply::<T, V>(number);
-            keep_inside(located.inside, value).store_front(values);
+            keep_inside(located.inside, value).store(values);
         }
     }
 }
@@ -145,7 +145,7 @@ impl<T: Float> Task<T> for Values<'_, T> {
 #[inline(always)]
 pub fn keep_inside<T: Float, V: Lanes<T>>(inside: V, value: V) -> V {
     let zero = V::splat(T::zero());
-    V::select_less(zero, inside, value, zero)
+    V::select(zero.lt(inside), value, zero)
 }
 
 /// What each point adds to the nodes of its cell for a cotangent of one; and what else is wanted.
@@ -158,7 +158,7 @@ pub(super) struct Products<'a, T> {
 impl<T: Float> Task<T> for Products<'_, T> {
     type Output = ();
     #[inline(always)]
-    fn run<V: Lanes<T>, const ROWS: usize>(self) {
+    fn run<V: Lanes<T>>(self) {
         let Share { parameters, at, contributions, mut values, mut coordinates } = self.share;
         for (k, contributions) in contributions.chunks_mut(V::LANES).enumerate() {
             let from = k * V::LANES;
@@ -167,16 +167,16 @@ impl<T: Float> Task<T> for Products<'_, T> {
             let (number, slopes) = interpolate(&corners, &located.within);
             let (value, slope) = self.activation.apply::<T, V>(number);
             if let Some(values) = &mut values {
-                keep_inside(located.inside, value).store_front(&mut values[from..]);
+                keep_inside(located.inside, value).store(&mut values[from..]);
             }
             let weight = keep_inside(located.inside, slope);
             if let Some((coordinates, cotangents)) = &mut coordinates {
-                let weight = weight * V::load_front(&cotangents[from..], T::zero());
+                let weight = weight * V::load_or(&cotangents[from..], T::zero());
                 let columns = coordinates.columns().iter_mut().zip(self.geometry.axes);
                 for ((column, axis), slope) in columns.zip(slopes) {
                     let out = &mut column[from..];
-                    let sum = V::load_front(out, T::zero());
-                    (weight * V::splat(axis.per_length)).mul_add(slope, sum).store_front(out);
+                    let sum = V::load_or(out, T::zero());
+                    (weight * V::splat(axis.per_length)).mul_add(slope, sum).store(out);
                 }
             }
             located.contribute(weight, contributions);
@@ -191,7 +191,7 @@ impl<T: Float, V: Lanes<T>> Located<T, V> {
         let mut lanes = [[T::zero(); MAX_LANES]; 4];
         let [x, y, z] = self.within;
         for (lanes, v) in lanes.iter_mut().zip([x, y, z, weight]) {
-            v.store_front(lanes);
+            v.store(lanes);
         }
         for (lane, contribution) in contributions.iter_mut().enumerate() {
             let (corner, weight) = (self.corner[lane] as u32, lanes[3][lane]);

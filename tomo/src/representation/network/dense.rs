@@ -2,7 +2,7 @@
 //!
 //! Points lie row by row, so that no activation is ever packed: a block of `ROWS` × 2 registers of
 //! sums runs over the common index, with one operand broadcast and the other loaded from a panel two
-//! registers wide. ReLU, its derivative and the biases are part of loading and storing a block.
+//! registers wide; `ROWS` is 6 where there are 16 registers and 12 where there are 32. ReLU, its derivative and the biases are part of loading and storing a block.
 
 use crate::simd::{Float, Lanes, Task};
 
@@ -36,7 +36,7 @@ unsafe fn block<T: Float, V: Lanes<T>, const ROWS: usize>(
         // SAFETY: within what the caller vouches for; the last step may point one row past it, which
         // `wrapping_add` allows.
         unsafe {
-            let (left, right) = (V::load(at.1), V::load(at.1.add(V::LANES)));
+            let (left, right) = (V::read(at.1), V::read(at.1.add(V::LANES)));
             for (m, sum) in sums.iter_mut().enumerate() {
                 let x = V::splat(*at.0.add(m * rows));
                 sum[0] = x.mul_add(left, sum[0]);
@@ -62,7 +62,14 @@ pub struct Forward<'a, T> {
 impl<T: Float> Task<T> for Forward<'_, T> {
     type Output = ();
     #[inline(always)]
-    fn run<V: Lanes<T>, const ROWS: usize>(self) {
+    fn run<V: Lanes<T>>(self) {
+        if const { V::REGISTERS < 32 } { self.by_rows::<V, 6>() } else { self.by_rows::<V, 12>() }
+    }
+}
+
+impl<T: Float> Forward<'_, T> {
+    #[inline(always)]
+    fn by_rows<V: Lanes<T>, const ROWS: usize>(self) {
         let width = 2 * V::LANES;
         let (rows, panels) = (self.points.next_multiple_of(ROWS), self.outputs.div_ceil(width));
         let panel = (self.inputs + 1) * width;
@@ -80,7 +87,7 @@ impl<T: Float> Task<T> for Forward<'_, T> {
                 unsafe {
                     let from = self.panels.as_ptr().add(p * panel);
                     let bias = from.add(self.inputs * width);
-                    let start = [V::load(bias), V::load(bias.add(V::LANES))];
+                    let start = [V::read(bias), V::read(bias.add(V::LANES))];
                     let input = self.input.numbers.as_ptr().add(row * self.input.stride);
                     let sums = block::<T, V, ROWS>(
                         start,
@@ -92,8 +99,8 @@ impl<T: Float> Task<T> for Forward<'_, T> {
                         let at = (row + m) * self.output.stride + p * width;
                         let to = self.output.numbers.as_mut_ptr().add(at);
                         // In this order a NaN stays one.
-                        zero.max(sum[0]).store(to);
-                        zero.max(sum[1]).store(to.add(V::LANES));
+                        zero.max(sum[0]).write(to);
+                        zero.max(sum[1]).write(to.add(V::LANES));
                     }
                 }
             }
@@ -117,7 +124,14 @@ pub struct Backward<'a, T> {
 impl<T: Float> Task<T> for Backward<'_, T> {
     type Output = ();
     #[inline(always)]
-    fn run<V: Lanes<T>, const ROWS: usize>(self) {
+    fn run<V: Lanes<T>>(self) {
+        if const { V::REGISTERS < 32 } { self.by_rows::<V, 6>() } else { self.by_rows::<V, 12>() }
+    }
+}
+
+impl<T: Float> Backward<'_, T> {
+    #[inline(always)]
+    fn by_rows<V: Lanes<T>, const ROWS: usize>(self) {
         let width = 2 * V::LANES;
         let (rows, panels) = (self.points.next_multiple_of(ROWS), self.outputs.div_ceil(width));
         let panel = self.units * width;
@@ -168,8 +182,8 @@ unsafe fn pass<T: Float, V: Lanes<T>>(sum: V, h: Option<*const T>, to: *mut T) {
     // SAFETY: as the caller vouches.
     unsafe {
         match h {
-            Some(h) => V::select_less(zero, V::load(h), sum, zero).store(to),
-            None => (V::load(to) + sum).store(to),
+            Some(h) => V::select(zero.lt(V::read(h)), sum, zero).write(to),
+            None => (V::read(to) + sum).write(to),
         }
     }
 }
@@ -190,7 +204,14 @@ pub struct Weights<'a, T> {
 impl<T: Float> Task<T> for Weights<'_, T> {
     type Output = ();
     #[inline(always)]
-    fn run<V: Lanes<T>, const ROWS: usize>(self) {
+    fn run<V: Lanes<T>>(self) {
+        if const { V::REGISTERS < 32 } { self.by_rows::<V, 6>() } else { self.by_rows::<V, 12>() }
+    }
+}
+
+impl<T: Float> Weights<'_, T> {
+    #[inline(always)]
+    fn by_rows<V: Lanes<T>, const ROWS: usize>(self) {
         let width = 2 * V::LANES;
         let (rows, panels) = (self.inputs + 1, self.outputs.div_ceil(width));
         assert!(rows.next_multiple_of(ROWS) <= self.input.stride);
@@ -225,8 +246,8 @@ impl<T: Float> Task<T> for Weights<'_, T> {
 fn put<T: Float, V: Lanes<T>>(sum: [V; 2], to: &mut [T], overwrite: bool) {
     let (left, right) = to.split_at_mut(V::LANES.min(to.len()));
     for (sum, to) in sum.into_iter().zip([left, right]) {
-        let sum = if overwrite { sum } else { V::load_front(to, T::zero()) + sum };
-        sum.store_front(to);
+        let sum = if overwrite { sum } else { V::load_or(to, T::zero()) + sum };
+        sum.store(to);
     }
 }
 

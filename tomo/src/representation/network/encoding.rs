@@ -17,13 +17,13 @@ pub struct Encode<'a, T> {
 impl<T: Float> Task<T> for Encode<'_, T> {
     type Output = ();
     #[inline(always)]
-    fn run<V: Lanes<T>, const ROWS: usize>(self) {
+    fn run<V: Lanes<T>>(self) {
         let (dimension, stride) = (self.at.dimension(), self.output.stride);
         let columns = dimension * (1 + 2 * self.degree);
         let rows = self.output.numbers.chunks_mut(stride * V::LANES);
         for (block, rows) in rows.enumerate().take(self.at.len().div_ceil(V::LANES)) {
             for (d, (column, scale)) in self.at.columns().iter().zip(self.scales).enumerate() {
-                let x = V::load_front(&column[block * V::LANES..], T::zero()) * V::splat(*scale);
+                let x = V::load_or(&column[block * V::LANES..], T::zero()) * V::splat(*scale);
                 put(x, rows, stride, d);
                 let mut x = x;
                 for j in 0..self.degree {
@@ -42,7 +42,7 @@ impl<T: Float> Task<T> for Encode<'_, T> {
 #[inline(always)]
 fn put<T: Float, V: Lanes<T>>(x: V, rows: &mut [T], stride: usize, column: usize) {
     let mut lanes = [T::zero(); MAX_LANES];
-    x.store_front(&mut lanes);
+    x.store(&mut lanes);
     for (row, x) in rows.chunks_mut(stride).zip(lanes) {
         row[column] = x;
     }

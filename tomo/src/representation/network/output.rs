@@ -19,23 +19,23 @@ pub struct Output<'a, T> {
 impl<T: Float> Task<T> for Output<'_, T> {
     type Output = ();
     #[inline(always)]
-    fn run<V: Lanes<T>, const ROWS: usize>(self) {
+    fn run<V: Lanes<T>>(self) {
         let rows = self.input.numbers.chunks(self.input.stride);
         for (value, row) in self.values.iter_mut().zip(rows) {
             let mut sum = V::splat(T::zero());
             for (w, x) in self.weights.chunks_exact(V::LANES).zip(row.chunks_exact(V::LANES)) {
-                let (w, x) = (V::load_front(w, T::zero()), V::load_front(x, T::zero()));
+                let (w, x) = (V::load_or(w, T::zero()), V::load_or(x, T::zero()));
                 sum = w.mul_add(x, sum);
             }
             *value = sum.sum();
         }
         let mut slopes = self.slopes.chunks_mut(V::LANES);
         for values in self.values.chunks_mut(V::LANES) {
-            let x = V::load_front(values, T::zero()) + V::splat(self.shift);
+            let x = V::load_or(values, T::zero()) + V::splat(self.shift);
             let (value, slope) = self.activation.apply::<T, V>(x);
-            value.store_front(values);
+            value.store(values);
             if let Some(slopes) = slopes.next() {
-                slope.store_front(slopes);
+                slope.store(slopes);
             }
         }
     }
@@ -57,27 +57,27 @@ pub struct OutputBackward<'a, T> {
 impl<T: Float> Task<T> for OutputBackward<'_, T> {
     type Output = ();
     #[inline(always)]
-    fn run<V: Lanes<T>, const ROWS: usize>(self) {
+    fn run<V: Lanes<T>>(self) {
         let zero = V::splat(T::zero());
         let blocks =
             self.weights.chunks_exact(V::LANES).zip(self.gradient.chunks_exact_mut(V::LANES));
         for (b, (weights, gradient)) in blocks.enumerate() {
             let columns = b * V::LANES..(b + 1) * V::LANES;
             let writes = columns.end <= self.output.stride;
-            let w = V::load_front(weights, T::zero());
-            let mut sum = V::load_front(gradient, T::zero());
+            let w = V::load_or(weights, T::zero());
+            let mut sum = V::load_or(gradient, T::zero());
             let rows = self.input.numbers.chunks(self.input.stride);
             let outputs = self.output.numbers.chunks_mut(self.output.stride);
             for ((x, row), output) in self.cotangents.iter().zip(rows).zip(outputs) {
                 let x = V::splat(*x);
-                let h = V::load_front(&row[columns.clone()], T::zero());
+                let h = V::load_or(&row[columns.clone()], T::zero());
                 sum = x.mul_add(h, sum);
                 if writes {
-                    let masked = V::select_less(zero, h, x * w, zero);
-                    masked.store_front(&mut output[columns.clone()]);
+                    let masked = V::select(zero.lt(h), x * w, zero);
+                    masked.store(&mut output[columns.clone()]);
                 }
             }
-            sum.store_front(gradient);
+            sum.store(gradient);
         }
     }
 }

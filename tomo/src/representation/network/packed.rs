@@ -4,7 +4,7 @@ use super::super::workspace::Lines;
 use super::Network;
 use super::dense::{pack_kernel, pack_transposed, packed_kernel};
 use super::layout::LINE;
-use crate::simd::Float;
+use crate::simd::{Float, panel};
 
 /// Packed weights of all layers.
 #[derive(Default)]
@@ -25,7 +25,7 @@ impl<T: Float + Default> Packed<T> {
     /// Packs what a forward pass needs; what the way back needs if `backward`, as far as the
     /// coordinates if `coordinates`.
     pub fn pack(&mut self, network: &Network, parameters: &[T], backward: bool, coordinates: bool) {
-        let (layout, width) = (&network.layout, network.instruction_set.panel::<T>());
+        let (layout, width) = (&network.layout, panel::<T>(network.instruction_set));
         self.layers.resize_with(layout.hidden().len(), Panels::default);
         for (k, (panels, layer)) in self.layers.iter_mut().zip(layout.hidden()).enumerate() {
             let rows = &parameters[layer.offset..layer.offset + layer.size()];

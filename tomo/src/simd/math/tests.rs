@@ -34,12 +34,12 @@ function!(Softplus, softplus::<T, V>);
 impl<T: Float, F: Function> Task<T> for Errors<'_, T, F> {
     type Output = f64;
     #[inline(always)]
-    fn run<V: Lanes<T>, const ROWS: usize>(self) -> f64 {
+    fn run<V: Lanes<T>>(self) -> f64 {
         let mut worst = 0.0f64;
         for x in self.arguments.chunks(V::LANES) {
             let rounded: Vec<T> = x.iter().map(|x| T::of(*x)).collect();
             let mut out = vec![T::zero(); x.len()];
-            self.compute.call::<T, V>(V::load_front(&rounded, T::zero())).store_front(&mut out);
+            self.compute.call::<T, V>(V::load_or(&rounded, T::zero())).store(&mut out);
             for (x, y) in rounded.iter().zip(out) {
                 let exact = (self.exact)(x.double());
                 let scale = if self.relative { exact.abs() } else { 1.0 };
@@ -51,7 +51,7 @@ impl<T: Float, F: Function> Task<T> for Errors<'_, T, F> {
     }
 }
 
-fn worst<T: Float>(
+fn worst<T: Float + Lanes<T, Mask = bool>>(
     arguments: &[f64],
     compute: impl Function + Copy,
     exact: fn(f64) -> f64,
@@ -60,7 +60,7 @@ fn worst<T: Float>(
     let errors =
         || Errors::<T, _> { arguments, compute, exact, relative, unit: core::marker::PhantomData };
     let of = InstructionSet::ALL.map(|set| dispatch(set, errors()));
-    let wide = errors().run::<Array<T, 16>, 6>();
+    let wide = errors().run::<Array<T, 16>>();
     of.into_iter().fold(wide, f64::max)
 }
 

@@ -19,7 +19,7 @@ fn products<V: Lanes<f64>, const ROWS: usize>(inputs: usize, outputs: usize) {
     let output = MatrixMut { numbers: &mut y, stride };
     let points = 13;
     let task = Forward { points, input, inputs, panels: &panels, outputs, output };
-    task.run::<V, ROWS>();
+    task.by_rows::<V, ROWS>();
     for p in 0..points {
         for o in 0..outputs {
             let sum: f64 = (0..inputs).map(|k| x[p * stride + k] * w[k * outputs + o]).sum();
@@ -36,7 +36,7 @@ fn products<V: Lanes<f64>, const ROWS: usize>(inputs: usize, outputs: usize) {
         let (activations, panels) = (masked.then_some(input), &panels[..]);
         let (units, outputs) = (outputs, inputs);
         Backward { points, cotangent, units, panels, activations, outputs, output }
-            .run::<V, ROWS>();
+            .by_rows::<V, ROWS>();
         for p in 0..points {
             for k in 0..inputs {
                 let sum: f64 = (0..units).map(|o| d[p * stride + o] * w[k * units + o]).sum();
@@ -49,7 +49,7 @@ fn products<V: Lanes<f64>, const ROWS: usize>(inputs: usize, outputs: usize) {
     for (overwrite, start) in [(false, 2.0), (true, 0.0)] {
         let gradient = &mut g[..];
         let task = Weights { points, input, inputs, cotangent, outputs, gradient, overwrite };
-        task.run::<V, ROWS>();
+        task.by_rows::<V, ROWS>();
         for k in 0..=inputs {
             for o in 0..outputs {
                 let product = |p: usize| x[p * stride + k] * d[p * stride + o];
