@@ -7,8 +7,10 @@
 //!
 //! docs/tutorials/your-own-representation.md walks through it.
 
-use kerrlight_cli::{OwnSettings, Program};
-use kerrlight_tomo::representation::{Coordinates, Float, Gradient, Representation, Workspace};
+use kerrlight_cli::Program;
+use kerrlight_tomo::representation::{
+    BuildError, Coordinates, Float, Gradient, OwnSettings, Representation, Workspace,
+};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
@@ -18,7 +20,7 @@ fn main() -> ExitCode {
     Program::new().representation("gaussian-blobs", build).run()
 }
 
-fn build(own: &OwnSettings) -> anyhow::Result<Box<dyn Representation<f32>>> {
+fn build(own: &OwnSettings) -> Result<Box<dyn Representation<f32>>, BuildError> {
     let count = own.number("blobs", 1.0..=4096.0)? as usize;
     let sigma = own.number("sigma", 0.01..=100.0)?;
     Ok(Box::new(GaussianBlobs { count, sigma, r_min: own.r_min, r_max: own.r_max }))

@@ -1,12 +1,13 @@
 //! `kerrlight convert`: visibilities from one format to another.
 
 use crate::answer::Answer;
-use crate::interferometry::arguments::{self, Source};
+use crate::interferometry::arguments;
 use crate::interferometry::{self, ObservationFile, Written};
 use crate::output;
 use anyhow::bail;
 use clap::Args;
 use kerrlight_tomo::interferometry::observation::{Flags, Observation};
+use kerrlight_tomo::interferometry::source::Source;
 use std::path::PathBuf;
 
 /// Arguments of `kerrlight convert`.

@@ -3,9 +3,11 @@
 //! It is a library so that a program of one's own can be all of `kerrlight` and more:
 //!
 //! ```no_run
-//! # use kerrlight_cli::{OwnSettings, Program};
-//! # use kerrlight_tomo::representation::{Network, NetworkSettings, Representation};
-//! fn small(own: &OwnSettings) -> anyhow::Result<Box<dyn Representation<f32>>> {
+//! # use kerrlight_cli::Program;
+//! # use kerrlight_tomo::representation::{
+//! #     BuildError, Network, NetworkSettings, OwnSettings, Representation,
+//! # };
+//! fn small(own: &OwnSettings) -> Result<Box<dyn Representation<f32>>, BuildError> {
 //!     let width = own.number("width", 8.0..=512.0)? as usize;
 //!     Ok(Box::new(Network::new(NetworkSettings { width, ..NetworkSettings::bhnerf() })?))
 //! }
@@ -49,11 +51,12 @@ mod uv;
 mod volume_files;
 
 pub use memory::Bounded;
-pub use program::{BuildRepresentation, OwnSettings, Program};
+pub use program::Program;
 
 use answer::{Answer, Form};
 use anyhow::bail;
 use clap::{Parser, Subcommand};
+use kerrlight_tomo::representation::Registry;
 
 /// Black holes: lensed images, simulated interferometry, 3D emission tomography
 #[derive(Debug, Parser)]
@@ -102,7 +105,7 @@ enum Verb {
     Man(help::ManPages),
 }
 
-fn run(arguments: &Arguments) -> anyhow::Result<()> {
+fn run(arguments: &Arguments, registry: &Registry) -> anyhow::Result<()> {
     memory::limit(arguments.memory)?;
     if let Some(threads) = arguments.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
@@ -113,7 +116,7 @@ fn run(arguments: &Arguments) -> anyhow::Result<()> {
         (false, true) => Form::Aside,
         (false, false) => Form::Text,
     };
-    arguments.verb.run(arguments)?.print(form)
+    arguments.verb.run(arguments, registry)?.print(form)
 }
 
 impl Verb {
@@ -130,7 +133,7 @@ impl Verb {
         }
     }
 
-    fn run(&self, arguments: &Arguments) -> anyhow::Result<Answer> {
+    fn run(&self, arguments: &Arguments, registry: &Registry) -> anyhow::Result<Answer> {
         match self {
             Verb::Render(render) => render.run(),
             Verb::Movie(movie) => movie.run(),
@@ -140,8 +143,8 @@ impl Verb {
             Verb::Observe(observe) => observe.run(),
             Verb::Uv(uv) => uv.run(),
             Verb::Convert(convert) => convert.run(),
-            Verb::Fit(fit) => fit.run(),
-            Verb::Compare(compare) => compare.run(arguments.threads, arguments.memory),
+            Verb::Fit(fit) => fit.run(registry),
+            Verb::Compare(compare) => compare.run((arguments.threads, arguments.memory), registry),
             Verb::Inspect(inspect) => inspect.run(),
             Verb::Completions(completions) => completions.run(),
             Verb::Man(pages) => pages.run(),

@@ -12,6 +12,7 @@ use kerrlight_tomo::interferometry::noise::{
 };
 use kerrlight_tomo::interferometry::observation::Observation;
 use kerrlight_tomo::interferometry::operator::{Method, Pulse};
+use kerrlight_tomo::interferometry::schedule;
 use kerrlight_tomo::interferometry::simulate::{self, Movie};
 use std::path::PathBuf;
 
@@ -117,7 +118,8 @@ impl Observe {
         let array = arguments::array_of(&self.array)?;
         let (schedule, setup) = (self.observing.schedule()?, self.observing.setup()?);
         let source = &self.observing.source;
-        let mut observation = arguments::observe(&array, source.position, &schedule, &setup)?;
+        let mut observation =
+            schedule::observe_affordable(&array, source.position, &schedule, &setup)?;
         observation.source.clone_from(&source.name);
         if observation.rows.is_empty() {
             bail!("no two stations see {} at any time", source.name);

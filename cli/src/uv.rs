@@ -8,6 +8,7 @@ use crate::output::{self, Output};
 use anyhow::bail;
 use clap::Args;
 use kerrlight_tomo::interferometry::observation::Observation;
+use kerrlight_tomo::interferometry::schedule;
 use std::path::PathBuf;
 
 /// Arguments of `kerrlight uv`.
@@ -34,7 +35,7 @@ impl Uv {
         let array = arguments::array_of(&self.array)?;
         let (schedule, setup) = (self.observing.schedule()?, self.observing.setup()?);
         let source = &self.observing.source;
-        let observation = arguments::observe(&array, source.position, &schedule, &setup)?;
+        let observation = schedule::observe_affordable(&array, source.position, &schedule, &setup)?;
         if observation.rows.is_empty() {
             bail!("no two stations see {} at any time", source.name);
         }

@@ -211,7 +211,7 @@ fn bad_input_is_named_and_nothing_is_begun() {
         ("hole.spin=1.5", "spin = 1.5"),
         ("region.r_max=1.0", "r_max = 1"),
         ("training.rate=-1.0", "training.rate = -1 is not allowed"),
-        ("training.batch={frames=0}", "1 or more"),
+        ("training.batch={frames=0}", "training.batch.frames = 0 is not allowed: at least 1"),
         ("loss.0.sigma=0.0", "loss.0.sigma = 0 is not allowed"),
         ("loss.0.data=visibilities", "pixels are for images alone"),
         ("truth.spot.0.sigma=0.0", "truth.spot.0.sigma = 0 is not allowed"),

@@ -6,6 +6,8 @@ use super::summary::called;
 use crate::fit;
 use crate::paths;
 use anyhow::{Context, anyhow, bail};
+use kerrlight_tomo::fit::settings::merge;
+use kerrlight_tomo::representation::Registry;
 use toml::{Table, Value};
 
 /// One fit of an experiment.
@@ -33,6 +35,8 @@ pub struct Choice {
     pub quick: bool,
     /// `key=value` for all cases.
     pub set: Vec<String>,
+    /// Representations that the program adds.
+    pub registry: Registry,
 }
 
 impl Choice {
@@ -190,22 +194,22 @@ fn settings(
         .or(experiment.fit.as_ref())
         .ok_or_else(|| anyhow!("neither the experiment nor a level names a fit"))?;
     let mut table = source.fit(path)?;
-    fit::merge(&mut table, &source.anchored(&experiment.set));
+    merge(&mut table, &source.anchored(&experiment.set));
     for level in levels {
         for key in &level.remove {
             remove(&mut table, key).with_context(|| format!("level {:?}", level.name))?;
         }
-        fit::merge(&mut table, &source.anchored(&level.set));
+        merge(&mut table, &source.anchored(&level.set));
     }
     if choice.quick {
-        fit::merge(&mut table, &source.anchored(&experiment.quick.set));
+        merge(&mut table, &source.anchored(&experiment.quick.set));
     }
     table.insert("seed".to_owned(), Value::Integer(seed as i64));
     let mut text = toml::to_string(&table).context("settings")?;
     for assignment in &choice.set {
         text = fit::assigned(&text, &paths::from_here(assignment, None)?)?;
     }
-    fit::check(&text)?;
+    fit::check(&text, &choice.registry)?;
     Ok(text)
 }
 
@@ -285,7 +289,7 @@ mod tests {
     fn exact_choices_of_the_command_line() {
         let only = vec!["what=scan".to_owned()];
         let set = vec!["training.steps=9".to_owned()];
-        let choice = Choice { seeds: Some(3), only, quick: false, set };
+        let choice = Choice { seeds: Some(3), only, set, ..Choice::default() };
         let cases = cases(&choice).unwrap();
         assert_eq!(cases.len(), 3);
         assert_eq!(table(&cases[2])["training"]["steps"].as_integer(), Some(9));

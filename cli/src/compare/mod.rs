@@ -23,6 +23,7 @@ use anyhow::{Context, bail};
 use cases::{Case, Choice};
 use clap::Args;
 use experiment::Experiment;
+use kerrlight_tomo::representation::Registry;
 use page::Page;
 use runner::{Runner, Status};
 use serde_json::{Value, json};
@@ -74,7 +75,11 @@ pub struct Failed {
 
 impl Compare {
     /// Runs an experiment.
-    pub fn run(&self, threads: Option<u16>, memory: Option<u64>) -> anyhow::Result<Answer> {
+    pub fn run(
+        &self,
+        (threads, memory): (Option<u16>, Option<u64>),
+        registry: &Registry,
+    ) -> anyhow::Result<Answer> {
         let Some(name) = &self.experiment else { return Ok(list_experiments()) };
         let before = self.against.as_deref().map(changes::read).transpose()?;
         // A folder that is called like an experiment is meant by ./name.
@@ -95,6 +100,7 @@ impl Compare {
             only: self.only.clone(),
             quick: self.quick,
             set: self.set.clone(),
+            registry: registry.clone(),
         };
         let chosen = cases::expand(&experiment, &source, &choice)?;
         ran::check(&experiment, &chosen).with_context(|| name.display().to_string())?;

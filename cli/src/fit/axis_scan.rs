@@ -1,10 +1,7 @@
 //! The scan of the whole sphere of axes with coarse linear grids, through few pixels.
 
-use super::config::{FitFile, LossKind, Nodes, Region, Scan, Screen, WidthOf};
-use super::data::{self, Measured};
 use super::failed;
 use super::linear::terms;
-use super::setup::{self, Instrument};
 use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
 use anyhow::Context;
@@ -13,7 +10,11 @@ use kerrlight_tomo::fit::linear::LinearError;
 use kerrlight_tomo::fit::scan::{
     AxisLoss, AxisProblem, AxisScan, AxisSettings, Effort, refine_axis, scan_axis,
 };
-use kerrlight_tomo::fit::{Motion, Objective};
+use kerrlight_tomo::fit::settings::{
+    AxisScan as AxisScanSettings, FitFile, LossKind, Region, Screen, WidthOf,
+};
+use kerrlight_tomo::fit::setup::{self, Instrument, Measured};
+use kerrlight_tomo::fit::{Motion, Objective, Sampling};
 use kerrlight_tomo::image::colormap::Colormap;
 use serde_json::{Value, json};
 use std::io::Cursor;
@@ -88,9 +89,9 @@ const FEWEST: usize = 32;
 /// The region with every n-th node, or panels of half as many.
 fn fewer_nodes(file: &FitFile, every: usize) -> Region {
     let nodes = match file.region.nodes {
-        Nodes::Gauss { order, split } => Nodes::Gauss { order: order.div_ceil(2), split },
-        Nodes::EqualMinoTime { per_ray } => {
-            Nodes::EqualMinoTime { per_ray: per_ray.min(FEWEST.max(per_ray / every)) }
+        Sampling::Gauss { order, split } => Sampling::Gauss { order: order.div_ceil(2), split },
+        Sampling::EqualMinoTime { per_ray } => {
+            Sampling::EqualMinoTime { per_ray: per_ray.min(FEWEST.max(per_ray / every)) }
         }
     };
     Region { nodes, ..file.region.clone() }
@@ -116,9 +117,9 @@ pub fn run(
     file: &FitFile,
     measured: &Measured,
     motion: &Motion,
-    settings: &Scan,
+    settings: &AxisScanSettings,
 ) -> anyhow::Result<Found> {
-    let Scan { directions, frames, pixels, refine, .. } = *settings;
+    let AxisScanSettings { directions, frames, pixels, refine, .. } = *settings;
     let view = View::new(file, measured, pixels)?;
     let settings = AxisSettings { directions, ..AxisSettings::default() };
     let (keeper, bar) = (Keeper::brief(STOPPED), progress::axes(directions as u64));
@@ -165,7 +166,7 @@ fn with_problem<R>(
 ) -> anyhow::Result<R> {
     let file = &view.file;
     let linear = setup::linear(file)?;
-    let chain = data::chain(&view.instrument, motion)?;
+    let chain = setup::chain(&view.instrument, motion)?;
     let count = file.screen.pixels * file.screen.pixels;
     let objective = Objective { chain, data: view.measured.terms(&file.loss, count)? };
     let all = objective.observed();

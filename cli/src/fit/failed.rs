@@ -1,8 +1,7 @@
 //! Fits that fail while they run: exit code 1.
 
-use super::config::FitFile;
-use super::unknowns;
 use kerrlight_tomo::fit::linear::LinearError;
+use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::fit::{Diverged, Objective, State, Trainer};
 
 /// What went wrong.
@@ -45,7 +44,7 @@ pub fn check(
     if let Some(found) = objective.not_finite(frames, movie) {
         return Err(Failed(named(found)).into());
     }
-    if !unknowns::is_convex(file) && movie.iter().all(|pixel| *pixel == 0.0) {
+    if !file.is_convex() && movie.iter().all(|pixel| *pixel == 0.0) {
         let data = objective.names().join(", ");
         return Err(Failed(format!(
             "what was recovered is dark, where {data} have no slope: that is no result; begin with light, e.g. with training.start.linear"

@@ -1,9 +1,6 @@
 //! What linear grids do for a fit: they are solved, and started from.
 
-use super::config::{Activation, FitFile, Kind};
 use super::failed;
-use super::penalty;
-use super::setup;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
 use anyhow::Context;
@@ -11,14 +8,10 @@ use kerrlight_tomo::dynamics::Axis;
 use kerrlight_tomo::fit::linear::{
     Coarse, Ending, LinearProblem, LinearProgress, LinearSettings, LinearSolution, Voxels, Weighted,
 };
-use kerrlight_tomo::fit::{Data, FrameTerm, Objective, State};
-use kerrlight_tomo::optimise::{Adam, AdamState};
-use kerrlight_tomo::representation::{Coordinates, Gradient, Groups, Representation, Workspace};
-use kerrlight_tomo::volume::Volume;
-use rand::{RngExt, SeedableRng};
-use rand_pcg::Pcg64;
+use kerrlight_tomo::fit::settings::{FitFile, Kind};
+use kerrlight_tomo::fit::{Data, FrameTerm, Objective, setup};
 use serde_json::{Value, json};
-use std::ops::{ControlFlow, Range};
+use std::ops::ControlFlow;
 
 /// A fit's linear problems.
 pub struct Linear<'a> {
@@ -46,7 +39,7 @@ impl Linear<'_> {
         objective.chain.weigh(axis);
         let (terms, mut priors) = (terms(&objective.data), setup::priors(linear));
         if self.file.representation.kind == Kind::LinearGrid {
-            priors.extend(penalty::priors(self.file)?);
+            priors.extend(self.file.priors()?);
         }
         let frames: Vec<usize> = objective.observed().into_iter().step_by(stride.max(1)).collect();
         let problem = LinearProblem {
@@ -145,85 +138,4 @@ pub fn outcome(file: &FitFile, lines: &[Value]) -> Option<Value> {
         "statement": linear["statement"], "ending": linear["ending"],
         "relative_gap": certificate["relative_gap"], "relative_violation": flatness["relative_violation"],
     }))
-}
-
-/// Points of a step of [`imprint`].
-const POINTS: usize = 4096;
-/// Its first rate, which falls to nothing.
-const RATE: f64 = 2e-3;
-
-/// Fits a representation to the solution of a linear problem, at random points of the region.
-pub fn imprint(
-    file: &FitFile,
-    representation: &dyn Representation<f32>,
-    emission: &[f32],
-    nodes: usize,
-    steps: u64,
-    state: &mut State<f32>,
-) -> anyhow::Result<()> {
-    let (r, region) = (file.region.r_max, setup::region(&file.region));
-    let volume = Volume::new([nodes; 3], [-r; 3], [r; 3], emission.to_vec())?;
-    if file.representation.kind == Kind::Grid {
-        read_off(file, &volume, &mut state.now.parameters);
-        return Ok(());
-    }
-    let mut random = Pcg64::seed_from_u64(file.seed ^ 0x1157_a27e);
-    let (mut memory, mut workspace) =
-        (AdamState::new(state.now.parameters.len()), Workspace::new());
-    let mut gradient = vec![0.0; state.now.parameters.len()];
-    let (starts, mut values): (Vec<usize>, _) = ((0..=POINTS).collect(), vec![0.0; POINTS]);
-    for step in 0..steps {
-        let mut columns: [Vec<f32>; 3] = Default::default();
-        let mut wanted = Vec::with_capacity(POINTS);
-        while wanted.len() < POINTS {
-            let x: [f64; 3] = [0, 1, 2].map(|_| random.random_range(-r..r));
-            if region.holds(x) {
-                columns.iter_mut().zip(x).for_each(|(column, x)| column.push(x as f32));
-                wanted.push(volume.at(x) as f32);
-            }
-        }
-        let link = |groups: Range<usize>, values: &[f32], out: &mut [f32]| {
-            let pairs = values.iter().zip(&wanted[groups]).zip(out);
-            pairs.for_each(|((e, wanted), out)| *out = 2.0 * (e - wanted) / POINTS as f32);
-        };
-        gradient.fill(0.0);
-        let [x, y, z] = &columns;
-        let zero = vec![0.0; POINTS];
-        let at = match representation.dimension() {
-            4 => Coordinates::txyz(&zero, x, y, z),
-            _ => Coordinates::xyz(x, y, z),
-        };
-        let into = Gradient { parameters: &mut gradient, coordinates: None };
-        let groups = Groups { starts: &starts, link: &link };
-        representation.eval_vjp(
-            &state.now.parameters,
-            at,
-            groups,
-            &mut values,
-            into,
-            &mut workspace,
-        );
-        let rate = RATE * (1.0 - step as f64 / steps as f64);
-        Adam::default().step(rate, &gradient, &mut memory, &mut state.now.parameters);
-        representation.project(&mut state.now.parameters);
-    }
-    Ok(())
-}
-
-/// The parameters of a grid whose nodes have these values.
-fn read_off(file: &FitFile, volume: &Volume, parameters: &mut [f32]) {
-    let (n, r) = (file.representation.nodes, file.region.r_max);
-    let at = |k: usize| -r + 2.0 * r * k as f64 / (n - 1) as f64;
-    for (k, parameter) in parameters.iter_mut().enumerate() {
-        let value = volume.at([at(k / (n * n)), at(k / n % n), at(k % n)]);
-        *parameter = match file.representation.activation {
-            // As dark and as bright as a sigmoid is at ±10.
-            Activation::Sigmoid => {
-                let held = value.clamp(4.54e-5, 1.0 - 4.54e-5);
-                (held / (1.0 - held)).ln() as f32
-            }
-            Activation::Softplus => value.max(4.54e-5).exp_m1().ln() as f32,
-            Activation::Linear => value.max(0.0) as f32,
-        };
-    }
 }

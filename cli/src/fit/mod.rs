@@ -1,39 +1,30 @@
 //! `kerrlight fit`: recovers emission from movies and visibilities.
 
+mod api;
 mod axis_scan;
-mod config;
 mod curves;
 mod data;
 mod failed;
 mod folder;
 mod init;
 mod inputs;
-mod learning;
+mod labels;
 mod linear;
-mod merge;
-mod penalty;
 mod results;
 mod run;
-mod seams;
-mod setup;
-mod truth;
-mod unknowns;
-mod visibility_file;
-mod words;
 
 use crate::answer::Answer;
 use crate::{interrupt, output, paths};
 use anyhow::{Context, bail};
+pub use api::{assigned, check, coverage, sizes, turned, velocities};
 use clap::Args;
-use config::FitFile;
 pub use failed::Failed;
 use folder::Folder;
 pub use inputs::Inputs;
-pub use merge::merge;
-pub use seams::{assigned, check, coverage, sizes, turned, velocities};
+use kerrlight_tomo::fit::settings::{FitError, FitFile};
+use kerrlight_tomo::representation::Registry;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-pub use words::representations;
 
 /// The experiment that runs without a file.
 const BUILT_IN: &str = include_str!("built_in.toml");
@@ -69,7 +60,7 @@ pub struct Fit {
 
 impl Fit {
     /// Fits.
-    pub fn run(&self) -> anyhow::Result<Answer> {
+    pub fn run(&self, registry: &Registry) -> anyhow::Result<Answer> {
         if self.stop_with_input {
             interrupt::follow_parent();
         }
@@ -80,10 +71,10 @@ impl Fit {
             let (folder, text) = Folder::open(path, self.patience())?;
             self.same(&text)?;
             let file = parse(&text).with_context(|| path.display().to_string())?;
-            let prepared = run::Prepared::new(file, near_of(&text))?;
+            let prepared = run::Prepared::new(file, &base_dir_of(&text), registry)?;
             return run::run(&prepared, &text, &folder, true);
         }
-        let (text, near) = self.settings()?;
+        let (text, base_dir) = self.settings()?;
         if self.print {
             let settings = serde_json::to_value(text.parse::<toml::Table>()?)?;
             return Ok(Answer::text(text).with("settings", settings));
@@ -93,9 +84,9 @@ impl Fit {
             Some(path) => path.clone(),
             None => free_name(),
         };
-        let (prepared, read) = output::with_reads(|| run::Prepared::new(file, near.clone()));
+        let (prepared, read) = output::with_reads(|| run::Prepared::new(file, &base_dir, registry));
         let prepared = prepared?;
-        let text = format!("{NEAR}{}\n{text}", near.display());
+        let text = format!("{BASE_DIR}{}\n{text}", base_dir.display());
         let folder = Folder::create(&folder, &text, Inputs::new(&text, read))?;
         run::run(&prepared, &text, &folder, false)
     }
@@ -111,21 +102,21 @@ impl Fit {
 
     /// The text of the settings and the folder that paths in it start from.
     fn settings(&self) -> anyhow::Result<(String, PathBuf)> {
-        let (mut text, near) = match &self.file {
+        let (mut text, base_dir) = match &self.file {
             None => (BUILT_IN.to_owned(), PathBuf::from(".")),
             Some(path) => {
-                let near = path.parent().filter(|near| *near != Path::new(""));
-                let near = near.unwrap_or(Path::new("."));
-                let near = std::path::absolute(near).with_context(|| path.display().to_string())?;
-                (output::read_text(path)?, near)
+                let folder = path.parent().filter(|folder| *folder != Path::new(""));
+                let folder = std::path::absolute(folder.unwrap_or(Path::new(".")))
+                    .with_context(|| path.display().to_string())?;
+                (output::read_text(path)?, folder)
             }
         };
         // The built-in experiment has no folder of its own.
-        let folder = self.file.is_some().then_some(near.as_path());
+        let folder = self.file.is_some().then_some(base_dir.as_path());
         for assignment in &self.set {
             text = assigned(&text, &paths::from_here(assignment, folder)?)?;
         }
-        Ok((text, near))
+        Ok((text, base_dir))
     }
 
     /// Refuses to go on with other settings than a run began with.
@@ -146,18 +137,19 @@ impl Fit {
 }
 
 /// The first line of a run's settings.
-const NEAR: &str = "# Paths start from ";
+const BASE_DIR: &str = "# Paths start from ";
 
 /// The folder that paths in a run's settings start from.
-fn near_of(text: &str) -> PathBuf {
+fn base_dir_of(text: &str) -> PathBuf {
     let first = text.lines().next().unwrap_or_default();
-    PathBuf::from(first.strip_prefix(NEAR).unwrap_or("."))
+    PathBuf::from(first.strip_prefix(BASE_DIR).unwrap_or("."))
 }
 
 fn parse(text: &str) -> anyhow::Result<FitFile> {
-    let file = toml::from_str(text).map_err(|error| init::explained(&error))?;
-    config::check_ranges(text)?;
-    Ok(file)
+    FitFile::parse(text).map_err(|error| match error {
+        FitError::Syntax(text) => init::explained(&text),
+        other => other.into(),
+    })
 }
 
 /// A folder that does not exist yet.

@@ -1,48 +1,45 @@
 //! The run: steps, log, checkpoints, results.
 
 use super::axis_scan;
-use super::config::{AxisSearch, FitFile, Kind, LossKind, Start};
-use super::data::{self, Measured};
+use super::data;
 use super::failed;
 use super::folder::{self, Folder};
-use super::learning;
+use super::labels;
 use super::linear::{self, Linear};
 use super::results::{self, Estimate};
-use super::setup::{self, Instrument};
-use super::unknowns;
-use super::words;
 use crate::answer::Answer;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
 use anyhow::{Context, bail};
-use kerrlight_tomo::fit::{
-    BatchSize, Loss, Motion, Objective, Outcome, State, Trainer, checkpoint,
-};
-use kerrlight_tomo::memory;
+use kerrlight_tomo::fit::settings::{AxisSearch, FitFile, Kind, Start};
+use kerrlight_tomo::fit::setup::{self, Instrument, Measured};
+use kerrlight_tomo::fit::{Loss, Motion, Objective, Outcome, State, Trainer, checkpoint};
+use kerrlight_tomo::representation::Registry;
 use kerrlight_tomo::volume::Volume;
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// The page that shows what was found.
 const REPORT: &str = "report.html";
 
 /// A fit with its data: all that can be found wrong is, before anything is written.
-pub struct Prepared {
+pub struct Prepared<'a> {
     file: FitFile,
+    registry: &'a Registry,
     instrument: Instrument,
     measured: Measured,
     motion: Motion,
 }
 
-impl Prepared {
-    /// Checks settings, traces rays, simulates or reads data; paths start from `near`.
-    pub fn new(file: FitFile, near: PathBuf) -> anyhow::Result<Self> {
-        check(&file)?;
+impl<'a> Prepared<'a> {
+    /// Checks settings, traces rays, simulates or reads data; relative paths start from `base_dir`.
+    pub fn new(file: FitFile, base_dir: &Path, registry: &'a Registry) -> anyhow::Result<Self> {
+        setup::check(&file, registry)?;
         let instrument = Instrument::new(&file)?;
-        let measured = data::measure(&file, &instrument, &near)?;
+        let measured = data::measure(&file, &instrument, base_dir)?;
         let motion = setup::motion(&file, measured.times.clone())?;
-        let prepared = Self { file, instrument, measured, motion };
+        let prepared = Self { file, registry, instrument, measured, motion };
         let seen = prepared.objective()?.observed().len();
         if matches!(prepared.file.axis, AxisSearch::Scan(_)) && seen < 2 {
             bail!("axis.scan needs frames at 2 times or more: a single one tells no axes apart");
@@ -53,60 +50,33 @@ impl Prepared {
     fn objective(&self) -> anyhow::Result<Objective<f32>> {
         let pixels = self.file.screen.pixels * self.file.screen.pixels;
         let data = self.measured.terms(&self.file.loss, pixels)?;
-        Ok(Objective { chain: data::chain(&self.instrument, &self.motion)?, data })
+        Ok(Objective { chain: setup::chain(&self.instrument, &self.motion)?, data })
     }
-}
-
-/// What can be told of settings without tracing rays.
-pub fn check(file: &FitFile) -> anyhow::Result<()> {
-    let (_, axis_rate) = setup::axis(file)?;
-    let parameters = learning::representation(file)?.parameters();
-    let what = || format!("{parameters} parameters of the representation");
-    memory::afford(what, memory::parameters(parameters as f64))?;
-    if let Start::Linear { nodes, .. } = file.training.start {
-        let what = || format!("training.start.linear.nodes = {nodes}: a grid");
-        memory::afford(what, memory::parameters((nodes as f64).powi(3)))?;
-    }
-    unknowns::check(file)?;
-    let training = learning::training(file, axis_rate)?;
-    let images_only = file.loss.iter().all(|loss| loss.data == LossKind::Image);
-    if matches!(training.batch, BatchSize::Pixels(_)) && !images_only {
-        bail!("training.batch: pixels are for images alone; take frames = N");
-    }
-    if file.representation.kind == Kind::LinearGrid || file.training.start != Start::Drawn {
-        setup::linear(file)?;
-    }
-    if !(2..=512).contains(&file.output.nodes) {
-        bail!("output.nodes = {} is not allowed: 2 to 512", file.output.nodes);
-    }
-    let nodes = file.output.nodes;
-    memory::afford(|| format!("output.nodes = {nodes}: volumes"), memory::volume(nodes as f64))?;
-    Ok(())
 }
 
 /// Runs a fit from its start or its last checkpoint to its end.
 pub fn run(
-    prepared: &Prepared,
+    prepared: &Prepared<'_>,
     text: &str,
     folder: &Folder,
     resume: bool,
 ) -> anyhow::Result<Answer> {
-    let Prepared { file, instrument, measured, motion } = prepared;
+    let Prepared { file, registry, instrument, measured, motion } = prepared;
     let begun = Instant::now();
     let objective = prepared.objective()?;
-    let representation = learning::representation(file)?;
+    let representation = setup::representation(file, registry)?;
     let (axis, axis_rate) = setup::axis(file)?;
-    let training = learning::training(file, axis_rate)?;
+    let training = setup::training(file, axis_rate)?;
     let mut state = State::new(&*representation, axis, &training);
     let trainer = Trainer::new(objective, &*representation, training);
     let truth = measured.truth.as_ref();
     let true_volume = truth.map(|truth| results::true_volume(file, truth)).transpose()?;
     let mut run = Run { file, text, folder, measured, true_volume, trainer, begun };
     eprintln!("{}", run.describe(instrument));
-    if let Some(note) = learning::caution(file) {
+    if let Some(note) = setup::caution(file) {
         eprintln!("note: {note}");
     }
-    for note in unknowns::stated(file) {
+    for note in file.unknowns() {
         eprintln!("note: {note}");
     }
     let checkpoint = if resume { folder.checkpoint()? } else { None };
@@ -179,7 +149,7 @@ impl Run<'_> {
             chain.frames(),
             chain.rays(),
             instrument.lines.points(),
-            words::representation(&self.file.representation.kind),
+            labels::representation(&self.file.representation.kind),
             self.trainer.representation.parameters(),
         )
     }
@@ -205,7 +175,7 @@ impl Run<'_> {
         } else if let Start::Linear { nodes, stride, steps } = self.file.training.start {
             let solution = linear.solve(&mut trainer.objective, axis, nodes, stride)?;
             self.folder.log(&linear::solved(&solution))?;
-            linear::imprint(
+            setup::imprint(
                 self.file,
                 trainer.representation,
                 &solution.emission,

@@ -5,35 +5,13 @@ use anyhow::{Context, anyhow, bail};
 use clap::{Args, ValueEnum};
 use kerrlight_tomo::interferometry::array::{self, Array};
 use kerrlight_tomo::interferometry::earth::{Frame, SourcePosition, Ut1};
-use kerrlight_tomo::interferometry::observation::Observation;
-use kerrlight_tomo::interferometry::schedule::{self, Clock, Schedule, Setup};
-use kerrlight_tomo::memory;
+use kerrlight_tomo::interferometry::schedule::{Clock, Schedule, Setup};
+use kerrlight_tomo::interferometry::source::Source;
 use std::path::Path;
-
-/// A source by name or by place.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Source {
-    /// Its name.
-    pub name: String,
-    /// Where it is.
-    pub position: SourcePosition,
-}
 
 /// `sgra`, `m87`, or right ascension in hours and declination in degrees.
 pub fn source(text: &str) -> Result<Source, String> {
-    let named = |name: &str, position| Ok(Source { name: name.to_owned(), position });
-    match text.to_ascii_lowercase().as_str() {
-        "sgra" | "sgra*" => return named("SGRA", SourcePosition::SGR_A),
-        "m87" | "m87*" => return named("M87", SourcePosition::M87),
-        _ => {}
-    }
-    let (ra, dec) = text.split_once(',').ok_or("expected sgra, m87 or RA_HOURS,DEC_DEGREES")?;
-    let number = |cell: &str, name: &str| {
-        cell.trim().parse::<f64>().map_err(|_| format!("{name} `{cell}` is not a number"))
-    };
-    let (ra, dec) = (number(ra, "RA")?, number(dec, "Dec")?);
-    let position = SourcePosition::new(ra, dec).map_err(|error| error.to_string())?;
-    named(&format!("{ra}:{dec}"), position)
+    text.parse()
 }
 
 /// Two numbers as `a-b`; each may have a sign.
@@ -64,26 +42,6 @@ pub fn array_near(name: &str, folder: &Path) -> anyhow::Result<Array> {
         bail!("array {name}: neither {} nor a file ({shown})", array::BUILT_IN.join(" nor "));
     }
     array::parse(&output::read_text(&path)?).with_context(|| format!("array {shown}"))
-}
-
-/// Scans of the trial by which the rows of many are estimated.
-const TRIAL: u32 = 256;
-
-/// Rows of all scans, if there is memory for them.
-pub fn observe(
-    array: &Array,
-    source: SourcePosition,
-    schedule: &Schedule,
-    setup: &Setup,
-) -> anyhow::Result<Observation> {
-    if schedule.scans > TRIAL {
-        let trial = Schedule { scans: TRIAL, ..*schedule };
-        let few = schedule::observe(array, source, &trial, setup)?.rows.len() as f64;
-        let rows = few * f64::from(schedule.scans) / f64::from(TRIAL);
-        let what = || format!("about {rows:.0} visibilities of {} scans", schedule.scans);
-        memory::afford(what, memory::visibilities(rows))?;
-    }
-    Ok(schedule::observe(array, source, schedule, setup)?)
 }
 
 /// How the Earth's attitude is taken.
@@ -205,13 +163,5 @@ mod tests {
         assert_eq!(range("-2--1"), Ok([-2.0, -1.0]));
         assert_eq!(range("1e-3-2"), Ok([1e-3, 2.0]));
         assert!(range("4").is_err() && range("a-b").is_err() && range("1-inf").is_err());
-    }
-
-    #[test]
-    fn exact_sources() {
-        assert_eq!(source("SgrA").unwrap().position, SourcePosition::SGR_A);
-        let place = source("12.5,-29.25").unwrap();
-        assert_eq!((place.position.ra_hours, place.position.dec_deg), (12.5, -29.25));
-        assert!(source("venus").is_err() && source("25,0").is_err());
     }
 }

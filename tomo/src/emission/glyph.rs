@@ -3,6 +3,7 @@
 use crate::image::canvas::coverage;
 use kerrlight_geodesic::OutOfRange;
 use kerrlight_geodesic::vector::{cross, dot, rotate};
+use serde::{Deserialize, Serialize};
 
 /// Pixels of a letter's height.
 const RESOLUTION: usize = 96;
@@ -27,7 +28,8 @@ pub struct Glyph {
 }
 
 /// What a letter looks like.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct GlyphShape {
     /// Which letter.
     pub letter: char,

@@ -13,6 +13,8 @@ mod occupancy;
 mod penalties;
 mod regulariser;
 pub mod scan;
+pub mod settings;
+pub mod setup;
 mod shift;
 mod sightlines;
 mod steps;

@@ -4,6 +4,7 @@
 use kerrlight_geodesic::simd::{NodeRequest, Nodes, PanelRule, RayNodes, Samples};
 use kerrlight_geodesic::vector::{distance, norm};
 use kerrlight_geodesic::{Kerr, Observer, OutOfRange, Quantities};
+use serde::{Deserialize, Serialize};
 
 /// Where emission is looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,7 +44,8 @@ impl Region {
 }
 
 /// Where nodes lie on a ray.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Sampling {
     /// Gauss–Legendre panels in Mino time inside the sphere r_max, weights Σ dτ: the integral over
     /// the affine parameter.

@@ -9,9 +9,11 @@ use crate::dynamics::Axis;
 use crate::optimise::{Adam, AdamState, Lbfgs, LbfgsState, Polynomial};
 use crate::representation::Representation;
 use crate::simd::Float;
+use serde::{Deserialize, Serialize};
 
 /// What a step looks at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum BatchSize {
     /// That many random (ray, frame) pairs; for images alone.
     Pixels(usize),

@@ -19,6 +19,7 @@ pub mod operator;
 pub mod products;
 pub mod schedule;
 pub mod simulate;
+pub mod source;
 
 /// Complex number of double precision, as visibilities are kept.
 pub type Complex64 = num_complex::Complex<f64>;

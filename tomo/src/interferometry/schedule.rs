@@ -4,6 +4,7 @@ use super::Complex64;
 use super::array::{Array, ArrayError};
 use super::earth::{EarthError, Frame, Moment, SourcePosition, Ut1, View, hours_utc_of_gmst};
 use super::observation::{Basis, Observation, Row};
+use crate::memory::{self, TooLarge};
 use crate::units::SPEED_OF_LIGHT;
 
 /// What hours are hours of.
@@ -67,6 +68,9 @@ pub enum ScheduleError {
         /// What would be allowed.
         allowed: &'static str,
     },
+    /// There is no memory for the rows.
+    #[error(transparent)]
+    Memory(#[from] TooLarge),
     /// Sidereal times with precession.
     #[error("hours of GMST go with the catalogue frame only")]
     GmstOfDate,
@@ -242,6 +246,29 @@ fn scan(
             });
         }
     }
+}
+
+/// Scans of the trial by which the rows of many are estimated.
+const TRIAL: u32 = 256;
+
+/// The same as [`observe`], if there is memory for the rows of all scans.
+///
+/// # Errors
+/// As [`observe`], or if there is no memory for the rows.
+pub fn observe_affordable(
+    array: &Array,
+    source: SourcePosition,
+    schedule: &Schedule,
+    setup: &Setup,
+) -> Result<Observation, ScheduleError> {
+    if schedule.scans > TRIAL {
+        let trial = Schedule { scans: TRIAL, ..*schedule };
+        let few = observe(array, source, &trial, setup)?.rows.len() as f64;
+        let rows = few * f64::from(schedule.scans) / f64::from(TRIAL);
+        let what = || format!("about {rows:.0} visibilities of {} scans", schedule.scans);
+        memory::afford(what, memory::visibilities(rows))?;
+    }
+    observe(array, source, schedule, setup)
 }
 
 #[cfg(test)]

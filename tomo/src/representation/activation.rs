@@ -1,9 +1,11 @@
 //! From an unbounded number to an emissivity.
 
 use crate::simd::{Float, Lanes, math};
+use serde::{Deserialize, Serialize};
 
 /// The last function of a representation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Activation {
     /// 1/(1 + e⁻ˣ): between 0 and 1.
     Sigmoid,

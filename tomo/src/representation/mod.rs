@@ -11,12 +11,14 @@ pub mod conformance;
 mod features;
 mod grid;
 mod network;
+mod registry;
 mod workspace;
 
 pub use activation::Activation;
 pub use features::{FeatureGrid, FeatureGridSettings};
 pub use grid::{Grid, GridSettings};
 pub use network::{Initialisation, Network, NetworkSettings};
+pub use registry::{BuildError, BuildRepresentation, OwnError, OwnSettings, Registry};
 pub use workspace::Workspace;
 
 pub use crate::points::{Coordinates, CoordinatesMut};

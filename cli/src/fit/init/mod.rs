@@ -20,11 +20,10 @@ use keys::{KEYS, TABLES};
 use std::path::{Path, PathBuf};
 
 /// An error in settings; of what is missing, with what to write.
-pub fn explained(error: &toml::de::Error) -> anyhow::Error {
-    let text = error.to_string();
+pub fn explained(text: &str) -> anyhow::Error {
     let missing = text.split_once("missing field `").and_then(|(_, rest)| rest.split('`').next());
     let advice = missing.map_or(String::new(), advice);
-    anyhow::anyhow!("{}{advice}", text.trim_end())
+    anyhow::anyhow!("{text}{advice}")
 }
 
 fn advice(missing: &str) -> String {

@@ -1,9 +1,8 @@
 //! The recovered and the true emission on the nodes of a box, and what one is worth beside the other.
 
-use crate::fit::config::FitFile;
-use crate::fit::setup;
-use crate::fit::truth::Truth;
 use kerrlight_geodesic::vector::distance;
+use kerrlight_tomo::fit::settings::FitFile;
+use kerrlight_tomo::fit::setup::Truth;
 use kerrlight_tomo::fit::{State, Trainer};
 use kerrlight_tomo::volume::Volume;
 use kerrlight_tomo::volume::metrics::{self, Comparison};
@@ -36,7 +35,7 @@ pub fn recovered(
     trainer: &mut Trainer<'_, f32>,
     state: &State<f32>,
 ) -> anyhow::Result<Volume> {
-    let region = setup::region(&file.region);
+    let region = file.region.limits();
     on_nodes(file, trainer, state, &|x| region.holds(x))
 }
 
@@ -47,7 +46,7 @@ pub fn carried(
     trainer: &mut Trainer<'_, f32>,
     state: &State<f32>,
 ) -> anyhow::Result<Volume> {
-    let (region, axis) = (setup::region(&file.region), state.now.axis.vector());
+    let (region, axis) = (file.region.limits(), state.now.axis.vector());
     let nodes = Box3::new(file);
     // The diagonal of a cell: values between nodes of the region need their neighbours.
     let margin = 2.0 * nodes.half / (nodes.nodes[0] - 1) as f64 * 3f64.sqrt();

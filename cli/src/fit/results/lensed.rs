@@ -2,7 +2,7 @@
 //! along photon rings as these take.
 
 use super::Estimate;
-use crate::fit::setup::{self, Instrument};
+use kerrlight_tomo::fit::setup::{self, Instrument};
 use kerrlight_tomo::fit::{
     Batch, Chain, Field, Motion, Sampling, SightlineRequest, Sightlines, State, Trainer,
 };
@@ -82,7 +82,7 @@ impl Estimate<'_> {
     fn chain(&self, rays: &Rays, motion: &Motion) -> anyhow::Result<Chain<f32>> {
         let Instrument { hole, redshift, .. } = self.instrument;
         let request = SightlineRequest {
-            region: setup::region(&self.file.region),
+            region: self.file.region.limits(),
             sampling: Sampling::Gauss { order: 6, split: 1 },
             delay: self.file.effects.slow_light,
             momentum: redshift.is_some(),

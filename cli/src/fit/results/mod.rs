@@ -11,13 +11,12 @@ mod verdict;
 
 pub use fields::{compare, true_volume};
 
-use super::config::FitFile;
-use super::data::Measured;
 use super::failed;
 use super::folder::Folder;
-use super::setup::{self, Instrument};
 use crate::checksum::sealed;
 use crate::volume_files;
+use kerrlight_tomo::fit::settings::FitFile;
+use kerrlight_tomo::fit::setup::{self, Instrument, Measured};
 use kerrlight_tomo::fit::{Loss, Motion, State, Trainer};
 use kerrlight_tomo::units::MICROARCSECOND;
 use kerrlight_tomo::volume::{Volume, VolumeFile, vti};

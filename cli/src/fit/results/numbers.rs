@@ -1,7 +1,7 @@
 //! What was found, in numbers.
 
 use super::{Estimate, Found};
-use crate::fit::{linear, unknowns};
+use crate::fit::linear;
 use crate::report;
 use crate::usage::usage;
 use kerrlight_tomo::fit::{State, Trainer};
@@ -61,7 +61,7 @@ impl Estimate<'_> {
         if let Some(linear) = linear::outcome(self.file, &self.folder.lines()?) {
             results["linear"] = linear;
         }
-        let unknown = unknowns::stated(self.file);
+        let unknown = self.file.unknowns();
         if !unknown.is_empty() {
             results["unknown"] = json!(unknown);
         }

@@ -3,12 +3,12 @@
 use super::lensed::{self, Still};
 use super::numbers::outcomes;
 use super::{Estimate, Found};
-use crate::fit::config::AxisSearch;
 use crate::fit::curves::{loss_plot, psnr_plot};
-use crate::fit::words;
+use crate::fit::labels;
 use crate::output;
 use crate::report::{self, LinePlot, Report, View3d};
 use anyhow::Context;
+use kerrlight_tomo::fit::settings::AxisSearch;
 use kerrlight_tomo::volume::Shown;
 use kerrlight_tomo::volume::projection::Surroundings;
 use kerrlight_tomo::volume::slices::Through;
@@ -134,7 +134,7 @@ impl Estimate<'_> {
 
     fn summary(&self, results: &Value) -> Vec<String> {
         let file = self.file;
-        let data: Vec<&str> = file.loss.iter().map(|l| words::data(l.data)).collect();
+        let data: Vec<&str> = file.loss.iter().map(|l| l.data.label()).collect();
         let number = |key: &str| results[key].as_f64();
         let mut lines = vec![format!(
             "Emission around a black hole of spin {}, seen at {}° from its spin axis, was recovered from {} frames of {}. It is described by {}.",
@@ -142,7 +142,7 @@ impl Estimate<'_> {
             file.observer.inclination_deg,
             self.measured.times.len(),
             data.join(", "),
-            words::described(file)
+            labels::described(file)
         )];
         if let Some(statement) = results["linear"]["statement"].as_str() {
             lines.push(format!("The linear grid's solution: {statement}."));

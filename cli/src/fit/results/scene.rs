@@ -1,10 +1,9 @@
 //! A scene of what was recovered, with its motion: `kerrlight render` and `kerrlight movie` show it.
 
 use super::{Estimate, fields};
-use crate::fit::config::Nodes;
-use crate::fit::setup;
 use crate::volume_files;
 use anyhow::Context;
+use kerrlight_tomo::fit::{Sampling, setup};
 use kerrlight_tomo::fit::{State, Trainer};
 use kerrlight_tomo::scene::{Scene, VolumeRegion};
 use kerrlight_tomo::volume::VolumeFile;
@@ -76,10 +75,10 @@ impl Estimate<'_> {
         }
         text += "# Emission is linear between the nodes of the volume (output.nodes of the fit).\n";
         text += match self.file.region.nodes {
-            Nodes::Gauss { .. } => {
+            Sampling::Gauss { .. } => {
                 "# Rays are integrated adaptively: where the picture differs from movie.npz, region.nodes of the fit are too few.\n"
             }
-            Nodes::EqualMinoTime { .. } => {
+            Sampling::EqualMinoTime { .. } => {
                 "# The fit's pixels are sums over chords (region.nodes = equal-mino-time), this scene's are integrals.\n"
             }
         };

@@ -5,9 +5,9 @@ mod expected;
 mod tests;
 mod words;
 
-use crate::fit::config::{DataFiles, FitFile, Loss, LossKind, Noise};
-use crate::fit::data::Measured;
 use kerrlight_tomo::fit::Objective;
+use kerrlight_tomo::fit::settings::{DataFiles, FitFile, Loss, LossKind, Noise};
+use kerrlight_tomo::fit::setup::Measured;
 use kerrlight_tomo::fit::verdict::{Errors, Outcome, Tested, Verdict, ZeroSpacing, judge, worst};
 use kerrlight_tomo::interferometry::products::debiased_amplitude;
 use serde_json::{Value, json};

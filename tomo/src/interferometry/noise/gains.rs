@@ -6,10 +6,12 @@ use crate::interferometry::observation::Observation;
 use core::f64::consts::PI;
 use rand::RngExt;
 use rand_distr::StandardNormal;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Random gains: V₁₂ becomes g₁ ḡ₂ V₁₂, the same for all hands.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct GainErrors {
     /// Standard deviation of ln|g|, one number a station for the whole observation.
     pub constant_amplitude: f64,

@@ -2,7 +2,7 @@
 //! low signal to noise, closure quantities more so. Noise is drawn anew about the model, and data are made of that.
 
 use super::Evidence;
-use crate::fit::config::{Loss, LossKind};
+use kerrlight_tomo::fit::settings::{Loss, LossKind};
 use kerrlight_tomo::fit::verdict::Statistics;
 use kerrlight_tomo::interferometry::data_terms::{AmplitudeTerm, ClosureTerm, DataTerm};
 use kerrlight_tomo::interferometry::noise::add_thermal_noise;

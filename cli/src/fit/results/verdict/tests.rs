@@ -1,8 +1,8 @@
 //! The verdict of the truth itself, through all that a fit's data pass through.
 
 use super::*;
-use crate::fit::setup::{self, Instrument};
 use crate::fit::{assigned, data, parse};
+use kerrlight_tomo::fit::setup::{self, Instrument};
 use std::path::Path;
 
 /// The verdict of the simulated movie times `scale`, of the built-in experiment with changes.
@@ -17,7 +17,7 @@ fn of_truth(changes: &[&str], scale: f32) -> Judged {
     let measured = data::measure(&file, &instrument, Path::new(".")).unwrap();
     let motion = setup::motion(&file, measured.times.clone()).unwrap();
     let data = measured.terms(&file.loss, 400).unwrap();
-    let objective = Objective { chain: data::chain(&instrument, &motion).unwrap(), data };
+    let objective = Objective { chain: setup::chain(&instrument, &motion).unwrap(), data };
     let movie: Vec<f32> =
         measured.movie.as_ref().unwrap().iter().map(|x| scale * *x as f32).collect();
     Evidence { file: &file, measured: &measured }.judged(&objective, &movie).unwrap()

@@ -1,16 +1,14 @@
 //! Settings of penalties on the emission, and what they mean for each representation.
 
-use super::config::{FitFile, Kind};
-use super::setup;
-use anyhow::{Context, anyhow, bail};
-use kerrlight_tomo::fit::linear::Prior;
-use kerrlight_tomo::fit::{Penalties, Probe, Regulariser};
+use super::{FitError, FitFile, Kind, Within, refuse};
+use crate::fit::linear::Prior;
+use crate::fit::{Penalties, Probe, Regulariser};
 use serde::{Deserialize, Serialize};
 
 /// A penalty.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Setting {
+pub struct PenaltySettings {
     /// Which: the other numbers are those of its kind.
     pub kind: PenaltyKind,
     /// Factor on its integral over the region.
@@ -43,16 +41,16 @@ pub enum PenaltyKind {
 /// Where penalties look at a network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ProbeSetting {
+pub struct ProbeSettings {
     /// Nodes along each axis of the cube that holds the region.
     pub nodes: usize,
 }
 
-impl Setting {
-    fn prior(&self) -> anyhow::Result<Prior> {
+impl PenaltySettings {
+    fn prior(&self) -> Result<Prior, FitError> {
         let Self { kind, weight, epsilon, level, floor } = *self;
         if !(weight > 0.0 && weight.is_finite()) {
-            bail!("weight = {weight} is not allowed: above 0");
+            return Err(FitError::range("weight", weight, "above 0"));
         }
         let given = [("epsilon", epsilon), ("level", level), ("floor", floor)];
         let (name, needed): (_, &[&str]) = match kind {
@@ -62,14 +60,17 @@ impl Setting {
             PenaltyKind::Entropy => ("entropy", &["level", "floor"]),
         };
         if let Some((other, _)) = given.iter().find(|(k, x)| x.is_some() && !needed.contains(k)) {
-            bail!("{other} is not for {name}");
+            refuse!("{other} is not for {name}");
         }
         let get = |key: &str| {
             let found = given.iter().find(|(name, _)| *name == key).and_then(|(_, value)| *value);
-            found.ok_or_else(|| anyhow!(
-                "{key} is missing: {name} needs it; give `{key} = …` beside `kind = \"{name}\"`: {}",
-                meaning(key)
-            ))
+            found.ok_or_else(|| {
+                let why = format!(
+                    "{name} needs it; give `{key} = …` beside `kind = \"{name}\"`: {}",
+                    meaning(key)
+                );
+                FitError::missing(key, why)
+            })
         };
         let regulariser = match kind {
             PenaltyKind::TotalVariation => Regulariser::TotalVariation { epsilon: get("epsilon")? },
@@ -92,36 +93,42 @@ fn meaning(key: &str) -> &'static str {
     }
 }
 
-/// Penalties that are asked for, with their weights.
-pub fn priors(file: &FitFile) -> anyhow::Result<Vec<Prior>> {
-    let one = |(k, setting): (usize, &Setting)| {
-        let same = |other: &Setting| other.kind == setting.kind;
-        if let Some(first) = file.regulariser[..k].iter().position(same) {
-            bail!("regulariser {k}: it has the kind of regulariser {first}, once is allowed");
-        }
-        setting.prior().with_context(|| format!("regulariser {k}"))
-    };
-    file.regulariser.iter().enumerate().map(one).collect()
-}
+impl FitFile {
+    /// The penalties with their weights.
+    ///
+    /// # Errors
+    /// If a kind occurs twice, or a number is missing or out of range.
+    pub fn priors(&self) -> Result<Vec<Prior>, FitError> {
+        let one = |(k, setting): (usize, &PenaltySettings)| {
+            let same = |other: &PenaltySettings| other.kind == setting.kind;
+            if let Some(first) = self.regulariser[..k].iter().position(same) {
+                refuse!("regulariser {k}: it has the kind of regulariser {first}, once is allowed");
+            }
+            setting.prior().within(format!("regulariser {k}"))
+        };
+        self.regulariser.iter().enumerate().map(one).collect()
+    }
 
-/// Penalties of a representation that is learnt; none of them costs nothing.
-pub fn penalties(file: &FitFile) -> anyhow::Result<Option<Penalties>> {
-    let priors = priors(file)?;
-    if let Some(ProbeSetting { nodes }) = file.probe
-        && !(4..=256).contains(&nodes)
-    {
-        bail!("probe.nodes = {nodes} is not allowed: 4 to 256");
+    /// Penalties of a representation that is learnt; `None` where there are none.
+    ///
+    /// # Errors
+    /// As [`FitFile::priors`], or if a network has no `probe`.
+    pub fn penalties(&self) -> Result<Option<Penalties>, FitError> {
+        let priors = self.priors()?;
+        if priors.is_empty() {
+            return Ok(None);
+        }
+        let probe = match (&self.representation.kind, self.probe) {
+            (Kind::Grid | Kind::LinearGrid, _) => Probe::Fixed { nodes: self.representation.nodes },
+            (_, Some(ProbeSettings { nodes })) => Probe::Moved { nodes },
+            (..) => {
+                return Err(FitError::missing(
+                    "probe.nodes",
+                    "regularisers look at a network at nodes of a grid; add a table [probe] with `nodes = 32`, nodes \
+                     along each axis, 4 to 256",
+                ));
+            }
+        };
+        Ok(Some(Penalties { priors, probe, region: self.region.limits() }))
     }
-    if priors.is_empty() {
-        return Ok(None);
-    }
-    let probe = match (&file.representation.kind, file.probe) {
-        (Kind::Grid | Kind::LinearGrid, _) => Probe::Fixed { nodes: file.representation.nodes },
-        (_, Some(ProbeSetting { nodes })) => Probe::Moved { nodes },
-        (..) => bail!(
-            "probe.nodes is missing: regularisers look at a network at nodes of a grid; add a table [probe] with \
-             `nodes = 32`, nodes along each axis, 4 to 256"
-        ),
-    };
-    Ok(Some(Penalties { priors, probe, region: setup::region(&file.region) }))
 }

@@ -1,5 +1,7 @@
 //! What is simulated, and the array that sees it.
 
+use crate::emission::glyph::GlyphShape;
+use crate::interferometry::noise::GainErrors;
 use serde::{Deserialize, Serialize};
 
 /// Frames of a movie.
@@ -23,25 +25,7 @@ pub struct Truth {
     pub spot: Vec<Spot>,
     /// Letters and digits at the reference time, flat in the plane across the axis.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub glyph: Vec<Glyph>,
-}
-
-/// A letter that is extruded along the axis, its upper side away from the hole.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Glyph {
-    /// Which.
-    pub letter: char,
-    /// Its middle, M.
-    pub center: [f64; 3],
-    /// From its lower to its upper edge, M.
-    pub height: f64,
-    /// Along the axis, M.
-    pub thickness: f64,
-    /// Standard deviation of its blurred edges, M.
-    pub softness: f64,
-    /// Emission in the middle of broad strokes.
-    pub amplitude: f64,
+    pub glyph: Vec<GlyphShape>,
 }
 
 /// A Gaussian spot.
@@ -89,7 +73,7 @@ pub struct Observation {
     pub noise: Noise,
     /// Errors of station gains, none unless asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub gains: Option<Gains>,
+    pub gains: Option<GainErrors>,
     /// Part of each amplitude that the fit adds to its error in quadrature, none unless asked for: for errors of gains,
     /// or where errors are so small that a loss has minima everywhere.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -106,16 +90,4 @@ pub enum Noise {
     None,
     /// Thermal.
     Thermal,
-}
-
-/// Random errors of station gains.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Gains {
-    /// Standard deviation of ln |g|, one number a station for the whole observation.
-    pub constant_amplitude: f64,
-    /// Standard deviation of ln |g|, another number for every scan.
-    pub scan_amplitude: f64,
-    /// Whether phases are uniform on the circle, for every station and scan.
-    pub random_phases: bool,
 }

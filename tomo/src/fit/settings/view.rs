@@ -1,5 +1,6 @@
 //! The hole, the view of it, what happens to light, and how matter turns.
 
+use crate::fit::{Region as Limits, Sampling};
 use serde::{Deserialize, Serialize};
 
 /// The hole.
@@ -66,25 +67,15 @@ pub struct Region {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub z_width: Option<f64>,
     /// Nodes on rays.
-    pub nodes: Nodes,
+    pub nodes: Sampling,
 }
 
-/// Nodes on rays.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Nodes {
-    /// Gauss–Legendre panels in Mino time inside r_max.
-    Gauss {
-        /// Nodes of a panel.
-        order: usize,
-        /// Cuts of the coarsest panels.
-        split: u32,
-    },
-    /// Equidistant in Mino time with chords as weights, as BH-NeRF has them.
-    EqualMinoTime {
-        /// Nodes of a ray.
-        per_ray: usize,
-    },
+impl Region {
+    /// Its limits; without `z_width` there is none of |z|.
+    pub fn limits(&self) -> Limits {
+        let z_width = self.z_width.unwrap_or(f64::INFINITY);
+        Limits { r_min: self.r_min, r_max: self.r_max, z_width }
+    }
 }
 
 /// What happens to light.

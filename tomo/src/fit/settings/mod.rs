@@ -1,20 +1,32 @@
-//! What a fit's file may say. Numbers that decide the result have no default.
+//! Settings of a fit: what is assumed, which data are compared with the model, and how emission is recovered.
+//!
+//! They are a TOML text; [`FitFile::parse`] checks every key, type and range. Numbers that decide the result have no
+//! default.
 
 mod data;
+mod error;
+mod penalties;
 mod ranges;
 mod recovery;
 mod simulation;
+mod unknowns;
 mod view;
+mod world;
 
-pub use data::*;
-pub use ranges::check as check_ranges;
-pub use recovery::*;
-pub use simulation::*;
-pub use view::*;
+pub use data::{DataFiles, Loss, LossKind};
+pub use error::FitError;
+pub(crate) use error::{Within, refuse};
+pub use penalties::{PenaltyKind, PenaltySettings, ProbeSettings};
+pub use recovery::{
+    AxisScan, AxisSearch, Kind, Linear, Occupancy, Optimiser, Representation, Start, Training,
+};
+pub use simulation::{Movie, Noise, Observation, Spot, Truth};
+pub use view::{Absorption, Effects, Hole, Motion, Observer, Region, Screen, Velocity, WidthOf};
+pub use world::merge;
 
 use serde::{Deserialize, Serialize};
 
-/// A fit.
+/// The settings of a fit. Lengths and times in M = GM/c² unless a name says otherwise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FitFile {
@@ -55,10 +67,10 @@ pub struct FitFile {
     pub loss: Vec<Loss>,
     /// Penalties on the emission beside the data; none unless asked.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub regulariser: Vec<super::penalty::Setting>,
+    pub regulariser: Vec<PenaltySettings>,
     /// Where regularisers look at a network; a grid has nodes of its own.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub probe: Option<super::penalty::ProbeSetting>,
+    pub probe: Option<ProbeSettings>,
     /// What is recovered.
     pub representation: Representation,
     /// How.
@@ -70,6 +82,27 @@ pub struct FitFile {
     pub axis: AxisSearch,
     /// The recovered volume.
     pub output: Output,
+}
+
+impl FitFile {
+    /// The settings in a TOML text.
+    ///
+    /// # Errors
+    /// On syntax, unknown or missing keys, wrong types and numbers out of range: with the line, the key and what is
+    /// allowed.
+    ///
+    /// # Examples
+    /// ```
+    /// # use kerrlight_tomo::fit::settings::FitFile;
+    /// let error = FitFile::parse("title = \"A flare\"\nseed = 1").unwrap_err();
+    /// assert!(error.to_string().contains("missing field `hole`"));
+    /// ```
+    pub fn parse(text: &str) -> Result<Self, FitError> {
+        let file = toml::from_str(text)
+            .map_err(|error| FitError::Syntax(error.to_string().trim_end().to_owned()))?;
+        ranges::check(text)?;
+        Ok(file)
+    }
 }
 
 /// The recovered volume.

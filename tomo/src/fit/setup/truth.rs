@@ -1,12 +1,14 @@
 //! Emission that is simulated.
 
-use super::config::{FitFile, Spot};
-use super::setup::{self, Instrument};
-use anyhow::{Context, anyhow, bail};
+use super::{AXIS, Instrument, Result, known_axis, motion};
+use crate::dynamics::{AngularVelocity, Axis};
+use crate::emission::glyph::Glyph;
+use crate::fit::settings::{FitError, FitFile, Spot, Within, refuse};
+use crate::fit::{Batch, Chain};
 use kerrlight_geodesic::vector::{distance, rotate};
-use kerrlight_tomo::dynamics::{AngularVelocity, Axis};
-use kerrlight_tomo::emission::glyph::{Glyph, GlyphShape};
-use kerrlight_tomo::fit::{Batch, Chain};
+
+/// What to write where there is no truth.
+pub(super) const SPOT: &str = "add a table [[truth.spot]] with `center = [x, y, z]` and `sigma = …` in M and `amplitude = 1.0`";
 
 /// The emission that is simulated.
 pub struct Truth {
@@ -17,39 +19,35 @@ pub struct Truth {
 }
 
 impl Truth {
-    /// Of settings that have a truth and an axis.
-    pub fn new(file: &FitFile) -> anyhow::Result<Self> {
+    /// The truth of settings that have one and an axis.
+    ///
+    /// # Errors
+    /// If there is none, or a number is out of range.
+    pub fn new(file: &FitFile) -> Result<Self> {
         let missing =
-            || anyhow!("truth is missing: there is nothing to simulate; {}", super::data::SPOT);
+            || FitError::missing("truth", format!("there is nothing to simulate; {SPOT}"));
         let truth = file.truth.as_ref().ok_or_else(missing)?;
         if truth.spot.is_empty() && truth.glyph.is_empty() {
-            bail!("truth is empty; {}", super::data::SPOT);
+            refuse!("truth is empty; {SPOT}");
         }
         for (k, spot) in truth.spot.iter().enumerate() {
             let numbers = [spot.sigma, spot.amplitude, spot.wound_for];
             let finite = numbers.iter().chain(&spot.center).all(|x| x.is_finite());
             if !finite || spot.sigma <= 0.0 || spot.amplitude < 0.0 {
-                bail!("truth.spot {k}: finite numbers with sigma above 0 and amplitude 0 or above");
+                refuse!(
+                    "truth.spot {k}: finite numbers with sigma above 0 and amplitude 0 or above"
+                );
             }
         }
-        let missing = || anyhow!("motion.axis is missing: a simulation needs it; {}", setup::AXIS);
-        let axis = setup::known_axis(file)?.ok_or_else(missing)?;
-        let glyph = |(k, of): (usize, &super::config::Glyph)| {
-            let shape = GlyphShape {
-                letter: of.letter,
-                center: of.center,
-                height: of.height,
-                thickness: of.thickness,
-                softness: of.softness,
-                amplitude: of.amplitude,
-            };
-            Glyph::new(&shape, axis.vector()).with_context(|| format!("truth.glyph {k}"))
-        };
+        let missing = || FitError::missing("motion.axis", format!("a simulation needs it; {AXIS}"));
+        let axis = known_axis(file)?.ok_or_else(missing)?;
+        let glyph =
+            |(k, shape)| Glyph::new(shape, axis.vector()).within(format!("truth.glyph {k}"));
         Ok(Self {
             spots: truth.spot.clone(),
-            glyphs: truth.glyph.iter().enumerate().map(glyph).collect::<anyhow::Result<_>>()?,
+            glyphs: truth.glyph.iter().enumerate().map(glyph).collect::<Result<_>>()?,
             axis,
-            velocity: setup::motion(file, Vec::new())?.velocity,
+            velocity: motion(file, Vec::new())?.velocity,
         })
     }
 
@@ -81,14 +79,17 @@ impl Truth {
         self.axis
     }
 
-    /// Its movie, in double precision.
+    /// Its movie at some times, in double precision: Jy per pixel, frame by frame, rows from the top.
+    ///
+    /// # Errors
+    /// If the motion is out of range.
     pub fn movie(
         &self,
         file: &FitFile,
         instrument: &Instrument,
         times: &[f64],
-    ) -> anyhow::Result<Vec<f64>> {
-        let motion = setup::motion(file, times.to_vec())?;
+    ) -> Result<Vec<f64>> {
+        let motion = motion(file, times.to_vec())?;
         let Instrument { lines, hole, redshift, .. } = instrument;
         let mut chain = Chain::<f64>::new(lines, &motion, hole, *redshift)?;
         chain.weigh(self.axis);

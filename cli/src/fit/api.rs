@@ -1,10 +1,11 @@
 //! What comparisons need of fits: settings as text in, checks and what follows from them without a run out.
 
-use super::config::FitFile;
-use super::data::{self, Measured};
-use super::setup::{self, Instrument};
-use super::{parse, run};
+use super::data;
+use super::parse;
 use anyhow::Context;
+use kerrlight_tomo::fit::settings::FitFile;
+use kerrlight_tomo::fit::setup::{self, Instrument, Measured};
+use kerrlight_tomo::representation::Registry;
 use kerrlight_tomo::scene::apply_override;
 use std::path::Path;
 
@@ -20,10 +21,8 @@ pub fn assigned(text: &str, assignment: &str) -> anyhow::Result<String> {
 }
 
 /// Whether settings make sense, as far as can be told without tracing rays.
-pub fn check(text: &str) -> anyhow::Result<()> {
-    let file = parse(text)?;
-    run::check(&file)?;
-    file.simulated().map(drop)
+pub fn check(text: &str, registry: &Registry) -> anyhow::Result<()> {
+    Ok(setup::check(&parse(text)?, registry)?)
 }
 
 /// Radius of the horizon, and of the region of recovery, M.
@@ -46,9 +45,9 @@ pub fn turned(text: &str, later: f64) -> anyhow::Result<[impl Fn(f64) -> f64; 2]
 }
 
 /// (u, v) of the data, wavelengths; none without visibilities.
-pub fn coverage(text: &str, near: &Path) -> anyhow::Result<Vec<[f64; 2]>> {
+pub fn coverage(text: &str, base_dir: &Path) -> anyhow::Result<Vec<[f64; 2]>> {
     let file = parse(text)?;
-    let Measured { visibilities, .. } = data::measure(&file, &Instrument::new(&file)?, near)?;
+    let Measured { visibilities, .. } = data::measure(&file, &Instrument::new(&file)?, base_dir)?;
     let rows = visibilities.into_iter().flat_map(|(observation, _)| observation.rows);
     Ok(rows.map(|row| row.uv).collect())
 }

@@ -1,6 +1,7 @@
 //! What is recovered, and how.
 
-use clap::ValueEnum;
+use crate::fit::BatchSize;
+use crate::representation::Activation;
 use serde::{Deserialize, Serialize};
 
 /// What is recovered.
@@ -42,7 +43,7 @@ pub struct Representation {
 }
 
 /// Kinds of representations.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
     /// Network of the pulled-back point.
@@ -57,20 +58,25 @@ pub enum Kind {
     LinearGrid,
     /// One that a program of one's own adds.
     #[serde(untagged)]
-    #[value(skip)]
     Own(String),
 }
 
-/// Last function.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Activation {
-    /// Between 0 and 1.
-    Sigmoid,
-    /// Above 0.
-    Softplus,
-    /// None; parameters are held at 0 or above.
-    Linear,
+impl Kind {
+    /// Those that kerrlight has itself.
+    pub const BUILT_IN: [Kind; 5] =
+        [Kind::Bhnerf, Kind::Mlp4d, Kind::FeatureGrid, Kind::Grid, Kind::LinearGrid];
+
+    /// What `representation.kind` calls it.
+    pub fn name(&self) -> &str {
+        match self {
+            Kind::Bhnerf => "bhnerf",
+            Kind::Mlp4d => "mlp4d",
+            Kind::FeatureGrid => "feature-grid",
+            Kind::Grid => "grid",
+            Kind::LinearGrid => "linear-grid",
+            Kind::Own(name) => name,
+        }
+    }
 }
 
 /// How it is recovered.
@@ -102,7 +108,7 @@ pub struct Training {
     #[serde(default)]
     pub ramp: u64,
     /// What a step looks at.
-    pub batch: Batch,
+    pub batch: BatchSize,
     /// From where parameters start.
     #[serde(default)]
     pub start: Start,
@@ -155,18 +161,6 @@ pub enum Start {
     },
 }
 
-/// What a step looks at.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Batch {
-    /// Random pixels of random frames: images only.
-    Pixels(usize),
-    /// Random frames, whole.
-    Frames(usize),
-    /// All frames.
-    All,
-}
-
 /// Mask of what shines.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -190,7 +184,7 @@ pub enum AxisSearch {
     /// It is `motion.axis`.
     Known {},
     /// It is sought on the whole sphere with coarse linear grids, and learnt from there.
-    Scan(Scan),
+    Scan(AxisScan),
     /// It is learnt from this start.
     From {
         /// Where it starts.
@@ -205,7 +199,7 @@ pub enum AxisSearch {
 /// A search of the whole sphere of axes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Scan {
+pub struct AxisScan {
     /// Directions that are tried.
     pub directions: usize,
     /// Frames that are looked at, spread over all.
@@ -261,4 +255,17 @@ pub enum Optimiser {
     Adam,
     /// Quasi-Newton steps on all data, for small problems.
     Lbfgs,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What messages list is what settings are read as.
+    #[test]
+    fn exact_names_are_those_of_the_settings() {
+        for kind in Kind::BUILT_IN {
+            assert_eq!(toml::Value::try_from(&kind).unwrap().as_str(), Some(kind.name()));
+        }
+    }
 }

@@ -1,7 +1,6 @@
 //! Settings that take the place of others.
 
-use super::config::FitFile;
-use anyhow::{Context, bail};
+use super::{FitError, FitFile, Within};
 use toml::{Table, Value};
 
 /// Tables that say which of several things they are by their only key: another key takes their place.
@@ -27,15 +26,21 @@ pub fn merge(into: &mut Table, changes: &Table) {
 const WORLD: [&str; 5] = ["hole", "observer", "region", "effects", "motion"];
 
 impl FitFile {
-    /// The settings that data are simulated with.
-    pub fn simulated(&self) -> anyhow::Result<Self> {
+    /// The settings that data are simulated with: these with the changes of `world`.
+    ///
+    /// # Errors
+    /// If `world` has a key that is no part of what is simulated, or is no setting at all.
+    pub fn simulated(&self) -> Result<Self, FitError> {
         if let Some(key) = self.world.keys().find(|key| !WORLD.contains(&key.as_str())) {
-            bail!("world.{key} is not allowed: {}", WORLD.join(", "));
+            return Err(FitError::Conflict(format!(
+                "world.{key} is not allowed: {}",
+                WORLD.join(", ")
+            )));
         }
-        let mut table = Table::try_from(self).context("settings")?;
+        let mut table = Table::try_from(self).within("settings")?;
         merge(&mut table, &self.world);
         table.remove("world");
-        table.try_into().context("world")
+        table.try_into().within("world")
     }
 }
 
@@ -60,7 +65,8 @@ mod tests {
 
     #[test]
     fn exact_a_world_changes_what_is_simulated() {
-        let mut file: FitFile = toml::from_str(include_str!("built_in.toml")).unwrap();
+        let mut file: FitFile =
+            toml::from_str(include_str!("../../../../cli/src/fit/built_in.toml")).unwrap();
         assert_eq!(file.simulated().unwrap(), file);
         file.world = table("[hole]\nspin = 0.9\n[effects]\nslow_light = false");
         let world = file.simulated().unwrap();

@@ -1,7 +1,7 @@
 //! Ranges of a fit's numbers, by key: a number outside of them gives a fit that means nothing.
 
-use anyhow::bail;
-use kerrlight_tomo::scene::{line_of, shown};
+use super::FitError;
+use crate::scene::shown;
 use toml::Value;
 
 /// Key (`*` stands for the number of a list's element), least and largest value, unit.
@@ -15,12 +15,16 @@ const RANGES: &[Range] = &[
     ("hole.mass_msun", 1e-20, 1e15, "solar masses"),
     ("hole.distance_kpc", 1e-9, 1e12, "kpc"),
     ("observer.inclination_deg", 0.0, 180.0, "degrees"),
+    ("screen.pixels", 2.0, 4096.0, "pixels along a side"),
     ("screen.width", 1e-3, LENGTH, "M"),
     ("screen.field_uas", 1e-6, 1e12, "microarcseconds"),
     ("screen.jy_per_pixel", 1e-15, 1e15, "Jy per M of emission 1"),
     ("region.r_min", 0.0, LENGTH, "M"),
     ("region.r_max", 1e-3, LENGTH, "M"),
     ("region.z_width", 1e-3, f64::INFINITY, "M"),
+    ("region.nodes.gauss.order", 1.0, 16.0, "nodes of a panel"),
+    ("region.nodes.gauss.split", 1.0, 1e9, "cuts of the coarsest panels"),
+    ("region.nodes.equal-mino-time.per_ray", 2.0, 1e5, "nodes of a ray"),
     ("effects.redshift_power", -20.0, 20.0, "an exponent"),
     ("effects.absorption.coefficient", 0.0, 1e6, "per M"),
     ("effects.absorption.radius", 1e-3, LENGTH, "M"),
@@ -33,6 +37,7 @@ const RANGES: &[Range] = &[
     ("motion.velocity.table.rates.*", -1e3, 1e3, "radians per M"),
     ("motion.reference_time", -TIME, TIME, "M"),
     ("motion.injection_time", -TIME, TIME, "M"),
+    ("movie.frames", 1.0, 1e5, "frames"),
     ("movie.from", -TIME, TIME, "M"),
     ("movie.to", -TIME, TIME, "M"),
     ("truth.spot.*.center.*", -LENGTH, LENGTH, "M"),
@@ -40,14 +45,19 @@ const RANGES: &[Range] = &[
     ("truth.spot.*.amplitude", 0.0, 1e12, "emission at the centre"),
     ("truth.spot.*.wound_for", -LENGTH, LENGTH, "M"),
     ("truth.glyph.*.amplitude", 0.0, 1e12, "emission in the strokes"),
+    ("observation.gains.constant_amplitude", 0.0, 10.0, "a standard deviation of ln |g|"),
+    ("observation.gains.scan_amplitude", 0.0, 10.0, "a standard deviation of ln |g|"),
     ("observation.first_time", -TIME, TIME, "M"),
     ("data.visibilities.first_time", -TIME, TIME, "M"),
+    ("data.visibilities.average_s", 0.0, f64::INFINITY, "seconds"),
+    ("data.visibilities.uv_min", 0.0, f64::INFINITY, "wavelengths"),
     ("data.visibilities.systematic", 0.0, 10.0, "part of the amplitude"),
     ("observation.systematic", 0.0, 10.0, "part of the amplitude"),
     ("loss.*.weight", 1e-12, 1e12, "a factor"),
     ("loss.*.sigma", 1e-15, 1e15, "Jy"),
     ("loss.*.least_snr", 0.0, 1e9, "a signal-to-noise ratio"),
     ("regulariser.*.weight", 0.0, 1e12, "a factor"),
+    ("probe.nodes", 4.0, 256.0, "nodes along each axis"),
     ("representation.length_scale", 1e-3, LENGTH, "M"),
     ("representation.time_scale", 1e-3, TIME, "M"),
     ("training.rate", 0.0, 10.0, "a learning rate"),
@@ -56,64 +66,70 @@ const RANGES: &[Range] = &[
     ("training.grid_last_rate", 0.0, 10.0, "a learning rate"),
     ("training.feature_rate", 0.0, 10.0, "a learning rate"),
     ("training.feature_last_rate", 0.0, 10.0, "a learning rate"),
+    ("training.batch.pixels", 1.0, f64::INFINITY, "pixels"),
+    ("training.batch.frames", 1.0, f64::INFINITY, "frames"),
+    ("training.log_every", 1.0, f64::INFINITY, "steps"),
+    ("training.occupancy.cells", 2.0, 256.0, "cells along each axis"),
     ("training.checkpoint_seconds", 0.0, 1e9, "seconds"),
     ("linear.upper", 1e-12, 1e12, "the largest emission"),
+    ("linear.flux_jy", 1e-15, 1e15, "Jy"),
     ("linear.smoothness", 0.0, 1e12, "a factor"),
     ("linear.sparsity", 0.0, 1e12, "a factor"),
     ("axis.from.rate", 0.0, 10.0, "a learning rate"),
     ("axis.from.last_rate", 0.0, 10.0, "a learning rate"),
+    ("axis.scan.directions", 12.0, 1e5, "directions"),
+    ("axis.scan.frames", 2.0, f64::INFINITY, "frames"),
+    ("axis.scan.pixels", 8.0, f64::INFINITY, "pixels along a side"),
+    ("axis.scan.refine", 8.0, 128.0, "nodes along each axis"),
     ("axis.scan.rate", 0.0, 10.0, "a learning rate"),
     ("axis.scan.last_rate", 0.0, 10.0, "a learning rate"),
+    ("output.nodes", 2.0, 512.0, "nodes along each axis"),
 ];
 
 /// Numbers of these tables are a representation's own; whoever adds it checks them.
 const OWN: &str = "representation.own";
 
 /// Refuses the first number of a fit's text that is out of its range, or not a number at all.
-pub fn check(text: &str) -> anyhow::Result<()> {
+pub fn check(text: &str) -> Result<(), FitError> {
     let table: toml::Table = toml::from_str(text)?;
-    walk(&Value::Table(table), &mut String::new(), text)
+    walk(&Value::Table(table), &mut String::new()).map_err(|error| error.located(text))
 }
 
-fn walk(value: &Value, key: &mut String, text: &str) -> anyhow::Result<()> {
+fn walk(value: &Value, key: &mut String) -> Result<(), FitError> {
     match value {
-        Value::Table(table) => {
-            table.iter().try_for_each(|(name, value)| below(value, key, name, text))
+        Value::Table(table) => table.iter().try_for_each(|(name, value)| below(value, key, name)),
+        Value::Array(values) => {
+            values.iter().enumerate().try_for_each(|(k, value)| below(value, key, &k.to_string()))
         }
-        Value::Array(values) => values
-            .iter()
-            .enumerate()
-            .try_for_each(|(k, value)| below(value, key, &k.to_string(), text)),
-        Value::Float(number) => one(key, *number, text),
-        Value::Integer(number) => one(key, *number as f64, text),
+        Value::Float(number) => one(key, *number),
+        Value::Integer(number) => one(key, *number as f64),
         _ => Ok(()),
     }
 }
 
-fn below(value: &Value, key: &mut String, name: &str, text: &str) -> anyhow::Result<()> {
+fn below(value: &Value, key: &mut String, name: &str) -> Result<(), FitError> {
     let length = key.len();
     if !key.is_empty() {
         key.push('.');
     }
     key.push_str(name);
-    let result = walk(value, key, text);
+    let result = walk(value, key);
     key.truncate(length);
     result
 }
 
-fn one(key: &str, number: f64, text: &str) -> anyhow::Result<()> {
+fn one(key: &str, number: f64) -> Result<(), FitError> {
     let (least, most, unit) = range_of(key);
     if key.starts_with(OWN) || (least..=most).contains(&number) {
         return Ok(());
     }
-    let line = line_of(text, key).map_or(String::new(), |line| format!("line {line}: "));
     let allowed = match (least, most) {
         (f64::MIN, _) => "a finite number".to_owned(),
         (_, f64::INFINITY) => format!("at least {}", shown(least)),
         _ => format!("{} to {}", shown(least), shown(most)),
     };
     let unit = if unit.is_empty() { String::new() } else { format!(" ({unit})") };
-    bail!("{line}{key} = {} is not allowed: {allowed}{unit}", shown(number))
+    Err(FitError::range(key, shown(number), &format!("{allowed}{unit}")))
 }
 
 /// The range of a key; any finite number where the table has none. What data are simulated with has the
@@ -142,9 +158,9 @@ fn matches(pattern: &str, key: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kerrlight_tomo::scene::apply_override;
+    use crate::scene::apply_override;
 
-    const BUILT_IN: &str = include_str!("../built_in.toml");
+    const BUILT_IN: &str = include_str!("../../../../cli/src/fit/built_in.toml");
 
     fn refused(assignment: &str) -> String {
         check(&apply_override(BUILT_IN, assignment).unwrap()).unwrap_err().to_string()
@@ -169,7 +185,8 @@ mod tests {
             ("representation.length_scale=nan", "representation.length_scale = NaN"),
             ("training.rate=-1", "training.rate = -1 is not allowed: 0 to 10"),
             ("world.hole.spin=2", "world.hole.spin = 2"),
-            ("output.nodes=nan", "output.nodes = NaN is not allowed: a finite number"),
+            ("output.nodes=nan", "output.nodes = NaN is not allowed: 2 to 512"),
+            ("observer.radius=nan", "observer.radius = NaN is not allowed: a finite number"),
         ] {
             let text = refused(assignment);
             assert!(text.contains(says), "{assignment}: {text}");

@@ -1,6 +1,5 @@
 //! Files of data, and what of them is compared.
 
-use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -46,7 +45,7 @@ pub struct Loss {
 }
 
 /// Kinds of data.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LossKind {
     /// Every pixel.
@@ -61,4 +60,58 @@ pub enum LossKind {
     LogClosureAmplitudes,
     /// Total flux.
     LightCurve,
+}
+
+impl LossKind {
+    /// All kinds.
+    pub const ALL: [LossKind; 6] = [
+        LossKind::Image,
+        LossKind::Visibilities,
+        LossKind::Amplitudes,
+        LossKind::ClosurePhases,
+        LossKind::LogClosureAmplitudes,
+        LossKind::LightCurve,
+    ];
+
+    /// What `loss.data` calls it.
+    pub fn name(self) -> &'static str {
+        match self {
+            LossKind::Image => "image",
+            LossKind::Visibilities => "visibilities",
+            LossKind::Amplitudes => "amplitudes",
+            LossKind::ClosurePhases => "closure-phases",
+            LossKind::LogClosureAmplitudes => "log-closure-amplitudes",
+            LossKind::LightCurve => "light-curve",
+        }
+    }
+
+    /// What it is called in a sentence.
+    pub fn label(self) -> &'static str {
+        match self {
+            LossKind::Image => "images",
+            LossKind::Visibilities => "visibilities",
+            LossKind::Amplitudes => "amplitudes",
+            LossKind::ClosurePhases => "closure phases",
+            LossKind::LogClosureAmplitudes => "log closure amplitudes",
+            LossKind::LightCurve => "the light curve",
+        }
+    }
+
+    /// Whether χ² of it is convex in the emission, so that a minimum can be told from other stationary points.
+    pub fn is_convex(self) -> bool {
+        matches!(self, LossKind::Image | LossKind::Visibilities | LossKind::LightCurve)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What messages list is what settings are read as.
+    #[test]
+    fn exact_names_are_those_of_the_settings() {
+        for kind in LossKind::ALL {
+            assert_eq!(toml::Value::try_from(kind).unwrap().as_str(), Some(kind.name()));
+        }
+    }
 }

@@ -1,0 +1,36 @@
+//! What things are called in sentences.
+
+use kerrlight_tomo::fit::settings::{FitFile, Kind};
+
+/// Kinds of representations, in a few words.
+pub fn representation(kind: &Kind) -> &str {
+    match kind {
+        Kind::Bhnerf => "network (BH-NeRF)",
+        Kind::Mlp4d => "network of space and time",
+        Kind::FeatureGrid => "grids of features",
+        Kind::Grid => "grid of voxels",
+        Kind::LinearGrid => "linear grid of voxels",
+        Kind::Own(name) => name,
+    }
+}
+
+/// The same for somebody who does not know the names.
+pub fn described(file: &FitFile) -> &str {
+    match &file.representation.kind {
+        Kind::Bhnerf => {
+            "a neural network of the place that matter had at the reference time (BH-NeRF)"
+        }
+        Kind::Mlp4d => "a neural network of place and time, which knows nothing of orbits",
+        Kind::FeatureGrid => {
+            "a small neural network of features on grids of several resolutions that are carried along the orbits"
+        }
+        Kind::Grid => "values at the nodes of a grid that is carried along the orbits",
+        Kind::LinearGrid if !file.is_convex() => {
+            "values at the nodes of a grid that is carried along the orbits, found by descent from several lit starts, as such data are not convex in the emission"
+        }
+        Kind::LinearGrid => {
+            "values at the nodes of a grid that is carried along the orbits, as the solution of a convex problem"
+        }
+        Kind::Own(name) => name,
+    }
+}

@@ -1,0 +1,126 @@
+//! Errors in settings, which name the key and, where there is a text, its line.
+
+use crate::memory::TooLarge;
+use crate::scene::line_of;
+use std::error::Error;
+
+/// Why settings are not those of a fit.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FitError {
+    /// Not TOML, an unknown or missing key, or a wrong type.
+    #[error("{0}")]
+    Syntax(String),
+    /// A value out of its range.
+    #[error("{}{key} = {value} is not allowed: {allowed}", line_prefix(*.line))]
+    Range {
+        /// Line of the text, counted from 1; `None` without a text.
+        line: Option<usize>,
+        /// Dotted path of the key.
+        key: String,
+        /// The value that was given.
+        value: String,
+        /// What would be allowed.
+        allowed: String,
+    },
+    /// A key that these settings need.
+    #[error("{key} is missing: {why}")]
+    Missing {
+        /// Dotted path of the key.
+        key: String,
+        /// Why it is needed, and what to write.
+        why: String,
+    },
+    /// Settings that contradict each other or the data.
+    #[error("{0}")]
+    Conflict(String),
+    /// What is wrong with a part of the settings, such as `loss 1`.
+    #[error("{part}: {error}")]
+    Part {
+        /// The part.
+        part: String,
+        /// What is wrong with it.
+        error: Box<FitError>,
+    },
+    /// More memory would be needed than there is.
+    #[error(transparent)]
+    Memory(#[from] TooLarge),
+    /// What the numbers are handed to refuses them.
+    #[error(transparent)]
+    Other(Box<dyn Error + Send + Sync>),
+}
+
+fn line_prefix(line: Option<usize>) -> String {
+    line.map(|line| format!("line {line}: ")).unwrap_or_default()
+}
+
+impl FitError {
+    /// A value out of its range.
+    pub(crate) fn range(key: impl Into<String>, value: impl ToString, allowed: &str) -> Self {
+        let (key, value) = (key.into(), value.to_string());
+        FitError::Range { line: None, key, value, allowed: allowed.to_owned() }
+    }
+
+    /// A key that is needed.
+    pub(crate) fn missing(key: &str, why: impl Into<String>) -> Self {
+        FitError::Missing { key: key.to_owned(), why: why.into() }
+    }
+
+    /// With the line of the text on which the key stands.
+    pub(super) fn located(self, text: &str) -> Self {
+        match self {
+            FitError::Range { key, value, allowed, .. } => {
+                FitError::Range { line: line_of(text, &key), key, value, allowed }
+            }
+            other => other,
+        }
+    }
+}
+
+/// Errors of what numbers of settings are handed to.
+macro_rules! other {
+    ($($error:ty),* $(,)?) => {
+        $(impl From<$error> for FitError {
+            fn from(error: $error) -> Self {
+                FitError::Other(Box::new(error))
+            }
+        })*
+    };
+}
+
+other!(
+    crate::dynamics::ZeroAxis,
+    crate::interferometry::data_terms::DataTermError,
+    crate::interferometry::earth::EarthError,
+    crate::interferometry::schedule::ScheduleError,
+    crate::volume::VolumeError,
+    kerrlight_geodesic::OutOfRange,
+    toml::de::Error,
+    toml::ser::Error,
+);
+
+impl From<Box<dyn Error + Send + Sync>> for FitError {
+    fn from(error: Box<dyn Error + Send + Sync>) -> Self {
+        FitError::Other(error)
+    }
+}
+
+/// Names the part of the settings that an error is about.
+pub(crate) trait Within<T> {
+    /// The same result, whose error begins with the part.
+    fn within(self, part: impl Into<String>) -> Result<T, FitError>;
+}
+
+impl<T, E: Into<FitError>> Within<T> for Result<T, E> {
+    fn within(self, part: impl Into<String>) -> Result<T, FitError> {
+        self.map_err(|error| FitError::Part { part: part.into(), error: Box::new(error.into()) })
+    }
+}
+
+/// Refuses settings that contradict each other.
+macro_rules! refuse {
+    ($($words:tt)*) => {
+        return Err(crate::fit::settings::FitError::Conflict(format!($($words)*)))
+    };
+}
+pub(crate) use refuse;

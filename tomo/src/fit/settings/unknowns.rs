@@ -1,0 +1,102 @@
+//! What data do not know of the emission, and what has to be given or avoided because of it.
+
+use super::{AxisSearch, FitError, FitFile, Kind, Linear, LossKind, Start, refuse};
+use crate::representation::Activation;
+
+impl FitFile {
+    /// Whether a minimum over the emission of voxels can be told from other stationary points.
+    pub fn is_convex(&self) -> bool {
+        self.loss.iter().all(|loss| loss.data.is_convex())
+    }
+
+    /// Refuses what these data cannot decide.
+    ///
+    /// # Errors
+    /// If closure quantities alone lack a flux, a flux is given that data know, or training starts in the dark where
+    /// data have no slope.
+    pub fn check_unknowns(&self) -> Result<(), FitError> {
+        flux(self)?;
+        let dark = self.representation.kind == Kind::Grid
+            && self.representation.activation == Activation::Linear
+            && self.training.start == Start::Drawn;
+        if dark && !self.is_convex() {
+            refuse!(
+                "training.start = drawn is not allowed: a grid with activation linear starts in the dark, where {} have no slope; take {{ linear = {{ nodes, stride, steps }} }}",
+                data(self)
+            );
+        }
+        Ok(())
+    }
+
+    /// What a reader has to know of what these data leave open, a paragraph each.
+    pub fn unknowns(&self) -> Vec<String> {
+        let mut all = Vec::new();
+        if !knows_flux(self) {
+            let from = self.linear.as_ref().and_then(|linear| linear.flux_jy);
+            let from = from.map_or("where training left it".to_owned(), |flux| {
+                format!("that of linear.flux_jy = {flux} Jy, from which training may have led away")
+            });
+            all.push(format!(
+                "{} alone do not know the flux: the brightness is {from}; PSNR and relative error depend on it, the correlation does not. They do not know where on the sky the source is either: the hole is taken to be in the middle of the screen",
+                data(self)
+            ));
+        }
+        if !knows_phase(self) {
+            all.push(format!(
+                "{} know no phases: an image and the same turned by 180° are alike to them, and only orbits, lensing and Doppler shifts tell those apart",
+                data(self)
+            ));
+        }
+        all
+    }
+}
+
+/// Whether any of the data knows the flux.
+fn knows_flux(file: &FitFile) -> bool {
+    let closure = |kind| matches!(kind, LossKind::ClosurePhases | LossKind::LogClosureAmplitudes);
+    file.loss.is_empty() || file.loss.iter().any(|loss| !closure(loss.data))
+}
+
+fn knows_phase(file: &FitFile) -> bool {
+    let none = [LossKind::Amplitudes, LossKind::LogClosureAmplitudes, LossKind::LightCurve];
+    file.loss.is_empty() || file.loss.iter().any(|loss| !none.contains(&loss.data))
+}
+
+fn data(file: &FitFile) -> String {
+    let names: Vec<&str> = file.loss.iter().map(|loss| loss.data.label()).collect();
+    names.join(" and ")
+}
+
+/// The flux is given where data do not know it, and nothing pulls it down.
+fn flux(file: &FitFile) -> Result<(), FitError> {
+    let given = file.linear.as_ref().and_then(|linear| linear.flux_jy);
+    if let Some(flux) = given.filter(|flux| !(*flux > 0.0 && flux.is_finite())) {
+        refuse!("linear.flux_jy = {flux} is not allowed: Jy above 0");
+    }
+    if knows_flux(file) {
+        return match given {
+            Some(flux) => refuse!(
+                "linear.flux_jy = {flux} is not allowed: it is for closure quantities alone, {} know the flux",
+                data(file)
+            ),
+            None => Ok(()),
+        };
+    }
+    let linear = file.representation.kind == Kind::LinearGrid
+        || file.training.start != Start::Drawn
+        || matches!(file.axis, AxisSearch::Scan(_));
+    if linear && given.is_none() {
+        refuse!(
+            "linear.flux_jy is missing: {} alone do not know the flux; give the mean flux of a frame in Jy, or add a loss of amplitudes or of the light curve",
+            data(file)
+        );
+    }
+    let pulls = |linear: &Linear| linear.smoothness > 0.0 || linear.sparsity > 0.0;
+    if !file.regulariser.is_empty() || file.linear.as_ref().is_some_and(pulls) {
+        refuse!(
+            "regulariser, linear.smoothness and linear.sparsity are not allowed with {} alone: these do not know the flux, and penalties would take it to 0; add a loss of amplitudes or of the light curve",
+            data(file)
+        );
+    }
+    Ok(())
+}

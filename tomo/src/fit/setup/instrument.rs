@@ -1,0 +1,111 @@
+//! What a fit looks through: sight lines, traced once.
+
+use super::{Result, observer, spacing};
+use crate::fit::settings::{Absorption, FitError, FitFile, Screen, Within, refuse};
+use crate::fit::{Redshift, Sampling, SightlineRequest, Sightlines};
+use crate::memory;
+use kerrlight_geodesic::Kerr;
+
+/// What a fit looks through: the same for all data and representations.
+pub struct Instrument {
+    /// The hole.
+    pub hole: Kerr,
+    /// Nodes on rays; weights in Jy a pixel for emission 1.
+    pub lines: Sightlines,
+    /// Emission goes like g to this power.
+    pub redshift: Option<Redshift>,
+}
+
+/// Rays of the trial by which the nodes of all are estimated.
+const TRIAL: usize = 512;
+
+impl Instrument {
+    /// Traces the rays of all pixels.
+    ///
+    /// # Errors
+    /// If a number is out of range, no ray meets the region, or there is no memory for the nodes.
+    pub fn new(file: &FitFile) -> Result<Self> {
+        let n = file.screen.pixels;
+        Self::afford(file, n.saturating_mul(n))?;
+        Self::of(file, &(0..n * n).collect::<Vec<_>>())
+    }
+
+    /// Refuses rays that there is no memory for, as estimated from a few of them.
+    fn afford(file: &FitFile, pixels: usize) -> Result<()> {
+        spacing(&file.screen)?;
+        let each = match file.region.nodes {
+            Sampling::Gauss { order, split } => order as f64 * f64::from(split),
+            Sampling::EqualMinoTime { per_ray } => per_ray as f64,
+        };
+        let block = || format!("region.nodes: {each} nodes or more on each ray of a block");
+        memory::afford(block, memory::nodes(each * TRIAL.min(pixels) as f64, 0.0))?;
+        let chosen: Vec<usize> = (0..pixels).step_by(pixels.div_ceil(TRIAL).max(1)).collect();
+        // What is wrong with them is told by those of all pixels.
+        let Ok(few) = Self::of(file, &chosen) else { return Ok(()) };
+        let nodes = few.lines.points() as f64 * pixels as f64 / chosen.len() as f64;
+        let (momenta, delays) = (few.lines.momentum[0].len(), few.lines.delay.len());
+        let columns = [(momenta, 3.0), (delays, 2.0)];
+        let columns = columns.iter().map(|(count, n)| if *count > 0 { *n } else { 0.0 }).sum();
+        let n = file.screen.pixels;
+        let what = || {
+            format!("screen.pixels = {n}: about {nodes:.0} nodes on the rays of {pixels} pixels")
+        };
+        Ok(memory::afford(what, memory::nodes(nodes, columns))?)
+    }
+
+    /// Traces the rays of some pixels, counted row by row from the top, each from the left.
+    ///
+    /// # Errors
+    /// As [`Instrument::new`].
+    pub fn of(file: &FitFile, chosen: &[usize]) -> Result<Self> {
+        let hole = Kerr::new(file.hole.spin).within("hole")?;
+        let region = file.region.limits();
+        let request = SightlineRequest {
+            region,
+            sampling: file.region.nodes,
+            delay: file.effects.slow_light,
+            momentum: file.effects.redshift_power.is_some(),
+        };
+        let (alpha, beta) = pixels(&file.screen, chosen)?;
+        let observer = observer(&file.observer)?;
+        let mut lines = Sightlines::trace(&hole, &observer, &alpha, &beta, &request)
+            .within("region and screen")?;
+        if lines.rays() == 0 {
+            refuse!("no ray meets the region: region.r_min to r_max lies outside the screen");
+        }
+        let jy = file.screen.jy_per_pixel;
+        if !(jy > 0.0 && jy.is_finite()) {
+            return Err(FitError::range("screen.jy_per_pixel", jy, "above 0"));
+        }
+        if let Some(medium) = file.effects.absorption {
+            lines.absorb(opacity(medium)?);
+        }
+        lines.weight.iter_mut().for_each(|weight| *weight *= jy);
+        let redshift = file.effects.redshift_power.map(|power| Redshift { power });
+        Ok(Self { hole, lines, redshift })
+    }
+}
+
+/// κ(x) of the medium.
+fn opacity(medium: Absorption) -> Result<impl Fn([f64; 3]) -> f64> {
+    let Absorption { coefficient, radius, height } = medium;
+    if !(coefficient >= 0.0 && coefficient.is_finite()) {
+        return Err(FitError::range("effects.absorption.coefficient", coefficient, "0 or above"));
+    }
+    for (name, value) in [("radius", radius), ("height", height)] {
+        if !(value > 0.0 && value.is_finite()) {
+            return Err(FitError::range(format!("effects.absorption.{name}"), value, "above 0"));
+        }
+    }
+    Ok(move |[x, y, z]: [f64; 3]| {
+        let square = (x * x + y * y + z * z) / (radius * radius) + z * z / (height * height);
+        coefficient * (-0.5 * square).exp()
+    })
+}
+
+/// (α, β) of pixels, rows from the top, each from the left.
+fn pixels(screen: &Screen, chosen: &[usize]) -> Result<(Vec<f64>, Vec<f64>)> {
+    let (n, step) = (screen.pixels, spacing(screen)?);
+    let at = |k: usize| (k as f64 - 0.5 * (n as f64 - 1.0)) * step;
+    Ok(chosen.iter().map(|k| (at(k % n), -at(k / n))).unzip())
+}

@@ -1,0 +1,209 @@
+//! From settings to what is recovered and how it is learnt.
+
+use super::{Result, axis, linear};
+use crate::fit::settings::{
+    FitError, FitFile, Kind, LossKind, Occupancy, Optimiser, Start, Within, refuse,
+};
+use crate::fit::{BatchSize, OccupancyPlan, OccupancySettings, Region, Training};
+use crate::memory;
+use crate::optimise::{Adam, Lbfgs, Polynomial};
+use crate::representation::{
+    Activation, FeatureGrid, FeatureGridSettings, Grid, GridSettings, Network, NetworkSettings,
+    OwnSettings, Registry, Representation,
+};
+
+/// What is recovered; `registry` has what the program adds to kerrlight's own representations.
+///
+/// # Errors
+/// If there is none of this kind, or a number is out of range.
+pub fn representation(file: &FitFile, registry: &Registry) -> Result<Box<dyn Representation<f32>>> {
+    let chosen = &file.representation;
+    let network = |settings: NetworkSettings| {
+        Network::new(NetworkSettings {
+            degree: chosen.degree,
+            width: chosen.width,
+            hidden_layers: chosen.hidden_layers,
+            skip_after: settings.skip_after.filter(|layer| *layer <= chosen.hidden_layers),
+            length_scale: chosen.length_scale,
+            time_scale: chosen.time_scale,
+            activation: chosen.activation,
+            ..settings
+        })
+        .within("representation")
+    };
+    let r = file.region.r_max;
+    Ok(match &chosen.kind {
+        Kind::Own(name) => own(name, file, registry)?,
+        Kind::Bhnerf => Box::new(network(NetworkSettings::bhnerf())?),
+        Kind::Mlp4d => Box::new(network(NetworkSettings::mlp4d())?),
+        Kind::FeatureGrid if chosen.activation == Activation::Linear => refuse!(
+            "representation.activation = linear is not allowed: sigmoid or softplus with feature-grid, whose network's output has any sign"
+        ),
+        Kind::FeatureGrid => {
+            let settings = FeatureGridSettings {
+                coarsest: chosen.coarsest,
+                levels: chosen.levels,
+                low: [-r; 3],
+                high: [r; 3],
+                activation: chosen.activation,
+                initial: FAINT,
+            };
+            Box::new(FeatureGrid::new(settings).within("representation")?)
+        }
+        Kind::Grid | Kind::LinearGrid => {
+            // As dark as a network starts, sigmoid(−10).
+            let (activation, initial) = match chosen.activation {
+                _ if chosen.kind == Kind::LinearGrid => (Activation::Linear, 0.0),
+                Activation::Linear => (Activation::Linear, 0.0),
+                other => (other, -10.0),
+            };
+            let settings = GridSettings {
+                nodes: [chosen.nodes; 3],
+                low: [-r; 3],
+                high: [r; 3],
+                activation,
+                initial,
+            };
+            Box::new(Grid::new(settings).within("representation")?)
+        }
+    })
+}
+
+/// A feature grid starts with a faint glow, 1/55: darker ones start late.
+const FAINT: f64 = -4.0;
+
+/// A representation that the program adds.
+fn own(name: &str, file: &FitFile, registry: &Registry) -> Result<Box<dyn Representation<f32>>> {
+    let Region { r_min, r_max, z_width } = file.region.limits();
+    let table = file.representation.own.clone();
+    if let Some(built) = registry.build(name, &OwnSettings { r_min, r_max, z_width, table }) {
+        return Ok(built?);
+    }
+    let known: Vec<&str> = Kind::BUILT_IN.iter().map(Kind::name).chain(registry.names()).collect();
+    Err(FitError::range("representation.kind", format!("{name:?}"), &known.join(", ")))
+}
+
+/// How it is learnt.
+///
+/// # Errors
+/// If a number is out of range, or settings contradict each other.
+pub fn training(file: &FitFile, axis_rate: Option<Polynomial>) -> Result<Training> {
+    let chosen = &file.training;
+    let (name, rate) = rates(file);
+    if matches!(chosen.batch, BatchSize::Pixels(0) | BatchSize::Frames(0)) {
+        refuse!("training.batch of 0 is not allowed: 1 or more");
+    }
+    let lbfgs = lbfgs(file)?;
+    let occupancy = chosen.occupancy.as_ref().map(occupancy).transpose()?;
+    if occupancy.is_some() && file.representation.kind == Kind::Mlp4d {
+        refuse!("training.occupancy is not for mlp4d, which has no co-rotating coordinates");
+    }
+    Ok(Training {
+        seed: file.seed,
+        adam: Adam::default(),
+        lbfgs,
+        rate: rate.checked().within(name)?,
+        axis_rate,
+        ramp: chosen.ramp,
+        batch: chosen.batch,
+        occupancy,
+        penalties: file.penalties()?,
+        region: file.region.limits(),
+        keep_every: 50,
+        divergence: 1e3,
+    })
+}
+
+/// What is allowed and most probably not meant.
+pub fn caution(file: &FitFile) -> Option<&'static str> {
+    let training = &file.training;
+    let is_dark = file.representation.kind == Kind::Grid && training.start == Start::Drawn;
+    (is_dark && training.occupancy.is_some()).then_some(
+        "a grid that starts in the dark is lit node by node: the mask of training.occupancy takes what is still dark for \
+         empty, and holds it back; leave the mask out, or take a linear start",
+    )
+}
+
+/// Rates, and what they are called: voxels may have their own, as their parameters are of another size.
+fn rates(file: &FitFile) -> (&'static str, Polynomial) {
+    let chosen = &file.training;
+    let (from, to, name) = match (&file.representation.kind, chosen.grid_rate) {
+        (Kind::Grid, Some(from)) => {
+            (from, chosen.grid_last_rate.unwrap_or(chosen.last_rate), "training.grid_rate")
+        }
+        (Kind::FeatureGrid, _) if chosen.feature_rate.is_some() => (
+            chosen.feature_rate.unwrap_or(chosen.rate),
+            chosen.feature_last_rate.unwrap_or(chosen.last_rate),
+            "training.feature_rate",
+        ),
+        _ => (chosen.rate, chosen.last_rate, "training.rate"),
+    };
+    (name, Polynomial { from, to, steps: chosen.steps, power: 1.0 })
+}
+
+fn occupancy(chosen: &Occupancy) -> Result<OccupancyPlan> {
+    let Occupancy { cells, threshold, memory, warm_up, every } = *chosen;
+    for (name, value) in [("threshold", threshold), ("memory", memory)] {
+        if !(0.0..1.0).contains(&value) {
+            let key = format!("training.occupancy.{name}");
+            return Err(FitError::range(key, value, "0 to 1, 1 excluded"));
+        }
+    }
+    Ok(OccupancyPlan {
+        settings: OccupancySettings { cells, threshold, memory },
+        warm_up,
+        every: every.max(1),
+    })
+}
+
+/// Quasi-Newton steps, if they are asked for and the loss is the same at every step.
+fn lbfgs(file: &FitFile) -> Result<Option<Lbfgs>> {
+    if file.training.optimiser == Optimiser::Adam {
+        return Ok(None);
+    }
+    if file.training.batch != BatchSize::All {
+        refuse!(
+            "training.optimiser = lbfgs needs the same data at every step: give training.batch = \"all\" (pixels and frames are random)"
+        );
+    }
+    let linear = file.representation.activation == Activation::Linear;
+    if file.representation.kind == Kind::Grid && linear {
+        refuse!(
+            "training.optimiser = lbfgs knows no bounds: a grid with activation linear is held at 0 or above; take representation = linear-grid, or activation sigmoid or softplus"
+        );
+    }
+    Ok(Some(Lbfgs::default()))
+}
+
+/// Refuses what can be told of settings without tracing rays.
+///
+/// # Errors
+/// Names the first setting that is out of range, missing, or in contradiction to another.
+pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
+    let (_, axis_rate) = axis(file)?;
+    afford(file, registry)?;
+    file.check_unknowns()?;
+    let training = training(file, axis_rate)?;
+    let images_only = file.loss.iter().all(|loss| loss.data == LossKind::Image);
+    if matches!(training.batch, BatchSize::Pixels(_)) && !images_only {
+        refuse!("training.batch: pixels are for images alone; take frames = N");
+    }
+    if file.representation.kind == Kind::LinearGrid || file.training.start != Start::Drawn {
+        linear(file)?;
+    }
+    file.simulated().map(drop)
+}
+
+/// Refuses representations, grids and volumes that there is no memory for.
+fn afford(file: &FitFile, registry: &Registry) -> Result<()> {
+    let parameters = representation(file, registry)?.parameters();
+    let what = || format!("{parameters} parameters of the representation");
+    memory::afford(what, memory::parameters(parameters as f64))?;
+    if let Start::Linear { nodes, .. } = file.training.start {
+        let what = || format!("training.start.linear.nodes = {nodes}: a grid");
+        memory::afford(what, memory::parameters((nodes as f64).powi(3)))?;
+    }
+    let nodes = file.output.nodes;
+    memory::afford(|| format!("output.nodes = {nodes}: volumes"), memory::volume(nodes as f64))?;
+    Ok(())
+}

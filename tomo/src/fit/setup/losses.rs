@@ -1,0 +1,144 @@
+//! The terms of the loss.
+
+use super::measured::FILE;
+use super::{Instrument, Measured, Result};
+use crate::fit::settings::{FitError, Loss, LossKind, Within, refuse};
+use crate::fit::{
+    Chain, Data, FrameTerm, ImageTerm, LightCurveTerm, Motion, Scan, ScanTerm, Weighted,
+};
+use crate::interferometry::data_terms::{
+    AmplitudeTerm, ClosureTerm, DataTerm, DataTermError, VisibilityTerm,
+};
+use crate::interferometry::observation::Observation;
+use crate::interferometry::operator::{Method, Pulse, Transform};
+use crate::interferometry::products::ClosureKind;
+
+impl Measured {
+    /// The terms of the loss, of images of so many pixels.
+    ///
+    /// # Errors
+    /// If there are none, one has no data, or a number is out of range.
+    pub fn terms(&self, losses: &[Loss], pixels: usize) -> Result<Data<f32>> {
+        let mut data = Data { image: None, others: Vec::new() };
+        if losses.is_empty() {
+            refuse!(
+                "loss is empty: there is nothing to fit; add a table [[loss]] with `data = …` ({}) and `weight = 1.0`",
+                LossKind::ALL.map(LossKind::name).join(", ")
+            );
+        }
+        for (k, loss) in losses.iter().enumerate() {
+            let name = || format!("loss {k}");
+            if !(loss.weight > 0.0 && loss.weight.is_finite()) {
+                refuse!("loss {k}: weight = {} is not allowed: above 0", loss.weight);
+            }
+            let weight = loss.weight;
+            match loss.data {
+                LossKind::Image if data.image.is_some() => refuse!("loss {k}: image again"),
+                LossKind::Image => {
+                    let term = Box::new(self.image(loss, pixels).within(name())?);
+                    data.image = Some(Weighted { weight, term });
+                }
+                _ => {
+                    let term = self.other(loss, pixels).within(name())?;
+                    data.others.push(Weighted { weight, term });
+                }
+            }
+        }
+        Ok(data)
+    }
+
+    fn movie(&self) -> Result<&[f64]> {
+        let missing = || FitError::Conflict("there are no images, only visibilities".to_owned());
+        self.movie.as_deref().ok_or_else(missing)
+    }
+
+    /// Flux of every frame, Jy.
+    fn fluxes(&self) -> Result<Vec<f64>> {
+        let movie = self.movie()?;
+        Ok(movie.chunks(movie.len() / self.times.len()).map(|f| f.iter().sum()).collect())
+    }
+
+    fn image(&self, loss: &Loss, pixels: usize) -> Result<ImageTerm<f32>> {
+        let sigma = loss.sigma.ok_or_else(|| {
+            FitError::missing(
+                "sigma",
+                "give `sigma = …`, the standard deviation of a pixel in Jy, beside `data = \"image\"`",
+            )
+        })?;
+        let movie = self.movie()?.iter().map(|x| *x as f32).collect();
+        Ok(ImageTerm::new(movie, pixels, sigma)?)
+    }
+
+    fn other(&self, loss: &Loss, pixels: usize) -> Result<Box<dyn FrameTerm<f32>>> {
+        if loss.data == LossKind::LightCurve {
+            let sigma = loss.sigma.ok_or_else(|| {
+                FitError::missing(
+                    "sigma",
+                    "give `sigma = …`, the standard deviation of the total flux in Jy, beside `data = \"light-curve\"`",
+                )
+            })?;
+            let flux: Vec<f64> = self.fluxes()?;
+            let sigmas = vec![sigma; flux.len()];
+            return Ok(Box::new(LightCurveTerm::new(flux, &sigmas, pixels)?));
+        }
+        let (name, quadratic) = match loss.data {
+            LossKind::Visibilities => ("visibilities", true),
+            LossKind::Amplitudes => ("amplitudes", false),
+            LossKind::ClosurePhases => ("closure phases", false),
+            _ => ("log closure amplitudes", false),
+        };
+        let scans: Vec<Option<Scan<f32>>> =
+            (0..self.times.len()).map(|frame| self.scan(frame, loss)).collect::<Result<_>>()?;
+        if scans.iter().all(Option::is_none) {
+            refuse!("no frame has any {name}");
+        }
+        Ok(Box::new(ScanTerm::new(name, pixels, quadratic, scans)))
+    }
+
+    fn scan(&self, frame: usize, loss: &Loss) -> Result<Option<Scan<f32>>> {
+        let missing = || {
+            FitError::Conflict(format!(
+                "there are no visibilities: give {FILE}, or a truth and an [observation] of it (`kerrlight fit --init` \
+                 writes an example)"
+            ))
+        };
+        let (observation, frames) = self.visibilities.as_ref().ok_or_else(missing)?;
+        let sky = self.sky.ok_or_else(missing)?;
+        let rows = observation.rows.iter().zip(frames).filter(|(_, of)| **of == frame);
+        let rows: Vec<_> = rows.map(|(row, _)| *row).collect();
+        let part = Observation { rows, ..observation.clone() };
+        if part.stokes_i().next().is_none() {
+            return Ok(None);
+        }
+        let uv: Vec<[f64; 2]> = part.stokes_i().map(|(row, _)| row.uv).collect();
+        let least = loss.least_snr.unwrap_or(0.0);
+        let term: Box<dyn DataTerm<f32> + Send> = match loss.data {
+            LossKind::Visibilities => Box::new(VisibilityTerm::new(&part)?),
+            LossKind::Amplitudes => Box::new(AmplitudeTerm::new(&part)?),
+            kind => {
+                let kind = match kind {
+                    LossKind::ClosurePhases => ClosureKind::Phase,
+                    _ => ClosureKind::LogAmplitude,
+                };
+                match ClosureTerm::new(&part, kind, least) {
+                    Err(DataTermError::Empty) => return Ok(None),
+                    term => Box::new(term?),
+                }
+            }
+        };
+        let transform = Transform::new(sky, Pulse::Triangle, &[uv], Method::Direct, MEMORY)?;
+        Ok(Some(Scan { transform, term }))
+    }
+}
+
+/// Exponentials of a frame up to this many bytes are kept.
+const MEMORY: usize = 8 << 20;
+
+/// The chain of a fit, in single precision.
+///
+/// # Errors
+/// If the motion is out of range.
+pub fn chain(instrument: &Instrument, motion: &Motion) -> Result<Chain<f32>> {
+    let Instrument { lines, hole, redshift, .. } = instrument;
+    Ok(Chain::new(lines, motion, hole, *redshift)?)
+}

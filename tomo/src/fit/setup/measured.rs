@@ -1,0 +1,254 @@
+//! The data of a fit: simulated, or measured.
+
+use super::truth::SPOT;
+use super::visibilities::{VisibilitySettings, frames_of, prepared};
+use super::{Instrument, Result, Truth, hours_per_m, sky};
+use crate::fit::settings::{
+    DataFiles, FitError, FitFile, Noise, Observation as Seen, Within, refuse,
+};
+use crate::interferometry::array::Array;
+use crate::interferometry::earth::{Frame, Ut1};
+use crate::interferometry::noise::{add_thermal_noise, apply_gains};
+use crate::interferometry::observation::Observation;
+use crate::interferometry::operator::{ImageGrid, Method, Pulse};
+use crate::interferometry::schedule::{self, Clock, Schedule, Setup};
+use crate::interferometry::simulate::{self, Movie};
+use crate::interferometry::source::Source;
+use crate::memory;
+
+/// What to write where there are no data.
+pub(super) const FILE: &str = "a table [data.visibilities] or [data.movie] with `path = \"FILE\"` (`kerrlight fit --init FILE` writes \
+     all of it)";
+
+/// The data of a fit, and what is known to be true.
+pub struct Measured {
+    /// Times of the frames, M.
+    pub times: Vec<f64>,
+    /// The movie, where images are the data or are simulated.
+    pub movie: Option<Vec<f64>>,
+    /// Visibilities, with the frame of each row.
+    pub visibilities: Option<(Observation, Vec<usize>)>,
+    /// Where pixels are on the sky, where that matters.
+    pub sky: Option<ImageGrid>,
+    /// What is simulated.
+    pub truth: Option<Truth>,
+}
+
+impl Measured {
+    /// Simulates the data of settings that have a truth, seen by `array` where they have an observation.
+    ///
+    /// # Errors
+    /// If settings are missing or contradict each other, or the truth shines in no pixel.
+    pub fn simulated(
+        file: &FitFile,
+        instrument: &Instrument,
+        array: Option<&Array>,
+    ) -> Result<Self> {
+        if file.world.is_empty() {
+            return simulate(file, instrument, array);
+        }
+        let world = file.simulated()?;
+        let instrument = Instrument::new(&world).within("world")?;
+        simulate(&world, &instrument, array)
+    }
+
+    /// Refuses settings that name both a truth and data, or neither.
+    ///
+    /// # Errors
+    /// Says what to write.
+    pub fn check_origin(file: &FitFile) -> Result<()> {
+        match (&file.data, &file.truth) {
+            (Some(_), Some(_)) => {
+                refuse!("truth and data exclude each other: simulate, or read")
+            }
+            (None, None) => refuse!(
+                "there is neither truth (to simulate) nor data (to read): {SPOT}; or {FILE}"
+            ),
+            (Some(_), None) if !file.world.is_empty() => {
+                refuse!("world is for simulated data: there is no truth")
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Takes images as the data. `name` is what the movie is called in messages.
+    ///
+    /// # Errors
+    /// If it has other frames or pixels than the settings.
+    pub fn of_movie(file: &FitFile, movie: Movie, name: &str) -> Result<Self> {
+        let (times, n) = (frames(file)?, file.screen.pixels);
+        if (movie.grid.width, movie.grid.height) != (n, n) || movie.frames() != times.len() {
+            refuse!(
+                "{name} has {} frames of {} x {} pixels: movie.frames and screen.pixels say {} of {n} x {n}",
+                movie.frames(),
+                movie.grid.width,
+                movie.grid.height,
+                times.len()
+            );
+        }
+        Ok(Measured {
+            times,
+            movie: Some(movie.pixels),
+            visibilities: None,
+            sky: sky(file).ok(),
+            truth: None,
+        })
+    }
+
+    /// Takes measured visibilities as the data. `name` is what they are called in messages.
+    ///
+    /// # Errors
+    /// If a visibility has no error, none is left, or mass or distance are missing.
+    pub fn of_visibilities(file: &FitFile, observation: Observation, name: &str) -> Result<Self> {
+        let Some(DataFiles::Visibilities { average_s, systematic, first_time, uv_min, .. }) =
+            file.data
+        else {
+            refuse!("{name} holds visibilities, and there is no [data.visibilities]")
+        };
+        let settings = VisibilitySettings { average_s, uv_min };
+        let mut observation = prepared(observation, &settings).within(name)?;
+        add_systematic("data.visibilities.systematic", systematic, &mut observation)?;
+        let (hours, of_rows) = frames_of(&mut observation);
+        let per_m = hours_per_m(file)?;
+        let times = hours.iter().map(|h| first_time + (h - hours[0]) / per_m).collect();
+        let (visibilities, sky) = (Some((observation, of_rows)), Some(sky(file)?));
+        Ok(Measured { times, movie: None, visibilities, sky, truth: None })
+    }
+
+    /// The data alone.
+    pub fn without_truth(&self) -> Self {
+        Self {
+            times: self.times.clone(),
+            movie: self.movie.clone(),
+            visibilities: self.visibilities.clone(),
+            sky: self.sky,
+            truth: None,
+        }
+    }
+}
+
+fn frames(file: &FitFile) -> Result<Vec<f64>> {
+    let missing = || {
+        FitError::missing(
+            "movie",
+            "frames of images need times; add a table [movie] with `frames = …`, their number, and `from = …` and \
+             `to = …`, the times of the first and the last in M",
+        )
+    };
+    let movie = file.movie.as_ref().ok_or_else(missing)?;
+    let n = movie.frames;
+    if !(movie.from.is_finite() && movie.to.is_finite() && (n == 1 || movie.to > movie.from)) {
+        refuse!("movie: from = {}, to = {} are not allowed: growing", movie.from, movie.to);
+    }
+    let step = (movie.to - movie.from) / (n.max(2) - 1) as f64;
+    Ok((0..n).map(|k| movie.from + step * k as f64).collect())
+}
+
+/// Refuses movies that there is no memory for: as they are simulated, as data, and as they are recovered.
+fn afford_movie(frames: usize, pixels: usize) -> Result<()> {
+    let what = || format!("movies of {frames} frames of {pixels} x {pixels} pixels");
+    let one = memory::movie(frames as f64, (pixels * pixels) as f64);
+    Ok(memory::afford(what, 2.0 * one)?)
+}
+
+fn simulate(file: &FitFile, instrument: &Instrument, array: Option<&Array>) -> Result<Measured> {
+    let truth = Truth::new(file)?;
+    let Some(seen) = &file.observation else {
+        let times = frames(file)?;
+        afford_movie(times.len(), file.screen.pixels)?;
+        let movie = Some(lit(&truth, truth.movie(file, instrument, &times)?)?);
+        let sky = sky(file).ok();
+        return Ok(Measured { times, movie, visibilities: None, sky, truth: Some(truth) });
+    };
+    let sky = sky(file)?;
+    let (mut observation, hours) = schedule_of(seen, array)?;
+    afford_movie(hours.len(), file.screen.pixels)?;
+    let per_m = hours_per_m(file)?;
+    let times: Vec<f64> = hours.iter().map(|h| seen.first_time + (h - hours[0]) / per_m).collect();
+    let movie = lit(&truth, truth.movie(file, instrument, &times)?)?;
+    let images = Movie { grid: sky, pixels: movie.clone() };
+    simulate::fill(&mut observation, &images, Pulse::Triangle, &hours, Method::Direct)?;
+    spoil(file, seen, &mut observation)?;
+    let frame = |time: f64| hours.partition_point(|hour| *hour < time - 1e-9).min(hours.len() - 1);
+    let of_rows = observation.rows.iter().map(|row| frame(row.time_h)).collect();
+    let visibilities = Some((observation, of_rows));
+    Ok(Measured { times, movie: Some(movie), visibilities, sky: Some(sky), truth: Some(truth) })
+}
+
+/// Rows of the observation without values, and hours of UTC of its scans.
+fn schedule_of(seen: &Seen, array: Option<&Array>) -> Result<(Observation, Vec<f64>)> {
+    let source: Source = seen
+        .source
+        .parse()
+        .map_err(|error| FitError::Conflict(format!("observation.source: {error}")))?;
+    let (clock, [start_h, stop_h]) = clock(seen)?;
+    let schedule = Schedule { mjd: seen.mjd, clock, start_h, stop_h, scans: seen.scans };
+    let setup = Setup {
+        frequency_hz: seen.frequency_ghz * 1e9,
+        bandwidth_hz: seen.bandwidth_ghz * 1e9,
+        integration_s: seen.integration_s,
+        elevation_deg: seen.elevation_deg,
+        ut1: Ut1::Table,
+        frame: Frame::Catalogue,
+    };
+    let missing = || FitError::missing("observation.array", "an observation needs its stations");
+    let array = array.ok_or_else(missing)?;
+    let mut observation = schedule::observe_affordable(array, source.position, &schedule, &setup)
+        .within("observation")?;
+    observation.source = source.name;
+    Ok((observation, schedule.hours_utc(setup.ut1).within("observation")?))
+}
+
+/// The clock of the observation and its hours.
+fn clock(seen: &Seen) -> Result<(Clock, [f64; 2])> {
+    match (seen.utc, seen.gmst) {
+        (Some(hours), None) => Ok((Clock::Utc, hours)),
+        (None, Some(hours)) => Ok((Clock::Gmst, hours)),
+        (Some(_), Some(_)) => refuse!(
+            "observation.gmst is not allowed: observation.utc is given too, and one is enough"
+        ),
+        (None, None) => Err(FitError::missing(
+            "observation.utc",
+            "give `utc = [FROM, TO]`, hours of UTC of the first scan and of one after the last, or `gmst = [FROM, TO]`, \
+             the same in sidereal time, in [observation]",
+        )),
+    }
+}
+
+/// Errors of gains, thermal noise and systematic errors, in the order of light's way.
+fn spoil(file: &FitFile, seen: &Seen, observation: &mut Observation) -> Result<()> {
+    if let Some(gains) = seen.gains {
+        apply_gains(observation, gains, file.seed);
+    }
+    if seen.noise == Noise::Thermal {
+        add_thermal_noise(observation, file.seed);
+    }
+    match seen.systematic {
+        Some(part) => add_systematic("observation.systematic", part, observation),
+        None => Ok(()),
+    }
+}
+
+/// A simulated movie, if any of its pixels shines: a dark one would be recovered as nothing, perfectly.
+/// A truth of amplitude 0 is meant to be dark.
+fn lit(truth: &Truth, movie: Vec<f64>) -> Result<Vec<f64>> {
+    let brightest = movie.iter().fold(0.0f64, |most, x| most.max(*x));
+    if brightest < 1e-30 && !truth.is_dark() {
+        refuse!(
+            "the truth shines in no pixel of any frame (the brightest has {brightest:e} Jy): spots must lie in the region \
+             (region.r_min, r_max, z_width), be wide enough to meet rays, and shine during the movie (motion.injection_time)"
+        );
+    }
+    Ok(movie)
+}
+
+/// Adds a part of each amplitude to its error in quadrature.
+fn add_systematic(name: &str, part: f64, observation: &mut Observation) -> Result<()> {
+    if !(part >= 0.0 && part.is_finite()) {
+        return Err(FitError::range(name, part, "0 or above"));
+    }
+    for row in &mut observation.rows {
+        row.noise_sigma[0] = row.noise_sigma[0].hypot(part * row.products[0].norm());
+    }
+    Ok(())
+}

@@ -1,0 +1,209 @@
+//! From settings to the parts of a fit: sight lines, motion, data with their losses, the representation and its training.
+
+mod imprint;
+mod instrument;
+mod learning;
+mod losses;
+mod measured;
+mod truth;
+mod visibilities;
+
+pub use imprint::imprint;
+pub use instrument::Instrument;
+pub use learning::{caution, check, representation, training};
+pub use losses::chain;
+pub use measured::Measured;
+pub use truth::Truth;
+pub use visibilities::{VisibilitySettings, frames_of, prepared};
+
+use super::linear::Prior;
+use super::settings::{
+    AxisScan, AxisSearch, FitError, FitFile, Linear, Observer as ObserverSettings, Screen,
+};
+use super::settings::{Velocity, WidthOf, Within};
+use super::{Motion, Regulariser};
+use crate::dynamics::{Axis, Injection};
+use crate::interferometry::operator::ImageGrid;
+use crate::optimise::Polynomial;
+use crate::scene;
+use crate::units::{MICROARCSECOND, gravitational_angle, gravitational_time};
+use kerrlight_geodesic::{Inclination, Observer};
+
+type Result<T> = std::result::Result<T, FitError>;
+
+/// The observer.
+///
+/// # Errors
+/// If an angle or a radius is out of range.
+pub fn observer(observer: &ObserverSettings) -> Result<Observer> {
+    let inclination = Inclination::from_degrees(observer.inclination_deg).within("observer")?;
+    match observer.radius {
+        None => Ok(Observer::at_infinity(inclination)),
+        Some(radius) => Observer::at_radius(inclination, radius).within("observer"),
+    }
+}
+
+/// M from one pixel to the next.
+///
+/// # Errors
+/// If the number of pixels or the width is out of range.
+pub fn spacing(screen: &Screen) -> Result<f64> {
+    let Screen { pixels, width, width_of, .. } = *screen;
+    if !(2..=4096).contains(&pixels) {
+        return Err(FitError::range("screen.pixels", pixels, "2 to 4096"));
+    }
+    if !(width > 0.0 && width.is_finite()) {
+        return Err(FitError::range("screen.width", width, "M above 0"));
+    }
+    Ok(match width_of {
+        WidthOf::Edges => width / pixels as f64,
+        WidthOf::Centers => width / (pixels - 1) as f64,
+    })
+}
+
+/// Where the model's pixels are on the sky.
+///
+/// # Errors
+/// If neither a field nor mass and distance are given, or they are out of range.
+pub fn sky(file: &FitFile) -> Result<ImageGrid> {
+    let n = file.screen.pixels;
+    let field_uas = match (file.screen.field_uas, file.hole.mass_msun, file.hole.distance_kpc) {
+        (Some(field), ..) => field,
+        (None, Some(mass), Some(distance)) => {
+            spacing(&file.screen)? * n as f64 * gravitational_angle(mass, distance)
+        }
+        (None, None, _) => {
+            let why = format!("visibilities need angles; {MASS}");
+            return Err(FitError::missing("hole.mass_msun", why));
+        }
+        _ => {
+            return Err(FitError::missing(
+                "hole.distance_kpc",
+                "visibilities need angles; give `distance_kpc = …` in [hole], e.g. 8.178 for Sgr A*, 16800.0 for M87*, or \
+                 `field_uas = …`, the width of the field on the sky, in [screen]",
+            ));
+        }
+    };
+    Ok(ImageGrid::new(n, n, field_uas * MICROARCSECOND)?)
+}
+
+/// What to write where the mass is missing.
+const MASS: &str =
+    "give `mass_msun = …`, in solar masses, in [hole], e.g. 4.154e6 for Sgr A*, 6.5e9 for M87*";
+
+/// What to write where the axis is missing.
+const AXIS: &str = "give `axis = [0.0, 0.0, 1.0]`, the direction that matter turns about right-handed (this one: \
+     the hole's), in [motion]";
+
+/// What to write where the linear problem is missing.
+const LINEAR: &str = "add a table [linear] with `upper = 3.0` (the largest emission that is allowed: a few times what \
+     you expect), `rounds = 4` and `iterations = 40`";
+
+/// Hours of one M.
+///
+/// # Errors
+/// If the mass is missing or not above 0.
+pub fn hours_per_m(file: &FitFile) -> Result<f64> {
+    let missing = || {
+        FitError::missing("hole.mass_msun", format!("times of an observation are hours; {MASS}"))
+    };
+    let mass = file.hole.mass_msun.ok_or_else(missing)?;
+    if !(mass > 0.0 && mass.is_finite()) {
+        return Err(FitError::range("hole.mass_msun", mass, "above 0"));
+    }
+    Ok(gravitational_time(mass) / 3600.0)
+}
+
+/// The linear problem's settings.
+///
+/// # Errors
+/// If they are missing.
+pub fn linear(file: &FitFile) -> Result<&Linear> {
+    let missing = || {
+        let why = format!("linear-grid, a linear start and a scan of axes need it; {LINEAR}");
+        FitError::missing("linear", why)
+    };
+    let linear = file.linear.as_ref().ok_or_else(missing)?;
+    if !(linear.upper > 0.0 && linear.upper.is_finite()) {
+        return Err(FitError::range("linear.upper", linear.upper, "above 0"));
+    }
+    Ok(linear)
+}
+
+/// Penalties of the linear problem.
+pub fn priors(linear: &Linear) -> Vec<Prior> {
+    let of =
+        [(Regulariser::Smoothness, linear.smoothness), (Regulariser::Sparsity, linear.sparsity)];
+    let asked = of.into_iter().filter(|(_, weight)| *weight > 0.0);
+    asked.map(|(regulariser, weight)| Prior { regulariser, weight }).collect()
+}
+
+/// How matter turns, with the times of the frames in M.
+///
+/// # Errors
+/// If the velocity is out of range.
+pub fn motion(file: &FitFile, times: Vec<f64>) -> Result<Motion> {
+    let velocity = law(&file.motion.velocity, file.seed).angular().within("motion.velocity")?;
+    Ok(Motion {
+        velocity,
+        reference: file.motion.reference_time,
+        injection: file.motion.injection_time.map(|time| Injection { time }),
+        times,
+    })
+}
+
+/// The law of the velocity, as scenes have it; what is drawn is drawn from `seed`.
+pub fn law(chosen: &Velocity, seed: u64) -> scene::Velocity {
+    match chosen.clone() {
+        Velocity::Keplerian { drag } => scene::Velocity::Keplerian { drag },
+        Velocity::PowerLaw { radius, rate, exponent } => {
+            scene::Velocity::PowerLaw { radius, rate, exponent }
+        }
+        Velocity::Table { radii, rates } => scene::Velocity::Table { radii, rates },
+        Velocity::Perturbed { of, deviation, correlation_length, radii } => {
+            let of = Box::new(law(&of, seed));
+            let by = scene::Perturbed { of, deviation, correlation_length, radii, seed };
+            scene::Velocity::Perturbed(by)
+        }
+    }
+}
+
+/// The true or known axis.
+///
+/// # Errors
+/// If it has no direction.
+pub fn known_axis(file: &FitFile) -> Result<Option<Axis>> {
+    file.motion.axis.map(Axis::new).transpose().within("motion")
+}
+
+/// Where the axis starts, and its rates if it is learnt.
+///
+/// # Errors
+/// If the axis is said to be known and is missing, or a rate is out of range.
+pub fn axis(file: &FitFile) -> Result<(Axis, Option<Polynomial>)> {
+    match &file.axis {
+        AxisSearch::Known {} => {
+            let missing = || {
+                FitError::missing(
+                    "motion.axis",
+                    format!("[axis.known] says that it is known; {AXIS}"),
+                )
+            };
+            Ok((known_axis(file)?.ok_or_else(missing)?, None))
+        }
+        AxisSearch::From { start, rate, last_rate } => {
+            let steps = file.training.steps;
+            let rate = Polynomial { from: *rate, to: *last_rate, steps, power: 1.0 };
+            let rate = rate.checked().within("axis.from")?;
+            Ok((Axis::new(*start).within("axis.from.start")?, Some(rate)))
+        }
+        AxisSearch::Scan(AxisScan { rate, last_rate, .. }) => {
+            linear(file)?;
+            let (from, to, steps) = (*rate, *last_rate, file.training.steps);
+            let rate = Polynomial { from, to, steps, power: 1.0 };
+            let rate = (from != 0.0).then(|| rate.checked()).transpose().within("axis.scan")?;
+            // Until the scan has found a better one.
+            Ok((Axis::new([0.0, 0.0, 1.0])?, rate))
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! Representations of others, beside those that kerrlight has itself.
+
+use super::Representation;
+use std::error::Error;
+use std::ops::RangeInclusive;
+
+/// Why a representation cannot be built: any error, of which the message is shown.
+pub type BuildError = Box<dyn Error + Send + Sync>;
+
+/// Makes a representation of its settings.
+pub type BuildRepresentation = fn(&OwnSettings) -> Result<Box<dyn Representation<f32>>, BuildError>;
+
+/// What a representation of one's own is told.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OwnSettings {
+    /// Inner radius of the region of recovery, M.
+    pub r_min: f64,
+    /// Outer radius of the region of recovery, M.
+    pub r_max: f64,
+    /// Largest |z| of the region of recovery, M; infinite where there is no limit.
+    pub z_width: f64,
+    /// `representation.own` of the fit.
+    pub table: toml::Table,
+}
+
+/// A number of `representation.own` that is missing or out of range.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum OwnError {
+    /// The number is missing: none has a default.
+    #[error(
+        "representation.own.{key} is missing: add `own = {{ {key} = … }}`, a number from {low} to {high}, to \
+         [representation]"
+    )]
+    Missing {
+        /// The key.
+        key: String,
+        /// Least value.
+        low: f64,
+        /// Largest value.
+        high: f64,
+    },
+    /// The value is no number, or out of range.
+    #[error("representation.own.{key} = {value} is not allowed: {low} to {high}")]
+    Range {
+        /// The key.
+        key: String,
+        /// The value that was given.
+        value: String,
+        /// Least value.
+        low: f64,
+        /// Largest value.
+        high: f64,
+    },
+}
+
+impl OwnSettings {
+    /// A number of `representation.own`, which has no default.
+    ///
+    /// # Errors
+    /// If it is missing, no number, or out of range.
+    pub fn number(&self, key: &str, allowed: RangeInclusive<f64>) -> Result<f64, OwnError> {
+        let (low, high) = (*allowed.start(), *allowed.end());
+        let missing = || OwnError::Missing { key: key.to_owned(), low, high };
+        let value = self.table.get(key).ok_or_else(missing)?;
+        let number = value.as_float().or(value.as_integer().map(|n| n as f64));
+        number.filter(|number| allowed.contains(number)).ok_or_else(|| OwnError::Range {
+            key: key.to_owned(),
+            value: value.to_string(),
+            low,
+            high,
+        })
+    }
+}
+
+/// Representations that a program adds, by the names that `representation.kind` gives them.
+#[derive(Debug, Clone, Default)]
+pub struct Registry {
+    all: Vec<(&'static str, BuildRepresentation)>,
+}
+
+impl Registry {
+    /// No representation but kerrlight's own.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a representation; of several with one name the first counts.
+    pub fn add(&mut self, name: &'static str, build: BuildRepresentation) {
+        self.all.push((name, build));
+    }
+
+    /// The names, in the order in which they were added.
+    pub fn names(&self) -> impl Iterator<Item = &'static str> {
+        self.all.iter().map(|(name, _)| *name)
+    }
+
+    /// Builds the representation of a name; `None` if there is none.
+    pub fn build(
+        &self,
+        name: &str,
+        settings: &OwnSettings,
+    ) -> Option<Result<Box<dyn Representation<f32>>, BuildError>> {
+        let (_, build) = self.all.iter().find(|(known, _)| *known == name)?;
+        Some(build(settings))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::representation::{Network, NetworkSettings};
+
+    fn small(own: &OwnSettings) -> Result<Box<dyn Representation<f32>>, BuildError> {
+        let width = own.number("width", 8.0..=512.0)? as usize;
+        Ok(Box::new(Network::new(NetworkSettings { width, ..NetworkSettings::bhnerf() })?))
+    }
+
+    #[test]
+    fn exact_what_is_added_is_built_and_refuses_by_name() {
+        let mut registry = Registry::new();
+        registry.add("small", small);
+        let own = |text: &str| OwnSettings {
+            r_min: 0.0,
+            r_max: 8.0,
+            z_width: f64::INFINITY,
+            table: text.parse().unwrap(),
+        };
+        let build = |text: &str| registry.build("small", &own(text)).unwrap();
+        assert!(build("width = 8").unwrap().parameters() > 0);
+        let says = |text: &str| build(text).err().unwrap().to_string();
+        assert!(says("").starts_with("representation.own.width is missing"));
+        assert_eq!(says("width = 4"), "representation.own.width = 4 is not allowed: 8 to 512");
+        assert!(registry.build("other", &own("")).is_none());
+        assert!(registry.names().eq(["small"]));
+    }
+}
