@@ -6,6 +6,10 @@ use core::ops::{Deref, DerefMut};
 /// Doubles per cache line.
 const LINE: usize = 8;
 
+/// Something that starts on a cache line, so that no register in it lies across two.
+#[repr(align(64))]
+pub(super) struct Aligned<T>(pub T);
+
 /// A column of doubles. Its first one lies on a 64-byte boundary, so that registers of rays with
 /// a multiple of four points are not written across two lines.
 #[derive(Debug, Default)]

@@ -2,6 +2,7 @@
 
 use super::checked;
 
+use super::column::Aligned;
 use super::error::{MAX_STEP, estimate};
 use super::lanes::{InstructionSet, Lanes, MAX_LANES, Task, dispatch};
 use super::march::{COLUMNS, GROWTH, Jump, Key, MAX_ORDER, March, RayLanes};
@@ -327,7 +328,7 @@ impl Task<f64> for Marching<'_> {
         let request = rays.request;
         let entry =
             if 1.0 / request.radius > rays.camera.w_obs { 1.0 / request.radius } else { 0.0 };
-        let mut rows = [[0.0; MAX_ORDER * MAX_LANES]; COLUMNS];
+        let Aligned(rows) = &mut Aligned([[0.0; MAX_ORDER * MAX_LANES]; COLUMNS]);
         let mut jumps = Jump::<V>::room(&rays.camera);
         let plan = core::mem::take(&mut nodes.plan);
         for group in plan.chunk_by(|a, b| a.key == b.key) {
@@ -343,7 +344,7 @@ impl Task<f64> for Marching<'_> {
                     motion,
                     rule: &request.rule,
                     wanted: request.quantities,
-                    rows: &mut rows,
+                    rows: &mut *rows,
                     jumps: &mut jumps,
                 };
                 let mut columns = nodes.columns.each_mut().map(Vec::as_mut_slice);

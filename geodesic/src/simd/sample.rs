@@ -1,5 +1,6 @@
 //! One block of rays, sampled equidistantly in Mino time.
 
+use super::column::Aligned;
 use super::error::{MAX_STEP, estimate, speed_of_samples};
 use super::lanes::{CHUNK, Lanes, MAX_LANES, Pair, Task, transpose_plain};
 use super::math::{SMALL_ANGLE, atan2, small_asin, small_atan};
@@ -167,7 +168,7 @@ fn sample_block<V: Lanes<f64>, const ESCAPE: bool, const PLAIN: bool>(
     }
     let parts = Parts { radial, mirror, outward: ESCAPE };
     let mut run = PolarRun::new(&rays.camera, &motion, (alpha, beta), h, parts.get(0));
-    let mut rows = [[0.0; CHUNK * MAX_LANES]; 4];
+    let Aligned(rows) = &mut Aligned([[0.0; CHUNK * MAX_LANES]; 4]);
     for at in (0..rays.per_ray).step_by(CHUNK) {
         let len = CHUNK.min(rays.per_ray - at);
         for start in starts.iter().take(V::LANES) {

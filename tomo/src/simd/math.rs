@@ -166,8 +166,7 @@ pub fn sin_cos<T: Float, V: Lanes<T>>(x: V) -> (V, V) {
     let (sin, cos) = near_sin_cos::<T, V>(x);
     let zero = V::splat(T::zero());
     let size = x.max(zero - x);
-    let beyond = V::select(V::splat(T::FAR).lt(size), V::splat(T::one()), zero).sum();
-    if beyond > T::zero() { patch::<T, V>(x, sin, cos) } else { (sin, cos) }
+    if V::any(V::splat(T::FAR).lt(size)) { patch::<T, V>(x, sin, cos) } else { (sin, cos) }
 }
 
 /// The lanes beyond `FAR` replaced by what the standard library says.

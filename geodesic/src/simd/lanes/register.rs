@@ -186,12 +186,7 @@ pub trait Lanes<T: Element>:
             // SAFETY: there are enough.
             return unsafe { Self::read(x.as_ptr()) };
         }
-        let mut lanes = [fill; MAX_LANES];
-        for (lane, x) in lanes.iter_mut().zip(x) {
-            *lane = *x;
-        }
-        // SAFETY: no register has more than MAX_LANES lanes.
-        unsafe { Self::read(lanes.as_ptr()) }
+        load_few(x, fill)
     }
 
     /// Lanes to the front of `out`, as many as fit.
@@ -201,9 +196,7 @@ pub trait Lanes<T: Element>:
             // SAFETY: there is room.
             return unsafe { self.write(out.as_mut_ptr()) };
         }
-        for (out, lane) in out.iter_mut().zip(self.lanes()) {
-            *out = lane;
-        }
+        store_few(&self, out);
     }
 
     /// The lanes, and zeros behind them.
@@ -235,6 +228,27 @@ pub trait Lanes<T: Element>:
     #[inline(always)]
     fn transpose_into(rows: &[T], stride: usize, out: &mut [T], starts: &[usize]) {
         transpose_plain(rows, stride, CHUNK, out, starts.get(..Self::LANES).unwrap_or(&[]));
+    }
+}
+
+/// [`Lanes::load_or`] of fewer numbers than there are lanes. Out of the way of kernels.
+#[cold]
+#[inline(never)]
+fn load_few<T: Element, V: Lanes<T>>(x: &[T], fill: T) -> V {
+    let mut lanes = [fill; MAX_LANES];
+    for (lane, x) in lanes.iter_mut().zip(x) {
+        *lane = *x;
+    }
+    // SAFETY: no register has more than MAX_LANES lanes.
+    unsafe { V::read(lanes.as_ptr()) }
+}
+
+/// [`Lanes::store`] to fewer places than there are lanes.
+#[cold]
+#[inline(never)]
+fn store_few<T: Element, V: Lanes<T>>(lanes: &V, out: &mut [T]) {
+    for (out, lane) in out.iter_mut().zip(lanes.lanes()) {
+        *out = lane;
     }
 }
 
