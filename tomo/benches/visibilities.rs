@@ -4,7 +4,7 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use kerrlight_tomo::interferometry::array::built_in;
 use kerrlight_tomo::interferometry::earth::{Frame, SourcePosition, Ut1};
-use kerrlight_tomo::interferometry::operator::{Dtft, ImageGrid, Nufft, Operator, Pulse, Real};
+use kerrlight_tomo::interferometry::operator::{Dtft, Float, ImageGrid, Nufft, Operator, Pulse};
 use kerrlight_tomo::interferometry::schedule::{Clock, Schedule, Setup, observe};
 use kerrlight_tomo::units::MICROARCSECOND;
 use num_complex::Complex;
@@ -31,7 +31,7 @@ fn frames() -> Vec<Vec<[f64; 2]>> {
     schedule.hours().map(|time| of(time).collect()).collect()
 }
 
-fn measure<T: Real>(criterion: &mut Criterion, name: &str, tolerance: f64, budget: usize) {
+fn measure<T: Float>(criterion: &mut Criterion, name: &str, tolerance: f64, budget: usize) {
     let grid = ImageGrid::new(PIXELS, PIXELS, 85.0 * MICROARCSECOND).expect("a grid");
     let operator = Dtft::<T>::new(grid, Pulse::Triangle, &frames(), budget);
     let count = FRAMES as usize * grid.pixels();

@@ -17,7 +17,6 @@ pub mod optimise;
 pub mod plan;
 pub mod points;
 pub mod polarization;
-mod real;
 pub mod render;
 pub mod representation;
 pub mod scene;

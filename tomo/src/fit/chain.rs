@@ -6,7 +6,6 @@ use super::occupancy::Occupancy;
 use super::shift::Shift;
 use super::sightlines::Sightlines;
 use crate::dynamics::{AngularVelocity, Axis, Injection};
-use crate::real::Real;
 use crate::representation::{Representation, Workspace};
 use crate::simd::Float;
 use kerrlight_geodesic::{Kerr, OutOfRange};
@@ -192,7 +191,8 @@ impl<T: Float> Chain<T> {
             batch.set((0..self.rays()).map(|ray| (ray as u32, frame as u32)));
             batch.gather(self, axis, None);
             let Columns { pulled: [x, y, z], weight, .. } = &batch.columns;
-            let light = |k: usize| weight[k].double() * field([x[k], y[k], z[k]].map(Real::double));
+            let light =
+                |k: usize| weight[k].double() * field([x[k], y[k], z[k]].map(Float::double));
             let sum = |range: &[usize]| (range[0]..range[1]).map(light).sum::<f64>();
             let fluxes: Vec<f64> = batch.starts.par_windows(2).map(sum).collect();
             for (pixel, flux) in self.pixel.iter().zip(fluxes) {

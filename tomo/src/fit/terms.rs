@@ -2,7 +2,7 @@
 
 use crate::interferometry::data_terms::{DataTerm, Residual};
 use crate::interferometry::operator::{Operator, Transform};
-use crate::real::Real;
+use crate::simd::Float;
 use kerrlight_geodesic::OutOfRange;
 use num_complex::Complex;
 use rustfft::FftNum;
@@ -11,7 +11,7 @@ use rustfft::FftNum;
 ///
 /// Images are rows of pixels from the north, each from the east, in Jy/pixel where data are
 /// radio ones.
-pub trait FrameTerm<T: Real>: Send + Sync {
+pub trait FrameTerm<T: Float>: Send + Sync {
     /// What the data are, for logs and reports.
     fn name(&self) -> &str;
 
@@ -59,7 +59,7 @@ pub struct ImageTerm<T> {
     inverse_variance: T,
 }
 
-impl<T: Real> ImageTerm<T> {
+impl<T: Float> ImageTerm<T> {
     /// Of a movie, frame after frame, all pixels with the same standard deviation.
     ///
     /// # Errors
@@ -89,7 +89,7 @@ impl<T: Real> ImageTerm<T> {
     }
 }
 
-impl<T: Real> FrameTerm<T> for ImageTerm<T> {
+impl<T: Float> FrameTerm<T> for ImageTerm<T> {
     fn name(&self) -> &str {
         "image"
     }
@@ -159,7 +159,7 @@ impl LightCurveTerm {
     }
 }
 
-impl<T: Real> FrameTerm<T> for LightCurveTerm {
+impl<T: Float> FrameTerm<T> for LightCurveTerm {
     fn name(&self) -> &str {
         "light curve"
     }
@@ -210,7 +210,7 @@ pub struct ScanTerm<T: FftNum> {
     scans: Vec<Option<Scan<T>>>,
 }
 
-impl<T: Real + FftNum> ScanTerm<T> {
+impl<T: Float + FftNum> ScanTerm<T> {
     /// Of a scan a frame. `quadratic`: whether χ² is so in the visibilities.
     ///
     /// # Panics
@@ -224,7 +224,7 @@ impl<T: Real + FftNum> ScanTerm<T> {
     }
 }
 
-impl<T: Real + FftNum> FrameTerm<T> for ScanTerm<T> {
+impl<T: Float + FftNum> FrameTerm<T> for ScanTerm<T> {
     fn name(&self) -> &str {
         &self.name
     }

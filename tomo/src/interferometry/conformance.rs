@@ -1,20 +1,20 @@
 //! What every operator and every data term has to satisfy, in any precision: one call each.
 
 use super::data_terms::DataTerm;
-use super::operator::{Operator, Real};
+use super::operator::{Float, Operator};
 use num_complex::Complex;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 /// A number of the data, real or complex, with the inner product Re Σ x̄ y.
-pub(super) trait Datum<T: Real>: Copy {
+pub(super) trait Datum<T: Float>: Copy {
     /// Of two numbers.
     fn of(parts: [f64; 2]) -> Self;
     /// Real and imaginary part.
     fn parts(self) -> [f64; 2];
 }
 
-impl<T: Real> Datum<T> for T {
+impl<T: Float> Datum<T> for T {
     fn of(parts: [f64; 2]) -> Self {
         T::of(parts[0])
     }
@@ -24,7 +24,7 @@ impl<T: Real> Datum<T> for T {
     }
 }
 
-impl<T: Real> Datum<T> for Complex<T> {
+impl<T: Float> Datum<T> for Complex<T> {
     fn of(parts: [f64; 2]) -> Self {
         Complex::new(T::of(parts[0]), T::of(parts[1]))
     }
@@ -34,7 +34,7 @@ impl<T: Real> Datum<T> for Complex<T> {
     }
 }
 
-fn dot<T: Real, D: Datum<T>>(a: &[D], b: &[D]) -> f64 {
+fn dot<T: Float, D: Datum<T>>(a: &[D], b: &[D]) -> f64 {
     let product = |(a, b): (&D, &D)| {
         let ([a_re, a_im], [b_re, b_im]) = (a.parts(), b.parts());
         a_re * b_re + a_im * b_im
@@ -42,17 +42,17 @@ fn dot<T: Real, D: Datum<T>>(a: &[D], b: &[D]) -> f64 {
     a.iter().zip(b).map(product).sum()
 }
 
-fn norm<T: Real, D: Datum<T>>(a: &[D]) -> f64 {
+fn norm<T: Float, D: Datum<T>>(a: &[D]) -> f64 {
     dot::<T, D>(a, a).sqrt()
 }
 
-fn random<T: Real, D: Datum<T>>(count: usize, seed: u64) -> Vec<D> {
+fn random<T: Float, D: Datum<T>>(count: usize, seed: u64) -> Vec<D> {
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     (0..count).map(|_| D::of([0, 1].map(|_| random.random_range(-1.0..1.0)))).collect()
 }
 
 /// a + s·b.
-fn moved<T: Real, D: Datum<T>>(a: &[D], b: &[D], s: f64) -> Vec<D> {
+fn moved<T: Float, D: Datum<T>>(a: &[D], b: &[D], s: f64) -> Vec<D> {
     let sum = |(a, b): (&D, &D)| {
         let (a, b) = (a.parts(), b.parts());
         D::of([a[0] + s * b[0], a[1] + s * b[1]])
@@ -64,7 +64,7 @@ fn moved<T: Real, D: Datum<T>>(a: &[D], b: &[D], s: f64) -> Vec<D> {
 /// direction are F of that direction; `forward` overwrites and `adjoint` adds.
 pub(super) fn operator<T, D>(name: &str, operator: &impl Operator<T, Datum = D>, tolerance: f64)
 where
-    T: Real,
+    T: Float,
     D: Datum<T>,
 {
     let forward = |movie: &[T]| {
@@ -95,7 +95,7 @@ where
 
 /// Central differences of fourth order with step `h`, along every visibility's real and imaginary
 /// part and along random directions, against the gradient; it adds, with the weight asked for.
-pub(super) fn data_term<T: Real>(
+pub(super) fn data_term<T: Float>(
     name: &str,
     term: &dyn DataTerm<T>,
     model: &[Complex<T>],
@@ -133,7 +133,7 @@ pub(super) fn data_term<T: Real>(
 
 /// The gradient of χ²(F x) with respect to pixels, from the adjoint of a data term's gradient,
 /// against central differences along random directions.
-pub(super) fn chain<T: Real>(
+pub(super) fn chain<T: Float>(
     name: &str,
     operator: &impl Operator<T, Datum = Complex<T>>,
     term: &dyn DataTerm<T>,

@@ -2,7 +2,7 @@
 
 use super::{DataTerm, DataTermError, Residual, faintest};
 use crate::interferometry::observation::Observation;
-use crate::interferometry::operator::Real;
+use crate::interferometry::operator::Float;
 use crate::interferometry::products::{ClosureKind, ClosureSet};
 use core::f64::consts::{PI, TAU};
 use nalgebra::DMatrix;
@@ -29,7 +29,7 @@ struct Scan<T> {
     stations: Vec<Vec<u16>>,
 }
 
-impl<T: Real> ClosureTerm<T> {
+impl<T: Float> ClosureTerm<T> {
     /// Of an observation's Stokes I: in every scan a largest set of independent quantities, from
     /// baselines stronger than `least_snr` times their noise.
     ///
@@ -53,7 +53,7 @@ impl<T: Real> ClosureTerm<T> {
     }
 }
 
-impl<T: Real> Scan<T> {
+impl<T: Float> Scan<T> {
     fn new(set: &ClosureSet) -> Result<Self, DataTermError> {
         let n = set.closures.len();
         let covariance = DMatrix::from_row_slice(n, n, &set.covariance);
@@ -121,17 +121,17 @@ impl<T: Real> Scan<T> {
 /// The residual of a log closure amplitude of a model without visibility.
 const DARK: f64 = 100.0;
 
-fn is_dark<T: Real>(visibility: Complex<T>) -> bool {
+fn is_dark<T: Float>(visibility: Complex<T>) -> bool {
     visibility.norm() <= faintest()
 }
 
 /// The same angle in [−π, π].
-fn wrapped<T: Real>(angle: T) -> T {
+fn wrapped<T: Float>(angle: T) -> T {
     let turns = (angle / T::of(TAU)).round();
     (angle - turns * T::of(TAU)).max(T::of(-PI)).min(T::of(PI))
 }
 
-impl<T: Real> DataTerm<T> for ClosureTerm<T> {
+impl<T: Float> DataTerm<T> for ClosureTerm<T> {
     fn visibilities(&self) -> usize {
         self.visibilities
     }

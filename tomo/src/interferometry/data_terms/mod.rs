@@ -8,7 +8,7 @@ pub use closures::ClosureTerm;
 pub use visibilities::{AmplitudeTerm, VisibilityTerm};
 
 use super::observation::{Measured, Observation};
-use super::operator::Real;
+use super::operator::Float;
 use num_complex::Complex;
 
 /// Why data make no term.
@@ -56,7 +56,7 @@ pub struct Residual {
 }
 
 /// A χ² of model visibilities.
-pub trait DataTerm<T: Real>: Sync {
+pub trait DataTerm<T: Float>: Sync {
     /// How many visibilities it expects.
     fn visibilities(&self) -> usize;
 
@@ -102,7 +102,7 @@ fn checked(observation: &Observation) -> Result<Vec<Measured>, DataTermError> {
 }
 
 /// 1/σ² of data in the fit's precision.
-fn inverse_variances<T: Real>(data: &[Measured]) -> Result<Vec<T>, DataTermError> {
+fn inverse_variances<T: Float>(data: &[Measured]) -> Result<Vec<T>, DataTermError> {
     let one = |(index, m): (usize, &Measured)| {
         let inverse = T::of(m.noise_sigma.powi(-2));
         let overflow = DataTermError::Overflow { index, sigma: m.noise_sigma };
@@ -112,7 +112,7 @@ fn inverse_variances<T: Real>(data: &[Measured]) -> Result<Vec<T>, DataTermError
 }
 
 /// Amplitudes at or below this count as 0: their squares underflow, and phase and logarithm mean nothing.
-fn faintest<T: Real>() -> T {
+fn faintest<T: Float>() -> T {
     T::min_positive_value().sqrt()
 }
 

@@ -26,7 +26,7 @@ fn observation(scans: usize, snr: f64) -> Observation {
 }
 
 /// The terms of an observation in either precision.
-fn terms<T: Real>(data: &Observation) -> Vec<(&'static str, Box<dyn DataTerm<T>>)> {
+fn terms<T: Float>(data: &Observation) -> Vec<(&'static str, Box<dyn DataTerm<T>>)> {
     let closure = |kind| Box::new(ClosureTerm::<T>::new(data, kind, 0.0).unwrap());
     vec![
         ("visibilities", Box::new(VisibilityTerm::<T>::new(data).unwrap())),
@@ -44,7 +44,7 @@ fn model(data: &Observation) -> Vec<Complex64> {
 }
 
 /// A model in either precision.
-fn of_precision<T: Real>(model: &[Complex64]) -> Vec<Complex<T>> {
+fn of_precision<T: Float>(model: &[Complex64]) -> Vec<Complex<T>> {
     model.iter().map(|v| Complex::new(T::of(v.re), T::of(v.im))).collect()
 }
 
@@ -85,7 +85,7 @@ fn exact_gradients_with_respect_to_pixels() {
     chains::<f32>(&data, grid, &uv, &movie, 3e-3, 1e-2);
 }
 
-fn chains<T: Real>(
+fn chains<T: Float>(
     data: &Observation,
     grid: ImageGrid,
     uv: &[Vec<[f64; 2]>],
@@ -167,7 +167,7 @@ fn exact_data_without_errors_are_refused() {
 
 /// Models without visibility, of a hardly visible one, and data below their noise: finite values and slopes in both precisions, and no
 /// closure quantity is explained by what is dark.
-fn hard<T: Real>(data: &Observation) {
+fn hard<T: Float>(data: &Observation) {
     for (name, term) in terms::<T>(data) {
         let count = term.visibilities();
         let mut values = Vec::new();

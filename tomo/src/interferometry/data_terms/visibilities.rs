@@ -2,7 +2,7 @@
 
 use super::{DataTerm, DataTermError, Residual, checked, faintest, inverse_variances, stations_of};
 use crate::interferometry::observation::Observation;
-use crate::interferometry::operator::Real;
+use crate::interferometry::operator::Float;
 use crate::interferometry::products::debiased_amplitude;
 use num_complex::Complex;
 
@@ -14,7 +14,7 @@ pub struct VisibilityTerm<T> {
     inverse_variance: Vec<T>,
 }
 
-impl<T: Real> VisibilityTerm<T> {
+impl<T: Float> VisibilityTerm<T> {
     /// Of the Stokes I of an observation, in its order.
     ///
     /// # Errors
@@ -30,7 +30,7 @@ impl<T: Real> VisibilityTerm<T> {
     }
 }
 
-impl<T: Real> DataTerm<T> for VisibilityTerm<T> {
+impl<T: Float> DataTerm<T> for VisibilityTerm<T> {
     fn visibilities(&self) -> usize {
         self.data.len()
     }
@@ -80,7 +80,7 @@ pub struct AmplitudeTerm<T> {
     inverse_variance: Vec<T>,
 }
 
-impl<T: Real> AmplitudeTerm<T> {
+impl<T: Float> AmplitudeTerm<T> {
     /// Of the Stokes I of an observation, in its order.
     ///
     /// # Errors
@@ -95,7 +95,7 @@ impl<T: Real> AmplitudeTerm<T> {
     }
 }
 
-impl<T: Real> DataTerm<T> for AmplitudeTerm<T> {
+impl<T: Float> DataTerm<T> for AmplitudeTerm<T> {
     fn visibilities(&self) -> usize {
         self.data.len()
     }

@@ -7,7 +7,7 @@
 //! kept are 2(w + h) numbers a visibility instead of 2wh.
 
 use super::matrix::{Shape, multiply};
-use super::{ImageGrid, Operator, Pulse, Real};
+use super::{Float, ImageGrid, Operator, Pulse};
 use core::f64::consts::TAU;
 use core::ops::Range;
 use num_complex::Complex;
@@ -44,7 +44,7 @@ pub struct Dtft<T> {
     data: usize,
 }
 
-impl<T: Real> Dtft<T> {
+impl<T: Float> Dtft<T> {
     /// The transform to `frames[k]`, the (u, v) in wavelengths that see frame k; data are in the
     /// order of frames and of their (u, v). Exponentials are kept if they fit into
     /// `memory_budget` bytes, otherwise computed each time, with the same result.
@@ -177,7 +177,7 @@ fn cut<D>(mut rest: &mut [D], lengths: impl Iterator<Item = usize>) -> Vec<&mut 
     pieces
 }
 
-impl<T: Real> Operator<T> for Dtft<T> {
+impl<T: Float> Operator<T> for Dtft<T> {
     type Datum = Complex<T>;
 
     fn frames(&self) -> usize {
@@ -247,7 +247,7 @@ mod tests {
         vec![uv(17), Vec::new(), uv(300)]
     }
 
-    fn random_numbers<T: Real>(random: &mut impl Rng, count: usize) -> Vec<T> {
+    fn random_numbers<T: Float>(random: &mut impl Rng, count: usize) -> Vec<T> {
         (0..count).map(|_| T::of(random.random_range(-1.0..1.0))).collect()
     }
 
@@ -283,7 +283,7 @@ mod tests {
         }
     }
 
-    fn conforms<T: Real>(tolerance: f64) {
+    fn conforms<T: Float>(tolerance: f64) {
         let frames = frames(&mut Pcg64Mcg::seed_from_u64(2));
         for (name, budget) in [("prepared transform", usize::MAX), ("transform on the fly", 0)] {
             let transform = Dtft::<T>::new(GRID, Pulse::Triangle, &frames, budget);

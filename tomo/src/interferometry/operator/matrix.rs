@@ -1,6 +1,6 @@
 //! Matrix products on slices.
 
-use super::Real;
+use super::Float;
 
 /// A matrix in a slice: shape and distances between neighbours down a column and along a row.
 #[derive(Clone, Copy)]
@@ -35,7 +35,7 @@ impl Shape {
 }
 
 /// result = a·b, or result += a·b, on the calling thread; `result` is row after row.
-pub fn multiply<T: Real>(a: &[T], of_a: Shape, b: &[T], of_b: Shape, result: &mut [T], add: bool) {
+pub fn multiply<T: Float>(a: &[T], of_a: Shape, b: &[T], of_b: Shape, result: &mut [T], add: bool) {
     let of_result = Shape::by_rows(of_a.rows, of_b.columns);
     assert!(of_a.columns == of_b.rows);
     assert!(of_a.fits(a.len()) && of_b.fits(b.len()) && of_result.fits(result.len()));

@@ -13,13 +13,13 @@ pub use nufft::Nufft;
 pub use plain::{FullImage, LightCurve};
 pub use transform::{Method, Transform};
 
-pub use crate::real::Real;
+pub use crate::simd::Float;
 
 /// A linear map from movies to data.
 ///
 /// A movie is `frames` images one after the other, each of `pixels` values in Jy/pixel, row by row
 /// from the top (north), each row from the left (east).
-pub trait Operator<T: Real>: Sync {
+pub trait Operator<T: Float>: Sync {
     /// A number of the data: `T` or `Complex<T>`.
     type Datum;
 

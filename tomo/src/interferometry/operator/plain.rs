@@ -1,6 +1,6 @@
 //! Measurements of pixels themselves.
 
-use super::{Operator, Real};
+use super::{Float, Operator};
 
 /// Every pixel of every frame.
 #[derive(Debug, Clone, Copy)]
@@ -20,7 +20,7 @@ pub struct LightCurve {
     pub pixels: usize,
 }
 
-impl<T: Real> Operator<T> for FullImage {
+impl<T: Float> Operator<T> for FullImage {
     type Datum = T;
 
     fn frames(&self) -> usize {
@@ -45,7 +45,7 @@ impl<T: Real> Operator<T> for FullImage {
     }
 }
 
-impl<T: Real> Operator<T> for LightCurve {
+impl<T: Float> Operator<T> for LightCurve {
     type Datum = T;
 
     fn frames(&self) -> usize {

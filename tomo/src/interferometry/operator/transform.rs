@@ -1,7 +1,7 @@
 //! The Fourier transform that suits the numbers of pixels and visibilities.
 
 use super::nufft::{cells, check_accuracy, width_of};
-use super::{Dtft, ImageGrid, Nufft, Operator, Pulse, Real};
+use super::{Dtft, Float, ImageGrid, Nufft, Operator, Pulse};
 use crate::interferometry::schedule::ScheduleError;
 use num_complex::Complex;
 use rustfft::FftNum;
@@ -25,7 +25,7 @@ pub enum Transform<T: FftNum> {
     Fast(Nufft<T>),
 }
 
-impl<T: Real + FftNum> Transform<T> {
+impl<T: Float + FftNum> Transform<T> {
     /// The transform to `frames[k]`, the (u, v) in wavelengths that see frame k. The direct one
     /// keeps its exponentials if they fit into `memory_budget` bytes.
     ///
@@ -89,7 +89,7 @@ fn is_fast_cheaper(grid: ImageGrid, frames: &[Vec<[f64; 2]>], accuracy: f64) -> 
     FAST_NS * seen * of_frame + CELL_NS * visibilities * (width * width) as f64 <= direct
 }
 
-impl<T: Real + FftNum> Operator<T> for Transform<T> {
+impl<T: Float + FftNum> Operator<T> for Transform<T> {
     type Datum = Complex<T>;
 
     fn frames(&self) -> usize {

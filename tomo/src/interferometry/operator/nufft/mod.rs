@@ -6,7 +6,7 @@
 
 mod kernel;
 
-use super::{ImageGrid, Operator, Pulse, Real};
+use super::{Float, ImageGrid, Operator, Pulse};
 use crate::interferometry::schedule::ScheduleError;
 use core::f64::consts::TAU;
 use core::ops::Range;
@@ -56,7 +56,7 @@ pub struct Nufft<T: FftNum> {
 }
 
 /// Refuses accuracies that kernels or rounding cannot reach.
-pub(super) fn check_accuracy<T: Real>(accuracy: f64) -> Result<(), ScheduleError> {
+pub(super) fn check_accuracy<T: Float>(accuracy: f64) -> Result<(), ScheduleError> {
     let single = T::epsilon().double() > 1e-10;
     let least = if single { 1e-6 } else { 1e-13 };
     if (least..=0.1).contains(&accuracy) {
@@ -66,7 +66,7 @@ pub(super) fn check_accuracy<T: Real>(accuracy: f64) -> Result<(), ScheduleError
     Err(ScheduleError::Range { name: "accuracy", value: accuracy, allowed })
 }
 
-impl<T: Real + FftNum> Nufft<T> {
+impl<T: Float + FftNum> Nufft<T> {
     /// The transform to `frames[k]`, the (u, v) in wavelengths that see frame k; data are in the
     /// order of frames and of their (u, v).
     ///
@@ -319,7 +319,7 @@ impl<T: Real + FftNum> Nufft<T> {
     }
 }
 
-impl<T: Real + FftNum> Operator<T> for Nufft<T> {
+impl<T: Float + FftNum> Operator<T> for Nufft<T> {
     type Datum = Complex<T>;
 
     fn frames(&self) -> usize {
@@ -399,7 +399,12 @@ mod tests {
     }
 
     /// The largest error in units of accuracy × Σ|I|.
-    fn worst<T: Real + FftNum>(grid: ImageGrid, pulse: Pulse, accuracy: f64, movie: &[f64]) -> f64 {
+    fn worst<T: Float + FftNum>(
+        grid: ImageGrid,
+        pulse: Pulse,
+        accuracy: f64,
+        movie: &[f64],
+    ) -> f64 {
         let frames = frames(grid);
         let single: Vec<T> = movie.iter().map(|x| T::of(*x)).collect();
         let fast = Nufft::<T>::new(grid, pulse, &frames, accuracy).unwrap();
@@ -434,7 +439,7 @@ mod tests {
         }
     }
 
-    fn conforms<T: Real + FftNum>(accuracy: f64, tolerance: f64) {
+    fn conforms<T: Float + FftNum>(accuracy: f64, tolerance: f64) {
         for (width, height) in [(13, 80), (64, 64)] {
             let grid = ImageGrid::new(width, height, 1e-9).unwrap();
             let fast = Nufft::<T>::new(grid, Pulse::Triangle, &frames(grid), accuracy).unwrap();
