@@ -111,7 +111,7 @@ fn picture(n: usize) -> (Kerr, Observer, Vec<f64>, Vec<f64>) {
 /// The whole of (t, r, θ, φ) at 100 points of every ray, from an observer at 1000 M, by
 /// instruction set and number of rays. `tests.rs` of the module holds every point against the tracer;
 /// here the sum of all Mino times is.
-fn bundles(c: &mut Criterion) {
+fn pictures(c: &mut Criterion) {
     let (hole, observer, alpha, beta) = picture(64);
     let tracer = Tracer::new(1e-12).expect("a tolerance");
     let mut path = Path::new();
@@ -208,5 +208,5 @@ fn assert_crossings(
     }
 }
 
-criterion_group!(benches, requests, tolerances, samples, bundles, crossings);
+criterion_group!(benches, requests, tolerances, samples, pictures, crossings);
 criterion_main!(benches);

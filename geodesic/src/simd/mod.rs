@@ -8,7 +8,8 @@
 //! quadratures of smooth functions of them over the same nodes, ten points an interval. The
 //! length of a ray and its fate come from one Carlson integral of each end point, and so does
 //! the time of a crossing. The instruction set is chosen at run time (AVX-512, else AVX2 with
-//! FMA, else SSE2, else one ray at a time).
+//! FMA, else SSE2; one ray at a time on other architectures). [`lanes`] has what kernels are written
+//! in.
 //!
 //! ```
 //! use kerrlight_geodesic::simd::{Crossings, Samples};

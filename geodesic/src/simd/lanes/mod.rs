@@ -30,6 +30,10 @@
 //! The register types of x86-64 have no name outside this module. Code meets them only as the type
 //! parameter of [`Task::run`], which [`dispatch`] calls after it has found the instruction set: the
 //! type itself is the proof, and no value of it can come into being without it.
+//!
+//! ```compile_fail
+//! use kerrlight_geodesic::simd::lanes::x86::F64x8; // private
+//! ```
 
 mod dispatch;
 mod pair;

@@ -1,4 +1,5 @@
 use super::{Array, Element, InstructionSet, Lanes, MAX_LANES, Task, dispatch};
+use core::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
 /// Numbers of every sign and size, and those that are none.
 const NUMBERS: [f64; 12] = [
@@ -6,8 +7,8 @@ const NUMBERS: [f64; 12] = [
     -0.0,
     1.0,
     -2.5,
-    0.7071067811865475,
-    1.4142135623730951,
+    FRAC_1_SQRT_2,
+    SQRT_2,
     3e-30,
     -7e20,
     f64::INFINITY,
