@@ -1,9 +1,6 @@
-//! Checksums: of files that are read, and of texts that carry their own.
+//! Checksums: of bytes, and of texts that carry their own.
 
-use crate::output;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 
 /// What tells bytes from others.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -18,22 +15,6 @@ impl Sum {
     /// Of these bytes.
     pub fn of(bytes: &[u8]) -> Self {
         Sum { bytes: bytes.len() as u64, crc32: format!("{:08x}", crc32fast::hash(bytes)) }
-    }
-}
-
-/// Sums of files, each of which is read once.
-#[derive(Default)]
-pub struct Sums(BTreeMap<PathBuf, Sum>);
-
-impl Sums {
-    /// The sum of a file.
-    pub fn of(&mut self, path: &Path) -> anyhow::Result<Sum> {
-        if let Some(sum) = self.0.get(path) {
-            return Ok(sum.clone());
-        }
-        let sum = Sum::of(&output::read(path)?);
-        self.0.insert(path.to_owned(), sum.clone());
-        Ok(sum)
     }
 }
 

@@ -28,6 +28,7 @@ mod columns;
 mod compare;
 mod convert;
 mod critical_curve;
+mod file_sums;
 mod fit;
 mod help;
 mod inspect;

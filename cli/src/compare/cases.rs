@@ -1,8 +1,8 @@
 //! From an experiment to its cases: every combination of levels and seeds, with the settings of its fit.
 
 use super::experiment::{Experiment, Factor, Level};
+use super::labels::called;
 use super::source::Source;
-use super::summary::called;
 use crate::fit;
 use crate::paths;
 use anyhow::{Context, anyhow, bail};
@@ -22,6 +22,17 @@ pub struct Case {
     pub settings: Result<String, String>,
     /// A name for a folder: levels, seed, and a checksum of the settings.
     pub slug: String,
+}
+
+/// How a case ended.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Status {
+    /// With these results.
+    Done(serde_json::Value),
+    /// With this message.
+    Failed(String),
+    /// It has not been run, or was interrupted.
+    Open,
 }
 
 /// Which cases are run, and how.

@@ -1,6 +1,6 @@
 //! What changed between two runs of an experiment.
 
-use super::summary::{described, result};
+use super::labels::{described, result};
 use crate::checksum::is_whole;
 use crate::output;
 use crate::report::Table;

@@ -1,6 +1,6 @@
 //! What an experiment's file may say.
 
-use super::summary::{ONE_CHI2, RESULTS};
+use super::labels::{ONE_CHI2, RESULTS};
 use anyhow::{Context, bail};
 use serde::Deserialize;
 use std::collections::BTreeMap;

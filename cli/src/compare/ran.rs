@@ -2,7 +2,8 @@
 
 use super::cases::Case;
 use super::experiment::{Experiment, FigureKind, QUALITIES};
-use super::summary::{ONE_CHI2, Summary, is_at, pairs};
+use super::labels::{ONE_CHI2, pairs};
+use super::summary::{Summary, is_at};
 use crate::report::Table;
 use anyhow::bail;
 use toml::Value;

@@ -1,7 +1,8 @@
 //! One case after the other, each a process of its own: what one does wrong, or takes of memory, is its own.
 
-use super::cases::Case;
-use crate::checksum::{Sums, is_whole};
+use super::cases::{Case, Status};
+use crate::checksum::is_whole;
+use crate::file_sums::FileSums;
 use crate::fit::Inputs;
 use crate::interrupt::Keeper;
 use crate::lock::Lock;
@@ -12,17 +13,6 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
-
-/// How a case ended.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Status {
-    /// With these results.
-    Done(Value),
-    /// With this message.
-    Failed(String),
-    /// It has not been run, or was interrupted.
-    Open,
-}
 
 /// The folders of the cases.
 pub struct Runner {
@@ -66,7 +56,7 @@ impl Runner {
 
     /// Refuses cases that have read files which are no longer the same: others would be compared with them.
     pub fn check_inputs(&self, cases: &[Case]) -> anyhow::Result<()> {
-        let mut sums = Sums::default();
+        let mut sums = FileSums::default();
         for run in cases.iter().map(|case| self.run_of(case)) {
             if let Ok(inputs) = Inputs::load(&run)
                 && inputs.version == env!("CARGO_PKG_VERSION")

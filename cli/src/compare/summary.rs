@@ -1,9 +1,8 @@
 //! What the cases of an experiment gave: all of them, and means over seeds.
 
-use super::cases::Case;
-use super::runner::Status;
+use super::cases::{Case, Status};
+use super::labels::{RESULTS, described, number, result};
 use serde_json::{Map, Value, json};
-use std::collections::BTreeMap;
 
 /// Cases and how they ended.
 pub struct Summary<'a> {
@@ -73,56 +72,6 @@ impl Spread {
         }
         format!("{} ± {}", number(self.mean, digits), number(self.deviation, digits))
     }
-}
-
-/// A number with so many digits behind the point, or in powers of ten where none of them would tell.
-pub fn number(x: f64, digits: usize) -> String {
-    let tells = x == 0.0 || x.abs() >= 5.0 * 10f64.powi(-(digits as i32));
-    if tells { format!("{x:.digits$}") } else { format!("{x:.1e}") }
-}
-
-/// Results that are shown: their names in results.json, what they are called, their units and digits.
-pub const RESULTS: [(&str, &str, &str, usize); 11] = [
-    ("psnr_db", "PSNR", "dB", 2),
-    ("psnr_inside_db", "PSNR inside the region", "dB", 2),
-    ("nrmse", "relative error", "", 4),
-    ("correlation", "correlation", "", 4),
-    ("axis_dot_truth", "axis · true axis", "", 4),
-    ("chi2", "χ² a datum", "", 3),
-    ("loss", "loss", "", 6),
-    ("seconds", "wall time", "s", 1),
-    ("cpu_seconds", "CPU time", "s", 1),
-    ("peak_memory_mib", "peak memory", "MiB", 0),
-    ("steps", "steps", "", 0),
-];
-
-/// χ² of one kind of data among several: `chi2.closure-phases`.
-pub const ONE_CHI2: &str = "chi2.";
-
-/// What a result is called with its unit, and its digits.
-pub fn described(value: &str) -> (String, usize) {
-    match RESULTS.iter().find(|(key, ..)| *key == value) {
-        Some((_, name, "", digits)) => ((*name).to_owned(), *digits),
-        Some((_, name, unit, digits)) => (format!("{name} ({unit})"), *digits),
-        None => match value.strip_prefix(ONE_CHI2) {
-            Some(name) => (format!("χ² a datum of {}", name.replace('-', " ")), 3),
-            None => (value.to_owned(), 4),
-        },
-    }
-}
-
-/// One result of a case.
-pub fn result(results: &Value, value: &str) -> Option<f64> {
-    if value == "chi2" {
-        let each = results["chi2_per_datum"].as_object()?;
-        return (each.len() == 1).then(|| each.values().next()?.as_f64()).flatten();
-    }
-    if let Some(name) = value.strip_prefix(ONE_CHI2) {
-        return results["chi2_per_datum"][name.replace('-', " ")]
-            .as_f64()
-            .filter(|x| x.is_finite());
-    }
-    results[value].as_f64().filter(|x| x.is_finite())
 }
 
 impl<'a> Summary<'a> {
@@ -251,35 +200,6 @@ pub fn is_at(case: &Case, levels: &[(&str, &str)]) -> bool {
     levels.iter().all(|(factor, level)| case.level(factor) == Some(level))
 }
 
-/// Every combination of levels of some factors, in the order of the experiment.
-pub fn combinations<'e>(levels: &'e [(String, Vec<String>)]) -> Vec<Vec<(&'e str, &'e str)>> {
-    levels.iter().fold(vec![Vec::new()], |all, (factor, levels)| {
-        let with = |before: &Vec<(&'e str, &'e str)>| -> Vec<Vec<(&'e str, &'e str)>> {
-            let one = |level: &'e String| {
-                let mut next = before.clone();
-                next.push((factor.as_str(), level.as_str()));
-                next
-            };
-            levels.iter().map(one).collect()
-        };
-        all.iter().flat_map(with).collect()
-    })
-}
-
-/// What a combination is called: levels, with the factor's name before a number.
-pub fn called(levels: &[(&str, &str)]) -> String {
-    let one = |(factor, level): &(&str, &str)| match level.parse::<f64>() {
-        Ok(_) => format!("{factor} {level}"),
-        Err(_) => (*level).to_owned(),
-    };
-    levels.iter().map(one).collect::<Vec<_>>().join(", ")
-}
-
-/// Pairs of a map.
-pub fn pairs(map: &BTreeMap<String, String>) -> Vec<(&str, &str)> {
-    map.iter().map(|(factor, level)| (factor.as_str(), level.as_str())).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -292,34 +212,5 @@ mod tests {
         let three = Spread::of(&[1.0, 2.0, 3.0]).unwrap();
         assert_eq!((three.mean, three.deviation), (2.0, 1.0));
         assert_eq!(three.text(2), "2.00 ± 1.00");
-        assert_eq!(
-            [number(0.0004, 3), number(0.0, 3), number(-0.25, 2)],
-            ["4.0e-4", "0.000", "-0.25"]
-        );
-    }
-
-    #[test]
-    fn exact_combinations_keep_their_order() {
-        let levels = [
-            ("a".to_owned(), vec!["1".to_owned(), "2".to_owned()]),
-            ("b".to_owned(), vec!["x".to_owned(), "y".to_owned()]),
-        ];
-        let names: Vec<String> = combinations(&levels).iter().map(|c| called(c)).collect();
-        assert_eq!(names, ["a 1, x", "a 1, y", "a 2, x", "a 2, y"]);
-        assert_eq!(combinations(&[]), [Vec::new()]);
-    }
-
-    #[test]
-    fn exact_results_are_numbers_or_nothing() {
-        let results =
-            json!({"psnr_db": 3.5, "nrmse": null, "chi2_per_datum": {"visibilities": 1.5}});
-        assert_eq!(result(&results, "psnr_db"), Some(3.5));
-        assert_eq!(result(&results, "nrmse"), None);
-        assert_eq!(result(&results, "chi2"), Some(1.5));
-        let two = json!({"chi2_per_datum": {"amplitudes": 1.5, "closure phases": 2.5}});
-        assert_eq!(result(&two, "chi2"), None);
-        assert_eq!(result(&two, "chi2.closure-phases"), Some(2.5));
-        assert_eq!(described("chi2.closure-phases").0, "χ² a datum of closure phases");
-        assert_eq!(described("psnr_db"), ("PSNR (dB)".to_owned(), 2));
     }
 }

@@ -1,8 +1,9 @@
 //! Tables of means over seeds.
 
+use super::cases::{Case, Status};
 use super::experiment::{Beside, Experiment, Level, TableAsked};
-use super::summary::{Spread, Summary, called, combinations, described, number, pairs};
-use super::verdicts;
+use super::labels::{called, combinations, described, number, pairs, result, verdict_of};
+use super::summary::{Spread, Summary};
 use crate::report::Table;
 use toml::Value;
 
@@ -182,21 +183,21 @@ pub fn all(summary: &Summary, with_verdicts: bool) -> Table {
         head.push("data explained?".to_owned());
     }
     let columns = head.len();
-    let row = |(case, status): &(&super::cases::Case, super::runner::Status)| {
+    let row = |(case, status): &(&Case, Status)| {
         let mut row = vec![case.name()];
         match status {
-            super::runner::Status::Done(results) => {
-                let cell = |key: &&str| match super::summary::result(results, key) {
+            Status::Done(results) => {
+                let cell = |key: &&str| match result(results, key) {
                     Some(x) => number(x, described(key).1),
                     None => NONE.to_owned(),
                 };
                 row.extend(shown.iter().map(cell));
                 if with_verdicts {
-                    row.push(verdicts::of_case(results).to_owned());
+                    row.push(verdict_of(results).to_owned());
                 }
             }
-            super::runner::Status::Failed(why) => row.push(format!("failed: {why}")),
-            super::runner::Status::Open => row.push("not run".to_owned()),
+            Status::Failed(why) => row.push(format!("failed: {why}")),
+            Status::Open => row.push("not run".to_owned()),
         }
         row.resize(columns, String::new());
         row
@@ -225,13 +226,12 @@ pub fn markdown(table: &Table) -> String {
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
     use crate::compare::cases::{Choice, expand};
-    use crate::compare::runner::Status;
     use crate::compare::source::Source;
 
-    const TEXT: &str = r#"
+    pub const TEXT: &str = r#"
         title = "t"
         question = "q"
         seeds = 1
@@ -262,8 +262,6 @@ mod tests {
         let table = table(&experiment, &summary, &experiment.table[0]);
         assert_eq!(table.rows, [["bhnerf", "30.00 (0.001)"], ["grid", "25.00 (0.002)"]]);
         assert_eq!(table.caption, "Of two. One seed. In brackets: the best level of rate.");
-        let said = verdicts::of_table(&experiment, &summary, &experiment.table[0]);
-        assert_eq!(said, ["Best, by PSNR (dB): bhnerf (30.00 (0.001)) > grid (25.00 (0.002))."]);
         // What no case has leaves a note.
         let none = cases.iter().map(|case| (case, Status::Done(serde_json::json!({})))).collect();
         let empty = super::table(&experiment, &Summary::new(none), &experiment.table[0]);

@@ -1,9 +1,9 @@
 //! What tables of qualities say, in sentences.
 
 use super::experiment::{Experiment, QUALITIES, TableAsked};
-use super::summary::{Summary, called, combinations, described, pairs};
+use super::labels::{called, combinations, described, pairs, verdict_of};
+use super::summary::Summary;
 use super::tables::{Cell, levels};
-use serde_json::Value;
 
 /// Rows of a table in an order that some of its columns share.
 struct Order {
@@ -28,20 +28,9 @@ impl Order {
     }
 }
 
-/// Whether a case explains its data, in a word or two.
-pub fn of_case(results: &Value) -> &'static str {
-    match results["verdict"]["outcome"].as_str() {
-        Some("explained") => "yes",
-        Some("reproduced") => "yes, without noise",
-        Some("fits-noise") => "fits noise",
-        Some("unexplained") => "no",
-        _ => "not judged",
-    }
-}
-
 /// How many cases explain their data.
 pub fn of_all(summary: &Summary) -> Option<String> {
-    let words: Vec<&str> = summary.done().map(|(_, results)| of_case(results)).collect();
+    let words: Vec<&str> = summary.done().map(|(_, results)| verdict_of(results)).collect();
     let count = |word: &str| words.iter().filter(|other| **other == word).count();
     let kinds = ["yes", "yes, without noise", "fits noise", "no", "not judged"];
     let told: Vec<String> = kinds
@@ -92,4 +81,23 @@ pub fn of_table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) 
         }
     }
     orders.iter().map(|order| order.sentence(&asked.title, &unit)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::compare::cases::{Choice, Status, expand};
+    use crate::compare::source::Source;
+    use crate::compare::tables::tests::TEXT;
+
+    #[test]
+    fn exact_rows_stand_in_their_order() {
+        let experiment = Experiment::parse(TEXT).unwrap();
+        let cases = expand(&experiment, &Source::BuiltIn, &Choice::default()).unwrap();
+        let results =
+            [30.0, 20.0, 21.0, 25.0].map(|x| Status::Done(serde_json::json!({"psnr_db": x})));
+        let summary = Summary::new(cases.iter().zip(results).collect());
+        let said = of_table(&experiment, &summary, &experiment.table[0]);
+        assert_eq!(said, ["Best, by PSNR (dB): bhnerf (30.00 (0.001)) > grid (25.00 (0.002))."]);
+    }
 }

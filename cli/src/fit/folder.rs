@@ -1,7 +1,7 @@
 //! The folder of a run: settings, log, checkpoint, results.
 
-use super::inputs::{self, Inputs};
-use crate::checksum::Sums;
+use super::inputs::{self, Inputs, SETTINGS};
+use crate::file_sums::FileSums;
 use crate::lock::{self, Lock};
 use crate::output::{self, Output};
 use anyhow::{Context, bail};
@@ -19,7 +19,6 @@ pub struct Folder {
 }
 
 /// Names in it.
-pub const SETTINGS: &str = "fit.toml";
 pub const LOG: &str = "log.jsonl";
 pub const CHECKPOINT: &str = "checkpoint.safetensors";
 
@@ -54,7 +53,7 @@ impl Folder {
         }
         let lock = Lock::take(path, BUSY, patience)?;
         let inputs = Inputs::load(path)?;
-        inputs.check(path, &mut Sums::default())?;
+        inputs.check(path, &mut FileSums::default())?;
         let text = output::read_text(&settings)?;
         Ok((Self { path: path.to_owned(), inputs, _lock: lock }, text))
     }

@@ -1,13 +1,16 @@
 //! What a run has read: one that is resumed reads the same, or is refused.
 
-use super::folder::SETTINGS;
-use crate::checksum::{Sum, Sums};
+use crate::checksum::Sum;
+use crate::file_sums::FileSums;
 use crate::output;
 use anyhow::{Context, bail};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Its name in the folder of a run.
+/// The settings in the folder of a run.
+pub const SETTINGS: &str = "fit.toml";
+
+/// Its own name there.
 pub const FILE: &str = "inputs.json";
 
 /// What decides a run beside its seed: the version of the program, settings and files.
@@ -52,7 +55,7 @@ impl Inputs {
     }
 
     /// Refuses what would make another run of it.
-    pub fn check(&self, run: &Path, sums: &mut Sums) -> anyhow::Result<()> {
+    pub fn check(&self, run: &Path, sums: &mut FileSums) -> anyhow::Result<()> {
         let (shown, version) = (run.display(), env!("CARGO_PKG_VERSION"));
         if self.version != version {
             bail!(
@@ -70,7 +73,7 @@ impl Inputs {
     }
 
     /// Refuses files that are not what they were.
-    pub fn check_files(&self, run: &Path, sums: &mut Sums) -> anyhow::Result<()> {
+    pub fn check_files(&self, run: &Path, sums: &mut FileSums) -> anyhow::Result<()> {
         for InputFile { path, sum } in &self.files {
             let shown = path.display();
             let run = run.display();

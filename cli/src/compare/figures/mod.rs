@@ -5,8 +5,9 @@ mod volumes;
 
 use super::cases::Case;
 use super::experiment::{Experiment, FigureAsked, FigureKind};
+use super::labels::{described, pairs};
 use super::runner::Runner;
-use super::summary::{Summary, described, is_at, pairs};
+use super::summary::{Summary, is_at};
 use super::tables::levels;
 use crate::output;
 use crate::report::{Figure, LinePlot, encode};

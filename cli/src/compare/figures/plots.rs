@@ -3,7 +3,8 @@
 use super::Figures;
 use crate::compare::cases::Case;
 use crate::compare::experiment::FigureAsked;
-use crate::compare::summary::{called, combinations, described, is_at, result};
+use crate::compare::labels::{called, combinations, described, result};
+use crate::compare::summary::is_at;
 use crate::compare::tables::levels;
 use crate::fit;
 use crate::output;
