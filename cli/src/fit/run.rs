@@ -11,6 +11,7 @@ use crate::answer::Answer;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
 use anyhow::{Context, bail};
+use indicatif::ProgressBar;
 use kerrlight_tomo::fit::settings::{AxisSearch, FitFile, Kind, Start};
 use kerrlight_tomo::fit::setup::{self, Instrument, Measured};
 use kerrlight_tomo::fit::{Loss, Motion, Objective, Outcome, State, Trainer, checkpoint};
@@ -203,34 +204,12 @@ impl Run<'_> {
             bar.set_position(step);
             bar.set_message(format!("loss {:.4e}", state.now.loss));
             let converged = outcome == Outcome::Converged;
-            match outcome {
-                Outcome::Done(loss)
-                    if step.is_multiple_of(self.file.training.log_every) || step == steps =>
-                {
-                    let line = self.line(state, &loss);
-                    self.folder.log(&line)?;
-                }
-                Outcome::Done(_) => {}
-                Outcome::SteppedBack { loss, to, caution } => {
-                    bar.println(format!(
-                        "the loss became {loss:e}: back to step {to}, rates times {caution}"
-                    ));
-                    let line = json!({"step": step, "diverged_loss": loss.to_string(), "caution": caution});
-                    self.folder.log(&line)?;
-                }
-                Outcome::Converged => {
-                    let line = json!({"step": step, "converged": true, "loss": state.now.loss});
-                    self.folder.log(&line)?;
-                }
-            }
+            self.record(state, outcome, &bar)?;
             let stop = keeper.stopped();
             let late = saved.elapsed().as_secs_f64() > self.file.training.checkpoint_seconds;
             if stop || late || converged || step == steps {
                 self.folder.save(&checkpoint::encode(state, self.text)?)?;
                 saved = Instant::now();
-            }
-            if converged {
-                bar.println(format!("converged after step {step}: no step lowers the loss"));
             }
             if stop {
                 bar.abandon();
@@ -244,6 +223,35 @@ impl Run<'_> {
         }
         bar.finish_and_clear();
         Ok(())
+    }
+
+    /// Logs what a step has done, and tells of what is unusual.
+    fn record(
+        &mut self,
+        state: &mut State<f32>,
+        outcome: Outcome,
+        bar: &ProgressBar,
+    ) -> anyhow::Result<()> {
+        let (step, training) = (state.now.step, &self.file.training);
+        let line = match outcome {
+            Outcome::Done(loss)
+                if step.is_multiple_of(training.log_every) || step == training.steps =>
+            {
+                self.line(state, &loss)
+            }
+            Outcome::Done(_) => return Ok(()),
+            Outcome::SteppedBack { loss, to, caution } => {
+                bar.println(format!(
+                    "the loss became {loss:e}: back to step {to}, rates times {caution}"
+                ));
+                json!({"step": step, "diverged_loss": loss.to_string(), "caution": caution})
+            }
+            Outcome::Converged => {
+                bar.println(format!("converged after step {step}: no step lowers the loss"));
+                json!({"step": step, "converged": true, "loss": state.now.loss})
+            }
+        };
+        self.folder.log(&line)
     }
 
     fn line(&mut self, state: &State<f32>, loss: &Loss) -> Value {

@@ -19,7 +19,7 @@ use kerrlight_tomo::image::preview as drawing;
 use kerrlight_tomo::image::reduce::Reduction;
 use kerrlight_tomo::image::sheet::sheet;
 use kerrlight_tomo::memory;
-use kerrlight_tomo::render::Raster;
+use kerrlight_tomo::render::{Raster, Summary};
 use kerrlight_tomo::scene::Scene;
 use preview::PreviewOptions;
 use source::Source;
@@ -73,19 +73,10 @@ impl Render {
     pub fn run(&self) -> anyhow::Result<Answer> {
         let source = Source::new(self.scene.as_deref())?;
         let (text, scene) = source.scene(&self.all_overrides())?;
-        let outputs = self.outputs(&source)?;
-        if let Some(input) = &self.scene {
-            outputs.all().iter().try_for_each(|output| output.spares(input))?;
-        }
-        if self.overlay.any() && outputs.png.is_none() {
-            bail!("marks are drawn into the PNG: give --preview");
-        }
-        outputs.differ()?;
+        let outputs = self.checked_outputs(&source)?;
         let files = assets::load(&scene, &source.folder, &outputs.all())?;
         source.compare(&files.identity);
-        let width = scene.screen.width;
-        let bands = memory::bands(width.into(), rayon::current_num_threads() as f64);
-        memory::afford(|| format!("screen.width = {width}: the rows under way"), bands)?;
+        afford(&scene)?;
         let start = Instant::now();
         let raster = Raster::new(&scene, files.decoded);
         let mut raster = raster.with_context(|| source.name.clone())?.with_tile(self.tile.into());
@@ -96,24 +87,9 @@ impl Render {
         if self.measure {
             raster = raster.with_meter();
         }
-        let reduced = look.as_ref().map_or(1, Reduction::factor);
-        let work = Work {
-            raster: &raster,
-            scene: &scene,
-            text: &text,
-            name: &source.name,
-            files: &files.identity,
-        };
-        let (summary, picture) = match &outputs.exr {
-            Some(exr) => {
-                let identity = raster.identity() + &files.identity;
-                work.exr(exr, &identity, look)?
-            }
-            None => work.preview(look)?,
-        };
-        if let Some(picture) = picture {
-            self.draw(&scene, (&picture, reduced), &outputs)?;
-        }
+        let (name, files) = (source.name.as_str(), files.identity.as_str());
+        let work = Work { raster: &raster, scene: &scene, text: &text, name, files };
+        let summary = self.render(&work, look, &outputs)?;
         let seconds = start.elapsed().as_secs_f64();
         report::warn(&scene, &summary);
         if self.measure {
@@ -124,6 +100,37 @@ impl Render {
         Ok(Answer::lines(&worth, &answer::listed(files.iter().copied()))
             .files(files)
             .with_all(report::figures(&scene, &summary, seconds)))
+    }
+
+    /// Renders, and writes all files.
+    fn render(
+        &self,
+        work: &Work<'_>,
+        look: Option<Reduction>,
+        outputs: &Outputs,
+    ) -> anyhow::Result<Summary> {
+        let reduced = look.as_ref().map_or(1, Reduction::factor);
+        let (summary, picture) = match &outputs.exr {
+            Some(exr) => work.exr(exr, &(work.raster.identity() + work.files), look)?,
+            None => work.preview(look)?,
+        };
+        if let Some(picture) = picture {
+            self.draw(work.scene, (&picture, reduced), outputs)?;
+        }
+        Ok(summary)
+    }
+
+    /// The files to be written: no input and no file twice.
+    fn checked_outputs(&self, source: &Source) -> anyhow::Result<Outputs> {
+        let outputs = self.outputs(source)?;
+        if let Some(input) = &self.scene {
+            outputs.all().iter().try_for_each(|output| output.spares(input))?;
+        }
+        if self.overlay.any() && outputs.png.is_none() {
+            bail!("marks are drawn into the PNG: give --preview");
+        }
+        outputs.differ()?;
+        Ok(outputs)
     }
 
     /// Whether standard output carries one of the files.
@@ -200,6 +207,13 @@ impl Render {
         let png = PathBuf::from(format!("{stem}.png"));
         Ok(Outputs { exr: check(&Some(exr), "exr")?, png: check(&Some(png), "png")?, sheet: None })
     }
+}
+
+/// Refuses rows that there is no memory for.
+fn afford(scene: &Scene) -> anyhow::Result<()> {
+    let width = scene.screen.width;
+    let bands = memory::bands(width.into(), rayon::current_num_threads() as f64);
+    Ok(memory::afford(|| format!("screen.width = {width}: the rows under way"), bands)?)
 }
 
 /// The files to be written.

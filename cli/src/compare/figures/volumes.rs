@@ -19,65 +19,68 @@ use serde_json::Value;
 impl Figures<'_> {
     /// Truths in the first row, recoveries of the first seed, or of every one, below.
     pub(super) fn volumes(&self, asked: &FigureAsked) -> anyhow::Result<Option<Figure>> {
-        let rows = levels(self.experiment, self.summary, &asked.rows);
+        let lines = match self.lines(asked)? {
+            Some(lines) if !lines[0].cells.is_empty() => lines,
+            _ => return Ok(None),
+        };
+        let truths = lines[0].cells.iter().map(|(_, truth)| truth.around.axis);
+        let views: Vec<View> = truths.map(|axis| view_of(asked, axis)).collect();
+        let rows: Vec<(String, Vec<Tile>)> = lines
+            .iter()
+            .map(|line| {
+                let tiles = line.cells.iter().zip(&views).map(|(cell, view)| tile(cell, *view));
+                (line.name.clone(), tiles.collect())
+            })
+            .collect();
+        let (caption, alt) = (self.caption(asked), asked.title.clone());
+        Ok(Some(Figure { png: encode(mosaic(&rows))?, caption, alt }))
+    }
+
+    /// The volumes of all rows, the truths first; `None` where a recovery is missing.
+    fn lines(&self, asked: &FigureAsked) -> anyhow::Result<Option<Vec<Line>>> {
         let columns = levels(self.experiment, self.summary, &asked.columns);
-        let (rows, columns) = (combinations(&rows), combinations(&columns));
-        let seeds = 1..=if asked.every_seed { self.summary.seeds } else { 1 };
-        let rows = rows.iter().flat_map(|row| seeds.clone().map(move |seed| (row, seed)));
-        let is_of = |case: &Case, levels: &[(&str, &str)], seed: u64| {
-            is_at(case, levels) && case.seed == seed
-        };
-        // What was never asked for here, as a method that has no such settings.
-        let is_there = |row: &[_], seed| self.chosen(asked).any(|(case, _)| is_of(case, row, seed));
-        let rows: Vec<_> = rows.filter(|(row, seed)| is_there(row, *seed)).collect();
-        let name = |(row, seed): &(&Vec<(&str, &str)>, u64)| {
-            let seed = asked.every_seed.then(|| format!("seed {seed}"));
-            let row = Some(called(row)).filter(|name| !name.is_empty());
-            row.into_iter().chain(seed).collect::<Vec<_>>().join(", ")
-        };
-        let mut loaded: Vec<(String, Vec<(String, Loaded)>)> =
-            vec![("truth".to_owned(), Vec::new())];
-        loaded.extend(rows.iter().map(|row| (name(row), Vec::new())));
-        for column in &columns {
-            let at = |(row, seed): &(&Vec<(&str, &str)>, u64)| {
-                let levels = [row.as_slice(), column].concat();
-                self.chosen(asked).find(|(case, _)| is_of(case, &levels, *seed))
+        let kinds = levels(self.experiment, self.summary, &asked.rows);
+        let kinds = combinations(&kinds);
+        let rows = self.rows(asked, &kinds);
+        let mut lines = vec![Line { name: "truth".to_owned(), cells: Vec::new() }];
+        lines.extend(rows.iter().map(|row| Line { name: row.name(asked), cells: Vec::new() }));
+        for column in combinations(&columns) {
+            let at = |row: &Row| {
+                let levels = [row.levels, &column].concat();
+                self.chosen(asked).find(|(case, _)| is_at(case, &levels) && case.seed == row.seed)
             };
-            let cells: Vec<Option<(&Case, &Value)>> = rows.iter().map(at).collect();
             // A column with a gap would stand under the wrong truth.
-            let Some(cells) = cells.into_iter().collect::<Option<Vec<_>>>() else { continue };
+            let cells: Option<Vec<(&Case, &Value)>> = rows.iter().map(at).collect();
+            let Some(cells) = cells else { continue };
             let Some((first, _)) = cells.first() else { continue };
             let Some(truth) = self.load(first, TRUTH, asked.later)? else { continue };
-            for (line, (case, results)) in loaded[1..].iter_mut().zip(cells) {
+            for (line, (case, results)) in lines[1..].iter_mut().zip(cells) {
                 let Some(volume) = self.load(case, FOUND, asked.later)? else { return Ok(None) };
                 let psnr = match asked.later {
                     Some(_) => metrics::compare(&volume.volume, &truth.volume, None)?.psnr_db,
                     None => result(results, "psnr_db"),
                 };
-                line.1.push((quality(psnr, results), volume));
+                line.cells.push((quality(psnr, results), volume));
             }
-            loaded[0].1.push((called(column), truth));
+            lines[0].cells.push((called(&column), truth));
         }
-        if loaded[0].1.is_empty() {
-            return Ok(None);
-        }
-        let tile = |(title, loaded): &'_ (String, Loaded)| (title.clone(), loaded.around);
-        let titles: Vec<Vec<(String, Surroundings)>> =
-            loaded.iter().map(|(_, row)| row.iter().map(tile).collect()).collect();
-        let rows: Vec<(String, Vec<Tile>)> = loaded
-            .iter()
-            .zip(&titles)
-            .map(|((name, row), titles)| {
-                let truths = loaded[0].1.iter().map(|(_, truth)| truth.around.axis);
-                let tiles = row.iter().zip(titles).zip(truths).map(|((shown, title), axis)| Tile {
-                    title: &title.0,
-                    volume: &shown.1.volume,
-                    around: title.1,
-                    view: view_of(asked, axis),
-                });
-                (name.clone(), tiles.collect())
-            })
-            .collect();
+        Ok(Some(lines))
+    }
+
+    /// Rows of recoveries, without what was never asked for here, as a method that has no such settings.
+    fn rows<'r>(&self, asked: &FigureAsked, kinds: &'r [Vec<Level<'r>>]) -> Vec<Row<'r>> {
+        let seeds = 1..=if asked.every_seed { self.summary.seeds } else { 1 };
+        let rows = kinds.iter().flat_map(|levels| {
+            seeds.clone().map(move |seed| Row { levels: levels.as_slice(), seed })
+        });
+        let is_there = |row: &Row| {
+            self.chosen(asked).any(|(case, _)| is_at(case, row.levels) && case.seed == row.seed)
+        };
+        rows.filter(is_there).collect()
+    }
+
+    /// What a figure says below.
+    fn caption(&self, asked: &FigureAsked) -> String {
         let from = match asked.view {
             Some([azimuth, elevation]) => {
                 format!("from azimuth {azimuth}° and elevation {elevation}°")
@@ -91,7 +94,7 @@ impl Figures<'_> {
             }
             None => "",
         };
-        let caption = format!(
+        format!(
             "{}. {}{when} Emission along straight parallel rays, seen {from}. The ball is the horizon, the blue line the axis \
              that was used (a point where it is seen end on), the closed curve the edge of the region in the hole's \
              equatorial plane. The colours of a column end at its truth's brightest place: what is brighter is shown like \
@@ -103,9 +106,7 @@ impl Figures<'_> {
             } else {
                 "Seed 1; the table of all cases has the others.".to_owned()
             }
-        );
-        let drawn = mosaic(&rows);
-        Ok(Some(Figure { png: encode(drawn)?, caption, alt: asked.title.clone() }))
+        )
     }
 
     /// A volume of a case: at its reference time, or carried along by its own motion.
@@ -141,9 +142,37 @@ impl Figures<'_> {
 const FOUND: (&str, usize) = ("volume.npz", 0);
 const TRUTH: (&str, usize) = ("truth.npz", 1);
 
+/// A factor and its level.
+type Level<'l> = (&'l str, &'l str);
+
+/// A row of recoveries: cases at these levels with this seed.
+struct Row<'l> {
+    levels: &'l [Level<'l>],
+    seed: u64,
+}
+
+impl Row<'_> {
+    fn name(&self, asked: &FigureAsked) -> String {
+        let seed = asked.every_seed.then(|| format!("seed {}", self.seed));
+        let row = Some(called(self.levels)).filter(|name| !name.is_empty());
+        row.into_iter().chain(seed).collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// A row of a figure: volumes with what stands above each.
+struct Line {
+    name: String,
+    cells: Vec<(String, Loaded)>,
+}
+
 struct Loaded {
     volume: Volume,
     around: Surroundings,
+}
+
+/// A volume as it is drawn.
+fn tile((title, loaded): &(String, Loaded), view: View) -> Tile<'_> {
+    Tile { title, volume: &loaded.volume, around: loaded.around, view }
 }
 
 /// From where a figure shows a volume that turns about an axis.
