@@ -37,7 +37,7 @@ pub enum Form {
     Text,
     /// One JSON object on standard output.
     Json,
-    /// Text on standard error: standard output carries the file that was asked for.
+    /// Text on standard error: standard output carries a file.
     Aside,
 }
 

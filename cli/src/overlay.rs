@@ -49,7 +49,7 @@ impl OverlayOptions {
         Ok(())
     }
 
-    /// Whether any mark is asked for.
+    /// Whether any mark is requested.
     pub fn any(&self) -> bool {
         self.scale_bar || self.critical_curve || self.ticks
     }

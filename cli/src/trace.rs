@@ -246,7 +246,7 @@ impl Trace {
 }
 
 /// The columns of each ray's first `width` points, filled up with NaN; those that were not
-/// asked for are left out.
+/// requested are left out.
 fn points(
     traced: &[RayTable],
     width: usize,

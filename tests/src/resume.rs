@@ -87,7 +87,7 @@ fn exact_same_bytes_after_an_interrupt() {
     std::fs::write(&partial, kept).unwrap();
     let tiles = [&arguments(&scene)[..], &["--tile", "7", "--threads", "3"]].concat();
     let output = kerrlight(folder.path(), &tiles);
-    assert!(String::from_utf8_lossy(&output.stderr).contains("bands are there"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("bands are done"));
     assert!(std::fs::read(folder.path().join("a.exr")).unwrap() == whole);
     assert!(!partial.exists());
 }

@@ -54,7 +54,7 @@ pub struct Compare {
     /// A look at whether it runs: few steps, few cases
     #[arg(long)]
     quick: bool,
-    /// Go on in a folder that exists: what is done is not done again
+    /// Resume in an existing folder: finished cases are not run again
     #[arg(long)]
     resume: bool,
     /// Show what changed since an earlier run
@@ -125,7 +125,7 @@ impl Compare {
         Ok(end(&tables, &summary, &folder))
     }
 
-    /// The folder, new or to go on with.
+    /// The folder, new or resumed.
     fn folder(&self, name: &Path, text: &str) -> anyhow::Result<(PathBuf, Lock)> {
         let stem =
             name.file_stem().map_or("compare".into(), |stem| stem.to_string_lossy().into_owned());

@@ -43,7 +43,7 @@ pub struct Fit {
     /// representation.kind=grid
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Go on with the run in this folder
+    /// Resume the run in this folder
     #[arg(long, value_name = "FOLDER", conflicts_with = "output")]
     resume: Option<PathBuf>,
     /// Write the settings that would be used and stop
@@ -119,10 +119,10 @@ impl Fit {
         Ok((text, base_dir))
     }
 
-    /// Refuses to go on with other settings than a run began with.
+    /// Refuses to resume a run with settings other than its own.
     fn same(&self, text: &str) -> anyhow::Result<()> {
         if !self.set.is_empty() {
-            bail!("--resume goes on with the settings of the run: --set is for a new one");
+            bail!("--resume uses the settings of the run: --set is for a new one");
         }
         let Some(path) = &self.file else { return Ok(()) };
         let given = output::read_text(path)?;

@@ -28,9 +28,9 @@ pub enum Written {
     ObsText,
     /// kerrlight's CSV (.csv)
     Csv,
-    /// The EHT's public csv, total intensity (only if asked for)
+    /// The EHT's public csv, total intensity (--format only)
     EhtCsv,
-    /// The EHT's public txt, total intensity (only if asked for)
+    /// The EHT's public txt, total intensity (--format only)
     EhtTxt,
 }
 
@@ -49,7 +49,7 @@ impl Written {
         };
         let format = asked.unwrap_or(by_name);
         if (format == Written::Uvfits) != (by_name == Written::Uvfits) {
-            bail!("output {}: its ending is not that of the format asked for", path.display());
+            bail!("output {}: its ending is not that of --format", path.display());
         }
         Ok(format)
     }

@@ -34,8 +34,8 @@ pub struct Movie {
     frames: u32,
     #[command(flatten)]
     span: Span,
-    /// Folder for the frames frame_0000.exr, frame_0001.exr, …; a second run of the same command
-    /// goes on where the first was stopped
+    /// Folder for the frames frame_0000.exr, frame_0001.exr, …; the same command resumes an
+    /// interrupted run
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
     /// Change a value of the scene, e.g. hole.spin=0.5 or spot.0.phase_deg=90
@@ -140,7 +140,9 @@ impl Movie {
         let there = |sequence: &Sequence| {
             let (done, all) = (sequence.len() - sequence.missing().len(), sequence.len());
             let folder = self.output.display();
-            format!("stopped: {done} of {all} frames are in {folder}; the same command goes on")
+            format!(
+                "stopped: {done} of {all} frames are in {folder}; run the same command again to resume"
+            )
         };
         let mut unresolved = 0;
         for batch in batches {

@@ -32,7 +32,7 @@ pub struct Viewing {
     white: Option<f32>,
 }
 
-/// The files that are asked for, checked.
+/// The requested files, checked.
 pub struct Animations {
     gif: Option<Output>,
     apng: Option<Output>,
@@ -76,7 +76,7 @@ impl Animations {
         self.gif.is_some() || self.apng.is_some() || self.png
     }
 
-    /// Draws all frames and writes what is asked for.
+    /// Draws all frames and writes the requested files.
     pub fn write(
         &self,
         sequence: &Sequence,

@@ -36,13 +36,13 @@ impl Partial {
         }
         let (journal, found) =
             Journal::open(file, identity, raster.bands()).with_context(|| {
-                format!("{shown} (where an interrupted run goes on); remove it or write elsewhere")
+                format!("{shown} (the state of an interrupted run); remove it or write elsewhere")
             })?;
         match found {
             Found::Bands(0) | Found::Nothing => {}
             Found::Bands(there) => {
                 let all = raster.bands();
-                eprintln!("going on with {shown}: {there} of {all} bands are there");
+                eprintln!("resuming from {shown}: {there} of {all} bands are done");
             }
             Found::Other => eprintln!("starting anew: {shown} was of another picture or version"),
         }
@@ -58,7 +58,7 @@ impl Partial {
     pub fn kept(&self) -> String {
         match &self.path {
             Some(path) => format!(
-                "what has been rendered is kept in {}: give the same command again to go on",
+                "finished bands are kept in {}: run the same command again to resume",
                 path.display()
             ),
             None => "nothing is kept".to_owned(),

@@ -83,7 +83,7 @@ pub fn warn(scene: &Scene, summary: &Summary) {
         let error = summary.image_error;
         eprintln!("image error {error:.1e}, {:.2} rays a pixel", rays as f64 / pixels);
         if error > asked {
-            eprintln!("warning: the image error {error:.1e} is above the {asked:e} asked for");
+            eprintln!("warning: the image error {error:.1e} exceeds the requested {asked:e}");
         }
     }
     if summary.unresolved > 0 {

@@ -25,7 +25,7 @@ pub struct Work<'a> {
 }
 
 impl Work<'_> {
-    /// Renders into an EXR file, going on where an interrupted run has stopped.
+    /// Renders into an EXR file; an interrupted run is resumed.
     pub fn exr(
         &self,
         exr: &Output,
