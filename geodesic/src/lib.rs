@@ -174,7 +174,7 @@ pub mod capi;
 
 pub use matter::{flow, plunge};
 pub use numbers::{legendre, quadrature, vector};
-pub use rays::{derivatives, footprint};
+pub use rays::{derivatives, footprint, nodes};
 pub use spacetime::orbits;
 
 pub use error::OutOfRange;
@@ -186,11 +186,16 @@ pub use integrate::uncertainty::Uncertainty;
 pub use numbers::compensated::Double;
 pub use numbers::dual::Dual;
 pub use numbers::scalar::{Elementary, Scalar};
+pub use rays::block::{
+    BlockRequest, BlockTracer, PathOfRay, PlaneCrossing, RayBlock, RayVisitor, SphereNodes,
+    TracedRay, Work,
+};
 pub use rays::columns::{Points, RayTable};
 pub use rays::integrator::Integrator;
 pub use rays::request::{Placement, Request};
 pub use screen::camera::{Camera, Motion};
 pub use screen::observer::{Inclination, Observer, Ray};
+pub use screen::view::View;
 pub use spacetime::frame::{ScreenPoint, ZamoFrame};
 pub use spacetime::kerr::Kerr;
 pub use spacetime::point::PathPoint;

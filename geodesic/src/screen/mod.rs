@@ -3,3 +3,4 @@
 
 pub(crate) mod camera;
 pub(crate) mod observer;
+pub(crate) mod view;

@@ -172,6 +172,11 @@ impl<T: Elementary> Observer<T> {
         self.inverse_radius
     }
 
+    /// λ = L/E of the photons that arrive at α: −α sin i.
+    pub fn lambda(&self, alpha: T) -> T {
+        -(alpha * self.inclination.sin)
+    }
+
     /// The photon that arrives at (α, β), followed backward in time.
     ///
     /// # Errors
@@ -197,7 +202,7 @@ impl<T: Elementary> Observer<T> {
         }
         let zero = T::constant(0.0);
         Ok(Ray {
-            lambda: -(alpha * sin),
+            lambda: self.lambda(alpha),
             eta: (alpha - a) * (alpha + a) * cos * cos + beta * beta,
             angular: alpha * alpha + beta * beta - a * a * cos * cos,
             position: [sin, zero, cos],

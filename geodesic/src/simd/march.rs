@@ -100,12 +100,12 @@ struct Panels<V> {
 impl<V: Lanes<f64>> Panels<V> {
     /// Mino time since the start of the panel, over its length, at the rule's variable s.
     fn place(&self, s: f64) -> f64 {
-        if self.falls { s * (2.0 - s) } else { s }
+        PanelRule::pace(s, self.falls).0
     }
 
     /// Its derivative.
     fn pace(&self, s: f64) -> f64 {
-        if self.falls { 2.0 * (1.0 - s) } else { 1.0 }
+        PanelRule::pace(s, self.falls).1
     }
 }
 

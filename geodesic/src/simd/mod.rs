@@ -54,6 +54,7 @@ pub use crossings::{Crossing, Crossings, RayEnds};
 pub(crate) use error::MAX_STEP;
 pub use lanes::InstructionSet;
 pub use nodes::{NodeRequest, Nodes, RayNodes};
+pub(crate) use panel::LONGEST_PANEL;
 pub use panel::PanelRule;
 pub(crate) use radial_sum::LEAST_STEPS;
 pub use samples::{RaySamples, Samples};
@@ -68,7 +69,7 @@ const BLOCK: usize = 512;
 
 /// The nearest observer, in M: outside every photon orbit, so that rays come from outside the
 /// barrier.
-const NEAREST: f64 = 5.0;
+pub(crate) const NEAREST: f64 = 5.0;
 
 /// The farthest one that is not at infinity: squares of squares of the radius have to be numbers.
 const FARTHEST: f64 = 1e30;

@@ -7,7 +7,7 @@ use super::error::{MAX_STEP, estimate};
 use super::lanes::{InstructionSet, Lanes, MAX_LANES, Task, dispatch};
 use super::march::{COLUMNS, GROWTH, Jump, Key, MAX_ORDER, March, RayLanes};
 use super::motion::{Camera, Clock, Journey, Motion};
-use super::panel::PanelRule;
+use super::panel::{LONGEST_PANEL, PanelRule};
 use crate::error::{OutOfRange, check};
 use crate::screen::observer::Observer;
 use crate::spacetime::kerr::Kerr;
@@ -63,9 +63,6 @@ pub struct RayNodes<'a> {
     /// proportion to the distance from the critical curve.
     pub error: f64,
 }
-
-/// Longest panel in units of 1/√max(1, η + λ²).
-const LONGEST: f64 = 0.4;
 
 /// Most panels of a ray before `split`: longer rays have no digits left.
 const MOST: f64 = 1e4;
@@ -300,13 +297,15 @@ impl Way {
     }
 
     fn panels(&self, length: f64) -> u32 {
-        (self.b * length / LONGEST).ceil().clamp(0.0, MOST) as u32
+        (self.b * length / LONGEST_PANEL).ceil().clamp(0.0, MOST) as u32
     }
 
     /// The number and the whole length of the growing legs at the beginning of a way.
     fn growing(&self, length: f64) -> (u32, f64) {
         let (mut legs, mut reach) = (0, self.since);
-        while reach * GROWTH < self.since + length && reach * (GROWTH - 1.0) < LONGEST / self.b {
+        while reach * GROWTH < self.since + length
+            && reach * (GROWTH - 1.0) < LONGEST_PANEL / self.b
+        {
             (legs, reach) = (legs + 1, reach * GROWTH);
         }
         (legs, reach - self.since)

@@ -3,6 +3,9 @@
 use crate::numbers::legendre;
 use crate::numbers::quadrature::gauss_legendre;
 
+/// Longest panel in units of 1/√max(1, η + λ²) of Mino time.
+pub(crate) const LONGEST_PANEL: f64 = 0.4;
+
 /// The Gauss–Legendre rule on [0, 1] with the integrals from 0 to its nodes.
 ///
 /// On its last panel before the horizon, where what is integrated may go like a half-integer power
@@ -46,6 +49,13 @@ impl PanelRule {
     /// The weights, which add up to 1.
     pub fn weights(&self) -> &[f64] {
         &self.weights
+    }
+
+    /// The place on a panel, and the pace there, at the rule's variable s: on the panel before the
+    /// horizon the pace falls to zero.
+    #[inline]
+    pub(crate) fn pace(s: f64, falls: bool) -> (f64, f64) {
+        if falls { (s * (2.0 - s), 2.0 * (1.0 - s)) } else { (s, 1.0) }
     }
 
     /// Row i: factors of f at the nodes in the integral of f from 0 to node i.

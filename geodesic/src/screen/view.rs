@@ -1,0 +1,63 @@
+//! A screen or a camera: what makes rays of points of a picture.
+
+use crate::error::OutOfRange;
+use crate::numbers::dual::Dual;
+use crate::screen::camera::Camera;
+use crate::screen::observer::{Observer, Ray};
+use crate::spacetime::kerr::Kerr;
+
+/// Where a picture is taken from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum View {
+    /// Bardeen's screen: points are (α, β) in M, and frequencies are those at infinity.
+    Screen(Observer),
+    /// A camera: points lie in the picture plane at distance 1, and frequencies are those in the
+    /// camera's frame.
+    Camera(Camera),
+}
+
+impl View {
+    /// The photon that arrives at the point (x, y) of the picture.
+    ///
+    /// # Errors
+    /// If no photon arrives there: see [`Observer::ray`] and [`Camera::ray`].
+    pub fn ray(&self, hole: &Kerr, x: f64, y: f64) -> Result<Ray, OutOfRange> {
+        match self {
+            View::Screen(observer) => observer.ray(hole, x, y),
+            View::Camera(camera) => camera.ray(x, y),
+        }
+    }
+
+    /// The same photon with its derivatives with respect to x and y, for
+    /// [`footprint::of_ray`](crate::footprint::of_ray).
+    ///
+    /// # Errors
+    /// As for [`ray`](Self::ray).
+    pub fn beam(&self, hole: &Kerr, x: f64, y: f64) -> Result<Ray<Dual<f64, 2>>, OutOfRange> {
+        let (x, y) = (Dual::parameter(x, 0), Dual::parameter(y, 1));
+        match self {
+            View::Screen(observer) => {
+                let lifted = observer.with_inclination(observer.inclination().lift());
+                lifted.ray(&hole.lift(), x, y)
+            }
+            View::Camera(camera) => camera.ray(x, y),
+        }
+    }
+
+    /// Frequency of light that arrives at (x, y), divided by its frequency at infinity; `None` for
+    /// a screen, where the two are equal.
+    pub fn blueshift(&self, x: f64, y: f64) -> Option<f64> {
+        match self {
+            View::Screen(_) => None,
+            View::Camera(camera) => Some(camera.blueshift(camera.direction(x, y))),
+        }
+    }
+
+    /// The observer whose screen it is; `None` for a camera.
+    pub fn observer(&self) -> Option<&Observer> {
+        match self {
+            View::Screen(observer) => Some(observer),
+            View::Camera(_) => None,
+        }
+    }
+}
