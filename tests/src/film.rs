@@ -4,8 +4,8 @@ use crate::support::{fail, kerrlight, root, scene, succeed};
 use kerrlight_geodesic::vector::dot;
 use kerrlight_geodesic::{Kerr, footprint};
 use kerrlight_tomo::emission::sky::SkyModel;
-use kerrlight_tomo::film::Film;
 use kerrlight_tomo::image::exr;
+use kerrlight_tomo::render::Film;
 use kerrlight_tomo::scene::{Scene, SceneError};
 use std::path::Path;
 

@@ -332,7 +332,7 @@ fn exact_rings_do_not_depend_on_tiles_or_batches() {
     };
     let whole = raster(64);
     assert_eq!(whole, raster(7));
-    let mut film = kerrlight_tomo::film::Film::new(&scene, None).unwrap();
+    let mut film = kerrlight_tomo::render::Film::new(&scene, None).unwrap();
     let times = [40.0, 55.0];
     let frames = film.frames(&times, &|_| true).unwrap();
     for (frame, time) in frames.into_iter().zip(times) {

@@ -8,13 +8,11 @@
 
 pub mod dynamics;
 pub mod emission;
-pub mod film;
 pub mod fit;
 pub mod image;
 pub mod interferometry;
 pub mod memory;
 pub mod optimise;
-pub mod plan;
 pub mod points;
 pub mod polarization;
 pub mod render;

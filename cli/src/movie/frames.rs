@@ -3,10 +3,10 @@
 use crate::output::{self, Output};
 use crate::render::report;
 use anyhow::{Context, bail};
-use kerrlight_tomo::film::{Film, Frame};
 use kerrlight_tomo::image::Picture;
 use kerrlight_tomo::image::exr::{self, Attributes};
 use kerrlight_tomo::render::Rendered;
+use kerrlight_tomo::render::{Film, Frame};
 use kerrlight_tomo::scene::{Scene, SceneError, apply_override};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};

@@ -2,7 +2,6 @@
 
 use crate::answer::Answer;
 use kerrlight_tomo::emission::medium::Part;
-use kerrlight_tomo::plan::Plan;
 use kerrlight_tomo::render::{Raster, RenderError};
 use kerrlight_tomo::scene::Scene;
 use kerrlight_tomo::transport::Meter;
@@ -28,7 +27,7 @@ pub fn before(scene: &Scene, raster: &Raster) -> anyhow::Result<Answer> {
     let mut text = format!(
         "plan: {rays} rays{placed}{refined} on {threads} threads, estimated from {tried} rays\n"
     );
-    let plan = Plan::new(scene);
+    let plan = raster.plan();
     let mut parts = Vec::new();
     for part in Part::ALL {
         let each = trial.spent(part).as_secs_f64() / tried as f64;

@@ -75,8 +75,10 @@ pub struct BlockRequest {
     /// The number of half-orbits after which rays are cut off: half-way between crossing number
     /// `half_orbits` (from 0) and the next.
     pub half_orbits: Option<u32>,
-    /// Whether [`RayVisitor::needs_path`] is to be asked.
+    /// Whether [`RayVisitor::needs_path`] decides which rays are traced step by step.
     pub paths: bool,
+    /// Coarse nodes by which [`RayVisitor::needs_path_at`] decides it too.
+    pub probes: Option<NodeRequest>,
     /// Nodes inside spheres.
     pub nodes: Vec<SphereNodes>,
 }
@@ -181,6 +183,8 @@ pub struct PathOfRay<'a> {
     pub ray: &'a Ray,
     /// Its path, with all quantities.
     pub path: &'a Path,
+    /// The tolerance that it was traced with.
+    pub tolerance: f64,
 }
 
 /// What a block of rays is traced for: it decides where rays end and takes what is found.
@@ -194,6 +198,12 @@ pub trait RayVisitor {
     /// Whether the path of a ray is needed, so that it has to be traced step by step.
     fn needs_path(&self, ray: &Ray) -> bool {
         let _ = ray;
+        false
+    }
+
+    /// The same, from coarse nodes along the ray: see [`BlockRequest::probes`].
+    fn needs_path_at(&self, ray: &TracedRay, nodes: &RayNodes<'_>) -> bool {
+        let _ = (ray, nodes);
         false
     }
 
@@ -285,6 +295,13 @@ impl Job<'_> {
     fn pick(&self, rays: &[usize]) -> [Vec<f64>; 2] {
         [self.alpha, self.beta].map(|column| rays.iter().map(|k| column[*k]).collect())
     }
+}
+
+/// What takes a ray's radial potential to know.
+struct Inspected {
+    eta: f64,
+    until: f64,
+    needs_path: bool,
 }
 
 impl BlockTracer {
@@ -393,9 +410,9 @@ impl BlockTracer {
             visitor.works_on(Work::Nodes(sphere));
             self.refine_on_path((sphere, k), job.request, block, visitor);
         }
-        let RayBlock { rays, plane, path, .. } = block;
+        let (RayBlock { rays, plane, path, .. }, tolerance) = (block, self.tracer.tolerance());
         let crossings = &plane[rays[k].crossings.clone()];
-        visitor.take(k, &rays[k], crossings, Some(PathOfRay { ray: &ray, path }))
+        visitor.take(k, &rays[k], crossings, Some(PathOfRay { ray: &ray, path, tolerance }))
     }
 
     /// Outcomes, crossings, nodes and directions of escape of the rays that the closed form serves.
@@ -409,6 +426,9 @@ impl BlockTracer {
         let located = job.request.crossings.max(1);
         block.crossings.trace(&self.hole, observer, job.alpha, job.beta, located)?;
         self.classify(observer, job, block, visitor)?;
+        if let Some(probes) = &job.request.probes {
+            self.probe(observer, probes, job, block, visitor)?;
+        }
         if job.request.exit {
             visitor.works_on(Work::Exits);
             self.find_exits(observer, job, block)?;
@@ -431,37 +451,73 @@ impl BlockTracer {
         let BlockRequest { crossings, rates, half_orbits, paths, .. } = *job.request;
         let with_ray = rates || paths || half_orbits.is_some();
         let most = half_orbits.map_or(usize::MAX, |n| n as usize + 1);
+        let RayBlock { rays, plane, crossings: found, .. } = block;
+        rays.reserve(job.alpha.len());
         for (k, (alpha, beta)) in job.alpha.iter().zip(job.beta).enumerate() {
-            let ends = block.crossings.ends(k);
-            // Its radial potential takes as long as all the rest.
-            let ray = with_ray.then(|| observer.ray(&self.hole, *alpha, *beta)).transpose()?;
-            let first = block.plane.len();
+            let (ends, first) = (found.ends(k), plane.len());
             if crossings > 0 {
-                let found = block.crossings.ray(k);
-                block.plane.extend(found.map(|crossing| PlaneCrossing::from(&crossing)));
-                if let (Some(ray), true) = (&ray, rates) {
-                    add_rates(ray, &ends, &mut block.plane[first..]);
-                }
+                plane.extend(found.ray(k).map(|crossing| PlaneCrossing::from(&crossing)));
             }
-            let until = ray.as_ref().map_or(f64::INFINITY, |ray| self.until(ray, half_orbits));
-            let plane = &block.plane[first..];
-            let surface = first_opaque(plane, until, visitor);
+            let own = &mut plane[first..];
+            let Inspected { eta, until, needs_path } = if with_ray {
+                // Its radial potential takes as long as all the rest.
+                let ray = observer.ray(&self.hole, *alpha, *beta)?;
+                self.inspect(&ray, &ends, job.request, own, visitor)
+            } else {
+                Inspected { eta: f64::NAN, until: f64::INFINITY, needs_path: false }
+            };
+            let surface = first_opaque(own, until, visitor);
             let all = crossings == 0
                 || surface.is_some()
-                || plane.len() >= (ends.crossings as usize).min(most);
-            let needed = || ray.as_ref().is_some_and(|ray| paths && visitor.needs_path(ray));
-            block.rays.push(TracedRay {
+                || own.len() >= (ends.crossings as usize).min(most);
+            rays.push(TracedRay {
                 lambda: observer.lambda(*alpha),
-                eta: ray.as_ref().map_or(f64::NAN, |ray| ray.eta),
+                eta,
                 outcome: if ends.escapes { Outcome::Escaped } else { Outcome::Captured },
                 crossing_count: ends.crossings,
-                crossings: first..block.plane.len(),
+                crossings: first..plane.len(),
                 mino_total: ends.mino_total,
                 until,
                 surface,
                 exit: None,
-                stepped: !all || self.loses_digits(ends.error) || needed(),
+                stepped: !all || needs_path || self.loses_digits(ends.error),
             });
+        }
+        Ok(())
+    }
+
+    /// What takes a ray's radial potential.
+    #[inline(never)]
+    fn inspect<V: RayVisitor>(
+        &self,
+        ray: &Ray,
+        ends: &RayEnds,
+        request: &BlockRequest,
+        plane: &mut [PlaneCrossing],
+        visitor: &V,
+    ) -> Inspected {
+        if request.rates {
+            add_rates(ray, ends, plane);
+        }
+        let needs_path = request.paths && visitor.needs_path(ray);
+        Inspected { eta: ray.eta, until: self.until(ray, request.half_orbits), needs_path }
+    }
+
+    /// Leaves the rays whose path is needed after all to be traced step by step.
+    fn probe<V: RayVisitor>(
+        &self,
+        observer: &Observer,
+        probes: &NodeRequest,
+        job: Job<'_>,
+        RayBlock { rays, nodes, .. }: &mut RayBlock,
+        visitor: &V,
+    ) -> Result<(), OutOfRange> {
+        let open: Vec<usize> = (0..rays.len()).filter(|k| !rays[*k].stepped).collect();
+        let [alpha, beta] = job.pick(&open);
+        let until: Vec<f64> = open.iter().map(|k| rays[*k].last_time()).collect();
+        nodes.trace(&self.hole, observer, &alpha, &beta, Some(&until), probes)?;
+        for (number, k) in open.into_iter().enumerate() {
+            rays[k].stepped = visitor.needs_path_at(&rays[k], &nodes.ray(number));
         }
         Ok(())
     }
@@ -585,7 +641,8 @@ impl BlockTracer {
         }
         let exit = request.exit.then(|| path.at(path.mino_total()).direction);
         let until = self.until(ray, request.half_orbits);
-        let off_plane = visitor.first_surface(PathOfRay { ray, path });
+        let off_plane =
+            visitor.first_surface(PathOfRay { ray, path, tolerance: self.tracer.tolerance() });
         let off_plane = off_plane.filter(|time| *time <= until);
         let in_plane = first_opaque(&plane[first..], until, visitor);
         TracedRay {

@@ -5,17 +5,20 @@
 mod adaptive;
 mod bands;
 mod channels;
+mod film;
 mod finish;
 mod grid;
 mod journal;
 mod pixels;
+mod plan;
 mod raw;
 mod rings;
 mod tally;
 
 pub use channels::{CHANNELS, ChannelKind};
+pub use film::{Film, Frame};
 pub use journal::{Found, Journal};
-pub(crate) use raw::Raw;
+pub use plan::{Plan, Step};
 pub use rings::{RingStrata, Stratum};
 pub use tally::Summary;
 

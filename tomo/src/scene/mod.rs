@@ -21,7 +21,7 @@ pub use sources::{
 };
 
 use crate::polarization::MagneticField;
-use kerrlight_geodesic::{Kerr, Method, orbits};
+use kerrlight_geodesic::{Kerr, orbits};
 use serde::{Deserialize, Serialize};
 
 /// A complete scene. Lengths and times in M = GM/c² unless a name says otherwise.
@@ -278,12 +278,13 @@ pub enum Integrator {
 }
 
 impl Integrator {
-    /// Its stepping method.
-    pub(crate) fn method(self) -> Method {
+    /// The tracer of that name.
+    pub(crate) fn tracer(self) -> kerrlight_geodesic::Integrator {
         match self {
-            Integrator::Rk45Mino => Method::Rk45,
-            Integrator::Dop853Mino => Method::Dop853,
-            Integrator::TaylorMino | Integrator::Elliptic => Method::Taylor,
+            Integrator::Rk45Mino => kerrlight_geodesic::Integrator::Rk45Mino,
+            Integrator::Dop853Mino => kerrlight_geodesic::Integrator::Dop853Mino,
+            Integrator::TaylorMino => kerrlight_geodesic::Integrator::TaylorMino,
+            Integrator::Elliptic => kerrlight_geodesic::Integrator::Elliptic,
         }
     }
 }

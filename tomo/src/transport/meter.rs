@@ -8,12 +8,14 @@ use std::time::{Duration, Instant};
 pub struct Meter {
     on: bool,
     spent: [Duration; 6],
+    /// What is worked on, and since when.
+    current: Option<(Part, Instant)>,
 }
 
 impl Meter {
     /// A meter that runs.
     pub fn running() -> Self {
-        Meter { on: true, spent: [Duration::ZERO; 6] }
+        Meter { on: true, ..Meter::default() }
     }
 
     /// Time spent on a part.
@@ -26,13 +28,19 @@ impl Meter {
         self.spent.iter_mut().zip(other.spent).for_each(|(sum, spent)| *sum += spent);
     }
 
-    pub(super) fn start(&self) -> Option<Instant> {
-        self.on.then(Instant::now)
+    /// From now on time is spent on a part.
+    #[inline]
+    pub(super) fn switch(&mut self, part: Part) {
+        if self.on {
+            self.stop();
+            self.current = Some((part, Instant::now()));
+        }
     }
 
-    pub(super) fn stop(&mut self, part: Part, start: Option<Instant>) {
-        if let Some(start) = start {
-            self.spent[part as usize] += start.elapsed();
+    /// From now on time is spent on nothing here.
+    pub(super) fn stop(&mut self) {
+        if let Some((part, since)) = self.current.take() {
+            self.spent[part as usize] += since.elapsed();
         }
     }
 }

@@ -1,13 +1,11 @@
-//! Polarised light: what a scene's field and electrons make of the light of its sources.
+//! Polarised light of the sources.
 
-use super::PreparedScene;
-use super::surface::Hit;
 use crate::emission::disc::DiscModel;
 use crate::emission::medium::{Emission, Medium};
 use crate::polarization::{Gas, MagneticField, PowerLaw, Stokes, view, view_at};
 use crate::scene::Scene;
 use kerrlight_geodesic::simd::RayNodes;
-use kerrlight_geodesic::{Kerr, OutOfRange, PathPoint, ScreenPoint, ZamoFrame};
+use kerrlight_geodesic::{Kerr, OutOfRange, PathPoint, PlaneCrossing, ScreenPoint, ZamoFrame};
 
 /// The field of the gas and its electrons.
 #[derive(Debug, Clone)]
@@ -18,7 +16,7 @@ pub(super) struct Polarization {
 }
 
 impl Polarization {
-    /// That of a scene, if it is asked for.
+    /// That of a scene, if it is simulated.
     pub fn new(scene: &Scene) -> Result<Option<Self>, OutOfRange> {
         let effects = &scene.effects;
         let (Some(field), true) = (scene.magnetic_field, effects.polarization) else {
@@ -36,34 +34,30 @@ impl Polarization {
     }
 }
 
-impl PreparedScene {
-    /// The screen of a ray, if light is polarised.
-    pub(super) fn screen_point(&self, x: f64, y: f64) -> Option<ScreenPoint> {
-        let (Some(_), super::View::Screen(observer)) = (&self.polarization, &self.view) else {
-            return None;
-        };
-        Some(ScreenPoint::new(&self.hole, observer.inclination().sin(), x, y))
-    }
+/// Polarised light along one ray.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PolarizedRay<'a> {
+    pub hole: &'a Kerr,
+    pub polarization: &'a Polarization,
+    /// Where it arrives.
+    pub screen: ScreenPoint,
+    /// λ = L/E, in M.
+    pub lambda: f64,
+}
 
+impl PolarizedRay<'_> {
     /// Makes the emission of a medium that of electrons in the field: emissivities times their
     /// own for unit field, and Q, U, V per intensity.
-    pub(super) fn polarize(
-        &self,
-        medium: &dyn Medium,
-        nodes: &RayNodes<'_>,
-        lambda: f64,
-        screen: &ScreenPoint,
-        out: &mut Emission,
-    ) {
+    pub fn polarize(&self, medium: &dyn Medium, nodes: &RayNodes<'_>, out: &mut Emission) {
+        let Polarization { law, field, .. } = self.polarization;
         out.polarization.clear();
-        let Some(Polarization { law, field, .. }) = &self.polarization else { return };
         for (k, emissivity) in out.emissivity.iter_mut().enumerate() {
             let (r, u) = (nodes.radius[k], nodes.cos_theta[k]);
             let rates = [nodes.radial_velocity[k], nodes.polar_velocity[k]];
             let azimuth = nodes.azimuth.get(k).copied().unwrap_or(0.0);
             let stokes = medium.four_velocity(r, u, azimuth).and_then(|velocity| {
-                let momentum = momentum(&self.hole, [r, u], rates, lambda);
-                view_at(&self.hole, screen, [r, u], momentum, velocity, field)
+                let momentum = momentum(self.hole, [r, u], rates, self.lambda);
+                view_at(self.hole, &self.screen, [r, u], momentum, velocity, field)
             });
             let stokes = stokes.map(|view| law.emissivity(&view)).unwrap_or_default();
             *emissivity *= stokes.i;
@@ -72,44 +66,28 @@ impl PreparedScene {
     }
 
     /// Light of the disc at a crossing for unit intensity in the gas frame: g^{3+α} j ℓ_p.
-    pub(super) fn polarized_hit(
-        &self,
-        disc: &DiscModel,
-        hit: &Hit,
-        lambda: f64,
-        screen: &ScreenPoint,
-    ) -> Stokes {
-        let Some(Polarization { law, field, .. }) = &self.polarization else {
-            return Stokes::default();
-        };
-        let r = hit.place.radius;
-        let seen = ZamoFrame::at(&self.hole, r, 1.0, 0.0).and_then(|frame| {
+    pub fn of_disc(&self, disc: &DiscModel, crossing: &PlaneCrossing) -> Stokes {
+        let Polarization { law, field, .. } = self.polarization;
+        let (hole, r) = (self.hole, crossing.radius);
+        let seen = ZamoFrame::at(hole, r, 1.0, 0.0).and_then(|frame| {
             let gas = match disc.plunging_velocity(r) {
                 Some(velocity) => Gas::of_velocity(&frame, velocity),
-                None => Gas::keplerian(&self.hole, &frame)?,
+                None => Gas::keplerian(hole, &frame)?,
             };
-            let photon = frame.covariant(momentum(&self.hole, [r, 0.0], hit.rates, lambda));
-            view(&frame, screen, photon, gas, field.at(&frame))
+            let photon = frame.covariant(momentum(hole, [r, 0.0], crossing.rates, self.lambda));
+            view(&frame, &self.screen, photon, gas, field.at(&frame))
         });
         seen.and_then(|view| law.of_layer(&view)).unwrap_or_default()
     }
 
     /// Emissivity, for unit emissivity across a unit field, and Q, U, V per intensity, at a point
     /// of matter that turns with `omega`.
-    pub(super) fn polarized_spot(
-        &self,
-        point: &PathPoint,
-        lambda: f64,
-        omega: [f64; 3],
-        screen: &ScreenPoint,
-    ) -> Stokes {
-        let Some(Polarization { law, field, .. }) = &self.polarization else {
-            return Stokes::default();
-        };
-        let seen = ZamoFrame::of(&self.hole, point).and_then(|frame| {
+    pub fn of_spot(&self, point: &PathPoint, omega: [f64; 3]) -> Stokes {
+        let Polarization { law, field, .. } = self.polarization;
+        let seen = ZamoFrame::of(self.hole, point).and_then(|frame| {
             let gas = Gas::rotating(&frame, point, omega)?;
-            let photon = frame.covariant(point.momentum(&self.hole, lambda));
-            view(&frame, screen, photon, gas, field.at(&frame))
+            let photon = frame.covariant(point.momentum(self.hole, self.lambda));
+            view(&frame, &self.screen, photon, gas, field.at(&frame))
         });
         seen.map(|view| law.emissivity(&view)).unwrap_or_default()
     }

@@ -1,21 +1,27 @@
-//! What is seen along rays, block by block.
+//! The only place where a pixel is a sum: light of every source along one ray.
 //!
 //! Surfaces come first, since they end rays; then what fills space, on quadrature nodes; then spots;
-//! then the sky.
+//! then the sky. A block of rays is traced by one call of [`BlockTracer::trace`], which hands what it
+//! finds to the [`Sum`].
+//!
+//! [`BlockTracer::trace`]: kerrlight_geodesic::BlockTracer::trace
 
-use super::rays::{End, TracedRay};
-use super::result::{Accumulator, Fate, RayResult, wrap};
-use super::spots::SpotTree;
-use super::straight::Line;
-use super::surface::Seen;
-use super::view::View;
-use super::{NEAREST, PreparedScene, Scratch};
+use super::meter::Meter;
+use super::prepare::PreparedScene;
+use super::result::{Accumulator, RayResult};
+use super::sources::disc::{Disc, DiscRay};
+use super::sources::media::{MediaRay, MediaScratch};
+use super::sources::meshes::MeshScratch;
+use super::sources::spots::{SpotRay, SpotScratch, SpotTree};
 use crate::emission::medium::Part;
-use crate::emission::sky::Beam;
-use kerrlight_geodesic::{Observer, OutOfRange, Ray, footprint};
+use kerrlight_geodesic::footprint::Number;
+use kerrlight_geodesic::simd::RayNodes;
+use kerrlight_geodesic::{
+    OutOfRange, Path, PathOfRay, PlaneCrossing, Ray, RayBlock, RayVisitor, TracedRay, Work,
+};
 use std::sync::Arc;
 
-/// Rays of a block, and the times of observation at which they are asked.
+/// Rays of a block, and the times of observation at which they are seen.
 #[derive(Clone, Copy)]
 pub(super) struct Block<'a> {
     pub alpha: &'a [f64],
@@ -23,11 +29,22 @@ pub(super) struct Block<'a> {
     pub times: &'a [f64],
 }
 
-impl Block<'_> {
-    /// Where ray number `k` arrives.
-    pub fn place(&self, k: usize) -> (f64, f64) {
-        (self.alpha[k], self.beta[k])
-    }
+/// Memory that is reused from block to block.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    pub(super) rays: RayBlock,
+    pub(super) sources: SourceScratch,
+    /// Where the time goes; off unless it is replaced.
+    pub meter: Meter,
+}
+
+/// What each source needs from ray to ray.
+#[derive(Debug, Default)]
+pub(super) struct SourceScratch {
+    pub media: MediaScratch,
+    meshes: MeshScratch,
+    spots: SpotScratch,
+    beam: Path<Number>,
 }
 
 impl PreparedScene {
@@ -60,209 +77,204 @@ impl PreparedScene {
         scratch: &mut Scratch,
         seen: &mut [RayResult],
     ) -> Result<(), OutOfRange> {
-        let rays = alpha.len();
-        scratch.traced.clear();
-        scratch.hits.clear();
-        if let (View::Screen(observer), false) = (&self.view, self.lensing) {
-            return self.observe_straight(observer, Block { alpha, beta, times }, scratch, seen);
-        }
-        let observer = self.closed_form();
-        if let (true, Some(observer)) = (self.bare, observer) {
-            return self.observe_bare(observer, Block { alpha, beta, times }, scratch, seen);
-        }
-        let trees: Vec<_> = times.iter().map(|time| self.spot_tree(*time)).collect();
-        let clock = scratch.meter.start();
-        match observer {
-            Some(observer) => {
-                self.trace_block(observer, (alpha, beta), (times, &trees), scratch)?
-            }
-            None => {
-                scratch.traced.resize(rays, TracedRay { by_steps: true, ..TracedRay::default() })
-            }
-        }
-        scratch.meter.stop(Part::Rays, clock);
-        scratch.volume.reset(self.media.len() * rays * times.len());
-        if let Some(observer) = observer {
-            for (m, medium) in
-                self.media.iter().enumerate().filter(|(_, m)| m.cell_size().is_none())
-            {
-                let clock = scratch.meter.start();
-                self.fill_block(m, observer, (alpha, beta), times, scratch)?;
-                scratch.meter.stop(medium.part(), clock);
-            }
-        }
-        for k in 0..rays {
-            let by_steps = scratch.traced[k].by_steps;
-            let ray = by_steps.then(|| self.step(k, (alpha[k], beta[k]), times, scratch));
-            let ray = ray.transpose()?;
-            let place = (alpha[k], beta[k]);
-            self.shade(k, ray.as_ref(), place, (times, &trees), scratch, seen)?;
-        }
-        Ok(())
-    }
-
-    /// Traces ray number `k` step by step, and gathers the light of what fills space along it.
-    pub(super) fn step(
-        &self,
-        k: usize,
-        (x, y): (f64, f64),
-        times: &[f64],
-        scratch: &mut Scratch,
-    ) -> Result<Ray, OutOfRange> {
-        let ray = self.view.ray(&self.hole, x, y)?;
-        let clock = scratch.meter.start();
-        scratch.traced[k] = self.trace_steps(&ray, scratch);
-        scratch.meter.stop(Part::Rays, clock);
-        let screen = self.screen_point(x, y);
-        for (m, medium) in self.media.iter().enumerate() {
-            let clock = scratch.meter.start();
-            match medium.cell_size() {
-                Some(cell) => self.fill_cells((m, k), &ray, (screen, cell), times, scratch),
-                None => self.fill_path((m, k), screen, times, scratch),
-            }
-            scratch.meter.stop(medium.part(), clock);
-        }
-        Ok(ray)
-    }
-
-    /// [`observe_block`](Self::observe_block) without gravitational lensing.
-    fn observe_straight(
-        &self,
-        observer: &Observer,
-        block: Block<'_>,
-        scratch: &mut Scratch,
-        seen: &mut [RayResult],
-    ) -> Result<(), OutOfRange> {
-        let (rays, times) = (block.alpha.len(), block.times);
-        scratch.traced.resize(rays, TracedRay::default());
-        scratch.volume.reset(self.media.len() * rays * times.len());
-        for k in 0..rays {
-            let (alpha, beta) = block.place(k);
-            let ray = observer.ray(&self.hole, alpha, beta)?;
-            let line = Line::new(observer, self.hole.horizon(), alpha, beta);
-            scratch.traced[k] = self.trace_line(&line, &ray, scratch);
-            self.fill_line(&line, k, times, scratch);
-            self.shade(k, None, (alpha, beta), (times, &[]), scratch, seen)?;
-        }
-        Ok(())
-    }
-
-    /// The observer, if it is one whose rays are to be had in closed form.
-    fn closed_form(&self) -> Option<&Observer> {
-        match &self.view {
-            View::Screen(observer) => {
-                Some(observer).filter(|o| self.closed_form && NEAREST * o.inverse_radius() <= 1.0)
-            }
-            View::Camera(_) => None,
-        }
-    }
-
-    /// What is seen along ray number `k`, of which everything is known but the light of the
-    /// surfaces, the spots and the sky. `ray` is there and the path of `scratch` is its own if it was
-    /// traced step by step.
-    pub(super) fn shade(
-        &self,
-        k: usize,
-        ray: Option<&Ray>,
-        (x, y): (f64, f64),
-        (times, trees): (&[f64], &[Option<Arc<SpotTree>>]),
-        scratch: &mut Scratch,
-        seen: &mut [RayResult],
-    ) -> Result<(), OutOfRange> {
-        let clock = scratch.meter.start();
-        let traced = scratch.traced[k].clone();
-        let mut still = Accumulator::new();
-        let hits = scratch.hits[traced.hits.clone()].iter().copied();
-        let screen = self.screen_point(x, y);
-        let shift = self.spectral_index.and_then(|_| self.view.blueshift(x, y));
-        let TracedRay { lambda, eta, .. } = traced;
-        let spectral_index = self.spectral_index;
-        let seen_as = Seen { lambda, eta, screen: screen.as_ref(), shift, spectral_index };
-        self.add_disc(hits, seen_as, traced.last_time(), &mut still);
-        if traced.by_steps {
-            self.add_meshes(scratch, traced.last_time(), &mut still);
-        }
-        scratch.meter.stop(Part::Surfaces, clock);
-        let clock = scratch.meter.start();
-        let sky = self.sky_light(x, y, &traced, scratch)?;
-        scratch.meter.stop(Part::Sky, clock);
-        let clock = scratch.meter.start();
-        for (j, time) in times.iter().enumerate() {
-            let mut gathered = still.clone();
-            let rays = scratch.traced.len();
-            for (m, medium) in self.media.iter().enumerate() {
-                let place = (m * rays + k) * times.len() + j;
-                if let Some(light) = scratch.volume.lights.get(place) {
-                    gathered.add_light(light, medium.color());
-                }
-            }
-            if let (Some(tree), Some(ray)) = (trees.get(j), ray) {
-                let end = traced.last_time();
-                match tree {
-                    Some(tree) => {
-                        self.add_spots(*time, tree, (ray, screen), scratch, end, &mut gathered)
-                    }
-                    None => self.add_every_spot(*time, (ray, screen), scratch, end, &mut gathered),
-                }
-            }
-            gathered.add_behind(sky);
-            let Some(place) = seen.get_mut(j * scratch.traced.len() + k) else { continue };
-            *place = ray_result(&traced, gathered);
-            if let (Some(index), Some(shift)) = (self.spectral_index, shift) {
-                place.receive(shift, index);
-            }
-        }
-        scratch.meter.stop(Part::Spots, clock);
-        Ok(())
-    }
-
-    /// Light of the sky at the end of a ray, dark if it does not get there.
-    fn sky_light(
-        &self,
-        x: f64,
-        y: f64,
-        traced: &TracedRay,
-        scratch: &mut Scratch,
-    ) -> Result<[f32; 3], OutOfRange> {
-        let (Some(sky), Some(direction), None) = (&self.sky, traced.exit, traced.surface) else {
-            return Ok([0.0; 3]);
+        let Scratch { rays, sources, meter } = scratch;
+        sources.media.reset(self.media.len(), alpha.len(), times.len());
+        let block = Block { alpha, beta, times };
+        let trees: Vec<_> = if self.optics.lensing {
+            times.iter().map(|time| self.spots.tree(&self.optics, *time)).collect()
+        } else {
+            Vec::new()
         };
-        if traced.until < traced.total {
-            return Ok([0.0; 3]);
-        }
-        if let (Some(spacing), true) = (self.beams, self.lensing) {
-            let ray = self.view.beam(&self.hole, x, y)?;
-            let hole = self.hole.lift();
-            let end = footprint::of_ray(&hole, &ray, self.tolerance, &mut scratch.beam)?;
-            if let Some(end) = end {
-                return Ok(sky.mean_color(&Beam::new(&end, spacing)));
-            }
-        }
-        Ok(sky.color(direction))
+        let sighted = self.spots.sight(&self.optics, times.len());
+        let request = if sighted { &self.sighting } else { &self.request };
+        let mut sum = Sum { scene: self, block, trees, sighted, sources, meter, seen };
+        let done = match (self.optics.view.observer(), self.optics.lensing) {
+            (Some(observer), false) => sum.along_lines(observer),
+            _ => self.tracer.trace(alpha, beta, request, rays, &mut sum),
+        };
+        meter.stop();
+        done
     }
 }
 
-/// The sum of everything along a ray.
-#[inline]
-pub(super) fn ray_result(traced: &TracedRay, gathered: Accumulator) -> RayResult {
-    let fate = match (traced.surface, traced.end) {
-        (Some(_), _) => Fate::Surface,
-        (None, End::Captured) => Fate::Captured,
-        (None, End::Escaped) => Fate::Escaped,
-        (None, End::Unresolved) => Fate::Unresolved,
-    };
-    let mean = if gathered.intensity > 0.0 { gathered.shift / gathered.intensity } else { 0.0 };
-    RayResult {
-        intensity: gathered.intensity,
-        rgb: gathered.rgb,
-        redshift: mean,
-        crossings: traced.crossings,
-        disc_images: gathered.disc_images,
-        radius: gathered.place.radius,
-        azimuth: wrap(gathered.place.azimuth),
-        delay: gathered.place.delay,
-        optical_depth: gathered.depth,
-        stokes: gathered.stokes,
-        fate,
+/// Sums up the light of a block of rays.
+pub(super) struct Sum<'a> {
+    pub scene: &'a PreparedScene,
+    pub block: Block<'a>,
+    /// Trees over the spots at each time.
+    trees: Vec<Option<Arc<SpotTree>>>,
+    /// Whether it is found from rays' positions which of them may meet spots.
+    sighted: bool,
+    pub sources: &'a mut SourceScratch,
+    pub meter: &'a mut Meter,
+    seen: &'a mut [RayResult],
+}
+
+impl RayVisitor for Sum<'_> {
+    #[inline]
+    fn is_opaque_at(&self, crossing: &PlaneCrossing) -> bool {
+        self.scene.disc.as_ref().is_some_and(|disc| disc.hides_at(crossing))
+    }
+
+    fn needs_path(&self, ray: &Ray) -> bool {
+        let PreparedScene { meshes, media, spots, optics, .. } = self.scene;
+        meshes.as_ref().is_some_and(|meshes| meshes.need_path(optics, ray))
+            || media.need_path(ray)
+            || (!self.sighted && spots.need_path(ray, &self.trees))
+    }
+
+    fn needs_path_at(&self, ray: &TracedRay, nodes: &RayNodes<'_>) -> bool {
+        self.scene.spots.may_be_met(&self.scene.optics, ray, nodes, self.block.times)
+    }
+
+    fn first_surface(&mut self, path: PathOfRay<'_>) -> Option<f64> {
+        let meshes = self.scene.meshes.as_ref()?;
+        meshes.meet(&self.scene.optics, path, &mut self.sources.meshes)
+    }
+
+    fn take_nodes(
+        &mut self,
+        sphere: usize,
+        number: usize,
+        ray: &TracedRay,
+        crossings: &[PlaneCrossing],
+        nodes: &RayNodes<'_>,
+    ) -> bool {
+        let PreparedScene { media, optics, .. } = self.scene;
+        let seen = self.media_ray(number, ray, crossings);
+        media.radiate(media.in_sphere(sphere), optics, &seen, 0, nodes, &mut self.sources.media)
+    }
+
+    #[inline]
+    fn take(
+        &mut self,
+        number: usize,
+        ray: &TracedRay,
+        crossings: &[PlaneCrossing],
+        path: Option<PathOfRay<'_>>,
+    ) -> Result<(), OutOfRange> {
+        if let Some(path) = path {
+            self.add_cells(number, ray, path);
+        }
+        self.meter.switch(Part::Surfaces);
+        let mut still = Accumulator::new();
+        self.add_surfaces(number, ray, crossings, path, &mut still);
+        self.meter.switch(Part::Sky);
+        let behind = self.sky(number, ray)?;
+        self.meter.switch(Part::Spots);
+        for (j, time) in self.block.times.iter().enumerate() {
+            let mut light = still.clone();
+            self.scene.media.add(number, j, &self.sources.media, &mut light);
+            if let Some(path) = path {
+                self.add_spots((number, j), *time, ray, path, &mut light);
+            }
+            light.add_behind(behind);
+            self.finish((number, j), ray, light);
+        }
+        Ok(())
+    }
+
+    fn works_on(&mut self, work: Work) {
+        let media = &self.scene.media;
+        self.meter.switch(match work {
+            Work::Rays => Part::Rays,
+            Work::Exits => Part::Sky,
+            Work::Nodes(sphere) => media.part(media.in_sphere(sphere)),
+        });
+    }
+}
+
+impl<'a> Sum<'a> {
+    fn place(&self, k: usize) -> (f64, f64) {
+        (self.block.alpha[k], self.block.beta[k])
+    }
+
+    /// Ray number `k` as media see it.
+    pub fn media_ray<'r>(
+        &self,
+        k: usize,
+        ray: &'r TracedRay,
+        crossings: &'r [PlaneCrossing],
+    ) -> MediaRay<'r>
+    where
+        'a: 'r,
+    {
+        let ((x, y), scene) = (self.place(k), self.scene);
+        let polarized = scene.optics.polarized(x, y, ray.lambda);
+        MediaRay { number: k, ray, crossings, polarized, times: self.block.times }
+    }
+
+    /// Sums up the light of media made of cells.
+    fn add_cells(&mut self, k: usize, ray: &TracedRay, path: PathOfRay<'_>) {
+        let PreparedScene { media, optics, .. } = self.scene;
+        for medium in media.with_cells() {
+            self.meter.switch(medium.1.part());
+            let seen = self.media_ray(k, ray, &[]);
+            media.radiate_cells(medium, optics, &seen, path, &mut self.sources.media);
+        }
+    }
+
+    /// Light of the disc and of meshes.
+    #[inline(always)]
+    fn add_surfaces(
+        &self,
+        k: usize,
+        ray: &TracedRay,
+        crossings: &[PlaneCrossing],
+        path: Option<PathOfRay<'_>>,
+        light: &mut Accumulator,
+    ) {
+        let ((x, y), PreparedScene { optics, disc, meshes, .. }) = (self.place(k), self.scene);
+        if let Some(disc) = disc {
+            let depths = self.sources.media.depths(ray);
+            let polarized = optics.polarized(x, y, ray.lambda);
+            let blueshift = optics.blueshift(x, y);
+            Disc::add(
+                disc,
+                optics,
+                &DiscRay { ray, crossings, depths, polarized, blueshift },
+                light,
+            );
+        }
+        if let (Some(meshes), Some(path)) = (meshes, path) {
+            meshes.add(optics, (path.path, ray.last_time()), &self.sources.meshes, light);
+        }
+    }
+
+    /// Light of the sky.
+    #[inline]
+    fn sky(&mut self, k: usize, ray: &TracedRay) -> Result<[f32; 3], OutOfRange> {
+        let Some(sky) = &self.scene.sky else { return Ok([0.0; 3]) };
+        sky.light(&self.scene.optics, self.place(k), ray, &mut self.sources.beam)
+    }
+
+    /// Light of the spots at time number `j`.
+    fn add_spots(
+        &mut self,
+        (k, j): (usize, usize),
+        time: f64,
+        ray: &TracedRay,
+        along: PathOfRay<'_>,
+        light: &mut Accumulator,
+    ) {
+        let Some(tree) = self.trees.get(j) else { return };
+        let ((x, y), PreparedScene { optics, spots, .. }) = (self.place(k), self.scene);
+        let polarized = optics.polarized(x, y, ray.lambda);
+        let SourceScratch { media, spots: scratch, .. } = &mut *self.sources;
+        let (end, depths) = (ray.last_time(), media.profile());
+        let seen = SpotRay { optics, along, end, polarized, depths };
+        spots.add(time, tree.as_deref(), &seen, scratch, light);
+    }
+
+    /// Writes down what ray number `k` sees at time number `j`.
+    #[inline]
+    fn finish(&mut self, (k, j): (usize, usize), ray: &TracedRay, light: Accumulator) {
+        let (x, y) = self.place(k);
+        let Some(seen) = self.seen.get_mut(j * self.block.alpha.len() + k) else { return };
+        *seen = light.result(ray);
+        let optics = &self.scene.optics;
+        if let (Some(index), Some(shift)) = (optics.spectral_index, optics.blueshift(x, y)) {
+            seen.receive(shift, index);
+        }
     }
 }

@@ -1,8 +1,8 @@
 //! What one ray sees, and how light adds up to it.
 
 use super::quadrature::Light;
-use kerrlight_geodesic::PathPoint;
 use kerrlight_geodesic::simd::RayNodes;
+use kerrlight_geodesic::{Outcome, PathPoint, PlaneCrossing, TracedRay};
 
 /// What became of a pixel's ray, as written into the `outcome` channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -117,6 +117,30 @@ impl Accumulator {
         self.mark(light.intensity, light.place);
     }
 
+    /// What the ray sees whose light this is.
+    #[inline]
+    pub fn result(&self, ray: &TracedRay) -> RayResult {
+        let fate = match (ray.surface, ray.outcome) {
+            (Some(_), _) => Fate::Surface,
+            (None, Outcome::Captured) => Fate::Captured,
+            (None, Outcome::Escaped) => Fate::Escaped,
+            (None, Outcome::Unresolved(_)) => Fate::Unresolved,
+        };
+        RayResult {
+            intensity: self.intensity,
+            rgb: self.rgb,
+            redshift: if self.intensity > 0.0 { self.shift / self.intensity } else { 0.0 },
+            crossings: ray.crossing_count,
+            disc_images: self.disc_images,
+            radius: self.place.radius,
+            azimuth: wrap(self.place.azimuth),
+            delay: self.place.delay,
+            optical_depth: self.depth,
+            stokes: self.stokes,
+            fate,
+        }
+    }
+
     /// Adds colour from behind everything.
     pub fn add_behind(&mut self, color: [f32; 3]) {
         let through = (-self.depth).exp() as f32;
@@ -145,6 +169,12 @@ impl Place {
     /// A point of a path.
     pub fn of_point(point: &PathPoint) -> Self {
         Place { radius: point.radius(), azimuth: point.azimuth, delay: point.delay }
+    }
+
+    /// A crossing of the equatorial plane.
+    pub fn of_crossing(crossing: &PlaneCrossing) -> Self {
+        let PlaneCrossing { radius, azimuth, delay, .. } = *crossing;
+        Place { radius, azimuth, delay }
     }
 
     /// Node number `k` of a ray.

@@ -1,13 +1,14 @@
 //! Rays without gravity, for comparison: straight lines x = α ê_α + β ê_β + s ô in the coordinates
 //! x = r n, that end where they meet the horizon's radius.
 
-use super::rays::{End, TracedRay};
+use super::ray::Sum;
 use super::result::Place;
-use super::surface::Hit;
-use super::volume::{Columns, Piece};
-use super::{PreparedScene, Scratch};
+use super::sources::media::{MediaRay, finest};
+use kerrlight_geodesic::nodes::{Leg, Node, NodeColumns};
 use kerrlight_geodesic::simd::PanelRule;
-use kerrlight_geodesic::{Observer, Ray};
+use kerrlight_geodesic::{
+    Observer, OutOfRange, Outcome, PlaneCrossing, Ray, RayVisitor, TracedRay,
+};
 
 /// A straight ray. Its parameter χ takes the place of Mino time: dχ = −ds/r², so that χ times the
 /// impact parameter is the angle by which it has turned about the hole.
@@ -64,11 +65,12 @@ impl Line {
     }
 
     /// The crossing of the equatorial plane.
-    fn hit(&self) -> Option<Hit> {
+    fn crossing(&self) -> Option<PlaneCrossing> {
         let s = -self.origin[2] / self.direction[2];
         let inside = s.is_finite() && s < self.ends[0] && s > self.ends[1];
-        let (_, place) = self.place(s);
-        inside.then(|| Hit { mino_time: self.parameter(s), place, rates: [0.0; 2], depth: 0.0 })
+        let (_, Place { radius, azimuth, delay }) = self.place(s);
+        let mino_time = self.parameter(s);
+        inside.then_some(PlaneCrossing { mino_time, radius, azimuth, delay, rates: [0.0; 2] })
     }
 
     fn is_captured(&self) -> bool {
@@ -81,10 +83,11 @@ impl Line {
         [-x * cos, -x * sin, -z]
     }
 
-    /// The pieces inside a sphere up to the parameter `until`, either side of the closest approach.
-    fn pieces(&self, sphere: f64, until: f64, split: u32) -> Vec<Piece> {
+    /// The legs inside a sphere up to the parameter `until`, either side of the closest approach, and
+    /// a bound of the rate at which the ray turns.
+    fn legs(&self, sphere: f64, until: f64) -> (Vec<Leg>, f64) {
         if self.impact >= sphere {
-            return Vec::new();
+            return (Vec::new(), 0.0);
         }
         let reach = ((sphere - self.impact) * (sphere + self.impact)).sqrt();
         let [from, end] =
@@ -94,24 +97,54 @@ impl Line {
         let middle = middle.clamp(from, end.max(from));
         let legs = [[from, middle], [middle, end]].into_iter().filter(|[from, to]| to > from);
         // r² has its pole at χ = 0.
-        let rate = self.impact.max(1.0 / from);
-        legs.map(|[from, to]| Piece::new([from, to], rate, split, falls)).collect()
+        (legs.map(|ends| Leg { ends, falls }).collect(), self.impact.max(1.0 / from))
     }
 
-    /// Nodes of the quadrature.
-    pub fn nodes(&self, rule: &PanelRule, pieces: &[Piece], columns: &mut Columns) {
-        for piece in pieces {
-            piece.nodes(
-                rule,
-                |parameter, step| {
-                    let s = self.distance(parameter);
-                    let (u, place) = self.place(s);
-                    let Place { radius: r, azimuth, delay } = place;
-                    let rates = [s / r, u * s - r * self.direction[2]];
-                    [r, u, r * r * step, parameter, azimuth, delay, rates[0], rates[1]]
-                },
-                columns,
-            );
+    /// The node at a parameter, for a step of it.
+    fn node(&self, parameter: f64, step: f64) -> Node {
+        let s = self.distance(parameter);
+        let (cos_theta, Place { radius, azimuth, delay }) = self.place(s);
+        Node {
+            radius,
+            cos_theta,
+            weight: radius * radius * step,
+            mino_time: parameter,
+            azimuth,
+            delay,
+            radial_velocity: s / radius,
+            polar_velocity: cos_theta * s - radius * self.direction[2],
+        }
+    }
+
+    /// Fills `columns` with the nodes inside a sphere.
+    fn nodes(
+        &self,
+        (sphere, until): (f64, f64),
+        (rule, split): (&PanelRule, u32),
+        columns: &mut NodeColumns,
+    ) {
+        columns.clear();
+        let (legs, rate) = self.legs(sphere, until);
+        for leg in legs {
+            let node = |parameter, step| self.node(parameter, step);
+            leg.place(rule, leg.panels(rate, split), node, columns);
+        }
+    }
+
+    /// What is known of it as a whole; `crossing` is that of the plane if it is opaque there.
+    fn traced(&self, ray: &Ray, crossings: usize, opaque: Option<&PlaneCrossing>) -> TracedRay {
+        let captured = self.is_captured();
+        TracedRay {
+            lambda: ray.lambda,
+            eta: ray.eta,
+            outcome: if captured { Outcome::Captured } else { Outcome::Escaped },
+            crossing_count: crossings as u32,
+            crossings: 0..crossings,
+            mino_total: self.parameter(self.ends[1]),
+            until: f64::INFINITY,
+            surface: opaque.map(|crossing| crossing.mino_time),
+            exit: (!captured).then(|| self.exit()),
+            stepped: false,
         }
     }
 }
@@ -119,41 +152,71 @@ impl Line {
 /// The least impact parameter: through the centre itself χ is no parameter.
 const SMALLEST: f64 = 1e-6;
 
-impl PreparedScene {
-    /// A straight ray, traced, along a straight ray.
-    pub(super) fn trace_line(&self, line: &Line, ray: &Ray, scratch: &mut Scratch) -> TracedRay {
-        let first = scratch.hits.len();
-        scratch.hits.extend(line.hit());
-        let end = if line.is_captured() { End::Captured } else { End::Escaped };
-        let hits = first..scratch.hits.len();
-        TracedRay {
-            lambda: ray.lambda,
-            eta: ray.eta,
-            end,
-            crossings: hits.len() as u32,
-            total: line.parameter(line.ends[1]),
-            until: f64::INFINITY,
-            surface: self.surface(scratch.hits[hits.clone()].iter().copied(), f64::INFINITY),
-            hits,
-            exit: Some(line.exit()).filter(|_| end == End::Escaped),
-            by_steps: false,
+impl Sum<'_> {
+    /// Sums up the light along straight rays.
+    pub(super) fn along_lines(&mut self, observer: &Observer) -> Result<(), OutOfRange> {
+        let mut columns = NodeColumns::default();
+        for k in 0..self.block.alpha.len() {
+            let (alpha, beta) = (self.block.alpha[k], self.block.beta[k]);
+            let hole = self.scene.hole();
+            let ray = observer.ray(hole, alpha, beta)?;
+            let line = Line::new(observer, hole.horizon(), alpha, beta);
+            let crossing = line.crossing();
+            let opaque = crossing.as_ref().filter(|crossing| self.is_opaque_at(crossing));
+            let ray = line.traced(&ray, usize::from(crossing.is_some()), opaque);
+            self.sources.media.forget_crossings();
+            self.add_media_along(&line, k, (&ray, crossing.as_slice()), &mut columns);
+            self.take(k, &ray, crossing.as_slice(), None)?;
+        }
+        Ok(())
+    }
+
+    /// Light of all media along straight ray number `k`. What changes has nodes of its own at each
+    /// time: no frame depends on another.
+    fn add_media_along(
+        &mut self,
+        line: &Line,
+        k: usize,
+        (ray, crossings): (&TracedRay, &[PlaneCrossing]),
+        columns: &mut NodeColumns,
+    ) {
+        let times = self.block.times;
+        for (m, medium) in self.scene.media.iter().enumerate() {
+            self.meter.switch(medium.part());
+            let together = if medium.changes() { 1 } else { times.len().max(1) };
+            for (number, times) in times.chunks(together).enumerate() {
+                let mut split = 1;
+                loop {
+                    let rule = (self.sources.media.rule(), split);
+                    line.nodes((medium.sphere(), ray.last_time()), rule, columns);
+                    let done =
+                        self.radiate(m, k, (ray, crossings), (times, number * together), columns);
+                    if done || split >= finest(medium) {
+                        break;
+                    }
+                    split *= 2;
+                }
+            }
         }
     }
 
-    /// Light of all media along straight ray number `k`.
-    pub(super) fn fill_line(&self, line: &Line, k: usize, times: &[f64], scratch: &mut Scratch) {
-        let until = scratch.traced[k].last_time();
-        for (m, medium) in self.media.iter().enumerate() {
-            let first = (m * scratch.traced.len() + k) * times.len();
-            // What changes has nodes of its own at each time: no frame depends on another.
-            let together = if medium.changes() { 1 } else { times.len().max(1) };
-            for (number, times) in times.chunks(together).enumerate() {
-                let times = (times, first + number * together);
-                self.fill_ray((m, k), None, times, scratch, |split, _, rule, columns| {
-                    let pieces = line.pieces(medium.sphere(), until, split);
-                    line.nodes(rule, &pieces, columns);
-                });
-            }
-        }
+    fn radiate(
+        &mut self,
+        m: usize,
+        k: usize,
+        (ray, crossings): (&TracedRay, &[PlaneCrossing]),
+        (times, first): (&[f64], usize),
+        columns: &NodeColumns,
+    ) -> bool {
+        let seen = MediaRay { number: k, ray, crossings, polarized: None, times };
+        let nodes = columns.all();
+        self.scene.media.radiate(
+            m,
+            &self.scene.optics,
+            &seen,
+            first,
+            &nodes,
+            &mut self.sources.media,
+        )
     }
 }

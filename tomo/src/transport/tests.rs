@@ -1,7 +1,7 @@
 use super::*;
-use crate::scene::Spot;
+use crate::scene::{Scene, Spot};
 
-mod bare;
+mod blocks;
 mod discs;
 mod meshes;
 mod volumes;
@@ -96,11 +96,11 @@ fn exact_rays_that_cannot_meet_a_spot() {
     let mut scene = scene(&[]);
     scene.spot = spots(40, None);
     let prepared = PreparedScene::new(&scene, None).unwrap();
-    let tree = prepared.spot_tree(30.0).unwrap();
+    let tree = prepared.spots.tree(&prepared.optics, 30.0).unwrap();
     let (alpha, beta) = screen(24, 40.0);
     let (mut out, mut lit) = (0, 0);
     for (alpha, beta) in alpha.iter().zip(&beta) {
-        let ray = prepared.view.ray(&prepared.hole, *alpha, *beta).unwrap();
+        let ray = prepared.view().ray(prepared.hole(), *alpha, *beta).unwrap();
         let seen = prepared.observe(*alpha, *beta, &mut Scratch::default()).unwrap();
         lit += u32::from(seen.intensity > 0.0);
         if !tree.can_be_met(&ray) {
@@ -149,7 +149,7 @@ fn exact_sighting_of_single_spots() {
             let (alpha, beta) = screen(24, 24.0);
             let mut seen = vec![RayResult::default(); alpha.len() * times.len()];
             prepared.observe_block(&alpha, &beta, &times, &mut scratch, &mut seen).unwrap();
-            stepped += scratch.traced.iter().filter(|ray| ray.by_steps).count();
+            stepped += scratch.rays.rays().iter().filter(|ray| ray.stepped).count();
             all += alpha.len();
         }
     }

@@ -41,7 +41,7 @@ impl Resolver {
     /// curve are found by their light.
     pub fn new(prepared: &PreparedScene, refined: bool) -> Option<Self> {
         let spacing = prepared.ring_spacing()?;
-        let strata = RingStrata::new(&prepared.hole, &prepared.view, spacing);
+        let strata = RingStrata::new(prepared.hole(), prepared.view(), spacing);
         let strata = if refined { strata.on_curve() } else { strata };
         Some(Resolver { strata, hides: prepared.has_opaque_disc() })
     }

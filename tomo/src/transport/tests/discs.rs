@@ -1,10 +1,10 @@
 //! Matter that plunges from the inner edge of a disc, against closed forms and both ways to trace.
 
 use super::*;
-use crate::emission::disc::Photon;
+use crate::emission::disc::{DiscModel, Photon};
 use crate::polarization::Gas;
 use crate::scene::{Disc, Plunging};
-use kerrlight_geodesic::{ZamoFrame, orbits, plunge::Plunge, vector::dot};
+use kerrlight_geodesic::{Kerr, ZamoFrame, orbits, plunge::Plunge, vector::dot};
 
 const LAW: Plunging = Plunging { intensity: 0.7, exponent: 1.5 };
 

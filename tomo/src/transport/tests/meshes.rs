@@ -1,5 +1,5 @@
 use super::*;
-use crate::emission::mesh::RawTriangle;
+use crate::emission::mesh::{MeshFile, RawTriangle};
 use crate::scene::{Disc, Mesh, MeshVelocity};
 use core::f64::consts::{FRAC_PI_2, PI, TAU};
 

@@ -2,10 +2,14 @@
 
 use super::*;
 use crate::emission::medium::{CellSize, Emission, Moment, PathSegment};
+use crate::emission::medium::{Medium, Part};
+use crate::emission::spot::SpotModel;
 use crate::scene::{Rotation, Velocity, VolumeSource};
 use crate::volume::Volume;
-use kerrlight_geodesic::Quantities;
+use crate::volume::VolumeFile;
 use kerrlight_geodesic::simd::RayNodes;
+use kerrlight_geodesic::{Kerr, Quantities};
+use std::sync::Arc;
 
 /// `value` on the nodes of a box.
 fn volume(nodes: usize, [low, high]: [[f64; 3]; 2], value: impl Fn([f64; 3]) -> f64) -> VolumeFile {
@@ -253,8 +257,11 @@ fn regress_panels_resolve_cells() {
             let source = source(Rotation::Keplerian, [0.0, 0.6, 0.8], 0.0);
             let coarse = prepared(scene, source, gaussian(center, 0.8, 33));
             let mut fine = coarse.clone();
-            fine.media = vec![Arc::new(Finer(coarse.media[0].clone(), 0.125))];
-            fine.tolerance = 1e-9;
+            fine.media = coarse
+                .media
+                .clone()
+                .map(|medium| Arc::new(Finer(medium, 0.125)) as Arc<dyn Medium>);
+            fine.optics.tolerance = 1e-9;
             let [miss, ..] = distances(&observe(&coarse, &[60.0]), &observe(&fine, &[60.0]));
             println!("{integrator}, {tolerance}: {miss:e}");
             assert!(miss < allowed, "{integrator}, {tolerance}: {miss:e}");

@@ -5,20 +5,19 @@
 //! closed form, a few per radian, show that in coordinates carried along with the matter they stay
 //! farther from its centre than its light reaches.
 
+use super::Spots;
 use crate::emission::spot::{MatterPoint, SpotModel};
-use crate::transport::rays::End;
-use crate::transport::{PreparedScene, Scratch};
+use crate::transport::optics::Optics;
 use kerrlight_geodesic::simd::{NodeRequest, PanelRule, RayNodes};
 use kerrlight_geodesic::vector::distance;
-use kerrlight_geodesic::{Observer, OutOfRange, Quantities};
-use std::sync::LazyLock;
+use kerrlight_geodesic::{Outcome, Quantities, TracedRay};
 
 /// Pairs of a spot and a time of observation beyond which asking each of them on each node would
 /// cost more than stepping.
 const MOST_PAIRS: usize = 4;
 
-/// The positions on a panel: panels are at most 0.4 radians long.
-static RULE: LazyLock<PanelRule> = LazyLock::new(|| PanelRule::new(4));
+/// Positions on a panel: panels are at most 0.4 radians long.
+const ORDER: usize = 4;
 
 /// From the last node of a panel to its end, over the distance of the last two nodes: 0.27.
 const END_GAP: f64 = 0.3;
@@ -29,43 +28,38 @@ const SLACK: f64 = 1.25;
 /// Positions are asked for as far outside of the spots as the gap at the end of a panel, in M.
 const MARGIN: f64 = 0.5;
 
-impl PreparedScene {
-    /// Whether rays are asked one by one if they meet spots before they are traced step by step.
-    pub(in crate::transport) fn sights_spots(&self, times: &[f64]) -> bool {
-        let pairs = self.spots.len() * times.len();
-        !self.one_by_one && (1..=MOST_PAIRS).contains(&pairs)
+impl Spots {
+    /// Whether it is found from rays' positions which of them may meet spots, at so many times of
+    /// observation.
+    pub fn sight(&self, optics: &Optics, times: usize) -> bool {
+        !optics.one_by_one && (1..=MOST_PAIRS).contains(&(self.models.len() * times))
     }
 
-    /// Leaves the rays of a block that may meet spots to be traced step by step.
-    pub(in crate::transport) fn sight_spots(
-        &self,
-        observer: &Observer,
-        (alpha, beta): (&[f64], &[f64]),
-        times: &[f64],
-        scratch: &mut Scratch,
-    ) -> Result<(), OutOfRange> {
-        let Scratch { traced, nodes, .. } = scratch;
-        let open: Vec<usize> = (0..traced.len()).filter(|k| !traced[*k].by_steps).collect();
-        let pick = |column: &[f64]| open.iter().map(|k| column[*k]).collect::<Vec<_>>();
-        let until: Vec<f64> = open.iter().map(|k| traced[*k].last_time()).collect();
-        let reach = self.spots.iter().map(|spot| spot.shell()[1]).fold(0.0, f64::max);
-        let request = NodeRequest {
+    /// The nodes that sighting takes.
+    pub fn probes(&self, optics: &Optics) -> NodeRequest {
+        let reach = self.models.iter().map(|spot| spot.shell()[1]).fold(0.0, f64::max);
+        NodeRequest {
             radius: reach + MARGIN,
-            rule: RULE.clone(),
+            rule: PanelRule::new(ORDER),
             split: 1,
-            quantities: Quantities { azimuth: true, time: self.slow_light, velocity: false },
-        };
-        nodes.trace(&self.hole, observer, &pick(alpha), &pick(beta), Some(&until), &request)?;
-        for (number, k) in open.into_iter().enumerate() {
-            let falls = traced[k].end == End::Captured;
-            let nodes = nodes.ray(number);
-            traced[k].by_steps = times.iter().any(|observed| {
-                let (observed, slow_light) = (*observed, self.slow_light);
-                let sees = |spot| Sighting { spot, observed, slow_light, nodes, falls }.may_meet();
-                self.spots.iter().any(sees)
-            });
+            quantities: Quantities { azimuth: true, time: optics.slow_light, velocity: false },
         }
-        Ok(())
+    }
+
+    /// Whether a ray with these nodes may meet a spot at one of `times`.
+    pub fn may_be_met(
+        &self,
+        optics: &Optics,
+        ray: &TracedRay,
+        nodes: &RayNodes<'_>,
+        times: &[f64],
+    ) -> bool {
+        let (falls, slow_light) = (ray.outcome == Outcome::Captured, optics.slow_light);
+        times.iter().any(|observed| {
+            let (observed, nodes) = (*observed, *nodes);
+            let sees = |spot| Sighting { spot, observed, slow_light, nodes, falls }.may_meet();
+            self.models.iter().any(sees)
+        })
     }
 }
 

@@ -1,7 +1,8 @@
 //! Many pictures of one scene: a film. Under a fixed camera each ray is traced once for a whole
 //! batch of frames.
 
-use crate::render::{Progress, Raster, Raw, RenderError, Rendered};
+use super::raw::Raw;
+use super::{Progress, Raster, RenderError, Rendered};
 use crate::scene::Scene;
 use crate::transport::Assets;
 

@@ -5,18 +5,19 @@
 //! are panels of the quadrature. Those that are off by more than their share of the allowed error
 //! are halved again, down to a part of a cell.
 
-use super::chord::ChordBound;
-use super::quadrature::{Light, integrate};
-use super::rays::{End, TracedRay};
-use super::tree::Node;
-use super::volume::{Columns, FAINT, Piece, Workspace, ray_nodes};
-use super::{PreparedScene, Scratch};
-use crate::emission::medium::{CellSize, Medium, Moment, PathSegment};
-use kerrlight_geodesic::{Path, Ray, ScreenPoint};
+use super::media::{FAINT, Media, MediaRay, MediaScratch};
+use crate::emission::medium::{CellSize, Emission, Medium, Moment, PathSegment};
+use crate::transport::chord::ChordBound;
+use crate::transport::optics::Optics;
+use crate::transport::polarized::PolarizedRay;
+use crate::transport::quadrature::{Light, Quadrature, integrate};
+use crate::transport::tree::Node;
+use kerrlight_geodesic::nodes::{self, Leg, NodeColumns};
+use kerrlight_geodesic::{Path, PathOfRay};
 
 /// A panel of one ray.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Panel {
+struct Panel {
     /// Mino times.
     ends: [f64; 2],
     /// In M.
@@ -27,75 +28,77 @@ pub(super) struct Panel {
     known: Option<usize>,
 }
 
+/// What cells need from ray to ray.
+#[derive(Debug, Default)]
+pub(super) struct CellScratch {
+    intervals: Vec<[f64; 2]>,
+    /// Panels of one ray, with their nodes and emission.
+    panels: Vec<Panel>,
+    nodes: NodeColumns,
+    emission: Emission,
+    /// Nodes and emission before panels were halved, and emission of one panel.
+    before: (NodeColumns, Emission),
+    fresh: Emission,
+}
+
 /// A piece is halved at most this often.
 const DEEPEST: u32 = 40;
 
 /// Light of cells that one ray meets at one time.
 struct Cells<'a> {
-    prepared: &'a PreparedScene,
+    optics: &'a Optics,
     medium: &'a dyn Medium,
     cell: CellSize,
     path: &'a Path,
     bound: ChordBound,
     moment: Moment,
     lambda: f64,
-    screen: Option<ScreenPoint>,
+    polarized: Option<PolarizedRay<'a>>,
 }
 
-impl PreparedScene {
-    /// Light of medium number `m`, made of cells, along ray number `k`, which was traced step by
+impl Media {
+    /// Sums up the light of medium number `m`, made of cells, along a ray that was traced step by
     /// step. Each time has nodes of its own, so that no time's light depends on another's.
-    pub(super) fn fill_cells(
+    pub fn radiate_cells(
         &self,
-        (m, k): (usize, usize),
-        ray: &Ray,
-        (screen, cell): (Option<ScreenPoint>, CellSize),
-        times: &[f64],
-        scratch: &mut Scratch,
+        (m, medium, cell): (usize, &dyn Medium, CellSize),
+        optics: &Optics,
+        seen: &MediaRay<'_>,
+        PathOfRay { ray, path, tolerance }: PathOfRay<'_>,
+        scratch: &mut MediaScratch,
     ) {
-        let Scratch { path, traced, intervals, volume, .. } = scratch;
-        let (medium, first) = (&*self.media[m], (m * traced.len() + k) * times.len());
-        for (j, observed) in times.iter().enumerate() {
-            if j > 0 && !medium.changes() {
-                volume.lights[first + j] = volume.lights[first];
-                continue;
+        let mut last = Light::default();
+        for (j, observed) in seen.times.iter().enumerate() {
+            if j == 0 || medium.changes() {
+                let cells = Cells {
+                    optics,
+                    medium,
+                    cell,
+                    path,
+                    bound: ChordBound::new(&optics.hole, ray, path, tolerance),
+                    moment: Moment { observed: *observed, slow_light: optics.slow_light },
+                    lambda: ray.lambda,
+                    polarized: seen.polarized,
+                };
+                let CellScratch { intervals, panels, .. } = &mut scratch.cells;
+                cells.find(seen.ray.last_time(), intervals, panels);
+                last = cells.light(scratch);
             }
-            let cells = Cells {
-                prepared: self,
-                medium,
-                cell,
-                path,
-                bound: ChordBound::new(&self.hole, ray, path, self.tracer.tolerance()),
-                moment: Moment { observed: *observed, slow_light: self.slow_light },
-                lambda: ray.lambda,
-                screen,
-            };
-            cells.find(&traced[k], intervals, &mut volume.panels);
-            volume.lights[first + j] = cells.light(volume);
+            self.keep((m, seen.number, j), last, scratch);
         }
     }
 }
 
 impl Cells<'_> {
     /// The panels on which there may be light.
-    fn find(&self, traced: &TracedRay, intervals: &mut Vec<[f64; 2]>, panels: &mut Vec<Panel>) {
+    fn find(&self, last: f64, intervals: &mut Vec<[f64; 2]>, panels: &mut Vec<Panel>) {
         panels.clear();
-        let (outer, last) = (self.medium.sphere(), traced.last_time());
-        let inner = self.cell.inner.min(outer).max(0.5 * self.prepared.hole.horizon());
-        self.path.intervals_within(inner, outer, intervals);
-        let turning = self.path.turning_point().map_or(f64::INFINITY, |(time, _)| time);
-        let whole = self.path.mino_total();
-        for [start, end] in intervals.iter().copied() {
-            let falls = traced.end == End::Captured && end >= whole && last >= end;
-            let end = end.min(last);
-            let middle = turning.clamp(start, end.max(start));
-            for [from, to] in [[start, middle], [middle, end]] {
-                if to > from {
-                    let ends = [from, to].map(|time| Node::at(self.path, time));
-                    self.search([&ends[0], &ends[1]], falls && to >= end, 0, panels);
-                }
-            }
-        }
+        let outer = self.medium.sphere();
+        let inner = self.cell.inner.min(outer).max(0.5 * self.optics.hole.horizon());
+        nodes::legs(self.path, [inner, outer], last, intervals, |Leg { ends, falls }| {
+            let ends = ends.map(|time| Node::at(self.path, time));
+            self.search([&ends[0], &ends[1]], falls, 0, panels);
+        });
     }
 
     fn search(&self, [start, end]: [&Node; 2], falls: bool, depth: u32, panels: &mut Vec<Panel>) {
@@ -105,7 +108,7 @@ impl Cells<'_> {
         let ends = [start.point.mino_time, end.point.mino_time];
         let reach = 1.0 / (start.point.inverse_radius * end.point.inverse_radius);
         // ∫ Σ dτ: on a straight line to the centre Δτ is the difference of 1/r.
-        let length = (ends[1] - ends[0]) * (reach + self.prepared.hole.spin().powi(2));
+        let length = (ends[1] - ends[0]) * (reach + self.optics.hole.spin().powi(2));
         if length <= self.cell.size || depth >= DEEPEST {
             return panels.push(Panel { ends, length, falls, known: None });
         }
@@ -128,19 +131,18 @@ impl Cells<'_> {
     }
 
     /// Light of the panels, which are halved as long as that makes sense.
-    fn light(&self, volume: &mut Workspace) -> Light {
-        if volume.panels.is_empty() {
+    fn light(&self, media: &mut MediaScratch) -> Light {
+        if media.cells.panels.is_empty() {
             return Light::default();
         }
-        let all = usize::MAX;
+        let MediaScratch { quadrature, sums, cells, .. } = media;
         loop {
-            self.fill(volume);
-            let Workspace { quadrature, columns, emission, sums, panels, .. } = volume;
-            let light = integrate(quadrature, &ray_nodes(columns, 0..all), emission, sums);
+            self.fill(quadrature, cells);
+            let light = integrate(quadrature, &cells.nodes.all(), &cells.emission, sums);
             let scale = light.intensity + FAINT * self.medium.scale();
-            let enough = self.prepared.tolerance * scale;
-            let share = enough / panels.len() as f64;
-            if light.error <= enough || !self.halve(panels, &sums.misses, share) {
+            let enough = self.optics.tolerance * scale;
+            let share = enough / cells.panels.len() as f64;
+            if light.error <= enough || !self.halve(&mut cells.panels, &sums.misses, share) {
                 return light;
             }
         }
@@ -165,37 +167,32 @@ impl Cells<'_> {
         panels.len() > before
     }
 
-    /// Columns and emission of all panels; those that are known are kept.
-    fn fill(&self, volume: &mut Workspace) {
-        let Workspace { quadrature, columns, emission, panels, before, fresh, .. } = volume;
+    /// Nodes and emission of all panels; those that are known are kept.
+    fn fill(&self, quadrature: &Quadrature, scratch: &mut CellScratch) {
+        let CellScratch { nodes, emission, panels, before, fresh, .. } = scratch;
         let rule = &quadrature.rule;
         let order = rule.order();
-        core::mem::swap(columns, &mut before.0);
+        core::mem::swap(nodes, &mut before.0);
         core::mem::swap(emission, &mut before.1);
-        columns.iter_mut().for_each(Vec::clear);
+        nodes.clear();
         emission.clear();
         for (number, panel) in panels.iter_mut().enumerate() {
             if let Some(old) = panel.known.replace(number) {
                 let range = old * order..(old + 1) * order;
-                copy(columns, &before.0, range.clone());
+                nodes.extend(&before.0, range.clone());
                 emission.append(&before.1, range);
                 continue;
             }
-            let place = |time, step| self.prepared.node_of(self.path, time, step);
-            Piece::single(panel.ends, panel.falls).nodes(rule, place, columns);
+            let (hole, path) = (&self.optics.hole, self.path);
+            let node = |time, step| nodes::Node::of_path(hole, path, time, step);
+            Leg { ends: panel.ends, falls: panel.falls }.place(rule, 1, node, nodes);
             fresh.clear();
-            let nodes = ray_nodes(columns, number * order..(number + 1) * order);
+            let nodes = nodes.view(number * order..(number + 1) * order);
             self.medium.fill(&nodes, self.lambda, self.moment, fresh);
-            if let Some(screen) = &self.screen {
-                self.prepared.polarize(self.medium, &nodes, self.lambda, screen, fresh);
+            if let Some(polarized) = &self.polarized {
+                polarized.polarize(self.medium, &nodes, fresh);
             }
             emission.append(fresh, 0..order);
         }
-    }
-}
-
-fn copy(columns: &mut Columns, from: &Columns, range: core::ops::Range<usize>) {
-    for (column, old) in columns.iter_mut().zip(from) {
-        column.extend_from_slice(&old[range.clone()]);
     }
 }

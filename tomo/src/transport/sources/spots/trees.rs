@@ -15,7 +15,7 @@ pub(in crate::transport) struct SpotTree {
 }
 
 /// Trees for spans of the time of emission, one after the other and as long each; made when they
-/// are first asked for. With slow light a ray passes spots at many times, but each place at one.
+/// are first needed. With slow light a ray passes spots at many times, but each place at one.
 #[derive(Debug)]
 pub(in crate::transport) struct SpotSpans {
     /// Length of a span in M.

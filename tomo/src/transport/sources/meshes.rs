@@ -1,17 +1,33 @@
 //! Triangle meshes: where a curved ray meets them, and their light.
 
-use super::chord::ChordBound;
-use super::result::{Accumulator, Place};
-use super::tree::{Node, Tree, Walk, WalkScratch};
-use super::{PreparedScene, Scratch};
-use crate::emission::mesh::{MeshModel, Triangle};
+use crate::emission::mesh::{MeshFile, MeshModel, Triangle};
+use crate::scene::Scene;
+use crate::transport::chord::ChordBound;
+use crate::transport::optics::Optics;
+use crate::transport::result::{Accumulator, Place};
+use crate::transport::tree::{Node, Tree, Walk, WalkScratch};
 use kerrlight_geodesic::vector::distance;
-use kerrlight_geodesic::{Kerr, Path, Ray};
+use kerrlight_geodesic::{Kerr, OutOfRange, Path, PathOfRay, Ray};
 use std::ops::ControlFlow;
+use std::sync::Arc;
+
+/// The meshes of a scene.
+#[derive(Debug, Clone)]
+pub(in crate::transport) struct Meshes {
+    tree: Arc<MeshTree>,
+}
+
+/// What meshes need from ray to ray.
+#[derive(Debug, Default)]
+pub(in crate::transport) struct MeshScratch {
+    walk: WalkScratch,
+    /// Where the last ray meets triangles.
+    hits: Vec<Hit>,
+}
 
 /// All meshes of a scene in one hierarchy.
 #[derive(Debug)]
-pub(super) struct MeshTree {
+struct MeshTree {
     meshes: Vec<MeshModel>,
     tree: Tree,
     /// Mesh and triangle of each leaf.
@@ -20,9 +36,9 @@ pub(super) struct MeshTree {
 
 /// Where a ray meets a triangle.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Hit {
+struct Hit {
     /// Mino time.
-    pub mino_time: f64,
+    mino_time: f64,
     leaf: u32,
 }
 
@@ -203,38 +219,65 @@ impl Cut<'_> {
     }
 }
 
-impl PreparedScene {
-    /// Fills `scratch.mesh_hits` and returns the Mino time of the first that hides the rest.
-    pub(super) fn meet_meshes(&self, ray: &Ray, scratch: &mut Scratch) -> Option<f64> {
-        scratch.mesh_hits.clear();
-        let meshes = self.meshes.as_ref()?;
-        let Scratch { path, walk, mesh_hits: hits, .. } = scratch;
-        let bound = ChordBound::new(&self.hole, ray, path, self.tracer.tolerance());
-        if self.one_by_one {
-            return meshes.meet_every(path, &bound, hits);
+impl Meshes {
+    /// The meshes of a scene with their files, if it has any.
+    pub fn new(scene: &Scene, files: &[MeshFile], hole: &Kerr) -> Result<Option<Self>, OutOfRange> {
+        if files.len() != scene.mesh.len() {
+            let (value, allowed) = (files.len() as f64, "one file for each [[mesh]]");
+            return Err(OutOfRange { field: "number of mesh files", value, allowed });
         }
-        if meshes.can_be_met(ray) { meshes.meet(path, &bound, walk, hits) } else { None }
+        if files.is_empty() {
+            return Ok(None);
+        }
+        let placed = scene.mesh.iter().zip(files).map(|(mesh, file)| MeshModel::new(mesh, file));
+        let tree = MeshTree::new(placed.collect::<Result<_, _>>()?, hole);
+        Ok(Some(Meshes { tree: Arc::new(tree) }))
     }
 
-    /// Light of the hits up to Mino time `end`: I = g^{3+α} I_em.
-    pub(super) fn add_meshes(&self, scratch: &Scratch, end: f64, gathered: &mut Accumulator) {
-        let Some(meshes) = &self.meshes else { return };
-        for hit in scratch.mesh_hits.iter().take_while(|hit| hit.mino_time <= end) {
-            let (mesh, triangle) = meshes.at(hit.leaf);
+    /// Whether the path of a ray is needed.
+    pub fn need_path(&self, optics: &Optics, ray: &Ray) -> bool {
+        optics.one_by_one || self.tree.can_be_met(ray)
+    }
+
+    /// Finds where a ray meets triangles; the Mino time of the first that hides the rest.
+    pub fn meet(
+        &self,
+        optics: &Optics,
+        PathOfRay { ray, path, tolerance }: PathOfRay<'_>,
+        MeshScratch { walk, hits }: &mut MeshScratch,
+    ) -> Option<f64> {
+        hits.clear();
+        let bound = ChordBound::new(&optics.hole, ray, path, tolerance);
+        if optics.one_by_one {
+            return self.tree.meet_every(path, &bound, hits);
+        }
+        if self.tree.can_be_met(ray) { self.tree.meet(path, &bound, walk, hits) } else { None }
+    }
+
+    /// Adds the light of the triangles met up to Mino time `end`: I = g^{3+α} I_em.
+    pub fn add(
+        &self,
+        optics: &Optics,
+        (path, end): (&Path, f64),
+        scratch: &MeshScratch,
+        light: &mut Accumulator,
+    ) {
+        for hit in scratch.hits.iter().take_while(|hit| hit.mino_time <= end) {
+            let (mesh, triangle) = self.tree.at(hit.leaf);
             if !mesh.shines() {
                 continue;
             }
-            let point = scratch.path.at(hit.mino_time);
+            let point = path.at(hit.mino_time);
             let (emitted, color) = mesh.light(triangle, point.cartesian());
-            let g = match self.spectral_index {
-                Some(_) => mesh.redshift(&self.hole, &point),
+            let g = match optics.spectral_index {
+                Some(_) => mesh.redshift(&optics.hole, &point),
                 None => Some(1.0),
             };
             // Where matter cannot move like this there is none that shines.
             let Some(g) = g else { continue };
-            let intensity = emitted * self.spectral_index.map_or(1.0, |index| g.powf(3.0 + index));
-            gathered.add(intensity, g, color);
-            gathered.mark(intensity, Place::of_point(&point));
+            let boost = optics.spectral_index.map_or(1.0, |index| g.powf(3.0 + index));
+            light.add(emitted * boost, g, color);
+            light.mark(emitted * boost, Place::of_point(&point));
         }
     }
 }

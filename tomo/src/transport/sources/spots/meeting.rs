@@ -1,43 +1,43 @@
 //! Which spots a ray meets, and where.
 
-use super::DEEPEST;
+use super::light::SpotRay;
 use super::trees::{SpotSpans, SpotTree};
+use super::{DEEPEST, SpotScratch, Spots};
 use crate::transport::chord::ChordBound;
 use crate::transport::tree::{Node, Walk, WalkScratch};
-use crate::transport::{PreparedScene, Scratch};
-use kerrlight_geodesic::{Path, Ray};
+use kerrlight_geodesic::{Path, PathOfRay};
 use std::ops::ControlFlow;
 
 /// Light that one spot may send along a piece of path.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::transport) struct Met {
-    pub(super) spot: u32,
+pub(super) struct Met {
+    pub spot: u32,
     piece: [f64; 2],
 }
 
-impl PreparedScene {
+impl Spots {
     /// Fills `scratch.met`, by spots and along the ray.
-    pub(super) fn meet_spots(
+    pub(super) fn meet(
         &self,
         time: f64,
         tree: &SpotTree,
-        ray: &Ray,
-        scratch: &mut Scratch,
-        end: f64,
+        seen: &SpotRay<'_>,
+        scratch: &mut SpotScratch,
     ) {
-        let Scratch { path, walk, met, intervals, .. } = scratch;
-        let bound = ChordBound::new(&self.hole, ray, path, self.tracer.tolerance());
-        let meeting = Meeting { prepared: self, time, path, bound };
+        let SpotScratch { walk, met, intervals, .. } = scratch;
+        let (optics, PathOfRay { ray, path, tolerance }) = (seen.optics, seen.along);
+        let bound = ChordBound::new(&optics.hole, ray, path, tolerance);
+        let meeting = Meeting { spots: self, seen, time, path, bound };
         let [low, high] = tree.tree.shell();
         path.intervals_within(low, high, intervals);
         met.clear();
         for &[from, to] in intervals.iter() {
-            let to = to.min(end);
+            let to = to.min(seen.end);
             if from >= to {
                 continue;
             }
             let ends = [&Node::at(path, from), &Node::at(path, to)];
-            match self.spot_spans.as_deref() {
+            match self.spans.as_deref() {
                 Some(spans) => meeting.by_spans((spans, tree), ends, 0, (walk, met)),
                 None => meeting.through(tree, ends, walk, met),
             }
@@ -48,7 +48,8 @@ impl PreparedScene {
 
 /// A ray on its way through the trees, seen at one time.
 struct Meeting<'a> {
-    prepared: &'a PreparedScene,
+    spots: &'a Spots,
+    seen: &'a SpotRay<'a>,
     time: f64,
     path: &'a Path,
     bound: ChordBound,
@@ -58,7 +59,7 @@ impl Meeting<'_> {
     /// The first and the last time at which light that is seen passed a piece.
     fn times(&self, ends: [&Node; 2]) -> [f64; 2] {
         let [early, late] =
-            [ends[1], ends[0]].map(|node| self.prepared.emission_time(self.time, &node.point));
+            [ends[1], ends[0]].map(|node| self.seen.optics.emission_time(self.time, &node.point));
         let error = self.bound.error(self.bound.reach(ends.map(|node| &node.point)));
         [early - error, late + error]
     }
@@ -71,12 +72,12 @@ impl Meeting<'_> {
         walk: &mut WalkScratch,
         met: &mut Vec<Met>,
     ) {
-        let slow = self.prepared.slow_light;
+        let slow = self.seen.optics.slow_light;
         // With slow light short pieces tell much about the time.
         let longest = if slow { 2.0 } else { 8.0 };
         let shines = |leaf: u32, ends: [&Node; 2], epsilon: f64| {
             let part = &tree.parts[leaf as usize];
-            let spot = &self.prepared.spots[part.spot as usize];
+            let spot = &self.spots.models[part.spot as usize];
             let when = if slow { self.times(ends) } else { [self.time; 2] };
             (!slow || spot.shines_from(part, when))
                 && spot.comes_near(ends.map(|node| node.position), epsilon, when)
@@ -102,7 +103,7 @@ impl Meeting<'_> {
         let [first, last] = self.times([start, end]).map(|time| spans.number(time));
         if last.saturating_sub(first) <= 1 {
             for number in first..=last {
-                let tree = spans.tree(&self.prepared.spots, &self.prepared.hole, number);
+                let tree = spans.tree(&self.spots.models, &self.seen.optics.hole, number);
                 self.through(&tree, [start, end], walk, met);
             }
             return;

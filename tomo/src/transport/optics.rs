@@ -1,0 +1,55 @@
+//! What every source of light needs to know of the scene besides itself.
+
+use super::polarized::{Polarization, PolarizedRay};
+use crate::emission::medium::Medium;
+use kerrlight_geodesic::{Kerr, PathPoint, Quantities, ScreenPoint, View};
+
+/// The hole, the view and the effects that are simulated.
+#[derive(Debug, Clone)]
+pub(super) struct Optics {
+    pub hole: Kerr,
+    pub view: View,
+    /// Error of a step along a ray, and relative error of the light summed up along it.
+    pub tolerance: f64,
+    /// Spectral index α, if redshift is simulated.
+    pub spectral_index: Option<f64>,
+    /// Whether light is seen as it was when it passed, not as it is at the time of observation.
+    pub slow_light: bool,
+    /// Whether rays are bent.
+    pub lensing: bool,
+    /// Whether every spot and every triangle is asked along every ray, without a hierarchy.
+    pub one_by_one: bool,
+    /// What is recorded of the brightest contribution to a pixel.
+    pub recorded: Quantities,
+    pub polarization: Option<Polarization>,
+}
+
+impl Optics {
+    /// When the light that is seen at `time` passed a point.
+    pub fn emission_time(&self, time: f64, point: &PathPoint) -> f64 {
+        if self.slow_light { time - point.delay } else { time }
+    }
+
+    /// What is computed at the nodes in a medium besides r and cos θ.
+    pub fn quantities_of(&self, medium: &dyn Medium) -> Quantities {
+        let velocity = self.polarization.is_some();
+        let polarized = Quantities { velocity, ..Quantities::default() };
+        medium.quantities().or(self.recorded).or(polarized)
+    }
+
+    /// The polarisation of a ray that arrives at (x, y), if light is polarised.
+    pub fn polarized(&self, x: f64, y: f64, lambda: f64) -> Option<PolarizedRay<'_>> {
+        let (Some(polarization), Some(observer)) = (&self.polarization, self.view.observer())
+        else {
+            return None;
+        };
+        let screen = ScreenPoint::new(&self.hole, observer.inclination().sin(), x, y);
+        Some(PolarizedRay { hole: &self.hole, polarization, screen, lambda })
+    }
+
+    /// What a camera's motion does to frequencies at (x, y), if redshift is simulated.
+    #[inline]
+    pub fn blueshift(&self, x: f64, y: f64) -> Option<f64> {
+        self.spectral_index.and_then(|_| self.view.blueshift(x, y))
+    }
+}

@@ -1,0 +1,108 @@
+//! The thin disc in the equatorial plane.
+
+use crate::emission::disc::{DiscModel, Photon};
+use crate::scene::Scene;
+use crate::transport::optics::Optics;
+use crate::transport::polarized::{PolarizedRay, share};
+use crate::transport::result::{Accumulator, Place};
+use kerrlight_geodesic::{Kerr, PlaneCrossing, TracedRay};
+
+/// Crossings of a ray that are located in closed form; rays with more are traced step by step.
+const CROSSINGS: usize = 4;
+
+/// The disc of a scene.
+#[derive(Debug, Clone)]
+pub(in crate::transport) struct Disc {
+    model: DiscModel,
+}
+
+/// How the light of the disc reaches the observer along one ray.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::transport) struct DiscRay<'a> {
+    pub ray: &'a TracedRay,
+    pub crossings: &'a [PlaneCrossing],
+    /// Optical depth of the gas in front of each crossing; empty without absorption.
+    pub depths: &'a [f64],
+    pub polarized: Option<PolarizedRay<'a>>,
+    /// What a camera adds to the redshift.
+    pub blueshift: Option<f64>,
+}
+
+impl Disc {
+    /// The disc of a scene, if it has one.
+    pub fn new(scene: &Scene, hole: &Kerr) -> Option<Self> {
+        scene.disc.as_ref().map(|disc| Disc { model: DiscModel::new(disc, hole) })
+    }
+
+    /// How many crossings of a ray are to be located.
+    pub fn crossings(&self) -> usize {
+        CROSSINGS
+    }
+
+    /// Whether it hides what is behind it.
+    pub fn is_opaque(&self) -> bool {
+        self.model.opaque
+    }
+
+    /// Whether some of its matter plunges.
+    pub fn plunges(&self) -> bool {
+        self.model.plunges()
+    }
+
+    /// Whether it hides what is behind a crossing.
+    #[inline]
+    pub fn hides_at(&self, crossing: &PlaneCrossing) -> bool {
+        self.model.opaque && self.model.covers(crossing.radius)
+    }
+
+    /// Adds its light: I = g^{3+α} I_em at every crossing up to the ray's last light.
+    #[inline(always)]
+    pub fn add(&self, optics: &Optics, seen: &DiscRay<'_>, light: &mut Accumulator) {
+        let end = seen.ray.last_time();
+        for (number, crossing) in seen.crossings.iter().enumerate() {
+            if crossing.mino_time > end {
+                break;
+            }
+            if self.model.covers(crossing.radius) {
+                let kind = if self.model.plunges_at(crossing.radius) { 16 } else { 0 };
+                light.disc_images |= 1 << (kind + number.min(15));
+                let depth = seen.depths.get(number).copied().unwrap_or(0.0);
+                self.add_crossing(optics, crossing, depth, seen, light);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn add_crossing(
+        &self,
+        optics: &Optics,
+        crossing: &PlaneCrossing,
+        depth: f64,
+        seen: &DiscRay<'_>,
+        light: &mut Accumulator,
+    ) {
+        let TracedRay { lambda, eta, .. } = *seen.ray;
+        let r = crossing.radius;
+        let g = match optics.spectral_index {
+            Some(_) => {
+                let outward = crossing.rates[0] > 0.0;
+                self.model.redshift(r, &Photon { lambda, eta, outward })
+            }
+            None => 1.0,
+        };
+        let stokes = seen.polarized.map(|polarized| polarized.of_disc(&self.model, crossing));
+        let boost = match stokes {
+            Some(stokes) => stokes.i,
+            None => optics.spectral_index.map_or(1.0, |index| g.powf(3.0 + index)),
+        };
+        let mut intensity = boost * self.model.intensity(r);
+        if depth > 0.0 {
+            intensity *= (-depth).exp();
+        }
+        light.add(intensity, g, self.model.color(r, g * seen.blueshift.unwrap_or(1.0)));
+        if let Some(stokes) = stokes {
+            light.add_stokes(intensity, share(&stokes));
+        }
+        light.mark(intensity, Place::of_crossing(crossing));
+    }
+}

@@ -1,0 +1,164 @@
+//! Light of one spot along one ray.
+
+use super::DEEPEST;
+use crate::emission::spot::{Comoving, SpotModel};
+use crate::transport::optics::Optics;
+use crate::transport::polarized::{PolarizedRay, share};
+use crate::transport::result::{Accumulator, Place};
+use crate::transport::sources::depth::DepthProfile;
+use kerrlight_geodesic::flow::rotating_redshift;
+use kerrlight_geodesic::quadrature::gauss_4;
+use kerrlight_geodesic::{PathOfRay, PathPoint};
+
+/// The ray along which spots are seen.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::transport) struct SpotRay<'a> {
+    pub optics: &'a Optics,
+    pub along: PathOfRay<'a>,
+    /// Mino time of the last light.
+    pub end: f64,
+    pub polarized: Option<PolarizedRay<'a>>,
+    /// Optical depth of the gas.
+    pub depths: &'a DepthProfile,
+}
+
+/// One spot's light along one ray.
+pub(super) struct SpotLight<'a> {
+    spot: &'a SpotModel,
+    /// Time of observation.
+    observed: f64,
+    /// Where it may shine, as intervals of Mino time in order.
+    pieces: &'a [[f64; 2]],
+    seen: &'a SpotRay<'a>,
+    /// The brightest point, and its emission per length.
+    brightest: Option<(f64, PathPoint)>,
+}
+
+/// A point of the path as a spot sees it.
+struct SpotNode {
+    point: PathPoint,
+    position: [f64; 3],
+    /// When the light that is seen passed here.
+    time: f64,
+    carried: Comoving,
+}
+
+/// Largest angle in radians by which a piece of path may turn before it is compared with
+/// a spot.
+const LARGEST_TURN: f64 = 0.5;
+
+impl<'a> SpotLight<'a> {
+    /// The light of a spot, seen at a time of observation, on `pieces` of a ray.
+    pub fn new(
+        spot: &'a SpotModel,
+        observed: f64,
+        pieces: &'a [[f64; 2]],
+        seen: &'a SpotRay<'a>,
+    ) -> Self {
+        SpotLight { spot, observed, pieces, seen, brightest: None }
+    }
+
+    /// Adds the light.
+    pub fn add(mut self, intervals: &mut Vec<[f64; 2]>, light: &mut Accumulator) {
+        let [lo, hi] = self.spot.shell();
+        let before = light.intensity;
+        let horizon = self.seen.optics.hole.horizon();
+        self.seen.along.path.intervals_within(lo.max(horizon), hi, intervals);
+        for &[from, to] in intervals.iter() {
+            let to = to.min(self.seen.end);
+            if from < to {
+                self.add_interval(from, to, light);
+            }
+        }
+        if let Some((_, point)) = self.brightest {
+            light.mark(light.intensity - before, Place::of_point(&point));
+        }
+    }
+
+    fn can_shine(&self, from: f64, to: f64) -> bool {
+        let behind = self.pieces.partition_point(|piece| piece[1] < from);
+        self.pieces.get(behind).is_some_and(|piece| piece[0] <= to)
+    }
+
+    /// A part of the path inside the spot's shell, cut so that no piece turns by much.
+    fn add_interval(&mut self, from: f64, to: f64, light: &mut Accumulator) {
+        let rate = self.seen.along.path.angular_rate();
+        let pieces = ((to - from) * rate / LARGEST_TURN).ceil().max(1.0);
+        let step = (to - from) / pieces;
+        let mut last = None;
+        for k in 0..pieces as usize {
+            let [start, end] = [k, k + 1].map(|k| from + step * k as f64);
+            if !self.can_shine(start, end) {
+                last = None;
+                continue;
+            }
+            let start = last.unwrap_or_else(|| self.node(start));
+            let end = self.node(end);
+            self.add_piece([&start, &end], 0, light);
+            last = Some(end);
+        }
+    }
+
+    fn node(&self, mino_time: f64) -> SpotNode {
+        let point = self.seen.along.path.at(mino_time);
+        let position = point.cartesian();
+        let time = self.seen.optics.emission_time(self.observed, &point);
+        SpotNode { point, position, time, carried: self.spot.comoving(position, time) }
+    }
+
+    /// Halves a piece until it is short against the spot or lies outside of it, then sums.
+    fn add_piece(&mut self, [start, end]: [&SpotNode; 2], depth: u32, light: &mut Accumulator) {
+        let (from, to) = (start.point.mino_time, end.point.mino_time);
+        if !self.can_shine(from, to) {
+            return;
+        }
+        let carried = [&start.carried, &end.carried];
+        let length = self.spot.comoving_length([start.position, end.position], carried);
+        if self.spot.is_missed(carried, length) {
+            return;
+        }
+        if length > self.spot.sigma() && depth < DEEPEST {
+            let middle = self.node(0.5 * (from + to));
+            self.add_piece([start, &middle], depth + 1, light);
+            self.add_piece([&middle, end], depth + 1, light);
+            return;
+        }
+        for (mino_time, weight) in gauss_4(from, to) {
+            self.add_node(&self.node(mino_time), weight, light);
+        }
+    }
+
+    /// One node of the quadrature.
+    fn add_node(&mut self, node: &SpotNode, weight: f64, light: &mut Accumulator) {
+        let emissivity = self.spot.emissivity(&node.carried, node.time);
+        if emissivity <= 0.0 {
+            return;
+        }
+        let (point, optics) = (&node.point, self.seen.optics);
+        let r = point.radius();
+        let omega = || self.spot.angular_velocity(r);
+        let g = match optics.spectral_index {
+            Some(_) => rotating_redshift(&optics.hole, point, omega()),
+            None => Some(1.0),
+        };
+        // Where matter cannot move like this there is none.
+        let Some(g) = g else { return };
+        let mut boost = optics.spectral_index.map_or(1.0, |index| g.powf(2.0 + index));
+        let path_length = optics.hole.sigma(r, point.cos_theta()) * weight;
+        // Gas in front of it.
+        let depth = self.seen.depths.at(point.mino_time);
+        if depth > 0.0 {
+            boost *= (-depth).exp();
+        }
+        if let Some(polarized) = &self.seen.polarized {
+            let stokes = polarized.of_spot(point, omega());
+            boost *= stokes.i;
+            light.add_stokes(boost * emissivity * path_length, share(&stokes));
+        }
+        light.add(boost * emissivity * path_length, g, self.spot.color);
+        let density = boost * emissivity;
+        if self.brightest.is_none_or(|(most, _)| density > most) {
+            self.brightest = Some((density, *point));
+        }
+    }
+}
