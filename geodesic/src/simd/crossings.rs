@@ -118,6 +118,19 @@ impl Crossings {
         })
     }
 
+    /// All rays as wholes, in order.
+    #[inline]
+    pub fn all_ends(&self) -> impl Iterator<Item = RayEnds> + '_ {
+        let [duration, escapes, count, doubt] = self.rays.each_ref().map(|column| column.iter());
+        let all = duration.zip(escapes).zip(count.zip(doubt));
+        all.map(|((duration, escapes), (count, doubt))| RayEnds {
+            mino_total: *duration,
+            escapes: *escapes > 0.5,
+            crossings: *count as u32,
+            error: *doubt,
+        })
+    }
+
     /// Ray number `k` as a whole.
     ///
     /// # Panics

@@ -168,7 +168,9 @@ impl RayVisitor for Sum<'_> {
             if let Some(path) = path {
                 self.add_spots((number, j), *time, ray, path, &mut light);
             }
-            light.add_behind(behind);
+            if behind != [0.0; 3] {
+                light.add_behind(behind);
+            }
             self.finish((number, j), ray, light);
         }
         Ok(())

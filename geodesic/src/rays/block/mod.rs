@@ -1,0 +1,65 @@
+//! Blocks of rays of one view, traced once for everything that is to be known about them: in closed
+//! form on SIMD lanes where that keeps its digits, else step by step.
+
+mod closed_form;
+mod request;
+mod stepped;
+mod traced;
+mod tracer;
+mod visitor;
+
+pub use request::{BlockRequest, SphereNodes};
+pub use traced::{PathOfRay, PlaneCrossing, TracedRay};
+pub use tracer::{BlockTracer, RayBlock};
+pub use visitor::{RayVisitor, Work};
+
+use crate::error::OutOfRange;
+use crate::rays::integrator::check_columns;
+use tracer::Job;
+
+impl BlockTracer {
+    /// Traces the rays that arrive at the points (`alpha[k]`, `beta[k]`) of the view, on the
+    /// caller's thread, and hands them to `visitor` in their order. No ray depends on another.
+    ///
+    /// # Errors
+    /// If the columns differ in length, no ray arrives at one of the points, or a number of the
+    /// request is out of its range; the visitor's own errors.
+    pub fn trace<V: RayVisitor>(
+        &self,
+        alpha: &[f64],
+        beta: &[f64],
+        request: &BlockRequest,
+        block: &mut RayBlock,
+        visitor: &mut V,
+    ) -> Result<(), OutOfRange> {
+        let job = Job { alpha, beta, request };
+        block.rays.clear();
+        block.plane.clear();
+        visitor.works_on(Work::Rays);
+        match self.closed_form() {
+            Some(observer) => self.trace_in_closed_form(observer, job, block, visitor)?,
+            None => {
+                check_columns(alpha, beta)?;
+                let unknown = TracedRay { stepped: true, ..TracedRay::default() };
+                block.rays.resize(alpha.len(), unknown);
+            }
+        }
+        (0..alpha.len()).try_for_each(|k| self.finish(k, job, block, visitor))
+    }
+
+    /// Hands a ray to the visitor; first traces it step by step if it has to be.
+    #[inline]
+    fn finish<V: RayVisitor>(
+        &self,
+        k: usize,
+        job: Job<'_>,
+        block: &mut RayBlock,
+        visitor: &mut V,
+    ) -> Result<(), OutOfRange> {
+        if block.rays[k].stepped {
+            return self.finish_stepped(k, job, block, visitor);
+        }
+        let ray = &block.rays[k];
+        visitor.take(k, ray, &block.plane[ray.crossings.clone()], None)
+    }
+}

@@ -1,0 +1,34 @@
+//! What is traced of a block of rays.
+
+use crate::simd::NodeRequest;
+
+/// What is to be found about the rays of a block.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct BlockRequest {
+    /// How many crossings of the equatorial plane are located in closed form. A ray with more of
+    /// them, none of which is opaque, is traced step by step and has them all. 0: they are counted,
+    /// not located.
+    pub crossings: usize,
+    /// The rates dw/dτ and d cos θ/dτ at crossings, and η.
+    pub rates: bool,
+    /// The direction in which rays escape.
+    pub exit: bool,
+    /// The number of half-orbits after which rays are cut off: half-way between crossing number
+    /// `half_orbits` (from 0) and the next.
+    pub half_orbits: Option<u32>,
+    /// Whether [`RayVisitor::needs_path`] decides which rays are traced step by step.
+    pub paths: bool,
+    /// Coarse nodes by which [`RayVisitor::needs_path_at`] decides it too.
+    pub probes: Option<NodeRequest>,
+    /// Nodes inside spheres.
+    pub nodes: Vec<SphereNodes>,
+}
+
+/// Nodes of a quadrature along rays inside a sphere.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SphereNodes {
+    /// The coarsest nodes.
+    pub request: NodeRequest,
+    /// How many panels a panel of the coarsest nodes is cut into at most.
+    pub finest: u32,
+}

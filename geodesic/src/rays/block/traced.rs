@@ -1,0 +1,95 @@
+//! What is known of a traced ray.
+
+use crate::integrate::path::{Outcome, Path, Unresolved};
+use crate::screen::observer::Ray;
+use crate::spacetime::point::PathPoint;
+use core::ops::Range;
+
+/// Where a ray crosses the equatorial plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlaneCrossing {
+    /// Mino time since the observer, in 1/M.
+    pub mino_time: f64,
+    /// Boyer–Lindquist radius, in M.
+    pub radius: f64,
+    /// Azimuth, continuous along the ray from the observer's on.
+    pub azimuth: f64,
+    /// t_o − t, in M; lim \[(t_o − t) − r_o − 2 ln r_o\] for an observer at infinity.
+    pub delay: f64,
+    /// d(1/r)/dτ and d cos θ/dτ; 0 unless requested, or for rays traced step by step.
+    pub rates: [f64; 2],
+}
+
+impl From<&PathPoint> for PlaneCrossing {
+    fn from(point: &PathPoint) -> Self {
+        PlaneCrossing {
+            mino_time: point.mino_time,
+            radius: point.radius(),
+            azimuth: point.azimuth,
+            delay: point.delay,
+            rates: [point.inverse_radius_rate, point.velocity[2]],
+        }
+    }
+}
+
+/// What is known of a ray as a whole.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TracedRay {
+    /// λ = L/E, in M.
+    pub lambda: f64,
+    /// η = Q/E², in M²; NaN unless rates are requested or the ray was traced step by step.
+    pub eta: f64,
+    /// What becomes of it if no surface ends it.
+    pub outcome: Outcome,
+    /// How many times it crosses the equatorial plane outside the horizon, along its whole length.
+    pub crossing_count: u32,
+    /// Which of the block's crossings are its own.
+    pub crossings: Range<usize>,
+    /// Mino time of the whole ray.
+    pub mino_total: f64,
+    /// Mino time after which no light is taken: see [`BlockRequest::half_orbits`].
+    pub until: f64,
+    /// Mino time of the first opaque surface, if there is one before `until`.
+    pub surface: Option<f64>,
+    /// Direction in which it escapes, if it does and that is requested.
+    pub exit: Option<[f64; 3]>,
+    /// Whether it was traced step by step.
+    pub stepped: bool,
+}
+
+impl Default for TracedRay {
+    /// A ray of which nothing is known.
+    fn default() -> Self {
+        TracedRay {
+            lambda: 0.0,
+            eta: 0.0,
+            outcome: Outcome::Unresolved(Unresolved::StepLimit),
+            crossing_count: 0,
+            crossings: 0..0,
+            mino_total: 0.0,
+            until: 0.0,
+            surface: None,
+            exit: None,
+            stepped: false,
+        }
+    }
+}
+
+impl TracedRay {
+    /// Mino time of the last light: of the first opaque surface or of the last half-orbit.
+    #[inline]
+    pub fn last_time(&self) -> f64 {
+        self.surface.unwrap_or(f64::INFINITY).min(self.until)
+    }
+}
+
+/// The path of a ray that was traced step by step.
+#[derive(Debug, Clone, Copy)]
+pub struct PathOfRay<'a> {
+    /// Its constants of motion.
+    pub ray: &'a Ray,
+    /// Its path, with all quantities.
+    pub path: &'a Path,
+    /// The tolerance that it was traced with.
+    pub tolerance: f64,
+}

@@ -1,0 +1,86 @@
+//! What a block of rays is traced for.
+
+use super::traced::{PathOfRay, PlaneCrossing, TracedRay};
+use crate::error::OutOfRange;
+use crate::screen::observer::Ray;
+use crate::simd::RayNodes;
+
+/// What a block of rays is traced for: it decides where rays end and takes what is found.
+pub trait RayVisitor {
+    /// Whether a surface in the equatorial plane hides what is behind a crossing.
+    fn is_opaque_at(&self, crossing: &PlaneCrossing) -> bool {
+        let _ = crossing;
+        false
+    }
+
+    /// Whether the path of a ray is needed, so that it has to be traced step by step.
+    fn needs_path(&self, ray: &Ray) -> bool {
+        let _ = ray;
+        false
+    }
+
+    /// The same, from coarse nodes along the ray: see [`BlockRequest::probes`].
+    fn needs_path_at(&self, ray: &TracedRay, nodes: &RayNodes<'_>) -> bool {
+        let _ = (ray, nodes);
+        false
+    }
+
+    /// The Mino time at which a surface off the equatorial plane hides what is behind it.
+    fn first_surface(&mut self, path: PathOfRay<'_>) -> Option<f64> {
+        let _ = path;
+        None
+    }
+
+    /// Takes the nodes of ray `number` inside sphere `sphere` of the request; whether they are fine
+    /// enough. If they are not, it is asked again with panels cut in two.
+    fn take_nodes(
+        &mut self,
+        sphere: usize,
+        number: usize,
+        ray: &TracedRay,
+        crossings: &[PlaneCrossing],
+        nodes: &RayNodes<'_>,
+    ) -> bool {
+        let _ = (sphere, number, ray, crossings, nodes);
+        true
+    }
+
+    /// Takes ray `number`: after its nodes, and after the rays before it.
+    ///
+    /// # Errors
+    /// Ends the block.
+    fn take(
+        &mut self,
+        number: usize,
+        ray: &TracedRay,
+        crossings: &[PlaneCrossing],
+        path: Option<PathOfRay<'_>>,
+    ) -> Result<(), OutOfRange>;
+
+    /// Told what is worked on from now on.
+    fn works_on(&mut self, work: Work) {
+        let _ = work;
+    }
+}
+
+/// What a block is worked on for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Work {
+    /// Outcomes, crossings and paths.
+    Rays,
+    /// Nodes inside a sphere.
+    Nodes(usize),
+    /// Directions of escape.
+    Exits,
+}
+
+/// The first crossing that hides the rest, unless that is after Mino time `until`.
+#[inline(always)]
+pub(super) fn first_opaque<V: RayVisitor>(
+    plane: &[PlaneCrossing],
+    until: f64,
+    visitor: &V,
+) -> Option<f64> {
+    let first = plane.iter().find(|crossing| visitor.is_opaque_at(crossing));
+    first.map(|crossing| crossing.mino_time).filter(|time| *time <= until)
+}
