@@ -213,3 +213,28 @@ fn regress_geodesic_has_no_circle_of_imports() {
     // A number of twice the precision is a scalar, and a scalar's name for it.
     assert_eq!(house.circular(), ["numbers/compensated.rs", "numbers/scalar.rs"]);
 }
+
+/// Rooms of tomo in which a scene becomes a picture, in the order of the data.
+const PICTURES: [&str; 3] = ["emission", "transport", "render"];
+
+#[test]
+fn regress_light_flows_from_emission_to_pictures() {
+    let house = House::of("tomo");
+    let place = |file: &Path| {
+        let name = module(&house.source, file).into_iter().next()?;
+        PICTURES.iter().position(|room| *room == name)
+    };
+    let mut arrows = 0;
+    for (file, targets) in &house.arrows {
+        for target in targets {
+            if let (Some(own), Some(other)) = (place(file), place(target)) {
+                assert!(other <= own, "{} -> {}", house.shown(file), house.shown(target));
+                arrows += 1;
+            }
+        }
+    }
+    assert!(arrows > 80, "only {arrows} imports found");
+    let circular = house.circular();
+    let ours = |file: &&String| PICTURES.iter().any(|room| file.starts_with(room));
+    assert_eq!(circular.iter().filter(ours).collect::<Vec<_>>(), [""; 0]);
+}

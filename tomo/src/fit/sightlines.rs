@@ -214,7 +214,7 @@ impl Tracer<'_> {
         self.nodes.trace(self.hole, self.observer, alpha, beta, None, &request)?;
         for k in 0..self.nodes.rays() {
             let ray = self.nodes.ray(k);
-            let lambda = self.observer.ray(self.hole, alpha[k], beta[k])?.lambda;
+            let lambda = self.observer.lambda(alpha[k]);
             for i in 0..ray.weight.len() {
                 self.node(&ray, i, lambda, all);
             }

@@ -6,6 +6,7 @@
 mod camera;
 mod check;
 mod check_volume;
+mod integrator;
 mod invalid;
 mod overrides;
 mod rotation;
@@ -21,6 +22,7 @@ pub use sources::{
 };
 
 use crate::polarization::MagneticField;
+pub use kerrlight_geodesic::Integrator;
 use kerrlight_geodesic::{Kerr, orbits};
 use serde::{Deserialize, Serialize};
 
@@ -257,36 +259,10 @@ impl Effects {
 #[serde(deny_unknown_fields)]
 pub struct TracerConfig {
     /// Which integrator.
+    #[serde(with = "integrator")]
     pub integrator: Integrator,
     /// Largest local error of a step.
     pub tolerance: f64,
-}
-
-/// The integrators by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Integrator {
-    /// Adaptive Runge–Kutta 5(4) in Mino time.
-    Rk45Mino,
-    /// Adaptive Runge–Kutta 8(5,3) in Mino time.
-    Dop853Mino,
-    /// Taylor series in Mino time.
-    TaylorMino,
-    /// The closed form, many rays a SIMD register; rays next to the critical curve, whose digits
-    /// it loses, and those that meet spots by Taylor series.
-    Elliptic,
-}
-
-impl Integrator {
-    /// The tracer of that name.
-    pub(crate) fn tracer(self) -> kerrlight_geodesic::Integrator {
-        match self {
-            Integrator::Rk45Mino => kerrlight_geodesic::Integrator::Rk45Mino,
-            Integrator::Dop853Mino => kerrlight_geodesic::Integrator::Dop853Mino,
-            Integrator::TaylorMino => kerrlight_geodesic::Integrator::TaylorMino,
-            Integrator::Elliptic => kerrlight_geodesic::Integrator::Elliptic,
-        }
-    }
 }
 
 impl Screen {

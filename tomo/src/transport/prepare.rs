@@ -123,8 +123,7 @@ impl PreparedScene {
         let assets: Assets = assets.into();
         let optics = Optics::new(scene)?;
         let (hole, settings) = (optics.hole, &scene.tracer);
-        let integrator = settings.integrator.tracer();
-        let tracer = BlockTracer::new(hole, optics.view, integrator, settings.tolerance)?;
+        let tracer = BlockTracer::new(hole, optics.view, settings.integrator, settings.tolerance)?;
         let mut prepared = PreparedScene {
             tracer,
             request: BlockRequest::default(),

@@ -1,26 +1,9 @@
 //! Sums of emission and absorption over the nodes of a ray.
 
-use super::result::Place;
+use super::result::{Light, Place};
 use crate::emission::medium::Emission;
 use kerrlight_geodesic::legendre;
 use kerrlight_geodesic::simd::{PanelRule, RayNodes};
-
-/// Light of a medium along a ray.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Light {
-    /// What is seen of it.
-    pub intensity: f64,
-    /// ∫ g dI.
-    pub shift: f64,
-    /// Q, U, V.
-    pub stokes: [f64; 3],
-    /// Optical depth of the whole way.
-    pub depth: f64,
-    /// Its brightest node.
-    pub place: Place,
-    /// An estimate of the error of the intensity.
-    pub error: f64,
-}
 
 /// Beyond this optical depth nothing is seen.
 const DARK: f64 = 45.0;

@@ -1,6 +1,5 @@
 //! What one ray sees, and how light adds up to it.
 
-use super::quadrature::Light;
 use kerrlight_geodesic::simd::RayNodes;
 use kerrlight_geodesic::{Outcome, PathPoint, PlaneCrossing, TracedRay};
 
@@ -155,6 +154,23 @@ impl Accumulator {
             (self.brightest, self.place) = (brightness, place);
         }
     }
+}
+
+/// Light of a medium along a ray.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Light {
+    /// What is seen of it.
+    pub intensity: f64,
+    /// ∫ g dI.
+    pub shift: f64,
+    /// Q, U, V.
+    pub stokes: [f64; 3],
+    /// Optical depth of the whole way.
+    pub depth: f64,
+    /// Its brightest node.
+    pub place: Place,
+    /// An estimate of the error of the intensity.
+    pub error: f64,
 }
 
 /// Where light comes from; zeros where it has not been asked.

@@ -1,8 +1,6 @@
 //! The sources of light, one file or folder each: what is prepared of it once, what it needs from
 //! ray to ray, and how it adds its light.
 
-mod cells;
-pub(super) mod depth;
 pub(super) mod disc;
 pub(super) mod media;
 pub(super) mod meshes;

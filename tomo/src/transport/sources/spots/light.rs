@@ -5,7 +5,7 @@ use crate::emission::spot::{Comoving, SpotModel};
 use crate::transport::optics::Optics;
 use crate::transport::polarized::{PolarizedRay, share};
 use crate::transport::result::{Accumulator, Place};
-use crate::transport::sources::depth::DepthProfile;
+use crate::transport::sources::media::DepthProfile;
 use kerrlight_geodesic::flow::rotating_redshift;
 use kerrlight_geodesic::quadrature::gauss_4;
 use kerrlight_geodesic::{PathOfRay, PathPoint};

@@ -5,12 +5,13 @@
 //! are panels of the quadrature. Those that are off by more than their share of the allowed error
 //! are halved again, down to a part of a cell.
 
-use super::media::{FAINT, Media, MediaRay, MediaScratch};
+use super::{FAINT, Media, MediaRay, MediaScratch};
 use crate::emission::medium::{CellSize, Emission, Medium, Moment, PathSegment};
 use crate::transport::chord::ChordBound;
 use crate::transport::optics::Optics;
 use crate::transport::polarized::PolarizedRay;
-use crate::transport::quadrature::{Light, Quadrature, integrate};
+use crate::transport::quadrature::{Quadrature, integrate};
+use crate::transport::result::Light;
 use crate::transport::tree::Node;
 use kerrlight_geodesic::nodes::{self, Leg, NodeColumns};
 use kerrlight_geodesic::{Path, PathOfRay};

@@ -1,18 +1,22 @@
 //! What fills space: gas and volumes, with as many nodes along each ray as it takes.
 
-use super::cells::CellScratch;
-use super::depth::DepthProfile;
+mod cells;
+mod depth;
+
+pub(in crate::transport) use depth::DepthProfile;
+
 use crate::emission::gas::{GasEffects, GasModel};
 use crate::emission::medium::{CellSize, Emission, Medium, Moment, Part};
 use crate::emission::volume::VolumeModel;
 use crate::scene::Scene;
 use crate::transport::optics::Optics;
 use crate::transport::polarized::PolarizedRay;
-use crate::transport::quadrature::{Light, Quadrature, Sums, integrate};
-use crate::transport::result::Accumulator;
+use crate::transport::quadrature::{Quadrature, Sums, integrate};
+use crate::transport::result::{Accumulator, Light};
 use crate::transport::tree::enters;
 use crate::units::SPEED_OF_LIGHT;
 use crate::volume::VolumeFile;
+use cells::CellScratch;
 use kerrlight_geodesic::simd::{NodeRequest, PanelRule, RayNodes};
 use kerrlight_geodesic::{Kerr, OutOfRange, PlaneCrossing, Ray, SphereNodes, TracedRay};
 use std::sync::Arc;
@@ -27,7 +31,7 @@ const FINEST: u32 = 256;
 const FINEST_OF_CELLS: u32 = 1024;
 
 /// Errors of rays fainter than this share of what the medium can reach are measured by that.
-pub(super) const FAINT: f64 = 1e-4;
+const FAINT: f64 = 1e-4;
 
 /// Panels may be longer than cells by so much that rounding does not cut them once more.
 const ROUNDING: f64 = 1.05;
@@ -43,16 +47,16 @@ pub(in crate::transport) struct Media {
 /// What media need from ray to ray.
 #[derive(Debug)]
 pub(in crate::transport) struct MediaScratch {
-    pub(super) quadrature: Quadrature,
-    pub(super) sums: Sums,
-    pub(super) cells: CellScratch,
+    quadrature: Quadrature,
+    sums: Sums,
+    cells: CellScratch,
     emission: Emission,
     /// Light of each medium along each ray at each time.
     lights: Vec<Light>,
     rays: usize,
     times: usize,
     /// Optical depth along the last ray.
-    pub(super) profile: DepthProfile,
+    profile: DepthProfile,
     /// Optical depth in front of each crossing of the block; empty without absorption.
     depths: Vec<f64>,
 }
