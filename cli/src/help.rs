@@ -1,12 +1,7 @@
-//! The command line as a whole: help with the verbs in groups, completions, manual pages.
+//! The help page of the program, with the verbs in groups.
 
 use crate::Arguments;
-use crate::answer::Answer;
-use anyhow::Context;
-use clap::{Args, Command, CommandFactory};
-use clap_complete::Shell;
-use clap_mangen::Man;
-use std::path::{Path, PathBuf};
+use clap::{Command, CommandFactory};
 
 /// Verbs by what they are about, in the order of the help page.
 const GROUPS: [(&str, &[&str]); 5] = [
@@ -36,60 +31,6 @@ fn grouped(command: &Command) -> String {
         format!("{heading}:\n{}", verbs.iter().map(line).collect::<String>())
     };
     GROUPS.iter().map(group).collect()
-}
-
-/// Arguments of `kerrlight completions`.
-#[derive(Debug, Args)]
-pub struct Completions {
-    /// The shell that reads the script
-    shell: Shell,
-}
-
-impl Completions {
-    /// The script.
-    pub fn run(&self) -> anyhow::Result<Answer> {
-        let mut script = Vec::new();
-        clap_complete::generate(self.shell, &mut Arguments::command(), "kerrlight", &mut script);
-        let script = String::from_utf8(script)?;
-        Ok(Answer::text(script.as_str())
-            .with("shell", self.shell.to_string())
-            .with("script", script))
-    }
-}
-
-/// Arguments of `kerrlight man`.
-#[derive(Debug, Args)]
-pub struct ManPages {
-    /// Folder for the pages, made if it does not exist, e.g. ~/.local/share/man/man1
-    #[arg(value_name = "DIR")]
-    folder: PathBuf,
-}
-
-impl ManPages {
-    /// Writes kerrlight.1 and a page for each verb.
-    pub fn run(&self) -> anyhow::Result<Answer> {
-        let shown = self.folder.display();
-        std::fs::create_dir_all(&self.folder)
-            .with_context(|| format!("cannot make the folder {shown}"))?;
-        let mut command = Arguments::command().disable_help_subcommand(true);
-        command.build();
-        let mut paths = vec![page(&self.folder, &command)?];
-        for verb in command.get_subcommands() {
-            paths.push(page(&self.folder, verb)?);
-        }
-        let worth = format!("{} manual pages", paths.len());
-        let first = format!("{}: read them with `man {}`", shown, paths[0].display());
-        Ok(Answer::lines(&worth, &first).files(paths.iter().map(PathBuf::as_path)))
-    }
-}
-
-fn page(folder: &Path, command: &Command) -> anyhow::Result<PathBuf> {
-    let page = Man::new(command.clone());
-    let path = folder.join(page.get_filename());
-    let mut bytes = Vec::new();
-    page.render(&mut bytes)?;
-    crate::output::Output::new(&path, "")?.write(&bytes)?;
-    Ok(path)
 }
 
 #[cfg(test)]

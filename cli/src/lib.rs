@@ -26,6 +26,7 @@ mod assets;
 mod checksum;
 mod columns;
 mod compare;
+mod completions;
 mod convert;
 mod critical_curve;
 mod file_sums;
@@ -35,6 +36,7 @@ mod inspect;
 mod interferometry;
 mod interrupt;
 mod lock;
+mod man;
 mod memory;
 mod movie;
 mod npz;
@@ -101,9 +103,9 @@ enum Verb {
     /// Show what a file or the folder of a fit contains
     Inspect(inspect::Inspect),
     /// Print a completion script for a shell
-    Completions(help::Completions),
+    Completions(completions::Completions),
     /// Write manual pages
-    Man(help::ManPages),
+    Man(man::Man),
 }
 
 fn run(arguments: &Arguments, registry: &Registry) -> anyhow::Result<()> {
