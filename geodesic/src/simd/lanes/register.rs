@@ -40,7 +40,9 @@ impl InstructionSet {
             Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
             #[cfg(target_arch = "x86_64")]
             Self::Avx512 => {
-                is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq")
+                is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512dq")
+                    && Self::Avx2.available()
             }
             #[cfg(not(target_arch = "x86_64"))]
             _ => false,
@@ -82,7 +84,8 @@ pub trait Element:
 /// Something to be done with lanes of any width.
 ///
 /// `run` and all that it calls must be `#[inline(always)]`, so that it is compiled anew for each
-/// instruction set. Closures are not: pass them nothing but scalars, or do without.
+/// instruction set. A closure that the compiler does not inline lacks the instruction set: keep those
+/// that handle lanes small.
 pub trait Task<T: Element> {
     /// Result.
     type Output;
