@@ -1,0 +1,9 @@
+//! Tests of the crate's public interface, as one program: it links once.
+
+mod capi;
+mod derivatives;
+mod footprint;
+mod hard;
+mod nodes;
+mod parallel_transport;
+mod requests;
