@@ -13,6 +13,7 @@ mod data_files;
 mod documents;
 mod eht_data;
 mod film;
+mod film_stars;
 mod fit;
 mod fit_bad_luck;
 mod fit_start;

@@ -11,65 +11,18 @@
 //! l = ((rx + ay)/(r² + a²), (ry − ax)/(r² + a²), z/r); x + iy = (r + ia) sin θ e^{iφ}
 //! (Kerr & Schild 1965; Visser 2007, arXiv:0706.0622, eqs. 32–42).
 
+mod equations;
+
 use crate::error::{OutOfRange, check};
 use crate::integrate::path::{Outcome, Unresolved};
 use crate::numbers::dual::Dual;
 use crate::numbers::polynomial::{Polynomial, hermite};
-use crate::numbers::scalar::Scalar;
 use crate::screen::observer::Observer;
 use crate::spacetime::kerr::Kerr;
 use crate::spacetime::point::PathPoint;
+use equations::{MINO_TIME, State, derivative, radius};
 use nalgebra::SVector;
 use ode_solvers::{Dopri5, OutputType};
-
-/// x, y, z, p_x, p_y, p_z, t and Mino time.
-type State<T> = [T; 8];
-const MINO_TIME: usize = 7;
-
-/// dy/ds of the reflected, future-directed ray with energy 1.
-fn derivative<T: Scalar>(spin: f64, y: &State<T>) -> State<T> {
-    let [x, y_, z, px, py, pz, _, _] = *y;
-    let (a, one, two) = (T::constant(spin), T::constant(1.0), T::constant(2.0));
-    let a2 = a * a;
-    let b = x * x + y_ * y_ + z * z - a2;
-    let r2 = (b + (b * b + T::constant(4.0) * a2 * z * z).sqrt()) / two;
-    let r = r2.sqrt();
-    let (inv, sum) = (one / (r2 * r2 + a2 * z * z), r2 + a2);
-    let f = two * r2 * r * inv;
-    let l = [(r * x + a * y_) / sum, (r * y_ - a * x) / sum, z / r];
-    // p_t = −1.
-    let along = one + l[0] * px + l[1] * py + l[2] * pz;
-    let f_along = f * along;
-    let gradient_r = [x * r2 * r * inv, y_ * r2 * r * inv, z * r * sum * inv];
-    // df = (6r²/N − 4r³·2r³/N²) dr − 4r³a²z/N² dz with N = r⁴ + a²z².
-    let f_r = T::constant(6.0) * r2 * inv - T::constant(8.0) * r2 * r2 * r2 * inv * inv;
-    let f_z = -(T::constant(4.0) * r2 * r * a2 * z * inv * inv);
-    // d(l·p) by r at fixed x, y, z, and by x, y, z at fixed r.
-    let l_r = (x - two * r * l[0]) / sum * px + (y_ - two * r * l[1]) / sum * py - z / r2 * pz;
-    let l_fixed = [(r * px - a * py) / sum, (a * px + r * py) / sum, pz / r];
-    let half = along * along / two;
-    let force = |k: usize| {
-        let df = f_r * gradient_r[k] + if k == 2 { f_z } else { T::constant(0.0) };
-        half * df + f_along * (l_r * gradient_r[k] + l_fixed[k])
-    };
-    let sigma = r2 + a2 * z * z / r2;
-    [
-        px - f_along * l[0],
-        py - f_along * l[1],
-        pz - f_along * l[2],
-        force(0),
-        force(1),
-        force(2),
-        one + f_along,
-        one / sigma,
-    ]
-}
-
-/// Boyer–Lindquist radius of a point.
-fn radius(spin: f64, [x, y, z]: [f64; 3]) -> f64 {
-    let b = x * x + y * y + z * z - spin * spin;
-    (0.5 * (b + b.hypot(2.0 * spin * z))).sqrt()
-}
 
 /// The end of a step, with first and second derivatives.
 #[derive(Debug, Clone)]
@@ -423,87 +376,4 @@ impl AffinePath {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{Inclination, Path, Quantities, Tracer};
-
-    /// Every force is −∂H/∂x: central differences of the Hamiltonian.
-    #[test]
-    fn exact_forces_are_gradients_of_the_hamiltonian() {
-        let hamiltonian = |a: f64, [x, y, z]: [f64; 3], p: [f64; 3]| {
-            let r = radius(a, [x, y, z]);
-            let f = 2.0 * r.powi(3) / (r.powi(4) + a * a * z * z);
-            let sum = r * r + a * a;
-            let l = [(r * x + a * y) / sum, (r * y - a * x) / sum, z / r];
-            let along = 1.0 + l[0] * p[0] + l[1] * p[1] + l[2] * p[2];
-            0.5 * (p[0] * p[0] + p[1] * p[1] + p[2] * p[2] - 1.0 - f * along * along)
-        };
-        for a in [0.0, 0.6, -0.95] {
-            let (q, p) = ([2.1, -1.3, 0.9], [0.3, -0.8, 0.5]);
-            let f = derivative(a, &[q[0], q[1], q[2], p[0], p[1], p[2], 0.0, 0.0]);
-            for k in 0..3 {
-                let h = 1e-5;
-                let shifted = |v: [f64; 3], step: f64| {
-                    let mut v = v;
-                    v[k] += step;
-                    v
-                };
-                let force = -(hamiltonian(a, shifted(q, h), p) - hamiltonian(a, shifted(q, -h), p))
-                    / (2.0 * h);
-                let speed = (hamiltonian(a, q, shifted(p, h)) - hamiltonian(a, q, shifted(p, -h)))
-                    / (2.0 * h);
-                assert!((f[3 + k] - force).abs() < 1e-9, "a = {a}, force {k}");
-                assert!((f[k] - speed).abs() < 1e-9, "a = {a}, speed {k}");
-            }
-        }
-    }
-
-    /// Two tracers without a common equation of motion.
-    #[test]
-    fn code_affine_and_mino_tracers_agree() {
-        let mut worst = [0.0f64; 4];
-        for (k, spin) in [0.0, 0.5, 0.94, -0.8, 1.0].into_iter().enumerate() {
-            let hole = Kerr::new(spin).unwrap();
-            let inclination = Inclination::from_degrees(10.0 + 38.0 * k as f64).unwrap();
-            let observer = Observer::at_radius(inclination, 200.0).unwrap();
-            for (alpha, beta) in [(-7.0, 2.0), (3.0, 9.0), (0.5, -1.0), (8.0, -3.0), (-1.0, 0.25)] {
-                let affine = AffineTracer::new(1e-13).unwrap();
-                let referee = affine.trace(&hole, &observer, alpha, beta).unwrap();
-                let ray = observer.ray(&hole, alpha, beta).unwrap();
-                let mut path = Path::new();
-                Tracer::new(1e-13).unwrap().trace(&hole, &ray, Quantities::ALL, &mut path);
-                assert_eq!(referee.outcome(), path.outcome(), "a = {spin}: ({alpha}, {beta})");
-                assert!(referee.largest_hamiltonian() < 1e-10);
-                let end = referee.mino_total();
-                for part in [0.1, 0.5, 0.9, 0.98] {
-                    let (a, b) = (referee.at(part * end), path.at(part * end));
-                    let turn = (a.azimuth - b.azimuth) / std::f64::consts::TAU;
-                    // A relative error in r moves both azimuths by this much more, without
-                    // bound at the horizon: dφ = a dr/Δ.
-                    let r = b.radius();
-                    let amplified = 1.0 + spin.abs() * r / hole.delta(r);
-                    let miss = [
-                        (a.radius() / b.radius() - 1.0).abs(),
-                        (a.theta() - b.theta()).abs(),
-                        (turn - turn.round()).abs() * std::f64::consts::TAU / amplified,
-                        (a.delay - b.delay).abs() / b.delay.max(1.0),
-                    ];
-                    for (worst, miss) in worst.iter_mut().zip(miss) {
-                        *worst = worst.max(miss);
-                    }
-                }
-                let count = referee.equatorial_crossings().len();
-                assert!(count <= path.equatorial_crossings().len());
-            }
-        }
-        assert!(worst.iter().all(|w| *w < 1e-10), "{worst:?}");
-    }
-
-    #[test]
-    fn an_observer_at_infinity_is_refused() {
-        let hole = Kerr::new(0.5).unwrap();
-        let observer = Observer::at_infinity(Inclination::from_degrees(30.0).unwrap());
-        assert!(AffineTracer::new(1e-9).unwrap().trace(&hole, &observer, 1.0, 1.0).is_err());
-        assert!(AffineTracer::new(0.5).is_err());
-    }
-}
+mod tests;

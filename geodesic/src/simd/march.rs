@@ -9,7 +9,7 @@
 use super::lanes::{Lanes, MAX_LANES, transpose_plain};
 use super::math::atan2;
 use super::motion::{Camera, Motion};
-use super::panel::PanelRule;
+use super::panel::{PanelRule, integral};
 use super::polar::{Direction, PolarStep};
 use super::radial::RadialStep;
 use super::radial_sum::closed_forms;
@@ -387,22 +387,6 @@ impl<V: Lanes<f64>> March<'_, V> {
             *start += order;
         }
     }
-}
-
-/// `sum + length Σ factors · rates`.
-#[inline(always)]
-fn integral<V: Lanes<f64>>(
-    factors: &[f64],
-    rates: &[[V; 2]; MAX_ORDER],
-    length: V,
-    sum: [V; 2],
-) -> [V; 2] {
-    let (mut time, mut azimuth) = (V::splat(0.0), V::splat(0.0));
-    for (factor, rate) in factors.iter().zip(rates) {
-        time = rate[0].mul_add(V::splat(*factor), time);
-        azimuth = rate[1].mul_add(V::splat(*factor), azimuth);
-    }
-    [time.mul_add(length, sum[0]), azimuth.mul_add(length, sum[1])]
 }
 
 /// The most nodes a panel may have.
