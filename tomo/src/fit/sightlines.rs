@@ -212,9 +212,9 @@ impl Tracer<'_> {
             },
         };
         self.nodes.trace(self.hole, self.observer, alpha, beta, None, &request)?;
-        for k in 0..self.nodes.rays() {
+        for (k, alpha) in alpha.iter().enumerate() {
             let ray = self.nodes.ray(k);
-            let lambda = self.observer.lambda(alpha[k]);
+            let lambda = self.observer.lambda(*alpha);
             for i in 0..ray.weight.len() {
                 self.node(&ray, i, lambda, all);
             }

@@ -145,7 +145,7 @@ impl RayVisitor for Sum<'_> {
         media.radiate(media.in_sphere(sphere), optics, &seen, 0, nodes, &mut self.sources.media)
     }
 
-    #[inline]
+    #[inline(always)]
     fn take(
         &mut self,
         number: usize,
@@ -244,7 +244,7 @@ impl<'a> Sum<'a> {
     }
 
     /// Light of the sky.
-    #[inline]
+    #[inline(always)]
     fn sky(&mut self, k: usize, ray: &TracedRay) -> Result<[f32; 3], OutOfRange> {
         let Some(sky) = &self.scene.sky else { return Ok([0.0; 3]) };
         sky.light(&self.scene.optics, self.place(k), ray, &mut self.sources.beam)
@@ -269,7 +269,7 @@ impl<'a> Sum<'a> {
     }
 
     /// Writes down what ray number `k` sees at time number `j`.
-    #[inline]
+    #[inline(always)]
     fn finish(&mut self, (k, j): (usize, usize), ray: &TracedRay, light: Accumulator) {
         let (x, y) = self.place(k);
         let Some(seen) = self.seen.get_mut(j * self.block.alpha.len() + k) else { return };

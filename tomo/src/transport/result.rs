@@ -75,6 +75,7 @@ pub(super) struct Accumulator {
 }
 
 impl Accumulator {
+    #[inline(always)]
     pub fn new() -> Self {
         Accumulator {
             intensity: 0.0,
@@ -89,6 +90,7 @@ impl Accumulator {
     }
 
     /// Adds intensity that is shifted by g.
+    #[inline(always)]
     pub fn add(&mut self, intensity: f64, g: f64, color: [f32; 3]) {
         self.intensity += intensity;
         self.shift += g * intensity;
@@ -117,7 +119,7 @@ impl Accumulator {
     }
 
     /// What the ray sees whose light this is.
-    #[inline]
+    #[inline(always)]
     pub fn result(&self, ray: &TracedRay) -> RayResult {
         let fate = match (ray.surface, ray.outcome) {
             (Some(_), _) => Fate::Surface,
@@ -149,6 +151,7 @@ impl Accumulator {
     }
 
     /// Remembers where the brightest contribution comes from.
+    #[inline(always)]
     pub fn mark(&mut self, brightness: f64, place: Place) {
         if brightness > self.brightest {
             (self.brightest, self.place) = (brightness, place);

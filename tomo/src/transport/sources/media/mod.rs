@@ -286,7 +286,7 @@ impl Media {
     }
 
     /// Adds the light of all media along ray number `k` at time number `j`.
-    #[inline]
+    #[inline(always)]
     pub fn add(&self, k: usize, j: usize, scratch: &MediaScratch, light: &mut Accumulator) {
         for (m, medium) in self.iter().enumerate() {
             let place = (m * scratch.rays + k) * scratch.times + j;
