@@ -47,7 +47,7 @@ pub struct TracedRay {
     pub crossings: Range<usize>,
     /// Mino time of the whole ray.
     pub mino_total: f64,
-    /// Mino time after which no light is taken: see [`BlockRequest::half_orbits`].
+    /// Mino time after which no light is taken: see [`BlockRequest::half_orbits`](crate::BlockRequest::half_orbits).
     pub until: f64,
     /// Mino time of the first opaque surface, if there is one before `until`.
     pub surface: Option<f64>,

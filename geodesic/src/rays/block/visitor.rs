@@ -19,7 +19,7 @@ pub trait RayVisitor {
         false
     }
 
-    /// The same, from coarse nodes along the ray: see [`BlockRequest::probes`].
+    /// The same, from coarse nodes along the ray: see [`BlockRequest::probes`](crate::BlockRequest::probes).
     fn needs_path_at(&self, ray: &TracedRay, nodes: &RayNodes<'_>) -> bool {
         let _ = (ray, nodes);
         false
