@@ -39,7 +39,6 @@ mod lock;
 mod man;
 mod memory;
 mod movie;
-mod npz;
 mod observe;
 mod output;
 mod overlay;

@@ -12,6 +12,7 @@ pub mod fit;
 pub mod image;
 pub mod interferometry;
 pub mod memory;
+pub mod numpy;
 pub mod optimise;
 pub mod points;
 pub mod polarization;

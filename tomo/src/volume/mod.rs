@@ -1,5 +1,6 @@
 //! Emission on the nodes of a box: what a fit recovers, and what a scene may show.
 
+mod file;
 pub mod metrics;
 mod panels;
 #[cfg(test)]
@@ -9,6 +10,7 @@ pub mod slices;
 pub mod vti;
 
 use crate::dynamics::Axis;
+pub use file::{VolumeArrays, VolumeFileError};
 use kerrlight_geodesic::OutOfRange;
 use kerrlight_geodesic::vector::rotate;
 pub use panels::Shown;

@@ -14,10 +14,10 @@ pub use fields::{compare, true_volume};
 use super::failed;
 use super::folder::Folder;
 use crate::checksum::sealed;
-use crate::volume_files;
 use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::fit::setup::{self, Instrument, Measured};
 use kerrlight_tomo::fit::{Loss, Motion, State, Trainer};
+use kerrlight_tomo::interferometry::files::images;
 use kerrlight_tomo::units::MICROARCSECOND;
 use kerrlight_tomo::volume::{Volume, VolumeFile, vti};
 use lensed::Still;
@@ -74,7 +74,7 @@ impl Estimate<'_> {
     fn volumes(&self, volume: &Volume, state: &State<f32>) -> anyhow::Result<()> {
         let save = |name: &str, volume: &Volume, axis| {
             let file = VolumeFile { volume: volume.clone(), axis: Some(axis) };
-            volume_files::write(&self.folder.file(name)?, &file)
+            self.folder.file(name)?.write(&file.to_npz())
         };
         save("volume.npz", volume, state.now.axis.vector())?;
         let mut fields = vec![vti::Field { name: "emission", volume }];
@@ -102,8 +102,7 @@ impl Estimate<'_> {
         if let Ok(sky) = setup::sky(self.file) {
             lists.push(("field_uas", vec![sky.pixel_rad / MICROARCSECOND * n as f64]));
         }
-        let bytes = volume_files::movie_archive(shape, &arrays, &lists)?;
-        self.folder.file("movie.npz")?.write(&bytes)
+        self.folder.file("movie.npz")?.write(&images::movie_archive(shape, &arrays, &lists))
     }
 }
 

@@ -1,7 +1,6 @@
 //! A scene of what was recovered, with its motion: `kerrlight render` and `kerrlight movie` show it.
 
 use super::{Estimate, fields};
-use crate::volume_files;
 use anyhow::Context;
 use kerrlight_tomo::fit::{Sampling, setup};
 use kerrlight_tomo::fit::{State, Trainer};
@@ -34,7 +33,7 @@ impl Estimate<'_> {
         let axis = state.now.axis;
         let volume = fields::carried(self.file, trainer, state)?;
         let file = VolumeFile { volume, axis: Some(axis.vector()) };
-        volume_files::write(&self.folder.file(VOLUME)?, &file)?;
+        self.folder.file(VOLUME)?.write(&file.to_npz())?;
         self.folder.file(SCENE)?.write(text.as_bytes())
     }
 

@@ -5,6 +5,7 @@ mod comments;
 mod eht_table;
 mod fits;
 mod fits_image;
+pub mod images;
 mod obs_text;
 mod table;
 mod uvfits;

@@ -1,0 +1,223 @@
+//! Images and movies as grids of numbers, arrays of NumPy, and pictures in EXR.
+
+use super::FileError;
+use crate::image::exr;
+use crate::interferometry::operator::ImageGrid;
+use crate::interferometry::simulate::Movie;
+use crate::numpy::{Archive, NumpyError, read_array, write_archive, write_array};
+use crate::scene::Scene;
+use crate::units::MICROARCSECOND;
+
+type Result<T> = std::result::Result<T, FileError>;
+
+/// Numbers of a file before one knows how large they are on the sky: images of Jy/pixel.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Pixels {
+    /// Pixels of a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Jy/pixel, image after image, rows from the north.
+    pub values: Vec<f64>,
+    /// Width of the field in µas, where the file tells.
+    pub field_uas: Option<f64>,
+    /// When the images show the source.
+    pub times: OwnTimes,
+}
+
+/// When the images of a file show the source, as far as it tells.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub enum OwnTimes {
+    /// It does not tell.
+    #[default]
+    Unknown,
+    /// Hours of UTC.
+    Utc(Vec<f64>),
+    /// Hours since some moment.
+    Since(Vec<f64>),
+}
+
+impl Pixels {
+    /// The movie on a field of this width in microarcseconds.
+    ///
+    /// # Errors
+    /// If the field is out of range, or a pixel is not finite.
+    pub fn movie(self, field_uas: f64) -> Result<Movie> {
+        let grid = ImageGrid::new(self.width, self.height, field_uas * MICROARCSECOND);
+        let grid = grid.map_err(|error| FileError::whole(error.to_string()))?;
+        self.all_finite()?;
+        Ok(Movie { grid, pixels: self.values })
+    }
+
+    fn all_finite(&self) -> Result<()> {
+        let bad = self.values.iter().position(|value| !value.is_finite());
+        let Some(k) = bad else { return Ok(()) };
+        let (row, column) = (k / self.width % self.height + 1, k % self.width + 1);
+        let message = format!("row {row}, column {column}: {} is not finite", self.values[k]);
+        Err(FileError::whole(message))
+    }
+}
+
+/// A row of pixels a line, separated by commas; lines that start with `#` are passed over.
+///
+/// # Errors
+/// Names the line and the column that is no number, and lines of other lengths.
+pub fn csv_grid(bytes: &[u8]) -> Result<Pixels> {
+    let text = core::str::from_utf8(bytes);
+    let text = text.map_err(|error| FileError::whole(format!("not UTF-8 text: {error}")))?;
+    let mut pixels = Pixels::default();
+    for (index, line) in text.lines().enumerate() {
+        let (number, line) = (index + 1, line.trim());
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let before = pixels.values.len();
+        for (column, cell) in line.trim_end_matches(',').split(',').enumerate() {
+            let value = cell.trim().parse().map_err(|_| {
+                let cell: String = cell.chars().take(20).collect();
+                let at = format!("line {number}, column {}", column + 1);
+                FileError::whole(format!("{at}: `{cell}` is not a number"))
+            })?;
+            pixels.values.push(value);
+        }
+        let width = pixels.values.len() - before;
+        if pixels.height > 0 && width != pixels.width {
+            let message = format!("{width} pixels, the lines before have {}", pixels.width);
+            return Err(FileError::line(number, message));
+        }
+        pixels.width = width;
+        pixels.height += 1;
+    }
+    if pixels.values.is_empty() {
+        return Err(FileError::whole("no pixels"));
+    }
+    Ok(pixels)
+}
+
+/// An array of shape (height, width) or (frames, height, width).
+///
+/// # Errors
+/// If it has another shape.
+pub fn npy(bytes: &[u8]) -> std::result::Result<Pixels, NumpyError> {
+    let (shape, values) = read_array(bytes)?;
+    let (&[height, width] | &[_, height, width]) = &shape[..] else {
+        return Err(NumpyError::content(format!("shape {shape:?}: {IMAGE_SHAPES}")));
+    };
+    Ok(Pixels { width: width as usize, height: height as usize, values, ..Pixels::default() })
+}
+
+const IMAGE_SHAPES: &str = "(height, width) or (frames, height, width) is expected";
+
+/// The only array of an archive, or the one named `movie`, `image` or `recovered` (of a fit); `times` are hours of
+/// UTC, `hours` those since some moment, `field_uas` is the width of the field.
+///
+/// # Errors
+/// If there is no such array, or it has another shape.
+pub fn npz_movie(bytes: &[u8]) -> std::result::Result<Pixels, NumpyError> {
+    let mut archive = Archive::open(bytes)?;
+    let names = archive.names()?;
+    let name = image_of(&names)?.to_owned();
+    let mut member = |wanted: &str| -> std::result::Result<_, NumpyError> {
+        if wanted == name || !names.iter().any(|name| name == wanted) {
+            return Ok(None);
+        }
+        let bytes = archive.member(wanted)?;
+        let array = bytes.map(|bytes| read_array(&bytes)).transpose();
+        Ok(array.map_err(|error| error.within(format!("{wanted}.npy")))?.map(|(_, all)| all))
+    };
+    let (hours, times) = (member("hours")?, member("times")?);
+    let field_uas = member("field_uas")?.and_then(|all| all.first().copied());
+    let none = || NumpyError::content(format!("holds no {name}"));
+    let pixels = npy(&archive.member(&name)?.ok_or_else(none)?);
+    let pixels = pixels.map_err(|error| error.within(format!("{name}.npy")))?;
+    let times = times.map(OwnTimes::Utc).or(hours.map(OwnTimes::Since)).unwrap_or_default();
+    Ok(Pixels { times, field_uas, ..pixels })
+}
+
+/// The array of an archive that is images.
+fn image_of(names: &[String]) -> std::result::Result<&str, NumpyError> {
+    let there = |wanted: &&&str| names.iter().any(|name| name == **wanted);
+    match (names, IMAGES.iter().find(there)) {
+        ([only], _) => Ok(only),
+        (_, Some(name)) => Ok(name),
+        _ => Err(NumpyError::content(format!(
+            "holds {}: an array named movie, image or recovered is expected",
+            names.join(", ")
+        ))),
+    }
+}
+
+/// Names of arrays that are images, the first that is there counts.
+const IMAGES: [&str; 3] = ["movie", "image", "recovered"];
+
+/// The channel `intensity` of a picture in EXR. One of kerrlight in Jy/µas² knows its field and its scale; one that is
+/// not of kerrlight knows no field and is taken as Jy/pixel.
+///
+/// # Errors
+/// If there is no such channel, or its unit is none of the sky.
+pub fn exr_picture(bytes: &[u8]) -> Result<Pixels> {
+    let (picture, attributes) = exr::decode(bytes)
+        .map_err(|error| FileError::whole(format!("damaged or unusual EXR: {error}")))?;
+    let lacks = |what: &str| FileError::whole(what.to_owned());
+    let channel = picture.channel("intensity");
+    let channel = channel.ok_or_else(|| lacks("has no channel named intensity"))?;
+    let (width, height) = (picture.width, picture.height);
+    let attribute = |name: &str| attributes.get(name).map(String::as_str);
+    let in_pixels = |factor: f64| Pixels {
+        width,
+        height,
+        values: channel.iter().map(|value| f64::from(*value) * factor).collect(),
+        ..Pixels::default()
+    };
+    match attribute("intensity_unit") {
+        Some("Jy/uas^2") => {
+            let scene = attribute("scene_resolved").ok_or_else(|| lacks("holds no scene"))?;
+            let scene = Scene::parse(scene)
+                .map_err(|error| FileError::whole(format!("scene in the EXR: {error}")))?;
+            let angle = scene.hole.angle_uas();
+            let angle = angle.ok_or_else(|| lacks("its scene has no mass or distance"))?;
+            let seconds = scene.hole.seconds().ok_or_else(|| lacks("its scene has no mass"))?;
+            let pixel_uas = scene.pixel_size() * angle;
+            let hours = scene.observer.time * seconds / 3600.0;
+            let field_uas = Some(pixel_uas * width as f64);
+            let times = OwnTimes::Since(vec![hours]);
+            Ok(Pixels { field_uas, times, ..in_pixels(pixel_uas * pixel_uas) })
+        }
+        Some(_) => {
+            Err(lacks("its intensity has no unit of the sky: render it with screen.total_flux_jy"))
+        }
+        None => Ok(in_pixels(1.0)),
+    }
+}
+
+/// The bytes of an NPZ archive of movies of one shape (frames, rows from the top, columns), with lists of numbers
+/// such as the times of the frames.
+pub fn movie_archive(
+    shape: [usize; 3],
+    movies: &[(&str, Vec<f32>)],
+    lists: &[(&str, Vec<f64>)],
+) -> Vec<u8> {
+    let shape = shape.map(|n| n as u64);
+    let movies =
+        movies.iter().map(|(name, movie)| (*name, write_array(&shape, movie.iter().copied())));
+    let lists = lists
+        .iter()
+        .map(|(name, list)| (*name, write_array(&[list.len() as u64], list.iter().copied())));
+    write_archive(movies.chain(lists))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exact_grids_of_numbers() {
+        let pixels = csv_grid(b"# Jy/pixel\n1, 2,3\n\n4,5e-1,-6\n").unwrap();
+        assert_eq!((pixels.width, pixels.height), (3, 2));
+        assert_eq!(pixels.values, [1.0, 2.0, 3.0, 4.0, 0.5, -6.0]);
+        let fail = |text: &str| csv_grid(text.as_bytes()).err().unwrap().to_string();
+        assert!(fail("1,2\n3\n").contains("line 2: 1 pixels"));
+        assert!(fail("#\n1,x\n").contains("line 2, column 2: `x`"));
+        assert!(fail("# nothing\n").contains("no pixels"));
+    }
+}

@@ -1,0 +1,125 @@
+//! NPZ archives.
+
+use super::NumpyError;
+use crate::memory;
+use std::io::{Cursor, Read, Write};
+use zip::result::ZipError;
+
+/// An NPZ archive in memory.
+#[derive(Debug)]
+pub struct Archive<'a>(zip::ZipArchive<Cursor<&'a [u8]>>);
+
+impl<'a> Archive<'a> {
+    /// The archive that these bytes are.
+    ///
+    /// # Errors
+    /// If they are none.
+    pub fn open(bytes: &'a [u8]) -> Result<Self, NumpyError> {
+        let archive = zip::ZipArchive::new(Cursor::new(bytes));
+        let not = |error| NumpyError::content(format!("not an npz archive: {error}"));
+        archive.map(Archive).map_err(not)
+    }
+
+    /// The names of its arrays, without `.npy`.
+    ///
+    /// # Errors
+    /// If the archive is damaged.
+    pub fn names(&mut self) -> Result<Vec<String>, NumpyError> {
+        let count = self.0.len();
+        let name = |k| -> Result<String, ZipError> {
+            let name = self.0.by_index(k)?.name()?.into_owned();
+            Ok(name.strip_suffix(".npy").unwrap_or(&name).to_owned())
+        };
+        let damaged = |error| NumpyError::content(format!("damaged npz archive: {error}"));
+        (0..count).map(name).collect::<Result<_, _>>().map_err(damaged)
+    }
+
+    /// The bytes of an array, whose checksum must be right; `None` if there is no such array.
+    ///
+    /// # Errors
+    /// If it is damaged, or there is no memory for it.
+    pub fn member(&mut self, name: &str) -> Result<Option<Vec<u8>>, NumpyError> {
+        let at = || format!("array {name}");
+        let failed = |error: &dyn std::error::Error| {
+            NumpyError::content(error.to_string()).within(format!("array {name}"))
+        };
+        let file = match self.0.by_name(&format!("{name}.npy")) {
+            Ok(file) => file,
+            Err(ZipError::FileNotFound) => return Ok(None),
+            Err(error) => return Err(failed(&error)),
+        };
+        let size = file.size();
+        // Numbers of four bytes, the smallest that are usual.
+        memory::afford(at, memory::array(size as f64, size as f64 / 4.0))?;
+        let mut bytes = Vec::new();
+        // Its checksum is compared at its end, which is one byte behind its last.
+        let mut file = file.take(size.saturating_add(1));
+        file.read_to_end(&mut bytes).map_err(|error| failed(&error))?;
+        if bytes.len() as u64 != size {
+            let damaged = format!("{} is damaged: its size is stated as {size} bytes", at());
+            return Err(NumpyError::content(damaged));
+        }
+        Ok(Some(bytes))
+    }
+}
+
+/// The bytes of an archive of arrays, each with its name and the bytes that [`write_array`](super::write_array) makes.
+///
+/// # Panics
+/// Never: writing to memory does not fail.
+pub fn write_archive<'n>(arrays: impl IntoIterator<Item = (&'n str, Vec<u8>)>) -> Vec<u8> {
+    let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    let options = zip::write::SimpleFileOptions::default();
+    for (name, bytes) in arrays {
+        archive.start_file(format!("{name}.npy"), options).expect("a name that is short");
+        archive.write_all(&bytes).expect("memory");
+    }
+    archive.finish().expect("memory").into_inner()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    fn archive(bytes: &[u8]) -> Vec<u8> {
+        let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
+        let options = zip::write::SimpleFileOptions::default();
+        archive.start_file("a.npy", options).unwrap();
+        archive.write_all(bytes).unwrap();
+        archive.finish().unwrap().into_inner()
+    }
+
+    /// No flipped bit changes an array: it is an error, or in what nobody reads (dates, attributes).
+    #[test]
+    fn exact_every_flipped_bit_is_found() {
+        let content: Vec<u8> =
+            (0..600u32).map(|k| (k.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+        let whole = archive(&content);
+        let read = |bytes: &[u8]| Archive::open(bytes)?.member("a");
+        assert_eq!(read(&whole).unwrap(), Some(content.clone()));
+        let mut refused = 0;
+        for at in 0..whole.len() {
+            for bit in 0..8 {
+                let mut flipped = whole.clone();
+                flipped[at] ^= 1 << bit;
+                match read(&flipped) {
+                    Ok(Some(bytes)) => assert!(bytes == content, "byte {at}, bit {bit}"),
+                    Ok(None) | Err(_) => refused += 1,
+                }
+            }
+        }
+        assert!(refused > 8 * 300, "{refused}");
+    }
+
+    /// Sizes in the archive that are not those of its members.
+    #[test]
+    fn exact_false_sizes_are_named() {
+        let mut whole = archive(&[7; 4096]);
+        let central = whole.windows(4).position(|window| window == b"PK\x01\x02").unwrap();
+        for size in [100u32, 5000, u32::MAX - 1] {
+            whole[central + 24..central + 28].copy_from_slice(&size.to_le_bytes());
+            assert!(Archive::open(&whole).unwrap().member("a").is_err(), "{size}");
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! NPY arrays.
+
+use super::NumpyError;
+use crate::memory;
+use npyz::WriterBuilder;
+
+/// Shape of an array of numbers of any type, and its numbers in C's order.
+///
+/// # Errors
+/// If the bytes are no array of numbers, or fewer than its shape says.
+pub fn read_array(bytes: &[u8]) -> Result<(Vec<u64>, Vec<f64>), NumpyError> {
+    let not = |error| NumpyError::content(format!("not an npy file: {error}"));
+    let file = npyz::NpyFile::new(bytes).map_err(not)?;
+    let in_fortran = file.order() == npyz::Order::Fortran;
+    let shape = file.shape().to_vec();
+    let count = shape.iter().try_fold(1u64, |product, n| product.checked_mul(*n));
+    // At least a byte each, so that a header cannot ask for more memory than there is file.
+    if count.is_none_or(|count| count == 0 || count > bytes.len() as u64) {
+        let message = format!("shape {shape:?} does not go with {} bytes", bytes.len());
+        return Err(NumpyError::content(message));
+    }
+    let values = 8.0 * count.unwrap_or_default() as f64;
+    memory::afford(|| format!("the array of shape {shape:?}"), values)?;
+    let values = numbers(file)?;
+    let values = if in_fortran { in_c_order(&shape, &values) } else { values };
+    Ok((shape, values))
+}
+
+/// Values whose first index runs fastest, with the last running fastest.
+fn in_c_order(shape: &[u64], values: &[f64]) -> Vec<f64> {
+    let shape: Vec<usize> = shape.iter().map(|n| *n as usize).collect();
+    let mut index = vec![0; shape.len()];
+    let mut ordered = Vec::with_capacity(values.len());
+    for _ in 0..values.len() {
+        let at = index.iter().zip(&shape).rev().fold(0, |at, (k, n)| at * n + k);
+        ordered.push(values[at]);
+        for (k, n) in index.iter_mut().zip(&shape).rev() {
+            *k += 1;
+            if *k < *n {
+                break;
+            }
+            *k = 0;
+        }
+    }
+    ordered
+}
+
+/// The values of an array of any number type that does not depend on the machine.
+fn numbers(file: npyz::NpyFile<&[u8]>) -> Result<Vec<f64>, NumpyError> {
+    use npyz::TypeChar::{Float, Int, Uint};
+    fn of<T: npyz::Deserialize>(
+        file: npyz::NpyFile<&[u8]>,
+        value: impl Fn(T) -> f64,
+    ) -> Result<Vec<f64>, NumpyError> {
+        let values = file.into_vec::<T>();
+        let values = values.map_err(|error| NumpyError::content(error.to_string()))?;
+        Ok(values.into_iter().map(value).collect())
+    }
+    let kind = match file.dtype() {
+        npyz::DType::Plain(plain) => Some((plain.type_char(), plain.size_field())),
+        _ => None,
+    };
+    match kind {
+        Some((Float, 4)) => of::<f32>(file, f64::from),
+        Some((Float, 8)) => of::<f64>(file, |x| x),
+        Some((Int, 1)) => of::<i8>(file, f64::from),
+        Some((Int, 2)) => of::<i16>(file, f64::from),
+        Some((Int, 4)) => of::<i32>(file, f64::from),
+        Some((Int, 8)) => of::<i64>(file, |n| n as f64),
+        Some((Uint, 1)) => of::<u8>(file, f64::from),
+        Some((Uint, 2)) => of::<u16>(file, f64::from),
+        Some((Uint, 4)) => of::<u32>(file, f64::from),
+        Some((Uint, 8)) => of::<u64>(file, |n| n as f64),
+        _ => Err(NumpyError::content(format!(
+            "values of type {}: whole numbers, float32 or float64 are expected",
+            file.dtype().descr()
+        ))),
+    }
+}
+
+/// The bytes of an array in C's order.
+///
+/// # Panics
+/// If there are not as many values as the shape says.
+pub fn write_array<T: npyz::AutoSerialize>(
+    shape: &[u64],
+    values: impl IntoIterator<Item = T>,
+) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let options = npyz::WriteOptions::new().default_dtype().shape(shape);
+    let mut writer = options.writer(&mut bytes).begin_nd().expect("memory");
+    writer.extend(values).expect("memory");
+    writer.finish().expect("as many values as the shape says");
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An array and its transpose in the other order are the same bytes of numbers.
+    #[test]
+    fn exact_fortran_order() {
+        let write = |order, values: &[f64]| {
+            use npyz::WriterBuilder;
+            let mut bytes = Vec::new();
+            let options = npyz::WriteOptions::new().default_dtype().order(order);
+            let mut writer = options.shape(&[2, 3, 4]).writer(&mut bytes).begin_nd().unwrap();
+            writer.extend(values.iter().copied()).unwrap();
+            writer.finish().unwrap();
+            bytes
+        };
+        let value = |i: usize, j: usize, k: usize| (100 * i + 10 * j + k) as f64;
+        let in_c: Vec<f64> = (0..24).map(|n| value(n / 12, n / 4 % 3, n % 4)).collect();
+        let in_fortran: Vec<f64> = (0..24).map(|n| value(n % 2, n / 2 % 3, n / 6)).collect();
+        let c = read_array(&write(npyz::Order::C, &in_c)).unwrap();
+        let fortran = read_array(&write(npyz::Order::Fortran, &in_fortran)).unwrap();
+        assert_eq!(c, (vec![2, 3, 4], in_c));
+        assert_eq!(fortran, c);
+    }
+}

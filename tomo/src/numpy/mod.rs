@@ -1,0 +1,41 @@
+//! Arrays of NumPy (NPY) and archives of them (NPZ), as bytes. Files state sizes that need not be true: nothing is
+//! allocated before it is checked against the bytes that are there.
+
+mod archive;
+mod array;
+
+pub use archive::{Archive, write_archive};
+pub use array::{read_array, write_array};
+
+use crate::memory::TooLarge;
+
+/// Why bytes are not the arrays that are expected.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NumpyError {
+    /// What is wrong with them.
+    #[error("{0}")]
+    Content(String),
+    /// What is wrong with a member of an archive.
+    #[error("{member}: {error}")]
+    Member {
+        /// The member.
+        member: String,
+        /// What is wrong with it.
+        error: Box<NumpyError>,
+    },
+    /// More memory would be needed than there is.
+    #[error(transparent)]
+    Memory(#[from] TooLarge),
+}
+
+impl NumpyError {
+    pub(crate) fn content(message: impl Into<String>) -> Self {
+        NumpyError::Content(message.into())
+    }
+
+    /// With the member that it is about.
+    pub(crate) fn within(self, member: impl Into<String>) -> Self {
+        NumpyError::Member { member: member.into(), error: Box::new(self) }
+    }
+}
