@@ -28,7 +28,7 @@ use kerrlight_geodesic::{
 ///     screen = { field_of_view_m = 30.0, width = 64 }
 ///     effects = { redshift = true, spectral_index = 0.0 }
 ///     tracer = { integrator = "elliptic", tolerance = 1e-8 }
-///     disc = { outer_edge = 20.0, peak_intensity = 1.0 }
+///     disc = { outer_edge = 20.0, peak_intensity = 1.0, opaque = true }
 /// "#)?;
 /// let prepared = PreparedScene::new(&scene, None)?;
 /// // α = −6 M, β = 2 M, at the scene's own time of observation.
