@@ -81,6 +81,22 @@ fn legendre_areas(n: usize, x: f64) -> Vec<f64> {
     (0..n).map(area).collect()
 }
 
+/// `sum + length Σ factors · rates`.
+#[inline(always)]
+pub(super) fn integral<V: Lanes<f64>>(
+    factors: &[f64],
+    rates: &[[V; 2]],
+    length: V,
+    sum: [V; 2],
+) -> [V; 2] {
+    let (mut time, mut azimuth) = (V::splat(0.0), V::splat(0.0));
+    for (factor, rate) in factors.iter().zip(rates) {
+        time = rate[0].mul_add(V::splat(*factor), time);
+        azimuth = rate[1].mul_add(V::splat(*factor), azimuth);
+    }
+    [time.mul_add(length, sum[0]), azimuth.mul_add(length, sum[1])]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -102,20 +118,4 @@ mod tests {
             }
         }
     }
-}
-
-/// `sum + length Σ factors · rates`.
-#[inline(always)]
-pub(super) fn integral<V: Lanes<f64>>(
-    factors: &[f64],
-    rates: &[[V; 2]],
-    length: V,
-    sum: [V; 2],
-) -> [V; 2] {
-    let (mut time, mut azimuth) = (V::splat(0.0), V::splat(0.0));
-    for (factor, rate) in factors.iter().zip(rates) {
-        time = rate[0].mul_add(V::splat(*factor), time);
-        azimuth = rate[1].mul_add(V::splat(*factor), azimuth);
-    }
-    [time.mul_add(length, sum[0]), azimuth.mul_add(length, sum[1])]
 }
