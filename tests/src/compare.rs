@@ -243,6 +243,7 @@ fn experiments_are_listed_and_mistakes_are_named() {
 
 /// A look at every experiment that the program carries: all cases are done, every table is filled, the page is whole.
 #[test]
+#[ignore = "long"]
 fn exact_quick_variants_of_all_experiments_run() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();

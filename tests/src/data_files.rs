@@ -114,6 +114,7 @@ const NAN: [f32; 3] = [f32::NAN, f32::NAN, 0.0];
 
 /// What the releases, their pipelines and the programs that flag them bring, made of one observation.
 #[test]
+#[ignore = "long"]
 fn exact_every_kind_of_published_visibilities_is_fitted() {
     let (folder, data) = (tempfile::tempdir().unwrap(), measured());
     let of_jcmt: Vec<bool> =

@@ -109,6 +109,7 @@ fn run_page(path: &Path, text: &str) -> usize {
 }
 
 #[test]
+#[ignore = "long"]
 fn exact_readme_and_tutorials_run_as_written() {
     let tutorials = root().join("docs/tutorials");
     let is_run = |path: &Path| path == root().join("README.md") || path.starts_with(&tutorials);

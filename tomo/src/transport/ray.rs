@@ -17,7 +17,7 @@ use crate::emission::medium::Part;
 use kerrlight_geodesic::footprint::Number;
 use kerrlight_geodesic::simd::RayNodes;
 use kerrlight_geodesic::{
-    OutOfRange, Path, PathOfRay, PlaneCrossing, Ray, RayBlock, RayVisitor, TracedRay, Work,
+    OutOfRange, Path, PathOfRay, PathUse, PlaneCrossing, Ray, RayBlock, RayVisitor, TracedRay, Work,
 };
 use std::sync::Arc;
 
@@ -85,7 +85,7 @@ impl PreparedScene {
         } else {
             Vec::new()
         };
-        let sighted = self.spots.sight(&self.optics, times.len());
+        let sighted = !self.media.absorb() && self.spots.sight(&self.optics, times.len());
         let request = if sighted { &self.sighting } else { &self.request };
         let mut sum = Sum { scene: self, block, trees, sighted, sources, meter, seen };
         let done = match (self.optics.view.observer(), self.optics.lensing) {
@@ -116,11 +116,17 @@ impl RayVisitor for Sum<'_> {
         self.scene.disc.as_ref().is_some_and(|disc| disc.hides_at(crossing))
     }
 
-    fn needs_path(&self, ray: &Ray) -> bool {
+    fn needs_path(&self, ray: &Ray) -> PathUse {
         let PreparedScene { meshes, media, spots, optics, .. } = self.scene;
-        meshes.as_ref().is_some_and(|meshes| meshes.need_path(optics, ray))
-            || media.need_path(ray)
-            || (!self.sighted && spots.need_path(ray, &self.trees))
+        let meets_mesh = meshes.as_ref().is_some_and(|meshes| meshes.need_path(optics, ray));
+        if meets_mesh || media.need_path(ray) {
+            return PathUse::Instead;
+        }
+        if self.sighted || !spots.need_path(ray, &self.trees) {
+            return PathUse::None;
+        }
+        // The depth in front of a spot is that of the last ray whose nodes were taken.
+        if media.absorb() { PathUse::Instead } else { PathUse::Beside }
     }
 
     fn needs_path_at(&self, ray: &TracedRay, nodes: &RayNodes<'_>) -> bool {
@@ -153,7 +159,7 @@ impl RayVisitor for Sum<'_> {
         crossings: &[PlaneCrossing],
         path: Option<PathOfRay<'_>>,
     ) -> Result<(), OutOfRange> {
-        if let Some(path) = path {
+        if let (Some(path), true) = (path, ray.stepped) {
             self.add_cells(number, ray, path);
         }
         self.meter.switch(Part::Surfaces);
@@ -238,7 +244,7 @@ impl<'a> Sum<'a> {
                 light,
             );
         }
-        if let (Some(meshes), Some(path)) = (meshes, path) {
+        if let (Some(meshes), Some(path), true) = (meshes, path, ray.stepped) {
             meshes.add(optics, (path.path, ray.last_time()), &self.sources.meshes, light);
         }
     }

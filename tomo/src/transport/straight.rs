@@ -145,6 +145,7 @@ impl Line {
             surface: opaque.map(|crossing| crossing.mino_time),
             exit: (!captured).then(|| self.exit()),
             stepped: false,
+            with_path: false,
         }
     }
 }

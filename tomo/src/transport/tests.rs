@@ -149,7 +149,8 @@ fn exact_sighting_of_single_spots() {
             let (alpha, beta) = screen(24, 24.0);
             let mut seen = vec![RayResult::default(); alpha.len() * times.len()];
             prepared.observe_block(&alpha, &beta, &times, &mut scratch, &mut seen).unwrap();
-            stepped += scratch.rays.rays().iter().filter(|ray| ray.stepped).count();
+            stepped +=
+                scratch.rays.rays().iter().filter(|ray| ray.with_path || ray.stepped).count();
             all += alpha.len();
         }
     }

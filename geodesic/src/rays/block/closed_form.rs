@@ -3,7 +3,7 @@
 use super::request::{BlockRequest, SphereNodes};
 use super::traced::{PlaneCrossing, TracedRay};
 use super::tracer::{BlockTracer, Job, RayBlock};
-use super::visitor::{RayVisitor, Work, first_opaque};
+use super::visitor::{PathUse, RayVisitor, Work, first_opaque};
 use crate::error::OutOfRange;
 use crate::integrate::path::Outcome;
 use crate::screen::observer::{Observer, Ray};
@@ -53,7 +53,7 @@ impl<'a> Located<'a> {
 struct Inspected {
     eta: f64,
     until: f64,
-    needs_path: bool,
+    path: PathUse,
 }
 
 impl BlockTracer {
@@ -104,12 +104,12 @@ impl BlockTracer {
                 located.copy(k, plane);
             }
             let own = &mut plane[first..];
-            let Inspected { eta, until, needs_path } = if with_ray {
+            let Inspected { eta, until, path } = if with_ray {
                 // Its radial potential takes as long as all the rest.
                 let ray = observer.ray(&self.hole, *alpha, *beta)?;
                 self.inspect(&ray, &ends, job.request, own, visitor)
             } else {
-                Inspected { eta: f64::NAN, until: f64::INFINITY, needs_path: false }
+                Inspected { eta: f64::NAN, until: f64::INFINITY, path: PathUse::None }
             };
             let surface = first_opaque(own, until, visitor);
             let all = crossings == 0
@@ -125,7 +125,8 @@ impl BlockTracer {
                 until,
                 surface,
                 exit: None,
-                stepped: !all || needs_path || self.loses_digits(ends.error),
+                stepped: !all || path == PathUse::Instead || self.loses_digits(ends.error),
+                with_path: path == PathUse::Beside,
             });
         }
         Ok(())
@@ -144,11 +145,11 @@ impl BlockTracer {
         if request.rates {
             add_rates(ray, ends, plane);
         }
-        let needs_path = request.paths && visitor.needs_path(ray);
-        Inspected { eta: ray.eta, until: self.until(ray, request.half_orbits), needs_path }
+        let path = if request.paths { visitor.needs_path(ray) } else { PathUse::None };
+        Inspected { eta: ray.eta, until: self.until(ray, request.half_orbits), path }
     }
 
-    /// Leaves the rays whose path is needed after all to be traced step by step.
+    /// Finds the rays whose path is needed beside the closed form.
     fn probe<V: RayVisitor>(
         &self,
         observer: &Observer,
@@ -162,7 +163,7 @@ impl BlockTracer {
         let until: Vec<f64> = open.iter().map(|k| rays[*k].last_time()).collect();
         nodes.trace(&self.hole, observer, &alpha, &beta, Some(&until), probes)?;
         for (number, k) in open.into_iter().enumerate() {
-            rays[k].stepped = visitor.needs_path_at(&rays[k], &nodes.ray(number));
+            rays[k].with_path = visitor.needs_path_at(&rays[k], &nodes.ray(number));
         }
         Ok(())
     }

@@ -11,7 +11,7 @@ mod visitor;
 pub use request::{BlockRequest, SphereNodes};
 pub use traced::{PathOfRay, PlaneCrossing, TracedRay};
 pub use tracer::{BlockTracer, RayBlock};
-pub use visitor::{RayVisitor, Work};
+pub use visitor::{PathUse, RayVisitor, Work};
 
 use crate::error::OutOfRange;
 use crate::rays::integrator::check_columns;
@@ -58,6 +58,9 @@ impl BlockTracer {
     ) -> Result<(), OutOfRange> {
         if block.rays[k].stepped {
             return self.finish_stepped(k, job, block, visitor);
+        }
+        if block.rays[k].with_path {
+            return self.finish_with_path(k, job, block, visitor);
         }
         let ray = &block.rays[k];
         visitor.take(k, ray, &block.plane[ray.crossings.clone()], None)

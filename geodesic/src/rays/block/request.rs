@@ -16,7 +16,7 @@ pub struct BlockRequest {
     /// The number of half-orbits after which rays are cut off: half-way between crossing number
     /// `half_orbits` (from 0) and the next.
     pub half_orbits: Option<u32>,
-    /// Whether [`RayVisitor::needs_path`](crate::RayVisitor::needs_path) decides which rays are traced step by step.
+    /// Whether [`RayVisitor::needs_path`](crate::RayVisitor::needs_path) decides of which rays the path is traced.
     pub paths: bool,
     /// Coarse nodes by which [`RayVisitor::needs_path_at`](crate::RayVisitor::needs_path_at) decides it too.
     pub probes: Option<NodeRequest>,

@@ -33,6 +33,23 @@ impl BlockTracer {
         visitor.take(k, &rays[k], crossings, Some(PathOfRay { ray: &ray, path, tolerance }))
     }
 
+    /// Hands a ray of the closed form to the visitor with its path.
+    #[inline(never)]
+    pub(super) fn finish_with_path<V: RayVisitor>(
+        &self,
+        k: usize,
+        job: Job<'_>,
+        block: &mut RayBlock,
+        visitor: &mut V,
+    ) -> Result<(), OutOfRange> {
+        visitor.works_on(Work::Rays);
+        let ray = self.view.ray(&self.hole, job.alpha[k], job.beta[k])?;
+        let (RayBlock { rays, plane, path, .. }, tolerance) = (block, self.tracer.tolerance());
+        self.tracer.trace(&self.hole, &ray, Quantities::ALL, path);
+        let crossings = &plane[rays[k].crossings.clone()];
+        visitor.take(k, &rays[k], crossings, Some(PathOfRay { ray: &ray, path, tolerance }))
+    }
+
     /// Hands the nodes of a ray inside a sphere to the visitor, until they are fine enough.
     fn refine_on_path<V: RayVisitor>(
         &self,
@@ -92,6 +109,7 @@ impl BlockTracer {
             surface: in_plane.into_iter().chain(off_plane).reduce(f64::min),
             exit: exit.filter(|_| path.outcome() == Outcome::Escaped),
             stepped: true,
+            with_path: false,
         }
     }
 }

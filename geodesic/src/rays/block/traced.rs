@@ -55,6 +55,8 @@ pub struct TracedRay {
     pub exit: Option<[f64; 3]>,
     /// Whether it was traced step by step.
     pub stepped: bool,
+    /// Whether its path is traced beside the closed form.
+    pub with_path: bool,
 }
 
 impl Default for TracedRay {
@@ -71,6 +73,7 @@ impl Default for TracedRay {
             surface: None,
             exit: None,
             stepped: false,
+            with_path: false,
         }
     }
 }

@@ -13,13 +13,14 @@ pub trait RayVisitor {
         false
     }
 
-    /// Whether the path of a ray is needed, so that it has to be traced step by step.
-    fn needs_path(&self, ray: &Ray) -> bool {
+    /// Whether the path of a ray is needed, and what for.
+    fn needs_path(&self, ray: &Ray) -> PathUse {
         let _ = ray;
-        false
+        PathUse::None
     }
 
-    /// The same, from coarse nodes along the ray: see [`BlockRequest::probes`](crate::BlockRequest::probes).
+    /// Whether the path of a ray is needed beside the closed form, from coarse nodes along it: see
+    /// [`BlockRequest::probes`](crate::BlockRequest::probes).
     fn needs_path_at(&self, ray: &TracedRay, nodes: &RayNodes<'_>) -> bool {
         let _ = (ray, nodes);
         false
@@ -61,6 +62,18 @@ pub trait RayVisitor {
     fn works_on(&mut self, work: Work) {
         let _ = work;
     }
+}
+
+/// What the path of a ray is needed for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PathUse {
+    /// Nothing.
+    None,
+    /// For sources of its own: crossings, nodes and the direction of escape stay those of the closed
+    /// form.
+    Beside,
+    /// For everything: the ray is traced step by step.
+    Instead,
 }
 
 /// What a block is worked on for.
