@@ -40,5 +40,6 @@ pub fn read(path: &Path, fov_uas: Option<f64>) -> anyhow::Result<(Movie, OwnTime
         _ => anyhow!("{} does not tell how large it is on the sky: give --fov-uas", name()),
     })?;
     let times = pixels.times.clone();
-    Ok((pixels.movie(field).with_context(name)?, times))
+    let source = || if fov_uas.is_some() { format!("{}, --fov-uas", name()) } else { name() };
+    Ok((pixels.movie(field).with_context(source)?, times))
 }

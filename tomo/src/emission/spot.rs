@@ -127,7 +127,7 @@ impl SpotModel {
     }
 
     /// How many times as long as in the affine parameter a piece of a ray within the spot's shell is
-    /// at most in the coordinates r n: infinite next to the hole. (|dx/dσ|² = 1 + B w³ + … of
+    /// at most in the coordinates r n. (|dx/dσ|² = 1 + B w³ + … of
     /// `transport::chord`, where B w² ≤ 2/(1 − 2w) next to the turning point, and frame dragging.)
     pub fn stretch(&self) -> f64 {
         let w = 1.0 / self.shell()[0];

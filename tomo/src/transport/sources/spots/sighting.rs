@@ -16,6 +16,10 @@ use kerrlight_geodesic::{Outcome, Quantities, TracedRay};
 /// cost more than stepping.
 const MOST_PAIRS: usize = 4;
 
+/// Spots that shine closer to the hole than this, in M, are not sighted: there rays bend too much from
+/// one position to the next.
+const NEAREST: f64 = 4.0;
+
 /// Positions on a panel: panels are at most 0.4 radians long.
 const ORDER: usize = 4;
 
@@ -32,7 +36,8 @@ impl Spots {
     /// Whether it is found from rays' positions which of them may meet spots, at so many times of
     /// observation.
     pub fn sight(&self, optics: &Optics, times: usize) -> bool {
-        !optics.one_by_one && (1..=MOST_PAIRS).contains(&(self.models.len() * times))
+        let far = self.models.iter().all(|spot| spot.shell()[0] >= NEAREST);
+        far && !optics.one_by_one && (1..=MOST_PAIRS).contains(&(self.models.len() * times))
     }
 
     /// The nodes that sighting takes.
