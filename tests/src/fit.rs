@@ -285,7 +285,7 @@ fn code_pixels_are_those_of_the_renderer() {
     use kerrlight_tomo::dynamics::{AngularVelocity, Axis, Injection};
     use kerrlight_tomo::emission::spot::SpotModel;
     use kerrlight_tomo::fit::{
-        Batch, Chain, Motion, Redshift, Region, Sampling, SightlineRequest, Sightlines,
+        Batch, ForwardModel, Motion, Redshift, Region, Sampling, SightlineRequest, Sightlines,
     };
     let text = std::fs::read_to_string(root().join("scenes/hot_spots.toml")).unwrap();
     let text = text.split("[[spot]]").next().unwrap().to_owned()
@@ -321,12 +321,12 @@ fn code_pixels_are_those_of_the_renderer() {
         times: vec![45.0],
     };
     let power = Redshift { power: 2.0 };
-    let mut chain = Chain::<f64>::new(&lines, &motion, &hole, Some(power)).unwrap();
+    let mut model = ForwardModel::<f64>::new(&lines, &motion, &hole, Some(power)).unwrap();
     let axis = Axis::new([0.6, 0.0, 0.8]).unwrap();
-    chain.weigh(axis);
+    model.weigh(axis);
     let center = SpotModel::new(&scene.spot[0], &hole).center(0.0);
     let light = |x: [f64; 3]| (-0.5 * (distance(x, center) / 0.6).powi(2)).exp();
-    let movie = chain.movie_of(axis, &light, &mut Batch::default());
+    let movie = model.movie_of(axis, &light, &mut Batch::default());
     let seen = seen.channel("intensity").unwrap();
     let most = seen.iter().fold(0.0f32, |most, x| most.max(*x));
     assert!(most > 0.1, "{most}");

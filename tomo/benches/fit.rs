@@ -30,10 +30,10 @@ fn axis() -> Axis {
 fn objective() -> Objective<f32> {
     let truth = paper::Truth::scene("1", axis()).expect("a scene");
     let lines = paper::lines_in(REGION, &paper::screen(64), 100).expect("rays");
-    let chain = paper::chain(&lines, paper::FRAMES).expect("a chain");
-    let term = ImageTerm::new(truth.movie(&chain), lines.pixels, 1.0).expect("a movie");
+    let model = paper::forward_model(&lines, paper::FRAMES).expect("a model");
+    let term = ImageTerm::new(truth.movie(&model), lines.pixels, 1.0).expect("a movie");
     let image = Some(Weighted { weight: 1.0, term: Box::new(term) });
-    Objective { chain, data: Data { image, others: Vec::new() } }
+    Objective { model, data: Data { image, others: Vec::new() } }
 }
 
 fn training(batch: BatchSize) -> Training {
@@ -66,7 +66,7 @@ fn parts(
     let (mut batch, mask) = (Batch::default(), state.now.occupancy.as_ref());
     let gather = least(|| {
         batch.set(pairs.iter().copied());
-        batch.gather(&trainer.objective.chain, axis(), mask);
+        batch.gather(&trainer.objective.model, axis(), mask);
     });
     let count = network_parameters(network);
     let (mut gradient, mut values) = (vec![0.0; count], vec![0.0; batch.points()]);
@@ -100,7 +100,7 @@ fn measure(batch: BatchSize) {
         let Ok(Outcome::Done(loss)) = trainer.step(&mut state) else { panic!("it diverged") };
         points = loss.points;
     }
-    let rays = trainer.objective.chain.rays() as u32;
+    let rays = trainer.objective.model.rays() as u32;
     let pairs: Vec<(u32, u32)> = match batch {
         BatchSize::Pixels(count) => {
             (0..count as u32).map(|k| (k * 7919 % rays, k * 31 % 128)).collect()

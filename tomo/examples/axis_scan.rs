@@ -11,7 +11,7 @@ mod paper;
 use kerrlight_tomo::dynamics::Axis;
 use kerrlight_tomo::fit::linear::Weighted;
 use kerrlight_tomo::fit::scan::{AxisLoss, AxisProblem, AxisSettings, scan_axis};
-use kerrlight_tomo::fit::{Chain, FrameTerm, ImageTerm, Scan, ScanTerm};
+use kerrlight_tomo::fit::{ForwardModel, FrameTerm, ImageTerm, Scan, ScanTerm};
 use kerrlight_tomo::image::colormap::Colormap;
 use kerrlight_tomo::interferometry::array::built_in;
 use kerrlight_tomo::interferometry::data_terms::VisibilityTerm;
@@ -21,7 +21,7 @@ use kerrlight_tomo::interferometry::observation::Observation;
 use kerrlight_tomo::interferometry::operator::{ImageGrid, Method, Pulse, Transform};
 use kerrlight_tomo::interferometry::schedule::{Clock, Schedule, Setup, observe};
 use kerrlight_tomo::interferometry::simulate::{Movie, fill};
-use paper::{FRAMES, Truth, chain, lines, processor_time, screen};
+use paper::{FRAMES, Truth, forward_model, lines, processor_time, screen};
 use std::error::Error;
 use std::time::Instant;
 
@@ -41,7 +41,7 @@ const FIELD: f64 = 85.0e-6 / 3600.0 * std::f64::consts::PI / 180.0;
 const PEAK: f64 = 0.03;
 
 /// What the scan sees: rays and data.
-type Seen = (Chain<f32>, Box<dyn FrameTerm<f32>>);
+type Seen = (ForwardModel<f32>, Box<dyn FrameTerm<f32>>);
 
 /// Pixels of the scan's images along each axis.
 const SIDE: usize = 22;
@@ -51,14 +51,14 @@ const PER_RAY: usize = 32;
 /// Every third pixel of the movie's rows and columns.
 fn images(movie: &[f32]) -> Result<Seen, Box<dyn Error>> {
     let places: Vec<f64> = screen(64).into_iter().step_by(3).collect();
-    let chain = chain(&lines(&places, PER_RAY)?, FRAMES)?;
+    let model = forward_model(&lines(&places, PER_RAY)?, FRAMES)?;
     let count = SIDE * SIDE;
     let kept = |k: usize| {
         let (frame, pixel) = (k / count, k % count);
         movie[frame * 4096 + pixel / SIDE * 3 * 64 + pixel % SIDE * 3]
     };
     let pixels = (0..FRAMES * count).map(kept).collect();
-    Ok((chain, Box::new(ImageTerm::new(pixels, count, 1.0)?)))
+    Ok((model, Box::new(ImageTerm::new(pixels, count, 1.0)?)))
 }
 
 /// Visibilities of the movie with thermal noise, and rays of few pixels that are to explain them.
@@ -89,8 +89,8 @@ fn visibilities(movie: &[f32], array: &str) -> Result<Seen, Box<dyn Error>> {
         let transform = Transform::new(grid, Pulse::Triangle, &uv, Method::Direct, 1 << 24)?;
         scans.push(Some(Scan { transform, term: Box::new(term) }));
     }
-    let chain = chain(&lines(&screen(SIDE), PER_RAY)?, FRAMES)?;
-    Ok((chain, Box::new(ScanTerm::new("visibilities", SIDE * SIDE, true, scans))))
+    let model = forward_model(&lines(&screen(SIDE), PER_RAY)?, FRAMES)?;
+    Ok((model, Box::new(ScanTerm::new("visibilities", SIDE * SIDE, true, scans))))
 }
 
 fn same_time(row: &kerrlight_tomo::interferometry::observation::Row, time: f64) -> bool {
@@ -107,17 +107,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     let stride = words.next().map_or(Ok(8), |word| word.parse())?;
     let axis = Axis::new([0.5, 0.0, -0.75f64.sqrt()])?;
     let truth = Truth::scene(&scene, axis)?;
-    let mut movie = truth.movie(&chain(&lines(&screen(64), 100)?, FRAMES)?);
-    let (chain, term) = if kind == "images" {
+    let mut movie = truth.movie(&forward_model(&lines(&screen(64), 100)?, FRAMES)?);
+    let (model, term) = if kind == "images" {
         images(&movie)?
     } else {
         movie.iter_mut().for_each(|x| *x *= PEAK as f32);
         visibilities(&movie, &kind)?
     };
     let frames: Vec<usize> = (0..FRAMES).step_by(stride).collect();
-    println!("{}: {} points, {} frames", term.name(), chain.points(), frames.len());
+    println!("{}: {} points, {} frames", term.name(), model.points(), frames.len());
     let problem = AxisProblem {
-        chain: &chain,
+        model: &model,
         frames: &frames,
         terms: &[Weighted { weight: 1.0, term: term.as_ref() }],
         half_width: 5.0,

@@ -13,7 +13,7 @@ use kerrlight_tomo::fit::linear::{
     Coarse, LinearProblem, LinearProgress, LinearSettings, Method, Prior, Voxels, Weighted,
 };
 use kerrlight_tomo::fit::{ImageTerm, Regulariser};
-use paper::{FRAMES, Truth, chain, lines, processor_time, screen};
+use paper::{FRAMES, Truth, forward_model, lines, processor_time, screen};
 use std::error::Error;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
@@ -72,12 +72,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let truth = Truth::scene(&scene, axis)?;
     let start = Instant::now();
     let lines = lines(&screen(64), 100)?;
-    let chain = chain(&lines, FRAMES)?;
-    println!("{} points on {} rays, {:.2?}", chain.points(), chain.rays(), start.elapsed());
-    let movie = truth.movie(&chain);
+    let model = forward_model(&lines, FRAMES)?;
+    println!("{} points on {} rays, {:.2?}", model.points(), model.rays(), start.elapsed());
+    let movie = truth.movie(&model);
     let sum = |k: usize| movie[k * 4096..(k + 1) * 4096].iter().map(|x| f64::from(*x)).sum::<f64>();
     println!("frames 0 and 64 sum to {:.5} and {:.5}", sum(0), sum(64));
-    let term = ImageTerm::new(movie, chain.pixels(), 1.0)?;
+    let term = ImageTerm::new(movie, model.pixels(), 1.0)?;
     let voxels = Voxels::cube(64, 5.0);
     let [x, y, z] = &lines.position;
     let radius = |k: usize| (x[k] * x[k] + y[k] * y[k] + z[k] * z[k]).sqrt();
@@ -90,7 +90,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let frames: Vec<usize> = (0..FRAMES).collect();
     let smooth = [Prior { regulariser: Regulariser::Smoothness, weight }];
     let problem = LinearProblem {
-        chain: &chain,
+        model: &model,
         axis,
         frames: &frames,
         terms: &[Weighted { weight: 1.0, term: &term }],

@@ -122,10 +122,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let axis = Axis::new([0.5, 0.0, -(0.75f64.sqrt())])?;
     let truth = Truth::scene(&words.get("scene", "1".to_owned())?, axis)?;
     let lines = paper::lines_in(REGION, &paper::screen(64), 100)?;
-    let chain = paper::chain(&lines, paper::FRAMES)?;
-    let term = Box::new(ImageTerm::new(truth.movie(&chain), lines.pixels, 1.0)?);
+    let model = paper::forward_model(&lines, paper::FRAMES)?;
+    let term = Box::new(ImageTerm::new(truth.movie(&model), lines.pixels, 1.0)?);
     let data = Data { image: Some(Weighted { weight: 1.0, term }), others: Vec::new() };
-    let objective = Objective { chain, data };
+    let objective = Objective { model, data };
     let (field, rate) = representation(&words.get("representation", "bhnerf".to_owned())?)?;
     let training = training(&words, rate)?;
     let mut state = State::new(&*field, axis, &training);

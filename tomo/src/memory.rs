@@ -85,7 +85,7 @@ pub fn visibilities(rows: f64) -> f64 {
     2.0 * size_of::<crate::interferometry::observation::Row>() as f64 * rows
 }
 
-/// Nodes on the rays of a fit: as they are traced, and as the chain of the fit keeps them in single precision;
+/// Nodes on the rays of a fit: as they are traced, and as the forward model keeps them in single precision;
 /// `columns` of momenta and delays beside positions, rates and weights.
 pub fn nodes(nodes: f64, columns: f64) -> f64 {
     nodes * (8.0 + 4.0) * (5.0 + columns)

@@ -166,14 +166,14 @@ fn with_problem<R>(
 ) -> anyhow::Result<R> {
     let file = &view.file;
     let linear = setup::linear(file)?;
-    let chain = setup::chain(&view.instrument, motion)?;
+    let model = setup::forward_model(&view.instrument, motion)?;
     let count = file.screen.pixels * file.screen.pixels;
-    let objective = Objective { chain, data: view.measured.terms(&file.loss, count)? };
+    let objective = Objective { model, data: view.measured.terms(&file.loss, count)? };
     let all = objective.observed();
     let chosen: Vec<usize> = all.iter().copied().step_by((all.len() / frames).max(1)).collect();
     let (terms, priors) = (terms(&objective.data), setup::priors(linear));
     let problem = AxisProblem {
-        chain: &objective.chain,
+        model: &objective.model,
         frames: &chosen,
         terms: &terms,
         half_width: file.region.r_max,

@@ -36,14 +36,14 @@ impl Linear<'_> {
         stride: usize,
     ) -> anyhow::Result<LinearSolution<f32>> {
         let linear = setup::linear(self.file)?;
-        objective.chain.weigh(axis);
+        objective.model.weigh(axis);
         let (terms, mut priors) = (terms(&objective.data), setup::priors(linear));
         if self.file.representation.kind == Kind::LinearGrid {
             priors.extend(self.file.priors()?);
         }
         let frames: Vec<usize> = objective.observed().into_iter().step_by(stride.max(1)).collect();
         let problem = LinearProblem {
-            chain: &objective.chain,
+            model: &objective.model,
             axis,
             frames: &frames,
             terms: &terms,

@@ -51,7 +51,7 @@ impl<'a> Prepared<'a> {
     fn objective(&self) -> anyhow::Result<Objective<f32>> {
         let pixels = self.file.screen.pixels * self.file.screen.pixels;
         let data = self.measured.terms(&self.file.loss, pixels)?;
-        Ok(Objective { chain: setup::chain(&self.instrument, &self.motion)?, data })
+        Ok(Objective { model: setup::forward_model(&self.instrument, &self.motion)?, data })
     }
 }
 
@@ -138,17 +138,17 @@ struct Run<'a> {
 
 impl Run<'_> {
     fn describe(&self, instrument: &Instrument) -> String {
-        let chain = &self.trainer.objective.chain;
+        let model = &self.trainer.objective.model;
         let names = self.trainer.objective.names().join(", ");
         let dark = match self.trainer.objective.observed().len() {
-            seen if seen < chain.frames() => format!(" ({seen} of them with data)"),
+            seen if seen < model.frames() => format!(" ({seen} of them with data)"),
             _ => String::new(),
         };
         format!(
             "{}: {names}; {} frames{dark} of {} rays, {} nodes; {} with {} parameters",
             self.file.title,
-            chain.frames(),
-            chain.rays(),
+            model.frames(),
+            model.rays(),
             instrument.lines.points(),
             labels::representation(&self.file.representation.kind),
             self.trainer.representation.parameters(),

@@ -2,7 +2,9 @@
 
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
 use kerrlight_tomo::dynamics::{AngularVelocity, Axis, Turned, pull_back};
-use kerrlight_tomo::fit::{Batch, Chain, Motion, Region, Sampling, SightlineRequest, Sightlines};
+use kerrlight_tomo::fit::{
+    Batch, ForwardModel, Motion, Region, Sampling, SightlineRequest, Sightlines,
+};
 use kerrlight_tomo::points::{Coordinates, CoordinatesMut};
 use std::error::Error;
 
@@ -40,7 +42,10 @@ pub fn lines_in(
 }
 
 /// These rays with a movie of `frames` frames over a unit of time.
-pub fn chain(lines: &Sightlines, frames: usize) -> Result<Chain<f32>, Box<dyn Error>> {
+pub fn forward_model(
+    lines: &Sightlines,
+    frames: usize,
+) -> Result<ForwardModel<f32>, Box<dyn Error>> {
     let time = |k: usize| k as f64 / (frames - 1) as f64;
     let motion = Motion {
         velocity: AngularVelocity::bhnerf(),
@@ -48,7 +53,7 @@ pub fn chain(lines: &Sightlines, frames: usize) -> Result<Chain<f32>, Box<dyn Er
         injection: None,
         times: (0..frames).map(time).collect(),
     };
-    Ok(Chain::new(lines, &motion, &Kerr::new(0.0)?, None)?)
+    Ok(ForwardModel::new(lines, &motion, &Kerr::new(0.0)?, None)?)
 }
 
 /// Gaussian spots of σ = 0.4 M at the reference time.
@@ -99,14 +104,14 @@ impl Truth {
     }
 
     /// Pixels of all frames, frame after frame.
-    pub fn movie(&self, chain: &Chain<f32>) -> Vec<f32> {
+    pub fn movie(&self, model: &ForwardModel<f32>) -> Vec<f32> {
         let mut batch = Batch::default();
-        let mut movie = vec![0.0; chain.frames() * chain.pixels()];
-        for (frame, image) in movie.chunks_exact_mut(chain.pixels()).enumerate() {
-            batch.set((0..chain.rays()).map(|ray| (ray as u32, frame as u32)));
-            batch.gather(chain, self.axis, None);
+        let mut movie = vec![0.0; model.frames() * model.pixels()];
+        for (frame, image) in movie.chunks_exact_mut(model.pixels()).enumerate() {
+            batch.set((0..model.rays()).map(|ray| (ray as u32, frame as u32)));
+            batch.gather(model, self.axis, None);
             let [x, y, z] = &batch.columns.pulled;
-            for (pixel, ends) in chain.pixel().iter().zip(batch.starts.windows(2)) {
+            for (pixel, ends) in model.pixel().iter().zip(batch.starts.windows(2)) {
                 let light = |k: usize| {
                     let weight = f64::from(batch.columns.weight[k]);
                     weight * self.at([x[k], y[k], z[k]].map(f64::from))

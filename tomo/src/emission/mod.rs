@@ -4,7 +4,6 @@
 pub mod black_body;
 pub mod disc;
 pub mod gas;
-pub mod glyph;
 pub mod medium;
 pub mod mesh;
 mod occupied;

@@ -1,6 +1,6 @@
 //! Nodes of some rays in some frames, pulled back to the reference time.
 
-use super::chain::Chain;
+use super::forward_model::ForwardModel;
 use super::occupancy::Occupancy;
 use crate::dynamics::{Axis, Turned, pull_back};
 use crate::points::{Coordinates, CoordinatesMut};
@@ -19,7 +19,7 @@ pub struct Columns<T> {
     pub weight: Vec<T>,
     /// Where the matter was at the reference time.
     pub pulled: [Vec<T>; 3],
-    /// Which node of the chain each is.
+    /// Which node of the forward model each is.
     pub node: Vec<u32>,
 }
 
@@ -32,7 +32,7 @@ pub struct Batch<T> {
     pub starts: Vec<usize>,
     /// The nodes.
     pub columns: Columns<T>,
-    /// Room for the emission of each node.
+    /// Buffer for the emission of each node.
     pub values: Vec<T>,
     kept: Vec<bool>,
 }
@@ -84,18 +84,18 @@ impl<T: Float> Batch<T> {
 
     /// Collects the nodes of the pairs and pulls them back; leaves out those that do not shine yet or
     /// come to lie where nothing does.
-    pub fn gather(&mut self, chain: &Chain<T>, axis: Axis, occupancy: Option<&Occupancy>) {
+    pub fn gather(&mut self, model: &ForwardModel<T>, axis: Axis, occupancy: Option<&Occupancy>) {
         self.columns.clear();
         self.starts.clear();
         self.starts.push(0);
         for &(ray, frame) in &self.pairs {
-            let range = chain.starts[ray as usize]..chain.starts[ray as usize + 1];
-            self.columns.push(chain, range, chain.times[frame as usize]);
+            let range = model.starts[ray as usize]..model.starts[ray as usize + 1];
+            self.columns.push(model, range, model.times[frame as usize]);
             self.starts.push(self.columns.weight.len());
         }
         self.columns.pull_back(axis);
-        if occupancy.is_some() || chain.earliest.is_some() {
-            self.thin_out(chain.earliest, occupancy);
+        if occupancy.is_some() || model.earliest.is_some() {
+            self.thin_out(model.earliest, occupancy);
         }
     }
 
@@ -133,19 +133,19 @@ impl<T: Float> Batch<T> {
 }
 
 impl<T: Float> Columns<T> {
-    fn push(&mut self, chain: &Chain<T>, range: core::ops::Range<usize>, time: T) {
-        for (to, from) in self.position.iter_mut().zip(&chain.position) {
+    fn push(&mut self, model: &ForwardModel<T>, range: core::ops::Range<usize>, time: T) {
+        for (to, from) in self.position.iter_mut().zip(&model.position) {
             to.extend_from_slice(&from[range.clone()]);
         }
-        self.weight.extend_from_slice(&chain.weight[range.clone()]);
+        self.weight.extend_from_slice(&model.weight[range.clone()]);
         self.node.extend(range.clone().map(|node| node as u32));
-        let rates = &chain.rate[range.clone()];
-        if chain.delay.is_empty() {
+        let rates = &model.rate[range.clone()];
+        if model.delay.is_empty() {
             self.time.resize(self.weight.len(), time);
             self.angle.extend(rates.iter().map(|rate| *rate * time));
         } else {
-            self.time.extend(chain.delay[range.clone()].iter().map(|delay| time - *delay));
-            let phases = rates.iter().zip(&chain.phase[range]);
+            self.time.extend(model.delay[range.clone()].iter().map(|delay| time - *delay));
+            let phases = rates.iter().zip(&model.phase[range]);
             self.angle.extend(phases.map(|(rate, phase)| *rate * time + *phase));
         }
     }

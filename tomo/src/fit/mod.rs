@@ -1,11 +1,11 @@
 //! Recovery of an emission field from movies and visibilities.
 //!
-//! [`Sightlines`] (traced once) → [`Chain`] (with the motion, once) → [`Batch`] (pulled back) →
+//! [`Sightlines`] (traced once) → [`ForwardModel`] (with the motion, once) → [`Batch`] (pulled back) →
 //! representation → pixels → data terms → gradient.
 
 mod batch;
-mod chain;
 pub mod checkpoint;
+mod forward_model;
 pub mod linear;
 mod newton;
 mod objective;
@@ -25,10 +25,10 @@ mod train;
 pub mod verdict;
 
 pub use batch::{Batch, Columns};
-pub use chain::{Chain, Field, Motion, Redshift};
-pub use objective::{Data, Gradients, Loss, Objective, Room, Selection, Weighted, is_turned};
+pub use forward_model::{Field, ForwardModel, Motion, Redshift};
+pub use objective::{Buffers, Data, Gradients, Loss, Objective, Selection, Weighted, is_turned};
 pub use occupancy::{Occupancy, OccupancySettings};
-pub use penalties::{Draw, Penalties, Probe, ProbeRoom};
+pub use penalties::{Draw, Penalties, Probe, ProbeBuffers};
 pub use regulariser::{Regulariser, Shape};
 pub use sightlines::{Region, Sampling, SightlineRequest, Sightlines};
 pub use steps::Place;

@@ -1,7 +1,7 @@
 //! The loss of a field of emission, and its gradient with respect to parameters and axis.
 
 use super::batch::Batch;
-use super::chain::{Chain, Field};
+use super::forward_model::{Field, ForwardModel};
 use super::terms::{FrameTerm, ImageTerm};
 use super::verdict::Statistics;
 use crate::dynamics::{Axis, Cotangents, Turned, pull_back_vjp};
@@ -56,9 +56,9 @@ pub struct Gradients<'a, T> {
     pub axis: Option<&'a mut [f64; 3]>,
 }
 
-/// Room that is kept from one step to the next.
+/// Buffers that are kept from one step to the next.
 #[derive(Default)]
-pub struct Room<T> {
+pub struct Buffers<T> {
     batch: Batch<T>,
     workspace: Workspace,
     image: Vec<T>,
@@ -68,14 +68,14 @@ pub struct Room<T> {
     of_weights: Vec<f64>,
 }
 
-impl<T> Room<T> {
+impl<T> Buffers<T> {
     /// The memory of the representation.
     pub fn workspace(&mut self) -> &mut Workspace {
         &mut self.workspace
     }
 }
 
-impl<T: Float> Room<T> {
+impl<T: Float> Buffers<T> {
     /// Emission at points (x, y, z) at the reference time.
     pub fn emission(
         &mut self,
@@ -93,10 +93,10 @@ impl<T: Float> Room<T> {
     }
 }
 
-/// A chain with its data.
+/// A forward model with its data.
 pub struct Objective<T> {
     /// From emission to pixels.
-    pub chain: Chain<T>,
+    pub model: ForwardModel<T>,
     /// What pixels are compared with.
     pub data: Data<T>,
 }
@@ -112,7 +112,7 @@ impl<T: Float> Objective<T> {
     pub fn observed(&self) -> Vec<usize> {
         let seen =
             |frame: &usize| self.terms().any(|(term, _)| term.degrees_of_freedom(*frame) > 0);
-        (0..self.chain.frames()).filter(seen).collect()
+        (0..self.model.frames()).filter(seen).collect()
     }
 
     fn terms(&self) -> impl Iterator<Item = (&dyn FrameTerm<T>, f64)> {
@@ -127,26 +127,26 @@ impl<T: Float> Objective<T> {
         (all as f64 / observed as f64 * frames as f64).max(1.0)
     }
 
-    /// The loss of a selection; adds its gradient. [`Chain::weigh`] comes first.
+    /// The loss of a selection; adds its gradient. [`ForwardModel::weigh`] comes first.
     pub fn value_and_gradient(
         &self,
         field: Field<'_, T>,
         selection: Selection<'_>,
         mut gradients: Gradients<'_, T>,
-        room: &mut Room<T>,
+        buffers: &mut Buffers<T>,
     ) -> Loss {
-        if gradients.axis.is_some() && self.chain.is_shifted() {
-            room.of_weights.clear();
-            room.of_weights.resize(self.chain.points(), 0.0);
+        if gradients.axis.is_some() && self.model.is_shifted() {
+            buffers.of_weights.clear();
+            buffers.of_weights.resize(self.model.points(), 0.0);
         }
         let loss = match selection {
-            Selection::Pixels(pairs) => self.pixels(field, pairs, &mut gradients, room),
-            Selection::Frames(frames) => self.frames(field, frames, &mut gradients, room),
+            Selection::Pixels(pairs) => self.pixels(field, pairs, &mut gradients, buffers),
+            Selection::Frames(frames) => self.frames(field, frames, &mut gradients, buffers),
         };
         if let Some(axis) = gradients.axis
-            && self.chain.is_shifted()
+            && self.model.is_shifted()
         {
-            let slope = self.chain.weights_vjp(field.axis, &room.of_weights);
+            let slope = self.model.weights_vjp(field.axis, &buffers.of_weights);
             axis.iter_mut().zip(slope).for_each(|(axis, slope)| *axis += slope);
         }
         loss
@@ -157,23 +157,23 @@ impl<T: Float> Objective<T> {
         field: Field<'_, T>,
         pairs: &[(u32, u32)],
         gradients: &mut Gradients<'_, T>,
-        room: &mut Room<T>,
+        buffers: &mut Buffers<T>,
     ) -> Loss {
         let Some(Weighted { weight, term }) = &self.data.image else { return Loss::default() };
         // A mean over the pixels of the screen, of which those without a ray are zero for ever.
-        let rays = self.chain.rays() as f64 / self.chain.pixels() as f64;
+        let rays = self.model.rays() as f64 / self.model.pixels() as f64;
         let scale = rays * term.inverse_variance().double() / pairs.len() as f64;
         let slope = T::of(2.0 * weight * scale);
-        let Room { batch, workspace, of_points, of_weights, .. } = room;
+        let Buffers { batch, workspace, of_points, of_weights, .. } = buffers;
         batch.set(pairs.iter().copied());
-        batch.gather(&self.chain, field.axis, field.occupancy);
+        batch.gather(&self.model, field.axis, field.occupancy);
         let mut values = core::mem::take(&mut batch.values);
         values.resize(batch.points(), T::zero());
         let residual = |group: usize, values: &[T]| {
             let (ray, frame) = batch.pairs[group];
             let weights = &batch.columns.weight[batch.starts[group]..batch.starts[group + 1]];
             let pixel: T = weights.iter().zip(values).map(|(w, e)| *w * *e).sum();
-            pixel - term.pixel(frame as usize, self.chain.pixel[ray as usize] as usize)
+            pixel - term.pixel(frame as usize, self.model.pixel[ray as usize] as usize)
         };
         let link = |groups: Range<usize>, values: &[T], out: &mut [T]| {
             let first = batch.starts[groups.start];
@@ -191,7 +191,7 @@ impl<T: Float> Objective<T> {
         let at = Batch::coordinates(&batch.columns, dimension);
         let groups = Groups { starts: &batch.starts, link: &link };
         field.representation.eval_vjp(field.parameters, at, groups, &mut values, into, workspace);
-        let (mut total, shifted) = (0.0, gradients.axis.is_some() && self.chain.is_shifted());
+        let (mut total, shifted) = (0.0, gradients.axis.is_some() && self.model.is_shifted());
         for group in 0..batch.pairs.len() {
             let range = batch.starts[group]..batch.starts[group + 1];
             let left = residual(group, &values[range.clone()]).double();
@@ -217,42 +217,48 @@ impl<T: Float> Objective<T> {
         field: Field<'_, T>,
         frames: &[usize],
         gradients: &mut Gradients<'_, T>,
-        room: &mut Room<T>,
+        buffers: &mut Buffers<T>,
     ) -> Loss {
         let scales: Vec<f64> =
             self.terms().map(|(term, _)| 1.0 / self.data_of(term, frames.len())).collect();
         let mut loss = Loss { terms: vec![0.0; scales.len()], ..Loss::default() };
         for &frame in frames {
-            self.image_of(field, frame, room);
-            loss.points += room.batch.points();
-            room.of_image.clear();
-            room.of_image.resize(self.chain.pixels(), T::zero());
+            self.image_of(field, frame, buffers);
+            loss.points += buffers.batch.points();
+            buffers.of_image.clear();
+            buffers.of_image.resize(self.model.pixels(), T::zero());
             for (k, (term, weight)) in self.terms().enumerate() {
                 let factor = T::of(weight * scales[k]);
-                let value = term.value_and_gradient(frame, &room.image, factor, &mut room.of_image);
+                let value =
+                    term.value_and_gradient(frame, &buffers.image, factor, &mut buffers.of_image);
                 loss.terms[k] += scales[k] * value;
             }
-            self.back(field, gradients, room);
+            self.back(field, gradients, buffers);
         }
         let weights = self.terms().map(|(_, weight)| weight);
         loss.total = loss.terms.iter().zip(weights).map(|(term, weight)| term * weight).sum();
         loss
     }
 
-    /// One frame into `room.image`.
-    fn image_of(&self, field: Field<'_, T>, frame: usize, room: &mut Room<T>) {
-        room.image.resize(self.chain.pixels(), T::zero());
-        let Room { batch, workspace, image, .. } = room;
-        self.chain.movie(field, &[frame], batch, workspace, image);
+    /// One frame into `buffers.image`.
+    fn image_of(&self, field: Field<'_, T>, frame: usize, buffers: &mut Buffers<T>) {
+        buffers.image.resize(self.model.pixels(), T::zero());
+        let Buffers { batch, workspace, image, .. } = buffers;
+        self.model.movie(field, &[frame], batch, workspace, image);
     }
 
     /// From the gradient with respect to the last image to the others.
-    fn back(&self, field: Field<'_, T>, gradients: &mut Gradients<'_, T>, room: &mut Room<T>) {
-        let Room { batch, workspace, of_image, cotangents, of_points, of_weights, .. } = room;
+    fn back(
+        &self,
+        field: Field<'_, T>,
+        gradients: &mut Gradients<'_, T>,
+        buffers: &mut Buffers<T>,
+    ) {
+        let Buffers { batch, workspace, of_image, cotangents, of_points, of_weights, .. } = buffers;
         cotangents.resize(batch.points(), T::zero());
-        let shifted = gradients.axis.is_some() && self.chain.is_shifted();
+        let shifted = gradients.axis.is_some() && self.model.is_shifted();
         for (group, (ray, _)) in batch.pairs.iter().enumerate() {
-            let slope = of_image[self.chain.pixel[*ray as usize] as usize];
+            let slope = of_image[self.model.pixel[*ray as usize] as usize];
             let range = batch.starts[group]..batch.starts[group + 1];
             let weights = &batch.columns.weight[range.clone()];
             let into = cotangents[range.clone()].iter_mut();
@@ -279,16 +285,16 @@ impl<T: Float> Objective<T> {
         &self,
         field: Field<'_, T>,
         frames: &[usize],
-        room: &mut Room<T>,
+        buffers: &mut Buffers<T>,
         movie: &mut [T],
     ) {
-        self.chain.movie(field, frames, &mut room.batch, &mut room.workspace, movie);
+        self.model.movie(field, frames, &mut buffers.batch, &mut buffers.workspace, movie);
     }
 
     /// What the residuals of images of all frames, one after the other, are like: for each kind of data, in the order of
     /// [`Self::names`].
     pub fn statistics(&self, movie: &[T]) -> Vec<Statistics> {
-        let pixels = self.chain.pixels();
+        let pixels = self.model.pixels();
         let of = |(term, _): (&dyn FrameTerm<T>, f64)| {
             let images = movie.chunks_exact(pixels).enumerate();
             let frames = images.map(|(frame, image)| term.residuals(frame, image));
@@ -299,11 +305,11 @@ impl<T: Float> Objective<T> {
 
     /// The loss of images of these frames, one after the other, without gradient.
     pub fn loss_of(&self, frames: &[usize], movie: &[T]) -> Loss {
-        let mut none = vec![T::zero(); self.chain.pixels()];
+        let mut none = vec![T::zero(); self.model.pixels()];
         let mut loss = Loss::default();
         for (term, weight) in self.terms() {
             let scale = 1.0 / self.data_of(term, frames.len());
-            let images = frames.iter().zip(movie.chunks_exact(self.chain.pixels()));
+            let images = frames.iter().zip(movie.chunks_exact(self.model.pixels()));
             let chi2 = images
                 .map(|(frame, image)| term.value_and_gradient(*frame, image, T::zero(), &mut none));
             let value = scale * chi2.sum::<f64>();
@@ -317,8 +323,8 @@ impl<T: Float> Objective<T> {
 impl<T: Float> Objective<T> {
     /// The first data, with frame and χ², that are no finite number of images of these frames.
     pub fn not_finite(&self, frames: &[usize], movie: &[T]) -> Option<(String, usize, f64)> {
-        let mut none = vec![T::zero(); self.chain.pixels()];
-        for (frame, image) in frames.iter().zip(movie.chunks_exact(self.chain.pixels())) {
+        let mut none = vec![T::zero(); self.model.pixels()];
+        for (frame, image) in frames.iter().zip(movie.chunks_exact(self.model.pixels())) {
             for (term, _) in self.terms() {
                 let value = term.value_and_gradient(*frame, image, T::zero(), &mut none);
                 if !value.is_finite() {
@@ -330,7 +336,7 @@ impl<T: Float> Objective<T> {
     }
 }
 
-/// Room for gradients with respect to coordinates, cleared, where they are wanted.
+/// Buffers for gradients with respect to coordinates, cleared, where they are wanted.
 fn wanted<T: Float>(
     wanted: bool,
     dimension: usize,

@@ -45,9 +45,9 @@ pub struct Penalties {
     pub region: Region,
 }
 
-/// Room that is kept from one step to the next.
+/// Buffers that are kept from one step to the next.
 #[derive(Default)]
-pub struct ProbeRoom<T> {
+pub struct ProbeBuffers<T> {
     inside: Vec<bool>,
     columns: [Vec<T>; 3],
     time: Vec<T>,
@@ -78,25 +78,25 @@ impl Penalties {
     }
 
     /// Collects the nodes that count.
-    fn place<T: Float>(&self, draw: &Draw<T>, room: &mut ProbeRoom<T>) {
+    fn place<T: Float>(&self, draw: &Draw<T>, buffers: &mut ProbeBuffers<T>) {
         let (n, half) = (self.probe.nodes(), self.region.r_max);
         let (spacing, moved) = match self.probe {
             Probe::Moved { .. } => (self.probe.spacing(half), draw.offset),
             Probe::Fixed { .. } => (self.probe.spacing(half), [0.0; 3]),
         };
         let at = |c: usize, k: usize| (k as f64 + moved[c]) * spacing - half;
-        room.inside.clear();
-        room.columns.iter_mut().for_each(Vec::clear);
+        buffers.inside.clear();
+        buffers.columns.iter_mut().for_each(Vec::clear);
         for k in 0..n.pow(3) {
             let x = [at(0, k / (n * n)), at(1, k / n % n), at(2, k % n)];
             let counts = matches!(self.probe, Probe::Fixed { .. }) || self.region.holds(x);
-            room.inside.push(counts);
+            buffers.inside.push(counts);
             if counts {
-                room.columns.iter_mut().zip(x).for_each(|(column, x)| column.push(T::of(x)));
+                buffers.columns.iter_mut().zip(x).for_each(|(column, x)| column.push(T::of(x)));
             }
         }
-        room.time.clear();
-        room.time.resize(room.columns[0].len(), draw.time);
+        buffers.time.clear();
+        buffers.time.resize(buffers.columns[0].len(), draw.time);
     }
 
     /// Weight · penalty of each; adds the gradient with respect to the parameters.
@@ -105,11 +105,11 @@ impl Penalties {
         field: Field<'_, T>,
         draw: &Draw<T>,
         gradient: &mut [T],
-        room: &mut ProbeRoom<T>,
+        buffers: &mut ProbeBuffers<T>,
         workspace: &mut Workspace,
     ) -> Vec<f64> {
-        self.place(draw, room);
-        let ProbeRoom { inside, columns: [x, y, z], time, compact, values, slopes } = room;
+        self.place(draw, buffers);
+        let ProbeBuffers { inside, columns: [x, y, z], time, compact, values, slopes } = buffers;
         let at = match field.representation.dimension() {
             4 => Coordinates::txyz(time, x, y, z),
             _ => Coordinates::xyz(x, y, z),

@@ -64,7 +64,7 @@ impl<T: Float> Trainer<'_, T> {
         if now.step >= plan.warm_up && (now.step - plan.warm_up).is_multiple_of(plan.every.max(1)) {
             let seed = mix(self.training.seed, now.step, 1);
             let (representation, parameters) = (self.representation, &now.parameters);
-            mask.refresh(representation, parameters, seed, self.room.workspace());
+            mask.refresh(representation, parameters, seed, self.buffers.workspace());
             // The loss is another one now.
             now.lbfgs.iter_mut().for_each(|memory| memory.value = None);
         }
@@ -79,16 +79,16 @@ impl<T: Float> Trainer<'_, T> {
     /// The loss of the part of the data that a step looks at, with penalties. The gradient with respect to the
     /// parameters is [`gradient`](Self::gradient) then; that of the axis is added, if it is learnt.
     pub fn loss(&mut self, place: Place<'_, T>, of_axis: &mut [f64; 3]) -> Loss {
-        self.objective.chain.weigh(place.axis);
+        self.objective.model.weigh(place.axis);
         self.gradient.fill(T::zero());
         let Place { parameters, axis, occupancy, step } = place;
         let field = Field { representation: self.representation, parameters, axis, occupancy };
         let mut loss = self.of_data(field, step, of_axis);
         if let Some(penalties) = &self.training.penalties {
             let draw = self.draw(step);
-            let (room, workspace) = (&mut self.probe, self.room.workspace());
+            let (buffers, workspace) = (&mut self.probe, self.buffers.workspace());
             let found =
-                penalties.value_and_gradient(field, &draw, &mut self.gradient, room, workspace);
+                penalties.value_and_gradient(field, &draw, &mut self.gradient, buffers, workspace);
             loss.total += found.iter().sum::<f64>();
             loss.penalties = found;
         }
@@ -108,7 +108,7 @@ impl<T: Float> Trainer<'_, T> {
         let observed = &self.observed;
         let selection = match self.training.batch {
             BatchSize::Pixels(count) => {
-                let rays = self.objective.chain.rays();
+                let rays = self.objective.model.rays();
                 self.pairs.clear();
                 self.pairs.extend((0..count).map(|_| {
                     let frame = observed[random.random_range(0..observed.len())];
@@ -121,17 +121,22 @@ impl<T: Float> Trainer<'_, T> {
                 let chosen = index::sample(&mut random, observed.len(), count);
                 let frames: Vec<usize> = chosen.into_iter().map(|k| observed[k]).collect();
                 let frames = Selection::Frames(&frames);
-                return self.objective.value_and_gradient(field, frames, gradients, &mut self.room);
+                return self.objective.value_and_gradient(
+                    field,
+                    frames,
+                    gradients,
+                    &mut self.buffers,
+                );
             }
             BatchSize::All => Selection::Frames(observed),
         };
-        self.objective.value_and_gradient(field, selection, gradients, &mut self.room)
+        self.objective.value_and_gradient(field, selection, gradients, &mut self.buffers)
     }
 
     fn draw(&self, step: u64) -> Draw<T> {
         let mut random = Pcg64::seed_from_u64(mix(self.training.seed, step, 2));
         let offset = [0, 1, 2].map(|_| random.random());
-        let times = &self.objective.chain.times;
+        let times = &self.objective.model.times;
         Draw { offset, time: times[self.observed[random.random_range(0..self.observed.len())]] }
     }
 

@@ -1,4 +1,4 @@
-//! The chain from parameters and axis to the loss, in double precision.
+//! The forward model from parameters and axis to the loss, in double precision.
 
 use super::*;
 
@@ -30,7 +30,7 @@ fn lines(delay: bool, momentum: bool) -> (Kerr, Sightlines) {
     (hole, Sightlines::trace(&hole, &observer, &alpha, &beta, &request).unwrap())
 }
 
-fn chain<T: Float>(delay: bool, momentum: bool) -> Chain<T> {
+fn forward_model<T: Float>(delay: bool, momentum: bool) -> ForwardModel<T> {
     let (hole, lines) = lines(delay, momentum);
     let motion = Motion {
         velocity: AngularVelocity::Keplerian { drag: 0.6 },
@@ -38,7 +38,7 @@ fn chain<T: Float>(delay: bool, momentum: bool) -> Chain<T> {
         injection: Some(Injection { time: 1.0 }),
         times: vec![0.0, 9.0, 17.0, 40.0],
     };
-    Chain::new(&lines, &motion, &hole, momentum.then_some(Redshift { power: 2.5 })).unwrap()
+    ForwardModel::new(&lines, &motion, &hole, momentum.then_some(Redshift { power: 2.5 })).unwrap()
 }
 
 /// Visibilities against fixed ones, all errors 1 Jy: `Observation`s need a schedule.
@@ -97,7 +97,7 @@ fn objective(delay: bool, momentum: bool, others: bool) -> Objective<f64> {
         let term = LightCurveTerm::new(flux, &sigma, SIDE * SIDE).unwrap();
         data.others.push(Weighted { weight: 0.4, term: Box::new(term) });
     }
-    Objective { chain: chain(delay, momentum), data }
+    Objective { model: forward_model(delay, momentum), data }
 }
 
 fn grid() -> Grid {
@@ -201,8 +201,8 @@ fn start(representation: &dyn Representation<f64>) -> Vec<f64> {
     parameters
 }
 
-fn pairs(chain: &Chain<f64>) -> Vec<(u32, u32)> {
-    let rays = chain.rays() as u32;
+fn pairs(model: &ForwardModel<f64>) -> Vec<(u32, u32)> {
+    let rays = model.rays() as u32;
     (0..4).flat_map(|frame| (0..rays).map(move |ray| (ray, frame))).collect()
 }
 
@@ -214,13 +214,15 @@ struct Case<'a> {
 
 impl Case<'_> {
     fn loss(&mut self, parameters: &[f64], axis: Axis, gradients: Gradients<'_, f64>) -> f64 {
-        self.objective.chain.weigh(axis);
+        self.objective.model.weigh(axis);
         let representation = self.representation;
         let field = Field { representation, parameters, axis, occupancy: None };
-        let pairs = pairs(&self.objective.chain);
+        let pairs = pairs(&self.objective.model);
         let selection =
             if self.pixels { Selection::Pixels(&pairs) } else { Selection::Frames(&[0, 1, 3, 2]) };
-        self.objective.value_and_gradient(field, selection, gradients, &mut Room::default()).total
+        self.objective
+            .value_and_gradient(field, selection, gradients, &mut Buffers::default())
+            .total
     }
 
     fn value(&mut self, parameters: &[f64], axis: Axis) -> f64 {
@@ -304,9 +306,9 @@ fn exact_pixels_and_frames_agree() {
     let (one, whole) = (run(true), run(false));
     // Pixels without a ray have the same loss for ever: only whole frames count it.
     let dark = {
-        let chain = chain::<f64>(true, true);
+        let model = forward_model::<f64>(true, true);
         let mut seen = [false; SIDE * SIDE];
-        chain.pixel().iter().for_each(|pixel| seen[*pixel as usize] = true);
+        model.pixel().iter().for_each(|pixel| seen[*pixel as usize] = true);
         let dark = |(k, x): (usize, &f64)| if seen[k % (SIDE * SIDE)] { 0.0 } else { x * x };
         0.7 * 4.0 * movie().iter().enumerate().map(dark).sum::<f64>() / (4 * SIDE * SIDE) as f64
     };

@@ -1,8 +1,8 @@
 //! How a fit is run, and what it remembers from step to step.
 
-use super::objective::{Loss, Objective, Room};
+use super::objective::{Buffers, Loss, Objective};
 use super::occupancy::{Occupancy, OccupancySettings};
-use super::penalties::{Penalties, ProbeRoom};
+use super::penalties::{Penalties, ProbeBuffers};
 use super::sightlines::Region;
 use super::{Field, is_turned};
 use crate::dynamics::Axis;
@@ -165,8 +165,8 @@ pub struct Trainer<'a, T> {
     /// How it is run.
     pub training: Training,
     pub(super) observed: Vec<usize>,
-    pub(super) room: Room<T>,
-    pub(super) probe: ProbeRoom<T>,
+    pub(super) buffers: Buffers<T>,
+    pub(super) probe: ProbeBuffers<T>,
     pub(super) gradient: Vec<T>,
     pub(super) pairs: Vec<(u32, u32)>,
 }
@@ -187,26 +187,26 @@ impl<'a, T: Float> Trainer<'a, T> {
     ) -> Self {
         let (observed, gradient) =
             (objective.observed(), vec![T::zero(); representation.parameters()]);
-        let (room, probe, pairs) = (Room::default(), ProbeRoom::default(), Vec::new());
-        Self { objective, representation, training, observed, room, probe, gradient, pairs }
+        let (buffers, probe, pairs) = (Buffers::default(), ProbeBuffers::default(), Vec::new());
+        Self { objective, representation, training, observed, buffers, probe, gradient, pairs }
     }
 
     /// The movie of these frames, with the mask of what shines or without.
     pub fn movie(&mut self, now: &Progress<T>, frames: &[usize], masked: bool) -> Vec<T> {
-        self.objective.chain.weigh(now.axis);
-        let mut movie = vec![T::zero(); frames.len() * self.objective.chain.pixels()];
+        self.objective.model.weigh(now.axis);
+        let mut movie = vec![T::zero(); frames.len() * self.objective.model.pixels()];
         let field = Field {
             representation: self.representation,
             parameters: &now.parameters,
             axis: now.axis,
             occupancy: now.occupancy.as_ref().filter(|_| masked),
         };
-        self.objective.movie(field, frames, &mut self.room, &mut movie);
+        self.objective.movie(field, frames, &mut self.buffers, &mut movie);
         movie
     }
 
     /// Emission at points at the reference time.
     pub fn emission(&mut self, now: &Progress<T>, points: [&[T]; 3]) -> Vec<T> {
-        self.room.emission(self.representation, &now.parameters, points)
+        self.buffers.emission(self.representation, &now.parameters, points)
     }
 }

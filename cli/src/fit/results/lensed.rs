@@ -4,7 +4,7 @@
 use super::Estimate;
 use kerrlight_tomo::fit::setup::{self, Instrument};
 use kerrlight_tomo::fit::{
-    Batch, Chain, Field, Motion, Sampling, SightlineRequest, Sightlines, State, Trainer,
+    Batch, Field, ForwardModel, Motion, Sampling, SightlineRequest, Sightlines, State, Trainer,
 };
 use kerrlight_tomo::render::{RingStrata, Stratum};
 use kerrlight_tomo::representation::Workspace;
@@ -37,11 +37,11 @@ impl Estimate<'_> {
         let mut still = Still { time, recovered: Vec::new(), truth: None };
         for row in (0..SIDE).step_by(ROWS) {
             let rays = self.rays(row)?;
-            let mut chain = self.chain(&rays, &motion)?;
-            still.recovered.extend(rays.pixels(&recovered(&mut chain, trainer, state)));
+            let mut model = self.forward_model(&rays, &motion)?;
+            still.recovered.extend(rays.pixels(&recovered(&mut model, trainer, state)));
             if let Some(truth) = &self.measured.truth {
-                chain.weigh(truth.axis());
-                let image = chain.movie_of(truth.axis(), &|x| truth.at(x), &mut Batch::default());
+                model.weigh(truth.axis());
+                let image = model.movie_of(truth.axis(), &|x| truth.at(x), &mut Batch::default());
                 let image: Vec<f32> = image.into_iter().map(|x| x as f32).collect();
                 still.truth.get_or_insert_default().extend(rays.pixels(&image));
             }
@@ -79,7 +79,7 @@ impl Estimate<'_> {
     }
 
     /// Nodes of rays, with the weights of integrals along them.
-    fn chain(&self, rays: &Rays, motion: &Motion) -> anyhow::Result<Chain<f32>> {
+    fn forward_model(&self, rays: &Rays, motion: &Motion) -> anyhow::Result<ForwardModel<f32>> {
         let Instrument { hole, redshift, .. } = self.instrument;
         let request = SightlineRequest {
             region: self.file.region.limits(),
@@ -89,7 +89,7 @@ impl Estimate<'_> {
         };
         let observer = setup::observer(&self.file.observer)?;
         let lines = Sightlines::trace(hole, &observer, &rays.alpha, &rays.beta, &request)?;
-        Ok(Chain::new(&lines, motion, hole, *redshift)?)
+        Ok(ForwardModel::new(&lines, motion, hole, *redshift)?)
     }
 }
 
@@ -122,16 +122,20 @@ impl Rays {
     }
 }
 
-fn recovered(chain: &mut Chain<f32>, trainer: &Trainer<'_, f32>, state: &State<f32>) -> Vec<f32> {
+fn recovered(
+    model: &mut ForwardModel<f32>,
+    trainer: &Trainer<'_, f32>,
+    state: &State<f32>,
+) -> Vec<f32> {
     let now = &state.now;
-    chain.weigh(now.axis);
+    model.weigh(now.axis);
     let field = Field {
         representation: trainer.representation,
         parameters: &now.parameters,
         axis: now.axis,
         occupancy: now.occupancy.as_ref(),
     };
-    let mut image = vec![0.0; chain.pixels()];
-    chain.movie(field, &[0], &mut Batch::default(), &mut Workspace::new(), &mut image);
+    let mut image = vec![0.0; model.pixels()];
+    model.movie(field, &[0], &mut Batch::default(), &mut Workspace::new(), &mut image);
     image
 }

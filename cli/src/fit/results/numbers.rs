@@ -19,8 +19,8 @@ pub fn mask_error(
     masked: &[f32],
 ) -> Option<f64> {
     state.now.occupancy.as_ref()?;
-    let chain = &trainer.objective.chain;
-    let (all, pixels) = (chain.frames(), chain.pixels());
+    let model = &trainer.objective.model;
+    let (all, pixels) = (model.frames(), model.pixels());
     let frames: Vec<usize> = [1, 3].map(|k| k * all / 4).to_vec();
     let whole = trainer.movie(&state.now, &frames, false);
     let mut sums = [0.0; 2];

@@ -102,7 +102,7 @@ impl<'a, 'b> Descent<'a, 'b> {
     }
 
     /// The longest step against a direction that stays in the box.
-    fn room(&self, p: &[f64]) -> f64 {
+    fn longest_step(&self, p: &[f64]) -> f64 {
         let of = |(k, (y, p)): (usize, (&f64, &f64))| {
             if *p > 0.0 {
                 y / p
@@ -201,7 +201,7 @@ impl<'a, 'b> Descent<'a, 'b> {
                 return Ending::Rounding;
             }
             let step = slope / bend;
-            if step <= self.room(direction) {
+            if step <= self.longest_step(direction) {
                 add(&mut self.y, -step, direction);
                 add(&mut self.gradient, -step, &product);
                 self.value -= 0.5 * step * slope;

@@ -1,7 +1,7 @@
 //! From values at some nodes of the grid to pixels, as a sparse matrix, and back.
 
 use super::data::Data;
-use super::walk::{Place, Room, Voxels, Walk};
+use super::walk::{Buffers, Place, Voxels, Walk};
 use crate::simd::Float;
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
@@ -141,7 +141,7 @@ pub(super) struct Operator<'a, T> {
 
 /// Memory of a thread.
 struct Scratch<T> {
-    room: Room<T>,
+    buffers: Buffers<T>,
     image: Vec<T>,
     slopes: Vec<T>,
 }
@@ -149,7 +149,7 @@ struct Scratch<T> {
 impl<'a, T: Float + Default> Operator<'a, T> {
     /// Restricted to these nodes, with at most about `budget` bytes of rows (those of 8 frames more).
     pub fn new(walk: Walk<'a, T>, active: Active, frames: &'a [usize], budget: usize) -> Self {
-        let (corners, pixels) = (walk.voxels.corners(), walk.chain.pixels());
+        let (corners, pixels) = (walk.voxels.corners(), walk.model.pixels());
         let mut all = Self { walk, active, corners, frames, pixels, rows: Vec::new() };
         let mut kept = 0;
         for some in frames.chunks(AT_A_TIME) {
@@ -168,7 +168,7 @@ impl<'a, T: Float + Default> Operator<'a, T> {
         let mut rows = Rows { starts: vec![0], ..Rows::default() };
         let mut place = vec![NONE; self.active.count()];
         let wanted = Some(self.active.cells.as_slice());
-        self.walk.frame(frame, wanted, &mut Room::default(), |pixel, places| {
+        self.walk.frame(frame, wanted, &mut Buffers::default(), |pixel, places| {
             rows.push(pixel, places, &self.active, &self.corners, &mut place);
         });
         rows.columns.shrink_to_fit();
@@ -187,13 +187,13 @@ impl<'a, T: Float + Default> Operator<'a, T> {
     }
 
     fn image(&self, k: usize, x: &[T], scratch: &mut Scratch<T>) {
-        let Scratch { room, image, .. } = scratch;
+        let Scratch { buffers, image, .. } = scratch;
         image.fill(T::zero());
         if let Some(rows) = &self.rows[k] {
             return rows.forward(x, image);
         }
         let wanted = Some(self.active.cells.as_slice());
-        self.walk.frame(self.frames[k], wanted, room, |pixel, places| {
+        self.walk.frame(self.frames[k], wanted, buffers, |pixel, places| {
             let mut sum = T::zero();
             for at in places {
                 for (corner, entry) in self.corners.iter().zip(at.weights()) {
@@ -212,8 +212,8 @@ impl<'a, T: Float + Default> Operator<'a, T> {
             return rows.adjoint(&scratch.slopes, sums);
         }
         let wanted = Some(self.active.cells.as_slice());
-        let Scratch { room, slopes, .. } = scratch;
-        self.walk.frame(self.frames[k], wanted, room, |pixel, places| {
+        let Scratch { buffers, slopes, .. } = scratch;
+        self.walk.frame(self.frames[k], wanted, buffers, |pixel, places| {
             let slope = slopes[pixel as usize];
             for at in places.iter().filter(|_| slope != T::zero()) {
                 for (corner, entry) in self.corners.iter().zip(at.weights()) {
@@ -228,8 +228,8 @@ impl<'a, T: Float + Default> Operator<'a, T> {
 
     /// The same for all nodes of the grid.
     fn back_to_all(&self, k: usize, scratch: &mut Scratch<T>, sums: &mut [T]) {
-        let Scratch { room, slopes, .. } = scratch;
-        self.walk.frame(self.frames[k], None, room, |pixel, places| {
+        let Scratch { buffers, slopes, .. } = scratch;
+        self.walk.frame(self.frames[k], None, buffers, |pixel, places| {
             let slope = slopes[pixel as usize];
             for at in places.iter().filter(|_| slope != T::zero()) {
                 for (corner, entry) in self.corners.iter().zip(at.weights()) {
@@ -253,7 +253,7 @@ impl<'a, T: Float + Default> Operator<'a, T> {
         let indices: Vec<usize> = (0..self.frames.len()).collect();
         let pixels = self.pixels;
         let scratch = || Scratch {
-            room: Room::default(),
+            buffers: Buffers::default(),
             image: vec![T::zero(); pixels],
             slopes: vec![T::zero(); pixels],
         };

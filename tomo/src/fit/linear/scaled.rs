@@ -7,13 +7,13 @@ pub(super) struct Scaled<'a> {
     inner: &'a mut dyn Convex,
     root: Vec<f64>,
     upper: f64,
-    room: Vec<f64>,
+    unscaled: Vec<f64>,
 }
 
 impl<'a> Scaled<'a> {
     pub fn new(inner: &'a mut dyn Convex, upper: f64) -> Self {
         let root = inner.diagonal().iter().map(|x| x.sqrt()).collect();
-        Self { inner, root, upper, room: Vec::new() }
+        Self { inner, root, upper, unscaled: Vec::new() }
     }
 
     pub fn from(&self, x: &[f64]) -> Vec<f64> {
@@ -42,20 +42,20 @@ impl<'a> Scaled<'a> {
 
     pub fn value_and_gradient(&mut self, y: &[f64], gradient: &mut Vec<f64>) -> f64 {
         self.fill(y);
-        let value = self.inner.value_and_gradient(&self.room, gradient);
+        let value = self.inner.value_and_gradient(&self.unscaled, gradient);
         self.divide(gradient);
         value
     }
 
     pub fn curvature(&mut self, direction: &[f64], out: &mut Vec<f64>) {
         self.fill(direction);
-        self.inner.curvature(&self.room, out);
+        self.inner.curvature(&self.unscaled, out);
         self.divide(out);
     }
 
     fn fill(&mut self, y: &[f64]) {
-        self.room.clear();
-        self.room.extend(y.iter().zip(&self.root).map(|(y, root)| y / root));
+        self.unscaled.clear();
+        self.unscaled.extend(y.iter().zip(&self.root).map(|(y, root)| y / root));
     }
 }
 

@@ -10,7 +10,7 @@ use super::run::{FEW, LIT, Run};
 use super::start::Trials;
 use super::walk::{Voxels, Walk};
 use crate::dynamics::Axis;
-use crate::fit::Chain;
+use crate::fit::ForwardModel;
 use crate::simd::Float;
 use core::ops::ControlFlow;
 use kerrlight_geodesic::OutOfRange;
@@ -18,8 +18,8 @@ use kerrlight_geodesic::OutOfRange;
 /// min Σ weight · χ²/data + priors over 0 ≤ e ≤ `upper` at the nodes of a grid.
 #[derive(Clone, Copy)]
 pub struct LinearProblem<'a, T: Float> {
-    /// Nodes of the rays, weighed for the axis ([`Chain::weigh`]).
-    pub chain: &'a Chain<T>,
+    /// Nodes of the rays, weighed for the axis ([`ForwardModel::weigh`]).
+    pub model: &'a ForwardModel<T>,
     /// The axis that matter turns about.
     pub axis: Axis,
     /// The frames of the movie that count.
@@ -192,11 +192,11 @@ impl<T: Float + Default> LinearProblem<'_, T> {
     }
 
     pub(super) fn data(&self) -> Result<Data<'_, T>, OutOfRange> {
-        Data::new(self.terms, self.frames, self.chain.pixels(), self.chain.frames())
+        Data::new(self.terms, self.frames, self.model.pixels(), self.model.frames())
     }
 
     pub(super) fn walk(&self) -> Walk<'_, T> {
-        Walk::new(self.chain, self.axis, self.voxels)
+        Walk::new(self.model, self.axis, self.voxels)
     }
 
     fn check(&self, settings: &LinearSettings) -> Result<(), OutOfRange> {

@@ -4,7 +4,7 @@ use super::walk::Walk;
 use super::*;
 use crate::dynamics::{AngularVelocity, Axis};
 use crate::fit::{
-    Batch, Chain, Field, FrameTerm, ImageTerm, Motion, Region, Regulariser, Sampling,
+    Batch, Field, ForwardModel, FrameTerm, ImageTerm, Motion, Region, Regulariser, Sampling,
     SightlineRequest, Sightlines,
 };
 use crate::representation::Workspace;
@@ -17,7 +17,7 @@ pub(in crate::fit) mod lit;
 
 pub(in crate::fit) const FRAMES: [usize; 5] = [0, 1, 2, 3, 4];
 
-pub(in crate::fit) fn chain() -> Chain<f64> {
+pub(in crate::fit) fn forward_model() -> ForwardModel<f64> {
     let hole = Kerr::new(0.0).unwrap();
     let observer = Observer::at_radius(Inclination::from_degrees(60.0).unwrap(), 1000.0).unwrap();
     let at = |k: usize| -5.0 + 10.0 * k as f64 / 8.0;
@@ -35,7 +35,7 @@ pub(in crate::fit) fn chain() -> Chain<f64> {
         injection: None,
         times: vec![0.0, 0.2, 0.35, 0.6, 0.9],
     };
-    Chain::new(&lines, &motion, &hole, None).unwrap()
+    ForwardModel::new(&lines, &motion, &hole, None).unwrap()
 }
 
 fn axis() -> Axis {
@@ -47,56 +47,56 @@ fn random(count: usize, seed: u64) -> Vec<f64> {
     (0..count).map(|_| random.random::<f64>()).collect()
 }
 
-fn movie(chain: &Chain<f64>, voxels: &Voxels, x: &[f64]) -> Vec<f64> {
-    movie_about(axis(), chain, voxels, x)
+fn movie(model: &ForwardModel<f64>, voxels: &Voxels, x: &[f64]) -> Vec<f64> {
+    movie_about(axis(), model, voxels, x)
 }
 
 /// Images of values at the nodes by way of the representation.
 pub(in crate::fit) fn movie_about(
     axis: Axis,
-    chain: &Chain<f64>,
+    model: &ForwardModel<f64>,
     voxels: &Voxels,
     x: &[f64],
 ) -> Vec<f64> {
     let grid = voxels.grid().unwrap();
     let field = Field { representation: &grid, parameters: x, axis, occupancy: None };
-    let mut movie = vec![0.0; FRAMES.len() * chain.pixels()];
-    chain.movie(field, &FRAMES, &mut Batch::default(), &mut Workspace::new(), &mut movie);
+    let mut movie = vec![0.0; FRAMES.len() * model.pixels()];
+    model.movie(field, &FRAMES, &mut Batch::default(), &mut Workspace::new(), &mut movie);
     movie
 }
 
 fn operator<'a>(
-    chain: &'a Chain<f64>,
+    model: &'a ForwardModel<f64>,
     voxels: Voxels,
     is_active: &[bool],
     budget: usize,
 ) -> Operator<'a, f64> {
     let active = Active::new(is_active, voxels.corners());
-    Operator::new(Walk::new(chain, axis(), voxels), active, &FRAMES, budget)
+    Operator::new(Walk::new(model, axis(), voxels), active, &FRAMES, budget)
 }
 
 /// ‖A x‖² and Aᵀ of twice the images, where the data are dark and all nodes or some count.
 #[test]
 fn exact_sparse_operator_is_the_grid_and_sums() {
-    let (chain, voxels) = (chain(), Voxels { nodes: [7, 6, 8], ..Voxels::cube(2, 5.0) });
-    let dark = ImageTerm::new(vec![0.0; FRAMES.len() * chain.pixels()], chain.pixels(), 1.0);
+    let (model, voxels) = (forward_model(), Voxels { nodes: [7, 6, 8], ..Voxels::cube(2, 5.0) });
+    let dark = ImageTerm::new(vec![0.0; FRAMES.len() * model.pixels()], model.pixels(), 1.0);
     let dark = dark.unwrap();
     let terms = [Weighted { weight: 1.0, term: &dark as &dyn FrameTerm<f64> }];
-    let data = Data::new(&terms, &FRAMES, chain.pixels(), 5).unwrap();
-    let count = (FRAMES.len() * chain.pixels()) as f64;
+    let data = Data::new(&terms, &FRAMES, model.pixels(), 5).unwrap();
+    let count = (FRAMES.len() * model.pixels()) as f64;
     let all = vec![true; voxels.count()];
     let some: Vec<bool> = random(all.len(), 4).iter().map(|x| *x < 0.4).collect();
     for is_active in [all, some] {
-        let operator = operator(&chain, voxels, &is_active, usize::MAX);
+        let operator = operator(&model, voxels, &is_active, usize::MAX);
         assert!(operator.entries() > 1000 && operator.bytes() > 12 * operator.entries());
         let x = random(operator.active.count(), 1);
-        let images = movie(&chain, &voxels, &operator.active.expand(&x));
+        let images = movie(&model, &voxels, &operator.active.expand(&x));
         let square: f64 = images.iter().map(|pixel| pixel * pixel).sum();
         let (value, gradient) = operator.value_and_gradient(&data, &x, false);
         assert!((value * count / square - 1.0).abs() < 1e-12);
         // ⟨y, Aᵀ A x⟩ = ⟨A y, A x⟩.
         let y = random(x.len(), 2);
-        let others = movie(&chain, &voxels, &operator.active.expand(&y));
+        let others = movie(&model, &voxels, &operator.active.expand(&y));
         let forward: f64 = others.iter().zip(&images).map(|(a, b)| a * b).sum();
         let back: f64 = gradient.iter().zip(&y).map(|(g, y)| 0.5 * count * g * y).sum();
         assert!((back / forward - 1.0).abs() < 1e-12, "{back} {forward}");
@@ -134,20 +134,20 @@ fn reference(columns: &[Vec<f64>], data: &[f64], upper: f64) -> (Vec<f64>, f64) 
 /// A small problem whose data no field explains, with both bounds active.
 #[test]
 fn exact_solution_and_gap_of_a_dense_problem() {
-    let (chain, voxels, upper) = (chain(), Voxels::cube(5, 5.0), 0.8);
+    let (model, voxels, upper) = (forward_model(), Voxels::cube(5, 5.0), 0.8);
     let unit = |k: usize| {
         let mut x = vec![0.0; voxels.count()];
         x[k] = 1.0;
-        movie(&chain, &voxels, &x)
+        movie(&model, &voxels, &x)
     };
     let columns: Vec<Vec<f64>> = (0..voxels.count()).map(unit).collect();
-    let mut pixels = movie(&chain, &voxels, &random(voxels.count(), 7));
+    let mut pixels = movie(&model, &voxels, &random(voxels.count(), 7));
     let noise = random(pixels.len(), 8);
     pixels.iter_mut().zip(noise).for_each(|(pixel, n)| *pixel += 2.0 * (n - 0.5));
     let (_, least) = reference(&columns, &pixels, upper);
-    let term = ImageTerm::new(pixels, chain.pixels(), 1.0).unwrap();
+    let term = ImageTerm::new(pixels, model.pixels(), 1.0).unwrap();
     let problem = LinearProblem {
-        chain: &chain,
+        model: &model,
         axis: axis(),
         frames: &FRAMES,
         terms: &[Weighted { weight: 1.0, term: &term }],
@@ -184,13 +184,13 @@ fn exact_solution_and_gap_of_a_dense_problem() {
 
 #[test]
 fn exact_threads_change_no_bit() {
-    let (chain, voxels) = (chain(), Voxels::cube(8, 5.0));
+    let (model, voxels) = (forward_model(), Voxels::cube(8, 5.0));
     let truth: Vec<f64> = random(voxels.count(), 3).iter().map(|x| (x - 0.7).max(0.0)).collect();
-    let term = ImageTerm::new(movie(&chain, &voxels, &truth), chain.pixels(), 0.1).unwrap();
+    let term = ImageTerm::new(movie(&model, &voxels, &truth), model.pixels(), 0.1).unwrap();
     let prior = Prior { regulariser: Regulariser::Smoothness, weight: 1e-3 };
     let run = |threads, memory| {
         let problem = LinearProblem {
-            chain: &chain,
+            model: &model,
             axis: axis(),
             frames: &FRAMES,
             terms: &[Weighted { weight: 1.0, term: &term }],
@@ -211,12 +211,12 @@ fn exact_threads_change_no_bit() {
 
 #[test]
 fn numbers_out_of_range_are_named_and_a_stop_is_heeded() {
-    let (chain, voxels) = (chain(), Voxels::cube(5, 5.0));
-    let pixels = vec![1.0; FRAMES.len() * chain.pixels()];
-    let term = ImageTerm::new(pixels, chain.pixels(), 1.0).unwrap();
+    let (model, voxels) = (forward_model(), Voxels::cube(5, 5.0));
+    let pixels = vec![1.0; FRAMES.len() * model.pixels()];
+    let term = ImageTerm::new(pixels, model.pixels(), 1.0).unwrap();
     let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
     let problem = LinearProblem {
-        chain: &chain,
+        model: &model,
         axis: axis(),
         frames: &FRAMES,
         terms: &terms,

@@ -1,7 +1,7 @@
 //! Where the nodes of a frame's rays come to lie in a grid of voxels.
 
 use crate::dynamics::{Axis, Turned, pull_back};
-use crate::fit::Chain;
+use crate::fit::ForwardModel;
 use crate::fit::regulariser::Shape;
 use crate::points::{Coordinates, CoordinatesMut};
 use crate::representation::{Activation, Grid, GridSettings};
@@ -123,7 +123,7 @@ impl<T: Float> Geometry<T> {
 
 /// Rays of a frame as they meet the grid.
 pub(super) struct Walk<'a, T> {
-    pub chain: &'a Chain<T>,
+    pub model: &'a ForwardModel<T>,
     pub voxels: Voxels,
     axis: Axis,
     geometry: Geometry<T>,
@@ -131,7 +131,7 @@ pub(super) struct Walk<'a, T> {
 
 /// Memory of a thread.
 #[derive(Default)]
-pub(super) struct Room<T> {
+pub(super) struct Buffers<T> {
     angles: Vec<T>,
     pulled: [Vec<T>; 3],
     places: Vec<Place<T>>,
@@ -142,8 +142,8 @@ const BLOCK: usize = 4096;
 
 impl<'a, T: Float> Walk<'a, T> {
     /// Of rays with the weights that they have for the axis.
-    pub fn new(chain: &'a Chain<T>, axis: Axis, voxels: Voxels) -> Self {
-        Self { chain, axis, voxels, geometry: Geometry::new(&voxels) }
+    pub fn new(model: &'a ForwardModel<T>, axis: Axis, voxels: Voxels) -> Self {
+        Self { model, axis, voxels, geometry: Geometry::new(&voxels) }
     }
 
     /// Hands over the pixel of every ray with those of its nodes that shine and lie in cells that are
@@ -152,38 +152,38 @@ impl<'a, T: Float> Walk<'a, T> {
         &self,
         frame: usize,
         wanted: Option<&[bool]>,
-        room: &mut Room<T>,
+        buffers: &mut Buffers<T>,
         mut ray: impl FnMut(u32, &[Place<T>]),
     ) {
-        let starts = &self.chain.starts;
+        let starts = &self.model.starts;
         let mut first = 0;
-        while first < self.chain.rays() {
+        while first < self.model.rays() {
             let after = starts.partition_point(|start| *start <= starts[first] + BLOCK) - 1;
             let next = after.max(first + 1);
-            self.pull(starts[first]..starts[next], self.chain.times[frame], room);
+            self.pull(starts[first]..starts[next], self.model.times[frame], buffers);
             for k in first..next {
                 let range = starts[k]..starts[k + 1];
-                self.places(range, starts[first], frame, wanted, room);
-                if !room.places.is_empty() {
-                    ray(self.chain.pixel[k], &room.places);
+                self.places(range, starts[first], frame, wanted, buffers);
+                if !buffers.places.is_empty() {
+                    ray(self.model.pixel[k], &buffers.places);
                 }
             }
             first = next;
         }
     }
 
-    fn pull(&self, range: core::ops::Range<usize>, time: T, room: &mut Room<T>) {
-        let Room { angles, pulled, .. } = room;
+    fn pull(&self, range: core::ops::Range<usize>, time: T, buffers: &mut Buffers<T>) {
+        let Buffers { angles, pulled, .. } = buffers;
         angles.clear();
-        let rates = &self.chain.rate[range.clone()];
-        if self.chain.delay.is_empty() {
+        let rates = &self.model.rate[range.clone()];
+        if self.model.delay.is_empty() {
             angles.extend(rates.iter().map(|rate| *rate * time));
         } else {
-            let phases = rates.iter().zip(&self.chain.phase[range.clone()]);
+            let phases = rates.iter().zip(&self.model.phase[range.clone()]);
             angles.extend(phases.map(|(rate, phase)| *rate * time + *phase));
         }
         pulled.iter_mut().for_each(|column| column.resize(range.len(), T::zero()));
-        let [x, y, z] = &self.chain.position;
+        let [x, y, z] = &self.model.position;
         let points = Coordinates::xyz(&x[range.clone()], &y[range.clone()], &z[range.clone()]);
         let [a, b, c] = pulled;
         pull_back(self.axis, Turned { points, angles }, CoordinatesMut::xyz(a, b, c));
@@ -192,9 +192,9 @@ impl<'a, T: Float> Walk<'a, T> {
     /// Whether a node shines in a frame.
     #[inline(always)]
     fn shines(&self, node: usize, frame: usize) -> bool {
-        self.chain.earliest.is_none_or(|earliest| {
-            let delay = self.chain.delay.get(node).copied().unwrap_or(T::zero());
-            self.chain.times[frame] - delay >= earliest
+        self.model.earliest.is_none_or(|earliest| {
+            let delay = self.model.delay.get(node).copied().unwrap_or(T::zero());
+            self.model.times[frame] - delay >= earliest
         })
     }
 
@@ -205,19 +205,19 @@ impl<'a, T: Float> Walk<'a, T> {
         first: usize,
         frame: usize,
         wanted: Option<&[bool]>,
-        room: &mut Room<T>,
+        buffers: &mut Buffers<T>,
     ) {
-        room.places.clear();
+        buffers.places.clear();
         for node in range {
-            let [x, y, z] = &room.pulled;
+            let [x, y, z] = &buffers.pulled;
             let k = node - first;
             let Some((corner, within)) = self.geometry.locate([x[k], y[k], z[k]]) else {
                 continue;
             };
             let is_wanted = wanted.is_none_or(|mask| mask[corner]);
             if is_wanted && self.shines(node, frame) {
-                let weight = self.chain.weight[node];
-                room.places.push(Place { corner: corner as u32, within, weight });
+                let weight = self.model.weight[node];
+                buffers.places.push(Place { corner: corner as u32, within, weight });
             }
         }
     }

@@ -8,7 +8,7 @@
 mod map;
 mod refine;
 
-use super::Chain;
+use super::ForwardModel;
 use super::linear::{LinearError, LinearProblem, Prior, Voxels, Weighted};
 use crate::dynamics::Axis;
 use crate::simd::Float;
@@ -21,7 +21,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 #[derive(Clone, Copy)]
 pub struct AxisProblem<'a, T: Float> {
     /// Nodes of the rays; few pixels are enough.
-    pub chain: &'a Chain<T>,
+    pub model: &'a ForwardModel<T>,
     /// The frames of the movie that count; few are enough.
     pub frames: &'a [usize],
     /// The data.
@@ -152,13 +152,13 @@ impl<T: Float + Default> Scanner<'_, T> {
             return Ok(None);
         }
         let mut own = None;
-        if self.problem.chain.is_shifted() {
-            own.insert(self.problem.chain.clone()).weigh(axis);
+        if self.problem.model.is_shifted() {
+            own.insert(self.problem.model.clone()).weigh(axis);
         }
-        let AxisProblem { chain, frames, terms, half_width, upper, flux, priors } = *self.problem;
-        let chain = own.as_ref().unwrap_or(chain);
+        let AxisProblem { model, frames, terms, half_width, upper, flux, priors } = *self.problem;
+        let model = own.as_ref().unwrap_or(model);
         let voxels = Voxels::cube(effort.nodes, half_width);
-        let problem = LinearProblem { chain, axis, frames, terms, voxels, upper, flux, priors };
+        let problem = LinearProblem { model, axis, frames, terms, voxels, upper, flux, priors };
         let loss = problem.least(effort.iterations)?;
         let solved = self.solved.fetch_add(1, Ordering::Relaxed) + 1;
         if !(self.watch)(solved, self.expected.max(solved)) {
@@ -289,7 +289,7 @@ fn candidates(map: &[AxisLoss], count: usize, distance: f64) -> Vec<Axis> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::linear::tests::{FRAMES, chain, movie_about};
+    use super::super::linear::tests::{FRAMES, forward_model, movie_about};
     use super::super::{FrameTerm, ImageTerm};
     use super::*;
 
@@ -312,7 +312,7 @@ mod tests {
         settings: &AxisSettings,
     ) -> Result<Option<AxisScan>, LinearError> {
         let problem = AxisProblem {
-            chain: &chain(),
+            model: &forward_model(),
             frames: &FRAMES,
             terms,
             half_width: 5.0,
@@ -344,9 +344,9 @@ mod tests {
     #[test]
     fn exact_axis_of_amplitudes_and_closure_phases() {
         use super::super::linear::tests::lit::{Seen, array, spot};
-        let (chain, voxels) = (chain(), Voxels::cube(9, 5.0));
+        let (model, voxels) = (forward_model(), Voxels::cube(9, 5.0));
         let truth = Axis::new([0.6, -0.3, -0.7]).unwrap();
-        let movie = movie_about(truth, &chain, &voxels, &spot(&voxels));
+        let movie = movie_about(truth, &model, &voxels, &spot(&voxels));
         let data = [Seen::Amplitudes, Seen::Phases].map(|seen| array(&movie, seen));
         let terms = [0, 1].map(|k| Weighted { weight: 1.0, term: &data[k] as &dyn FrameTerm<f64> });
         let scan = scan_of(&terms, &SMALL).unwrap().unwrap();
@@ -357,17 +357,17 @@ mod tests {
     /// A spot that turns about a known axis, in the field that the fine grid can represent.
     #[test]
     fn exact_axis_of_its_own_movie_on_any_number_of_threads() {
-        let (chain, voxels) = (chain(), Voxels::cube(9, 5.0));
+        let (model, voxels) = (forward_model(), Voxels::cube(9, 5.0));
         let truth = Axis::new([0.6, -0.3, -0.7]).unwrap();
         let light = |k: usize| {
             let [x, y, z] = voxels.position(k);
             (-((x - 1.5).powi(2) + (y + 2.0).powi(2) + (z - 2.0).powi(2)) / 2.0).exp()
         };
         let field: Vec<f64> = (0..voxels.count()).map(light).collect();
-        let pixels = movie_about(truth, &chain, &voxels, &field);
-        let term = ImageTerm::new(pixels, chain.pixels(), 1.0).unwrap();
+        let pixels = movie_about(truth, &model, &voxels, &field);
+        let term = ImageTerm::new(pixels, model.pixels(), 1.0).unwrap();
         let problem = AxisProblem {
-            chain: &chain,
+            model: &model,
             frames: &FRAMES,
             terms: &[Weighted { weight: 1.0, term: &term }],
             half_width: 5.0,

@@ -20,7 +20,7 @@ pub use penalties::{PenaltyKind, PenaltySettings, ProbeSettings};
 pub use recovery::{
     AxisScan, AxisSearch, Kind, Linear, Occupancy, Optimiser, Representation, Start, Training,
 };
-pub use simulation::{Movie, Noise, Observation, Spot, Truth};
+pub use simulation::{GlyphShape, Movie, Noise, Observation, Spot, Truth};
 pub use view::{Absorption, Effects, Hole, Motion, Observer, Region, Screen, Velocity, WidthOf};
 pub use world::merge;
 

@@ -1,6 +1,5 @@
 //! What is simulated, and the array that sees it.
 
-use crate::emission::glyph::GlyphShape;
 use crate::interferometry::noise::GainErrors;
 use serde::{Deserialize, Serialize};
 
@@ -41,6 +40,24 @@ pub struct Spot {
     /// For how long differential rotation has wound it up until the reference time, in units of time.
     #[serde(default)]
     pub wound_for: f64,
+}
+
+/// What a letter looks like.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GlyphShape {
+    /// Which letter.
+    pub letter: char,
+    /// Its middle, M.
+    pub center: [f64; 3],
+    /// From its lower to its upper edge, M.
+    pub height: f64,
+    /// Along the axis, M.
+    pub thickness: f64,
+    /// Standard deviation of its blurred edges, M.
+    pub softness: f64,
+    /// Emission in the middle of broad strokes.
+    pub amplitude: f64,
 }
 
 /// The array that sees the simulated movie.

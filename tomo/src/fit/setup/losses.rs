@@ -4,7 +4,7 @@ use super::measured::FILE;
 use super::{Instrument, Measured, Result};
 use crate::fit::settings::{FitError, Loss, LossKind, Within, refuse};
 use crate::fit::{
-    Chain, Data, FrameTerm, ImageTerm, LightCurveTerm, Motion, Scan, ScanTerm, Weighted,
+    Data, ForwardModel, FrameTerm, ImageTerm, LightCurveTerm, Motion, Scan, ScanTerm, Weighted,
 };
 use crate::interferometry::data_terms::{
     AmplitudeTerm, ClosureTerm, DataTerm, DataTermError, VisibilityTerm,
@@ -134,11 +134,11 @@ impl Measured {
 /// Exponentials of a frame up to this many bytes are kept.
 const MEMORY: usize = 8 << 20;
 
-/// The chain of a fit, in single precision.
+/// The forward model of a fit, in single precision.
 ///
 /// # Errors
 /// If the motion is out of range.
-pub fn chain(instrument: &Instrument, motion: &Motion) -> Result<Chain<f32>> {
+pub fn forward_model(instrument: &Instrument, motion: &Motion) -> Result<ForwardModel<f32>> {
     let Instrument { lines, hole, redshift, .. } = instrument;
-    Ok(Chain::new(lines, motion, hole, *redshift)?)
+    Ok(ForwardModel::new(lines, motion, hole, *redshift)?)
 }

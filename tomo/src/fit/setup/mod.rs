@@ -1,5 +1,6 @@
 //! From settings to the parts of a fit: sight lines, motion, data with their losses, the representation and its training.
 
+mod glyph;
 mod imprint;
 mod instrument;
 mod learning;
@@ -11,7 +12,7 @@ mod visibilities;
 pub use imprint::imprint;
 pub use instrument::Instrument;
 pub use learning::{caution, check, representation, training};
-pub use losses::chain;
+pub use losses::forward_model;
 pub use measured::Measured;
 pub use truth::Truth;
 pub use visibilities::{VisibilitySettings, frames_of, prepared};

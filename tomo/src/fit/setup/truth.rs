@@ -1,10 +1,10 @@
 //! Emission that is simulated.
 
+use super::glyph::Glyph;
 use super::{AXIS, Instrument, Result, known_axis, motion};
 use crate::dynamics::{AngularVelocity, Axis};
-use crate::emission::glyph::Glyph;
 use crate::fit::settings::{FitError, FitFile, Spot, Within, refuse};
-use crate::fit::{Batch, Chain};
+use crate::fit::{Batch, ForwardModel};
 use kerrlight_geodesic::vector::{distance, rotate};
 
 /// What to write where there is no truth.
@@ -91,8 +91,8 @@ impl Truth {
     ) -> Result<Vec<f64>> {
         let motion = motion(file, times.to_vec())?;
         let Instrument { lines, hole, redshift, .. } = instrument;
-        let mut chain = Chain::<f64>::new(lines, &motion, hole, *redshift)?;
-        chain.weigh(self.axis);
-        Ok(chain.movie_of(self.axis, &|x| self.at(x), &mut Batch::default()))
+        let mut model = ForwardModel::<f64>::new(lines, &motion, hole, *redshift)?;
+        model.weigh(self.axis);
+        Ok(model.movie_of(self.axis, &|x| self.at(x), &mut Batch::default()))
     }
 }

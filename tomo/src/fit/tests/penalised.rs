@@ -111,10 +111,10 @@ fn exact_total_variation_lowers_the_variation_of_a_noisy_recovery() {
     let shape = Shape { nodes: [13; 3], spacing: [1.0; 3] };
     let tv = Regulariser::TotalVariation { epsilon: 0.01 };
     let recover = |weight: f64| {
-        let mut chain = chain::<f32>(true, false);
-        chain.weigh(axis);
+        let mut model = forward_model::<f32>(true, false);
+        model.weigh(axis);
         let mut random = Pcg64::seed_from_u64(7);
-        let clean = chain.movie_of(axis, &blob, &mut Batch::default());
+        let clean = model.movie_of(axis, &blob, &mut Batch::default());
         let noisy = clean.iter().map(|x| (x + 0.6 * (random.random::<f64>() - 0.5)) as f32);
         let term = Box::new(ImageTerm::new(noisy.collect(), SIDE * SIDE, 0.17).unwrap());
         let data = Data { image: Some(Weighted { weight: 1.0, term }), others: Vec::new() };
@@ -129,7 +129,7 @@ fn exact_total_variation_lowers_the_variation_of_a_noisy_recovery() {
             ..settings()
         };
         let mut state = State::new(&grid, axis, &training);
-        let objective = Objective { chain, data };
+        let objective = Objective { model, data };
         let mut trainer = Trainer::new(objective, &grid, training);
         while state.now.step < 150 {
             trainer.step(&mut state).unwrap();

@@ -15,10 +15,10 @@ fn exact_parameters_and_axis_are_found_again() {
     let blobs = Blobs { dimension: 3 };
     let (known, axis) = (start(&blobs), Axis::new([0.3, -0.5, 0.8]).unwrap());
     let mut objective = objective(true, true, false);
-    objective.chain.weigh(axis);
+    objective.model.weigh(axis);
     let mut movie = vec![0.0; 4 * SIDE * SIDE];
     let field = Field { representation: &blobs, parameters: &known, axis, occupancy: None };
-    objective.movie(field, &[0, 1, 2, 3], &mut Room::default(), &mut movie);
+    objective.movie(field, &[0, 1, 2, 3], &mut Buffers::default(), &mut movie);
     let term = Box::new(ImageTerm::new(movie, SIDE * SIDE, 0.1).unwrap());
     objective.data.image = Some(Weighted { weight: 1.0, term });
     let training = Training { occupancy: None, ..training() };
@@ -54,7 +54,7 @@ fn regress_resumed_from_a_checkpoint_the_same_bits() {
         let movie = movie().iter().map(|x| *x as f32).collect();
         let term = Box::new(ImageTerm::new(movie, SIDE * SIDE, 0.5).unwrap());
         let data = Data { image: Some(Weighted { weight: 1.0, term }), others: Vec::new() };
-        Objective { chain: chain(true, true), data }
+        Objective { model: forward_model(true, true), data }
     };
     let start = || State::new(&network, Axis::new([0.1, 0.5, 0.8]).unwrap(), &training);
     let run = |state: &mut State<f32>, until: u64| {

@@ -30,7 +30,7 @@ fn objective() -> Objective<f32> {
     let movie = movie().iter().map(|x| *x as f32).collect();
     let term = Box::new(ImageTerm::new(movie, SIDE * SIDE, 0.5).unwrap());
     let data = Data { image: Some(Weighted { weight: 1.0, term }), others: Vec::new() };
-    Objective { chain: chain(true, true), data }
+    Objective { model: forward_model(true, true), data }
 }
 
 fn network() -> Network {

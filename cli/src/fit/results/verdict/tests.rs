@@ -17,7 +17,7 @@ fn of_truth(changes: &[&str], scale: f32) -> Judged {
     let measured = data::measure(&file, &instrument, Path::new(".")).unwrap();
     let motion = setup::motion(&file, measured.times.clone()).unwrap();
     let data = measured.terms(&file.loss, 400).unwrap();
-    let objective = Objective { chain: setup::chain(&instrument, &motion).unwrap(), data };
+    let objective = Objective { model: setup::forward_model(&instrument, &motion).unwrap(), data };
     let movie: Vec<f32> =
         measured.movie.as_ref().unwrap().iter().map(|x| scale * *x as f32).collect();
     Evidence { file: &file, measured: &measured }.judged(&objective, &movie).unwrap()

@@ -71,9 +71,9 @@ fn solve(
     terms: &[Weighted<'_, f64>],
     flux: Option<f64>,
 ) -> Result<LinearSolution<f64>, LinearError> {
-    let chain = chain();
+    let model = forward_model();
     let problem = LinearProblem {
-        chain: &chain,
+        model: &model,
         axis: axis(),
         frames: &FRAMES,
         terms,
@@ -89,13 +89,13 @@ fn solve(
 /// Slopes of all kinds of data along random directions are those of differences, at a lit field.
 #[test]
 fn exact_slopes_of_data_that_are_not_convex() {
-    let (chain, voxels) = (chain(), Voxels::cube(6, 5.0));
-    let movie = movie(&chain, &voxels, &spot(&voxels));
+    let (model, voxels) = (forward_model(), Voxels::cube(6, 5.0));
+    let movie = movie(&model, &voxels, &spot(&voxels));
     for seen in [Seen::Visibilities, Seen::Amplitudes, Seen::Phases, Seen::LogAmplitudes] {
         let term = array(&movie, seen);
         let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
-        let data = Data::new(&terms, &FRAMES, chain.pixels(), FRAMES.len()).unwrap();
-        let operator = operator(&chain, voxels, &vec![true; voxels.count()], usize::MAX);
+        let data = Data::new(&terms, &FRAMES, model.pixels(), FRAMES.len()).unwrap();
+        let operator = operator(&model, voxels, &vec![true; voxels.count()], usize::MAX);
         let mut objective = Objective::new(&operator, &data, &[], voxels.shape());
         let x: Vec<f64> = random(voxels.count(), 1).iter().map(|x| 0.5 + x).collect();
         let direction = random(voxels.count(), 2);
@@ -114,8 +114,8 @@ fn exact_slopes_of_data_that_are_not_convex() {
 /// A dark field has no slope: it is left all the same, and no certificate is claimed.
 #[test]
 fn exact_amplitudes_are_solved_from_lit_fields() {
-    let (chain, voxels) = (chain(), Voxels::cube(11, 5.0));
-    let movie = movie(&chain, &voxels, &spot(&voxels));
+    let (model, voxels) = (forward_model(), Voxels::cube(11, 5.0));
+    let movie = movie(&model, &voxels, &spot(&voxels));
     let flux = movie.iter().sum::<f64>() / FRAMES.len() as f64;
     let dark = vec![0.0; 81];
     for kinds in [&[Seen::Amplitudes][..], &[Seen::Amplitudes, Seen::Phases]] {
@@ -129,7 +129,7 @@ fn exact_amplitudes_are_solved_from_lit_fields() {
             data.iter().map(|term| term.value_and_gradient(0, &dark, 0.0, &mut dark.clone())).sum();
         assert!(at.value < 1.0 && at.value < 0.02 * at.start, "{kinds:?}: {at:?}");
         assert!(at.relative_violation() < 1e-2 && of_dark > 100.0, "{kinds:?}: {at:?}");
-        let found = super::movie(&chain, &voxels, &solution.emission);
+        let found = super::movie(&model, &voxels, &solution.emission);
         let found = found.iter().sum::<f64>() / FRAMES.len() as f64;
         assert!((found / flux - 1.0).abs() < 0.05, "{kinds:?}: {found} {flux}");
     }
@@ -137,8 +137,8 @@ fn exact_amplitudes_are_solved_from_lit_fields() {
 
 #[test]
 fn exact_closures_alone_need_a_flux_and_dark_data_have_no_light() {
-    let (chain, voxels) = (chain(), Voxels::cube(11, 5.0));
-    let movie = movie(&chain, &voxels, &spot(&voxels));
+    let (model, voxels) = (forward_model(), Voxels::cube(11, 5.0));
+    let movie = movie(&model, &voxels, &spot(&voxels));
     let closures = array(&movie, Seen::LogAmplitudes);
     let terms = [Weighted { weight: 1.0, term: &closures as &dyn FrameTerm<f64> }];
     assert!(matches!(solve(&terms, None), Err(LinearError::NoFlux(_))));

@@ -1,9 +1,9 @@
 //! Letters and digits that shine: emission whose shape everybody can judge.
 
+use crate::fit::settings::GlyphShape;
 use crate::image::canvas::coverage;
 use kerrlight_geodesic::OutOfRange;
 use kerrlight_geodesic::vector::{cross, dot, rotate};
-use serde::{Deserialize, Serialize};
 
 /// Pixels of a letter's height.
 const RESOLUTION: usize = 96;
@@ -25,24 +25,6 @@ pub struct Glyph {
     values: Vec<f32>,
     columns: usize,
     rows: usize,
-}
-
-/// What a letter looks like.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct GlyphShape {
-    /// Which letter.
-    pub letter: char,
-    /// Its middle, M.
-    pub center: [f64; 3],
-    /// From its lower to its upper edge, M.
-    pub height: f64,
-    /// Along the axis, M.
-    pub thickness: f64,
-    /// Standard deviation of its blurred edges, M.
-    pub softness: f64,
-    /// Emission in the middle of broad strokes.
-    pub amplitude: f64,
 }
 
 impl Glyph {

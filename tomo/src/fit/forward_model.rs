@@ -1,5 +1,5 @@
-//! From a field of emission at the reference time to pixels of a movie: what is common to all
-//! representations and data.
+//! The forward model: from a field of emission at the reference time to the pixels of a movie. Representations
+//! and data terms share it.
 
 use super::batch::{Batch, Columns};
 use super::occupancy::Occupancy;
@@ -33,7 +33,7 @@ pub struct Redshift {
 
 /// Nodes with all that does not change in a fit, in the scalar that it runs in.
 #[derive(Clone, Debug)]
-pub struct Chain<T> {
+pub struct ForwardModel<T> {
     pub(super) pixels: usize,
     pub(super) pixel: Vec<u32>,
     pub(super) starts: Vec<usize>,
@@ -55,7 +55,7 @@ pub struct Chain<T> {
     pub(super) earliest: Option<T>,
 }
 
-impl<T: Float> Chain<T> {
+impl<T: Float> ForwardModel<T> {
     /// Of these nodes and this motion.
     ///
     /// # Errors
@@ -167,7 +167,7 @@ impl<T: Float> Chain<T> {
     }
 }
 
-impl<T: Float> Chain<T> {
+impl<T: Float> ForwardModel<T> {
     /// Gradient along the sphere of a loss with respect to the axis, by way of the weights alone:
     /// `cotangents` holds dL/dweight of each node, summed over frames. Zero without redshift.
     pub fn weights_vjp(&self, axis: Axis, cotangents: &[f64]) -> [f64; 3] {
@@ -178,7 +178,7 @@ impl<T: Float> Chain<T> {
     }
 }
 
-impl<T: Float> Chain<T> {
+impl<T: Float> ForwardModel<T> {
     /// Images of a known field e₀(x) at the reference time, all frames one after the other.
     pub fn movie_of(
         &self,
