@@ -4,14 +4,14 @@
 //! `cargo run --release -p kerrlight-geodesic --example emitter`
 
 use kerrlight_geodesic::flow::keplerian_redshift;
-use kerrlight_geodesic::{Inclination, Integrator, Kerr, Observer, OutOfRange, Request, orbits};
+use kerrlight_geodesic::{Error, Inclination, Integrator, Kerr, Observer, Request, orbits};
 
 /// Rest-frame intensity of the line at radius r: yours to change.
 fn emissivity(r: f64) -> f64 {
     r.powi(-3)
 }
 
-fn main() -> Result<(), OutOfRange> {
+fn main() -> Result<(), Error> {
     let hole = Kerr::new(0.9)?;
     let observer = Observer::at_infinity(Inclination::from_degrees(40.0)?);
     let (inner, outer) = (orbits::isco(&hole), 20.0);

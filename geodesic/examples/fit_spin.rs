@@ -5,16 +5,16 @@
 //! `cargo run --release -p kerrlight-geodesic --example fit_spin`
 
 use kerrlight_geodesic::derivatives;
-use kerrlight_geodesic::{Inclination, Integrator, Kerr, Observer, OutOfRange, Request};
+use kerrlight_geodesic::{Error, Inclination, Integrator, Kerr, Observer, Request};
 
 const ALPHA: [f64; 5] = [-7.0, -5.5, -3.0, 6.0, 8.0];
 const BETA: [f64; 5] = [1.0, 3.0, -5.0, 2.5, -1.0];
 
-fn observer(radians: f64) -> Result<Observer, OutOfRange> {
+fn observer(radians: f64) -> Result<Observer, Error> {
     Ok(Observer::at_infinity(Inclination::from_radians(radians)?))
 }
 
-fn main() -> Result<(), OutOfRange> {
+fn main() -> Result<(), Error> {
     let request = Request { crossings: 1, ..Request::default() };
     let (hole, truth) = (Kerr::new(0.7)?, observer(0.9)?);
     let measured = Integrator::TaylorMino

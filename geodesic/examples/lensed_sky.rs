@@ -3,9 +3,9 @@
 //!
 //! `cargo run --release -p kerrlight-geodesic --example lensed_sky`
 
-use kerrlight_geodesic::{Camera, Inclination, Kerr, Motion, OutOfRange, footprint};
+use kerrlight_geodesic::{Camera, Error, Inclination, Kerr, Motion, footprint};
 
-fn main() -> Result<(), OutOfRange> {
+fn main() -> Result<(), Error> {
     let hole = Kerr::new(0.9)?;
     let camera = Camera::new(&hole, Inclination::from_degrees(80.0)?, 20.0, Motion::Static)?;
     let x: Vec<f64> = (0..13).map(|k| 0.1 * f64::from(k) + 0.2).collect();

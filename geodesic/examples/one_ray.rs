@@ -2,9 +2,9 @@
 //!
 //! `cargo run --release -p kerrlight-geodesic --example one_ray`
 
-use kerrlight_geodesic::{Inclination, Integrator, Kerr, Observer, OutOfRange, Placement, Request};
+use kerrlight_geodesic::{Error, Inclination, Integrator, Kerr, Observer, Placement, Request};
 
-fn main() -> Result<(), OutOfRange> {
+fn main() -> Result<(), Error> {
     let hole = Kerr::new(0.94)?;
     let observer = Observer::at_infinity(Inclination::from_degrees(60.0)?);
     // Everything about the first three crossings of the equatorial plane, and ten points.

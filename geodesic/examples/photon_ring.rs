@@ -3,20 +3,18 @@
 //!
 //! `cargo run --release -p kerrlight-geodesic --example photon_ring`
 
-use kerrlight_geodesic::{
-    Inclination, Kerr, Observer, OutOfRange, Path, PathPoint, Quantities, Tracer,
-};
+use kerrlight_geodesic::{Error, Inclination, Kerr, Observer, Path, PathPoint, Quantities, Tracer};
 
 const CIRCLE: f64 = 10.0;
 
-fn main() -> Result<(), OutOfRange> {
+fn main() -> Result<(), Error> {
     let hole = Kerr::new(0.0)?;
     let face_on = Observer::at_infinity(Inclination::from_degrees(0.0)?);
     let tracer = Tracer::new(1e-13)?;
     let critical = 27f64.sqrt();
 
     // The n-th crossing of the disc by the ray with impact parameter b.
-    let crossing = |b: f64, n: usize| -> Result<Option<PathPoint>, OutOfRange> {
+    let crossing = |b: f64, n: usize| -> Result<Option<PathPoint>, Error> {
         let mut path = Path::new();
         tracer.trace(&hole, &face_on.ray(&hole, b, 0.0)?, Quantities::ALL, &mut path);
         let time = path.equatorial_crossings().nth(n);

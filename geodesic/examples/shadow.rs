@@ -2,11 +2,11 @@
 //!
 //! `cargo run --release -p kerrlight-geodesic --example shadow`
 
-use kerrlight_geodesic::{Inclination, Integrator, Kerr, Observer, OutOfRange, Outcome, Request};
+use kerrlight_geodesic::{Error, Inclination, Integrator, Kerr, Observer, Outcome, Request};
 
 const COLUMNS: usize = 60;
 
-fn main() -> Result<(), OutOfRange> {
+fn main() -> Result<(), Error> {
     let hole = Kerr::new(0.998)?;
     let observer = Observer::at_infinity(Inclination::from_degrees(90.0)?);
     let place = |k: usize| (0.25 * (k % COLUMNS) as f64 - 5.5, 6.0 - 0.5 * (k / COLUMNS) as f64);

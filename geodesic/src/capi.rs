@@ -8,7 +8,7 @@
 //!
 //! (or `cdylib`), and `examples/c/shadow.c` uses it. Rust programs have no need of this module.
 
-use crate::error::{OutOfRange, check};
+use crate::error::{Error, check};
 use crate::integrate::path::{Outcome, Unresolved};
 use crate::rays::columns::{Points, RayTable};
 use crate::rays::integrator::Integrator;
@@ -111,8 +111,8 @@ thread_local! {
 /// A code and its message.
 struct Failure(i32, String);
 
-impl From<OutOfRange> for Failure {
-    fn from(error: OutOfRange) -> Self {
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
         Failure(OUT_OF_RANGE, error.to_string())
     }
 }
@@ -204,7 +204,7 @@ fn placed(placement: SamplePlacement) -> Result<Placement, Failure> {
         1 => Placement::MinoTime(points),
         2 => Placement::PathLength { points, radius: to },
         3 => Placement::GaussLegendre { points, from, to },
-        _ => return Err(OutOfRange { field: "placement", value: f64::from(kind), allowed }.into()),
+        _ => return Err(Error::out_of_range("placement", f64::from(kind), allowed).into()),
     })
 }
 
@@ -240,7 +240,7 @@ fn check_columns(out: &RayColumns, rays: usize) -> Result<(), Failure> {
         if size.is_none_or(|size| isize::try_from(size).is_err()) {
             let allowed = "a number of points that an array can hold";
             let value = points.stride as f64;
-            return Err(OutOfRange { field: what, value, allowed }.into());
+            return Err(Error::out_of_range(what, value, allowed).into());
         }
         let columns = [
             points.mino_time,

@@ -23,7 +23,7 @@
 //!     let hit = path.at(time);
 //!     println!("meets the disc at r = {:.6} M, φ = {:.6}", hit.radius(), hit.azimuth);
 //! }
-//! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+//! # Ok::<(), kerrlight_geodesic::Error>(())
 //! ```
 //!
 //! # Many rays
@@ -42,7 +42,7 @@
 //! let rays = Integrator::TaylorMino.trace(&hole, &observer, &alpha, &beta, 1e-8, &request)?;
 //! let shadow = rays.outcome.iter().filter(|o| **o == Outcome::Captured).count();
 //! assert_eq!(shadow, 52); // α < √27
-//! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+//! # Ok::<(), kerrlight_geodesic::Error>(())
 //! ```
 //!
 //! # Requests
@@ -66,12 +66,12 @@
 //! let points = &rays.samples;
 //! let light: f64 = points.of(0).map(|k| points.weight[k] * points.radius[k].powi(-2)).sum();
 //! assert!(light > 0.0 && points.azimuth.is_empty());
-//! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+//! # Ok::<(), kerrlight_geodesic::Error>(())
 //! ```
 //!
 //! # Errors
 //! With `uncertainty` each ray carries a bound of the [`Uncertainty`] of its points. Misuse is an
-//! [`OutOfRange`] that names the field, its value and what is allowed; nothing panics. What becomes
+//! [`Error`] that names the field, its value and what is allowed; nothing panics. What becomes
 //! of a ray is data: an [`Outcome`], with the reason where it is unresolved.
 //!
 //! ```
@@ -83,7 +83,7 @@
 //! let request = Request { uncertainty: true, ..Request::crossings(1) };
 //! let rays = Integrator::TaylorMino.trace(&hole, &observer, &[-6.0], &[2.0], 1e-12, &request)?;
 //! assert!(rays.uncertainty[0].radius < 1e-11);
-//! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+//! # Ok::<(), kerrlight_geodesic::Error>(())
 //! ```
 //!
 //! # Derivatives
@@ -97,7 +97,7 @@
 //! let request = Request::crossings(1);
 //! let rays = derivatives::trace(&hole, &observer, &[-6.0], &[2.0], 1e-12, &request)?;
 //! println!("dr/da = {} M", rays.crossings.radius[0].spin);
-//! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+//! # Ok::<(), kerrlight_geodesic::Error>(())
 //! ```
 //!
 //! # Cameras
@@ -112,7 +112,7 @@
 //! let mut path = Path::new();
 //! Tracer::new(1e-9)?.trace(&hole, &camera.ray(0.0, 0.0)?, Quantities::POLAR, &mut path);
 //! assert_eq!(path.outcome(), Outcome::Captured); // straight ahead is the hole
-//! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+//! # Ok::<(), kerrlight_geodesic::Error>(())
 //! ```
 //!
 //! # Beams
@@ -130,7 +130,7 @@
 //!     let [x, y, z] = sky.direction;
 //!     println!("from ({x:.3}, {y:.3}, {z:.3}), stretched {:.2} times", sky.ellipse().semi_major);
 //! }
-//! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+//! # Ok::<(), kerrlight_geodesic::Error>(())
 //! ```
 //!
 //! # Matter and closed forms
@@ -177,7 +177,7 @@ pub use numbers::{legendre, quadrature, vector};
 pub use rays::{derivatives, footprint, nodes};
 pub use spacetime::orbits;
 
-pub use error::OutOfRange;
+pub use error::Error;
 #[cfg(feature = "affine")]
 pub use integrate::affine::{AffinePath, AffineTracer};
 pub use integrate::path::{Outcome, Path, Unresolved};

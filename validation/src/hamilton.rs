@@ -3,7 +3,7 @@
 
 use crate::report::Case;
 use kerrlight_geodesic::{
-    AffineTracer, Inclination, Kerr, Observer, OutOfRange, Path, Quantities, Tracer,
+    AffineTracer, Error, Inclination, Kerr, Observer, Path, Quantities, Tracer,
 };
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -15,7 +15,7 @@ const AUTHORITY: &str = "Hamilton's equations, Kerr–Schild";
 const RAYS: u64 = 10_000;
 
 /// Errors of one ray: r, θ, azimuth, delay, and H of the referee.
-fn compare(seed: u64) -> Result<Option<[f64; 5]>, OutOfRange> {
+fn compare(seed: u64) -> Result<Option<[f64; 5]>, Error> {
     let mut random = Pcg64::seed_from_u64(seed);
     let hole = Kerr::new(random.random_range(-1.0..=1.0))?;
     let inclination = Inclination::from_degrees(random.random_range(1.0..179.0))?;

@@ -2,7 +2,7 @@
 //! Boyer–Lindquist integrals with mpmath (tests/reference/kerr_crossings.py).
 
 use crate::report::Case;
-use kerrlight_geodesic::{Inclination, Kerr, Observer, OutOfRange, Path, Quantities, Tracer};
+use kerrlight_geodesic::{Error, Inclination, Kerr, Observer, Path, Quantities, Tracer};
 use std::collections::HashMap;
 
 const AUTHORITY: &str = "mpmath, 25 digits";
@@ -19,7 +19,7 @@ fn trace(row: &Row) -> Option<Path> {
         ["spin", "inclination_rad", "alpha", "beta"].map(|column| number(row, column));
     let (spin, inclination, alpha, beta) = (spin?, inclination?, alpha?, beta?);
     let mut path = Path::new();
-    let mut traced = || -> Result<(), OutOfRange> {
+    let mut traced = || -> Result<(), Error> {
         let hole = Kerr::new(spin)?;
         let observer = Observer::at_infinity(Inclination::from_radians(inclination)?);
         let ray = observer.ray(&hole, alpha, beta)?;

@@ -5,7 +5,7 @@ use kerrlight_geodesic::{Inclination, Kerr, Observer, Path, Quantities, Tracer};
 /// The path of the ray (α, β) to an observer at infinity, at the tightest useful tolerance.
 pub fn trace(spin: f64, degrees: f64, alpha: f64, beta: f64, want: Quantities) -> Path {
     let mut path = Path::new();
-    let mut traced = || -> Result<(), kerrlight_geodesic::OutOfRange> {
+    let mut traced = || -> Result<(), kerrlight_geodesic::Error> {
         let hole = Kerr::new(spin)?;
         let observer = Observer::at_infinity(Inclination::from_degrees(degrees)?);
         let ray = observer.ray(&hole, alpha, beta)?;

@@ -47,7 +47,7 @@ impl LensingBand {
     /// let band = LensingBand::new(&Kerr::new(0.0)?, Inclination::from_degrees(0.0)?, 1);
     /// assert!((band.inner(0.0).0 - 5.0151354942).abs() < 1e-10);
     /// assert!((band.outer(0.0).unwrap().0 - 6.1675667648).abs() < 1e-10);
-    /// # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+    /// # Ok::<(), kerrlight_geodesic::Error>(())
     /// ```
     pub fn outer(&self, angle: f64) -> Option<(f64, f64)> {
         if self.half_orbits == 0 {

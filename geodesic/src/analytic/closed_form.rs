@@ -47,7 +47,7 @@ impl ClosedForm {
     /// let ray = ClosedForm::new(&hole, &observer.ray(&hole, 4.0, -3.5)?);
     /// let radii: Vec<f64> = ray.crossings().map(|crossing| crossing.radius).collect();
     /// assert!(!radii.is_empty());
-    /// # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+    /// # Ok::<(), kerrlight_geodesic::Error>(())
     /// ```
     pub fn new(hole: &Kerr, ray: &Ray) -> Self {
         let radial = Radial::new(&ray.potential);

@@ -75,7 +75,7 @@ impl CriticalCurve {
     /// let hole = Kerr::new(0.0)?;
     /// let point = CriticalCurve::new(&hole, Inclination::from_degrees(17.0)?).point(0.4);
     /// assert!((point.alpha.hypot(point.beta) - 27f64.sqrt()).abs() < 1e-14);
-    /// # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+    /// # Ok::<(), kerrlight_geodesic::Error>(())
     /// ```
     pub fn point(&self, angle: f64) -> CriticalPoint {
         let (sin, cos) = angle.sin_cos();

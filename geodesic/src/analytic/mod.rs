@@ -13,7 +13,7 @@
 //! let curve = CriticalCurve::new(&Kerr::new(0.9)?, Inclination::from_degrees(90.0)?);
 //! let flat_side = curve.point(core::f64::consts::PI);
 //! assert!((flat_side.alpha + 2.8444214035).abs() < 1e-10);
-//! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+//! # Ok::<(), kerrlight_geodesic::Error>(())
 //! ```
 
 mod bands;

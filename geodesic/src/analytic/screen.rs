@@ -1,6 +1,6 @@
 //! Bardeen's screen coordinates and a photon's constants of motion, both ways.
 
-use crate::error::{OutOfRange, check};
+use crate::error::{Error, check};
 use crate::screen::observer::Inclination;
 use crate::spacetime::kerr::Kerr;
 
@@ -25,14 +25,14 @@ pub fn constants(hole: &Kerr, inclination: Inclination, alpha: f64, beta: f64) -
 /// let (lambda, eta) = screen::constants(&hole, inclination, -3.0, 2.0);
 /// let (alpha, beta) = screen::point(&hole, inclination, lambda, eta)?;
 /// assert!((alpha + 3.0).abs() < 1e-14 && (beta - 2.0).abs() < 1e-14);
-/// # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+/// # Ok::<(), kerrlight_geodesic::Error>(())
 /// ```
 pub fn point(
     hole: &Kerr,
     inclination: Inclination,
     lambda: f64,
     eta: f64,
-) -> Result<(f64, f64), OutOfRange> {
+) -> Result<(f64, f64), Error> {
     let (a, sin, cos) = (hole.spin(), inclination.sin(), inclination.cos());
     let reaches = lambda.is_finite() && (sin != 0.0 || lambda == 0.0);
     check("lambda", lambda, reaches, "a finite number, 0 for an observer on the axis")?;
@@ -63,8 +63,8 @@ mod tests {
     fn photons_that_never_arrive_are_named() {
         let hole = Kerr::new(0.5).unwrap();
         let at = |degrees| Inclination::from_degrees(degrees).unwrap();
-        assert_eq!(point(&hole, at(0.0), 1.0, 20.0).unwrap_err().field, "lambda");
-        assert_eq!(point(&hole, at(30.0), 5.0, 1.0).unwrap_err().field, "eta");
+        assert_eq!(point(&hole, at(0.0), 1.0, 20.0).unwrap_err().field(), "lambda");
+        assert_eq!(point(&hole, at(30.0), 5.0, 1.0).unwrap_err().field(), "eta");
         assert!(point(&hole, at(30.0), f64::NAN, 1.0).is_err());
         assert!(point(&hole, at(30.0), 1.0, f64::NAN).is_err());
     }

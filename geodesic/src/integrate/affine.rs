@@ -13,7 +13,7 @@
 
 mod equations;
 
-use crate::error::{OutOfRange, check};
+use crate::error::{Error, check};
 use crate::integrate::path::{Outcome, Unresolved};
 use crate::numbers::dual::Dual;
 use crate::numbers::polynomial::{Polynomial, hermite};
@@ -97,7 +97,7 @@ impl AffineTracer {
     ///
     /// # Errors
     /// If `tolerance` is not in \[1e-14, 1e-2\].
-    pub fn new(tolerance: f64) -> Result<Self, OutOfRange> {
+    pub fn new(tolerance: f64) -> Result<Self, Error> {
         let ok = (1e-14..=1e-2).contains(&tolerance);
         check("tolerance", tolerance, ok, "a number in [1e-14, 1e-2]")?;
         Ok(AffineTracer { tolerance })
@@ -114,7 +114,7 @@ impl AffineTracer {
         observer: &Observer,
         alpha: f64,
         beta: f64,
-    ) -> Result<AffinePath, OutOfRange> {
+    ) -> Result<AffinePath, Error> {
         let w = observer.inverse_radius();
         check("observer radius", 1.0 / w, w > 0.0, "a finite radius")?;
         // Refuses what no tracer can follow.

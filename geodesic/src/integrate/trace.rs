@@ -1,6 +1,6 @@
 //! From a ray's initial data to its path.
 
-use crate::error::{OutOfRange, check};
+use crate::error::{Error, check};
 use crate::integrate::path::Path;
 use crate::integrate::run::Run;
 use crate::integrate::runge_kutta::{DormandPrince5, DormandPrince8};
@@ -64,7 +64,7 @@ impl Tracer {
     ///
     /// # Errors
     /// If `tolerance` is not in \[1e-14, 1e-2\].
-    pub fn new(tolerance: f64) -> Result<Self, OutOfRange> {
+    pub fn new(tolerance: f64) -> Result<Self, Error> {
         Self::with_method(Method::default(), tolerance)
     }
 
@@ -72,7 +72,7 @@ impl Tracer {
     ///
     /// # Errors
     /// If `tolerance` is not in \[1e-14, 1e-2\].
-    pub fn with_method(method: Method, tolerance: f64) -> Result<Self, OutOfRange> {
+    pub fn with_method(method: Method, tolerance: f64) -> Result<Self, Error> {
         let ok = (1e-14..=1e-2).contains(&tolerance);
         check("tolerance", tolerance, ok, "a number in [1e-14, 1e-2]")?;
         Ok(Tracer { method, tolerance, max_steps: MAX_STEPS })
@@ -139,7 +139,7 @@ impl Tracer {
 /// trace_series(1e-13, &hole, &ray, Quantities::ALL, &mut path)?;
 /// let hit = path.at(path.equatorial_crossings().next().unwrap());
 /// println!("r = {}, dr/da = {}", hit.radius().value, hit.radius().slope[0]);
-/// # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+/// # Ok::<(), kerrlight_geodesic::Error>(())
 /// ```
 ///
 /// # Errors
@@ -151,7 +151,7 @@ pub fn trace_series<T: Elementary>(
     ray: &Ray<T>,
     quantities: Quantities,
     path: &mut Path<T>,
-) -> Result<(), OutOfRange> {
+) -> Result<(), Error> {
     let ok = (1e-30..=1e-2).contains(&tolerance);
     check("tolerance", tolerance, ok, "a number in [1e-30, 1e-2]")?;
     let tolerance = TAYLOR_MARGIN * tolerance;

@@ -14,7 +14,7 @@
 //!     let (r, by) = (rays.values.crossings.radius[k], rays.crossings.radius[k]);
 //!     println!("r = {r:.6} M, dr/da = {:.6}, dr/di = {:.6} M/rad", by.spin, by.inclination);
 //! }
-//! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+//! # Ok::<(), kerrlight_geodesic::Error>(())
 //! ```
 //!
 //! # What is held fixed
@@ -26,7 +26,7 @@
 //! [`Gradients::at_fixed_mino_time`] has what is left: the derivative at the same Mino time.
 //! The observer's radius and azimuth are fixed always.
 
-use crate::error::{OutOfRange, check};
+use crate::error::{Error, check};
 use crate::integrate::path::Path;
 use crate::integrate::trace::{Tracer, trace_series};
 use crate::integrate::uncertainty::Uncertainty;
@@ -273,7 +273,7 @@ pub fn trace(
     beta: &[f64],
     tolerance: f64,
     request: &Request,
-) -> Result<Differentiated, OutOfRange> {
+) -> Result<Differentiated, Error> {
     check_columns(alpha, beta)?;
     request.check()?;
     Tracer::new(tolerance)?;
@@ -282,7 +282,7 @@ pub fn trace(
     let hole = Kerr::from_spin(Number::parameter(a, 0))?;
     let observer = observer.with_inclination(observer.inclination().parameter(1));
     let rule = sampling::rule(request);
-    let pieces = in_blocks(alpha, beta, |alpha, beta| -> Result<Differentiated, OutOfRange> {
+    let pieces = in_blocks(alpha, beta, |alpha, beta| -> Result<Differentiated, Error> {
         let sink = Differentiated::default();
         let mut sampler = Sampler::new(request, &hole, observer.is_at_infinity(), &rule, sink);
         let mut path = Path::empty();

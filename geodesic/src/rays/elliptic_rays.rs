@@ -2,7 +2,7 @@
 //! into the same columns as those of every other integrator.
 
 use crate::analytic::ClosedForm;
-use crate::error::{OutOfRange, check};
+use crate::error::{Error, check};
 use crate::integrate::path::Outcome;
 use crate::integrate::uncertainty::Uncertainty;
 use crate::rays::columns::{Points, RayTable};
@@ -22,7 +22,7 @@ pub(crate) fn trace(
     alpha: &[f64],
     beta: &[f64],
     request: &Request,
-) -> Result<RayTable, OutOfRange> {
+) -> Result<RayTable, Error> {
     let placed = matches!(request.samples, Placement::None | Placement::MinoTime(_));
     let allowed = "equidistant in Mino time with the integrator elliptic";
     check("placement of samples", 0.0, placed, allowed)?;
@@ -77,7 +77,7 @@ struct Job<'a> {
     clocks: &'a [Clock],
 }
 
-fn crossings(job: &Job<'_>, table: &mut RayTable) -> Result<(), OutOfRange> {
+fn crossings(job: &Job<'_>, table: &mut RayTable) -> Result<(), Error> {
     let Job { hole, observer, alpha, beta, request, clocks } = job;
     let mut found = Crossings::default();
     if request.crossings > 0 {
@@ -188,13 +188,13 @@ impl Clock {
 
 /// Samples equidistant in Mino time, without those at infinity: rays that fall have one of
 /// these, others two.
-fn samples(job: &Job<'_>, n: usize, table: &mut RayTable) -> Result<(), OutOfRange> {
+fn samples(job: &Job<'_>, n: usize, table: &mut RayTable) -> Result<(), Error> {
     let Job { hole, observer, alpha, beta, request, clocks } = job;
     let captured = |k: &usize| table.outcome[*k] == Outcome::Captured;
     let all = 0..alpha.len();
     let (falling, rising): (Vec<usize>, Vec<usize>) = all.partition(captured);
     let at_infinity = observer.is_at_infinity();
-    let trace = |rays: &[usize], ends: usize| -> Result<Samples, OutOfRange> {
+    let trace = |rays: &[usize], ends: usize| -> Result<Samples, Error> {
         let pick = |column: &[f64]| rays.iter().map(|k| column[*k]).collect::<Vec<_>>();
         let mut samples = Samples::default();
         let per_ray = if at_infinity { n + ends } else { n };

@@ -12,10 +12,10 @@
 //! let sky = beams.sky[0].expect("this ray escapes");
 //! let pixel = 0.05; // radius of a pixel in M
 //! println!("a pixel covers {:.3} rad of the sky", pixel * sky.ellipse().semi_major);
-//! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+//! # Ok::<(), kerrlight_geodesic::Error>(())
 //! ```
 
-use crate::error::OutOfRange;
+use crate::error::Error;
 use crate::integrate::path::{Outcome, Path};
 use crate::integrate::trace::{Tracer, trace_series};
 use crate::numbers::dual::Dual;
@@ -220,7 +220,7 @@ pub fn of_ray(
     ray: &Ray<Number>,
     tolerance: f64,
     path: &mut Path<Number>,
-) -> Result<Option<Sky>, OutOfRange> {
+) -> Result<Option<Sky>, Error> {
     trace_series(
         tolerance,
         hole,
@@ -246,7 +246,7 @@ pub fn of_screen(
     beta: &[f64],
     tolerance: f64,
     crossings: usize,
-) -> Result<Beams, OutOfRange> {
+) -> Result<Beams, Error> {
     let place = observer.with_inclination(observer.inclination().lift());
     let lifted = hole.lift();
     let ray = |alpha, beta| place.ray(&lifted, alpha, beta);
@@ -266,7 +266,7 @@ pub fn of_camera(
     y: &[f64],
     tolerance: f64,
     crossings: usize,
-) -> Result<Beams, OutOfRange> {
+) -> Result<Beams, Error> {
     beams(camera.hole(), x, y, tolerance, crossings, |x, y| camera.ray(x, y))
 }
 
@@ -276,12 +276,12 @@ fn beams(
     second: &[f64],
     tolerance: f64,
     crossings: usize,
-    ray: impl Fn(Number, Number) -> Result<Ray<Number>, OutOfRange> + Sync + Send,
-) -> Result<Beams, OutOfRange> {
+    ray: impl Fn(Number, Number) -> Result<Ray<Number>, Error> + Sync + Send,
+) -> Result<Beams, Error> {
     check_columns(first, second)?;
     Tracer::new(tolerance)?;
     let hole = hole.lift();
-    let pieces = in_blocks(first, second, |first, second| -> Result<Beams, OutOfRange> {
+    let pieces = in_blocks(first, second, |first, second| -> Result<Beams, Error> {
         let mut beams = Beams::default();
         let mut path = Path::empty();
         for (first, second) in first.iter().zip(second) {

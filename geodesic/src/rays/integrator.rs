@@ -1,6 +1,6 @@
 //! Every way to trace rays, behind one interface and with one kind of result.
 
-use crate::error::{OutOfRange, check};
+use crate::error::{Error, check};
 use crate::integrate::path::{Outcome, Path};
 use crate::integrate::trace::{Method, Tracer};
 use crate::integrate::uncertainty::Uncertainty;
@@ -88,7 +88,7 @@ impl Integrator {
     /// let rays = Integrator::TaylorMino.trace(&hole, &observer, &alpha, &beta, 1e-10, &request)?;
     /// assert_eq!(rays.outcome, [Outcome::Escaped, Outcome::Captured]);
     /// println!("meets the disc at r = {}", rays.crossings.radius[rays.crossings.of(0)][0]);
-    /// # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+    /// # Ok::<(), kerrlight_geodesic::Error>(())
     /// ```
     ///
     /// # Errors
@@ -103,7 +103,7 @@ impl Integrator {
         beta: &[f64],
         tolerance: f64,
         request: &Request,
-    ) -> Result<RayTable, OutOfRange> {
+    ) -> Result<RayTable, Error> {
         check_columns(alpha, beta)?;
         request.check()?;
         if self == Integrator::Elliptic {
@@ -111,7 +111,7 @@ impl Integrator {
         }
         let rule = sampling::rule(request);
         let at_infinity = observer.is_at_infinity();
-        let block = |alpha: &[f64], beta: &[f64]| -> Result<RayTable, OutOfRange> {
+        let block = |alpha: &[f64], beta: &[f64]| -> Result<RayTable, Error> {
             let mut sampler = Sampler::new(request, hole, at_infinity, &rule, RayTable::default());
             self.trace_block(hole, observer, alpha, beta, tolerance, request, &mut sampler)?;
             Ok(sampler.sink)
@@ -134,7 +134,7 @@ impl Integrator {
         tolerance: f64,
         request: &Request,
         sampler: &mut Sampler<'_, f64, RayTable>,
-    ) -> Result<(), OutOfRange> {
+    ) -> Result<(), Error> {
         let rays = alpha.iter().zip(beta);
         let Some(method) = self.method() else {
             #[cfg(feature = "affine")]
@@ -157,7 +157,7 @@ impl Integrator {
 }
 
 /// Whether there is a β for every α.
-pub(crate) fn check_columns(alpha: &[f64], beta: &[f64]) -> Result<(), OutOfRange> {
+pub(crate) fn check_columns(alpha: &[f64], beta: &[f64]) -> Result<(), Error> {
     let same = alpha.len() == beta.len();
     check("number of beta", beta.len() as f64, same, "as many as of alpha")?;
     Ok(())
@@ -233,7 +233,7 @@ impl AffinePair {
         [alpha, beta]: [f64; 2],
         tolerance: f64,
         request: &Request,
-    ) -> Result<Self, OutOfRange> {
+    ) -> Result<Self, Error> {
         let with = |tolerance: f64| {
             crate::integrate::affine::AffineTracer::new(tolerance)?
                 .trace(hole, observer, alpha, beta)

@@ -20,7 +20,7 @@ impl Tracer {
     /// let rays = rays.collect::<Result<Vec<_>, _>>()?;
     /// let outcomes = Tracer::new(1e-8)?.map(&hole, &rays, Quantities::POLAR, Path::outcome);
     /// assert_eq!(outcomes.iter().filter(|o| **o == Outcome::Captured).count(), 52); // α < √27
-    /// # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+    /// # Ok::<(), kerrlight_geodesic::Error>(())
     /// ```
     pub fn map<T: Send>(
         &self,

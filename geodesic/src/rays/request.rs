@@ -1,6 +1,6 @@
 //! What a caller asks of its rays. What is not asked for is not integrated.
 
-use crate::error::{OutOfRange, check};
+use crate::error::{Error, check};
 use crate::spacetime::quantities::Quantities;
 
 /// Where a ray is sampled, from the observer on.
@@ -79,7 +79,7 @@ impl Request {
         }
     }
 
-    pub(crate) fn check(&self) -> Result<(), OutOfRange> {
+    pub(crate) fn check(&self) -> Result<(), Error> {
         let count = |field, n: usize| {
             check(field, n as f64, (1..=1_000_000).contains(&n), "a number in [1, 1000000]")
         };

@@ -1,6 +1,6 @@
 //! Observers at a finite radius with a local frame and a perspective lens.
 
-use crate::error::{OutOfRange, check};
+use crate::error::{Error, check};
 use crate::numbers::scalar::Elementary;
 use crate::screen::observer::{Inclination, Ray};
 use crate::spacetime::frame::ZamoFrame;
@@ -58,7 +58,7 @@ impl Camera {
         inclination: Inclination,
         radius: f64,
         motion: Motion,
-    ) -> Result<Self, OutOfRange> {
+    ) -> Result<Self, Error> {
         let at_rest = Self::at_rest(hole, inclination, radius)?;
         let velocity = match motion {
             Motion::Zamo => [0.0; 3],
@@ -84,7 +84,7 @@ impl Camera {
         inclination: Inclination,
         radius: f64,
         rates: [f64; 3],
-    ) -> Result<Self, OutOfRange> {
+    ) -> Result<Self, Error> {
         let at_rest = Self::at_rest(hole, inclination, radius)?;
         let velocity = at_rest.local_velocity(rates);
         let speed = square(velocity).sqrt();
@@ -93,13 +93,13 @@ impl Camera {
     }
 
     /// The camera of zero angular momentum.
-    fn at_rest(hole: &Kerr, inclination: Inclination, radius: f64) -> Result<Self, OutOfRange> {
+    fn at_rest(hole: &Kerr, inclination: Inclination, radius: f64) -> Result<Self, Error> {
         let frame = ZamoFrame::at(hole, radius, inclination.sin(), inclination.cos());
-        let frame = frame.ok_or(OutOfRange {
-            field: "camera radius",
-            value: radius,
-            allowed: "a finite number outside the horizon",
-        })?;
+        let frame = frame.ok_or(Error::out_of_range(
+            "camera radius",
+            radius,
+            "a finite number outside the horizon",
+        ))?;
         let ZamoFrame { lapse, drag, girth, .. } = frame;
         Ok(Camera {
             hole: *hole,
@@ -162,7 +162,7 @@ impl Camera {
     /// # Errors
     /// If x or y is not in \[−1e12, 1e12\], or if the photon has no positive energy at infinity (some
     /// directions inside the ergosphere).
-    pub fn ray<T: Elementary>(&self, x: T, y: T) -> Result<Ray<T>, OutOfRange> {
+    pub fn ray<T: Elementary>(&self, x: T, y: T) -> Result<Ray<T>, Error> {
         for (field, value) in [("x", x.value()), ("y", y.value())] {
             check(field, value, value.abs() <= 1e12, "a number in [-1e12, 1e12]")?;
         }
@@ -187,7 +187,7 @@ impl Camera {
     ///
     /// # Errors
     /// If the vector's length is not 1 within 1e-6, or as for [`ray`](Self::ray).
-    pub fn arriving_from<T: Elementary>(&self, direction: [T; 3]) -> Result<Ray<T>, OutOfRange> {
+    pub fn arriving_from<T: Elementary>(&self, direction: [T; 3]) -> Result<Ray<T>, Error> {
         let length = direction.iter().map(|d| d.value() * d.value()).sum::<f64>().sqrt();
         let allowed = "1 (the direction is a unit vector)";
         check("length of the direction", length, (length - 1.0).abs() < 1e-6, allowed)?;

@@ -1,6 +1,6 @@
 //! Where the observer sits and which photon arrives at a point of the screen.
 
-use crate::error::{OutOfRange, check};
+use crate::error::{Error, check};
 use crate::numbers::compensated::Double;
 use crate::numbers::dual::Dual;
 use crate::numbers::scalar::{Elementary, Scalar};
@@ -22,7 +22,7 @@ impl Inclination {
     ///
     /// # Errors
     /// If `degrees` is outside the range.
-    pub fn from_degrees(degrees: f64) -> Result<Self, OutOfRange> {
+    pub fn from_degrees(degrees: f64) -> Result<Self, Error> {
         let allowed = "an angle in [0, 180] degrees";
         check("inclination", degrees, (0.0..=180.0).contains(&degrees), allowed)?;
         // Reduced to the nearest axis, so that the sine or cosine that vanishes is exactly 0.
@@ -74,7 +74,7 @@ impl<T: Elementary> Inclination<T> {
     ///
     /// # Errors
     /// If `radians` is outside the range.
-    pub fn from_radians(radians: T) -> Result<Self, OutOfRange> {
+    pub fn from_radians(radians: T) -> Result<Self, Error> {
         let angle = radians.value();
         let ok = (0.0..=core::f64::consts::PI).contains(&angle);
         check("inclination", angle, ok, "an angle in [0, pi] radians")?;
@@ -135,7 +135,7 @@ impl<T: Elementary> Observer<T> {
     ///
     /// # Errors
     /// If `radius` is not finite or not above 2 M.
-    pub fn at_radius(inclination: Inclination<T>, radius: f64) -> Result<Self, OutOfRange> {
+    pub fn at_radius(inclination: Inclination<T>, radius: f64) -> Result<Self, Error> {
         let ok = radius > 2.0 && radius.is_finite();
         check("observer radius", radius, ok, "a finite number above 2 (M)")?;
         Ok(Observer { inclination, azimuth: 0.0, inverse_radius: 1.0 / radius })
@@ -182,7 +182,7 @@ impl<T: Elementary> Observer<T> {
     /// # Errors
     /// If α or β is not in \[−1e12, 1e12\], or if no photon with these constants reaches the
     /// observer's radius (a finite observer inside the turning point).
-    pub fn ray(&self, hole: &Kerr<T>, alpha: T, beta: T) -> Result<Ray<T>, OutOfRange> {
+    pub fn ray(&self, hole: &Kerr<T>, alpha: T, beta: T) -> Result<Ray<T>, Error> {
         let (x, y) = (alpha.value(), beta.value());
         check("alpha", x, x.abs() <= 1e12, "a number in [-1e12, 1e12] (M)")?;
         check("beta", y, y.abs() <= 1e12, "a number in [-1e12, 1e12] (M)")?;
@@ -194,11 +194,11 @@ impl<T: Elementary> Observer<T> {
         let potential = RadialPotential::new(coefficients, horizon).narrow(T::narrow);
         let w = self.inverse_radius;
         if potential.value(T::constant(w)).value() < 0.0 {
-            return Err(OutOfRange {
-                field: "observer radius",
-                value: 1.0 / w,
-                allowed: "outside the turning point of the ray (alpha, beta)",
-            });
+            return Err(Error::out_of_range(
+                "observer radius",
+                1.0 / w,
+                "outside the turning point of the ray (alpha, beta)",
+            ));
         }
         let zero = T::constant(0.0);
         Ok(Ray {

@@ -1,6 +1,6 @@
 //! A screen or a camera: what makes rays of points of a picture.
 
-use crate::error::OutOfRange;
+use crate::error::Error;
 use crate::numbers::dual::Dual;
 use crate::screen::camera::Camera;
 use crate::screen::observer::{Observer, Ray};
@@ -21,7 +21,7 @@ impl View {
     ///
     /// # Errors
     /// If no photon arrives there: see [`Observer::ray`] and [`Camera::ray`].
-    pub fn ray(&self, hole: &Kerr, x: f64, y: f64) -> Result<Ray, OutOfRange> {
+    pub fn ray(&self, hole: &Kerr, x: f64, y: f64) -> Result<Ray, Error> {
         match self {
             View::Screen(observer) => observer.ray(hole, x, y),
             View::Camera(camera) => camera.ray(x, y),
@@ -33,7 +33,7 @@ impl View {
     ///
     /// # Errors
     /// As for [`ray`](Self::ray).
-    pub fn beam(&self, hole: &Kerr, x: f64, y: f64) -> Result<Ray<Dual<f64, 2>>, OutOfRange> {
+    pub fn beam(&self, hole: &Kerr, x: f64, y: f64) -> Result<Ray<Dual<f64, 2>>, Error> {
         let (x, y) = (Dual::parameter(x, 0), Dual::parameter(y, 1));
         match self {
             View::Screen(observer) => {

@@ -1,6 +1,6 @@
 //! Columns of results that start on a cache line.
 
-use crate::error::OutOfRange;
+use crate::error::Error;
 use core::ops::{Deref, DerefMut};
 
 /// Doubles per cache line.
@@ -21,14 +21,15 @@ pub(super) struct Column {
 
 impl Column {
     /// Makes room for `len` numbers; what they are is unspecified.
-    pub fn resize(&mut self, len: Option<usize>) -> Result<(), OutOfRange> {
+    pub fn resize(&mut self, len: Option<usize>) -> Result<(), Error> {
         let few = "few enough for the memory, with all rays";
-        let refused = OutOfRange { field: "points per ray", value: f64::INFINITY, allowed: few };
-        let len = len.and_then(|len| len.checked_add(LINE)).ok_or_else(|| refused.clone())?;
+        let refused = |len| Error::out_of_range("points per ray", len, few);
+        let len =
+            len.and_then(|len| len.checked_add(LINE)).ok_or_else(|| refused(f64::INFINITY))?;
         if self.data.len() < len {
             self.data = Vec::new();
             let room = self.data.try_reserve_exact(len);
-            room.map_err(|_| OutOfRange { value: len as f64, ..refused })?;
+            room.map_err(|_| refused(len as f64))?;
             self.data.resize(len, 0.0);
             self.shift = (LINE - (self.data.as_ptr().addr() / size_of::<f64>()) % LINE) % LINE;
         }

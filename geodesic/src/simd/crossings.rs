@@ -5,7 +5,7 @@ use super::crossing::{Block, Target, Whole};
 use super::lanes::{InstructionSet, dispatch};
 use super::motion::Camera;
 use super::{BLOCK, checked};
-use crate::error::{OutOfRange, check};
+use crate::error::{Error, check};
 use crate::screen::observer::Observer;
 use crate::spacetime::kerr::Kerr;
 
@@ -160,7 +160,7 @@ impl Crossings {
         alpha: &[f64],
         beta: &[f64],
         per_ray: usize,
-    ) -> Result<(), OutOfRange> {
+    ) -> Result<(), Error> {
         self.trace_at(InstructionSet::best(), hole, observer, alpha, beta, per_ray)
     }
 
@@ -176,7 +176,7 @@ impl Crossings {
         alpha: &[f64],
         beta: &[f64],
         per_ray: usize,
-    ) -> Result<(), OutOfRange> {
+    ) -> Result<(), Error> {
         check("crossings per ray", per_ray as f64, per_ray >= 1, "at least 1")?;
         let camera = checked(hole, observer, alpha, beta)?;
         let count = alpha.len().checked_mul(per_ray);

@@ -29,7 +29,7 @@
 //! crossings.trace(&hole, &observer, &alpha, &beta, 1)?;
 //! let disc = crossings.ray(0).next().expect("this ray meets the equatorial plane");
 //! assert!(disc.radius > 5.0 && disc.radius < 15.0);
-//! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+//! # Ok::<(), kerrlight_geodesic::Error>(())
 //! ```
 
 mod column;
@@ -59,7 +59,7 @@ pub use panel::PanelRule;
 pub(crate) use radial_sum::LEAST_STEPS;
 pub use samples::{RaySamples, Samples};
 
-use crate::error::{OutOfRange, check};
+use crate::error::{Error, check};
 use crate::screen::observer::Observer;
 use crate::spacetime::kerr::Kerr;
 use motion::Motion;
@@ -84,7 +84,7 @@ fn checked(
     observer: &Observer,
     alpha: &[f64],
     beta: &[f64],
-) -> Result<motion::Camera, OutOfRange> {
+) -> Result<motion::Camera, Error> {
     let w = observer.inverse_radius();
     let within = w == 0.0 || (1.0 / FARTHEST..=1.0 / NEAREST).contains(&w);
     check("observer radius", 1.0 / w, within, "infinity, or a number in [5, 1e30] (M)")?;

@@ -8,7 +8,7 @@ use super::lanes::{InstructionSet, Lanes, MAX_LANES, Task, dispatch};
 use super::march::{COLUMNS, GROWTH, Jump, Key, MAX_ORDER, March, RayLanes};
 use super::motion::{Camera, Clock, Journey, Motion};
 use super::panel::{LONGEST_PANEL, PanelRule};
-use crate::error::{OutOfRange, check};
+use crate::error::{Error, check};
 use crate::screen::observer::Observer;
 use crate::spacetime::kerr::Kerr;
 use crate::spacetime::quantities::Quantities;
@@ -118,7 +118,7 @@ impl Nodes {
         beta: &[f64],
         until: Option<&[f64]>,
         request: &NodeRequest,
-    ) -> Result<(), OutOfRange> {
+    ) -> Result<(), Error> {
         self.trace_at(InstructionSet::best(), hole, observer, alpha, beta, until, request)
     }
 
@@ -136,7 +136,7 @@ impl Nodes {
         beta: &[f64],
         until: Option<&[f64]>,
         request: &NodeRequest,
-    ) -> Result<(), OutOfRange> {
+    ) -> Result<(), Error> {
         let camera = Camera { margin: 0.0, ..checked(hole, observer, alpha, beta)? };
         let radius = request.radius;
         let outside = radius > camera.r_plus() && radius.is_finite();

@@ -5,7 +5,7 @@ use super::lanes::{InstructionSet, dispatch};
 use super::motion::Camera;
 use super::sample::{Block, Rays, Target};
 use super::{BLOCK, checked};
-use crate::error::{OutOfRange, check};
+use crate::error::{Error, check};
 use crate::screen::observer::Observer;
 use crate::spacetime::kerr::Kerr;
 
@@ -108,7 +108,7 @@ impl Samples {
         alpha: &[f64],
         beta: &[f64],
         per_ray: usize,
-    ) -> Result<(), OutOfRange> {
+    ) -> Result<(), Error> {
         self.trace_at(InstructionSet::best(), hole, observer, alpha, beta, per_ray)
     }
 
@@ -124,7 +124,7 @@ impl Samples {
         alpha: &[f64],
         beta: &[f64],
         per_ray: usize,
-    ) -> Result<(), OutOfRange> {
+    ) -> Result<(), Error> {
         check("samples per ray", per_ray as f64, per_ray >= 2, "at least 2")?;
         let camera = checked(hole, observer, alpha, beta)?;
         if let Err(error) = self.resize(alpha.len(), per_ray) {
@@ -157,7 +157,7 @@ impl Samples {
         }
     }
 
-    fn resize(&mut self, rays: usize, per_ray: usize) -> Result<(), OutOfRange> {
+    fn resize(&mut self, rays: usize, per_ray: usize) -> Result<(), Error> {
         let count = rays.checked_mul(per_ray);
         for column in [&mut self.delay, &mut self.radius, &mut self.theta, &mut self.azimuth] {
             column.resize(count)?;

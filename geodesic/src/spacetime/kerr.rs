@@ -1,7 +1,7 @@
 //! The hole: spin, horizons, and the closed forms in which what is singular at
 //! the horizon integrates.
 
-use crate::error::{OutOfRange, check};
+use crate::error::{Error, check};
 use crate::numbers::dual::Dual;
 use crate::numbers::scalar::Elementary;
 
@@ -20,7 +20,7 @@ impl Kerr {
     ///
     /// # Errors
     /// If `spin` is not in \[−1, 1\] (NaN included).
-    pub fn new(spin: f64) -> Result<Self, OutOfRange> {
+    pub fn new(spin: f64) -> Result<Self, Error> {
         Self::from_spin(spin)
     }
 
@@ -43,7 +43,7 @@ impl<T: Elementary> Kerr<T> {
     ///
     /// # Errors
     /// If the spin's value is not in \[−1, 1\] (NaN included).
-    pub fn from_spin(spin: T) -> Result<Self, OutOfRange> {
+    pub fn from_spin(spin: T) -> Result<Self, Error> {
         let a = spin.value();
         check("spin", a, (-1.0..=1.0).contains(&a), "a number in [-1, 1]")?;
         let one = T::constant(1.0);

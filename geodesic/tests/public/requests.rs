@@ -2,8 +2,7 @@
 //! nothing that was not asked for.
 
 use kerrlight_geodesic::{
-    Inclination, Integrator, Kerr, Observer, OutOfRange, Outcome, Placement, Points, RayTable,
-    Request,
+    Error, Inclination, Integrator, Kerr, Observer, Outcome, Placement, Points, RayTable, Request,
 };
 
 fn at_infinity(degrees: f64) -> Observer {
@@ -269,7 +268,7 @@ fn exact_columns_that_were_not_asked_for_are_empty() {
 fn requests_out_of_range_are_named() {
     let hole = Kerr::new(0.5).unwrap();
     let observer = at_infinity(20.0);
-    let attempt = |samples: Placement| -> OutOfRange {
+    let attempt = |samples: Placement| -> Error {
         let request = Request::samples(samples);
         Integrator::TaylorMino.trace(&hole, &observer, &[1.0], &[1.0], 1e-9, &request).unwrap_err()
     };

@@ -1,6 +1,6 @@
 //! How fast matter turns.
 
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 
 /// Angular velocity as a function of the (spherical) radius, in radians a unit of time; positive is
 /// right-handed about the axis.
@@ -41,7 +41,7 @@ impl AngularVelocity {
     ///
     /// # Errors
     /// Names the number that is not.
-    pub fn checked(self) -> Result<Self, OutOfRange> {
+    pub fn checked(self) -> Result<Self, Error> {
         let finite = |field, value: f64| (field, value, value.is_finite(), "a finite number");
         match &self {
             Self::Keplerian { drag } => first_wrong([finite("drag", *drag)]),
@@ -115,9 +115,11 @@ fn radius([x, y, z]: [f64; 3]) -> f64 {
 
 type Range = (&'static str, f64, bool, &'static str);
 
-fn first_wrong(ranges: impl IntoIterator<Item = Range>) -> Result<(), OutOfRange> {
+fn first_wrong(ranges: impl IntoIterator<Item = Range>) -> Result<(), Error> {
     let wrong = ranges.into_iter().find(|(_, _, ok, _)| !ok);
-    wrong.map_or(Ok(()), |(field, value, _, allowed)| Err(OutOfRange { field, value, allowed }))
+    wrong.map_or(Ok(()), |(field, value, _, allowed)| {
+        Err(Error::out_of_range(field, value, allowed))
+    })
 }
 
 /// When matter begins to shine: nothing is seen of what left a point before.

@@ -1,7 +1,7 @@
 //! Velocities that differ from a smooth law by chance.
 
 use super::AngularVelocity;
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -22,7 +22,7 @@ pub struct Perturbation {
 }
 
 impl Perturbation {
-    fn checked(self) -> Result<Self, OutOfRange> {
+    fn checked(self) -> Result<Self, Error> {
         let Self { deviation, correlation_length, radii: [first, last], rows } = self;
         for (field, value, ok, allowed) in [
             ("deviation", deviation, deviation >= 0.0 && deviation.is_finite(), "0 or above"),
@@ -36,7 +36,7 @@ impl Perturbation {
             ("rows", rows as f64, (2..=1000).contains(&rows), "2 to 1000"),
         ] {
             if !ok {
-                return Err(OutOfRange { field, value, allowed });
+                return Err(Error::out_of_range(field, value, allowed));
             }
         }
         Ok(self)
@@ -72,7 +72,7 @@ impl AngularVelocity {
     ///
     /// # Errors
     /// If a number of the perturbation is out of its range.
-    pub fn perturbed(&self, by: Perturbation, seed: u64) -> Result<Self, OutOfRange> {
+    pub fn perturbed(&self, by: Perturbation, seed: u64) -> Result<Self, Error> {
         let radii = by.checked()?.table();
         let drawn = by.draw(&radii, seed);
         let rates = radii.iter().zip(drawn).map(|(r, by)| self.rate(*r) + by).collect();

@@ -9,7 +9,7 @@ use crate::volume::{Volume, VolumeFile};
 use kerrlight_geodesic::flow::rotating_redshift_at;
 use kerrlight_geodesic::simd::RayNodes;
 use kerrlight_geodesic::vector::{cross, rotate};
-use kerrlight_geodesic::{Kerr, OutOfRange, Quantities};
+use kerrlight_geodesic::{Error, Kerr, Quantities};
 
 /// A volume around one hole, ready to be evaluated.
 #[derive(Debug, Clone)]
@@ -42,8 +42,8 @@ impl VolumeModel {
         file: &VolumeFile,
         hole: &Kerr,
         (spectral_index, slow_light): (Option<f64>, bool),
-    ) -> Result<Self, OutOfRange> {
-        let range = |field, value, allowed| OutOfRange { field, value, allowed };
+    ) -> Result<Self, Error> {
+        let range = |field, value, allowed| Error::out_of_range(field, value, allowed);
         let axis = match (source.axis.or(file.axis), &source.rotation) {
             (Some(axis), _) => axis,
             (None, Rotation::None) => [0.0, 0.0, 1.0],

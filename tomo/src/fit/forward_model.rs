@@ -8,7 +8,7 @@ use super::sightlines::Sightlines;
 use crate::dynamics::{AngularVelocity, Axis, Injection};
 use crate::representation::{Representation, Workspace};
 use crate::simd::Float;
-use kerrlight_geodesic::{Kerr, OutOfRange};
+use kerrlight_geodesic::{Error, Kerr};
 use rayon::prelude::*;
 
 /// How the matter moves, and when it is seen.
@@ -65,7 +65,7 @@ impl<T: Float> ForwardModel<T> {
         motion: &Motion,
         hole: &Kerr,
         redshift: Option<Redshift>,
-    ) -> Result<Self, OutOfRange> {
+    ) -> Result<Self, Error> {
         check(motion, redshift)?;
         let velocity = &motion.velocity;
         let rate = |k: usize| {
@@ -216,11 +216,11 @@ pub struct Field<'a, T> {
     pub occupancy: Option<&'a Occupancy>,
 }
 
-fn check(motion: &Motion, redshift: Option<Redshift>) -> Result<(), OutOfRange> {
+fn check(motion: &Motion, redshift: Option<Redshift>) -> Result<(), Error> {
     motion.velocity.clone().checked()?;
     let finite = |field, value: f64| {
         let allowed = "a finite number";
-        if value.is_finite() { Ok(()) } else { Err(OutOfRange { field, value, allowed }) }
+        if value.is_finite() { Ok(()) } else { Err(Error::out_of_range(field, value, allowed)) }
     };
     finite("reference time", motion.reference)?;
     motion.injection.map_or(Ok(()), |injection| finite("injection time", injection.time))?;

@@ -5,7 +5,7 @@
 //! the same on a finer grid.
 
 use crate::simd::Float;
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 use rayon::prelude::*;
 
 /// Nodes of a regular grid, z fastest.
@@ -57,10 +57,10 @@ impl Regulariser {
     ///
     /// # Errors
     /// Names the number that is not.
-    pub fn checked(self) -> Result<Self, OutOfRange> {
+    pub fn checked(self) -> Result<Self, Error> {
         let positive = |field, value: f64, most: f64, allowed| {
             let ok = value > 0.0 && value.is_finite() && value <= most;
-            if ok { Ok(()) } else { Err(OutOfRange { field, value, allowed }) }
+            if ok { Ok(()) } else { Err(Error::out_of_range(field, value, allowed)) }
         };
         match self {
             Self::TotalVariation { epsilon } => {

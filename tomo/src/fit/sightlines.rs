@@ -3,7 +3,7 @@
 
 use kerrlight_geodesic::simd::{NodeRequest, Nodes, PanelRule, RayNodes, Samples};
 use kerrlight_geodesic::vector::{distance, norm};
-use kerrlight_geodesic::{Kerr, Observer, OutOfRange, Quantities};
+use kerrlight_geodesic::{Error, Kerr, Observer, Quantities};
 use serde::{Deserialize, Serialize};
 
 /// Where emission is looked for.
@@ -22,7 +22,7 @@ impl Region {
     ///
     /// # Errors
     /// Names the number that is not.
-    pub fn checked(self) -> Result<Self, OutOfRange> {
+    pub fn checked(self) -> Result<Self, Error> {
         let Region { r_min, r_max, z_width } = self;
         for (field, value, ok, allowed) in [
             ("r_min", r_min, r_min.is_finite() && r_min >= 0.0, "0 or above"),
@@ -30,7 +30,7 @@ impl Region {
             ("z_width", z_width, z_width > 0.0, "above 0"),
         ] {
             if !ok {
-                return Err(OutOfRange { field, value, allowed });
+                return Err(Error::out_of_range(field, value, allowed));
             }
         }
         Ok(self)
@@ -111,7 +111,7 @@ impl Sightlines {
         alpha: &[f64],
         beta: &[f64],
         request: &SightlineRequest,
-    ) -> Result<Self, OutOfRange> {
+    ) -> Result<Self, Error> {
         request.region.checked()?;
         let mut all = Self { pixels: alpha.len(), starts: vec![0], ..Self::default() };
         let mut tracer = Tracer {
@@ -184,7 +184,7 @@ impl Tracer<'_> {
         alpha: &[f64],
         beta: &[f64],
         all: &mut Sightlines,
-    ) -> Result<(), OutOfRange> {
+    ) -> Result<(), Error> {
         match self.request.sampling {
             Sampling::Gauss { order, split } => {
                 self.gauss([order, split as usize], first, alpha, beta, all)
@@ -200,7 +200,7 @@ impl Tracer<'_> {
         alpha: &[f64],
         beta: &[f64],
         all: &mut Sightlines,
-    ) -> Result<(), OutOfRange> {
+    ) -> Result<(), Error> {
         let request = NodeRequest {
             radius: self.request.region.r_max,
             rule: PanelRule::new(order),
@@ -258,11 +258,11 @@ impl Tracer<'_> {
         alpha: &[f64],
         beta: &[f64],
         all: &mut Sightlines,
-    ) -> Result<(), OutOfRange> {
-        let refuse = |field, allowed| Err(OutOfRange { field, value: 1.0, allowed });
+    ) -> Result<(), Error> {
+        let refuse = |field, allowed| Err(Error::out_of_range(field, 1.0, allowed));
         if self.observer.is_at_infinity() {
             let allowed = "a finite radius with nodes equidistant in Mino time";
-            return Err(OutOfRange { field: "observer radius", value: f64::INFINITY, allowed });
+            return Err(Error::out_of_range("observer radius", f64::INFINITY, allowed));
         }
         if self.request.momentum {
             return refuse("redshift", "off with nodes equidistant in Mino time");

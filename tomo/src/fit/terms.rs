@@ -3,7 +3,7 @@
 use crate::interferometry::data_terms::{DataTerm, Residual};
 use crate::interferometry::operator::{Operator, Transform};
 use crate::simd::Float;
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 use num_complex::Complex;
 use rustfft::FftNum;
 
@@ -64,8 +64,8 @@ impl<T: Float> ImageTerm<T> {
     ///
     /// # Errors
     /// If σ is not positive, or the movie is not whole frames of finite numbers.
-    pub fn new(movie: Vec<T>, pixels: usize, noise_sigma: f64) -> Result<Self, OutOfRange> {
-        let range = |field, value, allowed| Err(OutOfRange { field, value, allowed });
+    pub fn new(movie: Vec<T>, pixels: usize, noise_sigma: f64) -> Result<Self, Error> {
+        let range = |field, value, allowed| Err(Error::out_of_range(field, value, allowed));
         if !(noise_sigma > 0.0 && noise_sigma.is_finite()) {
             return range("image sigma", noise_sigma, "above 0");
         }
@@ -143,8 +143,8 @@ impl LightCurveTerm {
     ///
     /// # Errors
     /// If a σ is not positive, a flux not finite, or their numbers differ.
-    pub fn new(flux: Vec<f64>, noise_sigma: &[f64], pixels: usize) -> Result<Self, OutOfRange> {
-        let range = |field, value, allowed| Err(OutOfRange { field, value, allowed });
+    pub fn new(flux: Vec<f64>, noise_sigma: &[f64], pixels: usize) -> Result<Self, Error> {
+        let range = |field, value, allowed| Err(Error::out_of_range(field, value, allowed));
         if flux.len() != noise_sigma.len() || flux.is_empty() {
             return range("light-curve sigmas", noise_sigma.len() as f64, "as many as fluxes");
         }

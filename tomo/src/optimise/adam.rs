@@ -1,7 +1,7 @@
 //! Adam (Kingma & Ba 2015, arXiv:1412.6980, algorithm 1).
 
 use crate::simd::{Float, InstructionSet, Lanes, Task, dispatch};
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 use rayon::prelude::*;
 
 /// Decay rates of the moments and the number that keeps the division safe.
@@ -48,19 +48,15 @@ impl Adam {
     ///
     /// # Errors
     /// Names the number that is not.
-    pub fn checked(self) -> Result<Self, OutOfRange> {
+    pub fn checked(self) -> Result<Self, Error> {
         for (field, value) in [("beta1", self.beta1), ("beta2", self.beta2)] {
             if !(0.0..1.0).contains(&value) {
-                return Err(OutOfRange { field, value, allowed: "0 ≤ β < 1" });
+                return Err(Error::out_of_range(field, value, "0 ≤ β < 1"));
             }
         }
         let ok = self.epsilon.is_finite() && self.epsilon > 0.0;
         let allowed = "above 0";
-        if ok {
-            Ok(self)
-        } else {
-            Err(OutOfRange { field: "epsilon", value: self.epsilon, allowed })
-        }
+        if ok { Ok(self) } else { Err(Error::out_of_range("epsilon", self.epsilon, allowed)) }
     }
 
     /// One step with learning rate `rate`, by all threads.

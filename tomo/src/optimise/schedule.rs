@@ -1,6 +1,6 @@
 //! Learning rates.
 
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 
 /// Polynomial decay of a learning rate: to + (from − to)(1 − step/steps)^power, then `to`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,7 +25,7 @@ impl Polynomial {
     ///
     /// # Errors
     /// Names the number that is not.
-    pub fn checked(self) -> Result<Self, OutOfRange> {
+    pub fn checked(self) -> Result<Self, Error> {
         let positive = |x: f64| x.is_finite() && x > 0.0;
         let whole = self.steps as f64;
         for (field, value, ok, allowed) in [
@@ -35,7 +35,7 @@ impl Polynomial {
             ("steps", whole, self.steps > 0, "1 or more"),
         ] {
             if !ok {
-                return Err(OutOfRange { field, value, allowed });
+                return Err(Error::out_of_range(field, value, allowed));
             }
         }
         Ok(self)

@@ -1,6 +1,6 @@
 //! Models of the magnetic field.
 
-use kerrlight_geodesic::{OutOfRange, ZamoFrame};
+use kerrlight_geodesic::{Error, ZamoFrame};
 use serde::{Deserialize, Serialize};
 
 /// The `[magnetic_field]` of a scene: a mixture of three fields whose components are those
@@ -27,7 +27,7 @@ impl MagneticField {
     ///
     /// # Errors
     /// With the key, its value and what is allowed.
-    pub fn check(&self) -> Result<(), OutOfRange> {
+    pub fn check(&self) -> Result<(), Error> {
         let components = [
             ("magnetic_field.vertical", self.vertical),
             ("magnetic_field.radial", self.radial),
@@ -36,12 +36,12 @@ impl MagneticField {
         for (field, value) in components {
             if value != 0.0 && !(1e-12..=1e12).contains(&value.abs()) {
                 let allowed = "0, or a number of magnitude in [1e-12, 1e12]";
-                return Err(OutOfRange { field, value, allowed });
+                return Err(Error::out_of_range(field, value, allowed));
             }
         }
         if components.iter().all(|(_, value)| *value == 0.0) {
             let allowed = "at least one of vertical, radial and toroidal is not 0";
-            return Err(OutOfRange { field: "magnetic_field.vertical", value: 0.0, allowed });
+            return Err(Error::out_of_range("magnetic_field.vertical", 0.0, allowed));
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! Optically thin synchrotron emission of electrons with a power law of energies.
 
 use super::{Stokes, SynchrotronView};
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 
 /// Electrons with isotropic momenta and N(γ) ∝ γ^−p, all of whose limits are far from the
 /// Lorentz factors that radiate at the observed frequency: j ∝ ν^−α, p = 2α + 1.
@@ -34,11 +34,11 @@ impl PowerLaw {
     /// # Errors
     /// If α is not in (−1/3, 10\] (flatter spectra come from the low-energy end of the
     /// electrons and not from their power law), or γ₁ not in \[10, 1e12\].
-    pub fn new(spectral_index: f64, lorentz_factor: Option<f64>) -> Result<Self, OutOfRange> {
+    pub fn new(spectral_index: f64, lorentz_factor: Option<f64>) -> Result<Self, Error> {
         let (index, field) = (spectral_index, "effects.spectral_index");
         if !(index > -1.0 / 3.0 && index <= 10.0) {
             let allowed = "with polarization: a number above -1/3 and at most 10";
-            return Err(OutOfRange { field, value: index, allowed });
+            return Err(Error::out_of_range(field, index, allowed));
         }
         let circular = match lorentz_factor {
             None => 0.0,
@@ -47,7 +47,7 @@ impl PowerLaw {
             }
             Some(value) => {
                 let field = "effects.circular_polarization_lorentz_factor";
-                return Err(OutOfRange { field, value, allowed: "a number in [10, 1e12]" });
+                return Err(Error::out_of_range(field, value, "a number in [10, 1e12]"));
             }
         };
         Ok(PowerLaw { index, linear: (index + 1.0) / (index + 5.0 / 3.0), circular })

@@ -27,7 +27,7 @@ use crate::image::exr::Layout;
 use crate::scene::{Rings, Scene};
 use crate::transport::{Assets, Meter, PreparedScene, RayResult, Scratch};
 use grid::Grid;
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 use rayon::prelude::*;
 use rings::{Resolver, Square};
 use std::sync::{Mutex, PoisonError};
@@ -41,7 +41,7 @@ pub type Progress<'a> = dyn Fn(usize) -> bool + Sync + 'a;
 pub enum RenderError {
     /// A value is out of range.
     #[error(transparent)]
-    OutOfRange(#[from] OutOfRange),
+    Range(#[from] Error),
     /// There is no light to scale.
     #[error("`screen.total_flux_jy` cannot be met: the picture's own flux is {0:e} scene units")]
     NoFlux(f64),

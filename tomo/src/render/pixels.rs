@@ -3,7 +3,7 @@
 use super::grid::Grid;
 use super::rings::{Counted, Resolver, Square};
 use crate::transport::{Fate, PreparedScene, RayResult, Scratch};
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 use std::ops::Range;
 
 /// A pixel: averages of light, data of its most central ray.
@@ -62,7 +62,7 @@ impl Workspace {
     }
 
     /// What all rays see, in their order.
-    pub fn observe(&mut self, prepared: &PreparedScene) -> Result<&[RayResult], OutOfRange> {
+    pub fn observe(&mut self, prepared: &PreparedScene) -> Result<&[RayResult], Error> {
         self.seen.clear();
         self.seen.resize(self.alpha.len(), RayResult::default());
         let rays = self.alpha.chunks(BLOCK).zip(self.beta.chunks(BLOCK));
@@ -82,7 +82,7 @@ impl Workspace {
         &mut self,
         prepared: &PreparedScene,
         times: &[f64],
-    ) -> Result<&[RayResult], OutOfRange> {
+    ) -> Result<&[RayResult], Error> {
         self.seen.clear();
         self.seen.resize(self.alpha.len() * times.len(), RayResult::default());
         prepared.observe_block(
@@ -104,7 +104,7 @@ pub(super) fn uniform(
     (rows, columns): (Range<usize>, Range<usize>),
     times: &[f64],
     work: &mut Workspace,
-) -> Result<Vec<Vec<Pixel>>, OutOfRange> {
+) -> Result<Vec<Vec<Pixel>>, Error> {
     let side = grid.side;
     // Whole pixels, about a block's worth of rays: `side`² is at most that.
     let together = (BLOCK / (side * side)).max(1);

@@ -2,7 +2,7 @@
 
 use super::Scene;
 use super::invalid::{Invalid, number};
-use kerrlight_geodesic::{Camera, Inclination, Kerr, Motion, OutOfRange};
+use kerrlight_geodesic::{Camera, Error, Inclination, Kerr, Motion};
 use serde::{Deserialize, Serialize};
 
 /// A table of a camera's place, direction and lens, with more fields before them: unknown keys
@@ -129,7 +129,7 @@ impl CameraConfig {
     ///
     /// # Errors
     /// If nothing can be there or move like that.
-    pub fn camera(&self, hole: &Kerr, time: f64) -> Result<Camera, OutOfRange> {
+    pub fn camera(&self, hole: &Kerr, time: f64) -> Result<Camera, Error> {
         let Pose { values, rates } = self.pose(time);
         let [radius, theta, phi, _, yaw, pitch, roll] = values;
         let place = Inclination::from_degrees(theta)?;
@@ -313,10 +313,10 @@ fn moments(camera: &CameraConfig, time: f64) -> impl Iterator<Item = f64> {
     pieces.chain([time])
 }
 
-fn impossible(camera: &CameraConfig, time: f64, error: &OutOfRange) -> Invalid {
+fn impossible(camera: &CameraConfig, time: f64, error: &Error) -> Invalid {
     let key = if camera.key.is_empty() { "camera.radius" } else { "camera.key" };
-    let allowed = format!("{} (at time {time})", error.allowed);
-    Invalid::new(key, format!("{} {}", error.field, error.value), allowed)
+    let allowed = format!("{} (at time {time})", error.allowed());
+    Invalid::new(key, format!("{} {}", error.field(), error.value()), allowed)
 }
 
 #[cfg(test)]

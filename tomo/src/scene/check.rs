@@ -4,7 +4,7 @@ use super::check_volume::check_volume;
 use super::invalid::{Invalid, brightness, number, positive, shown};
 use super::{Disc, Gas, GasMotion, GasProfile, Mesh, Plunging, Scene, Sky, Spot};
 use crate::polarization::PowerLaw;
-use kerrlight_geodesic::{Kerr, OutOfRange, orbits};
+use kerrlight_geodesic::{Error, Kerr, orbits};
 
 pub(super) fn check(scene: &Scene) -> Result<(), Invalid> {
     check_hole_and_observer(scene)?;
@@ -250,7 +250,7 @@ fn check_polarization(scene: &Scene) -> Result<(), Invalid> {
     let Some(field) = &scene.magnetic_field else {
         return Err(Invalid::missing("magnetic_field", "needed with polarization = true"));
     };
-    let wrong = |error: OutOfRange| Invalid::new(error.field, shown(error.value), error.allowed);
+    let wrong = |error: Error| Invalid::new(error.field(), shown(error.value()), error.allowed());
     field.check().map_err(wrong)?;
     let index = effects.index().unwrap_or(f64::NAN);
     PowerLaw::new(index, circular).map(|_| ()).map_err(wrong)

@@ -2,7 +2,7 @@
 
 use super::invalid::{Invalid, number, shown};
 use crate::dynamics::{AngularVelocity, Axis, Perturbation};
-use kerrlight_geodesic::{Kerr, OutOfRange};
+use kerrlight_geodesic::{Error, Kerr};
 use serde::de::value::{MapAccessDeserializer, StrDeserializer};
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -116,7 +116,7 @@ impl Rotation {
     ///
     /// # Errors
     /// Names the number that is out of its range.
-    pub fn about(&self, hole: &Kerr, axis: Axis) -> Result<Option<AngularVelocity>, OutOfRange> {
+    pub fn about(&self, hole: &Kerr, axis: Axis) -> Result<Option<AngularVelocity>, Error> {
         match self {
             Rotation::None => Ok(None),
             Rotation::Keplerian => {
@@ -132,7 +132,7 @@ impl Velocity {
     ///
     /// # Errors
     /// Names the number that is out of its range.
-    pub fn angular(&self) -> Result<AngularVelocity, OutOfRange> {
+    pub fn angular(&self) -> Result<AngularVelocity, Error> {
         match self.clone() {
             Velocity::Keplerian { drag } => AngularVelocity::Keplerian { drag },
             Velocity::PowerLaw { radius, rate, exponent } => {
@@ -175,8 +175,8 @@ impl Velocity {
     }
 
     fn ranges(&self, key: &str) -> Result<(), Invalid> {
-        let wrong = |error: OutOfRange| {
-            Invalid::new(format!("{key}.{}", error.field), shown(error.value), error.allowed)
+        let wrong = |error: Error| {
+            Invalid::new(format!("{key}.{}", error.field()), shown(error.value()), error.allowed())
         };
         self.angular().map(drop).map_err(wrong)
     }

@@ -5,7 +5,7 @@ use crate::emission::medium::{Emission, Medium};
 use crate::polarization::{Gas, MagneticField, PowerLaw, Stokes, view, view_at};
 use crate::scene::Scene;
 use kerrlight_geodesic::simd::RayNodes;
-use kerrlight_geodesic::{Kerr, OutOfRange, PathPoint, PlaneCrossing, ScreenPoint, ZamoFrame};
+use kerrlight_geodesic::{Error, Kerr, PathPoint, PlaneCrossing, ScreenPoint, ZamoFrame};
 
 /// The field of the gas and its electrons.
 #[derive(Debug, Clone)]
@@ -17,7 +17,7 @@ pub(super) struct Polarization {
 
 impl Polarization {
     /// That of a scene, if it is simulated.
-    pub fn new(scene: &Scene) -> Result<Option<Self>, OutOfRange> {
+    pub fn new(scene: &Scene) -> Result<Option<Self>, Error> {
         let effects = &scene.effects;
         let (Some(field), true) = (scene.magnetic_field, effects.polarization) else {
             return Ok(None);

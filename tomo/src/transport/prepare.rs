@@ -13,7 +13,7 @@ use crate::emission::sky::{Panorama, SkyModel};
 use crate::scene::Scene;
 use crate::volume::VolumeFile;
 use kerrlight_geodesic::{
-    BlockRequest, BlockTracer, Inclination, Kerr, Observer, OutOfRange, Quantities, View,
+    BlockRequest, BlockTracer, Error, Inclination, Kerr, Observer, Quantities, View,
 };
 
 /// A scene with everything computed that does not depend on the ray.
@@ -81,7 +81,7 @@ const SMOOTH: f64 = 0.5;
 ///
 /// # Errors
 /// If a value is outside its range.
-pub(super) fn view(scene: &Scene, hole: &Kerr) -> Result<View, OutOfRange> {
+pub(super) fn view(scene: &Scene, hole: &Kerr) -> Result<View, Error> {
     if let Some(camera) = &scene.camera {
         return Ok(View::Camera(camera.camera(hole, scene.observer.time)?));
     }
@@ -96,7 +96,7 @@ pub(super) fn view(scene: &Scene, hole: &Kerr) -> Result<View, OutOfRange> {
 }
 
 impl Optics {
-    fn new(scene: &Scene) -> Result<Self, OutOfRange> {
+    fn new(scene: &Scene) -> Result<Self, Error> {
         let hole = Kerr::new(scene.hole.spin)?;
         let kept = |name: &str| scene.screen.keeps(name);
         Ok(Optics {
@@ -119,7 +119,7 @@ impl PreparedScene {
     /// # Errors
     /// If a value is outside its range (a parsed [`Scene`] never is), if there is not one file for
     /// each mesh and each volume, or if a mesh's vertex comes to lie too far out.
-    pub fn new(scene: &Scene, assets: impl Into<Assets>) -> Result<Self, OutOfRange> {
+    pub fn new(scene: &Scene, assets: impl Into<Assets>) -> Result<Self, Error> {
         let assets: Assets = assets.into();
         let optics = Optics::new(scene)?;
         let (hole, settings) = (optics.hole, &scene.tracer);
@@ -168,7 +168,7 @@ impl PreparedScene {
     ///
     /// # Errors
     /// If the camera is impossible there.
-    pub fn move_to(&mut self, scene: &Scene) -> Result<(), OutOfRange> {
+    pub fn move_to(&mut self, scene: &Scene) -> Result<(), Error> {
         self.optics.view = view(scene, &self.optics.hole)?;
         self.tracer = self.tracer.clone().with_view(self.optics.view);
         if let Some(sky) = &mut self.sky {

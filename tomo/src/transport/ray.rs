@@ -17,7 +17,7 @@ use crate::emission::medium::Part;
 use kerrlight_geodesic::footprint::Number;
 use kerrlight_geodesic::simd::RayNodes;
 use kerrlight_geodesic::{
-    OutOfRange, Path, PathOfRay, PathUse, PlaneCrossing, Ray, RayBlock, RayVisitor, TracedRay, Work,
+    Error, Path, PathOfRay, PathUse, PlaneCrossing, Ray, RayBlock, RayVisitor, TracedRay, Work,
 };
 use std::sync::Arc;
 
@@ -57,7 +57,7 @@ impl PreparedScene {
         alpha: f64,
         beta: f64,
         scratch: &mut Scratch,
-    ) -> Result<RayResult, OutOfRange> {
+    ) -> Result<RayResult, Error> {
         let mut seen = [RayResult::default()];
         self.observe_block(&[alpha], &[beta], &[self.time], scratch, &mut seen)?;
         let [seen] = seen;
@@ -76,7 +76,7 @@ impl PreparedScene {
         times: &[f64],
         scratch: &mut Scratch,
         seen: &mut [RayResult],
-    ) -> Result<(), OutOfRange> {
+    ) -> Result<(), Error> {
         let Scratch { rays, sources, meter } = scratch;
         sources.media.reset(self.media.len(), alpha.len(), times.len());
         let block = Block { alpha, beta, times };
@@ -158,7 +158,7 @@ impl RayVisitor for Sum<'_> {
         ray: &TracedRay,
         crossings: &[PlaneCrossing],
         path: Option<PathOfRay<'_>>,
-    ) -> Result<(), OutOfRange> {
+    ) -> Result<(), Error> {
         if let (Some(path), true) = (path, ray.stepped) {
             self.add_cells(number, ray, path);
         }
@@ -251,7 +251,7 @@ impl<'a> Sum<'a> {
 
     /// Light of the sky.
     #[inline(always)]
-    fn sky(&mut self, k: usize, ray: &TracedRay) -> Result<[f32; 3], OutOfRange> {
+    fn sky(&mut self, k: usize, ray: &TracedRay) -> Result<[f32; 3], Error> {
         let Some(sky) = &self.scene.sky else { return Ok([0.0; 3]) };
         sky.light(&self.scene.optics, self.place(k), ray, &mut self.sources.beam)
     }

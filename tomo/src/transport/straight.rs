@@ -6,9 +6,7 @@ use super::result::Place;
 use super::sources::media::{MediaRay, finest};
 use kerrlight_geodesic::nodes::{Leg, Node, NodeColumns};
 use kerrlight_geodesic::simd::PanelRule;
-use kerrlight_geodesic::{
-    Observer, OutOfRange, Outcome, PlaneCrossing, Ray, RayVisitor, TracedRay,
-};
+use kerrlight_geodesic::{Error, Observer, Outcome, PlaneCrossing, Ray, RayVisitor, TracedRay};
 
 /// A straight ray. Its parameter χ takes the place of Mino time: dχ = −ds/r², so that χ times the
 /// impact parameter is the angle by which it has turned about the hole.
@@ -155,7 +153,7 @@ const SMALLEST: f64 = 1e-6;
 
 impl Sum<'_> {
     /// Sums up the light along straight rays.
-    pub(super) fn along_lines(&mut self, observer: &Observer) -> Result<(), OutOfRange> {
+    pub(super) fn along_lines(&mut self, observer: &Observer) -> Result<(), Error> {
         let mut columns = NodeColumns::default();
         for k in 0..self.block.alpha.len() {
             let (alpha, beta) = (self.block.alpha[k], self.block.beta[k]);

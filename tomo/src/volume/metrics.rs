@@ -4,7 +4,7 @@
 //! are dark: beside it stand the same inside a mask, the relative error and the correlation.
 
 use super::Volume;
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 
 /// Where an estimate is compared: r_min ≤ r ≤ r_max and |z| ≤ z_width, in M.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,8 +19,8 @@ impl Mask {
     ///
     /// # Errors
     /// Names the number that is not in its range.
-    pub fn new(r_min: f64, r_max: f64, z_width: f64) -> Result<Self, OutOfRange> {
-        let wrong = |field, value, allowed| Err(OutOfRange { field, value, allowed });
+    pub fn new(r_min: f64, r_max: f64, z_width: f64) -> Result<Self, Error> {
+        let wrong = |field, value, allowed| Err(Error::out_of_range(field, value, allowed));
         if !(r_min.is_finite() && r_min >= 0.0) {
             return wrong("r_min", r_min, "0 or more");
         }
@@ -188,7 +188,7 @@ mod tests {
         for (r_min, r_max, z_width, field) in
             [(-1.0, 2.0, 1.0, "r_min"), (2.0, 2.0, 1.0, "r_max"), (0.0, 2.0, f64::NAN, "z_width")]
         {
-            assert_eq!(Mask::new(r_min, r_max, z_width).unwrap_err().field, field);
+            assert_eq!(Mask::new(r_min, r_max, z_width).unwrap_err().field(), field);
         }
     }
 

@@ -11,7 +11,7 @@ pub mod vti;
 
 use crate::dynamics::Axis;
 pub use file::{VolumeArrays, VolumeFileError};
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 use kerrlight_geodesic::vector::rotate;
 pub use panels::Shown;
 
@@ -38,7 +38,7 @@ pub struct VolumeFile {
 pub enum VolumeError {
     /// A number of its shape.
     #[error(transparent)]
-    Range(#[from] OutOfRange),
+    Range(#[from] Error),
     /// As many values as nodes are needed.
     #[error("{found} values are not allowed: {wanted}, one a node")]
     Length {
@@ -68,7 +68,7 @@ impl Volume {
         high: [f64; 3],
         values: Vec<f32>,
     ) -> Result<Self, VolumeError> {
-        let range = |field, value, allowed| Err(OutOfRange { field, value, allowed });
+        let range = |field, value, allowed| Err(Error::out_of_range(field, value, allowed));
         for axis in 0..3 {
             if !(2..=2048).contains(&nodes[axis]) {
                 range("nodes", nodes[axis] as f64, "2 to 2048 along each axis")?;

@@ -6,7 +6,7 @@
 
 use super::rays::{Angle, Draw, beside_critical_curve, in_disc, log_uniform};
 use super::{Oracle, TrueError};
-use kerrlight_geodesic::{Integrator, Kerr, OutOfRange, Placement, Points, RayTable, Request};
+use kerrlight_geodesic::{Error, Integrator, Kerr, Placement, Points, RayTable, Request};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
@@ -92,7 +92,7 @@ impl Class {
         }
     }
 
-    fn draw(self, rng: &mut impl Rng) -> Result<Draw, OutOfRange> {
+    fn draw(self, rng: &mut impl Rng) -> Result<Draw, Error> {
         let spin = self.spin(rng);
         let mut inclination = f64::acos(rng.random_range(-1.0..1.0));
         if self == Class::NearAxis {
@@ -118,7 +118,7 @@ impl Class {
     }
 
     /// Random rays of this class that their observer sees.
-    pub fn rays(self, n: usize, seed: u64) -> Result<Vec<Draw>, OutOfRange> {
+    pub fn rays(self, n: usize, seed: u64) -> Result<Vec<Draw>, Error> {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let mut rays = Vec::with_capacity(n);
         while rays.len() < n {
@@ -139,7 +139,7 @@ fn beside_edge(
     spin: f64,
     inclination: Angle,
     radius: f64,
-) -> Result<[f64; 2], OutOfRange> {
+) -> Result<[f64; 2], Error> {
     let hole = Kerr::new(spin)?;
     let [x, y] = in_disc(rng, 1.0);
     let observer = Draw { spin, inclination, radius, alpha: x, beta: y }.observer()?;
@@ -303,9 +303,9 @@ pub fn run(
     settings: &[(Integrator, f64)],
     n: usize,
     seed: u64,
-) -> Result<Vec<Row>, OutOfRange> {
+) -> Result<Vec<Row>, Error> {
     let rays = class.rays(n, seed)?;
-    let of_ray = |oracle: &mut Oracle, ray: &Draw| -> Result<Vec<Result<Judged, ()>>, OutOfRange> {
+    let of_ray = |oracle: &mut Oracle, ray: &Draw| -> Result<Vec<Result<Judged, ()>>, Error> {
         oracle.trace(ray)?;
         let both = settings
             .iter()

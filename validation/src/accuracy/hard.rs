@@ -4,7 +4,7 @@
 use super::rays::{Angle, Draw, beside_critical_curve, in_disc, log_uniform};
 use super::{Oracle, TrueError};
 use kerrlight_geodesic::{
-    Integrator, Kerr, OutOfRange, Outcome, Placement, RayTable, Request, Uncertainty, Unresolved,
+    Error, Integrator, Kerr, Outcome, Placement, RayTable, Request, Uncertainty, Unresolved,
 };
 use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -119,7 +119,7 @@ pub fn run(
     rays: u64,
     seed: u64,
     progress: impl Fn(u64) -> bool + Sync,
-) -> Result<Vec<Tally>, OutOfRange> {
+) -> Result<Vec<Tally>, Error> {
     let batches = rays.div_ceil(BATCH);
     let nothing = || Kind::ALL.map(Tally::new).to_vec();
     (0..batches)
@@ -168,7 +168,7 @@ fn inclination(rng: &mut impl Rng) -> Angle {
 }
 
 /// A random hard ray.
-fn draw(rng: &mut impl Rng, kind: Kind) -> Result<Draw, OutOfRange> {
+fn draw(rng: &mut impl Rng, kind: Kind) -> Result<Draw, Error> {
     let (spin, inclination) = (spin(rng), inclination(rng));
     let [alpha, beta] = match kind {
         Kind::Strong => in_disc(rng, 15.0),
@@ -198,7 +198,7 @@ fn judge(
     tolerance: f64,
     oracle: &mut Oracle,
     tally: &mut Tally,
-) -> Result<(), OutOfRange> {
+) -> Result<(), Error> {
     let request = Request {
         crossings: MOST_CROSSINGS,
         uncertainty: true,

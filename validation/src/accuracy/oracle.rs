@@ -1,9 +1,7 @@
 //! The answers that traced rays are held against.
 
 use super::rays::Draw;
-use kerrlight_geodesic::{
-    Double, Kerr, OutOfRange, Outcome, Path, PathPoint, Quantities, trace_series,
-};
+use kerrlight_geodesic::{Double, Error, Kerr, Outcome, Path, PathPoint, Quantities, trace_series};
 use std::f64::consts::TAU;
 
 /// Tolerance of the oracle: far below what a double can hold.
@@ -50,7 +48,7 @@ impl Oracle {
     ///
     /// # Errors
     /// If a value is out of its range.
-    pub fn trace(&mut self, ray: &Draw) -> Result<(), OutOfRange> {
+    pub fn trace(&mut self, ray: &Draw) -> Result<(), Error> {
         let hole = Kerr::from_spin(Double::from(ray.spin))?;
         let observer = ray.observer()?.widen();
         let ray = observer.ray(&hole, Double::from(ray.alpha), Double::from(ray.beta))?;

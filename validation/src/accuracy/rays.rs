@@ -1,7 +1,7 @@
 //! Random rays of every kind, the same for the same seed.
 
 use kerrlight_geodesic::analytic::CriticalCurve;
-use kerrlight_geodesic::{Inclination, Kerr, Observer, OutOfRange};
+use kerrlight_geodesic::{Error, Inclination, Kerr, Observer};
 use rand::{Rng, RngExt};
 use std::f64::consts::{PI, TAU};
 
@@ -56,7 +56,7 @@ impl Angle {
     ///
     /// # Errors
     /// If it is out of range.
-    pub fn inclination(self) -> Result<Inclination, OutOfRange> {
+    pub fn inclination(self) -> Result<Inclination, Error> {
         match self {
             Angle::Radians(angle) => Inclination::from_radians(angle),
             Angle::Degrees(angle) => Inclination::from_degrees(angle),
@@ -84,7 +84,7 @@ impl Draw {
     ///
     /// # Errors
     /// If a value is out of its range.
-    pub fn observer(&self) -> Result<Observer, OutOfRange> {
+    pub fn observer(&self) -> Result<Observer, Error> {
         let inclination = self.inclination.inclination()?;
         if self.radius.is_finite() {
             Observer::at_radius(inclination, self.radius)
@@ -114,7 +114,7 @@ pub fn beside_critical_curve(
     spin: f64,
     inclination: Angle,
     distance: f64,
-) -> Result<[f64; 2], OutOfRange> {
+) -> Result<[f64; 2], Error> {
     let curve = CriticalCurve::new(&Kerr::new(spin)?, inclination.inclination()?);
     let point = curve.point(rng.random_range(0.0..TAU));
     let factor = if rng.random() { 1.0 + distance } else { 1.0 - distance };
@@ -125,12 +125,7 @@ pub fn beside_critical_curve(
 ///
 /// # Errors
 /// If the spin is out of range.
-pub fn draw(
-    rng: &mut impl Rng,
-    class: Class,
-    spin: f64,
-    n: usize,
-) -> Result<Vec<Draw>, OutOfRange> {
+pub fn draw(rng: &mut impl Rng, class: Class, spin: f64, n: usize) -> Result<Vec<Draw>, Error> {
     let mut inclination = f64::acos(rng.random_range(-1.0..1.0));
     if class == Class::NearPolar {
         inclination = log_uniform(rng, -10.0, -1.0);

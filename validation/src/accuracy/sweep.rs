@@ -2,7 +2,7 @@
 
 use super::rays::{Class, Draw, draw};
 use super::{Oracle, TrueError};
-use kerrlight_geodesic::{Integrator, Kerr, OutOfRange, Placement, RayTable, Request, Uncertainty};
+use kerrlight_geodesic::{Error, Integrator, Kerr, Placement, RayTable, Request, Uncertainty};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
@@ -88,7 +88,7 @@ fn counts(class: Class, spin: f64, radius: f64) -> bool {
 ///
 /// # Errors
 /// If a spin or tolerance is out of range.
-pub fn run(sweep: &Sweep, progress: impl Fn(usize, usize) -> bool) -> Result<Vec<Row>, OutOfRange> {
+pub fn run(sweep: &Sweep, progress: impl Fn(usize, usize) -> bool) -> Result<Vec<Row>, Error> {
     let mut rows = Vec::new();
     let groups = Class::ALL.len() * sweep.spins.len();
     let mut done = 0;
@@ -136,7 +136,7 @@ fn judge(
     rays: &[Draw],
     class: Class,
     settings: &[(Integrator, f64)],
-) -> Result<Vec<Vec<Judged>>, OutOfRange> {
+) -> Result<Vec<Vec<Judged>>, Error> {
     let placement = Placement::MinoTime(points(class));
     let request = Request { uncertainty: true, ..Request::samples(placement) };
     let judged = rays
@@ -148,7 +148,7 @@ fn judge(
                 let table = trace(one, *setting, &request)?;
                 Ok(judged(&table, class, ray.spin, oracle))
             };
-            settings.iter().map(judge).collect::<Result<Vec<_>, OutOfRange>>()
+            settings.iter().map(judge).collect::<Result<Vec<_>, Error>>()
         })
         .collect::<Result<Vec<_>, _>>()?;
     let mut columns: Vec<Vec<Judged>> = settings.iter().map(|_| Vec::new()).collect();
@@ -176,7 +176,7 @@ fn trace(
     rays: &[Draw],
     (integrator, tolerance): (Integrator, f64),
     request: &Request,
-) -> Result<RayTable, OutOfRange> {
+) -> Result<RayTable, Error> {
     let (hole, observer) = (Kerr::new(rays[0].spin)?, rays[0].observer()?);
     let column = |value: fn(&Draw) -> f64| rays.iter().map(value).collect::<Vec<_>>();
     let (alpha, beta) = (column(|ray| ray.alpha), column(|ray| ray.beta));
@@ -184,9 +184,9 @@ fn trace(
 }
 
 /// ns a ray and ns a sample on one core: the best of a few runs of at least a millisecond.
-fn time(rays: &[Vec<Draw>], setting: (Integrator, f64)) -> Result<[f64; 2], OutOfRange> {
+fn time(rays: &[Vec<Draw>], setting: (Integrator, f64)) -> Result<[f64; 2], Error> {
     let count = rays.iter().map(Vec::len).sum::<usize>() as f64;
-    let best = |points: usize| -> Result<f64, OutOfRange> {
+    let best = |points: usize| -> Result<f64, Error> {
         let samples = if points == 0 { Placement::None } else { Placement::MinoTime(points) };
         let request = Request::samples(samples);
         let mut best = f64::INFINITY;

@@ -4,7 +4,7 @@ use super::request::{BlockRequest, SphereNodes};
 use super::traced::{PlaneCrossing, TracedRay};
 use super::tracer::{BlockTracer, Job, RayBlock};
 use super::visitor::{PathUse, RayVisitor, Work, first_opaque};
-use crate::error::OutOfRange;
+use crate::error::Error;
 use crate::integrate::path::Outcome;
 use crate::screen::observer::{Observer, Ray};
 use crate::simd::{Crossings, NodeRequest, RayEnds};
@@ -64,7 +64,7 @@ impl BlockTracer {
         job: Job<'_>,
         block: &mut RayBlock,
         visitor: &mut V,
-    ) -> Result<(), OutOfRange> {
+    ) -> Result<(), Error> {
         let located = job.request.crossings.max(1);
         block.crossings.trace(&self.hole, observer, job.alpha, job.beta, located)?;
         self.classify(observer, job, block, visitor)?;
@@ -89,7 +89,7 @@ impl BlockTracer {
         job: Job<'_>,
         block: &mut RayBlock,
         visitor: &V,
-    ) -> Result<(), OutOfRange> {
+    ) -> Result<(), Error> {
         let BlockRequest { crossings, rates, half_orbits, paths, .. } = *job.request;
         let with_ray = rates || paths || half_orbits.is_some();
         let most = half_orbits.map_or(usize::MAX, |n| n as usize + 1);
@@ -157,7 +157,7 @@ impl BlockTracer {
         job: Job<'_>,
         RayBlock { rays, nodes, .. }: &mut RayBlock,
         visitor: &V,
-    ) -> Result<(), OutOfRange> {
+    ) -> Result<(), Error> {
         let open: Vec<usize> = (0..rays.len()).filter(|k| !rays[*k].stepped).collect();
         let [alpha, beta] = job.pick(&open);
         let until: Vec<f64> = open.iter().map(|k| rays[*k].last_time()).collect();
@@ -180,7 +180,7 @@ impl BlockTracer {
         observer: &Observer,
         job: Job<'_>,
         RayBlock { rays, samples, .. }: &mut RayBlock,
-    ) -> Result<(), OutOfRange> {
+    ) -> Result<(), Error> {
         let leaves = |ray: &TracedRay| {
             ray.outcome == Outcome::Escaped && ray.surface.is_none() && !ray.stepped
         };
@@ -208,7 +208,7 @@ impl BlockTracer {
         job: Job<'_>,
         block: &mut RayBlock,
         visitor: &mut V,
-    ) -> Result<(), OutOfRange> {
+    ) -> Result<(), Error> {
         let RayBlock { rays, plane, nodes, .. } = block;
         let mut pending: Vec<usize> = (0..rays.len()).filter(|k| !rays[*k].stepped).collect();
         let mut request = sphere.request.clone();

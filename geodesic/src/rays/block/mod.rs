@@ -13,7 +13,7 @@ pub use traced::{PathOfRay, PlaneCrossing, TracedRay};
 pub use tracer::{BlockTracer, RayBlock};
 pub use visitor::{PathUse, RayVisitor, Work};
 
-use crate::error::OutOfRange;
+use crate::error::Error;
 use crate::rays::integrator::check_columns;
 use tracer::Job;
 
@@ -31,7 +31,7 @@ impl BlockTracer {
         request: &BlockRequest,
         block: &mut RayBlock,
         visitor: &mut V,
-    ) -> Result<(), OutOfRange> {
+    ) -> Result<(), Error> {
         let job = Job { alpha, beta, request };
         block.rays.clear();
         block.plane.clear();
@@ -55,7 +55,7 @@ impl BlockTracer {
         job: Job<'_>,
         block: &mut RayBlock,
         visitor: &mut V,
-    ) -> Result<(), OutOfRange> {
+    ) -> Result<(), Error> {
         if block.rays[k].stepped {
             return self.finish_stepped(k, job, block, visitor);
         }

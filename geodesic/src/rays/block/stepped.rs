@@ -4,7 +4,7 @@ use super::request::BlockRequest;
 use super::traced::{PathOfRay, PlaneCrossing, TracedRay};
 use super::tracer::{BlockTracer, Job, RayBlock};
 use super::visitor::{RayVisitor, Work, first_opaque};
-use crate::error::OutOfRange;
+use crate::error::Error;
 use crate::integrate::path::Outcome;
 use crate::rays::nodes;
 use crate::screen::observer::Ray;
@@ -20,7 +20,7 @@ impl BlockTracer {
         job: Job<'_>,
         block: &mut RayBlock,
         visitor: &mut V,
-    ) -> Result<(), OutOfRange> {
+    ) -> Result<(), Error> {
         visitor.works_on(Work::Rays);
         let ray = self.view.ray(&self.hole, job.alpha[k], job.beta[k])?;
         block.rays[k] = self.step(&ray, job.request, block, visitor);
@@ -41,7 +41,7 @@ impl BlockTracer {
         job: Job<'_>,
         block: &mut RayBlock,
         visitor: &mut V,
-    ) -> Result<(), OutOfRange> {
+    ) -> Result<(), Error> {
         visitor.works_on(Work::Rays);
         let ray = self.view.ray(&self.hole, job.alpha[k], job.beta[k])?;
         let (RayBlock { rays, plane, path, .. }, tolerance) = (block, self.tracer.tolerance());

@@ -3,7 +3,7 @@
 use super::request::BlockRequest;
 use super::traced::{PlaneCrossing, TracedRay};
 use crate::analytic::ClosedForm;
-use crate::error::OutOfRange;
+use crate::error::Error;
 use crate::integrate::path::Path;
 use crate::integrate::trace::{Method, Tracer};
 use crate::rays::integrator::Integrator;
@@ -17,7 +17,7 @@ use crate::spacetime::kerr::Kerr;
 ///
 /// ```
 /// use kerrlight_geodesic::{
-///     BlockRequest, BlockTracer, Inclination, Integrator, Kerr, Observer, OutOfRange, PathOfRay,
+///     BlockRequest, BlockTracer, Inclination, Integrator, Kerr, Observer, Error, PathOfRay,
 ///     PlaneCrossing, RayBlock, RayVisitor, TracedRay, View,
 /// };
 ///
@@ -35,7 +35,7 @@ use crate::spacetime::kerr::Kerr;
 ///         ray: &TracedRay,
 ///         crossings: &[PlaneCrossing],
 ///         _path: Option<PathOfRay<'_>>,
-///     ) -> Result<(), OutOfRange> {
+///     ) -> Result<(), Error> {
 ///         let hit = crossings.iter().find(|crossing| Some(crossing.mino_time) == ray.surface);
 ///         self.0.push(hit.map(|hit| hit.radius));
 ///         Ok(())
@@ -49,7 +49,7 @@ use crate::spacetime::kerr::Kerr;
 /// let mut disc = Disc(Vec::new());
 /// tracer.trace(&[-9.0, 0.1], &[3.0, 0.1], &request, &mut RayBlock::default(), &mut disc)?;
 /// assert!(disc.0[0].is_some());
-/// # Ok::<(), OutOfRange>(())
+/// # Ok::<(), Error>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct BlockTracer {
@@ -106,11 +106,11 @@ impl BlockTracer {
         view: View,
         integrator: Integrator,
         tolerance: f64,
-    ) -> Result<Self, OutOfRange> {
+    ) -> Result<Self, Error> {
         let closed_form = integrator == Integrator::Elliptic;
         let method = if closed_form { Some(Method::Taylor) } else { integrator.method() };
         let allowed = "an integrator in Mino time";
-        let method = method.ok_or(OutOfRange { field: "integrator", value: f64::NAN, allowed })?;
+        let method = method.ok_or(Error::out_of_range("integrator", f64::NAN, allowed))?;
         Ok(BlockTracer { hole, view, tracer: Tracer::with_method(method, tolerance)?, closed_form })
     }
 

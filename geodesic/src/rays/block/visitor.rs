@@ -1,7 +1,7 @@
 //! What a block of rays is traced for.
 
 use super::traced::{PathOfRay, PlaneCrossing, TracedRay};
-use crate::error::OutOfRange;
+use crate::error::Error;
 use crate::screen::observer::Ray;
 use crate::simd::RayNodes;
 
@@ -56,7 +56,7 @@ pub trait RayVisitor {
         ray: &TracedRay,
         crossings: &[PlaneCrossing],
         path: Option<PathOfRay<'_>>,
-    ) -> Result<(), OutOfRange>;
+    ) -> Result<(), Error>;
 
     /// Told what is worked on from now on.
     fn works_on(&mut self, work: Work) {

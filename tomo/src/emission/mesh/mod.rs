@@ -11,7 +11,7 @@ pub use file::{Material, MeshError, MeshFile, RawTriangle, Resources};
 use crate::scene::{Mesh, MeshVelocity};
 use kerrlight_geodesic::flow::rotating_redshift;
 use kerrlight_geodesic::vector::{cross, difference, dot, rotate};
-use kerrlight_geodesic::{Kerr, OutOfRange, PathPoint};
+use kerrlight_geodesic::{Error, Kerr, PathPoint};
 
 /// A triangle with what a test against it needs.
 #[derive(Debug, Clone)]
@@ -110,7 +110,7 @@ impl MeshModel {
     ///
     /// # Errors
     /// If a vertex comes to lie farther than 1e7 M from the hole.
-    pub fn new(mesh: &Mesh, file: &MeshFile) -> Result<Self, OutOfRange> {
+    pub fn new(mesh: &Mesh, file: &MeshFile) -> Result<Self, Error> {
         let norm = dot(mesh.rotation_axis, mesh.rotation_axis).sqrt();
         let (axis, angle) = (mesh.rotation_axis.map(|x| x / norm), mesh.rotation_deg.to_radians());
         let place = |x: [f64; 3]| {
@@ -124,7 +124,7 @@ impl MeshModel {
             // Infinite or NaN where scale or file are out of all bounds.
             if far.is_nan() || far > FARTHEST {
                 let allowed = "vertices within 1e7 M of the hole: see `scale` and `position`";
-                return Err(OutOfRange { field: "mesh vertex distance", value: far, allowed });
+                return Err(Error::out_of_range("mesh vertex distance", far, allowed));
             }
             triangles.extend(Triangle::new(corners, raw.texture, raw.material));
         }

@@ -2,7 +2,7 @@
 
 use crate::fit::FrameTerm;
 use crate::simd::Float;
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 
 /// Data with the weight of their reduced χ².
 #[derive(Clone, Copy)]
@@ -24,8 +24,8 @@ impl<'a, T: Float> Data<'a, T> {
         frames: &[usize],
         pixels: usize,
         of_movie: usize,
-    ) -> Result<Self, OutOfRange> {
-        let range = |field, value, allowed| Err(OutOfRange { field, value, allowed });
+    ) -> Result<Self, Error> {
+        let range = |field, value, allowed| Err(Error::out_of_range(field, value, allowed));
         if frames.is_empty() {
             return range("frames", 0.0, "1 or more");
         }

@@ -3,10 +3,10 @@
 use super::walk::Voxels;
 use crate::points::Coordinates;
 use crate::representation::{Representation, Workspace};
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 
 /// Values at the nodes of another grid.
-pub(super) fn refined(from: &Voxels, x: &[f64], to: &Voxels) -> Result<Vec<f64>, OutOfRange> {
+pub(super) fn refined(from: &Voxels, x: &[f64], to: &Voxels) -> Result<Vec<f64>, Error> {
     let nodes: Vec<[f64; 3]> = (0..to.count()).map(|k| to.position(k)).collect();
     let column = |c: usize| {
         let clamp = |at: &[f64; 3]| at[c].clamp(from.low[c], from.high[c]);

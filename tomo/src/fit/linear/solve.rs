@@ -13,7 +13,7 @@ use crate::dynamics::Axis;
 use crate::fit::ForwardModel;
 use crate::simd::Float;
 use core::ops::ControlFlow;
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 
 /// min Σ weight · χ²/data + priors over 0 ≤ e ≤ `upper` at the nodes of a grid.
 #[derive(Clone, Copy)]
@@ -191,7 +191,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         objective.finite(found.value, &found.x)
     }
 
-    pub(super) fn data(&self) -> Result<Data<'_, T>, OutOfRange> {
+    pub(super) fn data(&self) -> Result<Data<'_, T>, Error> {
         Data::new(self.terms, self.frames, self.model.pixels(), self.model.frames())
     }
 
@@ -199,10 +199,10 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         Walk::new(self.model, self.axis, self.voxels)
     }
 
-    fn check(&self, settings: &LinearSettings) -> Result<(), OutOfRange> {
+    fn check(&self, settings: &LinearSettings) -> Result<(), Error> {
         let LinearProblem { upper, flux, .. } = *self;
         let check = |field, value: f64, ok, allowed| {
-            if ok { Ok(()) } else { Err(OutOfRange { field, value, allowed }) }
+            if ok { Ok(()) } else { Err(Error::out_of_range(field, value, allowed)) }
         };
         self.voxels.grid()?;
         let positive = |x: f64| x.is_finite() && x > 0.0;

@@ -6,7 +6,7 @@ use crate::fit::regulariser::Shape;
 use crate::points::{Coordinates, CoordinatesMut};
 use crate::representation::{Activation, Grid, GridSettings};
 use crate::simd::Float;
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 
 /// A grid of voxels, trilinear in between, zero outside; nodes at both ends, z fastest.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,7 +29,7 @@ impl Voxels {
     ///
     /// # Errors
     /// If a number is out of its range.
-    pub fn grid(&self) -> Result<Grid, OutOfRange> {
+    pub fn grid(&self) -> Result<Grid, Error> {
         let Self { nodes, low, high } = *self;
         Grid::new(GridSettings { nodes, low, high, activation: Activation::Linear, initial: 0.0 })
     }

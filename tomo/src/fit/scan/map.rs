@@ -6,7 +6,7 @@ use crate::image::canvas::{Align, BLACK, Canvas, Rgb, WHITE};
 use crate::image::colormap::Colormap;
 use core::f64::consts::{FRAC_PI_2, PI, SQRT_2};
 use image::RgbImage;
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 
 /// Points of the lattice that a pixel's loss is the weighted mean of.
 const NEAREST: usize = 4;
@@ -49,8 +49,8 @@ impl AxisScan {
     ///
     /// # Errors
     /// If the width is not 64 to 8192.
-    pub fn picture(&self, width: u32, colors: Colormap) -> Result<RgbImage, OutOfRange> {
-        let refused = OutOfRange { field: "map width", value: width.into(), allowed: "64 to 8192" };
+    pub fn picture(&self, width: u32, colors: Colormap) -> Result<RgbImage, Error> {
+        let refused = Error::out_of_range("map width", width.into(), "64 to 8192");
         if !(64..=8192).contains(&width) {
             return Err(refused);
         }

@@ -12,7 +12,7 @@ use super::ForwardModel;
 use super::linear::{LinearError, LinearProblem, Prior, Voxels, Weighted};
 use crate::dynamics::Axis;
 use crate::simd::Float;
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 use rayon::prelude::*;
 use refine::Refinement;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -110,9 +110,9 @@ pub fn lattice(directions: usize) -> Vec<Axis> {
 }
 
 impl AxisSettings {
-    fn checked(self) -> Result<Self, OutOfRange> {
+    fn checked(self) -> Result<Self, Error> {
         let check = |field, value: usize, ok, allowed| {
-            if ok { Ok(()) } else { Err(OutOfRange { field, value: value as f64, allowed }) }
+            if ok { Ok(()) } else { Err(Error::out_of_range(field, value as f64, allowed)) }
         };
         check("directions", self.directions, self.directions >= 8, "8 or more")?;
         check("candidates", self.candidates, self.candidates >= 2, "2 or more")?;

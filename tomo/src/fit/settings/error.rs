@@ -94,7 +94,7 @@ other!(
     crate::interferometry::earth::EarthError,
     crate::interferometry::schedule::ScheduleError,
     crate::volume::VolumeError,
-    kerrlight_geodesic::OutOfRange,
+    kerrlight_geodesic::Error,
     toml::de::Error,
     toml::ser::Error,
 );

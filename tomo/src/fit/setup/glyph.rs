@@ -2,7 +2,7 @@
 
 use crate::fit::settings::GlyphShape;
 use crate::image::canvas::coverage;
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 use kerrlight_geodesic::vector::{cross, dot, rotate};
 
 /// Pixels of a letter's height.
@@ -32,7 +32,7 @@ impl Glyph {
     ///
     /// # Errors
     /// If a number is out of its range, the font has no such letter, or its centre lies on the axis.
-    pub fn new(shape: &GlyphShape, axis: [f64; 3]) -> Result<Self, OutOfRange> {
+    pub fn new(shape: &GlyphShape, axis: [f64; 3]) -> Result<Self, Error> {
         let GlyphShape { letter, center, height, thickness, softness, amplitude } = *shape;
         let positive = |x: f64| x > 0.0 && x.is_finite();
         let up = across(center, axis);
@@ -49,14 +49,14 @@ impl Glyph {
             ("distance of center from the axis", 0.0, up.is_some(), "above 0"),
         ] {
             if !ok {
-                return Err(OutOfRange { field, value, allowed });
+                return Err(Error::out_of_range(field, value, allowed));
             }
         }
-        let no_letter = OutOfRange {
-            field: "letter",
-            value: f64::from(u32::from(letter)),
-            allowed: "one that the font has a picture of",
-        };
+        let no_letter = Error::out_of_range(
+            "letter",
+            f64::from(u32::from(letter)),
+            "one that the font has a picture of",
+        );
         let (Some(up), Some((width, covered))) = (up, coverage(letter, RESOLUTION)) else {
             return Err(no_letter);
         };

@@ -22,7 +22,7 @@ use super::rings::{Counted, Resolver, Square};
 use crate::transport::{Fate, PreparedScene, RayResult};
 use cell::Cell;
 use cut::Cut;
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 use light::{Light, range};
 use std::ops::Range;
 
@@ -47,7 +47,7 @@ impl Adaptive<'_> {
         &self,
         rectangle: (Range<usize>, Range<usize>),
         work: &mut Workspace,
-    ) -> Result<Vec<Pixel>, OutOfRange> {
+    ) -> Result<Vec<Pixel>, Error> {
         let (mut pixels, mut cuts) = self.first(rectangle, work)?;
         let middles = self.middles(&pixels, &mut cuts, work)?;
         work.clear();
@@ -80,7 +80,7 @@ impl Adaptive<'_> {
         pixels: &[Pixel],
         cuts: &mut [Cut],
         work: &mut Workspace,
-    ) -> Result<Vec<Light>, OutOfRange> {
+    ) -> Result<Vec<Light>, Error> {
         let mut seen: Vec<RayResult> = cuts.iter().map(|cut| pixels[cut.pixel].center).collect();
         let square = |cut: &Cut| self.grid.square(cut.column, cut.row, [0.0; 2], 1.0);
         let squares: Vec<Square> = cuts.iter().map(square).collect();
@@ -93,7 +93,7 @@ impl Adaptive<'_> {
     }
 
     /// The light of the squares of `work`.
-    fn sample(&self, work: &mut Workspace) -> Result<Vec<Light>, OutOfRange> {
+    fn sample(&self, work: &mut Workspace) -> Result<Vec<Light>, Error> {
         let mut seen = work.observe(self.prepared)?.to_vec();
         let squares = work.squares().to_vec();
         let counted = self.resolve(&squares, &mut seen, work)?;
@@ -105,7 +105,7 @@ impl Adaptive<'_> {
         squares: &[Square],
         seen: &mut [RayResult],
         work: &mut Workspace,
-    ) -> Result<Vec<Counted>, OutOfRange> {
+    ) -> Result<Vec<Counted>, Error> {
         let Some(rings) = self.rings else { return Ok(vec![Counted::default(); seen.len()]) };
         rings.resolve(self.prepared, squares, &[self.prepared.time()], seen, work)
     }
@@ -115,7 +115,7 @@ impl Adaptive<'_> {
         &self,
         going: Vec<(Cut, Vec<Cell>)>,
         work: &mut Workspace,
-    ) -> Result<Vec<Cut>, OutOfRange> {
+    ) -> Result<Vec<Cut>, Error> {
         work.clear();
         for (cut, parents) in &going {
             for parent in parents {
@@ -144,7 +144,7 @@ impl Adaptive<'_> {
         &self,
         (rows, columns): (Range<usize>, Range<usize>),
         work: &mut Workspace,
-    ) -> Result<(Vec<Pixel>, Vec<Cut>), OutOfRange> {
+    ) -> Result<(Vec<Pixel>, Vec<Cut>), Error> {
         let Self { grid, rings, tolerance, .. } = *self;
         // With the neighbours that there are.
         let around = |range: &Range<usize>, count: usize| {

@@ -4,7 +4,7 @@ use super::Adaptive;
 use crate::render::grid::Grid;
 use crate::render::pixels::Workspace;
 use crate::transport::PreparedScene;
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 use rayon::prelude::*;
 
 /// The share of the allowed error for which the tolerance of a pixel is chosen.
@@ -22,7 +22,7 @@ pub(in crate::render) fn tolerance(
     prepared: &PreparedScene,
     grid: &Grid,
     image_error: f64,
-) -> Result<f64, OutOfRange> {
+) -> Result<f64, Error> {
     let cut = grid.width.max(grid.height).div_ceil(COARSE);
     let coarse = Grid {
         width: grid.width.div_ceil(cut),
@@ -43,7 +43,7 @@ pub(in crate::render) fn tolerance(
         let sum: f64 = pixels.iter().map(|pixel| pixel.intensity * k * k).sum();
         Ok((errors, sum))
     });
-    let lines = lines.collect::<Result<Vec<_>, OutOfRange>>()?;
+    let lines = lines.collect::<Result<Vec<_>, Error>>()?;
     let sum: f64 = lines.iter().map(|(_, sum)| sum).sum();
     let errors = lines.into_iter().flat_map(|(errors, _)| errors).collect();
     Ok(allowed(errors, SAFETY * image_error * sum))

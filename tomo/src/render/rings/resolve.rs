@@ -3,7 +3,7 @@
 use super::{RingStrata, Stratum};
 use crate::render::pixels::Workspace;
 use crate::transport::{Fate, PreparedScene, RayResult};
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 use std::ops::Range;
 
 /// Resolves the photon rings of a prepared scene.
@@ -62,7 +62,7 @@ impl Resolver {
         times: &[f64],
         seen: &mut [RayResult],
         work: &mut Workspace,
-    ) -> Result<Vec<Counted>, OutOfRange> {
+    ) -> Result<Vec<Counted>, Error> {
         let mut counted = vec![Counted::default(); seen.len()];
         let mut rays = Vec::new();
         let mut jobs = Vec::new();
@@ -104,7 +104,7 @@ impl Resolver {
         seen: &[RayResult],
         jobs: &mut Vec<Job>,
         work: &mut Workspace,
-    ) -> Result<(), OutOfRange> {
+    ) -> Result<(), Error> {
         let hidden = |seen: &RayResult| seen.fate == Fate::Surface && seen.disc_images == 1;
         let asked = |job: &&Job| seen.get(job.square).is_some_and(hidden);
         work.clear();

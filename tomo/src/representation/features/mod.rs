@@ -11,7 +11,7 @@ use super::{Activation, Coordinates, CoordinatesMut, Gradient, Groups, Represent
 use crate::simd::{Float, InstructionSet, dispatch};
 use core::ops::Range;
 use kernels::{Backward, Corners, Forward};
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 use layout::{FEATURES, Layout, MAX_LEVELS, WIDTH};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -61,9 +61,9 @@ impl FeatureGrid {
     ///
     /// # Errors
     /// If a number is out of its range.
-    pub fn new(settings: FeatureGridSettings) -> Result<Self, OutOfRange> {
+    pub fn new(settings: FeatureGridSettings) -> Result<Self, Error> {
         let check = |field, value, ok, allowed| {
-            if ok { Ok(()) } else { Err(OutOfRange { field, value, allowed }) }
+            if ok { Ok(()) } else { Err(Error::out_of_range(field, value, allowed)) }
         };
         let FeatureGridSettings { coarsest, levels, low, high, .. } = &settings;
         check("levels", *levels as f64, (1..=6).contains(levels), "1 to 6")?;

@@ -4,7 +4,7 @@ use super::super::{Activation, Coordinates};
 use super::Share;
 use super::scatter::{Contribution, NOWHERE};
 use crate::simd::{Float, Lanes, MAX_LANES, Task, math};
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 
 /// One axis of the box.
 #[derive(Clone, Copy)]
@@ -23,13 +23,13 @@ pub struct Geometry<T> {
 }
 
 /// Whether a box has finite corners, the second above the first.
-pub fn check_box(low: [f64; 3], high: [f64; 3]) -> Result<(), OutOfRange> {
+pub fn check_box(low: [f64; 3], high: [f64; 3]) -> Result<(), Error> {
     for (low, high) in low.into_iter().zip(high) {
         if !low.is_finite() {
-            return Err(OutOfRange { field: "low", value: low, allowed: "a finite number" });
+            return Err(Error::out_of_range("low", low, "a finite number"));
         }
         if !(high.is_finite() && high > low) {
-            return Err(OutOfRange { field: "high", value: high, allowed: "above low" });
+            return Err(Error::out_of_range("high", high, "above low"));
         }
     }
     Ok(())

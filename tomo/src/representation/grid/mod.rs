@@ -8,7 +8,7 @@ mod tests;
 use super::{Activation, Coordinates, CoordinatesMut, Gradient, Groups, Representation, Workspace};
 use crate::simd::{Float, InstructionSet, dispatch};
 use cells::{Geometry, Products, Values, check_box};
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 use scatter::{Contribution, Scatter};
 
 /// Shape of a grid.
@@ -47,9 +47,9 @@ impl Grid {
     ///
     /// # Errors
     /// If a number is out of its range.
-    pub fn new(settings: GridSettings) -> Result<Self, OutOfRange> {
+    pub fn new(settings: GridSettings) -> Result<Self, Error> {
         let check = |field, value, ok, allowed| {
-            if ok { Ok(()) } else { Err(OutOfRange { field, value, allowed }) }
+            if ok { Ok(()) } else { Err(Error::out_of_range(field, value, allowed)) }
         };
         for nodes in settings.nodes {
             check("nodes", nodes as f64, (2..=2048).contains(&nodes), "2 to 2048 along each axis")?;

@@ -18,7 +18,7 @@ pub use settings::{Initialisation, NetworkSettings};
 use super::{Coordinates, Gradient, Groups, Representation, Workspace};
 use crate::simd::{Float, InstructionSet};
 use batch::{Cotangents, Memory, Way};
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 use layout::Layout;
 
 /// A network with positional encoding: `bhnerf` of (x, y, z), `mlp4d` of (t, x, y, z).
@@ -37,7 +37,7 @@ impl Network {
     ///
     /// # Errors
     /// If a size is out of its range.
-    pub fn new(settings: NetworkSettings) -> Result<Self, OutOfRange> {
+    pub fn new(settings: NetworkSettings) -> Result<Self, Error> {
         settings.check()?;
         let layout = Layout::new(&settings);
         Ok(Self { settings, layout, instruction_set: InstructionSet::best() })

@@ -1,7 +1,7 @@
 //! Sizes of a network.
 
 use super::super::Activation;
-use kerrlight_geodesic::OutOfRange;
+use kerrlight_geodesic::Error;
 
 /// How kernels are drawn; biases start at zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,7 +66,7 @@ impl NetworkSettings {
         self.dimension * (1 + 2 * self.degree)
     }
 
-    pub(super) fn check(&self) -> Result<(), OutOfRange> {
+    pub(super) fn check(&self) -> Result<(), Error> {
         let whole = |field, value: usize, low, high, allowed| {
             let ok = (low..=high).contains(&value);
             check(field, value as f64, ok, allowed)
@@ -85,11 +85,6 @@ impl NetworkSettings {
     }
 }
 
-fn check(
-    field: &'static str,
-    value: f64,
-    ok: bool,
-    allowed: &'static str,
-) -> Result<(), OutOfRange> {
-    if ok { Ok(()) } else { Err(OutOfRange { field, value, allowed }) }
+fn check(field: &'static str, value: f64, ok: bool, allowed: &'static str) -> Result<(), Error> {
+    if ok { Ok(()) } else { Err(Error::out_of_range(field, value, allowed)) }
 }

@@ -7,7 +7,7 @@ use crate::transport::optics::Optics;
 use crate::transport::result::{Accumulator, Place};
 use crate::transport::tree::{Node, Tree, Walk, WalkScratch};
 use kerrlight_geodesic::vector::distance;
-use kerrlight_geodesic::{Kerr, OutOfRange, Path, PathOfRay, Ray};
+use kerrlight_geodesic::{Error, Kerr, Path, PathOfRay, Ray};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -221,10 +221,10 @@ impl Cut<'_> {
 
 impl Meshes {
     /// The meshes of a scene with their files, if it has any.
-    pub fn new(scene: &Scene, files: &[MeshFile], hole: &Kerr) -> Result<Option<Self>, OutOfRange> {
+    pub fn new(scene: &Scene, files: &[MeshFile], hole: &Kerr) -> Result<Option<Self>, Error> {
         if files.len() != scene.mesh.len() {
             let (value, allowed) = (files.len() as f64, "one file for each [[mesh]]");
-            return Err(OutOfRange { field: "number of mesh files", value, allowed });
+            return Err(Error::out_of_range("number of mesh files", value, allowed));
         }
         if files.is_empty() {
             return Ok(None);

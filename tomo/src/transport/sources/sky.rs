@@ -4,7 +4,7 @@ use crate::emission::sky::{Beam, Panorama, SkyModel};
 use crate::scene::Scene;
 use crate::transport::optics::Optics;
 use kerrlight_geodesic::footprint::{self, Number};
-use kerrlight_geodesic::{OutOfRange, Path, TracedRay};
+use kerrlight_geodesic::{Error, Path, TracedRay};
 
 /// The sky of a scene.
 #[derive(Debug, Clone)]
@@ -47,7 +47,7 @@ impl Sky {
         (x, y): (f64, f64),
         ray: &TracedRay,
         path: &mut Path<Number>,
-    ) -> Result<[f32; 3], OutOfRange> {
+    ) -> Result<[f32; 3], Error> {
         let (Some(direction), None) = (ray.exit, ray.surface) else { return Ok([0.0; 3]) };
         if ray.until < ray.mino_total {
             return Ok([0.0; 3]);

@@ -18,7 +18,7 @@ use crate::units::SPEED_OF_LIGHT;
 use crate::volume::VolumeFile;
 use cells::CellScratch;
 use kerrlight_geodesic::simd::{NodeRequest, PanelRule, RayNodes};
-use kerrlight_geodesic::{Kerr, OutOfRange, PlaneCrossing, Ray, SphereNodes, TracedRay};
+use kerrlight_geodesic::{Error, Kerr, PlaneCrossing, Ray, SphereNodes, TracedRay};
 use std::sync::Arc;
 
 /// Nodes of a panel.
@@ -139,10 +139,10 @@ pub(in crate::transport) struct MediaRay<'a> {
 
 impl Media {
     /// The media of a scene with the files of its volumes.
-    pub fn new(scene: &Scene, files: &[VolumeFile], hole: &Kerr) -> Result<Self, OutOfRange> {
+    pub fn new(scene: &Scene, files: &[VolumeFile], hole: &Kerr) -> Result<Self, Error> {
         if files.len() != scene.volume.len() {
             let (value, allowed) = (files.len() as f64, "one file for each [[volume]]");
-            return Err(OutOfRange { field: "number of volume files", value, allowed });
+            return Err(Error::out_of_range("number of volume files", value, allowed));
         }
         let spectral_index = scene.effects.index();
         let mut all: Vec<Arc<dyn Medium>> = Vec::new();
