@@ -77,6 +77,22 @@ fn at_horizon<T: Elementary>(ray: &impl Trajectory<T>, mino_time: T) -> bool {
     ray.outcome() == Outcome::Captured && mino_time.value() >= ray.total().value()
 }
 
+/// The first and last of `n` samples equidistant in Mino time, in units of the whole ray's: at infinity itself there
+/// is no finite position.
+fn mino_ends(n: usize, at_infinity: bool, captured: bool) -> (f64, f64) {
+    match (at_infinity, captured) {
+        (true, true) => (1.0 / n as f64, 1.0),
+        (true, false) => (1.0 / (n + 1) as f64, n as f64 / (n + 1) as f64),
+        (false, _) => (0.0, 1.0),
+    }
+}
+
+/// The Mino times of samples, in units of the whole ray's.
+pub(crate) fn mino_times(n: usize, at_infinity: bool, captured: bool) -> impl Iterator<Item = f64> {
+    let (from, to) = mino_ends(n, at_infinity, captured);
+    equidistant(from, to, n)
+}
+
 impl<'a, T: Elementary, S: Sink<T>> Sampler<'a, T, S> {
     /// `rule` is that of the request.
     pub fn new(
@@ -161,12 +177,8 @@ impl<'a, T: Elementary, S: Sink<T>> Sampler<'a, T, S> {
 
     fn by_mino_time(&mut self, ray: &impl Trajectory<T>, lambda: T, total: T, n: usize) {
         let captured = ray.outcome() == Outcome::Captured;
-        // At infinity the ends have no finite position; each other end counts half.
-        let (from, to) = match (self.at_infinity, captured) {
-            (true, true) => (1.0 / n as f64, 1.0),
-            (true, false) => (1.0 / (n + 1) as f64, n as f64 / (n + 1) as f64),
-            (false, _) => (0.0, 1.0),
-        };
+        // Each end that is not at infinity counts half.
+        let (from, to) = mino_ends(n, self.at_infinity, captured);
         let step = if n > 1 { (to - from) / (n - 1) as f64 } else { to - from };
         for (k, share) in equidistant(from, to, n).enumerate() {
             let first = k == 0 && !self.at_infinity;

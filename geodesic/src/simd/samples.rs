@@ -46,6 +46,22 @@ pub struct RaySamples<'a> {
     pub error: f64,
 }
 
+impl RaySamples<'_> {
+    /// Some of them.
+    ///
+    /// # Panics
+    /// If there are no such samples.
+    pub fn part(&self, span: core::ops::Range<usize>) -> Self {
+        RaySamples {
+            delay: &self.delay[span.clone()],
+            radius: &self.radius[span.clone()],
+            theta: &self.theta[span.clone()],
+            azimuth: &self.azimuth[span],
+            ..*self
+        }
+    }
+}
+
 impl Samples {
     /// Samples per ray.
     pub fn per_ray(&self) -> usize {

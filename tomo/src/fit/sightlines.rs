@@ -1,9 +1,12 @@
 //! Where the light of a movie's pixels may come from: nodes on rays inside the region of recovery, and
 //! what each gives to its pixel. Computed once for a fit.
 
-use kerrlight_geodesic::simd::{NodeRequest, Nodes, PanelRule, RayNodes, Samples};
+use kerrlight_geodesic::simd::{NodeRequest, PanelRule, RayNodes, RaySamples};
 use kerrlight_geodesic::vector::{distance, norm};
-use kerrlight_geodesic::{Error, Kerr, Observer, Quantities};
+use kerrlight_geodesic::{
+    BlockRequest, BlockTracer, Error, Integrator, Kerr, Observer, PathOfRay, PlaneCrossing,
+    Quantities, RayBlock, RayVisitor, SphereNodes, TracedRay, View,
+};
 use serde::{Deserialize, Serialize};
 
 /// Where emission is looked for.
@@ -100,6 +103,9 @@ pub struct Sightlines {
 /// Rays traced at a time.
 const BLOCK: usize = 1024;
 
+/// The largest error of a node's position, relative, above which its ray is traced step by step.
+const TOLERANCE: f64 = 1e-8;
+
 impl Sightlines {
     /// Traces the rays that arrive at (`alpha[k]`, `beta[k]`), pixel k.
     ///
@@ -113,16 +119,17 @@ impl Sightlines {
         request: &SightlineRequest,
     ) -> Result<Self, Error> {
         request.region.checked()?;
+        let wanted = request.of_rays(observer)?;
+        let view = View::Screen(*observer);
+        let tracer = BlockTracer::new(*hole, view, Integrator::Elliptic, TOLERANCE)?;
+        let (flight, mut memory) = (flight(observer), RayBlock::default());
         let mut all = Self { pixels: alpha.len(), starts: vec![0], ..Self::default() };
-        let mut tracer = Tracer {
-            hole,
-            observer,
-            request,
-            samples: Samples::default(),
-            nodes: Nodes::default(),
-        };
         for (block, (alpha, beta)) in alpha.chunks(BLOCK).zip(beta.chunks(BLOCK)).enumerate() {
-            tracer.block(block * BLOCK, alpha, beta, &mut all)?;
+            let (first, lines) = (all.rays(), &mut all);
+            let mut visitor = Collector { request, flight, first: block * BLOCK, lines };
+            tracer.trace(alpha, beta, &wanted, &mut memory, &mut visitor)?;
+            // Rays that were traced step by step came last.
+            all.sort_from(first);
         }
         Ok(all)
     }
@@ -167,124 +174,152 @@ impl Sightlines {
             self.pixel.push(pixel as u32);
         }
     }
-}
 
-struct Tracer<'a> {
-    hole: &'a Kerr,
-    observer: &'a Observer,
-    request: &'a SightlineRequest,
-    samples: Samples,
-    nodes: Nodes,
-}
-
-impl Tracer<'_> {
-    fn block(
-        &mut self,
-        first: usize,
-        alpha: &[f64],
-        beta: &[f64],
-        all: &mut Sightlines,
-    ) -> Result<(), Error> {
-        match self.request.sampling {
-            Sampling::Gauss { order, split } => {
-                self.gauss([order, split as usize], first, alpha, beta, all)
+    /// Puts the rays from number `first` on into the order of their pixels.
+    fn sort_from(&mut self, first: usize) {
+        if self.pixel[first..].is_sorted() {
+            return;
+        }
+        let start = self.starts[first];
+        let (pixels, ends) = (self.pixel.split_off(first), self.starts.split_off(first + 1));
+        let columns = self.columns().map(|column| column.split_off(start.min(column.len())));
+        let mut order: Vec<usize> = (0..pixels.len()).collect();
+        order.sort_by_key(|ray| pixels[*ray]);
+        for ray in order {
+            let from = ray.checked_sub(1).map_or(start, |before| ends[before]);
+            for (to, column) in self.columns().into_iter().zip(&columns) {
+                let nodes = column.get(from - start..ends[ray] - start);
+                to.extend_from_slice(nodes.unwrap_or_default());
             }
-            Sampling::EqualMinoTime { per_ray } => self.equal(per_ray, first, alpha, beta, all),
+            self.end_ray(pixels[ray] as usize);
         }
     }
 
-    fn gauss(
-        &mut self,
-        [order, split]: [usize; 2],
-        first: usize,
-        alpha: &[f64],
-        beta: &[f64],
-        all: &mut Sightlines,
-    ) -> Result<(), Error> {
-        let request = NodeRequest {
-            radius: self.request.region.r_max,
-            rule: PanelRule::new(order),
-            split: split as u32,
-            quantities: Quantities {
-                azimuth: true,
-                time: self.request.delay,
-                velocity: self.request.momentum,
-            },
-        };
-        self.nodes.trace(self.hole, self.observer, alpha, beta, None, &request)?;
-        for (k, alpha) in alpha.iter().enumerate() {
-            let ray = self.nodes.ray(k);
-            let lambda = self.observer.lambda(*alpha);
-            for i in 0..ray.weight.len() {
-                self.node(&ray, i, lambda, all);
+    /// What there is of each node.
+    fn columns(&mut self) -> [&mut Vec<f64>; 8] {
+        let Self { position: [x, y, z], weight, delay, momentum: [mx, my, mz], .. } = self;
+        [x, y, z, weight, delay, mx, my, mz]
+    }
+}
+
+/// What the time of flight from a finite radius has in excess of its finite part.
+fn flight(observer: &Observer) -> f64 {
+    let w = observer.inverse_radius();
+    if w > 0.0 { 1.0 / w - 2.0 * w.ln() } else { 0.0 }
+}
+
+impl SightlineRequest {
+    /// What it takes of rays.
+    fn of_rays(&self, observer: &Observer) -> Result<BlockRequest, Error> {
+        match self.sampling {
+            Sampling::Gauss { order, split } => {
+                let (azimuth, time, velocity) = (true, self.delay, self.momentum);
+                let request = NodeRequest {
+                    radius: self.region.r_max,
+                    rule: PanelRule::new(order),
+                    split,
+                    quantities: Quantities { azimuth, time, velocity },
+                };
+                let nodes = vec![SphereNodes { request, finest: split }];
+                Ok(BlockRequest { nodes, ..BlockRequest::default() })
             }
-            all.end_ray(first + k);
+            Sampling::EqualMinoTime { per_ray } => {
+                self.check_equal(per_ray, observer)?;
+                Ok(BlockRequest { samples: per_ray, ..BlockRequest::default() })
+            }
+        }
+    }
+
+    fn check_equal(&self, per_ray: usize, observer: &Observer) -> Result<(), Error> {
+        let refuse = |field, value, allowed| Err(Error::out_of_range(field, value, allowed));
+        if observer.is_at_infinity() {
+            let allowed = "a finite radius with nodes equidistant in Mino time";
+            return refuse("observer radius", f64::INFINITY, allowed);
+        }
+        if self.momentum {
+            return refuse("redshift", 1.0, "off with nodes equidistant in Mino time");
+        }
+        if per_ray < 2 {
+            return refuse("samples per ray", per_ray as f64, "at least 2");
         }
         Ok(())
     }
+}
 
-    fn node(&self, ray: &RayNodes<'_>, i: usize, lambda: f64, all: &mut Sightlines) {
+/// Takes the nodes of one block of rays.
+struct Collector<'a> {
+    request: &'a SightlineRequest,
+    flight: f64,
+    /// Pixel of the block's first ray.
+    first: usize,
+    lines: &'a mut Sightlines,
+}
+
+impl RayVisitor for Collector<'_> {
+    fn take_nodes(
+        &mut self,
+        _sphere: usize,
+        number: usize,
+        ray: &TracedRay,
+        _crossings: &[PlaneCrossing],
+        nodes: &RayNodes<'_>,
+    ) -> bool {
+        for i in 0..nodes.weight.len() {
+            self.node(nodes, i, ray.lambda);
+        }
+        self.lines.end_ray(self.first + number);
+        true
+    }
+
+    fn take_samples(&mut self, number: usize, _ray: &TracedRay, samples: &RaySamples<'_>) {
+        let mut before = None;
+        for (i, r) in samples.radius.iter().enumerate() {
+            let ((sin, cos), (s, u)) = (samples.azimuth[i].sin_cos(), samples.theta[i].sin_cos());
+            let point = [r * s * cos, r * s * sin, r * u];
+            let chord = before.map_or(0.0, |before| distance(point, before));
+            before = Some(point);
+            if self.request.region.holds(point) {
+                self.lines.push(point, chord);
+                if self.request.delay {
+                    self.lines.delay.push(samples.delay[i] - self.flight);
+                }
+            }
+        }
+        self.lines.end_ray(self.first + number);
+    }
+
+    fn take(
+        &mut self,
+        _number: usize,
+        _ray: &TracedRay,
+        _crossings: &[PlaneCrossing],
+        _path: Option<PathOfRay<'_>>,
+    ) -> Result<(), Error> {
+        Ok(())
+    }
+}
+
+impl Collector<'_> {
+    /// Takes a node, if it lies in the region.
+    fn node(&mut self, ray: &RayNodes<'_>, i: usize, lambda: f64) {
         let (r, u) = (ray.radius[i], ray.cos_theta[i]);
         let (s, (sin, cos)) = (((1.0 - u) * (1.0 + u)).sqrt(), ray.azimuth[i].sin_cos());
         let point = [r * s * cos, r * s * sin, r * u];
         if !self.request.region.holds(point) {
             return;
         }
-        all.push(point, ray.weight[i]);
+        self.lines.push(point, ray.weight[i]);
         if self.request.delay {
-            all.delay.push(ray.delay[i] - self.flight());
+            self.lines.delay.push(ray.delay[i] - self.flight);
         }
         if self.request.momentum {
             // Backwards dθ/dτ = −u'/sin θ; the arriving photon has the opposite one.
             let of_theta = if s > 0.0 { ray.polar_velocity[i] / s } else { 0.0 };
             let of_phi = if s > 0.0 { lambda / s } else { 0.0 };
             let [phi, theta] = [[-sin, cos, 0.0], [u * cos, u * sin, -s]];
-            for (c, column) in all.momentum.iter_mut().enumerate() {
+            for (c, column) in self.lines.momentum.iter_mut().enumerate() {
                 column.push(of_theta * phi[c] - of_phi * theta[c]);
             }
         }
-    }
-
-    /// What the time of flight from a finite radius has in excess of its finite part.
-    fn flight(&self) -> f64 {
-        let w = self.observer.inverse_radius();
-        if w > 0.0 { 1.0 / w - 2.0 * w.ln() } else { 0.0 }
-    }
-
-    fn equal(
-        &mut self,
-        per_ray: usize,
-        first: usize,
-        alpha: &[f64],
-        beta: &[f64],
-        all: &mut Sightlines,
-    ) -> Result<(), Error> {
-        let refuse = |field, allowed| Err(Error::out_of_range(field, 1.0, allowed));
-        if self.observer.is_at_infinity() {
-            let allowed = "a finite radius with nodes equidistant in Mino time";
-            return Err(Error::out_of_range("observer radius", f64::INFINITY, allowed));
-        }
-        if self.request.momentum {
-            return refuse("redshift", "off with nodes equidistant in Mino time");
-        }
-        self.samples.trace(self.hole, self.observer, alpha, beta, per_ray)?;
-        for k in 0..self.samples.rays() {
-            let ray = self.samples.ray(k);
-            let mut before = None;
-            for (i, r) in ray.radius.iter().enumerate() {
-                let ((sin, cos), (s, u)) = (ray.azimuth[i].sin_cos(), ray.theta[i].sin_cos());
-                let point = [r * s * cos, r * s * sin, r * u];
-                let chord = before.map_or(0.0, |before| distance(point, before));
-                before = Some(point);
-                if self.request.region.holds(point) {
-                    all.push(point, chord);
-                    if self.request.delay {
-                        all.delay.push(ray.delay[i] - self.flight());
-                    }
-                }
-            }
-            all.end_ray(first + k);
-        }
-        Ok(())
     }
 }

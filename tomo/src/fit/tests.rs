@@ -358,3 +358,28 @@ fn exact_a_uniform_medium_dims_what_is_behind_it() {
         assert!(plain.delay[ends[0]..ends[1]].is_sorted());
     }
 }
+
+/// The critical curve of a hole without spin is the circle √27. A ray 1e-11 inside it is traced step by step, one 1e-7
+/// inside it in closed form; outside 3.5 M both have the same length. Rays come in the order of pixels.
+#[test]
+fn exact_rays_beside_the_critical_curve_have_nodes_in_their_place() {
+    let hole = Kerr::new(0.0).unwrap();
+    let inclination = Inclination::from_degrees(60.0).unwrap();
+    let region = Region { r_min: 3.5, r_max: 20.0, z_width: 20.0 };
+    let critical = 27f64.sqrt();
+    let alpha = [-4.0, critical * (1.0 - 1e-7), 0.0, critical * (1.0 - 1e-11), 2.0];
+    let gauss = Sampling::Gauss { order: 12, split: 4 };
+    let equal = Sampling::EqualMinoTime { per_ray: 40_000 };
+    let far = Observer::at_radius(inclination, 4000.0).unwrap();
+    for (observer, sampling) in
+        [(Observer::at_infinity(inclination), gauss), (far, gauss), (far, equal)]
+    {
+        let request = SightlineRequest { region, sampling, delay: true, momentum: false };
+        let lines = Sightlines::trace(&hole, &observer, &alpha, &[0.0; 5], &request).unwrap();
+        assert_eq!(lines.pixel, [0, 1, 2, 3, 4]);
+        let length = |ray: usize| -> f64 {
+            lines.weight[lines.starts[ray]..lines.starts[ray + 1]].iter().sum()
+        };
+        assert!((length(3) / length(1) - 1.0).abs() < 1e-3);
+    }
+}

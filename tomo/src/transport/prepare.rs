@@ -150,6 +150,7 @@ impl PreparedScene {
             half_orbits,
             paths: self.meshes.is_some() || self.media.have_cells() || !self.spots.is_empty(),
             probes: None,
+            samples: 0,
             nodes: self.media.nodes(&self.optics),
         }
     }

@@ -75,6 +75,9 @@ impl BlockTracer {
             visitor.works_on(Work::Exits);
             self.find_exits(observer, job, block)?;
         }
+        if job.request.samples > 0 {
+            self.sample_in_closed_form(observer, job, block, visitor)?;
+        }
         for (number, sphere) in job.request.nodes.iter().enumerate() {
             visitor.works_on(Work::Nodes(number));
             self.refine_in_closed_form(observer, (number, sphere), job, block, visitor)?;

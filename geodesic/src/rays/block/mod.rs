@@ -3,6 +3,7 @@
 
 mod closed_form;
 mod request;
+mod samples;
 mod stepped;
 mod traced;
 mod tracer;

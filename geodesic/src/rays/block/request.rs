@@ -20,6 +20,9 @@ pub struct BlockRequest {
     pub paths: bool,
     /// Coarse nodes by which [`RayVisitor::needs_path_at`](crate::RayVisitor::needs_path_at) decides it too.
     pub probes: Option<NodeRequest>,
+    /// The number of samples equidistant in Mino time along the whole ray, both ends included but for those at
+    /// infinity; see [`RayVisitor::take_samples`](crate::RayVisitor::take_samples).
+    pub samples: usize,
     /// Nodes inside spheres.
     pub nodes: Vec<SphereNodes>,
 }

@@ -24,6 +24,9 @@ impl BlockTracer {
         visitor.works_on(Work::Rays);
         let ray = self.view.ray(&self.hole, job.alpha[k], job.beta[k])?;
         block.rays[k] = self.step(&ray, job.request, block, visitor);
+        if job.request.samples > 0 {
+            self.sample_path(k, &ray, job.request.samples, block, visitor);
+        }
         for sphere in 0..job.request.nodes.len() {
             visitor.works_on(Work::Nodes(sphere));
             self.refine_on_path((sphere, k), job.request, block, visitor);

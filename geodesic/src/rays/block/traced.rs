@@ -96,3 +96,26 @@ pub struct PathOfRay<'a> {
     /// The tolerance that it was traced with.
     pub tolerance: f64,
 }
+
+/// The samples of one ray that was traced step by step.
+#[derive(Debug, Default)]
+pub(super) struct SampleColumns {
+    pub delay: Vec<f64>,
+    pub radius: Vec<f64>,
+    pub theta: Vec<f64>,
+    pub azimuth: Vec<f64>,
+}
+
+impl SampleColumns {
+    /// Those of a path at some Mino times.
+    pub fn fill(&mut self, path: &Path, times: impl Iterator<Item = f64>) {
+        let Self { delay, radius, theta, azimuth } = self;
+        [&mut *delay, &mut *radius, &mut *theta, &mut *azimuth].into_iter().for_each(Vec::clear);
+        for point in times.map(|time| path.at(time)) {
+            delay.push(point.delay);
+            radius.push(point.radius());
+            theta.push(point.theta());
+            azimuth.push(point.azimuth);
+        }
+    }
+}

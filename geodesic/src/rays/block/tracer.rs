@@ -1,7 +1,7 @@
 //! The tracer of a view, and the memory of its blocks.
 
 use super::request::BlockRequest;
-use super::traced::{PlaneCrossing, TracedRay};
+use super::traced::{PlaneCrossing, SampleColumns, TracedRay};
 use crate::analytic::ClosedForm;
 use crate::error::Error;
 use crate::integrate::path::Path;
@@ -69,6 +69,7 @@ pub struct RayBlock {
     pub(super) samples: Samples,
     pub(super) path: Path,
     pub(super) columns: NodeColumns,
+    pub(super) sampled: SampleColumns,
     pub(super) intervals: Vec<[f64; 2]>,
 }
 

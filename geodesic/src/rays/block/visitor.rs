@@ -3,7 +3,7 @@
 use super::traced::{PathOfRay, PlaneCrossing, TracedRay};
 use crate::error::Error;
 use crate::screen::observer::Ray;
-use crate::simd::RayNodes;
+use crate::simd::{RayNodes, RaySamples};
 
 /// What a block of rays is traced for: it decides where rays end and takes what is found.
 pub trait RayVisitor {
@@ -46,7 +46,13 @@ pub trait RayVisitor {
         true
     }
 
-    /// Takes ray `number`: after its nodes, and after the rays before it.
+    /// Takes the samples of ray `number`, which has an outcome. The last sample of a captured ray lies on the
+    /// horizon, or within a relative 1e-8 outside of it in closed form.
+    fn take_samples(&mut self, number: usize, ray: &TracedRay, samples: &RaySamples<'_>) {
+        let _ = (number, ray, samples);
+    }
+
+    /// Takes ray `number`: after its nodes and samples, and after the rays before it.
     ///
     /// # Errors
     /// Ends the block.
@@ -79,7 +85,7 @@ pub enum PathUse {
 /// What a block is worked on for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Work {
-    /// Outcomes, crossings and paths.
+    /// Outcomes, crossings, samples and paths.
     Rays,
     /// Nodes inside a sphere.
     Nodes(usize),
