@@ -1,8 +1,9 @@
 //! Films: frames that are those of `render`, that are kept, and that do not flicker.
 
 use crate::support::{fail, kerrlight, succeed};
+use kerrlight_tomo::Error;
 use kerrlight_tomo::image::exr;
-use kerrlight_tomo::scene::{Scene, SceneError};
+use kerrlight_tomo::scene::Scene;
 use std::path::Path;
 
 const SPOT: &str = r#"
@@ -190,7 +191,7 @@ fn regress_errors_of_cameras() {
     let error = |find: &str, replace: &str| -> String {
         assert!(STARS.contains(find));
         let parsed = Scene::parse(&STARS.replacen(find, replace, 1));
-        parsed.map(|_| ()).map_err(|e: SceneError| e.to_string()).unwrap_err()
+        parsed.map(|_| ()).map_err(|e: Error| e.to_string()).unwrap_err()
     };
     assert!(error("radius = 30.0\n", "").contains("`camera.radius` is missing"));
     assert!(error("time = 1000.0", "time = 0.0").contains("camera.key.1.time"));

@@ -8,6 +8,7 @@
 
 pub mod dynamics;
 pub mod emission;
+mod error;
 pub mod fit;
 pub mod image;
 pub mod interferometry;
@@ -23,3 +24,5 @@ mod simd;
 pub mod transport;
 pub mod units;
 pub mod volume;
+
+pub use error::Error;

@@ -1,6 +1,7 @@
 //! How much memory may be taken. What a number of a user or of a file's header decides is estimated before it is
 //! allocated: nothing is begun that cannot end.
 
+use crate::Error;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Bytes that may be taken.
@@ -32,12 +33,12 @@ pub fn limit() -> u64 {
 ///
 /// # Errors
 /// Names it with what it would take and what there is.
-pub fn afford(what: impl FnOnce() -> String, bytes: f64) -> Result<(), TooLarge> {
+pub fn afford(what: impl FnOnce() -> String, bytes: f64) -> Result<(), Error> {
     let limit = limit();
     if bytes <= limit as f64 {
         return Ok(());
     }
-    Err(TooLarge { what: what(), needed: bytes, limit })
+    Err(TooLarge { what: what(), needed: bytes, limit }.into())
 }
 
 /// Bytes as people write them: 3.5 GiB.
@@ -122,7 +123,7 @@ mod tests {
 
     #[test]
     fn exact_what_is_too_large_is_named() {
-        assert_eq!(afford(|| unreachable!(), 1e18), Ok(()));
+        afford(|| unreachable!(), 1e18).unwrap();
         let error = TooLarge { what: "a sky".to_owned(), needed: 3e9, limit: 1 << 30 };
         let said = "a sky would take 2.8 GiB of memory, and 1.0 GiB may be taken";
         assert_eq!(error.to_string(), said);

@@ -5,8 +5,8 @@ use super::linear::terms;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
 use anyhow::Context;
+use kerrlight_tomo::Error;
 use kerrlight_tomo::dynamics::Axis;
-use kerrlight_tomo::fit::linear::LinearError;
 use kerrlight_tomo::fit::scan::{
     AxisLoss, AxisProblem, AxisScan, AxisSettings, Effort, refine_axis, scan_axis,
 };
@@ -162,7 +162,7 @@ fn with_problem<R>(
     view: &View,
     motion: &Motion,
     frames: usize,
-    search: impl FnOnce(&AxisProblem<'_, f32>) -> Result<R, LinearError>,
+    search: impl FnOnce(&AxisProblem<'_, f32>) -> Result<R, Error>,
 ) -> anyhow::Result<R> {
     let file = &view.file;
     let linear = setup::linear(file)?;

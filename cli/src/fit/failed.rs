@@ -1,8 +1,9 @@
 //! Fits that fail while they run: exit code 1.
 
+use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::linear::LinearError;
 use kerrlight_tomo::fit::settings::FitFile;
-use kerrlight_tomo::fit::{Diverged, Objective, State, Trainer};
+use kerrlight_tomo::fit::{Objective, State, Trainer};
 
 /// What went wrong.
 #[derive(Debug, thiserror::Error)]
@@ -10,10 +11,10 @@ use kerrlight_tomo::fit::{Diverged, Objective, State, Trainer};
 pub struct Failed(String);
 
 /// A linear problem without a solution; wrong settings stay what they are.
-pub fn linear(error: LinearError) -> anyhow::Error {
+pub fn linear(error: Error) -> anyhow::Error {
     match error {
-        LinearError::Range(range) => range.into(),
-        other => Failed(other.to_string()).into(),
+        Error::Linear(error) => Failed(error.to_string()).into(),
+        other => other.into(),
     }
 }
 
@@ -21,7 +22,7 @@ pub fn linear(error: LinearError) -> anyhow::Error {
 pub fn diverged(
     trainer: &mut Trainer<'_, f32>,
     state: &State<f32>,
-    error: Diverged,
+    error: &Error,
 ) -> anyhow::Error {
     let frames = trainer.objective.observed();
     let movie = trainer.movie(&state.now, &frames, true);

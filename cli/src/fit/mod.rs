@@ -21,6 +21,7 @@ use clap::Args;
 pub use failed::Failed;
 use folder::Folder;
 pub use inputs::Inputs;
+use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::settings::{FitError, FitFile};
 use kerrlight_tomo::representation::Registry;
 use std::path::{Path, PathBuf};
@@ -147,7 +148,7 @@ fn base_dir_of(text: &str) -> PathBuf {
 
 fn parse(text: &str) -> anyhow::Result<FitFile> {
     FitFile::parse(text).map_err(|error| match error {
-        FitError::Syntax(text) => init::explained(&text),
+        Error::Fit(FitError::Syntax(text)) => init::explained(&text),
         other => other.into(),
     })
 }

@@ -198,7 +198,7 @@ impl Run<'_> {
         while state.now.step < steps {
             let outcome = match self.trainer.step(state) {
                 Ok(outcome) => outcome,
-                Err(error) => return Err(failed::diverged(&mut self.trainer, state, error)),
+                Err(error) => return Err(failed::diverged(&mut self.trainer, state, &error)),
             };
             let step = state.now.step;
             bar.set_position(step);

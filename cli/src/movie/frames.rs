@@ -3,11 +3,12 @@
 use crate::output::{self, Output};
 use crate::render::report;
 use anyhow::{Context, bail};
+use kerrlight_tomo::Error;
 use kerrlight_tomo::image::Picture;
 use kerrlight_tomo::image::exr::{self, Attributes};
 use kerrlight_tomo::render::Rendered;
 use kerrlight_tomo::render::{Film, Frame};
-use kerrlight_tomo::scene::{Scene, SceneError, apply_override};
+use kerrlight_tomo::scene::{Scene, apply_override};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
@@ -48,7 +49,7 @@ impl Sequence {
         let Origin { name, text, files } = of;
         let plan = |time: &f64| -> anyhow::Result<Plan> {
             let text = apply_override(text, &format!("observer.time={time:?}"))?;
-            let scene = Scene::parse(&text).map_err(SceneError::without_line);
+            let scene = Scene::parse(&text).map_err(Error::without_line);
             let scene = scene.with_context(|| format!("{name} at the time {time} of a frame"))?;
             Ok(Plan { scene, text })
         };

@@ -15,6 +15,7 @@ use crate::{assets, progress};
 use anyhow::{Context, bail};
 use clap::Args;
 use frames::{Origin, Sequence};
+use kerrlight_tomo::Error;
 use kerrlight_tomo::memory;
 use kerrlight_tomo::render::RenderError;
 use kerrlight_tomo::render::{Film, Frame};
@@ -153,7 +154,7 @@ impl Movie {
                 !keeper.stopped()
             });
             let frames = match frames {
-                Err(RenderError::Stopped) => {
+                Err(Error::Render(RenderError::Stopped)) => {
                     bar.finish_and_clear();
                     return Err(Interrupted(there(sequence)).into());
                 }

@@ -1,8 +1,9 @@
 //! What a scene calls for, what that is going to cost, and what it did cost.
 
 use crate::answer::Answer;
+use kerrlight_tomo::Error;
 use kerrlight_tomo::emission::medium::Part;
-use kerrlight_tomo::render::{Raster, RenderError};
+use kerrlight_tomo::render::Raster;
 use kerrlight_tomo::scene::Scene;
 use kerrlight_tomo::transport::Meter;
 use serde_json::json;
@@ -51,7 +52,7 @@ fn line(part: Part, each: f64, whole: f64) -> String {
 }
 
 /// The costs of some rays, and how many these are: fewer where rays are slow.
-fn trial(raster: &Raster) -> Result<(Meter, usize), RenderError> {
+fn trial(raster: &Raster) -> Result<(Meter, usize), Error> {
     // The first rays warm caches up.
     let mut rays = TRIAL / 32;
     raster.trial(rays)?;

@@ -3,6 +3,7 @@
 use crate::output;
 use crate::paths;
 use anyhow::Context;
+use kerrlight_tomo::Error;
 use kerrlight_tomo::image::exr;
 use kerrlight_tomo::scene::{Scene, SceneError, apply_override};
 use std::path::{Path, PathBuf};
@@ -61,13 +62,15 @@ impl Source {
             let assignment = paths::from_here(assignment, Some(&self.folder))?;
             text = apply_override(&text, &assignment).map_err(|error| match error {
                 // Not the override's fault.
-                SceneError::Syntax(_) => anyhow::Error::new(error).context(self.name.clone()),
+                Error::Scene(SceneError::Syntax(_)) => {
+                    anyhow::Error::new(error).context(self.name.clone())
+                }
                 _ => anyhow::Error::new(error).context("--set"),
             })?;
         }
         // Lines of the changed text are nobody's.
         let scene = Scene::parse(&text)
-            .map_err(SceneError::without_line)
+            .map_err(Error::without_line)
             .with_context(|| format!("{} with --set {}", self.name, overrides.join(" --set ")))?;
         Ok((text, scene))
     }

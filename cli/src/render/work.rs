@@ -6,6 +6,7 @@ use crate::interrupt::{Interrupted, Keeper};
 use crate::output::Output;
 use crate::progress;
 use anyhow::Context;
+use kerrlight_tomo::Error;
 use kerrlight_tomo::image::Picture;
 use kerrlight_tomo::image::reduce::Reduction;
 use kerrlight_tomo::render::{Journal, Raster, RenderError, Summary};
@@ -58,7 +59,7 @@ impl Work<'_> {
         let memory = Cursor::new(Vec::new());
         let (mut journal, _) = Journal::open(memory, "", self.raster.bands())?;
         let summary = self.fill(&mut journal, STOPPED).map_err(|error| match error {
-            RenderError::Stopped => Interrupted(STOPPED.to_owned()).into(),
+            Error::Render(RenderError::Stopped) => Interrupted(STOPPED.to_owned()).into(),
             other => anyhow::Error::new(other).context(self.name.to_owned()),
         })?;
         let Some(mut look) = look else { return Ok((summary, None)) };
@@ -71,7 +72,7 @@ impl Work<'_> {
         &self,
         journal: &mut Journal<F>,
         stopped: &str,
-    ) -> Result<Summary, RenderError> {
+    ) -> Result<Summary, Error> {
         let all = self.raster.bands();
         let bar = progress::bar(all as u64);
         bar.set_position((all - journal.missing().len()) as u64);
@@ -86,10 +87,12 @@ impl Work<'_> {
     }
 
     /// What to tell of a picture that has not been finished.
-    fn failed(&self, error: RenderError, partial: Partial) -> anyhow::Error {
+    fn failed(&self, error: Error, partial: Partial) -> anyhow::Error {
         match error {
-            RenderError::Stopped => Interrupted(format!("stopped; {}", partial.kept())).into(),
-            RenderError::Keep(error) => {
+            Error::Render(RenderError::Stopped) => {
+                Interrupted(format!("stopped; {}", partial.kept())).into()
+            }
+            Error::Exr(error) => {
                 let context = format!("cannot write {}; {}", partial.shown(), partial.kept());
                 anyhow::Error::new(error).context(context)
             }

@@ -1,6 +1,6 @@
 //! How fast matter turns.
 
-use kerrlight_geodesic::Error;
+use crate::Error;
 
 /// Angular velocity as a function of the (spherical) radius, in radians a unit of time; positive is
 /// right-handed about the axis.

@@ -1,7 +1,7 @@
 //! Velocities that differ from a smooth law by chance.
 
 use super::AngularVelocity;
-use kerrlight_geodesic::Error;
+use crate::Error;
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;

@@ -1,5 +1,6 @@
 //! Unit vectors, and steps on the sphere.
 
+use crate::Error;
 use kerrlight_geodesic::vector::dot;
 
 /// A unit vector.
@@ -16,22 +17,26 @@ impl Axis {
     ///
     /// # Errors
     /// If it has none.
-    pub fn new(vector: [f64; 3]) -> Result<Self, ZeroAxis> {
+    pub fn new(vector: [f64; 3]) -> Result<Self, Error> {
         // Scaled, so that no square over- or underflows.
         let largest = vector.iter().fold(0.0f64, |largest, x| largest.max(x.abs()));
         let scaled = vector.map(|x| x / largest);
         let norm = dot(scaled, scaled).sqrt();
         let axis = scaled.map(|x| x / norm);
-        if axis.iter().all(|x| x.is_finite()) { Ok(Self(axis)) } else { Err(ZeroAxis(vector)) }
+        if axis.iter().all(|x| x.is_finite()) {
+            Ok(Self(axis))
+        } else {
+            Err(ZeroAxis(vector).into())
+        }
     }
 
     /// A vector that is a unit vector already, bit for bit.
     ///
     /// # Errors
     /// If its length is not 1 within rounding.
-    pub fn exact(vector: [f64; 3]) -> Result<Self, ZeroAxis> {
+    pub fn exact(vector: [f64; 3]) -> Result<Self, Error> {
         let ok = (dot(vector, vector) - 1.0).abs() < 1e-12;
-        if ok { Ok(Self(vector)) } else { Err(ZeroAxis(vector)) }
+        if ok { Ok(Self(vector)) } else { Err(ZeroAxis(vector).into()) }
     }
 
     /// Its components.

@@ -3,13 +3,14 @@
 
 use super::medium::{CellSize, Emission, Medium, Moment, Part, PathSegment};
 use super::occupied::Occupied;
+use crate::Error;
 use crate::dynamics::{AngularVelocity, Axis, Injection};
 use crate::scene::{Rotation, VolumeRegion, VolumeSource};
 use crate::volume::{Volume, VolumeFile};
 use kerrlight_geodesic::flow::rotating_redshift_at;
 use kerrlight_geodesic::simd::RayNodes;
 use kerrlight_geodesic::vector::{cross, rotate};
-use kerrlight_geodesic::{Error, Kerr, Quantities};
+use kerrlight_geodesic::{Kerr, Quantities};
 
 /// A volume around one hole, ready to be evaluated.
 #[derive(Debug, Clone)]
@@ -50,7 +51,7 @@ impl VolumeModel {
             _ => return Err(range("volume axis", f64::NAN, "given by the scene or by the file")),
         };
         let not_zero = "finite numbers, not all 0";
-        let axis = Axis::new(axis).map_err(|error| range("volume axis", error.0[0], not_zero))?;
+        let axis = Axis::new(axis).map_err(|_| range("volume axis", axis[0], not_zero))?;
         let [least, largest] = file.volume.values().iter().fold([0.0f64; 2], |[l, h], value| {
             [l.min(f64::from(*value)), h.max(f64::from(*value))]
         });

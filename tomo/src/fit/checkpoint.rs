@@ -2,6 +2,7 @@
 
 use super::occupancy::Occupancy;
 use super::train::{Progress, State};
+use crate::Error;
 use crate::dynamics::Axis;
 use crate::optimise::{AdamState, LbfgsState};
 use safetensors::tensor::{Dtype, SafeTensorError, TensorView};
@@ -12,6 +13,7 @@ use std::ops::Range;
 
 /// Why bytes are no checkpoint of this fit.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CheckpointError {
     /// Not safetensors.
     #[error("it is no checkpoint: {0}")]
@@ -63,7 +65,7 @@ const KEY: &str = "kerrlight";
 ///
 /// # Errors
 /// If they cannot be laid out.
-pub fn encode(state: &State<f32>, settings: &str) -> Result<Vec<u8>, CheckpointError> {
+pub fn encode(state: &State<f32>, settings: &str) -> Result<Vec<u8>, Error> {
     let header = Header {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         step: state.now.step,
@@ -85,8 +87,10 @@ pub fn encode(state: &State<f32>, settings: &str) -> Result<Vec<u8>, CheckpointE
             let view = TensorView::new(*dtype, vec![bytes.len() / size], bytes)?;
             Ok((name.as_str(), view))
         })
-        .collect::<Result<Vec<_>, SafeTensorError>>()?;
-    let mut bytes = serialize(views, Some(HashMap::from([(KEY.to_owned(), text)])))?;
+        .collect::<Result<Vec<_>, SafeTensorError>>()
+        .map_err(CheckpointError::from)?;
+    let mut bytes = serialize(views, Some(HashMap::from([(KEY.to_owned(), text)])))
+        .map_err(CheckpointError::from)?;
     let at = checksum_place(&bytes)?;
     let sum = checksum(&bytes, &at);
     bytes[at].copy_from_slice(&sum.to_le_bytes());
@@ -163,21 +167,21 @@ fn push(of: &str, progress: &Progress<f32>, tensors: &mut Vec<Tensor>) {
 ///
 /// # Errors
 /// If it is none.
-pub fn header(bytes: &[u8]) -> Result<Header, CheckpointError> {
-    let (_, metadata) = SafeTensors::read_metadata(bytes)?;
+pub fn header(bytes: &[u8]) -> Result<Header, Error> {
+    let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(CheckpointError::from)?;
     let missing = || CheckpointError::Header("its header is missing".to_owned());
     let text = metadata.metadata().as_ref().and_then(|map| map.get(KEY)).ok_or_else(missing)?;
-    toml::from_str(text).map_err(|error| CheckpointError::Header(error.to_string()))
+    Ok(toml::from_str(text).map_err(|error| CheckpointError::Header(error.to_string()))?)
 }
 
 /// The state of a checkpoint, for a fit that would start as `start`.
 ///
 /// # Errors
 /// If it is none, damaged, or one of another fit.
-pub fn decode(bytes: &[u8], start: &State<f32>) -> Result<State<f32>, CheckpointError> {
+pub fn decode(bytes: &[u8], start: &State<f32>) -> Result<State<f32>, Error> {
     check(bytes)?;
     let header = header(bytes)?;
-    let tensors = SafeTensors::deserialize(bytes)?;
+    let tensors = SafeTensors::deserialize(bytes).map_err(CheckpointError::from)?;
     let read = |of: &str, step| progress(&tensors, of, step, &start.now);
     let good = header.good_step.map(|step| read("good", step)).transpose()?;
     let now = read("now", header.step)?;

@@ -5,10 +5,11 @@ use super::batch::{Batch, Columns};
 use super::occupancy::Occupancy;
 use super::shift::Shift;
 use super::sightlines::Sightlines;
+use crate::Error;
 use crate::dynamics::{AngularVelocity, Axis, Injection};
 use crate::representation::{Representation, Workspace};
 use crate::simd::Float;
-use kerrlight_geodesic::{Error, Kerr};
+use kerrlight_geodesic::Kerr;
 use rayon::prelude::*;
 
 /// How the matter moves, and when it is seen.

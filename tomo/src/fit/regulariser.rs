@@ -4,8 +4,8 @@
 //! Every penalty is an integral over the volume (a sum over nodes times the volume of a cell), so that a weight means
 //! the same on a finer grid.
 
+use crate::Error;
 use crate::simd::Float;
-use kerrlight_geodesic::Error;
 use rayon::prelude::*;
 
 /// Nodes of a regular grid, z fastest.

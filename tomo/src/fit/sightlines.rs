@@ -1,11 +1,12 @@
 //! Where the light of a movie's pixels may come from: nodes on rays inside the region of recovery, and
 //! what each gives to its pixel. Computed once for a fit.
 
+use crate::Error;
 use kerrlight_geodesic::simd::{NodeRequest, PanelRule, RayNodes, RaySamples};
 use kerrlight_geodesic::vector::{distance, norm};
 use kerrlight_geodesic::{
-    BlockRequest, BlockTracer, Error, Integrator, Kerr, Observer, PathOfRay, PlaneCrossing,
-    Quantities, RayBlock, RayVisitor, SphereNodes, TracedRay, View,
+    BlockRequest, BlockTracer, Integrator, Kerr, Observer, PathOfRay, PlaneCrossing, Quantities,
+    RayBlock, RayVisitor, SphereNodes, TracedRay, View,
 };
 use serde::{Deserialize, Serialize};
 

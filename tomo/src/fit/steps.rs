@@ -5,6 +5,7 @@ use super::objective::{Gradients, Loss, Selection};
 use super::occupancy::Occupancy;
 use super::penalties::Draw;
 use super::train::{BatchSize, Diverged, Outcome, Progress, State, Trainer, Training};
+use crate::Error;
 use crate::dynamics::Axis;
 use crate::simd::Float;
 use rand::seq::index;
@@ -33,13 +34,13 @@ impl<T: Float> Trainer<'_, T> {
     ///
     /// # Errors
     /// If the loss keeps diverging.
-    pub fn step(&mut self, state: &mut State<T>) -> Result<Outcome, Diverged> {
+    pub fn step(&mut self, state: &mut State<T>) -> Result<Outcome, Error> {
         let now = &mut state.now;
         self.refresh(now);
         if let Some(rule) = self.training.lbfgs {
             let (step, setbacks) = (now.step, state.setbacks);
             let diverged = |loss| Diverged { loss, step, setbacks };
-            return self.quasi_newton(rule, now).map_err(diverged);
+            return Ok(self.quasi_newton(rule, now).map_err(diverged)?);
         }
         let mut of_axis = [0.0; 3];
         let (step, occupancy) = (now.step, self.mask(now));
@@ -48,7 +49,7 @@ impl<T: Float> Trainer<'_, T> {
         let calm = state.good.as_ref().map_or(f64::INFINITY, |good| good.loss);
         let finite = loss.total.is_finite() && of_axis.iter().all(|slope| slope.is_finite());
         if !finite || loss.total > self.training.divergence * calm {
-            return step_back(state, loss.total);
+            return Ok(step_back(state, loss.total)?);
         }
         now.loss = loss.total;
         if now.step.is_multiple_of(self.training.keep_every.max(1)) {

@@ -1,9 +1,9 @@
 //! Data of a movie, frame by frame: χ² of an image, and its gradient with respect to pixels.
 
+use crate::Error;
 use crate::interferometry::data_terms::{DataTerm, Residual};
 use crate::interferometry::operator::{Operator, Transform};
 use crate::simd::Float;
-use kerrlight_geodesic::Error;
 use num_complex::Complex;
 use rustfft::FftNum;
 

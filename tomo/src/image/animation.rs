@@ -1,11 +1,13 @@
 //! Animations for a quick look: animated PNG and GIF.
 
+use crate::Error;
 use color_quant::NeuQuant;
 use image::RgbImage;
 use std::collections::{BTreeSet, HashMap};
 
 /// Why there is no animation.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum AnimationError {
     /// The PNG encoder failed.
     #[error(transparent)]
@@ -31,28 +33,28 @@ impl<'a> Apng<'a> {
         [width, height]: [u32; 2],
         frames: u32,
         per_second: u16,
-    ) -> Result<Self, AnimationError> {
+    ) -> Result<Self, Error> {
         let mut encoder = png::Encoder::new(bytes, width, height);
         encoder.set_color(png::ColorType::Rgb);
-        encoder.set_animated(frames, 0)?;
-        encoder.set_frame_delay(1, per_second)?;
-        Ok(Apng(encoder.write_header()?))
+        encoder.set_animated(frames, 0).map_err(AnimationError::from)?;
+        encoder.set_frame_delay(1, per_second).map_err(AnimationError::from)?;
+        Ok(Apng(encoder.write_header().map_err(AnimationError::from)?))
     }
 
     /// Appends a frame.
     ///
     /// # Errors
     /// If it has another size, or is one too many.
-    pub fn push(&mut self, frame: &RgbImage) -> Result<(), AnimationError> {
-        Ok(self.0.write_image_data(frame.as_raw())?)
+    pub fn push(&mut self, frame: &RgbImage) -> Result<(), Error> {
+        Ok(self.0.write_image_data(frame.as_raw()).map_err(AnimationError::from)?)
     }
 
     /// Ends the animation.
     ///
     /// # Errors
     /// On a failure of the encoder.
-    pub fn finish(self) -> Result<(), AnimationError> {
-        Ok(self.0.finish()?)
+    pub fn finish(self) -> Result<(), Error> {
+        Ok(self.0.finish().map_err(AnimationError::from)?)
     }
 }
 
@@ -118,13 +120,14 @@ impl<'a> Gif<'a> {
         [width, height]: [u32; 2],
         palette: Palette,
         per_second: u16,
-    ) -> Result<Self, AnimationError> {
+    ) -> Result<Self, Error> {
         let too_large = |_| AnimationError::TooLarge(width, height);
         let size = [width, height].map(u16::try_from);
         let [width, height] = [size[0].map_err(too_large)?, size[1].map_err(too_large)?];
         let colors = palette.colors.clone();
-        let mut encoder = gif::Encoder::new(bytes, width, height, &colors)?;
-        encoder.set_repeat(gif::Repeat::Infinite)?;
+        let mut encoder =
+            gif::Encoder::new(bytes, width, height, &colors).map_err(AnimationError::from)?;
+        encoder.set_repeat(gif::Repeat::Infinite).map_err(AnimationError::from)?;
         let delay = (100.0 / f64::from(per_second.max(1))).round().max(2.0) as u16;
         Ok(Gif { encoder, palette, delay })
     }
@@ -133,7 +136,7 @@ impl<'a> Gif<'a> {
     ///
     /// # Errors
     /// If the encoder fails.
-    pub fn push(&mut self, frame: &RgbImage) -> Result<(), AnimationError> {
+    pub fn push(&mut self, frame: &RgbImage) -> Result<(), Error> {
         let pixels: Vec<u8> = frame.pixels().map(|p| self.palette.index(p.0)).collect();
         // The size was checked when the animation began.
         let (width, height) = (frame.width() as u16, frame.height() as u16);
@@ -141,7 +144,7 @@ impl<'a> Gif<'a> {
             delay: self.delay,
             ..gif::Frame::from_indexed_pixels(width, height, pixels, None)
         };
-        Ok(self.encoder.write_frame(&frame)?)
+        Ok(self.encoder.write_frame(&frame).map_err(AnimationError::from)?)
     }
 }
 

@@ -2,9 +2,10 @@
 
 use super::Complex64;
 use super::array::{Array, ArrayError};
-use super::earth::{EarthError, Frame, Moment, SourcePosition, Ut1, View, hours_utc_of_gmst};
+use super::earth::{Frame, Moment, SourcePosition, Ut1, View, hours_utc_of_gmst};
 use super::observation::{Basis, Observation, Row};
-use crate::memory::{self, TooLarge};
+use crate::Error;
+use crate::memory::{self};
 use crate::units::SPEED_OF_LIGHT;
 
 /// What hours are hours of.
@@ -51,26 +52,8 @@ pub struct Setup {
 
 /// Why there is no observation.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ScheduleError {
-    /// The array cannot observe.
-    #[error(transparent)]
-    Array(#[from] ArrayError),
-    /// The Earth's attitude is not known.
-    #[error(transparent)]
-    Earth(#[from] EarthError),
-    /// A value out of range.
-    #[error("{name} = {value} is not allowed: {allowed}")]
-    Range {
-        /// What it is.
-        name: &'static str,
-        /// The value that was given.
-        value: f64,
-        /// What would be allowed.
-        allowed: &'static str,
-    },
-    /// There is no memory for the rows.
-    #[error(transparent)]
-    Memory(#[from] TooLarge),
     /// Sidereal times with precession.
     #[error("hours of GMST go with the catalogue frame only")]
     GmstOfDate,
@@ -79,13 +62,8 @@ pub enum ScheduleError {
 /// Most scans of a schedule.
 const MOST_SCANS: u32 = 1_000_000;
 
-fn check(
-    name: &'static str,
-    value: f64,
-    ok: bool,
-    allowed: &'static str,
-) -> Result<(), ScheduleError> {
-    if ok { Ok(()) } else { Err(ScheduleError::Range { name, value, allowed }) }
+fn check(name: &'static str, value: f64, ok: bool, allowed: &'static str) -> Result<(), Error> {
+    if ok { Ok(()) } else { Err(Error::out_of_range(name, value, allowed)) }
 }
 
 impl Schedule {
@@ -99,7 +77,7 @@ impl Schedule {
     ///
     /// # Errors
     /// If the day is out of range or its UT1 − UTC not known.
-    pub fn hours_utc(&self, ut1: Ut1) -> Result<Vec<f64>, EarthError> {
+    pub fn hours_utc(&self, ut1: Ut1) -> Result<Vec<f64>, Error> {
         let utc = |hours| match self.clock {
             Clock::Utc => Ok(hours),
             Clock::Gmst => hours_utc_of_gmst(self.mjd, hours, ut1),
@@ -107,7 +85,7 @@ impl Schedule {
         self.hours().map(utc).collect()
     }
 
-    fn check(&self) -> Result<(), ScheduleError> {
+    fn check(&self) -> Result<(), Error> {
         let hours = "hours in [-48, 72]";
         check("start", self.start_h, (-48.0..=72.0).contains(&self.start_h), hours)?;
         check("stop", self.stop_h, (-48.0..=72.0).contains(&self.stop_h), hours)?;
@@ -119,7 +97,7 @@ impl Schedule {
 }
 
 impl Setup {
-    fn check(&self) -> Result<(), ScheduleError> {
+    fn check(&self) -> Result<(), Error> {
         let Setup { frequency_hz, bandwidth_hz, integration_s, elevation_deg: [low, high], .. } =
             *self;
         check(
@@ -160,11 +138,11 @@ pub fn observe(
     source: SourcePosition,
     schedule: &Schedule,
     setup: &Setup,
-) -> Result<Observation, ScheduleError> {
+) -> Result<Observation, Error> {
     schedule.check()?;
     setup.check()?;
     if schedule.clock == Clock::Gmst && setup.frame != Frame::Catalogue {
-        return Err(ScheduleError::GmstOfDate);
+        return Err(ScheduleError::GmstOfDate.into());
     }
     let positions = array.positions()?;
     check_sefds(array)?;
@@ -201,7 +179,7 @@ fn view_at(
     schedule: &Schedule,
     setup: &Setup,
     hours: f64,
-) -> Result<(f64, View), EarthError> {
+) -> Result<(f64, View), Error> {
     match schedule.clock {
         Clock::Utc => {
             let moment = Moment { mjd: schedule.mjd, hours_utc: hours };
@@ -260,7 +238,7 @@ pub fn observe_affordable(
     source: SourcePosition,
     schedule: &Schedule,
     setup: &Setup,
-) -> Result<Observation, ScheduleError> {
+) -> Result<Observation, Error> {
     if schedule.scans > TRIAL {
         let trial = Schedule { scans: TRIAL, ..*schedule };
         let few = observe(array, source, &trial, setup)?.rows.len() as f64;

@@ -1,9 +1,10 @@
 //! A movie through an array: what [`schedule::observe`](super::schedule::observe) lays out, filled
 //! with the visibilities of images.
 
+use super::Complex64;
 use super::observation::{Basis, Observation};
 use super::operator::{ImageGrid, Method, Operator, Pulse, Transform};
-use super::{Complex64, schedule::ScheduleError};
+use crate::Error;
 
 /// Exponentials up to this many bytes are kept while a movie is transformed.
 const MEMORY: usize = 256 << 20;
@@ -38,7 +39,7 @@ pub fn fill(
     pulse: Pulse,
     times_h: &[f64],
     method: Method,
-) -> Result<String, ScheduleError> {
+) -> Result<String, Error> {
     check(movie, times_h)?;
     let mut shares: Vec<Vec<(usize, f64)>> = vec![Vec::new(); movie.frames()];
     for (index, row) in observation.rows.iter().enumerate() {
@@ -65,8 +66,8 @@ pub fn fill(
     Ok(operator.describe())
 }
 
-fn check(movie: &Movie, times_h: &[f64]) -> Result<(), ScheduleError> {
-    let range = |name, value, allowed| Err(ScheduleError::Range { name, value, allowed });
+fn check(movie: &Movie, times_h: &[f64]) -> Result<(), Error> {
+    let range = |name, value, allowed| Err(Error::out_of_range(name, value, allowed));
     let frames = movie.frames();
     if frames == 0 || frames != times_h.len() {
         return range("number of images", frames as f64, "1 at least, and as many as times");
@@ -81,10 +82,7 @@ fn check(movie: &Movie, times_h: &[f64]) -> Result<(), ScheduleError> {
 }
 
 /// The images that a time lies between, with their weights; one where it is that of an image.
-fn neighbours(
-    times_h: &[f64],
-    time_h: f64,
-) -> Result<impl Iterator<Item = (usize, f64)>, ScheduleError> {
+fn neighbours(times_h: &[f64], time_h: f64) -> Result<impl Iterator<Item = (usize, f64)>, Error> {
     let after = times_h.partition_point(|time| *time <= time_h);
     let weight = match (times_h.get(after.wrapping_sub(1)), times_h.get(after)) {
         _ if times_h.len() == 1 => 0.0,
@@ -92,7 +90,7 @@ fn neighbours(
         (Some(last), None) if *last == time_h => 0.0,
         _ => {
             let allowed = "hours from the first image to the last";
-            return Err(ScheduleError::Range { name: "time of a scan", value: time_h, allowed });
+            return Err(Error::out_of_range("time of a scan", time_h, allowed));
         }
     };
     let before = after.saturating_sub(1);

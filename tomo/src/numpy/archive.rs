@@ -1,6 +1,7 @@
 //! NPZ archives.
 
 use super::NumpyError;
+use crate::Error;
 use crate::memory;
 use std::io::{Cursor, Read, Write};
 use zip::result::ZipError;
@@ -14,39 +15,42 @@ impl<'a> Archive<'a> {
     ///
     /// # Errors
     /// If they are none.
-    pub fn open(bytes: &'a [u8]) -> Result<Self, NumpyError> {
+    pub fn open(bytes: &'a [u8]) -> Result<Self, Error> {
         let archive = zip::ZipArchive::new(Cursor::new(bytes));
         let not = |error| NumpyError::content(format!("not an npz archive: {error}"));
-        archive.map(Archive).map_err(not)
+        Ok(archive.map(Archive).map_err(not)?)
     }
 
     /// The names of its arrays, without `.npy`.
     ///
     /// # Errors
     /// If the archive is damaged.
-    pub fn names(&mut self) -> Result<Vec<String>, NumpyError> {
+    pub fn names(&mut self) -> Result<Vec<String>, Error> {
         let count = self.0.len();
         let name = |k| -> Result<String, ZipError> {
             let name = self.0.by_index(k)?.name()?.into_owned();
             Ok(name.strip_suffix(".npy").unwrap_or(&name).to_owned())
         };
         let damaged = |error| NumpyError::content(format!("damaged npz archive: {error}"));
-        (0..count).map(name).collect::<Result<_, _>>().map_err(damaged)
+        Ok((0..count).map(name).collect::<Result<_, _>>().map_err(damaged)?)
     }
 
     /// The bytes of an array, whose checksum must be right; `None` if there is no such array.
     ///
     /// # Errors
     /// If it is damaged, or there is no memory for it.
-    pub fn member(&mut self, name: &str) -> Result<Option<Vec<u8>>, NumpyError> {
+    pub fn member(&mut self, name: &str) -> Result<Option<Vec<u8>>, Error> {
         let at = || format!("array {name}");
         let failed = |error: &dyn std::error::Error| {
-            NumpyError::content(error.to_string()).within(format!("array {name}"))
+            NumpyError::member(
+                format!("array {name}"),
+                NumpyError::content(error.to_string()).into(),
+            )
         };
         let file = match self.0.by_name(&format!("{name}.npy")) {
             Ok(file) => file,
             Err(ZipError::FileNotFound) => return Ok(None),
-            Err(error) => return Err(failed(&error)),
+            Err(error) => return Err(failed(&error).into()),
         };
         let size = file.size();
         // Numbers of four bytes, the smallest that are usual.
@@ -57,7 +61,7 @@ impl<'a> Archive<'a> {
         file.read_to_end(&mut bytes).map_err(|error| failed(&error))?;
         if bytes.len() as u64 != size {
             let damaged = format!("{} is damaged: its size is stated as {size} bytes", at());
-            return Err(NumpyError::content(damaged));
+            return Err(NumpyError::content(damaged).into());
         }
         Ok(Some(bytes))
     }

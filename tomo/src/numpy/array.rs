@@ -1,6 +1,7 @@
 //! NPY arrays.
 
 use super::NumpyError;
+use crate::Error;
 use crate::memory;
 use npyz::WriterBuilder;
 
@@ -8,7 +9,7 @@ use npyz::WriterBuilder;
 ///
 /// # Errors
 /// If the bytes are no array of numbers, or fewer than its shape says.
-pub fn read_array(bytes: &[u8]) -> Result<(Vec<u64>, Vec<f64>), NumpyError> {
+pub fn read_array(bytes: &[u8]) -> Result<(Vec<u64>, Vec<f64>), Error> {
     let not = |error| NumpyError::content(format!("not an npy file: {error}"));
     let file = npyz::NpyFile::new(bytes).map_err(not)?;
     let in_fortran = file.order() == npyz::Order::Fortran;
@@ -17,7 +18,7 @@ pub fn read_array(bytes: &[u8]) -> Result<(Vec<u64>, Vec<f64>), NumpyError> {
     // At least a byte each, so that a header cannot ask for more memory than there is file.
     if count.is_none_or(|count| count == 0 || count > bytes.len() as u64) {
         let message = format!("shape {shape:?} does not go with {} bytes", bytes.len());
-        return Err(NumpyError::content(message));
+        return Err(NumpyError::content(message).into());
     }
     let values = 8.0 * count.unwrap_or_default() as f64;
     memory::afford(|| format!("the array of shape {shape:?}"), values)?;

@@ -7,10 +7,10 @@ mod array;
 pub use archive::{Archive, write_archive};
 pub use array::{read_array, write_array};
 
-use crate::memory::TooLarge;
+use crate::Error;
 
 /// Why bytes are not the arrays that are expected.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum NumpyError {
     /// What is wrong with them.
@@ -22,11 +22,8 @@ pub enum NumpyError {
         /// The member.
         member: String,
         /// What is wrong with it.
-        error: Box<NumpyError>,
+        error: Box<Error>,
     },
-    /// More memory would be needed than there is.
-    #[error(transparent)]
-    Memory(#[from] TooLarge),
 }
 
 impl NumpyError {
@@ -34,8 +31,8 @@ impl NumpyError {
         NumpyError::Content(message.into())
     }
 
-    /// With the member that it is about.
-    pub(crate) fn within(self, member: impl Into<String>) -> Self {
-        NumpyError::Member { member: member.into(), error: Box::new(self) }
+    /// With the member of an archive that it is about.
+    pub(crate) fn member(member: impl Into<String>, error: Error) -> Self {
+        NumpyError::Member { member: member.into(), error: Box::new(error) }
     }
 }

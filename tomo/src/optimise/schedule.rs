@@ -1,6 +1,6 @@
 //! Learning rates.
 
-use kerrlight_geodesic::Error;
+use crate::Error;
 
 /// Polynomial decay of a learning rate: to + (from − to)(1 − step/steps)^power, then `to`.
 #[derive(Clone, Copy, Debug, PartialEq)]

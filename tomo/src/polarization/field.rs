@@ -1,6 +1,7 @@
 //! Models of the magnetic field.
 
-use kerrlight_geodesic::{Error, ZamoFrame};
+use crate::Error;
+use kerrlight_geodesic::ZamoFrame;
 use serde::{Deserialize, Serialize};
 
 /// The `[magnetic_field]` of a scene: a mixture of three fields whose components are those

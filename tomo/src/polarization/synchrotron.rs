@@ -1,7 +1,7 @@
 //! Optically thin synchrotron emission of electrons with a power law of energies.
 
 use super::{Stokes, SynchrotronView};
-use kerrlight_geodesic::Error;
+use crate::Error;
 
 /// Electrons with isotropic momenta and N(γ) ∝ γ^−p, all of whose limits are far from the
 /// Lorentz factors that radiate at the observed frequency: j ∝ ν^−α, p = 2α + 1.

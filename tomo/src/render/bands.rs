@@ -5,6 +5,7 @@ use super::adaptive::{self, Adaptive};
 use super::pixels::{Pixel, Workspace, uniform};
 use super::tally::Tally;
 use super::{Progress, Raster, RenderError};
+use crate::Error;
 use crate::transport::Meter;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,7 +22,7 @@ pub(super) struct Band {
 }
 
 /// Takes a band at each time, in any order of bands and from several threads.
-pub(super) type Sink<'a> = dyn Fn(Vec<Band>) -> Result<(), RenderError> + Sync + 'a;
+pub(super) type Sink<'a> = dyn Fn(Vec<Band>) -> Result<(), Error> + Sync + 'a;
 
 /// The pixels of a tile at each time.
 type Tile = Vec<Vec<Pixel>>;
@@ -46,14 +47,14 @@ pub(super) fn render_bands(
     todo: &[usize],
     sink: &Sink<'_>,
     progress: &Progress<'_>,
-) -> Result<(), RenderError> {
+) -> Result<(), Error> {
     let tiles = raster.tiles();
     let tolerance = if todo.is_empty() { None } else { raster.tolerance()? };
     let stop = AtomicBool::new(false);
     let open: Vec<Mutex<Parts>> = todo.iter().map(|_| Mutex::default()).collect();
     let stopped = |k: &usize| k.is_multiple_of(tiles) && stop.load(Ordering::Relaxed);
     let order = (0..todo.len() * tiles).take_while(|k| !stopped(k)).par_bridge();
-    order.try_for_each_init(Workspace::default, |work, k| -> Result<(), RenderError> {
+    order.try_for_each_init(Workspace::default, |work, k| -> Result<(), Error> {
         let (band, tile) = (todo[k / tiles], k % tiles);
         let pixels = raster.tile((band, tile), times, tolerance, work)?;
         let Some(parts) = put(&open[k / tiles], tiles, tile, pixels) else { return Ok(()) };
@@ -64,7 +65,7 @@ pub(super) fn render_bands(
         }
         Ok(())
     })?;
-    if stop.into_inner() { Err(RenderError::Stopped) } else { Ok(()) }
+    if stop.into_inner() { Err(RenderError::Stopped.into()) } else { Ok(()) }
 }
 
 impl Raster {
@@ -74,7 +75,7 @@ impl Raster {
     }
 
     /// The error that each pixel may have, where pixels are refined.
-    fn tolerance(&self) -> Result<Option<f64>, RenderError> {
+    fn tolerance(&self) -> Result<Option<f64>, Error> {
         let Some(error) = self.scene.screen.image_error else { return Ok(None) };
         Ok(Some(adaptive::tolerance(&self.prepared, &self.grid, error)?))
     }
@@ -85,7 +86,7 @@ impl Raster {
         times: &[f64],
         tolerance: Option<f64>,
         work: &mut Workspace,
-    ) -> Result<Tile, RenderError> {
+    ) -> Result<Tile, Error> {
         let end = ((tile + 1) * self.tile).min(self.grid.width);
         let columns = tile * self.tile..end;
         let (prepared, grid, rows) = (&self.prepared, &self.grid, self.layout.rows(band));
@@ -106,7 +107,7 @@ impl Raster {
     }
 
     /// The band from its tiles at the time number `time`.
-    fn assemble(&self, index: usize, parts: &Parts, time: usize) -> Result<Band, RenderError> {
+    fn assemble(&self, index: usize, parts: &Parts, time: usize) -> Result<Band, Error> {
         let (width, rows) = (self.grid.width, self.layout.rows(index).len());
         let mut pixels = Vec::with_capacity(width * rows);
         for row in 0..rows {
@@ -120,7 +121,7 @@ impl Raster {
             let unit = if kind.scales { self.unit } else { 1.0 };
             let values: Vec<f32> = pixels.iter().map(|pixel| kind.value(pixel, unit)).collect();
             if !values.iter().all(|value| value.is_finite()) {
-                return Err(RenderError::NotFinite { channel: kind.name });
+                return Err(RenderError::NotFinite { channel: kind.name }.into());
             }
             channels.push(values);
         }

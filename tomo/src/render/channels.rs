@@ -3,6 +3,7 @@
 
 use super::RenderError;
 use super::pixels::Pixel;
+use crate::Error;
 use crate::transport::PreparedScene;
 
 /// A channel of a picture.
@@ -138,14 +139,14 @@ pub(super) fn chosen(
     prepared: &PreparedScene,
     refined: bool,
     asked: Option<&[String]>,
-) -> Result<Vec<&'static ChannelKind>, RenderError> {
+) -> Result<Vec<&'static ChannelKind>, Error> {
     let all: Vec<&ChannelKind> =
         CHANNELS.iter().filter(|kind| (kind.present)(prepared, refined)).collect();
     let Some(asked) = asked else { return Ok(all) };
     let find = |name: &String| all.iter().find(|kind| kind.name == name).copied();
     if let Some(name) = asked.iter().find(|name| find(name).is_none()) {
         let there: Vec<&str> = all.iter().map(|kind| kind.name).collect();
-        return Err(RenderError::Channel { name: name.clone(), there: there.join(", ") });
+        return Err(RenderError::Channel { name: name.clone(), there: there.join(", ") }.into());
     }
     // In the list's order, each once.
     Ok(all.into_iter().filter(|kind| asked.iter().any(|name| name == kind.name)).collect())

@@ -2,7 +2,8 @@
 //! batch of frames.
 
 use super::raw::Raw;
-use super::{Progress, Raster, RenderError, Rendered};
+use super::{Progress, Raster, Rendered};
+use crate::Error;
 use crate::scene::Scene;
 use crate::transport::Assets;
 
@@ -39,7 +40,7 @@ impl Film {
     ///
     /// # Errors
     /// If a value is out of range.
-    pub fn new(scene: &Scene, assets: impl Into<Assets>) -> Result<Self, RenderError> {
+    pub fn new(scene: &Scene, assets: impl Into<Assets>) -> Result<Self, Error> {
         Ok(Film { raster: Raster::new(scene, assets)? })
     }
 
@@ -84,7 +85,7 @@ impl Film {
     ///
     /// # Errors
     /// If the frame has no light to be scaled.
-    pub fn unit_factor(&self, frame: &Frame) -> Result<f64, RenderError> {
+    pub fn unit_factor(&self, frame: &Frame) -> Result<f64, Error> {
         self.raster.unit_factor(&self.scene_at(frame.time), &frame.raw)
     }
 
@@ -93,7 +94,7 @@ impl Film {
     ///
     /// # Errors
     /// If a value is too large for 32 bits then.
-    pub fn rendered(&self, frame: Frame, factor: f64) -> Result<Rendered, RenderError> {
+    pub fn rendered(&self, frame: Frame, factor: f64) -> Result<Rendered, Error> {
         self.raster.rendered(&self.scene_at(frame.time), frame.raw, factor)
     }
 
@@ -109,11 +110,7 @@ impl Film {
     /// # Errors
     /// If a value is out of range or too large for 32 bits, or `progress`, which is told of rows,
     /// returned false.
-    pub fn frames(
-        &mut self,
-        times: &[f64],
-        progress: &Progress<'_>,
-    ) -> Result<Vec<Frame>, RenderError> {
+    pub fn frames(&mut self, times: &[f64], progress: &Progress<'_>) -> Result<Vec<Frame>, Error> {
         if !self.one_by_one() {
             return self.together(times, progress);
         }
@@ -125,7 +122,7 @@ impl Film {
         Ok(frames)
     }
 
-    fn together(&self, times: &[f64], progress: &Progress<'_>) -> Result<Vec<Frame>, RenderError> {
+    fn together(&self, times: &[f64], progress: &Progress<'_>) -> Result<Vec<Frame>, Error> {
         let raws = self.raster.raw(times, progress)?;
         Ok(raws.into_iter().zip(times).map(|(raw, time)| Frame { raw, time: *time }).collect())
     }

@@ -3,7 +3,8 @@
 use super::bands::{Band, render_bands};
 use super::journal::Journal;
 use super::tally::Summary;
-use super::{Progress, Raster, RenderError};
+use super::{Progress, Raster};
+use crate::Error;
 use crate::image::exr::Attributes;
 use crate::image::reduce::Reduction;
 use exr::error::Result;
@@ -24,7 +25,7 @@ impl Raster {
         &self,
         journal: &mut Journal<F>,
         progress: &Progress<'_>,
-    ) -> std::result::Result<(), RenderError> {
+    ) -> std::result::Result<(), Error> {
         let todo = journal.missing();
         let journal = Mutex::new(journal);
         let keep = |bands: Vec<Band>| {
@@ -45,7 +46,7 @@ impl Raster {
     pub fn summary<F: Read + Write + Seek>(
         &self,
         journal: &Journal<F>,
-    ) -> std::result::Result<Summary, RenderError> {
+    ) -> std::result::Result<Summary, Error> {
         self.summarize(&journal.tally())
     }
 

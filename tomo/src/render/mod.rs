@@ -22,12 +22,12 @@ pub use plan::{Plan, Step};
 pub use rings::{RingStrata, Stratum};
 pub use tally::Summary;
 
+use crate::Error;
 use crate::image::Picture;
 use crate::image::exr::Layout;
 use crate::scene::{Rings, Scene};
 use crate::transport::{Assets, Meter, PreparedScene, RayResult, Scratch};
 use grid::Grid;
-use kerrlight_geodesic::Error;
 use rayon::prelude::*;
 use rings::{Resolver, Square};
 use std::sync::{Mutex, PoisonError};
@@ -38,10 +38,8 @@ pub type Progress<'a> = dyn Fn(usize) -> bool + Sync + 'a;
 
 /// Why there is no picture.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RenderError {
-    /// A value is out of range.
-    #[error(transparent)]
-    Range(#[from] Error),
     /// There is no light to scale.
     #[error("`screen.total_flux_jy` cannot be met: the picture's own flux is {0:e} scene units")]
     NoFlux(f64),
@@ -59,9 +57,6 @@ pub enum RenderError {
         /// The channels that there are.
         there: String,
     },
-    /// Bands cannot be kept.
-    #[error(transparent)]
-    Keep(#[from] exr::error::Error),
     /// The caller asked to stop.
     #[error("stopped")]
     Stopped,
@@ -104,7 +99,7 @@ impl Raster {
     ///
     /// # Errors
     /// If a value is out of range.
-    pub fn new(scene: &Scene, assets: impl Into<Assets>) -> Result<Self, RenderError> {
+    pub fn new(scene: &Scene, assets: impl Into<Assets>) -> Result<Self, Error> {
         let prepared = PreparedScene::new(scene, assets)?;
         let grid = Grid::new(scene);
         let refined = scene.screen.image_error.is_some();
@@ -137,7 +132,7 @@ impl Raster {
     ///
     /// # Errors
     /// If a value is out of range.
-    pub fn trial(&self, rays: usize) -> Result<Meter, RenderError> {
+    pub fn trial(&self, rays: usize) -> Result<Meter, Error> {
         let mut scratch = Scratch::default();
         scratch.meter = Meter::running();
         let (width, height) = (self.grid.width, self.grid.height);
@@ -211,7 +206,7 @@ impl Raster {
         channels::legend(&self.channels)
     }
 
-    fn summarize(&self, tally: &Tally) -> Result<Summary, RenderError> {
+    fn summarize(&self, tally: &Tally) -> Result<Summary, Error> {
         let factor = Summary::factor(&self.scene, tally).map_err(RenderError::NoFlux)?;
         Summary::new(&self.scene, tally, factor)
     }
@@ -234,7 +229,7 @@ pub fn render(
     scene: &Scene,
     assets: impl Into<Assets>,
     progress: &Progress<'_>,
-) -> Result<Rendered, RenderError> {
+) -> Result<Rendered, Error> {
     Raster::new(scene, assets)?.render(progress)
 }
 
@@ -243,7 +238,7 @@ impl Raster {
     ///
     /// # Errors
     /// If a value is out of range or does not fit, or `progress` returned false.
-    pub fn render(&self, progress: &Progress<'_>) -> Result<Rendered, RenderError> {
+    pub fn render(&self, progress: &Progress<'_>) -> Result<Rendered, Error> {
         let mut raw = self.raw(&[self.prepared.time()], progress)?;
         // One for each time.
         let raw = raw.pop().unwrap_or_default();

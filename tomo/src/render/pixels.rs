@@ -2,8 +2,8 @@
 
 use super::grid::Grid;
 use super::rings::{Counted, Resolver, Square};
+use crate::Error;
 use crate::transport::{Fate, PreparedScene, RayResult, Scratch};
-use kerrlight_geodesic::Error;
 use std::ops::Range;
 
 /// A pixel: averages of light, data of its most central ray.

@@ -4,6 +4,7 @@ use super::bands::{Band, render_bands};
 use super::grid::Grid;
 use super::tally::{Summary, Tally};
 use super::{Progress, Raster, RenderError, Rendered, resolver};
+use crate::Error;
 use crate::image::{Channel, Picture};
 use crate::scene::Scene;
 use std::sync::{Mutex, PoisonError};
@@ -38,11 +39,7 @@ impl Raw {
 impl Raster {
     /// The pictures at `times` of observation (in M), with rays that are traced once for all.
     /// Where pixels are refined there is one time, the prepared scene's.
-    pub(crate) fn raw(
-        &self,
-        times: &[f64],
-        progress: &Progress<'_>,
-    ) -> Result<Vec<Raw>, RenderError> {
+    pub(crate) fn raw(&self, times: &[f64], progress: &Progress<'_>) -> Result<Vec<Raw>, Error> {
         let all: Vec<usize> = (0..self.bands()).collect();
         let done = Mutex::new(vec![vec![None; all.len()]; times.len()]);
         let keep = |bands: Vec<Band>| {
@@ -66,8 +63,8 @@ impl Raster {
     ///
     /// # Errors
     /// If a flux is asked for and there is no light.
-    pub(crate) fn unit_factor(&self, scene: &Scene, raw: &Raw) -> Result<f64, RenderError> {
-        Summary::factor(scene, &raw.tally).map_err(RenderError::NoFlux)
+    pub(crate) fn unit_factor(&self, scene: &Scene, raw: &Raw) -> Result<f64, Error> {
+        Ok(Summary::factor(scene, &raw.tally).map_err(RenderError::NoFlux)?)
     }
 
     /// A picture of `scene` with its intensity times `factor`.
@@ -79,7 +76,7 @@ impl Raster {
         scene: &Scene,
         mut raw: Raw,
         factor: f64,
-    ) -> Result<Rendered, RenderError> {
+    ) -> Result<Rendered, Error> {
         let summary = Summary::new(scene, &raw.tally, factor)?;
         self.rescale(&mut raw.channels, factor);
         let named = self.channels.iter().zip(raw.channels);
@@ -93,7 +90,7 @@ impl Raster {
     ///
     /// # Errors
     /// If the camera is impossible there.
-    pub(crate) fn move_to(&mut self, time: f64) -> Result<(), RenderError> {
+    pub(crate) fn move_to(&mut self, time: f64) -> Result<(), Error> {
         self.scene.observer.time = time;
         self.prepared.move_to(&self.scene)?;
         self.rings = resolver(&self.scene, &self.prepared);

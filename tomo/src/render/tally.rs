@@ -2,6 +2,7 @@
 
 use super::RenderError;
 use super::pixels::Pixel;
+use crate::Error;
 use crate::scene::Scene;
 use crate::units::{JY_PER_SQUARE_UAS, MICROARCSECOND};
 
@@ -148,10 +149,10 @@ impl Summary {
     }
 
     /// From the sums over all pixels of a scene's picture that is scaled by `factor`.
-    pub(super) fn new(scene: &Scene, tally: &Tally, factor: f64) -> Result<Self, RenderError> {
+    pub(super) fn new(scene: &Scene, tally: &Tally, factor: f64) -> Result<Self, Error> {
         let largest = tally.largest * factor;
         if !(largest as f32).is_finite() {
-            return Err(RenderError::NotFinite { channel: "intensity" });
+            return Err(RenderError::NotFinite { channel: "intensity" }.into());
         }
         let area = pixel_area(scene);
         let pixels = f64::from(scene.screen.width) * f64::from(scene.screen.rows());

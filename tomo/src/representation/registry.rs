@@ -1,11 +1,11 @@
 //! Representations of others, beside those that kerrlight has itself.
 
 use super::Representation;
-use std::error::Error;
+use crate::Error;
 use std::ops::RangeInclusive;
 
 /// Why a representation cannot be built: any error, of which the message is shown.
-pub type BuildError = Box<dyn Error + Send + Sync>;
+pub type BuildError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Makes a representation of its settings.
 pub type BuildRepresentation = fn(&OwnSettings) -> Result<Box<dyn Representation<f32>>, BuildError>;
@@ -59,17 +59,17 @@ impl OwnSettings {
     ///
     /// # Errors
     /// If it is missing, no number, or out of range.
-    pub fn number(&self, key: &str, allowed: RangeInclusive<f64>) -> Result<f64, OwnError> {
+    pub fn number(&self, key: &str, allowed: RangeInclusive<f64>) -> Result<f64, Error> {
         let (low, high) = (*allowed.start(), *allowed.end());
         let missing = || OwnError::Missing { key: key.to_owned(), low, high };
         let value = self.table.get(key).ok_or_else(missing)?;
         let number = value.as_float().or(value.as_integer().map(|n| n as f64));
-        number.filter(|number| allowed.contains(number)).ok_or_else(|| OwnError::Range {
+        Ok(number.filter(|number| allowed.contains(number)).ok_or_else(|| OwnError::Range {
             key: key.to_owned(),
             value: value.to_string(),
             low,
             high,
-        })
+        })?)
     }
 }
 

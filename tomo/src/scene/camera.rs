@@ -2,7 +2,8 @@
 
 use super::Scene;
 use super::invalid::{Invalid, number};
-use kerrlight_geodesic::{Camera, Error, Inclination, Kerr, Motion};
+use crate::Error;
+use kerrlight_geodesic::{Camera, Inclination, Kerr, Motion};
 use serde::{Deserialize, Serialize};
 
 /// A table of a camera's place, direction and lens, with more fields before them: unknown keys
@@ -315,8 +316,9 @@ fn moments(camera: &CameraConfig, time: f64) -> impl Iterator<Item = f64> {
 
 fn impossible(camera: &CameraConfig, time: f64, error: &Error) -> Invalid {
     let key = if camera.key.is_empty() { "camera.radius" } else { "camera.key" };
-    let allowed = format!("{} (at time {time})", error.allowed());
-    Invalid::new(key, format!("{} {}", error.field(), error.value()), allowed)
+    let (field, value) = (error.field().unwrap_or_default(), error.value().unwrap_or_default());
+    let allowed = format!("{} (at time {time})", error.allowed().unwrap_or_default());
+    Invalid::new(key, format!("{field} {value}"), allowed)
 }
 
 #[cfg(test)]

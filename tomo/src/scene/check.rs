@@ -3,8 +3,9 @@
 use super::check_volume::check_volume;
 use super::invalid::{Invalid, brightness, number, positive, shown};
 use super::{Disc, Gas, GasMotion, GasProfile, Mesh, Plunging, Scene, Sky, Spot};
+use crate::Error;
 use crate::polarization::PowerLaw;
-use kerrlight_geodesic::{Error, Kerr, orbits};
+use kerrlight_geodesic::{Kerr, orbits};
 
 pub(super) fn check(scene: &Scene) -> Result<(), Invalid> {
     check_hole_and_observer(scene)?;
@@ -250,7 +251,7 @@ fn check_polarization(scene: &Scene) -> Result<(), Invalid> {
     let Some(field) = &scene.magnetic_field else {
         return Err(Invalid::missing("magnetic_field", "needed with polarization = true"));
     };
-    let wrong = |error: Error| Invalid::new(error.field(), shown(error.value()), error.allowed());
+    let wrong = |error: Error| Invalid::of("", &error);
     field.check().map_err(wrong)?;
     let index = effects.index().unwrap_or(f64::NAN);
     PowerLaw::new(index, circular).map(|_| ()).map_err(wrong)

@@ -1,9 +1,11 @@
 //! Errors in a scene text that point at the line, and the simplest ranges.
 
+use crate::Error;
 use toml_edit::{Document, Item};
 
 /// Why a scene text is not a scene.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SceneError {
     /// Not TOML, an unknown or missing key, or a wrong type.
     #[error("{0}")]
@@ -83,6 +85,13 @@ impl Invalid {
         allowed: impl Into<String>,
     ) -> Self {
         Invalid { key: key.into(), value: Some(value.to_string()), allowed: allowed.into() }
+    }
+
+    /// What the number of a part refuses, with the key of that part.
+    pub(super) fn of(part: &str, error: &Error) -> Self {
+        let key = format!("{part}{}", error.field().unwrap_or_default());
+        let allowed = error.allowed().map_or_else(|| error.to_string(), str::to_owned);
+        Invalid::new(key, error.value().unwrap_or_default(), allowed)
     }
 
     pub(super) fn missing(key: impl Into<String>, why: impl Into<String>) -> Self {

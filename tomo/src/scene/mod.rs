@@ -21,6 +21,7 @@ pub use sources::{
     Stars, VolumeRegion, VolumeSource,
 };
 
+use crate::Error;
 use crate::polarization::MagneticField;
 pub use kerrlight_geodesic::Integrator;
 use kerrlight_geodesic::{Kerr, orbits};
@@ -283,7 +284,7 @@ impl Scene {
     /// # Errors
     /// On syntax, unknown or missing keys, wrong types and values out of range: with the
     /// line, the key and what is allowed.
-    pub fn parse(text: &str) -> Result<Self, SceneError> {
+    pub fn parse(text: &str) -> Result<Self, Error> {
         let scene: Scene = toml::from_str(text).map_err(|e| SceneError::syntax(&e))?;
         check::check(&scene).map_err(|invalid| invalid.locate(text))?;
         Ok(scene)

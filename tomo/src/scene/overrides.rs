@@ -2,6 +2,7 @@
 //! written down.
 
 use super::SceneError;
+use crate::Error;
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, Value};
 
 /// The scene text with `key.path=value` applied, e.g. `hole.spin=0.5`,
@@ -12,14 +13,14 @@ use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, Value};
 /// # Errors
 /// If the text is not TOML, or the override has no `=`, an empty key or leads through
 /// something that is not a table.
-pub fn apply_override(text: &str, assignment: &str) -> Result<String, SceneError> {
+pub fn apply_override(text: &str, assignment: &str) -> Result<String, Error> {
     let fail = |why: String| SceneError::Override(format!("`{assignment}`: {why}"));
     let (path, value) = assignment
         .split_once('=')
         .ok_or_else(|| fail("is not of the form key.path=value".to_owned()))?;
     let keys: Vec<&str> = path.trim().split('.').map(str::trim).collect();
     if keys.iter().any(|key| key.is_empty()) {
-        return Err(fail("has an empty key".to_owned()));
+        return Err(fail("has an empty key".to_owned()).into());
     }
     let mut document: DocumentMut =
         text.parse().map_err(|e: toml_edit::TomlError| SceneError::Syntax(e.to_string()))?;

@@ -1,8 +1,9 @@
 //! How fast the matter of a volume turns.
 
-use super::invalid::{Invalid, number, shown};
+use super::invalid::{Invalid, number};
+use crate::Error;
 use crate::dynamics::{AngularVelocity, Axis, Perturbation};
-use kerrlight_geodesic::{Error, Kerr};
+use kerrlight_geodesic::Kerr;
 use serde::de::value::{MapAccessDeserializer, StrDeserializer};
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -175,10 +176,7 @@ impl Velocity {
     }
 
     fn ranges(&self, key: &str) -> Result<(), Invalid> {
-        let wrong = |error: Error| {
-            Invalid::new(format!("{key}.{}", error.field()), shown(error.value()), error.allowed())
-        };
-        self.angular().map(drop).map_err(wrong)
+        self.angular().map(drop).map_err(|error| Invalid::of(&format!("{key}."), &error))
     }
 }
 

@@ -1,11 +1,12 @@
 //! Polarised light of the sources.
 
+use crate::Error;
 use crate::emission::disc::DiscModel;
 use crate::emission::medium::{Emission, Medium};
 use crate::polarization::{Gas, MagneticField, PowerLaw, Stokes, view, view_at};
 use crate::scene::Scene;
 use kerrlight_geodesic::simd::RayNodes;
-use kerrlight_geodesic::{Error, Kerr, PathPoint, PlaneCrossing, ScreenPoint, ZamoFrame};
+use kerrlight_geodesic::{Kerr, PathPoint, PlaneCrossing, ScreenPoint, ZamoFrame};
 
 /// The field of the gas and its electrons.
 #[derive(Debug, Clone)]

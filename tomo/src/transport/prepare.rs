@@ -7,13 +7,14 @@ use super::sources::media::Media;
 use super::sources::meshes::Meshes;
 use super::sources::sky::Sky;
 use super::sources::spots::Spots;
+use crate::Error;
 use crate::emission::medium::Medium;
 use crate::emission::mesh::MeshFile;
 use crate::emission::sky::{Panorama, SkyModel};
 use crate::scene::Scene;
 use crate::volume::VolumeFile;
 use kerrlight_geodesic::{
-    BlockRequest, BlockTracer, Error, Inclination, Kerr, Observer, Quantities, View,
+    BlockRequest, BlockTracer, Inclination, Kerr, Observer, Quantities, View,
 };
 
 /// A scene with everything computed that does not depend on the ray.

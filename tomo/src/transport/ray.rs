@@ -57,7 +57,7 @@ impl PreparedScene {
         alpha: f64,
         beta: f64,
         scratch: &mut Scratch,
-    ) -> Result<RayResult, Error> {
+    ) -> Result<RayResult, crate::Error> {
         let mut seen = [RayResult::default()];
         self.observe_block(&[alpha], &[beta], &[self.time], scratch, &mut seen)?;
         let [seen] = seen;
@@ -76,7 +76,7 @@ impl PreparedScene {
         times: &[f64],
         scratch: &mut Scratch,
         seen: &mut [RayResult],
-    ) -> Result<(), Error> {
+    ) -> Result<(), crate::Error> {
         let Scratch { rays, sources, meter } = scratch;
         sources.media.reset(self.media.len(), alpha.len(), times.len());
         let block = Block { alpha, beta, times };
@@ -93,7 +93,7 @@ impl PreparedScene {
             _ => self.tracer.trace(alpha, beta, request, rays, &mut sum),
         };
         meter.stop();
-        done
+        Ok(done?)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Volumes as NPZ archives and NPY arrays.
 
-use super::{Volume, VolumeError, VolumeFile};
+use super::{Volume, VolumeFile};
 use crate::numpy::{Archive, NumpyError, read_array, write_archive, write_array};
 use crate::scene::{Rotation, VolumeSource};
 
@@ -17,31 +17,27 @@ pub struct VolumeArrays {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VolumeFileError {
-    /// Its arrays are not those of a volume.
-    #[error(transparent)]
-    Arrays(#[from] NumpyError),
-    /// They are no volume.
-    #[error(transparent)]
-    Volume(#[from] VolumeError),
     /// What is missing, or does not go with the scene.
     #[error("{0}")]
     Content(String),
 }
 
-type Result<T> = std::result::Result<T, VolumeFileError>;
+type Result<T> = std::result::Result<T, crate::Error>;
 
 /// Nodes along x, y and z and the values of an array of three dimensions.
-fn emission(bytes: &[u8]) -> std::result::Result<([usize; 3], Vec<f32>), NumpyError> {
+fn emission(bytes: &[u8]) -> std::result::Result<([usize; 3], Vec<f32>), crate::Error> {
     let (shape, values) = read_array(bytes)?;
     let [x, y, z] = shape[..] else {
-        return Err(NumpyError::content(format!("shape {shape:?}: (nx, ny, nz) is expected")));
+        return Err(
+            NumpyError::content(format!("shape {shape:?}: (nx, ny, nz) is expected")).into()
+        );
     };
     let nodes = [x, y, z].map(|n| n as usize);
     let single: Vec<f32> = values.iter().map(|value| *value as f32).collect();
     if let Some(k) = single.iter().position(|value| !value.is_finite()) {
         let (value, node) = (values[k], node(k, nodes));
         let message = format!("value {value:e} of node {node:?} is not finite in 32 bits");
-        return Err(NumpyError::content(message));
+        return Err(NumpyError::content(message).into());
     }
     Ok((nodes, single))
 }
@@ -51,12 +47,12 @@ fn node(k: usize, nodes: [usize; 3]) -> (usize, usize, usize) {
     (k / (nodes[1] * nodes[2]), k / nodes[2] % nodes[1], k % nodes[2])
 }
 
-fn three(bytes: &[u8]) -> std::result::Result<[f64; 3], NumpyError> {
+fn three(bytes: &[u8]) -> std::result::Result<[f64; 3], crate::Error> {
     let (shape, values) = read_array(bytes)?;
     let expected = |_| NumpyError::content(format!("shape {shape:?}: 3 numbers are expected"));
     let three: [f64; 3] = values.try_into().map_err(expected)?;
     if three.iter().any(|x| !x.is_finite()) {
-        return Err(NumpyError::content(format!("{three:?}: 3 finite numbers are expected")));
+        return Err(NumpyError::content(format!("{three:?}: 3 finite numbers are expected")).into());
     }
     Ok(three)
 }
@@ -80,11 +76,12 @@ impl VolumeArrays {
         let mut archive = Archive::open(bytes)?;
         let none = || VolumeFileError::Content("holds no array named emission".to_owned());
         let found = archive.member("emission")?.ok_or_else(none)?;
-        let (nodes, values) = emission(&found).map_err(|error| error.within("array emission"))?;
+        let (nodes, values) =
+            emission(&found).map_err(|error| NumpyError::member("array emission", error))?;
         let mut vector = |name: &str| -> Result<Option<[f64; 3]>> {
             let bytes = archive.member(name)?;
             let three = bytes.map(|bytes| three(&bytes)).transpose();
-            Ok(three.map_err(|error| error.within(format!("array {name}")))?)
+            Ok(three.map_err(|error| NumpyError::member(format!("array {name}"), error))?)
         };
         let corners = [vector("low")?, vector("high")?];
         Ok(VolumeArrays { nodes, values, corners, axis: vector("axis")? })
@@ -96,7 +93,9 @@ impl VolumeArrays {
     /// If it does not say so, or the arrays are no volume.
     pub fn located(self) -> Result<VolumeFile> {
         let [Some(low), Some(high)] = self.corners else {
-            return Err(VolumeFileError::Content("arrays low and high are missing".to_owned()));
+            return Err(
+                VolumeFileError::Content("arrays low and high are missing".to_owned()).into()
+            );
         };
         let volume = Volume::new(self.nodes, low, high, self.values)?;
         Ok(VolumeFile { volume, axis: self.axis })
@@ -108,7 +107,7 @@ impl VolumeArrays {
     /// If neither says where it is, or about what it turns; if its emission is below 0.
     pub fn placed(self, source: &VolumeSource) -> Result<VolumeFile> {
         let [low, high] = self.corners;
-        let refuse = |message: String| Err(VolumeFileError::Content(message));
+        let refuse = |message: String| Err(VolumeFileError::Content(message).into());
         let missing = |name: &str| {
             VolumeFileError::Content(format!(
                 "neither the file nor the scene gives `{name}`: coordinates of a corner (M)"

@@ -4,7 +4,7 @@
 //! are dark: beside it stand the same inside a mask, the relative error and the correlation.
 
 use super::Volume;
-use kerrlight_geodesic::Error;
+use crate::Error;
 
 /// Where an estimate is compared: r_min ≤ r ≤ r_max and |z| ≤ z_width, in M.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,12 +58,12 @@ pub struct Mismatch {
 ///
 /// # Errors
 /// Names what differs.
-pub fn same_nodes(a: &Volume, b: &Volume) -> Result<(), Mismatch> {
+pub fn same_nodes(a: &Volume, b: &Volume) -> Result<(), Error> {
     let counts = |volume: &Volume| volume.nodes().map(|n| n as f64);
     let properties =
         [("nodes", counts(a), counts(b)), ("low", a.low(), b.low()), ("high", a.high(), b.high())];
     match properties.into_iter().find(|(_, first, second)| first != second) {
-        Some((field, first, second)) => Err(Mismatch { field, first, second }),
+        Some((field, first, second)) => Err(Mismatch { field, first, second }.into()),
         None => Ok(()),
     }
 }
@@ -92,7 +92,7 @@ pub fn compare(
     estimate: &Volume,
     truth: &Volume,
     mask: Option<&Mask>,
-) -> Result<Comparison, Mismatch> {
+) -> Result<Comparison, Error> {
     same_nodes(estimate, truth)?;
     let inside = |k: &usize| mask.is_none_or(|mask| mask.contains(truth.position(*k)));
     let pair = |k: usize| [estimate.values()[k], truth.values()[k]].map(f64::from);
@@ -188,7 +188,7 @@ mod tests {
         for (r_min, r_max, z_width, field) in
             [(-1.0, 2.0, 1.0, "r_min"), (2.0, 2.0, 1.0, "r_max"), (0.0, 2.0, f64::NAN, "z_width")]
         {
-            assert_eq!(Mask::new(r_min, r_max, z_width).unwrap_err().field(), field);
+            assert_eq!(Mask::new(r_min, r_max, z_width).unwrap_err().field(), Some(field));
         }
     }
 

@@ -9,9 +9,9 @@ pub mod projection;
 pub mod slices;
 pub mod vti;
 
+use crate::Error;
 use crate::dynamics::Axis;
 pub use file::{VolumeArrays, VolumeFileError};
-use kerrlight_geodesic::Error;
 use kerrlight_geodesic::vector::rotate;
 pub use panels::Shown;
 
@@ -35,10 +35,8 @@ pub struct VolumeFile {
 
 /// Why there is no such volume.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum VolumeError {
-    /// A number of its shape.
-    #[error(transparent)]
-    Range(#[from] Error),
     /// As many values as nodes are needed.
     #[error("{found} values are not allowed: {wanted}, one a node")]
     Length {
@@ -67,7 +65,7 @@ impl Volume {
         low: [f64; 3],
         high: [f64; 3],
         values: Vec<f32>,
-    ) -> Result<Self, VolumeError> {
+    ) -> Result<Self, Error> {
         let range = |field, value, allowed| Err(Error::out_of_range(field, value, allowed));
         for axis in 0..3 {
             if !(2..=2048).contains(&nodes[axis]) {
@@ -83,10 +81,12 @@ impl Volume {
         let volume = Self { nodes, low, high, values };
         let (found, wanted) = (volume.values.len(), nodes.iter().product());
         if found != wanted {
-            return Err(VolumeError::Length { found, wanted });
+            return Err(VolumeError::Length { found, wanted }.into());
         }
         match volume.values.iter().position(|value| !value.is_finite()) {
-            Some(k) => Err(VolumeError::Value { node: volume.indices(k), value: volume.values[k] }),
+            Some(k) => {
+                Err(VolumeError::Value { node: volume.indices(k), value: volume.values[k] }.into())
+            }
             None => Ok(volume),
         }
     }

@@ -4,7 +4,8 @@
 //! <https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html>
 
 use super::Volume;
-use super::metrics::{Mismatch, same_nodes};
+use super::metrics::same_nodes;
+use crate::Error;
 use std::io::{self, Write};
 
 /// A volume as a field of a file.
@@ -18,19 +19,14 @@ pub struct Field<'a> {
 
 /// Why a file is not written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum VtiError {
-    /// The fields of a file share their nodes.
-    #[error(transparent)]
-    Mismatch(#[from] Mismatch),
     /// A name that is none.
     #[error("field name {0:?} is not allowed: letters, digits and _, another one for each field")]
     Name(String),
     /// A file holds one field or more.
     #[error("no field is not allowed: 1 or more")]
     Empty,
-    /// The bytes could not be written.
-    #[error(transparent)]
-    Io(#[from] io::Error),
 }
 
 /// Writes fields on the same nodes, the first of them as the one that is looked at first. Coordinates
@@ -38,13 +34,13 @@ pub enum VtiError {
 ///
 /// # Errors
 /// If the nodes differ, a name is not allowed or used twice, or the bytes cannot be written.
-pub fn write(out: &mut impl Write, fields: &[Field]) -> Result<(), VtiError> {
-    let Some(first) = fields.first() else { return Err(VtiError::Empty) };
+pub fn write(out: &mut impl Write, fields: &[Field]) -> Result<(), Error> {
+    let Some(first) = fields.first() else { return Err(VtiError::Empty.into()) };
     for (k, field) in fields.iter().enumerate() {
         let simple = field.name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
         let used = fields.iter().take(k).any(|other| other.name == field.name);
         if field.name.is_empty() || !simple || used {
-            return Err(VtiError::Name(field.name.to_owned()));
+            return Err(VtiError::Name(field.name.to_owned()).into());
         }
         same_nodes(first.volume, field.volume)?;
     }
@@ -155,14 +151,17 @@ mod tests {
         let (volume, mut bytes) = (ramp(), Vec::new());
         let other = Volume::new([2, 3, 4], [-5.0; 3], [5.0; 3], vec![0.0; 24]).unwrap();
         let field = |name, volume| Field { name, volume };
-        assert!(matches!(write(&mut bytes, &[]), Err(VtiError::Empty)));
+        assert!(matches!(write(&mut bytes, &[]), Err(Error::Vti(VtiError::Empty))));
         for name in ["", "a\"b", "a b"] {
-            assert!(matches!(write(&mut bytes, &[field(name, &volume)]), Err(VtiError::Name(_))));
+            assert!(matches!(
+                write(&mut bytes, &[field(name, &volume)]),
+                Err(Error::Vti(VtiError::Name(_)))
+            ));
         }
         let twice = [field("a", &volume), field("a", &volume)];
-        assert!(matches!(write(&mut bytes, &twice), Err(VtiError::Name(_))));
+        assert!(matches!(write(&mut bytes, &twice), Err(Error::Vti(VtiError::Name(_)))));
         let differ = [field("a", &volume), field("b", &other)];
-        assert!(matches!(write(&mut bytes, &differ), Err(VtiError::Mismatch(_))));
+        assert!(matches!(write(&mut bytes, &differ), Err(Error::Mismatch(_))));
         assert!(bytes.is_empty());
     }
 }

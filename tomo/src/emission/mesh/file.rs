@@ -1,12 +1,14 @@
 //! What a mesh file holds, whatever its format.
 
 use super::texture::Texture;
+use crate::Error;
 
 /// Reads what a mesh file refers to by a relative name: materials, buffers, pictures.
 pub type Resources<'a> = dyn Fn(&str) -> Result<Vec<u8>, String> + 'a;
 
 /// Why bytes are no mesh.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MeshError {
     /// Not an OBJ file.
     #[error("not a readable OBJ file: {0}")]
@@ -83,7 +85,7 @@ impl MeshFile {
     /// # Errors
     /// If the bytes are none of these, if something they refer to cannot be read, if there is no
     /// triangle or a coordinate is no number.
-    pub fn decode(bytes: &[u8], resources: &Resources<'_>) -> Result<Self, MeshError> {
+    pub fn decode(bytes: &[u8], resources: &Resources<'_>) -> Result<Self, Error> {
         let first = bytes.iter().find(|byte| !byte.is_ascii_whitespace());
         let file = if bytes.starts_with(b"glTF") || first == Some(&b'{') {
             super::gltf_file::decode(bytes, resources)?

@@ -8,10 +8,11 @@ mod texture;
 
 pub use file::{Material, MeshError, MeshFile, RawTriangle, Resources};
 
+use crate::Error;
 use crate::scene::{Mesh, MeshVelocity};
 use kerrlight_geodesic::flow::rotating_redshift;
 use kerrlight_geodesic::vector::{cross, difference, dot, rotate};
-use kerrlight_geodesic::{Error, Kerr, PathPoint};
+use kerrlight_geodesic::{Kerr, PathPoint};
 
 /// A triangle with what a test against it needs.
 #[derive(Debug, Clone)]

@@ -1,6 +1,7 @@
 //! An equirectangular picture of the whole sky.
 
 use super::beam::Beam;
+use crate::Error;
 use crate::image::exr;
 use crate::memory;
 use core::f64::consts::{PI, TAU};
@@ -41,6 +42,7 @@ fn exr_colors(bytes: &[u8]) -> Result<(usize, usize, Vec<[f32; 3]>), PanoramaErr
 
 /// Why a picture cannot be the sky.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PanoramaError {
     /// The bytes are no picture that can be read.
     #[error("not a readable PNG, JPEG, HDR or EXR picture: {0}")]
@@ -67,14 +69,14 @@ impl Panorama {
     ///
     /// # Errors
     /// If the bytes are no such picture.
-    pub fn decode(bytes: &[u8]) -> Result<Self, PanoramaError> {
+    pub fn decode(bytes: &[u8]) -> Result<Self, Error> {
         let is_exr = bytes.starts_with(&EXR_MAGIC);
         let (width, height) = if is_exr { exr::dimensions(bytes)? } else { dimensions(bytes)? };
         let what = || format!("a sky of {width} x {height} pixels");
         memory::afford(what, memory::colours(width.into(), height.into()))?;
         if is_exr {
             let (width, height, pixels) = exr_colors(bytes)?;
-            return Self::new(width, height, pixels);
+            return Ok(Self::new(width, height, pixels)?);
         }
         let picture = image::load_from_memory(bytes)?;
         let linear = matches!(
@@ -85,7 +87,7 @@ impl Panorama {
         let (width, height) = (picture.width() as usize, picture.height() as usize);
         let decode = |c: f32| if linear { c } else { srgb_to_linear(c) };
         let pixels: Vec<[f32; 3]> = picture.pixels().map(|p| p.0.map(decode)).collect();
-        Self::new(width, height, pixels)
+        Ok(Self::new(width, height, pixels)?)
     }
 
     fn new(width: usize, height: usize, pixels: Vec<[f32; 3]>) -> Result<Self, PanoramaError> {

@@ -1,8 +1,8 @@
 //! The data of a linear problem, and how they are weighted.
 
+use crate::Error;
 use crate::fit::FrameTerm;
 use crate::simd::Float;
-use kerrlight_geodesic::Error;
 
 /// Data with the weight of their reduced χ².
 #[derive(Clone, Copy)]

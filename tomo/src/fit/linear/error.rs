@@ -1,13 +1,9 @@
 //! Why a linear problem has no solution.
 
-use kerrlight_geodesic::Error;
-
 /// What a linear problem or a scan of axes ends in instead of a result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum LinearError {
-    /// A number of the settings.
-    #[error(transparent)]
-    Range(#[from] Error),
     /// A χ² that is no finite number.
     #[error("{data} of frame {frame}: χ² is {value}, which is not a finite number")]
     NotFinite {

@@ -1,9 +1,9 @@
 //! Nodes of one grid and of another.
 
 use super::walk::Voxels;
+use crate::Error;
 use crate::points::Coordinates;
 use crate::representation::{Representation, Workspace};
-use kerrlight_geodesic::Error;
 
 /// Values at the nodes of another grid.
 pub(super) fn refined(from: &Voxels, x: &[f64], to: &Voxels) -> Result<Vec<f64>, Error> {

@@ -3,6 +3,7 @@
 use super::data::Data;
 use super::error::LinearError;
 use super::operator::Operator;
+use crate::Error;
 use crate::fit::regulariser::{Regulariser, Shape};
 use crate::simd::Float;
 
@@ -55,13 +56,13 @@ impl<'a, 'b, T: Float + Default> Objective<'a, 'b, T> {
     }
 
     /// Refuses a value that is no finite number, and says which data have it.
-    pub fn finite(&self, value: f64, x: &[f64]) -> Result<f64, LinearError> {
+    pub fn finite(&self, value: f64, x: &[f64]) -> Result<f64, Error> {
         if value.is_finite() {
             return Ok(value);
         }
         let culprit = self.operator.not_finite(self.data, &rounded::<T>(x, 1.0));
         let (frame, data, value) = culprit.unwrap_or_else(|| (0, "penalties".to_owned(), value));
-        Err(LinearError::NotFinite { data, frame, value })
+        Err(LinearError::NotFinite { data, frame, value }.into())
     }
 
     /// Mean flux of the frames.

@@ -12,6 +12,7 @@ use super::scaled::Scaled;
 use super::solve::{Coarse, LinearProblem, LinearProgress, LinearSettings, LinearSolution, Watch};
 use super::start::{Lit, Trials};
 use super::walk::Voxels;
+use crate::Error;
 use crate::simd::Float;
 
 /// Values at the nodes, and which of them count.
@@ -93,7 +94,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
     }
 
     /// The coarse problem's solution at the nodes of the grid, and where they count.
-    pub fn coarse(&mut self, coarse: Coarse) -> Result<Option<Start>, LinearError> {
+    pub fn coarse(&mut self, coarse: Coarse) -> Result<Option<Start>, Error> {
         let fine = self.problem.voxels;
         let voxels = Voxels { nodes: fine.nodes.map(|n| n.min(coarse.nodes)), ..fine };
         let convex = self.problem.data()?.is_convex();
@@ -124,7 +125,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         &mut self,
         objective: &mut Objective<'_, '_, T>,
         iterations: usize,
-    ) -> Result<Option<Coarsely>, LinearError> {
+    ) -> Result<Option<Coarsely>, Error> {
         if !objective.data.is_convex() {
             let lit = self.lit(objective, Trials { iterations: PATIENCE * iterations, ..MANY })?;
             return Ok(lit.map(|Lit { start, x, .. }| (x, Some(start))));
@@ -135,7 +136,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
     }
 
     /// Value and slope at the lit field, where there is one.
-    pub fn reference(&mut self, data: &Data<'_, T>) -> Result<(), LinearError> {
+    pub fn reference(&mut self, data: &Data<'_, T>) -> Result<(), Error> {
         if data.is_convex() {
             return Ok(());
         }
@@ -157,7 +158,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         data: &Data<'_, T>,
         x: &mut Vec<f64>,
         is_active: &mut Vec<bool>,
-    ) -> Result<Option<LinearSolution<T>>, LinearError> {
+    ) -> Result<Option<LinearSolution<T>>, Error> {
         let (problem, settings) = (self.problem, self.settings);
         let active = Active::new(is_active, problem.voxels.corners());
         let operator = Operator::new(problem.walk(), active, problem.frames, settings.memory);
@@ -222,7 +223,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
 
     /// Brings a field whose data do not know the flux back to the one that was given, within the bound. The bound
     /// acted on another scale before, so that it may cut off some of the peak; it must leave nine tenths of the flux.
-    fn rescale(&self, objective: &Objective<'_, '_, T>, x: &mut [f64]) -> Result<(), LinearError> {
+    fn rescale(&self, objective: &Objective<'_, '_, T>, x: &mut [f64]) -> Result<(), Error> {
         let Some(flux) = self.problem.flux.filter(|_| objective.data.is_scale_free()) else {
             return Ok(());
         };
@@ -231,7 +232,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         let needed = x.iter().fold(0.0f64, |most, x| most.max(scale * *x));
         x.iter_mut().for_each(|x| *x = (scale * *x).min(upper));
         if needed > upper && objective.flux(x) < 0.9 * flux {
-            return Err(LinearError::TooBright { flux, needed, upper });
+            return Err(LinearError::TooBright { flux, needed, upper }.into());
         }
         Ok(())
     }

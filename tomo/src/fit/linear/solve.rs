@@ -3,17 +3,16 @@
 use super::certificate::{Certificate, Stationarity};
 use super::data::{Data, Weighted};
 use super::descent::{Ending, Method};
-use super::error::LinearError;
 use super::objective::{Objective, Prior};
 use super::operator::{Active, Operator};
 use super::run::{FEW, LIT, Run};
 use super::start::Trials;
 use super::walk::{Voxels, Walk};
+use crate::Error;
 use crate::dynamics::Axis;
 use crate::fit::ForwardModel;
 use crate::simd::Float;
 use core::ops::ControlFlow;
-use kerrlight_geodesic::Error;
 
 /// min Σ weight · χ²/data + priors over 0 ≤ e ≤ `upper` at the nodes of a grid.
 #[derive(Clone, Copy)]
@@ -145,7 +144,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         &self,
         settings: &LinearSettings,
         watch: &mut Watch<'_>,
-    ) -> Result<LinearSolution<T>, LinearError> {
+    ) -> Result<LinearSolution<T>, Error> {
         self.check(settings)?;
         let data = self.data()?;
         let mut run = Run::new(self, settings, watch);
@@ -172,7 +171,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
     ///
     /// # Errors
     /// As those of [`solve`](Self::solve).
-    pub fn least(&self, iterations: usize) -> Result<f64, LinearError> {
+    pub fn least(&self, iterations: usize) -> Result<f64, Error> {
         let settings = LinearSettings { coarse: None, tolerance: 0.0, ..LinearSettings::default() };
         self.check(&settings)?;
         let data = self.data()?;

@@ -6,6 +6,7 @@ use super::lit::{Around, Spots};
 use super::objective::{Convex, Objective};
 use super::run::Run;
 use super::scaled::dot;
+use crate::Error;
 use crate::simd::Float;
 
 /// A lit field and where the descent from it ended.
@@ -38,7 +39,7 @@ impl<T: Float + Default> Run<'_, '_, '_, T> {
         &mut self,
         objective: &mut Objective<'_, '_, T>,
         trials: Trials,
-    ) -> Result<Option<Lit>, LinearError> {
+    ) -> Result<Option<Lit>, Error> {
         let starts = self.starts(objective, trials)?;
         let mut best: Option<Lit> = None;
         for (_, start) in starts {
@@ -50,7 +51,7 @@ impl<T: Float + Default> Run<'_, '_, '_, T> {
                 best = Some(Lit { start, x: end.x, value: end.value });
             }
         }
-        best.map(Some).ok_or_else(|| LinearError::NoLight(objective.data.names()))
+        Ok(best.map(Some).ok_or_else(|| LinearError::NoLight(objective.data.names()))?)
     }
 
     /// The best spots and the wide fields, each with its value; none that a dark field is better than.
@@ -58,7 +59,7 @@ impl<T: Float + Default> Run<'_, '_, '_, T> {
         &mut self,
         objective: &mut Objective<'_, '_, T>,
         trials: Trials,
-    ) -> Result<Vec<(f64, Vec<f64>)>, LinearError> {
+    ) -> Result<Vec<(f64, Vec<f64>)>, Error> {
         let around = Around::new(&objective.operator.voxels(), self.problem.axis);
         let seen = objective.operator.seen();
         let dark = match objective.data.is_scale_free() {
@@ -87,7 +88,7 @@ impl<T: Float + Default> Run<'_, '_, '_, T> {
         &self,
         objective: &mut Objective<'_, '_, T>,
         shape: &[f64],
-    ) -> Result<Option<(f64, Vec<f64>)>, LinearError> {
+    ) -> Result<Option<(f64, Vec<f64>)>, Error> {
         let largest = shape.iter().fold(0.0f64, |most, x| most.max(*x));
         let flux = if largest > 0.0 { objective.flux(shape) } else { 0.0 };
         if flux <= 0.0 {

@@ -1,12 +1,12 @@
 //! Where the nodes of a frame's rays come to lie in a grid of voxels.
 
+use crate::Error;
 use crate::dynamics::{Axis, Turned, pull_back};
 use crate::fit::ForwardModel;
 use crate::fit::regulariser::Shape;
 use crate::points::{Coordinates, CoordinatesMut};
 use crate::representation::{Activation, Grid, GridSettings};
 use crate::simd::Float;
-use kerrlight_geodesic::Error;
 
 /// A grid of voxels, trilinear in between, zero outside; nodes at both ends, z fastest.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,12 +1,12 @@
 //! A picture of a scan: the sphere in Mollweide's projection, which keeps areas.
 
 use super::AxisScan;
+use crate::Error;
 use crate::dynamics::Axis;
 use crate::image::canvas::{Align, BLACK, Canvas, Rgb, WHITE};
 use crate::image::colormap::Colormap;
 use core::f64::consts::{FRAC_PI_2, PI, SQRT_2};
 use image::RgbImage;
-use kerrlight_geodesic::Error;
 
 /// Points of the lattice that a pixel's loss is the weighted mean of.
 const NEAREST: usize = 4;

@@ -10,9 +10,9 @@ mod refine;
 
 use super::ForwardModel;
 use super::linear::{LinearError, LinearProblem, Prior, Voxels, Weighted};
+use crate::Error;
 use crate::dynamics::Axis;
 use crate::simd::Float;
-use kerrlight_geodesic::Error;
 use rayon::prelude::*;
 use refine::Refinement;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -141,13 +141,13 @@ struct Scanner<'a, T: Float> {
 impl<T: Float + Default> Scanner<'_, T> {
     /// The loss of each axis; none if the scan was cancelled. Axes are shared among threads, and each
     /// has its own sums: their number does not change a bit.
-    fn losses(&self, axes: &[Axis], effort: Effort) -> Result<Option<Vec<AxisLoss>>, LinearError> {
+    fn losses(&self, axes: &[Axis], effort: Effort) -> Result<Option<Vec<AxisLoss>>, Error> {
         let all: Vec<Option<AxisLoss>> =
             axes.par_iter().map(|axis| self.loss(*axis, effort)).collect::<Result<_, _>>()?;
         Ok(all.into_iter().collect())
     }
 
-    fn loss(&self, axis: Axis, effort: Effort) -> Result<Option<AxisLoss>, LinearError> {
+    fn loss(&self, axis: Axis, effort: Effort) -> Result<Option<AxisLoss>, Error> {
         if self.cancelled.load(Ordering::Relaxed) {
             return Ok(None);
         }
@@ -177,7 +177,7 @@ impl<T: Float + Default> Scanner<'_, T> {
         found: &[AxisLoss],
         map: &[AxisLoss],
         effort: Effort,
-    ) -> Result<Option<AxisLoss>, LinearError> {
+    ) -> Result<Option<AxisLoss>, Error> {
         let best = |all: &[AxisLoss]| {
             let there = all.iter().filter(|found| found.axis.dot(axis) < 0.0);
             there.min_by(|a, b| a.loss.total_cmp(&b.loss)).copied()
@@ -198,7 +198,7 @@ pub fn scan_axis<T: Float + Default>(
     problem: &AxisProblem<'_, T>,
     settings: &AxisSettings,
     watch: &ScanWatch<'_>,
-) -> Result<Option<AxisScan>, LinearError> {
+) -> Result<Option<AxisScan>, Error> {
     let settings = settings.checked()?;
     let scanner = Scanner {
         problem,
@@ -234,13 +234,13 @@ pub fn scan_axis<T: Float + Default>(
 const SAME: f64 = 1e-6;
 
 /// Refuses a map whose losses are all the same.
-fn told_apart(map: &[AxisLoss]) -> Result<(), LinearError> {
+fn told_apart(map: &[AxisLoss]) -> Result<(), Error> {
     let least = map.iter().fold(f64::INFINITY, |least, at| least.min(at.loss));
     let most = map.iter().fold(f64::NEG_INFINITY, |most, at| most.max(at.loss));
     if most - least > SAME * most.abs() {
         return Ok(());
     }
-    Err(LinearError::Alike { axes: map.len(), loss: least })
+    Err(LinearError::Alike { axes: map.len(), loss: least }.into())
 }
 
 /// The axis of least loss near one that is nearly right, by steps that are halved `halvings` times; none if the
@@ -254,7 +254,7 @@ pub fn refine_axis<T: Float + Default>(
     step: f64,
     (effort, halvings): (Effort, usize),
     watch: &ScanWatch<'_>,
-) -> Result<Option<AxisLoss>, LinearError> {
+) -> Result<Option<AxisLoss>, Error> {
     let settings = AxisSettings { fine: effort, halvings, ..AxisSettings::default() }.checked()?;
     let scanner = Scanner {
         problem,
@@ -310,7 +310,7 @@ mod tests {
     fn scan_of(
         terms: &[Weighted<'_, f64>],
         settings: &AxisSettings,
-    ) -> Result<Option<AxisScan>, LinearError> {
+    ) -> Result<Option<AxisScan>, Error> {
         let problem = AxisProblem {
             model: &forward_model(),
             frames: &FRAMES,
@@ -337,6 +337,7 @@ mod tests {
         let term = ImageTerm::new(vec![0.0; 5 * 81], 81, 1.0).unwrap();
         let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
         let error = scan_of(&terms, &SMALL).unwrap_err();
+        let Error::Linear(error) = error else { panic!("{error}") };
         assert_eq!(error, LinearError::Alike { axes: 40, loss: 0.0 });
     }
 
@@ -391,7 +392,7 @@ mod tests {
         assert!(scan.best.axis.dot(truth) > 0.99, "{:?}", scan.best);
         assert!(scan.runner_up.axis.dot(scan.best.axis) < 0.0);
         assert!(scan.best.loss < scan.runner_up.loss);
-        assert_eq!(scan_axis(&problem, &settings, &|_, _| false), Ok(None));
+        assert_eq!(scan_axis(&problem, &settings, &|_, _| false).unwrap(), None);
         let none = AxisSettings { directions: 2, ..settings };
         let text = scan_axis(&problem, &none, &|_, _| true).unwrap_err().to_string();
         assert!(text.contains("directions = 2 "), "{text}");

@@ -1,8 +1,8 @@
 //! From a point of the lattice down to the minimum beside it.
 
 use super::{AxisLoss, Effort, Scanner};
+use crate::Error;
 use crate::dynamics::Axis;
-use crate::fit::linear::LinearError;
 use crate::simd::Float;
 
 /// A pattern search: six directions about the best one so far, half as far away when none is better; at the end
@@ -18,7 +18,7 @@ const MOVES: usize = 6;
 
 impl<T: Float + Default> Refinement<'_, '_, T> {
     /// None if the scan was cancelled.
-    pub fn run(&self, from: Axis, step: f64) -> Result<Option<AxisLoss>, LinearError> {
+    pub fn run(&self, from: Axis, step: f64) -> Result<Option<AxisLoss>, Error> {
         let Some(losses) = self.scanner.losses(&[from], self.effort)? else { return Ok(None) };
         let mut best = losses[0];
         let mut step = step;

@@ -1,8 +1,8 @@
 //! Errors in settings, which name the key and, where there is a text, its line.
 
+use crate::error::{Error, Parts};
 use crate::memory::TooLarge;
 use crate::scene::line_of;
-use std::error::Error;
 
 /// Why settings are not those of a fit.
 #[derive(Debug, thiserror::Error)]
@@ -47,7 +47,7 @@ pub enum FitError {
     Memory(#[from] TooLarge),
     /// What the numbers are handed to refuses them.
     #[error(transparent)]
-    Other(Box<dyn Error + Send + Sync>),
+    Other(Box<dyn std::error::Error + Send + Sync>),
 }
 
 fn line_prefix(line: Option<usize>) -> String {
@@ -66,6 +66,18 @@ impl FitError {
         FitError::Missing { key: key.to_owned(), why: why.into() }
     }
 
+    /// Field, value, allowed range and line, where this error has them.
+    pub(crate) fn parts(&self) -> Parts<'_> {
+        match self {
+            FitError::Range { line, key, value, allowed } => {
+                (Some(key), Some(value.into()), Some(allowed), *line)
+            }
+            FitError::Missing { key, .. } => (Some(key), None, None, None),
+            FitError::Part { error, .. } => error.parts(),
+            _ => (None, None, None, None),
+        }
+    }
+
     /// With the line of the text on which the key stands.
     pub(super) fn located(self, text: &str) -> Self {
         match self {
@@ -73,6 +85,16 @@ impl FitError {
                 FitError::Range { line: line_of(text, &key), key, value, allowed }
             }
             other => other,
+        }
+    }
+}
+
+impl From<Error> for FitError {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::Fit(error) => error,
+            Error::Memory(error) => FitError::Memory(error),
+            other => FitError::Other(Box::new(other)),
         }
     }
 }
@@ -88,19 +110,10 @@ macro_rules! other {
     };
 }
 
-other!(
-    crate::dynamics::ZeroAxis,
-    crate::interferometry::data_terms::DataTermError,
-    crate::interferometry::earth::EarthError,
-    crate::interferometry::schedule::ScheduleError,
-    crate::volume::VolumeError,
-    kerrlight_geodesic::Error,
-    toml::de::Error,
-    toml::ser::Error,
-);
+other!(kerrlight_geodesic::Error, toml::de::Error, toml::ser::Error,);
 
-impl From<Box<dyn Error + Send + Sync>> for FitError {
-    fn from(error: Box<dyn Error + Send + Sync>) -> Self {
+impl From<Box<dyn std::error::Error + Send + Sync>> for FitError {
+    fn from(error: Box<dyn std::error::Error + Send + Sync>) -> Self {
         FitError::Other(error)
     }
 }
@@ -108,19 +121,21 @@ impl From<Box<dyn Error + Send + Sync>> for FitError {
 /// Names the part of the settings that an error is about.
 pub(crate) trait Within<T> {
     /// The same result, whose error begins with the part.
-    fn within(self, part: impl Into<String>) -> Result<T, FitError>;
+    fn within(self, part: impl Into<String>) -> Result<T, Error>;
 }
 
 impl<T, E: Into<FitError>> Within<T> for Result<T, E> {
-    fn within(self, part: impl Into<String>) -> Result<T, FitError> {
-        self.map_err(|error| FitError::Part { part: part.into(), error: Box::new(error.into()) })
+    fn within(self, part: impl Into<String>) -> Result<T, Error> {
+        self.map_err(|error| {
+            FitError::Part { part: part.into(), error: Box::new(error.into()) }.into()
+        })
     }
 }
 
 /// Refuses settings that contradict each other.
 macro_rules! refuse {
     ($($words:tt)*) => {
-        return Err(crate::fit::settings::FitError::Conflict(format!($($words)*)))
+        return Err(crate::fit::settings::FitError::Conflict(format!($($words)*)).into())
     };
 }
 pub(crate) use refuse;

@@ -24,6 +24,7 @@ pub use simulation::{GlyphShape, Movie, Noise, Observation, Spot, Truth};
 pub use view::{Absorption, Effects, Hole, Motion, Observer, Region, Screen, Velocity, WidthOf};
 pub use world::merge;
 
+use crate::Error;
 use serde::{Deserialize, Serialize};
 
 /// The settings of a fit. Lengths and times in M = GM/c² unless a name says otherwise.
@@ -97,7 +98,7 @@ impl FitFile {
     /// let error = FitFile::parse("title = \"A flare\"\nseed = 1").unwrap_err();
     /// assert!(error.to_string().contains("missing field `hole`"));
     /// ```
-    pub fn parse(text: &str) -> Result<Self, FitError> {
+    pub fn parse(text: &str) -> Result<Self, Error> {
         let file = toml::from_str(text)
             .map_err(|error| FitError::Syntax(error.to_string().trim_end().to_owned()))?;
         ranges::check(text)?;

@@ -1,6 +1,7 @@
 //! Settings of penalties on the emission, and what they mean for each representation.
 
 use super::{FitError, FitFile, Kind, Within, refuse};
+use crate::Error;
 use crate::fit::linear::Prior;
 use crate::fit::{Penalties, Probe, Regulariser};
 use serde::{Deserialize, Serialize};
@@ -98,7 +99,7 @@ impl FitFile {
     ///
     /// # Errors
     /// If a kind occurs twice, or a number is missing or out of range.
-    pub fn priors(&self) -> Result<Vec<Prior>, FitError> {
+    pub fn priors(&self) -> Result<Vec<Prior>, Error> {
         let one = |(k, setting): (usize, &PenaltySettings)| {
             let same = |other: &PenaltySettings| other.kind == setting.kind;
             if let Some(first) = self.regulariser[..k].iter().position(same) {
@@ -113,7 +114,7 @@ impl FitFile {
     ///
     /// # Errors
     /// As [`FitFile::priors`], or if a network has no `probe`.
-    pub fn penalties(&self) -> Result<Option<Penalties>, FitError> {
+    pub fn penalties(&self) -> Result<Option<Penalties>, Error> {
         let priors = self.priors()?;
         if priors.is_empty() {
             return Ok(None);
@@ -126,7 +127,7 @@ impl FitFile {
                     "probe.nodes",
                     "regularisers look at a network at nodes of a grid; add a table [probe] with `nodes = 32`, nodes \
                      along each axis, 4 to 256",
-                ));
+                ).into());
             }
         };
         Ok(Some(Penalties { priors, probe, region: self.region.limits() }))

@@ -40,7 +40,7 @@ impl FitFile {
         let mut table = Table::try_from(self).within("settings")?;
         merge(&mut table, &self.world);
         table.remove("world");
-        table.try_into().within("world")
+        Ok(table.try_into().within("world")?)
     }
 }
 

@@ -1,8 +1,8 @@
 //! Letters and digits that shine: emission whose shape everybody can judge.
 
+use crate::Error;
 use crate::fit::settings::GlyphShape;
 use crate::image::canvas::coverage;
-use kerrlight_geodesic::Error;
 use kerrlight_geodesic::vector::{cross, dot, rotate};
 
 /// Pixels of a letter's height.

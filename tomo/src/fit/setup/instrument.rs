@@ -75,7 +75,7 @@ impl Instrument {
         }
         let jy = file.screen.jy_per_pixel;
         if !(jy > 0.0 && jy.is_finite()) {
-            return Err(FitError::range("screen.jy_per_pixel", jy, "above 0"));
+            return Err(FitError::range("screen.jy_per_pixel", jy, "above 0").into());
         }
         if let Some(medium) = file.effects.absorption {
             lines.absorb(opacity(medium)?);
@@ -90,11 +90,15 @@ impl Instrument {
 fn opacity(medium: Absorption) -> Result<impl Fn([f64; 3]) -> f64> {
     let Absorption { coefficient, radius, height } = medium;
     if !(coefficient >= 0.0 && coefficient.is_finite()) {
-        return Err(FitError::range("effects.absorption.coefficient", coefficient, "0 or above"));
+        return Err(
+            FitError::range("effects.absorption.coefficient", coefficient, "0 or above").into()
+        );
     }
     for (name, value) in [("radius", radius), ("height", height)] {
         if !(value > 0.0 && value.is_finite()) {
-            return Err(FitError::range(format!("effects.absorption.{name}"), value, "above 0"));
+            return Err(
+                FitError::range(format!("effects.absorption.{name}"), value, "above 0").into()
+            );
         }
     }
     Ok(move |[x, y, z]: [f64; 3]| {

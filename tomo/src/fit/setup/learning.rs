@@ -77,10 +77,10 @@ fn own(name: &str, file: &FitFile, registry: &Registry) -> Result<Box<dyn Repres
     let Region { r_min, r_max, z_width } = file.region.limits();
     let table = file.representation.own.clone();
     if let Some(built) = registry.build(name, &OwnSettings { r_min, r_max, z_width, table }) {
-        return Ok(built?);
+        return Ok(built.map_err(FitError::from)?);
     }
     let known: Vec<&str> = Kind::BUILT_IN.iter().map(Kind::name).chain(registry.names()).collect();
-    Err(FitError::range("representation.kind", format!("{name:?}"), &known.join(", ")))
+    Err(FitError::range("representation.kind", format!("{name:?}"), &known.join(", ")).into())
 }
 
 /// How it is learnt.
@@ -146,7 +146,7 @@ fn occupancy(chosen: &Occupancy) -> Result<OccupancyPlan> {
     for (name, value) in [("threshold", threshold), ("memory", memory)] {
         if !(0.0..1.0).contains(&value) {
             let key = format!("training.occupancy.{name}");
-            return Err(FitError::range(key, value, "0 to 1, 1 excluded"));
+            return Err(FitError::range(key, value, "0 to 1, 1 excluded").into());
         }
     }
     Ok(OccupancyPlan {
@@ -191,7 +191,7 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
     if file.representation.kind == Kind::LinearGrid || file.training.start != Start::Drawn {
         linear(file)?;
     }
-    file.simulated().map(drop)
+    Ok(file.simulated().map(drop)?)
 }
 
 /// Refuses representations, grids and volumes that there is no memory for.

@@ -49,7 +49,7 @@ impl Measured {
 
     fn movie(&self) -> Result<&[f64]> {
         let missing = || FitError::Conflict("there are no images, only visibilities".to_owned());
-        self.movie.as_deref().ok_or_else(missing)
+        Ok(self.movie.as_deref().ok_or_else(missing)?)
     }
 
     /// Flux of every frame, Jy.
@@ -121,7 +121,7 @@ impl Measured {
                     _ => ClosureKind::LogAmplitude,
                 };
                 match ClosureTerm::new(&part, kind, least) {
-                    Err(DataTermError::Empty) => return Ok(None),
+                    Err(crate::Error::DataTerm(DataTermError::Empty)) => return Ok(None),
                     term => Box::new(term?),
                 }
             }

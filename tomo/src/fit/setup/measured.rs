@@ -211,7 +211,7 @@ fn clock(seen: &Seen) -> Result<(Clock, [f64; 2])> {
             "observation.utc",
             "give `utc = [FROM, TO]`, hours of UTC of the first scan and of one after the last, or `gmst = [FROM, TO]`, \
              the same in sidereal time, in [observation]",
-        )),
+        ).into()),
     }
 }
 
@@ -245,7 +245,7 @@ fn lit(truth: &Truth, movie: Vec<f64>) -> Result<Vec<f64>> {
 /// Adds a part of each amplitude to its error in quadrature.
 fn add_systematic(name: &str, part: f64, observation: &mut Observation) -> Result<()> {
     if !(part >= 0.0 && part.is_finite()) {
-        return Err(FitError::range(name, part, "0 or above"));
+        return Err(FitError::range(name, part, "0 or above").into());
     }
     for row in &mut observation.rows {
         row.noise_sigma[0] = row.noise_sigma[0].hypot(part * row.products[0].norm());

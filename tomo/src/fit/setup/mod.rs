@@ -30,7 +30,7 @@ use crate::scene;
 use crate::units::{MICROARCSECOND, gravitational_angle, gravitational_time};
 use kerrlight_geodesic::{Inclination, Observer};
 
-type Result<T> = std::result::Result<T, FitError>;
+type Result<T> = std::result::Result<T, crate::Error>;
 
 /// The observer.
 ///
@@ -51,10 +51,10 @@ pub fn observer(observer: &ObserverSettings) -> Result<Observer> {
 pub fn spacing(screen: &Screen) -> Result<f64> {
     let Screen { pixels, width, width_of, .. } = *screen;
     if !(2..=4096).contains(&pixels) {
-        return Err(FitError::range("screen.pixels", pixels, "2 to 4096"));
+        return Err(FitError::range("screen.pixels", pixels, "2 to 4096").into());
     }
     if !(width > 0.0 && width.is_finite()) {
-        return Err(FitError::range("screen.width", width, "M above 0"));
+        return Err(FitError::range("screen.width", width, "M above 0").into());
     }
     Ok(match width_of {
         WidthOf::Edges => width / pixels as f64,
@@ -75,14 +75,14 @@ pub fn sky(file: &FitFile) -> Result<ImageGrid> {
         }
         (None, None, _) => {
             let why = format!("visibilities need angles; {MASS}");
-            return Err(FitError::missing("hole.mass_msun", why));
+            return Err(FitError::missing("hole.mass_msun", why).into());
         }
         _ => {
             return Err(FitError::missing(
                 "hole.distance_kpc",
                 "visibilities need angles; give `distance_kpc = …` in [hole], e.g. 8.178 for Sgr A*, 16800.0 for M87*, or \
                  `field_uas = …`, the width of the field on the sky, in [screen]",
-            ));
+            ).into());
         }
     };
     Ok(ImageGrid::new(n, n, field_uas * MICROARCSECOND)?)
@@ -110,7 +110,7 @@ pub fn hours_per_m(file: &FitFile) -> Result<f64> {
     };
     let mass = file.hole.mass_msun.ok_or_else(missing)?;
     if !(mass > 0.0 && mass.is_finite()) {
-        return Err(FitError::range("hole.mass_msun", mass, "above 0"));
+        return Err(FitError::range("hole.mass_msun", mass, "above 0").into());
     }
     Ok(gravitational_time(mass) / 3600.0)
 }
@@ -126,7 +126,7 @@ pub fn linear(file: &FitFile) -> Result<&Linear> {
     };
     let linear = file.linear.as_ref().ok_or_else(missing)?;
     if !(linear.upper > 0.0 && linear.upper.is_finite()) {
-        return Err(FitError::range("linear.upper", linear.upper, "above 0"));
+        return Err(FitError::range("linear.upper", linear.upper, "above 0").into());
     }
     Ok(linear)
 }

@@ -108,6 +108,7 @@ fn exact_a_divergence_is_stepped_back_from() {
         }
         assert!(state.now.step < 40);
     };
+    let crate::Error::Diverged(fail) = fail else { panic!("{fail}") };
     assert!(fail.setbacks == 12 && fail.to_string().contains("after 12 returns"), "{fail}");
 }
 

@@ -90,7 +90,7 @@ mod tests {
     fn exact_stations_stand_on_the_ground() {
         for name in BUILT_IN {
             let array = built_in(name).unwrap();
-            assert_eq!(Array::new(array.stations.clone()), Ok(array.clone()));
+            assert_eq!(Array::new(array.stations.clone()).unwrap(), array);
             for station in array.stations {
                 let [x, y, z] = station.position.unwrap();
                 let radius = (x * x + y * y + z * z).sqrt();

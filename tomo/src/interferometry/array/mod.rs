@@ -8,9 +8,11 @@ pub(super) use text::{HEADING, columns, station};
 pub use text::{parse, to_text};
 
 use super::Complex64;
+use crate::Error;
 
 /// Why there is no array, or it is not fit for use.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ArrayError {
     /// A line of a text that is no station.
     #[error("line {line}: {message}")]
@@ -103,17 +105,17 @@ impl Array {
     ///
     /// # Errors
     /// If there are fewer, or too many, or names occur twice.
-    pub fn new(stations: Vec<Station>) -> Result<Self, ArrayError> {
+    pub fn new(stations: Vec<Station>) -> Result<Self, Error> {
         if stations.len() < 2 {
-            return Err(ArrayError::TooFew(stations.len()));
+            return Err(ArrayError::TooFew(stations.len()).into());
         }
         if stations.len() > MOST_STATIONS {
-            return Err(ArrayError::TooMany(stations.len()));
+            return Err(ArrayError::TooMany(stations.len()).into());
         }
         let mut names: Vec<&str> = stations.iter().map(|s| s.name.as_str()).collect();
         names.sort_unstable();
         match names.windows(2).find(|pair| pair[0] == pair[1]) {
-            Some(pair) => Err(ArrayError::Twice(pair[0].to_owned())),
+            Some(pair) => Err(ArrayError::Twice(pair[0].to_owned()).into()),
             None => Ok(Array { stations }),
         }
     }
@@ -123,8 +125,8 @@ impl Array {
     /// # Errors
     /// If a station has none or stands at the centre of the Earth, which is how eht-imaging marks
     /// a spacecraft: orbits are not supported.
-    pub fn positions(&self) -> Result<Vec<[f64; 3]>, ArrayError> {
-        self.stations.iter().map(position).collect()
+    pub fn positions(&self) -> Result<Vec<[f64; 3]>, Error> {
+        Ok(self.stations.iter().map(position).collect::<Result<_, _>>()?)
     }
 }
 

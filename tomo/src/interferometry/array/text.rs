@@ -2,6 +2,7 @@
 //! `name x y z SEFD` or `name x y z SEFD_R SEFD_L fr_par fr_el fr_off D_R(re im) D_L(re im)`.
 
 use super::{Array, ArrayError, FeedRotation, MOST_STATIONS, Station};
+use crate::Error;
 use crate::interferometry::Complex64;
 use core::fmt::Write;
 
@@ -10,7 +11,7 @@ use core::fmt::Write;
 ///
 /// # Errors
 /// If a line has another number of columns, no number where one belongs, or the array is none.
-pub fn parse(text: &str) -> Result<Array, ArrayError> {
+pub fn parse(text: &str) -> Result<Array, Error> {
     let mut stations = Vec::new();
     for (index, line) in text.lines().enumerate() {
         let line_of = |message: String| ArrayError::Line { line: index + 1, message };
@@ -22,7 +23,7 @@ pub fn parse(text: &str) -> Result<Array, ArrayError> {
         }
         stations.push(station(&cells).map_err(line_of)?);
         if stations.len() > MOST_STATIONS {
-            return Err(ArrayError::TooMany(stations.len()));
+            return Err(ArrayError::TooMany(stations.len()).into());
         }
     }
     Array::new(stations)
@@ -98,7 +99,7 @@ mod tests {
         array.stations[2].sefd = [5600.0, 5800.25];
         array.stations[2].leakage[1] = Complex64::new(0.01, -0.0625);
         array.stations[3].feed_rotation.offset_deg = 45.0;
-        assert_eq!(parse(&to_text(&array)), Ok(array));
+        assert_eq!(parse(&to_text(&array)).unwrap(), array);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Closure phases and log closure amplitudes, with the covariance of those that share baselines.
 
 use super::{DataTerm, DataTermError, Residual, faintest};
+use crate::Error;
 use crate::interferometry::observation::Observation;
 use crate::interferometry::operator::Float;
 use crate::interferometry::products::{ClosureKind, ClosureSet};
@@ -39,14 +40,14 @@ impl<T: Float> ClosureTerm<T> {
         observation: &Observation,
         kind: ClosureKind,
         least_snr: f64,
-    ) -> Result<Self, DataTermError> {
+    ) -> Result<Self, Error> {
         let bad = observation.stokes_i().position(|(_, i)| !i.visibility.is_finite());
         if let Some(index) = bad {
-            return Err(DataTermError::NotFinite(index));
+            return Err(DataTermError::NotFinite(index).into());
         }
         let sets = ClosureSet::of(observation, kind, least_snr);
         if sets.is_empty() {
-            return Err(DataTermError::Empty);
+            return Err(DataTermError::Empty.into());
         }
         let scans = sets.iter().map(Scan::new).collect::<Result<_, _>>()?;
         Ok(ClosureTerm { kind, visibilities: observation.stokes_i().count(), scans })

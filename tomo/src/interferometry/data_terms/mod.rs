@@ -13,6 +13,7 @@ use num_complex::Complex;
 
 /// Why data make no term.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum DataTermError {
     /// A datum with an error of 0, infinity, or so small that its weight is none in single precision.
     #[error("datum {index}: sigma = {sigma} Jy is not allowed: above 0 and finite")]

@@ -1,6 +1,7 @@
 //! Every term: gradients by finite differences, mean of χ², agreement of both precisions.
 
 use super::*;
+use crate::Error;
 use crate::interferometry::noise::add_thermal_noise;
 use crate::interferometry::observation::{Basis, Row};
 use crate::interferometry::operator::{Dtft, ImageGrid, Operator, Pulse};
@@ -34,6 +35,14 @@ fn terms<T: Float>(data: &Observation) -> Vec<(&'static str, Box<dyn DataTerm<T>
         ("closure phases", closure(ClosureKind::Phase)),
         ("log closure amplitudes", closure(ClosureKind::LogAmplitude)),
     ]
+}
+
+/// Why there is no term of some data.
+fn refusal<T>(term: Result<T, Error>) -> DataTermError {
+    match term.err() {
+        Some(Error::DataTerm(error)) => error,
+        other => panic!("{other:?}"),
+    }
 }
 
 /// A model that is off by 10 %.
@@ -161,7 +170,7 @@ fn exact_data_without_errors_are_refused() {
     let message = VisibilityTerm::<f64>::new(&data).unwrap_err().to_string();
     assert!(message.contains("datum 3: sigma = 0"), "{message}");
     data.rows.clear();
-    assert_eq!(AmplitudeTerm::<f32>::new(&data).unwrap_err(), DataTermError::Empty);
+    assert_eq!(refusal(AmplitudeTerm::<f32>::new(&data)), DataTermError::Empty);
     assert!(ClosureTerm::<f32>::new(&data, ClosureKind::Phase, 0.0).is_err());
 }
 
@@ -206,8 +215,8 @@ fn exact_data_that_overflow_or_are_no_numbers_are_refused() {
     assert!(AmplitudeTerm::<f32>::new(&data).is_err());
     data.rows[3].products[0].re = f64::NAN;
     let not_finite = DataTermError::NotFinite(3);
-    assert_eq!(VisibilityTerm::<f64>::new(&data).unwrap_err(), not_finite);
+    assert_eq!(refusal(VisibilityTerm::<f64>::new(&data)), not_finite);
     for kind in [ClosureKind::Phase, ClosureKind::LogAmplitude] {
-        assert_eq!(ClosureTerm::<f64>::new(&data, kind, 0.0).unwrap_err(), not_finite);
+        assert_eq!(refusal(ClosureTerm::<f64>::new(&data, kind, 0.0)), not_finite);
     }
 }

@@ -1,6 +1,7 @@
 //! Complex visibilities, and amplitudes.
 
-use super::{DataTerm, DataTermError, Residual, checked, faintest, inverse_variances, stations_of};
+use super::{DataTerm, Residual, checked, faintest, inverse_variances, stations_of};
+use crate::Error;
 use crate::interferometry::observation::Observation;
 use crate::interferometry::operator::Float;
 use crate::interferometry::products::debiased_amplitude;
@@ -19,7 +20,7 @@ impl<T: Float> VisibilityTerm<T> {
     ///
     /// # Errors
     /// If there are none, or an error is not positive.
-    pub fn new(observation: &Observation) -> Result<Self, DataTermError> {
+    pub fn new(observation: &Observation) -> Result<Self, Error> {
         let data = checked(observation)?;
         let value = |v: Complex<f64>| Complex::new(T::of(v.re), T::of(v.im));
         Ok(VisibilityTerm {
@@ -85,7 +86,7 @@ impl<T: Float> AmplitudeTerm<T> {
     ///
     /// # Errors
     /// If there are none, or an error is not positive.
-    pub fn new(observation: &Observation) -> Result<Self, DataTermError> {
+    pub fn new(observation: &Observation) -> Result<Self, Error> {
         let data = checked(observation)?;
         Ok(AmplitudeTerm {
             stations: stations_of(observation),

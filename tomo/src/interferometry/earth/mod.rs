@@ -10,6 +10,7 @@ pub use view::{Frame, SourcePosition, View};
 
 /// Why the Earth's attitude is not known.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum EarthError {
     /// A day outside the built-in table of UT1 − UTC.
     #[error(
@@ -26,14 +27,4 @@ pub enum EarthError {
     /// A day for which leap seconds are not known.
     #[error("MJD = {0} is not allowed: days from 41317 (1972) to 90000 (2105)")]
     Day(f64),
-    /// A source that is nowhere on the sky.
-    #[error("{name} = {value} is not allowed: {allowed}")]
-    Source {
-        /// Right ascension or declination.
-        name: &'static str,
-        /// What was given.
-        value: f64,
-        /// What would be allowed.
-        allowed: &'static str,
-    },
 }

@@ -1,6 +1,7 @@
 //! UTC and sidereal time, by the IAU's SOFA routines (the crate `sofars`).
 
 use super::{EarthError, Ut1};
+use crate::Error;
 
 /// JD of MJD 0.
 const MJD_ZERO: f64 = 2_400_000.5;
@@ -37,10 +38,10 @@ impl Moment {
     }
 
     /// UT1 and TT as two-part Julian dates.
-    pub(super) fn ut1_tt(self, ut1: Ut1) -> Result<[(f64, f64); 2], EarthError> {
+    pub(super) fn ut1_tt(self, ut1: Ut1) -> Result<[(f64, f64); 2], Error> {
         let mjd = self.mjd_utc();
         if !(41317.0..=90000.0).contains(&mjd) {
-            return Err(EarthError::Day(mjd));
+            return Err(EarthError::Day(mjd).into());
         }
         let fraction = self.hours_utc / 24.0;
         let day = MJD_ZERO + f64::from(self.mjd);
@@ -55,7 +56,7 @@ impl Moment {
 ///
 /// # Errors
 /// If the day is out of range or its UT1 − UTC not known.
-pub fn gmst_hours(moment: Moment, ut1: Ut1) -> Result<f64, EarthError> {
+pub fn gmst_hours(moment: Moment, ut1: Ut1) -> Result<f64, Error> {
     let [ut1, tt] = moment.ut1_tt(ut1)?;
     let radians = sofars::erst::gmst06(ut1.0, ut1.1, tt.0, tt.1);
     Ok((radians * 12.0 / core::f64::consts::PI).rem_euclid(24.0))
@@ -67,7 +68,7 @@ pub fn gmst_hours(moment: Moment, ut1: Ut1) -> Result<f64, EarthError> {
 ///
 /// # Errors
 /// If the day is out of range or its UT1 − UTC not known.
-pub fn hours_utc_of_gmst(mjd: i32, gmst: f64, ut1: Ut1) -> Result<f64, EarthError> {
+pub fn hours_utc_of_gmst(mjd: i32, gmst: f64, ut1: Ut1) -> Result<f64, Error> {
     let midnight = gmst_hours(Moment { mjd, hours_utc: 0.0 }, ut1)?;
     Ok((gmst - midnight) * SOLAR_PER_SIDEREAL)
 }

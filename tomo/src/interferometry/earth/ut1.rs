@@ -2,6 +2,7 @@
 //! Service (series EOP 20 C04, daily since 1999) or as given.
 
 use super::{EarthError, sidereal};
+use crate::Error;
 use std::sync::OnceLock;
 
 /// Where UT1 − UTC comes from.
@@ -18,7 +19,7 @@ impl Ut1 {
     ///
     /// # Errors
     /// If the date is outside the table.
-    pub fn seconds(self, mjd_utc: f64) -> Result<f64, EarthError> {
+    pub fn seconds(self, mjd_utc: f64) -> Result<f64, Error> {
         match self {
             Ut1::Given(seconds) => Ok(seconds),
             Ut1::Table => ut1_minus_utc(mjd_utc),
@@ -61,12 +62,12 @@ fn read(text: &str) -> Table {
 ///
 /// # Errors
 /// If the date is outside the table.
-pub fn ut1_minus_utc(mjd_utc: f64) -> Result<f64, EarthError> {
+pub fn ut1_minus_utc(mjd_utc: f64) -> Result<f64, Error> {
     let Table { first, microseconds } = table();
     let last = first + microseconds.len() as i32 - 1;
     let unknown = || EarthError::Ut1Unknown { mjd: mjd_utc, first: *first, last };
     if !(f64::from(*first)..=f64::from(last)).contains(&mjd_utc) {
-        return Err(unknown());
+        return Err(unknown().into());
     }
     let day = (mjd_utc.floor() as i32).min(last - 1);
     let seconds = |day: i32| f64::from(microseconds[(day - first) as usize]) * 1e-6;

@@ -1,6 +1,7 @@
 //! A source, and the baselines that it sees.
 
-use super::{EarthError, Moment, Ut1};
+use super::{Moment, Ut1};
+use crate::Error;
 use core::f64::consts::PI;
 use kerrlight_geodesic::vector::dot;
 
@@ -25,14 +26,14 @@ impl SourcePosition {
     ///
     /// # Errors
     /// If it is not.
-    pub fn new(ra_hours: f64, dec_deg: f64) -> Result<Self, EarthError> {
+    pub fn new(ra_hours: f64, dec_deg: f64) -> Result<Self, Error> {
         if !(0.0..24.0).contains(&ra_hours) {
             let allowed = "hours in [0, 24)";
-            return Err(EarthError::Source { name: "right ascension", value: ra_hours, allowed });
+            return Err(Error::out_of_range("right ascension", ra_hours, allowed));
         }
         if !(-90.0..=90.0).contains(&dec_deg) {
             let allowed = "degrees in [-90, 90]";
-            return Err(EarthError::Source { name: "declination", value: dec_deg, allowed });
+            return Err(Error::out_of_range("declination", dec_deg, allowed));
         }
         Ok(SourcePosition { ra_hours, dec_deg })
     }
@@ -69,7 +70,7 @@ impl View {
         moment: Moment,
         ut1: Ut1,
         frame: Frame,
-    ) -> Result<Self, EarthError> {
+    ) -> Result<Self, Error> {
         match frame {
             Frame::Catalogue => Ok(Self::at_gmst(source, super::gmst_hours(moment, ut1)?)),
             Frame::OfDate => {

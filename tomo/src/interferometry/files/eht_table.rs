@@ -1,6 +1,7 @@
 //! Writing the tables of the EHT's public releases: total intensity, amplitude and phase.
 
-use super::{FileError, table};
+use super::table;
+use crate::Error;
 use crate::interferometry::observation::{Observation, Unknown};
 use core::fmt::Write;
 
@@ -18,7 +19,7 @@ pub enum EhtTable {
 ///
 /// # Errors
 /// If the date or the frequency is not known, or there are several spectral channels.
-pub fn to_eht_table(observation: &Observation, style: EhtTable) -> Result<String, FileError> {
+pub fn to_eht_table(observation: &Observation, style: EhtTable) -> Result<String, Error> {
     super::one_channel(observation)?;
     let mjd = observation.mjd.ok_or(Unknown("the date (MJD)"))?;
     let frequency = observation.frequency_hz.ok_or(Unknown("the frequency"))? / 1e9;

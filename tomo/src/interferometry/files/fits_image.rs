@@ -2,6 +2,7 @@
 
 use super::FileError;
 use super::fits::{Header, Unit};
+use crate::Error;
 use crate::interferometry::operator::ImageGrid;
 use crate::interferometry::simulate::Movie;
 
@@ -11,26 +12,26 @@ use crate::interferometry::simulate::Movie;
 ///
 /// # Errors
 /// If the file is damaged, no image, of another unit, or holds values that are not finite.
-pub fn read(bytes: &[u8]) -> Result<Movie, FileError> {
+pub fn read(bytes: &[u8]) -> Result<Movie, Error> {
     let unit = Unit::read(bytes, 0)?;
     let header = &unit.header;
     let axes = header.axes()?;
     let (Some(&width), Some(&height)) = (axes.first(), axes.get(1)) else {
-        return Err(header.error("NAXIS", "2 or more: an image"));
+        return Err(header.error("NAXIS", "2 or more: an image").into());
     };
     if header.is_true("GROUPS") || width == 0 {
-        return Err(FileError::whole("visibilities (UVFITS), not an image"));
+        return Err(FileError::whole("visibilities (UVFITS), not an image").into());
     }
     let unit_name = header.text("BUNIT").unwrap_or_default().to_ascii_uppercase();
     if unit_name.trim() != "JY/PIXEL" {
-        return Err(header.error("BUNIT", "JY/PIXEL"));
+        return Err(header.error("BUNIT", "JY/PIXEL").into());
     }
     let (east_to_west, pixel_rad) = pixel(header)?;
     let field_rad = pixel_rad * width as f64;
     if !(field_rad > 0.0 && field_rad < 1.0) {
         let degrees = field_rad.to_degrees();
         let message = format!("{width} pixels span {degrees} degrees, in (0, 57.29) is expected");
-        return Err(header.error("CDELT1", message));
+        return Err(header.error("CDELT1", message).into());
     }
     let grid =
         ImageGrid::new(width, height, field_rad).map_err(|error| header.error("NAXIS1", error))?;

@@ -1,6 +1,7 @@
 //! Images and movies as grids of numbers, arrays of NumPy, and pictures in EXR.
 
 use super::FileError;
+use crate::Error;
 use crate::image::exr;
 use crate::interferometry::operator::ImageGrid;
 use crate::interferometry::simulate::Movie;
@@ -98,10 +99,10 @@ pub fn csv_grid(bytes: &[u8]) -> Result<Pixels> {
 ///
 /// # Errors
 /// If it has another shape.
-pub fn npy(bytes: &[u8]) -> std::result::Result<Pixels, NumpyError> {
+pub fn npy(bytes: &[u8]) -> std::result::Result<Pixels, Error> {
     let (shape, values) = read_array(bytes)?;
     let (&[height, width] | &[_, height, width]) = &shape[..] else {
-        return Err(NumpyError::content(format!("shape {shape:?}: {IMAGE_SHAPES}")));
+        return Err(NumpyError::content(format!("shape {shape:?}: {IMAGE_SHAPES}")).into());
     };
     Ok(Pixels { width: width as usize, height: height as usize, values, ..Pixels::default() })
 }
@@ -113,23 +114,25 @@ const IMAGE_SHAPES: &str = "(height, width) or (frames, height, width) is expect
 ///
 /// # Errors
 /// If there is no such array, or it has another shape.
-pub fn npz_movie(bytes: &[u8]) -> std::result::Result<Pixels, NumpyError> {
+pub fn npz_movie(bytes: &[u8]) -> std::result::Result<Pixels, Error> {
     let mut archive = Archive::open(bytes)?;
     let names = archive.names()?;
     let name = image_of(&names)?.to_owned();
-    let mut member = |wanted: &str| -> std::result::Result<_, NumpyError> {
+    let mut member = |wanted: &str| -> std::result::Result<_, Error> {
         if wanted == name || !names.iter().any(|name| name == wanted) {
             return Ok(None);
         }
         let bytes = archive.member(wanted)?;
         let array = bytes.map(|bytes| read_array(&bytes)).transpose();
-        Ok(array.map_err(|error| error.within(format!("{wanted}.npy")))?.map(|(_, all)| all))
+        Ok(array
+            .map_err(|error| NumpyError::member(format!("{wanted}.npy"), error))?
+            .map(|(_, all)| all))
     };
     let (hours, times) = (member("hours")?, member("times")?);
     let field_uas = member("field_uas")?.and_then(|all| all.first().copied());
     let none = || NumpyError::content(format!("holds no {name}"));
     let pixels = npy(&archive.member(&name)?.ok_or_else(none)?);
-    let pixels = pixels.map_err(|error| error.within(format!("{name}.npy")))?;
+    let pixels = pixels.map_err(|error| NumpyError::member(format!("{name}.npy"), error))?;
     let times = times.map(OwnTimes::Utc).or(hours.map(OwnTimes::Since)).unwrap_or_default();
     Ok(Pixels { times, field_uas, ..pixels })
 }

@@ -18,10 +18,12 @@ pub use uvfits::{read as read_uvfits, write as write_uvfits};
 
 use super::array::{MOST_STATIONS, Station};
 use super::observation::{Observation, Unknown};
+use crate::Error;
 use std::collections::HashMap;
 
 /// Why a file cannot be read, or data not be written.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FileError {
     /// At a line of a text.
     #[error("line {line}: {message}")]
@@ -86,7 +88,7 @@ impl core::fmt::Display for Format {
 ///
 /// # Errors
 /// If it begins like none of them, or is damaged.
-pub fn decode(bytes: &[u8]) -> Result<(Format, Observation), FileError> {
+pub fn decode(bytes: &[u8]) -> Result<(Format, Observation), Error> {
     if bytes.starts_with(b"SIMPLE  =") {
         return Ok((Format::Uvfits, read_uvfits(bytes)?));
     }

@@ -2,6 +2,7 @@
 //! stations, then 20 columns, amplitudes in Jy and phases in degrees.
 
 use super::{FileError, Names, number, sigma};
+use crate::Error;
 use crate::interferometry::Complex64;
 use crate::interferometry::array;
 use crate::interferometry::earth::SourcePosition;
@@ -22,7 +23,7 @@ pub(super) fn is_obs_text(text: &str) -> bool {
 /// # Errors
 /// If a line of the heading is missing, or a line of data has another number of columns, an
 /// unknown station, or no number where one belongs.
-pub fn parse(text: &str) -> Result<Observation, FileError> {
+pub fn parse(text: &str) -> Result<Observation, Error> {
     let mut observation = Observation::empty(Basis::Stokes);
     let mut names = Names::new(Vec::new());
     let mut has_columns = false;
@@ -34,20 +35,20 @@ pub fn parse(text: &str) -> Result<Observation, FileError> {
             has_columns |= found;
         } else if !line.trim().is_empty() {
             if !has_columns {
-                return Err(located("data before the heading `# time (hr) ...`".to_owned()));
+                return Err(located("data before the heading `# time (hr) ...`".to_owned()).into());
             }
             let row = row(line, &names).map_err(located)?;
             observation.rows.push(row);
         }
     }
     if observation.rows.is_empty() {
-        return Err(FileError::whole("no visibilities"));
+        return Err(FileError::whole("no visibilities").into());
     }
     let complete = observation.position.is_some()
         && observation.mjd.is_some()
         && observation.frequency_hz.is_some();
     if !complete {
-        return Err(FileError::whole("the heading lacks RA, DEC, MJD or RF"));
+        return Err(FileError::whole("the heading lacks RA, DEC, MJD or RF").into());
     }
     observation.stations = names.stations;
     Ok(observation)
@@ -181,7 +182,7 @@ fn row(line: &str, names: &Names) -> Result<Row, String> {
 /// # Errors
 /// If the source's position, the date or the frequency is not known, or there are several spectral
 /// channels.
-pub fn to_text(observation: &Observation) -> Result<String, FileError> {
+pub fn to_text(observation: &Observation) -> Result<String, Error> {
     super::one_channel(observation)?;
     let position =
         observation.position.ok_or(Unknown("the source's right ascension and declination"))?;

@@ -2,6 +2,7 @@
 //! by a line of names: kerrlight's CSV, and the csv and txt of the EHT's public releases.
 
 use super::{FileError, Names, comments, number, sigma};
+use crate::Error;
 use crate::interferometry::Complex64;
 use crate::interferometry::observation::{Basis, Measured, Observation, Row};
 use core::fmt::Write;
@@ -51,7 +52,7 @@ impl Heading {
 /// If no line names the columns of either kind, or a line of data has too few of them or no
 /// number where one belongs. Lines whose visibility or error is `nan` are left out; the history says how
 /// many.
-pub fn parse(text: &str) -> Result<Observation, FileError> {
+pub fn parse(text: &str) -> Result<Observation, Error> {
     let mut observation = Observation::empty(Basis::Stokes);
     let mut names = Names::new(Vec::new());
     let mut heading = None;
@@ -77,22 +78,26 @@ pub fn parse(text: &str) -> Result<Observation, FileError> {
             continue;
         }
         let Some(heading) = &heading else {
-            return Err(located(format!("data before a line that names {}", COLUMNS.join(", "))));
+            return Err(
+                located(format!("data before a line that names {}", COLUMNS.join(", "))).into()
+            );
         };
         let Some(row) = row(&cells(line), heading, &mut names).map_err(located)? else {
             left_out += 1;
             continue;
         };
         if usize::from(row.channel) >= observation.channels.len().max(1) {
-            return Err(located(format!("channel {} is not in the comments", row.channel)));
+            return Err(located(format!("channel {} is not in the comments", row.channel)).into());
         }
         observation.rows.push(row);
     }
     if heading.is_none() {
-        return Err(FileError::whole(format!("no line names the columns {}", COLUMNS.join(", "))));
+        return Err(
+            FileError::whole(format!("no line names the columns {}", COLUMNS.join(", "))).into()
+        );
     }
     if observation.rows.is_empty() {
-        return Err(FileError::whole("no visibilities"));
+        return Err(FileError::whole("no visibilities").into());
     }
     if left_out > 0 {
         observation.history.push(format!("{left_out} lines without a visibility (nan) left out"));

@@ -1,5 +1,6 @@
 //! The interstellar medium towards Sgr A*.
 
+use crate::Error;
 use crate::interferometry::observation::{Observation, Row, Unknown};
 use crate::units::{MICROARCSECOND, SPEED_OF_LIGHT};
 use core::f64::consts::PI;
@@ -41,7 +42,7 @@ impl ScatteringKernel {
 ///
 /// # Errors
 /// If the frequency is not known.
-pub fn scatter(observation: &mut Observation, kernel: &ScatteringKernel) -> Result<(), Unknown> {
+pub fn scatter(observation: &mut Observation, kernel: &ScatteringKernel) -> Result<(), Error> {
     let factor = |row: &Row| {
         let frequency_hz = observation.frequency_of(row).ok_or(Unknown("the frequency"))?;
         Ok(kernel.transform(row.uv, frequency_hz))

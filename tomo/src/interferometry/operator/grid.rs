@@ -1,6 +1,6 @@
 //! Where pixels are on the sky, and what a pixel looks like.
 
-use crate::interferometry::schedule::ScheduleError;
+use crate::Error;
 use crate::units::MICROARCSECOND;
 use core::f64::consts::PI;
 
@@ -31,8 +31,8 @@ impl ImageGrid {
     ///
     /// # Errors
     /// If there are no pixels, too many, or the field is not between 0 and 1 rad.
-    pub fn new(width: usize, height: usize, field_rad: f64) -> Result<Self, ScheduleError> {
-        let range = |name, value, allowed| Err(ScheduleError::Range { name, value, allowed });
+    pub fn new(width: usize, height: usize, field_rad: f64) -> Result<Self, Error> {
+        let range = |name, value, allowed| Err(Error::out_of_range(name, value, allowed));
         for (name, pixels) in [("image width", width), ("image height", height)] {
             if !(1..=65536).contains(&pixels) {
                 return range(name, pixels as f64, "1 to 65536 pixels");

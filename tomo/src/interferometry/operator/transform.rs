@@ -2,7 +2,7 @@
 
 use super::nufft::{cells, check_accuracy, width_of};
 use super::{Dtft, Float, ImageGrid, Nufft, Operator, Pulse};
-use crate::interferometry::schedule::ScheduleError;
+use crate::Error;
 use num_complex::Complex;
 use rustfft::FftNum;
 
@@ -37,7 +37,7 @@ impl<T: Float + FftNum> Transform<T> {
         frames: &[Vec<[f64; 2]>],
         method: Method,
         memory_budget: usize,
-    ) -> Result<Self, ScheduleError> {
+    ) -> Result<Self, Error> {
         let fast = |accuracy| Nufft::new(grid, pulse, frames, accuracy).map(Transform::Fast);
         if let Method::Cheaper(accuracy) = method {
             check_accuracy::<T>(accuracy)?;

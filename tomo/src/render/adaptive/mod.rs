@@ -19,10 +19,10 @@ pub(super) use tolerance::tolerance;
 use super::grid::Grid;
 use super::pixels::{Pixel, Workspace};
 use super::rings::{Counted, Resolver, Square};
+use crate::Error;
 use crate::transport::{Fate, PreparedScene, RayResult};
 use cell::Cell;
 use cut::Cut;
-use kerrlight_geodesic::Error;
 use light::{Light, range};
 use std::ops::Range;
 

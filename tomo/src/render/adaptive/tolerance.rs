@@ -1,10 +1,10 @@
 //! What single pixels may be off by so that the picture is not off by more than asked.
 
 use super::Adaptive;
+use crate::Error;
 use crate::render::grid::Grid;
 use crate::render::pixels::Workspace;
 use crate::transport::PreparedScene;
-use kerrlight_geodesic::Error;
 use rayon::prelude::*;
 
 /// The share of the allowed error for which the tolerance of a pixel is chosen.

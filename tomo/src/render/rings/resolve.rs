@@ -1,9 +1,9 @@
 //! What squares of a picture see, with the rays that photon rings need.
 
 use super::{RingStrata, Stratum};
+use crate::Error;
 use crate::render::pixels::Workspace;
 use crate::transport::{Fate, PreparedScene, RayResult};
-use kerrlight_geodesic::Error;
 use std::ops::Range;
 
 /// Resolves the photon rings of a prepared scene.

@@ -3,8 +3,8 @@
 use super::super::{Activation, Coordinates};
 use super::Share;
 use super::scatter::{Contribution, NOWHERE};
+use crate::Error;
 use crate::simd::{Float, Lanes, MAX_LANES, Task, math};
-use kerrlight_geodesic::Error;
 
 /// One axis of the box.
 #[derive(Clone, Copy)]

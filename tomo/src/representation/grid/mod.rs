@@ -6,9 +6,9 @@ pub(super) mod scatter;
 mod tests;
 
 use super::{Activation, Coordinates, CoordinatesMut, Gradient, Groups, Representation, Workspace};
+use crate::Error;
 use crate::simd::{Float, InstructionSet, dispatch};
 use cells::{Geometry, Products, Values, check_box};
-use kerrlight_geodesic::Error;
 use scatter::{Contribution, Scatter};
 
 /// Shape of a grid.

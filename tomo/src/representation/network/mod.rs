@@ -16,9 +16,9 @@ mod tile;
 pub use settings::{Initialisation, NetworkSettings};
 
 use super::{Coordinates, Gradient, Groups, Representation, Workspace};
+use crate::Error;
 use crate::simd::{Float, InstructionSet};
 use batch::{Cotangents, Memory, Way};
-use kerrlight_geodesic::Error;
 use layout::Layout;
 
 /// A network with positional encoding: `bhnerf` of (x, y, z), `mlp4d` of (t, x, y, z).

@@ -1,7 +1,7 @@
 //! Sizes of a network.
 
 use super::super::Activation;
-use kerrlight_geodesic::Error;
+use crate::Error;
 
 /// How kernels are drawn; biases start at zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,5 +1,6 @@
 //! Triangle meshes: where a curved ray meets them, and their light.
 
+use crate::Error;
 use crate::emission::mesh::{MeshFile, MeshModel, Triangle};
 use crate::scene::Scene;
 use crate::transport::chord::ChordBound;
@@ -7,7 +8,7 @@ use crate::transport::optics::Optics;
 use crate::transport::result::{Accumulator, Place};
 use crate::transport::tree::{Node, Tree, Walk, WalkScratch};
 use kerrlight_geodesic::vector::distance;
-use kerrlight_geodesic::{Error, Kerr, Path, PathOfRay, Ray};
+use kerrlight_geodesic::{Kerr, Path, PathOfRay, Ray};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 

@@ -3,8 +3,9 @@
 use crate::emission::sky::{Beam, Panorama, SkyModel};
 use crate::scene::Scene;
 use crate::transport::optics::Optics;
+use kerrlight_geodesic::Error;
 use kerrlight_geodesic::footprint::{self, Number};
-use kerrlight_geodesic::{Error, Path, TracedRay};
+use kerrlight_geodesic::{Path, TracedRay};
 
 /// The sky of a scene.
 #[derive(Debug, Clone)]

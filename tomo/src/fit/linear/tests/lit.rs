@@ -2,6 +2,7 @@
 
 use super::super::objective::{Convex, Objective};
 use super::*;
+use crate::Error;
 use crate::fit::{Scan, ScanTerm};
 use crate::interferometry::data_terms::{
     AmplitudeTerm, ClosureTerm, DataTerm, Residual, VisibilityTerm,
@@ -67,10 +68,7 @@ pub(in crate::fit) fn spot(voxels: &Voxels) -> Vec<f64> {
     (0..voxels.count()).map(light).collect()
 }
 
-fn solve(
-    terms: &[Weighted<'_, f64>],
-    flux: Option<f64>,
-) -> Result<LinearSolution<f64>, LinearError> {
+fn solve(terms: &[Weighted<'_, f64>], flux: Option<f64>) -> Result<LinearSolution<f64>, Error> {
     let model = forward_model();
     let problem = LinearProblem {
         model: &model,
@@ -141,13 +139,13 @@ fn exact_closures_alone_need_a_flux_and_dark_data_have_no_light() {
     let movie = movie(&model, &voxels, &spot(&voxels));
     let closures = array(&movie, Seen::LogAmplitudes);
     let terms = [Weighted { weight: 1.0, term: &closures as &dyn FrameTerm<f64> }];
-    assert!(matches!(solve(&terms, None), Err(LinearError::NoFlux(_))));
-    assert!(matches!(solve(&terms, Some(-1.0)), Err(LinearError::Range(_))));
+    assert!(matches!(solve(&terms, None), Err(Error::Linear(LinearError::NoFlux(_)))));
+    assert!(matches!(solve(&terms, Some(-1.0)), Err(Error::Range(_))));
     let error = solve(&terms, Some(1e6)).unwrap_err();
-    assert!(matches!(error, LinearError::TooBright { .. }), "{error}");
+    assert!(matches!(error, Error::Linear(LinearError::TooBright { .. })), "{error}");
     let none = array(&vec![0.0; movie.len()], Seen::Amplitudes);
     let terms = [Weighted { weight: 1.0, term: &none as &dyn FrameTerm<f64> }];
-    assert!(matches!(solve(&terms, None), Err(LinearError::NoLight(_))));
+    assert!(matches!(solve(&terms, None), Err(Error::Linear(LinearError::NoLight(_)))));
 }
 
 /// χ² that is no number in one of its frames.

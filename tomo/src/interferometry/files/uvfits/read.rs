@@ -5,6 +5,7 @@ use super::super::fits;
 use super::antennas::AntennaTables;
 use super::frequencies;
 use super::layout::{Antennas, Layout};
+use crate::Error;
 use crate::interferometry::Complex64;
 use crate::interferometry::earth::SourcePosition;
 use crate::interferometry::observation::{Observation, Row};
@@ -23,7 +24,7 @@ const MJD_ZERO: f64 = 2_400_000.5;
 /// # Errors
 /// If the file is damaged, no UVFITS, or holds no datum; if rows of many channels would take more
 /// memory than `MOST_MEMORY` times the file.
-pub fn read(bytes: &[u8]) -> Result<Observation, FileError> {
+pub fn read(bytes: &[u8]) -> Result<Observation, Error> {
     let units = fits::units(bytes)?;
     let header = &units[0].header;
     let layout = Layout::new(header)?;
@@ -31,12 +32,14 @@ pub fn read(bytes: &[u8]) -> Result<Observation, FileError> {
     let rows = layout.groups.checked_mul(count).and_then(|n| n.checked_mul(size_of::<Row>()));
     if rows.is_none_or(|size| size > MOST_MEMORY * bytes.len()) {
         let message = format!("{count} channels of so few bytes that rows would be too large");
-        return Err(header.error("BITPIX", message));
+        return Err(header.error("BITPIX", message).into());
     }
     let tables = AntennaTables::read(&units)?;
     let frequency_hz = tables.frequency_hz.unwrap_or(layout.frequency_hz);
     if !(1e6..=1e15).contains(&frequency_hz) {
-        return Err(header.error("CRVAL4", "no frequency in [1e6, 1e15] Hz in AN table or header"));
+        return Err(header
+            .error("CRVAL4", "no frequency in [1e6, 1e15] Hz in AN table or header")
+            .into());
     }
     let (channels, unknown) = frequencies::channels(&units, &layout, frequency_hz)?;
     let wavelengths = match channels.as_slice() {

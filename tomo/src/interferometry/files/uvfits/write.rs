@@ -3,6 +3,7 @@
 use super::super::FileError;
 use super::super::fits::{Cards, ColumnData, binary_table, padded};
 use super::frequencies;
+use crate::Error;
 use crate::interferometry::array::Station;
 use crate::interferometry::earth::{SourcePosition, ut1_minus_utc};
 use crate::interferometry::observation::{Basis, Channel, Observation, Row, Unknown};
@@ -29,7 +30,7 @@ struct Facts {
 /// # Errors
 /// If the source's position, date, frequency, bandwidth or a station's position is not known, or
 /// there are no rows, more than 255 stations, or rows of a channel that is not listed.
-pub fn write(observation: &Observation) -> Result<Vec<u8>, FileError> {
+pub fn write(observation: &Observation) -> Result<Vec<u8>, Error> {
     let frequency_hz = observation.frequency_hz.ok_or(Unknown("the frequency"))?;
     let bandwidth_hz = observation.bandwidth_hz.ok_or(Unknown("the bandwidth"))?;
     let only = vec![Channel { frequency_hz, bandwidth_hz }];
@@ -48,11 +49,11 @@ pub fn write(observation: &Observation) -> Result<Vec<u8>, FileError> {
     }
     if observation.stations.len() > 255 {
         let count = observation.stations.len();
-        return Err(FileError::whole(format!("{count} stations: UVFITS numbers 255")));
+        return Err(FileError::whole(format!("{count} stations: UVFITS numbers 255")).into());
     }
     let listed = observation.channels.len().max(1);
     if observation.rows.iter().any(|row| usize::from(row.channel) >= listed) {
-        return Err(FileError::whole("a row of a spectral channel that is not listed"));
+        return Err(FileError::whole("a row of a spectral channel that is not listed").into());
     }
     let only_i = |row: &Row| row.noise_sigma[1..].iter().all(|sigma| sigma.is_nan());
     let mut observation = match observation.basis {
@@ -62,7 +63,7 @@ pub fn write(observation: &Observation) -> Result<Vec<u8>, FileError> {
         _ => Cow::Borrowed(observation),
     };
     if observation.rows.is_empty() {
-        return Err(FileError::whole("there are no visibilities to write"));
+        return Err(FileError::whole("there are no visibilities to write").into());
     }
     let ordered = |row: &Row| row.stations[0] < row.stations[1];
     let sorted = observation.rows.is_sorted_by(|a, b| a.time_h <= b.time_h);

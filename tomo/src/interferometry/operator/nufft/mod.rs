@@ -7,7 +7,7 @@
 mod kernel;
 
 use super::{Float, ImageGrid, Operator, Pulse};
-use crate::interferometry::schedule::ScheduleError;
+use crate::Error;
 use core::f64::consts::TAU;
 use core::ops::Range;
 use kernel::Kernel;
@@ -56,14 +56,14 @@ pub struct Nufft<T: FftNum> {
 }
 
 /// Refuses accuracies that kernels or rounding cannot reach.
-pub(super) fn check_accuracy<T: Float>(accuracy: f64) -> Result<(), ScheduleError> {
+pub(super) fn check_accuracy<T: Float>(accuracy: f64) -> Result<(), Error> {
     let single = T::epsilon().double() > 1e-10;
     let least = if single { 1e-6 } else { 1e-13 };
     if (least..=0.1).contains(&accuracy) {
         return Ok(());
     }
     let allowed = "1e-13 to 0.1, in single precision 1e-6 to 0.1";
-    Err(ScheduleError::Range { name: "accuracy", value: accuracy, allowed })
+    Err(Error::out_of_range("accuracy", accuracy, allowed))
 }
 
 impl<T: Float + FftNum> Nufft<T> {
@@ -77,7 +77,7 @@ impl<T: Float + FftNum> Nufft<T> {
         pulse: Pulse,
         frames: &[Vec<[f64; 2]>],
         accuracy: f64,
-    ) -> Result<Self, ScheduleError> {
+    ) -> Result<Self, Error> {
         check_accuracy::<T>(accuracy)?;
         let kernel = Kernel::of_accuracy(accuracy);
         let [across, rows] = [grid.width, grid.height].map(|pixels| cells(pixels, kernel.width));

@@ -5,6 +5,7 @@ mod depth;
 
 pub(in crate::transport) use depth::DepthProfile;
 
+use crate::Error;
 use crate::emission::gas::{GasEffects, GasModel};
 use crate::emission::medium::{CellSize, Emission, Medium, Moment, Part};
 use crate::emission::volume::VolumeModel;
@@ -18,7 +19,7 @@ use crate::units::SPEED_OF_LIGHT;
 use crate::volume::VolumeFile;
 use cells::CellScratch;
 use kerrlight_geodesic::simd::{NodeRequest, PanelRule, RayNodes};
-use kerrlight_geodesic::{Error, Kerr, PlaneCrossing, Ray, SphereNodes, TracedRay};
+use kerrlight_geodesic::{Kerr, PlaneCrossing, Ray, SphereNodes, TracedRay};
 use std::sync::Arc;
 
 /// Nodes of a panel.
