@@ -295,7 +295,7 @@ impl RayVisitor for Collector<'_> {
         _ray: &TracedRay,
         _crossings: &[PlaneCrossing],
         _path: Option<PathOfRay<'_>>,
-    ) -> Result<(), Error> {
+    ) -> Result<(), kerrlight_geodesic::Error> {
         Ok(())
     }
 }
