@@ -34,7 +34,7 @@ pub const INTERNAL: i32 = 4;
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct Scene {
-    /// Spin in \[−1, 1\].
+    /// Spin in \[−1, 1\], dimensionless.
     pub spin: f64,
     /// Inclination in \[0, 180\] degrees.
     pub inclination_degrees: f64,
@@ -68,17 +68,17 @@ pub struct PointColumns {
     pub stride: usize,
     /// Number of points of each ray.
     pub count: *mut u32,
-    /// Mino times.
+    /// Mino times, M⁻¹.
     pub mino_time: *mut f64,
-    /// Radii.
+    /// Radii, M.
     pub radius: *mut f64,
-    /// Polar angles.
+    /// Polar angles, radians.
     pub theta: *mut f64,
-    /// Azimuths.
+    /// Azimuths, radians.
     pub azimuth: *mut f64,
-    /// Delays.
+    /// Delays, M.
     pub delay: *mut f64,
-    /// Covariant momenta, four numbers each.
+    /// Covariant momenta for unit energy, four numbers each: p_t and p_r dimensionless, p_θ and p_φ in M.
     pub momentum: *mut f64,
     /// Path weights.
     pub weight: *mut f64,
@@ -90,13 +90,13 @@ pub struct PointColumns {
 pub struct RayColumns {
     /// 0 captured, 1 escaped, 2 on a photon orbit, 3 out of steps.
     pub outcome: *mut i32,
-    /// Mino time of each whole ray.
+    /// Mino time of each whole ray, M⁻¹.
     pub mino_total: *mut f64,
-    /// Smallest radius of each ray that turns.
+    /// Smallest radius in M of each ray that turns.
     pub turning_radius: *mut f64,
     /// Equatorial crossings of each ray.
     pub crossing_count: *mut u32,
-    /// Estimated errors of r, θ, azimuth and delay of each ray.
+    /// Estimated errors of r (M), θ and azimuth (radians) and delay (M) of each ray.
     pub uncertainty: *mut f64,
     /// The first crossings.
     pub crossings: PointColumns,

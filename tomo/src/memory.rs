@@ -51,12 +51,12 @@ pub fn shown(bytes: f64) -> String {
     }
 }
 
-/// A decoded picture of colours: as it is decoded, in single precision, and as it is kept.
+/// Bytes of a decoded picture of colours: as it is decoded, in single precision, and as it is kept.
 pub fn colours(width: f64, height: f64) -> f64 {
     width * height * (16.0 + 12.0 + 12.0)
 }
 
-/// Channels of an EXR that is decoded: blocks, samples and channels.
+/// Bytes of the channels of an EXR that is decoded: blocks, samples and channels.
 pub fn channels(width: f64, height: f64, channels: f64) -> f64 {
     width * height * channels * 12.0
 }
@@ -66,7 +66,7 @@ pub fn array(bytes: f64, values: f64) -> f64 {
     bytes + 8.0 * values
 }
 
-/// A movie in double precision.
+/// Bytes of a movie in double precision.
 pub fn movie(frames: f64, pixels: f64) -> f64 {
     8.0 * frames * pixels
 }
@@ -76,12 +76,12 @@ pub fn bands(width: f64, threads: f64) -> f64 {
     130.0 * 16.0 * width * (threads + 2.0)
 }
 
-/// Frames of a film that are rendered together: values, and what they are made of.
+/// Bytes of the frames of a film that are rendered together: values, and what they are made of.
 pub fn frames(frames: f64, pixels: f64, channels: f64) -> f64 {
     4.0 * frames * pixels * (channels + 2.0)
 }
 
-/// Rows of visibilities: when they are made, spoilt, and written.
+/// Bytes of rows of visibilities: when they are made, spoilt, and written.
 pub fn visibilities(rows: f64) -> f64 {
     2.0 * size_of::<crate::interferometry::observation::Row>() as f64 * rows
 }
@@ -92,18 +92,18 @@ pub fn nodes(nodes: f64, columns: f64) -> f64 {
     nodes * (8.0 + 4.0) * (5.0 + columns)
 }
 
-/// Parameters of a representation: as they are, moments of the steps, gradients, all of that once more to go back to,
+/// Bytes of the parameters of a representation: as they are, moments of the steps, gradients, all of that once more to go back to,
 /// and a checkpoint.
 pub fn parameters(parameters: f64) -> f64 {
     4.0 * parameters * 10.0
 }
 
-/// A volume on nodes along each axis, with the truth and what is written of both.
+/// Bytes of a volume on nodes along each axis, with the truth and what is written of both.
 pub fn volume(nodes: f64) -> f64 {
     4.0 * nodes.powi(3) * 6.0
 }
 
-/// Points of a traced ray and the table of them: numbers as they are traced, as columns, and as text.
+/// Bytes of the points of a traced ray and the table of them: numbers as they are traced, as columns, and as text.
 pub fn table(rows: f64, numbers: f64) -> f64 {
     rows * numbers * (8.0 + 8.0 + 24.0)
 }

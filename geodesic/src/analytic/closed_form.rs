@@ -69,7 +69,7 @@ impl ClosedForm {
         ClosedForm { radial, polar: Polar::new(hole, ray), start, total }
     }
 
-    /// Mino time from the observer to the end of the ray: the horizon, or infinity. Infinite
+    /// Mino time in M⁻¹ from the observer to the end of the ray: the horizon, or infinity. Infinite
     /// on the critical curve.
     pub fn mino_total(&self) -> f64 {
         self.total

@@ -103,7 +103,7 @@ impl AffineTracer {
         Ok(AffineTracer { tolerance })
     }
 
-    /// Follows the photon that arrives at (α, β) backward.
+    /// Follows the photon that arrives at (α, β), in M, backward.
     ///
     /// # Errors
     /// If the observer is at infinity, which no affine parameter reaches, or the ray does
@@ -208,12 +208,12 @@ impl AffinePath {
             .map_or(0.0, |node| radius(self.hole.spin(), [node.y[0], node.y[1], node.y[2]]))
     }
 
-    /// Mino time from the observer to the horizon or back to the observer's radius.
+    /// Mino time in M⁻¹ from the observer to the horizon or back to the observer's radius.
     pub fn mino_total(&self) -> f64 {
         self.state(self.end)[MINO_TIME]
     }
 
-    /// Smallest radius of a ray that came back.
+    /// Smallest radius in M of a ray that came back.
     pub fn closest_approach(&self) -> Option<f64> {
         let y = self.state(self.closest_affine()?);
         Some(radius(self.hole.spin(), [y[0], y[1], y[2]]))
@@ -254,7 +254,7 @@ impl AffinePath {
         self.nodes.len().saturating_sub(1)
     }
 
-    /// H = ½ g^{μν} p_μ p_ν at the ends of all steps: 0 but for the integrator's error.
+    /// Largest |H| at the ends of all steps, H = ½ g^{μν} p_μ p_ν, dimensionless: 0 but for the integrator's error.
     pub fn largest_hamiltonian(&self) -> f64 {
         let value = |node: &Node| {
             let [x, y, z, px, py, pz, _, _] = node.y;
@@ -315,7 +315,7 @@ impl AffinePath {
         }
     }
 
-    /// The pieces of the path with lo ≤ r ≤ hi as intervals of Mino time, in order: at most
+    /// The pieces of the path with lo ≤ r ≤ hi (M) as intervals of Mino time (M⁻¹), in order: at most
     /// two, since the radius has at most one minimum.
     pub fn intervals_within(&self, lo: f64, hi: f64, intervals: &mut Vec<[f64; 2]>) {
         intervals.clear();
@@ -357,7 +357,7 @@ impl AffinePath {
         0.5 * (lo + hi)
     }
 
-    /// Mino times of the crossings of the equatorial plane.
+    /// Mino times in M⁻¹ of the crossings of the equatorial plane.
     pub fn equatorial_crossings(&self) -> Vec<f64> {
         let mut crossings = Vec::new();
         for pair in self.nodes.windows(2) {

@@ -292,7 +292,7 @@ impl<T: Elementary> Path<T> {
         point
     }
 
-    /// The pieces of the path with lo ≤ r ≤ hi as intervals of Mino time, in order; none
+    /// The pieces of the path with lo ≤ r ≤ hi (M) as intervals of Mino time (M⁻¹), in order; none
     /// unless 0 ≤ lo ≤ hi.
     pub fn intervals_within(&self, lo: f64, hi: f64, intervals: &mut Vec<[T; 2]>) {
         intervals.clear();

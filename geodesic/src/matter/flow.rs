@@ -60,7 +60,8 @@ pub fn rotating_redshift_at(
     (norm > 0.0 && energy > 0.0).then(|| norm.sqrt() / energy)
 }
 
-/// (uᵗ)⁻² of matter at r n with dn/dt = v; not above 0 where it would not be slower than light.
+/// (uᵗ)⁻², dimensionless, of matter at r n (r in M, n a unit vector) with dn/dt = v in M⁻¹; not above 0 where it
+/// would not be slower than light.
 pub fn rotation_norm(hole: &Kerr, r: f64, n: [f64; 3], v: [f64; 3]) -> f64 {
     let a = hole.spin();
     let sigma = hole.sigma(r, n[2]);

@@ -39,7 +39,7 @@ impl Plunge {
         self.isco
     }
 
-    /// uʳ = −√(2/(3 r_isco)) (r_isco/r − 1)^{3/2} for r up to the innermost stable orbit.
+    /// uʳ = −√(2/(3 r_isco)) (r_isco/r − 1)^{3/2}, dimensionless, for r (M) up to the innermost stable orbit.
     pub fn radial_velocity(&self, r: f64) -> f64 {
         -(2.0 / (3.0 * self.isco)).sqrt() * (self.isco / r - 1.0).max(0.0).powf(1.5)
     }

@@ -20,7 +20,7 @@ pub fn values<T: Elementary>(x: T) -> impl Iterator<Item = T> {
     })
 }
 
-/// P_n(x) and its derivative, for |x| < 1.
+/// P_n(x) and its derivative, both dimensionless, for |x| < 1.
 ///
 /// ```
 /// let (value, slope) = kerrlight_geodesic::legendre::with_slope(2, 0.5);

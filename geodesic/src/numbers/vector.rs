@@ -12,25 +12,25 @@ pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// The vector product a × b.
+/// The vector product a × b, in the product of their units.
 #[inline]
 pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// The Euclidean length.
+/// The Euclidean length, in the unit of the vector.
 #[inline]
 pub fn norm(a: [f64; 3]) -> f64 {
     dot(a, a).sqrt()
 }
 
-/// The vector from b to a.
+/// The vector from b to a, in their unit.
 #[inline]
 pub fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// The Euclidean distance of two points.
+/// The Euclidean distance of two points, in their unit.
 #[inline]
 pub fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     norm(difference(a, b))

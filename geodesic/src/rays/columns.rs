@@ -12,7 +12,7 @@ use crate::spacetime::point::PathPoint;
 pub struct Points {
     /// Where each ray's points end; the first ray's start at 0.
     ends: Vec<usize>,
-    /// Mino time since the observer, growing backward in time.
+    /// Mino time since the observer in M⁻¹, growing backward in time.
     pub mino_time: Vec<f64>,
     /// Boyer–Lindquist radius, in M.
     pub radius: Vec<f64>,
@@ -22,7 +22,8 @@ pub struct Points {
     pub azimuth: Vec<f64>,
     /// t_o − t (see [`PathPoint::delay`]), in M.
     pub delay: Vec<f64>,
-    /// Covariant momentum (p_t, p_r, p_θ, p_φ) of the photon for unit energy at infinity.
+    /// Covariant momentum (p_t, p_r, p_θ, p_φ) of the photon for unit energy at infinity: the first two dimensionless,
+    /// the angular ones in M.
     pub momentum: Vec<[f64; 4]>,
     /// Weights of the points in an integral over the affine parameter, in M.
     pub weight: Vec<f64>,
@@ -85,10 +86,10 @@ impl Points {
 pub struct RayTable {
     /// What became of each ray.
     pub outcome: Vec<Outcome>,
-    /// Mino time of each whole ray: to the horizon, to infinity, or back to a finite
+    /// Mino time of each whole ray in M⁻¹: to the horizon, to infinity, or back to a finite
     /// observer's radius. NaN where unresolved.
     pub mino_total: Vec<f64>,
-    /// Smallest radius of each ray that turns; NaN of others.
+    /// Smallest radius in M of each ray that turns; NaN of others.
     pub turning_radius: Vec<f64>,
     /// How many times each ray crosses the equatorial plane.
     pub crossing_count: Vec<u32>,

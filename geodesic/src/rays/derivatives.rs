@@ -59,7 +59,7 @@ impl Gradient {
     const NONE: Gradient =
         Gradient { spin: f64::NAN, inclination: f64::NAN, alpha: f64::NAN, beta: f64::NAN };
 
-    /// In the order spin, inclination, α, β.
+    /// In the order spin, inclination, α, β: the unit of the quantity per 1, per radian, per M and per M.
     pub fn to_array(self) -> [f64; 4] {
         [self.spin, self.inclination, self.alpha, self.beta]
     }

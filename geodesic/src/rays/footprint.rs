@@ -37,7 +37,7 @@ pub type Number = Dual<f64, 2>;
 pub struct Ellipse {
     /// Longer semi-axis, per unit of the screen.
     pub semi_major: f64,
-    /// Shorter semi-axis, ≥ 0.
+    /// Shorter semi-axis, ≥ 0, in the unit of the longer one.
     pub semi_minor: f64,
     /// Direction of the longer axis in the plane: angle from the first towards the second
     /// basis vector, in (−π/2, π/2].

@@ -16,6 +16,7 @@ use crate::spacetime::point::PathPoint;
 
 /// How rays are traced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+#[non_exhaustive]
 pub enum Integrator {
     /// `rk45-affine`: Runge–Kutta 5(4) in the affine parameter on Kerr–Schild coordinates, an
     /// independent referee. Needs an observer at a finite radius.

@@ -21,14 +21,14 @@ pub struct Node {
     pub azimuth: f64,
     /// Delay, in M.
     pub delay: f64,
-    /// d(1/r)/dτ.
+    /// d(1/r)/dτ, dimensionless.
     pub radial_velocity: f64,
     /// d cos θ/dτ.
     pub polar_velocity: f64,
 }
 
 impl Node {
-    /// The node at a Mino time of a path, for a step of Mino time.
+    /// The node at a Mino time of a path, for a step of Mino time, both in M⁻¹.
     pub fn of_path(hole: &Kerr, path: &Path, mino_time: f64, step: f64) -> Self {
         let point = path.at(mino_time);
         let (radius, cos_theta) = (point.radius(), point.cos_theta());
@@ -146,7 +146,7 @@ impl NodeColumns {
 /// turning point, or at the horizon.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Leg {
-    /// Where it starts and ends, in Mino time or another parameter of the ray.
+    /// Where it starts and ends, in Mino time (M⁻¹) or another parameter of the ray.
     pub ends: [f64; 2],
     /// Whether it ends at the horizon: its last panel is followed at a pace that falls to zero.
     pub falls: bool,
@@ -183,7 +183,7 @@ impl Leg {
     }
 }
 
-/// Calls `take` with the legs of a path that lie in a shell of radii, up to the Mino time `until`.
+/// Calls `take` with the legs of a path that lie in a shell of radii (M), up to the Mino time `until` (M⁻¹).
 /// `intervals` is memory to be reused.
 pub fn legs(
     path: &Path,

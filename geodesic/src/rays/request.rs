@@ -5,6 +5,7 @@ use crate::spacetime::quantities::Quantities;
 
 /// Where a ray is sampled, from the observer on.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub enum Placement {
     /// Nowhere.
     #[default]

@@ -10,6 +10,7 @@ use crate::spacetime::radial::RadialPotential;
 
 /// How a local observer moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Motion {
     /// At rest with respect to infinity; outside the ergosphere only.
     Static,
@@ -47,7 +48,7 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// A camera around `hole` at `radius` > r₊, polar angle `inclination` and azimuth 0.
+    /// A camera around `hole` at `radius` > r₊ in M, polar angle `inclination` and azimuth 0.
     ///
     /// # Errors
     /// If the radius is not finite or not outside the horizon, or if nothing can move as

@@ -167,7 +167,7 @@ impl<T: Elementary> Observer<T> {
         self.inverse_radius == 0.0
     }
 
-    /// 1/r of the observer: 0 at infinity.
+    /// 1/r of the observer in M⁻¹: 0 at infinity.
     pub fn inverse_radius(&self) -> f64 {
         self.inverse_radius
     }
@@ -246,9 +246,9 @@ pub struct Ray<T = f64> {
     /// Sense in which the backward ray turns about the axis (the sign of −λ; that of α,
     /// signed zeros included, where λ = 0).
     pub rotation_sign: f64,
-    /// Azimuth of the observer, added to every azimuth of the ray.
+    /// Azimuth of the observer in radians, added to every azimuth of the ray.
     pub azimuth: f64,
-    /// 1/r of the starting point.
+    /// 1/r of the starting point, M⁻¹.
     pub inverse_radius: f64,
     /// Whether the backward ray starts towards the hole.
     pub inward: bool,

@@ -17,7 +17,8 @@ pub enum View {
 }
 
 impl View {
-    /// The photon that arrives at the point (x, y) of the picture.
+    /// The photon that arrives at the point (x, y) of the picture: (α, β) in M of an observer, tangents of angles from
+    /// the line of sight of a camera.
     ///
     /// # Errors
     /// If no photon arrives there: see [`Observer::ray`] and [`Camera::ray`].
@@ -44,7 +45,7 @@ impl View {
         }
     }
 
-    /// Frequency of light that arrives at (x, y), divided by its frequency at infinity; `None` for
+    /// Ratio of the frequency of light that arrives at (x, y) to its frequency at infinity; `None` for
     /// a screen, where the two are equal.
     pub fn blueshift(&self, x: f64, y: f64) -> Option<f64> {
         match self {

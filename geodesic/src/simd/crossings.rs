@@ -30,7 +30,7 @@ pub struct Crossings {
 /// What is known about a ray as a whole.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayEnds {
-    /// Mino time of the whole ray.
+    /// Mino time of the whole ray, M⁻¹.
     pub mino_total: f64,
     /// Whether it returns to the observer's radius, be that infinite; else it is captured.
     pub escapes: bool,
@@ -49,7 +49,7 @@ pub struct Crossing {
     pub delay: f64,
     /// Boyer–Lindquist radius, in M.
     pub radius: f64,
-    /// Azimuth, continuous along the ray from the observer's on.
+    /// Azimuth in radians, continuous along the ray from the observer's on.
     pub azimuth: f64,
     /// Mino time since the observer, in 1/M.
     pub mino_time: f64,
@@ -76,27 +76,27 @@ impl Crossings {
         self.radius.len().checked_div(self.per_ray).unwrap_or(0)
     }
 
-    /// Delay of each crossing, as in [`Crossing`].
+    /// Delay of each crossing in M, as in [`Crossing`].
     pub fn delay(&self) -> &[f64] {
         &self.delay
     }
 
-    /// Radius of each crossing.
+    /// Radius of each crossing, M.
     pub fn radius(&self) -> &[f64] {
         &self.radius
     }
 
-    /// Azimuth of each crossing.
+    /// Azimuth of each crossing, radians.
     pub fn azimuth(&self) -> &[f64] {
         &self.azimuth
     }
 
-    /// Mino time of each crossing.
+    /// Mino time of each crossing, M⁻¹.
     pub fn mino_time(&self) -> &[f64] {
         &self.mino_time
     }
 
-    /// Estimate of the error of each crossing, as in [`Crossing`].
+    /// Estimate of the error of each crossing, in the units of [`Crossing`].
     pub fn error(&self) -> &[f64] {
         &self.error
     }

@@ -49,13 +49,13 @@ pub struct RayNodes<'a> {
     pub cos_theta: &'a [f64],
     /// Σ dτ: what an integral over the affine parameter gives to each node, in M.
     pub weight: &'a [f64],
-    /// Mino time since the observer.
+    /// Mino time since the observer, M⁻¹.
     pub mino_time: &'a [f64],
-    /// Azimuth, but for whole turns; empty unless asked for.
+    /// Azimuth in radians, but for whole turns; empty unless asked for.
     pub azimuth: &'a [f64],
-    /// t_o − t (its finite part for an observer at infinity); empty unless asked for.
+    /// Delay t_o − t in M (its finite part for an observer at infinity); empty unless asked for.
     pub delay: &'a [f64],
-    /// d(1/r)/dτ, positive on the way in; empty unless asked for.
+    /// d(1/r)/dτ, dimensionless, positive on the way in; empty unless asked for.
     pub radial_velocity: &'a [f64],
     /// d cos θ/dτ; empty unless asked for.
     pub polar_velocity: &'a [f64],

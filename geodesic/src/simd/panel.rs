@@ -42,7 +42,7 @@ impl PanelRule {
         self.nodes.len()
     }
 
-    /// The nodes, in (0, 1).
+    /// The nodes, in (0, 1), as parts of a panel.
     pub fn nodes(&self) -> &[f64] {
         &self.nodes
     }

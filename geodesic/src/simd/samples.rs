@@ -25,16 +25,16 @@ pub struct Samples {
 /// The samples of one ray.
 #[derive(Clone, Copy, Debug)]
 pub struct RaySamples<'a> {
-    /// t_o − t; lim \[(t_o − t) − r_o − 2 ln r_o\] for an observer at infinity, where the first
+    /// Delay in M: t_o − t; lim \[(t_o − t) − r_o − 2 ln r_o\] for an observer at infinity, where the first
     /// sample has −∞ and the last one of a ray that escapes +∞.
     pub delay: &'a [f64],
-    /// Boyer–Lindquist radius, infinite at infinity.
+    /// Boyer–Lindquist radius in M, infinite at infinity.
     pub radius: &'a [f64],
-    /// Polar angle.
+    /// Polar angle, radians.
     pub theta: &'a [f64],
-    /// Azimuth, continuous along the ray from the observer's on.
+    /// Azimuth in radians, continuous along the ray from the observer's on.
     pub azimuth: &'a [f64],
-    /// Mino time of the whole ray.
+    /// Mino time of the whole ray, M⁻¹.
     pub mino_total: f64,
     /// Whether the ray returns to the observer's radius, be that infinite; else it is captured,
     /// and its last sample lies a relative 1e-8 outside the horizon.
@@ -78,17 +78,17 @@ impl Samples {
         &self.delay
     }
 
-    /// Radii of all samples, in the same order.
+    /// Radii of all samples in M, in the same order.
     pub fn radius(&self) -> &[f64] {
         &self.radius
     }
 
-    /// Polar angles of all samples, in the same order.
+    /// Polar angles of all samples in radians, in the same order.
     pub fn theta(&self) -> &[f64] {
         &self.theta
     }
 
-    /// Azimuths of all samples, in the same order.
+    /// Azimuths of all samples in radians, in the same order.
     pub fn azimuth(&self) -> &[f64] {
         &self.azimuth
     }

@@ -72,7 +72,7 @@ impl ZamoFrame {
         [self.sin, self.cos]
     }
 
-    /// A covariant Boyer–Lindquist vector (p_t, p_r, p_θ, p_φ) in this frame. On the axis
+    /// A covariant Boyer–Lindquist vector (p_t, p_r, p_θ, p_φ), the angular ones in M, in this frame. On the axis
     /// p_φ must be 0.
     #[inline]
     pub fn covariant(&self, p: [f64; 4]) -> [f64; 4] {
@@ -81,14 +81,14 @@ impl ZamoFrame {
         [energy, p[1] * self.radial, p[2] / self.length, around]
     }
 
-    /// A contravariant Boyer–Lindquist vector (uᵗ, uʳ, u^θ, u^φ) in this frame.
+    /// A contravariant Boyer–Lindquist vector (uᵗ, uʳ, u^θ, u^φ), the angular ones in M⁻¹, in this frame.
     #[inline]
     pub fn contravariant(&self, u: [f64; 4]) -> [f64; 4] {
         let around = self.girth * self.sin * (u[3] - self.drag * u[0]);
         [self.lapse * u[0], u[1] / self.radial, self.length * u[2], around]
     }
 
-    /// The contravariant Boyer–Lindquist components of a vector of this frame; u^φ diverges on
+    /// The contravariant Boyer–Lindquist components, the angular ones in M⁻¹, of a vector of this frame; u^φ diverges on
     /// the axis.
     pub fn to_coordinates(&self, v: [f64; 4]) -> [f64; 4] {
         let time = v[0] / self.lapse;
@@ -96,7 +96,7 @@ impl ZamoFrame {
         [time, v[1] * self.radial, v[2] / self.length, around]
     }
 
-    /// The velocity in this frame of matter at rest with respect to infinity, along e_φ; it is
+    /// The velocity in this frame, in units of c, of matter at rest with respect to infinity, along e_φ; it is
     /// not below 1 in magnitude where there is no rest, in the ergosphere.
     pub fn velocity_at_rest(&self) -> f64 {
         self.orbital_velocity(0.0)

@@ -2,7 +2,7 @@
 
 use crate::spacetime::kerr::Kerr;
 
-/// Radius of the innermost stable circular orbit that turns about +z: prograde for a > 0,
+/// Radius in M of the innermost stable circular orbit that turns about +z: prograde for a > 0,
 /// retrograde for a < 0 (Bardeen, Press & Teukolsky 1972, eq. 2.21).
 pub fn isco(hole: &Kerr) -> f64 {
     let a = hole.spin();
@@ -14,14 +14,14 @@ pub fn isco(hole: &Kerr) -> f64 {
     3.0 + z2 - difference * ((p + q) * (3.0 + z1 + 2.0 * z2)).sqrt()
 }
 
-/// Radius of the circular equatorial photon orbit that turns about +z (Bardeen, Press &
+/// Radius in M of the circular equatorial photon orbit that turns about +z (Bardeen, Press &
 /// Teukolsky 1972, eq. 2.18); no circular orbit of matter lies inside it.
 pub fn photon_orbit(hole: &Kerr) -> f64 {
     let (a, root) = (hole.spin(), 0.5 * hole.horizon_gap());
     1.0 + if a < 0.0 { equatorial_retrograde(root, -a) } else { equatorial_prograde(root, a) }
 }
 
-/// Radius of the circular equatorial photon orbit that turns against +z.
+/// Radius in M of the circular equatorial photon orbit that turns against +z.
 pub fn counter_rotating_photon_orbit(hole: &Kerr) -> f64 {
     let (a, root) = (hole.spin(), 0.5 * hole.horizon_gap());
     1.0 + if a < 0.0 { equatorial_prograde(root, -a) } else { equatorial_retrograde(root, a) }
@@ -39,12 +39,12 @@ pub fn polar_photon_orbit(hole: &Kerr) -> f64 {
     1.0 + 2.0 * size.sqrt() * (angle / 3.0).cos()
 }
 
-/// Ω = dφ/dt = 1/(r^{3/2} + a) of the circular equatorial geodesic that turns about +z.
+/// Ω = dφ/dt = 1/(r^{3/2} + a), radians per M, of the circular equatorial geodesic that turns about +z.
 pub fn keplerian_angular_velocity(hole: &Kerr, r: f64) -> f64 {
     1.0 / (r * r.sqrt() + hole.spin())
 }
 
-/// E = −u_t of a circular equatorial geodesic that turns about +z at radius r outside the
+/// Energy per rest mass E = −u_t of a circular equatorial geodesic that turns about +z at radius r (M) outside the
 /// photon orbit (Bardeen, Press & Teukolsky 1972, eq. 2.12).
 pub fn circular_energy(hole: &Kerr, r: f64) -> f64 {
     let (a, x) = (hole.spin(), r.sqrt());
@@ -67,14 +67,14 @@ pub fn circular_angular_momentum(hole: &Kerr, r: f64) -> f64 {
     (r * r - 2.0 * a * x + a * a) / (x.powf(1.5) * photon_orbit_distance(hole, r).sqrt())
 }
 
-/// x³ − 3x + 2a with x = √r, which vanishes on the photon orbit and is positive outside of
+/// x³ − 3x + 2a with x = √r (r in M), which vanishes on the photon orbit and is positive outside of
 /// it, without cancellation near x = 1 for a → 1.
 pub fn photon_orbit_distance(hole: &Kerr, r: f64) -> f64 {
     let x = r.sqrt();
     (x - 1.0) * (x - 1.0) * (x + 2.0) - 2.0 * (1.0 - hole.spin())
 }
 
-/// 1 − E at the innermost stable orbit: what a thin disc radiates of the mass it accretes.
+/// 1 − E at the innermost stable orbit, dimensionless: the share of the accreted mass that a thin disc radiates.
 pub fn binding_efficiency(hole: &Kerr) -> f64 {
     1.0 - circular_energy(hole, isco(hole))
 }

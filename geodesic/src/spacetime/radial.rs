@@ -20,7 +20,7 @@ pub struct RadialPotential<T = f64> {
 /// hole's critical curve, it is the horizon itself, where W is a square.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Barrier<T = f64> {
-    /// Where W is smallest, to the nearest double.
+    /// The w = 1/r in M⁻¹ at which W is smallest, to the nearest double.
     pub w: f64,
     /// W there, rounded from twice the working precision.
     pub height: T,
@@ -37,7 +37,7 @@ impl<T: Elementary> Barrier<T> {
         self.height + x * (self.slope + x * (c2 + x * (c3 + x * c4)))
     }
 
-    /// The distance from the minimum at which W differs from its least value by as much
+    /// The distance in w = 1/r (M⁻¹) from the minimum at which W differs from its least value by as much
     /// as that value itself: how closely the ray approaches the spherical photon orbit.
     pub fn width(&self) -> f64 {
         (self.height.value() / self.expansion[0].value()).abs().sqrt()

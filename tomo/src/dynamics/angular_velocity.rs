@@ -5,6 +5,7 @@ use crate::Error;
 /// Angular velocity as a function of the (spherical) radius, in radians a unit of time; positive is
 /// right-handed about the axis.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum AngularVelocity {
     /// 1/(r^{3/2} + drag), circular geodesics (Bardeen, Press & Teukolsky 1972): the drag is the spin for
     /// orbits about it, spin · ξ_z for tilted ones, 0 in the paper.
@@ -65,7 +66,7 @@ impl AngularVelocity {
         Ok(self)
     }
 
-    /// At radius r.
+    /// Ω in radians per M at radius r (M).
     pub fn rate(&self, r: f64) -> f64 {
         match self {
             Self::Keplerian { drag } => 1.0 / (r.powf(1.5) + drag),
@@ -74,7 +75,7 @@ impl AngularVelocity {
         }
     }
 
-    /// dΩ/dr at radius r.
+    /// dΩ/dr in radians per M² at radius r (M).
     pub fn slope(&self, r: f64) -> f64 {
         match self {
             Self::Keplerian { .. } => -1.5 * r.sqrt() * self.rate(r).powi(2),
@@ -97,13 +98,13 @@ impl AngularVelocity {
         }
     }
 
-    /// Angle by which the point at (x, y, z) is turned at time t to where its matter was at
+    /// Angle in radians by which the point at (x, y, z) is turned at time t to where its matter was at
     /// t₀ = `reference`: −Ω(r)(t − t₀).
     pub fn angle(&self, point: [f64; 3], time: f64, reference: f64) -> f64 {
         -self.rate(radius(point)) * (time - reference)
     }
 
-    /// Derivative of [`Self::angle`] with respect to the radius.
+    /// Derivative of [`Self::angle`] with respect to the radius, in radians per M.
     pub fn angle_slope(&self, point: [f64; 3], time: f64, reference: f64) -> f64 {
         -self.slope(radius(point)) * (time - reference)
     }
@@ -130,7 +131,7 @@ pub struct Injection {
 }
 
 impl Injection {
-    /// Whether a point shines at its time.
+    /// Whether a point shines at its time (M).
     pub fn shines(self, time: f64) -> bool {
         time >= self.time
     }

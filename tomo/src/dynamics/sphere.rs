@@ -13,7 +13,7 @@ pub struct Axis([f64; 3]);
 pub struct ZeroAxis(pub [f64; 3]);
 
 impl Axis {
-    /// The direction of a vector.
+    /// The direction of a vector of any length and unit.
     ///
     /// # Errors
     /// If it has none.
@@ -39,7 +39,7 @@ impl Axis {
         if ok { Ok(Self(vector)) } else { Err(ZeroAxis(vector).into()) }
     }
 
-    /// Its components.
+    /// Its components, those of a unit vector.
     pub fn vector(self) -> [f64; 3] {
         self.0
     }
@@ -70,7 +70,7 @@ impl Axis {
         [n, east, north]
     }
 
-    /// The direction of self + step: a step on the sphere, to first order. A step that leads to the
+    /// The direction of self + step: a step on the sphere, in radians to first order. A step that leads to the
     /// centre or is not finite is not taken.
     pub fn moved(self, step: [f64; 3]) -> Self {
         Self::new(core::array::from_fn(|k| self.0[k] + step[k])).unwrap_or(self)

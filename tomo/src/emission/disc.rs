@@ -58,7 +58,7 @@ impl DiscModel {
         }
     }
 
-    /// Whether there is disc at radius r.
+    /// Whether there is disc at radius r (M).
     pub fn covers(&self, r: f64) -> bool {
         (self.inner..=self.outer).contains(&r)
     }
@@ -73,18 +73,18 @@ impl DiscModel {
         self.plunging.as_ref().filter(|(flow, _)| r < flow.isco())
     }
 
-    /// Whether the matter at radius r plunges.
+    /// Whether the matter at radius r (M) plunges.
     pub fn plunges_at(&self, r: f64) -> bool {
         self.plunge_at(r).is_some()
     }
 
-    /// Contravariant Boyer–Lindquist four-velocity at radius r where matter plunges; `None`
+    /// Contravariant Boyer–Lindquist four-velocity (angular components in M⁻¹) at radius r (M) where matter plunges; `None`
     /// elsewhere.
     pub fn plunging_velocity(&self, r: f64) -> Option<[f64; 4]> {
         self.plunge_at(r).and_then(|(flow, _)| flow.velocity(r))
     }
 
-    /// g = ν_obs/ν_em of light from radius r: of circular geodesics, and of matter that plunges
+    /// g = ν_obs/ν_em, dimensionless, of light from radius r (M): of circular geodesics, and of matter that plunges
     /// from the innermost of them. 0 where there is no such light.
     pub fn redshift(&self, r: f64, photon: &Photon) -> f64 {
         let Photon { lambda, eta, outward } = *photon;
@@ -95,7 +95,7 @@ impl DiscModel {
         g.unwrap_or(0.0)
     }
 
-    /// Linear colour of its light from radius r, shifted by g. A black body at T is seen as one at gT
+    /// Linear colour (R, G, B) of its light from radius r (M), shifted by the ratio g. A black body at T is seen as one at gT
     /// (I_ν/ν³ is invariant), and T⁴ goes like the flux.
     pub fn color(&self, r: f64, g: f64) -> [f32; 3] {
         let Some((peak, colors)) = &self.black_body else { return self.color };
@@ -108,7 +108,7 @@ impl DiscModel {
         core::array::from_fn(|k| self.color[k] * shade[k])
     }
 
-    /// Intensity in the gas frame at radius r (isotropic; F = πI).
+    /// Intensity in scene units in the gas frame at radius r (M) (isotropic; F = πI).
     pub fn intensity(&self, r: f64) -> f64 {
         match self.plunge_at(r) {
             Some((flow, law)) => law.intensity * (r / flow.isco()).powf(law.exponent),

@@ -6,6 +6,7 @@ use kerrlight_geodesic::simd::RayNodes;
 
 /// What work is done for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Part {
     /// Rays: their fate, crossings and, where a source needs it, their path.
     Rays,
@@ -125,7 +126,7 @@ pub struct Emission {
     pub emissivity: Vec<f64>,
     /// Optical depth gained per unit of the affine parameter, κ/g; empty without absorption.
     pub absorption: Vec<f64>,
-    /// g; 1 where redshift is off.
+    /// g = ν_obs/ν_em, dimensionless; 1 where redshift is off.
     pub redshift: Vec<f64>,
     /// Q, U, V over I; empty without polarisation.
     pub polarization: Vec<[f64; 3]>,

@@ -23,7 +23,7 @@ pub struct SpotModel {
     sigma: f64,
     peak: f64,
     sheared_since: Option<f64>,
-    /// Linear colour.
+    /// Linear colour in R, G and B, dimensionless.
     pub color: [f32; 3],
 }
 
@@ -62,7 +62,7 @@ impl SpotModel {
         self.axis.map(|x| x * self.rate(r))
     }
 
-    /// Where the centre is at `time`.
+    /// Where the centre is at `time`, both in M.
     pub fn center(&self, time: f64) -> [f64; 3] {
         rotate(self.axis, self.rate(self.orbit) * time, self.start)
     }
@@ -83,7 +83,7 @@ impl SpotModel {
         Comoving { position: rotate(self.axis, -angle, x), angle }
     }
 
-    /// A bound of the length of a short piece of path in comoving coordinates: its chord
+    /// A bound of the length in M of a short piece of path in comoving coordinates: its chord
     /// and what differential rotation adds.
     pub fn comoving_length(&self, ends: [[f64; 3]; 2], carried: [&Comoving; 2]) -> f64 {
         let reach = ends.map(|x| dot(x, x).sqrt());
@@ -91,7 +91,7 @@ impl SpotModel {
         distance(ends[0], ends[1]) + reach[0].max(reach[1]) * wound
     }
 
-    /// What differential rotation adds to the length of a piece of path in comoving coordinates. The
+    /// What differential rotation adds to the length (M) of a piece of path in comoving coordinates. The
     /// angles by which time and by which radius make matter turn do not cancel.
     pub fn sheared_length(&self, [a, b]: [MatterPoint; 2]) -> f64 {
         let by_time = (a.rate * (a.time - b.time)).abs();
@@ -100,13 +100,13 @@ impl SpotModel {
         a.radius.max(b.radius) * (by_time + by_radius.abs())
     }
 
-    /// Matter at radius r and at `time`.
+    /// Matter at radius r and at `time`, both in M.
     pub fn matter_at(&self, radius: f64, time: f64) -> MatterPoint {
         let rate = self.rate(if self.sheared_since.is_some() { radius } else { self.orbit });
         MatterPoint { radius, time, rate }
     }
 
-    /// The point `x` carried along with its matter, as in [`comoving`](Self::comoving).
+    /// The point `x` (M) carried along with its matter, as in [`comoving`](Self::comoving).
     pub fn carried(&self, x: [f64; 3], at: &MatterPoint) -> [f64; 3] {
         let angle = match self.sheared_since {
             None => at.rate * at.time,
@@ -115,12 +115,12 @@ impl SpotModel {
         rotate(self.axis, -angle, x)
     }
 
-    /// Distance of a point carried along with the matter from the spot's centre.
+    /// Distance in M of a point carried along with the matter from the spot's centre.
     pub fn offset(&self, carried: [f64; 3]) -> f64 {
         distance(carried, self.start)
     }
 
-    /// A lower bound of that distance at a radius and a height z.
+    /// A lower bound of that distance at a radius and a height z, all in M.
     pub fn least_offset(&self, radius: f64, z: f64) -> f64 {
         let above = if self.axis[0] == 0.0 && self.axis[1] == 0.0 { z.abs() } else { 0.0 };
         (radius - self.orbit).abs().max(above)
@@ -134,12 +134,12 @@ impl SpotModel {
         if w < 0.25 { 1.2 * (1.0 + 2.0 * w / (1.0 - 2.0 * w)).sqrt() } else { f64::INFINITY }
     }
 
-    /// Distance from its centre at which its light is cut off.
+    /// Distance in M from its centre at which its light is cut off.
     pub fn reach(&self) -> f64 {
         CUT_OFF * self.sigma
     }
 
-    /// Emissivity in the gas frame at a point carried along with the matter, at `time`.
+    /// Emissivity in scene units per M, in the gas frame, at a point carried along with the matter, at `time` (M).
     pub fn emissivity(&self, carried: &Comoving, time: f64) -> f64 {
         if self.sheared_since.is_some_and(|since| time < since) {
             return 0.0;
@@ -171,7 +171,7 @@ impl SpotModel {
         [angles.into_iter().fold(f64::INFINITY, f64::min), most]
     }
 
-    /// Speed of the centre, in coordinates.
+    /// Coordinate speed of the centre, in units of c.
     pub fn speed(&self) -> f64 {
         self.orbit * self.rate(self.orbit).abs()
     }
@@ -194,13 +194,13 @@ impl SpotModel {
         distance(middle, self.start) > CUT_OFF * self.sigma + length
     }
 
-    /// The shell of radii outside of which it does not shine.
+    /// The shell of radii (M) outside of which it does not shine.
     pub fn shell(&self) -> [f64; 2] {
         let reach = CUT_OFF * self.sigma;
         [(self.orbit - reach).max(0.0), self.orbit + reach]
     }
 
-    /// σ.
+    /// Standard deviation σ of its Gaussian, M.
     pub fn sigma(&self) -> f64 {
         self.sigma
     }

@@ -97,7 +97,7 @@ impl SpotModel {
         radii.map(square).into_iter().fold(0.0, f64::max).sqrt()
     }
 
-    /// The box around a part.
+    /// The box around a part, M.
     pub fn bounds(&self, part: &SpotPart) -> [[f64; 3]; 2] {
         let (start, axis, orbit) = self.orbit();
         let scale = self.middle(part.radii) / orbit;

@@ -180,7 +180,7 @@ impl<T: Float> ForwardModel<T> {
 }
 
 impl<T: Float> ForwardModel<T> {
-    /// Images of a known field e₀(x) at the reference time, all frames one after the other.
+    /// Images in Jy per pixel of a known field e₀(x) (x in M) at the reference time, all frames one after the other.
     pub fn movie_of(
         &self,
         axis: Axis,

@@ -19,6 +19,7 @@ pub struct Shape {
 
 /// A penalty on a field e(x).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Regulariser {
     /// ∫ (√(|∇e|² + ε²) − ε) dV with forward differences: total variation (Rudin, Osher & Fatemi 1992), smoothed
     /// where slopes are below ε.

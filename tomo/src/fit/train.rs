@@ -61,7 +61,7 @@ pub struct Training {
     pub region: Region,
     /// Steps from one good state that is kept to the next.
     pub keep_every: u64,
-    /// A loss this much larger than that of the kept state is a divergence.
+    /// A loss larger than that of the kept state by this factor is a divergence.
     pub divergence: f64,
 }
 
@@ -84,7 +84,7 @@ pub struct Progress<T> {
     pub occupancy: Option<Occupancy>,
     /// Factor on the rates: halved at each divergence.
     pub caution: f64,
-    /// Loss of the last step.
+    /// Loss of the last step, dimensionless.
     pub loss: f64,
 }
 
@@ -101,6 +101,7 @@ pub struct State<T> {
 
 /// What a step did.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Outcome {
     /// It moved on.
     Done(Loss),
@@ -123,7 +124,7 @@ pub enum Outcome {
     "the loss is {loss} at step {step}, after {setbacks} returns to earlier steps at ever smaller rates"
 )]
 pub struct Diverged {
-    /// The last loss.
+    /// The last loss, dimensionless.
     pub loss: f64,
     /// The step.
     pub step: u64,

@@ -2,6 +2,7 @@
 
 /// Colour maps by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Colormap {
     /// `afmhot` stretched so that lightness rises evenly: the way the EHT shows its images.
     AfmhotUs,

@@ -15,7 +15,7 @@ pub mod ticks;
 pub struct Channel {
     /// Name as in the file.
     pub name: String,
-    /// width × height values.
+    /// width × height values, in the unit of the channel.
     pub values: Vec<f32>,
 }
 
@@ -31,7 +31,7 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// The values of a channel.
+    /// The values of a channel, in its unit.
     pub fn channel(&self, name: &str) -> Option<&[f32]> {
         self.channels.iter().find(|c| c.name == name).map(|c| c.values.as_slice())
     }

@@ -6,6 +6,7 @@ use std::io::Cursor;
 
 /// What a preview shows.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Look {
     /// The intensity through a colour map.
     Intensity(Colormap, Stretch),
@@ -15,6 +16,7 @@ pub enum Look {
 
 /// How intensity is stretched over the colour map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Stretch {
     /// In proportion, as the EHT shows brightness temperature.
     Linear,
@@ -45,7 +47,7 @@ pub fn encode(drawn: &image::RgbImage) -> image::ImageResult<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The value that a picture of its own would show as white.
+/// The value, in the unit of the channel, that a picture of its own would show as white.
 ///
 /// # Errors
 /// If a channel that the look needs is missing.

@@ -14,7 +14,7 @@ const MEMORY: usize = 256 << 20;
 pub struct Movie {
     /// Where pixels are.
     pub grid: ImageGrid,
-    /// Image after image, row by row from the north, each row from the east.
+    /// Jy per pixel: image after image, row by row from the north, each row from the east.
     pub pixels: Vec<f64>,
 }
 

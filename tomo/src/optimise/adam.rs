@@ -7,11 +7,11 @@ use rayon::prelude::*;
 /// Decay rates of the moments and the number that keeps the division safe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Adam {
-    /// Of the mean gradient.
+    /// Decay rate β₁ of the mean gradient, 0 to 1.
     pub beta1: f64,
-    /// Of the mean square.
+    /// Decay rate β₂ of the mean square, 0 to 1.
     pub beta2: f64,
-    /// Added to the root of the mean square.
+    /// Added to the root of the mean square, in units of the gradient.
     pub epsilon: f64,
 }
 
@@ -59,7 +59,7 @@ impl Adam {
         if ok { Ok(self) } else { Err(Error::out_of_range("epsilon", self.epsilon, allowed)) }
     }
 
-    /// One step with learning rate `rate`, by all threads.
+    /// One step with learning rate `rate` (in units of the parameters), by all threads.
     ///
     /// # Panics
     /// If the slices differ in length.

@@ -48,7 +48,7 @@ pub struct LbfgsState<T> {
     pub numbers: Vec<T>,
     /// Pairs taken up so far.
     pub pairs: u64,
-    /// Loss at the parameters, once known.
+    /// Loss at the parameters, dimensionless, once known.
     pub value: Option<f64>,
 }
 

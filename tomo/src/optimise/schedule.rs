@@ -5,13 +5,13 @@ use crate::Error;
 /// Polynomial decay of a learning rate: to + (from − to)(1 − step/steps)^power, then `to`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Polynomial {
-    /// Rate of step 0.
+    /// Learning rate of step 0, in units of the parameters.
     pub from: f64,
-    /// Rate from step `steps` on.
+    /// Learning rate from step `steps` on, in the same unit.
     pub to: f64,
     /// Steps of the decay.
     pub steps: u64,
-    /// 1: linear.
+    /// Exponent of the decay; 1: linear.
     pub power: f64,
 }
 
@@ -41,7 +41,7 @@ impl Polynomial {
         Ok(self)
     }
 
-    /// Rate of a step, counted from 0.
+    /// Learning rate of a step, counted from 0, in units of the parameters.
     pub fn rate(&self, step: u64) -> f64 {
         let left = 1.0 - step.min(self.steps) as f64 / self.steps.max(1) as f64;
         self.to + (self.from - self.to) * left.powf(self.power)

@@ -16,9 +16,9 @@ use serde::{Deserialize, Serialize};
 pub struct MagneticField {
     /// Along +z: cos θ e_r − sin θ e_θ.
     pub vertical: f64,
-    /// Away from the hole, e_r.
+    /// Away from the hole, e_r; relative to the other components.
     pub radial: f64,
-    /// Around +z, e_φ.
+    /// Around +z, e_φ; relative to the other components.
     pub toroidal: f64,
 }
 
@@ -47,7 +47,7 @@ impl MagneticField {
         Ok(())
     }
 
-    /// The components along e_r, e_θ, e_φ of the gas at a place.
+    /// The components along e_r, e_θ, e_φ of the gas at a place, in units of the scene's field.
     pub fn at(&self, frame: &ZamoFrame) -> [f64; 3] {
         let [sin, cos] = frame.polar_angle();
         [self.radial + self.vertical * cos, -self.vertical * sin, self.toroidal]

@@ -14,7 +14,7 @@ impl Gas {
         Gas([1.0, 0.0, 0.0, 0.0])
     }
 
-    /// Gas with the contravariant Boyer–Lindquist four-velocity (uᵗ, uʳ, u^θ, u^φ).
+    /// Gas with the contravariant Boyer–Lindquist four-velocity (uᵗ, uʳ, u^θ, u^φ), the last two in M⁻¹.
     ///
     /// γ follows from the other three, so that its rounding does not become a mass.
     pub fn of_velocity(frame: &ZamoFrame, u: [f64; 4]) -> Self {

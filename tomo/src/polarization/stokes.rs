@@ -5,24 +5,24 @@ use core::ops::{AddAssign, Mul};
 /// Stokes parameters I, Q, U, V, in the unit of the intensity.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Stokes {
-    /// Intensity.
+    /// Intensity, scene units.
     pub i: f64,
     /// P cos 2χ.
     pub q: f64,
     /// P sin 2χ.
     pub u: f64,
-    /// Right-handed less left-handed circular polarisation (IAU 1973).
+    /// Right-handed less left-handed circular polarisation (IAU 1973), scene units.
     pub v: f64,
 }
 
 impl Stokes {
-    /// The position angle χ of the electric vector, east of north, in (−π/2, π/2]; 0 without
+    /// The position angle χ of the electric vector in radians, east of north, in (−π/2, π/2]; 0 without
     /// linear polarisation.
     pub fn evpa(&self) -> f64 {
         0.5 * self.u.atan2(self.q)
     }
 
-    /// The intensity of the linearly polarised part, P = √(Q² + U²).
+    /// The intensity of the linearly polarised part, in units of I, P = √(Q² + U²).
     pub fn linear(&self) -> f64 {
         self.q.hypot(self.u)
     }

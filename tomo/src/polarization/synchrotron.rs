@@ -53,7 +53,7 @@ impl PowerLaw {
         Ok(PowerLaw { index, linear: (index + 1.0) / (index + 5.0 / 3.0), circular })
     }
 
-    /// α of the spectrum ν^−α.
+    /// Spectral index α of the spectrum ν^−α, dimensionless.
     pub fn spectral_index(&self) -> f64 {
         self.index
     }

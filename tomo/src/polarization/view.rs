@@ -6,9 +6,9 @@ use kerrlight_geodesic::{Kerr, ScreenPoint, ZamoFrame};
 /// How gas and field at a point look along the ray that reaches the screen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SynchrotronView {
-    /// g = ν_obs/ν_em.
+    /// g = ν_obs/ν_em, dimensionless.
     pub redshift: f64,
-    /// |B| in the gas frame.
+    /// |B| in the gas frame, in units of the scene's field.
     pub field: f64,
     /// Sine of the angle θ_B between field and photon in the gas frame.
     pub sin_pitch: f64,

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 /// The last function of a representation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Activation {
     /// 1/(1 + e⁻ˣ): between 0 and 1.
     Sigmoid,

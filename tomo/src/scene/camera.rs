@@ -76,6 +76,7 @@ pose_table! {
 /// The motion of the camera's frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum CameraMotion {
     /// At rest with respect to infinity.
     Static,
@@ -126,7 +127,7 @@ impl CameraConfig {
         pose
     }
 
-    /// The camera at `time`.
+    /// The camera at `time` (M).
     ///
     /// # Errors
     /// If nothing can be there or move like that.
@@ -149,7 +150,7 @@ impl CameraConfig {
         Ok(camera.with_azimuth(phi.to_radians()).with_pointing(yaw, pitch, roll))
     }
 
-    /// First and last time of the keys.
+    /// First and last time of the keys, M.
     pub fn span(&self) -> Option<[f64; 2]> {
         Some([self.key.first()?.time, self.key.last()?.time])
     }

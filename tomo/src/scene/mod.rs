@@ -194,7 +194,7 @@ pub struct Effects {
     /// dI = g^{2+α} j ds of a volume, with the spectral index α.
     #[serde(default)]
     pub redshift: bool,
-    /// α of the emitted spectrum ν^{−α}; 1 is the law of bolometric intensity. Needed
+    /// Spectral index α (dimensionless) of the emitted spectrum ν^{−α}; 1 is the law of bolometric intensity. Needed
     /// when `redshift` is on.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spectral_index: Option<f64>,
@@ -248,7 +248,7 @@ fn on() -> bool {
 }
 
 impl Effects {
-    /// α of the emitted spectrum, if redshift is simulated.
+    /// Spectral index α (dimensionless) of the emitted spectrum, if redshift is simulated.
     pub fn index(&self) -> Option<f64> {
         let given = self.spectral_index.or(self.redshift_power.map(|power| power - 2.0));
         self.redshift.then_some(given).flatten()
@@ -262,7 +262,7 @@ pub struct TracerConfig {
     /// Which integrator.
     #[serde(with = "integrator")]
     pub integrator: Integrator,
-    /// Largest local error of a step.
+    /// Largest local error of a step, relative.
     pub tolerance: f64,
 }
 

@@ -10,6 +10,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// Angular velocity Ω(r) of matter on circles about an axis ξ: a name, or a law with numbers.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Rotation {
     /// At rest in Boyer–Lindquist coordinates.
     None,
@@ -22,6 +23,7 @@ pub enum Rotation {
 /// Laws of the angular velocity, with the names and numbers that fits have.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
+#[non_exhaustive]
 pub enum Velocity {
     /// 1/(r^{3/2} + drag).
     Keplerian {

@@ -24,7 +24,7 @@ pub struct Gas {
     pub absorptivity: f64,
     /// Radius in M beyond which there is none.
     pub outer_radius: f64,
-    /// Linear colour of its light in the R, G, B channels.
+    /// Linear colour of its light in the R, G, B channels, dimensionless.
     #[serde(default = "white")]
     pub color: [f32; 3],
 }
@@ -32,6 +32,7 @@ pub struct Gas {
 /// How the density of a gas falls with x = r/scale.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
+#[non_exhaustive]
 pub enum GasProfile {
     /// exp(−x²/2).
     Gaussian,
@@ -45,6 +46,7 @@ pub enum GasProfile {
 /// How a gas moves.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
+#[non_exhaustive]
 pub enum GasMotion {
     /// On circles with −u_φ/u_t = l₀ R^{3/2}/(1 + R), R = r sin θ, down to the horizon.
     AngularMomentum {
@@ -67,7 +69,7 @@ pub struct Disc {
     pub inner_edge: Option<f64>,
     /// Outer edge in M.
     pub outer_edge: f64,
-    /// Intensity in the gas frame where the flux profile peaks.
+    /// Intensity in the gas frame where the flux profile peaks; it defines the scene units.
     pub peak_intensity: f64,
     /// Whether the disc hides what is behind it.
     pub opaque: bool,
@@ -78,7 +80,7 @@ pub struct Disc {
     /// Matter that falls in from the innermost stable orbit; without it all is dark inside.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub plunging: Option<Plunging>,
-    /// Linear colour of its light in the R, G, B channels.
+    /// Linear colour of its light in the R, G, B channels, dimensionless.
     #[serde(default = "white")]
     pub color: [f32; 3],
 }
@@ -90,7 +92,7 @@ pub struct Disc {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plunging {
-    /// Intensity in the matter's frame at the innermost stable orbit.
+    /// Intensity in the matter's frame at the innermost stable orbit, scene units.
     pub intensity: f64,
     /// Exponent of r.
     pub exponent: f64,
@@ -109,18 +111,18 @@ pub struct Spot {
     /// Angle along the orbit at time 0, in degrees from the image of the x axis when z is
     /// tipped onto the orbit's axis along the shortest way.
     pub phase_deg: f64,
-    /// Axis of the orbit; the spot turns about it right-handed.
+    /// Axis of the orbit, a vector of any length; the spot turns about it right-handed.
     #[serde(default = "up")]
     pub axis: [f64; 3],
     /// Standard deviation of the Gaussian in M.
     pub sigma: f64,
     /// Emissivity at the centre, in intensity per M.
     pub peak_emissivity: f64,
-    /// Time since which differential rotation shears the spot; without it the spot keeps
+    /// Time in M since which differential rotation shears the spot; without it the spot keeps
     /// its shape.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sheared_since: Option<f64>,
-    /// Linear colour of its light in the R, G, B channels.
+    /// Linear colour of its light in the R, G, B channels, dimensionless.
     #[serde(default = "white")]
     pub color: [f32; 3],
 }
@@ -141,7 +143,7 @@ pub struct Mesh {
     /// Where the file's origin comes to lie, in M.
     #[serde(default)]
     pub position: [f64; 3],
-    /// Axis about which it is turned first.
+    /// Axis about which it is turned first, a vector of any length.
     #[serde(default = "up")]
     pub rotation_axis: [f64; 3],
     /// By how much it is turned, right-handed, in degrees.
@@ -149,9 +151,9 @@ pub struct Mesh {
     pub rotation_deg: f64,
     /// Whether it hides what is behind it.
     pub opaque: bool,
-    /// Intensity in the surface's frame where its colour is 1; 0: black.
+    /// Intensity in scene units, in the surface's frame, where its colour is 1; 0: black.
     pub brightness: f64,
-    /// Linear colour of its light; without it that of its materials.
+    /// Linear colour of its light (R, G, B; dimensionless); without it that of its materials.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub color: Option<[f32; 3]>,
     /// How its matter moves; needed when `effects.redshift` is on.
@@ -162,6 +164,7 @@ pub struct Mesh {
 /// How the matter of a mesh moves, for its redshift: the surface itself stays where it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum MeshVelocity {
     /// At rest in Boyer–Lindquist coordinates.
     Static,
@@ -184,7 +187,7 @@ pub struct VolumeSource {
     /// Coordinates of the last node in M; without it those of the file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub high: Option<[f64; 3]>,
-    /// Axis about which it turns right-handed; without it that of the file.
+    /// Axis about which it turns right-handed, a vector of any length; without it that of the file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axis: Option<[f64; 3]>,
     /// How fast it turns; `velocity` means the same, as fits call it.
@@ -199,7 +202,7 @@ pub struct VolumeSource {
     /// Where it shines, at rest while matter passes through; wherever the file has light without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub region: Option<VolumeRegion>,
-    /// Linear colour of its light in the R, G, B channels.
+    /// Linear colour of its light in the R, G, B channels, dimensionless.
     #[serde(default = "white")]
     pub color: [f32; 3],
 }
@@ -218,7 +221,7 @@ pub struct VolumeRegion {
 }
 
 impl VolumeRegion {
-    /// Whether a point at height z and radius r lies in it.
+    /// Whether a point at height z and radius r (both in M) lies in it.
     pub fn holds(&self, z: f64, r: f64) -> bool {
         r >= self.r_min && r < self.r_max && self.z_width.is_none_or(|width| z.abs() <= width)
     }
@@ -227,6 +230,7 @@ impl VolumeRegion {
 /// What the rays that escape see: `[sky.checker]`, `[sky.stars]` or `[sky.image]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase", deny_unknown_fields)]
+#[non_exhaustive]
 pub enum Sky {
     /// A checkered sphere with a colour per quadrant, to see how directions are bent.
     Checker(Checker),

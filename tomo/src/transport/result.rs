@@ -31,15 +31,15 @@ pub struct RayResult {
     /// Which crossings of the equatorial plane are on the disc and seen: bit n for number n, counted
     /// from 0 (bit 15 for all from there on), and bit 16 + n where its matter plunges.
     pub disc_images: u32,
-    /// Radius of the brightest contribution; 0 where there is none.
+    /// Radius in M of the brightest contribution; 0 where there is none.
     pub radius: f64,
-    /// Azimuth of the brightest contribution in \[−π, π\]; 0 where there is none.
+    /// Azimuth in radians of the brightest contribution in \[−π, π\]; 0 where there is none.
     pub azimuth: f64,
     /// Delay of the brightest contribution in M; 0 where there is none.
     pub delay: f64,
     /// Stokes Q, U, V of the emission, in the unit of intensity; 0 without polarisation.
     pub stokes: [f64; 3],
-    /// Optical depth of the way to the ray's end; 0 where nothing absorbs.
+    /// Optical depth, dimensionless, of the way to the ray's end; 0 where nothing absorbs.
     pub optical_depth: f64,
     /// What became of the ray.
     pub fate: Fate,
@@ -162,17 +162,17 @@ impl Accumulator {
 /// Light of a medium along a ray.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Light {
-    /// What is seen of it.
+    /// What is seen of it, scene units.
     pub intensity: f64,
     /// ∫ g dI.
     pub shift: f64,
     /// Q, U, V.
     pub stokes: [f64; 3],
-    /// Optical depth of the whole way.
+    /// Optical depth of the whole way, dimensionless.
     pub depth: f64,
     /// Its brightest node.
     pub place: Place,
-    /// An estimate of the error of the intensity.
+    /// An estimate of the error of the intensity, scene units.
     pub error: f64,
 }
 

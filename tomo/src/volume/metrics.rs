@@ -15,7 +15,7 @@ pub struct Mask {
 }
 
 impl Mask {
-    /// The nodes of a shell, in a slab about the equatorial plane; `z_width` may be infinite.
+    /// The nodes of a shell (radii in M), in a slab (M) about the equatorial plane; `z_width` may be infinite.
     ///
     /// # Errors
     /// Names the number that is not in its range.
@@ -48,9 +48,9 @@ impl Mask {
 pub struct Mismatch {
     /// Which property differs: `nodes`, `low` or `high`.
     pub field: &'static str,
-    /// That of the first volume.
+    /// That of the first volume: a count of nodes, or M.
     pub first: [f64; 3],
-    /// That of the other one.
+    /// That of the other one, in the same unit.
     pub second: [f64; 3],
 }
 
@@ -74,7 +74,7 @@ pub struct Comparison {
     /// 10 log10(max(t)²/⟨(e − t)²⟩) in dB, over the nodes that are compared, max(t) being the truth's
     /// largest value on all nodes; infinite for a perfect estimate. Without a positive truth: none.
     pub psnr_db: Option<f64>,
-    /// ‖e − t‖/‖t‖: 0 for a perfect estimate, 1 for an empty one. Without a truth that is not zero: none.
+    /// ‖e − t‖/‖t‖, dimensionless: 0 for a perfect estimate, 1 for an empty one. Without a truth that is not zero: none.
     pub nrmse: Option<f64>,
     /// Normalised cross-correlation ⟨(e − ⟨e⟩)(t − ⟨t⟩)⟩/(σ_e σ_t), −1 to 1, blind to the estimate's
     /// scale and offset (ρ_NX of Event Horizon Telescope Collaboration 2019, ApJL 875, L4). None if either is

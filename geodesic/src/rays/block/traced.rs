@@ -12,7 +12,7 @@ pub struct PlaneCrossing {
     pub mino_time: f64,
     /// Boyer–Lindquist radius, in M.
     pub radius: f64,
-    /// Azimuth, continuous along the ray from the observer's on.
+    /// Azimuth in radians, continuous along the ray from the observer's on.
     pub azimuth: f64,
     /// t_o − t, in M; lim \[(t_o − t) − r_o − 2 ln r_o\] for an observer at infinity.
     pub delay: f64,
@@ -45,13 +45,13 @@ pub struct TracedRay {
     pub crossing_count: u32,
     /// Which of the block's crossings are its own.
     pub crossings: Range<usize>,
-    /// Mino time of the whole ray.
+    /// Mino time of the whole ray, M⁻¹.
     pub mino_total: f64,
-    /// Mino time after which no light is taken: see [`BlockRequest::half_orbits`](crate::BlockRequest::half_orbits).
+    /// Mino time in M⁻¹ after which no light is taken: see [`BlockRequest::half_orbits`](crate::BlockRequest::half_orbits).
     pub until: f64,
-    /// Mino time of the first opaque surface, if there is one before `until`.
+    /// Mino time in M⁻¹ of the first opaque surface, if there is one before `until`.
     pub surface: Option<f64>,
-    /// Direction in which it escapes, if it does and that is requested.
+    /// Unit vector of the direction in which it escapes, if it does and that is requested.
     pub exit: Option<[f64; 3]>,
     /// Whether it was traced step by step.
     pub stepped: bool,
@@ -79,7 +79,7 @@ impl Default for TracedRay {
 }
 
 impl TracedRay {
-    /// Mino time of the last light: of the first opaque surface or of the last half-orbit.
+    /// Mino time in M⁻¹ of the last light: of the first opaque surface or of the last half-orbit.
     #[inline]
     pub fn last_time(&self) -> f64 {
         self.surface.unwrap_or(f64::INFINITY).min(self.until)

@@ -14,6 +14,7 @@ pub trait Sealed {}
 
 /// Instruction sets that kernels are compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum InstructionSet {
     /// One number at a time: what [`Portable`](Self::Portable) is without SSE2.
     #[cfg(test)]

@@ -17,13 +17,13 @@ use kerrlight_geodesic::{Kerr, PathPoint};
 /// A triangle with what a test against it needs.
 #[derive(Debug, Clone)]
 pub struct Triangle {
-    /// Corners.
+    /// Corners, M.
     pub corners: [[f64; 3]; 3],
     /// Unit normal.
     normal: [f64; 3],
     /// In-plane unit vectors that point inward from the edge after each corner.
     inward: [[f64; 3]; 3],
-    /// Longest edge.
+    /// Longest edge, M.
     size: f64,
     texture: [[f32; 2]; 3],
     material: u32,
@@ -50,23 +50,23 @@ impl Triangle {
         Some(Triangle { corners, normal, inward: [a, b, c], size, texture, material })
     }
 
-    /// Signed distance of a point from its plane.
+    /// Signed distance of a point from its plane, M.
     pub fn height(&self, x: [f64; 3]) -> f64 {
         dot(self.normal, difference(x, self.corners[0]))
     }
 
-    /// Whether a point of its plane is inside, or outside by at most `margin`.
+    /// Whether a point of its plane is inside, or outside by at most `margin` (M).
     pub fn holds(&self, x: [f64; 3], margin: f64) -> bool {
         let margin = margin + SEAM * self.size;
         (0..3).all(|k| dot(self.inward[k], difference(x, self.corners[k])) >= -margin)
     }
 
-    /// Longest edge.
+    /// Longest edge, M.
     pub fn size(&self) -> f64 {
         self.size
     }
 
-    /// The box around it.
+    /// The box around it, M.
     pub fn bounds(&self) -> [[f64; 3]; 2] {
         let fold = |pick: fn(f64, f64) -> f64| {
             core::array::from_fn(|k| self.corners.iter().map(|c| c[k]).reduce(pick).unwrap_or(0.0))
@@ -145,7 +145,7 @@ impl MeshModel {
         self.brightness > 0.0
     }
 
-    /// Intensity in the frame of the surface and its colour at a point of a triangle. The
+    /// Intensity (scene units) in the frame of the surface and its colour at a point (M) of a triangle. The
     /// material's colour counts by its largest component.
     pub fn light(&self, triangle: &Triangle, x: [f64; 3]) -> (f64, [f32; 3]) {
         if let Some(color) = self.color {
@@ -164,7 +164,7 @@ impl MeshModel {
         }
     }
 
-    /// g at a point of a ray; `None` where matter cannot move like this.
+    /// g = ν_obs/ν_em, dimensionless, at a point of a ray; `None` where matter cannot move like this.
     pub fn redshift(&self, hole: &Kerr, point: &PathPoint) -> Option<f64> {
         let rate = match self.velocity {
             MeshVelocity::Static => 0.0,

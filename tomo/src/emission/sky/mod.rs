@@ -16,6 +16,7 @@ use crate::scene::{Checker, Sky};
 
 /// A sky ready to be looked at.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub enum SkyModel {
     /// A checkered sphere.
     Checker(Checker),

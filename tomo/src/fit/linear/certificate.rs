@@ -3,9 +3,9 @@
 /// Bounds at a field x, from the gradient g with respect to every node of the grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Certificate {
-    /// f(x).
+    /// f(x), the loss: dimensionless.
     pub value: f64,
-    /// f of nothing that shines.
+    /// f of the dark field, dimensionless.
     pub dark: f64,
     /// The Frank–Wolfe gap max ⟨g, x − s⟩ over the fields 0 ≤ s ≤ `upper` (Jaggi 2013): f(x) exceeds the least value
     /// over that box by no more, as f is convex.
@@ -13,9 +13,9 @@ pub struct Certificate {
     /// The largest violation of the conditions for a minimum: |g| of nodes inside the box, the part of g that points
     /// into it at nodes on its boundary.
     pub violation: f64,
-    /// Largest |g| where nothing shines: what `violation` compares with.
+    /// Largest |g| of the dark field, per unit of emission: the scale of `violation`.
     pub dark_slope: f64,
-    /// Largest value of the box.
+    /// Largest value of the box, in units of emission.
     pub upper: f64,
 }
 
@@ -51,15 +51,15 @@ impl Certificate {
 /// How flat the function is at a field x, where it is not convex: there is no bound on how much less it could be elsewhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stationarity {
-    /// f(x).
+    /// f(x), the loss: dimensionless.
     pub value: f64,
-    /// f of the lit field that the descent began with.
+    /// f of the lit field that the descent began with, dimensionless.
     pub start: f64,
-    /// The largest violation of the conditions for a stationary point, as in [`Certificate::violation`].
+    /// The largest violation of the conditions for a stationary point, dimensionless, as in [`Certificate::violation`].
     pub violation: f64,
-    /// Largest |g| at the start: what `violation` compares with.
+    /// Largest |g| at the start, per unit of emission: the scale of `violation`.
     pub start_slope: f64,
-    /// Largest value of the box.
+    /// Largest value of the box, in units of emission.
     pub upper: f64,
 }
 

@@ -12,6 +12,7 @@ use core::ops::ControlFlow;
 
 /// How the box-constrained problem is solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Method {
     /// For any convex and smooth function.
     QuasiNewton,
@@ -23,6 +24,7 @@ pub enum Method {
 
 /// Why iterations ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Ending {
     /// The projected gradient is small enough.
     Converged,

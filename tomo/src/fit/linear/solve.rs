@@ -93,7 +93,7 @@ pub struct LinearProgress<'a> {
     pub round: usize,
     /// Values, gradients and products so far.
     pub evaluations: usize,
-    /// Of what is minimised (of the coarse problem, in round 0).
+    /// The loss, dimensionless (of the coarse problem, in round 0).
     pub value: f64,
     /// Nodes that count.
     pub nodes: usize,

@@ -30,7 +30,7 @@ pub struct AxisProblem<'a, T: Float> {
     pub half_width: f64,
     /// The largest emission that is allowed.
     pub upper: f64,
-    /// Mean flux of a frame, for data none of which knows it.
+    /// Mean flux of a frame in Jy, for data none of which knows it.
     pub flux: Option<f64>,
     /// Penalties; none is the usual.
     pub priors: &'a [Prior],

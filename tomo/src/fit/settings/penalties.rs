@@ -28,6 +28,7 @@ pub struct PenaltySettings {
 /// Kinds of penalties.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum PenaltyKind {
     /// ∫ |∇e| dV.
     TotalVariation,

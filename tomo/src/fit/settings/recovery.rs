@@ -45,6 +45,7 @@ pub struct Representation {
 /// Kinds of representations.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Kind {
     /// Network of the pulled-back point.
     Bhnerf,
@@ -88,20 +89,20 @@ pub struct Training {
     pub optimiser: Optimiser,
     /// Steps.
     pub steps: u64,
-    /// First rate.
+    /// First learning rate, in units of the parameters.
     pub rate: f64,
-    /// Last rate, reached linearly.
+    /// Last learning rate, in the same unit, reached linearly.
     pub last_rate: f64,
-    /// First rate of a grid, whose parameters are of another size than a network's; `rate`, without it.
+    /// First learning rate of a grid, whose parameters are of another size than a network's; `rate`, without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub grid_rate: Option<f64>,
-    /// Last rate of a grid.
+    /// Last learning rate of a grid.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub grid_last_rate: Option<f64>,
-    /// First rate of a feature grid; `rate`, without it.
+    /// First learning rate of a feature grid; `rate`, without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub feature_rate: Option<f64>,
-    /// Last rate of a feature grid.
+    /// Last learning rate of a feature grid.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub feature_last_rate: Option<f64>,
     /// Steps over which rates grow to that.
@@ -146,6 +147,7 @@ pub struct Linear {
 /// From where parameters start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
+#[non_exhaustive]
 pub enum Start {
     /// As the representation draws them.
     #[default]
@@ -169,7 +171,7 @@ pub struct Occupancy {
     pub cells: usize,
     /// Part of the peak below which a cell is empty.
     pub threshold: f64,
-    /// What is remembered from one look to the next.
+    /// The share of the brightness that is remembered from one refresh to the next.
     pub memory: f64,
     /// Steps without it.
     pub warm_up: u64,
@@ -189,9 +191,9 @@ pub enum AxisSearch {
     From {
         /// Where it starts.
         start: [f64; 3],
-        /// First rate.
+        /// First learning rate, in units of the parameters.
         rate: f64,
-        /// Last rate, reached linearly.
+        /// Last learning rate, in the same unit, reached linearly.
         last_rate: f64,
     },
 }
@@ -210,9 +212,9 @@ pub struct AxisScan {
     /// it that is the scan's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refine: Option<usize>,
-    /// First rate of what follows; 0: it stays where the scan has found it.
+    /// First learning rate (radians a step) of the refinement that follows; 0: the axis stays where the scan found it.
     pub rate: f64,
-    /// Last rate, reached linearly.
+    /// Last learning rate, in the same unit, reached linearly.
     pub last_rate: f64,
 }
 
@@ -249,6 +251,7 @@ fn checkpoint_seconds() -> f64 {
 /// Rules of steps.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Optimiser {
     /// Steps along the mean gradient of random parts of the data.
     #[default]

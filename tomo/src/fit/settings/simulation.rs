@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 pub struct Movie {
     /// How many.
     pub frames: usize,
-    /// Time of the first.
+    /// Time of the first, M.
     pub from: f64,
-    /// Time of the last.
+    /// Time of the last, M.
     pub to: f64,
 }
 
@@ -84,7 +84,7 @@ pub struct Observation {
     pub frequency_ghz: f64,
     /// Bandwidth in GHz.
     pub bandwidth_ghz: f64,
-    /// Elevations at which stations observe.
+    /// Least and greatest elevation at which stations observe, degrees.
     pub elevation_deg: [f64; 2],
     /// Noise that is added to the data.
     pub noise: Noise,
@@ -102,6 +102,7 @@ pub struct Observation {
 /// Noise of simulated data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Noise {
     /// None; errors are those of thermal noise.
     None,

@@ -21,7 +21,7 @@ pub struct Hole {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Observer {
-    /// Angle to the spin axis.
+    /// Angle to the spin axis, degrees.
     pub inclination_deg: f64,
     /// M; infinity without it.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -111,12 +111,12 @@ pub struct Absorption {
 pub struct Motion {
     /// Angular velocity about the axis.
     pub velocity: Velocity,
-    /// The axis of the truth, or the known one.
+    /// The axis of the truth, or the known one: a vector of any length.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axis: Option<[f64; 3]>,
-    /// When the volume is what it is.
+    /// Time at which the volume is the recovered one, M.
     pub reference_time: f64,
-    /// When it begins to shine.
+    /// Time at which it begins to shine, M.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub injection_time: Option<f64>,
 }
@@ -124,6 +124,7 @@ pub struct Motion {
 /// Angular velocity.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
+#[non_exhaustive]
 pub enum Velocity {
     /// 1/(r^{3/2} + drag).
     Keplerian {

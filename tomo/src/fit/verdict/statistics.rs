@@ -41,7 +41,7 @@ impl Pairs {
         self.squares[1] += b * b;
     }
 
-    /// Σ ab/√(Σ a² Σ b²); none where one of the sums is 0.
+    /// Correlation Σ ab/√(Σ a² Σ b²), dimensionless; none where one of the sums is 0.
     pub fn correlation(&self) -> Option<f64> {
         let scale = (self.squares[0] * self.squares[1]).sqrt();
         (scale > 0.0).then(|| self.product / scale)

@@ -22,7 +22,7 @@ impl SourcePosition {
     pub const M87: Self =
         SourcePosition { ra_hours: 12.513_728_716_666_667, dec_deg: 12.391_123_305_555_556 };
 
-    /// A position in range.
+    /// A position: right ascension in hours, declination in degrees.
     ///
     /// # Errors
     /// If it is not.
@@ -41,6 +41,7 @@ impl SourcePosition {
 
 /// How the Earth's attitude is taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Frame {
     /// As eht-imaging does: catalogue coordinates as if they were of date, mean sidereal time.
     #[default]

@@ -7,6 +7,7 @@ use core::fmt::Write;
 
 /// How columns are set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum EhtTable {
     /// Separated by commas.
     Csv,

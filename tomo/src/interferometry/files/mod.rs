@@ -65,6 +65,7 @@ impl FileError {
 
 /// The formats that [`decode`] tells apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Format {
     /// Random groups with an antenna table.
     Uvfits,

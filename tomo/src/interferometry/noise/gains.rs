@@ -13,9 +13,9 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GainErrors {
-    /// Standard deviation of ln|g|, one number a station for the whole observation.
+    /// Standard deviation of ln|g|, dimensionless, one number a station for the whole observation.
     pub constant_amplitude: f64,
-    /// Standard deviation of ln|g|, another number a station and scan.
+    /// Standard deviation of ln|g|, dimensionless, another number a station and scan.
     pub scan_amplitude: f64,
     /// Whether arg g is random, uniform on the circle, for every station and scan, as the
     /// atmosphere makes it at millimetre wavelengths.

@@ -11,7 +11,7 @@ use core::f64::consts::PI;
 pub struct ScatteringKernel {
     /// Full width at half maximum along the major axis in µas at 1 cm.
     pub major_uas: f64,
-    /// Along the minor axis.
+    /// Along the minor axis, µas.
     pub minor_uas: f64,
     /// Position angle of the major axis in degrees east of north.
     pub position_angle_deg: f64,

@@ -34,7 +34,7 @@ pub struct Row {
     /// Standard deviation in Jy of each product's real part, and of its imaginary part; NaN where
     /// there is no such product.
     pub noise_sigma: [f64; 4],
-    /// Zenith opacities at the stations; 0 where a file does not tell.
+    /// Zenith opacities at the stations, dimensionless; 0 where a file does not tell.
     pub opacity: [f32; 2],
     /// Which of [`Observation::channels`]; 0 where there are none.
     pub channel: u16,
@@ -67,7 +67,7 @@ impl Measured {
 }
 
 impl Row {
-    /// A row of Stokes I only.
+    /// A row of Stokes I only: hours of UTC, (u, v) in wavelengths.
     pub fn total_intensity(time_h: f64, stations: [u16; 2], uv: [f64; 2], i: Measured) -> Self {
         let none = Complex64::new(0.0, 0.0);
         Row {

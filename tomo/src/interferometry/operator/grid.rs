@@ -17,6 +17,7 @@ pub struct ImageGrid {
 
 /// The shape of a pixel, normalised to a flux of 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Pulse {
     /// A point.
     Delta,

@@ -8,6 +8,7 @@ use rustfft::FftNum;
 
 /// Which Fourier transform.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Method {
     /// The sum over pixels.
     Direct,

@@ -6,6 +6,7 @@ use std::collections::HashMap;
 
 /// What kind of closure quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ClosureKind {
     /// Sums of phases around triangles, in radians.
     Phase,
@@ -31,7 +32,7 @@ pub struct Closure {
     pub legs: Vec<Leg>,
     /// Its value: radians in (−π, π], or a logarithm.
     pub value: f64,
-    /// Its standard deviation for high signal to noise: √Σ(σ/|V|)².
+    /// Its standard deviation for high signal to noise, √Σ(σ/|V|)²: radians of a phase, dimensionless of an amplitude.
     pub noise_sigma: f64,
 }
 

@@ -9,7 +9,7 @@ pub use closure::{Closure, ClosureKind, ClosureSet, Leg};
 
 use super::observation::Measured;
 
-/// Amplitude without the bias of noise: √(|V|² − σ²), 0 where |V| < σ (Rice statistics to first
+/// Amplitude in Jy without the bias of noise: √(|V|² − σ²), 0 where |V| < σ (Rice statistics to first
 /// order; Thompson, Moran & Swenson 2017, eq. 9.53 in the limit of high signal to noise).
 pub fn debiased_amplitude(measured: &Measured) -> f64 {
     (measured.visibility.norm_sqr() - measured.noise_sigma.powi(2)).max(0.0).sqrt()

@@ -5,6 +5,7 @@ use crate::Error;
 
 /// How kernels are drawn; biases start at zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Initialisation {
     /// Uniform in ±√(6/inputs) (He et al. 2015), what the BH-NeRF code trains from.
     HeUniform,

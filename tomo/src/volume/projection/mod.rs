@@ -29,11 +29,11 @@ pub const VIEWS: [View; 4] = [
 /// What is around the emission, and how much of it is in the picture; lengths in M.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surroundings {
-    /// Radius of the ball: that of the outer horizon.
+    /// Radius of the ball in M: that of the outer horizon.
     pub hole_radius: f64,
     /// Direction that matter turns about, of any length; zero draws no line.
     pub axis: [f64; 3],
-    /// Radius of the circle in the plane z = 0: that of the region that was looked at.
+    /// Radius in M of the circle in the plane z = 0: that of the region of recovery.
     pub ring_radius: f64,
     /// Half the width of the picture.
     pub half_width: f64,
