@@ -50,7 +50,6 @@ impl Region {
 /// Where nodes lie on a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
-#[non_exhaustive]
 pub enum Sampling {
     /// Gauss–Legendre panels in Mino time inside the sphere r_max, weights Σ dτ: the integral over
     /// the affine parameter.

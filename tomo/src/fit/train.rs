@@ -101,7 +101,6 @@ pub struct State<T> {
 
 /// What a step did.
 #[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
 pub enum Outcome {
     /// It moved on.
     Done(Loss),

@@ -6,7 +6,6 @@ use std::io::Cursor;
 
 /// What a preview shows.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
 pub enum Look {
     /// The intensity through a colour map.
     Intensity(Colormap, Stretch),

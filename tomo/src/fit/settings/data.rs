@@ -47,7 +47,6 @@ pub struct Loss {
 /// Kinds of data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
 pub enum LossKind {
     /// Every pixel.
     Image,

@@ -45,7 +45,6 @@ pub struct Representation {
 /// Kinds of representations.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
 pub enum Kind {
     /// Network of the pulled-back point.
     Bhnerf,

@@ -109,7 +109,6 @@ pub struct ZeroSpacing {
 
 /// What a fit is worth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-#[non_exhaustive]
 pub enum Outcome {
     /// All residuals are as expected.
     Explained,
@@ -132,7 +131,6 @@ pub struct Reason {
 
 /// What is wrong with residuals.
 #[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
 pub enum Fault {
     /// χ² is not a number.
     NotFinite,

@@ -28,7 +28,6 @@ pub struct Pixels {
 
 /// When the images of a file show the source, as far as it tells.
 #[derive(Debug, Clone, Default, PartialEq)]
-#[non_exhaustive]
 pub enum OwnTimes {
     /// It does not tell.
     #[default]
