@@ -105,13 +105,6 @@ impl Trace {
                 "--integrator rk45-affine needs an observer at a finite radius: --observer RADIUS"
             );
         }
-        let placed = self.within.is_some() || self.between.is_some();
-        if self.integrator == Integrator::Elliptic && (placed || self.momentum) {
-            bail!(
-                "--integrator elliptic gives samples equidistant in Mino time and no momenta: \
-                 leave out --within, --between and --momentum, or take another integrator"
-            );
-        }
         if self.observer.is_nan() || self.observer <= 2.0 {
             bail!(
                 "--observer {} is not allowed: `infinity` or a radius above 2 (M)",

@@ -44,10 +44,12 @@ enum {
 
 /* How rays are traced. */
 enum {
-    KERRLIGHT_TAYLOR_MINO = 0,   /* the fastest at every tolerance */
+    KERRLIGHT_TAYLOR_MINO = 0,   /* the fastest of those that step */
     KERRLIGHT_DOP853_MINO = 1,
     KERRLIGHT_RK45_MINO = 2,
-    KERRLIGHT_RK45_AFFINE = 3    /* only in libraries built with the feature `affine` */
+    KERRLIGHT_RK45_AFFINE = 3,   /* only in libraries built with the feature `affine` */
+    KERRLIGHT_ELLIPTIC = 4       /* closed form: by far the fastest for crossings and for samples
+                                    at equal Mino times; steps where it has no digits */
 };
 
 /* Where rays are sampled. */

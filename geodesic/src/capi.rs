@@ -42,7 +42,7 @@ pub struct Scene {
     pub observer_radius: f64,
     /// Tolerance in \[1e-14, 1e-2\].
     pub tolerance: f64,
-    /// 0 taylor-mino, 1 dop853-mino, 2 rk45-mino, 3 rk45-affine.
+    /// 0 taylor-mino, 1 dop853-mino, 2 rk45-mino, 3 rk45-affine, 4 elliptic.
     pub integrator: i32,
 }
 
@@ -209,10 +209,10 @@ fn placed(placement: SamplePlacement) -> Result<Placement, Failure> {
 }
 
 fn integrator(scene: Scene) -> Result<Integrator, Failure> {
-    const NAMES: [&str; 4] = ["taylor-mino", "dop853-mino", "rk45-mino", "rk45-affine"];
+    const NAMES: [&str; 5] = ["taylor-mino", "dop853-mino", "rk45-mino", "rk45-affine", "elliptic"];
     let name = usize::try_from(scene.integrator).ok().and_then(|k| NAMES.get(k));
     let found = name.and_then(|name| Integrator::named(name));
-    let allowed = "0 to 2, or 3 in a library built with the feature `affine`";
+    let allowed = "0 to 4, without 3 in a library built without the feature `affine`";
     check("integrator", f64::from(scene.integrator), found.is_some(), allowed)?;
     Ok(found.unwrap_or_default())
 }

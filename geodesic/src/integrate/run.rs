@@ -159,14 +159,19 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
             }
         }
         self.budget.direction += turn + eps * (1.0 + h);
-        if !has_azimuth(N) && !has_time(N) {
-            return;
+        if has_azimuth(N) || has_time(N) {
+            self.spend_on_quadratures(error, y, h, truncation + blur);
         }
+    }
+
+    /// Adds the errors of azimuth and delay in a step with an error of `phase`.
+    fn spend_on_quadratures(&mut self, error: &[f64; N], y: &[T; N], h: f64, phase: f64) {
+        let eps = T::EPSILON;
         // The quadratures dwell longer or shorter where the step's phase is wrong, and know
         // their slope as well as the denominator g.
         let way = T::constant(self.state.leg);
         let g = self.state.system.blur(&self.state.y, way).value().abs();
-        let dwell = (truncation + blur) / h + 4.0 * eps * g;
+        let dwell = phase / h + 4.0 * eps * g;
         let quadrature = |k: usize| {
             let (start, end) = (self.state.y[k].value(), y[k].value());
             error[k].abs() + (end - start).abs() * dwell + eps * (end.abs() + h)
@@ -177,7 +182,8 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
         if has_time(N) {
             // dI_t/ds holds a² cos²θ, and with it twice the error of cos θ.
             let [.., tilt] = self.state.system.time().map(T::value);
-            let height = u.max(self.state.y[index::U].value().abs());
+            let [start, end] = [&self.state.y, y].map(|y| y[index::U].value().abs());
+            let height = end.max(start);
             self.budget.delay += quadrature(N - 1) + 2.0 * h * tilt * height * self.budget.polar;
         }
     }

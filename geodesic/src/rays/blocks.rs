@@ -1,10 +1,13 @@
 //! Rays in blocks, on all cores where there are threads.
 
-/// Rays that one task works on.
-const BLOCK: usize = 64;
+use crate::error::{Error, check};
 
-/// `work` on blocks of rays, in their order.
+/// Rays that one task works on step by step.
+pub(crate) const BLOCK: usize = 64;
+
+/// `work` on blocks of `size` rays, in their order.
 pub(crate) fn in_blocks<T: Send>(
+    size: usize,
     alpha: &[f64],
     beta: &[f64],
     work: impl Fn(&[f64], &[f64]) -> T + Sync + Send,
@@ -12,12 +15,19 @@ pub(crate) fn in_blocks<T: Send>(
     #[cfg(feature = "rayon")]
     {
         use rayon::prelude::*;
-        let blocks = alpha.par_chunks(BLOCK).zip(beta.par_chunks(BLOCK));
+        let blocks = alpha.par_chunks(size).zip(beta.par_chunks(size));
         blocks.map(|(alpha, beta)| work(alpha, beta)).collect()
     }
     #[cfg(not(feature = "rayon"))]
     {
-        let blocks = alpha.chunks(BLOCK).zip(beta.chunks(BLOCK));
+        let blocks = alpha.chunks(size).zip(beta.chunks(size));
         blocks.map(|(alpha, beta)| work(alpha, beta)).collect()
     }
+}
+
+/// Whether there is a β for every α.
+pub(crate) fn check_columns(alpha: &[f64], beta: &[f64]) -> Result<(), Error> {
+    let same = alpha.len() == beta.len();
+    check("number of beta", beta.len() as f64, same, "as many as of alpha")?;
+    Ok(())
 }

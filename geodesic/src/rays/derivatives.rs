@@ -14,13 +14,6 @@
 //!     let (r, by) = (rays.values.crossings.radius[k], rays.crossings.radius[k]);
 //!     println!("r = {r:.6} M, dr/da = {:.6}, dr/di = {:.6} M/rad", by.spin, by.inclination);
 //! }
-//!
-//! // Without spin, seen along the axis, radii depend on √(α² + β²) alone.
-//! let hole = Kerr::new(0.0)?;
-//! let above = Observer::at_infinity(Inclination::from_degrees(0.0)?);
-//! let rays = derivatives::trace(&hole, &above, &[6.0], &[4.0], 1e-12, &Request::crossings(1))?;
-//! let by = rays.crossings.radius[0];
-//! assert!((4.0 * by.alpha - 6.0 * by.beta).abs() < 1e-9);
 //! # Ok::<(), kerrlight_geodesic::Error>(())
 //! ```
 //!
@@ -38,11 +31,11 @@ use crate::integrate::path::Path;
 use crate::integrate::trace::{Tracer, trace_series};
 use crate::integrate::uncertainty::Uncertainty;
 use crate::numbers::dual::Dual;
-use crate::rays::blocks::in_blocks;
+use crate::rays::blocks::{BLOCK, check_columns, in_blocks};
 use crate::rays::columns::RayTable;
-use crate::rays::integrator::{MinoPath, check_columns};
 use crate::rays::request::Request;
 use crate::rays::sampling::{self, Sampler, Sink, Summary};
+use crate::rays::trajectory::MinoPath;
 use crate::screen::observer::Observer;
 use crate::spacetime::kerr::Kerr;
 use crate::spacetime::point::PathPoint;
@@ -289,7 +282,7 @@ pub fn trace(
     let hole = Kerr::from_spin(Number::parameter(a, 0))?;
     let observer = observer.with_inclination(observer.inclination().parameter(1));
     let rule = sampling::rule(request);
-    let pieces = in_blocks(alpha, beta, |alpha, beta| -> Result<Differentiated, Error> {
+    let pieces = in_blocks(BLOCK, alpha, beta, |alpha, beta| -> Result<Differentiated, Error> {
         let sink = Differentiated::default();
         let mut sampler = Sampler::new(request, &hole, observer.is_at_infinity(), &rule, sink);
         let mut path = Path::empty();

@@ -1,242 +1,175 @@
-//! The integrator `elliptic`: rays in closed form, many a SIMD register ([`crate::simd`]), put
-//! into the same columns as those of every other integrator.
+//! The integrator `elliptic`: rays from blocks ([`BlockTracer`]), put into the same columns as those
+//! of every other integrator.
 
 use crate::analytic::ClosedForm;
-use crate::error::{Error, check};
-use crate::integrate::path::Outcome;
+use crate::error::Error;
 use crate::integrate::uncertainty::Uncertainty;
-use crate::rays::columns::{Points, RayTable};
+use crate::rays::block::{
+    BlockRequest, BlockTracer, PathOfRay, PlaneCrossing, RayBlock, RayVisitor, TracedRay,
+};
+use crate::rays::clock::{Clock, widen};
+use crate::rays::columns::RayTable;
 use crate::rays::request::{Placement, Request};
+use crate::rays::sampling::Sampler;
+use crate::rays::trajectory::MinoPath;
 use crate::screen::observer::{Observer, Ray};
-use crate::simd::{Crossings, LEAST_STEPS, MAX_STEP, Samples};
+use crate::simd::RaySamples;
 use crate::spacetime::kerr::Kerr;
 
-/// Traces rays and takes from them what is requested.
+/// What blocks of rays are traced for, if the closed form has all that is requested: it has no
+/// momenta, and no samples placed otherwise than by Mino time.
+pub(crate) fn in_closed_form(request: &Request) -> Option<BlockRequest> {
+    let samples = match request.samples {
+        Placement::None => Some(0),
+        Placement::MinoTime(n) => Some(n),
+        Placement::PathLength { .. } | Placement::GaussLegendre { .. } => None,
+    };
+    let samples = samples.filter(|_| !request.momentum)?;
+    Some(BlockRequest { crossings: request.crossings, samples, ..BlockRequest::default() })
+}
+
+/// Traces a block of rays.
 ///
 /// # Errors
-/// As for the kernels, or if the request is one that they do not serve: momentum, or samples
-/// placed otherwise than by Mino time.
-pub(crate) fn trace(
-    hole: &Kerr,
+/// As [`BlockTracer::trace`].
+pub(crate) fn trace_block(
+    tracer: &BlockTracer,
     observer: &Observer,
-    alpha: &[f64],
-    beta: &[f64],
+    [alpha, beta]: [&[f64]; 2],
+    wanted: &BlockRequest,
     request: &Request,
 ) -> Result<RayTable, Error> {
-    let placed = matches!(request.samples, Placement::None | Placement::MinoTime(_));
-    let allowed = "equidistant in Mino time with the integrator elliptic";
-    check("placement of samples", 0.0, placed, allowed)?;
-    check("momentum", 1.0, !request.momentum, "not with the integrator elliptic")?;
-    let rays = alpha.iter().zip(beta).map(|(alpha, beta)| observer.ray(hole, *alpha, *beta));
-    let rays = rays.collect::<Result<Vec<_>, _>>()?;
-    let mut table = RayTable::default();
-    fates(hole, &rays, &mut table);
-    table.uncertainty = vec![Uncertainty::default(); rays.len()];
-    let clocks: Vec<Clock> = rays.iter().map(|ray| Clock::new(hole, ray)).collect();
-    let job = Job { hole, observer, alpha, beta, request, clocks: &clocks };
-    crossings(&job, &mut table)?;
-    if let Placement::MinoTime(n) = request.samples {
-        samples(&job, n, &mut table)?;
-    } else {
-        rays.iter().for_each(|_| table.samples.end_ray());
-    }
-    if !request.uncertainty {
-        table.uncertainty.clear();
-    }
-    Ok(table)
+    let (hole, at_infinity) = (tracer.hole(), observer.is_at_infinity());
+    let sampler = Sampler::new(request, hole, at_infinity, &[], RayTable::default());
+    let worst = Uncertainty::default();
+    let mut table = Collector { hole, observer, alpha, beta, request, sampler, worst };
+    tracer.trace(alpha, beta, wanted, &mut RayBlock::default(), &mut table)?;
+    Ok(table.sampler.sink)
 }
 
-/// Outcomes, lengths, turning points and numbers of crossings.
-fn fates(hole: &Kerr, rays: &[Ray], table: &mut RayTable) {
-    for ray in rays {
-        let form = ClosedForm::new(hole, ray);
-        let turning = ray.potential.outer_turning_point();
-        let total = match turning {
-            Some(_) if ray.inverse_radius > 0.0 => form.time_back(),
-            _ => form.mino_total(),
-        };
-        let captured = ray.potential.captures();
-        table.outcome.push(if captured { Outcome::Captured } else { Outcome::Escaped });
-        table.mino_total.push(total);
-        table.turning_radius.push(turning.map_or(f64::NAN, |w| 1.0 / w));
-        // A ray that lies in the plane does not cross it.
-        let in_plane = ray.position[2] == 0.0 && ray.velocity[2] == 0.0;
-        let before_end = form.crossings().take_while(|crossing| crossing.mino_time <= total);
-        let count = if in_plane { 0 } else { before_end.count() };
-        table.crossing_count.push(count as u32);
-    }
-}
-
-/// Rays of one observer, and what is wanted of them.
-struct Job<'a> {
+/// Puts the rays of a block into columns.
+struct Collector<'a> {
     hole: &'a Kerr,
     observer: &'a Observer,
     alpha: &'a [f64],
     beta: &'a [f64],
     request: &'a Request,
-    clocks: &'a [Clock],
+    /// Takes what is requested from the paths of rays that were traced step by step.
+    sampler: Sampler<'a, f64, RayTable>,
+    /// The largest errors of the present ray.
+    worst: Uncertainty,
 }
 
-fn crossings(job: &Job<'_>, table: &mut RayTable) -> Result<(), Error> {
-    let Job { hole, observer, alpha, beta, request, clocks } = job;
-    let mut found = Crossings::default();
-    if request.crossings > 0 {
-        found.trace(hole, observer, alpha, beta, request.crossings)?;
+impl RayVisitor for Collector<'_> {
+    fn take_samples(&mut self, number: usize, ray: &TracedRay, samples: &RaySamples<'_>) {
+        if ray.stepped {
+            return;
+        }
+        let (n, falls) = (samples.radius.len(), !samples.escapes);
+        // The numbers of the first sample, and of the one at the ray's end, from the observer on.
+        let first = usize::from(self.observer.is_at_infinity());
+        let last = n - 1 + if falls { first } else { 2 * first };
+        let step = samples.mino_total / last.max(1) as f64;
+        let points = &mut self.sampler.sink.samples;
+        points.mino_time.extend((first..first + n).map(|j| step * j as f64));
+        points.radius.extend_from_slice(samples.radius);
+        points.theta.extend_from_slice(samples.theta);
+        if self.request.azimuth {
+            points.azimuth.extend_from_slice(samples.azimuth);
+        }
+        if self.request.time {
+            points.delay.extend_from_slice(samples.delay);
+        }
+        if self.request.weight {
+            let weight = |(j, (r, theta)): (usize, (&f64, &f64))| {
+                let end = j + first == 0 || j + first == last;
+                let share = if end { 0.5 * step } else { step };
+                share * self.hole.sigma(*r, theta.cos())
+            };
+            let places = samples.radius.iter().zip(samples.theta);
+            points.weight.extend(places.enumerate().map(weight));
+        }
+        if self.request.uncertainty {
+            self.doubt_samples(number, samples, step);
+        }
     }
-    for k in 0..alpha.len() {
-        for crossing in found.ray(k) {
-            let points = &mut table.crossings;
-            points.mino_time.push(crossing.mino_time);
-            points.radius.push(crossing.radius);
-            points.theta.push(core::f64::consts::FRAC_PI_2);
-            angles(points, request, crossing.azimuth, crossing.delay);
-            let turning = !table.turning_radius[k].is_nan();
-            let half = if turning { 0.5 * table.mino_total[k] } else { f64::INFINITY };
-            let (time, r) = (crossing.mino_time, crossing.radius);
-            let delay = clocks[k].rounding(crossing.delay, r)
-                + clocks[k].quadrature(clocks[k].step_to(time, half))
-                + crossing.error * clocks[k].reach(r);
-            widen(&mut table.uncertainty[k], crossing.error, crossing.error, delay);
+
+    fn take(
+        &mut self,
+        number: usize,
+        ray: &TracedRay,
+        crossings: &[PlaneCrossing],
+        path: Option<PathOfRay<'_>>,
+    ) -> Result<(), Error> {
+        if let Some(PathOfRay { ray, path, .. }) = path {
+            self.sampler.take(&MinoPath { path, ray }, ray.lambda);
+            // Steps lose digits of the whole next to the critical curve.
+            if let Some(total) = self.sampler.sink.mino_total.last_mut().filter(|t| !t.is_nan()) {
+                *total = whole(self.hole, ray);
+            }
+            return Ok(());
+        }
+        let photon = self.photon(number)?;
+        let turning = turning_radius(&photon);
+        if self.request.uncertainty {
+            self.doubt_crossings(&Clock::new(self.hole, &photon), ray, turning, crossings);
+        }
+        let table = &mut self.sampler.sink;
+        table.outcome.push(ray.outcome);
+        table.mino_total.push(ray.mino_total);
+        table.turning_radius.push(turning);
+        table.crossing_count.push(ray.crossing_count);
+        for crossing in crossings {
+            table.crossings.push_crossing(self.request, crossing);
         }
         table.crossings.end_ray();
-    }
-    Ok(())
-}
-
-/// The columns that are there only if they were asked for.
-fn angles(points: &mut Points, request: &Request, azimuth: f64, delay: f64) {
-    if request.azimuth {
-        points.azimuth.push(azimuth);
-    }
-    if request.time {
-        points.delay.push(delay);
-    }
-}
-
-/// Takes the error of a position and that of its delay into the estimate of a ray. A relative
-/// error of 1/r of 1 or more leaves nothing known about r and the delay.
-fn widen(worst: &mut Uncertainty, error: f64, azimuth: f64, delay: f64) {
-    let lost = if error < 1.0 { 1.0 / (1.0 - error) } else { f64::INFINITY };
-    let (radius, delay) = (error * lost, delay * lost);
-    *worst = worst.max(Uncertainty { radius, theta: error, azimuth, delay });
-}
-
-/// The error of the delay over b, by quadrature at the largest step: of the derivatives of 1/g at
-/// both ends, the largest for rays that hardly bend. Measured (docs/measurements/geodesics.md of the
-/// repository).
-const QUADRATURE: f64 = 2e-10;
-
-/// What the error of a ray's delay depends on.
-struct Clock {
-    spin: f64,
-    lambda: f64,
-    /// The ray's fastest frequency.
-    b: f64,
-    /// Radius of the observer; 0 for one at infinity, where closed forms start from 0.
-    start: f64,
-}
-
-impl Clock {
-    fn new(hole: &Kerr, ray: &Ray) -> Self {
-        let w = ray.inverse_radius;
-        let start = if w > 0.0 { 1.0 / w } else { 0.0 };
-        Clock { spin: hole.spin(), lambda: ray.lambda, b: ray.angular.max(1.0).sqrt(), start }
-    }
-
-    /// By quadrature with steps of bτ `step`: of order ten.
-    fn quadrature(&self, step: f64) -> f64 {
-        QUADRATURE * self.b * (step / MAX_STEP).powi(10)
-    }
-
-    /// The step, as a bτ, to a crossing at `time` of a ray that turns after `half`.
-    fn step_to(&self, time: f64, half: f64) -> f64 {
-        let steps = (self.b * time / MAX_STEP).ceil().max(LEAST_STEPS as f64);
-        // The outward leg mirrors the inward one: two sums, each of as many steps.
-        let outward = time > half;
-        let (inner, rest) = if outward { (2.0 * half - time, time - half) } else { (time, 0.0) };
-        self.b * inner.max(rest) / steps
-    }
-
-    /// At worst of samples a `step` of Mino time apart, whose positions have this error; without
-    /// those at the horizon, where the delay has no limit.
-    fn worst(&self, hole: &Kerr, [radii, delays]: [&[f64]; 2], step: f64, error: f64) -> f64 {
-        let horizon = hole.horizon() * (1.0 + 2e-8);
-        let fine = (self.b * step / MAX_STEP).ceil().max(1.0);
-        let quadrature = self.quadrature(self.b * step / fine);
-        let outside = radii.iter().zip(delays).filter(|(r, _)| **r > horizon);
-        let each = outside.map(|(r, delay)| self.rounding(*delay, *r) + error * self.reach(*r));
-        each.fold(0.0, f64::max) + quadrature
-    }
-
-    /// By rounding, at radius `r`.
-    fn rounding(&self, delay: f64, r: f64) -> f64 {
-        16.0 * f64::EPSILON * (delay.abs() + r + self.start + self.b)
-    }
-
-    /// By how much faster the azimuth grows at radius `r` than bτ: frame dragging.
-    fn dragging(&self, r: f64) -> f64 {
-        let (a, delta) = (self.spin, (r * (r - 2.0) + self.spin * self.spin).max(f64::EPSILON));
-        1.0 + (a * ((r * r + a * (a - self.lambda)) / delta - 1.0)).abs() / self.b
-    }
-
-    /// By how much the delay moves with a relative error of the radius: r dt/dr.
-    fn reach(&self, r: f64) -> f64 {
-        let a2 = self.spin * self.spin;
-        r * (r * r + a2) / (r * (r - 2.0) + a2).max(f64::EPSILON)
-    }
-}
-
-/// Samples equidistant in Mino time, without those at infinity: rays that fall have one of
-/// these, others two.
-fn samples(job: &Job<'_>, n: usize, table: &mut RayTable) -> Result<(), Error> {
-    let Job { hole, observer, alpha, beta, request, clocks } = job;
-    let captured = |k: &usize| table.outcome[*k] == Outcome::Captured;
-    let all = 0..alpha.len();
-    let (falling, rising): (Vec<usize>, Vec<usize>) = all.partition(captured);
-    let at_infinity = observer.is_at_infinity();
-    let trace = |rays: &[usize], ends: usize| -> Result<Samples, Error> {
-        let pick = |column: &[f64]| rays.iter().map(|k| column[*k]).collect::<Vec<_>>();
-        let mut samples = Samples::default();
-        let per_ray = if at_infinity { n + ends } else { n };
-        if !rays.is_empty() {
-            samples.trace(hole, observer, &pick(alpha), &pick(beta), per_ray.max(2))?;
-        }
-        Ok(samples)
-    };
-    let (down, up) = (trace(&falling, 1)?, trace(&rising, 2)?);
-    let (mut next_down, mut next_up) = (0, 0);
-    for k in 0..alpha.len() {
-        let falls = table.outcome[k] == Outcome::Captured;
-        let (source, next) = if falls { (&down, &mut next_down) } else { (&up, &mut next_up) };
-        let ray = source.ray(*next);
-        *next += 1;
-        let first = usize::from(at_infinity);
-        let step = ray.mino_total / (source.per_ray() - 1) as f64;
-        let span = first..first + n;
-        let points = &mut table.samples;
-        points.mino_time.extend(span.clone().map(|j| step * j as f64));
-        points.radius.extend_from_slice(&ray.radius[span.clone()]);
-        points.theta.extend_from_slice(&ray.theta[span.clone()]);
-        if request.azimuth {
-            points.azimuth.extend_from_slice(&ray.azimuth[span.clone()]);
-        }
-        if request.time {
-            points.delay.extend_from_slice(&ray.delay[span.clone()]);
-        }
-        if request.weight {
-            let last = source.per_ray() - 1;
-            points.weight.extend(span.clone().map(|j| {
-                let ends = (!at_infinity && j == 0) || (j == last && (falls || !at_infinity));
-                let share = if ends { 0.5 * step } else { step };
-                share * hole.sigma(ray.radius[j], ray.theta[j].cos())
-            }));
-        }
-        let points = [&ray.radius[span.clone()], &ray.delay[span]];
-        let delay = clocks[k].worst(hole, points, step, ray.error);
-        // A ray that falls is dragged most at its end, which its error knows.
-        let dragged = if falls { 1.0 } else { clocks[k].dragging(table.turning_radius[k]) };
-        widen(&mut table.uncertainty[k], ray.error, ray.error * dragged, delay);
         table.samples.end_ray();
+        let worst = core::mem::take(&mut self.worst);
+        table.uncertainty.extend(self.request.uncertainty.then_some(worst));
+        Ok(())
     }
-    Ok(())
+}
+
+impl Collector<'_> {
+    fn photon(&self, number: usize) -> Result<Ray, Error> {
+        self.observer.ray(self.hole, self.alpha[number], self.beta[number])
+    }
+
+    fn doubt_samples(&mut self, number: usize, samples: &RaySamples<'_>, step: f64) {
+        let Ok(photon) = self.photon(number) else { return };
+        let clock = Clock::new(self.hole, &photon);
+        let points = [samples.radius, samples.delay];
+        let delay = clock.worst(self.hole, points, step, samples.error);
+        // A ray that falls is dragged most at its end, which its error knows.
+        let dragged = if samples.escapes { clock.dragging(turning_radius(&photon)) } else { 1.0 };
+        widen(&mut self.worst, samples.error, samples.error * dragged, delay);
+    }
+
+    fn doubt_crossings(
+        &mut self,
+        clock: &Clock,
+        ray: &TracedRay,
+        turning: f64,
+        crossings: &[PlaneCrossing],
+    ) {
+        let half = if turning.is_nan() { f64::INFINITY } else { 0.5 * ray.mino_total };
+        for PlaneCrossing { mino_time, radius, delay, error, .. } in crossings {
+            let delay = clock.rounding(*delay, *radius)
+                + clock.quadrature(clock.step_to(*mino_time, half))
+                + error * clock.reach(*radius);
+            widen(&mut self.worst, *error, *error, delay);
+        }
+    }
+}
+
+/// Where a ray turns; NaN if it does not.
+fn turning_radius(photon: &Ray) -> f64 {
+    photon.potential.outer_turning_point().map_or(f64::NAN, |w| 1.0 / w)
+}
+
+/// Mino time of a whole ray.
+fn whole(hole: &Kerr, photon: &Ray) -> f64 {
+    let form = ClosedForm::new(hole, photon);
+    let returns = photon.inverse_radius > 0.0 && photon.potential.outer_turning_point().is_some();
+    if returns { form.time_back() } else { form.mino_total() }
 }

@@ -20,8 +20,7 @@ use crate::integrate::path::{Outcome, Path};
 use crate::integrate::trace::{Tracer, trace_series};
 use crate::numbers::dual::Dual;
 use crate::numbers::vector::dot;
-use crate::rays::blocks::in_blocks;
-use crate::rays::integrator::check_columns;
+use crate::rays::blocks::{BLOCK, check_columns, in_blocks};
 use crate::screen::camera::Camera;
 use crate::screen::observer::{Observer, Ray};
 use crate::spacetime::kerr::Kerr;
@@ -281,7 +280,7 @@ fn beams(
     check_columns(first, second)?;
     Tracer::new(tolerance)?;
     let hole = hole.lift();
-    let pieces = in_blocks(first, second, |first, second| -> Result<Beams, Error> {
+    let pieces = in_blocks(BLOCK, first, second, |first, second| -> Result<Beams, Error> {
         let mut beams = Beams::default();
         let mut path = Path::empty();
         for (first, second) in first.iter().zip(second) {

@@ -1,7 +1,10 @@
 //! Many rays: what is requested of them, every way to trace them, and the columns that come back.
 
+#[cfg(feature = "affine")]
+mod affine_pair;
 pub(crate) mod block;
 mod blocks;
+mod clock;
 pub(crate) mod columns;
 pub mod derivatives;
 mod elliptic_rays;
@@ -13,3 +16,5 @@ pub mod nodes;
 mod parallel;
 pub(crate) mod request;
 mod sampling;
+mod tables;
+mod trajectory;

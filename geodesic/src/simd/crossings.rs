@@ -4,7 +4,7 @@ use super::column::Column;
 use super::crossing::{Block, Target, Whole};
 use super::lanes::{InstructionSet, dispatch};
 use super::motion::Camera;
-use super::{BLOCK, checked};
+use super::{BLOCK, checked, each};
 use crate::error::{Error, check};
 use crate::screen::observer::Observer;
 use crate::spacetime::kerr::Kerr;
@@ -202,8 +202,7 @@ impl Crossings {
         [delay, radius, azimuth, mino_time, error]
     }
 
-    /// Blocks of rays, each on its own: neither the number of threads nor their order
-    /// changes a bit.
+    /// Works on blocks of rays.
     fn run(&mut self, set: InstructionSet, camera: Camera, alpha: &[f64], beta: &[f64]) {
         let count = self.per_ray;
         // The columns have that length times the number of rays.
@@ -227,12 +226,6 @@ impl Crossings {
         let work = |(alpha, beta, mut out): (&[f64], &[f64], Target<'_>)| {
             dispatch(set, Block { camera, alpha, beta, count, out: &mut out });
         };
-        #[cfg(feature = "rayon")]
-        {
-            use rayon::prelude::*;
-            blocks.into_par_iter().for_each(work);
-        }
-        #[cfg(not(feature = "rayon"))]
-        blocks.into_iter().for_each(work);
+        each(blocks, work);
     }
 }

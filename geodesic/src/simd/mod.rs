@@ -67,6 +67,18 @@ use motion::Motion;
 /// Rays that one task works on: enough for many registers, few enough for the cache.
 const BLOCK: usize = 512;
 
+/// Works on blocks of rays, each on its own: neither the number of threads nor their order changes a
+/// bit.
+fn each<B: Send>(blocks: Vec<B>, work: impl Fn(B) + Send + Sync) {
+    #[cfg(feature = "rayon")]
+    {
+        use rayon::prelude::*;
+        blocks.into_par_iter().for_each(work);
+    }
+    #[cfg(not(feature = "rayon"))]
+    blocks.into_iter().for_each(work);
+}
+
 /// The nearest observer, in M: outside every photon orbit, so that rays come from outside the
 /// barrier.
 pub(crate) const NEAREST: f64 = 5.0;

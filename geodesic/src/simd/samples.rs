@@ -4,7 +4,7 @@ use super::column::Column;
 use super::lanes::{InstructionSet, dispatch};
 use super::motion::Camera;
 use super::sample::{Block, Rays, Target};
-use super::{BLOCK, checked};
+use super::{BLOCK, checked, each};
 use crate::error::{Error, check};
 use crate::screen::observer::Observer;
 use crate::spacetime::kerr::Kerr;
@@ -185,8 +185,7 @@ impl Samples {
         Ok(())
     }
 
-    /// Blocks of rays, each on its own: neither the number of threads nor their order
-    /// changes a bit.
+    /// Works on blocks of rays.
     fn run(&mut self, set: InstructionSet, camera: Camera, alpha: &[f64], beta: &[f64]) {
         let per_ray = self.per_ray;
         let (long, short) = (BLOCK * per_ray, BLOCK);
@@ -206,12 +205,6 @@ impl Samples {
         let work = |(rays, mut out): (Rays<'_>, Target<'_>)| {
             dispatch(set, Block { rays, out: &mut out });
         };
-        #[cfg(feature = "rayon")]
-        {
-            use rayon::prelude::*;
-            blocks.into_par_iter().for_each(work);
-        }
-        #[cfg(not(feature = "rayon"))]
-        blocks.into_iter().for_each(work);
+        each(blocks, work);
     }
 }

@@ -360,3 +360,36 @@ fn code_all_integrators_agree() {
         }
     }
 }
+
+/// What the closed form does not serve is traced as with the default integrator, to the bit; and a
+/// ray next to the critical curve has its digits.
+#[test]
+fn code_elliptic_serves_every_request() {
+    let hole = Kerr::new(0.94).unwrap();
+    let inclination = Inclination::from_degrees(60.0).unwrap();
+    let far = Observer::at_radius(inclination, 100.0).unwrap();
+    let near = Observer::at_radius(inclination, 3.0).unwrap();
+    let trace = |integrator: Integrator, observer: &Observer, request: &Request| {
+        let (alpha, beta) = ([-3.0, 0.5, 1.0], [2.0, 0.5, 1.0]);
+        integrator.trace(&hole, observer, &alpha, &beta, 1e-11, request).unwrap()
+    };
+    let momentum = Request { momentum: true, ..Request::crossings(2) };
+    let length = Request::samples(Placement::PathLength { points: 9, radius: 20.0 });
+    let nodes = Request::samples(Placement::GaussLegendre { points: 9, from: 2.0, to: 20.0 });
+    let times = Request::samples(Placement::MinoTime(9));
+    for (observer, request) in [(far, momentum), (far, length), (far, nodes), (near, times)] {
+        let [closed, series] = [Integrator::Elliptic, Integrator::TaylorMino]
+            .map(|integrator| trace(integrator, &observer, &request));
+        // As text: columns have NaN where rays do not turn.
+        assert_eq!(format!("{closed:?}"), format!("{series:?}"));
+    }
+    let hole = Kerr::new(0.0).unwrap();
+    let alpha = [27f64.sqrt() * (1.0 + 1e-9)];
+    let request = Request { uncertainty: true, ..Request::crossings(3) };
+    let [closed, series] = [Integrator::Elliptic, Integrator::TaylorMino].map(|integrator| {
+        let infinity = Observer::at_infinity(inclination);
+        integrator.trace(&hole, &infinity, &alpha, &[0.0], 1e-12, &request).unwrap()
+    });
+    assert_eq!(closed.crossings, series.crossings);
+    assert_eq!(closed.uncertainty, series.uncertainty);
+}

@@ -68,7 +68,8 @@ impl Line {
         let inside = s.is_finite() && s < self.ends[0] && s > self.ends[1];
         let (_, Place { radius, azimuth, delay }) = self.place(s);
         let mino_time = self.parameter(s);
-        inside.then_some(PlaneCrossing { mino_time, radius, azimuth, delay, rates: [0.0; 2] })
+        let (rates, error) = ([0.0; 2], 0.0);
+        inside.then_some(PlaneCrossing { mino_time, radius, azimuth, delay, rates, error })
     }
 
     fn is_captured(&self) -> bool {

@@ -22,6 +22,7 @@ struct Located<'a> {
     radius: &'a [f64],
     azimuth: &'a [f64],
     delay: &'a [f64],
+    error: &'a [f64],
 }
 
 impl<'a> Located<'a> {
@@ -32,6 +33,7 @@ impl<'a> Located<'a> {
             radius: found.radius(),
             azimuth: found.azimuth(),
             delay: found.delay(),
+            error: found.error(),
         }
     }
 
@@ -44,7 +46,8 @@ impl<'a> Located<'a> {
                 break;
             }
             let (radius, azimuth, delay) = (self.radius[m], self.azimuth[m], self.delay[m]);
-            plane.push(PlaneCrossing { mino_time, radius, azimuth, delay, rates: [0.0; 2] });
+            let (rates, error) = ([0.0; 2], self.error[m]);
+            plane.push(PlaneCrossing { mino_time, radius, azimuth, delay, rates, error });
         }
     }
 }
@@ -76,7 +79,7 @@ impl BlockTracer {
             self.find_exits(observer, job, block)?;
         }
         if job.request.samples > 0 {
-            self.sample_in_closed_form(observer, job, block, visitor)?;
+            self.sample_in_closed_form(observer, job, block)?;
         }
         for (number, sphere) in job.request.nodes.iter().enumerate() {
             visitor.works_on(Work::Nodes(number));
@@ -93,7 +96,7 @@ impl BlockTracer {
         block: &mut RayBlock,
         visitor: &V,
     ) -> Result<(), Error> {
-        let BlockRequest { crossings, rates, half_orbits, paths, .. } = *job.request;
+        let BlockRequest { crossings, all_crossings, rates, half_orbits, paths, .. } = *job.request;
         let with_ray = rates || paths || half_orbits.is_some();
         let most = half_orbits.map_or(usize::MAX, |n| n as usize + 1);
         let RayBlock { rays, plane, crossings: found, .. } = block;
@@ -115,7 +118,7 @@ impl BlockTracer {
                 Inspected { eta: f64::NAN, until: f64::INFINITY, path: PathUse::None }
             };
             let surface = first_opaque(own, until, visitor);
-            let all = crossings == 0
+            let all = !all_crossings
                 || surface.is_some()
                 || own.len() >= (ends.crossings as usize).min(most);
             rays.push(TracedRay {
@@ -182,7 +185,7 @@ impl BlockTracer {
         &self,
         observer: &Observer,
         job: Job<'_>,
-        RayBlock { rays, samples, .. }: &mut RayBlock,
+        RayBlock { rays, exits, .. }: &mut RayBlock,
     ) -> Result<(), Error> {
         let leaves = |ray: &TracedRay| {
             ray.outcome == Outcome::Escaped && ray.surface.is_none() && !ray.stepped
@@ -192,9 +195,9 @@ impl BlockTracer {
             return Ok(());
         }
         let [alpha, beta] = job.pick(&outward);
-        samples.trace(&self.hole, observer, &alpha, &beta, 2)?;
+        exits.trace(&self.hole, observer, &alpha, &beta, 2)?;
         for (j, k) in outward.into_iter().enumerate() {
-            let ray = samples.ray(j);
+            let ray = exits.ray(j);
             let (sin, u) = ray.theta[1].sin_cos();
             let (y, x) = ray.azimuth[1].sin_cos();
             rays[k].exit = Some([sin * x, sin * y, u]);

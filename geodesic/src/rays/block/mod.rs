@@ -15,7 +15,7 @@ pub use tracer::{BlockTracer, RayBlock};
 pub use visitor::{PathUse, RayVisitor, Work};
 
 use crate::error::Error;
-use crate::rays::integrator::check_columns;
+use crate::rays::blocks::check_columns;
 use tracer::Job;
 
 impl BlockTracer {
@@ -59,6 +59,9 @@ impl BlockTracer {
     ) -> Result<(), Error> {
         if block.rays[k].stepped {
             return self.finish_stepped(k, job, block, visitor);
+        }
+        if let (1.., Some(observer)) = (job.request.samples, self.closed_form()) {
+            self.hand_samples(observer, (k, job.request.samples), block, visitor);
         }
         if block.rays[k].with_path {
             return self.finish_with_path(k, job, block, visitor);

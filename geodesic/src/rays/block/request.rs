@@ -5,10 +5,11 @@ use crate::simd::NodeRequest;
 /// What is to be found about the rays of a block.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BlockRequest {
-    /// How many crossings of the equatorial plane are located in closed form. A ray with more of
-    /// them, none of which is opaque, is traced step by step and has them all. 0: they are counted,
-    /// not located.
+    /// How many crossings of the equatorial plane are located. 0: they are counted, not located.
     pub crossings: usize,
+    /// Whether a ray with more crossings, the first of which are not opaque, is traced step by step
+    /// and has them all.
+    pub all_crossings: bool,
     /// The rates dw/dτ and d cos θ/dτ at crossings, and η.
     pub rates: bool,
     /// The direction in which rays escape.

@@ -5,39 +5,51 @@ use super::tracer::{BlockTracer, Job, RayBlock};
 use super::visitor::RayVisitor;
 use crate::error::Error;
 use crate::integrate::path::Outcome;
-use crate::rays::integrator::MinoPath;
 use crate::rays::sampling::{Trajectory, mino_times};
+use crate::rays::trajectory::MinoPath;
 use crate::screen::observer::{Observer, Ray};
-use crate::simd::RaySamples;
+use crate::simd::{RaySamples, Samples};
 
 impl BlockTracer {
-    /// Hands samples of the rays in closed form to the visitor. From infinity, those that fall come
-    /// first: they have one end there, others two.
-    pub(super) fn sample_in_closed_form<V: RayVisitor>(
+    /// Samples the rays in closed form. From infinity, those that fall have one end there and others
+    /// two: they are sampled apart.
+    pub(super) fn sample_in_closed_form(
         &self,
         observer: &Observer,
         job: Job<'_>,
         block: &mut RayBlock,
-        visitor: &mut V,
     ) -> Result<(), Error> {
-        let RayBlock { rays, samples, .. } = block;
-        let (n, at_infinity) = (job.request.samples, observer.is_at_infinity());
-        let mut hand = |chosen: Vec<usize>, [first, last]: [usize; 2]| -> Result<(), Error> {
+        let RayBlock { rays, falling, rising, places, .. } = block;
+        let n = job.request.samples;
+        places.clear();
+        places.resize(rays.len(), 0);
+        let mut sample = |samples: &mut Samples, chosen: Vec<usize>, ends: usize| {
+            chosen.iter().enumerate().for_each(|(place, k)| places[*k] = place);
             let [alpha, beta] = job.pick(&chosen);
-            let per_ray = (first + n + last).max(2);
-            samples.trace(&self.hole, observer, &alpha, &beta, per_ray)?;
-            for (place, k) in chosen.into_iter().enumerate() {
-                visitor.take_samples(k, &rays[k], &samples.ray(place).part(first..first + n));
-            }
-            Ok(())
+            samples.trace(&self.hole, observer, &alpha, &beta, (n + ends).max(2))
         };
         let closed = (0..rays.len()).filter(|k| !rays[*k].stepped);
-        if !at_infinity {
-            return hand(closed.collect(), [0, 0]);
+        if !observer.is_at_infinity() {
+            return sample(falling, closed.collect(), 0);
         }
-        let (falling, rising) = closed.partition(|k| rays[*k].outcome == Outcome::Captured);
-        hand(falling, [1, 0])?;
-        hand(rising, [1, 1])
+        let (down, up) = closed.partition(|k| rays[*k].outcome == Outcome::Captured);
+        sample(falling, down, 1)?;
+        sample(rising, up, 2)
+    }
+
+    /// Hands the samples of ray number `k`, which is in closed form, to the visitor.
+    pub(super) fn hand_samples<V: RayVisitor>(
+        &self,
+        observer: &Observer,
+        (k, n): (usize, usize),
+        block: &RayBlock,
+        visitor: &mut V,
+    ) {
+        let RayBlock { rays, falling, rising, places, .. } = block;
+        let first = usize::from(observer.is_at_infinity());
+        let rises = first == 1 && rays[k].outcome == Outcome::Escaped;
+        let samples = if rises { rising } else { falling }.ray(places[k]);
+        visitor.take_samples(k, &rays[k], &samples.part(first..first + n));
     }
 
     /// Hands `n` samples of the block's path to the visitor.

@@ -18,6 +18,9 @@ pub struct PlaneCrossing {
     pub delay: f64,
     /// d(1/r)/dτ and d cos θ/dτ; 0 unless requested, or for rays traced step by step.
     pub rates: [f64; 2],
+    /// An estimate of its error in closed form, relative in the radius and absolute in the azimuth; 0
+    /// for rays traced step by step, whose path knows it.
+    pub error: f64,
 }
 
 impl From<&PathPoint> for PlaneCrossing {
@@ -28,6 +31,7 @@ impl From<&PathPoint> for PlaneCrossing {
             azimuth: point.azimuth,
             delay: point.delay,
             rates: [point.inverse_radius_rate, point.velocity[2]],
+            error: 0.0,
         }
     }
 }

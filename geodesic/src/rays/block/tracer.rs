@@ -5,7 +5,7 @@ use super::traced::{PlaneCrossing, SampleColumns, TracedRay};
 use crate::analytic::ClosedForm;
 use crate::error::Error;
 use crate::integrate::path::Path;
-use crate::integrate::trace::{Method, Tracer};
+use crate::integrate::trace::Tracer;
 use crate::rays::integrator::Integrator;
 use crate::rays::nodes::NodeColumns;
 use crate::screen::observer::{Observer, Ray};
@@ -66,7 +66,13 @@ pub struct RayBlock {
     pub(super) plane: Vec<PlaneCrossing>,
     pub(super) crossings: Crossings,
     pub(super) nodes: Nodes,
-    pub(super) samples: Samples,
+    /// Ends of rays that escape.
+    pub(super) exits: Samples,
+    /// Samples of whole rays: of those that fall, or of all from a finite radius, and of the others.
+    pub(super) falling: Samples,
+    pub(super) rising: Samples,
+    /// Place of each ray among them.
+    pub(super) places: Vec<usize>,
     pub(super) path: Path,
     pub(super) columns: NodeColumns,
     pub(super) sampled: SampleColumns,
@@ -109,9 +115,9 @@ impl BlockTracer {
         tolerance: f64,
     ) -> Result<Self, Error> {
         let closed_form = integrator == Integrator::Elliptic;
-        let method = if closed_form { Some(Method::Taylor) } else { integrator.method() };
         let allowed = "an integrator in Mino time";
-        let method = method.ok_or(Error::out_of_range("integrator", f64::NAN, allowed))?;
+        let method =
+            integrator.method().ok_or(Error::out_of_range("integrator", f64::NAN, allowed))?;
         Ok(BlockTracer { hole, view, tracer: Tracer::with_method(method, tolerance)?, closed_form })
     }
 
