@@ -5,81 +5,35 @@ use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
 use anyhow::Context;
 use kerrlight_tomo::dynamics::Axis;
-use kerrlight_tomo::fit::linear::{
-    Coarse, Ending, LinearProblem, LinearProgress, LinearSettings, LinearSolution, Voxels, Weighted,
-};
+use kerrlight_tomo::fit::linear::{Ending, LinearProgress, LinearSolution};
 use kerrlight_tomo::fit::settings::{FitFile, Kind};
-use kerrlight_tomo::fit::{Data, FrameTerm, Objective, setup};
+use kerrlight_tomo::fit::{Objective, setup};
 use serde_json::{Value, json};
 use std::ops::ControlFlow;
 
-/// A fit's linear problems.
-pub struct Linear<'a> {
-    /// Settings.
-    pub file: &'a FitFile,
-}
-
-/// All terms of the data, the image first.
-pub fn terms(data: &Data<f32>) -> Vec<Weighted<'_, f32>> {
-    let image = data.image.iter().map(|w| (w.weight, &*w.term as &dyn FrameTerm<f32>));
-    let others = data.others.iter().map(|w| (w.weight, &*w.term));
-    image.chain(others).map(|(weight, term)| Weighted { weight, term }).collect()
-}
-
-impl Linear<'_> {
-    /// The grid of `nodes` along each axis that fits every `stride`-th frame best.
-    pub fn solve(
-        &self,
-        objective: &mut Objective<f32>,
-        axis: Axis,
-        nodes: usize,
-        stride: usize,
-    ) -> anyhow::Result<LinearSolution<f32>> {
-        let linear = setup::linear(self.file)?;
-        objective.model.weigh(axis);
-        let (terms, mut priors) = (terms(&objective.data), setup::priors(linear));
-        if self.file.representation.kind == Kind::LinearGrid {
-            priors.extend(self.file.priors()?);
-        }
-        let frames: Vec<usize> = objective.observed().into_iter().step_by(stride.max(1)).collect();
-        let problem = LinearProblem {
-            model: &objective.model,
-            axis,
-            frames: &frames,
-            terms: &terms,
-            voxels: Voxels::cube(nodes, self.file.region.r_max),
-            upper: linear.upper,
-            flux: linear.flux_jy,
-            priors: &priors,
-        };
-        let usual = LinearSettings::default();
-        let coarse = usual.coarse.filter(|_| nodes >= 40).map(|coarse| Coarse {
-            stride: coarse.stride.min(frames.len().div_ceil(8)).max(1),
-            ..coarse
-        });
-        let settings = LinearSettings {
-            rounds: linear.rounds,
-            iterations: linear.iterations,
-            coarse,
-            ..usual
-        };
-        let (keeper, bar) = (Keeper::brief(STOPPED), progress::waiting("linear grid"));
-        let mut watch = |now: &LinearProgress<'_>| {
-            bar.set_message(format!(
-                "round {}, {} evaluations, {} nodes, value {:.4e}",
-                now.round, now.evaluations, now.nodes, now.value
-            ));
-            bar.tick();
-            if keeper.stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        };
-        let solution =
-            problem.solve(&settings, &mut watch).map_err(failed::linear).context("linear")?;
-        bar.finish_and_clear();
-        if solution.ending == Ending::Cancelled {
-            return Err(Interrupted(STOPPED.to_owned()).into());
-        }
-        Ok(solution)
+/// The grid of `nodes` along each axis that fits every `stride`-th frame best.
+pub fn solve(
+    file: &FitFile,
+    objective: &mut Objective<f32>,
+    axis: Axis,
+    (nodes, stride): (usize, usize),
+) -> anyhow::Result<LinearSolution<f32>> {
+    let (keeper, bar) = (Keeper::brief(STOPPED), progress::waiting("linear grid"));
+    let mut watch = |now: &LinearProgress<'_>| {
+        bar.set_message(format!(
+            "round {}, {} evaluations, {} nodes, value {:.4e}",
+            now.round, now.evaluations, now.nodes, now.value
+        ));
+        bar.tick();
+        if keeper.stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let solution = setup::solve_linear(file, objective, axis, (nodes, stride), &mut watch);
+    let solution = solution.map_err(failed::linear).context("linear")?;
+    bar.finish_and_clear();
+    if solution.ending == Ending::Cancelled {
+        return Err(Interrupted(STOPPED.to_owned()).into());
     }
+    Ok(solution)
 }
 
 const STOPPED: &str = "stopped while the linear grid was being solved: nothing is kept of that";

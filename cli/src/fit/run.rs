@@ -5,7 +5,7 @@ use super::data;
 use super::failed;
 use super::folder::{self, Folder};
 use super::labels;
-use super::linear::{self, Linear};
+use super::linear;
 use super::results::{self, Estimate};
 use crate::answer::Answer;
 use crate::interrupt::{Interrupted, Keeper};
@@ -157,7 +157,6 @@ impl Run<'_> {
 
     /// The axis and the parameters that a scan and the linear problem give to begin with.
     fn start(&mut self, state: &mut State<f32>, motion: &Motion) -> anyhow::Result<()> {
-        let linear = Linear { file: self.file };
         if let AxisSearch::Scan(settings) = &self.file.axis {
             let found = axis_scan::run(self.file, self.measured, motion, settings)?;
             state.now.axis = found.axis();
@@ -169,12 +168,12 @@ impl Run<'_> {
         let trainer = &mut self.trainer;
         if self.file.representation.kind == Kind::LinearGrid {
             let nodes = self.file.representation.nodes;
-            let solution = linear.solve(&mut trainer.objective, axis, nodes, 1)?;
+            let solution = linear::solve(self.file, &mut trainer.objective, axis, (nodes, 1))?;
             self.folder.log(&linear::solved(&solution))?;
             eprintln!("{}", linear::statement(&solution));
             state.now.parameters = solution.emission;
         } else if let Start::Linear { nodes, stride, steps } = self.file.training.start {
-            let solution = linear.solve(&mut trainer.objective, axis, nodes, stride)?;
+            let solution = linear::solve(self.file, &mut trainer.objective, axis, (nodes, stride))?;
             self.folder.log(&linear::solved(&solution))?;
             setup::imprint(
                 self.file,

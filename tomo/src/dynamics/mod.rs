@@ -6,6 +6,7 @@
 //! repeats.
 
 mod angular_velocity;
+mod law;
 mod perturbed;
 mod pull_back;
 mod sphere;
@@ -13,6 +14,7 @@ mod sphere;
 mod tests;
 
 pub use angular_velocity::{AngularVelocity, Injection};
+pub use law::{Perturbed, Velocity};
 pub use perturbed::Perturbation;
 pub use pull_back::{Cotangents, Turned, pull_back, pull_back_vjp};
 pub use sphere::{Axis, ZeroAxis};

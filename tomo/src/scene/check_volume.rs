@@ -2,7 +2,7 @@
 
 use super::check::check_color;
 use super::invalid::{Invalid, brightness, number};
-use super::{Rotation, VolumeRegion, VolumeSource};
+use super::{Rotation, VolumeRegion, VolumeSource, rotation};
 
 pub(super) fn check_volume(volume: &VolumeSource, k: usize) -> Result<(), Invalid> {
     let key = |name: &str| format!("volume.{k}.{name}");
@@ -51,7 +51,7 @@ fn check_rotation(volume: &VolumeSource, key: &impl Fn(&str) -> String) -> Resul
         return Err(Invalid::missing(key("reference_time"), why));
     }
     let Rotation::Law(law) = &volume.rotation else { return Ok(()) };
-    law.check(&key("rotation"))
+    rotation::check(law, &key("rotation"))
 }
 
 fn check_region(volume: &VolumeSource, key: &impl Fn(&str) -> String) -> Result<(), Invalid> {

@@ -2,7 +2,7 @@
 
 use super::invalid::{Invalid, number};
 use crate::Error;
-use crate::dynamics::{AngularVelocity, Axis, Perturbation};
+use crate::dynamics::{AngularVelocity, Axis, Velocity};
 use kerrlight_geodesic::Kerr;
 use serde::de::value::{MapAccessDeserializer, StrDeserializer};
 use serde::de::{MapAccess, Visitor};
@@ -18,52 +18,6 @@ pub enum Rotation {
     Keplerian,
     /// A law with numbers.
     Law(Velocity),
-}
-
-/// Laws of the angular velocity, with the names and numbers that fits have.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-#[non_exhaustive]
-pub enum Velocity {
-    /// 1/(r^{3/2} + drag).
-    Keplerian {
-        /// The spin, for orbits about it.
-        drag: f64,
-    },
-    /// rate (radius/r)^exponent.
-    PowerLaw {
-        /// Where the rate is reached, M.
-        radius: f64,
-        /// Radians per M.
-        rate: f64,
-        /// 1.5: Keplerian without spin, 0: like a rigid body.
-        exponent: f64,
-    },
-    /// Linear between these, held beyond the first and the last.
-    Table {
-        /// Growing, M.
-        radii: Vec<f64>,
-        /// Radians per M.
-        rates: Vec<f64>,
-    },
-    /// Another law, and a Gaussian process over the radius.
-    Perturbed(Perturbed),
-}
-
-/// A law and a Gaussian process over the radius, which is drawn from a seed.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Perturbed {
-    /// The law without it.
-    pub of: Box<Velocity>,
-    /// Its standard deviation, radians per M.
-    pub deviation: f64,
-    /// Its correlation length, M.
-    pub correlation_length: f64,
-    /// The first and the last radius of its table of 100 rows, M.
-    pub radii: [f64; 2],
-    /// What it is drawn from.
-    pub seed: u64,
 }
 
 /// Rotations that are a word.
@@ -110,7 +64,11 @@ impl<'de> Visitor<'de> for WordOrLaw {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Rotation, A::Error> {
-        Velocity::deserialize(MapAccessDeserializer::new(map)).map(Rotation::Law)
+        let law = Velocity::deserialize(MapAccessDeserializer::new(map))?;
+        if !law.has_seeds() {
+            return Err(serde::de::Error::missing_field("seed"));
+        }
+        Ok(Rotation::Law(law))
     }
 }
 
@@ -125,61 +83,40 @@ impl Rotation {
             Rotation::Keplerian => {
                 Ok(Some(AngularVelocity::Keplerian { drag: hole.spin() * axis.vector()[2] }))
             }
-            Rotation::Law(law) => law.angular().map(Some),
+            // Its perturbations have seeds of their own.
+            Rotation::Law(law) => law.angular(0).map(Some),
         }
     }
 }
 
-impl Velocity {
-    /// Ω(r).
-    ///
-    /// # Errors
-    /// Names the number that is out of its range.
-    pub fn angular(&self) -> Result<AngularVelocity, Error> {
-        match self.clone() {
-            Velocity::Keplerian { drag } => AngularVelocity::Keplerian { drag },
-            Velocity::PowerLaw { radius, rate, exponent } => {
-                AngularVelocity::PowerLaw { radius, rate, exponent }
-            }
-            Velocity::Table { radii, rates } => AngularVelocity::Table { radii, rates },
-            Velocity::Perturbed(by) => {
-                let Perturbed { of, deviation, correlation_length, radii, seed } = by;
-                let by = Perturbation { deviation, correlation_length, radii, rows: 100 };
-                of.angular()?.perturbed(by, seed)?
-            }
+/// Ranges that a scene keeps to; `key` is that of the law.
+pub(super) fn check(law: &Velocity, key: &str) -> Result<(), Invalid> {
+    let name = |name: &str| format!("{key}.{name}");
+    match law {
+        Velocity::Keplerian { drag } => {
+            let ok = drag.abs() <= 1e3;
+            number(name("keplerian.drag"), *drag, ok, "a number in [-1000, 1000]")
         }
-        .checked()
-    }
-
-    /// Ranges that a scene keeps to; `key` is that of the law.
-    pub(super) fn check(&self, key: &str) -> Result<(), Invalid> {
-        let name = |name: &str| format!("{key}.{name}");
-        match self {
-            Velocity::Keplerian { drag } => {
-                let ok = drag.abs() <= 1e3;
-                number(name("keplerian.drag"), *drag, ok, "a number in [-1000, 1000]")
-            }
-            Velocity::PowerLaw { radius, rate, exponent } => {
-                let ok = (1e-6..=1e6).contains(radius);
-                number(name("power-law.radius"), *radius, ok, "a radius in [1e-6, 1e6] (M)")?;
-                rate_in_range(name("power-law.rate"), *rate)?;
-                let ok = (-10.0..=10.0).contains(exponent);
-                number(name("power-law.exponent"), *exponent, ok, "a number in [-10, 10]")
-            }
-            Velocity::Table { rates, .. } => {
-                rates.iter().try_for_each(|rate| rate_in_range(name("table.rates"), *rate))?;
-                self.ranges(&name("table"))
-            }
-            Velocity::Perturbed(by) => {
-                by.of.check(&name("perturbed.of"))?;
-                self.ranges(&name("perturbed"))
-            }
+        Velocity::PowerLaw { radius, rate, exponent } => {
+            let ok = (1e-6..=1e6).contains(radius);
+            number(name("power-law.radius"), *radius, ok, "a radius in [1e-6, 1e6] (M)")?;
+            rate_in_range(name("power-law.rate"), *rate)?;
+            let ok = (-10.0..=10.0).contains(exponent);
+            number(name("power-law.exponent"), *exponent, ok, "a number in [-10, 10]")
+        }
+        Velocity::Table { rates, .. } => {
+            rates.iter().try_for_each(|rate| rate_in_range(name("table.rates"), *rate))?;
+            ranges(law, &name("table"))
+        }
+        Velocity::Perturbed(by) => {
+            check(&by.of, &name("perturbed.of"))?;
+            ranges(law, &name("perturbed"))
         }
     }
+}
 
-    fn ranges(&self, key: &str) -> Result<(), Invalid> {
-        self.angular().map(drop).map_err(|error| Invalid::of(&format!("{key}."), &error))
-    }
+fn ranges(law: &Velocity, key: &str) -> Result<(), Invalid> {
+    law.angular(0).map(drop).map_err(|error| Invalid::of(&format!("{key}."), &error))
 }
 
 fn rate_in_range(key: String, rate: f64) -> Result<(), Invalid> {

@@ -21,7 +21,7 @@ pub use recovery::{
     AxisScan, AxisSearch, Kind, Linear, Occupancy, Optimiser, Representation, Start, Training,
 };
 pub use simulation::{GlyphShape, Movie, Noise, Observation, Spot, Truth};
-pub use view::{Absorption, Effects, Hole, Motion, Observer, Region, Screen, Velocity, WidthOf};
+pub use view::{Absorption, Effects, Hole, Motion, Observer, Region, Screen, WidthOf};
 pub use world::merge;
 
 use crate::Error;

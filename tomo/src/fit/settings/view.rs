@@ -1,5 +1,6 @@
 //! The hole, the view of it, what happens to light, and how matter turns.
 
+use crate::dynamics::Velocity;
 use crate::fit::{Region as Limits, Sampling};
 use serde::{Deserialize, Serialize};
 
@@ -119,43 +120,4 @@ pub struct Motion {
     /// Time at which it begins to shine, M.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub injection_time: Option<f64>,
-}
-
-/// Angular velocity.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-#[non_exhaustive]
-pub enum Velocity {
-    /// 1/(r^{3/2} + drag).
-    Keplerian {
-        /// The spin, for orbits about it.
-        drag: f64,
-    },
-    /// rate · (radius/r)^exponent.
-    PowerLaw {
-        /// M.
-        radius: f64,
-        /// Radians a unit of time.
-        rate: f64,
-        /// 1.5 without spin.
-        exponent: f64,
-    },
-    /// Linear between these.
-    Table {
-        /// Growing, M.
-        radii: Vec<f64>,
-        /// Radians a unit of time.
-        rates: Vec<f64>,
-    },
-    /// Another velocity, and a Gaussian process over the radius that is drawn from the fit's seed.
-    Perturbed {
-        /// The velocity without it.
-        of: Box<Velocity>,
-        /// Its standard deviation, radians a unit of time.
-        deviation: f64,
-        /// Its correlation length, M.
-        correlation_length: f64,
-        /// The first and the last radius of its table of 100 rows, M.
-        radii: [f64; 2],
-    },
 }

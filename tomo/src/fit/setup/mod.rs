@@ -1,17 +1,21 @@
 //! From settings to the parts of a fit: sight lines, motion, data with their losses, the representation and its training.
 
+mod coarse_view;
 mod glyph;
 mod imprint;
 mod instrument;
 mod learning;
+mod linear_problem;
 mod losses;
 mod measured;
 mod truth;
 mod visibilities;
 
+pub use coarse_view::CoarseView;
 pub use imprint::imprint;
 pub use instrument::Instrument;
 pub use learning::{caution, check, representation, training};
+pub use linear_problem::solve_linear;
 pub use losses::forward_model;
 pub use measured::Measured;
 pub use truth::Truth;
@@ -21,12 +25,11 @@ use super::linear::Prior;
 use super::settings::{
     AxisScan, AxisSearch, FitError, FitFile, Linear, Observer as ObserverSettings, Screen,
 };
-use super::settings::{Velocity, WidthOf, Within};
+use super::settings::{WidthOf, Within};
 use super::{Motion, Regulariser};
 use crate::dynamics::{Axis, Injection};
 use crate::interferometry::operator::ImageGrid;
 use crate::optimise::Polynomial;
-use crate::scene;
 use crate::units::{MICROARCSECOND, gravitational_angle, gravitational_time};
 use kerrlight_geodesic::{Inclination, Observer};
 
@@ -144,29 +147,13 @@ pub fn priors(linear: &Linear) -> Vec<Prior> {
 /// # Errors
 /// If the velocity is out of range.
 pub fn motion(file: &FitFile, times: Vec<f64>) -> Result<Motion> {
-    let velocity = law(&file.motion.velocity, file.seed).angular().within("motion.velocity")?;
+    let velocity = file.motion.velocity.angular(file.seed).within("motion.velocity")?;
     Ok(Motion {
         velocity,
         reference: file.motion.reference_time,
         injection: file.motion.injection_time.map(|time| Injection { time }),
         times,
     })
-}
-
-/// The law of the velocity, as scenes have it; what is drawn is drawn from `seed`.
-pub fn law(chosen: &Velocity, seed: u64) -> scene::Velocity {
-    match chosen.clone() {
-        Velocity::Keplerian { drag } => scene::Velocity::Keplerian { drag },
-        Velocity::PowerLaw { radius, rate, exponent } => {
-            scene::Velocity::PowerLaw { radius, rate, exponent }
-        }
-        Velocity::Table { radii, rates } => scene::Velocity::Table { radii, rates },
-        Velocity::Perturbed { of, deviation, correlation_length, radii } => {
-            let of = Box::new(law(&of, seed));
-            let by = scene::Perturbed { of, deviation, correlation_length, radii, seed };
-            scene::Velocity::Perturbed(by)
-        }
-    }
 }
 
 /// The true or known axis.

@@ -1,0 +1,116 @@
+//! What a scan of axes looks through: fewer pixels and nodes.
+
+use super::linear_problem::terms;
+use super::{Instrument, Measured, Result, forward_model, linear, priors, sky, spacing};
+use crate::fit::scan::AxisProblem;
+use crate::fit::settings::{FitFile, LossKind, Region, Screen, WidthOf};
+use crate::fit::{Motion, Objective, Sampling};
+
+/// What a fit is seen through by a scan.
+pub struct CoarseView {
+    file: FitFile,
+    instrument: Instrument,
+    measured: Measured,
+}
+
+impl CoarseView {
+    /// The same view with fewer pixels, and as many fewer nodes on rays. Images are known at every n-th
+    /// pixel; visibilities are explained by pixels n times as wide. A loss that has both is seen through
+    /// all pixels, as is one of few.
+    ///
+    /// # Errors
+    /// As [`Instrument::new`].
+    pub fn new(file: &FitFile, measured: &Measured, pixels: usize) -> Result<Self> {
+        let images = file.loss.iter().filter(|loss| loss.data == LossKind::Image).count();
+        let screen = &file.screen;
+        let every = screen.pixels / pixels.max(2);
+        if every < 2 || (images > 0 && images < file.loss.len()) {
+            let instrument = Instrument::new(file)?;
+            return Ok(Self { file: file.clone(), instrument, measured: measured.without_truth() });
+        }
+        if images > 0 {
+            Self::thinned(file, measured, every)
+        } else {
+            Self::wide(file, measured, pixels)
+        }
+    }
+
+    /// Every n-th row and column of images.
+    fn thinned(file: &FitFile, measured: &Measured, every: usize) -> Result<Self> {
+        let n = file.screen.pixels;
+        let places: Vec<usize> = (every / 2..n).step_by(every).collect();
+        let kept: Vec<usize> = places
+            .iter()
+            .flat_map(|row| places.iter().map(move |column| row * n + column))
+            .collect();
+        let region = fewer_nodes(file, every);
+        let file = FitFile { region, ..file.clone() };
+        let instrument = Instrument::of(&file, &kept)?;
+        let thin = |movie: &Vec<f64>| -> Vec<f64> {
+            movie.chunks(n * n).flat_map(|frame| kept.iter().map(|k| frame[*k])).collect()
+        };
+        let measured =
+            Measured { movie: measured.movie.as_ref().map(thin), ..measured.without_truth() };
+        let screen = Screen { pixels: places.len(), ..file.screen.clone() };
+        Ok(Self { file: FitFile { screen, ..file }, instrument, measured })
+    }
+
+    /// Wider pixels over the same field.
+    fn wide(file: &FitFile, measured: &Measured, pixels: usize) -> Result<Self> {
+        let n = file.screen.pixels as f64;
+        let screen = Screen {
+            pixels,
+            width: spacing(&file.screen)? * n,
+            width_of: WidthOf::Edges,
+            jy_per_pixel: file.screen.jy_per_pixel * (n / pixels as f64).powi(2),
+            ..file.screen.clone()
+        };
+        let region = fewer_nodes(file, file.screen.pixels / pixels);
+        let file = FitFile { screen, region, ..file.clone() };
+        let instrument = Instrument::new(&file)?;
+        let measured = Measured { sky: sky(&file).ok(), ..measured.without_truth() };
+        Ok(Self { file, instrument, measured })
+    }
+
+    /// Hands the linear problem of all axes, through about so many frames, to a search.
+    ///
+    /// # Errors
+    /// If a setting is missing or out of range, or those of the search.
+    pub fn search<R>(
+        &self,
+        motion: &Motion,
+        frames: usize,
+        search: impl FnOnce(&AxisProblem<'_, f32>) -> Result<R>,
+    ) -> Result<R> {
+        let file = &self.file;
+        let settings = linear(file)?;
+        let model = forward_model(&self.instrument, motion)?;
+        let count = file.screen.pixels * file.screen.pixels;
+        let objective = Objective { model, data: self.measured.terms(&file.loss, count)? };
+        let all = objective.observed();
+        let chosen: Vec<usize> = all.iter().copied().step_by((all.len() / frames).max(1)).collect();
+        search(&AxisProblem {
+            model: &objective.model,
+            frames: &chosen,
+            terms: &terms(&objective.data),
+            half_width: file.region.r_max,
+            upper: settings.upper,
+            flux: settings.flux_jy,
+            priors: &priors(settings),
+        })
+    }
+}
+
+/// The fewest equidistant nodes that a ray is thinned to: a node for each of the grid's voxels that it crosses.
+const FEWEST: usize = 32;
+
+/// The region with every n-th node, or panels of half as many.
+fn fewer_nodes(file: &FitFile, every: usize) -> Region {
+    let nodes = match file.region.nodes {
+        Sampling::Gauss { order, split } => Sampling::Gauss { order: order.div_ceil(2), split },
+        Sampling::EqualMinoTime { per_ray } => {
+            Sampling::EqualMinoTime { per_ray: per_ray.min(FEWEST.max(per_ray / every)) }
+        }
+    };
+    Region { nodes, ..file.region.clone() }
+}

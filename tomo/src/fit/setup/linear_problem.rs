@@ -1,0 +1,56 @@
+//! The linear problem of a fit: the grid that fits its data best about a known axis.
+
+use super::{Result, linear, priors};
+use crate::dynamics::Axis;
+use crate::fit::linear::{
+    Coarse, LinearProblem, LinearSettings, LinearSolution, Voxels, Watch, Weighted,
+};
+use crate::fit::settings::{FitFile, Kind};
+use crate::fit::{Data, FrameTerm, Objective};
+
+/// Nodes along an axis from which on a coarser grid is solved first.
+const FINE: usize = 40;
+
+/// All terms of the data, the image first.
+pub(super) fn terms(data: &Data<f32>) -> Vec<Weighted<'_, f32>> {
+    let image = data.image.iter().map(|w| (w.weight, &*w.term as &dyn FrameTerm<f32>));
+    let others = data.others.iter().map(|w| (w.weight, &*w.term));
+    image.chain(others).map(|(weight, term)| Weighted { weight, term }).collect()
+}
+
+/// The grid of `nodes` along each axis that fits every `stride`-th frame best.
+///
+/// # Errors
+/// If a setting is missing or out of range, or the problem has no solution.
+pub fn solve_linear(
+    file: &FitFile,
+    objective: &mut Objective<f32>,
+    axis: Axis,
+    (nodes, stride): (usize, usize),
+    watch: &mut Watch<'_>,
+) -> Result<LinearSolution<f32>> {
+    let settings = linear(file)?;
+    objective.model.weigh(axis);
+    let mut priors = priors(settings);
+    if file.representation.kind == Kind::LinearGrid {
+        priors.extend(file.priors()?);
+    }
+    let frames: Vec<usize> = objective.observed().into_iter().step_by(stride.max(1)).collect();
+    let problem = LinearProblem {
+        model: &objective.model,
+        axis,
+        frames: &frames,
+        terms: &terms(&objective.data),
+        voxels: Voxels::cube(nodes, file.region.r_max),
+        upper: settings.upper,
+        flux: settings.flux_jy,
+        priors: &priors,
+    };
+    let usual = LinearSettings::default();
+    let coarse = usual.coarse.filter(|_| nodes >= FINE).map(|coarse| Coarse {
+        stride: coarse.stride.min(frames.len().div_ceil(8)).max(1),
+        ..coarse
+    });
+    let (rounds, iterations) = (settings.rounds, settings.iterations);
+    problem.solve(&LinearSettings { rounds, iterations, coarse, ..usual }, watch)
+}
