@@ -78,9 +78,8 @@ pub fn parse(text: &str) -> Result<Observation, Error> {
             continue;
         }
         let Some(heading) = &heading else {
-            return Err(
-                located(format!("data before a line that names {}", COLUMNS.join(", "))).into()
-            );
+            let why = format!("data before a line that names {}", COLUMNS.join(", "));
+            return Err(located(why).into());
         };
         let Some(row) = row(&cells(line), heading, &mut names).map_err(located)? else {
             left_out += 1;
@@ -92,9 +91,8 @@ pub fn parse(text: &str) -> Result<Observation, Error> {
         observation.rows.push(row);
     }
     if heading.is_none() {
-        return Err(
-            FileError::whole(format!("no line names the columns {}", COLUMNS.join(", "))).into()
-        );
+        let why = format!("no line names the columns {}", COLUMNS.join(", "));
+        return Err(FileError::whole(why).into());
     }
     if observation.rows.is_empty() {
         return Err(FileError::whole("no visibilities").into());

@@ -192,16 +192,7 @@ impl Adaptive<'_> {
                         unresolved: 0,
                     });
                 }
-                pixels.push(Pixel {
-                    intensity: center.intensity,
-                    rgb: center.rgb,
-                    stokes: center.stokes,
-                    center,
-                    unresolved: u32::from(center.fate == Fate::Unresolved),
-                    rays: 1,
-                    error,
-                    known: 1.0,
-                });
+                pixels.push(of_one_ray(center, error));
             }
         }
         Ok((pixels, cuts))
@@ -243,4 +234,18 @@ fn estimate<'a>(at: impl Fn(isize, isize) -> &'a Light) -> Estimate {
         error = error.max(HIDDEN * bright);
     }
     Estimate { error, contrast, bright }
+}
+
+/// A pixel that one ray stands for.
+fn of_one_ray(center: RayResult, error: f64) -> Pixel {
+    Pixel {
+        intensity: center.intensity,
+        rgb: center.rgb,
+        stokes: center.stokes,
+        center,
+        unresolved: u32::from(center.fate == Fate::Unresolved),
+        rays: 1,
+        error,
+        known: 1.0,
+    }
 }
