@@ -95,6 +95,30 @@ impl Points {
 }
 
 /// Traced rays in columns: the same from every [`Integrator`](crate::Integrator).
+///
+/// Ray k has `outcome[k]`, `mino_total[k]` and so on; its crossings and samples are the points
+/// `crossings.of(k)` and `samples.of(k)` of the columns in [`Points`]. A column that the
+/// [`Request`] does not ask for is empty. 100 000 rays with one crossing take about 10 MB.
+///
+/// ```
+/// use kerrlight_geodesic::{Inclination, Integrator, Kerr, Observer, Outcome, Request};
+///
+/// let hole = Kerr::new(0.0)?;
+/// let observer = Observer::at_infinity(Inclination::from_degrees(0.0)?);
+/// let (alpha, beta) = ([6.0, 3.0, 8.0], [0.0, 4.0, 0.0]);
+/// let request = Request::crossings(1);
+/// let rays = Integrator::Elliptic.trace(&hole, &observer, &alpha, &beta, 1e-12, &request)?;
+///
+/// assert_eq!(rays.len(), 3);
+/// assert_eq!(rays.outcome, [Outcome::Escaped, Outcome::Captured, Outcome::Escaped]);
+/// // Without spin a ray turns where b² = r³/(r − 2).
+/// let r = rays.turning_radius[2];
+/// assert!((r.powi(3) / (r - 2.0) - 64.0).abs() < 1e-10);
+/// let hits: Vec<f64> = rays.crossings.of(0).map(|k| rays.crossings.radius[k]).collect();
+/// assert!(hits.len() == 1 && hits[0] > 4.0 && hits[0] < 6.0);
+/// assert!(rays.samples.radius.is_empty()); // not requested
+/// # Ok::<(), kerrlight_geodesic::Error>(())
+/// ```
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RayTable {
     /// What became of each ray.

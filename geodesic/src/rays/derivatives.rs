@@ -14,6 +14,13 @@
 //!     let (r, by) = (rays.values.crossings.radius[k], rays.crossings.radius[k]);
 //!     println!("r = {r:.6} M, dr/da = {:.6}, dr/di = {:.6} M/rad", by.spin, by.inclination);
 //! }
+//!
+//! // Without spin, seen along the axis, radii depend on √(α² + β²) alone.
+//! let hole = Kerr::new(0.0)?;
+//! let above = Observer::at_infinity(Inclination::from_degrees(0.0)?);
+//! let rays = derivatives::trace(&hole, &above, &[6.0], &[4.0], 1e-12, &Request::crossings(1))?;
+//! let by = rays.crossings.radius[0];
+//! assert!((4.0 * by.alpha - 6.0 * by.beta).abs() < 1e-9);
 //! # Ok::<(), kerrlight_geodesic::Error>(())
 //! ```
 //!

@@ -109,6 +109,23 @@ impl<T: Elementary> Inclination<T> {
 /// λ = L/E = −α sin i, η = Q/E² = (α² − a²) cos²i + β², and p^θ at the observer has the
 /// sign of β (Bardeen 1973). At a finite radius (α, β) stay what they are at infinity:
 /// labels of the constants of motion, not angles of a local frame.
+///
+/// Use it for images as a distant astronomer sees them. [`Camera`](crate::Camera) has the local frame,
+/// lens and motion of someone near the hole, and [`View`](crate::View) is either of the two.
+///
+/// ```
+/// use kerrlight_geodesic::{Inclination, Kerr, Observer};
+///
+/// let observer = Observer::at_infinity(Inclination::from_degrees(30.0)?);
+/// assert!((observer.lambda(-4.0) - 2.0).abs() < 1e-15); // λ = −α sin i, in M
+///
+/// // Nearby, some photons turn back before they arrive.
+/// let hole = Kerr::new(0.5)?;
+/// let near = Observer::at_radius(Inclination::from_degrees(30.0)?, 10.0)?;
+/// assert!(near.ray(&hole, 5.0, 0.0).is_ok());
+/// assert_eq!(near.ray(&hole, 50.0, 0.0).unwrap_err().field(), "observer radius");
+/// # Ok::<(), kerrlight_geodesic::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observer<T: Elementary = f64> {
     inclination: Inclination<T>,

@@ -6,7 +6,26 @@ use crate::screen::camera::Camera;
 use crate::screen::observer::{Observer, Ray};
 use crate::spacetime::kerr::Kerr;
 
-/// Where a picture is taken from.
+/// Where a picture is taken from: a distant observer's screen or a camera near the hole.
+///
+/// Code that renders or traces takes a `View` and need not know which of the two it has: points
+/// are (x, y), and [`blueshift`](Self::blueshift) tells what a camera's motion and depth in the
+/// potential do to the light that it receives.
+///
+/// ```
+/// use kerrlight_geodesic::{Camera, Inclination, Kerr, Motion, Observer, View};
+///
+/// let hole = Kerr::new(0.0)?;
+/// let inclination = Inclination::from_degrees(90.0)?;
+/// let screen = View::Screen(Observer::at_infinity(inclination));
+/// assert_eq!(screen.blueshift(3.0, 4.0), None);
+///
+/// // At rest at 8 M light arrives blueshifted by 1/√(1 − 2/r), from every direction.
+/// let camera = View::Camera(Camera::new(&hole, inclination, 8.0, Motion::Static)?);
+/// let blueshift = camera.blueshift(0.2, -0.1).unwrap();
+/// assert!((blueshift - 0.75f64.sqrt().recip()).abs() < 1e-14);
+/// # Ok::<(), kerrlight_geodesic::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum View {
     /// Bardeen's screen: points are (α, β) in M, and frequencies are those at infinity.

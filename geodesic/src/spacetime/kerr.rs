@@ -5,8 +5,22 @@ use crate::error::{Error, check};
 use crate::numbers::dual::Dual;
 use crate::numbers::scalar::Elementary;
 
-/// A Kerr black hole in units G = c = M = 1; `T` is `f64`, or one of the numbers that carry
-/// derivatives or more digits ([`Kerr::from_spin`]).
+/// A Kerr black hole in units G = c = M = 1: its spin, and the radii of its horizons.
+///
+/// Everything else in the crate takes a hole by reference; it is `Copy`, and making one costs a square
+/// root. `T` is `f64`, or one of the numbers that carry derivatives or more digits
+/// ([`Kerr::from_spin`]). Radii of orbits are functions of a hole in [`orbits`](crate::orbits).
+///
+/// ```
+/// use kerrlight_geodesic::{Kerr, orbits};
+///
+/// let hole = Kerr::new(0.6)?;
+/// assert!((hole.horizon() - 1.8).abs() < 1e-15); // 1 + √(1 − a²), in M
+/// assert!((hole.inner_horizon() - 0.2).abs() < 1e-15);
+/// assert_eq!(orbits::isco(&Kerr::new(0.0)?), 6.0);
+/// assert!(Kerr::new(f64::NAN).is_err());
+/// # Ok::<(), kerrlight_geodesic::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Kerr<T = f64> {
     spin: T,

@@ -2,6 +2,43 @@
 //!
 //! [`Sightlines`] (traced once) → [`ForwardModel`] (with the motion, once) → [`Batch`] (pulled back) →
 //! representation → pixels → data terms → gradient.
+//!
+//! [`settings::FitFile`] and [`setup`] make all of these from a fit file; the pieces also stand alone,
+//! for data terms, motions or optimisers of your own. Lengths and times are in M, fluxes in Jy.
+//!
+//! ```
+//! use kerrlight_geodesic::{Inclination, Kerr, Observer};
+//! use kerrlight_tomo::dynamics::{AngularVelocity, Axis};
+//! use kerrlight_tomo::fit::{
+//!     Batch, ForwardModel, Motion, Region, Sampling, SightlineRequest, Sightlines,
+//! };
+//!
+//! let hole = Kerr::new(0.0)?;
+//! let observer = Observer::at_infinity(Inclination::from_degrees(0.0)?);
+//! // One ray that grazes the region, one that misses it: impact parameters 6 M and 40 M.
+//! let request = SightlineRequest {
+//!     region: Region { r_min: 5.0, r_max: 10.0, z_width: f64::INFINITY },
+//!     sampling: Sampling::Gauss { order: 8, split: 1 },
+//!     delay: false,
+//!     momentum: false,
+//! };
+//! let lines = Sightlines::trace(&hole, &observer, &[6.0, 40.0], &[0.0, 0.0], &request)?;
+//! assert_eq!((lines.pixels, lines.rays()), (2, 1));
+//!
+//! // Emission that does not depend on the azimuth looks the same however it turns about the axis.
+//! let motion = Motion {
+//!     velocity: AngularVelocity::bhnerf(),
+//!     reference: 0.0,
+//!     injection: None,
+//!     times: vec![0.0, 30.0],
+//! };
+//! let model = ForwardModel::<f64>::new(&lines, &motion, &hole, None)?;
+//! let ring = |[x, y, _]: [f64; 3]| (-(x.hypot(y) - 7.0).powi(2)).exp();
+//! let movie = model.movie_of(Axis::new([0.0, 0.0, 1.0])?, &ring, &mut Batch::default());
+//! let [first, miss, last, _] = movie[..] else { panic!("two frames of two pixels") };
+//! assert!(first > 0.0 && miss == 0.0 && (first - last).abs() < 1e-12 * first);
+//! # Ok::<(), kerrlight_tomo::Error>(())
+//! ```
 
 mod batch;
 pub mod checkpoint;

@@ -131,6 +131,33 @@ fn hand_sigmas(first: [f64; 2], second: [f64; 2], setup: &Setup) -> [f64; 4] {
 /// The observation that a schedule makes: every baseline at every scan at which both of its
 /// stations see the source, with visibilities of zero and the thermal errors of RR, LL, RL, LR.
 ///
+/// [`simulate::fill`](super::simulate::fill) then sets the visibilities to those of a movie, and
+/// [`noise`](super::noise) spoils them.
+///
+/// ```
+/// use kerrlight_tomo::interferometry::array::built_in;
+/// use kerrlight_tomo::interferometry::earth::{Frame, SourcePosition, Ut1};
+/// use kerrlight_tomo::interferometry::schedule::{Clock, Schedule, Setup, observe};
+///
+/// let array = built_in("EHT2017").unwrap();
+/// let schedule =
+///     Schedule { mjd: 57854, clock: Clock::Utc, start_h: 0.0, stop_h: 12.0, scans: 12 };
+/// let setup = Setup {
+///     frequency_hz: 230e9,
+///     bandwidth_hz: 2e9,
+///     integration_s: 10.0,
+///     elevation_deg: [10.0, 85.0],
+///     ut1: Ut1::Table,
+///     frame: Frame::OfDate,
+/// };
+/// let observation = observe(&array, SourcePosition::M87, &schedule, &setup)?;
+/// // No baseline is longer than the Earth's diameter, in wavelengths of 1.3 mm.
+/// let longest = 2.0 * 6.4e6 / (299_792_458.0 / 230e9);
+/// assert!(!observation.rows.is_empty());
+/// assert!(observation.rows.iter().all(|row| row.uv[0].hypot(row.uv[1]) < longest));
+/// # Ok::<(), kerrlight_tomo::Error>(())
+/// ```
+///
 /// # Errors
 /// If a value is out of range, or a station's position or SEFD not known.
 pub fn observe(

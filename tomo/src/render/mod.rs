@@ -223,6 +223,35 @@ pub struct Rendered {
 
 /// Renders a picture that fits into memory.
 ///
+/// `assets` are the decoded files that the scene names (`None` without any); `progress` is told
+/// of finished rows and returns whether to go on. All threads of the current rayon pool work, and
+/// their number does not change a bit of the picture. [`Raster`] renders band by band into a
+/// journal instead, for pictures that are larger than memory or that must survive a crash.
+///
+/// ```
+/// use kerrlight_tomo::render::render;
+/// use kerrlight_tomo::scene::Scene;
+///
+/// let scene = Scene::parse(r#"
+///     hole = { spin = 0.0, mass_msun = 6.5e9, distance_kpc = 16800.0 }
+///     observer = { inclination_deg = 0.0 }
+///     screen = { field_of_view_m = 30.0, width = 16, total_flux_jy = 0.5 }
+///     tracer = { integrator = "elliptic", tolerance = 1e-8 }
+///     disc = { outer_edge = 12.0, peak_intensity = 1.0, opaque = true }
+/// "#)?;
+/// let rendered = render(&scene, None, &|_rows| true)?;
+///
+/// let intensity = rendered.picture.channel("intensity").unwrap(); // Jy/µas²
+/// assert_eq!(intensity.len(), 16 * 16);
+/// let side = scene.pixel_size() * scene.hole.angle_uas().unwrap(); // µas
+/// let flux: f64 = intensity.iter().map(|x| f64::from(*x) * side * side).sum();
+/// assert!((flux - 0.5).abs() < 1e-5 && rendered.summary.flux_unit == "Jy");
+/// // Seen along the axis of a hole without spin, the picture is symmetric.
+/// let at = |row: usize, column: usize| intensity[16 * row + column];
+/// assert!((at(4, 7) - at(7, 4)).abs() < 1e-5 * at(4, 7) && at(4, 7) > 0.0);
+/// # Ok::<(), kerrlight_tomo::Error>(())
+/// ```
+///
 /// # Errors
 /// If a value is out of range or does not fit, or `progress` returned false.
 pub fn render(

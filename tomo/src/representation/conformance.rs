@@ -21,7 +21,7 @@
 //!     sum
 //! };
 //! check(&Subject { representation: &grid, within: 0.9, parameter_noise: 1.0, tangent: &tangent });
-//! # Ok::<(), kerrlight_geodesic::Error>(())
+//! # Ok::<(), kerrlight_tomo::Error>(())
 //! ```
 
 use super::{Coordinates, CoordinatesMut, Gradient, Groups, Representation, Workspace};

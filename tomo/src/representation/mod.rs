@@ -74,6 +74,37 @@ impl<T> Groups<'_, T> {
 /// allocated once the workspace has seen a batch of the size.
 ///
 /// Lengths that do not fit together are bugs and panic.
+///
+/// [`Grid`], [`FeatureGrid`] and [`Network`] are built in. One of your own implements the first five
+/// methods, passes [`conformance`], and enters a [`Registry`] to have a name in fit files.
+///
+/// ```
+/// use kerrlight_tomo::representation::{
+///     Activation, Coordinates, Gradient, Grid, GridSettings, Representation, Workspace,
+/// };
+///
+/// let field = Grid::new(GridSettings {
+///     nodes: [2, 2, 2],
+///     low: [0.0; 3],
+///     high: [1.0; 3],
+///     activation: Activation::Linear,
+///     initial: 0.0,
+/// })?;
+/// // Node (x, y, z) holds x: then the field is e = x.
+/// let parameters = [0.0f64, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0];
+/// let (x, y, z) = ([0.25], [0.5], [0.75]);
+/// let at = || Coordinates::xyz(&x, &y, &z);
+/// let (mut values, mut workspace) = ([0.0], Workspace::new());
+/// field.eval(&parameters, at(), &mut values, &mut workspace);
+/// assert!((values[0] - 0.25).abs() < 1e-15);
+///
+/// // de/dparameter are the weights of trilinear interpolation: they add up to 1.
+/// let mut weights = [0.0; 8];
+/// let gradient = Gradient { parameters: &mut weights, coordinates: None };
+/// field.vjp(&parameters, at(), &[1.0], gradient, &mut workspace);
+/// assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-15);
+/// # Ok::<(), kerrlight_tomo::Error>(())
+/// ```
 pub trait Representation<T: Float>: Send + Sync {
     /// Coordinates of a point: 3 (x, y, z) or 4 (t, x, y, z).
     fn dimension(&self) -> usize;

@@ -28,7 +28,32 @@ pub use kerrlight_geodesic::Integrator;
 use kerrlight_geodesic::{Kerr, orbits};
 use serde::{Deserialize, Serialize};
 
-/// A complete scene. Lengths and times in M = GM/c² unless a name says otherwise.
+/// A complete scene: the hole, who looks at it, what shines, and how rays are traced.
+///
+/// Lengths and times are in M = GM/c² unless a name says otherwise. A scene comes from TOML
+/// ([`Scene::parse`], the format of the program's scene files) or from code; both are checked
+/// when a picture is made of them. It is plain data: [`render`](crate::render::render()) makes the
+/// picture, [`PreparedScene`](crate::transport::PreparedScene) answers for single rays.
+///
+/// ```
+/// use kerrlight_tomo::scene::{Scene, apply_override};
+///
+/// let text = r#"
+///     hole = { spin = 0.9 }
+///     observer = { inclination_deg = 60.0 }
+///     screen = { field_of_view_m = 30.0, width = 64 }
+///     tracer = { integrator = "elliptic", tolerance = 1e-8 }
+///     disc = { outer_edge = 20.0, peak_intensity = 1.0, opaque = true }
+/// "#;
+/// let scene = Scene::parse(text)?;
+/// assert_eq!(scene.pixel_size(), 30.0 / 64.0); // M
+/// assert!(scene.has_emission());
+/// // Written out with its defaults it is the same scene.
+/// assert_eq!(Scene::parse(&scene.to_toml())?.to_toml(), scene.to_toml());
+/// let tilted = Scene::parse(&apply_override(text, "observer.inclination_deg=17")?)?;
+/// assert_eq!(tilted.observer.inclination_deg, 17.0);
+/// # Ok::<(), kerrlight_tomo::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
