@@ -71,14 +71,19 @@ impl Panorama {
     /// If the bytes are no such picture.
     pub fn decode(bytes: &[u8]) -> Result<Self, Error> {
         let is_exr = bytes.starts_with(&EXR_MAGIC);
-        let (width, height) = if is_exr { exr::dimensions(bytes)? } else { dimensions(bytes)? };
+        let size = if is_exr {
+            exr::dimensions(bytes).map_err(PanoramaError::Exr)
+        } else {
+            dimensions(bytes).map_err(PanoramaError::Decode)
+        };
+        let (width, height) = size?;
         let what = || format!("a sky of {width} x {height} pixels");
         memory::afford(what, memory::colours(width.into(), height.into()))?;
         if is_exr {
             let (width, height, pixels) = exr_colors(bytes)?;
             return Ok(Self::new(width, height, pixels)?);
         }
-        let picture = image::load_from_memory(bytes)?;
+        let picture = image::load_from_memory(bytes).map_err(PanoramaError::Decode)?;
         let linear = matches!(
             picture,
             image::DynamicImage::ImageRgb32F(_) | image::DynamicImage::ImageRgba32F(_)
@@ -283,6 +288,7 @@ mod tests {
         assert!(said.starts_with("row 1, column 1: R, G, B = [NaN, NaN, NaN]"), "{said}");
         let whole = picture(&["Y"], 1.0);
         assert!(fail(&whole[..whole.len() - 9]).contains("damaged"));
+        assert!(fail(b"\x89PNG\r\n\x1a\n garbage").starts_with("not a readable PNG"));
     }
 
     /// Seen from inside, facing −x (azimuth 180°) is at the left and right edges, azimuth 90°
