@@ -112,7 +112,7 @@ impl Output {
     pub fn differs(&self, other: &Path) -> anyhow::Result<()> {
         let full = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         if full(&self.path) == full(other) {
-            bail!("{} is asked for twice: give different names", other.display());
+            bail!("{} is given for two outputs: use different names", other.display());
         }
         Ok(())
     }

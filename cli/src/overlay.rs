@@ -41,7 +41,7 @@ impl OverlayOptions {
             }
         }
         if self.critical_curve && !scene.effects.lensing {
-            bail!("--critical-curve needs `effects.lensing`: straight rays have none");
+            bail!("--critical-curve needs `effects.lensing`: straight rays have no critical curve");
         }
         if self.ticks && POLARIZATION.iter().any(|name| !names.contains(name)) {
             bail!("--ticks: the picture has no channels Q and U");

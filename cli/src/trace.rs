@@ -305,15 +305,15 @@ impl Table {
         let header = reader.headers().context("the header line cannot be read")?.clone();
         for (k, name) in header.iter().enumerate() {
             if NAMES.contains(&name) && header.iter().skip(k + 1).any(|other| other == name) {
-                bail!("there are two columns `{name}`");
+                bail!("column `{name}` appears twice");
             }
         }
         let find = |name: &str| header.iter().position(|column| column == name);
-        let need = |name: &str| find(name).with_context(|| format!("there is no column `{name}`"));
+        let need = |name: &str| find(name).with_context(|| format!("column `{name}` is missing"));
         let (in_degrees, inclination) = match (find(RADIANS), find(DEGREES)) {
             (Some(column), None) => (false, column),
             (None, Some(column)) => (true, column),
-            (None, None) => bail!("there is no column `{RADIANS}` or `{DEGREES}`"),
+            (None, None) => bail!("column `{RADIANS}` or `{DEGREES}` is missing"),
             (Some(_), Some(_)) => bail!("there are both `{RADIANS}` and `{DEGREES}`: give one"),
         };
         let columns = [need("spin")?, inclination, need("alpha")?, need("beta")?];

@@ -118,7 +118,7 @@ impl From<Error> for Failure {
 }
 
 fn no_room(what: &str) -> Failure {
-    Failure(NO_ROOM, format!("{what} is too small for the points that are asked for"))
+    Failure(NO_ROOM, format!("{what} is too small for the requested points"))
 }
 
 /// `kerrlight_trace`: see the header.

@@ -205,7 +205,7 @@ fn files_that_have_changed_are_told() {
     let said = |name: &str| {
         let output = kerrlight(at, &["render", "first.exr", "-o", name]);
         assert!(output.status.success());
-        String::from_utf8_lossy(&output.stderr).contains("another picture")
+        String::from_utf8_lossy(&output.stderr).contains("the picture will differ")
     };
     assert!(!said("second.exr"));
     let mesh = at.join("ring_and_moon.obj");
@@ -219,7 +219,7 @@ fn one_file_is_not_two_outputs() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let text = fail(at, &["render", "--preview", "a.png", "--sheet", "./a.png"]);
-    assert!(text.contains("asked for twice"), "{text}");
+    assert!(text.contains("given for two outputs"), "{text}");
     let scene = root().join("scenes/hot_spots.toml").display().to_string();
     let words = [
         "movie",
@@ -236,7 +236,7 @@ fn one_file_is_not_two_outputs() {
     ];
     std::fs::create_dir(at.join("m")).unwrap();
     let text = fail(at, &words);
-    assert!(text.contains("asked for twice"), "{text}");
+    assert!(text.contains("given for two outputs"), "{text}");
     assert!(!at.join("a.png").exists() && !at.join("m/frame_0000.png").exists());
 }
 

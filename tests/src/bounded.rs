@@ -29,7 +29,7 @@ fn bomb(path: &Path, name: &str, shape: [usize; 3]) {
 fn refused(at: &Path, memory: &str, words: &[&str], said: &str) {
     let message = fail(at, &[&["--memory", memory][..], words].concat());
     assert!(message.contains(said), "{words:?}: {message}");
-    let [needs, has] = [" would take ", " may be taken"].map(|text| message.contains(text));
+    let [needs, has] = [" would take ", " the limit is "].map(|text| message.contains(text));
     assert!(needs && has && message.contains("iB"), "{words:?}: {message}");
 }
 

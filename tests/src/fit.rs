@@ -215,7 +215,7 @@ fn bad_input_is_named_and_nothing_is_begun() {
         ("training.rate=-1.0", "training.rate = -1 is not allowed"),
         ("training.batch={frames=0}", "training.batch.frames = 0 is not allowed: at least 1"),
         ("loss.0.sigma=0.0", "loss.0.sigma = 0 is not allowed"),
-        ("loss.0.data=visibilities", "pixels are for images alone"),
+        ("loss.0.data=visibilities", "pixels work with images only"),
         ("truth.spot.0.sigma=0.0", "truth.spot.0.sigma = 0 is not allowed"),
         ("output.nodes=1", "output.nodes = 1"),
         ("movie.frames=0", "movie.frames = 0"),

@@ -125,7 +125,7 @@ fn exact_standard_output_carries_the_bytes_of_files() {
     let names: Vec<_> = std::fs::read_dir(at).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert_eq!(names.len(), 4, "{names:?}");
     let both = [&["render", "-o", "-", "--preview", "-"][..], &SIZE].concat();
-    assert!(fail(at, &both).contains("asked for twice"));
+    assert!(fail(at, &both).contains("given for two outputs"));
     let twice = [&["render", "-o", "-", "--json"][..], &SIZE].concat();
     assert!(fail(at, &twice).contains("standard output"));
 }

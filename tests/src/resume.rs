@@ -81,7 +81,7 @@ fn exact_same_bytes_after_an_interrupt() {
 
     let changed = [&arguments(&scene)[..], &["--set", "hole.spin=0.4"]].concat();
     let output = kerrlight(folder.path(), &changed);
-    assert!(String::from_utf8_lossy(&output.stderr).contains("of another picture"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("to another picture"));
     assert!(std::fs::read(folder.path().join("a.exr")).unwrap() != whole);
 
     std::fs::write(&partial, kept).unwrap();

@@ -9,7 +9,7 @@ static LIMIT: AtomicU64 = AtomicU64::new(u64::MAX);
 
 /// Something would take more memory than there is.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{what} would take {} of memory, and {} may be taken", shown(*.needed), shown(*.limit as f64))]
+#[error("{what} would take {} of memory, but the limit is {}", shown(*.needed), shown(*.limit as f64))]
 pub struct TooLarge {
     /// What it is.
     pub what: String,
@@ -125,7 +125,7 @@ mod tests {
     fn exact_what_is_too_large_is_named() {
         afford(|| unreachable!(), 1e18).unwrap();
         let error = TooLarge { what: "a sky".to_owned(), needed: 3e9, limit: 1 << 30 };
-        let said = "a sky would take 2.8 GiB of memory, and 1.0 GiB may be taken";
+        let said = "a sky would take 2.8 GiB of memory, but the limit is 1.0 GiB";
         assert_eq!(error.to_string(), said);
     }
 }

@@ -16,7 +16,7 @@ pub const RESULTS: [(&str, &str, &str, usize); 11] = [
     ("nrmse", "relative error", "", 4),
     ("correlation", "correlation", "", 4),
     ("axis_dot_truth", "axis · true axis", "", 4),
-    ("chi2", "χ² a datum", "", 3),
+    ("chi2", "χ² per data point", "", 3),
     ("loss", "loss", "", 6),
     ("seconds", "wall time", "s", 1),
     ("cpu_seconds", "CPU time", "s", 1),
@@ -33,7 +33,7 @@ pub fn described(value: &str) -> (String, usize) {
         Some((_, name, "", digits)) => ((*name).to_owned(), *digits),
         Some((_, name, unit, digits)) => (format!("{name} ({unit})"), *digits),
         None => match value.strip_prefix(ONE_CHI2) {
-            Some(name) => (format!("χ² a datum of {}", name.replace('-', " ")), 3),
+            Some(name) => (format!("χ² per data point of {}", name.replace('-', " ")), 3),
             None => (value.to_owned(), 4),
         },
     }
@@ -127,7 +127,7 @@ mod tests {
         let two = json!({"chi2_per_datum": {"amplitudes": 1.5, "closure phases": 2.5}});
         assert_eq!(result(&two, "chi2"), None);
         assert_eq!(result(&two, "chi2.closure-phases"), Some(2.5));
-        assert_eq!(described("chi2.closure-phases").0, "χ² a datum of closure phases");
+        assert_eq!(described("chi2.closure-phases").0, "χ² per data point of closure phases");
         assert_eq!(described("psnr_db"), ("PSNR (dB)".to_owned(), 2));
     }
 }

@@ -96,7 +96,7 @@ pub fn table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) -> 
         1 => "One seed.".to_owned(),
         seeds => format!("Mean ± standard deviation over {seeds} seeds."),
     };
-    let gaps = if gaps { " –: not asked for, or not there." } else { "" };
+    let gaps = if gaps { " –: not part of the experiment, or missing." } else { "" };
     let best =
         asked.best_of.as_ref().map(|name| format!(" In brackets: the best level of {name}."));
     let best = best.unwrap_or_default();

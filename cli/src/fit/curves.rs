@@ -23,7 +23,7 @@ pub fn loss_plot(lines: &[Value]) -> Option<LinePlot> {
     }
     Some(LinePlot {
         title: "Loss".to_owned(),
-        caption: "What the fit makes smaller, step by step: the squared distance of model and data in units of the data's errors (χ²) a datum, and its weighted sum, the loss. Steps that look at a random part of the data see another value each time; a curve that has become flat has converged.".to_owned(),
+        caption: "χ² per data point of each kind of data and their weighted sum, the loss, against the optimiser step. Random batches make the curves noisy; a flat curve has converged.".to_owned(),
         x: Axis { label: "step".to_owned(), unit: String::new(), log: false },
         y: Axis { label: "loss".to_owned(), unit: String::new(), log: true },
         series: all,
@@ -35,7 +35,7 @@ pub fn psnr_plot(lines: &[Value]) -> Option<LinePlot> {
     let psnr = series(lines, "PSNR", |line| line["psnr_db"].as_f64());
     (!psnr.points.is_empty()).then(|| LinePlot {
         title: "Quality".to_owned(),
-        caption: "How close the volume is to the truth while the fit goes on: the peak signal-to-noise ratio of all nodes. The fit does not know the truth and does not use it.".to_owned(),
+        caption: "Peak signal-to-noise ratio of the volume against the truth, over all nodes. The fit does not use the truth.".to_owned(),
         x: Axis { label: "step".to_owned(), unit: String::new(), log: false },
         y: Axis { label: "PSNR".to_owned(), unit: "dB".to_owned(), log: false },
         series: vec![psnr],

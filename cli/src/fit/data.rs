@@ -48,7 +48,7 @@ fn visibilities(file: &FitFile, path: &Path) -> anyhow::Result<Measured> {
     let without = all - observation.stokes_i().count();
     let measured = Measured::of_visibilities(file, observation, &name)?;
     if without > 0 {
-        eprintln!("{name}: {without} of {all} rows have no parallel hand and are left out");
+        eprintln!("{name}: {without} of {all} rows have no parallel hands and are dropped");
     }
     Ok(measured)
 }

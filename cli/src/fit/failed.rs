@@ -48,7 +48,7 @@ pub fn check(
     if !file.is_convex() && movie.iter().all(|pixel| *pixel == 0.0) {
         let data = objective.names().join(", ");
         return Err(Failed(format!(
-            "what was recovered is dark, where {data} have no slope: that is no result; begin with light, e.g. with training.start.linear"
+            "the recovered emission is zero everywhere, where {data} have no gradient: start from a nonzero field, e.g. with training.start.linear"
         ))
         .into());
     }

@@ -18,18 +18,18 @@ pub fn representation(kind: &Kind) -> &str {
 pub fn described(file: &FitFile) -> &str {
     match &file.representation.kind {
         Kind::Bhnerf => {
-            "a neural network of the place that matter had at the reference time (BH-NeRF)"
+            "a neural network on coordinates pulled back to the reference time (BH-NeRF)"
         }
         Kind::Mlp4d => "a neural network of place and time, which knows nothing of orbits",
         Kind::FeatureGrid => {
-            "a small neural network of features on grids of several resolutions that are carried along the orbits"
+            "a small neural network on multi-resolution feature grids that move with the matter"
         }
         Kind::Grid => "values at the nodes of a grid that is carried along the orbits",
         Kind::LinearGrid if !file.is_convex() => {
-            "values at the nodes of a grid that is carried along the orbits, found by descent from several lit starts, as such data are not convex in the emission"
+            "voxel values on a grid that moves with the matter, found by descent from several starts because these data make the problem non-convex"
         }
         Kind::LinearGrid => {
-            "values at the nodes of a grid that is carried along the orbits, as the solution of a convex problem"
+            "voxel values on a grid that moves with the matter, the solution of a convex problem"
         }
         Kind::Own(name) => name,
     }

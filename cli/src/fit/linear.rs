@@ -21,7 +21,7 @@ pub fn solve(
     let (keeper, bar) = (Keeper::brief(STOPPED), progress::waiting("linear grid"));
     let mut watch = |now: &LinearProgress<'_>| {
         bar.set_message(format!(
-            "round {}, {} evaluations, {} nodes, value {:.4e}",
+            "round {}, {} evaluations, {} nodes, loss {:.4e}",
             now.round, now.evaluations, now.nodes, now.value
         ));
         bar.tick();
@@ -69,14 +69,14 @@ pub fn statement(solution: &LinearSolution<f32>) -> String {
             return "minimum of a convex problem: the dark field explains the data".to_owned();
         }
         return format!(
-            "minimum of a convex problem, with a certificate: at most {:.1e} of the dark field's loss above the least",
+            "certified minimum of a convex problem: at most {:.1e} of the dark field's loss above the global minimum",
             certificate.relative_gap()
         );
     }
     let slope = solution.stationarity.map_or(f64::NAN, |s| s.relative_violation());
     let what = if stopped { "not yet a stationary point" } else { "stationary point" };
     format!(
-        "{what}, no certificate: the data are not convex in the emission; largest slope {slope:.1e} of that at the start"
+        "{what}, not certified: the loss is not convex in the emission; gradient {slope:.1e} of its initial size"
     )
 }
 

@@ -43,7 +43,9 @@ impl<'a> Prepared<'a> {
         let prepared = Self { file, registry, instrument, measured, motion };
         let seen = prepared.objective()?.observed().len();
         if matches!(prepared.file.axis, AxisSearch::Scan(_)) && seen < 2 {
-            bail!("axis.scan needs frames at 2 times or more: a single one tells no axes apart");
+            bail!(
+                "axis.scan needs at least 2 frame times: a single frame does not constrain the axis"
+            );
         }
         Ok(prepared)
     }
@@ -115,7 +117,7 @@ fn answer(folder: &Folder, (worth, results): (String, Value)) -> Answer {
 fn restored(bytes: &[u8], start: &State<f32>, text: &str) -> anyhow::Result<State<f32>> {
     let state = checkpoint::decode(bytes, start)?;
     if checkpoint::header(bytes)?.settings != text {
-        bail!("it is of a run with other settings");
+        bail!("it belongs to a run with other settings");
     }
     Ok(state)
 }
@@ -123,7 +125,7 @@ fn restored(bytes: &[u8], start: &State<f32>, text: &str) -> anyhow::Result<Stat
 /// What to do about a checkpoint that is of no use.
 fn unusable(folder: &Folder) -> String {
     let path = folder.path().join(folder::CHECKPOINT);
-    format!("{} (restore it, or remove it to begin the run anew)", path.display())
+    format!("{} (restore it, or remove it to start over)", path.display())
 }
 
 struct Run<'a> {
@@ -190,7 +192,7 @@ impl Run<'_> {
     /// All steps; an error if a signal stops them, after a checkpoint.
     fn steps(&mut self, state: &mut State<f32>) -> anyhow::Result<()> {
         let steps = self.file.training.steps;
-        let keeper = Keeper::saving("stopping after this step; a second signal ends at once");
+        let keeper = Keeper::saving("stopping after this step; a second signal quits at once");
         let bar = progress::steps(steps);
         bar.set_position(state.now.step);
         let mut saved = Instant::now();
@@ -241,12 +243,12 @@ impl Run<'_> {
             Outcome::Done(_) => return Ok(()),
             Outcome::SteppedBack { loss, to, caution } => {
                 bar.println(format!(
-                    "the loss became {loss:e}: back to step {to}, rates times {caution}"
+                    "the loss rose to {loss:e}: back to step {to}, learning rates scaled by {caution}"
                 ));
                 json!({"step": step, "diverged_loss": loss.to_string(), "caution": caution})
             }
             Outcome::Converged => {
-                bar.println(format!("converged after step {step}: no step lowers the loss"));
+                bar.println(format!("converged at step {step}: no further decrease of the loss"));
                 json!({"step": step, "converged": true, "loss": state.now.loss})
             }
         };

@@ -75,7 +75,7 @@ impl Movie {
             self.look.channels(&scene, &film.names())?;
             self.overlay.check(&scene, &film.names())?;
         } else if self.overlay.any() {
-            bail!("marks are drawn into pictures to look at: give --gif, --apng or --png");
+            bail!("marks are drawn only into --gif, --apng or --png: give one of them");
         }
         afford(&film, &scene)?;
         let of = Origin { name: &source.name, text: &text, files: &files.identity };

@@ -127,7 +127,7 @@ impl Render {
             outputs.all().iter().try_for_each(|output| output.spares(input))?;
         }
         if self.overlay.any() && outputs.png.is_none() {
-            bail!("marks are drawn into the PNG: give --preview");
+            bail!("marks are drawn only into the PNG: add --preview");
         }
         outputs.differ()?;
         Ok(outputs)

@@ -44,7 +44,9 @@ impl Partial {
                 let all = raster.bands();
                 eprintln!("resuming from {shown}: {there} of {all} bands are done");
             }
-            Found::Other => eprintln!("starting anew: {shown} was of another picture or version"),
+            Found::Other => {
+                eprintln!("starting over: {shown} belongs to another picture or version")
+            }
         }
         Ok(Partial { path: Some(path), journal })
     }

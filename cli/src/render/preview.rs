@@ -84,7 +84,7 @@ pub fn reduction(scene: &Scene, names: &[&str], wanted: &[&str]) -> Reduction {
     let reduction = Reduction::new(width, height, names, wanted, MOST_PIXELS);
     if reduction.factor() > 1 {
         let factor = reduction.factor();
-        eprintln!("a pixel of the PNG is the mean of {factor} x {factor} of the picture");
+        eprintln!("the PNG is downsampled {factor} x {factor}");
     }
     reduction
 }

@@ -45,7 +45,7 @@ impl Source {
     pub fn compare(&self, identity: &str) {
         if self.files.as_ref().is_some_and(|files| files != identity) {
             eprintln!(
-                "warning: files that the scene names are not those that {} was rendered from: it will be another picture",
+                "warning: files of the scene have changed since {} was rendered: the picture will differ",
                 self.name
             );
         }

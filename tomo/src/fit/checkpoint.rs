@@ -16,13 +16,13 @@ use std::ops::Range;
 #[non_exhaustive]
 pub enum CheckpointError {
     /// Not safetensors.
-    #[error("it is no checkpoint: {0}")]
+    #[error("not a checkpoint: {0}")]
     Format(#[from] SafeTensorError),
     /// Not by kerrlight, or damaged.
-    #[error("it is no checkpoint of a fit: {0}")]
+    #[error("not a checkpoint of a fit: {0}")]
     Header(String),
     /// Bytes that are not those that were written.
-    #[error("it is damaged: its checksum is {written:08x}, that of its bytes {found:08x}")]
+    #[error("damaged: the stored checksum is {written:08x}, that of the bytes {found:08x}")]
     Damaged {
         /// As it was written.
         written: u32,
@@ -30,7 +30,7 @@ pub enum CheckpointError {
         found: u32,
     },
     /// A tensor that does not fit.
-    #[error("tensor {name} is not allowed: {found} numbers, {wanted} wanted")]
+    #[error("tensor {name} has {found} numbers where {wanted} are expected")]
     Tensor {
         /// Its name.
         name: String,

@@ -120,7 +120,7 @@ pub enum Outcome {
 /// Why a fit cannot go on.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "the loss is {loss} at step {step}, after {setbacks} returns to earlier steps at ever smaller rates"
+    "the loss is {loss} at step {step}, after {setbacks} returns to earlier steps with ever smaller learning rates"
 )]
 pub struct Diverged {
     /// The last loss, dimensionless.

@@ -55,7 +55,7 @@ pub struct Setup {
 #[non_exhaustive]
 pub enum ScheduleError {
     /// Sidereal times with precession.
-    #[error("hours of GMST go with the catalogue frame only")]
+    #[error("hours of GMST require the catalogue frame")]
     GmstOfDate,
 }
 

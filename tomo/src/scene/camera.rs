@@ -246,7 +246,7 @@ fn check_rivals(scene: &Scene) -> Result<(), Invalid> {
         ("screen.total_flux_jy", screen.total_flux_jy),
     ];
     for (key, value) in rivals {
-        let allowed = "not with a `[camera]`, which has a place and a lens of its own";
+        let allowed = "not allowed with a `[camera]`, which has its own position and lens";
         number(key, value.unwrap_or(0.0), value.is_none(), allowed)?;
     }
     Ok(())
@@ -271,7 +271,7 @@ fn check_keys(camera: &CameraConfig) -> Result<(), Invalid> {
         let keyed = camera.key.iter().any(|key| key.given()[j].is_some());
         match camera.given()[j] {
             Some(value) if keyed => {
-                let allowed = "not with keys that give it too";
+                let allowed = "not allowed where keys give it as well";
                 return Err(Invalid::new(format!("camera.{name}"), value, allowed));
             }
             None if !keyed && j < 4 => {

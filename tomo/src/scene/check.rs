@@ -221,7 +221,8 @@ fn check_combinations(scene: &Scene) -> Result<(), Invalid> {
     }
     let plunges = scene.disc.as_ref().is_some_and(|disc| disc.plunging.is_some());
     if plunges && effects.redshift && !effects.lensing {
-        let allowed = "true with redshift and [disc.plunging]: straight rays have no momentum next to the hole";
+        let allowed =
+            "true with redshift and [disc.plunging]: straight rays have no momentum near the hole";
         return Err(Invalid::new("effects.lensing", false, allowed));
     }
     check_polarization(scene)?;

@@ -43,7 +43,7 @@ impl Mask {
 /// Two volumes do not have the same nodes.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "{field} = {first:?} and {second:?} are not allowed: the same for volumes that belong together"
+    "{field} = {first:?} and {second:?} differ: volumes can be compared only on the same nodes"
 )]
 pub struct Mismatch {
     /// Which property differs: `nodes`, `low` or `high`.

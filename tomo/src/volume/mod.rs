@@ -59,7 +59,7 @@ pub struct VolumeFile {
 #[non_exhaustive]
 pub enum VolumeError {
     /// As many values as nodes are needed.
-    #[error("{found} values are not allowed: {wanted}, one a node")]
+    #[error("{found} values are not allowed: {wanted} are needed, one per node")]
     Length {
         /// How many there are.
         found: usize,
@@ -239,7 +239,10 @@ mod tests {
         let new = |nodes, values: Vec<f32>| {
             Volume::new(nodes, [0.0; 3], [1.0; 3], values).unwrap_err().to_string()
         };
-        assert_eq!(new([2, 2, 2], vec![0.0; 7]), "7 values are not allowed: 8, one a node");
+        assert_eq!(
+            new([2, 2, 2], vec![0.0; 7]),
+            "7 values are not allowed: 8 are needed, one per node"
+        );
         assert_eq!(new([1, 2, 2], vec![]), "nodes = 1 is not allowed: 2 to 2048 along each axis");
         let mut values = vec![0.0; 8];
         values[6] = f32::NAN;

@@ -22,10 +22,10 @@ pub struct Field<'a> {
 #[non_exhaustive]
 pub enum VtiError {
     /// A name that is none.
-    #[error("field name {0:?} is not allowed: letters, digits and _, another one for each field")]
+    #[error("field name {0:?} is not allowed: unique names of letters, digits and _")]
     Name(String),
     /// A file holds one field or more.
-    #[error("no field is not allowed: 1 or more")]
+    #[error("at least one field is needed")]
     Empty,
 }
 

@@ -95,7 +95,9 @@ pub fn write(data: Option<&Path>, to: Option<&Path>) -> anyhow::Result<Answer> {
     output.write(text.as_bytes())?;
     let left = plain.lines().filter(|line| line.starts_with("#? ")).count();
     let assumed = plain.matches(" #! ").count();
-    eprintln!("{assumed} numbers are ASSUMED, {left} are left to FILL IN: see its comments");
+    eprintln!(
+        "{assumed} values are ASSUMED and {left} are left to FILL IN: see the comments in the file"
+    );
     let answer = Answer::text(format!("{}\n", path.display())).outputs([&output]);
     Ok(answer.with("assumed", assumed).with("to_fill_in", left))
 }
@@ -103,17 +105,17 @@ pub fn write(data: Option<&Path>, to: Option<&Path>) -> anyhow::Result<Answer> {
 fn head(path: &Path, plain: &str) -> String {
     let run = format!("#   kerrlight fit {}\n", path.display());
     let left = if plain.contains("#? ") {
-        "# Lines with FILL IN above them decide the result and cannot be told from the data: the fit names the first that\n# is missing until all are there.\n"
+        "# FILL IN marks settings that decide the result and that the data do not determine. The fit names the first one\n# that is missing.\n"
     } else {
         ""
     };
     let assumed = if plain.contains(" #! ") {
-        "# Lines with ASSUMED above them decide the result and are not told by the data: change them as you know better.\n"
+        "# ASSUMED marks settings that decide the result and that the data do not determine: replace them with your own.\n"
     } else {
         ""
     };
     format!(
-        "# Settings of a fit. Run it with\n{run}{left}{assumed}# Lengths and times are in M (GM/c^2, GM/c^3) where nothing else is said; docs/reference/fit-file.md tells more.\n"
+        "# Settings of a fit. Run it with\n{run}{left}{assumed}# Lengths and times are in M (GM/c^2, GM/c^3) unless stated otherwise; see docs/reference/fit-file.md.\n"
     )
 }
 
@@ -194,11 +196,10 @@ fn of_visibilities(observation: &Observation, path: &str) -> anyhow::Result<Stri
         ),
         None => (
             format!(
-                "#? mass_msun = 4.154e6 # nothing is known here of {name}\n#? distance_kpc = 8.178 # the same"
+                "#? mass_msun = 4.154e6 # no built-in value for {name}\n#? distance_kpc = 8.178 # the same"
             ),
-            "#? inclination_deg = 60.0 # the data do not tell from where the hole is seen"
-                .to_owned(),
-            "as wide as mass and distance make it".to_owned(),
+            "#? inclination_deg = 60.0 # the data do not determine the inclination".to_owned(),
+            "from the mass and distance".to_owned(),
         ),
     };
     let mut losses = "[[loss]]\ndata = \"amplitudes\"\nweight = 1.0".to_owned();
@@ -236,7 +237,7 @@ fn short_baselines(observation: &Observation) -> anyhow::Result<f64> {
     all.sort_by(|a, b| a[1].total_cmp(&b[1]));
     match all.get(all.len() / 2) {
         Some([_, flux]) if *flux > 0.0 => Ok(*flux),
-        _ => bail!("there are no visibilities of total intensity with light in them"),
+        _ => bail!("there are no nonzero visibilities of total intensity"),
     }
 }
 
@@ -244,13 +245,13 @@ fn of_movie(images: &Images, path: &str) -> anyhow::Result<String> {
     let Images { movie, times, field_uas } = images;
     let (grid, frames) = (movie.grid, movie.frames());
     if grid.width != grid.height {
-        bail!("images of {} x {} pixels: a fit's are square", grid.width, grid.height);
+        bail!("images of {} x {} pixels: a fit needs square images", grid.width, grid.height);
     }
     let flux =
         movie.pixels.chunks(grid.pixels()).map(|image| image.iter().sum()).fold(0.0, f64::max);
     let peak = movie.pixels.iter().copied().fold(0.0, f64::max);
     if flux <= 0.0 {
-        bail!("there is no light in the images");
+        bail!("all pixels of the images are zero");
     }
     let span = field_uas
         .map_or(String::new(), |field| format!("; on the sky it is {field:.1} microarcseconds"));

@@ -137,7 +137,7 @@ impl Estimate<'_> {
         let data: Vec<&str> = file.loss.iter().map(|l| l.data.label()).collect();
         let number = |key: &str| results[key].as_f64();
         let mut lines = vec![format!(
-            "Emission around a black hole of spin {}, seen at {}° from its spin axis, was recovered from {} frames of {}. It is described by {}.",
+            "Emission around a black hole of spin {}, seen at {}° from its spin axis, was recovered from {} frames of {}. It is represented by {}.",
             file.hole.spin,
             file.observer.inclination_deg,
             self.measured.times.len(),
@@ -148,29 +148,31 @@ impl Estimate<'_> {
             lines.push(format!("The linear grid's solution: {statement}."));
         }
         let unknown = results["unknown"].as_array().into_iter().flatten();
-        lines.extend(unknown.filter_map(Value::as_str).map(|open| format!("Mind that {open}.")));
+        lines.extend(unknown.filter_map(Value::as_str).map(|open| format!("Note that {open}.")));
         if let Some(chi2) = results["chi2_per_datum"].as_object() {
             let each = chi2.iter().map(|(name, value)| {
-                format!("{name}: χ² a datum {:.4}", value.as_f64().unwrap_or(f64::NAN))
+                format!("{name}: χ² per data point {:.4}", value.as_f64().unwrap_or(f64::NAN))
             });
             lines.push(format!(
-                "{}. χ² is the squared distance of model and data in units of the data's errors: about 1 a datum where the model is right and the errors are honest, less where data have no noise.",
+                "{}. χ² per data point is the mean squared residual in units of the error bars: about 1 for the right model and errors, less for noise-free data.",
                 each.collect::<Vec<_>>().join("; ")
             ));
         }
         if let (Some(psnr), Some(nrmse)) = (number("psnr_db"), number("nrmse")) {
             lines.push(format!(
-                "Beside the truth the volume has a peak signal-to-noise ratio of {psnr:.2} dB and a relative error of {nrmse:.3} (an empty volume has 1)."
+                "Compared with the truth, the volume has a peak signal-to-noise ratio of {psnr:.2} dB and a relative error of {nrmse:.3} (1 for an empty volume)."
             ));
         }
         if let Some(note) = results["note"].as_str() {
-            lines.push(format!("Mind that {note}."));
+            lines.push(format!("Note that {note}."));
         }
         if !matches!(file.axis, AxisSearch::Known {})
             && let Some(dot) = number("axis_dot_truth")
         {
             let angle = dot.clamp(-1.0, 1.0).acos().to_degrees();
-            lines.push(format!("The axis that matter turns about was learnt: {angle:.2}° from the true one (cosine {dot:.5})."));
+            lines.push(format!(
+                "The fitted rotation axis is {angle:.2}° from the true one (cosine {dot:.5})."
+            ));
         }
         lines
     }

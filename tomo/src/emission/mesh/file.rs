@@ -110,7 +110,7 @@ impl MeshFile {
         };
         if let Some(k) = self.triangles.iter().position(broken) {
             return fail(format!(
-                "triangle {k} (counted from 0) has a coordinate that is no number"
+                "triangle {k} (counted from 0) has a coordinate that is not a finite number"
             ));
         }
         let is_color = |layer: &Layer| layer.color.iter().all(|c| (0.0..=1e6).contains(c));

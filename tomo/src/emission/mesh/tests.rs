@@ -85,7 +85,7 @@ fn files_that_are_no_meshes_say_why() {
     let error = |bytes: &[u8]| MeshFile::decode(bytes, &none).unwrap_err().to_string();
     assert!(error(OBJ.as_bytes()).contains("`paint.mtl`"));
     assert!(error(b"v 0 0 0\n").contains("no triangles"));
-    assert!(error(b"v 0 0 0\nv 1 0 0\nv nan 1 0\nf 1 2 3\n").contains("no number"));
+    assert!(error(b"v 0 0 0\nv 1 0 0\nv nan 1 0\nf 1 2 3\n").contains("not a finite number"));
     assert!(error(b"v 0 0 0\nf 1 2 3\n").contains("OBJ"));
     assert!(error(b"glTF\x02\0\0\0").contains("glTF"));
     assert!(error(b"{\"asset\":").contains("glTF"));

@@ -15,11 +15,11 @@ pub enum LinearError {
         value: f64,
     },
     /// Data that know no flux, and none is given.
-    #[error("{0} do not know the flux, and none is given")]
+    #[error("{0} do not determine the flux; give linear.flux_jy")]
     NoFlux(String),
     /// A flux that emission within the bounds cannot have.
     #[error(
-        "a mean flux of {flux} Jy needs an emission of {needed:.4}, above the largest allowed, {upper}"
+        "a mean flux of {flux} Jy needs an emission of {needed:.4}, above linear.upper = {upper}"
     )]
     TooBright {
         /// What was given, Jy.
@@ -30,10 +30,10 @@ pub enum LinearError {
         upper: f64,
     },
     /// Data that no lit field explains better than a dark one.
-    #[error("no field that shines explains {0} better than a dark one: the data show no light")]
+    #[error("no emission explains {0} better than none: the data contain no signal")]
     NoLight(String),
     /// Axes that data cannot tell apart.
-    #[error("the losses of all {axes} axes are {loss:.6e}: the data do not tell them apart")]
+    #[error("the losses of all {axes} axes are {loss:.6e}: the data do not constrain the axis")]
     Alike {
         /// How many.
         axes: usize,

@@ -91,7 +91,7 @@ fn meaning(key: &str) -> &'static str {
     match key {
         "epsilon" => "the slope below which it is smoothed, emission per M, above 0",
         "level" => "the emission where the penalty is 0, above 0",
-        _ => "the part of level below which it goes on as a parabola, above 0",
+        _ => "the fraction of level below which it continues as a parabola, above 0",
     }
 }
 
@@ -104,7 +104,9 @@ impl FitFile {
         let one = |(k, setting): (usize, &PenaltySettings)| {
             let same = |other: &PenaltySettings| other.kind == setting.kind;
             if let Some(first) = self.regulariser[..k].iter().position(same) {
-                refuse!("regulariser {k}: it has the kind of regulariser {first}, once is allowed");
+                refuse!(
+                    "regulariser {k}: the same kind as regulariser {first}; each kind is allowed once"
+                );
             }
             setting.prior().within(format!("regulariser {k}"))
         };
@@ -126,7 +128,7 @@ impl FitFile {
             (..) => {
                 return Err(FitError::missing(
                     "probe.nodes",
-                    "regularisers look at a network at nodes of a grid; add a table [probe] with `nodes = 32`, nodes \
+                    "regularisers of a network are evaluated on a grid; add a table [probe] with `nodes = 32`, nodes \
                      along each axis, 4 to 256",
                 ).into());
             }

@@ -21,7 +21,7 @@ impl FitFile {
             && self.training.start == Start::Drawn;
         if dark && !self.is_convex() {
             refuse!(
-                "training.start = drawn is not allowed: a grid with activation linear starts in the dark, where {} have no slope; take {{ linear = {{ nodes, stride, steps }} }}",
+                "training.start = drawn is not allowed: a grid with activation linear starts at zero emission, where {} have no gradient; use {{ linear = {{ nodes, stride, steps }} }}",
                 data(self)
             );
         }
@@ -37,13 +37,13 @@ impl FitFile {
                 format!("that of linear.flux_jy = {flux} Jy, from which training may have led away")
             });
             all.push(format!(
-                "{} alone do not know the flux: the brightness is {from}; PSNR and relative error depend on it, the correlation does not. They do not know where on the sky the source is either: the hole is taken to be in the middle of the screen",
+                "{} alone do not determine the flux: the brightness is {from}; PSNR and relative error depend on it, the correlation does not. Nor do they determine the position on the sky: the hole is placed at the centre of the screen",
                 data(self)
             ));
         }
         if !knows_phase(self) {
             all.push(format!(
-                "{} know no phases: an image and the same turned by 180° are alike to them, and only orbits, lensing and Doppler shifts tell those apart",
+                "{} carry no phases: they cannot distinguish an image from itself rotated by 180°; only orbits, lensing and Doppler shifts can",
                 data(self)
             ));
         }
@@ -76,7 +76,7 @@ fn flux(file: &FitFile) -> Result<(), FitError> {
     if knows_flux(file) {
         return match given {
             Some(flux) => refuse!(
-                "linear.flux_jy = {flux} is not allowed: it is for closure quantities alone, {} know the flux",
+                "linear.flux_jy = {flux} is not allowed: it is for closure quantities alone, and {} determine the flux",
                 data(file)
             ),
             None => Ok(()),
@@ -87,14 +87,14 @@ fn flux(file: &FitFile) -> Result<(), FitError> {
         || matches!(file.axis, AxisSearch::Scan(_));
     if linear && given.is_none() {
         refuse!(
-            "linear.flux_jy is missing: {} alone do not know the flux; give the mean flux of a frame in Jy, or add a loss of amplitudes or of the light curve",
+            "linear.flux_jy is missing: {} alone do not determine the flux; give the mean flux of a frame in Jy, or add a loss of amplitudes or of the light curve",
             data(file)
         );
     }
     let pulls = |linear: &Linear| linear.smoothness > 0.0 || linear.sparsity > 0.0;
     if !file.regulariser.is_empty() || file.linear.as_ref().is_some_and(pulls) {
         refuse!(
-            "regulariser, linear.smoothness and linear.sparsity are not allowed with {} alone: these do not know the flux, and penalties would take it to 0; add a loss of amplitudes or of the light curve",
+            "regulariser, linear.smoothness and linear.sparsity are not allowed with {} alone: these do not determine the flux, and penalties would drive it to 0; add a loss of amplitudes or of the light curve",
             data(file)
         );
     }

@@ -71,7 +71,9 @@ impl Instrument {
         let mut lines = Sightlines::trace(&hole, &observer, &alpha, &beta, &request)
             .within("region and screen")?;
         if lines.rays() == 0 {
-            refuse!("no ray meets the region: region.r_min to r_max lies outside the screen");
+            refuse!(
+                "no ray meets the region: region.r_min to r_max lies outside the field of view"
+            );
         }
         let jy = file.screen.jy_per_pixel;
         if !(jy > 0.0 && jy.is_finite()) {

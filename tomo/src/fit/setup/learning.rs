@@ -96,7 +96,9 @@ pub fn training(file: &FitFile, axis_rate: Option<Polynomial>) -> Result<Trainin
     let lbfgs = lbfgs(file)?;
     let occupancy = chosen.occupancy.as_ref().map(occupancy).transpose()?;
     if occupancy.is_some() && file.representation.kind == Kind::Mlp4d {
-        refuse!("training.occupancy is not for mlp4d, which has no co-rotating coordinates");
+        refuse!(
+            "training.occupancy does not work with mlp4d, which has no co-rotating coordinates"
+        );
     }
     Ok(Training {
         seed: file.seed,
@@ -169,7 +171,7 @@ fn lbfgs(file: &FitFile) -> Result<Option<Lbfgs>> {
     let linear = file.representation.activation == Activation::Linear;
     if file.representation.kind == Kind::Grid && linear {
         refuse!(
-            "training.optimiser = lbfgs knows no bounds: a grid with activation linear is held at 0 or above; take representation = linear-grid, or activation sigmoid or softplus"
+            "training.optimiser = lbfgs does not support bounds, and a grid with activation linear is bounded below by 0; use representation = linear-grid, or activation sigmoid or softplus"
         );
     }
     Ok(Some(Lbfgs::default()))
@@ -186,7 +188,7 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
     let training = training(file, axis_rate)?;
     let images_only = file.loss.iter().all(|loss| loss.data == LossKind::Image);
     if matches!(training.batch, BatchSize::Pixels(_)) && !images_only {
-        refuse!("training.batch: pixels are for images alone; take frames = N");
+        refuse!("training.batch: pixels work with images only; use frames = N");
     }
     if file.representation.kind == Kind::LinearGrid || file.training.start != Start::Drawn {
         linear(file)?;

@@ -33,7 +33,9 @@ impl Measured {
             }
             let weight = loss.weight;
             match loss.data {
-                LossKind::Image if data.image.is_some() => refuse!("loss {k}: image again"),
+                LossKind::Image if data.image.is_some() => {
+                    refuse!("loss {k}: there is already a loss of images")
+                }
                 LossKind::Image => {
                     let term = Box::new(self.image(loss, pixels).within(name())?);
                     data.image = Some(Weighted { weight, term });

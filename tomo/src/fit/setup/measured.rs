@@ -59,13 +59,13 @@ impl Measured {
     pub fn check_origin(file: &FitFile) -> Result<()> {
         match (&file.data, &file.truth) {
             (Some(_), Some(_)) => {
-                refuse!("truth and data exclude each other: simulate, or read")
+                refuse!("truth and data exclude each other: give one of them")
             }
             (None, None) => refuse!(
                 "there is neither truth (to simulate) nor data (to read): {SPOT}; or {FILE}"
             ),
             (Some(_), None) if !file.world.is_empty() => {
-                refuse!("world is for simulated data: there is no truth")
+                refuse!("world needs simulated data: add a truth")
             }
             _ => Ok(()),
         }
@@ -79,7 +79,7 @@ impl Measured {
         let (times, n) = (frames(file)?, file.screen.pixels);
         if (movie.grid.width, movie.grid.height) != (n, n) || movie.frames() != times.len() {
             refuse!(
-                "{name} has {} frames of {} x {} pixels: movie.frames and screen.pixels say {} of {n} x {n}",
+                "{name} has {} frames of {} x {} pixels, but movie.frames and screen.pixels say {} of {n} x {n}",
                 movie.frames(),
                 movie.grid.width,
                 movie.grid.height,
@@ -138,7 +138,11 @@ fn frames(file: &FitFile) -> Result<Vec<f64>> {
     let movie = file.movie.as_ref().ok_or_else(missing)?;
     let n = movie.frames;
     if !(movie.from.is_finite() && movie.to.is_finite() && (n == 1 || movie.to > movie.from)) {
-        refuse!("movie: from = {}, to = {} are not allowed: growing", movie.from, movie.to);
+        refuse!(
+            "movie: from = {}, to = {} are not allowed: from must be below to",
+            movie.from,
+            movie.to
+        );
     }
     let step = (movie.to - movie.from) / (n.max(2) - 1) as f64;
     Ok((0..n).map(|k| movie.from + step * k as f64).collect())
@@ -205,7 +209,7 @@ fn clock(seen: &Seen) -> Result<(Clock, [f64; 2])> {
         (Some(hours), None) => Ok((Clock::Utc, hours)),
         (None, Some(hours)) => Ok((Clock::Gmst, hours)),
         (Some(_), Some(_)) => refuse!(
-            "observation.gmst is not allowed: observation.utc is given too, and one is enough"
+            "observation.gmst is not allowed together with observation.utc"
         ),
         (None, None) => Err(FitError::missing(
             "observation.utc",
@@ -235,7 +239,7 @@ fn lit(truth: &Truth, movie: Vec<f64>) -> Result<Vec<f64>> {
     let brightest = movie.iter().fold(0.0f64, |most, x| most.max(*x));
     if brightest < 1e-30 && !truth.is_dark() {
         refuse!(
-            "the truth shines in no pixel of any frame (the brightest has {brightest:e} Jy): spots must lie in the region \
+            "the truth is dark in every pixel of every frame (the brightest has {brightest:e} Jy): spots must lie in the region \
              (region.r_min, r_max, z_width), be wide enough to meet rays, and shine during the movie (motion.injection_time)"
         );
     }

@@ -23,7 +23,7 @@ pub enum ArrayError {
         message: String,
     },
     /// Fewer than two stations.
-    #[error("{0} stations are no array: at least 2 are needed")]
+    #[error("{0} stations: an array needs at least 2")]
     TooFew(usize),
     /// More stations than a file can number.
     #[error("{0} stations: at most {MOST_STATIONS} are supported")]

@@ -16,7 +16,7 @@ use num_complex::Complex;
 #[non_exhaustive]
 pub enum DataTermError {
     /// A datum with an error of 0, infinity, or so small that its weight is none in single precision.
-    #[error("datum {index}: sigma = {sigma} Jy is not allowed: above 0 and finite")]
+    #[error("data point {index}: sigma = {sigma} Jy is not allowed: above 0 and finite")]
     Sigma {
         /// Which datum, counted from 0.
         index: usize,
@@ -25,7 +25,7 @@ pub enum DataTermError {
     },
     /// An error whose inverse square the precision of the fit cannot hold.
     #[error(
-        "datum {index}: sigma = {sigma} Jy is not allowed: its inverse square overflows the fit's numbers"
+        "data point {index}: sigma = {sigma} Jy is not allowed: its inverse square overflows single precision"
     )]
     Overflow {
         /// Which datum, counted from 0.
@@ -34,7 +34,7 @@ pub enum DataTermError {
         sigma: f64,
     },
     /// A visibility that is not a finite number.
-    #[error("datum {0} is not a finite visibility")]
+    #[error("data point {0} is not a finite visibility")]
     NotFinite(usize),
     /// Nothing to compare with.
     #[error("there are no data for this term")]

@@ -168,7 +168,7 @@ fn exact_data_without_errors_are_refused() {
     let mut data = observation(1, 20.0);
     data.rows[3].noise_sigma[0] = 0.0;
     let message = VisibilityTerm::<f64>::new(&data).unwrap_err().to_string();
-    assert!(message.contains("datum 3: sigma = 0"), "{message}");
+    assert!(message.contains("data point 3: sigma = 0"), "{message}");
     data.rows.clear();
     assert_eq!(refusal(AmplitudeTerm::<f32>::new(&data)), DataTermError::Empty);
     assert!(ClosureTerm::<f32>::new(&data, ClosureKind::Phase, 0.0).is_err());
@@ -211,7 +211,7 @@ fn exact_data_that_overflow_or_are_no_numbers_are_refused() {
     data.rows[3].noise_sigma[0] = 1e-25;
     assert!(VisibilityTerm::<f64>::new(&data).is_ok());
     let message = VisibilityTerm::<f32>::new(&data).unwrap_err().to_string();
-    assert!(message.contains("datum 3: sigma = 0.0000000000000000000000001 Jy"), "{message}");
+    assert!(message.contains("data point 3: sigma = 0.0000000000000000000000001 Jy"), "{message}");
     assert!(AmplitudeTerm::<f32>::new(&data).is_err());
     data.rows[3].products[0].re = f64::NAN;
     let not_finite = DataTermError::NotFinite(3);

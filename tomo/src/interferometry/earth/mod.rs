@@ -14,7 +14,7 @@ pub use view::{Frame, SourcePosition, View};
 pub enum EarthError {
     /// A day outside the built-in table of UT1 − UTC.
     #[error(
-        "UT1 - UTC at MJD {mjd} is not in the built-in table (MJD {first} to {last}): give its value"
+        "UT1 - UTC at MJD {mjd} is not in the built-in table (MJD {first} to {last}): give a value"
     )]
     Ut1Unknown {
         /// The day asked for.

@@ -157,7 +157,7 @@ pub struct Observation {
 
 /// A metadatum that an operation needs and the observation does not hold.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("the data do not hold {0}: it has to be given")]
+#[error("the data lack {0}: give it")]
 pub struct Unknown(pub &'static str);
 
 impl Observation {

@@ -25,7 +25,7 @@ impl Judged {
         match self.verdict.outcome {
             Outcome::Explained => format!("The model explains its data: {}.", self.chi2()),
             Outcome::Reproduced => format!(
-                "The model reproduces its noise-free data{}: σ is only a weight, χ² is no test.",
+                "The model reproduces its noise-free data{}: σ is only a weight, so χ² tests nothing.",
                 self.left_over()
             ),
             Outcome::FitsNoise => format!(
@@ -73,13 +73,17 @@ impl Judged {
             }
             Fault::Group(stations, chi2) => {
                 format!(
-                    "{name} of {} alone have χ² {} per datum",
+                    "{name} of {} alone have χ² {} per data point",
                     self.names(stations),
                     short(*chi2)
                 )
             }
             Fault::Frame(frame, chi2) => {
-                format!("{name} of frame {} alone have χ² {} per datum", frame + 1, short(*chi2))
+                format!(
+                    "{name} of frame {} alone have χ² {} per data point",
+                    frame + 1,
+                    short(*chi2)
+                )
             }
             Fault::Flux => self.flux.map_or(String::new(), |flux| {
                 format!(
@@ -100,13 +104,13 @@ impl Judged {
         let mut text = Vec::new();
         if self.verdict.outcome == Outcome::Unexplained {
             text.push(
-                "What is shown below is the best that this fit has found, not what emitted the data: its settings (spin, \
-                 inclination, motion, region), its errors or its training are not right."
+                "What follows is the best solution of this fit, but not a description of the source: the settings (spin, \
+                 inclination, motion, region), the error bars or the training are wrong."
                     .to_owned(),
             );
         }
         if self.terms.iter().any(|(_, tested)| tested.errors == Errors::Assumed) {
-            text.push("σ is a number of the settings: χ² is worth as much as that.".to_owned());
+            text.push("σ is assumed in the settings, not measured; χ² depends on it.".to_owned());
         }
         Notice { tone, headline: self.headline(), text }
     }
@@ -116,7 +120,7 @@ impl Judged {
         let head = [
             "data",
             "number",
-            "χ² per datum",
+            "χ² per data point",
             "expected",
             "mean, σ",
             "correlation in time",
@@ -142,9 +146,9 @@ impl Judged {
         };
         Table {
             title: "Residuals".to_owned(),
-            caption: "Model minus data in units of σ, over all frames. χ² per datum of a right model with honest errors is as \
-                      expected, mean and correlation from frame to frame are 0; where parameters have used up data, χ² is \
-                      smaller."
+            caption: "Model minus data in units of σ, over all frames. With the right model and errors χ² per data point is as \
+                      expected, and the mean and the correlation between frames vanish. Fitted parameters lower χ².\
+                      "
                 .to_owned(),
             head: head.map(str::to_owned).to_vec(),
             rows: self.terms.iter().map(row).collect(),
@@ -152,7 +156,7 @@ impl Judged {
         }
     }
 
-    /// The worst station, group of stations and frame with their χ² per datum.
+    /// The worst station, group of stations and frame with their χ² per data point.
     fn worst(&self, tested: &Tested) -> String {
         let statistics = &tested.statistics;
         let station = worst(statistics.stations.iter())
@@ -165,12 +169,12 @@ impl Judged {
     }
 }
 
-/// `χ² 1.68 per datum of visibilities (1.00 ± 0.02 expected)`.
+/// `χ² 1.68 per data point of visibilities (1.00 ± 0.02 expected)`.
 fn chi2_of(name: &str, tested: &Tested) -> String {
     let Expected { chi2: mean, spread, .. } = tested.expected;
     let chi2 = tested.statistics.chi2().map_or("–".to_owned(), short);
     let assumed = if tested.errors == Errors::Assumed { " with the assumed σ" } else { "" };
-    format!("χ² {chi2} per datum of {name} ({mean:.2} ± {spread:.2} expected{assumed})")
+    format!("χ² {chi2} per data point of {name} ({mean:.2} ± {spread:.2} expected{assumed})")
 }
 
 /// Three digits.

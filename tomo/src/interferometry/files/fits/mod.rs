@@ -39,7 +39,7 @@ impl<'a> Unit<'a> {
         let Some(padded) = padded else {
             return Err(FileError::byte(
                 start,
-                format!("the header tells of {size} bytes of data, the file has {rest}"),
+                format!("the header declares {size} bytes of data, the file has {rest}"),
             ));
         };
         let data = &bytes[start..start + size];
