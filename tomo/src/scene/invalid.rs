@@ -39,15 +39,30 @@ fn line_prefix(line: Option<usize>) -> String {
     line.map(|line| format!("line {line}: ")).unwrap_or_default()
 }
 
+/// Rust's types, of which the parser speaks, and what a value of each has to be.
+const TYPES: [(&str, &str); 9] = [
+    ("f64", "a number"),
+    ("f32", "a number"),
+    ("usize", "a whole number, 0 or more"),
+    ("u64", "a whole number, 0 or more"),
+    ("u32", "a whole number, 0 to 4294967295"),
+    ("u16", "a whole number, 0 to 65535"),
+    ("u8", "a whole number, 0 to 255"),
+    ("i64", "a whole number"),
+    ("i32", "a whole number, -2147483648 to 2147483647"),
+];
+
+/// The parser's message in the user's words.
+pub(crate) fn syntax(error: &toml::de::Error) -> String {
+    let plain = |text: String, (name, meaning): &(&str, &str)| {
+        text.replace(&format!("expected {name}"), &format!("expected {meaning}"))
+    };
+    TYPES.iter().fold(error.to_string().trim_end().to_owned(), plain)
+}
+
 impl SceneError {
     pub(super) fn syntax(error: &toml::de::Error) -> Self {
-        // The parser speaks of Rust's types.
-        let text = error.to_string();
-        let text = text.replace("expected f64", "expected a number");
-        let text = text.replace("expected f32", "expected a number");
-        let text = text.replace("expected u32", "expected a whole number, 0 or more");
-        let text = text.replace("expected u64", "expected a whole number, 0 or more");
-        SceneError::Syntax(text.trim_end().to_owned())
+        SceneError::Syntax(syntax(error))
     }
 
     /// The same without a line: that of a text which the user never saw.

@@ -14,6 +14,7 @@ mod sources;
 
 pub use crate::dynamics::{Perturbed, Velocity};
 pub use camera::{CameraConfig, CameraKey, CameraMotion, Pose};
+pub(crate) use invalid::syntax;
 pub use invalid::{SceneError, line_of, shown};
 pub use overrides::apply_override;
 pub use rotation::Rotation;

@@ -98,7 +98,9 @@ fn unknown_keys_and_wrong_types_name_the_line() {
     let text = error("spin = 0.9", "spinn = 0.9");
     assert!(text.contains("line 3") && text.contains("spinn") && text.contains("`spin`"), "{text}");
     let text = error("spin = 0.9", "spin = \"fast\"");
-    assert!(text.contains("line 3") && text.contains("spin"), "{text}");
+    assert!(text.contains("line 3") && text.contains("expected a number"), "{text}");
+    let text = error("width = 64", "width = -3");
+    assert!(text.contains("expected a whole number, 0 to 4294967295"), "{text}");
     let text = error("opaque = true", "opaque = true\n[sky.chequers]\nx = 1");
     assert!(text.contains("chequers") && text.contains("checker"), "{text}");
     let text = error("[hole]", "[hole");

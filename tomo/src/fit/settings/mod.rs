@@ -25,6 +25,7 @@ pub use view::{Absorption, Effects, Hole, Motion, Observer, Region, Screen, Widt
 pub use world::merge;
 
 use crate::Error;
+use crate::scene::syntax;
 use serde::{Deserialize, Serialize};
 
 /// The settings of a fit. Lengths and times in M = GM/c² unless a name says otherwise.
@@ -99,8 +100,7 @@ impl FitFile {
     /// assert!(error.to_string().contains("missing field `hole`"));
     /// ```
     pub fn parse(text: &str) -> Result<Self, Error> {
-        let file = toml::from_str(text)
-            .map_err(|error| FitError::Syntax(error.to_string().trim_end().to_owned()))?;
+        let file = toml::from_str(text).map_err(|error| FitError::Syntax(syntax(&error)))?;
         ranges::check(text)?;
         Ok(file)
     }
