@@ -105,12 +105,12 @@ pub fn write(data: Option<&Path>, to: Option<&Path>) -> anyhow::Result<Answer> {
 fn head(path: &Path, plain: &str) -> String {
     let run = format!("#   kerrlight fit {}\n", path.display());
     let left = if plain.contains("#? ") {
-        "# FILL IN marks settings that decide the result and that the data do not determine. The fit names the first one\n# that is missing.\n"
+        "# Settings marked FILL IN decide the result, and the data do not determine them. The fit names the first one\n# that is missing.\n"
     } else {
         ""
     };
     let assumed = if plain.contains(" #! ") {
-        "# ASSUMED marks settings that decide the result and that the data do not determine: replace them with your own.\n"
+        "# Settings marked ASSUMED decide the result, and the data do not determine them: replace them with your own.\n"
     } else {
         ""
     };
