@@ -71,7 +71,7 @@ impl Gradient {
         [self.spin, self.inclination, self.alpha, self.beta]
     }
 
-    fn of(number: Number) -> Self {
+    pub(crate) fn of(number: Number) -> Self {
         let [spin, inclination, alpha, beta] = number.slope;
         Gradient { spin, inclination, alpha, beta }
     }

@@ -20,7 +20,7 @@ pub(super) const COLUMNS: usize = 8;
 
 /// Legs and panels of rays that are marched together.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Key {
+pub(crate) struct Key {
     /// Whether the last leg is the panel before the horizon.
     pub falls: bool,
     /// Panels of the approach to the sphere.
@@ -46,7 +46,7 @@ impl Key {
 
 /// Far out, where Σ has its double pole at infinity, a panel is `GROWTH` − 1 times as long as the
 /// Mino time since infinity at its start, so that the next one starts at `GROWTH` times that.
-pub(super) const GROWTH: f64 = 3.0;
+pub(crate) const GROWTH: f64 = 3.0;
 
 /// Rays side by side.
 #[derive(Clone, Copy)]
