@@ -4,7 +4,7 @@
 //! [`Nodes`] places nodes on many rays in closed form; this module says how each of them moves.
 //!
 //! ```
-//! use kerrlight_geodesic::node_gradients::{self, NodeGradient};
+//! use kerrlight_geodesic::node_gradients;
 //! use kerrlight_geodesic::simd::{NodeRequest, PanelRule};
 //! use kerrlight_geodesic::{Inclination, Kerr, Observer, Quantities};
 //! let hole = Kerr::new(0.9)?;
@@ -12,9 +12,10 @@
 //! let (rule, quantities) = (PanelRule::new(6), Quantities::ALL);
 //! let request = NodeRequest { radius: 10.0, rule, split: 1, quantities };
 //! let nodes = node_gradients::trace(&hole, &observer, &[-6.0], &[2.0], 1e-12, &request)?;
-//! let NodeGradient { position: [x, _, _], weight, .. } = nodes.ray(0)[0];
-//! println!("dx/da = {} M, dw/di = {} M/rad", x.spin, weight.inclination);
-//! # Ok::<(), kerrlight_geodesic::OutOfRange>(())
+//! let node = nodes.ray(0)[0];
+//! let ([x, _, _], [dx, _, _]) = (node.value.position, node.gradient.position);
+//! println!("x = {x} M, dx/da = {} M, dx/di = {} M/rad", dx.spin, dx.inclination);
+//! # Ok::<(), kerrlight_geodesic::Error>(())
 //! ```
 //!
 //! A derivative follows the node: its Mino time moves with the entry into the sphere and with the turning point or
@@ -23,7 +24,7 @@
 //!
 //! Rays are followed with dual numbers by Taylor series, about 60 µs a ray and 1.5 µs a node.
 
-use crate::error::{OutOfRange, check};
+use crate::error::{Error, check};
 use crate::integrate::path::Path;
 use crate::integrate::trace::{Tracer, trace_series};
 use crate::numbers::dual::Dual;
@@ -40,34 +41,54 @@ use crate::spacetime::point::PathPoint;
 
 type Number = Dual<f64, 4>;
 
-/// How a node moves.
+/// What is known at a node: numbers, or their derivatives.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct NodeGradient {
-    /// Of the point r n (x, y and z, M).
-    pub position: [Gradient; 3],
-    /// Of the arriving photon's angular momentum per energy, k_θ φ̂ − k_φ θ̂/sin θ (x, y and z, M).
-    pub momentum: [Gradient; 3],
-    /// Of the delay, M; 0 unless requested.
-    pub delay: Gradient,
-    /// Of the weight Σ dτ, M.
-    pub weight: Gradient,
+pub struct NodeState<N> {
+    /// The point r n (x, y and z, M).
+    pub position: [N; 3],
+    /// The arriving photon's angular momentum per energy, k_θ φ̂ − k_φ θ̂/sin θ (x, y and z, M).
+    pub momentum: [N; 3],
+    /// t_o − t, M (its finite part for an observer at infinity); 0 unless requested.
+    pub delay: N,
+    /// The weight Σ dτ, M.
+    pub weight: N,
 }
 
-/// Derivatives of the nodes of many rays.
+impl NodeState<Number> {
+    fn map<N>(self, f: impl Fn(Number) -> N) -> NodeState<N> {
+        NodeState {
+            position: self.position.map(&f),
+            momentum: self.momentum.map(&f),
+            delay: f(self.delay),
+            weight: f(self.weight),
+        }
+    }
+}
+
+/// A node, and how it moves.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct DifferentiatedNode {
+    /// Where it is, as [`Nodes`] has it.
+    pub value: NodeState<f64>,
+    /// Its derivatives.
+    pub gradient: NodeState<Gradient>,
+}
+
+/// The nodes of many rays with their derivatives.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct NodeGradients {
+pub struct DifferentiatedNodes {
     ends: Vec<usize>,
-    nodes: Vec<NodeGradient>,
+    nodes: Vec<DifferentiatedNode>,
 }
 
-impl NodeGradients {
+impl DifferentiatedNodes {
     /// Number of rays.
     pub fn rays(&self) -> usize {
         self.ends.len()
     }
 
     /// Those of ray `k`, one for each of [`Nodes::ray`]; none if there is no such ray.
-    pub fn ray(&self, k: usize) -> &[NodeGradient] {
+    pub fn ray(&self, k: usize) -> &[DifferentiatedNode] {
         let end = self.ends.get(k).copied().unwrap_or(0);
         let start = k.checked_sub(1).and_then(|k| self.ends.get(k)).copied().unwrap_or(0);
         self.nodes.get(start..end).unwrap_or(&[])
@@ -93,7 +114,7 @@ pub fn trace(
     beta: &[f64],
     tolerance: f64,
     request: &NodeRequest,
-) -> Result<NodeGradients, OutOfRange> {
+) -> Result<DifferentiatedNodes, Error> {
     check_columns(alpha, beta)?;
     Tracer::new(tolerance)?;
     let a = hole.spin();
@@ -104,12 +125,12 @@ pub fn trace(
         tolerance,
         request,
     };
-    let pieces = in_blocks(alpha, beta, |alpha, beta| -> Result<NodeGradients, OutOfRange> {
+    let pieces = in_blocks(alpha, beta, |alpha, beta| -> Result<DifferentiatedNodes, Error> {
         let mut nodes = Nodes::default();
         nodes.trace(hole, observer, alpha, beta, None, request)?;
         dual.block(&nodes.layouts(), alpha, beta)
     });
-    let mut whole = NodeGradients::default();
+    let mut whole = DifferentiatedNodes::default();
     for piece in pieces {
         whole.append(piece?);
     }
@@ -130,8 +151,8 @@ impl DualRays<'_> {
         layouts: &[Key],
         alpha: &[f64],
         beta: &[f64],
-    ) -> Result<NodeGradients, OutOfRange> {
-        let mut found = NodeGradients::default();
+    ) -> Result<DifferentiatedNodes, Error> {
+        let mut found = DifferentiatedNodes::default();
         let mut path = Path::empty();
         for ((layout, alpha), beta) in layouts.iter().zip(alpha).zip(beta) {
             if layout.sampled() > 0 {
@@ -147,7 +168,12 @@ impl DualRays<'_> {
     }
 
     /// The nodes of a ray, leg after leg.
-    fn nodes(&self, layout: &Key, path: &MinoPath<'_, Number>, nodes: &mut Vec<NodeGradient>) {
+    fn nodes(
+        &self,
+        layout: &Key,
+        path: &MinoPath<'_, Number>,
+        nodes: &mut Vec<DifferentiatedNode>,
+    ) {
         let mut pieces = Vec::new();
         path.within(0.0, self.request.radius, &mut pieces);
         let mut time = pieces.first().map_or(Number::constant(0.0), |piece| piece[0]);
@@ -202,7 +228,7 @@ impl DualRays<'_> {
         path: &MinoPath<'_, Number>,
         [start, length]: [Number; 2],
         falls: bool,
-        nodes: &mut Vec<NodeGradient>,
+        nodes: &mut Vec<DifferentiatedNode>,
     ) {
         let rule = &self.request.rule;
         for (s, weight) in rule.nodes().iter().zip(rule.weights()) {
@@ -212,20 +238,17 @@ impl DualRays<'_> {
         }
     }
 
-    fn node(&self, point: &PathPoint<Number>, step: Number) -> NodeGradient {
+    fn node(&self, point: &PathPoint<Number>, step: Number) -> DifferentiatedNode {
         let ([x, y, z], [a, b, c]) = (point.direction, point.velocity);
-        // −n × velocity.
-        let momentum = [z * b - y * c, x * c - z * a, y * a - x * b];
-        NodeGradient {
-            position: point.cartesian().map(Gradient::of),
-            momentum: momentum.map(Gradient::of),
-            delay: if self.request.quantities.time {
-                Gradient::of(point.delay)
-            } else {
-                Gradient::default()
-            },
-            weight: Gradient::of(self.hole.sigma(point.radius(), point.cos_theta()) * step),
-        }
+        let state = NodeState {
+            position: point.cartesian(),
+            // −n × velocity.
+            momentum: [z * b - y * c, x * c - z * a, y * a - x * b],
+            delay: point.delay,
+            weight: self.hole.sigma(point.radius(), point.cos_theta()) * step,
+        };
+        let value = state.map(|number| number.value);
+        DifferentiatedNode { value, gradient: state.map(Gradient::of) }
     }
 }
 
@@ -267,7 +290,7 @@ mod tests {
         (0..ray.radius.len()).map(|i| numbers(&ray, i, lambda)).collect()
     }
 
-    fn slopes(node: &NodeGradient, parameter: usize) -> [f64; 8] {
+    fn slopes(node: &NodeState<Gradient>, parameter: usize) -> [f64; 8] {
         let of = |gradient: Gradient| gradient.to_array()[parameter];
         let [[x, y, z], [a, b, c]] = [node.position.map(of), node.momentum.map(of)];
         [x, y, z, a, b, c, of(node.delay), of(node.weight)]
@@ -291,7 +314,19 @@ mod tests {
             };
             let [a, b, c, d] = [-2.0, -1.0, 1.0, 2.0].map(moved);
             for (k, node) in found.ray(0).iter().enumerate() {
-                for (c8, slope) in slopes(node, parameter).into_iter().enumerate() {
+                let NodeState { position: [x, y, z], momentum: [u, v, w], delay, weight } =
+                    node.value;
+                let here = nodes(place, distance, &request)[k];
+                // Azimuths diverge logarithmically at the horizon.
+                let near = x.hypot(y).hypot(z) < hole.horizon() + 0.05;
+                let tolerance = if near { 1e-8 } else { 1e-10 };
+                for (found, here) in [x, y, z, u, v, w, delay, weight].into_iter().zip(here) {
+                    assert!(
+                        (found - here).abs() < 1e-10 * (1.0 + here.abs()),
+                        "{place:?}: {found} {here}"
+                    );
+                }
+                for (c8, slope) in slopes(&node.gradient, parameter).into_iter().enumerate() {
                     let difference =
                         (a[k][c8] - d[k][c8] + 8.0 * (c[k][c8] - b[k][c8])) / (12.0 * h);
                     let scale = 1.0 + slope.abs();
@@ -322,9 +357,9 @@ mod tests {
         let request = NodeRequest { radius: 10.0, rule, split: 1, quantities: Quantities::ALL };
         let extreme = Kerr::new(1.0).unwrap();
         let error = trace(&extreme, &observer, &[1.0], &[1.0], 1e-12, &request).unwrap_err();
-        assert_eq!(error.field, "spin");
+        assert_eq!(error.field(), "spin");
         let error = trace(&hole, &observer, &[1.0], &[], 1e-12, &request).unwrap_err();
-        assert_eq!(error.field, "number of beta");
+        assert_eq!(error.field(), "number of beta");
         let none = NodeRequest { radius: 0.5, ..request };
         assert!(trace(&hole, &observer, &[1.0], &[1.0], 1e-12, &none).is_err());
     }
