@@ -29,6 +29,13 @@ pub enum AngularVelocity {
         /// Radians a unit of time.
         rates: Vec<f64>,
     },
+    /// Another one, faster by a factor.
+    Scaled {
+        /// The other one.
+        of: Box<AngularVelocity>,
+        /// Dimensionless.
+        factor: f64,
+    },
 }
 
 impl AngularVelocity {
@@ -51,6 +58,10 @@ impl AngularVelocity {
                 finite("rate", *rate),
                 finite("exponent", *exponent),
             ]),
+            Self::Scaled { of, factor } => {
+                of.clone().checked()?;
+                first_wrong([finite("factor", *factor)])
+            }
             Self::Table { radii, rates } => {
                 let (r, v) = (radii.len(), rates.len());
                 let length = ("rates", v as f64, r == v && v > 0, "as many as radii, 1 or more");
@@ -72,6 +83,7 @@ impl AngularVelocity {
             Self::Keplerian { drag } => 1.0 / (r.powf(1.5) + drag),
             Self::PowerLaw { radius, rate, exponent } => rate * (radius / r).powf(*exponent),
             Self::Table { .. } => self.interpolated(r).0,
+            Self::Scaled { of, factor } => factor * of.rate(r),
         }
     }
 
@@ -81,6 +93,7 @@ impl AngularVelocity {
             Self::Keplerian { .. } => -1.5 * r.sqrt() * self.rate(r).powi(2),
             Self::PowerLaw { exponent, .. } => -exponent / r * self.rate(r),
             Self::Table { .. } => self.interpolated(r).1,
+            Self::Scaled { of, factor } => factor * of.slope(r),
         }
     }
 

@@ -60,6 +60,7 @@ mod terms;
 mod tests;
 mod train;
 pub mod verdict;
+pub mod world;
 
 pub use batch::{Batch, Columns};
 pub use forward_model::{Field, ForwardModel, Motion, Redshift};

@@ -164,12 +164,12 @@ impl Sightlines {
         [0, 1, 2].map(|c| self.position[c][k])
     }
 
-    fn push(&mut self, point: [f64; 3], weight: f64) {
+    pub(super) fn push(&mut self, point: [f64; 3], weight: f64) {
         self.position.iter_mut().zip(point).for_each(|(column, x)| column.push(x));
         self.weight.push(weight);
     }
 
-    fn end_ray(&mut self, pixel: usize) {
+    pub(super) fn end_ray(&mut self, pixel: usize) {
         if self.weight.len() > *self.starts.last().unwrap_or(&0) {
             self.starts.push(self.weight.len());
             self.pixel.push(pixel as u32);

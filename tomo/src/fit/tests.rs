@@ -108,8 +108,8 @@ fn grid() -> Grid {
 
 /// A field without kinks, so that differences converge: Σ a exp(−|x − c|²/8), four parameters and, of
 /// events, one for the time a blob.
-struct Blobs {
-    dimension: usize,
+pub(super) struct Blobs {
+    pub dimension: usize,
 }
 
 const BLOBS: usize = 3;

@@ -1,0 +1,155 @@
+//! Derivatives of images and losses with respect to the world, for any representation.
+
+use super::Tangents;
+use crate::dynamics::{Axis, Cotangents, Turned, pull_back_vjp};
+use crate::fit::batch::Batch;
+use crate::fit::{Field, ForwardModel};
+use crate::points::{Coordinates, CoordinatesMut};
+use crate::representation::{Gradient, Workspace};
+use crate::simd::Float;
+
+/// What a loss changes by where the points of a batch change.
+#[derive(Default)]
+pub(crate) struct PointCotangents<T> {
+    /// With respect to the places where emission is evaluated, and its times.
+    pub coordinates: [Vec<T>; 4],
+    /// With respect to the weights.
+    pub weights: Vec<T>,
+    angles: Vec<T>,
+    places: [Vec<T>; 3],
+}
+
+impl<T: Float> PointCotangents<T> {
+    /// From pulled-back points to the points themselves, with their angles held, and to the angles.
+    fn pull(&mut self, batch: &Batch<T>, axis: Axis, dimension: usize) {
+        let count = batch.points();
+        let [a, b, c, _] = &self.coordinates;
+        self.angles.clear();
+        self.angles.resize(count, T::zero());
+        if dimension == 4 {
+            for (place, coordinate) in self.places.iter_mut().zip([a, b, c]) {
+                place.clone_from(coordinate);
+            }
+            return;
+        }
+        for place in &mut self.places {
+            place.clear();
+            place.resize(count, T::zero());
+        }
+        let [x, y, z] = &batch.columns.position;
+        let turned = Turned { points: Coordinates::xyz(x, y, z), angles: &batch.columns.angle };
+        let [u, v, w] = &mut self.places;
+        let wanted = Cotangents {
+            angles: Some(&mut self.angles),
+            points: Some(CoordinatesMut::xyz(u, v, w)),
+        };
+        pull_back_vjp(axis, turned, Coordinates::xyz(a, b, c), wanted);
+    }
+
+    /// Hands over, pair after pair of the batch, what the loss changes by per unit of each parameter.
+    pub fn contract(
+        &mut self,
+        model: &ForwardModel<T>,
+        batch: &Batch<T>,
+        (axis, dimension): (Axis, usize),
+        tangents: &Tangents,
+        mut pair: impl FnMut(usize, &[f64]),
+    ) {
+        self.pull(batch, axis, dimension);
+        let free = tangents.free.len();
+        let mut sums = vec![0.0; free];
+        for (group, (_, frame)) in batch.pairs.iter().enumerate() {
+            sums.fill(0.0);
+            let time = model.times[*frame as usize].double();
+            for point in batch.starts[group]..batch.starts[group + 1] {
+                self.point(model, batch, (point, time), tangents, &mut sums);
+            }
+            pair(group, &sums);
+        }
+    }
+
+    #[inline(always)]
+    fn point(
+        &self,
+        model: &ForwardModel<T>,
+        batch: &Batch<T>,
+        (point, frame_time): (usize, f64),
+        tangents: &Tangents,
+        sums: &mut [f64],
+    ) {
+        let node = batch.columns.node[point] as usize;
+        let rate = model.rate[node].double();
+        let of_weight = self.weights[point].double();
+        let of_angle = self.angles[point].double();
+        let of_place = [0, 1, 2].map(|c| self.places[c][point].double());
+        let of_rate = of_angle * batch.columns.time[point].double();
+        let of_time =
+            of_angle * rate + self.coordinates[3].get(point).map_or(0.0, |slope| slope.double());
+        let moves = &tangents.moves[node * sums.len()..(node + 1) * sums.len()];
+        for (sum, by) in sums.iter_mut().zip(moves) {
+            let [x, y, z] = by.position;
+            *sum += of_place[0] * x + of_place[1] * y + of_place[2] * z;
+            *sum += of_weight * by.weight + of_rate * by.rate + of_time * by.time;
+        }
+        if let Some((place, mass)) = tangents.mass {
+            // Times go like 1/mass.
+            sums[place] -= of_time * frame_time / mass;
+        }
+    }
+}
+
+/// Derivatives of images.
+#[derive(Default)]
+pub struct WorldBuffers<T> {
+    batch: Batch<T>,
+    workspace: Workspace,
+    cotangents: PointCotangents<T>,
+    parameters: Vec<T>,
+    values: Vec<T>,
+}
+
+impl<T: Float> ForwardModel<T> {
+    /// What the pixels of a frame change by per unit of each parameter of the world: image after image. Costs an
+    /// evaluation of the field with its gradient at every node.
+    pub fn image_tangents(
+        &self,
+        field: Field<'_, T>,
+        frame: usize,
+        tangents: &Tangents,
+        buffers: &mut WorldBuffers<T>,
+    ) -> Vec<Vec<T>> {
+        let WorldBuffers { batch, workspace, cotangents, parameters, values } = buffers;
+        batch.set((0..self.rays()).map(|ray| (ray as u32, frame as u32)));
+        batch.gather(self, field.axis, field.occupancy);
+        let (count, dimension) = (batch.points(), field.representation.dimension());
+        values.resize(count, T::zero());
+        let at = Batch::coordinates(&batch.columns, dimension);
+        field.representation.eval(field.parameters, at, values, workspace);
+        for column in &mut cotangents.coordinates {
+            column.clear();
+        }
+        for column in &mut cotangents.coordinates[..dimension] {
+            column.resize(count, T::zero());
+        }
+        // Parameters have gradients too, which nobody looks at.
+        parameters.resize(field.parameters.len(), T::zero());
+        let [x, y, z, t] = &mut cotangents.coordinates;
+        let coordinates = match dimension {
+            4 => CoordinatesMut::txyz(t, x, y, z),
+            _ => CoordinatesMut::xyz(x, y, z),
+        };
+        let into = Gradient { parameters, coordinates: Some(coordinates) };
+        let weights = &batch.columns.weight;
+        field.representation.vjp(field.parameters, at, weights, into, workspace);
+        cotangents.weights.clone_from(values);
+        let mut images = vec![vec![T::zero(); self.pixels()]; tangents.free.len()];
+        let pixels = self.pixel();
+        cotangents.contract(self, batch, (field.axis, dimension), tangents, |group, slopes| {
+            let pixel = pixels[batch.pairs[group].0 as usize] as usize;
+            for (image, slope) in images.iter_mut().zip(slopes) {
+                image[pixel] = T::of(*slope);
+            }
+        });
+        images
+    }
+}

@@ -1,0 +1,162 @@
+//! What a fit may not know of the world beside the emission: the hole, the view of it, and how matter moves.
+//!
+//! [`World`] is a point in the space of these parameters, [`WorldModel`] makes a forward model of it, and
+//! [`Tangents`] say how each node moves with each parameter, so that images, χ² and gradients follow exactly.
+
+mod derivative;
+mod model;
+mod prior;
+mod redshift;
+mod tangents;
+#[cfg(test)]
+mod tests;
+
+pub use derivative::WorldBuffers;
+pub use model::{Law, WorldModel};
+pub use prior::Prior;
+pub use tangents::Tangents;
+
+use core::f64::consts::{PI, TAU};
+use kerrlight_geodesic::{Dual, Error};
+
+/// A parameter of the world.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Parameter {
+    /// a, M; negative where matter that turns right-handed about the axis is retrograde.
+    Spin,
+    /// Angle from the spin axis to the observer, radians.
+    Inclination,
+    /// Of the spin axis on the sky, radians east of north (anticlockwise on images with north up).
+    PositionAngle,
+    /// Where the hole is on the screen, M of the reference mass to the right (west).
+    OffsetX,
+    /// The same, upwards (north).
+    OffsetY,
+    /// Mass over the reference mass, dimensionless: the unit of time, and the angular size at the same distance.
+    Mass,
+    /// Angular velocity over that of the law, dimensionless: below 1, sub-Keplerian.
+    Rotation,
+    /// Power of g that emission goes with, dimensionless: 2 + spectral index.
+    RedshiftPower,
+}
+
+/// Number of parameters.
+pub const PARAMETERS: usize = 8;
+
+/// A number with its derivatives with respect to all parameters.
+pub(super) type Number = Dual<f64, PARAMETERS>;
+
+impl Parameter {
+    /// All of them, in the order of [`World`].
+    pub const ALL: [Parameter; PARAMETERS] = [
+        Parameter::Spin,
+        Parameter::Inclination,
+        Parameter::PositionAngle,
+        Parameter::OffsetX,
+        Parameter::OffsetY,
+        Parameter::Mass,
+        Parameter::Rotation,
+        Parameter::RedshiftPower,
+    ];
+
+    /// Its place in [`World`].
+    pub fn index(self) -> usize {
+        self as usize
+    }
+
+    /// What settings and results call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Parameter::Spin => "spin",
+            Parameter::Inclination => "inclination_deg",
+            Parameter::PositionAngle => "position_angle_deg",
+            Parameter::OffsetX => "offset_x",
+            Parameter::OffsetY => "offset_y",
+            Parameter::Mass => "mass_factor",
+            Parameter::Rotation => "rotation_factor",
+            Parameter::RedshiftPower => "redshift_power",
+        }
+    }
+
+    /// What one of settings and results is in [`World`]: a degree is π/180.
+    pub fn unit(self) -> f64 {
+        match self {
+            Parameter::Inclination | Parameter::PositionAngle => PI / 180.0,
+            _ => 1.0,
+        }
+    }
+
+    /// Least and largest value that a model exists for.
+    pub fn range(self) -> [f64; 2] {
+        match self {
+            // Derivatives end where the horizons meet.
+            Parameter::Spin => [-0.999, 0.999],
+            Parameter::Inclination => [0.0, PI],
+            Parameter::PositionAngle => [-TAU, TAU],
+            Parameter::OffsetX | Parameter::OffsetY => [-1e3, 1e3],
+            Parameter::Mass => [1e-3, 1e3],
+            Parameter::Rotation => [-10.0, 10.0],
+            Parameter::RedshiftPower => [-10.0, 10.0],
+        }
+    }
+
+    /// A step that changes images by about as much as one of any other parameter.
+    pub fn scale(self) -> f64 {
+        match self {
+            Parameter::Spin => 0.3,
+            Parameter::Inclination | Parameter::PositionAngle => 0.2,
+            Parameter::OffsetX | Parameter::OffsetY => 0.5,
+            Parameter::Mass | Parameter::Rotation => 0.1,
+            Parameter::RedshiftPower => 0.5,
+        }
+    }
+}
+
+/// A value of every parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct World([f64; PARAMETERS]);
+
+impl World {
+    /// A hole of the reference mass in the middle of the screen, its spin towards north, matter as fast as the law.
+    pub fn new(spin: f64, inclination: f64, redshift_power: f64) -> Self {
+        World([spin, inclination, 0.0, 0.0, 0.0, 1.0, 1.0, redshift_power])
+    }
+
+    /// Of a parameter.
+    pub fn get(&self, parameter: Parameter) -> f64 {
+        self.0[parameter.index()]
+    }
+
+    /// The same with another value of a parameter.
+    pub fn with(mut self, parameter: Parameter, value: f64) -> Self {
+        self.0[parameter.index()] = value;
+        self
+    }
+
+    /// Itself, if every value is in its range.
+    ///
+    /// # Errors
+    /// Names the parameter that is not.
+    pub fn checked(self) -> Result<Self, Error> {
+        for parameter in Parameter::ALL {
+            let ([low, high], value) = (parameter.range(), self.get(parameter));
+            if !(low..=high).contains(&value) {
+                let allowed = match parameter {
+                    Parameter::Spin => "-0.999 to 0.999",
+                    Parameter::Inclination => "0 to pi radians",
+                    Parameter::PositionAngle => "-2 pi to 2 pi radians",
+                    Parameter::OffsetX | Parameter::OffsetY => "-1000 to 1000 M",
+                    Parameter::Mass => "0.001 to 1000",
+                    Parameter::Rotation | Parameter::RedshiftPower => "-10 to 10",
+                };
+                return Err(Error::out_of_range(parameter.name(), value, allowed));
+            }
+        }
+        Ok(self)
+    }
+
+    /// All values, each the parameter of its own derivative.
+    pub(super) fn numbers(&self) -> [Number; PARAMETERS] {
+        core::array::from_fn(|k| Number::parameter(self.0[k], k))
+    }
+}

@@ -1,0 +1,153 @@
+//! What is thought about a parameter of the world before any data.
+
+use kerrlight_geodesic::Error;
+
+/// A probability density.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Prior {
+    /// The same everywhere between two values.
+    Uniform {
+        /// Least value.
+        low: f64,
+        /// Largest value.
+        high: f64,
+    },
+    /// A bell curve.
+    Normal {
+        /// Its middle.
+        mean: f64,
+        /// Its standard deviation, above 0.
+        sigma: f64,
+    },
+    /// A bell curve of the logarithm.
+    LogNormal {
+        /// The median, above 0.
+        median: f64,
+        /// Standard deviation of ln x, above 0.
+        sigma: f64,
+    },
+    /// Of an inclination whose axis may point anywhere: sin i between two angles in radians.
+    Isotropic {
+        /// Least inclination.
+        low: f64,
+        /// Largest inclination.
+        high: f64,
+    },
+}
+
+/// −ln p up to a constant, with its first and second derivative.
+pub type Penalty = [f64; 3];
+
+impl Prior {
+    /// Least and largest value that is possible.
+    pub fn bounds(&self) -> [f64; 2] {
+        match *self {
+            Prior::Uniform { low, high } | Prior::Isotropic { low, high } => [low, high],
+            Prior::Normal { .. } => [f64::NEG_INFINITY, f64::INFINITY],
+            Prior::LogNormal { .. } => [f64::MIN_POSITIVE, f64::INFINITY],
+        }
+    }
+
+    /// −ln p(x), infinite where x is not possible.
+    pub fn penalty(&self, x: f64) -> Penalty {
+        let [low, high] = self.bounds();
+        if !(low..=high).contains(&x) {
+            return [f64::INFINITY, 0.0, 0.0];
+        }
+        match *self {
+            Prior::Uniform { .. } => [0.0; 3],
+            Prior::Normal { mean, sigma } => {
+                let (u, weight) = ((x - mean) / sigma, 1.0 / sigma);
+                [0.5 * u * u, u * weight, weight * weight]
+            }
+            Prior::LogNormal { median, sigma } => {
+                let u = (x / median).ln() / sigma;
+                let (slope, square) = (u / (sigma * x), (sigma * x).powi(-2));
+                [0.5 * u * u + x.ln(), slope + 1.0 / x, square - slope / x - x.powi(-2)]
+            }
+            Prior::Isotropic { .. } => {
+                // At the poles, where p = 0, only just not impossible.
+                let sin = x.sin().max(1e-6);
+                [-sin.ln(), -x.cos() / sin, sin.powi(-2)]
+            }
+        }
+    }
+
+    /// The value below which a part `share` of the probability lies, for starts and draws.
+    pub fn quantile(&self, share: f64) -> f64 {
+        let normal = |share: f64| {
+            // A logistic curve within 0.02 of the normal one: these are places to start from.
+            (share.clamp(1e-6, 1.0 - 1e-6) / (1.0 - share.clamp(1e-6, 1.0 - 1e-6))).ln() / 1.702
+        };
+        match *self {
+            Prior::Uniform { low, high } => low + (high - low) * share,
+            Prior::Normal { mean, sigma } => mean + sigma * normal(share),
+            Prior::LogNormal { median, sigma } => median * (sigma * normal(share)).exp(),
+            Prior::Isotropic { low, high } => {
+                (low.cos() + (high.cos() - low.cos()) * share).clamp(-1.0, 1.0).acos()
+            }
+        }
+    }
+
+    /// Itself, if its numbers make a density.
+    ///
+    /// # Errors
+    /// Names the number that is out of its range.
+    pub fn checked(self) -> Result<Self, Error> {
+        let wrong = |field, value, allowed| Err(Error::out_of_range(field, value, allowed));
+        match self {
+            Prior::Uniform { low, high } | Prior::Isotropic { low, high } => {
+                if !(low.is_finite() && high.is_finite() && high > low) {
+                    return wrong("high", high, "above low");
+                }
+            }
+            Prior::Normal { mean, sigma } => {
+                if !mean.is_finite() {
+                    return wrong("mean", mean, "a finite number");
+                }
+                if !(sigma > 0.0 && sigma.is_finite()) {
+                    return wrong("sigma", sigma, "above 0");
+                }
+            }
+            Prior::LogNormal { median, sigma } => {
+                if !(median > 0.0 && median.is_finite()) {
+                    return wrong("median", median, "above 0");
+                }
+                if !(sigma > 0.0 && sigma.is_finite()) {
+                    return wrong("sigma", sigma, "above 0");
+                }
+            }
+        }
+        Ok(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exact_derivatives_of_priors_are_those_of_differences() {
+        let priors = [
+            (Prior::Normal { mean: 0.3, sigma: 0.2 }, 0.7),
+            (Prior::LogNormal { median: 1.2, sigma: 0.4 }, 0.8),
+            (Prior::Isotropic { low: 0.0, high: 3.0 }, 1.1),
+        ];
+        for (prior, x) in priors {
+            let at = |h: f64| prior.penalty(x + h)[0];
+            let [_, slope, curvature] = prior.penalty(x);
+            let h = 1e-4;
+            assert!(((at(h) - at(-h)) / (2.0 * h) - slope).abs() < 1e-6, "{prior:?}");
+            let second = (at(h) - 2.0 * at(0.0) + at(-h)) / (h * h);
+            assert!((second - curvature).abs() < 1e-5 * curvature.abs(), "{prior:?}");
+        }
+    }
+
+    #[test]
+    fn exact_quantiles_of_a_direction_share_the_sphere() {
+        let whole = Prior::Isotropic { low: 0.0, high: core::f64::consts::PI };
+        assert!((whole.quantile(0.25) - 0.5f64.acos()).abs() < 1e-12);
+        assert_eq!(Prior::Uniform { low: -1.0, high: 3.0 }.quantile(0.5), 1.0);
+        assert!(whole.penalty(-0.1)[0].is_infinite());
+    }
+}

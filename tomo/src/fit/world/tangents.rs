@@ -1,0 +1,128 @@
+//! How the nodes of all rays move with the parameters of the world.
+
+use super::redshift::Gas;
+use super::{Number, PARAMETERS, Parameter, World, WorldModel};
+use crate::fit::Sightlines;
+use kerrlight_geodesic::derivatives::Gradient;
+use kerrlight_geodesic::node_gradients::{DifferentiatedNode, DifferentiatedNodes};
+use kerrlight_geodesic::{Elementary, Scalar};
+
+/// Derivatives of what a node is to the forward model, with respect to one parameter.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Move {
+    /// Of its place, M.
+    pub position: [f64; 3],
+    /// Of its weight, redshift included, Jy a pixel.
+    pub weight: f64,
+    /// Of the rate by which it is turned back, radians per M.
+    pub rate: f64,
+    /// Of the time of emission in any frame, M.
+    pub time: f64,
+}
+
+/// Derivatives of every node with respect to some parameters.
+#[derive(Clone, Debug, Default)]
+pub struct Tangents {
+    /// The parameters.
+    pub free: Vec<Parameter>,
+    /// Of node k with respect to parameter p: `moves[k * free.len() + p]`.
+    pub(super) moves: Vec<Move>,
+    /// ln(mass) is by how much the frames' times shrink, if that is free.
+    pub(super) mass: Option<(usize, f64)>,
+}
+
+impl Tangents {
+    /// The nodes inside the region, and how they move.
+    pub(super) fn new(
+        model: &WorldModel,
+        world: &World,
+        free: &[Parameter],
+        nodes: &DifferentiatedNodes,
+    ) -> (Sightlines, Self) {
+        let pixels = nodes.rays();
+        let mut lines = Sightlines { pixels, starts: vec![0], ..Sightlines::default() };
+        let mass = free.iter().position(|parameter| *parameter == Parameter::Mass);
+        let mass = mass.map(|place| (place, world.get(Parameter::Mass)));
+        let mut tangents = Tangents { free: free.to_vec(), moves: Vec::new(), mass };
+        let mut builder =
+            Builder { model, numbers: world.numbers(), ray: [Number::constant(0.0); 2] };
+        for pixel in 0..pixels {
+            builder.ray = model.place(&builder.numbers, pixel);
+            for node in nodes.ray(pixel).iter().filter(|n| model.region.holds(n.value.position)) {
+                builder.push(node, &mut lines);
+                let moves = builder.moves(node);
+                tangents.moves.extend(free.iter().map(|parameter| moves[parameter.index()]));
+            }
+            lines.end_ray(pixel);
+        }
+        (lines, tangents)
+    }
+}
+
+/// What the nodes of a ray share.
+struct Builder<'a> {
+    model: &'a WorldModel,
+    numbers: [Number; PARAMETERS],
+    /// α and β.
+    ray: [Number; 2],
+}
+
+impl Builder<'_> {
+    fn push(&self, node: &DifferentiatedNode, lines: &mut Sightlines) {
+        lines.push(node.value.position, self.model.jy * node.value.weight);
+        if self.model.slow_light {
+            lines.delay.push(node.value.delay - self.flight());
+        }
+        if self.model.redshift {
+            let columns = lines.momentum.iter_mut().zip(node.value.momentum);
+            columns.for_each(|(column, x)| column.push(x));
+        }
+    }
+
+    /// What the time of flight from a finite radius has in excess of its finite part.
+    fn flight(&self) -> f64 {
+        self.model.observer_radius.map_or(0.0, |radius| radius + 2.0 * radius.ln())
+    }
+
+    /// A number of a node, by way of spin, inclination, α and β, with respect to all parameters.
+    fn number(&self, value: f64, gradient: Gradient) -> Number {
+        let [alpha, beta] = self.ray;
+        let mut slope = core::array::from_fn(|k| {
+            gradient.alpha * alpha.slope[k] + gradient.beta * beta.slope[k]
+        });
+        slope[Parameter::Spin.index()] += gradient.spin;
+        slope[Parameter::Inclination.index()] += gradient.inclination;
+        Number { value, slope }
+    }
+
+    fn moves(&self, node: &DifferentiatedNode) -> [Move; PARAMETERS] {
+        let (at, by) = (&node.value, &node.gradient);
+        let vector = |at: [f64; 3], by: [Gradient; 3]| [0, 1, 2].map(|c| self.number(at[c], by[c]));
+        let of = |parameter: Parameter| self.numbers[parameter.index()];
+        let position = vector(at.position, by.position);
+        let [x, y, z] = position;
+        let r = (x * x + y * y + z * z).sqrt();
+        let spin = of(Parameter::Spin);
+        let velocity = self.model.law.rate(r, spin, of(Parameter::Rotation));
+        let plain = self.number(at.weight, by.weight) * Number::constant(self.model.jy);
+        let momentum = vector(at.momentum, by.momentum);
+        let gas = Gas { position, momentum, spin, velocity };
+        let weight = if self.model.redshift { self.shifted(&gas, plain) } else { plain };
+        let delay = self.number(at.delay, by.delay);
+        core::array::from_fn(|k| Move {
+            position: [0, 1, 2].map(|c| position[c].slope[k]),
+            weight: weight.slope[k],
+            rate: -velocity.slope[k],
+            time: if self.model.slow_light { -delay.slope[k] } else { 0.0 },
+        })
+    }
+
+    /// Weight times g^power: dark where the gas would be faster than light.
+    fn shifted(&self, gas: &Gas<Number>, plain: Number) -> Number {
+        let power = self.numbers[Parameter::RedshiftPower.index()];
+        let Some(g) = gas.redshift(self.model.axis.vector()) else { return Number::constant(0.0) };
+        let exponent = power * g.ln();
+        let value = exponent.value.exp();
+        plain * Number { value, slope: exponent.slope.map(|slope| value * slope) }
+    }
+}

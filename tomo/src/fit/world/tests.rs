@@ -1,0 +1,133 @@
+//! Derivatives of images with respect to the world against central differences, in double precision.
+
+use super::*;
+use crate::dynamics::{AngularVelocity, Axis};
+use crate::fit::tests::Blobs;
+use crate::fit::{Batch, Field, ForwardModel, Motion, Region};
+use crate::representation::{Representation, Workspace};
+
+fn model(law: Law) -> WorldModel {
+    // Rays that stay where gas on circular orbits is slower than light: beyond, weights have a kink.
+    let at = |k: usize| {
+        let (sin, cos) = (0.7 * k as f64).sin_cos();
+        ((7.0 + 0.15 * k as f64) * cos, (7.0 + 0.15 * k as f64) * sin)
+    };
+    let (x, y) = (0..30).map(at).unzip();
+    WorldModel {
+        x,
+        y,
+        observer_radius: None,
+        region: Region { r_min: 0.0, r_max: 17.0, z_width: f64::INFINITY },
+        order: 14,
+        split: 1,
+        slow_light: true,
+        redshift: true,
+        law,
+        axis: Axis::new([0.1, -0.2, 1.0]).unwrap(),
+        motion: Motion {
+            velocity: AngularVelocity::Keplerian { drag: 0.0 },
+            reference: 3.0,
+            injection: None,
+            times: vec![0.0, 9.0, 30.0],
+        },
+        jy: 0.3,
+    }
+}
+
+fn world() -> World {
+    let all = World::new(0.6, 0.9, 2.5).with(Parameter::PositionAngle, 0.3);
+    let all = all.with(Parameter::OffsetX, 0.2).with(Parameter::OffsetY, -0.4);
+    all.with(Parameter::Mass, 1.1).with(Parameter::Rotation, 0.8)
+}
+
+fn parameters(dimension: usize) -> (Blobs, Vec<f64>) {
+    let blobs = Blobs { dimension };
+    let mut parameters = vec![0.0; Representation::parameters(&blobs)];
+    blobs.initialise(5, &mut parameters);
+    (blobs, parameters)
+}
+
+fn images(forward: &ForwardModel<f64>, field: Field<'_, f64>) -> Vec<f64> {
+    let frames: Vec<usize> = (0..forward.frames()).collect();
+    let mut movie = vec![0.0; frames.len() * forward.pixels()];
+    let (mut batch, mut workspace) = (Batch::default(), Workspace::new());
+    forward.movie(field, &frames, &mut batch, &mut workspace, &mut movie);
+    movie
+}
+
+fn compare(law: Law, dimension: usize) {
+    let (model, world) = (model(law), world());
+    let (blobs, parameters) = parameters(dimension);
+    let field = Field {
+        representation: &blobs,
+        parameters: &parameters,
+        axis: model.axis,
+        occupancy: None,
+    };
+    let at = |world: World| images(&model.forward(&world).unwrap(), field);
+    let (forward, tangents) = model.differentiated::<f64>(&world, &Parameter::ALL).unwrap();
+    let (here, plain) = (images(&forward, field), at(world));
+    let brightest = plain.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+    for (a, b) in here.iter().zip(&plain) {
+        assert!((a - b).abs() < 1e-8 * brightest, "{a} {b}");
+    }
+    let mut buffers = WorldBuffers::default();
+    let frames = 0..forward.frames();
+    let slopes: Vec<Vec<Vec<f64>>> =
+        frames.map(|frame| forward.image_tangents(field, frame, &tangents, &mut buffers)).collect();
+    for (k, parameter) in Parameter::ALL.into_iter().enumerate() {
+        let h = 1e-3;
+        let moved = |by: f64| at(world.with(parameter, world.get(parameter) + by * h));
+        let [a, b, c, d] = [-2.0, -1.0, 1.0, 2.0].map(moved);
+        let slopes = slopes.iter().flat_map(|frame| &frame[k]);
+        let differences = (0..a.len()).map(|p| (a[p] - d[p] + 8.0 * (c[p] - b[p])) / (12.0 * h));
+        let pairs: Vec<(f64, f64)> = differences.zip(slopes.copied()).collect();
+        let largest = pairs.iter().fold(0.0f64, |most, pair| most.max(pair.0.abs()));
+        assert!(largest > 1e-3 * brightest, "{} does not matter", parameter.name());
+        for (pixel, (difference, slope)) in pairs.iter().enumerate() {
+            assert!(
+                (difference - slope).abs() < 1e-6 * largest,
+                "{}, pixel {pixel}: {difference} {slope} of {largest}",
+                parameter.name()
+            );
+        }
+    }
+}
+
+#[test]
+fn exact_image_tangents_are_those_of_differences() {
+    compare(Law::CircularOrbits, 3);
+    let radii = vec![2.0, 5.0, 20.0];
+    let rates = vec![0.3, 0.08, 0.01];
+    compare(Law::Fixed(AngularVelocity::Table { radii, rates }), 3);
+}
+
+#[test]
+fn exact_image_tangents_of_events_are_those_of_differences() {
+    compare(Law::CircularOrbits, 4);
+}
+
+#[test]
+fn exact_position_angle_turns_the_spin_from_north_to_east() {
+    let model = model(Law::CircularOrbits);
+    let plain = World::new(0.5, 1.0, 2.0);
+    let turned = plain.with(Parameter::PositionAngle, core::f64::consts::FRAC_PI_2);
+    // East is left: what the spin points at lies at negative x.
+    let place = |world: World, x: f64, y: f64| {
+        let one = WorldModel { x: vec![x], y: vec![y], ..model.clone() };
+        one.place(&world.numbers(), 0).map(|number| number.value)
+    };
+    let [alpha, beta] = place(turned, -3.0, 0.0);
+    assert!(alpha.abs() < 1e-15 && (beta - 3.0).abs() < 1e-15, "{alpha} {beta}");
+    assert_eq!(place(plain, 1.0, 2.0), [1.0, 2.0]);
+    let heavier = plain.with(Parameter::Mass, 2.0).with(Parameter::OffsetX, 1.0);
+    assert_eq!(place(heavier, 5.0, 2.0), [2.0, 1.0]);
+}
+
+#[test]
+fn exact_worlds_out_of_range_are_refused() {
+    let world = World::new(1.0, 0.5, 2.0);
+    assert_eq!(world.checked().unwrap_err().field(), "spin");
+    let error = model(Law::CircularOrbits).sightlines(&world).unwrap_err();
+    assert!(error.to_string().contains("-0.999"), "{error}");
+}
