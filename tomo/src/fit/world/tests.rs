@@ -18,7 +18,7 @@ fn model(law: Law) -> WorldModel {
         y,
         observer_radius: None,
         region: Region { r_min: 0.0, r_max: 17.0, z_width: f64::INFINITY },
-        order: 14,
+        order: 12,
         split: 1,
         slow_light: true,
         redshift: true,
@@ -76,7 +76,7 @@ fn compare(law: Law, dimension: usize) {
     let slopes: Vec<Vec<Vec<f64>>> =
         frames.map(|frame| forward.image_tangents(field, frame, &tangents, &mut buffers)).collect();
     for (k, parameter) in Parameter::ALL.into_iter().enumerate() {
-        let h = 1e-3;
+        let h = 1e-4;
         let moved = |by: f64| at(world.with(parameter, world.get(parameter) + by * h));
         let [a, b, c, d] = [-2.0, -1.0, 1.0, 2.0].map(moved);
         let slopes = slopes.iter().flat_map(|frame| &frame[k]);
@@ -97,9 +97,8 @@ fn compare(law: Law, dimension: usize) {
 #[test]
 fn exact_image_tangents_are_those_of_differences() {
     compare(Law::CircularOrbits, 3);
-    let radii = vec![2.0, 5.0, 20.0];
-    let rates = vec![0.3, 0.08, 0.01];
-    compare(Law::Fixed(AngularVelocity::Table { radii, rates }), 3);
+    let law = AngularVelocity::PowerLaw { radius: 6.0, rate: -0.06, exponent: 1.2 };
+    compare(Law::Fixed(law), 3);
 }
 
 #[test]
