@@ -251,12 +251,6 @@ impl<'a, T: Float + Default> Operator<'a, T> {
         let count = if all { self.active.column.len() } else { self.active.count() };
         let piece = self.frames.len().div_ceil(PIECES);
         let indices: Vec<usize> = (0..self.frames.len()).collect();
-        let pixels = self.pixels;
-        let scratch = || Scratch {
-            buffers: Buffers::default(),
-            image: vec![T::zero(); pixels],
-            slopes: vec![T::zero(); pixels],
-        };
         let of_piece = |scratch: &mut Scratch<T>, piece: &[usize]| {
             let (mut value, mut sums) = (0.0, vec![T::zero(); count]);
             for k in piece {
@@ -271,9 +265,17 @@ impl<'a, T: Float + Default> Operator<'a, T> {
             (value, sums)
         };
         let pieces: Vec<(f64, Vec<T>)> =
-            indices.par_chunks(piece).map_init(scratch, of_piece).collect();
+            indices.par_chunks(piece).map_init(|| self.scratch(), of_piece).collect();
         let value = pieces.iter().map(|piece| piece.0).sum();
         (value, total(pieces, count))
+    }
+
+    fn scratch(&self) -> Scratch<T> {
+        Scratch {
+            buffers: Buffers::default(),
+            image: vec![T::zero(); self.pixels],
+            slopes: vec![T::zero(); self.pixels],
+        }
     }
 
     /// Value of the data at `x`, and the gradient with respect to the nodes that count, or to all.

@@ -4,16 +4,21 @@
 //! [`Tangents`] say how each node moves with each parameter, so that images, χ² and gradients follow exactly.
 
 mod derivative;
+mod explore;
+mod matrix;
 mod model;
 mod prior;
 mod redshift;
+mod search;
 mod tangents;
 #[cfg(test)]
 mod tests;
 
 pub use derivative::WorldBuffers;
+pub use explore::{Exploration, Explored, Sample};
 pub use model::{Law, WorldModel};
 pub use prior::Prior;
+pub use search::{Effort, Estimate, Found, Free, WorldProblem, WorldProgress};
 pub use tangents::Tangents;
 
 use core::f64::consts::{PI, TAU};

@@ -2,8 +2,9 @@
 
 use super::*;
 use crate::dynamics::{AngularVelocity, Axis};
+use crate::fit::linear::Weighted;
 use crate::fit::tests::Blobs;
-use crate::fit::{Batch, Field, ForwardModel, Motion, Region};
+use crate::fit::{Batch, Field, ForwardModel, FrameTerm, ImageTerm, Motion, Region};
 use crate::representation::{Representation, Workspace};
 
 fn model(law: Law) -> WorldModel {
@@ -129,4 +130,76 @@ fn exact_worlds_out_of_range_are_refused() {
     assert_eq!(world.checked().unwrap_err().field(), "spin");
     let error = model(Law::CircularOrbits).sightlines(&world).unwrap_err();
     assert!(error.to_string().contains("-0.999"), "{error}");
+}
+
+/// A screen of so many pixels over 20 M, in single precision as fits have it.
+fn screen(side: usize, frames: usize) -> WorldModel {
+    let at = |k: usize| 20.0 * ((k as f64 + 0.5) / side as f64 - 0.5);
+    let (x, y) = (0..side * side).map(|k| (at(k % side), -at(k / side))).unzip();
+    let mut model = model(Law::CircularOrbits);
+    model.region = Region { r_min: 3.0, r_max: 9.0, z_width: 4.0 };
+    model.axis = Axis::new([0.0, 0.0, 1.0]).unwrap();
+    model.motion.reference = 0.0;
+    model.motion.times = (0..frames).map(|k| 120.0 * k as f64 / frames as f64).collect();
+    WorldModel { x, y, order: 4, ..model }
+}
+
+fn spot(at: [f64; 3]) -> f64 {
+    let square = (at[0] - 5.5).powi(2) + at[1].powi(2) + at[2].powi(2);
+    (-0.5 * square / 0.49).exp()
+}
+
+/// Images of a hot spot through 0.1 % of noise: spin, inclination and position angle from starts all over.
+#[test]
+fn exact_world_of_a_hot_spot_is_found_from_everywhere() {
+    let (model, side) = (screen(20, 12), 20);
+    let truth = World::new(0.6, 1.05, 2.0).with(Parameter::PositionAngle, 0.7);
+    let forward: ForwardModel<f32> = model.forward(&truth).unwrap();
+    let movie = forward.movie_of(model.axis, &spot, &mut Batch::default());
+    let brightest = movie.iter().fold(0.0f64, |most, x| most.max(*x));
+    let sigma = 1e-2 * brightest;
+    let noise = |k: usize| sigma * (1.7 * k as f64 * (k as f64 * 0.37).sin()).sin() * 2f64.sqrt();
+    let data: Vec<f32> = movie.iter().enumerate().map(|(k, x)| (x + noise(k)) as f32).collect();
+    let count = data.len() as f64;
+    let term = ImageTerm::new(data, side * side, sigma).unwrap();
+    let terms = [Weighted { weight: count, term: &term as &dyn FrameTerm<f32> }];
+    let free = [
+        Free { parameter: Parameter::Spin, prior: Prior::Uniform { low: -0.95, high: 0.95 } },
+        Free {
+            parameter: Parameter::Inclination,
+            prior: Prior::Isotropic { low: 0.0, high: core::f64::consts::PI },
+        },
+        Free {
+            parameter: Parameter::PositionAngle,
+            prior: Prior::Uniform { low: -core::f64::consts::PI, high: core::f64::consts::PI },
+        },
+    ];
+    let frames: Vec<usize> = (0..12).collect();
+    let problem = WorldProblem {
+        model: &model,
+        known: World::new(0.0, 0.5, 2.0),
+        free: &free,
+        frames: &frames,
+        terms: &terms,
+        half_width: 9.0,
+        upper: 3.0,
+        penalties: &[],
+        watch: &|_| true,
+    };
+    let effort = Effort { nodes: 16, first: 30, again: 15, follow: 20, steps: 25 };
+    for (k, start) in problem.starts(8).into_iter().enumerate() {
+        let begun = std::time::Instant::now();
+        let found = problem.descend(k, start, None, &effort).unwrap().unwrap();
+        let of = |world: &World| free.map(|free| world.get(free.parameter));
+        eprintln!(
+            "{k}: {:.2?} -> {:.4?}, chi2/N {:.4}, {} evaluations, converged {}, {:.2?}, sigma {:?}",
+            of(&start),
+            of(&found.end.world),
+            found.end.chi2 / count,
+            found.evaluations,
+            found.converged,
+            begun.elapsed(),
+            found.covariance().map(|c| [c[0].sqrt(), c[4].sqrt(), c[8].sqrt()]),
+        );
+    }
 }
