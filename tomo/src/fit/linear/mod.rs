@@ -28,5 +28,7 @@ pub use data::Weighted;
 pub use descent::{Ending, Method};
 pub use error::LinearError;
 pub use objective::Prior;
-pub use solve::{Coarse, LinearProblem, LinearProgress, LinearSettings, LinearSolution, Watch};
+pub use solve::{
+    Coarse, Least, LinearProblem, LinearProgress, LinearSettings, LinearSolution, Watch,
+};
 pub use walk::Voxels;

@@ -6,7 +6,7 @@ use super::descent::{Ending, Method};
 use super::objective::{Objective, Prior};
 use super::operator::{Active, Operator};
 use super::run::{FEW, LIT, Run};
-use super::start::Trials;
+use super::start::{Lit, Trials};
 use super::walk::{Voxels, Walk};
 use crate::Error;
 use crate::dynamics::Axis;
@@ -131,6 +131,15 @@ pub struct LinearSolution<T> {
     pub bytes: usize,
 }
 
+/// What some iterations reached.
+#[derive(Clone, Debug)]
+pub struct Least {
+    /// Emission at all nodes of the grid.
+    pub x: Vec<f64>,
+    /// What is minimised.
+    pub value: f64,
+}
+
 /// Told how it goes, says whether to go on.
 pub type Watch<'a> = dyn FnMut(&LinearProgress<'_>) -> ControlFlow<()> + 'a;
 
@@ -166,7 +175,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         }
     }
 
-    /// The value that some iterations over all nodes reach from a dark field, or from the best lit one where data are
+    /// What some iterations over all nodes reach from a dark field, or from the best lit one where data are
     /// not convex.
     ///
     /// # Errors
@@ -183,11 +192,13 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         let mut run = Run::new(self, &settings, &mut watch);
         if !data.is_convex() {
             let lit = run.lit(&mut objective, Trials { iterations, ..FEW })?;
-            return Ok(lit.map_or(f64::INFINITY, |lit| lit.value));
+            let dark = || Least { x: vec![0.0; self.voxels.count()], value: f64::INFINITY };
+            return Ok(lit.map_or_else(dark, |Lit { x, value, .. }| Least { x, value }));
         }
         let dark = vec![0.0; self.voxels.count()];
         let found = run.minimise(&mut objective, &dark, iterations);
-        objective.finite(found.value, &found.x)
+        let value = objective.finite(found.value, &found.x)?;
+        Ok(Least { x: found.x, value })
     }
 
     pub(super) fn data(&self) -> Result<Data<'_, T>, Error> {

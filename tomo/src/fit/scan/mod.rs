@@ -159,7 +159,7 @@ impl<T: Float + Default> Scanner<'_, T> {
         let model = own.as_ref().unwrap_or(model);
         let voxels = Voxels::cube(effort.nodes, half_width);
         let problem = LinearProblem { model, axis, frames, terms, voxels, upper, flux, priors };
-        let loss = problem.least(effort.iterations)?;
+        let loss = problem.least(effort.iterations)?.value;
         let solved = self.solved.fetch_add(1, Ordering::Relaxed) + 1;
         if !(self.watch)(solved, self.expected.max(solved)) {
             self.cancelled.store(true, Ordering::Relaxed);

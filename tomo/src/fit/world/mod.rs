@@ -5,20 +5,19 @@
 
 mod derivative;
 mod explore;
-mod matrix;
 mod model;
 mod prior;
+mod problem;
 mod redshift;
-mod search;
 mod tangents;
 #[cfg(test)]
 mod tests;
 
 pub use derivative::WorldBuffers;
-pub use explore::{Exploration, Explored, Sample};
+pub use explore::{Exploration, Explored, Sample, WorldWatch};
 pub use model::{Law, WorldModel};
 pub use prior::Prior;
-pub use search::{Effort, Estimate, Found, Free, WorldProblem, WorldProgress};
+pub use problem::{Effort, Estimate, Free, WorldProblem};
 pub use tangents::Tangents;
 
 use core::f64::consts::{PI, TAU};
@@ -102,6 +101,14 @@ impl Parameter {
             Parameter::Mass => [1e-3, 1e3],
             Parameter::Rotation => [-10.0, 10.0],
             Parameter::RedshiftPower => [-10.0, 10.0],
+        }
+    }
+
+    /// The difference of two values, the short way about a circle for angles on the sky.
+    pub fn difference(self, a: f64, b: f64) -> f64 {
+        match self {
+            Parameter::PositionAngle => (a - b + PI).rem_euclid(TAU) - PI,
+            _ => a - b,
         }
     }
 

@@ -1,0 +1,145 @@
+//! Worlds as data see them: for each, the volume that explains the data best is solved for.
+
+use super::{Parameter, Prior, World, WorldModel};
+use crate::fit::ForwardModel;
+use crate::fit::linear::{Least, LinearError, LinearProblem, Prior as Penalty, Voxels, Weighted};
+use crate::simd::Float;
+use core::f64::consts::TAU;
+
+/// A parameter that is not known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Free {
+    /// Which.
+    pub parameter: Parameter,
+    /// What is thought of it before.
+    pub prior: Prior,
+}
+
+/// Data, and what of the world is not known.
+#[derive(Clone, Copy)]
+pub struct WorldProblem<'a, T: Float> {
+    /// The screen and what all worlds share.
+    pub model: &'a WorldModel,
+    /// Values of the parameters that are known; those of the others are not used.
+    pub known: World,
+    /// The others.
+    pub free: &'a [Free],
+    /// The frames of the movie that count.
+    pub frames: &'a [usize],
+    /// The data, each with the factor on its χ² times its number of data: the loss is then a sum of χ².
+    pub terms: &'a [Weighted<'a, T>],
+    /// Half the width of the grid of voxels, M.
+    pub half_width: f64,
+    /// The largest emission that is allowed, dimensionless.
+    pub upper: f64,
+    /// Mean flux of a frame in Jy, for data none of which knows it.
+    pub flux: Option<f64>,
+    /// Penalties on the volume, in units of χ².
+    pub penalties: &'a [Penalty],
+    /// What is solved for each world.
+    pub effort: Effort,
+}
+
+/// How a volume is solved for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Effort {
+    /// Voxels along each axis.
+    pub nodes: usize,
+    /// Iterations from a dark field.
+    pub iterations: usize,
+}
+
+/// A world with the volume that explains the data best in it.
+#[derive(Clone, Debug)]
+pub struct Estimate {
+    /// The world.
+    pub world: World,
+    /// Emission at all voxels.
+    pub x: Vec<f64>,
+    /// χ² and the volume's penalties.
+    pub chi2: f64,
+    /// Half of that, and −ln of the priors' densities.
+    pub value: f64,
+}
+
+impl<T: Float + Default> WorldProblem<'_, T> {
+    /// Places to begin: shares of the priors by an additive recurrence in all dimensions (Roberts 2018), the first one
+    /// in the middle.
+    pub fn starts(&self, count: usize) -> Vec<World> {
+        let dimensions = self.free.len() as f64;
+        // The positive root of x^(d + 1) = x + 1.
+        let root = (0..64).fold(2.0f64, |x, _| (1.0 + x).powf(1.0 / (dimensions + 1.0)));
+        let start = |k: usize| {
+            let share = |d: usize| (0.5 + k as f64 * root.powi(-(d as i32 + 1))).fract();
+            let free = self.free.iter().enumerate();
+            free.fold(self.known, |world, (d, free)| {
+                world.with(free.parameter, free.prior.quantile(share(d)))
+            })
+        };
+        (0..count).map(start).collect()
+    }
+
+    /// The best volume of a world, from a dark one: the same for the same world.
+    ///
+    /// # Errors
+    /// If a number is out of its range, or χ² is not finite.
+    pub fn solve(&self, world: World) -> Result<Estimate, LinearError> {
+        let forward: ForwardModel<T> = self.model.forward(&world)?;
+        let problem = LinearProblem {
+            model: &forward,
+            axis: self.model.axis,
+            frames: self.frames,
+            terms: self.terms,
+            voxels: Voxels::cube(self.effort.nodes, self.half_width),
+            upper: self.upper,
+            flux: self.flux,
+            priors: self.penalties,
+        };
+        let Least { x, value } = problem.least(self.effort.iterations)?;
+        let penalty = |free: &Free| free.prior.penalty(world.get(free.parameter));
+        let penalties: f64 = self.free.iter().map(penalty).sum();
+        Ok(Estimate { world, x, chi2: value, value: 0.5 * value + penalties })
+    }
+
+    /// Least and largest value of a free parameter.
+    pub(super) fn bounds(&self, k: usize) -> [f64; 2] {
+        let Free { parameter, prior } = self.free[k];
+        let ([low, high], [least, most]) = (parameter.range(), prior.bounds());
+        [low.max(least), high.min(most)]
+    }
+
+    /// The world at a place about another one, in units of [`Parameter::scale`]; bounds are mirrors, a whole circle has
+    /// none.
+    pub(super) fn place(&self, about: &World, u: &[f64]) -> World {
+        let one = |world: World, (k, free): (usize, &Free)| {
+            let [low, high] = self.bounds(k);
+            let value = about.get(free.parameter) + u[k] * free.parameter.scale();
+            let circle = free.parameter == Parameter::PositionAngle && high - low > TAU - 1e-6;
+            let value = match circle {
+                true => low + (value - low).rem_euclid(TAU),
+                false => mirrored(value, low, high),
+            };
+            world.with(free.parameter, value)
+        };
+        self.free.iter().enumerate().fold(*about, one)
+    }
+}
+
+/// x between two mirrors.
+fn mirrored(x: f64, low: f64, high: f64) -> f64 {
+    let width = high - low;
+    let folded = (x - low).rem_euclid(2.0 * width);
+    low + if folded > width { 2.0 * width - folded } else { folded }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exact_mirrors_keep_values_inside() {
+        for (x, expected) in [(0.2, 0.2), (-0.3, 0.3), (1.4, 0.6), (2.3, 0.3), (-1.1, 0.9)] {
+            assert!((mirrored(x, 0.0, 1.0) - expected).abs() < 1e-14, "{x}");
+        }
+    }
+}
