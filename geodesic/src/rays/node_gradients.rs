@@ -30,10 +30,10 @@ use crate::integrate::trace::{Tracer, trace_series};
 use crate::numbers::dual::Dual;
 use crate::numbers::quadrature::gauss_legendre;
 use crate::numbers::scalar::Scalar;
-use crate::rays::blocks::in_blocks;
+use crate::rays::blocks::{BLOCK, check_columns, in_blocks};
 use crate::rays::derivatives::Gradient;
-use crate::rays::integrator::{MinoPath, check_columns};
 use crate::rays::sampling::Trajectory;
+use crate::rays::trajectory::MinoPath;
 use crate::screen::observer::{Observer, Ray};
 use crate::simd::{GROWTH, Key, NodeRequest, Nodes, PanelRule};
 use crate::spacetime::kerr::Kerr;
@@ -125,11 +125,12 @@ pub fn trace(
         tolerance,
         request,
     };
-    let pieces = in_blocks(alpha, beta, |alpha, beta| -> Result<DifferentiatedNodes, Error> {
-        let mut nodes = Nodes::default();
-        nodes.trace(hole, observer, alpha, beta, None, request)?;
-        dual.block(&nodes.layouts(), alpha, beta)
-    });
+    let pieces =
+        in_blocks(BLOCK, alpha, beta, |alpha, beta| -> Result<DifferentiatedNodes, Error> {
+            let mut nodes = Nodes::default();
+            nodes.trace(hole, observer, alpha, beta, None, request)?;
+            dual.block(&nodes.layouts(), alpha, beta)
+        });
     let mut whole = DifferentiatedNodes::default();
     for piece in pieces {
         whole.append(piece?);

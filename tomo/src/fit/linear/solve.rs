@@ -180,7 +180,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
     ///
     /// # Errors
     /// As those of [`solve`](Self::solve).
-    pub fn least(&self, iterations: usize) -> Result<f64, Error> {
+    pub fn least(&self, iterations: usize) -> Result<Least, Error> {
         let settings = LinearSettings { coarse: None, tolerance: 0.0, ..LinearSettings::default() };
         self.check(&settings)?;
         let data = self.data()?;

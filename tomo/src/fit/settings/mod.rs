@@ -9,6 +9,7 @@ mod penalties;
 mod ranges;
 mod recovery;
 mod simulation;
+mod unknown_world;
 mod unknowns;
 mod view;
 mod world;
@@ -21,6 +22,7 @@ pub use recovery::{
     AxisScan, AxisSearch, Kind, Linear, Occupancy, Optimiser, Representation, Start, Training,
 };
 pub use simulation::{GlyphShape, Movie, Noise, Observation, Spot, Truth};
+pub use unknown_world::{PriorSettings, UnknownWorld, WorldSearch, WorldView};
 pub use view::{Absorption, Effects, Hole, Motion, Observer, Region, Screen, WidthOf};
 pub use world::merge;
 
@@ -56,7 +58,8 @@ pub struct FitFile {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub truth: Option<Truth>,
     /// What data are simulated with where that differs from what the fit assumes: any part of `hole`,
-    /// `observer`, `region`, `effects` and `motion`.
+    /// `observer`, `region`, `effects` and `motion`; and what of the world the fit does not know
+    /// ([`UnknownWorld`]).
     #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
     pub world: toml::Table,
     /// The array that sees the simulated movie.

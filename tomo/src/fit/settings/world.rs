@@ -23,7 +23,7 @@ pub fn merge(into: &mut Table, changes: &Table) {
 }
 
 /// What may differ between what is simulated and what a fit assumes.
-const WORLD: [&str; 5] = ["hole", "observer", "region", "effects", "motion"];
+pub(super) const SIMULATED: [&str; 5] = ["hole", "observer", "region", "effects", "motion"];
 
 impl FitFile {
     /// The settings that data are simulated with: these with the changes of `world`.
@@ -31,14 +31,12 @@ impl FitFile {
     /// # Errors
     /// If `world` has a key that is no part of what is simulated, or is no setting at all.
     pub fn simulated(&self) -> Result<Self, FitError> {
-        if let Some(key) = self.world.keys().find(|key| !WORLD.contains(&key.as_str())) {
-            return Err(FitError::Conflict(format!(
-                "world.{key} is not allowed: {}",
-                WORLD.join(", ")
-            )));
-        }
+        self.unknown_world()?;
         let mut table = Table::try_from(self).within("settings")?;
-        merge(&mut table, &self.world);
+        let simulated = |(key, value): (&String, &Value)| {
+            SIMULATED.contains(&key.as_str()).then(|| (key.clone(), value.clone()))
+        };
+        merge(&mut table, &self.world.iter().filter_map(simulated).collect());
         table.remove("world");
         Ok(table.try_into().within("world")?)
     }

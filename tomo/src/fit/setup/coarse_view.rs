@@ -8,9 +8,9 @@ use crate::fit::{Motion, Objective, Sampling};
 
 /// What a fit is seen through by a scan.
 pub struct CoarseView {
-    file: FitFile,
-    instrument: Instrument,
-    measured: Measured,
+    pub(super) file: FitFile,
+    pub(super) instrument: Instrument,
+    pub(super) measured: Measured,
 }
 
 impl CoarseView {

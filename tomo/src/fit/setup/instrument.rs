@@ -8,6 +8,8 @@ use kerrlight_geodesic::Kerr;
 
 /// What a fit looks through: the same for all data and representations.
 pub struct Instrument {
+    /// Where its pixels are: M to the right and upwards of the middle of the screen.
+    pub pixels: [Vec<f64>; 2],
     /// The hole.
     pub hole: Kerr,
     /// Nodes on rays; weights in Jy a pixel for emission 1.
@@ -84,7 +86,7 @@ impl Instrument {
         }
         lines.weight.iter_mut().for_each(|weight| *weight *= jy);
         let redshift = file.effects.redshift_power.map(|power| Redshift { power });
-        Ok(Self { hole, lines, redshift })
+        Ok(Self { pixels: [alpha, beta], hole, lines, redshift })
     }
 }
 

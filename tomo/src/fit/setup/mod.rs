@@ -10,6 +10,7 @@ mod losses;
 mod measured;
 mod truth;
 mod visibilities;
+mod world;
 
 pub use coarse_view::CoarseView;
 pub use imprint::imprint;
@@ -20,6 +21,7 @@ pub use losses::forward_model;
 pub use measured::Measured;
 pub use truth::Truth;
 pub use visibilities::{VisibilitySettings, frames_of, prepared};
+pub use world::{FoundWorld, SearchWatch, Trial, find_world, in_world, known_world};
 
 use super::linear::Prior;
 use super::settings::{

@@ -4,7 +4,7 @@
 
 use super::World;
 use super::problem::{Estimate, WorldProblem};
-use crate::fit::linear::LinearError;
+use crate::Error;
 use crate::simd::Float;
 use cmaes::{CMAESOptions, DVector, TerminationReason};
 use std::sync::{Mutex, PoisonError};
@@ -54,7 +54,7 @@ const ALIKE: f64 = 0.05;
 #[derive(Default)]
 struct Log {
     samples: Vec<Sample>,
-    error: Option<LinearError>,
+    error: Option<Error>,
 }
 
 impl<T: Float + Default> WorldProblem<'_, T> {
@@ -68,7 +68,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         start: World,
         how: &Exploration,
         watch: &mut WorldWatch<'_>,
-    ) -> Result<Option<Explored>, LinearError> {
+    ) -> Result<Option<Explored>, Error> {
         let log = Mutex::new(Log::default());
         let look = |u: &DVector<f64>| self.look(self.place(&start, u.as_slice()), &log);
         let options = CMAESOptions::new(vec![0.0; self.free.len()], how.width)
@@ -79,7 +79,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
             .tol_fun_hist(ALIKE);
         let mut search = options.build(look).map_err(|_| {
             let allowed = "above 0, with at least one free parameter";
-            kerrlight_geodesic::Error::out_of_range("width of the population", how.width, allowed)
+            Error::out_of_range("width of the population", how.width, allowed)
         })?;
         let ended = loop {
             if let Some(ended) = search.next_parallel() {

@@ -9,6 +9,7 @@ mod model;
 mod prior;
 mod problem;
 mod redshift;
+mod spread;
 mod tangents;
 #[cfg(test)]
 mod tests;
@@ -18,10 +19,12 @@ pub use explore::{Exploration, Explored, Sample, WorldWatch};
 pub use model::{Law, WorldModel};
 pub use prior::Prior;
 pub use problem::{Effort, Estimate, Free, WorldProblem};
+pub use spread::Spread;
 pub use tangents::Tangents;
 
+use crate::Error;
 use core::f64::consts::{PI, TAU};
-use kerrlight_geodesic::{Dual, Error};
+use kerrlight_geodesic::Dual;
 
 /// A parameter of the world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -2,12 +2,13 @@
 
 use super::tangents::Tangents;
 use super::{Number, Parameter, World};
+use crate::Error;
 use crate::dynamics::{AngularVelocity, Axis};
 use crate::fit::{ForwardModel, Motion, Redshift, Region, Sampling, SightlineRequest, Sightlines};
 use crate::simd::Float;
 use kerrlight_geodesic::node_gradients;
 use kerrlight_geodesic::simd::{NodeRequest, PanelRule};
-use kerrlight_geodesic::{Error, Inclination, Kerr, Observer, Quantities};
+use kerrlight_geodesic::{Inclination, Kerr, Observer, Quantities};
 
 /// Angular velocity before [`Parameter::Rotation`] is applied.
 #[derive(Clone, Debug, PartialEq)]
@@ -144,7 +145,8 @@ impl WorldModel {
         Ok((hole, observer))
     }
 
-    fn motion_of(&self, world: &World) -> Motion {
+    /// How matter moves in a world, and the times of its frames in that world's M.
+    pub fn motion_of(&self, world: &World) -> Motion {
         let [spin, mass, factor] =
             [Parameter::Spin, Parameter::Mass, Parameter::Rotation].map(|p| world.get(p));
         let reference = self.motion.reference;

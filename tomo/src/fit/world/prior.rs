@@ -1,6 +1,6 @@
 //! What is thought about a parameter of the world before any data.
 
-use kerrlight_geodesic::Error;
+use crate::Error;
 
 /// A probability density.
 #[derive(Clone, Copy, Debug, PartialEq)]

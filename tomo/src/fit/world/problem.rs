@@ -1,8 +1,9 @@
 //! Worlds as data see them: for each, the volume that explains the data best is solved for.
 
 use super::{Parameter, Prior, World, WorldModel};
+use crate::Error;
 use crate::fit::ForwardModel;
-use crate::fit::linear::{Least, LinearError, LinearProblem, Prior as Penalty, Voxels, Weighted};
+use crate::fit::linear::{Least, LinearProblem, Prior as Penalty, Voxels, Weighted};
 use crate::simd::Float;
 use core::f64::consts::TAU;
 
@@ -13,6 +14,14 @@ pub struct Free {
     pub parameter: Parameter,
     /// What is thought of it before.
     pub prior: Prior,
+}
+
+impl Free {
+    /// Least and largest value.
+    pub fn bounds(&self) -> [f64; 2] {
+        let ([low, high], [least, most]) = (self.parameter.range(), self.prior.bounds());
+        [low.max(least), high.min(most)]
+    }
 }
 
 /// Data, and what of the world is not known.
@@ -83,7 +92,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
     ///
     /// # Errors
     /// If a number is out of its range, or χ² is not finite.
-    pub fn solve(&self, world: World) -> Result<Estimate, LinearError> {
+    pub fn solve(&self, world: World) -> Result<Estimate, Error> {
         let forward: ForwardModel<T> = self.model.forward(&world)?;
         let problem = LinearProblem {
             model: &forward,
@@ -101,19 +110,12 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         Ok(Estimate { world, x, chi2: value, value: 0.5 * value + penalties })
     }
 
-    /// Least and largest value of a free parameter.
-    pub(super) fn bounds(&self, k: usize) -> [f64; 2] {
-        let Free { parameter, prior } = self.free[k];
-        let ([low, high], [least, most]) = (parameter.range(), prior.bounds());
-        [low.max(least), high.min(most)]
-    }
-
     /// The world at a place about another one, in units of [`Parameter::scale`]; bounds are mirrors, a whole circle has
     /// none.
     pub(super) fn place(&self, about: &World, u: &[f64]) -> World {
-        let one = |world: World, (k, free): (usize, &Free)| {
-            let [low, high] = self.bounds(k);
-            let value = about.get(free.parameter) + u[k] * free.parameter.scale();
+        let one = |world: World, (free, u): (&Free, &f64)| {
+            let [low, high] = free.bounds();
+            let value = about.get(free.parameter) + u * free.parameter.scale();
             let circle = free.parameter == Parameter::PositionAngle && high - low > TAU - 1e-6;
             let value = match circle {
                 true => low + (value - low).rem_euclid(TAU),
@@ -121,7 +123,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
             };
             world.with(free.parameter, value)
         };
-        self.free.iter().enumerate().fold(*about, one)
+        self.free.iter().zip(u).fold(*about, one)
     }
 }
 

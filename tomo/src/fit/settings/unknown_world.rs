@@ -1,0 +1,192 @@
+//! What of the world is not known, and how it is looked for.
+
+use super::world::SIMULATED;
+use super::{FitError, FitFile, Within};
+use crate::Error;
+use crate::fit::world::{Free, Parameter, Prior};
+use serde::{Deserialize, Serialize};
+use toml::Table;
+
+/// Parameters of the world that are not known, each with its prior.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct UnknownWorld {
+    /// a, M.
+    pub spin: Option<PriorSettings>,
+    /// Angle from the spin to the observer, degrees.
+    pub inclination_deg: Option<PriorSettings>,
+    /// Of the spin on the sky, degrees east of north.
+    pub position_angle_deg: Option<PriorSettings>,
+    /// Where the hole is on the screen, M to the right (west).
+    pub offset_x: Option<PriorSettings>,
+    /// Where the hole is on the screen, M upwards (north).
+    pub offset_y: Option<PriorSettings>,
+    /// Mass over `hole.mass_msun`, dimensionless.
+    pub mass_factor: Option<PriorSettings>,
+    /// Angular velocity over `motion.velocity`, dimensionless.
+    pub rotation_factor: Option<PriorSettings>,
+    /// Power of g that emission goes with, dimensionless.
+    pub redshift_power: Option<PriorSettings>,
+    /// How they are looked for.
+    pub search: WorldSearch,
+}
+
+/// A prior, in the unit of its parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum PriorSettings {
+    /// The same everywhere from the first to the second value.
+    Uniform([f64; 2]),
+    /// A bell curve.
+    Normal {
+        /// Its middle.
+        mean: f64,
+        /// Its standard deviation, above 0.
+        sigma: f64,
+    },
+    /// A bell curve of the logarithm.
+    LogNormal {
+        /// The median, above 0.
+        median: f64,
+        /// Standard deviation of the logarithm, above 0.
+        sigma: f64,
+    },
+    /// Of an inclination: any direction in space between two angles.
+    Isotropic([f64; 2]),
+}
+
+/// How the world is looked for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WorldSearch {
+    /// Places to begin, all over the priors.
+    pub starts: usize,
+    /// The search from each of them.
+    pub coarse: WorldView,
+    /// The search about the best of their ends.
+    pub fine: WorldView,
+    /// Whether the drag of a Keplerian velocity is the spin, whatever that is.
+    pub drag_is_spin: bool,
+}
+
+/// What worlds are looked at through.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WorldView {
+    /// Worlds, at most.
+    pub worlds: usize,
+    /// Voxels along each axis of the volume that is solved for.
+    pub nodes: usize,
+    /// Iterations of each solution.
+    pub iterations: usize,
+    /// Pixels along each side, about.
+    pub pixels: usize,
+    /// Frames, about.
+    pub frames: usize,
+}
+
+impl PriorSettings {
+    /// In the unit of [`World`](crate::fit::world::World).
+    fn prior(self, unit: f64) -> Prior {
+        match self {
+            Self::Uniform([low, high]) => Prior::Uniform { low: low * unit, high: high * unit },
+            Self::Isotropic([low, high]) => Prior::Isotropic { low: low * unit, high: high * unit },
+            Self::Normal { mean, sigma } => {
+                Prior::Normal { mean: mean * unit, sigma: sigma * unit }
+            }
+            Self::LogNormal { median, sigma } => Prior::LogNormal { median: median * unit, sigma },
+        }
+    }
+}
+
+impl UnknownWorld {
+    fn prior(&self, parameter: Parameter) -> Option<PriorSettings> {
+        match parameter {
+            Parameter::Spin => self.spin,
+            Parameter::Inclination => self.inclination_deg,
+            Parameter::PositionAngle => self.position_angle_deg,
+            Parameter::OffsetX => self.offset_x,
+            Parameter::OffsetY => self.offset_y,
+            Parameter::Mass => self.mass_factor,
+            Parameter::Rotation => self.rotation_factor,
+            Parameter::RedshiftPower => self.redshift_power,
+        }
+    }
+
+    /// The free parameters.
+    ///
+    /// # Errors
+    /// If there is none, or a prior is no density on possible values.
+    pub fn free(&self) -> Result<Vec<Free>, Error> {
+        let given = Parameter::ALL.into_iter().filter_map(|p| Some((p, self.prior(p)?)));
+        let free: Vec<Free> = given.map(|(p, prior)| free(p, prior)).collect::<Result<_, _>>()?;
+        if free.is_empty() {
+            let names = Parameter::ALL.map(Parameter::name).join(", ");
+            let why = format!(
+                "world.search looks for parameters with a prior, and there is none; give one of {names}"
+            );
+            return Err(FitError::Conflict(why).into());
+        }
+        Ok(free)
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        self.free()?;
+        let WorldSearch { starts, coarse, fine, .. } = &self.search;
+        let within = |key: &str, value: usize, [low, high]: [usize; 2]| {
+            let allowed = format!("{low} to {high}");
+            let key = format!("world.search.{key}");
+            if (low..=high).contains(&value) {
+                Ok(())
+            } else {
+                Err(Error::from(FitError::range(key, value, &allowed)))
+            }
+        };
+        within("starts", *starts, [1, 1000])?;
+        for (name, view) in [("coarse", coarse), ("fine", fine)] {
+            within(&format!("{name}.worlds"), view.worlds, [1, 1_000_000])?;
+            within(&format!("{name}.nodes"), view.nodes, [2, 128])?;
+            within(&format!("{name}.iterations"), view.iterations, [1, 10_000])?;
+            within(&format!("{name}.pixels"), view.pixels, [2, 4096])?;
+            within(&format!("{name}.frames"), view.frames, [2, 1_000_000])?;
+        }
+        Ok(())
+    }
+}
+
+fn free(parameter: Parameter, settings: PriorSettings) -> Result<Free, Error> {
+    let name = parameter.name();
+    let prior = settings.prior(parameter.unit()).checked().within(format!("world.{name}"))?;
+    if matches!(prior, Prior::Isotropic { .. }) && parameter != Parameter::Inclination {
+        let why = format!(
+            "world.{name}: isotropic is a prior of inclinations; take uniform, normal or log-normal"
+        );
+        return Err(FitError::Conflict(why).into());
+    }
+    let ([low, high], [least, most], unit) = (parameter.range(), prior.bounds(), parameter.unit());
+    let outside = [least, most]
+        .into_iter()
+        .find(|x| x.is_finite() && !(low - 1e-9..=high + 1e-9).contains(x));
+    if let Some(bad) = outside.filter(|_| !matches!(prior, Prior::LogNormal { .. })) {
+        let allowed = format!("{} to {}", low / unit, high / unit);
+        return Err(FitError::range(format!("world.{name}"), bad / unit, &allowed).into());
+    }
+    Ok(Free { parameter, prior })
+}
+
+impl FitFile {
+    /// What of the world is not known; none if all is.
+    ///
+    /// # Errors
+    /// If a key of `world` is unknown, or a number out of range.
+    pub fn unknown_world(&self) -> Result<Option<UnknownWorld>, Error> {
+        let keys = self.world.iter().filter(|(key, _)| !SIMULATED.contains(&key.as_str()));
+        let table: Table = keys.map(|(key, value)| (key.clone(), value.clone())).collect();
+        if table.is_empty() {
+            return Ok(None);
+        }
+        let world: UnknownWorld = table.try_into().within("world")?;
+        world.check()?;
+        Ok(Some(world))
+    }
+}

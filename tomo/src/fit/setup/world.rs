@@ -1,0 +1,227 @@
+//! From settings to a world that is not known: its model, its parameters, and the search for them.
+
+use super::coarse_view::CoarseView;
+use super::linear_problem::terms;
+use super::{Instrument, Measured, Result, axis, forward_model, linear, motion, priors};
+use crate::dynamics::Velocity;
+use crate::fit::linear::{Prior as Penalty, Weighted};
+use crate::fit::settings::{AxisSearch, FitError, FitFile, UnknownWorld, WorldView};
+use crate::fit::world::{
+    Effort, Exploration, Explored, Law, Spread, World, WorldModel, WorldProblem, WorldWatch,
+};
+use crate::fit::{Motion, Objective, Redshift, Sampling};
+use kerrlight_geodesic::Kerr;
+
+/// Where one search ended, in [`World`]'s units.
+#[derive(Clone, Debug)]
+pub struct Trial {
+    /// Where it began.
+    pub start: World,
+    /// Where it ended.
+    pub end: World,
+    /// Half of χ² there, and −ln of the priors' densities.
+    pub value: f64,
+    /// Worlds that were looked at.
+    pub worlds: usize,
+    /// Whether the last populations were alike.
+    pub converged: bool,
+}
+
+/// A world that was found.
+#[derive(Clone, Debug)]
+pub struct FoundWorld {
+    /// The best world.
+    pub world: World,
+    /// How sure it is; none if the data leave a parameter open.
+    pub spread: Option<Spread>,
+    /// χ² of the fine search's best world over the number of its data.
+    pub reduced_chi2: f64,
+    /// The searches from all starts.
+    pub trials: Vec<Trial>,
+}
+
+/// Told which search of how many goes on, its number of worlds and its least value; says whether to go on.
+pub type SearchWatch<'a> = dyn FnMut((usize, usize), usize, f64) -> bool + 'a;
+
+/// Width of the first population from a start, and of the one about the best end, in units of a parameter's scale.
+const WIDTHS: [f64; 2] = [1.5, 0.4];
+
+/// Looks for the world from all starts, and again with finer voxels about the best end; none if it was cancelled.
+///
+/// # Errors
+/// If a setting is missing or out of range, or the linear problem of a world has no solution.
+pub fn find_world(
+    file: &FitFile,
+    measured: &Measured,
+    unknown: &UnknownWorld,
+    watch: &mut SearchWatch<'_>,
+) -> Result<Option<FoundWorld>> {
+    let search = &unknown.search;
+    let count = search.starts + 1;
+    let coarse = Seen::new(file, measured, &search.coarse)?;
+    let trials = coarse.with(unknown, &search.coarse, |problem| {
+        let mut trials = Vec::new();
+        for (k, start) in problem.starts(search.starts).into_iter().enumerate() {
+            let mut told = |worlds: usize, best: f64| watch((k, count), worlds, best);
+            let seed = file.seed.wrapping_add(k as u64);
+            let how = Exploration { width: WIDTHS[0], worlds: search.coarse.worlds, seed };
+            let Some(explored) = problem.explore(start, &how, &mut told)? else { return Ok(None) };
+            trials.push(trial(&explored));
+        }
+        Ok(Some(trials))
+    })?;
+    let Some(trials) = trials else { return Ok(None) };
+    let Some(best) = trials.iter().min_by(|a, b| a.value.total_cmp(&b.value)) else {
+        return Ok(None);
+    };
+    let fine = Seen::new(file, measured, &search.fine)?;
+    let mut told = |worlds: usize, best: f64| watch((count - 1, count), worlds, best);
+    let told: &mut WorldWatch<'_> = &mut told;
+    let found = fine.with(unknown, &search.fine, |problem| {
+        let how = Exploration { width: WIDTHS[1], worlds: search.fine.worlds, seed: file.seed };
+        let Some(explored) = problem.explore(best.end, &how, told)? else { return Ok(None) };
+        let spread = Spread::of(problem.free, &explored.samples);
+        let data: f64 = problem.terms.iter().map(|term| term.weight).sum();
+        Ok(Some((explored, spread, data)))
+    })?;
+    Ok(found.map(|(explored, spread, data)| FoundWorld {
+        world: spread.as_ref().map_or(explored.best.world, |spread| spread.world),
+        reduced_chi2: explored.best.chi2 / data,
+        spread,
+        trials,
+    }))
+}
+
+fn trial(explored: &Explored) -> Trial {
+    Trial {
+        start: explored.start,
+        end: explored.best.world,
+        value: explored.best.value,
+        worlds: explored.samples.len(),
+        converged: explored.converged,
+    }
+}
+
+/// The world that the settings say, for parameters that are known, and for data that are simulated.
+pub fn known_world(file: &FitFile) -> World {
+    let inclination = file.observer.inclination_deg.to_radians();
+    World::new(file.hole.spin, inclination, file.effects.redshift_power.unwrap_or(0.0))
+}
+
+/// What a fit looks through in a world, and how matter moves there.
+///
+/// # Errors
+/// If a setting is missing or out of range.
+pub fn in_world(
+    file: &FitFile,
+    unknown: &UnknownWorld,
+    instrument: &Instrument,
+    measured: &Measured,
+    world: &World,
+) -> Result<(Instrument, Motion)> {
+    let plain = motion(file, measured.times.clone())?;
+    let model = model(file, unknown, instrument, &plain)?;
+    let power = world.get(crate::fit::world::Parameter::RedshiftPower);
+    let hole = Kerr::new(world.get(crate::fit::world::Parameter::Spin))?;
+    let found = Instrument {
+        pixels: instrument.pixels.clone(),
+        hole,
+        lines: model.sightlines(world)?,
+        redshift: instrument.redshift.map(|_| Redshift { power }),
+    };
+    Ok((found, model.motion_of(world)))
+}
+
+/// What all worlds share.
+fn model(
+    file: &FitFile,
+    unknown: &UnknownWorld,
+    instrument: &Instrument,
+    motion: &Motion,
+) -> Result<WorldModel> {
+    let Sampling::Gauss { order, split } = file.region.nodes else {
+        let why = "an unknown world needs region.nodes = { gauss = { order, split } }: nodes equidistant in Mino time \
+                   have no derivatives";
+        return Err(FitError::Conflict(why.to_owned()).into());
+    };
+    if file.effects.absorption.is_some() {
+        let why = "an unknown world and effects.absorption exclude each other".to_owned();
+        return Err(FitError::Conflict(why).into());
+    }
+    if !matches!(file.axis, AxisSearch::Known {}) {
+        let why = "an unknown world needs [axis.known]: matter turns about motion.axis, in the frame of the hole";
+        return Err(FitError::Conflict(why.to_owned()).into());
+    }
+    let follows = unknown.search.drag_is_spin;
+    let law = match file.motion.velocity {
+        Velocity::Keplerian { .. } if follows => Law::CircularOrbits,
+        _ => Law::Fixed(motion.velocity.clone()),
+    };
+    let [x, y] = instrument.pixels.clone();
+    Ok(WorldModel {
+        x,
+        y,
+        observer_radius: file.observer.radius,
+        region: file.region.limits(),
+        order,
+        split,
+        slow_light: file.effects.slow_light,
+        redshift: instrument.redshift.is_some(),
+        law,
+        axis: axis(file)?.0,
+        motion: motion.clone(),
+        jy: file.screen.jy_per_pixel,
+    })
+}
+
+/// Data as a search looks at them.
+struct Seen {
+    view: CoarseView,
+    frames: usize,
+}
+
+impl Seen {
+    fn new(file: &FitFile, measured: &Measured, view: &WorldView) -> Result<Self> {
+        Ok(Self { view: CoarseView::new(file, measured, view.pixels)?, frames: view.frames })
+    }
+
+    fn with<R>(
+        &self,
+        unknown: &UnknownWorld,
+        view: &WorldView,
+        search: impl FnOnce(&WorldProblem<'_, f32>) -> Result<R>,
+    ) -> Result<R> {
+        let CoarseView { file, instrument, measured } = &self.view;
+        let plain = motion(file, measured.times.clone())?;
+        let count = file.screen.pixels * file.screen.pixels;
+        let data = measured.terms(&file.loss, count)?;
+        let objective = Objective { model: forward_model(instrument, &plain)?, data };
+        let all = objective.observed();
+        let frames: Vec<usize> =
+            all.iter().copied().step_by((all.len() / self.frames).max(1)).collect();
+        let terms: Vec<Weighted<'_, f32>> =
+            terms(&objective.data).into_iter().map(|term| counted(term, &frames)).collect();
+        let data: f64 = terms.iter().map(|term| term.weight).sum();
+        let settings = linear(file)?;
+        let scaled = |penalty: Penalty| Penalty { weight: data * penalty.weight, ..penalty };
+        let penalties: Vec<Penalty> = priors(settings).into_iter().map(scaled).collect();
+        search(&WorldProblem {
+            model: &model(file, unknown, instrument, &plain)?,
+            known: known_world(file),
+            free: &unknown.free()?,
+            frames: &frames,
+            terms: &terms,
+            half_width: file.region.r_max,
+            upper: settings.upper,
+            flux: settings.flux_jy,
+            penalties: &penalties,
+            effort: Effort { nodes: view.nodes, iterations: view.iterations },
+        })
+    }
+}
+
+/// Data with their weight times their number in some frames.
+fn counted<'a>(term: Weighted<'a, f32>, frames: &[usize]) -> Weighted<'a, f32> {
+    let data: usize = frames.iter().map(|frame| term.term.degrees_of_freedom(*frame)).sum();
+    Weighted { weight: term.weight * data as f64, ..term }
+}

@@ -1,0 +1,164 @@
+//! How sure a world is: a quadratic form through the values of worlds near the best one.
+
+use super::{Free, Sample, World};
+use nalgebra::{DMatrix, DVector};
+
+/// What the values near the best world say.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spread {
+    /// The lowest point of the quadratic form, inside the bounds.
+    pub world: World,
+    /// Standard deviation of each free parameter, in its own unit.
+    pub sigma: Vec<f64>,
+    /// Correlations of the free parameters, row by row.
+    pub correlation: Vec<f64>,
+    /// Standard deviation of the values about the form: the ripples of χ²/2.
+    pub ripple: f64,
+    /// Worlds that the form was fitted to.
+    pub worlds: usize,
+}
+
+/// Worlds farther above the best one than this many ripples and one are left out, as long as enough remain.
+const REACH: f64 = 8.0;
+/// Worlds for each coefficient of the form.
+const PLENTY: usize = 2;
+
+impl Spread {
+    /// Of worlds sorted by their values; none if there are too few, or they have no lowest point inside the bounds.
+    ///
+    /// Ripples of standard deviation s, which come from rays next to the critical curve, hide the lowest point within
+    /// the region where the form rises by s: the covariance is 1 + 2 s times the inverse of its second derivatives.
+    pub fn of(free: &[Free], samples: &[Sample]) -> Option<Self> {
+        let n = free.len();
+        let coefficients = (n + 1) * (n + 2) / 2;
+        let best = samples.first()?;
+        let fewest = PLENTY * coefficients;
+        let mut near = samples.iter().take_while(|s| s.value < best.value + REACH).count();
+        let (mut form, mut ripple) = (None, 0.0);
+        for _ in 0..3 {
+            let taken = samples.get(..near.max(fewest))?;
+            let found = Form::fit(free, best, taken)?;
+            ripple = found.ripple;
+            form = Some((found, taken.len()));
+            let reach = REACH * (1.0 + ripple);
+            near = samples.iter().take_while(|s| s.value < best.value + reach).count();
+        }
+        let (form, worlds) = form?;
+        let factors = DMatrix::from_row_slice(n, n, &form.bends).cholesky()?;
+        let lowest = factors.solve(&DVector::from_iterator(n, form.slopes.iter().map(|x| -x)));
+        let covariance = factors.inverse() * (1.0 + 2.0 * ripple);
+        let sigma = |k: usize| covariance[(k, k)].sqrt();
+        let correlation = (0..n * n).map(|at| {
+            let (row, column) = (at / n, at % n);
+            covariance[(row, column)] / (sigma(row) * sigma(column))
+        });
+        let unit = |k: usize| free[k].parameter.scale();
+        let world = (0..n).fold(best.world, |world, k| {
+            // Not farther than worlds have been looked at.
+            let step = lowest[k].clamp(-form.reach[k], form.reach[k]) * unit(k);
+            let [low, high] = free[k].bounds();
+            let value = best.world.get(free[k].parameter) + step;
+            world.with(free[k].parameter, value.clamp(low, high))
+        });
+        Some(Self {
+            world,
+            sigma: (0..n).map(|k| sigma(k) * unit(k)).collect(),
+            correlation: correlation.collect(),
+            ripple,
+            worlds,
+        })
+    }
+}
+
+/// c + slopes·u + u·bends·u/2 about the best world, u in units of each parameter's scale.
+struct Form {
+    slopes: Vec<f64>,
+    bends: Vec<f64>,
+    ripple: f64,
+    /// How far worlds lie from the best one.
+    reach: Vec<f64>,
+}
+
+impl Form {
+    fn fit(free: &[Free], best: &Sample, samples: &[Sample]) -> Option<Self> {
+        let n = free.len();
+        let place = |sample: &Sample| -> Vec<f64> {
+            let of = |free: &Free| {
+                let (a, b) = (sample.world.get(free.parameter), best.world.get(free.parameter));
+                free.parameter.difference(a, b) / free.parameter.scale()
+            };
+            free.iter().map(of).collect()
+        };
+        let places: Vec<Vec<f64>> = samples.iter().map(place).collect();
+        let columns = (n + 1) * (n + 2) / 2;
+        let row = |u: &Vec<f64>| -> Vec<f64> {
+            let squares = (0..n).flat_map(|a| (a..n).map(move |b| (a, b)));
+            let squares =
+                squares.map(|(a, b)| if a == b { 0.5 * u[a] * u[a] } else { u[a] * u[b] });
+            core::iter::once(1.0).chain(u.iter().copied()).chain(squares).collect()
+        };
+        let rows: Vec<f64> = places.iter().flat_map(row).collect();
+        let matrix = DMatrix::from_row_slice(samples.len(), columns, &rows);
+        let values = samples.iter().map(|sample| sample.value - best.value);
+        let right = DVector::from_iterator(samples.len(), values);
+        let solution = matrix.clone().svd(true, true).solve(&right, 1e-10).ok()?;
+        let left = (&right - &matrix * &solution).norm_squared();
+        let freedom = samples.len().saturating_sub(columns).max(1);
+        let mut bends = vec![0.0; n * n];
+        let mut at = n + 1;
+        for a in 0..n {
+            for b in a..n {
+                bends[a * n + b] = solution[at];
+                bends[b * n + a] = solution[at];
+                at += 1;
+            }
+        }
+        let reach = |k: usize| places.iter().fold(0.0f64, |most, u| most.max(u[k].abs()));
+        Some(Self {
+            slopes: solution.rows(1, n).iter().copied().collect(),
+            bends,
+            ripple: (left / freedom as f64).sqrt(),
+            reach: (0..n).map(reach).collect(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::world::{Parameter, Prior};
+
+    #[test]
+    fn exact_covariance_of_a_paraboloid() {
+        let prior = Prior::Uniform { low: -0.9, high: 0.9 };
+        let turn = Prior::Uniform { low: 0.0, high: 3.0 };
+        let free = [
+            Free { parameter: Parameter::Spin, prior },
+            Free { parameter: Parameter::Inclination, prior: turn },
+        ];
+        let center = World::new(0.31, 1.02, 2.0);
+        // Inverse covariance.
+        let (a, b, c) = (1.0 / 0.0025, 300.0, 1.0 / 0.0009);
+        let value = |world: &World| {
+            let x = world.get(Parameter::Spin) - 0.31;
+            let y = world.get(Parameter::Inclination) - 1.02;
+            0.5 * (a * x * x + 2.0 * b * x * y + c * y * y)
+        };
+        let sample = |k: usize| {
+            let angle = 2.4 * k as f64;
+            let r = 0.1 * ((k + 1) as f64 / 60.0).sqrt();
+            let world = center.with(Parameter::Spin, 0.31 + 0.02 + r * angle.cos());
+            let world = world.with(Parameter::Inclination, 1.02 + 0.6 * r * angle.sin());
+            Sample { world, value: value(&world) }
+        };
+        let mut samples: Vec<Sample> = (0..60).map(sample).collect();
+        samples.sort_by(|a, b| a.value.total_cmp(&b.value));
+        let found = Spread::of(&free, &samples).unwrap();
+        assert!(found.ripple < 1e-9 && (found.world.get(Parameter::Spin) - 0.31).abs() < 1e-9);
+        let determinant = a * c - b * b;
+        assert!((found.sigma[0] - (c / determinant).sqrt()).abs() < 1e-9);
+        assert!((found.sigma[1] - (a / determinant).sqrt()).abs() < 1e-9);
+        assert!((found.correlation[1] + b / (a * c).sqrt()).abs() < 1e-9);
+        assert!(Spread::of(&free, &samples[..5]).is_none());
+    }
+}
