@@ -27,6 +27,11 @@ pub fn cases(count: u64) -> ProgressBar {
     styled(count, "{bar:30} {pos} of {len} done  {elapsed} gone, {eta} left  {msg}")
 }
 
+/// A bar that counts worlds, and says which search goes on.
+pub fn worlds(count: u64) -> ProgressBar {
+    styled(count, "{bar:30} world {pos} of at most {len}  {msg}  {elapsed} gone, {eta} left")
+}
+
 /// A bar that counts axes.
 pub fn axes(count: u64) -> ProgressBar {
     styled(count, "{bar:30} axis {pos} of {len}  {elapsed} gone, {eta} left")

@@ -12,6 +12,7 @@ mod labels;
 mod linear;
 mod results;
 mod run;
+mod world_search;
 
 use crate::answer::Answer;
 use crate::{interrupt, output, paths};

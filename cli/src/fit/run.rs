@@ -7,6 +7,7 @@ use super::folder::{self, Folder};
 use super::labels;
 use super::linear;
 use super::results::{self, Estimate};
+use super::world_search::{self, Placed};
 use crate::answer::Answer;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
@@ -40,8 +41,13 @@ impl<'a> Prepared<'a> {
         let instrument = Instrument::new(&file)?;
         let measured = data::measure(&file, &instrument, base_dir)?;
         let motion = setup::motion(&file, measured.times.clone())?;
+        if let Some(unknown) = file.unknown_world()? {
+            // What contradicts it is told before anything is written.
+            let world = setup::known_world(&file);
+            setup::in_world(&file, &unknown, &instrument, &measured, &world)?;
+        }
         let prepared = Self { file, registry, instrument, measured, motion };
-        let seen = prepared.objective()?.observed().len();
+        let seen = prepared.objective(&prepared.instrument, &prepared.motion)?.observed().len();
         if matches!(prepared.file.axis, AxisSearch::Scan(_)) && seen < 2 {
             bail!(
                 "axis.scan needs at least 2 frame times: a single frame does not constrain the axis"
@@ -50,10 +56,14 @@ impl<'a> Prepared<'a> {
         Ok(prepared)
     }
 
-    fn objective(&self) -> anyhow::Result<Objective<f32>> {
+    fn objective(
+        &self,
+        instrument: &Instrument,
+        motion: &Motion,
+    ) -> anyhow::Result<Objective<f32>> {
         let pixels = self.file.screen.pixels * self.file.screen.pixels;
         let data = self.measured.terms(&self.file.loss, pixels)?;
-        Ok(Objective { model: setup::forward_model(&self.instrument, &self.motion)?, data })
+        Ok(Objective { model: setup::forward_model(instrument, motion)?, data })
     }
 }
 
@@ -66,7 +76,12 @@ pub fn run(
 ) -> anyhow::Result<Answer> {
     let Prepared { file, registry, instrument, measured, motion } = prepared;
     let begun = Instant::now();
-    let objective = prepared.objective()?;
+    let placed = world_search::place(file, instrument, measured, folder)?;
+    let (file, instrument, motion) = match &placed {
+        Some(Placed { file, instrument, motion }) => (file, instrument, motion),
+        None => (file, instrument, motion),
+    };
+    let objective = prepared.objective(instrument, motion)?;
     let representation = setup::representation(file, registry)?;
     let (axis, axis_rate) = setup::axis(file)?;
     let training = setup::training(file, axis_rate)?;

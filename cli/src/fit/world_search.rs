@@ -1,0 +1,186 @@
+//! A world that is not known: it is found before the emission is fitted in it.
+
+use super::failed;
+use super::folder::Folder;
+use crate::checksum::sealed;
+use crate::interrupt::{Interrupted, Keeper};
+use crate::output;
+use crate::progress;
+use anyhow::Context;
+use kerrlight_tomo::dynamics::Velocity;
+use kerrlight_tomo::fit::Motion;
+use kerrlight_tomo::fit::settings::{FitFile, UnknownWorld};
+use kerrlight_tomo::fit::setup::{self, FoundWorld, Instrument, Measured, Trial};
+use kerrlight_tomo::fit::world::{Free, Parameter, World};
+use serde_json::{Map, Value, json};
+
+/// What was found, in the folder of the run.
+pub const FILE: &str = "world.json";
+
+const STOPPED: &str = "stopped while the world was looked for: nothing is kept of that";
+
+/// Settings, rays and motion in the world that was found.
+pub struct Placed {
+    /// Settings with its spin, inclination and power of g.
+    pub file: FitFile,
+    /// Rays.
+    pub instrument: Instrument,
+    /// Motion.
+    pub motion: Motion,
+}
+
+/// Finds the world of a fit, or reads it where an earlier run has found it; none if it is known.
+pub fn place(
+    file: &FitFile,
+    instrument: &Instrument,
+    measured: &Measured,
+    folder: &Folder,
+) -> anyhow::Result<Option<Placed>> {
+    let Some(unknown) = file.unknown_world()? else { return Ok(None) };
+    let path = folder.path().join(FILE);
+    if !path.exists() {
+        let found = search(file, measured, &unknown)?;
+        let results = results(file, measured, &unknown, &found)?;
+        folder.file(FILE)?.write(sealed(results).as_bytes())?;
+    }
+    // Read in any case, so that a run that goes on has the same bits.
+    let results: Value = serde_json::from_str(&output::read_text(&path)?)
+        .with_context(|| format!("{} is damaged: remove it to look again", path.display()))?;
+    for line in lines(&results) {
+        eprintln!("{line}");
+    }
+    let world = world_of(file, &unknown.free()?, &results)
+        .with_context(|| format!("{} is damaged: remove it to look again", path.display()))?;
+    let (instrument, motion) = setup::in_world(file, &unknown, instrument, measured, &world)?;
+    Ok(Some(Placed { file: settled(file, &unknown, &world), instrument, motion }))
+}
+
+fn search(
+    file: &FitFile,
+    measured: &Measured,
+    unknown: &UnknownWorld,
+) -> anyhow::Result<FoundWorld> {
+    let keeper = Keeper::brief(STOPPED);
+    let search = &unknown.search;
+    let total = search.starts * search.coarse.worlds + search.fine.worlds;
+    let bar = progress::worlds(total as u64);
+    let mut watch = |(k, count): (usize, usize), worlds: usize, best: f64| {
+        bar.set_position((k * search.coarse.worlds + worlds) as u64);
+        bar.set_message(format!("search {} of {count}, least chi2/2 {best:.5e}", k + 1));
+        !keeper.stopped()
+    };
+    let found = setup::find_world(file, measured, unknown, &mut watch)
+        .map_err(|error| failed::linear(error).context("world.search"))?;
+    bar.finish_and_clear();
+    found.ok_or_else(|| Interrupted(STOPPED.to_owned()).into())
+}
+
+/// The settings with what was found in place of what was assumed.
+fn settled(file: &FitFile, unknown: &UnknownWorld, world: &World) -> FitFile {
+    let mut file = file.clone();
+    file.hole.spin = world.get(Parameter::Spin);
+    file.observer.inclination_deg = world.get(Parameter::Inclination).to_degrees();
+    if let Some(power) = &mut file.effects.redshift_power {
+        *power = world.get(Parameter::RedshiftPower);
+    }
+    if let Velocity::Keplerian { drag } = &mut file.motion.velocity
+        && unknown.search.drag_is_spin
+    {
+        *drag = file.hole.spin;
+    }
+    file
+}
+
+/// Names and values of the free parameters, in their units.
+fn values(free: &[Free], of: impl Fn(usize, Parameter) -> Option<f64>) -> Map<String, Value> {
+    let one = |(k, free): (usize, &Free)| {
+        let value = of(k, free.parameter).map(|value| value / free.parameter.unit());
+        (free.parameter.name().to_owned(), json!(value))
+    };
+    free.iter().enumerate().map(one).collect()
+}
+
+fn results(
+    file: &FitFile,
+    measured: &Measured,
+    unknown: &UnknownWorld,
+    found: &FoundWorld,
+) -> anyhow::Result<Value> {
+    let free = unknown.free()?;
+    let world = |world: &World| values(&free, |_, parameter| Some(world.get(parameter)));
+    let spread = found.spread.as_ref();
+    let truth = match measured.truth {
+        Some(_) => Some(world(&setup::known_world(&file.simulated()?))),
+        None => None,
+    };
+    let least = found.trials.iter().map(|trial| trial.value).fold(f64::INFINITY, f64::min);
+    let trial = |trial: &Trial| {
+        json!({
+            "start": world(&trial.start), "end": world(&trial.end), "above_best": trial.value - least,
+            "worlds": trial.worlds, "converged": trial.converged,
+            "same": is_same(&free, trial, &found.trials),
+        })
+    };
+    let trials: Vec<Value> = found.trials.iter().map(trial).collect();
+    let same = trials.iter().filter(|trial| trial["same"] == true).count();
+    let priors = free.iter().map(|free| {
+        (free.parameter.name().to_owned(), json!(free.bounds().map(|x| x / free.parameter.unit())))
+    });
+    Ok(json!({
+        "world": world(&found.world),
+        "sigma": values(&free, |k, _| spread.map(|spread| spread.sigma[k])),
+        "correlation": spread.map(|spread| spread.correlation.clone()),
+        "ripple": spread.map(|spread| spread.ripple),
+        "bounds": priors.collect::<Map<String, Value>>(),
+        "truth": truth,
+        "chi2_per_datum": found.reduced_chi2,
+        "starts": trials.len(),
+        "ended_at_the_best": same,
+        "trials": trials,
+    }))
+}
+
+/// Whether a search ended where the best one did: within half of each parameter's scale.
+fn is_same(free: &[Free], trial: &Trial, trials: &[Trial]) -> bool {
+    let best = trials.iter().min_by(|a, b| a.value.total_cmp(&b.value));
+    best.is_some_and(|best| {
+        free.iter().all(|Free { parameter, .. }| {
+            let apart = parameter.difference(trial.end.get(*parameter), best.end.get(*parameter));
+            apart.abs() < 0.5 * parameter.scale()
+        })
+    })
+}
+
+/// A line for each parameter, and one for the starts.
+pub fn lines(results: &Value) -> Vec<String> {
+    let Some(world) = results["world"].as_object() else { return Vec::new() };
+    let mut lines: Vec<String> = world
+        .iter()
+        .map(|(name, value)| {
+            let value = value.as_f64().unwrap_or(f64::NAN);
+            let sure = match results["sigma"][name].as_f64() {
+                Some(sigma) => format!("{value:.4} ± {sigma:.4}"),
+                None => format!("{value:.4}, of unknown error: the data leave the world open"),
+            };
+            match results["truth"][name].as_f64() {
+                Some(truth) => format!("world.{name} = {sure} (truth {truth:.4})"),
+                None => format!("world.{name} = {sure}"),
+            }
+        })
+        .collect();
+    lines.push(format!(
+        "world: {} of {} starts ended at the best one; χ²/N = {:.3}",
+        results["ended_at_the_best"],
+        results["starts"],
+        results["chi2_per_datum"].as_f64().unwrap_or(f64::NAN)
+    ));
+    lines
+}
+
+fn world_of(file: &FitFile, free: &[Free], results: &Value) -> anyhow::Result<World> {
+    free.iter().try_fold(setup::known_world(file), |world, Free { parameter, .. }| {
+        let value = results["world"][parameter.name()].as_f64();
+        let value = value.with_context(|| format!("there is no {}", parameter.name()))?;
+        Ok(world.with(*parameter, value * parameter.unit()))
+    })
+}
