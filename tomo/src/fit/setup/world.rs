@@ -80,13 +80,14 @@ pub fn find_world(
     let found = fine.with(unknown, &search.fine, |problem| {
         let how = Exploration { width: WIDTHS[1], worlds: search.fine.worlds, seed: file.seed };
         let Some(explored) = problem.explore(best.end, &how, told)? else { return Ok(None) };
-        let spread = Spread::of(problem.free, &explored.samples);
         let data: f64 = problem.terms.iter().map(|term| term.weight).sum();
-        Ok(Some((explored, spread, data)))
+        let reduced = explored.best.chi2 / data;
+        let spread = Spread::of(problem.free, &explored.samples, reduced);
+        Ok(Some((explored, spread, reduced)))
     })?;
-    Ok(found.map(|(explored, spread, data)| FoundWorld {
+    Ok(found.map(|(explored, spread, reduced_chi2)| FoundWorld {
         world: spread.as_ref().map_or(explored.best.world, |spread| spread.world),
-        reduced_chi2: explored.best.chi2 / data,
+        reduced_chi2,
         spread,
         trials,
     }))

@@ -18,35 +18,38 @@ pub struct Spread {
     pub worlds: usize,
 }
 
-/// Worlds farther above the best one than this many ripples and one are left out, as long as enough remain.
-const REACH: f64 = 8.0;
-/// Worlds for each coefficient of the form.
+/// Worlds for each coefficient of the form, at least.
 const PLENTY: usize = 2;
+/// The form is trusted where it rises by so many ripples.
+const CLEAR: f64 = 4.0;
 
 impl Spread {
-    /// Of worlds sorted by their values; none if there are too few, or they have no lowest point inside the bounds.
+    /// Of worlds sorted by their values, of data with this χ²/N at the best; none if there are too few, or the values
+    /// have no lowest point that is clear of their ripples.
     ///
-    /// Ripples of standard deviation s, which come from rays next to the critical curve, hide the lowest point within
-    /// the region where the form rises by s: the covariance is 1 + 2 s times the inverse of its second derivatives.
-    pub fn of(free: &[Free], samples: &[Sample]) -> Option<Self> {
+    /// The form goes through the fewest of the best worlds over which it rises clearly above the ripples: values that
+    /// differ from it because rays next to the critical curve come and go. Ripples of standard deviation s hide the
+    /// lowest point within the region where the form rises by s: the covariance is 1 + 2 s times the inverse of its
+    /// second derivatives, and χ²/N times that where it is above 1.
+    pub fn of(free: &[Free], samples: &[Sample], reduced_chi2: f64) -> Option<Self> {
         let n = free.len();
-        let coefficients = (n + 1) * (n + 2) / 2;
         let best = samples.first()?;
-        let fewest = PLENTY * coefficients;
-        let mut near = samples.iter().take_while(|s| s.value < best.value + REACH).count();
-        let (mut form, mut ripple) = (None, 0.0);
-        for _ in 0..3 {
-            let taken = samples.get(..near.max(fewest))?;
-            let found = Form::fit(free, best, taken)?;
-            ripple = found.ripple;
-            form = Some((found, taken.len()));
-            let reach = REACH * (1.0 + ripple);
-            near = samples.iter().take_while(|s| s.value < best.value + reach).count();
+        let fewest = PLENTY * (n + 1) * (n + 2) / 2;
+        let counts = core::iter::successors(Some(fewest), |count| Some(count * 5 / 4 + 1));
+        let counts = counts.take_while(|count| *count <= samples.len());
+        counts.filter_map(|count| Self::through(free, best, &samples[..count], reduced_chi2)).next()
+    }
+
+    fn through(free: &[Free], best: &Sample, taken: &[Sample], reduced_chi2: f64) -> Option<Self> {
+        let n = free.len();
+        let form = Form::fit(free, best, taken)?;
+        let rise = taken.last()?.value - best.value;
+        if rise < CLEAR * form.ripple {
+            return None;
         }
-        let (form, worlds) = form?;
         let factors = DMatrix::from_row_slice(n, n, &form.bends).cholesky()?;
         let lowest = factors.solve(&DVector::from_iterator(n, form.slopes.iter().map(|x| -x)));
-        let covariance = factors.inverse() * (1.0 + 2.0 * ripple);
+        let covariance = factors.inverse() * ((1.0 + 2.0 * form.ripple) * reduced_chi2.max(1.0));
         let sigma = |k: usize| covariance[(k, k)].sqrt();
         let correlation = (0..n * n).map(|at| {
             let (row, column) = (at / n, at % n);
@@ -64,8 +67,8 @@ impl Spread {
             world,
             sigma: (0..n).map(|k| sigma(k) * unit(k)).collect(),
             correlation: correlation.collect(),
-            ripple,
-            worlds,
+            ripple: form.ripple,
+            worlds: taken.len(),
         })
     }
 }
@@ -153,12 +156,12 @@ mod tests {
         };
         let mut samples: Vec<Sample> = (0..60).map(sample).collect();
         samples.sort_by(|a, b| a.value.total_cmp(&b.value));
-        let found = Spread::of(&free, &samples).unwrap();
+        let found = Spread::of(&free, &samples, 0.9).unwrap();
         assert!(found.ripple < 1e-9 && (found.world.get(Parameter::Spin) - 0.31).abs() < 1e-9);
         let determinant = a * c - b * b;
         assert!((found.sigma[0] - (c / determinant).sqrt()).abs() < 1e-9);
         assert!((found.sigma[1] - (a / determinant).sqrt()).abs() < 1e-9);
         assert!((found.correlation[1] + b / (a * c).sqrt()).abs() < 1e-9);
-        assert!(Spread::of(&free, &samples[..5]).is_none());
+        assert!(Spread::of(&free, &samples[..5], 1.0).is_none());
     }
 }
