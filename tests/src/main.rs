@@ -32,4 +32,5 @@ mod resumed_fits;
 #[cfg(unix)]
 mod signals;
 mod support;
+mod unknown_world;
 mod verdict;

@@ -140,13 +140,13 @@ fn results(
     }))
 }
 
-/// Whether a search ended where the best one did: within half of each parameter's scale.
+/// Whether a search ended where the best one did: within 1.5 of each parameter's scale, the width of a first population.
 fn is_same(free: &[Free], trial: &Trial, trials: &[Trial]) -> bool {
     let best = trials.iter().min_by(|a, b| a.value.total_cmp(&b.value));
     best.is_some_and(|best| {
         free.iter().all(|Free { parameter, .. }| {
             let apart = parameter.difference(trial.end.get(*parameter), best.end.get(*parameter));
-            apart.abs() < 0.5 * parameter.scale()
+            apart.abs() < 1.5 * parameter.scale()
         })
     })
 }

@@ -174,12 +174,25 @@ fn free(parameter: Parameter, settings: PriorSettings) -> Result<Free, Error> {
     Ok(Free { parameter, prior })
 }
 
+/// Refuses keys that are neither simulated nor parameters.
+fn check_keys(world: &Table) -> Result<(), Error> {
+    let names = Parameter::ALL.map(Parameter::name);
+    let known = || SIMULATED.iter().chain(&names).chain(&["search"]);
+    let Some(key) = world.keys().find(|key| !known().any(|name| name == key)) else {
+        return Ok(());
+    };
+    let list: Vec<String> = known().map(|name| format!("`{name}`")).collect();
+    let why = format!("world: unknown field `{key}`, expected one of {}", list.join(", "));
+    Err(FitError::Conflict(why).into())
+}
+
 impl FitFile {
     /// What of the world is not known; none if all is.
     ///
     /// # Errors
     /// If a key of `world` is unknown, or a number out of range.
     pub fn unknown_world(&self) -> Result<Option<UnknownWorld>, Error> {
+        check_keys(&self.world)?;
         let keys = self.world.iter().filter(|(key, _)| !SIMULATED.contains(&key.as_str()));
         let table: Table = keys.map(|(key, value)| (key.clone(), value.clone())).collect();
         if table.is_empty() {

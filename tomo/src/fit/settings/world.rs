@@ -72,7 +72,7 @@ mod tests {
         assert!(!world.effects.slow_light && world.effects.redshift_power == Some(2.0));
         file.world = table("[loss]\n");
         let error = format!("{:#}", file.simulated().unwrap_err());
-        assert!(error.contains("world.loss is not allowed: hole"), "{error}");
+        assert!(error.contains("world: unknown field `loss`, expected one of `hole`"), "{error}");
         file.world = table("[hole]\nspn = 0.9\n");
         let error = format!("{:#}", file.simulated().unwrap_err());
         assert!(error.contains("unknown field `spn`"), "{error}");

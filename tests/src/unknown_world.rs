@@ -1,0 +1,70 @@
+//! Fits that do not know the world.
+
+use crate::support::{kerrlight, root};
+use serde_json::Value;
+
+/// The built-in flare seen by the ngEHT, few pixels and scans, from another inclination and orientation than its
+/// settings say.
+fn settings(worlds: usize) -> String {
+    let built_in = std::fs::read_to_string(root().join("cli/src/fit/built_in.toml")).unwrap();
+    let small = built_in
+        .replace("pixels = 40", "pixels = 20")
+        .replace("jy_per_pixel = 0.08", "jy_per_pixel = 0.32")
+        .replace("scans = 64", "scans = 12")
+        .replace("steps = 600", "steps = 20")
+        .replace("steps = 300", "steps = 20")
+        .replace("nodes = 64", "nodes = 24");
+    let view =
+        format!("{{ worlds = {worlds}, nodes = 16, iterations = 25, pixels = 20, frames = 12 }}");
+    format!(
+        "{small}\n[world.inclination_deg]\nisotropic = [0.0, 180.0]\n[world.position_angle_deg]\nuniform = [-180.0, \
+         180.0]\n[world.search]\nstarts = 2\ndrag_is_spin = true\ncoarse = {view}\nfine = {view}\n"
+    )
+}
+
+fn read(path: &std::path::Path) -> Value {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+#[test]
+fn exact_inclination_and_position_angle_are_found_from_visibilities() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("fit.toml"), settings(300)).unwrap();
+    let run = kerrlight(folder.path(), &["fit", "fit.toml", "-o", "run"]);
+    let told = String::from_utf8_lossy(&run.stderr).into_owned();
+    assert!(run.status.success(), "{told}");
+    assert!(told.contains("world.inclination_deg = "), "{told}");
+    let world = read(&folder.path().join("run/world.json"));
+    let inclination = world["world"]["inclination_deg"].as_f64().unwrap();
+    let angle = world["world"]["position_angle_deg"].as_f64().unwrap();
+    assert!((inclination - 60.0).abs() < 3.0 && angle.abs() < 3.0, "{world}");
+    assert_eq!(world["truth"]["inclination_deg"].as_f64(), Some(60.0));
+    assert_eq!(world["starts"], 2);
+    // The same again, to the bit.
+    let first = std::fs::read(folder.path().join("run/world.json")).unwrap();
+    std::fs::remove_file(folder.path().join("run/checkpoint.safetensors")).unwrap();
+    std::fs::remove_file(folder.path().join("run/world.json")).unwrap();
+    let again = kerrlight(folder.path(), &["fit", "--resume", "run"]);
+    assert!(again.status.success(), "{}", String::from_utf8_lossy(&again.stderr));
+    assert_eq!(first, std::fs::read(folder.path().join("run/world.json")).unwrap());
+}
+
+#[test]
+fn exact_impossible_priors_are_refused_before_anything_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("fit.toml"), settings(50)).unwrap();
+    for (change, expected) in [
+        ("world.inclination_deg={uniform=[50.0,20.0]}", "high"),
+        ("world={spin={uniform=[0.0,1.5]}}", "missing field `search`"),
+        ("world.spin={uniform=[0.0,1.5]}", "world.spin = 1.5 is not allowed: -0.999 to 0.999"),
+        ("world.position_angle_deg={isotropic=[0.0,1.0]}", "isotropic is a prior of inclinations"),
+        ("world.search.starts=0", "world.search.starts = 0 is not allowed"),
+        ("axis={from={start=[0.0,0.0,1.0],rate=0.1,last_rate=0.1}}", "[axis.known]"),
+    ] {
+        let run = kerrlight(folder.path(), &["fit", "fit.toml", "-o", "run", "--set", change]);
+        let told = String::from_utf8_lossy(&run.stderr).into_owned();
+        assert_eq!(run.status.code(), Some(2), "{change}: {told}");
+        assert!(told.contains(expected), "{change}: {told}");
+        assert!(!folder.path().join("run").exists(), "{change}");
+    }
+}
