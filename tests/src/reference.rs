@@ -78,7 +78,7 @@ fn section<'a>(page: &'a str, heading: &str) -> &'a str {
 
 /// The keys that a table may have, as the refusal of an unknown one lists them behind its name.
 fn allowed(folder: &Path, arguments: &[&str]) -> Vec<String> {
-    const AROUND: [&str; 6] = ["expected", "one", "of", "or", "available", "keys"];
+    const AROUND: [&str; 7] = ["expected", "one", "of", "or", "in", "available", "keys"];
     let output = kerrlight(folder, arguments);
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(!output.status.success() && errors.contains("nonsense"), "{arguments:?}: {errors}");
