@@ -52,7 +52,7 @@ impl Instrument {
         let what = || {
             format!("screen.pixels = {n}: about {nodes:.0} nodes on the rays of {pixels} pixels")
         };
-        Ok(memory::afford(what, memory::nodes(nodes, columns))?)
+        memory::afford(what, memory::nodes(nodes, columns))
     }
 
     /// Traces the rays of some pixels, counted row by row from the top, each from the left.

@@ -68,7 +68,7 @@ impl Measured {
             )
         })?;
         let movie = self.movie()?.iter().map(|x| *x as f32).collect();
-        Ok(ImageTerm::new(movie, pixels, sigma)?)
+        ImageTerm::new(movie, pixels, sigma)
     }
 
     fn other(&self, loss: &Loss, pixels: usize) -> Result<Box<dyn FrameTerm<f32>>> {
@@ -142,5 +142,5 @@ const MEMORY: usize = 8 << 20;
 /// If the motion is out of range.
 pub fn forward_model(instrument: &Instrument, motion: &Motion) -> Result<ForwardModel<f32>> {
     let Instrument { lines, hole, redshift, .. } = instrument;
-    Ok(ForwardModel::new(lines, motion, hole, *redshift)?)
+    ForwardModel::new(lines, motion, hole, *redshift)
 }

@@ -90,7 +90,7 @@ pub fn sky(file: &FitFile) -> Result<ImageGrid> {
             ).into());
         }
     };
-    Ok(ImageGrid::new(n, n, field_uas * MICROARCSECOND)?)
+    ImageGrid::new(n, n, field_uas * MICROARCSECOND)
 }
 
 /// What to write where the mass is missing.
