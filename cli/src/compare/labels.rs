@@ -10,12 +10,18 @@ pub fn number(x: f64, digits: usize) -> String {
 }
 
 /// Results that are shown: their names in results.json, what they are called, their units and digits.
-pub const RESULTS: [(&str, &str, &str, usize); 11] = [
+pub const RESULTS: [(&str, &str, &str, usize); 17] = [
     ("psnr_db", "PSNR", "dB", 2),
     ("psnr_inside_db", "PSNR inside the region", "dB", 2),
     ("nrmse", "relative error", "", 4),
     ("correlation", "correlation", "", 4),
     ("axis_dot_truth", "axis · true axis", "", 4),
+    ("spin_error", "error of the spin", "M", 4),
+    ("spin_pull", "error of the spin over its standard deviation", "", 2),
+    ("inclination_error_deg", "error of the inclination", "°", 3),
+    ("inclination_pull", "error of the inclination over its standard deviation", "", 2),
+    ("position_angle_error_deg", "error of the position angle", "°", 3),
+    ("position_angle_pull", "error of the position angle over its standard deviation", "", 2),
     ("chi2", "χ² per data point", "", 3),
     ("loss", "loss", "", 6),
     ("seconds", "wall time", "s", 1),

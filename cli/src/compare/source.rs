@@ -33,6 +33,7 @@ const CARRIED: &[(&str, &str)] = &carried![
     "experiments/effects.toml",
     "experiments/cost.toml",
     "experiments/spin-mismatch.toml",
+    "experiments/world.toml",
     "experiments/fits/first_pattern.toml",
     "experiments/fits/second_pattern.toml",
     "experiments/fits/digits.toml",

@@ -177,6 +177,76 @@ pub fn lines(results: &Value) -> Vec<String> {
     lines
 }
 
+/// What a run has found, if its world was not known.
+pub fn found(folder: &Folder) -> anyhow::Result<Option<Value>> {
+    let path = folder.path().join(FILE);
+    if !path.exists() {
+        return Ok(None);
+    }
+    Ok(Some(serde_json::from_str(&output::read_text(&path)?)?))
+}
+
+/// Distances from the truth, and how many standard deviations they are.
+pub fn errors(results: &Value) -> Vec<(String, Value)> {
+    let of = |parameter: Parameter| {
+        let name = parameter.name();
+        let number = |key: &str| results[key][name].as_f64();
+        let (value, truth) = (number("world")?, number("truth")?);
+        let unit = parameter.unit();
+        let error = (parameter.difference(value * unit, truth * unit) / unit).abs();
+        let (plain, suffix) = name.strip_suffix("_deg").map_or((name, ""), |name| (name, "_deg"));
+        let pull = number("sigma").map(|sigma| error / sigma);
+        let error = (format!("{plain}_error{suffix}"), json!(error));
+        Some([error, (format!("{plain}_pull"), json!(pull))])
+    };
+    Parameter::ALL.into_iter().filter_map(of).flatten().collect()
+}
+
+/// A sentence for each parameter, and one for the starts.
+pub fn sentences(results: &Value) -> Vec<String> {
+    let of = |parameter: Parameter| {
+        let name = parameter.name();
+        let number = |key: &str| results[key][name].as_f64();
+        let value = number("world")?;
+        let (words, unit) = described(parameter);
+        let truth =
+            number("truth").map_or(String::new(), |truth| format!(" (truth: {truth:.3}{unit})"));
+        let bounds = results["bounds"][name].as_array()?;
+        let [low, high] = [0, 1].map(|k| bounds.get(k).and_then(Value::as_f64).unwrap_or(f64::NAN));
+        let Some(sigma) = number("sigma") else {
+            return Some(format!("The {words} is {value:.3}{unit}, with an unknown error{truth}."));
+        };
+        let ends = [value - 2.0 * sigma, value + 2.0 * sigma];
+        if ends[0] <= low && ends[1] >= high {
+            return Some(format!(
+                "The {words} is not constrained: {value:.3}{unit} explains the data best{truth}."
+            ));
+        }
+        let [from, to] = [ends[0].max(low), ends[1].min(high)];
+        Some(format!("The {words} is between {from:.3}{unit} and {to:.3}{unit} at 95 %{truth}."))
+    };
+    let mut all: Vec<String> = Parameter::ALL.into_iter().filter_map(of).collect();
+    all.push(format!(
+        "The world was searched for from {} places; {} of the searches ended near the best one.",
+        results["starts"], results["ended_at_the_best"]
+    ));
+    all
+}
+
+/// What a parameter is called in a sentence, and its unit.
+fn described(parameter: Parameter) -> (&'static str, &'static str) {
+    match parameter {
+        Parameter::Spin => ("spin", ""),
+        Parameter::Inclination => ("inclination", "°"),
+        Parameter::PositionAngle => ("position angle of the spin", "°"),
+        Parameter::OffsetX => ("horizontal position of the hole", " M"),
+        Parameter::OffsetY => ("vertical position of the hole", " M"),
+        Parameter::Mass => ("mass over the assumed one", ""),
+        Parameter::Rotation => ("angular velocity over the assumed one", ""),
+        Parameter::RedshiftPower => ("power of the redshift factor", ""),
+    }
+}
+
 fn world_of(file: &FitFile, free: &[Free], results: &Value) -> anyhow::Result<World> {
     free.iter().try_fold(setup::known_world(file), |world, Free { parameter, .. }| {
         let value = results["world"][parameter.name()].as_f64();

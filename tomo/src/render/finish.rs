@@ -20,7 +20,7 @@ impl Raster {
     ///
     /// # Errors
     /// If a value is out of range or does not fit, the journal cannot be written, or
-    /// `progress` returned false ([`RenderError::Stopped`]). What is in the journal stays.
+    /// `progress` returned false ([`RenderError::Stopped`](crate::render::RenderError::Stopped)). What is in the journal stays.
     pub fn fill<F: Read + Write + Seek + Send>(
         &self,
         journal: &mut Journal<F>,

@@ -22,7 +22,7 @@ use kerrlight_geodesic::{
 /// Use it to ask what single rays see, or to drive a renderer of your own: preparing costs what the
 /// scene's files and tables need (milliseconds for a disc), [`observe_block`](Self::observe_block)
 /// a few microseconds a ray where the closed form applies. It is `Sync`: each thread brings its own
-/// [`Scratch`]. Intensities are in scene units, radii and delays in M.
+/// [`Scratch`](super::Scratch). Intensities are in scene units, radii and delays in M.
 ///
 /// ```
 /// use kerrlight_tomo::scene::Scene;

@@ -1,7 +1,7 @@
 //! What was found, in numbers.
 
 use super::{Estimate, Found};
-use crate::fit::linear;
+use crate::fit::{linear, world_search};
 use crate::report;
 use crate::usage::usage;
 use kerrlight_tomo::fit::{State, Trainer};
@@ -60,6 +60,10 @@ impl Estimate<'_> {
         }
         if let Some(linear) = linear::outcome(self.file, &self.folder.lines()?) {
             results["linear"] = linear;
+        }
+        if let Some(world) = world_search::found(self.folder)? {
+            world_search::errors(&world).into_iter().for_each(|(key, value)| results[key] = value);
+            results["world"] = world;
         }
         let unknown = self.file.unknowns();
         if !unknown.is_empty() {

@@ -4,7 +4,7 @@ use super::lensed::{self, Still};
 use super::numbers::outcomes;
 use super::{Estimate, Found};
 use crate::fit::curves::{loss_plot, psnr_plot};
-use crate::fit::labels;
+use crate::fit::{labels, world_search};
 use crate::output;
 use crate::report::{self, LinePlot, Report, View3d};
 use anyhow::Context;
@@ -144,6 +144,9 @@ impl Estimate<'_> {
             data.join(", "),
             labels::described(file)
         )];
+        if results["world"].is_object() {
+            lines.extend(world_search::sentences(&results["world"]));
+        }
         if let Some(statement) = results["linear"]["statement"].as_str() {
             lines.push(format!("The linear grid's solution: {statement}."));
         }
