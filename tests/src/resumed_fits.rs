@@ -113,7 +113,7 @@ fn exact_changed_inputs_and_damaged_state_are_refused() {
         assert!(message.contains("checkpoint.safetensors (restore it, or remove it"), "{message}");
     }
     std::fs::write(&path, &bytes[..bytes.len() - 9]).unwrap();
-    assert!(refused(at).contains("remove it to begin the run anew"));
+    assert!(refused(at).contains("remove it to start over"));
     // Of the same fit with other settings.
     succeed(at, &[&words[..], &["-o", "other", "--set", "training.grid_rate=2e-3"]].concat());
     std::fs::copy(at.join("other/checkpoint.safetensors"), &path).unwrap();

@@ -129,5 +129,5 @@ fn damaged_checkpoints_are_refused() {
     let larger = Network::new(NetworkSettings { width: 17, ..NetworkSettings::bhnerf() }).unwrap();
     let other = State::new(&larger, state.now.axis, &training);
     let text = checkpoint::decode(&bytes, &other).unwrap_err().to_string();
-    assert!(text.contains("now.") && text.contains("wanted"), "{text}");
+    assert!(text.contains("now.") && text.contains("are expected"), "{text}");
 }
