@@ -117,7 +117,7 @@ fn exact_changed_inputs_and_damaged_state_are_refused() {
     // Of the same fit with other settings.
     succeed(at, &[&words[..], &["-o", "other", "--set", "training.grid_rate=2e-3"]].concat());
     std::fs::copy(at.join("other/checkpoint.safetensors"), &path).unwrap();
-    assert!(refused(at).contains("of a run with other settings"));
+    assert!(refused(at).contains("belongs to a run with other settings"));
     std::fs::write(&path, &bytes).unwrap();
     succeed(at, &["fit", "--resume", "run"]);
     for file in ["volume.npz", "movie.npz", "checkpoint.safetensors"] {
