@@ -254,3 +254,46 @@ fn world_of(file: &FitFile, free: &[Free], results: &Value) -> anyhow::Result<Wo
         Ok(world.with(*parameter, value * parameter.unit()))
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found() -> Value {
+        json!({
+            "world": {"spin": 0.91, "inclination_deg": 59.0, "position_angle_deg": 179.0},
+            "sigma": {"spin": 0.6, "inclination_deg": 0.5, "position_angle_deg": null},
+            "truth": {"spin": 0.9, "inclination_deg": 60.0, "position_angle_deg": -179.0},
+            "bounds": {
+                "spin": [-0.2, 0.95], "inclination_deg": [0.0, 180.0], "position_angle_deg": [-180.0, 180.0],
+            },
+            "starts": 4, "ended_at_the_best": 3, "chi2_per_datum": 1.02,
+        })
+    }
+
+    #[test]
+    fn exact_errors_go_the_short_way_about_a_circle() {
+        let errors: Map<String, Value> = errors(&found()).into_iter().collect();
+        let number = |key: &str| errors[key].as_f64().unwrap();
+        assert!((number("position_angle_error_deg") - 2.0).abs() < 1e-9);
+        assert!((number("inclination_pull") - 2.0).abs() < 1e-9);
+        assert!((number("spin_error") - 0.01).abs() < 1e-12);
+        assert!(errors["position_angle_pull"].is_null());
+    }
+
+    #[test]
+    fn exact_sentences_say_what_is_known() {
+        let said = sentences(&found());
+        assert_eq!(
+            said[0],
+            "The spin is not constrained: 0.910 explains the data best (truth: 0.900)."
+        );
+        assert_eq!(
+            said[1],
+            "The inclination is between 58.000° and 60.000° at 95 % (truth: 60.000°)."
+        );
+        assert!(said[2].contains("with an unknown error"), "{}", said[2]);
+        assert!(said[3].contains("from 4 places; 3 of the searches"), "{}", said[3]);
+        assert!(lines(&found())[3].contains("3 of 4 starts"));
+    }
+}
