@@ -134,6 +134,7 @@ fn results(
         "bounds": priors.collect::<Map<String, Value>>(),
         "truth": truth,
         "chi2_per_datum": found.reduced_chi2,
+        "noise_factor": found.noise_factor,
         "starts": trials.len(),
         "ended_at_the_best": same,
         "trials": trials,
@@ -149,6 +150,11 @@ fn is_same(free: &[Free], trial: &Trial, trials: &[Trial]) -> bool {
             apart.abs() < 1.5 * parameter.scale()
         })
     })
+}
+
+/// χ²/N with digits that tell.
+fn reduced(chi2: f64) -> String {
+    if chi2 < 5e-3 { format!("{chi2:.1e}") } else { format!("{chi2:.3}") }
 }
 
 /// A line for each parameter, and one for the starts.
@@ -168,11 +174,12 @@ pub fn lines(results: &Value) -> Vec<String> {
             }
         })
         .collect();
+    lines.extend(small_residuals(results).map(|said| format!("note: {said}")));
     lines.push(format!(
-        "world: {} of {} starts ended at the best one; χ²/N = {:.3}",
+        "world: {} of {} starts ended at the best one; χ²/N = {}",
         results["ended_at_the_best"],
         results["starts"],
-        results["chi2_per_datum"].as_f64().unwrap_or(f64::NAN)
+        reduced(results["chi2_per_datum"].as_f64().unwrap_or(f64::NAN))
     ));
     lines
 }
@@ -226,6 +233,7 @@ pub fn sentences(results: &Value) -> Vec<String> {
         Some(format!("The {words} is between {from:.3}{unit} and {to:.3}{unit} at 95 %{truth}."))
     };
     let mut all: Vec<String> = Parameter::ALL.into_iter().filter_map(of).collect();
+    all.extend(small_residuals(results).map(|said| format!("Note that {said}.")));
     all.push(format!(
         "The world was searched for from {} places; {} of the searches ended near the best one.",
         results["starts"], results["ended_at_the_best"]
@@ -245,6 +253,15 @@ fn described(parameter: Parameter) -> (&'static str, &'static str) {
         Parameter::Rotation => ("angular velocity over the assumed one", ""),
         Parameter::RedshiftPower => ("power of the redshift factor", ""),
     }
+}
+
+/// What errors of the world mean where residuals are much smaller than the errors of the data.
+fn small_residuals(results: &Value) -> Option<String> {
+    let factor = results["noise_factor"].as_f64().filter(|factor| *factor < 1.0)?;
+    Some(format!(
+        "residuals are much smaller than the errors of the data; the world was searched for with errors {factor:.1e} \
+         times as large"
+    ))
 }
 
 fn world_of(file: &FitFile, free: &[Free], results: &Value) -> anyhow::Result<World> {

@@ -138,8 +138,8 @@ impl Estimate<'_> {
         let number = |key: &str| results[key].as_f64();
         let mut lines = vec![format!(
             "Emission around a black hole of spin {}, seen at {}° from its spin axis, was recovered from {} frames of {}. It is represented by {}.",
-            file.hole.spin,
-            file.observer.inclination_deg,
+            rounded(file.hole.spin),
+            rounded(file.observer.inclination_deg),
             self.measured.times.len(),
             data.join(", "),
             labels::described(file)
@@ -186,6 +186,11 @@ impl Estimate<'_> {
         flatten("", &toml::Value::Table(table), &mut all);
         Ok(all)
     }
+}
+
+/// With four digits behind the point, as far as there are any.
+fn rounded(x: f64) -> f64 {
+    (1e4 * x).round() / 1e4
 }
 
 /// `a.b = value` of every leaf.

@@ -19,6 +19,8 @@ pub struct Trial {
     pub start: World,
     /// Where it ended.
     pub end: World,
+    /// χ² over the number of data there.
+    pub reduced_chi2: f64,
     /// Half of χ² there, and −ln of the priors' densities.
     pub value: f64,
     /// Worlds that were looked at.
@@ -36,6 +38,9 @@ pub struct FoundWorld {
     pub spread: Option<Spread>,
     /// χ² of the fine search's best world over the number of its data.
     pub reduced_chi2: f64,
+    /// Errors that the search took over those of the data: below 1 where residuals are much smaller than the errors,
+    /// as those of images without noise.
+    pub noise_factor: f64,
     /// The searches from all starts.
     pub trials: Vec<Trial>,
 }
@@ -59,14 +64,16 @@ pub fn find_world(
     let search = &unknown.search;
     let count = search.starts + 1;
     let coarse = Seen::new(file, measured, &search.coarse)?;
-    let trials = coarse.with(unknown, &search.coarse, |problem| {
+    let first =
+        coarse.with(unknown, &search.coarse, 1.0, |problem| least(problem, search.starts))?;
+    let trials = coarse.with(unknown, &search.coarse, scale(first), |problem| {
         let mut trials = Vec::new();
         for (k, start) in problem.starts(search.starts).into_iter().enumerate() {
             let mut told = |worlds: usize, best: f64| watch((k, count), worlds, best);
             let seed = file.seed.wrapping_add(k as u64);
             let how = Exploration { width: WIDTHS[0], worlds: search.coarse.worlds, seed };
             let Some(explored) = problem.explore(start, &how, &mut told)? else { return Ok(None) };
-            trials.push(trial(&explored));
+            trials.push(trial(&explored, problem));
         }
         Ok(Some(trials))
     })?;
@@ -75,26 +82,49 @@ pub fn find_world(
         return Ok(None);
     };
     let fine = Seen::new(file, measured, &search.fine)?;
+    // The coarse search has left less than it began with.
+    let scale = scale(best.reduced_chi2);
     let mut told = |worlds: usize, best: f64| watch((count - 1, count), worlds, best);
     let told: &mut WorldWatch<'_> = &mut told;
-    let found = fine.with(unknown, &search.fine, |problem| {
+    let found = fine.with(unknown, &search.fine, scale, |problem| {
         let how = Exploration { width: WIDTHS[1], worlds: search.fine.worlds, seed: file.seed };
         let Some(explored) = problem.explore(best.end, &how, told)? else { return Ok(None) };
         let data: f64 = problem.terms.iter().map(|term| term.weight).sum();
-        let reduced = explored.best.chi2 / data;
+        let reduced = problem.scale * explored.best.chi2 / data;
         let spread = Spread::of(problem.free, &explored.samples, reduced);
         Ok(Some((explored, spread, reduced)))
     })?;
     Ok(found.map(|(explored, spread, reduced_chi2)| FoundWorld {
         world: spread.as_ref().map_or(explored.best.world, |spread| spread.world),
-        reduced_chi2,
+        reduced_chi2: reduced_chi2 / scale,
+        noise_factor: scale.powf(-0.5),
         spread,
         trials,
     }))
 }
 
-fn trial(explored: &Explored) -> Trial {
+/// The least χ²/N of the worlds where searches begin.
+fn least(problem: &WorldProblem<'_, f32>, starts: usize) -> Result<f64> {
+    let data: f64 = problem.terms.iter().map(|term| term.weight).sum();
+    problem
+        .starts(starts)
+        .into_iter()
+        .try_fold(f64::INFINITY, |least, start| Ok(least.min(problem.solve(start)?.chi2 / data)))
+}
+
+/// χ²/N below which errors say nothing about residuals.
+const TOO_SMALL: f64 = 0.5;
+
+/// By what χ² is multiplied so that errors are as large as residuals, where these are much smaller: data without noise
+/// whose errors are only a scale.
+fn scale(reduced_chi2: f64) -> f64 {
+    if reduced_chi2 > 0.0 && reduced_chi2 < TOO_SMALL { 1.0 / reduced_chi2 } else { 1.0 }
+}
+
+fn trial(explored: &Explored, problem: &WorldProblem<'_, f32>) -> Trial {
+    let data: f64 = problem.terms.iter().map(|term| term.weight).sum();
     Trial {
+        reduced_chi2: explored.best.chi2 / data,
         start: explored.start,
         end: explored.best.world,
         value: explored.best.value,
@@ -190,6 +220,7 @@ impl Seen {
         &self,
         unknown: &UnknownWorld,
         view: &WorldView,
+        scale: f64,
         search: impl FnOnce(&WorldProblem<'_, f32>) -> Result<R>,
     ) -> Result<R> {
         let CoarseView { file, instrument, measured } = &self.view;
@@ -216,6 +247,7 @@ impl Seen {
             upper: settings.upper,
             flux: settings.flux_jy,
             penalties: &penalties,
+            scale,
             effort: Effort { nodes: view.nodes, iterations: view.iterations },
         })
     }

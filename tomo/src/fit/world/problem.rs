@@ -45,6 +45,8 @@ pub struct WorldProblem<'a, T: Float> {
     pub flux: Option<f64>,
     /// Penalties on the volume, in units of χ².
     pub penalties: &'a [Penalty],
+    /// By what χ² is multiplied against the priors: 1 for data with errors.
+    pub scale: f64,
     /// What is solved for each world.
     pub effort: Effort,
 }
@@ -67,7 +69,7 @@ pub struct Estimate {
     pub x: Vec<f64>,
     /// χ² and the volume's penalties.
     pub chi2: f64,
-    /// Half of that, and −ln of the priors' densities.
+    /// Half of that times the problem's scale, and −ln of the priors' densities.
     pub value: f64,
 }
 
@@ -107,7 +109,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         let Least { x, value } = problem.least(self.effort.iterations)?;
         let penalty = |free: &Free| free.prior.penalty(world.get(free.parameter));
         let penalties: f64 = self.free.iter().map(penalty).sum();
-        Ok(Estimate { world, x, chi2: value, value: 0.5 * value + penalties })
+        Ok(Estimate { world, x, chi2: value, value: 0.5 * self.scale * value + penalties })
     }
 
     /// The world at a place about another one, in units of [`Parameter::scale`]; bounds are mirrors, a whole circle has

@@ -181,6 +181,7 @@ fn exact_world_of_a_hot_spot_is_found_from_everywhere() {
         upper: 3.0,
         flux: None,
         penalties: &[],
+        scale: 1.0,
         effort: Effort { nodes: 16, iterations: 30 },
     };
     let apart = |world: &World| {
