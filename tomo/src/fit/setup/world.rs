@@ -92,15 +92,28 @@ pub fn find_world(
         let data: f64 = problem.terms.iter().map(|term| term.weight).sum();
         let reduced = problem.scale * explored.best.chi2 / data;
         let spread = Spread::of(problem.free, &explored.samples, reduced);
-        Ok(Some((explored, spread, reduced)))
+        let world = lower(problem, &explored, spread.as_ref())?;
+        Ok(Some((spread, reduced, world)))
     })?;
-    Ok(found.map(|(explored, spread, reduced_chi2)| FoundWorld {
-        world: spread.as_ref().map_or(explored.best.world, |spread| spread.world),
+    Ok(found.map(|(spread, reduced_chi2, world)| FoundWorld {
+        world,
         reduced_chi2: reduced_chi2 / scale,
         noise_factor: scale.powf(-0.5),
         spread,
         trials,
     }))
+}
+
+/// The lowest point of the quadratic form, if it explains the data better than the best world that was looked at.
+fn lower(
+    problem: &WorldProblem<'_, f32>,
+    explored: &Explored,
+    spread: Option<&Spread>,
+) -> Result<World> {
+    let Some(spread) = spread else { return Ok(explored.best.world) };
+    let lowest = problem.solve(spread.world)?;
+    let better = lowest.value < explored.best.value;
+    Ok(if better { lowest.world } else { explored.best.world })
 }
 
 /// The least χ²/N of the worlds where searches begin.
