@@ -26,6 +26,11 @@ pub fn merge(into: &mut Table, changes: &Table) {
 pub(super) const SIMULATED: [&str; 5] = ["hole", "observer", "region", "effects", "motion"];
 
 impl FitFile {
+    /// Whether data are simulated with other settings than the fit's.
+    pub fn is_simulated_elsewhere(&self) -> bool {
+        self.world.keys().any(|key| SIMULATED.contains(&key.as_str()))
+    }
+
     /// The settings that data are simulated with: these with the changes of `world`.
     ///
     /// # Errors

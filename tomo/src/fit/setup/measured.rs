@@ -44,7 +44,7 @@ impl Measured {
         instrument: &Instrument,
         array: Option<&Array>,
     ) -> Result<Self> {
-        if file.world.is_empty() {
+        if !file.is_simulated_elsewhere() {
             return simulate(file, instrument, array);
         }
         let world = file.simulated()?;
@@ -64,8 +64,10 @@ impl Measured {
             (None, None) => refuse!(
                 "there is neither truth (to simulate) nor data (to read): {SPOT}; or {FILE}"
             ),
-            (Some(_), None) if !file.world.is_empty() => {
-                refuse!("world needs simulated data: add a truth")
+            (Some(_), None) if file.is_simulated_elsewhere() => {
+                refuse!(
+                    "world.hole, observer, region, effects and motion need simulated data: add a truth"
+                )
             }
             _ => Ok(()),
         }
