@@ -89,7 +89,9 @@ fn exact_what_keeps_nothing_ends_at_once() {
         let folder = tempfile::tempdir().unwrap();
         let mut command = Command::new(binary());
         command.current_dir(folder.path()).args(words).stdout(Stdio::null());
-        let child = command.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut child = command.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        // Open until it has ended: what reads it would else see its end, perhaps before the signal.
+        let _stdin = child.stdin.take();
         std::thread::sleep(Duration::from_millis(700));
         let clock = Instant::now();
         signal(child.id(), "-INT");
@@ -192,6 +194,7 @@ fn exact_a_hangup_that_is_ignored_stays_ignored() {
     let mut command = Command::new("sh");
     command.current_dir(folder.path()).args(["-c", &script]).stdout(Stdio::null());
     let mut child = command.stdin(Stdio::piped()).spawn().unwrap();
+    let _stdin = child.stdin.take();
     std::thread::sleep(Duration::from_millis(500));
     signal(child.id(), "-HUP");
     std::thread::sleep(Duration::from_millis(500));
