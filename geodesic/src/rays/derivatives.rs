@@ -263,6 +263,17 @@ impl Sink<Number> for Differentiated {
     }
 }
 
+/// Hole and observer whose spin and inclination are the first two parameters of all derivatives.
+pub(crate) fn with_parameters(
+    hole: &Kerr,
+    observer: &Observer,
+) -> Result<(Kerr<Number>, Observer<Number>), Error> {
+    let a = hole.spin();
+    check("spin", a, a.abs() < 1.0, "a number in (-1, 1), for derivatives")?;
+    let observer = observer.with_inclination(observer.inclination().parameter(1));
+    Ok((Kerr::from_spin(Number::parameter(a, 0))?, observer))
+}
+
 /// Traces the rays that arrive at (`alpha[k]`, `beta[k]`) by
 /// [`Integrator::TaylorMino`](crate::Integrator::TaylorMino) and takes from them what is
 /// requested together with its derivatives, on all cores with the feature `rayon`. An estimate of
@@ -284,10 +295,7 @@ pub fn trace(
     check_columns(alpha, beta)?;
     request.check()?;
     Tracer::new(tolerance)?;
-    let a = hole.spin();
-    check("spin", a, a.abs() < 1.0, "a number in (-1, 1), for derivatives")?;
-    let hole = Kerr::from_spin(Number::parameter(a, 0))?;
-    let observer = observer.with_inclination(observer.inclination().parameter(1));
+    let (hole, observer) = with_parameters(hole, observer)?;
     let rule = sampling::rule(request);
     let pieces = in_blocks(BLOCK, alpha, beta, |alpha, beta| -> Result<Differentiated, Error> {
         let sink = Differentiated::default();
