@@ -134,7 +134,7 @@
 //! ```
 //!
 //! # Matter and closed forms
-//! [`flow`] and [`plunge`] have the redshift factors of orbiting and falling matter, [`orbits`] the
+//! [`flow`], [`plunge`] and [`infall`] have the redshift factors of orbiting and falling matter, [`orbits`] the
 //! special radii, [`analytic`] the critical curve, lensing bands and crossings in closed form.
 //!
 //! # Frames and polarisation
@@ -172,7 +172,7 @@ mod rays;
 #[cfg(feature = "capi")]
 pub mod capi;
 
-pub use matter::{flow, plunge};
+pub use matter::{flow, infall, plunge};
 pub use numbers::{legendre, quadrature, vector};
 pub use rays::{derivatives, footprint, node_gradients, nodes};
 pub use spacetime::orbits;

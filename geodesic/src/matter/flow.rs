@@ -60,6 +60,35 @@ pub fn rotating_redshift_at(
     (norm > 0.0 && energy > 0.0).then(|| norm.sqrt() / energy)
 }
 
+/// The redshift of matter that moves along the radius besides: `fall` is its dr/dt, and `momentum` has the λ (in M) of
+/// the backward ray, its d cos θ/dτ and its d(1/r)/dτ.
+///
+/// N loses Σ/Δ (dr/dt)², and k·u gains p_r dr/dt with p_r = (d(1/r)/dτ)/(Δ/r²).
+pub fn falling_redshift_at(
+    hole: &Kerr,
+    (r, n): (f64, [f64; 3]),
+    momentum: [f64; 3],
+    (omega, fall): ([f64; 3], f64),
+) -> Option<f64> {
+    let v = cross(omega, n);
+    let norm = falling_norm(hole, r, n, (v, fall));
+    let [lambda, polar, radial] = momentum;
+    let sin2 = (n[0] * n[0] + n[1] * n[1]).max(1e-300);
+    let swirl = n[0] * v[1] - n[1] * v[0];
+    let along = radial * fall * r * r / hole.delta(r);
+    let energy = 1.0 + (v[2] * polar - lambda * swirl) / sin2 - along;
+    (norm > 0.0 && energy > 0.0).then(|| norm.sqrt() / energy)
+}
+
+/// [`rotation_norm`] of matter with dr/dt = `fall` besides; not above 0 at and inside the horizon.
+pub fn falling_norm(hole: &Kerr, r: f64, n: [f64; 3], (v, fall): ([f64; 3], f64)) -> f64 {
+    let delta = hole.delta(r);
+    if delta <= 0.0 {
+        return 0.0;
+    }
+    rotation_norm(hole, r, n, v) - hole.sigma(r, n[2]) / delta * fall * fall
+}
+
 /// (uᵗ)⁻², dimensionless, of matter at r n (r in M, n a unit vector) with dn/dt = v in M⁻¹; not above 0 where it
 /// would not be slower than light.
 pub fn rotation_norm(hole: &Kerr, r: f64, n: [f64; 3], v: [f64; 3]) -> f64 {

@@ -1,4 +1,5 @@
-//! Redshift factors of matter that orbits or plunges.
+//! Redshift factors of matter that orbits, plunges or falls.
 
 pub mod flow;
+pub mod infall;
 pub mod plunge;

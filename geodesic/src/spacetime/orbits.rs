@@ -1,11 +1,27 @@
 //! Circular orbits: where they are stable, how fast they turn, what they radiate.
 
+use crate::numbers::scalar::Elementary;
 use crate::spacetime::kerr::Kerr;
 
 /// Radius in M of the innermost stable circular orbit that turns about +z: prograde for a > 0,
 /// retrograde for a < 0 (Bardeen, Press & Teukolsky 1972, eq. 2.21).
 pub fn isco(hole: &Kerr) -> f64 {
-    let a = hole.spin();
+    isco_of(hole.spin())
+}
+
+/// The same for any kind of number. The derivative is that of the root of r² − 6r + 8a√r − 3a²; it diverges for
+/// |a| → 1, where the orbit about +z meets the horizon.
+pub fn stable_orbit<T: Elementary>(hole: &Kerr<T>) -> T {
+    let (a, r) = (hole.spin(), isco_of(hole.spin().value()));
+    let slope = 2.0 * r - 6.0 + 4.0 * a.value() / r.sqrt();
+    if slope == 0.0 {
+        return T::constant(r);
+    }
+    let root = a * T::constant(8.0 * r.sqrt()) - a * a * T::constant(3.0);
+    T::constant(r) - (root - T::constant(root.value())) / T::constant(slope)
+}
+
+fn isco_of(a: f64) -> f64 {
     let (p, q) = ((1.0 + a).cbrt(), (1.0 - a).cbrt());
     let z1 = 1.0 + p * q * (p + q);
     let z2 = (3.0 * a * a + z1 * z1).sqrt();
