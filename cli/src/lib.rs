@@ -58,7 +58,6 @@ pub use program::Program;
 use answer::{Answer, Form};
 use anyhow::bail;
 use clap::{Parser, Subcommand};
-use kerrlight_tomo::representation::Registry;
 
 /// Black holes: lensed images, simulated interferometry, 3D emission tomography
 #[derive(Debug, Parser)]
@@ -107,7 +106,7 @@ enum Verb {
     Man(man::Man),
 }
 
-fn run(arguments: &Arguments, registry: &Registry) -> anyhow::Result<()> {
+fn run(arguments: &Arguments, program: &Program) -> anyhow::Result<()> {
     memory::limit(arguments.memory)?;
     if let Some(threads) = arguments.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
@@ -118,7 +117,7 @@ fn run(arguments: &Arguments, registry: &Registry) -> anyhow::Result<()> {
         (false, true) => Form::Aside,
         (false, false) => Form::Text,
     };
-    arguments.verb.run(arguments, registry)?.print(form)
+    arguments.verb.run(arguments, program)?.print(form)
 }
 
 impl Verb {
@@ -135,7 +134,7 @@ impl Verb {
         }
     }
 
-    fn run(&self, arguments: &Arguments, registry: &Registry) -> anyhow::Result<Answer> {
+    fn run(&self, arguments: &Arguments, program: &Program) -> anyhow::Result<Answer> {
         match self {
             Verb::Render(render) => render.run(),
             Verb::Movie(movie) => movie.run(),
@@ -145,8 +144,8 @@ impl Verb {
             Verb::Observe(observe) => observe.run(),
             Verb::Uv(uv) => uv.run(),
             Verb::Convert(convert) => convert.run(),
-            Verb::Fit(fit) => fit.run(registry),
-            Verb::Compare(compare) => compare.run((arguments.threads, arguments.memory), registry),
+            Verb::Fit(fit) => fit.run(&program.registry),
+            Verb::Compare(compare) => compare.run((arguments.threads, arguments.memory), program),
             Verb::Inspect(inspect) => inspect.run(),
             Verb::Completions(completions) => completions.run(),
             Verb::Man(pages) => pages.run(),

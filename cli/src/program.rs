@@ -1,14 +1,17 @@
 //! The program with what others add to it.
 
 use super::{Arguments, compare, fit, help, interrupt, run};
+use anyhow::Context;
 use clap::FromArgMatches;
 use kerrlight_tomo::representation::{BuildRepresentation, Registry};
-use std::process::ExitCode;
+use std::ffi::OsString;
+use std::process::{Command, ExitCode};
 
 /// `kerrlight` with representations of one's own.
 #[derive(Default)]
 pub struct Program {
-    registry: Registry,
+    pub(crate) registry: Registry,
+    launcher: Vec<OsString>,
 }
 
 impl Program {
@@ -24,23 +27,48 @@ impl Program {
         self
     }
 
+    /// Started by this command and its first arguments, where the executable of the process is something else: an
+    /// interpreter that has the program as a module. Comparisons start their fits with it.
+    #[must_use]
+    pub fn launched_by(mut self, command: Vec<OsString>) -> Self {
+        self.launcher = command;
+        self
+    }
+
+    /// A command that starts the program once more.
+    pub(crate) fn again(&self) -> anyhow::Result<Command> {
+        let Some((program, first)) = self.launcher.split_first() else {
+            let program = std::env::current_exe().context("cannot find the program itself")?;
+            return Ok(Command::new(program));
+        };
+        let mut command = Command::new(program);
+        command.args(first);
+        Ok(command)
+    }
+
     /// Does what the command line says; 0 is success, 2 an error, 1 a fit that failed while it ran or a comparison of which
     /// a part did, 128 and the number of the signal what a signal has stopped: 130 after Ctrl-C, 143 after SIGTERM.
     pub fn run(self) -> ExitCode {
-        let matches = help::command().get_matches();
+        ExitCode::from(self.run_with(std::env::args_os()))
+    }
+
+    /// The same for a command line of the caller's, whose first word is the program's name; returns the exit code.
+    /// Help, and what is wrong with the words themselves, end the process.
+    pub fn run_with(self, words: impl IntoIterator<Item = OsString>) -> u8 {
+        let matches = help::command().get_matches_from(words);
         let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
         interrupt::listen();
-        match run(&arguments, &self.registry) {
-            Ok(()) => ExitCode::SUCCESS,
+        match run(&arguments, &self) {
+            Ok(()) => 0,
             Err(error) if error.is::<interrupt::Interrupted>() => {
                 eprintln!("{error:#}");
-                ExitCode::from(interrupt::code())
+                interrupt::code()
             }
             Err(error) => {
                 eprintln!("error: {error:#}");
                 let failed = error.downcast_ref::<compare::Failed>().is_some()
                     || error.downcast_ref::<fit::Failed>().is_some();
-                ExitCode::from(if failed { 1 } else { 2 })
+                if failed { 1 } else { 2 }
             }
         }
     }

@@ -19,12 +19,12 @@ use crate::answer::Answer;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::lock::{self, Lock};
 use crate::output::Output;
+use crate::program::Program;
 use crate::progress;
 use anyhow::{Context, bail};
 use cases::{Case, Choice, Status};
 use clap::Args;
 use experiment::Experiment;
-use kerrlight_tomo::representation::Registry;
 use page::Page;
 use runner::Runner;
 use serde_json::{Value, json};
@@ -79,7 +79,7 @@ impl Compare {
     pub fn run(
         &self,
         (threads, memory): (Option<u16>, Option<u64>),
-        registry: &Registry,
+        program: &Program,
     ) -> anyhow::Result<Answer> {
         let Some(name) = &self.experiment else { return Ok(list_experiments()) };
         let before = self.against.as_deref().map(changes::read).transpose()?;
@@ -101,7 +101,7 @@ impl Compare {
             only: self.only.clone(),
             quick: self.quick,
             set: self.set.clone(),
-            registry: registry.clone(),
+            registry: program.registry.clone(),
         };
         let chosen = cases::expand(&experiment, &source, &choice)?;
         ran::check(&experiment, &chosen).with_context(|| name.display().to_string())?;
@@ -116,7 +116,7 @@ impl Compare {
         }
         let all = cases::expand(&experiment, &source, &choice.unrestricted())?;
         let (folder, lock) = self.folder(name, &text)?;
-        let runner = Runner::new(&folder, (threads, memory), lock)?;
+        let runner = Runner::new(&folder, (threads, memory), program, lock)?;
         let cases = with_known(chosen, all, &runner);
         runner.check_inputs(&cases)?;
         let summary = run(&cases, &runner);
@@ -164,7 +164,7 @@ fn list_cases(cases: &[Case]) -> Answer {
 }
 
 /// The chosen cases, and those that an earlier run of the same folder has done beside them.
-fn with_known(mut chosen: Vec<Case>, all: Vec<Case>, runner: &Runner) -> Vec<Case> {
+fn with_known(mut chosen: Vec<Case>, all: Vec<Case>, runner: &Runner<'_>) -> Vec<Case> {
     let is_done = |case: &Case| matches!(runner.known(case), Status::Done(_));
     let mut cases = Vec::with_capacity(all.len());
     for case in all {
@@ -179,7 +179,7 @@ fn with_known(mut chosen: Vec<Case>, all: Vec<Case>, runner: &Runner) -> Vec<Cas
 }
 
 /// Runs what is not done yet, until a signal.
-fn run<'a>(cases: &'a [Case], runner: &Runner) -> Summary<'a> {
+fn run<'a>(cases: &'a [Case], runner: &Runner<'_>) -> Summary<'a> {
     let keeper = Keeper::saving("stopping after the fit's step; a second signal ends at once");
     let mut all: Vec<(&Case, Status)> =
         cases.iter().map(|case| (case, runner.known(case))).collect();

@@ -25,7 +25,7 @@ impl Page<'_> {
     /// Writes results.json, results.csv, tables.md, pictures and report.html; the text of the tables.
     pub fn write(
         &self,
-        runner: &Runner,
+        runner: &Runner<'_>,
         folder: &Path,
         before: Option<&Value>,
     ) -> anyhow::Result<String> {
@@ -38,7 +38,7 @@ impl Page<'_> {
 
     fn files(
         &self,
-        runner: &Runner,
+        runner: &Runner<'_>,
         folder: &Path,
         before: Option<&Value>,
         mut left_out: Vec<String>,

@@ -7,32 +7,35 @@ use crate::fit::Inputs;
 use crate::interrupt::Keeper;
 use crate::lock::Lock;
 use crate::output::{self, Output};
+use crate::program::Program;
 use anyhow::Context;
 use serde_json::Value;
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Child, ExitStatus, Stdio};
 use std::time::Duration;
 
 /// The folders of the cases.
-pub struct Runner {
+pub struct Runner<'a> {
     folder: PathBuf,
+    program: &'a Program,
     threads: Option<u16>,
     memory: Option<u64>,
     _lock: Lock,
 }
 
-impl Runner {
+impl<'a> Runner<'a> {
     /// In `cases` of this folder, whose lock is held.
     pub fn new(
         folder: &Path,
         (threads, memory): (Option<u16>, Option<u64>),
+        program: &'a Program,
         lock: Lock,
     ) -> anyhow::Result<Self> {
         let folder = folder.join("cases");
         std::fs::create_dir_all(&folder)
             .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-        Ok(Self { folder, threads, memory, _lock: lock })
+        Ok(Self { folder, program, threads, memory, _lock: lock })
     }
 
     /// The run's folder of a case.
@@ -91,8 +94,7 @@ impl Runner {
         let settings = self.folder.join(format!("{}.toml", case.slug));
         let text = case.settings.as_deref().unwrap_or_default();
         Output::new(&settings, "toml")?.write(text.as_bytes())?;
-        let program = std::env::current_exe().context("cannot find the program itself")?;
-        let mut command = Command::new(program);
+        let mut command = self.program.again()?;
         command.args(["fit", "--stop-with-input"]);
         // What another version has finished, or has not come so far as to have settings, is begun anew.
         let is_foreign = results(&run).is_some_and(|(results, _)| !is_ours(&results))

@@ -39,6 +39,11 @@ impl Points {
         start..end(ray)
     }
 
+    /// Where each ray's points end in the columns; those of the first ray start at 0.
+    pub fn ends(&self) -> &[usize] {
+        &self.ends
+    }
+
     /// Number of points of all rays.
     pub fn len(&self) -> usize {
         self.radius.len()

@@ -32,7 +32,7 @@ pub struct Figures<'a> {
     /// What was found.
     pub summary: &'a Summary<'a>,
     /// Where the runs are.
-    pub runner: &'a Runner,
+    pub runner: &'a Runner<'a>,
 }
 
 impl Figures<'_> {

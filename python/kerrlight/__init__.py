@@ -1,0 +1,73 @@
+"""Black holes from Python: rays, lensed pictures, visibilities, tomography and gradients.
+
+>>> import kerrlight
+>>> hole = kerrlight.Kerr(0.9)
+>>> observer = hole.observer(inclination_deg=60)
+>>> rays = observer.trace([-6.0, 0.5], [2.0, 0.5], crossings=1)
+>>> rays.outcome.tolist() == [kerrlight.Outcome.ESCAPED, kerrlight.Outcome.CAPTURED]
+True
+>>> print(f"{rays.crossings.r[0, 0]:.6f} M")
+5.244939 M
+
+Lengths and times are in units of M (G = c = 1), angles in radians where no name says otherwise. Importing the
+package imports nothing but itself: numpy comes with the first name that needs it.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from kerrlight._core import __version__
+
+if TYPE_CHECKING:
+    from kerrlight.rays import (
+        Curve,
+        GaussLegendre,
+        Kerr,
+        MinoTime,
+        Observer,
+        Outcome,
+        PathLength,
+        Points,
+        Rays,
+    )
+
+# The module of each name.
+_MODULES = {
+    "Curve": "rays",
+    "GaussLegendre": "rays",
+    "Kerr": "rays",
+    "MinoTime": "rays",
+    "Observer": "rays",
+    "Outcome": "rays",
+    "PathLength": "rays",
+    "Points": "rays",
+    "Rays": "rays",
+}
+
+__all__ = [
+    "Curve",
+    "GaussLegendre",
+    "Kerr",
+    "MinoTime",
+    "Observer",
+    "Outcome",
+    "PathLength",
+    "Points",
+    "Rays",
+    "__version__",
+]
+
+
+def __getattr__(name: str) -> object:
+    module = _MODULES.get(name)
+    if module is None:
+        raise AttributeError(f"module 'kerrlight' has no attribute {name!r}")
+    value = getattr(import_module(f"kerrlight.{module}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(set(globals()) | set(_MODULES))

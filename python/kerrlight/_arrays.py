@@ -1,0 +1,31 @@
+"""What callers may give where an array is wanted."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def real(name: str, value: Any) -> Floats:
+    """``value`` as an array of real numbers; quantities of astropy must have no unit."""
+    if hasattr(value, "to_value"):
+        value = value.to_value("")
+    array = np.asarray(value)
+    if array.dtype.kind not in "buif" and array.size > 0:
+        raise TypeError(f"{name} has the type {array.dtype}: real numbers are needed")
+    return np.asarray(array, dtype=np.float64)
+
+
+def together(**values: Any) -> tuple[tuple[int, ...], list[Floats]]:
+    """The common shape of arrays, and each of them with that shape as a contiguous column."""
+    arrays = {name: real(name, value) for name, value in values.items()}
+    try:
+        broad = np.broadcast_arrays(*arrays.values())
+    except ValueError:
+        shapes = " and ".join(str(array.shape) for array in arrays.values())
+        raise ValueError(f"{' and '.join(arrays)} have shapes {shapes}, which do not broadcast") from None
+    return broad[0].shape, [np.ascontiguousarray(array).reshape(-1) for array in broad]

@@ -1,0 +1,1 @@
+"""Interfaces of other packages, served by kerrlight's rays: :mod:`kerrlight.compat.kgeo`."""

@@ -1,0 +1,100 @@
+//! The critical curve and lensing bands.
+
+use crate::call::{detached, refused};
+use crate::rays::Place;
+use kerrlight_geodesic::analytic::{CriticalCurve, CriticalPoint, HalfOrbit, LensingBand};
+use kerrlight_geodesic::{Inclination, Kerr};
+use numpy::{IntoPyArray, PyReadonlyArray1};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::convert::Infallible;
+
+/// Adds the functions of this module.
+pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(critical_curve, module)?)?;
+    module.add_function(wrap_pyfunction!(critical_points, module)?)?;
+    module.add_function(wrap_pyfunction!(band, module)?)
+}
+
+const COLUMNS: [&str; 8] = ["r", "lam", "eta", "alpha", "beta", "gamma", "delta", "tau"];
+
+fn values(point: CriticalPoint) -> [f64; 8] {
+    let CriticalPoint { radius, lambda, eta, alpha, beta, .. } = point;
+    let HalfOrbit { gamma, delta, tau } = point.half_orbit();
+    [radius, lambda, eta, alpha, beta, gamma, delta, tau]
+}
+
+fn columns(py: Python<'_>, rows: Vec<[f64; 8]>) -> PyResult<Bound<'_, PyDict>> {
+    let dict = PyDict::new(py);
+    for (k, name) in COLUMNS.iter().enumerate() {
+        let column: Vec<f64> = rows.iter().map(|row| row[k]).collect();
+        dict.set_item(name, column.into_pyarray(py))?;
+    }
+    Ok(dict)
+}
+
+fn curve(spin: f64, place: Place) -> PyResult<(Kerr, Inclination)> {
+    Ok((Kerr::new(spin).map_err(refused)?, place.inclination()?))
+}
+
+/// `count` points of the critical curve at equal steps of the angle on the screen.
+#[pyfunction]
+fn critical_curve(
+    py: Python<'_>,
+    spin: f64,
+    place: Place,
+    count: u32,
+) -> PyResult<Bound<'_, PyDict>> {
+    let (hole, inclination) = curve(spin, place)?;
+    let work = || {
+        let points = CriticalCurve::new(&hole, inclination).points(count);
+        Ok::<_, Infallible>(points.map(values).collect())
+    };
+    columns(py, detached(py, work)?)
+}
+
+/// The points of the critical curve in these directions of the screen.
+#[pyfunction]
+fn critical_points<'py>(
+    py: Python<'py>,
+    spin: f64,
+    place: Place,
+    angles: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let (hole, inclination) = curve(spin, place)?;
+    let angles = angles.as_slice()?;
+    let work = || {
+        let curve = CriticalCurve::new(&hole, inclination);
+        Ok::<_, Infallible>(angles.iter().map(|angle| values(curve.point(*angle))).collect())
+    };
+    columns(py, detached(py, work)?)
+}
+
+/// (alpha, beta) of both edges of a lensing band in these directions; NaN where there is none.
+#[pyfunction]
+fn band<'py>(
+    py: Python<'py>,
+    spin: f64,
+    place: Place,
+    order: u16,
+    angles: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let (hole, inclination) = curve(spin, place)?;
+    let angles = angles.as_slice()?;
+    let none = (f64::NAN, f64::NAN);
+    let work = || {
+        let band = LensingBand::new(&hole, inclination, order);
+        let edges = angles.iter().map(|angle| (band.inner(*angle), band.outer(*angle)));
+        Ok::<_, Infallible>(edges.map(|(inner, outer)| [inner, outer.unwrap_or(none)]).collect())
+    };
+    let rows: Vec<[(f64, f64); 2]> = detached(py, work)?;
+    let dict = PyDict::new(py);
+    for (k, name) in ["inner", "outer"].iter().enumerate() {
+        for (c, axis) in ["alpha", "beta"].iter().enumerate() {
+            let value = |row: &[(f64, f64); 2]| if c == 0 { row[k].0 } else { row[k].1 };
+            let column: Vec<f64> = rows.iter().map(value).collect();
+            dict.set_item(format!("{name}_{axis}"), column.into_pyarray(py))?;
+        }
+    }
+    Ok(dict)
+}
