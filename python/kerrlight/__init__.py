@@ -21,6 +21,8 @@ from typing import TYPE_CHECKING
 from kerrlight._core import __version__
 
 if TYPE_CHECKING:
+    from kerrlight.interferometry import Closures, Fourier, Observation, Station
+    from kerrlight.model import ForwardModel, Keplerian, PowerLaw, Tabulated, VoxelModel, screen
     from kerrlight.rays import (
         Curve,
         GaussLegendre,
@@ -35,28 +37,48 @@ if TYPE_CHECKING:
 
 # The module of each name.
 _MODULES = {
+    "Closures": "interferometry",
     "Curve": "rays",
+    "ForwardModel": "model",
+    "Fourier": "interferometry",
     "GaussLegendre": "rays",
+    "Keplerian": "model",
     "Kerr": "rays",
     "MinoTime": "rays",
+    "Observation": "interferometry",
     "Observer": "rays",
     "Outcome": "rays",
     "PathLength": "rays",
     "Points": "rays",
+    "PowerLaw": "model",
     "Rays": "rays",
+    "Station": "interferometry",
+    "Tabulated": "model",
+    "VoxelModel": "model",
+    "screen": "model",
 }
 
 __all__ = [
+    "Closures",
     "Curve",
+    "ForwardModel",
+    "Fourier",
     "GaussLegendre",
+    "Keplerian",
     "Kerr",
     "MinoTime",
+    "Observation",
     "Observer",
     "Outcome",
     "PathLength",
     "Points",
+    "PowerLaw",
     "Rays",
+    "Station",
+    "Tabulated",
+    "VoxelModel",
     "__version__",
+    "screen",
 ]
 
 

@@ -8,7 +8,10 @@
 
 mod call;
 mod curve;
+mod fourier;
 mod lengths;
+mod model;
+mod observation;
 mod orbits;
 mod program;
 mod rays;
@@ -20,7 +23,10 @@ use pyo3::prelude::*;
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     curve::add(module)?;
+    fourier::add(module)?;
     lengths::add(module)?;
+    model::add(module)?;
+    observation::add(module)?;
     orbits::add(module)?;
     program::add(module)?;
     rays::add(module)

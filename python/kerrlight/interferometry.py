@@ -1,0 +1,452 @@
+"""Visibilities: files, columns, closure quantities, eht-imaging's objects, and the transform from images."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from os import PathLike, fspath
+from typing import Any, Sequence, Union
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kerrlight import _core
+from kerrlight._arrays import Floats, real
+from kerrlight.model import _Linear, precision
+
+__all__ = ["Closures", "Fourier", "Observation", "Station"]
+
+MICROARCSECOND = math.pi / 180 / 3600 * 1e-6
+
+_ENDINGS = {".uvfits": "uvfits", ".fits": "uvfits", ".txt": "obs-text", ".csv": "csv"}
+_FORMATS = ("uvfits", "obs-text", "csv", "eht-csv", "eht-txt")
+_PRODUCTS = {False: ("", "q", "u", "v"), True: ("rr", "ll", "rl", "lr")}
+
+
+@dataclass(frozen=True)
+class Station:
+    """A telescope."""
+
+    name: str
+    position: tuple[float, float, float] | None = None
+    """Geocentric x, y and z in metres, where known."""
+    sefd: tuple[float, float] = (0.0, 0.0)
+    """System equivalent flux densities of the R and L feeds (Jy)."""
+    feed_rotation: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Factors on parallactic angle and elevation, and a constant in degrees."""
+    leakage: tuple[complex, complex] = (0j, 0j)
+    """Of the R and L feeds; carried along for files."""
+
+
+@dataclass(frozen=True, eq=False)
+class Closures:
+    """Independent closure quantities, a row each."""
+
+    time: Floats
+    """Hours of UTC."""
+    value: Floats
+    """Closure phases in radians, or logarithms of closure amplitudes."""
+    sigma: Floats
+    """Standard deviations for high signal to noise."""
+    stations: NDArray[np.str_]
+    """Names: triangles 1, 2, 3, or quadrangles 1, 2, 3, 4 of |V12 V34|/|V13 V24|."""
+    rows: NDArray[np.int64]
+    """Rows of the observation that each is made of."""
+    signs: NDArray[np.int8]
+    """Signs of their phases, or of the logarithms of their amplitudes."""
+
+    def __len__(self) -> int:
+        return len(self.value)
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """What an array has measured: columns with a row for each baseline and time.
+
+    ``products`` are RR, LL, RL, LR if ``circular``, else I, Q, U, V, in Jy; ``sigmas`` are the standard deviations of
+    their real and of their imaginary parts, NaN where there is no such product.
+
+    >>> import numpy as np
+    >>> names = np.array([["AA", "LM"], ["AA", "PV"], ["LM", "PV"]])
+    >>> uv = np.array([[1e9, 2e9], [3e9, -1e9], [2e9, -3e9]])
+    >>> obs = Observation.of_stokes_i([4.0, 4.0, 4.0], names, uv, [1 + 1j, 0.5, -0.2j], [0.01, 0.01, 0.02])
+    >>> print(f"{obs.closure_phases().value[0]:.6f} rad")  # π/4 - π/2 - 0
+    -0.785398 rad
+    """
+
+    time: Floats
+    """Hours of UTC since 0 h of the day ``mjd``."""
+    stations: NDArray[np.str_]
+    """Names of the two stations of each row, shape (rows, 2)."""
+    uv: Floats
+    """(u, v) in wavelengths, shape (rows, 2)."""
+    products: NDArray[np.complex128]
+    """Shape (rows, 4)."""
+    sigmas: Floats
+    """Shape (rows, 4)."""
+    circular: bool = False
+    integration: Floats | None = None
+    """Seconds; 0 where a file does not tell."""
+    opacity: Floats | None = None
+    """Zenith opacities at both stations, shape (rows, 2)."""
+    channel: NDArray[np.int64] | None = None
+    """Which of ``channels`` each row is of."""
+    array: tuple[Station, ...] = ()
+    """The stations that rows name."""
+    source: str = ""
+    ra_hours: float | None = None
+    dec_deg: float | None = None
+    mjd: int | None = None
+    frequency_hz: float | None = None
+    bandwidth_hz: float | None = None
+    channels: tuple[tuple[float, float], ...] = ()
+    """Frequency and bandwidth (Hz) of spectral channels; none where all rows are of ``frequency_hz``."""
+    history: tuple[str, ...] = ()
+    """How the data came about."""
+    _core: Any = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        count = len(np.atleast_1d(real("time", self.time)))
+        names = np.asarray(self.stations, dtype=str).reshape(-1, 2)
+        known = {station.name for station in self.array}
+        missing = [name for name in dict.fromkeys(names.ravel().tolist()) if name not in known]
+        columns = {
+            "time": _column("time", self.time, (count,)),
+            "uv": _column("uv", self.uv, (count, 2)),
+            "sigmas": _column("sigmas", self.sigmas, (count, 4)),
+            "integration": _column("integration", _or_zero(self.integration, (count,)), (count,)),
+            "opacity": _column("opacity", _or_zero(self.opacity, (count, 2)), (count, 2)),
+        }
+        for name, column in columns.items():
+            object.__setattr__(self, name, column)
+        if names.shape != (count, 2):
+            raise ValueError(f"stations have the shape {names.shape}, not {(count, 2)}")
+        object.__setattr__(self, "stations", names)
+        object.__setattr__(self, "array", (*self.array, *map(Station, missing)))
+        products = np.ascontiguousarray(self.products, dtype=np.complex128)
+        if products.shape != (count, 4):
+            raise ValueError(f"products have the shape {products.shape}, not {(count, 4)}")
+        object.__setattr__(self, "products", products)
+        channel = np.zeros(count) if self.channel is None else np.asarray(self.channel)
+        object.__setattr__(self, "channel", np.ascontiguousarray(channel, dtype=np.int64))
+        object.__setattr__(self, "_core", self._visibilities())
+
+    def _visibilities(self) -> Any:
+        numbers = {station.name: k for k, station in enumerate(self.array)}
+        if len(numbers) != len(self.array):
+            raise ValueError("two stations of the array have the same name")
+        pairs = np.array([numbers[name] for name in self.stations.ravel().tolist()], dtype=np.int64)
+        position = None
+        if self.ra_hours is not None and self.dec_deg is not None:
+            position = (float(self.ra_hours), float(self.dec_deg))
+        metadata = {
+            "source": self.source,
+            "position": position,
+            "mjd": self.mjd,
+            "frequency_hz": self.frequency_hz,
+            "bandwidth_hz": self.bandwidth_hz,
+            "channels": list(self.channels),
+            "circular": self.circular,
+            "stations": [
+                (s.name, s.position, s.sefd, s.feed_rotation, s.leakage) for s in self.array
+            ],
+            "history": list(self.history),
+        }
+        columns = {
+            "time": self.time,
+            "integration": self.integration,
+            "stations": pairs,
+            "uv": self.uv.reshape(-1),
+            "products": self.products.reshape(-1),
+            "sigmas": self.sigmas.reshape(-1),
+            "opacity": np.asarray(self.opacity).reshape(-1),
+            "channel": self.channel,
+        }
+        return _core.Visibilities(metadata, columns)
+
+    @staticmethod
+    def _of(core: Any) -> Observation:
+        metadata, columns = core.metadata(), core.columns()
+        array = tuple(
+            Station(name, position and tuple(position), tuple(sefd), tuple(feed), tuple(leakage))
+            for name, position, sefd, feed, leakage in metadata["stations"]
+        )
+        names = np.array([station.name for station in array] or [""], dtype=str)
+        ra, dec = metadata["position"] or (None, None)
+        return Observation(
+            time=columns["time"],
+            stations=names[columns["stations"]].reshape(-1, 2),
+            uv=columns["uv"].reshape(-1, 2),
+            products=columns["products"].reshape(-1, 4),
+            sigmas=columns["sigmas"].reshape(-1, 4),
+            circular=metadata["circular"],
+            integration=columns["integration"],
+            opacity=columns["opacity"].reshape(-1, 2),
+            channel=columns["channel"],
+            array=array,
+            source=metadata["source"],
+            ra_hours=ra,
+            dec_deg=dec,
+            mjd=metadata["mjd"],
+            frequency_hz=metadata["frequency_hz"],
+            bandwidth_hz=metadata["bandwidth_hz"],
+            channels=tuple(metadata["channels"]),
+            history=tuple(metadata["history"]),
+        )
+
+    @staticmethod
+    def of_stokes_i(
+        time: ArrayLike, stations: ArrayLike, uv: ArrayLike, vis: ArrayLike, sigma: ArrayLike, **more: Any
+    ) -> Observation:
+        """An observation of Stokes I alone, from columns of its rows; ``more`` are other fields of the class."""
+        values = np.atleast_1d(np.asarray(vis, dtype=np.complex128))
+        products = np.zeros((len(values), 4), dtype=np.complex128)
+        products[:, 0] = values
+        sigmas = np.full((len(values), 4), np.nan)
+        sigmas[:, 0] = real("sigma", sigma)
+        return Observation(
+            np.atleast_1d(real("time", time)), np.asarray(stations), real("uv", uv), products, sigmas, **more
+        )
+
+    @staticmethod
+    def read(path: Union[str, PathLike[str]]) -> Observation:
+        """Reads a file: UVFITS, eht-imaging's text, the EHT's public csv and txt, or kerrlight's csv."""
+        with open(path, "rb") as file:
+            bytes_ = file.read()
+        try:
+            core, _ = _core.Visibilities.decode(bytes_)
+        except ValueError as error:
+            raise ValueError(f"{fspath(path)}: {error}") from None
+        return Observation._of(core)
+
+    def write(self, path: Union[str, PathLike[str]], format: str | None = None) -> None:
+        """Writes a file. The ending tells the format: .uvfits, .fits, .txt (eht-imaging's) or .csv; ``format`` may
+        also be ``"eht-csv"`` or ``"eht-txt"``, total intensity as the EHT publishes it.
+        """
+        ending = "." + fspath(path).rsplit(".", 1)[-1].lower()
+        kind = format or _ENDINGS.get(ending)
+        if kind not in _FORMATS:
+            allowed = ", ".join(_ENDINGS) if format is None else ", ".join(_FORMATS)
+            raise ValueError(f"{format or fspath(path)} is not allowed: one of {allowed}")
+        data = self._core.encode(kind)
+        with open(path, "wb") as file:
+            file.write(data)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def u(self) -> Floats:
+        """u in wavelengths."""
+        return self.uv[:, 0]
+
+    @property
+    def v(self) -> Floats:
+        """v in wavelengths."""
+        return self.uv[:, 1]
+
+    @property
+    def vis(self) -> NDArray[np.complex128]:
+        """Stokes I (Jy): the mean of both parallel hands, or the one that there is; NaN where there is none."""
+        return self._core.stokes_i()[0]
+
+    @property
+    def sigma(self) -> Floats:
+        """Standard deviation of the real, and of the imaginary part of :attr:`vis` (Jy)."""
+        return self._core.stokes_i()[1]
+
+    def averaged(self, seconds: float, *, in_scans: bool = False) -> Observation:
+        """Averages over intervals of so many seconds: of the clock, or from the start of each scan."""
+        if not (seconds > 0 and math.isfinite(seconds)):
+            raise ValueError(f"seconds = {seconds} is not allowed: above 0")
+        return Observation._of(self._core.averaged(float(seconds), in_scans))
+
+    def total_intensity(self) -> Observation:
+        """The same data as Stokes I alone."""
+        return Observation._of(self._core.total_intensity())
+
+    def where(self, keep: ArrayLike) -> Observation:
+        """The rows that ``keep``, a mask or an array of indices, selects."""
+        rows = np.arange(len(self))[np.asarray(keep)]
+        columns = ("time", "stations", "uv", "products", "sigmas", "integration", "opacity", "channel")
+        return replace(self, **{name: getattr(self, name)[rows] for name in columns})
+
+    def _closures(self, phases: bool, least_snr: float) -> Closures:
+        found = self._core.closures(phases, float(least_snr))
+        names = np.array([station.name for station in self.array] or [""], dtype=str)
+        return Closures(**{**found, "stations": names[found["stations"]]})
+
+    def closure_phases(self, least_snr: float = 0.0) -> Closures:
+        """A largest set of independent closure phases of every scan, the least noisy first; baselines weaker than
+        ``least_snr`` times their noise are left out.
+        """
+        return self._closures(True, least_snr)
+
+    def log_closure_amplitudes(self, least_snr: float = 0.0) -> Closures:
+        """A largest set of independent logarithms of closure amplitudes, as :meth:`closure_phases`."""
+        return self._closures(False, least_snr)
+
+    def fourier(
+        self, shape: tuple[int, int], field_uas: float, *, pulse: str = "triangle", accuracy: float | None = None
+    ) -> Fourier:
+        """The transform from an image (rows from the north, each from the east) to the rows of this observation."""
+        return Fourier(shape, field_uas, self.uv, pulse=pulse, accuracy=accuracy)
+
+    @staticmethod
+    def from_ehtim(obs: Any) -> Observation:
+        """From an ``ehtim.obsdata.Obsdata``; its noise may not be in amplitude-only columns of other bases."""
+        circular = {"stokes": False, "circ": True}.get(obs.polrep)
+        if circular is None:
+            raise ValueError(f'polrep = "{obs.polrep}" is not allowed: stokes or circ')
+        data = obs.data
+        names = _PRODUCTS[circular]
+        products = [np.asarray(data[f"{name}vis"], dtype=np.complex128) for name in names]
+        sigmas = [np.asarray(data[f"{name}sigma"], dtype=np.float64) for name in names]
+        # eht-imaging has NaN where there is no product.
+        missing = [~np.isfinite(product) for product in products]
+        for product, sigma, none in zip(products, sigmas, missing):
+            product[none] = 0.0
+            sigma[none] = np.nan
+        array = tuple(
+            Station(
+                str(row["site"]),
+                (float(row["x"]), float(row["y"]), float(row["z"])),
+                (float(row["sefdr"]), float(row["sefdl"])),
+                (float(row["fr_par"]), float(row["fr_elev"]), float(row["fr_off"])),
+                (complex(row["dr"]), complex(row["dl"])),
+            )
+            for row in obs.tarr
+        )
+        return Observation(
+            time=np.array(data["time"], dtype=np.float64),
+            stations=np.stack([data["t1"], data["t2"]], axis=-1).astype(str),
+            uv=np.stack([data["u"], data["v"]], axis=-1).astype(np.float64),
+            products=np.stack(products, axis=-1),
+            sigmas=np.stack(sigmas, axis=-1),
+            circular=circular,
+            integration=np.array(data["tint"], dtype=np.float64),
+            opacity=np.stack([data["tau1"], data["tau2"]], axis=-1).astype(np.float64),
+            array=array,
+            source=str(obs.source),
+            ra_hours=float(obs.ra),
+            dec_deg=float(obs.dec),
+            mjd=int(obs.mjd),
+            frequency_hz=float(obs.rf),
+            bandwidth_hz=float(obs.bw),
+            history=("from eht-imaging",),
+        )
+
+    def to_ehtim(self) -> Any:
+        """An ``ehtim.obsdata.Obsdata``; needs eht-imaging, one spectral channel, and stations with positions."""
+        import ehtim
+
+        lacking = [
+            name
+            for name in ("ra_hours", "dec_deg", "mjd", "frequency_hz", "bandwidth_hz")
+            if getattr(self, name) is None
+        ]
+        if lacking:
+            raise ValueError(f"the data lack {', '.join(lacking)}: give it")
+        if len(self.channels) > 1:
+            raise ValueError(f"eht-imaging has no {len(self.channels)} spectral channels: average them first")
+        names = _PRODUCTS[self.circular]
+        kind = "DTPOL_CIRC" if self.circular else "DTPOL_STOKES"
+        data = np.zeros(len(self), dtype=getattr(ehtim.const_def, kind))
+        data["time"], data["tint"] = self.time, self.integration
+        data["t1"], data["t2"] = self.stations.T
+        data["tau1"], data["tau2"] = np.asarray(self.opacity).T
+        data["u"], data["v"] = self.uv.T
+        for k, name in enumerate(names):
+            sigma = self.sigmas[:, k]
+            data[f"{name}vis"] = np.where(np.isnan(sigma), np.nan, self.products[:, k])
+            data[f"{name}sigma"] = sigma
+        tarr = np.zeros(len(self.array), dtype=ehtim.const_def.DTARR)
+        for row, station in zip(tarr, self.array):
+            row["site"] = station.name
+            row["x"], row["y"], row["z"] = station.position or (0.0, 0.0, 0.0)
+            row["sefdr"], row["sefdl"] = station.sefd
+            row["fr_par"], row["fr_elev"], row["fr_off"] = station.feed_rotation
+            row["dr"], row["dl"] = station.leakage
+        return ehtim.obsdata.Obsdata(
+            self.ra_hours,
+            self.dec_deg,
+            self.frequency_hz,
+            self.bandwidth_hz,
+            data,
+            tarr,
+            polrep="circ" if self.circular else "stokes",
+            source=self.source,
+            mjd=self.mjd,
+        )
+
+    def __repr__(self) -> str:
+        basis = "RR, LL, RL, LR" if self.circular else "I, Q, U, V"
+        return f"<Observation of {self.source or 'no name'}: {len(self)} rows of {basis}, {len(self.array)} stations>"
+
+
+def _or_zero(column: Any, shape: tuple[int, ...]) -> Any:
+    return np.zeros(shape) if column is None else column
+
+
+def _column(name: str, value: Any, shape: tuple[int, ...]) -> Floats:
+    array = np.ascontiguousarray(np.atleast_1d(real(name, value)))
+    if array.shape != shape:
+        raise ValueError(f"{name} has the shape {array.shape}, not {shape}")
+    return array
+
+
+class Fourier(_Linear):
+    """From images in Jy/pixel to visibilities, with the adjoint.
+
+    :param shape: rows and columns of an image; rows from the north, each from the east.
+    :param field_uas: width of the field (µas).
+    :param uv: (u, v) in wavelengths, shape (n, 2), that see one image; or a list of such arrays, one for each image
+        of a movie.
+    :param pulse: shape of a pixel: ``"triangle"``, ``"rectangle"`` or ``"delta"``.
+    :param accuracy: largest error in units of the flux, for a fast transform where that is quicker; without it the sum
+        is exact.
+
+    >>> import numpy as np
+    >>> fourier = Fourier((5, 5), 100.0, [[1e9, 0.0], [3e9, -4e9]], pulse="delta")
+    >>> image = np.zeros((5, 5))
+    >>> image[2, 2] = 0.6
+    >>> bool(np.allclose(fourier.apply(image), 0.6))  # a point at the centre
+    True
+    """
+
+    is_complex = True
+
+    def __init__(
+        self,
+        shape: tuple[int, int],
+        field_uas: float,
+        uv: ArrayLike | Sequence[ArrayLike],
+        *,
+        pulse: str = "triangle",
+        accuracy: float | None = None,
+    ) -> None:
+        height, width = (int(n) for n in shape)
+        alone = isinstance(uv, np.ndarray) or np.ndim(uv[0]) == 1  # type: ignore[index]
+        lists: list[Any] = [uv] if alone else list(uv)  # type: ignore[arg-type]
+        frames = [real("uv", each).reshape(-1, 2) for each in lists]
+        counts = [len(frame) for frame in frames]
+        flat = np.ascontiguousarray(np.concatenate(frames)).reshape(-1)
+        screen = (width, height, float(field_uas))
+        self._core = _core.Fourier(screen, pulse, flat, counts, accuracy)
+        self.input_shape = (height, width) if alone else (len(frames), height, width)
+        self.output_shape = (sum(counts),)
+
+    def apply(self, values: ArrayLike) -> NDArray[np.complex128]:
+        """Visibilities (Jy) of an image or a movie, image after image."""
+        movie = precision("image", values, self.input_shape)
+        return self._core.apply(movie.astype(np.float64, copy=False))
+
+    def vjp(self, cotangent: ArrayLike) -> Floats:
+        """The adjoint under the inner product Re Σ x̄ y: from dL/dRe V + i dL/dIm V to dL/dpixel."""
+        data = np.ascontiguousarray(cotangent, dtype=np.complex128)
+        if data.shape != self.output_shape:
+            raise ValueError(f"cotangent has the shape {data.shape}, not {self.output_shape}")
+        return self._core.vjp(data).reshape(self.input_shape)
+
+    def __repr__(self) -> str:
+        return f"<Fourier from {self.input_shape} to {self.output_shape[0]} visibilities, {self._core.describe()}>"

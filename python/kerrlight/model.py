@@ -1,0 +1,320 @@
+"""The forward model of a fit as a linear map on arrays: from emission to images, and back.
+
+Light of an optically thin medium adds up along rays: a pixel is Σ weight · emission over the nodes of its ray. A
+:class:`ForwardModel` has the nodes, where their matter was at the reference time, and the map with its adjoint, for
+networks and optimisers of your own (:mod:`kerrlight.torch`, :mod:`kerrlight.jax`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Sequence, Union
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from kerrlight import _core
+from kerrlight._arrays import Floats, real, together
+from kerrlight.rays import Observer
+
+__all__ = ["ForwardModel", "Keplerian", "PowerLaw", "Tabulated", "VoxelModel", "screen"]
+
+
+@dataclass(frozen=True)
+class Keplerian:
+    """Angular velocity 1/(r^{3/2} + drag); without ``drag`` the part of the spin along the axis."""
+
+    drag: float | None = None
+
+
+@dataclass(frozen=True)
+class PowerLaw:
+    """Angular velocity rate · (radius/r)^exponent, in radians per M; ``radius`` in M."""
+
+    radius: float
+    rate: float
+    exponent: float = 1.5
+
+
+@dataclass(frozen=True)
+class Tabulated:
+    """Angular velocity linear between ``radii`` (M), held beyond the first and the last; ``rates`` in radians per M."""
+
+    radii: Sequence[float]
+    rates: Sequence[float]
+
+
+Velocity = Union[Keplerian, PowerLaw, Tabulated]
+
+
+def screen(pixels: int, width: float) -> tuple[Floats, Floats]:
+    """(α, β) of the pixels of a square screen, rows from the top, each from the left; ``width`` (M) is that of the
+    pixels' outer edges.
+
+    >>> alpha, beta = screen(4, 8.0)
+    >>> alpha[0].tolist(), beta[:, 0].tolist()
+    ([-3.0, -1.0, 1.0, 3.0], [3.0, 1.0, -1.0, -3.0])
+    """
+    if not 1 <= pixels <= 16384:
+        raise ValueError(f"pixels = {pixels} is not allowed: 1 to 16384")
+    if not (width > 0 and math.isfinite(width)):
+        raise ValueError(f"width = {width} is not allowed: above 0 (M)")
+    at = (np.arange(pixels) - 0.5 * (pixels - 1)) * (width / pixels)
+    alpha, beta = np.meshgrid(at, -at)
+    return alpha, beta
+
+
+def _law(velocity: Velocity, observer: Observer, axis: Floats) -> tuple[Any, ...] | float:
+    """A velocity for the compiled half."""
+    if isinstance(velocity, PowerLaw):
+        return (float(velocity.radius), float(velocity.rate), float(velocity.exponent))
+    if isinstance(velocity, Tabulated):
+        return ([float(r) for r in velocity.radii], [float(rate) for rate in velocity.rates])
+    if velocity.drag is not None:
+        return float(velocity.drag)
+    return float(observer.hole.spin * axis[2] / (np.linalg.norm(axis) or 1.0))
+
+
+def precision(name: str, value: Any, shape: tuple[int, ...]) -> NDArray[Any]:
+    """``value`` as a contiguous column in single precision if it is in single precision, else in double."""
+    array = np.asarray(value)
+    if array.dtype != np.float32:
+        array = real(name, value)
+    if array.shape != shape:
+        raise ValueError(f"{name} has the shape {array.shape}, not {shape}")
+    return np.ascontiguousarray(array).reshape(-1)
+
+
+class _Linear:
+    """A linear map of arrays with its adjoint."""
+
+    input_shape: tuple[int, ...]
+    """Shape of what it takes."""
+    output_shape: tuple[int, ...]
+    """Shape of what it gives."""
+
+    def apply(self, values: ArrayLike) -> NDArray[Any]:
+        """The map."""
+        raise NotImplementedError
+
+    def vjp(self, cotangent: ArrayLike) -> NDArray[Any]:
+        """The adjoint."""
+        raise NotImplementedError
+
+
+class ForwardModel(_Linear):
+    """From emission on the nodes of rays to a movie.
+
+    :param observer: who sees which hole.
+    :param alpha: screen coordinates of the pixels (M), as of :func:`screen`; their shape is that of an image.
+    :param beta: as ``alpha``.
+    :param r_min: least radius of the region that may shine (M).
+    :param r_max: its largest radius (M).
+    :param z_width: its largest |z| (M).
+    :param order: nodes of a Gauss–Legendre panel, 1 to 16; weights are those of the integral over the affine parameter.
+    :param split: into how many panels each of the coarsest ones is cut.
+    :param per_ray: nodes equidistant in Mino time instead, with BH-NeRF's weights |x_i - x_{i-1}|; for observers at a
+        finite radius.
+    :param times: times of the frames (M).
+    :param reference_time: time of the field of emission (M); matter turns from there to each frame.
+    :param velocity: how fast matter turns: :class:`Keplerian`, :class:`PowerLaw` or :class:`Tabulated`.
+    :param axis: what it turns about, right-handed.
+    :param injection_time: when it begins to shine (M); always, without one.
+    :param slow_light: whether light takes its time.
+    :param redshift_power: emission goes like g to this power; without it there is no redshift.
+    :param scale: flux of a pixel with an integral of 1.
+
+    >>> from kerrlight import Kerr
+    >>> observer = Kerr(0.0).observer(inclination_deg=60)
+    >>> model = ForwardModel(observer, *screen(16, 20.0), r_min=3.0, r_max=9.0, times=[0.0, 20.0])
+    >>> x, y, z = np.moveaxis(model.coordinates(), -1, 0)
+    >>> emission = np.exp(-0.5 * ((x - 6) ** 2 + y**2 + z**2))
+    >>> movie = model.apply(emission)
+    >>> movie.shape == model.output_shape == (2, 16, 16)
+    True
+    >>> back = model.vjp(movie)  # the adjoint: <A e, m> = <e, A* m>
+    >>> bool(abs((movie**2).sum() / (emission * back).sum() - 1) < 1e-12)
+    True
+    """
+
+    def __init__(
+        self,
+        observer: Observer,
+        alpha: ArrayLike,
+        beta: ArrayLike,
+        *,
+        r_min: float,
+        r_max: float,
+        z_width: float = math.inf,
+        order: int = 8,
+        split: int = 1,
+        per_ray: int | None = None,
+        times: ArrayLike = 0.0,
+        reference_time: float = 0.0,
+        velocity: Velocity = Keplerian(),
+        axis: ArrayLike = (0.0, 0.0, 1.0),
+        injection_time: float | None = None,
+        slow_light: bool = False,
+        redshift_power: float | None = None,
+        scale: float = 1.0,
+    ) -> None:
+        self.image_shape, columns = together(alpha=alpha, beta=beta)
+        self.times = np.atleast_1d(real("times", times)).copy()
+        direction = real("axis", axis)
+        if direction.shape != (3,):
+            raise ValueError(f"axis has the shape {direction.shape}, not (3,)")
+        if not 1 <= order <= 16:
+            raise ValueError(f"order = {order} is not allowed: 1 to 16")
+        if not 1 <= split <= 4096:
+            raise ValueError(f"split = {split} is not allowed: 1 to 4096")
+        if not math.isfinite(scale):
+            raise ValueError(f"scale = {scale} is not allowed: a finite number")
+        settings = {
+            "region": (float(r_min), float(r_max), float(z_width)),
+            "order": int(order),
+            "split": int(split),
+            "per_ray": per_ray,
+            "slow_light": bool(slow_light),
+            "redshift_power": redshift_power,
+            "velocity": _law(velocity, observer, direction),
+            "axis": direction.tolist(),
+            "times": self.times.tolist(),
+            "reference": float(reference_time),
+            "injection": injection_time,
+            "scale": float(scale),
+        }
+        self._core = _core.Model(
+            observer.hole.spin, observer._place, (columns[0], columns[1]), settings
+        )
+        self._frames = list(range(len(self.times)))
+
+    @property
+    def nodes(self) -> int:
+        """Number of nodes of all rays."""
+        return self._core.sizes()[1]
+
+    @property
+    def frames(self) -> int:
+        """Number of frames."""
+        return len(self._frames)
+
+    @property
+    def input_shape(self) -> tuple[int, ...]:  # type: ignore[override]
+        """(frames, nodes)."""
+        return (self.frames, self.nodes)
+
+    @property
+    def output_shape(self) -> tuple[int, ...]:  # type: ignore[override]
+        """(frames, ...) with the shape of an image."""
+        return (self.frames, *self.image_shape)
+
+    @cached_property
+    def _columns(self) -> dict[str, Any]:
+        return self._core.columns()
+
+    @property
+    def positions(self) -> Floats:
+        """Where light is emitted: x, y and z of each node (M), shape (nodes, 3)."""
+        return self._columns["position"].reshape(-1, 3)
+
+    @property
+    def weights(self) -> Floats:
+        """What the emission of each node is multiplied by in its pixel."""
+        return self._columns["weight"]
+
+    @property
+    def pixels(self) -> NDArray[np.uint32]:
+        """The pixel of each node, counted row by row."""
+        return self._columns["pixel"]
+
+    @property
+    def delays(self) -> Floats:
+        """How long before the frame's time the light of each node left (M); 0 without ``slow_light``."""
+        delay: Floats = self._columns["delay"]
+        return delay if len(delay) else np.zeros(self.nodes)
+
+    def coordinates(self, dtype: DTypeLike = np.float64) -> NDArray[Any]:
+        """Where the matter of every node was at the reference time: x, y and z (M), shape (frames, nodes, 3).
+
+        A field of emission is evaluated here. ``dtype`` is float64 or float32.
+        """
+        kind = np.dtype(dtype)
+        if kind not in (np.dtype(np.float64), np.dtype(np.float32)):
+            raise TypeError(f"dtype = {kind} is not allowed: float64 or float32")
+        places = self._core.coordinates(self._frames, kind == np.dtype(np.float32))
+        return places.reshape(self.frames, self.nodes, 3)
+
+    def at(self, frames: Sequence[int]) -> ForwardModel:
+        """The same model with some of its frames alone, for a step of training; nothing is traced or copied."""
+        part = object.__new__(ForwardModel)
+        part.__dict__.update({k: v for k, v in self.__dict__.items() if k != "_columns"})
+        part._frames = [self._frames[int(frame)] for frame in frames]
+        part.times = self.times[[int(frame) for frame in frames]]
+        return part
+
+    def apply(self, values: ArrayLike) -> NDArray[Any]:
+        """The movie of emission on the nodes: (frames, nodes) to (frames, ...), in the precision of the emission."""
+        emission = precision("emission", values, self.input_shape)
+        return self._core.apply(emission, self._frames).reshape(self.output_shape)
+
+    def vjp(self, cotangent: ArrayLike) -> NDArray[Any]:
+        """The adjoint of :meth:`apply`: from the gradient with respect to the movie to that of the emission."""
+        movie = precision("cotangent", cotangent, self.output_shape)
+        return self._core.vjp(movie, self._frames).reshape(self.input_shape)
+
+    def voxels(
+        self, shape: int | Sequence[int], low: ArrayLike, high: ArrayLike | None = None
+    ) -> VoxelModel:
+        """The model for emission on voxels: ``shape`` nodes along x, y and z from ``low`` to ``high`` (M).
+
+        A single number stands for all three axes, and without ``high`` the box is [-low, low]³.
+        """
+        nodes = [int(n) for n in np.broadcast_to(np.asarray(shape), 3)]
+        first = np.broadcast_to(real("low", low), 3)
+        if high is None:
+            return VoxelModel(self, nodes, (-abs(first)).tolist(), abs(first).tolist())
+        last = np.broadcast_to(real("high", high), 3)
+        return VoxelModel(self, nodes, first.tolist(), last.tolist())
+
+    def __repr__(self) -> str:
+        return f"<ForwardModel: {self.frames} frames of shape {self.image_shape}, {self.nodes} nodes>"
+
+
+class VoxelModel(_Linear):
+    """From emission on voxels, linear in between and dark outside, to a movie; made by :meth:`ForwardModel.voxels`.
+
+    >>> from kerrlight import Kerr
+    >>> observer = Kerr(0.5).observer(inclination_deg=30)
+    >>> model = ForwardModel(observer, *screen(12, 20.0), r_min=3.0, r_max=8.0, times=[0.0, 10.0])
+    >>> voxels = model.voxels(20, 8.0)
+    >>> movie = voxels.apply(np.ones((20, 20, 20)))
+    >>> bool(np.allclose(movie, model.apply(np.ones(model.input_shape))))
+    True
+    """
+
+    def __init__(
+        self, model: ForwardModel, nodes: list[int], low: list[float], high: list[float]
+    ) -> None:
+        _core.check_voxels((nodes, low, high))
+        self.model = model
+        self.input_shape = tuple(nodes)
+        self.output_shape = model.output_shape
+        self.low, self.high = low, high
+
+    @property
+    def _voxels(self) -> tuple[list[int], list[float], list[float]]:
+        return (list(self.input_shape), self.low, self.high)
+
+    def apply(self, values: ArrayLike) -> NDArray[Any]:
+        """The movie of emission on voxels, an array over (x, y, z)."""
+        volume = precision("volume", values, self.input_shape)
+        movie = self.model._core.apply_voxels(self._voxels, volume, self.model._frames)
+        return movie.reshape(self.output_shape)
+
+    def vjp(self, cotangent: ArrayLike) -> NDArray[Any]:
+        """The adjoint of :meth:`apply`."""
+        movie = precision("cotangent", cotangent, self.output_shape)
+        volume = self.model._core.vjp_voxels(self._voxels, movie, self.model._frames)
+        return volume.reshape(self.input_shape)

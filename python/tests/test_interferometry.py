@@ -1,0 +1,182 @@
+"""Files, columns, closures, the transform and its adjoint, and eht-imaging's objects."""
+
+import types
+
+import numpy as np
+import pytest
+
+from kerrlight import Fourier, Observation, Station
+
+RNG = np.random.default_rng(3)
+NAMES = ["AA", "LM", "PV", "SM"]
+
+
+def observation(circular=False, times=(4.0, 5.0)):
+    pairs = [(a, b) for i, a in enumerate(NAMES) for b in NAMES[i + 1 :]]
+    count = len(pairs) * len(times)
+    array = tuple(
+        Station(name, (1e6 * k + 0.5, 2e6, -3e6 * k), (100.0 * k, 90.0), (1.0, 0.5, 45.0), (0.1j, 0.2 + 0j))
+        for k, name in enumerate(NAMES)
+    )
+    products = RNG.normal(size=(count, 4)) + 1j * RNG.normal(size=(count, 4))
+    return Observation(
+        time=np.repeat(times, len(pairs)),
+        stations=np.array(pairs * len(times)),
+        uv=RNG.normal(size=(count, 2)) * 1e9,
+        products=products,
+        sigmas=0.01 + 0.01 * RNG.random((count, 4)),
+        circular=circular,
+        integration=np.full(count, 60.0),
+        array=array,
+        source="M87",
+        ra_hours=12.5,
+        dec_deg=12.4,
+        mjd=57850,
+        frequency_hz=2.3e11,
+        bandwidth_hz=2e9,
+    )
+
+
+@pytest.mark.parametrize("ending", [".uvfits", ".txt", ".csv"])
+def test_files(tmp_path, ending):
+    before = observation(circular=ending == ".uvfits")
+    path = tmp_path / f"data{ending}"
+    before.write(path)
+    after = Observation.read(path)
+    assert len(after) == len(before) and after.source == "M87" and after.mjd == 57850
+    assert after.frequency_hz == pytest.approx(2.3e11)
+    np.testing.assert_allclose(np.sort(after.time), before.time, atol=1e-6)
+    order = np.lexsort((after.v, after.u)), np.lexsort((before.v, before.u))
+    np.testing.assert_allclose(after.uv[order[0]], before.uv[order[1]], rtol=1e-6)
+    np.testing.assert_allclose(after.vis[order[0]], before.vis[order[1]], rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(after.sigma[order[0]], before.sigma[order[1]], rtol=1e-5, atol=1e-6)
+
+
+def test_what_is_not_a_file_of_visibilities(tmp_path):
+    path = tmp_path / "picture.uvfits"
+    path.write_bytes(b"\x89PNG\xff")
+    with pytest.raises(ValueError, match="picture.uvfits: .*neither UVFITS"):
+        Observation.read(path)
+    with pytest.raises(FileNotFoundError):
+        Observation.read(tmp_path / "none.uvfits")
+    with pytest.raises(ValueError, match="is not allowed: one of .uvfits"):
+        observation().write(tmp_path / "data.png")
+    bare = Observation.of_stokes_i([1.0], [["A", "B"]], [[1.0, 2.0]], [1.0], [0.1])
+    with pytest.raises(ValueError, match="the data lack"):
+        bare.write(tmp_path / "data.uvfits")
+
+
+def test_stokes_i_of_hands():
+    of = observation(circular=True)
+    np.testing.assert_allclose(of.vis, 0.5 * (of.products[:, 0] + of.products[:, 1]))
+    np.testing.assert_allclose(of.sigma, 0.5 * np.hypot(of.sigmas[:, 0], of.sigmas[:, 1]))
+    total = of.total_intensity()
+    assert not total.circular and np.isnan(total.sigmas[:, 1:]).all()
+    np.testing.assert_array_equal(total.vis, of.vis)
+
+
+def test_selection_and_averages():
+    of = observation()
+    early = of.where(of.time < 4.5)
+    assert len(early) == 6 and (early.time == 4.0).all() and early.array == of.array
+    assert len(of.averaged(7200.0)) == 6
+    with pytest.raises(ValueError, match="seconds"):
+        of.averaged(0.0)
+
+
+def test_closures_do_not_see_gains():
+    of = observation()
+    gains = {name: 1.3 * np.exp(2j * k) for k, name in enumerate(NAMES)}
+    factor = np.array([gains[a] * np.conj(gains[b]) for a, b in of.stations])
+    spoiled = Observation.of_stokes_i(of.time, of.stations, of.uv, of.vis * factor, of.sigma)
+    plain = Observation.of_stokes_i(of.time, of.stations, of.uv, of.vis, of.sigma)
+    phases, log_amplitudes = plain.closure_phases(), plain.log_closure_amplitudes()
+    assert len(phases) == 6 and len(log_amplitudes) == 4
+    turned = np.exp(1j * (phases.value - spoiled.closure_phases().value))
+    np.testing.assert_allclose(turned, 1.0, atol=1e-12)
+    np.testing.assert_allclose(log_amplitudes.value, spoiled.log_closure_amplitudes().value, atol=1e-12)
+    by_hand = (phases.signs * np.angle(plain.vis)[phases.rows]).sum(axis=1)
+    np.testing.assert_allclose(np.exp(1j * by_hand), np.exp(1j * phases.value), atol=1e-12)
+    logs = (log_amplitudes.signs * np.log(np.abs(plain.vis))[log_amplitudes.rows]).sum(axis=1)
+    np.testing.assert_allclose(logs, log_amplitudes.value, atol=1e-12)
+    assert phases.stations.shape == (6, 3) and set(phases.stations.ravel()) <= set(NAMES)
+
+
+@pytest.mark.parametrize("accuracy", [None, 1e-8])
+@pytest.mark.parametrize("pulse", ["delta", "rectangle", "triangle"])
+def test_fourier_adjoint(accuracy, pulse):
+    lists = [RNG.normal(size=(n, 2)) * 2e9 for n in (40, 0, 25)]
+    fourier = Fourier((24, 20), 150.0, lists, pulse=pulse, accuracy=accuracy)
+    assert fourier.input_shape == (3, 24, 20) and fourier.output_shape == (65,)
+    movie = RNG.normal(size=fourier.input_shape)
+    data = RNG.normal(size=65) + 1j * RNG.normal(size=65)
+    left = np.vdot(fourier.apply(movie), data).real
+    right = (movie * fourier.vjp(data)).sum()
+    assert abs(left - right) < 1e-10 * np.linalg.norm(movie) * np.linalg.norm(data)
+
+
+def test_fourier_is_the_sum_over_pixels():
+    uv = RNG.normal(size=(5, 2)) * 3e9
+    pixel = 100.0 / 6 * np.pi / 180 / 3600 * 1e-6
+    east = (2.5 - np.arange(6)) * pixel
+    north = (1.5 - np.arange(4)) * pixel
+    image = RNG.random((4, 6))
+    fourier = Fourier((4, 6), 100.0, uv, pulse="delta")
+    phase = uv[:, 0, None, None] * east + uv[:, 1, None, None] * north[:, None]
+    signs = [np.exp(sign * 2j * np.pi * phase) for sign in (-1, 1)]
+    errors = [abs((image * wave).sum(axis=(1, 2)) - fourier.apply(image)).max() for wave in signs]
+    assert min(errors) < 1e-12
+
+
+def test_refusals():
+    for call, words in [
+        (lambda: Fourier((4, 4), 100.0, [[1.0, 2.0]], pulse="round"), 'pulse = "round"'),
+        (lambda: Fourier((4, 4), -1.0, [[1.0, 2.0]]), "field of view"),
+        (lambda: Fourier((4, 4), 1.0, [[1.0, 2.0]]).apply(np.zeros((3, 3))), "image has the shape"),
+        (lambda: Observation.of_stokes_i([1.0], [["A", "B"]], [[1.0]], [1.0], [0.1]), "uv has the shape"),
+    ]:
+        with pytest.raises(ValueError) as refused:
+            call()
+        assert words in str(refused.value)
+
+
+def fake_obsdata(of):
+    """What an Obsdata has, without eht-imaging."""
+    dtype = [("time", "f8"), ("tint", "f8"), ("t1", "U32"), ("t2", "U32"), ("tau1", "f8"), ("tau2", "f8"), ("u", "f8"), ("v", "f8")]
+    dtype += [(f"{p}vis", "c16") for p in ("", "q", "u", "v")] + [(f"{p}sigma", "f8") for p in ("", "q", "u", "v")]
+    data = np.zeros(len(of), dtype=dtype)
+    data["time"], data["tint"], data["u"], data["v"] = of.time, 60.0, of.u, of.v
+    data["t1"], data["t2"] = of.stations.T
+    data["vis"], data["sigma"] = of.products[:, 0], of.sigmas[:, 0]
+    data["qvis"] = np.nan
+    site = [("site", "U32"), ("x", "f8"), ("y", "f8"), ("z", "f8"), ("sefdr", "f8"), ("sefdl", "f8")]
+    site += [("dr", "c16"), ("dl", "c16"), ("fr_par", "f8"), ("fr_elev", "f8"), ("fr_off", "f8")]
+    tarr = np.zeros(4, dtype=site)
+    tarr["site"] = NAMES
+    return types.SimpleNamespace(
+        data=data, tarr=tarr, polrep="stokes", source="M87", ra=12.5, dec=12.4, mjd=57850, rf=2.3e11, bw=2e9
+    )
+
+
+def test_from_ehtim_by_its_columns():
+    of = observation()
+    found = Observation.from_ehtim(fake_obsdata(of))
+    np.testing.assert_array_equal(found.vis, of.products[:, 0])
+    np.testing.assert_array_equal(found.uv, of.uv)
+    assert np.isnan(found.sigmas[:, 1]).all() and found.array[1].name == "LM"
+    assert len(found.closure_phases()) == 6
+
+
+@pytest.mark.parametrize("circular", [False, True])
+def test_to_ehtim_and_back(circular, tmp_path):
+    ehtim = pytest.importorskip("ehtim")
+    of = observation(circular)
+    obs = of.to_ehtim()
+    back = Observation.from_ehtim(obs)
+    order = [np.lexsort((o.v, o.u)) for o in (of, back)]
+    for name in ("uv", "products", "sigmas", "time", "stations"):
+        np.testing.assert_array_equal(getattr(back, name)[order[1]], getattr(of, name)[order[0]])
+    assert {s.name: s for s in back.array} == {s.name: s for s in of.array}
+    of.write(tmp_path / "data.uvfits")
+    theirs = ehtim.obsdata.load_uvfits(str(tmp_path / "data.uvfits"))
+    assert len(theirs.data) == len(of)

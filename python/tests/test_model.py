@@ -1,0 +1,181 @@
+"""The forward model: its adjoint, known sums, frames, precision, and gradients in PyTorch and JAX."""
+
+import numpy as np
+import pytest
+
+from kerrlight import ForwardModel, Keplerian, Kerr, PowerLaw, Tabulated, screen
+
+RNG = np.random.default_rng(7)
+
+
+def model(**more):
+    observer = Kerr(0.6).observer(inclination_deg=50, radius=more.pop("radius", float("inf")))
+    settings = {"r_min": 3.0, "r_max": 9.0, "times": [0.0, 15.0, 40.0], **more}
+    return ForwardModel(observer, *screen(10, 22.0), **settings)
+
+
+KINDS = {
+    "plain": {},
+    "redshift": {"redshift_power": 2.0},
+    "slow light": {"slow_light": True, "injection_time": 5.0},
+    "tilted": {"axis": [1.0, 0.0, 1.0], "velocity": PowerLaw(3.5, 0.2)},
+    "table": {"velocity": Tabulated([3.0, 9.0], [0.1, 0.02]), "z_width": 4.0, "order": 5, "split": 2},
+    "bhnerf": {"per_ray": 60, "radius": 1000.0},
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("voxels", [False, True])
+def test_adjoint(kind, voxels):
+    of = model(**KINDS[kind])
+    operator = of.voxels((9, 10, 11), 9.0) if voxels else of
+    x, y = RNG.normal(size=operator.input_shape), RNG.normal(size=operator.output_shape)
+    left, right = np.vdot(operator.apply(x), y), np.vdot(x, operator.vjp(y))
+    assert abs(left - right) <= 1e-12 * np.linalg.norm(operator.apply(x)) * np.linalg.norm(y)
+    half = operator.apply(x.astype(np.float32))
+    assert half.dtype == np.float32
+    np.testing.assert_allclose(half, operator.apply(x), rtol=1e-4, atol=1e-3)
+    back = operator.vjp(y.astype(np.float32))
+    assert back.dtype == np.float32
+    np.testing.assert_allclose(back, operator.vjp(y), rtol=1e-4, atol=1e-3)
+
+
+def test_pixels_are_sums():
+    of = model(redshift_power=2.0)
+    emission = RNG.random(of.input_shape)
+    expected = [
+        np.bincount(of.pixels, of.weights * emission[frame], minlength=100) for frame in range(3)
+    ]
+    np.testing.assert_allclose(of.apply(emission).reshape(3, 100), expected, rtol=1e-13)
+
+
+def test_a_ring_does_not_change():
+    of = model()
+    x, y, z = np.moveaxis(of.coordinates(), -1, 0)
+    movie = of.apply(np.exp(-((np.hypot(x, y) - 6) ** 2) - z**2))
+    np.testing.assert_allclose(movie[1:], [movie[0]] * 2, rtol=1e-10)
+    np.testing.assert_allclose(of.coordinates(np.float32), of.coordinates(), atol=1e-5)
+    np.testing.assert_allclose(of.coordinates()[0], of.positions, atol=1e-12)
+
+
+def test_matter_turns_with_the_law():
+    of = model(velocity=Keplerian(0.0))
+    x, y, _ = of.positions.T
+    r = np.linalg.norm(of.positions, axis=1)
+    angle = np.arctan2(y, x) - 40.0 * r**-1.5
+    pulled = of.coordinates()[2]
+    np.testing.assert_allclose(pulled[:, 0], np.hypot(x, y) * np.cos(angle), atol=1e-10)
+    np.testing.assert_allclose(pulled[:, 1], np.hypot(x, y) * np.sin(angle), atol=1e-10)
+
+
+def test_dark_before_the_injection():
+    of = model(slow_light=True, injection_time=5.0)
+    lit = of.times[:, None] - of.delays >= 5.0
+    assert lit.any() and not lit.all()
+    np.testing.assert_array_equal(of.vjp(np.ones(of.output_shape)) > 0, lit)
+
+
+def test_frames():
+    of = model()
+    emission = RNG.random(of.input_shape)
+    part = of.at([2, 0])
+    assert part.times.tolist() == [40.0, 0.0] and part.output_shape == (2, 10, 10)
+    np.testing.assert_array_equal(part.apply(emission[[2, 0]]), of.apply(emission)[[2, 0]])
+    np.testing.assert_array_equal(part.coordinates(), of.coordinates()[[2, 0]])
+    volume = RNG.random((8, 8, 8))
+    np.testing.assert_array_equal(
+        of.at([1]).voxels(8, 9.0).apply(volume), of.voxels(8, 9.0).apply(volume)[[1]]
+    )
+    with pytest.raises(IndexError):
+        of.at([3])
+
+
+def test_refusals():
+    of = model()
+    for call, words in [
+        (lambda: model(r_min=9.0), "r_max"),
+        (lambda: model(axis=[0, 0, 0]), "axis"),
+        (lambda: model(order=17), "order = 17"),
+        (lambda: model(per_ray=50), "observer radius"),
+        (lambda: model(r_min=100.0, r_max=101.0), "no ray meets the region"),
+        (lambda: of.apply(np.zeros(3)), "emission has the shape"),
+        (lambda: of.vjp(np.zeros(3)), "cotangent has the shape"),
+        (lambda: of.voxels(1, 9.0), "nodes = 1 is not allowed"),
+        (lambda: screen(0, 9.0), "pixels = 0"),
+        (lambda: screen(8, -1.0), "width = -1"),
+    ]:
+        with pytest.raises(ValueError) as refused:
+            call()
+        assert words in str(refused.value)
+    with pytest.raises(TypeError, match="real numbers"):
+        of.apply(np.zeros(of.input_shape, dtype=complex))
+
+
+def test_torch():
+    torch = pytest.importorskip("torch")
+    import kerrlight.torch
+
+    of = model()
+    for operator in (of, of.voxels(5, 9.0)):
+        values = torch.rand(operator.input_shape, dtype=torch.float64, requires_grad=True)
+        movie = kerrlight.torch.apply(operator, values)
+        (movie**2).sum().backward()
+        expected = operator.vjp(2 * operator.apply(values.detach().numpy()))
+        np.testing.assert_allclose(values.grad.numpy(), expected, rtol=1e-12)
+    few = ForwardModel(Kerr(0.6).observer(inclination_deg=50), [4.0], [1.0], r_min=3.0, r_max=9.0)
+    values = torch.rand(few.input_shape, dtype=torch.float64, requires_grad=True)
+    function = lambda x: kerrlight.torch.apply(few, x) ** 2
+    assert torch.autograd.gradcheck(function, values)
+    assert torch.autograd.gradgradcheck(function, values)
+    single = kerrlight.torch.apply(few, values.float())
+    assert single.dtype == torch.float32
+
+
+def test_jax():
+    jax = pytest.importorskip("jax")
+    import kerrlight.jax
+    from kerrlight import Fourier
+
+    jnp = jax.numpy
+    of = model()
+    values = jnp.asarray(RNG.random(of.input_shape), dtype=jnp.float32)
+    loss = jax.jit(lambda x: (kerrlight.jax.apply(of, x) ** 2).sum())
+    slope = jax.grad(loss)(values)
+    expected = of.vjp(2 * of.apply(np.asarray(values)))
+    np.testing.assert_allclose(slope, expected, rtol=1e-4, atol=1e-4)
+    movies = jax.vmap(lambda x: kerrlight.jax.apply(of, x))(jnp.stack([values, 2 * values]))
+    np.testing.assert_allclose(movies[1], 2 * movies[0], rtol=1e-5)
+    jax.config.update("jax_enable_x64", True)
+    try:
+        fourier = Fourier((10, 10), 100.0, RNG.normal(size=(7, 2)) * 3e9)
+        data = jnp.asarray(RNG.normal(size=7) + 1j * RNG.normal(size=7))
+        image = jnp.asarray(RNG.random((10, 10)))
+        loss = jax.jit(lambda x: (jnp.abs(kerrlight.jax.apply(fourier, x) - data) ** 2).sum())
+        direction = RNG.normal(size=(10, 10))
+        slope = float((jax.grad(loss)(image) * direction).sum())
+        ends = [float(loss(image + step * direction)) for step in (1e-4, -1e-4)]
+        assert abs(slope - (ends[0] - ends[1]) / 2e-4) < 1e-9 * abs(slope) + 1e-9
+    finally:
+        jax.config.update("jax_enable_x64", False)
+
+
+def test_a_network_trains_through_rays():
+    torch = pytest.importorskip("torch")
+    import kerrlight.torch
+
+    of = model()
+    at = torch.from_numpy(of.coordinates(np.float32)) / 9.0
+    truth = torch.exp(-8 * ((at - torch.tensor([0.6, 0.0, 0.0])) ** 2).sum(-1))
+    movie = kerrlight.torch.apply(of, truth)
+    torch.manual_seed(1)
+    layers = [torch.nn.Linear(3, 32), torch.nn.Tanh(), torch.nn.Linear(32, 1), torch.nn.Softplus()]
+    network = torch.nn.Sequential(*layers)
+    rates = torch.optim.Adam(network.parameters(), 1e-2)
+    losses = []
+    for _ in range(60):
+        rates.zero_grad()
+        loss = ((kerrlight.torch.apply(of, network(at)[..., 0]) - movie) ** 2).mean()
+        loss.backward()
+        rates.step()
+        losses.append(loss.item())
+    assert losses[-1] < 0.1 * losses[0]
