@@ -43,6 +43,7 @@ mod observe;
 mod output;
 mod overlay;
 mod paths;
+pub mod pictures;
 mod program;
 mod progress;
 mod render;

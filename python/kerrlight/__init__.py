@@ -9,6 +9,10 @@ True
 >>> print(f"{rays.crossings.r[0, 0]:.6f} M")
 5.244939 M
 
+Rays are in :mod:`kerrlight.rays`, pictures in :mod:`kerrlight.pictures`, fits in :mod:`kerrlight.fit`, the forward model
+with its gradients in :mod:`kerrlight.model` (:mod:`kerrlight.torch`, :mod:`kerrlight.jax`), visibilities in
+:mod:`kerrlight.interferometry`, and kgeo's interface in :mod:`kerrlight.compat.kgeo`.
+
 Lengths and times are in units of M (G = c = 1), angles in radians where no name says otherwise. Importing the
 package imports nothing but itself: numpy comes with the first name that needs it.
 """
@@ -21,8 +25,10 @@ from typing import TYPE_CHECKING
 from kerrlight._core import __version__
 
 if TYPE_CHECKING:
+    from kerrlight.fit import Fit, FitError, Report, Volume
     from kerrlight.interferometry import Closures, Fourier, Observation, Station
     from kerrlight.model import ForwardModel, Keplerian, PowerLaw, Tabulated, VoxelModel, screen
+    from kerrlight.pictures import Movie, Picture, movie, render
     from kerrlight.rays import (
         Curve,
         GaussLegendre,
@@ -39,45 +45,61 @@ if TYPE_CHECKING:
 _MODULES = {
     "Closures": "interferometry",
     "Curve": "rays",
+    "Fit": "fit",
+    "FitError": "fit",
     "ForwardModel": "model",
     "Fourier": "interferometry",
     "GaussLegendre": "rays",
     "Keplerian": "model",
     "Kerr": "rays",
     "MinoTime": "rays",
+    "Movie": "pictures",
     "Observation": "interferometry",
     "Observer": "rays",
     "Outcome": "rays",
     "PathLength": "rays",
+    "Picture": "pictures",
     "Points": "rays",
     "PowerLaw": "model",
     "Rays": "rays",
+    "Report": "fit",
     "Station": "interferometry",
     "Tabulated": "model",
+    "Volume": "fit",
     "VoxelModel": "model",
+    "movie": "pictures",
+    "render": "pictures",
     "screen": "model",
 }
 
 __all__ = [
     "Closures",
     "Curve",
+    "Fit",
+    "FitError",
     "ForwardModel",
     "Fourier",
     "GaussLegendre",
     "Keplerian",
     "Kerr",
     "MinoTime",
+    "Movie",
     "Observation",
     "Observer",
     "Outcome",
     "PathLength",
+    "Picture",
     "Points",
     "PowerLaw",
     "Rays",
+    "Report",
     "Station",
     "Tabulated",
+    "Volume",
     "VoxelModel",
     "__version__",
+    "movie",
+    "render",
     "screen",
 ]
 

@@ -5,6 +5,9 @@ use pyo3::prelude::*;
 use std::any::Any;
 use std::fmt::Display;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
 
 /// The `ValueError` with the words of a refusal.
 pub fn refused(error: impl Display) -> PyErr {
@@ -23,6 +26,47 @@ pub fn detached<T: Send, E: Display + Send>(
         Ok(result) => result.map_err(refused),
         Err(panic) => Err(PyRuntimeError::new_err(format!("internal error: {}", message(&*panic)))),
     }
+}
+
+/// How long a signal may wait to be seen.
+const MOMENT: Duration = Duration::from_millis(50);
+
+/// Does long work that looks at the flag whether to stop, which a signal raises: Python's handler of the signal runs,
+/// and what it raises is returned. The work is on a thread of its own, as signals reach Python's main thread alone.
+///
+/// # Errors
+/// As [`detached`], and what the handler of a signal raises.
+pub fn interruptible<T: Send, E: Display + Send>(
+    py: Python<'_>,
+    work: impl FnOnce(&AtomicBool) -> Result<T, E> + Send,
+) -> PyResult<T> {
+    let [stop, done] = [false, false].map(AtomicBool::new);
+    let caller = thread::current();
+    thread::scope(|scope| {
+        let worker = scope.spawn(|| {
+            let result = catch_unwind(AssertUnwindSafe(|| work(&stop)));
+            done.store(true, Ordering::Release);
+            caller.unpark();
+            result
+        });
+        let mut raised = None;
+        while !done.load(Ordering::Acquire) {
+            py.detach(|| thread::park_timeout(MOMENT));
+            if let (None, Err(error)) = (&raised, py.check_signals()) {
+                stop.store(true, Ordering::Relaxed);
+                raised = Some(error);
+            }
+        }
+        let result = py.detach(|| worker.join()).and_then(|result| result);
+        raised.map_or_else(|| finished(result), Err)
+    })
+}
+
+/// What is told of work that has ended.
+fn finished<T, E: Display>(result: Result<Result<T, E>, Box<dyn Any + Send>>) -> PyResult<T> {
+    let text = |panic: &(dyn Any + Send)| format!("internal error: {}", message(panic));
+    let result = result.map_err(|panic| PyRuntimeError::new_err(text(&*panic)))?;
+    result.map_err(refused)
 }
 
 /// What a panic said.

@@ -8,11 +8,13 @@
 
 mod call;
 mod curve;
+mod fits;
 mod fourier;
 mod lengths;
 mod model;
 mod observation;
 mod orbits;
+mod pictures;
 mod program;
 mod rays;
 
@@ -23,11 +25,13 @@ use pyo3::prelude::*;
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     curve::add(module)?;
+    fits::add(module)?;
     fourier::add(module)?;
     lengths::add(module)?;
     model::add(module)?;
     observation::add(module)?;
     orbits::add(module)?;
+    pictures::add(module)?;
     program::add(module)?;
     rays::add(module)
 }

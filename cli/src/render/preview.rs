@@ -8,7 +8,7 @@ use kerrlight_tomo::image::reduce::Reduction;
 use kerrlight_tomo::scene::Scene;
 
 /// Options of the PNG.
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 pub struct PreviewOptions {
     /// Colours of the PNG: a map of the intensity, or `color` for the R, G, B channels
     /// [default: afmhot-us; color where the scene has a sky, a mesh or a disc with the colours of a
@@ -31,8 +31,9 @@ enum Colors {
     Color,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
+#[derive(Debug, Clone, Copy, Default, ValueEnum)]
 enum StretchName {
+    #[default]
     Linear,
     Sqrt,
     Log,

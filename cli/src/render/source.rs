@@ -9,9 +9,10 @@ use kerrlight_tomo::scene::{Scene, SceneError, apply_override};
 use std::path::{Path, PathBuf};
 
 /// The scene that is rendered when none is given.
-const BUILT_IN: &str = include_str!("../built_in_scene.toml");
+pub const BUILT_IN: &str = include_str!("../built_in_scene.toml");
 
 /// A scene with where it came from.
+#[derive(Debug)]
 pub struct Source {
     pub text: String,
     /// What it is called in messages.
@@ -19,7 +20,7 @@ pub struct Source {
     /// What relative paths in it are relative to.
     pub folder: PathBuf,
     /// What tells the files that it named from others, where it comes from a picture.
-    files: Option<String>,
+    pub files: Option<String>,
 }
 
 impl Source {

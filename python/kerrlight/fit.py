@@ -1,0 +1,345 @@
+"""Fits: emission in three dimensions from visibilities or movies, as ``kerrlight fit`` recovers it.
+
+A fit runs in a process of its own with a folder of its own, so that it survives the notebook that started it and can
+be resumed, by this class or by ``kerrlight fit --resume``.
+"""
+
+from __future__ import annotations
+
+import html
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from functools import cached_property
+from itertools import count
+from os import PathLike, fspath
+from pathlib import Path
+from typing import IO, Any, Callable, Iterator, Mapping, Union
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kerrlight import _core
+from kerrlight._arrays import Floats
+from kerrlight.pictures import Settings, overrides_of, text_of
+
+__all__ = ["Fit", "FitError", "Report", "Volume"]
+
+Callback = Callable[[Mapping[str, Any]], object]
+
+
+class FitError(RuntimeError):
+    """A fit that failed while it ran; its settings made sense."""
+
+
+class Volume:
+    """Emission on the nodes of a box."""
+
+    def __init__(self, path: Union[str, PathLike[str]]) -> None:
+        with np.load(path) as arrays:
+            self.emission: NDArray[np.float32] = arrays["emission"]
+            """Over (x, y, z)."""
+            self.low: Floats = arrays["low"]
+            """Coordinates of the first node (M)."""
+            self.high: Floats = arrays["high"]
+            """Coordinates of the last node (M)."""
+            self.axis: Floats = arrays["axis"]
+            """What matter turns about."""
+
+    def _nodes(self, k: int) -> Floats:
+        return np.linspace(self.low[k], self.high[k], self.emission.shape[k])
+
+    @property
+    def x(self) -> Floats:
+        """Coordinates of the nodes along x (M)."""
+        return self._nodes(0)
+
+    @property
+    def y(self) -> Floats:
+        """Coordinates of the nodes along y (M)."""
+        return self._nodes(1)
+
+    @property
+    def z(self) -> Floats:
+        """Coordinates of the nodes along z (M)."""
+        return self._nodes(2)
+
+    def to_xarray(self) -> Any:
+        """As an ``xarray.DataArray`` with coordinates; needs xarray."""
+        import xarray
+
+        coordinates = {name: (name, getattr(self, name), {"units": "M"}) for name in "xyz"}
+        attributes = {"axis": self.axis.tolist(), "long_name": "emission"}
+        return xarray.DataArray(
+            self.emission, coords=coordinates, dims=("x", "y", "z"), name="emission", attrs=attributes
+        )
+
+    def __repr__(self) -> str:
+        shape = " x ".join(map(str, self.emission.shape))
+        return f"<Volume of {shape} nodes from {self.low.tolist()} to {self.high.tolist()} M>"
+
+
+class Report:
+    """The page of a fit, with its interactive view of the volume. In a notebook it shows itself."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        """Where the page lies."""
+
+    def open(self) -> bool:
+        """Shows it in a browser."""
+        import webbrowser
+
+        return webbrowser.open(self.path.resolve().as_uri())
+
+    def _repr_html_(self) -> str:
+        page = html.escape(self.path.read_text(encoding="utf-8"), quote=True)
+        return f'<iframe srcdoc="{page}" width="100%" height="800" style="border: 0"></iframe>'
+
+    def __repr__(self) -> str:
+        return f"<Report {self.path}>"
+
+
+class Fit:
+    """A fit.
+
+    :param config: settings as of a fit file: a dictionary, TOML text, the path of a file, or nothing for the built-in
+        experiment, a flare of Sgr A* seen by the ngEHT.
+    :param folder: the folder of the run, new or empty; by default ``kerrlight-fit``, or ``kerrlight-fit-2``, ….
+    :param set: changes with dotted keys, such as ``{"training.steps": 500}``.
+    :param base: where relative paths in the settings start from: by default the folder of their file, else the current
+        one.
+    :raises ValueError: for settings that the program refuses, with its words.
+
+    ::
+
+        fit = kerrlight.Fit(set={"training.steps": 500}).run()
+        fit.results["psnr_db"], fit.volume, fit.report()
+    """
+
+    def __init__(
+        self,
+        config: Settings = None,
+        folder: Union[None, str, PathLike[str]] = None,
+        *,
+        set: Mapping[str, Any] | None = None,
+        base: Union[None, str, PathLike[str]] = None,
+    ) -> None:
+        self._text, self._base = text_of(config, base)
+        self._set = overrides_of(set)
+        self.folder = Path(fspath(folder)) if folder is not None else _free()
+        """The folder of the run."""
+        if not self._set and self._text is not None:
+            _core.check_fit(self._text)
+        self.settings = self._settings()
+        """The settings as TOML, with all changes."""
+        self._steps = _core.check_fit(self.settings)
+
+    @staticmethod
+    def open(folder: Union[str, PathLike[str]]) -> Fit:
+        """A fit that was begun earlier, to look at or to resume."""
+        fit = object.__new__(Fit)
+        fit.folder = Path(fspath(folder))
+        fit.settings = (fit.folder / "fit.toml").read_text(encoding="utf-8")
+        fit._text, fit._base, fit._set = fit.settings, ".", []
+        fit._steps = _core.check_fit(fit.settings)
+        return fit
+
+    def _file(self) -> Any:
+        """A file of the settings for the program, beside what its paths start from."""
+        file = tempfile.NamedTemporaryFile(
+            "w", dir=self._base, prefix=".kerrlight-", suffix=".toml", encoding="utf-8"
+        )
+        file.write(self._text or "")
+        file.flush()
+        return file
+
+    def _command(self, file: Any) -> list[str]:
+        words = [sys.executable, "-m", "kerrlight", "fit"]
+        words += [file.name] if file is not None else []
+        for change in self._set:
+            words += ["--set", change]
+        return words
+
+    def _settings(self) -> str:
+        if self._text is not None and not self._set:
+            return self._text
+        file = self._file() if self._text is not None else None
+        try:
+            command = [*self._command(file), "--print"]
+            done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+        finally:
+            if file is not None:
+                file.close()
+        if done.returncode != 0:
+            raise ValueError(_said(done.stderr, file))
+        return done.stdout
+
+    def run(
+        self,
+        callback: Callback | None = None,
+        *,
+        progress: bool = True,
+        threads: int | None = None,
+        memory: str | None = None,
+    ) -> Fit:
+        """Runs the fit, or resumes it where its folder holds a part of it.
+
+        :param callback: called with each line of the log, a dictionary with ``step``, ``loss``, ``chi2_per_datum`` and,
+            where the truth is known, ``psnr_db``. What it raises stops the fit after its step, and is raised.
+        :param progress: whether to show a bar, if tqdm is installed.
+        :param threads: how many threads to use, which changes no result.
+        :param memory: a limit, such as ``"4GiB"``.
+        :raises FitError: if the fit fails while it runs.
+
+        Ctrl-C stops it after the step that is under way, and raises ``KeyboardInterrupt``; ``run`` again goes on.
+        """
+        is_begun = (self.folder / "fit.toml").is_file()
+        file = None if is_begun or self._text is None else self._file()
+        try:
+            command = self._command(file)
+            if is_begun:
+                command = [*command[:4], "--resume", os.fspath(self.folder)]
+            else:
+                command += ["-o", os.fspath(self.folder)]
+            command += ["--threads", str(threads)] if threads is not None else []
+            command += ["--memory", memory] if memory is not None else []
+            self._follow([*command, "--stop-with-input"], callback, progress, file)
+        finally:
+            if file is not None:
+                file.close()
+        self.__dict__.pop("results", None)
+        return self
+
+    def _follow(
+        self, command: list[str], callback: Callback | None, progress: bool, file: Any
+    ) -> None:
+        seen = len(self.log)
+        with tempfile.TemporaryFile("w+", encoding="utf-8") as said:
+            child = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
+                stderr=said,
+                start_new_session=True,
+            )
+            bar = _bar(self._steps) if progress else None
+            try:
+                while child.poll() is None:
+                    seen = self._tell(seen, callback, bar)
+                    time.sleep(0.05)
+                self._tell(seen, callback, bar)
+            except BaseException:
+                # The end of its input makes it save its state and stop.
+                assert child.stdin is not None
+                child.stdin.close()
+                child.wait()
+                raise
+            finally:
+                if bar is not None:
+                    bar.close()
+                if child.stdin is not None:
+                    child.stdin.close()
+            _check(child.returncode, said, file)
+
+    def _tell(self, seen: int, callback: Callback | None, bar: Any) -> int:
+        lines = self._lines()[seen:]
+        for line in lines:
+            if bar is not None and "step" in line:
+                bar.update(line["step"] - bar.n)
+                if "loss" in line:
+                    bar.set_postfix(loss=f"{line['loss']:.4g}")
+            if callback is not None:
+                callback(line)
+        return seen + len(lines)
+
+    def _lines(self) -> list[dict[str, Any]]:
+        try:
+            text = (self.folder / "log.jsonl").read_text(encoding="utf-8")
+        except FileNotFoundError:
+            return []
+        # The last line may be under way.
+        return [json.loads(line) for line in text.split("\n")[:-1] if line]
+
+    @property
+    def log(self) -> list[dict[str, Any]]:
+        """All lines of the log so far."""
+        return self._lines()
+
+    @cached_property
+    def results(self) -> dict[str, Any]:
+        """All numbers of ``results.json``: ``psnr_db``, ``chi2_per_datum``, ``verdict`` and so on."""
+        path = self.folder / "results.json"
+        if not path.is_file():
+            raise FileNotFoundError(f"{self.folder} holds no results yet: run() it to its end")
+        return json.loads(path.read_text(encoding="utf-8"))
+
+    @property
+    def verdict(self) -> str:
+        """Whether the model explains its data, in words."""
+        return self.results["verdict"]["text"]
+
+    @property
+    def volume(self) -> Volume:
+        """The recovered emission."""
+        return Volume(self.folder / "volume.npz")
+
+    @property
+    def truth(self) -> Volume:
+        """The true emission, where it is known."""
+        return Volume(self.folder / "truth.npz")
+
+    @property
+    def movie(self) -> dict[str, NDArray[Any]]:
+        """Images: ``recovered`` and ``data``, arrays over (t, y, x) in Jy/pixel, with ``time`` in M and, where mass and
+        distance are known, ``hours`` and ``field_uas``."""
+        with np.load(self.folder / "movie.npz") as arrays:
+            return {name: arrays[name] for name in arrays}
+
+    def report(self) -> Report:
+        """The page of the fit."""
+        path = self.folder / "report.html"
+        if not path.is_file():
+            raise FileNotFoundError(f"{self.folder} holds no report yet: run() it to its end")
+        return Report(path)
+
+    def __repr__(self) -> str:
+        return f"<Fit in {self.folder}: {self._steps} steps>"
+
+
+def _free() -> Path:
+    names: Iterator[Path] = (
+        Path("kerrlight-fit" if k == 1 else f"kerrlight-fit-{k}") for k in count(1)
+    )
+    return next(name for name in names if not name.exists())
+
+
+def _bar(steps: int) -> Any:
+    try:
+        from tqdm.auto import tqdm
+    except ImportError:
+        return None
+    return tqdm(total=steps, unit="step")
+
+
+def _said(text: str, file: Any) -> str:
+    """What the program complains of, without the name of a file that nobody knows."""
+    lines = [line for line in text.splitlines() if line.strip()]
+    at = next((k for k, line in enumerate(lines) if line.startswith("error: ")), 0)
+    words = "\n".join(lines[at:]).removeprefix("error: ")
+    return words.replace(f"{file.name}: ", "") if file is not None else words
+
+
+def _check(code: int, said: IO[str], file: Any) -> None:
+    if code == 0:
+        return
+    said.seek(0)
+    words = _said(said.read(), file)
+    if code == 2:
+        raise ValueError(words)
+    if code in (129, 130, 143):
+        raise KeyboardInterrupt(words)
+    raise FitError(words or f"the fit ended with the code {code}")

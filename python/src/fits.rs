@@ -1,0 +1,21 @@
+//! What is known of a fit's settings before it runs.
+
+use crate::call::{detached, refused};
+use kerrlight_tomo::fit::settings::FitFile;
+use kerrlight_tomo::fit::setup;
+use kerrlight_tomo::representation::Registry;
+use pyo3::prelude::*;
+
+/// Adds the functions of this module.
+pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(check_fit, module)?)
+}
+
+/// Steps of training of a fit's settings, which it refuses if they make no sense, as far as can be told without
+/// tracing rays.
+#[pyfunction]
+fn check_fit(py: Python<'_>, text: &str) -> PyResult<u64> {
+    let file = FitFile::parse(text).map_err(refused)?;
+    detached(py, || setup::check(&file, &Registry::default()))?;
+    Ok(file.training.steps)
+}

@@ -1,0 +1,118 @@
+//! Pictures and films of scenes.
+
+use crate::call::{detached, interruptible, refused};
+use kerrlight_cli::pictures::{Shot, Shown};
+use kerrlight_tomo::render::Summary;
+use numpy::{IntoPyArray, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+
+/// Adds the functions of this module.
+pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Picture>()?;
+    module.add_function(wrap_pyfunction!(toml_of_json, module)?)?;
+    module.add_function(wrap_pyfunction!(render, module)?)?;
+    module.add_function(wrap_pyfunction!(film, module)?)
+}
+
+/// A rendered picture.
+#[pyclass(frozen, module = "kerrlight._core")]
+pub struct Picture {
+    shown: Shown,
+}
+
+/// Settings as TOML, from the same settings as JSON.
+#[pyfunction]
+fn toml_of_json(json: &str) -> PyResult<String> {
+    let table: toml::Table = serde_json::from_str(json).map_err(refused)?;
+    toml::to_string(&table).map_err(refused)
+}
+
+/// The picture of a scene: its text (TOML; none: the built-in one), the folder of its files, and overrides.
+#[pyfunction]
+fn render(
+    py: Python<'_>,
+    text: Option<String>,
+    folder: PathBuf,
+    overrides: Vec<String>,
+) -> PyResult<Picture> {
+    let shot = Shot::new(text.as_deref(), &folder, &overrides).map_err(refused)?;
+    let work =
+        |stop: &std::sync::atomic::AtomicBool| shot.render(&|_| !stop.load(Ordering::Relaxed));
+    Ok(Picture { shown: interruptible(py, work)? })
+}
+
+/// Its pictures at times in M.
+#[pyfunction]
+fn film(
+    py: Python<'_>,
+    text: Option<String>,
+    folder: PathBuf,
+    overrides: Vec<String>,
+    times: Vec<f64>,
+) -> PyResult<Vec<Picture>> {
+    let shot = Shot::new(text.as_deref(), &folder, &overrides).map_err(refused)?;
+    let work = |stop: &std::sync::atomic::AtomicBool| {
+        shot.film(&times, &|_| !stop.load(Ordering::Relaxed))
+    };
+    Ok(interruptible(py, work)?.into_iter().map(|shown| Picture { shown }).collect())
+}
+
+#[pymethods]
+impl Picture {
+    /// Names of the channels.
+    fn names(&self) -> Vec<&str> {
+        let channels = &self.shown.rendered.picture.channels;
+        channels.iter().map(|channel| channel.name.as_str()).collect()
+    }
+
+    /// Rows and columns.
+    fn shape(&self) -> (usize, usize) {
+        let picture = &self.shown.rendered.picture;
+        (picture.height, picture.width)
+    }
+
+    /// A channel, if there is one of that name.
+    fn channel<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let Some(values) = self.shown.rendered.picture.channel(name) else { return Ok(None) };
+        let (rows, columns) = self.shape();
+        let array = values.to_vec().into_pyarray(py).reshape([rows, columns])?;
+        Ok(Some(array.into_any()))
+    }
+
+    /// What is worth knowing.
+    fn summary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        let Summary { rays, unresolved, flux, flux_error, image_error, .. } =
+            self.shown.rendered.summary;
+        dict.set_item("flux", flux)?;
+        dict.set_item("flux_error", flux_error)?;
+        dict.set_item("flux_unit", self.shown.rendered.summary.flux_unit)?;
+        dict.set_item("intensity_unit", self.shown.rendered.summary.intensity_unit)?;
+        dict.set_item("image_error", image_error)?;
+        dict.set_item("rays", rays)?;
+        dict.set_item("unresolved_rays", unresolved)?;
+        Ok(dict)
+    }
+
+    /// What its EXR file says of it.
+    fn attributes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        for (name, value) in &self.shown.attributes {
+            dict.set_item(name, value)?;
+        }
+        Ok(dict)
+    }
+
+    /// The bytes of an EXR file.
+    fn exr<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        Ok(PyBytes::new(py, &detached(py, || self.shown.exr())?))
+    }
+
+    /// The bytes of a PNG.
+    fn png<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        Ok(PyBytes::new(py, &detached(py, || self.shown.png())?))
+    }
+}
