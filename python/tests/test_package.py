@@ -1,12 +1,9 @@
 """What importing costs and brings, the program as a module, and leaks."""
 
 import importlib.metadata
-import resource
 import subprocess
 import sys
 import time
-
-import numpy as np
 
 import kerrlight
 
@@ -59,26 +56,3 @@ def test_program_ends_at_a_signal(tmp_path):
     child.send_signal(signal.SIGINT)
     said = child.communicate(timeout=60)[1]
     assert child.returncode == 130, said
-
-
-def test_calls_leave_no_memory_behind():
-    observer = kerrlight.Kerr(0.9).observer(inclination_deg=60)
-    alpha = np.linspace(-8, 8, 16)
-
-    def calls(count):
-        for _ in range(count):
-            observer.trace(alpha, 1.0, samples=8, errors=True, momentum=True, weights=True)
-            observer.trace(alpha[:2], 1.0, samples=2, derivatives=True)
-            observer.critical_curve(8)
-            observer.band(1, alpha[:2])
-            kerrlight.Kerr(0.5).keplerian_redshift(alpha + 20, 0.0)
-            try:
-                kerrlight.Kerr(2.0)
-            except ValueError:
-                pass
-
-    calls(500)
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    calls(10_000)
-    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
-    assert grown < 4096, f"{grown} KiB more"
