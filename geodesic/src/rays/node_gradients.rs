@@ -48,6 +48,8 @@ pub struct NodeState<N> {
     pub position: [N; 3],
     /// The arriving photon's angular momentum per energy, k_θ φ̂ − k_φ θ̂/sin θ (x, y and z, M).
     pub momentum: [N; 3],
+    /// d(1/r)/dτ of the backward ray, dimensionless.
+    pub radial: N,
     /// t_o − t, M (its finite part for an observer at infinity); 0 unless requested.
     pub delay: N,
     /// The weight Σ dτ, M.
@@ -59,6 +61,7 @@ impl NodeState<Number> {
         NodeState {
             position: self.position.map(&f),
             momentum: self.momentum.map(&f),
+            radial: f(self.radial),
             delay: f(self.delay),
             weight: f(self.weight),
         }
@@ -241,6 +244,7 @@ impl DualRays<'_> {
             position: point.cartesian(),
             // −n × velocity.
             momentum: [z * b - y * c, x * c - z * a, y * a - x * b],
+            radial: point.inverse_radius_rate,
             delay: point.delay,
             weight: self.hole.sigma(point.radius(), point.cos_theta()) * step,
         };
@@ -268,18 +272,19 @@ mod tests {
         (Kerr::new(place[0]).unwrap(), observer)
     }
 
-    /// x, y, z, the momentum's, delay and weight of a node.
-    fn numbers(ray: &RayNodes<'_>, i: usize, lambda: f64) -> [f64; 8] {
+    /// x, y, z, the momentum's, d(1/r)/dτ, delay and weight of a node.
+    fn numbers(ray: &RayNodes<'_>, i: usize, lambda: f64) -> [f64; 9] {
         let (r, u) = (ray.radius[i], ray.cos_theta[i]);
         let (s, (sin, cos)) = ((1.0 - u * u).sqrt(), ray.azimuth[i].sin_cos());
         let (of_theta, of_phi) = (ray.polar_velocity[i] / s, lambda / s);
         let (phi, theta) = ([-sin, cos, 0.0], [u * cos, u * sin, -s]);
         let momentum = [0, 1, 2].map(|c| of_theta * phi[c] - of_phi * theta[c]);
         let [a, b, c] = momentum;
-        [r * s * cos, r * s * sin, r * u, a, b, c, ray.delay[i], ray.weight[i]]
+        let radial = ray.radial_velocity[i];
+        [r * s * cos, r * s * sin, r * u, a, b, c, radial, ray.delay[i], ray.weight[i]]
     }
 
-    fn nodes(place: Place, distance: Option<f64>, request: &NodeRequest) -> Vec<[f64; 8]> {
+    fn nodes(place: Place, distance: Option<f64>, request: &NodeRequest) -> Vec<[f64; 9]> {
         let (hole, observer) = observed(place, distance);
         let mut nodes = Nodes::default();
         nodes.trace(&hole, &observer, &[place[2]], &[place[3]], None, request).unwrap();
@@ -287,10 +292,10 @@ mod tests {
         (0..ray.radius.len()).map(|i| numbers(&ray, i, lambda)).collect()
     }
 
-    fn slopes(node: &NodeState<Gradient>, parameter: usize) -> [f64; 8] {
+    fn slopes(node: &NodeState<Gradient>, parameter: usize) -> [f64; 9] {
         let of = |gradient: Gradient| gradient.to_array()[parameter];
         let [[x, y, z], [a, b, c]] = [node.position.map(of), node.momentum.map(of)];
-        [x, y, z, a, b, c, of(node.delay), of(node.weight)]
+        [x, y, z, a, b, c, of(node.radial), of(node.delay), of(node.weight)]
     }
 
     /// Central differences of the closed form, of fourth order.
@@ -311,10 +316,11 @@ mod tests {
             };
             let [a, b, c, d] = [-2.0, -1.0, 1.0, 2.0].map(moved);
             for (k, node) in found.ray(0).iter().enumerate() {
-                let NodeState { position: [x, y, z], momentum: [u, v, w], delay, weight } =
+                let NodeState { position: [x, y, z], momentum: [u, v, w], radial, delay, weight } =
                     node.value;
                 let here = nodes(place, distance, &request)[k];
-                for (found, here) in [x, y, z, u, v, w, delay, weight].into_iter().zip(here) {
+                for (found, here) in [x, y, z, u, v, w, radial, delay, weight].into_iter().zip(here)
+                {
                     assert!(
                         (found - here).abs() < 1e-10 * (1.0 + here.abs()),
                         "{place:?}: node {k} of {count}, r {}: {found} {here}",

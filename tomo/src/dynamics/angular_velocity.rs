@@ -1,9 +1,14 @@
-//! How fast matter turns.
+//! How matter moves: how fast it turns, and whether it falls.
 
+use super::Axis;
+use super::infall::{Falling, Profile};
 use crate::Error;
+use kerrlight_geodesic::Dual;
+use kerrlight_geodesic::vector::rotate;
+use std::sync::Arc;
 
 /// Angular velocity as a function of the (spherical) radius, in radians a unit of time; positive is
-/// right-handed about the axis.
+/// right-handed about the axis. Matter of most laws stays at its radius; that of [`Falling`](Self::Falling) does not.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum AngularVelocity {
@@ -36,6 +41,10 @@ pub enum AngularVelocity {
         /// Dimensionless.
         factor: f64,
     },
+    /// Between knots, of matter that stays at its radius.
+    Profile(Profile),
+    /// Of matter that changes its radius.
+    Falling(Arc<Falling>),
 }
 
 impl AngularVelocity {
@@ -58,6 +67,8 @@ impl AngularVelocity {
                 finite("rate", *rate),
                 finite("exponent", *exponent),
             ]),
+            // Made of numbers that were checked.
+            Self::Profile(_) | Self::Falling(_) => Ok(()),
             Self::Scaled { of, factor } => {
                 of.clone().checked()?;
                 first_wrong([finite("factor", *factor)])
@@ -83,6 +94,8 @@ impl AngularVelocity {
             Self::Keplerian { drag } => 1.0 / (r.powf(1.5) + drag),
             Self::PowerLaw { radius, rate, exponent } => rate * (radius / r).powf(*exponent),
             Self::Table { .. } => self.interpolated(r).0,
+            Self::Profile(profile) => profile.rates(r)[1],
+            Self::Falling(flow) => flow.rates(r)[1],
             Self::Scaled { of, factor } => factor * of.rate(r),
         }
     }
@@ -93,8 +106,33 @@ impl AngularVelocity {
             Self::Keplerian { .. } => -1.5 * r.sqrt() * self.rate(r).powi(2),
             Self::PowerLaw { exponent, .. } => -exponent / r * self.rate(r),
             Self::Table { .. } => self.interpolated(r).1,
+            Self::Profile(profile) => profile.rates(Dual::<f64, 1>::parameter(r, 0))[1].slope[0],
+            Self::Falling(flow) => flow.slopes(r)[1].slope[0],
             Self::Scaled { of, factor } => factor * of.slope(r),
         }
+    }
+
+    /// dr/dt, dimensionless, at radius r (M): 0 where matter turns on circles.
+    pub fn fall(&self, r: f64) -> f64 {
+        self.falling().map_or(0.0, |flow| flow.rates(r)[0])
+    }
+
+    /// The flow whose matter changes its radius; none where it turns on circles.
+    pub fn falling(&self) -> Option<&Arc<Falling>> {
+        match self {
+            Self::Falling(flow) => Some(flow),
+            _ => None,
+        }
+    }
+
+    /// Where the matter at a point (M) was `elapsed` (M) before, if it moves like this about an axis.
+    pub fn before(&self, axis: Axis, point: [f64; 3], elapsed: f64) -> [f64; 3] {
+        let r = radius(point);
+        let Some(flow) = self.falling() else {
+            return rotate(axis.vector(), -self.rate(r) * elapsed, point);
+        };
+        let [stretch, angle] = flow.before(&flow.origin(r), elapsed);
+        rotate(axis.vector(), angle, point.map(|x| stretch * x))
     }
 
     fn interpolated(&self, r: f64) -> (f64, f64) {
@@ -112,7 +150,7 @@ impl AngularVelocity {
     }
 
     /// Angle in radians by which the point at (x, y, z) is turned at time t to where its matter was at
-    /// t₀ = `reference`: −Ω(r)(t − t₀).
+    /// t₀ = `reference`, if it stays at its radius: −Ω(r)(t − t₀).
     pub fn angle(&self, point: [f64; 3], time: f64, reference: f64) -> f64 {
         -self.rate(radius(point)) * (time - reference)
     }

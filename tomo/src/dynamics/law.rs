@@ -1,10 +1,14 @@
-//! Laws of the angular velocity, as files write them.
+//! Laws of motion, as files write them.
 
+use super::infall::{Falling, Law, Profile};
 use super::{AngularVelocity, Perturbation};
 use crate::Error;
+use kerrlight_geodesic::infall::Mixture;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
-/// A law of the angular velocity Ω(r), as scenes and fits write it.
+/// How matter moves about an axis, as scenes and fits write it: a law of the angular velocity Ω(r), or one of both Ω and
+/// dr/dt.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
@@ -32,6 +36,28 @@ pub enum Velocity {
     },
     /// Another law, and a Gaussian process over the radius.
     Perturbed(Perturbed),
+    /// The family between circular orbits and free fall
+    /// ([`kerrlight_geodesic::infall`]; Cárdenas-Avendaño, Lupsasca & Zhu 2023).
+    Infall {
+        /// ξ: specific angular momentum over that of circular geodesics, 0 to 1.
+        xi: f64,
+        /// β_r: 1, the radial velocity of circular orbits and their plunge; 0, that of free fall.
+        beta_r: f64,
+        /// β_φ: the same of the angular velocity.
+        beta_phi: f64,
+        /// The spin as the flow sees it, M; without it, a ξ_z of the hole and the axis.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        drag: Option<f64>,
+    },
+    /// Monotone cubics between these, held beyond the first and the last.
+    Profile {
+        /// Growing, M.
+        radii: Vec<f64>,
+        /// Ω, radians per M.
+        angular: Vec<f64>,
+        /// dr/dt, dimensionless: all below 0, all above 0, or all 0.
+        radial: Vec<f64>,
+    },
 }
 
 /// A law and a Gaussian process over the radius, which is drawn from a seed.
@@ -55,11 +81,12 @@ pub struct Perturbed {
 const ROWS: usize = 100;
 
 impl Velocity {
-    /// Ω(r); perturbations without a seed are drawn from `seed`.
+    /// What it is about a hole whose spin as the flow sees it is `drag` (M); perturbations without a seed are drawn from
+    /// `seed`.
     ///
     /// # Errors
-    /// Names the number that is out of its range.
-    pub fn angular(&self, seed: u64) -> Result<AngularVelocity, Error> {
+    /// Names the number that is out of its range, or says that what falls cannot be perturbed.
+    pub fn angular(&self, seed: u64, drag: f64) -> Result<AngularVelocity, Error> {
         match self.clone() {
             Velocity::Keplerian { drag } => AngularVelocity::Keplerian { drag },
             Velocity::PowerLaw { radius, rate, exponent } => {
@@ -69,10 +96,46 @@ impl Velocity {
             Velocity::Perturbed(law) => {
                 let Perturbed { of, deviation, correlation_length, radii, seed: own } = law;
                 let by = Perturbation { deviation, correlation_length, radii, rows: ROWS };
-                of.angular(seed)?.perturbed(by, own.unwrap_or(seed))?
+                let of = of.angular(seed, drag)?;
+                if of.falling().is_some() {
+                    let allowed = "a law of matter that stays at its radius";
+                    return Err(Error::out_of_range("of", f64::NAN, allowed));
+                }
+                of.perturbed(by, own.unwrap_or(seed))?
+            }
+            Velocity::Infall { xi, beta_r, beta_phi, drag: own } => {
+                let mixture = Mixture { xi, beta_r, beta_phi };
+                let law = Law::Family { spin: own.unwrap_or(drag), mixture, factor: 1.0 };
+                AngularVelocity::Falling(Arc::new(Falling::new(law)?))
+            }
+            Velocity::Profile { radii, angular, radial } => {
+                match Profile::new(radii, angular, radial)? {
+                    profile if profile.is_circular() => AngularVelocity::Profile(profile),
+                    profile => {
+                        AngularVelocity::Falling(Arc::new(Falling::new(Law::Profile(profile))?))
+                    }
+                }
             }
         }
         .checked()
+    }
+
+    /// Whether matter changes its radius.
+    pub fn falls(&self) -> bool {
+        match self {
+            Velocity::Infall { .. } => true,
+            Velocity::Profile { radial, .. } => radial.iter().any(|v| *v != 0.0),
+            _ => false,
+        }
+    }
+
+    /// Itself with `drag` (M) for a flow that follows its hole.
+    #[must_use]
+    pub fn dragged(mut self, spin: f64) -> Self {
+        if let Velocity::Infall { drag, .. } = &mut self {
+            drag.get_or_insert(spin);
+        }
+        self
     }
 
     /// Itself with `seed` for the perturbations that have none.

@@ -157,17 +157,35 @@ impl Occupied {
         {
             return false;
         }
-        let heights = segment.positions.map(|x| dot(self.axis, x));
-        let farthest = segment.radii[1];
-        let heights = [
-            (heights[0].min(heights[1]) - segment.off).max(-farthest),
-            (heights[0].max(heights[1]) + segment.off).min(farthest),
-        ];
+        let heights = self.heights(segment);
         let azimuths = match (self.azimuths(segment), turned(segment.radii)) {
             (Some([low, high]), Some([least, most])) => [low - most, high - least],
             _ => [-PI, PI],
         };
         self.shines(&[segment.radii, heights, azimuths])
+    }
+
+    /// Whether there may be light along a segment of a ray whose matter has come from other radii, the least and the
+    /// largest of which these are.
+    pub fn may_shine_from(&self, segment: &PathSegment, labels: [f64; 2]) -> bool {
+        let missed = labels[1] < self.radii[0] || labels[0] > self.radii[1];
+        if self.sums.is_empty() || missed {
+            return false;
+        }
+        let stretch = [labels[0] / segment.radii[1], labels[1] / segment.radii[0]];
+        let [low, high] = self.heights(segment).map(|height| stretch.map(|by| by * height));
+        let heights = [low[0].min(low[1]) - ROUNDING, high[0].max(high[1]) + ROUNDING];
+        self.shines(&[labels, heights, [-PI, PI]])
+    }
+
+    /// Least and largest height above the plane normal to the axis along a segment, M.
+    fn heights(&self, segment: &PathSegment) -> [f64; 2] {
+        let heights = segment.positions.map(|x| dot(self.axis, x));
+        let farthest = segment.radii[1];
+        [
+            (heights[0].min(heights[1]) - segment.off).max(-farthest),
+            (heights[0].max(heights[1]) + segment.off).min(farthest),
+        ]
     }
 
     /// Azimuths about the axis along a segment; `None` if it may meet the axis.

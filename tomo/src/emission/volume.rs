@@ -1,13 +1,16 @@
 //! Emission on the nodes of a box, carried along by matter on circles about an axis
-//! (Levis et al. 2022): e(t, x) = e₀(R(ξ, −Ω(|x|)(t − t₀)) x), in positions r n.
+//! (Levis et al. 2022): e(t, x) = e₀(R(ξ, −Ω(|x|)(t − t₀)) x), in positions r n; or by matter that falls as well.
 
 use super::medium::{CellSize, Emission, Medium, Moment, Part, PathSegment};
 use super::occupied::Occupied;
 use crate::Error;
+use crate::dynamics::infall::Falling;
 use crate::dynamics::{AngularVelocity, Axis, Injection};
 use crate::scene::{Rotation, VolumeRegion, VolumeSource};
 use crate::volume::{Volume, VolumeFile};
-use kerrlight_geodesic::flow::rotating_redshift_at;
+use kerrlight_geodesic::flow::{
+    falling_norm, falling_redshift_at, rotating_redshift_at, rotation_norm,
+};
 use kerrlight_geodesic::simd::RayNodes;
 use kerrlight_geodesic::vector::{cross, rotate};
 use kerrlight_geodesic::{Kerr, Quantities};
@@ -86,7 +89,7 @@ impl VolumeModel {
     fn turned(&self, radii: [f64; 2], times: [f64; 2]) -> Option<[f64; 2]> {
         let rates = match &self.rotation {
             None => [0.0; 2],
-            Some(AngularVelocity::Table { .. }) => return None,
+            Some(AngularVelocity::Table { .. } | AngularVelocity::Profile(_)) => return None,
             Some(rotation) => radii.map(|r| rotation.rate(r)),
         };
         let angle = |k: usize| rates[k & 1] * (times[k >> 1] - self.reference);
@@ -102,11 +105,40 @@ impl VolumeModel {
         if self.injection.is_some_and(|injection| !injection.shines(time)) {
             return 0.0;
         }
+        let elapsed = time - self.reference;
         let origin = match &self.rotation {
-            Some(rotation) => rotate(self.axis, -rotation.rate(r) * (time - self.reference), x),
-            None => x,
+            Some(rotation) => match rotation.falling() {
+                Some(flow) => self.origin(flow, x, r, elapsed),
+                None => Some(rotate(self.axis, -rotation.rate(r) * elapsed, x)),
+            },
+            None => Some(x),
         };
-        self.factor * self.volume.at(origin)
+        origin.map_or(0.0, |origin| self.factor * self.volume.at(origin))
+    }
+
+    /// Where falling matter came from; `None` where that is outside of the region.
+    fn origin(&self, flow: &Falling, x: [f64; 3], r: f64, elapsed: f64) -> Option<[f64; 3]> {
+        let [stretch, angle] = flow.before(&flow.origin(r), elapsed);
+        let inside =
+            |region: VolumeRegion| stretch * r >= region.r_min && stretch * r <= region.r_max;
+        let followed = self.region.is_none_or(inside);
+        followed.then(|| rotate(self.axis, angle, x.map(|c| stretch * c)))
+    }
+
+    fn falling(&self) -> Option<&Falling> {
+        self.rotation.as_ref()?.falling().map(|flow| &**flow)
+    }
+
+    /// The least and the largest radius at the reference time of matter that is between two radii between two times.
+    fn labels(&self, flow: &Falling, radii: [f64; 2], times: [f64; 2]) -> [f64; 2] {
+        let corner = |k: usize| flow.radius_before(radii[k & 1], times[k >> 1] - self.reference);
+        let wider = |[low, high]: [f64; 2]| [low * (1.0 - 1e-9), high * (1.0 + 1e-9)];
+        wider(
+            [0, 1, 2, 3]
+                .map(corner)
+                .iter()
+                .fold([f64::INFINITY, 0.0], |[low, high], r| [low.min(*r), high.max(*r)]),
+        )
     }
 
     /// g² j and g at node number `k`; `None` where nothing shines.
@@ -118,7 +150,8 @@ impl VolumeModel {
         moment: Moment,
     ) -> Option<[f64; 2]> {
         let (r, u) = (nodes.radius[k], nodes.cos_theta[k]);
-        if !(self.occupied.radii[0]..=self.occupied.radii[1]).contains(&r) {
+        let lit = (self.occupied.radii[0]..=self.occupied.radii[1]).contains(&r);
+        if !lit && self.falling().is_none() {
             return None;
         }
         let n = direction(u, nodes.azimuth[k]);
@@ -136,7 +169,14 @@ impl VolumeModel {
         let Some(index) = self.spectral_index else { return Some([emissivity, 1.0]) };
         let polar = nodes.polar_velocity.get(k).copied().unwrap_or(0.0);
         let omega = self.angular_velocity(r);
-        let g = rotating_redshift_at(&self.hole, (r, n), (lambda, polar), omega)?;
+        let g = match self.falling() {
+            None => rotating_redshift_at(&self.hole, (r, n), (lambda, polar), omega)?,
+            Some(flow) => {
+                let radial = nodes.radial_velocity.get(k).copied().unwrap_or(0.0);
+                let motion = (omega, flow.rates(r)[0]);
+                falling_redshift_at(&self.hole, (r, n), [lambda, polar, radial], motion)?
+            }
+        };
         Some([emissivity * g.powf(2.0 + index), g])
     }
 }
@@ -156,7 +196,12 @@ impl Medium for VolumeModel {
     fn sphere(&self) -> f64 {
         // Somewhere outside of the horizon even where all is inside.
         let outer = self.region.map_or(f64::INFINITY, |region| region.r_max);
-        self.occupied.radii[1].min(outer).max(1.01 * self.hole.horizon())
+        let lit = if self.falling().is_some() && outer.is_finite() {
+            outer
+        } else {
+            self.occupied.radii[1].min(outer)
+        };
+        lit.max(1.01 * self.hole.horizon())
     }
 
     fn cell_size(&self) -> Option<CellSize> {
@@ -166,7 +211,8 @@ impl Medium for VolumeModel {
 
     fn quantities(&self) -> Quantities {
         let tilted = self.axis[0] != 0.0 || self.axis[1] != 0.0;
-        let velocity = self.spectral_index.is_some() && tilted && self.rotation.is_some();
+        let moves = self.rotation.is_some() && tilted || self.falling().is_some();
+        let velocity = self.spectral_index.is_some() && moves;
         Quantities { azimuth: true, time: self.slow_light && self.changes(), velocity }
     }
 
@@ -183,9 +229,13 @@ impl Medium for VolumeModel {
         let v = cross(self.angular_velocity(r), n);
         let sin2 = (n[0] * n[0] + n[1] * n[1]).max(1e-300);
         let rates = [-v[2] / sin2.sqrt(), (n[0] * v[1] - n[1] * v[0]) / sin2];
-        let norm = kerrlight_geodesic::flow::rotation_norm(&self.hole, r, n, v);
+        let fall = self.falling().map_or(0.0, |flow| flow.rates(r)[0]);
+        let norm = match fall {
+            0.0 => rotation_norm(&self.hole, r, n, v),
+            fall => falling_norm(&self.hole, r, n, (v, fall)),
+        };
         let time = 1.0 / norm.sqrt();
-        (norm > 0.0).then_some([time, 0.0, time * rates[0], time * rates[1]])
+        (norm > 0.0).then_some([time, time * fall, time * rates[0], time * rates[1]])
     }
 
     fn changes(&self) -> bool {
@@ -202,6 +252,11 @@ impl Medium for VolumeModel {
             false => [moment.observed; 2],
         };
         let before = |injection: Injection| !injection.shines(late);
+        if let Some(flow) = self.falling() {
+            let labels = self.labels(flow, segment.radii, [early, late]);
+            return !self.injection.is_some_and(before)
+                && self.occupied.may_shine_from(segment, labels);
+        }
         !self.injection.is_some_and(before)
             && self.occupied.may_shine(segment, |radii| self.turned(radii, [early, late]))
     }

@@ -1,15 +1,21 @@
 //! Nodes of some rays in some frames, pulled back to the reference time.
 
-use super::forward_model::ForwardModel;
+use super::fall::Fall;
+use super::forward_model::{Field, ForwardModel};
 use super::occupancy::Occupancy;
 use crate::dynamics::{Axis, Turned, pull_back};
 use crate::points::{Coordinates, CoordinatesMut};
 use crate::simd::Float;
+use rayon::prelude::*;
+
+/// Points of matter that falls, which one thread carries at a time.
+const SHARE: usize = 2048;
 
 /// Columns of a batch's points.
 #[derive(Clone, Debug, Default)]
 pub struct Columns<T> {
-    /// Where the light was emitted.
+    /// Where the light was emitted; of matter that changes its radius, stretched to the one that it had at the reference
+    /// time.
     pub position: [Vec<T>; 3],
     /// When, since the reference time.
     pub time: Vec<T>,
@@ -60,6 +66,22 @@ impl<T: Float> Columns<T> {
         self.node.truncate(length);
     }
 
+    /// Stretches positions to the radii that matter had at the reference time, and sets the angles.
+    fn carry(&mut self, fall: &Fall) {
+        let [x, y, z] = &mut self.position;
+        let to = (x.par_iter_mut(), y.par_iter_mut(), z.par_iter_mut(), self.angle.par_iter_mut());
+        let from = self.node.par_iter().zip(&self.time);
+        to.into_par_iter().zip(from).with_min_len(SHARE).for_each(
+            |((x, y, z, angle), (node, time))| {
+                let [stretch, turn] = fall.before(*node as usize, time.double());
+                for x in [x, y, z] {
+                    *x = T::of(x.double() * stretch);
+                }
+                *angle = T::of(turn);
+            },
+        );
+    }
+
     fn pull_back(&mut self, axis: Axis) {
         let length = self.weight.len();
         self.pulled.iter_mut().for_each(|column| column.resize(length, T::zero()));
@@ -85,6 +107,22 @@ impl<T: Float> Batch<T> {
     /// Collects the nodes of the pairs and pulls them back; leaves out those that do not shine yet or
     /// come to lie where nothing does.
     pub fn gather(&mut self, model: &ForwardModel<T>, axis: Axis, occupancy: Option<&Occupancy>) {
+        self.collect(model, (axis, model.fall.as_ref()), occupancy);
+    }
+
+    /// The same for a field. One of events is not carried along, and sees where light was emitted.
+    pub fn gather_field(&mut self, model: &ForwardModel<T>, field: Field<'_, T>) {
+        let carried = field.representation.dimension() != 4;
+        let fall = model.fall.as_ref().filter(|_| carried);
+        self.collect(model, (field.axis, fall), field.occupancy);
+    }
+
+    fn collect(
+        &mut self,
+        model: &ForwardModel<T>,
+        (axis, fall): (Axis, Option<&Fall>),
+        occupancy: Option<&Occupancy>,
+    ) {
         self.columns.clear();
         self.starts.clear();
         self.starts.push(0);
@@ -93,18 +131,22 @@ impl<T: Float> Batch<T> {
             self.columns.push(model, range, model.times[frame as usize]);
             self.starts.push(self.columns.weight.len());
         }
+        if let Some(fall) = fall {
+            self.columns.carry(fall);
+        }
         self.columns.pull_back(axis);
-        if occupancy.is_some() || model.earliest.is_some() {
-            self.thin_out(model.earliest, occupancy);
+        if occupancy.is_some() || model.earliest.is_some() || fall.is_some() {
+            self.thin_out(model.earliest, occupancy, fall.is_some());
         }
     }
 
-    fn thin_out(&mut self, earliest: Option<T>, occupancy: Option<&Occupancy>) {
+    fn thin_out(&mut self, earliest: Option<T>, occupancy: Option<&Occupancy>, falls: bool) {
         let columns = &mut self.columns;
         self.kept.clear();
         let [x, y, z] = &columns.pulled;
         self.kept.extend((0..x.len()).map(|k| {
             earliest.is_none_or(|earliest| columns.time[k] >= earliest)
+                && (!falls || x[k].is_finite())
                 && occupancy
                     .is_none_or(|mask| mask.holds([x[k].double(), y[k].double(), z[k].double()]))
         }));

@@ -2,6 +2,7 @@
 //! and data terms share it.
 
 use super::batch::{Batch, Columns};
+use super::fall::Fall;
 use super::occupancy::Occupancy;
 use super::shift::Shift;
 use super::sightlines::Sightlines;
@@ -15,7 +16,7 @@ use rayon::prelude::*;
 /// How the matter moves, and when it is seen.
 #[derive(Clone, Debug)]
 pub struct Motion {
-    /// Angular velocity about the axis.
+    /// How matter moves about the axis.
     pub velocity: AngularVelocity,
     /// Time at which the field of emission is what a representation says, M.
     pub reference: f64,
@@ -48,6 +49,8 @@ pub struct ForwardModel<T> {
     pub(super) weight: Vec<T>,
     pub(super) plain_weight: Vec<f64>,
     pub(super) shift: Option<Shift>,
+    /// Where matter comes from that changes its radius; `rate` and `phase` then do not say it.
+    pub(super) fall: Option<Fall>,
     factors: Vec<f64>,
     weighted_for: Option<Axis>,
     /// Times of the frames since the reference time.
@@ -88,6 +91,7 @@ impl<T: Float> ForwardModel<T> {
             weight: column(&lines.weight),
             plain_weight: lines.weight.clone(),
             shift: redshift.map(|shift| Shift::new(lines, hole, velocity, shift.power)),
+            fall: velocity.falling().map(|flow| Fall::new(flow, lines)),
             factors: Vec::new(),
             weighted_for: None,
             times: motion.times.iter().map(|time| since(*time)).collect(),
@@ -155,7 +159,7 @@ impl<T: Float> ForwardModel<T> {
         movie.fill(T::zero());
         for (frame, image) in frames.iter().zip(movie.chunks_exact_mut(self.pixels)) {
             batch.set((0..self.rays()).map(|ray| (ray as u32, *frame as u32)));
-            batch.gather(self, field.axis, field.occupancy);
+            batch.gather_field(self, field);
             batch.values.resize(batch.points(), T::zero());
             let at = Batch::coordinates(&batch.columns, field.representation.dimension());
             field.representation.eval(field.parameters, at, &mut batch.values, workspace);

@@ -42,6 +42,7 @@
 
 mod batch;
 pub mod checkpoint;
+mod fall;
 mod forward_model;
 pub mod linear;
 mod newton;

@@ -166,7 +166,7 @@ impl<T: Float> Objective<T> {
         let slope = T::of(2.0 * weight * scale);
         let Buffers { batch, workspace, of_points, of_weights, .. } = buffers;
         batch.set(pairs.iter().copied());
-        batch.gather(&self.model, field.axis, field.occupancy);
+        batch.gather_field(&self.model, field);
         let mut values = core::mem::take(&mut batch.values);
         values.resize(batch.points(), T::zero());
         let residual = |group: usize, values: &[T]| {

@@ -20,6 +20,8 @@ struct Node {
     speeds: [[f64; 3]; 2],
     /// Ω L.
     boost: [f64; 3],
+    /// 1 − p_r dr/dt, what ξ·Ω L is subtracted from: 1 for gas on spheres.
+    ahead: f64,
 }
 
 /// g^power of all nodes for any axis.
@@ -33,11 +35,17 @@ pub(super) struct Shift {
 const SHARE: usize = 4096;
 
 impl Shift {
-    /// Of gas on the spheres of a hole; the sightlines must have momenta.
+    /// Of gas on the spheres of a hole, or falling in; the sightlines must have momenta.
     pub fn new(lines: &Sightlines, hole: &Kerr, velocity: &AngularVelocity, power: f64) -> Self {
         let node = |k| {
             let at = |columns: &[Vec<f64>; 3]| [0, 1, 2].map(|c| columns[c][k]);
-            Node::new(at(&lines.position), at(&lines.momentum), hole.spin(), velocity)
+            let mut node =
+                Node::new(at(&lines.position), at(&lines.momentum), hole.spin(), velocity);
+            if let Some(flow) = velocity.falling() {
+                let r = norm(at(&lines.position));
+                node.fall(lines.radial[k], flow.rates(r)[0], hole, lines.position[2][k] / r, r);
+            }
+            node
         };
         Self { nodes: (0..lines.points()).map(node).collect(), power }
     }
@@ -89,7 +97,16 @@ impl Node {
             drag: scaled(theta, -4.0 * spin * r * s * rate / sigma_kerr),
             speeds: [scaled(theta, rate * round.sqrt()), scaled(phi, rate * sigma_kerr.sqrt())],
             boost: scaled(momentum, rate),
+            ahead: 1.0,
         }
+    }
+
+    /// Adds dr/dt = v at radius r, cos θ = u, where the backward ray has d(1/r)/dτ = `radial`: N loses g_rr v², and
+    /// p_r = r² `radial`/Δ.
+    fn fall(&mut self, radial: f64, v: f64, hole: &Kerr, u: f64, r: f64) {
+        let delta = hole.delta(r);
+        self.still -= hole.sigma(r, u) / delta * v * v;
+        self.ahead -= radial * r * r / delta * v;
     }
 
     /// g and dg/dξ, unless faster than light.
@@ -97,7 +114,7 @@ impl Node {
         let dot = |v: [f64; 3]| axis[0] * v[0] + axis[1] * v[1] + axis[2] * v[2];
         let [round, polar] = self.speeds.map(dot);
         let square = self.still + dot(self.drag) - round * round - polar * polar;
-        let boost = 1.0 - dot(self.boost);
+        let boost = self.ahead - dot(self.boost);
         if !(square > 0.0 && boost > 0.0) {
             return None;
         }

@@ -40,6 +40,11 @@ impl Region {
         Ok(self)
     }
 
+    /// Least and largest radius, M.
+    pub fn radii(&self) -> [f64; 2] {
+        [self.r_min, self.r_max]
+    }
+
     /// Whether a point (r n, in M) lies in it; the outer sphere does not belong to it.
     pub fn holds(&self, point: [f64; 3]) -> bool {
         let r = norm(point);
@@ -99,6 +104,10 @@ pub struct Sightlines {
     /// (k_θ φ̂ − k_φ θ̂/sin θ: its product with an axis is the momentum conjugate to turns about
     /// it.)
     pub momentum: [Vec<f64>; 3],
+    /// d(1/r)/dτ of the backward ray; empty unless momenta are wanted.
+    pub radial: Vec<f64>,
+    /// Least and largest radius of the region, M: matter that comes from elsewhere is dark. Without them, none is.
+    pub limits: Option<[f64; 2]>,
 }
 
 /// Rays traced at a time.
@@ -124,7 +133,8 @@ impl Sightlines {
         let view = View::Screen(*observer);
         let tracer = BlockTracer::new(*hole, view, Integrator::Elliptic, TOLERANCE)?;
         let (flight, mut memory) = (flight(observer), RayBlock::default());
-        let mut all = Self { pixels: alpha.len(), starts: vec![0], ..Self::default() };
+        let limits = Some(request.region.radii());
+        let mut all = Self { pixels: alpha.len(), starts: vec![0], limits, ..Self::default() };
         for (block, (alpha, beta)) in alpha.chunks(BLOCK).zip(beta.chunks(BLOCK)).enumerate() {
             let (first, lines) = (all.rays(), &mut all);
             let mut visitor = Collector { request, flight, first: block * BLOCK, lines };
@@ -197,9 +207,9 @@ impl Sightlines {
     }
 
     /// What there is of each node.
-    fn columns(&mut self) -> [&mut Vec<f64>; 8] {
-        let Self { position: [x, y, z], weight, delay, momentum: [mx, my, mz], .. } = self;
-        [x, y, z, weight, delay, mx, my, mz]
+    fn columns(&mut self) -> [&mut Vec<f64>; 9] {
+        let Self { position: [x, y, z], weight, delay, momentum: [mx, my, mz], radial, .. } = self;
+        [x, y, z, weight, delay, mx, my, mz, radial]
     }
 }
 
@@ -321,6 +331,7 @@ impl Collector<'_> {
             for (c, column) in self.lines.momentum.iter_mut().enumerate() {
                 column.push(of_theta * phi[c] - of_phi * theta[c]);
             }
+            self.lines.radial.push(ray.radial_velocity[i]);
         }
     }
 }

@@ -6,13 +6,14 @@ mod penalised;
 mod quasi_newton;
 mod training;
 
-use crate::dynamics::{AngularVelocity, Axis, Injection};
+use crate::dynamics::{AngularVelocity, Axis, Injection, Velocity};
 use crate::interferometry::data_terms::{DataTerm, Residual};
 use crate::interferometry::operator::{Dtft, ImageGrid, Pulse, Transform};
 use crate::representation::{
     Activation, Coordinates, Gradient, Grid, GridSettings, Groups, Representation, Workspace,
 };
 use crate::simd::Float;
+use kerrlight_geodesic::vector::{distance, norm};
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
 use num_complex::Complex;
 
@@ -31,9 +32,22 @@ fn lines(delay: bool, momentum: bool) -> (Kerr, Sightlines) {
 }
 
 fn forward_model<T: Float>(delay: bool, momentum: bool) -> ForwardModel<T> {
+    forward_model_of(AngularVelocity::Keplerian { drag: 0.6 }, delay, momentum)
+}
+
+fn falling() -> AngularVelocity {
+    let law = Velocity::Infall { xi: 0.7, beta_r: 0.97, beta_phi: 0.9, drag: None };
+    law.angular(0, 0.6).unwrap()
+}
+
+fn forward_model_of<T: Float>(
+    velocity: AngularVelocity,
+    delay: bool,
+    momentum: bool,
+) -> ForwardModel<T> {
     let (hole, lines) = lines(delay, momentum);
     let motion = Motion {
-        velocity: AngularVelocity::Keplerian { drag: 0.6 },
+        velocity,
         reference: 3.0,
         injection: Some(Injection { time: 1.0 }),
         times: vec![0.0, 9.0, 17.0, 40.0],
@@ -269,10 +283,56 @@ fn exact_gradients_of_parameters_and_axis_by_differences() {
             (&events, true, false),
             (&events, false, true),
         ] {
-            let objective = objective(delay, momentum, others);
+            let mut objective = objective(delay, momentum, others);
+            Case { objective, representation, pixels }.check();
+            objective = self::objective(delay, momentum, others);
+            objective.model = forward_model_of(falling(), delay, momentum);
             Case { objective, representation, pixels }.check();
         }
     }
+}
+
+/// Nodes of falling matter are where the equations of motion have them come from, and dark if that is outside of the
+/// region. Events do not move.
+#[test]
+fn exact_falling_matter_is_pulled_back_to_where_it_was() {
+    let (model, axis) =
+        (forward_model_of::<f64>(falling(), true, false), Axis::new([0.3, -0.5, 0.8]).unwrap());
+    let (_, lines) = lines(true, false);
+    let (mut batch, mut lit) = (Batch::default(), 0);
+    for frame in [1, 2, 3] {
+        batch.set((0..model.rays()).map(|ray| (ray as u32, frame)));
+        batch.gather(&model, axis, None);
+        let seen = lines
+            .delay
+            .iter()
+            .enumerate()
+            .filter(|(_, delay)| model.times[frame as usize] - **delay >= -2.0);
+        let came = seen.filter_map(|(k, delay)| {
+            let point = [0, 1, 2].map(|c| lines.position[c][k]);
+            let from = falling().before(axis, point, model.times[frame as usize] - delay);
+            (3.0..=6.0).contains(&norm(from)).then_some((k, from))
+        });
+        let came: Vec<_> = came.collect();
+        assert!(
+            came.len() == batch.points() && came.len() > 50,
+            "{} {}",
+            came.len(),
+            batch.points()
+        );
+        lit += came.len();
+        for (place, (k, from)) in came.into_iter().enumerate() {
+            assert_eq!(batch.columns.node[place] as usize, k);
+            let pulled = batch.columns.pulled.each_ref().map(|column| column[place]);
+            assert!(distance(pulled, from) < 1e-11, "{pulled:?} {from:?}");
+        }
+    }
+    assert!(lit < 3 * lines.points());
+    let field = Blobs { dimension: 4 };
+    let field = Field { representation: &field, parameters: &[], axis, occupancy: None };
+    batch.gather_field(&model, field);
+    let first = batch.columns.node[0] as usize;
+    assert_eq!(batch.columns.position[0][0], lines.position[0][first]);
 }
 
 #[test]

@@ -2,7 +2,9 @@
 
 use super::check_volume::check_volume;
 use super::invalid::{Invalid, brightness, number, positive, shown};
-use super::{Disc, Gas, GasMotion, GasProfile, Mesh, Plunging, Scene, Sky, Spot};
+use super::{
+    Disc, Gas, GasMotion, GasProfile, Mesh, Plunging, Rotation, Scene, Sky, Spot, VolumeSource,
+};
 use crate::Error;
 use crate::polarization::PowerLaw;
 use kerrlight_geodesic::{Kerr, orbits};
@@ -223,6 +225,12 @@ fn check_combinations(scene: &Scene) -> Result<(), Invalid> {
     if plunges && effects.redshift && !effects.lensing {
         let allowed =
             "true with redshift and [disc.plunging]: straight rays have no momentum near the hole";
+        return Err(Invalid::new("effects.lensing", false, allowed));
+    }
+    let falls =
+        |volume: &VolumeSource| matches!(&volume.rotation, Rotation::Law(law) if law.falls());
+    if scene.volume.iter().any(falls) && effects.redshift && !effects.lensing {
+        let allowed = "true with redshift and a volume that falls: straight rays have no momentum near the hole";
         return Err(Invalid::new("effects.lensing", false, allowed));
     }
     check_polarization(scene)?;

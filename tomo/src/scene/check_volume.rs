@@ -51,6 +51,10 @@ fn check_rotation(volume: &VolumeSource, key: &impl Fn(&str) -> String) -> Resul
         return Err(Invalid::missing(key("reference_time"), why));
     }
     let Rotation::Law(law) = &volume.rotation else { return Ok(()) };
+    if law.falls() && volume.region.is_none() {
+        let why = "needed if matter falls: how far out and in it is followed, { r_min, r_max }";
+        return Err(Invalid::missing(key("region"), why));
+    }
     rotation::check(law, &key("rotation"))
 }
 

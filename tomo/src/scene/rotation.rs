@@ -1,4 +1,4 @@
-//! How fast the matter of a volume turns.
+//! How the matter of a volume moves.
 
 use super::invalid::{Invalid, number};
 use crate::Error;
@@ -8,7 +8,7 @@ use serde::de::value::{MapAccessDeserializer, StrDeserializer};
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Angular velocity Ω(r) of matter on circles about an axis ξ: a name, or a law with numbers.
+/// How matter moves about an axis ξ: a name, or a law with numbers.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Rotation {
@@ -52,7 +52,8 @@ impl<'de> Visitor<'de> for WordOrLaw {
     fn expecting(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(
             "\"none\", \"keplerian\", or { keplerian = { drag } }, { power-law = { radius, rate, exponent } }, \
-             { table = { radii, rates } }, { perturbed = { of, deviation, correlation_length, radii, seed } }",
+             { table = { radii, rates } }, { perturbed = { of, deviation, correlation_length, radii, seed } }, \
+             { infall = { xi, beta_r, beta_phi } }, { profile = { radii, angular, radial } }",
         )
     }
 
@@ -84,7 +85,7 @@ impl Rotation {
                 Ok(Some(AngularVelocity::Keplerian { drag: hole.spin() * axis.vector()[2] }))
             }
             // Its perturbations have seeds of their own.
-            Rotation::Law(law) => law.angular(0).map(Some),
+            Rotation::Law(law) => law.angular(0, hole.spin() * axis.vector()[2]).map(Some),
         }
     }
 }
@@ -112,11 +113,23 @@ pub(super) fn check(law: &Velocity, key: &str) -> Result<(), Invalid> {
             check(&by.of, &name("perturbed.of"))?;
             ranges(law, &name("perturbed"))
         }
+        Velocity::Infall { drag, .. } => {
+            let drag = drag.unwrap_or(0.0);
+            number(name("infall.drag"), drag, drag.abs() <= 1.0, "a number in [-1, 1] (M)")?;
+            ranges(law, &name("infall"))
+        }
+        Velocity::Profile { angular, radial, .. } => {
+            angular.iter().try_for_each(|rate| rate_in_range(name("profile.angular"), *rate))?;
+            let key =
+                |v: f64| number(name("profile.radial"), v, v.abs() < 1.0, "a number in (-1, 1)");
+            radial.iter().try_for_each(|v| key(*v))?;
+            ranges(law, &name("profile"))
+        }
     }
 }
 
 fn ranges(law: &Velocity, key: &str) -> Result<(), Invalid> {
-    law.angular(0).map(drop).map_err(|error| Invalid::of(&format!("{key}."), &error))
+    law.angular(0, 0.0).map(drop).map_err(|error| Invalid::of(&format!("{key}."), &error))
 }
 
 fn rate_in_range(key: String, rate: f64) -> Result<(), Invalid> {

@@ -222,6 +222,9 @@ fn exact_volumes_turn_as_fits_let_them() {
         let text = SCENE.replacen("[[spot]]", &format!("{head}{key} = {law}\n\n[[spot]]"), 1);
         Scene::parse(&text).map_err(|error| error.to_string())
     };
+    let volume_with_region = |key: &str, law: &str| {
+        volume(key, &format!("{law}\nregion = {{ r_min = 2.0, r_max = 9.0 }}"))
+    };
     let hole = Kerr::new(0.9).unwrap();
     let rate = |law: &str, r: f64| {
         let scene = volume("rotation", law).unwrap();
@@ -236,6 +239,13 @@ fn exact_volumes_turn_as_fits_let_them() {
     assert_eq!(rate("{ keplerian = { drag = 0.5 } }", 4.0), 1.0 / 8.5);
     assert_eq!(rate("{ power-law = { radius = 8.0, rate = 0.25, exponent = 2.0 } }", 4.0), 1.0);
     assert_eq!(rate("{ table = { radii = [2.0, 6.0], rates = [0.5, 0.25] } }", 4.0), 0.375);
+    let falls =
+        volume_with_region("rotation", "{ infall = { xi = 0.7, beta_r = 0.9, beta_phi = 0.8 } }");
+    let axis = crate::dynamics::Axis::new([0.0, 0.0, -1.0]).unwrap();
+    let flow = falls.unwrap().volume[0].rotation.about(&hole, axis).unwrap().unwrap();
+    let law = Velocity::Infall { xi: 0.7, beta_r: 0.9, beta_phi: 0.8, drag: Some(-0.9) };
+    assert_eq!(flow, law.angular(0, 0.0).unwrap());
+    assert!(flow.fall(8.0) < 0.0 && flow.rate(8.0) > 0.0);
     let of = "of = { keplerian = { drag = 0.5 } }, correlation_length = 0.5, radii = [2.0, 9.0]";
     let still = rate(&format!("{{ perturbed = {{ {of}, deviation = 0.0, seed = 3 }} }}"), 2.0);
     assert!((still - rate("{ keplerian = { drag = 0.5 } }", 2.0)).abs() < 1e-15);
@@ -253,8 +263,21 @@ fn exact_volumes_turn_as_fits_let_them() {
             "rotation.perturbed.deviation` = -1",
         ),
         (&format!("{{ perturbed = {{ {of}, deviation = 1.0 }} }}"), "missing field `seed`"),
+        ("{ infall = { xi = 0.7, beta_r = 1.0, beta_phi = 1.0 } }", "`volume.0.region` is missing"),
     ] {
         let text = volume("rotation", law).unwrap_err();
+        assert!(text.contains(says), "{law}: {text}");
+    }
+    for (law, says) in [
+        ("{ infall = { xi = 1.7, beta_r = 1.0, beta_phi = 1.0 } }", "rotation.infall.xi` = 1.7"),
+        ("{ infall = { xi = 0.7, beta_r = 1.0 } }", "missing field `beta_phi`"),
+        ("{ infall = { xi = 0.7, beta_r = 1.0, beta_phi = 1.0, drag = 3 } }", "infall.drag` = 3"),
+        (
+            "{ profile = { radii = [3.0, 4.0], angular = [0.1, 0.1], radial = [-0.1, 0.1] } }",
+            "rotation.profile.radial` = 0.1",
+        ),
+    ] {
+        let text = volume_with_region("rotation", law).unwrap_err();
         assert!(text.contains(says), "{law}: {text}");
     }
 }

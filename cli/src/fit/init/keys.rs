@@ -122,7 +122,7 @@ pub const KEYS: &[Key] = &[
         "motion",
         "velocity",
         "",
-        "angular velocity: keplerian { drag }, power-law { radius, rate, exponent }, table { radii, rates }, perturbed { … }; radians per M",
+        "angular velocity: keplerian { drag }, power-law { radius, rate, exponent }, table { radii, rates }, perturbed { … }; radians per M; with a fall: infall { xi, beta_r, beta_phi }, profile { radii, angular, radial }",
     ),
     key("motion", "axis", "", "rotation axis (right-handed); a vector of any length"),
     key("motion", "reference_time", "", "time at which the recovered volume is defined; M"),

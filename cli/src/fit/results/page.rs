@@ -120,12 +120,15 @@ impl Estimate<'_> {
             recovered: found.volume.clone(),
             truth: self.true_volume.clone(),
             unit: UNIT.to_owned(),
-            motion: (ends[1] > ends[0]).then(|| report::Motion {
-                axis: found.state.now.axis.vector(),
-                rates,
-                times: ends,
-                reference: self.motion.reference,
-                time_unit: "GM/c³".to_owned(),
+            // The viewer turns matter about the axis, and knows of no fall.
+            motion: (ends[1] > ends[0] && !self.file.motion.velocity.falls()).then(|| {
+                report::Motion {
+                    axis: found.state.now.axis.vector(),
+                    rates,
+                    times: ends,
+                    reference: self.motion.reference,
+                    time_unit: "GM/c³".to_owned(),
+                }
             }),
             hole_radius: self.instrument.hole.horizon(),
             r_max,

@@ -131,7 +131,7 @@ impl Estimate<'_> {
 
     fn volume(&self, state: &State<f32>) -> anyhow::Result<String> {
         let (motion, region) = (&self.file.motion, &self.file.region);
-        let law = motion.velocity.clone().seeded(self.file.seed);
+        let law = motion.velocity.clone().seeded(self.file.seed).dragged(setup::drag(self.file)?);
         let law = toml::Value::try_from(&law).context("motion.velocity")?;
         let region =
             VolumeRegion { r_min: region.r_min, r_max: region.r_max, z_width: region.z_width };

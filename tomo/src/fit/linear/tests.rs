@@ -2,7 +2,7 @@ use super::data::{Data, Weighted};
 use super::operator::{Active, Operator};
 use super::walk::Walk;
 use super::*;
-use crate::dynamics::{AngularVelocity, Axis};
+use crate::dynamics::{AngularVelocity, Axis, Velocity};
 use crate::fit::{
     Batch, Field, ForwardModel, FrameTerm, ImageTerm, Motion, Region, Regulariser, Sampling,
     SightlineRequest, Sightlines,
@@ -18,6 +18,16 @@ pub(in crate::fit) mod lit;
 pub(in crate::fit) const FRAMES: [usize; 5] = [0, 1, 2, 3, 4];
 
 pub(in crate::fit) fn forward_model() -> ForwardModel<f64> {
+    forward_model_of(AngularVelocity::bhnerf(), 1.0)
+}
+
+fn falling_model() -> ForwardModel<f64> {
+    let law = Velocity::Infall { xi: 0.8, beta_r: 0.9, beta_phi: 0.95, drag: None };
+    forward_model_of(law.angular(0, 0.0).unwrap(), 20.0)
+}
+
+/// Times are in units of `unit` M.
+fn forward_model_of(velocity: AngularVelocity, unit: f64) -> ForwardModel<f64> {
     let hole = Kerr::new(0.0).unwrap();
     let observer = Observer::at_radius(Inclination::from_degrees(60.0).unwrap(), 1000.0).unwrap();
     let at = |k: usize| -5.0 + 10.0 * k as f64 / 8.0;
@@ -30,10 +40,10 @@ pub(in crate::fit) fn forward_model() -> ForwardModel<f64> {
     };
     let lines = Sightlines::trace(&hole, &observer, &alpha, &beta, &request).unwrap();
     let motion = Motion {
-        velocity: AngularVelocity::bhnerf(),
+        velocity,
         reference: 0.0,
         injection: None,
-        times: vec![0.0, 0.2, 0.35, 0.6, 0.9],
+        times: [0.0, 0.2, 0.35, 0.6, 0.9].map(|time| unit * time).to_vec(),
     };
     ForwardModel::new(&lines, &motion, &hole, None).unwrap()
 }
@@ -78,7 +88,13 @@ fn operator<'a>(
 /// ‖A x‖² and Aᵀ of twice the images, where the data are dark and all nodes or some count.
 #[test]
 fn exact_sparse_operator_is_the_grid_and_sums() {
-    let (model, voxels) = (forward_model(), Voxels { nodes: [7, 6, 8], ..Voxels::cube(2, 5.0) });
+    for model in [forward_model(), falling_model()] {
+        compare_with_the_grid(&model);
+    }
+}
+
+fn compare_with_the_grid(model: &ForwardModel<f64>) {
+    let voxels = Voxels { nodes: [7, 6, 8], ..Voxels::cube(2, 5.0) };
     let dark = ImageTerm::new(vec![0.0; FRAMES.len() * model.pixels()], model.pixels(), 1.0);
     let dark = dark.unwrap();
     let terms = [Weighted { weight: 1.0, term: &dark as &dyn FrameTerm<f64> }];
@@ -87,16 +103,16 @@ fn exact_sparse_operator_is_the_grid_and_sums() {
     let all = vec![true; voxels.count()];
     let some: Vec<bool> = random(all.len(), 4).iter().map(|x| *x < 0.4).collect();
     for is_active in [all, some] {
-        let operator = operator(&model, voxels, &is_active, usize::MAX);
+        let operator = operator(model, voxels, &is_active, usize::MAX);
         assert!(operator.entries() > 1000 && operator.bytes() > 12 * operator.entries());
         let x = random(operator.active.count(), 1);
-        let images = movie(&model, &voxels, &operator.active.expand(&x));
+        let images = movie(model, &voxels, &operator.active.expand(&x));
         let square: f64 = images.iter().map(|pixel| pixel * pixel).sum();
         let (value, gradient) = operator.value_and_gradient(&data, &x, false);
         assert!((value * count / square - 1.0).abs() < 1e-12);
         // ⟨y, Aᵀ A x⟩ = ⟨A y, A x⟩.
         let y = random(x.len(), 2);
-        let others = movie(&model, &voxels, &operator.active.expand(&y));
+        let others = movie(model, &voxels, &operator.active.expand(&y));
         let forward: f64 = others.iter().zip(&images).map(|(a, b)| a * b).sum();
         let back: f64 = gradient.iter().zip(&y).map(|(g, y)| 0.5 * count * g * y).sum();
         assert!((back / forward - 1.0).abs() < 1e-12, "{back} {forward}");

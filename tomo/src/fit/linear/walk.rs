@@ -134,6 +134,7 @@ pub(super) struct Walk<'a, T> {
 pub(super) struct Buffers<T> {
     angles: Vec<T>,
     pulled: [Vec<T>; 3],
+    stretched: [Vec<T>; 3],
     places: Vec<Place<T>>,
 }
 
@@ -173,6 +174,9 @@ impl<'a, T: Float> Walk<'a, T> {
     }
 
     fn pull(&self, range: core::ops::Range<usize>, time: T, buffers: &mut Buffers<T>) {
+        if self.model.fall.is_some() {
+            return self.carry(range, time, buffers);
+        }
         let Buffers { angles, pulled, .. } = buffers;
         angles.clear();
         let rates = &self.model.rate[range.clone()];
@@ -187,6 +191,26 @@ impl<'a, T: Float> Walk<'a, T> {
         let points = Coordinates::xyz(&x[range.clone()], &y[range.clone()], &z[range.clone()]);
         let [a, b, c] = pulled;
         pull_back(self.axis, Turned { points, angles }, CoordinatesMut::xyz(a, b, c));
+    }
+
+    /// The same of matter that changes its radius.
+    fn carry(&self, range: core::ops::Range<usize>, time: T, buffers: &mut Buffers<T>) {
+        let (model, Some(fall)) = (self.model, &self.model.fall) else { return };
+        let Buffers { angles, pulled, stretched, .. } = buffers;
+        angles.clear();
+        pulled.iter_mut().for_each(|column| column.resize(range.len(), T::zero()));
+        stretched.iter_mut().for_each(Vec::clear);
+        for node in range {
+            let delay = model.delay.get(node).copied().unwrap_or(T::zero());
+            let [stretch, angle] = fall.before(node, (time - delay).double());
+            angles.push(T::of(angle));
+            for (column, position) in stretched.iter_mut().zip(&model.position) {
+                column.push(T::of(stretch * position[node].double()));
+            }
+        }
+        let ([x, y, z], [a, b, c]) = (&*stretched, pulled);
+        let turned = Turned { points: Coordinates::xyz(x, y, z), angles };
+        pull_back(self.axis, turned, CoordinatesMut::xyz(a, b, c));
     }
 
     /// Whether a node shines in a frame.

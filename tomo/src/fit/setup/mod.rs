@@ -149,13 +149,22 @@ pub fn priors(linear: &Linear) -> Vec<Prior> {
 /// # Errors
 /// If the velocity is out of range.
 pub fn motion(file: &FitFile, times: Vec<f64>) -> Result<Motion> {
-    let velocity = file.motion.velocity.angular(file.seed).within("motion.velocity")?;
+    let law = &file.motion.velocity;
+    let velocity = law.angular(file.seed, drag(file)?).within("motion.velocity")?;
     Ok(Motion {
         velocity,
         reference: file.motion.reference_time,
         injection: file.motion.injection_time.map(|time| Injection { time }),
         times,
     })
+}
+
+/// The spin as matter sees it that turns about the axis, M: a ξ_z, and a without an axis.
+///
+/// # Errors
+/// If the axis has no direction.
+pub fn drag(file: &FitFile) -> Result<f64> {
+    Ok(file.hole.spin * known_axis(file)?.map_or(1.0, |axis| axis.vector()[2]))
 }
 
 /// The true or known axis.

@@ -5,7 +5,7 @@ use super::{AXIS, Instrument, Result, known_axis, motion};
 use crate::dynamics::{AngularVelocity, Axis};
 use crate::fit::settings::{FitError, FitFile, Spot, Within, refuse};
 use crate::fit::{Batch, ForwardModel};
-use kerrlight_geodesic::vector::{distance, rotate};
+use kerrlight_geodesic::vector::distance;
 
 /// What to write where there is no truth.
 pub(super) const SPOT: &str = "add a table [[truth.spot]] with `center = [x, y, z]` and `sigma = …` in M and `amplitude = 1.0`";
@@ -57,9 +57,7 @@ impl Truth {
         let mut turned = (0.0, x);
         let light = |spot: &Spot| {
             if spot.wound_for != turned.0 {
-                let rate = self.velocity.rate(distance(x, [0.0; 3]));
-                let back = rotate(self.axis.vector(), -rate * spot.wound_for, x);
-                turned = (spot.wound_for, back);
+                turned = (spot.wound_for, self.velocity.before(self.axis, x, spot.wound_for));
             }
             let offset = distance(turned.1, spot.center) / spot.sigma;
             spot.amplitude * (-0.5 * offset * offset).exp()

@@ -120,7 +120,7 @@ impl<T: Float> ForwardModel<T> {
     ) -> Vec<Vec<T>> {
         let WorldBuffers { batch, workspace, cotangents, parameters, values } = buffers;
         batch.set((0..self.rays()).map(|ray| (ray as u32, frame as u32)));
-        batch.gather(self, field.axis, field.occupancy);
+        batch.gather_field(self, field);
         let (count, dimension) = (batch.points(), field.representation.dimension());
         values.resize(count, T::zero());
         let at = Batch::coordinates(&batch.columns, dimension);

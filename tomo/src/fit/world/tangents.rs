@@ -40,7 +40,8 @@ impl Tangents {
         nodes: &DifferentiatedNodes,
     ) -> (Sightlines, Self) {
         let pixels = nodes.rays();
-        let mut lines = Sightlines { pixels, starts: vec![0], ..Sightlines::default() };
+        let limits = Some(model.region.radii());
+        let mut lines = Sightlines { pixels, starts: vec![0], limits, ..Sightlines::default() };
         let mass = free.iter().position(|parameter| *parameter == Parameter::Mass);
         let mass = mass.map(|place| (place, world.get(Parameter::Mass)));
         let mut tangents = Tangents { free: free.to_vec(), moves: Vec::new(), mass };
@@ -76,6 +77,7 @@ impl Builder<'_> {
         if self.model.redshift {
             let columns = lines.momentum.iter_mut().zip(node.value.momentum);
             columns.for_each(|(column, x)| column.push(x));
+            lines.radial.push(node.value.radial);
         }
     }
 

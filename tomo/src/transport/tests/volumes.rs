@@ -4,11 +4,11 @@ use super::*;
 use crate::emission::medium::{CellSize, Emission, Moment, PathSegment};
 use crate::emission::medium::{Medium, Part};
 use crate::emission::spot::SpotModel;
-use crate::scene::{Rotation, Velocity, VolumeSource};
+use crate::scene::{Rotation, Velocity, VolumeRegion, VolumeSource};
 use crate::volume::Volume;
 use crate::volume::VolumeFile;
 use kerrlight_geodesic::simd::RayNodes;
-use kerrlight_geodesic::{Kerr, Quantities};
+use kerrlight_geodesic::{Inclination, Kerr, Observer, Quantities};
 use std::sync::Arc;
 
 /// `value` on the nodes of a box.
@@ -290,4 +290,47 @@ fn exact_darkness_and_refusals() {
     assert_eq!(text, "least value of the volume = -8 is not allowed: 0 or more");
     let text = PreparedScene::new(&wrong, None).unwrap_err().to_string();
     assert!(text.contains("one file for each [[volume]]"), "{text}");
+}
+
+/// A volume that falls, with slow light and redshift, has the pixels that a fit has of it: these share neither panels nor
+/// bricks, nor the formula of g.
+#[test]
+fn exact_falling_volumes_are_those_of_fits() {
+    use crate::dynamics::Axis;
+    use crate::fit::{
+        Batch, ForwardModel, Motion, Redshift, Region, Sampling, SightlineRequest, Sightlines,
+    };
+    let set = ["effects.slow_light=true", "effects.spectral_index=0.5", "tracer.tolerance=1e-5"];
+    let (scene, hole, since) = (scene(&set), Kerr::new(0.9).unwrap(), 20.0);
+    let law = Velocity::Infall { xi: 0.7, beta_r: 0.9, beta_phi: 0.8, drag: None };
+    let (r_min, r_max, axis) = (1.6, 11.0, Axis::new([0.3, 0.0, 1.0]).unwrap());
+    let file = gaussian([6.0, 4.0, 1.0], 1.0, 33);
+    let mut source = source(Rotation::Law(law.clone()), axis.vector(), since);
+    source.region = Some(VolumeRegion { r_min, r_max, z_width: None });
+    let volume = file.volume.clone();
+    let found = observe(&prepared(scene.clone(), source, file), &TIMES);
+    let (alpha, beta) = screen(24, 24.0);
+    let request = SightlineRequest {
+        region: Region { r_min, r_max, z_width: f64::INFINITY },
+        sampling: Sampling::Gauss { order: 8, split: 12 },
+        delay: true,
+        momentum: true,
+    };
+    let inclination = Inclination::from_degrees(scene.observer.inclination_deg).unwrap();
+    let observer = Observer::at_infinity(inclination);
+    let lines = Sightlines::trace(&hole, &observer, &alpha, &beta, &request).unwrap();
+    let velocity = law.angular(0, 0.9 * axis.vector()[2]).unwrap();
+    let (times, reference) = (TIMES.to_vec(), since);
+    let motion = Motion { velocity, reference, injection: None, times };
+    let mut model =
+        ForwardModel::<f64>::new(&lines, &motion, &hole, Some(Redshift { power: 2.5 })).unwrap();
+    model.weigh(axis);
+    let movie = model.movie_of(axis, &|x| volume.at(x), &mut Batch::default());
+    let most = movie.iter().fold(0.0f64, |most, x| most.max(*x));
+    let lit = movie.iter().filter(|x| **x > 0.01 * most).count();
+    assert!(most > 0.1 && lit > 60, "{most} {lit}");
+    for (pixel, seen) in movie.iter().zip(&found) {
+        let seen = seen.intensity;
+        assert!((pixel - seen).abs() < 3e-3 * most, "{pixel} {seen} of {most}");
+    }
 }

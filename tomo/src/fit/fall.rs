@@ -1,0 +1,37 @@
+//! Where matter that changes its radius was at the reference time.
+
+use super::sightlines::Sightlines;
+use crate::dynamics::infall::{Falling, Origin};
+use kerrlight_geodesic::vector::norm;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// The nodes of all rays on the fall of their matter.
+#[derive(Clone, Debug)]
+pub(super) struct Fall {
+    flow: Arc<Falling>,
+    origins: Vec<Origin>,
+    limits: [f64; 2],
+}
+
+impl Fall {
+    /// Of nodes.
+    pub fn new(flow: &Arc<Falling>, lines: &Sightlines) -> Self {
+        let origin = |k: usize| flow.origin(norm([0, 1, 2].map(|c| lines.position[c][k])));
+        Self {
+            flow: flow.clone(),
+            origins: (0..lines.points()).into_par_iter().map(origin).collect(),
+            limits: lines.limits.unwrap_or([0.0, f64::INFINITY]),
+        }
+    }
+
+    /// What node number k is stretched by and turned by to where its matter was `elapsed` (M) before: no numbers where
+    /// that is outside of the region, so that nothing shines.
+    #[inline]
+    pub fn before(&self, node: usize, elapsed: f64) -> [f64; 2] {
+        let origin = &self.origins[node];
+        let [stretch, angle] = self.flow.before(origin, elapsed);
+        let ([least, most], radius) = (self.limits, stretch * origin.radius());
+        if radius >= least && radius <= most { [stretch, angle] } else { [f64::NAN; 2] }
+    }
+}
