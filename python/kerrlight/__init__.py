@@ -11,7 +11,7 @@ True
 
 Rays are in :mod:`kerrlight.rays`, pictures in :mod:`kerrlight.pictures`, fits in :mod:`kerrlight.fit`, the forward model
 with its gradients in :mod:`kerrlight.model` (:mod:`kerrlight.torch`, :mod:`kerrlight.jax`), visibilities in
-:mod:`kerrlight.interferometry`, and kgeo's interface in :mod:`kerrlight.compat.kgeo`.
+:mod:`kerrlight.interferometry` and :mod:`kerrlight.observing`, and kgeo's interface in :mod:`kerrlight.compat.kgeo`.
 
 Lengths and times are in units of M (G = c = 1), angles in radians where no name says otherwise. Importing the
 package imports nothing but itself: numpy comes with the first name that needs it.
@@ -26,20 +26,13 @@ from kerrlight._core import __version__
 
 if TYPE_CHECKING:
     from kerrlight.fit import Fit, FitError, Report, Volume
-    from kerrlight.interferometry import Closures, Fourier, Observation, Station
+    from kerrlight.fourier import Fourier
+    from kerrlight.interferometry import Closures, Observation, Station
     from kerrlight.model import ForwardModel, Keplerian, PowerLaw, Tabulated, VoxelModel, screen
+    from kerrlight.observing import observe, stations
     from kerrlight.pictures import Movie, Picture, movie, render
-    from kerrlight.rays import (
-        Curve,
-        GaussLegendre,
-        Kerr,
-        MinoTime,
-        Observer,
-        Outcome,
-        PathLength,
-        Points,
-        Rays,
-    )
+    from kerrlight.rays import Curve, GaussLegendre, Kerr, MinoTime, Observer, PathLength
+    from kerrlight.table import Outcome, Points, Rays
 
 # The module of each name.
 _MODULES = {
@@ -48,7 +41,7 @@ _MODULES = {
     "Fit": "fit",
     "FitError": "fit",
     "ForwardModel": "model",
-    "Fourier": "interferometry",
+    "Fourier": "fourier",
     "GaussLegendre": "rays",
     "Keplerian": "model",
     "Kerr": "rays",
@@ -56,20 +49,22 @@ _MODULES = {
     "Movie": "pictures",
     "Observation": "interferometry",
     "Observer": "rays",
-    "Outcome": "rays",
+    "Outcome": "table",
     "PathLength": "rays",
     "Picture": "pictures",
-    "Points": "rays",
+    "Points": "table",
     "PowerLaw": "model",
-    "Rays": "rays",
+    "Rays": "table",
     "Report": "fit",
     "Station": "interferometry",
     "Tabulated": "model",
     "Volume": "fit",
     "VoxelModel": "model",
     "movie": "pictures",
+    "observe": "observing",
     "render": "pictures",
     "screen": "model",
+    "stations": "observing",
 }
 
 __all__ = [
@@ -99,8 +94,10 @@ __all__ = [
     "VoxelModel",
     "__version__",
     "movie",
+    "observe",
     "render",
     "screen",
+    "stations",
 ]
 
 

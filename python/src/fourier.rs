@@ -19,6 +19,19 @@ pub struct Fourier {
     transform: Transform<f64>,
 }
 
+/// The shape of a pixel with that name.
+pub fn pulse(name: &str) -> PyResult<Pulse> {
+    match name {
+        "delta" => Ok(Pulse::Delta),
+        "rectangle" => Ok(Pulse::Rectangle),
+        "triangle" => Ok(Pulse::Triangle),
+        other => {
+            let allowed = "delta, rectangle or triangle";
+            Err(refused(format!("pulse = \"{other}\" is not allowed: {allowed}")))
+        }
+    }
+}
+
 /// Exponentials up to this many bytes are kept.
 const MEMORY: usize = 256 << 20;
 
@@ -36,15 +49,7 @@ impl Fourier {
     ) -> PyResult<Self> {
         let (width, height, field_uas) = screen;
         let grid = ImageGrid::new(width, height, field_uas * MICROARCSECOND).map_err(refused)?;
-        let pulse = match pulse {
-            "delta" => Pulse::Delta,
-            "rectangle" => Pulse::Rectangle,
-            "triangle" => Pulse::Triangle,
-            other => {
-                let allowed = "delta, rectangle or triangle";
-                return Err(refused(format!("pulse = \"{other}\" is not allowed: {allowed}")));
-            }
-        };
+        let pulse = self::pulse(pulse)?;
         let mut pairs = uv.as_slice()?.chunks_exact(2).map(|pair| [pair[0], pair[1]]);
         let frames: Vec<Vec<[f64; 2]>> =
             counts.iter().map(|count| pairs.by_ref().take(*count).collect()).collect();

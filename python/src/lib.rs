@@ -13,6 +13,7 @@ mod fourier;
 mod lengths;
 mod model;
 mod observation;
+mod observing;
 mod orbits;
 mod pictures;
 mod program;
@@ -30,6 +31,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     lengths::add(module)?;
     model::add(module)?;
     observation::add(module)?;
+    observing::add(module)?;
     orbits::add(module)?;
     pictures::add(module)?;
     program::add(module)?;

@@ -28,7 +28,7 @@ pub struct Visibilities {
 
 /// Name, position (metres), SEFDs (Jy), feed rotation (parallactic, elevation, offset in degrees) and leakage of a
 /// telescope.
-type Telescope = (String, Option<[f64; 3]>, [f64; 2], [f64; 3], [Complex64; 2]);
+pub type Telescope = (String, Option<[f64; 3]>, [f64; 2], [f64; 3], [Complex64; 2]);
 
 /// What an observation has beside its rows.
 #[derive(FromPyObject)]
@@ -86,13 +86,15 @@ impl Metadata {
     }
 }
 
-fn station((name, position, sefd, feed, leakage): Telescope) -> Station {
+/// The station with these numbers.
+pub fn station((name, position, sefd, feed, leakage): Telescope) -> Station {
     let [parallactic, elevation, offset_deg] = feed;
     let feed_rotation = FeedRotation { parallactic, elevation, offset_deg };
     Station { position, sefd, feed_rotation, leakage, ..Station::named(&name) }
 }
 
-fn telescope(station: &Station) -> Telescope {
+/// Its numbers.
+pub fn telescope(station: &Station) -> Telescope {
     let FeedRotation { parallactic, elevation, offset_deg } = station.feed_rotation;
     let feed = [parallactic, elevation, offset_deg];
     (station.name.clone(), station.position, station.sefd, feed, station.leakage)
@@ -128,6 +130,13 @@ impl Columns<'_> {
 fn number(value: i64, count: usize, what: &str) -> PyResult<u16> {
     let index = u16::try_from(value).ok().filter(|index| usize::from(*index) < count);
     index.ok_or_else(|| refused(format!("{what} = {value} is not allowed: there are {count}")))
+}
+
+impl Visibilities {
+    /// Of an observation.
+    pub fn of(observation: Observation) -> Self {
+        Visibilities { observation }
+    }
 }
 
 #[pymethods]

@@ -1,0 +1,71 @@
+"""From images to visibilities, and back."""
+
+from __future__ import annotations
+
+from typing import Any, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kerrlight import _core
+from kerrlight._arrays import Floats, real
+from kerrlight.model import _Linear, precision
+
+__all__ = ["Fourier"]
+
+
+class Fourier(_Linear):
+    """From images in Jy/pixel to visibilities, with the adjoint.
+
+    :param shape: rows and columns of an image; rows from the north, each from the east.
+    :param field_uas: width of the field (µas).
+    :param uv: (u, v) in wavelengths, shape (n, 2), that see one image; or a list of such arrays, one for each image
+        of a movie.
+    :param pulse: shape of a pixel: ``"triangle"``, ``"rectangle"`` or ``"delta"``.
+    :param accuracy: largest error in units of the flux, for a fast transform where that is quicker; without it the sum
+        is exact.
+
+    >>> import numpy as np
+    >>> fourier = Fourier((5, 5), 100.0, [[1e9, 0.0], [3e9, -4e9]], pulse="delta")
+    >>> image = np.zeros((5, 5))
+    >>> image[2, 2] = 0.6
+    >>> bool(np.allclose(fourier.apply(image), 0.6))  # a point at the centre
+    True
+    """
+
+    is_complex = True
+
+    def __init__(
+        self,
+        shape: tuple[int, int],
+        field_uas: float,
+        uv: ArrayLike | Sequence[ArrayLike],
+        *,
+        pulse: str = "triangle",
+        accuracy: float | None = None,
+    ) -> None:
+        height, width = (int(n) for n in shape)
+        alone = isinstance(uv, np.ndarray) or np.ndim(uv[0]) == 1  # type: ignore[index]
+        lists: list[Any] = [uv] if alone else list(uv)  # type: ignore[arg-type]
+        frames = [real("uv", each).reshape(-1, 2) for each in lists]
+        counts = [len(frame) for frame in frames]
+        flat = np.ascontiguousarray(np.concatenate(frames)).reshape(-1)
+        screen = (width, height, float(field_uas))
+        self._core = _core.Fourier(screen, pulse, flat, counts, accuracy)
+        self.input_shape = (height, width) if alone else (len(frames), height, width)
+        self.output_shape = (sum(counts),)
+
+    def apply(self, values: ArrayLike) -> NDArray[np.complex128]:
+        """Visibilities (Jy) of an image or a movie, image after image."""
+        movie = precision("image", values, self.input_shape)
+        return self._core.apply(movie.astype(np.float64, copy=False))
+
+    def vjp(self, cotangent: ArrayLike) -> Floats:
+        """The adjoint under the inner product Re Σ x̄ y: from dL/dRe V + i dL/dIm V to dL/dpixel."""
+        data = np.ascontiguousarray(cotangent, dtype=np.complex128)
+        if data.shape != self.output_shape:
+            raise ValueError(f"cotangent has the shape {data.shape}, not {self.output_shape}")
+        return self._core.vjp(data).reshape(self.input_shape)
+
+    def __repr__(self) -> str:
+        return f"<Fourier from {self.input_shape} to {self.output_shape[0]} visibilities, {self._core.describe()}>"

@@ -1,0 +1,135 @@
+//! Simulated observations of images and movies.
+
+use crate::call::{detached, refused};
+use crate::fourier::pulse;
+use crate::observation::{Telescope, Visibilities, station};
+use kerrlight_tomo::Error;
+use kerrlight_tomo::interferometry::array::{Array, BUILT_IN, built_in, parse};
+use kerrlight_tomo::interferometry::earth::{Frame, Ut1};
+use kerrlight_tomo::interferometry::noise::{
+    GainErrors, ScatteringKernel, add_thermal_noise, apply_gains, scatter,
+};
+use kerrlight_tomo::interferometry::observation::Observation;
+use kerrlight_tomo::interferometry::operator::{ImageGrid, Method, Pulse};
+use kerrlight_tomo::interferometry::schedule::{Clock, Schedule, Setup, observe_affordable};
+use kerrlight_tomo::interferometry::simulate::{Movie, fill};
+use kerrlight_tomo::interferometry::source::Source;
+use kerrlight_tomo::units::MICROARCSECOND;
+use numpy::PyReadonlyArray1;
+use pyo3::prelude::*;
+
+/// Adds the functions of this module.
+pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(array, module)?)?;
+    module.add_function(wrap_pyfunction!(observe, module)?)
+}
+
+/// The stations of a built-in array, or of a text in eht-imaging's format.
+#[pyfunction]
+fn array(name: &str, text: Option<&str>) -> PyResult<Vec<Telescope>> {
+    let array = match text {
+        Some(text) => parse(text).map_err(refused)?,
+        None => built_in(name).ok_or_else(|| {
+            refused(format!("array {name}: neither {} nor a file", BUILT_IN.join(" nor ")))
+        })?,
+    };
+    Ok(array.stations.iter().map(crate::observation::telescope).collect())
+}
+
+/// What is observed when, where and how.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct Plan {
+    stations: Vec<Telescope>,
+    source: String,
+    mjd: i32,
+    hours: (f64, f64),
+    gmst: bool,
+    scans: u32,
+    integration: f64,
+    frequency_hz: f64,
+    bandwidth_hz: f64,
+    elevation_deg: [f64; 2],
+    of_date: bool,
+    ut1_utc: Option<f64>,
+    /// Hours of UTC of the images; none: those of the scans.
+    frame_hours: Option<Vec<f64>>,
+    pulse: String,
+    accuracy: Option<f64>,
+    scattering: bool,
+    /// Of station gains: constant, a scan, and whether phases are random.
+    gains: (f64, f64, bool),
+    thermal: bool,
+    seed: u64,
+}
+
+impl Plan {
+    fn schedule(&self) -> Schedule {
+        let (start_h, stop_h) = self.hours;
+        let clock = if self.gmst { Clock::Gmst } else { Clock::Utc };
+        Schedule { mjd: self.mjd, clock, start_h, stop_h, scans: self.scans }
+    }
+
+    fn setup(&self) -> Setup {
+        Setup {
+            frequency_hz: self.frequency_hz,
+            bandwidth_hz: self.bandwidth_hz,
+            integration_s: self.integration,
+            elevation_deg: self.elevation_deg,
+            ut1: self.ut1_utc.map_or(Ut1::Table, Ut1::Given),
+            frame: if self.of_date { Frame::OfDate } else { Frame::Catalogue },
+        }
+    }
+
+    fn observe(&self, source: &Source, movie: &Movie, pulse: Pulse) -> Result<Observation, Error> {
+        let array = Array::new(self.stations.iter().cloned().map(station).collect())?;
+        let (schedule, setup) = (self.schedule(), self.setup());
+        let mut observation = observe_affordable(&array, source.position, &schedule, &setup)?;
+        observation.source.clone_from(&source.name);
+        let hours = match (&self.frame_hours, movie.frames()) {
+            (Some(hours), _) => hours.clone(),
+            (None, 1) => vec![0.0],
+            (None, _) => schedule.hours_utc(setup.ut1)?,
+        };
+        let method = self.accuracy.map_or(Method::Direct, Method::Cheaper);
+        let transform = fill(&mut observation, movie, pulse, &hours, method)?;
+        self.spoil(&mut observation)?;
+        let version = env!("CARGO_PKG_VERSION");
+        observation.history = vec![format!("kerrlight {version} observe, from Python"), transform];
+        observation.history.push(if self.thermal { "noise thermal" } else { "noise none" }.into());
+        Ok(observation)
+    }
+
+    /// In the order of light's way.
+    fn spoil(&self, observation: &mut Observation) -> Result<(), Error> {
+        if self.scattering {
+            scatter(observation, &ScatteringKernel::SGR_A)?;
+        }
+        let (constant_amplitude, scan_amplitude, random_phases) = self.gains;
+        let gains = GainErrors { constant_amplitude, scan_amplitude, random_phases };
+        if gains != GainErrors::default() {
+            apply_gains(observation, gains, self.seed);
+        }
+        if self.thermal {
+            add_thermal_noise(observation, self.seed);
+        }
+        Ok(())
+    }
+}
+
+/// What an array sees of a movie of `frames` images of width × height pixels over a field (µas).
+#[pyfunction]
+fn observe(
+    py: Python<'_>,
+    movie: PyReadonlyArray1<'_, f64>,
+    screen: (usize, usize, f64),
+    plan: Plan,
+) -> PyResult<Visibilities> {
+    let (width, height, field_uas) = screen;
+    let grid = ImageGrid::new(width, height, field_uas * MICROARCSECOND).map_err(refused)?;
+    let movie = Movie { grid, pixels: movie.as_slice()?.to_vec() };
+    let source: Source = plan.source.parse().map_err(refused)?;
+    let pulse = pulse(&plan.pulse)?;
+    let observation = detached(py, || plan.observe(&source, &movie, pulse))?;
+    Ok(Visibilities::of(observation))
+}
