@@ -15,6 +15,10 @@ pub(crate) fn in_blocks<T: Send>(
     #[cfg(feature = "rayon")]
     {
         use rayon::prelude::*;
+        // A single block stays on the calling thread: waking others costs more than it.
+        if (1..=size).contains(&alpha.len()) {
+            return vec![work(alpha, beta)];
+        }
         let blocks = alpha.par_chunks(size).zip(beta.par_chunks(size));
         blocks.map(|(alpha, beta)| work(alpha, beta)).collect()
     }
