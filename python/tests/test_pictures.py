@@ -118,7 +118,7 @@ def test_ctrl_c_stops_a_picture():
     threading.Thread(target=interrupt).start()
     begun = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
-        render(set={"screen.width": 8192, "screen.samples_per_pixel": 16, "screen.channels": ["intensity"]})
+        render(set={"screen.width": 3072, "screen.samples_per_pixel": 64, "screen.channels": ["intensity"]})
     assert time.monotonic() - begun < 20
 
 
