@@ -59,6 +59,8 @@ fn exact_impossible_priors_are_refused_before_anything_is_written() {
         ("world={spin={uniform=[0.0,1.5]}}", "missing field `search`"),
         ("world.spin={uniform=[0.0,1.5]}", "world.spin = 1.5 is not allowed: -0.999 to 0.999"),
         ("world.position_angle_deg={isotropic=[0.0,1.0]}", "isotropic is a prior of inclinations"),
+        ("world.xi={uniform=[0.5,1.0]}", "velocity = { infall = { xi, beta_r, beta_phi } }"),
+        ("world.beta_r={uniform=[0.5,1.5]}", "world.beta_r = 1.5 is not allowed: 0 to 1"),
         ("world.search.starts=0", "world.search.starts = 0 is not allowed"),
         ("axis={from={start=[0.0,0.0,1.0],rate=0.1,last_rate=0.1}}", "[axis.known]"),
     ] {

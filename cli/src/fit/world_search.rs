@@ -83,10 +83,19 @@ fn settled(file: &FitFile, unknown: &UnknownWorld, world: &World) -> FitFile {
     if let Some(power) = &mut file.effects.redshift_power {
         *power = world.get(Parameter::RedshiftPower);
     }
-    if let Velocity::Keplerian { drag } = &mut file.motion.velocity
-        && unknown.search.drag_is_spin
-    {
-        *drag = file.hole.spin;
+    let follows = unknown.search.drag_is_spin;
+    match &mut file.motion.velocity {
+        Velocity::Keplerian { drag } if follows => *drag = file.hole.spin,
+        Velocity::Infall { xi, beta_r, beta_phi, drag } => {
+            for (number, parameter) in [xi, beta_r, beta_phi].into_iter().zip(Parameter::FLOW) {
+                *number = world.get(parameter);
+            }
+            if follows {
+                // That of the hole that was found.
+                *drag = None;
+            }
+        }
+        _ => {}
     }
     file
 }
@@ -252,6 +261,9 @@ fn described(parameter: Parameter) -> (&'static str, &'static str) {
         Parameter::Mass => ("mass over the assumed one", ""),
         Parameter::Rotation => ("angular velocity over the assumed one", ""),
         Parameter::RedshiftPower => ("power of the redshift factor", ""),
+        Parameter::Xi => ("angular momentum over that of circular orbits", ""),
+        Parameter::BetaR => ("part of the radial velocity that is not free fall", ""),
+        Parameter::BetaPhi => ("part of the angular velocity that is not free fall", ""),
     }
 }
 

@@ -105,7 +105,7 @@ impl Velocity {
             }
             Velocity::Infall { xi, beta_r, beta_phi, drag: own } => {
                 let mixture = Mixture { xi, beta_r, beta_phi };
-                let law = Law::Family { spin: own.unwrap_or(drag), mixture, factor: 1.0 };
+                let law = Law::Family { spin: own.unwrap_or(drag), mixture };
                 AngularVelocity::Falling(Arc::new(Falling::new(law)?))
             }
             Velocity::Profile { radii, angular, radial } => {

@@ -1,10 +1,8 @@
 //! Ranges of a scene's values.
 
-use super::check_volume::check_volume;
+use super::check_volume::{check_falls, check_volume};
 use super::invalid::{Invalid, brightness, number, positive, shown};
-use super::{
-    Disc, Gas, GasMotion, GasProfile, Mesh, Plunging, Rotation, Scene, Sky, Spot, VolumeSource,
-};
+use super::{Disc, Gas, GasMotion, GasProfile, Mesh, Plunging, Scene, Sky, Spot};
 use crate::Error;
 use crate::polarization::PowerLaw;
 use kerrlight_geodesic::{Kerr, orbits};
@@ -227,12 +225,7 @@ fn check_combinations(scene: &Scene) -> Result<(), Invalid> {
             "true with redshift and [disc.plunging]: straight rays have no momentum near the hole";
         return Err(Invalid::new("effects.lensing", false, allowed));
     }
-    let falls =
-        |volume: &VolumeSource| matches!(&volume.rotation, Rotation::Law(law) if law.falls());
-    if scene.volume.iter().any(falls) && effects.redshift && !effects.lensing {
-        let allowed = "true with redshift and a volume that falls: straight rays have no momentum near the hole";
-        return Err(Invalid::new("effects.lensing", false, allowed));
-    }
+    check_falls(scene)?;
     check_polarization(scene)?;
     match effects.half_orbits {
         Some(n) if n > 100 => {

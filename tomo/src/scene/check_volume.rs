@@ -2,7 +2,7 @@
 
 use super::check::check_color;
 use super::invalid::{Invalid, brightness, number};
-use super::{Rotation, VolumeRegion, VolumeSource, rotation};
+use super::{Rotation, Scene, VolumeRegion, VolumeSource, rotation};
 
 pub(super) fn check_volume(volume: &VolumeSource, k: usize) -> Result<(), Invalid> {
     let key = |name: &str| format!("volume.{k}.{name}");
@@ -67,4 +67,16 @@ fn check_region(volume: &VolumeSource, key: &impl Fn(&str) -> String) -> Result<
     let width = z_width.unwrap_or(1.0);
     let ok = width > 0.0 && width <= 1e6;
     number(key("region.z_width"), width, ok, "a height above 0 and at most 1e6 (M)")
+}
+
+/// Straight rays have no momentum along the radius near the hole.
+pub(super) fn check_falls(scene: &Scene) -> Result<(), Invalid> {
+    let effects = &scene.effects;
+    let falls =
+        |volume: &VolumeSource| matches!(&volume.rotation, Rotation::Law(law) if law.falls());
+    if scene.volume.iter().any(falls) && effects.redshift && !effects.lensing {
+        let allowed = "true with redshift and a volume that falls: straight rays have no momentum near the hole";
+        return Err(Invalid::new("effects.lensing", false, allowed));
+    }
+    Ok(())
 }

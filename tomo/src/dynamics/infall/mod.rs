@@ -37,8 +37,6 @@ pub enum Law {
         spin: f64,
         /// Where between circles and free fall.
         mixture: Mixture,
-        /// What its angular velocity is multiplied by.
-        factor: f64,
     },
     /// Values between knots.
     Profile(Profile),
@@ -48,6 +46,8 @@ pub enum Law {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Falling {
     law: Law,
+    /// What angular velocities are multiplied by.
+    factor: f64,
     flow: Option<Infall<Along<f64>>>,
     table: Trajectory<f64>,
     /// From this radius on matter stays where it is, M.
@@ -86,11 +86,8 @@ impl Falling {
     /// If a number is out of its range, or a profile's matter does not change its radius.
     pub fn new(law: Law) -> Result<Self, Error> {
         let profile = match &law {
-            Law::Family { spin, mixture, factor } => {
-                if !factor.is_finite() {
-                    return Err(Error::out_of_range("factor", *factor, "a finite number"));
-                }
-                return Family { spin: *spin, mixture: *mixture, factor: *factor }.falling(law);
+            Law::Family { spin, mixture } => {
+                return Family { spin: *spin, mixture: *mixture, factor: 1.0 }.falling(law);
             }
             Law::Profile(profile) => profile,
         };
@@ -99,7 +96,7 @@ impl Falling {
         }
         // To inside of any horizon.
         let table = profile.trajectory(0.5);
-        Ok(Self { law, flow: None, table, circular: f64::INFINITY })
+        Ok(Self { law, factor: 1.0, flow: None, table, circular: f64::INFINITY })
     }
 
     /// What it follows.
@@ -114,15 +111,30 @@ impl Falling {
 
     /// The same with the derivatives with respect to r.
     pub fn slopes(&self, r: f64) -> [Along<f64>; 2] {
-        let (r, s) = (Along::parameter(r, 0), Along::constant);
-        match (&self.law, &self.flow) {
+        let r = Along::parameter(r, 0);
+        let [fall, turn] = match (&self.law, &self.flow) {
             (Law::Profile(profile), _) => profile.rates(r),
-            (Law::Family { factor, .. }, Some(flow)) => {
-                let [fall, turn] = flow.rates(outside(flow, r));
-                [fall, turn * s(*factor)]
-            }
-            (Law::Family { .. }, None) => [s(0.0); 2],
-        }
+            (Law::Family { .. }, Some(flow)) => flow.rates(outside(flow, r)),
+            (Law::Family { .. }, None) => [Along::constant(0.0); 2],
+        };
+        [fall, turn * Along::constant(self.factor)]
+    }
+
+    /// The same with all angular velocities multiplied by a factor.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        let table = self.table.lift(factor);
+        Self { factor: factor * self.factor, table, ..self.clone() }
+    }
+
+    /// From this radius on matter stays where it is, M.
+    pub(crate) fn circular_from(&self) -> f64 {
+        self.circular
+    }
+
+    /// The table, with a factor on all angular velocities that may have derivatives.
+    pub(crate) fn lifted<N: Elementary>(&self, factor: N) -> Trajectory<N> {
+        self.table.lift(factor)
     }
 
     /// Matter at a radius (M), to be carried back.
@@ -151,6 +163,20 @@ impl Falling {
     }
 }
 
+/// dr/dt and Ω of the family.
+pub(crate) struct Flow<N> {
+    flow: Infall<N>,
+    factor: N,
+}
+
+impl<N: Elementary> Flow<N> {
+    /// At a radius; next to the horizon, where it is not outside of it.
+    pub fn rates(&self, r: N) -> [N; 2] {
+        let [fall, turn] = self.flow.rates(outside(&self.flow, r));
+        [fall, turn * self.factor]
+    }
+}
+
 impl<N: Elementary> Family<N> {
     fn flow<M: Elementary>(&self, lift: impl Fn(N) -> M) -> Result<Infall<M>, Error> {
         let Mixture { xi, beta_r, beta_phi } = self.mixture;
@@ -160,6 +186,16 @@ impl<N: Elementary> Family<N> {
         let is_extremal = spin.abs() > EXTREMAL && spin.abs() <= 1.0;
         let spin = if is_extremal { N::constant(EXTREMAL.copysign(spin)) } else { self.spin };
         Ok(Infall::new(&Kerr::from_spin(lift(spin))?, mixture)?)
+    }
+
+    /// From where on matter stays at its radius, M.
+    pub fn circular_from(&self) -> Result<f64, Error> {
+        Ok(if self.is_still() { self.flow(|x| x)?.isco().value() } else { f64::INFINITY })
+    }
+
+    /// Its dr/dt and Ω.
+    pub fn flowing(&self) -> Result<Flow<N>, Error> {
+        Ok(Flow { flow: self.flow(|x| x)?, factor: self.factor })
     }
 
     fn is_still(&self) -> bool {
@@ -222,8 +258,14 @@ impl<N: Elementary> Family<N> {
 impl Family<f64> {
     fn falling(self, law: Law) -> Result<Falling, Error> {
         let flow = self.flow(Along::constant)?;
-        let circular = if self.is_still() { flow.isco().value } else { f64::INFINITY };
-        Ok(Falling { law, table: self.trajectory()?, flow: Some(flow), circular })
+        let circular = self.circular_from()?;
+        Ok(Falling {
+            law,
+            factor: self.factor,
+            table: self.trajectory()?,
+            flow: Some(flow),
+            circular,
+        })
     }
 }
 

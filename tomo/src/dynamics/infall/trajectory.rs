@@ -116,6 +116,35 @@ impl<N: Elementary> Trajectory<N> {
         let cell = self.cells.get(k)?;
         Some(cell.time_at(radius, [self.times[k], self.times[k + 1]]))
     }
+
+    /// dr/dt at a time, without its derivatives; 0 beyond both ends.
+    pub fn speed(&self, time: f64) -> f64 {
+        let number = self.times.partition_point(|start| *start <= time);
+        let cell = number.checked_sub(1).and_then(|k| self.cells.get(k));
+        cell.map_or(0.0, |cell| cell.speed(time))
+    }
+}
+
+impl Trajectory<f64> {
+    /// The same without derivatives, but for a factor on all angular velocities.
+    pub fn lift<N: Elementary>(&self, factor: N) -> Trajectory<N> {
+        let s = N::constant;
+        let cell = |cell: &Cell<f64>| Cell {
+            start: s(cell.start),
+            per_time: s(cell.per_time),
+            radius: cell.radius.map(s),
+            azimuth: cell.azimuth.map(|x| factor * s(x)),
+        };
+        let end = |[radius, azimuth, rate]: Point<f64>| {
+            [s(radius), factor * s(azimuth), factor * s(rate)]
+        };
+        Trajectory {
+            times: self.times.clone(),
+            radii: self.radii.clone(),
+            cells: self.cells.iter().map(cell).collect(),
+            ends: self.ends.map(end),
+        }
+    }
 }
 
 impl<N: Elementary> Way<'_, N> {

@@ -3,6 +3,7 @@
 use super::world::SIMULATED;
 use super::{FitError, FitFile, Within};
 use crate::Error;
+use crate::dynamics::Velocity;
 use crate::fit::world::{Free, Parameter, Prior};
 use serde::{Deserialize, Serialize};
 use toml::Table;
@@ -27,6 +28,12 @@ pub struct UnknownWorld {
     pub rotation_factor: Option<PriorSettings>,
     /// Power of g that emission goes with, dimensionless.
     pub redshift_power: Option<PriorSettings>,
+    /// ξ of `motion.velocity.infall`, dimensionless.
+    pub xi: Option<PriorSettings>,
+    /// β_r of the same.
+    pub beta_r: Option<PriorSettings>,
+    /// β_φ of the same.
+    pub beta_phi: Option<PriorSettings>,
     /// How they are looked for.
     pub search: WorldSearch,
 }
@@ -65,7 +72,7 @@ pub struct WorldSearch {
     pub coarse: WorldView,
     /// The search about the best of their ends.
     pub fine: WorldView,
-    /// Whether the drag of a Keplerian velocity is the spin, whatever that is.
+    /// Whether the drag of a Keplerian velocity is the spin, whatever that is, and that of `infall` the spin along the axis.
     pub drag_is_spin: bool,
 }
 
@@ -110,6 +117,9 @@ impl UnknownWorld {
             Parameter::Mass => self.mass_factor,
             Parameter::Rotation => self.rotation_factor,
             Parameter::RedshiftPower => self.redshift_power,
+            Parameter::Xi => self.xi,
+            Parameter::BetaR => self.beta_r,
+            Parameter::BetaPhi => self.beta_phi,
         }
     }
 
@@ -200,6 +210,18 @@ impl FitFile {
         }
         let world: UnknownWorld = table.try_into().within("world")?;
         world.check()?;
+        let is_free = |parameter: &Parameter| world.prior(*parameter).is_some();
+        let flow = Parameter::FLOW.into_iter().find(is_free);
+        if let (Some(parameter), false) =
+            (flow, matches!(self.motion.velocity, Velocity::Infall { .. }))
+        {
+            let why = format!(
+                "world.{} is a parameter of `velocity = {{ infall = {{ xi, beta_r, beta_phi }} }}` in [motion], which \
+                 is another law here",
+                parameter.name()
+            );
+            return Err(FitError::Conflict(why).into());
+        }
         Ok(Some(world))
     }
 }

@@ -2,12 +2,13 @@
 
 use super::coarse_view::CoarseView;
 use super::linear_problem::terms;
-use super::{Instrument, Measured, Result, axis, forward_model, linear, motion, priors};
+use super::{Instrument, Measured, Result, axis, drag, forward_model, linear, motion, priors};
 use crate::dynamics::Velocity;
 use crate::fit::linear::{Prior as Penalty, Weighted};
 use crate::fit::settings::{AxisSearch, FitError, FitFile, UnknownWorld, WorldView};
 use crate::fit::world::{
-    Effort, Exploration, Explored, Law, Spread, World, WorldModel, WorldProblem, WorldWatch,
+    Effort, Exploration, Explored, Law, Parameter, Spread, World, WorldModel, WorldProblem,
+    WorldWatch,
 };
 use crate::fit::{Motion, Objective, Redshift, Sampling};
 use kerrlight_geodesic::Kerr;
@@ -149,7 +150,11 @@ fn trial(explored: &Explored, problem: &WorldProblem<'_, f32>) -> Trial {
 /// The world that the settings say, for parameters that are known, and for data that are simulated.
 pub fn known_world(file: &FitFile) -> World {
     let inclination = file.observer.inclination_deg.to_radians();
-    World::new(file.hole.spin, inclination, file.effects.redshift_power.unwrap_or(0.0))
+    let power = file.effects.redshift_power.unwrap_or(0.0);
+    let world = World::new(file.hole.spin, inclination, power);
+    let Velocity::Infall { xi, beta_r, beta_phi, .. } = file.motion.velocity else { return world };
+    let flow = Parameter::FLOW.into_iter().zip([xi, beta_r, beta_phi]);
+    flow.fold(world, |world, (parameter, value)| world.with(parameter, value))
 }
 
 /// What a fit looks through in a world, and how matter moves there.
@@ -165,15 +170,15 @@ pub fn in_world(
 ) -> Result<(Instrument, Motion)> {
     let plain = motion(file, measured.times.clone())?;
     let model = model(file, unknown, instrument, &plain)?;
-    let power = world.get(crate::fit::world::Parameter::RedshiftPower);
-    let hole = Kerr::new(world.get(crate::fit::world::Parameter::Spin))?;
+    let power = world.get(Parameter::RedshiftPower);
+    let hole = Kerr::new(world.get(Parameter::Spin))?;
     let found = Instrument {
         pixels: instrument.pixels.clone(),
         hole,
         lines: model.sightlines(world)?,
         redshift: instrument.redshift.map(|_| Redshift { power }),
     };
-    Ok((found, model.motion_of(world)))
+    Ok((found, model.motion_of(world)?))
 }
 
 /// What all worlds share.
@@ -199,6 +204,8 @@ fn model(
     let follows = unknown.search.drag_is_spin;
     let law = match file.motion.velocity {
         Velocity::Keplerian { .. } if follows => Law::CircularOrbits,
+        Velocity::Infall { .. } if follows => Law::Infall(None),
+        Velocity::Infall { drag: own, .. } => Law::Infall(Some(own.unwrap_or(drag(file)?))),
         _ => Law::Fixed(motion.velocity.clone()),
     };
     let [x, y] = instrument.pixels.clone();

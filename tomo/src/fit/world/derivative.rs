@@ -1,12 +1,14 @@
 //! Derivatives of images and losses with respect to the world, for any representation.
 
-use super::Tangents;
+use super::fall::Falls;
+use super::{Number, Parameter, Tangents};
 use crate::dynamics::{Axis, Cotangents, Turned, pull_back_vjp};
 use crate::fit::batch::Batch;
 use crate::fit::{Field, ForwardModel};
 use crate::points::{Coordinates, CoordinatesMut};
 use crate::representation::{Gradient, Workspace};
 use crate::simd::Float;
+use kerrlight_geodesic::Scalar;
 
 /// What a loss changes by where the points of a batch change.
 #[derive(Default)]
@@ -56,15 +58,54 @@ impl<T: Float> PointCotangents<T> {
         mut pair: impl FnMut(usize, &[f64]),
     ) {
         self.pull(batch, axis, dimension);
+        let falls = tangents.falls.as_ref().filter(|_| dimension == 3);
         let free = tangents.free.len();
         let mut sums = vec![0.0; free];
         for (group, (_, frame)) in batch.pairs.iter().enumerate() {
             sums.fill(0.0);
             let time = model.times[*frame as usize].double();
             for point in batch.starts[group]..batch.starts[group + 1] {
-                self.point(model, batch, (point, time), tangents, &mut sums);
+                match falls {
+                    None => self.point(model, batch, (point, time), tangents, &mut sums),
+                    Some(falls) => {
+                        let falls = (falls, tangents);
+                        self.fallen(model, batch, (point, time), falls, &mut sums);
+                    }
+                }
             }
             pair(group, &sums);
+        }
+    }
+
+    /// The same as [`Self::point`] of matter that changes its radius.
+    fn fallen(
+        &self,
+        model: &ForwardModel<T>,
+        batch: &Batch<T>,
+        (point, frame_time): (usize, f64),
+        (falls, tangents): (&Falls, &Tangents),
+        sums: &mut [f64],
+    ) {
+        let node = batch.columns.node[point] as usize;
+        let moves = &tangents.moves[node * sums.len()..(node + 1) * sums.len()];
+        let mut elapsed = Number::constant(batch.columns.time[point].double());
+        for (parameter, by) in tangents.free.iter().zip(moves) {
+            elapsed.slope[parameter.index()] = by.time;
+        }
+        if let Some((_, mass)) = tangents.mass {
+            // Times go like 1/mass.
+            elapsed.slope[Parameter::Mass.index()] -= frame_time / mass;
+        }
+        let [stretch, angle] = falls.before(node, elapsed);
+        let of_place = [0, 1, 2].map(|c| self.places[c][point].double());
+        let along: f64 = (0..3).map(|c| of_place[c] * model.position[c][node].double()).sum();
+        let (of_weight, of_angle) = (self.weights[point].double(), self.angles[point].double());
+        for ((sum, by), parameter) in sums.iter_mut().zip(moves).zip(&tangents.free) {
+            let [x, y, z] = by.position;
+            let moved = of_place[0] * x + of_place[1] * y + of_place[2] * z;
+            let k = parameter.index();
+            *sum += stretch.value * moved + along * stretch.slope[k];
+            *sum += of_angle * angle.slope[k] + of_weight * by.weight;
         }
     }
 

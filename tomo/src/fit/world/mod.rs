@@ -5,6 +5,7 @@
 
 mod derivative;
 mod explore;
+mod fall;
 mod model;
 mod prior;
 mod problem;
@@ -45,10 +46,16 @@ pub enum Parameter {
     Rotation,
     /// Power of g that emission goes with, dimensionless: 2 + spectral index.
     RedshiftPower,
+    /// ξ of [`Law::Infall`]: specific angular momentum over that of circular geodesics, 0 to 1.
+    Xi,
+    /// β_r of the same: radial velocity from that of free fall, 0, to that of circular orbits, 1.
+    BetaR,
+    /// β_φ of the same: the same of the angular velocity.
+    BetaPhi,
 }
 
 /// Number of parameters.
-pub const PARAMETERS: usize = 8;
+pub const PARAMETERS: usize = 11;
 
 /// A number with its derivatives with respect to all parameters.
 pub(super) type Number = Dual<f64, PARAMETERS>;
@@ -64,7 +71,13 @@ impl Parameter {
         Parameter::Mass,
         Parameter::Rotation,
         Parameter::RedshiftPower,
+        Parameter::Xi,
+        Parameter::BetaR,
+        Parameter::BetaPhi,
     ];
+
+    /// Those of [`Law::Infall`] alone.
+    pub const FLOW: [Parameter; 3] = [Parameter::Xi, Parameter::BetaR, Parameter::BetaPhi];
 
     /// Its place in [`World`].
     pub fn index(self) -> usize {
@@ -82,6 +95,9 @@ impl Parameter {
             Parameter::Mass => "mass_factor",
             Parameter::Rotation => "rotation_factor",
             Parameter::RedshiftPower => "redshift_power",
+            Parameter::Xi => "xi",
+            Parameter::BetaR => "beta_r",
+            Parameter::BetaPhi => "beta_phi",
         }
     }
 
@@ -104,6 +120,7 @@ impl Parameter {
             Parameter::Mass => [1e-3, 1e3],
             Parameter::Rotation => [-10.0, 10.0],
             Parameter::RedshiftPower => [-10.0, 10.0],
+            Parameter::Xi | Parameter::BetaR | Parameter::BetaPhi => [0.0, 1.0],
         }
     }
 
@@ -123,6 +140,9 @@ impl Parameter {
             Parameter::OffsetX | Parameter::OffsetY => 0.5,
             Parameter::Mass | Parameter::Rotation => 0.1,
             Parameter::RedshiftPower => 0.5,
+            Parameter::Xi => 0.15,
+            Parameter::BetaR => 0.05,
+            Parameter::BetaPhi => 0.1,
         }
     }
 }
@@ -132,9 +152,10 @@ impl Parameter {
 pub struct World([f64; PARAMETERS]);
 
 impl World {
-    /// A hole of the reference mass in the middle of the screen, its spin towards north, matter as fast as the law.
+    /// A hole of the reference mass in the middle of the screen, its spin towards north, matter as fast as the law, and
+    /// on circular orbits where the law has three more parameters.
     pub fn new(spin: f64, inclination: f64, redshift_power: f64) -> Self {
-        World([spin, inclination, 0.0, 0.0, 0.0, 1.0, 1.0, redshift_power])
+        World([spin, inclination, 0.0, 0.0, 0.0, 1.0, 1.0, redshift_power, 1.0, 1.0, 1.0])
     }
 
     /// Of a parameter.
@@ -163,6 +184,7 @@ impl World {
                     Parameter::OffsetX | Parameter::OffsetY => "-1000 to 1000 M",
                     Parameter::Mass => "0.001 to 1000",
                     Parameter::Rotation | Parameter::RedshiftPower => "-10 to 10",
+                    Parameter::Xi | Parameter::BetaR | Parameter::BetaPhi => "0 to 1",
                 };
                 return Err(Error::out_of_range(parameter.name(), value, allowed));
             }

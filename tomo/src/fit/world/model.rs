@@ -3,40 +3,68 @@
 use super::tangents::Tangents;
 use super::{Number, Parameter, World};
 use crate::Error;
+use crate::dynamics::infall::{self, Falling};
 use crate::dynamics::{AngularVelocity, Axis};
 use crate::fit::{ForwardModel, Motion, Redshift, Region, Sampling, SightlineRequest, Sightlines};
 use crate::simd::Float;
+use kerrlight_geodesic::infall::Mixture;
 use kerrlight_geodesic::node_gradients;
 use kerrlight_geodesic::simd::{NodeRequest, PanelRule};
 use kerrlight_geodesic::{Inclination, Kerr, Observer, Quantities};
+use std::sync::Arc;
 
-/// Angular velocity before [`Parameter::Rotation`] is applied.
+/// How matter moves before [`Parameter::Rotation`] is applied.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Law {
     /// 1/(r^{3/2} + a): circular geodesics about whatever spin the hole has.
     CircularOrbits,
     /// The same for all worlds.
     Fixed(AngularVelocity),
+    /// The family between circular orbits and free fall that [`Parameter::Xi`], [`Parameter::BetaR`] and
+    /// [`Parameter::BetaPhi`] say, about a spin (M) of the flow's own or, without one, that of each world along the axis.
+    Infall(Option<f64>),
 }
 
 impl Law {
-    /// As it is for a spin, times a factor.
-    fn velocity(&self, spin: f64, factor: f64) -> AngularVelocity {
+    /// As it is in a world, about an axis.
+    fn velocity(&self, world: &World, axis: Axis) -> Result<AngularVelocity, Error> {
+        let factor = world.get(Parameter::Rotation);
         let law = match self {
-            Law::CircularOrbits => AngularVelocity::Keplerian { drag: spin },
-            Law::Fixed(law) => law.clone(),
+            Law::Infall(drag) => infall(*drag, world, axis)?,
+            _ => self.circular(world.get(Parameter::Spin)),
         };
-        if factor == 1.0 { law } else { AngularVelocity::Scaled { of: Box::new(law), factor } }
+        Ok(match law {
+            law if factor == 1.0 => law,
+            AngularVelocity::Falling(flow) => {
+                AngularVelocity::Falling(Arc::new(flow.scaled(factor)))
+            }
+            law => AngularVelocity::Scaled { of: Box::new(law), factor },
+        })
     }
 
-    /// With the derivatives that radius, spin and factor have.
+    fn circular(&self, spin: f64) -> AngularVelocity {
+        match self {
+            Law::Fixed(law) => law.clone(),
+            _ => AngularVelocity::Keplerian { drag: spin },
+        }
+    }
+
+    /// The angular velocity of matter that stays at its radius, with the derivatives that radius, spin and factor have.
     pub(super) fn rate(&self, r: Number, spin: Number, factor: Number) -> Number {
-        let law = self.velocity(spin.value, 1.0);
+        let law = self.circular(spin.value);
         let (rate, slope) = (law.rate(r.value), law.slope(r.value));
         let by_spin = if *self == Law::CircularOrbits { -rate * rate } else { 0.0 };
         let bend = core::array::from_fn(|k| slope * r.slope[k] + by_spin * spin.slope[k]);
         factor * Number { value: rate, slope: bend }
     }
+}
+
+/// The family's flow in a world.
+fn infall(drag: Option<f64>, world: &World, axis: Axis) -> Result<AngularVelocity, Error> {
+    let [xi, beta_r, beta_phi] = Parameter::FLOW.map(|parameter| world.get(parameter));
+    let spin = drag.unwrap_or(world.get(Parameter::Spin) * axis.vector()[2]);
+    let law = infall::Law::Family { spin, mixture: Mixture { xi, beta_r, beta_phi } };
+    Ok(AngularVelocity::Falling(Arc::new(Falling::new(law)?)))
 }
 
 /// What all worlds share: the screen, where emission is looked for, the law of motion and the frames.
@@ -117,7 +145,7 @@ impl WorldModel {
             quantities: Quantities { azimuth: true, time: self.slow_light, velocity: true },
         };
         let nodes = node_gradients::trace(&hole, &observer, &alpha, &beta, TOLERANCE, &request)?;
-        let (lines, tangents) = Tangents::new(self, world, free, &nodes);
+        let (lines, tangents) = Tangents::new(self, world, free, &nodes)?;
         Ok((self.forward_of(world, &lines)?, tangents))
     }
 
@@ -129,7 +157,7 @@ impl WorldModel {
         let (hole, _) = self.observed(world)?;
         let power = world.get(Parameter::RedshiftPower);
         let redshift = self.redshift.then_some(Redshift { power });
-        let mut model = ForwardModel::new(lines, &self.motion_of(world), &hole, redshift)?;
+        let mut model = ForwardModel::new(lines, &self.motion_of(world)?, &hole, redshift)?;
         model.weigh(self.axis);
         Ok(model)
     }
@@ -146,16 +174,18 @@ impl WorldModel {
     }
 
     /// How matter moves in a world, and the times of its frames in that world's M.
-    pub fn motion_of(&self, world: &World) -> Motion {
-        let [spin, mass, factor] =
-            [Parameter::Spin, Parameter::Mass, Parameter::Rotation].map(|p| world.get(p));
+    ///
+    /// # Errors
+    /// If a parameter of the flow is out of its range.
+    pub fn motion_of(&self, world: &World) -> Result<Motion, Error> {
+        let mass = world.get(Parameter::Mass);
         let reference = self.motion.reference;
         let since = |time: &f64| reference + (time - reference) / mass;
-        Motion {
-            velocity: self.law.velocity(spin, factor),
+        Ok(Motion {
+            velocity: self.law.velocity(world, self.axis)?,
             times: self.motion.times.iter().map(since).collect(),
             ..self.motion.clone()
-        }
+        })
     }
 
     fn screen(&self, world: &World) -> (Vec<f64>, Vec<f64>) {

@@ -1,4 +1,4 @@
-//! The redshift of gas on spheres, for numbers that carry derivatives.
+//! The redshift of gas on spheres, or falling, for numbers that carry derivatives.
 
 use kerrlight_geodesic::Elementary;
 
@@ -12,10 +12,13 @@ pub(super) struct Gas<T> {
     pub spin: T,
     /// Angular velocity, radians per M.
     pub velocity: T,
+    /// dr/dt, and d(1/r)/dτ of the backward ray; none of gas on spheres.
+    pub fall: Option<[T; 2]>,
 }
 
 impl<T: Elementary> Gas<T> {
-    /// g = √N/(1 − Ω ξ·L), N = −u·u of the gas per (dt)², with dφ/dt = −Ω ξ·θ̂/sin θ and dθ/dt = Ω ξ·φ̂; none where
+    /// g = √N/(1 − Ω ξ·L), N = −u·u of the gas per (dt)², with dφ/dt = −Ω ξ·θ̂/sin θ and dθ/dt = Ω ξ·φ̂, less
+    /// g_rr (dr/dt)² and p_r dr/dt of gas that falls; none where
     /// it would be faster than light.
     pub fn redshift(&self, axis: [f64; 3]) -> Option<T> {
         let s = T::constant;
@@ -39,8 +42,13 @@ impl<T: Elementary> Gas<T> {
         let drag = s(4.0) * a * r * sin_theta * rate * along_theta / sigma;
         let speeds =
             rate * rate * (round * along_theta * along_theta + sigma * along_phi * along_phi);
-        let square = s(1.0) - s(2.0) * r / sigma - drag - speeds;
-        let boost = s(1.0) - rate * dot(self.momentum, axis);
+        let mut square = s(1.0) - s(2.0) * r / sigma - drag - speeds;
+        let mut boost = s(1.0) - rate * dot(self.momentum, axis);
+        if let Some([fall, radial]) = self.fall {
+            let delta = r2 - s(2.0) * r + a * a;
+            square = square - sigma / delta * fall * fall;
+            boost = boost - radial * fall * r2 / delta;
+        }
         (square.value() > 0.0 && boost.value() > 0.0).then(|| square.sqrt() / boost)
     }
 }

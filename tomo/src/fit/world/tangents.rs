@@ -1,7 +1,9 @@
 //! How the nodes of all rays move with the parameters of the world.
 
+use super::fall::{Fallen, Falls, Flowing};
 use super::redshift::Gas;
 use super::{Number, PARAMETERS, Parameter, World, WorldModel};
+use crate::Error;
 use crate::fit::Sightlines;
 use kerrlight_geodesic::derivatives::Gradient;
 use kerrlight_geodesic::node_gradients::{DifferentiatedNode, DifferentiatedNodes};
@@ -29,6 +31,8 @@ pub struct Tangents {
     pub(super) moves: Vec<Move>,
     /// ln(mass) is by how much the frames' times shrink, if that is free.
     pub(super) mass: Option<(usize, f64)>,
+    /// How matter is carried along that changes its radius; the moves' rates are then not used.
+    pub(super) falls: Option<Falls>,
 }
 
 impl Tangents {
@@ -38,31 +42,35 @@ impl Tangents {
         world: &World,
         free: &[Parameter],
         nodes: &DifferentiatedNodes,
-    ) -> (Sightlines, Self) {
+    ) -> Result<(Sightlines, Self), Error> {
         let pixels = nodes.rays();
         let limits = Some(model.region.radii());
         let mut lines = Sightlines { pixels, starts: vec![0], limits, ..Sightlines::default() };
         let mass = free.iter().position(|parameter| *parameter == Parameter::Mass);
         let mass = mass.map(|place| (place, world.get(Parameter::Mass)));
-        let mut tangents = Tangents { free: free.to_vec(), moves: Vec::new(), mass };
-        let mut builder =
-            Builder { model, numbers: world.numbers(), ray: [Number::constant(0.0); 2] };
+        let mut tangents = Tangents { free: free.to_vec(), mass, ..Tangents::default() };
+        let (numbers, flow) = (world.numbers(), Flowing::new(model, world)?);
+        let mut builder = Builder { model, flow, numbers, ray: [Number::constant(0.0); 2] };
+        let mut fallen = Vec::new();
         for pixel in 0..pixels {
             builder.ray = model.place(&builder.numbers, pixel);
             for node in nodes.ray(pixel).iter().filter(|n| model.region.holds(n.value.position)) {
                 builder.push(node, &mut lines);
-                let moves = builder.moves(node);
+                let (moves, origin) = builder.moves(node);
+                fallen.extend(origin);
                 tangents.moves.extend(free.iter().map(|parameter| moves[parameter.index()]));
             }
             lines.end_ray(pixel);
         }
-        (lines, tangents)
+        tangents.falls = builder.flow.falls(fallen);
+        Ok((lines, tangents))
     }
 }
 
 /// What the nodes of a ray share.
 struct Builder<'a> {
     model: &'a WorldModel,
+    flow: Flowing<'a>,
     numbers: [Number; PARAMETERS],
     /// α and β.
     ray: [Number; 2],
@@ -97,7 +105,7 @@ impl Builder<'_> {
         Number { value, slope }
     }
 
-    fn moves(&self, node: &DifferentiatedNode) -> [Move; PARAMETERS] {
+    fn moves(&self, node: &DifferentiatedNode) -> ([Move; PARAMETERS], Option<Fallen>) {
         let (at, by) = (&node.value, &node.gradient);
         let vector = |at: [f64; 3], by: [Gradient; 3]| [0, 1, 2].map(|c| self.number(at[c], by[c]));
         let of = |parameter: Parameter| self.numbers[parameter.index()];
@@ -105,18 +113,24 @@ impl Builder<'_> {
         let [x, y, z] = position;
         let r = (x * x + y * y + z * z).sqrt();
         let spin = of(Parameter::Spin);
-        let velocity = self.model.law.rate(r, spin, of(Parameter::Rotation));
+        let falling = self.flow.at(r);
+        let velocity = match falling {
+            Some([_, turn]) => turn,
+            None => self.model.law.rate(r, spin, of(Parameter::Rotation)),
+        };
         let plain = self.number(at.weight, by.weight) * Number::constant(self.model.jy);
         let momentum = vector(at.momentum, by.momentum);
-        let gas = Gas { position, momentum, spin, velocity };
+        let fall = falling.map(|[fall, _]| [fall, self.number(at.radial, by.radial)]);
+        let gas = Gas { position, momentum, spin, velocity, fall };
         let weight = if self.model.redshift { self.shifted(&gas, plain) } else { plain };
         let delay = self.number(at.delay, by.delay);
-        core::array::from_fn(|k| Move {
+        let moves = core::array::from_fn(|k| Move {
             position: [0, 1, 2].map(|c| position[c].slope[k]),
             weight: weight.slope[k],
             rate: -velocity.slope[k],
             time: if self.model.slow_light { -delay.slope[k] } else { 0.0 },
-        })
+        });
+        (moves, falling.map(|rates| self.flow.origin(r, rates)))
     }
 
     /// Weight times g^power: dark where the gas would be faster than light.
