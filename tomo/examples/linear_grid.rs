@@ -10,7 +10,7 @@ mod paper;
 
 use kerrlight_tomo::dynamics::Axis;
 use kerrlight_tomo::fit::linear::{
-    Coarse, LinearProblem, LinearProgress, LinearSettings, Method, Prior, Voxels, Weighted,
+    Change, Coarse, LinearProblem, LinearProgress, LinearSettings, Method, Prior, Voxels, Weighted,
 };
 use kerrlight_tomo::fit::{ImageTerm, Regulariser};
 use paper::{FRAMES, Truth, forward_model, lines, processor_time, screen};
@@ -98,6 +98,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         upper: 2.0,
         flux: None,
         priors: if weight > 0.0 { &smooth } else { &[] },
+        change: Change::NONE,
     };
 
     let (start, cpu, mut next) = (Instant::now(), processor_time(), Duration::ZERO);

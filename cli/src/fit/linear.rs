@@ -5,7 +5,7 @@ use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
 use anyhow::Context;
 use kerrlight_tomo::dynamics::Axis;
-use kerrlight_tomo::fit::linear::{Ending, LinearProgress, LinearSolution};
+use kerrlight_tomo::fit::linear::{Change, Ending, LinearProgress, LinearSolution};
 use kerrlight_tomo::fit::settings::{FitFile, Kind};
 use kerrlight_tomo::fit::{Objective, setup};
 use serde_json::{Value, json};
@@ -15,7 +15,7 @@ use std::ops::ControlFlow;
 pub fn solve(
     file: &FitFile,
     objective: &mut Objective<f32>,
-    axis: Axis,
+    (axis, change): (Axis, Change),
     (nodes, stride): (usize, usize),
 ) -> anyhow::Result<LinearSolution<f32>> {
     let (keeper, bar) = (Keeper::brief(STOPPED), progress::waiting("linear grid"));
@@ -27,7 +27,8 @@ pub fn solve(
         bar.tick();
         if keeper.stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let solution = setup::solve_linear(file, objective, axis, (nodes, stride), &mut watch);
+    let solution =
+        setup::solve_linear(file, objective, (axis, change), (nodes, stride), &mut watch);
     let solution = solution.map_err(failed::linear).context("linear")?;
     bar.finish_and_clear();
     if solution.ending == Ending::Cancelled {

@@ -13,6 +13,7 @@ use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
+use kerrlight_tomo::fit::linear::Change;
 use kerrlight_tomo::fit::settings::{AxisSearch, FitFile, Kind, Start};
 use kerrlight_tomo::fit::setup::{self, Instrument, Measured};
 use kerrlight_tomo::fit::{Loss, Motion, Objective, Outcome, State, Trainer, checkpoint};
@@ -82,7 +83,9 @@ pub fn run(
         None => (file, instrument, motion),
     };
     let objective = prepared.objective(instrument, motion)?;
-    let representation = setup::representation(file, registry)?;
+    let times = setup::emission_times(instrument, motion);
+    let representation = setup::representation(file, registry, times)?;
+    let change = setup::change(file, times)?;
     let (axis, axis_rate) = setup::axis(file)?;
     let training = setup::training(file, axis_rate)?;
     let mut state = State::new(&*representation, axis, &training);
@@ -105,7 +108,7 @@ pub fn run(
         }
         None => {
             folder.file(folder::LOG)?.write(b"")?;
-            run.start(&mut state, motion)?;
+            run.start(&mut state, motion, change)?;
             folder.save(&checkpoint::encode(&state, text)?)?;
         }
     }
@@ -173,7 +176,12 @@ impl Run<'_> {
     }
 
     /// The axis and the parameters that a scan and the linear problem give to begin with.
-    fn start(&mut self, state: &mut State<f32>, motion: &Motion) -> anyhow::Result<()> {
+    fn start(
+        &mut self,
+        state: &mut State<f32>,
+        motion: &Motion,
+        change: Change,
+    ) -> anyhow::Result<()> {
         if let AxisSearch::Scan(settings) = &self.file.axis {
             let found = axis_scan::run(self.file, self.measured, motion, settings)?;
             state.now.axis = found.axis();
@@ -185,12 +193,18 @@ impl Run<'_> {
         let trainer = &mut self.trainer;
         if self.file.representation.kind == Kind::LinearGrid {
             let nodes = self.file.representation.nodes;
-            let solution = linear::solve(self.file, &mut trainer.objective, axis, (nodes, 1))?;
+            let solution =
+                linear::solve(self.file, &mut trainer.objective, (axis, change), (nodes, 1))?;
             self.folder.log(&linear::solved(&solution))?;
             eprintln!("{}", linear::statement(&solution));
             state.now.parameters = solution.emission;
         } else if let Start::Linear { nodes, stride, steps } = self.file.training.start {
-            let solution = linear::solve(self.file, &mut trainer.objective, axis, (nodes, stride))?;
+            let solution = linear::solve(
+                self.file,
+                &mut trainer.objective,
+                (axis, Change::NONE),
+                (nodes, stride),
+            )?;
             self.folder.log(&linear::solved(&solution))?;
             setup::imprint(
                 self.file,

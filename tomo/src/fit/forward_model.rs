@@ -7,7 +7,8 @@ use super::occupancy::Occupancy;
 use super::shift::Shift;
 use super::sightlines::Sightlines;
 use crate::Error;
-use crate::dynamics::{AngularVelocity, Axis, Injection};
+use crate::dynamics::{AngularVelocity, Axis, Injection, Turned, pull_back};
+use crate::points::{Coordinates, CoordinatesMut};
 use crate::representation::{Representation, Workspace};
 use crate::simd::Float;
 use kerrlight_geodesic::Kerr;
@@ -24,6 +25,22 @@ pub struct Motion {
     pub injection: Option<Injection>,
     /// Times of the frames, M.
     pub times: Vec<f64>,
+}
+
+impl Motion {
+    /// Where the matter at points (M) at a time since the reference time (M) is at the reference time.
+    pub fn matter<T: Float>(&self, axis: Axis, time: f64, [x, y, z]: [&[T]; 3]) -> [Vec<T>; 3] {
+        let angle = |k: usize| {
+            let [x, y, z] = [x[k], y[k], z[k]].map(Float::double);
+            T::of(-self.velocity.rate((x * x + y * y + z * z).sqrt()) * time)
+        };
+        let angles: Vec<T> = (0..x.len()).map(angle).collect();
+        let mut pulled: [Vec<T>; 3] = core::array::from_fn(|_| vec![T::zero(); x.len()]);
+        let turned = Turned { points: Coordinates::xyz(x, y, z), angles: &angles };
+        let [a, b, c] = &mut pulled;
+        pull_back(axis, turned, CoordinatesMut::xyz(a, b, c));
+        pulled
+    }
 }
 
 /// Redshift of the emission: j ∝ g^power a unit of affine parameter.
@@ -191,13 +208,25 @@ impl<T: Float> ForwardModel<T> {
         field: &(dyn Fn([f64; 3]) -> f64 + Sync),
         batch: &mut Batch<T>,
     ) -> Vec<f64> {
+        self.movie_in_time(axis, &|x, _| field(x), batch)
+    }
+
+    /// The same of a field e₀(x, t) that also depends on the time since the reference time, M.
+    pub fn movie_in_time(
+        &self,
+        axis: Axis,
+        field: &(dyn Fn([f64; 3], f64) -> f64 + Sync),
+        batch: &mut Batch<T>,
+    ) -> Vec<f64> {
         let mut movie = vec![0.0; self.frames() * self.pixels];
         for (frame, image) in movie.chunks_exact_mut(self.pixels).enumerate() {
             batch.set((0..self.rays()).map(|ray| (ray as u32, frame as u32)));
             batch.gather(self, axis, None);
-            let Columns { pulled: [x, y, z], weight, .. } = &batch.columns;
-            let light =
-                |k: usize| weight[k].double() * field([x[k], y[k], z[k]].map(Float::double));
+            let Columns { pulled: [x, y, z], weight, time, .. } = &batch.columns;
+            let light = |k: usize| {
+                let emission = field([x[k], y[k], z[k]].map(Float::double), time[k].double());
+                weight[k].double() * emission
+            };
             let sum = |range: &[usize]| (range[0]..range[1]).map(light).sum::<f64>();
             let fluxes: Vec<f64> = batch.starts.par_windows(2).map(sum).collect();
             for (pixel, flux) in self.pixel.iter().zip(fluxes) {

@@ -4,9 +4,10 @@ use super::objective::{Buffers, Loss, Objective};
 use super::occupancy::{Occupancy, OccupancySettings};
 use super::penalties::{Penalties, ProbeBuffers};
 use super::sightlines::Region;
-use super::{Field, is_turned};
+use super::{Field, Motion, is_turned};
 use crate::dynamics::Axis;
 use crate::optimise::{Adam, AdamState, Lbfgs, LbfgsState, Polynomial};
+use crate::points::Coordinates;
 use crate::representation::Representation;
 use crate::simd::Float;
 use serde::{Deserialize, Serialize};
@@ -208,5 +209,26 @@ impl<'a, T: Float> Trainer<'a, T> {
     /// Emission at points at the reference time.
     pub fn emission(&mut self, now: &Progress<T>, points: [&[T]; 3]) -> Vec<T> {
         self.buffers.emission(self.representation, &now.parameters, points)
+    }
+
+    /// Emission at points (M) at another time, M since the reference time; `motion` is that of the forward model.
+    pub fn emission_at(
+        &mut self,
+        now: &Progress<T>,
+        motion: &Motion,
+        time: f64,
+        points: [&[T]; 3],
+    ) -> Vec<T> {
+        let (x, y, z) = (points[0], points[1], points[2]);
+        let matter = motion.matter(now.axis, time, points);
+        let times = vec![T::of(time); x.len()];
+        let at = match self.representation.dimension() {
+            4 => Coordinates::txyz(&times, x, y, z),
+            _ => Coordinates::xyz(&matter[0], &matter[1], &matter[2]),
+        };
+        let mut values = vec![T::zero(); x.len()];
+        let workspace = self.buffers.workspace();
+        self.representation.eval(&now.parameters, at, &mut values, workspace);
+        values
     }
 }

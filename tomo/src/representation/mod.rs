@@ -7,6 +7,7 @@
 //! [`conformance`] holds what every representation must pass.
 
 mod activation;
+mod changing;
 pub mod conformance;
 mod features;
 mod grid;
@@ -15,6 +16,7 @@ mod registry;
 mod workspace;
 
 pub use activation::Activation;
+pub use changing::{Allowed, Changing, Knots};
 pub use features::{FeatureGrid, FeatureGridSettings};
 pub use grid::{Grid, GridSettings};
 pub use network::{Initialisation, Network, NetworkSettings};

@@ -2,6 +2,7 @@
 
 mod file;
 pub mod metrics;
+mod over_time;
 mod panels;
 #[cfg(test)]
 mod paper;
@@ -13,6 +14,7 @@ use crate::Error;
 use crate::dynamics::Axis;
 pub use file::{VolumeArrays, VolumeFileError};
 use kerrlight_geodesic::vector::rotate;
+pub use over_time::OverTime;
 pub use panels::Shown;
 
 /// Numbers on a regular grid of nodes, linear in between along each axis and zero outside.

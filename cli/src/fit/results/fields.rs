@@ -3,7 +3,7 @@
 use kerrlight_geodesic::vector::distance;
 use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::fit::setup::Truth;
-use kerrlight_tomo::fit::{State, Trainer};
+use kerrlight_tomo::fit::{Motion, State, Trainer};
 use kerrlight_tomo::volume::Volume;
 use kerrlight_tomo::volume::metrics::{self, Comparison};
 
@@ -36,7 +36,7 @@ pub fn recovered(
     state: &State<f32>,
 ) -> anyhow::Result<Volume> {
     let region = file.region.limits();
-    on_nodes(file, trainer, state, &|x| region.holds(x))
+    on_nodes(file, (trainer, None), state, &|x| region.holds(x))
 }
 
 /// The field at the reference time at all nodes whose matter passes the region at some time, or next to it: what a
@@ -58,13 +58,13 @@ pub fn carried(
         let least = (along * axis[2]).abs() - reach;
         r > region.r_min - margin && r < region.r_max + margin && least <= region.z_width + margin
     };
-    on_nodes(file, trainer, state, &passes)
+    on_nodes(file, (trainer, None), state, &passes)
 }
 
-/// The field at the reference time, zero where nothing is wanted.
+/// The field at the reference time or another one, zero where nothing is wanted.
 fn on_nodes(
     file: &FitFile,
-    trainer: &mut Trainer<'_, f32>,
+    (trainer, at): (&mut Trainer<'_, f32>, Option<(&Motion, f64)>),
     state: &State<f32>,
     wanted: &dyn Fn([f64; 3]) -> bool,
 ) -> anyhow::Result<Volume> {
@@ -73,16 +73,37 @@ fn on_nodes(
     let inside: Vec<usize> = (0..positions.len()).filter(|k| wanted(positions[*k])).collect();
     let column = |c: usize| inside.iter().map(|k| positions[*k][c] as f32).collect::<Vec<f32>>();
     let [x, y, z] = [0, 1, 2].map(column);
-    let found = trainer.emission(&state.now, [&x, &y, &z]);
+    let found = match at {
+        Some((motion, since)) => trainer.emission_at(&state.now, motion, since, [&x, &y, &z]),
+        None => trainer.emission(&state.now, [&x, &y, &z]),
+    };
     let mut values = vec![0.0; positions.len()];
     inside.iter().zip(found).for_each(|(k, value)| values[*k] = value);
     nodes.volume(values)
 }
 
+/// The field at another time, M since the reference time; zero outside the region.
+pub fn recovered_at(
+    file: &FitFile,
+    (trainer, motion): (&mut Trainer<'_, f32>, &Motion),
+    state: &State<f32>,
+    since: f64,
+) -> anyhow::Result<Volume> {
+    let region = file.region.limits();
+    on_nodes(file, (trainer, Some((motion, since))), state, &|x| region.holds(x))
+}
+
+/// The truth at a time since the reference time, M.
+pub fn true_volume_at(file: &FitFile, truth: &Truth, since: f64) -> anyhow::Result<Volume> {
+    let nodes = Box3::new(file);
+    let light = |x: &[f64; 3]| truth.seen_at(*x, since) as f32;
+    nodes.volume(nodes.positions().iter().map(light).collect())
+}
+
 /// The truth at the reference time.
 pub fn true_volume(file: &FitFile, truth: &Truth) -> anyhow::Result<Volume> {
     let nodes = Box3::new(file);
-    nodes.volume(nodes.positions().iter().map(|x| truth.at(*x) as f32).collect())
+    nodes.volume(nodes.positions().iter().map(|x| truth.at(*x, 0.0) as f32).collect())
 }
 
 /// What the field is worth beside the truth.

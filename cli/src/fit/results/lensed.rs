@@ -41,7 +41,8 @@ impl Estimate<'_> {
             still.recovered.extend(rays.pixels(&recovered(&mut model, trainer, state)));
             if let Some(truth) = &self.measured.truth {
                 model.weigh(truth.axis());
-                let image = model.movie_of(truth.axis(), &|x| truth.at(x), &mut Batch::default());
+                let light = |x, t| truth.at(x, t);
+                let image = model.movie_in_time(truth.axis(), &light, &mut Batch::default());
                 let image: Vec<f32> = image.into_iter().map(|x| x as f32).collect();
                 still.truth.get_or_insert_default().extend(rays.pixels(&image));
             }

@@ -3,6 +3,7 @@
 mod fields;
 mod lensed;
 mod numbers;
+mod over_time;
 mod page;
 mod plots;
 mod scene;
@@ -21,6 +22,7 @@ use kerrlight_tomo::interferometry::files::images;
 use kerrlight_tomo::units::MICROARCSECOND;
 use kerrlight_tomo::volume::{Volume, VolumeFile, vti};
 use lensed::Still;
+use over_time::Changes;
 use serde_json::Value;
 use std::time::Instant;
 use verdict::{Evidence, Judged};
@@ -57,10 +59,14 @@ impl Estimate<'_> {
         let mask = numbers::mask_error(trainer, state, &movie);
         self.volumes(&volume, state)?;
         self.movies(&movie)?;
+        let changes = self.changes(trainer, state)?;
+        if let Some(changes) = &changes {
+            self.folder.file("emission.csv")?.write(changes.table().as_bytes())?;
+        }
         self.scene(trainer, state, &movie)?;
         let still = self.still(trainer, state)?;
         let judged = self.evidence().judged(&trainer.objective, &movie)?;
-        let found = Found { volume, still, loss, mask, judged, movie, state, begun };
+        let found = Found { volume, changes, still, loss, mask, judged, movie, state, begun };
         let results = self.results(trainer, &found)?;
         self.folder.file("results.json")?.write(sealed(results.clone()).as_bytes())?;
         self.report(&found, &results)?;
@@ -109,6 +115,8 @@ impl Estimate<'_> {
 /// What was found.
 pub struct Found<'a> {
     volume: Volume,
+    /// The emission over time, where it is not the same at all times.
+    changes: Option<Changes>,
     still: Still,
     loss: Loss,
     /// What the mask of what shines leaves out, of the flux; nothing without a mask.

@@ -85,6 +85,10 @@ impl Estimate<'_> {
         results["psnr_inside_db"] = json!(inside.psnr_db);
         results["nrmse"] = json!(all.nrmse);
         results["correlation"] = json!(all.correlation);
+        if let Some(changes) = &found.changes {
+            results["psnr_over_time_db"] = json!(changes.closeness.psnr_db());
+            results["nrmse_over_time"] = json!(changes.closeness.nrmse());
+        }
         Ok(results)
     }
 }
@@ -121,7 +125,7 @@ const fn meaning(
     Meaning { key, name, digits, unit, text }
 }
 
-const MEANINGS: [Meaning; 11] = [
+const MEANINGS: [Meaning; 13] = [
     meaning("loss", "loss", 6, "", "what was minimised, of all data, without penalties"),
     meaning(
         "psnr_db",
@@ -137,6 +141,20 @@ const MEANINGS: [Meaning; 11] = [
         2,
         "dB",
         "the same, of the nodes inside the region of recovery alone",
+    ),
+    meaning(
+        "psnr_over_time_db",
+        "PSNR over time",
+        2,
+        "dB",
+        "the same of the volumes at the times of all frames together, for emission that changes",
+    ),
+    meaning(
+        "nrmse_over_time",
+        "relative error over time",
+        4,
+        "",
+        "root mean square error of the volumes at the times of all frames over that of the truth",
     ),
     meaning(
         "nrmse",

@@ -2,6 +2,7 @@
 
 use super::lensed::{self, Still};
 use super::numbers::outcomes;
+use super::over_time::Changes;
 use super::{Estimate, Found};
 use crate::fit::curves::{loss_plot, psnr_plot};
 use crate::fit::{labels, world_search};
@@ -24,6 +25,7 @@ impl Estimate<'_> {
         let mut plots: Vec<LinePlot> = loss_plot(&lines).into_iter().collect();
         plots.extend(psnr_plot(&lines));
         plots.push(self.light_curve(&found.movie));
+        plots.extend(found.changes.as_ref().map(Changes::plot));
         plots.extend(self.amplitudes(&found.movie)?);
         let report = Report {
             title: self.file.title.clone(),

@@ -7,6 +7,7 @@
 //! `descent` → `certificate`.
 
 mod certificate;
+mod change;
 mod data;
 mod descent;
 mod error;
@@ -24,6 +25,7 @@ pub(in crate::fit) mod tests;
 mod walk;
 
 pub use certificate::{Certificate, Stationarity};
+pub use change::Change;
 pub use data::Weighted;
 pub use descent::{Ending, Method};
 pub use error::LinearError;

@@ -18,10 +18,11 @@ pub(super) fn refined(from: &Voxels, x: &[f64], to: &Voxels) -> Result<Vec<f64>,
     Ok(values)
 }
 
-/// Marks what is not farther than this many nodes along each axis.
-pub(super) fn dilated(mut marked: Vec<bool>, [_, ny, nz]: [usize; 3], steps: usize) -> Vec<bool> {
+/// Marks what is not farther than this many nodes along each axis, and knots in time.
+pub(super) fn dilated(mut marked: Vec<bool>, [nx, ny, nz]: [usize; 3], steps: usize) -> Vec<bool> {
     let count = marked.len();
-    for (stride, n) in [(1, nz), (nz, ny), (ny * nz, count / (ny * nz))] {
+    let knots = count / (nx * ny * nz);
+    for (stride, n) in [(1, nz), (nz, ny), (ny * nz, nx), (nx * ny * nz, knots)] {
         for _ in 0..steps {
             let spread = |k: usize| {
                 let place = k / stride % n;

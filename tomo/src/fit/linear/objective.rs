@@ -1,5 +1,6 @@
 //! What is minimised: data and penalties as a function of the values at the nodes that count.
 
+use super::change::Change;
 use super::data::Data;
 use super::error::LinearError;
 use super::operator::Operator;
@@ -28,12 +29,51 @@ pub(super) trait Convex {
     fn diagonal(&self) -> Vec<f64>;
 }
 
+/// Penalties on a field, and how it may change.
+#[derive(Clone, Copy)]
+pub(super) struct Penalised<'a> {
+    /// On the field of each knot.
+    pub priors: &'a [Prior],
+    /// The nodes of the grid.
+    pub shape: Shape,
+    /// Along the flow.
+    pub change: Change,
+    /// The largest emission that is allowed.
+    pub upper: f64,
+}
+
+impl Penalised<'_> {
+    fn is_empty(&self) -> bool {
+        self.priors.is_empty() && !(self.change.is_any() && self.change.weight > 0.0)
+    }
+
+    /// The quadratic one alone.
+    fn smoothness(&self) -> Option<Self> {
+        let at = self.priors.iter().position(|p| p.regulariser == Regulariser::Smoothness)?;
+        let change = Change { weight: 0.0, ..self.change };
+        Some(Self { priors: &self.priors[at..=at], change, ..*self })
+    }
+
+    /// Of values at all nodes and knots; those on fields are the means over time of a field that changes, sums over what
+    /// is born. Adds slopes.
+    fn value_and_gradient(&self, x: &[f64], slopes: &mut [f64]) -> f64 {
+        let mut value = self.change.penalty(x, (self.shape.cell(), self.upper), slopes);
+        let (nodes, share) = (self.shape.count(), self.change.share());
+        for (field, slopes) in x.chunks_exact(nodes).zip(slopes.chunks_exact_mut(nodes)) {
+            for Prior { regulariser, weight } in self.priors {
+                let weight = weight * share;
+                value += regulariser.value_and_gradient(field, self.shape, weight, slopes);
+            }
+        }
+        value
+    }
+}
+
 /// The linear problem on the nodes that count.
 pub(super) struct Objective<'a, 'b, T: Float> {
     pub operator: &'b Operator<'a, T>,
     pub data: &'b Data<'a, T>,
-    pub priors: &'b [Prior],
-    pub shape: Shape,
+    pub terms: &'b Penalised<'b>,
     dark: Vec<T>,
     /// Values and gradients and products with second derivatives that were computed.
     pub evaluations: usize,
@@ -43,16 +83,18 @@ impl<'a, 'b, T: Float + Default> Objective<'a, 'b, T> {
     pub fn new(
         operator: &'b Operator<'a, T>,
         data: &'b Data<'a, T>,
-        priors: &'b [Prior],
-        shape: Shape,
+        terms: &'b Penalised<'b>,
     ) -> Self {
         let dark = if data.is_quadratic() { operator.dark(data) } else { Vec::new() };
-        Self { operator, data, priors, shape, dark, evaluations: 0 }
+        Self { operator, data, terms, dark, evaluations: 0 }
     }
 
     /// Whether second derivatives are the same everywhere.
     pub fn is_quadratic(&self) -> bool {
-        self.data.is_quadratic() && self.priors.iter().all(|prior| prior.regulariser.is_quadratic())
+        let Penalised { priors, change, .. } = self.terms;
+        self.data.is_quadratic()
+            && change.is_quadratic()
+            && priors.iter().all(|prior| prior.regulariser.is_quadratic())
     }
 
     /// Refuses a value that is no finite number, and says which data have it.
@@ -89,15 +131,12 @@ impl<'a, 'b, T: Float + Default> Objective<'a, 'b, T> {
     }
 
     fn penalties(&self, x: &[f64], add: impl FnOnce(&[f64])) -> f64 {
-        if self.priors.is_empty() {
+        if self.terms.is_empty() {
             return 0.0;
         }
         let all = self.operator.active.expand(x);
         let mut slopes = vec![0.0; all.len()];
-        let one = |prior: &Prior| {
-            prior.regulariser.value_and_gradient(&all, self.shape, prior.weight, &mut slopes)
-        };
-        let value = self.priors.iter().map(one).sum();
+        let value = self.terms.value_and_gradient(&all, &mut slopes);
         add(&slopes);
         value
     }
@@ -131,13 +170,10 @@ impl<T: Float + Default> Convex for Objective<'_, '_, T> {
         let scale = if largest > 0.0 { 1.0 / largest } else { 1.0 };
         *out = self.operator.curvature(self.data, &self.dark, &rounded::<T>(direction, scale));
         out.iter_mut().for_each(|x| *x *= largest);
-        if self.priors.iter().any(|prior| prior.regulariser == Regulariser::Smoothness) {
+        if let Some(smoothness) = self.terms.smoothness() {
             let all = self.operator.active.expand(direction);
             let mut slopes = vec![0.0; all.len()];
-            for prior in self.priors.iter().filter(|p| p.regulariser == Regulariser::Smoothness) {
-                let weight = prior.weight;
-                prior.regulariser.value_and_gradient(&all, self.shape, weight, &mut slopes);
-            }
+            smoothness.value_and_gradient(&all, &mut slopes);
             let slopes = self.operator.active.gather(&slopes);
             out.iter_mut().zip(slopes).for_each(|(x, slope)| *x += slope);
         }

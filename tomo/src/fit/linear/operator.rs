@@ -20,7 +20,8 @@ pub(super) struct Active {
     pub node: Vec<u32>,
     /// Column of each node, or [`NONE`].
     column: Vec<u32>,
-    /// By its first node, whether any of a cell's nodes counts.
+    /// By its first node, whether any of a cell's nodes counts. Cells of nodes at the edge reach into the next row, plane
+    /// or knot: no ray meets them.
     cells: Vec<bool>,
 }
 
@@ -105,7 +106,7 @@ impl<T: Float> Rows<T> {
             let range = ends[0] as usize..ends[1] as usize;
             let (columns, entries) = (&self.columns[range.clone()], &self.entries[range]);
             let sum = columns.iter().zip(entries).map(|(c, e)| *e * x[*c as usize]);
-            image[*pixel as usize] = sum.fold(T::zero(), |sum, x| sum + x);
+            image[*pixel as usize] += sum.fold(T::zero(), |sum, x| sum + x);
         }
     }
 
@@ -203,7 +204,7 @@ impl<'a, T: Float + Default> Operator<'a, T> {
                     }
                 }
             }
-            image[pixel as usize] = sum;
+            image[pixel as usize] += sum;
         });
     }
 

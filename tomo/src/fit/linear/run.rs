@@ -7,7 +7,7 @@ use super::error::LinearError;
 use super::lit::Spots;
 use super::nodes::{dilated, refined};
 use super::objective::Objective;
-use super::operator::{Active, Operator};
+use super::operator::Operator;
 use super::scaled::Scaled;
 use super::solve::{Coarse, LinearProblem, LinearProgress, LinearSettings, LinearSolution, Watch};
 use super::start::{Lit, Trials};
@@ -98,19 +98,28 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         let fine = self.problem.voxels;
         let voxels = Voxels { nodes: fine.nodes.map(|n| n.min(coarse.nodes)), ..fine };
         let convex = self.problem.data()?.is_convex();
-        // Without phases more frames are needed to tell solutions apart.
-        let stride = if convex { coarse.stride } else { coarse.stride.div_ceil(2) };
+        // Without phases more frames are needed to tell solutions apart; what changes may be seen in one alone.
+        let stride = match (convex, self.problem.change.is_any()) {
+            (_, true) => 1,
+            (true, _) => coarse.stride,
+            (false, _) => coarse.stride.div_ceil(2),
+        };
         let frames: Vec<usize> = self.problem.frames.iter().copied().step_by(stride).collect();
         let problem = LinearProblem { voxels, frames: &frames, priors: &[], ..*self.problem };
         let data = problem.data()?;
-        let active = Active::new(&vec![true; voxels.count()], voxels.corners());
-        let operator = Operator::new(problem.walk(), active, &frames, self.settings.memory);
+        let operator = Operator::new(problem.walk(), problem.all(), &frames, self.settings.memory);
         self.bytes = self.bytes.max(operator.bytes());
-        let mut objective = Objective::new(&operator, &data, &[], voxels.shape());
+        let terms = problem.penalised();
+        let mut objective = Objective::new(&operator, &data, &terms);
         let found = self.coarse_field(&mut objective, coarse.iterations)?;
         self.evaluations += objective.evaluations;
         let Some((x, lit)) = found else { return Ok(None) };
-        let refined = |x: &[f64]| refined(&voxels, &operator.active.expand(x), &fine);
+        let refined = |x: &[f64]| -> Result<Vec<f64>, Error> {
+            let all = operator.active.expand(x);
+            let knots = all.chunks_exact(voxels.count());
+            let fields = knots.map(|knot| refined(&voxels, knot, &fine));
+            Ok(fields.collect::<Result<Vec<_>, _>>()?.concat())
+        };
         self.lit = lit.map_or(Ok(Vec::new()), |lit| refined(&lit))?;
         let x = refined(&x)?;
         let least = self.settings.threshold * x.iter().fold(0.0f64, |most, x| most.max(*x));
@@ -141,9 +150,9 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
             return Ok(());
         }
         let problem = self.problem;
-        let active = Active::new(&vec![true; problem.voxels.count()], problem.voxels.corners());
-        let operator = Operator::new(problem.walk(), active, problem.frames, 0);
-        let mut objective = Objective::new(&operator, data, problem.priors, problem.voxels.shape());
+        let operator = Operator::new(problem.walk(), problem.all(), problem.frames, 0);
+        let terms = problem.penalised();
+        let mut objective = Objective::new(&operator, data, &terms);
         let (value, gradient) = objective.everywhere(&self.lit);
         self.evaluations += 1;
         let slope = gradient.iter().fold(0.0f64, |most, g| most.max(g.abs()));
@@ -160,11 +169,11 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         is_active: &mut Vec<bool>,
     ) -> Result<Option<LinearSolution<T>>, Error> {
         let (problem, settings) = (self.problem, self.settings);
-        let active = Active::new(is_active, problem.voxels.corners());
+        let active = problem.active(is_active);
         let operator = Operator::new(problem.walk(), active, problem.frames, settings.memory);
         self.bytes = self.bytes.max(operator.bytes());
-        let shape = problem.voxels.shape();
-        let mut objective = Objective::new(&operator, data, problem.priors, shape);
+        let terms = problem.penalised();
+        let mut objective = Objective::new(&operator, data, &terms);
         let (dark, dark_slope) = objective.nothing();
         let start = operator.active.gather(x);
         let Descended { x: mut inner, ending, .. } =

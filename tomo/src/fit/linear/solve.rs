@@ -1,9 +1,10 @@
 //! The grid's values from movies and visibilities where the axis is known.
 
 use super::certificate::{Certificate, Stationarity};
+use super::change::Change;
 use super::data::{Data, Weighted};
 use super::descent::{Ending, Method};
-use super::objective::{Objective, Prior};
+use super::objective::{Objective, Penalised, Prior};
 use super::operator::{Active, Operator};
 use super::run::{FEW, LIT, Run};
 use super::start::{Lit, Trials};
@@ -33,6 +34,8 @@ pub struct LinearProblem<'a, T: Float> {
     pub flux: Option<f64>,
     /// Penalties; none is the usual.
     pub priors: &'a [Prior],
+    /// How emission may change while matter carries it; [`Change::NONE`] is the usual.
+    pub change: Change,
 }
 
 /// Where a solution is first looked for.
@@ -104,7 +107,7 @@ pub struct LinearProgress<'a> {
 }
 
 impl LinearProgress<'_> {
-    /// Emission at all nodes of the grid (of the coarse one, in round 0).
+    /// Emission at all nodes of the grid (of the coarse one, in round 0), knot after knot.
     pub fn emission(&self) -> Vec<f64> {
         self.active.expand(self.x)
     }
@@ -113,7 +116,7 @@ impl LinearProgress<'_> {
 /// A solution.
 #[derive(Clone, Debug)]
 pub struct LinearSolution<T> {
-    /// Emission at the nodes, parameters of the linear grid.
+    /// Emission at the nodes, parameters of the linear grid; knot after knot where it may change.
     pub emission: Vec<T>,
     /// How far from the minimum it can be; none if it was cancelled, or the data are not convex in the pixels.
     pub certificate: Option<Certificate>,
@@ -161,9 +164,9 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         let (mut x, mut is_active) = match coarse {
             Some(coarse) => match run.coarse(coarse)? {
                 Some(start) => start,
-                None => return Ok(run.cancelled(vec![0.0; self.voxels.count()], 0)),
+                None => return Ok(run.cancelled(vec![0.0; self.unknowns()], 0)),
             },
-            None => (vec![0.0; self.voxels.count()], vec![true; self.voxels.count()]),
+            None => (vec![0.0; self.unknowns()], vec![true; self.unknowns()]),
         };
         run.reference(&data)?;
         loop {
@@ -184,18 +187,17 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         let settings = LinearSettings { coarse: None, tolerance: 0.0, ..LinearSettings::default() };
         self.check(&settings)?;
         let data = self.data()?;
-        let active = Active::new(&vec![true; self.voxels.count()], self.voxels.corners());
-        let operator = Operator::new(self.walk(), active, self.frames, settings.memory);
-        let shape = self.voxels.shape();
-        let mut objective = Objective::new(&operator, &data, self.priors, shape);
+        let operator = Operator::new(self.walk(), self.all(), self.frames, settings.memory);
+        let terms = self.penalised();
+        let mut objective = Objective::new(&operator, &data, &terms);
         let mut watch = |_: &LinearProgress<'_>| ControlFlow::Continue(());
         let mut run = Run::new(self, &settings, &mut watch);
         if !data.is_convex() {
             let lit = run.lit(&mut objective, Trials { iterations, ..FEW })?;
-            let dark = || Least { x: vec![0.0; self.voxels.count()], value: f64::INFINITY };
+            let dark = || Least { x: vec![0.0; self.unknowns()], value: f64::INFINITY };
             return Ok(lit.map_or_else(dark, |Lit { x, value, .. }| Least { x, value }));
         }
-        let dark = vec![0.0; self.voxels.count()];
+        let dark = vec![0.0; self.unknowns()];
         let found = run.minimise(&mut objective, &dark, iterations);
         let value = objective.finite(found.value, &found.x)?;
         Ok(Least { x: found.x, value })
@@ -206,7 +208,27 @@ impl<T: Float + Default> LinearProblem<'_, T> {
     }
 
     pub(super) fn walk(&self) -> Walk<'_, T> {
-        Walk::new(self.model, self.axis, self.voxels)
+        Walk::new(self.model, self.axis, (self.voxels, self.change.knots))
+    }
+
+    /// All nodes at all knots.
+    pub(super) fn all(&self) -> Active {
+        self.active(&vec![true; self.unknowns()])
+    }
+
+    /// These nodes, knot after knot.
+    pub(super) fn active(&self, is_active: &[bool]) -> Active {
+        Active::new(is_active, self.voxels.corners())
+    }
+
+    /// Values at all nodes and knots.
+    pub(super) fn unknowns(&self) -> usize {
+        self.voxels.count() * self.change.knots.count
+    }
+
+    pub(super) fn penalised(&self) -> Penalised<'_> {
+        let (priors, change, upper) = (self.priors, self.change, self.upper);
+        Penalised { priors, shape: self.voxels.shape(), change, upper }
     }
 
     fn check(&self, settings: &LinearSettings) -> Result<(), Error> {
@@ -215,6 +237,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
             if ok { Ok(()) } else { Err(Error::out_of_range(field, value, allowed)) }
         };
         self.voxels.grid()?;
+        self.change.checked()?;
         let positive = |x: f64| x.is_finite() && x > 0.0;
         check("upper", upper, positive(upper), "above 0")?;
         check("flux", flux.unwrap_or(1.0), flux.is_none_or(positive), "above 0")?;

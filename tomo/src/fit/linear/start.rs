@@ -67,6 +67,7 @@ impl<T: Float + Default> Run<'_, '_, '_, T> {
             false => objective.nothing().0,
         };
         let mut scaled = |shape: Vec<f64>| {
+            let shape = objective.terms.change.steady(&shape);
             let mut shape = objective.operator.active.gather(&shape);
             shape.iter_mut().zip(&seen).for_each(|(x, seen)| *x *= f64::from(u8::from(*seen)));
             self.scaled(objective, &shape)

@@ -7,7 +7,7 @@ use crate::fit::{
     Batch, Field, ForwardModel, FrameTerm, ImageTerm, Motion, Region, Regulariser, Sampling,
     SightlineRequest, Sightlines,
 };
-use crate::representation::Workspace;
+use crate::representation::{Knots, Workspace};
 use core::ops::ControlFlow;
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
 use rand::{RngExt, SeedableRng};
@@ -82,7 +82,7 @@ fn operator<'a>(
     budget: usize,
 ) -> Operator<'a, f64> {
     let active = Active::new(is_active, voxels.corners());
-    Operator::new(Walk::new(model, axis(), voxels), active, &FRAMES, budget)
+    Operator::new(Walk::new(model, axis(), (voxels, Knots::STEADY)), active, &FRAMES, budget)
 }
 
 /// ‖A x‖² and Aᵀ of twice the images, where the data are dark and all nodes or some count.
@@ -171,6 +171,7 @@ fn exact_solution_and_gap_of_a_dense_problem() {
         upper,
         flux: None,
         priors: &[],
+        change: Change::NONE,
     };
     let solve = |method, iterations, coarse| {
         let settings = LinearSettings {
@@ -214,6 +215,7 @@ fn exact_threads_change_no_bit() {
             upper: 2.0,
             flux: None,
             priors: &[prior],
+            change: Change::NONE,
         };
         let settings = LinearSettings { coarse: None, memory, ..LinearSettings::default() };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -240,6 +242,7 @@ fn numbers_out_of_range_are_named_and_a_stop_is_heeded() {
         upper: 1.0,
         flux: None,
         priors: &[],
+        change: Change::NONE,
     };
     let fail = |problem: LinearProblem<'_, f64>| {
         let go_on = &mut |_: &LinearProgress<'_>| ControlFlow::Continue(());

@@ -5,7 +5,7 @@ use crate::dynamics::{Axis, Turned, pull_back};
 use crate::fit::ForwardModel;
 use crate::fit::regulariser::Shape;
 use crate::points::{Coordinates, CoordinatesMut};
-use crate::representation::{Activation, Grid, GridSettings};
+use crate::representation::{Activation, Allowed, Grid, GridSettings, Knots};
 use crate::simd::Float;
 
 /// A grid of voxels, trilinear in between, zero outside; nodes at both ends, z fastest.
@@ -64,11 +64,11 @@ impl Voxels {
 /// A ray's node in its cell.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place<T> {
-    /// First node of the cell.
+    /// First node of the cell; those of the second knot come after those of the first.
     pub corner: u32,
     /// Position in the cell, 0 to 1 along each axis.
     pub within: [T; 3],
-    /// What emission there is multiplied by in the pixel.
+    /// What the value there is multiplied by in the pixel.
     pub weight: T,
 }
 
@@ -125,8 +125,11 @@ impl<T: Float> Geometry<T> {
 pub(super) struct Walk<'a, T> {
     pub model: &'a ForwardModel<T>,
     pub voxels: Voxels,
+    knots: Knots,
     axis: Axis,
     geometry: Geometry<T>,
+    /// Least and largest delay of a node.
+    delays: [T; 2],
 }
 
 /// Memory of a thread.
@@ -143,12 +146,15 @@ const BLOCK: usize = 4096;
 
 impl<'a, T: Float> Walk<'a, T> {
     /// Of rays with the weights that they have for the axis.
-    pub fn new(model: &'a ForwardModel<T>, axis: Axis, voxels: Voxels) -> Self {
-        Self { model, axis, voxels, geometry: Geometry::new(&voxels) }
+    pub fn new(model: &'a ForwardModel<T>, axis: Axis, (voxels, knots): (Voxels, Knots)) -> Self {
+        let delays = &model.delay;
+        let bound = |of: fn(T, T) -> T| delays.iter().copied().reduce(of).unwrap_or(T::zero());
+        let delays = [bound(T::min), bound(T::max)];
+        Self { model, axis, voxels, knots, geometry: Geometry::new(&voxels), delays }
     }
 
     /// Hands over the pixel of every ray with those of its nodes that shine and lie in cells that are
-    /// wanted (all, without a mask), ray after ray.
+    /// wanted (all, without a mask), ray after ray: once for each knot that has a share in the frame.
     pub fn frame(
         &self,
         frame: usize,
@@ -156,15 +162,46 @@ impl<'a, T: Float> Walk<'a, T> {
         buffers: &mut Buffers<T>,
         mut ray: impl FnMut(u32, &[Place<T>]),
     ) {
+        let nodes = self.voxels.count();
+        for knot in 0..self.knots.count {
+            let wanted = wanted.map(|wanted| &wanted[knot * nodes..(knot + 1) * nodes]);
+            if self.takes_part(knot, frame) && wanted.is_none_or(|wanted| wanted.contains(&true)) {
+                self.knot((frame, knot), wanted, buffers, &mut ray);
+            }
+        }
+    }
+
+    /// Whether a knot has a share in the light of a frame.
+    fn takes_part(&self, knot: usize, frame: usize) -> bool {
+        let Knots { first, spacing, count, allowed } = self.knots;
+        if count == 1 {
+            return true;
+        }
+        let of_knot = first + knot as f64 * spacing;
+        let [earliest, latest] =
+            [1, 0].map(|k| (self.model.times[frame] - self.delays[k]).double());
+        let begun = knot == 0 || latest > of_knot - spacing;
+        let over = allowed == Allowed::Any && knot + 1 < count && earliest > of_knot + spacing;
+        begun && !over
+    }
+
+    fn knot(
+        &self,
+        (frame, knot): (usize, usize),
+        wanted: Option<&[bool]>,
+        buffers: &mut Buffers<T>,
+        ray: &mut impl FnMut(u32, &[Place<T>]),
+    ) {
+        let label = T::of(self.knots.label_time(knot));
         let starts = &self.model.starts;
         let mut first = 0;
         while first < self.model.rays() {
             let after = starts.partition_point(|start| *start <= starts[first] + BLOCK) - 1;
             let next = after.max(first + 1);
-            self.pull(starts[first]..starts[next], self.model.times[frame], buffers);
+            self.pull(starts[first]..starts[next], self.model.times[frame] - label, buffers);
             for k in first..next {
                 let range = starts[k]..starts[k + 1];
-                self.places(range, starts[first], frame, wanted, buffers);
+                self.places(range, starts[first], (frame, knot), wanted, buffers);
                 if !buffers.places.is_empty() {
                     ray(self.model.pixel[k], &buffers.places);
                 }
@@ -213,13 +250,26 @@ impl<'a, T: Float> Walk<'a, T> {
         pull_back(self.axis, turned, CoordinatesMut::xyz(a, b, c));
     }
 
+    /// When the light of a node in a frame is emitted.
+    #[inline(always)]
+    fn time(&self, node: usize, frame: usize) -> T {
+        let delay = self.model.delay.get(node).copied().unwrap_or(T::zero());
+        self.model.times[frame] - delay
+    }
+
     /// Whether a node shines in a frame.
     #[inline(always)]
     fn shines(&self, node: usize, frame: usize) -> bool {
-        self.model.earliest.is_none_or(|earliest| {
-            let delay = self.model.delay.get(node).copied().unwrap_or(T::zero());
-            self.model.times[frame] - delay >= earliest
-        })
+        self.model.earliest.is_none_or(|earliest| self.time(node, frame) >= earliest)
+    }
+
+    /// The share of a knot in a node's emission in a frame.
+    #[inline(always)]
+    fn share(&self, node: usize, (frame, knot): (usize, usize)) -> T {
+        match self.knots.count {
+            1 => T::one(),
+            _ => self.knots.share(knot, self.time(node, frame)).0,
+        }
     }
 
     #[inline(always)]
@@ -227,10 +277,11 @@ impl<'a, T: Float> Walk<'a, T> {
         &self,
         range: core::ops::Range<usize>,
         first: usize,
-        frame: usize,
+        (frame, knot): (usize, usize),
         wanted: Option<&[bool]>,
         buffers: &mut Buffers<T>,
     ) {
+        let nodes_before = (knot * self.voxels.count()) as u32;
         buffers.places.clear();
         for node in range {
             let [x, y, z] = &buffers.pulled;
@@ -240,8 +291,12 @@ impl<'a, T: Float> Walk<'a, T> {
             };
             let is_wanted = wanted.is_none_or(|mask| mask[corner]);
             if is_wanted && self.shines(node, frame) {
-                let weight = self.model.weight[node];
-                buffers.places.push(Place { corner: corner as u32, within, weight });
+                let share = self.share(node, (frame, knot));
+                let weight = share * self.model.weight[node];
+                if share > T::zero() {
+                    let corner = nodes_before + corner as u32;
+                    buffers.places.push(Place { corner, within, weight });
+                }
             }
         }
     }

@@ -9,7 +9,7 @@ mod map;
 mod refine;
 
 use super::ForwardModel;
-use super::linear::{LinearError, LinearProblem, Prior, Voxels, Weighted};
+use super::linear::{Change, LinearError, LinearProblem, Prior, Voxels, Weighted};
 use crate::Error;
 use crate::dynamics::Axis;
 use crate::simd::Float;
@@ -158,7 +158,9 @@ impl<T: Float + Default> Scanner<'_, T> {
         let AxisProblem { model, frames, terms, half_width, upper, flux, priors } = *self.problem;
         let model = own.as_ref().unwrap_or(model);
         let voxels = Voxels::cube(effort.nodes, half_width);
-        let problem = LinearProblem { model, axis, frames, terms, voxels, upper, flux, priors };
+        let change = Change::NONE;
+        let problem =
+            LinearProblem { model, axis, frames, terms, voxels, upper, flux, priors, change };
         let loss = problem.least(effort.iterations)?.value;
         let solved = self.solved.fetch_add(1, Ordering::Relaxed) + 1;
         if !(self.watch)(solved, self.expected.max(solved)) {

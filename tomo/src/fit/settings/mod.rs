@@ -3,6 +3,7 @@
 //! They are a TOML text; [`FitFile::parse`] checks every key, type and range. Numbers that decide the result have no
 //! default.
 
+mod change;
 mod data;
 mod error;
 mod penalties;
@@ -14,6 +15,7 @@ mod unknowns;
 mod view;
 mod world;
 
+pub use change::ChangeSettings;
 pub use data::{DataFiles, Loss, LossKind};
 pub use error::FitError;
 pub(crate) use error::{Within, refuse};
@@ -21,7 +23,7 @@ pub use penalties::{PenaltyKind, PenaltySettings, ProbeSettings};
 pub use recovery::{
     AxisScan, AxisSearch, Kind, Linear, Occupancy, Optimiser, Representation, Start, Training,
 };
-pub use simulation::{GlyphShape, Movie, Noise, Observation, Spot, Truth};
+pub use simulation::{GlyphShape, Movie, Noise, Observation, Shines, Spot, Truth};
 pub use unknown_world::{PriorSettings, UnknownWorld, WorldSearch, WorldView};
 pub use view::{Absorption, Effects, Hole, Motion, Observer, Region, Screen, WidthOf};
 pub use world::merge;
@@ -51,6 +53,9 @@ pub struct FitFile {
     pub effects: Effects,
     /// How matter turns.
     pub motion: Motion,
+    /// How emission may change while matter carries it; not at all, without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub change: Option<ChangeSettings>,
     /// Frames of a simulated movie, or of an observation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub movie: Option<Movie>,

@@ -40,6 +40,32 @@ pub struct Spot {
     /// For how long differential rotation has wound it up until the reference time, in units of time.
     #[serde(default)]
     pub wound_for: f64,
+    /// When it shines; always, without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shines: Option<Shines>,
+}
+
+/// When emission appears and fades.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Shines {
+    /// Time at which it has reached half of its brightness, M; it has been there for ever, without one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub from: Option<f64>,
+    /// Time at which it has faded to half, M; it never fades, without one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub until: Option<f64>,
+    /// Time constant of both, logistic functions 1/(1 + exp(−t/rise)), M.
+    pub rise: f64,
+}
+
+impl Shines {
+    /// The share of the brightness at a time.
+    pub fn at(&self, time: f64) -> f64 {
+        let logistic = |t: f64| 1.0 / (1.0 + (-t / self.rise).exp());
+        let rising = self.from.map_or(1.0, |from| logistic(time - from));
+        rising * self.until.map_or(1.0, |until| logistic(until - time))
+    }
 }
 
 /// What a letter looks like.

@@ -1,6 +1,8 @@
 //! From settings to what is recovered and how it is learnt.
 
-use super::{Result, axis, linear};
+use super::change::{self, change};
+use super::{Result, axis, linear, motion};
+use crate::fit::linear::Change;
 use crate::fit::settings::{
     FitError, FitFile, Kind, LossKind, Occupancy, Optimiser, Start, Within, refuse,
 };
@@ -8,15 +10,35 @@ use crate::fit::{BatchSize, OccupancyPlan, OccupancySettings, Region, Training};
 use crate::memory;
 use crate::optimise::{Adam, Lbfgs, Polynomial};
 use crate::representation::{
-    Activation, FeatureGrid, FeatureGridSettings, Grid, GridSettings, Network, NetworkSettings,
-    OwnSettings, Registry, Representation,
+    Activation, Changing, FeatureGrid, FeatureGridSettings, Grid, GridSettings, Network,
+    NetworkSettings, OwnSettings, Registry, Representation,
 };
 
-/// What is recovered; `registry` has what the program adds to kerrlight's own representations.
+/// What is recovered; `registry` has what the program adds to kerrlight's own representations. Where emission
+/// may change, `times` are those of the first and the last emission, M since the reference time
+/// ([`emission_times`](super::emission_times)).
 ///
 /// # Errors
 /// If there is none of this kind, or a number is out of range.
-pub fn representation(file: &FitFile, registry: &Registry) -> Result<Box<dyn Representation<f32>>> {
+pub fn representation(
+    file: &FitFile,
+    registry: &Registry,
+    times: [f64; 2],
+) -> Result<Box<dyn Representation<f32>>> {
+    let inner = of_matter(file, registry)?;
+    let Change { knots, .. } = change(file, times)?;
+    if knots.count == 1 {
+        return Ok(inner);
+    }
+    let parameters = inner.parameters() as f64 * knots.count as f64;
+    let what = || format!("change.spacing: {} times of {} voxels", knots.count, inner.parameters());
+    memory::afford(what, memory::parameters(parameters))?;
+    let velocity = motion(file, Vec::new())?.velocity;
+    Ok(Box::new(Changing::new(inner, knots, (axis(file)?.0, velocity))?))
+}
+
+/// What is recovered where matter carries emission unchanged.
+fn of_matter(file: &FitFile, registry: &Registry) -> Result<Box<dyn Representation<f32>>> {
     let chosen = &file.representation;
     let network = |settings: NetworkSettings| {
         Network::new(NetworkSettings {
@@ -186,6 +208,7 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
     afford(file, registry)?;
     file.check_unknowns()?;
     let training = training(file, axis_rate)?;
+    change::check(file)?;
     let images_only = file.loss.iter().all(|loss| loss.data == LossKind::Image);
     if matches!(training.batch, BatchSize::Pixels(_)) && !images_only {
         refuse!("training.batch: pixels work with images only; use frames = N");
@@ -198,7 +221,7 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
 
 /// Refuses representations, grids and volumes that there is no memory for.
 fn afford(file: &FitFile, registry: &Registry) -> Result<()> {
-    let parameters = representation(file, registry)?.parameters();
+    let parameters = of_matter(file, registry)?.parameters();
     let what = || format!("{parameters} parameters of the representation");
     memory::afford(what, memory::parameters(parameters as f64))?;
     if let Start::Linear { nodes, .. } = file.training.start {

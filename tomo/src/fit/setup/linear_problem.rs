@@ -3,7 +3,7 @@
 use super::{Result, linear, priors};
 use crate::dynamics::Axis;
 use crate::fit::linear::{
-    Coarse, LinearProblem, LinearSettings, LinearSolution, Voxels, Watch, Weighted,
+    Change, Coarse, LinearProblem, LinearSettings, LinearSolution, Voxels, Watch, Weighted,
 };
 use crate::fit::settings::{FitFile, Kind};
 use crate::fit::{Data, FrameTerm, Objective};
@@ -25,7 +25,7 @@ pub(super) fn terms(data: &Data<f32>) -> Vec<Weighted<'_, f32>> {
 pub fn solve_linear(
     file: &FitFile,
     objective: &mut Objective<f32>,
-    axis: Axis,
+    (axis, change): (Axis, Change),
     (nodes, stride): (usize, usize),
     watch: &mut Watch<'_>,
 ) -> Result<LinearSolution<f32>> {
@@ -45,6 +45,7 @@ pub fn solve_linear(
         upper: settings.upper,
         flux: settings.flux_jy,
         priors: &priors,
+        change,
     };
     let usual = LinearSettings::default();
     let coarse = usual.coarse.filter(|_| nodes >= FINE).map(|coarse| Coarse {

@@ -1,5 +1,6 @@
 //! From settings to the parts of a fit: sight lines, motion, data with their losses, the representation and its training.
 
+mod change;
 mod coarse_view;
 mod glyph;
 mod imprint;
@@ -12,6 +13,7 @@ mod truth;
 mod visibilities;
 mod world;
 
+pub use change::{change, emission_times};
 pub use coarse_view::CoarseView;
 pub use imprint::imprint;
 pub use instrument::Instrument;

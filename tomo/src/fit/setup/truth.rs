@@ -3,7 +3,7 @@
 use super::glyph::Glyph;
 use super::{AXIS, Instrument, Result, known_axis, motion};
 use crate::dynamics::{AngularVelocity, Axis};
-use crate::fit::settings::{FitError, FitFile, Spot, Within, refuse};
+use crate::fit::settings::{FitError, FitFile, Shines, Spot, Within, refuse};
 use crate::fit::{Batch, ForwardModel};
 use kerrlight_geodesic::vector::distance;
 
@@ -16,7 +16,12 @@ pub struct Truth {
     glyphs: Vec<Glyph>,
     axis: Axis,
     velocity: AngularVelocity,
+    /// M.
+    reference: f64,
 }
+
+/// Of what does not change.
+const ALWAYS: Shines = Shines { from: None, until: None, rise: 1.0 };
 
 impl Truth {
     /// The truth of settings that have one and an axis.
@@ -32,6 +37,11 @@ impl Truth {
         }
         for (k, spot) in truth.spot.iter().enumerate() {
             let numbers = [spot.sigma, spot.amplitude, spot.wound_for];
+            let shines = spot.shines.unwrap_or(ALWAYS);
+            if !(shines.rise > 0.0 && shines.rise.is_finite()) {
+                let key = format!("truth.spot.{k}.shines.rise");
+                return Err(FitError::range(key, shines.rise, "M above 0").into());
+            }
             let finite = numbers.iter().chain(&spot.center).all(|x| x.is_finite());
             if !finite || spot.sigma <= 0.0 || spot.amplitude < 0.0 {
                 refuse!(
@@ -48,11 +58,12 @@ impl Truth {
             glyphs: truth.glyph.iter().enumerate().map(glyph).collect::<Result<_>>()?,
             axis,
             velocity: motion(file, Vec::new())?.velocity,
+            reference: file.motion.reference_time,
         })
     }
 
-    /// Emission at the reference time.
-    pub fn at(&self, x: [f64; 3]) -> f64 {
+    /// Emission at a time since the reference time (M) of the matter that is at x (M) at the reference time.
+    pub fn at(&self, x: [f64; 3], time: f64) -> f64 {
         // Spots that were wound up for the same time share the rotation.
         let mut turned = (0.0, x);
         let light = |spot: &Spot| {
@@ -60,16 +71,28 @@ impl Truth {
                 turned = (spot.wound_for, self.velocity.before(self.axis, x, spot.wound_for));
             }
             let offset = distance(turned.1, spot.center) / spot.sigma;
-            spot.amplitude * (-0.5 * offset * offset).exp()
+            let shines = spot.shines.map_or(1.0, |shines| shines.at(self.reference + time));
+            spot.amplitude * shines * (-0.5 * offset * offset).exp()
         };
         let of_glyphs: f64 = self.glyphs.iter().map(|glyph| glyph.at(x, 0.0)).sum();
         self.spots.iter().map(light).sum::<f64>() + of_glyphs
+    }
+
+    /// Emission at a place (M) at a time since the reference time, M.
+    pub fn seen_at(&self, x: [f64; 3], time: f64) -> f64 {
+        let angle = -self.velocity.rate(distance(x, [0.0; 3])) * time;
+        self.at(rotate(self.axis.vector(), angle, x), time)
     }
 
     /// Whether every amplitude is 0: data of noise alone.
     pub fn is_dark(&self) -> bool {
         self.spots.iter().all(|spot| spot.amplitude == 0.0)
             && self.glyphs.iter().all(Glyph::is_dark)
+    }
+
+    /// Whether matter carries it unchanged.
+    pub fn is_carried(&self) -> bool {
+        self.spots.iter().all(|spot| spot.shines.is_none())
     }
 
     /// Its axis.
@@ -91,6 +114,6 @@ impl Truth {
         let Instrument { lines, hole, redshift, .. } = instrument;
         let mut model = ForwardModel::<f64>::new(lines, &motion, hole, *redshift)?;
         model.weigh(self.axis);
-        Ok(model.movie_of(self.axis, &|x| self.at(x), &mut Batch::default()))
+        Ok(model.movie_in_time(self.axis, &|x, time| self.at(x, time), &mut Batch::default()))
     }
 }

@@ -3,7 +3,7 @@
 use super::{Parameter, Prior, World, WorldModel};
 use crate::Error;
 use crate::fit::ForwardModel;
-use crate::fit::linear::{Least, LinearProblem, Prior as Penalty, Voxels, Weighted};
+use crate::fit::linear::{Change, Least, LinearProblem, Prior as Penalty, Voxels, Weighted};
 use crate::simd::Float;
 use core::f64::consts::TAU;
 
@@ -105,6 +105,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
             upper: self.upper,
             flux: self.flux,
             priors: self.penalties,
+            change: Change::NONE,
         };
         let Least { x, value } = problem.least(self.effort.iterations)?;
         let penalty = |free: &Free| free.prior.penalty(world.get(free.parameter));

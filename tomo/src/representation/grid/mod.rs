@@ -3,7 +3,7 @@
 pub(super) mod cells;
 pub(super) mod scatter;
 #[cfg(test)]
-mod tests;
+pub(in crate::representation) mod tests;
 
 use super::{Activation, Coordinates, CoordinatesMut, Gradient, Groups, Representation, Workspace};
 use crate::Error;

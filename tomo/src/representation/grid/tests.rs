@@ -2,7 +2,13 @@ use super::*;
 use crate::representation::conformance::{Subject, check};
 
 /// Interpolation as a sum over all nodes of products of hat functions, and its derivative.
-fn plain(settings: &GridSettings, p: &[f64], dp: &[f64], at: &[f64], dat: &[f64]) -> (f64, f64) {
+pub(in crate::representation) fn plain(
+    settings: &GridSettings,
+    p: &[f64],
+    dp: &[f64],
+    at: &[f64],
+    dat: &[f64],
+) -> (f64, f64) {
     if (0..3).any(|k| at[k] < settings.low[k] || at[k] > settings.high[k]) {
         return (0.0, 0.0);
     }

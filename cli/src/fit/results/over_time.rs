@@ -1,0 +1,95 @@
+//! The emission at the times of the frames: what changes while matter carries it is not told by one volume.
+
+use super::{Estimate, fields};
+use crate::report::{Axis, LinePlot, Marks, Series};
+use kerrlight_tomo::fit::{State, Trainer};
+use kerrlight_tomo::volume::{OverTime, Volume};
+
+/// Emission in the region over time.
+pub struct Changes {
+    /// Times of the frames, M.
+    pub times: Vec<f64>,
+    /// ∫ e dV of the recovered field, M³.
+    pub recovered: Vec<f64>,
+    /// The same of the true one, if it is known.
+    pub truth: Option<Vec<f64>>,
+    /// How close the two come.
+    pub closeness: OverTime,
+}
+
+impl Estimate<'_> {
+    /// Of emission that may change, or does in the truth; none where matter carries it.
+    pub fn changes(
+        &self,
+        trainer: &mut Trainer<'_, f32>,
+        state: &State<f32>,
+    ) -> anyhow::Result<Option<Changes>> {
+        let known = self.measured.truth.as_ref();
+        if self.file.change.is_none() && known.is_none_or(|truth| truth.is_carried()) {
+            return Ok(None);
+        }
+        let times = self.measured.times.clone();
+        let mut found = Changes {
+            times: times.clone(),
+            recovered: Vec::new(),
+            truth: known.map(|_| Vec::new()),
+            closeness: OverTime::default(),
+        };
+        for time in times {
+            let since = time - self.motion.reference;
+            let volume = fields::recovered_at(self.file, (trainer, self.motion), state, since)?;
+            found.recovered.push(integral(&volume));
+            if let (Some(truth), Some(curve)) = (known, &mut found.truth) {
+                let truth = fields::true_volume_at(self.file, truth, since)?;
+                curve.push(integral(&truth));
+                found.closeness.add(&volume, &truth)?;
+            }
+        }
+        Ok(Some(found))
+    }
+}
+
+/// ∫ e dV, M³.
+fn integral(volume: &Volume) -> f64 {
+    let cell =
+        |k: usize| (volume.high()[k] - volume.low()[k]) / (volume.nodes()[k].max(2) - 1) as f64;
+    let sum: f64 = volume.values().iter().map(|x| f64::from(*x)).sum();
+    sum * (0..3).map(cell).product::<f64>()
+}
+
+impl Changes {
+    /// A row a frame.
+    pub fn table(&self) -> String {
+        let head = "# time in GM/c^3; integral of emission over the volume in (GM/c^2)^3\n";
+        let names =
+            if self.truth.is_some() { "time,recovered,truth\n" } else { "time,recovered\n" };
+        let row = |k: usize| {
+            let truth = self.truth.as_ref().map(|truth| format!(",{:.6e}", truth[k]));
+            let (time, recovered) = (self.times[k], self.recovered[k]);
+            format!("{time:.6},{recovered:.6e}{}\n", truth.unwrap_or_default())
+        };
+        let rows: String = (0..self.times.len()).map(row).collect();
+        format!("{head}{names}{rows}")
+    }
+
+    /// The same as a curve.
+    pub fn plot(&self) -> LinePlot {
+        let points =
+            |values: &[f64]| self.times.iter().zip(values).map(|(t, x)| [*t, *x]).collect();
+        let series = |name: &str, values: &[f64], marks| Series {
+            name: name.to_owned(),
+            points: points(values),
+            errors: Vec::new(),
+            marks,
+        };
+        let mut all = vec![series("recovered", &self.recovered, Marks::Line)];
+        all.extend(self.truth.as_ref().map(|truth| series("truth", truth, Marks::Points)));
+        LinePlot {
+            title: "Emission over time".to_owned(),
+            caption: "All emission in the volume at the time of each frame. Matter carries emission; where this curve rises, emission appears, where it falls, emission fades or leaves the volume.".to_owned(),
+            x: Axis { label: "time".to_owned(), unit: "GM/c³".to_owned(), log: false },
+            y: Axis { label: "integral of emission".to_owned(), unit: "(GM/c²)³".to_owned(), log: false },
+            series: all,
+        }
+    }
+}

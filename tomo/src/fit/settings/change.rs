@@ -1,0 +1,16 @@
+//! Emission that changes while matter carries it.
+
+use crate::representation::Allowed;
+use serde::{Deserialize, Serialize};
+
+/// How emission may change while matter carries it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChangeSettings {
+    /// Which changes are allowed.
+    pub allowed: Allowed,
+    /// Factor on ∫∫ |∂e/∂t| dV dt along the flow.
+    pub weight: f64,
+    /// Times between which emission is linear in time are not farther apart than this, M.
+    pub spacing: f64,
+}

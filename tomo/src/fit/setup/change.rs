@@ -1,0 +1,59 @@
+//! From settings to how emission may change while matter carries it.
+
+use super::{Instrument, Result};
+use crate::fit::Motion;
+use crate::fit::linear::Change;
+use crate::fit::settings::{AxisSearch, ChangeSettings, FitFile, Kind, Within, refuse};
+use crate::representation::Knots;
+
+impl ChangeSettings {
+    /// The change with its knots over these times of emission, M since the reference time.
+    ///
+    /// # Errors
+    /// If a number is out of range.
+    pub fn over(&self, times: [f64; 2]) -> Result<Change> {
+        let knots = Knots::between(times, self.spacing, self.allowed).within("change")?;
+        Change { knots, weight: self.weight }.checked().within("change")
+    }
+}
+
+/// First and last time at which light of the movie is emitted, M since the reference time.
+pub fn emission_times(instrument: &Instrument, motion: &Motion) -> [f64; 2] {
+    let delays = &instrument.lines.delay;
+    let bound = |of: fn(f64, f64) -> f64, none: f64| match delays.is_empty() {
+        true => 0.0,
+        false => delays.iter().fold(none, |bound, delay| of(bound, *delay)),
+    };
+    let (least, most) = (bound(f64::min, f64::INFINITY), bound(f64::max, f64::NEG_INFINITY));
+    let first = motion.times.iter().fold(f64::INFINITY, |first, time| first.min(*time)) - most;
+    let last = motion.times.iter().fold(f64::NEG_INFINITY, |last, time| last.max(*time)) - least;
+    let from = motion.injection.map_or(first, |injection| injection.time.max(first));
+    [from - motion.reference, last.max(from) - motion.reference]
+}
+
+/// How emission may change in a fit, with the knots over these times of emission, M since the reference time.
+///
+/// # Errors
+/// If a number is out of range.
+pub fn change(file: &FitFile, times: [f64; 2]) -> Result<Change> {
+    file.change.map_or(Ok(Change::NONE), |change| change.over(times))
+}
+
+/// Refuses what emission that changes does not go with.
+pub(super) fn check(file: &FitFile) -> Result<()> {
+    let Some(change) = file.change else { return Ok(()) };
+    // Of any length: the spacing against the data is told once rays are traced.
+    change.over([0.0, 0.0])?;
+    match file.representation.kind {
+        Kind::LinearGrid => {}
+        Kind::Mlp4d => refuse!("change does not apply to mlp4d, which is free at every time"),
+        _ => refuse!("change needs representation.kind = \"linear-grid\""),
+    }
+    if file.axis != (AxisSearch::Known {}) {
+        refuse!("change needs a known axis; add `[axis.known]` and `axis` in [motion]");
+    }
+    if file.unknown_world()?.is_some() {
+        refuse!("change does not work together with unknown parameters in [world]");
+    }
+    Ok(())
+}
