@@ -293,7 +293,7 @@ mod tests {
     use crate::representation::conformance::{Subject, check};
     use crate::representation::grid::tests::plain;
     use crate::representation::{Activation, Grid, GridSettings};
-    use kerrlight_geodesic::vector::rotate;
+    use kerrlight_geodesic::vector::{cross, rotate};
 
     const AXIS: [f64; 3] = [0.36, 0.48, 0.8];
 
@@ -339,7 +339,7 @@ mod tests {
         }
     }
 
-    /// The same written plainly, and its derivative; rotations by differences.
+    /// The same written plainly, and its derivative.
     fn plain_in_time(
         knots: Knots,
         (p, dp): (&[f64], &[f64]),
@@ -350,15 +350,14 @@ mod tests {
         for (knot, (share, growth)) in shares(knots, at[0]).into_iter().enumerate() {
             let births = knots.count > 1 && knots.allowed == Allowed::Births;
             let label = if births { knots.times()[knot] } else { 0.0 };
-            let place = |s: f64| {
-                let at: Vec<f64> = at.iter().zip(dat).map(|(x, d)| x + s * d).collect();
-                let x = [at[1], at[2], at[3]];
-                let r = x.iter().map(|x| x * x).sum::<f64>().sqrt();
-                rotate(AXIS, -0.4 / r * (at[0] - label), x)
-            };
-            let (h, here) = (1e-5, place(0.0));
-            let (after, before) = (place(h), place(-h));
-            let slope = [0, 1, 2].map(|c| (after[c] - before[c]) / (2.0 * h));
+            let (x, dx) = ([at[1], at[2], at[3]], [dat[1], dat[2], dat[3]]);
+            let r = x.iter().map(|x| x * x).sum::<f64>().sqrt();
+            let dr = x.iter().zip(dx).map(|(x, d)| x * d).sum::<f64>() / r;
+            let angle = -0.4 / r * (at[0] - label);
+            let dangle = -0.4 / r * dat[0] - angle * dr / r;
+            let (here, along) = (rotate(AXIS, angle, x), rotate(AXIS, angle, dx));
+            let across = cross(AXIS, here);
+            let slope = [0, 1, 2].map(|c| along[c] + dangle * across[c]);
             let own = knot * n..(knot + 1) * n;
             let (e, de) = plain(&settings(), &p[own.clone()], &dp[own], &here, &slope);
             sum += share * e;

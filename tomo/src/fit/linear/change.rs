@@ -44,6 +44,11 @@ impl Change {
         self.knots.count > 1
     }
 
+    /// Whether emission may appear and fade.
+    pub(super) fn is_free(&self) -> bool {
+        self.is_any() && self.knots.allowed == Allowed::Any
+    }
+
     fn is_born(&self) -> bool {
         self.is_any() && self.knots.allowed == Allowed::Births
     }

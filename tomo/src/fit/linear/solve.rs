@@ -159,6 +159,10 @@ impl<T: Float + Default> LinearProblem<'_, T> {
     ) -> Result<LinearSolution<T>, Error> {
         self.check(settings)?;
         let data = self.data()?;
+        let carried = match self.change.is_free() {
+            true => Some(LinearProblem { change: Change::NONE, ..*self }.solve(settings, watch)?),
+            false => None,
+        };
         let mut run = Run::new(self, settings, watch);
         let coarse = settings.coarse.or((!data.is_convex()).then_some(LIT));
         let (mut x, mut is_active) = match coarse {
@@ -168,6 +172,15 @@ impl<T: Float + Default> LinearProblem<'_, T> {
             },
             None => (vec![0.0; self.unknowns()], vec![true; self.unknowns()]),
         };
+        if let Some(carried) = carried {
+            if carried.ending == Ending::Cancelled {
+                return Ok(run.cancelled(x, 0));
+            }
+            // From a field that matter carries unchanged: no price is too high for it.
+            let field: Vec<f64> = carried.emission.iter().map(|e| e.double()).collect();
+            x = self.change.steady(&field);
+            is_active.iter_mut().zip(&x).for_each(|(active, x)| *active |= *x > 0.0);
+        }
         run.reference(&data)?;
         loop {
             run.round += 1;

@@ -13,6 +13,7 @@ use kerrlight_geodesic::{Inclination, Kerr, Observer};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
+mod changing;
 pub(in crate::fit) mod lit;
 
 pub(in crate::fit) const FRAMES: [usize; 5] = [0, 1, 2, 3, 4];

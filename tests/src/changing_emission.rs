@@ -1,0 +1,105 @@
+//! Fits of emission that changes while matter carries it.
+
+use crate::support::{kerrlight, root};
+use serde_json::Value;
+use std::path::Path;
+
+/// The scene of a flare that appears and fades, with fewer pixels and frames.
+fn settings() -> String {
+    let scene = std::fs::read_to_string(root().join("scenes/fits/appearing_flare.toml")).unwrap();
+    scene
+        .replace("pixels = 32", "pixels = 20")
+        .replace("jy_per_pixel = 0.08", "jy_per_pixel = 0.2")
+        .replace("frames = 48", "frames = 30")
+        .replace("nodes = 28", "nodes = 20")
+        .replace("iterations = 60", "iterations = 40")
+        .replace("nodes = 48", "nodes = 24")
+}
+
+fn fit(folder: &Path, changes: &[&str]) -> Value {
+    std::fs::write(folder.join("fit.toml"), settings()).unwrap();
+    let mut arguments = vec!["fit", "fit.toml", "-o", "run"];
+    arguments.extend(changes.iter().flat_map(|change| ["--set", change]));
+    let run = kerrlight(folder, &arguments);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    serde_json::from_slice(&std::fs::read(folder.join("run/results.json")).unwrap()).unwrap()
+}
+
+/// Columns of `emission.csv`: time, recovered, truth.
+fn curves(folder: &Path) -> Vec<[f64; 3]> {
+    let text = std::fs::read_to_string(folder.join("run/emission.csv")).unwrap();
+    let rows = text.lines().filter(|line| !line.starts_with(['#', 't']));
+    let numbers = |row: &str| -> Vec<f64> { row.split(',').map(|x| x.parse().unwrap()).collect() };
+    rows.map(|row| numbers(row).try_into().unwrap()).collect()
+}
+
+/// Times at which a curve first and last is at half of its maximum, linear between the frames.
+fn halves(curve: &[[f64; 2]]) -> [f64; 2] {
+    let half = 0.5 * curve.iter().fold(0.0f64, |most, [_, x]| most.max(*x));
+    let crossing = |pair: &[[f64; 2]]| {
+        let [[t, x], [u, y]] = [pair[0], pair[1]];
+        ((x < half) != (y < half)).then(|| t + (half - x) / (y - x) * (u - t))
+    };
+    let all: Vec<f64> = curve.windows(2).filter_map(crossing).collect();
+    [all[0], all[all.len() - 1]]
+}
+
+#[test]
+fn exact_onset_and_end_of_a_flare_are_found_within_one_frame() {
+    let folder = tempfile::tempdir().unwrap();
+    let results = fit(folder.path(), &[]);
+    let curves = curves(folder.path());
+    let of = |k: usize| curves.iter().map(|row| [row[0], row[k]]).collect::<Vec<_>>();
+    let (found, truth) = (halves(&of(1)), halves(&of(2)));
+    let frame = curves[1][0] - curves[0][0];
+    // The truth is half as bright at the times of the settings.
+    assert!((truth[0] - 29.3).abs() < frame && (truth[1] - 88.0).abs() < frame, "{truth:?}");
+    for (found, truth) in found.iter().zip(truth) {
+        assert!((found - truth).abs() < frame, "{found} {truth}");
+    }
+    // 0.4 is the relative error of 0.7 M spots on nodes that are 0.95 M apart.
+    assert!(results["nrmse_over_time"].as_f64().unwrap() < 0.5, "{results}");
+    assert_eq!(results["linear"]["relative_gap"].as_f64().map(|gap| gap < 0.1), Some(true));
+}
+
+/// Without a change the same data are not explained, and the first line says so.
+#[test]
+fn exact_hard_motion_is_recognised_as_wrong() {
+    let folder = tempfile::tempdir().unwrap();
+    let chi2 = |results: &Value| results["chi2_per_datum"]["image"].as_f64().unwrap();
+    let soft = chi2(&fit(folder.path(), &[]));
+    std::fs::remove_dir_all(folder.path().join("run")).unwrap();
+    let text = settings();
+    let (start, end) = (text.find("[change]").unwrap(), text.find("[[truth.spot]]").unwrap());
+    std::fs::write(folder.path().join("hard.toml"), format!("{}{}", &text[..start], &text[end..]))
+        .unwrap();
+    let run = kerrlight(folder.path(), &["fit", "hard.toml", "-o", "run"]);
+    let told = String::from_utf8_lossy(&run.stdout).into_owned();
+    assert!(told.starts_with("The model does not explain its data"), "{told}");
+    let results: Value =
+        serde_json::from_slice(&std::fs::read(folder.path().join("run/results.json")).unwrap())
+            .unwrap();
+    assert!(chi2(&results) > 10.0 * soft, "{} {soft}", chi2(&results));
+    assert!(folder.path().join("run/emission.csv").exists());
+}
+
+#[test]
+fn exact_what_cannot_change_is_refused_before_anything_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("fit.toml"), settings()).unwrap();
+    for (change, expected) in [
+        ("change.weight=-1.0", "change.weight = -1"),
+        ("change.spacing=0.0", "change.spacing = 0"),
+        ("change.allowed=deaths", "unknown variant `deaths`"),
+        ("representation=mlp4d", "change does not apply to mlp4d"),
+        ("representation=grid", "linear-grid"),
+        ("truth.spot.0.shines.rise=0.0", "truth.spot.0.shines.rise = 0"),
+        ("axis={from={start=[0.0,0.0,1.0],rate=0.1,last_rate=0.1}}", "[axis.known]"),
+    ] {
+        let run = kerrlight(folder.path(), &["fit", "fit.toml", "-o", "run", "--set", change]);
+        let told = String::from_utf8_lossy(&run.stderr).into_owned();
+        assert_eq!(run.status.code(), Some(2), "{change}: {told}");
+        assert!(told.contains(expected), "{change}: {told}");
+        assert!(!folder.path().join("run").exists(), "{change}");
+    }
+}

@@ -1,0 +1,134 @@
+//! Fields that change while matter carries them.
+
+use super::super::change::Change;
+use super::*;
+use crate::dynamics::AngularVelocity;
+use crate::representation::{Allowed, Changing};
+
+const ALLOWED: [Allowed; 2] = [Allowed::Any, Allowed::Births];
+
+fn knots(allowed: Allowed) -> Knots {
+    Knots { first: 0.05, spacing: 0.2, count: 4, allowed }
+}
+
+/// Rays with or without delays, in units of time in which the pattern turns once at 3.5 M.
+fn model(delay: bool) -> ForwardModel<f64> {
+    let mut model = forward_model();
+    if delay {
+        // Light from farther along x comes later: as good as any for what is tested here.
+        model.delay = model.position[0].iter().map(|x| 0.03 * x).collect();
+        let pairs = model.rate.iter().zip(&model.delay);
+        model.phase = pairs.map(|(rate, delay)| -rate * delay).collect();
+    }
+    model
+}
+
+fn changing(voxels: &Voxels, knots: Knots) -> Changing<f64> {
+    let motion = (axis(), AngularVelocity::bhnerf());
+    Changing::new(Box::new(voxels.grid().unwrap()), knots, motion).unwrap()
+}
+
+fn images(model: &ForwardModel<f64>, field: &Changing<f64>, x: &[f64]) -> Vec<f64> {
+    let field = Field { representation: field, parameters: x, axis: axis(), occupancy: None };
+    let mut movie = vec![0.0; FRAMES.len() * model.pixels()];
+    model.movie(field, &FRAMES, &mut Batch::default(), &mut Workspace::new(), &mut movie);
+    movie
+}
+
+/// ‖A x‖² by the sparse matrix, where all nodes or some count, is that of the representation's images; so is its transpose.
+#[test]
+fn exact_sparse_operator_is_the_changing_field_and_sums() {
+    let voxels = Voxels { nodes: [7, 6, 8], ..Voxels::cube(2, 5.0) };
+    for (allowed, delay) in ALLOWED.into_iter().flat_map(|a| [(a, false), (a, true)]) {
+        let (model, knots) = (model(delay), knots(allowed));
+        let field = changing(&voxels, knots);
+        let dark = vec![0.0; FRAMES.len() * model.pixels()];
+        let dark = ImageTerm::new(dark, model.pixels(), 1.0).unwrap();
+        let terms = [Weighted { weight: 1.0, term: &dark as &dyn FrameTerm<f64> }];
+        let data = Data::new(&terms, &FRAMES, model.pixels(), 5).unwrap();
+        let count = (FRAMES.len() * model.pixels()) as f64;
+        let all = 4 * voxels.count();
+        for share in [1.0, 0.4] {
+            let is_active: Vec<bool> = random(all, 4).iter().map(|x| *x < share).collect();
+            for budget in [usize::MAX, 0] {
+                let active = Active::new(&is_active, voxels.corners());
+                let walk = Walk::new(&model, axis(), (voxels, knots));
+                let operator = Operator::new(walk, active, &FRAMES, budget);
+                let x = random(operator.active.count(), 1);
+                let seen = images(&model, &field, &operator.active.expand(&x));
+                let square: f64 = seen.iter().map(|pixel| pixel * pixel).sum();
+                let (value, gradient) = operator.value_and_gradient(&data, &x, false);
+                assert!((value * count / square - 1.0).abs() < 1e-12, "{value} {allowed:?}");
+                let y = random(x.len(), 2);
+                let others = images(&model, &field, &operator.active.expand(&y));
+                let forward: f64 = others.iter().zip(&seen).map(|(a, b)| a * b).sum();
+                let back: f64 = gradient.iter().zip(&y).map(|(g, y)| 0.5 * count * g * y).sum();
+                assert!((back / forward - 1.0).abs() < 1e-12, "{back} {forward}");
+                let (_, everywhere) = operator.value_and_gradient(&data, &x, true);
+                for (a, b) in operator.active.gather(&everywhere).iter().zip(&gradient) {
+                    assert!((a - b).abs() < 1e-13);
+                }
+            }
+        }
+    }
+}
+
+fn solve(model: &ForwardModel<f64>, pixels: Vec<f64>, change: Change) -> LinearSolution<f64> {
+    let term = ImageTerm::new(pixels, model.pixels(), 1e-3).unwrap();
+    let problem = LinearProblem {
+        model,
+        axis: axis(),
+        frames: &FRAMES,
+        terms: &[Weighted { weight: 1.0, term: &term }],
+        voxels: Voxels::cube(9, 5.0),
+        upper: 2.0,
+        flux: None,
+        priors: &[],
+        change,
+    };
+    let settings = LinearSettings {
+        coarse: None,
+        iterations: 800,
+        rounds: 1,
+        tolerance: 1e-7,
+        ..LinearSettings::default()
+    };
+    problem.solve(&settings, &mut |_| ControlFlow::Continue(())).unwrap()
+}
+
+/// What is born, or appears and fades, explains images of it; a field that matter carries unchanged does not. A price
+/// that is too high leaves such a field.
+#[test]
+fn exact_between_a_field_that_is_carried_and_one_that_is_free() {
+    let (model, voxels) = (model(false), Voxels::cube(9, 5.0));
+    let spot = lit::spot(&voxels);
+    for allowed in ALLOWED {
+        let knots = knots(allowed);
+        let shares: &[f64] = match allowed {
+            Allowed::Births => &[0.1, 0.0, 1.0, 0.0],
+            _ => &[0.1, 0.1, 1.0, 0.2],
+        };
+        let truth: Vec<f64> = shares.iter().flat_map(|s| spot.iter().map(move |e| s * e)).collect();
+        let pixels = images(&model, &changing(&voxels, knots), &truth);
+        let value = |weight: f64| {
+            let found = solve(&model, pixels.clone(), Change { knots, weight });
+            let certificate = found.certificate.unwrap();
+            assert!(certificate.gap >= 0.0 && certificate.value <= certificate.dark);
+            (certificate.value / certificate.dark, found.emission)
+        };
+        let (free, _) = value(0.0);
+        assert!(free < 1e-4, "{allowed:?}: {free:e}");
+        let steady = solve(&model, pixels.clone(), Change::NONE);
+        let carried = steady.certificate.unwrap();
+        let carried = carried.value / carried.dark;
+        assert!(carried > 0.05, "{allowed:?}: {carried:e}");
+        if allowed == Allowed::Any {
+            let (dear, emission) = value(3e4);
+            assert!((dear / carried - 1.0).abs() < 0.02, "{dear} {carried}");
+            let change = emission
+                .chunks_exact(voxels.count())
+                .flat_map(|knot| knot.iter().zip(&emission).map(|(a, b)| (a - b).abs()));
+            assert!(change.fold(0.0, f64::max) < 0.02);
+        }
+    }
+}
