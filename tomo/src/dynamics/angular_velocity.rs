@@ -47,6 +47,9 @@ pub enum AngularVelocity {
     Falling(Arc<Falling>),
 }
 
+/// Below this |dr/dt| matter is on a circle.
+const STILL: f64 = 1e-12;
+
 impl AngularVelocity {
     /// BH-NeRF's experiments of known velocity: e(t, x) = e₀(R(ξ, 2π t v(|x|)) x),
     /// v = (3.5/r)^{3/2} turns a unit of time. The pattern turns left-handed about ξ.
@@ -133,6 +136,31 @@ impl AngularVelocity {
         };
         let [stretch, angle] = flow.before(&flow.origin(r), elapsed);
         rotate(axis.vector(), angle, point.map(|x| stretch * x))
+    }
+
+    /// What a point at radius r (M) is stretched by, and turned by about the axis (radians, right-handed), to where its
+    /// matter was `elapsed` (M) before.
+    pub fn step_back(&self, r: f64, elapsed: f64) -> [f64; 2] {
+        match self.falling() {
+            None => [1.0, -self.rate(r) * elapsed],
+            Some(flow) => flow.before(&flow.origin(r), elapsed),
+        }
+    }
+
+    /// Derivatives of [`step_back`](Self::step_back): of the stretch (per M) and the angle (radians per M) with respect to
+    /// the radius, and of both with respect to the elapsed time.
+    pub fn step_back_slopes(&self, r: f64, elapsed: f64) -> [[f64; 2]; 2] {
+        let circular = || [[0.0, -self.slope(r) * elapsed], [0.0, -self.rate(r)]];
+        let Some(flow) = self.falling() else { return circular() };
+        let [fall, turn] = flow.rates(r);
+        if fall.abs() < STILL {
+            return circular();
+        }
+        let [stretch, _] = self.step_back(r, elapsed);
+        let [fall_before, turn_before] = flow.rates(stretch * r);
+        // ∫ dr/v between the two radii stays the same.
+        let by_radius = [(fall_before / fall - stretch) / r, (turn_before - turn) / fall];
+        [by_radius, [-fall_before / r, -turn_before]]
     }
 
     fn interpolated(&self, r: f64) -> (f64, f64) {

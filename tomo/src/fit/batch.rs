@@ -117,6 +117,22 @@ impl<T: Float> Batch<T> {
         self.collect(model, (field.axis, fall), field.occupancy);
     }
 
+    /// The same of places and times of emission; nothing is carried along.
+    pub fn gather_events(&mut self, model: &ForwardModel<T>) {
+        self.columns.clear();
+        self.starts.clear();
+        self.starts.push(0);
+        for &(ray, frame) in &self.pairs {
+            let range = model.starts[ray as usize]..model.starts[ray as usize + 1];
+            self.columns.push(model, range, model.times[frame as usize]);
+            self.starts.push(self.columns.weight.len());
+        }
+        if model.earliest.is_some() {
+            self.columns.pulled.clone_from(&self.columns.position);
+            self.thin_out(model.earliest, None, false);
+        }
+    }
+
     fn collect(
         &mut self,
         model: &ForwardModel<T>,

@@ -7,8 +7,7 @@ use super::occupancy::Occupancy;
 use super::shift::Shift;
 use super::sightlines::Sightlines;
 use crate::Error;
-use crate::dynamics::{AngularVelocity, Axis, Injection, Turned, pull_back};
-use crate::points::{Coordinates, CoordinatesMut};
+use crate::dynamics::{AngularVelocity, Axis, Injection};
 use crate::representation::{Representation, Workspace};
 use crate::simd::Float;
 use kerrlight_geodesic::Kerr;
@@ -30,16 +29,11 @@ pub struct Motion {
 impl Motion {
     /// Where the matter at points (M) at a time since the reference time (M) is at the reference time.
     pub fn matter<T: Float>(&self, axis: Axis, time: f64, [x, y, z]: [&[T]; 3]) -> [Vec<T>; 3] {
-        let angle = |k: usize| {
-            let [x, y, z] = [x[k], y[k], z[k]].map(Float::double);
-            T::of(-self.velocity.rate((x * x + y * y + z * z).sqrt()) * time)
+        let before = |k: usize| {
+            self.velocity.before(axis, [x[k], y[k], z[k]].map(Float::double), time).map(T::of)
         };
-        let angles: Vec<T> = (0..x.len()).map(angle).collect();
-        let mut pulled: [Vec<T>; 3] = core::array::from_fn(|_| vec![T::zero(); x.len()]);
-        let turned = Turned { points: Coordinates::xyz(x, y, z), angles: &angles };
-        let [a, b, c] = &mut pulled;
-        pull_back(axis, turned, CoordinatesMut::xyz(a, b, c));
-        pulled
+        let places: Vec<[T; 3]> = (0..x.len()).into_par_iter().map(before).collect();
+        [0, 1, 2].map(|c| places.iter().map(|place| place[c]).collect())
     }
 }
 
@@ -208,25 +202,45 @@ impl<T: Float> ForwardModel<T> {
         field: &(dyn Fn([f64; 3]) -> f64 + Sync),
         batch: &mut Batch<T>,
     ) -> Vec<f64> {
-        self.movie_in_time(axis, &|x, _| field(x), batch)
+        self.summed(
+            batch,
+            |batch| batch.gather(self, axis, None),
+            |columns, k| {
+                let [x, y, z] = &columns.pulled;
+                field([x[k], y[k], z[k]].map(Float::double))
+            },
+        )
     }
 
-    /// The same of a field e₀(x, t) that also depends on the time since the reference time, M.
-    pub fn movie_in_time(
+    /// The same of a known field e(x, t) of places (M) and times since the reference time (M), whatever moves.
+    pub fn movie_of_events(
         &self,
-        axis: Axis,
         field: &(dyn Fn([f64; 3], f64) -> f64 + Sync),
         batch: &mut Batch<T>,
+    ) -> Vec<f64> {
+        self.summed(
+            batch,
+            |batch| batch.gather_events(self),
+            |columns, k| {
+                let [x, y, z] = &columns.position;
+                field([x[k], y[k], z[k]].map(Float::double), columns.time[k].double())
+            },
+        )
+    }
+
+    /// Images of the emission at each node of the batches that `gather` makes.
+    fn summed(
+        &self,
+        batch: &mut Batch<T>,
+        gather: impl Fn(&mut Batch<T>),
+        emission: impl Fn(&Columns<T>, usize) -> f64 + Sync,
     ) -> Vec<f64> {
         let mut movie = vec![0.0; self.frames() * self.pixels];
         for (frame, image) in movie.chunks_exact_mut(self.pixels).enumerate() {
             batch.set((0..self.rays()).map(|ray| (ray as u32, frame as u32)));
-            batch.gather(self, axis, None);
-            let Columns { pulled: [x, y, z], weight, time, .. } = &batch.columns;
-            let light = |k: usize| {
-                let emission = field([x[k], y[k], z[k]].map(Float::double), time[k].double());
-                weight[k].double() * emission
-            };
+            gather(batch);
+            let columns = &batch.columns;
+            let light = |k: usize| columns.weight[k].double() * emission(columns, k);
             let sum = |range: &[usize]| (range[0]..range[1]).map(light).sum::<f64>();
             let fluxes: Vec<f64> = batch.starts.par_windows(2).map(sum).collect();
             for (pixel, flux) in self.pixel.iter().zip(fluxes) {

@@ -4,6 +4,7 @@ use super::{Coordinates, CoordinatesMut, Gradient, Representation, Workspace};
 use crate::Error;
 use crate::dynamics::{AngularVelocity, Axis, Cotangents, Turned, pull_back, pull_back_vjp};
 use crate::simd::Float;
+use kerrlight_geodesic::vector::norm;
 use serde::{Deserialize, Serialize};
 
 /// Which changes are allowed.
@@ -91,13 +92,23 @@ impl Knots {
     }
 }
 
+/// The motion that carries fields along.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Carrier {
+    /// The axis that matter turns about.
+    pub axis: Axis,
+    /// How it moves.
+    pub velocity: AngularVelocity,
+    /// Least and largest radius (M) of matter that shines, of matter that changes its radius.
+    pub limits: [f64; 2],
+}
+
 /// Fields in space, one a knot, that matter carries: e(t, x) = Σ share_k(t) e_k(x_k), where x_k is the place that the
 /// matter at (t, x) has at the knot's label time. Parameters are those of the fields, one after the other.
 pub struct Changing<T> {
     inner: Box<dyn Representation<T>>,
     knots: Knots,
-    axis: Axis,
-    velocity: AngularVelocity,
+    carrier: Carrier,
 }
 
 /// Points that one knot has a share in.
@@ -105,10 +116,14 @@ struct Part<T> {
     points: Vec<usize>,
     /// Share of each, and its growth.
     share: Vec<(T, T)>,
-    place: [Vec<T>; 3],
-    /// By which places are turned.
+    /// Places, M, and times since the knot's label time, M.
+    place: Vec<[f64; 3]>,
+    elapsed: Vec<f64>,
+    /// Places at the radii that matter has at the label time.
+    stretched: [Vec<T>; 3],
+    /// By which they are turned.
     angle: Vec<T>,
-    /// The same places at the knot's label time.
+    /// Places at the label time.
     pulled: [Vec<T>; 3],
 }
 
@@ -120,7 +135,7 @@ impl<T: Float> Changing<T> {
     pub fn new(
         inner: Box<dyn Representation<T>>,
         knots: Knots,
-        (axis, velocity): (Axis, AngularVelocity),
+        carrier: Carrier,
     ) -> Result<Self, Error> {
         if inner.dimension() != 3 {
             let dimension = inner.dimension() as f64;
@@ -129,7 +144,7 @@ impl<T: Float> Changing<T> {
         if knots.count == 0 {
             return Err(Error::out_of_range("knots", 0.0, "1 or more"));
         }
-        Ok(Self { inner, knots, axis, velocity })
+        Ok(Self { inner, knots, carrier })
     }
 
     fn of<'a>(&self, parameters: &'a [T], knot: usize) -> &'a [T] {
@@ -144,48 +159,38 @@ impl<T: Float> Changing<T> {
         let label = self.knots.label_time(knot);
         for (k, t) in time.iter().enumerate() {
             let share = self.knots.share(knot, *t);
-            if share == (T::zero(), T::zero()) {
-                continue;
+            if share != (T::zero(), T::zero()) {
+                let place = [x[k], y[k], z[k]].map(Float::double);
+                part.push((k, share), (place, t.double() - label), &self.carrier);
             }
-            let place = [x[k], y[k], z[k]];
-            part.points.push(k);
-            part.share.push(share);
-            part.place.iter_mut().zip(place).for_each(|(to, x)| to.push(x));
-            let angle = self.velocity.angle(place.map(Float::double), t.double(), label);
-            part.angle.push(T::of(angle));
         }
-        part.pull(self.axis);
+        part.pull(self.carrier.axis);
         part
     }
 
     /// Adds what a knot's points take from the coordinates, from the slopes of its field.
     fn of_coordinates(
         &self,
-        (knot, part): (usize, &Part<T>),
+        part: &Part<T>,
         (values, slopes): (&[T], &[Vec<T>; 3]),
-        (times, cotangents): (&[T], &[T]),
+        cotangents: &[T],
         into: &mut CoordinatesMut<'_, T>,
     ) {
-        let mut angles = vec![T::zero(); part.points.len()];
-        let mut places: [Vec<T>; 3] = core::array::from_fn(|_| angles.clone());
-        let ([x, y, z], [u, v, w]) = (&part.place, &mut places);
-        let turned = Turned { points: Coordinates::xyz(x, y, z), angles: &part.angle };
-        let points = Some(CoordinatesMut::xyz(u, v, w));
-        let [a, b, c] = slopes;
-        let wanted = Cotangents { angles: Some(&mut angles), points };
-        pull_back_vjp(self.axis, turned, Coordinates::xyz(a, b, c), wanted);
+        let (angles, places) = part.pull_vjp(self.carrier.axis, slopes);
         let [time, to @ ..] = into.columns() else { panic!("points in time and space") };
-        let label = self.knots.label_time(knot);
         for (at, k) in part.points.iter().enumerate() {
-            let place = [0, 1, 2].map(|c| part.place[c][at].double());
-            let r = place.iter().map(|x| x * x).sum::<f64>().sqrt();
-            let of_angle = angles[at].double();
-            let of_radius = of_angle * self.velocity.angle_slope(place, times[*k].double(), label);
+            let (place, elapsed) = (part.place[at], part.elapsed[at]);
+            let r = norm(place);
+            let [stretch, _] = self.carrier.velocity.step_back(r, elapsed);
+            let [by_radius, by_time] = self.carrier.velocity.step_back_slopes(r, elapsed);
+            let of_place = [0, 1, 2].map(|c| places[c][at].double());
+            let of_stretch: f64 = (0..3).map(|c| of_place[c] * place[c]).sum();
+            let along = |by: [f64; 2]| of_stretch * by[0] + angles[at].double() * by[1];
             let grown = (cotangents[*k] * values[at] * part.share[at].1).double();
-            time[*k] += T::of(grown - of_angle * self.velocity.rate(r));
+            time[*k] += T::of(grown + along(by_time));
+            let of_radius = if r > 0.0 { along(by_radius) / r } else { 0.0 };
             for (c, to) in to.iter_mut().enumerate() {
-                let by_radius = if r > 0.0 { of_radius * place[c] / r } else { 0.0 };
-                to[*k] += places[c][at] + T::of(by_radius);
+                to[*k] += T::of(stretch * of_place[c] + of_radius * place[c]);
             }
         }
     }
@@ -193,17 +198,63 @@ impl<T: Float> Changing<T> {
 
 impl<T> Default for Part<T> {
     fn default() -> Self {
-        let (points, share, angle) = (Vec::new(), Vec::new(), Vec::new());
-        Self { points, share, place: Default::default(), angle, pulled: Default::default() }
+        Self {
+            points: Vec::new(),
+            share: Vec::new(),
+            place: Vec::new(),
+            elapsed: Vec::new(),
+            stretched: Default::default(),
+            angle: Vec::new(),
+            pulled: Default::default(),
+        }
     }
 }
 
 impl<T: Float> Part<T> {
+    /// A point with its share, place and time since the label time, if its matter shines.
+    fn push(
+        &mut self,
+        (point, share): (usize, (T, T)),
+        (place, elapsed): ([f64; 3], f64),
+        carrier: &Carrier,
+    ) {
+        let r = norm(place);
+        let [stretch, angle] = carrier.velocity.step_back(r, elapsed);
+        let [least, most] = carrier.limits;
+        let inside = stretch * r >= least && stretch * r <= most;
+        if carrier.velocity.falling().is_some() && !inside {
+            return;
+        }
+        self.points.push(point);
+        self.share.push(share);
+        self.place.push(place);
+        self.elapsed.push(elapsed);
+        self.angle.push(T::of(angle));
+        let columns = self.stretched.iter_mut().zip(place);
+        columns.for_each(|(column, x)| column.push(T::of(stretch * x)));
+    }
+
+    fn turned(&self) -> Turned<'_, T> {
+        let [x, y, z] = &self.stretched;
+        Turned { points: Coordinates::xyz(x, y, z), angles: &self.angle }
+    }
+
     fn pull(&mut self, axis: Axis) {
-        self.pulled = core::array::from_fn(|_| vec![T::zero(); self.points.len()]);
-        let ([x, y, z], [a, b, c]) = (&self.place, &mut self.pulled);
-        let turned = Turned { points: Coordinates::xyz(x, y, z), angles: &self.angle };
-        pull_back(axis, turned, CoordinatesMut::xyz(a, b, c));
+        let mut pulled: [Vec<T>; 3] = core::array::from_fn(|_| vec![T::zero(); self.points.len()]);
+        let [a, b, c] = &mut pulled;
+        pull_back(axis, self.turned(), CoordinatesMut::xyz(a, b, c));
+        self.pulled = pulled;
+    }
+
+    /// From slopes at the label time to those of the angles and of the stretched places.
+    fn pull_vjp(&self, axis: Axis, [a, b, c]: &[Vec<T>; 3]) -> (Vec<T>, [Vec<T>; 3]) {
+        let mut angles = vec![T::zero(); self.points.len()];
+        let mut places: [Vec<T>; 3] = core::array::from_fn(|_| angles.clone());
+        let [x, y, z] = &mut places;
+        let points = Some(CoordinatesMut::xyz(x, y, z));
+        let wanted = Cotangents { angles: Some(&mut angles), points };
+        pull_back_vjp(axis, self.turned(), Coordinates::xyz(a, b, c), wanted);
+        (angles, places)
     }
 
     fn coordinates(&self) -> Coordinates<'_, T> {
@@ -281,8 +332,7 @@ impl<T: Float> Representation<T> for Changing<T> {
             let columns = CoordinatesMut::xyz(x, y, z);
             let gradient = Gradient { parameters: out, coordinates: Some(columns) };
             self.inner.vjp(own, part.coordinates(), &inner, gradient, workspace);
-            let times = at.columns()[0];
-            self.of_coordinates((knot, &part), (&values, &slopes), (times, cotangents), into);
+            self.of_coordinates(&part, (&values, &slopes), cotangents, into);
         }
     }
 }
@@ -290,10 +340,13 @@ impl<T: Float> Representation<T> for Changing<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dynamics::Velocity;
     use crate::representation::conformance::{Subject, check};
     use crate::representation::grid::tests::plain;
     use crate::representation::{Activation, Grid, GridSettings};
     use kerrlight_geodesic::vector::{cross, rotate};
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
 
     const AXIS: [f64; 3] = [0.36, 0.48, 0.8];
 
@@ -313,8 +366,9 @@ mod tests {
 
     fn field(count: usize, allowed: Allowed) -> Changing<f64> {
         let knots = Knots { first: -0.3, spacing: 0.25, count, allowed };
-        let motion = (Axis::new(AXIS).unwrap(), velocity());
-        Changing::new(Box::new(Grid::new(settings()).unwrap()), knots, motion).unwrap()
+        let axis = Axis::new(AXIS).unwrap();
+        let carrier = Carrier { axis, velocity: velocity(), limits: [0.0, 2.0] };
+        Changing::new(Box::new(Grid::new(settings()).unwrap()), knots, carrier).unwrap()
     }
 
     /// Shares of the knots at a time, and their growth: hat functions, or ramps that stay up.
@@ -398,6 +452,48 @@ mod tests {
             field.eval(&parameters, at, &mut values, &mut Workspace::new());
             for (value, expected) in values.iter().zip(expected) {
                 assert!((value - expected).abs() < 1e-13, "{value} {expected}");
+            }
+        }
+    }
+
+    /// Where matter falls, slopes along random directions are those of central differences.
+    #[test]
+    fn exact_slopes_of_falling_fields_are_those_of_differences() {
+        let law = Velocity::Infall { xi: 0.8, beta_r: 0.8, beta_phi: 0.9, drag: None };
+        let settings = GridSettings { low: [-9.0; 3], high: [9.0; 3], ..settings() };
+        for allowed in [Allowed::Any, Allowed::Births] {
+            let knots = Knots { first: -3.0, spacing: 2.5, count: 3, allowed };
+            let velocity = law.angular(0, 0.3).unwrap();
+            let axis = Axis::new(AXIS).unwrap();
+            let carrier = Carrier { axis, velocity, limits: [2.0, 12.0] };
+            let grid = Grid::new(settings.clone()).unwrap();
+            let field = Changing::<f64>::new(Box::new(grid), knots, carrier).unwrap();
+            let mut random = Pcg64::seed_from_u64(3);
+            let mut draw = |low: f64, high: f64| random.random_range(low..high);
+            let parameters: Vec<f64> = (0..field.parameters()).map(|_| draw(-1.0, 1.0)).collect();
+            for _ in 0..40 {
+                let at = [draw(-2.9, 1.9), draw(3.0, 6.0), draw(-5.0, 5.0), draw(-3.0, 3.0)];
+                let along = [0; 4].map(|_| draw(-1.0, 1.0));
+                let value = |s: f64| {
+                    let [t, x, y, z]: [f64; 4] = core::array::from_fn(|k| at[k] + s * along[k]);
+                    let (columns, mut value) = ([[t], [x], [y], [z]], [0.0]);
+                    let [t, x, y, z] = &columns;
+                    let at = Coordinates::txyz(t, x, y, z);
+                    field.eval(&parameters, at, &mut value, &mut Workspace::new());
+                    value[0]
+                };
+                let [t, x, y, z] = at.map(|x| [x]);
+                let mut slopes = [[0.0]; 4];
+                let [dt, dx, dy, dz] = &mut slopes;
+                let mut unused = vec![0.0; parameters.len()];
+                let coordinates = Some(CoordinatesMut::txyz(dt, dx, dy, dz));
+                let into = Gradient { parameters: &mut unused, coordinates };
+                let at = Coordinates::txyz(&t, &x, &y, &z);
+                field.vjp(&parameters, at, &[1.0], into, &mut Workspace::new());
+                let slope: f64 = slopes.iter().zip(along).map(|([s], d)| s * d).sum();
+                let h = 1e-5;
+                let difference = (value(h) - value(-h)) / (2.0 * h);
+                assert!((slope - difference).abs() < 1e-6, "{slope} {difference} {at:?}");
             }
         }
     }

@@ -16,7 +16,7 @@ mod registry;
 mod workspace;
 
 pub use activation::Activation;
-pub use changing::{Allowed, Changing, Knots};
+pub use changing::{Allowed, Carrier, Changing, Knots};
 pub use features::{FeatureGrid, FeatureGridSettings};
 pub use grid::{Grid, GridSettings};
 pub use network::{Initialisation, Network, NetworkSettings};

@@ -103,7 +103,7 @@ pub fn true_volume_at(file: &FitFile, truth: &Truth, since: f64) -> anyhow::Resu
 /// The truth at the reference time.
 pub fn true_volume(file: &FitFile, truth: &Truth) -> anyhow::Result<Volume> {
     let nodes = Box3::new(file);
-    nodes.volume(nodes.positions().iter().map(|x| truth.at(*x, 0.0) as f32).collect())
+    nodes.volume(nodes.positions().iter().map(|x| truth.at(*x) as f32).collect())
 }
 
 /// What the field is worth beside the truth.

@@ -40,9 +40,7 @@ impl Estimate<'_> {
             let mut model = self.forward_model(&rays, &motion)?;
             still.recovered.extend(rays.pixels(&recovered(&mut model, trainer, state)));
             if let Some(truth) = &self.measured.truth {
-                model.weigh(truth.axis());
-                let light = |x, t| truth.at(x, t);
-                let image = model.movie_in_time(truth.axis(), &light, &mut Batch::default());
+                let image = truth.movie_through(&mut model);
                 let image: Vec<f32> = image.into_iter().map(|x| x as f32).collect();
                 still.truth.get_or_insert_default().extend(rays.pixels(&image));
             }

@@ -10,7 +10,7 @@ use crate::fit::{BatchSize, OccupancyPlan, OccupancySettings, Region, Training};
 use crate::memory;
 use crate::optimise::{Adam, Lbfgs, Polynomial};
 use crate::representation::{
-    Activation, Changing, FeatureGrid, FeatureGridSettings, Grid, GridSettings, Network,
+    Activation, Carrier, Changing, FeatureGrid, FeatureGridSettings, Grid, GridSettings, Network,
     NetworkSettings, OwnSettings, Registry, Representation,
 };
 
@@ -33,8 +33,10 @@ pub fn representation(
     let parameters = inner.parameters() as f64 * knots.count as f64;
     let what = || format!("change.spacing: {} times of {} voxels", knots.count, inner.parameters());
     memory::afford(what, memory::parameters(parameters))?;
-    let velocity = motion(file, Vec::new())?.velocity;
-    Ok(Box::new(Changing::new(inner, knots, (axis(file)?.0, velocity))?))
+    let (axis, velocity) = (axis(file)?.0, motion(file, Vec::new())?.velocity);
+    let Region { r_min, r_max, .. } = file.region.limits();
+    let carrier = Carrier { axis, velocity, limits: [r_min, r_max] };
+    Ok(Box::new(Changing::new(inner, knots, carrier)?))
 }
 
 /// What is recovered where matter carries emission unchanged.

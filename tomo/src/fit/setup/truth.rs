@@ -5,6 +5,7 @@ use super::{AXIS, Instrument, Result, known_axis, motion};
 use crate::dynamics::{AngularVelocity, Axis};
 use crate::fit::settings::{FitError, FitFile, Shines, Spot, Within, refuse};
 use crate::fit::{Batch, ForwardModel};
+use crate::simd::Float;
 use kerrlight_geodesic::vector::distance;
 
 /// What to write where there is no truth.
@@ -62,26 +63,39 @@ impl Truth {
         })
     }
 
-    /// Emission at a time since the reference time (M) of the matter that is at x (M) at the reference time.
-    pub fn at(&self, x: [f64; 3], time: f64) -> f64 {
-        // Spots that were wound up for the same time share the rotation.
-        let mut turned = (0.0, x);
-        let light = |spot: &Spot| {
-            if spot.wound_for != turned.0 {
-                turned = (spot.wound_for, self.velocity.before(self.axis, x, spot.wound_for));
-            }
-            let offset = distance(turned.1, spot.center) / spot.sigma;
-            let shines = spot.shines.map_or(1.0, |shines| shines.at(self.reference + time));
-            spot.amplitude * shines * (-0.5 * offset * offset).exp()
-        };
-        let of_glyphs: f64 = self.glyphs.iter().map(|glyph| glyph.at(x, 0.0)).sum();
-        self.spots.iter().map(light).sum::<f64>() + of_glyphs
+    /// Emission at a place (M) at the reference time.
+    pub fn at(&self, x: [f64; 3]) -> f64 {
+        self.seen_at(x, 0.0)
     }
 
     /// Emission at a place (M) at a time since the reference time, M.
     pub fn seen_at(&self, x: [f64; 3], time: f64) -> f64 {
-        let angle = -self.velocity.rate(distance(x, [0.0; 3])) * time;
-        self.at(rotate(self.axis.vector(), angle, x), time)
+        let before = |elapsed: f64| match elapsed == 0.0 {
+            true => x,
+            false => self.velocity.before(self.axis, x, elapsed),
+        };
+        // Spots that were round at the same time share the way back.
+        let mut moved = (time, before(time));
+        let reference = moved.1;
+        let light = |spot: &Spot| {
+            if time + spot.wound_for != moved.0 {
+                moved = (time + spot.wound_for, before(time + spot.wound_for));
+            }
+            let offset = distance(moved.1, spot.center) / spot.sigma;
+            let shines = spot.shines.map_or(1.0, |shines| shines.at(self.reference + time));
+            spot.amplitude * shines * (-0.5 * offset * offset).exp()
+        };
+        let of_spots: f64 = self.spots.iter().map(light).sum();
+        of_spots + self.glyphs.iter().map(|glyph| glyph.at(reference, 0.0)).sum::<f64>()
+    }
+
+    /// Images in Jy per pixel of a forward model with the truth's motion, all frames one after the other.
+    pub fn movie_through<T: Float>(&self, model: &mut ForwardModel<T>) -> Vec<f64> {
+        model.weigh(self.axis);
+        match self.is_carried() {
+            true => model.movie_of(self.axis, &|x| self.at(x), &mut Batch::default()),
+            false => model.movie_of_events(&|x, t| self.seen_at(x, t), &mut Batch::default()),
+        }
     }
 
     /// Whether every amplitude is 0: data of noise alone.
@@ -113,7 +127,6 @@ impl Truth {
         let motion = motion(file, times.to_vec())?;
         let Instrument { lines, hole, redshift, .. } = instrument;
         let mut model = ForwardModel::<f64>::new(lines, &motion, hole, *redshift)?;
-        model.weigh(self.axis);
-        Ok(model.movie_in_time(self.axis, &|x, time| self.at(x, time), &mut Batch::default()))
+        Ok(self.movie_through(&mut model))
     }
 }

@@ -3,7 +3,7 @@
 use super::super::change::Change;
 use super::*;
 use crate::dynamics::AngularVelocity;
-use crate::representation::{Allowed, Changing};
+use crate::representation::{Allowed, Carrier, Changing};
 
 const ALLOWED: [Allowed; 2] = [Allowed::Any, Allowed::Births];
 
@@ -24,8 +24,8 @@ fn model(delay: bool) -> ForwardModel<f64> {
 }
 
 fn changing(voxels: &Voxels, knots: Knots) -> Changing<f64> {
-    let motion = (axis(), AngularVelocity::bhnerf());
-    Changing::new(Box::new(voxels.grid().unwrap()), knots, motion).unwrap()
+    let carrier = Carrier { axis: axis(), velocity: AngularVelocity::bhnerf(), limits: [0.0, 5.0] };
+    Changing::new(Box::new(voxels.grid().unwrap()), knots, carrier).unwrap()
 }
 
 fn images(model: &ForwardModel<f64>, field: &Changing<f64>, x: &[f64]) -> Vec<f64> {
