@@ -11,6 +11,11 @@ use crate::fit::{Data, FrameTerm, Objective};
 /// Nodes along an axis from which on a coarser grid is solved first.
 const FINE: usize = 40;
 
+/// Nodes along an axis of the grid on which emission that changes is looked for first.
+const COARSE: usize = 24;
+/// Bytes of the sparse matrix of emission that changes: its rows take long to compute anew.
+const MANY_ROWS: usize = 2 << 30;
+
 /// All terms of the data, the image first.
 pub(super) fn terms(data: &Data<f32>) -> Vec<Weighted<'_, f32>> {
     let image = data.image.iter().map(|w| (w.weight, &*w.term as &dyn FrameTerm<f32>));
@@ -53,5 +58,10 @@ pub fn solve_linear(
         ..coarse
     });
     let (rounds, iterations) = (settings.rounds, settings.iterations);
-    problem.solve(&LinearSettings { rounds, iterations, coarse, ..usual }, watch)
+    let coarse = match change.is_any() {
+        true => Some(Coarse { nodes: nodes.min(COARSE), stride: 1, iterations: 20 }),
+        false => coarse,
+    };
+    let memory = if change.is_any() { MANY_ROWS } else { usual.memory };
+    problem.solve(&LinearSettings { rounds, iterations, coarse, memory, ..usual }, watch)
 }
