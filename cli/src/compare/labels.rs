@@ -10,10 +10,12 @@ pub fn number(x: f64, digits: usize) -> String {
 }
 
 /// Results that are shown: their names in results.json, what they are called, their units and digits.
-pub const RESULTS: [(&str, &str, &str, usize); 17] = [
+pub const RESULTS: [(&str, &str, &str, usize); 19] = [
     ("psnr_db", "PSNR", "dB", 2),
     ("psnr_inside_db", "PSNR inside the region", "dB", 2),
+    ("psnr_over_time_db", "PSNR over time", "dB", 2),
     ("nrmse", "relative error", "", 4),
+    ("nrmse_over_time", "relative error over time", "", 4),
     ("correlation", "correlation", "", 4),
     ("axis_dot_truth", "axis · true axis", "", 4),
     ("spin_error", "error of the spin", "M", 4),
