@@ -82,9 +82,7 @@ impl Knots {
             (one + u, per_time)
         } else if falls {
             (one - u, -per_time)
-        } else if u <= -one && !first {
-            (zero, zero)
-        } else if u >= one && !last && self.allowed == Allowed::Any {
+        } else if (u <= -one && !first) || (u >= one && !last && self.allowed == Allowed::Any) {
             (zero, zero)
         } else {
             (one, zero)
