@@ -70,8 +70,11 @@ fn exact_hard_motion_is_recognised_as_wrong() {
     std::fs::remove_dir_all(folder.path().join("run")).unwrap();
     let text = settings();
     let (start, end) = (text.find("\n[change]").unwrap(), text.find("[[truth.spot]]").unwrap());
-    std::fs::write(folder.path().join("hard.toml"), format!("{}{}", &text[..start], &text[end..]))
-        .unwrap();
+    std::fs::write(
+        folder.path().join("hard.toml"),
+        format!("{}\n{}", &text[..start], &text[end..]),
+    )
+    .unwrap();
     let run = kerrlight(folder.path(), &["fit", "hard.toml", "-o", "run"]);
     let told = String::from_utf8_lossy(&run.stderr).into_owned();
     assert!(told.contains("The model does not explain its data"), "{told}");

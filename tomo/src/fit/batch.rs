@@ -119,6 +119,15 @@ impl<T: Float> Batch<T> {
 
     /// The same of places and times of emission; nothing is carried along.
     pub fn gather_events(&mut self, model: &ForwardModel<T>) {
+        self.fill(model);
+        if model.earliest.is_some() {
+            self.columns.pulled.clone_from(&self.columns.position);
+            self.thin_out(model.earliest, None, false);
+        }
+    }
+
+    /// Collects the nodes of the pairs.
+    fn fill(&mut self, model: &ForwardModel<T>) {
         self.columns.clear();
         self.starts.clear();
         self.starts.push(0);
@@ -126,10 +135,6 @@ impl<T: Float> Batch<T> {
             let range = model.starts[ray as usize]..model.starts[ray as usize + 1];
             self.columns.push(model, range, model.times[frame as usize]);
             self.starts.push(self.columns.weight.len());
-        }
-        if model.earliest.is_some() {
-            self.columns.pulled.clone_from(&self.columns.position);
-            self.thin_out(model.earliest, None, false);
         }
     }
 
@@ -139,14 +144,7 @@ impl<T: Float> Batch<T> {
         (axis, fall): (Axis, Option<&Fall>),
         occupancy: Option<&Occupancy>,
     ) {
-        self.columns.clear();
-        self.starts.clear();
-        self.starts.push(0);
-        for &(ray, frame) in &self.pairs {
-            let range = model.starts[ray as usize]..model.starts[ray as usize + 1];
-            self.columns.push(model, range, model.times[frame as usize]);
-            self.starts.push(self.columns.weight.len());
-        }
+        self.fill(model);
         if let Some(fall) = fall {
             self.columns.carry(fall);
         }

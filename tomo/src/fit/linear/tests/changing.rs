@@ -2,7 +2,7 @@
 
 use super::super::change::Change;
 use super::*;
-use crate::dynamics::AngularVelocity;
+use crate::dynamics::{AngularVelocity, Velocity};
 use crate::representation::{Allowed, Carrier, Changing};
 
 const ALLOWED: [Allowed; 2] = [Allowed::Any, Allowed::Births];
@@ -13,7 +13,10 @@ fn knots(allowed: Allowed) -> Knots {
 
 /// Rays with or without delays, in units of time in which the pattern turns once at 3.5 M.
 fn model(delay: bool) -> ForwardModel<f64> {
-    let mut model = forward_model();
+    delayed(forward_model(), delay)
+}
+
+fn delayed(mut model: ForwardModel<f64>, delay: bool) -> ForwardModel<f64> {
     if delay {
         // Light from farther along x comes later: as good as any for what is tested here.
         model.delay = model.position[0].iter().map(|x| 0.03 * x).collect();
@@ -40,35 +43,52 @@ fn images(model: &ForwardModel<f64>, field: &Changing<f64>, x: &[f64]) -> Vec<f6
 fn exact_sparse_operator_is_the_changing_field_and_sums() {
     let voxels = Voxels { nodes: [7, 6, 8], ..Voxels::cube(2, 5.0) };
     for (allowed, delay) in ALLOWED.into_iter().flat_map(|a| [(a, false), (a, true)]) {
-        let (model, knots) = (model(delay), knots(allowed));
-        let field = changing(&voxels, knots);
-        let dark = vec![0.0; FRAMES.len() * model.pixels()];
-        let dark = ImageTerm::new(dark, model.pixels(), 1.0).unwrap();
-        let terms = [Weighted { weight: 1.0, term: &dark as &dyn FrameTerm<f64> }];
-        let data = Data::new(&terms, &FRAMES, model.pixels(), 5).unwrap();
-        let count = (FRAMES.len() * model.pixels()) as f64;
-        let all = 4 * voxels.count();
-        for share in [1.0, 0.4] {
-            let is_active: Vec<bool> = random(all, 4).iter().map(|x| *x < share).collect();
-            for budget in [usize::MAX, 0] {
-                let active = Active::new(&is_active, voxels.corners());
-                let walk = Walk::new(&model, axis(), (voxels, knots));
-                let operator = Operator::new(walk, active, &FRAMES, budget);
-                let x = random(operator.active.count(), 1);
-                let seen = images(&model, &field, &operator.active.expand(&x));
-                let square: f64 = seen.iter().map(|pixel| pixel * pixel).sum();
-                let (value, gradient) = operator.value_and_gradient(&data, &x, false);
-                assert!((value * count / square - 1.0).abs() < 1e-12, "{value} {allowed:?}");
-                let y = random(x.len(), 2);
-                let others = images(&model, &field, &operator.active.expand(&y));
-                let forward: f64 = others.iter().zip(&seen).map(|(a, b)| a * b).sum();
-                let back: f64 = gradient.iter().zip(&y).map(|(g, y)| 0.5 * count * g * y).sum();
-                assert!((back / forward - 1.0).abs() < 1e-12, "{back} {forward}");
-                let (_, everywhere) = operator.value_and_gradient(&data, &x, true);
-                for (a, b) in operator.active.gather(&everywhere).iter().zip(&gradient) {
-                    assert!((a - b).abs() < 1e-13);
-                }
-            }
+        let knots = knots(allowed);
+        compare_with_images(&model(delay), &changing(&voxels, knots), (voxels, knots));
+    }
+}
+
+/// The same of matter that falls.
+#[test]
+fn exact_sparse_operator_is_the_changing_field_of_a_falling_flow() {
+    let voxels = Voxels { nodes: [7, 6, 8], ..Voxels::cube(2, 5.0) };
+    let law = Velocity::Infall { xi: 0.8, beta_r: 0.9, beta_phi: 0.95, drag: None };
+    for (allowed, delay) in ALLOWED.into_iter().flat_map(|a| [(a, false), (a, true)]) {
+        let knots = Knots { first: 1.0, spacing: 4.0, count: 4, allowed };
+        let field = changing_of(law.angular(0, 0.0).unwrap(), &voxels, knots);
+        compare_with_images(&delayed(falling_model(), delay), &field, (voxels, knots));
+    }
+}
+
+fn compare_with_images(
+    model: &ForwardModel<f64>,
+    field: &Changing<f64>,
+    (voxels, knots): (Voxels, Knots),
+) {
+    let dark = vec![0.0; FRAMES.len() * model.pixels()];
+    let dark = ImageTerm::new(dark, model.pixels(), 1.0).unwrap();
+    let terms = [Weighted { weight: 1.0, term: &dark as &dyn FrameTerm<f64> }];
+    let data = Data::new(&terms, &FRAMES, model.pixels(), 5).unwrap();
+    let count = (FRAMES.len() * model.pixels()) as f64;
+    for (share, budget) in [(1.0, usize::MAX), (1.0, 0), (0.4, usize::MAX), (0.4, 0)] {
+        let is_active: Vec<bool> =
+            random(4 * voxels.count(), 4).iter().map(|x| *x < share).collect();
+        let active = Active::new(&is_active, voxels.corners());
+        let walk = Walk::new(model, axis(), (voxels, knots));
+        let operator = Operator::new(walk, active, &FRAMES, budget);
+        let x = random(operator.active.count(), 1);
+        let seen = images(model, field, &operator.active.expand(&x));
+        let square: f64 = seen.iter().map(|pixel| pixel * pixel).sum();
+        let (value, gradient) = operator.value_and_gradient(&data, &x, false);
+        assert!((value * count / square - 1.0).abs() < 1e-12, "{value} {square}");
+        let y = random(x.len(), 2);
+        let others = images(model, field, &operator.active.expand(&y));
+        let forward: f64 = others.iter().zip(&seen).map(|(a, b)| a * b).sum();
+        let back: f64 = gradient.iter().zip(&y).map(|(g, y)| 0.5 * count * g * y).sum();
+        assert!((back / forward - 1.0).abs() < 1e-12, "{back} {forward}");
+        let (_, everywhere) = operator.value_and_gradient(&data, &x, true);
+        for (a, b) in operator.active.gather(&everywhere).iter().zip(&gradient) {
+            assert!((a - b).abs() < 1e-13);
         }
     }
 }
