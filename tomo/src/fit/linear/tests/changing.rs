@@ -27,7 +27,11 @@ fn delayed(mut model: ForwardModel<f64>, delay: bool) -> ForwardModel<f64> {
 }
 
 fn changing(voxels: &Voxels, knots: Knots) -> Changing<f64> {
-    let carrier = Carrier { axis: axis(), velocity: AngularVelocity::bhnerf(), limits: [0.0, 5.0] };
+    changing_of(AngularVelocity::bhnerf(), voxels, knots)
+}
+
+fn changing_of(velocity: AngularVelocity, voxels: &Voxels, knots: Knots) -> Changing<f64> {
+    let carrier = Carrier { axis: axis(), velocity, limits: [0.0, 5.0] };
     Changing::new(Box::new(voxels.grid().unwrap()), knots, carrier).unwrap()
 }
 
