@@ -93,6 +93,7 @@ fn exact_what_cannot_change_is_refused_before_anything_is_written() {
     for (change, expected) in [
         ("change.weight=-1.0", "change.weight = -1"),
         ("change.spacing=0.0", "change.spacing = 0"),
+        ("change.spacing=0.001", "with at most 10,000 in the time of the data"),
         ("change.allowed=deaths", "unknown variant `deaths`"),
         ("representation=mlp4d", "change does not apply to mlp4d"),
         ("representation=grid", "linear-grid"),

@@ -42,6 +42,8 @@ impl<'a> Prepared<'a> {
         let instrument = Instrument::new(&file)?;
         let measured = data::measure(&file, &instrument, base_dir)?;
         let motion = setup::motion(&file, measured.times.clone())?;
+        // Times at which emission may change are those of the rays.
+        setup::representation(&file, registry, setup::emission_times(&instrument, &motion))?;
         if let Some(unknown) = file.unknown_world()? {
             // What contradicts it is told before anything is written.
             let world = setup::known_world(&file);
