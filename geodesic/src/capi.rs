@@ -9,7 +9,6 @@
 //! (or `cdylib`), and `examples/c/shadow.c` uses it. Rust programs have no need of this module.
 
 use crate::error::{Error, check};
-use crate::integrate::path::{Outcome, Unresolved};
 use crate::rays::columns::{Points, RayTable};
 use crate::rays::integrator::Integrator;
 use crate::rays::request::{Placement, Request};
@@ -302,16 +301,10 @@ unsafe fn put<T>(column: *mut T, values: impl Iterator<Item = T>) {
 /// # Safety
 /// The columns are null or have the lengths that the header says.
 unsafe fn fill(out: &RayColumns, table: &RayTable, rays: usize) {
-    let code = |outcome: &Outcome| match outcome {
-        Outcome::Captured => 0,
-        Outcome::Escaped => 1,
-        Outcome::Unresolved(Unresolved::PhotonOrbit) => 2,
-        Outcome::Unresolved(Unresolved::StepLimit) => 3,
-    };
     let errors = table.uncertainty.iter().flat_map(|u| [u.radius, u.theta, u.azimuth, u.delay]);
     // SAFETY: the caller's promise, for each column.
     unsafe {
-        put(out.outcome, table.outcome.iter().map(code));
+        put(out.outcome, table.outcome.iter().map(|outcome| i32::from(outcome.code())));
         put(out.mino_total, table.mino_total.iter().copied());
         put(out.turning_radius, table.turning_radius.iter().copied());
         put(out.crossing_count, table.crossing_count.iter().copied());

@@ -3,7 +3,7 @@
 use crate::call::{detached, refused};
 use crate::rays::Place;
 use kerrlight_geodesic::quadrature::gauss_legendre;
-use kerrlight_geodesic::{Error, Kerr, Observer, Outcome, Path, Quantities, Tracer};
+use kerrlight_geodesic::{Error, Kerr, Observer, Path, Quantities, Tracer};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use rayon::prelude::*;
@@ -45,7 +45,7 @@ fn along(
     rows.try_for_each_init(Path::new, |path, (row, (alpha, beta))| {
         let ray = observer.ray(hole, *alpha, *beta)?;
         tracer.trace(hole, &ray, Quantities::POLAR, path);
-        if !matches!(path.outcome(), Outcome::Unresolved(_)) {
+        if !path.outcome().is_unresolved() {
             fill(hole, path, observer.inverse_radius(), &rule, row);
         }
         Ok(())

@@ -3,8 +3,7 @@
 use crate::call::{detached, refused};
 use kerrlight_geodesic::derivatives::{self, Differentiated, Gradient, Gradients};
 use kerrlight_geodesic::{
-    Inclination, Integrator, Kerr, Observer, Outcome, Placement, Points, RayTable, Request,
-    Uncertainty, Unresolved,
+    Inclination, Integrator, Kerr, Observer, Placement, Points, RayTable, Request, Uncertainty,
 };
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -132,19 +131,9 @@ fn differentiate<'py>(
     Ok(dict)
 }
 
-/// The numbers that C has too.
-fn code(outcome: &Outcome) -> i8 {
-    match outcome {
-        Outcome::Captured => 0,
-        Outcome::Escaped => 1,
-        Outcome::Unresolved(Unresolved::PhotonOrbit) => 2,
-        Outcome::Unresolved(Unresolved::StepLimit) => 3,
-    }
-}
-
 fn table(py: Python<'_>, rays: RayTable) -> PyResult<Bound<'_, PyDict>> {
     let dict = PyDict::new(py);
-    let codes: Vec<i8> = rays.outcome.iter().map(code).collect();
+    let codes: Vec<i8> = rays.outcome.iter().map(|outcome| outcome.code()).collect();
     dict.set_item("outcome", codes.into_pyarray(py))?;
     dict.set_item("mino_total", rays.mino_total.into_pyarray(py))?;
     dict.set_item("turning_radius", rays.turning_radius.into_pyarray(py))?;

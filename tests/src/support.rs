@@ -18,7 +18,12 @@ pub fn binary() -> &'static Path {
         let mut cargo = Command::new(env!("CARGO"));
         cargo.current_dir(root()).args(["build", "--quiet", "--package", "kerrlight"]);
         if cfg!(feature = "beside-python") {
-            cargo.args(["--package", "kerrlight-python", "--features", "kerrlight-python/extension"]);
+            cargo.args([
+                "--package",
+                "kerrlight-python",
+                "--features",
+                "kerrlight-python/extension",
+            ]);
         }
         if !cfg!(debug_assertions) {
             cargo.arg("--release");

@@ -109,7 +109,7 @@ impl<'a, T: Elementary, S: Sink<T>> Sampler<'a, T, S> {
     /// Takes a ray with angular momentum `lambda`.
     pub fn take(&mut self, ray: &impl Trajectory<T>, lambda: T) {
         let outcome = ray.outcome();
-        let total = (!matches!(outcome, Outcome::Unresolved(_))).then(|| ray.total());
+        let total = (!outcome.is_unresolved()).then(|| ray.total());
         let mut times = core::mem::take(&mut self.times);
         times.clear();
         ray.crossings(&mut times);

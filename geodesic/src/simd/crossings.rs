@@ -4,7 +4,7 @@ use super::column::Column;
 use super::crossing::{Block, Target, Whole};
 use super::lanes::{InstructionSet, dispatch};
 use super::motion::Camera;
-use super::{BLOCK, checked, each};
+use super::{BLOCK, ScreenRays, each};
 use crate::error::{Error, check};
 use crate::screen::observer::Observer;
 use crate::spacetime::kerr::Kerr;
@@ -177,23 +177,32 @@ impl Crossings {
         beta: &[f64],
         per_ray: usize,
     ) -> Result<(), Error> {
+        self.trace_rays(set, ScreenRays::new(hole, observer, alpha, beta)?, per_ray)
+    }
+
+    /// [`trace_at`](Self::trace_at) of rays that have been checked.
+    pub(crate) fn trace_rays(
+        &mut self,
+        set: InstructionSet,
+        rays: ScreenRays<'_>,
+        per_ray: usize,
+    ) -> Result<(), Error> {
         check("crossings per ray", per_ray as f64, per_ray >= 1, "at least 1")?;
-        let camera = checked(hole, observer, alpha, beta)?;
-        let count = alpha.len().checked_mul(per_ray);
-        let fits = self.columns().into_iter().try_for_each(|column| column.resize(count));
-        let rays = self.rays.iter_mut().try_for_each(|column| column.resize(Some(alpha.len())));
-        let fits = fits.and(rays);
-        if let Err(error) = fits {
+        if let Err(error) = self.resize(rays.alpha.len(), per_ray) {
             *self = Self::default();
             return Err(error);
         }
-        self.per_ray = per_ray;
         // The horizon itself is the end: no sample has to lie short of it.
-        self.run(set, Camera { margin: 0.0, ..camera }, alpha, beta);
-        let origin = observer.azimuth();
-        if origin != 0.0 {
-            self.azimuth.iter_mut().for_each(|phi| *phi += origin);
-        }
+        self.run(set, Camera { margin: 0.0, ..rays.camera }, rays.alpha, rays.beta);
+        rays.turn(&mut self.azimuth);
+        Ok(())
+    }
+
+    fn resize(&mut self, rays: usize, per_ray: usize) -> Result<(), Error> {
+        let count = rays.checked_mul(per_ray);
+        self.columns().into_iter().try_for_each(|column| column.resize(count))?;
+        self.rays.iter_mut().try_for_each(|column| column.resize(Some(rays)))?;
+        self.per_ray = per_ray;
         Ok(())
     }
 

@@ -91,28 +91,65 @@ const FARTHEST: f64 = 1e30;
 /// digits in its root.
 const SLOWEST: f64 = 0.01;
 
-/// The kernels' view of the observer, if all rays are within their reach.
-fn checked(
-    hole: &Kerr,
-    observer: &Observer,
-    alpha: &[f64],
-    beta: &[f64],
-) -> Result<motion::Camera, Error> {
-    let w = observer.inverse_radius();
-    let within = w == 0.0 || (1.0 / FARTHEST..=1.0 / NEAREST).contains(&w);
-    check("observer radius", 1.0 / w, within, "infinity, or a number in [5, 1e30] (M)")?;
-    let same = alpha.len() == beta.len();
-    check("number of beta", beta.len() as f64, same, "as many as of alpha")?;
-    let camera = motion::Camera::new(hole, observer);
-    for (x, y) in alpha.iter().zip(beta) {
-        check("alpha", *x, x.abs() <= 1e12, "a number in [-1e12, 1e12] (M)")?;
-        check("beta", *y, y.abs() <= 1e12, "a number in [-1e12, 1e12] (M)")?;
-        let radial = Motion::<f64>::new(&camera, *x, *y).radial(w);
-        let inwards = "with beta a ray that reaches the observer from well inside \
-                       (W(1/r) = (dr/dtau)^2/r^4 at least 0.01)";
-        check("alpha", *x, radial >= SLOWEST, inwards)?;
+/// Points of an observer's screen within the reach of the kernels. They are checked when this is made, so that kernels
+/// which trace the same rays need not.
+#[derive(Clone, Copy)]
+pub(crate) struct ScreenRays<'a> {
+    camera: motion::Camera,
+    /// The observer's azimuth, in radians.
+    azimuth: f64,
+    alpha: &'a [f64],
+    beta: &'a [f64],
+}
+
+impl<'a> ScreenRays<'a> {
+    /// The points (`alpha[k]`, `beta[k]`).
+    ///
+    /// # Errors
+    /// As for [`Crossings::trace`].
+    pub fn new(
+        hole: &Kerr,
+        observer: &Observer,
+        alpha: &'a [f64],
+        beta: &'a [f64],
+    ) -> Result<Self, Error> {
+        let w = observer.inverse_radius();
+        let within = w == 0.0 || (1.0 / FARTHEST..=1.0 / NEAREST).contains(&w);
+        check("observer radius", 1.0 / w, within, "infinity, or a number in [5, 1e30] (M)")?;
+        let same = alpha.len() == beta.len();
+        check("number of beta", beta.len() as f64, same, "as many as of alpha")?;
+        let camera = motion::Camera::new(hole, observer);
+        let mut points = alpha.iter().zip(beta);
+        points.try_for_each(|(alpha, beta)| check_point(&camera, *alpha, *beta))?;
+        Ok(ScreenRays { camera, azimuth: observer.azimuth(), alpha, beta })
     }
-    Ok(camera)
+
+    /// Some of these points, in any order.
+    pub fn part<'b>(&self, alpha: &'b [f64], beta: &'b [f64]) -> ScreenRays<'b> {
+        ScreenRays { camera: self.camera, azimuth: self.azimuth, alpha, beta }
+    }
+
+    /// Whether the observer is at infinity.
+    pub fn is_at_infinity(&self) -> bool {
+        self.camera.w_obs == 0.0
+    }
+
+    /// Counts azimuths from the observer's on.
+    fn turn(&self, azimuth: &mut [f64]) {
+        if self.azimuth != 0.0 {
+            azimuth.iter_mut().for_each(|phi| *phi += self.azimuth);
+        }
+    }
+}
+
+fn check_point(camera: &motion::Camera, alpha: f64, beta: f64) -> Result<(), Error> {
+    check("alpha", alpha, alpha.abs() <= 1e12, "a number in [-1e12, 1e12] (M)")?;
+    check("beta", beta, beta.abs() <= 1e12, "a number in [-1e12, 1e12] (M)")?;
+    let radial = Motion::<f64>::new(camera, alpha, beta).radial(camera.w_obs);
+    let inwards = "with beta a ray that reaches the observer from well inside \
+                   (W(1/r) = (dr/dtau)^2/r^4 at least 0.01)";
+    check("alpha", alpha, radial >= SLOWEST, inwards)?;
+    Ok(())
 }
 
 #[cfg(test)]

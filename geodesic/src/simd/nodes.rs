@@ -1,6 +1,6 @@
 //! Nodes of a quadrature along many rays, inside a sphere.
 
-use super::checked;
+use super::ScreenRays;
 
 use super::column::Aligned;
 use super::error::{MAX_STEP, estimate};
@@ -137,7 +137,20 @@ impl Nodes {
         until: Option<&[f64]>,
         request: &NodeRequest,
     ) -> Result<(), Error> {
-        let camera = Camera { margin: 0.0, ..checked(hole, observer, alpha, beta)? };
+        let rays = ScreenRays::new(hole, observer, alpha, beta)?;
+        self.trace_rays(set, rays, until, request)
+    }
+
+    /// [`trace_at`](Self::trace_at) of rays that have been checked.
+    pub(crate) fn trace_rays(
+        &mut self,
+        set: InstructionSet,
+        screen: ScreenRays<'_>,
+        until: Option<&[f64]>,
+        request: &NodeRequest,
+    ) -> Result<(), Error> {
+        let ScreenRays { alpha, beta, .. } = screen;
+        let camera = Camera { margin: 0.0, ..screen.camera };
         let radius = request.radius;
         let outside = radius > camera.r_plus() && radius.is_finite();
         check("radius of the sphere", radius, outside, "a finite number above the horizon's (M)")?;
@@ -151,10 +164,7 @@ impl Nodes {
         dispatch(set, Planning { rays: &rays, nodes: self });
         self.lay_out(&rays);
         dispatch(set, Marching { rays: &rays, nodes: self });
-        let origin = observer.azimuth();
-        if origin != 0.0 {
-            self.columns[4].iter_mut().for_each(|phi| *phi += origin);
-        }
+        screen.turn(&mut self.columns[4]);
         Ok(())
     }
 

@@ -4,7 +4,7 @@ use super::column::Column;
 use super::lanes::{InstructionSet, dispatch};
 use super::motion::Camera;
 use super::sample::{Block, Rays, Target};
-use super::{BLOCK, checked, each};
+use super::{BLOCK, ScreenRays, each};
 use crate::error::{Error, check};
 use crate::screen::observer::Observer;
 use crate::spacetime::kerr::Kerr;
@@ -141,20 +141,26 @@ impl Samples {
         beta: &[f64],
         per_ray: usize,
     ) -> Result<(), Error> {
+        self.trace_rays(set, ScreenRays::new(hole, observer, alpha, beta)?, per_ray)
+    }
+
+    /// [`trace_at`](Self::trace_at) of rays that have been checked.
+    pub(crate) fn trace_rays(
+        &mut self,
+        set: InstructionSet,
+        rays: ScreenRays<'_>,
+        per_ray: usize,
+    ) -> Result<(), Error> {
         check("samples per ray", per_ray as f64, per_ray >= 2, "at least 2")?;
-        let camera = checked(hole, observer, alpha, beta)?;
-        if let Err(error) = self.resize(alpha.len(), per_ray) {
+        if let Err(error) = self.resize(rays.alpha.len(), per_ray) {
             *self = Self::default();
             return Err(error);
         }
-        self.run(set, camera, alpha, beta);
-        if observer.is_at_infinity() {
+        self.run(set, rays.camera, rays.alpha, rays.beta);
+        if rays.is_at_infinity() {
             self.mark_infinity();
         }
-        let origin = observer.azimuth();
-        if origin != 0.0 {
-            self.azimuth.iter_mut().for_each(|phi| *phi += origin);
-        }
+        rays.turn(&mut self.azimuth);
         Ok(())
     }
 

@@ -5,6 +5,7 @@ use super::RenderError;
 use super::pixels::Pixel;
 use crate::Error;
 use crate::transport::PreparedScene;
+use kerrlight_geodesic::Outcome;
 
 /// A channel of a picture.
 pub struct ChannelKind {
@@ -130,9 +131,19 @@ pub static CHANNELS: [ChannelKind; 15] = [
         "outcome",
         "",
         "of the central ray: 0 captured, 1 escaped, 2 met an opaque surface, 3 unresolved",
-        |p| f64::from(p.center.fate as u8),
+        |p| outcome_code(p.center.outcome),
     ),
 ];
+
+/// The number of an outcome in pictures, where the reason for giving up a ray does not matter.
+fn outcome_code(outcome: Outcome) -> f64 {
+    match outcome {
+        Outcome::Captured => 0.0,
+        Outcome::Escaped => 1.0,
+        Outcome::Surface => 2.0,
+        Outcome::Unresolved(_) => 3.0,
+    }
+}
 
 /// The channels of a picture of `prepared`: all that it has, or those asked for.
 pub(super) fn chosen(

@@ -3,7 +3,7 @@
 use super::grid::Grid;
 use super::rings::{Counted, Resolver, Square};
 use crate::Error;
-use crate::transport::{Fate, PreparedScene, RayResult, Scratch};
+use crate::transport::{PreparedScene, RayResult, Scratch};
 use std::ops::Range;
 
 /// A pixel: averages of light, data of its most central ray.
@@ -171,7 +171,7 @@ fn mean(rays: &[RayResult], side: usize) -> Pixel {
         for (sum, x) in pixel.stokes.iter_mut().zip(ray.stokes) {
             *sum += x;
         }
-        pixel.unresolved += u32::from(ray.fate == Fate::Unresolved);
+        pixel.unresolved += u32::from(ray.outcome.is_unresolved());
     }
     pixel.intensity /= rays.len() as f64;
     pixel.stokes = pixel.stokes.map(|x| x / rays.len() as f64);

@@ -22,4 +22,4 @@ pub use kerrlight_geodesic::View;
 pub use meter::Meter;
 pub use prepare::{Assets, PreparedScene};
 pub use ray::Scratch;
-pub use result::{Fate, RayResult};
+pub use result::RayResult;

@@ -3,20 +3,6 @@
 use kerrlight_geodesic::simd::RayNodes;
 use kerrlight_geodesic::{Outcome, PathPoint, PlaneCrossing, TracedRay};
 
-/// What became of a pixel's ray, as written into the `outcome` channel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Fate {
-    /// Fell into the hole (0).
-    Captured = 0,
-    /// Reached the sky (1).
-    Escaped = 1,
-    /// Met an opaque surface (2).
-    Surface = 2,
-    /// Was given up (3).
-    #[default]
-    Unresolved = 3,
-}
-
 /// What one ray sees.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RayResult {
@@ -42,7 +28,7 @@ pub struct RayResult {
     /// Optical depth, dimensionless, of the way to the ray's end; 0 where nothing absorbs.
     pub optical_depth: f64,
     /// What became of the ray.
-    pub fate: Fate,
+    pub outcome: Outcome,
 }
 
 impl RayResult {
@@ -121,12 +107,7 @@ impl Accumulator {
     /// What the ray sees whose light this is.
     #[inline(always)]
     pub fn result(&self, ray: &TracedRay) -> RayResult {
-        let fate = match (ray.surface, ray.outcome) {
-            (Some(_), _) => Fate::Surface,
-            (None, Outcome::Captured) => Fate::Captured,
-            (None, Outcome::Escaped) => Fate::Escaped,
-            (None, Outcome::Unresolved(_)) => Fate::Unresolved,
-        };
+        let outcome = if ray.surface.is_some() { Outcome::Surface } else { ray.outcome };
         RayResult {
             intensity: self.intensity,
             rgb: self.rgb,
@@ -138,7 +119,7 @@ impl Accumulator {
             delay: self.place.delay,
             optical_depth: self.depth,
             stokes: self.stokes,
-            fate,
+            outcome,
         }
     }
 

@@ -214,8 +214,9 @@ fn judge(
         Outcome::Escaped => tally.fates[1] += 1,
         Outcome::Unresolved(Unresolved::PhotonOrbit) => tally.unresolved[0] += 1,
         Outcome::Unresolved(Unresolved::StepLimit) => tally.unresolved[1] += 1,
+        Outcome::Surface => {}
     }
-    let unresolved = matches!(table.outcome[0], Outcome::Unresolved(_));
+    let unresolved = table.outcome[0].is_unresolved();
     let wrong_fate = !unresolved && table.outcome[0] != oracle.outcome();
     let wrong_count = !unresolved && !wrong_fate && !same_crossings(&hole, &table, oracle);
     let estimate = table.uncertainty[0];

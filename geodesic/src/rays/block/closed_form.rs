@@ -7,7 +7,7 @@ use super::visitor::{PathUse, RayVisitor, Work, first_opaque};
 use crate::error::Error;
 use crate::integrate::path::Outcome;
 use crate::screen::observer::{Observer, Ray};
-use crate::simd::{Crossings, NodeRequest, RayEnds};
+use crate::simd::{Crossings, InstructionSet, NodeRequest, RayEnds, ScreenRays};
 
 /// Rays whose nodes are in memory at once: few enough for the second-level cache.
 const TOGETHER: usize = 128;
@@ -69,21 +69,22 @@ impl BlockTracer {
         visitor: &mut V,
     ) -> Result<(), Error> {
         let located = job.request.crossings.max(1);
-        block.crossings.trace(&self.hole, observer, job.alpha, job.beta, located)?;
+        let screen = ScreenRays::new(&self.hole, observer, job.alpha, job.beta)?;
+        block.crossings.trace_rays(InstructionSet::best(), screen, located)?;
         self.classify(observer, job, block, visitor)?;
         if let Some(probes) = &job.request.probes {
-            self.probe(observer, probes, job, block, visitor)?;
+            self.probe(screen, probes, job, block, visitor)?;
         }
         if job.request.exit {
             visitor.works_on(Work::Exits);
-            self.find_exits(observer, job, block)?;
+            self.find_exits(screen, job, block)?;
         }
         if job.request.samples > 0 {
-            self.sample_in_closed_form(observer, job, block)?;
+            self.sample_in_closed_form(screen, job, block)?;
         }
         for (number, sphere) in job.request.nodes.iter().enumerate() {
             visitor.works_on(Work::Nodes(number));
-            self.refine_in_closed_form(observer, (number, sphere), job, block, visitor)?;
+            self.refine_in_closed_form(screen, (number, sphere), job, block, visitor)?;
         }
         Ok(())
     }
@@ -158,16 +159,17 @@ impl BlockTracer {
     /// Finds the rays whose path is needed beside the closed form.
     fn probe<V: RayVisitor>(
         &self,
-        observer: &Observer,
+        screen: ScreenRays<'_>,
         probes: &NodeRequest,
         job: Job<'_>,
         RayBlock { rays, nodes, .. }: &mut RayBlock,
         visitor: &V,
     ) -> Result<(), Error> {
+        let set = InstructionSet::best();
         let open: Vec<usize> = (0..rays.len()).filter(|k| !rays[*k].stepped).collect();
         let [alpha, beta] = job.pick(&open);
         let until: Vec<f64> = open.iter().map(|k| rays[*k].last_time()).collect();
-        nodes.trace(&self.hole, observer, &alpha, &beta, Some(&until), probes)?;
+        nodes.trace_rays(set, screen.part(&alpha, &beta), Some(&until), probes)?;
         for (number, k) in open.into_iter().enumerate() {
             rays[k].with_path = visitor.needs_path_at(&rays[k], &nodes.ray(number));
         }
@@ -183,7 +185,7 @@ impl BlockTracer {
     /// Finds where the rays go that meet no surface and escape.
     fn find_exits(
         &self,
-        observer: &Observer,
+        screen: ScreenRays<'_>,
         job: Job<'_>,
         RayBlock { rays, exits, .. }: &mut RayBlock,
     ) -> Result<(), Error> {
@@ -195,7 +197,7 @@ impl BlockTracer {
             return Ok(());
         }
         let [alpha, beta] = job.pick(&outward);
-        exits.trace(&self.hole, observer, &alpha, &beta, 2)?;
+        exits.trace_rays(InstructionSet::best(), screen.part(&alpha, &beta), 2)?;
         for (j, k) in outward.into_iter().enumerate() {
             let ray = exits.ray(j);
             let (sin, u) = ray.theta[1].sin_cos();
@@ -209,7 +211,7 @@ impl BlockTracer {
     /// that need them.
     fn refine_in_closed_form<V: RayVisitor>(
         &self,
-        observer: &Observer,
+        screen: ScreenRays<'_>,
         (number, sphere): (usize, &SphereNodes),
         job: Job<'_>,
         block: &mut RayBlock,
@@ -217,13 +219,13 @@ impl BlockTracer {
     ) -> Result<(), Error> {
         let RayBlock { rays, plane, nodes, .. } = block;
         let mut pending: Vec<usize> = (0..rays.len()).filter(|k| !rays[*k].stepped).collect();
-        let mut request = sphere.request.clone();
+        let (set, mut request) = (InstructionSet::best(), sphere.request.clone());
         while !pending.is_empty() {
             let mut more = Vec::new();
             for some in pending.chunks(TOGETHER) {
                 let [alpha, beta] = job.pick(some);
                 let until: Vec<f64> = some.iter().map(|k| rays[*k].last_time()).collect();
-                nodes.trace(&self.hole, observer, &alpha, &beta, Some(&until), &request)?;
+                nodes.trace_rays(set, screen.part(&alpha, &beta), Some(&until), &request)?;
                 for (place, k) in some.iter().enumerate() {
                     let crossings = &plane[rays[*k].crossings.clone()];
                     let nodes = nodes.ray(place);

@@ -8,14 +8,14 @@ use crate::integrate::path::Outcome;
 use crate::rays::sampling::{Trajectory, mino_times};
 use crate::rays::trajectory::MinoPath;
 use crate::screen::observer::{Observer, Ray};
-use crate::simd::{RaySamples, Samples};
+use crate::simd::{InstructionSet, RaySamples, Samples, ScreenRays};
 
 impl BlockTracer {
     /// Samples the rays in closed form. From infinity, those that fall have one end there and others
     /// two: they are sampled apart.
     pub(super) fn sample_in_closed_form(
         &self,
-        observer: &Observer,
+        screen: ScreenRays<'_>,
         job: Job<'_>,
         block: &mut RayBlock,
     ) -> Result<(), Error> {
@@ -26,10 +26,11 @@ impl BlockTracer {
         let mut sample = |samples: &mut Samples, chosen: Vec<usize>, ends: usize| {
             chosen.iter().enumerate().for_each(|(place, k)| places[*k] = place);
             let [alpha, beta] = job.pick(&chosen);
-            samples.trace(&self.hole, observer, &alpha, &beta, (n + ends).max(2))
+            let part = screen.part(&alpha, &beta);
+            samples.trace_rays(InstructionSet::best(), part, (n + ends).max(2))
         };
         let closed = (0..rays.len()).filter(|k| !rays[*k].stepped);
-        if !observer.is_at_infinity() {
+        if !screen.is_at_infinity() {
             return sample(falling, closed.collect(), 0);
         }
         let (down, up) = closed.partition(|k| rays[*k].outcome == Outcome::Captured);
@@ -62,7 +63,7 @@ impl BlockTracer {
         visitor: &mut V,
     ) {
         let trajectory = MinoPath { path, ray };
-        if matches!(path.outcome(), Outcome::Unresolved(_)) {
+        if path.outcome().is_unresolved() {
             return;
         }
         let (total, escapes) = (trajectory.total(), path.outcome() == Outcome::Escaped);

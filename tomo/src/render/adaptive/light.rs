@@ -1,7 +1,8 @@
 //! What single rays see, and whether two of them see the same piece of the picture.
 
 use crate::render::rings::Counted;
-use crate::transport::{Fate, RayResult};
+use crate::transport::RayResult;
+use kerrlight_geodesic::Outcome;
 
 /// What a ray, or several along photon rings, adds to its cell.
 #[derive(Debug, Clone, Copy, Default)]
@@ -20,8 +21,8 @@ pub(super) struct Light {
 /// What rays of one smooth piece of the picture have in common.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Kind {
-    /// Lensing band and fate.
-    pub(super) band: (u32, Fate),
+    /// Lensing band and outcome.
+    pub(super) band: (u32, Outcome),
     /// Images of the disc that are seen.
     pub(super) disc_images: u32,
     /// Whether there is emission.
@@ -42,7 +43,7 @@ impl Light {
 
     /// What a ray sees.
     pub(super) fn of_ray(seen: &RayResult) -> Self {
-        let band = (seen.crossings, seen.fate);
+        let band = (seen.crossings, seen.outcome);
         let (disc_images, lit) = (seen.disc_images, seen.radius > 0.0);
         Light {
             intensity: seen.intensity,
@@ -50,7 +51,7 @@ impl Light {
             stokes: seen.stokes,
             kind: Kind { band, disc_images, lit },
             rays: 1,
-            unresolved: u32::from(seen.fate == Fate::Unresolved),
+            unresolved: u32::from(seen.outcome.is_unresolved()),
             mean: None,
         }
     }

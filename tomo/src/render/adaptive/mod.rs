@@ -20,7 +20,7 @@ use super::grid::Grid;
 use super::pixels::{Pixel, Workspace};
 use super::rings::{Counted, Resolver, Square};
 use crate::Error;
-use crate::transport::{Fate, PreparedScene, RayResult};
+use crate::transport::{PreparedScene, RayResult};
 use cell::Cell;
 use cut::Cut;
 use light::{Light, range};
@@ -243,7 +243,7 @@ fn of_one_ray(center: RayResult, error: f64) -> Pixel {
         rgb: center.rgb,
         stokes: center.stokes,
         center,
-        unresolved: u32::from(center.fate == Fate::Unresolved),
+        unresolved: u32::from(center.outcome.is_unresolved()),
         rays: 1,
         error,
         known: 1.0,

@@ -3,7 +3,8 @@
 use super::{RingStrata, Stratum};
 use crate::Error;
 use crate::render::pixels::Workspace;
-use crate::transport::{Fate, PreparedScene, RayResult};
+use crate::transport::{PreparedScene, RayResult};
+use kerrlight_geodesic::Outcome;
 use std::ops::Range;
 
 /// Resolves the photon rings of a prepared scene.
@@ -105,7 +106,7 @@ impl Resolver {
         jobs: &mut Vec<Job>,
         work: &mut Workspace,
     ) -> Result<(), Error> {
-        let hidden = |seen: &RayResult| seen.fate == Fate::Surface && seen.disc_images == 1;
+        let hidden = |seen: &RayResult| seen.outcome == Outcome::Surface && seen.disc_images == 1;
         let asked = |job: &&Job| seen.get(job.square).is_some_and(hidden);
         work.clear();
         for Square { center: (x, y), size } in
@@ -154,7 +155,7 @@ fn mean(rays: &[Stratum], found: &[RayResult], seen: &mut RayResult) -> Counted 
         for (sum, x) in seen.stokes.iter_mut().zip(light.stokes) {
             *sum += share * x;
         }
-        counted.unresolved += u32::from(light.fate == Fate::Unresolved);
+        counted.unresolved += u32::from(light.outcome.is_unresolved());
     }
     counted.error = error(rays, found);
     counted

@@ -2,6 +2,7 @@ use super::*;
 use crate::emission::mesh::{MeshFile, RawTriangle};
 use crate::scene::{Disc, Mesh, MeshVelocity};
 use core::f64::consts::{FRAC_PI_2, PI, TAU};
+use kerrlight_geodesic::Outcome;
 
 fn file(triangles: impl IntoIterator<Item = [[f64; 3]; 3]>) -> MeshFile {
     let raw = |corners| RawTriangle { corners, texture: [[0.0; 2]; 3], material: u32::MAX };
@@ -81,7 +82,7 @@ fn exact_annulus_against_the_disc() {
             if near_edge(mesh.radius) || near_edge(disc.radius) {
                 continue;
             }
-            assert_eq!(mesh.fate, disc.fate);
+            assert_eq!(mesh.outcome, disc.outcome);
             assert!((mesh.radius - disc.radius).abs() < 1e-8, "{} {}", mesh.radius, disc.radius);
             assert!((mesh.azimuth - disc.azimuth).abs() < 1e-8);
             assert!((mesh.redshift - disc.redshift).abs() < 1e-8);
@@ -106,12 +107,12 @@ fn exact_silhouette_of_a_sphere() {
             let (sin, cos) = (0.4 + f64::from(k)).sin_cos();
             let hit = |b: f64| {
                 let seen = prepared.observe(b * cos, b * sin, &mut Scratch::default()).unwrap();
-                if seen.fate == Fate::Surface {
+                if seen.outcome == Outcome::Surface {
                     let g = (1.0 - 2.0 / seen.radius).sqrt();
                     assert!((seen.redshift - g).abs() < 1e-9, "{} {g}", seen.redshift);
                     assert!(seen.radius > inside * 0.999_999 && seen.radius < radius * 1.000_001);
                 }
-                seen.fate == Fate::Surface
+                seen.outcome == Outcome::Surface
             };
             let (mut low, mut high) = (0.5 * radius, 2.0 * edge(radius));
             assert!(hit(low) && !hit(high));
@@ -139,10 +140,10 @@ fn exact_straight_rays_far_out() {
         let b = f64::hypot(alpha, beta);
         assert!((seen.radius / b - 1.0).abs() < 10.0 / b, "{} {b}", seen.radius);
         assert!((seen.azimuth.abs() - FRAC_PI_2).abs() < 1e-9);
-        assert!((seen.redshift - 1.0).abs() < 10.0 / b && seen.fate == Fate::Surface);
+        assert!((seen.redshift - 1.0).abs() < 10.0 / b && seen.outcome == Outcome::Surface);
     }
     let past = prepared.observe(3.01e6, 0.0, &mut Scratch::default()).unwrap();
-    assert_eq!(past.fate, Fate::Escaped);
+    assert_eq!(past.outcome, Outcome::Escaped);
 }
 
 /// Triangles of many sizes, some of which hide: the hierarchy finds what one finds one by one.
@@ -169,7 +170,7 @@ fn exact_tree_against_every_triangle() {
             (observe(&prepared, &[0.0]), observe(&prepared.clone().one_by_one(), &[0.0]));
         for (a, b) in found.iter().zip(&expected) {
             let same = |x: f64, y: f64| (x - y).abs() < 1e-7 * (1.0 + y.abs());
-            assert_eq!(a.fate, b.fate);
+            assert_eq!(a.outcome, b.outcome);
             assert!(same(a.intensity, b.intensity) && same(a.radius, b.radius), "{a:?} {b:?}");
             lit += u32::from(a.intensity > 0.0);
         }
@@ -186,8 +187,8 @@ fn exact_ray_in_the_plane_of_a_mesh() {
         let ring = (mesh(true, MeshVelocity::Static), annulus(5.0, 60.0, 64));
         let prepared = prepared(scene, vec![ring]);
         let observe = |beta| prepared.observe(10.0, beta, &mut Scratch::default()).unwrap();
-        assert_ne!(observe(0.0).fate, Fate::Surface);
-        assert_eq!(observe(0.1).fate, Fate::Surface);
+        assert_ne!(observe(0.0).outcome, Outcome::Surface);
+        assert_eq!(observe(0.1).outcome, Outcome::Surface);
     }
 }
 
@@ -199,7 +200,9 @@ fn exact_dark_surfaces_hide() {
     let dark = Mesh { brightness: 0.0, ..mesh(true, MeshVelocity::Static) };
     let hidden = prepared(base.clone(), vec![(dark, sphere(18.0, 16))]);
     assert!(
-        observe(&hidden, &[30.0]).iter().all(|s| s.intensity == 0.0 && s.fate == Fate::Surface)
+        observe(&hidden, &[30.0])
+            .iter()
+            .all(|s| s.intensity == 0.0 && s.outcome == Outcome::Surface)
     );
     let open = PreparedScene::new(&base, None).unwrap();
     assert!(observe(&open, &[30.0]).iter().any(|seen| seen.intensity > 0.0));

@@ -2,10 +2,10 @@
 //! through a loop over the same traced rays that knows none.
 
 use kerrlight_geodesic::simd::Crossings;
-use kerrlight_geodesic::{Inclination, Kerr, Observer};
+use kerrlight_geodesic::{Inclination, Kerr, Observer, Outcome};
 use kerrlight_tomo::emission::disc::DiscModel;
 use kerrlight_tomo::scene::Scene;
-use kerrlight_tomo::transport::{Fate, PreparedScene, RayResult, Scratch};
+use kerrlight_tomo::transport::{PreparedScene, RayResult, Scratch};
 use std::time::Instant;
 
 /// An opaque disc and nothing else.
@@ -28,7 +28,7 @@ struct Seen {
     radius: f64,
     azimuth: f64,
     delay: f64,
-    fate: Fate,
+    outcome: Outcome,
 }
 
 /// Both ways to the same picture.
@@ -109,7 +109,7 @@ impl Off {
             radius: 0.0,
             azimuth: 0.0,
             delay: 0.0,
-            fate: if ends.escapes { Fate::Escaped } else { Fate::Captured },
+            outcome: if ends.escapes { Outcome::Escaped } else { Outcome::Captured },
         };
         for (number, crossing) in self.crossings.ray(k).enumerate() {
             if self.disc.covers(crossing.radius) {
@@ -120,13 +120,13 @@ impl Off {
                 let turns = (crossing.azimuth / std::f64::consts::TAU).round();
                 seen.azimuth = crossing.azimuth - std::f64::consts::TAU * turns;
                 seen.delay = crossing.delay;
-                seen.fate = Fate::Surface;
+                seen.outcome = Outcome::Surface;
                 return seen;
             }
         }
         // As in the library, such a ray would have to be traced by steps.
         if self.crossings.ray(k).count() < ends.crossings as usize || ends.error.is_nan() {
-            seen.fate = Fate::Unresolved;
+            seen.outcome = Outcome::default();
         }
         seen
     }
@@ -134,14 +134,14 @@ impl Off {
     /// Whether both see the same.
     pub fn agree(&self) -> bool {
         let same = |(seen, result): (&Seen, &RayResult)| {
-            let unmet = seen.fate == Fate::Unresolved;
+            let unmet = seen.outcome.is_unresolved();
             let light = seen.intensity == result.intensity && seen.rgb == result.rgb;
             let place = [seen.radius, seen.azimuth, seen.delay];
             let place = place == [result.radius, result.azimuth, result.delay];
             let rest = seen.crossings == result.crossings && seen.images == result.disc_images;
-            unmet || (light && place && rest && seen.fate == result.fate)
+            unmet || (light && place && rest && seen.outcome == result.outcome)
         };
-        let unmet = self.seen.iter().filter(|seen| seen.fate == Fate::Unresolved).count();
+        let unmet = self.seen.iter().filter(|seen| seen.outcome.is_unresolved()).count();
         unmet * 1000 < self.seen.len() && self.seen.iter().zip(&self.results).all(same)
     }
 }
