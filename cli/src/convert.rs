@@ -1,11 +1,13 @@
 //! `kerrlight convert`: visibilities from one format to another.
 
-use crate::answer::Answer;
+use crate::answer::{self, Answer};
 use crate::interferometry::arguments;
 use crate::interferometry::{self, ObservationFile, Written};
-use crate::output;
+use crate::output::{self, Output};
 use anyhow::bail;
 use clap::Args;
+use kerrlight_tomo::interferometry::files;
+use kerrlight_tomo::interferometry::light_curve::LightCurve;
 use kerrlight_tomo::interferometry::observation::{Flags, Observation};
 use kerrlight_tomo::interferometry::source::Source;
 use std::path::PathBuf;
@@ -18,6 +20,9 @@ pub struct Convert {
     /// Where to write; the name's ending tells the format, `-` is CSV on standard output
     #[arg(value_name = "OUTPUT.uvfits|.txt|.csv")]
     output: PathBuf,
+    /// Write the light curve that baselines within a site (ALMA-APEX, JCMT-SMA) have measured: I, Q, U, V as CSV
+    #[arg(long, conflicts_with_all = ["format", "comments", "stokes_i"])]
+    light_curve: bool,
     /// Format to write [default: by the name's ending]
     #[arg(long, value_name = "FORMAT")]
     format: Option<Written>,
@@ -96,10 +101,28 @@ impl Convert {
         if observation.rows.is_empty() {
             bail!("{}: no visibilities are left", self.input.display());
         }
+        if self.light_curve {
+            return self.write_light_curve(&observation);
+        }
         output.write(&observation)?;
         let (rows, flagged) = (observation.rows.len(), selection.dropped);
         eprintln!("{rows} rows, {flagged} flagged");
         Ok(output.answer().with("rows", rows).with("flagged", flagged))
+    }
+
+    fn write_light_curve(&self, observation: &Observation) -> anyhow::Result<Answer> {
+        let curve = LightCurve::of_sites(observation);
+        if curve.samples.is_empty() {
+            bail!("{}: no baseline lies within a site", self.input.display());
+        }
+        let output = Output::or_pipe(&self.output, &["csv"])?;
+        output.spares(&self.input)?;
+        output.write(files::light_curve_to_csv(&curve).as_bytes())?;
+        let count = curve.samples.len();
+        eprintln!("{count} samples");
+        let written = answer::written([&output]);
+        let text: String = written.iter().map(|file| format!("{}\n", file.display())).collect();
+        Ok(Answer::text(text).files(written).with("samples", count))
     }
 
     /// Whether standard output carries the visibilities.

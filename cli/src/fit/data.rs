@@ -1,9 +1,11 @@
 //! The data of a fit: simulated, or read from files.
 
 use crate::interferometry::{self, arguments, movie_files};
-use anyhow::Context;
+use crate::output;
+use anyhow::{Context, bail};
 use kerrlight_tomo::fit::settings::{DataFiles, FitFile};
 use kerrlight_tomo::fit::setup::{Instrument, Measured};
+use kerrlight_tomo::interferometry::files;
 use kerrlight_tomo::interferometry::simulate::Movie;
 use std::path::Path;
 
@@ -16,6 +18,7 @@ pub fn measure(
     Measured::check_origin(file)?;
     match &file.data {
         None => {
+            let file = &with_times(file, base_dir)?;
             let array = file.observation.as_ref().map(|seen| {
                 arguments::array_near(&seen.array, base_dir).context("observation.array")
             });
@@ -26,8 +29,29 @@ pub fn measure(
             let movie = movie(file, &path)?;
             Ok(Measured::of_movie(file, movie, &path.display().to_string())?)
         }
+        Some(DataFiles::LightCurve(settings)) => {
+            let path = base_dir.join(&settings.path);
+            let name = path.display().to_string();
+            let curve =
+                files::parse_light_curve(&output::read_text(&path)?).context(name.clone())?;
+            Ok(Measured::of_light_curve(file, curve, &name)?)
+        }
         Some(DataFiles::Visibilities { path, .. }) => visibilities(file, &base_dir.join(path)),
     }
+}
+
+/// The settings with the times of a simulated light curve, where these are in a file.
+fn with_times(file: &FitFile, base_dir: &Path) -> anyhow::Result<FitFile> {
+    let mut file = file.clone();
+    let Some(curve) = &mut file.light_curve else { return Ok(file) };
+    let Some(path) = curve.times.take() else { return Ok(file) };
+    if curve.times_h.is_some() {
+        bail!("light_curve.times and times_h exclude each other");
+    }
+    let path = base_dir.join(path);
+    let times = files::parse_times(&output::read_text(&path)?);
+    curve.times_h = Some(times.with_context(|| path.display().to_string())?);
+    Ok(file)
 }
 
 /// The movie of a file, which may know its field.

@@ -96,6 +96,13 @@ impl ZamoFrame {
         [time, v[1] * self.radial, v[2] / self.length, around]
     }
 
+    /// The covariant Boyer–Lindquist components, the angular ones in M, of a vector of this frame.
+    pub fn to_covariant(&self, v: [f64; 4]) -> [f64; 4] {
+        let around = v[3] * self.girth * self.sin;
+        let time = -self.lapse * v[0] - self.drag * around;
+        [time, v[1] / self.radial, v[2] * self.length, around]
+    }
+
     /// The velocity in this frame, in units of c, of matter at rest with respect to infinity, along e_φ; it is
     /// not below 1 in magnitude where there is no rest, in the ergosphere.
     pub fn velocity_at_rest(&self) -> f64 {

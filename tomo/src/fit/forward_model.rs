@@ -6,8 +6,10 @@ use super::fall::Fall;
 use super::occupancy::Occupancy;
 use super::shift::Shift;
 use super::sightlines::Sightlines;
+use super::stokes::{Planes, Seen};
 use crate::Error;
 use crate::dynamics::{AngularVelocity, Axis, Injection};
+use crate::polarization::{Stokes, StokesParameter};
 use crate::representation::{Representation, Workspace};
 use crate::simd::Float;
 use kerrlight_geodesic::Kerr;
@@ -62,6 +64,10 @@ pub struct ForwardModel<T> {
     pub(super) shift: Option<Shift>,
     /// Where matter comes from that changes its radius; `rate` and `phase` then do not say it.
     pub(super) fall: Option<Fall>,
+    /// With which factors nodes enter several images; one image without.
+    pub(super) planes: Option<Planes<T>>,
+    /// Whether all rays add to the same pixel.
+    pub(super) is_flux: bool,
     factors: Vec<f64>,
     weighted_for: Option<Axis>,
     /// Times of the frames since the reference time.
@@ -103,6 +109,8 @@ impl<T: Float> ForwardModel<T> {
             plain_weight: lines.weight.clone(),
             shift: redshift.map(|shift| Shift::new(lines, hole, velocity, shift.power)),
             fall: velocity.falling().map(|flow| Fall::new(flow, lines)),
+            planes: None,
+            is_flux: false,
             factors: Vec::new(),
             weighted_for: None,
             times: motion.times.iter().map(|time| since(*time)).collect(),
@@ -110,7 +118,50 @@ impl<T: Float> ForwardModel<T> {
         })
     }
 
-    /// Pixels of an image.
+    /// The same as data see it that are not images of total intensity alone; `factors` are those of all nodes
+    /// ([`PolarizedView::factors`](super::PolarizedView::factors)), and without them there is no Q, U and V.
+    ///
+    /// # Errors
+    /// If there are no parameters, or no factors for all of them.
+    pub fn seen(mut self, factors: Option<&[Stokes]>, seen: &Seen) -> Result<Self, Error> {
+        let parameters = seen.parameters();
+        let known = factors.map_or(0, <[Stokes]>::len);
+        if factors.is_some() && known != self.points() {
+            let allowed = "as many as nodes";
+            return Err(Error::out_of_range("Stokes factors", known as f64, allowed));
+        }
+        if seen.is_flux() {
+            (self.pixels, self.is_flux) = (1, true);
+            self.pixel.fill(0);
+        }
+        match factors {
+            Some(factors) if parameters == [StokesParameter::I] => self.scale(factors),
+            Some(factors) if !parameters.is_empty() => {
+                let planes = Planes::new(factors, parameters, self.pixels);
+                self.pixels *= planes.count;
+                self.planes = Some(planes);
+            }
+            None if parameters == [StokesParameter::I] => {}
+            _ => {
+                let allowed = "I, and with a law of polarisation Q and U";
+                let count = parameters.len() as f64;
+                return Err(Error::out_of_range("Stokes parameters", count, allowed));
+            }
+        }
+        Ok(self)
+    }
+
+    /// Weights of total intensity.
+    fn scale(&mut self, factors: &[Stokes]) {
+        for ((weight, plain), factor) in
+            self.weight.iter_mut().zip(&mut self.plain_weight).zip(factors)
+        {
+            *plain *= factor.i;
+            *weight = T::of(*plain);
+        }
+    }
+
+    /// Pixels of an image, of all images of a frame together.
     pub fn pixels(&self) -> usize {
         self.pixels
     }
@@ -176,8 +227,37 @@ impl<T: Float> ForwardModel<T> {
             field.representation.eval(field.parameters, at, &mut batch.values, workspace);
             for (ray, range) in batch.starts.windows(2).enumerate() {
                 let range = range[0]..range[1];
+                if let Some(planes) = &self.planes {
+                    self.add_planes(planes, ray, range, batch, image);
+                    continue;
+                }
                 let sum = batch.columns.weight[range.clone()].iter().zip(&batch.values[range]);
-                image[self.pixel[ray] as usize] = sum.map(|(w, e)| *w * *e).sum();
+                let sum: T = sum.map(|(w, e)| *w * *e).sum();
+                self.put(image, ray, sum);
+            }
+        }
+    }
+
+    /// A ray's light into its pixel.
+    fn put<U: core::ops::AddAssign>(&self, image: &mut [U], ray: usize, light: U) {
+        let pixel = &mut image[self.pixel[ray] as usize];
+        if self.is_flux { *pixel += light } else { *pixel = light }
+    }
+
+    /// A ray's light into its pixels of all images.
+    fn add_planes(
+        &self,
+        planes: &Planes<T>,
+        ray: usize,
+        range: core::ops::Range<usize>,
+        batch: &Batch<T>,
+        image: &mut [T],
+    ) {
+        let pixel = self.pixel[ray] as usize;
+        for k in range {
+            let light = batch.columns.weight[k] * batch.values[k];
+            for (plane, factor) in planes.of(batch.columns.node[k]).iter().enumerate() {
+                image[pixel + plane * planes.stride] += light * *factor;
             }
         }
     }
@@ -241,13 +321,41 @@ impl<T: Float> ForwardModel<T> {
             gather(batch);
             let columns = &batch.columns;
             let light = |k: usize| columns.weight[k].double() * emission(columns, k);
+            if let Some(planes) = &self.planes {
+                self.add_summed(planes, columns, &batch.starts, &light, image);
+                continue;
+            }
             let sum = |range: &[usize]| (range[0]..range[1]).map(light).sum::<f64>();
             let fluxes: Vec<f64> = batch.starts.par_windows(2).map(sum).collect();
-            for (pixel, flux) in self.pixel.iter().zip(fluxes) {
-                image[*pixel as usize] = flux;
-            }
+            fluxes.into_iter().enumerate().for_each(|(ray, flux)| self.put(image, ray, flux));
         }
         movie
+    }
+
+    /// The light of all nodes into all images.
+    fn add_summed(
+        &self,
+        planes: &Planes<T>,
+        columns: &Columns<T>,
+        starts: &[usize],
+        light: &(impl Fn(usize) -> f64 + Sync),
+        image: &mut [f64],
+    ) {
+        let sum = |range: &[usize]| {
+            let mut sums = vec![0.0; planes.count];
+            for k in range[0]..range[1] {
+                let light = light(k);
+                let factors = planes.of(columns.node[k]);
+                sums.iter_mut().zip(factors).for_each(|(sum, f)| *sum += light * f.double());
+            }
+            sums
+        };
+        let fluxes: Vec<Vec<f64>> = starts.par_windows(2).map(sum).collect();
+        for (pixel, fluxes) in self.pixel.iter().zip(fluxes) {
+            for (plane, flux) in fluxes.into_iter().enumerate() {
+                image[*pixel as usize + plane * planes.stride] += flux;
+            }
+        }
     }
 }
 

@@ -42,6 +42,7 @@
 
 mod batch;
 pub mod checkpoint;
+mod curve_term;
 mod fall;
 mod forward_model;
 pub mod linear;
@@ -56,6 +57,7 @@ pub mod setup;
 mod shift;
 mod sightlines;
 mod steps;
+mod stokes;
 mod terms;
 #[cfg(test)]
 mod tests;
@@ -64,6 +66,7 @@ pub mod verdict;
 pub mod world;
 
 pub use batch::{Batch, Columns};
+pub use curve_term::{FluxDatum, StokesCurveTerm};
 pub use forward_model::{Field, ForwardModel, Motion, Redshift};
 pub use objective::{Buffers, Data, Gradients, Loss, Objective, Selection, Weighted, is_turned};
 pub use occupancy::{Occupancy, OccupancySettings};
@@ -71,5 +74,6 @@ pub use penalties::{Draw, Penalties, Probe, ProbeBuffers};
 pub use regulariser::{Regulariser, Shape};
 pub use sightlines::{Region, Sampling, SightlineRequest, Sightlines};
 pub use steps::Place;
+pub use stokes::{PolarizedView, Seen};
 pub use terms::{FrameTerm, ImageTerm, LightCurveTerm, Scan, ScanTerm};
 pub use train::{BatchSize, Diverged, OccupancyPlan, Outcome, Progress, State, Trainer, Training};

@@ -258,8 +258,16 @@ impl<T: Float> Objective<T> {
         cotangents.resize(batch.points(), T::zero());
         let shifted = gradients.axis.is_some() && self.model.is_shifted();
         for (group, (ray, _)) in batch.pairs.iter().enumerate() {
-            let slope = of_image[self.model.pixel[*ray as usize] as usize];
+            let pixel = self.model.pixel[*ray as usize] as usize;
             let range = batch.starts[group]..batch.starts[group + 1];
+            if let Some(planes) = &self.model.planes {
+                for k in range {
+                    let slope = planes.slope(of_image, pixel, batch.columns.node[k]);
+                    cotangents[k] = slope * batch.columns.weight[k];
+                }
+                continue;
+            }
+            let slope = of_image[pixel];
             let weights = &batch.columns.weight[range.clone()];
             let into = cotangents[range.clone()].iter_mut();
             into.zip(weights).for_each(|(cotangent, weight)| *cotangent = slope * *weight);

@@ -4,7 +4,9 @@ use super::*;
 
 mod penalised;
 mod quasi_newton;
+mod stokes;
 mod training;
+mod transport;
 
 use crate::dynamics::{AngularVelocity, Axis, Injection, Velocity};
 use crate::interferometry::data_terms::{DataTerm, Residual};

@@ -57,12 +57,32 @@ impl Gas {
     /// where that would not be slower than light. The point must have been traced with its
     /// azimuth.
     pub fn rotating(frame: &ZamoFrame, point: &PathPoint, omega: [f64; 3]) -> Option<Self> {
-        let [x, y, u] = point.direction;
-        let [sin, _] = frame.polar_angle();
-        let (cos_phi, sin_phi) = if sin > 0.0 { (x / sin, y / sin) } else { (1.0, 0.0) };
-        // dn/dt = ω × n along e_θ and e_φ.
-        let along_theta = omega[1] * cos_phi - omega[0] * sin_phi;
-        let along_phi = omega[2] * sin - u * (omega[0] * cos_phi + omega[1] * sin_phi);
-        Self::with_velocity(frame.sphere_velocity(along_theta, along_phi))
+        Self::with_velocity(on_sphere(frame, point.direction, omega))
     }
+
+    /// The same in the direction `n` (a unit vector) of gas that changes its radius, too, with dr/dt = `fall`.
+    pub fn falling(frame: &ZamoFrame, n: [f64; 3], (omega, fall): ([f64; 3], f64)) -> Option<Self> {
+        let [_, polar, around] = on_sphere(frame, n, omega);
+        let [time, radial, ..] = frame.contravariant([1.0, fall, 0.0, 0.0]);
+        Self::with_velocity([radial / time, polar, around])
+    }
+
+    /// The components along e_r, e_θ, e_φ that the gas measures of a vector of the frame, of which the part along its
+    /// four-velocity is left out.
+    pub fn measured(&self, vector: [f64; 4]) -> [f64; 3] {
+        let Gas([gamma, x, y, z]) = *self;
+        let along = x * vector[1] + y * vector[2] + z * vector[3];
+        let lift = along / (1.0 + gamma) - vector[0];
+        [vector[1] + lift * x, vector[2] + lift * y, vector[3] + lift * z]
+    }
+}
+
+/// The velocity along e_r, e_θ, e_φ at `n` of what turns rigidly.
+fn on_sphere(frame: &ZamoFrame, [x, y, u]: [f64; 3], omega: [f64; 3]) -> [f64; 3] {
+    let [sin, _] = frame.polar_angle();
+    let (cos_phi, sin_phi) = if sin > 0.0 { (x / sin, y / sin) } else { (1.0, 0.0) };
+    // dn/dt = ω × n along e_θ and e_φ.
+    let along_theta = omega[1] * cos_phi - omega[0] * sin_phi;
+    let along_phi = omega[2] * sin - u * (omega[0] * cos_phi + omega[1] * sin_phi);
+    frame.sphere_velocity(along_theta, along_phi)
 }

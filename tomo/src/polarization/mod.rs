@@ -12,6 +12,7 @@
 
 mod field;
 mod gas;
+mod law;
 mod stokes;
 mod synchrotron;
 #[cfg(test)]
@@ -20,6 +21,7 @@ mod view;
 
 pub use field::MagneticField;
 pub use gas::Gas;
-pub use stokes::Stokes;
+pub use law::{Components, FieldFrame, MixedField, Normalisation, PolarizationLaw};
+pub use stokes::{Stokes, StokesParameter};
 pub use synchrotron::PowerLaw;
 pub use view::{SynchrotronView, view, view_at};

@@ -1,6 +1,35 @@
 //! Stokes parameters.
 
 use core::ops::{AddAssign, Mul};
+use serde::{Deserialize, Serialize};
+
+/// One of the four.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub enum StokesParameter {
+    /// Intensity.
+    I,
+    /// P cos 2χ.
+    Q,
+    /// P sin 2χ.
+    U,
+    /// Right-handed less left-handed.
+    V,
+}
+
+impl StokesParameter {
+    /// All four, in their order.
+    pub const ALL: [Self; 4] = [Self::I, Self::Q, Self::U, Self::V];
+
+    /// Its place in that order.
+    pub fn index(self) -> usize {
+        self as usize
+    }
+
+    /// Its letter.
+    pub fn name(self) -> &'static str {
+        ["I", "Q", "U", "V"][self.index()]
+    }
+}
 
 /// Stokes parameters I, Q, U, V, in the unit of the intensity.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -20,6 +49,18 @@ impl Stokes {
     /// linear polarisation.
     pub fn evpa(&self) -> f64 {
         0.5 * self.u.atan2(self.q)
+    }
+
+    /// One of them, in the unit of the intensity.
+    pub fn get(&self, parameter: StokesParameter) -> f64 {
+        [self.i, self.q, self.u, self.v][parameter.index()]
+    }
+
+    /// The same with position angles that are larger by `angle` (radians, east of north): Q + iU times e^{2i angle}.
+    #[must_use]
+    pub fn turned(self, angle: f64) -> Self {
+        let (sin, cos) = (2.0 * angle).sin_cos();
+        Stokes { q: self.q * cos - self.u * sin, u: self.q * sin + self.u * cos, ..self }
     }
 
     /// The intensity of the linearly polarised part, in units of I, P = √(Q² + U²).

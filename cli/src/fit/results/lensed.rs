@@ -4,7 +4,8 @@
 use super::Estimate;
 use kerrlight_tomo::fit::setup::{self, Instrument};
 use kerrlight_tomo::fit::{
-    Batch, Field, ForwardModel, Motion, Sampling, SightlineRequest, Sightlines, State, Trainer,
+    Batch, Field, ForwardModel, Motion, PolarizedView, Sampling, Seen, SightlineRequest,
+    Sightlines, State, Trainer,
 };
 use kerrlight_tomo::render::{RingStrata, Stratum};
 use kerrlight_tomo::representation::Workspace;
@@ -79,16 +80,21 @@ impl Estimate<'_> {
 
     /// Nodes of rays, with the weights of integrals along them.
     fn forward_model(&self, rays: &Rays, motion: &Motion) -> anyhow::Result<ForwardModel<f32>> {
-        let Instrument { hole, redshift, .. } = self.instrument;
+        let Instrument { hole, redshift, polarized, .. } = self.instrument;
         let request = SightlineRequest {
             region: self.file.region.limits(),
             sampling: Sampling::Gauss { order: 6, split: 1 },
             delay: self.file.effects.slow_light,
-            momentum: redshift.is_some(),
+            momentum: redshift.is_some() || polarized.is_some(),
         };
         let observer = setup::observer(&self.file.observer)?;
         let lines = Sightlines::trace(hole, &observer, &rays.alpha, &rays.beta, &request)?;
-        Ok(ForwardModel::new(&lines, motion, hole, *redshift)?)
+        let model = ForwardModel::new(&lines, motion, hole, *redshift)?;
+        let Some(view) = polarized else { return Ok(model) };
+        let screen = [rays.alpha.clone(), rays.beta.clone()];
+        let factors =
+            PolarizedView { screen, ..view.clone() }.factors(&lines, hole, &motion.velocity)?;
+        Ok(model.seen(Some(&factors), &Seen::Images)?)
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod fields;
 mod lensed;
+mod light_curve;
 mod numbers;
 mod over_time;
 mod page;
@@ -53,10 +54,11 @@ impl Estimate<'_> {
     ) -> anyhow::Result<(String, Value)> {
         let volume = fields::recovered(self.file, trainer, state)?;
         let frames: Vec<usize> = (0..self.measured.times.len()).collect();
-        let movie = trainer.movie(&state.now, &frames, true);
-        failed::check(self.file, &trainer.objective, &frames, &movie)?;
-        let loss = trainer.objective.loss_of(&frames, &movie);
-        let mask = numbers::mask_error(trainer, state, &movie);
+        let seen = trainer.movie(&state.now, &frames, true);
+        failed::check(self.file, &trainer.objective, &frames, &seen)?;
+        let loss = trainer.objective.loss_of(&frames, &seen);
+        let mask = numbers::mask_error(trainer, state, &seen);
+        let movie = self.pictured(trainer, state, &seen)?;
         self.volumes(&volume, state)?;
         self.movies(&movie)?;
         let changes = self.changes(trainer, state)?;
@@ -65,8 +67,9 @@ impl Estimate<'_> {
         }
         self.scene(trainer, state, &movie)?;
         let still = self.still(trainer, state)?;
-        let judged = self.evidence().judged(&trainer.objective, &movie)?;
-        let found = Found { volume, changes, still, loss, mask, judged, movie, state, begun };
+        let judged = self.evidence().judged(&trainer.objective, &seen)?;
+        self.curve_table(&seen)?;
+        let found = Found { volume, changes, still, loss, mask, judged, seen, movie, state, begun };
         let results = self.results(trainer, &found)?;
         self.folder.file("results.json")?.write(sealed(results.clone()).as_bytes())?;
         self.report(&found, &results)?;
@@ -122,6 +125,8 @@ pub struct Found<'a> {
     /// What the mask of what shines leaves out, of the flux; nothing without a mask.
     mask: Option<f64>,
     judged: Judged,
+    /// What data see of the movie: the movie itself, or its fluxes.
+    seen: Vec<f32>,
     movie: Vec<f32>,
     state: &'a State<f32>,
     begun: Instant,

@@ -55,6 +55,9 @@ impl Estimate<'_> {
             "inputs": self.folder.inputs().files,
             "verdict": found.judged.json(),
         });
+        if let Some(validation) = self.validation(&found.seen)? {
+            results["validation_chi2_per_datum"] = json!(validation);
+        }
         if let Some(mask) = found.mask {
             results["mask_error"] = json!(mask);
         }
@@ -125,8 +128,15 @@ const fn meaning(
     Meaning { key, name, digits, unit, text }
 }
 
-const MEANINGS: [Meaning; 13] = [
+const MEANINGS: [Meaning; 14] = [
     meaning("loss", "loss", 6, "", "what was minimised, of all data, without penalties"),
+    meaning(
+        "validation_chi2_per_datum",
+        "validation",
+        4,
+        "",
+        "χ² per data point of the samples that were not fitted",
+    ),
     meaning(
         "psnr_db",
         "PSNR",

@@ -24,6 +24,7 @@ impl Estimate<'_> {
         let lines = self.folder.lines()?;
         let mut plots: Vec<LinePlot> = loss_plot(&lines).into_iter().collect();
         plots.extend(psnr_plot(&lines));
+        plots.extend(self.light_curves(&found.seen));
         plots.push(self.light_curve(&found.movie));
         plots.extend(found.changes.as_ref().map(Changes::plot));
         plots.extend(self.amplitudes(&found.movie)?);

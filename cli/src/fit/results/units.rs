@@ -1,7 +1,7 @@
 //! Units of settings, as docs/reference/fit-file.md gives them.
 
 /// Keys as they end, without the numbers of lists, and their units; the first that fits counts.
-const UNITS: [(&str, &str); 47] = [
+const UNITS: [(&str, &str); 55] = [
     ("hole.spin", "M"),
     ("hole.mass_msun", "solar masses"),
     ("hole.distance_kpc", "kpc"),
@@ -44,6 +44,14 @@ const UNITS: [(&str, &str); 47] = [
     ("elevation_deg", "°"),
     ("first_time", "GM/c³"),
     ("visibilities.average_s", "s"),
+    ("light_curve.times_h", "h"),
+    ("light-curve.utc_h", "h"),
+    ("most_gap_s", "s"),
+    ("validate_after_min", "min"),
+    ("azimuth_deg", "°"),
+    ("turn_deg", "°"),
+    ("derotation_deg", "°"),
+    ("mean_flux.jy", "Jy"),
     ("loss.sigma", "Jy"),
     ("length_scale", "M"),
     ("time_scale", "GM/c³"),

@@ -41,7 +41,10 @@ fn errors(file: &FitFile, kind: LossKind) -> Errors {
     let of_pixels = matches!(kind, LossKind::Image | LossKind::LightCurve);
     match (&file.data, &file.observation) {
         (Some(DataFiles::Movie { .. }), _) => Errors::Assumed,
-        (Some(DataFiles::Visibilities { .. }), _) => Errors::Stated,
+        (Some(DataFiles::Visibilities { .. } | DataFiles::LightCurve(_)), _) => Errors::Stated,
+        _ if file.light_curve.as_ref().is_some_and(|curve| curve.noise == Noise::Thermal) => {
+            Errors::Known
+        }
         (None, Some(seen)) if !of_pixels && seen.noise == Noise::Thermal => match seen.systematic {
             Some(part) if part > 0.0 => Errors::Stated,
             _ => Errors::Known,

@@ -101,6 +101,17 @@ impl<T: Float> Rows<T> {
         }
     }
 
+    /// Adds a row of all columns.
+    fn push_dense(&mut self, pixel: u32, row: &[T]) {
+        let lit = row.iter().enumerate().filter(|(_, entry)| **entry != T::zero());
+        for (column, entry) in lit {
+            self.columns.push(column as u32);
+            self.entries.push(*entry);
+        }
+        self.pixel.push(pixel);
+        self.starts.push(self.columns.len() as u32);
+    }
+
     fn forward(&self, x: &[T], image: &mut [T]) {
         for (pixel, ends) in self.pixel.iter().zip(self.starts.windows(2)) {
             let range = ends[0] as usize..ends[1] as usize;
@@ -166,6 +177,9 @@ impl<'a, T: Float + Default> Operator<'a, T> {
     }
 
     fn rows_of(&self, frame: usize) -> Rows<T> {
+        if self.walk.model.is_flux {
+            return self.fluxes_of(frame);
+        }
         let mut rows = Rows { starts: vec![0], ..Rows::default() };
         let mut place = vec![NONE; self.active.count()];
         let wanted = Some(self.active.cells.as_slice());
@@ -174,6 +188,29 @@ impl<'a, T: Float + Default> Operator<'a, T> {
         });
         rows.columns.shrink_to_fit();
         rows.entries.shrink_to_fit();
+        rows
+    }
+
+    /// Rows to which all rays add.
+    fn fluxes_of(&self, frame: usize) -> Rows<T> {
+        let columns = self.active.count();
+        let mut sums = vec![T::zero(); self.pixels * columns];
+        let wanted = Some(self.active.cells.as_slice());
+        self.walk.frame(frame, wanted, &mut Buffers::default(), |pixel, places| {
+            let row = &mut sums[pixel as usize * columns..][..columns];
+            for at in places {
+                for (corner, entry) in self.corners.iter().zip(at.weights()) {
+                    let column = self.active.column[at.corner as usize + corner];
+                    if column != NONE {
+                        row[column as usize] += entry;
+                    }
+                }
+            }
+        });
+        let mut rows = Rows { starts: vec![0], ..Rows::default() };
+        for (pixel, row) in sums.chunks_exact(columns.max(1)).enumerate() {
+            rows.push_dense(pixel as u32, row);
+        }
         rows
     }
 

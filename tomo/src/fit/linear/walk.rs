@@ -139,6 +139,9 @@ pub(super) struct Buffers<T> {
     pulled: [Vec<T>; 3],
     stretched: [Vec<T>; 3],
     places: Vec<Place<T>>,
+    /// Which nodes these are, where there are several images, and the same with their weights in one of them.
+    nodes: Vec<u32>,
+    of_plane: Vec<Place<T>>,
 }
 
 /// Nodes that are pulled back at a time: they stay in the first caches.
@@ -203,10 +206,30 @@ impl<'a, T: Float> Walk<'a, T> {
                 let range = starts[k]..starts[k + 1];
                 self.places(range, starts[first], (frame, knot), wanted, buffers);
                 if !buffers.places.is_empty() {
-                    ray(self.model.pixel[k], &buffers.places);
+                    self.hand_over(self.model.pixel[k], buffers, ray);
                 }
             }
             first = next;
+        }
+    }
+
+    /// A ray's nodes to its pixel, or to those of all images.
+    fn hand_over(
+        &self,
+        pixel: u32,
+        buffers: &mut Buffers<T>,
+        ray: &mut impl FnMut(u32, &[Place<T>]),
+    ) {
+        let Buffers { places, nodes, of_plane, .. } = buffers;
+        let Some(planes) = &self.model.planes else { return ray(pixel, places) };
+        for plane in 0..planes.count {
+            let weighed = |(place, node): (&Place<T>, &u32)| Place {
+                weight: place.weight * planes.of(*node)[plane],
+                ..*place
+            };
+            of_plane.clear();
+            of_plane.extend(places.iter().zip(nodes.iter()).map(weighed));
+            ray(pixel + (plane * planes.stride) as u32, of_plane);
         }
     }
 
@@ -283,6 +306,7 @@ impl<'a, T: Float> Walk<'a, T> {
     ) {
         let nodes_before = (knot * self.voxels.count()) as u32;
         buffers.places.clear();
+        buffers.nodes.clear();
         for node in range {
             let [x, y, z] = &buffers.pulled;
             let k = node - first;
@@ -296,6 +320,9 @@ impl<'a, T: Float> Walk<'a, T> {
                 if share > T::zero() {
                     let corner = nodes_before + corner as u32;
                     buffers.places.push(Place { corner, within, weight });
+                    if self.model.planes.is_some() {
+                        buffers.nodes.push(node as u32);
+                    }
                 }
             }
         }

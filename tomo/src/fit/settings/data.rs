@@ -1,5 +1,7 @@
 //! Files of data, and what of them is compared.
 
+use super::MeasuredCurve;
+use crate::polarization::StokesParameter;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -21,6 +23,8 @@ pub enum DataFiles {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         uv_min: Option<f64>,
     },
+    /// The light curve of an unresolved source: CSV.
+    LightCurve(MeasuredCurve),
     /// A movie in Jy/pixel: .npz, .npy, .csv, .fits or .exr.
     Movie {
         /// The file, relative to the fit's.
@@ -39,6 +43,9 @@ pub struct Loss {
     /// Standard deviation of a pixel (image) or of the flux (light curve), Jy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma: Option<f64>,
+    /// Which of the Stokes parameters of a light curve; I, without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stokes: Option<Vec<StokesParameter>>,
     /// Least signal-to-noise ratio of baselines of closure quantities.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub least_snr: Option<f64>,

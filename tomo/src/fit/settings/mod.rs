@@ -6,6 +6,7 @@
 mod change;
 mod data;
 mod error;
+mod light_curve;
 mod penalties;
 mod ranges;
 mod recovery;
@@ -19,16 +20,18 @@ pub use change::ChangeSettings;
 pub use data::{DataFiles, Loss, LossKind};
 pub use error::FitError;
 pub(crate) use error::{Within, refuse};
+pub use light_curve::{MeanFlux, MeasuredCurve, PerStokes, SimulatedCurve};
 pub use penalties::{PenaltyKind, PenaltySettings, ProbeSettings};
 pub use recovery::{
     AxisScan, AxisSearch, Kind, Linear, Occupancy, Optimiser, Representation, Start, Training,
 };
-pub use simulation::{GlyphShape, Movie, Noise, Observation, Shines, Spot, Truth};
+pub use simulation::{GlyphShape, Movie, Noise, Observation, Shines, Spot, Truth, Tube};
 pub use unknown_world::{PriorSettings, UnknownWorld, WorldSearch, WorldView};
 pub use view::{Absorption, Effects, Hole, Motion, Observer, Region, Screen, WidthOf};
 pub use world::merge;
 
 use crate::Error;
+use crate::polarization::PolarizationLaw;
 use crate::scene::syntax;
 use serde::{Deserialize, Serialize};
 
@@ -53,6 +56,9 @@ pub struct FitFile {
     pub effects: Effects,
     /// How matter turns.
     pub motion: Motion,
+    /// The field of the gas and its polarised light; total intensity alone, without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub polarization: Option<PolarizationLaw>,
     /// How emission may change while matter carries it; not at all, without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub change: Option<ChangeSettings>,
@@ -70,6 +76,9 @@ pub struct FitFile {
     /// The array that sees the simulated movie.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub observation: Option<Observation>,
+    /// The light curve of the simulation, of a source that is not resolved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub light_curve: Option<SimulatedCurve>,
     /// Files, instead of a simulation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub data: Option<DataFiles>,

@@ -22,6 +22,9 @@ pub struct Truth {
     /// Gaussian spots at the reference time.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub spot: Vec<Spot>,
+    /// Arcs about the z axis with a Gaussian cross-section at the reference time.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tube: Vec<Tube>,
     /// Letters and digits at the reference time, flat in the plane across the axis.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub glyph: Vec<GlyphShape>,
@@ -43,6 +46,45 @@ pub struct Spot {
     /// When it shines; always, without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shines: Option<Shines>,
+}
+
+/// An arc about the z axis, in the plane of the hole, with a Gaussian cross-section.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tube {
+    /// Its radius, M.
+    pub radius: f64,
+    /// Standard deviation across it, M.
+    pub sigma: f64,
+    /// Azimuths of its ends, degrees.
+    pub azimuth_deg: [f64; 2],
+    /// Emission on the arc, far from its ends.
+    pub amplitude: f64,
+}
+
+/// Spots on an arc are this many of their standard deviations apart: closer, nothing of a flat arc changes in double
+/// precision.
+const SPACING: f64 = 0.4;
+
+impl Tube {
+    /// The spots that it is made of.
+    pub fn spots(&self) -> Vec<Spot> {
+        let [from, to] = self.azimuth_deg.map(f64::to_radians);
+        let length = self.radius * (to - from).abs();
+        let count = (length / (SPACING * self.sigma)).ceil().clamp(1.0, 1e5);
+        let share = length / count / ((core::f64::consts::TAU).sqrt() * self.sigma);
+        let spot = |k: usize| {
+            let (sin, cos) = (from + (to - from) * (k as f64 + 0.5) / count).sin_cos();
+            Spot {
+                center: [self.radius * cos, self.radius * sin, 0.0],
+                sigma: self.sigma,
+                amplitude: self.amplitude * share,
+                wound_for: 0.0,
+                shines: None,
+            }
+        };
+        (0..count as usize).map(spot).collect()
+    }
 }
 
 /// When emission appears and fades.

@@ -23,7 +23,8 @@ pub fn merge(into: &mut Table, changes: &Table) {
 }
 
 /// What may differ between what is simulated and what a fit assumes.
-pub(super) const SIMULATED: [&str; 5] = ["hole", "observer", "region", "effects", "motion"];
+pub(super) const SIMULATED: [&str; 6] =
+    ["hole", "observer", "region", "effects", "motion", "polarization"];
 
 impl FitFile {
     /// Whether data are simulated with other settings than the fit's.

@@ -1,9 +1,14 @@
 //! What a fit looks through: sight lines, traced once.
 
-use super::{Result, observer, spacing};
-use crate::fit::settings::{Absorption, FitError, FitFile, Screen, Within, refuse};
-use crate::fit::{Redshift, Sampling, SightlineRequest, Sightlines};
+use super::light_curve::seen;
+use super::{AXIS, Result, known_axis, observer, spacing};
+use crate::fit::settings::{Absorption, AxisSearch, FitError, FitFile, Screen, Within, refuse};
+use crate::fit::{
+    ForwardModel, Motion, PolarizedView, Redshift, Sampling, Seen, SightlineRequest, Sightlines,
+};
 use crate::memory;
+use crate::polarization::StokesParameter;
+use crate::simd::Float;
 use kerrlight_geodesic::Kerr;
 
 /// What a fit looks through: the same for all data and representations.
@@ -16,6 +21,10 @@ pub struct Instrument {
     pub lines: Sightlines,
     /// Emission goes like g to this power.
     pub redshift: Option<Redshift>,
+    /// How polarised light is seen; total intensity alone, without.
+    pub polarized: Option<PolarizedView>,
+    /// What data see.
+    pub seen: Seen,
 }
 
 /// Rays of the trial by which the nodes of all are estimated.
@@ -66,7 +75,7 @@ impl Instrument {
             region,
             sampling: file.region.nodes,
             delay: file.effects.slow_light,
-            momentum: file.effects.redshift_power.is_some(),
+            momentum: file.effects.redshift_power.is_some() || file.polarization.is_some(),
         };
         let (alpha, beta) = pixels(&file.screen, chosen)?;
         let observer = observer(&file.observer)?;
@@ -86,8 +95,70 @@ impl Instrument {
         }
         lines.weight.iter_mut().for_each(|weight| *weight *= jy);
         let redshift = file.effects.redshift_power.map(|power| Redshift { power });
-        Ok(Self { pixels: [alpha, beta], hole, lines, redshift })
+        let pixels = [alpha, beta];
+        let polarized = polarized(file, &pixels)?;
+        Ok(Self { pixels, hole, lines, redshift, polarized, seen: seen(file)? })
     }
+
+    /// What data see of emission that moves like this.
+    ///
+    /// # Errors
+    /// If the motion is out of range.
+    pub fn forward<T: Float>(&self, motion: &Motion) -> Result<ForwardModel<T>> {
+        self.model(motion, &self.seen)
+    }
+
+    /// The same as images of total intensity, whatever data see.
+    ///
+    /// # Errors
+    /// If the motion is out of range.
+    pub fn pictured<T: Float>(&self, motion: &Motion) -> Result<ForwardModel<T>> {
+        self.model(motion, &Seen::Images)
+    }
+
+    /// The same as fluxes in some Stokes parameters.
+    ///
+    /// # Errors
+    /// If the motion is out of range, or a parameter needs a field that there is not.
+    pub fn summed(
+        &self,
+        motion: &Motion,
+        parameters: &[StokesParameter],
+    ) -> Result<ForwardModel<f64>> {
+        self.model(motion, &Seen::Fluxes(parameters.to_vec()))
+    }
+
+    fn model<T: Float>(&self, motion: &Motion, seen: &Seen) -> Result<ForwardModel<T>> {
+        let Self { lines, hole, redshift, polarized, .. } = self;
+        let model = ForwardModel::new(lines, motion, hole, *redshift)?;
+        let factors = polarized.as_ref().map(|view| view.factors(lines, hole, &motion.velocity));
+        model.seen(factors.transpose()?.as_deref(), seen)
+    }
+}
+
+/// How polarised light arrives at these pixels, if any is modelled.
+fn polarized(file: &FitFile, screen: &[Vec<f64>; 2]) -> Result<Option<PolarizedView>> {
+    let Some(law) = file.polarization else { return Ok(None) };
+    law.check()?;
+    if let Some(power) = file.effects.redshift_power {
+        refuse!(
+            "effects.redshift_power = {power} is not allowed together with [polarization], whose redshift_power it is"
+        );
+    }
+    if !matches!(file.axis, AxisSearch::Known {}) {
+        refuse!("polarization needs a known axis; add `[axis.known]` and `axis` in [motion]");
+    }
+    if !matches!(file.region.nodes, Sampling::Gauss { .. }) {
+        refuse!("polarization needs region.nodes = {{ gauss = {{ order, split }} }}");
+    }
+    let missing = || FitError::missing("motion.axis", format!("polarization needs it; {AXIS}"));
+    Ok(Some(PolarizedView {
+        law,
+        axis: known_axis(file)?.ok_or_else(missing)?,
+        sin_inclination: observer(&file.observer)?.inclination().sin(),
+        screen: screen.clone(),
+        position_angle: 0.0,
+    }))
 }
 
 /// κ(x) of the medium.

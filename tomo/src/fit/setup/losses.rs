@@ -72,6 +72,9 @@ impl Measured {
     }
 
     fn other(&self, loss: &Loss, pixels: usize) -> Result<Box<dyn FrameTerm<f32>>> {
+        if let Some(curve) = &self.curve {
+            return Ok(Box::new(curve.fitted()?));
+        }
         if loss.data == LossKind::LightCurve {
             let sigma = loss.sigma.ok_or_else(|| {
                 FitError::missing(
@@ -141,6 +144,5 @@ const MEMORY: usize = 8 << 20;
 /// # Errors
 /// If the motion is out of range.
 pub fn forward_model(instrument: &Instrument, motion: &Motion) -> Result<ForwardModel<f32>> {
-    let Instrument { lines, hole, redshift, .. } = instrument;
-    ForwardModel::new(lines, motion, hole, *redshift)
+    instrument.forward(motion)
 }

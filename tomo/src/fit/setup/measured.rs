@@ -1,5 +1,6 @@
 //! The data of a fit: simulated, or measured.
 
+use super::light_curve::{self, Curve};
 use super::truth::SPOT;
 use super::visibilities::{VisibilitySettings, frames_of, prepared};
 use super::{Instrument, Result, Truth, hours_per_m, sky};
@@ -28,6 +29,8 @@ pub struct Measured {
     pub movie: Option<Vec<f64>>,
     /// Visibilities, with the frame of each row.
     pub visibilities: Option<(Observation, Vec<usize>)>,
+    /// The light curve of an unresolved source.
+    pub curve: Option<Curve>,
     /// Where pixels are on the sky, where that matters.
     pub sky: Option<ImageGrid>,
     /// What is simulated.
@@ -45,11 +48,11 @@ impl Measured {
         array: Option<&Array>,
     ) -> Result<Self> {
         if !file.is_simulated_elsewhere() {
-            return simulate(file, instrument, array);
+            return simulate(file, file, instrument, array);
         }
         let world = file.simulated()?;
         let instrument = Instrument::new(&world).within("world")?;
-        simulate(&world, &instrument, array)
+        simulate(&world, file, &instrument, array)
     }
 
     /// Refuses settings that name both a truth and data, or neither.
@@ -92,6 +95,7 @@ impl Measured {
             times,
             movie: Some(movie.pixels),
             visibilities: None,
+            curve: None,
             sky: sky(file).ok(),
             truth: None,
         })
@@ -114,7 +118,7 @@ impl Measured {
         let per_m = hours_per_m(file)?;
         let times = hours.iter().map(|h| first_time + (h - hours[0]) / per_m).collect();
         let (visibilities, sky) = (Some((observation, of_rows)), Some(sky(file)?));
-        Ok(Measured { times, movie: None, visibilities, sky, truth: None })
+        Ok(Measured { times, movie: None, visibilities, curve: None, sky, truth: None })
     }
 
     /// The data alone.
@@ -123,6 +127,7 @@ impl Measured {
             times: self.times.clone(),
             movie: self.movie.clone(),
             visibilities: self.visibilities.clone(),
+            curve: self.curve.clone(),
             sky: self.sky,
             truth: None,
         }
@@ -157,14 +162,29 @@ fn afford_movie(frames: usize, pixels: usize) -> Result<()> {
     memory::afford(what, 2.0 * one)
 }
 
-fn simulate(file: &FitFile, instrument: &Instrument, array: Option<&Array>) -> Result<Measured> {
+fn simulate(
+    file: &FitFile,
+    fit: &FitFile,
+    instrument: &Instrument,
+    array: Option<&Array>,
+) -> Result<Measured> {
+    if let Some(settings) = &file.light_curve {
+        return light_curve::simulate(file, fit, instrument, settings);
+    }
     let truth = Truth::new(file)?;
     let Some(seen) = &file.observation else {
         let times = frames(file)?;
         afford_movie(times.len(), file.screen.pixels)?;
         let movie = Some(lit(&truth, truth.movie(file, instrument, &times)?)?);
         let sky = sky(file).ok();
-        return Ok(Measured { times, movie, visibilities: None, sky, truth: Some(truth) });
+        return Ok(Measured {
+            times,
+            movie,
+            visibilities: None,
+            curve: None,
+            sky,
+            truth: Some(truth),
+        });
     };
     let sky = sky(file)?;
     let (mut observation, hours) = schedule_of(seen, array)?;
@@ -178,7 +198,8 @@ fn simulate(file: &FitFile, instrument: &Instrument, array: Option<&Array>) -> R
     let frame = |time: f64| hours.partition_point(|hour| *hour < time - 1e-9).min(hours.len() - 1);
     let of_rows = observation.rows.iter().map(|row| frame(row.time_h)).collect();
     let visibilities = Some((observation, of_rows));
-    Ok(Measured { times, movie: Some(movie), visibilities, sky: Some(sky), truth: Some(truth) })
+    let (movie, sky, truth) = (Some(movie), Some(sky), Some(truth));
+    Ok(Measured { times, movie, visibilities, curve: None, sky, truth })
 }
 
 /// Rows of the observation without values, and hours of UTC of its scans.

@@ -3,7 +3,7 @@
 use super::glyph::Glyph;
 use super::{AXIS, Instrument, Result, known_axis, motion};
 use crate::dynamics::{AngularVelocity, Axis};
-use crate::fit::settings::{FitError, FitFile, Shines, Spot, Within, refuse};
+use crate::fit::settings::{FitError, FitFile, Shines, Spot, Tube, Within, refuse};
 use crate::fit::{Batch, ForwardModel};
 use crate::simd::Float;
 use kerrlight_geodesic::vector::distance;
@@ -19,7 +19,12 @@ pub struct Truth {
     velocity: AngularVelocity,
     /// M.
     reference: f64,
+    /// What its amplitudes are multiplied by.
+    scale: f64,
 }
+
+/// Where a Gaussian is 0 in double precision, in its standard deviations.
+const DARK: f64 = 39.0;
 
 /// Of what does not change.
 const ALWAYS: Shines = Shines { from: None, until: None, rise: 1.0 };
@@ -33,10 +38,12 @@ impl Truth {
         let missing =
             || FitError::missing("truth", format!("there is nothing to simulate; {SPOT}"));
         let truth = file.truth.as_ref().ok_or_else(missing)?;
-        if truth.spot.is_empty() && truth.glyph.is_empty() {
+        if truth.spot.is_empty() && truth.glyph.is_empty() && truth.tube.is_empty() {
             refuse!("truth is empty; {SPOT}");
         }
-        for (k, spot) in truth.spot.iter().enumerate() {
+        let mut spots = truth.spot.clone();
+        spots.extend(truth.tube.iter().flat_map(Tube::spots));
+        for (k, spot) in spots.iter().enumerate() {
             let numbers = [spot.sigma, spot.amplitude, spot.wound_for];
             let shines = spot.shines.unwrap_or(ALWAYS);
             if !(shines.rise > 0.0 && shines.rise.is_finite()) {
@@ -55,12 +62,18 @@ impl Truth {
         let glyph =
             |(k, shape)| Glyph::new(shape, axis.vector()).within(format!("truth.glyph {k}"));
         Ok(Self {
-            spots: truth.spot.clone(),
+            spots,
             glyphs: truth.glyph.iter().enumerate().map(glyph).collect::<Result<_>>()?,
             axis,
             velocity: motion(file, Vec::new())?.velocity,
             reference: file.motion.reference_time,
+            scale: 1.0,
         })
+    }
+
+    /// Makes it so many times as bright.
+    pub fn scale(&mut self, factor: f64) {
+        self.scale *= factor;
     }
 
     /// Emission at a place (M) at the reference time.
@@ -82,11 +95,15 @@ impl Truth {
                 moved = (time + spot.wound_for, before(time + spot.wound_for));
             }
             let offset = distance(moved.1, spot.center) / spot.sigma;
+            if offset > DARK {
+                return 0.0;
+            }
             let shines = spot.shines.map_or(1.0, |shines| shines.at(self.reference + time));
             spot.amplitude * shines * (-0.5 * offset * offset).exp()
         };
         let of_spots: f64 = self.spots.iter().map(light).sum();
-        of_spots + self.glyphs.iter().map(|glyph| glyph.at(reference, 0.0)).sum::<f64>()
+        let of_glyphs = self.glyphs.iter().map(|glyph| glyph.at(reference, 0.0)).sum::<f64>();
+        self.scale * (of_spots + of_glyphs)
     }
 
     /// Images in Jy per pixel of a forward model with the truth's motion, all frames one after the other.
@@ -125,8 +142,6 @@ impl Truth {
         times: &[f64],
     ) -> Result<Vec<f64>> {
         let motion = motion(file, times.to_vec())?;
-        let Instrument { lines, hole, redshift, .. } = instrument;
-        let mut model = ForwardModel::<f64>::new(lines, &motion, hole, *redshift)?;
-        Ok(self.movie_through(&mut model))
+        Ok(self.movie_through(&mut instrument.pictured::<f64>(&motion)?))
     }
 }

@@ -177,6 +177,8 @@ pub fn in_world(
         hole,
         lines: model.sightlines(world)?,
         redshift: instrument.redshift.map(|_| Redshift { power }),
+        polarized: model.polarized(world),
+        seen: instrument.seen.clone(),
     };
     Ok((found, model.motion_of(world)?))
 }
@@ -222,6 +224,8 @@ fn model(
         axis: axis(file)?.0,
         motion: motion.clone(),
         jy: file.screen.jy_per_pixel,
+        polarization: file.polarization,
+        seen: instrument.seen.clone(),
     })
 }
 

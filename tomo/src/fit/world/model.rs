@@ -5,7 +5,11 @@ use super::{Number, Parameter, World};
 use crate::Error;
 use crate::dynamics::infall::{self, Falling};
 use crate::dynamics::{AngularVelocity, Axis};
-use crate::fit::{ForwardModel, Motion, Redshift, Region, Sampling, SightlineRequest, Sightlines};
+use crate::fit::{
+    ForwardModel, Motion, PolarizedView, Redshift, Region, Sampling, Seen, SightlineRequest,
+    Sightlines,
+};
+use crate::polarization::PolarizationLaw;
 use crate::simd::Float;
 use kerrlight_geodesic::infall::Mixture;
 use kerrlight_geodesic::node_gradients;
@@ -95,6 +99,10 @@ pub struct WorldModel {
     pub motion: Motion,
     /// Jy in a pixel of a ray with 1 M of emission 1.
     pub jy: f64,
+    /// The law of polarised light, which has a power of g of its own; unpolarised, without one.
+    pub polarization: Option<PolarizationLaw>,
+    /// What data see.
+    pub seen: Seen,
 }
 
 /// Tolerance of rays with derivatives.
@@ -111,7 +119,7 @@ impl WorldModel {
             region: self.region,
             sampling: Sampling::Gauss { order: self.order, split: self.split },
             delay: self.slow_light,
-            momentum: self.redshift,
+            momentum: self.redshift || self.polarization.is_some(),
         };
         let (alpha, beta) = self.screen(world);
         let mut lines = Sightlines::trace(&hole, &observer, &alpha, &beta, &request)?;
@@ -136,6 +144,10 @@ impl WorldModel {
         world: &World,
         free: &[Parameter],
     ) -> Result<(ForwardModel<T>, Tangents), Error> {
+        if self.polarization.is_some() || self.seen != Seen::Images {
+            let allowed = "images of total intensity: others have no derivatives";
+            return Err(Error::out_of_range("polarization", 1.0, allowed));
+        }
         let (hole, observer) = self.observed(world)?;
         let (alpha, beta) = self.screen(world);
         let request = NodeRequest {
@@ -157,9 +169,25 @@ impl WorldModel {
         let (hole, _) = self.observed(world)?;
         let power = world.get(Parameter::RedshiftPower);
         let redshift = self.redshift.then_some(Redshift { power });
-        let mut model = ForwardModel::new(lines, &self.motion_of(world)?, &hole, redshift)?;
+        let motion = self.motion_of(world)?;
+        let model = ForwardModel::new(lines, &motion, &hole, redshift)?;
+        let view = self.polarized(world);
+        let factors = view.map(|view| view.factors(lines, &hole, &motion.velocity)).transpose()?;
+        let mut model = model.seen(factors.as_deref(), &self.seen)?;
         model.weigh(self.axis);
         Ok(model)
+    }
+
+    /// How polarised light is seen in a world.
+    pub fn polarized(&self, world: &World) -> Option<PolarizedView> {
+        let (alpha, beta) = self.screen(world);
+        Some(PolarizedView {
+            law: self.polarization?,
+            axis: self.axis,
+            sin_inclination: world.get(Parameter::Inclination).sin(),
+            screen: [alpha, beta],
+            position_angle: world.get(Parameter::PositionAngle),
+        })
     }
 
     fn observed(&self, world: &World) -> Result<(Kerr, Observer), Error> {

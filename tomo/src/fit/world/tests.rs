@@ -4,7 +4,7 @@ use super::*;
 use crate::dynamics::{AngularVelocity, Axis, Velocity};
 use crate::fit::linear::Weighted;
 use crate::fit::tests::Blobs;
-use crate::fit::{Batch, Field, ForwardModel, FrameTerm, ImageTerm, Motion, Region};
+use crate::fit::{Batch, Field, ForwardModel, FrameTerm, ImageTerm, Motion, Region, Seen};
 use crate::representation::{Representation, Workspace};
 use core::f64::consts::{FRAC_PI_2, PI};
 
@@ -33,6 +33,8 @@ fn model(law: Law) -> WorldModel {
             times: vec![0.0, 9.0, 30.0],
         },
         jy: 0.3,
+        polarization: None,
+        seen: Seen::Images,
     }
 }
 

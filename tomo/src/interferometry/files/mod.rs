@@ -6,12 +6,14 @@ mod eht_table;
 mod fits;
 mod fits_image;
 pub mod images;
+mod light_curve;
 mod obs_text;
 mod table;
 mod uvfits;
 
 pub use eht_table::{EhtTable, to_eht_table};
 pub use fits_image::read as read_fits_image;
+pub use light_curve::{parse as parse_light_curve, parse_times, to_csv as light_curve_to_csv};
 pub use obs_text::{parse as parse_obs_text, to_text as to_obs_text};
 pub use table::{COLUMNS as TABLE_COLUMNS, parse as parse_table, to_csv};
 pub use uvfits::{read as read_uvfits, write as write_uvfits};

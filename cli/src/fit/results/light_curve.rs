@@ -1,0 +1,111 @@
+//! Light curves of unresolved sources: the model beside the data.
+
+use super::Estimate;
+use crate::report::{Axis, LinePlot, Marks, Series};
+use kerrlight_tomo::fit::{Batch, Field, FrameTerm, State, Trainer};
+use kerrlight_tomo::representation::Workspace;
+use std::fmt::Write;
+
+/// The table of data and model.
+const TABLE: &str = "light_curve.csv";
+
+impl Estimate<'_> {
+    /// Images of all frames, whatever data see of them.
+    pub fn pictured(
+        &self,
+        trainer: &Trainer<'_, f32>,
+        state: &State<f32>,
+        seen: &[f32],
+    ) -> anyhow::Result<Vec<f32>> {
+        if self.measured.curve.is_none() {
+            return Ok(seen.to_vec());
+        }
+        let mut model = self.instrument.pictured::<f32>(self.motion)?;
+        let now = &state.now;
+        model.weigh(now.axis);
+        let field = Field {
+            representation: trainer.representation,
+            parameters: &now.parameters,
+            axis: now.axis,
+            occupancy: now.occupancy.as_ref(),
+        };
+        let frames: Vec<usize> = (0..model.frames()).collect();
+        let mut movie = vec![0.0; frames.len() * model.pixels()];
+        model.movie(field, &frames, &mut Batch::default(), &mut Workspace::new(), &mut movie);
+        Ok(movie)
+    }
+
+    /// χ² per datum of the samples that were not fitted, if there are any.
+    pub fn validation(&self, seen: &[f32]) -> anyhow::Result<Option<f64>> {
+        let Some(curve) = &self.measured.curve else { return Ok(None) };
+        let Some(term) = curve.validation()? else { return Ok(None) };
+        let term: &dyn FrameTerm<f32> = &term;
+        let (mut chi2, mut count) = (0.0, 0);
+        for (frame, image) in seen.chunks_exact(term.pixels()).enumerate() {
+            count += term.degrees_of_freedom(frame);
+            chi2 += term.residuals(frame, image).iter().map(|r| r.value * r.value).sum::<f64>();
+        }
+        Ok((count > 0).then(|| chi2 / count as f64))
+    }
+
+    /// Writes data and model, if the data are a light curve.
+    pub fn curve_table(&self, seen: &[f32]) -> anyhow::Result<()> {
+        let Some(curve) = &self.measured.curve else { return Ok(()) };
+        let mut text = "time_utc_h,time_m,fitted".to_owned();
+        for parameter in &curve.parameters {
+            write!(text, ",{0},sigma_{0},model_{0}", parameter.name())?;
+        }
+        let count = curve.parameters.len();
+        for (frame, hour) in curve.hours.iter().enumerate() {
+            let (time, fitted) = (self.measured.times[frame], u8::from(curve.fitted[frame]));
+            write!(text, "\n{hour},{time},{fitted}")?;
+            for k in frame * count..(frame + 1) * count {
+                let [flux, sigma] = curve.data[k].unwrap_or([f64::NAN; 2]);
+                write!(text, ",{flux},{sigma},{}", seen[k])?;
+            }
+        }
+        text.push('\n');
+        self.folder.file(TABLE)?.write(text.as_bytes())
+    }
+
+    /// Data and model of each Stokes parameter over time, and the loop in Q and U.
+    pub fn light_curves(&self, seen: &[f32]) -> Vec<LinePlot> {
+        let Some(curve) = &self.measured.curve else { return Vec::new() };
+        let count = curve.parameters.len();
+        let mut series = Vec::new();
+        for (plane, parameter) in curve.parameters.iter().enumerate() {
+            let of_model = curve.hours.iter().zip(seen[plane..].iter().step_by(count));
+            series.push(Series {
+                name: format!("{} of the model", parameter.name()),
+                points: of_model.map(|(hour, flux)| [*hour, f64::from(*flux)]).collect(),
+                errors: Vec::new(),
+                marks: Marks::Line,
+            });
+            let data = curve.hours.iter().zip(curve.data[plane..].iter().step_by(count));
+            let measured: Vec<[f64; 3]> =
+                data.filter_map(|(h, datum)| datum.map(|[jy, sigma]| [*h, jy, sigma])).collect();
+            series.push(Series {
+                name: parameter.name().to_owned(),
+                points: measured.iter().map(|[h, jy, _]| [*h, *jy]).collect(),
+                errors: measured.iter().map(|[.., sigma]| *sigma).collect(),
+                marks: Marks::Points,
+            });
+        }
+        let held = match curve.fitted.iter().position(|fitted| !fitted) {
+            Some(first) => format!(
+                " Samples from {:.3} h on were not fitted: they judge the fit.",
+                curve.hours[first]
+            ),
+            None => String::new(),
+        };
+        vec![LinePlot {
+            title: "Stokes light curves".to_owned(),
+            caption: format!(
+                "Fluxes of the unresolved source, data as points with their standard deviations, the recovered emission as lines.{held}"
+            ),
+            x: Axis { label: "time".to_owned(), unit: "h UTC".to_owned(), log: false },
+            y: Axis { label: "flux density".to_owned(), unit: "Jy".to_owned(), log: false },
+            series,
+        }]
+    }
+}

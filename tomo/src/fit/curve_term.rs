@@ -1,0 +1,87 @@
+//! Fluxes of an unresolved source in Stokes parameters, frame by frame.
+
+use super::FrameTerm;
+use super::terms::plain;
+use crate::Error;
+use crate::interferometry::data_terms::Residual;
+use crate::simd::Float;
+
+/// A flux and its standard deviation, Jy.
+pub type FluxDatum = [f64; 2];
+
+/// χ² of the fluxes of a model that sees nothing else: a pixel for each Stokes parameter.
+#[derive(Clone, Debug)]
+pub struct StokesCurveTerm {
+    parameters: usize,
+    /// Frame by frame, parameter by parameter.
+    data: Vec<Option<FluxDatum>>,
+}
+
+impl StokesCurveTerm {
+    /// Of what was measured, parameter by parameter in each frame.
+    ///
+    /// # Errors
+    /// If numbers are not whole frames, not finite, or a standard deviation is not above 0.
+    pub fn new(parameters: usize, data: Vec<Option<FluxDatum>>) -> Result<Self, Error> {
+        let range = |field, value, allowed| Err(Error::out_of_range(field, value, allowed));
+        if parameters == 0 || !data.len().is_multiple_of(parameters) || data.is_empty() {
+            return range("light-curve numbers", data.len() as f64, "whole frames, 1 or more");
+        }
+        for [flux, sigma] in data.iter().flatten() {
+            if !flux.is_finite() {
+                return range("light-curve flux", *flux, "finite numbers");
+            }
+            if !(*sigma > 0.0 && sigma.is_finite()) {
+                return range("light-curve sigma", *sigma, "above 0");
+            }
+        }
+        Ok(Self { parameters, data })
+    }
+
+    fn of(&self, frame: usize) -> &[Option<FluxDatum>] {
+        &self.data[frame * self.parameters..(frame + 1) * self.parameters]
+    }
+}
+
+impl<T: Float> FrameTerm<T> for StokesCurveTerm {
+    fn name(&self) -> &str {
+        "light curve"
+    }
+
+    fn frames(&self) -> usize {
+        self.data.len() / self.parameters
+    }
+
+    fn pixels(&self) -> usize {
+        self.parameters
+    }
+
+    fn degrees_of_freedom(&self, frame: usize) -> usize {
+        self.of(frame).iter().flatten().count()
+    }
+
+    fn is_quadratic(&self) -> bool {
+        true
+    }
+
+    fn value_and_gradient(&self, frame: usize, image: &[T], weight: T, gradient: &mut [T]) -> f64 {
+        let mut value = 0.0;
+        for ((model, datum), slope) in image.iter().zip(self.of(frame)).zip(gradient) {
+            let Some([flux, sigma]) = datum else { continue };
+            let residual = (model.double() - flux) / sigma;
+            *slope += T::of(2.0 * residual / sigma) * weight;
+            value += residual * residual;
+        }
+        value
+    }
+
+    fn residuals(&self, frame: usize, image: &[T]) -> Vec<Residual> {
+        let pairs = image.iter().zip(self.of(frame));
+        pairs
+            .filter_map(|(model, datum)| {
+                let [flux, sigma] = (*datum)?;
+                Some(plain(model.double(), flux, 1.0 / sigma))
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,106 @@
+//! Light curves in Stokes parameters: simulated, or read from a file.
+
+use super::Noise;
+use crate::polarization::StokesParameter;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// A number for some of the Stokes parameters.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(non_snake_case)]
+pub struct PerStokes {
+    /// Of I.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub I: Option<f64>,
+    /// Of Q.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub Q: Option<f64>,
+    /// Of U.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub U: Option<f64>,
+    /// Of V.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub V: Option<f64>,
+}
+
+impl PerStokes {
+    /// That of a parameter.
+    pub fn of(&self, parameter: StokesParameter) -> Option<f64> {
+        self.all()[parameter.index()]
+    }
+
+    /// All four.
+    pub fn all(&self) -> [Option<f64>; 4] {
+        [self.I, self.Q, self.U, self.V]
+    }
+}
+
+/// A light curve that is simulated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SimulatedCurve {
+    /// Hours of UTC of the samples.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub times_h: Option<Vec<f64>>,
+    /// The same from a column of a file, relative to the fit's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub times: Option<PathBuf>,
+    /// Time of the first sample, M.
+    pub first_time: f64,
+    /// Standard deviations, Jy.
+    pub sigma: PerStokes,
+    /// Noise that is added.
+    pub noise: Noise,
+    /// What the truth is scaled to; as bright as its amplitudes say, without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_flux: Option<MeanFlux>,
+    /// Samples later than this many minutes after the first are not fitted: they judge the fit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub validate_after_min: Option<f64>,
+}
+
+/// A mean of I.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeanFlux {
+    /// Jy.
+    pub jy: f64,
+    /// Over so many minutes from the first sample on.
+    pub minutes: f64,
+}
+
+/// A light curve of a file, and what is done with it, in this order.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeasuredCurve {
+    /// The file, relative to the fit's.
+    pub path: PathBuf,
+    /// Time of the first sample that is left, M.
+    pub first_time: f64,
+    /// First and last hour of UTC; all, without.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub utc_h: Option<[f64; 2]>,
+    /// Samples that are averaged; none, without.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub average: Option<usize>,
+    /// Averages later than this many seconds after the one before are left out: they bridge gaps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub most_gap_s: Option<f64>,
+    /// Standard deviations in Jy that take the place of the file's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma: Option<PerStokes>,
+    /// What does not move, and is subtracted, Jy.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub steady: Option<PerStokes>,
+    /// What is added to position angles so that they are those of the source, degrees east of north: Faraday rotation
+    /// that is taken back.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub derotation_deg: Option<f64>,
+    /// I of all samples in place of the file's, Jy.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub intensity: Option<f64>,
+    /// Samples later than this many minutes after the first are not fitted: they judge the fit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub validate_after_min: Option<f64>,
+}

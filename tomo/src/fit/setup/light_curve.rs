@@ -1,0 +1,275 @@
+//! Light curves as the data of a fit: simulated, or measured.
+
+use super::{Instrument, Measured, Result, Truth, hours_per_m, motion};
+use crate::fit::settings::{
+    DataFiles, FitError, FitFile, Loss, LossKind, MeasuredCurve, Noise, PerStokes, SimulatedCurve,
+    Within, refuse,
+};
+use crate::fit::{FluxDatum, Seen, StokesCurveTerm};
+use crate::interferometry::light_curve::LightCurve;
+use crate::polarization::StokesParameter;
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64Mcg;
+
+/// A light curve that a fit explains.
+#[derive(Clone, Debug)]
+pub struct Curve {
+    /// Which numbers each frame has.
+    pub parameters: Vec<StokesParameter>,
+    /// Hours of UTC of the frames.
+    pub hours: Vec<f64>,
+    /// Frame by frame, parameter by parameter: Jy and standard deviation.
+    pub data: Vec<Option<FluxDatum>>,
+    /// Frames that are fitted; the others judge the fit.
+    pub fitted: Vec<bool>,
+}
+
+impl Curve {
+    /// χ² of the frames that are fitted.
+    ///
+    /// # Errors
+    /// If a number is not finite, or a standard deviation not above 0.
+    pub fn fitted(&self) -> Result<StokesCurveTerm> {
+        self.term(true)
+    }
+
+    /// χ² of the other frames; none if there are none.
+    ///
+    /// # Errors
+    /// As [`Self::fitted`].
+    pub fn validation(&self) -> Result<Option<StokesCurveTerm>> {
+        match self.fitted.contains(&false) {
+            true => self.term(false).map(Some),
+            false => Ok(None),
+        }
+    }
+
+    fn term(&self, fitted: bool) -> Result<StokesCurveTerm> {
+        let count = self.parameters.len();
+        let of = |k: usize| self.data[k].filter(|_| self.fitted[k / count] == fitted);
+        StokesCurveTerm::new(count, (0..self.data.len()).map(of).collect())
+    }
+}
+
+/// What data see: fluxes, if they are a light curve of their own.
+///
+/// # Errors
+/// If other losses stand beside it, a Stokes parameter has no model, or settings are missing.
+pub(super) fn seen(file: &FitFile) -> Result<Seen> {
+    let is_curve =
+        file.light_curve.is_some() || matches!(file.data, Some(DataFiles::LightCurve(_)));
+    let named = file.loss.iter().position(|loss| loss.stokes.is_some());
+    if !is_curve {
+        return match named {
+            Some(k) => refuse!(
+                "loss.{k}.stokes needs a light curve of its own: a table [light_curve] (to simulate) or [data.light-curve] (to read)"
+            ),
+            None => Ok(Seen::Images),
+        };
+    }
+    let [Loss { data: LossKind::LightCurve, stokes, .. }] = &file.loss[..] else {
+        refuse!("a light curve of an unresolved source has one loss, with data = \"light-curve\"");
+    };
+    let parameters = stokes.clone().unwrap_or_else(|| vec![StokesParameter::I]);
+    check(file, &parameters)?;
+    Ok(Seen::Fluxes(parameters))
+}
+
+fn check(file: &FitFile, parameters: &[StokesParameter]) -> Result<()> {
+    let mut sorted = parameters.to_vec();
+    sorted.sort();
+    sorted.dedup();
+    if sorted.len() < parameters.len() || parameters.is_empty() {
+        refuse!("loss.0.stokes: some of \"I\", \"Q\" and \"U\", each once");
+    }
+    if parameters.contains(&StokesParameter::V) {
+        refuse!("loss.0.stokes: V is not modelled; give some of \"I\", \"Q\" and \"U\"");
+    }
+    if file.polarization.is_none() && parameters != [StokesParameter::I] {
+        let why = "Q and U need the field of the gas: add a table [polarization]";
+        return Err(FitError::missing("polarization", why).into());
+    }
+    if file.loss[0].sigma.is_some() {
+        refuse!("loss.0.sigma is not allowed: the light curve has errors of its own");
+    }
+    if file.observation.is_some() || file.movie.is_some() {
+        refuse!("a light curve has times of its own: [observation] and [movie] are not allowed");
+    }
+    Ok(())
+}
+
+impl Measured {
+    /// Takes a measured light curve as the data. `name` is what it is called in messages.
+    ///
+    /// # Errors
+    /// If nothing is left of it, a parameter or an error is missing, or mass or settings are.
+    pub fn of_light_curve(file: &FitFile, curve: LightCurve, name: &str) -> Result<Self> {
+        let (Some(DataFiles::LightCurve(settings)), Seen::Fluxes(parameters)) =
+            (&file.data, seen(file)?)
+        else {
+            refuse!("{name} holds a light curve, and there is no [data.light-curve]")
+        };
+        let curve = prepared(curve, settings).within(name)?;
+        let hours: Vec<f64> = curve.samples.iter().map(|sample| sample.time_h).collect();
+        let data = curve.samples.iter().flat_map(|sample| {
+            parameters.iter().map(|parameter| datum(sample, *parameter)).collect::<Vec<_>>()
+        });
+        let data = data.collect::<Result<Vec<_>>>().within(name)?;
+        if data.iter().all(Option::is_none) {
+            refuse!("{name}: there are no fluxes of the parameters of loss.0.stokes");
+        }
+        let fitted = fitted(&hours, settings.validate_after_min)?;
+        let times = times(file, &hours, settings.first_time)?;
+        let curve = Curve { parameters, hours, data, fitted };
+        Ok(Self { times, curve: Some(curve), ..Self::empty() })
+    }
+
+    fn empty() -> Self {
+        let times = Vec::new();
+        Self { times, movie: None, visibilities: None, curve: None, sky: None, truth: None }
+    }
+}
+
+/// The flux of a parameter with its error, if it was measured.
+fn datum(
+    sample: &crate::interferometry::light_curve::Sample,
+    parameter: StokesParameter,
+) -> Result<Option<FluxDatum>> {
+    let Some(flux) = sample.stokes[parameter.index()] else { return Ok(None) };
+    let Some(sigma) = flux.sigma_jy else {
+        let name = parameter.name();
+        refuse!(
+            "{name} at {} h has no error: give a column sigma_{name}, or `sigma = {{ {name} = … }}` in [data.light-curve]",
+            sample.time_h
+        )
+    };
+    Ok(Some([flux.jy, sigma]))
+}
+
+/// What is left of a file's light curve.
+fn prepared(mut curve: LightCurve, settings: &MeasuredCurve) -> Result<LightCurve> {
+    check_positive("data.light-curve.average", settings.average.map(|count| count as f64))?;
+    check_positive("data.light-curve.most_gap_s", settings.most_gap_s)?;
+    if let Some(hours) = settings.utc_h {
+        curve = curve.cropped(hours);
+    }
+    if let Some(count) = settings.average {
+        curve = curve.averaged(count);
+    }
+    if let Some(most) = settings.most_gap_s {
+        curve = curve.without_gaps(most);
+    }
+    if let Some(sigmas) = settings.sigma {
+        curve = curve.with_sigmas(checked(sigmas, "data.light-curve.sigma")?.all());
+    }
+    if let Some(steady) = settings.steady {
+        curve = curve.less(steady.all().map(|jy| jy.unwrap_or(0.0)));
+    }
+    if let Some(angle) = settings.derotation_deg {
+        curve = curve.turned(angle);
+    }
+    if let Some(jy) = settings.intensity {
+        curve = curve.with_intensity(jy);
+        curve = curve.with_sigmas(settings.sigma.map_or([None; 4], |sigma| sigma.all()));
+    }
+    if curve.samples.is_empty() {
+        refuse!("no samples are left: see utc_h, average and most_gap_s of [data.light-curve]");
+    }
+    Ok(curve)
+}
+
+fn checked(sigmas: PerStokes, key: &str) -> Result<PerStokes> {
+    for parameter in StokesParameter::ALL {
+        check_positive(&format!("{key}.{}", parameter.name()), sigmas.of(parameter))?;
+    }
+    Ok(sigmas)
+}
+
+fn check_positive(key: &str, value: Option<f64>) -> Result<()> {
+    match value.filter(|value| !(*value > 0.0 && value.is_finite())) {
+        Some(bad) => Err(FitError::range(key, bad, "above 0").into()),
+        None => Ok(()),
+    }
+}
+
+/// Whether each frame is fitted.
+fn fitted(hours: &[f64], after_min: Option<f64>) -> Result<Vec<bool>> {
+    let last = after_min.unwrap_or(f64::INFINITY);
+    let fitted: Vec<bool> = hours.iter().map(|h| (h - hours[0]) * 60.0 <= last).collect();
+    if !fitted.contains(&true) {
+        refuse!("validate_after_min = {last} leaves nothing to fit");
+    }
+    Ok(fitted)
+}
+
+fn times(file: &FitFile, hours: &[f64], first: f64) -> Result<Vec<f64>> {
+    let per_m = hours_per_m(file)?;
+    Ok(hours.iter().map(|h| first + (h - hours[0]) / per_m).collect())
+}
+
+/// The light curve of a truth.
+pub(super) fn simulate(
+    file: &FitFile,
+    fit: &FitFile,
+    instrument: &Instrument,
+    settings: &SimulatedCurve,
+) -> Result<Measured> {
+    let Seen::Fluxes(parameters) = seen(fit)? else { refuse!("there is no loss of a light curve") };
+    let hours = hours(settings)?;
+    let times = times(file, &hours, settings.first_time)?;
+    let mut truth = Truth::new(file)?;
+    let motion = motion(file, times.clone())?;
+    if let Some(mean) = settings.mean_flux {
+        check_positive("light_curve.mean_flux.jy", Some(mean.jy))?;
+        let fluxes = truth.movie_through(&mut instrument.summed(&motion, &[StokesParameter::I])?);
+        let first = hours.iter().take_while(|h| (*h - hours[0]) * 60.0 <= mean.minutes).count();
+        let now = fluxes[..first].iter().sum::<f64>() / first.max(1) as f64;
+        if !(now > 0.0 && first > 0) {
+            refuse!("light_curve.mean_flux: the truth is dark in these {first} samples");
+        }
+        truth.scale(mean.jy / now);
+    }
+    let fluxes = truth.movie_through(&mut instrument.summed(&motion, &parameters)?);
+    let data = measure(&fluxes, &parameters, settings, file.seed)?;
+    let movie = Some(truth.movie_through(&mut instrument.pictured::<f64>(&motion)?));
+    let fitted = fitted(&hours, settings.validate_after_min)?;
+    let curve = Some(Curve { parameters, hours, data, fitted });
+    Ok(Measured { times, movie, curve, truth: Some(truth), ..Measured::empty() })
+}
+
+fn hours(settings: &SimulatedCurve) -> Result<Vec<f64>> {
+    let hours = settings.times_h.clone().unwrap_or_default();
+    if hours.is_empty() {
+        let why =
+            "give `times_h = [ … ]`, hours of UTC, or `times = \"FILE.csv\"` with such a column";
+        return Err(FitError::missing("light_curve.times_h", why).into());
+    }
+    if !hours.is_sorted() || hours.iter().any(|h| !(-1e4..=1e4).contains(h)) {
+        refuse!("light_curve.times_h: hours of UTC in growing order");
+    }
+    Ok(hours)
+}
+
+/// Fluxes with noise of their own for each parameter.
+fn measure(
+    fluxes: &[f64],
+    parameters: &[StokesParameter],
+    settings: &SimulatedCurve,
+    seed: u64,
+) -> Result<Vec<Option<FluxDatum>>> {
+    let sigmas = checked(settings.sigma, "light_curve.sigma")?;
+    let mut random = Pcg64Mcg::seed_from_u64(seed ^ 0x1165_c04e);
+    let mut one = |k: usize| {
+        let parameter = parameters[k % parameters.len()];
+        let missing = || {
+            let key = format!("light_curve.sigma.{}", parameter.name());
+            FitError::missing(&key, "its standard deviation in Jy")
+        };
+        let sigma = sigmas.of(parameter).ok_or_else(missing)?;
+        let drawn: f64 = random.sample(StandardNormal);
+        let noise = if settings.noise == Noise::Thermal { drawn * sigma } else { 0.0 };
+        Ok(Some([fluxes[k] + noise, sigma]))
+    };
+    (0..fluxes.len()).map(&mut one).collect()
+}

@@ -1,0 +1,185 @@
+//! Stokes parameters of a fit: what a unit of emission at each node adds to I, Q and U of its pixel, and several images
+//! of one model.
+
+use super::sightlines::Sightlines;
+use crate::Error;
+use crate::dynamics::{AngularVelocity, Axis};
+use crate::polarization::{
+    Gas, Normalisation, PolarizationLaw, Stokes, StokesParameter, SynchrotronView,
+};
+use crate::simd::Float;
+use kerrlight_geodesic::vector::norm;
+use kerrlight_geodesic::{Kerr, ScreenPoint, ZamoFrame};
+use rayon::prelude::*;
+
+/// How polarised light of a fit is seen.
+#[derive(Clone, Debug)]
+pub struct PolarizedView {
+    /// The law of emission.
+    pub law: PolarizationLaw,
+    /// The axis that matter turns about.
+    pub axis: Axis,
+    /// Sine of the angle between the spin and the line of sight.
+    pub sin_inclination: f64,
+    /// Where each pixel's ray arrives: α and β, M.
+    pub screen: [Vec<f64>; 2],
+    /// Of the spin on the sky, radians east of north.
+    pub position_angle: f64,
+}
+
+impl PolarizedView {
+    /// What a unit of emission at each node adds per weight of the node: I, Q and U of matter that moves like this; zero
+    /// where it would be faster than light. The nodes must have momenta.
+    ///
+    /// # Errors
+    /// If a number of the law is out of its range, or the nodes have no momenta.
+    pub fn factors(
+        &self,
+        lines: &Sightlines,
+        hole: &Kerr,
+        velocity: &AngularVelocity,
+    ) -> Result<Vec<Stokes>, Error> {
+        self.law.check()?;
+        if lines.radial.len() != lines.points() {
+            let allowed = "nodes with momenta";
+            return Err(Error::out_of_range("polarization", lines.points() as f64, allowed));
+        }
+        let views: Vec<Vec<Option<SynchrotronView>>> = (0..lines.rays())
+            .into_par_iter()
+            .map(|ray| self.along(lines, ray, hole, velocity))
+            .collect();
+        let unit = self.unit(views.iter().flatten().flatten());
+        let of = |seen: &Option<SynchrotronView>| {
+            seen.map_or(Stokes::default(), |seen| self.law.stokes(&seen, unit))
+        };
+        Ok(views.iter().flatten().map(|seen| of(seen).turned(self.position_angle)).collect())
+    }
+
+    /// What |b| is measured in.
+    fn unit<'a>(&self, views: impl Iterator<Item = &'a SynchrotronView>) -> f64 {
+        if self.law.normalisation == Normalisation::None {
+            return 1.0;
+        }
+        let (sum, count) = views.fold((0.0, 0.0), |(sum, n), seen| (sum + seen.field, n + 1.0));
+        if sum > 0.0 { sum / count } else { 1.0 }
+    }
+
+    /// The nodes of a ray.
+    fn along(
+        &self,
+        lines: &Sightlines,
+        ray: usize,
+        hole: &Kerr,
+        velocity: &AngularVelocity,
+    ) -> Vec<Option<SynchrotronView>> {
+        let [alpha, beta] = &self.screen;
+        let pixel = lines.pixel[ray] as usize;
+        let screen = ScreenPoint::new(hole, self.sin_inclination, alpha[pixel], beta[pixel]);
+        let nodes = lines.starts[ray]..lines.starts[ray + 1];
+        nodes.map(|k| self.node(&Node::new(lines, k), &screen, hole, velocity)).collect()
+    }
+
+    fn node(
+        &self,
+        node: &Node,
+        screen: &ScreenPoint,
+        hole: &Kerr,
+        velocity: &AngularVelocity,
+    ) -> Option<SynchrotronView> {
+        let Node { r, n: [x, y, u], .. } = *node;
+        let frame = ZamoFrame::at(hole, r, x.hypot(y), u)?;
+        let omega = self.axis.vector().map(|axis| velocity.rate(r) * axis);
+        let gas = Gas::falling(&frame, node.n, (omega, velocity.fall(r)))?;
+        self.law.view(&frame, screen, frame.covariant(node.momentum(hole)), gas)
+    }
+}
+
+/// A node of a ray.
+struct Node {
+    r: f64,
+    n: [f64; 3],
+    /// Angular momentum of the arriving photon.
+    turn: [f64; 3],
+    /// d(1/r)/dτ of the backward ray.
+    radial: f64,
+}
+
+impl Node {
+    fn new(lines: &Sightlines, k: usize) -> Self {
+        let of = |columns: &[Vec<f64>; 3]| [0, 1, 2].map(|c| columns[c][k]);
+        let position = of(&lines.position);
+        let r = norm(position);
+        let (n, turn) = (position.map(|x| x / r), of(&lines.momentum));
+        Node { r, n, turn, radial: lines.radial[k] }
+    }
+
+    /// (p_t, p_r, p_θ, p_φ) of the arriving photon of unit energy.
+    fn momentum(&self, hole: &Kerr) -> [f64; 4] {
+        let [x, y, _] = self.n;
+        let sin = x.hypot(y);
+        let (cos_phi, sin_phi) = if sin > 0.0 { (x / sin, y / sin) } else { (1.0, 0.0) };
+        let polar = self.turn[1] * cos_phi - self.turn[0] * sin_phi;
+        let radial = self.radial * self.r * self.r / hole.delta(self.r);
+        [-1.0, radial, polar, self.turn[2]]
+    }
+}
+
+/// What data see of a model.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Seen {
+    /// Every pixel, of total intensity.
+    Images,
+    /// Every pixel, an image for each of these parameters, one after the other.
+    StokesImages(Vec<StokesParameter>),
+    /// The flux of all pixels together: a number for each of these parameters.
+    Fluxes(Vec<StokesParameter>),
+}
+
+impl Seen {
+    /// The parameters, in the order of the images.
+    pub fn parameters(&self) -> &[StokesParameter] {
+        match self {
+            Seen::Images => &[StokesParameter::I],
+            Seen::StokesImages(parameters) | Seen::Fluxes(parameters) => parameters,
+        }
+    }
+
+    /// Whether pixels are added up.
+    pub fn is_flux(&self) -> bool {
+        matches!(self, Seen::Fluxes(_))
+    }
+}
+
+/// Factors with which the emission of a node enters several images.
+#[derive(Clone, Debug)]
+pub(super) struct Planes<T> {
+    /// How many.
+    pub count: usize,
+    /// Pixels of one image.
+    pub stride: usize,
+    factors: Vec<T>,
+}
+
+impl<T: Float> Planes<T> {
+    /// Of the factors of all nodes.
+    pub fn new(factors: &[Stokes], parameters: &[StokesParameter], stride: usize) -> Self {
+        let mut all = Vec::with_capacity(factors.len() * parameters.len());
+        for stokes in factors {
+            all.extend(parameters.iter().map(|parameter| T::of(stokes.get(*parameter))));
+        }
+        Self { count: parameters.len(), stride, factors: all }
+    }
+
+    /// Those of a node.
+    #[inline(always)]
+    pub fn of(&self, node: u32) -> &[T] {
+        &self.factors[node as usize * self.count..(node as usize + 1) * self.count]
+    }
+
+    /// What a loss changes by per light of a node in a pixel of the first image.
+    #[inline(always)]
+    pub fn slope(&self, of_image: &[T], pixel: usize, node: u32) -> T {
+        let factors = self.of(node).iter().enumerate();
+        factors.map(|(plane, factor)| of_image[pixel + plane * self.stride] * *factor).sum()
+    }
+}
