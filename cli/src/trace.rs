@@ -13,6 +13,7 @@ use kerrlight_geodesic::{
 };
 use kerrlight_tomo::memory;
 use rayon::prelude::*;
+use std::ops::Range;
 use std::path::PathBuf;
 
 /// Arguments of `kerrlight trace`.
@@ -127,16 +128,12 @@ impl Trace {
         let each = 4 * u32::from(self.crossings) + 5 * self.samples;
         let what = || format!("{} rays with {each} numbers each", table.rays.len());
         memory::afford(what, memory::table(table.rays.len() as f64, f64::from(each)))?;
-        let traced = table
-            .rays
-            .par_iter()
-            .map(|ray| {
-                self.trace(&table, ray, &request).with_context(|| format!("line {}", ray.line))
-            })
-            .collect::<anyhow::Result<Vec<_>>>()
-            .with_context(|| name.clone())?;
+        let blocks = table.blocks();
+        let traced = blocks.par_iter().map(|rays| self.trace(table.in_degrees, rays, &request));
+        let tables: anyhow::Result<_> = traced.collect();
+        let traced = Traced { tables: tables.with_context(|| name.clone())? };
         let groups = self.columns(&table, &traced);
-        let rows = traced.len();
+        let rows = table.rays.len();
         let Some(output) = output else { return Ok(Answer::table("rays", groups, rows)) };
         let bytes = if npz { columns::npz(&groups)? } else { columns::csv(&groups, rows)? };
         output.write(&bytes)?;
@@ -180,31 +177,56 @@ impl Trace {
         Ok(bytes)
     }
 
-    fn trace(&self, table: &Table, ray: &RayLine, request: &Request) -> anyhow::Result<RayTable> {
-        let hole = Kerr::new(ray.spin)?;
-        let inclination = if table.in_degrees {
-            Inclination::from_degrees(ray.inclination)?
+    /// Traces rays of one hole and one observer; an error names the line of the first ray that cannot be traced.
+    fn trace(
+        &self,
+        in_degrees: bool,
+        rays: &[RayLine],
+        request: &Request,
+    ) -> anyhow::Result<RayTable> {
+        self.trace_block(in_degrees, rays, request).or_else(|error| {
+            for ray in rays {
+                let alone = self.trace_block(in_degrees, std::slice::from_ref(ray), request);
+                alone.with_context(|| format!("line {}", ray.line))?;
+            }
+            Err(error)
+        })
+    }
+
+    fn trace_block(
+        &self,
+        in_degrees: bool,
+        rays: &[RayLine],
+        request: &Request,
+    ) -> anyhow::Result<RayTable> {
+        let Some(first) = rays.first() else { return Ok(RayTable::default()) };
+        let hole = Kerr::new(first.spin)?;
+        let inclination = if in_degrees {
+            Inclination::from_degrees(first.inclination)?
         } else {
-            Inclination::from_radians(ray.inclination)?
+            Inclination::from_radians(first.inclination)?
         };
         let observer = if self.observer.is_finite() {
             Observer::at_radius(inclination, self.observer)?
         } else {
             Observer::at_infinity(inclination)
         };
-        let screen = [[ray.alpha], [ray.beta]];
-        let [alpha, beta] = &screen;
-        Ok(self.integrator.trace(&hole, &observer, alpha, beta, self.tolerance, request)?)
+        let alpha: Vec<f64> = rays.iter().map(|ray| ray.alpha).collect();
+        let beta: Vec<f64> = rays.iter().map(|ray| ray.beta).collect();
+        Ok(self.integrator.trace(&hole, &observer, &alpha, &beta, self.tolerance, request)?)
     }
 
-    fn columns(&self, table: &Table, traced: &[RayTable]) -> Vec<Vec<Column>> {
-        let number = |name: &str, value: &dyn Fn(usize) -> f64| {
-            Column::Numbers(name.to_owned(), (0..traced.len()).map(value).collect())
-        };
+    fn columns(&self, table: &Table, traced: &Traced) -> Vec<Vec<Column>> {
         let rays = &table.rays;
+        let number = |name: &str, value: &dyn Fn(usize) -> f64| {
+            Column::Numbers(name.to_owned(), (0..rays.len()).map(value).collect())
+        };
+        let result = |name: &str, value: &dyn Fn(&RayTable, usize) -> f64| {
+            Column::Numbers(name.to_owned(), traced.rays().map(|(t, k)| value(t, k)).collect())
+        };
         let inclination_name = if table.in_degrees { DEGREES } else { RADIANS };
-        let outcomes = traced.iter().map(|t| t.outcome[0].name().to_owned()).collect();
-        let counts = traced.iter().map(|t| u64::from(t.crossing_count[0])).collect();
+        let outcomes = traced.rays().map(|(t, k)| t.outcome[k].name().to_owned()).collect();
+        let counts = traced.rays().map(|(t, k)| u64::from(t.crossing_count[k])).collect();
         let mut groups: Vec<Vec<Column>> = vec![
             vec![number("spin", &|k| rays[k].spin)],
             vec![number(inclination_name, &|k| rays[k].inclination)],
@@ -212,8 +234,8 @@ impl Trace {
             vec![number("beta", &|k| rays[k].beta)],
             vec![Column::Words("outcome".to_owned(), outcomes)],
             vec![Column::Counts("crossings".to_owned(), counts)],
-            vec![number("mino_total", &|k| traced[k].mino_total[0])],
-            vec![number("r_min", &|k| traced[k].turning_radius[0])],
+            vec![result("mino_total", &|t, k| t.mino_total[k])],
+            vec![result("r_min", &|t, k| t.turning_radius[k])],
         ];
         let crossings = points(traced, usize::from(self.crossings), "", |b| &b.crossings);
         groups.push(crossings.into_iter().filter(|column| column.name() != "theta").collect());
@@ -224,7 +246,7 @@ impl Trace {
         }
         if self.errors {
             let error = |name: &str, value: &dyn Fn(&Uncertainty) -> f64| {
-                vec![number(name, &|k| value(&traced[k].uncertainty[0]))]
+                vec![result(name, &|t, k| value(&t.uncertainty[k]))]
             };
             groups.push(error("error_r", &|u| u.radius));
             groups.push(error("error_theta", &|u| u.theta));
@@ -232,42 +254,55 @@ impl Trace {
             groups.push(error("error_delay", &|u| u.delay));
         }
         let integrator = self.integrator.name().to_owned();
-        groups.push(vec![Column::Words("integrator".to_owned(), vec![integrator; traced.len()])]);
+        groups.push(vec![Column::Words("integrator".to_owned(), vec![integrator; rays.len()])]);
         groups.push(vec![number("tolerance", &|_| self.tolerance)]);
         groups
+    }
+}
+
+/// Tables of blocks of rays, in the order of the input.
+struct Traced {
+    tables: Vec<RayTable>,
+}
+
+impl Traced {
+    /// Each ray: the table that it is in, and its number there.
+    fn rays(&self) -> impl Iterator<Item = (&RayTable, usize)> {
+        self.tables.iter().flat_map(|table| (0..table.len()).map(move |k| (table, k)))
     }
 }
 
 /// The columns of each ray's first `width` points, filled up with NaN; those that were not
 /// requested are left out.
 fn points(
-    traced: &[RayTable],
+    traced: &Traced,
     width: usize,
     prefix: &str,
     of: impl Fn(&RayTable) -> &Points,
 ) -> Vec<Column> {
-    let block = |name: &str, row: &dyn Fn(&Points) -> Vec<f64>| {
-        let rows = traced.iter().map(|table| {
-            let mut row = row(of(table));
+    let block = |name: &str, row: &dyn Fn(&Points, Range<usize>) -> Vec<f64>| {
+        let rows = traced.rays().map(|(table, k)| {
+            let points = of(table);
+            let mut row = row(points, points.of(k));
             row.resize(width, f64::NAN);
             row
         });
         Column::Blocks(format!("{prefix}{name}"), rows.collect())
     };
     let mut columns = vec![
-        block("mino", &|p| p.mino_time.clone()),
-        block("r", &|p| p.radius.clone()),
-        block("theta", &|p| p.theta.clone()),
-        block("phi", &|p| p.azimuth.clone()),
-        block("delay", &|p| p.delay.clone()),
+        block("mino", &|p, at| p.mino_time[at].to_vec()),
+        block("r", &|p, at| p.radius[at].to_vec()),
+        block("theta", &|p, at| p.theta[at].to_vec()),
+        block("phi", &|p, at| p.azimuth[at].to_vec()),
+        block("delay", &|p, at| p.delay[at].to_vec()),
     ];
-    let has = |wanted: &dyn Fn(&Points) -> bool| traced.iter().any(|table| wanted(of(table)));
+    let has = |wanted: &dyn Fn(&Points) -> bool| traced.tables.iter().any(|t| wanted(of(t)));
     if has(&|p| !p.momentum.is_empty()) {
-        columns.push(block("p_r", &|p| p.momentum.iter().map(|m| m[1]).collect()));
-        columns.push(block("p_theta", &|p| p.momentum.iter().map(|m| m[2]).collect()));
+        columns.push(block("p_r", &|p, at| p.momentum[at].iter().map(|m| m[1]).collect()));
+        columns.push(block("p_theta", &|p, at| p.momentum[at].iter().map(|m| m[2]).collect()));
     }
     if has(&|p| !p.weight.is_empty()) {
-        columns.push(block("weight", &|p| p.weight.clone()));
+        columns.push(block("weight", &|p, at| p.weight[at].to_vec()));
     }
     columns
 }
@@ -295,7 +330,17 @@ impl LineCounter<'_> {
     }
 }
 
+/// Rays that a task traces at most.
+const TOGETHER: usize = 1024;
+
 impl Table {
+    /// Rays of the same hole and observer that follow each other.
+    fn blocks(&self) -> Vec<&[RayLine]> {
+        let place = |ray: &RayLine| [ray.spin, ray.inclination].map(f64::to_bits);
+        let same = self.rays.chunk_by(|one, other| place(one) == place(other));
+        same.flat_map(|rays| rays.chunks(TOGETHER)).collect()
+    }
+
     fn parse(bytes: &[u8]) -> anyhow::Result<Self> {
         let mut reader = csv::ReaderBuilder::new()
             .flexible(true)

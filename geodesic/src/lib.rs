@@ -180,7 +180,8 @@ pub use spacetime::orbits;
 pub use error::Error;
 #[cfg(feature = "affine")]
 pub use integrate::affine::{AffinePath, AffineTracer};
-pub use integrate::path::{Outcome, Path, Unresolved};
+pub use integrate::outcome::{Outcome, Unresolved};
+pub use integrate::path::Path;
 pub use integrate::trace::{Method, Tracer, trace_series};
 pub use integrate::uncertainty::Uncertainty;
 pub use numbers::compensated::Double;

@@ -14,7 +14,7 @@
 mod equations;
 
 use crate::error::{Error, check};
-use crate::integrate::path::{Outcome, Unresolved};
+use crate::integrate::outcome::{Outcome, Unresolved};
 use crate::numbers::dual::Dual;
 use crate::numbers::polynomial::{Polynomial, hermite};
 use crate::screen::observer::Observer;

@@ -4,6 +4,7 @@
 #[cfg(feature = "affine")]
 pub(crate) mod affine;
 pub(crate) mod mino;
+pub(crate) mod outcome;
 pub(crate) mod path;
 mod run;
 mod runge_kutta;

@@ -1,7 +1,8 @@
 //! A ray under way: step after step into a path, with its events and the errors it collects.
 
 use crate::integrate::mino::{System, has_azimuth, has_time, index};
-use crate::integrate::path::{Outcome, Path, Segment, Unresolved, turn};
+use crate::integrate::outcome::{Outcome, Unresolved};
+use crate::integrate::path::{Path, Segment, turn};
 use crate::integrate::stepper::{Made, State, Stepper};
 use crate::integrate::uncertainty::Budget;
 use crate::numbers::scalar::Elementary;

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::integrate::affine::{AffinePath, AffineTracer};
-use crate::integrate::path::Outcome;
+use crate::integrate::outcome::Outcome;
 use crate::integrate::uncertainty::Uncertainty;
 use crate::rays::request::Request;
 use crate::rays::sampling::Trajectory;

@@ -1,6 +1,6 @@
 //! The product of every tracer: a table of rays in columns.
 
-use crate::integrate::path::Outcome;
+use crate::integrate::outcome::Outcome;
 use crate::integrate::uncertainty::Uncertainty;
 use crate::rays::block::PlaneCrossing;
 use crate::rays::request::Request;

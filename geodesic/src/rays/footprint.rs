@@ -16,7 +16,8 @@
 //! ```
 
 use crate::error::Error;
-use crate::integrate::path::{Outcome, Path};
+use crate::integrate::outcome::Outcome;
+use crate::integrate::path::Path;
 use crate::integrate::trace::{Tracer, trace_series};
 use crate::numbers::dual::Dual;
 use crate::numbers::vector::dot;

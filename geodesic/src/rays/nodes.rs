@@ -1,7 +1,8 @@
 //! Quadrature nodes along single rays: panels on the legs of a path, and the columns that hold
 //! their nodes. For whole blocks of rays in closed form see [`Nodes`](crate::simd::Nodes).
 
-use crate::integrate::path::{Outcome, Path};
+use crate::integrate::outcome::Outcome;
+use crate::integrate::path::Path;
 use crate::simd::{LONGEST_PANEL, PanelRule, RayNodes};
 use crate::spacetime::kerr::Kerr;
 use core::ops::Range;

@@ -1,7 +1,7 @@
 //! Where the points of a traced ray lie, whichever tracer traced it and whatever kind of
 //! number it is made of: with dual numbers every place carries its own derivatives.
 
-use crate::integrate::path::Outcome;
+use crate::integrate::outcome::Outcome;
 use crate::integrate::uncertainty::Uncertainty;
 use crate::numbers::quadrature::{equidistant, gauss_legendre};
 use crate::numbers::scalar::Elementary;

@@ -1,6 +1,7 @@
 //! A path in Mino time, as samples are taken from it.
 
-use crate::integrate::path::{Outcome, Path};
+use crate::integrate::outcome::Outcome;
+use crate::integrate::path::Path;
 use crate::integrate::uncertainty::Uncertainty;
 use crate::numbers::scalar::Elementary;
 use crate::rays::sampling::Trajectory;

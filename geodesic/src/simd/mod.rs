@@ -47,6 +47,7 @@ mod panel;
 mod polar;
 mod radial;
 mod radial_sum;
+mod ray_nodes;
 mod sample;
 mod samples;
 
@@ -54,10 +55,11 @@ pub use crossings::{Crossing, Crossings, RayEnds};
 pub(crate) use error::MAX_STEP;
 pub use lanes::InstructionSet;
 pub(crate) use march::{GROWTH, Key};
-pub use nodes::{NodeRequest, Nodes, RayNodes};
+pub use nodes::{NodeRequest, Nodes};
 pub(crate) use panel::LONGEST_PANEL;
 pub use panel::PanelRule;
 pub(crate) use radial_sum::LEAST_STEPS;
+pub use ray_nodes::RayNodes;
 pub use samples::{RaySamples, Samples};
 
 use crate::error::{Error, check};

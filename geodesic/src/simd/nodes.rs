@@ -1,13 +1,13 @@
 //! Nodes of a quadrature along many rays, inside a sphere.
 
 use super::ScreenRays;
-
 use super::column::Aligned;
 use super::error::{MAX_STEP, estimate};
 use super::lanes::{InstructionSet, Lanes, MAX_LANES, Task, dispatch};
 use super::march::{COLUMNS, GROWTH, Jump, Key, MAX_ORDER, March, RayLanes};
 use super::motion::{Camera, Clock, Journey, Motion};
 use super::panel::{LONGEST_PANEL, PanelRule};
+use super::ray_nodes::RayNodes;
 use crate::error::{Error, check};
 use crate::screen::observer::Observer;
 use crate::spacetime::kerr::Kerr;
@@ -38,30 +38,6 @@ pub struct Nodes {
     columns: [Vec<f64>; COLUMNS],
     error: Vec<f64>,
     plan: Vec<Plan>,
-}
-
-/// The nodes of one ray.
-#[derive(Clone, Copy, Debug)]
-pub struct RayNodes<'a> {
-    /// Boyer–Lindquist radius, in M.
-    pub radius: &'a [f64],
-    /// cos θ.
-    pub cos_theta: &'a [f64],
-    /// Σ dτ: what an integral over the affine parameter gives to each node, in M.
-    pub weight: &'a [f64],
-    /// Mino time since the observer, M⁻¹.
-    pub mino_time: &'a [f64],
-    /// Azimuth in radians, but for whole turns; empty unless asked for.
-    pub azimuth: &'a [f64],
-    /// Delay t_o − t in M (its finite part for an observer at infinity); empty unless asked for.
-    pub delay: &'a [f64],
-    /// d(1/r)/dτ, dimensionless, positive on the way in; empty unless asked for.
-    pub radial_velocity: &'a [f64],
-    /// d cos θ/dτ; empty unless asked for.
-    pub polar_velocity: &'a [f64],
-    /// An estimate of the relative error of positions by rounding; it grows in inverse
-    /// proportion to the distance from the critical curve.
-    pub error: f64,
 }
 
 /// Most panels of a ray before `split`: longer rays have no digits left.

@@ -1,6 +1,6 @@
 //! Ranges of a volume's values.
 
-use super::check::check_color;
+use super::check_sources::check_color;
 use super::invalid::{Invalid, brightness, number};
 use super::{Rotation, Scene, VolumeRegion, VolumeSource, rotation};
 

@@ -5,6 +5,7 @@
 
 mod camera;
 mod check;
+mod check_sources;
 mod check_volume;
 mod integrator;
 mod invalid;

@@ -154,6 +154,7 @@ impl PreparedScene {
             all_crossings: self.disc.is_some(),
             rates: self.optics.polarization.is_some() || self.has_plunging_disc(),
             exit: self.sky.is_some(),
+            beams: self.optics.lensing && self.sky.as_ref().is_some_and(Sky::is_averaged),
             half_orbits,
             paths: self.meshes.is_some() || self.media.have_cells() || !self.spots.is_empty(),
             probes: None,

@@ -14,10 +14,9 @@ use super::sources::media::{MediaRay, MediaScratch};
 use super::sources::meshes::MeshScratch;
 use super::sources::spots::{SpotRay, SpotScratch, SpotTree};
 use crate::emission::medium::Part;
-use kerrlight_geodesic::footprint::Number;
 use kerrlight_geodesic::simd::RayNodes;
 use kerrlight_geodesic::{
-    Error, Path, PathOfRay, PathUse, PlaneCrossing, Ray, RayBlock, RayVisitor, TracedRay, Work,
+    Error, PathOfRay, PathUse, PlaneCrossing, Ray, RayBlock, RayVisitor, TracedRay, Work, footprint,
 };
 use std::sync::Arc;
 
@@ -44,7 +43,8 @@ pub(super) struct SourceScratch {
     pub media: MediaScratch,
     meshes: MeshScratch,
     spots: SpotScratch,
-    beam: Path<Number>,
+    /// Where the beam of the present ray ends on the sky.
+    beam: Option<footprint::Sky>,
 }
 
 impl PreparedScene {
@@ -151,6 +151,10 @@ impl RayVisitor for Sum<'_> {
         media.radiate(media.in_sphere(sphere), optics, &seen, 0, nodes, &mut self.sources.media)
     }
 
+    fn take_beam(&mut self, end: &footprint::Sky) {
+        self.sources.beam = Some(*end);
+    }
+
     #[inline(always)]
     fn take(
         &mut self,
@@ -166,7 +170,7 @@ impl RayVisitor for Sum<'_> {
         let mut still = Accumulator::new();
         self.add_surfaces(number, ray, crossings, path, &mut still);
         self.meter.switch(Part::Sky);
-        let behind = self.sky(number, ray)?;
+        let behind = self.sky(ray);
         self.meter.switch(Part::Spots);
         for (j, time) in self.block.times.iter().enumerate() {
             let mut light = still.clone();
@@ -251,9 +255,9 @@ impl<'a> Sum<'a> {
 
     /// Light of the sky.
     #[inline(always)]
-    fn sky(&mut self, k: usize, ray: &TracedRay) -> Result<[f32; 3], Error> {
-        let Some(sky) = &self.scene.sky else { return Ok([0.0; 3]) };
-        sky.light(&self.scene.optics, self.place(k), ray, &mut self.sources.beam)
+    fn sky(&mut self, ray: &TracedRay) -> [f32; 3] {
+        let beam = self.sources.beam.take();
+        self.scene.sky.as_ref().map_or([0.0; 3], |sky| sky.light(ray, beam.as_ref()))
     }
 
     /// Light of the spots at time number `j`.

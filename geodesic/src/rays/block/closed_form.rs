@@ -5,7 +5,7 @@ use super::traced::{PlaneCrossing, TracedRay};
 use super::tracer::{BlockTracer, Job, RayBlock};
 use super::visitor::{PathUse, RayVisitor, Work, first_opaque};
 use crate::error::Error;
-use crate::integrate::path::Outcome;
+use crate::integrate::outcome::Outcome;
 use crate::screen::observer::{Observer, Ray};
 use crate::simd::{Crossings, InstructionSet, NodeRequest, RayEnds, ScreenRays};
 

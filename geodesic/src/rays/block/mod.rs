@@ -16,6 +16,7 @@ pub use visitor::{PathUse, RayVisitor, Work};
 
 use crate::error::Error;
 use crate::rays::blocks::check_columns;
+use crate::rays::footprint;
 use tracer::Job;
 
 impl BlockTracer {
@@ -66,7 +67,31 @@ impl BlockTracer {
         if block.rays[k].with_path {
             return self.finish_with_path(k, job, block, visitor);
         }
+        self.hand_beam(k, job, block, visitor)?;
         let ray = &block.rays[k];
         visitor.take(k, ray, &block.plane[ray.crossings.clone()], None)
+    }
+
+    /// Hands the beam of a ray to the visitor, if it is requested and reaches the sky.
+    #[inline]
+    fn hand_beam<V: RayVisitor>(
+        &self,
+        k: usize,
+        job: Job<'_>,
+        block: &mut RayBlock,
+        visitor: &mut V,
+    ) -> Result<(), Error> {
+        let ray = &block.rays[k];
+        let is_seen = ray.exit.is_some() && ray.surface.is_none() && ray.until >= ray.mino_total;
+        if !(job.request.beams && is_seen) {
+            return Ok(());
+        }
+        visitor.works_on(Work::Exits);
+        let beam = self.view.beam(&self.hole, job.alpha[k], job.beta[k])?;
+        let (hole, tolerance) = (self.hole.lift(), self.tracer.tolerance());
+        if let Some(end) = footprint::of_ray(&hole, &beam, tolerance, &mut block.beam)? {
+            visitor.take_beam(&end);
+        }
+        Ok(())
     }
 }

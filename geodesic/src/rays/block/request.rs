@@ -14,6 +14,9 @@ pub struct BlockRequest {
     pub rates: bool,
     /// The direction in which rays escape.
     pub exit: bool,
+    /// Whether [`RayVisitor::take_beam`](crate::RayVisitor::take_beam) is given the beams of rays that escape; takes
+    /// `exit`.
+    pub beams: bool,
     /// The number of half-orbits after which rays are cut off: half-way between crossing number
     /// `half_orbits` (from 0) and the next.
     pub half_orbits: Option<u32>,

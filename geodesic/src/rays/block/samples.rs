@@ -4,7 +4,7 @@ use super::traced::SampleColumns;
 use super::tracer::{BlockTracer, Job, RayBlock};
 use super::visitor::RayVisitor;
 use crate::error::Error;
-use crate::integrate::path::Outcome;
+use crate::integrate::outcome::Outcome;
 use crate::rays::sampling::{Trajectory, mino_times};
 use crate::rays::trajectory::MinoPath;
 use crate::screen::observer::{Observer, Ray};

@@ -5,7 +5,7 @@ use super::traced::{PathOfRay, PlaneCrossing, TracedRay};
 use super::tracer::{BlockTracer, Job, RayBlock};
 use super::visitor::{RayVisitor, Work, first_opaque};
 use crate::error::Error;
-use crate::integrate::path::Outcome;
+use crate::integrate::outcome::Outcome;
 use crate::rays::nodes;
 use crate::screen::observer::Ray;
 use crate::simd::NodeRequest;
@@ -31,6 +31,7 @@ impl BlockTracer {
             visitor.works_on(Work::Nodes(sphere));
             self.refine_on_path((sphere, k), job.request, block, visitor);
         }
+        self.hand_beam(k, job, block, visitor)?;
         let (RayBlock { rays, plane, path, .. }, tolerance) = (block, self.tracer.tolerance());
         let crossings = &plane[rays[k].crossings.clone()];
         visitor.take(k, &rays[k], crossings, Some(PathOfRay { ray: &ray, path, tolerance }))
@@ -45,6 +46,7 @@ impl BlockTracer {
         block: &mut RayBlock,
         visitor: &mut V,
     ) -> Result<(), Error> {
+        self.hand_beam(k, job, block, visitor)?;
         visitor.works_on(Work::Rays);
         let ray = self.view.ray(&self.hole, job.alpha[k], job.beta[k])?;
         let (RayBlock { rays, plane, path, .. }, tolerance) = (block, self.tracer.tolerance());

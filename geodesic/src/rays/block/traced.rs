@@ -1,6 +1,7 @@
 //! What is known of a traced ray.
 
-use crate::integrate::path::{Outcome, Path, Unresolved};
+use crate::integrate::outcome::{Outcome, Unresolved};
+use crate::integrate::path::Path;
 use crate::screen::observer::Ray;
 use crate::spacetime::point::PathPoint;
 use core::ops::Range;

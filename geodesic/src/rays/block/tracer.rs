@@ -6,6 +6,7 @@ use crate::analytic::ClosedForm;
 use crate::error::Error;
 use crate::integrate::path::Path;
 use crate::integrate::trace::Tracer;
+use crate::rays::footprint;
 use crate::rays::integrator::Integrator;
 use crate::rays::nodes::NodeColumns;
 use crate::screen::observer::{Observer, Ray};
@@ -74,6 +75,7 @@ pub struct RayBlock {
     /// Place of each ray among them.
     pub(super) places: Vec<usize>,
     pub(super) path: Path,
+    pub(super) beam: Path<footprint::Number>,
     pub(super) columns: NodeColumns,
     pub(super) sampled: SampleColumns,
     pub(super) intervals: Vec<[f64; 2]>,

@@ -2,6 +2,7 @@
 
 use super::traced::{PathOfRay, PlaneCrossing, TracedRay};
 use crate::error::Error;
+use crate::rays::footprint::Sky;
 use crate::screen::observer::Ray;
 use crate::simd::{RayNodes, RaySamples};
 
@@ -50,6 +51,12 @@ pub trait RayVisitor {
     /// horizon, or within a relative 1e-8 outside of it in closed form.
     fn take_samples(&mut self, number: usize, ray: &TracedRay, samples: &RaySamples<'_>) {
         let _ = (number, ray, samples);
+    }
+
+    /// Takes where the beam of the ray that is taken next ends on the sky. Rays that meet a surface or are cut off
+    /// have none.
+    fn take_beam(&mut self, end: &Sky) {
+        let _ = end;
     }
 
     /// Takes ray `number`: after its nodes and samples, and after the rays before it.

@@ -2,10 +2,8 @@
 
 use crate::emission::sky::{Beam, Panorama, SkyModel};
 use crate::scene::Scene;
-use crate::transport::optics::Optics;
-use kerrlight_geodesic::Error;
-use kerrlight_geodesic::footprint::{self, Number};
-use kerrlight_geodesic::{Path, TracedRay};
+use kerrlight_geodesic::TracedRay;
+use kerrlight_geodesic::footprint;
 
 /// The sky of a scene.
 #[derive(Debug, Clone)]
@@ -39,28 +37,18 @@ impl Sky {
         self.beams.is_some()
     }
 
-    /// Its linear colour at the end of a ray that arrives at (x, y); dark if the ray does not get
-    /// there.
+    /// Its linear colour at the end of a ray, averaged over the ray's beam if there is one; dark if the ray does not
+    /// get there.
     #[inline]
-    pub fn light(
-        &self,
-        optics: &Optics,
-        (x, y): (f64, f64),
-        ray: &TracedRay,
-        path: &mut Path<Number>,
-    ) -> Result<[f32; 3], Error> {
-        let (Some(direction), None) = (ray.exit, ray.surface) else { return Ok([0.0; 3]) };
+    pub fn light(&self, ray: &TracedRay, beam: Option<&footprint::Sky>) -> [f32; 3] {
+        let (Some(direction), None) = (ray.exit, ray.surface) else { return [0.0; 3] };
         if ray.until < ray.mino_total {
-            return Ok([0.0; 3]);
+            return [0.0; 3];
         }
-        if let (Some(spacing), true) = (self.beams, optics.lensing) {
-            let beam = optics.view.beam(&optics.hole, x, y)?;
-            let hole = optics.hole.lift();
-            if let Some(end) = footprint::of_ray(&hole, &beam, optics.tolerance, path)? {
-                return Ok(self.model.mean_color(&Beam::new(&end, spacing)));
-            }
+        match (self.beams, beam) {
+            (Some(spacing), Some(end)) => self.model.mean_color(&Beam::new(end, spacing)),
+            _ => self.model.color(direction),
         }
-        Ok(self.model.color(direction))
     }
 }
 
