@@ -47,7 +47,7 @@ impl Answer {
         Answer { text: Body::Text(text.into()), ..Self::default() }
     }
 
-    /// The two lines with which work ends: what it is worth, and where to look.
+    /// The last two lines of a command: a figure of merit, and where to look.
     pub fn lines(worth: &str, look_at: &str) -> Self {
         Self::text(format!("{worth}\n{look_at}\n"))
     }

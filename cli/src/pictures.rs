@@ -24,7 +24,7 @@ pub struct Shot {
 /// A picture with everything that decided it.
 #[derive(Debug)]
 pub struct Shown {
-    /// The picture, and what is worth knowing of it.
+    /// The picture and its summary.
     pub rendered: Rendered,
     /// What its EXR file says of it.
     pub attributes: Attributes,

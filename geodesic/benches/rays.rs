@@ -1,4 +1,4 @@
-//! Cost of a ray by what is asked for and by tolerance: 64 × 64 rays, α, β ∈ [−8, 8],
+//! Cost of a ray by what is requested and by tolerance: 64 × 64 rays, α, β ∈ [−8, 8],
 //! i = 60°, a = 0.94. Every benchmark asserts its answer.
 //!
 //! `cargo bench -p kerrlight-geodesic --features affine`

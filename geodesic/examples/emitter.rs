@@ -19,7 +19,7 @@ fn main() -> Result<(), Error> {
     let at = |k: u32| 0.2 * f64::from(k) - 25.0;
     let (alpha, beta): (Vec<f64>, Vec<f64>) =
         (0..250 * 250).map(|k| (at(k % 250), at(k / 250))).unzip();
-    // r alone is asked for, so nothing else is integrated.
+    // r alone is requested, so nothing else is integrated.
     let request = Request { crossings: 1, ..Request::default() };
     let rays = Integrator::TaylorMino.trace(&hole, &observer, &alpha, &beta, 1e-8, &request)?;
 

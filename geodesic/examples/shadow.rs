@@ -12,7 +12,7 @@ fn main() -> Result<(), Error> {
     let place = |k: usize| (0.25 * (k % COLUMNS) as f64 - 5.5, 6.0 - 0.5 * (k / COLUMNS) as f64);
     let (alpha, beta): (Vec<f64>, Vec<f64>) = (0..COLUMNS * 25).map(place).unzip();
 
-    // Fates and numbers of crossings come with every ray: nothing else is asked for.
+    // Fates and numbers of crossings come with every ray: nothing else is requested.
     let request = Request::default();
     let rays = Integrator::TaylorMino.trace(&hole, &observer, &alpha, &beta, 1e-6, &request)?;
     let letter = |k: usize| match rays.outcome[k] {

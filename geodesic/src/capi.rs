@@ -24,7 +24,7 @@ pub const OK: i32 = 0;
 pub const NULL_POINTER: i32 = 1;
 /// `KERRLIGHT_OUT_OF_RANGE`.
 pub const OUT_OF_RANGE: i32 = 2;
-/// `KERRLIGHT_NO_ROOM`: a stride is smaller than what is asked for.
+/// `KERRLIGHT_NO_ROOM`: a stride is smaller than the request needs.
 pub const NO_ROOM: i32 = 3;
 /// `KERRLIGHT_INTERNAL`: a bug.
 pub const INTERNAL: i32 = 4;

@@ -47,7 +47,7 @@
 //!
 //! # Requests
 //! A [`Request`] says what is wanted of each ray: equatorial crossings, samples at a [`Placement`],
-//! azimuth, coordinate time, momentum, path weight, errors. What is not asked for is not
+//! azimuth, coordinate time, momentum, path weight, errors. What is not requested is not
 //! integrated, and its column is empty.
 //!
 //! ```

@@ -82,7 +82,7 @@ impl Picture {
         Ok(Some(array.into_any()))
     }
 
-    /// What is worth knowing.
+    /// Its summary.
     fn summary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
         let Summary { rays, unresolved, flux, flux_error, image_error, .. } =

@@ -149,7 +149,7 @@ fn table(py: Python<'_>, rays: RayTable) -> PyResult<Bound<'_, PyDict>> {
 fn points(py: Python<'_>, points: Points) -> PyResult<Bound<'_, PyDict>> {
     let dict = PyDict::new(py);
     let count = points.len();
-    // Columns of no points are whole, whatever was asked for.
+    // Columns of no points are whole, whatever was requested.
     let is_whole = |length: usize| length == count;
     let ends: Vec<i64> = points.ends().iter().map(|end| *end as i64).collect();
     dict.set_item("ends", ends.into_pyarray(py))?;

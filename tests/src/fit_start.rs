@@ -166,7 +166,7 @@ fn exact_starters_of_visibilities_run() {
     }
 }
 
-/// Images: what they do not tell is asked for, key by key.
+/// Images: what they do not tell is requested, key by key.
 #[test]
 fn exact_starters_of_images_ask_for_what_is_missing() {
     let folder = tempfile::tempdir().unwrap();

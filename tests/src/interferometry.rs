@@ -52,7 +52,7 @@ fn find(data: &Observation, time_h: f64, pair: [&str; 2]) -> ([f64; 2], Complex6
     panic!("no {pair:?} at {time_h}");
 }
 
-/// (u, v) to 1e-6 of the longest baseline is asked for; both codes agree to 1e-10.
+/// (u, v) to 1e-6 of the longest baseline is requested; both codes agree to 1e-10.
 #[test]
 fn code_ehtim_visibilities() {
     let folder = tempfile::tempdir().unwrap();

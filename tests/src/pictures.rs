@@ -131,7 +131,7 @@ fn exact_same_picture_on_any_number_of_threads() {
     assert_eq!(on(1), on(3));
 }
 
-/// The flux asked for is the flux of the picture.
+/// The flux requested is the flux of the picture.
 #[test]
 fn exact_total_flux() {
     let scene = scene(&file("hot_spots.toml"), &SMALL);
@@ -191,7 +191,7 @@ fn distance(picture: &Picture, reference: &Picture) -> f64 {
     off / b.iter().map(|b| f64::from(*b)).sum::<f64>()
 }
 
-/// Refined pixels are as good as was asked for, better than a regular grid of as many rays; the
+/// Refined pixels are as good as was requested, better than a regular grid of as many rays; the
 /// `error` channel adds up to what is stated.
 #[test]
 fn exact_image_error_is_met() {

@@ -199,7 +199,7 @@ fn exact_disc_without_lensing() {
     assert!(sum(&picture.picture) > 0.0);
 }
 
-/// Tiles of any size and any number of rays asked for at once give the same, bit for bit.
+/// Tiles of any size and any number of rays requested at once give the same, bit for bit.
 #[test]
 fn exact_blocks_do_not_matter() {
     for scene in [gold(3, &[]), gold(5, &[]), scene(FACE_ON, &["tracer.integrator=\"elliptic\""])] {

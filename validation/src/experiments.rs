@@ -80,7 +80,7 @@ impl Expected {
     /// Every expectation against `results.json`.
     ///
     /// # Errors
-    /// If these are no results, or no case has a result that is asked for.
+    /// If these are no results, or no case has a result that is requested.
     pub fn hold(&self, results: &Value) -> anyhow::Result<Vec<Verdict>> {
         let cases = results["cases"].as_array().context("there are no cases")?;
         let ranges = self.range.iter().map(|range| range.hold(cases));

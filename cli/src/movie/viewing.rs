@@ -11,7 +11,7 @@ use kerrlight_tomo::image::animation::{Apng, Gif, Palette};
 use kerrlight_tomo::image::preview::{self, Look};
 use std::path::PathBuf;
 
-/// Options of what is made to be looked at.
+/// Options of images and animations for viewing.
 #[derive(Debug, Args)]
 pub struct Viewing {
     /// Where to write a GIF: 256 colours, shown everywhere
@@ -71,7 +71,7 @@ impl Animations {
         [&self.gif, &self.apng].into_iter().flatten().collect()
     }
 
-    /// Whether anything is to be looked at.
+    /// Whether any image or animation is to be made.
     pub fn any(&self) -> bool {
         self.gif.is_some() || self.apng.is_some() || self.png
     }

@@ -160,7 +160,7 @@ impl Render {
         Ok((!wanted.is_empty()).then(|| preview::reduction(scene, &names, &wanted)))
     }
 
-    /// Writes what is to be looked at. A pixel of the picture may be the mean of several.
+    /// Writes the preview images. A pixel of the picture may be the mean of several.
     fn draw(
         &self,
         scene: &Scene,

@@ -32,7 +32,7 @@ fn pixel_unit(scene: &Scene) -> &'static str {
     if scene.camera.is_some() { "pixel_size_plane" } else { "pixel_size_m" }
 }
 
-/// What a picture is worth, in one line: flux, size and time.
+/// Summary of a picture in one line: flux, size and time.
 pub fn worth(scene: &Scene, summary: &Summary, seconds: f64) -> String {
     let (screen, rays) = (&scene.screen, summary.rays);
     let Summary { flux, flux_error, flux_unit, .. } = summary;

@@ -29,7 +29,7 @@ pub struct Report {
     pub results: Vec<Outcome>,
     /// Further tables.
     pub tables: Vec<Table>,
-    /// The emission in three dimensions.
+    /// Emission in 3D.
     pub view: Option<View3d>,
     /// Pictures.
     pub figures: Vec<Figure>,
@@ -37,7 +37,7 @@ pub struct Report {
     pub plots: Vec<LinePlot>,
     /// Tables for whoever wants to know everything.
     pub details: Vec<Table>,
-    /// What was asked for.
+    /// The settings of the run.
     pub settings: Vec<Setting>,
 }
 

@@ -1,4 +1,4 @@
-//! The emission in three dimensions: data for the page's own viewer.
+//! Emission in 3D: data for the page's viewer.
 
 use super::html::{escape, fill};
 use super::pictures::encode;
@@ -56,7 +56,7 @@ pub struct View3d {
     pub motion: Option<Motion>,
     /// Radius of the outer horizon, M.
     pub hole_radius: f64,
-    /// Radius of the region that was looked at, M: nothing is drawn beyond.
+    /// Radius of the fitted region, in M; nothing is drawn outside.
     pub r_max: f64,
 }
 

@@ -24,7 +24,7 @@ pub enum Unresolved {
 }
 
 impl Default for Outcome {
-    /// That of a ray which nobody has followed.
+    /// The outcome of a ray that has not been traced.
     fn default() -> Self {
         Outcome::Unresolved(Unresolved::StepLimit)
     }

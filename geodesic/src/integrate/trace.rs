@@ -19,7 +19,7 @@ pub enum Method {
     /// The adaptive Runge–Kutta method of order 8(5,3) of Hairer, Nørsett & Wanner (1993),
     /// with dense output of degree 9: `dop853-mino`.
     Dop853,
-    /// Taylor series of an order that grows with the digits asked for, which are their own
+    /// Taylor series of an order that grows with the digits requested, which are their own
     /// dense output: `taylor-mino`. The fastest at every tolerance, and the default.
     #[default]
     Taylor,
@@ -233,7 +233,7 @@ mod tests {
         assert_eq!(intervals.len(), 1);
     }
 
-    /// What is asked for beside it does not change r and θ.
+    /// What is requested beside it does not change r and θ.
     #[test]
     fn exact_same_positions_whatever_is_wanted() {
         let hole = Kerr::new(0.94).unwrap();

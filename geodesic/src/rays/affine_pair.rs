@@ -56,7 +56,7 @@ impl AffinePair {
         self.coarse.as_ref().filter(|coarse| coarse.outcome() == self.fine.outcome())
     }
 
-    /// The estimate without a run to compare with: none was asked for, or it ended elsewhere.
+    /// The estimate without a run to compare with: none was requested, or it ended elsewhere.
     fn unknown(&self) -> Uncertainty {
         if self.coarse.is_some() { Uncertainty::UNKNOWN } else { Uncertainty::default() }
     }

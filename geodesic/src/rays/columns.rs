@@ -8,7 +8,7 @@ use crate::rays::sampling::{Sink, Summary};
 use crate::spacetime::kerr::Kerr;
 use crate::spacetime::point::PathPoint;
 
-/// Points of many rays in columns, ray after ray. Columns that were not asked for are empty.
+/// Points of many rays in columns, ray after ray. Columns that were not requested are empty.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Points {
     /// Where each ray's points end; the first ray's start at 0.
@@ -135,11 +135,11 @@ pub struct RayTable {
     pub turning_radius: Vec<f64>,
     /// How many times each ray crosses the equatorial plane.
     pub crossing_count: Vec<u32>,
-    /// The first crossings, as many as were asked for.
+    /// The first crossings, as many as were requested.
     pub crossings: Points,
     /// The samples.
     pub samples: Points,
-    /// For each ray the largest estimated errors of its crossings and samples, if asked for; a
+    /// For each ray the largest estimated errors of its crossings and samples, if requested; a
     /// sample at the horizon itself, where azimuth and delay have no limit, does not count.
     pub uncertainty: Vec<Uncertainty>,
 }

@@ -100,7 +100,7 @@ pub struct Rate {
 }
 
 /// Derivatives of points in columns, in the places of the columns of
-/// [`Points`](crate::Points). Columns that were not asked for are empty. At the horizon itself,
+/// [`Points`](crate::Points). Columns that were not requested are empty. At the horizon itself,
 /// where azimuth and delay diverge, their derivatives are NaN.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Gradients {
@@ -118,7 +118,7 @@ pub struct Gradients {
     pub weight: Vec<Gradient>,
     /// Of the covariant momentum (p_t, p_r, p_θ, p_φ).
     pub momentum: Vec<[Gradient; 4]>,
-    /// Rates of change along the ray: those of azimuth and delay wherever they are asked for,
+    /// Rates of change along the ray: those of azimuth and delay wherever they are requested,
     /// else 0.
     pub rate: Vec<Rate>,
 }
@@ -130,9 +130,9 @@ pub struct Fixed {
     pub radius: Gradient,
     /// Of the polar angle.
     pub theta: Gradient,
-    /// Of the azimuth; 0 unless asked for.
+    /// Of the azimuth; 0 unless requested.
     pub azimuth: Gradient,
-    /// Of the delay; 0 unless asked for.
+    /// Of the delay; 0 unless requested.
     pub delay: Gradient,
 }
 

@@ -1,4 +1,4 @@
-//! What a caller asks of its rays. What is not asked for is not integrated.
+//! What is computed along rays. Quantities that are not requested are not integrated.
 
 use crate::error::{Error, check};
 use crate::spacetime::quantities::Quantities;

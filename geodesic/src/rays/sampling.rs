@@ -39,7 +39,7 @@ pub(crate) struct Summary<T> {
 pub(crate) trait Sink<T> {
     fn summary(&mut self, summary: Summary<T>);
     fn crossing(&mut self, request: &Request, hole: &Kerr<T>, lambda: T, point: &PathPoint<T>);
-    /// `weight`: Σ dτ, if it was asked for.
+    /// `weight`: Σ dτ, if it was requested.
     fn sample(
         &mut self,
         request: &Request,

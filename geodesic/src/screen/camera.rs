@@ -52,7 +52,7 @@ impl Camera {
     ///
     /// # Errors
     /// If the radius is not finite or not outside the horizon, or if nothing can move as
-    /// asked for at this place (a static camera in the ergosphere, a Keplerian one inside
+    /// requested at this place (a static camera in the ergosphere, a Keplerian one inside
     /// the photon orbit).
     pub fn new(
         hole: &Kerr,

@@ -4,7 +4,7 @@
 //! `Q² + (A − c²) Q + C = 0`, and `τ = R_F(Q, Q + A/2 ± √(A²/4 − C))`, or that much short of
 //! a whole half-oscillation if the ray first moves away from the equator. From one crossing to
 //! the next the polar motion repeats itself: it is followed up to the first one and, if more are
-//! asked for, over one half-oscillation from there.
+//! requested, over one half-oscillation from there.
 
 use super::crossing_polar::{PolarSum, polar_times};
 

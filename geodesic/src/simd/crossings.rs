@@ -34,7 +34,7 @@ pub struct RayEnds {
     pub mino_total: f64,
     /// Whether it returns to the observer's radius, be that infinite; else it is captured.
     pub escapes: bool,
-    /// How many times it crosses the plane, asked for or not.
+    /// How many times it crosses the plane, requested or not.
     pub crossings: u32,
     /// An estimate, rarely exceeded, of the error of its phase by rounding, in radians: in
     /// inverse proportion to its distance from the critical curve. Where that is not small
@@ -66,7 +66,7 @@ fn part(column: &Column, span: core::ops::Range<usize>) -> core::slice::Iter<'_,
 }
 
 impl Crossings {
-    /// The most crossings per ray that were asked for.
+    /// The most crossings per ray that were requested.
     pub fn per_ray(&self) -> usize {
         self.per_ray
     }

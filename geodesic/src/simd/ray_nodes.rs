@@ -11,13 +11,13 @@ pub struct RayNodes<'a> {
     pub weight: &'a [f64],
     /// Mino time since the observer, M⁻¹.
     pub mino_time: &'a [f64],
-    /// Azimuth in radians, but for whole turns; empty unless asked for.
+    /// Azimuth in radians, but for whole turns; empty unless requested.
     pub azimuth: &'a [f64],
-    /// Delay t_o − t in M (its finite part for an observer at infinity); empty unless asked for.
+    /// Delay t_o − t in M (its finite part for an observer at infinity); empty unless requested.
     pub delay: &'a [f64],
-    /// d(1/r)/dτ, dimensionless, positive on the way in; empty unless asked for.
+    /// d(1/r)/dτ, dimensionless, positive on the way in; empty unless requested.
     pub radial_velocity: &'a [f64],
-    /// d cos θ/dτ; empty unless asked for.
+    /// d cos θ/dτ; empty unless requested.
     pub polar_velocity: &'a [f64],
     /// An estimate of the relative error of positions by rounding; it grows in inverse
     /// proportion to the distance from the critical curve.

@@ -285,7 +285,7 @@ struct Turn<V> {
 
 impl<V: Lanes<f64>> PolarRun<V> {
     /// `first` are the radial parts at the observer, where time and azimuth are zero; at infinity
-    /// the parts themselves are what is asked for.
+    /// the parts themselves are what is requested.
     #[inline(always)]
     fn new(
         cam: &Camera,

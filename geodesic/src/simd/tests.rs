@@ -351,7 +351,7 @@ fn exact_no_crossings() {
     assert_eq!((crossings.rays(), crossings.ray(7).count()), (0, 0));
 }
 
-/// Nothing that can be asked for panics, and what cannot be is refused by name.
+/// Nothing that can be requested panics, and what cannot be is refused by name.
 #[test]
 fn rays_that_cannot_be_are_refused() {
     let hole = Kerr::new(0.5).unwrap();

@@ -17,10 +17,10 @@ pub struct PathPoint<T = f64> {
     /// dn/dτ of the backward ray less its frame dragging, so that the photon's covariant
     /// momentum on the sphere is p·v = −velocity·v. Without azimuth: (0, 0, d cos θ/dτ).
     pub velocity: [T; 3],
-    /// Azimuth, unwrapped from the observer on; 0 unless asked for.
+    /// Azimuth, unwrapped from the observer on; 0 unless requested.
     pub azimuth: T,
     /// How much earlier the photon was here: t_o − t for an observer at finite radius,
-    /// lim \[(t_o − t) − r_o − 2 ln r_o\] for one at infinity; 0 unless asked for.
+    /// lim \[(t_o − t) − r_o − 2 ln r_o\] for one at infinity; 0 unless requested.
     pub delay: T,
 }
 

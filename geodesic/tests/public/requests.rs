@@ -1,5 +1,5 @@
 //! What a request brings: weights that integrate, equidistant samples, momenta that are null, and
-//! nothing that was not asked for.
+//! nothing that was not requested.
 
 use kerrlight_geodesic::{
     Error, Inclination, Integrator, Kerr, Observer, Outcome, Placement, Points, RayTable, Request,
@@ -226,7 +226,7 @@ fn paper_signs_of_momenta() {
     assert!(captured.samples.momentum[..4].iter().all(|p| p[1] > 0.0));
 }
 
-/// A column that was not asked for is empty, and what is asked for is not changed by what is not.
+/// A column that was not requested is empty, and what is requested is not changed by what is not.
 #[test]
 fn exact_columns_that_were_not_asked_for_are_empty() {
     let placement = Placement::MinoTime(4);

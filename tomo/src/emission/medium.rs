@@ -82,7 +82,7 @@ pub struct PathSegment {
     pub positions: [[f64; 3]; 2],
     /// Its least and its largest radius, in M.
     pub radii: [f64; 2],
-    /// Its largest and its least delay, in M; 0 where delays are not asked for.
+    /// Its largest and its least delay, in M; 0 where delays are not requested.
     pub delays: [f64; 2],
     /// How far it may lie from its chord, in M; infinite if that is not known.
     pub off: f64,

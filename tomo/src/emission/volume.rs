@@ -159,7 +159,7 @@ impl VolumeModel {
         if self.region.is_some_and(|region| !region.holds(x[2], r)) {
             return None;
         }
-        // No delays are asked for where nothing changes.
+        // No delays are requested where nothing changes.
         let delay = nodes.delay.get(k).filter(|_| moment.slow_light).copied().unwrap_or(0.0);
         let time = moment.observed - delay;
         let emissivity = self.emissivity(x, r, time);

@@ -40,7 +40,7 @@ pub enum Selection<'a> {
 pub struct Loss {
     /// Σ weight · χ²/data, and penalties.
     pub total: f64,
-    /// χ² a datum of each kind of data, the image first if there is one.
+    /// χ² per datum of each kind of data, the image first if there is one.
     pub terms: Vec<f64>,
     /// Weight · penalty of each, if there are any.
     pub penalties: Vec<f64>,

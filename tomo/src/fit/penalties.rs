@@ -1,5 +1,5 @@
 //! Penalties on a field of emission beside its data: on its values at the nodes of a probe grid, so that they are
-//! the same for every representation. None is used unless it is asked for.
+//! the same for every representation. Off by default.
 
 use super::Field;
 use super::linear::Prior;
@@ -9,7 +9,7 @@ use crate::points::Coordinates;
 use crate::representation::{Gradient, Workspace};
 use crate::simd::Float;
 
-/// Where a field is looked at.
+/// Where a field is evaluated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Probe {
     /// A regular grid of that many nodes along each axis of the cube that holds the region, moved as a whole by a part of
@@ -30,7 +30,7 @@ pub enum Probe {
 pub struct Draw<T> {
     /// By which parts of the distance of nodes the probe is moved, 0 to 1.
     pub offset: [f64; 3],
-    /// Time at which a field of events is looked at, since the reference time.
+    /// Time at which a field of events is evaluated, since the reference time.
     pub time: T,
 }
 

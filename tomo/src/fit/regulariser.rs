@@ -1,5 +1,5 @@
 //! What is thought about an emission field beside the data: penalties on values at the nodes of a
-//! regular grid. None is used unless it is asked for.
+//! regular grid. Off by default.
 //!
 //! Every penalty is an integral over the volume (a sum over nodes times the volume of a cell), so that a weight means
 //! the same on a finer grid.

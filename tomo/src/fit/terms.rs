@@ -2,10 +2,9 @@
 
 use crate::Error;
 use crate::interferometry::data_terms::{DataTerm, Residual};
-use crate::interferometry::operator::{Operator, Transform};
+use crate::interferometry::operator::{FourierNumber, Operator, Transform};
 use crate::simd::Float;
 use num_complex::Complex;
-use rustfft::FftNum;
 
 /// χ² of the frames of a movie.
 ///
@@ -195,7 +194,7 @@ impl<T: Float> FrameTerm<T> for LightCurveTerm {
 }
 
 /// What an array of telescopes measures of a frame.
-pub struct Scan<T: FftNum> {
+pub struct Scan<T: FourierNumber> {
     /// From the frame to its visibilities.
     pub transform: Transform<T>,
     /// From visibilities to χ².
@@ -203,14 +202,14 @@ pub struct Scan<T: FftNum> {
 }
 
 /// Visibilities, or what is made of them, of the frames that were observed.
-pub struct ScanTerm<T: FftNum> {
+pub struct ScanTerm<T: FourierNumber> {
     name: String,
     pixels: usize,
     quadratic: bool,
     scans: Vec<Option<Scan<T>>>,
 }
 
-impl<T: Float + FftNum> ScanTerm<T> {
+impl<T: Float + FourierNumber> ScanTerm<T> {
     /// Of a scan a frame. `quadratic`: whether χ² is so in the visibilities.
     ///
     /// # Panics
@@ -224,7 +223,7 @@ impl<T: Float + FftNum> ScanTerm<T> {
     }
 }
 
-impl<T: Float + FftNum> FrameTerm<T> for ScanTerm<T> {
+impl<T: Float + FourierNumber> FrameTerm<T> for ScanTerm<T> {
     fn name(&self) -> &str {
         &self.name
     }

@@ -94,7 +94,7 @@ where
 }
 
 /// Central differences of fourth order with step `h`, along every visibility's real and imaginary
-/// part and along random directions, against the gradient; it adds, with the weight asked for.
+/// part and along random directions, against the gradient; it adds, with the weight requested.
 pub(super) fn data_term<T: Float>(
     name: &str,
     term: &dyn DataTerm<T>,

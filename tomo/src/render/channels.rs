@@ -145,7 +145,7 @@ fn outcome_code(outcome: Outcome) -> f64 {
     }
 }
 
-/// The channels of a picture of `prepared`: all that it has, or those asked for.
+/// The channels of a picture of `prepared`: all that it has, or those requested.
 pub(super) fn chosen(
     prepared: &PreparedScene,
     refined: bool,

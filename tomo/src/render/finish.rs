@@ -39,10 +39,10 @@ impl Raster {
         render_bands(self, &[self.prepared.time()], &todo, &keep, progress)
     }
 
-    /// What is worth knowing about the whole picture.
+    /// Summary of the whole picture.
     ///
     /// # Errors
-    /// If a flux is asked for and there is no light, or a value does not fit after scaling.
+    /// If a flux is requested and there is no light, or a value does not fit after scaling.
     pub fn summary<F: Read + Write + Seek>(
         &self,
         journal: &Journal<F>,

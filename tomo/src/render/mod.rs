@@ -52,7 +52,7 @@ pub enum RenderError {
     /// A channel that the scene does not have.
     #[error("`screen.channels`: this scene has no channel `{name}`; it has {there}")]
     Channel {
-        /// The name that was asked for.
+        /// The name that was requested.
         name: String,
         /// The channels that there are.
         there: String,
@@ -212,12 +212,12 @@ impl Raster {
     }
 }
 
-/// The picture of a scene with what is worth knowing about it.
+/// The picture of a scene and its summary.
 #[derive(Debug, Clone)]
 pub struct Rendered {
     /// The picture.
     pub picture: Picture,
-    /// What is worth knowing.
+    /// Its summary.
     pub summary: Summary,
 }
 

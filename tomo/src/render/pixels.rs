@@ -22,7 +22,7 @@ pub(super) struct Pixel {
     pub known: f64,
 }
 
-/// Rays that are asked for at once.
+/// Rays that are traced together.
 const BLOCK: usize = 1024;
 
 /// Memory that is reused from tile to tile.

@@ -62,7 +62,7 @@ impl Raster {
     /// The factor that gives a picture of `scene` the unit, and the flux, that the scene asks for.
     ///
     /// # Errors
-    /// If a flux is asked for and there is no light.
+    /// If a flux is requested and there is no light.
     pub(crate) fn unit_factor(&self, scene: &Scene, raw: &Raw) -> Result<f64, Error> {
         Ok(Summary::factor(scene, &raw.tally).map_err(RenderError::NoFlux)?)
     }

@@ -114,7 +114,7 @@ fn sampling_error(pixels: &[Pixel], width: usize, side: usize) -> f64 {
     sum + known
 }
 
-/// What is worth knowing about a picture.
+/// Summary of a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Summary {
     /// Rays that were traced for it.
@@ -177,7 +177,7 @@ impl Summary {
     }
 }
 
-/// Factor from the scene's unit of intensity to that of a file whose flux is not asked for: gas
+/// Factor from the scene's unit of intensity to that of a file whose flux is not requested: gas
 /// shines in physical units.
 pub(super) fn own_unit(scene: &Scene) -> f64 {
     if scene.gas.is_some() { JY_PER_SQUARE_UAS } else { 1.0 }

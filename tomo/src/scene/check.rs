@@ -1,9 +1,9 @@
 //! Ranges of a scene's values.
 
+use super::Scene;
 use super::check_sources::{check_disc, check_gas, check_mesh, check_sky, check_spot};
 use super::check_volume::{check_falls, check_volume};
 use super::invalid::{Invalid, number, positive, shown};
-use super::Scene;
 use crate::Error;
 use crate::polarization::PowerLaw;
 use kerrlight_geodesic::Kerr;

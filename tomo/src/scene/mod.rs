@@ -1,4 +1,4 @@
-//! What is looked at: the hole, the observer, the screen, and what shines.
+//! Scenes: the black hole, the observer, the screen and the sources of light.
 //!
 //! A scene is a TOML text; [`Scene::parse`] checks every key, type and range, and
 //! [`Scene::to_toml`] writes the resolved scene with every default spelled out.

@@ -187,11 +187,11 @@ impl Node {
 /// A piece is halved at most this often.
 const DEEPEST: u32 = 40;
 
-/// A piece is asked for boxes once it stays within this part of its length, and taken as it is
+/// A piece is tested against boxes once it stays within this part of its length, and taken as it is
 /// once it stays within this part of the smallest box it met.
 const FINE: f64 = 0.25;
 
-/// A long piece that comes near more leaves than this is halved before they are looked at.
+/// A long piece that comes near more leaves than this is halved before they are tested.
 const MANY: usize = 32;
 
 /// The walk of one ray through a tree.

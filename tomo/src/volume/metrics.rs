@@ -68,7 +68,7 @@ pub fn same_nodes(a: &Volume, b: &Volume) -> Result<(), Error> {
     }
 }
 
-/// What an estimate is worth. A number is `None` where it is not defined.
+/// Quality of an estimate. A number is `None` where it is not defined.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Comparison {
     /// 10 log10(max(t)²/⟨(e − t)²⟩) in dB, over the nodes that are compared, max(t) being the truth's

@@ -29,7 +29,7 @@ pub enum VtiError {
     Empty,
 }
 
-/// Writes fields on the same nodes, the first of them as the one that is looked at first. Coordinates
+/// Writes fields on the same nodes, the first of them as the active one. Coordinates
 /// are in M.
 ///
 /// # Errors

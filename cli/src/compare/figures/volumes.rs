@@ -67,7 +67,7 @@ impl Figures<'_> {
         Ok(Some(lines))
     }
 
-    /// Rows of recoveries, without what was never asked for here, as a method that has no such settings.
+    /// Rows of recoveries, without methods that do not have the settings of this figure.
     fn rows<'r>(&self, asked: &FigureAsked, kinds: &'r [Vec<Level<'r>>]) -> Vec<Row<'r>> {
         let seeds = 1..=if asked.every_seed { self.summary.seeds } else { 1 };
         let rows = kinds.iter().flat_map(|levels| {

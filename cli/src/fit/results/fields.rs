@@ -1,4 +1,4 @@
-//! The recovered and the true emission on the nodes of a box, and what one is worth beside the other.
+//! The recovered and the true emission on the nodes of a box, and how well they agree.
 
 use kerrlight_geodesic::vector::distance;
 use kerrlight_tomo::fit::settings::FitFile;
@@ -106,7 +106,7 @@ pub fn true_volume(file: &FitFile, truth: &Truth) -> anyhow::Result<Volume> {
     nodes.volume(nodes.positions().iter().map(|x| truth.at(*x) as f32).collect())
 }
 
-/// What the field is worth beside the truth.
+/// How well the field agrees with the truth.
 pub fn compare(
     file: &FitFile,
     trainer: &mut Trainer<'_, f32>,

@@ -45,7 +45,7 @@ pub struct Estimate<'a> {
 }
 
 impl Estimate<'_> {
-    /// Writes all of them; a line that says what the fit is worth, and results.json.
+    /// Writes all of them: a line with the quality of the fit, and results.json.
     pub fn write(
         &self,
         trainer: &mut Trainer<'_, f32>,

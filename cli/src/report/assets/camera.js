@@ -1,4 +1,4 @@
-// An observer far away, in the direction (azimuth, elevation) of the hole: parallel rays.
+// Orthographic camera: a distant observer in the direction (azimuth, elevation) from the hole.
 
 function cameraFrame(state) {
   const [a, e] = [state.azimuth, state.elevation].map((degrees) => (degrees * Math.PI) / 180);
@@ -10,12 +10,12 @@ function dot(a, b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-// Half the width of the picture, M.
+// Half the field of view, in M.
 function halfWidth(scene, state) {
   return (1.1 * scene.rMax) / state.zoom;
 }
 
-// To the right, upward and towards the observer, M.
+// Coordinates to the right, upward and towards the observer, in M.
 function seen(frame, point) {
   return [dot(frame.right, point), dot(frame.up, point), dot(frame.towards, point)];
 }

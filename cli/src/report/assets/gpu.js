@@ -1,4 +1,4 @@
-// Rays on the graphics unit: one fragment a ray, marched through a 3D texture.
+// GPU ray marcher: one fragment per ray, through a 3D texture.
 
 const VERTEX = `#version 300 es
 in vec2 corner;
@@ -23,7 +23,7 @@ float rate(float r) {
   return mix(a, b, at - float(first));
 }
 
-// Where the matter of a point sat at the reference time.
+// Position at the reference time of the matter that is now at a point.
 vec3 pulledBack(vec3 p) {
   float angle = -rate(length(p)) * elapsed;
   float s = sin(angle), c = cos(angle);
@@ -73,13 +73,13 @@ function link(gl) {
   return program;
 }
 
-// Who draws, in the browser's words.
+// Name of the graphics driver, as the browser reports it.
 function rendererName(gl) {
   const info = gl.getExtension("WEBGL_debug_renderer_info");
   return String(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER) ?? "");
 }
 
-// Whose work the processor does in place of a graphics unit; nothing if there is one.
+// Name of a software rasteriser that stands in for the GPU; empty with a real GPU.
 function softwareName(name) {
   return name.match(/swiftshader|llvmpipe|softpipe|software|basic render/i)?.[0] ?? "";
 }
@@ -94,7 +94,7 @@ function bindTexture(gl, target, slot, filter) {
   gl.texParameteri(target, gl.TEXTURE_MAG_FILTER, filter);
 }
 
-// Volumes from slot 2 on; colours in slot 0, angular velocities in slot 1.
+// Texture units: 0 for the colour map, 1 for angular velocities, 2 and above for volumes.
 function uploadTextures(gl, scene) {
   gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
   const colors = scene.colors.length / 3;
@@ -143,7 +143,7 @@ function setUniforms(gl, program, uniforms) {
   }
 }
 
-// A renderer on a canvas, or null where there is no WebGL2.
+// Renderer that draws on a canvas; null without WebGL2.
 function gpuRenderer(canvas, scene) {
   const gl = canvas.getContext("webgl2", { alpha: false, preserveDrawingBuffer: true });
   if (!gl) return null;
@@ -161,7 +161,7 @@ function gpuRenderer(canvas, scene) {
     const error = gl.getError();
     if (error !== gl.NO_ERROR && !gl.isContextLost()) throw new Error(`WebGL error ${error}`);
   };
-  // Returns when all that was drawn is there.
+  // Waits until the GPU has finished.
   const finish = () => gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
   return { draw, finish, by: rendererName(gl) };
 }

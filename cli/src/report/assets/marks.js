@@ -1,8 +1,8 @@
-// Lines over the picture: the hole's edge, its equator, the axis of rotation, directions and colours.
+// Overlay: the event horizon, the equator, the axis of rotation, coordinate axes and the colour bar.
 
 const MARKS = { edge: "#7882a0", axis: "#6ec8ff", ring: "#789678", farRing: "#3c4c3c", text: "#e8e8e8" };
 
-// Readable on any picture.
+// Light text with a dark outline, legible on any background.
 function drawText(context, text, x, y, color) {
   context.lineJoin = "round";
   context.strokeStyle = "#000";
@@ -21,7 +21,7 @@ function drawPiece(context, toCanvas, ends, color) {
   context.stroke();
 }
 
-// A line in space, piece by piece, without what the hole hides.
+// Draws a 3D polyline without the segments that the hole hides.
 function drawLine(context, view, points, near, far) {
   const places = points.map((point) => seen(view.frame, point));
   const hidden = (p) => p[2] < 0 && Math.hypot(p[0], p[1]) < view.hole;
@@ -45,7 +45,7 @@ function drawHole(context, view) {
   context.stroke();
 }
 
-// From the hole's surface outward: nobody sees what is inside.
+// Starts at the horizon, since the inside is hidden.
 function drawAxis(context, view, scene) {
   const along = (s) => scene.axis.map((x) => x * s);
   for (const sign of [-1, 1]) {
@@ -59,7 +59,7 @@ function drawAxis(context, view, scene) {
   }
 }
 
-// Directions of x, y and z in the lower right corner.
+// Directions of x, y and z, in the lower right corner.
 function drawDirections(context, view, size) {
   const [x0, y0] = [size - 48, size - 48];
   for (const [name, point] of [["x", [30, 0, 0]], ["y", [0, 30, 0]], ["z", [0, 0, 30]]]) {
@@ -73,7 +73,7 @@ function drawDirections(context, view, size) {
   }
 }
 
-// The colours and what the last of them means.
+// Colour bar with the intensity of its upper end.
 function drawColors(context, scene, white, size) {
   const [left, top, wide, tall] = [14, size - 40, 0.28 * size, 10];
   const last = scene.colors.length / 3 - 1;

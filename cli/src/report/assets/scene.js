@@ -1,4 +1,4 @@
-// What the page carries: volumes as bytes, x fastest; a byte of 255 is `scale` in the unit of emission.
+// Data embedded in the page: volumes of bytes, x varying fastest. A byte of 255 stands for `scale`, in units of emission.
 
 function decodeBytes(text) {
   return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
@@ -20,7 +20,7 @@ function unit(vector) {
   return vector.map((x) => x / norm);
 }
 
-// Angular velocity at a radius: linear between the rows of the table, held beyond them.
+// Angular velocity at a radius: interpolated linearly in the table, constant outside it.
 function rateAt(rates, r) {
   const above = rates.findIndex((row) => row[0] > r);
   if (above === 0) return rates[0][1];
@@ -31,18 +31,18 @@ function rateAt(rates, r) {
 
 const RATES = 512;
 
-// The same at equal steps from 0 to rMax, for the renderers.
+// The same table, resampled at equal steps from 0 to rMax for the renderers.
 function rateTable(scene) {
   const rate = (k) => rateAt(scene.motion.rates, (scene.rMax * k) / (RATES - 1));
   return Float32Array.from({ length: RATES }, (_, k) => (scene.motion ? rate(k) : 0));
 }
 
-// Time since the volumes' own.
+// Time relative to the reference time of the volumes.
 function elapsed(scene, state) {
   return scene.motion ? state.time - scene.motion.reference : 0;
 }
 
-// Three digits, as short as they can be.
+// A number with three significant digits, in its shortest form.
 function digits(x) {
   return String(Number(x.toPrecision(3))).replace("-", "−");
 }

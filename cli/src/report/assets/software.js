@@ -1,8 +1,8 @@
-// The same rays on the processor, fewer and in longer steps.
+// CPU ray marcher: the algorithm of the GPU renderer with fewer rays and longer steps.
 
 const STEPS = 64;
 
-// The value at a point in M, linear between nodes, 0 to 255.
+// Trilinear interpolation at a point (in M); values from 0 to 255.
 function sample(volume, p) {
   const [cell, part] = [[0, 0, 0], [0, 0, 0]];
   for (let k = 0; k < 3; k += 1) {
@@ -20,7 +20,7 @@ function sample(volume, p) {
   return side(first) + (side(first + nx * ny) - side(first)) * part[2];
 }
 
-// Where the matter of a point sat at the reference time.
+// Position at the reference time of the matter that is now at a point.
 function pulledBack(scene, time, p) {
   if (time === 0) return p;
   const at = Math.min(Math.hypot(...p) / scene.rMax, 1) * (RATES - 1);
@@ -37,7 +37,7 @@ function pulledBack(scene, time, p) {
   ];
 }
 
-// Light of one ray in the unit of emission times M.
+// Intensity along one ray, in units of emission times M.
 function lightAt(scene, state, frame, right, up) {
   const square = right * right + up * up;
   const near = Math.sqrt(Math.max(scene.rMax ** 2 - square, 0));
@@ -55,7 +55,7 @@ function lightAt(scene, state, frame, right, up) {
   return steps > 0 ? sum * ds * scene.scale : 0;
 }
 
-// Light of size × size rays, row by row from the top.
+// Intensities of size × size rays, row by row from the top.
 function lightMap(scene, state, size) {
   const [frame, half] = [cameraFrame(state), halfWidth(scene, state)];
   const at = (k) => half * ((2 * k + 1) / size - 1);
@@ -68,7 +68,7 @@ function lightMap(scene, state, size) {
   return light;
 }
 
-// A renderer on a canvas of any size.
+// Renderer that draws on a canvas of any size.
 function softwareRenderer(canvas, scene) {
   const context = canvas.getContext("2d");
   const last = scene.colors.length / 3 - 1;

@@ -1,4 +1,4 @@
-// The viewer: its state, the controls, and when to draw.
+// The viewer: state, controls and scheduling of frames.
 
 const element = (id) => document.getElementById(id);
 
@@ -20,7 +20,7 @@ function clamp(x, low, high) {
   return Math.min(Math.max(x, low), high);
 }
 
-// Ranges of what a fragment such as #time=0.5&azimuth=40&elevation=20&volume=truth may set.
+// Ranges of the parameters of a URL fragment such as #time=0.5&azimuth=40&elevation=20&volume=truth.
 function limits(scene) {
   const time = scene.motion ? scene.motion.times : [0, 0];
   return {
@@ -44,7 +44,7 @@ function addCanvas(stage) {
   return canvas;
 }
 
-// The brightest ray of the first view: it is white at brightness 0, whatever volume or time is shown.
+// Maximum intensity of the first view. It is white at brightness 0, for every volume and time.
 function brightest(scene) {
   let most = 0;
   scene.volumes.forEach((_, volume) => {
@@ -58,7 +58,7 @@ function softwareChoice(canvas, scene) {
   return { name: "fallback", canvas, draw: softwareRenderer(canvas, scene), finish: () => {}, first: 128, most: 256 };
 }
 
-// `first` and `most`: pixels along a side of the first picture and of the largest one.
+// `first` and `most`: resolution of the first frame and upper limit of the resolution, in pixels along a side.
 function chooseRenderer(stage, scene) {
   const forced = new URLSearchParams(location.hash.slice(1)).get("renderer") === "fallback";
   const canvas = addCanvas(stage);
@@ -69,16 +69,16 @@ function chooseRenderer(stage, scene) {
 }
 
 function noteOf({ name, by }) {
-  if (name === "fallback") return "(drawn by the processor: WebGL2 is not used)";
+  if (name === "fallback") return "(on the CPU: WebGL2 is not used)";
   const software = softwareName(by);
-  return software ? `(drawn by the processor: ${software}, no graphics unit)` : "(drawn by the graphics unit)";
+  return software ? `(on the CPU: ${software} instead of a GPU)` : "(on the GPU)";
 }
 
-// Milliseconds that a picture may take while it moves, and at rest.
+// Time budget of a frame in milliseconds: during interaction, and at rest.
 const MOVING = 50;
 const RESTING = 700;
 
-// Pixels along a side: as many as were seen to be drawn in the time that there is, or as the fragment says.
+// Resolution in pixels along a side: what the time budget allowed so far, or what the URL fragment sets.
 class Quality {
   constructor({ first, most }) {
     const fixed = Number.parseInt(new URLSearchParams(location.hash.slice(1)).get("pixels"), 10);
@@ -121,7 +121,7 @@ class Viewer {
     this.ask();
   }
 
-  // Canvases as large as the place, or as can be drawn in time.
+  // Fits canvases to the stage, at most as large as the time budget allows.
   resize(budget) {
     const size = Math.max(this.stage.clientWidth, 1);
     const full = Math.round(size * Math.min(window.devicePixelRatio || 1, 2));
@@ -146,7 +146,7 @@ class Viewer {
     this.sharpen(full);
   }
 
-  // Once it rests, as sharp as can be.
+  // Full resolution at rest.
   sharpen(full) {
     clearTimeout(this.rest);
     const drawn = this.renderer.canvas.width;
@@ -204,7 +204,7 @@ function addSliders(viewer) {
   });
 }
 
-// Once through all times in 12 s, and again.
+// Plays all times in a loop of 12 s.
 function addPlay(viewer) {
   const button = element("play");
   let last = null;
@@ -223,7 +223,7 @@ function addPlay(viewer) {
   });
 }
 
-// One pointer turns, two zoom.
+// One pointer rotates, two zoom.
 function addPointers(viewer) {
   const { stage, state } = viewer;
   const pointers = new Map();
@@ -252,7 +252,7 @@ function addPointers(viewer) {
   }
 }
 
-// The wheel belongs to the page until somebody has clicked into the picture.
+// The wheel scrolls the page until the viewer has been clicked.
 function addWheelAndKeys(viewer) {
   const { stage, state } = viewer;
   stage.addEventListener("wheel", (event) => {

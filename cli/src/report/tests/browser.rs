@@ -92,10 +92,10 @@ fn code_page_runs_in_a_browser() {
     assert!(["ready: webgl2", "ready: fallback"].contains(&status(&found)), "{}", status(&found));
     assert!(found.contains("<output id=\"time-text\">0.5 orbits at 3.5 M</output>"));
     assert_eq!(found.matches("type=\"radio\"").count(), 2);
-    assert!(found.contains("drawn by the ") && found.contains("class=\"still\""));
+    assert!(found.contains("(on the ") && found.contains("class=\"still\""));
     let found = dump(&browser, folder.path(), "renderer=fallback");
     assert_eq!(status(&found), "ready: fallback");
-    assert!(found.contains("drawn by the processor: WebGL2 is not used"));
+    assert!(found.contains("on the CPU: WebGL2 is not used"));
 }
 
 /// Emission at a time, from that of the reference time.

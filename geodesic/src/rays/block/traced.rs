@@ -65,7 +65,7 @@ pub struct TracedRay {
 }
 
 impl Default for TracedRay {
-    /// A ray of which nothing is known.
+    /// A ray that has not been traced.
     fn default() -> Self {
         TracedRay {
             lambda: 0.0,

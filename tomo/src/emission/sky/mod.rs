@@ -14,7 +14,7 @@ pub use stars::StarField;
 
 use crate::scene::{Checker, Sky};
 
-/// A sky ready to be looked at.
+/// A sky prepared for evaluation.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub enum SkyModel {

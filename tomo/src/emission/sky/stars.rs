@@ -158,7 +158,7 @@ impl Hash {
 mod tests {
     use super::*;
 
-    /// As many stars as asked for, evenly over the sphere: the share of the sphere that is
+    /// The requested number of stars, evenly over the sphere: the share of the sphere that is
     /// lit is count (1 − cos radius)/2 but for overlaps.
     #[test]
     fn exact_star_count_by_lit_area() {

@@ -10,7 +10,7 @@ use std::sync::{Mutex, PoisonError};
 const NONE: u32 = u32::MAX;
 /// Pieces that frames are cut into, whatever the number of threads: each adds up its own gradient.
 const PIECES: usize = 16;
-/// Frames whose rows are made at a time; between them memory is looked at.
+/// Frames whose rows are made at a time; memory is checked between them.
 const AT_A_TIME: usize = 8;
 
 /// The nodes that count, in the order of the grid.

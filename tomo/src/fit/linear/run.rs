@@ -21,7 +21,7 @@ type Start = (Vec<f64>, Vec<bool>);
 /// What the coarse problem found, and the lit field that it began with if there was one.
 type Coarsely = (Vec<f64>, Option<Vec<f64>>);
 
-/// Where lit fields are looked at if no coarse problem is asked for.
+/// Where lit fields are evaluated if no coarse problem is requested.
 pub(super) const LIT: Coarse = Coarse { nodes: 32, stride: 1, iterations: 20 };
 /// Lit fields of a problem, and of one of the many problems of a scan.
 const MANY: Trials = Trials { spots: Spots { circles: 12, on_each: 16 }, best: 4, iterations: 0 };

@@ -22,7 +22,7 @@ pub(super) struct Lit {
 /// How lit fields are tried.
 #[derive(Clone, Copy)]
 pub(super) struct Trials {
-    /// Spots that are looked at.
+    /// Number of candidate spots.
     pub spots: Spots,
     /// The best of them, from which descents begin, beside the wide fields.
     pub best: usize,

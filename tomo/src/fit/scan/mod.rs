@@ -3,7 +3,7 @@
 //!
 //! The loss of an axis is the least χ² of any field of emission that turns about it (variable
 //! projection, Golub & Pereyra 1973), so that no field has to be guessed before the axis is known and both
-//! hemispheres are looked at alike: a local minimum near the antipode of the axis is usual (Levis et al. 2022).
+//! hemispheres are searched alike: a local minimum near the antipode of the axis is usual (Levis et al. 2022).
 
 mod map;
 mod refine;

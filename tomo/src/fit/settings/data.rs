@@ -38,7 +38,7 @@ pub enum DataFiles {
 pub struct Loss {
     /// Which.
     pub data: LossKind,
-    /// Factor on χ² a datum.
+    /// Factor on χ² per datum.
     pub weight: f64,
     /// Standard deviation of a pixel (image) or of the flux (light curve), Jy.
     #[serde(skip_serializing_if = "Option::is_none")]

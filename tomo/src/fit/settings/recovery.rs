@@ -203,11 +203,11 @@ pub enum AxisSearch {
 pub struct AxisScan {
     /// Directions that are tried.
     pub directions: usize,
-    /// Frames that are looked at, spread over all.
+    /// Number of frames in use, spread over all.
     pub frames: usize,
     /// Pixels along a side of the model that is fitted to them; all that there are if it is more than half of them.
     pub pixels: usize,
-    /// Nodes along each axis of a grid with which all pixels are then looked at, for axes near the best one; without
+    /// Nodes along each axis of a grid with which all pixels are then fitted, for axes near the best one; without
     /// it that is the scan's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refine: Option<usize>,

@@ -156,10 +156,10 @@ pub struct Observation {
     pub elevation_deg: [f64; 2],
     /// Noise that is added to the data.
     pub noise: Noise,
-    /// Errors of station gains, none unless asked for.
+    /// Errors of station gains, none by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gains: Option<GainErrors>,
-    /// Part of each amplitude that the fit adds to its error in quadrature, none unless asked for: for errors of gains,
+    /// Part of each amplitude that the fit adds to its error in quadrature, none by default: for errors of gains,
     /// or where errors are so small that a loss has minima everywhere.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub systematic: Option<f64>,

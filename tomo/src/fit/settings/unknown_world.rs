@@ -76,7 +76,7 @@ pub struct WorldSearch {
     pub drag_is_spin: bool,
 }
 
-/// What worlds are looked at through.
+/// How worlds are evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WorldView {

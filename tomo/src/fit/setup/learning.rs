@@ -182,7 +182,7 @@ fn occupancy(chosen: &Occupancy) -> Result<OccupancyPlan> {
     })
 }
 
-/// Quasi-Newton steps, if they are asked for and the loss is the same at every step.
+/// Quasi-Newton steps, if they are requested and the loss is the same at every step.
 fn lbfgs(file: &FitFile) -> Result<Option<Lbfgs>> {
     if file.training.optimiser == Optimiser::Adam {
         return Ok(None);

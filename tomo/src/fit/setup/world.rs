@@ -24,7 +24,7 @@ pub struct Trial {
     pub reduced_chi2: f64,
     /// Half of χ² there, and −ln of the priors' densities.
     pub value: f64,
-    /// Worlds that were looked at.
+    /// Worlds that were evaluated.
     pub worlds: usize,
     /// Whether the last populations were alike.
     pub converged: bool,
@@ -105,7 +105,7 @@ pub fn find_world(
     }))
 }
 
-/// The lowest point of the quadratic form, if it explains the data better than the best world that was looked at.
+/// The lowest point of the quadratic form, if it explains the data better than the best world that was evaluated.
 fn lower(
     problem: &WorldProblem<'_, f32>,
     explored: &Explored,

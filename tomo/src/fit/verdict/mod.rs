@@ -12,10 +12,10 @@ pub use statistics::{Pairs, Part, Statistics};
 
 /// Standard deviations of χ² that chance is granted: 5 of them come about once in a million.
 pub const CHANCE: f64 = 5.0;
-/// Excess of χ² per datum that is let pass however many data show it: an error of the model of 0.3 σ, smaller than
+/// Excess of χ² per datum that is tolerated for any number of data: an error of the model of 0.3 σ, smaller than
 /// anything that single data can tell.
 pub const EXCESS: f64 = 0.1;
-/// Lack of χ² per datum that is let pass: the share of data that parameters may use up.
+/// Deficit of χ² per datum that is tolerated: the share of data that parameters may use up.
 pub const LACK: f64 = 0.2;
 /// Mean residual in σ, or correlation of neighbours, that is let pass: what an error of the model as large as
 /// [`EXCESS`] allows makes, if it is the same all over.
@@ -107,7 +107,7 @@ pub struct ZeroSpacing {
     pub count: usize,
 }
 
-/// What a fit is worth.
+/// Verdict on a fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Outcome {
     /// All residuals are as expected.

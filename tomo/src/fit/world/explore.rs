@@ -9,7 +9,7 @@ use crate::simd::Float;
 use cmaes::{CMAESOptions, DVector, TerminationReason};
 use std::sync::{Mutex, PoisonError};
 
-/// A world that was looked at.
+/// A world that was evaluated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// The world.
@@ -25,9 +25,9 @@ pub struct Explored {
     pub start: World,
     /// The best one.
     pub best: Estimate,
-    /// All that were looked at.
+    /// All worlds that were evaluated.
     pub samples: Vec<Sample>,
-    /// Whether populations had shrunk, rather than too many worlds been looked at.
+    /// Whether populations had shrunk, rather than the limit on worlds been reached.
     pub converged: bool,
 }
 
@@ -36,7 +36,7 @@ pub struct Explored {
 pub struct Exploration {
     /// Standard deviation of the first population in units of [`Parameter::scale`](super::Parameter::scale).
     pub width: f64,
-    /// Worlds that are looked at, at most.
+    /// Largest number of worlds to evaluate.
     pub worlds: usize,
     /// Of the draws.
     pub seed: u64,
@@ -50,7 +50,7 @@ const NARROW: f64 = 0.02;
 /// Populations whose values differ by less are alike: a tenth of what one standard deviation makes.
 const ALIKE: f64 = 0.05;
 
-/// What worlds that are looked at leave behind.
+/// Record of the worlds that were evaluated.
 #[derive(Default)]
 struct Log {
     samples: Vec<Sample>,

@@ -57,7 +57,7 @@ impl Spread {
         });
         let unit = |k: usize| free[k].parameter.scale();
         let world = (0..n).fold(best.world, |world, k| {
-            // Not farther than worlds have been looked at.
+            // Not beyond the worlds that were evaluated.
             let step = lowest[k].clamp(-form.reach[k], form.reach[k]) * unit(k);
             let [low, high] = free[k].bounds();
             let value = best.world.get(free[k].parameter) + step;

@@ -17,7 +17,7 @@ pub enum EarthError {
         "UT1 - UTC at MJD {mjd} is not in the built-in table (MJD {first} to {last}): give a value"
     )]
     Ut1Unknown {
-        /// The day asked for.
+        /// The day requested.
         mjd: f64,
         /// First day of the table.
         first: i32,

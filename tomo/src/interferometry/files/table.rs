@@ -18,7 +18,7 @@ pub const CHANNEL: &str = "channel";
 pub(super) const EHT_COLUMNS: [&str; 8] =
     ["time(UTC)", "T1", "T2", "U(lambda)", "V(lambda)", "Iamp(Jy)", "Iphase(d)", "Isigma(Jy)"];
 
-/// Cells of a line; more than anyone writes are not looked at.
+/// Largest number of cells that are read of a line; no known writer has more.
 fn cells(line: &str) -> Vec<&str> {
     let separate = |c: char| c == ',' || c.is_whitespace();
     if line.contains(',') {

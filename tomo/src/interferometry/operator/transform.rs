@@ -1,10 +1,9 @@
 //! The Fourier transform that suits the numbers of pixels and visibilities.
 
 use super::nufft::{cells, check_accuracy, width_of};
-use super::{Dtft, Float, ImageGrid, Nufft, Operator, Pulse};
+use super::{Dtft, Float, FourierNumber, ImageGrid, Nufft, Operator, Pulse};
 use crate::Error;
 use num_complex::Complex;
-use rustfft::FftNum;
 
 /// Which Fourier transform.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,14 +18,14 @@ pub enum Method {
 }
 
 /// The direct transform or the fast one.
-pub enum Transform<T: FftNum> {
+pub enum Transform<T: FourierNumber> {
     /// The sum over pixels.
     Direct(Dtft<T>),
     /// By way of a fast transform.
     Fast(Nufft<T>),
 }
 
-impl<T: Float + FftNum> Transform<T> {
+impl<T: Float + FourierNumber> Transform<T> {
     /// The transform to `frames[k]`, the (u, v) in wavelengths that see frame k. The direct one
     /// keeps its exponentials if they fit into `memory_budget` bytes.
     ///
@@ -90,7 +89,7 @@ fn is_fast_cheaper(grid: ImageGrid, frames: &[Vec<[f64; 2]>], accuracy: f64) -> 
     FAST_NS * seen * of_frame + CELL_NS * visibilities * (width * width) as f64 <= direct
 }
 
-impl<T: Float + FftNum> Operator<T> for Transform<T> {
+impl<T: Float + FourierNumber> Operator<T> for Transform<T> {
     type Datum = Complex<T>;
 
     fn frames(&self) -> usize {

@@ -5,6 +5,7 @@
 //! Images are real, V(−u, −v) is the conjugate of V(u, v): half the columns of the grid suffice.
 
 mod kernel;
+mod plan;
 
 use super::{Float, ImageGrid, Operator, Pulse};
 use crate::Error;
@@ -14,8 +15,9 @@ use kernel::Kernel;
 use kernel::MOST_CELLS;
 pub(super) use kernel::{cells, width_of};
 use num_complex::Complex;
+pub use plan::FourierNumber;
 use rayon::prelude::*;
-use rustfft::{Fft, FftNum, FftPlanner};
+use rustfft::Fft;
 use std::sync::Arc;
 
 /// Columns of the grid that a thread works on at a time.
@@ -37,7 +39,7 @@ struct Site<T> {
 
 /// Fast Fourier transform of the frames of a movie, each to visibilities of its own, with an error
 /// of at most `accuracy` × Σ|I| Jy. The adjoint is the transpose of the same map, exactly.
-pub struct Nufft<T: FftNum> {
+pub struct Nufft<T: FourierNumber> {
     grid: ImageGrid,
     kernel: Kernel,
     accuracy: f64,
@@ -66,7 +68,7 @@ pub(super) fn check_accuracy<T: Float>(accuracy: f64) -> Result<(), Error> {
     Err(Error::out_of_range("accuracy", accuracy, allowed))
 }
 
-impl<T: Float + FftNum> Nufft<T> {
+impl<T: Float + FourierNumber> Nufft<T> {
     /// The transform to `frames[k]`, the (u, v) in wavelengths that see frame k; data are in the
     /// order of frames and of their (u, v).
     ///
@@ -85,8 +87,6 @@ impl<T: Float + FftNum> Nufft<T> {
         let correction = |pixels: usize, cells: usize| {
             kernel.transform(pixels, cells).into_iter().map(|x| T::of(x.recip())).collect()
         };
-        let mut planner = FftPlanner::new();
-        let mut both = |n| [planner.plan_fft_forward(n), planner.plan_fft_inverse(n)];
         let mut operator = Nufft {
             grid,
             kernel,
@@ -95,8 +95,8 @@ impl<T: Float + FftNum> Nufft<T> {
             columns: 0,
             margin,
             correction: [correction(grid.width, across), correction(grid.height, rows)],
-            along_row: both(across),
-            along_column: both(rows),
+            along_row: T::plans(across),
+            along_column: T::plans(rows),
             sites: Vec::new(),
             frames: Vec::new(),
         };
@@ -319,7 +319,7 @@ impl<T: Float + FftNum> Nufft<T> {
     }
 }
 
-impl<T: Float + FftNum> Operator<T> for Nufft<T> {
+impl<T: Float + FourierNumber> Operator<T> for Nufft<T> {
     type Datum = Complex<T>;
 
     fn frames(&self) -> usize {

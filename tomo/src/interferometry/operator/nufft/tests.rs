@@ -28,7 +28,12 @@ fn movies(grid: ImageGrid) -> [Vec<f64>; 2] {
 }
 
 /// The largest error in units of accuracy × Σ|I|.
-fn worst<T: Float + FftNum>(grid: ImageGrid, pulse: Pulse, accuracy: f64, movie: &[f64]) -> f64 {
+fn worst<T: Float + FourierNumber>(
+    grid: ImageGrid,
+    pulse: Pulse,
+    accuracy: f64,
+    movie: &[f64],
+) -> f64 {
     let frames = frames(grid);
     let single: Vec<T> = movie.iter().map(|x| T::of(*x)).collect();
     let fast = Nufft::<T>::new(grid, pulse, &frames, accuracy).unwrap();
@@ -63,7 +68,7 @@ fn exact_error_is_below_the_accuracy_asked_for() {
     }
 }
 
-fn conforms<T: Float + FftNum>(accuracy: f64, tolerance: f64) {
+fn conforms<T: Float + FourierNumber>(accuracy: f64, tolerance: f64) {
     for (width, height) in [(13, 80), (64, 64)] {
         let grid = ImageGrid::new(width, height, 1e-9).unwrap();
         let fast = Nufft::<T>::new(grid, Pulse::Triangle, &frames(grid), accuracy).unwrap();

@@ -29,7 +29,7 @@ const END_GAP: f64 = 0.3;
 /// What a piece of path may be longer than its chord, in coordinates that are sheared.
 const SLACK: f64 = 1.25;
 
-/// Positions are asked for as far outside of the spots as the gap at the end of a panel, in M.
+/// Positions are needed as far outside the spots as the gap at the end of a panel, in M.
 const MARGIN: f64 = 0.5;
 
 impl Spots {
