@@ -2,6 +2,7 @@
 
 use super::Picture;
 use super::colormap::Colormap;
+use crate::Error;
 use std::io::Cursor;
 
 /// What a preview shows.
@@ -32,7 +33,7 @@ const UNCLIPPED: f64 = 0.998;
 ///
 /// # Errors
 /// If a channel that the look needs is missing, or on a failure of the encoder.
-pub fn encode_png(picture: &Picture, look: Look) -> image::ImageResult<Vec<u8>> {
+pub fn encode_png(picture: &Picture, look: Look) -> Result<Vec<u8>, Error> {
     encode(&draw(picture, look, white(picture, look)?)?)
 }
 
@@ -40,7 +41,7 @@ pub fn encode_png(picture: &Picture, look: Look) -> image::ImageResult<Vec<u8>> 
 ///
 /// # Errors
 /// On a failure of the encoder.
-pub fn encode(drawn: &image::RgbImage) -> image::ImageResult<Vec<u8>> {
+pub fn encode(drawn: &image::RgbImage) -> Result<Vec<u8>, Error> {
     let mut bytes = Vec::new();
     drawn.write_to(&mut Cursor::new(&mut bytes), image::ImageFormat::Png)?;
     Ok(bytes)
@@ -50,7 +51,7 @@ pub fn encode(drawn: &image::RgbImage) -> image::ImageResult<Vec<u8>> {
 ///
 /// # Errors
 /// If a channel that the look needs is missing.
-pub fn white(picture: &Picture, look: Look) -> image::ImageResult<f32> {
+pub fn white(picture: &Picture, look: Look) -> Result<f32, Error> {
     Ok(match look {
         Look::Intensity(..) => white_point(channel(picture, "intensity")?.iter().copied()),
         Look::Color => {
@@ -65,7 +66,7 @@ pub fn white(picture: &Picture, look: Look) -> image::ImageResult<f32> {
 ///
 /// # Errors
 /// If a channel that the look needs is missing.
-pub fn draw(picture: &Picture, look: Look, white: f32) -> image::ImageResult<image::RgbImage> {
+pub fn draw(picture: &Picture, look: Look, white: f32) -> Result<image::RgbImage, Error> {
     let pixels = match look {
         Look::Intensity(map, stretch) => {
             mapped(channel(picture, "intensity")?, map, stretch, white)
@@ -76,12 +77,12 @@ pub fn draw(picture: &Picture, look: Look, white: f32) -> image::ImageResult<ima
     image::RgbImage::from_raw(width, height, pixels).ok_or_else(missing)
 }
 
-pub(super) fn missing() -> image::ImageError {
+pub(super) fn missing() -> Error {
     let kind = image::error::ParameterErrorKind::DimensionMismatch;
-    image::ImageError::Parameter(image::error::ParameterError::from_kind(kind))
+    image::ImageError::Parameter(image::error::ParameterError::from_kind(kind)).into()
 }
 
-fn channel<'a>(picture: &'a Picture, name: &str) -> image::ImageResult<&'a [f32]> {
+fn channel<'a>(picture: &'a Picture, name: &str) -> Result<&'a [f32], Error> {
     picture.channel(name).ok_or_else(missing)
 }
 
@@ -112,7 +113,7 @@ fn mapped(values: &[f32], map: Colormap, stretch: Stretch, white: f32) -> Vec<u8
 
 /// Linear colour through the sRGB transfer function, the brightest light kept below
 /// white by a common factor.
-fn colored(picture: &Picture, white: f32) -> image::ImageResult<Vec<u8>> {
+fn colored(picture: &Picture, white: f32) -> Result<Vec<u8>, Error> {
     let [r, g, b] = ["R", "G", "B"].map(|name| channel(picture, name));
     let (r, g, b) = (r?, g?, b?);
     let encode = |c: f32| {

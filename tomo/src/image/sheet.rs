@@ -5,6 +5,7 @@ use super::colormap::Colormap;
 use super::overlay::digits;
 use super::preview::{self, Look};
 use super::{Channel, Picture};
+use crate::Error;
 use image::RgbImage;
 use image::imageops::{FilterType, resize};
 use std::f64::consts::PI;
@@ -31,7 +32,7 @@ struct Panel {
 ///
 /// # Errors
 /// If the picture is too small or too large to be drawn.
-pub fn sheet(picture: &Picture) -> image::ImageResult<RgbImage> {
+pub fn sheet(picture: &Picture) -> Result<RgbImage, Error> {
     let mut panels = Vec::new();
     if ["R", "G", "B"].iter().all(|name| picture.channel(name).is_some()) {
         let white = preview::white(picture, Look::Color)?;
@@ -45,7 +46,7 @@ pub fn sheet(picture: &Picture) -> image::ImageResult<RgbImage> {
     arrange(&panels).ok_or_else(preview::missing)
 }
 
-fn panel(picture: &Picture, channel: &Channel) -> image::ImageResult<Panel> {
+fn panel(picture: &Picture, channel: &Channel) -> Result<Panel, Error> {
     let there = mask(picture, &channel.name);
     let seen = channel.values.iter().zip(&there).filter(|(_, there)| **there);
     let (map, ends) = scale(&channel.name, seen.map(|(value, _)| *value).collect());

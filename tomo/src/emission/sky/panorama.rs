@@ -22,11 +22,11 @@ const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
 /// Width, height and linear colours of an EXR.
 fn exr_colors(bytes: &[u8]) -> Result<(usize, usize, Vec<[f32; 3]>), PanoramaError> {
-    if !exr::is_whole(bytes)? {
+    if !exr::is_whole(bytes).map_err(PanoramaError::exr)? {
         let message = "an EXR of part of its display window, which would not fit the sky";
         return Err(PanoramaError::Content(message.to_owned()));
     }
-    let (picture, _) = exr::decode(bytes)?;
+    let (picture, _) = exr::decode(bytes).map_err(PanoramaError::exr)?;
     let named = |names: [&str; 3]| {
         let [r, g, b] = names.map(|name| picture.channel(name));
         Some([r?, g?, b?])
@@ -52,10 +52,16 @@ pub enum PanoramaError {
     Memory(#[from] memory::TooLarge),
     /// An EXR that cannot be read.
     #[error("damaged or unusual EXR: {0}")]
-    Exr(#[from] ::exr::error::Error),
+    Exr(#[source] Box<Error>),
     /// The picture is empty or has a value that is no colour.
     #[error("{0}")]
     Content(String),
+}
+
+impl PanoramaError {
+    fn exr(error: Error) -> Self {
+        PanoramaError::Exr(Box::new(error))
+    }
 }
 
 /// Columns and rows of a picture, as its header states them.
@@ -72,7 +78,7 @@ impl Panorama {
     pub fn decode(bytes: &[u8]) -> Result<Self, Error> {
         let is_exr = bytes.starts_with(&EXR_MAGIC);
         let size = if is_exr {
-            exr::dimensions(bytes).map_err(PanoramaError::Exr)
+            exr::dimensions(bytes).map_err(PanoramaError::exr)
         } else {
             dimensions(bytes).map_err(PanoramaError::Decode)
         };

@@ -17,6 +17,14 @@ use std::ops::Range;
 /// Rows of pixels that are compressed together.
 pub const BAND_ROWS: usize = 16;
 
+/// A file of any kind, so that the encoder is compiled once.
+trait AnyFile: Write + Seek {}
+
+impl<F: Write + Seek> AnyFile for F {}
+
+/// Writes the compressed bytes of a band.
+type WriteBand<'a> = dyn FnMut(usize, Vec<u8>) -> Result<()> + 'a;
+
 /// How hard DEFLATE tries, of 9: what OpenEXR does too.
 const LEVEL: u32 = 4;
 
@@ -139,9 +147,20 @@ impl Layout {
     /// On a failure to write, of `bands`, or if a band is missing.
     pub fn write(
         &self,
-        out: impl Write + Seek,
+        mut out: impl Write + Seek,
         attributes: &Attributes,
         bands: impl FnOnce(&mut dyn FnMut(usize, Vec<u8>) -> Result<()>) -> Result<()>,
+    ) -> Result<()> {
+        let mut bands = Some(bands);
+        let mut once = |write: &mut WriteBand<'_>| bands.take().map_or(Ok(()), |give| give(write));
+        self.write_file(&mut out, attributes, &mut once)
+    }
+
+    fn write_file(
+        &self,
+        out: &mut dyn AnyFile,
+        attributes: &Attributes,
+        bands: &mut dyn FnMut(&mut WriteBand<'_>) -> Result<()>,
     ) -> Result<()> {
         let mut own = LayerAttributes {
             software_name: Some(Text::from(concat!("kerrlight ", env!("CARGO_PKG_VERSION")))),

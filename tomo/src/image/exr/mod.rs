@@ -32,7 +32,7 @@ fn utf8(text: &str) -> Text {
 ///
 /// # Errors
 /// If the picture is empty, or on a failure of the encoder.
-pub fn encode(picture: &Picture, attributes: &Attributes) -> exr::error::Result<Vec<u8>> {
+pub fn encode(picture: &Picture, attributes: &Attributes) -> Result<Vec<u8>, crate::Error> {
     let names: Vec<&str> = picture.channels.iter().map(|c| c.name.as_str()).collect();
     let layout = Layout::new(picture.width, picture.height, &names)?;
     let bands = (0..layout.bands()).into_par_iter().map(|band| {
@@ -60,9 +60,12 @@ fn settings(attributes: &Attributes) -> exr::error::Result<(Text, AttributeValue
 ///
 /// # Errors
 /// If the bytes are no EXR file.
-pub fn decode_attributes(file: impl Read) -> exr::error::Result<Attributes> {
+pub fn decode_attributes(mut file: impl Read) -> Result<Attributes, crate::Error> {
+    // One kind of file, so that the decoder is compiled once.
+    let file: &mut dyn Read = &mut file;
     let data = MetaData::read_from_unbuffered(file, true)?;
-    data.headers.first().map_or(Ok(Attributes::new()), |header| attributes(&header.own_attributes))
+    let first = data.headers.first();
+    Ok(first.map_or(Ok(Attributes::new()), |header| attributes(&header.own_attributes))?)
 }
 
 fn attributes(layer: &LayerAttributes) -> exr::error::Result<Attributes> {
@@ -79,7 +82,7 @@ fn attributes(layer: &LayerAttributes) -> exr::error::Result<Attributes> {
 ///
 /// # Errors
 /// If the bytes are no EXR file.
-pub fn dimensions(bytes: &[u8]) -> exr::error::Result<(u32, u32)> {
+pub fn dimensions(bytes: &[u8]) -> Result<(u32, u32), crate::Error> {
     let data = MetaData::read_from_unbuffered(Cursor::new(bytes), true)?;
     let size = data.headers.first().map_or(Vec2(0, 0), |header| header.layer_size);
     let number = |n: usize| u32::try_from(n).map_err(|_| Error::Invalid("size".into()));
@@ -90,7 +93,7 @@ pub fn dimensions(bytes: &[u8]) -> exr::error::Result<(u32, u32)> {
 ///
 /// # Errors
 /// If the bytes are no EXR file.
-pub fn is_whole(bytes: &[u8]) -> exr::error::Result<bool> {
+pub fn is_whole(bytes: &[u8]) -> Result<bool, crate::Error> {
     let data = MetaData::read_from_unbuffered(Cursor::new(bytes), true)?;
     Ok(data.headers.first().is_none_or(|header| {
         let window = header.shared_attributes.display_window;
@@ -102,7 +105,7 @@ pub fn is_whole(bytes: &[u8]) -> exr::error::Result<bool> {
 ///
 /// # Errors
 /// If the bytes are no EXR file, or a channel is subsampled.
-pub fn decode(bytes: &[u8]) -> exr::error::Result<(Picture, Attributes)> {
+pub fn decode(bytes: &[u8]) -> Result<(Picture, Attributes), crate::Error> {
     check_size(bytes)?;
     let image = read()
         .no_deep_data()
@@ -118,7 +121,7 @@ pub fn decode(bytes: &[u8]) -> exr::error::Result<(Picture, Attributes)> {
     for channel in layer.channel_data.list {
         let values: Vec<f32> = channel.sample_data.values_as_f32().collect();
         if values.len() != width * height {
-            return Err(Error::NotSupported("subsampled channels".into()));
+            return Err(Error::NotSupported("subsampled channels".into()).into());
         }
         channels.push(Channel { name: channel.name.to_string(), values });
     }

@@ -41,7 +41,16 @@ pub struct Survey {
 ///
 /// # Errors
 /// If the bytes are no EXR file of flat data, or a channel is subsampled.
-pub fn survey(file: impl Read + Seek) -> Result<Survey> {
+pub fn survey(mut file: impl Read + Seek) -> std::result::Result<Survey, crate::Error> {
+    Ok(survey_file(&mut file)?)
+}
+
+/// A file of any kind, so that the decoder is compiled once.
+trait AnyFile: Read + Seek {}
+
+impl<F: Read + Seek> AnyFile for F {}
+
+fn survey_file(file: &mut dyn AnyFile) -> Result<Survey> {
     let reader = exr::block::read(file, true)?;
     let unusual = |what: &'static str| Error::NotSupported(what.into());
     let header = reader.headers().first().ok_or_else(|| unusual("no layer"))?.clone();
