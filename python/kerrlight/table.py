@@ -35,7 +35,7 @@ class Points:
     """Points on rays: crossings of the equatorial plane, or samples.
 
     Every column has the shape of the rays and one axis more, along the ray from the observer on, filled up with NaN
-    behind the last point of a ray. Columns that were not asked for are refused with an ``AttributeError``.
+    behind the last point of a ray. Columns that were not requested raise an ``AttributeError``.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class Points:
     def flat(self, name: str) -> Floats:
         """A column without its filling: the points of all rays, ray after ray (:attr:`count` says how many of each)."""
         if name == "ends" or name not in self._columns:
-            raise AttributeError(f"{name} was not asked for: {self!r}")
+            raise AttributeError(f"{name} was not requested: {self!r}")
         column: Floats = self._columns[name]
         return column
 
@@ -153,7 +153,7 @@ def _derivative(columns: dict[str, Any] | None, name: str, by: str, fill: Any) -
     if by not in PARAMETERS:
         raise ValueError(f'by = "{by}" is not allowed: one of {", ".join(PARAMETERS)}')
     if name not in columns:
-        raise AttributeError(f"{name} was not asked for, or has no derivatives")
+        raise AttributeError(f"{name} was not requested, or has no derivatives")
     derivative: Floats = fill(columns[name])[..., PARAMETERS.index(by)]
     return derivative
 

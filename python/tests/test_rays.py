@@ -153,7 +153,7 @@ def test_refusals_have_the_programs_words():
         observer.trace(1.0, 0.0).crossings.derivative("r", "spin")
     with pytest.raises(AttributeError, match="errors=True"):
         observer.trace(1.0, 0.0).error("r")
-    with pytest.raises(AttributeError, match="momentum was not asked for"):
+    with pytest.raises(AttributeError, match="momentum was not requested"):
         observer.trace(1.0, 9.0).crossings.momentum
 
 

@@ -52,7 +52,7 @@ class Geodesics:
 
     @cached_property
     def affine_times(self) -> Floats:
-        """-∫Σ dτ (M), computed when it is first asked for."""
+        """-∫Σ dτ (M), computed on first access."""
         place = (float(self.th_o), False, float(self.r_o), 0.0)
         ngeo = self.mino_times.shape[0]
         screen = (self.alpha, self.beta)
