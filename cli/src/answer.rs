@@ -93,6 +93,16 @@ impl Answer {
         self
     }
 
+    /// With another result: its text below, its object as an entry.
+    #[must_use]
+    pub fn and(mut self, name: &str, other: Self) -> Self {
+        if let (Body::Text(text), Body::Text(more)) = (&mut self.text, &other.text) {
+            text.push_str(more);
+        }
+        self.json.insert(name.to_owned(), Value::Object(other.json));
+        self
+    }
+
     /// Prints the result.
     ///
     /// # Errors

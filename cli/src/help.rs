@@ -8,7 +8,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("Pictures", &["render", "movie"]),
     ("Rays", &["trace", "critical-curve", "accuracy"]),
     ("Data", &["observe", "uv", "convert"]),
-    ("Fits", &["fit", "compare"]),
+    ("Fits", &["fit", "posterior", "compare"]),
     ("Other", &["inspect", "completions", "man"]),
 ];
 

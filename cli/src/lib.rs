@@ -97,6 +97,8 @@ enum Verb {
     Convert(convert::Convert),
     /// Reconstruct emission in 3D from visibilities or movies
     Fit(fit::Fit),
+    /// Draw samples around a finished fit: how sure are volume and world?
+    Posterior(fit::Posterior),
     /// Run a grid of fits and compare their results
     Compare(compare::Compare),
     /// Show what a file or the folder of a fit contains
@@ -146,6 +148,7 @@ impl Verb {
             Verb::Uv(uv) => uv.run(),
             Verb::Convert(convert) => convert.run(),
             Verb::Fit(fit) => fit.run(&program.registry),
+            Verb::Posterior(posterior) => posterior.run(&program.registry),
             Verb::Compare(compare) => compare.run((arguments.threads, arguments.memory), program),
             Verb::Inspect(inspect) => inspect.run(),
             Verb::Completions(completions) => completions.run(),

@@ -24,6 +24,7 @@ mod interferometry;
 mod kerr_references;
 mod lensing;
 mod pictures;
+mod posterior;
 mod radiative_transfer;
 mod readme;
 mod reference;

@@ -13,6 +13,7 @@ use kerrlight_tomo::fit::linear::{
     Change, Coarse, LinearProblem, LinearProgress, LinearSettings, Method, Prior, Voxels, Weighted,
 };
 use kerrlight_tomo::fit::{ImageTerm, Regulariser};
+use kerrlight_tomo::representation::Degree;
 use paper::{FRAMES, Truth, forward_model, lines, processor_time, screen};
 use std::error::Error;
 use std::ops::ControlFlow;
@@ -78,7 +79,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let sum = |k: usize| movie[k * 4096..(k + 1) * 4096].iter().map(|x| f64::from(*x)).sum::<f64>();
     println!("frames 0 and 64 sum to {:.5} and {:.5}", sum(0), sum(64));
     let term = ImageTerm::new(movie, model.pixels(), 1.0)?;
-    let voxels = Voxels::cube(64, 5.0);
+    let voxels = Voxels::cube(64, 5.0, Degree::Linear);
     let [x, y, z] = &lines.position;
     let radius = |k: usize| (x[k] * x[k] + y[k] * y[k] + z[k] * z[k]).sqrt();
     let radii = (0..x.len()).fold([f64::INFINITY, 0.0], |[low, high]: [f64; 2], k| {

@@ -10,7 +10,7 @@ pub fn number(x: f64, digits: usize) -> String {
 }
 
 /// Results that are shown: their names in results.json, what they are called, their units and digits.
-pub const RESULTS: [(&str, &str, &str, usize); 19] = [
+pub const RESULTS: [(&str, &str, &str, usize); 25] = [
     ("psnr_db", "PSNR", "dB", 2),
     ("psnr_inside_db", "PSNR inside the region", "dB", 2),
     ("psnr_over_time_db", "PSNR over time", "dB", 2),
@@ -24,6 +24,12 @@ pub const RESULTS: [(&str, &str, &str, usize); 19] = [
     ("inclination_pull", "error of the inclination over its standard deviation", "", 2),
     ("position_angle_error_deg", "error of the position angle", "°", 3),
     ("position_angle_pull", "error of the position angle over its standard deviation", "", 2),
+    ("spin_within_68", "spin within its 68 % interval", "", 2),
+    ("spin_within_95", "spin within its 95 % interval", "", 2),
+    ("inclination_within_68", "inclination within its 68 % interval", "", 2),
+    ("inclination_within_95", "inclination within its 95 % interval", "", 2),
+    ("position_angle_within_68", "position angle within its 68 % interval", "", 2),
+    ("position_angle_within_95", "position angle within its 95 % interval", "", 2),
     ("chi2", "χ² per data point", "", 3),
     ("loss", "loss", "", 6),
     ("seconds", "wall time", "s", 1),

@@ -34,6 +34,7 @@ const CARRIED: &[(&str, &str)] = &carried![
     "experiments/cost.toml",
     "experiments/spin-mismatch.toml",
     "experiments/world.toml",
+    "experiments/calibration.toml",
     "experiments/soft-flow.toml",
     "experiments/fits/first_pattern.toml",
     "experiments/fits/second_pattern.toml",

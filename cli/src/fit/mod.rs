@@ -10,6 +10,7 @@ mod init;
 mod inputs;
 mod labels;
 mod linear;
+mod posterior;
 mod results;
 mod run;
 mod world_search;
@@ -25,6 +26,7 @@ pub use inputs::Inputs;
 use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::settings::{FitError, FitFile};
 use kerrlight_tomo::representation::Registry;
+pub use posterior::Posterior;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -48,6 +50,9 @@ pub struct Fit {
     /// Resume the run in this folder
     #[arg(long, value_name = "FOLDER", conflicts_with = "output")]
     resume: Option<PathBuf>,
+    /// Draw so many samples of volume and world when the fit is finished, as `kerrlight posterior` does
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    samples: Option<u32>,
     /// Write the settings that would be used and stop
     #[arg(long)]
     print: bool,
@@ -74,7 +79,7 @@ impl Fit {
             self.same(&text)?;
             let file = parse(&text).with_context(|| path.display().to_string())?;
             let prepared = run::Prepared::new(file, &base_dir_of(&text), registry)?;
-            return run::run(&prepared, &text, &folder, true);
+            return self.run_all(&prepared, &text, &folder, true);
         }
         let (text, base_dir) = self.settings()?;
         if self.print {
@@ -90,7 +95,20 @@ impl Fit {
         let prepared = prepared?;
         let text = format!("{BASE_DIR}{}\n{text}", base_dir.display());
         let folder = Folder::create(&folder, &text, Inputs::new(&text, read))?;
-        run::run(&prepared, &text, &folder, false)
+        self.run_all(&prepared, &text, &folder, false)
+    }
+
+    /// The fit, and the draws that are wanted after it.
+    fn run_all(
+        &self,
+        prepared: &run::Prepared<'_>,
+        text: &str,
+        folder: &Folder,
+        resume: bool,
+    ) -> anyhow::Result<Answer> {
+        let answer = run::run(prepared, text, folder, resume)?;
+        let Some(samples) = self.samples else { return Ok(answer) };
+        Ok(answer.and("posterior", posterior::draw(prepared, folder, samples)?))
     }
 
     /// For how long to wait for another process: the fit of a comparison that was killed a moment ago is about to end.

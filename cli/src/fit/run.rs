@@ -7,7 +7,8 @@ use super::folder::{self, Folder};
 use super::labels;
 use super::linear;
 use super::results::{self, Estimate};
-use super::world_search::{self, Placed};
+use super::world_search;
+pub use super::world_search::Placed;
 use crate::answer::Answer;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
@@ -28,11 +29,16 @@ const REPORT: &str = "report.html";
 
 /// A fit with its data: all that can be found wrong is, before anything is written.
 pub struct Prepared<'a> {
-    file: FitFile,
-    registry: &'a Registry,
-    instrument: Instrument,
-    measured: Measured,
-    motion: Motion,
+    /// Settings.
+    pub file: FitFile,
+    /// Representations of others.
+    pub registry: &'a Registry,
+    /// Rays.
+    pub instrument: Instrument,
+    /// Data.
+    pub measured: Measured,
+    /// Motion.
+    pub motion: Motion,
 }
 
 impl<'a> Prepared<'a> {

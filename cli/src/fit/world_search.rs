@@ -51,8 +51,24 @@ pub fn place(
     }
     let world = world_of(file, &unknown.free()?, &results)
         .with_context(|| format!("{} is damaged: remove it to look again", path.display()))?;
-    let (instrument, motion) = setup::in_world(file, &unknown, instrument, measured, &world)?;
-    Ok(Some(Placed { file: settled(file, &unknown, &world), instrument, motion }))
+    Ok(Some(placed(file, &unknown, instrument, measured, &world)?))
+}
+
+/// Settings, rays and motion in a world.
+pub fn placed(
+    file: &FitFile,
+    unknown: &UnknownWorld,
+    instrument: &Instrument,
+    measured: &Measured,
+    world: &World,
+) -> anyhow::Result<Placed> {
+    let (instrument, motion) = setup::in_world(file, unknown, instrument, measured, world)?;
+    Ok(Placed { file: settled(file, unknown, world), instrument, motion })
+}
+
+/// Names and values of the free parameters of a world, in their units.
+pub fn values_of(free: &[Free], world: &World) -> Value {
+    Value::Object(values(free, |_, parameter| Some(world.get(parameter))))
 }
 
 fn search(
@@ -212,8 +228,14 @@ pub fn errors(results: &Value) -> Vec<(String, Value)> {
         let error = (parameter.difference(value * unit, truth * unit) / unit).abs();
         let (plain, suffix) = name.strip_suffix("_deg").map_or((name, ""), |name| (name, "_deg"));
         let pull = number("sigma").map(|sigma| error / sigma);
-        let error = (format!("{plain}_error{suffix}"), json!(error));
-        Some([error, (format!("{plain}_pull"), json!(pull))])
+        // An unknown error is that of the prior, which holds the truth.
+        let within = |reach: f64| json!(f64::from(pull.is_none_or(|pull| pull <= reach)));
+        Some([
+            (format!("{plain}_error{suffix}"), json!(error)),
+            (format!("{plain}_pull"), json!(pull)),
+            (format!("{plain}_within_68"), within(1.0)),
+            (format!("{plain}_within_95"), within(1.96)),
+        ])
     };
     Parameter::ALL.into_iter().filter_map(of).flatten().collect()
 }
@@ -251,7 +273,7 @@ pub fn sentences(results: &Value) -> Vec<String> {
 }
 
 /// What a parameter is called in a sentence, and its unit.
-fn described(parameter: Parameter) -> (&'static str, &'static str) {
+pub fn described(parameter: Parameter) -> (&'static str, &'static str) {
     match parameter {
         Parameter::Spin => ("spin", ""),
         Parameter::Inclination => ("inclination", "°"),
@@ -276,7 +298,8 @@ fn small_residuals(results: &Value) -> Option<String> {
     ))
 }
 
-fn world_of(file: &FitFile, free: &[Free], results: &Value) -> anyhow::Result<World> {
+/// The world that a run has found.
+pub fn world_of(file: &FitFile, free: &[Free], results: &Value) -> anyhow::Result<World> {
     free.iter().try_fold(setup::known_world(file), |world, Free { parameter, .. }| {
         let value = results["world"][parameter.name()].as_f64();
         let value = value.with_context(|| format!("there is no {}", parameter.name()))?;

@@ -1,6 +1,6 @@
 //! The page around everything else. All text from outside goes through [`escape`].
 
-use super::{Figure, LinePlot, Notice, Outcome, Part, Report, Setting, Table, Tone};
+use super::{Drawing, Figure, LinePlot, Notice, Outcome, Part, Report, Setting, Table, Tone};
 use std::fmt::Write;
 
 const PAGE: &str = include_str!("assets/page.html");
@@ -30,6 +30,7 @@ pub fn page(report: &Report) -> anyhow::Result<String> {
         section("results", "Results", &results(&report.results)),
         section("tables", "Tables", &tables(&report.tables)),
         report.view.as_ref().map(super::View3d::html).transpose()?.unwrap_or_default(),
+        section("drawings", "Distributions", &drawings(&report.drawings)),
         section("pictures", "Pictures", &report.figures.iter().map(figure).collect::<String>()),
         section("plots", "Plots", &plots(&report.plots)?),
         section("details", "Details", &tables(&report.details)),
@@ -152,6 +153,19 @@ fn figure(figure: &Figure) -> String {
         base64::encode(&figure.png),
         escape(&figure.caption)
     )
+}
+
+fn drawings(drawings: &[Drawing]) -> String {
+    let one = |(k, Drawing { svg, caption, alt }): (usize, &Drawing)| {
+        format!(
+            "<figure class=\"plot\"><div class=\"wide\" role=\"img\" aria-label=\"{}\">{}</div>\n\
+             <figcaption>{}</figcaption></figure>\n",
+            escape(alt),
+            super::plot::inline(svg, &format!("drawing{k}-")),
+            escape(caption)
+        )
+    };
+    drawings.iter().enumerate().map(one).collect()
 }
 
 fn plots(plots: &[LinePlot]) -> anyhow::Result<String> {

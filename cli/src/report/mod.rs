@@ -6,10 +6,12 @@ mod pictures;
 mod plot;
 #[cfg(test)]
 mod tests;
+mod triangle;
 mod view;
 
 pub use pictures::{Figure, encode, frames, projections, slices, still};
 pub use plot::{Axis, LinePlot, Marks, Series};
+pub use triangle::{Triangle, Variable};
 pub use view::{Motion, View3d, rates};
 
 use crate::output::Output;
@@ -33,12 +35,25 @@ pub struct Report {
     pub view: Option<View3d>,
     /// Pictures.
     pub figures: Vec<Figure>,
+    /// Pictures that are drawings.
+    pub drawings: Vec<Drawing>,
     /// Curves and points with axes.
     pub plots: Vec<LinePlot>,
     /// Tables for whoever wants to know everything.
     pub details: Vec<Table>,
     /// The settings of the run.
     pub settings: Vec<Setting>,
+}
+
+/// A drawing of the page.
+#[derive(Debug)]
+pub struct Drawing {
+    /// Its SVG.
+    pub svg: String,
+    /// What it shows.
+    pub caption: String,
+    /// What somebody who does not see it should know.
+    pub alt: String,
 }
 
 /// What has to be read before all else.

@@ -185,7 +185,7 @@ fn means(points: &[Point]) -> Vec<(f64, f64)> {
 
 /// The same drawing as wide as its place: the size in pixels becomes a view box. Names in it get a
 /// prefix, because all drawings share those of the page.
-fn inline(svg: &str, prefix: &str) -> String {
+pub fn inline(svg: &str, prefix: &str) -> String {
     let parts = svg.split_once("width=\"").and_then(|(head, rest)| {
         let (width, rest) = rest.split_once("\" height=\"")?;
         let (height, rest) = rest.split_once('"')?;

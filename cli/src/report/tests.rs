@@ -120,6 +120,7 @@ fn report(nodes: usize) -> Report {
             outcome("PSNR", "36.2", "dB", "an empty volume has 28.48 dB"),
         ],
         settings: vec![setting("spin", "0", ""), setting("fov", "16", "M")],
+        drawings: Vec::new(),
         parts: vec![Part { heading: text("How <to> read it"), text: vec![text("Slowly.")] }],
         tables: Vec::new(),
         details: vec![Table {

@@ -1,6 +1,7 @@
 //! Where the light of a movie's pixels may come from: nodes on rays inside the region of recovery, and
 //! what each gives to its pixel. Computed once for a fit.
 
+use super::pixel_rays::PixelRays;
 use crate::Error;
 use kerrlight_geodesic::simd::{NodeRequest, PanelRule, RayNodes, RaySamples};
 use kerrlight_geodesic::vector::{distance, norm};
@@ -143,6 +144,43 @@ impl Sightlines {
             all.sort_from(first);
         }
         Ok(all)
+    }
+
+    /// Traces the rays of pixels, each of which is the mean over its own.
+    ///
+    /// # Errors
+    /// As those of [`trace`](Self::trace).
+    pub(super) fn of_pixels(
+        (hole, observer): (&Kerr, &Observer),
+        rays: &PixelRays,
+        screen: impl Fn([f64; 2]) -> [f64; 2],
+        request: &SightlineRequest,
+    ) -> Result<Self, Error> {
+        let places = rays.places.iter().map(|place| screen(*place));
+        let (alpha, beta): (Vec<f64>, Vec<f64>) = places.map(|[a, b]| (a, b)).unzip();
+        Ok(Self::trace(hole, observer, &alpha, &beta, request)?.grouped(rays))
+    }
+
+    /// The nodes of all rays of a pixel as those of one.
+    fn grouped(mut self, rays: &PixelRays) -> Self {
+        self.pixels = rays.starts.len() - 1;
+        if self.pixels == rays.places.len() {
+            return self;
+        }
+        let (of_rays, ends) = (core::mem::take(&mut self.pixel), core::mem::take(&mut self.starts));
+        self.starts.push(0);
+        for (ray, range) in of_rays.iter().zip(ends.windows(2)) {
+            let pixel = rays.pixel_of(*ray as usize);
+            let share = rays.share(pixel);
+            self.weight[range[0]..range[1]].iter_mut().for_each(|weight| *weight *= share);
+            if self.pixel.last() == Some(&(pixel as u32)) {
+                self.starts.pop();
+            } else {
+                self.pixel.push(pixel as u32);
+            }
+            self.starts.push(range[1]);
+        }
+        self
     }
 
     /// Rays that meet the region.

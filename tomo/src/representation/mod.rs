@@ -13,6 +13,7 @@ mod features;
 mod grid;
 mod network;
 mod registry;
+pub(crate) mod spline;
 mod workspace;
 
 pub use activation::Activation;
@@ -21,6 +22,7 @@ pub use features::{FeatureGrid, FeatureGridSettings};
 pub use grid::{Grid, GridSettings};
 pub use network::{Initialisation, Network, NetworkSettings};
 pub use registry::{BuildError, BuildRepresentation, OwnError, OwnSettings, Registry};
+pub use spline::{Degree, Spline};
 pub use workspace::Workspace;
 
 pub use crate::points::{Coordinates, CoordinatesMut};

@@ -1,5 +1,6 @@
 //! Emission on the nodes of a box: what a fit recovers, and what a scene may show.
 
+mod ensemble;
 mod file;
 pub mod metrics;
 mod over_time;
@@ -12,6 +13,7 @@ pub mod vti;
 
 use crate::Error;
 use crate::dynamics::Axis;
+pub use ensemble::{Coverage, Ensemble, Feature};
 pub use file::{VolumeArrays, VolumeFileError};
 use kerrlight_geodesic::vector::rotate;
 pub use over_time::OverTime;

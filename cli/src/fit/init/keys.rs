@@ -87,6 +87,12 @@ pub const KEYS: &[Key] = &[
     ),
     key(
         "screen",
+        "ring_rays",
+        "8",
+        "rays of each pixel near the critical curve, whose mean is its light; 1 to 1024",
+    ),
+    key(
+        "screen",
         "jy_per_pixel",
         "",
         "pixel flux in Jy of a line of sight with unit emission over 1 M; sets the unit of emission; above 0",
@@ -267,6 +273,7 @@ pub const KEYS: &[Key] = &[
     key("training.occupancy", "warm_up", "", "steps before the mask is used"),
     key("training.occupancy", "every", "", "steps between updates"),
     key("linear", "upper", "", "upper bound of the emission; above 0"),
+    key("linear", "degree", "\"linear\"", "B-splines between voxels: linear, quadratic or cubic"),
     key("linear", "smoothness", "0.0", "weight of the integrated squared gradient; 0 or above"),
     key("linear", "sparsity", "0.0", "weight of the integrated emission; 0 or above"),
     key("linear", "rounds", "", "number of rounds in which nodes are added"),

@@ -11,7 +11,7 @@ mod scene;
 mod units;
 mod verdict;
 
-pub use fields::{compare, true_volume};
+pub use fields::{compare, recovered, true_volume};
 
 use super::failed;
 use super::folder::Folder;
@@ -52,7 +52,7 @@ impl Estimate<'_> {
         state: &State<f32>,
         begun: Instant,
     ) -> anyhow::Result<(String, Value)> {
-        let volume = fields::recovered(self.file, trainer, state)?;
+        let volume = recovered(self.file, trainer, state)?;
         let frames: Vec<usize> = (0..self.measured.times.len()).collect();
         let seen = trainer.movie(&state.now, &frames, true);
         failed::check(self.file, &trainer.objective, &frames, &seen)?;

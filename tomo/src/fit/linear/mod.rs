@@ -15,6 +15,7 @@ mod lit;
 mod nodes;
 mod objective;
 mod operator;
+mod profile;
 mod quasi_newton;
 mod run;
 mod scaled;
@@ -30,6 +31,7 @@ pub use data::Weighted;
 pub use descent::{Ending, Method};
 pub use error::LinearError;
 pub use objective::Prior;
+pub use profile::Profile;
 pub use solve::{
     Coarse, Least, LinearProblem, LinearProgress, LinearSettings, LinearSolution, Watch,
 };

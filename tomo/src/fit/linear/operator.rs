@@ -2,6 +2,7 @@
 
 use super::data::Data;
 use super::walk::{Buffers, Place, Voxels, Walk};
+use crate::representation::spline::{Degree, STENCIL};
 use crate::simd::Float;
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
@@ -27,14 +28,14 @@ pub(super) struct Active {
 
 impl Active {
     /// These nodes.
-    pub fn new(is_active: &[bool], corners: [usize; 8]) -> Self {
+    pub fn new(is_active: &[bool], corners: &[usize]) -> Self {
         let mut column = vec![NONE; is_active.len()];
         let mut cells = vec![false; is_active.len()];
         let mut node = Vec::new();
         for (k, _) in is_active.iter().enumerate().filter(|(_, active)| **active) {
             column[k] = node.len() as u32;
             node.push(k as u32);
-            for corner in corners.into_iter().filter(|corner| *corner <= k) {
+            for corner in corners.iter().filter(|corner| **corner <= k) {
                 cells[k - corner] = true;
             }
         }
@@ -75,12 +76,14 @@ impl<T: Float> Rows<T> {
         pixel: u32,
         places: &[Place<T>],
         active: &Active,
-        corners: &[usize; 8],
+        (corners, degree): (&[usize], Degree),
         place: &mut [u32],
     ) {
         let start = self.columns.len();
+        let mut weights = [T::zero(); STENCIL];
         for at in places {
-            for (corner, entry) in corners.iter().zip(at.weights()) {
+            at.weights(degree, &mut weights);
+            for (corner, entry) in corners.iter().zip(weights) {
                 let column = active.column[at.corner as usize + corner];
                 if column == NONE || entry == T::zero() {
                     continue;
@@ -145,7 +148,7 @@ impl<T: Float> Rows<T> {
 pub(super) struct Operator<'a, T> {
     walk: Walk<'a, T>,
     pub active: Active,
-    corners: [usize; 8],
+    corners: Vec<usize>,
     frames: &'a [usize],
     pixels: usize,
     rows: Vec<Option<Rows<T>>>,
@@ -182,9 +185,9 @@ impl<'a, T: Float + Default> Operator<'a, T> {
         }
         let mut rows = Rows { starts: vec![0], ..Rows::default() };
         let mut place = vec![NONE; self.active.count()];
-        let wanted = Some(self.active.cells.as_slice());
+        let (wanted, degree) = (Some(self.active.cells.as_slice()), self.walk.voxels.degree);
         self.walk.frame(frame, wanted, &mut Buffers::default(), |pixel, places| {
-            rows.push(pixel, places, &self.active, &self.corners, &mut place);
+            rows.push(pixel, places, &self.active, (&self.corners, degree), &mut place);
         });
         rows.columns.shrink_to_fit();
         rows.entries.shrink_to_fit();
@@ -195,11 +198,13 @@ impl<'a, T: Float + Default> Operator<'a, T> {
     fn fluxes_of(&self, frame: usize) -> Rows<T> {
         let columns = self.active.count();
         let mut sums = vec![T::zero(); self.pixels * columns];
-        let wanted = Some(self.active.cells.as_slice());
+        let (wanted, degree) = (Some(self.active.cells.as_slice()), self.walk.voxels.degree);
+        let mut weights = [T::zero(); STENCIL];
         self.walk.frame(frame, wanted, &mut Buffers::default(), |pixel, places| {
             let row = &mut sums[pixel as usize * columns..][..columns];
             for at in places {
-                for (corner, entry) in self.corners.iter().zip(at.weights()) {
+                at.weights(degree, &mut weights);
+                for (corner, entry) in self.corners.iter().zip(weights) {
                     let column = self.active.column[at.corner as usize + corner];
                     if column != NONE {
                         row[column as usize] += entry;
@@ -230,11 +235,13 @@ impl<'a, T: Float + Default> Operator<'a, T> {
         if let Some(rows) = &self.rows[k] {
             return rows.forward(x, image);
         }
-        let wanted = Some(self.active.cells.as_slice());
+        let (wanted, degree) = (Some(self.active.cells.as_slice()), self.walk.voxels.degree);
+        let mut weights = [T::zero(); STENCIL];
         self.walk.frame(self.frames[k], wanted, buffers, |pixel, places| {
             let mut sum = T::zero();
             for at in places {
-                for (corner, entry) in self.corners.iter().zip(at.weights()) {
+                at.weights(degree, &mut weights);
+                for (corner, entry) in self.corners.iter().zip(weights) {
                     let column = self.active.column[at.corner as usize + corner];
                     if column != NONE {
                         sum += entry * x[column as usize];
@@ -249,12 +256,14 @@ impl<'a, T: Float + Default> Operator<'a, T> {
         if let Some(rows) = &self.rows[k] {
             return rows.adjoint(&scratch.slopes, sums);
         }
-        let wanted = Some(self.active.cells.as_slice());
+        let (wanted, degree) = (Some(self.active.cells.as_slice()), self.walk.voxels.degree);
         let Scratch { buffers, slopes, .. } = scratch;
+        let mut weights = [T::zero(); STENCIL];
         self.walk.frame(self.frames[k], wanted, buffers, |pixel, places| {
             let slope = slopes[pixel as usize];
             for at in places.iter().filter(|_| slope != T::zero()) {
-                for (corner, entry) in self.corners.iter().zip(at.weights()) {
+                at.weights(degree, &mut weights);
+                for (corner, entry) in self.corners.iter().zip(weights) {
                     let column = self.active.column[at.corner as usize + corner];
                     if column != NONE {
                         sums[column as usize] += entry * slope;
@@ -266,11 +275,13 @@ impl<'a, T: Float + Default> Operator<'a, T> {
 
     /// The same for all nodes of the grid.
     fn back_to_all(&self, k: usize, scratch: &mut Scratch<T>, sums: &mut [T]) {
-        let Scratch { buffers, slopes, .. } = scratch;
+        let (Scratch { buffers, slopes, .. }, degree) = (scratch, self.walk.voxels.degree);
+        let mut weights = [T::zero(); STENCIL];
         self.walk.frame(self.frames[k], None, buffers, |pixel, places| {
             let slope = slopes[pixel as usize];
             for at in places.iter().filter(|_| slope != T::zero()) {
-                for (corner, entry) in self.corners.iter().zip(at.weights()) {
+                at.weights(degree, &mut weights);
+                for (corner, entry) in self.corners.iter().zip(weights) {
                     sums[at.corner as usize + corner] += entry * slope;
                 }
             }
@@ -341,6 +352,27 @@ impl<'a, T: Float + Default> Operator<'a, T> {
             0.0
         };
         self.through(direction, false, link).1
+    }
+
+    /// The images of `x`, frame after frame.
+    pub fn images(&self, x: &[T]) -> Vec<T> {
+        let indices: Vec<usize> = (0..self.frames.len()).collect();
+        let of = |scratch: &mut Scratch<T>, k: &usize| {
+            self.image(*k, x, scratch);
+            scratch.image.clone()
+        };
+        let all: Vec<Vec<T>> = indices.par_iter().map_init(|| self.scratch(), of).collect();
+        all.concat()
+    }
+
+    /// What slopes with respect to pixels, frame after frame, take from the nodes that count.
+    pub fn adjoint(&self, slopes: &[T]) -> Vec<f64> {
+        let dark = vec![T::zero(); self.active.count()];
+        let link = |k: usize, _: &[T], out: &mut [T]| {
+            out.copy_from_slice(&slopes[k * self.pixels..(k + 1) * self.pixels]);
+            0.0
+        };
+        self.through(&dark, false, link).1
     }
 
     /// Mean over frames of the sum of an image's pixels.

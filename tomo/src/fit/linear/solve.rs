@@ -197,6 +197,17 @@ impl<T: Float + Default> LinearProblem<'_, T> {
     /// # Errors
     /// As those of [`solve`](Self::solve).
     pub fn least(&self, iterations: usize) -> Result<Least, Error> {
+        self.least_from(None, iterations)
+    }
+
+    /// The same from a field at all nodes, where data are convex.
+    ///
+    /// # Errors
+    /// As those of [`solve`](Self::solve).
+    ///
+    /// # Panics
+    /// If the field has another number of values.
+    pub fn least_from(&self, start: Option<&[f64]>, iterations: usize) -> Result<Least, Error> {
         let settings = LinearSettings { coarse: None, tolerance: 0.0, ..LinearSettings::default() };
         self.check(&settings)?;
         let data = self.data()?;
@@ -210,8 +221,9 @@ impl<T: Float + Default> LinearProblem<'_, T> {
             let dark = || Least { x: vec![0.0; self.unknowns()], value: f64::INFINITY };
             return Ok(lit.map_or_else(dark, |Lit { x, value, .. }| Least { x, value }));
         }
-        let dark = vec![0.0; self.unknowns()];
-        let found = run.minimise(&mut objective, &dark, iterations);
+        let start = start.map_or_else(|| vec![0.0; self.unknowns()], <[f64]>::to_vec);
+        assert!(start.len() == self.unknowns());
+        let found = run.minimise(&mut objective, &start, iterations);
         let value = objective.finite(found.value, &found.x)?;
         Ok(Least { x: found.x, value })
     }
@@ -231,7 +243,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
 
     /// These nodes, knot after knot.
     pub(super) fn active(&self, is_active: &[bool]) -> Active {
-        Active::new(is_active, self.voxels.corners())
+        Active::new(is_active, &self.voxels.corners())
     }
 
     /// Values at all nodes and knots.
@@ -249,7 +261,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         let check = |field, value: f64, ok, allowed| {
             if ok { Ok(()) } else { Err(Error::out_of_range(field, value, allowed)) }
         };
-        self.voxels.grid()?;
+        self.voxels.field()?;
         self.change.checked()?;
         let positive = |x: f64| x.is_finite() && x > 0.0;
         check("upper", upper, positive(upper), "above 0")?;

@@ -7,6 +7,7 @@ use crate::fit::{
     Batch, Field, ForwardModel, FrameTerm, ImageTerm, Motion, Region, Regulariser, Sampling,
     SightlineRequest, Sightlines,
 };
+use crate::representation::Degree;
 use crate::representation::{Knots, Workspace};
 use core::ops::ControlFlow;
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
@@ -15,6 +16,7 @@ use rand_pcg::Pcg64;
 
 mod changing;
 pub(in crate::fit) mod lit;
+mod profile;
 
 pub(in crate::fit) const FRAMES: [usize; 5] = [0, 1, 2, 3, 4];
 
@@ -69,7 +71,7 @@ pub(in crate::fit) fn movie_about(
     voxels: &Voxels,
     x: &[f64],
 ) -> Vec<f64> {
-    let grid = voxels.grid().unwrap();
+    let grid = voxels.field().unwrap();
     let field = Field { representation: &grid, parameters: x, axis, occupancy: None };
     let mut movie = vec![0.0; FRAMES.len() * model.pixels()];
     model.movie(field, &FRAMES, &mut Batch::default(), &mut Workspace::new(), &mut movie);
@@ -82,7 +84,7 @@ fn operator<'a>(
     is_active: &[bool],
     budget: usize,
 ) -> Operator<'a, f64> {
-    let active = Active::new(is_active, voxels.corners());
+    let active = Active::new(is_active, &voxels.corners());
     Operator::new(Walk::new(model, axis(), (voxels, Knots::STEADY)), active, &FRAMES, budget)
 }
 
@@ -90,12 +92,15 @@ fn operator<'a>(
 #[test]
 fn exact_sparse_operator_is_the_grid_and_sums() {
     for model in [forward_model(), falling_model()] {
-        compare_with_the_grid(&model);
+        compare_with_the_grid(&model, Degree::Linear);
+    }
+    for degree in [Degree::Quadratic, Degree::Cubic] {
+        compare_with_the_grid(&forward_model(), degree);
     }
 }
 
-fn compare_with_the_grid(model: &ForwardModel<f64>) {
-    let voxels = Voxels { nodes: [7, 6, 8], ..Voxels::cube(2, 5.0) };
+fn compare_with_the_grid(model: &ForwardModel<f64>, degree: Degree) {
+    let voxels = Voxels { nodes: [7, 6, 8], ..Voxels::cube(4, 5.0, degree) };
     let dark = ImageTerm::new(vec![0.0; FRAMES.len() * model.pixels()], model.pixels(), 1.0);
     let dark = dark.unwrap();
     let terms = [Weighted { weight: 1.0, term: &dark as &dyn FrameTerm<f64> }];
@@ -151,7 +156,7 @@ fn reference(columns: &[Vec<f64>], data: &[f64], upper: f64) -> (Vec<f64>, f64) 
 /// A small problem whose data no field explains, with both bounds active.
 #[test]
 fn exact_solution_and_gap_of_a_dense_problem() {
-    let (model, voxels, upper) = (forward_model(), Voxels::cube(5, 5.0), 0.8);
+    let (model, voxels, upper) = (forward_model(), Voxels::cube(5, 5.0, Degree::Linear), 0.8);
     let unit = |k: usize| {
         let mut x = vec![0.0; voxels.count()];
         x[k] = 1.0;
@@ -202,7 +207,7 @@ fn exact_solution_and_gap_of_a_dense_problem() {
 
 #[test]
 fn exact_threads_change_no_bit() {
-    let (model, voxels) = (forward_model(), Voxels::cube(8, 5.0));
+    let (model, voxels) = (forward_model(), Voxels::cube(8, 5.0, Degree::Linear));
     let truth: Vec<f64> = random(voxels.count(), 3).iter().map(|x| (x - 0.7).max(0.0)).collect();
     let term = ImageTerm::new(movie(&model, &voxels, &truth), model.pixels(), 0.1).unwrap();
     let prior = Prior { regulariser: Regulariser::Smoothness, weight: 1e-3 };
@@ -230,7 +235,7 @@ fn exact_threads_change_no_bit() {
 
 #[test]
 fn numbers_out_of_range_are_named_and_a_stop_is_heeded() {
-    let (model, voxels) = (forward_model(), Voxels::cube(5, 5.0));
+    let (model, voxels) = (forward_model(), Voxels::cube(5, 5.0, Degree::Linear));
     let pixels = vec![1.0; FRAMES.len() * model.pixels()];
     let term = ImageTerm::new(pixels, model.pixels(), 1.0).unwrap();
     let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];

@@ -5,10 +5,11 @@ use crate::dynamics::{Axis, Turned, pull_back};
 use crate::fit::ForwardModel;
 use crate::fit::regulariser::Shape;
 use crate::points::{Coordinates, CoordinatesMut};
-use crate::representation::{Activation, Allowed, Grid, GridSettings, Knots};
+use crate::representation::spline::{Degree, STENCIL, Spline};
+use crate::representation::{Allowed, Knots};
 use crate::simd::Float;
 
-/// A grid of voxels, trilinear in between, zero outside; nodes at both ends, z fastest.
+/// A grid of voxels, z fastest, zero outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Voxels {
     /// Nodes along x, y and z, at least two of each.
@@ -17,21 +18,24 @@ pub struct Voxels {
     pub low: [f64; 3],
     /// Coordinates of the last node, M.
     pub high: [f64; 3],
+    /// What is between them.
+    pub degree: Degree,
 }
 
 impl Voxels {
-    /// A cube about the hole.
-    pub fn cube(nodes: usize, half_width: f64) -> Self {
-        Self { nodes: [nodes; 3], low: [-half_width; 3], high: [half_width; 3] }
+    /// A cube about the hole that reaches `half_width` (M) to each side.
+    pub fn cube(nodes: usize, half_width: f64, degree: Degree) -> Self {
+        let reach = half_width * degree.reach(nodes);
+        Self { nodes: [nodes; 3], low: [-reach; 3], high: [reach; 3], degree }
     }
 
-    /// The same as a representation, whose parameters are the values at the nodes.
+    /// The same as a representation, whose parameters are the numbers of the nodes.
     ///
     /// # Errors
     /// If a number is out of its range.
-    pub fn grid(&self) -> Result<Grid, Error> {
-        let Self { nodes, low, high } = *self;
-        Grid::new(GridSettings { nodes, low, high, activation: Activation::Linear, initial: 0.0 })
+    pub fn field(&self) -> Result<Spline, Error> {
+        let Self { nodes, low, high, degree } = *self;
+        Spline::new(nodes, low, high, degree)
     }
 
     /// Number of nodes.
@@ -53,11 +57,11 @@ impl Voxels {
         core::array::from_fn(|k| self.low[k] + spacing[k] * at[k] as f64)
     }
 
-    /// From the first node of a cell to its eight nodes.
-    pub(super) fn corners(&self) -> [usize; 8] {
-        let [_, ny, nz] = self.nodes;
-        let (x, y) = (ny * nz, nz);
-        [0, 1, y, y + 1, x, x + 1, x + y, x + y + 1]
+    /// From the first node of a cell to all that a point in it takes from, z fastest.
+    pub(super) fn corners(&self) -> Vec<usize> {
+        let ([_, ny, nz], taps) = (self.nodes, self.degree.taps());
+        let node = |k: usize| (k / (taps * taps) * ny + k / taps % taps) * nz + k % taps;
+        (0..taps.pow(3)).map(node).collect()
     }
 }
 
@@ -73,34 +77,33 @@ pub(super) struct Place<T> {
 }
 
 impl<T: Float> Place<T> {
-    /// What the eight nodes of the cell are multiplied by, x slowest.
+    /// What the nodes of the cell are multiplied by, z fastest.
     #[inline(always)]
-    pub fn weights(&self) -> [T; 8] {
-        let [x, y, z] = self.within;
-        let (right, one) = (self.weight * x, T::one());
-        let left = self.weight - right;
-        let (b, d) = (left * y, right * y);
-        let rows = [left - b, b, right - d, d];
-        core::array::from_fn(|k| rows[k / 2] * if k % 2 == 0 { one - z } else { z })
+    pub fn weights(&self, degree: Degree, out: &mut [T; STENCIL]) {
+        degree.products(self.within, self.weight, out);
     }
 }
 
 #[derive(Clone, Copy)]
 struct Geometry<T> {
+    /// Where the first cell begins.
     low: [T; 3],
     per_length: [T; 3],
+    /// Cells along each axis.
     cells: [T; 3],
+    last: [usize; 3],
     nodes: [usize; 3],
 }
 
 impl<T: Float> Geometry<T> {
     fn new(voxels: &Voxels) -> Self {
-        let cells = voxels.nodes.map(|n| (n - 1) as f64);
-        let width = |k: usize| voxels.high[k] - voxels.low[k];
+        let (spacing, margin) = (voxels.shape().spacing, voxels.degree.margin());
+        let last = voxels.nodes.map(|n| n - voxels.degree.taps());
         Self {
-            low: voxels.low.map(T::of),
-            per_length: [0, 1, 2].map(|k| T::of(cells[k] / width(k))),
-            cells: cells.map(T::of),
+            low: [0, 1, 2].map(|k| T::of(voxels.low[k] + margin * spacing[k])),
+            per_length: spacing.map(|x| T::of(1.0 / x)),
+            cells: last.map(|last| T::of((last + 1) as f64)),
+            last,
             nodes: voxels.nodes,
         }
     }
@@ -113,7 +116,7 @@ impl<T: Float> Geometry<T> {
             if !(u >= T::zero() && u <= self.cells[k]) {
                 return None;
             }
-            let cell = u.to_u32().map_or(0, |cell| cell as usize).min(self.nodes[k] - 2);
+            let cell = u.to_u32().map_or(0, |cell| cell as usize).min(self.last[k]);
             within[k] = u - T::of(cell as f64);
             corner = corner * self.nodes[k] + cell;
         }

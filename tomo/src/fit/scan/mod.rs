@@ -12,6 +12,7 @@ use super::ForwardModel;
 use super::linear::{Change, LinearError, LinearProblem, Prior, Voxels, Weighted};
 use crate::Error;
 use crate::dynamics::Axis;
+use crate::representation::Degree;
 use crate::simd::Float;
 use rayon::prelude::*;
 use refine::Refinement;
@@ -157,7 +158,7 @@ impl<T: Float + Default> Scanner<'_, T> {
         }
         let AxisProblem { model, frames, terms, half_width, upper, flux, priors } = *self.problem;
         let model = own.as_ref().unwrap_or(model);
-        let voxels = Voxels::cube(effort.nodes, half_width);
+        let voxels = Voxels::cube(effort.nodes, half_width, Degree::Linear);
         let change = Change::NONE;
         let problem =
             LinearProblem { model, axis, frames, terms, voxels, upper, flux, priors, change };

@@ -54,7 +54,7 @@ fn exact_losses_that_are_all_the_same_are_refused() {
 #[test]
 fn exact_axis_of_amplitudes_and_closure_phases() {
     use super::super::linear::tests::lit::{Seen, array, spot};
-    let (model, voxels) = (forward_model(), Voxels::cube(9, 5.0));
+    let (model, voxels) = (forward_model(), Voxels::cube(9, 5.0, Degree::Linear));
     let truth = Axis::new([0.6, -0.3, -0.7]).unwrap();
     let movie = movie_about(truth, &model, &voxels, &spot(&voxels));
     let data = [Seen::Amplitudes, Seen::Phases].map(|seen| array(&movie, seen));
@@ -67,7 +67,7 @@ fn exact_axis_of_amplitudes_and_closure_phases() {
 /// A spot that turns about a known axis, in the field that the fine grid can represent.
 #[test]
 fn exact_axis_of_its_own_movie_on_any_number_of_threads() {
-    let (model, voxels) = (forward_model(), Voxels::cube(9, 5.0));
+    let (model, voxels) = (forward_model(), Voxels::cube(9, 5.0, Degree::Linear));
     let truth = Axis::new([0.6, -0.3, -0.7]).unwrap();
     let light = |k: usize| {
         let [x, y, z] = voxels.position(k);

@@ -2,6 +2,7 @@
 
 use crate::fit::BatchSize;
 use crate::representation::Activation;
+use crate::representation::Degree;
 use serde::{Deserialize, Serialize};
 
 /// What is recovered.
@@ -137,6 +138,9 @@ pub struct Linear {
     /// Factor on ∫ e dV.
     #[serde(default)]
     pub sparsity: f64,
+    /// What is between the nodes.
+    #[serde(default)]
+    pub degree: Degree,
     /// Times that nodes may be admitted again.
     pub rounds: usize,
     /// Iterations of each round.

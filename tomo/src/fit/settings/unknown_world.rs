@@ -5,6 +5,8 @@ use super::{FitError, FitFile, Within};
 use crate::Error;
 use crate::dynamics::Velocity;
 use crate::fit::world::{Free, Parameter, Prior};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
@@ -34,6 +36,9 @@ pub struct UnknownWorld {
     pub beta_r: Option<PriorSettings>,
     /// β_φ of the same.
     pub beta_phi: Option<PriorSettings>,
+    /// Whether what is simulated has values drawn from the priors, another draw for each seed: for calibration.
+    #[serde(default)]
+    pub drawn: bool,
     /// How they are looked for.
     pub search: WorldSearch,
 }
@@ -140,6 +145,30 @@ impl UnknownWorld {
         Ok(free)
     }
 
+    /// Puts values drawn from the priors into settings; the view's orientation, offsets and mass are no settings and
+    /// stay what they are.
+    pub(super) fn draw(&self, file: &mut FitFile) -> Result<(), Error> {
+        let mut random = Pcg64::seed_from_u64(file.seed ^ DRAWN);
+        for Free { parameter, prior } in self.free()? {
+            let value = prior.quantile(random.random()) / parameter.unit();
+            match (parameter, &mut file.motion.velocity) {
+                (Parameter::Spin, _) => file.hole.spin = value,
+                (Parameter::Inclination, _) => file.observer.inclination_deg = value,
+                (Parameter::RedshiftPower, _) => file.effects.redshift_power = Some(value),
+                (Parameter::Xi, Velocity::Infall { xi, .. }) => *xi = value,
+                (Parameter::BetaR, Velocity::Infall { beta_r, .. }) => *beta_r = value,
+                (Parameter::BetaPhi, Velocity::Infall { beta_phi, .. }) => *beta_phi = value,
+                _ => {}
+            }
+        }
+        if let (true, Velocity::Keplerian { drag }) =
+            (self.search.drag_is_spin, &mut file.motion.velocity)
+        {
+            *drag = file.hole.spin;
+        }
+        Ok(())
+    }
+
     fn check(&self) -> Result<(), Error> {
         self.free()?;
         let WorldSearch { starts, coarse, fine, .. } = &self.search;
@@ -164,6 +193,9 @@ impl UnknownWorld {
     }
 }
 
+/// Sets draws of the world apart from those of the noise.
+const DRAWN: u64 = 0x77a1_d5ee_d000_0001;
+
 fn free(parameter: Parameter, settings: PriorSettings) -> Result<Free, Error> {
     let name = parameter.name();
     let prior = settings.prior(parameter.unit()).checked().within(format!("world.{name}"))?;
@@ -187,7 +219,7 @@ fn free(parameter: Parameter, settings: PriorSettings) -> Result<Free, Error> {
 /// Refuses keys that are neither simulated nor parameters.
 fn check_keys(world: &Table) -> Result<(), Error> {
     let names = Parameter::ALL.map(Parameter::name);
-    let known = || SIMULATED.iter().chain(&names).chain(&["search"]);
+    let known = || SIMULATED.iter().chain(&names).chain(&["search", "drawn"]);
     let Some(key) = world.keys().find(|key| !known().any(|name| name == key)) else {
         return Ok(());
     };

@@ -44,6 +44,9 @@ pub struct Screen {
     pub field_uas: Option<f64>,
     /// Jy in a pixel of a sight line with 1 M of emission 1.
     pub jy_per_pixel: f64,
+    /// Rays of each pixel near the critical curve, whose mean is its light; one in the middle, without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ring_rays: Option<usize>,
 }
 
 /// What a width is of.

@@ -29,7 +29,8 @@ pub(super) const SIMULATED: [&str; 6] =
 impl FitFile {
     /// Whether data are simulated with other settings than the fit's.
     pub fn is_simulated_elsewhere(&self) -> bool {
-        self.world.keys().any(|key| SIMULATED.contains(&key.as_str()))
+        let is_drawn = self.world.get("drawn").and_then(Value::as_bool) == Some(true);
+        is_drawn || self.world.keys().any(|key| SIMULATED.contains(&key.as_str()))
     }
 
     /// The settings that data are simulated with: these with the changes of `world`.
@@ -37,14 +38,18 @@ impl FitFile {
     /// # Errors
     /// If `world` has a key that is no part of what is simulated, or is no setting at all.
     pub fn simulated(&self) -> Result<Self, FitError> {
-        self.unknown_world()?;
+        let unknown = self.unknown_world()?;
         let mut table = Table::try_from(self).within("settings")?;
         let simulated = |(key, value): (&String, &Value)| {
             SIMULATED.contains(&key.as_str()).then(|| (key.clone(), value.clone()))
         };
         merge(&mut table, &self.world.iter().filter_map(simulated).collect());
         table.remove("world");
-        Ok(table.try_into().within("world")?)
+        let mut file: Self = table.try_into().within("world")?;
+        if let Some(unknown) = unknown.filter(|unknown| unknown.drawn) {
+            unknown.draw(&mut file)?;
+        }
+        Ok(file)
     }
 }
 

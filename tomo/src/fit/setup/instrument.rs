@@ -2,9 +2,11 @@
 
 use super::light_curve::seen;
 use super::{AXIS, Result, known_axis, observer, spacing};
+use crate::fit::pixel_rays::PixelRays;
 use crate::fit::settings::{Absorption, AxisSearch, FitError, FitFile, Screen, Within, refuse};
 use crate::fit::{
-    ForwardModel, Motion, PolarizedView, Redshift, Sampling, Seen, SightlineRequest, Sightlines,
+    ForwardModel, Motion, PolarizedView, Redshift, RingRays, Sampling, Seen, SightlineRequest,
+    Sightlines,
 };
 use crate::memory;
 use crate::polarization::StokesParameter;
@@ -79,7 +81,11 @@ impl Instrument {
         };
         let (alpha, beta) = pixels(&file.screen, chosen)?;
         let observer = observer(&file.observer)?;
-        let mut lines = Sightlines::trace(&hole, &observer, &alpha, &beta, &request)
+        let rays = match ring(file)? {
+            None => PixelRays::single(&alpha, &beta),
+            Some(ring) => PixelRays::new(ring, (&hole, &observer), [&alpha, &beta], |place| place),
+        };
+        let mut lines = Sightlines::of_pixels((&hole, &observer), &rays, |place| place, &request)
             .within("region and screen")?;
         if lines.rays() == 0 {
             refuse!(
@@ -159,6 +165,24 @@ fn polarized(file: &FitFile, screen: &[Vec<f64>; 2]) -> Result<Option<PolarizedV
         screen: screen.clone(),
         position_angle: 0.0,
     }))
+}
+
+/// More rays for pixels of the photon ring, where they are wanted.
+///
+/// # Errors
+/// If their number is out of range, or rays have no mean.
+pub(super) fn ring(file: &FitFile) -> Result<Option<RingRays>> {
+    let Some(count) = file.screen.ring_rays else { return Ok(None) };
+    if !(1..=1024).contains(&count) {
+        return Err(FitError::range("screen.ring_rays", count, "1 to 1024").into());
+    }
+    if file.effects.absorption.is_some() {
+        refuse!("screen.ring_rays and effects.absorption exclude each other");
+    }
+    if file.polarization.is_some() {
+        refuse!("screen.ring_rays and polarization exclude each other");
+    }
+    Ok((count > 1).then_some(RingRays { count, spacing: spacing(&file.screen)?, shift: [0.0; 2] }))
 }
 
 /// κ(x) of the medium.

@@ -10,8 +10,8 @@ use crate::fit::{BatchSize, OccupancyPlan, OccupancySettings, Region, Training};
 use crate::memory;
 use crate::optimise::{Adam, Lbfgs, Polynomial};
 use crate::representation::{
-    Activation, Carrier, Changing, FeatureGrid, FeatureGridSettings, Grid, GridSettings, Network,
-    NetworkSettings, OwnSettings, Registry, Representation,
+    Activation, Carrier, Changing, Degree, FeatureGrid, FeatureGridSettings, Grid, GridSettings,
+    Network, NetworkSettings, OwnSettings, Registry, Representation, Spline,
 };
 
 /// What is recovered; `registry` has what the program adds to kerrlight's own representations. Where emission
@@ -74,6 +74,9 @@ fn of_matter(file: &FitFile, registry: &Registry) -> Result<Box<dyn Representati
             };
             Box::new(FeatureGrid::new(settings).within("representation")?)
         }
+        Kind::LinearGrid if degree(file) != Degree::Linear => {
+            Box::new(Spline::cube(chosen.nodes, r, degree(file)).within("representation")?)
+        }
         Kind::Grid | Kind::LinearGrid => {
             // As dark as a network starts, sigmoid(−10).
             let (activation, initial) = match chosen.activation {
@@ -91,6 +94,11 @@ fn of_matter(file: &FitFile, registry: &Registry) -> Result<Box<dyn Representati
             Box::new(Grid::new(settings).within("representation")?)
         }
     })
+}
+
+/// What is between the nodes of a linear grid.
+fn degree(file: &FitFile) -> Degree {
+    file.linear.as_ref().map_or(Degree::Linear, |linear| linear.degree)
 }
 
 /// A feature grid starts with a faint glow, 1/55: darker ones start late.

@@ -5,17 +5,20 @@ use super::truth::SPOT;
 use super::visibilities::{VisibilitySettings, frames_of, prepared};
 use super::{Instrument, Result, Truth, hours_per_m, sky};
 use crate::fit::settings::{
-    DataFiles, FitError, FitFile, Noise, Observation as Seen, Within, refuse,
+    DataFiles, FitError, FitFile, Loss, LossKind, Noise, Observation as Seen, Within, refuse,
 };
 use crate::interferometry::array::Array;
 use crate::interferometry::earth::{Frame, Ut1};
 use crate::interferometry::noise::{add_thermal_noise, apply_gains};
-use crate::interferometry::observation::Observation;
+use crate::interferometry::observation::{Observation, Row};
 use crate::interferometry::operator::{ImageGrid, Method, Pulse};
 use crate::interferometry::schedule::{self, Clock, Schedule, Setup};
 use crate::interferometry::simulate::{self, Movie};
 use crate::interferometry::source::Source;
 use crate::memory;
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64;
 
 /// What to write where there are no data.
 pub(super) const FILE: &str = "a table [data.visibilities] or [data.movie] with `path = \"FILE\"` (`kerrlight fit --init FILE` writes \
@@ -119,6 +122,28 @@ impl Measured {
         let times = hours.iter().map(|h| first_time + (h - hours[0]) / per_m).collect();
         let (visibilities, sky) = (Some((observation, of_rows)), Some(sky(file)?));
         Ok(Measured { times, movie: None, visibilities, curve: None, sky, truth: None })
+    }
+
+    /// The data with noise once more, `factor` times as large as their errors: what might as well have been measured.
+    /// Every frame's pixels get that of the loss that they are in; visibilities that of their rows.
+    pub fn perturbed(&self, losses: &[Loss], factor: f64, seed: u64) -> Self {
+        let mut copy = self.without_truth();
+        if let Some((observation, _)) = &mut copy.visibilities {
+            let scale = |row: &mut Row, by: f64| row.noise_sigma.iter_mut().for_each(|s| *s *= by);
+            observation.rows.iter_mut().for_each(|row| scale(row, factor));
+            add_thermal_noise(observation, seed);
+            observation.rows.iter_mut().for_each(|row| scale(row, 1.0 / factor));
+        }
+        let of_pixels = |loss: &&Loss| matches!(loss.data, LossKind::Image | LossKind::LightCurve);
+        let sigma = losses.iter().filter(of_pixels).filter_map(|loss| loss.sigma).next();
+        if let (Some(movie), Some(sigma)) = (&mut copy.movie, sigma) {
+            let mut random = Pcg64::seed_from_u64(seed);
+            for pixel in movie {
+                let noise: f64 = random.sample(StandardNormal);
+                *pixel += factor * sigma * noise;
+            }
+        }
+        copy
     }
 
     /// The data alone.

@@ -25,7 +25,9 @@ pub use losses::forward_model;
 pub use measured::Measured;
 pub use truth::Truth;
 pub use visibilities::{VisibilitySettings, frames_of, prepared};
-pub use world::{FoundWorld, SearchWatch, Trial, find_world, in_world, known_world};
+pub use world::{
+    FoundWorld, SearchWatch, Trial, WorldPosterior, find_world, in_world, known_world,
+};
 
 use super::linear::Prior;
 use super::settings::{

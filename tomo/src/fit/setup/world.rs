@@ -1,14 +1,15 @@
 //! From settings to a world that is not known: its model, its parameters, and the search for them.
 
 use super::coarse_view::CoarseView;
+use super::instrument::ring;
 use super::linear_problem::terms;
 use super::{Instrument, Measured, Result, axis, drag, forward_model, linear, motion, priors};
 use crate::dynamics::Velocity;
 use crate::fit::linear::{Prior as Penalty, Weighted};
-use crate::fit::settings::{AxisSearch, FitError, FitFile, UnknownWorld, WorldView};
+use crate::fit::settings::{AxisSearch, FitError, FitFile, UnknownWorld, WorldView, refuse};
 use crate::fit::world::{
-    Effort, Exploration, Explored, Law, Parameter, Spread, World, WorldModel, WorldProblem,
-    WorldWatch,
+    Effort, Estimate, Exploration, Explored, Law, Parameter, Polish, Polished, Spread, World,
+    WorldModel, WorldProblem, WorldWatch,
 };
 use crate::fit::{Motion, Objective, Redshift, Sampling};
 use kerrlight_geodesic::Kerr;
@@ -48,6 +49,13 @@ pub struct FoundWorld {
 
 /// Told which search of how many goes on, its number of worlds and its least value; says whether to go on.
 pub type SearchWatch<'a> = dyn FnMut((usize, usize), usize, f64) -> bool + 'a;
+
+/// Other rays that the best world is looked for through.
+const LATTICES: u64 = 4;
+/// Steps to the best world of other data, or through other rays.
+const STEPS: usize = 3;
+/// Iterations of the first solution of a world, for each of a search.
+const PATIENCE: usize = 4;
 
 /// Width of the first population from a start, and of the one about the best end, in units of a parameter's scale.
 const WIDTHS: [f64; 2] = [1.5, 0.4];
@@ -92,6 +100,12 @@ pub fn find_world(
         let Some(explored) = problem.explore(best.end, &how, told)? else { return Ok(None) };
         let data: f64 = problem.terms.iter().map(|term| term.weight).sum();
         let reduced = problem.scale * explored.best.chi2 / data;
+        if problem.model.ring.is_some() {
+            let (polished, reduced) = polished(problem, &explored.best)?;
+            let spread = surely(problem, &polished, reduced)?;
+            let world = spread.as_ref().map_or(polished.best.world, |spread| spread.world);
+            return Ok(Some((spread, reduced, world)));
+        }
         let spread = Spread::of(problem.free, &explored.samples, reduced);
         let world = lower(problem, &explored, spread.as_ref())?;
         Ok(Some((spread, reduced, world)))
@@ -103,6 +117,134 @@ pub fn find_world(
         spread,
         trials,
     }))
+}
+
+/// The best world near another one, and its χ²/N.
+fn polished(problem: &WorldProblem<'_, f32>, start: &Estimate) -> Result<(Polished, f64)> {
+    let polished = problem.polish(start, &Polish::default())?;
+    let data: f64 = problem.terms.iter().map(|term| term.weight).sum();
+    let reduced = problem.scale * polished.best.chi2 / data;
+    Ok((polished, reduced))
+}
+
+/// A world's best volume with other voxels, and from there its best world through other rays: what is left of both
+/// where the data do not decide.
+fn otherwise(problem: &WorldProblem<'_, f32>, polished: &Polished, number: u64) -> Result<World> {
+    let model = problem.model.seen_along(number);
+    let effort = other_voxels(problem.effort, number);
+    let other = WorldProblem { model: &model, effort, ..*problem };
+    let start = other.solve(polished.best.world)?;
+    let from = Polished { best: start, ..polished.clone() };
+    Ok(other.follow(&from, STEPS, &Polish::default())?.world)
+}
+
+/// A few voxels more or less, and as many iterations as a start from a dark field takes.
+fn other_voxels(effort: Effort, number: u64) -> Effort {
+    const MORE: [usize; 6] = [2, 5, 1, 4, 3, 6];
+    let nodes = effort.nodes - 2 + MORE[number as usize % MORE.len()];
+    Effort { nodes, iterations: PATIENCE * effort.iterations, ..effort }
+}
+
+/// How sure a world is: the inverse of the second derivatives, times χ²/N where that is above 1, and how much the world
+/// depends on its voxels, and on the rays that its pixels are seen along. Its world is the mean over these.
+fn surely(
+    problem: &WorldProblem<'_, f32>,
+    polished: &Polished,
+    reduced: f64,
+) -> Result<Option<Spread>> {
+    let n = problem.free.len();
+    if polished.covariance.iter().any(|x| !x.is_finite()) {
+        return Ok(None);
+    }
+    let mut worlds = vec![polished.best.world];
+    for number in 1..=LATTICES {
+        worlds.push(otherwise(problem, polished, number)?);
+    }
+    let best = polished.best.world;
+    let away = |world: &World, k: usize| {
+        let parameter = problem.free[k].parameter;
+        parameter.difference(world.get(parameter), best.get(parameter))
+    };
+    let mean = |k: usize| worlds.iter().map(|w| away(w, k)).sum::<f64>() / worlds.len() as f64;
+    let means: Vec<f64> = (0..n).map(mean).collect();
+    let scatter = |a: usize, b: usize| {
+        let product = |w: &World| (away(w, a) - means[a]) * (away(w, b) - means[b]);
+        worlds.iter().map(product).sum::<f64>() / LATTICES as f64
+    };
+    let covariance: Vec<f64> = (0..n * n)
+        .map(|k| polished.covariance[k] * reduced.max(1.0) + scatter(k / n, k % n))
+        .collect();
+    let sigma: Vec<f64> = (0..n).map(|k| covariance[k * n + k].sqrt()).collect();
+    let correlation = (0..n * n).map(|k| covariance[k] / (sigma[k / n] * sigma[k % n]));
+    let correlation = correlation.collect();
+    // The mean has a smaller error than each of them.
+    let world = problem.free.iter().enumerate().fold(best, |world, (k, free)| {
+        let [low, high] = free.bounds();
+        world.with(free.parameter, (best.get(free.parameter) + means[k]).clamp(low, high))
+    });
+    Ok(Some(Spread { world, sigma, correlation, ripple: 0.0, worlds: worlds.len() }))
+}
+
+/// Worlds that the data leave possible: each is the best one of data with noise once more, seen along other rays
+/// (randomise, then optimise: Bardsley et al. 2014).
+pub struct WorldPosterior<'a> {
+    file: &'a FitFile,
+    unknown: &'a UnknownWorld,
+    measured: &'a Measured,
+    polished: Polished,
+    /// Noise of a draw over the data's errors.
+    factor: f64,
+    scale: f64,
+}
+
+impl<'a> WorldPosterior<'a> {
+    /// About a world that was found, with errors of the data that are `noise_factor` of what they say.
+    ///
+    /// # Errors
+    /// If a setting is missing or out of range, the problem has no solution, or the data leave a parameter open.
+    pub fn new(
+        file: &'a FitFile,
+        measured: &'a Measured,
+        unknown: &'a UnknownWorld,
+        (world, noise_factor): (World, f64),
+    ) -> Result<Self> {
+        let scale = noise_factor.powi(-2);
+        let seen = Seen::new(file, measured, &unknown.search.fine)?;
+        let (polished, reduced) = seen.with(unknown, &unknown.search.fine, scale, |problem| {
+            let iterations = PATIENCE * problem.effort.iterations;
+            let effort = Effort { iterations, ..problem.effort };
+            let start = WorldProblem { effort, ..*problem }.solve(world)?;
+            polished(problem, &start)
+        })?;
+        if polished.covariance.iter().any(|x| !x.is_finite()) {
+            refuse!(
+                "the data leave a parameter of the world open: there is no best world to draw others around"
+            );
+        }
+        let factor = noise_factor * reduced.max(1.0).sqrt();
+        Ok(Self { file, unknown, measured, polished, factor, scale })
+    }
+
+    /// Noise of a draw over the data's errors.
+    pub fn factor(&self) -> f64 {
+        self.factor
+    }
+
+    /// A draw: the same for the same data and number.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn draw(&self, measured: &Measured, number: u64) -> Result<World> {
+        let seen = Seen::new(self.file, measured, &self.unknown.search.fine)?;
+        seen.with(self.unknown, &self.unknown.search.fine, self.scale, |problem| {
+            otherwise(problem, &self.polished, number)
+        })
+    }
+
+    /// Data with noise once more.
+    pub fn data(&self, number: u64) -> Measured {
+        self.measured.perturbed(&self.file.loss, self.factor, number)
+    }
 }
 
 /// The lowest point of the quadratic form, if it explains the data better than the best world that was evaluated.
@@ -214,6 +356,7 @@ fn model(
     Ok(WorldModel {
         x,
         y,
+        ring: ring(file)?,
         observer_radius: file.observer.radius,
         region: file.region.limits(),
         order,
@@ -272,7 +415,11 @@ impl Seen {
             flux: settings.flux_jy,
             penalties: &penalties,
             scale,
-            effort: Effort { nodes: view.nodes, iterations: view.iterations },
+            effort: Effort {
+                nodes: view.nodes,
+                degree: settings.degree,
+                iterations: view.iterations,
+            },
         })
     }
 }

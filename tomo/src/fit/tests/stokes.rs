@@ -7,6 +7,7 @@ use crate::fit::linear::{
 use crate::polarization::{
     Components, FieldFrame, MixedField, Normalisation, PolarizationLaw, Stokes, StokesParameter,
 };
+use crate::representation::Degree;
 use crate::scene::Scene;
 use crate::transport::{PreparedScene, Scratch};
 use core::f64::consts::{PI, TAU};
@@ -279,7 +280,7 @@ fn exact_fluxes_are_sums_of_images() {
             assert!((found - expected).abs() < 1e-12 * sum(frame, 0));
         }
     }
-    let grid = Voxels::cube(7, 12.0).grid().unwrap();
+    let grid = Voxels::cube(7, 12.0, Degree::Linear).field().unwrap();
     let parameters: Vec<f64> = (0..343).map(|k| (0.37 * f64::from(k)).sin().abs()).collect();
     let field = Field { representation: &grid, parameters: &parameters, axis, occupancy: None };
     let mut movie = vec![0.0; 9];
@@ -291,7 +292,7 @@ fn exact_fluxes_are_sums_of_images() {
         axis,
         frames: &[0, 1, 2],
         terms: &[Weighted { weight: 1.0, term: &term }],
-        voxels: Voxels::cube(7, 12.0),
+        voxels: Voxels::cube(7, 12.0, Degree::Linear),
         upper: 1.0,
         flux: None,
         priors: &[],
@@ -319,7 +320,7 @@ fn exact_gradients_of_polarised_fluxes() {
     let others: Vec<crate::fit::Weighted<dyn FrameTerm<f64>>> =
         vec![crate::fit::Weighted { weight: 0.7, term: Box::new(term) }];
     let objective = Objective { model, data: Data { image: None, others } };
-    let grid = Voxels::cube(5, 12.0).grid().unwrap();
+    let grid = Voxels::cube(5, 12.0, Degree::Linear).field().unwrap();
     let parameters: Vec<f64> = (0..125).map(|k| (0.61 * f64::from(k)).cos().abs()).collect();
     let loss = |parameters: &[f64], gradient: &mut [f64]| {
         let field = Field { representation: &grid, parameters, axis, occupancy: None };

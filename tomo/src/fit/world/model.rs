@@ -5,9 +5,10 @@ use super::{Number, Parameter, World};
 use crate::Error;
 use crate::dynamics::infall::{self, Falling};
 use crate::dynamics::{AngularVelocity, Axis};
+use crate::fit::pixel_rays::PixelRays;
 use crate::fit::{
-    ForwardModel, Motion, PolarizedView, Redshift, Region, Sampling, Seen, SightlineRequest,
-    Sightlines,
+    ForwardModel, Motion, PolarizedView, Redshift, Region, RingRays, Sampling, Seen,
+    SightlineRequest, Sightlines,
 };
 use crate::polarization::PolarizationLaw;
 use crate::simd::Float;
@@ -78,6 +79,8 @@ pub struct WorldModel {
     pub x: Vec<f64>,
     /// The same, upwards.
     pub y: Vec<f64>,
+    /// More rays for pixels near the critical curve, where they are wanted.
+    pub ring: Option<RingRays>,
     /// Distance of the observer, M; infinity without one.
     pub observer_radius: Option<f64>,
     /// Where emission may be.
@@ -121,8 +124,9 @@ impl WorldModel {
             delay: self.slow_light,
             momentum: self.redshift || self.polarization.is_some(),
         };
-        let (alpha, beta) = self.screen(world);
-        let mut lines = Sightlines::trace(&hole, &observer, &alpha, &beta, &request)?;
+        let (rays, numbers) = (self.rays(world, (&hole, &observer)), world.numbers());
+        let screen = |place| self.place(&numbers, place).map(|number| number.value);
+        let mut lines = Sightlines::of_pixels((&hole, &observer), &rays, screen, &request)?;
         lines.weight.iter_mut().for_each(|weight| *weight *= self.jy);
         Ok(lines)
     }
@@ -149,7 +153,12 @@ impl WorldModel {
             return Err(Error::out_of_range("polarization", 1.0, allowed));
         }
         let (hole, observer) = self.observed(world)?;
-        let (alpha, beta) = self.screen(world);
+        let (rays, numbers) = (self.rays(world, (&hole, &observer)), world.numbers());
+        let places = rays.places.iter().map(|place| {
+            let [alpha, beta] = self.place(&numbers, *place);
+            (alpha.value, beta.value)
+        });
+        let (alpha, beta): (Vec<f64>, Vec<f64>) = places.unzip();
         let request = NodeRequest {
             radius: self.region.r_max,
             rule: PanelRule::new(self.order),
@@ -157,7 +166,7 @@ impl WorldModel {
             quantities: Quantities { azimuth: true, time: self.slow_light, velocity: true },
         };
         let nodes = node_gradients::trace(&hole, &observer, &alpha, &beta, TOLERANCE, &request)?;
-        let (lines, tangents) = Tangents::new(self, world, free, &nodes)?;
+        let (lines, tangents) = Tangents::new(self, (world, &rays), free, &nodes)?;
         Ok((self.forward_of(world, &lines)?, tangents))
     }
 
@@ -180,9 +189,15 @@ impl WorldModel {
 
     /// How polarised light is seen in a world.
     pub fn polarized(&self, world: &World) -> Option<PolarizedView> {
-        let (alpha, beta) = self.screen(world);
+        let law = self.polarization?;
+        let numbers = world.numbers();
+        let place = |(x, y): (&f64, &f64)| {
+            let [alpha, beta] = self.place(&numbers, [*x, *y]);
+            (alpha.value, beta.value)
+        };
+        let (alpha, beta) = self.x.iter().zip(&self.y).map(place).unzip();
         Some(PolarizedView {
-            law: self.polarization?,
+            law,
             axis: self.axis,
             sin_inclination: world.get(Parameter::Inclination).sin(),
             screen: [alpha, beta],
@@ -201,6 +216,12 @@ impl WorldModel {
         Ok((hole, observer))
     }
 
+    /// The same with other rays for the pixels near the critical curve; those of number 0 are the usual ones.
+    pub fn seen_along(&self, number: u64) -> Self {
+        let shifted = |ring| RingRays { shift: RingRays::shift(number), ..ring };
+        Self { ring: self.ring.map(shifted), ..self.clone() }
+    }
+
     /// How matter moves in a world, and the times of its frames in that world's M.
     ///
     /// # Errors
@@ -216,21 +237,25 @@ impl WorldModel {
         })
     }
 
-    fn screen(&self, world: &World) -> (Vec<f64>, Vec<f64>) {
-        let place = |k| {
-            let [alpha, beta] = self.place(&world.numbers(), k);
-            (alpha.value, beta.value)
-        };
-        (0..self.x.len()).map(place).unzip()
+    /// The rays of all pixels of a world.
+    fn rays(&self, world: &World, seen: (&Kerr, &Observer)) -> PixelRays {
+        let Some(ring) = self.ring else { return PixelRays::single(&self.x, &self.y) };
+        let numbers = world.numbers();
+        let screen = |place| self.place(&numbers, place).map(|number| number.value);
+        PixelRays::new(ring, seen, [&self.x, &self.y], screen)
     }
 
-    /// α and β of a pixel, M: α across the spin's projection, β along it.
-    pub(super) fn place(&self, numbers: &[Number; super::PARAMETERS], pixel: usize) -> [Number; 2] {
+    /// α and β of a place on the screen (M to the right and upwards), M: α across the spin's projection, β along it.
+    pub(super) fn place(
+        &self,
+        numbers: &[Number; super::PARAMETERS],
+        place: [f64; 2],
+    ) -> [Number; 2] {
         use kerrlight_geodesic::{Elementary, Scalar};
         let of = |parameter: Parameter| numbers[parameter.index()];
         let (sin, cos) = of(Parameter::PositionAngle).sin_cos();
-        let x = Number::constant(self.x[pixel]) - of(Parameter::OffsetX);
-        let y = Number::constant(self.y[pixel]) - of(Parameter::OffsetY);
+        let x = Number::constant(place[0]) - of(Parameter::OffsetX);
+        let y = Number::constant(place[1]) - of(Parameter::OffsetY);
         let mass = of(Parameter::Mass);
         [(x * cos + y * sin) / mass, (y * cos - x * sin) / mass]
     }

@@ -4,6 +4,7 @@ use super::{Parameter, Prior, World, WorldModel};
 use crate::Error;
 use crate::fit::ForwardModel;
 use crate::fit::linear::{Change, Least, LinearProblem, Prior as Penalty, Voxels, Weighted};
+use crate::representation::Degree;
 use crate::simd::Float;
 use core::f64::consts::TAU;
 
@@ -56,6 +57,8 @@ pub struct WorldProblem<'a, T: Float> {
 pub struct Effort {
     /// Voxels along each axis.
     pub nodes: usize,
+    /// What is between them.
+    pub degree: Degree,
     /// Iterations from a dark field.
     pub iterations: usize,
 }
@@ -96,21 +99,33 @@ impl<T: Float + Default> WorldProblem<'_, T> {
     /// If a number is out of its range, or χ² is not finite.
     pub fn solve(&self, world: World) -> Result<Estimate, Error> {
         let forward: ForwardModel<T> = self.model.forward(&world)?;
-        let problem = LinearProblem {
-            model: &forward,
+        let least = self.linear(&forward).least(self.effort.iterations)?;
+        Ok(self.estimate(world, least))
+    }
+
+    /// The voxels that are solved for.
+    pub(super) fn voxels(&self) -> Voxels {
+        Voxels::cube(self.effort.nodes, self.half_width, self.effort.degree)
+    }
+
+    pub(super) fn linear<'b>(&'b self, forward: &'b ForwardModel<T>) -> LinearProblem<'b, T> {
+        LinearProblem {
+            model: forward,
             axis: self.model.axis,
             frames: self.frames,
             terms: self.terms,
-            voxels: Voxels::cube(self.effort.nodes, self.half_width),
+            voxels: self.voxels(),
             upper: self.upper,
             flux: self.flux,
             priors: self.penalties,
             change: Change::NONE,
-        };
-        let Least { x, value } = problem.least(self.effort.iterations)?;
+        }
+    }
+
+    pub(super) fn estimate(&self, world: World, Least { x, value }: Least) -> Estimate {
         let penalty = |free: &Free| free.prior.penalty(world.get(free.parameter));
         let penalties: f64 = self.free.iter().map(penalty).sum();
-        Ok(Estimate { world, x, chi2: value, value: 0.5 * self.scale * value + penalties })
+        Estimate { world, x, chi2: value, value: 0.5 * self.scale * value + penalties }
     }
 
     /// The world at a place about another one, in units of [`Parameter::scale`]; bounds are mirrors, a whole circle has

@@ -5,6 +5,7 @@ use super::redshift::Gas;
 use super::{Number, PARAMETERS, Parameter, World, WorldModel};
 use crate::Error;
 use crate::fit::Sightlines;
+use crate::fit::pixel_rays::PixelRays;
 use kerrlight_geodesic::derivatives::Gradient;
 use kerrlight_geodesic::node_gradients::{DifferentiatedNode, DifferentiatedNodes};
 use kerrlight_geodesic::{Elementary, Scalar};
@@ -39,26 +40,31 @@ impl Tangents {
     /// The nodes inside the region, and how they move.
     pub(super) fn new(
         model: &WorldModel,
-        world: &World,
+        (world, rays): (&World, &PixelRays),
         free: &[Parameter],
         nodes: &DifferentiatedNodes,
     ) -> Result<(Sightlines, Self), Error> {
-        let pixels = nodes.rays();
+        let pixels = rays.starts.len() - 1;
         let limits = Some(model.region.radii());
         let mut lines = Sightlines { pixels, starts: vec![0], limits, ..Sightlines::default() };
         let mass = free.iter().position(|parameter| *parameter == Parameter::Mass);
         let mass = mass.map(|place| (place, world.get(Parameter::Mass)));
         let mut tangents = Tangents { free: free.to_vec(), mass, ..Tangents::default() };
         let (numbers, flow) = (world.numbers(), Flowing::new(model, world)?);
-        let mut builder = Builder { model, flow, numbers, ray: [Number::constant(0.0); 2] };
+        let mut builder =
+            Builder { model, flow, numbers, ray: [Number::constant(0.0); 2], jy: 0.0 };
         let mut fallen = Vec::new();
         for pixel in 0..pixels {
-            builder.ray = model.place(&builder.numbers, pixel);
-            for node in nodes.ray(pixel).iter().filter(|n| model.region.holds(n.value.position)) {
-                builder.push(node, &mut lines);
-                let (moves, origin) = builder.moves(node);
-                fallen.extend(origin);
-                tangents.moves.extend(free.iter().map(|parameter| moves[parameter.index()]));
+            builder.jy = model.jy * rays.share(pixel);
+            for ray in rays.starts[pixel]..rays.starts[pixel + 1] {
+                builder.ray = model.place(&builder.numbers, rays.places[ray]);
+                let nodes = nodes.ray(ray).iter();
+                for node in nodes.filter(|node| model.region.holds(node.value.position)) {
+                    builder.push(node, &mut lines);
+                    let (moves, origin) = builder.moves(node);
+                    fallen.extend(origin);
+                    tangents.moves.extend(free.iter().map(|parameter| moves[parameter.index()]));
+                }
             }
             lines.end_ray(pixel);
         }
@@ -74,11 +80,13 @@ struct Builder<'a> {
     numbers: [Number; PARAMETERS],
     /// α and β.
     ray: [Number; 2],
+    /// Jy in the pixel of 1 M of emission 1 on the ray.
+    jy: f64,
 }
 
 impl Builder<'_> {
     fn push(&self, node: &DifferentiatedNode, lines: &mut Sightlines) {
-        lines.push(node.value.position, self.model.jy * node.value.weight);
+        lines.push(node.value.position, self.jy * node.value.weight);
         if self.model.slow_light {
             lines.delay.push(node.value.delay - self.flight());
         }
@@ -118,7 +126,7 @@ impl Builder<'_> {
             Some([_, turn]) => turn,
             None => self.model.law.rate(r, spin, of(Parameter::Rotation)),
         };
-        let plain = self.number(at.weight, by.weight) * Number::constant(self.model.jy);
+        let plain = self.number(at.weight, by.weight) * Number::constant(self.jy);
         let momentum = vector(at.momentum, by.momentum);
         let fall = falling.map(|[fall, _]| [fall, self.number(at.radial, by.radial)]);
         let gas = Gas { position, momentum, spin, velocity, fall };

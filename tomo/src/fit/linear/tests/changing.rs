@@ -3,6 +3,7 @@
 use super::super::change::Change;
 use super::*;
 use crate::dynamics::{AngularVelocity, Velocity};
+use crate::representation::Degree;
 use crate::representation::{Allowed, Carrier, Changing};
 
 const ALLOWED: [Allowed; 2] = [Allowed::Any, Allowed::Births];
@@ -32,7 +33,7 @@ fn changing(voxels: &Voxels, knots: Knots) -> Changing<f64> {
 
 fn changing_of(velocity: AngularVelocity, voxels: &Voxels, knots: Knots) -> Changing<f64> {
     let carrier = Carrier { axis: axis(), velocity, limits: [0.0, 5.0] };
-    Changing::new(Box::new(voxels.grid().unwrap()), knots, carrier).unwrap()
+    Changing::new(Box::new(voxels.field().unwrap()), knots, carrier).unwrap()
 }
 
 fn images(model: &ForwardModel<f64>, field: &Changing<f64>, x: &[f64]) -> Vec<f64> {
@@ -45,7 +46,7 @@ fn images(model: &ForwardModel<f64>, field: &Changing<f64>, x: &[f64]) -> Vec<f6
 /// ‖A x‖² by the sparse matrix, where all nodes or some count, is that of the representation's images; so is its transpose.
 #[test]
 fn exact_sparse_operator_is_the_changing_field_and_sums() {
-    let voxels = Voxels { nodes: [7, 6, 8], ..Voxels::cube(2, 5.0) };
+    let voxels = Voxels { nodes: [7, 6, 8], ..Voxels::cube(2, 5.0, Degree::Linear) };
     for (allowed, delay) in ALLOWED.into_iter().flat_map(|a| [(a, false), (a, true)]) {
         let knots = knots(allowed);
         compare_with_images(&model(delay), &changing(&voxels, knots), (voxels, knots));
@@ -55,7 +56,7 @@ fn exact_sparse_operator_is_the_changing_field_and_sums() {
 /// The same of matter that falls.
 #[test]
 fn exact_sparse_operator_is_the_changing_field_of_a_falling_flow() {
-    let voxels = Voxels { nodes: [7, 6, 8], ..Voxels::cube(2, 5.0) };
+    let voxels = Voxels { nodes: [7, 6, 8], ..Voxels::cube(2, 5.0, Degree::Linear) };
     let law = Velocity::Infall { xi: 0.8, beta_r: 0.9, beta_phi: 0.95, drag: None };
     for (allowed, delay) in ALLOWED.into_iter().flat_map(|a| [(a, false), (a, true)]) {
         let knots = Knots { first: 1.0, spacing: 4.0, count: 4, allowed };
@@ -77,7 +78,7 @@ fn compare_with_images(
     for (share, budget) in [(1.0, usize::MAX), (1.0, 0), (0.4, usize::MAX), (0.4, 0)] {
         let is_active: Vec<bool> =
             random(4 * voxels.count(), 4).iter().map(|x| *x < share).collect();
-        let active = Active::new(&is_active, voxels.corners());
+        let active = Active::new(&is_active, &voxels.corners());
         let walk = Walk::new(model, axis(), (voxels, knots));
         let operator = Operator::new(walk, active, &FRAMES, budget);
         let x = random(operator.active.count(), 1);
@@ -104,7 +105,7 @@ fn solve(model: &ForwardModel<f64>, pixels: Vec<f64>, change: Change) -> LinearS
         axis: axis(),
         frames: &FRAMES,
         terms: &[Weighted { weight: 1.0, term: &term }],
-        voxels: Voxels::cube(9, 5.0),
+        voxels: Voxels::cube(9, 5.0, Degree::Linear),
         upper: 2.0,
         flux: None,
         priors: &[],
@@ -124,7 +125,7 @@ fn solve(model: &ForwardModel<f64>, pixels: Vec<f64>, change: Change) -> LinearS
 /// that is too high leaves such a field.
 #[test]
 fn exact_between_a_field_that_is_carried_and_one_that_is_free() {
-    let (model, voxels) = (model(false), Voxels::cube(9, 5.0));
+    let (model, voxels) = (model(false), Voxels::cube(9, 5.0, Degree::Linear));
     let spot = lit::spot(&voxels);
     for allowed in ALLOWED {
         let knots = knots(allowed);

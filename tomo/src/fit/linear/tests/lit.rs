@@ -75,7 +75,7 @@ fn solve(terms: &[Weighted<'_, f64>], flux: Option<f64>) -> Result<LinearSolutio
         axis: axis(),
         frames: &FRAMES,
         terms,
-        voxels: Voxels::cube(11, 5.0),
+        voxels: Voxels::cube(11, 5.0, Degree::Linear),
         upper: 2.0,
         flux,
         priors: &[],
@@ -88,7 +88,7 @@ fn solve(terms: &[Weighted<'_, f64>], flux: Option<f64>) -> Result<LinearSolutio
 /// Slopes of all kinds of data along random directions are those of differences, at a lit field.
 #[test]
 fn exact_slopes_of_data_that_are_not_convex() {
-    let (model, voxels) = (forward_model(), Voxels::cube(6, 5.0));
+    let (model, voxels) = (forward_model(), Voxels::cube(6, 5.0, Degree::Linear));
     let movie = movie(&model, &voxels, &spot(&voxels));
     for seen in [Seen::Visibilities, Seen::Amplitudes, Seen::Phases, Seen::LogAmplitudes] {
         let term = array(&movie, seen);
@@ -115,7 +115,7 @@ fn exact_slopes_of_data_that_are_not_convex() {
 /// A dark field has no slope: it is left all the same, and no certificate is claimed.
 #[test]
 fn exact_amplitudes_are_solved_from_lit_fields() {
-    let (model, voxels) = (forward_model(), Voxels::cube(11, 5.0));
+    let (model, voxels) = (forward_model(), Voxels::cube(11, 5.0, Degree::Linear));
     let movie = movie(&model, &voxels, &spot(&voxels));
     let flux = movie.iter().sum::<f64>() / FRAMES.len() as f64;
     let dark = vec![0.0; 81];
@@ -138,7 +138,7 @@ fn exact_amplitudes_are_solved_from_lit_fields() {
 
 #[test]
 fn exact_closures_alone_need_a_flux_and_dark_data_have_no_light() {
-    let (model, voxels) = (forward_model(), Voxels::cube(11, 5.0));
+    let (model, voxels) = (forward_model(), Voxels::cube(11, 5.0, Degree::Linear));
     let movie = movie(&model, &voxels, &spot(&voxels));
     let closures = array(&movie, Seen::LogAmplitudes);
     let terms = [Weighted { weight: 1.0, term: &closures as &dyn FrameTerm<f64> }];

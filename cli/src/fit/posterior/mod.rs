@@ -1,0 +1,230 @@
+//! `kerrlight posterior`: how sure a fit is. Each draw is the fit of the data with noise once more (randomise, then
+//! optimise: Bardsley et al. 2014), in a world of its own where the world is not known.
+
+mod page;
+mod sample;
+mod summary;
+
+use super::folder::Folder;
+use super::run::{Placed, Prepared};
+use super::world_search;
+use crate::answer::Answer;
+use crate::checksum::{is_whole, sealed};
+use crate::interrupt::{Interrupted, Keeper};
+use crate::{output, progress, volume_files};
+use anyhow::{Context, bail};
+use clap::Args;
+use kerrlight_tomo::fit::settings::{AxisSearch, FitFile, Kind, UnknownWorld};
+use kerrlight_tomo::fit::setup::WorldPosterior;
+use kerrlight_tomo::representation::Registry;
+use kerrlight_tomo::volume::{Volume, VolumeFile};
+use sample::{Drawn, Through};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Where draws and what follows from them are, in the folder of a run.
+pub const FOLDER: &str = "posterior";
+/// The page.
+pub const PAGE: &str = "report.html";
+/// Numbers.
+pub const NUMBERS: &str = "posterior.json";
+
+/// Arguments of `kerrlight posterior`.
+#[derive(Debug, Args)]
+pub struct Posterior {
+    /// Folder of a finished fit
+    #[arg(value_name = "RUN")]
+    run: PathBuf,
+    /// Draws, those of an earlier call included
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    samples: u32,
+}
+
+impl Posterior {
+    /// Draws, and writes what follows from the draws.
+    pub fn run(&self, registry: &Registry) -> anyhow::Result<Answer> {
+        let (folder, text) = Folder::open(&self.run, Duration::ZERO)?;
+        if !self.run.join("results.json").is_file() {
+            let run = self.run.display();
+            bail!(
+                "{run} is not finished: there is no results.json in it; resume it with `kerrlight fit --resume {run}`"
+            );
+        }
+        let file = super::parse(&text).with_context(|| self.run.display().to_string())?;
+        let prepared = Prepared::new(file, &super::base_dir_of(&text), registry)?;
+        draw(&prepared, &folder, self.samples)
+    }
+}
+
+/// One draw as it is kept.
+struct Kept {
+    /// Emission at the reference time.
+    pub volume: Volume,
+    /// The world, where it is not known, and χ² of each loss.
+    pub numbers: Value,
+}
+
+/// Draws so many times, those that are there included, and writes what follows.
+pub fn draw(prepared: &Prepared<'_>, folder: &Folder, samples: u32) -> anyhow::Result<Answer> {
+    if !matches!(prepared.file.axis, AxisSearch::Known {}) {
+        bail!("a posterior needs [axis.known]: draws do not look for the axis of the motion");
+    }
+    let path = folder.path().join(FOLDER);
+    std::fs::create_dir_all(&path).with_context(|| format!("cannot make {}", path.display()))?;
+    let unknown = prepared.file.unknown_world()?;
+    let world = world_search::found(folder)?;
+    let complete = (1..=u64::from(samples)).all(|number| names(&path, number)[1].is_file());
+    let worlds = match (&unknown, &world) {
+        (Some(unknown), Some(world)) if !complete => Some(worlds(prepared, unknown, world)?),
+        _ => None,
+    };
+    let factor = match &worlds {
+        Some(worlds) => worlds.factor(),
+        None => noise_of(folder)?,
+    };
+    let drawing = Drawing { prepared, unknown: unknown.as_ref(), worlds, factor };
+    let bar = progress::samples(u64::from(samples));
+    let keeper = Keeper::brief(format!("stopping; resume with: {}", again(folder, samples)));
+    let mut all = Vec::new();
+    for number in 1..=u64::from(samples) {
+        let kept = match kept(&path, number)? {
+            Some(kept) => kept,
+            None => {
+                let told = |text: &str| bar.set_message(text.to_owned());
+                let Some(drawn) = drawing.one(number, &keeper, &told)? else {
+                    bar.abandon();
+                    let how = again(folder, samples);
+                    let text = format!("stopped after {} draws; resume with: {how}", all.len());
+                    return Err(Interrupted(text).into());
+                };
+                keep(&path, number, factor, drawn)?
+            }
+        };
+        all.push(kept);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let truth = prepared.measured.truth.as_ref();
+    let truth = truth.map(|t| super::results::true_volume(&prepared.file, t)).transpose()?;
+    let found = summary::Summary::new(&prepared.file, world.as_ref(), &all, truth)?;
+    page::write(&found, prepared, &path)?;
+    let numbers = found.numbers();
+    output::Output::new(&path.join(NUMBERS), "")?.write(sealed(numbers.clone()).as_bytes())?;
+    let files = [PAGE, NUMBERS, "mean.npz", "deviation.npz"].map(|name| path.join(name));
+    Ok(Answer::lines(&found.sentences().join(" "), &files[0].display().to_string())
+        .with_all(numbers)
+        .files(files.iter().map(PathBuf::as_path)))
+}
+
+fn again(folder: &Folder, samples: u32) -> String {
+    format!("kerrlight posterior {} --samples {samples}", folder.path().display())
+}
+
+/// Worlds about the one that the run has found.
+fn worlds<'a>(
+    prepared: &'a Prepared<'_>,
+    unknown: &'a UnknownWorld,
+    world: &Value,
+) -> anyhow::Result<WorldPosterior<'a>> {
+    eprintln!("the best world, once more");
+    let best = world_search::world_of(&prepared.file, &unknown.free()?, world)?;
+    let noise = world["noise_factor"].as_f64().unwrap_or(1.0);
+    let (file, measured) = (&prepared.file, &prepared.measured);
+    Ok(WorldPosterior::new(file, measured, unknown, (best, noise))?)
+}
+
+/// Noise of a draw over the errors of the data: these are too small where the model does not explain them.
+fn noise_of(folder: &Folder) -> anyhow::Result<f64> {
+    let text = output::read_text(&folder.path().join("results.json"))?;
+    let results: Value = serde_json::from_str(&text).context("results.json is damaged")?;
+    let chi2 = results["chi2_per_datum"].as_object().into_iter().flatten();
+    Ok(chi2.filter_map(|(_, value)| value.as_f64()).fold(1.0f64, f64::max).sqrt())
+}
+
+/// What draws are made of.
+struct Drawing<'a> {
+    prepared: &'a Prepared<'a>,
+    unknown: Option<&'a UnknownWorld>,
+    worlds: Option<WorldPosterior<'a>>,
+    /// Noise of a draw over the errors of the data.
+    factor: f64,
+}
+
+impl Drawing<'_> {
+    fn one(
+        &self,
+        number: u64,
+        keeper: &Keeper,
+        told: &dyn Fn(&str),
+    ) -> anyhow::Result<Option<(Drawn, Value)>> {
+        let Prepared { file, instrument, measured, motion, registry } = self.prepared;
+        let mut file = file.clone();
+        file.seed = file.seed.wrapping_add(number);
+        if file.representation.kind == Kind::LinearGrid {
+            file.representation.nodes = other_voxels(file.representation.nodes, number);
+        }
+        let noise = seed(&file, number);
+        let (Some(unknown), Some(worlds)) = (self.unknown, &self.worlds) else {
+            let data = measured.perturbed(&file.loss, self.factor, noise);
+            let through = Through { file: &file, instrument, motion, registry };
+            let drawn = sample::draw(&through, &data, keeper, told)?;
+            return Ok(drawn.map(|drawn| (drawn, Value::Null)));
+        };
+        told("the world");
+        let data = worlds.data(noise);
+        let world = worlds.draw(&data, number)?;
+        let Placed { file, instrument, motion } =
+            world_search::placed(&file, unknown, instrument, measured, &world)?;
+        let through = Through { file: &file, instrument: &instrument, motion: &motion, registry };
+        let drawn = sample::draw(&through, &data, keeper, told)?;
+        let values = world_search::values_of(&unknown.free()?, &world);
+        Ok(drawn.map(|drawn| (drawn, values)))
+    }
+}
+
+/// Voxels of a draw along each axis, a few per cent more or fewer: what depends on where they lie is not known.
+fn other_voxels(nodes: usize, number: u64) -> usize {
+    const PERCENT: [usize; 7] = [97, 103, 94, 109, 100, 91, 106];
+    (nodes * PERCENT[number as usize % PERCENT.len()]).div_ceil(100).max(4)
+}
+
+/// Of the noise of a draw: not that of the simulation.
+fn seed(file: &FitFile, number: u64) -> u64 {
+    file.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(number)
+}
+
+fn names(folder: &Path, number: u64) -> [PathBuf; 2] {
+    ["npz", "json"].map(|kind| folder.join(format!("sample_{number:04}.{kind}")))
+}
+
+/// A draw of an earlier call, if it is whole.
+fn kept(folder: &Path, number: u64) -> anyhow::Result<Option<Kept>> {
+    let [volume, numbers] = names(folder, number);
+    if !numbers.is_file() {
+        return Ok(None);
+    }
+    let text = output::read_text(&numbers)?;
+    if !is_whole(&text) {
+        bail!("{} is damaged: remove it to draw again", numbers.display());
+    }
+    let numbers = serde_json::from_str(&text).with_context(|| numbers.display().to_string())?;
+    Ok(Some(Kept { volume: volume_files::load(&volume)?.volume, numbers }))
+}
+
+fn keep(
+    folder: &Path,
+    number: u64,
+    factor: f64,
+    (drawn, world): (Drawn, Value),
+) -> anyhow::Result<Kept> {
+    let [volume, numbers] = names(folder, number);
+    let file = VolumeFile { volume: drawn.volume.clone(), axis: None };
+    output::Output::new(&volume, "")?.write(&file.to_npz())?;
+    let of_draw = json!({
+        "world": world, "chi2_per_datum": drawn.chi2, "noise_factor": factor,
+    });
+    // Last: with it the draw is whole.
+    output::Output::new(&numbers, "")?.write(sealed(of_draw.clone()).as_bytes())?;
+    Ok(Kept { volume: drawn.volume, numbers: of_draw })
+}

@@ -1,0 +1,112 @@
+//! The page of a posterior, its volumes and tables.
+
+use super::super::run::Prepared;
+use super::PAGE;
+use super::summary::{Interval, Summary};
+use crate::output::Output;
+use crate::report::{self, Drawing, Report, Triangle, Variable};
+use kerrlight_tomo::volume::slices::Through;
+use kerrlight_tomo::volume::{Shown, Volume, VolumeFile, vti};
+use std::path::Path;
+
+/// Writes mean.npz, deviation.npz, posterior.vti, worlds.csv, triangle.svg and the page.
+pub fn write(found: &Summary, prepared: &Prepared<'_>, folder: &Path) -> anyhow::Result<()> {
+    let file = |name: &str| Output::new(&folder.join(name), "");
+    let noise = found.ensemble.signal_to_noise()?;
+    let volumes = [
+        ("mean", &found.ensemble.mean),
+        ("deviation", &found.ensemble.deviation),
+        ("signal_to_noise", &noise),
+    ];
+    for (name, volume) in &volumes[..2] {
+        let bytes = VolumeFile { volume: (*volume).clone(), axis: None }.to_npz();
+        file(&format!("{name}.npz"))?.write(&bytes)?;
+    }
+    let fields = volumes.map(|(name, volume)| vti::Field { name, volume });
+    let write = |out: &mut std::io::BufWriter<&std::fs::File>| Ok(vti::write(out, &fields)?);
+    file("posterior.vti")?.write_with(write)?;
+    let triangle = triangle(found);
+    if let Some(triangle) = &triangle {
+        file("worlds.csv")?.write(table(&found.world).as_bytes())?;
+        file("triangle.svg")?.write(triangle.svg().as_bytes())?;
+    }
+    let hole_radius = prepared.instrument.hole.horizon();
+    let report = Report {
+        title: format!("{}: how sure", prepared.file.title),
+        summary: found.sentences(),
+        details: coverage(found),
+        figures: figures(found, &noise, hole_radius)?,
+        drawings: triangle.iter().map(drawing).collect(),
+        ..Report::default()
+    };
+    report.write(&file(PAGE)?)
+}
+
+fn figures(
+    found: &Summary,
+    noise: &Volume,
+    hole_radius: f64,
+) -> anyhow::Result<Vec<report::Figure>> {
+    let shown = [
+        Shown { name: "standard deviation", volume: &found.ensemble.deviation },
+        Shown { name: "mean", volume: &found.ensemble.mean },
+    ];
+    // Where the mean is bright, not where a single dark node is sure to be dark.
+    let at = Through::Point(Through::Maximum.point(&found.ensemble.mean));
+    let ratio = [Shown { name: "mean over standard deviation", volume: noise }];
+    let unit = "model units";
+    let mut second = report::slices(&ratio, at, hole_radius, "standard deviations")?;
+    second.caption = format!("Signal over noise. {}", second.caption);
+    Ok(vec![report::slices(&shown, Through::Maximum, hole_radius, unit)?, second])
+}
+
+fn triangle(found: &Summary) -> Option<Triangle> {
+    let one = |interval: &Interval| Variable {
+        name: interval.parameter.name().replace("_deg", " (°)").replace('_', " "),
+        values: interval.values.clone(),
+        truth: interval.truth,
+    };
+    let variables: Vec<Variable> = found.world.iter().map(one).collect();
+    (!variables.is_empty()).then_some(Triangle { variables })
+}
+
+fn drawing(triangle: &Triangle) -> Drawing {
+    Drawing {
+        svg: triangle.svg(),
+        caption: "Draws of the world: each parameter's distribution on the diagonal, each pair's below it. Orange: what was \
+                  simulated, where the data are a simulation."
+            .to_owned(),
+        alt: "Triangle of the marginal distributions of all unknown parameters.".to_owned(),
+    }
+}
+
+fn table(world: &[Interval]) -> String {
+    let names: Vec<&str> = world.iter().map(|interval| interval.parameter.name()).collect();
+    let count = world.first().map_or(0, |interval| interval.values.len());
+    let row = |k: usize| {
+        let values: Vec<String> =
+            world.iter().map(|interval| format!("{:?}", interval.values[k])).collect();
+        format!("{}\n", values.join(","))
+    };
+    format!("{}\n{}", names.join(","), (0..count).map(row).collect::<String>())
+}
+
+/// How often the truth lies inside, where it is known.
+fn coverage(found: &Summary) -> Vec<report::Table> {
+    let Some(coverage) = &found.coverage else { return Vec::new() };
+    let row = |(name, c): (&str, &kerrlight_tomo::volume::Coverage)| {
+        let percent = |part: f64| format!("{:.0} %", 100.0 * part);
+        vec![name.to_owned(), c.nodes.to_string(), percent(c.one), percent(c.two)]
+    };
+    let names = ["random nodes of the region", "nodes that shine"];
+    vec![report::Table {
+        title: "How often the truth lies inside".to_owned(),
+        caption: "Part of the nodes at which the simulated emission lies within 1 and 1.96 standard deviations of the \
+                  mean: 68 % and 95 % for independent normal errors. Nodes in the dark are inside more often: emission \
+                  is not negative."
+            .to_owned(),
+        head: ["nodes", "number", "within 1 σ", "within 1.96 σ"].map(str::to_owned).to_vec(),
+        rows: names.into_iter().zip(coverage).map(row).collect(),
+        links: Vec::new(),
+    }]
+}

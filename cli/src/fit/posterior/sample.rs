@@ -1,0 +1,117 @@
+//! One draw from the posterior: the fit of data with noise once more.
+
+use super::super::failed;
+use crate::interrupt::Keeper;
+use anyhow::{Context, bail};
+use kerrlight_tomo::fit::linear::LinearProgress;
+use kerrlight_tomo::fit::settings::{FitFile, Kind, Start};
+use kerrlight_tomo::fit::setup::{self, Instrument, Measured};
+use kerrlight_tomo::fit::{Motion, Objective, Outcome, State, Trainer};
+use kerrlight_tomo::representation::Registry;
+use kerrlight_tomo::volume::Volume;
+use std::ops::ControlFlow;
+
+/// What a fit goes through.
+pub struct Through<'a> {
+    /// Settings, with the world that the draw has.
+    pub file: &'a FitFile,
+    /// Rays of that world.
+    pub instrument: &'a Instrument,
+    /// Motion of that world.
+    pub motion: &'a Motion,
+    /// Representations of others.
+    pub registry: &'a Registry,
+}
+
+/// What a draw found.
+pub struct Drawn {
+    /// Emission at the reference time.
+    pub volume: Volume,
+    /// χ² over the number of data, of each loss.
+    pub chi2: Vec<f64>,
+}
+
+/// Fits `measured` from the start, with draws of the representation's parameters of their own; none if it was stopped.
+pub fn draw(
+    through: &Through<'_>,
+    measured: &Measured,
+    keeper: &Keeper,
+    told: &dyn Fn(&str),
+) -> anyhow::Result<Option<Drawn>> {
+    let Through { file, instrument, motion, registry } = *through;
+    let pixels = file.screen.pixels * file.screen.pixels;
+    let data = measured.terms(&file.loss, pixels)?;
+    let objective = Objective { model: setup::forward_model(instrument, motion)?, data };
+    let times = setup::emission_times(instrument, motion);
+    let representation = setup::representation(file, registry, times)?;
+    let (axis, rate) = setup::axis(file)?;
+    let training = setup::training(file, rate)?;
+    let mut state = State::new(&*representation, axis, &training);
+    let mut trainer = Trainer::new(objective, &*representation, training);
+    if !begin(file, &mut trainer, &mut state, times, (keeper, told))? {
+        return Ok(None);
+    }
+    let steps = if file.representation.kind == Kind::LinearGrid { 0 } else { file.training.steps };
+    if !learn(&mut trainer, &mut state, (steps, keeper), told)? {
+        return Ok(None);
+    }
+    let frames: Vec<usize> = (0..measured.times.len()).collect();
+    let movie = trainer.movie(&state.now, &frames, true);
+    let chi2 = trainer.objective.loss_of(&frames, &movie).terms;
+    let volume = super::super::results::recovered(file, &mut trainer, &state)?;
+    Ok(Some(Drawn { volume, chi2 }))
+}
+
+/// The linear problem, where the representation is solved by it or starts from it; whether to go on.
+fn begin(
+    file: &FitFile,
+    trainer: &mut Trainer<'_, f32>,
+    state: &mut State<f32>,
+    times: [f64; 2],
+    (keeper, told): (&Keeper, &dyn Fn(&str)),
+) -> anyhow::Result<bool> {
+    let is_linear = file.representation.kind == Kind::LinearGrid;
+    let change = setup::change(file, times)?;
+    let (nodes, stride, steps) = match file.training.start {
+        _ if is_linear => (file.representation.nodes, 1, 0),
+        Start::Linear { nodes, stride, steps } => (nodes, stride, steps),
+        _ => return Ok(true),
+    };
+    let change = if is_linear { change } else { kerrlight_tomo::fit::linear::Change::NONE };
+    let mut watch = |now: &LinearProgress<'_>| {
+        told(&format!("linear grid, round {}, loss {:.4e}", now.round, now.value));
+        if keeper.stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let how = ((state.now.axis, change), (nodes, stride));
+    let solution = setup::solve_linear(file, &mut trainer.objective, how.0, how.1, &mut watch);
+    let solution = solution.map_err(failed::linear).context("linear")?;
+    if keeper.stopped() {
+        return Ok(false);
+    }
+    if is_linear {
+        state.now.parameters = solution.emission;
+    } else {
+        setup::imprint(file, trainer.representation, &solution.emission, nodes, steps, state)?;
+    }
+    Ok(true)
+}
+
+/// All steps; whether to go on.
+fn learn(
+    trainer: &mut Trainer<'_, f32>,
+    state: &mut State<f32>,
+    (steps, keeper): (u64, &Keeper),
+    told: &dyn Fn(&str),
+) -> anyhow::Result<bool> {
+    while state.now.step < steps {
+        if keeper.stopped() {
+            return Ok(false);
+        }
+        match trainer.step(state) {
+            Ok(Outcome::Converged) => break,
+            Ok(_) => told(&format!("step {}, loss {:.4e}", state.now.step, state.now.loss)),
+            Err(error) => bail!("a draw diverged at step {}: {error}", state.now.step),
+        }
+    }
+    Ok(true)
+}

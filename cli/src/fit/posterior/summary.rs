@@ -1,0 +1,212 @@
+//! What follows from draws: intervals of the world, mean and spread of the volume, features, and how often a known truth
+//! lies inside.
+
+use super::super::world_search::described;
+use super::Kept;
+use kerrlight_tomo::fit::settings::FitFile;
+use kerrlight_tomo::fit::world::Parameter;
+use kerrlight_tomo::volume::{Coverage, Ensemble, Feature, Volume};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use serde_json::{Map, Value, json};
+
+/// A parameter of the world over the draws, in its own unit.
+pub struct Interval {
+    /// Which.
+    pub parameter: Parameter,
+    /// The draws.
+    pub values: Vec<f64>,
+    /// Their mean.
+    pub mean: f64,
+    /// Standard deviation.
+    pub deviation: f64,
+    /// Least and largest value that the prior allows.
+    pub bounds: [f64; 2],
+    /// What was simulated.
+    pub truth: Option<f64>,
+}
+
+/// What follows from draws.
+pub struct Summary {
+    /// Mean and standard deviation of the volume.
+    pub ensemble: Ensemble,
+    /// The world, where it is not known.
+    pub world: Vec<Interval>,
+    /// Bright features, the brightest first.
+    pub features: Vec<Feature>,
+    /// How often the truth lies inside: at random nodes of the region, and at those that shine.
+    pub coverage: Option<[Coverage; 2]>,
+    samples: usize,
+    /// Noise of the draws over the errors of the data.
+    factor: f64,
+    /// Part of the mean's light at nodes whose mean is above three standard deviations.
+    certain: f64,
+}
+
+/// Noise over the errors of the data above which a model is wrong: χ² of 1.2 per data point.
+const WRONG: f64 = 1.1;
+/// Random nodes at which a truth is looked at.
+const NODES: f64 = 1000.0;
+/// Nodes shine where the truth is brighter than this part of its maximum.
+const SHINES: f32 = 0.05;
+
+impl Summary {
+    /// Of draws of a fit, with what its run has found of the world, and the truth where there is one.
+    pub fn new(
+        file: &FitFile,
+        world: Option<&Value>,
+        draws: &[Kept],
+        truth: Option<Volume>,
+    ) -> anyhow::Result<Self> {
+        let volumes: Vec<Volume> = draws.iter().map(|draw| draw.volume.clone()).collect();
+        let ensemble = Ensemble::of(&volumes)?;
+        let features = ensemble.features(&volumes);
+        let world = world.map_or(Vec::new(), |world| intervals(world, draws));
+        let coverage = truth.map(|truth| covered(file, &ensemble, &truth)).transpose()?;
+        let certain = certain(&ensemble);
+        let factors = draws.iter().filter_map(|draw| draw.numbers["noise_factor"].as_f64());
+        let factor = factors.fold(1.0, f64::max);
+        Ok(Self { ensemble, world, features, coverage, samples: draws.len(), factor, certain })
+    }
+
+    /// Numbers for a script.
+    pub fn numbers(&self) -> Value {
+        let world: Map<String, Value> = self.world.iter().map(Interval::numbers).collect();
+        let degrees = |[mean, deviation]: [f64; 2]| [mean.to_degrees(), deviation.to_degrees()];
+        let feature = |f: &Feature| {
+            json!({
+                "radius": f.radius, "azimuth_deg": degrees(f.azimuth), "height": f.height,
+                "light": f.light, "peak": f.peak,
+            })
+        };
+        let coverage = |c: &Coverage| json!({ "nodes": c.nodes, "within_1_sigma": c.one, "within_1.96_sigma": c.two });
+        let [random, bright] = self
+            .coverage
+            .as_ref()
+            .map_or([Value::Null, Value::Null], |all| [coverage(&all[0]), coverage(&all[1])]);
+        json!({
+            "samples": self.samples,
+            "effective_samples": self.samples,
+            "noise_factor": self.factor,
+            "world": world,
+            "features": self.features.iter().map(feature).collect::<Vec<_>>(),
+            "light_above_3_sigma": self.certain,
+            "coverage_random_nodes": random,
+            "coverage_bright_nodes": bright,
+        })
+    }
+
+    /// What a person wants to know.
+    pub fn sentences(&self) -> Vec<String> {
+        let mut all = Vec::new();
+        if self.factor > WRONG {
+            all.push(format!(
+                "The model does not explain the data: draws have noise {:.1} times as large as the errors, and intervals \
+                 are those of a model that is wrong.",
+                self.factor
+            ));
+        }
+        all.extend(self.world.iter().map(Interval::sentence));
+        all.extend(self.features.iter().enumerate().map(|(k, f)| {
+            let ([r, dr], [phi, dphi]) = (f.radius, f.azimuth.map(f64::to_degrees));
+            format!(
+                "Feature {}: radius {r:.2} ± {dr:.2} M, azimuth {phi:.1} ± {dphi:.1}°, light {:.3} ± {:.3}.",
+                k + 1,
+                f.light[0],
+                f.light[1]
+            )
+        }));
+        all.push(format!(
+            "{:.0} % of the light is at nodes where the mean of {} draws is above three standard deviations.",
+            100.0 * self.certain,
+            self.samples
+        ));
+        all
+    }
+}
+
+impl Interval {
+    /// Its values at some quantiles.
+    pub fn quantile(&self, share: f64) -> f64 {
+        let mut sorted = self.values.clone();
+        sorted.sort_by(f64::total_cmp);
+        let at = share * (sorted.len() - 1) as f64;
+        let below = at.floor() as usize;
+        let above = (below + 1).min(sorted.len() - 1);
+        sorted[below] + (at - at.floor()) * (sorted[above] - sorted[below])
+    }
+
+    /// What the interval of 95 % is: that of a normal distribution, inside the bounds.
+    pub fn ends(&self) -> [f64; 2] {
+        let reach = 1.96 * self.deviation;
+        let [low, high] = self.bounds;
+        [(self.mean - reach).max(low), (self.mean + reach).min(high)]
+    }
+
+    fn numbers(&self) -> (String, Value) {
+        let quantiles: Vec<f64> =
+            [0.025, 0.16, 0.5, 0.84, 0.975].iter().map(|share| self.quantile(*share)).collect();
+        let value = json!({
+            "mean": self.mean, "deviation": self.deviation, "quantiles": quantiles, "truth": self.truth,
+        });
+        (self.parameter.name().to_owned(), value)
+    }
+
+    fn sentence(&self) -> String {
+        let (words, unit) = described(self.parameter);
+        let truth = self.truth.map(|truth| if truth.abs() < 5e-4 { 0.0 } else { truth });
+        let truth = truth.map_or(String::new(), |truth| format!(" (truth: {truth:.3}{unit})"));
+        let ([from, to], [low, high]) = (self.ends(), self.bounds);
+        if from <= low && to >= high {
+            return format!("The {words} is not constrained{truth}.");
+        }
+        format!("The {words} is between {from:.3}{unit} and {to:.3}{unit} at 95 %{truth}.")
+    }
+}
+
+fn intervals(world: &Value, draws: &[Kept]) -> Vec<Interval> {
+    let one = |parameter: Parameter| {
+        let name = parameter.name();
+        let best = world["world"][name].as_f64()?;
+        let unit = parameter.unit();
+        // Angles that differ by a whole turn are the same: the short way from the best one.
+        let near = |x: f64| best + parameter.difference(x * unit, best * unit) / unit;
+        let of = |draw: &Kept| draw.numbers["world"][name].as_f64().map(near);
+        let values: Vec<f64> = draws.iter().filter_map(of).collect();
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let squares: f64 = values.iter().map(|x| (x - mean).powi(2)).sum();
+        let bound = |k: usize| world["bounds"][name][k].as_f64().unwrap_or(f64::NAN);
+        Some(Interval {
+            parameter,
+            mean,
+            deviation: (squares / (n - 1.0)).sqrt(),
+            values,
+            bounds: [bound(0), bound(1)],
+            truth: world["truth"][name].as_f64().map(near),
+        })
+    };
+    Parameter::ALL.into_iter().filter_map(one).collect()
+}
+
+fn covered(file: &FitFile, ensemble: &Ensemble, truth: &Volume) -> anyhow::Result<[Coverage; 2]> {
+    let region = file.region.limits();
+    let inside = (0..truth.values().len()).filter(|k| region.holds(truth.position(*k))).count();
+    let mut random = Pcg64::seed_from_u64(file.seed);
+    let part = NODES / inside.max(1) as f64;
+    let mut chosen = || random.random::<f64>() < part;
+    let of_all = ensemble.coverage(truth, |x, _| chosen() && region.holds(x))?;
+    let least = SHINES * truth.values().iter().fold(0.0f32, |most, x| most.max(*x));
+    let of_bright = ensemble.coverage(truth, |x, value| value > least && region.holds(x))?;
+    Ok([of_all, of_bright])
+}
+
+fn certain(ensemble: &Ensemble) -> f64 {
+    let (mean, deviation) = (ensemble.mean.values(), ensemble.deviation.values());
+    let light = |only: bool| -> f64 {
+        let counted = mean.iter().zip(deviation).filter(|(m, d)| !only || **m > 3.0 * **d);
+        counted.map(|(m, _)| f64::from(*m)).sum()
+    };
+    let all = light(false);
+    if all > 0.0 { light(true) / all } else { 0.0 }
+}

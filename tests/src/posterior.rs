@@ -1,0 +1,113 @@
+//! Draws around a finished fit.
+
+use crate::support::{kerrlight, root};
+use serde_json::Value;
+use std::path::Path;
+
+/// The built-in flare, few pixels, scans and voxels.
+fn settings() -> String {
+    let built_in = std::fs::read_to_string(root().join("cli/src/fit/built_in.toml")).unwrap();
+    built_in
+        .replace("pixels = 40", "pixels = 20\nring_rays = 4")
+        .replace("jy_per_pixel = 0.08", "jy_per_pixel = 0.32")
+        .replace("scans = 64", "scans = 12")
+        .replace("iterations = 40", "iterations = 25")
+        .replace("rounds = 4", "rounds = 2")
+        .replace("nodes = 64", "nodes = 20")
+}
+
+fn run(folder: &Path, arguments: &[&str]) -> String {
+    let run = kerrlight(folder, arguments);
+    let told = String::from_utf8_lossy(&run.stderr).into_owned();
+    assert!(run.status.success(), "{arguments:?}: {told}");
+    told
+}
+
+fn read(path: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+#[test]
+fn exact_draws_of_voxels_resume_to_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("fit.toml"), settings()).unwrap();
+    let kind = ["--set", "representation=linear-grid", "--set", "representation.nodes=20"];
+    run(folder.path(), &[&["fit", "fit.toml", "-o", "run"][..], &kind[..]].concat());
+    run(folder.path(), &["posterior", "run", "--samples", "4"]);
+    let of = |name: &str| std::fs::read(folder.path().join("run/posterior").join(name)).unwrap();
+    let numbers = read(&folder.path().join("run/posterior/posterior.json"));
+    assert_eq!((&numbers["samples"], &numbers["world"]), (&4.into(), &serde_json::json!({})));
+    let feature = &numbers["features"][0];
+    let [radius, azimuth] = ["radius", "azimuth_deg"].map(|key| feature[key][0].as_f64().unwrap());
+    assert!((radius - 5.5).abs() < 0.5 && azimuth.abs() < 5.0, "{feature}");
+    let spread = feature["radius"][1].as_f64().unwrap();
+    assert!(spread > 0.0 && spread < 0.5, "{feature}");
+    let coverage = &numbers["coverage_random_nodes"];
+    assert!(coverage["nodes"].as_f64().unwrap() > 800.0, "{coverage}");
+    assert!(coverage["within_1.96_sigma"].as_f64() >= coverage["within_1_sigma"].as_f64());
+    let page = String::from_utf8(of("report.html")).unwrap();
+    assert!(page.contains("Signal over noise") && page.contains("How often the truth lies"));
+    // Two draws again, and the rest found: the same bytes.
+    let all = ["mean.npz", "deviation.npz", "posterior.json"].map(of);
+    for name in ["sample_0002.json", "sample_0003.npz", "sample_0003.json", "mean.npz"] {
+        std::fs::remove_file(folder.path().join("run/posterior").join(name)).unwrap();
+    }
+    run(folder.path(), &["posterior", "run", "--samples", "4", "--threads", "1"]);
+    assert_eq!(all, ["mean.npz", "deviation.npz", "posterior.json"].map(of));
+    // More draws keep those that there are.
+    let first = of("sample_0001.json");
+    run(folder.path(), &["posterior", "run", "--samples", "5"]);
+    assert_eq!(first, of("sample_0001.json"));
+}
+
+#[test]
+fn exact_draws_of_an_unknown_world_have_worlds() {
+    let folder = tempfile::tempdir().unwrap();
+    let view = "{ worlds = 60, nodes = 16, iterations = 40, pixels = 20, frames = 12 }";
+    let text = format!(
+        "{}\n[world.inclination_deg]\nuniform = [50.0, 70.0]\n[world.position_angle_deg]\nuniform = [-10.0, 10.0]\n\
+         [world.search]\nstarts = 1\ndrag_is_spin = true\ncoarse = {view}\nfine = {view}\n",
+        settings()
+    );
+    std::fs::write(folder.path().join("fit.toml"), text).unwrap();
+    let kind = ["--set", "representation=linear-grid", "--set", "representation.nodes=20"];
+    let told = run(
+        folder.path(),
+        &[&["fit", "fit.toml", "-o", "run", "--samples", "3"][..], &kind[..]].concat(),
+    );
+    assert!(told.contains("world.inclination_deg = "), "{told}");
+    let world = read(&folder.path().join("run/world.json"));
+    assert!(world["sigma"]["inclination_deg"].as_f64().unwrap() > 0.0, "{world}");
+    let numbers = read(&folder.path().join("run/posterior/posterior.json"));
+    let inclination = &numbers["world"]["inclination_deg"];
+    assert!((inclination["mean"].as_f64().unwrap() - 60.0).abs() < 3.0, "{inclination}");
+    assert_eq!(inclination["quantiles"].as_array().map(Vec::len), Some(5));
+    let table = std::fs::read_to_string(folder.path().join("run/posterior/worlds.csv")).unwrap();
+    assert!(table.starts_with("inclination_deg,position_angle_deg\n"), "{table}");
+    assert_eq!(table.lines().count(), 4);
+    let triangle =
+        std::fs::read_to_string(folder.path().join("run/posterior/triangle.svg")).unwrap();
+    assert!(triangle.contains("inclination (°)"));
+}
+
+#[test]
+fn exact_draws_without_a_finished_fit_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let refused = |arguments: &[&str], expected: &str| {
+        let run = kerrlight(folder.path(), arguments);
+        let told = String::from_utf8_lossy(&run.stderr).into_owned();
+        assert_eq!(run.status.code(), Some(2), "{arguments:?}: {told}");
+        assert!(told.contains(expected), "{arguments:?}: {told}");
+    };
+    refused(&["posterior", "nowhere", "--samples", "4"], "nowhere");
+    refused(&["posterior", "nowhere", "--samples", "1"], "2..=100000");
+    std::fs::write(folder.path().join("fit.toml"), settings()).unwrap();
+    for (change, expected) in [
+        ("screen.ring_rays=0", "screen.ring_rays = 0 is not allowed: 1 to 1024"),
+        ("linear.degree=quartic", "unknown variant `quartic`, expected"),
+        ("effects.absorption={coefficient=0.1,radius=5.0,height=2.0}", "exclude each other"),
+    ] {
+        refused(&["fit", "fit.toml", "-o", "run", "--set", change], expected);
+        assert!(!folder.path().join("run").exists(), "{change}");
+    }
+}

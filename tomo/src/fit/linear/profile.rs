@@ -1,0 +1,142 @@
+//! What data say of numbers that move all images, when the field follows them: variable projection
+//! (Golub & Pereyra 1973).
+//!
+//! With F(ω) the minimum over fields of a function of images and fields, its slope is that at the minimising field held
+//! (the envelope theorem), and its second derivative the Schur complement
+//! `Iᵀ H I − (Aᵀ H I)ᵀ (Aᵀ H A + P)⁻¹ Aᵀ H I` of images' derivatives I, second derivatives H of the data, operator A and
+//! second derivatives P of penalties, over the nodes that shine. Second derivatives of the images are left out
+//! (Gauss & Newton).
+
+use super::data::Data;
+use super::objective::{Convex, Objective};
+use super::operator::Operator;
+use super::scaled::{add, dot};
+use super::solve::LinearProblem;
+use crate::Error;
+use crate::simd::Float;
+use rayon::prelude::*;
+
+/// Slope and second derivatives of the minimum over fields.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Profile {
+    /// With respect to each number.
+    pub slopes: Vec<f64>,
+    /// Row by row.
+    pub bends: Vec<f64>,
+}
+
+/// Conjugate gradients end where a step adds less than this part of what the field has absorbed.
+const ENOUGH: f64 = 1e-9;
+
+/// Second derivatives of the data times what each number moves, pixel after pixel.
+struct Moved<T> {
+    /// Slopes of the data at the field.
+    slopes: Vec<f64>,
+    /// Images' derivatives times H, number after number.
+    bent: Vec<Vec<T>>,
+}
+
+impl<T: Float + Default> LinearProblem<'_, T> {
+    /// At a field (values at all nodes) that is the best one, with derivatives of the frames' images with respect to
+    /// each number, frame after frame.
+    ///
+    /// `iterations` are those of the conjugate gradients by which the field follows; without any it is held.
+    ///
+    /// # Errors
+    /// If data do not fit the rays, or none is in the frames.
+    pub fn profile(
+        &self,
+        x: &[f64],
+        tangents: &[Vec<T>],
+        iterations: usize,
+    ) -> Result<Profile, Error> {
+        let data = self.data()?;
+        let shines: Vec<bool> = x.iter().map(|x| *x > 0.0 && *x < self.upper).collect();
+        let operator = Operator::new(self.walk(), self.active(&shines), self.frames, usize::MAX);
+        let free: Vec<T> = operator.active.gather(x).into_iter().map(T::of).collect();
+        let images = operator.images(&free);
+        let moved = moved(&data, self.frames, &images, tangents);
+        let terms = self.penalised();
+        let mut objective = Objective::new(&operator, &data, &terms);
+        let taken: Vec<Vec<f64>> = moved.bent.iter().map(|bent| operator.adjoint(bent)).collect();
+        let absorbed: Vec<Vec<f64>> =
+            taken.iter().map(|b| solved(&mut objective, b, iterations)).collect();
+        let n = tangents.len();
+        let product = |a: &[T], b: &[T]| -> f64 {
+            a.iter().zip(b).map(|(a, b)| a.double() * b.double()).sum()
+        };
+        let bend = |k: usize| {
+            let (a, b) = (k / n, k % n);
+            product(&tangents[a], &moved.bent[b]) - dot(&taken[a], &absorbed[b])
+        };
+        Ok(Profile { slopes: moved.slopes, bends: (0..n * n).map(bend).collect() })
+    }
+}
+
+fn moved<T: Float>(
+    data: &Data<'_, T>,
+    frames: &[usize],
+    images: &[T],
+    tangents: &[Vec<T>],
+) -> Moved<T> {
+    let pixels = images.len() / frames.len();
+    let of_frame = |(k, frame): (usize, &usize)| {
+        let range = k * pixels..(k + 1) * pixels;
+        let image = &images[range.clone()];
+        let (mut here, mut there) = (vec![T::zero(); pixels], vec![T::zero(); pixels]);
+        data.value(*frame, image, &mut here);
+        let largest = |all: &[T]| all.iter().fold(0.0f64, |most, x| most.max(x.double().abs()));
+        let of_number = |tangent: &Vec<T>| {
+            let tangent = &tangent[range.clone()];
+            let slope: f64 = here.iter().zip(tangent).map(|(a, b)| a.double() * b.double()).sum();
+            // As long as the image, so that the slopes that are subtracted cost no digits.
+            let length = largest(tangent);
+            let step = if length > 0.0 { largest(image).max(1e-12) / length } else { 1.0 };
+            let shifted: Vec<T> =
+                image.iter().zip(tangent).map(|(x, t)| *x + T::of(step) * *t).collect();
+            data.value(*frame, &shifted, &mut there);
+            let bent = there.iter().zip(&here).map(|(a, b)| (*a - *b) * T::of(1.0 / step));
+            (slope, bent.collect::<Vec<T>>())
+        };
+        tangents.iter().map(of_number).collect::<Vec<_>>()
+    };
+    let all: Vec<Vec<(f64, Vec<T>)>> = frames.par_iter().enumerate().map(of_frame).collect();
+    let of = |n: usize| all.iter().map(move |frame| &frame[n]);
+    let numbers = 0..tangents.len();
+    Moved {
+        slopes: numbers.clone().map(|n| of(n).map(|x| x.0).sum()).collect(),
+        bent: numbers.map(|n| of(n).flat_map(|x| x.1.iter().copied()).collect()).collect(),
+    }
+}
+
+/// M⁻¹ b by conjugate gradients with a diagonal preconditioner.
+fn solved(objective: &mut dyn Convex, b: &[f64], iterations: usize) -> Vec<f64> {
+    let diagonal = objective.diagonal();
+    let scaled = |r: &[f64]| -> Vec<f64> { r.iter().zip(&diagonal).map(|(r, d)| r / d).collect() };
+    let mut x = vec![0.0; b.len()];
+    let (mut r, mut product) = (b.to_vec(), Vec::new());
+    let mut z = scaled(&r);
+    let mut p = z.clone();
+    let (mut rz, mut absorbed) = (dot(&r, &z), 0.0);
+    for _ in 0..iterations {
+        objective.curvature(&p, &mut product);
+        let bend = dot(&p, &product);
+        if bend <= 0.0 || rz <= 0.0 {
+            break;
+        }
+        let step = rz / bend;
+        add(&mut x, step, &p);
+        add(&mut r, -step, &product);
+        let gained = step * rz;
+        absorbed += gained;
+        if gained < ENOUGH * absorbed {
+            break;
+        }
+        z = scaled(&r);
+        let next = dot(&r, &z);
+        let keep = next / rz;
+        p.iter_mut().zip(&z).for_each(|(p, z)| *p = z + keep * *p);
+        rz = next;
+    }
+    x
+}

@@ -1,0 +1,83 @@
+//! The minimum over fields as a function of numbers that move all images.
+
+use super::*;
+use crate::fit::linear::LinearProblem;
+
+/// Data that the images of a field and ω times fixed images explain together.
+struct Case {
+    model: ForwardModel<f64>,
+    moved: Vec<Vec<f64>>,
+    data: Vec<f64>,
+}
+
+const VOXELS: usize = 5;
+const SMOOTH: f64 = 0.02;
+
+impl Case {
+    fn new() -> Self {
+        let model = forward_model();
+        let voxels = Voxels::cube(VOXELS, 5.0, Degree::Linear);
+        let count = FRAMES.len() * model.pixels();
+        let mut data = movie(&model, &voxels, &random(voxels.count(), 7));
+        let noise = random(count, 8);
+        data.iter_mut().zip(noise).for_each(|(pixel, n)| *pixel += 2.0 * (n - 0.5));
+        // One that fields can follow in part, and one that they cannot.
+        let mut first = movie(&model, &voxels, &random(voxels.count(), 9));
+        first.iter_mut().zip(random(count, 10)).for_each(|(pixel, n)| *pixel += n);
+        let second = random(count, 11).iter().map(|n| n - 0.5).collect();
+        Self { model, moved: vec![first, second], data }
+    }
+
+    /// Hands the problem of data less ω times the images to a function.
+    fn with<R>(&self, omega: [f64; 2], f: impl FnOnce(&LinearProblem<'_, f64>) -> R) -> R {
+        let [a, b] = &self.moved[..] else { panic!("two numbers") };
+        let left = self.data.iter().zip(a.iter().zip(b));
+        let left = left.map(|(d, (a, b))| d - omega[0] * a - omega[1] * b).collect();
+        let term = ImageTerm::new(left, self.model.pixels(), 0.5).unwrap();
+        let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
+        f(&LinearProblem {
+            model: &self.model,
+            axis: axis(),
+            frames: &FRAMES,
+            terms: &terms,
+            voxels: Voxels::cube(VOXELS, 5.0, Degree::Linear),
+            upper: 1e3,
+            flux: None,
+            priors: &[Prior { regulariser: Regulariser::Smoothness, weight: SMOOTH }],
+            change: Change::NONE,
+        })
+    }
+
+    fn least(&self, omega: [f64; 2]) -> (Vec<f64>, f64) {
+        let Least { x, value } = self.with(omega, |problem| problem.least(20_000)).unwrap();
+        (x, value)
+    }
+}
+
+/// Steps are small enough that no node goes dark or lights up.
+#[test]
+fn exact_slopes_and_bends_are_those_of_differences_of_the_minimum() {
+    let case = Case::new();
+    let (x, _) = case.least([0.0; 2]);
+    // Images move by −∂(data)/∂ω.
+    let found = case.with([0.0; 2], |problem| problem.profile(&x, &case.moved, 4000)).unwrap();
+    let h = 2e-3;
+    let at = |a: f64, b: f64| case.least([a * h, b * h]).1;
+    let middle = at(0.0, 0.0);
+    for (k, [a, b]) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
+        let (up, down) = (at(a, b), at(-a, -b));
+        let slope = (up - down) / (2.0 * h);
+        assert!((slope / found.slopes[k] - 1.0).abs() < 1e-5, "{k}: {slope} {:?}", found.slopes);
+        let bend = (up - 2.0 * middle + down) / (h * h);
+        let of = found.bends[3 * k];
+        assert!((bend / of - 1.0).abs() < 2e-3, "{k}: {bend} {of}");
+    }
+    let mixed = (at(1.0, 1.0) - at(1.0, -1.0) - at(-1.0, 1.0) + at(-1.0, -1.0)) / (4.0 * h * h);
+    let scale = (found.bends[0] * found.bends[3]).sqrt();
+    assert!((mixed - found.bends[1]).abs() < 2e-3 * scale, "{mixed} {:?}", found.bends);
+    // Conjugate gradients end where squares change by 1e-9, products by its root.
+    assert!((found.bends[1] - found.bends[2]).abs() < 1e-4 * scale);
+    // A field that is held follows nothing: the data say more.
+    let held = case.with([0.0; 2], |problem| problem.profile(&x, &case.moved, 0)).unwrap();
+    assert!(held.bends[0] > 1.05 * found.bends[0], "{held:?} {found:?}");
+}

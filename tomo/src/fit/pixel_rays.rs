@@ -1,0 +1,153 @@
+//! More rays for the pixels that the photon ring passes through.
+//!
+//! Subrings are narrower than pixels and as bright as what they are images of (Gralla, Holz & Wald 2019): a single ray
+//! in the middle of a pixel meets one or misses it. The mean over several rays is the pixel's flux, and changes
+//! smoothly with the world.
+
+use kerrlight_geodesic::analytic::CriticalCurve;
+use kerrlight_geodesic::{Kerr, Observer};
+
+/// How pixels near the critical curve are seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RingRays {
+    /// Rays of each of them.
+    pub count: usize,
+    /// Width of a pixel on the screen, M.
+    pub spacing: f64,
+    /// By which part of a pixel they are shifted, those that leave it coming back on the other side.
+    pub shift: [f64; 2],
+}
+
+impl RingRays {
+    /// Shifts that are spread evenly over a pixel; none for number 0.
+    pub fn shift(number: u64) -> [f64; 2] {
+        // Powers of the root of x³ = x + 1 (Roberts 2018).
+        const ROOT: f64 = 1.324_717_957_244_746;
+        [1, 2].map(|power| (number as f64 * ROOT.powi(-power)).fract())
+    }
+}
+
+/// Rays of all pixels, pixel after pixel.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct PixelRays {
+    /// Where they are on the screen, M to the right and upwards.
+    pub places: Vec<[f64; 2]>,
+    /// Pixel k has the rays `starts[k]..starts[k + 1]`.
+    pub starts: Vec<usize>,
+}
+
+/// Half the diagonal of a pixel of width 1.
+const HALF_DIAGONAL: f64 = core::f64::consts::FRAC_1_SQRT_2;
+/// How far beyond the pixel the critical curve may be, M: the second image lies within that.
+const BEYOND: f64 = 0.3;
+/// Points of the critical curve.
+const POINTS: u32 = 256;
+/// Distance of neighbours in the sequence k φ mod 1, which is the most even one: the golden ratio less 1.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+impl PixelRays {
+    /// One ray in the middle of each pixel.
+    pub fn single(x: &[f64], y: &[f64]) -> Self {
+        let places = x.iter().zip(y).map(|(x, y)| [*x, *y]).collect();
+        Self { places, starts: (0..=x.len()).collect() }
+    }
+
+    /// `ring.count` rays for each pixel near the critical curve, one for the others; `screen` gives (α, β) in M of a
+    /// place on the screen.
+    pub fn new(
+        ring: RingRays,
+        (hole, observer): (&Kerr, &Observer),
+        [x, y]: [&[f64]; 2],
+        screen: impl Fn([f64; 2]) -> [f64; 2],
+    ) -> Self {
+        let curve: Vec<[f64; 2]> = CriticalCurve::new(hole, observer.inclination())
+            .points(POINTS)
+            .map(|point| [point.alpha, point.beta])
+            .collect();
+        let width = distance(screen([0.0, 0.0]), screen([ring.spacing, 0.0]));
+        let limit = HALF_DIAGONAL * width + BEYOND;
+        let mut all = Self { places: Vec::new(), starts: vec![0] };
+        for (x, y) in x.iter().zip(y) {
+            let here = screen([*x, *y]);
+            if curve.iter().any(|point| distance(*point, here) < limit) {
+                let places = (0..ring.count).map(|k| ring.place(k));
+                all.places
+                    .extend(places.map(|[u, v]| [x + u * ring.spacing, y + v * ring.spacing]));
+            } else {
+                all.places.push([*x, *y]);
+            }
+            all.starts.push(all.places.len());
+        }
+        all
+    }
+
+    /// The pixel of a ray.
+    pub fn pixel_of(&self, ray: usize) -> usize {
+        self.starts.partition_point(|start| *start <= ray) - 1
+    }
+
+    /// What a ray counts in its pixel.
+    pub fn share(&self, pixel: usize) -> f64 {
+        1.0 / (self.starts[pixel + 1] - self.starts[pixel]) as f64
+    }
+}
+
+impl RingRays {
+    /// The k-th of the places spread over a pixel of width 1 about 0, such that none are behind each other from any
+    /// side.
+    fn place(&self, k: usize) -> [f64; 2] {
+        let even = [(k as f64 + 0.5) / self.count as f64, k as f64 * GOLDEN + 0.5];
+        [0, 1].map(|c| (even[c] + self.shift[c]).fract() - 0.5)
+    }
+}
+
+fn distance([a, b]: [f64; 2], [c, d]: [f64; 2]) -> f64 {
+    (a - c).hypot(b - d)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use kerrlight_geodesic::Inclination;
+
+    fn rays(count: usize) -> PixelRays {
+        let hole = Kerr::new(0.0).unwrap();
+        let observer = Observer::at_infinity(Inclination::from_degrees(60.0).unwrap());
+        // The critical curve is a circle of 3√3 = 5.196.
+        let (x, y) = ([5.3, 0.0, 8.0, -3.6], [0.0, 0.0, 0.0, 3.6]);
+        PixelRays::new(
+            RingRays { count, spacing: 0.5, shift: [0.0; 2] },
+            (&hole, &observer),
+            [&x, &y],
+            |place| place,
+        )
+    }
+
+    #[test]
+    fn exact_pixels_of_the_ring_have_more_rays() {
+        let rays = rays(8);
+        assert_eq!(rays.starts, [0, 8, 9, 10, 18]);
+        assert_eq!([0, 7, 8, 9, 17].map(|ray| rays.pixel_of(ray)), [0, 0, 1, 2, 3]);
+        assert_eq!([0, 1, 3].map(|pixel| rays.share(pixel)), [0.125, 1.0, 0.125]);
+        assert_eq!((rays.places[8], rays.places[9]), ([0.0, 0.0], [8.0, 0.0]));
+        let inside = |place: &[f64; 2]| (place[0] - 5.3).abs() < 0.25 && place[1].abs() < 0.25;
+        assert!(rays.places[..8].iter().all(inside));
+    }
+
+    /// No line through the pixel meets more than a few of the places: seen along any direction they are spread.
+    #[test]
+    fn exact_lattices_are_spread_from_all_sides() {
+        let count = 13;
+        let ring = RingRays { count, spacing: 1.0, shift: RingRays::shift(3) };
+        for turn in 0..90 {
+            let (sin, cos) = (f64::from(turn) * 0.035).sin_cos();
+            let mut seen: Vec<f64> =
+                (0..count).map(|k| ring.place(k)).map(|[u, v]| u * cos + v * sin).collect();
+            seen.sort_by(f64::total_cmp);
+            let widest = seen.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0f64, f64::max);
+            assert!(widest < 0.35, "{turn}: {widest}");
+            let mean = seen.iter().sum::<f64>() / count as f64;
+            assert!(mean.abs() < 0.1, "{turn}: {mean}");
+        }
+    }
+}

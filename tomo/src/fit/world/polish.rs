@@ -1,0 +1,224 @@
+//! Gauss–Newton steps to the best world, with the volume solved for in each (variable projection, Golub & Pereyra
+//! 1973).
+//!
+//! Images are differentiated by differences as wide as the ripples that rays next to the critical curve make: exact
+//! derivatives are those of single ripples.
+
+use super::problem::{Estimate, WorldProblem};
+use super::{Prior, World};
+use crate::Error;
+use crate::fit::linear::Profile;
+use crate::fit::{Batch, Field, ForwardModel};
+use crate::representation::Workspace;
+use crate::simd::Float;
+use nalgebra::{DMatrix, DVector};
+
+/// Where Gauss–Newton steps ended.
+#[derive(Clone, Debug)]
+pub struct Polished {
+    /// The best world and its volume.
+    pub best: Estimate,
+    /// Covariance of the free parameters row by row, in their own units: the inverse of half the second derivatives of
+    /// χ² with the volume solved for, and of those of the priors.
+    pub covariance: Vec<f64>,
+    /// Steps that lowered the value.
+    pub steps: usize,
+}
+
+/// How steps are taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Polish {
+    /// Steps, at most.
+    pub steps: usize,
+    /// Iterations of each solution, from the last one.
+    pub iterations: usize,
+    /// Conjugate gradients by which the volume follows the world, at most.
+    pub following: usize,
+}
+
+impl Default for Polish {
+    fn default() -> Self {
+        Self { steps: 8, iterations: 160, following: 300 }
+    }
+}
+
+/// Half the distance of a difference, in units of [`Parameter::scale`](super::Parameter::scale).
+const WIDTH: f64 = 0.1;
+/// Parts of a step that are tried.
+const PARTS: [f64; 4] = [1.0, 0.5, 0.25, 0.1];
+/// Steps that promise to lower the value by less than this are not taken: a tenth of a standard deviation.
+const ENOUGH: f64 = 0.005;
+
+/// Slope and second derivatives of the value with respect to the free parameters in units of their scales.
+struct Bowl {
+    slopes: DVector<f64>,
+    bends: DMatrix<f64>,
+}
+
+impl<T: Float + Default> WorldProblem<'_, T> {
+    /// From a world and its volume to the best one near it.
+    ///
+    /// # Errors
+    /// If a number is out of its range, or χ² is not finite.
+    pub fn polish(&self, start: &Estimate, how: &Polish) -> Result<Polished, Error> {
+        let mut best = self.solve_from(start.world, &start.x, how.iterations)?;
+        let mut bowl = self.bowl(&best, how.following)?;
+        let mut steps = 0;
+        while steps < how.steps {
+            let Some(lower) = self.descend(&best, &bowl, how.iterations)? else { break };
+            best = lower;
+            steps += 1;
+            bowl = self.bowl(&best, how.following)?;
+        }
+        let covariance = self.covariance(&bowl);
+        Ok(Polished { best, covariance, steps })
+    }
+
+    /// Steps with known second derivatives to the best world of other data, or through other rays, near a world.
+    ///
+    /// # Errors
+    /// As those of [`polish`](Self::polish).
+    pub fn follow(
+        &self,
+        polished: &Polished,
+        steps: usize,
+        how: &Polish,
+    ) -> Result<Estimate, Error> {
+        let n = self.free.len();
+        let scale = |k: usize| self.free[k].parameter.scale();
+        let covariance =
+            DMatrix::from_fn(n, n, |a, b| polished.covariance[a * n + b] / (scale(a) * scale(b)));
+        let mut now = self.solve_from(polished.best.world, &polished.best.x, how.iterations)?;
+        let Some(bends) = covariance.try_inverse() else { return Ok(now) };
+        for _ in 0..steps {
+            let bowl = Bowl { slopes: self.bowl(&now, 0)?.slopes, bends: bends.clone() };
+            let Some(lower) = self.descend(&now, &bowl, how.iterations)? else { break };
+            now = lower;
+        }
+        Ok(now)
+    }
+
+    /// The best volume of a world, from that of another one.
+    fn solve_from(&self, world: World, x: &[f64], iterations: usize) -> Result<Estimate, Error> {
+        let forward: ForwardModel<T> = self.model.forward(&world)?;
+        let least = self.linear(&forward).least_from(Some(x), iterations)?;
+        Ok(self.estimate(world, least))
+    }
+
+    /// The first part of a Newton step that lowers the value; none if none does.
+    fn descend(
+        &self,
+        from: &Estimate,
+        bowl: &Bowl,
+        iterations: usize,
+    ) -> Result<Option<Estimate>, Error> {
+        let Some(inverse) = bowl.bends.clone().cholesky() else { return Ok(None) };
+        let step = -inverse.solve(&bowl.slopes);
+        if -0.5 * step.dot(&bowl.slopes) < ENOUGH {
+            return Ok(None);
+        }
+        for part in PARTS {
+            let own = |k: usize| part * step[k] * self.free[k].parameter.scale();
+            let own: Vec<f64> = (0..step.len()).map(own).collect();
+            let there = self.solve_from(self.moved(&from.world, &own), &from.x, iterations)?;
+            if there.value < from.value {
+                return Ok(Some(there));
+            }
+        }
+        Ok(None)
+    }
+
+    /// A world at a distance, in the parameters' own units; bounds hold it.
+    fn moved(&self, from: &World, step: &[f64]) -> World {
+        self.free.iter().zip(step).fold(*from, |world, (free, step)| {
+            let [low, high] = free.bounds();
+            world.with(free.parameter, (from.get(free.parameter) + step).clamp(low, high))
+        })
+    }
+
+    fn covariance(&self, bowl: &Bowl) -> Vec<f64> {
+        let n = self.free.len();
+        let inverse = match bowl.bends.clone().cholesky() {
+            Some(factors) => factors.inverse(),
+            None => DMatrix::from_diagonal_element(n, n, f64::INFINITY),
+        };
+        let scale = |k: usize| self.free[k].parameter.scale();
+        (0..n * n).map(|k| inverse[(k / n, k % n)] * scale(k / n) * scale(k % n)).collect()
+    }
+
+    /// Slope and second derivatives at a world with its best volume.
+    fn bowl(&self, at: &Estimate, following: usize) -> Result<Bowl, Error> {
+        let forward: ForwardModel<T> = self.model.forward(&at.world)?;
+        let moved = self.image_differences(at)?;
+        let Profile { slopes, bends } = self.linear(&forward).profile(&at.x, &moved, following)?;
+        let n = self.free.len();
+        let half = 0.5 * self.scale;
+        let mut bowl = Bowl {
+            slopes: DVector::from_vec(slopes) * half,
+            bends: DMatrix::from_row_slice(n, n, &bends) * half,
+        };
+        for (k, free) in self.free.iter().enumerate() {
+            let scale = free.parameter.scale();
+            let [slope, bend] = curve(&free.prior, at.world.get(free.parameter), WIDTH * scale);
+            bowl.slopes[k] += slope * scale;
+            bowl.bends[(k, k)] += bend * scale * scale;
+        }
+        Ok(bowl)
+    }
+
+    /// What images of a held volume change by per scale of each free parameter.
+    fn image_differences(&self, at: &Estimate) -> Result<Vec<Vec<T>>, Error> {
+        let one = |free: &super::Free| -> Result<Vec<T>, Error> {
+            let ([low, high], here) = (free.bounds(), at.world.get(free.parameter));
+            let width = WIDTH * free.parameter.scale();
+            let ends = [(here - width).max(low), (here + width).min(high)];
+            let [before, after] = ends.map(|value| at.world.with(free.parameter, value));
+            let (before, after) = (self.images(before, &at.x)?, self.images(after, &at.x)?);
+            let factor = T::of(free.parameter.scale() / (ends[1] - ends[0]));
+            Ok(after.iter().zip(&before).map(|(a, b)| (*a - *b) * factor).collect())
+        };
+        self.free.iter().map(one).collect()
+    }
+
+    /// Images of a volume in a world, frame after frame.
+    fn images(&self, world: World, x: &[f64]) -> Result<Vec<T>, Error> {
+        let forward: ForwardModel<T> = self.model.forward(&world)?;
+        let representation = self.voxels().field()?;
+        let parameters: Vec<T> = x.iter().map(|x| T::of(*x)).collect();
+        let field = Field {
+            representation: &representation,
+            parameters: &parameters,
+            axis: self.model.axis,
+            occupancy: None,
+        };
+        let mut movie = vec![T::zero(); self.frames.len() * forward.pixels()];
+        let (mut batch, mut workspace) = (Batch::default(), Workspace::new());
+        forward.movie(field, self.frames, &mut batch, &mut workspace, &mut movie);
+        Ok(movie)
+    }
+}
+
+/// Slope and second derivative of a prior's penalty by differences inside its bounds.
+fn curve(prior: &Prior, x: f64, width: f64) -> [f64; 2] {
+    let [low, high] = prior.bounds();
+    let x = x.clamp(low + width, high - width);
+    let [before, here, after] = [x - width, x, x + width].map(|x| prior.penalty(x));
+    let slope = (after - before) / (2.0 * width);
+    [slope, ((after - 2.0 * here + before) / (width * width)).max(0.0)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exact_priors_curve_like_their_densities() {
+        let [slope, bend] = curve(&Prior::Normal { mean: 0.3, sigma: 0.2 }, 0.5, 1e-3);
+        assert!((slope - 5.0).abs() < 1e-9 && (bend - 25.0).abs() < 1e-6, "{slope} {bend}");
+        assert_eq!(curve(&Prior::Uniform { low: 0.0, high: 1.0 }, 1.0, 0.1), [0.0, 0.0]);
+        let isotropic = Prior::Isotropic { low: 0.0, high: core::f64::consts::PI };
+        let [slope, bend] = curve(&isotropic, 1.0, 1e-3);
+        assert!((slope + 1.0 / 1f64.tan()).abs() < 1e-5);
+        assert!((bend - 1.0 / 1f64.sin().powi(2)).abs() < 1e-4);
+    }
+}
