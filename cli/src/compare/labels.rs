@@ -10,7 +10,7 @@ pub fn number(x: f64, digits: usize) -> String {
 }
 
 /// Results that are shown: their names in results.json, what they are called, their units and digits.
-pub const RESULTS: [(&str, &str, &str, usize); 25] = [
+pub const RESULTS: [(&str, &str, &str, usize); 32] = [
     ("psnr_db", "PSNR", "dB", 2),
     ("psnr_inside_db", "PSNR inside the region", "dB", 2),
     ("psnr_over_time_db", "PSNR over time", "dB", 2),
@@ -30,6 +30,13 @@ pub const RESULTS: [(&str, &str, &str, usize); 25] = [
     ("inclination_within_95", "inclination within its 95 % interval", "", 2),
     ("position_angle_within_68", "position angle within its 68 % interval", "", 2),
     ("position_angle_within_95", "position angle within its 95 % interval", "", 2),
+    ("band_inclination_deg", "median of the inclination", "°", 1),
+    ("band_inclination_low_deg", "2.5 % quantile of the inclination", "°", 1),
+    ("band_inclination_high_deg", "97.5 % quantile of the inclination", "°", 1),
+    ("band_radius", "radius of the flare", "M", 2),
+    ("band_azimuth_deg", "azimuth of the flare", "°", 1),
+    ("band_forward", "probability of the law's sense of rotation", "", 4),
+    ("band_validation", "χ² per data point of samples that were not fitted", "", 3),
     ("chi2", "χ² per data point", "", 3),
     ("loss", "loss", "", 6),
     ("seconds", "wall time", "s", 1),

@@ -36,6 +36,7 @@ const CARRIED: &[(&str, &str)] = &carried![
     "experiments/world.toml",
     "experiments/calibration.toml",
     "experiments/soft-flow.toml",
+    "experiments/orbital-polarimetry.toml",
     "experiments/fits/first_pattern.toml",
     "experiments/fits/second_pattern.toml",
     "experiments/fits/digits.toml",
@@ -43,6 +44,7 @@ const CARRIED: &[(&str, &str)] = &carried![
     "scenes/fits/scene_1.toml",
     "scenes/fits/scene_4.toml",
     "scenes/fits/scene_8.toml",
+    "scenes/fits/orbital_polarimetry.toml",
     "cli/src/fit/built_in.toml",
 ];
 

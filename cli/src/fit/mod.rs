@@ -2,6 +2,7 @@
 
 mod api;
 mod axis_scan;
+mod band_search;
 mod curves;
 mod data;
 mod failed;

@@ -1,6 +1,7 @@
 //! The run: steps, log, checkpoints, results.
 
 use super::axis_scan;
+use super::band_search;
 use super::data;
 use super::failed;
 use super::folder::{self, Folder};
@@ -85,7 +86,10 @@ pub fn run(
 ) -> anyhow::Result<Answer> {
     let Prepared { file, registry, instrument, measured, motion } = prepared;
     let begun = Instant::now();
-    let placed = world_search::place(file, instrument, measured, folder)?;
+    let placed = match world_search::place(file, instrument, measured, folder)? {
+        None => band_search::place(file, measured, folder)?,
+        placed => placed,
+    };
     let (file, instrument, motion) = match &placed {
         Some(Placed { file, instrument, motion }) => (file, instrument, motion),
         None => (file, instrument, motion),

@@ -40,6 +40,7 @@
 //! # Ok::<(), kerrlight_tomo::Error>(())
 //! ```
 
+pub mod band;
 mod batch;
 pub mod checkpoint;
 mod curve_term;

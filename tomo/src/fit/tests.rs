@@ -2,6 +2,7 @@
 
 use super::*;
 
+mod orbital;
 mod penalised;
 mod quasi_newton;
 mod stokes;

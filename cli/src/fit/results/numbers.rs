@@ -1,7 +1,7 @@
 //! What was found, in numbers.
 
 use super::{Estimate, Found};
-use crate::fit::{linear, world_search};
+use crate::fit::{band_search, linear, world_search};
 use crate::report;
 use crate::usage::usage;
 use kerrlight_tomo::fit::{State, Trainer};
@@ -64,10 +64,7 @@ impl Estimate<'_> {
         if let Some(linear) = linear::outcome(self.file, &self.folder.lines()?) {
             results["linear"] = linear;
         }
-        if let Some(world) = world_search::found(self.folder)? {
-            world_search::errors(&world).into_iter().for_each(|(key, value)| results[key] = value);
-            results["world"] = world;
-        }
+        self.add_worlds(&mut results)?;
         let unknown = self.file.unknowns();
         if !unknown.is_empty() {
             results["unknown"] = json!(unknown);
@@ -93,6 +90,21 @@ impl Estimate<'_> {
             results["nrmse_over_time"] = json!(changes.closeness.nrmse());
         }
         Ok(results)
+    }
+}
+
+impl Estimate<'_> {
+    /// The worlds that were found, where they were not known.
+    fn add_worlds(&self, results: &mut Value) -> anyhow::Result<()> {
+        if let Some(world) = world_search::found(self.folder)? {
+            world_search::errors(&world).into_iter().for_each(|(key, value)| results[key] = value);
+            results["world"] = world;
+        }
+        if let Some(band) = band_search::found(self.folder)? {
+            band_search::numbers(&band).into_iter().for_each(|(key, value)| results[key] = value);
+            results["band"] = band;
+        }
+        Ok(())
     }
 }
 

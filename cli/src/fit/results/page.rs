@@ -5,7 +5,7 @@ use super::numbers::outcomes;
 use super::over_time::Changes;
 use super::{Estimate, Found};
 use crate::fit::curves::{loss_plot, psnr_plot};
-use crate::fit::{labels, world_search};
+use crate::fit::{band_search, labels, world_search};
 use crate::output;
 use crate::report::{self, LinePlot, Report, View3d};
 use anyhow::Context;
@@ -152,6 +152,9 @@ impl Estimate<'_> {
         )];
         if results["world"].is_object() {
             lines.extend(world_search::sentences(&results["world"]));
+        }
+        if results["band"].is_object() {
+            lines.extend(band_search::sentences(&results["band"]));
         }
         if let Some(statement) = results["linear"]["statement"].as_str() {
             lines.push(format!("The linear grid's solution: {statement}."));

@@ -9,6 +9,7 @@
 mod certificate;
 mod change;
 mod data;
+mod dense;
 mod descent;
 mod error;
 mod lit;

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
 
 /// No column.
-const NONE: u32 = u32::MAX;
+pub(super) const NONE: u32 = u32::MAX;
 /// Pieces that frames are cut into, whatever the number of threads: each adds up its own gradient.
 const PIECES: usize = 16;
 /// Frames whose rows are made at a time; memory is checked between them.
@@ -20,10 +20,10 @@ pub(super) struct Active {
     /// Node of each column.
     pub node: Vec<u32>,
     /// Column of each node, or [`NONE`].
-    column: Vec<u32>,
+    pub column: Vec<u32>,
     /// By its first node, whether any of a cell's nodes counts. Cells of nodes at the edge reach into the next row, plane
     /// or knot: no ray meets them.
-    cells: Vec<bool>,
+    pub cells: Vec<bool>,
 }
 
 impl Active {
@@ -62,11 +62,11 @@ impl Active {
 
 /// The rows of a frame that are not empty.
 #[derive(Default)]
-struct Rows<T> {
-    pixel: Vec<u32>,
-    starts: Vec<u32>,
-    columns: Vec<u32>,
-    entries: Vec<T>,
+pub(super) struct Rows<T> {
+    pub pixel: Vec<u32>,
+    pub starts: Vec<u32>,
+    pub columns: Vec<u32>,
+    pub entries: Vec<T>,
 }
 
 impl<T: Float> Rows<T> {
@@ -104,17 +104,6 @@ impl<T: Float> Rows<T> {
         }
     }
 
-    /// Adds a row of all columns.
-    fn push_dense(&mut self, pixel: u32, row: &[T]) {
-        let lit = row.iter().enumerate().filter(|(_, entry)| **entry != T::zero());
-        for (column, entry) in lit {
-            self.columns.push(column as u32);
-            self.entries.push(*entry);
-        }
-        self.pixel.push(pixel);
-        self.starts.push(self.columns.len() as u32);
-    }
-
     fn forward(&self, x: &[T], image: &mut [T]) {
         for (pixel, ends) in self.pixel.iter().zip(self.starts.windows(2)) {
             let range = ends[0] as usize..ends[1] as usize;
@@ -146,12 +135,12 @@ impl<T: Float> Rows<T> {
 /// The movie as a function of the values at the nodes that count. Rows that fit into the memory are
 /// kept, those of other frames made anew each time.
 pub(super) struct Operator<'a, T> {
-    walk: Walk<'a, T>,
+    pub walk: Walk<'a, T>,
     pub active: Active,
-    corners: Vec<usize>,
-    frames: &'a [usize],
-    pixels: usize,
-    rows: Vec<Option<Rows<T>>>,
+    pub corners: Vec<usize>,
+    pub frames: &'a [usize],
+    pub pixels: usize,
+    pub rows: Vec<Option<Rows<T>>>,
 }
 
 /// Memory of a thread.
@@ -191,31 +180,6 @@ impl<'a, T: Float + Default> Operator<'a, T> {
         });
         rows.columns.shrink_to_fit();
         rows.entries.shrink_to_fit();
-        rows
-    }
-
-    /// Rows to which all rays add.
-    fn fluxes_of(&self, frame: usize) -> Rows<T> {
-        let columns = self.active.count();
-        let mut sums = vec![T::zero(); self.pixels * columns];
-        let (wanted, degree) = (Some(self.active.cells.as_slice()), self.walk.voxels.degree);
-        let mut weights = [T::zero(); STENCIL];
-        self.walk.frame(frame, wanted, &mut Buffers::default(), |pixel, places| {
-            let row = &mut sums[pixel as usize * columns..][..columns];
-            for at in places {
-                at.weights(degree, &mut weights);
-                for (corner, entry) in self.corners.iter().zip(weights) {
-                    let column = self.active.column[at.corner as usize + corner];
-                    if column != NONE {
-                        row[column as usize] += entry;
-                    }
-                }
-            }
-        });
-        let mut rows = Rows { starts: vec![0], ..Rows::default() };
-        for (pixel, row) in sums.chunks_exact(columns.max(1)).enumerate() {
-            rows.push_dense(pixel as u32, row);
-        }
         rows
     }
 

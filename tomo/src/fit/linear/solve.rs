@@ -228,6 +228,13 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         Ok(Least { x: found.x, value })
     }
 
+    /// The matrix from voxels to pixels: frame by frame of [`frames`](Self::frames), pixel by pixel, a row of all voxels
+    /// (and knots), in double precision.
+    pub fn rows(&self) -> Vec<Vec<f64>> {
+        let operator = Operator::new(self.walk(), self.all(), self.frames, usize::MAX);
+        operator.all_rows()
+    }
+
     pub(super) fn data(&self) -> Result<Data<'_, T>, Error> {
         Data::new(self.terms, self.frames, self.model.pixels(), self.model.frames())
     }

@@ -3,6 +3,7 @@
 //! They are a TOML text; [`FitFile::parse`] checks every key, type and range. Numbers that decide the result have no
 //! default.
 
+mod band;
 mod change;
 mod data;
 mod error;
@@ -16,6 +17,7 @@ mod unknowns;
 mod view;
 mod world;
 
+pub use band::{BandSettings, Steps};
 pub use change::ChangeSettings;
 pub use data::{DataFiles, Loss, LossKind};
 pub use error::FitError;
@@ -99,6 +101,9 @@ pub struct FitFile {
     pub linear: Option<Linear>,
     /// What is known of the axis.
     pub axis: AxisSearch,
+    /// Worlds that are compared first by the light curve of a flare in an orbital band.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub band: Option<BandSettings>,
     /// The recovered volume.
     pub output: Output,
 }

@@ -120,6 +120,18 @@ const RANGES: &[Range] = &[
     ("axis.scan.refine", 8.0, 128.0, "nodes along each axis"),
     ("axis.scan.rate", 0.0, 10.0, "a learning rate"),
     ("axis.scan.last_rate", 0.0, 10.0, "a learning rate"),
+    ("band.inclinations_deg.from", 0.0, 180.0, "degrees"),
+    ("band.inclinations_deg.to", 0.0, 180.0, "degrees"),
+    ("band.inclinations_deg.step", 1e-3, 180.0, "degrees"),
+    ("band.rotation_factors.*", -10.0, 10.0, "a factor"),
+    ("band.position_angles_deg.*", -360.0, 360.0, "degrees east of north"),
+    ("band.radii.from", 1e-3, LENGTH, "M"),
+    ("band.radii.to", 1e-3, LENGTH, "M"),
+    ("band.radii.step", 1e-3, LENGTH, "M"),
+    ("band.widths.*", 1e-3, LENGTH, "M"),
+    ("band.height", 1e-3, LENGTH, "M"),
+    ("band.lengths.*", 1e-3, LENGTH, "M"),
+    ("band.nodes", 4.0, 64.0, "voxels along each axis"),
     ("output.nodes", 2.0, 512.0, "nodes along each axis"),
 ];
 

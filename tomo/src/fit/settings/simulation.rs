@@ -72,7 +72,7 @@ impl Tube {
         let [from, to] = self.azimuth_deg.map(f64::to_radians);
         let length = self.radius * (to - from).abs();
         let count = (length / (SPACING * self.sigma)).ceil().clamp(1.0, 1e5);
-        let share = length / count / ((core::f64::consts::TAU).sqrt() * self.sigma);
+        let share = length / count / (core::f64::consts::TAU.sqrt() * self.sigma);
         let spot = |k: usize| {
             let (sin, cos) = (from + (to - from) * (k as f64 + 0.5) / count).sin_cos();
             Spot {

@@ -219,6 +219,9 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
     file.check_unknowns()?;
     let training = training(file, axis_rate)?;
     change::check(file)?;
+    if file.band.is_some() && file.unknown_world()?.is_some() {
+        refuse!("band does not work together with unknown parameters in [world]");
+    }
     let images_only = file.loss.iter().all(|loss| loss.data == LossKind::Image);
     if matches!(training.batch, BatchSize::Pixels(_)) && !images_only {
         refuse!("training.batch: pixels work with images only; use frames = N");

@@ -1,5 +1,6 @@
 //! From settings to the parts of a fit: sight lines, motion, data with their losses, the representation and its training.
 
+mod band;
 mod change;
 mod coarse_view;
 mod glyph;
@@ -14,6 +15,7 @@ mod truth;
 mod visibilities;
 mod world;
 
+pub use band::{BandScan, BandWatch, BandWorld, band_motion, in_band_world, scan_band};
 pub use change::{change, emission_times};
 pub use coarse_view::CoarseView;
 pub use imprint::imprint;

@@ -1,0 +1,236 @@
+//! Worlds that are weighed by the light curve of a flare in an orbital band, before the emission is fitted.
+
+use super::failed;
+use super::folder::Folder;
+use super::world_search::Placed;
+use crate::checksum::sealed;
+use crate::interrupt::{Interrupted, Keeper};
+use crate::output;
+use crate::progress;
+use anyhow::Context;
+use kerrlight_tomo::fit::settings::{BandSettings, FitFile};
+use kerrlight_tomo::fit::setup::{self, BandScan, BandWorld, Instrument, Measured};
+use serde_json::{Value, json};
+
+/// What was found, in the folder of the run.
+pub const FILE: &str = "band.json";
+
+const STOPPED: &str = "stopped while worlds were weighed: nothing is kept of that";
+
+/// Finds the world, or reads it where an earlier run has found it; none if it is not asked for.
+pub fn place(
+    file: &FitFile,
+    measured: &Measured,
+    folder: &Folder,
+) -> anyhow::Result<Option<Placed>> {
+    let Some(settings) = &file.band else { return Ok(None) };
+    let path = folder.path().join(FILE);
+    if !path.exists() {
+        let scan = search(file, measured, settings)?;
+        let results = results(&scan, file)?;
+        folder.file(FILE)?.write(sealed(results).as_bytes())?;
+    }
+    let damaged = || format!("{} is damaged: remove it to look again", path.display());
+    let results: Value = serde_json::from_str(&output::read_text(&path)?).with_context(damaged)?;
+    sentences(&results).iter().for_each(|line| eprintln!("{line}"));
+    let best = |key: &str| results[key]["best"].as_f64().with_context(damaged);
+    let mut found = setup::in_band_world(file, best("inclination_deg")?);
+    if let Some(law) = &mut found.polarization {
+        law.turn_deg += best("position_angle_deg")?;
+    }
+    let motion = setup::band_motion(&found, measured, best("rotation_factor")?)?;
+    let instrument = Instrument::new(&found)?;
+    Ok(Some(Placed { file: found, instrument, motion }))
+}
+
+fn search(
+    file: &FitFile,
+    measured: &Measured,
+    settings: &BandSettings,
+) -> anyhow::Result<BandScan> {
+    let keeper = Keeper::brief(STOPPED);
+    let count = settings.inclinations_deg.values().len() * settings.rotation_factors.len();
+    let bar = progress::worlds(count as u64);
+    let watch = |_: usize| {
+        bar.inc(1);
+        !keeper.stopped()
+    };
+    let scan = setup::scan_band(file, measured, settings, &watch)
+        .map_err(|error| failed::linear(error).context("band"))?;
+    bar.finish_and_clear();
+    scan.ok_or_else(|| Interrupted(STOPPED.to_owned()).into())
+}
+
+/// Shares of the probability of values, in their order.
+fn shares(worlds: &[BandWorld], of: fn(&BandWorld) -> f64) -> Vec<[f64; 2]> {
+    let most = worlds.iter().map(|world| world.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
+    let mut all: Vec<[f64; 2]> = Vec::new();
+    for world in worlds {
+        let share = (world.ln_posterior - most).exp();
+        match all.iter_mut().find(|[value, _]| *value == of(world)) {
+            Some([_, sum]) => *sum += share,
+            None => all.push([of(world), share]),
+        }
+    }
+    normalised(all)
+}
+
+fn normalised(mut all: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    all.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let sum: f64 = all.iter().map(|[_, share]| share).sum();
+    all.iter_mut().for_each(|[_, share]| *share /= sum);
+    all
+}
+
+/// Shares of the radii of all worlds.
+fn radii(scan: &BandScan) -> Vec<[f64; 2]> {
+    let most = scan
+        .worlds
+        .iter()
+        .flat_map(|world| world.by_radius.iter().copied())
+        .fold(f64::NEG_INFINITY, f64::max);
+    let share = |k: usize| {
+        let of = |world: &BandWorld| {
+            (world.by_radius[k] - most).exp() * world.inclination_deg.to_radians().sin().max(1e-6)
+        };
+        scan.worlds.iter().map(of).sum::<f64>()
+    };
+    normalised(scan.radii.iter().enumerate().map(|(k, radius)| [*radius, share(k)]).collect())
+}
+
+/// The value below which a part of the probability lies, each share spread evenly half way to its neighbours.
+fn quantile(shares: &[[f64; 2]], part: f64) -> f64 {
+    let edge = |k: usize| match (k.checked_sub(1).map(|k| shares[k][0]), shares.get(k)) {
+        (Some(before), Some([after, _])) => 0.5 * (before + after),
+        (None, Some([first, _])) => *first,
+        (before, None) => before.unwrap_or(f64::NAN),
+    };
+    let mut below = 0.0;
+    for (k, [_, share]) in shares.iter().enumerate() {
+        if below + share >= part && *share > 0.0 {
+            return edge(k) + (edge(k + 1) - edge(k)) * ((part - below) / share).clamp(0.0, 1.0);
+        }
+        below += share;
+    }
+    edge(shares.len())
+}
+
+/// Median and 95 % interval.
+fn interval(shares: &[[f64; 2]], best: Option<f64>) -> Value {
+    let [low, median, high] = [0.025, 0.5, 0.975].map(|part| quantile(shares, part));
+    json!({"best": best, "median": median, "low": low, "high": high})
+}
+
+fn results(scan: &BandScan, file: &FitFile) -> anyhow::Result<Value> {
+    let best = &scan.worlds[scan.best];
+    let inclinations = shares(&scan.worlds, |world| world.inclination_deg);
+    let probabilities = |of: fn(&BandWorld) -> f64, best: f64| json!({"best": best, "probabilities": shares(&scan.worlds, of)});
+    let row = |world: &BandWorld| {
+        let BandWorld { inclination_deg, rotation_factor, position_angle_deg, .. } = world;
+        let ln = world.ln_posterior - best.ln_posterior;
+        json!([inclination_deg, rotation_factor, position_angle_deg, ln])
+    };
+    let truth = match file.truth {
+        Some(_) => Some(file.simulated()?.observer.inclination_deg),
+        None => None,
+    };
+    let band = best.band;
+    Ok(json!({
+        "inclination_deg": interval(&inclinations, Some(best.inclination_deg)),
+        "inclinations": inclinations,
+        "rotation_factor": probabilities(|world| world.rotation_factor, best.rotation_factor),
+        "position_angle_deg": probabilities(|world| world.position_angle_deg, best.position_angle_deg),
+        "radius": interval(&radii(scan), Some(band.radius)),
+        "band": {
+            "radius": band.radius, "width": band.width, "height": band.height, "length": band.length,
+            "power": band.power, "mean": band.mean,
+        },
+        "emission_radius": scan.field.radius,
+        "azimuth_deg": scan.field.azimuth.to_degrees().rem_euclid(360.0),
+        "validation_chi2_per_datum": scan.field.validation,
+        "truth": {"inclination_deg": truth},
+        "worlds": scan.worlds.iter().map(row).collect::<Vec<_>>(),
+    }))
+}
+
+/// What a run has found, if it has looked.
+pub fn found(folder: &Folder) -> anyhow::Result<Option<Value>> {
+    let path = folder.path().join(FILE);
+    if !path.exists() {
+        return Ok(None);
+    }
+    Ok(Some(serde_json::from_str(&output::read_text(&path)?)?))
+}
+
+/// Numbers for tables: of the 95 % interval, of the band, and the probability that matter turns as the law says.
+pub fn numbers(results: &Value) -> Vec<(&'static str, Value)> {
+    let forward = results["rotation_factor"]["probabilities"].as_array().map(|all| {
+        let share = |pair: &Value| match pair[0].as_f64() {
+            Some(factor) if factor > 0.0 => pair[1].as_f64().unwrap_or(0.0),
+            _ => 0.0,
+        };
+        all.iter().map(share).sum::<f64>()
+    });
+    let inclination = &results["inclination_deg"];
+    vec![
+        ("band_inclination_deg", inclination["median"].clone()),
+        ("band_inclination_low_deg", inclination["low"].clone()),
+        ("band_inclination_high_deg", inclination["high"].clone()),
+        ("band_radius", results["emission_radius"].clone()),
+        ("band_azimuth_deg", results["azimuth_deg"].clone()),
+        ("band_forward", json!(forward)),
+        ("band_validation", results["validation_chi2_per_datum"].clone()),
+    ]
+}
+
+/// What was found, in sentences.
+pub fn sentences(results: &Value) -> Vec<String> {
+    let number = |of: &Value| of.as_f64().unwrap_or(f64::NAN);
+    let of = |key: &str, part: &str| number(&results[key][part]);
+    let truth = results["truth"]["inclination_deg"].as_f64();
+    let truth = truth.map_or(String::new(), |truth| format!(" (truth: {truth:.1}°)"));
+    let mut all = vec![
+        format!(
+            "The inclination is between {:.1}° and {:.1}° at 95 %, with a median of {:.1}°{truth}.",
+            of("inclination_deg", "low"),
+            of("inclination_deg", "high"),
+            of("inclination_deg", "median")
+        ),
+        format!(
+            "The flare orbits at {:.1} M; at the reference time its middle is at an azimuth of {:.0}°.",
+            number(&results["emission_radius"]),
+            number(&results["azimuth_deg"])
+        ),
+    ];
+    let turns = results["rotation_factor"]["probabilities"].as_array();
+    if turns.is_some_and(|turns| turns.len() > 1) {
+        let best = of("rotation_factor", "best");
+        all.push(format!("It turns {best:.2} times as fast as the law of motion says."));
+    }
+    if let Some(validation) = results["validation_chi2_per_datum"].as_f64() {
+        all.push(format!(
+            "Samples that were not fitted have a χ² of {validation:.2} per datum with the errors that are expected of them."
+        ));
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Quantiles of equal shares are those of a straight line.
+    #[test]
+    fn exact_quantiles_of_shares() {
+        let shares: Vec<[f64; 2]> = (0..11).map(|k| [f64::from(k), 1.0]).collect();
+        let shares = normalised(shares);
+        assert!((quantile(&shares, 0.5) - 5.0).abs() < 1e-12);
+        assert!(
+            (quantile(&shares, 0.0)).abs() < 1e-12 && (quantile(&shares, 1.0) - 10.0).abs() < 1e-9
+        );
+        let one = normalised(vec![[3.0, 0.0], [4.0, 1.0], [5.0, 0.0]]);
+        assert!(
+            (quantile(&one, 0.5) - 4.0).abs() < 1e-12 && (quantile(&one, 0.1) - 3.6).abs() < 1e-12
+        );
+    }
+}

@@ -1,0 +1,98 @@
+//! How probable a world is, given the light curve of a flare that orbits in a band: the emission is marginalised, not
+//! fitted.
+//!
+//! Emission is thought of as env(x) (μ + g(x)) a with a Gaussian random field g of unit variance, the envelope
+//! env = exp(−½ [((ρ − ρ₀)/w)² + (z/h)²]) of a circle of radius ρ₀ about the z axis, and an amplitude a. A light curve
+//! is linear in it, so that the probability of the data, with g integrated out, is a Gaussian with a known covariance:
+//! worlds in which data could be explained by many fields, but need not, are not preferred for it. Fields may be
+//! negative here; μ is a standard deviation of their mean.
+
+mod evidence;
+mod field;
+#[cfg(test)]
+mod tests;
+
+pub use evidence::{Weighed, evidence, recovered};
+pub use field::CurveRows;
+
+use crate::Error;
+
+/// What is thought of the emission before any data: all combinations of these, each as probable.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BandPrior {
+    /// ρ₀, M.
+    pub radii: Vec<f64>,
+    /// w, M.
+    pub widths: Vec<f64>,
+    /// h, M.
+    pub height: f64,
+    /// Correlation lengths of the field, M.
+    pub lengths: Vec<f64>,
+    /// a², over that with which the model's mean square is that of the data.
+    pub powers: Vec<f64>,
+    /// μ.
+    pub means: Vec<f64>,
+}
+
+impl BandPrior {
+    /// Powers of amplitudes over two orders of magnitude to both sides, and means up to twice the field's deviation.
+    pub fn usual(radii: Vec<f64>, widths: Vec<f64>, lengths: Vec<f64>, height: f64) -> Self {
+        let powers = [0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0].to_vec();
+        Self { radii, widths, height, lengths, powers, means: vec![0.0, 0.5, 1.0, 2.0] }
+    }
+
+    /// Itself, if its numbers are in their ranges.
+    ///
+    /// # Errors
+    /// Names the number that is not.
+    pub fn checked(self) -> Result<Self, Error> {
+        let height = [self.height];
+        let lists: [(&'static str, &[f64]); 5] = [
+            ("radii", &self.radii),
+            ("widths", &self.widths),
+            ("height", &height),
+            ("lengths", &self.lengths),
+            ("powers", &self.powers),
+        ];
+        for (field, list) in lists {
+            let bad = list.iter().find(|x| !(**x > 0.0 && x.is_finite()));
+            if let Some(bad) = bad.copied().or(list.is_empty().then_some(f64::NAN)) {
+                return Err(Error::out_of_range(field, bad, "above 0, one or more"));
+            }
+        }
+        if self.means.is_empty() || self.means.iter().any(|x| !(*x >= 0.0 && x.is_finite())) {
+            return Err(Error::out_of_range("means", f64::NAN, "0 or above, one or more"));
+        }
+        Ok(self)
+    }
+}
+
+/// One of the combinations.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Band {
+    /// ρ₀, M.
+    pub radius: f64,
+    /// w, M.
+    pub width: f64,
+    /// h, M.
+    pub height: f64,
+    /// Correlation length, M.
+    pub length: f64,
+    /// a² of the rows' unit of emission.
+    pub power: f64,
+    /// μ.
+    pub mean: f64,
+}
+
+/// The emission that is expected, given the data.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recovered {
+    /// At all voxels; may be negative.
+    pub emission: Vec<f64>,
+    /// Mean distance of what is positive from the axis, M.
+    pub radius: f64,
+    /// Mean azimuth of what is positive, radians.
+    pub azimuth: f64,
+    /// χ² per datum of the data that were not used, with the covariance that is expected of them; none without any.
+    pub validation: Option<f64>,
+}

@@ -1,0 +1,63 @@
+//! Rows of data to which all rays add: a number for every node.
+
+use super::operator::{NONE, Operator, Rows};
+use super::walk::Buffers;
+use crate::representation::spline::STENCIL;
+use crate::simd::Float;
+
+impl<T: Float> Rows<T> {
+    /// Adds a row of all columns.
+    fn push_dense(&mut self, pixel: u32, row: &[T]) {
+        let lit = row.iter().enumerate().filter(|(_, entry)| **entry != T::zero());
+        for (column, entry) in lit {
+            self.columns.push(column as u32);
+            self.entries.push(*entry);
+        }
+        self.pixel.push(pixel);
+        self.starts.push(self.columns.len() as u32);
+    }
+}
+
+impl<T: Float + Default> Operator<'_, T> {
+    /// Rows to which all rays add.
+    pub fn fluxes_of(&self, frame: usize) -> Rows<T> {
+        let columns = self.active.count();
+        let mut sums = vec![T::zero(); self.pixels * columns];
+        let (wanted, degree) = (Some(self.active.cells.as_slice()), self.walk.voxels.degree);
+        let mut weights = [T::zero(); STENCIL];
+        self.walk.frame(frame, wanted, &mut Buffers::default(), |pixel, places| {
+            let row = &mut sums[pixel as usize * columns..][..columns];
+            for at in places {
+                at.weights(degree, &mut weights);
+                for (corner, entry) in self.corners.iter().zip(weights) {
+                    let column = self.active.column[at.corner as usize + corner];
+                    if column != NONE {
+                        row[column as usize] += entry;
+                    }
+                }
+            }
+        });
+        let mut rows = Rows { starts: vec![0], ..Rows::default() };
+        for (pixel, row) in sums.chunks_exact(columns.max(1)).enumerate() {
+            rows.push_dense(pixel as u32, row);
+        }
+        rows
+    }
+
+    /// All rows with all columns: frame by frame, pixel by pixel.
+    pub fn all_rows(&self) -> Vec<Vec<f64>> {
+        let mut all = vec![vec![0.0; self.active.count()]; self.frames.len() * self.pixels];
+        for (frame, rows) in self.rows.iter().enumerate() {
+            let Some(rows) = rows else { continue };
+            for (k, pixel) in rows.pixel.iter().enumerate() {
+                let range = rows.starts[k] as usize..rows.starts[k + 1] as usize;
+                let to = &mut all[frame * self.pixels + *pixel as usize];
+                for (column, entry) in rows.columns[range.clone()].iter().zip(&rows.entries[range])
+                {
+                    to[*column as usize] += entry.double();
+                }
+            }
+        }
+        all
+    }
+}

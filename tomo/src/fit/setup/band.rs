@@ -1,0 +1,232 @@
+//! From settings to worlds that are weighed by the light curve of a flare in an orbital band.
+
+use super::{Curve, Instrument, Measured, Result, axis, forward_model, motion};
+use crate::dynamics::AngularVelocity;
+use crate::fit::Motion;
+use crate::fit::band::{Band, BandPrior, CurveRows, Recovered, evidence, recovered};
+use crate::fit::linear::{Change, LinearProblem, Voxels};
+use crate::fit::settings::{BandSettings, FitError, FitFile, refuse};
+use crate::polarization::StokesParameter;
+use crate::representation::Degree;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// A world, and how probable it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BandWorld {
+    /// Angle from the spin to the observer, degrees.
+    pub inclination_deg: f64,
+    /// Angular velocity over that of the law.
+    pub rotation_factor: f64,
+    /// Of the spin, degrees east of north.
+    pub position_angle_deg: f64,
+    /// ln of the probability, up to what all worlds share: the evidence, and sin i of axes in any direction.
+    pub ln_posterior: f64,
+    /// ln of the evidence of each radius.
+    pub by_radius: Vec<f64>,
+    /// The most probable band.
+    pub band: Band,
+}
+
+/// What was found.
+#[derive(Clone, Debug)]
+pub struct BandScan {
+    /// All worlds.
+    pub worlds: Vec<BandWorld>,
+    /// Radii of the bands, M.
+    pub radii: Vec<f64>,
+    /// Which world is the most probable.
+    pub best: usize,
+    /// The emission that is expected there.
+    pub field: Recovered,
+    /// The grid that it is on.
+    pub voxels: Voxels,
+}
+
+/// Told how many worlds are done; says whether to go on.
+pub type BandWatch<'a> = dyn Fn(usize) -> bool + Sync + 'a;
+
+/// Weighs all worlds; none if it was cancelled.
+///
+/// # Errors
+/// If there is no light curve, or a setting is out of range.
+pub fn scan_band(
+    file: &FitFile,
+    measured: &Measured,
+    settings: &BandSettings,
+    watch: &BandWatch<'_>,
+) -> Result<Option<BandScan>> {
+    let Some(curve) = &measured.curve else {
+        refuse!("band needs a light curve of its own: [light_curve] or [data.light-curve]");
+    };
+    check(file, settings, curve)?;
+    let worlds = worlds(settings);
+    let done = std::sync::atomic::AtomicUsize::new(0);
+    let one = |world: &(f64, f64)| -> Result<Option<Vec<BandWorld>>> {
+        let count = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        if !watch(count) {
+            return Ok(None);
+        }
+        weighed(file, measured, (settings, curve), *world).map(Some)
+    };
+    let all: Vec<Option<Vec<BandWorld>>> = worlds.par_iter().map(one).collect::<Result<_>>()?;
+    let Some(all) = all.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };
+    let worlds: Vec<BandWorld> = all.into_iter().flatten().collect();
+    let better = |a: &usize, b: &usize| worlds[*a].ln_posterior.total_cmp(&worlds[*b].ln_posterior);
+    let best = (0..worlds.len()).max_by(better).unwrap_or(0);
+    let BandWorld { inclination_deg, rotation_factor, position_angle_deg, band, .. } = worlds[best];
+    let rows = rows(file, measured, (settings, curve), (inclination_deg, rotation_factor))?;
+    let field = recovered(&rows, &turned(curve, position_angle_deg), &band)?;
+    let radii = settings.radii.values();
+    Ok(Some(BandScan { worlds, radii, best, field, voxels: rows.voxels }))
+}
+
+fn check(file: &FitFile, settings: &BandSettings, curve: &Curve) -> Result<()> {
+    prior(settings).checked()?;
+    let range = |key: &str, value: f64, allowed| {
+        Err(FitError::range(format!("band.{key}"), value, allowed).into())
+    };
+    let inclinations = settings.inclinations_deg.values();
+    if let Some(bad) = inclinations.iter().find(|i| !(0.0..=180.0).contains(*i)) {
+        return range("inclinations_deg", *bad, "0 to 180 degrees");
+    }
+    if inclinations.is_empty() {
+        return range(
+            "inclinations_deg.step",
+            settings.inclinations_deg.step,
+            "one or more values",
+        );
+    }
+    if let Some(bad) = settings.rotation_factors.iter().find(|x| !(-10.0..=10.0).contains(*x)) {
+        return range("rotation_factors", *bad, "-10 to 10");
+    }
+    if !(4..=64).contains(&settings.nodes) {
+        return range("nodes", settings.nodes as f64, "4 to 64");
+    }
+    if settings.rotation_factors.is_empty() || settings.position_angles_deg.is_empty() {
+        refuse!("band: rotation_factors and position_angles_deg need one value or more");
+    }
+    let turns = settings.position_angles_deg.iter().any(|angle| *angle != 0.0);
+    if turns && !can_turn(curve) {
+        refuse!(
+            "band.position_angles_deg needs loss.0.stokes = [\"Q\", \"U\"] with the same error of both"
+        );
+    }
+    axis(file).map(drop)
+}
+
+/// Whether every frame has Q and U, in this order, with the same error: noise then has no direction.
+fn can_turn(curve: &Curve) -> bool {
+    let same = |pair: &[Option<[f64; 2]>]| match pair {
+        [Some([_, a]), Some([_, b])] => (a - b).abs() <= 1e-9 * a,
+        pair => pair.iter().all(Option::is_none),
+    };
+    curve.parameters == [StokesParameter::Q, StokesParameter::U] && curve.data.chunks(2).all(same)
+}
+
+fn prior(settings: &BandSettings) -> BandPrior {
+    let BandSettings { radii, widths, lengths, height, .. } = settings;
+    BandPrior::usual(radii.values(), widths.clone(), lengths.clone(), *height)
+}
+
+fn worlds(settings: &BandSettings) -> Vec<(f64, f64)> {
+    let inclinations = settings.inclinations_deg.values();
+    let of = |factor: &f64| inclinations.iter().map(|i| (*i, *factor)).collect::<Vec<_>>();
+    settings.rotation_factors.iter().flat_map(of).collect()
+}
+
+/// All position angles of a world.
+fn weighed(
+    file: &FitFile,
+    measured: &Measured,
+    (settings, curve): (&BandSettings, &Curve),
+    world: (f64, f64),
+) -> Result<Vec<BandWorld>> {
+    let rows = rows(file, measured, (settings, curve), world)?;
+    let data: Vec<Vec<f64>> =
+        settings.position_angles_deg.iter().map(|angle| turned(curve, *angle)).collect();
+    let weighed = evidence(&rows, &data, &prior(settings))?;
+    let (inclination_deg, rotation_factor) = world;
+    // Of an axis that points anywhere; just above the poles, where it is 0.
+    let direction = inclination_deg.to_radians().sin().max(1e-6).ln();
+    let one = |(angle, weighed): (&f64, crate::fit::band::Weighed)| BandWorld {
+        inclination_deg,
+        rotation_factor,
+        position_angle_deg: *angle,
+        ln_posterior: weighed.ln_evidence + direction,
+        by_radius: weighed.by_radius,
+        band: weighed.best,
+    };
+    Ok(settings.position_angles_deg.iter().zip(weighed).map(one).collect())
+}
+
+/// The settings of a world.
+pub fn in_band_world(file: &FitFile, inclination_deg: f64) -> FitFile {
+    let mut file = file.clone();
+    file.observer.inclination_deg = inclination_deg;
+    file
+}
+
+/// How matter moves in a world.
+///
+/// # Errors
+/// If the motion is out of range.
+pub fn band_motion(file: &FitFile, measured: &Measured, factor: f64) -> Result<Motion> {
+    let plain = motion(file, measured.times.clone())?;
+    let velocity = match plain.velocity {
+        law if factor == 1.0 => law,
+        AngularVelocity::Falling(flow) => AngularVelocity::Falling(Arc::new(flow.scaled(factor))),
+        law => AngularVelocity::Scaled { of: Box::new(law), factor },
+    };
+    Ok(Motion { velocity, ..plain })
+}
+
+/// The rows of a world, over the errors of the data.
+fn rows(
+    file: &FitFile,
+    measured: &Measured,
+    (settings, curve): (&BandSettings, &Curve),
+    (inclination_deg, factor): (f64, f64),
+) -> Result<CurveRows> {
+    let file = in_band_world(file, inclination_deg);
+    let instrument = Instrument::new(&file)?;
+    let mut model = forward_model(&instrument, &band_motion(&file, measured, factor)?)?;
+    let axis = axis(&file)?.0;
+    model.weigh(axis);
+    let frames: Vec<usize> = (0..measured.times.len()).collect();
+    let problem = LinearProblem {
+        model: &model,
+        axis,
+        frames: &frames,
+        terms: &[],
+        voxels: Voxels::cube(settings.nodes, file.region.r_max, Degree::Linear),
+        upper: 1.0,
+        flux: None,
+        priors: &[],
+        change: Change::NONE,
+    };
+    let over = |(mut row, datum): (Vec<f64>, &Option<[f64; 2]>)| {
+        let scale = datum.map_or(0.0, |[_, sigma]| 1.0 / sigma);
+        row.iter_mut().for_each(|x| *x *= scale);
+        row
+    };
+    let rows = problem.rows().into_iter().zip(&curve.data).map(over).collect();
+    let count = curve.parameters.len();
+    let used = |k: usize| curve.fitted[k / count] || curve.data[k].is_none();
+    let used = (0..curve.data.len()).map(used).collect();
+    Ok(CurveRows { voxels: problem.voxels, rows, used })
+}
+
+/// The data over their errors, seen by who is turned by a position angle; 0 where there are none.
+fn turned(curve: &Curve, angle_deg: f64) -> Vec<f64> {
+    let value = |datum: &Option<[f64; 2]>| datum.map_or(0.0, |[flux, sigma]| flux / sigma);
+    let mut all: Vec<f64> = curve.data.iter().map(value).collect();
+    if angle_deg != 0.0 {
+        let (sin, cos) = (2.0 * angle_deg.to_radians()).sin_cos();
+        for pair in all.chunks_exact_mut(2) {
+            let (q, u) = (pair[0], pair[1]);
+            (pair[0], pair[1]) = (q * cos + u * sin, u * cos - q * sin);
+        }
+    }
+    all
+}

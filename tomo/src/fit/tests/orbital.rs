@@ -1,0 +1,171 @@
+//! Light curves as data, simulated and measured, and worlds weighed by them.
+
+use crate::fit::Seen;
+use crate::fit::settings::{DataFiles, FitFile, Steps};
+use crate::fit::setup::{self, Instrument, Measured};
+use crate::interferometry::files::{light_curve_to_csv, parse_light_curve};
+use crate::interferometry::light_curve::{Flux, LightCurve, Sample};
+use crate::polarization::StokesParameter;
+use crate::scene::apply_override;
+
+const PUBLISHED: &str = include_str!("../../../../scenes/fits/orbital_polarimetry.toml");
+const TEXTBOOK: &str = include_str!("../../../../scenes/fits/orbital_polarimetry_textbook.toml");
+
+fn file(text: &str, set: &[&str]) -> FitFile {
+    let text = set
+        .iter()
+        .fold(text.to_owned(), |text, assignment| apply_override(&text, assignment).unwrap());
+    FitFile::parse(&text).unwrap()
+}
+
+fn simulated(file: &FitFile) -> (Instrument, Measured) {
+    let instrument = Instrument::new(file).unwrap();
+    let measured = Measured::simulated(file, &instrument, None).unwrap();
+    (instrument, measured)
+}
+
+/// I has the mean that is asked for, Q and U the errors, and both laws are polarised as they say.
+#[test]
+fn exact_simulated_light_curves() {
+    for (text, fraction) in [(PUBLISHED, 0.85), (TEXTBOOK, 0.75)] {
+        let set = [
+            "screen.pixels=24",
+            "loss.0.stokes=[\"I\", \"Q\", \"U\"]",
+            "light_curve.noise=\"none\"",
+        ];
+        let (instrument, measured) = simulated(&file(text, &set));
+        assert!(matches!(&instrument.seen, Seen::Fluxes(parameters) if parameters.len() == 3));
+        let curve = measured.curve.unwrap();
+        assert_eq!((curve.hours.len(), curve.data.len()), (98, 294));
+        let first = curve.hours.iter().filter(|h| (*h - curve.hours[0]) * 60.0 <= 100.0).count();
+        let fluxes: Vec<[f64; 3]> =
+            curve.data.chunks(3).map(|c| [0, 1, 2].map(|k| c[k].unwrap()[0])).collect();
+        let mean = fluxes[..first].iter().map(|f| f[0]).sum::<f64>() / first as f64;
+        assert!((mean - 0.3).abs() < 1e-12, "{mean}");
+        let parts: Vec<f64> = fluxes.iter().map(|[i, q, u]| q.hypot(*u) / i).collect();
+        let most = parts.iter().fold(0.0f64, |most, part| most.max(*part));
+        assert!(most < fraction && most > 0.1, "{most}");
+        let later = curve.fitted.iter().filter(|fitted| !**fitted).count();
+        assert!((5..20).contains(&later), "{later}");
+        // The movie of the report has the same flux.
+        let movie = measured.movie.unwrap();
+        let pictured: f64 = movie[..24 * 24].iter().sum();
+        assert!((pictured - curve.data[0].unwrap()[0]).abs() < 1e-9);
+    }
+}
+
+/// The inclination, the sense of rotation, the radius and the azimuth of the tube are found.
+#[test]
+fn exact_worlds_of_the_published_test() {
+    let set = ["screen.pixels=48", "band.widths=[1.0]", "band.lengths=[4.0]"];
+    let mut file = file(PUBLISHED, &set);
+    let band = file.band.as_mut().unwrap();
+    band.inclinations_deg = Steps { from: 12.0, to: 40.0, step: 28.0 };
+    band.radii = Steps { from: 8.0, to: 12.0, step: 2.0 };
+    let (_, measured) = simulated(&file);
+    let settings = file.band.clone().unwrap();
+    let found = setup::scan_band(&file, &measured, &settings, &|_| true).unwrap().unwrap();
+    assert_eq!(found.worlds.len(), 4);
+    let best = &found.worlds[found.best];
+    assert_eq!((best.inclination_deg, best.rotation_factor), (12.0, 1.0));
+    for world in &found.worlds {
+        let worse = best.ln_posterior - world.ln_posterior;
+        assert!(world == best || worse > 8.0, "{world:?}: {worse}");
+    }
+    assert!((found.field.radius - 10.0).abs() < 1.0, "{}", found.field.radius);
+    let azimuth = found.field.azimuth.to_degrees().rem_euclid(360.0);
+    assert!((azimuth - 230.0).abs() < 10.0, "{azimuth}");
+    assert!(setup::scan_band(&file, &measured, &settings, &|_| false).unwrap().is_none());
+}
+
+/// Data whose position angles are turned are those of a spin whose position angle is.
+#[test]
+fn exact_position_angles_of_the_spin() {
+    let set = [
+        "screen.pixels=24",
+        "band.nodes=12",
+        "band.widths=[2.0]",
+        "band.lengths=[4.0]",
+        "band.position_angles_deg=[0.0, 40.0, 80.0]",
+        "polarization.turn_deg=40.0",
+    ];
+    let mut file = file(PUBLISHED, &set);
+    let band = file.band.as_mut().unwrap();
+    band.inclinations_deg = Steps { from: 12.0, to: 12.0, step: 1.0 };
+    band.radii = Steps { from: 10.0, to: 10.0, step: 1.0 };
+    band.rotation_factors = vec![1.0];
+    let (_, measured) = simulated(&file);
+    if let Some(law) = &mut file.polarization {
+        law.turn_deg = 0.0;
+    }
+    let settings = file.band.clone().unwrap();
+    let found = setup::scan_band(&file, &measured, &settings, &|_| true).unwrap().unwrap();
+    assert_eq!(found.worlds[found.best].position_angle_deg, 40.0, "{:?}", found.worlds);
+}
+
+fn measured_file(more: &str) -> FitFile {
+    let start = PUBLISHED.find("[[truth.tube]]").unwrap();
+    let end = PUBLISHED.find("[[loss]]").unwrap();
+    let data = format!("[data.light-curve]\npath = \"curve.csv\"\nfirst_time = 5.0\n{more}\n\n");
+    FitFile::parse(&format!("{}{data}{}", &PUBLISHED[..start], &PUBLISHED[end..])).unwrap()
+}
+
+fn curve(count: usize) -> LightCurve {
+    let flux = |jy: f64| Some(Flux { jy, sigma_jy: Some(0.02) });
+    let sample = |k: usize| Sample {
+        time_h: 9.0 + k as f64 / 60.0,
+        stokes: [flux(2.5), flux(0.1 + 0.01 * k as f64), flux(-0.2), None],
+        by: String::new(),
+    };
+    LightCurve { samples: (0..count).map(sample).collect() }
+}
+
+/// Cropped, averaged, less what is steady, derotated, with errors of their own, and divided into spans.
+#[test]
+fn exact_measured_light_curves() {
+    let more = "utc_h = [9.0, 9.66]\naverage = 4\nsteady = { Q = 0.1, U = -0.2 }\nderotation_deg = 45.0\n\
+         sigma = { Q = 0.03, U = 0.03 }\nvalidate_after_min = 21.0";
+    let file = measured_file(more);
+    let text = light_curve_to_csv(&curve(60));
+    let found =
+        Measured::of_light_curve(&file, parse_light_curve(&text).unwrap(), "curve.csv").unwrap();
+    let curve = found.curve.unwrap();
+    assert_eq!(
+        (curve.parameters.as_slice(), curve.hours.len()),
+        (&[StokesParameter::Q, StokesParameter::U][..], 10)
+    );
+    assert!((curve.hours[0] - 9.025).abs() < 1e-9 && found.times[0] == 5.0);
+    let per_m = setup::hours_per_m(&file).unwrap();
+    assert!((found.times[1] - 5.0 - 4.0 / 60.0 / per_m).abs() < 1e-9);
+    // Q = 0.015, U = 0 before they are turned by 90° of 2χ.
+    let [q, u] = [0, 1].map(|k| curve.data[k].unwrap());
+    assert!(q[0].abs() < 1e-12 && (u[0] - 0.015).abs() < 1e-12 && u[1] == 0.03, "{q:?} {u:?}");
+    assert_eq!(curve.fitted, [true, true, true, true, true, true, false, false, false, false]);
+    assert!(matches!(file.data, Some(DataFiles::LightCurve(_))));
+}
+
+#[test]
+fn regress_light_curves_that_mean_nothing_are_refused() {
+    let says = |more: &str, curve: LightCurve| {
+        Measured::of_light_curve(&measured_file(more), curve, "c.csv").err().unwrap().to_string()
+    };
+    let text = says("utc_h = [1.0, 2.0]", curve(9));
+    assert!(text.contains("c.csv") && text.contains("no samples are left"), "{text}");
+    let mut bare = curve(9);
+    bare.samples[3].stokes[2] = Some(Flux { jy: 0.1, sigma_jy: None });
+    let text = says("", bare);
+    assert!(text.contains("U at 9.05 h has no error: give a column sigma_U"), "{text}");
+    let text = says("sigma = { Q = -1.0 }", curve(9));
+    assert!(text.contains("data.light-curve.sigma.Q = -1 is not allowed"), "{text}");
+    let refused = |set: &[&str]| Instrument::new(&file(PUBLISHED, set)).err().unwrap().to_string();
+    let text = refused(&["loss.0.stokes=[\"Q\", \"V\"]"]);
+    assert!(text.contains("V is not modelled"), "{text}");
+    let text = refused(&["effects.redshift_power=2.0"]);
+    assert!(text.contains("effects.redshift_power = 2 is not allowed together with"), "{text}");
+    let text = refused(&["polarization.frame=\"gas\""]);
+    assert!(text.contains("polarization.components"), "{text}");
+    let mut plain = file(PUBLISHED, &[]);
+    plain.polarization = None;
+    let text = Instrument::new(&plain).err().unwrap().to_string();
+    assert!(text.contains("polarization is missing: Q and U need the field"), "{text}");
+}
