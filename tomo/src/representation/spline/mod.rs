@@ -86,15 +86,15 @@ impl Spline {
 
     fn place<T: Float>(&self, at: &Coordinates<'_, T>, point: usize) -> Option<Place<T>> {
         let (mut corner, mut within) = (0, [T::zero(); 3]);
-        for k in 0..3 {
-            let u = (at.columns()[k][point] - T::of(self.first[k])) * T::of(self.per_length[k]);
+        for (k, (within, column)) in within.iter_mut().zip(at.columns()).enumerate() {
+            let u = (column[point] - T::of(self.first[k])) * T::of(self.per_length[k]);
             let last = self.nodes[k] - self.degree.taps();
             if u < T::zero() || u > T::of((last + 1) as f64) {
                 return None;
             }
             // A NaN is in the first cell, and makes the value one.
             let cell = u.to_usize().unwrap_or(0).min(last);
-            within[k] = u - T::of(cell as f64);
+            *within = u - T::of(cell as f64);
             corner = corner * self.nodes[k] + cell;
         }
         Some(Place { corner, within })
