@@ -59,9 +59,10 @@ impl Estimate<'_> {
         for (frame, hour) in curve.hours.iter().enumerate() {
             let (time, fitted) = (self.measured.times[frame], u8::from(curve.fitted[frame]));
             write!(text, "\n{hour},{time},{fitted}")?;
-            for k in frame * count..(frame + 1) * count {
-                let [flux, sigma] = curve.data[k].unwrap_or([f64::NAN; 2]);
-                write!(text, ",{flux},{sigma},{}", seen[k])?;
+            let range = frame * count..(frame + 1) * count;
+            for (datum, model) in curve.data[range.clone()].iter().zip(&seen[range]) {
+                let [flux, sigma] = datum.unwrap_or([f64::NAN; 2]);
+                write!(text, ",{flux},{sigma},{model}")?;
             }
         }
         text.push('\n');
