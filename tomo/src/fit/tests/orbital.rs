@@ -57,7 +57,7 @@ fn exact_simulated_light_curves() {
 /// The inclination, the sense of rotation, the radius and the azimuth of the tube are found.
 #[test]
 fn exact_worlds_of_the_published_test() {
-    let set = ["screen.pixels=48", "band.widths=[1.0]", "band.lengths=[4.0]"];
+    let set = ["screen.pixels=48", "band.nodes=20", "band.widths=[1.0]", "band.lengths=[4.0]"];
     let mut file = file(PUBLISHED, &set);
     let band = file.band.as_mut().unwrap();
     band.inclinations_deg = Steps { from: 12.0, to: 40.0, step: 28.0 };
