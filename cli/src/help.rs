@@ -17,7 +17,7 @@ pub fn command() -> Command {
     let command = Arguments::command();
     let verbs = grouped(&command);
     command.help_template(format!(
-        "{{about}}\n\n{{usage-heading}} kerrlight [OPTIONS] VERB ...\n       kerrlight VERB --help\n\n{verbs}\nOptions:\n{{options}}{{after-help}}"
+        "{{about}}\n\n{{usage-heading}} kerrlight [OPTIONS] VERB ...   or   kerrlight VERB --help\n\n{verbs}\nOptions:\n{{options}}{{after-help}}"
     ))
 }
 

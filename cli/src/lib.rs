@@ -97,7 +97,7 @@ enum Verb {
     Convert(convert::Convert),
     /// Reconstruct emission in 3D from visibilities or movies
     Fit(fit::Fit),
-    /// Draw samples around a finished fit: how sure are volume and world?
+    /// Draw samples around a finished fit: how sure is it?
     Posterior(fit::Posterior),
     /// Run a grid of fits and compare their results
     Compare(compare::Compare),

@@ -110,4 +110,8 @@ fn exact_draws_without_a_finished_fit_are_refused() {
         refused(&["fit", "fit.toml", "-o", "run", "--set", change], expected);
         assert!(!folder.path().join("run").exists(), "{change}");
     }
+    let unknown = "axis={from={start=[0.0,0.0,1.0],rate=0.1,last_rate=0.1}}";
+    let arguments = ["fit", "fit.toml", "-o", "run", "--samples", "3", "--set", unknown];
+    refused(&arguments, "a posterior needs [axis.known]");
+    assert!(!folder.path().join("run").exists());
 }

@@ -92,6 +92,9 @@ impl Fit {
             Some(path) => path.clone(),
             None => free_name(),
         };
+        if self.samples.is_some() {
+            posterior::check(&file)?;
+        }
         let (prepared, read) = output::with_reads(|| run::Prepared::new(file, &base_dir, registry));
         let prepared = prepared?;
         let text = format!("{BASE_DIR}{}\n{text}", base_dir.display());

@@ -65,11 +65,22 @@ struct Kept {
     pub numbers: Value,
 }
 
-/// Draws so many times, those that are there included, and writes what follows.
-pub fn draw(prepared: &Prepared<'_>, folder: &Folder, samples: u32) -> anyhow::Result<Answer> {
-    if !matches!(prepared.file.axis, AxisSearch::Known {}) {
+/// Refuses fits around which nothing is drawn.
+pub fn check(file: &FitFile) -> anyhow::Result<()> {
+    if !matches!(file.axis, AxisSearch::Known {}) {
         bail!("a posterior needs [axis.known]: draws do not look for the axis of the motion");
     }
+    if file.band.is_some() {
+        bail!(
+            "a fit with [band] has the posterior of its world in band.json: nothing else is drawn around it"
+        );
+    }
+    Ok(())
+}
+
+/// Draws so many times, those that are there included, and writes what follows.
+pub fn draw(prepared: &Prepared<'_>, folder: &Folder, samples: u32) -> anyhow::Result<Answer> {
+    check(&prepared.file)?;
     let path = folder.path().join(FOLDER);
     std::fs::create_dir_all(&path).with_context(|| format!("cannot make {}", path.display()))?;
     let unknown = prepared.file.unknown_world()?;

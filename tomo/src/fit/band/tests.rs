@@ -19,7 +19,7 @@ fn curve(data: usize) -> CurveRows {
         let radius = x.hypot(y).max(0.5);
         let phase = 40.0 * datum as f64 / data as f64 * radius.powf(-1.5) * 8.0;
         let (sin, cos) = phase.sin_cos();
-        4.0 * if datum % 2 == 0 { x * cos + y * sin } else { y * cos - x * sin } / radius
+        4.0 * if datum.is_multiple_of(2) { x * cos + y * sin } else { y * cos - x * sin } / radius
     };
     let rows = (0..data).map(|k| (0..voxels.count()).map(|v| entry(k, v)).collect()).collect();
     CurveRows { voxels, rows, used: (0..data).map(|k| k < data - 10).collect() }

@@ -143,6 +143,13 @@ impl Measured {
                 *pixel += factor * sigma * noise;
             }
         }
+        if let Some(curve) = &mut copy.curve {
+            let mut random = Pcg64::seed_from_u64(seed);
+            for [flux, sigma] in curve.data.iter_mut().flatten() {
+                let noise: f64 = random.sample(StandardNormal);
+                *flux += factor * *sigma * noise;
+            }
+        }
         copy
     }
 
