@@ -101,7 +101,10 @@ impl<T: Float> Geometry<T> {
         let last = voxels.nodes.map(|n| n - voxels.degree.taps());
         Self {
             low: [0, 1, 2].map(|k| T::of(voxels.low[k] + margin * spacing[k])),
-            per_length: spacing.map(|x| T::of(1.0 / x)),
+            per_length: [0, 1, 2].map(|k| {
+                let cells = (voxels.nodes[k] - 1) as f64;
+                T::of(cells / (voxels.high[k] - voxels.low[k]))
+            }),
             cells: last.map(|last| T::of((last + 1) as f64)),
             last,
             nodes: voxels.nodes,
