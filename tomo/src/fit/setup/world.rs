@@ -141,7 +141,8 @@ fn otherwise(problem: &WorldProblem<'_, f32>, polished: &Polished, number: u64) 
 /// A few voxels more or less, and as many iterations as a start from a dark field takes.
 fn other_voxels(effort: Effort, number: u64) -> Effort {
     const MORE: [usize; 6] = [2, 5, 1, 4, 3, 6];
-    let nodes = effort.nodes - 2 + MORE[number as usize % MORE.len()];
+    let nodes = effort.nodes + MORE[number as usize % MORE.len()] - 2;
+    let nodes = nodes.max(effort.degree.taps());
     Effort { nodes, iterations: PATIENCE * effort.iterations, ..effort }
 }
 
