@@ -4,7 +4,7 @@ use crate::answer::{self, Answer};
 use crate::interferometry::arguments;
 use crate::interferometry::{self, ObservationFile, Written};
 use crate::output::{self, Output};
-use anyhow::bail;
+use anyhow::{Context, bail};
 use clap::Args;
 use kerrlight_tomo::interferometry::files;
 use kerrlight_tomo::interferometry::light_curve::LightCurve;
@@ -50,6 +50,10 @@ pub struct Convert {
     /// Leave out baselines longer than this many wavelengths
     #[arg(long, value_name = "WAVELENGTHS", allow_negative_numbers = true)]
     uv_max: Option<f64>,
+    /// Take station gains out: a table as a fit with [instrument.gains] leaves it (gains.csv); rows without a gain are
+    /// left out
+    #[arg(long, value_name = "GAINS.csv")]
+    gains: Option<PathBuf>,
     /// The source, where the input does not tell where it is: sgra, m87, or hours and degrees
     #[arg(long, value_name = "sgra|m87|RA,DEC", value_parser = arguments::source)]
     source: Option<Source>,
@@ -72,6 +76,7 @@ impl Convert {
     pub fn run(&self) -> anyhow::Result<Answer> {
         let output = ObservationFile::new(&self.output, self.format, self.comments)?;
         output.spares(&self.input)?;
+        self.gains.iter().try_for_each(|gains| output.spares(gains))?;
         if let Some(seconds) = self.average.filter(|s| !(*s > 0.0 && s.is_finite())) {
             bail!("--average {seconds} is not allowed: positive seconds");
         }
@@ -89,6 +94,7 @@ impl Convert {
         self.check_intervals(&observation)?;
         let selection = flags.apply(&observation);
         let mut observation = selection.observation;
+        self.calibrate(&mut observation)?;
         if self.stokes_i {
             observation = observation.total_intensity();
         }
@@ -108,6 +114,21 @@ impl Convert {
         let (rows, flagged) = (observation.rows.len(), selection.dropped);
         eprintln!("{rows} rows, {flagged} flagged");
         Ok(output.answer().with("rows", rows).with("flagged", flagged))
+    }
+
+    /// Takes the gains of a table out.
+    fn calibrate(&self, observation: &mut Observation) -> anyhow::Result<()> {
+        let Some(path) = &self.gains else { return Ok(()) };
+        let name = path.display().to_string();
+        let table = files::parse_gains(&output::read_text(path)?).context(name.clone())?;
+        let (all, lost) = (observation.rows.len(), table.take_out(observation));
+        if lost == all {
+            bail!("{name} has no gains for the stations and times of {}", self.input.display());
+        }
+        if lost > 0 {
+            eprintln!("{name}: {lost} of {all} rows have no gain and are left out");
+        }
+        Ok(())
     }
 
     fn write_light_curve(&self, observation: &Observation) -> anyhow::Result<Answer> {

@@ -191,6 +191,7 @@ impl Observe {
             constant_amplitude: self.gain_constant,
             scan_amplitude: self.gain_scan,
             random_phases: self.random_phases,
+            ..GainErrors::default()
         }
     }
 
@@ -235,7 +236,7 @@ impl Observe {
             scatter(observation, &ScatteringKernel::SGR_A)?;
         }
         if self.gains() != GainErrors::default() {
-            apply_gains(observation, self.gains(), seed);
+            apply_gains(observation, &self.gains(), seed);
         }
         if self.noise == Noise::Thermal {
             add_thermal_noise(observation, seed);

@@ -106,9 +106,14 @@ impl Plan {
             scatter(observation, &ScatteringKernel::SGR_A)?;
         }
         let (constant_amplitude, scan_amplitude, random_phases) = self.gains;
-        let gains = GainErrors { constant_amplitude, scan_amplitude, random_phases };
+        let gains = GainErrors {
+            constant_amplitude,
+            scan_amplitude,
+            random_phases,
+            ..GainErrors::default()
+        };
         if gains != GainErrors::default() {
-            apply_gains(observation, gains, self.seed);
+            apply_gains(observation, &gains, self.seed);
         }
         if self.thermal {
             add_thermal_noise(observation, self.seed);

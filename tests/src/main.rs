@@ -17,6 +17,7 @@ mod film;
 mod film_stars;
 mod fit;
 mod fit_bad_luck;
+mod fit_data;
 mod fit_start;
 mod fit_without_phases;
 mod fuzz_corpus;
@@ -33,6 +34,7 @@ mod resume;
 mod resumed_fits;
 #[cfg(unix)]
 mod signals;
+mod station_gains;
 mod support;
 mod unknown_world;
 mod verdict;

@@ -167,6 +167,7 @@ fn regress_the_reference_has_every_key_of_a_fit() {
         "band={radii={nonsense=1}}",
         "truth.tube=[{nonsense=1}]",
         "observation.gains={nonsense=1}",
+        "instrument={gains={nonsense=1}}",
         "world={spin={uniform=[0.0,0.5]},nonsense=1}",
         "world={search={nonsense=1}}",
         "world={search={starts=1,drag_is_spin=true,coarse={nonsense=1}}}",

@@ -44,6 +44,10 @@ pub struct Fit {
     /// [default: my_fit.toml]
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
+    /// Fit this file of data (visibilities, images or a light curve) with settings that are guessed from it; every guess
+    /// is told, and what cannot be guessed is asked for
+    #[arg(long, value_name = "DATA", conflicts_with_all = ["file", "resume", "init"])]
+    data: Option<PathBuf>,
     /// Change a setting, e.g. training.steps=500; `representation=grid` is short for
     /// representation.kind=grid
     #[arg(long, value_name = "KEY=VALUE")]
@@ -82,10 +86,15 @@ impl Fit {
             let prepared = run::Prepared::new(file, &base_dir_of(&text), registry)?;
             return self.run_all(&prepared, &text, &folder, true);
         }
-        let (text, base_dir) = self.settings()?;
+        let guess = self.data.as_deref().map(init::guess).transpose()?;
+        let (text, base_dir) = self.settings(guess.as_ref())?;
         if self.print {
             let settings = serde_json::to_value(text.parse::<toml::Table>()?)?;
             return Ok(Answer::text(text).with("settings", settings));
+        }
+        if let (Some(guess), Some(data)) = (&guess, &self.data) {
+            guess.check(&text, data)?;
+            eprint!("{text}\n{}", guess.sentences(&text));
         }
         let file = parse(&text).with_context(|| self.name())?;
         let folder = match &self.output {
@@ -121,14 +130,16 @@ impl Fit {
     }
 
     fn name(&self) -> String {
-        self.file.as_ref().map_or("built-in experiment".to_owned(), |f| f.display().to_string())
+        let file = self.file.as_ref().or(self.data.as_ref());
+        file.map_or("built-in experiment".to_owned(), |f| f.display().to_string())
     }
 
     /// The text of the settings and the folder that paths in it start from.
-    fn settings(&self) -> anyhow::Result<(String, PathBuf)> {
-        let (mut text, base_dir) = match &self.file {
-            None => (BUILT_IN.to_owned(), PathBuf::from(".")),
-            Some(path) => {
+    fn settings(&self, guess: Option<&init::Guess>) -> anyhow::Result<(String, PathBuf)> {
+        let (mut text, base_dir) = match (&self.file, guess) {
+            (None, Some(guess)) => (guess.text.clone(), PathBuf::from(".")),
+            (None, None) => (BUILT_IN.to_owned(), PathBuf::from(".")),
+            (Some(path), _) => {
                 let folder = path.parent().filter(|folder| *folder != Path::new(""));
                 let folder = std::path::absolute(folder.unwrap_or(Path::new(".")))
                     .with_context(|| path.display().to_string())?;

@@ -13,6 +13,7 @@ mod conformance;
 pub mod data_terms;
 pub mod earth;
 pub mod files;
+pub mod gains;
 pub mod light_curve;
 pub mod noise;
 pub mod observation;

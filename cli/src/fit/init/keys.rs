@@ -22,7 +22,7 @@ const fn key(
 }
 
 /// What a heading is about.
-pub const TABLES: [(&str, &str); 21] = [
+pub const TABLES: [(&str, &str); 25] = [
     ("hole", "The black hole."),
     ("observer", "Where the observer is."),
     ("screen", "Square pixels of the model."),
@@ -35,6 +35,8 @@ pub const TABLES: [(&str, &str); 21] = [
     ("observation.gains", "Station gain errors."),
     ("data.visibilities", "Measured visibilities."),
     ("data.movie", "Measured or simulated images, Jy/pixel."),
+    ("data.light-curve", "The light curve of a source that is not resolved."),
+    ("instrument.gains", "Complex gains of the stations, solved for in every frame beside the emission."),
     ("loss", "Terms of the loss, which is the weighted sum of each term's chi^2 per data point."),
     ("representation", "How the recovered emission is represented."),
     ("training", "How the representation is optimised."),
@@ -49,6 +51,8 @@ pub const TABLES: [(&str, &str); 21] = [
     ),
     ("regulariser", "A penalty on the emission."),
     ("probe", "The grid on which penalties of a network are evaluated."),
+    ("polarization", "The magnetic field of the gas and the law of its polarised light; see docs/reference/fit-file.md."),
+    ("band", "Worlds that are compared first, with a flare in an orbital band."),
     ("output", "The recovered volume."),
 ];
 

@@ -1,7 +1,9 @@
 //! `kerrlight fit --init`: a commented file to start from, for given data or for the built-in experiment.
 
 mod annotate;
+mod guess;
 mod keys;
+mod light_curve;
 
 use super::{BUILT_IN, parse};
 use crate::answer::Answer;
@@ -9,9 +11,12 @@ use crate::interferometry::image_files::OwnTimes;
 use crate::interferometry::movie_files;
 use crate::output::Output;
 use annotate::annotate;
+pub use guess::{Guess, guess};
 use anyhow::{Context, bail};
 use kerrlight_tomo::interferometry::data_terms::ClosureTerm;
 use kerrlight_tomo::interferometry::earth::SourcePosition;
+use kerrlight_tomo::interferometry::files;
+use kerrlight_tomo::interferometry::gains::prior_table;
 use kerrlight_tomo::interferometry::observation::Observation;
 use kerrlight_tomo::interferometry::products::ClosureKind;
 use kerrlight_tomo::interferometry::simulate::Movie;
@@ -52,6 +57,8 @@ struct Source {
     mass_msun: f64,
     distance_kpc: f64,
     inclination_deg: f64,
+    /// A setting that leaves out baselines that see more than the surroundings of the hole.
+    uv_min: Option<&'static str>,
     /// Where the numbers come from.
     mass: &'static str,
     inclination: &'static str,
@@ -65,6 +72,7 @@ const SOURCES: [Source; 2] = [
         mass_msun: 4.154e6,
         distance_kpc: 8.178,
         inclination_deg: 30.0,
+        uv_min: None,
         mass: "Sgr A* (GRAVITY Collaboration 2019, A&A 625, L10)",
         inclination: "the EHT's models prefer views of Sgr A* near face-on, 30 degrees or less from an axis (2022, ApJL 930, L16)",
     },
@@ -75,6 +83,7 @@ const SOURCES: [Source; 2] = [
         mass_msun: 6.5e9,
         distance_kpc: 16_800.0,
         inclination_deg: 163.0,
+        uv_min: Some("uv_min = 1e8 #! shorter baselines see the jet as well: 1.1 Jy, where the ring has about 0.6"),
         mass: "M87* (EHT Collaboration 2019, ApJL 875, L1)",
         inclination: "17 degrees from the jet's axis, with the hole turned away (EHT Collaboration 2019, ApJL 875, L5)",
     },
@@ -126,14 +135,17 @@ fn of_data(data: &Path, toml: &Path) -> anyhow::Result<String> {
     if matches!(extension.to_ascii_lowercase().as_str(), "npz" | "npy" | "exr") {
         return of_movie(&read_movie(data)?, &path);
     }
-    match crate::interferometry::read(data) {
-        Ok((_, observation)) => of_visibilities(&observation, &path),
-        // A FITS file or a table may hold an image, too.
-        Err(first) => match read_movie(data) {
-            Ok(movie) => of_movie(&movie, &path),
-            Err(_) => Err(first),
-        },
+    let name = data.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    let first = match crate::interferometry::read(data) {
+        Ok((_, observation)) => return of_visibilities(&observation, &path, name),
+        Err(first) => first,
+    };
+    // A table may hold a light curve, and a FITS file or a table an image.
+    let text = crate::output::read_text(data);
+    if let Some(curve) = text.ok().and_then(|text| files::parse_light_curve(&text).ok()) {
+        return light_curve::of_light_curve(&curve, &path, name);
     }
+    read_movie(data).map_or(Err(first), |movie| of_movie(&movie, &path))
 }
 
 /// The data's path as the file that names it has to say it.
@@ -176,7 +188,7 @@ fn known(observation: &Observation) -> Option<&'static Source> {
     })
 }
 
-fn of_visibilities(observation: &Observation, path: &str) -> anyhow::Result<String> {
+fn of_visibilities(observation: &Observation, path: &str, file: &str) -> anyhow::Result<String> {
     let flux = short_baselines(observation)?;
     let source = known(observation);
     let name = source.map_or(observation.source.trim(), |source| source.name);
@@ -216,9 +228,33 @@ fn of_visibilities(observation: &Observation, path: &str) -> anyhow::Result<Stri
         ("jy", digits(per_pixel)),
         ("flux", digits(flux)),
         ("losses", losses),
+        ("uv_min", source.and_then(|source| source.uv_min).unwrap_or_default().to_owned()),
+        ("gains", gains(observation)),
+        ("read", read(observation, file, name, source.is_some())),
         ("path", path.to_owned()),
     ];
     complete(include_str!("visibilities.toml"), &fields)
+}
+
+/// What is assumed of the gains of the stations.
+fn gains(observation: &Observation) -> String {
+    let seen = |k: usize| observation.rows.iter().any(|r| r.stations.contains(&(k as u16)));
+    let names = observation.stations.iter().enumerate().filter(|(k, _)| seen(*k));
+    let known = |name: &str| prior_table("EHT2017", name).is_some();
+    match names.map(|(_, station)| &station.name).all(|name| known(name)) {
+        true => "table = \"EHT2017\" #! 10 % of the amplitude, 60 % at the LMT, which lost light by pointing".to_owned(),
+        false => "amplitude = 0.1 #! stations are calibrated to 10 % of their amplitudes".to_owned(),
+    }
+}
+
+/// What the file says, in a line.
+fn read(observation: &Observation, file: &str, name: &str, is_known: bool) -> String {
+    let rows: Vec<f64> = observation.stokes_i().map(|(row, _)| row.time_h).collect();
+    let [first, last] = rows.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], time| [a.min(*time), b.max(*time)]);
+    let source = if is_known { format!("{name}, recognised by position or name") } else { name.to_owned() };
+    let day = observation.mjd.map_or(String::new(), |mjd| format!(", MJD {mjd}"));
+    let frequency = observation.frequency_hz.map_or(String::new(), |hz| format!(" at {:.1} GHz", hz * 1e-9));
+    format!("{file}: {source}{day}, {first:.2} h to {last:.2} h UTC, {} stations, {} visibilities of Stokes I{frequency}", observation.stations.len(), rows.len())
 }
 
 /// Median amplitude of the shortest tenth of the baselines, Jy.

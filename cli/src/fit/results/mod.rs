@@ -1,6 +1,7 @@
 //! What a run leaves: the volume, the movie, numbers, pictures and the report.
 
 mod fields;
+mod gains;
 mod lensed;
 mod light_curve;
 mod numbers;
@@ -22,6 +23,7 @@ use kerrlight_tomo::fit::{Loss, Motion, State, Trainer};
 use kerrlight_tomo::interferometry::files::images;
 use kerrlight_tomo::units::MICROARCSECOND;
 use kerrlight_tomo::volume::{Volume, VolumeFile, vti};
+use gains::Gains;
 use lensed::Still;
 use over_time::Changes;
 use serde_json::Value;
@@ -69,7 +71,9 @@ impl Estimate<'_> {
         let still = self.still(trainer, state)?;
         let judged = self.evidence().judged(&trainer.objective, &seen)?;
         self.curve_table(&seen)?;
-        let found = Found { volume, changes, still, loss, mask, judged, seen, movie, state, begun };
+        let gains = self.gains(&movie)?;
+        let found =
+            Found { volume, changes, still, loss, mask, judged, gains, seen, movie, state, begun };
         let results = self.results(trainer, &found)?;
         self.folder.file("results.json")?.write(sealed(results.clone()).as_bytes())?;
         self.report(&found, &results)?;
@@ -125,6 +129,8 @@ pub struct Found<'a> {
     /// What the mask of what shines leaves out, of the flux; nothing without a mask.
     mask: Option<f64>,
     judged: Judged,
+    /// Gains of stations, where they are solved for.
+    gains: Option<Gains>,
     /// What data see of the movie: the movie itself, or its fluxes.
     seen: Vec<f32>,
     movie: Vec<f32>,

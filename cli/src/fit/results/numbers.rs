@@ -58,6 +58,9 @@ impl Estimate<'_> {
         if let Some(validation) = self.validation(&found.seen)? {
             results["validation_chi2_per_datum"] = json!(validation);
         }
+        if let Some(gains) = &found.gains {
+            results["gains"] = gains.json();
+        }
         if let Some(mask) = found.mask {
             results["mask_error"] = json!(mask);
         }

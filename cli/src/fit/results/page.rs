@@ -1,5 +1,6 @@
 //! The report.
 
+use super::gains::Gains;
 use super::lensed::{self, Still};
 use super::numbers::outcomes;
 use super::over_time::Changes;
@@ -27,13 +28,15 @@ impl Estimate<'_> {
         plots.extend(self.light_curves(&found.seen));
         plots.push(self.light_curve(&found.movie));
         plots.extend(found.changes.as_ref().map(Changes::plot));
-        plots.extend(self.amplitudes(&found.movie)?);
+        plots.extend(self.amplitudes(found)?);
+        plots.extend(found.gains.iter().flat_map(Gains::plots));
+        let details = found.gains.as_ref().map(Gains::details);
         let report = Report {
             title: self.file.title.clone(),
             notice: Some(found.judged.notice()),
-            summary: self.summary(results),
+            summary: self.summary(found, results),
             results: outcomes(results),
-            details: vec![found.judged.table()],
+            details: [found.judged.table()].into_iter().chain(details).collect(),
             view: Some(self.view(found)),
             figures: self.figures(found)?,
             plots,
@@ -138,7 +141,7 @@ impl Estimate<'_> {
         }
     }
 
-    fn summary(&self, results: &Value) -> Vec<String> {
+    fn summary(&self, found: &Found<'_>, results: &Value) -> Vec<String> {
         let file = self.file;
         let data: Vec<&str> = file.loss.iter().map(|l| l.data.label()).collect();
         let number = |key: &str| results[key].as_f64();
@@ -170,6 +173,7 @@ impl Estimate<'_> {
                 each.collect::<Vec<_>>().join("; ")
             ));
         }
+        lines.extend(found.gains.iter().flat_map(Gains::sentences));
         if let (Some(psnr), Some(nrmse)) = (number("psnr_db"), number("nrmse")) {
             lines.push(format!(
                 "Compared with the truth, the volume has a peak signal-to-noise ratio of {psnr:.2} dB and a relative error of {nrmse:.3} (1 for an empty volume)."

@@ -82,7 +82,9 @@ impl Evidence<'_> {
         let flux = self.zero_spacing(movie);
         let knows_flux =
             |loss: &Loss| matches!(loss.data, LossKind::Visibilities | LossKind::Amplitudes);
-        let judged = flux.filter(|_| self.file.loss.iter().any(knows_flux));
+        // Gains that are free may be what is missing.
+        let knows = self.measured.gains.is_none() && self.file.loss.iter().any(knows_flux);
+        let judged = flux.filter(|_| knows);
         let observation = self.measured.visibilities.as_ref().map(|(observation, _)| observation);
         let stations = observation.map(|o| o.stations.iter().map(|s| s.name.clone()).collect());
         Ok(Judged {

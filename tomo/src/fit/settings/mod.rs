@@ -7,6 +7,7 @@ mod band;
 mod change;
 mod data;
 mod error;
+mod instrument;
 mod light_curve;
 mod penalties;
 mod ranges;
@@ -22,6 +23,7 @@ pub use change::ChangeSettings;
 pub use data::{DataFiles, Loss, LossKind};
 pub use error::FitError;
 pub(crate) use error::{Within, refuse};
+pub use instrument::{GainPhases, GainSettings, InstrumentSettings};
 pub use light_curve::{MeanFlux, MeasuredCurve, PerStokes, SimulatedCurve};
 pub use penalties::{PenaltyKind, PenaltySettings, ProbeSettings};
 pub use recovery::{
@@ -84,6 +86,9 @@ pub struct FitFile {
     /// Files, instead of a simulation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub data: Option<DataFiles>,
+    /// What of the instrument is solved for; nothing, without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub instrument: Option<InstrumentSettings>,
     /// What is compared with the data.
     pub loss: Vec<Loss>,
     /// Penalties on the emission beside the data; none unless asked.
@@ -125,6 +130,12 @@ impl FitFile {
         let file = toml::from_str(text).map_err(|error| FitError::Syntax(syntax(&error)))?;
         ranges::check(text)?;
         Ok(file)
+    }
+
+    /// Whether the data are visibilities, measured or simulated.
+    pub fn has_visibilities(&self) -> bool {
+        let simulated = self.observation.is_some() && self.light_curve.is_none();
+        matches!(self.data, Some(DataFiles::Visibilities { .. })) || (self.data.is_none() && simulated)
     }
 }
 

@@ -4,7 +4,7 @@ use super::FitError;
 use crate::scene::shown;
 use toml::Value;
 
-/// Key (`*` stands for the number of a list's element), least and largest value, unit.
+/// Key (`*` stands for the number of a list's element, `?` for any name), least and largest value, unit.
 type Range = (&'static str, f64, f64, &'static str);
 
 const TIME: f64 = 1e9;
@@ -84,6 +84,9 @@ const RANGES: &[Range] = &[
     ("truth.glyph.*.amplitude", 0.0, 1e12, "emission in the strokes"),
     ("observation.gains.constant_amplitude", 0.0, 10.0, "a standard deviation of ln |g|"),
     ("observation.gains.scan_amplitude", 0.0, 10.0, "a standard deviation of ln |g|"),
+    ("instrument.gains.stations.?", 0.0, 10.0, "a standard deviation of ln |g|"),
+    ("observation.gains.stations.?", 0.0, 10.0, "a standard deviation of ln |g|"),
+    ("instrument.gains.amplitude", 0.0, 10.0, "a standard deviation of ln |g|"),
     ("observation.first_time", -TIME, TIME, "M"),
     ("data.visibilities.first_time", -TIME, TIME, "M"),
     ("data.visibilities.average_s", 0.0, f64::INFINITY, "seconds"),
@@ -198,6 +201,7 @@ fn matches(pattern: &str, key: &str) -> bool {
         match (wanted.next(), given.next()) {
             (None, None) => return true,
             (Some("*"), Some(part)) if part.parse::<usize>().is_ok() => {}
+            (Some("?"), Some(_)) => {}
             (Some(name), Some(part)) if name == part => {}
             _ => return false,
         }
@@ -260,7 +264,7 @@ mod tests {
         let documents = include_str!("../../../../docs/reference/fit-file.md");
         for (pattern, least, most, _) in RANGES {
             assert!(least < most, "{pattern}");
-            let name = pattern.trim_end_matches(".*").rsplit('.').next().unwrap_or_default();
+            let name = pattern.trim_end_matches(".*").trim_end_matches(".?").rsplit('.').next().unwrap_or_default();
             assert!(documents.contains(name), "docs/reference/fit-file.md does not know {pattern}");
         }
     }

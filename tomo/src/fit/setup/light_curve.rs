@@ -125,9 +125,17 @@ impl Measured {
         Ok(Self { times, curve: Some(curve), ..Self::empty() })
     }
 
-    fn empty() -> Self {
-        let times = Vec::new();
-        Self { times, movie: None, visibilities: None, curve: None, sky: None, truth: None }
+    pub(super) fn empty() -> Self {
+        Self {
+            times: Vec::new(),
+            movie: None,
+            visibilities: None,
+            curve: None,
+            sky: None,
+            truth: None,
+            gains: None,
+            true_gains: None,
+        }
     }
 }
 

@@ -7,7 +7,7 @@ use crate::fit::{
     Data, ForwardModel, FrameTerm, ImageTerm, LightCurveTerm, Motion, Scan, ScanTerm, Weighted,
 };
 use crate::interferometry::data_terms::{
-    AmplitudeTerm, ClosureTerm, DataTerm, DataTermError, VisibilityTerm,
+    AmplitudeTerm, ClosureTerm, DataTerm, DataTermError, GainTerm, VisibilityTerm,
 };
 use crate::interferometry::observation::Observation;
 use crate::interferometry::operator::{Method, Pulse, Transform};
@@ -87,7 +87,7 @@ impl Measured {
             return Ok(Box::new(LightCurveTerm::new(flux, &sigmas, pixels)?));
         }
         let (name, quadratic) = match loss.data {
-            LossKind::Visibilities => ("visibilities", true),
+            LossKind::Visibilities => ("visibilities", self.gains.is_none()),
             LossKind::Amplitudes => ("amplitudes", false),
             LossKind::ClosurePhases => ("closure phases", false),
             _ => ("log closure amplitudes", false),
@@ -116,25 +116,37 @@ impl Measured {
             return Ok(None);
         }
         let uv: Vec<[f64; 2]> = part.stokes_i().map(|(row, _)| row.uv).collect();
-        let least = loss.least_snr.unwrap_or(0.0);
-        let term: Box<dyn DataTerm<f32> + Send> = match loss.data {
-            LossKind::Visibilities => Box::new(VisibilityTerm::new(&part)?),
-            LossKind::Amplitudes => Box::new(AmplitudeTerm::new(&part)?),
-            kind => {
-                let kind = match kind {
-                    LossKind::ClosurePhases => ClosureKind::Phase,
-                    _ => ClosureKind::LogAmplitude,
-                };
-                match ClosureTerm::new(&part, kind, least) {
-                    Err(crate::Error::DataTerm(DataTermError::Empty)) => return Ok(None),
-                    term => Box::new(term?),
-                }
-            }
-        };
+        let Some(term) = self.scan_data(loss, &part)? else { return Ok(None) };
         let transform = Transform::new(sky, Pulse::Triangle, &[uv], Method::Direct, MEMORY)?;
         Ok(Some(Scan { transform, term }))
     }
 }
+
+impl Measured {
+    /// The data of a scan that a loss compares; none where closure quantities have too few baselines.
+    fn scan_data(&self, loss: &Loss, part: &Observation) -> Result<Option<ScanData>> {
+        let least = loss.least_snr.unwrap_or(0.0);
+        let kind = match (loss.data, &self.gains) {
+            (LossKind::Visibilities, Some(priors)) => {
+                return Ok(Some(Box::new(GainTerm::visibilities(part, priors)?)));
+            }
+            (LossKind::Amplitudes, Some(priors)) => {
+                return Ok(Some(Box::new(GainTerm::amplitudes(part, priors)?)));
+            }
+            (LossKind::Visibilities, None) => return Ok(Some(Box::new(VisibilityTerm::new(part)?))),
+            (LossKind::Amplitudes, None) => return Ok(Some(Box::new(AmplitudeTerm::new(part)?))),
+            (LossKind::ClosurePhases, _) => ClosureKind::Phase,
+            _ => ClosureKind::LogAmplitude,
+        };
+        match ClosureTerm::new(part, kind, least) {
+            Err(crate::Error::DataTerm(DataTermError::Empty)) => Ok(None),
+            term => Ok(Some(Box::new(term?))),
+        }
+    }
+}
+
+/// Data of a scan.
+type ScanData = Box<dyn DataTerm<f32> + Send>;
 
 /// Exponentials of a frame up to this many bytes are kept.
 const MEMORY: usize = 8 << 20;

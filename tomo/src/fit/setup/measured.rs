@@ -1,5 +1,6 @@
 //! The data of a fit: simulated, or measured.
 
+use super::gains;
 use super::light_curve::{self, Curve};
 use super::truth::SPOT;
 use super::visibilities::{VisibilitySettings, frames_of, prepared};
@@ -9,6 +10,7 @@ use crate::fit::settings::{
 };
 use crate::interferometry::array::Array;
 use crate::interferometry::earth::{Frame, Ut1};
+use crate::interferometry::gains::{GainPriors, GainTable};
 use crate::interferometry::noise::{add_thermal_noise, apply_gains};
 use crate::interferometry::observation::{Observation, Row};
 use crate::interferometry::operator::{ImageGrid, Method, Pulse};
@@ -38,6 +40,10 @@ pub struct Measured {
     pub sky: Option<ImageGrid>,
     /// What is simulated.
     pub truth: Option<Truth>,
+    /// Priors of the stations' gains, where these are solved for.
+    pub gains: Option<GainPriors>,
+    /// The gains that were put on simulated data.
+    pub true_gains: Option<GainTable>,
 }
 
 impl Measured {
@@ -75,6 +81,9 @@ impl Measured {
                     "world.hole, observer, region, effects and motion need simulated data: add a truth"
                 )
             }
+            _ if file.instrument.is_some() && !file.has_visibilities() => refuse!(
+                "instrument.gains needs visibilities: [data.visibilities], or an [observation] of the truth"
+            ),
             _ => Ok(()),
         }
     }
@@ -94,14 +103,8 @@ impl Measured {
                 times.len()
             );
         }
-        Ok(Measured {
-            times,
-            movie: Some(movie.pixels),
-            visibilities: None,
-            curve: None,
-            sky: sky(file).ok(),
-            truth: None,
-        })
+        let (movie, sky) = (Some(movie.pixels), sky(file).ok());
+        Ok(Measured { times, movie, sky, ..Measured::empty() })
     }
 
     /// Takes measured visibilities as the data. `name` is what they are called in messages.
@@ -120,8 +123,9 @@ impl Measured {
         let (hours, of_rows) = frames_of(&mut observation);
         let per_m = hours_per_m(file)?;
         let times = hours.iter().map(|h| first_time + (h - hours[0]) / per_m).collect();
+        let gains = gains::priors(file, &observation)?;
         let (visibilities, sky) = (Some((observation, of_rows)), Some(sky(file)?));
-        Ok(Measured { times, movie: None, visibilities, curve: None, sky, truth: None })
+        Ok(Measured { times, visibilities, sky, gains, ..Measured::empty() })
     }
 
     /// The data with noise once more, `factor` times as large as their errors: what might as well have been measured.
@@ -161,7 +165,9 @@ impl Measured {
             visibilities: self.visibilities.clone(),
             curve: self.curve.clone(),
             sky: self.sky,
+            gains: self.gains.clone(),
             truth: None,
+            true_gains: None,
         }
     }
 }
@@ -209,14 +215,7 @@ fn simulate(
         afford_movie(times.len(), file.screen.pixels)?;
         let movie = Some(lit(&truth, truth.movie(file, instrument, &times)?)?);
         let sky = sky(file).ok();
-        return Ok(Measured {
-            times,
-            movie,
-            visibilities: None,
-            curve: None,
-            sky,
-            truth: Some(truth),
-        });
+        return Ok(Measured { times, movie, sky, truth: Some(truth), ..Measured::empty() });
     };
     let sky = sky(file)?;
     let (mut observation, hours) = schedule_of(seen, array)?;
@@ -226,12 +225,13 @@ fn simulate(
     let movie = lit(&truth, truth.movie(file, instrument, &times)?)?;
     let images = Movie { grid: sky, pixels: movie.clone() };
     simulate::fill(&mut observation, &images, Pulse::Triangle, &hours, Method::Direct)?;
-    spoil(file, seen, &mut observation)?;
+    let true_gains = spoil(file, seen, &mut observation)?;
+    let gains = gains::priors(fit, &observation)?;
     let frame = |time: f64| hours.partition_point(|hour| *hour < time - 1e-9).min(hours.len() - 1);
     let of_rows = observation.rows.iter().map(|row| frame(row.time_h)).collect();
     let visibilities = Some((observation, of_rows));
     let (movie, sky, truth) = (Some(movie), Some(sky), Some(truth));
-    Ok(Measured { times, movie, visibilities, curve: None, sky, truth })
+    Ok(Measured { times, movie, visibilities, sky, truth, gains, true_gains, ..Measured::empty() })
 }
 
 /// Rows of the observation without values, and hours of UTC of its scans.
@@ -275,17 +275,23 @@ fn clock(seen: &Seen) -> Result<(Clock, [f64; 2])> {
 }
 
 /// Errors of gains, thermal noise and systematic errors, in the order of light's way.
-fn spoil(file: &FitFile, seen: &Seen, observation: &mut Observation) -> Result<()> {
-    if let Some(gains) = seen.gains {
-        apply_gains(observation, gains, file.seed);
+fn spoil(
+    file: &FitFile,
+    seen: &Seen,
+    observation: &mut Observation,
+) -> Result<Option<GainTable>> {
+    let gains = seen.gains.as_ref();
+    if let Some(name) = gains.and_then(|gains| gains.unknown_station(observation)) {
+        refuse!("observation.gains.stations.{name}: {} has no such station", seen.array);
     }
+    let gains = gains.map(|gains| apply_gains(observation, gains, file.seed));
     if seen.noise == Noise::Thermal {
         add_thermal_noise(observation, file.seed);
     }
-    match seen.systematic {
-        Some(part) => add_systematic("observation.systematic", part, observation),
-        None => Ok(()),
+    if let Some(part) = seen.systematic {
+        add_systematic("observation.systematic", part, observation)?;
     }
+    Ok(gains)
 }
 
 /// A simulated movie, if any of its pixels shines: a dark one would be recovered as nothing, perfectly.

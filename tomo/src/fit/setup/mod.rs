@@ -3,6 +3,7 @@
 mod band;
 mod change;
 mod coarse_view;
+mod gains;
 mod glyph;
 mod imprint;
 mod instrument;

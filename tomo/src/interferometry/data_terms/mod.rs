@@ -2,9 +2,11 @@
 //! never images; an [`Operator`](super::operator::Operator) carries the gradient on.
 
 mod closures;
+mod gains;
 mod visibilities;
 
 pub use closures::ClosureTerm;
+pub use gains::GainTerm;
 pub use visibilities::{AmplitudeTerm, VisibilityTerm};
 
 use super::observation::{Measured, Observation};

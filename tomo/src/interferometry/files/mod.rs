@@ -5,6 +5,7 @@ mod comments;
 mod eht_table;
 mod fits;
 mod fits_image;
+mod gains;
 pub mod images;
 mod light_curve;
 mod obs_text;
@@ -13,6 +14,7 @@ mod uvfits;
 
 pub use eht_table::{EhtTable, to_eht_table};
 pub use fits_image::read as read_fits_image;
+pub use gains::{COLUMNS as GAIN_COLUMNS, parse as parse_gains, to_csv as gains_to_csv};
 pub use light_curve::{parse as parse_light_curve, parse_times, to_csv as light_curve_to_csv};
 pub use obs_text::{parse as parse_obs_text, to_text as to_obs_text};
 pub use table::{COLUMNS as TABLE_COLUMNS, parse as parse_table, to_csv};

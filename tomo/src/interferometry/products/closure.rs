@@ -278,8 +278,13 @@ mod tests {
         let clean = random(7);
         let mut spoilt = clean.clone();
         let errors =
-            GainErrors { constant_amplitude: 0.3, scan_amplitude: 0.2, random_phases: true };
-        apply_gains(&mut spoilt, errors, 4);
+            GainErrors {
+                constant_amplitude: 0.3,
+                scan_amplitude: 0.2,
+                random_phases: true,
+                ..GainErrors::default()
+            };
+        apply_gains(&mut spoilt, &errors, 4);
         // The relative errors shall stay what they were.
         for (a, b) in clean.rows.iter().zip(&mut spoilt.rows) {
             assert!((a.products[0] - b.products[0]).norm() > 1e-3);

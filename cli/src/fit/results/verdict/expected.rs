@@ -45,7 +45,9 @@ impl Evidence<'_> {
     /// Residuals of the model beside drawn data; none for data whose errors are Gaussian, or of which a draw has none.
     pub(super) fn draws(&self, loss: &Loss, model: &[Complex<f64>]) -> Option<Vec<Statistics>> {
         let (observation, frames) = self.measured.visibilities.as_ref()?;
-        if matches!(loss.data, LossKind::Visibilities | LossKind::Image | LossKind::LightCurve) {
+        let has_gains = self.measured.gains.is_some() && loss.data == LossKind::Amplitudes;
+        let kinds = [LossKind::Visibilities, LossKind::Image, LossKind::LightCurve];
+        if has_gains || kinds.contains(&loss.data) {
             return None;
         }
         let draw = |k: u64| {

@@ -1,0 +1,154 @@
+//! `kerrlight fit --data FILE`: settings that are guessed from a file of data, with every guess told in a sentence.
+
+use super::annotate::annotate;
+use super::of_data;
+use anyhow::bail;
+use std::path::Path;
+
+/// Settings for a file of data.
+pub struct Guess {
+    /// As a commented fit file.
+    pub text: String,
+    /// What the file says of itself, a sentence each.
+    read: Vec<String>,
+    /// What neither the file nor a published value says, with the reason for what was taken.
+    assumed: Vec<String>,
+    /// What has to be given.
+    missing: Vec<Missing>,
+}
+
+/// A setting without which there is no fit.
+struct Missing {
+    /// Dotted path.
+    key: String,
+    /// A value as it might be.
+    example: String,
+    why: String,
+}
+
+/// The settings for data at an absolute path.
+///
+/// # Errors
+/// If the file holds no visibilities, images or light curve.
+pub fn guess(data: &Path) -> anyhow::Result<Guess> {
+    let data = std::path::absolute(data)?;
+    let plain = of_data(&data, Path::new(""))?;
+    let mut guess =
+        Guess { text: annotate(&plain), read: Vec::new(), assumed: Vec::new(), missing: Vec::new() };
+    let mut table = String::new();
+    for line in plain.lines() {
+        if let Some(said) = line.strip_prefix(READ) {
+            guess.read.push(said.to_owned());
+        } else if line.starts_with('[') {
+            table = line.trim_matches(['[', ']']).to_owned();
+        } else {
+            guess.line(line, &table);
+        }
+    }
+    Ok(guess)
+}
+
+/// How lines begin that say what was read.
+pub const READ: &str = "# Read: ";
+
+impl Guess {
+    fn line(&mut self, line: &str, table: &str) {
+        let path = |key: &str| if table.is_empty() { key.to_owned() } else { format!("{table}.{key}") };
+        if let Some((setting, why)) = line.split_once(" #! ") {
+            self.assumed.push(format!("{}: {why}", path(setting)));
+        } else if let Some(open) = line.strip_prefix("#? ")
+            && let Some((setting, why)) = open.split_once(" # ")
+            && let Some((key, example)) = setting.split_once(" = ")
+        {
+            let (key, example, why) = (path(key), example.to_owned(), why.to_owned());
+            self.missing.push(Missing { key, example, why });
+        }
+    }
+
+    /// Refuses settings in which something is left open that nothing can be guessed of.
+    ///
+    /// # Errors
+    /// Names all of it, with what to write.
+    pub fn check(&self, settings: &str, data: &Path) -> anyhow::Result<()> {
+        let table: toml::Table = settings.parse()?;
+        let is_open = |missing: &&Missing| !has(&table, &missing.key);
+        let open: Vec<&Missing> = self.missing.iter().filter(is_open).collect();
+        if open.is_empty() {
+            return Ok(());
+        }
+        let line = |m: &&Missing| format!("\n  {} ({}): --set '{}={}'", m.key, m.why, m.key, m.example);
+        let lines: String = open.iter().map(line).collect();
+        bail!("{} does not say what decides the result; give{lines}", data.display())
+    }
+
+    /// What was read and what was assumed, in lines.
+    pub fn sentences(&self, settings: &str) -> String {
+        let table: toml::Table = settings.parse().unwrap_or_default();
+        let mut text = String::new();
+        self.read.iter().for_each(|said| text += &format!("read: {said}\n"));
+        for assumed in &self.assumed {
+            // What --set has changed is no guess any more.
+            let (setting, _) = assumed.split_once(": ").unwrap_or((assumed, ""));
+            let (key, value) = setting.split_once(" = ").unwrap_or((setting, ""));
+            if is_still(&table, key, value) {
+                text += &format!("assumed: {assumed}\n");
+            }
+        }
+        text
+    }
+}
+
+fn find<'a>(table: &'a toml::Table, key: &str) -> Option<&'a toml::Value> {
+    let mut words = key.split('.');
+    let first = table.get(words.next()?)?;
+    words.try_fold(first, |value, word| match value {
+        // Of a list of tables the last one is meant that has the key.
+        toml::Value::Array(list) => list.iter().rev().find_map(|item| item.get(word)),
+        value => value.get(word),
+    })
+}
+
+fn has(table: &toml::Table, key: &str) -> bool {
+    find(table, key).is_some()
+}
+
+fn is_still(table: &toml::Table, key: &str, value: &str) -> bool {
+    let guessed: Option<toml::Table> = format!("value = {value}").parse().ok();
+    let guessed = guessed.and_then(|table| table.get("value").cloned());
+    guessed.is_none() || find(table, key) == guessed.as_ref()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn guess_of(plain: &str) -> Guess {
+        let mut guess = Guess {
+            text: plain.to_owned(),
+            read: Vec::new(),
+            assumed: Vec::new(),
+            missing: Vec::new(),
+        };
+        let mut table = String::new();
+        for line in plain.lines() {
+            match line.starts_with('[') {
+                true => line.trim_matches(['[', ']']).clone_into(&mut table),
+                false => guess.line(line, &table),
+            }
+        }
+        guess
+    }
+
+    #[test]
+    fn exact_what_is_open_is_demanded_and_what_is_changed_is_no_guess() {
+        let plain = "[hole]\nspin = 0.5 #! the data do not tell the spin\n#? mass_msun = 4e6 # no value for it\n";
+        let guess = guess_of(plain);
+        let path = Path::new("a.uvfits");
+        let error = guess.check("[hole]\nspin = 0.5", path).unwrap_err().to_string();
+        assert!(error.contains("hole.mass_msun (no value for it): --set 'hole.mass_msun=4e6'"), "{error}");
+        guess.check("[hole]\nspin = 0.5\nmass_msun = 6e9", path).unwrap();
+        let said = guess.sentences("[hole]\nspin = 0.5");
+        assert_eq!(said, "assumed: hole.spin = 0.5: the data do not tell the spin\n");
+        assert_eq!(guess.sentences("[hole]\nspin = 0.9"), "");
+    }
+}

@@ -1,0 +1,167 @@
+//! Gains of stations that a fit has solved for: a table to apply, pictures and numbers.
+
+use super::Estimate;
+use crate::report::{Axis, LinePlot, Marks, Series, Table};
+use kerrlight_tomo::interferometry::Complex64;
+use kerrlight_tomo::interferometry::files;
+use kerrlight_tomo::interferometry::gains::{GainDistance, GainTable, StationGain};
+use kerrlight_tomo::interferometry::observation::{Observation, Row};
+use serde_json::{Value, json};
+
+/// The table of all gains.
+const TABLE: &str = "gains.csv";
+
+/// Curves that a plot has room for.
+const CURVES: usize = 6;
+
+/// Gains that were found.
+pub struct Gains {
+    table: GainTable,
+    distance: Option<GainDistance>,
+}
+
+/// What the gains of a station are like.
+struct Summary<'a> {
+    station: &'a str,
+    scans: usize,
+    /// exp of the mean of ln|g|.
+    mean: f64,
+    /// Standard deviation of ln|g| about its mean.
+    scatter: f64,
+    /// Root mean squares of the standard deviations of ln|g| and of arg g (radians).
+    errors: [f64; 2],
+    largest: f64,
+}
+
+impl Estimate<'_> {
+    /// The gains of all stations and frames, beside these images, where they are solved for; writes their table.
+    pub fn gains(&self, movie: &[f32]) -> anyhow::Result<Option<Gains>> {
+        let Some(model) = self.evidence().model_visibilities(movie)? else { return Ok(None) };
+        let Some(table) = self.measured.gains(self.file, &model)? else { return Ok(None) };
+        self.folder.file(TABLE)?.write(files::gains_to_csv(&table).as_bytes())?;
+        let distance = self.measured.true_gains.as_ref().and_then(|truth| table.distance(truth));
+        Ok(Some(Gains { table, distance }))
+    }
+}
+
+impl Gains {
+    /// Multiplies visibilities of a model by g₁ ḡ₂ of their stations at their times; by 1 where a station has none.
+    pub fn put_on(&self, observation: &Observation, rows: &[&Row], model: &mut [Complex64]) {
+        let gains = self.table.by_station();
+        for (row, v) in rows.iter().zip(model) {
+            let gain = |name: &str| gains.at(name, row.time_h).unwrap_or(1.0.into());
+            let [first, second] = observation.names(row).map(gain);
+            *v *= first * second.conj();
+        }
+    }
+
+    /// For results.json.
+    pub fn json(&self) -> Value {
+        let station = |s: Summary<'_>| {
+            json!({
+                "station": s.station, "scans": s.scans, "amplitude": s.mean, "scatter": s.scatter,
+                "amplitude_error": s.errors[0], "phase_error_deg": s.errors[1].to_degrees(),
+                "largest_log_amplitude": s.largest,
+            })
+        };
+        let mut all = json!({
+            "file": TABLE,
+            "stations": self.summaries().into_iter().map(station).collect::<Vec<_>>(),
+        });
+        if let Some(distance) = self.distance {
+            all["beside_the_truth"] = json!({
+                "rms": distance.rms, "median": distance.median, "scale": distance.scale,
+                "count": distance.count,
+            });
+        }
+        all
+    }
+
+    /// Sentences for the report.
+    pub fn sentences(&self) -> Vec<String> {
+        let mut all = vec![format!(
+            "Complex gains of {} stations were solved for in every frame beside the model; {TABLE} has them, and `kerrlight convert IN OUT --gains {TABLE}` takes them out of data. Phases count from the station with the strongest data. A factor on all amplitudes and the flux of the source are told apart by the priors of the amplitudes alone.",
+            self.table.stations().len()
+        )];
+        if let Some(GainDistance { scale, rms, median, .. }) = self.distance {
+            all.push(format!(
+                "Beside the true gains, apart from a factor {scale:.4} on all amplitudes and a phase that all stations of a frame share, the recovered ones are off by {:.2} % (root mean square; median {:.2} %).",
+                100.0 * rms,
+                100.0 * median
+            ));
+        }
+        all
+    }
+
+    /// A line for every station.
+    pub fn details(&self) -> Table {
+        let row = |s: Summary<'_>| {
+            vec![
+                s.station.to_owned(),
+                s.scans.to_string(),
+                format!("{:.3}", s.mean),
+                format!("{:.3}", s.scatter),
+                format!("{:.3}", s.errors[0]),
+                format!("{:.2}", s.errors[1].to_degrees()),
+            ]
+        };
+        let head = ["station", "frames", "amplitude", "scatter", "σ of ln|g|", "σ of phase (°)"];
+        Table {
+            title: "Station gains".to_owned(),
+            caption: "Gains that explain the data best beside the model: what a station measures is its gain times what it should. Amplitude and scatter are mean and standard deviation over the frames; σ is what data and priors leave open in one frame, the model taken for granted. A mean far from 1 is an error of calibration, or of the model.".to_owned(),
+            head: head.map(str::to_owned).to_vec(),
+            rows: self.summaries().into_iter().map(row).collect(),
+            links: Vec::new(),
+        }
+    }
+
+    /// Amplitudes of all stations over time, some stations a plot.
+    pub fn plots(&self) -> Vec<LinePlot> {
+        let names = self.table.stations();
+        let count = names.len().div_ceil(CURVES);
+        let plot = |(k, names): (usize, &[&str])| {
+            let part = if count > 1 { format!(" ({} of {count})", k + 1) } else { String::new() };
+            LinePlot {
+                title: format!("Gains of stations{part}"),
+                caption: "Amplitudes of the gains in every frame with their standard deviations; 1 is a station that is calibrated.".to_owned(),
+                x: Axis { label: "time".to_owned(), unit: "h UTC".to_owned(), log: false },
+                y: Axis { label: "amplitude of the gain".to_owned(), unit: String::new(), log: true },
+                series: names.iter().map(|name| self.series(name)).collect(),
+            }
+        };
+        names.chunks(CURVES).enumerate().map(plot).collect()
+    }
+
+    fn of<'a>(&'a self, name: &str) -> impl Iterator<Item = &'a StationGain> {
+        self.table.gains.iter().filter(move |gain| gain.station == name)
+    }
+
+    fn series(&self, name: &str) -> Series {
+        Series {
+            name: name.to_owned(),
+            points: self.of(name).map(|g| [g.time_h, g.gain.norm()]).collect(),
+            errors: self.of(name).map(|g| g.errors[0] * g.gain.norm()).collect(),
+            marks: Marks::Points,
+        }
+    }
+
+    fn summaries(&self) -> Vec<Summary<'_>> {
+        self.table.stations().into_iter().map(|name| self.summary(name)).collect()
+    }
+
+    fn summary<'a>(&self, station: &'a str) -> Summary<'a> {
+        let logs: Vec<f64> = self.of(station).map(|gain| gain.gain.norm().ln()).collect();
+        let scans = logs.len();
+        let mean_of = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / scans as f64;
+        let mean = mean_of(&mut logs.iter().copied());
+        let square = |k: usize| mean_of(&mut self.of(station).map(|gain| gain.errors[k].powi(2)));
+        Summary {
+            station,
+            scans,
+            mean: mean.exp(),
+            scatter: mean_of(&mut logs.iter().map(|x| (x - mean).powi(2))).sqrt(),
+            errors: [0, 1].map(|k| square(k).sqrt()),
+            largest: logs.iter().fold(0.0, |most: f64, x| most.max(x.abs())),
+        }
+    }
+}

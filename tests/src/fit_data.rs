@@ -1,0 +1,114 @@
+//! `kerrlight fit --data FILE`: settings that are guessed from a file, with every guess told.
+
+use crate::support::{fail, kerrlight, root, succeed};
+use std::path::Path;
+
+const SEEN: &str = "observe image.csv --fov-uas 100 --array EHT2017 --mjd 57850 --utc 5-7 --frames 6 --tint 60 --noise thermal --seed 1";
+const FEW: [&str; 6] =
+    ["--set", "training.steps=2", "--set", "screen.pixels=8", "--set", "output.nodes=8"];
+
+/// What a fit of data has said, with the settings in the run's folder.
+fn said(folder: &Path, words: &[&str], run: &str) -> (String, String) {
+    let output = kerrlight(folder, &[&["fit"], words, &FEW, &["-o", run]].concat());
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{said}");
+    (said, std::fs::read_to_string(folder.join(run).join("fit.toml")).unwrap())
+}
+
+/// Of a known source everything is guessed and told; of another one what cannot be guessed is asked for, all at once.
+#[test]
+fn exact_visibilities_are_fitted_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    std::fs::write(path.join("image.csv"), "0.1,0.2,0.1\n".repeat(3)).unwrap();
+    for (source, data) in [("m87", "a.uvfits"), ("12.5,12.4", "b.uvfits")] {
+        let words: Vec<&str> = SEEN.split(' ').chain(["--source", source, "-o", data]).collect();
+        succeed(path, &words);
+    }
+    let (told, kept) = said(path, &["--data", "a.uvfits"], "a");
+    for sentence in [
+        "read: a.uvfits: M87*, recognised by position or name, MJD 57850",
+        "assumed: hole.mass_msun = 6500000000.0: M87* (EHT Collaboration 2019",
+        "assumed: hole.spin = 0.5: the data do not tell the spin",
+        "assumed: instrument.gains.table = \"EHT2017\"",
+        "uv_min = 100000000.0",
+    ] {
+        assert!(told.contains(sentence), "{sentence}: {told}");
+    }
+    // Told on the way, and kept: the same settings with the same reasons.
+    assert!(kept.contains("# ASSUMED: the data do not tell the spin"), "{kept}");
+    assert!(told.contains("# ASSUMED: the data do not tell the spin"));
+    let (told, _) = said(path, &["--data", "a.uvfits", "--set", "hole.spin=0.9"], "spin");
+    assert!(!told.contains("assumed: hole.spin"), "{told}");
+    let missing = fail(path, &["fit", "--data", "b.uvfits", "-o", "b"]);
+    for key in ["hole.mass_msun", "hole.distance_kpc", "observer.inclination_deg"] {
+        assert!(missing.contains(&format!("--set '{key}=")), "{missing}");
+    }
+    assert!(!path.join("b").exists());
+    let given = ["hole.mass_msun=1e9", "hole.distance_kpc=1e4", "observer.inclination_deg=40"];
+    let given: Vec<&str> = given.iter().flat_map(|set| ["--set", set]).collect();
+    said(path, &[&["--data", "b.uvfits"], &given[..]].concat(), "b");
+}
+
+/// Light curves: Q and U with errors, and a total flux without any.
+#[test]
+fn exact_light_curves_are_fitted_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let mut text = "time_utc_h,I,Q,U\n".to_owned();
+    for k in 0..40 {
+        let (time, turn) = (9.0 + 0.03 * f64::from(k), 0.35 * f64::from(k));
+        text += &format!("{time},{},{},{}\n", 2.5 + 0.1 * turn.sin(), 0.1 + 0.05 * turn.cos(), 0.05 * turn.sin());
+    }
+    std::fs::write(path.join("qu.csv"), &text).unwrap();
+    let missing = fail(path, &["fit", "--data", "qu.csv", "-o", "none"]);
+    assert!(missing.contains("--set 'hole.mass_msun=4.154e6'"), "{missing}");
+    let quick = [
+        "hole.mass_msun=4.154e6",
+        "band.radii={from=9.0,to=11.0,step=1.0}",
+        "band.inclinations_deg={from=20.0,to=40.0,step=20.0}",
+        "band.nodes=10",
+        "representation.nodes=12",
+        "linear.rounds=1",
+        "linear.iterations=5",
+    ];
+    let quick: Vec<&str> = quick.iter().flat_map(|set| ["--set", set]).collect();
+    let (told, kept) = said(path, &[&["--data", "qu.csv"], &quick[..]].concat(), "qu");
+    assert!(told.contains("read: qu.csv: 40 samples from 9.000 h to 10.170 h UTC; Q and U are fitted"), "{told}");
+    assert!(told.contains("the file has no errors"), "{told}");
+    assert!(kept.contains("stokes = [\"Q\", \"U\"]"), "{kept}");
+    std::fs::write(path.join("i.csv"), text.replace("I,Q,U", "I,x,y")).unwrap();
+    let (told, _) = said(path, &[&["--data", "i.csv"], &quick[..]].concat(), "i");
+    assert!(told.contains("I are fitted"), "{told}");
+}
+
+#[test]
+fn bad_input_of_data_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    assert!(fail(path, &["fit", "--data", "nowhere.uvfits"]).contains("nowhere.uvfits"));
+    std::fs::write(path.join("words.csv"), "some,words\n1,2\n").unwrap();
+    assert!(fail(path, &["fit", "--data", "words.csv"]).contains("words.csv"));
+    std::fs::write(path.join("flat.csv"), "time_utc_h,I\n1.0,2.0\n1.1,2.0\n1.2,2.0\n").unwrap();
+    assert!(fail(path, &["fit", "--data", "flat.csv"]).contains("does not vary"));
+    let both = fail(path, &["fit", "some.toml", "--data", "flat.csv"]);
+    assert!(both.contains("cannot be used with"), "{both}");
+}
+
+/// The public files of the EHT: settings for each are complete.
+#[test]
+fn code_eht_data_need_nothing_more() {
+    let folder = std::env::var_os("KERRLIGHT_EHT_DATA")
+        .map_or_else(|| root().join("../shared/data/eht"), std::path::PathBuf::from);
+    let Ok(entries) = std::fs::read_dir(&folder) else {
+        return eprintln!("SKIPPED: no public EHT data in {}", folder.display());
+    };
+    let uvfits = entries.map(|entry| entry.unwrap().path());
+    let uvfits: Vec<_> = uvfits.filter(|p| p.extension().is_some_and(|e| e == "uvfits")).collect();
+    assert!(!uvfits.is_empty());
+    let here = tempfile::tempdir().unwrap();
+    for file in uvfits {
+        let text = succeed(here.path(), &["fit", "--data", file.to_str().unwrap(), "--print"]);
+        assert!(!text.contains("FILL IN") && text.contains("table = \"EHT2017\""), "{text}");
+    }
+}

@@ -1,0 +1,104 @@
+//! What of the instrument is solved for.
+
+use super::{FitError, refuse};
+use crate::interferometry::gains::{GainPriors, PRIOR_TABLES, prior_table};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// What of the instrument the fit does not know.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InstrumentSettings {
+    /// Complex gains of the stations, new ones in every frame.
+    pub gains: GainSettings,
+}
+
+/// Gains of stations that are solved for in every frame, beside every model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GainSettings {
+    /// Whether phases are free.
+    pub phases: GainPhases,
+    /// Standard deviation of ln|g| of stations by name; 0: the amplitude is right.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub stations: BTreeMap<String, f64>,
+    /// A table that comes with the program, for stations that are not listed: EHT2017 or ngEHT.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub table: Option<String>,
+    /// Standard deviation of ln|g| of all stations that neither has.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub amplitude: Option<f64>,
+}
+
+/// What is known of phases.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum GainPhases {
+    /// Nothing, in any frame.
+    Free,
+    /// They are calibrated.
+    Known,
+}
+
+impl GainSettings {
+    /// The priors of these stations.
+    ///
+    /// # Errors
+    /// If a station has none, a table is not known, or a listed station does not observe.
+    pub fn priors(&self, stations: &[String]) -> Result<GainPriors, FitError> {
+        if let Some(name) = self.stations.keys().find(|name| !stations.contains(name)) {
+            refuse!(
+                "instrument.gains.stations.{name}: no such station observes; there are {}",
+                stations.join(", ")
+            );
+        }
+        if let Some(name) = &self.table
+            && !PRIOR_TABLES.iter().any(|known| known.eq_ignore_ascii_case(name))
+        {
+            refuse!(
+                "instrument.gains.table = {name:?} is not allowed: {}",
+                PRIOR_TABLES.join(" or ")
+            );
+        }
+        let amplitude_sigma = stations.iter().map(|name| self.prior(name));
+        Ok(GainPriors {
+            free_phases: self.phases == GainPhases::Free,
+            amplitude_sigma: amplitude_sigma.collect::<Result<_, _>>()?,
+        })
+    }
+
+    fn prior(&self, station: &str) -> Result<f64, FitError> {
+        let of_table = || self.table.as_ref().and_then(|name| prior_table(name, station));
+        let known = self.stations.get(station).copied().or_else(of_table).or(self.amplitude);
+        known.ok_or_else(|| {
+            let why = "its gain has no prior; give the standard deviation of ln |g| (0.0: the amplitude is right), or \
+                       `instrument.gains.amplitude = …` for all stations that are not listed";
+            FitError::missing(&format!("instrument.gains.stations.{station}"), why)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn settings(text: &str) -> GainSettings {
+        toml::from_str(text).unwrap()
+    }
+
+    #[test]
+    fn exact_priors_from_the_list_the_table_and_the_rest() {
+        let all: Vec<String> = ["AA", "LM", "XX"].map(str::to_owned).to_vec();
+        let text = "phases = \"free\"\ntable = \"EHT2017\"\namplitude = 0.3\nstations = { AA = 0.0 }";
+        let priors = settings(text).priors(&all).unwrap();
+        assert_eq!(priors.amplitude_sigma, [0.0, 0.6, 0.3]);
+        let without = settings("phases = \"known\"\ntable = \"EHT2017\"").priors(&all);
+        let error = without.unwrap_err().to_string();
+        assert!(error.starts_with("instrument.gains.stations.XX is missing"), "{error}");
+        let other = settings("phases = \"free\"\nstations = { ZZ = 0.1 }").priors(&all);
+        let error = other.unwrap_err().to_string();
+        assert!(error.contains("stations.ZZ: no such station observes; there are AA, LM, XX"));
+        let table = settings("phases = \"free\"\ntable = \"VLA\"").priors(&all);
+        assert!(table.unwrap_err().to_string().contains("\"VLA\" is not allowed: EHT2017 or ngEHT"));
+    }
+}

@@ -1,0 +1,112 @@
+//! The term of free gains beside those that gains cannot touch.
+
+use super::*;
+use crate::interferometry::conformance;
+use crate::interferometry::data_terms::ClosureTerm;
+use crate::interferometry::noise::{GainErrors, add_thermal_noise, apply_gains};
+use crate::interferometry::observation::{Basis, Measured, Row};
+use crate::interferometry::products::ClosureKind;
+use crate::interferometry::array::Station;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+/// A scan of seven stations with gains of 15 % and random phases, and its true visibilities.
+fn scan(seed: u64, snr: f64) -> (Observation, Vec<Complex64>) {
+    let mut random = Pcg64Mcg::seed_from_u64(seed);
+    let mut observation = Observation::empty(Basis::Stokes);
+    observation.stations = (0..7).map(|k| Station::named(&format!("S{k}"))).collect();
+    for (a, b) in (0..7u16).flat_map(|a| (a + 1..7).map(move |b| (a, b))) {
+        let phase = random.random_range(-3.0..3.0);
+        let visibility = Complex64::from_polar(random.random_range(0.5..1.5), phase);
+        let i = Measured { visibility, noise_sigma: random.random_range(0.5..1.0) / snr };
+        let stations = if (a + b) % 3 == 0 { [b, a] } else { [a, b] };
+        observation.rows.push(Row::total_intensity(1.0, stations, [0.0; 2], i));
+    }
+    let truth = observation.rows.iter().map(|row| row.products[0]).collect();
+    let errors =
+        GainErrors { scan_amplitude: 0.15, random_phases: true, ..GainErrors::default() };
+    apply_gains(&mut observation, &errors, seed);
+    add_thermal_noise(&mut observation, seed);
+    (observation, truth)
+}
+
+fn priors(free_phases: bool) -> GainPriors {
+    GainPriors { free_phases, amplitude_sigma: vec![0.15; 7] }
+}
+
+/// A model that is off by 10 %.
+fn off(truth: &[Complex64]) -> Vec<Complex64> {
+    let mut random = Pcg64Mcg::seed_from_u64(12);
+    let mut part = || 0.1 * random.random_range(-1.0..1.0);
+    truth.iter().map(|v| v + Complex64::new(part(), part())).collect()
+}
+
+#[test]
+fn exact_gradients_of_the_least_chi2() {
+    let (data, truth) = scan(1, 20.0);
+    let model = off(&truth);
+    let free = GainTerm::visibilities(&data, &priors(true)).unwrap();
+    conformance::data_term::<f64>("free gains", &free, &model, 1e-3, 1e-7);
+    let held = GainTerm::visibilities(&data, &priors(false)).unwrap();
+    conformance::data_term::<f64>("amplitudes free", &held, &model, 1e-3, 1e-7);
+    let amplitudes = GainTerm::amplitudes(&data, &priors(true)).unwrap();
+    conformance::data_term::<f64>("of amplitudes", &amplitudes, &model, 1e-3, 1e-7);
+    let single: Vec<Complex<f32>> =
+        model.iter().map(|v| Complex::new(v.re as f32, v.im as f32)).collect();
+    conformance::data_term::<f32>("in single precision", &free, &single, 1e-2, 2e-3);
+}
+
+/// χ² of the truth is the number of degrees of freedom; residuals add up to it, one each.
+#[test]
+fn exact_degrees_of_freedom() {
+    let (mut sums, count) = ([0.0; 2], 200);
+    for seed in 0..count {
+        let (data, truth) = scan(seed, 30.0);
+        let terms = [
+            GainTerm::visibilities(&data, &priors(true)).unwrap(),
+            GainTerm::amplitudes(&data, &priors(true)).unwrap(),
+        ];
+        for (sum, term) in sums.iter_mut().zip(terms) {
+            let term: &dyn DataTerm<f64> = &term;
+            let value = term.value_and_gradient(&truth, 0.0, &mut vec![Complex64::default(); 21]);
+            let residuals = term.residuals(&truth);
+            assert_eq!(residuals.len(), term.degrees_of_freedom());
+            let squares: f64 = residuals.iter().map(|r| r.value * r.value).sum();
+            assert!((squares - value).abs() < 1e-8 * value, "{squares} {value}");
+            *sum += value / term.degrees_of_freedom() as f64 / f64::from(count as u32);
+        }
+    }
+    assert!(sums.iter().all(|chi2| (0.95..1.05).contains(chi2)), "{sums:?}");
+}
+
+/// Closure quantities are the limit of free gains: without priors, χ² of a model that is nearly right is that of all
+/// closure phases and log closure amplitudes together.
+#[test]
+fn exact_closures_are_the_limit_of_free_gains() {
+    let (data, truth) = scan(4, 300.0);
+    let wide = GainPriors { free_phases: true, amplitude_sigma: vec![1e3; 7] };
+    let free = GainTerm::visibilities(&data, &wide).unwrap();
+    let value = |term: &dyn DataTerm<f64>, model: &[Complex64]| {
+        term.value_and_gradient(model, 0.0, &mut vec![Complex64::default(); 21])
+    };
+    let mut random = Pcg64Mcg::seed_from_u64(5);
+    let mut part = || 0.01 * random.random_range(-1.0..1.0);
+    let model: Vec<Complex64> =
+        truth.iter().map(|v| v * Complex64::new(1.0 + part(), part())).collect();
+    let closures: f64 = [ClosureKind::Phase, ClosureKind::LogAmplitude]
+        .iter()
+        .map(|kind| value(&ClosureTerm::<f64>::new(&data, *kind, 0.0).unwrap(), &model))
+        .sum();
+    let gains = value(&free, &model);
+    assert!((gains / closures - 1.0).abs() < 0.02, "{gains} {closures}");
+}
+
+#[test]
+fn exact_data_that_make_no_term_are_refused() {
+    let (mut data, _) = scan(1, 20.0);
+    data.rows[3].noise_sigma[0] = 0.0;
+    let refused = GainTerm::visibilities(&data, &priors(true)).unwrap_err().to_string();
+    assert!(refused.contains("data point 3: sigma = 0"), "{refused}");
+    data.rows.clear();
+    assert!(GainTerm::amplitudes(&data, &priors(true)).is_err());
+}
