@@ -31,7 +31,7 @@ fn exact_visibilities_are_fitted_at_once() {
         "assumed: hole.mass_msun = 6500000000.0: M87* (EHT Collaboration 2019",
         "assumed: hole.spin = 0.5: the data do not tell the spin",
         "assumed: instrument.gains.table = \"EHT2017\"",
-        "uv_min = 100000000.0",
+        "data.visibilities.uv_min = 1e8",
     ] {
         assert!(told.contains(sentence), "{sentence}: {told}");
     }
@@ -58,7 +58,12 @@ fn exact_light_curves_are_fitted_at_once() {
     let mut text = "time_utc_h,I,Q,U\n".to_owned();
     for k in 0..40 {
         let (time, turn) = (9.0 + 0.03 * f64::from(k), 0.35 * f64::from(k));
-        text += &format!("{time},{},{},{}\n", 2.5 + 0.1 * turn.sin(), 0.1 + 0.05 * turn.cos(), 0.05 * turn.sin());
+        text += &format!(
+            "{time},{},{},{}\n",
+            2.5 + 0.1 * turn.sin(),
+            0.1 + 0.05 * turn.cos(),
+            0.05 * turn.sin()
+        );
     }
     std::fs::write(path.join("qu.csv"), &text).unwrap();
     let missing = fail(path, &["fit", "--data", "qu.csv", "-o", "none"]);
@@ -74,7 +79,10 @@ fn exact_light_curves_are_fitted_at_once() {
     ];
     let quick: Vec<&str> = quick.iter().flat_map(|set| ["--set", set]).collect();
     let (told, kept) = said(path, &[&["--data", "qu.csv"], &quick[..]].concat(), "qu");
-    assert!(told.contains("read: qu.csv: 40 samples from 9.000 h to 10.170 h UTC; Q and U are fitted"), "{told}");
+    assert!(
+        told.contains("read: qu.csv: 40 samples from 9.000 h to 10.170 h UTC; Q and U are fitted"),
+        "{told}"
+    );
     assert!(told.contains("the file has no errors"), "{told}");
     assert!(kept.contains("stokes = [\"Q\", \"U\"]"), "{kept}");
     std::fs::write(path.join("i.csv"), text.replace("I,Q,U", "I,x,y")).unwrap();

@@ -33,8 +33,12 @@ struct Missing {
 pub fn guess(data: &Path) -> anyhow::Result<Guess> {
     let data = std::path::absolute(data)?;
     let plain = of_data(&data, Path::new(""))?;
-    let mut guess =
-        Guess { text: annotate(&plain), read: Vec::new(), assumed: Vec::new(), missing: Vec::new() };
+    let mut guess = Guess {
+        text: annotate(&plain),
+        read: Vec::new(),
+        assumed: Vec::new(),
+        missing: Vec::new(),
+    };
     let mut table = String::new();
     for line in plain.lines() {
         if let Some(said) = line.strip_prefix(READ) {
@@ -53,7 +57,8 @@ pub const READ: &str = "# Read: ";
 
 impl Guess {
     fn line(&mut self, line: &str, table: &str) {
-        let path = |key: &str| if table.is_empty() { key.to_owned() } else { format!("{table}.{key}") };
+        let path =
+            |key: &str| if table.is_empty() { key.to_owned() } else { format!("{table}.{key}") };
         if let Some((setting, why)) = line.split_once(" #! ") {
             self.assumed.push(format!("{}: {why}", path(setting)));
         } else if let Some(open) = line.strip_prefix("#? ")
@@ -76,7 +81,8 @@ impl Guess {
         if open.is_empty() {
             return Ok(());
         }
-        let line = |m: &&Missing| format!("\n  {} ({}): --set '{}={}'", m.key, m.why, m.key, m.example);
+        let line =
+            |m: &&Missing| format!("\n  {} ({}): --set '{}={}'", m.key, m.why, m.key, m.example);
         let lines: String = open.iter().map(line).collect();
         bail!("{} does not say what decides the result; give{lines}", data.display())
     }
@@ -145,7 +151,10 @@ mod tests {
         let guess = guess_of(plain);
         let path = Path::new("a.uvfits");
         let error = guess.check("[hole]\nspin = 0.5", path).unwrap_err().to_string();
-        assert!(error.contains("hole.mass_msun (no value for it): --set 'hole.mass_msun=4e6'"), "{error}");
+        assert!(
+            error.contains("hole.mass_msun (no value for it): --set 'hole.mass_msun=4e6'"),
+            "{error}"
+        );
         guess.check("[hole]\nspin = 0.5\nmass_msun = 6e9", path).unwrap();
         let said = guess.sentences("[hole]\nspin = 0.5");
         assert_eq!(said, "assumed: hole.spin = 0.5: the data do not tell the spin\n");

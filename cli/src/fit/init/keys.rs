@@ -36,7 +36,10 @@ pub const TABLES: [(&str, &str); 25] = [
     ("data.visibilities", "Measured visibilities."),
     ("data.movie", "Measured or simulated images, Jy/pixel."),
     ("data.light-curve", "The light curve of a source that is not resolved."),
-    ("instrument.gains", "Complex gains of the stations, solved for in every frame beside the emission."),
+    (
+        "instrument.gains",
+        "Complex gains of the stations, solved for in every frame beside the emission.",
+    ),
     ("loss", "Terms of the loss, which is the weighted sum of each term's chi^2 per data point."),
     ("representation", "How the recovered emission is represented."),
     ("training", "How the representation is optimised."),
@@ -51,7 +54,10 @@ pub const TABLES: [(&str, &str); 25] = [
     ),
     ("regulariser", "A penalty on the emission."),
     ("probe", "The grid on which penalties of a network are evaluated."),
-    ("polarization", "The magnetic field of the gas and the law of its polarised light; see docs/reference/fit-file.md."),
+    (
+        "polarization",
+        "The magnetic field of the gas and the law of its polarised light; see docs/reference/fit-file.md.",
+    ),
     ("band", "Worlds that are compared first, with a flare in an orbital band."),
     ("output", "The recovered volume."),
 ];

@@ -56,7 +56,11 @@ pub fn of_light_curve(curve: &LightCurve, path: &str, name: &str) -> anyhow::Res
         ("read", fitted.read(name)),
         ("title", super::plain_words(name)),
         ("jy", digits(flare * JY_PER_PIXEL)),
-        ("redshift", if polarized { "" } else { "\nredshift_power = 3.0 #! a spectral index of 1" }.to_owned()),
+        (
+            "redshift",
+            if polarized { "" } else { "\nredshift_power = 3.0 #! a spectral index of 1" }
+                .to_owned(),
+        ),
         ("polarization", if polarized { POLARIZATION } else { "" }.to_owned()),
         ("path", path.to_owned()),
         ("average", fitted.average.to_string()),
@@ -110,9 +114,10 @@ impl Fitted {
 
     /// One error for all samples, Jy, and where it comes from.
     fn sigma(&self) -> (f64, &'static str) {
-        let errors = self.parameters.iter().flat_map(|p| {
-            self.curve.samples.iter().filter_map(|s| s.stokes[p.index()]?.sigma_jy)
-        });
+        let errors = self
+            .parameters
+            .iter()
+            .flat_map(|p| self.curve.samples.iter().filter_map(|s| s.stokes[p.index()]?.sigma_jy));
         if let Some(sigma) = median(errors.collect()) {
             return (sigma, "the median of the file's errors; Q and U have to have the same");
         }

@@ -11,8 +11,9 @@ use crate::interferometry::image_files::OwnTimes;
 use crate::interferometry::movie_files;
 use crate::output::Output;
 use annotate::annotate;
-pub use guess::{Guess, guess};
 use anyhow::{Context, bail};
+pub use guess::{Guess, guess};
+use kerrlight_tomo::fit::setup::{self, VisibilitySettings};
 use kerrlight_tomo::interferometry::data_terms::ClosureTerm;
 use kerrlight_tomo::interferometry::earth::SourcePosition;
 use kerrlight_tomo::interferometry::files;
@@ -83,7 +84,9 @@ const SOURCES: [Source; 2] = [
         mass_msun: 6.5e9,
         distance_kpc: 16_800.0,
         inclination_deg: 163.0,
-        uv_min: Some("uv_min = 1e8 #! shorter baselines see the jet as well: 1.1 Jy, where the ring has about 0.6"),
+        uv_min: Some(
+            "uv_min = 1e8 #! shorter baselines see the jet as well: 1.1 Jy, where the ring has about 0.6",
+        ),
         mass: "M87* (EHT Collaboration 2019, ApJL 875, L1)",
         inclination: "17 degrees from the jet's axis, with the hole turned away (EHT Collaboration 2019, ApJL 875, L5)",
     },
@@ -215,7 +218,7 @@ fn of_visibilities(observation: &Observation, path: &str, file: &str) -> anyhow:
         ),
     };
     let mut losses = "[[loss]]\ndata = \"amplitudes\"\nweight = 1.0".to_owned();
-    if ClosureTerm::<f64>::new(observation, ClosureKind::Phase, 3.0).is_ok() {
+    if has_closures(observation, source.is_some_and(|source| source.uv_min.is_some())) {
         losses += "\n[[loss]]\ndata = \"closure-phases\"\nweight = 1.0\nleast_snr = 3.0 #! weaker ones are not Gaussian";
     }
     // Pixels of the region, 8 M deep, with emission 0.02.
@@ -236,6 +239,14 @@ fn of_visibilities(observation: &Observation, path: &str, file: &str) -> anyhow:
     complete(include_str!("visibilities.toml"), &fields)
 }
 
+/// Whether closure phases are left of the rows that the template's fit keeps.
+fn has_closures(observation: &Observation, long_only: bool) -> bool {
+    let settings = VisibilitySettings { average_s: 300.0, uv_min: long_only.then_some(1e8) };
+    let Ok(mut kept) = setup::prepared(observation.clone(), &settings) else { return false };
+    setup::frames_of(&mut kept);
+    ClosureTerm::<f64>::new(&kept, ClosureKind::Phase, 3.0).is_ok()
+}
+
 /// What is assumed of the gains of the stations.
 fn gains(observation: &Observation) -> String {
     let seen = |k: usize| observation.rows.iter().any(|r| r.stations.contains(&(k as u16)));
@@ -250,11 +261,19 @@ fn gains(observation: &Observation) -> String {
 /// What the file says, in a line.
 fn read(observation: &Observation, file: &str, name: &str, is_known: bool) -> String {
     let rows: Vec<f64> = observation.stokes_i().map(|(row, _)| row.time_h).collect();
-    let [first, last] = rows.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], time| [a.min(*time), b.max(*time)]);
-    let source = if is_known { format!("{name}, recognised by position or name") } else { name.to_owned() };
+    let [first, last] = rows
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], time| [a.min(*time), b.max(*time)]);
+    let source =
+        if is_known { format!("{name}, recognised by position or name") } else { name.to_owned() };
     let day = observation.mjd.map_or(String::new(), |mjd| format!(", MJD {mjd}"));
-    let frequency = observation.frequency_hz.map_or(String::new(), |hz| format!(" at {:.1} GHz", hz * 1e-9));
-    format!("{file}: {source}{day}, {first:.2} h to {last:.2} h UTC, {} stations, {} visibilities of Stokes I{frequency}", observation.stations.len(), rows.len())
+    let frequency =
+        observation.frequency_hz.map_or(String::new(), |hz| format!(" at {:.1} GHz", hz * 1e-9));
+    format!(
+        "{file}: {source}{day}, {first:.2} h to {last:.2} h UTC, {} stations, {} visibilities of Stokes I{frequency}",
+        observation.stations.len(),
+        rows.len()
+    )
 }
 
 /// Median amplitude of the shortest tenth of the baselines, Jy.

@@ -67,8 +67,14 @@ impl Estimate<'_> {
         ];
         Ok(Some(LinePlot {
             title: "Visibilities".to_owned(),
-            caption: format!("What the telescopes measure and what the recovered movie would give them{with}: amplitudes of the Fourier components of all frames against the distance of two telescopes as seen from the source, in wavelengths. Long baselines see fine detail. Bars are standard deviations of the data; where they are met the model explains the data."),
-            x: Axis { label: "baseline".to_owned(), unit: "10⁹ wavelengths".to_owned(), log: false },
+            caption: format!(
+                "What the telescopes measure and what the recovered movie would give them{with}: amplitudes of the Fourier components of all frames against the distance of two telescopes as seen from the source, in wavelengths. Long baselines see fine detail. Bars are standard deviations of the data; where they are met the model explains the data."
+            ),
+            x: Axis {
+                label: "baseline".to_owned(),
+                unit: "10⁹ wavelengths".to_owned(),
+                log: false,
+            },
             y: Axis { label: "amplitude".to_owned(), unit: "Jy".to_owned(), log: true },
             series,
         }))

@@ -89,7 +89,8 @@ mod tests {
     #[test]
     fn exact_priors_from_the_list_the_table_and_the_rest() {
         let all: Vec<String> = ["AA", "LM", "XX"].map(str::to_owned).to_vec();
-        let text = "phases = \"free\"\ntable = \"EHT2017\"\namplitude = 0.3\nstations = { AA = 0.0 }";
+        let text =
+            "phases = \"free\"\ntable = \"EHT2017\"\namplitude = 0.3\nstations = { AA = 0.0 }";
         let priors = settings(text).priors(&all).unwrap();
         assert_eq!(priors.amplitude_sigma, [0.0, 0.6, 0.3]);
         let without = settings("phases = \"known\"\ntable = \"EHT2017\"").priors(&all);
@@ -99,6 +100,8 @@ mod tests {
         let error = other.unwrap_err().to_string();
         assert!(error.contains("stations.ZZ: no such station observes; there are AA, LM, XX"));
         let table = settings("phases = \"free\"\ntable = \"VLA\"").priors(&all);
-        assert!(table.unwrap_err().to_string().contains("\"VLA\" is not allowed: EHT2017 or ngEHT"));
+        assert!(
+            table.unwrap_err().to_string().contains("\"VLA\" is not allowed: EHT2017 or ngEHT")
+        );
     }
 }

@@ -135,7 +135,8 @@ impl FitFile {
     /// Whether the data are visibilities, measured or simulated.
     pub fn has_visibilities(&self) -> bool {
         let simulated = self.observation.is_some() && self.light_curve.is_none();
-        matches!(self.data, Some(DataFiles::Visibilities { .. })) || (self.data.is_none() && simulated)
+        matches!(self.data, Some(DataFiles::Visibilities { .. }))
+            || (self.data.is_none() && simulated)
     }
 }
 

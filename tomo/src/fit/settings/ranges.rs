@@ -264,7 +264,12 @@ mod tests {
         let documents = include_str!("../../../../docs/reference/fit-file.md");
         for (pattern, least, most, _) in RANGES {
             assert!(least < most, "{pattern}");
-            let name = pattern.trim_end_matches(".*").trim_end_matches(".?").rsplit('.').next().unwrap_or_default();
+            let name = pattern
+                .trim_end_matches(".*")
+                .trim_end_matches(".?")
+                .rsplit('.')
+                .next()
+                .unwrap_or_default();
             assert!(documents.contains(name), "docs/reference/fit-file.md does not know {pattern}");
         }
     }

@@ -133,7 +133,9 @@ impl Measured {
             (LossKind::Amplitudes, Some(priors)) => {
                 return Ok(Some(Box::new(GainTerm::amplitudes(part, priors)?)));
             }
-            (LossKind::Visibilities, None) => return Ok(Some(Box::new(VisibilityTerm::new(part)?))),
+            (LossKind::Visibilities, None) => {
+                return Ok(Some(Box::new(VisibilityTerm::new(part)?)));
+            }
             (LossKind::Amplitudes, None) => return Ok(Some(Box::new(AmplitudeTerm::new(part)?))),
             (LossKind::ClosurePhases, _) => ClosureKind::Phase,
             _ => ClosureKind::LogAmplitude,

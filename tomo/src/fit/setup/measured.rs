@@ -275,11 +275,7 @@ fn clock(seen: &Seen) -> Result<(Clock, [f64; 2])> {
 }
 
 /// Errors of gains, thermal noise and systematic errors, in the order of light's way.
-fn spoil(
-    file: &FitFile,
-    seen: &Seen,
-    observation: &mut Observation,
-) -> Result<Option<GainTable>> {
+fn spoil(file: &FitFile, seen: &Seen, observation: &mut Observation) -> Result<Option<GainTable>> {
     let gains = seen.gains.as_ref();
     if let Some(name) = gains.and_then(|gains| gains.unknown_station(observation)) {
         refuse!("observation.gains.stations.{name}: {} has no such station", seen.array);

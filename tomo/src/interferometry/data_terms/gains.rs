@@ -133,17 +133,31 @@ impl GainTerm {
         all
     }
 
-    /// Derivatives of residuals with respect to the phases that are free.
-    fn slopes(&self, model: &[Complex64], gains: &ScanGains, rows: usize) -> DMatrix<f64> {
-        let free = self.phases_free();
-        let mut slopes = DMatrix::zeros(rows, free.len());
+    /// Derivatives of residuals with respect to the amplitudes (ln|g|) and phases that are free.
+    fn slopes(&self, model: &[Complex64], gains: &ScanGains) -> DMatrix<f64> {
+        let (amplitudes, phases) = (self.amplitudes_free(), self.phases_free());
+        let (parts, data) = (self.parts(), self.parts() * self.data.len());
+        let columns = amplitudes.len() + phases.len();
+        let mut slopes = DMatrix::zeros(data + amplitudes.len(), columns);
+        let mut put = |k: usize, column: usize, slope: Complex64| {
+            slopes[(parts * k, column)] += slope.re;
+            if parts == 2 {
+                slopes[(2 * k + 1, column)] += slope.im;
+            }
+        };
         for (k, pair) in self.problem.pairs().iter().enumerate() {
             let seen = gains.on(*pair) * model[k] / self.sigma[k];
             for (station, sign) in [(pair[0], 1.0), (pair[1], -1.0)] {
-                let Some(column) = free.iter().position(|f| *f == station) else { continue };
-                slopes[(2 * k, column)] -= sign * seen.im;
-                slopes[(2 * k + 1, column)] += sign * seen.re;
+                if let Some(column) = amplitudes.iter().position(|(s, _)| *s == station) {
+                    put(k, column, seen);
+                }
+                if let Some(column) = phases.iter().position(|s| *s == station) {
+                    put(k, amplitudes.len() + column, Complex64::new(0.0, sign) * seen);
+                }
             }
+        }
+        for (row, (_, precision)) in amplitudes.iter().enumerate() {
+            slopes[(data + row, row)] = precision.sqrt();
         }
         slopes
     }
@@ -154,10 +168,9 @@ impl<T: Float> DataTerm<T> for GainTerm {
         self.data.len()
     }
 
-    /// Data and priors of amplitudes, less one for each phase that is free.
+    /// Data less one for each phase that is free. Each amplitude takes away as much as its prior adds.
     fn degrees_of_freedom(&self) -> usize {
-        let data = self.parts() * self.data.len() + self.amplitudes_free().len();
-        data - self.phases_free().len()
+        self.parts() * self.data.len() - self.phases_free().len()
     }
 
     fn value_and_gradient(
@@ -182,16 +195,16 @@ impl<T: Float> DataTerm<T> for GainTerm {
     }
 
     /// Real and imaginary parts of the misses and the amplitudes' priors, turned such that as many are left as there are
-    /// degrees of freedom: free phases take the others away. Each is under the stations that it belonged to before.
+    /// degrees of freedom: free gains take the others away. Each is under the stations that it belonged to before.
     fn residuals(&self, model: &[Complex<T>]) -> Vec<Residual> {
         let seen = self.seen(model);
         let gains = self.problem.solve(&seen);
         let mut all = self.all_residuals(&self.misses(&seen, &gains), &gains);
-        let taken = self.phases_free().len();
+        let taken = self.amplitudes_free().len() + self.phases_free().len();
         if taken == 0 {
             return all;
         }
-        let turn = self.slopes(&seen, &gains, all.len()).qr();
+        let turn = self.slopes(&seen, &gains).qr();
         let column = |of: fn(&Residual) -> f64| {
             let mut column = DVector::from_iterator(all.len(), all.iter().map(of));
             turn.q_tr_mul(&mut column);

@@ -25,7 +25,8 @@ pub fn to_csv(table: &GainTable) -> String {
     let known = |x: f64| if x.is_finite() { format!("{x:.6}") } else { String::new() };
     for StationGain { time_h, span_s, station, gain, errors } in &table.gains {
         let (amplitude, phase) = (gain.norm(), gain.arg().to_degrees());
-        let (of_amplitude, of_phase) = (known(errors[0] * amplitude), known(errors[1].to_degrees()));
+        let (of_amplitude, of_phase) =
+            (known(errors[0] * amplitude), known(errors[1].to_degrees()));
         // Writing to a string does not fail.
         let _ = writeln!(
             text,
@@ -65,7 +66,8 @@ type Places = [Option<usize>; COLUMNS.len()];
 
 fn heading(cells: &[&str]) -> Result<Places, String> {
     let places = COLUMNS.map(|name| cells.iter().position(|cell| *cell == name));
-    let missing = COLUMNS.iter().zip(places).find(|(name, at)| at.is_none() && !OPTIONAL.contains(name));
+    let missing =
+        COLUMNS.iter().zip(places).find(|(name, at)| at.is_none() && !OPTIONAL.contains(name));
     match missing {
         Some((name, _)) => Err(format!("there is no column {name}")),
         None => Ok(places),

@@ -94,8 +94,11 @@ pub struct GainDistance {
 impl GainTable {
     /// How far these gains are from true ones; none if no gain is in both.
     pub fn distance(&self, truth: &GainTable) -> Option<GainDistance> {
-        let truth: HashMap<(u64, &str), Complex64> =
-            truth.gains.iter().map(|g| ((g.time_h.to_bits(), g.station.as_str()), g.gain)).collect();
+        let truth: HashMap<(u64, &str), Complex64> = truth
+            .gains
+            .iter()
+            .map(|g| ((g.time_h.to_bits(), g.station.as_str()), g.gain))
+            .collect();
         let mut ratios: Vec<Complex64> = Vec::new();
         for scan in self.gains.chunk_by(|a, b| a.time_h == b.time_h) {
             let ratio = |g: &StationGain| {

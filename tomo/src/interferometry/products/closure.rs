@@ -277,13 +277,12 @@ mod tests {
     fn exact_gains_cancel() {
         let clean = random(7);
         let mut spoilt = clean.clone();
-        let errors =
-            GainErrors {
-                constant_amplitude: 0.3,
-                scan_amplitude: 0.2,
-                random_phases: true,
-                ..GainErrors::default()
-            };
+        let errors = GainErrors {
+            constant_amplitude: 0.3,
+            scan_amplitude: 0.2,
+            random_phases: true,
+            ..GainErrors::default()
+        };
         apply_gains(&mut spoilt, &errors, 4);
         // The relative errors shall stay what they were.
         for (a, b) in clean.rows.iter().zip(&mut spoilt.rows) {

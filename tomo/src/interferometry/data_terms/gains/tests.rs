@@ -1,12 +1,12 @@
 //! The term of free gains beside those that gains cannot touch.
 
 use super::*;
+use crate::interferometry::array::Station;
 use crate::interferometry::conformance;
 use crate::interferometry::data_terms::ClosureTerm;
 use crate::interferometry::noise::{GainErrors, add_thermal_noise, apply_gains};
 use crate::interferometry::observation::{Basis, Measured, Row};
 use crate::interferometry::products::ClosureKind;
-use crate::interferometry::array::Station;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -23,8 +23,7 @@ fn scan(seed: u64, snr: f64) -> (Observation, Vec<Complex64>) {
         observation.rows.push(Row::total_intensity(1.0, stations, [0.0; 2], i));
     }
     let truth = observation.rows.iter().map(|row| row.products[0]).collect();
-    let errors =
-        GainErrors { scan_amplitude: 0.15, random_phases: true, ..GainErrors::default() };
+    let errors = GainErrors { scan_amplitude: 0.15, random_phases: true, ..GainErrors::default() };
     apply_gains(&mut observation, &errors, seed);
     add_thermal_noise(&mut observation, seed);
     (observation, truth)

@@ -52,9 +52,8 @@ fn exact_errors_and_chi2_are_those_of_noise() {
         let (problem, model, truth) = scan(seed, 0.02);
         let found = problem.solve(&model);
         let errors = problem.errors(&model, &found);
-        let pull = |k: usize| {
-            (found.log_amplitude[k] - truth.log_amplitude[k]) / errors.log_amplitude[k]
-        };
+        let pull =
+            |k: usize| (found.log_amplitude[k] - truth.log_amplitude[k]) / errors.log_amplitude[k];
         pulls += (0..STATIONS).map(|k| pull(k).powi(2)).sum::<f64>() / STATIONS as f64;
         chi2 += problem.value(&model, &found);
     }
@@ -116,8 +115,7 @@ fn exact_what_is_not_known_or_not_free_stays() {
     assert_eq!(problem.solve(&dark), ScanGains::unit(STATIONS));
     let priors = GainPriors { free_phases: false, amplitude_sigma: vec![0.0; STATIONS] };
     let variance = vec![1e-4; model.len()];
-    let fixed =
-        GainProblem::new(problem.pairs.clone(), problem.data.clone(), &variance, &priors);
+    let fixed = GainProblem::new(problem.pairs.clone(), problem.data.clone(), &variance, &priors);
     assert_eq!(fixed.solve(&model), ScanGains::unit(STATIONS));
     let known = GainPriors { free_phases: true, ..priors };
     let phases = GainProblem::new(problem.pairs, problem.data, &variance, &known).solve(&model);
