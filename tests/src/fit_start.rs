@@ -31,7 +31,7 @@ fn fit(folder: &Path) {
     succeed(folder, &words);
 }
 
-fn array(path: &Path, name: &str) -> Vec<f64> {
+pub fn array(path: &Path, name: &str) -> Vec<f64> {
     let file = std::fs::File::open(path).unwrap();
     let mut archive = zip::ZipArchive::new(file).unwrap();
     let mut bytes = Vec::new();

@@ -34,6 +34,7 @@ mod resume;
 mod resumed_fits;
 #[cfg(unix)]
 mod signals;
+mod static_sky;
 mod station_gains;
 mod support;
 mod unknown_world;
