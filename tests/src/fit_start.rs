@@ -23,7 +23,8 @@ fn fit(folder: &Path) {
         "representation=linear-grid",
         "representation.nodes=24",
         "training.start=drawn",
-        "linear={upper=3.0,rounds=1,iterations=8}",
+        // What a scene has between its nodes.
+        "linear={upper=3.0,rounds=1,iterations=8,degree=\"linear\"}",
         "output.nodes=24",
     ] {
         words.extend(["--set", change]);

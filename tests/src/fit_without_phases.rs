@@ -16,6 +16,8 @@ fn small(sets: &[&str]) -> Vec<String> {
         "screen.jy_per_pixel=0.32",
         "observation.scans=12",
         "representation.nodes=20",
+        // So few cubic splines are wider than the flare.
+        "linear.degree=linear",
         "output.nodes=24",
         "training.steps=60",
         "training.start={linear={nodes=20,stride=1,steps=200}}",

@@ -105,6 +105,10 @@ fn exact_draws_without_a_finished_fit_are_refused() {
     for (change, expected) in [
         ("screen.ring_rays=0", "screen.ring_rays = 0 is not allowed: 1 to 1024"),
         ("linear.degree=quartic", "unknown variant `quartic`, expected"),
+        (
+            "training.start.linear.nodes=3",
+            "training.start.linear.nodes = 3 is not allowed: 4 or more with this linear.degree",
+        ),
         ("effects.absorption={coefficient=0.1,radius=5.0,height=2.0}", "exclude each other"),
     ] {
         refused(&["fit", "fit.toml", "-o", "run", "--set", change], expected);

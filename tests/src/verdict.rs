@@ -7,11 +7,14 @@ use serde_json::Value;
 use std::path::Path;
 
 /// The built-in experiment with fewer pixels, scans and nodes, as the convex problem: some seconds.
-const SMALL: [&str; 12] = [
+const SMALL: [&str; 14] = [
     "--set",
     "representation=linear-grid",
     "--set",
     "representation.nodes=24",
+    // So few cubic splines are wider than the flare.
+    "--set",
+    "linear.degree=linear",
     "--set",
     "screen.pixels=20",
     "--set",

@@ -204,7 +204,7 @@ impl Run<'_> {
         let axis = state.now.axis;
         let trainer = &mut self.trainer;
         if self.file.representation.kind == Kind::LinearGrid {
-            let nodes = self.file.representation.nodes;
+            let nodes = self.file.representation.grid_nodes();
             let solution =
                 linear::solve(self.file, &mut trainer.objective, (axis, change), (nodes, 1))?;
             self.folder.log(&linear::solved(&solution))?;

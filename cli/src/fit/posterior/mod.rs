@@ -173,7 +173,8 @@ impl Drawing<'_> {
         let mut file = file.clone();
         file.seed = file.seed.wrapping_add(number);
         if file.representation.kind == Kind::LinearGrid {
-            file.representation.nodes = other_voxels(file.representation.nodes, number);
+            let nodes = other_voxels(file.representation.grid_nodes(), number);
+            file.representation.nodes = Some(nodes);
         }
         let noise = seed(&file, number);
         let (Some(unknown), Some(worlds)) = (self.unknown, &self.worlds) else {
@@ -236,6 +237,8 @@ fn keep(
         "world": world, "chi2_per_datum": drawn.chi2, "noise_factor": factor,
     });
     // Last: with it the draw is whole.
-    output::Output::new(&numbers, "")?.write(sealed(of_draw.clone()).as_bytes())?;
-    Ok(Kept { volume: drawn.volume, numbers: of_draw })
+    let text = sealed(of_draw);
+    output::Output::new(&numbers, "")?.write(text.as_bytes())?;
+    // As a later call reads them, to the last digit.
+    Ok(Kept { volume: drawn.volume, numbers: serde_json::from_str(&text)? })
 }

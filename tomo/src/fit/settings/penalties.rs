@@ -123,7 +123,9 @@ impl FitFile {
             return Ok(None);
         }
         let probe = match (&self.representation.kind, self.probe) {
-            (Kind::Grid | Kind::LinearGrid, _) => Probe::Fixed { nodes: self.representation.nodes },
+            (Kind::Grid | Kind::LinearGrid, _) => {
+                Probe::Fixed { nodes: self.representation.grid_nodes() }
+            }
             (_, Some(ProbeSettings { nodes })) => Probe::Moved { nodes },
             (..) => {
                 return Err(FitError::missing(

@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 pub struct Representation {
     /// Which: the other numbers are those of its kind.
     pub kind: Kind,
-    /// Nodes of a grid along each axis.
-    #[serde(default = "grid_nodes")]
-    pub nodes: usize,
+    /// Nodes of a grid along each axis; [`grid_nodes`](Self::grid_nodes) has the usual number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nodes: Option<usize>,
     /// Cells of the coarsest grid of features along each axis; each further one has twice as many.
     #[serde(default = "coarsest")]
     pub coarsest: usize,
@@ -41,6 +41,14 @@ pub struct Representation {
     /// Numbers of a representation that a program of one's own adds.
     #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
     pub own: toml::Table,
+}
+
+impl Representation {
+    /// Nodes of a grid along each axis: those that are set, or the usual number of its kind. Splines need fewer than
+    /// voxels that are learnt.
+    pub fn grid_nodes(&self) -> usize {
+        self.nodes.unwrap_or(if self.kind == Kind::LinearGrid { 36 } else { 64 })
+    }
 }
 
 /// Kinds of representations.
@@ -139,7 +147,7 @@ pub struct Linear {
     #[serde(default)]
     pub sparsity: f64,
     /// What is between the nodes.
-    #[serde(default)]
+    #[serde(default = "cubic")]
     pub degree: Degree,
     /// Times that nodes may be admitted again.
     pub rounds: usize,
@@ -221,8 +229,8 @@ pub struct AxisScan {
     pub last_rate: f64,
 }
 
-fn grid_nodes() -> usize {
-    64
+fn cubic() -> Degree {
+    Degree::Cubic
 }
 fn sigmoid() -> Activation {
     Activation::Sigmoid

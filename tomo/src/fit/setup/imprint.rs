@@ -1,11 +1,12 @@
 //! A start of a representation from the solution of a linear problem.
 
-use super::Result;
-use crate::fit::settings::{FitFile, Kind};
+use super::{Result, linear};
+use crate::fit::settings::{FitFile, Kind, refuse};
 use crate::fit::{Region, State};
 use crate::optimise::{Adam, AdamState};
-use crate::representation::{Activation, Coordinates, Gradient, Groups, Representation, Workspace};
-use crate::volume::Volume;
+use crate::representation::{
+    Activation, Coordinates, Gradient, Groups, Representation, Spline, Workspace,
+};
 use core::ops::Range;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -19,7 +20,7 @@ const RATE: f64 = 2e-3;
 /// the region.
 ///
 /// # Errors
-/// If the emission does not have `nodes`³ values.
+/// If there is no table `linear`, or the emission does not have `nodes`³ values.
 pub fn imprint(
     file: &FitFile,
     representation: &dyn Representation<f32>,
@@ -29,16 +30,21 @@ pub fn imprint(
     state: &mut State<f32>,
 ) -> Result<()> {
     let (r, region) = (file.region.r_max, file.region.limits());
-    let volume = Volume::new([nodes; 3], [-r; 3], [r; 3], emission.to_vec())?;
+    let spline = Spline::cube(nodes, r, linear(file)?.degree)?;
+    let (given, wanted) = (emission.len(), nodes.pow(3));
+    if given != wanted {
+        refuse!("the solution of the linear problem has {given} values; {wanted} are wanted");
+    }
+    let solution = Solution { spline, emission };
     if file.representation.kind == Kind::Grid {
-        read_off(file, &volume, &mut state.now.parameters);
+        read_off(file, &solution, &mut state.now.parameters);
         return Ok(());
     }
     let mut random = Pcg64::seed_from_u64(file.seed ^ 0x1157_a27e);
     let mut memory = AdamState::new(state.now.parameters.len());
     let (mut workspace, mut gradient) = (Workspace::new(), vec![0.0; state.now.parameters.len()]);
     for step in 0..steps {
-        let draw = Draw::new(&mut random, r, &region, &volume);
+        let draw = Draw::new(&mut random, r, &region, &solution);
         gradient.fill(0.0);
         draw.gradient(representation, &state.now.parameters, &mut gradient, &mut workspace);
         let rate = RATE * (1.0 - step as f64 / steps as f64);
@@ -46,6 +52,21 @@ pub fn imprint(
         representation.project(&mut state.now.parameters);
     }
     Ok(())
+}
+
+/// What a linear problem has found.
+struct Solution<'a> {
+    spline: Spline,
+    emission: &'a [f32],
+}
+
+impl Solution<'_> {
+    fn at(&self, [x, y, z]: &[Vec<f32>; 3]) -> Vec<f32> {
+        let mut values = vec![0.0; x.len()];
+        let at = Coordinates::xyz(x, y, z);
+        self.spline.eval(self.emission, at, &mut values, &mut Workspace::new());
+        values
+    }
 }
 
 /// Random points of the region with what they should have.
@@ -56,16 +77,15 @@ struct Draw {
 }
 
 impl Draw {
-    fn new(random: &mut Pcg64, r: f64, region: &Region, volume: &Volume) -> Self {
+    fn new(random: &mut Pcg64, r: f64, region: &Region, solution: &Solution<'_>) -> Self {
         let mut columns: [Vec<f32>; 3] = Default::default();
-        let mut wanted = Vec::with_capacity(POINTS);
-        while wanted.len() < POINTS {
+        while columns[0].len() < POINTS {
             let x: [f64; 3] = [0, 1, 2].map(|_| random.random_range(-r..r));
             if region.holds(x) {
                 columns.iter_mut().zip(x).for_each(|(column, x)| column.push(x as f32));
-                wanted.push(volume.at(x) as f32);
             }
         }
+        let wanted = solution.at(&columns);
         Draw { columns, wanted }
     }
 
@@ -94,11 +114,13 @@ impl Draw {
 }
 
 /// The parameters of a grid whose nodes have these values.
-fn read_off(file: &FitFile, volume: &Volume, parameters: &mut [f32]) {
-    let (n, r) = (file.representation.nodes, file.region.r_max);
-    let at = |k: usize| -r + 2.0 * r * k as f64 / (n - 1) as f64;
-    for (k, parameter) in parameters.iter_mut().enumerate() {
-        let value = volume.at([at(k / (n * n)), at(k / n % n), at(k % n)]);
+fn read_off(file: &FitFile, solution: &Solution<'_>, parameters: &mut [f32]) {
+    let (n, r) = (file.representation.grid_nodes(), file.region.r_max);
+    let at = |k: usize| (-r + 2.0 * r * k as f64 / (n - 1) as f64) as f32;
+    let of = |node: fn(usize, usize) -> usize| (0..n * n * n).map(|k| at(node(k, n))).collect();
+    let values = solution.at(&[of(|k, n| k / (n * n)), of(|k, n| k / n % n), of(|k, n| k % n)]);
+    for (parameter, value) in parameters.iter_mut().zip(values) {
+        let value = f64::from(value);
         *parameter = match file.representation.activation {
             // As dark and as bright as a sigmoid is at ±10.
             Activation::Sigmoid => {

@@ -75,7 +75,7 @@ fn of_matter(file: &FitFile, registry: &Registry) -> Result<Box<dyn Representati
             Box::new(FeatureGrid::new(settings).within("representation")?)
         }
         Kind::LinearGrid if degree(file) != Degree::Linear => {
-            Box::new(Spline::cube(chosen.nodes, r, degree(file)).within("representation")?)
+            Box::new(Spline::cube(chosen.grid_nodes(), r, degree(file)).within("representation")?)
         }
         Kind::Grid | Kind::LinearGrid => {
             // As dark as a network starts, sigmoid(−10).
@@ -85,7 +85,7 @@ fn of_matter(file: &FitFile, registry: &Registry) -> Result<Box<dyn Representati
                 other => (other, -10.0),
             };
             let settings = GridSettings {
-                nodes: [chosen.nodes; 3],
+                nodes: [chosen.grid_nodes(); 3],
                 low: [-r; 3],
                 high: [r; 3],
                 activation,
@@ -98,7 +98,7 @@ fn of_matter(file: &FitFile, registry: &Registry) -> Result<Box<dyn Representati
 
 /// What is between the nodes of a linear grid.
 fn degree(file: &FitFile) -> Degree {
-    file.linear.as_ref().map_or(Degree::Linear, |linear| linear.degree)
+    file.linear.as_ref().map_or(Degree::Cubic, |linear| linear.degree)
 }
 
 /// A feature grid starts with a faint glow, 1/55: darker ones start late.
@@ -229,7 +229,28 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
     if file.representation.kind == Kind::LinearGrid || file.training.start != Start::Drawn {
         linear(file)?;
     }
+    enough_nodes(file)?;
     Ok(file.simulated().map(drop)?)
+}
+
+/// Refuses grids with fewer nodes than a B-spline of the linear problem reaches over.
+fn enough_nodes(file: &FitFile) -> Result<()> {
+    let least = degree(file).taps();
+    let mut grids = Vec::new();
+    if let Start::Linear { nodes, .. } = file.training.start {
+        grids.push(("training.start.linear.nodes", nodes));
+    }
+    if let Some(unknown) = file.unknown_world()? {
+        grids.push(("world.search.coarse.nodes", unknown.search.coarse.nodes));
+        grids.push(("world.search.fine.nodes", unknown.search.fine.nodes));
+    }
+    match grids.into_iter().find(|(_, nodes)| *nodes < least) {
+        Some((key, nodes)) => {
+            let allowed = format!("{least} or more with this linear.degree");
+            Err(FitError::range(key, nodes, &allowed).into())
+        }
+        None => Ok(()),
+    }
 }
 
 /// Refuses representations, grids and volumes that there is no memory for.

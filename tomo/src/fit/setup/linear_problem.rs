@@ -7,7 +7,6 @@ use crate::fit::linear::{
 };
 use crate::fit::settings::{FitFile, Kind};
 use crate::fit::{Data, FrameTerm, Objective};
-use crate::representation::Degree;
 
 /// Nodes along an axis from which on a coarser grid is solved first.
 const FINE: usize = 40;
@@ -37,10 +36,9 @@ pub fn solve_linear(
 ) -> Result<LinearSolution<f32>> {
     let settings = linear(file)?;
     objective.model.weigh(axis);
-    let (mut priors, mut degree) = (priors(settings), Degree::Linear);
+    let mut priors = priors(settings);
     if file.representation.kind == Kind::LinearGrid {
         priors.extend(file.priors()?);
-        degree = settings.degree;
     }
     let frames: Vec<usize> = objective.observed().into_iter().step_by(stride.max(1)).collect();
     let problem = LinearProblem {
@@ -48,7 +46,7 @@ pub fn solve_linear(
         axis,
         frames: &frames,
         terms: &terms(&objective.data),
-        voxels: Voxels::cube(nodes, file.region.r_max, degree),
+        voxels: Voxels::cube(nodes, file.region.r_max, settings.degree),
         upper: settings.upper,
         flux: settings.flux_jy,
         priors: &priors,

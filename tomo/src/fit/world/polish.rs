@@ -131,8 +131,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
     /// A world at a distance, in the parameters' own units; bounds hold it.
     fn moved(&self, from: &World, step: &[f64]) -> World {
         self.free.iter().zip(step).fold(*from, |world, (free, step)| {
-            let [low, high] = free.bounds();
-            world.with(free.parameter, (from.get(free.parameter) + step).clamp(low, high))
+            world.with(free.parameter, free.inside(from.get(free.parameter) + step))
         })
     }
 

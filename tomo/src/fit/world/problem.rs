@@ -23,6 +23,20 @@ impl Free {
         let ([low, high], [least, most]) = (self.parameter.range(), self.prior.bounds());
         [low.max(least), high.min(most)]
     }
+
+    /// A value brought inside the bounds; a whole circle has none.
+    pub fn inside(&self, value: f64) -> f64 {
+        let [low, high] = self.bounds();
+        match self.is_circle() {
+            true => low + (value - low).rem_euclid(TAU),
+            false => value.clamp(low, high),
+        }
+    }
+
+    fn is_circle(&self) -> bool {
+        let [low, high] = self.bounds();
+        self.parameter == Parameter::PositionAngle && high - low > TAU - 1e-6
+    }
 }
 
 /// Data, and what of the world is not known.
@@ -103,6 +117,11 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         Ok(self.estimate(world, least))
     }
 
+    /// χ² over the number of data.
+    pub fn reduced(&self, chi2: f64) -> f64 {
+        chi2 / self.terms.iter().map(|term| term.weight).sum::<f64>()
+    }
+
     /// The voxels that are solved for.
     pub(super) fn voxels(&self) -> Voxels {
         Voxels::cube(self.effort.nodes, self.half_width, self.effort.degree)
@@ -134,11 +153,8 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         let one = |world: World, (free, u): (&Free, &f64)| {
             let [low, high] = free.bounds();
             let value = about.get(free.parameter) + u * free.parameter.scale();
-            let circle = free.parameter == Parameter::PositionAngle && high - low > TAU - 1e-6;
-            let value = match circle {
-                true => low + (value - low).rem_euclid(TAU),
-                false => mirrored(value, low, high),
-            };
+            let value =
+                if free.is_circle() { free.inside(value) } else { mirrored(value, low, high) };
             world.with(free.parameter, value)
         };
         self.free.iter().zip(u).fold(*about, one)

@@ -1,0 +1,143 @@
+//! The search for a world: from many starts with coarse voxels, then with fine ones.
+
+use super::posterior::{polished, surely};
+use super::seen::Seen;
+use crate::fit::settings::{FitFile, UnknownWorld};
+use crate::fit::setup::{Measured, Result};
+use crate::fit::world::{Exploration, Explored, Spread, World, WorldProblem, WorldWatch};
+
+/// Where one search ended, in [`World`]'s units.
+#[derive(Clone, Debug)]
+pub struct Trial {
+    /// Where it began.
+    pub start: World,
+    /// Where it ended.
+    pub end: World,
+    /// χ² over the number of data there.
+    pub reduced_chi2: f64,
+    /// Half of χ² there, and −ln of the priors' densities.
+    pub value: f64,
+    /// Worlds that were evaluated.
+    pub worlds: usize,
+    /// Whether the last populations were alike.
+    pub converged: bool,
+}
+
+/// A world that was found.
+#[derive(Clone, Debug)]
+pub struct FoundWorld {
+    /// The best world.
+    pub world: World,
+    /// How sure it is; none if the data leave a parameter open.
+    pub spread: Option<Spread>,
+    /// χ² of the fine search's best world over the number of its data.
+    pub reduced_chi2: f64,
+    /// Errors that the search took over those of the data: below 1 where residuals are much smaller than the errors,
+    /// as those of images without noise.
+    pub noise_factor: f64,
+    /// The searches from all starts.
+    pub trials: Vec<Trial>,
+}
+
+/// Told which search of how many goes on, its number of worlds and its least value; says whether to go on.
+pub type SearchWatch<'a> = dyn FnMut((usize, usize), usize, f64) -> bool + 'a;
+
+/// Width of the first population from a start, and of the one about the best end, in units of a parameter's scale.
+const WIDTHS: [f64; 2] = [1.5, 0.4];
+
+/// Looks for the world from all starts, and again with finer voxels about the best end; none if it was cancelled.
+///
+/// # Errors
+/// If a setting is missing or out of range, or the linear problem of a world has no solution.
+pub fn find_world(
+    file: &FitFile,
+    measured: &Measured,
+    unknown: &UnknownWorld,
+    watch: &mut SearchWatch<'_>,
+) -> Result<Option<FoundWorld>> {
+    let search = &unknown.search;
+    let count = search.starts + 1;
+    let coarse = Seen::new(file, measured, &search.coarse)?;
+    let first =
+        coarse.with(unknown, &search.coarse, 1.0, |problem| least(problem, search.starts))?;
+    let trials = coarse.with(unknown, &search.coarse, scale(first), |problem| {
+        let mut trials = Vec::new();
+        for (k, start) in problem.starts(search.starts).into_iter().enumerate() {
+            let mut told = |worlds: usize, best: f64| watch((k, count), worlds, best);
+            let seed = file.seed.wrapping_add(k as u64);
+            let how = Exploration { width: WIDTHS[0], worlds: search.coarse.worlds, seed };
+            let Some(explored) = problem.explore(start, &how, &mut told)? else { return Ok(None) };
+            trials.push(trial(&explored, problem));
+        }
+        Ok(Some(trials))
+    })?;
+    let Some(trials) = trials else { return Ok(None) };
+    let Some(best) = trials.iter().min_by(|a, b| a.value.total_cmp(&b.value)) else {
+        return Ok(None);
+    };
+    let fine = Seen::new(file, measured, &search.fine)?;
+    // The coarse search has left less than it began with.
+    let scale = scale(best.reduced_chi2);
+    let mut told = |worlds: usize, best: f64| watch((count - 1, count), worlds, best);
+    let told: &mut WorldWatch<'_> = &mut told;
+    let found = fine.with(unknown, &search.fine, scale, |problem| {
+        let how = Exploration { width: WIDTHS[1], worlds: search.fine.worlds, seed: file.seed };
+        let Some(explored) = problem.explore(best.end, &how, told)? else { return Ok(None) };
+        let reduced = problem.scale * problem.reduced(explored.best.chi2);
+        if problem.model.ring.is_some() {
+            let (polished, reduced) = polished(problem, &explored.best)?;
+            let spread = surely(problem, &polished, reduced)?;
+            let world = spread.as_ref().map_or(polished.best.world, |spread| spread.world);
+            return Ok(Some((spread, reduced, world)));
+        }
+        let spread = Spread::of(problem.free, &explored.samples, reduced);
+        let world = lower(problem, &explored, spread.as_ref())?;
+        Ok(Some((spread, reduced, world)))
+    })?;
+    Ok(found.map(|(spread, reduced_chi2, world)| FoundWorld {
+        world,
+        reduced_chi2: reduced_chi2 / scale,
+        noise_factor: scale.powf(-0.5),
+        spread,
+        trials,
+    }))
+}
+
+/// The lowest point of the quadratic form, if it explains the data better than the best world that was evaluated.
+fn lower(
+    problem: &WorldProblem<'_, f32>,
+    explored: &Explored,
+    spread: Option<&Spread>,
+) -> Result<World> {
+    let Some(spread) = spread else { return Ok(explored.best.world) };
+    let lowest = problem.solve(spread.world)?;
+    let better = lowest.value < explored.best.value;
+    Ok(if better { lowest.world } else { explored.best.world })
+}
+
+/// The least χ²/N of the worlds where searches begin.
+fn least(problem: &WorldProblem<'_, f32>, starts: usize) -> Result<f64> {
+    problem.starts(starts).into_iter().try_fold(f64::INFINITY, |least, start| {
+        Ok(least.min(problem.reduced(problem.solve(start)?.chi2)))
+    })
+}
+
+/// χ²/N below which errors say nothing about residuals.
+const TOO_SMALL: f64 = 0.5;
+
+/// By what χ² is multiplied so that errors are as large as residuals, where these are much smaller: data without noise
+/// whose errors are only a scale.
+fn scale(reduced_chi2: f64) -> f64 {
+    if reduced_chi2 > 0.0 && reduced_chi2 < TOO_SMALL { 1.0 / reduced_chi2 } else { 1.0 }
+}
+
+fn trial(explored: &Explored, problem: &WorldProblem<'_, f32>) -> Trial {
+    Trial {
+        reduced_chi2: problem.reduced(explored.best.chi2),
+        start: explored.start,
+        end: explored.best.world,
+        value: explored.best.value,
+        worlds: explored.samples.len(),
+        converged: explored.converged,
+    }
+}

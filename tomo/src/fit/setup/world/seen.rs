@@ -1,0 +1,67 @@
+//! Data as a search looks at them.
+
+use super::{known_world, model};
+use crate::fit::Objective;
+use crate::fit::linear::{Prior as Penalty, Weighted};
+use crate::fit::settings::{FitFile, UnknownWorld, WorldView};
+use crate::fit::setup::linear_problem::terms;
+use crate::fit::setup::{CoarseView, Measured, Result, forward_model, linear, motion, priors};
+use crate::fit::world::{Effort, WorldProblem};
+
+/// Data as a search looks at them.
+pub(super) struct Seen {
+    view: CoarseView,
+    frames: usize,
+}
+
+impl Seen {
+    pub fn new(file: &FitFile, measured: &Measured, view: &WorldView) -> Result<Self> {
+        Ok(Self { view: CoarseView::new(file, measured, view.pixels)?, frames: view.frames })
+    }
+
+    pub fn with<R>(
+        &self,
+        unknown: &UnknownWorld,
+        view: &WorldView,
+        scale: f64,
+        search: impl FnOnce(&WorldProblem<'_, f32>) -> Result<R>,
+    ) -> Result<R> {
+        let CoarseView { file, instrument, measured } = &self.view;
+        let plain = motion(file, measured.times.clone())?;
+        let count = file.screen.pixels * file.screen.pixels;
+        let data = measured.terms(&file.loss, count)?;
+        let objective = Objective { model: forward_model(instrument, &plain)?, data };
+        let all = objective.observed();
+        let frames: Vec<usize> =
+            all.iter().copied().step_by((all.len() / self.frames).max(1)).collect();
+        let terms: Vec<Weighted<'_, f32>> =
+            terms(&objective.data).into_iter().map(|term| counted(term, &frames)).collect();
+        let data: f64 = terms.iter().map(|term| term.weight).sum();
+        let settings = linear(file)?;
+        let scaled = |penalty: Penalty| Penalty { weight: data * penalty.weight, ..penalty };
+        let penalties: Vec<Penalty> = priors(settings).into_iter().map(scaled).collect();
+        search(&WorldProblem {
+            model: &model(file, unknown, instrument, &plain)?,
+            known: known_world(file),
+            free: &unknown.free()?,
+            frames: &frames,
+            terms: &terms,
+            half_width: file.region.r_max,
+            upper: settings.upper,
+            flux: settings.flux_jy,
+            penalties: &penalties,
+            scale,
+            effort: Effort {
+                nodes: view.nodes,
+                degree: settings.degree,
+                iterations: view.iterations,
+            },
+        })
+    }
+}
+
+/// Data with their weight times their number in some frames.
+fn counted<'a>(term: Weighted<'a, f32>, frames: &[usize]) -> Weighted<'a, f32> {
+    let data: usize = frames.iter().map(|frame| term.term.degrees_of_freedom(*frame)).sum();
+    Weighted { weight: term.weight * data as f64, ..term }
+}
