@@ -15,7 +15,7 @@ pub struct StationGain {
     pub station: String,
     /// g: the station's data are g times what they should be.
     pub gain: Complex64,
-    /// Standard deviations of |g|/|g| and of arg g (radians); NaN where they are not known.
+    /// Standard deviations of ln|g| and of arg g (radians); NaN where they are not known.
     pub errors: [f64; 2],
 }
 
