@@ -143,7 +143,7 @@
 //!
 //! # Features
 //! `rayon` (default): all cores. `affine`: an independent tracer in the affine parameter. `capi`:
-//! the functions of `include/kerrlight.h` for C.
+//! the functions of `include/kerrlight.h` for C. `wgpu`: `gpu`, which runs the shaders of [`wgsl`].
 
 /// The examples of the README compile and run.
 #[cfg(doctest)]
@@ -168,6 +168,11 @@ pub mod simd;
 mod matter;
 
 mod rays;
+
+pub mod wgsl;
+
+#[cfg(feature = "wgpu")]
+pub mod gpu;
 
 #[cfg(feature = "capi")]
 pub mod capi;

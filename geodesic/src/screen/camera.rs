@@ -244,6 +244,39 @@ impl Camera {
         boosted.map(|k| k / energy)
     }
 
+    /// (Energy at infinity, p_r, p_φ/sin θ, p_θ) of the photon from the direction forward + x right + y up as a linear
+    /// map of (|direction|, 1, x, y): four rows. Shaders take it in place of the frame.
+    pub(crate) fn lens(&self) -> [[f64; 4]; 4] {
+        let [right, up, forward] = self.axes;
+        let columns = [(1.0, [0.0; 3]), (0.0, forward), (0.0, right), (0.0, up)]
+            .map(|(energy, from)| self.unscaled(energy, from.map(|d| -d)));
+        core::array::from_fn(|row| columns.map(|column| column[row]))
+    }
+
+    /// [`lens`](Self::lens) of a photon of energy `energy` and momentum `p` in the camera's frame.
+    fn unscaled(&self, energy: f64, p: [f64; 3]) -> [f64; 4] {
+        let speed = square(self.velocity);
+        let gamma = 1.0 / (1.0 - speed).sqrt();
+        let along: f64 = self.velocity.iter().zip(p).map(|(v, k)| v * k).sum();
+        let stretch = if speed > 0.0 { (gamma - 1.0) * along / speed } else { 0.0 };
+        let factor = stretch + gamma * energy;
+        let k: [f64; 3] = core::array::from_fn(|j| p[j] + factor * self.velocity[j]);
+        let sigma = self.hole.sigma(self.radius, self.inclination.cos());
+        let (around, polar) = (k[2] * self.girth, k[1] * sigma.sqrt());
+        let drag = self.drag * self.inclination.sin() * around;
+        [self.lapse * gamma * (energy + along) + drag, k[0], around, polar]
+    }
+
+    /// Its inclination.
+    pub(crate) fn inclination(&self) -> Inclination {
+        self.inclination
+    }
+
+    /// Its azimuth, in radians.
+    pub(crate) fn azimuth(&self) -> f64 {
+        self.azimuth
+    }
+
     /// ν in the camera's frame over ν at infinity, for the photon that arrives from
     /// `direction`: multiplies every redshift factor g that is written for infinity.
     pub fn blueshift(&self, direction: [f64; 3]) -> f64 {

@@ -1,0 +1,14 @@
+//! Rays on a graphics device (feature `wgpu`): the shaders of [`wgsl`](crate::wgsl), run through Vulkan, Metal or
+//! DirectX 12.
+//!
+//! A software device serves as well, for tests: Mesa's llvmpipe, in the package `mesa-vulkan-drivers` of Debian, Ubuntu
+//! and Fedora. It is slower than the rest of this crate on the same processor.
+
+mod device;
+mod error;
+mod kernel;
+mod tracer;
+
+pub use device::{Adapter, adapter, adapters};
+pub use error::GpuError;
+pub use tracer::{GpuCrossing, GpuEnd, GpuRays, GpuRequest, GpuSample, GpuTracer};

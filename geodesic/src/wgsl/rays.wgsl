@@ -1,0 +1,179 @@
+// Whole rays: outcome, equatorial crossings, direction of escape, samples. One invocation a ray.
+
+struct KerrTask {
+    hole: KerrHole,
+    place: KerrPlace,
+    lens: KerrLens,
+    rays: u32,
+    crossings: u32,    // room for each ray's crossings
+    samples: u32,      // of each ray, equidistant in Mino time
+    camera: u32,       // 1: points are (x, y) of the lens; 0: (alpha, beta)
+    row: u32,          // invocations in a row of the grid
+    quadratures: u32,  // 1: azimuths and delays are wanted
+    pad: vec2<u32>,
+}
+
+struct KerrEnd {
+    exit: vec3<f32>,     // where the ray goes, if it escapes
+    outcome: u32,
+    flags: u32,
+    crossings: u32,      // of the equatorial plane, along the whole ray
+    mino_time: f32,      // of the whole ray
+    error: f32,          // estimate: relative in r, radians in azimuth
+    lambda: f32,
+    eta: f32,
+    steps: u32,
+    pad: u32,
+}
+
+struct KerrCrossing {
+    radius: f32,
+    azimuth: f32,
+    mino_time: f32,
+    delay: f32,
+    rate: f32,           // dw/dtau
+    polar_rate: f32,     // d cos theta/dtau
+    pad: vec2<f32>,
+}
+
+@group(0) @binding(0) var<uniform> kerr_task: KerrTask;
+@group(0) @binding(1) var<storage, read> kerr_points: array<vec4<f32>>;
+@group(0) @binding(2) var<storage, read_write> kerr_end_of: array<KerrEnd>;
+@group(0) @binding(3) var<storage, read_write> kerr_crossing_of: array<KerrCrossing>;
+@group(0) @binding(4) var<storage, read_write> kerr_sample_of: array<vec4<f32>>;
+
+fn kerr_arrive(point: vec4<f32>) -> KerrPhoton {
+    if kerr_task.camera != 0u {
+        return kerr_through_lens(kerr_task.hole, kerr_task.place, kerr_task.lens, point.xz, point.yw);
+    }
+    return kerr_on_screen(kerr_task.hole, kerr_task.place, point.xz, point.yw);
+}
+
+// What rounding makes of the ray: that of every step, and of the minimum of W.
+fn kerr_error(ray: KerrRay, steps: u32) -> f32 {
+    let rounding = 1e-7 * f32(steps + 4u);
+    return select(rounding, rounding + 1e-12 / max(abs(ray.height), 1e-20), ray.centre > 0.0);
+}
+
+// Traces ray `k`; if `total` is not 0, writes its samples instead, of which it is the Mino time of the whole.
+fn kerr_follow(k: u32, total: f32) -> KerrEnd {
+    let hole = kerr_task.hole;
+    var walk: KerrWalk;
+    var series: KerrSeries;
+    var ray = kerr_begin(hole, kerr_task.place, kerr_arrive(kerr_points[k]), &walk);
+    let quadratures = kerr_task.quadratures != 0u;
+    var end = KerrEnd(vec3<f32>(0.0), ray.outcome, ray.flags, 0u, 0.0, 0.0, ray.lambda, ray.eta, 0u, 0u);
+    if ray.outcome == KERR_LOST {
+        return end;
+    }
+    let count = kerr_task.samples;
+    let ends = kerr_sample_ends(ray, count);
+    var next = 0u;
+    var done = false;
+    while end.steps < KERR_MOST_STEPS {
+        kerr_expand(ray, walk, quadratures, &series);
+        var x = 0.0;
+        done = kerr_ends(ray, walk, &series, &x);
+        if total > 0.0 {
+            while next < count {
+                let share = ends.x + (ends.y - ends.x) * f32(next) / f32(max(count, 2u) - 1u);
+                let at = share * total * ray.b - walk.s;
+                if at > x && !done {
+                    break;
+                }
+                let point = kerr_point(hole, ray, walk, &series, clamp(at, 0.0, x));
+                let sin_theta = length(point.n.xy);
+                let theta = kerr_angle(sin_theta, point.n.z);
+                kerr_sample_of[k * count + next] = vec4<f32>(1.0 / point.inverse_radius, theta, point.azimuth, point.delay);
+                next++;
+            }
+        } else {
+            kerr_cross(k, ray, walk, &series, x, &end);
+        }
+        end.steps++;
+        if done {
+            break;
+        }
+        kerr_advance(hole, ray, &walk, &series, x);
+    }
+    if done {
+        let x = kerr_end_step(ray, &series);
+        let last = kerr_point(hole, ray, walk, &series, x);
+        let turn = kerr_cos_sin(last.azimuth - kerr_angle(last.n.y, last.n.x));
+        let n = last.n;
+        end.exit = normalize(vec3<f32>(turn.x * n.x - turn.y * n.y, turn.y * n.x + turn.x * n.y, n.z));
+        end.mino_time = last.mino_time;
+    } else {
+        end.flags |= KERR_OUT_OF_STEPS;
+        end.mino_time = walk.s / ray.b;
+    }
+    end.error = kerr_error(ray, end.steps);
+    return end;
+}
+
+fn kerr_end_step(ray: KerrRay, series: ptr<function, KerrSeries>) -> f32 {
+    return kerr_end_point(ray, series, (*series).h, ray.outcome == KERR_CAPTURED);
+}
+
+// First and last sample as shares of the whole ray: both ends, but for those at infinity.
+fn kerr_sample_ends(ray: KerrRay, count: u32) -> vec2<f32> {
+    let n = f32(count);
+    if kerr_task.place.inverse_radius.x > 0.0 {
+        return vec2<f32>(0.0, 1.0);
+    }
+    if ray.outcome == KERR_CAPTURED {
+        return vec2<f32>(1.0 / n, 1.0);
+    }
+    return vec2<f32>(1.0 / (n + 1.0), n / (n + 1.0));
+}
+
+// Takes the crossing of the equatorial plane within the step, if there is one.
+fn kerr_cross(
+    k: u32,
+    ray: KerrRay,
+    walk: KerrWalk,
+    series: ptr<function, KerrSeries>,
+    x: f32,
+    end: ptr<function, KerrEnd>,
+) {
+    let at = kerr_height(series, x);
+    let above = select(at.x > 0.0, at.y > 0.0, at.x == 0.0);
+    if above == kerr_above(walk.n, walk.dn) {
+        return;
+    }
+    let number = (*end).crossings;
+    (*end).crossings = number + 1u;
+    if number >= kerr_task.crossings {
+        (*end).flags |= KERR_MORE_CROSSINGS;
+        return;
+    }
+    let point = kerr_point(kerr_task.hole, ray, walk, series, kerr_solve(series, true, 0.0, x));
+    kerr_crossing_of[k * kerr_task.crossings + number] = KerrCrossing(
+        1.0 / point.inverse_radius,
+        point.azimuth,
+        point.mino_time,
+        point.delay,
+        point.rate,
+        point.velocity.z,
+        vec2<f32>(0.0),
+    );
+}
+
+@compute @workgroup_size(64)
+fn kerr_trace(@builtin(global_invocation_id) id: vec3<u32>) {
+    let k = id.y * kerr_task.row + id.x;
+    if k < kerr_task.rays {
+        kerr_end_of[k] = kerr_follow(k, 0.0);
+    }
+}
+
+@compute @workgroup_size(64)
+fn kerr_sample(@builtin(global_invocation_id) id: vec3<u32>) {
+    let k = id.y * kerr_task.row + id.x;
+    if k < kerr_task.rays {
+        let total = kerr_end_of[k].mino_time;
+        if total > 0.0 {
+            _ = kerr_follow(k, total);
+        }
+    }
+}
