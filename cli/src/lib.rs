@@ -24,6 +24,7 @@ mod accuracy;
 mod answer;
 mod assets;
 mod checksum;
+mod claims;
 mod columns;
 mod compare;
 mod completions;

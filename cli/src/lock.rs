@@ -1,6 +1,6 @@
 //! A folder that one process at a time works in.
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -12,12 +12,18 @@ pub const NAME: &str = "lock";
 pub struct Lock(#[expect(dead_code, reason = "it is held, not read")] File);
 
 impl Lock {
+    /// Shares a folder with others who do the same, and with nobody else, as far as the file system has locks.
+    pub fn share(folder: &Path, busy: &str) -> anyhow::Result<Self> {
+        let file = open(folder)?;
+        match file.try_lock_shared() {
+            Err(TryLockError::WouldBlock) => Err(in_use(folder, busy)),
+            Ok(()) | Err(TryLockError::Error(_)) => Ok(Lock(file)),
+        }
+    }
+
     /// Takes the lock of a folder, within `patience`; `busy` is what another process does there.
     pub fn take(folder: &Path, busy: &str, patience: Duration) -> anyhow::Result<Self> {
-        let path = folder.join(NAME);
-        let mut options = OpenOptions::new();
-        let file = options.read(true).write(true).create(true).truncate(false).open(&path);
-        let file = file.with_context(|| format!("cannot open {}", path.display()))?;
+        let file = open(folder)?;
         let clock = Instant::now();
         loop {
             match file.try_lock() {
@@ -27,13 +33,22 @@ impl Lock {
                 Err(TryLockError::WouldBlock) if clock.elapsed() < patience => {
                     std::thread::sleep(Duration::from_millis(20));
                 }
-                Err(TryLockError::WouldBlock) => {
-                    bail!("{} is in use: another kerrlight {busy} it", folder.display())
-                }
+                Err(TryLockError::WouldBlock) => return Err(in_use(folder, busy)),
             }
         }
         Ok(Lock(file))
     }
+}
+
+fn open(folder: &Path) -> anyhow::Result<File> {
+    let path = folder.join(NAME);
+    let mut options = OpenOptions::new();
+    let file = options.read(true).write(true).create(true).truncate(false).open(&path);
+    file.with_context(|| format!("cannot open {}", path.display()))
+}
+
+fn in_use(folder: &Path, busy: &str) -> anyhow::Error {
+    anyhow!("{} is in use: another kerrlight {busy} it", folder.display())
 }
 
 /// Whether there is nothing in a folder but its lock; so it is if there is no folder.

@@ -32,6 +32,7 @@ mod reference;
 mod results;
 mod resume;
 mod resumed_fits;
+mod shared_folder;
 #[cfg(unix)]
 mod signals;
 mod static_sky;

@@ -8,6 +8,10 @@ use crate::paths;
 use anyhow::{Context, anyhow, bail};
 use kerrlight_tomo::fit::settings::merge;
 use kerrlight_tomo::representation::Registry;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 use toml::{Table, Value};
 
 /// One fit of an experiment.
@@ -18,10 +22,24 @@ pub struct Case {
     pub numbers: Vec<Option<f64>>,
     /// Its seed.
     pub seed: u64,
-    /// Its settings, or what is wrong with them.
-    pub settings: Result<String, String>,
+    /// What is wrong with its settings.
+    pub error: Option<String>,
     /// A name for a folder: levels, seed, and a checksum of the settings.
     pub slug: String,
+    recipe: Arc<Recipe>,
+    /// Its level of each factor, by number.
+    chosen: Vec<u32>,
+}
+
+/// What settings of cases are made of. They are made when they are wanted: a hundred thousand of them would fill the
+/// memory.
+struct Recipe {
+    experiment: Experiment,
+    source: Source,
+    choice: Choice,
+    levels: Vec<Vec<Level>>,
+    /// Fits that have been read.
+    fits: Mutex<BTreeMap<PathBuf, Table>>,
 }
 
 /// How a case ended.
@@ -51,6 +69,11 @@ pub struct Choice {
 }
 
 impl Choice {
+    /// Whether some cases are left out.
+    pub fn is_restricted(&self) -> bool {
+        self.seeds.is_some() || !self.only.is_empty()
+    }
+
     /// All cases, with the same settings.
     pub fn unrestricted(&self) -> Self {
         Self { seeds: None, only: Vec::new(), ..self.clone() }
@@ -58,6 +81,17 @@ impl Choice {
 }
 
 impl Case {
+    /// The settings of its fit.
+    ///
+    /// # Errors
+    /// What is wrong with them.
+    pub fn settings(&self) -> Result<String, String> {
+        match &self.error {
+            Some(error) => Err(error.clone()),
+            None => self.recipe.text(&self.chosen, self.seed).map_err(|e| format!("{e:#}")),
+        }
+    }
+
     /// Its level of a factor.
     pub fn level(&self, factor: &str) -> Option<&str> {
         self.levels.iter().find(|(name, _)| name == factor).map(|(_, level)| level.as_str())
@@ -98,30 +132,25 @@ pub fn expand(
         choice.only.clone()
     };
     let only = kept(experiment, &asked)?;
-    let combinations = combinations(&experiment.factor);
-    let mut cases = Vec::new();
-    for seed in 1..=seeds {
-        for levels in &combinations {
-            let of = |factor: &str| {
-                let at = experiment.factor.iter().position(|f| f.name == factor);
-                at.map(|at| levels[at].name.as_str())
-            };
-            let skipped = |skip: &std::collections::BTreeMap<String, String>| {
-                skip.iter().all(|(factor, level)| of(factor) == Some(level))
-            };
-            let wanted = only.iter().all(|(factor, levels)| {
-                of(factor).is_some_and(|level| levels.iter().any(|l| l == level))
-            });
-            if !wanted || experiment.skip.iter().any(skipped) {
-                continue;
-            }
-            cases.push(case(experiment, source, choice, levels, seed));
-        }
-    }
-    if cases.is_empty() {
+    let recipe = Arc::new(Recipe::new(experiment, source, choice));
+    let is_wanted = |chosen: &Vec<u32>| {
+        let of = |factor: &str| recipe.level(chosen, factor);
+        let is_skipped = experiment.skip.iter().any(|skip| {
+            skip.iter().all(|(factor, level)| of(factor) == Some(level.as_str()))
+        });
+        let is_kept = only.iter().all(|(factor, levels)| {
+            of(factor).is_some_and(|level| levels.iter().any(|l| l == level))
+        });
+        is_kept && !is_skipped
+    };
+    let mut wanted = combinations(&recipe.levels);
+    wanted.retain(is_wanted);
+    let all: Vec<(u64, &Vec<u32>)> =
+        (1..=seeds).flat_map(|seed| wanted.iter().map(move |chosen| (seed, chosen))).collect();
+    if all.is_empty() {
         bail!("no case is left");
     }
-    Ok(cases)
+    Ok(all.into_par_iter().map(|(seed, chosen)| case(&recipe, chosen, seed)).collect())
 }
 
 type Kept = Vec<(String, Vec<String>)>;
@@ -150,31 +179,24 @@ fn kept(experiment: &Experiment, only: &[String]) -> anyhow::Result<Kept> {
     Ok(kept)
 }
 
-/// Every combination of levels, the last factor fastest.
-fn combinations(factors: &[Factor]) -> Vec<Vec<Level>> {
-    factors.iter().fold(vec![Vec::new()], |all, factor| {
-        let levels = factor.levels();
-        let with = |before: &Vec<Level>| {
-            levels
-                .iter()
-                .map(|level| [before.as_slice(), std::slice::from_ref(level)].concat())
-                .collect()
+/// Every combination of levels by number, the last factor fastest.
+fn combinations(levels: &[Vec<Level>]) -> Vec<Vec<u32>> {
+    levels.iter().fold(vec![Vec::new()], |all, levels| {
+        let with = |before: &Vec<u32>| -> Vec<Vec<u32>> {
+            (0..levels.len() as u32).map(|k| [before.as_slice(), &[k]].concat()).collect()
         };
-        all.iter().flat_map(|before| -> Vec<Vec<Level>> { with(before) }).collect()
+        all.iter().flat_map(with).collect()
     })
 }
 
-fn case(
-    experiment: &Experiment,
-    source: &Source,
-    choice: &Choice,
-    levels: &[Level],
-    seed: u64,
-) -> Case {
-    let factors = experiment.factor.iter();
-    let named = factors.zip(levels).map(|(f, l)| (f.name.clone(), l.name.clone())).collect();
-    let settings = settings(experiment, source, choice, levels, seed);
-    let settings = settings.map_err(|error| format!("{error:#}"));
+fn case(recipe: &Arc<Recipe>, chosen: &[u32], seed: u64) -> Case {
+    let levels: Vec<&Level> = recipe.levels_of(chosen).collect();
+    let factors = recipe.experiment.factor.iter();
+    let named = factors.zip(&levels).map(|(f, l)| (f.name.clone(), l.name.clone())).collect();
+    let settings = recipe.text(chosen, seed).and_then(|text| {
+        fit::check(&text, &recipe.choice.registry)?;
+        Ok(text)
+    });
     let sum = crc32fast::hash(settings.as_deref().unwrap_or_default().as_bytes());
     let words: Vec<String> = levels.iter().map(|level| plain(&level.name)).collect();
     let words = words.into_iter().chain([format!("seed{seed}"), format!("{sum:08x}")]);
@@ -182,8 +204,10 @@ fn case(
         levels: named,
         numbers: levels.iter().map(|level| level.number).collect(),
         seed,
-        settings,
+        error: settings.err().map(|error| format!("{error:#}")),
         slug: words.collect::<Vec<_>>().join("_"),
+        recipe: Arc::clone(recipe),
+        chosen: chosen.to_vec(),
     }
 }
 
@@ -193,35 +217,62 @@ fn plain(name: &str) -> String {
     name.chars().take(40).map(letter).collect()
 }
 
-fn settings(
-    experiment: &Experiment,
-    source: &Source,
-    choice: &Choice,
-    levels: &[Level],
-    seed: u64,
-) -> anyhow::Result<String> {
-    let last = levels.iter().rev().find_map(|level| level.fit.as_ref());
-    let path = last
-        .or(experiment.fit.as_ref())
-        .ok_or_else(|| anyhow!("neither the experiment nor a level names a fit"))?;
-    let mut table = source.fit(path)?;
-    merge(&mut table, &source.anchored(&experiment.set));
-    for level in levels {
-        for key in &level.remove {
-            remove(&mut table, key).with_context(|| format!("level {:?}", level.name))?;
+impl Recipe {
+    fn new(experiment: &Experiment, source: &Source, choice: &Choice) -> Self {
+        Recipe {
+            levels: experiment.factor.iter().map(Factor::levels).collect(),
+            experiment: experiment.clone(),
+            source: source.clone(),
+            choice: choice.clone(),
+            fits: Mutex::default(),
         }
-        merge(&mut table, &source.anchored(&level.set));
     }
-    if choice.quick {
-        merge(&mut table, &source.anchored(&experiment.quick.set));
+
+    fn levels_of(&self, chosen: &[u32]) -> impl Iterator<Item = &Level> {
+        self.levels.iter().zip(chosen).filter_map(|(levels, k)| levels.get(*k as usize))
     }
-    table.insert("seed".to_owned(), Value::Integer(seed as i64));
-    let mut text = toml::to_string(&table).context("settings")?;
-    for assignment in &choice.set {
-        text = fit::assigned(&text, &paths::from_here(assignment, None)?)?;
+
+    /// The name of the level of a factor.
+    fn level(&self, chosen: &[u32], factor: &str) -> Option<&str> {
+        let at = self.experiment.factor.iter().position(|f| f.name == factor)?;
+        Some(&self.levels[at].get(*chosen.get(at)? as usize)?.name)
     }
-    fit::check(&text, &choice.registry)?;
-    Ok(text)
+
+    /// The settings of a fit, which is read once.
+    fn fit(&self, path: &Path) -> anyhow::Result<Table> {
+        let mut fits = self.fits.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(table) = fits.get(path) {
+            return Ok(table.clone());
+        }
+        let table = self.source.fit(path)?;
+        fits.insert(path.to_owned(), table.clone());
+        Ok(table)
+    }
+
+    fn text(&self, chosen: &[u32], seed: u64) -> anyhow::Result<String> {
+        let Recipe { experiment, source, choice, .. } = self;
+        let levels: Vec<&Level> = self.levels_of(chosen).collect();
+        let last = levels.iter().rev().find_map(|level| level.fit.as_ref());
+        let path = last
+            .or(experiment.fit.as_ref())
+            .ok_or_else(|| anyhow!("neither the experiment nor a level names a fit"))?;
+        let mut table = self.fit(path)?;
+        merge(&mut table, &source.anchored(&experiment.set));
+        for level in levels {
+            for key in &level.remove {
+                remove(&mut table, key).with_context(|| format!("level {:?}", level.name))?;
+            }
+            merge(&mut table, &source.anchored(&level.set));
+        }
+        if choice.quick {
+            merge(&mut table, &source.anchored(&experiment.quick.set));
+        }
+        table.insert("seed".to_owned(), Value::Integer(seed as i64));
+        let text = toml::to_string(&table).context("settings")?;
+        choice.set.iter().try_fold(text, |text, assignment| {
+            fit::assigned(&text, &paths::from_here(assignment, None)?)
+        })
+    }
 }
 
 fn remove(table: &mut Table, key: &str) -> anyhow::Result<()> {
@@ -238,7 +289,6 @@ fn remove(table: &mut Table, key: &str) -> anyhow::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
 
     const TEXT: &str = r#"
         title = "t"
@@ -271,7 +321,7 @@ mod tests {
     }
 
     fn table(case: &Case) -> Table {
-        case.settings.as_ref().unwrap().parse().unwrap()
+        case.settings().unwrap().parse().unwrap()
     }
 
     #[test]
@@ -319,9 +369,9 @@ mod tests {
         let wrong = TEXT.replace("kind = \"grid\"", "kind = \"gird\"");
         let experiment = Experiment::parse(&wrong).unwrap();
         let cases = expand(&experiment, &Source::BuiltIn, &Choice::default()).unwrap();
-        let error = cases[0].settings.as_ref().unwrap_err();
+        let error = cases[0].settings().unwrap_err();
         assert!(error.contains("gird"), "{error}");
-        assert!(cases[2].settings.is_ok());
+        assert!(cases[2].error.is_none());
     }
 
     #[test]
@@ -334,7 +384,7 @@ mod tests {
                 let cases = expand(&experiment, &source, &choice).unwrap();
                 super::super::ran::check(&experiment, &cases).unwrap();
                 for case in cases {
-                    assert!(case.settings.is_ok(), "{name}: {:?}", case.settings);
+                    assert!(case.error.is_none(), "{name}: {:?}", case.error);
                 }
             }
         }

@@ -7,10 +7,13 @@ mod figures;
 mod labels;
 mod map;
 mod page;
+mod plan;
 mod quick;
 mod ran;
 mod runner;
+mod share;
 mod source;
+mod status;
 mod summary;
 mod tables;
 mod verdicts;
@@ -18,7 +21,6 @@ mod verdicts;
 use crate::answer::Answer;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::lock::{self, Lock};
-use crate::output::Output;
 use crate::program::Program;
 use crate::progress;
 use anyhow::{Context, bail};
@@ -26,9 +28,12 @@ use cases::{Case, Choice, Status};
 use clap::Args;
 use experiment::Experiment;
 use page::Page;
+use plan::Plan;
 use runner::Runner;
 use serde_json::{Value, json};
+use share::{Share, Sharing};
 use source::Source;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use summary::Summary;
@@ -57,6 +62,15 @@ pub struct Compare {
     /// Resume in an existing folder: finished cases are not run again
     #[arg(long)]
     resume: bool,
+    /// Run the cases together with others who share the folder, new or not
+    #[arg(long, value_name = "THEN", value_enum, num_args = 0..=1, require_equals = true, default_missing_value = "wait", hide_possible_values = true)]
+    share: Option<Share>,
+    /// Show how a folder's cases stand, and who runs them
+    #[arg(long, conflicts_with_all = ["resume", "share", "list"])]
+    status: bool,
+    /// Write the report of the cases that are done so far
+    #[arg(long, conflicts_with_all = ["resume", "share", "list", "status"])]
+    collect: bool,
     /// Show what changed since an earlier run
     #[arg(long, value_name = "RESULTS")]
     against: Option<PathBuf>,
@@ -86,7 +100,8 @@ impl Compare {
         // A folder that is called like an experiment is meant by ./name.
         let is_known = source::built_in().any(|(known, _)| Path::new(known) == name);
         let is_file = name.extension().is_some_and(|e| e == "json");
-        if is_file || (!is_known && name.join("results.json").is_file()) {
+        let goes_on = self.resume || self.share.is_some() || self.status || self.collect;
+        if is_file || (!is_known && !goes_on && name.join("results.json").is_file()) {
             let Some(before) = before else {
                 bail!("{} are results: give others with --against", name.display());
             };
@@ -94,55 +109,154 @@ impl Compare {
             let answer = Answer::text(tables::markdown(&changed)).with("note", changed.caption);
             return Ok(answer.with("head", changed.head).with("rows", changed.rows));
         }
-        let (source, text) = Source::find(name)?;
-        let experiment = Experiment::parse(&text).with_context(|| name.display().to_string())?;
-        let choice = Choice {
-            seeds: self.seeds,
-            only: self.only.clone(),
-            quick: self.quick,
-            set: self.set.clone(),
-            registry: program.registry.clone(),
-        };
-        let chosen = cases::expand(&experiment, &source, &choice)?;
-        ran::check(&experiment, &chosen).with_context(|| name.display().to_string())?;
+        let asked = self.asked(name, program)?;
+        let folder = asked.folder.clone();
+        let Asked { experiment, choice, source, .. } = &asked;
+        let chosen = cases::expand(experiment, source, choice)?;
+        ran::check(experiment, &chosen).with_context(|| name.display().to_string())?;
         if let [first, ..] = &chosen[..]
-            && chosen.iter().all(|case| case.settings.is_err())
+            && let Some(why) = &first.error
+            && chosen.iter().all(|case| case.error.is_some())
         {
-            let why = first.settings.as_ref().err().map(String::as_str).unwrap_or_default();
             bail!("{}: no case can be run; {}: {why}", name.display(), first.name());
         }
         if self.list {
             return Ok(list_cases(&chosen));
         }
-        let all = cases::expand(&experiment, &source, &choice.unrestricted())?;
-        let (folder, lock) = self.folder(name, &text)?;
+        if self.status {
+            return status::show(&folder, &chosen);
+        }
+        let lock = self.enter(&asked)?;
         let runner = Runner::new(&folder, (threads, memory), program, lock)?;
-        let cases = with_known(chosen, all, &runner);
+        let cases = if choice.is_restricted() && self.share.is_none() {
+            let all = cases::expand(experiment, source, &choice.unrestricted())?;
+            with_known(chosen, all, &runner)
+        } else {
+            chosen
+        };
         runner.check_inputs(&cases)?;
-        let summary = run(&cases, &runner);
-        let page = Page { experiment: &experiment, choice: &choice, summary: &summary };
+        let summary = match self.work(&cases, &runner, &folder)? {
+            Ended::Here(summary) => summary,
+            Ended::Left(answer) => return Ok(answer),
+        };
+        let page = Page { experiment, choice, summary: &summary };
         let tables = page.write(&runner, &folder, before.as_ref())?;
-        Ok(end(&tables, &summary, &folder))
+        Ok(end(&tables, &summary, &folder, self.collect))
     }
 
-    /// The folder, new or resumed.
-    fn folder(&self, name: &Path, text: &str) -> anyhow::Result<(PathBuf, Lock)> {
+    /// Runs what is not done: alone, with others, or nothing at all where a report is wanted.
+    fn work<'a>(
+        &self,
+        cases: &'a [Case],
+        runner: &Runner<'_>,
+        folder: &Path,
+    ) -> anyhow::Result<Ended<'a>> {
+        if self.collect {
+            return Ok(Ended::Here(collected(cases, runner, folder)));
+        }
+        if let Some(share) = self.share {
+            return shared(cases, runner, folder, share);
+        }
+        share::end(folder, &folder.join(runner::CASES))?;
+        Ok(Ended::Here(run(cases, runner)))
+    }
+
+    /// What is asked for: by an experiment, or by a folder in which one was begun.
+    fn asked(&self, name: &Path, program: &Program) -> anyhow::Result<Asked> {
+        let begun = if name.is_dir() { Plan::load(name)? } else { None };
+        let (plan, text, folder) = match begun {
+            Some((plan, text)) => {
+                self.adds_nothing(name)?;
+                (plan, text, name.to_owned())
+            }
+            None => {
+                let (source, text) = Source::find(name)?;
+                let choice = Choice {
+                    seeds: self.seeds,
+                    only: self.only.clone(),
+                    quick: self.quick,
+                    set: self.set.clone(),
+                    registry: program.registry.clone(),
+                };
+                (Plan::new(&source, &choice)?, text, self.folder_for(name))
+            }
+        };
+        let experiment = Experiment::parse(&text).with_context(|| name.display().to_string())?;
+        let (source, choice) = (plan.source(), plan.choice(&program.registry));
+        Ok(Asked { plan, text, experiment, source, choice, folder })
+    }
+
+    /// Refuses to change what a folder was begun with.
+    fn adds_nothing(&self, folder: &Path) -> anyhow::Result<()> {
+        let is_plain = self.seeds.is_none() && self.only.is_empty() && self.set.is_empty();
+        if !is_plain || self.quick || self.output.is_some() {
+            bail!(
+                "{} has its cases: --output, --seeds, --only, --set and --quick go with an experiment",
+                folder.display()
+            );
+        }
+        Ok(())
+    }
+
+    fn folder_for(&self, name: &Path) -> PathBuf {
         let stem =
             name.file_stem().map_or("compare".into(), |stem| stem.to_string_lossy().into_owned());
-        let folder =
-            self.output.clone().unwrap_or_else(|| PathBuf::from(format!("kerrlight-{stem}")));
-        let shown = folder.display().to_string();
-        if !lock::is_free(&folder) && !self.resume {
+        self.output.clone().unwrap_or_else(|| PathBuf::from(format!("kerrlight-{stem}")))
+    }
+
+    /// Enters the folder: new, resumed, or shared with others. A report takes no lock.
+    fn enter(&self, asked: &Asked) -> anyhow::Result<Option<Lock>> {
+        let folder = &asked.folder;
+        let shown = folder.display();
+        let begun = Plan::load(folder)?;
+        if self.collect {
+            let Some(_) = begun else { return Err(status::no_comparison(folder)) };
+            return Ok(None);
+        }
+        let is_free = lock::is_free(folder);
+        if !is_free && !self.resume && self.share.is_none() {
             bail!(
                 "{shown} exists and is not an empty folder: resume it with --resume, or give another with -o"
             );
         }
-        std::fs::create_dir_all(&folder)
+        if self.share.is_some() && !is_free && !folder.join(plan::EXPERIMENT).is_file() {
+            bail!("{shown} holds other files than a comparison: give another folder with -o");
+        }
+        std::fs::create_dir_all(folder)
             .with_context(|| format!("cannot make the folder {shown}"))?;
-        let lock = Lock::take(&folder, "compares in", Duration::ZERO)?;
-        Output::new(&folder.join("experiment.toml"), "toml")?.write(text.as_bytes())?;
-        Ok((folder, lock))
+        if self.share.is_none() {
+            let lock = Lock::take(folder, "compares in", Duration::ZERO)?;
+            asked.plan.write(folder, &asked.text)?;
+            return Ok(Some(lock));
+        }
+        let lock = Lock::share(folder, "compares in")?;
+        if begun.is_none() {
+            asked.plan.write(folder, &asked.text)?;
+        }
+        // Somebody else may have begun at the same moment.
+        if let Some((plan, _)) = Plan::load(folder)? {
+            asked.plan.joins(&plan, folder)?;
+        }
+        Ok(Some(lock))
     }
+}
+
+/// What is asked for, and where the results go.
+struct Asked {
+    plan: Plan,
+    text: String,
+    experiment: Experiment,
+    source: Source,
+    choice: Choice,
+    folder: PathBuf,
+}
+
+/// How the work of a process ends.
+enum Ended<'a> {
+    /// There is a report to be made.
+    Here(Summary<'a>),
+    /// Others still run cases, and it does not wait for them.
+    Left(Answer),
 }
 
 fn list_experiments() -> Answer {
@@ -154,28 +268,57 @@ fn list_experiments() -> Answer {
 }
 
 fn list_cases(cases: &[Case]) -> Answer {
-    let line = |case: &Case| match &case.settings {
-        Ok(_) => format!("{}\n", case.name()),
-        Err(error) => format!("{}: {error}\n", case.name()),
+    let line = |case: &Case| match &case.error {
+        None => format!("{}\n", case.name()),
+        Some(error) => format!("{}: {error}\n", case.name()),
     };
-    let entry = |case: &Case| json!({"name": case.name(), "error": case.settings.as_ref().err()});
+    let entry = |case: &Case| json!({"name": case.name(), "error": case.error});
     Answer::text(cases.iter().map(line).collect::<String>())
         .with("cases", cases.iter().map(entry).collect::<Vec<_>>())
 }
 
 /// The chosen cases, and those that an earlier run of the same folder has done beside them.
-fn with_known(mut chosen: Vec<Case>, all: Vec<Case>, runner: &Runner<'_>) -> Vec<Case> {
+fn with_known(chosen: Vec<Case>, all: Vec<Case>, runner: &Runner<'_>) -> Vec<Case> {
     let is_done = |case: &Case| matches!(runner.known(case), Status::Done(_));
-    let mut cases = Vec::with_capacity(all.len());
-    for case in all {
-        match chosen.iter().position(|other| other.slug == case.slug) {
-            Some(at) => cases.push(chosen.remove(at)),
-            None if is_done(&case) => cases.push(case),
-            None => {}
-        }
-    }
-    cases.extend(chosen);
+    let wanted: HashSet<&str> = chosen.iter().map(|case| case.slug.as_str()).collect();
+    let is_shown = |case: &Case| wanted.contains(case.slug.as_str()) || is_done(case);
+    let mut cases: Vec<Case> = all.into_iter().filter(is_shown).collect();
+    let known: HashSet<String> = cases.iter().map(|case| case.slug.clone()).collect();
+    cases.extend(chosen.into_iter().filter(|case| !known.contains(&case.slug)));
     cases
+}
+
+/// How all cases stand, of which others may still run some.
+fn collected<'a>(cases: &'a [Case], runner: &Runner<'_>, folder: &Path) -> Summary<'a> {
+    let failures = share::failures(folder, cases);
+    let status = |case: &Case| match (runner.known(case), failures.get(&case.slug)) {
+        (Status::Open, Some(why)) => Status::Failed(why.clone()),
+        (status, _) => status,
+    };
+    Summary::new(cases.iter().map(|case| (case, status(case))).collect())
+}
+
+/// Runs what is left of a folder together with others.
+fn shared<'a>(
+    cases: &'a [Case],
+    runner: &Runner<'_>,
+    folder: &Path,
+    share: Share,
+) -> anyhow::Result<Ended<'a>> {
+    let keeper = Keeper::saving("stopping after the fit's step; a second signal ends at once");
+    let (open, run) = Sharing::join(folder, runner, cases)?.run(share, &keeper)?;
+    if open == 0 {
+        return Ok(Ended::Here(collected(cases, runner, folder)));
+    }
+    let shown = folder.display();
+    if keeper.stopped() {
+        let how = format!("resume with: kerrlight compare {shown} --share");
+        let text = format!("stopped: {run} cases were run here, {open} are open; {how}");
+        return Err(Interrupted(text).into());
+    }
+    let text = format!("{run} cases were run here; others run the last {open}");
+    let answer = Answer::lines(&text, &shown.to_string());
+    Ok(Ended::Left(answer.with("folder", shown.to_string()).with("run", run).with("open", open)))
 }
 
 /// Runs what is not done yet, until a signal.
@@ -208,7 +351,7 @@ fn run<'a>(cases: &'a [Case], runner: &Runner<'_>) -> Summary<'a> {
 }
 
 /// The tables, how many cases are done and which of them are best and worst, and where to look.
-fn end(tables: &str, summary: &Summary, folder: &Path) -> Answer {
+fn end(tables: &str, summary: &Summary, folder: &Path, is_early: bool) -> Answer {
     let files = ["report.html", "results.json", "results.csv", "tables.md"];
     let files = files.map(|name| folder.join(name));
     let failed = summary.failed().map(|(case, why)| json!({"name": case.name(), "error": why}));
@@ -219,7 +362,7 @@ fn end(tables: &str, summary: &Summary, folder: &Path) -> Answer {
         .with("done", summary.done().count())
         .with("failed", failed.collect::<Vec<_>>())
         .with_all(summary.extremes().map_or(Value::Null, |extremes| extremes.json()));
-    match failure(summary, folder) {
+    match failure(summary, folder).filter(|_| !is_early) {
         Some(error) => answer.failing(error),
         None => answer,
     }

@@ -30,7 +30,7 @@ fn at(settings: &toml::Table, key: &str) -> Option<String> {
 }
 
 fn settings(case: &Case) -> Option<toml::Table> {
-    case.settings.as_ref().ok()?.parse().ok()
+    case.settings().ok()?.parse().ok()
 }
 
 /// Different values with the number of cases that have them, in the order of the cases.

@@ -21,18 +21,21 @@ pub struct Runner<'a> {
     program: &'a Program,
     threads: Option<u16>,
     memory: Option<u64>,
-    _lock: Lock,
+    _lock: Option<Lock>,
 }
 
+/// The folder of the runs in that of the results.
+pub const CASES: &str = "cases";
+
 impl<'a> Runner<'a> {
-    /// In `cases` of this folder, whose lock is held.
+    /// In `cases` of this folder, whose lock is held by those who run any.
     pub fn new(
         folder: &Path,
         (threads, memory): (Option<u16>, Option<u64>),
         program: &'a Program,
-        lock: Lock,
+        lock: Option<Lock>,
     ) -> anyhow::Result<Self> {
-        let folder = folder.join("cases");
+        let folder = folder.join(CASES);
         std::fs::create_dir_all(&folder)
             .with_context(|| format!("cannot make the folder {}", folder.display()))?;
         Ok(Self { folder, program, threads, memory, _lock: lock })
@@ -45,11 +48,15 @@ impl<'a> Runner<'a> {
 
     /// What is known of a case without running it.
     pub fn known(&self, case: &Case) -> Status {
-        if let Err(error) = &case.settings {
+        self.known_in(case, &self.run_of(case))
+    }
+
+    /// The same where the case is worked on elsewhere.
+    fn known_in(&self, case: &Case, run: &Path) -> Status {
+        if let Some(error) = &case.error {
             return Status::Failed(error.clone());
         }
-        let run = self.run_of(case);
-        match results(&run) {
+        match results(run) {
             Some((results, true)) if is_ours(&results) && run.join("report.html").exists() => {
                 Status::Done(results)
             }
@@ -72,41 +79,52 @@ impl<'a> Runner<'a> {
 
     /// Runs a case to its end, from where it is; `Open` if a signal has stopped it.
     pub fn run(&self, case: &Case, keeper: &Keeper) -> Status {
-        match self.known(case) {
+        self.run_in(case, &self.run_of(case), keeper)
+    }
+
+    /// The same in another folder than its own.
+    pub fn run_in(&self, case: &Case, run: &Path, keeper: &Keeper) -> Status {
+        match self.known_in(case, run) {
             Status::Open => {}
             known => return known,
         }
-        match self.child(case, keeper) {
-            Ok((status, _)) if status.success() => match self.known(case) {
+        match self.child(case, run, keeper) {
+            Ok((status, _)) if status.success() => match self.known_in(case, run) {
                 Status::Open => Status::Failed("it ended without results".to_owned()),
                 known => known,
             },
             // What stops because it is told to has not failed.
             _ if keeper.stopped() => Status::Open,
+            Ok((status, _)) if was_told(status) => Status::Open,
             Ok((status, said)) => Status::Failed(failure(status, &said)),
             Err(error) => Status::Failed(format!("{error:#}")),
         }
     }
 
     /// The fit in a process of its own, and what it said.
-    fn child(&self, case: &Case, keeper: &Keeper) -> anyhow::Result<(ExitStatus, String)> {
-        let run = self.run_of(case);
+    fn child(
+        &self,
+        case: &Case,
+        run: &Path,
+        keeper: &Keeper,
+    ) -> anyhow::Result<(ExitStatus, String)> {
+        // Paths in it start from its folder, wherever the run is.
         let settings = self.folder.join(format!("{}.toml", case.slug));
-        let text = case.settings.as_deref().unwrap_or_default();
+        let text = case.settings().unwrap_or_default();
         Output::new(&settings, "toml")?.write(text.as_bytes())?;
         let mut command = self.program.again()?;
         command.args(["fit", "--stop-with-input"]);
         // What another version has finished, or has not come so far as to have settings, is begun anew.
-        let is_foreign = results(&run).is_some_and(|(results, _)| !is_ours(&results))
-            || !Inputs::load(&run).is_ok_and(|inputs| inputs.version == env!("CARGO_PKG_VERSION"));
+        let is_foreign = results(run).is_some_and(|(results, _)| !is_ours(&results))
+            || !Inputs::load(run).is_ok_and(|inputs| inputs.version == env!("CARGO_PKG_VERSION"));
         if run.join("fit.toml").is_file() && !is_foreign {
-            command.arg("--resume").arg(&run);
+            command.arg("--resume").arg(run);
         } else {
             if run.exists() {
-                std::fs::remove_dir_all(&run)
+                std::fs::remove_dir_all(run)
                     .with_context(|| format!("cannot clear {}", run.display()))?;
             }
-            command.arg(&settings).arg("-o").arg(&run);
+            command.arg(&settings).arg("-o").arg(run);
         }
         if let Some(threads) = self.threads {
             command.args(["--threads", &threads.to_string()]);
@@ -114,7 +132,7 @@ impl<'a> Runner<'a> {
         if let Some(memory) = self.memory {
             command.args(["--memory", &memory.to_string()]);
         }
-        let said = self.folder.join(format!("{}.txt", case.slug));
+        let said = said(run);
         let file =
             File::create(&said).with_context(|| format!("cannot write {}", said.display()))?;
         let child = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(file).spawn();
@@ -136,6 +154,18 @@ fn wait(mut child: Child, keeper: &Keeper) -> anyhow::Result<ExitStatus> {
         }
         std::thread::sleep(Duration::from_millis(10));
     }
+}
+
+/// Where the messages of a run go: beside it.
+pub fn said(run: &Path) -> PathBuf {
+    let mut name = run.as_os_str().to_owned();
+    name.push(".txt");
+    name.into()
+}
+
+/// Whether a fit has ended because a signal told it to, which may reach it before it reaches this process.
+fn was_told(status: ExitStatus) -> bool {
+    status.code().is_some_and(|code| matches!(code, 129 | 130 | 143))
 }
 
 /// What a run has found, if it has come so far, and whether that is as it was written.

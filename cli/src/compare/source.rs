@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use toml::Table;
 
 /// Where an experiment and the fits that it names are read from.
+#[derive(Debug, Clone)]
 pub enum Source {
     /// Those that the program carries.
     BuiltIn,

@@ -141,8 +141,8 @@ impl<'a> Summary<'a> {
         let case = |(case, status): &(&Case, Status)| {
             let levels: Map<String, Value> =
                 case.levels.iter().map(|(factor, level)| (factor.clone(), json!(level))).collect();
-            let settings = case.settings.as_ref().ok();
-            let settings = settings.and_then(|text| toml::from_str::<Value>(text).ok());
+            let settings = case.settings().ok();
+            let settings = settings.and_then(|text| toml::from_str::<Value>(&text).ok());
             let mut line = json!({
                 "levels": levels,
                 "seed": case.seed,

@@ -110,7 +110,7 @@ impl Figures<'_> {
     pub(super) fn coverage(&self, asked: &FigureAsked) -> anyhow::Result<Vec<LinePlot>> {
         let mut plots = Vec::new();
         for (case, _) in self.chosen(asked).filter(|(case, _)| case.seed == 1) {
-            let uv = fit::coverage(case.settings.as_deref().unwrap_or_default(), Path::new("/"))?;
+            let uv = fit::coverage(&case.settings().unwrap_or_default(), Path::new("/"))?;
             if uv.is_empty() {
                 continue;
             }
@@ -146,7 +146,7 @@ impl Figures<'_> {
                 continue;
             };
             let [assumed, simulated] =
-                fit::velocities(case.settings.as_deref().unwrap_or_default())?;
+                fit::velocities(&case.settings().unwrap_or_default())?;
             let curve = |name: String, points| Series {
                 name,
                 points,

@@ -121,7 +121,7 @@ impl Figures<'_> {
             return Ok(None);
         }
         let VolumeFile { mut volume, axis } = volume_files::load(&path)?;
-        let settings = case.settings.as_deref().unwrap_or_default();
+        let settings = &case.settings().unwrap_or_default();
         if let Some(later) = later {
             let axis = axis.with_context(|| format!("{}: no axis", path.display()))?;
             let turned = &fit::turned(settings, later).context("later")?[motion];
