@@ -115,7 +115,8 @@ fn exact_failures_are_told_once() {
     experiment(at, 1, 5);
     let text = std::fs::read_to_string(at.join("seeds.toml")).unwrap();
     // The lens of the first case is too large for the memory that it is given.
-    let text = text.replace("\"training.grid_rate\"", "\"output.nodes\"").replace("[0.1]", "[400, 6]");
+    let text =
+        text.replace("\"training.grid_rate\"", "\"output.nodes\"").replace("[0.1]", "[400, 6]");
     std::fs::write(at.join("seeds.toml"), text.replace("output.nodes = 6\n", "")).unwrap();
     let words = ["compare", "seeds.toml", "-o", "out", "--share", "--memory", "96MiB"];
     let output = kerrlight(at, &words);

@@ -31,8 +31,7 @@ impl Worker {
         let worker = format!("{host}_{}_{word:08x}", process.id);
         let path = folder.join(format!("{worker}.{EXTENSION}"));
         let (piece, beat, done, failed, seconds) = (None, 0, 0, 0, 0.0);
-        let record =
-            Record { worker, host, process, every_s, beat, piece, done, failed, seconds };
+        let record = Record { worker, host, process, every_s, beat, piece, done, failed, seconds };
         write(&path, &record).with_context(|| format!("cannot write {}", path.display()))?;
         let record = Arc::new(Mutex::new(record));
         let (stop, stopped) = channel();

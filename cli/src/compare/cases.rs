@@ -135,9 +135,10 @@ pub fn expand(
     let recipe = Arc::new(Recipe::new(experiment, source, choice));
     let is_wanted = |chosen: &Vec<u32>| {
         let of = |factor: &str| recipe.level(chosen, factor);
-        let is_skipped = experiment.skip.iter().any(|skip| {
-            skip.iter().all(|(factor, level)| of(factor) == Some(level.as_str()))
-        });
+        let is_skipped = experiment
+            .skip
+            .iter()
+            .any(|skip| skip.iter().all(|(factor, level)| of(factor) == Some(level.as_str())));
         let is_kept = only.iter().all(|(factor, levels)| {
             of(factor).is_some_and(|level| levels.iter().any(|l| l == level))
         });

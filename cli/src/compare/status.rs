@@ -125,9 +125,7 @@ impl Now {
     }
 
     fn answer(&self) -> Answer {
-        let worker = |(record, case): &(Record, String)| {
-            json!({"worker": record.worker, "host": record.host, "case": case, "done": record.done})
-        };
+        let worker = |(record, case): &(Record, String)| json!({"worker": record.worker, "host": record.host, "case": case, "done": record.done});
         let failed = |(name, why): &(String, String)| json!({"name": name, "error": why});
         Answer::text(self.text())
             .with("cases", self.all)

@@ -145,8 +145,7 @@ impl Figures<'_> {
             let Some((case, _)) = self.chosen(asked).find(|(case, _)| is_at(case, &row)) else {
                 continue;
             };
-            let [assumed, simulated] =
-                fit::velocities(&case.settings().unwrap_or_default())?;
+            let [assumed, simulated] = fit::velocities(&case.settings().unwrap_or_default())?;
             let curve = |name: String, points| Series {
                 name,
                 points,
