@@ -13,30 +13,33 @@ pub struct Lock(#[expect(dead_code, reason = "it is held, not read")] File);
 
 impl Lock {
     /// Shares a folder with others who do the same, and with nobody else, as far as the file system has locks.
-    pub fn share(folder: &Path, busy: &str) -> anyhow::Result<Self> {
-        let file = open(folder)?;
-        match file.try_lock_shared() {
-            Err(TryLockError::WouldBlock) => Err(in_use(folder, busy)),
-            Ok(()) | Err(TryLockError::Error(_)) => Ok(Lock(file)),
-        }
+    pub fn share(folder: &Path, busy: &str, patience: Duration) -> anyhow::Result<Self> {
+        Self::by(File::try_lock_shared, folder, busy, patience)
     }
 
     /// Takes the lock of a folder, within `patience`; `busy` is what another process does there.
     pub fn take(folder: &Path, busy: &str, patience: Duration) -> anyhow::Result<Self> {
+        Self::by(File::try_lock, folder, busy, patience)
+    }
+
+    fn by(
+        lock: fn(&File) -> Result<(), TryLockError>,
+        folder: &Path,
+        busy: &str,
+        patience: Duration,
+    ) -> anyhow::Result<Self> {
         let file = open(folder)?;
         let clock = Instant::now();
         loop {
-            match file.try_lock() {
-                Ok(()) => break,
+            match lock(&file) {
                 // Not every file system has locks.
-                Err(TryLockError::Error(_)) => break,
+                Ok(()) | Err(TryLockError::Error(_)) => return Ok(Lock(file)),
                 Err(TryLockError::WouldBlock) if clock.elapsed() < patience => {
                     std::thread::sleep(Duration::from_millis(20));
                 }
                 Err(TryLockError::WouldBlock) => return Err(in_use(folder, busy)),
             }
         }
-        Ok(Lock(file))
     }
 }
 

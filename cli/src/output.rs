@@ -19,6 +19,9 @@ pub struct Output {
     piped: bool,
 }
 
+/// How names begin of what is written beside its place.
+pub const BESIDE: &str = ".kerrlight-";
+
 /// The name of standard output and of standard input.
 pub const PIPE: &str = "-";
 
@@ -86,7 +89,7 @@ impl Output {
 
     fn beside(&self) -> anyhow::Result<tempfile::NamedTempFile> {
         let mut builder = tempfile::Builder::new();
-        builder.prefix(".kerrlight-");
+        builder.prefix(BESIDE);
         // The permissions of any newly created file, which the process's mask narrows.
         #[cfg(unix)]
         let builder = {

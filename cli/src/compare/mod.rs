@@ -213,30 +213,18 @@ impl Compare {
             let Some(_) = begun else { return Err(status::no_comparison(folder)) };
             return Ok(None);
         }
-        let is_free = lock::is_free(folder);
-        if !is_free && !self.resume && self.share.is_none() {
+        if self.share.is_some() {
+            return plan::join(&asked.plan, &asked.text, folder).map(Some);
+        }
+        if !lock::is_free(folder) && !self.resume {
             bail!(
                 "{shown} exists and is not an empty folder: resume it with --resume, or give another with -o"
             );
         }
-        if self.share.is_some() && !is_free && !folder.join(plan::EXPERIMENT).is_file() {
-            bail!("{shown} holds other files than a comparison: give another folder with -o");
-        }
         std::fs::create_dir_all(folder)
             .with_context(|| format!("cannot make the folder {shown}"))?;
-        if self.share.is_none() {
-            let lock = Lock::take(folder, "compares in", Duration::ZERO)?;
-            asked.plan.write(folder, &asked.text)?;
-            return Ok(Some(lock));
-        }
-        let lock = Lock::share(folder, "compares in")?;
-        if begun.is_none() {
-            asked.plan.write(folder, &asked.text)?;
-        }
-        // Somebody else may have begun at the same moment.
-        if let Some((plan, _)) = Plan::load(folder)? {
-            asked.plan.joins(&plan, folder)?;
-        }
+        let lock = Lock::take(folder, plan::BUSY, Duration::ZERO)?;
+        asked.plan.write(folder, &asked.text)?;
         Ok(Some(lock))
     }
 }

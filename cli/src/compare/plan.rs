@@ -3,17 +3,26 @@
 use super::cases::Choice;
 use super::source::Source;
 use crate::checksum::{is_whole, sealed};
+use crate::lock::{self, Lock};
 use crate::output::{self, Output};
 use crate::paths;
 use anyhow::{Context, bail};
 use kerrlight_tomo::representation::Registry;
 use serde::{Deserialize, Serialize};
+use std::ffi::OsString;
+use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 /// Its name in the folder.
 pub const FILE: &str = "plan.json";
 /// The experiment's own text beside it.
 pub const EXPERIMENT: &str = "experiment.toml";
+
+/// What another process does in the folder.
+pub const BUSY: &str = "compares in";
+/// For how long somebody who begins in a folder that is there may take.
+const BEGINNING: Duration = Duration::from_secs(5);
 
 /// Which cases of which experiment are run, and how.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -101,5 +110,125 @@ impl Plan {
             );
         }
         Ok(())
+    }
+}
+
+/// Enters a folder together with others, of whom some may enter it in the same moment: whoever is first begins it, and
+/// the others must want the same cases.
+pub fn join(plan: &Plan, experiment: &str, folder: &Path) -> anyhow::Result<Lock> {
+    if !folder.join(FILE).is_file() && !appear(plan, experiment, folder)? {
+        begin_within(plan, experiment, folder)?;
+    }
+    let lock = Lock::share(folder, BUSY, BEGINNING)?;
+    match Plan::load(folder)? {
+        Some((begun, _)) => plan.joins(&begun, folder)?,
+        None => bail!("{}: {FILE} is gone", folder.display()),
+    }
+    Ok(lock)
+}
+
+/// Makes a folder with its plan in it, by one rename: nobody sees the one without the other. False if something is in
+/// the way.
+fn appear(plan: &Plan, experiment: &str, folder: &Path) -> anyhow::Result<bool> {
+    let name = || format!("cannot make the folder {}", folder.display());
+    let place = std::path::absolute(folder).with_context(name)?;
+    let parent = place.parent().with_context(name)?;
+    fs::create_dir_all(parent).with_context(name)?;
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(output::BESIDE);
+    // Those of any newly made folder, which the process's mask narrows.
+    #[cfg(unix)]
+    let builder = {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o777))
+    };
+    let beside = builder.tempdir_in(parent).with_context(name)?;
+    plan.write(beside.path(), experiment)?;
+    Ok(fs::rename(beside.path(), &place).is_ok())
+}
+
+/// Begins in a folder that is there, and cannot be replaced: where file systems are mounted, or that an earlier version
+/// has left. Whoever has its lock writes the plan.
+fn begin_within(plan: &Plan, experiment: &str, folder: &Path) -> anyhow::Result<()> {
+    let (shown, clock) = (folder.display(), Instant::now());
+    let is_foreign = is_foreign(folder);
+    // What others add to a folder they add after its plan.
+    while !folder.join(FILE).is_file() {
+        if is_foreign {
+            bail!("{shown} holds other files than a comparison: give another folder with -o");
+        }
+        match Lock::take(folder, BUSY, Duration::ZERO) {
+            Ok(_alone) if folder.join(FILE).is_file() => break,
+            Ok(_alone) => plan.write(folder, experiment)?,
+            Err(error) if clock.elapsed() > BEGINNING => return Err(error),
+            Err(_) => std::thread::sleep(Duration::from_millis(20)),
+        }
+    }
+    Ok(())
+}
+
+/// Whether there is something in a folder that no comparison leaves there before its plan.
+fn is_foreign(folder: &Path) -> bool {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let names: Vec<_> = entries.map(|entry| entry.file_name()).collect();
+    let is_ours = |name: &OsString| {
+        [lock::NAME, FILE, EXPERIMENT].iter().any(|ours| name == ours)
+            || name.to_string_lossy().starts_with(output::BESIDE)
+    };
+    !names.iter().any(|name| name == EXPERIMENT) && !names.iter().all(is_ours)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Barrier;
+
+    fn plan(seeds: u64) -> Plan {
+        let choice = Choice { seeds: Some(seeds), ..Choice::default() };
+        Plan::new(&Source::BuiltIn, &choice).unwrap()
+    }
+
+    /// Eight that want the same cases in the same moment all get in, whatever there is of the folder.
+    #[test]
+    fn exact_all_who_begin_together_join() {
+        let at = tempfile::tempdir().unwrap();
+        for round in 0..30 {
+            let folder = at.path().join(format!("a/{round}"));
+            if round % 3 > 0 {
+                fs::create_dir_all(&folder).unwrap();
+            }
+            if round % 3 > 1 {
+                fs::write(folder.join(lock::NAME), "").unwrap();
+            }
+            let start = Barrier::new(8);
+            let enter = || {
+                start.wait();
+                join(&plan(3), "text", &folder).map(drop)
+            };
+            std::thread::scope(|scope| {
+                let all: Vec<_> = (0..8).map(|_| scope.spawn(enter)).collect();
+                all.into_iter().for_each(|one| one.join().unwrap().unwrap());
+            });
+            assert_eq!(Plan::load(&folder).unwrap(), Some((plan(3), "text".to_owned())));
+        }
+        // Nothing stays beside the folders.
+        assert_eq!(fs::read_dir(at.path().join("a")).unwrap().count(), 30);
+    }
+
+    /// Of two that want different cases one is refused.
+    #[test]
+    fn exact_one_plan_wins() {
+        let at = tempfile::tempdir().unwrap();
+        let folder = at.path().join("out");
+        let enter = |seeds| join(&plan(seeds), "text", &folder).map(drop);
+        let (one, other) = std::thread::scope(|scope| {
+            let one = scope.spawn(|| enter(1));
+            (one.join().unwrap(), enter(2))
+        });
+        assert!(one.is_ok());
+        assert!(other.unwrap_err().to_string().contains("has other cases"));
+        fs::write(at.path().join("notes"), "mine").unwrap();
+        let error = join(&plan(1), "text", at.path()).map(drop).unwrap_err().to_string();
+        assert!(error.contains("holds other files than a comparison"), "{error}");
     }
 }

@@ -108,7 +108,7 @@ impl<'a> Runner<'a> {
         run: &Path,
         keeper: &Keeper,
     ) -> anyhow::Result<(ExitStatus, String)> {
-        // Paths in it start from its folder, wherever the run is.
+        // Paths in it start from the root.
         let settings = self.folder.join(format!("{}.toml", case.slug));
         let text = case.settings().unwrap_or_default();
         Output::new(&settings, "toml")?.write(text.as_bytes())?;

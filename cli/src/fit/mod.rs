@@ -106,7 +106,7 @@ impl Fit {
         }
         let (prepared, read) = output::with_reads(|| run::Prepared::new(file, &base_dir, registry));
         let prepared = prepared?;
-        let text = format!("{BASE_DIR}{}\n{text}", base_dir.display());
+        let text = format!("{BASE_DIR}{}\n{text}", self.shown(&base_dir).display());
         let folder = Folder::create(&folder, &text, Inputs::new(&text, read))?;
         self.run_all(&prepared, &text, &folder, false)
     }
@@ -152,6 +152,12 @@ impl Fit {
             text = assigned(&text, &paths::from_here(assignment, folder)?)?;
         }
         Ok((text, base_dir))
+    }
+
+    /// The folder that the run's settings name. Paths in those of a comparison start from the root: a case is the same
+    /// bytes in any folder.
+    fn shown<'a>(&self, base_dir: &'a Path) -> &'a Path {
+        if self.stop_with_input { Path::new("/") } else { base_dir }
     }
 
     /// Refuses to resume a run with settings other than its own.
