@@ -9,7 +9,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("Rays", &["trace", "critical-curve", "accuracy"]),
     ("Data", &["observe", "uv", "convert"]),
     ("Fits", &["fit", "posterior", "compare"]),
-    ("Other", &["inspect", "completions", "man"]),
+    ("Other", &["inspect", "devices", "completions", "man"]),
 ];
 
 /// The command line, whose help page shows the verbs in groups.
@@ -17,7 +17,7 @@ pub fn command() -> Command {
     let command = Arguments::command();
     let verbs = grouped(&command);
     command.help_template(format!(
-        "{{about}}\n\n{{usage-heading}} kerrlight [OPTIONS] VERB ...   or   kerrlight VERB --help\n\n{verbs}\nOptions:\n{{options}}{{after-help}}"
+        "{{about}}\n\n{{usage-heading}} kerrlight [OPTIONS] VERB ...   or   kerrlight VERB --help\n\n{verbs}Options:\n{{options}}{{after-help}}"
     ))
 }
 

@@ -30,6 +30,7 @@ mod compare;
 mod completions;
 mod convert;
 mod critical_curve;
+mod devices;
 mod file_sums;
 mod fit;
 mod help;
@@ -104,6 +105,8 @@ enum Verb {
     Compare(compare::Compare),
     /// Show what a file or the folder of a fit contains
     Inspect(inspect::Inspect),
+    /// List the graphics devices that can trace rays
+    Devices(devices::Devices),
     /// Print a completion script for a shell
     Completions(completions::Completions),
     /// Write manual pages
@@ -152,6 +155,7 @@ impl Verb {
             Verb::Posterior(posterior) => posterior.run(&program.registry),
             Verb::Compare(compare) => compare.run((arguments.threads, arguments.memory), program),
             Verb::Inspect(inspect) => inspect.run(),
+            Verb::Devices(devices) => devices.run(),
             Verb::Completions(completions) => completions.run(),
             Verb::Man(pages) => pages.run(),
         }

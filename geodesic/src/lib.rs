@@ -193,8 +193,8 @@ pub use numbers::compensated::Double;
 pub use numbers::dual::Dual;
 pub use numbers::scalar::{Elementary, Scalar};
 pub use rays::block::{
-    BlockRequest, BlockTracer, PathOfRay, PathUse, PlaneCrossing, RayBlock, RayVisitor,
-    SphereNodes, TracedRay, Work,
+    BlockRequest, BlockTracer, DeviceEnd, DeviceRays, DeviceRequest, DeviceSample, PathOfRay,
+    PathUse, PlaneCrossing, RayBlock, RayDevice, RayVisitor, SphereNodes, TracedRay, Work,
 };
 pub use rays::columns::{Points, RayTable};
 pub use rays::integrator::Integrator;

@@ -21,6 +21,7 @@ mod fit_data;
 mod fit_start;
 mod fit_without_phases;
 mod fuzz_corpus;
+mod graphics_devices;
 mod interferometry;
 mod kerr_references;
 mod lensing;

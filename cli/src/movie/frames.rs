@@ -24,6 +24,8 @@ pub struct Sequence {
     factor: Option<f64>,
     /// Lengths and checksums of the files that the scene names.
     files: String,
+    /// The device that traces rays, if it is not this processor.
+    device: String,
 }
 
 /// Where a film comes from.
@@ -34,6 +36,8 @@ pub struct Origin<'a> {
     pub text: &'a str,
     /// Lengths and checksums of the files that the scene names.
     pub files: &'a str,
+    /// The device that traces rays; nothing for this processor.
+    pub device: &'a str,
 }
 
 /// A frame to be.
@@ -46,7 +50,7 @@ struct Plan {
 impl Sequence {
     /// The frames at `times`, in `folder`, which is made if it is not there.
     pub fn new(folder: &Path, of: &Origin<'_>, times: &[f64]) -> anyhow::Result<Self> {
-        let Origin { name, text, files } = of;
+        let Origin { name, text, files, device } = of;
         let plan = |time: &f64| -> anyhow::Result<Plan> {
             let text = apply_override(text, &format!("observer.time={time:?}"))?;
             let scene = Scene::parse(&text).map_err(Error::without_line);
@@ -58,9 +62,10 @@ impl Sequence {
             bail!("output {} is not a folder", folder.display());
         }
         let done = vec![false; plans.len()];
-        let (folder, files) = (folder.to_owned(), (*files).to_owned());
+        let [files, device] = [*files, *device].map(str::to_owned);
+        let folder = folder.to_owned();
         let fluxes = vec![None; plans.len()];
-        Ok(Sequence { folder, plans, done, fluxes, factor: None, files })
+        Ok(Sequence { folder, plans, done, fluxes, factor: None, files, device })
     }
 
     /// Looks which frames are there. Frames with other settings, or beyond the last, are errors:
@@ -215,14 +220,18 @@ impl Sequence {
         if !self.files.is_empty() {
             settings.insert("frame_files".to_owned(), self.files.clone());
         }
+        if !self.device.is_empty() {
+            settings.insert("device".to_owned(), self.device.clone());
+        }
         settings
     }
 }
 
 /// The first setting that a file does not have or has otherwise.
 fn differs(settings: &Attributes, attributes: &Attributes) -> Option<String> {
-    let other = |name: &&String| attributes.get(*name) != settings.get(*name);
-    settings.keys().find(other).cloned()
+    let other = |name: &&str| attributes.get(*name) != settings.get(*name);
+    // Frames of this processor name no device.
+    settings.keys().map(String::as_str).chain(["device"]).find(other).map(str::to_owned)
 }
 
 fn flux_of(attributes: &Attributes) -> Option<(f64, String)> {

@@ -5,6 +5,7 @@ mod times;
 mod viewing;
 
 use crate::answer::{self, Answer};
+use crate::devices::{self, DeviceOption};
 use crate::interrupt::{Interrupted, Keeper};
 use crate::output::Output;
 use crate::overlay::OverlayOptions;
@@ -15,6 +16,7 @@ use crate::{assets, progress};
 use anyhow::{Context, bail};
 use clap::Args;
 use frames::{Origin, Sequence};
+use kerrlight_geodesic::RayDevice;
 use kerrlight_tomo::Error;
 use kerrlight_tomo::memory;
 use kerrlight_tomo::render::RenderError;
@@ -42,6 +44,8 @@ pub struct Movie {
     /// Change a value of the scene, e.g. hole.spin=0.5 or spot.0.phase_deg=90
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     overrides: Vec<String>,
+    #[command(flatten)]
+    device: DeviceOption,
     #[command(flatten)]
     viewing: viewing::Viewing,
     #[command(flatten)]
@@ -77,8 +81,12 @@ impl Movie {
         } else if self.overlay.any() {
             bail!("marks are drawn only into --gif, --apng or --png: give one of them");
         }
+        if let Some(device) = self.device.open()? {
+            film = film.with_device(device);
+        }
         afford(&film, &scene)?;
-        let of = Origin { name: &source.name, text: &text, files: &files.identity };
+        let device = film.device().map_or("", RayDevice::name);
+        let of = Origin { name: &source.name, text: &text, files: &files.identity, device };
         let mut sequence = Sequence::new(&self.output, &of, &times)?;
         for input in iter::once(&self.scene).chain(&files.paths) {
             sequence.spare(input)?;
@@ -90,6 +98,9 @@ impl Movie {
             eprintln!("warning: nothing in this scene moves: all frames are the same");
         }
         sequence.find()?;
+        if let Some(device) = film.device() {
+            devices::announce(device, &film.beside_device());
+        }
         let start = Instant::now();
         let rendered =
             self.render(&mut film, &mut sequence).with_context(|| source.name.clone())?;
@@ -158,7 +169,12 @@ impl Movie {
                     bar.finish_and_clear();
                     return Err(Interrupted(there(sequence)).into());
                 }
-                other => other?,
+                Err(error) => {
+                    let failure = film.device().and_then(RayDevice::failure);
+                    let told = failure.map(|failure| format!("{failure}; {}", there(sequence)));
+                    return Err(told.map_or(error.into(), anyhow::Error::msg));
+                }
+                Ok(frames) => frames,
             };
             unresolved += frames.iter().map(Frame::unresolved).sum::<u64>();
             sequence.write(film, batch, frames)?;

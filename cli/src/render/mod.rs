@@ -9,6 +9,7 @@ mod work;
 
 use crate::answer::{self, Answer};
 use crate::assets;
+use crate::devices::{self, DeviceOption};
 use crate::output::{self, Output};
 use crate::overlay::OverlayOptions;
 use anyhow::{Context, bail};
@@ -62,6 +63,8 @@ pub struct Render {
     /// Where to write a contact sheet, a PNG of all channels with colour bars; `-` for standard output
     #[arg(long, value_name = "FILE.png")]
     sheet: Option<PathBuf>,
+    #[command(flatten)]
+    device: DeviceOption,
     /// Columns of pixels that are traced together; the picture does not depend on it
     #[arg(long, value_name = "N", default_value = "64", hide_short_help = true)]
     #[arg(value_parser = clap::value_parser!(u16).range(1..))]
@@ -77,15 +80,22 @@ impl Render {
         let files = assets::load(&scene, &source.folder, &outputs.all())?;
         source.compare(&files.identity);
         afford(&scene)?;
+        let device = self.device.open()?;
         let start = Instant::now();
         let raster = Raster::new(&scene, files.decoded);
         let mut raster = raster.with_context(|| source.name.clone())?.with_tile(self.tile.into());
+        if let Some(device) = device {
+            raster = raster.with_device(device);
+        }
         let look = self.reduction(&scene, &raster, &outputs)?;
         if self.explain {
             return explain::before(&scene, &raster);
         }
         if self.measure {
             raster = raster.with_meter();
+        }
+        if let Some(device) = raster.device() {
+            devices::announce(device, &raster.beside_device());
         }
         let (name, files) = (source.name.as_str(), files.identity.as_str());
         let work = Work { raster: &raster, scene: &scene, text: &text, name, files };

@@ -44,6 +44,9 @@ impl Work<'_> {
         if !self.files.is_empty() {
             attributes.insert("files".to_owned(), self.files.to_owned());
         }
+        if let Some(device) = self.raster.device() {
+            attributes.insert("device".to_owned(), device.name().to_owned());
+        }
         exr.write_with(|file| {
             let journal = &mut partial.journal;
             let look = look.as_mut();
@@ -60,6 +63,7 @@ impl Work<'_> {
         let (mut journal, _) = Journal::open(memory, "", self.raster.bands())?;
         let summary = self.fill(&mut journal, STOPPED).map_err(|error| match error {
             Error::Render(RenderError::Stopped) => Interrupted(STOPPED.to_owned()).into(),
+            _ if self.device_failure().is_some() => self.told("nothing is kept"),
             other => anyhow::Error::new(other).context(self.name.to_owned()),
         })?;
         let Some(mut look) = look else { return Ok((summary, None)) };
@@ -86,6 +90,16 @@ impl Work<'_> {
         self.raster.summary(journal)
     }
 
+    /// How the graphics device failed, if it did.
+    fn device_failure(&self) -> Option<String> {
+        self.raster.device()?.failure()
+    }
+
+    /// The failure of the device, and what is left.
+    fn told(&self, left: &str) -> anyhow::Error {
+        anyhow::anyhow!("{}; {left}", self.device_failure().unwrap_or_default())
+    }
+
     /// What to tell of a picture that has not been finished.
     fn failed(&self, error: Error, partial: Partial) -> anyhow::Error {
         match error {
@@ -95,6 +109,9 @@ impl Work<'_> {
             Error::Exr(error) => {
                 let context = format!("cannot write {}; {}", partial.shown(), partial.kept());
                 anyhow::Error::new(error).context(context)
+            }
+            _ if self.device_failure().is_some() => {
+                self.told(&format!("{}, or with --device cpu to start over", partial.kept()))
             }
             // The scene is at fault: the same picture will never be.
             other => {

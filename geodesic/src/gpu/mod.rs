@@ -11,4 +11,4 @@ mod tracer;
 
 pub use device::{Adapter, adapter, adapters};
 pub use error::GpuError;
-pub use tracer::{GpuCrossing, GpuEnd, GpuRays, GpuRequest, GpuSample, GpuTracer};
+pub use tracer::GpuTracer;

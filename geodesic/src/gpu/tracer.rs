@@ -3,24 +3,29 @@
 use super::device::{Adapter, Device};
 use super::error::GpuError;
 use super::kernel::{Binding, Program, ROW};
+use crate::error::Error;
 use crate::integrate::outcome::{Outcome, Unresolved};
+use crate::rays::block::{
+    DeviceEnd, DeviceRays, DeviceRequest, DeviceSample, PlaneCrossing, RayDevice,
+};
 use crate::screen::view::View;
 use crate::spacetime::kerr::Kerr;
 use crate::wgsl::{
     self, CROSSING_BYTES, END_BYTES, POINT_BYTES, SAMPLE_BYTES, TASK_BYTES, Task, flags,
 };
+use std::sync::{Mutex, PoisonError};
 
 /// Traces rays on a graphics device, in floats: about six digits.
 ///
 /// ```no_run
-/// use kerrlight_geodesic::gpu::{self, GpuRays, GpuRequest, GpuTracer};
-/// use kerrlight_geodesic::{Inclination, Kerr, Observer, View};
+/// use kerrlight_geodesic::gpu::{self, GpuTracer};
+/// use kerrlight_geodesic::{DeviceRays, DeviceRequest, Inclination, Kerr, Observer, View};
 ///
 /// let tracer = GpuTracer::open(&gpu::adapter(None)?)?;
 /// let hole = Kerr::new(0.9)?;
 /// let view = View::Screen(Observer::at_infinity(Inclination::from_degrees(60.0)?));
-/// let request = GpuRequest { crossings: 1, ..GpuRequest::default() };
-/// let mut rays = GpuRays::default();
+/// let request = DeviceRequest { crossings: 1, ..DeviceRequest::default() };
+/// let mut rays = DeviceRays::default();
 /// tracer.trace(&hole, &view, (&[-6.0], &[2.0]), &request, &mut rays)?;
 /// println!("crosses the equatorial plane at r = {} M", rays.crossings_of(0)[0].radius);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -29,107 +34,7 @@ use crate::wgsl::{
 pub struct GpuTracer {
     device: Device,
     program: Program,
-}
-
-/// What is traced of each ray, beside outcome and number of crossings.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct GpuRequest {
-    /// How many crossings of the equatorial plane are located.
-    pub crossings: usize,
-    /// Samples equidistant in Mino time along the whole ray, both ends included but for those at infinity.
-    pub samples: usize,
-    /// Whether azimuths, delays and directions of escape are computed.
-    pub quadratures: bool,
-    /// 1/r in M⁻¹ at which rays that escape end: 0 for infinity.
-    pub end: f64,
-}
-
-/// How a ray ends.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GpuEnd {
-    /// Unit vector of the direction in which it escapes, if it does; needs `quadratures`.
-    pub exit: [f64; 3],
-    /// What becomes of it; unresolved where floats cannot tell.
-    pub outcome: Outcome,
-    /// What of it cannot be trusted: [`flags`].
-    pub flags: u32,
-    /// Crossings of the equatorial plane along the whole ray.
-    pub crossings: u32,
-    /// Mino time of the whole ray, M⁻¹.
-    pub mino_time: f64,
-    /// Estimated error: relative in radii, radians in azimuths.
-    pub error: f64,
-    /// λ = L/E, in M.
-    pub lambda: f64,
-    /// η = Q/E², in M².
-    pub eta: f64,
-    /// Steps that it took.
-    pub steps: u32,
-}
-
-impl GpuEnd {
-    /// Whether floats vouch for it; if not, trace it again in doubles.
-    pub fn is_trusted(&self) -> bool {
-        self.flags & !flags::MORE_CROSSINGS == 0
-    }
-}
-
-/// Where a ray crosses the equatorial plane.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct GpuCrossing {
-    /// Boyer–Lindquist radius, in M.
-    pub radius: f64,
-    /// Azimuth in radians, continuous along the ray; needs `quadratures`.
-    pub azimuth: f64,
-    /// Mino time since the observer, M⁻¹.
-    pub mino_time: f64,
-    /// t_o − t in M, its finite part for an observer at infinity; needs `quadratures`.
-    pub delay: f64,
-    /// d(1/r)/dτ and d cos θ/dτ.
-    pub rates: [f64; 2],
-}
-
-/// A sample of a ray.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GpuSample {
-    /// Boyer–Lindquist radius, in M.
-    pub radius: f64,
-    /// Polar angle, radians.
-    pub theta: f64,
-    /// Azimuth in radians, continuous along the ray; needs `quadratures`.
-    pub azimuth: f64,
-    /// t_o − t in M, its finite part for an observer at infinity; needs `quadratures`.
-    pub delay: f64,
-}
-
-/// What was found of some rays; memory is reused.
-#[derive(Debug, Default)]
-pub struct GpuRays {
-    ends: Vec<GpuEnd>,
-    crossings: Vec<GpuCrossing>,
-    per_ray: usize,
-    samples: Vec<GpuSample>,
-    samples_per_ray: usize,
-    points: Vec<u8>,
-}
-
-impl GpuRays {
-    /// The ends of all rays.
-    pub fn ends(&self) -> &[GpuEnd] {
-        &self.ends
-    }
-
-    /// The located crossings of ray `k`, in their order.
-    pub fn crossings_of(&self, k: usize) -> &[GpuCrossing] {
-        let count = (self.ends[k].crossings as usize).min(self.per_ray);
-        &self.crossings[k * self.per_ray..][..count]
-    }
-
-    /// The samples of ray `k`: none if it has no outcome.
-    pub fn samples_of(&self, k: usize) -> &[GpuSample] {
-        let count = if self.ends[k].outcome.is_unresolved() { 0 } else { self.samples_per_ray };
-        &self.samples[k * self.samples_per_ray..][..count]
-    }
+    failure: Mutex<Option<GpuError>>,
 }
 
 const SHADER_SELF_TEST: &str = include_str!("self_test.wgsl");
@@ -145,7 +50,7 @@ impl GpuTracer {
         let kinds = bindings(&[], &[], [0; 3]);
         let program =
             Program::new(&device, &wgsl::program(), &["kerr_trace", "kerr_sample"], &kinds)?;
-        Ok(GpuTracer { device, program })
+        Ok(GpuTracer { device, program, failure: Mutex::default() })
     }
 
     /// The name of the device.
@@ -166,14 +71,11 @@ impl GpuTracer {
         hole: &Kerr,
         view: &View,
         (x, y): (&[f64], &[f64]),
-        request: &GpuRequest,
-        rays: &mut GpuRays,
+        request: &DeviceRequest,
+        rays: &mut DeviceRays,
     ) -> Result<(), GpuError> {
         assert_eq!(x.len(), y.len(), "as many y as x");
-        rays.ends.clear();
-        rays.crossings.clear();
-        rays.samples.clear();
-        (rays.per_ray, rays.samples_per_ray) = (request.crossings, request.samples);
+        rays.start(request);
         let task = Task {
             hole: *hole,
             view: *view,
@@ -192,8 +94,8 @@ impl GpuTracer {
     }
 
     /// Rays whose results fit the largest buffer.
-    fn most_rays(&self, request: &GpuRequest) -> usize {
-        let GpuRequest { crossings, samples, .. } = request;
+    fn most_rays(&self, request: &DeviceRequest) -> usize {
+        let DeviceRequest { crossings, samples, .. } = request;
         let widest = (crossings * CROSSING_BYTES).max(samples * SAMPLE_BYTES).max(END_BYTES);
         let rows = u64::from(ROW) * 4096;
         (self.device.largest / widest as u64).clamp(1, rows) as usize
@@ -203,9 +105,9 @@ impl GpuTracer {
         &self,
         task: Task,
         (x, y): (&[f64], &[f64]),
-        rays: &mut GpuRays,
+        rays: &mut DeviceRays,
     ) -> Result<(), GpuError> {
-        wgsl::point_bytes(x, y, &mut rays.points);
+        let points = wgsl::point_bytes(x, y);
         let uniform = task.bytes();
         let count = x.len();
         let sizes = [
@@ -213,17 +115,42 @@ impl GpuTracer {
             count * task.crossings as usize * CROSSING_BYTES,
             count * task.samples as usize * SAMPLE_BYTES,
         ];
-        let bindings = bindings(&uniform, &rays.points, sizes.map(|size| size as u64));
+        let bindings = bindings(&uniform, &points, sizes.map(|size| size as u64));
         let entries: &[usize] = if task.samples > 0 { &[0, 1] } else { &[0] };
         let outputs = self.program.run(&self.device, entries, task.rays, &bindings)?;
         let start = task.delay_start();
         let sized = |k: usize| &outputs[k][..sizes[k]];
-        rays.ends.extend(sized(0).chunks_exact(END_BYTES).map(end));
-        let crossings = sized(1).chunks_exact(CROSSING_BYTES);
-        rays.crossings.extend(crossings.map(|bytes| crossing(bytes, start)));
-        let samples = sized(2).chunks_exact(SAMPLE_BYTES);
-        rays.samples.extend(samples.map(|bytes| sample(bytes, start)));
+        rays.extend(
+            sized(0).chunks_exact(END_BYTES).map(end),
+            sized(1).chunks_exact(CROSSING_BYTES).map(|bytes| crossing(bytes, start)),
+            sized(2).chunks_exact(SAMPLE_BYTES).map(|bytes| sample(bytes, start)),
+        );
         Ok(())
+    }
+}
+
+impl RayDevice for GpuTracer {
+    fn name(&self) -> &str {
+        self.name()
+    }
+
+    fn trace(
+        &self,
+        hole: &Kerr,
+        view: &View,
+        points: (&[f64], &[f64]),
+        request: &DeviceRequest,
+        rays: &mut DeviceRays,
+    ) -> Result<(), Error> {
+        GpuTracer::trace(self, hole, view, points, request, rays).map_err(|failure| {
+            *self.failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(failure);
+            Error::out_of_range("graphics device", f64::NAN, "one that does not fail")
+        })
+    }
+
+    fn failure(&self) -> Option<String> {
+        let failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
+        failure.as_ref().map(ToString::to_string)
     }
 }
 
@@ -240,7 +167,7 @@ fn float(bytes: &[u8], at: usize) -> f64 {
     f64::from(f32::from_bits(word(bytes, at)))
 }
 
-fn end(bytes: &[u8]) -> GpuEnd {
+fn end(bytes: &[u8]) -> DeviceEnd {
     let flagged = word(bytes, 4);
     let outcome = match word(bytes, 3) {
         _ if flagged & flags::NEAR_CRITICAL != 0 => Outcome::Unresolved(Unresolved::PhotonOrbit),
@@ -249,10 +176,10 @@ fn end(bytes: &[u8]) -> GpuEnd {
         1 => Outcome::Escaped,
         _ => Outcome::Unresolved(Unresolved::StepLimit),
     };
-    GpuEnd {
+    DeviceEnd {
         exit: [0, 1, 2].map(|k| float(bytes, k)),
         outcome,
-        flags: flagged,
+        is_trusted: flagged & !flags::MORE_CROSSINGS == 0,
         crossings: word(bytes, 5),
         mino_time: float(bytes, 6),
         error: float(bytes, 7),
@@ -262,18 +189,19 @@ fn end(bytes: &[u8]) -> GpuEnd {
     }
 }
 
-fn crossing(bytes: &[u8], delay_start: f64) -> GpuCrossing {
-    GpuCrossing {
+fn crossing(bytes: &[u8], delay_start: f64) -> PlaneCrossing {
+    PlaneCrossing {
         radius: float(bytes, 0),
         azimuth: float(bytes, 1),
         mino_time: float(bytes, 2),
         delay: float(bytes, 3) + delay_start,
         rates: [float(bytes, 4), float(bytes, 5)],
+        error: float(bytes, 6),
     }
 }
 
-fn sample(bytes: &[u8], delay_start: f64) -> GpuSample {
-    GpuSample {
+fn sample(bytes: &[u8], delay_start: f64) -> DeviceSample {
+    DeviceSample {
         radius: float(bytes, 0),
         theta: float(bytes, 1),
         azimuth: float(bytes, 2),

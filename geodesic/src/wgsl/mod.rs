@@ -70,7 +70,8 @@
 //! `KerrEnd`: direction of escape (3 × f32 at 0), outcome (u32 at 12: 0 captured, 1 escaped, 3 lost), flags (u32 at 16),
 //! number of crossings (u32 at 20), Mino time of the whole ray (f32 at 24), estimated error (f32 at 28: relative in r,
 //! radians in φ), λ and η (f32 at 32 and 36), steps (u32 at 40). `KerrCrossing`: r, φ, Mino time, delay, dw/dτ, d cos θ/dτ
-//! (f32 at 0, 4, … 20; 8 bytes unused). Delays lack the tortoise coordinate of the observer, r* = r + 2 ln r + …, which
+//! and the estimated
+//! error of that ray (f32 at 0, 4, … 24; 4 bytes unused). Delays lack the tortoise coordinate of the observer, r* = r + 2 ln r + …, which
 //! [`Task::delay_start`] has in doubles.
 
 use crate::screen::view::View;
@@ -215,11 +216,11 @@ fn push_wide<const N: usize>(words: &mut Vec<u32>, numbers: [f64; N]) {
 }
 
 /// The bytes of points (`x[k]`, `y[k]`): (α, β) in M of a screen, or places in a camera's picture plane.
-pub fn point_bytes(x: &[f64], y: &[f64], bytes: &mut Vec<u8>) {
-    bytes.clear();
-    bytes.reserve(x.len() * POINT_BYTES);
+pub fn point_bytes(x: &[f64], y: &[f64]) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(x.len() * POINT_BYTES);
     for (x, y) in x.iter().zip(y) {
         let ([x, x_low], [y, y_low]) = (two_floats(*x), two_floats(*y));
         bytes.extend([x, y, x_low, y_low].into_iter().flat_map(f32::to_le_bytes));
     }
+    bytes
 }

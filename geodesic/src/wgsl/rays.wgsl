@@ -33,7 +33,8 @@ struct KerrCrossing {
     delay: f32,
     rate: f32,           // dw/dtau
     polar_rate: f32,     // d cos theta/dtau
-    pad: vec2<f32>,
+    error: f32,          // estimate: relative in r, radians in azimuth
+    pad: f32,
 }
 
 @group(0) @binding(0) var<uniform> kerr_task: KerrTask;
@@ -155,7 +156,8 @@ fn kerr_cross(
         point.delay,
         point.rate,
         point.velocity.z,
-        vec2<f32>(0.0),
+        kerr_error(ray, (*end).steps),
+        0.0,
     );
 }
 

@@ -1,9 +1,9 @@
 //! Rays of a device against those of the tracer in doubles.
 
 use crate::classes::Picture;
-use kerrlight_geodesic::gpu::{GpuRays, GpuRequest, GpuTracer};
+use kerrlight_geodesic::gpu::GpuTracer;
 use kerrlight_geodesic::vector::distance;
-use kerrlight_geodesic::{Outcome, Path, PathPoint, Quantities, Tracer};
+use kerrlight_geodesic::{DeviceRays, DeviceRequest, Outcome, Path, PathPoint, Quantities, Tracer};
 
 /// Crossings that are compared, and samples.
 const CROSSINGS: usize = 4;
@@ -47,18 +47,18 @@ pub fn quantile(values: &mut [f64], share: f64) -> f64 {
 pub fn compare(tracer: &GpuTracer, picture: &Picture, errors: &mut Errors) {
     let Picture { hole, view, x, y } = picture;
     let request =
-        GpuRequest { crossings: CROSSINGS, samples: SAMPLES, quadratures: true, end: 0.0 };
-    let mut rays = GpuRays::default();
+        DeviceRequest { crossings: CROSSINGS, samples: SAMPLES, quadratures: true, end: 0.0 };
+    let mut rays = DeviceRays::default();
     tracer.trace(hole, view, (x, y), &request, &mut rays).unwrap();
     let (mut path, exact) = (Path::new(), Tracer::new(1e-12).unwrap());
     for (k, (x, y)) in x.iter().zip(y).enumerate() {
         let Ok(ray) = view.ray(hole, *x, *y) else {
-            assert!(!rays.ends()[k].is_trusted(), "no photon arrives at ({x}, {y})");
+            assert!(!rays.ends()[k].is_trusted, "no photon arrives at ({x}, {y})");
             continue;
         };
         errors.rays += 1;
         exact.trace(hole, &ray, Quantities::ALL, &mut path);
-        if !rays.ends()[k].is_trusted() {
+        if !rays.ends()[k].is_trusted {
             errors.flagged += 1;
             continue;
         }
@@ -71,7 +71,7 @@ pub fn compare(tracer: &GpuTracer, picture: &Picture, errors: &mut Errors) {
 }
 
 /// Compares ray `k`; whether its fate and its number of crossings are right.
-fn agree(rays: &GpuRays, k: usize, path: &Path, errors: &mut Errors) -> bool {
+fn agree(rays: &DeviceRays, k: usize, path: &Path, errors: &mut Errors) -> bool {
     let end = &rays.ends()[k];
     errors.steps.push(f64::from(end.steps));
     if end.outcome != path.outcome() || end.crossings as usize != path.equatorial_crossings().len()
@@ -94,7 +94,7 @@ fn agree(rays: &GpuRays, k: usize, path: &Path, errors: &mut Errors) -> bool {
 }
 
 /// Samples are compared at their own Mino times; the last one of a captured ray lies on the horizon.
-fn samples(rays: &GpuRays, k: usize, path: &Path, errors: &mut Errors) {
+fn samples(rays: &DeviceRays, k: usize, path: &Path, errors: &mut Errors) {
     let captured = path.outcome() == Outcome::Captured;
     let n = SAMPLES as f64;
     let at_infinity = path.at(0.0).inverse_radius == 0.0;

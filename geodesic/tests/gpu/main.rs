@@ -7,8 +7,8 @@ mod compare;
 
 use classes::{Class, classes, critical_factor};
 use compare::{Errors, compare, quantile};
-use kerrlight_geodesic::gpu::{self, GpuError, GpuRays, GpuRequest, GpuTracer};
-use kerrlight_geodesic::{Inclination, Kerr, Observer, View};
+use kerrlight_geodesic::gpu::{self, GpuError, GpuTracer};
+use kerrlight_geodesic::{DeviceRays, DeviceRequest, Inclination, Kerr, Observer, View};
 use std::sync::OnceLock;
 
 /// The first device; where there is none a test says so and passes.
@@ -59,7 +59,7 @@ fn code_errors_by_class() {
 #[test]
 fn code_near_critical_rays_are_flagged_not_wrong() {
     let Some(tracer) = device() else { return };
-    let mut rays = GpuRays::default();
+    let mut rays = DeviceRays::default();
     for (spin, degrees) in [(0.0, 60.0), (0.94, 17.0), (0.998, 85.0)] {
         let hole = Kerr::new(spin).unwrap();
         let view = View::Screen(Observer::at_infinity(Inclination::from_degrees(degrees).unwrap()));
@@ -76,13 +76,13 @@ fn code_near_critical_rays_are_flagged_not_wrong() {
                 }
             }
         }
-        tracer.trace(&hole, &view, (&x, &y), &GpuRequest::default(), &mut rays).unwrap();
+        tracer.trace(&hole, &view, (&x, &y), &DeviceRequest::default(), &mut rays).unwrap();
         for (k, end) in rays.ends().iter().enumerate() {
             let power = (k / 2) % 13 + 1;
             let captured = end.outcome == kerrlight_geodesic::Outcome::Captured;
-            assert!(!end.is_trusted() || captured == inside[k], "1e-{power}: {end:?}");
-            assert!(end.is_trusted() || power > 6, "1e-{power}: {end:?}");
-            assert!(!end.is_trusted() || power < 12, "1e-{power}: {end:?}");
+            assert!(!end.is_trusted || captured == inside[k], "1e-{power}: {end:?}");
+            assert!(end.is_trusted || power > 6, "1e-{power}: {end:?}");
+            assert!(!end.is_trusted || power < 12, "1e-{power}: {end:?}");
         }
     }
 }

@@ -6,6 +6,8 @@ use super::{Progress, Raster, Rendered};
 use crate::Error;
 use crate::scene::Scene;
 use crate::transport::Assets;
+use kerrlight_geodesic::RayDevice;
+use std::sync::Arc;
 
 /// A film of a scene.
 #[derive(Debug)]
@@ -68,6 +70,21 @@ impl Film {
     /// Whether anything in the scene changes with time.
     pub fn changes(&self) -> bool {
         self.camera_moves() || self.raster.scene().changes()
+    }
+
+    /// The same with rays traced on a device: see [`Raster::with_device`].
+    pub fn with_device(self, device: Arc<dyn RayDevice>) -> Self {
+        Film { raster: self.raster.with_device(device) }
+    }
+
+    /// The device on which rays are traced, if it is not this processor.
+    pub fn device(&self) -> Option<&dyn RayDevice> {
+        self.raster.device()
+    }
+
+    /// What of the scene is traced on this processor even so.
+    pub fn beside_device(&self) -> Vec<&'static str> {
+        self.raster.beside_device()
     }
 
     /// Names of the channels.

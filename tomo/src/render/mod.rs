@@ -28,9 +28,10 @@ use crate::image::exr::Layout;
 use crate::scene::{Rings, Scene};
 use crate::transport::{Assets, Meter, PreparedScene, RayResult, Scratch};
 use grid::Grid;
+use kerrlight_geodesic::RayDevice;
 use rayon::prelude::*;
 use rings::{Resolver, Square};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use tally::{Tally, own_unit};
 
 /// Told how many more rows of pixels are done; returns whether to go on.
@@ -86,6 +87,9 @@ const TRIAL: usize = 64;
 /// Columns of a tile: with the rows of a band a block of rays.
 const TILE: usize = 64;
 
+/// The same for devices, which take many rays at a time.
+const DEVICE_TILE: usize = 2048;
+
 /// What resolves photon rings, if the scene has them resolved.
 fn resolver(scene: &Scene, prepared: &PreparedScene) -> Option<Resolver> {
     match scene.screen.rings {
@@ -115,6 +119,23 @@ impl Raster {
     /// The same with tiles of `columns` pixels; no pixel depends on it.
     pub fn with_tile(self, columns: usize) -> Self {
         Raster { tile: columns.max(1), ..self }
+    }
+
+    /// The same with rays traced on a device, in its precision, and with tiles wide enough for it. Rays that it does not
+    /// vouch for, and what [`beside_device`](Self::beside_device) lists, are traced on this processor.
+    pub fn with_device(self, device: Arc<dyn RayDevice>) -> Self {
+        let prepared = self.prepared.with_device(device);
+        Raster { prepared, tile: self.tile.max(DEVICE_TILE), ..self }
+    }
+
+    /// The device on which rays are traced, if it is not this processor.
+    pub fn device(&self) -> Option<&dyn RayDevice> {
+        self.prepared.tracer().device()
+    }
+
+    /// What of the scene is traced on this processor even so.
+    pub fn beside_device(&self) -> Vec<&'static str> {
+        self.prepared.beside_device()
     }
 
     /// The same with a meter of the time that its parts take.
@@ -193,7 +214,10 @@ impl Raster {
     pub fn identity(&self) -> String {
         let version = env!("CARGO_PKG_VERSION");
         let (scene, names) = (self.scene.to_toml(), self.names());
-        format!("kerrlight {version}\n{scene}\n{names:?}\nin {:e} scene units\n", self.unit)
+        let device =
+            self.device().map_or(String::new(), |device| format!("on {}\n", device.name()));
+        let unit = self.unit;
+        format!("kerrlight {version}\n{scene}\n{names:?}\nin {unit:e} scene units\n{device}")
     }
 
     /// Names of the channels.

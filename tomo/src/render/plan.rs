@@ -166,6 +166,10 @@ fn how(prepared: &PreparedScene) -> &'static str {
     if !prepared.has_lensing() {
         return "straight lines: lensing is off";
     }
+    if tracer.device().is_some() {
+        return "on a graphics device in floats; step by step on this processor next to the critical \
+                curve and where a path is needed";
+    }
     match (tracer.closed_form(), request.paths) {
         (Some(_), true) => {
             "closed form on SIMD lanes; step by step next to the critical curve and where a spot, a \

@@ -14,8 +14,9 @@ use crate::emission::sky::{Panorama, SkyModel};
 use crate::scene::Scene;
 use crate::volume::VolumeFile;
 use kerrlight_geodesic::{
-    BlockRequest, BlockTracer, Inclination, Kerr, Observer, Quantities, View,
+    BlockRequest, BlockTracer, Inclination, Kerr, Observer, Quantities, RayDevice, View,
 };
+use std::sync::Arc;
 
 /// A scene with everything computed that does not depend on the ray.
 ///
@@ -185,6 +186,29 @@ impl PreparedScene {
         }
         self.time = scene.observer.time;
         Ok(())
+    }
+
+    /// The same scene with rays traced on a device: see [`BlockTracer::with_device`].
+    pub fn with_device(self, device: Arc<dyn RayDevice>) -> Self {
+        PreparedScene { tracer: self.tracer.with_device(device), ..self }
+    }
+
+    /// What is traced on this processor where rays are traced on a device.
+    pub fn beside_device(&self) -> Vec<&'static str> {
+        if !self.optics.lensing {
+            return vec!["everything (lensing is off)"];
+        }
+        let whole = self.tracer.closed_form().is_none();
+        let nodes = !self.request.nodes.is_empty();
+        let parts = [
+            (nodes && whole, "everything (gas before a camera or a near observer)"),
+            (nodes && !whole, "points in gas"),
+            (self.media.have_cells(), "rays through volumes"),
+            (self.meshes.is_some(), "rays that may meet meshes"),
+            (!self.spots.is_empty(), "paths that may meet spots"),
+            (self.request.beams, "ray bundles on the sky"),
+        ];
+        parts.into_iter().filter_map(|(needed, what)| needed.then_some(what)).collect()
     }
 
     /// The same scene with every spot and every triangle asked along every ray, without a hierarchy:

@@ -157,7 +157,7 @@ impl BlockTracer {
     }
 
     /// Finds the rays whose path is needed beside the closed form.
-    fn probe<V: RayVisitor>(
+    pub(super) fn probe<V: RayVisitor>(
         &self,
         screen: ScreenRays<'_>,
         probes: &NodeRequest,
@@ -209,7 +209,7 @@ impl BlockTracer {
 
     /// Hands the nodes of all rays inside a sphere to the visitor, and finer ones of those rays
     /// that need them.
-    fn refine_in_closed_form<V: RayVisitor>(
+    pub(super) fn refine_in_closed_form<V: RayVisitor>(
         &self,
         screen: ScreenRays<'_>,
         (number, sphere): (usize, &SphereNodes),

@@ -2,6 +2,8 @@
 //! form on SIMD lanes where that keeps its digits, else step by step.
 
 mod closed_form;
+mod device;
+mod on_device;
 mod request;
 mod samples;
 mod stepped;
@@ -9,6 +11,7 @@ mod traced;
 mod tracer;
 mod visitor;
 
+pub use device::{DeviceEnd, DeviceRays, DeviceRequest, DeviceSample, RayDevice};
 pub use request::{BlockRequest, SphereNodes};
 pub use traced::{PathOfRay, PlaneCrossing, TracedRay};
 pub use tracer::{BlockTracer, RayBlock};
@@ -38,9 +41,10 @@ impl BlockTracer {
         block.rays.clear();
         block.plane.clear();
         visitor.works_on(Work::Rays);
-        match self.closed_form() {
-            Some(observer) => self.trace_in_closed_form(observer, job, block, visitor)?,
-            None => {
+        match (&self.device, self.closed_form()) {
+            (Some(device), _) => self.trace_on_device(&**device, job, block, visitor)?,
+            (None, Some(observer)) => self.trace_in_closed_form(observer, job, block, visitor)?,
+            (None, None) => {
                 check_columns(alpha, beta)?;
                 let unknown = TracedRay { stepped: true, ..TracedRay::default() };
                 block.rays.resize(alpha.len(), unknown);

@@ -1,5 +1,6 @@
 //! The tracer of a view, and the memory of its blocks.
 
+use super::device::{DeviceRays, RayDevice};
 use super::request::BlockRequest;
 use super::traced::{PlaneCrossing, SampleColumns, TracedRay};
 use crate::analytic::ClosedForm;
@@ -13,6 +14,7 @@ use crate::screen::observer::{Observer, Ray};
 use crate::screen::view::View;
 use crate::simd::{Crossings, NEAREST, Nodes, Samples};
 use crate::spacetime::kerr::Kerr;
+use std::sync::Arc;
 
 /// Traces the rays of one view of a hole. Made once, it serves any number of blocks and threads.
 ///
@@ -57,6 +59,7 @@ pub struct BlockTracer {
     pub(super) hole: Kerr,
     pub(super) view: View,
     pub(super) tracer: Tracer,
+    pub(super) device: Option<Arc<dyn RayDevice>>,
     closed_form: bool,
 }
 
@@ -67,6 +70,7 @@ pub struct RayBlock {
     pub(super) plane: Vec<PlaneCrossing>,
     pub(super) crossings: Crossings,
     pub(super) nodes: Nodes,
+    pub(super) device: DeviceRays,
     /// Ends of rays that escape.
     pub(super) exits: Samples,
     /// Samples of whole rays: of those that fall, or of all from a finite radius, and of the others.
@@ -120,7 +124,8 @@ impl BlockTracer {
         let allowed = "an integrator in Mino time";
         let method =
             integrator.method().ok_or(Error::out_of_range("integrator", f64::NAN, allowed))?;
-        Ok(BlockTracer { hole, view, tracer: Tracer::with_method(method, tolerance)?, closed_form })
+        let tracer = Tracer::with_method(method, tolerance)?;
+        Ok(BlockTracer { hole, view, tracer, device: None, closed_form })
     }
 
     /// The hole.
@@ -136,6 +141,18 @@ impl BlockTracer {
     /// The same rays of another view.
     pub fn with_view(self, view: View) -> Self {
         BlockTracer { view, ..self }
+    }
+
+    /// The same rays, traced on a device: their outcomes, crossings and directions of escape have its digits. Rays that
+    /// it does not vouch for are traced step by step on this processor, and so is whatever needs a path; nodes inside
+    /// spheres are those of the closed form.
+    pub fn with_device(self, device: Arc<dyn RayDevice>) -> Self {
+        BlockTracer { device: Some(device), ..self }
+    }
+
+    /// The device on which rays are traced, if it is not this processor.
+    pub fn device(&self) -> Option<&dyn RayDevice> {
+        self.device.as_deref()
     }
 
     /// The tracer of rays that are traced step by step.

@@ -1,0 +1,148 @@
+//! `kerrlight devices`, and the device that `--device` names.
+
+use crate::answer::Answer;
+use clap::Args;
+use kerrlight_geodesic::RayDevice;
+use serde_json::{Value, json};
+use std::sync::Arc;
+
+/// Arguments of `kerrlight devices`.
+#[derive(Debug, Args)]
+pub struct Devices {}
+
+/// Where rays are traced.
+#[derive(Debug, Args)]
+pub struct DeviceOption {
+    /// Where rays are traced: `cpu`, `gpu` (the first graphics device, in floats), or a name or
+    /// number of `kerrlight devices` [default: cpu]
+    #[arg(long = "device", value_name = "DEVICE")]
+    name: Option<String>,
+}
+
+/// A graphics device as it is listed.
+struct Listed {
+    name: String,
+    kind: &'static str,
+    interface: &'static str,
+    driver: String,
+    /// Bytes of the largest buffer that a shader may see.
+    largest_buffer: u64,
+    /// Invocations of the largest workgroup, and bytes of its memory.
+    workgroup: (u32, u32),
+}
+
+impl Devices {
+    /// The processor and all graphics devices.
+    pub fn run(&self) -> anyhow::Result<Answer> {
+        let threads = rayon::current_num_threads();
+        let devices = graphics::listed();
+        let mut text = format!("cpu  {threads} threads\n");
+        for (number, device) in devices.iter().enumerate() {
+            text += &format!("{number:<4} {}\n", device.line());
+        }
+        text += match devices.is_empty() {
+            true => graphics::ABSENT,
+            false => "--device gpu takes the first graphics device, --device NAME another one\n",
+        };
+        let devices: Vec<Value> = devices.iter().map(Listed::json).collect();
+        Ok(Answer::text(text).with("threads", threads).with("devices", devices))
+    }
+}
+
+impl Listed {
+    fn line(&self) -> String {
+        let Listed { name, kind, interface, driver, largest_buffer, workgroup } = self;
+        let (invocations, memory) = (workgroup.0, workgroup.1 >> 10);
+        let limits = format!(
+            "buffers up to {} MiB, workgroups of {invocations} with {memory} KiB",
+            largest_buffer >> 20
+        );
+        format!("{name}: {kind}, {interface}, driver {driver}; {limits}")
+    }
+
+    fn json(&self) -> Value {
+        json!({
+            "name": self.name,
+            "kind": self.kind,
+            "interface": self.interface,
+            "driver": self.driver,
+            "largest_buffer_bytes": self.largest_buffer,
+            "workgroup_invocations": self.workgroup.0,
+            "workgroup_bytes": self.workgroup.1,
+        })
+    }
+}
+
+impl DeviceOption {
+    /// The device, opened; `None` is this processor.
+    pub fn open(&self) -> anyhow::Result<Option<Arc<dyn RayDevice>>> {
+        match self.name.as_deref() {
+            None | Some("cpu") => Ok(None),
+            Some("gpu") => graphics::open(None).map(Some),
+            Some(name) => graphics::open(Some(name)).map(Some),
+        }
+    }
+}
+
+/// Says where rays are traced, and what of the scene is not.
+pub fn announce(device: &dyn RayDevice, rest: &[&str]) {
+    let rest = match rest {
+        [] => String::new(),
+        some => format!("; on this processor: {}", some.join(", ")),
+    };
+    eprintln!("rays on {} in floats, about six digits{rest}", device.name());
+}
+
+#[cfg(feature = "gpu")]
+mod graphics {
+    use super::Listed;
+    use anyhow::Context;
+    use kerrlight_geodesic::RayDevice;
+    use kerrlight_geodesic::gpu::{self, GpuError, GpuTracer};
+    use std::sync::Arc;
+
+    pub const ABSENT: &str = "no graphics device: install the driver of your card, or Mesa's \
+                              software device\n(Debian, Ubuntu: apt install mesa-vulkan-drivers)\n";
+
+    pub fn listed() -> Vec<Listed> {
+        let list = |adapter: &gpu::Adapter| Listed {
+            name: adapter.name().to_owned(),
+            kind: adapter.kind(),
+            interface: adapter.interface(),
+            driver: adapter.driver(),
+            largest_buffer: adapter.largest_buffer(),
+            workgroup: adapter.workgroup(),
+        };
+        gpu::adapters().iter().map(list).collect()
+    }
+
+    pub fn open(name: Option<&str>) -> anyhow::Result<Arc<dyn RayDevice>> {
+        let opened: Result<_, GpuError> =
+            gpu::adapter(name).and_then(|adapter| GpuTracer::open(&adapter));
+        let tracer = opened.with_context(|| format!("--device {}", name.unwrap_or("gpu")))?;
+        Ok(Arc::new(tracer))
+    }
+}
+
+#[cfg(not(feature = "gpu"))]
+mod graphics {
+    use super::Listed;
+    use anyhow::bail;
+    use kerrlight_geodesic::RayDevice;
+    use std::sync::Arc;
+
+    pub const ABSENT: &str = "graphics devices are not looked for: this kerrlight was built \
+                              without them\n(cargo build --release --features gpu)\n";
+
+    pub fn listed() -> Vec<Listed> {
+        Vec::new()
+    }
+
+    pub fn open(name: Option<&str>) -> anyhow::Result<Arc<dyn RayDevice>> {
+        bail!(
+            "--device {}: this kerrlight was built without graphics devices, only `cpu` is there: \
+             build it with `cargo build --release --features gpu`",
+            name.unwrap_or("gpu")
+        )
+    }
+}
