@@ -199,6 +199,8 @@ fn regress_geodesic_imports_from_what_stands_before() {
         "simd",
         "matter",
         "rays",
+        "wgsl",
+        "gpu",
         "capi",
     ];
     assert_eq!(house.rooms, expected);
