@@ -63,20 +63,10 @@ fn cases(results: &Value) -> &Vec<Value> {
     results["cases"].as_array().unwrap()
 }
 
-#[test]
-fn exact_cases_are_whole_and_not_done_twice() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    experiment(at, &[]);
-    let printed = succeed(at, &["compare", "rates.toml", "-o", "out"]);
-    assert!(printed.contains("| rate | PSNR (dB) |"), "{printed}");
-    let lines: Vec<&str> = printed.lines().collect();
-    let [worth, look_at] = lines[lines.len() - 2..] else { panic!("{printed}") };
-    assert!(worth.starts_with("4 of 4 cases done; PSNR (dB) from "), "{worth}");
-    assert_eq!(look_at, "out/report.html");
-    let first = results(&at.join("out"));
-    assert_eq!(cases(&first).len(), 4);
-    for case in cases(&first) {
+/// What the page, the table and every case of a finished comparison hold.
+fn check_comparison(at: &Path, first: &Value) {
+    assert_eq!(cases(first).len(), 4);
+    for case in cases(first) {
         assert_eq!(case["status"], "done");
         assert!(case["results"]["psnr_db"].as_f64().unwrap() > 20.0);
         assert!(case["results"]["peak_memory_mib"].as_f64().unwrap() > 1.0);
@@ -95,6 +85,21 @@ fn exact_cases_are_whole_and_not_done_twice() {
     assert!((1.4..1.8).contains(&ratio), "{ratio}");
     let table = std::fs::read_to_string(at.join("out/results.csv")).unwrap();
     assert_eq!(table.lines().count(), 5);
+}
+
+#[test]
+fn exact_cases_are_whole_and_not_done_twice() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    experiment(at, &[]);
+    let printed = succeed(at, &["compare", "rates.toml", "-o", "out"]);
+    assert!(printed.contains("| rate | PSNR (dB) |"), "{printed}");
+    let lines: Vec<&str> = printed.lines().collect();
+    let [worth, look_at] = lines[lines.len() - 2..] else { panic!("{printed}") };
+    assert!(worth.starts_with("4 of 4 cases done; PSNR (dB) from "), "{worth}");
+    assert_eq!(look_at, "out/report.html");
+    let first = results(&at.join("out"));
+    check_comparison(at, &first);
     // A full folder is not written to by accident; what is done is not done again.
     let refused = fail(at, &["compare", "rates.toml", "-o", "out"]);
     assert!(refused.contains("--resume"), "{refused}");

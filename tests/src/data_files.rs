@@ -112,15 +112,12 @@ const NONE: [f32; 3] = [0.0, 0.0, 0.0];
 const PLACEHOLDER: [f32; 3] = [0.0, 0.0, f32::INFINITY];
 const NAN: [f32; 3] = [f32::NAN, f32::NAN, 0.0];
 
-/// What the releases, their pipelines and the programs that flag them bring, made of one observation.
-#[test]
-#[ignore = "long"]
-fn exact_every_kind_of_published_visibilities_is_fitted() {
-    let (folder, data) = (tempfile::tempdir().unwrap(), measured());
-    let of_jcmt: Vec<bool> =
-        data.rows.iter().map(|row| data.names(row).contains(&"JCMT")).collect();
-    type Change<'a> = Box<dyn Fn(usize, &mut [[f32; 3]; 4]) + 'a>;
-    let cases: Vec<(&str, Change<'_>)> = vec![
+/// What is done to the four products of a row, whose number is given.
+type Change<'a> = Box<dyn Fn(usize, &mut [[f32; 3]; 4]) + 'a>;
+
+/// What is missing or marked in files of the releases, their pipelines and the programs that flag them.
+fn changes(of_jcmt: &[bool]) -> Vec<(&'static str, Change<'_>)> {
+    vec![
         ("full polarisation", Box::new(|_, _| ())),
         ("no cross hands", Box::new(|_, p| (p[2], p[3]) = (NONE, NONE))),
         (
@@ -167,7 +164,17 @@ fn exact_every_kind_of_published_visibilities_is_fitted() {
                 }
             }),
         ),
-    ];
+    ]
+}
+
+/// What the releases, their pipelines and the programs that flag them bring, made of one observation.
+#[test]
+#[ignore = "long"]
+fn exact_every_kind_of_published_visibilities_is_fitted() {
+    let (folder, data) = (tempfile::tempdir().unwrap(), measured());
+    let of_jcmt: Vec<bool> =
+        data.rows.iter().map(|row| data.names(row).contains(&"JCMT")).collect();
+    let cases = changes(&of_jcmt);
     let path = folder.path().join("data.uvfits");
     for (k, (name, change)) in cases.iter().enumerate() {
         std::fs::write(&path, altered(&data, change)).unwrap();

@@ -3,7 +3,7 @@
 use crate::film::STARS;
 use crate::support::{root, scene};
 use kerrlight_geodesic::vector::dot;
-use kerrlight_geodesic::{Kerr, footprint};
+use kerrlight_geodesic::{Camera, Kerr, footprint};
 use kerrlight_tomo::emission::sky::SkyModel;
 use kerrlight_tomo::render::Film;
 use kerrlight_tomo::scene::Scene;
@@ -29,25 +29,21 @@ fn step_to(sky: &footprint::Sky, star: [f64; 3]) -> Plane {
     [(p * map[1][1] - q * map[1][0]) / det, (q * map[0][0] - p * map[0][1]) / det]
 }
 
-/// All images of stars in a frame, by Newton's method from every pixel whose beam covers a star.
-fn images(scene: &Scene, stars: &[([f64; 3], f64)]) -> Vec<Image> {
-    let hole = Kerr::new(scene.hole.spin).unwrap();
-    let config = scene.camera.as_ref().unwrap();
-    let camera = config.camera(&hole, scene.observer.time).unwrap();
-    let (width, height) = (scene.screen.width as usize, scene.screen.rows() as usize);
-    let size = scene.pixel_size();
-    let middle = [0.5 * width as f64, 0.5 * height as f64];
-    let beams = |places: &[Plane]| {
-        let [x, y] = [0, 1].map(|c| places.iter().map(|p| p[c]).collect::<Vec<f64>>());
-        footprint::of_camera(&camera, &x, &y, 1e-9, 0).unwrap().sky
-    };
-    let center = |k: usize| {
-        let (column, row) = ((k % width) as f64 + 0.5, (k / width) as f64 + 0.5);
-        [(column - middle[0]) * size, (middle[1] - row) * size]
-    };
-    let centers: Vec<Plane> = (0..width * height).map(center).collect();
-    let mut found: Vec<(usize, Plane)> = Vec::new();
-    for (sky, place) in beams(&centers).iter().zip(&centers) {
+/// The beams of points of a camera's picture on the sky.
+fn beams(camera: &Camera, places: &[Plane]) -> Vec<Option<footprint::Sky>> {
+    let [x, y] = [0, 1].map(|c| places.iter().map(|p| p[c]).collect::<Vec<f64>>());
+    footprint::of_camera(camera, &x, &y, 1e-9, 0).unwrap().sky
+}
+
+/// The stars that pixels' beams cover, and where in the picture they may be.
+fn covered(
+    camera: &Camera,
+    centers: &[Plane],
+    size: f64,
+    stars: &[([f64; 3], f64)],
+) -> Vec<(usize, Plane)> {
+    let mut found = Vec::new();
+    for (sky, place) in beams(camera, centers).iter().zip(centers) {
         let Some(sky) = sky else { continue };
         for (star, (direction, _)) in stars.iter().enumerate() {
             if dot(*direction, sky.direction) > 0.9 {
@@ -58,10 +54,27 @@ fn images(scene: &Scene, stars: &[([f64; 3], f64)]) -> Vec<Image> {
             }
         }
     }
+    found
+}
+
+/// All images of stars in a frame, by Newton's method from every pixel whose beam covers a star.
+fn images(scene: &Scene, stars: &[([f64; 3], f64)]) -> Vec<Image> {
+    let hole = Kerr::new(scene.hole.spin).unwrap();
+    let config = scene.camera.as_ref().unwrap();
+    let camera = config.camera(&hole, scene.observer.time).unwrap();
+    let (width, height) = (scene.screen.width as usize, scene.screen.rows() as usize);
+    let size = scene.pixel_size();
+    let middle = [0.5 * width as f64, 0.5 * height as f64];
+    let center = |k: usize| {
+        let (column, row) = ((k % width) as f64 + 0.5, (k / width) as f64 + 0.5);
+        [(column - middle[0]) * size, (middle[1] - row) * size]
+    };
+    let centers: Vec<Plane> = (0..width * height).map(center).collect();
+    let mut found = covered(&camera, &centers, size, stars);
     let mut images: Vec<Image> = Vec::new();
     for round in 0..4 {
         let places: Vec<Plane> = found.iter().map(|f| f.1).collect();
-        for ((star, place), sky) in found.iter_mut().zip(beams(&places)) {
+        for ((star, place), sky) in found.iter_mut().zip(beams(&camera, &places)) {
             let Some(sky) = sky else { continue };
             let (direction, flux) = stars[*star];
             let [x, y] = *place;

@@ -276,17 +276,8 @@ fn exact_visibilities_and_closures_together() {
     assert!(chi2.values().all(|value| value.as_f64().is_some_and(f64::is_finite)));
 }
 
-/// A fit's pixels of a sheared spot on a tilted orbit, with slow light and redshift, are those of the renderer, which
-/// shares neither nodes nor sums with it.
-#[test]
-fn code_pixels_are_those_of_the_renderer() {
-    use kerrlight_geodesic::vector::distance;
-    use kerrlight_geodesic::{Inclination, Kerr, Observer};
-    use kerrlight_tomo::dynamics::{AngularVelocity, Axis, Injection};
-    use kerrlight_tomo::emission::spot::SpotModel;
-    use kerrlight_tomo::fit::{
-        Batch, ForwardModel, Motion, Redshift, Region, Sampling, SightlineRequest, Sightlines,
-    };
+/// A sheared spot on a tilted orbit, on 24 × 24 pixels of 1 M.
+fn sheared_spot() -> kerrlight_tomo::scene::Scene {
     let text = std::fs::read_to_string(root().join("scenes/hot_spots.toml")).unwrap();
     let text = text.split("[[spot]]").next().unwrap().to_owned()
         + "[[spot]]\nradius = 7.0\nphase_deg = 200.0\naxis = [0.6, 0.0, 0.8]\nsigma = 0.6\npeak_emissivity = 1.0\nsheared_since = 0.0\n";
@@ -300,7 +291,21 @@ fn code_pixels_are_those_of_the_renderer() {
         "screen.rings=\"regular-grid\"",
         "observer.time=45.0",
     ];
-    let scene = crate::support::scene(&text, &changes);
+    crate::support::scene(&text, &changes)
+}
+
+/// A fit's pixels of a sheared spot on a tilted orbit, with slow light and redshift, are those of the renderer, which
+/// shares neither nodes nor sums with it.
+#[test]
+fn code_pixels_are_those_of_the_renderer() {
+    use kerrlight_geodesic::vector::distance;
+    use kerrlight_geodesic::{Inclination, Kerr, Observer};
+    use kerrlight_tomo::dynamics::{AngularVelocity, Axis, Injection};
+    use kerrlight_tomo::emission::spot::SpotModel;
+    use kerrlight_tomo::fit::{
+        Batch, ForwardModel, Motion, Redshift, Region, Sampling, SightlineRequest, Sightlines,
+    };
+    let scene = sheared_spot();
     let seen = kerrlight_tomo::render::render(&scene, None, &|_| true).unwrap().picture;
     let hole = Kerr::new(0.5).unwrap();
     let observer = Observer::at_infinity(Inclination::from_degrees(60.0).unwrap());

@@ -1,6 +1,6 @@
 //! Fits that do not know the world.
 
-use crate::support::{kerrlight, root};
+use crate::support::{kerrlight, root, succeed};
 use serde_json::Value;
 
 /// The built-in flare seen by the ngEHT, few pixels and scans, from another inclination and orientation than its
@@ -50,6 +50,48 @@ fn exact_inclination_and_position_angle_are_found_from_visibilities() {
     assert_eq!(first, std::fs::read(folder.path().join("run/world.json")).unwrap());
 }
 
+/// Beside the grid over the inclination the position angle is searched for in each of its worlds.
+#[test]
+fn exact_a_scan_leaves_its_map() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("fit.toml"), settings(60)).unwrap();
+    let scanned = "world.inclination_deg={scanned={from=30.0,to=90.0,points=5}}";
+    let told = succeed(
+        folder.path(),
+        &[
+            "fit",
+            "fit.toml",
+            "-o",
+            "run",
+            "--set",
+            scanned,
+            "--set",
+            "world.search.coarse.worlds=24",
+        ],
+    );
+    assert!(!told.is_empty());
+    let world = read(&folder.path().join("run/world.json"));
+    assert_eq!((&world["scan"]["worlds"], &world["starts"]), (&Value::from(5), &Value::from(0)));
+    let table = std::fs::read_to_string(folder.path().join("run/world_scan.csv")).unwrap();
+    let rows: Vec<Vec<f64>> = table
+        .lines()
+        .skip(1)
+        .map(|row| row.split(',').map(|cell| cell.parse().unwrap()).collect())
+        .collect();
+    assert!(table.starts_with("inclination_deg,position_angle_deg,half_chi2,"), "{table}");
+    assert_eq!(
+        rows.iter().map(|row| row[0].round()).collect::<Vec<_>>(),
+        [30.0, 45.0, 60.0, 75.0, 90.0]
+    );
+    let best = rows.iter().min_by(|a, b| a[2].total_cmp(&b[2])).unwrap();
+    assert!(best[0].round() == 60.0 && best[1].abs() < 5.0, "{best:?}");
+    let page = std::fs::read_to_string(folder.path().join("run/report.html")).unwrap();
+    assert!(page.contains("on a grid of 5 worlds over inclination"));
+    assert!(
+        std::fs::read_to_string(folder.path().join("run/world_scan.svg")).unwrap().contains("<svg")
+    );
+}
+
 #[test]
 fn exact_impossible_priors_are_refused_before_anything_is_written() {
     let folder = tempfile::tempdir().unwrap();
@@ -63,6 +105,12 @@ fn exact_impossible_priors_are_refused_before_anything_is_written() {
         ("world.beta_r={uniform=[0.5,1.5]}", "world.beta_r = 1.5 is not allowed: 0 to 1"),
         ("world.search.starts=0", "world.search.starts = 0 is not allowed"),
         ("axis={from={start=[0.0,0.0,1.0],rate=0.1,last_rate=0.1}}", "[axis.known]"),
+        ("hole.spin=0.9", "leave the drag out"),
+        (
+            "world.inclination_deg={scanned={from=40.0,to=80.0,points=1}}",
+            "world.inclination_deg.scanned.points = 1 is not allowed: 2 to 1000",
+        ),
+        ("world.inclination_deg={scanned={from=80.0,to=40.0,points=5}}", "high"),
     ] {
         let run = kerrlight(folder.path(), &["fit", "fit.toml", "-o", "run", "--set", change]);
         let told = String::from_utf8_lossy(&run.stderr).into_owned();

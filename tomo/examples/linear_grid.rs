@@ -12,7 +12,7 @@ use kerrlight_tomo::dynamics::Axis;
 use kerrlight_tomo::fit::linear::{
     Change, Coarse, LinearProblem, LinearProgress, LinearSettings, Method, Prior, Voxels, Weighted,
 };
-use kerrlight_tomo::fit::{ImageTerm, Regulariser};
+use kerrlight_tomo::fit::{ImageTerm, Regulariser, Sightlines};
 use kerrlight_tomo::representation::Degree;
 use paper::{FRAMES, Truth, forward_model, lines, processor_time, screen};
 use std::error::Error;
@@ -49,26 +49,40 @@ impl Volume {
     }
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let mut words = std::env::args().skip(1);
-    let scene = words.next().unwrap_or_else(|| "1".to_owned());
-    let seconds: f64 = words.next().map_or(Ok(10.0), |word| word.parse())?;
-    let method = match words.next().as_deref() {
-        None | Some("lbfgs") => Method::QuasiNewton,
-        Some("cg") => Method::ConjugateGradients,
-        Some("fista") => Method::Fista,
-        Some(other) => return Err(format!("{other}: lbfgs, cg or fista").into()),
-    };
-    let weight: f64 = words.next().map_or(Ok(0.0), |word| word.parse())?;
-    let mut settings = LinearSettings { method, ..LinearSettings::default() };
-    settings.iterations = words.next().map_or(Ok(settings.iterations), |word| word.parse())?;
-    settings.rounds = words.next().map_or(Ok(settings.rounds), |word| word.parse())?;
-    let mut coarse = Coarse { nodes: 32, stride: 8, iterations: 20 };
-    coarse.nodes = words.next().map_or(Ok(coarse.nodes), |word| word.parse())?;
-    coarse.stride = words.next().map_or(Ok(coarse.stride), |word| word.parse())?;
-    coarse.iterations = words.next().map_or(Ok(coarse.iterations), |word| word.parse())?;
-    settings.coarse = Some(coarse);
+/// What the command line says.
+struct Arguments {
+    scene: String,
+    seconds: f64,
+    weight: f64,
+    settings: LinearSettings,
+}
 
+impl Arguments {
+    fn read() -> Result<Self, Box<dyn Error>> {
+        let mut words = std::env::args().skip(1);
+        let scene = words.next().unwrap_or_else(|| "1".to_owned());
+        let seconds = words.next().map_or(Ok(10.0), |word| word.parse())?;
+        let method = match words.next().as_deref() {
+            None | Some("lbfgs") => Method::QuasiNewton,
+            Some("cg") => Method::ConjugateGradients,
+            Some("fista") => Method::Fista,
+            Some(other) => return Err(format!("{other}: lbfgs, cg or fista").into()),
+        };
+        let weight = words.next().map_or(Ok(0.0), |word| word.parse())?;
+        let mut settings = LinearSettings { method, ..LinearSettings::default() };
+        settings.iterations = words.next().map_or(Ok(settings.iterations), |word| word.parse())?;
+        settings.rounds = words.next().map_or(Ok(settings.rounds), |word| word.parse())?;
+        let mut coarse = Coarse { nodes: 32, stride: 8, iterations: 20 };
+        coarse.nodes = words.next().map_or(Ok(coarse.nodes), |word| word.parse())?;
+        coarse.stride = words.next().map_or(Ok(coarse.stride), |word| word.parse())?;
+        coarse.iterations = words.next().map_or(Ok(coarse.iterations), |word| word.parse())?;
+        settings.coarse = Some(coarse);
+        Ok(Self { scene, seconds, weight, settings })
+    }
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let Arguments { scene, seconds, weight, settings } = Arguments::read()?;
     let axis = Axis::new([0.5, 0.0, -0.75f64.sqrt()])?;
     let truth = Truth::scene(&scene, axis)?;
     let start = Instant::now();
@@ -80,12 +94,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("frames 0 and 64 sum to {:.5} and {:.5}", sum(0), sum(64));
     let term = ImageTerm::new(movie, model.pixels(), 1.0)?;
     let voxels = Voxels::cube(64, 5.0, Degree::Linear);
-    let [x, y, z] = &lines.position;
-    let radius = |k: usize| (x[k] * x[k] + y[k] * y[k] + z[k] * z[k]).sqrt();
-    let radii = (0..x.len()).fold([f64::INFINITY, 0.0], |[low, high]: [f64; 2], k| {
-        [low.min(radius(k)), high.max(radius(k))]
-    });
-    let volume = Volume::new(&voxels, &truth, radii);
+    let volume = Volume::new(&voxels, &truth, radii(&lines));
     println!("the truth sums to {:.4}", volume.truth.iter().sum::<f64>());
     println!("an empty volume: {:.2} dB", volume.psnr(&vec![0.0; voxels.count()]));
     let frames: Vec<usize> = (0..FRAMES).collect();
@@ -102,6 +111,25 @@ fn main() -> Result<(), Box<dyn Error>> {
         change: Change::NONE,
     };
 
+    recover(&problem, &settings, &volume, seconds)
+}
+
+/// The least and the greatest radius of the nodes.
+fn radii(lines: &Sightlines) -> [f64; 2] {
+    let [x, y, z] = &lines.position;
+    let radius = |k: usize| (x[k] * x[k] + y[k] * y[k] + z[k] * z[k]).sqrt();
+    (0..x.len()).fold([f64::INFINITY, 0.0], |[low, high]: [f64; 2], k| {
+        [low.min(radius(k)), high.max(radius(k))]
+    })
+}
+
+/// Solves the problem within `seconds` and prints what is reached, and when.
+fn recover(
+    problem: &LinearProblem<'_, f32>,
+    settings: &LinearSettings,
+    volume: &Volume,
+    seconds: f64,
+) -> Result<(), Box<dyn Error>> {
     let (start, cpu, mut next) = (Instant::now(), processor_time(), Duration::ZERO);
     let mut watch = |progress: &LinearProgress<'_>| {
         let spent = start.elapsed();
@@ -122,7 +150,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         if over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let solution = problem.solve(&settings, &mut watch)?;
+    let solution = problem.solve(settings, &mut watch)?;
     let emission: Vec<f64> = solution.emission.iter().map(|x| f64::from(*x)).collect();
     println!(
         "{:.2} s, processor {:.2} s: {:.2} dB, {:?} after {} rounds and {} evaluations, {} nodes, {} MB",

@@ -14,6 +14,7 @@ mod linear;
 mod posterior;
 mod results;
 mod run;
+mod world_scan;
 mod world_search;
 
 use crate::answer::Answer;

@@ -1,7 +1,7 @@
 //! A world that is not known: it is found before the emission is fitted in it.
 
-use super::failed;
 use super::folder::Folder;
+use super::{failed, world_scan};
 use crate::checksum::sealed;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::output;
@@ -40,6 +40,10 @@ pub fn place(
     let path = folder.path().join(FILE);
     if !path.exists() {
         let found = search(file, measured, &unknown)?;
+        if let Some(scan) = &found.scan {
+            let truth = true_world(file, measured)?;
+            world_scan::write(folder, scan, truth.as_ref())?;
+        }
         let results = results(file, measured, &unknown, &found)?;
         folder.file(FILE)?.write(sealed(results).as_bytes())?;
     }
@@ -78,10 +82,14 @@ fn search(
 ) -> anyhow::Result<FoundWorld> {
     let keeper = Keeper::brief(STOPPED);
     let search = &unknown.search;
-    let total = search.starts * search.coarse.worlds + search.fine.worlds;
-    let bar = progress::worlds(total as u64);
+    let scanned = unknown.scanned();
+    let (searches, each) = match scanned.is_empty() {
+        true => (search.starts, search.coarse.worlds),
+        false => (1, scanned.iter().map(|scanned| scanned.values.len()).product()),
+    };
+    let bar = progress::worlds((searches * each + search.fine.worlds) as u64);
     let mut watch = |(k, count): (usize, usize), worlds: usize, best: f64| {
-        bar.set_position((k * search.coarse.worlds + worlds) as u64);
+        bar.set_position((k * each + worlds) as u64);
         bar.set_message(format!("search {} of {count}, least chi2/2 {best:.5e}", k + 1));
         !keeper.stopped()
     };
@@ -101,13 +109,13 @@ fn settled(file: &FitFile, unknown: &UnknownWorld, world: &World) -> FitFile {
     }
     let follows = unknown.search.drag_is_spin;
     match &mut file.motion.velocity {
-        Velocity::Keplerian { drag } if follows => *drag = file.hole.spin,
+        // That of the hole that was found.
+        Velocity::Keplerian { drag } if follows => *drag = None,
         Velocity::Infall { xi, beta_r, beta_phi, drag } => {
             for (number, parameter) in [xi, beta_r, beta_phi].into_iter().zip(Parameter::FLOW) {
                 *number = world.get(parameter);
             }
             if follows {
-                // That of the hole that was found.
                 *drag = None;
             }
         }
@@ -134,10 +142,7 @@ fn results(
     let free = unknown.free()?;
     let world = |world: &World| values(&free, |_, parameter| Some(world.get(parameter)));
     let spread = found.spread.as_ref();
-    let truth = match measured.truth {
-        Some(_) => Some(world(&setup::known_world(&file.simulated()?))),
-        None => None,
-    };
+    let truth = true_world(file, measured)?.map(|truth| world(&truth));
     let least = found.trials.iter().map(|trial| trial.value).fold(f64::INFINITY, f64::min);
     let trial = |trial: &Trial| {
         json!({
@@ -163,7 +168,14 @@ fn results(
         "starts": trials.len(),
         "ended_at_the_best": same,
         "trials": trials,
+        "scan": found.scan.as_ref().map(world_scan::json),
     }))
+}
+
+/// The world of a simulation.
+fn true_world(file: &FitFile, measured: &Measured) -> anyhow::Result<Option<World>> {
+    let known = || anyhow::Ok(setup::known_world(&file.simulated()?));
+    measured.truth.as_ref().map(|_| known()).transpose()
 }
 
 /// Whether a search ended where the best one did: within 1.5 of each parameter's scale, the width of a first population.
@@ -200,12 +212,14 @@ pub fn lines(results: &Value) -> Vec<String> {
         })
         .collect();
     lines.extend(small_residuals(results).map(|said| format!("note: {said}")));
-    lines.push(format!(
-        "world: {} of {} starts ended at the best one; χ²/N = {}",
-        results["ended_at_the_best"],
-        results["starts"],
-        reduced(results["chi2_per_datum"].as_f64().unwrap_or(f64::NAN))
-    ));
+    let chi2 = reduced(results["chi2_per_datum"].as_f64().unwrap_or(f64::NAN));
+    lines.push(match results["scan"]["worlds"].as_u64() {
+        Some(worlds) => format!("world: a grid of {worlds} worlds was scanned; χ²/N = {chi2}"),
+        None => format!(
+            "world: {} of {} starts ended at the best one; χ²/N = {chi2}",
+            results["ended_at_the_best"], results["starts"],
+        ),
+    });
     lines
 }
 
@@ -265,10 +279,12 @@ pub fn sentences(results: &Value) -> Vec<String> {
     };
     let mut all: Vec<String> = Parameter::ALL.into_iter().filter_map(of).collect();
     all.extend(small_residuals(results).map(|said| format!("Note that {said}.")));
-    all.push(format!(
-        "The world was searched for from {} places; {} of the searches ended near the best one.",
-        results["starts"], results["ended_at_the_best"]
-    ));
+    all.push(world_scan::sentence(&results["scan"]).unwrap_or_else(|| {
+        format!(
+            "The world was searched for from {} places; {} of the searches ended near the best one.",
+            results["starts"], results["ended_at_the_best"]
+        )
+    }));
     all
 }
 

@@ -1,6 +1,7 @@
 //! One HTML page that says what a fit found: sentences, tables, pictures, plots and the emission in
 //! three dimensions. Nothing in it is loaded from anywhere else.
 
+mod grid_map;
 mod html;
 mod pictures;
 mod plot;
@@ -9,7 +10,8 @@ mod tests;
 mod triangle;
 mod view;
 
-pub use pictures::{Figure, encode, frames, projections, slices, still};
+pub use grid_map::{GridAxis, GridMap};
+pub use pictures::{Figure, encode, frames, projections, residuals, slices, still};
 pub use plot::{Axis, LinePlot, Marks, Series};
 pub use triangle::{Triangle, Variable};
 pub use view::{Motion, View3d, rates};

@@ -79,30 +79,43 @@ pub fn projections(shown: &[Shown], around: &Surroundings, unit: &str) -> anyhow
 /// Frames of a strip of a movie.
 const STRIP: usize = 6;
 
-/// Images of n × n pixels on a sheet of equal cells, on one scale of brightness from 0 to `most`.
+/// Images of n × n pixels on a sheet of equal cells, on one scale of colours.
 struct Sheet {
     drawn: image::RgbImage,
     n: usize,
     zoom: usize,
-    most: f32,
+    /// The values of the first and the last colour.
+    ends: [f32; 2],
+    table: Vec<[u8; 3]>,
 }
 
 /// Grey lines between images, pixels.
 const GAP: usize = 4;
 
 impl Sheet {
-    fn new([columns, rows]: [usize; 2], n: usize, zoom: usize, most: f32) -> Self {
+    /// Brightness from 0 to `most`.
+    fn new(cells: [usize; 2], n: usize, zoom: usize, most: f32) -> Self {
+        let ends = [0.0, most.max(f32::MIN_POSITIVE)];
+        Self::colored(cells, n, zoom, (ends, Colormap::Inferno))
+    }
+
+    fn colored(
+        [columns, rows]: [usize; 2],
+        n: usize,
+        zoom: usize,
+        (ends, colors): ([f32; 2], Colormap),
+    ) -> Self {
         let side = n * zoom + GAP;
         let [width, height] = [columns, rows].map(|count| (side * count) as u32);
         let drawn = image::RgbImage::from_pixel(width, height, image::Rgb([128; 3]));
-        Self { drawn, n, zoom, most }
+        Self { drawn, n, zoom, ends, table: colors.table() }
     }
 
     fn put(&mut self, [column, row]: [usize; 2], image: &[f32]) {
-        let (n, zoom, table) = (self.n, self.zoom, Colormap::Inferno.table());
+        let (n, zoom, table, [low, high]) = (self.n, self.zoom, &self.table, self.ends);
         let [left, top] = [column, row].map(|k| k * (n * zoom + GAP));
         for (k, value) in image.iter().enumerate() {
-            let part = (value / self.most.max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+            let part = ((value - low) / (high - low)).clamp(0.0, 1.0);
             let color = image::Rgb(table[(part * (table.len() - 1) as f32).round() as usize]);
             for pixel in 0..zoom * zoom {
                 let (x, y) = (k % n * zoom + pixel % zoom, k / n * zoom + pixel / zoom);
@@ -136,6 +149,30 @@ pub fn frames(movies: &[(&str, Vec<f32>)], n: usize, times: &[f64]) -> anyhow::R
         at.join(", ")
     );
     let alt = format!("Frames of the movie: {names}.");
+    Ok(Figure { png: encode(Some(sheet.drawn))?, caption, alt })
+}
+
+/// Colours of residuals reach at least so many σ to both sides: noise alone stays pale.
+const FAINTEST: f32 = 5.0;
+
+/// Residuals of n × n pixels in units of σ beside each other; `what` says how they were made.
+///
+/// # Errors
+/// If it cannot be encoded.
+pub fn residuals(maps: &[(&str, &Vec<f32>)], n: usize, what: &str) -> anyhow::Result<Figure> {
+    let all = maps.iter().flat_map(|(_, map)| *map);
+    let (worst, most) = all.fold((0.0f32, FAINTEST), |(worst, most), x| {
+        (if x.abs() > worst.abs() { *x } else { worst }, most.max(x.abs()))
+    });
+    let colors = ([-most, most], Colormap::RedBlue);
+    let mut sheet = Sheet::colored([maps.len(), 1], n, (320 / n).max(1), colors);
+    maps.iter().enumerate().for_each(|(k, (_, map))| sheet.put([k, 0], map));
+    let names = maps.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", right of it ");
+    let worst = format!("{worst:.1}").replace('-', "−");
+    let caption = format!(
+        "{what} Shown: {names}. Red is below 0, white 0, blue above; the colours end at ±{most:.1}. The pixel          that is furthest off has {worst}. Noise alone gives a pale pattern without structure; what has the shape of          the source is light that the model puts elsewhere. North is up, east to the left."
+    );
+    let alt = format!("Map of the residuals: {names}.");
     Ok(Figure { png: encode(Some(sheet.drawn))?, caption, alt })
 }
 

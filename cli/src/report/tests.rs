@@ -80,6 +80,14 @@ fn amplitudes() -> LinePlot {
     }
 }
 
+fn outcome(name: &str, value: &str, unit: &str, meaning: &str) -> Outcome {
+    Outcome { name: text(name), value: text(value), unit: text(unit), meaning: text(meaning) }
+}
+
+fn setting(key: &str, value: &str, unit: &str) -> Setting {
+    Setting { key: text(key), value: text(value), unit: text(unit) }
+}
+
 /// A page as a fit would fill it. What is called recovered is the truth, wider and fainter.
 fn report(nodes: usize) -> Report {
     let (recovered, truth) = (spots(nodes, 0.5, 0.8), spots(nodes, 0.4, 1.0));
@@ -91,17 +99,6 @@ fn report(nodes: usize) -> Report {
         projections(&shown, &around, unit).unwrap(),
         slices(&shown, Through::Maximum, 2.0, unit).unwrap(),
     ];
-    let outcome = |name: &str, value: &str, unit: &str, meaning: &str| Outcome {
-        name: text(name),
-        value: text(value),
-        unit: text(unit),
-        meaning: text(meaning),
-    };
-    let setting = |key: &str, value: &str, unit: &str| Setting {
-        key: text(key),
-        value: text(value),
-        unit: text(unit),
-    };
     Report {
         title: text("Four spots around a hole without spin"),
         notice: Some(Notice {

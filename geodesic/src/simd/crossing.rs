@@ -13,7 +13,7 @@ use super::lanes::{Lanes, MAX_LANES, Task};
 use super::math::atan2;
 use super::motion::{Camera, Journey, Motion};
 use super::polar::unwrap;
-use super::radial_sum::{LEAST_STEPS, RadialSum, closed_forms};
+use super::radial_sum::{LEAST_STEPS, RadialSum, closed_forms, to_turning_point};
 
 /// The most steps to one crossing: a ray that circles longer than that has no digits left.
 const MOST_STEPS: f64 = 1e5;
@@ -341,21 +341,14 @@ impl<'a, V: Lanes<f64>> LaneRays<'a, V> {
         }
         // From there to the turning point, and back.
         let rest = V::select(outward, turning - inner, inner);
-        let mut run = RadialSum::new(m, rest * s(1.0 / steps as f64), end.w, end.speed);
-        for _ in LEAST_STEPS..steps {
-            run.next();
-        }
-        let turn = run.finish(camera);
-        let at_turn = closed_forms(camera, turn.w);
-        let dt = turn.time + (closed[0] - at_turn[0]);
-        let dphi = turn.turn.neg_mul_add(spin, at_turn[1] - closed[1]);
+        let [dt, dphi, w] = to_turning_point((camera, m), (rest, steps), &end, closed);
         let twice = s(2.0);
         [
             r,
             V::select(outward, dt.mul_add(twice, t), t),
             V::select(outward, dphi.mul_add(twice, phi), phi),
             V::select(outward, r, speed),
-            V::select(outward, turn.w, end.w) * s(camera.r_plus()),
+            V::select(outward, w, end.w) * s(camera.r_plus()),
         ]
     }
 

@@ -91,6 +91,27 @@ impl<V: Lanes<f64>> RadialSum<V> {
     }
 }
 
+/// What time and azimuth gain over the Mino time `rest`, in `steps`, from `from`, where the closed forms are `closed`,
+/// to the turning point; and w there.
+#[inline(always)]
+pub fn to_turning_point<V: Lanes<f64>>(
+    (camera, motion): (&Camera, &Motion<V>),
+    (rest, steps): (V, usize),
+    from: &RadialEnd<V>,
+    closed: [V; 2],
+) -> [V; 3] {
+    let s = V::splat;
+    let mut run = RadialSum::new(motion, rest * s(1.0 / steps as f64), from.w, from.speed);
+    for _ in LEAST_STEPS..steps {
+        run.next();
+    }
+    let turn = run.finish(camera);
+    let at_turn = closed_forms(camera, turn.w);
+    let dt = turn.time + (closed[0] - at_turn[0]);
+    let dphi = turn.turn.neg_mul_add(s(camera.spin), at_turn[1] - closed[1]);
+    [dt, dphi, turn.w]
+}
+
 /// The closed-form terms of time and azimuth at w, `r + 2F + 2r₊Λ` and `aΛ`; for w = 0, zero in
 /// place of the infinite one.
 #[inline(always)]

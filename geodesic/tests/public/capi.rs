@@ -2,7 +2,9 @@
 #![cfg(feature = "capi")]
 
 use kerrlight_geodesic::capi::{self, PointColumns, RayColumns, SamplePlacement, Scene};
-use kerrlight_geodesic::{Inclination, Integrator, Kerr, Observer, Outcome, Placement, Request};
+use kerrlight_geodesic::{
+    Inclination, Integrator, Kerr, Observer, Outcome, Placement, RayTable, Request,
+};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::ptr::{null, null_mut};
@@ -52,6 +54,22 @@ fn message() -> String {
     String::from_utf8(buffer[..length].to_vec()).unwrap()
 }
 
+/// The rays of the test below, traced by a call from Rust.
+fn from_rust() -> RayTable {
+    let hole = Kerr::new(0.94).unwrap();
+    let observer = Observer::at_infinity(Inclination::from_degrees(60.0).unwrap());
+    let request = Request {
+        crossings: 2,
+        samples: Placement::GaussLegendre { points: 4, from: 4.0, to: 20.0 },
+        azimuth: true,
+        momentum: true,
+        weight: true,
+        uncertainty: true,
+        ..Request::default()
+    };
+    Integrator::TaylorMino.trace(&hole, &observer, &ALPHA, &BETA, 1e-10, &request).unwrap()
+}
+
 #[test]
 fn exact_same_columns_as_from_rust() {
     let (mut outcome, mut total) = ([9i32; 3], [0.0; 3]);
@@ -84,19 +102,7 @@ fn exact_same_columns_as_from_rust() {
     let placement = SamplePlacement { kind: 3, points: 4, from: 4.0, to: 20.0 };
     assert_eq!(call(&SCENE, &placement, &out), capi::OK, "{}", message());
 
-    let hole = Kerr::new(0.94).unwrap();
-    let observer = Observer::at_infinity(Inclination::from_degrees(60.0).unwrap());
-    let request = Request {
-        crossings: 2,
-        samples: Placement::GaussLegendre { points: 4, from: 4.0, to: 20.0 },
-        azimuth: true,
-        momentum: true,
-        weight: true,
-        uncertainty: true,
-        ..Request::default()
-    };
-    let rust =
-        Integrator::TaylorMino.trace(&hole, &observer, &ALPHA, &BETA, 1e-10, &request).unwrap();
+    let rust = from_rust();
     for ray in 0..3 {
         assert_eq!(outcome[ray] == 0, rust.outcome[ray] == Outcome::Captured);
         assert_eq!((total[ray], crossed[ray]), (rust.mino_total[ray], rust.crossing_count[ray]));
@@ -108,15 +114,11 @@ fn exact_same_columns_as_from_rust() {
             assert_eq!(radius[2 * ray + k].to_bits(), column(&rust.crossings.radius));
             assert_eq!(azimuth[2 * ray + k].to_bits(), column(&rust.crossings.azimuth));
         }
-        let found = rust.samples.of(ray);
+        let (found, samples) = (rust.samples.of(ray), &rust.samples);
         assert_eq!(number[ray] as usize, found.len());
-        for (k, place) in found.enumerate() {
-            let here = 8 * ray + k;
-            assert_eq!(
-                (r[here], weight[here]),
-                (rust.samples.radius[place], rust.samples.weight[place])
-            );
-            assert_eq!(momentum[4 * here..4 * here + 4], rust.samples.momentum[place]);
+        for (here, place) in (8 * ray..).zip(found) {
+            assert_eq!((r[here], weight[here]), (samples.radius[place], samples.weight[place]));
+            assert_eq!(momentum[4 * here..4 * here + 4], samples.momentum[place]);
         }
         assert!(r[8 * ray + number[ray] as usize..8 * (ray + 1)].iter().all(|x| x.is_nan()));
     }

@@ -233,6 +233,32 @@ fn traced(case: &Case, place: Place, request: &Request) -> kerrlight_geodesic::R
     traced.unwrap()
 }
 
+/// Five-point differences of all columns with h = 2e-3.
+fn column_differences(
+    case: &Case,
+    place: [f64; 4],
+    request: &Request,
+    crossings: bool,
+) -> Vec<[[f64; 4]; 7]> {
+    let h = 2e-3;
+    let at = |k: usize, steps: f64| {
+        let mut place = place;
+        place[k] += steps * h;
+        columns(&traced(case, place, request), crossings)
+    };
+    let mut slopes = vec![[[0.0; 4]; 7]; at(0, 0.0).len()];
+    for k in 0..4 {
+        let at = [1.0, -1.0, 2.0, -2.0].map(|steps| at(k, steps));
+        for (p, slopes) in slopes.iter_mut().enumerate() {
+            for (q, slope) in slopes.iter_mut().enumerate() {
+                let [up, down, up2, down2] = [0, 1, 2, 3].map(|side: usize| at[side][p][q]);
+                slope[k] = (8.0 * (up - down) - (up2 - down2)) / (12.0 * h);
+            }
+        }
+    }
+    slopes
+}
+
 /// The column API on every placement: the derivative of a point moves with its label. Five-point
 /// differences of doubles with h = 2e-3 leave out 1e-11 of a fifth derivative and 1e-12 of
 /// rounding; what an order of magnitude more of either gives is the tolerance.
@@ -266,23 +292,9 @@ fn exact_columns_of_derivatives_on_every_placement() {
         let found = derivatives::trace(&hole, &observer, &alpha, &beta, 1e-14, &request).unwrap();
         assert_eq!(found.values.uncertainty.len(), 1);
         for crossings in [true, false] {
-            let mut expected = vec![[[0.0; 4]; 7]; columns(&found.values, crossings).len()];
-            assert!(crossings || !expected.is_empty());
-            for k in 0..4 {
-                let h = 2e-3;
-                let at = [1.0, -1.0, 2.0, -2.0].map(|steps| {
-                    let mut place = place;
-                    place[k] += steps * h;
-                    columns(&traced(case, place, &request), crossings)
-                });
-                for (p, expected) in expected.iter_mut().enumerate() {
-                    for (q, expected) in expected.iter_mut().enumerate() {
-                        let [up, down, up2, down2] = [0, 1, 2, 3].map(|side: usize| at[side][p][q]);
-                        expected[k] = (8.0 * (up - down) - (up2 - down2)) / (12.0 * h);
-                    }
-                }
-            }
+            let expected = column_differences(case, place, &request, crossings);
             let values = columns(&found.values, crossings);
+            assert!(values.len() == expected.len() && (crossings || !expected.is_empty()));
             let plain = columns(&traced(case, place, &request), crossings);
             for ((value, plain), (found, expected)) in
                 values.iter().zip(&plain).zip(gradients(&found, crossings).iter().zip(&expected))

@@ -15,8 +15,9 @@ use std::sync::Arc;
 pub enum Velocity {
     /// 1/(r^{3/2} + drag).
     Keplerian {
-        /// The spin, for orbits about it.
-        drag: f64,
+        /// M; for circular geodesics about the hole's axis its spin. Without it, a ξ_z of the hole and the axis.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        drag: Option<f64>,
     },
     /// rate (radius/r)^exponent.
     PowerLaw {
@@ -88,7 +89,9 @@ impl Velocity {
     /// Names the number that is out of its range, or says that what falls cannot be perturbed.
     pub fn angular(&self, seed: u64, drag: f64) -> Result<AngularVelocity, Error> {
         match self.clone() {
-            Velocity::Keplerian { drag } => AngularVelocity::Keplerian { drag },
+            Velocity::Keplerian { drag: own } => {
+                AngularVelocity::Keplerian { drag: own.unwrap_or(drag) }
+            }
             Velocity::PowerLaw { radius, rate, exponent } => {
                 AngularVelocity::PowerLaw { radius, rate, exponent }
             }
@@ -132,7 +135,11 @@ impl Velocity {
     /// Itself with `drag` (M) for a flow that follows its hole.
     #[must_use]
     pub fn dragged(mut self, spin: f64) -> Self {
-        if let Velocity::Infall { drag, .. } = &mut self {
+        let mut law = &mut self;
+        while let Velocity::Perturbed(by) = law {
+            law = &mut by.of;
+        }
+        if let Velocity::Keplerian { drag } | Velocity::Infall { drag, .. } = law {
             drag.get_or_insert(spin);
         }
         self

@@ -191,16 +191,15 @@ impl<T: Float> Objective<T> {
         let at = Batch::coordinates(&batch.columns, dimension);
         let groups = Groups { starts: &batch.starts, link: &link };
         field.representation.eval_vjp(field.parameters, at, groups, &mut values, into, workspace);
-        let (mut total, shifted) = (0.0, gradients.axis.is_some() && self.model.is_shifted());
-        for group in 0..batch.pairs.len() {
-            let range = batch.starts[group]..batch.starts[group + 1];
+        let shifted = gradients.axis.is_some() && self.model.is_shifted();
+        let mut total = 0.0;
+        for (group, ends) in batch.starts.windows(2).enumerate() {
+            let range = ends[0]..ends[1];
             let left = residual(group, &values[range.clone()]).double();
             total += left * left;
-            if shifted {
-                for k in range {
-                    let node = batch.columns.node[k] as usize;
-                    of_weights[node] += slope.double() * left * values[k].double();
-                }
+            for k in range.filter(|_| shifted) {
+                let node = batch.columns.node[k] as usize;
+                of_weights[node] += slope.double() * left * values[k].double();
             }
         }
         batch.values = values;

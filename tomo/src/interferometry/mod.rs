@@ -11,6 +11,7 @@ pub mod array;
 #[cfg(test)]
 mod conformance;
 pub mod data_terms;
+pub mod dirty_image;
 pub mod earth;
 pub mod files;
 pub mod gains;

@@ -95,8 +95,8 @@ pub(super) fn check(law: &Velocity, key: &str) -> Result<(), Invalid> {
     let name = |name: &str| format!("{key}.{name}");
     match law {
         Velocity::Keplerian { drag } => {
-            let ok = drag.abs() <= 1e3;
-            number(name("keplerian.drag"), *drag, ok, "a number in [-1000, 1000]")
+            let drag = drag.unwrap_or(0.0);
+            number(name("keplerian.drag"), drag, drag.abs() <= 1e3, "a number in [-1000, 1000]")
         }
         Velocity::PowerLaw { radius, rate, exponent } => {
             let ok = (1e-6..=1e6).contains(radius);

@@ -214,17 +214,26 @@ fn exact_mass_and_distance_are_needed_where_they_matter() {
     assert!(error("mass_msun = 4.154e6", "mass_msun = 0").contains("`hole.mass_msun` = 0"));
 }
 
-/// The laws of fits under the names of fits, and what is wrong with their numbers.
+/// The scene with a volume that turns by `law`, or what is wrong with it.
+fn volume(key: &str, law: &str) -> Result<Scene, String> {
+    let head = "[[volume]]\npath = \"v.npz\"\nfactor = 1.0\nreference_time = 0.0\n";
+    let text = SCENE.replacen("[[spot]]", &format!("{head}{key} = {law}\n\n[[spot]]"), 1);
+    Scene::parse(&text).map_err(|error| error.to_string())
+}
+
+fn volume_with_region(key: &str, law: &str) -> Result<Scene, String> {
+    volume(key, &format!("{law}\nregion = {{ r_min = 2.0, r_max = 9.0 }}"))
+}
+
+/// A law that varies at random about a Keplerian one.
+fn perturbed(end: &str) -> String {
+    let of = "of = { keplerian = { drag = 0.5 } }, correlation_length = 0.5, radii = [2.0, 9.0]";
+    format!("{{ perturbed = {{ {of}, {end} }} }}")
+}
+
+/// The laws of fits under the names of fits.
 #[test]
 fn exact_volumes_turn_as_fits_let_them() {
-    let volume = |key: &str, law: &str| {
-        let head = "[[volume]]\npath = \"v.npz\"\nfactor = 1.0\nreference_time = 0.0\n";
-        let text = SCENE.replacen("[[spot]]", &format!("{head}{key} = {law}\n\n[[spot]]"), 1);
-        Scene::parse(&text).map_err(|error| error.to_string())
-    };
-    let volume_with_region = |key: &str, law: &str| {
-        volume(key, &format!("{law}\nregion = {{ r_min = 2.0, r_max = 9.0 }}"))
-    };
     let hole = Kerr::new(0.9).unwrap();
     let rate = |law: &str, r: f64| {
         let scene = volume("rotation", law).unwrap();
@@ -237,6 +246,7 @@ fn exact_volumes_turn_as_fits_let_them() {
     assert_eq!(rate("\"none\"", 4.0), 0.0);
     assert_eq!(rate("\"keplerian\"", 4.0), 1.0 / 8.9);
     assert_eq!(rate("{ keplerian = { drag = 0.5 } }", 4.0), 1.0 / 8.5);
+    assert_eq!(rate("{ keplerian = {} }", 4.0), 1.0 / 8.9);
     assert_eq!(rate("{ power-law = { radius = 8.0, rate = 0.25, exponent = 2.0 } }", 4.0), 1.0);
     assert_eq!(rate("{ table = { radii = [2.0, 6.0], rates = [0.5, 0.25] } }", 4.0), 0.375);
     let falls =
@@ -246,23 +256,22 @@ fn exact_volumes_turn_as_fits_let_them() {
     let law = Velocity::Infall { xi: 0.7, beta_r: 0.9, beta_phi: 0.8, drag: Some(-0.9) };
     assert_eq!(flow, law.angular(0, 0.0).unwrap());
     assert!(flow.fall(8.0) < 0.0 && flow.rate(8.0) > 0.0);
-    let of = "of = { keplerian = { drag = 0.5 } }, correlation_length = 0.5, radii = [2.0, 9.0]";
-    let still = rate(&format!("{{ perturbed = {{ {of}, deviation = 0.0, seed = 3 }} }}"), 2.0);
+    let still = rate(&perturbed("deviation = 0.0, seed = 3"), 2.0);
     assert!((still - rate("{ keplerian = { drag = 0.5 } }", 2.0)).abs() < 1e-15);
-    let drawn = |seed: u32| {
-        rate(&format!("{{ perturbed = {{ {of}, deviation = 0.1, seed = {seed} }} }}"), 4.0)
-    };
+    let drawn = |seed: u32| rate(&perturbed(&format!("deviation = 0.1, seed = {seed}")), 4.0);
     assert_eq!(drawn(3), drawn(3));
     assert_ne!(drawn(3), drawn(4));
+}
+
+/// What is wrong with the numbers of a law.
+#[test]
+fn bad_laws_of_volumes_are_named() {
     for (law, says) in [
         ("\"rigid\"", "expected `none` or `keplerian`"),
         ("{ table = { radii = [2.0], rates = [] } }", "`volume.0.rotation.table.rates` = 0"),
         ("{ keplerian = { drag = 1e9 } }", "`volume.0.rotation.keplerian.drag` = 1e9"),
-        (
-            &format!("{{ perturbed = {{ {of}, deviation = -1.0, seed = 3 }} }}"),
-            "rotation.perturbed.deviation` = -1",
-        ),
-        (&format!("{{ perturbed = {{ {of}, deviation = 1.0 }} }}"), "missing field `seed`"),
+        (&perturbed("deviation = -1.0, seed = 3"), "rotation.perturbed.deviation` = -1"),
+        (&perturbed("deviation = 1.0"), "missing field `seed`"),
         ("{ infall = { xi = 0.7, beta_r = 1.0, beta_phi = 1.0 } }", "`volume.0.region` is missing"),
     ] {
         let text = volume("rotation", law).unwrap_err();

@@ -89,26 +89,13 @@ pub(super) fn integrate(
     let panels = panels.zip(emission.redshift.chunks_exact(order));
     for (number, ((weights, emissivity), redshift)) in panels.enumerate() {
         let start = number * order;
-        let mut miss = None;
         for ((gain, weight), j) in gains.iter_mut().zip(weights).zip(emissivity) {
             *gain = weight * j;
         }
-        if !emission.absorption.is_empty() {
-            let absorption = &emission.absorption[start..start + order];
-            let mut thick = [0.0; MOST_NODES];
-            for ((thick, weight), k) in thick.iter_mut().zip(weights).zip(absorption) {
-                *thick = weight * k;
-            }
-            let thick = &thick[..order];
-            if thick.iter().sum::<f64>() > OPAQUE {
-                miss = Some(shade_opaque(thick, gains, &mut light.depth, depths));
-            } else {
-                quadrature.absorb(thick, &mut light.depth, depths);
-                for (gain, depth) in gains.iter_mut().zip(&depths[start..]) {
-                    *gain *= (-depth).exp();
-                }
-            }
-        }
+        let absorption = emission.absorption.get(start..start + order);
+        let miss = absorption.and_then(|absorption| {
+            shade(quadrature, [weights, absorption], gains, &mut light.depth, depths)
+        });
         for (i, (gain, g)) in gains.iter().zip(redshift).enumerate() {
             light.intensity += gain;
             light.shift += g * gain;
@@ -132,6 +119,30 @@ pub(super) fn integrate(
     }
     light.place = brightest.map_or_else(Place::default, |k| Place::of_node(nodes, k));
     light
+}
+
+/// Dims the gains of a panel by what lies before its nodes, whose weights and absorption are given. The error, if it
+/// is not that of the rule.
+fn shade(
+    quadrature: &Quadrature,
+    [weights, absorption]: [&[f64]; 2],
+    gains: &mut [f64],
+    depth: &mut f64,
+    depths: &mut Vec<f64>,
+) -> Option<f64> {
+    let (mut thick, start) = ([0.0; MOST_NODES], depths.len());
+    for ((thick, weight), k) in thick.iter_mut().zip(weights).zip(absorption) {
+        *thick = weight * k;
+    }
+    let thick = &thick[..gains.len()];
+    if thick.iter().sum::<f64>() > OPAQUE {
+        return Some(shade_opaque(thick, gains, depth, depths));
+    }
+    quadrature.absorb(thick, depth, depths);
+    for (gain, depth) in gains.iter_mut().zip(&depths[start..]) {
+        *gain *= (-depth).exp();
+    }
+    None
 }
 
 /// Optical depth of a panel beyond which e^{−D} is no polynomial over it.

@@ -8,6 +8,7 @@ mod numbers;
 mod over_time;
 mod page;
 mod plots;
+mod residuals;
 mod scene;
 mod units;
 mod verdict;

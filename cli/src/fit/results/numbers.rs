@@ -72,15 +72,23 @@ impl Estimate<'_> {
         if !unknown.is_empty() {
             results["unknown"] = json!(unknown);
         }
+        self.add_closeness(&mut results, found)?;
+        Ok(results)
+    }
+}
+
+impl Estimate<'_> {
+    /// How close the volume is to the truth, where there is one.
+    fn add_closeness(&self, results: &mut Value, found: &Found<'_>) -> anyhow::Result<()> {
         let (Some(truth), Some(volume)) = (&self.measured.truth, &self.true_volume) else {
-            return Ok(results);
+            return Ok(());
         };
         let region = &self.file.region;
         let z_width = region.z_width.unwrap_or(f64::INFINITY);
         let mask = Mask::new(region.r_min, region.r_max, z_width)?;
         let all = metrics::compare(&found.volume, volume, None)?;
         let inside = metrics::compare(&found.volume, volume, Some(&mask))?;
-        results["axis_dot_truth"] = json!(now.axis.dot(truth.axis()));
+        results["axis_dot_truth"] = json!(found.state.now.axis.dot(truth.axis()));
         if all.psnr_db.is_none() {
             results["note"] = json!(DARK);
         }
@@ -92,11 +100,9 @@ impl Estimate<'_> {
             results["psnr_over_time_db"] = json!(changes.closeness.psnr_db());
             results["nrmse_over_time"] = json!(changes.closeness.nrmse());
         }
-        Ok(results)
+        Ok(())
     }
-}
 
-impl Estimate<'_> {
     /// The worlds that were found, where they were not known.
     fn add_worlds(&self, results: &mut Value) -> anyhow::Result<()> {
         if let Some(world) = world_search::found(self.folder)? {

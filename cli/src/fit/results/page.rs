@@ -6,7 +6,7 @@ use super::numbers::outcomes;
 use super::over_time::Changes;
 use super::{Estimate, Found};
 use crate::fit::curves::{loss_plot, psnr_plot};
-use crate::fit::{band_search, labels, world_search};
+use crate::fit::{band_search, labels, world_scan, world_search};
 use crate::output;
 use crate::report::{self, LinePlot, Report, View3d};
 use anyhow::Context;
@@ -29,6 +29,7 @@ impl Estimate<'_> {
         plots.push(self.light_curve(&found.movie));
         plots.extend(found.changes.as_ref().map(Changes::plot));
         plots.extend(self.amplitudes(found)?);
+        plots.extend(self.residual_plots(found));
         plots.extend(found.gains.iter().flat_map(Gains::plots));
         let details = found.gains.as_ref().map(Gains::details);
         let report = Report {
@@ -36,9 +37,13 @@ impl Estimate<'_> {
             notice: Some(found.judged.notice()),
             summary: self.summary(found, results),
             results: outcomes(results),
-            details: [found.judged.table()].into_iter().chain(details).collect(),
+            details: [Some(found.judged.table()), found.judged.by_station(), details]
+                .into_iter()
+                .flatten()
+                .collect(),
             view: Some(self.view(found)),
             figures: self.figures(found)?,
+            drawings: world_scan::drawing(self.folder)?.into_iter().collect(),
             plots,
             settings: self.settings()?,
             ..Report::default()
@@ -82,6 +87,10 @@ impl Estimate<'_> {
         .flatten()
         .collect();
         figures.push(report::frames(&rows, n, &self.measured.times)?);
+        if let Some(figure) = self.residual_map(found)? {
+            self.folder.file("residuals.png")?.write(&figure.png)?;
+            figures.push(figure);
+        }
         figures.extend(self.axes()?);
         Ok(figures)
     }

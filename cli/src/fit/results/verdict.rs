@@ -1,6 +1,7 @@
 //! Whether a fit explains its data: from the residuals of its last state, in words and for other programs.
 
 mod expected;
+mod parts;
 #[cfg(test)]
 mod tests;
 mod words;
@@ -184,6 +185,7 @@ impl Judged {
             let name = self.names(&[*station]);
             term["worst_station"] =
                 json!({ "station": name, "chi2_per_datum": chi2, "count": part.count });
+            term["stations"] = json!(self.station_values(tested));
         }
         term
     }

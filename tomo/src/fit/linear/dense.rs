@@ -1,6 +1,7 @@
 //! Rows of data to which all rays add: a number for every node.
 
-use super::operator::{NONE, Operator, Rows};
+use super::operator::{NONE, Operator};
+use super::rows::Rows;
 use super::walk::Buffers;
 use crate::representation::spline::STENCIL;
 use crate::simd::Float;

@@ -18,6 +18,7 @@ mod objective;
 mod operator;
 mod profile;
 mod quasi_newton;
+mod rows;
 mod run;
 mod scaled;
 mod solve;

@@ -4,7 +4,7 @@ use super::world::SIMULATED;
 use super::{FitError, FitFile, Within};
 use crate::Error;
 use crate::dynamics::Velocity;
-use crate::fit::world::{Free, Parameter, Prior};
+use crate::fit::world::{Free, Parameter, Prior, Scanned};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
@@ -65,6 +65,15 @@ pub enum PriorSettings {
     },
     /// Of an inclination: any direction in space between two angles.
     Isotropic([f64; 2]),
+    /// The same everywhere from the first to the last value, and looked at on a grid.
+    Scanned {
+        /// The first value.
+        from: f64,
+        /// The last value.
+        to: f64,
+        /// Values of the grid, both ends included.
+        points: usize,
+    },
 }
 
 /// How the world is looked for.
@@ -77,7 +86,7 @@ pub struct WorldSearch {
     pub coarse: WorldView,
     /// The search about the best of their ends.
     pub fine: WorldView,
-    /// Whether the drag of a Keplerian velocity is the spin, whatever that is, and that of `infall` the spin along the axis.
+    /// Whether the drag of a Keplerian velocity and of `infall` is the spin of each world along the axis.
     pub drag_is_spin: bool,
 }
 
@@ -107,9 +116,15 @@ impl PriorSettings {
                 Prior::Normal { mean: mean * unit, sigma: sigma * unit }
             }
             Self::LogNormal { median, sigma } => Prior::LogNormal { median: median * unit, sigma },
+            Self::Scanned { from, to, .. } => Prior::Uniform { low: from * unit, high: to * unit },
         }
     }
 }
+
+/// Parameters of a grid, at most: with more there is no picture of it.
+const MOST_SCANNED: usize = 3;
+/// Worlds of a grid, at most.
+const MOST_POINTS: usize = 100_000;
 
 impl UnknownWorld {
     fn prior(&self, parameter: Parameter) -> Option<PriorSettings> {
@@ -145,6 +160,39 @@ impl UnknownWorld {
         Ok(free)
     }
 
+    /// The grid over the parameters that are scanned, empty without any.
+    pub fn scanned(&self) -> Vec<Scanned> {
+        let of = |parameter: Parameter| match self.prior(parameter)? {
+            PriorSettings::Scanned { from, to, points } => {
+                Some(Scanned::even(parameter, [from, to].map(|x| x * parameter.unit()), points))
+            }
+            _ => None,
+        };
+        Parameter::ALL.into_iter().filter_map(of).collect()
+    }
+
+    fn check_scan(&self) -> Result<(), Error> {
+        let scanned = self.scanned();
+        for Scanned { parameter, values } in &scanned {
+            if !(2..=1000).contains(&values.len()) {
+                let key = format!("world.{}.scanned.points", parameter.name());
+                return Err(FitError::range(key, values.len(), "2 to 1000").into());
+            }
+        }
+        let worlds = scanned.iter().map(|scanned| scanned.values.len()).product::<usize>();
+        if scanned.len() > MOST_SCANNED || worlds > MOST_POINTS {
+            let names: Vec<_> = scanned.iter().map(|scanned| scanned.parameter.name()).collect();
+            let why = format!(
+                "a scan of {} parameters ({}) and {worlds} worlds is not allowed: at most {MOST_SCANNED} parameters and \
+                 {MOST_POINTS} worlds",
+                scanned.len(),
+                names.join(", ")
+            );
+            return Err(FitError::Conflict(why).into());
+        }
+        Ok(())
+    }
+
     /// Puts values drawn from the priors into settings; the view's orientation, offsets and mass are no settings and
     /// stay what they are.
     pub(super) fn draw(&self, file: &mut FitFile) -> Result<(), Error> {
@@ -164,13 +212,14 @@ impl UnknownWorld {
         if let (true, Velocity::Keplerian { drag }) =
             (self.search.drag_is_spin, &mut file.motion.velocity)
         {
-            *drag = file.hole.spin;
+            *drag = None;
         }
         Ok(())
     }
 
     fn check(&self) -> Result<(), Error> {
         self.free()?;
+        self.check_scan()?;
         let WorldSearch { starts, coarse, fine, .. } = &self.search;
         let within = |key: &str, value: usize, [low, high]: [usize; 2]| {
             let allowed = format!("{low} to {high}");
@@ -254,6 +303,21 @@ impl FitFile {
             );
             return Err(FitError::Conflict(why).into());
         }
+        self.check_drag(&world)?;
         Ok(Some(world))
+    }
+
+    /// Where the flow follows the hole, it does so in the file as well: a simulation would have another flow otherwise.
+    fn check_drag(&self, world: &UnknownWorld) -> Result<(), Error> {
+        let Velocity::Keplerian { drag: Some(drag) } = self.motion.velocity else { return Ok(()) };
+        let spin = self.hole.spin * self.motion.axis.map_or(1.0, |[.., z]| z);
+        if !world.search.drag_is_spin || drag == spin {
+            return Ok(());
+        }
+        let why = format!(
+            "motion.velocity.keplerian.drag = {drag} and world.search.drag_is_spin exclude each other where the spin \
+             along the axis is {spin}: leave the drag out, `velocity = {{ keplerian = {{}} }}`"
+        );
+        Err(FitError::Conflict(why).into())
     }
 }

@@ -3,6 +3,7 @@
 use super::change::{self, change};
 use super::{Result, axis, linear, motion};
 use crate::fit::linear::Change;
+use crate::fit::settings;
 use crate::fit::settings::{
     FitError, FitFile, Kind, LossKind, Occupancy, Optimiser, Start, Within, refuse,
 };
@@ -43,17 +44,7 @@ pub fn representation(
 fn of_matter(file: &FitFile, registry: &Registry) -> Result<Box<dyn Representation<f32>>> {
     let chosen = &file.representation;
     let network = |settings: NetworkSettings| {
-        Network::new(NetworkSettings {
-            degree: chosen.degree,
-            width: chosen.width,
-            hidden_layers: chosen.hidden_layers,
-            skip_after: settings.skip_after.filter(|layer| *layer <= chosen.hidden_layers),
-            length_scale: chosen.length_scale,
-            time_scale: chosen.time_scale,
-            activation: chosen.activation,
-            ..settings
-        })
-        .within("representation")
+        Network::new(chosen_network(chosen, settings)).within("representation")
     };
     let r = file.region.r_max;
     Ok(match &chosen.kind {
@@ -78,22 +69,34 @@ fn of_matter(file: &FitFile, registry: &Registry) -> Result<Box<dyn Representati
             Box::new(Spline::cube(chosen.grid_nodes(), r, degree(file)).within("representation")?)
         }
         Kind::Grid | Kind::LinearGrid => {
-            // As dark as a network starts, sigmoid(−10).
-            let (activation, initial) = match chosen.activation {
-                _ if chosen.kind == Kind::LinearGrid => (Activation::Linear, 0.0),
-                Activation::Linear => (Activation::Linear, 0.0),
-                other => (other, -10.0),
-            };
-            let settings = GridSettings {
-                nodes: [chosen.grid_nodes(); 3],
-                low: [-r; 3],
-                high: [r; 3],
-                activation,
-                initial,
-            };
-            Box::new(Grid::new(settings).within("representation")?)
+            Box::new(Grid::new(chosen_grid(chosen, r)).within("representation")?)
         }
     })
+}
+
+/// The paper's network with what the file says of it.
+fn chosen_network(chosen: &settings::Representation, paper: NetworkSettings) -> NetworkSettings {
+    NetworkSettings {
+        degree: chosen.degree,
+        width: chosen.width,
+        hidden_layers: chosen.hidden_layers,
+        skip_after: paper.skip_after.filter(|layer| *layer <= chosen.hidden_layers),
+        length_scale: chosen.length_scale,
+        time_scale: chosen.time_scale,
+        activation: chosen.activation,
+        ..paper
+    }
+}
+
+/// Trilinear voxels of the cube |x| ≤ `r`, as dark as a network starts: sigmoid(−10).
+fn chosen_grid(chosen: &settings::Representation, r: f64) -> GridSettings {
+    let (activation, initial) = match chosen.activation {
+        _ if chosen.kind == Kind::LinearGrid => (Activation::Linear, 0.0),
+        Activation::Linear => (Activation::Linear, 0.0),
+        other => (other, -10.0),
+    };
+    let nodes = [chosen.grid_nodes(); 3];
+    GridSettings { nodes, low: [-r; 3], high: [r; 3], activation, initial }
 }
 
 /// What is between the nodes of a linear grid.

@@ -9,7 +9,7 @@ use crate::polarization::{
 };
 use crate::representation::Degree;
 use crate::scene::Scene;
-use crate::transport::{PreparedScene, Scratch};
+use crate::transport::{PreparedScene, RayResult, Scratch};
 use core::f64::consts::{PI, TAU};
 
 /// The textbook's exponents, a field of these components (vertical, radial, toroidal).
@@ -175,12 +175,15 @@ fn exact_polarised_spot_of_the_renderer() {
     let spot = |x: [f64; 3]| (-0.5 * distance(x, center).powi(2)).exp();
     let axis = Axis::new([0.0, 0.0, 1.0]).unwrap();
     let found = model.movie_of(axis, &spot, &mut Batch::default());
-    let pixels = side * side;
-    let mut lit = 0;
-    let mut worst = 0.0f64;
     let mut scratch = Scratch::default();
-    let seen: Vec<_> =
-        (0..pixels).map(|k| scene.observe(alpha[k], beta[k], &mut scratch).unwrap()).collect();
+    let rays = alpha.iter().zip(&beta);
+    let seen: Vec<_> = rays.map(|(x, y)| scene.observe(*x, *y, &mut scratch).unwrap()).collect();
+    compare_stokes(&found, &seen);
+}
+
+/// Planes of I, Q and U beside what the renderer sees in every pixel.
+fn compare_stokes(found: &[f64], seen: &[RayResult]) {
+    let (pixels, mut lit, mut worst) = (seen.len(), 0, 0.0f64);
     let peak = seen.iter().fold(0.0f64, |peak, seen| peak.max(seen.intensity));
     for (k, seen) in seen.iter().enumerate() {
         lit += usize::from(seen.intensity > 0.1 * peak);

@@ -8,7 +8,7 @@ mod statistics;
 #[cfg(test)]
 mod tests;
 
-pub use statistics::{Pairs, Part, Statistics};
+pub use statistics::{Pairs, Part, PixelSum, Statistics};
 
 /// Standard deviations of χ² that chance is granted: 5 of them come about once in a million.
 pub const CHANCE: f64 = 5.0;

@@ -24,6 +24,15 @@ impl Part {
     }
 }
 
+/// The residuals of one pixel in all frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PixelSum {
+    /// Their number and squares.
+    pub part: Part,
+    /// Their sum, in σ.
+    pub sum: f64,
+}
+
 /// Sums over pairs of residuals that are neighbours.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pairs {
@@ -55,6 +64,8 @@ pub struct Statistics {
     pub all: Part,
     /// By frame; without data where nothing was observed.
     pub frames: Vec<Part>,
+    /// By pixel, or by number where data of a frame have no stations.
+    pub pixels: Vec<PixelSum>,
     /// By the stations of a baseline, triangle or quadrangle.
     pub groups: BTreeMap<Vec<u16>, Part>,
     /// By station, each in all groups that it is part of.
@@ -113,6 +124,11 @@ impl Statistics {
 
     fn add_plain(&mut self, value: f64, now: &mut Frame, width: usize) {
         let at = now.plain.len();
+        if self.pixels.len() == at {
+            self.pixels.push(PixelSum::default());
+        }
+        self.pixels[at].part.add(value);
+        self.pixels[at].sum += value;
         if let Some(before) = self.before.plain.get(at) {
             self.in_time.add(*before, value);
         }

@@ -11,6 +11,7 @@ mod polish;
 mod prior;
 mod problem;
 mod redshift;
+mod scan;
 mod spread;
 mod tangents;
 #[cfg(test)]
@@ -22,6 +23,7 @@ pub use model::{Law, WorldModel};
 pub use polish::{Polish, Polished};
 pub use prior::Prior;
 pub use problem::{Effort, Estimate, Free, WorldProblem};
+pub use scan::{ScanPoint, Scanned, WorldScan};
 pub use spread::Spread;
 pub use tangents::Tangents;
 

@@ -36,7 +36,7 @@ impl Law {
         let factor = world.get(Parameter::Rotation);
         let law = match self {
             Law::Infall(drag) => infall(*drag, world, axis)?,
-            _ => self.circular(world.get(Parameter::Spin)),
+            _ => self.circular(world.get(Parameter::Spin) * axis.vector()[2]),
         };
         Ok(match law {
             law if factor == 1.0 => law,
@@ -54,7 +54,8 @@ impl Law {
         }
     }
 
-    /// The angular velocity of matter that stays at its radius, with the derivatives that radius, spin and factor have.
+    /// The angular velocity of matter that stays at its radius, with the derivatives that radius, spin (along the axis)
+    /// and factor have.
     pub(super) fn rate(&self, r: Number, spin: Number, factor: Number) -> Number {
         let law = self.circular(spin.value);
         let (rate, slope) = (law.rate(r.value), law.slope(r.value));

@@ -124,7 +124,10 @@ impl Builder<'_> {
         let falling = self.flow.at(r);
         let velocity = match falling {
             Some([_, turn]) => turn,
-            None => self.model.law.rate(r, spin, of(Parameter::Rotation)),
+            None => {
+                let along = Number::constant(self.model.axis.vector()[2]);
+                self.model.law.rate(r, spin * along, of(Parameter::Rotation))
+            }
         };
         let plain = self.number(at.weight, by.weight) * Number::constant(self.jy);
         let momentum = vector(at.momentum, by.momentum);

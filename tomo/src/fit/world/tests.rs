@@ -257,6 +257,27 @@ fn exact_pixels_of_the_ring_are_means_over_rays() {
     }
 }
 
+/// The search for the world of a hot spot in twelve frames.
+fn of_hot_spot<'a>(
+    model: &'a WorldModel,
+    free: &'a [Free],
+    terms: &'a [Weighted<'a, f32>],
+) -> WorldProblem<'a, f32> {
+    WorldProblem {
+        model,
+        known: World::new(0.0, 0.5, 2.0),
+        free,
+        frames: &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11],
+        terms,
+        half_width: 9.0,
+        upper: 3.0,
+        flux: None,
+        penalties: &[],
+        scale: 1.0,
+        effort: Effort { nodes: 16, degree: Degree::Linear, iterations: 30 },
+    }
+}
+
 /// From nearby to the best world, with images of other rays and noise of 1 %: the errors hold what is left.
 #[test]
 fn exact_steps_lead_to_the_best_world() {
@@ -281,20 +302,8 @@ fn exact_steps_lead_to_the_best_world() {
         Free { parameter: Parameter::Inclination, prior: Prior::Isotropic { low: 0.0, high: PI } },
         Free { parameter: Parameter::PositionAngle, prior: Prior::Uniform { low: -PI, high: PI } },
     ];
-    let frames: Vec<usize> = (0..12).collect();
-    let problem = WorldProblem {
-        model: &model,
-        known: truth,
-        free: &free,
-        frames: &frames,
-        terms: &terms,
-        half_width: 9.0,
-        upper: 3.0,
-        flux: None,
-        penalties: &[],
-        scale: 1.0,
-        effort: Effort { nodes: 18, degree: Degree::Linear, iterations: 60 },
-    };
+    let effort = Effort { nodes: 18, degree: Degree::Linear, iterations: 60 };
+    let problem = WorldProblem { known: truth, effort, ..of_hot_spot(&model, &free, &terms) };
     let away = truth.with(Parameter::Inclination, 1.13).with(Parameter::PositionAngle, 0.6);
     let start = problem.solve(away).unwrap();
     let found = problem.polish(&start, &Polish::default()).unwrap();
@@ -334,20 +343,7 @@ fn exact_world_of_a_hot_spot_is_found_from_everywhere() {
         Free { parameter: Parameter::Inclination, prior: Prior::Isotropic { low: 0.0, high: PI } },
         Free { parameter: Parameter::PositionAngle, prior: all_round },
     ];
-    let frames: Vec<usize> = (0..12).collect();
-    let problem = WorldProblem {
-        model: &model,
-        known: World::new(0.0, 0.5, 2.0),
-        free: &free,
-        frames: &frames,
-        terms: &terms,
-        half_width: 9.0,
-        upper: 3.0,
-        flux: None,
-        penalties: &[],
-        scale: 1.0,
-        effort: Effort { nodes: 16, degree: Degree::Linear, iterations: 30 },
-    };
+    let problem = of_hot_spot(&model, &free, &terms);
     let apart = |world: &World| {
         free.map(|Free { parameter, .. }| {
             parameter.difference(world.get(parameter), truth.get(parameter)).abs()

@@ -179,18 +179,7 @@ impl Adaptive<'_> {
                 if contrast.is_some() || error > tolerance || ring() {
                     let around =
                         core::array::from_fn(|k| *neighbor(k as isize % 3 - 1, k as isize / 3 - 1));
-                    cuts.push(Cut {
-                        pixel: pixels.len(),
-                        column,
-                        row,
-                        cells: Vec::new(),
-                        bright,
-                        around,
-                        contrast: 0.0,
-                        samples: 0,
-                        rays: 0,
-                        unresolved: 0,
-                    });
+                    cuts.push(Cut::whole(pixels.len(), [column, row], bright, around));
                 }
                 pixels.push(of_one_ray(center, error));
             }

@@ -140,6 +140,22 @@ fn exact_polarized_volumes_are_hot_spots() {
     assert!((3.0..5.0).contains(&(coarse[3] / fine[3])), "{coarse:?} {fine:?}");
 }
 
+/// The chord of a straight ray through the cube |x| < 3.
+fn chord_of_cube(offset: [f64; 3], direction: [f64; 3]) -> f64 {
+    let mut ends = [f64::NEG_INFINITY, f64::INFINITY];
+    for (x, d) in offset.iter().zip(direction) {
+        if d == 0.0 {
+            if x.abs() > 3.0 {
+                return 0.0;
+            }
+            continue;
+        }
+        let (near, far) = ((-3.0 * d.signum() - x) / d, (3.0 * d.signum() - x) / d);
+        ends = [ends[0].max(near), ends[1].min(far)];
+    }
+    (ends[1] - ends[0]).max(0.0)
+}
+
 /// Without lensing the picture of a uniform box or ball is its chords: exactly up to the last
 /// cell on either side, whose edge lies somewhere in a panel.
 #[test]
@@ -155,18 +171,7 @@ fn exact_chords_of_uniform_bodies() {
     };
     let slab = |alpha: f64, beta: f64| {
         let (offset, direction) = at(alpha, beta);
-        let mut ends = [f64::NEG_INFINITY, f64::INFINITY];
-        for (x, d) in offset.iter().zip(direction) {
-            if d == 0.0 {
-                if x.abs() > 3.0 {
-                    return 0.0;
-                }
-                continue;
-            }
-            let (near, far) = ((-3.0 * d.signum() - x) / d, (3.0 * d.signum() - x) / d);
-            ends = [ends[0].max(near), ends[1].min(far)];
-        }
-        (ends[1] - ends[0]).max(0.0)
+        chord_of_cube(offset, direction)
     };
     let ball = |alpha: f64, beta: f64| {
         let (offset, direction) = at(alpha, beta);

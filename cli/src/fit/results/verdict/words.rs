@@ -178,7 +178,7 @@ fn chi2_of(name: &str, tested: &Tested) -> String {
 }
 
 /// Three digits.
-fn short(x: f64) -> String {
+pub(super) fn short(x: f64) -> String {
     match x.abs() {
         size if !(1e-3..1e5).contains(&size) => format!("{x:.2e}"),
         size if size >= 100.0 => format!("{x:.0}"),

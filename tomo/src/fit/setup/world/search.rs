@@ -1,10 +1,12 @@
-//! The search for a world: from many starts with coarse voxels, then with fine ones.
+//! The search for a world: from many starts or over a grid with coarse voxels, then with fine ones.
 
 use super::posterior::{polished, surely};
 use super::seen::Seen;
 use crate::fit::settings::{FitFile, UnknownWorld};
 use crate::fit::setup::{Measured, Result};
-use crate::fit::world::{Exploration, Explored, Spread, World, WorldProblem, WorldWatch};
+use crate::fit::world::{
+    Exploration, Explored, Scanned, Spread, World, WorldProblem, WorldScan, WorldWatch,
+};
 
 /// Where one search ended, in [`World`]'s units.
 #[derive(Clone, Debug)]
@@ -35,8 +37,10 @@ pub struct FoundWorld {
     /// Errors that the search took over those of the data: below 1 where residuals are much smaller than the errors,
     /// as those of images without noise.
     pub noise_factor: f64,
-    /// The searches from all starts.
+    /// The searches from all starts; none where a grid was scanned in their place.
     pub trials: Vec<Trial>,
+    /// The grid of worlds, if one was scanned.
+    pub scan: Option<WorldScan>,
 }
 
 /// Told which search of how many goes on, its number of worlds and its least value; says whether to go on.
@@ -56,33 +60,26 @@ pub fn find_world(
     watch: &mut SearchWatch<'_>,
 ) -> Result<Option<FoundWorld>> {
     let search = &unknown.search;
-    let count = search.starts + 1;
     let coarse = Seen::new(file, measured, &search.coarse)?;
     let first =
         coarse.with(unknown, &search.coarse, 1.0, |problem| least(problem, search.starts))?;
-    let trials = coarse.with(unknown, &search.coarse, scale(first), |problem| {
-        let mut trials = Vec::new();
-        for (k, start) in problem.starts(search.starts).into_iter().enumerate() {
-            let mut told = |worlds: usize, best: f64| watch((k, count), worlds, best);
-            let seed = file.seed.wrapping_add(k as u64);
-            let how = Exploration { width: WIDTHS[0], worlds: search.coarse.worlds, seed };
-            let Some(explored) = problem.explore(start, &how, &mut told)? else { return Ok(None) };
-            trials.push(trial(&explored, problem));
+    let over = unknown.scanned();
+    let found = coarse.with(unknown, &search.coarse, scale(first), |problem| {
+        if over.is_empty() {
+            return from_starts(problem, file.seed, unknown, watch);
         }
-        Ok(Some(trials))
+        on_grid(problem, &over, file.seed, unknown, watch)
     })?;
-    let Some(trials) = trials else { return Ok(None) };
-    let Some(best) = trials.iter().min_by(|a, b| a.value.total_cmp(&b.value)) else {
-        return Ok(None);
-    };
+    let Some(Found { start, reduced_chi2, trials, scan }) = found else { return Ok(None) };
     let fine = Seen::new(file, measured, &search.fine)?;
     // The coarse search has left less than it began with.
-    let scale = scale(best.reduced_chi2);
+    let scale = scale(reduced_chi2);
+    let count = trials.len().max(1) + 1;
     let mut told = |worlds: usize, best: f64| watch((count - 1, count), worlds, best);
     let told: &mut WorldWatch<'_> = &mut told;
     let found = fine.with(unknown, &search.fine, scale, |problem| {
-        let how = Exploration { width: WIDTHS[1], worlds: search.fine.worlds, seed: file.seed };
-        let Some(explored) = problem.explore(best.end, &how, told)? else { return Ok(None) };
+        let how = Exploration { width: width(&over), worlds: search.fine.worlds, seed: file.seed };
+        let Some(explored) = problem.explore(start, &how, told)? else { return Ok(None) };
         let reduced = problem.scale * problem.reduced(explored.best.chi2);
         if problem.model.ring.is_some() {
             let (polished, reduced) = polished(problem, &explored.best)?;
@@ -100,7 +97,60 @@ pub fn find_world(
         noise_factor: scale.powf(-0.5),
         spread,
         trials,
+        scan,
     }))
+}
+
+/// What the coarse search has found: where the fine one begins, with χ²/N there.
+struct Found {
+    start: World,
+    reduced_chi2: f64,
+    trials: Vec<Trial>,
+    scan: Option<WorldScan>,
+}
+
+fn from_starts(
+    problem: &WorldProblem<'_, f32>,
+    seed: u64,
+    UnknownWorld { search, .. }: &UnknownWorld,
+    watch: &mut SearchWatch<'_>,
+) -> Result<Option<Found>> {
+    let mut trials: Vec<Trial> = Vec::new();
+    for (k, start) in problem.starts(search.starts).into_iter().enumerate() {
+        let mut told = |worlds: usize, best: f64| watch((k, search.starts + 1), worlds, best);
+        let seed = seed.wrapping_add(k as u64);
+        let how = Exploration { width: WIDTHS[0], worlds: search.coarse.worlds, seed };
+        let Some(explored) = problem.explore(start, &how, &mut told)? else { return Ok(None) };
+        trials.push(trial(&explored, problem));
+    }
+    let best = trials.iter().min_by(|a, b| a.value.total_cmp(&b.value));
+    let best = best.map(|best| (best.end, best.reduced_chi2));
+    Ok(best.map(|(start, reduced_chi2)| Found { start, reduced_chi2, trials, scan: None }))
+}
+
+fn on_grid(
+    problem: &WorldProblem<'_, f32>,
+    over: &[Scanned],
+    seed: u64,
+    UnknownWorld { search, .. }: &UnknownWorld,
+    watch: &mut SearchWatch<'_>,
+) -> Result<Option<Found>> {
+    let mut told = |worlds: usize, best: f64| watch((0, 2), worlds, best);
+    let how = Exploration { width: WIDTHS[0], worlds: search.coarse.worlds, seed };
+    let Some(scan) = problem.scan(over, &how, &mut told)? else { return Ok(None) };
+    let best = scan.best().map(|best| (best.world, best.reduced_chi2));
+    Ok(best.map(|(start, reduced_chi2)| Found {
+        start,
+        reduced_chi2,
+        trials: Vec::new(),
+        scan: Some(scan),
+    }))
+}
+
+/// Width of the fine search's first population: where a grid is coarse, half of its cells.
+fn width(over: &[Scanned]) -> f64 {
+    let cell = |scanned: &Scanned| 0.5 * scanned.step() / scanned.parameter.scale();
+    over.iter().map(cell).fold(WIDTHS[1], f64::max)
 }
 
 /// The lowest point of the quadratic form, if it explains the data better than the best world that was evaluated.

@@ -1,0 +1,130 @@
+//! Residuals by frame, by baseline and by station.
+
+use super::Judged;
+use super::words::short;
+use crate::report::{Axis, LinePlot, Marks, Series, Table};
+use kerrlight_tomo::fit::verdict::{Errors, Part, Tested};
+use std::collections::BTreeSet;
+
+/// χ² per data point of parts at x, with the scatter of chance √(2/n).
+fn series<'a>(name: &str, parts: impl Iterator<Item = (f64, &'a Part)>) -> Series {
+    let (mut points, mut errors) = (Vec::new(), Vec::new());
+    for (x, part) in parts {
+        if let Some(chi2) = part.per_datum() {
+            points.push([x, chi2]);
+            errors.push((2.0 / part.count as f64).sqrt());
+        }
+    }
+    Series { name: name.to_owned(), points, errors, marks: Marks::Points }
+}
+
+/// With a line where χ² is expected, on a logarithmic axis if most of it would be lost on a linear one.
+fn plot(
+    [title, caption]: [&str; 2],
+    [label, unit]: [&str; 2],
+    mut series: Vec<Series>,
+    expected: Option<f64>,
+) -> Option<LinePlot> {
+    series.retain(|series| series.points.len() > 1);
+    let points = || series.iter().flat_map(|series| &series.points);
+    let ends = |c: usize| {
+        let fold = |[low, high]: [f64; 2], x: f64| [low.min(x), high.max(x)];
+        points().map(|point| point[c]).fold([f64::INFINITY, f64::NEG_INFINITY], fold)
+    };
+    let ([first, last], [least, most]) = (ends(0), ends(1));
+    let log = least > 0.0 && most > 20.0 * least.max(1.0);
+    if series.is_empty() {
+        return None;
+    }
+    if log {
+        series.iter_mut().for_each(|series| series.errors.clear());
+    }
+    series.extend(expected.map(|expected| Series {
+        name: "expected".to_owned(),
+        points: vec![[first, expected], [last, expected]],
+        errors: Vec::new(),
+        marks: Marks::Line,
+    }));
+    Some(LinePlot {
+        title: title.to_owned(),
+        caption: caption.to_owned(),
+        x: Axis { label: label.to_owned(), unit: unit.to_owned(), log: false },
+        y: Axis { label: "χ² per data point".to_owned(), unit: String::new(), log },
+        series,
+    })
+}
+
+impl Judged {
+    /// Where χ² of the first data with errors is expected.
+    fn expected(&self) -> Option<f64> {
+        let noisy = |tested: &&Tested| tested.errors != Errors::Weight;
+        self.terms.iter().map(|(_, tested)| tested).find(noisy).map(|tested| tested.expected.chi2)
+    }
+
+    /// Residuals of each frame; nothing of a single one.
+    pub fn over_time(&self) -> Option<LinePlot> {
+        let of = |(name, tested): &(String, Tested)| {
+            series(name, self.times.iter().copied().zip(&tested.statistics.frames))
+        };
+        let caption = "χ² per data point of each frame. Bars are the scatter of chance, √(2/n) for n data points. A frame that \
+                       stands out, or a trend, is something that the model cannot do at that time.";
+        let series = self.terms.iter().map(of).collect();
+        plot(["Residuals over time", caption], ["time", "GM/c³"], series, self.expected())
+    }
+
+    /// Residuals of each baseline, triangle and quadrangle against its longest baseline, whose length the caller knows.
+    pub fn over_baselines(&self, length: impl Fn([u16; 2]) -> Option<f64>) -> Option<LinePlot> {
+        let longest = |stations: &[u16]| {
+            let pairs = stations.iter().flat_map(|a| stations.iter().map(|b| [*a, *b]));
+            pairs.filter_map(&length).reduce(f64::max)
+        };
+        let of = |(name, tested): &(String, Tested)| {
+            let groups = tested.statistics.groups.iter();
+            series(name, groups.filter_map(|(stations, part)| Some((longest(stations)?, part))))
+        };
+        let caption = "χ² per data point of each pair of stations, triangle and quadrangle over all frames, against the mean \
+                       length of its longest baseline. Bars are the scatter of chance. What rises to long baselines is \
+                       detail that the model lacks; single points far up are stations that are not calibrated.";
+        let series = self.terms.iter().map(of).collect();
+        let axis = ["longest baseline", "10⁹ wavelengths"];
+        plot(["Residuals of baselines", caption], axis, series, self.expected())
+    }
+
+    /// Residuals of all data that a station is part of; nothing without stations.
+    pub fn by_station(&self) -> Option<Table> {
+        let measured: Vec<_> =
+            self.terms.iter().filter(|(_, t)| !t.statistics.stations.is_empty()).collect();
+        let stations: BTreeSet<u16> =
+            measured.iter().flat_map(|(_, t)| t.statistics.stations.keys().copied()).collect();
+        let cells = |station: u16, tested: &Tested| {
+            let part = tested.statistics.stations.get(&station).copied().unwrap_or_default();
+            let chi2 = part.per_datum().map_or("–".to_owned(), short);
+            [chi2, part.count.to_string()]
+        };
+        let row = |station: u16| {
+            let cells = measured.iter().flat_map(|(_, tested)| cells(station, tested));
+            [self.names(&[station])].into_iter().chain(cells).collect()
+        };
+        let heads =
+            measured.iter().flat_map(|(name, _)| [format!("χ² of {name}"), "number".to_owned()]);
+        (!stations.is_empty()).then(|| Table {
+            title: "Residuals of stations".to_owned(),
+            caption: "χ² per data point of all data that a station is part of, and their number."
+                .to_owned(),
+            head: ["station".to_owned()].into_iter().chain(heads).collect(),
+            rows: stations.iter().map(|station| row(*station)).collect(),
+            links: Vec::new(),
+        })
+    }
+
+    /// For results.json: χ² per data point by station.
+    pub(super) fn station_values(
+        &self,
+        tested: &Tested,
+    ) -> serde_json::Map<String, serde_json::Value> {
+        let of = |(station, part): (&u16, &Part)| {
+            (self.names(&[*station]), serde_json::json!(part.per_datum()))
+        };
+        tested.statistics.stations.iter().map(of).collect()
+    }
+}

@@ -1,0 +1,78 @@
+//! Rows of the sparse matrix from nodes to the pixels of a frame.
+
+use super::operator::{Active, NONE};
+use super::walk::Place;
+use crate::representation::spline::{Degree, STENCIL};
+use crate::simd::Float;
+
+/// The rows of a frame that are not empty.
+#[derive(Default)]
+pub(super) struct Rows<T> {
+    pub pixel: Vec<u32>,
+    pub starts: Vec<u32>,
+    pub columns: Vec<u32>,
+    pub entries: Vec<T>,
+}
+
+impl<T: Float> Rows<T> {
+    /// Adds up what a ray's nodes take from each column; `place` remembers where in the row a column is.
+    pub fn push(
+        &mut self,
+        pixel: u32,
+        places: &[Place<T>],
+        active: &Active,
+        (corners, degree): (&[usize], Degree),
+        place: &mut [u32],
+    ) {
+        let start = self.columns.len();
+        let mut weights = [T::zero(); STENCIL];
+        for at in places {
+            at.weights(degree, &mut weights);
+            for (corner, entry) in corners.iter().zip(weights) {
+                let column = active.column[at.corner as usize + corner];
+                if column == NONE || entry == T::zero() {
+                    continue;
+                }
+                let known = place[column as usize] as usize;
+                if known >= start && self.columns.get(known) == Some(&column) {
+                    self.entries[known] += entry;
+                } else {
+                    place[column as usize] = self.columns.len() as u32;
+                    self.columns.push(column);
+                    self.entries.push(entry);
+                }
+            }
+        }
+        if self.columns.len() > start {
+            self.pixel.push(pixel);
+            self.starts.push(self.columns.len() as u32);
+        }
+    }
+
+    pub fn forward(&self, x: &[T], image: &mut [T]) {
+        for (pixel, ends) in self.pixel.iter().zip(self.starts.windows(2)) {
+            let range = ends[0] as usize..ends[1] as usize;
+            let (columns, entries) = (&self.columns[range.clone()], &self.entries[range]);
+            let sum = columns.iter().zip(entries).map(|(c, e)| *e * x[*c as usize]);
+            image[*pixel as usize] += sum.fold(T::zero(), |sum, x| sum + x);
+        }
+    }
+
+    pub fn adjoint(&self, gradient: &[T], sums: &mut [T]) {
+        for (pixel, ends) in self.pixel.iter().zip(self.starts.windows(2)) {
+            let slope = gradient[*pixel as usize];
+            if slope == T::zero() {
+                continue;
+            }
+            let range = ends[0] as usize..ends[1] as usize;
+            let (columns, entries) = (&self.columns[range.clone()], &self.entries[range]);
+            for (column, entry) in columns.iter().zip(entries) {
+                sums[*column as usize] += *entry * slope;
+            }
+        }
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.entries.len() * (size_of::<T>() + 4) + self.pixel.len() * 8
+    }
+}
