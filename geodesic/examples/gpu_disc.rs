@@ -37,6 +37,7 @@ fn uniform(hole: &Kerr, camera: Camera, inner: f32) -> Vec<u8> {
         row: 0,
         quadratures: true,
         end: 0.0,
+        sphere: 0.0,
     };
     let mut bytes = task.bytes()[..192].to_vec();
     bytes.extend([WIDTH, HEIGHT].into_iter().flat_map(u32::to_le_bytes));

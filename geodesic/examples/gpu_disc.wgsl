@@ -50,7 +50,7 @@ fn look(x: vec2<f32>, y: vec2<f32>) -> vec4<f32> {
         var h = 0.0;
         let done = kerr_ends(ray, walk, &series, &h);
         if kerr_above(walk.n, walk.dn) != (kerr_height(&series, h).x > 0.0) {
-            let at = kerr_solve(&series, true, 0.0, h);
+            let at = kerr_solve(&series, true, 0.0, 0.0, h);
             let point = kerr_point(picture.hole, ray, walk, &series, at);
             let r = 1.0 / point.inverse_radius;
             if (r > picture.inner) && (r < picture.outer) {

@@ -8,11 +8,13 @@ use crate::integrate::outcome::{Outcome, Unresolved};
 use crate::rays::block::{
     DeviceEnd, DeviceRays, DeviceRequest, DeviceSample, PlaneCrossing, RayDevice,
 };
+use crate::rays::nodes::{Node, NodeColumns};
 use crate::screen::view::View;
 use crate::spacetime::kerr::Kerr;
 use crate::wgsl::{
-    self, CROSSING_BYTES, END_BYTES, POINT_BYTES, SAMPLE_BYTES, TASK_BYTES, Task, flags,
+    self, CROSSING_BYTES, END_BYTES, NODE_BYTES, POINT_BYTES, SAMPLE_BYTES, TASK_BYTES, Task, flags,
 };
+use core::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
 /// Traces rays on a graphics device, in floats: about six digits.
@@ -34,6 +36,7 @@ use std::sync::{Mutex, PoisonError};
 pub struct GpuTracer {
     device: Device,
     program: Program,
+    places: Program,
     failure: Mutex<Option<GpuError>>,
 }
 
@@ -50,7 +53,13 @@ impl GpuTracer {
         let kinds = bindings(&[], &[], [0; 3]);
         let program =
             Program::new(&device, &wgsl::program(), &["kerr_trace", "kerr_sample"], &kinds)?;
-        Ok(GpuTracer { device, program, failure: Mutex::default() })
+        let places = Program::new(
+            &device,
+            &wgsl::places(),
+            &["kerr_place"],
+            &node_bindings(&[], [&[]; 3], 0),
+        )?;
+        Ok(GpuTracer { device, program, places, failure: Mutex::default() })
     }
 
     /// The name of the device.
@@ -85,12 +94,85 @@ impl GpuTracer {
             row: ROW,
             quadratures: request.quadratures,
             end: request.end,
+            sphere: request.sphere.map_or(0.0, |radius| 1.0 / radius),
         };
         let most = self.most_rays(request);
         for (x, y) in x.chunks(most).zip(y.chunks(most)) {
             self.trace_some(Task { rays: x.len() as u32, ..task }, (x, y), rays)?;
         }
         Ok(())
+    }
+
+    /// Finds where rays are at given Mino times: see [`RayDevice::place`].
+    ///
+    /// # Errors
+    /// If the device fails: [`GpuError`].
+    ///
+    /// # Panics
+    /// If the columns differ in length, or there are not as many spans.
+    pub fn place(
+        &self,
+        hole: &Kerr,
+        view: &View,
+        (x, y): (&[f64], &[f64]),
+        spans: &[Range<usize>],
+        nodes: &mut NodeColumns,
+    ) -> Result<(), GpuError> {
+        assert!(x.len() == y.len() && spans.len() == x.len(), "as many y and spans as x");
+        let most = (self.device.largest / NODE_BYTES as u64) as usize;
+        let pieces: Vec<Piece> = spans.iter().enumerate().flat_map(pieces).collect();
+        let mut rest = &pieces[..];
+        while let Some((_, Range { start, .. })) = rest.first() {
+            let fits = |piece: &&Piece| piece.1.end - start <= most;
+            let count = rest.iter().take_while(fits).count().max(1);
+            self.place_some((hole, view), (x, y), &rest[..count], nodes)?;
+            rest = &rest[count..];
+        }
+        Ok(())
+    }
+
+    fn place_some(
+        &self,
+        (hole, view): (&Kerr, &View),
+        (x, y): (&[f64], &[f64]),
+        pieces: &[Piece],
+        nodes: &mut NodeColumns,
+    ) -> Result<(), GpuError> {
+        let all = pieces[0].1.start..pieces[pieces.len() - 1].1.end;
+        let task = Task {
+            hole: *hole,
+            view: *view,
+            rays: pieces.len() as u32,
+            crossings: 0,
+            samples: 0,
+            row: ROW,
+            quadratures: true,
+            end: 0.0,
+            sphere: 0.0,
+        };
+        let of_pieces =
+            |column: &[f64]| -> Vec<f64> { pieces.iter().map(|(ray, _)| column[*ray]).collect() };
+        let points = wgsl::point_bytes(&of_pieces(x), &of_pieces(y));
+        let words = pieces.iter().flat_map(|(_, span)| [span.start - all.start, span.len()]);
+        let spans: Vec<u8> = words.flat_map(|word| (word as u32).to_le_bytes()).collect();
+        let times = nodes.mino_times()[all.clone()].iter().map(|time| *time as f32);
+        let times: Vec<u8> = times.flat_map(f32::to_le_bytes).collect();
+        let size = (all.len() * NODE_BYTES) as u64;
+        let uniform = task.bytes();
+        let bindings = node_bindings(&uniform, [&points, &spans, &times], size);
+        let outputs = self.places.run(&self.device, &[0], task.rays, &bindings)?;
+        let start = task.delay_start();
+        for (k, bytes) in all.zip(outputs[0].chunks_exact(NODE_BYTES)) {
+            let step = (nodes.mino_times()[k], nodes.weights()[k]);
+            nodes.set(k, node(bytes, hole, step, start).ok_or_else(unfinished)?);
+        }
+        Ok(())
+    }
+
+    /// Keeps a failure, and names it to whoever traces.
+    fn note(&self, failure: GpuError) -> Error {
+        *self.failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(failure);
+        Error::out_of_range("graphics device", f64::NAN, "one that does not fail")
     }
 
     /// Rays whose results fit the largest buffer.
@@ -125,6 +207,11 @@ impl GpuTracer {
             sized(1).chunks_exact(CROSSING_BYTES).map(|bytes| crossing(bytes, start)),
             sized(2).chunks_exact(SAMPLE_BYTES).map(|bytes| sample(bytes, start)),
         );
+        let first = rays.ends().len() - count;
+        let last = |k: usize| rays.samples_of(k).last().map_or(1.0, |sample| sample.radius);
+        if (first..first + count).any(|k| last(k) == 0.0) {
+            return Err(unfinished());
+        }
         Ok(())
     }
 }
@@ -142,10 +229,18 @@ impl RayDevice for GpuTracer {
         request: &DeviceRequest,
         rays: &mut DeviceRays,
     ) -> Result<(), Error> {
-        GpuTracer::trace(self, hole, view, points, request, rays).map_err(|failure| {
-            *self.failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(failure);
-            Error::out_of_range("graphics device", f64::NAN, "one that does not fail")
-        })
+        GpuTracer::trace(self, hole, view, points, request, rays).map_err(|why| self.note(why))
+    }
+
+    fn place(
+        &self,
+        hole: &Kerr,
+        view: &View,
+        points: (&[f64], &[f64]),
+        spans: &[Range<usize>],
+        nodes: &mut NodeColumns,
+    ) -> Result<(), Error> {
+        GpuTracer::place(self, hole, view, points, spans, nodes).map_err(|why| self.note(why))
     }
 
     fn failure(&self) -> Option<String> {
@@ -157,6 +252,11 @@ impl RayDevice for GpuTracer {
 fn bindings<'a>(uniform: &'a [u8], points: &'a [u8], sizes: [u64; 3]) -> [Binding<'a>; 5] {
     let [ends, crossings, samples] = sizes.map(Binding::Output);
     [Binding::Uniform(uniform), Binding::Input(points), ends, crossings, samples]
+}
+
+fn node_bindings<'a>(uniform: &'a [u8], inputs: [&'a [u8]; 3], nodes: u64) -> [Binding<'a>; 5] {
+    let [points, spans, times] = inputs.map(Binding::Input);
+    [Binding::Uniform(uniform), points, spans, times, Binding::Output(nodes)]
 }
 
 fn word(bytes: &[u8], at: usize) -> u32 {
@@ -186,6 +286,8 @@ fn end(bytes: &[u8]) -> DeviceEnd {
         lambda: float(bytes, 8),
         eta: float(bytes, 9),
         steps: word(bytes, 10),
+        within: (float(bytes, 12) >= 0.0).then(|| [12, 13].map(|at| float(bytes, at))),
+        turning: Some(float(bytes, 11)).filter(|time| *time >= 0.0),
     }
 }
 
@@ -207,6 +309,43 @@ fn sample(bytes: &[u8], delay_start: f64) -> DeviceSample {
         azimuth: float(bytes, 2),
         delay: float(bytes, 3) + delay_start,
     }
+}
+
+/// Some nodes of a ray: its number and theirs.
+type Piece = (usize, Range<usize>);
+
+/// Most nodes of an invocation: devices end those that take too long.
+const MOST_NODES: usize = 1024;
+
+/// The nodes of a ray in pieces for one invocation each.
+fn pieces((ray, span): (usize, &Range<usize>)) -> impl Iterator<Item = Piece> {
+    let end = span.end;
+    span.clone().step_by(MOST_NODES).map(move |start| (ray, start..(start + MOST_NODES).min(end)))
+}
+
+fn unfinished() -> GpuError {
+    GpuError::Failed("it did not follow a ray to its end".to_owned())
+}
+
+/// `None` if the device did not get there.
+fn node(
+    bytes: &[u8],
+    hole: &Kerr,
+    (mino_time, step): (f64, f64),
+    delay_start: f64,
+) -> Option<Node> {
+    let (inverse_radius, cos_theta) = (float(bytes, 0), float(bytes, 1));
+    let radius = Some(1.0 / inverse_radius).filter(|_| inverse_radius > 0.0)?;
+    Some(Node {
+        radius,
+        cos_theta,
+        weight: hole.sigma(radius, cos_theta) * step,
+        mino_time,
+        azimuth: float(bytes, 2),
+        delay: float(bytes, 3) + delay_start,
+        radial_velocity: float(bytes, 4),
+        polar_velocity: float(bytes, 5),
+    })
 }
 
 /// Sums and products of two floats on the device, against exact ones.

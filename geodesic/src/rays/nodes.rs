@@ -106,6 +106,35 @@ impl NodeColumns {
         self.columns().into_iter().zip(from).for_each(|(to, from)| to.extend_from_slice(from));
     }
 
+    /// Mino times of all nodes.
+    pub fn mino_times(&self) -> &[f64] {
+        &self.mino_time
+    }
+
+    /// Puts `node` in the place of node `k`.
+    ///
+    /// # Panics
+    /// If there is no such node.
+    pub fn set(&mut self, k: usize, node: Node) {
+        let Node { radius, cos_theta, weight, mino_time, azimuth, delay, .. } = node;
+        let values = [
+            radius,
+            cos_theta,
+            weight,
+            mino_time,
+            azimuth,
+            delay,
+            node.radial_velocity,
+            node.polar_velocity,
+        ];
+        self.columns().into_iter().zip(values).for_each(|(column, value)| column[k] = value);
+    }
+
+    /// Weights of all nodes, in M.
+    pub fn weights(&self) -> &[f64] {
+        &self.weight
+    }
+
     /// All nodes.
     pub fn all(&self) -> RayNodes<'_> {
         self.view(0..self.len())

@@ -20,7 +20,8 @@
 //! }
 //! ```
 //!
-//! [`program`] adds bindings and the kernels `kerr_trace` and `kerr_sample`, one invocation a ray.
+//! [`program`] adds bindings and the kernels `kerr_trace` and `kerr_sample`, one invocation a ray; [`places`] adds
+//! `kerr_place`, which finds where rays are at given Mino times.
 //!
 //! # Numbers
 //! Coordinates, constants and outcomes are those of the rest of the crate. Floats are enough for a ray but for two
@@ -55,7 +56,8 @@
 //! | 204 | u32 | `camera` | 1: points are (x, y) of the lens; 0: (α, β) |
 //! | 208 | u32 | `row` | invocations in a row of the grid |
 //! | 212 | u32 | `quadratures` | 1: azimuths, delays and directions of escape are wanted |
-//! | 216 | 8 bytes | | unused |
+//! | 216 | f32 | `sphere` | 1/r of a sphere: when rays enter and leave it is wanted; 0 for none |
+//! | 220 | 4 bytes | | unused |
 //!
 //! Bindings of group 0:
 //!
@@ -63,13 +65,18 @@
 //! |---|---|---|
 //! | 0 | uniform | `KerrTask` |
 //! | 1 | storage, read | 4 × f32 a ray: x, y (or α, β in M), and what the first floats leave of each |
-//! | 2 | storage | `KerrEnd`, 48 bytes a ray |
+//! | 2 | storage | `KerrEnd`, 64 bytes a ray |
 //! | 3 | storage | `KerrCrossing`, 32 bytes, `crossings` of them a ray |
 //! | 4 | storage | 4 × f32 a sample: r in M, θ, φ in radians, delay in M; `samples` of them a ray |
 //!
+//! In [`places`], bindings 2 to 4 are the first time of each ray and their number (2 × u32), the Mino times (f32, ascending
+//! along each ray), and `KerrNode`, 32 bytes a time: 1/r, cos θ, φ, delay, dw/dτ, d cos θ/dτ (f32 at 0, 4, … 20).
+//!
 //! `KerrEnd`: direction of escape (3 × f32 at 0), outcome (u32 at 12: 0 captured, 1 escaped, 3 lost), flags (u32 at 16),
 //! number of crossings (u32 at 20), Mino time of the whole ray (f32 at 24), estimated error (f32 at 28: relative in r,
-//! radians in φ), λ and η (f32 at 32 and 36), steps (u32 at 40). `KerrCrossing`: r, φ, Mino time, delay, dw/dτ, d cos θ/dτ
+//! radians in φ), λ and η (f32 at 32 and 36), steps (u32 at 40), Mino times of the
+//! turning point, of entry into the sphere and of leaving it (f32 at 44, 48, 52, negative if there is none; 8 bytes
+//! unused). `KerrCrossing`: r, φ, Mino time, delay, dw/dτ, d cos θ/dτ
 //! and the estimated
 //! error of that ray (f32 at 0, 4, … 24; 4 bytes unused). Delays lack the tortoise coordinate of the observer, r* = r + 2 ln r + …, which
 //! [`Task::delay_start`] has in doubles.
@@ -89,8 +96,14 @@ pub const PHOTONS: &str = include_str!("photons.wgsl");
 /// Rays under way, step by step.
 pub const STEPS: &str = include_str!("steps.wgsl");
 
-/// Bindings and kernels.
+/// The uniform and the points.
+pub const TASK: &str = include_str!("task.wgsl");
+
+/// The kernels of whole rays.
 pub const RAYS: &str = include_str!("rays.wgsl");
+
+/// The kernel of places on rays.
+pub const NODES: &str = include_str!("nodes.wgsl");
 
 /// Flags of a ray: what of it cannot be trusted. The numbers are those of the shader.
 pub mod flags {
@@ -111,9 +124,11 @@ pub const TASK_BYTES: usize = 224;
 /// Bytes of a point.
 pub const POINT_BYTES: usize = 16;
 /// Bytes of `KerrEnd`.
-pub const END_BYTES: usize = 48;
+pub const END_BYTES: usize = 64;
 /// Bytes of `KerrCrossing`.
 pub const CROSSING_BYTES: usize = 32;
+/// Bytes of `KerrNode`.
+pub const NODE_BYTES: usize = 32;
 /// Bytes of a sample.
 pub const SAMPLE_BYTES: usize = 16;
 
@@ -124,7 +139,12 @@ pub fn library() -> String {
 
 /// The tracer with bindings and the kernels `kerr_trace` and `kerr_sample`, workgroups of 64.
 pub fn program() -> String {
-    [TWO_FLOATS, FUNCTIONS, PHOTONS, STEPS, RAYS].join("\n")
+    [TWO_FLOATS, FUNCTIONS, PHOTONS, STEPS, TASK, RAYS].join("\n")
+}
+
+/// The tracer with bindings and the kernel `kerr_place`, workgroups of 64.
+pub fn places() -> String {
+    [TWO_FLOATS, FUNCTIONS, PHOTONS, STEPS, TASK, NODES].join("\n")
 }
 
 /// `x` as the sum of two floats.
@@ -152,6 +172,8 @@ pub struct Task {
     pub quadratures: bool,
     /// 1/r in M⁻¹ at which rays that escape end: 0 for infinity.
     pub end: f64,
+    /// 1/r in M⁻¹ of a sphere that rays enter and leave; 0 for none.
+    pub sphere: f64,
 }
 
 impl Task {
@@ -163,7 +185,8 @@ impl Task {
         self.lens_words(&mut words);
         words.extend([self.rays, self.crossings, self.samples]);
         words.push(u32::from(self.view.observer().is_none()));
-        words.extend([self.row, u32::from(self.quadratures), 0, 0]);
+        words.extend([self.row, u32::from(self.quadratures)]);
+        words.extend([(self.sphere as f32).to_bits(), 0]);
         let mut bytes = [0; TASK_BYTES];
         for (place, word) in bytes.chunks_exact_mut(4).zip(words) {
             place.copy_from_slice(&word.to_le_bytes());

@@ -11,7 +11,7 @@
 const KERR_ORDER: u32 = 10u;
 const KERR_TERMS: u32 = 11u;
 const KERR_TOLERANCE: f32 = 3e-8;
-const KERR_MOST_STEPS: u32 = 300u;
+const KERR_MOST_STEPS: u32 = 250u;
 
 // Outcomes.
 const KERR_CAPTURED: u32 = 0u;

@@ -1,18 +1,5 @@
 // Whole rays: outcome, equatorial crossings, direction of escape, samples. One invocation a ray.
 
-struct KerrTask {
-    hole: KerrHole,
-    place: KerrPlace,
-    lens: KerrLens,
-    rays: u32,
-    crossings: u32,    // room for each ray's crossings
-    samples: u32,      // of each ray, equidistant in Mino time
-    camera: u32,       // 1: points are (x, y) of the lens; 0: (alpha, beta)
-    row: u32,          // invocations in a row of the grid
-    quadratures: u32,  // 1: azimuths and delays are wanted
-    pad: vec2<u32>,
-}
-
 struct KerrEnd {
     exit: vec3<f32>,     // where the ray goes, if it escapes
     outcome: u32,
@@ -23,7 +10,9 @@ struct KerrEnd {
     lambda: f32,
     eta: f32,
     steps: u32,
-    pad: u32,
+    turning: f32,        // Mino time of the radial turning point; negative if there is none
+    within: vec2<f32>,   // Mino times of entry into the sphere and of leaving it; negative if it is not met
+    pad: vec2<u32>,
 }
 
 struct KerrCrossing {
@@ -37,18 +26,9 @@ struct KerrCrossing {
     pad: f32,
 }
 
-@group(0) @binding(0) var<uniform> kerr_task: KerrTask;
-@group(0) @binding(1) var<storage, read> kerr_points: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read_write> kerr_end_of: array<KerrEnd>;
 @group(0) @binding(3) var<storage, read_write> kerr_crossing_of: array<KerrCrossing>;
 @group(0) @binding(4) var<storage, read_write> kerr_sample_of: array<vec4<f32>>;
-
-fn kerr_arrive(point: vec4<f32>) -> KerrPhoton {
-    if kerr_task.camera != 0u {
-        return kerr_through_lens(kerr_task.hole, kerr_task.place, kerr_task.lens, point.xz, point.yw);
-    }
-    return kerr_on_screen(kerr_task.hole, kerr_task.place, point.xz, point.yw);
-}
 
 // What rounding makes of the ray: that of every step, and of the minimum of W.
 fn kerr_error(ray: KerrRay, steps: u32) -> f32 {
@@ -63,7 +43,7 @@ fn kerr_follow(k: u32, total: f32) -> KerrEnd {
     var series: KerrSeries;
     var ray = kerr_begin(hole, kerr_task.place, kerr_arrive(kerr_points[k]), &walk);
     let quadratures = kerr_task.quadratures != 0u;
-    var end = KerrEnd(vec3<f32>(0.0), ray.outcome, ray.flags, 0u, 0.0, 0.0, ray.lambda, ray.eta, 0u, 0u);
+    var end = KerrEnd(vec3<f32>(0.0), ray.outcome, ray.flags, 0u, 0.0, 0.0, ray.lambda, ray.eta, 0u, -1.0, vec2<f32>(-1.0), vec2<u32>(0u));
     if ray.outcome == KERR_LOST {
         return end;
     }
@@ -90,6 +70,7 @@ fn kerr_follow(k: u32, total: f32) -> KerrEnd {
             }
         } else {
             kerr_cross(k, ray, walk, &series, x, &end);
+            kerr_reach(ray, walk, &series, x, &end);
         }
         end.steps++;
         if done {
@@ -109,6 +90,9 @@ fn kerr_follow(k: u32, total: f32) -> KerrEnd {
         end.mino_time = walk.s / ray.b;
     }
     end.error = kerr_error(ray, end.steps);
+    if (end.within.x >= 0.0) && (end.within.y < 0.0) {
+        end.within.y = end.mino_time;
+    }
     return end;
 }
 
@@ -148,7 +132,7 @@ fn kerr_cross(
         (*end).flags |= KERR_MORE_CROSSINGS;
         return;
     }
-    let point = kerr_point(kerr_task.hole, ray, walk, series, kerr_solve(series, true, 0.0, x));
+    let point = kerr_point(kerr_task.hole, ray, walk, series, kerr_solve(series, true, 0.0, 0.0, x));
     kerr_crossing_of[k * kerr_task.crossings + number] = KerrCrossing(
         1.0 / point.inverse_radius,
         point.azimuth,
@@ -159,6 +143,66 @@ fn kerr_cross(
         kerr_error(ray, (*end).steps),
         0.0,
     );
+}
+
+// Where in the step the radius turns, if it does; else its end.
+fn kerr_turning(series: ptr<function, KerrSeries>, x: f32) -> f32 {
+    let rises = (*series).v[1] > 0.0;
+    if (kerr_radial(series, x).y > 0.0) == rises {
+        return x;
+    }
+    var low = 0.0;
+    var high = x;
+    for (var i = 0u; i < 22u; i++) {
+        let middle = 0.5 * (low + high);
+        if (kerr_radial(series, middle).y > 0.0) == rises {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return 0.5 * (low + high);
+}
+
+// Takes where the step turns, enters the sphere and leaves it.
+fn kerr_reach(ray: KerrRay, walk: KerrWalk, series: ptr<function, KerrSeries>, x: f32, end: ptr<function, KerrEnd>) {
+    if kerr_task.sphere <= 0.0 {
+        return;
+    }
+    let edge = ray.b * kerr_task.sphere - ray.centre;
+    let turning = kerr_turning(series, x);
+    if turning < x {
+        (*end).turning = (walk.s + turning) / ray.b;
+    }
+    if (walk.s == 0.0) && (walk.v >= edge) {
+        (*end).within.x = 0.0;
+    }
+    kerr_pass(ray, walk, series, edge, vec2<f32>(0.0, turning), end);
+    if turning < x {
+        kerr_pass(ray, walk, series, edge, vec2<f32>(turning, x), end);
+    }
+}
+
+// Takes whether the ray enters the sphere or leaves it on a part of the step on which the radius does not turn.
+fn kerr_pass(
+    ray: KerrRay,
+    walk: KerrWalk,
+    series: ptr<function, KerrSeries>,
+    edge: f32,
+    part: vec2<f32>,
+    end: ptr<function, KerrEnd>,
+) {
+    let before = kerr_radial(series, part.x).x >= edge;
+    let after = kerr_radial(series, part.y).x >= edge;
+    if before == after {
+        return;
+    }
+    let time = (walk.s + kerr_solve(series, false, edge, part.x, part.y)) / ray.b;
+    if after {
+        (*end).within.x = time;
+    } else {
+        (*end).within.y = time;
+    }
 }
 
 @compute @workgroup_size(64)

@@ -87,36 +87,81 @@ fn kerr_step_length(walk: KerrWalk, series: ptr<function, KerrSeries>) -> f32 {
     return h;
 }
 
+// Value and derivative of the radial series. Written out, here and below: software devices count the turns of loops.
 fn kerr_radial(series: ptr<function, KerrSeries>, x: f32) -> vec2<f32> {
-    var v = (*series).v[KERR_ORDER];
-    var rate = 0.0;
-    for (var k = KERR_ORDER; k > 0u; k--) {
-        rate = fma(rate, x, v);
-        v = fma(v, x, (*series).v[k - 1u]);
-    }
-    return vec2<f32>(v, rate);
+    var p = vec2<f32>((*series).v[10], 0.0);
+    p = kerr_horner(p, x, (*series).v[9]);
+    p = kerr_horner(p, x, (*series).v[8]);
+    p = kerr_horner(p, x, (*series).v[7]);
+    p = kerr_horner(p, x, (*series).v[6]);
+    p = kerr_horner(p, x, (*series).v[5]);
+    p = kerr_horner(p, x, (*series).v[4]);
+    p = kerr_horner(p, x, (*series).v[3]);
+    p = kerr_horner(p, x, (*series).v[2]);
+    p = kerr_horner(p, x, (*series).v[1]);
+    p = kerr_horner(p, x, (*series).v[0]);
+    return p;
 }
 
+// The same of the series of cos theta.
 fn kerr_height(series: ptr<function, KerrSeries>, x: f32) -> vec2<f32> {
-    var u = (*series).n[KERR_ORDER].z;
-    var rate = 0.0;
-    for (var k = KERR_ORDER; k > 0u; k--) {
-        rate = fma(rate, x, u);
-        u = fma(u, x, (*series).n[k - 1u].z);
-    }
-    return vec2<f32>(u, rate);
+    var p = vec2<f32>((*series).n[10].z, 0.0);
+    p = kerr_horner(p, x, (*series).n[9].z);
+    p = kerr_horner(p, x, (*series).n[8].z);
+    p = kerr_horner(p, x, (*series).n[7].z);
+    p = kerr_horner(p, x, (*series).n[6].z);
+    p = kerr_horner(p, x, (*series).n[5].z);
+    p = kerr_horner(p, x, (*series).n[4].z);
+    p = kerr_horner(p, x, (*series).n[3].z);
+    p = kerr_horner(p, x, (*series).n[2].z);
+    p = kerr_horner(p, x, (*series).n[1].z);
+    p = kerr_horner(p, x, (*series).n[0].z);
+    return p;
 }
 
-// Where in [0, h] the radial series (or, if polar, that of cos theta) has the value `target`; it lies between the ends.
-fn kerr_solve(series: ptr<function, KerrSeries>, polar: bool, value: f32, h: f32) -> f32 {
-    var low = 0.0;
-    var high = h;
-    var start = (*series).v[0];
+fn kerr_horner(p: vec2<f32>, x: f32, next: f32) -> vec2<f32> {
+    return vec2<f32>(fma(p.x, x, next), fma(p.y, x, p.x));
+}
+
+// Direction, its derivative, and the quadratures of azimuth and time.
+struct KerrSum {
+    n: vec3<f32>,
+    dn: vec3<f32>,
+    quadratures: vec2<f32>,
+}
+
+fn kerr_sum(series: ptr<function, KerrSeries>, x: f32) -> KerrSum {
+    var sum = KerrSum((*series).n[10], vec3<f32>(0.0), vec2<f32>(0.0));
+    sum = kerr_next(sum, x, series, 9u);
+    sum = kerr_next(sum, x, series, 8u);
+    sum = kerr_next(sum, x, series, 7u);
+    sum = kerr_next(sum, x, series, 6u);
+    sum = kerr_next(sum, x, series, 5u);
+    sum = kerr_next(sum, x, series, 4u);
+    sum = kerr_next(sum, x, series, 3u);
+    sum = kerr_next(sum, x, series, 2u);
+    sum = kerr_next(sum, x, series, 1u);
+    sum = kerr_next(sum, x, series, 0u);
+    return sum;
+}
+
+fn kerr_next(sum: KerrSum, x: f32, series: ptr<function, KerrSeries>, k: u32) -> KerrSum {
+    let quadratures = vec2<f32>((*series).azimuth[k], (*series).time[k]);
+    return KerrSum(sum.n * x + (*series).n[k], sum.dn * x + sum.n, sum.quadratures * x + quadratures);
+}
+
+// Where between `start` and `stop` the radial series (or, if polar, that of cos theta) has a value that lies between
+// those there.
+fn kerr_solve(series: ptr<function, KerrSeries>, polar: bool, value: f32, start: f32, stop: f32) -> f32 {
+    var low = start;
+    var high = stop;
+    let h = stop - start;
+    var first = kerr_radial(series, start).x;
     if polar {
-        start = (*series).n[0].z;
+        first = kerr_height(series, start).x;
     }
-    let below = start < value;
-    var x = 0.5 * h;
+    let below = first < value;
+    var x = 0.5 * (start + stop);
     for (var i = 0u; i < 24u; i++) {
         var at = kerr_radial(series, x);
         if polar {
@@ -129,7 +174,7 @@ fn kerr_solve(series: ptr<function, KerrSeries>, polar: bool, value: f32, h: f32
         }
         let next = x - (at.x - value) / at.y;
         if abs(next - x) <= 1e-6 * h {
-            return clamp(next, 0.0, h);
+            return clamp(next, start, stop);
         }
         x = select(0.5 * (low + high), next, (next > low) && (next < high));
     }
@@ -145,29 +190,22 @@ fn kerr_turn(sense: f32, from_: vec2<f32>, to: vec2<f32>) -> f32 {
 // The point after x of scaled Mino time from where the series were taken.
 fn kerr_point(hole: KerrHole, ray: KerrRay, walk: KerrWalk, series: ptr<function, KerrSeries>, x: f32) -> KerrPoint {
     let radial = kerr_radial(series, x);
-    var n = (*series).n[KERR_ORDER];
-    var dn = vec3<f32>(0.0);
-    var azimuth = 0.0;
-    var time = 0.0;
-    for (var k = KERR_ORDER; k > 0u; k--) {
-        dn = dn * x + n;
-        n = n * x + (*series).n[k - 1u];
-        azimuth = fma(azimuth, x, (*series).azimuth[k - 1u]);
-        time = fma(time, x, (*series).time[k - 1u]);
-    }
+    let sum = kerr_sum(series, x);
+    let n = sum.n;
+    let dn = sum.dn;
     let w = max((radial.x + ray.centre) / ray.b, 0.0);
     let turned = walk.turned + kerr_turn(ray.sense, walk.heading, kerr_heading(n, dn));
     let closed = walk.leg * hole.spin.x * kerr_horizon_log(hole, w);
     var delay = 0.0;
     if w > 0.0 {
-        delay = ray.b * time + (walk.time_start - walk.leg * kerr_tortoise(hole, w));
+        delay = ray.b * sum.quadratures.y + (walk.time_start - walk.leg * kerr_tortoise(hole, w));
     }
     return KerrPoint(
         w,
         radial.y,
         n,
         dn * ray.b,
-        turned + (azimuth + (walk.azimuth_start + closed)),
+        turned + (sum.quadratures.x + (walk.azimuth_start + closed)),
         delay,
         (walk.s + x) / ray.b,
     );
@@ -176,16 +214,9 @@ fn kerr_point(hole: KerrHole, ray: KerrRay, walk: KerrWalk, series: ptr<function
 // Goes on by x, and puts the state back on its constraints: (dw/dtau)^2 = W, |n| = 1, n.n' = 0, |n'|^2 = K + a^2 u^2.
 fn kerr_advance(hole: KerrHole, ray: KerrRay, walk: ptr<function, KerrWalk>, series: ptr<function, KerrSeries>, x: f32) {
     let radial = kerr_radial(series, x);
-    var n = (*series).n[KERR_ORDER];
-    var dn = vec3<f32>(0.0);
-    var azimuth = 0.0;
-    var time = 0.0;
-    for (var k = KERR_ORDER; k > 0u; k--) {
-        dn = dn * x + n;
-        n = n * x + (*series).n[k - 1u];
-        azimuth = fma(azimuth, x, (*series).azimuth[k - 1u]);
-        time = fma(time, x, (*series).time[k - 1u]);
-    }
+    let sum = kerr_sum(series, x);
+    var n = sum.n;
+    var dn = sum.dn;
     n = n * (1.5 - 0.5 * dot(n, n));
     dn = dn - n * dot(n, dn);
     let speed = ray.angular + ray.tilt * n.z * n.z;
@@ -198,8 +229,8 @@ fn kerr_advance(hole: KerrHole, ray: KerrRay, walk: ptr<function, KerrWalk>, ser
     (*walk).heading = heading;
     (*walk).n = n;
     (*walk).dn = dn;
-    (*walk).azimuth = azimuth;
-    (*walk).time = time;
+    (*walk).azimuth = sum.quadratures.x;
+    (*walk).time = sum.quadratures.y;
     (*walk).s += x;
     let kept = kerr_project(ray, radial, (*walk).leg);
     (*walk).v = kept.x;
@@ -248,7 +279,7 @@ fn kerr_end_point(ray: KerrRay, series: ptr<function, KerrSeries>, h: f32, falls
     let start = (*series).v[0];
     let before = select((start > ray.last), (start < ray.last), falls);
     if before {
-        return kerr_solve(series, false, ray.last, h);
+        return kerr_solve(series, false, ray.last, 0.0, h);
     }
     return h;
 }

@@ -46,8 +46,13 @@ pub fn quantile(values: &mut [f64], share: f64) -> f64 {
 /// Adds a picture's errors.
 pub fn compare(tracer: &GpuTracer, picture: &Picture, errors: &mut Errors) {
     let Picture { hole, view, x, y } = picture;
-    let request =
-        DeviceRequest { crossings: CROSSINGS, samples: SAMPLES, quadratures: true, end: 0.0 };
+    let request = DeviceRequest {
+        crossings: CROSSINGS,
+        samples: SAMPLES,
+        quadratures: true,
+        end: 0.0,
+        sphere: None,
+    };
     let mut rays = DeviceRays::default();
     tracer.trace(hole, view, (x, y), &request, &mut rays).unwrap();
     let (mut path, exact) = (Path::new(), Tracer::new(1e-12).unwrap());

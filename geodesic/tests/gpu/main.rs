@@ -2,6 +2,7 @@
 //!
 //! `cargo test --release -p kerrlight-geodesic --features wgpu --test gpu -- --nocapture` prints the errors by class.
 
+mod blocks;
 mod classes;
 mod compare;
 
@@ -9,18 +10,18 @@ use classes::{Class, classes, critical_factor};
 use compare::{Errors, compare, quantile};
 use kerrlight_geodesic::gpu::{self, GpuError, GpuTracer};
 use kerrlight_geodesic::{DeviceRays, DeviceRequest, Inclination, Kerr, Observer, View};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// The first device; where there is none a test says so and passes.
-fn device() -> Option<&'static GpuTracer> {
-    static DEVICE: OnceLock<Result<GpuTracer, GpuError>> = OnceLock::new();
-    let opened =
-        DEVICE.get_or_init(|| gpu::adapter(None).and_then(|found| GpuTracer::open(&found)));
+fn device() -> Option<Arc<GpuTracer>> {
+    static DEVICE: OnceLock<Result<Arc<GpuTracer>, GpuError>> = OnceLock::new();
+    let opened = DEVICE
+        .get_or_init(|| gpu::adapter(None).and_then(|found| GpuTracer::open(&found).map(Arc::new)));
     if let Err(error) = opened {
         assert_eq!(*error, GpuError::NoAdapter);
         eprintln!("SKIPPED, nothing was tested: {error}");
     }
-    opened.as_ref().ok()
+    opened.as_ref().ok().cloned()
 }
 
 fn print(class: &Class, errors: &mut Errors) {
@@ -42,7 +43,7 @@ fn code_errors_by_class() {
     let Some(tracer) = device() else { return };
     for class in classes() {
         let mut errors = Errors::default();
-        class.pictures.iter().for_each(|picture| compare(tracer, picture, &mut errors));
+        class.pictures.iter().for_each(|picture| compare(&tracer, picture, &mut errors));
         print(&class, &mut errors);
         assert_eq!(errors.wrong, 0, "{}: fates", class.name);
         assert!(errors.flagged as f64 <= class.flagged * errors.rays as f64, "{}", class.name);
@@ -85,4 +86,16 @@ fn code_near_critical_rays_are_flagged_not_wrong() {
             assert!(!end.is_trusted || power < 12, "1e-{power}: {end:?}");
         }
     }
+}
+
+#[test]
+fn code_blocks_on_a_device_are_those_without() {
+    let Some(tracer) = device() else { return };
+    blocks::compare(tracer);
+}
+
+#[test]
+fn code_many_nodes_of_a_ray_are_all_there() {
+    let Some(tracer) = device() else { return };
+    blocks::many_nodes(tracer);
 }

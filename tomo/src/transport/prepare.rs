@@ -198,11 +198,7 @@ impl PreparedScene {
         if !self.optics.lensing {
             return vec!["everything (lensing is off)"];
         }
-        let whole = self.tracer.closed_form().is_none();
-        let nodes = !self.request.nodes.is_empty();
         let parts = [
-            (nodes && whole, "everything (gas before a camera or a near observer)"),
-            (nodes && !whole, "points in gas"),
             (self.media.have_cells(), "rays through volumes"),
             (self.meshes.is_some(), "rays that may meet meshes"),
             (!self.spots.is_empty(), "paths that may meet spots"),

@@ -209,7 +209,7 @@ impl BlockTracer {
 
     /// Hands the nodes of all rays inside a sphere to the visitor, and finer ones of those rays
     /// that need them.
-    pub(super) fn refine_in_closed_form<V: RayVisitor>(
+    fn refine_in_closed_form<V: RayVisitor>(
         &self,
         screen: ScreenRays<'_>,
         (number, sphere): (usize, &SphereNodes),

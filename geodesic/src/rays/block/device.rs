@@ -3,9 +3,11 @@
 use super::traced::PlaneCrossing;
 use crate::error::Error;
 use crate::integrate::outcome::Outcome;
+use crate::rays::nodes::{Leg, NodeColumns};
 use crate::screen::view::View;
 use crate::spacetime::kerr::Kerr;
 use core::fmt;
+use core::ops::Range;
 
 /// What traces rays in place of this processor: a graphics device (`gpu::GpuTracer`, feature `wgpu`), or one of your own.
 /// [`BlockTracer::with_device`](crate::BlockTracer::with_device) takes it.
@@ -28,6 +30,20 @@ pub trait RayDevice: fmt::Debug + Send + Sync {
         rays: &mut DeviceRays,
     ) -> Result<(), Error>;
 
+    /// Finds where rays are: those of ray `k` are the nodes `spans[k]`, whose Mino times ascend. They come with Mino times
+    /// and steps of Mino time as weights; the device adds the rest, and Σ to the weights.
+    ///
+    /// # Errors
+    /// If it fails; [`failure`](Self::failure) then says how.
+    fn place(
+        &self,
+        hole: &Kerr,
+        view: &View,
+        points: (&[f64], &[f64]),
+        spans: &[Range<usize>],
+        nodes: &mut NodeColumns,
+    ) -> Result<(), Error>;
+
     /// How it failed, if it did.
     fn failure(&self) -> Option<String>;
 }
@@ -43,6 +59,8 @@ pub struct DeviceRequest {
     pub quadratures: bool,
     /// 1/r in M⁻¹ at which rays that escape end: 0 for infinity.
     pub end: f64,
+    /// Radius in M of a sphere: when rays enter and leave it is wanted, and when they turn.
+    pub sphere: Option<f64>,
 }
 
 /// How a ray ends.
@@ -66,6 +84,22 @@ pub struct DeviceEnd {
     pub eta: f64,
     /// Steps that it took.
     pub steps: u32,
+    /// Mino times in M⁻¹ at which it enters the sphere and leaves it, or ends; `None` if it does not meet it.
+    pub within: Option<[f64; 2]>,
+    /// Mino time in M⁻¹ of its turning point, if it turns; with a sphere alone.
+    pub turning: Option<f64>,
+}
+
+impl DeviceEnd {
+    /// Its legs inside the sphere up to the Mino time `until` (M⁻¹), cut at the turning point.
+    pub fn legs(&self, until: f64) -> impl Iterator<Item = Leg> {
+        let [start, leave] = self.within.unwrap_or([0.0; 2]);
+        let falls = self.outcome == Outcome::Captured && leave >= self.mino_time && until >= leave;
+        let end = leave.min(until);
+        let middle = self.turning.unwrap_or(f64::INFINITY).clamp(start, end.max(start));
+        let legs = [[start, middle], [middle, end]].into_iter().filter(|[from, to]| to > from);
+        legs.map(move |ends| Leg { ends, falls: falls && ends[1] >= end })
+    }
 }
 
 /// A sample of a ray.

@@ -1,21 +1,21 @@
 //! Rays of a block on a device.
 
 use super::device::{DeviceEnd, DeviceRequest, RayDevice};
-use super::request::BlockRequest;
+use super::request::{BlockRequest, SphereNodes};
 use super::traced::TracedRay;
 use super::tracer::{BlockTracer, Job, RayBlock};
 use super::visitor::{PathUse, RayVisitor, Work, first_opaque};
 use crate::error::Error;
 use crate::integrate::outcome::Outcome;
 use crate::rays::blocks::check_columns;
-use crate::simd::ScreenRays;
+use crate::rays::nodes::{Node, NodeColumns};
+use crate::simd::{PanelRule, ScreenRays};
 
 /// The estimated error of a ray beyond which it is traced on this processor instead.
 const ROUGH: f64 = 1e-3;
 
 impl BlockTracer {
-    /// Outcomes, crossings and directions of escape of the rays that `device` vouches for; nodes in closed form on this
-    /// processor.
+    /// Outcomes, crossings, directions of escape and nodes of the rays that `device` vouches for.
     pub(super) fn trace_on_device<V: RayVisitor>(
         &self,
         device: &dyn RayDevice,
@@ -28,7 +28,8 @@ impl BlockTracer {
             crossings: job.request.crossings,
             samples: 0,
             quadratures: true,
-            end: self.closed_form().map_or(0.0, |observer| observer.inverse_radius()),
+            end: self.end_on_device(),
+            sphere: None,
         };
         let points = (job.alpha, job.beta);
         device.trace(&self.hole, &self.view, points, &request, &mut block.device)?;
@@ -36,7 +37,7 @@ impl BlockTracer {
             let ray = self.judge(k, job, block, visitor)?;
             block.rays.push(ray);
         }
-        self.add_nodes(job, block, visitor)
+        self.add_nodes(device, job, block, visitor)
     }
 
     /// What is known of ray `k` from the device, and whether it has to be traced step by step.
@@ -75,32 +76,84 @@ impl BlockTracer {
         Ok(TracedRay { until, surface, stepped, with_path, ..from_device(end, crossings, leaves) })
     }
 
-    /// Whether nothing of the request can be had of a device: where nodes or samples have no closed form.
+    /// Whether nothing of the request can be had of a device: where samples are wanted, or probes have no closed form.
     fn needs_steps(&self, request: &BlockRequest) -> bool {
-        let along = !request.nodes.is_empty() || request.probes.is_some();
-        request.samples > 0 || along && self.closed_form().is_none()
+        request.samples > 0 || request.probes.is_some() && self.closed_form().is_none()
     }
 
-    /// Nodes of all rays, in closed form.
+    /// Probes in closed form, and nodes of all rays on the device.
     fn add_nodes<V: RayVisitor>(
         &self,
+        device: &dyn RayDevice,
         job: Job<'_>,
         block: &mut RayBlock,
         visitor: &mut V,
     ) -> Result<(), Error> {
-        let Some(observer) = self.closed_form() else { return Ok(()) };
-        if job.request.nodes.is_empty() && job.request.probes.is_none() {
-            return Ok(());
-        }
-        let screen = ScreenRays::new(&self.hole, observer, job.alpha, job.beta)?;
-        if let Some(probes) = &job.request.probes {
+        if let (Some(observer), Some(probes)) = (self.closed_form(), &job.request.probes) {
+            let screen = ScreenRays::new(&self.hole, observer, job.alpha, job.beta)?;
             self.probe(screen, probes, job, block, visitor)?;
         }
         for (number, sphere) in job.request.nodes.iter().enumerate() {
             visitor.works_on(Work::Nodes(number));
-            self.refine_in_closed_form(screen, (number, sphere), job, block, visitor)?;
+            self.refine_on_device(device, (number, sphere), job, block, visitor)?;
         }
         Ok(())
+    }
+
+    /// Hands the nodes of all rays inside a sphere to the visitor, and finer ones of those rays that need them.
+    fn refine_on_device<V: RayVisitor>(
+        &self,
+        device: &dyn RayDevice,
+        (number, sphere): (usize, &SphereNodes),
+        job: Job<'_>,
+        block: &mut RayBlock,
+        visitor: &mut V,
+    ) -> Result<(), Error> {
+        let end = self.end_on_device();
+        let sought =
+            DeviceRequest { sphere: Some(sphere.request.radius), end, ..DeviceRequest::default() };
+        device.trace(&self.hole, &self.view, (job.alpha, job.beta), &sought, &mut block.device)?;
+        let RayBlock { rays, plane, device: found, columns, .. } = block;
+        let mut pending: Vec<usize> = (0..rays.len()).filter(|k| !rays[*k].stepped).collect();
+        let mut split = sphere.request.split;
+        while !pending.is_empty() {
+            let mut spans = Vec::with_capacity(pending.len());
+            columns.clear();
+            for k in &pending {
+                let first = columns.len();
+                let (end, until) = (&found.ends()[*k], rays[*k].last_time());
+                plan(end, until, (&sphere.request.rule, split), columns);
+                spans.push(first..columns.len());
+            }
+            let [alpha, beta] = job.pick(&pending);
+            device.place(&self.hole, &self.view, (&alpha, &beta), &spans, columns)?;
+            let mut more = Vec::new();
+            for (k, span) in pending.into_iter().zip(spans) {
+                let crossings = &plane[rays[k].crossings.clone()];
+                let nodes = columns.view(span);
+                let done = visitor.take_nodes(number, k, &rays[k], crossings, &nodes);
+                if !done && split < sphere.finest {
+                    more.push(k);
+                }
+            }
+            pending = more;
+            split *= 2;
+        }
+        Ok(())
+    }
+
+    /// 1/r at which rays that escape end: at the observer's radius in closed form, else at infinity.
+    fn end_on_device(&self) -> f64 {
+        self.closed_form().map_or(0.0, |observer| observer.inverse_radius())
+    }
+}
+
+/// Appends the Mino times of a ray's nodes, with steps of Mino time as weights.
+fn plan(end: &DeviceEnd, until: f64, (rule, split): (&PanelRule, u32), columns: &mut NodeColumns) {
+    let rate = (end.eta + end.lambda * end.lambda).max(1.0).sqrt();
+    let node = |mino_time, weight| Node { mino_time, weight, ..Node::default() };
+    for leg in end.legs(until) {
+        leg.place(rule, leg.panels(rate, split), node, columns);
     }
 }
 

@@ -143,9 +143,8 @@ impl BlockTracer {
         BlockTracer { view, ..self }
     }
 
-    /// The same rays, traced on a device: their outcomes, crossings and directions of escape have its digits. Rays that
-    /// it does not vouch for are traced step by step on this processor, and so is whatever needs a path; nodes inside
-    /// spheres are those of the closed form.
+    /// The same rays, traced on a device: their outcomes, crossings, directions of escape and nodes inside spheres have its
+    /// digits. Rays that it does not vouch for are traced step by step on this processor, and so is whatever needs a path.
     pub fn with_device(self, device: Arc<dyn RayDevice>) -> Self {
         BlockTracer { device: Some(device), ..self }
     }
