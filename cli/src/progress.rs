@@ -37,6 +37,11 @@ pub fn samples(count: u64) -> ProgressBar {
     styled(count, "{bar:30} draw {pos} of {len}  {msg}  {elapsed} gone, {eta} left")
 }
 
+/// A bar that counts solutions without a part of the frames.
+pub fn held_out(count: u64) -> ProgressBar {
+    styled(count, "{bar:30} solution {pos} of {len}  {msg}  {elapsed} gone, {eta} left")
+}
+
 /// A bar that counts axes.
 pub fn axes(count: u64) -> ProgressBar {
     styled(count, "{bar:30} axis {pos} of {len}  {elapsed} gone, {eta} left")

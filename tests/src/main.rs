@@ -22,6 +22,7 @@ mod fit_start;
 mod fit_without_phases;
 mod fuzz_corpus;
 mod graphics_devices;
+mod held_out;
 mod interferometry;
 mod kerr_references;
 mod lensing;

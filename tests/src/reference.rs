@@ -126,7 +126,7 @@ fn regress_the_reference_has_every_key_of_a_scene() {
 }
 
 /// Tables of a fit that the built-in fit does not have, each with a key that does not exist.
-const INNER_TABLES: [&str; 21] = [
+const INNER_TABLES: [&str; 22] = [
     "axis={scan={nonsense=1}}",
     "axis={from={nonsense=1}}",
     "data={visibilities={nonsense=1}}",
@@ -148,6 +148,7 @@ const INNER_TABLES: [&str; 21] = [
     "truth.glyph=[{nonsense=1}]",
     "regulariser=[{nonsense=1}]",
     "probe={nonsense=1}",
+    "held_out={nonsense=1}",
 ];
 
 #[test]

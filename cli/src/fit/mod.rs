@@ -7,6 +7,7 @@ mod curves;
 mod data;
 mod failed;
 mod folder;
+mod held_out;
 mod init;
 mod inputs;
 mod labels;

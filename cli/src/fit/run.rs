@@ -5,6 +5,7 @@ use super::band_search;
 use super::data;
 use super::failed;
 use super::folder::{self, Folder};
+use super::held_out;
 use super::labels;
 use super::linear;
 use super::results::{self, Estimate};
@@ -97,7 +98,6 @@ pub fn run(
     let objective = prepared.objective(instrument, motion)?;
     let times = setup::emission_times(instrument, motion);
     let representation = setup::representation(file, registry, times)?;
-    let change = setup::change(file, times)?;
     let (axis, axis_rate) = setup::axis(file)?;
     let training = setup::training(file, axis_rate)?;
     let mut state = State::new(&*representation, axis, &training);
@@ -120,7 +120,7 @@ pub fn run(
         }
         None => {
             folder.file(folder::LOG)?.write(b"")?;
-            run.start(&mut state, motion, change)?;
+            run.start(&mut state, motion, times)?;
             folder.save(&checkpoint::encode(&state, text)?)?;
         }
     }
@@ -192,7 +192,7 @@ impl Run<'_> {
         &mut self,
         state: &mut State<f32>,
         motion: &Motion,
-        change: Change,
+        times: [f64; 2],
     ) -> anyhow::Result<()> {
         if let AxisSearch::Scan(settings) = &self.file.axis {
             let found = axis_scan::run(self.file, self.measured, motion, settings)?;
@@ -205,8 +205,11 @@ impl Run<'_> {
         let trainer = &mut self.trainer;
         if self.file.representation.kind == Kind::LinearGrid {
             let nodes = self.file.representation.grid_nodes();
+            let file =
+                held_out::place(self.file, self.folder, &mut trainer.objective, (axis, times))?;
+            let change = setup::change(&file, times)?;
             let solution =
-                linear::solve(self.file, &mut trainer.objective, (axis, change), (nodes, 1))?;
+                linear::solve(&file, &mut trainer.objective, (axis, change), (nodes, 1))?;
             self.folder.log(&linear::solved(&solution))?;
             eprintln!("{}", linear::statement(&solution));
             state.now.parameters = solution.emission;

@@ -6,6 +6,7 @@ mod sample;
 mod summary;
 
 use super::folder::Folder;
+use super::held_out;
 use super::run::{Placed, Prepared};
 use super::world_search;
 use crate::answer::Answer;
@@ -94,7 +95,8 @@ pub fn draw(prepared: &Prepared<'_>, folder: &Folder, samples: u32) -> anyhow::R
         Some(worlds) => worlds.factor(),
         None => noise_of(folder)?,
     };
-    let drawing = Drawing { prepared, unknown: unknown.as_ref(), worlds, factor };
+    let file = held_out::settled(&prepared.file, folder)?;
+    let drawing = Drawing { prepared, file, unknown: unknown.as_ref(), worlds, factor };
     let bar = progress::samples(u64::from(samples));
     let keeper = Keeper::brief(format!("stopping; resume with: {}", again(folder, samples)));
     let mut all = Vec::new();
@@ -156,6 +158,8 @@ fn noise_of(folder: &Folder) -> anyhow::Result<f64> {
 /// What draws are made of.
 struct Drawing<'a> {
     prepared: &'a Prepared<'a>,
+    /// Settings, with what the run has chosen.
+    file: FitFile,
     unknown: Option<&'a UnknownWorld>,
     worlds: Option<WorldPosterior<'a>>,
     /// Noise of a draw over the errors of the data.
@@ -169,8 +173,8 @@ impl Drawing<'_> {
         keeper: &Keeper,
         told: &dyn Fn(&str),
     ) -> anyhow::Result<Option<(Drawn, Value)>> {
-        let Prepared { file, instrument, measured, motion, registry } = self.prepared;
-        let mut file = file.clone();
+        let Prepared { instrument, measured, motion, registry, .. } = self.prepared;
+        let mut file = self.file.clone();
         file.seed = file.seed.wrapping_add(number);
         if file.representation.kind == Kind::LinearGrid {
             let nodes = other_voxels(file.representation.grid_nodes(), number);

@@ -1,7 +1,7 @@
 //! What was found, in numbers.
 
 use super::{Estimate, Found};
-use crate::fit::{band_search, linear, world_search};
+use crate::fit::{band_search, held_out, linear, world_search};
 use crate::report;
 use crate::usage::usage;
 use kerrlight_tomo::fit::{State, Trainer};
@@ -66,6 +66,9 @@ impl Estimate<'_> {
         }
         if let Some(linear) = linear::outcome(self.file, &self.folder.lines()?) {
             results["linear"] = linear;
+        }
+        if let Some(held_out) = held_out::found(self.folder)? {
+            results["held_out"] = held_out;
         }
         self.add_worlds(&mut results)?;
         let unknown = self.file.unknowns();

@@ -6,7 +6,7 @@ use super::numbers::outcomes;
 use super::over_time::Changes;
 use super::{Estimate, Found};
 use crate::fit::curves::{loss_plot, psnr_plot};
-use crate::fit::{band_search, labels, world_scan, world_search};
+use crate::fit::{band_search, held_out, labels, world_scan, world_search};
 use crate::output;
 use crate::report::{self, LinePlot, Report, View3d};
 use anyhow::Context;
@@ -25,6 +25,7 @@ impl Estimate<'_> {
         let lines = self.folder.lines()?;
         let mut plots: Vec<LinePlot> = loss_plot(&lines).into_iter().collect();
         plots.extend(psnr_plot(&lines));
+        plots.extend(held_out::plot(&results["held_out"]));
         plots.extend(self.light_curves(&found.seen));
         plots.push(self.light_curve(&found.movie));
         plots.extend(found.changes.as_ref().map(Changes::plot));
@@ -168,6 +169,7 @@ impl Estimate<'_> {
         if results["band"].is_object() {
             lines.extend(band_search::sentences(&results["band"]));
         }
+        lines.extend(held_out::sentence(&results["held_out"]));
         if let Some(statement) = results["linear"]["statement"].as_str() {
             lines.push(format!("The linear grid's solution: {statement}."));
         }

@@ -235,6 +235,25 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         operator.all_rows()
     }
 
+    /// The loss of the frames in a field at the nodes (knot after knot), without penalties.
+    ///
+    /// # Errors
+    /// If a number is out of its range, or the field has other nodes.
+    pub fn misfit(&self, emission: &[T]) -> Result<f64, Error> {
+        if emission.len() != self.unknowns() {
+            let allowed = "as many as the nodes at all knots";
+            return Err(Error::out_of_range("values", emission.len() as f64, allowed));
+        }
+        let shines: Vec<bool> = emission.iter().map(|x| *x != T::zero()).collect();
+        let data = self.data()?;
+        let operator = Operator::new(self.walk(), self.active(&shines), self.frames, 0);
+        let x: Vec<T> = emission.iter().copied().filter(|x| *x != T::zero()).collect();
+        let images = operator.images(&x);
+        let mut slopes = vec![T::zero(); self.model.pixels()];
+        let frames = self.frames.iter().zip(images.chunks_exact(slopes.len()));
+        Ok(frames.map(|(frame, image)| data.value(*frame, image, &mut slopes)).sum())
+    }
+
     pub(super) fn data(&self) -> Result<Data<'_, T>, Error> {
         Data::new(self.terms, self.frames, self.model.pixels(), self.model.frames())
     }

@@ -198,6 +198,9 @@ fn exact_solution_and_gap_of_a_dense_problem() {
             assert!(excess.abs() < 1e-6 * certificate.dark, "{method:?}: {excess:e}");
             assert!(excess <= certificate.gap + 1e-12, "{method:?}");
             assert!(solution.emission.iter().all(|x| (0.0..=upper).contains(x)));
+            // Without penalties the value is the loss of the data.
+            let misfit = problem.misfit(&solution.emission).unwrap();
+            assert!((misfit / certificate.value - 1.0).abs() < 1e-12, "{misfit}");
             // Far from the minimum the gap still bounds what is missing.
             let rough = solve(method, 3, coarse).certificate.unwrap();
             assert!(rough.value - least <= rough.gap && rough.value > certificate.value);

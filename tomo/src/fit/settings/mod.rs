@@ -7,6 +7,7 @@ mod band;
 mod change;
 mod data;
 mod error;
+mod held_out;
 mod instrument;
 mod light_curve;
 mod penalties;
@@ -23,6 +24,7 @@ pub use change::ChangeSettings;
 pub use data::{DataFiles, Loss, LossKind};
 pub use error::FitError;
 pub(crate) use error::{Within, refuse};
+pub use held_out::{HeldOutSettings, Weight};
 pub use instrument::{GainPhases, GainSettings, InstrumentSettings};
 pub use light_curve::{MeanFlux, MeasuredCurve, PerStokes, SimulatedCurve};
 pub use penalties::{PenaltyKind, PenaltySettings, ProbeSettings};
@@ -63,6 +65,9 @@ pub struct FitFile {
     /// The field of the gas and its polarised light; total intensity alone, without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub polarization: Option<PolarizationLaw>,
+    /// A weight that is chosen by data that are held out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<HeldOutSettings>,
     /// How emission may change while matter carries it; not at all, without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub change: Option<ChangeSettings>,

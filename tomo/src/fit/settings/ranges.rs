@@ -53,6 +53,8 @@ const RANGES: &[Range] = &[
     ("polarization.turn_deg", -360.0, 360.0, "degrees east of north"),
     ("motion.reference_time", -TIME, TIME, "M"),
     ("motion.injection_time", -TIME, TIME, "M"),
+    ("held_out.values.*", 0.0, 1e12, "a factor"),
+    ("held_out.folds", 2.0, 1000.0, "parts of the frames"),
     ("change.weight", 0.0, 1e12, "a factor"),
     ("change.spacing", 1e-6, TIME, "M"),
     ("movie.frames", 1.0, 1e5, "frames"),

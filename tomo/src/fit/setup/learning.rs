@@ -222,6 +222,9 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
     file.check_unknowns()?;
     let training = training(file, axis_rate)?;
     change::check(file)?;
+    if let Some(held_out) = &file.held_out {
+        held_out.check(file)?;
+    }
     if file.band.is_some() && file.unknown_world()?.is_some() {
         refuse!("band does not work together with unknown parameters in [world]");
     }

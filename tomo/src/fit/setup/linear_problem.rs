@@ -34,24 +34,60 @@ pub fn solve_linear(
     (nodes, stride): (usize, usize),
     watch: &mut Watch<'_>,
 ) -> Result<LinearSolution<f32>> {
-    let settings = linear(file)?;
     objective.model.weigh(axis);
-    let mut priors = priors(settings);
-    if file.representation.kind == Kind::LinearGrid {
-        priors.extend(file.priors()?);
-    }
     let frames: Vec<usize> = objective.observed().into_iter().step_by(stride.max(1)).collect();
-    let problem = LinearProblem {
-        model: &objective.model,
-        axis,
-        frames: &frames,
-        terms: &terms(&objective.data),
-        voxels: Voxels::cube(nodes, file.region.r_max, settings.degree),
-        upper: settings.upper,
-        flux: settings.flux_jy,
-        priors: &priors,
-        change,
-    };
+    solve_frames(&Of { file, objective, how: (axis, change), nodes }, &frames, watch)
+}
+
+/// What the linear problem of a fit is made of; its model is weighed for the axis.
+pub(super) struct Of<'a> {
+    pub file: &'a FitFile,
+    pub objective: &'a Objective<f32>,
+    pub how: (Axis, Change),
+    /// Along each axis.
+    pub nodes: usize,
+}
+
+impl Of<'_> {
+    /// The problem of some frames.
+    fn with<R>(
+        &self,
+        frames: &[usize],
+        solve: impl FnOnce(&LinearProblem<'_, f32>) -> Result<R>,
+    ) -> Result<R> {
+        let Of { file, objective, how: (axis, change), nodes } = *self;
+        let settings = linear(file)?;
+        let mut priors = priors(settings);
+        if file.representation.kind == Kind::LinearGrid {
+            priors.extend(file.priors()?);
+        }
+        solve(&LinearProblem {
+            model: &objective.model,
+            axis,
+            frames,
+            terms: &terms(&objective.data),
+            voxels: Voxels::cube(nodes, file.region.r_max, settings.degree),
+            upper: settings.upper,
+            flux: settings.flux_jy,
+            priors: &priors,
+            change,
+        })
+    }
+}
+
+/// The loss of some frames in a field, without penalties.
+pub(super) fn misfit(of: &Of<'_>, frames: &[usize], emission: &[f32]) -> Result<f64> {
+    of.with(frames, |problem| problem.misfit(emission))
+}
+
+/// The grid that fits some frames best.
+pub(super) fn solve_frames(
+    of: &Of<'_>,
+    frames: &[usize],
+    watch: &mut Watch<'_>,
+) -> Result<LinearSolution<f32>> {
+    let Of { how: (_, change), nodes, .. } = *of;
+    let settings = linear(of.file)?;
     let usual = LinearSettings::default();
     let coarse = usual.coarse.filter(|_| nodes >= FINE).map(|coarse| Coarse {
         stride: coarse.stride.min(frames.len().div_ceil(8)).max(1),
@@ -63,5 +99,6 @@ pub fn solve_linear(
         false => coarse,
     };
     let memory = if change.is_any() { MANY_ROWS } else { usual.memory };
-    problem.solve(&LinearSettings { rounds, iterations, coarse, memory, ..usual }, watch)
+    let how = LinearSettings { rounds, iterations, coarse, memory, ..usual };
+    of.with(frames, |problem| problem.solve(&how, watch))
 }

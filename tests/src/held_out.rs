@@ -1,0 +1,75 @@
+//! Weights that are chosen by frames that are held out.
+
+use crate::support::{kerrlight, succeed};
+use serde_json::Value;
+use std::path::Path;
+
+const SMALL: [&str; 17] = [
+    "fit",
+    "--set",
+    "representation=linear-grid",
+    "--set",
+    "representation.nodes=40",
+    "--set",
+    "linear.degree=linear",
+    "--set",
+    "linear.rounds=2",
+    "--set",
+    "observation.scans=24",
+    "--set",
+    "output.nodes=24",
+    "--set",
+    "screen.pixels=32",
+    "--set",
+    "screen.jy_per_pixel=0.125",
+];
+const HELD_OUT: &str = "held_out={setting=\"linear.smoothness\",values=[0.0,0.1,30.0],folds=2}";
+
+fn results(folder: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(folder.join("results.json")).unwrap()).unwrap()
+}
+
+/// Without smoothness voxels follow the noise, with too much of it they cannot be a flare: frames that were left out
+/// tell, and the volume is that of a fit with the chosen weight to the bit.
+#[test]
+fn exact_held_out_frames_choose_the_weight() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeed(at, &[&SMALL[..], &["--set", HELD_OUT, "-o", "chosen"]].concat());
+    let found = results(&at.join("chosen"));
+    let held_out = &found["held_out"];
+    assert_eq!(
+        (&held_out["setting"], &held_out["chosen"]),
+        (&"linear.smoothness".into(), &0.1.into())
+    );
+    let losses: Vec<f64> = held_out["values"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|v| v["loss"].as_f64().unwrap())
+        .collect();
+    assert!(losses[0] > losses[1] && losses[2] > losses[1], "{losses:?}");
+    succeed(at, &[&SMALL[..], &["--set", "linear.smoothness=0.1", "-o", "given"]].concat());
+    let volume = |run: &str| std::fs::read(at.join(run).join("volume.npz")).unwrap();
+    assert_eq!(volume("chosen"), volume("given"));
+    let page = std::fs::read_to_string(at.join("chosen/report.html")).unwrap();
+    assert!(page.contains("linear.smoothness = 0.1 was chosen from 3 values"));
+}
+
+#[test]
+fn bad_ways_to_hold_out_are_refused_before_anything_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    for (change, expected) in [
+        ("held_out={setting=\"change.weight\",values=[0.1,1.0],folds=2}", "there is no [change]"),
+        ("held_out={setting=\"linear.smoothness\",values=[0.1],folds=2}", "2 values or more"),
+        ("held_out={setting=\"linear.smoothness\",values=[0.1,-1.0],folds=2}", "held_out.values"),
+        ("held_out={setting=\"linear.smoothness\",values=[0.1,1.0],folds=1}", "held_out.folds = 1"),
+        ("held_out={setting=\"linear.upper\",values=[0.1,1.0],folds=2}", "expected one of"),
+    ] {
+        let run = kerrlight(folder.path(), &[&SMALL[..], &["--set", change, "-o", "run"]].concat());
+        let told = String::from_utf8_lossy(&run.stderr).into_owned();
+        assert_eq!(run.status.code(), Some(2), "{change}: {told}");
+        assert!(told.contains(expected), "{change}: {told}");
+        assert!(!folder.path().join("run").exists(), "{change}");
+    }
+}

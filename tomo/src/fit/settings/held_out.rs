@@ -1,0 +1,72 @@
+//! A setting that is chosen by data that are held out.
+
+use super::{FitError, FitFile, Kind};
+use crate::Error;
+use serde::{Deserialize, Serialize};
+
+/// Which setting is chosen, from which values, and how data are divided.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HeldOutSettings {
+    /// The setting.
+    pub setting: Weight,
+    /// Its values, from which one is chosen.
+    pub values: Vec<f64>,
+    /// Parts of the frames, each of which is held out once: frame k belongs to part k modulo their number.
+    pub folds: usize,
+}
+
+/// A weight of the linear problem.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Weight {
+    /// How much a change of emission costs.
+    #[serde(rename = "change.weight")]
+    Change,
+    /// How much slopes cost.
+    #[serde(rename = "linear.smoothness")]
+    Smoothness,
+    /// How much light costs.
+    #[serde(rename = "linear.sparsity")]
+    Sparsity,
+}
+
+impl Weight {
+    /// Its key.
+    pub fn name(self) -> &'static str {
+        match self {
+            Weight::Change => "change.weight",
+            Weight::Smoothness => "linear.smoothness",
+            Weight::Sparsity => "linear.sparsity",
+        }
+    }
+
+    /// The settings with another value of it.
+    #[must_use]
+    pub fn put(self, mut file: FitFile, value: f64) -> FitFile {
+        match (self, &mut file.change, &mut file.linear) {
+            (Weight::Change, Some(change), _) => change.weight = value,
+            (Weight::Smoothness, _, Some(linear)) => linear.smoothness = value,
+            (Weight::Sparsity, _, Some(linear)) => linear.sparsity = value,
+            _ => {}
+        }
+        file
+    }
+}
+
+impl HeldOutSettings {
+    /// Refuses what cannot be chosen.
+    pub(in crate::fit) fn check(&self, file: &FitFile) -> Result<(), Error> {
+        if self.values.len() < 2 {
+            let allowed = "2 values or more";
+            return Err(
+                FitError::range("length of held_out.values", self.values.len(), allowed).into()
+            );
+        }
+        let why = match (file.representation.kind == Kind::LinearGrid, self.setting, file.change) {
+            (false, ..) => "needs representation.kind = \"linear-grid\"",
+            (true, Weight::Change, None) => "chooses change.weight, and there is no [change]",
+            _ => return Ok(()),
+        };
+        Err(FitError::Conflict(format!("held_out {why}")).into())
+    }
+}
