@@ -2,7 +2,7 @@
 //! batch of frames.
 
 use super::raw::Raw;
-use super::{Progress, Raster, Rendered};
+use super::{Progress, Raster, Rendered, TILE};
 use crate::Error;
 use crate::scene::Scene;
 use crate::transport::Assets;
@@ -74,7 +74,8 @@ impl Film {
 
     /// The same with rays traced on a device: see [`Raster::with_device`].
     pub fn with_device(self, device: Arc<dyn RayDevice>) -> Self {
-        Film { raster: self.raster.with_device(device) }
+        // A block has a pixel of every frame for each of its rays: wide tiles would take too much memory.
+        Film { raster: self.raster.with_device(device).with_tile(TILE) }
     }
 
     /// The device on which rays are traced, if it is not this processor.
