@@ -5,7 +5,7 @@ use clap::{Command, CommandFactory};
 
 /// Verbs by what they are about, in the order of the help page.
 const GROUPS: [(&str, &[&str]); 5] = [
-    ("Pictures", &["render", "movie"]),
+    ("Pictures", &["render", "movie", "view"]),
     ("Rays", &["trace", "critical-curve", "accuracy"]),
     ("Data", &["observe", "uv", "convert"]),
     ("Fits", &["fit", "posterior", "compare"]),
@@ -17,7 +17,7 @@ pub fn command() -> Command {
     let command = Arguments::command();
     let verbs = grouped(&command);
     command.help_template(format!(
-        "{{about}}\n\n{{usage-heading}} kerrlight [OPTIONS] VERB ...   or   kerrlight VERB --help\n\n{verbs}Options:\n{{options}}{{after-help}}"
+        "{{about}}\n{{usage-heading}} kerrlight [OPTIONS] VERB ...   or   kerrlight VERB --help\n\n{verbs}Options:\n{{options}}{{after-help}}"
     ))
 }
 

@@ -53,6 +53,7 @@ mod report;
 mod trace;
 mod usage;
 mod uv;
+mod view;
 mod volume_files;
 
 pub use memory::Bounded;
@@ -85,6 +86,8 @@ enum Verb {
     Render(render::Render),
     /// Render a sequence of EXR frames, a GIF or an APNG
     Movie(movie::Movie),
+    /// Write a page to fly around a black hole in a browser
+    View(view::View),
     /// Trace the rays of a table
     Trace(trace::Trace),
     /// Tabulate the critical curve, the edge of the shadow
@@ -145,6 +148,7 @@ impl Verb {
         match self {
             Verb::Render(render) => render.run(),
             Verb::Movie(movie) => movie.run(),
+            Verb::View(view) => view.run(),
             Verb::Trace(trace) => trace.run(),
             Verb::CriticalCurve(table) => table.run(),
             Verb::Accuracy(accuracy) => accuracy.run(),

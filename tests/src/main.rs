@@ -42,3 +42,4 @@ mod station_gains;
 mod support;
 mod unknown_world;
 mod verdict;
+mod view;
