@@ -48,6 +48,7 @@ mod paths;
 pub mod pictures;
 mod program;
 mod progress;
+mod ranks;
 mod render;
 mod report;
 mod trace;
@@ -127,6 +128,7 @@ fn run(arguments: &Arguments, program: &Program) -> anyhow::Result<()> {
         (false, true) => Form::Aside,
         (false, false) => Form::Text,
     };
+    let form = if ranks::is_silent() { Form::Silent } else { form };
     arguments.verb.run(arguments, program)?.print(form)
 }
 

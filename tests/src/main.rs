@@ -26,6 +26,8 @@ mod held_out;
 mod interferometry;
 mod kerr_references;
 mod lensing;
+#[cfg(unix)]
+mod mpirun;
 mod pictures;
 mod posterior;
 mod radiative_transfer;
@@ -37,6 +39,8 @@ mod resumed_fits;
 mod shared_folder;
 #[cfg(unix)]
 mod signals;
+#[cfg(unix)]
+mod slurm;
 mod static_sky;
 mod station_gains;
 mod support;

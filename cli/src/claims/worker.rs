@@ -18,7 +18,8 @@ const VARIABLE: &str = "KERRLIGHT_RENEW_SECONDS";
 pub struct Worker {
     path: PathBuf,
     record: Arc<Mutex<Record>>,
-    stop: Option<Sender<()>>,
+    /// A word has the record renewed at once; when this is dropped, it no longer is.
+    now: Option<Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -34,12 +35,12 @@ impl Worker {
         let record = Record { worker, host, process, every_s, beat, piece, done, failed, seconds };
         write(&path, &record).with_context(|| format!("cannot write {}", path.display()))?;
         let record = Arc::new(Mutex::new(record));
-        let (stop, stopped) = channel();
+        let (now, wanted) = channel();
         let thread = {
             let (path, record) = (path.clone(), Arc::clone(&record));
-            std::thread::spawn(move || renew(&path, &record, every_s, &stopped))
+            std::thread::spawn(move || renew(&path, &record, every_s, &wanted))
         };
-        Ok(Self { path, record, stop: Some(stop), thread: Some(thread) })
+        Ok(Self { path, record, now: Some(now), thread: Some(thread) })
     }
 
     /// Its name.
@@ -57,9 +58,14 @@ impl Worker {
         serde_json::to_string(&*locked(&self.record)).unwrap_or_default()
     }
 
-    /// What it works on, from the next renewal on.
+    /// What it works on, which others see at once.
     pub fn works_on(&self, piece: Option<&str>) {
-        locked(&self.record).piece = piece.map(str::to_owned);
+        let before = std::mem::replace(&mut locked(&self.record).piece, piece.map(str::to_owned));
+        if before.as_deref() != piece
+            && let Some(now) = &self.now
+        {
+            let _ = now.send(());
+        }
     }
 
     /// A piece more has come to its end.
@@ -73,7 +79,7 @@ impl Worker {
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        drop(self.stop.take());
+        drop(self.now.take());
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
@@ -96,9 +102,9 @@ fn interval(given: Option<&str>) -> anyhow::Result<f64> {
 
 /// Renews a record until its worker leaves. What cannot be written now is written the next time: others wait for
 /// several times the interval.
-fn renew(path: &Path, record: &Mutex<Record>, every_s: f64, stopped: &Receiver<()>) {
+fn renew(path: &Path, record: &Mutex<Record>, every_s: f64, wanted: &Receiver<()>) {
     let every = Duration::from_secs_f64(every_s);
-    while let Err(RecvTimeoutError::Timeout) = stopped.recv_timeout(every) {
+    while wanted.recv_timeout(every) != Err(RecvTimeoutError::Disconnected) {
         let now = {
             let mut record = locked(record);
             record.beat += 1;

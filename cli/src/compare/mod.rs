@@ -12,6 +12,7 @@ mod quick;
 mod ran;
 mod runner;
 mod share;
+mod slurm;
 mod source;
 mod status;
 mod summary;
@@ -23,6 +24,7 @@ use crate::interrupt::{Interrupted, Keeper};
 use crate::lock::{self, Lock};
 use crate::program::Program;
 use crate::progress;
+use crate::ranks;
 use anyhow::{Context, bail};
 use cases::{Case, Choice, Status};
 use clap::Args;
@@ -32,6 +34,7 @@ use plan::Plan;
 use runner::Runner;
 use serde_json::{Value, json};
 use share::{Share, Sharing};
+use slurm::Slurm;
 use source::Source;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -41,8 +44,7 @@ use summary::Summary;
 /// Arguments of `kerrlight compare`.
 #[derive(Debug, Args)]
 pub struct Compare {
-    /// An experiment that the program carries, an experiment's file (.toml), or the results of an earlier run
-    /// (results.json) to hold against others; without it, the experiments are listed
+    /// A built-in experiment [default: list them], a file (.toml), or a folder of results
     experiment: Option<PathBuf>,
     /// Folder of the results [default: the experiment's name]
     #[arg(short, long, value_name = "FOLDER")]
@@ -71,6 +73,8 @@ pub struct Compare {
     /// Write the report of the cases that are done so far
     #[arg(long, conflicts_with_all = ["resume", "share", "list", "status"])]
     collect: bool,
+    #[command(flatten)]
+    slurm: Slurm,
     /// Show what changed since an earlier run
     #[arg(long, value_name = "RESULTS")]
     against: Option<PathBuf>,
@@ -100,7 +104,11 @@ impl Compare {
         // A folder that is called like an experiment is meant by ./name.
         let is_known = source::built_in().any(|(known, _)| Path::new(known) == name);
         let is_file = name.extension().is_some_and(|e| e == "json");
-        let goes_on = self.resume || self.share.is_some() || self.status || self.collect;
+        let goes_on = self.resume
+            || self.sharing().is_some()
+            || self.status
+            || self.collect
+            || self.slurm.is_wanted();
         if is_file || (!is_known && !goes_on && name.join("results.json").is_file()) {
             let Some(before) = before else {
                 bail!("{} are results: give others with --against", name.display());
@@ -126,9 +134,12 @@ impl Compare {
         if self.status {
             return status::show(&folder, &chosen);
         }
+        if self.slurm.is_wanted() {
+            return self.slurm.run(&asked, program, (threads, memory));
+        }
         let lock = self.enter(&asked)?;
         let runner = Runner::new(&folder, (threads, memory), program, lock)?;
-        let cases = if choice.is_restricted() && self.share.is_none() {
+        let cases = if choice.is_restricted() && self.sharing().is_none() {
             let all = cases::expand(experiment, source, &choice.unrestricted())?;
             with_known(chosen, all, &runner)
         } else {
@@ -154,11 +165,20 @@ impl Compare {
         if self.collect {
             return Ok(Ended::Here(collected(cases, runner, folder)));
         }
-        if let Some(share) = self.share {
+        if let Some(share) = self.sharing() {
             return shared(cases, runner, folder, share);
         }
         share::end(folder, &folder.join(runner::CASES))?;
         Ok(Ended::Here(run(cases, runner)))
+    }
+
+    /// How the folder is shared, if it is: ranks of one job do so unasked, and all but the first leave.
+    fn sharing(&self) -> Option<Share> {
+        match ranks::this() {
+            Some((0, _)) => Some(self.share.unwrap_or(Share::Wait)),
+            Some(_) => Some(Share::Leave),
+            None => self.share,
+        }
     }
 
     /// What is asked for: by an experiment, or by a folder in which one was begun.
@@ -213,7 +233,7 @@ impl Compare {
             let Some(_) = begun else { return Err(status::no_comparison(folder)) };
             return Ok(None);
         }
-        if self.share.is_some() {
+        if self.sharing().is_some() {
             return plan::join(&asked.plan, &asked.text, folder).map(Some);
         }
         if !lock::is_free(folder) && !self.resume {
@@ -295,7 +315,7 @@ fn shared<'a>(
 ) -> anyhow::Result<Ended<'a>> {
     let keeper = Keeper::saving("stopping after the fit's step; a second signal ends at once");
     let (open, run) = Sharing::join(folder, runner, cases)?.run(share, &keeper)?;
-    if open == 0 {
+    if open == 0 && !ranks::is_silent() {
         return Ok(Ended::Here(collected(cases, runner, folder)));
     }
     let shown = folder.display();

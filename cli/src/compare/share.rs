@@ -6,6 +6,7 @@ use crate::claims::{Board, Claim, Queue, Watch};
 use crate::interrupt::Keeper;
 use crate::lock::Lock;
 use crate::progress;
+use crate::ranks;
 use anyhow::Context;
 use clap::ValueEnum;
 use indicatif::ProgressBar;
@@ -59,7 +60,9 @@ impl<'a> Sharing<'a> {
     /// Runs cases until none is left to take; how many are open then, and how many this process has run.
     pub fn run(&mut self, share: Share, keeper: &Keeper) -> anyhow::Result<(usize, usize)> {
         let (open, name) = (self.queue.open(), self.queue.claims.name().to_owned());
-        eprintln!("{} cases, {open} of them open; this is {name}", self.cases.len());
+        if !ranks::is_silent() {
+            eprintln!("{} cases, {open} of them open; this is {name}", self.cases.len());
+        }
         let bar = progress::cases(open as u64);
         let mut run = 0;
         while !keeper.stopped() && self.queue.open() > 0 {

@@ -112,7 +112,8 @@ impl Now {
         for (worker, case) in &self.running {
             let _ = writeln!(text, "  {:<32} {:>6} done  {case}", worker.worker, worker.done);
         }
-        for worker in &self.dead {
+        // Once all have ended it does not matter who died.
+        for worker in self.dead.iter().filter(|_| self.open() > 0) {
             let _ = writeln!(text, "  {worker:<32} dead: others take up what it had");
         }
         for (name, why) in self.failed.iter().take(NAMED) {

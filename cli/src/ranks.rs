@@ -1,0 +1,46 @@
+//! This process among those that `mpirun` or `srun` has started together.
+
+/// Variables by which launchers tell a process its rank and how many there are: Open MPI, MPICH and its relatives, and
+/// the tasks of a step of Slurm.
+const VARIABLES: [[&str; 2]; 3] = [
+    ["OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"],
+    ["PMI_RANK", "PMI_SIZE"],
+    ["SLURM_PROCID", "SLURM_STEP_NUM_TASKS"],
+];
+
+/// Rank and number of ranks; nothing if the process was started alone.
+pub fn this() -> Option<(u32, u32)> {
+    of(|name| std::env::var(name).ok())
+}
+
+/// Whether another process speaks for this one.
+pub fn is_silent() -> bool {
+    this().is_some_and(|(rank, _)| rank > 0)
+}
+
+fn of(variable: impl Fn(&str) -> Option<String>) -> Option<(u32, u32)> {
+    let number = |name: &str| variable(name)?.trim().parse::<u32>().ok();
+    let both = |[rank, size]: &[&str; 2]| Some((number(rank)?, number(size)?));
+    VARIABLES.iter().find_map(both).filter(|(rank, size)| *size > 1 && rank < size)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exact_ranks_are_those_of_the_launcher() {
+        let of = |set: &[(&str, &str)]| {
+            super::of(|name| set.iter().find(|(n, _)| *n == name).map(|(_, v)| (*v).to_owned()))
+        };
+        assert_eq!(
+            of(&[("OMPI_COMM_WORLD_RANK", "2"), ("OMPI_COMM_WORLD_SIZE", "4")]),
+            Some((2, 4))
+        );
+        assert_eq!(of(&[("PMI_RANK", "0"), ("PMI_SIZE", "7")]), Some((0, 7)));
+        // A script of Slurm is no step of it.
+        assert_eq!(of(&[("SLURM_PROCID", "0"), ("SLURM_NTASKS", "4")]), None);
+        assert_eq!(of(&[("PMI_RANK", "0"), ("PMI_SIZE", "1")]), None);
+        assert_eq!(of(&[("PMI_RANK", "x"), ("PMI_SIZE", "2")]), None);
+    }
+}
