@@ -49,8 +49,10 @@ pub mod pictures;
 mod program;
 mod progress;
 mod ranks;
+mod record;
 mod render;
 mod report;
+mod reproduce;
 mod trace;
 mod usage;
 mod uv;
@@ -63,6 +65,9 @@ pub use program::Program;
 use answer::{Answer, Form};
 use anyhow::bail;
 use clap::{Parser, Subcommand};
+use output::Output;
+use record::Recorder;
+use std::path::PathBuf;
 
 /// Black holes: lensed images, simulated interferometry, 3D emission tomography
 #[derive(Debug, Parser)]
@@ -79,6 +84,9 @@ struct Arguments {
     /// Print the result as one JSON object
     #[arg(long, global = true)]
     json: bool,
+    /// Write a record: command, version, host, and checksums of all files that are read and written
+    #[arg(long, global = true, hide = true, value_name = "FILE.json")]
+    record: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -109,6 +117,8 @@ enum Verb {
     Compare(compare::Compare),
     /// Show what a file or the folder of a fit contains
     Inspect(inspect::Inspect),
+    /// Print the command that made a result, check its inputs
+    Reproduce(reproduce::Reproduce),
     /// List the graphics devices that can trace rays
     Devices(devices::Devices),
     /// Print a completion script for a shell
@@ -129,7 +139,13 @@ fn run(arguments: &Arguments, program: &Program) -> anyhow::Result<()> {
         (false, false) => Form::Text,
     };
     let form = if ranks::is_silent() { Form::Silent } else { form };
-    arguments.verb.run(arguments, program)?.print(form)
+    let to = arguments.record.as_deref().map(|path| Output::new(path, "json")).transpose()?;
+    let Some(to) = to else { return arguments.verb.run(arguments, program)?.print(form) };
+    output::follow();
+    let recorder = Recorder::of_process();
+    let answer = arguments.verb.run(arguments, program)?;
+    recorder.write(&to)?;
+    answer.print(form)
 }
 
 impl Verb {
@@ -161,6 +177,7 @@ impl Verb {
             Verb::Posterior(posterior) => posterior.run(&program.registry),
             Verb::Compare(compare) => compare.run((arguments.threads, arguments.memory), program),
             Verb::Inspect(inspect) => inspect.run(),
+            Verb::Reproduce(reproduce) => reproduce.run(),
             Verb::Devices(devices) => devices.run(),
             Verb::Completions(completions) => completions.run(),
             Verb::Man(pages) => pages.run(),

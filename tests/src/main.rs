@@ -33,6 +33,7 @@ mod posterior;
 mod radiative_transfer;
 mod readme;
 mod reference;
+mod reproduce;
 mod results;
 mod resume;
 mod resumed_fits;

@@ -20,7 +20,7 @@ mod worker;
 
 pub use board::Board;
 pub use queue::Queue;
-pub use record::Record;
+pub use record::{Record, host};
 pub use watch::Watch;
 
 use anyhow::Context;

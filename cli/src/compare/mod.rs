@@ -25,12 +25,13 @@ use crate::lock::{self, Lock};
 use crate::program::Program;
 use crate::progress;
 use crate::ranks;
+use crate::record::Recorder;
 use anyhow::{Context, bail};
 use cases::{Case, Choice, Status};
 use clap::Args;
 use experiment::Experiment;
 use page::Page;
-use plan::Plan;
+pub use plan::Plan;
 use runner::Runner;
 use serde_json::{Value, json};
 use share::{Share, Sharing};
@@ -109,7 +110,12 @@ impl Compare {
             || self.status
             || self.collect
             || self.slurm.is_wanted();
-        if is_file || (!is_known && !goes_on && name.join("results.json").is_file()) {
+        if is_file
+            || (!is_known
+                && !goes_on
+                && self.output.is_none()
+                && name.join("results.json").is_file())
+        {
             let Some(before) = before else {
                 bail!("{} are results: give others with --against", name.display());
             };
@@ -137,6 +143,7 @@ impl Compare {
         if self.slurm.is_wanted() {
             return self.slurm.run(&asked, program, (threads, memory));
         }
+        let recorder = Recorder::of_process();
         let lock = self.enter(&asked)?;
         let runner = Runner::new(&folder, (threads, memory), program, lock)?;
         let cases = if choice.is_restricted() && self.sharing().is_none() {
@@ -152,6 +159,7 @@ impl Compare {
         };
         let page = Page { experiment, choice, summary: &summary };
         let tables = page.write(&runner, &folder, before.as_ref())?;
+        recorder.write_into(&folder)?;
         Ok(end(&tables, &summary, &folder, self.collect))
     }
 
@@ -187,7 +195,10 @@ impl Compare {
         let (plan, text, folder) = match begun {
             Some((plan, text)) => {
                 self.adds_nothing(name)?;
-                (plan, text, name.to_owned())
+                match &self.output {
+                    Some(other) => (plan.again(), text, other.clone()),
+                    None => (plan, text, name.to_owned()),
+                }
             }
             None => {
                 let (source, text) = Source::find(name)?;
@@ -209,9 +220,9 @@ impl Compare {
     /// Refuses to change what a folder was begun with.
     fn adds_nothing(&self, folder: &Path) -> anyhow::Result<()> {
         let is_plain = self.seeds.is_none() && self.only.is_empty() && self.set.is_empty();
-        if !is_plain || self.quick || self.output.is_some() {
+        if !is_plain || self.quick {
             bail!(
-                "{} has its cases: --output, --seeds, --only, --set and --quick go with an experiment",
+                "{} has its cases: --seeds, --only, --set and --quick go with an experiment",
                 folder.display()
             );
         }

@@ -19,13 +19,14 @@ mod world_scan;
 mod world_search;
 
 use crate::answer::Answer;
+use crate::record::Recorder;
 use crate::{interrupt, output, paths};
 use anyhow::{Context, bail};
 pub use api::{assigned, check, coverage, sizes, turned, velocities};
 use clap::Args;
 pub use failed::Failed;
 use folder::Folder;
-pub use inputs::Inputs;
+pub use inputs::{Inputs, SETTINGS};
 use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::settings::{FitError, FitFile};
 use kerrlight_tomo::representation::Registry;
@@ -108,6 +109,11 @@ impl Fit {
         }
         let (prepared, read) = output::with_reads(|| run::Prepared::new(file, &base_dir, registry));
         let prepared = prepared?;
+        // Settings of a run say so already.
+        let text = text
+            .strip_prefix(BASE_DIR)
+            .and_then(|t| t.split_once('\n'))
+            .map_or(text.as_str(), |(_, t)| t);
         let text = format!("{BASE_DIR}{}\n{text}", self.shown(&base_dir).display());
         let folder = Folder::create(&folder, &text, Inputs::new(&text, read))?;
         self.run_all(&prepared, &text, &folder, false)
@@ -121,7 +127,9 @@ impl Fit {
         folder: &Folder,
         resume: bool,
     ) -> anyhow::Result<Answer> {
+        let recorder = Recorder::of_process();
         let answer = run::run(prepared, text, folder, resume)?;
+        recorder.write_into(folder.path())?;
         let Some(samples) = self.samples else { return Ok(answer) };
         Ok(answer.and("posterior", posterior::draw(prepared, folder, samples)?))
     }
@@ -145,7 +153,9 @@ impl Fit {
                 let folder = path.parent().filter(|folder| *folder != Path::new(""));
                 let folder = std::path::absolute(folder.unwrap_or(Path::new(".")))
                     .with_context(|| path.display().to_string())?;
-                (output::read_text(path)?, folder)
+                let text = output::read_text(path)?;
+                let folder = if text.starts_with(BASE_DIR) { base_dir_of(&text) } else { folder };
+                (text, folder)
             }
         };
         // The built-in experiment has no folder of its own.
