@@ -66,12 +66,12 @@ fn exact_records_and_pictures_know_their_commands() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     std::fs::write(at.join("rays.csv"), "spin,inclination_deg,alpha,beta\n0.9,60,-6,1\n").unwrap();
-    let words = ["trace", "rays.csv", "-o", "table.csv", "--record", "table.json"];
+    let words = ["trace", "--rays", "rays.csv", "-o", "table.csv", "--record", "table.json"];
     succeed(at, &words);
     let first = std::fs::read(at.join("table.csv")).unwrap();
     std::fs::remove_file(at.join("table.csv")).unwrap();
     let line = again(at, "table.json");
-    assert!(line.starts_with("cd ") && line.contains("trace rays.csv"), "{line}");
+    assert!(line.starts_with("cd ") && line.contains("trace --rays rays.csv"), "{line}");
     assert!(std::fs::read(at.join("table.csv")).unwrap() == first);
     let record = std::fs::read_to_string(at.join("table.json")).unwrap();
     let record: Value = serde_json::from_str(&record).unwrap();
