@@ -17,7 +17,7 @@ pub fn command() -> Command {
     let command = Arguments::command();
     let verbs = grouped(&command);
     command.help_template(format!(
-        "{{about}}\n{{usage-heading}} kerrlight [OPTIONS] VERB ...   or   kerrlight VERB --help\n\n{verbs}Options:\n{{options}}{{after-help}}"
+        "{{about}}\n{{usage-heading}} kerrlight [OPTIONS] VERB ...   or   kerrlight VERB --help\n{verbs}Options:\n{{options}}{{after-help}}"
     ))
 }
 

@@ -26,8 +26,6 @@ fn of(variable: impl Fn(&str) -> Option<String>) -> Option<(u32, u32)> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-
     #[test]
     fn exact_ranks_are_those_of_the_launcher() {
         let of = |set: &[(&str, &str)]| {
