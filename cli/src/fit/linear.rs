@@ -7,6 +7,7 @@ use anyhow::Context;
 use kerrlight_tomo::dynamics::Axis;
 use kerrlight_tomo::fit::linear::{Change, Ending, LinearProgress, LinearSolution};
 use kerrlight_tomo::fit::settings::{FitFile, Kind};
+use kerrlight_tomo::fit::setup::Imprinted;
 use kerrlight_tomo::fit::{Objective, setup};
 use serde_json::{Value, json};
 use std::ops::ControlFlow;
@@ -59,6 +60,14 @@ pub fn solved(solution: &LinearSolution<f32>) -> Value {
             "bytes": solution.bytes, "ending": format!("{:?}", solution.ending), "statement": statement(solution),
             "certificate": certificate, "stationarity": stationarity,
         },
+    })
+}
+
+/// A line of the log.
+pub fn imprinted(found: &Imprinted) -> Value {
+    json!({
+        "step": 0,
+        "imprint": { "steps": found.steps, "relative_error": found.relative_error },
     })
 }
 

@@ -221,7 +221,7 @@ impl Run<'_> {
                 (nodes, stride),
             )?;
             self.folder.log(&linear::solved(&solution))?;
-            setup::imprint(
+            let imprinted = setup::imprint(
                 self.file,
                 trainer.representation,
                 &solution.emission,
@@ -229,6 +229,7 @@ impl Run<'_> {
                 steps,
                 state,
             )?;
+            self.folder.log(&linear::imprinted(&imprinted))?;
         }
         Ok(())
     }

@@ -21,7 +21,7 @@ pub use band::{BandScan, BandWatch, BandWorld, band_motion, in_band_world, scan_
 pub use change::{change, emission_times};
 pub use coarse_view::CoarseView;
 pub use held_out::{Held, HeldWatch, best as best_held, hold_out};
-pub use imprint::imprint;
+pub use imprint::{Imprinted, imprint};
 pub use instrument::Instrument;
 pub use learning::{caution, check, representation, training};
 pub use light_curve::Curve;
