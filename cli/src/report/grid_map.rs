@@ -1,10 +1,9 @@
 //! A function on a grid of a few numbers: its profile along each on the diagonal, over each pair below it.
 
-use kuva::backend::svg::SvgBackend;
+use super::panels;
 use kuva::plot::line::LinePlot;
 use kuva::plot::scatter::ScatterPlot;
 use kuva::plot::{ColorMap, Heatmap};
-use kuva::render::figure::Figure;
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 
@@ -52,19 +51,11 @@ impl GridAxis {
 impl GridMap {
     /// The picture as text.
     pub fn svg(&self) -> String {
-        let n = self.axes.len();
-        let (mut plots, mut layouts, mut structure) = (Vec::new(), Vec::new(), Vec::new());
-        for row in 0..n {
-            for column in 0..=row {
-                let panel = if row == column { self.curve(row) } else { self.pair(column, row) };
-                layouts.push(self.layout(&panel, row, column));
-                plots.push(panel);
-                structure.push(vec![row * n + column]);
-            }
-        }
-        let figure = Figure::new(n, n).with_structure(structure).with_plots(plots);
-        let figure = figure.with_layouts(layouts).with_cell_size(PANEL, PANEL).with_spacing(6.0);
-        SvgBackend::new().render_scene(&figure.render())
+        panels::triangle(self.axes.len(), PANEL, |row, column| {
+            let panel = if row == column { self.curve(row) } else { self.pair(column, row) };
+            let layout = self.layout(&panel, row, column);
+            (panel, layout)
+        })
     }
 
     fn curve(&self, k: usize) -> Vec<Plot> {

@@ -3,6 +3,7 @@
 
 mod grid_map;
 mod html;
+mod panels;
 mod pictures;
 mod plot;
 #[cfg(test)]
