@@ -3,7 +3,7 @@
 use super::{Arguments, compare, fit, help, interrupt, run};
 use anyhow::Context;
 use clap::FromArgMatches;
-use kerrlight_tomo::representation::{BuildRepresentation, Registry};
+use kerrlight_tomo::representation::{BuildRepresentation, FindRepresentation, Registry};
 use std::ffi::OsString;
 use std::process::{Command, ExitCode};
 
@@ -24,6 +24,13 @@ impl Program {
     #[must_use]
     pub fn representation(mut self, name: &'static str, build: BuildRepresentation) -> Self {
         self.registry.add(name, build);
+        self
+    }
+
+    /// With the representations that `find` knows by name, loaded when a fit names one.
+    #[must_use]
+    pub fn other_representations(mut self, find: FindRepresentation) -> Self {
+        self.registry.find_others(find);
         self
     }
 

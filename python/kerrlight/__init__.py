@@ -25,18 +25,32 @@ from typing import TYPE_CHECKING
 from kerrlight._core import __version__
 
 if TYPE_CHECKING:
-    from kerrlight.fit import Fit, FitError, Report, Volume
+    from kerrlight.comparison import Comparison, compare
+    from kerrlight.fit import Fit, FitError
     from kerrlight.fourier import Fourier
     from kerrlight.interferometry import Closures, Observation, Station
-    from kerrlight.model import ForwardModel, Keplerian, PowerLaw, Tabulated, VoxelModel, screen
+    from kerrlight.model import (
+        ForwardModel,
+        Keplerian,
+        PolarizationLaw,
+        PowerLaw,
+        Tabulated,
+        VoxelModel,
+        screen,
+    )
     from kerrlight.observing import observe, stations
     from kerrlight.pictures import Movie, Picture, movie, render
+    from kerrlight.posterior import Posterior
     from kerrlight.rays import Curve, GaussLegendre, Kerr, MinoTime, Observer, PathLength
+    from kerrlight.report import Report
+    from kerrlight.representation import Region, Representation
     from kerrlight.table import Outcome, Points, Rays
+    from kerrlight.volume import Volume
 
 # The module of each name.
 _MODULES = {
     "Closures": "interferometry",
+    "Comparison": "comparison",
     "Curve": "rays",
     "Fit": "fit",
     "FitError": "fit",
@@ -53,13 +67,18 @@ _MODULES = {
     "PathLength": "rays",
     "Picture": "pictures",
     "Points": "table",
+    "PolarizationLaw": "model",
+    "Posterior": "posterior",
     "PowerLaw": "model",
     "Rays": "table",
-    "Report": "fit",
+    "Region": "representation",
+    "Report": "report",
+    "Representation": "representation",
     "Station": "interferometry",
     "Tabulated": "model",
-    "Volume": "fit",
+    "Volume": "volume",
     "VoxelModel": "model",
+    "compare": "comparison",
     "movie": "pictures",
     "observe": "observing",
     "render": "pictures",
@@ -69,6 +88,7 @@ _MODULES = {
 
 __all__ = [
     "Closures",
+    "Comparison",
     "Curve",
     "Fit",
     "FitError",
@@ -85,14 +105,19 @@ __all__ = [
     "PathLength",
     "Picture",
     "Points",
+    "PolarizationLaw",
+    "Posterior",
     "PowerLaw",
     "Rays",
+    "Region",
     "Report",
+    "Representation",
     "Station",
     "Tabulated",
     "Volume",
     "VoxelModel",
     "__version__",
+    "compare",
     "movie",
     "observe",
     "render",

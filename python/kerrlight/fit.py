@@ -6,101 +6,29 @@ be resumed, by this class or by ``kerrlight fit --resume``.
 
 from __future__ import annotations
 
-import html
 import json
 import os
 import subprocess
-import sys
 import tempfile
-import time
 from functools import cached_property
 from itertools import count
 from os import PathLike, fspath
 from pathlib import Path
-from typing import IO, Any, Callable, Iterator, Mapping, Union
+from typing import Any, Callable, Iterator, Mapping, Union
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kerrlight import _core
-from kerrlight._arrays import Floats
+from kerrlight import _core, _program
+from kerrlight._program import FitError
 from kerrlight.pictures import Settings, overrides_of, text_of
+from kerrlight.posterior import Posterior, draw
+from kerrlight.report import Report
+from kerrlight.volume import Volume
 
-__all__ = ["Fit", "FitError", "Report", "Volume"]
+__all__ = ["Fit", "FitError", "Posterior", "Report", "Volume"]
 
 Callback = Callable[[Mapping[str, Any]], object]
-
-
-class FitError(RuntimeError):
-    """A fit that failed while it ran; its settings made sense."""
-
-
-class Volume:
-    """Emission on the nodes of a box."""
-
-    def __init__(self, path: Union[str, PathLike[str]]) -> None:
-        with np.load(path) as arrays:
-            self.emission: NDArray[np.float32] = arrays["emission"]
-            """Over (x, y, z)."""
-            self.low: Floats = arrays["low"]
-            """Coordinates of the first node (M)."""
-            self.high: Floats = arrays["high"]
-            """Coordinates of the last node (M)."""
-            self.axis: Floats = arrays["axis"]
-            """What matter turns about."""
-
-    def _nodes(self, k: int) -> Floats:
-        return np.linspace(self.low[k], self.high[k], self.emission.shape[k])
-
-    @property
-    def x(self) -> Floats:
-        """Coordinates of the nodes along x (M)."""
-        return self._nodes(0)
-
-    @property
-    def y(self) -> Floats:
-        """Coordinates of the nodes along y (M)."""
-        return self._nodes(1)
-
-    @property
-    def z(self) -> Floats:
-        """Coordinates of the nodes along z (M)."""
-        return self._nodes(2)
-
-    def to_xarray(self) -> Any:
-        """As an ``xarray.DataArray`` with coordinates; needs xarray."""
-        import xarray
-
-        coordinates = {name: (name, getattr(self, name), {"units": "M"}) for name in "xyz"}
-        attributes = {"axis": self.axis.tolist(), "long_name": "emission"}
-        return xarray.DataArray(
-            self.emission, coords=coordinates, dims=("x", "y", "z"), name="emission", attrs=attributes
-        )
-
-    def __repr__(self) -> str:
-        shape = " x ".join(map(str, self.emission.shape))
-        return f"<Volume of {shape} nodes from {self.low.tolist()} to {self.high.tolist()} M>"
-
-
-class Report:
-    """The page of a fit, with its interactive view of the volume. In a notebook it shows itself."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        """Where the page lies."""
-
-    def open(self) -> bool:
-        """Shows it in a browser."""
-        import webbrowser
-
-        return webbrowser.open(self.path.resolve().as_uri())
-
-    def _repr_html_(self) -> str:
-        page = html.escape(self.path.read_text(encoding="utf-8"), quote=True)
-        return f'<iframe srcdoc="{page}" width="100%" height="800" style="border: 0"></iframe>'
-
-    def __repr__(self) -> str:
-        return f"<Report {self.path}>"
 
 
 class Fit:
@@ -109,7 +37,7 @@ class Fit:
     :param config: settings as of a fit file: a dictionary, TOML text, the path of a file, or nothing for the built-in
         experiment, a flare of Sgr A* seen by the ngEHT.
     :param folder: the folder of the run, new or empty; by default ``kerrlight-fit``, or ``kerrlight-fit-2``, ….
-    :param set: changes with dotted keys, such as ``{"training.steps": 500}``.
+    :param set: changes with dotted keys, such as ``{"training.steps": 500}``; None removes a key.
     :param base: where relative paths in the settings start from: by default the folder of their file, else the current
         one.
     :raises ValueError: for settings that the program refuses, with its words.
@@ -158,7 +86,7 @@ class Fit:
         return file
 
     def _command(self, file: Any) -> list[str]:
-        words = [sys.executable, "-m", "kerrlight", "fit"]
+        words = [*_program.LAUNCHER, "fit"]
         words += [file.name] if file is not None else []
         for change in self._set:
             words += ["--set", change]
@@ -175,7 +103,7 @@ class Fit:
             if file is not None:
                 file.close()
         if done.returncode != 0:
-            raise ValueError(_said(done.stderr, file))
+            raise ValueError(_program.said(done.stderr, file))
         return done.stdout
 
     def run(
@@ -205,8 +133,7 @@ class Fit:
                 command = [*command[:4], "--resume", os.fspath(self.folder)]
             else:
                 command += ["-o", os.fspath(self.folder)]
-            command += ["--threads", str(threads)] if threads is not None else []
-            command += ["--memory", memory] if memory is not None else []
+            command += _program.limits(threads, memory)
             self._follow([*command, "--stop-with-input"], callback, progress, file)
         finally:
             if file is not None:
@@ -218,43 +145,23 @@ class Fit:
         self, command: list[str], callback: Callback | None, progress: bool, file: Any
     ) -> None:
         seen = len(self.log)
-        with tempfile.TemporaryFile("w+", encoding="utf-8") as said:
-            child = subprocess.Popen(
-                command,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.DEVNULL,
-                stderr=said,
-                start_new_session=True,
-            )
-            bar = _bar(self._steps) if progress else None
-            try:
-                while child.poll() is None:
-                    seen = self._tell(seen, callback, bar)
-                    time.sleep(0.05)
-                self._tell(seen, callback, bar)
-            except BaseException:
-                # The end of its input makes it save its state and stop.
-                assert child.stdin is not None
-                child.stdin.close()
-                child.wait()
-                raise
-            finally:
-                if bar is not None:
-                    bar.close()
-                if child.stdin is not None:
-                    child.stdin.close()
-            _check(child.returncode, said, file)
+        bar = _program.bar(self._steps, "step") if progress else None
 
-    def _tell(self, seen: int, callback: Callback | None, bar: Any) -> int:
-        lines = self._lines()[seen:]
-        for line in lines:
-            if bar is not None and "step" in line:
-                bar.update(line["step"] - bar.n)
-                if "loss" in line:
-                    bar.set_postfix(loss=f"{line['loss']:.4g}")
-            if callback is not None:
-                callback(line)
-        return seen + len(lines)
+        def tell() -> None:
+            nonlocal seen
+            lines = self._lines()[seen:]
+            seen += len(lines)
+            for line in lines:
+                _show(bar, line)
+                if callback is not None:
+                    callback(line)
+
+        try:
+            # The end of its input makes it save its state and stop.
+            _program.follow(command, tell, lambda child: child.stdin.close(), file)
+        finally:
+            if bar is not None:
+                bar.close()
 
     def _lines(self) -> list[dict[str, Any]]:
         try:
@@ -299,6 +206,24 @@ class Fit:
         with np.load(self.folder / "movie.npz") as arrays:
             return {name: arrays[name] for name in arrays}
 
+    def posterior(
+        self,
+        samples: int,
+        *,
+        progress: bool = True,
+        threads: int | None = None,
+        memory: str | None = None,
+    ) -> Posterior:
+        """How sure the fit is: draws volumes, and worlds where the world is not known, that the data leave possible,
+        as ``kerrlight posterior`` does.
+
+        :param samples: number of draws, those of earlier calls included; each takes about as long as the fit.
+        :raises ValueError: for fits around which nothing is drawn.
+
+        Ctrl-C stops it; the draws that are complete are kept, and the next call continues.
+        """
+        return draw(self.folder, samples, progress, _program.limits(threads, memory))
+
     def report(self) -> Report:
         """The page of the fit."""
         path = self.folder / "report.html"
@@ -307,7 +232,7 @@ class Fit:
         return Report(path)
 
     def __repr__(self) -> str:
-        return f"<Fit in {self.folder}: {self._steps} steps>"
+        return f"<Fit in {self.folder}: {getattr(self, '_steps', '?')} steps>"
 
 
 def _free() -> Path:
@@ -317,29 +242,9 @@ def _free() -> Path:
     return next(name for name in names if not name.exists())
 
 
-def _bar(steps: int) -> Any:
-    try:
-        from tqdm.auto import tqdm
-    except ImportError:
-        return None
-    return tqdm(total=steps, unit="step")
-
-
-def _said(text: str, file: Any) -> str:
-    """What the program complains of, without the name of a file that nobody knows."""
-    lines = [line for line in text.splitlines() if line.strip()]
-    at = next((k for k, line in enumerate(lines) if line.startswith("error: ")), 0)
-    words = "\n".join(lines[at:]).removeprefix("error: ")
-    return words.replace(f"{file.name}: ", "") if file is not None else words
-
-
-def _check(code: int, said: IO[str], file: Any) -> None:
-    if code == 0:
+def _show(bar: Any, line: Mapping[str, Any]) -> None:
+    if bar is None or "step" not in line:
         return
-    said.seek(0)
-    words = _said(said.read(), file)
-    if code == 2:
-        raise ValueError(words)
-    if code in (129, 130, 143):
-        raise KeyboardInterrupt(words)
-    raise FitError(words or f"the fit ended with the code {code}")
+    bar.update(line["step"] - bar.n)
+    if "loss" in line:
+        bar.set_postfix(loss=f"{line['loss']:.4g}")

@@ -377,6 +377,25 @@ class Observation:
             mjd=self.mjd,
         )
 
+    @staticmethod
+    def from_pyuvdata(data: Any, sigmas: ArrayLike | None = None) -> Observation:
+        """From a ``pyuvdata.UVData`` in Jy with one phase centre.
+
+        ``sigmas``, in the shape of its ``data_array``, are standard deviations of real and imaginary parts (Jy). Without
+        them they are 1/√nsample: pyuvdata keeps the weights of a UVFITS file, which in EHT files are 1/σ², as numbers
+        of samples. What is flagged counts as not measured.
+        """
+        from kerrlight import _pyuvdata
+
+        return _pyuvdata.read(data, sigmas)
+
+    def to_pyuvdata(self) -> Any:
+        """A ``pyuvdata.UVData``, with 1/σ² as numbers of samples, as :meth:`from_pyuvdata` reads it; needs pyuvdata, one
+        spectral channel, and stations with positions."""
+        from kerrlight import _pyuvdata
+
+        return _pyuvdata.write(self)
+
     def __repr__(self) -> str:
         basis = "RR, LL, RL, LR" if self.circular else "I, Q, U, V"
         return f"<Observation of {self.source or 'no name'}: {len(self)} rows of {basis}, {len(self.array)} stations>"

@@ -12,14 +12,18 @@ True
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-__all__ = ["apply"]
+from jax.flatten_util import ravel_pytree
+
+import kerrlight.representation
+
+__all__ = ["Representation", "apply"]
 
 
 def _complex(dtype: Any) -> Any:
@@ -57,3 +61,82 @@ def _backward(operator: Any, like: Any, cotangent: Any) -> tuple[Any]:
 
 
 apply.defvjp(_forward, _backward)
+
+
+class Representation(kerrlight.representation.Representation):
+    """Emission as a function of JAX, for fits and comparisons; derivatives are JAX's.
+
+    ::
+
+        class Blobs(kerrlight.jax.Representation):
+            def __init__(self, region, *, count, sigma):
+                self.region, self.count, self.sigma = region, count, sigma
+
+            def initial(self, key):
+                return {"center": self.region.r_max * jax.random.uniform(key, (self.count, 3), minval=-1),
+                        "light": jnp.full(self.count, 0.1)}
+
+            def emission(self, parameters, points):
+                offset = points[:, None] - parameters["center"]
+                return jnp.exp(-0.5 * (offset**2).sum(-1) / self.sigma**2) @ parameters["light"] ** 2
+    """
+
+    chunk: int = 16384
+    """Points that are done at a time: functions are compiled once for this number."""
+
+    def initial(self, key: Any) -> Any:
+        """Parameters to start from: any tree of arrays."""
+        raise NotImplementedError
+
+    def emission(self, parameters: Any, points: Any) -> Any:
+        """Emission at points of shape (points, dimension)."""
+        raise NotImplementedError
+
+    @cached_property
+    def _tree(self) -> tuple[int, Any]:
+        flat, unravel = ravel_pytree(self.initial(jax.random.key(0)))
+        return len(flat), unravel
+
+    @property
+    def parameters(self) -> int:  # type: ignore[override]
+        """Number of parameters."""
+        return self._tree[0]
+
+    @cached_property
+    def _functions(self) -> tuple[Any, Any]:
+        unravel = self._tree[1]
+
+        def value(flat: Any, points: Any) -> Any:
+            return self.emission(unravel(flat), points)
+
+        def pull(flat: Any, points: Any, cotangents: Any) -> Any:
+            return jax.vjp(value, flat, points)[1](cotangents)
+
+        return jax.jit(value), jax.jit(pull)
+
+    def _chunks(self, points: Any) -> Any:
+        """Slices of the points, and what fills each up to a chunk: more of its first point."""
+        for start in range(0, len(points), self.chunk):
+            part = points[start : start + self.chunk]
+            filling = np.broadcast_to(part[:1], (self.chunk - len(part), points.shape[1]))
+            yield slice(start, start + len(part)), np.concatenate([part, filling])
+
+    def initialise(self, seed: int) -> Any:
+        return np.asarray(ravel_pytree(self.initial(jax.random.key(seed)))[0])
+
+    def eval(self, parameters: Any, points: Any) -> Any:
+        values = np.empty(len(points), np.float32)
+        for rows, part in self._chunks(points):
+            values[rows] = self._functions[0](parameters, part)[: rows.stop - rows.start]
+        return values
+
+    def vjp(self, parameters: Any, points: Any, cotangents: Any, wants_points: bool) -> Any:
+        total, of_points = np.zeros_like(parameters), np.zeros_like(points)
+        for rows, part in self._chunks(points):
+            padded = np.zeros(self.chunk, np.float32)
+            padded[: rows.stop - rows.start] = cotangents[rows]
+            first, second = self._functions[1](parameters, part, padded)
+            total += np.asarray(first)
+            if wants_points:
+                of_points[rows] = second[: rows.stop - rows.start]
+        return total, of_points if wants_points else None

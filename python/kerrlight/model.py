@@ -7,10 +7,11 @@ networks and optimisers of your own (:mod:`kerrlight.torch`, :mod:`kerrlight.jax
 
 from __future__ import annotations
 
+import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any, Sequence, Union
+from typing import Any, Literal, Sequence, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -19,7 +20,15 @@ from kerrlight import _core
 from kerrlight._arrays import Floats, real, together
 from kerrlight.rays import Observer
 
-__all__ = ["ForwardModel", "Keplerian", "PowerLaw", "Tabulated", "VoxelModel", "screen"]
+__all__ = [
+    "ForwardModel",
+    "Keplerian",
+    "PolarizationLaw",
+    "PowerLaw",
+    "Tabulated",
+    "VoxelModel",
+    "screen",
+]
 
 
 @dataclass(frozen=True)
@@ -47,6 +56,45 @@ class Tabulated:
 
 
 Velocity = Union[Keplerian, PowerLaw, Tabulated]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PolarizationLaw:
+    """Light of gas in a magnetic field: I ∝ g^a |b|^c sin^s θ_B per unit of emission, of which ``fraction`` is linearly
+    polarised along k × b. Keys, ranges and units are those of ``[polarization]`` in fit files; none has a default, as
+    published programs differ.
+    """
+
+    vertical: float
+    """Field along +z: B^r = radial sinⁿθ + vertical cos θ, B^θ = −vertical sin θ."""
+    radial: float
+    """Field away from the hole."""
+    toroidal: float
+    """B^φ."""
+    radial_sine_power: float
+    """n."""
+    components: Literal["orthonormal", "coordinate"]
+    """What the components are along."""
+    frame: Literal["gas", "ideal", "lowered"]
+    """Whose they are."""
+    redshift_power: float
+    """a."""
+    field_power: float
+    """c."""
+    sine_power: float
+    """s."""
+    fraction: float
+    """Linearly polarised part, 0 to 1."""
+    normalisation: Literal["mean-field", "none"]
+    """What |b| is measured in."""
+    turn_deg: float
+    """Added to all position angles, degrees east of north."""
+
+    def _json(self) -> str:
+        law: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
+        parts = ("vertical", "radial", "toroidal", "radial_sine_power")
+        law["field"] = {part: float(law.pop(part)) for part in parts}
+        return json.dumps(law)
 
 
 def screen(pixels: int, width: float) -> tuple[Floats, Floats]:
@@ -125,6 +173,9 @@ class ForwardModel(_Linear):
     :param slow_light: whether light takes its time.
     :param redshift_power: emission goes like g to this power; without it there is no redshift.
     :param scale: flux of a pixel with an integral of 1.
+    :param polarization: the gas's field and law of light; images are then of the parameters in ``stokes``, with the
+        electric vector's angle counted from +β towards −α (from north to east, if the spin points north).
+    :param stokes: which parameters, with ``polarization``: some of the letters of ``"IQU"``.
 
     >>> from kerrlight import Kerr
     >>> observer = Kerr(0.0).observer(inclination_deg=60)
@@ -159,6 +210,8 @@ class ForwardModel(_Linear):
         slow_light: bool = False,
         redshift_power: float | None = None,
         scale: float = 1.0,
+        polarization: PolarizationLaw | None = None,
+        stokes: str = "IQU",
     ) -> None:
         self.image_shape, columns = together(alpha=alpha, beta=beta)
         self.times = np.atleast_1d(real("times", times)).copy()
@@ -171,6 +224,10 @@ class ForwardModel(_Linear):
             raise ValueError(f"split = {split} is not allowed: 1 to 4096")
         if not math.isfinite(scale):
             raise ValueError(f"scale = {scale} is not allowed: a finite number")
+        if not stokes or len(set(stokes)) < len(stokes):
+            raise ValueError(f'stokes = "{stokes}" is not allowed: some of the letters of "IQU", each once')
+        self.stokes = stokes if polarization is not None else ""
+        """The Stokes parameters of its images, in order; empty without ``polarization``."""
         settings = {
             "region": (float(r_min), float(r_max), float(z_width)),
             "order": int(order),
@@ -184,6 +241,7 @@ class ForwardModel(_Linear):
             "reference": float(reference_time),
             "injection": injection_time,
             "scale": float(scale),
+            "polarization": (polarization._json(), list(stokes)) if polarization else None,
         }
         self._core = _core.Model(
             observer.hole.spin, observer._place, (columns[0], columns[1]), settings
@@ -207,8 +265,14 @@ class ForwardModel(_Linear):
 
     @property
     def output_shape(self) -> tuple[int, ...]:  # type: ignore[override]
-        """(frames, ...) with the shape of an image."""
-        return (self.frames, *self.image_shape)
+        """(frames, ...) with the shape of an image; (frames, parameters, ...) with ``polarization``."""
+        planes = (len(self.stokes),) if self.stokes else ()
+        return (self.frames, *planes, *self.image_shape)
+
+    @property
+    def factors(self) -> Floats:
+        """What weights are multiplied by for each Stokes parameter, shape (parameters, nodes)."""
+        return self._core.factors().reshape(-1, self.nodes)
 
     @cached_property
     def _columns(self) -> dict[str, Any]:

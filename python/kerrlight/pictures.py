@@ -7,7 +7,7 @@ import json
 import os
 from functools import cached_property
 from os import PathLike, fspath
-from typing import Any, Iterator, Mapping, Sequence, Union
+from typing import TYPE_CHECKING, Any, Iterator, Mapping, Sequence, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,10 +15,13 @@ from numpy.typing import ArrayLike, NDArray
 from kerrlight import _core
 from kerrlight._arrays import Floats, real
 
+if TYPE_CHECKING:
+    from kerrlight.scene import Scene
+
 __all__ = ["Movie", "Picture", "movie", "render"]
 
-Settings = Union[None, str, "PathLike[str]", Mapping[str, Any]]
-"""A dictionary, TOML text, the path of a file, or nothing: what is built in."""
+Settings = Union[None, str, "PathLike[str]", Mapping[str, Any], "Scene"]
+"""A dictionary, TOML text, the path of a file, a scene as objects, or nothing: what is built in."""
 
 
 def _plain(value: Any) -> Any:
@@ -33,15 +36,35 @@ def _plain(value: Any) -> Any:
 
 
 def _without_none(value: Any) -> Any:
+    """Tables without keys that are None; a key with dots leads through tables, as in TOML."""
     if isinstance(value, Mapping):
-        return {str(k): _without_none(v) for k, v in value.items() if v is not None}
+        table: dict[str, Any] = {}
+        for key, of in value.items():
+            if of is not None:
+                _put(table, str(key).split("."), _without_none(of))
+        return table
     if isinstance(value, (list, tuple)):
         return [_without_none(v) for v in value]
     return value
 
 
+def _put(table: dict[str, Any], keys: list[str], value: Any) -> None:
+    for key in keys[:-1]:
+        table = table.setdefault(key, {})
+        if not isinstance(table, dict):
+            raise ValueError(f"{'.'.join(keys)}: {key} is a value, not a table")
+    here = table.get(keys[-1])
+    if isinstance(here, dict) and isinstance(value, dict):
+        for key, of in value.items():
+            _put(here, [key], of)
+    else:
+        table[keys[-1]] = value
+
+
 def text_of(settings: Settings, folder: Union[None, str, PathLike[str]]) -> tuple[str | None, str]:
     """The TOML text of settings, and the folder that relative paths in it start from."""
+    if settings is not None and hasattr(settings, "to_dict"):
+        settings = settings.to_dict()
     if isinstance(settings, Mapping):
         encoded = json.dumps(_without_none(settings), default=_plain)
         return _core.toml_of_json(encoded), fspath(folder or ".")
@@ -54,10 +77,18 @@ def text_of(settings: Settings, folder: Union[None, str, PathLike[str]]) -> tupl
         return file.read(), fspath(folder or os.path.dirname(name) or ".")
 
 
+def _flat(changes: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted keys of all values in dictionaries of dictionaries."""
+    for key, value in changes.items():
+        if isinstance(value, Mapping) and value:
+            yield from _flat(value, f"{before}{key}.")
+        else:
+            yield f"{before}{key}", value
+
+
 def overrides_of(changes: Mapping[str, Any] | None) -> list[str]:
-    """``key.path=value`` of each change, values as TOML writes them."""
-    if not changes:
-        return []
+    """``key.path=value`` of each change, values as TOML writes them; a dictionary changes the keys that it has, and None
+    removes a key."""
 
     def value(of: Any) -> str:
         text = _core.toml_of_json(json.dumps({"value": _without_none(of)}, default=_plain))
@@ -66,7 +97,8 @@ def overrides_of(changes: Mapping[str, Any] | None) -> list[str]:
             raise TypeError(f"{of!r} is no single value: change its keys one by one")
         return rest.strip()
 
-    return [f"{key}={value(of)}" for key, of in changes.items()]
+    flat = _flat(changes or {})
+    return [f"{key}=" if of is None else f"{key}={value(of)}" for key, of in flat]
 
 
 class Picture(Mapping[str, "NDArray[np.float32]"]):
@@ -197,7 +229,8 @@ def render(
 ) -> Picture:
     """Renders a scene.
 
-    :param scene: a dictionary with the tables of a scene file, its text, its path, or nothing for the built-in scene.
+    :param scene: a :class:`kerrlight.scene.Scene`, a dictionary with the tables of a scene file, its text, its path, or
+        nothing for the built-in scene.
     :param set: changes, with dotted keys: ``{"hole.spin": 0.5, "spot.0.phase_deg": 90}``.
     :param folder: where relative paths in the scene start from; by default the folder of its file, else the current one.
     :raises ValueError: for what the program refuses, with its words.

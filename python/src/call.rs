@@ -22,9 +22,29 @@ pub fn detached<T: Send, E: Display + Send>(
     py: Python<'_>,
     work: impl FnOnce() -> Result<T, E> + Send,
 ) -> PyResult<T> {
+    let work = || {
+        stay_on_this_thread();
+        work()
+    };
     match py.detach(|| catch_unwind(AssertUnwindSafe(work))) {
         Ok(result) => result.map_err(refused),
         Err(panic) => Err(PyRuntimeError::new_err(format!("internal error: {}", message(&*panic)))),
+    }
+}
+
+thread_local! {
+    /// Whether this thread is the only one of a pool of its own; the pool lives as long as the process.
+    static IS_ALONE: bool = {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
+        pool.map(std::mem::forget).is_ok()
+    };
+}
+
+/// Where there is one thread for all work (`RAYON_NUM_THREADS=1`), calls from several threads of Python, such as those
+/// of dask or joblib, would wait for one another: each then works on the thread that it comes from.
+fn stay_on_this_thread() {
+    if rayon::current_thread_index().is_none() && rayon::current_num_threads() == 1 {
+        IS_ALONE.with(|_| ());
     }
 }
 

@@ -1,6 +1,7 @@
 //! What is known of a fit's settings before it runs.
 
 use crate::call::{detached, refused};
+use crate::representation;
 use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::fit::setup;
 use kerrlight_tomo::representation::Registry;
@@ -16,6 +17,8 @@ pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
 #[pyfunction]
 fn check_fit(py: Python<'_>, text: &str) -> PyResult<u64> {
     let file = FitFile::parse(text).map_err(refused)?;
-    detached(py, || setup::check(&file, &Registry::default()))?;
+    let mut registry = Registry::new();
+    registry.find_others(representation::find);
+    detached(py, || setup::check(&file, &registry))?;
     Ok(file.training.steps)
 }

@@ -18,6 +18,8 @@ mod orbits;
 mod pictures;
 mod program;
 mod rays;
+mod representation;
+mod volume;
 
 use pyo3::prelude::*;
 
@@ -35,5 +37,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     orbits::add(module)?;
     pictures::add(module)?;
     program::add(module)?;
-    rays::add(module)
+    rays::add(module)?;
+    volume::add(module)
 }

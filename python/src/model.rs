@@ -6,8 +6,10 @@ use kerrlight_geodesic::Kerr;
 use kerrlight_tomo::Error;
 use kerrlight_tomo::dynamics::{AngularVelocity, Axis};
 use kerrlight_tomo::fit::{
-    Batch, ForwardModel, Motion, Redshift, Region, Sampling, SightlineRequest, Sightlines,
+    Batch, ForwardModel, Motion, PolarizedView, Redshift, Region, Sampling, SightlineRequest,
+    Sightlines,
 };
+use kerrlight_tomo::polarization::{PolarizationLaw, StokesParameter};
 use kerrlight_tomo::representation::{
     Activation, Coordinates, Float, Gradient, Grid, GridSettings, Representation, Workspace,
 };
@@ -63,6 +65,8 @@ struct Settings {
     injection: Option<f64>,
     /// Flux of a pixel with an integral of 1.
     scale: f64,
+    /// A law of polarised light as JSON, and the Stokes parameters that are wanted.
+    polarization: Option<(String, Vec<String>)>,
 }
 
 impl Settings {
@@ -73,9 +77,33 @@ impl Settings {
             region: Region { r_min, r_max, z_width },
             sampling: self.per_ray.map_or(gauss, |per_ray| Sampling::EqualMinoTime { per_ray }),
             delay: self.slow_light,
-            momentum: self.redshift_power.is_some(),
+            momentum: self.redshift_power.is_some() || self.polarization.is_some(),
         }
     }
+
+    /// The law of polarised light with the wanted parameters.
+    fn stokes(&self) -> Result<Option<(PolarizationLaw, Vec<StokesParameter>)>, Refused> {
+        let Some((law, names)) = &self.polarization else { return Ok(None) };
+        if let Some(power) = self.redshift_power {
+            return Err(Refused(format!(
+                "redshift_power = {power} is not allowed together with polarization, whose redshift_power it is"
+            )));
+        }
+        let law = serde_json::from_str(law).map_err(|e| Refused(format!("polarization: {e}")))?;
+        Ok(Some((law, names.iter().map(|name| parameter(name)).collect::<Result<_, _>>()?)))
+    }
+}
+
+/// Settings that contradict each other, or say nothing.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct Refused(String);
+
+fn parameter(name: &str) -> Result<StokesParameter, Refused> {
+    let modelled = [StokesParameter::I, StokesParameter::Q, StokesParameter::U];
+    modelled.into_iter().find(|known| known.name() == name).ok_or_else(|| {
+        Refused(format!("stokes = \"{name}\" is not allowed: some of \"I\", \"Q\" and \"U\""))
+    })
 }
 
 /// Nodes on rays, and what each gives to its pixel.
@@ -92,6 +120,8 @@ pub struct Model {
     /// Times of the frames, and when it begins to shine.
     times: Vec<f64>,
     injection: Option<f64>,
+    /// Of each Stokes parameter that is wanted, what it is multiplied by at each node; none for intensity alone.
+    factors: Vec<Vec<f64>>,
 }
 
 impl Model {
@@ -100,11 +130,12 @@ impl Model {
         place: &kerrlight_geodesic::Observer,
         [alpha, beta]: [&[f64]; 2],
         settings: Settings,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self, Box<dyn std::error::Error + Send + Sync>> {
+        let stokes = settings.stokes()?;
         let mut lines = Sightlines::trace(hole, place, alpha, beta, &settings.request())?;
         if lines.rays() == 0 {
             let allowed = "above the least radius that the rays reach: no ray meets the region";
-            return Err(Error::out_of_range("r_max", settings.region.1, allowed));
+            return Err(Error::out_of_range("r_max", settings.region.1, allowed).into());
         }
         lines.weight.iter_mut().for_each(|weight| *weight *= settings.scale);
         let redshift = settings.redshift_power.map(|power| Redshift { power });
@@ -114,8 +145,16 @@ impl Model {
             injection: None,
             times: settings.times.clone(),
         };
-        let mut model = ForwardModel::new(&lines, &motion, hole, redshift)?;
         let axis = Axis::new(settings.axis)?;
+        let factors = stokes.map_or(Ok(Vec::new()), |(law, parameters)| {
+            let sin_inclination = place.inclination().sin();
+            let screen = [alpha.to_vec(), beta.to_vec()];
+            let view = PolarizedView { law, axis, sin_inclination, screen, position_angle: 0.0 };
+            let factors = view.factors(&lines, hole, &motion.velocity)?;
+            let of = |p: &StokesParameter| factors.iter().map(|stokes| stokes.get(*p)).collect();
+            Ok::<_, Error>(parameters.iter().map(of).collect())
+        })?;
+        let mut model = ForwardModel::new(&lines, &motion, hole, redshift)?;
         model.weigh(axis);
         let mut batch = Batch::default();
         batch.set((0..lines.rays() as u32).map(|ray| (ray, 0)));
@@ -128,6 +167,7 @@ impl Model {
             delay: lines.delay,
             times: settings.times,
             injection: settings.injection,
+            factors,
             model,
         })
     }
@@ -143,38 +183,58 @@ impl Model {
         if is_dark { 0.0 } else { self.weight[k] }
     }
 
+    /// Images of a frame, one for each Stokes parameter.
+    fn planes(&self) -> usize {
+        self.factors.len().max(1)
+    }
+
+    /// Pixels of all images of a frame.
+    fn pixels(&self) -> usize {
+        self.planes() * self.model.pixels()
+    }
+
+    /// What a node gives to an image per emission.
+    fn light(&self, plane: usize, frame: usize, k: usize) -> f64 {
+        let weight = self.weight(frame, k);
+        self.factors.get(plane).map_or(weight, |factors| weight * factors[k])
+    }
+
     /// The nodes of each ray with its pixel.
     fn rays(&self) -> impl Iterator<Item = (usize, std::ops::Range<usize>)> + '_ {
         let ranges = self.starts.windows(2).map(|ends| ends[0]..ends[1]);
         self.model.pixel().iter().map(|pixel| *pixel as usize).zip(ranges)
     }
 
-    fn image<T: Float>(&self, frame: usize, emission: &[T], image: &mut [T]) {
-        for (pixel, nodes) in self.rays() {
-            let light = nodes.map(|k| self.weight(frame, k) * emission[k].double());
-            image[pixel] = T::of(light.sum());
+    fn image<T: Float>(&self, frame: usize, emission: &[T], images: &mut [T]) {
+        for (plane, image) in images.chunks_mut(self.model.pixels()).enumerate() {
+            for (pixel, nodes) in self.rays() {
+                let light = nodes.map(|k| self.light(plane, frame, k) * emission[k].double());
+                image[pixel] = T::of(light.sum());
+            }
         }
     }
 
-    fn back<T: Float>(&self, frame: usize, image: &[T], cotangents: &mut [T]) {
+    fn back<T: Float>(&self, frame: usize, images: &[T], cotangents: &mut [T]) {
+        let cotangent =
+            |plane: usize, pixel: usize| images[plane * self.model.pixels() + pixel].double();
         for (pixel, nodes) in self.rays() {
             for k in nodes {
-                cotangents[k] = T::of(self.weight(frame, k) * image[pixel].double());
+                let part = |plane| self.light(plane, frame, k) * cotangent(plane, pixel);
+                cotangents[k] = T::of((0..self.planes()).map(part).sum());
             }
         }
     }
 
     fn apply<T: Float>(&self, emission: &[T], frames: &[usize]) -> Vec<T> {
-        let pixels = self.model.pixels();
-        let mut movie = vec![T::zero(); frames.len() * pixels];
-        let images = movie.par_chunks_mut(pixels).zip(emission.par_chunks(self.nodes()));
+        let mut movie = vec![T::zero(); frames.len() * self.pixels()];
+        let images = movie.par_chunks_mut(self.pixels()).zip(emission.par_chunks(self.nodes()));
         images.zip(frames).for_each(|((image, field), frame)| self.image(*frame, field, image));
         movie
     }
 
     fn vjp<T: Float>(&self, movie: &[T], frames: &[usize]) -> Vec<T> {
         let mut cotangents = vec![T::zero(); frames.len() * self.nodes()];
-        let images = movie.par_chunks(self.model.pixels());
+        let images = movie.par_chunks(self.pixels());
         let fields = cotangents.par_chunks_mut(self.nodes()).zip(images).zip(frames);
         fields.for_each(|((field, image), frame)| self.back(*frame, image, field));
         cotangents
@@ -200,8 +260,8 @@ impl Model {
     }
 
     fn of_voxels<T: Float>(&self, grid: &Grid, volume: &[T], frames: &[usize]) -> Vec<T> {
-        let mut movie = vec![T::zero(); frames.len() * self.model.pixels()];
-        let images = movie.par_chunks_mut(self.model.pixels()).zip(frames);
+        let mut movie = vec![T::zero(); frames.len() * self.pixels()];
+        let images = movie.par_chunks_mut(self.pixels()).zip(frames);
         images.for_each_init(Workspace::new, |workspace, (image, frame)| {
             let [x, y, z] = self.pulled::<T>(*frame);
             let mut values = vec![T::zero(); self.nodes()];
@@ -216,7 +276,7 @@ impl Model {
         let count = grid.settings().nodes.iter().product();
         let (mut sum, volume) = (vec![T::zero(); count], vec![T::zero(); count]);
         let (mut workspace, mut cotangents) = (Workspace::new(), vec![T::zero(); self.nodes()]);
-        for (image, frame) in movie.chunks(self.model.pixels()).zip(frames) {
+        for (image, frame) in movie.chunks(self.pixels()).zip(frames) {
             let [x, y, z] = self.pulled::<T>(*frame);
             self.back(*frame, image, &mut cotangents);
             let into = Gradient { parameters: &mut sum, coordinates: None };
@@ -285,6 +345,11 @@ impl Model {
     /// Pixels of an image, nodes of a frame, and frames.
     fn sizes(&self) -> (usize, usize, usize) {
         (self.model.pixels(), self.nodes(), self.model.frames())
+    }
+
+    /// What each wanted Stokes parameter is multiplied by at each node, one after the other.
+    fn factors<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        self.factors.concat().into_pyarray(py).into_any()
     }
 
     /// Where nodes lie, what they weigh, their pixels and delays.

@@ -11,7 +11,11 @@ from kerrlight import Observation
 
 PAGES = pathlib.Path(__file__).parents[2] / "docs" / "python"
 # Steps of training are a few here.
-SHORTER = {"range(1000)": "range(3)", '"training.steps": 500': '"training.steps": 5, "output.nodes": 16'}
+SHORTER = {
+    "range(1000)": "range(3)",
+    '"training.steps": 500': '"training.steps": 3, "output.nodes": 16, "screen.pixels": 16, "training.start": "drawn"',
+    "samples=1000": "samples=50",
+}
 
 
 def blocks(page):

@@ -13,7 +13,14 @@ import pytest
 from kerrlight import Fit
 from kerrlight.fit import FitError
 
-QUICK = {"training.steps": 12, "training.log_every": 2, "output.nodes": 16}
+QUICK = {
+    "training.steps": 12,
+    "training.log_every": 2,
+    "output.nodes": 16,
+    "screen.pixels": 16,
+    "observation.scans": 16,
+    "training.start.linear.steps": 20,
+}
 
 
 def test_the_programs_results(tmp_path):

@@ -5,7 +5,7 @@ import types
 import numpy as np
 import pytest
 
-from kerrlight import Fourier, Observation, Station
+from kerrlight import Fourier, Observation, Station, observe
 
 RNG = np.random.default_rng(3)
 NAMES = ["AA", "LM", "PV", "SM"]
@@ -180,3 +180,35 @@ def test_to_ehtim_and_back(circular, tmp_path):
     of.write(tmp_path / "data.uvfits")
     theirs = ehtim.obsdata.load_uvfits(str(tmp_path / "data.uvfits"))
     assert len(theirs.data) == len(of)
+
+
+def test_pyuvdata(tmp_path):
+    """Files that pyuvdata reads and what kerrlight reads of them are the same, and so is the way back."""
+    uvdata = pytest.importorskip("pyuvdata").UVData
+    image = np.random.default_rng(1).random((16, 16)) / 256
+    when = {"source": "sgra", "mjd": 57850, "utc": (4.0, 5.0), "scans": 2, "integration": 60}
+    obs = observe(image, 100.0, "EHT2017", **when, seed=1)
+    obs.write(tmp_path / "a.uvfits")
+    obs = Observation.read(tmp_path / "a.uvfits")
+    data = uvdata()
+    data.read_uvfits(str(tmp_path / "a.uvfits"), run_check=False)
+    for theirs in (Observation.from_pyuvdata(data), Observation.from_pyuvdata(obs.to_pyuvdata())):
+        np.testing.assert_allclose(theirs.uv, obs.uv, rtol=1e-14)
+        np.testing.assert_array_equal(theirs.stations, obs.stations)
+        np.testing.assert_allclose(theirs.time, obs.time, atol=1e-7)
+        is_there = ~np.isnan(theirs.sigmas)
+        assert is_there[:, :2].all() and theirs.circular == obs.circular
+        np.testing.assert_allclose(theirs.products[is_there], obs.products[is_there], rtol=1e-12)
+        np.testing.assert_allclose(theirs.sigmas[is_there], obs.sigmas[is_there], rtol=1e-12)
+        places = {station.name: station.position for station in theirs.array}
+        np.testing.assert_allclose(
+            [places[station.name] for station in obs.array], [s.position for s in obs.array], atol=1e-3
+        )
+        assert (theirs.source, theirs.mjd) == (obs.source, obs.mjd)
+    halves = Observation.from_pyuvdata(data, sigmas=np.full(data.data_array.shape, 0.5))
+    assert set(halves.sigmas[~np.isnan(halves.sigmas)].tolist()) == {0.5}
+    with pytest.raises(ValueError, match="sigmas have the shape"):
+        Observation.from_pyuvdata(data, sigmas=np.ones(3))
+    data.vis_units = "K str"
+    with pytest.raises(ValueError, match="vis_units"):
+        Observation.from_pyuvdata(data)

@@ -7,14 +7,34 @@ import pathlib
 import numpy as np
 import pytest
 
-from kerrlight import Fourier, ForwardModel, Kerr, Observation, render, screen
+from kerrlight import Fourier, ForwardModel, Kerr, Observation, PolarizationLaw, render, screen
+from kerrlight import _core
 from kerrlight.compat.kgeo import raytrace_ana
+from kerrlight.pictures import overrides_of
 
 STATM = pathlib.Path("/proc/self/statm")
 pytestmark = pytest.mark.skipif(not STATM.exists(), reason="no /proc")
 
 OBSERVER = Kerr(0.9).observer(inclination_deg=60)
 MODEL = ForwardModel(OBSERVER, *screen(6, 20.0), r_min=3.0, r_max=8.0, times=[0.0, 5.0])
+LAW = PolarizationLaw(
+    vertical=1.0,
+    radial=0.0,
+    toroidal=0.0,
+    radial_sine_power=0.0,
+    components="orthonormal",
+    frame="gas",
+    redshift_power=3.0,
+    field_power=2.0,
+    sine_power=2.0,
+    fraction=0.7,
+    normalisation="none",
+    turn_deg=0.0,
+)
+POLARISED = ForwardModel(OBSERVER, *screen(6, 20.0), r_min=3.0, r_max=8.0, polarization=LAW)
+LIGHT = np.ones(POLARISED.input_shape)
+CORNERS = ([4, 4, 4], [-1.0] * 3, [1.0] * 3)
+BOX = np.ones(64, np.float32)
 VOXELS = MODEL.voxels(6, 8.0)
 EMISSION, MOVIE, VOLUME = (np.ones(of) for of in (MODEL.input_shape, MODEL.output_shape, (6, 6, 6)))
 UV = np.array([[1e9, 2e9], [3e9, -1e9], [2e9, -3e9]])
@@ -49,6 +69,9 @@ CALLS = {
     "apply": lambda: MODEL.apply(EMISSION),
     "vjp": lambda: MODEL.vjp(MOVIE),
     "voxels": lambda: VOXELS.vjp(VOXELS.apply(VOLUME)),
+    "stokes": lambda: POLARISED.vjp(POLARISED.apply(LIGHT)),
+    "view": lambda: _core.view(CORNERS, BOX, (0.0, 20.0), (2.0, 0.0), 8),
+    "overrides": lambda: overrides_of({"a": {"b": 1.0}, "c": None}),
     "transform": lambda: Fourier((8, 8), 100.0, UV),
     "visibilities": lambda: FOURIER.vjp(FOURIER.apply(IMAGE) + DATA),
     "observation": lambda: Observation.of_stokes_i(*ROWS).vis,

@@ -1,9 +1,11 @@
 """The forward model: its adjoint, known sums, frames, precision, and gradients in PyTorch and JAX."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from kerrlight import ForwardModel, Keplerian, Kerr, PowerLaw, Tabulated, screen
+from kerrlight import ForwardModel, Keplerian, Kerr, PolarizationLaw, PowerLaw, Tabulated, screen
 
 RNG = np.random.default_rng(7)
 
@@ -14,12 +16,28 @@ def model(**more):
     return ForwardModel(observer, *screen(10, 22.0), **settings)
 
 
+LAW = PolarizationLaw(
+    vertical=0.0,
+    radial=0.0,
+    toroidal=1.0,
+    radial_sine_power=0.0,
+    components="orthonormal",
+    frame="gas",
+    redshift_power=2.0,
+    field_power=0.0,
+    sine_power=0.0,
+    fraction=0.5,
+    normalisation="none",
+    turn_deg=0.0,
+)
 KINDS = {
     "plain": {},
     "redshift": {"redshift_power": 2.0},
     "slow light": {"slow_light": True, "injection_time": 5.0},
     "tilted": {"axis": [1.0, 0.0, 1.0], "velocity": PowerLaw(3.5, 0.2)},
     "table": {"velocity": Tabulated([3.0, 9.0], [0.1, 0.02]), "z_width": 4.0, "order": 5, "split": 2},
+    "stokes": {"polarization": LAW, "slow_light": True},
+    "only U": {"polarization": LAW, "stokes": "U"},
     "bhnerf": {"per_ray": 60, "radius": 1000.0},
 }
 
@@ -75,6 +93,35 @@ def test_dark_before_the_injection():
     np.testing.assert_array_equal(of.vjp(np.ones(of.output_shape)) > 0, lit)
 
 
+def test_light_of_a_toroidal_field_is_polarised_radially():
+    """Far from the hole and seen from above, the electric vector points away from it: at the north it is along north
+    (Q > 0), at the east along east (Q < 0), at the north-east half way (U > 0). East is towards -α."""
+    observer = Kerr(0.0).observer(inclination_deg=0)
+    alpha, beta = [0.0, -60.0, -42.4, 42.4], [60.0, 0.0, 42.4, 42.4]
+    at_rest = PowerLaw(60.0, 1e-9)
+    of = ForwardModel(
+        observer, alpha, beta, r_min=50.0, r_max=70.0, z_width=3.0, velocity=at_rest, polarization=LAW
+    )
+    assert of.stokes == "IQU" and of.output_shape == (1, 3, 4)
+    i, q, u = of.apply(np.ones(of.input_shape))[0]
+    np.testing.assert_allclose(q / (0.5 * i), [1, -1, 0, 0], atol=0.02)
+    np.testing.assert_allclose(u / (0.5 * i), [0, 0, 1, -1], atol=0.02)
+
+
+def test_factors_of_stokes_parameters():
+    of = model(polarization=LAW)
+    i, q, u = of.factors
+    np.testing.assert_allclose(np.hypot(q, u), 0.5 * i, rtol=1e-12)
+    plain = model(redshift_power=2.0)
+    np.testing.assert_allclose(i * of.weights, plain.weights, rtol=1e-10)
+    emission = RNG.random(of.input_shape)
+    movie = of.apply(emission)
+    np.testing.assert_allclose(movie[:, 0], plain.apply(emission), rtol=1e-10)
+    alone = model(polarization=LAW, stokes="U")
+    np.testing.assert_array_equal(alone.apply(emission)[:, 0], movie[:, 2])
+    assert model().factors.shape == (0, of.nodes)
+
+
 def test_frames():
     of = model()
     emission = RNG.random(of.input_shape)
@@ -98,6 +145,10 @@ def test_refusals():
         (lambda: model(order=17), "order = 17"),
         (lambda: model(per_ray=50), "observer radius"),
         (lambda: model(r_min=100.0, r_max=101.0), "no ray meets the region"),
+        (lambda: model(polarization=LAW, redshift_power=2.0), "redshift_power = 2"),
+        (lambda: model(polarization=LAW, stokes="IV"), 'stokes = "V"'),
+        (lambda: model(polarization=LAW, stokes="II"), 'stokes = "II"'),
+        (lambda: model(polarization=replace(LAW, fraction=2.0)), "polarization.fraction = 2"),
         (lambda: of.apply(np.zeros(3)), "emission has the shape"),
         (lambda: of.vjp(np.zeros(3)), "cotangent has the shape"),
         (lambda: of.voxels(1, 9.0), "nodes = 1 is not allowed"),

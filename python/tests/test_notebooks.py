@@ -8,7 +8,7 @@ import pytest
 
 NOTEBOOKS = sorted((pathlib.Path(__file__).parents[1] / "notebooks").glob("*.ipynb"))
 SHORTER = {
-    '"training.steps": 300': '"training.steps": 20, "output.nodes": 16',
+    '"training.steps": 300': '"training.steps": 20, "output.nodes": 16, "screen.pixels": 20',
     "range(1, 201)": "range(1, 31)",
 }
 

@@ -127,3 +127,18 @@ def test_settings_survive_json():
 
     text = toml_of_json(json.dumps({"a": 1, "b": [1.5, 2], "c": {"d": True, "e": "x\ny"}}))
     assert "a = 1" in text and "[c]" in text
+
+
+def test_keys_with_dots():
+    from kerrlight.pictures import overrides_of, text_of
+
+    text, _ = text_of({"a.b": 1, "a": {"c": 2, "d.e": [3.5], "no": None}}, None)
+    assert tomllib_of(text) == {"a": {"b": 1, "c": 2, "d": {"e": [3.5]}}}
+    assert overrides_of({"a": {"b": 1, "c": {"d": "x"}}, "e.f": None}) == ["a.b=1", 'a.c.d="x"', "e.f="]
+    with pytest.raises(ValueError, match="a is a value"):
+        text_of({"a": 1, "a.b": 2}, None)
+
+
+def tomllib_of(text):
+    tomllib = pytest.importorskip("tomllib")
+    return tomllib.loads(text)

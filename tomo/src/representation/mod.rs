@@ -21,7 +21,9 @@ pub use changing::{Allowed, Carrier, Changing, Knots};
 pub use features::{FeatureGrid, FeatureGridSettings};
 pub use grid::{Grid, GridSettings};
 pub use network::{Initialisation, Network, NetworkSettings};
-pub use registry::{BuildError, BuildRepresentation, OwnError, OwnSettings, Registry};
+pub use registry::{
+    BuildError, BuildRepresentation, FindRepresentation, OwnError, OwnSettings, Registry,
+};
 pub use spline::{Degree, Spline};
 pub use workspace::Workspace;
 

@@ -10,6 +10,10 @@ pub type BuildError = Box<dyn std::error::Error + Send + Sync>;
 /// Makes a representation of its settings.
 pub type BuildRepresentation = fn(&OwnSettings) -> Result<Box<dyn Representation<f32>>, BuildError>;
 
+/// Makes a representation of a name that is not known before, or says with `None` that the name is none of its own.
+pub type FindRepresentation =
+    fn(&str, &OwnSettings) -> Option<Result<Box<dyn Representation<f32>>, BuildError>>;
+
 /// What a representation of one's own is told.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OwnSettings {
@@ -77,6 +81,7 @@ impl OwnSettings {
 #[derive(Debug, Clone, Default)]
 pub struct Registry {
     all: Vec<(&'static str, BuildRepresentation)>,
+    find: Option<FindRepresentation>,
 }
 
 impl Registry {
@@ -90,6 +95,11 @@ impl Registry {
         self.all.push((name, build));
     }
 
+    /// Asks `find` for the names that were not added: those of a plug-in that is loaded when a fit names it.
+    pub fn find_others(&mut self, find: FindRepresentation) {
+        self.find = Some(find);
+    }
+
     /// The names, in the order in which they were added.
     pub fn names(&self) -> impl Iterator<Item = &'static str> {
         self.all.iter().map(|(name, _)| *name)
@@ -101,8 +111,10 @@ impl Registry {
         name: &str,
         settings: &OwnSettings,
     ) -> Option<Result<Box<dyn Representation<f32>>, BuildError>> {
-        let (_, build) = self.all.iter().find(|(known, _)| *known == name)?;
-        Some(build(settings))
+        match self.all.iter().find(|(known, _)| *known == name) {
+            Some((_, build)) => Some(build(settings)),
+            None => self.find.and_then(|find| find(name, settings)),
+        }
     }
 }
 
@@ -133,5 +145,8 @@ mod tests {
         assert_eq!(says("width = 4"), "representation.own.width = 4 is not allowed: 8 to 512");
         assert!(registry.build("other", &own("")).is_none());
         assert!(registry.names().eq(["small"]));
+        registry.find_others(|name, own| name.starts_with("plug-in:").then(|| small(own)));
+        assert!(registry.build("plug-in:small", &own("width = 8")).unwrap().is_ok());
+        assert!(registry.build("other", &own("")).is_none());
     }
 }

@@ -7,7 +7,7 @@ use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, Value};
 
 /// The scene text with `key.path=value` applied, e.g. `hole.spin=0.5`,
 /// `spot.0.phase_deg=90`. A value that is no TOML is taken as a string; an empty one removes
-/// the key; `{a=1, b={c=2}}` takes the place of a whole table. The element after the last one of a
+/// the key; `{a=1, b={c=2}}` takes the place of a whole table, and so does a string. The element after the last one of a
 /// list of tables adds one: `loss.1.data=amplitudes` where there is one loss.
 ///
 /// # Errors
@@ -102,6 +102,8 @@ fn put(table: &mut Table, key: &str, value: &str) -> Result<(), String> {
             .into_array_of_tables()
             .map(Item::ArrayOfTables)
             .map_err(|_| "names a list of tables: give a list of tables".to_owned())?,
+        // A choice without settings in place of one that has some: `start=drawn`.
+        (Some(Item::Table(_)), word @ Value::String(_)) => Item::Value(word),
         (Some(Item::Table(_) | Item::ArrayOfTables(_)), _) => {
             return Err("names a table, not a value".to_owned());
         }

@@ -165,6 +165,11 @@ fn overrides_that_lead_nowhere_say_so() {
     assert!(error("mesh.1.path=a.obj").contains("there is no `mesh`, so none with number 1"));
     assert!(error("hole.spin.x=1").contains("not a table"));
     assert!(error("hole=1").contains("names a table"));
+    let chosen = apply_override("[a.start.linear]\nnodes = 3\n\n[b]\nc = 1\n", "a.start=drawn");
+    assert_eq!(
+        chosen.unwrap().parse::<toml::Table>().unwrap()["a"]["start"].as_str(),
+        Some("drawn")
+    );
     assert!(error(".=1").contains("empty key"));
 }
 

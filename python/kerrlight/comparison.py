@@ -1,0 +1,165 @@
+"""Comparisons: many fits that differ in named factors, as ``kerrlight compare`` runs them."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import tempfile
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any, Mapping, Sequence, Union
+
+from kerrlight import _program
+from kerrlight.fit import Fit
+from kerrlight.pictures import Settings, overrides_of, text_of
+from kerrlight.report import Report
+
+__all__ = ["Comparison", "compare"]
+
+
+class Comparison:
+    """The cases of a comparison with their results."""
+
+    def __init__(self, folder: Union[str, PathLike[str]]) -> None:
+        self.folder = Path(folder)
+        """Where it lies."""
+        path = self.folder / "results.json"
+        if not path.is_file():
+            raise FileNotFoundError(f"{folder} holds no results of a comparison")
+        results = json.loads(path.read_text(encoding="utf-8"))
+        self.title: str = results["title"]
+        self.is_quick: bool = results["quick"]
+        """Whether it was a look at whether it runs, and no measurement."""
+        self.cases: list[dict[str, Any]] = results["cases"]
+        """Of each case ``levels``, ``seed``, ``status``, ``settings`` and ``results``."""
+
+    def rows(self) -> list[dict[str, Any]]:
+        """A row for each case: its levels, its seed, its status, its verdict, and every result that is a single
+        number."""
+        return [_row(case) for case in self.cases]
+
+    def table(self) -> Any:
+        """:meth:`rows` as a ``pandas.DataFrame``; needs pandas."""
+        import pandas
+
+        return pandas.DataFrame(self.rows())
+
+    def fit(self, k: int) -> Fit:
+        """The fit of a case."""
+        return Fit.open(self.folder / self.cases[k]["folder"])
+
+    def report(self) -> Report:
+        """The page: ranking, tables, figures, all cases."""
+        return Report(self.folder / "report.html")
+
+    def __len__(self) -> int:
+        return len(self.cases)
+
+    def __repr__(self) -> str:
+        return f"<Comparison of {len(self)} cases in {self.folder}: {self.title}>"
+
+
+def _row(case: Mapping[str, Any]) -> dict[str, Any]:
+    results = case.get("results") or {}
+    row = {**case["levels"], "seed": case["seed"], "status": case["status"]}
+    verdict = results.get("verdict")
+    if isinstance(verdict, Mapping):
+        row["verdict"] = verdict["outcome"]
+    for name, value in results.items():
+        if isinstance(value, (int, float)) and not isinstance(value, bool):
+            row[name] = value
+    return row
+
+
+def compare(
+    experiment: Settings,
+    folder: Union[None, str, PathLike[str]] = None,
+    *,
+    only: Mapping[str, Any] | None = None,
+    set: Mapping[str, Any] | None = None,
+    seeds: int | None = None,
+    quick: bool = False,
+    progress: bool = True,
+    threads: int | None = None,
+    memory: str | None = None,
+) -> Comparison:
+    """Runs a comparison, or continues the one in its folder.
+
+    :param experiment: the name of a built-in experiment, or an experiment file as a dictionary, TOML text or path.
+        ``representation.kind`` may name a class of yours, ``"module:Class"`` (:class:`kerrlight.Representation`).
+    :param folder: of the results; by default the name of the experiment, or ``comparison``.
+    :param only: levels of factors: the cases that have them.
+    :param set: changes of the settings of all fits, with dotted keys.
+    :param seeds: seeds of every case.
+    :param quick: few steps and cases, to see whether it runs.
+    :param progress: whether to show a bar, if tqdm is installed.
+    :param threads: threads of each fit.
+    :param memory: limit of each fit, such as ``"4GiB"``.
+    :raises ValueError: for what the program refuses, with its words.
+    :raises kerrlight.FitError: if cases failed; the others are whole.
+
+    Ctrl-C stops it after the step that is under way, and the next call continues. ::
+
+        mine = kerrlight.compare("representations", only={"scene": 1})
+        mine.table().sort_values("psnr_db")
+    """
+    file, words = None, _words(only, set, seeds, quick)
+    if isinstance(experiment, str) and "\n" not in experiment and "=" not in experiment:
+        name = experiment
+    elif isinstance(experiment, PathLike):
+        name = fspath(experiment)
+    else:
+        text, base = text_of(experiment, None)
+        file = tempfile.NamedTemporaryFile(
+            "w", dir=base, prefix=".kerrlight-", suffix=".toml", encoding="utf-8"
+        )
+        file.write(text or "")
+        file.flush()
+        name = file.name
+    place = Path(folder) if folder is not None else _folder(name, file)
+    words += ["-o", str(place), "--resume"]
+    try:
+        _run([*_program.LAUNCHER, "compare", name], words, place, progress, _program.limits(threads, memory), file)
+    finally:
+        if file is not None:
+            file.close()
+    return Comparison(place)
+
+
+def _folder(name: str, file: Any) -> Path:
+    return Path("comparison") if file is not None else Path(Path(name).stem)
+
+
+def _words(
+    only: Mapping[str, Any] | None, set: Mapping[str, Any] | None, seeds: int | None, quick: bool
+) -> list[str]:
+    words = [word for name, level in (only or {}).items() for word in ("--only", f"{name}={level}")]
+    words += [word for change in overrides_of(set) for word in ("--set", change)]
+    words += ["--seeds", str(seeds)] if seeds is not None else []
+    return [*words, "--quick"] if quick else words
+
+
+def _run(
+    command: list[str], words: Sequence[str], place: Path, progress: bool, limits: list[str], file: Any
+) -> None:
+    chosen = [word for word in words if word != "--resume"]
+    listed = subprocess.run(
+        [*command, *chosen, "--list", "--json"],
+        capture_output=True,
+        text=True,
+        stdin=subprocess.DEVNULL,
+    )
+    if listed.returncode != 0:
+        raise ValueError(_program.said(listed.stderr, file))
+    total = len(json.loads(listed.stdout)["cases"])
+
+    def done() -> int:
+        return min(total, len(list(place.glob("cases/*/report.html"))))
+
+    counter = _program.Counter(total, "fit", done, progress)
+    try:
+        stop = lambda child: child.send_signal(signal.SIGINT)  # noqa: E731
+        _program.follow([*command, *words, *limits], counter, stop, file)
+    finally:
+        counter.close()

@@ -1,0 +1,100 @@
+"""How sure a fit is: what :meth:`kerrlight.Fit.posterior` draws."""
+
+from __future__ import annotations
+
+import json
+import signal
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import Any, Iterator, Union
+
+import numpy as np
+
+from kerrlight import _program
+from kerrlight._arrays import Floats
+from kerrlight.report import Report
+from kerrlight.volume import Volume
+
+__all__ = ["Posterior"]
+
+
+class Posterior:
+    """Draws around a finished fit, each a volume, and a world where that is not known.
+
+    ``len(posterior)`` is their number, ``posterior[k]`` the volume of a draw.
+    """
+
+    def __init__(self, folder: Union[str, PathLike[str]]) -> None:
+        self.folder = Path(folder)
+        """The folder of the draws, ``posterior`` in that of the fit."""
+        path = self.folder / "posterior.json"
+        if not path.is_file():
+            raise FileNotFoundError(f"{folder} holds no posterior: Fit.posterior(samples) draws one")
+        self.summary: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        """All numbers of ``posterior.json``: ``world``, ``features``, ``light_above_3_sigma`` and so on."""
+
+    def __len__(self) -> int:
+        return int(self.summary["samples"])
+
+    def __getitem__(self, k: int) -> Volume:
+        number = range(1, len(self) + 1)[k]
+        return Volume(self.folder / f"sample_{number:04}.npz")
+
+    def __iter__(self) -> Iterator[Volume]:
+        return (self[k] for k in range(len(self)))
+
+    @cached_property
+    def mean(self) -> Volume:
+        """Mean of the draws."""
+        return Volume(self.folder / "mean.npz")
+
+    @cached_property
+    def deviation(self) -> Volume:
+        """Their standard deviation."""
+        return Volume(self.folder / "deviation.npz")
+
+    @cached_property
+    def worlds(self) -> dict[str, Floats]:
+        """Each free parameter of the world in all draws; empty where the world is known."""
+        path = self.folder / "worlds.csv"
+        if not path.is_file():
+            return {}
+        table = np.genfromtxt(path, delimiter=",", names=True, comments="#", ndmin=1)
+        names = [name for name in table.dtype.names or () if name in self.summary["world"]]
+        return {name: np.ascontiguousarray(table[name]) for name in names}
+
+    def interval(self, name: str, probability: float = 0.95) -> tuple[float, float]:
+        """The central interval of a parameter of the world that holds so much of the draws."""
+        if not 0 < probability < 1:
+            raise ValueError(f"probability = {probability} is not allowed: between 0 and 1")
+        if name not in self.worlds:
+            known = ", ".join(self.worlds) or "none: the world is known"
+            raise ValueError(f"{name} is no free parameter of the world, which are {known}")
+        ends = np.quantile(self.worlds[name], [0.5 - 0.5 * probability, 0.5 + 0.5 * probability])
+        return float(ends[0]), float(ends[1])
+
+    def report(self) -> Report:
+        """The page."""
+        return Report(self.folder / "report.html")
+
+    def __repr__(self) -> str:
+        return f"<Posterior of {len(self)} draws in {self.folder}>"
+
+
+def draw(folder: Path, samples: int, progress: bool, limits: list[str]) -> Posterior:
+    """Draws around the fit in a folder."""
+    if samples < 2:
+        raise ValueError(f"samples = {samples} is not allowed: 2 to 100000")
+    inside = folder / "posterior"
+
+    def done() -> int:
+        return min(samples, len(list(inside.glob("sample_*.json"))))
+
+    command = [*_program.LAUNCHER, "posterior", str(folder), "--samples", str(samples), *limits]
+    counter = _program.Counter(samples, "draw", done, progress)
+    try:
+        _program.follow(command, counter, lambda child: child.send_signal(signal.SIGINT))
+    finally:
+        counter.close()
+    return Posterior(inside)
