@@ -198,6 +198,7 @@ pub use rays::block::{
 };
 pub use rays::columns::{Points, RayTable};
 pub use rays::integrator::Integrator;
+pub use rays::path_length::PathLength;
 pub use rays::request::{Placement, Request};
 pub use screen::camera::{Camera, Motion};
 pub use screen::observer::{Inclination, Observer, Ray};

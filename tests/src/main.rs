@@ -9,6 +9,7 @@ mod changing_emission;
 mod closed_forms;
 mod command_line;
 mod compare;
+mod compositing;
 mod critical_curve;
 mod data_files;
 mod documents;

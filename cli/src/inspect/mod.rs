@@ -11,7 +11,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use kerrlight_tomo::image::exr::{self, Attributes, ChannelSurvey, Survey};
 use kerrlight_tomo::interferometry::files;
-use kerrlight_tomo::render::CHANNELS;
+use kerrlight_tomo::render::all_channels;
 use serde_json::{Value, json};
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -124,7 +124,7 @@ fn channel_table(survey: &Survey) -> String {
 
 /// The unit of a channel, where kerrlight wrote it.
 fn unit<'a>(name: &str, attributes: &'a Attributes) -> &'a str {
-    let kind = CHANNELS.iter().find(|kind| kind.name == name);
+    let kind = all_channels().find(|kind| kind.name == name);
     match kind.map(|kind| kind.unit) {
         Some(unit) if !attributes.is_empty() => attributes.get(unit).map_or(unit, String::as_str),
         _ => "",

@@ -191,6 +191,7 @@ impl Sequence {
             let Rendered { picture, summary } = film.rendered(frame, factor)?;
             let Plan { scene, text } = &this.plans[*k];
             let mut attributes = report::attributes(scene, text, film.legend(), &summary);
+            attributes.extend(film.identifiers().map(|ids| ("ids".to_owned(), ids)));
             attributes.append(&mut this.settings(*k));
             let bytes = exr::encode(&picture, &attributes).context("cannot encode the EXR")?;
             Output::new(&this.path(*k, "exr"), "exr")?.write(&bytes)?;

@@ -44,6 +44,7 @@ impl Work<'_> {
         if !self.files.is_empty() {
             attributes.insert("files".to_owned(), self.files.to_owned());
         }
+        attributes.extend(self.raster.identifiers().map(|ids| ("ids".to_owned(), ids)));
         if let Some(device) = self.raster.device() {
             attributes.insert("device".to_owned(), device.name().to_owned());
         }

@@ -2,7 +2,7 @@
 //! a band puts the band together, so that only a few bands are in memory at any time.
 
 use super::adaptive::{self, Adaptive};
-use super::pixels::{Pixel, Workspace, uniform};
+use super::pixels::{Pixels, Workspace, uniform};
 use super::tally::Tally;
 use super::{Progress, Raster, RenderError};
 use crate::Error;
@@ -25,7 +25,7 @@ pub(super) struct Band {
 pub(super) type Sink<'a> = dyn Fn(Vec<Band>) -> Result<(), Error> + Sync + 'a;
 
 /// The pixels of a tile at each time.
-type Tile = Vec<Vec<Pixel>>;
+type Tile = Vec<Pixels>;
 
 /// The tiles of a band that are there.
 type Parts = Vec<Option<Tile>>;
@@ -96,7 +96,8 @@ impl Raster {
         let pixels = match tolerance {
             Some(tolerance) => {
                 let rings = self.rings.as_ref();
-                vec![Adaptive { prepared, grid, rings, tolerance }.pixels((rows, columns), work)?]
+                let refined = Adaptive { prepared, grid, rings, tolerance };
+                vec![Pixels::plain(refined.pixels((rows, columns), work)?)]
             }
             None => uniform((prepared, self.rings.as_ref()), grid, (rows, columns), times, work)?,
         };
@@ -109,17 +110,12 @@ impl Raster {
     /// The band from its tiles at the time number `time`.
     fn assemble(&self, index: usize, parts: &Parts, time: usize) -> Result<Band, Error> {
         let (width, rows) = (self.grid.width, self.layout.rows(index).len());
-        let mut pixels = Vec::with_capacity(width * rows);
-        for row in 0..rows {
-            for part in parts.iter().flatten().filter_map(|tile| tile.get(time)) {
-                let columns = part.len() / rows;
-                pixels.extend_from_slice(&part[row * columns..(row + 1) * columns]);
-            }
-        }
+        let parts: Vec<&Pixels> = parts.iter().flatten().filter_map(|tile| tile.get(time)).collect();
+        let Pixels { pixels, layers } = Pixels::joined(&parts, width, rows);
         let mut channels = Vec::with_capacity(self.channels.len());
         for kind in &self.channels {
             let unit = if kind.scales { self.unit } else { 1.0 };
-            let values: Vec<f32> = pixels.iter().map(|pixel| kind.value(pixel, unit)).collect();
+            let values = kind.values(&pixels, &layers, unit);
             if !values.iter().all(|value| value.is_finite()) {
                 return Err(RenderError::NotFinite { channel: kind.name }.into());
             }

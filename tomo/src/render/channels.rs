@@ -3,9 +3,19 @@
 
 use super::RenderError;
 use super::pixels::Pixel;
+use super::requested::REQUESTED;
+use crate::scene::DEFAULT_CHANNELS;
+use crate::transport::Layers;
 use crate::Error;
 use crate::transport::PreparedScene;
 use kerrlight_geodesic::Outcome;
+
+/// Whether a scene has a channel, with pixels refined or not.
+pub(super) type Present = fn(&PreparedScene, bool) -> bool;
+
+pub(super) fn always(_: &PreparedScene, _: bool) -> bool {
+    true
+}
 
 /// A channel of a picture.
 pub struct ChannelKind {
@@ -16,11 +26,20 @@ pub struct ChannelKind {
     /// What it holds.
     pub meaning: &'static str,
     /// Whether a scene has it, with pixels refined or not.
-    present: fn(&PreparedScene, bool) -> bool,
+    present: Present,
     /// How it is taken from a pixel.
-    value: fn(&Pixel) -> f64,
+    value: Value,
+    /// Whether pictures have it only where `screen.channels` names it or its layer.
+    pub on_request: bool,
     /// Whether it is in the unit of intensity.
     pub(super) scales: bool,
+}
+
+/// How a channel is taken from a pixel: from its light and its central ray, or from what is kept besides.
+#[derive(Clone, Copy)]
+enum Value {
+    Pixel(fn(&Pixel) -> f64),
+    Layers(fn(&Layers) -> f64),
 }
 
 impl std::fmt::Debug for ChannelKind {
@@ -30,9 +49,23 @@ impl std::fmt::Debug for ChannelKind {
 }
 
 impl ChannelKind {
-    /// The value of a pixel as it is kept, times `unit`.
-    pub(super) fn value(&self, pixel: &Pixel, unit: f64) -> f32 {
-        ((self.value)(pixel) * unit) as f32
+    /// The values of pixels as they are kept, times `unit`; `layers` are as many, or none.
+    pub(super) fn values(&self, pixels: &[Pixel], layers: &[Layers], unit: f64) -> Vec<f32> {
+        match self.value {
+            Value::Pixel(value) => pixels.iter().map(|pixel| (value(pixel) * unit) as f32).collect(),
+            Value::Layers(value) => layers.iter().map(|layer| (value(layer) * unit) as f32).collect(),
+        }
+    }
+
+    /// Whether a name in `screen.channels` means it.
+    fn is_meant(&self, name: &str) -> bool {
+        let default = name == DEFAULT_CHANNELS && !self.on_request;
+        name == self.name || name == self.layer() || default
+    }
+
+    /// The layer that it belongs to; its own name where that has no dot.
+    pub fn layer(&self) -> &'static str {
+        self.name.split_once('.').map_or(self.name, |(layer, _)| layer)
     }
 
     const fn new(
@@ -41,7 +74,19 @@ impl ChannelKind {
         meaning: &'static str,
         value: fn(&Pixel) -> f64,
     ) -> Self {
-        ChannelKind { name, unit, meaning, present: |_, _| true, value, scales: false }
+        let (value, present) = (Value::Pixel(value), always as Present);
+        ChannelKind { name, unit, meaning, present, value, on_request: false, scales: false }
+    }
+
+    pub(super) const fn on_request(
+        name: &'static str,
+        unit: &'static str,
+        meaning: &'static str,
+        present: Present,
+        value: fn(&Layers) -> f64,
+    ) -> Self {
+        let value = Value::Layers(value);
+        ChannelKind { name, unit, meaning, present, value, on_request: true, scales: false }
     }
 }
 
@@ -55,7 +100,7 @@ const fn stokes(
 
 const LIGHT: &str = "linear light: emission in scene units times its colour, plus the sky";
 
-/// Every channel, in the order in which they are listed.
+/// The channels that pictures have without a request.
 pub static CHANNELS: [ChannelKind; 15] = [
     ChannelKind::new("R", "scene unit", LIGHT, |p| f64::from(p.rgb[0])),
     ChannelKind::new("G", "scene unit", LIGHT, |p| f64::from(p.rgb[1])),
@@ -145,22 +190,33 @@ fn outcome_code(outcome: Outcome) -> f64 {
     }
 }
 
+/// Every channel, those on request last.
+pub fn all_channels() -> impl Iterator<Item = &'static ChannelKind> {
+    CHANNELS.iter().chain(&REQUESTED)
+}
+
 /// The channels of a picture of `prepared`: all that it has, or those requested.
 pub(super) fn chosen(
     prepared: &PreparedScene,
     refined: bool,
     asked: Option<&[String]>,
 ) -> Result<Vec<&'static ChannelKind>, Error> {
-    let all: Vec<&ChannelKind> =
-        CHANNELS.iter().filter(|kind| (kind.present)(prepared, refined)).collect();
-    let Some(asked) = asked else { return Ok(all) };
-    let find = |name: &String| all.iter().find(|kind| kind.name == name).copied();
-    if let Some(name) = asked.iter().find(|name| find(name).is_none()) {
+    let there = |kind: &&ChannelKind| (kind.present)(prepared, refined);
+    let all: Vec<&ChannelKind> = all_channels().filter(there).collect();
+    let Some(asked) = asked else {
+        return Ok(all.into_iter().filter(|kind| !kind.on_request).collect());
+    };
+    if let Some(name) = asked.iter().find(|name| !all.iter().any(|kind| kind.is_meant(name))) {
         let there: Vec<&str> = all.iter().map(|kind| kind.name).collect();
         return Err(RenderError::Channel { name: name.clone(), there: there.join(", ") }.into());
     }
     // In the list's order, each once.
-    Ok(all.into_iter().filter(|kind| asked.iter().any(|name| name == kind.name)).collect())
+    let is_meant = |kind: &&ChannelKind| asked.iter().any(|name| kind.is_meant(name));
+    let chosen: Vec<&ChannelKind> = all.into_iter().filter(is_meant).collect();
+    match chosen.iter().find(|kind| kind.on_request && refined) {
+        Some(kind) => Err(RenderError::Refined { channel: kind.name }.into()),
+        None => Ok(chosen),
+    }
 }
 
 /// What the channels of a picture hold, for whoever opens its file.

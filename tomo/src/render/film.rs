@@ -98,6 +98,11 @@ impl Film {
         self.raster.legend()
     }
 
+    /// What the numbers in the channel `id` stand for: see [`Raster::identifiers`].
+    pub fn identifiers(&self) -> Option<String> {
+        self.raster.identifiers()
+    }
+
     /// Factor from the scene's unit of intensity to that of the file, such that the frame has the
     /// scene's flux.
     ///

@@ -9,13 +9,16 @@ mod film;
 mod finish;
 mod grid;
 mod journal;
+mod layers;
 mod pixels;
 mod plan;
 mod raw;
+mod requested;
 mod rings;
 mod tally;
 
-pub use channels::{CHANNELS, ChannelKind};
+pub use channels::{CHANNELS, ChannelKind, all_channels};
+pub use requested::REQUESTED;
 pub use film::{Film, Frame};
 pub use journal::{Found, Journal};
 pub use plan::{Plan, Step};
@@ -26,7 +29,7 @@ use crate::Error;
 use crate::image::Picture;
 use crate::image::exr::Layout;
 use crate::scene::{Rings, Scene};
-use crate::transport::{Assets, Meter, PreparedScene, RayResult, Scratch};
+use crate::transport::{Assets, Meter, PreparedScene, RayResult, Scratch, names};
 use grid::Grid;
 use kerrlight_geodesic::RayDevice;
 use rayon::prelude::*;
@@ -57,6 +60,12 @@ pub enum RenderError {
         name: String,
         /// The channels that there are.
         there: String,
+    },
+    /// A channel that pictures with refined pixels do not have.
+    #[error("`screen.channels`: {channel} is not there with `screen.image_error`: give samples_per_pixel in its place")]
+    Refined {
+        /// The channel.
+        channel: &'static str,
     },
     /// The caller asked to stop.
     #[error("stopped")]
@@ -228,6 +237,13 @@ impl Raster {
     /// What the channels hold.
     pub fn legend(&self) -> String {
         channels::legend(&self.channels)
+    }
+
+    /// What the numbers in the channel `id` stand for, a line for each; nothing without that channel.
+    pub fn identifiers(&self) -> Option<String> {
+        self.names().contains(&"id").then_some(())?;
+        let names = names(&self.scene).into_iter().enumerate();
+        Some(names.map(|(k, name)| format!("{k} {name}\n")).collect())
     }
 
     fn summarize(&self, tally: &Tally) -> Result<Summary, Error> {

@@ -1,9 +1,10 @@
 //! The pixels of a tile, from blocks of rays.
 
 use super::grid::Grid;
+use super::layers;
 use super::rings::{Counted, Resolver, Square};
 use crate::Error;
-use crate::transport::{PreparedScene, RayResult, Scratch};
+use crate::transport::{Block, Layers, PreparedScene, RayResult, Scratch};
 use std::ops::Range;
 
 /// A pixel: averages of light, data of its most central ray.
@@ -22,6 +23,35 @@ pub(super) struct Pixel {
     pub known: f64,
 }
 
+/// Pixels of a rectangle, row by row.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Pixels {
+    pub pixels: Vec<Pixel>,
+    /// What is kept of them besides: as many, or none.
+    pub layers: Vec<Layers>,
+}
+
+impl Pixels {
+    /// Without anything besides.
+    pub fn plain(pixels: Vec<Pixel>) -> Self {
+        Pixels { pixels, layers: Vec::new() }
+    }
+
+    /// Tiles beside each other, `width` pixels wide in all.
+    pub fn joined(tiles: &[&Pixels], width: usize, rows: usize) -> Self {
+        let mut all = Pixels::plain(Vec::with_capacity(width * rows));
+        for row in 0..rows {
+            for Pixels { pixels, layers } in tiles {
+                let columns = pixels.len() / rows;
+                let range = row * columns..(row + 1) * columns;
+                all.pixels.extend_from_slice(&pixels[range.clone()]);
+                all.layers.extend_from_slice(layers.get(range).unwrap_or(&[]));
+            }
+        }
+        all
+    }
+}
+
 /// Rays that are traced together.
 const BLOCK: usize = 1024;
 
@@ -29,10 +59,12 @@ const BLOCK: usize = 1024;
 #[derive(Debug, Default)]
 pub(super) struct Workspace {
     pub scratch: Scratch,
-    alpha: Vec<f64>,
-    beta: Vec<f64>,
+    pub alpha: Vec<f64>,
+    pub beta: Vec<f64>,
     squares: Vec<Square>,
-    seen: Vec<RayResult>,
+    pub seen: Vec<RayResult>,
+    /// What is kept of the rays besides, if anything is wanted.
+    pub layers: Vec<Layers>,
 }
 
 impl Workspace {
@@ -85,13 +117,13 @@ impl Workspace {
     ) -> Result<&[RayResult], Error> {
         self.seen.clear();
         self.seen.resize(self.alpha.len() * times.len(), RayResult::default());
-        prepared.observe_block(
-            &self.alpha,
-            &self.beta,
-            times,
-            &mut self.scratch,
-            &mut self.seen,
-        )?;
+        self.layers.clear();
+        if prepared.wanted().any {
+            self.layers.resize(self.seen.len(), Layers::default());
+        }
+        let block = Block { alpha: &self.alpha, beta: &self.beta, times };
+        let (seen, layers) = (&mut self.seen, &mut self.layers);
+        prepared.observe_layers(block, &mut self.scratch, seen, layers)?;
         Ok(&self.seen)
     }
 }
@@ -104,13 +136,13 @@ pub(super) fn uniform(
     (rows, columns): (Range<usize>, Range<usize>),
     times: &[f64],
     work: &mut Workspace,
-) -> Result<Vec<Vec<Pixel>>, Error> {
+) -> Result<Vec<Pixels>, Error> {
     let side = grid.side;
     // Whole pixels, about a block's worth of rays: `side`² is at most that.
     let together = (BLOCK / (side * side)).max(1);
     let places: Vec<(usize, usize)> =
         rows.flat_map(|row| columns.clone().map(move |column| (column, row))).collect();
-    let mut pixels = vec![Vec::with_capacity(places.len()); times.len()];
+    let mut all = vec![Pixels::plain(Vec::with_capacity(places.len())); times.len()];
     for some in places.chunks(together) {
         work.clear();
         for (column, row) in some {
@@ -121,24 +153,30 @@ pub(super) fn uniform(
         }
         let rays = some.len() * side * side;
         work.observe_at(prepared, times)?;
+        layers::add_central(prepared, grid, work)?;
         let mut seen = std::mem::take(&mut work.seen);
+        let mut layers = std::mem::take(&mut work.layers);
         let counted = match rings {
             Some(rings) => {
                 let squares = std::mem::take(&mut work.squares);
-                rings.resolve(prepared, &squares, times, &mut seen, work)?
+                let lights = (&mut seen[..], &mut layers[..]);
+                rings.resolve(prepared, &squares, times, lights, work)?
             }
             None => Vec::new(),
         };
         let mut counted = counted.chunks_exact(side * side);
-        for (pixels, seen) in pixels.iter_mut().zip(seen.chunks_exact(rays)) {
+        for (all, seen) in all.iter_mut().zip(seen.chunks_exact(rays)) {
             for rays in seen.chunks_exact(side * side) {
                 let more = counted.next().unwrap_or_default();
-                pixels.push(with_rings(mean(rays, side), more));
+                all.pixels.push(with_rings(mean(rays, side), more));
             }
         }
-        work.seen = seen;
+        for (all, layers) in all.iter_mut().zip(layers.chunks_exact(rays)) {
+            all.layers.extend(layers.chunks_exact(side * side).map(|rays| layers::mean(rays, side)));
+        }
+        (work.seen, work.layers) = (seen, layers);
     }
-    Ok(pixels)
+    Ok(all)
 }
 
 /// A pixel with what is known of the squares around its rays.

@@ -190,10 +190,14 @@ pub struct Screen {
     /// `samples_per_pixel`; off without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub image_error: Option<f64>,
-    /// Names of the channels that are kept; without it all that the scene has.
+    /// Names of the channels or layers that are kept, [`DEFAULT_CHANNELS`] for those that are kept without this key: all
+    /// that cost nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub channels: Option<Vec<String>>,
 }
+
+/// What `screen.channels` calls the channels that are kept without it.
+pub const DEFAULT_CHANNELS: &str = "default";
 
 fn one() -> u32 {
     1
@@ -300,9 +304,17 @@ impl Screen {
         self.height.unwrap_or(self.width)
     }
 
-    /// Whether the picture keeps a channel.
+    /// Whether the picture keeps a channel that is kept unless others are requested.
     pub fn keeps(&self, channel: &str) -> bool {
-        self.channels.as_ref().is_none_or(|names| names.iter().any(|name| name == channel))
+        let all = |names: &Vec<String>| names.iter().any(|name| name == DEFAULT_CHANNELS);
+        self.channels.as_ref().is_none_or(all) || self.asks(channel)
+    }
+
+    /// Whether a channel is requested, by its name or with its layer.
+    pub fn asks(&self, channel: &str) -> bool {
+        let layer = channel.split_once('.').map(|(layer, _)| layer);
+        let named = |name: &String| name == channel || layer.is_some_and(|layer| name == layer);
+        self.channels.as_ref().is_some_and(|names| names.iter().any(named))
     }
 }
 

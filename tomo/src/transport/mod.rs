@@ -4,7 +4,9 @@
 //! and memory of its own and adds its light to an accumulator; `ray` is the only place where they are
 //! summed up.
 
+mod central;
 mod chord;
+mod layers;
 mod meter;
 mod optics;
 mod polarized;
@@ -19,7 +21,9 @@ mod tests;
 mod tree;
 
 pub use kerrlight_geodesic::View;
+pub(crate) use layers::{Layers, Mixed, names};
 pub use meter::Meter;
 pub use prepare::{Assets, PreparedScene};
+pub(crate) use ray::Block;
 pub use ray::Scratch;
 pub use result::RayResult;

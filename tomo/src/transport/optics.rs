@@ -1,5 +1,6 @@
 //! What every source of light needs to know of the scene besides itself.
 
+use super::layers::{Numbering, Wanted};
 use super::polarized::{Polarization, PolarizedRay};
 use crate::emission::medium::Medium;
 use kerrlight_geodesic::{Kerr, PathPoint, Quantities, ScreenPoint, View};
@@ -22,6 +23,9 @@ pub(super) struct Optics {
     /// What is recorded of the brightest contribution to a pixel.
     pub recorded: Quantities,
     pub polarization: Option<Polarization>,
+    /// What is kept of rays besides their light.
+    pub wanted: Wanted,
+    pub numbering: Numbering,
 }
 
 impl Optics {

@@ -1,5 +1,6 @@
 //! From a scene to everything that can be computed before any ray.
 
+use super::layers::{Numbering, Wanted};
 use super::optics::Optics;
 use super::polarized::Polarization;
 use super::sources::disc::Disc;
@@ -116,6 +117,8 @@ impl Optics {
             one_by_one: false,
             recorded: Quantities { azimuth: kept("azimuth"), time: kept("delay"), velocity: false },
             polarization: Polarization::new(scene)?,
+            wanted: Wanted::new(scene),
+            numbering: Numbering::new(scene),
         })
     }
 }
@@ -154,7 +157,7 @@ impl PreparedScene {
             crossings: self.disc.as_ref().map_or(0, Disc::crossings),
             all_crossings: self.disc.is_some(),
             rates: self.optics.polarization.is_some() || self.has_plunging_disc(),
-            exit: self.sky.is_some(),
+            exit: self.sky.is_some() || self.optics.wanted.exit || self.optics.wanted.footprint,
             beams: self.optics.lensing && self.sky.as_ref().is_some_and(Sky::is_averaged),
             half_orbits,
             paths: self.meshes.is_some() || self.media.have_cells() || !self.spots.is_empty(),
@@ -298,6 +301,17 @@ impl PreparedScene {
     pub fn polarization(&self) -> [bool; 2] {
         let circular = self.optics.polarization.as_ref().map(Polarization::is_circular);
         [circular.is_some(), circular == Some(true)]
+    }
+
+    /// What is kept of rays besides their light.
+    pub(crate) fn wanted(&self) -> Wanted {
+        self.optics.wanted
+    }
+
+    /// Whether anything shines or is opaque but the hole.
+    pub fn has_sources(&self) -> bool {
+        let solid = self.disc.is_some() || self.meshes.is_some();
+        solid || self.media.len() > 0 || !self.spots.is_empty()
     }
 
     /// Whether anything absorbs.

@@ -46,6 +46,35 @@ impl Quadrature {
         rest * x * x.sqrt()
     }
 
+    /// What of a panel's light, with these gains at these Mino times, comes from behind the Mino time `cut`: the
+    /// integral of the polynomial through the nodes, by its Legendre series.
+    fn rest(&self, times: &[f64], gains: &[f64], cut: f64) -> f64 {
+        let whole: f64 = gains.iter().sum();
+        let place = self.place(times, cut);
+        if place <= 0.0 || place >= 1.0 {
+            return if place <= 0.0 { whole } else { 0.0 };
+        }
+        let x = 2.0 * place - 1.0;
+        let basis: Vec<f64> = legendre::values(x).take(gains.len() + 1).collect();
+        let mut before = 0.5 * whole * (x + 1.0);
+        for k in 1..gains.len() {
+            let at = |node: &f64| legendre::values(2.0 * node - 1.0).nth(k).unwrap_or(0.0);
+            let nodes = self.rule.nodes().iter().map(at).zip(gains);
+            let coefficient: f64 = nodes.map(|(p, gain)| p * gain).sum();
+            // ∫P_k = (P_{k+1} − P_{k−1})/(2k + 1).
+            before += 0.5 * coefficient * (basis[k + 1] - basis[k - 1]);
+        }
+        whole - before.clamp(0.0, whole)
+    }
+
+    /// Where in a panel, from 0 to 1, a Mino time lies: linear between the nodes and beyond them.
+    fn place(&self, times: &[f64], cut: f64) -> f64 {
+        let last = times.len() - 1;
+        let k = times.partition_point(|time| *time < cut).clamp(1, last);
+        let [a, b] = [k - 1, k].map(|k| self.rule.nodes()[k]);
+        a + (b - a) * (cut - times[k - 1]) / (times[k] - times[k - 1])
+    }
+
     /// Optical depths at the nodes of a panel and at its end, from the gains of each node.
     fn absorb(&self, gains: &[f64], depth: &mut f64, depths: &mut Vec<f64>) {
         let mut rates = [0.0; MOST_NODES];
@@ -71,11 +100,12 @@ pub(super) struct Sums {
 }
 
 /// Sums emission up, front to back: I = ∫ j e^{−D} ds, D = ∫ κ ds. The sums' depths are
-/// those of every node if there is absorption.
+/// those of every node if there is absorption. With `cuts` the light after these Mino times is summed up too.
 pub(super) fn integrate(
     quadrature: &Quadrature,
     nodes: &RayNodes<'_>,
     emission: &Emission,
+    cuts: Option<[f64; 2]>,
     Sums { depths, misses }: &mut Sums,
 ) -> Light {
     let order = quadrature.rule.order();
@@ -110,6 +140,12 @@ pub(super) fn integrate(
                 }
             }
         }
+        if let Some(cuts) = cuts {
+            let times = &nodes.mino_time[start..start + order];
+            for (later, cut) in light.later.iter_mut().zip(cuts) {
+                *later += quadrature.rest(times, gains, cut);
+            }
+        }
         let miss = miss.unwrap_or_else(|| quadrature.missed(gains));
         misses.push(miss);
         light.error += miss;
@@ -117,7 +153,9 @@ pub(super) fn integrate(
             break;
         }
     }
-    light.place = brightest.map_or_else(Place::default, |k| Place::of_node(nodes, k));
+    if let Some(k) = brightest {
+        (light.place, light.mino_time) = (Place::of_node(nodes, k), nodes.mino_time[k]);
+    }
     light
 }
 

@@ -6,6 +6,8 @@
 //!
 //! [`BlockTracer::trace`]: kerrlight_geodesic::BlockTracer::trace
 
+use super::central::CentralScratch;
+use super::layers::{HOLE, Layers, Origin, Record};
 use super::meter::Meter;
 use super::prepare::PreparedScene;
 use super::result::{Accumulator, RayResult};
@@ -14,15 +16,16 @@ use super::sources::media::{MediaRay, MediaScratch};
 use super::sources::meshes::MeshScratch;
 use super::sources::spots::{SpotRay, SpotScratch, SpotTree};
 use crate::emission::medium::Part;
+use kerrlight_geodesic::analytic::ClosedForm;
 use kerrlight_geodesic::simd::RayNodes;
 use kerrlight_geodesic::{
-    Error, PathOfRay, PathUse, PlaneCrossing, Ray, RayBlock, RayVisitor, TracedRay, Work, footprint,
+    Error, Outcome, PathOfRay, PathUse, PlaneCrossing, Ray, RayBlock, RayVisitor, TracedRay, Work, footprint,
 };
 use std::sync::Arc;
 
 /// Rays of a block, and the times of observation at which they are seen.
 #[derive(Clone, Copy)]
-pub(super) struct Block<'a> {
+pub(crate) struct Block<'a> {
     pub alpha: &'a [f64],
     pub beta: &'a [f64],
     pub times: &'a [f64],
@@ -33,6 +36,7 @@ pub(super) struct Block<'a> {
 pub struct Scratch {
     pub(super) rays: RayBlock,
     pub(super) sources: SourceScratch,
+    pub(super) central: CentralScratch,
     /// Where the time goes; off unless it is replaced.
     pub meter: Meter,
 }
@@ -43,6 +47,8 @@ pub(super) struct SourceScratch {
     pub media: MediaScratch,
     meshes: MeshScratch,
     spots: SpotScratch,
+    /// Mino times from which on light of each ray is of the next image; empty unless images are kept apart.
+    cuts: Vec<[f64; 2]>,
     /// Where the beam of the present ray ends on the sky.
     beam: Option<footprint::Sky>,
 }
@@ -77,9 +83,20 @@ impl PreparedScene {
         scratch: &mut Scratch,
         seen: &mut [RayResult],
     ) -> Result<(), crate::Error> {
-        let Scratch { rays, sources, meter } = scratch;
+        self.observe_layers(Block { alpha, beta, times }, scratch, seen, &mut [])
+    }
+
+    /// The same with what is wanted besides, in the same order, unless there is no room for it.
+    pub(crate) fn observe_layers(
+        &self,
+        block: Block<'_>,
+        scratch: &mut Scratch,
+        seen: &mut [RayResult],
+        layers: &mut [Layers],
+    ) -> Result<(), crate::Error> {
+        let (Scratch { rays, sources, meter, .. }, Block { alpha, beta, times }) = (scratch, block);
         sources.media.reset(self.media.len(), alpha.len(), times.len());
-        let block = Block { alpha, beta, times };
+        self.find_cuts(block, !layers.is_empty(), &mut sources.cuts)?;
         let trees: Vec<_> = if self.optics.lensing {
             times.iter().map(|time| self.spots.tree(&self.optics, *time)).collect()
         } else {
@@ -87,13 +104,35 @@ impl PreparedScene {
         };
         let sighted = !self.media.absorb() && self.spots.sight(&self.optics, times.len());
         let request = if sighted { &self.sighting } else { &self.request };
-        let mut sum = Sum { scene: self, block, trees, sighted, sources, meter, seen };
+        let mut sum = Sum { scene: self, block, trees, sighted, sources, meter, seen, layers };
         let done = match (self.optics.view.observer(), self.optics.lensing) {
             (Some(observer), false) => sum.along_lines(observer),
             _ => self.tracer.trace(alpha, beta, request, rays, &mut sum),
         };
         meter.stop();
         Ok(done?)
+    }
+
+    /// Fills `cuts` with the Mino times between the equatorial crossings of each ray, where it turns in θ, if images are
+    /// kept apart.
+    fn find_cuts(
+        &self,
+        Block { alpha, beta, .. }: Block<'_>,
+        asked: bool,
+        cuts: &mut Vec<[f64; 2]>,
+    ) -> Result<(), Error> {
+        cuts.clear();
+        if !(asked && self.optics.wanted.orders && self.optics.lensing) {
+            return Ok(());
+        }
+        let (hole, view) = (&self.optics.hole, &self.optics.view);
+        for (x, y) in alpha.iter().zip(beta) {
+            let form = ClosedForm::new(hole, &view.ray(hole, *x, *y)?);
+            let mut crossings = form.crossings().map(|crossing| crossing.mino_time);
+            let times = [(); 3].map(|()| crossings.next().unwrap_or(f64::INFINITY));
+            cuts.push([0, 1].map(|k| 0.5 * (times[k] + times[k + 1])));
+        }
+        Ok(())
     }
 }
 
@@ -108,6 +147,8 @@ pub(super) struct Sum<'a> {
     pub sources: &'a mut SourceScratch,
     pub meter: &'a mut Meter,
     seen: &'a mut [RayResult],
+    /// As many, or none.
+    layers: &'a mut [Layers],
 }
 
 impl RayVisitor for Sum<'_> {
@@ -167,14 +208,15 @@ impl RayVisitor for Sum<'_> {
             self.add_cells(number, ray, path);
         }
         self.meter.switch(Part::Surfaces);
-        let mut still = Accumulator::new();
+        let mut still = self.accumulator(number, ray, crossings);
         self.add_surfaces(number, ray, crossings, path, &mut still);
         self.meter.switch(Part::Sky);
         let behind = self.sky(ray);
         self.meter.switch(Part::Spots);
         for (j, time) in self.block.times.iter().enumerate() {
             let mut light = still.clone();
-            self.scene.media.add(number, j, &self.sources.media, &mut light);
+            let source = self.scene.optics.numbering.media;
+            self.scene.media.add((number, j), source, &self.sources.media, &mut light);
             if let Some(path) = path {
                 self.add_spots((number, j), *time, ray, path, &mut light);
             }
@@ -197,6 +239,32 @@ impl RayVisitor for Sum<'_> {
 }
 
 impl<'a> Sum<'a> {
+    /// No light yet, along ray number `k`.
+    #[inline(always)]
+    fn accumulator(&self, k: usize, ray: &TracedRay, crossings: &[PlaneCrossing]) -> Accumulator {
+        let record = (!self.layers.is_empty()).then(|| self.record(k, ray, crossings));
+        Accumulator { record, ..Accumulator::new() }
+    }
+
+    /// What is kept of ray number `k` besides its light: as long as nothing shines, the surface that ends it.
+    fn record(&self, k: usize, ray: &TracedRay, crossings: &[PlaneCrossing]) -> Box<Record> {
+        let cuts = self.sources.cuts.get(k).copied().unwrap_or([f64::INFINITY; 2]);
+        Box::new(Record { origin: self.end(ray, crossings), ..Record::new(cuts) })
+    }
+
+    /// The opaque surface or the hole that a ray ends at.
+    fn end(&self, ray: &TracedRay, crossings: &[PlaneCrossing]) -> Option<Origin> {
+        let PreparedScene { optics, meshes, .. } = self.scene;
+        let Some(mino_time) = ray.surface else {
+            let falls = ray.outcome == Outcome::Captured && ray.until >= ray.mino_total;
+            return falls.then_some(Origin { source: HOLE, mino_time: ray.mino_total });
+        };
+        let in_plane = crossings.iter().any(|crossing| crossing.mino_time == mino_time);
+        let mesh = meshes.as_ref().filter(|_| !in_plane);
+        let mesh = mesh.and_then(|all| all.hidden_by(optics, &self.sources.meshes, mino_time));
+        Some(Origin { source: mesh.unwrap_or(optics.numbering.disc), mino_time })
+    }
+
     fn place(&self, k: usize) -> (f64, f64) {
         (self.block.alpha[k], self.block.beta[k])
     }
@@ -213,7 +281,8 @@ impl<'a> Sum<'a> {
     {
         let ((x, y), scene) = (self.place(k), self.scene);
         let polarized = scene.optics.polarized(x, y, ray.lambda);
-        MediaRay { number: k, ray, crossings, polarized, times: self.block.times }
+        let cuts = self.sources.cuts.get(k).copied();
+        MediaRay { number: k, ray, crossings, polarized, times: self.block.times, cuts }
     }
 
     /// Sums up the light of media made of cells.
@@ -282,11 +351,17 @@ impl<'a> Sum<'a> {
     #[inline(always)]
     fn finish(&mut self, (k, j): (usize, usize), ray: &TracedRay, light: Accumulator) {
         let (x, y) = self.place(k);
-        let Some(seen) = self.seen.get_mut(j * self.block.alpha.len() + k) else { return };
+        let place = j * self.block.alpha.len() + k;
+        let Some(seen) = self.seen.get_mut(place) else { return };
         *seen = light.result(ray);
         let optics = &self.scene.optics;
+        let mut boost = 1.0;
         if let (Some(index), Some(shift)) = (optics.spectral_index, optics.blueshift(x, y)) {
-            seen.receive(shift, index);
+            boost = seen.receive(shift, index);
+        }
+        if let (Some(layers), Some(record)) = (self.layers.get_mut(place), &light.record) {
+            *layers = Layers::of(ray, record, (light.intensity, light.through()));
+            layers.mixed.boost(boost as f32);
         }
     }
 }

@@ -1,5 +1,6 @@
 //! What one ray sees, and how light adds up to it.
 
+use super::layers::{Origin, Record};
 use kerrlight_geodesic::simd::RayNodes;
 use kerrlight_geodesic::{Outcome, PathPoint, PlaneCrossing, TracedRay};
 
@@ -35,15 +36,17 @@ impl RayResult {
     /// Light as it is received by someone in whose frame it has `shift` times the frequency that
     /// it has at infinity: I_ν/ν³ is invariant, so that a spectrum ν^(−α) gains shift^(3 + α).
     ///
-    /// Never inlined: its power would be computed ahead of the question whether there is a shift.
+    /// Returns the factor on its intensity. Never inlined: its power would be computed ahead of the question whether there
+    /// is a shift.
     #[inline(never)]
-    pub(super) fn receive(&mut self, shift: f64, index: f64) {
+    pub(super) fn receive(&mut self, shift: f64, index: f64) -> f64 {
         let boost = shift.powf(3.0 + index);
         self.intensity *= boost;
         self.redshift *= shift;
         for channel in &mut self.rgb {
             *channel *= boost as f32;
         }
+        boost
     }
 }
 
@@ -58,6 +61,8 @@ pub(super) struct Accumulator {
     pub depth: f64,
     pub stokes: [f64; 3],
     pub disc_images: u32,
+    /// What is kept besides, if anything is.
+    pub record: Option<Box<Record>>,
 }
 
 impl Accumulator {
@@ -72,16 +77,20 @@ impl Accumulator {
             depth: 0.0,
             stokes: [0.0; 3],
             disc_images: 0,
+            record: None,
         }
     }
 
-    /// Adds intensity that is shifted by g.
+    /// Adds intensity from a Mino time that is shifted by g.
     #[inline(always)]
-    pub fn add(&mut self, intensity: f64, g: f64, color: [f32; 3]) {
+    pub fn add(&mut self, intensity: f64, g: f64, color: [f32; 3], mino_time: f64) {
         self.intensity += intensity;
         self.shift += g * intensity;
         for (channel, tint) in self.rgb.iter_mut().zip(color) {
             *channel += tint * intensity as f32;
+        }
+        if let Some(record) = &mut self.record {
+            record.add(intensity, color, mino_time);
         }
     }
 
@@ -92,8 +101,8 @@ impl Accumulator {
         }
     }
 
-    /// Adds the light of a medium.
-    pub fn add_light(&mut self, light: &Light, color: [f32; 3]) {
+    /// Adds the light of the medium that is source number `source`.
+    pub fn add_light(&mut self, light: &Light, color: [f32; 3], source: u32) {
         self.intensity += light.intensity;
         self.shift += light.shift;
         self.depth += light.depth;
@@ -101,7 +110,11 @@ impl Accumulator {
         for (channel, tint) in self.rgb.iter_mut().zip(color) {
             *channel += tint * light.intensity as f32;
         }
-        self.mark(light.intensity, light.place);
+        if let Some(record) = &mut self.record {
+            record.add_light(light, color);
+        }
+        let mino_time = light.mino_time;
+        self.mark(light.intensity, light.place, Origin { source, mino_time });
     }
 
     /// What the ray sees whose light this is.
@@ -125,17 +138,28 @@ impl Accumulator {
 
     /// Adds colour from behind everything.
     pub fn add_behind(&mut self, color: [f32; 3]) {
-        let through = (-self.depth).exp() as f32;
+        let through = self.through();
         for (channel, light) in self.rgb.iter_mut().zip(color) {
             *channel += through * light;
         }
+        if let Some(record) = &mut self.record {
+            record.sky = color.map(|light| through * light);
+        }
+    }
+
+    /// Share of the light from behind everything that gets through its gas.
+    pub fn through(&self) -> f32 {
+        (-self.depth).exp() as f32
     }
 
     /// Remembers where the brightest contribution comes from.
     #[inline(always)]
-    pub fn mark(&mut self, brightness: f64, place: Place) {
+    pub fn mark(&mut self, brightness: f64, place: Place, origin: Origin) {
         if brightness > self.brightest {
             (self.brightest, self.place) = (brightness, place);
+            if let Some(record) = &mut self.record {
+                record.origin = Some(origin);
+            }
         }
     }
 }
@@ -153,6 +177,11 @@ pub(super) struct Light {
     pub depth: f64,
     /// Its brightest node.
     pub place: Place,
+    /// Mino time of the brightest node, in M⁻¹.
+    pub mino_time: f64,
+    /// What of the intensity is of the second image and later ones, and of the third and later ones; 0 unless they are
+    /// kept apart.
+    pub later: [f64; 2],
     /// An estimate of the error of the intensity, scene units.
     pub error: f64,
 }

@@ -208,7 +208,7 @@ impl Sum<'_> {
         (times, first): (&[f64], usize),
         columns: &NodeColumns,
     ) -> bool {
-        let seen = MediaRay { number: k, ray, crossings, polarized: None, times };
+        let seen = MediaRay { number: k, ray, crossings, polarized: None, times, cuts: None };
         let nodes = columns.all();
         self.scene.media.radiate(
             m,

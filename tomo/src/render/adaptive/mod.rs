@@ -107,7 +107,7 @@ impl Adaptive<'_> {
         work: &mut Workspace,
     ) -> Result<Vec<Counted>, Error> {
         let Some(rings) = self.rings else { return Ok(vec![Counted::default(); seen.len()]) };
-        rings.resolve(self.prepared, squares, &[self.prepared.time()], seen, work)
+        rings.resolve(self.prepared, squares, &[self.prepared.time()], (seen, &mut []), work)
     }
 
     /// Traces the quarters of the quarters of `parents`.

@@ -3,7 +3,7 @@
 use super::{RingStrata, Stratum};
 use crate::Error;
 use crate::render::pixels::Workspace;
-use crate::transport::{PreparedScene, RayResult};
+use crate::transport::{Layers, Mixed, PreparedScene, RayResult};
 use kerrlight_geodesic::Outcome;
 use std::ops::Range;
 
@@ -55,13 +55,14 @@ impl Resolver {
     }
 
     /// Replaces the light in `seen`, of rays at the centres of `squares` (square k at time j is `[j · squares
-    /// + k]`), by means over the squares where photon rings run through them.
+    /// + k]`), and what is kept of them besides in `layers`, by means over the squares where photon rings run through
+    /// them.
     pub fn resolve(
         &self,
         prepared: &PreparedScene,
         squares: &[Square],
         times: &[f64],
-        seen: &mut [RayResult],
+        (seen, layers): (&mut [RayResult], &mut [Layers]),
         work: &mut Workspace,
     ) -> Result<Vec<Counted>, Error> {
         let mut counted = vec![Counted::default(); seen.len()];
@@ -83,14 +84,17 @@ impl Resolver {
                 work.push_ray((ray.x, ray.y));
             }
             let count = work.len();
-            let found = work.observe_at(prepared, times)?;
-            for (j, found) in found.chunks_exact(count.max(1)).enumerate() {
-                let mut rest = found;
+            work.observe_at(prepared, times)?;
+            for j in 0..times.len() {
+                let mut first = j * count;
                 for job in some {
-                    let (own, others) = rest.split_at(job.rays.len());
-                    rest = others;
+                    let (strata, own) = (&rays[job.rays.clone()], first..first + job.rays.len());
+                    first = own.end;
                     let place = j * squares.len() + job.square;
-                    counted[place] = mean(&rays[job.rays.clone()], own, &mut seen[place]);
+                    counted[place] = mean(strata, &work.seen[own.clone()], &mut seen[place]);
+                    if let Some(layers) = layers.get_mut(place) {
+                        layers.mixed = mixed(strata, &work.layers[own]);
+                    }
                 }
             }
         }
@@ -159,6 +163,15 @@ fn mean(rays: &[Stratum], found: &[RayResult], seen: &mut RayResult) -> Counted 
     }
     counted.error = error(rays, found);
     counted
+}
+
+/// The same of what is averaged besides.
+fn mixed(rays: &[Stratum], found: &[Layers]) -> Mixed {
+    let mut mixed = Mixed::default();
+    for (Stratum { share, .. }, layers) in rays.iter().zip(found) {
+        mixed.add(*share as f32, &layers.mixed);
+    }
+    mixed
 }
 
 /// Of the mean: an edge between two strata is anywhere between their rays, so that a quarter of its height

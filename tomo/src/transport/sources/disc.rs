@@ -2,10 +2,11 @@
 
 use crate::emission::disc::{DiscModel, Photon};
 use crate::scene::Scene;
+use crate::transport::layers::Origin;
 use crate::transport::optics::Optics;
 use crate::transport::polarized::{PolarizedRay, share};
 use crate::transport::result::{Accumulator, Place};
-use kerrlight_geodesic::{Kerr, PlaneCrossing, TracedRay};
+use kerrlight_geodesic::{Kerr, PlaneCrossing, TracedRay, orbits};
 
 /// Crossings of a ray that are located in closed form; rays with more are traced step by step.
 const CROSSINGS: usize = 4;
@@ -47,6 +48,14 @@ impl Disc {
     /// Whether some of its matter plunges.
     pub fn plunges(&self) -> bool {
         self.model.plunges()
+    }
+
+    /// dx/dt of its matter at a point of the plane (M): on circular geodesics, or as it plunges.
+    pub fn velocity(&self, hole: &Kerr, [x, y, _]: [f64; 3]) -> [f64; 3] {
+        let r = x.hypot(y);
+        let rates = self.model.plunging_velocity(r).map(|[t, fall, _, turn]| [fall / t, turn / t]);
+        let [fall, turn] = rates.unwrap_or([0.0, orbits::keplerian_angular_velocity(hole, r)]);
+        [fall * x / r - turn * y, fall * y / r + turn * x, 0.0]
     }
 
     /// Whether it hides what is behind a crossing.
@@ -99,10 +108,12 @@ impl Disc {
         if depth > 0.0 {
             intensity *= (-depth).exp();
         }
-        light.add(intensity, g, self.model.color(r, g * seen.blueshift.unwrap_or(1.0)));
+        let (color, mino_time) = (self.model.color(r, g * seen.blueshift.unwrap_or(1.0)), crossing.mino_time);
+        light.add(intensity, g, color, mino_time);
         if let Some(stokes) = stokes {
             light.add_stokes(intensity, share(&stokes));
         }
-        light.mark(intensity, Place::of_crossing(crossing));
+        let origin = Origin { source: optics.numbering.disc, mino_time };
+        light.mark(intensity, Place::of_crossing(crossing), origin);
     }
 }

@@ -4,6 +4,7 @@ use crate::Error;
 use crate::emission::mesh::{MeshFile, MeshModel, Triangle};
 use crate::scene::Scene;
 use crate::transport::chord::ChordBound;
+use crate::transport::layers::Origin;
 use crate::transport::optics::Optics;
 use crate::transport::result::{Accumulator, Place};
 use crate::transport::tree::{Node, Tree, Walk, WalkScratch};
@@ -265,6 +266,7 @@ impl Meshes {
     ) {
         for hit in scratch.hits.iter().take_while(|hit| hit.mino_time <= end) {
             let (mesh, triangle) = self.tree.at(hit.leaf);
+            let source = self.source(optics, hit);
             if !mesh.shines() {
                 continue;
             }
@@ -277,8 +279,19 @@ impl Meshes {
             // Where matter cannot move like this there is none that shines.
             let Some(g) = g else { continue };
             let boost = optics.spectral_index.map_or(1.0, |index| g.powf(3.0 + index));
-            light.add(emitted * boost, g, color);
-            light.mark(emitted * boost, Place::of_point(&point));
+            light.add(emitted * boost, g, color, hit.mino_time);
+            let origin = Origin { source, mino_time: hit.mino_time };
+            light.mark(emitted * boost, Place::of_point(&point), origin);
         }
+    }
+
+    /// The mesh that ends the last ray at a Mino time, if one does.
+    pub fn hidden_by(&self, optics: &Optics, scratch: &MeshScratch, time: f64) -> Option<u32> {
+        let hit = scratch.hits.iter().find(|hit| hit.mino_time == time)?;
+        Some(self.source(optics, hit))
+    }
+
+    fn source(&self, optics: &Optics, hit: &Hit) -> u32 {
+        optics.numbering.meshes + self.tree.leaves[hit.leaf as usize][0]
     }
 }

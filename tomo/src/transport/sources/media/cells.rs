@@ -55,6 +55,7 @@ struct Cells<'a> {
     moment: Moment,
     lambda: f64,
     polarized: Option<PolarizedRay<'a>>,
+    cuts: Option<[f64; 2]>,
 }
 
 impl Media {
@@ -80,6 +81,7 @@ impl Media {
                     moment: Moment { observed: *observed, slow_light: optics.slow_light },
                     lambda: ray.lambda,
                     polarized: seen.polarized,
+                    cuts: seen.cuts,
                 };
                 let CellScratch { intervals, panels, .. } = &mut scratch.cells;
                 cells.find(seen.ray.last_time(), intervals, panels);
@@ -139,7 +141,7 @@ impl Cells<'_> {
         let MediaScratch { quadrature, sums, cells, .. } = media;
         loop {
             self.fill(quadrature, cells);
-            let light = integrate(quadrature, &cells.nodes.all(), &cells.emission, sums);
+            let light = integrate(quadrature, &cells.nodes.all(), &cells.emission, self.cuts, sums);
             let scale = light.intensity + FAINT * self.medium.scale();
             let enough = self.optics.tolerance * scale;
             let share = enough / cells.panels.len() as f64;

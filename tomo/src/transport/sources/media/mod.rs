@@ -10,6 +10,7 @@ use crate::emission::gas::{GasEffects, GasModel};
 use crate::emission::medium::{CellSize, Emission, Medium, Moment, Part};
 use crate::emission::volume::VolumeModel;
 use crate::scene::Scene;
+use crate::transport::central::in_cartesian;
 use crate::transport::optics::Optics;
 use crate::transport::polarized::PolarizedRay;
 use crate::transport::quadrature::{Quadrature, Sums, integrate};
@@ -136,6 +137,8 @@ pub(in crate::transport) struct MediaRay<'a> {
     pub polarized: Option<PolarizedRay<'a>>,
     /// Times of observation.
     pub times: &'a [f64],
+    /// Mino times in M⁻¹ from which on light is of the next image, if images are kept apart.
+    pub cuts: Option<[f64; 2]>,
 }
 
 impl Media {
@@ -176,6 +179,18 @@ impl Media {
     /// All of them.
     pub fn iter(&self) -> impl Iterator<Item = &dyn Medium> {
         self.all.iter().map(|medium| &**medium)
+    }
+
+    /// dx/dt of the matter of medium number `m` at the point of a path with this radius, cos θ and azimuth; 0 where there
+    /// is none.
+    pub fn velocity(&self, m: usize, r: f64, cos: f64, azimuth: f64) -> [f64; 3] {
+        let medium = self.all.get(m);
+        let Some([t, fall, polar, turn]) = medium.and_then(|all| all.four_velocity(r, cos, azimuth))
+        else {
+            return [0.0; 3];
+        };
+        let rates = [fall / t, polar / t, turn / t];
+        in_cartesian([r, cos, azimuth], rates)
     }
 
     /// Whether anything absorbs.
@@ -266,7 +281,8 @@ impl Media {
             if let Some(polarized) = &seen.polarized {
                 polarized.polarize(medium, nodes, &mut emission);
             }
-            let light = integrate(&scratch.quadrature, nodes, &emission, &mut scratch.sums);
+            let sums = &mut scratch.sums;
+            let light = integrate(&scratch.quadrature, nodes, &emission, seen.cuts, sums);
             let enough = optics.tolerance * (light.intensity + FAINT * medium.scale());
             done &= resolved && (finest || light.error <= enough);
             scratch.lights_of(m, seen.number)[first + j] = light;
@@ -286,13 +302,19 @@ impl Media {
         scratch.lights_of(m, k)[j] = light;
     }
 
-    /// Adds the light of all media along ray number `k` at time number `j`.
+    /// Adds the light of all media along ray number `k` at time number `j`; the first is source number `source`.
     #[inline(always)]
-    pub fn add(&self, k: usize, j: usize, scratch: &MediaScratch, light: &mut Accumulator) {
-        for (m, medium) in self.iter().enumerate() {
+    pub fn add(
+        &self,
+        (k, j): (usize, usize),
+        source: u32,
+        scratch: &MediaScratch,
+        light: &mut Accumulator,
+    ) {
+        for ((m, medium), source) in self.iter().enumerate().zip(source..) {
             let place = (m * scratch.rays + k) * scratch.times + j;
             if let Some(found) = scratch.lights.get(place) {
-                light.add_light(found, medium.color());
+                light.add_light(found, medium.color(), source);
             }
         }
     }

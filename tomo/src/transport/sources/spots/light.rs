@@ -2,6 +2,7 @@
 
 use super::DEEPEST;
 use crate::emission::spot::{Comoving, SpotModel};
+use crate::transport::layers::Origin;
 use crate::transport::optics::Optics;
 use crate::transport::polarized::{PolarizedRay, share};
 use crate::transport::result::{Accumulator, Place};
@@ -25,6 +26,8 @@ pub(in crate::transport) struct SpotRay<'a> {
 /// One spot's light along one ray.
 pub(super) struct SpotLight<'a> {
     spot: &'a SpotModel,
+    /// Its number among the spots.
+    number: u32,
     /// Time of observation.
     observed: f64,
     /// Where it may shine, as intervals of Mino time in order.
@@ -50,12 +53,12 @@ const LARGEST_TURN: f64 = 0.5;
 impl<'a> SpotLight<'a> {
     /// The light of a spot, seen at a time of observation, on `pieces` of a ray.
     pub fn new(
-        spot: &'a SpotModel,
+        (number, spot): (u32, &'a SpotModel),
         observed: f64,
         pieces: &'a [[f64; 2]],
         seen: &'a SpotRay<'a>,
     ) -> Self {
-        SpotLight { spot, observed, pieces, seen, brightest: None }
+        SpotLight { spot, number, observed, pieces, seen, brightest: None }
     }
 
     /// Adds the light.
@@ -71,7 +74,9 @@ impl<'a> SpotLight<'a> {
             }
         }
         if let Some((_, point)) = self.brightest {
-            light.mark(light.intensity - before, Place::of_point(&point));
+            let source = self.seen.optics.numbering.spots + self.number;
+            let origin = Origin { source, mino_time: point.mino_time };
+            light.mark(light.intensity - before, Place::of_point(&point), origin);
         }
     }
 
@@ -155,7 +160,7 @@ impl<'a> SpotLight<'a> {
             boost *= stokes.i;
             light.add_stokes(boost * emissivity * path_length, share(&stokes));
         }
-        light.add(boost * emissivity * path_length, g, self.spot.color);
+        light.add(boost * emissivity * path_length, g, self.spot.color, point.mino_time);
         let density = boost * emissivity;
         if self.brightest.is_none_or(|(most, _)| density > most) {
             self.brightest = Some((density, *point));

@@ -13,6 +13,7 @@ use crate::scene::Scene;
 use crate::transport::optics::Optics;
 use crate::transport::result::Accumulator;
 use crate::transport::tree::WalkScratch;
+use kerrlight_geodesic::vector::{cross, dot};
 use kerrlight_geodesic::{Kerr, Ray};
 use light::SpotLight;
 use meeting::{Met, join};
@@ -64,6 +65,17 @@ impl Spots {
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.models.is_empty()
+    }
+
+    /// A spot with its number.
+    fn of(&self, number: usize) -> (u32, &SpotModel) {
+        (number as u32, &self.models[number])
+    }
+
+    /// dx/dt of the matter of spot number `number` at a point, M.
+    pub fn velocity(&self, number: usize, x: [f64; 3]) -> [f64; 3] {
+        let r = dot(x, x).sqrt();
+        self.models.get(number).map_or([0.0; 3], |spot| cross(spot.angular_velocity(r), x))
     }
 
     /// Their sizes by the radii of their orbits.
@@ -119,8 +131,7 @@ impl Spots {
         let SpotScratch { intervals, met, pieces, .. } = scratch;
         for same in met.chunk_by(|a, b| a.spot == b.spot) {
             join(same, pieces);
-            let spot = &self.models[same[0].spot as usize];
-            SpotLight::new(spot, time, pieces, seen).add(intervals, light);
+            SpotLight::new(self.of(same[0].spot as usize), time, pieces, seen).add(intervals, light);
         }
     }
 
@@ -132,9 +143,9 @@ impl Spots {
         scratch: &mut SpotScratch,
         light: &mut Accumulator,
     ) {
-        for spot in &self.models {
+        for number in 0..self.models.len() {
             let everywhere = [[0.0, f64::INFINITY]];
-            SpotLight::new(spot, time, &everywhere, seen).add(&mut scratch.intervals, light);
+            SpotLight::new(self.of(number), time, &everywhere, seen).add(&mut scratch.intervals, light);
         }
     }
 }

@@ -1,0 +1,38 @@
+//! What is kept of pixels besides their light.
+
+use super::grid::Grid;
+use super::pixels::Workspace;
+use crate::Error;
+use crate::transport::{Layers, PreparedScene};
+
+/// Adds what is wanted of the central ray of each pixel in a block of rays that has been observed, with `side`² rays a
+/// pixel.
+pub(super) fn add_central(
+    prepared: &PreparedScene,
+    grid: &Grid,
+    work: &mut Workspace,
+) -> Result<(), Error> {
+    if !prepared.wanted().central() {
+        return Ok(());
+    }
+    let (rays, samples) = (work.alpha.len(), grid.side * grid.side);
+    for k in (0..work.layers.len()).filter(|k| k % samples == central(grid.side)) {
+        let place = (work.alpha[k % rays], work.beta[k % rays]);
+        prepared.add_central(place, grid.size, &mut work.scratch, &mut work.layers[k])?;
+    }
+    Ok(())
+}
+
+/// One pixel from its rays, row by row.
+pub(super) fn mean(rays: &[Layers], side: usize) -> Layers {
+    let mut pixel = rays.get(central(side)).copied().unwrap_or_default();
+    pixel.mixed = crate::transport::Mixed::default();
+    let share = 1.0 / rays.len() as f32;
+    rays.iter().for_each(|ray| pixel.mixed.add(share, &ray.mixed));
+    pixel
+}
+
+/// Number of the most central of `side`² rays.
+fn central(side: usize) -> usize {
+    side / 2 * side + side / 2
+}
