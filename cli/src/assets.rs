@@ -4,7 +4,7 @@ use crate::output::{self, Output};
 use crate::volume_files;
 use anyhow::Context;
 use kerrlight_tomo::emission::mesh::MeshFile;
-use kerrlight_tomo::emission::sky::Panorama;
+use kerrlight_tomo::emission::sky::{Catalogue, Panorama};
 use kerrlight_tomo::scene::{Scene, Sky};
 use kerrlight_tomo::transport::Assets;
 use std::cell::RefCell;
@@ -53,7 +53,11 @@ pub fn load(scene: &Scene, folder: &Path, outputs: &[&Output]) -> anyhow::Result
             .with_context(|| format!("`volume.{k}.path` {}", path.display()))
     });
     let volumes = volumes.collect::<anyhow::Result<_>>()?;
-    let decoded = Assets { sky, meshes, volumes };
+    let stars = match &scene.sky {
+        Some(Sky::Catalogue(stars)) => Some(load_stars(&folder.join(&stars.path), &read)?),
+        _ => None,
+    };
+    let decoded = Assets { sky, stars, meshes, volumes };
     Ok(Files { decoded, identity: identity.into_inner(), paths: paths.into_inner() })
 }
 
@@ -63,6 +67,14 @@ fn sky_path(scene: &Scene, folder: &Path) -> Option<PathBuf> {
         Some(Sky::Image(image)) => Some(folder.join(&image.path)),
         _ => None,
     }
+}
+
+fn load_stars(
+    path: &Path,
+    read: &dyn Fn(&Path) -> anyhow::Result<Vec<u8>>,
+) -> anyhow::Result<Catalogue> {
+    let bytes = read(path).context("`sky.catalogue.path`")?;
+    Catalogue::decode(&bytes).with_context(|| format!("`sky.catalogue.path` {}", path.display()))
 }
 
 fn load_sky(

@@ -1,10 +1,11 @@
 //! Channels on request, against closed forms and against other pictures.
 
 use crate::support::scene;
-use kerrlight_tomo::emission::sky::Panorama;
+use kerrlight_tomo::emission::sky::{Catalogue, Panorama};
 use kerrlight_tomo::image::{Channel, Picture, exr};
 use kerrlight_tomo::render::render;
 use kerrlight_tomo::scene::Scene;
+use kerrlight_tomo::transport::Assets;
 
 /// A disc that absorbing gas surrounds, and a spot, with light of all images.
 const WORLD: &str = r#"
@@ -103,7 +104,10 @@ fn exact_alpha_is_what_is_missing_of_a_white_sky() {
 /// The shadow of a hole without spin has an area of 27π M² (Synge 1966).
 #[test]
 fn exact_alpha_has_the_area_of_the_shadow() {
-    let seen = picture(&asking(EMPTY, r#""A","id","Z""#, &["screen.samples_per_pixel=16"]), Some(sky(|_, _| [1.0; 3])));
+    let seen = picture(
+        &asking(EMPTY, r#""A","id","Z""#, &["screen.samples_per_pixel=16"]),
+        Some(sky(|_, _| [1.0; 3])),
+    );
     let sum: f64 = seen.channel("A").unwrap().iter().map(|a| f64::from(*a)).sum();
     let area = sum * (16.0f64 / 64.0).powi(2);
     assert!((area / (27.0 * core::f64::consts::PI) - 1.0).abs() < 1e-3, "{area}");
@@ -126,7 +130,10 @@ fn exact_layers_add_up() {
         let layers = ["", "emission", "sky", "n0", "n1", "n2"].map(of);
         for k in 0..layers[0].len() {
             let [whole, emission, sky, n0, n1, n2] = layers.map(|layer| f64::from(layer[k]));
-            assert!((emission + sky - whole).abs() <= 1e-6 * whole, "{k}: {emission} {sky} {whole}");
+            assert!(
+                (emission + sky - whole).abs() <= 1e-6 * whole,
+                "{k}: {emission} {sky} {whole}"
+            );
             assert!((n0 + n1 + n2 - emission).abs() <= 1e-6 * emission, "{k}");
         }
         let sums = layers.map(|layer| layer.iter().map(|x| f64::from(*x)).sum::<f64>());
@@ -144,7 +151,8 @@ fn code_images_are_those_of_half_orbits() {
             let cut: Vec<&str> = more.iter().copied().chain([most.as_str()]).collect();
             let cut = picture(&asking(WORLD, r#""default""#, &cut), None);
             for c in 0..3 {
-                let images: Vec<_> = (0..=orders).map(|n| color(&whole, &format!("n{n}"))[c]).collect();
+                let images: Vec<_> =
+                    (0..=orders).map(|n| color(&whole, &format!("n{n}"))[c]).collect();
                 let (mut off, mut sum) = (0.0, 0.0);
                 for (k, cut) in color(&cut, "")[c].iter().enumerate() {
                     let light: f32 = images.iter().map(|image| image[k]).sum();
@@ -161,7 +169,10 @@ fn code_images_are_those_of_half_orbits() {
 fn exact_st_map_finds_the_sky() {
     let turns = |u: f64| (core::f64::consts::TAU * u).sin_cos();
     let wave = |u: f64, v: f64| [0.5 + 0.4 * turns(u).0, 0.5 + 0.4 * turns(u).1, v];
-    let seen = picture(&asking(EMPTY, r#""sky","st""#, &["screen.rings=\"regular-grid\""]), Some(sky(wave)));
+    let seen = picture(
+        &asking(EMPTY, r#""sky","st""#, &["screen.rings=\"regular-grid\""]),
+        Some(sky(wave)),
+    );
     let [u, v, a] = ["st.u", "st.v", "st.a"].map(|name| seen.channel(name).unwrap());
     let sky = color(&seen, "sky");
     let mut open = 0;
@@ -182,16 +193,25 @@ fn exact_st_map_finds_the_sky() {
 /// The footprint of a pixel is the solid angle between the places on the sky of its neighbours.
 #[test]
 fn exact_footprint_is_the_solid_angle_between_neighbours() {
-    let more = ["screen.field_of_view_m=40.0", "screen.width=200", "screen.rings=\"regular-grid\"", "hole.spin=0.9"];
+    let more = [
+        "screen.field_of_view_m=40.0",
+        "screen.width=200",
+        "screen.rings=\"regular-grid\"",
+        "hole.spin=0.9",
+    ];
     let seen = picture(&asking(EMPTY, r#""st","footprint""#, &more), Some(sky(|_, _| [1.0; 3])));
     let [u, v, a, footprint] =
         ["st.u", "st.v", "st.a", "footprint"].map(|name| seen.channel(name).unwrap());
     let direction = |k: usize| {
-        let (azimuth, polar) = (core::f64::consts::TAU * (0.5 - f64::from(u[k])), core::f64::consts::PI * (1.0 - f64::from(v[k])));
+        let (azimuth, polar) = (
+            core::f64::consts::TAU * (0.5 - f64::from(u[k])),
+            core::f64::consts::PI * (1.0 - f64::from(v[k])),
+        );
         [polar.sin() * azimuth.cos(), polar.sin() * azimuth.sin(), polar.cos()]
     };
     let mut seen = 0;
-    for k in (0..u.len()).filter(|k| (1..199).contains(&(k % 200)) && (1..199).contains(&(k / 200))) {
+    for k in (0..u.len()).filter(|k| (1..199).contains(&(k % 200)) && (1..199).contains(&(k / 200)))
+    {
         let (x, y) = (0.2 * ((k % 200) as f64 - 99.5), 0.2 * ((k / 200) as f64 - 99.5));
         if x.hypot(y) < 12.0 || a[k] == 0.0 {
             continue;
@@ -203,7 +223,11 @@ fn exact_footprint_is_the_solid_angle_between_neighbours() {
         let ([ax, ay, az], [bx, by, bz]) = (half(k + 1, k - 1), half(k + 200, k - 200));
         let cross = [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx];
         let area = cross.iter().map(|c| c * c).sum::<f64>().sqrt();
-        assert!((f64::from(footprint[k]) / area - 1.0).abs() < 0.02, "{x} {y}: {} {area}", footprint[k]);
+        assert!(
+            (f64::from(footprint[k]) / area - 1.0).abs() < 0.02,
+            "{x} {y}: {} {area}",
+            footprint[k]
+        );
         seen += 1;
     }
     assert!(seen > 10_000);
@@ -261,18 +285,27 @@ fn exact_motion_between_two_pictures() {
     for (phase, slow) in [(0.0, true), (70.0, true), (70.0, false), (200.0, true)] {
         let step = 1.0;
         let at = |time: f64| {
-            let set = [format!("spot.0.phase_deg={phase}"), format!("observer.time={time}"), format!("effects.slow_light={slow}")];
+            let set = [
+                format!("spot.0.phase_deg={phase}"),
+                format!("observer.time={time}"),
+                format!("effects.slow_light={slow}"),
+            ];
             let set: Vec<&str> = set.iter().map(String::as_str).collect();
             picture(&asking(text, r#""default","motion""#, &set), None)
         };
         let mean = |seen: &Picture, of: &dyn Fn(usize) -> f64| {
             let light = seen.channel("intensity").unwrap().iter().map(|x| f64::from(*x));
-            let sums = light.enumerate().fold((0.0, 0.0), |sums, (k, light)| (sums.0 + light * of(k), sums.1 + light));
+            let sums = light
+                .enumerate()
+                .fold((0.0, 0.0), |sums, (k, light)| (sums.0 + light * of(k), sums.1 + light));
             sums.0 / sums.1
         };
-        let place = |seen: &Picture| [mean(seen, &|k| (k % 112) as f64), -mean(seen, &|k| (k / 112) as f64)];
+        let place = |seen: &Picture| {
+            [mean(seen, &|k| (k % 112) as f64), -mean(seen, &|k| (k / 112) as f64)]
+        };
         let (before, now, after) = (at(-step), at(0.0), at(step));
-        let moved: Vec<f64> = place(&after).iter().zip(place(&before)).map(|(b, a)| (b - a) / (2.0 * step)).collect();
+        let moved: Vec<f64> =
+            place(&after).iter().zip(place(&before)).map(|(b, a)| (b - a) / (2.0 * step)).collect();
         for (name, moved) in ["motion.u", "motion.v"].iter().zip(moved) {
             let channel = now.channel(name).unwrap();
             let said = mean(&now, &|k| f64::from(channel[k]));
@@ -291,8 +324,40 @@ fn exact_identifiers_and_refusals() {
     let seen = picture(&scene, None);
     let id = seen.channel("id").unwrap();
     assert!((2..=4).all(|source| id.contains(&(source as f32))), "{id:?}");
-    let fail = |channels: &str, more: &[&str]| raster(&asking(WORLD, channels, more)).unwrap_err().to_string();
+    let fail = |channels: &str, more: &[&str]| {
+        raster(&asking(WORLD, channels, more)).unwrap_err().to_string()
+    };
     assert!(fail(r#""sky""#, &[]).contains("no channel `sky`"));
     let said = fail(r#""A""#, &["screen.image_error=1e-2"]);
     assert!(said.contains("A is not there with `screen.image_error`"), "{said}");
+}
+
+/// Light of a star at an angle u behind a hole, in units of the Einstein angle of a camera far away: unlensed times
+/// (u² + 2)/(u √(u² + 4)), of both images together (Paczyński 1986, ApJ 304, 1, eq. 4).
+#[test]
+fn paper_stars_are_magnified() {
+    let distance: f64 = 3e5;
+    let einstein = (4.0 / distance).sqrt();
+    let field = 6.0 * einstein.to_degrees();
+    let text = format!(
+        r#"
+        hole = {{ spin = 0.0 }}
+        camera = {{ motion = "static", radius = {distance}, theta_deg = 90.0, phi_deg = 0.0, field_of_view_deg = {field} }}
+        screen = {{ width = 160, rings = "regular-grid" }}
+        tracer = {{ integrator = "elliptic", tolerance = 1e-10 }}
+        sky.catalogue = {{ path = "-", brightness = 1.0, psf_fwhm_pixels = 2.0 }}
+    "#
+    );
+    let scene = Scene::parse(&text).unwrap();
+    let pixel = scene.pixel_size().to_degrees();
+    for u in [0.4, 0.8, 1.5] {
+        let star = format!("lon,lat,mag\n180,{},2.5\n", (u * einstein).to_degrees());
+        let stars = Some(Catalogue::decode(star.as_bytes()).unwrap());
+        let assets = Assets { stars, ..Assets::default() };
+        let seen = render(&scene, assets, &|_| true).unwrap().picture;
+        let sum: f64 = color(&seen, "")[1].iter().map(|x| f64::from(*x)).sum();
+        let magnified = sum * pixel * pixel / 0.1;
+        let expected = (u * u + 2.0) / (u * (u * u + 4.0).sqrt());
+        assert!((magnified / expected - 1.0).abs() < 0.02, "{u}: {magnified} {expected}");
+    }
 }

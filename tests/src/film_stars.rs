@@ -111,7 +111,8 @@ fn images(scene: &Scene, stars: &[([f64; 3], f64)]) -> Vec<Image> {
 fn photometry(text: &str, overrides: &[&str], frames: u32, most: f64) -> (Vec<f64>, Vec<f64>) {
     const APART: f64 = 6.5;
     let mut scene = scene(text, overrides);
-    let Some(SkyModel::Stars(field)) = SkyModel::new(scene.sky.as_ref().unwrap(), None) else {
+    let Some(SkyModel::Stars(field)) = SkyModel::new(scene.sky.as_ref().unwrap(), None, None)
+    else {
         panic!("a field of stars");
     };
     let stars = field.catalogue();

@@ -117,6 +117,7 @@ fn regress_the_reference_has_every_key_of_a_scene() {
         ("sky_checker", "sky.checker", "[sky]"),
         ("sky_stars", "sky.stars", "[sky]"),
         ("sky_image", "sky.image", "[sky]"),
+        ("sky_catalogue", "sky.catalogue", "[sky]"),
     ] {
         let file = format!("scenes/{scene}.toml");
         let unknown = format!("{table}.nonsense=1");

@@ -110,7 +110,8 @@ fn volume(bytes: &[u8]) -> kerrlight_tomo::volume::VolumeFile {
 
 /// Renders a scene whose files, if any, lie in the folder of scenes.
 pub fn render(scene: &Scene) -> Picture {
-    use kerrlight_tomo::emission::{mesh::MeshFile, sky::Panorama};
+    use kerrlight_tomo::emission::mesh::MeshFile;
+    use kerrlight_tomo::emission::sky::{Catalogue, Panorama};
     use kerrlight_tomo::scene::Sky;
     use kerrlight_tomo::transport::Assets;
     let read = |path: &str| std::fs::read(root().join("scenes").join(path)).expect(path);
@@ -118,11 +119,15 @@ pub fn render(scene: &Scene) -> Picture {
         Some(Sky::Image(image)) => Some(Panorama::decode(&read(&image.path)).expect("a picture")),
         _ => None,
     };
+    let stars = match &scene.sky {
+        Some(Sky::Catalogue(stars)) => Some(Catalogue::decode(&read(&stars.path)).expect("stars")),
+        _ => None,
+    };
     let resource = |name: &str| Ok(read(name));
     let mesh = |path: &str| MeshFile::decode(&read(path), &resource).expect("a mesh");
     let meshes = scene.mesh.iter().map(|one| mesh(&one.path)).collect();
     let volumes = scene.volume.iter().map(|one| volume(&read(&one.path))).collect();
-    kerrlight_tomo::render::render(scene, Assets { sky, meshes, volumes }, &|_| true)
+    kerrlight_tomo::render::render(scene, Assets { sky, stars, meshes, volumes }, &|_| true)
         .expect("a picture")
         .picture
 }

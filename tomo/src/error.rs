@@ -2,7 +2,7 @@
 
 use crate::dynamics::ZeroAxis;
 use crate::emission::mesh::MeshError;
-use crate::emission::sky::PanoramaError;
+use crate::emission::sky::{CatalogueError, PanoramaError};
 use crate::fit::Diverged;
 use crate::fit::checkpoint::CheckpointError;
 use crate::fit::linear::LinearError;
@@ -56,6 +56,8 @@ pub enum Error {
     Memory(#[from] TooLarge),
     /// A scene, or an override of one of its keys.
     Scene(#[from] SceneError),
+    /// The text of a catalogue of stars.
+    Catalogue(#[from] CatalogueError),
     /// The bytes of a mesh.
     Mesh(#[from] MeshError),
     /// The bytes of a sky.

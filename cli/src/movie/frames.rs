@@ -1,11 +1,12 @@
 //! The numbered files of a film: which are there, which are to be written.
 
 use crate::output::{self, Output};
+use crate::render::exr_options::ExrOptions;
 use crate::render::report;
 use anyhow::{Context, bail};
 use kerrlight_tomo::Error;
 use kerrlight_tomo::image::Picture;
-use kerrlight_tomo::image::exr::{self, Attributes};
+use kerrlight_tomo::image::exr::{self, Attributes, Style};
 use kerrlight_tomo::render::Rendered;
 use kerrlight_tomo::render::{Film, Frame};
 use kerrlight_tomo::scene::{Scene, apply_override};
@@ -175,10 +176,12 @@ impl Sequence {
             .try_for_each(|frame| output.differs(&frame))
     }
 
-    /// Writes a batch of frames. What is scaled to Jy is scaled by the first frame's factor.
+    /// Writes a batch of frames in some style, so many a second. What is scaled to Jy is scaled by the first frame's
+    /// factor.
     pub fn write(
         &mut self,
         film: &Film,
+        (options, per_second): (&ExrOptions, u16),
         batch: &[usize],
         frames: Vec<Frame>,
     ) -> anyhow::Result<()> {
@@ -188,12 +191,15 @@ impl Sequence {
         let factor = self.factor.context("the film has no unit of intensity")?;
         let this: &Sequence = self;
         let written = batch.par_iter().zip(frames).map(|(k, frame)| -> anyhow::Result<_> {
+            let style = options.style(film.camera(&frame)?);
+            let style = Style { frames_per_second: Some(per_second), ..style };
             let Rendered { picture, summary } = film.rendered(frame, factor)?;
             let Plan { scene, text } = &this.plans[*k];
             let mut attributes = report::attributes(scene, text, film.legend(), &summary);
             attributes.extend(film.identifiers().map(|ids| ("ids".to_owned(), ids)));
             attributes.append(&mut this.settings(*k));
-            let bytes = exr::encode(&picture, &attributes).context("cannot encode the EXR")?;
+            let bytes = exr::encode_in_style(&picture, &attributes, style);
+            let bytes = bytes.context("cannot encode the EXR")?;
             Output::new(&this.path(*k, "exr"), "exr")?.write(&bytes)?;
             Ok((summary.flux, summary.flux_unit.to_owned()))
         });

@@ -9,6 +9,7 @@ use crate::devices::{self, DeviceOption};
 use crate::interrupt::{Interrupted, Keeper};
 use crate::output::Output;
 use crate::overlay::OverlayOptions;
+use crate::render::exr_options::ExrOptions;
 use crate::render::preview::PreviewOptions;
 use crate::render::report;
 use crate::render::source::Source;
@@ -44,6 +45,8 @@ pub struct Movie {
     /// Change a value of the scene, e.g. hole.spin=0.5 or spot.0.phase_deg=90
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     overrides: Vec<String>,
+    #[command(flatten)]
+    exr: ExrOptions,
     #[command(flatten)]
     device: DeviceOption,
     #[command(flatten)]
@@ -177,7 +180,8 @@ impl Movie {
                 Ok(frames) => frames,
             };
             unresolved += frames.iter().map(Frame::unresolved).sum::<u64>();
-            sequence.write(film, batch, frames)?;
+            let style = (&self.exr, self.viewing.frames_per_second());
+            sequence.write(film, style, batch, frames)?;
         }
         bar.finish_and_clear();
         let seconds = start.elapsed().as_secs_f64();

@@ -23,7 +23,7 @@ pub struct Viewing {
     /// Write a PNG beside each EXR
     #[arg(long)]
     png: bool,
-    /// Frames per second of the GIF and the APNG
+    /// Frames per second of the GIF and the APNG, and in the headers of the EXR files
     #[arg(long, value_name = "N", default_value = "25", value_parser = clap::value_parser!(u16).range(1..=50))]
     fps: u16,
     /// The value that is white in all pictures [default: the largest of all frames, but for 0.2 %
@@ -46,6 +46,11 @@ pub struct Animations {
 const PALETTE_FRAMES: usize = 12;
 
 impl Viewing {
+    /// Frames per second of the film.
+    pub fn frames_per_second(&self) -> u16 {
+        self.fps
+    }
+
     /// Checks where files are to go.
     pub fn outputs(&self, frames: u32) -> anyhow::Result<Animations> {
         let check = |path: &Option<PathBuf>, extension| {

@@ -1,6 +1,7 @@
 //! `kerrlight render`: from a scene to EXR and PNG.
 
 mod explain;
+pub mod exr_options;
 mod partial;
 pub mod preview;
 pub mod report;
@@ -14,6 +15,7 @@ use crate::output::{self, Output};
 use crate::overlay::OverlayOptions;
 use anyhow::{Context, bail};
 use clap::Args;
+use exr_options::ExrOptions;
 use image::RgbImage;
 use kerrlight_tomo::image::Picture;
 use kerrlight_tomo::image::preview as drawing;
@@ -64,6 +66,8 @@ pub struct Render {
     #[arg(long, value_name = "FILE.png")]
     sheet: Option<PathBuf>,
     #[command(flatten)]
+    exr: ExrOptions,
+    #[command(flatten)]
     device: DeviceOption,
     /// Columns of pixels that are traced together; the picture does not depend on it
     #[arg(long, value_name = "N", default_value = "64", hide_short_help = true)]
@@ -98,7 +102,8 @@ impl Render {
             devices::announce(device, &raster.beside_device());
         }
         let (name, files) = (source.name.as_str(), files.identity.as_str());
-        let work = Work { raster: &raster, scene: &scene, text: &text, name, files };
+        let work =
+            Work { raster: &raster, scene: &scene, text: &text, name, files, style: &self.exr };
         let summary = self.render(&work, look, &outputs)?;
         let seconds = start.elapsed().as_secs_f64();
         report::warn(&scene, &summary);

@@ -1,5 +1,6 @@
 //! Rendering, with a journal beside the EXR or without one.
 
+use super::exr_options::ExrOptions;
 use super::partial::Partial;
 use super::report;
 use crate::interrupt::{Interrupted, Keeper};
@@ -23,6 +24,8 @@ pub struct Work<'a> {
     pub name: &'a str,
     /// What tells the files that the scene names from others.
     pub files: &'a str,
+    /// How the EXR is written.
+    pub style: &'a ExrOptions,
 }
 
 impl Work<'_> {
@@ -51,7 +54,8 @@ impl Work<'_> {
         exr.write_with(|file| {
             let journal = &mut partial.journal;
             let look = look.as_mut();
-            Ok(self.raster.write_exr(journal, &summary, &attributes, file, look)?)
+            let style = self.style.style(self.raster.camera());
+            Ok(self.raster.write_exr(journal, &summary, (&attributes, style), file, look)?)
         })
         .with_context(|| partial.kept())?;
         partial.remove();

@@ -11,11 +11,11 @@ mod elliptic_rays;
 pub mod footprint;
 pub(crate) mod integrator;
 mod length;
-pub(crate) mod path_length;
 pub mod node_gradients;
 pub mod nodes;
 #[cfg(feature = "rayon")]
 mod parallel;
+pub(crate) mod path_length;
 pub(crate) mod request;
 mod sampling;
 mod tables;

@@ -178,6 +178,11 @@ impl Camera {
         core::array::from_fn(|k| (forward[k] + x * right[k] + y * up[k]) / norm)
     }
 
+    /// Unit vectors (e_r, e_θ, e_φ) to the right, up and forward, in the camera's frame.
+    pub fn axes(&self) -> [[f64; 3]; 3] {
+        self.axes
+    }
+
     /// Its Boyer–Lindquist radius, in M.
     pub fn radius(&self) -> f64 {
         self.radius
@@ -268,12 +273,12 @@ impl Camera {
     }
 
     /// Its inclination.
-    pub(crate) fn inclination(&self) -> Inclination {
+    pub fn inclination(&self) -> Inclination {
         self.inclination
     }
 
     /// Its azimuth, in radians.
-    pub(crate) fn azimuth(&self) -> f64 {
+    pub fn azimuth(&self) -> f64 {
         self.azimuth
     }
 

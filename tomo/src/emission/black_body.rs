@@ -33,6 +33,12 @@ impl BlackBody {
         BlackBody { table, reference: tristimulus(temperature)[1] }
     }
 
+    /// Linear R, G, B of luminance 1 at `temperature` (K).
+    pub fn at(temperature: f64) -> [f32; 3] {
+        let xyz = tristimulus(temperature);
+        linear_srgb(xyz.map(|x| x / xyz[1])).map(|c| c.max(0.0) as f32)
+    }
+
     /// Linear R, G, B at temperature `t` (K), for total intensity 1. What is outside of the
     /// primaries' triangle (deep red below 1900 K) loses its negative part.
     pub fn color(&self, t: f64) -> [f32; 3] {

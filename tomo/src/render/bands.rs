@@ -110,7 +110,8 @@ impl Raster {
     /// The band from its tiles at the time number `time`.
     fn assemble(&self, index: usize, parts: &Parts, time: usize) -> Result<Band, Error> {
         let (width, rows) = (self.grid.width, self.layout.rows(index).len());
-        let parts: Vec<&Pixels> = parts.iter().flatten().filter_map(|tile| tile.get(time)).collect();
+        let parts: Vec<&Pixels> =
+            parts.iter().flatten().filter_map(|tile| tile.get(time)).collect();
         let Pixels { pixels, layers } = Pixels::joined(&parts, width, rows);
         let mut channels = Vec::with_capacity(self.channels.len());
         for kind in &self.channels {

@@ -4,9 +4,9 @@
 use super::RenderError;
 use super::pixels::Pixel;
 use super::requested::REQUESTED;
+use crate::Error;
 use crate::scene::DEFAULT_CHANNELS;
 use crate::transport::Layers;
-use crate::Error;
 use crate::transport::PreparedScene;
 use kerrlight_geodesic::Outcome;
 
@@ -52,8 +52,12 @@ impl ChannelKind {
     /// The values of pixels as they are kept, times `unit`; `layers` are as many, or none.
     pub(super) fn values(&self, pixels: &[Pixel], layers: &[Layers], unit: f64) -> Vec<f32> {
         match self.value {
-            Value::Pixel(value) => pixels.iter().map(|pixel| (value(pixel) * unit) as f32).collect(),
-            Value::Layers(value) => layers.iter().map(|layer| (value(layer) * unit) as f32).collect(),
+            Value::Pixel(value) => {
+                pixels.iter().map(|pixel| (value(pixel) * unit) as f32).collect()
+            }
+            Value::Layers(value) => {
+                layers.iter().map(|layer| (value(layer) * unit) as f32).collect()
+            }
         }
     }
 

@@ -4,6 +4,7 @@
 use super::raw::Raw;
 use super::{Progress, Raster, Rendered, TILE};
 use crate::Error;
+use crate::image::exr::CameraMatrices;
 use crate::scene::Scene;
 use crate::transport::Assets;
 use kerrlight_geodesic::RayDevice;
@@ -96,6 +97,14 @@ impl Film {
     /// What the channels hold.
     pub fn legend(&self) -> String {
         self.raster.legend()
+    }
+
+    /// Where a frame is taken from: see [`Raster::camera`].
+    ///
+    /// # Errors
+    /// If the camera is impossible there.
+    pub fn camera(&self, frame: &Frame) -> Result<CameraMatrices, Error> {
+        self.raster.camera_at(frame.time)
     }
 
     /// What the numbers in the channel `id` stand for: see [`Raster::identifiers`].

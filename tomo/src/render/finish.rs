@@ -5,7 +5,7 @@ use super::journal::Journal;
 use super::tally::Summary;
 use super::{Progress, Raster};
 use crate::Error;
-use crate::image::exr::Attributes;
+use crate::image::exr::{Attributes, Layout, Style};
 use crate::image::reduce::Reduction;
 use exr::error::Result;
 use rayon::prelude::*;
@@ -30,7 +30,7 @@ impl Raster {
         let journal = Mutex::new(journal);
         let keep = |bands: Vec<Band>| {
             bands.iter().try_for_each(|band| {
-                let bytes = self.layout.compress(band.index, &band.channels)?;
+                let bytes = self.layout.compress(band.index, &band.channels)?.concat();
                 let mut journal = journal.lock().unwrap_or_else(PoisonError::into_inner);
                 journal.append(band.index, band.tally, &bytes).map_err(exr::error::Error::from)?;
                 Ok(())
@@ -50,7 +50,7 @@ impl Raster {
         self.summarize(&journal.tally())
     }
 
-    /// Writes the EXR file.
+    /// Writes the EXR file with settings, in some style.
     ///
     /// # Errors
     /// If the journal is not complete, or on a failure to read or write.
@@ -58,12 +58,13 @@ impl Raster {
         &self,
         journal: &mut Journal<F>,
         summary: &Summary,
-        attributes: &Attributes,
+        (attributes, style): (&Attributes, Style),
         out: impl Write + Seek,
         reduction: Option<&mut Reduction>,
     ) -> Result<()> {
-        self.layout.write(out, attributes, |write| {
-            self.for_each_band(journal, summary, true, reduction, write)
+        let layout = Layout::styled(self.grid.width, self.grid.height, &self.names(), style)?;
+        layout.write(out, attributes, |write| {
+            self.for_each_band(journal, summary, Some(&layout), reduction, write)
         })
     }
 
@@ -77,21 +78,22 @@ impl Raster {
         summary: &Summary,
         reduction: &mut Reduction,
     ) -> Result<()> {
-        self.for_each_band(journal, summary, false, Some(reduction), &mut |_, _| Ok(()))
+        self.for_each_band(journal, summary, None, Some(reduction), &mut |_, _| Ok(()))
     }
 
-    /// Hands on the compressed bytes of each band in the file's units, from the top, and its
+    /// Hands on the compressed bytes of each band in the file's units and layout, from the top, and its
     /// values to the reduction. Several bands are taken apart in parallel.
     fn for_each_band<F: Read + Write + Seek>(
         &self,
         journal: &mut Journal<F>,
         summary: &Summary,
-        write: bool,
+        layout: Option<&Layout>,
         mut reduction: Option<&mut Reduction>,
-        each: &mut dyn FnMut(usize, Vec<u8>) -> Result<()>,
+        each: &mut dyn FnMut(usize, Vec<Vec<u8>>) -> Result<()>,
     ) -> Result<()> {
         let rescale = summary.unit_factor != self.unit;
-        let values = reduction.is_some() || rescale;
+        let restyle = layout.filter(|layout| rescale || !layout.is_plain());
+        let values = reduction.is_some() || rescale || restyle.is_some();
         let bands: Vec<usize> = (0..self.layout.bands()).collect();
         let height = self.layout.rows(0).len();
         for some in bands.chunks((WINDOW / (self.grid.width * height)).max(1)) {
@@ -99,14 +101,14 @@ impl Raster {
                 some.iter().map(|band| Ok(journal.read(*band)?)).collect::<Result<_>>()?;
             let done = read.into_par_iter().zip(some).map(|(bytes, band)| {
                 if !values {
-                    return Ok((bytes, Vec::new()));
+                    return Ok((vec![bytes], Vec::new()));
                 }
                 let mut channels = self.layout.expand(*band, bytes.clone())?;
-                if !rescale {
-                    return Ok((bytes, channels));
-                }
                 self.rescale(&mut channels, summary.unit_factor);
-                let bytes = if write { self.layout.compress(*band, &channels)? } else { bytes };
+                let bytes = match restyle {
+                    Some(layout) => layout.compress(*band, &channels)?,
+                    None => vec![bytes],
+                };
                 Ok((bytes, channels))
             });
             for ((bytes, channels), band) in done.collect::<Result<Vec<_>>>()?.into_iter().zip(some)

@@ -11,6 +11,7 @@ mod grid;
 mod journal;
 mod layers;
 mod pixels;
+mod placement;
 mod plan;
 mod raw;
 mod requested;
@@ -18,10 +19,10 @@ mod rings;
 mod tally;
 
 pub use channels::{CHANNELS, ChannelKind, all_channels};
-pub use requested::REQUESTED;
 pub use film::{Film, Frame};
 pub use journal::{Found, Journal};
 pub use plan::{Plan, Step};
+pub use requested::REQUESTED;
 pub use rings::{RingStrata, Stratum};
 pub use tally::Summary;
 
@@ -62,7 +63,9 @@ pub enum RenderError {
         there: String,
     },
     /// A channel that pictures with refined pixels do not have.
-    #[error("`screen.channels`: {channel} is not there with `screen.image_error`: give samples_per_pixel in its place")]
+    #[error(
+        "`screen.channels`: {channel} is not there with `screen.image_error`: give samples_per_pixel in its place"
+    )]
     Refined {
         /// The channel.
         channel: &'static str,

@@ -172,7 +172,8 @@ pub(super) fn uniform(
             }
         }
         for (all, layers) in all.iter_mut().zip(layers.chunks_exact(rays)) {
-            all.layers.extend(layers.chunks_exact(side * side).map(|rays| layers::mean(rays, side)));
+            all.layers
+                .extend(layers.chunks_exact(side * side).map(|rays| layers::mean(rays, side)));
         }
         (work.seen, work.layers) = (seen, layers);
     }

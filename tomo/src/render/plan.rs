@@ -36,6 +36,7 @@ impl Plan {
     pub fn of(prepared: &PreparedScene) -> Self {
         let mut plan = Plan { steps: Vec::new() };
         plan.rays(prepared);
+        plan.layers(prepared);
         plan.surfaces(prepared);
         plan.gas(prepared);
         plan.volumes(prepared);
@@ -63,6 +64,21 @@ impl Plan {
                        momentum, azimuth";
         let none = "no polarisation: no Stokes parameters but I";
         self.either(Part::Rays, prepared.polarization()[0], [carried, none]);
+    }
+
+    /// What channels on request need.
+    fn layers(&mut self, prepared: &PreparedScene) {
+        let wanted = prepared.wanted();
+        for (done, what) in [
+            (wanted.orders, "images of each order apart"),
+            (wanted.depth, "path length of central rays, traced once more"),
+            (wanted.motion, "motion at central rays, by dual numbers"),
+            (wanted.footprint, "footprints on the sky, by dual numbers"),
+        ] {
+            if done {
+                self.say(Part::Rays, true, what);
+            }
+        }
     }
 
     fn surfaces(&mut self, prepared: &PreparedScene) {
@@ -152,6 +168,7 @@ impl Plan {
         let what = match sky {
             SkyModel::Checker(_) => "checkered sky",
             SkyModel::Stars(_) => "stars",
+            SkyModel::Catalogue(_) => "stars of a catalogue",
             SkyModel::Picture(..) => "a picture as sky",
         };
         self.say(Part::Sky, true, what);

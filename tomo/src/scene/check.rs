@@ -1,9 +1,9 @@
 //! Ranges of a scene's values.
 
-use super::Scene;
 use super::check_sources::{check_disc, check_gas, check_mesh, check_sky, check_spot};
 use super::check_volume::{check_falls, check_volume};
 use super::invalid::{Invalid, number, positive, shown};
+use super::{Scene, Sky};
 use crate::Error;
 use crate::polarization::PowerLaw;
 use kerrlight_geodesic::Kerr;
@@ -218,6 +218,10 @@ fn check_combinations(scene: &Scene) -> Result<(), Invalid> {
     }
     if scene.camera.is_some() && !effects.lensing {
         let allowed = "true with a [camera]: straight rays are those of a distant observer";
+        return Err(Invalid::new("effects.lensing", false, allowed));
+    }
+    if matches!(scene.sky, Some(Sky::Catalogue(_))) && !effects.lensing {
+        let allowed = "true with a [sky.catalogue], whose stars are seen by bundles of rays";
         return Err(Invalid::new("effects.lensing", false, allowed));
     }
     let plunges = scene.disc.as_ref().is_some_and(|disc| disc.plunging.is_some());

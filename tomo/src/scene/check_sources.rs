@@ -143,6 +143,11 @@ pub(super) fn check_sky(sky: &Sky) -> Result<(), Invalid> {
             number("sky.stars.radius_deg", stars.radius_deg, ok, "an angle in (0, 2]")?;
             brightness("sky.stars.brightness", stars.brightness)
         }
+        Sky::Catalogue(stars) => {
+            let (key, fwhm) = ("sky.catalogue.psf_fwhm_pixels", stars.psf_fwhm_pixels);
+            number(key, fwhm, (1.6..=64.0).contains(&fwhm), "a width in [1.6, 64] (pixels)")?;
+            brightness("sky.catalogue.brightness", stars.brightness)
+        }
         Sky::Image(image) => brightness("sky.image.brightness", image.brightness),
     }
 }

@@ -21,7 +21,7 @@ pub use overrides::apply_override;
 pub use rotation::Rotation;
 pub use sources::{
     Checker, Disc, Gas, GasMotion, GasProfile, Mesh, MeshVelocity, Plunging, Sky, SkyImage, Spot,
-    Stars, VolumeRegion, VolumeSource,
+    StarCatalogue, Stars, VolumeRegion, VolumeSource,
 };
 
 use crate::Error;

@@ -227,7 +227,7 @@ impl VolumeRegion {
     }
 }
 
-/// What the rays that escape see: `[sky.checker]`, `[sky.stars]` or `[sky.image]`.
+/// What the rays that escape see: `[sky.checker]`, `[sky.stars]`, `[sky.catalogue]` or `[sky.image]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase", deny_unknown_fields)]
 #[non_exhaustive]
@@ -236,6 +236,8 @@ pub enum Sky {
     Checker(Checker),
     /// Random stars, the same for the same seed.
     Stars(Stars),
+    /// Stars of a catalogue.
+    Catalogue(StarCatalogue),
     /// An equirectangular picture as seen from inside with +z up: azimuth 0 at the centre
     /// and growing to the left, +z along the upper edge.
     Image(SkyImage),
@@ -263,6 +265,23 @@ pub struct Stars {
     pub brightness: f64,
     /// Seed of the pattern.
     pub seed: u64,
+}
+
+/// Stars of a catalogue, as points whose light is spread over pixels.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StarCatalogue {
+    /// CSV file, relative to the scene file.
+    pub path: String,
+    /// Light of a star of magnitude 0, in scene units × square degrees.
+    pub brightness: f64,
+    /// Full width at half maximum of the Gaussian point-spread function, in pixels.
+    #[serde(default = "two")]
+    pub psf_fwhm_pixels: f64,
+}
+
+fn two() -> f64 {
+    2.0
 }
 
 /// A picture as sky.

@@ -86,9 +86,8 @@ impl PreparedScene {
         let velocity = self.velocity(origin, &point);
         let along = rates(hole, &point, ray.lambda.value);
         let slow = if self.optics.slow_light { 1.0 } else { 0.0 };
-        let column = |by: [f64; 3], delay: f64| {
-            core::array::from_fn(|k| by[k] + slow * velocity[k] * delay)
-        };
+        let column =
+            |by: [f64; 3], delay: f64| core::array::from_fn(|k| by[k] + slow * velocity[k] * delay);
         let on_view = |k: usize| column(position.map(|x| x.slope[k]), point.delay.slope[k]);
         let columns = [on_view(0), on_view(1), column(along.0, along.1)];
         Ok(solve(columns, velocity))

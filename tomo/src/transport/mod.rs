@@ -20,9 +20,11 @@ mod straight;
 mod tests;
 mod tree;
 
+pub(crate) use central::FAR;
 pub use kerrlight_geodesic::View;
 pub(crate) use layers::{Layers, Mixed, names};
 pub use meter::Meter;
+pub(crate) use prepare::view;
 pub use prepare::{Assets, PreparedScene};
 pub(crate) use ray::Block;
 pub use ray::Scratch;

@@ -11,7 +11,7 @@ use super::sources::spots::Spots;
 use crate::Error;
 use crate::emission::medium::Medium;
 use crate::emission::mesh::MeshFile;
-use crate::emission::sky::{Panorama, SkyModel};
+use crate::emission::sky::{Catalogue, Panorama, SkyModel};
 use crate::scene::Scene;
 use crate::volume::VolumeFile;
 use kerrlight_geodesic::{
@@ -65,6 +65,8 @@ pub struct PreparedScene {
 pub struct Assets {
     /// The picture of a `[sky.image]`.
     pub sky: Option<Panorama>,
+    /// The stars of a `[sky.catalogue]`.
+    pub stars: Option<Catalogue>,
     /// A file for each `[[mesh]]`, in their order.
     pub meshes: Vec<MeshFile>,
     /// A file for each `[[volume]]`, in their order.
@@ -89,7 +91,7 @@ const SMOOTH: f64 = 0.5;
 ///
 /// # Errors
 /// If a value is outside its range.
-pub(super) fn view(scene: &Scene, hole: &Kerr) -> Result<View, Error> {
+pub(crate) fn view(scene: &Scene, hole: &Kerr) -> Result<View, Error> {
     if let Some(camera) = &scene.camera {
         return Ok(View::Camera(camera.camera(hole, scene.observer.time)?));
     }
@@ -143,7 +145,7 @@ impl PreparedScene {
             media: Media::new(scene, &assets.volumes, &hole)?,
             meshes: Meshes::new(scene, &assets.meshes, &hole)?,
             spots: Spots::new(scene, &hole),
-            sky: Sky::new(scene, assets.sky),
+            sky: Sky::new(scene, assets.sky, assets.stars),
             optics,
         };
         prepared.request = prepared.needs(scene.effects.half_orbits);

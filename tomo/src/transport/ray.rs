@@ -19,7 +19,8 @@ use crate::emission::medium::Part;
 use kerrlight_geodesic::analytic::ClosedForm;
 use kerrlight_geodesic::simd::RayNodes;
 use kerrlight_geodesic::{
-    Error, Outcome, PathOfRay, PathUse, PlaneCrossing, Ray, RayBlock, RayVisitor, TracedRay, Work, footprint,
+    Error, Outcome, PathOfRay, PathUse, PlaneCrossing, Ray, RayBlock, RayVisitor, TracedRay, Work,
+    footprint,
 };
 use std::sync::Arc;
 

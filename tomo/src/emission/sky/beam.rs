@@ -37,6 +37,11 @@ impl Beam {
         Beam { direction: sky.direction, axes: [mix(cos, sin), mix(-sin, cos)], spread }
     }
 
+    /// The spacing of rays whose beams have a full width at half maximum on the screen.
+    pub fn spacing(fwhm: f64) -> f64 {
+        fwhm / (8.0 * core::f64::consts::LN_2).sqrt() / KERNEL
+    }
+
     /// A round beam of standard deviation `spread` (radians) around a unit vector.
     pub fn of_circle(direction: [f64; 3], spread: f64) -> Self {
         let zero = [0.0; 3];

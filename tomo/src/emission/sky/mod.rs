@@ -4,10 +4,13 @@
 //! unless the scene turns it.
 
 mod beam;
+mod catalogue;
+mod cells;
 mod panorama;
 mod stars;
 
 pub use beam::Beam;
+pub use catalogue::{Catalogue, CatalogueError, CatalogueSky, CatalogueStar};
 pub use panorama::{Panorama, PanoramaError};
 pub(crate) use panorama::{dimensions, srgb_to_linear};
 pub use stars::StarField;
@@ -22,16 +25,21 @@ pub enum SkyModel {
     Checker(Checker),
     /// Stars in cells of equal area.
     Stars(StarField),
+    /// Stars of a catalogue.
+    Catalogue(CatalogueSky),
     /// A picture and its brightness.
     Picture(Panorama, f32),
 }
 
 impl SkyModel {
-    /// The sky of a scene; `picture` is the decoded file of a `[sky.image]`.
-    pub fn new(sky: &Sky, picture: Option<Panorama>) -> Option<Self> {
+    /// The sky of a scene; `picture` is the decoded file of a `[sky.image]`, `stars` that of a `[sky.catalogue]`.
+    pub fn new(sky: &Sky, picture: Option<Panorama>, stars: Option<Catalogue>) -> Option<Self> {
         match sky {
             Sky::Checker(checker) => Some(SkyModel::Checker(checker.clone())),
             Sky::Stars(stars) => Some(SkyModel::Stars(StarField::new(stars))),
+            Sky::Catalogue(settings) => {
+                stars.map(|stars| SkyModel::Catalogue(CatalogueSky::new(settings, stars)))
+            }
             Sky::Image(image) => {
                 picture.map(|picture| SkyModel::Picture(picture, image.brightness as f32))
             }
@@ -53,17 +61,19 @@ impl SkyModel {
         match self {
             SkyModel::Checker(checker) => beam.mean(|n| checker_color(checker, n)),
             SkyModel::Stars(stars) => stars.mean_color(beam),
+            SkyModel::Catalogue(stars) => stars.mean_color(beam),
             SkyModel::Picture(picture, brightness) => {
                 picture.mean_color(beam).map(|c| c * brightness)
             }
         }
     }
 
-    /// Linear colour in a direction.
+    /// Linear colour in a direction; points have none.
     pub fn color(&self, direction: [f64; 3]) -> [f32; 3] {
         match self {
             SkyModel::Checker(checker) => checker_color(checker, direction),
             SkyModel::Stars(stars) => stars.color(direction),
+            SkyModel::Catalogue(_) => [0.0; 3],
             SkyModel::Picture(picture, brightness) => {
                 picture.color(direction).map(|c| c * brightness)
             }

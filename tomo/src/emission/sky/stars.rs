@@ -1,6 +1,7 @@
 //! Random stars.
 
 use super::beam::Beam;
+use super::cells::Cells;
 use crate::scene::Stars;
 use kerrlight_geodesic::vector::dot;
 
@@ -9,8 +10,7 @@ use kerrlight_geodesic::vector::dot;
 /// hash of its number.
 #[derive(Debug, Clone)]
 pub struct StarField {
-    rings: i64,
-    sectors: i64,
+    cells: Cells,
     probability: f64,
     cos_radius: f64,
     radius: f64,
@@ -21,14 +21,11 @@ pub struct StarField {
 impl StarField {
     pub(super) fn new(stars: &Stars) -> Self {
         // Half the cells hold a star.
-        let cells = 2.0 * f64::from(stars.count);
-        let rings = (cells / core::f64::consts::PI).sqrt().ceil().max(2.0);
-        let sectors = (cells / rings).ceil().max(4.0);
+        let cells = Cells::about(2.0 * f64::from(stars.count));
         let radius = stars.radius_deg.to_radians();
         StarField {
-            rings: rings as i64,
-            sectors: sectors as i64,
-            probability: f64::from(stars.count) / (rings * sectors),
+            cells,
+            probability: f64::from(stars.count) / cells.count() as f64,
             cos_radius: radius.cos(),
             radius,
             brightness: stars.brightness,
@@ -66,38 +63,22 @@ impl StarField {
 
     /// All stars within `across` and `along` the meridian of a direction, and some more.
     fn near(&self, direction: [f64; 3], [across, along]: [f64; 2], mut see: impl FnMut(&Star)) {
-        use core::f64::consts::{PI, TAU};
-        let [x, y, z] = direction;
-        let ring_at =
-            |z: f64| ((0.5 * (z + 1.0) * self.rings as f64) as i64).clamp(0, self.rings - 1);
-        let polar = x.hypot(y).atan2(z);
-        let (least, most) = ((polar - along).max(0.0), (polar + along).min(PI));
-        let (lowest, highest) = (ring_at(most.cos()), ring_at(least.cos()));
-        let azimuth = y.atan2(x).rem_euclid(TAU) / TAU;
-        // So much azimuth is spanned; all of it next to a pole.
-        let sin = least.sin().min(most.sin());
-        let reach = if sin > across.sin() { across.sin() / sin } else { 4.0 };
-        let width = self.sectors as f64;
-        let from = ((azimuth - reach / TAU * 1.6) * width).floor() as i64;
-        let to = ((azimuth + reach / TAU * 1.6) * width).floor() as i64;
-        let to = to.min(from + self.sectors - 1);
-        for ring in lowest..=highest {
-            for sector in from..=to {
-                if let Some(star) = self.star(ring, sector.rem_euclid(self.sectors)) {
-                    see(&star);
-                }
+        self.cells.near(direction, [across, along], |ring, sector| {
+            if let Some(star) = self.star(ring, sector) {
+                see(&star);
             }
-        }
+        });
     }
 
     /// The star of a cell, if it holds one.
     fn star(&self, ring: i64, sector: i64) -> Option<Star> {
-        let mut random = Hash(self.seed ^ (ring * self.sectors + sector) as u64);
+        let mut random = Hash(self.seed ^ (ring * self.cells.sectors + sector) as u64);
         if random.unit() > self.probability {
             return None;
         }
-        let z = 2.0 * (ring as f64 + random.unit()) / self.rings as f64 - 1.0;
-        let angle = core::f64::consts::TAU * (sector as f64 + random.unit()) / self.sectors as f64;
+        let z = 2.0 * (ring as f64 + random.unit()) / self.cells.rings as f64 - 1.0;
+        let angle =
+            core::f64::consts::TAU * (sector as f64 + random.unit()) / self.cells.sectors as f64;
         let sin = (1.0 - z * z).max(0.0).sqrt();
         let direction = [sin * angle.cos(), sin * angle.sin(), z];
         Some(Star { direction, brightness: self.brightness, random })
@@ -107,7 +88,8 @@ impl StarField {
     /// stars.
     pub fn catalogue(&self) -> Vec<([f64; 3], f64)> {
         let flux = core::f64::consts::TAU * (1.0 - self.cos_radius) / 3.0;
-        let cells = (0..self.rings).flat_map(|ring| (0..self.sectors).map(move |k| (ring, k)));
+        let Cells { rings, sectors } = self.cells;
+        let cells = (0..rings).flat_map(|ring| (0..sectors).map(move |k| (ring, k)));
         let stars = cells.filter_map(|(ring, sector)| self.star(ring, sector));
         let seen = stars.map(|star| {
             let mut color = [0.0; 3];

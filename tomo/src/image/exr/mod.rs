@@ -1,9 +1,9 @@
-//! One flat layer of 32-bit float channels, as every EXR viewer opens it.
+//! Layers of float channels, in one part as every EXR viewer opens it or in one for each layer.
 
 mod layout;
 mod survey;
 
-pub use layout::{BAND_ROWS, Layout};
+pub use layout::{BAND_ROWS, CameraMatrices, Layout, Style};
 pub use survey::{ChannelSurvey, Survey, survey};
 
 use super::{Channel, Picture};
@@ -33,8 +33,20 @@ fn utf8(text: &str) -> Text {
 /// # Errors
 /// If the picture is empty, or on a failure of the encoder.
 pub fn encode(picture: &Picture, attributes: &Attributes) -> Result<Vec<u8>, crate::Error> {
+    encode_in_style(picture, attributes, Style::default())
+}
+
+/// The same in some style.
+///
+/// # Errors
+/// As for [`encode`].
+pub fn encode_in_style(
+    picture: &Picture,
+    attributes: &Attributes,
+    style: Style,
+) -> Result<Vec<u8>, crate::Error> {
     let names: Vec<&str> = picture.channels.iter().map(|c| c.name.as_str()).collect();
-    let layout = Layout::new(picture.width, picture.height, &names)?;
+    let layout = Layout::styled(picture.width, picture.height, &names, style)?;
     let bands = (0..layout.bands()).into_par_iter().map(|band| {
         let Range { start, end } = layout.rows(band);
         let values = start * picture.width..end * picture.width;
@@ -101,7 +113,8 @@ pub fn is_whole(bytes: &[u8]) -> Result<bool, crate::Error> {
     }))
 }
 
-/// The channels and kerrlight's settings of the first layer of an EXR file.
+/// The channels and kerrlight's settings of an EXR file: of all parts that are as large as the first, and of those with the
+/// same name the first.
 ///
 /// # Errors
 /// If the bytes are no EXR file, or a channel is subsampled.
@@ -111,22 +124,26 @@ pub fn decode(bytes: &[u8]) -> Result<(Picture, Attributes), crate::Error> {
         .no_deep_data()
         .largest_resolution_level()
         .all_channels()
-        .first_valid_layer()
+        .all_layers()
         .all_attributes()
         .pedantic()
         .from_buffered(Cursor::new(bytes))?;
-    let layer = image.layer_data;
-    let Vec2(width, height) = layer.size;
-    let mut channels = Vec::new();
-    for channel in layer.channel_data.list {
-        let values: Vec<f32> = channel.sample_data.values_as_f32().collect();
-        if values.len() != width * height {
-            return Err(Error::NotSupported("subsampled channels".into()).into());
+    let first = image.layer_data.first().ok_or(Error::Invalid("no layer".into()))?;
+    let (size, attributes) = (first.size, attributes(&first.attributes)?);
+    let mut picture = Picture { width: size.0, height: size.1, channels: Vec::new() };
+    for layer in image.layer_data.iter().filter(|layer| layer.size == size) {
+        for channel in &layer.channel_data.list {
+            let name = channel.name.to_string();
+            let values: Vec<f32> = channel.sample_data.values_as_f32().collect();
+            if values.len() != size.area() {
+                return Err(Error::NotSupported("subsampled channels".into()).into());
+            }
+            if picture.channel(&name).is_none() {
+                picture.channels.push(Channel { name, values });
+            }
         }
-        channels.push(Channel { name: channel.name.to_string(), values });
     }
-    let attributes = attributes(&layer.attributes)?;
-    Ok((Picture { width, height, channels }, attributes))
+    Ok((picture, attributes))
 }
 
 /// Refuses a picture that there is no memory for: its header may state any size.

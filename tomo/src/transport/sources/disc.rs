@@ -108,7 +108,8 @@ impl Disc {
         if depth > 0.0 {
             intensity *= (-depth).exp();
         }
-        let (color, mino_time) = (self.model.color(r, g * seen.blueshift.unwrap_or(1.0)), crossing.mino_time);
+        let (color, mino_time) =
+            (self.model.color(r, g * seen.blueshift.unwrap_or(1.0)), crossing.mino_time);
         light.add(intensity, g, color, mino_time);
         if let Some(stokes) = stokes {
             light.add_stokes(intensity, share(&stokes));

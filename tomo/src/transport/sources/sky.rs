@@ -1,7 +1,7 @@
 //! The sky behind everything.
 
-use crate::emission::sky::{Beam, Panorama, SkyModel};
-use crate::scene::Scene;
+use crate::emission::sky::{Beam, Catalogue, Panorama, SkyModel};
+use crate::scene::{self, Scene};
 use kerrlight_geodesic::TracedRay;
 use kerrlight_geodesic::footprint;
 
@@ -14,10 +14,10 @@ pub(in crate::transport) struct Sky {
 }
 
 impl Sky {
-    /// The sky of a scene, if it has one, with the picture that it names.
-    pub fn new(scene: &Scene, picture: Option<Panorama>) -> Option<Self> {
-        let model = scene.sky.as_ref().and_then(|sky| SkyModel::new(sky, picture))?;
-        let averaged = scene.effects.ray_bundles;
+    /// The sky of a scene, if it has one, with the picture or the stars that it names.
+    pub fn new(scene: &Scene, picture: Option<Panorama>, stars: Option<Catalogue>) -> Option<Self> {
+        let model = scene.sky.as_ref().and_then(|sky| SkyModel::new(sky, picture, stars))?;
+        let averaged = scene.effects.ray_bundles || matches!(model, SkyModel::Catalogue(_));
         let model = if averaged { model.for_beams() } else { model };
         Some(Sky { model, beams: averaged.then(|| ray_spacing(scene)) })
     }
@@ -52,7 +52,10 @@ impl Sky {
     }
 }
 
-/// Distance of neighbouring rays on the screen.
+/// Distance of neighbouring rays on the screen; with a point-spread function, of rays whose beams are as wide as it.
 fn ray_spacing(scene: &Scene) -> f64 {
+    if let Some(scene::Sky::Catalogue(stars)) = &scene.sky {
+        return Beam::spacing(stars.psf_fwhm_pixels * scene.pixel_size());
+    }
     scene.pixel_size() / f64::from(scene.screen.samples_per_pixel.isqrt())
 }

@@ -185,7 +185,8 @@ impl Media {
     /// is none.
     pub fn velocity(&self, m: usize, r: f64, cos: f64, azimuth: f64) -> [f64; 3] {
         let medium = self.all.get(m);
-        let Some([t, fall, polar, turn]) = medium.and_then(|all| all.four_velocity(r, cos, azimuth))
+        let Some([t, fall, polar, turn]) =
+            medium.and_then(|all| all.four_velocity(r, cos, azimuth))
         else {
             return [0.0; 3];
         };

@@ -131,7 +131,8 @@ impl Spots {
         let SpotScratch { intervals, met, pieces, .. } = scratch;
         for same in met.chunk_by(|a, b| a.spot == b.spot) {
             join(same, pieces);
-            SpotLight::new(self.of(same[0].spot as usize), time, pieces, seen).add(intervals, light);
+            SpotLight::new(self.of(same[0].spot as usize), time, pieces, seen)
+                .add(intervals, light);
         }
     }
 
@@ -145,7 +146,8 @@ impl Spots {
     ) {
         for number in 0..self.models.len() {
             let everywhere = [[0.0, f64::INFINITY]];
-            SpotLight::new(self.of(number), time, &everywhere, seen).add(&mut scratch.intervals, light);
+            SpotLight::new(self.of(number), time, &everywhere, seen)
+                .add(&mut scratch.intervals, light);
         }
     }
 }

@@ -1,0 +1,23 @@
+//! How EXR files are written.
+
+use clap::Args;
+use kerrlight_tomo::image::exr::{CameraMatrices, Style};
+
+/// Options of EXR files.
+#[derive(Debug, Default, Args)]
+pub struct ExrOptions {
+    /// Write colours and alpha as 16-bit floats; all other channels keep 32 bits
+    #[arg(long)]
+    half: bool,
+    /// Write a part for each layer
+    #[arg(long)]
+    multi_part: bool,
+}
+
+impl ExrOptions {
+    /// The style of a picture that is taken from some place.
+    pub fn style(&self, camera: CameraMatrices) -> Style {
+        let (half, multi_part) = (self.half, self.multi_part);
+        Style { half, multi_part, camera: Some(camera), frames_per_second: None }
+    }
+}

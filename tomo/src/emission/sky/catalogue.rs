@@ -1,0 +1,232 @@
+//! Stars of a catalogue: points whose light a point-spread function spreads over pixels.
+
+use super::beam::Beam;
+use super::cells::Cells;
+use crate::Error;
+use crate::emission::black_body::BlackBody;
+use crate::scene::StarCatalogue;
+
+/// A star.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CatalogueStar {
+    /// Unit vector towards it.
+    pub direction: [f64; 3],
+    /// Linear colour times its light, in that of a white star of magnitude 0.
+    pub light: [f32; 3],
+}
+
+/// A decoded catalogue.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Catalogue {
+    stars: Vec<CatalogueStar>,
+}
+
+/// Why a text is no catalogue.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CatalogueError {
+    /// The text is not UTF-8.
+    #[error("a catalogue of stars is a text in UTF-8")]
+    Text,
+    /// The first line lacks a column.
+    #[error(
+        "the first line names no column {0}: columns are lon, lat (or ra, dec) in degrees, magnitude (or mag, vmag) and, \
+         if there is one, color_index (or bv)"
+    )]
+    Column(&'static str),
+    /// A value is no number or out of range.
+    #[error("line {line}: {column} = {value:?} is not allowed: {allowed}")]
+    Value {
+        /// Line of the file, from 1.
+        line: usize,
+        /// The column.
+        column: &'static str,
+        /// What stands there.
+        value: String,
+        /// What may.
+        allowed: &'static str,
+    },
+}
+
+/// Names of the columns, and where they are.
+const COLUMNS: [&[&str]; 4] = [
+    &["lon", "longitude", "ra", "ra_deg"],
+    &["lat", "latitude", "dec", "dec_deg"],
+    &["magnitude", "mag", "vmag"],
+    &["color_index", "bv", "b-v", "ci"],
+];
+
+/// A line of a catalogue with the places of its columns.
+struct Line<'a> {
+    number: usize,
+    fields: Vec<&'a str>,
+    places: [Option<usize>; 4],
+}
+
+impl Line<'_> {
+    /// A number; nothing where the column is not there or empty.
+    fn number(
+        &self,
+        column: usize,
+        [least, most]: [f64; 2],
+        allowed: &'static str,
+    ) -> Result<Option<f64>, CatalogueError> {
+        let place = self.places[column].and_then(|place| self.fields.get(place));
+        let Some(text) = place.filter(|text| !text.is_empty()) else { return Ok(None) };
+        match text.parse::<f64>() {
+            Ok(value) if (least..=most).contains(&value) => Ok(Some(value)),
+            _ => Err(self.wrong(column, text, allowed)),
+        }
+    }
+
+    /// A number that must be there.
+    fn needed(
+        &self,
+        column: usize,
+        range: [f64; 2],
+        allowed: &'static str,
+    ) -> Result<f64, CatalogueError> {
+        self.number(column, range, allowed)?.ok_or_else(|| self.wrong(column, "", allowed))
+    }
+
+    fn wrong(&self, column: usize, value: &str, allowed: &'static str) -> CatalogueError {
+        let (line, column, value) = (self.number, COLUMNS[column][0], value.to_owned());
+        CatalogueError::Value { line, column, value, allowed }
+    }
+
+    fn star(&self) -> Result<CatalogueStar, CatalogueError> {
+        let lon = self.needed(0, [-360.0, 360.0], "an angle in [-360, 360]")?.to_radians();
+        let lat = self.needed(1, [-90.0, 90.0], "an angle in [-90, 90]")?.to_radians();
+        let magnitude = self.needed(2, [-30.0, 40.0], "a magnitude in [-30, 40]")?;
+        let index = self.number(3, [-0.6, 6.0], "a colour index B - V in [-0.6, 6]")?;
+        let direction = [lat.cos() * lon.cos(), lat.cos() * lon.sin(), lat.sin()];
+        let light = 10f64.powf(-0.4 * magnitude);
+        let tint = index.map_or([1.0; 3], tint);
+        Ok(CatalogueStar { direction, light: tint.map(|c| (light * f64::from(c)) as f32) })
+    }
+}
+
+/// Linear colour of luminance 1 of a star with a colour index B − V, by the temperature of Ballesteros (2012, EPL 97,
+/// 34008, eq. 14).
+fn tint(index: f64) -> [f32; 3] {
+    let temperature = 4600.0 * (1.0 / (0.92 * index + 1.7) + 1.0 / (0.92 * index + 0.62));
+    BlackBody::at(temperature)
+}
+
+impl Catalogue {
+    /// Reads a table with commas between its columns, whose first line names them; lines that are empty or begin with #
+    /// are left out.
+    ///
+    /// # Errors
+    /// If a column is missing or a value is no number in its range.
+    pub fn decode(bytes: &[u8]) -> Result<Self, Error> {
+        let text = core::str::from_utf8(bytes).map_err(|_| CatalogueError::Text)?;
+        let lines = text.lines().enumerate().map(|(k, line)| (k + 1, line.trim()));
+        let mut lines = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+        let (_, names) = lines.next().unwrap_or_default();
+        let names: Vec<String> = names.split(',').map(|x| x.trim().to_ascii_lowercase()).collect();
+        let places = COLUMNS.map(|known| names.iter().position(|name| known.contains(&&**name)));
+        if let Some(missing) = (0..3).find(|k| places[*k].is_none()) {
+            return Err(CatalogueError::Column(COLUMNS[missing][0]).into());
+        }
+        let star = |(number, line): (usize, &str)| {
+            let fields = line.split(',').map(str::trim).collect();
+            Line { number, fields, places }.star()
+        };
+        Ok(Catalogue { stars: lines.map(star).collect::<Result<_, _>>()? })
+    }
+
+    /// The stars, in the order of the file.
+    pub fn stars(&self) -> &[CatalogueStar] {
+        &self.stars
+    }
+}
+
+/// A catalogue as sky.
+#[derive(Debug, Clone)]
+pub struct CatalogueSky {
+    cells: Cells,
+    /// Where the stars of each cell begin; one more than cells.
+    starts: Vec<usize>,
+    stars: Vec<CatalogueStar>,
+    /// Light of magnitude 0, scene units × sr.
+    flux: f64,
+}
+
+impl CatalogueSky {
+    pub(super) fn new(settings: &StarCatalogue, Catalogue { mut stars }: Catalogue) -> Self {
+        let cells = Cells::about((stars.len() as f64).clamp(32.0, 1e6));
+        stars.sort_by_key(|star| cells.holding(star.direction));
+        let before = |k| stars.partition_point(|star| cells.holding(star.direction) < k);
+        let starts = (0..=cells.count()).map(before).collect();
+        let flux = settings.brightness * 1f64.to_radians().powi(2);
+        CatalogueSky { cells, starts, stars, flux }
+    }
+
+    /// Mean brightness over a beam, which is the point-spread function seen on the sky.
+    pub(super) fn mean_color(&self, beam: &Beam) -> [f32; 3] {
+        let (peak, mut color) = (self.flux * beam.peak_density(), [0.0; 3]);
+        self.cells.near(beam.direction(), beam.reach(), |ring, sector| {
+            let cell = (ring * self.cells.sectors + sector) as usize;
+            for star in &self.stars[self.starts[cell]..self.starts[cell + 1]] {
+                let part = (peak * beam.weight(star.direction)) as f32;
+                color.iter_mut().zip(star.light).for_each(|(sum, light)| *sum += part * light);
+            }
+        });
+        color
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exact_stars_of_a_table() {
+        let text = "# bright stars\nname, RA, dec, Vmag, BV\nA, 90, 0, 0, \nB,0,90,5,0.65\n\nC,180,-30,-2.5,1.5\n";
+        let stars = Catalogue::decode(text.as_bytes()).unwrap().stars;
+        assert_eq!(stars.len(), 3);
+        let near = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12);
+        assert!(near(stars[0].direction, [0.0, 1.0, 0.0]) && stars[0].light == [1.0; 3]);
+        assert!(near(stars[1].direction, [0.0, 0.0, 1.0]));
+        let luminance = |c: [f32; 3]| 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
+        assert!((luminance(stars[1].light) - 0.01).abs() < 2e-4, "{:?}", stars[1]);
+        assert!((luminance(stars[2].light) - 10.0).abs() < 0.2);
+        // The Sun is white with a little red, a giant redder.
+        let [sun, giant] = [stars[1].light, stars[2].light].map(|c| c[0] / c[2]);
+        assert!((1.0..1.6).contains(&sun) && giant > 1.8, "{sun} {giant}");
+    }
+
+    #[test]
+    fn exact_refusals_name_line_and_column() {
+        let fail = |text: &str| Catalogue::decode(text.as_bytes()).unwrap_err().to_string();
+        assert!(fail("lon,lat\n1,2\n").contains("no column magnitude"));
+        let said = fail("lon,lat,mag\n1,2,3\n4,95,6\n");
+        assert!(said.starts_with("line 3: lat = \"95\" is not allowed"), "{said}");
+        assert!(fail("lon,lat,mag\n1,2,bright\n").contains("magnitude = \"bright\""));
+        assert!(Catalogue::decode(&[0xff, 0xfe]).is_err());
+    }
+
+    /// Every star is found, wherever beams lie: side by side they have all of its light.
+    #[test]
+    fn exact_light_of_all_stars() {
+        let star = |k: u32| format!("{},{},{}\n", 37 * k % 360, f64::from(k % 179) - 89.0, k % 5);
+        let text: String = (0..200).map(star).collect();
+        let catalogue = Catalogue::decode(format!("lon,lat,mag\n{text}").as_bytes()).unwrap();
+        let expected: f64 = catalogue.stars.iter().map(|star| f64::from(star.light[1])).sum();
+        let settings = StarCatalogue { path: String::new(), brightness: 1.0, psf_fwhm_pixels: 2.0 };
+        let sky = CatalogueSky::new(&settings, catalogue);
+        // A net of directions of equal solid angles (Fibonacci), and beams a few steps wide.
+        let (count, mut sum) = (100_000, 0.0);
+        let area = 4.0 * core::f64::consts::PI / f64::from(count);
+        for k in 0..count {
+            let z = 1.0 - (2.0 * f64::from(k) + 1.0) / f64::from(count);
+            let azimuth = f64::from(k) * 2.399_963_229_728_653;
+            let s = (1.0 - z * z).sqrt();
+            let beam = Beam::of_circle([s * azimuth.cos(), s * azimuth.sin(), z], 0.015);
+            sum += area * f64::from(sky.mean_color(&beam)[1]);
+        }
+        sum /= 1f64.to_radians().powi(2);
+        assert!((sum / expected - 1.0).abs() < 2e-3, "{sum} {expected}");
+    }
+}
