@@ -33,7 +33,7 @@ impl PathLength {
     /// let (hole, observer) = (Kerr::new(0.0)?, Observer::at_infinity(Inclination::from_degrees(30.0)?));
     /// let (ray, mut path) = (observer.ray(&hole, 300.0, 0.0)?, Path::new());
     /// Tracer::new(1e-12)?.trace(&hole, &ray, Quantities::default(), &mut path);
-    /// // Far from the hole rays are straight: at the closest approach the plane is reached.
+    /// // Far from the hole rays are straight but for about 1 M: at the closest approach the plane is reached.
     /// let (time, _) = path.turning_point().unwrap();
     /// let length = PathLength::default().until(&hole, &ray, &path, time);
     /// assert!(length.abs() < 1.1);
@@ -46,7 +46,7 @@ impl PathLength {
         };
         let (start, far) = match ray.inverse_radius > 0.0 {
             true => (0.0, 0.0),
-            false => self.from_infinity(hole, ray, path, mino_time),
+            false => self.far_part(hole, ray, path, mino_time),
         };
         if start >= mino_time {
             return far;
@@ -55,7 +55,7 @@ impl PathLength {
     }
 
     /// A Mino time on the way in, `mino_time` at most, and the length up to there: −1/w + ∫(1/√W − 1)/w² dw + ∫a²cos²θ dτ.
-    fn from_infinity(&self, hole: &Kerr, ray: &Ray, path: &Path, mino_time: f64) -> (f64, f64) {
+    fn far_part(&self, hole: &Kerr, ray: &Ray, path: &Path, mino_time: f64) -> (f64, f64) {
         let turning = path.turning_point().map_or(f64::INFINITY, |(time, _)| time);
         let mut time = mino_time.min(turning);
         while ray.potential.value(path.at(time).inverse_radius) < FAR {

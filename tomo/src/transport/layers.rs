@@ -193,14 +193,11 @@ impl Numbering {
 
     /// What a source is.
     pub fn kind(&self, source: u32) -> Kind {
-        let kinds: [(u32, fn(usize) -> Kind); 4] = [
-            (self.meshes, Kind::Mesh),
-            (self.spots, Kind::Spot),
-            (self.media, Kind::Medium),
-            (self.disc, |_| Kind::Disc),
-        ];
-        let found = kinds.into_iter().find(|(first, _)| (*first..self.end).contains(&source));
-        found.map_or(Kind::Other, |(first, kind)| kind((source - first) as usize))
+        let from =
+            |first: u32| (first..self.end).contains(&source).then(|| (source - first) as usize);
+        let solid = from(self.meshes).map(Kind::Mesh).or_else(|| from(self.spots).map(Kind::Spot));
+        let found = solid.or_else(|| from(self.media).map(Kind::Medium));
+        found.or_else(|| from(self.disc).map(|_| Kind::Disc)).unwrap_or(Kind::Other)
     }
 }
 

@@ -54,9 +54,9 @@ impl Resolver {
         rays.len()
     }
 
-    /// Replaces the light in `seen`, of rays at the centres of `squares` (square k at time j is `[j · squares
-    /// + k]`), and what is kept of them besides in `layers`, by means over the squares where photon rings run through
-    /// them.
+    /// Replaces the light in `seen`, of rays at the centres of `squares` at each time (square k at time j has the number
+    /// j times the count of squares, and k more), by means over the squares where photon rings run through them; and what is
+    /// kept of these rays besides, in `layers`.
     pub fn resolve(
         &self,
         prepared: &PreparedScene,
