@@ -11,16 +11,18 @@ use kerrlight_tomo::render::{RingStrata, Stratum};
 use kerrlight_tomo::representation::Workspace;
 use kerrlight_tomo::transport::View;
 
-/// Pixels along each side.
-pub const SIDE: usize = 256;
+/// Pixels along each side: six times those of the fit, no more than this.
+const MOST: usize = 256;
 /// Rows that are traced at a time: what they need goes like their number.
 const ROWS: usize = 32;
 /// Of rays along photon rings, in the logarithm of their distance from the critical curve: less than a cell of
 /// a volume by its radius.
 const SPACING: f64 = 0.1;
 
-/// Images of SIDE × SIDE pixels, rows from the top: Σ emission · path, in M.
+/// Square images, rows from the top: Σ emission · path, in M.
 pub struct Still {
+    /// Pixels along each side.
+    pub side: usize,
     /// When it is seen, M.
     pub time: f64,
     /// Of the recovered field.
@@ -35,8 +37,9 @@ impl Estimate<'_> {
     pub fn still(&self, trainer: &Trainer<'_, f32>, state: &State<f32>) -> anyhow::Result<Still> {
         let time = self.time_of_still();
         let motion = Motion { times: vec![time], ..self.motion.clone() };
-        let mut still = Still { time, recovered: Vec::new(), truth: None };
-        for row in (0..SIDE).step_by(ROWS) {
+        let side = self.side_of_still();
+        let mut still = Still { side, time, recovered: Vec::new(), truth: None };
+        for row in (0..side).step_by(ROWS) {
             let rays = self.rays(row)?;
             let mut model = self.forward_model(&rays, &motion)?;
             still.recovered.extend(rays.pixels(&recovered(&mut model, trainer, state)));
@@ -49,6 +52,10 @@ impl Estimate<'_> {
         Ok(still)
     }
 
+    fn side_of_still(&self) -> usize {
+        (6 * self.file.screen.pixels).min(MOST)
+    }
+
     /// When it is seen, M.
     pub(super) fn time_of_still(&self) -> f64 {
         let (times, reference) = (&self.measured.times, self.motion.reference);
@@ -59,15 +66,15 @@ impl Estimate<'_> {
 
     /// The rays of some rows of pixels: one through the centre of each, or several along photon rings.
     fn rays(&self, first: usize) -> anyhow::Result<Rays> {
-        let screen = &self.file.screen;
-        let step = setup::spacing(screen)? * screen.pixels as f64 / SIDE as f64;
-        let at = |k: usize| (k as f64 - 0.5 * (SIDE as f64 - 1.0)) * step;
+        let (screen, side) = (&self.file.screen, self.side_of_still());
+        let step = setup::spacing(screen)? * screen.pixels as f64 / side as f64;
+        let at = |k: usize| (k as f64 - 0.5 * (side as f64 - 1.0)) * step;
         let view = View::Screen(setup::observer(&self.file.observer)?);
         let strata = RingStrata::new(&self.instrument.hole, &view, SPACING);
         let mut rays = Rays::default();
         let mut ring = Vec::new();
-        for k in first * SIDE..(first + ROWS) * SIDE {
-            let (x, y) = (at(k % SIDE), -at(k / SIDE));
+        for k in first * side..(first + ROWS).min(side) * side {
+            let (x, y) = (at(k % side), -at(k / side));
             ring.clear();
             strata.place((x, y), step, &mut ring);
             if ring.is_empty() {

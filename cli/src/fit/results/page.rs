@@ -1,7 +1,7 @@
 //! The report.
 
 use super::gains::Gains;
-use super::lensed::{self, Still};
+use super::lensed::Still;
 use super::numbers::outcomes;
 use super::over_time::Changes;
 use super::{Estimate, Found};
@@ -111,7 +111,7 @@ impl Estimate<'_> {
             (false, true) => "Doppler shifts included, delays left out as in the fit",
             (false, false) => "delays and Doppler shifts left out as in the fit",
         };
-        report::still(&images, lensed::SIDE, still.time, with)
+        report::still(&images, still.side, still.time, with)
     }
 
     /// The map of a scan of axes, if there was one.
