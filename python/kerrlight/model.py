@@ -11,7 +11,7 @@ import json
 import math
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any, Literal, Sequence, Union
+from typing import Any, ClassVar, Literal, Sequence, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -22,40 +22,87 @@ from kerrlight.rays import Observer
 
 __all__ = [
     "ForwardModel",
+    "Infall",
     "Keplerian",
     "PolarizationLaw",
     "PowerLaw",
+    "Profile",
     "Tabulated",
     "VoxelModel",
     "screen",
 ]
 
 
+class _Law:
+    """A law of motion, with its name and keys in files."""
+
+    _name: ClassVar[str]
+
+    def table(self) -> dict[str, Any]:
+        """The law as scene and fit files have it."""
+        keys = {part.name: getattr(self, part.name) for part in fields(self)}  # type: ignore[arg-type]
+        plain = {key: _numbers(value) for key, value in keys.items() if value is not None}
+        return {self._name: plain}
+
+
+def _numbers(value: Any) -> Any:
+    return float(value) if np.ndim(value) == 0 else [float(x) for x in value]
+
+
 @dataclass(frozen=True)
-class Keplerian:
+class Keplerian(_Law):
     """Angular velocity 1/(r^{3/2} + drag); without ``drag`` the part of the spin along the axis."""
 
+    _name = "keplerian"
     drag: float | None = None
 
 
 @dataclass(frozen=True)
-class PowerLaw:
+class PowerLaw(_Law):
     """Angular velocity rate · (radius/r)^exponent, in radians per M; ``radius`` in M."""
 
+    _name = "power-law"
     radius: float
     rate: float
     exponent: float = 1.5
 
 
 @dataclass(frozen=True)
-class Tabulated:
+class Tabulated(_Law):
     """Angular velocity linear between ``radii`` (M), held beyond the first and the last; ``rates`` in radians per M."""
 
+    _name = "table"
     radii: Sequence[float]
     rates: Sequence[float]
 
 
-Velocity = Union[Keplerian, PowerLaw, Tabulated]
+@dataclass(frozen=True)
+class Infall(_Law):
+    """The family between circular orbits and free fall (Cárdenas-Avendaño, Lupsasca & Zhu 2023): ``xi`` is the specific
+    angular momentum over that of circular orbits, ``beta_r`` and ``beta_phi`` are 1 for the radial and angular velocity
+    of these and 0 for those of free fall; without ``drag`` the flow sees the part of the spin along the axis.
+    """
+
+    _name = "infall"
+    xi: float
+    beta_r: float
+    beta_phi: float
+    drag: float | None = None
+
+
+@dataclass(frozen=True)
+class Profile(_Law):
+    """Monotone cubics through Ω (``angular``, radians per M) and dr/dt (``radial``) at ``radii`` (M), held beyond the
+    first and the last; dr/dt has one sign.
+    """
+
+    _name = "profile"
+    radii: Sequence[float]
+    angular: Sequence[float]
+    radial: Sequence[float]
+
+
+Velocity = Union[Keplerian, PowerLaw, Tabulated, Infall, Profile]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,17 +161,6 @@ def screen(pixels: int, width: float) -> tuple[Floats, Floats]:
     return alpha, beta
 
 
-def _law(velocity: Velocity, observer: Observer, axis: Floats) -> tuple[Any, ...] | float:
-    """A velocity for the compiled half."""
-    if isinstance(velocity, PowerLaw):
-        return (float(velocity.radius), float(velocity.rate), float(velocity.exponent))
-    if isinstance(velocity, Tabulated):
-        return ([float(r) for r in velocity.radii], [float(rate) for rate in velocity.rates])
-    if velocity.drag is not None:
-        return float(velocity.drag)
-    return float(observer.hole.spin * axis[2] / (np.linalg.norm(axis) or 1.0))
-
-
 def precision(name: str, value: Any, shape: tuple[int, ...]) -> NDArray[Any]:
     """``value`` as a contiguous column in single precision if it is in single precision, else in double."""
     array = np.asarray(value)
@@ -167,7 +203,8 @@ class ForwardModel(_Linear):
         finite radius.
     :param times: times of the frames (M).
     :param reference_time: time of the field of emission (M); matter turns from there to each frame.
-    :param velocity: how fast matter turns: :class:`Keplerian`, :class:`PowerLaw` or :class:`Tabulated`.
+    :param velocity: how matter moves: :class:`Keplerian`, :class:`PowerLaw`, :class:`Tabulated`, :class:`Infall` or
+        :class:`Profile`.
     :param axis: what it turns about, right-handed.
     :param injection_time: when it begins to shine (M); always, without one.
     :param slow_light: whether light takes its time.
@@ -235,7 +272,7 @@ class ForwardModel(_Linear):
             "per_ray": per_ray,
             "slow_light": bool(slow_light),
             "redshift_power": redshift_power,
-            "velocity": _law(velocity, observer, direction),
+            "velocity": json.dumps(velocity.table()),
             "axis": direction.tolist(),
             "times": self.times.tolist(),
             "reference": float(reference_time),

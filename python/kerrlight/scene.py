@@ -23,7 +23,7 @@ from dataclasses import dataclass, field, fields, is_dataclass
 from os import PathLike
 from typing import Any, Literal, Mapping, Sequence, Union
 
-from kerrlight.model import Keplerian, PowerLaw, Tabulated
+from kerrlight.model import Infall, Keplerian, PowerLaw, Profile, Tabulated, Velocity
 
 __all__ = [
     "Camera",
@@ -52,7 +52,7 @@ Color = Sequence[float]
 Vector = Sequence[float]
 Path = Union[str, "PathLike[str]"]
 Motion = Literal["static", "zamo", "keplerian", "free-fall", "path"]
-Rotation = Union[Literal["none", "keplerian"], Keplerian, PowerLaw, Tabulated, Mapping[str, Any]]
+Rotation = Union[Literal["none", "keplerian"], Velocity, Mapping[str, Any]]
 
 
 @dataclass(kw_only=True)
@@ -340,13 +340,8 @@ class Scene:
 
 def plain(value: Any) -> Any:
     """Objects as the tables of a file; what is None or an empty list is left out."""
-    if isinstance(value, Keplerian):
-        return "keplerian" if value.drag is None else {"keplerian": {"drag": value.drag}}
-    if isinstance(value, PowerLaw):
-        law = {"radius": value.radius, "rate": value.rate, "exponent": value.exponent}
-        return {"power-law": law}
-    if isinstance(value, Tabulated):
-        return {"table": {"radii": list(value.radii), "rates": list(value.rates)}}
+    if isinstance(value, (Keplerian, PowerLaw, Tabulated, Infall, Profile)):
+        return value.table()
     if is_dataclass(value) and not isinstance(value, type):
         parts = {part.name: plain(getattr(value, part.name)) for part in fields(value)}
         return {name: part for name, part in parts.items() if part is not None and part != []}

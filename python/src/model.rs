@@ -4,7 +4,7 @@ use crate::call::{detached, refused};
 use crate::rays::Place;
 use kerrlight_geodesic::Kerr;
 use kerrlight_tomo::Error;
-use kerrlight_tomo::dynamics::{AngularVelocity, Axis};
+use kerrlight_tomo::dynamics::{Axis, Velocity};
 use kerrlight_tomo::fit::{
     Batch, ForwardModel, Motion, PolarizedView, Redshift, Region, Sampling, SightlineRequest,
     Sightlines,
@@ -25,26 +25,6 @@ pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Model>()
 }
 
-/// A law of the angular velocity: the numbers of the one that is there.
-#[derive(FromPyObject)]
-enum Velocity {
-    Keplerian(f64),
-    PowerLaw(f64, f64, f64),
-    Table(Vec<f64>, Vec<f64>),
-}
-
-impl Velocity {
-    fn law(self) -> AngularVelocity {
-        match self {
-            Velocity::Keplerian(drag) => AngularVelocity::Keplerian { drag },
-            Velocity::PowerLaw(radius, rate, exponent) => {
-                AngularVelocity::PowerLaw { radius, rate, exponent }
-            }
-            Velocity::Table(radii, rates) => AngularVelocity::Table { radii, rates },
-        }
-    }
-}
-
 /// What a model is made with, beside hole, observer and screen.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
@@ -57,7 +37,8 @@ struct Settings {
     per_ray: Option<usize>,
     slow_light: bool,
     redshift_power: Option<f64>,
-    velocity: Velocity,
+    /// How matter moves, as JSON of what files say.
+    velocity: String,
     axis: [f64; 3],
     /// Times of the frames and of the field of emission, M.
     times: Vec<f64>,
@@ -79,6 +60,22 @@ impl Settings {
             delay: self.slow_light,
             momentum: self.redshift_power.is_some() || self.polarization.is_some(),
         }
+    }
+
+    /// How matter moves about a hole of this spin.
+    fn motion(
+        &self,
+        spin: f64,
+        axis: Axis,
+    ) -> Result<Motion, Box<dyn std::error::Error + Send + Sync>> {
+        let law: Velocity =
+            serde_json::from_str(&self.velocity).map_err(|e| Refused(format!("velocity: {e}")))?;
+        Ok(Motion {
+            velocity: law.angular(0, spin * axis.vector()[2])?,
+            reference: self.reference,
+            injection: None,
+            times: self.times.clone(),
+        })
     }
 
     /// The law of polarised light with the wanted parameters.
@@ -120,6 +117,8 @@ pub struct Model {
     /// Times of the frames, and when it begins to shine.
     times: Vec<f64>,
     injection: Option<f64>,
+    /// Of each frame, whether the matter of a node was outside of the region; empty where none can have been.
+    dark: Vec<Vec<bool>>,
     /// Of each Stokes parameter that is wanted, what it is multiplied by at each node; none for intensity alone.
     factors: Vec<Vec<f64>>,
 }
@@ -139,13 +138,8 @@ impl Model {
         }
         lines.weight.iter_mut().for_each(|weight| *weight *= settings.scale);
         let redshift = settings.redshift_power.map(|power| Redshift { power });
-        let motion = Motion {
-            velocity: settings.velocity.law(),
-            reference: settings.reference,
-            injection: None,
-            times: settings.times.clone(),
-        };
         let axis = Axis::new(settings.axis)?;
+        let motion = settings.motion(hole.spin(), axis)?;
         let factors = stokes.map_or(Ok(Vec::new()), |(law, parameters)| {
             let sin_inclination = place.inclination().sin();
             let screen = [alpha.to_vec(), beta.to_vec()];
@@ -154,13 +148,15 @@ impl Model {
             let of = |p: &StokesParameter| factors.iter().map(|stokes| stokes.get(*p)).collect();
             Ok::<_, Error>(parameters.iter().map(of).collect())
         })?;
+        let falls = motion.velocity.falling().is_some();
         let mut model = ForwardModel::new(&lines, &motion, hole, redshift)?;
         model.weigh(axis);
         let mut batch = Batch::default();
         batch.set((0..lines.rays() as u32).map(|ray| (ray, 0)));
-        batch.gather(&model, axis, None);
-        Ok(Model {
+        batch.gather_whole(&model, axis);
+        let mut model = Model {
             axis,
+            dark: Vec::new(),
             starts: batch.starts,
             weight: batch.columns.weight,
             position: lines.position,
@@ -169,18 +165,31 @@ impl Model {
             injection: settings.injection,
             factors,
             model,
-        })
+        };
+        if falls {
+            model.dark = (0..model.times.len()).into_par_iter().map(|k| model.unlit(k)).collect();
+        }
+        Ok(model)
+    }
+
+    /// Nodes of a frame whose matter was outside of the region at the reference time.
+    fn unlit(&self, frame: usize) -> Vec<bool> {
+        self.carried(frame)[0].iter().map(|x| x.is_nan()).collect()
     }
 
     fn nodes(&self) -> usize {
         self.weight.len()
     }
 
-    /// The weight of a node in a frame: 0 before the emission begins.
+    /// The weight of a node in a frame: 0 before the emission begins, and for matter that was outside of the region.
     fn weight(&self, frame: usize, k: usize) -> f64 {
         let emitted = self.times[frame] - self.delay.get(k).copied().unwrap_or(0.0);
         let is_dark = self.injection.is_some_and(|injection| emitted < injection);
-        if is_dark { 0.0 } else { self.weight[k] }
+        if is_dark || self.dark.get(frame).is_some_and(|dark| dark[k]) {
+            0.0
+        } else {
+            self.weight[k]
+        }
     }
 
     /// Images of a frame, one for each Stokes parameter.
@@ -240,12 +249,21 @@ impl Model {
         cotangents
     }
 
-    /// Where the matter of a frame's nodes was at the reference time: x, y and z.
-    fn pulled<T: Float>(&self, frame: usize) -> [Vec<T>; 3] {
+    /// Where the matter of a frame's nodes was at the reference time: x, y and z, no numbers outside of the region.
+    fn carried(&self, frame: usize) -> [Vec<f64>; 3] {
         let mut batch = Batch::default();
         batch.set((0..self.model.rays()).map(|ray| (ray as u32, frame as u32)));
-        batch.gather(&self.model, self.axis, None);
-        batch.columns.pulled.map(|column| column.into_iter().map(T::of).collect())
+        batch.gather_whole(&self.model, self.axis);
+        batch.columns.pulled
+    }
+
+    /// The same with the places of the nodes themselves where there are no numbers: nothing shines there.
+    fn pulled<T: Float>(&self, frame: usize) -> [Vec<T>; 3] {
+        let mut columns = self.carried(frame);
+        for (column, places) in columns.iter_mut().zip(&self.position) {
+            column.iter_mut().zip(places).filter(|(x, _)| x.is_nan()).for_each(|(x, at)| *x = *at);
+        }
+        columns.map(|column| column.into_iter().map(T::of).collect())
     }
 
     fn places<T: Float>(&self, frames: &[usize]) -> Vec<T> {

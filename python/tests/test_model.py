@@ -5,7 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kerrlight import ForwardModel, Keplerian, Kerr, PolarizationLaw, PowerLaw, Tabulated, screen
+from kerrlight import (
+    ForwardModel,
+    Infall,
+    Keplerian,
+    Kerr,
+    PolarizationLaw,
+    PowerLaw,
+    Profile,
+    Tabulated,
+    screen,
+)
 
 RNG = np.random.default_rng(7)
 
@@ -37,6 +47,8 @@ KINDS = {
     "tilted": {"axis": [1.0, 0.0, 1.0], "velocity": PowerLaw(3.5, 0.2)},
     "table": {"velocity": Tabulated([3.0, 9.0], [0.1, 0.02]), "z_width": 4.0, "order": 5, "split": 2},
     "stokes": {"polarization": LAW, "slow_light": True},
+    "infall": {"velocity": Infall(0.9, 0.3, 0.6), "redshift_power": 3.0},
+    "profile": {"velocity": Profile([3.0, 6.0, 9.0], [0.2, 0.06, 0.04], [-0.1, -0.05, -0.01])},
     "only U": {"polarization": LAW, "stokes": "U"},
     "bhnerf": {"per_ray": 60, "radius": 1000.0},
 }
@@ -84,6 +96,24 @@ def test_matter_turns_with_the_law():
     pulled = of.coordinates()[2]
     np.testing.assert_allclose(pulled[:, 0], np.hypot(x, y) * np.cos(angle), atol=1e-10)
     np.testing.assert_allclose(pulled[:, 1], np.hypot(x, y) * np.sin(angle), atol=1e-10)
+
+
+def test_flows():
+    """Circular orbits are one end of the family of infall; matter that falls was farther out before."""
+    circular = model(velocity=Infall(1.0, 1.0, 1.0), r_min=6.5)
+    falling = model(velocity=Infall(1.0, 0.5, 0.5), r_min=6.5, r_max=15.0)
+    known = model(velocity=Keplerian(), r_min=6.5)
+    np.testing.assert_allclose(circular.coordinates(), known.coordinates(), atol=1e-6)
+    # What came from outside of the region is dark.
+    before, now = (np.linalg.norm(falling.coordinates()[frame], axis=-1) for frame in (1, 0))
+    lit = falling.vjp(np.ones(falling.output_shape))[1] > 0
+    assert 0 < lit.sum() < lit.size and (before[lit] > now[lit]).all() and before[lit].max() <= 15
+    straight = model(velocity=Profile([3.0, 9.0], [0.0, 0.0], [-0.01, -0.01]))
+    radius = np.linalg.norm(straight.positions, axis=-1)
+    lit = straight.vjp(np.ones(straight.output_shape))[1] > 0
+    expected = straight.positions * (1 + 0.15 / radius)[:, None]
+    np.testing.assert_allclose(straight.coordinates()[1][lit], expected[lit], atol=1e-6)
+    np.testing.assert_array_equal(lit, radius + 0.15 <= 9)
 
 
 def test_dark_before_the_injection():
@@ -145,6 +175,8 @@ def test_refusals():
         (lambda: model(order=17), "order = 17"),
         (lambda: model(per_ray=50), "observer radius"),
         (lambda: model(r_min=100.0, r_max=101.0), "no ray meets the region"),
+        (lambda: model(velocity=Infall(2.0, 0.5, 0.5)), "xi"),
+        (lambda: model(velocity=Profile([3.0, 9.0], [0.1], [0.0, 0.0])), "angular"),
         (lambda: model(polarization=LAW, redshift_power=2.0), "redshift_power = 2"),
         (lambda: model(polarization=LAW, stokes="IV"), 'stokes = "V"'),
         (lambda: model(polarization=LAW, stokes="II"), 'stokes = "II"'),

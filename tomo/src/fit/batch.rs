@@ -110,6 +110,15 @@ impl<T: Float> Batch<T> {
         self.collect(model, (axis, model.fall.as_ref()), occupancy);
     }
 
+    /// The same with every node of the pairs; where the matter was outside of the region, its place is no number.
+    pub fn gather_whole(&mut self, model: &ForwardModel<T>, axis: Axis) {
+        self.fill(model);
+        if let Some(fall) = &model.fall {
+            self.columns.carry(fall);
+        }
+        self.columns.pull_back(axis);
+    }
+
     /// The same for a field. One of events is not carried along, and sees where light was emitted.
     pub fn gather_field(&mut self, model: &ForwardModel<T>, field: Field<'_, T>) {
         let carried = field.representation.dimension() != 4;
