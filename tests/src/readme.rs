@@ -66,6 +66,9 @@ fn shorter(line: &str) -> &'static str {
     if line.contains("unknown_world.toml") {
         return " --set training.steps=5 --set world.search.coarse.worlds=40 --set world.search.fine.worlds=20";
     }
+    if line.contains("--data") {
+        return " --set training.steps=5 --set output.nodes=24";
+    }
     if line.contains(" fit") && !is_whole {
         return " --set training.steps=5 --set training.start.linear.steps=20 --set output.nodes=24";
     }
