@@ -27,6 +27,7 @@ from kerrlight.model import Infall, Keplerian, PowerLaw, Profile, Tabulated, Vel
 
 __all__ = [
     "Camera",
+    "Catalogue",
     "Checker",
     "Disc",
     "Effects",
@@ -301,12 +302,23 @@ class SkyImage:
 
 
 @dataclass(kw_only=True)
+class Catalogue:
+    """Stars of a catalogue."""
+
+    path: Path
+    brightness: float
+    psf_fwhm_pixels: float | None = None
+    """Width of the point-spread function."""
+
+
+@dataclass(kw_only=True)
 class Sky:
     """What is behind it all: one of these."""
 
     checker: Checker | None = None
     stars: Stars | None = None
     image: SkyImage | None = None
+    catalogue: Catalogue | None = None
 
 
 @dataclass(kw_only=True)

@@ -29,7 +29,13 @@ CLASSES = {
 
 def keys(of, before=""):
     """Dotted keys of a class, with those of the tables inside."""
-    inner = {"plunging": scene.Plunging, "checker": scene.Checker, "stars": scene.Stars, "image": scene.SkyImage}
+    inner = {
+        "plunging": scene.Plunging,
+        "checker": scene.Checker,
+        "stars": scene.Stars,
+        "image": scene.SkyImage,
+        "catalogue": scene.Catalogue,
+    }
     for part in dataclasses.fields(of):
         if part.name in inner:
             yield from keys(inner[part.name], f"{before}{part.name}.")
