@@ -1,10 +1,7 @@
 //! What a picture can hold: the one list of channels that rendering, `inspect` and the
 //! documents share.
 
-use super::RenderError;
 use super::pixels::Pixel;
-use super::requested::REQUESTED;
-use crate::Error;
 use crate::scene::DEFAULT_CHANNELS;
 use crate::transport::Layers;
 use crate::transport::PreparedScene;
@@ -26,7 +23,7 @@ pub struct ChannelKind {
     /// What it holds.
     pub meaning: &'static str,
     /// Whether a scene has it, with pixels refined or not.
-    present: Present,
+    pub(super) present: Present,
     /// How it is taken from a pixel.
     value: Value,
     /// Whether pictures have it only where `screen.channels` names it or its layer.
@@ -62,7 +59,7 @@ impl ChannelKind {
     }
 
     /// Whether a name in `screen.channels` means it.
-    fn is_meant(&self, name: &str) -> bool {
+    pub(super) fn is_meant(&self, name: &str) -> bool {
         let default = name == DEFAULT_CHANNELS && !self.on_request;
         name == self.name || name == self.layer() || default
     }
@@ -192,42 +189,4 @@ fn outcome_code(outcome: Outcome) -> f64 {
         Outcome::Surface => 2.0,
         Outcome::Unresolved(_) => 3.0,
     }
-}
-
-/// Every channel, those on request last.
-pub fn all_channels() -> impl Iterator<Item = &'static ChannelKind> {
-    CHANNELS.iter().chain(&REQUESTED)
-}
-
-/// The channels of a picture of `prepared`: all that it has, or those requested.
-pub(super) fn chosen(
-    prepared: &PreparedScene,
-    refined: bool,
-    asked: Option<&[String]>,
-) -> Result<Vec<&'static ChannelKind>, Error> {
-    let there = |kind: &&ChannelKind| (kind.present)(prepared, refined);
-    let all: Vec<&ChannelKind> = all_channels().filter(there).collect();
-    let Some(asked) = asked else {
-        return Ok(all.into_iter().filter(|kind| !kind.on_request).collect());
-    };
-    if let Some(name) = asked.iter().find(|name| !all.iter().any(|kind| kind.is_meant(name))) {
-        let there: Vec<&str> = all.iter().map(|kind| kind.name).collect();
-        return Err(RenderError::Channel { name: name.clone(), there: there.join(", ") }.into());
-    }
-    // In the list's order, each once.
-    let is_meant = |kind: &&ChannelKind| asked.iter().any(|name| kind.is_meant(name));
-    let chosen: Vec<&ChannelKind> = all.into_iter().filter(is_meant).collect();
-    match chosen.iter().find(|kind| kind.on_request && refined) {
-        Some(kind) => Err(RenderError::Refined { channel: kind.name }.into()),
-        None => Ok(chosen),
-    }
-}
-
-/// What the channels of a picture hold, for whoever opens its file.
-pub(super) fn legend(channels: &[&ChannelKind]) -> String {
-    let line = |kind: &&ChannelKind| {
-        let unit = if kind.unit.is_empty() { String::new() } else { format!(" ({})", kind.unit) };
-        format!("{}{unit}: {}", kind.name, kind.meaning)
-    };
-    channels.iter().map(line).collect::<Vec<_>>().join(". ")
 }

@@ -1,24 +1,26 @@
 //! What is kept of pixels besides their light.
 
 use super::grid::Grid;
-use super::pixels::Workspace;
 use crate::Error;
-use crate::transport::{Layers, PreparedScene};
+use crate::transport::{Layers, PreparedScene, Scratch};
 
 /// Adds what is wanted of the central ray of each pixel in a block of rays that has been observed, with `side`² rays a
 /// pixel.
 pub(super) fn add_central(
     prepared: &PreparedScene,
     grid: &Grid,
-    work: &mut Workspace,
+    (alpha, beta): (&[f64], &[f64]),
+    scratch: &mut Scratch,
+    layers: &mut [Layers],
 ) -> Result<(), Error> {
     if !prepared.wanted().central() {
         return Ok(());
     }
-    let (rays, samples) = (work.alpha.len(), grid.side * grid.side);
-    for k in (0..work.layers.len()).filter(|k| k % samples == central(grid.side)) {
-        let place = (work.alpha[k % rays], work.beta[k % rays]);
-        prepared.add_central(place, grid.size, &mut work.scratch, &mut work.layers[k])?;
+    let (rays, samples) = (alpha.len(), grid.side * grid.side);
+    for (k, layers) in layers.iter_mut().enumerate() {
+        if k % samples == central(grid.side) {
+            prepared.add_central((alpha[k % rays], beta[k % rays]), grid.size, scratch, layers)?;
+        }
     }
     Ok(())
 }

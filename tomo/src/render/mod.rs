@@ -5,6 +5,7 @@
 mod adaptive;
 mod bands;
 mod channels;
+mod choice;
 mod film;
 mod finish;
 mod grid;
@@ -18,7 +19,8 @@ mod requested;
 mod rings;
 mod tally;
 
-pub use channels::{CHANNELS, ChannelKind, all_channels};
+pub use channels::{CHANNELS, ChannelKind};
+pub use choice::all_channels;
 pub use film::{Film, Frame};
 pub use journal::{Found, Journal};
 pub use plan::{Plan, Step};
@@ -119,7 +121,7 @@ impl Raster {
         let prepared = PreparedScene::new(scene, assets)?;
         let grid = Grid::new(scene);
         let refined = scene.screen.image_error.is_some();
-        let channels = channels::chosen(&prepared, refined, scene.screen.channels.as_deref())?;
+        let channels = choice::chosen(&prepared, refined, scene.screen.channels.as_deref())?;
         let rings = resolver(scene, &prepared);
         let names: Vec<&str> = channels.iter().map(|kind| kind.name).collect();
         let layout = Layout::new(grid.width, grid.height, &names)?;
@@ -239,7 +241,7 @@ impl Raster {
 
     /// What the channels hold.
     pub fn legend(&self) -> String {
-        channels::legend(&self.channels)
+        choice::legend(&self.channels)
     }
 
     /// What the numbers in the channel `id` stand for, a line for each; nothing without that channel.

@@ -59,8 +59,8 @@ const BLOCK: usize = 1024;
 #[derive(Debug, Default)]
 pub(super) struct Workspace {
     pub scratch: Scratch,
-    pub alpha: Vec<f64>,
-    pub beta: Vec<f64>,
+    alpha: Vec<f64>,
+    beta: Vec<f64>,
     squares: Vec<Square>,
     pub seen: Vec<RayResult>,
     /// What is kept of the rays besides, if anything is wanted.
@@ -153,7 +153,8 @@ pub(super) fn uniform(
         }
         let rays = some.len() * side * side;
         work.observe_at(prepared, times)?;
-        layers::add_central(prepared, grid, work)?;
+        let Workspace { alpha, beta, scratch, layers, .. } = &mut *work;
+        layers::add_central(prepared, grid, (alpha, beta), scratch, layers)?;
         let mut seen = std::mem::take(&mut work.seen);
         let mut layers = std::mem::take(&mut work.layers);
         let counted = match rings {

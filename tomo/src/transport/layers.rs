@@ -1,7 +1,6 @@
 //! What is known of a ray besides its light, on request: opacity, the sky apart from emission, lensed images apart, and
 //! where its brightest contribution comes from.
 
-use super::result::Light;
 use crate::scene::Scene;
 use kerrlight_geodesic::{Outcome, TracedRay};
 
@@ -154,10 +153,8 @@ impl Record {
         self.add_to(order, intensity, color);
     }
 
-    /// Adds the light of a medium.
-    pub fn add_light(&mut self, light: &Light, color: [f32; 3]) {
-        let [first, second] = light.later;
-        let parts = [light.intensity - first, first - second, second];
+    /// Adds intensity of each image.
+    pub fn add_parts(&mut self, parts: [f64; ORDERS], color: [f32; 3]) {
         (0..).zip(parts).for_each(|(order, part)| self.add_to(order, part, color));
     }
 

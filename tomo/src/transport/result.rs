@@ -111,7 +111,8 @@ impl Accumulator {
             *channel += tint * light.intensity as f32;
         }
         if let Some(record) = &mut self.record {
-            record.add_light(light, color);
+            let [first, second] = light.later;
+            record.add_parts([light.intensity - first, first - second, second], color);
         }
         let mino_time = light.mino_time;
         self.mark(light.intensity, light.place, Origin { source, mino_time });
