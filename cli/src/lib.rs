@@ -44,6 +44,7 @@ mod movie;
 mod observe;
 mod output;
 mod overlay;
+mod parquet_table;
 mod paths;
 pub mod pictures;
 mod program;
@@ -138,8 +139,10 @@ fn run(arguments: &Arguments, program: &Program) -> anyhow::Result<()> {
         (false, true) => Form::Aside,
         (false, false) => Form::Text,
     };
-    let form = if ranks::is_silent() { Form::Silent } else { form };
-    let to = arguments.record.as_deref().map(|path| Output::new(path, "json")).transpose()?;
+    let is_silent = arguments.verb.shares() && ranks::is_silent();
+    let form = if is_silent { Form::Silent } else { form };
+    let to = arguments.record.as_deref().filter(|_| !is_silent);
+    let to = to.map(|path| Output::new(path, "json")).transpose()?;
     let Some(to) = to else { return arguments.verb.run(arguments, program)?.print(form) };
     output::follow();
     let recorder = Recorder::of_process();
@@ -149,6 +152,15 @@ fn run(arguments: &Arguments, program: &Program) -> anyhow::Result<()> {
 }
 
 impl Verb {
+    /// Whether ranks of one job do it together. Of others each does it for itself.
+    fn shares(&self) -> bool {
+        match self {
+            Verb::Render(_) | Verb::Movie(_) | Verb::Fit(_) | Verb::Posterior(_) => true,
+            Verb::Compare(_) => true,
+            _ => false,
+        }
+    }
+
     /// Whether standard output carries a file, because a path is `-`.
     fn pipes(&self) -> bool {
         match self {

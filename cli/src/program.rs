@@ -1,6 +1,7 @@
 //! The program with what others add to it.
 
-use super::{Arguments, compare, fit, help, interrupt, run};
+use super::{Arguments, compare, fit, help, interrupt, ranks, run};
+use crate::ranks::Silence;
 use anyhow::Context;
 use clap::FromArgMatches;
 use kerrlight_tomo::representation::{BuildRepresentation, FindRepresentation, Registry};
@@ -44,12 +45,17 @@ impl Program {
 
     /// A command that starts the program once more.
     pub(crate) fn again(&self) -> anyhow::Result<Command> {
-        let Some((program, first)) = self.launcher.split_first() else {
-            let program = std::env::current_exe().context("cannot find the program itself")?;
-            return Ok(Command::new(program));
+        let mut command = match self.launcher.split_first() {
+            Some((program, first)) => {
+                let mut command = Command::new(program);
+                command.args(first);
+                command
+            }
+            None => {
+                Command::new(std::env::current_exe().context("cannot find the program itself")?)
+            }
         };
-        let mut command = Command::new(program);
-        command.args(first);
+        ranks::forget(&mut command);
         Ok(command)
     }
 
@@ -65,6 +71,7 @@ impl Program {
         let matches = help::command().get_matches_from(words);
         let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
         interrupt::listen();
+        let silence = if arguments.verb.shares() { ranks::hush() } else { Silence::default() };
         match run(&arguments, &self) {
             Ok(()) => 0,
             Err(error) if error.is::<interrupt::Interrupted>() => {
@@ -73,6 +80,7 @@ impl Program {
             }
             Err(error) => {
                 eprintln!("error: {error:#}");
+                silence.tell(&error);
                 let failed = error.downcast_ref::<compare::Failed>().is_some()
                     || error.downcast_ref::<fit::Failed>().is_some();
                 if failed { 1 } else { 2 }

@@ -1,13 +1,17 @@
-//! `kerrlight compare` as the ranks of one job of MPI.
+//! `kerrlight` as the ranks of one job of MPI.
 
 use crate::shared_folder::{claims, experiment};
-use crate::support::{binary, succeed};
+use crate::support::{binary, root, succeed};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// So many ranks on this machine; nothing where there is no `mpirun`.
 fn start(at: &Path, ranks: usize, output: &str) -> Option<Child> {
+    start_with(at, ranks, &["compare", "seeds.toml", "-o", output, "--threads", "1"])
+}
+
+fn start_with(at: &Path, ranks: usize, words: &[&str]) -> Option<Child> {
     if Command::new("mpirun").arg("--version").output().is_err() {
         eprintln!("MPI IS NOT TESTED: there is no mpirun");
         return None;
@@ -15,8 +19,15 @@ fn start(at: &Path, ranks: usize, output: &str) -> Option<Child> {
     let mut command = Command::new("mpirun");
     command.current_dir(at).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     command.args(["--oversubscribe", "--allow-run-as-root", "-n", &ranks.to_string()]);
-    command.arg(binary()).args(["compare", "seeds.toml", "-o", output, "--threads", "1"]);
+    command.arg(binary()).args(words);
     Some(command.spawn().unwrap())
+}
+
+/// What a job says that must succeed; nothing where there is no `mpirun`.
+fn says(at: &Path, ranks: usize, words: &[&str]) -> Option<String> {
+    let said = start_with(at, ranks, words)?.wait_with_output().unwrap();
+    assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stderr));
+    Some(String::from_utf8(said.stdout).unwrap())
 }
 
 fn same(at: &Path, one: &str, other: &str) {
@@ -90,4 +101,195 @@ fn exact_a_killed_rank_ends_the_job_and_loses_nothing() {
     assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stderr));
     assert_eq!(claims(&at.join("out"), ".done"), 10);
     same(at, "alone", "out");
+}
+
+/// Names in a folder.
+fn names(at: &Path) -> Vec<String> {
+    let mut all: Vec<String> = std::fs::read_dir(at)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    all.sort();
+    all
+}
+
+/// Kills a rank of the jobs that `start` starts, each a little later than in the one before, until one ends before that;
+/// how many were killed. A job ends within 10 s of that, and mpirun says why.
+fn kill_ranks(start: impl Fn(usize) -> Option<Child>) -> usize {
+    for k in 0..40 {
+        let Some(mut job) = start(2 + k % 4) else { return k };
+        std::thread::sleep(Duration::from_millis(200 + 70 * k as u64));
+        let ranks = ranks_of(&job);
+        let killed = ranks.get(k % ranks.len().max(1));
+        if let Some(rank) = killed {
+            Command::new("kill").args(["-9", rank]).status().unwrap();
+        }
+        let clock = Instant::now();
+        while job.try_wait().unwrap().is_none() {
+            assert!(clock.elapsed() < Duration::from_secs(10), "the job goes on");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        let said = job.wait_with_output().unwrap();
+        if said.status.success() {
+            return k;
+        }
+        assert!(String::from_utf8_lossy(&said.stderr).contains("mpirun"), "a message");
+    }
+    40
+}
+
+/// A scene of the repository.
+fn scene(name: &str) -> String {
+    root().join("scenes").join(name).display().to_string()
+}
+
+/// Any number of ranks renders what one process renders, one of them speaks, and nothing is left beside the file.
+#[test]
+#[ignore = "long"]
+fn exact_ranks_of_mpirun_render_one_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let scene = scene("hot_spots.toml");
+    let words =
+        |output| ["render", &scene, "-o", output, "--preview", "p.png", "--set", "screen.width=80"];
+    succeed(at, &words("alone.exr"));
+    let png = std::fs::read(at.join("p.png")).unwrap();
+    let alone = std::fs::read(at.join("alone.exr")).unwrap();
+    for ranks in [1, 2, 4, 7] {
+        let Some(text) = says(at, ranks, &words("out.exr")) else { return };
+        assert_eq!(text.matches("flux").count(), 1, "{text}");
+        assert!(std::fs::read(at.join("out.exr")).unwrap() == alone, "{ranks} ranks");
+        assert!(std::fs::read(at.join("p.png")).unwrap() == png, "{ranks} ranks");
+        assert_eq!(names(at), ["alone.exr", "out.exr", "p.png"]);
+    }
+}
+
+/// Killed ranks lose nothing but the bands under way, and another number of ranks, or one process, goes on.
+#[test]
+#[ignore = "long"]
+fn exact_a_killed_rank_of_mpirun_leaves_its_bands() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let scene = scene("disc_face_on.toml");
+    let words = |output| {
+        let mut words = vec!["render", &scene, "-o", output, "--threads", "1"];
+        words.extend(["--set", "screen.width=640", "--set", "screen.samples_per_pixel=16"]);
+        words
+    };
+    succeed(at, &words("alone.exr"));
+    let kills = kill_ranks(|ranks| start_with(at, ranks, &words("out.exr")));
+    println!("{kills} jobs with a killed rank");
+    if kills == 0 {
+        return;
+    }
+    assert!(
+        std::fs::read(at.join("out.exr")).unwrap() == std::fs::read(at.join("alone.exr")).unwrap()
+    );
+    assert_eq!(names(at), ["alone.exr", "out.exr"]);
+    // What ranks have left is of use to one process.
+    std::fs::remove_file(at.join("out.exr")).unwrap();
+    let mut job = start_with(at, 3, &words("out.exr")).unwrap();
+    std::thread::sleep(Duration::from_millis(1500));
+    Command::new("kill").args(["-9", &ranks_of(&job)[2]]).status().unwrap();
+    job.wait().unwrap();
+    succeed(at, &words("out.exr"));
+    assert!(
+        std::fs::read(at.join("out.exr")).unwrap() == std::fs::read(at.join("alone.exr")).unwrap()
+    );
+    assert_eq!(names(at), ["alone.exr", "out.exr"]);
+}
+
+/// A film with one scale for all frames, which is that of the first, by any number of ranks and after kills.
+#[test]
+#[ignore = "long"]
+fn exact_ranks_of_mpirun_render_one_film() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let scene = scene("hot_spots.toml");
+    let words = |output| {
+        let mut words = vec!["movie", &scene, "-o", output, "--frames", "13", "--duration", "100"];
+        words.extend(["--set", "screen.width=16", "--set", "screen.total_flux_jy=2.5"]);
+        words.extend(["--gif", "film.gif", "--threads", "1"]);
+        words
+    };
+    succeed(at, &words("alone"));
+    let gif = std::fs::read(at.join("film.gif")).unwrap();
+    let same = |other: &str| {
+        assert_eq!(names(&at.join("alone")), names(&at.join(other)));
+        for name in names(&at.join("alone")) {
+            let [a, b] = ["alone", other].map(|folder| std::fs::read(at.join(folder).join(&name)));
+            assert!(a.unwrap() == b.unwrap(), "{other}/{name}");
+        }
+        assert!(std::fs::read(at.join("film.gif")).unwrap() == gif);
+    };
+    for ranks in [1, 2, 4, 7] {
+        let output = format!("out{ranks}");
+        let Some(text) = says(at, ranks, &words(&output)) else { return };
+        assert_eq!(text.matches("13 frames, 13 of them rendered").count(), 1, "{text}");
+        same(&output);
+    }
+    let kills = kill_ranks(|ranks| start_with(at, ranks, &words("out")));
+    println!("{kills} jobs with a killed rank");
+    same("out");
+}
+
+/// Draws are those of one process, whoever draws them, also right after a fit.
+#[test]
+#[ignore = "long"]
+fn exact_ranks_of_mpirun_draw_what_one_process_draws() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("fit.toml"), crate::posterior::settings()).unwrap();
+    let kind = ["--set", "representation=linear-grid", "--set", "representation.nodes=20"];
+    succeed(at, &[&["fit", "fit.toml", "-o", "alone", "--samples", "6"][..], &kind].concat());
+    let same = |other: &str| {
+        let [a, b] = ["alone", other].map(|run| at.join(run).join("posterior"));
+        assert_eq!(names(&a), names(&b), "{other}");
+        for name in names(&a).into_iter().filter(|name| !name.ends_with("html")) {
+            assert!(
+                std::fs::read(a.join(&name)).unwrap() == std::fs::read(b.join(&name)).unwrap(),
+                "{other}/{name}"
+            );
+        }
+    };
+    let words = [&["fit", "fit.toml", "-o", "together", "--samples", "6"][..], &kind].concat();
+    let Some(text) = says(at, 3, &words) else { return };
+    assert_eq!(text.matches("posterior/report.html").count(), 1, "{text}");
+    same("together");
+    for ranks in [1, 2, 4, 7] {
+        std::fs::remove_dir_all(at.join("together/posterior")).unwrap();
+        says(at, ranks, &["posterior", "together", "--samples", "6"]).unwrap();
+        same("together");
+    }
+    std::fs::remove_dir_all(at.join("together/posterior")).unwrap();
+    let draw = ["posterior", "together", "--samples", "6", "--threads", "1"];
+    let kills = kill_ranks(|ranks| start_with(at, ranks, &draw));
+    println!("{kills} jobs with a killed rank");
+    same("together");
+}
+
+/// A wrong scene is told once, and a rank that is told to be alone is.
+#[test]
+#[ignore = "long"]
+fn wrong_scenes_of_mpirun_are_told_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let words = ["render", "-o", "out.exr", "--set", "hole.spin=2"];
+    let Some(job) = start_with(at, 4, &words) else { return };
+    let said = job.wait_with_output().unwrap();
+    let text = String::from_utf8_lossy(&said.stderr);
+    assert!(!said.status.success());
+    assert_eq!(text.matches("hole.spin").count(), 1, "{text}");
+    let alone = Command::new(binary())
+        .current_dir(at)
+        .args(["render", "-o", "out.exr", "--set", "screen.width=16", "--set", "screen.height=16"])
+        .envs([("KERRLIGHT_ALONE", "1"), ("PMI_RANK", "1"), ("PMI_SIZE", "2")])
+        .output()
+        .unwrap();
+    assert!(alone.status.success() && !alone.stdout.is_empty());
+    // Verbs that ranks do not share are each rank's own.
+    let table = ["critical-curve", "--spin", "0.5", "--inclination", "60", "--points", "9"];
+    let rank = [("PMI_RANK", "1"), ("PMI_SIZE", "2")];
+    let own = Command::new(binary()).args(table).envs(rank).output().unwrap();
+    assert_eq!(String::from_utf8(own.stdout).unwrap(), succeed(at, &table));
 }

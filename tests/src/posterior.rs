@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::path::Path;
 
 /// The built-in flare, few pixels, scans and voxels.
-fn settings() -> String {
+pub fn settings() -> String {
     let built_in = std::fs::read_to_string(root().join("cli/src/fit/built_in.toml")).unwrap();
     built_in
         .replace("pixels = 40", "pixels = 20\nring_rays = 4")

@@ -83,6 +83,11 @@ impl Claims {
         self.mark(&format!("{}.done", claim.piece))
     }
 
+    /// Says that a piece was done before it was shared.
+    pub fn done_before(&self, piece: &str) -> anyhow::Result<()> {
+        self.mark(&format!("{piece}.done"))
+    }
+
     /// Says that a piece failed, and why.
     pub fn failed(&self, claim: &Claim, why: &str) -> anyhow::Result<()> {
         self.worker.ended(0.0, true);

@@ -90,6 +90,20 @@ impl Queue {
         Ok(claim.map(|claim| (self.open[k], claim)))
     }
 
+    /// Says that a piece was done before: nobody takes it.
+    pub fn skip(&mut self, at: usize) -> anyhow::Result<()> {
+        self.claims.done_before(&self.pieces[at])?;
+        self.forget(at);
+        Ok(())
+    }
+
+    /// Whether whoever took a piece last is dead, as far as is known yet.
+    pub fn is_abandoned(&mut self, at: usize) -> bool {
+        let piece = &self.pieces[at];
+        let now = Board::read(&self.folder).unwrap_or_default().of(piece);
+        now.is_open() && (now.is_free() || self.watch.is_abandoned(piece, now.turns - 1))
+    }
+
     /// Says that a piece is done, which took this process so long.
     pub fn done(&mut self, (at, claim): (usize, &Claim), seconds: f64) -> anyhow::Result<()> {
         self.claims.done(claim, seconds)?;

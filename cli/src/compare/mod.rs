@@ -371,7 +371,7 @@ fn run<'a>(cases: &'a [Case], runner: &Runner<'_>) -> Summary<'a> {
 
 /// The tables, how many cases are done and which of them are best and worst, and where to look.
 fn end(tables: &str, summary: &Summary, folder: &Path, is_early: bool) -> Answer {
-    let files = ["report.html", "results.json", "results.csv", "tables.md"];
+    let files = ["report.html", "results.json", "results.csv", "results.parquet", "tables.md"];
     let files = files.map(|name| folder.join(name));
     let failed = summary.failed().map(|(case, why)| json!({"name": case.name(), "error": why}));
     let answer = Answer::text(format!("{tables}{}\n{}\n", summary.worth(), files[0].display()))

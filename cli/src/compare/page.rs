@@ -7,6 +7,7 @@ use super::summary::Summary;
 use super::{changes, figures, quick, ran, tables, verdicts};
 use crate::checksum::sealed;
 use crate::output::Output;
+use crate::parquet_table;
 use crate::report::{Figure, Part, Report, Table};
 use serde_json::Value;
 use std::path::Path;
@@ -22,7 +23,7 @@ pub struct Page<'a> {
 }
 
 impl Page<'_> {
-    /// Writes results.json, results.csv, tables.md, pictures and report.html; the text of the tables.
+    /// Writes results.json, results.csv, results.parquet, tables.md, pictures and report.html; the text of the tables.
     pub fn write(
         &self,
         runner: &Runner<'_>,
@@ -48,6 +49,7 @@ impl Page<'_> {
         let results = summary.json(&experiment.title, choice.quick);
         file("results.json")?.write(sealed(results.clone()).as_bytes())?;
         file("results.csv")?.write(&summary.csv()?)?;
+        file("results.parquet")?.write(&parquet_table::encode(&summary.columns())?)?;
         let shown = self.tables(before, &results)?;
         let text: String = shown.iter().map(tables::markdown).collect();
         let text = [self.heading(), text].concat();

@@ -2,6 +2,7 @@
 
 use super::cases::{Case, Status};
 use super::labels::{RESULTS, described, number, result};
+use crate::parquet_table::Values;
 use serde_json::{Map, Value, json};
 
 /// Cases and how they ended.
@@ -170,28 +171,56 @@ impl<'a> Summary<'a> {
     /// The same as a table, a line a case.
     pub fn csv(&self) -> anyhow::Result<Vec<u8>> {
         let mut writer = csv::Writer::from_writer(Vec::new());
-        let factors: Vec<String> = match self.all.first() {
-            Some((case, _)) => case.levels.iter().map(|(factor, _)| factor.clone()).collect(),
-            None => Vec::new(),
-        };
-        let numbers = RESULTS.iter().map(|(key, ..)| (*key).to_owned());
-        let tail = ["seed", "status", "folder"].map(str::to_owned);
-        writer.write_record(factors.into_iter().chain(tail).chain(numbers))?;
-        for (case, status) in &self.all {
-            let (word, results) = match status {
-                Status::Done(results) => ("done", Some(results)),
-                Status::Failed(_) => ("failed", None),
-                Status::Open => ("open", None),
-            };
-            let levels = case.levels.iter().map(|(_, level)| level.clone());
-            let tail = [case.seed.to_string(), word.to_owned(), format!("cases/{}", case.slug)];
-            let number = |key: &str| {
-                results.and_then(|r| result(r, key)).map(|x| x.to_string()).unwrap_or_default()
-            };
-            let numbers = RESULTS.iter().map(|(key, ..)| number(key));
-            writer.write_record(levels.chain(tail).chain(numbers))?;
+        let columns = self.columns();
+        writer.write_record(columns.iter().map(|(name, _)| name))?;
+        for row in 0..self.all.len() {
+            writer.write_record(columns.iter().map(|(_, values)| match values {
+                Values::Text(all) => all[row].clone(),
+                Values::Whole(all) => all[row].to_string(),
+                Values::Number(all) => all[row].map(|x| x.to_string()).unwrap_or_default(),
+            }))?;
         }
         Ok(writer.into_inner()?)
+    }
+
+    /// Levels of the factors, seed, status, folder and results of all cases.
+    pub fn columns(&self) -> Vec<(String, Values)> {
+        let first = self.all.first().map(|(case, _)| &case.levels[..]).unwrap_or_default();
+        let all = || self.all.iter();
+        let level = |k: usize| {
+            Values::Text(
+                all()
+                    .map(|(case, _)| {
+                        case.levels.get(k).map_or(String::new(), |(_, level)| level.clone())
+                    })
+                    .collect(),
+            )
+        };
+        let status = |(_, status): &(&Case, Status)| {
+            let word = match status {
+                Status::Done(_) => "done",
+                Status::Failed(_) => "failed",
+                Status::Open => "open",
+            };
+            word.to_owned()
+        };
+        let number = |key: &str| {
+            let of = |(_, status): &(&Case, Status)| match status {
+                Status::Done(results) => result(results, key),
+                _ => None,
+            };
+            Values::Number(all().map(of).collect())
+        };
+        let seeds = all().map(|(case, _)| case.seed.cast_signed()).collect();
+        let folders = all().map(|(case, _)| format!("cases/{}", case.slug)).collect();
+        let tail = [
+            ("seed".to_owned(), Values::Whole(seeds)),
+            ("status".to_owned(), Values::Text(all().map(status).collect())),
+            ("folder".to_owned(), Values::Text(folders)),
+        ];
+        let levels = first.iter().enumerate().map(|(k, (name, _))| (name.clone(), level(k)));
+        let numbers = RESULTS.iter().map(|(key, ..)| ((*key).to_owned(), number(key)));
+        levels.chain(tail).chain(numbers).collect()
     }
 }
 

@@ -15,7 +15,7 @@ use std::time::Duration;
 pub struct Folder {
     path: PathBuf,
     inputs: Inputs,
-    _lock: Lock,
+    _lock: Option<Lock>,
 }
 
 /// Names in it.
@@ -36,7 +36,7 @@ impl Folder {
         }
         std::fs::create_dir_all(path).with_context(|| format!("cannot make the folder {shown}"))?;
         let lock = Lock::take(path, BUSY, Duration::ZERO)?;
-        let folder = Self { path: path.to_owned(), inputs, _lock: lock };
+        let folder = Self { path: path.to_owned(), inputs, _lock: Some(lock) };
         let inputs = serde_json::to_string_pretty(&folder.inputs)?;
         folder.file(inputs::FILE)?.write(format!("{inputs}\n").as_bytes())?;
         // Last: with them it is a run.
@@ -47,14 +47,21 @@ impl Folder {
     /// A folder that holds a run, within `patience` if another process works in it; all that the run has read must be
     /// what it was.
     pub fn open(path: &Path, patience: Duration) -> anyhow::Result<(Self, String)> {
-        let settings = path.join(SETTINGS);
-        if !settings.is_file() {
-            bail!("{} holds no run: there is no {SETTINGS} in it", path.display());
-        }
+        is_run(path)?;
         let lock = Lock::take(path, BUSY, patience)?;
+        Self::held(path, Some(lock))
+    }
+
+    /// The same while another process works in it, by whose leave this one reads.
+    pub fn look(path: &Path) -> anyhow::Result<(Self, String)> {
+        is_run(path)?;
+        Self::held(path, None)
+    }
+
+    fn held(path: &Path, lock: Option<Lock>) -> anyhow::Result<(Self, String)> {
         let inputs = Inputs::load(path)?;
         inputs.check(path, &mut FileSums::default())?;
-        let text = output::read_text(&settings)?;
+        let text = output::read_text(&path.join(SETTINGS))?;
         Ok((Self { path: path.to_owned(), inputs, _lock: lock }, text))
     }
 
@@ -114,4 +121,11 @@ impl Folder {
             self.lines()?.iter().filter(|l| kept(l)).map(|line| format!("{line}\n")).collect();
         self.file(LOG)?.write(lines.as_bytes())
     }
+}
+
+fn is_run(path: &Path) -> anyhow::Result<()> {
+    if !path.join(SETTINGS).is_file() {
+        bail!("{} holds no run: there is no {SETTINGS} in it", path.display());
+    }
+    Ok(())
 }

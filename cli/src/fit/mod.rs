@@ -20,7 +20,7 @@ mod world_search;
 
 use crate::answer::Answer;
 use crate::record::Recorder;
-use crate::{interrupt, output, paths};
+use crate::{interrupt, output, paths, ranks};
 use anyhow::{Context, bail};
 pub use api::{assigned, check, coverage, sizes, turned, velocities};
 use clap::Args;
@@ -79,6 +79,9 @@ impl Fit {
         if self.stop_with_input {
             interrupt::follow_parent();
         }
+        if let Some((rank @ 1.., _)) = ranks::this() {
+            return self.help(rank, registry);
+        }
         if let Some(data) = &self.init {
             return init::write(data.as_deref(), self.output.as_deref());
         }
@@ -128,10 +131,24 @@ impl Fit {
         resume: bool,
     ) -> anyhow::Result<Answer> {
         let recorder = Recorder::of_process();
+        // Other ranks know where the run is if that was said.
+        let shared = self.samples.filter(|_| self.output.is_some() || self.resume.is_some());
+        let lead = shared.map(|samples| posterior::lead(folder, samples)).transpose()?;
         let answer = run::run(prepared, text, folder, resume)?;
         recorder.write_into(folder.path())?;
         let Some(samples) = self.samples else { return Ok(answer) };
-        Ok(answer.and("posterior", posterior::draw(prepared, folder, samples)?))
+        Ok(answer.and("posterior", posterior::draw(prepared, folder, samples, lead.flatten())?))
+    }
+
+    /// As a rank that is not the first, which fits: takes part in the draws after the fit, if there are any and it is known
+    /// where the run is.
+    fn help(&self, rank: u32, registry: &Registry) -> anyhow::Result<Answer> {
+        match (self.samples, self.resume.as_ref().or(self.output.as_ref())) {
+            (Some(samples), Some(run)) if !self.print && self.init.is_none() => {
+                posterior::help(run, samples, rank, registry)
+            }
+            _ => Ok(Answer::default()),
+        }
     }
 
     /// For how long to wait for another process: the fit of a comparison that was killed a moment ago is about to end.

@@ -12,6 +12,7 @@ use kerrlight_tomo::render::{Film, Frame};
 use kerrlight_tomo::scene::{Scene, apply_override};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 /// A film's frames.
 pub struct Sequence {
@@ -21,6 +22,8 @@ pub struct Sequence {
     done: Vec<bool>,
     /// Fluxes of those that are there, with their unit.
     fluxes: Vec<Option<(f64, String)>>,
+    /// Rays of those that are there which were given up.
+    unresolved: Vec<u64>,
     /// Factor from the scene's unit of intensity, that of the first frame.
     factor: Option<f64>,
     /// Lengths and checksums of the files that the scene names.
@@ -65,8 +68,8 @@ impl Sequence {
         let done = vec![false; plans.len()];
         let [files, device] = [*files, *device].map(str::to_owned);
         let folder = folder.to_owned();
-        let fluxes = vec![None; plans.len()];
-        Ok(Sequence { folder, plans, done, fluxes, factor: None, files, device })
+        let (fluxes, unresolved) = (vec![None; plans.len()], vec![0; plans.len()]);
+        Ok(Sequence { folder, plans, done, fluxes, unresolved, factor: None, files, device })
     }
 
     /// Looks which frames are there. Frames with other settings, or beyond the last, are errors:
@@ -91,8 +94,9 @@ impl Sequence {
             }
             self.done[k] = true;
             self.fluxes[k] = flux_of(&attributes);
+            self.unresolved[k] = number(&attributes, "unresolved_rays").unwrap_or(0);
             if k == 0 {
-                self.factor = factor_of(&attributes);
+                self.factor = number(&attributes, FACTOR);
             }
         }
         Ok(())
@@ -151,6 +155,37 @@ impl Sequence {
         Some((least, most, unit))
     }
 
+    /// Rays of some frames that were given up.
+    pub fn unresolved(&self, frames: &[usize]) -> u64 {
+        frames.iter().map(|k| self.unresolved[*k]).sum()
+    }
+
+    /// All that decides the film.
+    pub fn identity(&self) -> String {
+        let times: Vec<f64> = (0..self.len()).map(|k| self.time(k)).collect();
+        let text = self.plans.first().map_or("", |plan| plan.text.as_str());
+        format!("{} {text} {times:?} {} {}", env!("CARGO_PKG_VERSION"), self.files, self.device)
+    }
+
+    /// Whether frames have the scale of the first one, which is not there yet.
+    pub fn lacks_scale(&mut self) -> anyhow::Result<bool> {
+        let is_shared =
+            self.plans.first().is_some_and(|plan| plan.scene.screen.total_flux_jy.is_some());
+        let first = self.path(0, "exr");
+        if self.factor.is_none() && is_shared && first.exists() {
+            let attributes = exr::decode_attributes(output::open(&first)?);
+            let name = || first.display().to_string();
+            self.factor = number(&attributes.with_context(name)?, FACTOR);
+        }
+        Ok(is_shared && self.factor.is_none())
+    }
+
+    /// Gives all frames the scale of this one.
+    pub fn scale_like(&mut self, film: &Film, first: &Frame) -> anyhow::Result<()> {
+        self.factor = Some(film.unit_factor(first)?);
+        Ok(())
+    }
+
     /// Rows of a frame.
     pub fn height(&self) -> usize {
         self.plans.first().map_or(0, |plan| plan.scene.screen.rows() as usize)
@@ -186,7 +221,7 @@ impl Sequence {
         frames: Vec<Frame>,
     ) -> anyhow::Result<()> {
         if let (None, Some(first)) = (self.factor, frames.first()) {
-            self.factor = Some(film.unit_factor(first)?);
+            self.scale_like(film, first)?;
         }
         let factor = self.factor.context("the film has no unit of intensity")?;
         let this: &Sequence = self;
@@ -201,12 +236,13 @@ impl Sequence {
             let bytes = exr::encode_in_style(&picture, &attributes, style);
             let bytes = bytes.context("cannot encode the EXR")?;
             Output::new(&this.path(*k, "exr"), "exr")?.write(&bytes)?;
-            Ok((summary.flux, summary.flux_unit.to_owned()))
+            Ok(summary)
         });
-        let fluxes = written.collect::<anyhow::Result<Vec<_>>>()?;
-        for (k, flux) in batch.iter().zip(fluxes) {
+        let summaries = written.collect::<anyhow::Result<Vec<_>>>()?;
+        for (k, summary) in batch.iter().zip(summaries) {
             self.done[*k] = true;
-            self.fluxes[*k] = Some(flux);
+            self.fluxes[*k] = Some((summary.flux, summary.flux_unit.to_owned()));
+            self.unresolved[*k] = summary.unresolved;
         }
         Ok(())
     }
@@ -242,9 +278,12 @@ fn differs(settings: &Attributes, attributes: &Attributes) -> Option<String> {
 }
 
 fn flux_of(attributes: &Attributes) -> Option<(f64, String)> {
-    Some((attributes.get("flux")?.parse().ok()?, attributes.get("flux_unit")?.clone()))
+    Some((number(attributes, "flux")?, attributes.get("flux_unit")?.clone()))
 }
 
-fn factor_of(attributes: &Attributes) -> Option<f64> {
-    attributes.get("intensity_per_scene_unit")?.parse().ok()
+/// The attribute of a frame's scale.
+const FACTOR: &str = "intensity_per_scene_unit";
+
+fn number<T: FromStr>(attributes: &Attributes, name: &str) -> Option<T> {
+    attributes.get(name)?.parse().ok()
 }

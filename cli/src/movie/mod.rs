@@ -1,28 +1,27 @@
 //! `kerrlight movie`: numbered EXR frames of a scene, and animations of them.
 
 mod frames;
+mod rendering;
 mod times;
 mod viewing;
 
 use crate::answer::{self, Answer};
 use crate::devices::{self, DeviceOption};
-use crate::interrupt::{Interrupted, Keeper};
 use crate::output::Output;
 use crate::overlay::OverlayOptions;
 use crate::render::exr_options::ExrOptions;
 use crate::render::preview::PreviewOptions;
 use crate::render::report;
 use crate::render::source::Source;
-use crate::{assets, progress};
+use crate::{assets, ranks};
 use anyhow::{Context, bail};
 use clap::Args;
 use frames::{Origin, Sequence};
 use kerrlight_geodesic::RayDevice;
-use kerrlight_tomo::Error;
 use kerrlight_tomo::memory;
-use kerrlight_tomo::render::RenderError;
-use kerrlight_tomo::render::{Film, Frame};
+use kerrlight_tomo::render::Film;
 use kerrlight_tomo::scene::Scene;
+use rendering::Rendering;
 use std::iter;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -105,8 +104,12 @@ impl Movie {
             devices::announce(device, &film.beside_device());
         }
         let start = Instant::now();
-        let rendered =
-            self.render(&mut film, &mut sequence).with_context(|| source.name.clone())?;
+        let style = (&self.exr, self.viewing.frames_per_second());
+        let rendering = Rendering::new(&mut film, &mut sequence, &self.output, style);
+        let rendered = rendering.run().with_context(|| source.name.clone())?;
+        if ranks::is_silent() {
+            return Ok(Answer::default());
+        }
         animations.write(&sequence, self.look.look(&scene), |picture, look, white| {
             self.overlay.draw(&scene, (picture, 1), look, white)
         })?;
@@ -143,55 +146,5 @@ impl Movie {
             .with("frames", sequence.len())
             .with("rendered", rendered)
             .with("seconds", seconds)
-    }
-
-    /// Renders the frames that are missing, batch by batch, and counts them.
-    fn render(&self, film: &mut Film, sequence: &mut Sequence) -> anyhow::Result<usize> {
-        let missing = sequence.missing();
-        let (count, start) = (missing.len(), Instant::now());
-        let rows = sequence.height();
-        let batches: Vec<&[usize]> = missing.chunks(film.batch()).collect();
-        let bar = progress::bar((batches.len() * rows) as u64);
-        let there = |sequence: &Sequence| {
-            let (done, all) = (sequence.len() - sequence.missing().len(), sequence.len());
-            let folder = self.output.display();
-            format!(
-                "stopped: {done} of {all} frames are in {folder}; run the same command again to resume"
-            )
-        };
-        let mut unresolved = 0;
-        for batch in batches {
-            let keeper = Keeper::brief(there(sequence));
-            let times: Vec<f64> = batch.iter().map(|k| sequence.time(*k)).collect();
-            let frames = film.frames(&times, &|rows| {
-                bar.inc(rows as u64);
-                !keeper.stopped()
-            });
-            let frames = match frames {
-                Err(Error::Render(RenderError::Stopped)) => {
-                    bar.finish_and_clear();
-                    return Err(Interrupted(there(sequence)).into());
-                }
-                Err(error) => {
-                    let failure = film.device().and_then(RayDevice::failure);
-                    let told = failure.map(|failure| format!("{failure}; {}", there(sequence)));
-                    return Err(told.map_or(error.into(), anyhow::Error::msg));
-                }
-                Ok(frames) => frames,
-            };
-            unresolved += frames.iter().map(Frame::unresolved).sum::<u64>();
-            let style = (&self.exr, self.viewing.frames_per_second());
-            sequence.write(film, style, batch, frames)?;
-        }
-        bar.finish_and_clear();
-        let seconds = start.elapsed().as_secs_f64();
-        eprintln!(
-            "{count} frames rendered in {seconds:.2} s, {} were there",
-            sequence.len() - count
-        );
-        if unresolved > 0 {
-            eprintln!("warning: {unresolved} rays unresolved, shown as dark");
-        }
-        Ok(count)
     }
 }

@@ -8,6 +8,7 @@ use super::{Progress, Raster, RenderError};
 use crate::Error;
 use crate::transport::Meter;
 use rayon::prelude::*;
+use std::iter::from_fn;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
@@ -39,25 +40,26 @@ fn put(band: &Mutex<Parts>, tiles: usize, tile: usize, pixels: Tile) -> Option<P
     complete.then(|| std::mem::take(&mut *parts))
 }
 
-/// Renders the bands `todo` at each of `times` into `sink`. Where `progress` says so it stops
-/// after the bands that are under way. Where pixels are refined there is one time, the prepared scene's.
+/// Renders the bands `todo` at each of `times` into `sink`. A band is asked for when a thread is free for it. Where
+/// `progress` says so it stops after the bands that are under way. Where pixels are refined there is one time, the
+/// prepared scene's.
 pub(super) fn render_bands(
     raster: &Raster,
     times: &[f64],
-    todo: &[usize],
+    todo: impl Iterator<Item = usize> + Send,
     sink: &Sink<'_>,
     progress: &Progress<'_>,
 ) -> Result<(), Error> {
     let tiles = raster.tiles();
-    let tolerance = if todo.is_empty() { None } else { raster.tolerance()? };
+    let mut todo = todo.peekable();
+    let tolerance = if todo.peek().is_none() { None } else { raster.tolerance()? };
     let stop = AtomicBool::new(false);
-    let open: Vec<Mutex<Parts>> = todo.iter().map(|_| Mutex::default()).collect();
-    let stopped = |k: &usize| k.is_multiple_of(tiles) && stop.load(Ordering::Relaxed);
-    let order = (0..todo.len() * tiles).take_while(|k| !stopped(k)).par_bridge();
-    order.try_for_each_init(Workspace::default, |work, k| -> Result<(), Error> {
-        let (band, tile) = (todo[k / tiles], k % tiles);
+    let open: Vec<Mutex<Parts>> = (0..raster.bands()).map(|_| Mutex::default()).collect();
+    let wanted = from_fn(|| if stop.load(Ordering::Relaxed) { None } else { todo.next() });
+    let order = wanted.flat_map(|band| (0..tiles).map(move |tile| (band, tile))).par_bridge();
+    order.try_for_each_init(Workspace::default, |work, (band, tile)| -> Result<(), Error> {
         let pixels = raster.tile((band, tile), times, tolerance, work)?;
-        let Some(parts) = put(&open[k / tiles], tiles, tile, pixels) else { return Ok(()) };
+        let Some(parts) = put(&open[band], tiles, tile, pixels) else { return Ok(()) };
         let at = |time: usize| raster.assemble(band, &parts, time);
         sink((0..times.len()).map(at).collect::<Result<_, _>>()?)?;
         if !progress(raster.layout.rows(band).len()) {

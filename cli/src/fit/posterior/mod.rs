@@ -4,6 +4,7 @@
 mod page;
 mod sample;
 mod summary;
+mod together;
 
 use super::folder::Folder;
 use super::held_out;
@@ -12,9 +13,11 @@ use super::world_search;
 use crate::answer::Answer;
 use crate::checksum::{is_whole, sealed};
 use crate::interrupt::{Interrupted, Keeper};
+use crate::ranks::{self, Lead};
 use crate::{output, progress, volume_files};
 use anyhow::{Context, bail};
 use clap::Args;
+use indicatif::ProgressBar;
 use kerrlight_tomo::fit::settings::{AxisSearch, FitFile, Kind, UnknownWorld};
 use kerrlight_tomo::fit::setup::WorldPosterior;
 use kerrlight_tomo::representation::Registry;
@@ -23,6 +26,7 @@ use sample::{Drawn, Through};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+pub use together::{help, lead};
 
 /// Where draws and what follows from them are, in the folder of a run.
 pub const FOLDER: &str = "posterior";
@@ -45,16 +49,38 @@ pub struct Posterior {
 impl Posterior {
     /// Draws, and writes what follows from the draws.
     pub fn run(&self, registry: &Registry) -> anyhow::Result<Answer> {
+        if let Some((rank @ 1.., _)) = ranks::this() {
+            return help(&self.run, self.samples, rank, registry);
+        }
         let (folder, text) = Folder::open(&self.run, Duration::ZERO)?;
+        let prepared = self.prepared(&text, registry)?;
+        let lead = lead(&folder, self.samples)?;
+        draw(&prepared, &folder, self.samples, lead)
+    }
+
+    fn prepared<'a>(&self, text: &str, registry: &'a Registry) -> anyhow::Result<Prepared<'a>> {
         if !self.run.join("results.json").is_file() {
             let run = self.run.display();
             bail!(
                 "{run} is not finished: there is no results.json in it; resume it with `kerrlight fit --resume {run}`"
             );
         }
-        let file = super::parse(&text).with_context(|| self.run.display().to_string())?;
-        let prepared = Prepared::new(file, &super::base_dir_of(&text), registry)?;
-        draw(&prepared, &folder, self.samples)
+        let file = super::parse(text).with_context(|| self.run.display().to_string())?;
+        Prepared::new(file, &super::base_dir_of(text), registry)
+    }
+
+    /// Hands what draws are made of, and the folder they go to, to `work` while another process holds the run.
+    fn with(
+        &self,
+        registry: &Registry,
+        work: impl FnOnce(&Drawing<'_>, &Path) -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
+        let (folder, text) = Folder::look(&self.run)?;
+        let prepared = self.prepared(&text, registry)?;
+        let unknown = prepared.file.unknown_world()?;
+        let path = folder.path().join(FOLDER);
+        let drawing = Drawing::new(&prepared, &folder, (unknown.as_ref(), self.samples), &path)?;
+        work(&drawing, &path)
     }
 }
 
@@ -79,49 +105,54 @@ pub fn check(file: &FitFile) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Draws so many times, those that are there included, and writes what follows.
-pub fn draw(prepared: &Prepared<'_>, folder: &Folder, samples: u32) -> anyhow::Result<Answer> {
+/// Draws so many times, those that are there included, and writes what follows. Where other ranks wait for `lead`, all
+/// draw.
+pub fn draw(
+    prepared: &Prepared<'_>,
+    folder: &Folder,
+    samples: u32,
+    lead: Option<Lead>,
+) -> anyhow::Result<Answer> {
     check(&prepared.file)?;
     let path = folder.path().join(FOLDER);
     std::fs::create_dir_all(&path).with_context(|| format!("cannot make {}", path.display()))?;
     let unknown = prepared.file.unknown_world()?;
-    let world = world_search::found(folder)?;
-    let complete = (1..=u64::from(samples)).all(|number| names(&path, number)[1].is_file());
-    let worlds = match (&unknown, &world) {
-        (Some(unknown), Some(world)) if !complete => Some(worlds(prepared, unknown, world)?),
-        _ => None,
-    };
-    let factor = match &worlds {
-        Some(worlds) => worlds.factor(),
-        None => noise_of(folder)?,
-    };
-    let file = held_out::settled(&prepared.file, folder)?;
-    let drawing = Drawing { prepared, file, unknown: unknown.as_ref(), worlds, factor };
+    let drawing = Drawing::new(prepared, folder, (unknown.as_ref(), samples), &path)?;
     let bar = progress::samples(u64::from(samples));
     let keeper = Keeper::brief(format!("stopping; resume with: {}", again(folder, samples)));
+    if let Some(lead) = &lead {
+        drawing.share_all(&lead.team, &path, (samples, &keeper), &bar)?;
+        bar.set_position(0);
+    }
     let mut all = Vec::new();
     for number in 1..=u64::from(samples) {
-        let kept = match kept(&path, number)? {
-            Some(kept) => kept,
-            None => {
-                let told = |text: &str| bar.set_message(text.to_owned());
-                let Some(drawn) = drawing.one(number, &keeper, &told)? else {
-                    bar.abandon();
-                    let how = again(folder, samples);
-                    let text = format!("stopped after {} draws; resume with: {how}", all.len());
-                    return Err(Interrupted(text).into());
-                };
-                keep(&path, number, factor, drawn)?
-            }
+        let Some(kept) = drawing.kept_or_drawn(&path, number, &keeper, &bar)? else {
+            bar.abandon();
+            let how = again(folder, samples);
+            let text = format!("stopped after {} draws; resume with: {how}", all.len());
+            return Err(Interrupted(text).into());
         };
         all.push(kept);
         bar.inc(1);
     }
     bar.finish_and_clear();
+    let answer = add_up(prepared, folder, &path, &all)?;
+    together::end(lead, folder);
+    Ok(answer)
+}
+
+/// Writes what follows from draws.
+fn add_up(
+    prepared: &Prepared<'_>,
+    folder: &Folder,
+    path: &Path,
+    all: &[Kept],
+) -> anyhow::Result<Answer> {
+    let world = world_search::found(folder)?;
     let truth = prepared.measured.truth.as_ref();
     let truth = truth.map(|t| super::results::true_volume(&prepared.file, t)).transpose()?;
-    let found = summary::Summary::new(&prepared.file, world.as_ref(), &all, truth)?;
-    page::write(&found, prepared, &path)?;
+    let found = summary::Summary::new(&prepared.file, world.as_ref(), all, truth)?;
+    page::write(&found, prepared, path)?;
     let numbers = found.numbers();
     output::Output::new(&path.join(NUMBERS), "")?.write(sealed(numbers.clone()).as_bytes())?;
     let files = [PAGE, NUMBERS, "mean.npz", "deviation.npz"].map(|name| path.join(name));
@@ -166,7 +197,44 @@ struct Drawing<'a> {
     factor: f64,
 }
 
-impl Drawing<'_> {
+impl<'a> Drawing<'a> {
+    /// Of draws around the run in `folder`, of which there are to be so many in `path`.
+    fn new(
+        prepared: &'a Prepared<'a>,
+        folder: &Folder,
+        (unknown, samples): (Option<&'a UnknownWorld>, u32),
+        path: &Path,
+    ) -> anyhow::Result<Self> {
+        let world = world_search::found(folder)?;
+        let complete = (1..=u64::from(samples)).all(|number| names(path, number)[1].is_file());
+        let worlds = match (unknown, &world) {
+            (Some(unknown), Some(world)) if !complete => Some(worlds(prepared, unknown, world)?),
+            _ => None,
+        };
+        let factor = match &worlds {
+            Some(worlds) => worlds.factor(),
+            None => noise_of(folder)?,
+        };
+        let file = held_out::settled(&prepared.file, folder)?;
+        Ok(Self { prepared, file, unknown, worlds, factor })
+    }
+
+    /// A draw of an earlier call, or a new one; none if it was stopped.
+    fn kept_or_drawn(
+        &self,
+        path: &Path,
+        number: u64,
+        keeper: &Keeper,
+        bar: &ProgressBar,
+    ) -> anyhow::Result<Option<Kept>> {
+        if let Some(kept) = kept(path, number)? {
+            return Ok(Some(kept));
+        }
+        let told = |text: &str| bar.set_message(text.to_owned());
+        let Some(drawn) = self.one(number, keeper, &told)? else { return Ok(None) };
+        keep(path, number, self.factor, drawn).map(Some)
+    }
+
     fn one(
         &self,
         number: u64,
