@@ -154,11 +154,8 @@ fn run(arguments: &Arguments, program: &Program) -> anyhow::Result<()> {
 impl Verb {
     /// Whether ranks of one job do it together. Of others each does it for itself.
     fn shares(&self) -> bool {
-        match self {
-            Verb::Render(_) | Verb::Movie(_) | Verb::Fit(_) | Verb::Posterior(_) => true,
-            Verb::Compare(_) => true,
-            _ => false,
-        }
+        let pictures = matches!(self, Verb::Render(_) | Verb::Movie(_));
+        pictures || matches!(self, Verb::Fit(_) | Verb::Posterior(_) | Verb::Compare(_))
     }
 
     /// Whether standard output carries a file, because a path is `-`.

@@ -2,6 +2,7 @@
 
 use crate::shared_folder::{claims, experiment};
 use crate::support::{binary, root, succeed};
+use std::ffi::OsStr;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -11,7 +12,7 @@ fn start(at: &Path, ranks: usize, output: &str) -> Option<Child> {
     start_with(at, ranks, &["compare", "seeds.toml", "-o", output, "--threads", "1"])
 }
 
-fn start_with(at: &Path, ranks: usize, words: &[&str]) -> Option<Child> {
+fn start_with(at: &Path, ranks: usize, words: &[impl AsRef<OsStr>]) -> Option<Child> {
     if Command::new("mpirun").arg("--version").output().is_err() {
         eprintln!("MPI IS NOT TESTED: there is no mpirun");
         return None;
@@ -24,7 +25,7 @@ fn start_with(at: &Path, ranks: usize, words: &[&str]) -> Option<Child> {
 }
 
 /// What a job says that must succeed; nothing where there is no `mpirun`.
-fn says(at: &Path, ranks: usize, words: &[&str]) -> Option<String> {
+fn says(at: &Path, ranks: usize, words: &[impl AsRef<OsStr>]) -> Option<String> {
     let said = start_with(at, ranks, words)?.wait_with_output().unwrap();
     assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stderr));
     Some(String::from_utf8(said.stdout).unwrap())
@@ -206,13 +207,14 @@ fn exact_ranks_of_mpirun_render_one_film() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let scene = scene("hot_spots.toml");
-    let words = |output| {
-        let mut words = vec!["movie", &scene, "-o", output, "--frames", "13", "--duration", "100"];
-        words.extend(["--set", "screen.width=16", "--set", "screen.total_flux_jy=2.5"]);
-        words.extend(["--gif", "film.gif", "--threads", "1"]);
-        words
+    let words = |output: &str| {
+        let fixed = ["movie", &scene, "--frames", "13", "--duration", "100", "--gif", "film.gif"];
+        let set = ["--set", "screen.width=16", "--set", "screen.total_flux_jy=2.5"];
+        let all = [&fixed[..], &set, &["--threads", "1", "-o", output]].concat();
+        all.into_iter().map(str::to_owned).collect::<Vec<String>>()
     };
-    succeed(at, &words("alone"));
+    let alone = words("alone");
+    succeed(at, &alone.iter().map(String::as_str).collect::<Vec<_>>());
     let gif = std::fs::read(at.join("film.gif")).unwrap();
     let same = |other: &str| {
         assert_eq!(names(&at.join("alone")), names(&at.join(other)));

@@ -17,6 +17,9 @@ pub fn experiment(folder: &Path, seeds: usize, steps: usize) {
         fit = {fit:?}
         [set]
         screen.pixels = 6
+        screen.width = 30.0
+        region.r_min = 3.0
+        region.r_max = 4.2
         movie.frames = 2
         output.nodes = 6
         representation = {{ kind = "grid", nodes = 6 }}
