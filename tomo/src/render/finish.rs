@@ -53,7 +53,7 @@ impl Raster {
     ) -> std::result::Result<(), Error> {
         let sink = |bands: Vec<Band>| {
             bands.iter().try_for_each(|band| {
-                let bytes = self.layout.compress(band.index, &band.channels)?;
+                let bytes = self.layout.compress(band.index, &band.channels)?.concat();
                 let alone =
                     Journal::of_band(identity, self.bands(), (band.index, band.tally), &bytes);
                 alone.and_then(|alone| keep(band.index, alone)).map_err(exr::error::Error::from)?;
