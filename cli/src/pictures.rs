@@ -6,7 +6,7 @@ use crate::render::preview::PreviewOptions;
 use crate::render::report;
 use crate::render::source::{BUILT_IN, Source};
 use anyhow::Context;
-use kerrlight_tomo::image::exr::{self, Attributes};
+use kerrlight_tomo::image::exr::{self, Attributes, CameraMatrices, Style};
 use kerrlight_tomo::image::preview::{Look, encode_png};
 use kerrlight_tomo::memory;
 use kerrlight_tomo::render::{Film, Progress, Raster, Rendered};
@@ -28,7 +28,23 @@ pub struct Shown {
     pub rendered: Rendered,
     /// What its EXR file says of it.
     pub attributes: Attributes,
+    camera: CameraMatrices,
     look: Look,
+}
+
+/// What pictures of one scene share.
+struct Common<'a> {
+    legend: String,
+    identifiers: Option<String>,
+    files: &'a str,
+}
+
+/// The text of the scene that an EXR of this program holds.
+///
+/// # Errors
+/// If the file cannot be read, or holds no scene.
+pub fn scene_of_exr(path: &Path) -> anyhow::Result<String> {
+    Ok(Source::new(Some(path))?.text)
 }
 
 impl Shot {
@@ -60,7 +76,12 @@ impl Shot {
         let raster = Raster::new(&self.scene, files.decoded);
         let raster = raster.with_context(|| self.source.name.clone())?;
         let rendered = raster.render(progress)?;
-        Ok(self.shown(rendered, raster.legend(), &files.identity))
+        let common = Common {
+            legend: raster.legend(),
+            identifiers: raster.identifiers(),
+            files: &files.identity,
+        };
+        Ok(self.shown(rendered, raster.camera(), &common))
     }
 
     /// Pictures at `times` (of observation, M) that share the first one's unit of intensity.
@@ -72,6 +93,11 @@ impl Shot {
         let files = assets::load(&self.scene, &self.source.folder, &[])?;
         let film = Film::new(&self.scene, files.decoded);
         let mut film = film.with_context(|| self.source.name.clone())?;
+        let common = Common {
+            legend: film.legend(),
+            identifiers: film.identifiers(),
+            files: &files.identity,
+        };
         let (mut shown, mut factor) = (Vec::with_capacity(times.len()), None);
         for batch in times.chunks(film.batch()) {
             let frames = film.frames(batch, progress)?;
@@ -79,8 +105,9 @@ impl Shot {
                 factor = Some(film.unit_factor(first)?);
             }
             for frame in frames {
+                let camera = film.camera(&frame)?;
                 let rendered = film.rendered(frame, factor.unwrap_or(1.0))?;
-                shown.push(self.shown(rendered, film.legend(), &files.identity));
+                shown.push(self.shown(rendered, camera, &common));
             }
         }
         Ok(shown)
@@ -94,12 +121,14 @@ impl Shot {
         Ok(memory::afford(what, memory::table(pixels, 40.0))?)
     }
 
-    fn shown(&self, rendered: Rendered, legend: String, files: &str) -> Shown {
+    fn shown(&self, rendered: Rendered, camera: CameraMatrices, common: &Common<'_>) -> Shown {
+        let legend = common.legend.clone();
         let mut attributes = report::attributes(&self.scene, &self.text, legend, &rendered.summary);
-        if !files.is_empty() {
-            attributes.insert("files".to_owned(), files.to_owned());
+        if !common.files.is_empty() {
+            attributes.insert("files".to_owned(), common.files.to_owned());
         }
-        Shown { rendered, attributes, look: PreviewOptions::default().look(&self.scene) }
+        attributes.extend(common.identifiers.iter().map(|ids| ("ids".to_owned(), ids.clone())));
+        Shown { rendered, attributes, camera, look: PreviewOptions::default().look(&self.scene) }
     }
 }
 
@@ -109,7 +138,8 @@ impl Shown {
     /// # Errors
     /// On a failure of the encoder.
     pub fn exr(&self) -> anyhow::Result<Vec<u8>> {
-        Ok(exr::encode(&self.rendered.picture, &self.attributes)?)
+        let style = Style { camera: Some(self.camera), ..Style::default() };
+        Ok(exr::encode_in_style(&self.rendered.picture, &self.attributes, style)?)
     }
 
     /// The bytes of a PNG.

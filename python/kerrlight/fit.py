@@ -116,7 +116,7 @@ class Fit:
     ) -> Fit:
         """Runs the fit, or resumes it where its folder holds a part of it.
 
-        :param callback: called with each line of the log, a dictionary with ``step``, ``loss``, ``chi2_per_datum`` and,
+        :param callback: called with each line of the log that has a loss, a dictionary with ``step``, ``loss``, ``chi2_per_datum`` and,
             where the truth is known, ``psnr_db``. What it raises stops the fit after its step, and is raised.
         :param progress: whether to show a bar, if tqdm is installed.
         :param threads: how many threads to use, which changes no result.
@@ -126,6 +126,10 @@ class Fit:
         Ctrl-C stops it after the step that is under way, and raises ``KeyboardInterrupt``; ``run`` again goes on.
         """
         is_begun = (self.folder / "fit.toml").is_file()
+        if is_begun:
+            self._check_same()
+        if callback is not None and not callable(callback):
+            raise TypeError(f"callback = {callback!r} is not allowed: a function")
         file = None if is_begun or self._text is None else self._file()
         try:
             command = self._command(file)
@@ -141,6 +145,13 @@ class Fit:
         self.__dict__.pop("results", None)
         return self
 
+    def _check_same(self) -> None:
+        kept = (self.folder / "fit.toml").read_text(encoding="utf-8")
+        if not _core.same_toml(kept, self.settings):
+            raise ValueError(
+                f"{self.folder} holds a fit with other settings: give another folder, or Fit.open({str(self.folder)!r})"
+            )
+
     def _follow(
         self, command: list[str], callback: Callback | None, progress: bool, file: Any
     ) -> None:
@@ -153,7 +164,7 @@ class Fit:
             seen += len(lines)
             for line in lines:
                 _show(bar, line)
-                if callback is not None:
+                if callback is not None and "loss" in line:
                     callback(line)
 
         try:
@@ -189,21 +200,27 @@ class Fit:
         """Whether the model explains its data, in words."""
         return self.results["verdict"]["text"]
 
+    def _written(self, name: str) -> Path:
+        path = self.folder / name
+        if not path.is_file():
+            raise FileNotFoundError(f"{self.folder} holds no {name} yet: run() it to its end")
+        return path
+
     @property
     def volume(self) -> Volume:
         """The recovered emission."""
-        return Volume(self.folder / "volume.npz")
+        return Volume(self._written("volume.npz"))
 
     @property
     def truth(self) -> Volume:
         """The true emission, where it is known."""
-        return Volume(self.folder / "truth.npz")
+        return Volume(self._written("truth.npz"))
 
     @property
     def movie(self) -> dict[str, NDArray[Any]]:
         """Images: ``recovered`` and ``data``, arrays over (t, y, x) in Jy/pixel, with ``time`` in M and, where mass and
         distance are known, ``hours`` and ``field_uas``."""
-        with np.load(self.folder / "movie.npz") as arrays:
+        with np.load(self._written("movie.npz")) as arrays:
             return {name: arrays[name] for name in arrays}
 
     def posterior(
@@ -222,6 +239,7 @@ class Fit:
 
         Ctrl-C stops it; the draws that are complete are kept, and the next call continues.
         """
+        self._written("results.json")
         return draw(self.folder, samples, progress, _program.limits(threads, memory))
 
     def report(self) -> Report:

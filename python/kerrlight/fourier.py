@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kerrlight import _core
-from kerrlight._arrays import Floats, real
+from kerrlight._arrays import Floats, finite
 from kerrlight.model import _Linear, precision
 
 __all__ = ["Fourier"]
@@ -47,7 +47,7 @@ class Fourier(_Linear):
         height, width = (int(n) for n in shape)
         alone = isinstance(uv, np.ndarray) or np.ndim(uv[0]) == 1  # type: ignore[index]
         lists: list[Any] = [uv] if alone else list(uv)  # type: ignore[arg-type]
-        frames = [real("uv", each).reshape(-1, 2) for each in lists]
+        frames = [finite("uv", each).reshape(-1, 2) for each in lists]
         counts = [len(frame) for frame in frames]
         flat = np.ascontiguousarray(np.concatenate(frames)).reshape(-1)
         screen = (width, height, float(field_uas))

@@ -115,18 +115,22 @@ class Observation:
             "integration": _column("integration", _or_zero(self.integration, (count,)), (count,)),
             "opacity": _column("opacity", _or_zero(self.opacity, (count, 2)), (count, 2)),
         }
+        if not np.isfinite(columns["time"]).all():
+            raise ValueError("time has an element that is no finite number")
+        if (columns["sigmas"] < 0).any():
+            raise ValueError(f"sigmas = {columns['sigmas'].min()} is not allowed: 0 or above, or NaN")
         for name, column in columns.items():
-            object.__setattr__(self, name, column)
+            object.__setattr__(self, name, _frozen(column))
         if names.shape != (count, 2):
             raise ValueError(f"stations have the shape {names.shape}, not {(count, 2)}")
-        object.__setattr__(self, "stations", names)
+        object.__setattr__(self, "stations", _frozen(names))
         object.__setattr__(self, "array", (*self.array, *map(Station, missing)))
         products = np.ascontiguousarray(self.products, dtype=np.complex128)
         if products.shape != (count, 4):
             raise ValueError(f"products have the shape {products.shape}, not {(count, 4)}")
-        object.__setattr__(self, "products", products)
+        object.__setattr__(self, "products", _frozen(products))
         channel = np.zeros(count) if self.channel is None else np.asarray(self.channel)
-        object.__setattr__(self, "channel", np.ascontiguousarray(channel, dtype=np.int64))
+        object.__setattr__(self, "channel", _frozen(np.asarray(channel, dtype=np.int64)))
         object.__setattr__(self, "_core", self._visibilities())
 
     def _visibilities(self) -> Any:
@@ -399,6 +403,13 @@ class Observation:
     def __repr__(self) -> str:
         basis = "RR, LL, RL, LR" if self.circular else "I, Q, U, V"
         return f"<Observation of {self.source or 'no name'}: {len(self)} rows of {basis}, {len(self.array)} stations>"
+
+
+def _frozen(column: Any) -> Any:
+    """A copy that cannot be written to: an observation does not change."""
+    column = np.array(column, order="C")
+    column.setflags(write=False)
+    return column
 
 
 def _or_zero(column: Any, shape: tuple[int, ...]) -> Any:

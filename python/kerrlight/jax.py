@@ -41,12 +41,16 @@ def _call(function: Any, shape: tuple[int, ...], dtype: Any, values: Any) -> Any
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
 def apply(operator: Any, values: Any) -> Any:
-    """``operator.apply(values)`` for an array of JAX, under ``jit``, ``grad`` and ``vmap``.
+    """``operator.apply(values)`` for an array of JAX, under ``jit``, ``grad`` and ``vmap``; there is no forward mode (``jvp``).
 
     ``operator`` is a :class:`kerrlight.ForwardModel`, what its ``voxels`` or ``at`` gives, or a
     :class:`kerrlight.Fourier`. The work is done on the host; results have the precision of ``values``.
     """
     values = jnp.asarray(values)
+    if values.shape != tuple(operator.input_shape):
+        raise ValueError(f"values have the shape {values.shape}, not {tuple(operator.input_shape)}")
+    if values.dtype not in (jnp.float32, jnp.float64):
+        raise TypeError(f"values have the type {values.dtype}: float32 or float64 are needed")
     dtype = _complex(values.dtype) if getattr(operator, "is_complex", False) else values.dtype
     return _call(operator.apply, operator.output_shape, dtype, values)
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from kerrlight import _core
-from kerrlight._arrays import Floats, real, together
+from kerrlight._arrays import Floats, finite, real, together, whole
 from kerrlight.rays import Observer
 
 __all__ = [
@@ -152,8 +152,7 @@ def screen(pixels: int, width: float) -> tuple[Floats, Floats]:
     >>> alpha[0].tolist(), beta[:, 0].tolist()
     ([-3.0, -1.0, 1.0, 3.0], [3.0, 1.0, -1.0, -3.0])
     """
-    if not 1 <= pixels <= 16384:
-        raise ValueError(f"pixels = {pixels} is not allowed: 1 to 16384")
+    pixels = whole("pixels", pixels, 1, 16384)
     if not (width > 0 and math.isfinite(width)):
         raise ValueError(f"width = {width} is not allowed: above 0 (M)")
     at = (np.arange(pixels) - 0.5 * (pixels - 1)) * (width / pixels)
@@ -212,7 +211,10 @@ class ForwardModel(_Linear):
     :param scale: flux of a pixel with an integral of 1.
     :param polarization: the gas's field and law of light; images are then of the parameters in ``stokes``, with the
         electric vector's angle counted from +β towards −α (from north to east, if the spin points north).
-    :param stokes: which parameters, with ``polarization``: some of the letters of ``"IQU"``.
+    :param stokes: which parameters, with ``polarization``: some of the letters of ``"IQU"``, all by default.
+
+    A pixel is the light of the ray through its centre. Photon rings are thinner than coarse pixels: use many pixels, or
+    regions and orders without them, where their light matters.
 
     >>> from kerrlight import Kerr
     >>> observer = Kerr(0.0).observer(inclination_deg=60)
@@ -248,19 +250,28 @@ class ForwardModel(_Linear):
         redshift_power: float | None = None,
         scale: float = 1.0,
         polarization: PolarizationLaw | None = None,
-        stokes: str = "IQU",
+        stokes: str | None = None,
     ) -> None:
         self.image_shape, columns = together(alpha=alpha, beta=beta)
-        self.times = np.atleast_1d(real("times", times)).copy()
-        direction = real("axis", axis)
+        self.times = np.atleast_1d(finite("times", times)).copy()
+        if self.times.ndim != 1 or self.times.size == 0:
+            raise ValueError(f"times have the shape {self.times.shape}: give a list of one or more")
+        if not isinstance(velocity, _Law):
+            allowed = "Keplerian, PowerLaw, Tabulated, Infall or Profile"
+            raise TypeError(f"velocity = {velocity!r} is not allowed: {allowed}")
+        direction = finite("axis", axis)
         if direction.shape != (3,):
             raise ValueError(f"axis has the shape {direction.shape}, not (3,)")
-        if not 1 <= order <= 16:
-            raise ValueError(f"order = {order} is not allowed: 1 to 16")
-        if not 1 <= split <= 4096:
-            raise ValueError(f"split = {split} is not allowed: 1 to 4096")
+        order, split = whole("order", order, 1, 16), whole("split", split, 1, 4096)
+        if per_ray is not None:
+            per_ray = whole("per_ray", per_ray, 1, 10**6)
+            if not math.isfinite(observer.radius):
+                raise ValueError("per_ray needs an observer at a finite radius: hole.observer(…, radius=1000)")
         if not math.isfinite(scale):
             raise ValueError(f"scale = {scale} is not allowed: a finite number")
+        if stokes is not None and polarization is None:
+            raise ValueError(f'stokes = "{stokes}" needs polarization: a PolarizationLaw')
+        stokes = "IQU" if stokes is None else stokes
         if not stokes or len(set(stokes)) < len(stokes):
             raise ValueError(f'stokes = "{stokes}" is not allowed: some of the letters of "IQU", each once')
         self.stokes = stokes if polarization is not None else ""
@@ -347,13 +358,29 @@ class ForwardModel(_Linear):
         places = self._core.coordinates(self._frames, kind == np.dtype(np.float32))
         return places.reshape(self.frames, self.nodes, 3)
 
-    def at(self, frames: Sequence[int]) -> ForwardModel:
-        """The same model with some of its frames alone, for a step of training; nothing is traced or copied."""
+    def at(self, frames: ArrayLike | slice) -> ForwardModel:
+        """The same model with some of its frames alone, for a step of training; nothing is traced or copied.
+
+        ``frames`` are numbers of frames, a slice or a mask.
+        """
+        chosen = self._chosen(frames)
         part = object.__new__(ForwardModel)
         part.__dict__.update({k: v for k, v in self.__dict__.items() if k != "_columns"})
-        part._frames = [self._frames[int(frame)] for frame in frames]
-        part.times = self.times[[int(frame) for frame in frames]]
+        part._frames = [self._frames[frame] for frame in chosen]
+        part.times = self.times[chosen]
         return part
+
+    def _chosen(self, frames: Any) -> list[int]:
+        if isinstance(frames, slice):
+            return list(range(self.frames))[frames]
+        array = np.atleast_1d(np.asarray(frames))
+        if array.dtype == bool and array.shape == (self.frames,):
+            return np.flatnonzero(array).tolist()
+        if array.dtype.kind not in "iu" or array.ndim != 1 or array.size == 0:
+            raise TypeError(f"frames = {frames!r} is not allowed: numbers of frames, a slice, or a mask of {self.frames}")
+        if not ((-self.frames <= array) & (array < self.frames)).all():
+            raise IndexError(f"frames = {array.tolist()} is not allowed: there are {self.frames}")
+        return array.tolist()
 
     def apply(self, values: ArrayLike) -> NDArray[Any]:
         """The movie of emission on the nodes: (frames, nodes) to (frames, ...), in the precision of the emission."""
@@ -372,10 +399,12 @@ class ForwardModel(_Linear):
 
         A single number stands for all three axes, and without ``high`` the box is [-low, low]³.
         """
-        nodes = [int(n) for n in np.broadcast_to(np.asarray(shape), 3)]
+        nodes = [whole("shape", n, 2, 4096) for n in np.broadcast_to(np.asarray(shape), 3)]
         first = np.broadcast_to(real("low", low), 3)
         if high is None:
-            return VoxelModel(self, nodes, (-abs(first)).tolist(), abs(first).tolist())
+            if not (first > 0).all():
+                raise ValueError(f"low = {first.tolist()} is not allowed without high: half the sides of a box, above 0")
+            return VoxelModel(self, nodes, (-first).tolist(), first.tolist())
         last = np.broadcast_to(real("high", high), 3)
         return VoxelModel(self, nodes, first.tolist(), last.tolist())
 

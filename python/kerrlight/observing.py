@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerrlight import _core
-from kerrlight._arrays import real
+from kerrlight._arrays import finite, real, whole
 from kerrlight.interferometry import Observation, Station
 
 __all__ = ["observe", "stations"]
@@ -79,6 +79,7 @@ def observe(
     :param elevation_deg: least and greatest elevation at which stations observe.
     :param of_date: whether the Earth's axis precesses; otherwise catalogue coordinates are taken as of date.
     :param ut1_utc: UT1 - UTC in seconds, in place of the built-in table's.
+    :param noise: whether there is thermal noise, which needs a ``seed``.
     :param frame_hours: hours of UTC of the images of a movie, between which it is linear; by default those of the scans.
     :param pulse: shape of a pixel, as of :class:`kerrlight.Fourier`.
     :param accuracy: as of :class:`kerrlight.Fourier`.
@@ -86,7 +87,6 @@ def observe(
     :param gain_constant: standard deviation of the logarithm of station gains, constant in time.
     :param gain_scan: the same, another gain for every scan.
     :param random_phases: whether stations have random phases in every scan.
-    :param noise: whether there is thermal noise.
     :param seed: of noise and gains, without which they do not go.
 
     >>> import numpy as np
@@ -97,7 +97,15 @@ def observe(
     >>> bool(np.allclose(abs(obs.vis), 1.0)), obs.source
     (True, 'M87')
     """
-    movie = real("images", images)
+    if not isinstance(array, (str, PathLike)) and hasattr(array, "tarr"):
+        raise TypeError("array is eht-imaging's: give the path of its file, or kerrlight.Station objects")
+    if hasattr(images, "imarr") or hasattr(images, "frames"):
+        raise TypeError("images are eht-imaging's: give im.imarr(), or np.array([im.imarr() for im in movie.im_list()])")
+    if not isinstance(source, str):
+        raise TypeError(f'source = {source!r} is not allowed: "sgra", "m87", or text such as "12.5,-29.25"')
+    movie = finite("images", images)
+    mjd, scans = whole("mjd", mjd, -(10**9), 10**9), whole("scans", scans, -(10**9), 10**9)
+    seed = None if seed is None else whole("seed", seed, 0, 2**64 - 1)
     if movie.ndim not in (2, 3):
         raise ValueError(f"images have the shape {movie.shape}: (y, x) or (t, y, x) are needed")
     if (utc is None) == (gmst is None):

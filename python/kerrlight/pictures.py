@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 import os
 from functools import cached_property
 from os import PathLike, fspath
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kerrlight import _core
-from kerrlight._arrays import Floats, real
+from kerrlight._arrays import Floats, finite
 
 if TYPE_CHECKING:
     from kerrlight.scene import Scene
@@ -35,16 +36,27 @@ def _plain(value: Any) -> Any:
     raise TypeError(f"{value!r} is no setting")
 
 
-def _without_none(value: Any) -> Any:
+INFINITE = "\0inf"
+"""What stands for infinity in JSON, which has none."""
+
+
+def _without_none(value: Any, name: str = "") -> Any:
     """Tables without keys that are None; a key with dots leads through tables, as in TOML."""
     if isinstance(value, Mapping):
         table: dict[str, Any] = {}
         for key, of in value.items():
             if of is not None:
-                _put(table, str(key).split("."), _without_none(of))
+                whole_name = f"{name}.{key}" if name else str(key)
+                _put(table, str(key).split("."), _without_none(of, whole_name))
         return table
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
     if isinstance(value, (list, tuple)):
-        return [_without_none(v) for v in value]
+        return [_without_none(v, f"{name}.{k}") for k, v in enumerate(value)]
+    if isinstance(value, (float, np.floating)) and not math.isfinite(value):
+        if math.isnan(value):
+            raise ValueError(f"{name} = nan is not allowed: a number")
+        return INFINITE if value > 0 else f"-{INFINITE}"
     return value
 
 
@@ -70,7 +82,12 @@ def text_of(settings: Settings, folder: Union[None, str, PathLike[str]]) -> tupl
         return _core.toml_of_json(encoded), fspath(folder or ".")
     if settings is None:
         return None, fspath(folder or ".")
+    if not isinstance(settings, (str, PathLike)):
+        kind = type(settings).__name__
+        raise TypeError(f"settings are a dictionary, TOML text, the path of a file or a Scene, not {kind}")
     name = fspath(settings)
+    if name.lower().endswith(".exr") and "\n" not in name:
+        return _core.scene_of_exr(name), fspath(folder or os.path.dirname(name) or ".")
     if isinstance(settings, str) and ("\n" in name or "=" in name):
         return name, fspath(folder or ".")
     with open(name, encoding="utf-8") as file:
@@ -90,15 +107,18 @@ def overrides_of(changes: Mapping[str, Any] | None) -> list[str]:
     """``key.path=value`` of each change, values as TOML writes them; a dictionary changes the keys that it has, and None
     removes a key."""
 
-    def value(of: Any) -> str:
-        text = _core.toml_of_json(json.dumps({"value": _without_none(of)}, default=_plain))
+    if changes is not None and not isinstance(changes, Mapping):
+        raise TypeError(f"set = {changes!r} is not allowed: a dictionary of changes")
+
+    def value(key: str, of: Any) -> str:
+        text = _core.toml_of_json(json.dumps({"value": _without_none(of, key)}, default=_plain))
         name, _, rest = text.partition("=")
         if name.strip() != "value":
             raise TypeError(f"{of!r} is no single value: change its keys one by one")
         return rest.strip()
 
     flat = _flat(changes or {})
-    return [f"{key}=" if of is None else f"{key}={value(of)}" for key, of in flat]
+    return [f"{key}=" if of is None else f"{key}={value(key, of)}" for key, of in flat]
 
 
 class Picture(Mapping[str, "NDArray[np.float32]"]):
@@ -150,12 +170,12 @@ class Picture(Mapping[str, "NDArray[np.float32]"]):
         return (-x, x, -y, y)
 
     def to_exr(self, path: Union[str, PathLike[str]]) -> None:
-        """Writes an EXR file with all channels; ``kerrlight render FILE.exr`` renders it again."""
-        _write(path, self._core.exr())
+        """Writes an EXR file with all channels; :func:`render` and ``kerrlight render`` render it again."""
+        _write(_ending(path, ".exr"), self._core.exr())
 
     def to_png(self, path: Union[str, PathLike[str]]) -> None:
         """Writes the PNG that ``kerrlight render`` writes by default."""
-        _write(path, self._core.png())
+        _write(_ending(path, ".png"), self._core.png())
 
     def plot(self, channel: str = "intensity", ax: Any = None, **options: Any) -> Any:
         """Draws a channel with matplotlib, on ``ax`` or a new figure; ``options`` go to ``imshow``. Returns the axes."""
@@ -216,6 +236,12 @@ class Movie:
         return f"<Movie of {len(self)} frames: {self.frames[0]!r}>"
 
 
+def _ending(path: Union[str, PathLike[str]], wanted: str) -> Union[str, PathLike[str]]:
+    if not fspath(path).lower().endswith(wanted):
+        raise ValueError(f"{fspath(path)} is not allowed: a name that ends with {wanted}")
+    return path
+
+
 def _write(path: Union[str, PathLike[str]], data: bytes) -> None:
     with open(path, "wb") as file:
         file.write(data)
@@ -229,8 +255,8 @@ def render(
 ) -> Picture:
     """Renders a scene.
 
-    :param scene: a :class:`kerrlight.scene.Scene`, a dictionary with the tables of a scene file, its text, its path, or
-        nothing for the built-in scene.
+    :param scene: a :class:`kerrlight.scene.Scene`, a dictionary with the tables of a scene file, its text, its path, an
+        EXR that was rendered before, or nothing for the built-in scene.
     :param set: changes, with dotted keys: ``{"hole.spin": 0.5, "spot.0.phase_deg": 90}``.
     :param folder: where relative paths in the scene start from; by default the folder of its file, else the current one.
     :raises ValueError: for what the program refuses, with its words.
@@ -266,7 +292,7 @@ def movie(
     Under a fixed camera a ray is traced once for many frames. If the scene asks for a flux, that is the first frame's.
     """
     text, base = text_of(scene, folder)
-    moments = np.atleast_1d(real("times", times)).copy()
+    moments = np.atleast_1d(finite("times", times)).copy()
     if moments.size == 0:
         raise ValueError("times is empty: give one or more")
     frames: Sequence[Any] = _core.film(text, base, overrides_of(set), moments.tolist())

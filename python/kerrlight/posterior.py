@@ -12,7 +12,7 @@ from typing import Any, Iterator, Union
 import numpy as np
 
 from kerrlight import _program
-from kerrlight._arrays import Floats
+from kerrlight._arrays import Floats, whole
 from kerrlight.report import Report
 from kerrlight.volume import Volume
 
@@ -84,8 +84,7 @@ class Posterior:
 
 def draw(folder: Path, samples: int, progress: bool, limits: list[str]) -> Posterior:
     """Draws around the fit in a folder."""
-    if samples < 2:
-        raise ValueError(f"samples = {samples} is not allowed: 2 to 100000")
+    samples = whole("samples", samples, 2, 100_000)
     inside = folder / "posterior"
 
     def done() -> int:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerrlight import _core
-from kerrlight._arrays import Floats, real, together
+from kerrlight._arrays import Floats, finite, together, whole
 from kerrlight.table import Outcome, Points, Rays
 
 __all__ = [
@@ -65,13 +65,13 @@ def _placement(samples: Placement) -> tuple[tuple[str, int, float, float], int]:
     if isinstance(samples, MinoTime):
         samples = samples.points
     if isinstance(samples, PathLength):
-        return ("path-length", samples.points, 0.0, float(samples.radius)), samples.points
+        points = whole("points", samples.points, 1, 10**9)
+        return ("path-length", points, 0.0, float(samples.radius)), points
     if isinstance(samples, GaussLegendre):
-        kind = ("gauss-legendre", samples.points, float(samples.start), float(samples.stop))
-        return kind, 2 * samples.points
-    if samples < 0:
-        raise ValueError(f"samples = {samples} is not allowed: 0 or above")
-    return ("mino-time" if samples else "none", int(samples), 0.0, 0.0), int(samples)
+        points = whole("points", samples.points, 1, 10**9)
+        return ("gauss-legendre", points, float(samples.start), float(samples.stop)), 2 * points
+    points = whole("samples", samples, 0, 10**9)
+    return ("mino-time" if points else "none", points, 0.0, 0.0), points
 
 
 @dataclass(frozen=True)
@@ -89,6 +89,8 @@ class Kerr:
     spin: float
 
     def __post_init__(self) -> None:
+        if isinstance(self.spin, (str, bytes)):
+            raise TypeError(f"spin = {self.spin!r} is not allowed: a number in [-1, 1]")
         object.__setattr__(self, "spin", float(self.spin))
         _core.radii(self.spin)
 
@@ -250,8 +252,7 @@ class Observer:
         """
         shape, (a, b) = together(alpha=alpha, beta=beta)
         placed, width = _placement(samples)
-        if crossings < 0:
-            raise ValueError(f"crossings = {crossings} is not allowed: 0 or above")
+        crossings = whole("crossings", crossings, 0, 10**9)
         asked = {"momentum": momentum, "weight": weights, "errors": errors}
         wanted = _wanted(crossings, placed, asked)
         if not derivatives:
@@ -274,7 +275,7 @@ class Observer:
             if not 1 <= points <= 1_000_000:
                 raise ValueError(f"points = {points} is not allowed: 1 to 1000000")
             return Curve(**_core.critical_curve(self.hole.spin, self._place, points))
-        column = real("angles", angles)
+        column = finite("angles", angles)
         flat = np.ascontiguousarray(column).reshape(-1)
         columns = _core.critical_points(self.hole.spin, self._place, flat)
         return Curve(**{name: values.reshape(column.shape) for name, values in columns.items()})
@@ -292,7 +293,7 @@ class Observer:
         """
         if not 0 <= order <= 65535:
             raise ValueError(f"order = {order} is not allowed: 0 to 65535")
-        column = real("angles", angles)
+        column = finite("angles", angles)
         flat = np.ascontiguousarray(column).reshape(-1)
         edges = _core.band(self.hole.spin, self._place, order, flat)
 

@@ -356,7 +356,7 @@ def plain(value: Any) -> Any:
         return value.table()
     if is_dataclass(value) and not isinstance(value, type):
         parts = {part.name: plain(getattr(value, part.name)) for part in fields(value)}
-        return {name: part for name, part in parts.items() if part is not None and part != []}
+        return {name: part for name, part in parts.items() if part is not None and not (isinstance(part, list) and not part)}
     if isinstance(value, list):
         return [plain(part) for part in value]
     return value

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kerrlight import _core
-from kerrlight._arrays import Floats
+from kerrlight._arrays import Floats, whole
 
 __all__ = ["Volume"]
 
@@ -77,8 +77,7 @@ class Volume:
         :param width: of the picture (M); by default that of the box along its longest side.
         :param hole_radius: radius (M) of a ball about the origin that hides what is behind it.
         """
-        if not 1 <= pixels <= 8192:
-            raise ValueError(f"pixels = {pixels} is not allowed: 1 to 8192")
+        pixels = whole("pixels", pixels, 1, 8192)
         side = float(np.max(self.high - self.low)) if width is None else float(width)
         if not (side > 0 and math.isfinite(side)):
             raise ValueError(f"width = {width} is not allowed: above 0 (M)")

@@ -13,6 +13,8 @@ use std::sync::atomic::Ordering;
 pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Picture>()?;
     module.add_function(wrap_pyfunction!(toml_of_json, module)?)?;
+    module.add_function(wrap_pyfunction!(same_toml, module)?)?;
+    module.add_function(wrap_pyfunction!(scene_of_exr, module)?)?;
     module.add_function(wrap_pyfunction!(render, module)?)?;
     module.add_function(wrap_pyfunction!(film, module)?)
 }
@@ -26,8 +28,33 @@ pub struct Picture {
 /// Settings as TOML, from the same settings as JSON.
 #[pyfunction]
 fn toml_of_json(json: &str) -> PyResult<String> {
-    let table: toml::Table = serde_json::from_str(json).map_err(refused)?;
+    let mut table: toml::Table = serde_json::from_str(json).map_err(refused)?;
+    table.iter_mut().for_each(|(_, value)| with_infinities(value));
     toml::to_string(&table).map_err(refused)
+}
+
+/// Infinities, which JSON has not, in place of the words that stand for them.
+fn with_infinities(value: &mut toml::Value) {
+    match value {
+        toml::Value::String(word) if word == "\0inf" => *value = f64::INFINITY.into(),
+        toml::Value::String(word) if word == "-\0inf" => *value = f64::NEG_INFINITY.into(),
+        toml::Value::Array(all) => all.iter_mut().for_each(with_infinities),
+        toml::Value::Table(table) => table.iter_mut().for_each(|(_, value)| with_infinities(value)),
+        _ => {}
+    }
+}
+
+/// Whether two texts say the same, whatever their order and their comments.
+#[pyfunction]
+fn same_toml(first: &str, second: &str) -> PyResult<bool> {
+    let [first, second] = [first, second].map(|text| text.parse::<toml::Table>().map_err(refused));
+    Ok(first? == second?)
+}
+
+/// The scene that a picture's file holds.
+#[pyfunction]
+fn scene_of_exr(path: PathBuf) -> PyResult<String> {
+    kerrlight_cli::pictures::scene_of_exr(&path).map_err(refused)
 }
 
 /// The picture of a scene: its text (TOML; none: the built-in one), the folder of its files, and overrides.

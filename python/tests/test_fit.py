@@ -36,7 +36,8 @@ def test_the_programs_results(tmp_path):
         assert fit.results[name] == theirs.results[name]
     steps = [line["step"] for line in lines if "loss" in line]
     assert steps == sorted(steps) and steps[-1] == 12
-    assert lines == fit.log and all("psnr_db" in line for line in lines if "loss" in line)
+    assert lines == [line for line in fit.log if "loss" in line]
+    assert all("psnr_db" in line for line in lines)
     assert fit.volume.emission.shape == (16, 16, 16) and fit.volume.x[0] == fit.volume.low[0]
     assert fit.truth.emission.max() > 0 and "model" in fit.verdict
     assert fit.movie["recovered"].shape == fit.movie["data"].shape
@@ -104,6 +105,19 @@ def test_refusals(tmp_path):
         Fit(folder=tmp_path / "full", set=QUICK).run(progress=False)
     with pytest.raises((ValueError, FitError), match="memory|16"):
         Fit(folder=tmp_path / "small", set=QUICK).run(progress=False, memory="1MB")
+
+
+def test_a_folder_keeps_its_settings(tmp_path):
+    fit = Fit(folder=tmp_path / "run", set=QUICK).run(progress=False)
+    assert Fit(folder=tmp_path / "run", set=QUICK).run(progress=False).results == fit.results
+    with pytest.raises(ValueError, match="holds a fit with other settings"):
+        Fit(folder=tmp_path / "run", set={**QUICK, "hole.spin": 0.9}).run(progress=False)
+    with pytest.raises(TypeError, match="callback"):
+        fit.run(3)
+    unfinished = Fit(folder=tmp_path / "none", set=QUICK)
+    for read in (lambda: unfinished.volume, lambda: unfinished.movie, lambda: unfinished.posterior(2)):
+        with pytest.raises(FileNotFoundError, match="run\\(\\) it to its end"):
+            read()
 
 
 def test_bar(tmp_path):

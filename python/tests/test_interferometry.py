@@ -1,6 +1,7 @@
 """Files, columns, closures, the transform and its adjoint, and eht-imaging's objects."""
 
 import types
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -212,3 +213,13 @@ def test_pyuvdata(tmp_path):
     data.vis_units = "K str"
     with pytest.raises(ValueError, match="vis_units"):
         Observation.from_pyuvdata(data)
+
+
+def test_an_observation_does_not_change():
+    obs = observation()
+    for column in (obs.uv, obs.products, obs.sigmas, obs.time, obs.u):
+        with pytest.raises(ValueError, match="read-only"):
+            column[0] = 1
+    for wrong in ({"sigmas": -obs.sigmas}, {"time": obs.time * np.nan}):
+        with pytest.raises(ValueError, match="|".join(wrong)):
+            replace(obs, **wrong)

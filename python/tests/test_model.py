@@ -163,6 +163,12 @@ def test_frames():
     np.testing.assert_array_equal(
         of.at([1]).voxels(8, 9.0).apply(volume), of.voxels(8, 9.0).apply(volume)[[1]]
     )
+    for frames in (slice(1, None), of.times > 0, np.array([1, 2])):
+        np.testing.assert_array_equal(of.at(frames).times, [15.0, 40.0])
+    assert of.at(-1).times.tolist() == [40.0]
+    for wrong in ([0.7], ["0"], [], [True]):
+        with pytest.raises(TypeError, match="frames"):
+            of.at(wrong)
     with pytest.raises(IndexError):
         of.at([3])
 
@@ -173,7 +179,7 @@ def test_refusals():
         (lambda: model(r_min=9.0), "r_max"),
         (lambda: model(axis=[0, 0, 0]), "axis"),
         (lambda: model(order=17), "order = 17"),
-        (lambda: model(per_ray=50), "observer radius"),
+        (lambda: model(per_ray=50), "finite radius"),
         (lambda: model(r_min=100.0, r_max=101.0), "no ray meets the region"),
         (lambda: model(velocity=Infall(2.0, 0.5, 0.5)), "xi"),
         (lambda: model(velocity=Profile([3.0, 9.0], [0.1], [0.0, 0.0])), "angular"),
@@ -183,13 +189,22 @@ def test_refusals():
         (lambda: model(polarization=replace(LAW, fraction=2.0)), "polarization.fraction = 2"),
         (lambda: of.apply(np.zeros(3)), "emission has the shape"),
         (lambda: of.vjp(np.zeros(3)), "cotangent has the shape"),
-        (lambda: of.voxels(1, 9.0), "nodes = 1 is not allowed"),
+        (lambda: of.voxels(1, 9.0), "shape = 1 is not allowed"),
+        (lambda: of.voxels(8, -9.0), "low"),
+        (lambda: model(times=[]), "times"),
+        (lambda: model(times=[[0.0, 1.0]]), "times"),
+        (lambda: model(times=[0.0, np.nan]), "times = nan"),
+        (lambda: model(stokes="QU"), "needs polarization"),
+        (lambda: of.apply(np.ma.masked_array(np.zeros(of.input_shape), True)), "masked"),
         (lambda: screen(0, 9.0), "pixels = 0"),
         (lambda: screen(8, -1.0), "width = -1"),
     ]:
         with pytest.raises(ValueError) as refused:
             call()
         assert words in str(refused.value)
+    for call in (lambda: screen(3.5, 1.0), lambda: model(velocity="keplerian"), lambda: model(order=2.5)):
+        with pytest.raises(TypeError, match="not allowed"):
+            call()
     with pytest.raises(TypeError, match="real numbers"):
         of.apply(np.zeros(of.input_shape, dtype=complex))
 
@@ -226,6 +241,10 @@ def test_jax():
     slope = jax.grad(loss)(values)
     expected = of.vjp(2 * of.apply(np.asarray(values)))
     np.testing.assert_allclose(slope, expected, rtol=1e-4, atol=1e-4)
+    with pytest.raises(ValueError, match="values have the shape"):
+        jax.jit(lambda x: kerrlight.jax.apply(of, x))(values[0])
+    with pytest.raises(TypeError, match="complex64"):
+        kerrlight.jax.apply(of, values.astype(jnp.complex64))
     movies = jax.vmap(lambda x: kerrlight.jax.apply(of, x))(jnp.stack([values, 2 * values]))
     np.testing.assert_allclose(movies[1], 2 * movies[0], rtol=1e-5)
     jax.config.update("jax_enable_x64", True)

@@ -142,3 +142,26 @@ def test_keys_with_dots():
 def tomllib_of(text):
     tomllib = pytest.importorskip("tomllib")
     return tomllib.loads(text)
+
+
+def test_rendered_again(tmp_path):
+    scene = {
+        "hole": {"spin": 0.5},
+        "observer": {"inclination_deg": 60.0, "radius": float("inf")},
+        "screen": {"field_of_view_m": 30.0, "width": 8},
+        "tracer": {"integrator": "elliptic", "tolerance": 1e-6},
+        "disc": {"outer_edge": 12.0, "peak_intensity": 1.0, "opaque": True},
+    }
+    picture = kerrlight.render(scene)
+    picture.to_exr(tmp_path / "disc.exr")
+    again = kerrlight.render(tmp_path / "disc.exr")
+    np.testing.assert_array_equal(again["intensity"], picture["intensity"])
+    with pytest.raises(ValueError, match="ends with .exr"):
+        picture.to_exr(tmp_path / "disc.png")
+    for wrong in (3, [1, 2]):
+        with pytest.raises(TypeError, match="a dictionary, TOML text"):
+            kerrlight.render(wrong)
+    with pytest.raises(TypeError, match="set ="):
+        kerrlight.render(scene, set=[("hole.spin", 0.5)])
+    with pytest.raises(ValueError, match="times = nan"):
+        kerrlight.movie(scene, times=[0.0, np.nan])

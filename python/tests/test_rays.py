@@ -185,3 +185,15 @@ def test_hole_and_observer_are_values():
     assert "0.9" in repr(observer)
     assert abs(Kerr(0.0).photon_orbit - 3) < 1e-12 and Kerr(1.0).horizon == 1.0
     assert kerrlight.Kerr is Kerr
+
+
+def test_angles_are_finite_and_numbers_whole():
+    observer = kerrlight.Kerr(0.9).observer(inclination_deg=60)
+    for call in (lambda: observer.band(1, [np.nan]), lambda: observer.critical_curve(angles=[np.inf])):
+        with pytest.raises(ValueError, match="angles"):
+            call()
+    for call in (lambda: observer.trace(1.0, 1.0, samples=2.5), lambda: kerrlight.Kerr("0.5")):
+        with pytest.raises(TypeError, match="not allowed"):
+            call()
+    with pytest.raises(ValueError, match="masked"):
+        observer.trace(np.ma.masked_array([1.0, 2.0], [0, 1]), 1.0)

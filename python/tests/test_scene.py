@@ -95,6 +95,14 @@ def test_laws_and_refusals():
     assert scene.plain(Keplerian()) == {"keplerian": {}} and scene.plain(Keplerian(0.5)) == {"keplerian": {"drag": 0.5}}
     with pytest.raises(TypeError):
         scene.Disc(outer_edge=3.0)
+    numbers = disc()
+    numbers.screen.width, numbers.disc.opaque = np.int64(12), np.True_
+    numbers.spot[0].axis = np.array([0.0, 0.0, 1.0])
+    numbers.observer.radius = np.inf
+    np.testing.assert_array_equal(render(numbers)["intensity"], render(disc())["intensity"])
+    numbers.hole.spin = np.nan
+    with pytest.raises(ValueError, match="hole.spin = nan"):
+        render(numbers)
     wrong = disc()
     wrong.hole.spin = 2.0
     with pytest.raises(ValueError, match=".hole.spin. = 2 is not allowed"):
