@@ -33,9 +33,9 @@ fn exact_no_special_rays() {
                 if text.contains("inner_edge = ") {
                     overrides.push("disc.inner_edge=9.5");
                 }
-                if text.contains("spot]]") {
-                    overrides.extend(["spot.0.radius=8", "spot.2.radius=8"]);
-                }
+                let spots = text.matches("[[spot]]").count();
+                overrides.extend((spots > 0).then_some("spot.0.radius=8"));
+                overrides.extend((spots > 2).then_some("spot.2.radius=8"));
                 let picture = small(&text, &overrides);
                 for channel in &picture.channels {
                     let bad = channel.values.iter().position(|v| !v.is_finite());
