@@ -128,15 +128,7 @@ def write(obs: Observation) -> Any:
     """A ``UVData`` of an observation."""
     from pyuvdata import UVData
 
-    lacking = [
-        name
-        for name in ("ra_hours", "dec_deg", "mjd", "frequency_hz", "bandwidth_hz")
-        if getattr(obs, name) is None
-    ]
-    if lacking:
-        raise ValueError(f"the data lack {', '.join(lacking)}: give it")
-    if len(obs.channels) > 1:
-        raise ValueError(f"{len(obs.channels)} spectral channels are not allowed: average them first")
+    obs._check_known()
     telescope = _telescope(obs)
     numbers = {station.name: k + 1 for k, station in enumerate(obs.array)}
     catalog = {

@@ -342,15 +342,7 @@ class Observation:
         """An ``ehtim.obsdata.Obsdata``; needs eht-imaging, one spectral channel, and stations with positions."""
         import ehtim
 
-        lacking = [
-            name
-            for name in ("ra_hours", "dec_deg", "mjd", "frequency_hz", "bandwidth_hz")
-            if getattr(self, name) is None
-        ]
-        if lacking:
-            raise ValueError(f"the data lack {', '.join(lacking)}: give it")
-        if len(self.channels) > 1:
-            raise ValueError(f"eht-imaging has no {len(self.channels)} spectral channels: average them first")
+        self._check_known()
         names = _PRODUCTS[self.circular]
         kind = "DTPOL_CIRC" if self.circular else "DTPOL_STOKES"
         data = np.zeros(len(self), dtype=getattr(ehtim.const_def, kind))
@@ -380,6 +372,18 @@ class Observation:
             source=self.source,
             mjd=self.mjd,
         )
+
+    def _check_known(self) -> None:
+        """Refuses data without what other packages want to know of them."""
+        lacking = [
+            name
+            for name in ("ra_hours", "dec_deg", "mjd", "frequency_hz", "bandwidth_hz")
+            if getattr(self, name) is None
+        ]
+        if lacking:
+            raise ValueError(f"the data lack {', '.join(lacking)}: give it")
+        if len(self.channels) > 1:
+            raise ValueError(f"{len(self.channels)} spectral channels are not converted: average them first")
 
     @staticmethod
     def from_pyuvdata(data: Any, sigmas: ArrayLike | None = None) -> Observation:

@@ -7,30 +7,18 @@ import pathlib
 import numpy as np
 import pytest
 
-from kerrlight import Fourier, ForwardModel, Kerr, Observation, PolarizationLaw, render, screen
+from kerrlight import Fourier, ForwardModel, Kerr, Observation, render, screen
 from kerrlight import _core
 from kerrlight.compat.kgeo import raytrace_ana
 from kerrlight.pictures import overrides_of
+
+from laws import LAW
 
 STATM = pathlib.Path("/proc/self/statm")
 pytestmark = pytest.mark.skipif(not STATM.exists(), reason="no /proc")
 
 OBSERVER = Kerr(0.9).observer(inclination_deg=60)
 MODEL = ForwardModel(OBSERVER, *screen(6, 20.0), r_min=3.0, r_max=8.0, times=[0.0, 5.0])
-LAW = PolarizationLaw(
-    vertical=1.0,
-    radial=0.0,
-    toroidal=0.0,
-    radial_sine_power=0.0,
-    components="orthonormal",
-    frame="gas",
-    redshift_power=3.0,
-    field_power=2.0,
-    sine_power=2.0,
-    fraction=0.7,
-    normalisation="none",
-    turn_deg=0.0,
-)
 POLARISED = ForwardModel(OBSERVER, *screen(6, 20.0), r_min=3.0, r_max=8.0, polarization=LAW)
 LIGHT = np.ones(POLARISED.input_shape)
 CORNERS = ([4, 4, 4], [-1.0] * 3, [1.0] * 3)

@@ -10,12 +10,13 @@ from kerrlight import (
     Infall,
     Keplerian,
     Kerr,
-    PolarizationLaw,
     PowerLaw,
     Profile,
     Tabulated,
     screen,
 )
+
+from laws import LAW
 
 RNG = np.random.default_rng(7)
 
@@ -26,20 +27,6 @@ def model(**more):
     return ForwardModel(observer, *screen(10, 22.0), **settings)
 
 
-LAW = PolarizationLaw(
-    vertical=0.0,
-    radial=0.0,
-    toroidal=1.0,
-    radial_sine_power=0.0,
-    components="orthonormal",
-    frame="gas",
-    redshift_power=2.0,
-    field_power=0.0,
-    sine_power=0.0,
-    fraction=0.5,
-    normalisation="none",
-    turn_deg=0.0,
-)
 KINDS = {
     "plain": {},
     "redshift": {"redshift_power": 2.0},

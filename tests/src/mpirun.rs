@@ -117,26 +117,28 @@ fn names(at: &Path) -> Vec<String> {
 /// Kills a rank of the jobs that `start` starts, each a little later than in the one before, until one ends before that;
 /// how many were killed. A job ends within 10 s of that, and mpirun says why.
 fn kill_ranks(start: impl Fn(usize) -> Option<Child>) -> usize {
-    for k in 0..40 {
-        let Some(mut job) = start(2 + k % 4) else { return k };
-        std::thread::sleep(Duration::from_millis(200 + 70 * k as u64));
-        let ranks = ranks_of(&job);
-        let killed = ranks.get(k % ranks.len().max(1));
-        if let Some(rank) = killed {
-            Command::new("kill").args(["-9", rank]).status().unwrap();
-        }
-        let clock = Instant::now();
-        while job.try_wait().unwrap().is_none() {
-            assert!(clock.elapsed() < Duration::from_secs(10), "the job goes on");
-            std::thread::sleep(Duration::from_millis(20));
-        }
-        let said = job.wait_with_output().unwrap();
-        if said.status.success() {
-            return k;
-        }
-        assert!(String::from_utf8_lossy(&said.stderr).contains("mpirun"), "a message");
+    let kills = (0..40).take_while(|k| start(2 + k % 4).is_some_and(|job| ends_by_kill(job, *k)));
+    let kills = kills.count();
+    println!("{kills} jobs with a killed rank");
+    kills
+}
+
+/// Kills rank k of a job, which ends within seconds; whether the job had not been finished before.
+fn ends_by_kill(mut job: Child, k: usize) -> bool {
+    std::thread::sleep(Duration::from_millis(200 + 70 * k as u64));
+    let ranks = ranks_of(&job);
+    if let Some(rank) = ranks.get(k % ranks.len().max(1)) {
+        Command::new("kill").args(["-9", rank]).status().unwrap();
     }
-    40
+    let clock = Instant::now();
+    while job.try_wait().unwrap().is_none() {
+        assert!(clock.elapsed() < Duration::from_secs(10), "the job goes on");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let said = job.wait_with_output().unwrap();
+    let text = String::from_utf8_lossy(&said.stderr);
+    assert!(said.status.success() || text.contains("mpirun"), "a message: {text}");
+    !said.status.success()
 }
 
 /// A scene of the repository.
@@ -179,7 +181,6 @@ fn exact_a_killed_rank_of_mpirun_leaves_its_bands() {
     };
     succeed(at, &words("alone.exr"));
     let kills = kill_ranks(|ranks| start_with(at, ranks, &words("out.exr")));
-    println!("{kills} jobs with a killed rank");
     if kills == 0 {
         return;
     }
@@ -230,8 +231,7 @@ fn exact_ranks_of_mpirun_render_one_film() {
         assert_eq!(text.matches("13 frames, 13 of them rendered").count(), 1, "{text}");
         same(&output);
     }
-    let kills = kill_ranks(|ranks| start_with(at, ranks, &words("out")));
-    println!("{kills} jobs with a killed rank");
+    kill_ranks(|ranks| start_with(at, ranks, &words("out")));
     same("out");
 }
 
@@ -265,8 +265,7 @@ fn exact_ranks_of_mpirun_draw_what_one_process_draws() {
     }
     std::fs::remove_dir_all(at.join("together/posterior")).unwrap();
     let draw = ["posterior", "together", "--samples", "6", "--threads", "1"];
-    let kills = kill_ranks(|ranks| start_with(at, ranks, &draw));
-    println!("{kills} jobs with a killed rank");
+    kill_ranks(|ranks| start_with(at, ranks, &draw));
     same("together");
 }
 
