@@ -64,7 +64,8 @@ fn fresh(to: &Path) {
 fn shorter(line: &str) -> &'static str {
     let is_whole = line.contains("--resume") || line.contains("--init");
     if line.contains("unknown_world.toml") {
-        return " --set training.steps=5 --set world.search.starts=1 --set world.search.coarse.worlds=40 --set world.search.fine.worlds=20";
+        return " --set training.steps=5 --set world.search.starts=1 --set world.search.coarse.worlds=40 \
+                --set 'world.search.fine={worlds=20,nodes=16,iterations=30,pixels=20,frames=12}'";
     }
     if line.contains(" fit") && !is_whole {
         return " --set training.steps=5 --set output.nodes=24";
