@@ -1,5 +1,6 @@
 //! Tables as Parquet, for programs that read columns of many rows.
 
+use crate::compare::Values;
 use anyhow::Context;
 use parquet::basic::{LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
@@ -7,16 +8,6 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::types::{Type, TypePtr};
 use std::sync::Arc;
-
-/// A column.
-pub enum Values {
-    /// Words.
-    Text(Vec<String>),
-    /// Whole numbers.
-    Whole(Vec<i64>),
-    /// Numbers, of which some may be missing.
-    Number(Vec<Option<f64>>),
-}
 
 /// The bytes of a file with these columns, which have the same length.
 pub fn encode(columns: &[(String, Values)]) -> anyhow::Result<Vec<u8>> {

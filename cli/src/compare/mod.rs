@@ -41,6 +41,8 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use summary::Summary;
+#[cfg(feature = "parquet")]
+pub use summary::Values;
 
 /// Arguments of `kerrlight compare`.
 #[derive(Debug, Args)]
@@ -371,8 +373,7 @@ fn run<'a>(cases: &'a [Case], runner: &Runner<'_>) -> Summary<'a> {
 
 /// The tables, how many cases are done and which of them are best and worst, and where to look.
 fn end(tables: &str, summary: &Summary, folder: &Path, is_early: bool) -> Answer {
-    let files = ["report.html", "results.json", "results.csv", "results.parquet", "tables.md"];
-    let files = files.map(|name| folder.join(name));
+    let files = page::files(folder);
     let failed = summary.failed().map(|(case, why)| json!({"name": case.name(), "error": why}));
     let answer = Answer::text(format!("{tables}{}\n{}\n", summary.worth(), files[0].display()))
         .with("folder", folder.display().to_string())

@@ -7,10 +7,21 @@ use super::summary::Summary;
 use super::{changes, figures, quick, ran, tables, verdicts};
 use crate::checksum::sealed;
 use crate::output::Output;
-use crate::parquet_table;
 use crate::report::{Figure, Part, Report, Table};
+#[cfg(not(feature = "parquet"))]
+use anyhow::Context;
 use serde_json::Value;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// Results as columns, for programs that read some of them out of many rows.
+const PARQUET: &str = "results.parquet";
+
+/// Where the results are, beside the pictures.
+pub fn files(folder: &Path) -> Vec<PathBuf> {
+    let always = ["report.html", "results.json", "results.csv", "tables.md"];
+    let on_request = cfg!(feature = "parquet").then_some(PARQUET);
+    always.into_iter().chain(on_request).map(|name| folder.join(name)).collect()
+}
 
 /// All that a page is made of.
 pub struct Page<'a> {
@@ -23,7 +34,7 @@ pub struct Page<'a> {
 }
 
 impl Page<'_> {
-    /// Writes results.json, results.csv, results.parquet, tables.md, pictures and report.html; the text of the tables.
+    /// Writes the results, tables.md, pictures and report.html; the text of the tables.
     pub fn write(
         &self,
         runner: &Runner<'_>,
@@ -49,7 +60,7 @@ impl Page<'_> {
         let results = summary.json(&experiment.title, choice.quick);
         file("results.json")?.write(sealed(results.clone()).as_bytes())?;
         file("results.csv")?.write(&summary.csv()?)?;
-        file("results.parquet")?.write(&parquet_table::encode(&summary.columns())?)?;
+        self.parquet(folder)?;
         let shown = self.tables(before, &results)?;
         let text: String = shown.iter().map(tables::markdown).collect();
         let text = [self.heading(), text].concat();
@@ -74,6 +85,26 @@ impl Page<'_> {
         };
         report.write(&file("report.html")?)?;
         Ok(text)
+    }
+
+    /// Writes [`PARQUET`].
+    #[cfg(feature = "parquet")]
+    fn parquet(&self, folder: &Path) -> anyhow::Result<()> {
+        let bytes = crate::parquet_table::encode(&self.summary.columns())?;
+        Ok(Output::new(&folder.join(PARQUET), "")?.write(&bytes)?)
+    }
+
+    /// Removes [`PARQUET`]: one that a program with the feature has left would be of other results.
+    #[cfg(not(feature = "parquet"))]
+    #[expect(clippy::unused_self, reason = "as with the feature")]
+    fn parquet(&self, folder: &Path) -> anyhow::Result<()> {
+        let path = folder.join(PARQUET);
+        match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                Err(error).with_context(|| format!("cannot remove {}", path.display()))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// What ran, what the experiment asks for, and what has changed.

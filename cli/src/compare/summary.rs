@@ -2,7 +2,6 @@
 
 use super::cases::{Case, Status};
 use super::labels::{RESULTS, described, number, result};
-use crate::parquet_table::Values;
 use serde_json::{Map, Value, json};
 
 /// Cases and how they ended.
@@ -11,6 +10,16 @@ pub struct Summary<'a> {
     pub all: Vec<(&'a Case, Status)>,
     /// How many seeds there are.
     pub seeds: u64,
+}
+
+/// A column of the table of results.
+pub enum Values {
+    /// Words.
+    Text(Vec<String>),
+    /// Whole numbers.
+    Whole(Vec<i64>),
+    /// Numbers, of which some may be missing.
+    Number(Vec<Option<f64>>),
 }
 
 /// The best and the worst case by one result.
