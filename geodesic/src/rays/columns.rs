@@ -86,6 +86,18 @@ impl Points {
         }
     }
 
+    /// Makes room for `points` samples of a request.
+    pub(crate) fn reserve(&mut self, request: &Request, points: usize) {
+        let room = |asked: bool| if asked { points } else { 0 };
+        self.mino_time.reserve(points);
+        self.radius.reserve(points);
+        self.theta.reserve(points);
+        self.azimuth.reserve(room(request.azimuth));
+        self.delay.reserve(room(request.time));
+        self.momentum.reserve(room(request.momentum));
+        self.weight.reserve(room(request.weight));
+    }
+
     pub(crate) fn append(&mut self, other: Self) {
         let before = self.radius.len();
         self.ends.extend(other.ends.iter().map(|end| end + before));
@@ -96,6 +108,11 @@ impl Points {
         self.delay.extend(other.delay);
         self.momentum.extend(other.momentum);
         self.weight.extend(other.weight);
+    }
+
+    /// How many points `pieces` have in all.
+    fn count<'a>(pieces: impl Iterator<Item = &'a Self>) -> usize {
+        pieces.map(|points| points.radius.len()).sum()
     }
 }
 
@@ -153,6 +170,18 @@ impl RayTable {
     /// Whether there is no ray.
     pub fn is_empty(&self) -> bool {
         self.outcome.is_empty()
+    }
+
+    /// The table of all rays of `pieces`, one after the other.
+    pub(crate) fn joined(pieces: Vec<Self>, request: &Request) -> Self {
+        let mut pieces = pieces.into_iter();
+        // Most often the only one.
+        let Some(mut whole) = pieces.next() else { return Self::default() };
+        let rest = pieces.as_slice();
+        whole.crossings.reserve(request, Points::count(rest.iter().map(|piece| &piece.crossings)));
+        whole.samples.reserve(request, Points::count(rest.iter().map(|piece| &piece.samples)));
+        pieces.for_each(|piece| whole.append(piece));
+        whole
     }
 
     pub(crate) fn append(&mut self, other: Self) {

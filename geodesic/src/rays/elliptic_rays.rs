@@ -40,7 +40,9 @@ pub(crate) fn trace_block(
     request: &Request,
 ) -> Result<RayTable, Error> {
     let (hole, at_infinity) = (tracer.hole(), observer.is_at_infinity());
-    let sampler = Sampler::new(request, hole, at_infinity, &[], RayTable::default());
+    let mut table = RayTable::default();
+    table.samples.reserve(request, wanted.samples * alpha.len());
+    let sampler = Sampler::new(request, hole, at_infinity, &[], table);
     let worst = Uncertainty::default();
     let mut table = Collector { hole, observer, alpha, beta, request, sampler, worst };
     tracer.trace(alpha, beta, wanted, &mut RayBlock::default(), &mut table)?;

@@ -71,11 +71,8 @@ impl Integrator {
             }),
             None => in_blocks(BLOCK, alpha, beta, |alpha, beta| self.step_block(job, alpha, beta)),
         };
-        let mut whole = RayTable::default();
-        for piece in pieces {
-            whole.append(piece?);
-        }
-        Ok(whole)
+        let pieces = pieces.into_iter().collect::<Result<Vec<_>, _>>()?;
+        Ok(RayTable::joined(pieces, request))
     }
 
     /// What traces rays in closed form and what for, if that is how they are traced.
