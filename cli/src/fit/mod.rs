@@ -15,6 +15,7 @@ mod linear;
 mod posterior;
 mod results;
 mod run;
+mod world_results;
 mod world_scan;
 mod world_search;
 

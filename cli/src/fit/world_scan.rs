@@ -1,7 +1,7 @@
 //! The map of a scan over parameters of the world: as a table, as a picture and in words.
 
 use super::folder::Folder;
-use super::world_search::described;
+use super::world_results::described;
 use crate::output;
 use crate::report::{Drawing, GridAxis, GridMap};
 use kerrlight_tomo::fit::world::{Parameter, Scanned, World, WorldScan};

@@ -1,7 +1,7 @@
 //! What follows from draws: intervals of the world, mean and spread of the volume, features, and how often a known truth
 //! lies inside.
 
-use super::super::world_search::described;
+use super::super::world_results::described;
 use super::Kept;
 use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::fit::world::Parameter;
@@ -22,6 +22,8 @@ pub struct Interval {
     pub deviation: f64,
     /// Least and largest value that the prior allows.
     pub bounds: [f64; 2],
+    /// Whether the data say nothing about it.
+    pub open: bool,
     /// What was simulated.
     pub truth: Option<f64>,
 }
@@ -157,7 +159,7 @@ impl Interval {
         let truth = self.truth.map(|truth| if truth.abs() < 5e-4 { 0.0 } else { truth });
         let truth = truth.map_or(String::new(), |truth| format!(" (truth: {truth:.3}{unit})"));
         let ([from, to], [low, high]) = (self.ends(), self.bounds);
-        if from <= low && to >= high {
+        if self.open || (from <= low && to >= high) {
             return format!("The {words} is not constrained{truth}.");
         }
         format!("The {words} is between {from:.3}{unit} and {to:.3}{unit} at 95 %{truth}.")
@@ -183,6 +185,7 @@ fn intervals(world: &Value, draws: &[Kept]) -> Vec<Interval> {
             deviation: (squares / (n - 1.0)).sqrt(),
             values,
             bounds: [bound(0), bound(1)],
+            open: world["open"][name] == true,
             truth: world["truth"][name].as_f64().map(near),
         })
     };

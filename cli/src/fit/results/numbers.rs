@@ -1,7 +1,7 @@
 //! What was found, in numbers.
 
 use super::{Estimate, Found};
-use crate::fit::{band_search, held_out, linear, world_search};
+use crate::fit::{band_search, held_out, linear, world_results, world_search};
 use crate::report;
 use crate::usage::usage;
 use kerrlight_tomo::fit::{State, Trainer};
@@ -109,7 +109,7 @@ impl Estimate<'_> {
     /// The worlds that were found, where they were not known.
     fn add_worlds(&self, results: &mut Value) -> anyhow::Result<()> {
         if let Some(world) = world_search::found(self.folder)? {
-            world_search::errors(&world).into_iter().for_each(|(key, value)| results[key] = value);
+            world_results::errors(&world).into_iter().for_each(|(key, value)| results[key] = value);
             results["world"] = world;
         }
         if let Some(band) = band_search::found(self.folder)? {

@@ -6,7 +6,7 @@ use super::numbers::outcomes;
 use super::over_time::Changes;
 use super::{Estimate, Found};
 use crate::fit::curves::{loss_plot, psnr_plot};
-use crate::fit::{band_search, held_out, labels, world_scan, world_search};
+use crate::fit::{band_search, held_out, labels, world_results, world_scan};
 use crate::output;
 use crate::report::{self, LinePlot, Report, View3d};
 use anyhow::Context;
@@ -164,7 +164,7 @@ impl Estimate<'_> {
             labels::described(file)
         )];
         if results["world"].is_object() {
-            lines.extend(world_search::sentences(&results["world"]));
+            lines.extend(world_results::sentences(&results["world"]));
         }
         if results["band"].is_object() {
             lines.extend(band_search::sentences(&results["band"]));

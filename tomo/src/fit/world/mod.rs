@@ -3,6 +3,7 @@
 //! [`World`] is a point in the space of these parameters, [`WorldModel`] makes a forward model of it, and
 //! [`Tangents`] say how each node moves with each parameter, so that images, χ² and gradients follow exactly.
 
+mod covariance;
 mod derivative;
 mod explore;
 mod fall;
@@ -22,7 +23,7 @@ pub use explore::{Exploration, Explored, Sample, WorldWatch};
 pub use model::{Law, WorldModel};
 pub use polish::{Polish, Polished};
 pub use prior::Prior;
-pub use problem::{Effort, Estimate, Free, WorldProblem};
+pub use problem::{Effort, Estimate, Free, Span, WorldProblem};
 pub use scan::{ScanPoint, Scanned, WorldScan};
 pub use spread::Spread;
 pub use tangents::Tangents;

@@ -4,6 +4,7 @@
 //! Images are differentiated by differences as wide as the ripples that rays next to the critical curve make: exact
 //! derivatives are those of single ripples.
 
+use super::covariance::covariance;
 use super::problem::{Estimate, WorldProblem};
 use super::{Prior, World};
 use crate::Error;
@@ -19,7 +20,7 @@ pub struct Polished {
     /// The best world and its volume.
     pub best: Estimate,
     /// Covariance of the free parameters row by row, in their own units: the inverse of half the second derivatives of
-    /// χ² with the volume solved for, and of those of the priors.
+    /// χ² with the volume solved for, and of those of the priors; the spread of the priors where the data do not decide.
     pub covariance: Vec<f64>,
     /// Steps that lowered the value.
     pub steps: usize,
@@ -70,7 +71,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
             steps += 1;
             bowl = self.bowl(&best, how.following)?;
         }
-        let covariance = self.covariance(&bowl);
+        let covariance = self.covariance(&best.world, &bowl);
         Ok(Polished { best, covariance, steps })
     }
 
@@ -135,12 +136,10 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         })
     }
 
-    fn covariance(&self, bowl: &Bowl) -> Vec<f64> {
+    fn covariance(&self, world: &World, bowl: &Bowl) -> Vec<f64> {
         let n = self.free.len();
-        let inverse = match bowl.bends.clone().cholesky() {
-            Some(factors) => factors.inverse(),
-            None => DMatrix::from_diagonal_element(n, n, f64::INFINITY),
-        };
+        let inverse = covariance(self.free, world, &bowl.bends, 1.0)
+            .unwrap_or_else(|| DMatrix::from_diagonal_element(n, n, f64::INFINITY));
         let scale = |k: usize| self.free[k].parameter.scale();
         (0..n * n).map(|k| inverse[(k / n, k % n)] * scale(k / n) * scale(k % n)).collect()
     }
@@ -198,10 +197,12 @@ impl<T: Float + Default> WorldProblem<'_, T> {
 }
 
 /// Slope and second derivative of a prior's penalty by differences inside its bounds.
-fn curve(prior: &Prior, x: f64, width: f64) -> [f64; 2] {
+pub(super) fn curve(prior: &Prior, x: f64, width: f64) -> [f64; 2] {
     let [low, high] = prior.bounds();
     let x = x.clamp(low + width, high - width);
-    let [before, here, after] = [x - width, x, x + width].map(|x| prior.penalty(x));
+    // Rounding must not lead across a bound.
+    let [before, here, after] =
+        [x - width, x, x + width].map(|x| prior.penalty(x.clamp(low, high)));
     let slope = (after - before) / (2.0 * width);
     [slope, ((after - 2.0 * here + before) / (width * width)).max(0.0)]
 }
@@ -214,7 +215,15 @@ mod tests {
     fn exact_priors_curve_like_their_densities() {
         let [slope, bend] = curve(&Prior::Normal { mean: 0.3, sigma: 0.2 }, 0.5, 1e-3);
         assert!((slope - 5.0).abs() < 1e-9 && (bend - 25.0).abs() < 1e-6, "{slope} {bend}");
-        assert_eq!(curve(&Prior::Uniform { low: 0.0, high: 1.0 }, 1.0, 0.1), [0.0, 0.0]);
+        // 0.25 + 0.1 - 0.1 is below 0.25.
+        for (low, x) in [(0.0, 1.0), (0.25, 0.25)] {
+            assert_eq!(curve(&Prior::Uniform { low, high: 1.0 }, x, 0.1), [0.0, 0.0]);
+        }
+        for degrees in 1..90 {
+            let low = f64::from(degrees).to_radians();
+            let [slope, bend] = curve(&Prior::Isotropic { low, high: 3.0 }, low, 0.02);
+            assert!(slope.is_finite() && bend.is_finite(), "{degrees}");
+        }
         let isotropic = Prior::Isotropic { low: 0.0, high: core::f64::consts::PI };
         let [slope, bend] = curve(&isotropic, 1.0, 1e-3);
         assert!((slope + 1.0 / 1f64.tan()).abs() < 1e-5);

@@ -62,12 +62,29 @@ impl Prior {
         }
     }
 
-    /// The value below which a part `share` of the probability lies, for starts and draws.
+    /// Its standard deviation.
+    pub fn deviation(&self) -> f64 {
+        match *self {
+            Prior::Uniform { low, high } => (high - low) / 12f64.sqrt(),
+            Prior::Normal { sigma, .. } => sigma,
+            Prior::LogNormal { median, sigma } => {
+                median * (sigma.powi(2).exp_m1() * sigma.powi(2).exp()).sqrt()
+            }
+            Prior::Isotropic { low, high } => {
+                // Integrals of sin θ, θ sin θ and θ² sin θ.
+                let sums = |x: f64| {
+                    let (sin, cos) = x.sin_cos();
+                    [-cos, sin - x * cos, 2.0 * x * sin + (2.0 - x * x) * cos]
+                };
+                let (from, to) = (sums(low), sums(high));
+                let [whole, first, second] = [0, 1, 2].map(|k| to[k] - from[k]);
+                (second / whole - (first / whole).powi(2)).max(0.0).sqrt()
+            }
+        }
+    }
+
+    /// The value below which a part `share` of the probability lies, for starts, draws and intervals.
     pub fn quantile(&self, share: f64) -> f64 {
-        let normal = |share: f64| {
-            // A logistic curve within 0.02 of the normal one: these are places to start from.
-            (share.clamp(1e-6, 1.0 - 1e-6) / (1.0 - share.clamp(1e-6, 1.0 - 1e-6))).ln() / 1.702
-        };
         match *self {
             Prior::Uniform { low, high } => low + (high - low) * share,
             Prior::Normal { mean, sigma } => mean + sigma * normal(share),
@@ -111,6 +128,18 @@ impl Prior {
     }
 }
 
+/// The quantile of the standard normal distribution.
+fn normal(share: f64) -> f64 {
+    let share = share.clamp(1e-6, 1.0 - 1e-6);
+    // A logistic curve within 0.02 of it, and Newton's steps from there.
+    let start = (share / (1.0 - share)).ln() / 1.702;
+    (0..6).fold(start, |x, _| {
+        let below = 0.5 * libm::erfc(-x * core::f64::consts::FRAC_1_SQRT_2);
+        let density = (-0.5 * x * x).exp() / core::f64::consts::TAU.sqrt();
+        x - (below - share) / density
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -119,15 +148,21 @@ mod tests {
     #[test]
     fn exact_quantiles_have_their_share_of_the_density() {
         let priors = [
-            (Prior::Normal { mean: 0.3, sigma: 0.2 }, 0.02),
-            (Prior::LogNormal { median: 1.2, sigma: 0.4 }, 0.02),
+            (Prior::Normal { mean: 0.3, sigma: 0.2 }, 1e-3),
+            (Prior::LogNormal { median: 1.2, sigma: 0.4 }, 1e-3),
             (Prior::Isotropic { low: 0.3, high: 3.0 }, 1e-4),
             (Prior::Uniform { low: -0.5, high: 2.0 }, 1e-4),
         ];
         for (prior, tolerance) in priors {
             let density = |k: usize| (-prior.penalty(-5.0 + 1e-4 * k as f64)).exp();
             let below = |x: f64| (0..((x + 5.0) * 1e4) as usize).map(density).sum::<f64>();
-            for share in [0.1, 0.5, 0.8] {
+            let moment = |power: i32| {
+                let at = |k: usize| (-5.0 + 1e-4 * k as f64).powi(power) * density(k);
+                (0..200_000).map(at).sum::<f64>() / below(15.0)
+            };
+            let deviation = (moment(2) - moment(1).powi(2)).sqrt();
+            assert!((prior.deviation() / deviation - 1.0).abs() < 1e-3, "{prior:?}: {deviation}");
+            for share in [0.025, 0.1, 0.5, 0.8, 0.975] {
                 let found = below(prior.quantile(share)) / below(15.0);
                 assert!((found - share).abs() < tolerance, "{prior:?}: {share} {found}");
             }

@@ -8,6 +8,25 @@ use crate::representation::Degree;
 use crate::simd::Float;
 use core::f64::consts::TAU;
 
+/// From this part of its prior's deviation on, the data say nothing about a parameter.
+const OPEN: f64 = 0.8;
+
+/// How much of the probability an interval holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Span {
+    /// Its part.
+    pub probability: f64,
+    /// Standard deviations to each side of the middle of a normal distribution.
+    pub deviations: f64,
+}
+
+impl Span {
+    /// 68 %: one standard deviation.
+    pub const ONE_SIGMA: Self = Span { probability: 0.682_689_492, deviations: 1.0 };
+    /// 95 %.
+    pub const NEARLY_ALL: Self = Span { probability: 0.95, deviations: 1.959_963_985 };
+}
+
 /// A parameter that is not known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Free {
@@ -31,6 +50,24 @@ impl Free {
             true => low + (value - low).rem_euclid(TAU),
             false => value.clamp(low, high),
         }
+    }
+
+    /// Whether data that leave this standard deviation, in the parameter's own unit, say nothing about it.
+    pub fn is_open(&self, sigma: f64) -> bool {
+        sigma >= OPEN * self.prior.deviation()
+    }
+
+    /// Where the parameter lies with the probability of `span`, in its own unit: about its best value, within its
+    /// bounds, or where the data say nothing, the middle of its prior.
+    pub fn interval(&self, value: f64, sigma: Option<f64>, span: Span) -> [f64; 2] {
+        let Some(sigma) = sigma.filter(|sigma| !self.is_open(*sigma)) else {
+            return [-0.5, 0.5].map(|half| self.prior.quantile(0.5 + half * span.probability));
+        };
+        let [low, high] = match self.is_circle() {
+            true => [f64::NEG_INFINITY, f64::INFINITY],
+            false => self.bounds(),
+        };
+        [-1.0, 1.0].map(|side| (value + side * span.deviations * sigma).clamp(low, high))
     }
 
     fn is_circle(&self) -> bool {

@@ -1,5 +1,6 @@
 //! How sure a world is: a quadratic form through the values of worlds near the best one.
 
+use super::covariance::covariance;
 use super::{Free, Sample, World};
 use nalgebra::{DMatrix, DVector};
 
@@ -10,6 +11,8 @@ pub struct Spread {
     pub world: World,
     /// Standard deviation of each free parameter, in its own unit.
     pub sigma: Vec<f64>,
+    /// Whether the data say nothing about a free parameter: its standard deviation is that of its prior.
+    pub open: Vec<bool>,
     /// Correlations of the free parameters, row by row.
     pub correlation: Vec<f64>,
     /// Standard deviation of the values about the form: the ripples of χ²/2.
@@ -30,7 +33,8 @@ impl Spread {
     /// The form goes through the fewest of the best worlds over which it rises clearly above the ripples: values that
     /// differ from it because rays next to the critical curve come and go. Ripples of standard deviation s hide the
     /// lowest point within the region where the form rises by s: the covariance is 1 + 2 s times the inverse of its
-    /// second derivatives, and χ²/N times that where it is above 1.
+    /// second derivatives, and χ²/N times that where it is above 1. Directions along which the values do not rise have
+    /// the spread of the priors.
     pub fn of(free: &[Free], samples: &[Sample], reduced_chi2: f64) -> Option<Self> {
         let n = free.len();
         let best = samples.first()?;
@@ -47,9 +51,10 @@ impl Spread {
         if rise < CLEAR * form.ripple {
             return None;
         }
-        let factors = DMatrix::from_row_slice(n, n, &form.bends).cholesky()?;
-        let lowest = factors.solve(&DVector::from_iterator(n, form.slopes.iter().map(|x| -x)));
-        let covariance = factors.inverse() * ((1.0 + 2.0 * form.ripple) * reduced_chi2.max(1.0));
+        let bends = DMatrix::from_row_slice(n, n, &form.bends);
+        let inflation = (1.0 + 2.0 * form.ripple) * reduced_chi2.max(1.0);
+        let covariance = covariance(free, &best.world, &bends, inflation)?;
+        let lowest = -&covariance * DVector::from_column_slice(&form.slopes) / inflation;
         let sigma = |k: usize| covariance[(k, k)].sqrt();
         let correlation = (0..n * n).map(|at| {
             let (row, column) = (at / n, at % n);
@@ -66,6 +71,7 @@ impl Spread {
         Some(Self {
             world,
             sigma: (0..n).map(|k| sigma(k) * unit(k)).collect(),
+            open: (0..n).map(|k| free[k].is_open(sigma(k) * unit(k))).collect(),
             correlation: correlation.collect(),
             ripple: form.ripple,
             worlds: taken.len(),
@@ -163,5 +169,30 @@ mod tests {
         assert!((found.sigma[1] - (a / determinant).sqrt()).abs() < 1e-9);
         assert!((found.correlation[1] + b / (a * c).sqrt()).abs() < 1e-9);
         assert!(Spread::of(&free, &samples[..5], 1.0).is_none());
+    }
+
+    /// Values that do not depend on the spin.
+    #[test]
+    fn exact_what_is_not_seen_leaves_the_errors_of_the_rest() {
+        let prior = Prior::Uniform { low: -0.9, high: 0.9 };
+        let turn = Prior::Uniform { low: 0.0, high: 3.0 };
+        let free = [
+            Free { parameter: Parameter::Spin, prior },
+            Free { parameter: Parameter::Inclination, prior: turn },
+        ];
+        let sample = |k: usize| {
+            let (angle, r) = (2.4 * k as f64, 0.1 * ((k + 1) as f64 / 60.0).sqrt());
+            let world = World::new(0.31 + 4.0 * r * angle.cos(), 1.02 + r * angle.sin(), 2.0);
+            let y = world.get(Parameter::Inclination) - 1.03;
+            Sample { world, value: 0.5 * (y / 0.02).powi(2) }
+        };
+        let mut samples: Vec<Sample> = (0..60).map(sample).collect();
+        samples.sort_by(|a, b| a.value.total_cmp(&b.value));
+        let found = Spread::of(&free, &samples, 1.0).unwrap();
+        assert_eq!(found.open, [true, false]);
+        assert!((found.sigma[0] - 1.8 / 12f64.sqrt()).abs() < 1e-9, "{:?}", found.sigma);
+        assert!((found.sigma[1] - 0.02).abs() < 1e-5, "{:?}", found.sigma);
+        assert!((found.world.get(Parameter::Inclination) - 1.03).abs() < 1e-4);
+        assert!(found.correlation[1].abs() < 1e-6);
     }
 }

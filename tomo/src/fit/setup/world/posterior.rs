@@ -4,11 +4,15 @@ use super::seen::Seen;
 use crate::fit::settings::{FitFile, UnknownWorld, refuse};
 use crate::fit::setup::{Measured, Result};
 use crate::fit::world::{Effort, Estimate, Polish, Polished, Spread, World, WorldProblem};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 
 /// Other rays that the best world is looked for through.
 const LATTICES: u64 = 4;
 /// Steps to the best world of other data, or through other rays.
 const STEPS: usize = 3;
+/// Of the random numbers for what the data leave open.
+const OPEN_DRAWS: u64 = 0x6f70_656e_0000_0000;
 /// Iterations of the first solution of a world, for each of a search.
 const PATIENCE: usize = 4;
 
@@ -70,14 +74,18 @@ pub(super) fn surely(
     let covariance: Vec<f64> = (0..n * n)
         .map(|k| polished.covariance[k] * reduced.max(1.0) + scatter(k / n, k % n))
         .collect();
-    let sigma: Vec<f64> = (0..n).map(|k| covariance[k * n + k].sqrt()).collect();
-    let correlation = (0..n * n).map(|k| covariance[k] / (sigma[k / n] * sigma[k % n]));
+    let whole: Vec<f64> = (0..n).map(|k| covariance[k * n + k].sqrt()).collect();
+    let correlation = (0..n * n).map(|k| covariance[k] / (whole[k / n] * whole[k % n]));
     let correlation = correlation.collect();
     // The mean has a smaller error than each of them.
     let world = problem.free.iter().enumerate().fold(best, |world, (k, free)| {
         world.with(free.parameter, free.inside(best.get(free.parameter) + means[k]))
     });
-    Ok(Some(Spread { world, sigma, correlation, ripple: 0.0, worlds: worlds.len() }))
+    // Nobody knows less than before the data.
+    let sigma = problem.free.iter().zip(whole).map(|(free, x)| x.min(free.prior.deviation()));
+    let sigma: Vec<f64> = sigma.collect();
+    let open = problem.free.iter().zip(&sigma).map(|(free, sigma)| free.is_open(*sigma)).collect();
+    Ok(Some(Spread { world, sigma, open, correlation, ripple: 0.0, worlds: worlds.len() }))
 }
 
 /// Worlds that the data leave possible: each is the best one of data with noise once more, seen along other rays
@@ -125,15 +133,30 @@ impl<'a> WorldPosterior<'a> {
         self.factor
     }
 
-    /// A draw: the same for the same data and number.
+    /// A draw: the same for the same data and number. What the data say nothing about is drawn from its prior first.
     ///
     /// # Errors
     /// As [`new`](Self::new).
     pub fn draw(&self, measured: &Measured, number: u64) -> Result<World> {
         let seen = Seen::new(self.file, measured, &self.unknown.search.fine)?;
         seen.with(self.unknown, &self.unknown.search.fine, self.scale, |problem| {
-            otherwise(problem, &self.polished, number)
+            otherwise(problem, &self.somewhere(problem, number), number)
         })
+    }
+
+    /// The best world with what the data leave open anywhere in its prior.
+    fn somewhere(&self, problem: &WorldProblem<'_, f32>, number: u64) -> Polished {
+        let mut random = Pcg64::seed_from_u64(self.file.seed ^ OPEN_DRAWS.wrapping_add(number));
+        let mut polished = self.polished.clone();
+        let n = problem.free.len();
+        for (k, free) in problem.free.iter().enumerate() {
+            let share = random.random::<f64>();
+            if free.is_open(polished.covariance[k * n + k].sqrt()) {
+                let world = &mut polished.best.world;
+                *world = world.with(free.parameter, free.inside(free.prior.quantile(share)));
+            }
+        }
+        polished
     }
 
     /// Data with noise once more.

@@ -1,0 +1,181 @@
+//! What is said of a world that was found: lines, sentences, and distances from a known one.
+
+use super::world_scan;
+use kerrlight_tomo::fit::world::Parameter;
+use serde_json::{Value, json};
+
+/// χ²/N with digits that tell.
+fn reduced(chi2: f64) -> String {
+    if chi2 < 5e-3 { format!("{chi2:.1e}") } else { format!("{chi2:.3}") }
+}
+
+/// A line for each parameter, and one for the starts.
+pub fn lines(results: &Value) -> Vec<String> {
+    let Some(world) = results["world"].as_object() else { return Vec::new() };
+    let mut lines: Vec<String> = world
+        .iter()
+        .map(|(name, value)| {
+            let value = value.as_f64().unwrap_or(f64::NAN);
+            let sure = match results["sigma"][name].as_f64() {
+                Some(sigma) if results["open"][name] != true => format!("{value:.4} ± {sigma:.4}"),
+                _ => format!("{value:.4}, not constrained: the data leave it open"),
+            };
+            match results["truth"][name].as_f64() {
+                Some(truth) => format!("world.{name} = {sure} (truth {truth:.4})"),
+                None => format!("world.{name} = {sure}"),
+            }
+        })
+        .collect();
+    lines.extend(small_residuals(results).map(|said| format!("note: {said}")));
+    let chi2 = reduced(results["chi2_per_datum"].as_f64().unwrap_or(f64::NAN));
+    lines.push(match results["scan"]["worlds"].as_u64() {
+        Some(worlds) => format!("world: a grid of {worlds} worlds was scanned; χ²/N = {chi2}"),
+        None => format!(
+            "world: {} of {} starts ended at the best one; χ²/N = {chi2}",
+            results["ended_at_the_best"], results["starts"],
+        ),
+    });
+    lines
+}
+
+/// Distances from the truth, and how many standard deviations they are.
+pub fn errors(results: &Value) -> Vec<(String, Value)> {
+    let of = |parameter: Parameter| {
+        let name = parameter.name();
+        let number = |key: &str| results[key][name].as_f64();
+        let (value, truth) = (number("world")?, number("truth")?);
+        let unit = parameter.unit();
+        let error = (parameter.difference(value * unit, truth * unit) / unit).abs();
+        let (plain, suffix) = name.strip_suffix("_deg").map_or((name, ""), |name| (name, "_deg"));
+        let pull = number("sigma").map(|sigma| error / sigma);
+        let within = |interval: &str| {
+            let [low, high] = ends(results, interval, name)?;
+            let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+            let away = parameter.difference(truth * unit, middle * unit) / unit;
+            Some(f64::from(away.abs() <= half))
+        };
+        Some([
+            (format!("{plain}_error{suffix}"), json!(error)),
+            (format!("{plain}_pull"), json!(pull)),
+            (format!("{plain}_within_68"), json!(within("interval_68"))),
+            (format!("{plain}_within_95"), json!(within("interval_95"))),
+        ])
+    };
+    Parameter::ALL.into_iter().filter_map(of).flatten().collect()
+}
+
+/// The ends of a parameter's interval.
+fn ends(results: &Value, interval: &str, name: &str) -> Option<[f64; 2]> {
+    let ends = &results[interval][name];
+    Some([ends[0].as_f64()?, ends[1].as_f64()?])
+}
+
+/// A sentence for each parameter, and one for the starts.
+pub fn sentences(results: &Value) -> Vec<String> {
+    let of = |parameter: Parameter| {
+        let name = parameter.name();
+        let number = |key: &str| results[key][name].as_f64();
+        let value = number("world")?;
+        let (words, unit) = described(parameter);
+        let truth =
+            number("truth").map_or(String::new(), |truth| format!(" (truth: {truth:.3}{unit})"));
+        let [from, to] = ends(results, "interval_95", name)?;
+        if results["open"][name] == true {
+            return Some(format!(
+                "The {words} is not constrained: {value:.3}{unit} explains the data best, and the prior alone says \
+                 {from:.3}{unit} to {to:.3}{unit} at 95 %{truth}."
+            ));
+        }
+        Some(format!("The {words} is between {from:.3}{unit} and {to:.3}{unit} at 95 %{truth}."))
+    };
+    let mut all: Vec<String> = Parameter::ALL.into_iter().filter_map(of).collect();
+    all.extend(small_residuals(results).map(|said| format!("Note that {said}.")));
+    all.push(world_scan::sentence(&results["scan"]).unwrap_or_else(|| {
+        format!(
+            "The world was searched for from {} places; {} of the searches ended near the best one.",
+            results["starts"], results["ended_at_the_best"]
+        )
+    }));
+    all
+}
+
+/// What a parameter is called in a sentence, and its unit.
+pub fn described(parameter: Parameter) -> (&'static str, &'static str) {
+    match parameter {
+        Parameter::Spin => ("spin", ""),
+        Parameter::Inclination => ("inclination", "°"),
+        Parameter::PositionAngle => ("position angle of the spin", "°"),
+        Parameter::OffsetX => ("horizontal position of the hole", " M"),
+        Parameter::OffsetY => ("vertical position of the hole", " M"),
+        Parameter::Mass => ("mass over the assumed one", ""),
+        Parameter::Rotation => ("angular velocity over the assumed one", ""),
+        Parameter::RedshiftPower => ("power of the redshift factor", ""),
+        Parameter::Xi => ("angular momentum over that of circular orbits", ""),
+        Parameter::BetaR => ("part of the radial velocity that is not free fall", ""),
+        Parameter::BetaPhi => ("part of the angular velocity that is not free fall", ""),
+    }
+}
+
+/// What errors of the world mean where residuals are much smaller than the errors of the data.
+fn small_residuals(results: &Value) -> Option<String> {
+    let factor = results["noise_factor"].as_f64().filter(|factor| *factor < 1.0)?;
+    Some(format!(
+        "residuals are much smaller than the errors of the data; the world was searched for with errors {factor:.1e} \
+         times as large"
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::Map;
+
+    fn found() -> Value {
+        json!({
+            "world": {"spin": 0.91, "inclination_deg": 59.0, "position_angle_deg": 179.0},
+            "sigma": {"spin": 0.34, "inclination_deg": 0.5, "position_angle_deg": 1.5},
+            "open": {"spin": true, "inclination_deg": false, "position_angle_deg": false},
+            "interval_68": {
+                "spin": [-0.02, 0.77], "inclination_deg": [58.5, 59.5], "position_angle_deg": [177.5, 180.5],
+            },
+            "interval_95": {
+                "spin": [-0.17, 0.92], "inclination_deg": [58.02, 59.98], "position_angle_deg": [176.06, 181.94],
+            },
+            "truth": {"spin": 0.9, "inclination_deg": 60.0, "position_angle_deg": -179.0},
+            "bounds": {
+                "spin": [-0.2, 0.95], "inclination_deg": [0.0, 180.0], "position_angle_deg": [-180.0, 180.0],
+            },
+            "starts": 4, "ended_at_the_best": 3, "chi2_per_datum": 1.02,
+        })
+    }
+
+    #[test]
+    fn exact_errors_go_the_short_way_about_a_circle() {
+        let errors: Map<String, Value> = errors(&found()).into_iter().collect();
+        let number = |key: &str| errors[key].as_f64().unwrap();
+        assert!((number("position_angle_error_deg") - 2.0).abs() < 1e-9);
+        assert!((number("inclination_pull") - 2.0).abs() < 1e-9);
+        assert!((number("spin_error") - 0.01).abs() < 1e-12);
+        assert_eq!(number("position_angle_within_68"), 0.0);
+        assert_eq!(number("position_angle_within_95"), 1.0);
+        assert_eq!(number("inclination_within_95"), 0.0);
+        assert_eq!((number("spin_within_68"), number("spin_within_95")), (0.0, 1.0));
+    }
+
+    #[test]
+    fn exact_sentences_say_what_is_known() {
+        let said = sentences(&found());
+        assert_eq!(
+            said[0],
+            "The spin is not constrained: 0.910 explains the data best, and the prior alone says -0.170 to 0.920 at \
+             95 % (truth: 0.900)."
+        );
+        assert_eq!(
+            said[1],
+            "The inclination is between 58.020° and 59.980° at 95 % (truth: 60.000°)."
+        );
+        assert!(said[2].contains("between 176.060° and 181.940°"), "{}", said[2]);
+        assert!(said[3].contains("from 4 places; 3 of the searches"), "{}", said[3]);
+        assert!(lines(&found())[3].contains("3 of 4 starts"));
+    }
+}
