@@ -27,6 +27,7 @@ pub fn lines(results: &Value) -> Vec<String> {
         })
         .collect();
     lines.extend(small_residuals(results).map(|said| format!("note: {said}")));
+    lines.extend(rival(results).map(|said| format!("note: {said}")));
     let chi2 = reduced(results["chi2_per_datum"].as_f64().unwrap_or(f64::NAN));
     lines.push(match results["scan"]["worlds"].as_u64() {
         Some(worlds) => format!("world: a grid of {worlds} worlds was scanned; χ²/N = {chi2}"),
@@ -90,6 +91,7 @@ pub fn sentences(results: &Value) -> Vec<String> {
     };
     let mut all: Vec<String> = Parameter::ALL.into_iter().filter_map(of).collect();
     all.extend(small_residuals(results).map(|said| format!("Note that {said}.")));
+    all.extend(rival(results).map(|said| format!("Note that {said}.")));
     all.push(world_scan::sentence(&results["scan"]).unwrap_or_else(|| {
         format!(
             "The world was searched for from {} places; {} of the searches ended near the best one.",
@@ -114,6 +116,31 @@ pub fn described(parameter: Parameter) -> (&'static str, &'static str) {
         Parameter::BetaR => ("part of the radial velocity that is not free fall", ""),
         Parameter::BetaPhi => ("part of the angular velocity that is not free fall", ""),
     }
+}
+
+/// χ²/2 above the best below which the coarse search does not tell another world from it.
+const ALIKE: f64 = 3.0;
+
+/// A world far from the best one that explains the data about as well: one of two mirror images, say.
+fn rival(results: &Value) -> Option<String> {
+    let above = |trial: &&Value| trial["above_best"].as_f64().unwrap_or(f64::INFINITY);
+    let elsewhere = results["trials"].as_array()?.iter().filter(|trial| trial["same"] == false);
+    let nearest = elsewhere.min_by(|a, b| above(a).total_cmp(&above(b)))?;
+    if above(&nearest) >= ALIKE {
+        return None;
+    }
+    let value = |parameter: Parameter| {
+        let value = nearest["end"][parameter.name()].as_f64()?;
+        let (words, unit) = described(parameter);
+        Some(format!("{words} {value:.3}{unit}"))
+    };
+    let values: Vec<String> = Parameter::ALL.into_iter().filter_map(value).collect();
+    Some(format!(
+        "another world explains the data about as well (χ²/2 larger by {:.1} in the coarse search), and the intervals \
+         leave it out: {}",
+        above(&nearest),
+        values.join(", ")
+    ))
 }
 
 /// What errors of the world mean where residuals are much smaller than the errors of the data.
@@ -177,5 +204,24 @@ mod tests {
         assert!(said[2].contains("between 176.060° and 181.940°"), "{}", said[2]);
         assert!(said[3].contains("from 4 places; 3 of the searches"), "{}", said[3]);
         assert!(lines(&found())[3].contains("3 of 4 starts"));
+    }
+
+    #[test]
+    fn exact_a_mirror_image_of_the_best_world_is_told() {
+        let end =
+            |spin: f64, inclination: f64| json!({"spin": spin, "inclination_deg": inclination});
+        let mut results = found();
+        results["trials"] = json!([
+            {"end": end(0.91, 59.0), "above_best": 0.0, "same": true},
+            {"end": end(0.9, 59.1), "above_best": 0.1, "same": true},
+            {"end": end(-0.88, 121.0), "above_best": 1.23, "same": false},
+            {"end": end(0.1, 80.0), "above_best": 40.0, "same": false},
+        ]);
+        let said = sentences(&results).join(" ");
+        let rival = "larger by 1.2 in the coarse search), and the intervals leave it out: spin -0.880, inclination \
+                     121.000°.";
+        assert!(said.contains(rival), "{said}");
+        results["trials"][2]["above_best"] = json!(12.0);
+        assert!(!sentences(&results).join(" ").contains("another world"));
     }
 }
