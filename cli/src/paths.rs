@@ -2,8 +2,32 @@
 //! start from the file's.
 
 use anyhow::Context;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use toml::{Table, Value};
+
+/// The folder of the public files of the Event Horizon Telescope.
+const EHT_DATA: &str = "KERRLIGHT_EHT_DATA";
+
+/// Where a file of data is: `$KERRLIGHT_EHT_DATA/NAME` in the folder that this variable of the environment names, any
+/// other path from `base_dir`.
+///
+/// # Errors
+/// If the variable is not set.
+pub fn of_data(path: &Path, base_dir: &Path) -> anyhow::Result<PathBuf> {
+    let Ok(name) = path.strip_prefix(format!("${EHT_DATA}")) else {
+        return Ok(base_dir.join(path));
+    };
+    let folder = std::env::var_os(EHT_DATA).filter(|folder| !folder.is_empty());
+    let folder = folder.with_context(|| {
+        format!(
+            "{}: {EHT_DATA} is not set; set it to the folder with the public data of the Event Horizon Telescope, or give the \
+             file: --set data.visibilities.path=FILE",
+            path.display()
+        )
+    })?;
+    let full = std::path::absolute(Path::new(&folder).join(name));
+    full.with_context(|| path.display().to_string())
+}
 
 /// An assignment `key.path=value` whose relative paths start from the current folder, as one for settings
 /// whose paths start from `folder` (from the root without one). Everything else stays as it is.
@@ -37,7 +61,9 @@ fn is_path(key: &str, value: &str) -> bool {
 
 fn move_paths(key: &str, value: &mut Value, moved: &dyn Fn(&str) -> String) {
     match value {
-        Value::String(path) if !path.is_empty() && is_path(key, path) => *path = moved(path),
+        Value::String(path) if !path.is_empty() && !path.starts_with('$') && is_path(key, path) => {
+            *path = moved(path);
+        }
         Value::Table(table) => {
             table.iter_mut().for_each(|(key, value)| move_paths(key, value, moved));
         }

@@ -25,7 +25,7 @@ fn exact_visibilities_are_fitted_at_once() {
         let words: Vec<&str> = SEEN.split(' ').chain(["--source", source, "-o", data]).collect();
         succeed(path, &words);
     }
-    let (told, kept) = said(path, &["--data", "a.uvfits"], "a");
+    let (told, kept) = said(path, &["--data", "a.uvfits", "--model", "volume"], "a");
     for sentence in [
         "read: a.uvfits: M87*, recognised by position or name, MJD 57850",
         "assumed: hole.mass_msun = 6500000000.0: M87* (EHT Collaboration 2019",
@@ -38,7 +38,8 @@ fn exact_visibilities_are_fitted_at_once() {
     // Told on the way, and kept: the same settings with the same reasons.
     assert!(kept.contains("# ASSUMED: the data do not tell the spin"), "{kept}");
     assert!(told.contains("# ASSUMED: the data do not tell the spin"));
-    let (told, _) = said(path, &["--data", "a.uvfits", "--set", "hole.spin=0.9"], "spin");
+    let spin = ["--data", "a.uvfits", "--model", "volume", "--set", "hole.spin=0.9"];
+    let (told, _) = said(path, &spin, "spin");
     assert!(!told.contains("assumed: hole.spin"), "{told}");
     let missing = fail(path, &["fit", "--data", "b.uvfits", "-o", "b"]);
     for key in ["hole.mass_msun", "hole.distance_kpc", "observer.inclination_deg"] {

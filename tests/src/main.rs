@@ -43,6 +43,7 @@ mod shared_folder;
 mod signals;
 #[cfg(unix)]
 mod slurm;
+mod static_image;
 mod static_sky;
 mod station_gains;
 mod support;

@@ -187,6 +187,24 @@ fn regress_the_reference_has_every_key_of_a_fit() {
 }
 
 #[test]
+fn regress_the_reference_has_every_key_of_a_static_image() {
+    let page = read(&root().join("docs/reference/fit-file.md"));
+    for unknown in [
+        "image.nonsense=1",
+        "image.starts=[{ring={nonsense=1}}]",
+        "image.starts=[{gaussian={nonsense=1}}]",
+        "data.visibilities.nonsense=1",
+        "data.visibilities.variability={nonsense=1}",
+        "strength.nonsense=1",
+        "envelope={nonsense=1}",
+        "ring.nonsense=1",
+    ] {
+        let keys = allowed(&root(), &["fit", "scenes/fits/m87_image.toml", "--set", unknown]);
+        check("fit-file.md", section(&page, "Static images"), &keys);
+    }
+}
+
+#[test]
 fn regress_the_reference_has_every_key_of_an_experiment() {
     let folder = tempfile::tempdir().unwrap();
     let page = read(&root().join("docs/reference/experiment-file.md"));

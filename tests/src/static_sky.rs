@@ -7,7 +7,7 @@ use crate::support::{root, succeed};
 use std::path::{Path, PathBuf};
 
 /// A public file; says so where it is not there.
-fn data(name: &str) -> Option<PathBuf> {
+pub fn data(name: &str) -> Option<PathBuf> {
     let folder = std::env::var_os("KERRLIGHT_EHT_DATA")
         .map_or_else(|| root().join("../shared/data/eht"), PathBuf::from);
     let path = folder.join(name);

@@ -174,6 +174,8 @@ pub enum FigureKind {
     Time,
     /// A result against a factor of numbers.
     Curve,
+    /// Static images of the first seed, one beside the other.
+    Images,
     /// Means of a result over two factors of numbers.
     Map,
     /// The loss over the sphere of axes.

@@ -10,7 +10,7 @@ pub fn number(x: f64, digits: usize) -> String {
 }
 
 /// Results that are shown: their names in results.json, what they are called, their units and digits.
-pub const RESULTS: [(&str, &str, &str, usize); 32] = [
+pub const RESULTS: [(&str, &str, &str, usize); 41] = [
     ("psnr_db", "PSNR", "dB", 2),
     ("psnr_inside_db", "PSNR inside the region", "dB", 2),
     ("psnr_over_time_db", "PSNR over time", "dB", 2),
@@ -37,6 +37,15 @@ pub const RESULTS: [(&str, &str, &str, usize); 32] = [
     ("band_azimuth_deg", "azimuth of the flare", "°", 1),
     ("band_forward", "probability of the law's sense of rotation", "", 4),
     ("band_validation", "χ² per data point of samples that were not fitted", "", 3),
+    ("ring_diameter_uas", "diameter of the ring", "µas", 1),
+    ("ring_diameter_uas_error", "error of the diameter", "µas", 1),
+    ("ring_width_uas", "width of the ring", "µas", 1),
+    ("ring_position_angle_deg", "brightest direction of the ring", "°", 0),
+    ("ring_position_angle_deg_error", "error of the brightest direction", "°", 0),
+    ("ring_asymmetry", "asymmetry of the ring", "", 3),
+    ("ring_central_brightness", "brightness at the centre over that of the ring", "", 3),
+    ("flux_jy", "flux", "Jy", 3),
+    ("strength", "factor on the penalties", "", 3),
     ("chi2", "χ² per data point", "", 3),
     ("loss", "loss", "", 6),
     ("seconds", "wall time", "s", 1),

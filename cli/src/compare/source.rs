@@ -38,6 +38,8 @@ const CARRIED: &[(&str, &str)] = &carried![
     "experiments/calibration.toml",
     "experiments/soft-flow.toml",
     "experiments/orbital-polarimetry.toml",
+    "experiments/m87-2017.toml",
+    "experiments/sgra-2017.toml",
     "experiments/fits/first_pattern.toml",
     "experiments/fits/second_pattern.toml",
     "experiments/fits/digits.toml",
@@ -46,6 +48,8 @@ const CARRIED: &[(&str, &str)] = &carried![
     "scenes/fits/scene_4.toml",
     "scenes/fits/scene_8.toml",
     "scenes/fits/orbital_polarimetry.toml",
+    "scenes/fits/m87_image.toml",
+    "scenes/fits/sgra_image.toml",
     "cli/src/fit/built_in.toml",
 ];
 

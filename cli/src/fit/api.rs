@@ -2,6 +2,7 @@
 
 use super::data;
 use super::parse;
+use super::work::Work;
 use anyhow::Context;
 use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::fit::setup::{self, Instrument, Measured};
@@ -22,7 +23,10 @@ pub fn assigned(text: &str, assignment: &str) -> anyhow::Result<String> {
 
 /// Whether settings make sense, as far as can be told without tracing rays.
 pub fn check(text: &str, registry: &Registry) -> anyhow::Result<()> {
-    Ok(setup::check(&parse(text)?, registry)?)
+    match Work::read(text)? {
+        Work::Emission(file) => Ok(setup::check(&file, registry)?),
+        Work::Image(_) => Ok(()),
+    }
 }
 
 /// Radius of the horizon, and of the region of recovery, M.
@@ -46,8 +50,10 @@ pub fn turned(text: &str, later: f64) -> anyhow::Result<[impl Fn(f64) -> f64; 2]
 
 /// (u, v) of the data, wavelengths; none without visibilities.
 pub fn coverage(text: &str, base_dir: &Path) -> anyhow::Result<Vec<[f64; 2]>> {
-    let file = parse(text)?;
-    let Measured { visibilities, .. } = data::measure(&file, &Instrument::new(&file)?, base_dir)?;
+    let Measured { visibilities, .. } = match Work::read(text)? {
+        Work::Emission(file) => data::measure(&file, &Instrument::new(&file)?, base_dir)?,
+        Work::Image(file) => data::of_static(&file, base_dir)?,
+    };
     let rows = visibilities.into_iter().flat_map(|(observation, _)| observation.rows);
     Ok(rows.map(|row| row.uv).collect())
 }

@@ -2,10 +2,13 @@
 
 use crate::interferometry::{self, arguments, movie_files};
 use crate::output;
+use crate::paths;
 use anyhow::{Context, bail};
-use kerrlight_tomo::fit::settings::{DataFiles, FitFile};
+use kerrlight_tomo::Error;
+use kerrlight_tomo::fit::settings::{DataFiles, FitFile, StaticImageFile};
 use kerrlight_tomo::fit::setup::{Instrument, Measured};
 use kerrlight_tomo::interferometry::files;
+use kerrlight_tomo::interferometry::observation::Observation;
 use kerrlight_tomo::interferometry::simulate::Movie;
 use std::path::Path;
 
@@ -36,7 +39,10 @@ pub fn measure(
                 files::parse_light_curve(&output::read_text(&path)?).context(name.clone())?;
             Ok(Measured::of_light_curve(file, curve, &name)?)
         }
-        Some(DataFiles::Visibilities { path, .. }) => visibilities(file, &base_dir.join(path)),
+        Some(DataFiles::Visibilities { path, .. }) => {
+            let of = |observation, name: &str| Measured::of_visibilities(file, observation, name);
+            visibilities(&paths::of_data(path, base_dir)?, of)
+        }
     }
 }
 
@@ -66,11 +72,20 @@ fn movie(file: &FitFile, path: &Path) -> anyhow::Result<Movie> {
     Ok(movie)
 }
 
-fn visibilities(file: &FitFile, path: &Path) -> anyhow::Result<Measured> {
+/// The data of a static image.
+pub fn of_static(file: &StaticImageFile, base_dir: &Path) -> anyhow::Result<Measured> {
+    let path = paths::of_data(&file.data.visibilities.path, base_dir)?;
+    visibilities(&path, |observation, name| Measured::of_static(file, observation, name))
+}
+
+fn visibilities(
+    path: &Path,
+    of: impl FnOnce(Observation, &str) -> Result<Measured, Error>,
+) -> anyhow::Result<Measured> {
     let (_, observation) = interferometry::read(path)?;
     let (name, all) = (path.display().to_string(), observation.rows.len());
     let without = all - observation.stokes_i().count();
-    let measured = Measured::of_visibilities(file, observation, &name)?;
+    let measured = of(observation, &name)?;
     if without > 0 {
         eprintln!("{name}: {without} of {all} rows have no parallel hands and are dropped");
     }

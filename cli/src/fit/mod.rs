@@ -15,6 +15,8 @@ mod linear;
 mod posterior;
 mod results;
 mod run;
+mod static_image;
+mod work;
 mod world_results;
 mod world_scan;
 mod world_search;
@@ -29,11 +31,12 @@ pub use failed::Failed;
 use folder::Folder;
 pub use inputs::{Inputs, SETTINGS};
 use kerrlight_tomo::Error;
-use kerrlight_tomo::fit::settings::{FitError, FitFile};
+use kerrlight_tomo::fit::settings::{FitError, FitFile, StaticImageFile};
 use kerrlight_tomo::representation::Registry;
 pub use posterior::Posterior;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use work::{Prepared, Work};
 
 /// The experiment that runs without a file.
 const BUILT_IN: &str = include_str!("built_in.toml");
@@ -72,6 +75,9 @@ pub struct Fit {
     /// experiment
     #[arg(long, value_name = "DATA", num_args = 0..=1, conflicts_with_all = ["file", "set", "resume", "print"])]
     init: Option<Option<PathBuf>>,
+    /// With --data or --init: fit a static image or a volume [default: an image of M87*]
+    #[arg(long, value_enum, hide_possible_values = true, value_name = "image|volume", conflicts_with_all = ["file", "resume"])]
+    model: Option<init::Model>,
 }
 
 impl Fit {
@@ -84,16 +90,16 @@ impl Fit {
             return self.help(rank, registry);
         }
         if let Some(data) = &self.init {
-            return init::write(data.as_deref(), self.output.as_deref());
+            return init::write(data.as_deref(), self.output.as_deref(), self.model);
         }
         if let Some(path) = &self.resume {
             let (folder, text) = Folder::open(path, self.patience())?;
             self.same(&text)?;
-            let file = parse(&text).with_context(|| path.display().to_string())?;
-            let prepared = run::Prepared::new(file, &base_dir_of(&text), registry)?;
-            return self.run_all(&prepared, &text, &folder, true);
+            let work = Work::read(&text).with_context(|| path.display().to_string())?;
+            let work = work.prepared(&base_dir_of(&text), registry)?;
+            return self.run_all(&work, &text, &folder, true);
         }
-        let guess = self.data.as_deref().map(init::guess).transpose()?;
+        let guess = self.data.as_deref().map(|data| init::guess(data, self.model)).transpose()?;
         let (text, base_dir) = self.settings(guess.as_ref())?;
         if self.print {
             let settings = serde_json::to_value(text.parse::<toml::Table>()?)?;
@@ -103,15 +109,15 @@ impl Fit {
             guess.check(&text, data)?;
             eprint!("{text}\n{}", guess.sentences(&text));
         }
-        let file = parse(&text).with_context(|| self.name())?;
+        let work = Work::read(&text).with_context(|| self.name())?;
         let folder = match &self.output {
             Some(path) => path.clone(),
             None => free_name(),
         };
         if self.samples.is_some() {
-            posterior::check(&file)?;
+            work.check_draws()?;
         }
-        let (prepared, read) = output::with_reads(|| run::Prepared::new(file, &base_dir, registry));
+        let (prepared, read) = output::with_reads(|| work.prepared(&base_dir, registry));
         let prepared = prepared?;
         // Settings of a run say so already.
         let text = text
@@ -126,11 +132,20 @@ impl Fit {
     /// The fit, and the draws that are wanted after it.
     fn run_all(
         &self,
-        prepared: &run::Prepared<'_>,
+        work: &Prepared<'_>,
         text: &str,
         folder: &Folder,
         resume: bool,
     ) -> anyhow::Result<Answer> {
+        let prepared = match work {
+            Prepared::Emission(prepared) => prepared,
+            Prepared::Image(prepared) => {
+                let recorder = Recorder::of_process();
+                let answer = static_image::run(prepared, folder)?;
+                recorder.write_into(folder.path())?;
+                return Ok(answer);
+            }
+        };
         let recorder = Recorder::of_process();
         // Other ranks know where the run is if that was said.
         let shared = self.samples.filter(|_| self.output.is_some() || self.resume.is_some());
@@ -197,8 +212,7 @@ impl Fit {
         }
         let Some(path) = &self.file else { return Ok(()) };
         let given = output::read_text(path)?;
-        let (new, old) = (parse(&given)?, parse(text)?);
-        if new != old {
+        if Work::read(&given)? != Work::read(text)? {
             let at = text.lines().skip(1).zip(given.lines()).position(|(a, b)| a != b);
             let line = at.map_or(String::new(), |k| format!(", first in line {}", k + 1));
             bail!("{} differs from the settings that the run began with{line}", path.display());
@@ -217,6 +231,9 @@ fn base_dir_of(text: &str) -> PathBuf {
 }
 
 fn parse(text: &str) -> anyhow::Result<FitFile> {
+    if StaticImageFile::is_meant(text) {
+        bail!("there is a table [image]: a static image has no volume, and this needs one");
+    }
     FitFile::parse(text).map_err(|error| match error {
         Error::Fit(FitError::Syntax(text)) => init::explained(&text),
         other => other.into(),

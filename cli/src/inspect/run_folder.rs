@@ -23,8 +23,13 @@ pub fn describe(folder: &Path) -> anyhow::Result<Answer> {
     let mut line = |key: &str, value: String| text += &format!("{key:<16}{value}\n");
     line("title", string(&table, &["title"]));
     line("data", data(&table));
-    line("representation", string(&table, &["representation", "kind"]));
-    line("steps", steps(&table, log.as_ref(), results.is_some()));
+    match table.get("image").and_then(|image| image.get("pixels")) {
+        Some(pixels) => line("model", format!("static image of {pixels} x {pixels} pixels")),
+        None => {
+            line("representation", string(&table, &["representation", "kind"]));
+            line("steps", steps(&table, log.as_ref(), results.is_some()));
+        }
+    }
     for (key, value) in results.iter().flatten().filter(|(key, _)| *key != "steps") {
         line(key, short(value));
     }

@@ -12,7 +12,9 @@ mod triangle;
 mod view;
 
 pub use grid_map::{GridAxis, GridMap};
-pub use pictures::{Figure, encode, frames, projections, residuals, slices, still};
+pub use pictures::{
+    Figure, encode, enlarged, frames, images, projections, residuals, slices, still,
+};
 pub use plot::{Axis, LinePlot, Marks, Series};
 pub use triangle::{Triangle, Variable};
 pub use view::{Motion, View3d, rates};

@@ -176,6 +176,37 @@ pub fn residuals(maps: &[(&str, &Vec<f32>)], n: usize, what: &str) -> anyhow::Re
     Ok(Figure { png: encode(Some(sheet.drawn))?, caption, alt })
 }
 
+/// An image of n × n pixels with `zoom` times as many along each side, linear between the centres of its own.
+pub fn enlarged(image: &[f32], n: usize, zoom: usize) -> Vec<f32> {
+    let last = n.saturating_sub(1);
+    let place = |k: usize| ((k as f32 + 0.5) / zoom as f32 - 0.5).clamp(0.0, last as f32);
+    let at = |row: f32, column: f32| {
+        let (i, j) = (row as usize, column as usize);
+        let (a, b) = (row - i as f32, column - j as f32);
+        let value = |i: usize, j: usize| image[i.min(last) * n + j.min(last)];
+        let along = |i: usize| value(i, j) * (1.0 - b) + value(i, j + 1) * b;
+        along(i) * (1.0 - a) + along(i + 1) * a
+    };
+    let side = n * zoom;
+    (0..side * side).map(|k| at(place(k / side), place(k % side))).collect()
+}
+
+/// Images of n × n pixels beside each other, north up; `what` says what they are.
+///
+/// # Errors
+/// If it cannot be encoded.
+pub fn images(images: &[(&str, Vec<f32>)], n: usize, what: &str) -> anyhow::Result<Figure> {
+    let most = images.iter().flat_map(|(_, image)| image).fold(0.0f32, |most, x| most.max(*x));
+    let mut sheet = Sheet::new([images.len(), 1], n, 1, most);
+    images.iter().enumerate().for_each(|(k, (_, image))| sheet.put([k, 0], image));
+    let names = images.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", right of it ");
+    let caption = format!(
+        "{what} Shown: {names}, on one linear scale of brightness from black (0) to yellow. North is up, east to the left."
+    );
+    let alt = format!("Images: {names}.");
+    Ok(Figure { png: encode(Some(sheet.drawn))?, caption, alt })
+}
+
 /// Sharp images of n × n rays beside each other, at a time in M; `with` says what of light is in them.
 ///
 /// # Errors
@@ -199,4 +230,16 @@ pub fn still(
     );
     let alt = format!("The lensed image of the volume: {names}.");
     Ok(Figure { png: encode(Some(sheet.drawn))?, caption, alt })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exact_enlarged_pixels_lie_between() {
+        let fine = enlarged(&[0.0, 1.0, 2.0, 3.0], 2, 2);
+        assert_eq!(fine.len(), 16);
+        assert_eq!((fine[0], fine[15], fine[5]), (0.0, 3.0, 0.75));
+    }
 }

@@ -58,6 +58,7 @@ pub mod settings;
 pub mod setup;
 mod shift;
 mod sightlines;
+pub mod static_image;
 mod steps;
 mod stokes;
 mod terms;

@@ -1,5 +1,6 @@
 //! Pictures of an experiment.
 
+mod images;
 mod plots;
 mod volumes;
 
@@ -79,6 +80,11 @@ impl Figures<'_> {
             FigureKind::Map => {
                 if let Some(figure) = self.map(asked)? {
                     drawn.figures.push((name("map"), figure));
+                }
+            }
+            FigureKind::Images => {
+                if let Some(figure) = self.images(asked)? {
+                    drawn.figures.push((name("images"), figure));
                 }
             }
             FigureKind::Time => drawn.plots.extend(self.times(asked)?),

@@ -1,7 +1,7 @@
 //! `kerrlight fit --data FILE`: settings that are guessed from a file of data, with every guess told in a sentence.
 
 use super::annotate::annotate;
-use super::of_data;
+use super::{Model, of_data};
 use anyhow::bail;
 use std::path::Path;
 
@@ -30,9 +30,9 @@ struct Missing {
 ///
 /// # Errors
 /// If the file holds no visibilities, images or light curve.
-pub fn guess(data: &Path) -> anyhow::Result<Guess> {
+pub fn guess(data: &Path, model: Option<Model>) -> anyhow::Result<Guess> {
     let data = std::path::absolute(data)?;
-    let plain = of_data(&data, Path::new(""))?;
+    let plain = of_data(&data, Path::new(""), model)?;
     let mut guess = Guess {
         text: annotate(&plain),
         read: Vec::new(),

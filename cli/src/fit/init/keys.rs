@@ -22,7 +22,11 @@ const fn key(
 }
 
 /// What a heading is about.
-pub const TABLES: [(&str, &str); 25] = [
+pub const TABLES: [(&str, &str); 29] = [
+    ("envelope", "A Gaussian in the middle of the field that light is expected in."),
+    ("image", "The static image: nothing is assumed of a hole, and nothing moves."),
+    ("strength", "A factor on all penalties, which frames that are held out choose."),
+    ("ring", "Where a ring is looked for, to be measured."),
     ("hole", "The black hole."),
     ("observer", "Where the observer is."),
     ("screen", "Square pixels of the model."),
@@ -64,6 +68,31 @@ pub const TABLES: [(&str, &str); 25] = [
 
 /// All keys, in the order in which they stand.
 pub const KEYS: &[Key] = &[
+    key("image", "pixels", "", "pixels per side; 8 to 512"),
+    key("image", "field_uas", "", "width of the field; microarcseconds"),
+    key("image", "flux_jy", "", "mean of the Gaussian prior of the flux; Jy"),
+    key("image", "flux_sigma_jy", "", "its standard deviation; Jy"),
+    key("image", "starts", "", "images to start from: rings and Gaussians; microarcseconds"),
+    key("image", "iterations", "", "iterations from one start, at most"),
+    key("image", "draws", "", "fits of the image measured once more, for errors; 2 or more"),
+    key("data.visibilities", "scattering", "", "\"sgra\": the scattering of Sgr A*"),
+    key(
+        "data.visibilities",
+        "variability",
+        "",
+        "error for what varies: jy/(1 + (|u|/uv)^2)^(power/2)",
+    ),
+    key("regulariser", "kind", "", "total-variation, smoothness or entropy"),
+    key("regulariser", "weight", "", "factor on its integral over a field of side 1"),
+    key("regulariser", "epsilon", "", "slope below which total variation is smooth"),
+    key("regulariser", "level", "", "brightness over its mean at which entropy is 0"),
+    key("regulariser", "floor", "", "fraction of level below which entropy is a parabola"),
+    key("envelope", "fwhm_uas", "", "its full width at half maximum; microarcseconds"),
+    key("envelope", "weight", "", "factor on the entropy relative to it; above 0"),
+    key("strength", "values", "", "the factors; above 0"),
+    key("strength", "folds", "", "parts of the frames that are held out in turn; 2 or more"),
+    key("ring", "least_radius_uas", "", "least distance of the brightest points; microarcseconds"),
+    key("ring", "most_radius_uas", "", "largest distance; microarcseconds"),
     key("", "title", "", "one-line description of the fit"),
     key("", "seed", "", "random seed for noise, initial parameters and batches; a whole number"),
     key("hole", "spin", "", "dimensionless spin a/M along +z; -1 to 1"),

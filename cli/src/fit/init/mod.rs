@@ -4,8 +4,10 @@ mod annotate;
 mod guess;
 mod keys;
 mod light_curve;
+mod sources;
+mod static_image;
 
-use super::{BUILT_IN, parse};
+use super::{BUILT_IN, Work};
 use crate::answer::Answer;
 use crate::interferometry::image_files::OwnTimes;
 use crate::interferometry::movie_files;
@@ -15,7 +17,6 @@ use anyhow::{Context, bail};
 pub use guess::{Guess, guess};
 use kerrlight_tomo::fit::setup::{self, VisibilitySettings};
 use kerrlight_tomo::interferometry::data_terms::ClosureTerm;
-use kerrlight_tomo::interferometry::earth::SourcePosition;
 use kerrlight_tomo::interferometry::files;
 use kerrlight_tomo::interferometry::gains::prior_table;
 use kerrlight_tomo::interferometry::observation::Observation;
@@ -23,6 +24,7 @@ use kerrlight_tomo::interferometry::products::ClosureKind;
 use kerrlight_tomo::interferometry::simulate::Movie;
 use kerrlight_tomo::units::{MICROARCSECOND, gravitational_angle};
 use keys::{KEYS, TABLES};
+use sources::{SOURCES, Source};
 use std::path::{Path, PathBuf};
 
 /// An error in settings; of what is missing, with what to write.
@@ -47,53 +49,24 @@ fn advice(missing: &str) -> String {
     found.into_iter().chain(KEYS.iter().filter(key).map(of)).collect()
 }
 
+/// What is fitted to visibilities.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Model {
+    /// An image that does not change.
+    Image,
+    /// Emission around a hole that moves.
+    Volume,
+}
+
 /// Where it goes unless the user says.
 const NAME: &str = "my_fit.toml";
 
-/// A source whose mass and distance are known.
-struct Source {
-    name: &'static str,
-    words: [&'static str; 2],
-    position: SourcePosition,
-    mass_msun: f64,
-    distance_kpc: f64,
-    inclination_deg: f64,
-    /// A setting that leaves out baselines that see more than the surroundings of the hole.
-    uv_min: Option<&'static str>,
-    /// Where the numbers come from.
-    mass: &'static str,
-    inclination: &'static str,
-}
-
-const SOURCES: [Source; 2] = [
-    Source {
-        name: "Sgr A*",
-        words: ["SGRA", "SGR_A"],
-        position: SourcePosition::SGR_A,
-        mass_msun: 4.154e6,
-        distance_kpc: 8.178,
-        inclination_deg: 30.0,
-        uv_min: None,
-        mass: "Sgr A* (GRAVITY Collaboration 2019, A&A 625, L10)",
-        inclination: "the EHT's models prefer views of Sgr A* near face-on, 30 degrees or less from an axis (2022, ApJL 930, L16)",
-    },
-    Source {
-        name: "M87*",
-        words: ["M87", "VIRGOA"],
-        position: SourcePosition::M87,
-        mass_msun: 6.5e9,
-        distance_kpc: 16_800.0,
-        inclination_deg: 163.0,
-        uv_min: Some(
-            "uv_min = 1e8 #! shorter baselines see the jet as well: 1.1 Jy, where the ring has about 0.6",
-        ),
-        mass: "M87* (EHT Collaboration 2019, ApJL 875, L1)",
-        inclination: "17 degrees from the jet's axis, with the hole turned away (EHT Collaboration 2019, ApJL 875, L5)",
-    },
-];
-
 /// Writes the file and says what is left to the user.
-pub fn write(data: Option<&Path>, to: Option<&Path>) -> anyhow::Result<Answer> {
+pub fn write(
+    data: Option<&Path>,
+    to: Option<&Path>,
+    model: Option<Model>,
+) -> anyhow::Result<Answer> {
     let path = to.unwrap_or(Path::new(NAME));
     if path.exists() {
         bail!("{} exists: give another name with -o", path.display());
@@ -101,7 +74,7 @@ pub fn write(data: Option<&Path>, to: Option<&Path>) -> anyhow::Result<Answer> {
     let output = Output::new(path, "toml")?;
     let plain = match data {
         None => BUILT_IN.to_owned(),
-        Some(data) => of_data(data, path)?,
+        Some(data) => of_data(data, path, model)?,
     };
     let text = format!("{}{}", head(path, &plain), annotate(&plain));
     output.write(text.as_bytes())?;
@@ -132,7 +105,11 @@ fn head(path: &Path, plain: &str) -> String {
 }
 
 /// The plain settings of a fit of this file, for annotation.
-fn of_data(data: &Path, toml: &Path) -> anyhow::Result<String> {
+fn of_data(data: &Path, toml: &Path, model: Option<Model>) -> anyhow::Result<String> {
+    if model == Some(Model::Image) {
+        let (_, observation) = crate::interferometry::read(data)?;
+        return of_observation(&observation, (data, toml), model);
+    }
     let path = toml::Value::String(seen_from(toml, data)?).to_string();
     let extension = data.extension().and_then(|e| e.to_str()).unwrap_or_default();
     if matches!(extension.to_ascii_lowercase().as_str(), "npz" | "npy" | "exr") {
@@ -140,7 +117,7 @@ fn of_data(data: &Path, toml: &Path) -> anyhow::Result<String> {
     }
     let name = data.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let first = match crate::interferometry::read(data) {
-        Ok((_, observation)) => return of_visibilities(&observation, &path, name),
+        Ok((_, observation)) => return of_observation(&observation, (data, toml), model),
         Err(first) => first,
     };
     // A table may hold a light curve, and a FITS file or a table an image.
@@ -189,6 +166,24 @@ fn known(observation: &Observation) -> Option<&'static Source> {
         });
         near || source.words.iter().any(|name| word.starts_with(name))
     })
+}
+
+/// Of visibilities: a static image, if that is wanted or the source is known to stand still for a night.
+fn of_observation(
+    observation: &Observation,
+    (data, toml): (&Path, &Path),
+    model: Option<Model>,
+) -> anyhow::Result<String> {
+    let path = toml::Value::String(seen_from(toml, data)?).to_string();
+    let file = data.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    let source = known(observation);
+    let stands_still = source.is_some_and(|source| !source.varies);
+    if model.map_or(stands_still, |model| model == Model::Image) {
+        let name = source.map_or(observation.source.trim(), |source| source.name);
+        let name = if name.is_empty() { "unnamed source" } else { name };
+        return static_image::of_visibilities(observation, source, name, (&path, file));
+    }
+    of_visibilities(observation, &path, file)
 }
 
 fn of_visibilities(observation: &Observation, path: &str, file: &str) -> anyhow::Result<String> {
@@ -347,6 +342,6 @@ fn complete(template: &str, fields: &[(&str, String)]) -> anyhow::Result<String>
     let text = fields.iter().fold(template.to_owned(), |text, (name, value)| {
         text.replace(&format!("{{{name}}}"), value)
     });
-    parse(&text.replace("#? ", "")).context("the starter file")?;
+    Work::read(&text.replace("#? ", "")).context("the starter file")?;
     Ok(text)
 }

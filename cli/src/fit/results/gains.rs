@@ -1,6 +1,8 @@
 //! Gains of stations that a fit has solved for: a table to apply, pictures and numbers.
 
 use super::Estimate;
+use super::verdict::Evidence;
+use crate::fit::folder::Folder;
 use crate::report::{Axis, LinePlot, Marks, Series, Table};
 use kerrlight_tomo::interferometry::Complex64;
 use kerrlight_tomo::interferometry::files;
@@ -36,15 +38,25 @@ struct Summary<'a> {
 impl Estimate<'_> {
     /// The gains of all stations and frames, beside these images, where they are solved for; writes their table.
     pub fn gains(&self, movie: &[f32]) -> anyhow::Result<Option<Gains>> {
-        let Some(model) = self.evidence().model_visibilities(movie)? else { return Ok(None) };
-        let Some(table) = self.measured.gains(self.file, &model)? else { return Ok(None) };
-        self.folder.file(TABLE)?.write(files::gains_to_csv(&table).as_bytes())?;
-        let distance = self.measured.true_gains.as_ref().and_then(|truth| table.distance(truth));
-        Ok(Some(Gains { table, distance }))
+        Gains::beside(&self.evidence(), movie, self.folder)
     }
 }
 
 impl Gains {
+    /// The gains of all stations and frames beside images of all frames, where they are solved for; writes their table.
+    pub fn beside(
+        evidence: &Evidence<'_>,
+        movie: &[f32],
+        folder: &Folder,
+    ) -> anyhow::Result<Option<Self>> {
+        let Evidence { measured, losses, .. } = *evidence;
+        let Some(model) = evidence.model_visibilities(movie)? else { return Ok(None) };
+        let Some(table) = measured.gains(losses, &model)? else { return Ok(None) };
+        folder.file(TABLE)?.write(files::gains_to_csv(&table).as_bytes())?;
+        let distance = measured.true_gains.as_ref().and_then(|truth| table.distance(truth));
+        Ok(Some(Gains { table, distance }))
+    }
+
     /// Multiplies visibilities of a model by g₁ ḡ₂ of their stations at their times; by 1 where a station has none.
     pub fn put_on(&self, observation: &Observation, rows: &[&Row], model: &mut [Complex64]) {
         let gains = self.table.by_station();

@@ -1,17 +1,17 @@
 //! What a run leaves: the volume, the movie, numbers, pictures and the report.
 
 mod fields;
-mod gains;
+pub mod gains;
 mod lensed;
 mod light_curve;
 mod numbers;
 mod over_time;
-mod page;
-mod plots;
-mod residuals;
+pub mod page;
+pub mod plots;
+pub mod residuals;
 mod scene;
 mod units;
-mod verdict;
+pub mod verdict;
 
 pub use fields::{compare, recovered, true_volume};
 
@@ -70,7 +70,9 @@ impl Estimate<'_> {
         }
         self.scene(trainer, state, &movie)?;
         let still = self.still(trainer, state)?;
-        let judged = self.evidence().judged(&trainer.objective, &seen)?;
+        let objective = &trainer.objective;
+        let compared = (objective.names(), objective.statistics(&seen));
+        let judged = self.evidence().judged(compared, &seen)?;
         self.curve_table(&seen)?;
         let gains = self.gains(&movie)?;
         let found =
@@ -82,7 +84,8 @@ impl Estimate<'_> {
     }
 
     fn evidence(&self) -> Evidence<'_> {
-        Evidence { file: self.file, measured: self.measured }
+        let Estimate { file, measured, .. } = *self;
+        Evidence { file: Some(file), losses: &file.loss, seed: file.seed, measured }
     }
 
     fn volumes(&self, volume: &Volume, state: &State<f32>) -> anyhow::Result<()> {

@@ -46,7 +46,7 @@ impl Estimate<'_> {
             figures: self.figures(found)?,
             drawings: world_scan::drawing(self.folder)?.into_iter().collect(),
             plots,
-            settings: self.settings()?,
+            settings: settings(self.file)?,
             ..Report::default()
         };
         let names = ["views.png", "lensed.png", "slices.png", "movie.png"];
@@ -203,13 +203,14 @@ impl Estimate<'_> {
         }
         lines
     }
+}
 
-    fn settings(&self) -> anyhow::Result<Vec<report::Setting>> {
-        let table = toml::Table::try_from(self.file).context("settings")?;
-        let mut all = Vec::new();
-        flatten("", &toml::Value::Table(table), &mut all);
-        Ok(all)
-    }
+/// Every setting with its unit.
+pub fn settings(file: &impl serde::Serialize) -> anyhow::Result<Vec<report::Setting>> {
+    let table = toml::Table::try_from(file).context("settings")?;
+    let mut all = Vec::new();
+    flatten("", &toml::Value::Table(table), &mut all);
+    Ok(all)
 }
 
 /// With four digits behind the point, as far as there are any.

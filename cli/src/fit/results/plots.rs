@@ -1,5 +1,7 @@
 //! Data and model as curves.
 
+use super::gains::Gains;
+use super::verdict::Evidence;
 use super::{Estimate, Found};
 use crate::report::{Axis, LinePlot, Marks, Series};
 
@@ -40,43 +42,48 @@ impl Estimate<'_> {
 
     /// Amplitudes of the data and of the model, with the data's errors.
     pub fn amplitudes(&self, found: &Found<'_>) -> anyhow::Result<Option<LinePlot>> {
-        let Some((observation, _)) = &self.measured.visibilities else { return Ok(None) };
-        let mut model = self.evidence().model_visibilities(&found.movie)?.unwrap_or_default();
-        let rows: Vec<_> = observation.stokes_i().collect();
-        if let Some(gains) = &found.gains {
-            let rows: Vec<_> = rows.iter().map(|(row, _)| *row).collect();
-            gains.put_on(observation, &rows, &mut model);
-        }
-        let with = if found.gains.is_some() { ", with the gains that were found" } else { "" };
-        let length = |uv: [f64; 2]| uv[0].hypot(uv[1]) * 1e-9;
-        let data = rows.iter().map(|(row, i)| [length(row.uv), i.visibility.norm()]);
-        let fitted = rows.iter().zip(&model).map(|((row, _), v)| [length(row.uv), v.norm()]);
-        let series = vec![
-            Series {
-                name: "data".to_owned(),
-                points: data.collect(),
-                errors: rows.iter().map(|(_, i)| i.noise_sigma).collect(),
-                marks: Marks::Points,
-            },
-            Series {
-                name: "recovered".to_owned(),
-                points: fitted.collect(),
-                errors: Vec::new(),
-                marks: Marks::Points,
-            },
-        ];
-        Ok(Some(LinePlot {
-            title: "Visibilities".to_owned(),
-            caption: format!(
-                "What the telescopes measure and what the recovered movie would give them{with}: amplitudes of the Fourier components of all frames against the distance of two telescopes as seen from the source, in wavelengths. Long baselines see fine detail. Bars are standard deviations of the data; where they are met the model explains the data."
-            ),
-            x: Axis {
-                label: "baseline".to_owned(),
-                unit: "10⁹ wavelengths".to_owned(),
-                log: false,
-            },
-            y: Axis { label: "amplitude".to_owned(), unit: "Jy".to_owned(), log: true },
-            series,
-        }))
+        amplitudes(&self.evidence(), &found.movie, found.gains.as_ref())
     }
+}
+
+/// Amplitudes of the data and of images of all frames with these gains.
+pub fn amplitudes(
+    evidence: &Evidence<'_>,
+    movie: &[f32],
+    gains: Option<&Gains>,
+) -> anyhow::Result<Option<LinePlot>> {
+    let Some((observation, _)) = &evidence.measured.visibilities else { return Ok(None) };
+    let mut model = evidence.model_visibilities(movie)?.unwrap_or_default();
+    let rows: Vec<_> = observation.stokes_i().collect();
+    if let Some(gains) = gains {
+        let rows: Vec<_> = rows.iter().map(|(row, _)| *row).collect();
+        gains.put_on(observation, &rows, &mut model);
+    }
+    let with = if gains.is_some() { ", with the gains that were found" } else { "" };
+    let length = |uv: [f64; 2]| uv[0].hypot(uv[1]) * 1e-9;
+    let data = rows.iter().map(|(row, i)| [length(row.uv), i.visibility.norm()]);
+    let fitted = rows.iter().zip(&model).map(|((row, _), v)| [length(row.uv), v.norm()]);
+    let series = vec![
+        Series {
+            name: "data".to_owned(),
+            points: data.collect(),
+            errors: rows.iter().map(|(_, i)| i.noise_sigma).collect(),
+            marks: Marks::Points,
+        },
+        Series {
+            name: "recovered".to_owned(),
+            points: fitted.collect(),
+            errors: Vec::new(),
+            marks: Marks::Points,
+        },
+    ];
+    Ok(Some(LinePlot {
+        title: "Visibilities".to_owned(),
+        caption: format!(
+            "What the telescopes measure and what the recovered images would give them{with}: amplitudes of the Fourier components of all frames against the distance of two telescopes as seen from the source, in wavelengths. Long baselines see fine detail. Bars are standard deviations of the data; where they are met the model explains the data."
+        ),
+        x: Axis { label: "baseline".to_owned(), unit: "10⁹ wavelengths".to_owned(), log: false },
+        y: Axis { label: "amplitude".to_owned(), unit: "Jy".to_owned(), log: true },
+        series,
+    }))
 }

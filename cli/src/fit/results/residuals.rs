@@ -1,8 +1,10 @@
 //! Residuals on the sky and on baselines.
 
+use super::verdict::Judged;
 use super::{Estimate, Found};
 use crate::report::{self, Figure, LinePlot};
 use kerrlight_tomo::fit::settings::LossKind;
+use kerrlight_tomo::fit::setup::Measured;
 use kerrlight_tomo::fit::verdict::Tested;
 use kerrlight_tomo::interferometry::dirty_image;
 use num_complex::Complex;
@@ -11,25 +13,7 @@ use std::collections::HashMap;
 impl Estimate<'_> {
     /// Residuals over time and over baselines.
     pub fn residual_plots(&self, found: &Found<'_>) -> Vec<LinePlot> {
-        let lengths = self.baselines();
-        let length = |[a, b]: [u16; 2]| lengths.get(&[a.min(b), a.max(b)]).copied();
-        [found.judged.over_time(), found.judged.over_baselines(length)]
-            .into_iter()
-            .flatten()
-            .collect()
-    }
-
-    /// Mean lengths of baselines, 10⁹ wavelengths.
-    fn baselines(&self) -> HashMap<[u16; 2], f64> {
-        let mut sums: HashMap<[u16; 2], [f64; 2]> = HashMap::new();
-        let rows =
-            self.measured.visibilities.iter().flat_map(|(observation, _)| observation.stokes_i());
-        for (row, _) in rows {
-            let [a, b] = row.stations;
-            let sum = sums.entry([a.min(b), a.max(b)]).or_default();
-            *sum = [sum[0] + 1.0, sum[1] + row.uv[0].hypot(row.uv[1]) * 1e-9];
-        }
-        sums.into_iter().map(|(pair, [count, sum])| (pair, sum / count)).collect()
+        plots(&found.judged, self.measured)
     }
 
     /// Where on the sky images or visibilities have light that the model lacks; nothing where data know no places.
@@ -78,6 +62,25 @@ impl Estimate<'_> {
         let sigmas: Vec<f64> = rows.iter().map(|(_, i)| i.noise_sigma).collect();
         Ok(Some(dirty_image::in_sigmas(sky, uv, &residuals, &sigmas)?))
     }
+}
+
+/// Residuals over time and over baselines.
+pub fn plots(judged: &Judged, measured: &Measured) -> Vec<LinePlot> {
+    let lengths = baselines(measured);
+    let length = |[a, b]: [u16; 2]| lengths.get(&[a.min(b), a.max(b)]).copied();
+    [judged.over_time(), judged.over_baselines(length)].into_iter().flatten().collect()
+}
+
+/// Mean lengths of baselines, 10⁹ wavelengths.
+fn baselines(measured: &Measured) -> HashMap<[u16; 2], f64> {
+    let mut sums: HashMap<[u16; 2], [f64; 2]> = HashMap::new();
+    let rows = measured.visibilities.iter().flat_map(|(observation, _)| observation.stokes_i());
+    for (row, _) in rows {
+        let [a, b] = row.stations;
+        let sum = sums.entry([a.min(b), a.max(b)]).or_default();
+        *sum = [sum[0] + 1.0, sum[1] + row.uv[0].hypot(row.uv[1]) * 1e-9];
+    }
+    sums.into_iter().map(|(pair, [count, sum])| (pair, sum / count)).collect()
 }
 
 /// Mean and χ² of each pixel's residuals in units of their errors; nothing of data that are no images of so many pixels.

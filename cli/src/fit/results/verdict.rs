@@ -6,10 +6,11 @@ mod parts;
 mod tests;
 mod words;
 
-use kerrlight_tomo::fit::Objective;
 use kerrlight_tomo::fit::settings::{DataFiles, FitFile, Loss, LossKind, Noise};
 use kerrlight_tomo::fit::setup::Measured;
-use kerrlight_tomo::fit::verdict::{Errors, Outcome, Tested, Verdict, ZeroSpacing, judge, worst};
+use kerrlight_tomo::fit::verdict::{
+    Errors, Outcome, Statistics, Tested, Verdict, ZeroSpacing, judge, worst,
+};
 use kerrlight_tomo::interferometry::products::debiased_amplitude;
 use serde_json::{Value, json};
 
@@ -23,8 +24,10 @@ pub struct Judged {
     pub flux: Option<ZeroSpacing>,
     /// Names of the stations.
     stations: Vec<String>,
-    /// Times of the frames, M.
+    /// Times of the frames: M; hours of UTC of a static image.
     times: Vec<f64>,
+    /// Whether they are those of a static image.
+    is_static: bool,
 }
 
 /// Baselines shorter than this part of 1/(field of view) see the whole flux: within 0.3 % for a source whose standard
@@ -32,8 +35,8 @@ pub struct Judged {
 const SHORT: f64 = 0.05;
 
 /// Losses in the order of the objective's terms: the image first.
-fn ordered(file: &FitFile) -> impl Iterator<Item = &Loss> {
-    let of = |image: bool| file.loss.iter().filter(move |l| (l.data == LossKind::Image) == image);
+fn ordered(losses: &[Loss]) -> impl Iterator<Item = &Loss> {
+    let of = |image: bool| losses.iter().filter(move |l| (l.data == LossKind::Image) == image);
     of(true).chain(of(false))
 }
 
@@ -57,20 +60,31 @@ fn errors(file: &FitFile, kind: LossKind) -> Errors {
 /// Data, and what they are to the fit.
 #[derive(Clone, Copy)]
 pub struct Evidence<'a> {
-    /// Settings.
-    pub file: &'a FitFile,
+    /// Settings; none of a static image, whose errors are those that its data state.
+    pub file: Option<&'a FitFile>,
+    /// What is compared.
+    pub losses: &'a [Loss],
+    /// Seed of the settings.
+    pub seed: u64,
     /// Data.
     pub measured: &'a Measured,
 }
 
+/// Kinds of data with their names, in the order of the losses, images first.
+pub type Compared<'a> = (Vec<&'a str>, Vec<Statistics>);
+
 impl Evidence<'_> {
     /// Of images of all frames.
-    pub fn judged(&self, objective: &Objective<f32>, movie: &[f32]) -> anyhow::Result<Judged> {
-        let (names, statistics) = (objective.names(), objective.statistics(movie));
+    pub fn judged(
+        &self,
+        (names, statistics): Compared<'_>,
+        movie: &[f32],
+    ) -> anyhow::Result<Judged> {
         let model = self.model_visibilities(movie)?;
         let mut terms = Vec::new();
-        for ((loss, name), statistics) in ordered(self.file).zip(names).zip(statistics) {
-            let mut tested = Tested::gaussian(statistics, errors(self.file, loss.data));
+        for ((loss, name), statistics) in ordered(self.losses).zip(names).zip(statistics) {
+            let errors = self.file.map_or(Errors::Stated, |file| errors(file, loss.data));
+            let mut tested = Tested::gaussian(statistics, errors);
             if tested.errors != Errors::Weight
                 && let Some(model) = &model
                 && let Some(draws) = self.draws(loss, model)
@@ -84,7 +98,7 @@ impl Evidence<'_> {
         let knows_flux =
             |loss: &Loss| matches!(loss.data, LossKind::Visibilities | LossKind::Amplitudes);
         // Gains that are free may be what is missing.
-        let knows = self.measured.gains.is_none() && self.file.loss.iter().any(knows_flux);
+        let knows = self.measured.gains.is_none() && self.losses.iter().any(knows_flux);
         let judged = flux.filter(|_| knows);
         let observation = self.measured.visibilities.as_ref().map(|(observation, _)| observation);
         let stations = observation.map(|o| o.stations.iter().map(|s| s.name.clone()).collect());
@@ -94,6 +108,7 @@ impl Evidence<'_> {
             flux,
             stations: stations.unwrap_or_default(),
             times: self.measured.times.clone(),
+            is_static: self.file.is_none(),
         })
     }
 

@@ -14,6 +14,7 @@ mod penalties;
 mod ranges;
 mod recovery;
 mod simulation;
+mod static_image;
 mod unknown_world;
 mod unknowns;
 mod view;
@@ -32,6 +33,10 @@ pub use recovery::{
     AxisScan, AxisSearch, Kind, Linear, Occupancy, Optimiser, Representation, Start, Training,
 };
 pub use simulation::{GlyphShape, Movie, Noise, Observation, Shines, Spot, Truth, Tube};
+pub use static_image::{
+    EnvelopeSettings, ImageSettings, RingSettings, Scattering, StartImage, StaticData,
+    StaticImageFile, StaticVisibilities, StrengthSettings, Variability,
+};
 pub use unknown_world::{PriorSettings, UnknownWorld, WorldSearch, WorldView};
 pub use view::{Absorption, Effects, Hole, Motion, Observer, Region, Screen, WidthOf};
 pub use world::merge;

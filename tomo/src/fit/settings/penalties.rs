@@ -95,22 +95,30 @@ fn meaning(key: &str) -> &'static str {
     }
 }
 
+/// Penalties with their weights.
+///
+/// # Errors
+/// If a kind occurs twice, or a number is missing or out of range.
+pub(super) fn priors_of(settings: &[PenaltySettings]) -> Result<Vec<Prior>, Error> {
+    let one = |(k, setting): (usize, &PenaltySettings)| {
+        let same = |other: &PenaltySettings| other.kind == setting.kind;
+        if let Some(first) = settings[..k].iter().position(same) {
+            refuse!(
+                "regulariser {k}: the same kind as regulariser {first}; each kind is allowed once"
+            );
+        }
+        setting.prior().within(format!("regulariser {k}"))
+    };
+    settings.iter().enumerate().map(one).collect()
+}
+
 impl FitFile {
     /// The penalties with their weights.
     ///
     /// # Errors
     /// If a kind occurs twice, or a number is missing or out of range.
     pub fn priors(&self) -> Result<Vec<Prior>, Error> {
-        let one = |(k, setting): (usize, &PenaltySettings)| {
-            let same = |other: &PenaltySettings| other.kind == setting.kind;
-            if let Some(first) = self.regulariser[..k].iter().position(same) {
-                refuse!(
-                    "regulariser {k}: the same kind as regulariser {first}; each kind is allowed once"
-                );
-            }
-            setting.prior().within(format!("regulariser {k}"))
-        };
-        self.regulariser.iter().enumerate().map(one).collect()
+        priors_of(&self.regulariser)
     }
 
     /// Penalties of a representation that is learnt; `None` where there are none.

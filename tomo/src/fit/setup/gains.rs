@@ -1,7 +1,7 @@
 //! Gains of stations: priors of those that observe, and what a fit found.
 
 use super::{Measured, Result};
-use crate::fit::settings::{FitFile, LossKind, refuse};
+use crate::fit::settings::{InstrumentSettings, Loss, LossKind, refuse};
 use crate::interferometry::Complex64;
 use crate::interferometry::data_terms::GainTerm;
 use crate::interferometry::gains::{GainPriors, GainTable, StationGain};
@@ -11,9 +11,13 @@ use crate::interferometry::observation::Observation;
 ///
 /// # Errors
 /// If a station has none, or no loss has gains, or two of them.
-pub(super) fn priors(file: &FitFile, observation: &Observation) -> Result<Option<GainPriors>> {
-    let Some(instrument) = &file.instrument else { return Ok(None) };
-    let has = |kind| file.loss.iter().any(|loss| loss.data == kind);
+pub(super) fn priors(
+    instrument: Option<&InstrumentSettings>,
+    losses: &[Loss],
+    observation: &Observation,
+) -> Result<Option<GainPriors>> {
+    let Some(instrument) = instrument else { return Ok(None) };
+    let has = |kind| losses.iter().any(|loss| loss.data == kind);
     match (has(LossKind::Visibilities), has(LossKind::Amplitudes)) {
         (true, true) => refuse!(
             "instrument.gains: losses of visibilities and of amplitudes would each have gains of their own; give one of \
@@ -46,7 +50,7 @@ impl Measured {
     ///
     /// # Errors
     /// If data make no term.
-    pub fn gains(&self, file: &FitFile, model: &[Complex64]) -> Result<Option<GainTable>> {
+    pub fn gains(&self, losses: &[Loss], model: &[Complex64]) -> Result<Option<GainTable>> {
         let (Some(priors), Some((observation, frames))) = (&self.gains, &self.visibilities) else {
             return Ok(None);
         };
@@ -57,7 +61,7 @@ impl Measured {
         for scan in seen.chunk_by(|a, b| a.0 == b.0) {
             let rows = scan.iter().map(|(_, row, _)| *row).collect();
             let part = Observation { rows, ..observation.clone() };
-            let term = match file.loss.iter().any(|loss| loss.data == LossKind::Visibilities) {
+            let term = match losses.iter().any(|loss| loss.data == LossKind::Visibilities) {
                 true => GainTerm::visibilities(&part, priors)?,
                 false => GainTerm::amplitudes(&part, priors)?,
             };

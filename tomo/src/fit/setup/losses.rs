@@ -10,7 +10,7 @@ use crate::interferometry::data_terms::{
     AmplitudeTerm, ClosureTerm, DataTerm, DataTermError, GainTerm, VisibilityTerm,
 };
 use crate::interferometry::observation::Observation;
-use crate::interferometry::operator::{Method, Pulse, Transform};
+use crate::interferometry::operator::{Float, FourierNumber, Method, Pulse, Transform};
 use crate::interferometry::products::ClosureKind;
 
 impl Measured {
@@ -86,21 +86,42 @@ impl Measured {
             let sigmas = vec![sigma; flux.len()];
             return Ok(Box::new(LightCurveTerm::new(flux, &sigmas, pixels)?));
         }
+        Ok(Box::new(self.scans(loss, pixels)?))
+    }
+
+    /// The visibilities of all frames, or what is made of them, in any precision.
+    fn scans<T: Float + FourierNumber>(&self, loss: &Loss, pixels: usize) -> Result<ScanTerm<T>> {
         let (name, quadratic) = match loss.data {
             LossKind::Visibilities => ("visibilities", self.gains.is_none()),
             LossKind::Amplitudes => ("amplitudes", false),
             LossKind::ClosurePhases => ("closure phases", false),
             _ => ("log closure amplitudes", false),
         };
-        let scans: Vec<Option<Scan<f32>>> =
+        let scans: Vec<Option<Scan<T>>> =
             (0..self.times.len()).map(|frame| self.scan(frame, loss)).collect::<Result<_>>()?;
         if scans.iter().all(Option::is_none) {
             refuse!("no frame has any {name}");
         }
-        Ok(Box::new(ScanTerm::new(name, pixels, quadratic, scans)))
+        Ok(ScanTerm::new(name, pixels, quadratic, scans))
     }
 
-    fn scan(&self, frame: usize, loss: &Loss) -> Result<Option<Scan<f32>>> {
+    /// The terms of losses of visibilities, of images of so many pixels, in any precision.
+    ///
+    /// # Errors
+    /// If one has no data.
+    pub fn visibility_terms<T: Float + FourierNumber>(
+        &self,
+        losses: &[Loss],
+        pixels: usize,
+    ) -> Result<Vec<Weighted<dyn FrameTerm<T>>>> {
+        let one = |(k, loss): (usize, &Loss)| -> Result<Weighted<dyn FrameTerm<T>>> {
+            let term = Box::new(self.scans(loss, pixels).within(format!("loss {k}"))?);
+            Ok(Weighted { weight: loss.weight, term })
+        };
+        losses.iter().enumerate().map(one).collect()
+    }
+
+    fn scan<T: Float + FourierNumber>(&self, frame: usize, loss: &Loss) -> Result<Option<Scan<T>>> {
         let missing = || {
             FitError::Conflict(format!(
                 "there are no visibilities: give {FILE}, or a truth and an [observation] of it (`kerrlight fit --init` \
@@ -124,7 +145,11 @@ impl Measured {
 
 impl Measured {
     /// The data of a scan that a loss compares; none where closure quantities have too few baselines.
-    fn scan_data(&self, loss: &Loss, part: &Observation) -> Result<Option<ScanData>> {
+    fn scan_data<T: Float + FourierNumber>(
+        &self,
+        loss: &Loss,
+        part: &Observation,
+    ) -> Result<Option<ScanData<T>>> {
         let least = loss.least_snr.unwrap_or(0.0);
         let kind = match (loss.data, &self.gains) {
             (LossKind::Visibilities, Some(priors)) => {
@@ -148,7 +173,7 @@ impl Measured {
 }
 
 /// Data of a scan.
-type ScanData = Box<dyn DataTerm<f32> + Send>;
+type ScanData<T> = Box<dyn DataTerm<T> + Send>;
 
 /// Exponentials of a frame up to this many bytes are kept.
 const MEMORY: usize = 8 << 20;

@@ -6,14 +6,16 @@ use super::truth::SPOT;
 use super::visibilities::{VisibilitySettings, frames_of, prepared};
 use super::{Instrument, Result, Truth, hours_per_m, sky};
 use crate::fit::settings::{
-    DataFiles, FitError, FitFile, Loss, LossKind, Noise, Observation as Seen, Within, refuse,
+    DataFiles, FitError, FitFile, Loss, LossKind, Noise, Observation as Seen, Scattering,
+    StaticImageFile, Within, refuse,
 };
+use crate::interferometry::Complex64;
 use crate::interferometry::array::Array;
 use crate::interferometry::earth::{Frame, Ut1};
 use crate::interferometry::gains::{GainPriors, GainTable};
-use crate::interferometry::noise::{add_thermal_noise, apply_gains};
+use crate::interferometry::noise::{ScatteringKernel, add_thermal_noise, apply_gains, unscatter};
 use crate::interferometry::observation::{Observation, Row};
-use crate::interferometry::operator::{ImageGrid, Method, Pulse};
+use crate::interferometry::operator::{ImageGrid, Method, Operator, Pulse, Transform};
 use crate::interferometry::schedule::{self, Clock, Schedule, Setup};
 use crate::interferometry::simulate::{self, Movie};
 use crate::interferometry::source::Source;
@@ -123,8 +125,37 @@ impl Measured {
         let (hours, of_rows) = frames_of(&mut observation);
         let per_m = hours_per_m(file)?;
         let times = hours.iter().map(|h| first_time + (h - hours[0]) / per_m).collect();
-        let gains = gains::priors(file, &observation)?;
+        let gains = gains::priors(file.instrument.as_ref(), &file.loss, &observation)?;
         let (visibilities, sky) = (Some((observation, of_rows)), Some(sky(file)?));
+        Ok(Measured { times, visibilities, sky, gains, ..Measured::empty() })
+    }
+
+    /// Takes measured visibilities as the data of a static image, whose frames have hours of UTC for times. `name` is
+    /// what they are called in messages.
+    ///
+    /// # Errors
+    /// If a visibility has no error, none is left, or the kernel of scattering needs a frequency that is not known.
+    pub fn of_static(file: &StaticImageFile, observation: Observation, name: &str) -> Result<Self> {
+        let data = &file.data.visibilities;
+        let settings = VisibilitySettings { average_s: data.average_s, uv_min: data.uv_min };
+        let mut observation = prepared(observation, &settings).within(name)?;
+        add_systematic("data.visibilities.systematic", data.systematic, &mut observation)?;
+        if data.scattering == Some(Scattering::SgrA) {
+            unscatter(&mut observation, &ScatteringKernel::SGR_A).within(name)?;
+        }
+        if let Some(variability) = &data.variability {
+            for row in &mut observation.rows {
+                let sigma = variability.sigma(row.uv[0].hypot(row.uv[1]));
+                row.noise_sigma[0] = row.noise_sigma[0].hypot(sigma);
+            }
+        }
+        let (times, of_rows) = frames_of(&mut observation);
+        if let Some(strength) = file.strength.as_ref().filter(|s| times.len() < 2 * s.folds) {
+            let allowed = format!("{} at most, half of the frames", times.len() / 2);
+            return Err(FitError::range("strength.folds", strength.folds, &allowed).into());
+        }
+        let gains = gains::priors(file.instrument.as_ref(), &file.loss, &observation)?;
+        let (visibilities, sky) = (Some((observation, of_rows)), Some(file.image.grid()?));
         Ok(Measured { times, visibilities, sky, gains, ..Measured::empty() })
     }
 
@@ -155,6 +186,37 @@ impl Measured {
             }
         }
         copy
+    }
+
+    /// What would have been measured of a static image, with the gains that explain the data best beside it and with other
+    /// noise. Data without visibilities stay as they are.
+    ///
+    /// # Errors
+    /// If data make no term.
+    pub fn redrawn(&self, losses: &[Loss], image: &[f64], seed: u64) -> Result<Self> {
+        let mut copy = self.without_truth();
+        let (Some((observation, _)), Some(sky)) = (&mut copy.visibilities, self.sky) else {
+            return Ok(copy);
+        };
+        let uv: Vec<[f64; 2]> = observation.stokes_i().map(|(row, _)| row.uv).collect();
+        let transform = Transform::<f64>::new(sky, Pulse::Triangle, &[uv], Method::Direct, 0)?;
+        let mut model = vec![Complex64::default(); transform.data()];
+        transform.forward(image, &mut model);
+        let gains = self.gains(losses, &model)?.unwrap_or_default();
+        let gains = gains.by_station();
+        let basis = observation.basis;
+        let names: Vec<String> = observation.stations.iter().map(|s| s.name.clone()).collect();
+        let seen = observation.rows.iter_mut().filter(|row| row.stokes_i(basis).is_some());
+        for (row, v) in seen.zip(model) {
+            let [first, second] = row
+                .stations
+                .map(|k| gains.at(&names[usize::from(k)], row.time_h).unwrap_or(1.0.into()));
+            // Both parallel hands; in a basis of Stokes parameters the second has no part in I.
+            let v = v * first * second.conj();
+            (row.products[0], row.products[1]) = (v, v);
+        }
+        add_thermal_noise(observation, seed);
+        Ok(copy)
     }
 
     /// The data alone.
@@ -226,7 +288,7 @@ fn simulate(
     let images = Movie { grid: sky, pixels: movie.clone() };
     simulate::fill(&mut observation, &images, Pulse::Triangle, &hours, Method::Direct)?;
     let true_gains = spoil(file, seen, &mut observation)?;
-    let gains = gains::priors(fit, &observation)?;
+    let gains = gains::priors(fit.instrument.as_ref(), &fit.loss, &observation)?;
     let frame = |time: f64| hours.partition_point(|hour| *hour < time - 1e-9).min(hours.len() - 1);
     let of_rows = observation.rows.iter().map(|row| frame(row.time_h)).collect();
     let visibilities = Some((observation, of_rows));

@@ -10,7 +10,7 @@ mod scattering;
 mod thermal;
 
 pub use gains::{GainErrors, apply_gains};
-pub use scattering::{ScatteringKernel, scatter};
+pub use scattering::{ScatteringKernel, scatter, unscatter};
 pub use thermal::add_thermal_noise;
 
 use rand::SeedableRng;

@@ -43,15 +43,34 @@ impl ScatteringKernel {
 /// # Errors
 /// If the frequency is not known.
 pub fn scatter(observation: &mut Observation, kernel: &ScatteringKernel) -> Result<(), Error> {
-    let factor = |row: &Row| {
-        let frequency_hz = observation.frequency_of(row).ok_or(Unknown("the frequency"))?;
-        Ok(kernel.transform(row.uv, frequency_hz))
-    };
-    let factors = observation.rows.iter().map(factor).collect::<Result<Vec<f64>, Unknown>>()?;
+    let factors = factors(observation, kernel)?;
     for (row, factor) in observation.rows.iter_mut().zip(factors) {
         row.products.iter_mut().for_each(|product| *product *= factor);
     }
     Ok(())
+}
+
+/// Divides all visibilities and their errors by a kernel's transform: a model without scattering fits them as the
+/// scattered model fits the data, with the same χ² (Fish et al. 2014, ApJ 795, 134).
+///
+/// # Errors
+/// If the frequency is not known.
+pub fn unscatter(observation: &mut Observation, kernel: &ScatteringKernel) -> Result<(), Error> {
+    let factors = factors(observation, kernel)?;
+    for (row, factor) in observation.rows.iter_mut().zip(factors) {
+        row.products.iter_mut().for_each(|product| *product /= factor);
+        row.noise_sigma.iter_mut().for_each(|sigma| *sigma /= factor);
+    }
+    Ok(())
+}
+
+/// A kernel's transform on every row.
+fn factors(observation: &Observation, kernel: &ScatteringKernel) -> Result<Vec<f64>, Unknown> {
+    let factor = |row: &Row| {
+        let frequency_hz = observation.frequency_of(row).ok_or(Unknown("the frequency"))?;
+        Ok(kernel.transform(row.uv, frequency_hz))
+    };
+    observation.rows.iter().map(factor).collect()
 }
 
 #[cfg(test)]

@@ -51,7 +51,7 @@ impl Evidence<'_> {
             return None;
         }
         let draw = |k: u64| {
-            let drawn = redrawn(observation, model, self.file.seed.wrapping_add(1000 + k));
+            let drawn = redrawn(observation, model, self.seed.wrapping_add(1000 + k));
             statistics(&drawn, frames, loss, model)
         };
         (0..DRAWS).map(draw).collect()

@@ -69,7 +69,8 @@ impl Judged {
         let caption = "χ² per data point of each frame. Bars are the scatter of chance, √(2/n) for n data points. A frame that \
                        stands out, or a trend, is something that the model cannot do at that time.";
         let series = self.terms.iter().map(of).collect();
-        plot(["Residuals over time", caption], ["time", "GM/c³"], series, self.expected())
+        let unit = if self.is_static { "h UTC" } else { "GM/c³" };
+        plot(["Residuals over time", caption], ["time", unit], series, self.expected())
     }
 
     /// Residuals of each baseline, triangle and quadrangle against its longest baseline, whose length the caller knows.

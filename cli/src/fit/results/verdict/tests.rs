@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::fit::{assigned, data, parse};
+use kerrlight_tomo::fit::Objective;
 use kerrlight_tomo::fit::setup::{self, Instrument};
 use std::path::Path;
 
@@ -20,7 +21,9 @@ fn of_truth(changes: &[&str], scale: f32) -> Judged {
     let objective = Objective { model: setup::forward_model(&instrument, &motion).unwrap(), data };
     let movie: Vec<f32> =
         measured.movie.as_ref().unwrap().iter().map(|x| scale * *x as f32).collect();
-    Evidence { file: &file, measured: &measured }.judged(&objective, &movie).unwrap()
+    let evidence =
+        Evidence { file: Some(&file), losses: &file.loss, seed: file.seed, measured: &measured };
+    evidence.judged((objective.names(), objective.statistics(&movie)), &movie).unwrap()
 }
 
 fn assert_explained(kind: &str, array: &str, flux: f64) {

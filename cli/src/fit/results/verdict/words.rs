@@ -103,11 +103,17 @@ impl Judged {
         };
         let mut text = Vec::new();
         if self.verdict.outcome == Outcome::Unexplained {
-            text.push(
-                "What follows is the best solution of this fit, but not a description of the source: the settings (spin, \
-                 inclination, motion, region), the error bars or the training are wrong."
-                    .to_owned(),
-            );
+            let wrong = match self.is_static {
+                true => {
+                    "the source changed, the field is too small, penalties are too strong, or the error bars are wrong"
+                }
+                false => {
+                    "the settings (spin, inclination, motion, region), the error bars or the training are wrong"
+                }
+            };
+            text.push(format!(
+                "What follows is the best solution of this fit, but not a description of the source: {wrong}."
+            ));
         }
         if self.terms.iter().any(|(_, tested)| tested.errors == Errors::Assumed) {
             text.push("σ is assumed in the settings, not measured; χ² depends on it.".to_owned());

@@ -1,0 +1,195 @@
+//! The run of a static image: no steps to go on from, so that a run that was stopped begins again and comes to the same
+//! bytes.
+
+mod numbers;
+mod page;
+mod pictures;
+mod words;
+
+use super::data;
+use super::folder::{self, Folder};
+use super::results::gains::Gains;
+use super::results::verdict::{Evidence, Judged};
+use crate::answer::Answer;
+use crate::checksum::sealed;
+use crate::interrupt::{Interrupted, Keeper};
+use crate::progress;
+use kerrlight_tomo::fit::FrameTerm;
+use kerrlight_tomo::fit::settings::{Loss, LossKind, StaticImageFile};
+use kerrlight_tomo::fit::setup::Measured;
+use kerrlight_tomo::fit::static_image::{Stage, Survey, survey};
+use kerrlight_tomo::fit::verdict::Statistics;
+use kerrlight_tomo::interferometry::files::images;
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
+const STOPPED: &str =
+    "stopped: nothing is kept of a static image; `kerrlight fit --resume` begins it again";
+
+/// Settings and data.
+pub struct Prepared {
+    file: StaticImageFile,
+    measured: Measured,
+}
+
+/// What was found.
+struct Found<'a> {
+    file: &'a StaticImageFile,
+    measured: &'a Measured,
+    folder: &'a Folder,
+    survey: Survey,
+    /// The image once a frame.
+    movie: Vec<f32>,
+    judged: Judged,
+    gains: Option<Gains>,
+    /// Kinds of data that were not fitted, with χ² per datum.
+    beside: Vec<(&'static str, f64)>,
+    begun: Instant,
+}
+
+impl Prepared {
+    /// Reads the data; relative paths start from `base_dir`.
+    pub fn new(file: StaticImageFile, base_dir: &Path) -> anyhow::Result<Self> {
+        let measured = data::of_static(&file, base_dir)?;
+        let pixels = file.image.pixels * file.image.pixels;
+        measured.visibility_terms::<f64>(&file.loss, pixels)?;
+        Ok(Self { file, measured })
+    }
+}
+
+/// Finds the image, and writes all that was found.
+pub fn run(prepared: &Prepared, folder: &Folder) -> anyhow::Result<Answer> {
+    let Prepared { file, measured } = prepared;
+    let begun = Instant::now();
+    folder.file(folder::LOG)?.write(b"")?;
+    let survey = searched(file, measured)?;
+    let image: Vec<f32> = survey.found().solution.image.iter().map(|x| *x as f32).collect();
+    let movie = image.repeat(measured.times.len());
+    let evidence = Evidence { file: None, losses: &file.loss, seed: file.seed, measured };
+    let judged = evidence.judged(compared(file, measured, &survey)?, &movie)?;
+    let gains = Gains::beside(&evidence, &movie, folder)?;
+    let beside = beside(file, measured, &survey);
+    let found = Found { file, measured, folder, survey, movie, judged, gains, beside, begun };
+    found.images()?;
+    let results = found.results();
+    folder.file("results.json")?.write(sealed(results.clone()).as_bytes())?;
+    found.report(&evidence, &results)?;
+    let files = ["report.html", "results.json", "image.npz", "image.png"];
+    let files = files.map(|name| folder.path().join(name));
+    Ok(Answer::lines(&found.worth(), &files[0].display().to_string())
+        .with_all(results)
+        .with("folder", folder.path().display().to_string())
+        .files(files.iter().map(|path| path.as_path())))
+}
+
+/// The search, with its progress; an error if a signal stops it.
+fn searched(file: &StaticImageFile, measured: &Measured) -> anyhow::Result<Survey> {
+    let (rows, frames) = (
+        measured.visibilities.iter().flat_map(|(seen, _)| seen.stokes_i()).count(),
+        measured.times.len(),
+    );
+    let losses: Vec<&str> = file.loss.iter().map(|loss| loss.data.label()).collect();
+    eprintln!(
+        "{}: {}; {rows} visibilities in {frames} frames; an image of {} x {} pixels, {:.2} µas each",
+        file.title,
+        losses.join(", "),
+        file.image.pixels,
+        file.image.pixels,
+        file.image.field_uas / file.image.pixels as f64,
+    );
+    let values = file.strength.as_ref().map_or(0, |s| s.values.len() * s.folds);
+    let all = file.image.starts.len() + values + file.image.draws.unwrap_or(0);
+    let keeper = Keeper::brief(STOPPED);
+    let bar = progress::held_out(all as u64);
+    let done = AtomicU64::new(0);
+    let watch = |stage: Stage, solved: usize| {
+        if solved > 0 {
+            bar.set_message(match stage {
+                Stage::Starts => "starts",
+                Stage::HeldOut => "frames held out",
+                Stage::Strengths => "other strengths",
+                Stage::Draws => "draws of noise",
+            });
+            bar.set_position(done.fetch_add(solved as u64, Ordering::Relaxed) + 1);
+        }
+        !keeper.stopped()
+    };
+    let found = survey(file, measured, &watch)?;
+    bar.finish_and_clear();
+    found.ok_or_else(|| Interrupted(STOPPED.to_owned()).into())
+}
+
+/// Residuals of the data that were fitted.
+fn compared<'a>(
+    file: &StaticImageFile,
+    measured: &Measured,
+    survey: &Survey,
+) -> anyhow::Result<(Vec<&'a str>, Vec<Statistics>)> {
+    let image = &survey.found().solution.image;
+    let terms = measured.visibility_terms::<f64>(&file.loss, image.len())?;
+    let of = |term: &dyn FrameTerm<f64>| {
+        Statistics::of((0..measured.times.len()).map(|frame| term.residuals(frame, image)), 1)
+    };
+    let names = file.loss.iter().map(|loss| name(loss.data)).collect();
+    Ok((names, terms.iter().map(|term| of(&*term.term)).collect()))
+}
+
+/// What results call a kind of data.
+fn name(kind: LossKind) -> &'static str {
+    match kind {
+        LossKind::Amplitudes => "amplitudes",
+        LossKind::ClosurePhases => "closure phases",
+        LossKind::LogClosureAmplitudes => "log closure amplitudes",
+        _ => "visibilities",
+    }
+}
+
+/// χ² per datum of the gain-free data that were not fitted, from baselines above three times their noise.
+fn beside(
+    file: &StaticImageFile,
+    measured: &Measured,
+    survey: &Survey,
+) -> Vec<(&'static str, f64)> {
+    let image = &survey.found().solution.image;
+    let of = |kind: LossKind| {
+        let loss =
+            Loss { data: kind, weight: 1.0, sigma: None, stokes: None, least_snr: Some(3.0) };
+        let terms = measured.visibility_terms::<f64>(&[loss], image.len()).ok()?;
+        let term = &terms.first()?.term;
+        let frames = || 0..measured.times.len();
+        let count: usize = frames().map(|frame| term.degrees_of_freedom(frame)).sum();
+        let mut none = vec![0.0; image.len()];
+        let of_frame = |frame| term.value_and_gradient(frame, image, 0.0, &mut none);
+        let chi2: f64 = frames().map(of_frame).sum();
+        Some((name(kind), chi2 / count as f64))
+    };
+    let fitted = |kind: &LossKind| file.loss.iter().any(|loss| loss.data == *kind);
+    let all = [LossKind::ClosurePhases, LossKind::LogClosureAmplitudes];
+    all.into_iter().filter(|kind| !fitted(kind)).filter_map(of).collect()
+}
+
+impl Found<'_> {
+    /// The image, and those of the draws, as arrays.
+    fn images(&self) -> anyhow::Result<()> {
+        let n = self.file.image.pixels;
+        let field = ("field_uas", vec![self.file.image.field_uas]);
+        let image = self.survey.found().solution.image.iter().map(|x| *x as f32).collect();
+        let lists = [("time", vec![0.0]), ("hours", vec![0.0]), field.clone()];
+        let bytes = images::movie_archive([1, n, n], &[("recovered", image)], &lists);
+        self.folder.file("image.npz")?.write(&bytes)?;
+        let draws = &self.survey.draws;
+        if draws.is_empty() {
+            return Ok(());
+        }
+        let all = draws.iter().flat_map(|draw| &draw.solution.image).map(|x| *x as f32).collect();
+        let bytes = images::movie_archive([draws.len(), n, n], &[("draws", all)], &[field]);
+        self.folder.file("draws.npz")?.write(&bytes)
+    }
+
+    /// The verdict and the ring in a line.
+    fn worth(&self) -> String {
+        let ring = words::ring(&self.survey).map_or(String::new(), |ring| format!("\n{ring}"));
+        self.judged.worth() + &ring
+    }
+}

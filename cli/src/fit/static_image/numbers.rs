@@ -1,0 +1,105 @@
+//! results.json of a static image.
+
+use super::Found;
+use crate::usage::usage;
+use kerrlight_tomo::fit::static_image::{Candidate, Ring, Survey};
+use serde_json::{Map, Value, json};
+
+/// Numbers of a ring: name, unit in the name, and value. Errors have `_error` behind the name.
+pub const RING: [(&str, fn(&Ring) -> f64); 5] = [
+    ("ring_diameter_uas", |ring| ring.diameter_uas),
+    ("ring_width_uas", |ring| ring.width_uas),
+    ("ring_position_angle_deg", |ring| ring.position_angle_deg),
+    ("ring_asymmetry", |ring| ring.asymmetry),
+    ("ring_central_brightness", |ring| ring.central_brightness),
+];
+
+/// The error of a number of the ring. Angles are compared the short way round.
+pub fn error(survey: &Survey, name: &str, number: fn(&Ring) -> f64) -> Option<f64> {
+    if name != "ring_position_angle_deg" {
+        return survey.ring_error(number);
+    }
+    let here = survey.found().ring?.position_angle_deg;
+    survey.ring_error(|ring| {
+        here + (ring.position_angle_deg - here + 540.0).rem_euclid(360.0) - 180.0
+    })
+}
+
+fn candidate(image: &Candidate) -> Value {
+    json!({
+        "start": image.start + 1,
+        "strength": image.strength,
+        "loss": image.solution.loss,
+        "flux_jy": image.solution.image.iter().sum::<f64>(),
+        "iterations": image.solution.iterations,
+        "has_converged": image.solution.has_converged,
+        "chi2_per_datum": image.chi2,
+        "ring_diameter_uas": image.ring.map(|ring| ring.diameter_uas),
+    })
+}
+
+impl Found<'_> {
+    /// All numbers.
+    pub fn results(&self) -> Value {
+        let found = self.survey.found();
+        let kinds = self.file.loss.iter().map(|loss| super::name(loss.data));
+        let chi2: Map<String, Value> =
+            kinds.zip(&found.chi2).map(|(name, chi2)| (name.to_owned(), json!(chi2))).collect();
+        let beside: Map<String, Value> =
+            self.beside.iter().map(|(name, chi2)| ((*name).to_owned(), json!(chi2))).collect();
+        let all = |images: &[Candidate]| images.iter().map(candidate).collect::<Vec<_>>();
+        let mut results = json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "kind": "static image",
+            "steps": found.solution.iterations,
+            "seconds": self.begun.elapsed().as_secs_f64(),
+            "cpu_seconds": usage().map(|usage| usage.cpu_seconds),
+            "peak_memory_mib": usage().map(|usage| usage.peak_mib),
+            "loss": found.solution.loss,
+            "chi2_per_datum": chi2,
+            "chi2_not_fitted": beside,
+            "inputs": self.folder.inputs().files,
+            "verdict": self.judged.json(),
+            "flux_jy": found.solution.image.iter().sum::<f64>(),
+            "flux_error_jy": self.flux_error(),
+            "strength": self.survey.strength,
+            "starts": all(&self.survey.starts),
+            "strengths": all(&self.survey.strengths),
+            "draws": all(&self.survey.draws),
+            "has_converged": found.solution.has_converged,
+        });
+        if !self.survey.held.is_empty() {
+            let held = self.survey.held.iter();
+            let one = |held: &kerrlight_tomo::fit::setup::Held| json!({"value": held.value, "loss": held.mean(), "losses": held.losses});
+            results["held_out"] = json!(held.map(one).collect::<Vec<_>>());
+        }
+        if let Some(gains) = &self.gains {
+            results["gains"] = gains.json();
+        }
+        self.add_ring(&mut results);
+        results
+    }
+
+    fn add_ring(&self, results: &mut Value) {
+        let Some(ring) = &self.survey.found().ring else { return };
+        for (name, number) in RING {
+            results[name] = json!(number(ring));
+            results[format!("{name}_error")] = json!(error(&self.survey, name, number));
+        }
+        results["ring"] = json!({
+            "centre_east_uas": ring.centre_uas[0],
+            "centre_north_uas": ring.centre_uas[1],
+            "diameter_scatter_uas": ring.diameter_scatter_uas,
+        });
+    }
+
+    /// Scatter of the flux over the draws.
+    fn flux_error(&self) -> Option<f64> {
+        let fluxes: Vec<f64> =
+            self.survey.draws.iter().map(|draw| draw.solution.image.iter().sum()).collect();
+        let count = fluxes.len() as f64;
+        let mean = fluxes.iter().sum::<f64>() / count;
+        let square: f64 = fluxes.iter().map(|x| (x - mean).powi(2)).sum();
+        (fluxes.len() > 1).then(|| (square / (count - 1.0)).sqrt())
+    }
+}

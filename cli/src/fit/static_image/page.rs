@@ -1,0 +1,162 @@
+//! The page of a static image.
+
+use super::Found;
+use super::numbers::{RING, error};
+use super::words;
+use crate::fit::results::gains::Gains;
+use crate::fit::results::page::settings;
+use crate::fit::results::verdict::Evidence;
+use crate::fit::results::{plots, residuals};
+use crate::report::{Axis, LinePlot, Marks, Outcome, Report, Series, Table};
+use kerrlight_tomo::fit::static_image::Candidate;
+use serde_json::Value;
+
+/// What the numbers of a ring are called, their units and what they mean.
+const MEANINGS: [(&str, &str, usize, &str); 5] = [
+    (
+        "diameter of the ring",
+        "µas",
+        1,
+        "twice the mean distance of the brightest point from the centre, over all directions",
+    ),
+    (
+        "width of the ring",
+        "µas",
+        1,
+        "mean full width at half maximum of its profile, above the brightness at the largest radius",
+    ),
+    (
+        "brightest direction",
+        "°",
+        0,
+        "position angle of the first moment along the ring, east of north: 180 is south",
+    ),
+    (
+        "asymmetry",
+        "",
+        3,
+        "modulus of that moment over the light: 0 for an even ring, 1 for a point",
+    ),
+    (
+        "central brightness",
+        "",
+        3,
+        "mean brightness within 5 µas of the centre over that at the ring's radius",
+    ),
+];
+
+impl Found<'_> {
+    /// Draws and writes it.
+    pub fn report(&self, evidence: &Evidence<'_>, results: &Value) -> anyhow::Result<()> {
+        let figure = self.picture()?;
+        self.folder.file("image.png")?.write(&figure.png)?;
+        let mut all_plots: Vec<LinePlot> =
+            plots::amplitudes(evidence, &self.movie, self.gains.as_ref())?.into_iter().collect();
+        all_plots.extend(residuals::plots(&self.judged, self.measured));
+        all_plots.extend(self.held_out());
+        all_plots.extend(self.gains.iter().flat_map(Gains::plots));
+        let details = self.gains.as_ref().map(Gains::details);
+        let details = [Some(self.judged.table()), self.judged.by_station(), details];
+        let report = Report {
+            title: self.file.title.clone(),
+            notice: Some(self.judged.notice()),
+            summary: words::ring(&self.survey).into_iter().collect(),
+            parts: self.parts(),
+            results: self.outcomes(results),
+            figures: vec![figure],
+            plots: all_plots,
+            details: details.into_iter().flatten().chain([self.images_table()]).collect(),
+            settings: settings(self.file)?,
+            ..Report::default()
+        };
+        report.write(&self.folder.file("report.html")?)
+    }
+
+    fn outcomes(&self, results: &Value) -> Vec<Outcome> {
+        let of_ring = RING.iter().zip(MEANINGS).filter_map(|((key, number), meaning)| {
+            let (name, unit, digits, text) = meaning;
+            let value = number(self.survey.found().ring.as_ref()?);
+            Some(Outcome {
+                name: name.to_owned(),
+                value: words::with_error(value, error(&self.survey, key, *number), digits),
+                unit: unit.to_owned(),
+                meaning: text.to_owned(),
+            })
+        });
+        let flux = Outcome {
+            name: "flux".to_owned(),
+            value: words::with_error(
+                results["flux_jy"].as_f64().unwrap_or(f64::NAN),
+                results["flux_error_jy"].as_f64(),
+                3,
+            ),
+            unit: "Jy".to_owned(),
+            meaning: "all light of the field; its prior has a part in it".to_owned(),
+        };
+        let seconds = Outcome {
+            name: "time".to_owned(),
+            value: format!("{:.1}", results["seconds"].as_f64().unwrap_or(f64::NAN)),
+            unit: "s".to_owned(),
+            meaning: "wall time of this run".to_owned(),
+        };
+        of_ring.chain([flux, seconds]).collect()
+    }
+
+    /// The loss of held-out frames against the strength.
+    fn held_out(&self) -> Option<LinePlot> {
+        let held = &self.survey.held;
+        let best = kerrlight_tomo::fit::setup::best_held(held)?;
+        Some(LinePlot {
+            title: "Held-out frames".to_owned(),
+            caption: "Weighted χ² per data point of frames that were not fitted, against the factor on all penalties; bars are \
+                      standard errors of the difference from the best. Too weak penalties fit noise, too strong ones cannot \
+                      fit the data. The least is taken."
+                .to_owned(),
+            x: Axis { label: "factor on the penalties".to_owned(), unit: String::new(), log: true },
+            y: Axis { label: "loss of held-out data".to_owned(), unit: String::new(), log: false },
+            series: vec![Series {
+                name: "held out".to_owned(),
+                points: held.iter().map(|held| [held.value, held.mean()]).collect(),
+                errors: held.iter().map(|held| held.error_beside(best)).collect(),
+                marks: Marks::Joined,
+            }],
+        })
+    }
+
+    /// Every image that was found, with what it fits.
+    fn images_table(&self) -> Table {
+        let kinds: Vec<String> =
+            self.file.loss.iter().map(|loss| format!("χ² of {}", super::name(loss.data))).collect();
+        let row = |what: &str, image: &Candidate| {
+            let ring =
+                image.ring.map_or("–".to_owned(), |ring| format!("{:.1}", ring.diameter_uas));
+            let head = [
+                what.to_owned(),
+                (image.start + 1).to_string(),
+                format!("{}", image.strength),
+                format!("{:.5}", image.solution.loss),
+            ];
+            let chi2 = image.chi2.iter().map(|chi2| format!("{chi2:.3}"));
+            head.into_iter().chain(chi2).chain([ring]).collect()
+        };
+        let rows = |what: &'static str, images: &[Candidate]| -> Vec<Vec<String>> {
+            images.iter().map(|image| row(what, image)).collect()
+        };
+        let survey = &self.survey;
+        let first = ["image", "start", "factor", "loss"].map(str::to_owned).into_iter();
+        Table {
+            title: "All images".to_owned(),
+            caption: "Images from all starts, with other factors on the penalties that predict held-out frames as well, and of \
+                      measurements of the best image with other noise: the loss, χ² per data point and the diameter of the ring, µas."
+                .to_owned(),
+            head: first.chain(kinds).chain(["diameter".to_owned()]).collect(),
+            rows: [
+                rows("start", &survey.starts),
+                rows("other factor", &survey.strengths),
+                rows("draw", &survey.draws),
+            ]
+            .concat(),
+            links: Vec::new(),
+        }
+    }
+}

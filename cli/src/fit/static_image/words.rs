@@ -1,0 +1,173 @@
+//! What is said of a static image: data, model, priors, and what may be concluded.
+
+use super::Found;
+use super::numbers::{RING, error};
+use crate::report::Part;
+use kerrlight_tomo::fit::settings::StartImage;
+use kerrlight_tomo::fit::static_image::Survey;
+
+/// `42.1 ± 0.8`, or the number alone where its error is not known.
+pub fn with_error(value: f64, error: Option<f64>, digits: usize) -> String {
+    match error {
+        Some(error) => format!("{value:.digits$} ± {error:.digits$}"),
+        None => format!("{value:.digits$}"),
+    }
+}
+
+/// The ring in a sentence.
+pub fn ring(survey: &Survey) -> Option<String> {
+    let ring = survey.found().ring?;
+    let [diameter, width, angle, ..] =
+        RING.map(|(name, number)| (number(&ring), error(survey, name, number)));
+    Some(format!(
+        "The image has a ring of {} µas, {} µas wide, brightest at {}° east of north.",
+        with_error(diameter.0, diameter.1, 1),
+        with_error(width.0, width.1, 1),
+        with_error(angle.0, angle.1, 0)
+    ))
+}
+
+impl Found<'_> {
+    /// Paragraphs under headings.
+    pub fn parts(&self) -> Vec<Part> {
+        let part = |heading: &str, text: Vec<String>| Part { heading: heading.to_owned(), text };
+        vec![
+            part("Data", self.data()),
+            part("Model and priors", self.model()),
+            part("How sure it is", self.errors()),
+            part("What is concluded", self.concluded()),
+            part("What is not concluded", self.not_concluded()),
+        ]
+    }
+
+    fn data(&self) -> Vec<String> {
+        let data = &self.file.data.visibilities;
+        let rows = self.measured.visibilities.iter().flat_map(|(seen, _)| seen.stokes_i()).count();
+        let kinds: Vec<&str> = self.file.loss.iter().map(|loss| loss.data.label()).collect();
+        let mut text = vec![format!(
+            "{}: {rows} visibilities of Stokes I in {} frames of {} s; {} are fitted. {} % of each amplitude was added to its \
+             error in quadrature.",
+            data.path.display(),
+            self.measured.times.len(),
+            data.average_s,
+            kinds.join(", "),
+            100.0 * data.systematic
+        )];
+        if let Some(least) = data.uv_min {
+            text.push(format!("Baselines below {least:e} wavelengths are left out."));
+        }
+        if data.scattering.is_some() {
+            text.push("Diffractive scattering towards Sgr A* (Johnson et al. 2018) is part of the model: visibilities and errors were divided by its kernel, so that amplitudes below are those of the source behind the screen. Refraction is left out.".to_owned());
+        }
+        if let Some(law) = &data.variability {
+            text.push(format!(
+                "The source varies: {} Jy/(1 + (|u|/{:e})²)^{} was added to all errors in quadrature. χ² is that of data with \
+                 these errors.",
+                law.jy,
+                law.uv,
+                0.5 * law.power
+            ));
+        }
+        text
+    }
+
+    fn model(&self) -> Vec<String> {
+        let image = &self.file.image;
+        let starts: Vec<String> = image.starts.iter().copied().map(start).collect();
+        let penalties: Vec<String> = self
+            .file
+            .regulariser
+            .iter()
+            .map(|penalty| format!("{:?} (weight {})", penalty.kind, penalty.weight))
+            .collect();
+        let mut text = vec![
+            format!(
+                "One image of {} × {} positive pixels in a field of {} µas for all frames: nothing moves. No hole, no gas and no \
+                 ring is assumed. Its flux has a Gaussian prior, {} ± {} Jy, and came out as {} Jy.",
+                image.pixels,
+                image.pixels,
+                image.field_uas,
+                image.flux_jy,
+                image.flux_sigma_jy,
+                format_args!("{:.3}", self.survey.found().solution.image.iter().sum::<f64>())
+            ),
+            format!("Starts: {}.", starts.join("; ")),
+        ];
+        let envelope = self.file.envelope.map(|envelope| {
+            format!(
+                "entropy relative to a Gaussian of {} µas (weight {})",
+                envelope.fwhm_uas, envelope.weight
+            )
+        });
+        let penalties: Vec<String> = envelope.into_iter().chain(penalties).collect();
+        if !penalties.is_empty() {
+            text.push(format!(
+                "Penalties: {}, all times {}.",
+                penalties.join(", "),
+                self.survey.strength
+            ));
+        }
+        if !self.survey.held.is_empty() {
+            text.push(format!(
+                "The factor is the one of {} that predicts frames best which were not fitted.",
+                self.survey.held.len()
+            ));
+        }
+        match &self.gains {
+            Some(gains) => text.extend(gains.sentences()),
+            None => text.push("No gains are solved for.".to_owned()),
+        }
+        text
+    }
+
+    fn errors(&self) -> Vec<String> {
+        let (draws, others) = (self.survey.draws.len(), self.survey.alternatives().count());
+        if draws < 2 {
+            return vec!["No draws were asked for: numbers have no errors.".to_owned()];
+        }
+        vec![format!(
+            "Errors add in quadrature how far {draws} images of measurements of this image with other noise, and of a flux drawn \
+             from its prior, are from it (root mean square, what the method distorts included), and how far {others} images are \
+             that the data do not tell from the best: of other starts with a loss within 1 %, and of other factors that predict \
+             held-out frames as well. The kind of penalty, the field and the size of pixels stay what they are: what they \
+             decide is in no error."
+        )]
+    }
+
+    fn concluded(&self) -> Vec<String> {
+        let mut text = vec![self.judged.headline()];
+        for (name, chi2) in &self.beside {
+            text.push(format!("χ² {chi2:.2} per data point of {name}, which were not fitted."));
+        }
+        text.extend(ring(&self.survey));
+        if self.file.ring.is_some() && self.survey.found().ring.is_none() {
+            text.push("The image has no ring between the radii that were asked for.".to_owned());
+        }
+        text
+    }
+
+    fn not_concluded(&self) -> Vec<String> {
+        let mut text = vec![
+            "The position on the sky: neither closure phases nor amplitudes know it. Detail finer than the longest baselines \
+             resolve is that of the penalties, and brightness that is spread wider than the shortest baselines see is that of \
+             the prior of the flux and of the field."
+                .to_owned(),
+            "Mass, spin and inclination: the image knows of no hole. The width of the ring includes what the array and the \
+             penalties blur."
+                .to_owned(),
+        ];
+        if !self.survey.found().solution.has_converged {
+            text.push("The optimiser had not come to its end after image.iterations.".to_owned());
+        }
+        text
+    }
+}
+
+fn start(start: StartImage) -> String {
+    match start {
+        StartImage::Ring { diameter_uas, width_uas } => {
+            format!("a ring of {diameter_uas} µas, {width_uas} µas wide")
+        }
+        StartImage::Gaussian { fwhm_uas } => format!("a Gaussian of {fwhm_uas} µas"),
+    }
+}

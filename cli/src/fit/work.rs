@@ -1,0 +1,69 @@
+//! What a fit's file asks for: emission around a hole, or a static image.
+
+use super::init;
+use super::posterior;
+use super::run;
+use super::static_image;
+use anyhow::bail;
+use kerrlight_tomo::Error;
+use kerrlight_tomo::fit::settings::{FitError, FitFile, StaticImageFile};
+use kerrlight_tomo::representation::Registry;
+use std::path::Path;
+
+/// Settings of either.
+#[derive(Debug, PartialEq)]
+pub enum Work {
+    /// Emission around a hole.
+    Emission(Box<FitFile>),
+    /// A static image.
+    Image(Box<StaticImageFile>),
+}
+
+/// The same with its data, and all that can be found wrong found.
+pub enum Prepared<'a> {
+    /// Emission around a hole.
+    Emission(Box<run::Prepared<'a>>),
+    /// A static image.
+    Image(Box<static_image::Prepared>),
+}
+
+impl Work {
+    /// The settings in a text: a table `image` makes them those of a static image.
+    pub fn read(text: &str) -> anyhow::Result<Self> {
+        if !StaticImageFile::is_meant(text) {
+            return Ok(Work::Emission(Box::new(super::parse(text)?)));
+        }
+        let file = StaticImageFile::parse(text).map_err(|error| match error {
+            Error::Fit(FitError::Syntax(text)) => init::explained(&text),
+            other => other.into(),
+        })?;
+        Ok(Work::Image(Box::new(file)))
+    }
+
+    /// With its data, whose relative paths start from `base_dir`.
+    pub fn prepared<'a>(
+        self,
+        base_dir: &Path,
+        registry: &'a Registry,
+    ) -> anyhow::Result<Prepared<'a>> {
+        Ok(match self {
+            Work::Emission(file) => {
+                let prepared = run::Prepared::new(*file, base_dir, registry)?;
+                Prepared::Emission(Box::new(prepared))
+            }
+            Work::Image(file) => {
+                Prepared::Image(Box::new(static_image::Prepared::new(*file, base_dir)?))
+            }
+        })
+    }
+
+    /// Refuses draws from a posterior where there is none.
+    pub fn check_draws(&self) -> anyhow::Result<()> {
+        match self {
+            Work::Emission(file) => posterior::check(file),
+            Work::Image(_) => {
+                bail!("--samples is for emission: image.draws has those of a static image")
+            }
+        }
+    }
+}

@@ -1,0 +1,344 @@
+//! Settings of a static image: of a source that does not change while it is observed. No hole, no gas and no motion
+//! are assumed.
+
+use super::penalties::priors_of;
+use super::{FitError, InstrumentSettings, Loss, LossKind, PenaltyKind, PenaltySettings, Within};
+use super::{ranges, refuse};
+use crate::Error;
+use crate::fit::linear::Prior;
+use crate::interferometry::operator::ImageGrid;
+use crate::scene::syntax;
+use crate::units::MICROARCSECOND;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// The settings of a fit of a static image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StaticImageFile {
+    /// One line that says what is fitted.
+    pub title: String,
+    /// Seed of the draws of noise.
+    pub seed: u64,
+    /// Pixels, flux and how the image is looked for.
+    pub image: ImageSettings,
+    /// What was measured.
+    pub data: StaticData,
+    /// What of the instrument is solved for; nothing, without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub instrument: Option<InstrumentSettings>,
+    /// What is compared with the data.
+    pub loss: Vec<Loss>,
+    /// Penalties on the brightness.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub regulariser: Vec<PenaltySettings>,
+    /// Where light is expected; anywhere in the field, without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub envelope: Option<EnvelopeSettings>,
+    /// A factor on all penalties that frames which are held out choose; 1, without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub strength: Option<StrengthSettings>,
+    /// Measures a ring in the image; nothing is measured without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ring: Option<RingSettings>,
+}
+
+/// Pixels of a static image, its flux, and how it is looked for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ImageSettings {
+    /// Pixels along a side.
+    pub pixels: usize,
+    /// Width of the square field, µas.
+    pub field_uas: f64,
+    /// Flux that is expected of the field, Jy ...
+    pub flux_jy: f64,
+    /// ... and its standard deviation: a Gaussian prior.
+    pub flux_sigma_jy: f64,
+    /// Images to start from; the fit ends with the one that comes to the least loss.
+    pub starts: Vec<StartImage>,
+    /// Iterations of the optimiser from one start, at most.
+    pub iterations: usize,
+    /// Fits of the image measured once more with other noise, which give errors; none without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub draws: Option<usize>,
+}
+
+/// An image to start from, in the middle of the field.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum StartImage {
+    /// A circle with a Gaussian cross-section.
+    Ring {
+        /// Its diameter, µas.
+        diameter_uas: f64,
+        /// Its full width at half maximum, µas.
+        width_uas: f64,
+    },
+    /// A round Gaussian.
+    Gaussian {
+        /// Its full width at half maximum, µas.
+        fwhm_uas: f64,
+    },
+}
+
+/// A round Gaussian in the middle of the field that light is expected in: the entropy relative to it is a penalty.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EnvelopeSettings {
+    /// Its full width at half maximum, µas.
+    pub fwhm_uas: f64,
+    /// Factor on Σ s ln(s/m), with shares s of the flux in the image and m in the Gaussian.
+    pub weight: f64,
+}
+
+/// Data of a static image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StaticData {
+    /// Visibilities.
+    pub visibilities: StaticVisibilities,
+}
+
+/// Visibilities of a source that does not change.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StaticVisibilities {
+    /// UVFITS, eht-imaging's text, the EHT's tables or CSV; relative to the fit's file.
+    pub path: PathBuf,
+    /// Rows this close in time are averaged and share the gains of their stations, s.
+    pub average_s: f64,
+    /// Part of each amplitude that is added to its error in quadrature: for what calibration has left.
+    pub systematic: f64,
+    /// Baselines shorter than this many wavelengths are left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub uv_min: Option<f64>,
+    /// The interstellar medium that the light has passed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scattering: Option<Scattering>,
+    /// Errors for what the source does vary.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub variability: Option<Variability>,
+}
+
+/// A known scattering screen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Scattering {
+    /// Diffractive scattering towards Sgr A* (Johnson et al. 2018).
+    #[serde(rename = "sgra")]
+    SgrA,
+}
+
+/// The scatter of visibilities of a source that varies about those of its mean image: σ = jy/(1 + (|u|/uv)²)^(power/2).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Variability {
+    /// On short baselines, Jy, per real and imaginary part.
+    pub jy: f64,
+    /// The length of baselines from which on it falls, wavelengths.
+    pub uv: f64,
+    /// How steeply it falls.
+    pub power: f64,
+}
+
+impl Variability {
+    /// Standard deviation on a baseline of this length (wavelengths), Jy.
+    pub fn sigma(&self, length: f64) -> f64 {
+        self.jy / (1.0 + (length / self.uv).powi(2)).powf(0.5 * self.power)
+    }
+}
+
+/// Factors on all penalties, from which frames that are held out choose.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StrengthSettings {
+    /// The factors.
+    pub values: Vec<f64>,
+    /// Parts of the frames, each of which is held out once: frame k belongs to part k modulo their number.
+    pub folds: usize,
+}
+
+/// Where a ring is looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RingSettings {
+    /// Least distance from the centre at which the brightest point of a direction may lie, µas.
+    pub least_radius_uas: f64,
+    /// The largest one, µas.
+    pub most_radius_uas: f64,
+}
+
+impl ImageSettings {
+    /// The pixels on the sky.
+    ///
+    /// # Errors
+    /// If their number or the field is out of range.
+    pub fn grid(&self) -> Result<ImageGrid, Error> {
+        ImageGrid::new(self.pixels, self.pixels, self.field_uas * MICROARCSECOND)
+    }
+}
+
+impl StaticImageFile {
+    /// Whether a fit's text asks for a static image: it has a table `image`.
+    pub fn is_meant(text: &str) -> bool {
+        text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("image"))
+    }
+
+    /// The settings in a TOML text.
+    ///
+    /// # Errors
+    /// On syntax, unknown or missing keys, wrong types, numbers out of range, and settings that contradict each other.
+    ///
+    /// # Examples
+    /// ```
+    /// # use kerrlight_tomo::fit::settings::StaticImageFile;
+    /// let error = StaticImageFile::parse("title = \"M87*\"\nseed = 1").unwrap_err();
+    /// assert!(error.to_string().contains("missing field `image`"));
+    /// ```
+    pub fn parse(text: &str) -> Result<Self, Error> {
+        let file: Self = toml::from_str(text).map_err(|error| FitError::Syntax(syntax(&error)))?;
+        ranges::check(text)?;
+        file.check()?;
+        Ok(file)
+    }
+
+    /// Penalties with their weights, before the factor on all of them.
+    ///
+    /// # Errors
+    /// If a kind occurs twice or a number is missing or out of range.
+    pub fn priors(&self) -> Result<Vec<Prior>, Error> {
+        priors_of(&self.regulariser)
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        if self.image.starts.is_empty() {
+            return Err(FitError::range("length of image.starts", 0, "1 image or more").into());
+        }
+        if self.loss.is_empty() {
+            refuse!("loss is empty: there is nothing to fit; add a table [[loss]]");
+        }
+        for (k, loss) in self.loss.iter().enumerate() {
+            loss_of_visibilities(loss).within(format!("loss {k}"))?;
+            if let Some(first) = self.loss[..k].iter().position(|other| other.data == loss.data) {
+                refuse!("loss {k}: the same data as loss {first}; each kind is allowed once");
+            }
+        }
+        self.check_penalties()?;
+        self.check_ring()
+    }
+
+    fn check_penalties(&self) -> Result<(), Error> {
+        let is_sparsity = |penalty: &PenaltySettings| penalty.kind == PenaltyKind::Sparsity;
+        if let Some(k) = self.regulariser.iter().position(is_sparsity) {
+            refuse!(
+                "regulariser {k}: kind = \"sparsity\" is not for an image: its light adds up to the flux, which has a prior of \
+                 its own"
+            );
+        }
+        self.priors()?;
+        let Some(strength) = &self.strength else { return Ok(()) };
+        if strength.values.len() < 2 {
+            let (key, count) = ("length of strength.values", strength.values.len());
+            return Err(FitError::range(key, count, "2 values or more").into());
+        }
+        if self.regulariser.is_empty() && self.envelope.is_none() {
+            refuse!(
+                "strength is a factor on penalties, and there is no [[regulariser]] and no [envelope]"
+            );
+        }
+        Ok(())
+    }
+
+    fn check_ring(&self) -> Result<(), Error> {
+        let Some(RingSettings { least_radius_uas, most_radius_uas }) = self.ring else {
+            return Ok(());
+        };
+        let most = 0.5 * self.image.field_uas;
+        if !(most_radius_uas > least_radius_uas && most_radius_uas <= most) {
+            let allowed = format!("above ring.least_radius_uas, at most {most}, half of the field");
+            return Err(FitError::range("ring.most_radius_uas", most_radius_uas, &allowed).into());
+        }
+        Ok(())
+    }
+}
+
+fn loss_of_visibilities(loss: &Loss) -> Result<(), FitError> {
+    if matches!(loss.data, LossKind::Image | LossKind::LightCurve) {
+        refuse!(
+            "data = {:?} is not for a static image: visibilities, amplitudes, closure-phases or log-closure-amplitudes",
+            loss.data.name()
+        );
+    }
+    if loss.sigma.is_some() || loss.stokes.is_some() {
+        refuse!("sigma and stokes are not for visibilities, whose errors the data state");
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    pub const TEXT: &str = r#"
+title = "a ring"
+seed = 1
+[image]
+pixels = 32
+field_uas = 120.0
+flux_jy = 0.6
+flux_sigma_jy = 0.1
+starts = [{ ring = { diameter_uas = 40.0, width_uas = 20.0 } }, { gaussian = { fwhm_uas = 50.0 } }]
+iterations = 100
+[data.visibilities]
+path = "a.uvfits"
+average_s = 300.0
+systematic = 0.01
+[[loss]]
+data = "closure-phases"
+weight = 1.0
+[[regulariser]]
+kind = "smoothness"
+weight = 1e-4
+[strength]
+values = [0.1, 1.0]
+folds = 3
+[ring]
+least_radius_uas = 10.0
+most_radius_uas = 40.0
+"#;
+
+    #[test]
+    fn exact_settings_survive_being_written() {
+        let file = StaticImageFile::parse(TEXT).unwrap();
+        let again = StaticImageFile::parse(&toml::to_string(&file).unwrap()).unwrap();
+        assert_eq!(file, again);
+        assert!(StaticImageFile::is_meant(TEXT) && !StaticImageFile::is_meant("title = \"x\""));
+    }
+
+    #[test]
+    fn bad_settings_are_named() {
+        for (from, to, says) in [
+            ("pixels = 32", "pixels = 4", "image.pixels = 4 is not allowed: 8 to 512"),
+            ("flux_jy = 0.6", "flux_jy = -1.0", "image.flux_jy = -1"),
+            ("diameter_uas = 40.0", "diameter_uas = 0.0", "image.starts.0.ring.diameter_uas = 0"),
+            ("values = [0.1, 1.0]", "values = [0.1]", "length of strength.values = 1"),
+            ("folds = 3", "folds = 1", "strength.folds = 1"),
+            ("\"smoothness\"", "\"sparsity\"", "regulariser 0: kind = \"sparsity\" is not for"),
+            ("\"closure-phases\"", "\"image\"", "loss 0: data = \"image\" is not for"),
+            ("most_radius_uas = 40.0", "most_radius_uas = 70.0", "at most 60, half of the field"),
+            ("[ring]", "[hole]\nspin = 0.5\n[ring]", "unknown field `hole`"),
+        ] {
+            assert!(TEXT.contains(from));
+            let error = StaticImageFile::parse(&TEXT.replace(from, to)).unwrap_err().to_string();
+            assert!(error.contains(says), "{to}: {error}");
+        }
+    }
+
+    /// Half of a Gaussian's power on baselines as long as `uv`, for a power of 2.
+    #[test]
+    fn exact_variability_falls_with_the_length_of_baselines() {
+        let law = Variability { jy: 0.2, uv: 2e9, power: 2.0 };
+        assert_eq!(law.sigma(0.0), 0.2);
+        assert!((law.sigma(2e9) - 0.1).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,59 @@
+//! One minimum.
+
+use super::ImageProblem;
+use crate::optimise::{Lbfgs, LbfgsState, Step};
+
+/// An image that no step improves, or that iterations have ended at.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solution {
+    /// Parameters of the problem.
+    pub parameters: Vec<f64>,
+    /// Pixels, Jy.
+    pub image: Vec<f64>,
+    /// The loss.
+    pub loss: f64,
+    /// Iterations that were made.
+    pub iterations: usize,
+    /// Whether the loss had ceased to fall.
+    pub has_converged: bool,
+}
+
+/// Iterations over which the loss has to fall by [`FALL`] of itself to go on.
+const SPAN: usize = 20;
+const FALL: f64 = 1e-4;
+
+/// The minimum that L-BFGS comes to from these parameters; none if `go_on` said no.
+pub fn solve(
+    problem: &ImageProblem<'_>,
+    start: &[f64],
+    iterations: usize,
+    go_on: &(dyn Fn() -> bool + Sync),
+) -> Option<Solution> {
+    let lbfgs = Lbfgs::default();
+    let mut parameters = start.to_vec();
+    let mut state = LbfgsState::new(parameters.len(), lbfgs.memory);
+    let mut objective = |x: &[f64], g: &mut [f64]| problem.value_and_gradient(x, g);
+    let mut losses: Vec<f64> = Vec::new();
+    let mut has_converged = false;
+    while losses.len() < iterations && !has_converged {
+        if !go_on() {
+            return None;
+        }
+        match lbfgs.step(&mut objective, &mut state, &mut parameters) {
+            Step::Taken { value, .. } => losses.push(value),
+            Step::NoDescent | Step::NotFinite => break,
+        }
+        let before = losses.len().checked_sub(SPAN + 1).map(|k| losses[k]);
+        has_converged =
+            before.is_some_and(|before| before - losses[losses.len() - 1] < FALL * before);
+    }
+    let ended = losses.len() < iterations;
+    let loss = state.value.unwrap_or(f64::NAN);
+    Some(Solution {
+        image: problem.image(&parameters),
+        parameters,
+        loss,
+        iterations: losses.len(),
+        has_converged: (has_converged || ended) && loss.is_finite(),
+    })
+}

@@ -1,0 +1,259 @@
+//! All that is asked of a static image: the strength of its penalties, the best of several starts, what else the data
+//! allow, and how noise scatters it.
+
+use super::solve::{Solution, solve};
+use super::start;
+use super::{FluxPrior, ImageProblem, Ring};
+use crate::Error;
+use crate::fit::linear::Prior;
+use crate::fit::settings::StaticImageFile;
+use crate::fit::setup::{Held, Measured, best_held};
+use crate::fit::{FrameTerm, Weighted};
+use crate::interferometry::operator::ImageGrid;
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+
+/// What is being solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// From all starts.
+    Starts,
+    /// Without a part of the frames.
+    HeldOut,
+    /// With other strengths that held-out frames allow.
+    Strengths,
+    /// The image measured once more, with other noise.
+    Draws,
+}
+
+/// Told what has been solved of a stage and how many solutions it has; says whether to go on.
+pub type SurveyWatch<'a> = dyn Fn(Stage, usize) -> bool + Sync + 'a;
+
+/// An image with what it was made of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    /// Which start.
+    pub start: usize,
+    /// Factor on the penalties.
+    pub strength: f64,
+    /// The image.
+    pub solution: Solution,
+    /// χ² per datum of each kind.
+    pub chi2: Vec<f64>,
+    /// Its ring, where one is wanted and there is one.
+    pub ring: Option<Ring>,
+}
+
+/// What came out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Survey {
+    /// Strengths with the loss of frames that were held out.
+    pub held: Vec<Held>,
+    /// The strength: the one that predicts held-out frames best.
+    pub strength: f64,
+    /// Images from all starts, in their order.
+    pub starts: Vec<Candidate>,
+    /// The start with the least loss.
+    pub best: usize,
+    /// Images with the other strengths that predict held-out frames as well, from the best start.
+    pub strengths: Vec<Candidate>,
+    /// Images of the measurement of the image with other noise.
+    pub draws: Vec<Candidate>,
+}
+
+impl Survey {
+    /// The image.
+    pub fn found(&self) -> &Candidate {
+        &self.starts[self.best]
+    }
+
+    /// Images that data do not tell from the best: those of other starts with a loss within 1 %, and of other strengths.
+    pub fn alternatives(&self) -> impl Iterator<Item = &Candidate> {
+        let least = self.found().solution.loss;
+        let as_good = move |start: &&Candidate| start.solution.loss <= 1.01 * least;
+        self.starts.iter().filter(as_good).chain(&self.strengths)
+    }
+
+    /// Error of a number of the ring: root mean square distance of the draws from it, and of the images that data do not tell
+    /// from it, added in quadrature; none without draws, or where one of the images has no ring.
+    pub fn ring_error(&self, number: impl Fn(&Ring) -> f64) -> Option<f64> {
+        let all = |images: &mut dyn Iterator<Item = &Candidate>| -> Option<Vec<f64>> {
+            images.map(|image| image.ring.as_ref().map(&number)).collect()
+        };
+        let here = number(self.found().ring.as_ref()?);
+        let square = |values: &[f64]| {
+            values.iter().map(|x| (x - here).powi(2)).sum::<f64>() / values.len() as f64
+        };
+        let draws = all(&mut self.draws.iter())?;
+        let others = all(&mut self.alternatives())?;
+        if draws.len() < 2 {
+            return None;
+        }
+        Some((square(&draws) + square(&others)).sqrt())
+    }
+}
+
+/// Finds the image of measured visibilities; none if `watch` said no.
+///
+/// # Errors
+/// If a loss has no data.
+pub fn survey(
+    file: &StaticImageFile,
+    measured: &Measured,
+    watch: &SurveyWatch<'_>,
+) -> Result<Option<Survey>, Error> {
+    let grid = file.image.grid()?;
+    let terms = measured.visibility_terms(&file.loss, grid.pixels())?;
+    let envelope =
+        file.envelope.map(|envelope| (start::envelope(envelope.fwhm_uas, grid), envelope.weight));
+    let search = Search { file, grid, priors: file.priors()?, envelope, terms: &terms, watch };
+    let frames: Vec<usize> = (0..measured.times.len()).collect();
+    let middle = file.strength.as_ref().map_or(1.0, |s| s.values[s.values.len() / 2]);
+    let Some(starts) = search.starts(middle, &frames) else { return Ok(None) };
+    let Some(held) = search.hold_out(least(&starts), &frames) else { return Ok(None) };
+    let allowed = allowed(&held);
+    let strength = best_held(&held).map_or(1.0, |best| best.value);
+    let starts = match strength == middle {
+        true => Some(starts),
+        false => search.starts(strength, &frames),
+    };
+    let Some(starts) = starts else { return Ok(None) };
+    let best = least(&starts);
+    let others: Vec<f64> = allowed.into_iter().filter(|value| *value != strength).collect();
+    let of = |value: &f64| search.solved(Stage::Strengths, (best, *value), &frames, search.flux());
+    let Some(strengths) = others.par_iter().map(of).collect() else { return Ok(None) };
+    let draws = search.draws(measured, &starts[best], &frames)?;
+    Ok(draws.map(|draws| Survey { held, strength, starts, best, strengths, draws }))
+}
+
+/// The start with the least loss.
+fn least(starts: &[Candidate]) -> usize {
+    let losses = starts.iter().enumerate().map(|(k, start)| (k, start.solution.loss));
+    losses.min_by(|(_, a), (_, b)| a.total_cmp(b)).map_or(0, |(k, _)| k)
+}
+
+/// Strengths that predict held-out frames as well as the best within a standard error of the difference, rising.
+fn allowed(held: &[Held]) -> Vec<f64> {
+    let Some(best) = best_held(held) else { return Vec::new() };
+    let good = |one: &&Held| one.mean() <= best.mean() + one.error_beside(best);
+    let mut values: Vec<f64> = held.iter().filter(good).map(|held| held.value).collect();
+    values.sort_by(f64::total_cmp);
+    values
+}
+
+struct Search<'a> {
+    file: &'a StaticImageFile,
+    grid: ImageGrid,
+    priors: Vec<Prior>,
+    envelope: Option<(Vec<f64>, f64)>,
+    terms: &'a [Weighted<dyn FrameTerm<f64>>],
+    watch: &'a SurveyWatch<'a>,
+}
+
+impl Search<'_> {
+    fn flux(&self) -> FluxPrior {
+        FluxPrior { jy: self.file.image.flux_jy, sigma_jy: self.file.image.flux_sigma_jy }
+    }
+
+    fn problem(&self, strength: f64, frames: &[usize], flux: FluxPrior) -> ImageProblem<'_> {
+        let (terms, priors, side) = (self.terms, &self.priors, self.file.image.pixels);
+        let envelope = self.envelope.as_ref().map(|(shares, weight)| (&shares[..], *weight));
+        ImageProblem { terms, frames: frames.to_vec(), priors, envelope, strength, flux, side }
+    }
+
+    /// The image from a start with a strength.
+    fn solved(
+        &self,
+        stage: Stage,
+        (start, strength): (usize, f64),
+        frames: &[usize],
+        flux: FluxPrior,
+    ) -> Option<Candidate> {
+        let problem = self.problem(strength, frames, flux);
+        let shares = start::image(self.file.image.starts[start], self.grid);
+        let begin = problem.parameters_of(&shares);
+        self.from(stage, &problem, &begin, start)
+    }
+
+    fn from(
+        &self,
+        stage: Stage,
+        problem: &ImageProblem<'_>,
+        begin: &[f64],
+        start: usize,
+    ) -> Option<Candidate> {
+        let go_on = || (self.watch)(stage, 0);
+        let solution = solve(problem, begin, self.file.image.iterations, &go_on)?;
+        (self.watch)(stage, 1).then_some(())?;
+        let ring = self.file.ring.as_ref();
+        Some(Candidate {
+            start,
+            strength: problem.strength,
+            chi2: problem.chi2(&solution.image),
+            ring: ring.and_then(|ring| Ring::measure(&solution.image, self.grid, ring)),
+            solution,
+        })
+    }
+
+    fn starts(&self, strength: f64, frames: &[usize]) -> Option<Vec<Candidate>> {
+        let of = |k: usize| self.solved(Stage::Starts, (k, strength), frames, self.flux());
+        (0..self.file.image.starts.len()).into_par_iter().map(of).collect()
+    }
+
+    /// The loss of frames that were not fitted, for each strength; nothing where one is given.
+    fn hold_out(&self, start: usize, frames: &[usize]) -> Option<Vec<Held>> {
+        let Some(settings) = &self.file.strength else { return Some(Vec::new()) };
+        let folds = settings.folds;
+        let part = |fold: usize, seen: bool| -> Vec<usize> {
+            frames.iter().copied().filter(|frame| (frame % folds != fold) == seen).collect()
+        };
+        let cases: Vec<(usize, usize)> = (0..settings.values.len())
+            .flat_map(|value| (0..folds).map(move |fold| (value, fold)))
+            .collect();
+        let loss = |(value, fold): &(usize, usize)| {
+            let strength = settings.values[*value];
+            let how = (start, strength);
+            let found = self.solved(Stage::HeldOut, how, &part(*fold, true), self.flux())?;
+            let unseen = self.problem(strength, &part(*fold, false), self.flux());
+            Some(unseen.misfit(&found.solution.image))
+        };
+        let losses: Option<Vec<f64>> = cases.par_iter().map(loss).collect();
+        let held = |losses: Vec<f64>| {
+            let each = settings.values.iter().zip(losses.chunks(folds));
+            each.map(|(value, losses)| Held { value: *value, losses: losses.to_vec() }).collect()
+        };
+        losses.map(held)
+    }
+
+    /// Images of the measurement of the best image with other noise, and of a flux drawn from its prior, each from the best
+    /// image.
+    fn draws(
+        &self,
+        measured: &Measured,
+        best: &Candidate,
+        frames: &[usize],
+    ) -> Result<Option<Vec<Candidate>>, Error> {
+        let one = |k: usize| -> Result<Option<Candidate>, Error> {
+            let seed = self.file.seed.wrapping_add(1 + k as u64);
+            let drawn = measured.redrawn(&self.file.loss, &best.solution.image, seed)?;
+            let terms = drawn.visibility_terms(&self.file.loss, self.grid.pixels())?;
+            let noise: f64 = Pcg64::seed_from_u64(seed).sample(StandardNormal);
+            let FluxPrior { jy, sigma_jy } = self.flux();
+            // A flux below 0 is none: far from it for any prior that says something.
+            let flux = FluxPrior { jy: (jy + noise * sigma_jy).max(0.01 * jy), sigma_jy };
+            let problem =
+                ImageProblem { terms: &terms, ..self.problem(best.strength, frames, flux) };
+            let mut begin = best.solution.parameters.clone();
+            if let Some(last) = begin.last_mut() {
+                *last += (jy / flux.jy).ln();
+            }
+            Ok(self.from(Stage::Draws, &problem, &begin, best.start))
+        };
+        let draws = self.file.image.draws.unwrap_or(0);
+        let all: Result<Vec<Option<Candidate>>, Error> =
+            (0..draws).into_par_iter().map(one).collect();
+        Ok(all?.into_iter().collect())
+    }
+}
