@@ -114,6 +114,13 @@ fn names(at: &Path) -> Vec<String> {
     all
 }
 
+/// Names in the folders of a folder.
+fn names_below(at: &Path) -> Vec<String> {
+    let folders = std::fs::read_dir(at).into_iter().flatten().flatten();
+    let inner = folders.flat_map(|folder| std::fs::read_dir(folder.path()).into_iter().flatten());
+    inner.flatten().filter_map(|entry| entry.file_name().into_string().ok()).collect()
+}
+
 /// Kills a rank of the jobs that `start` starts, each a little later than in the one before, until one ends before that;
 /// how many were killed. A job ends within 10 s of that, and mpirun says why.
 fn kill_ranks(start: impl Fn(usize) -> Option<Child>) -> usize {
@@ -191,9 +198,17 @@ fn exact_a_killed_rank_of_mpirun_leaves_its_bands() {
     // What ranks have left is of use to one process.
     std::fs::remove_file(at.join("out.exr")).unwrap();
     let mut job = start_with(at, 3, &words("out.exr")).unwrap();
-    std::thread::sleep(Duration::from_millis(1500));
-    Command::new("kill").args(["-9", &ranks_of(&job)[2]]).status().unwrap();
+    let shared = at.join("out.exr.shared");
+    let has_bands = || names_below(&shared).iter().any(|name| name.ends_with(".partial"));
+    let clock = Instant::now();
+    while !has_bands() && clock.elapsed() < Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let ranks = ranks_of(&job);
+    let last = ranks.last().expect("40 bands take longer than one");
+    Command::new("kill").args(["-9", last]).status().unwrap();
     job.wait().unwrap();
+    assert!(has_bands() && !at.join("out.exr").exists());
     succeed(at, &words("out.exr"));
     assert!(
         std::fs::read(at.join("out.exr")).unwrap() == std::fs::read(at.join("alone.exr")).unwrap()
@@ -267,6 +282,79 @@ fn exact_ranks_of_mpirun_draw_what_one_process_draws() {
     let draw = ["posterior", "together", "--samples", "6", "--threads", "1"];
     kill_ranks(|ranks| start_with(at, ranks, &draw));
     same("together");
+}
+
+/// Any number of ranks takes the steps of one process, also where jobs are killed and others go on.
+#[test]
+#[ignore = "long"]
+fn exact_ranks_of_mpirun_take_parts_of_one_fit() {
+    fn words(output: &str) -> [&str; 6] {
+        ["fit", "fit.toml", "-o", output, "--threads", "1"]
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let built_in = std::fs::read_to_string(root().join("cli/src/fit/built_in.toml")).unwrap();
+    let text = built_in
+        .replace("steps = 600", "steps = 150\nparts = 8\ncheckpoint_seconds = 0.1")
+        .replace("pixels = 40", "pixels = 20")
+        .replace("scans = 64", "scans = 16")
+        .replace("rounds = 4", "rounds = 1")
+        .replace("nodes = 64", "nodes = 20");
+    std::fs::write(at.join("fit.toml"), text).unwrap();
+    succeed(at, &words("alone"));
+    let same = |other: &str| {
+        for name in ["checkpoint.safetensors", "volume.npz", "movie.npz"] {
+            let [a, b] = ["alone", other].map(|run| std::fs::read(at.join(run).join(name)));
+            assert!(a.unwrap() == b.unwrap(), "{other}/{name}");
+        }
+        assert!(!at.join(other).join("ranks.json").exists());
+    };
+    for ranks in [1, 2, 4, 7] {
+        let output = format!("out{ranks}");
+        let Some(text) = says(at, ranks, &words(&output)) else { return };
+        assert_eq!(text.matches("report.html").count(), 1, "{text}");
+        same(&output);
+    }
+    kill_ranks(|ranks| {
+        if at.join("out/fit.toml").exists() {
+            return start_with(at, ranks, &["fit", "--resume", "out", "--threads", "1"]);
+        }
+        let _ = std::fs::remove_dir_all(at.join("out"));
+        start_with(at, ranks, &words("out"))
+    });
+    same("out");
+}
+
+/// Without a launcher that ends the job, the others end it: at once, and with one message.
+#[test]
+#[ignore = "long"]
+fn exact_ranks_end_a_fit_that_has_lost_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let rank = |rank: usize| {
+        let mut command = Command::new(binary());
+        command.current_dir(at).args(["fit", "-o", "out", "--threads", "1"]);
+        command.args(["--set", "training.parts=3", "--set", "training.log_every=1"]);
+        command.envs([("PMI_RANK", rank.to_string()), ("PMI_SIZE", "3".to_owned())]);
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
+    };
+    let mut ranks = [0, 1, 2].map(rank);
+    let has_steps = || std::fs::read(at.join("out/log.jsonl")).is_ok_and(|log| log.len() > 1000);
+    let clock = Instant::now();
+    while !has_steps() {
+        assert!(clock.elapsed() < Duration::from_secs(300), "no steps");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    ranks[2].kill().unwrap();
+    let clock = Instant::now();
+    let said = ranks.map(|rank| rank.wait_with_output().unwrap());
+    assert!(clock.elapsed() < Duration::from_secs(10), "{:?}", clock.elapsed());
+    assert_eq!(said[0].status.code(), Some(1));
+    assert_eq!(said[1].status.code(), Some(1));
+    let text: String =
+        said.iter().map(|said| String::from_utf8_lossy(&said.stderr).into_owned()).collect();
+    assert_eq!(text.matches("error:").count(), 1, "{text}");
+    assert!(text.contains("rank 2 is gone") && text.contains("fit --resume out"), "{text}");
 }
 
 /// A wrong scene is told once, and a rank that is told to be alone is.

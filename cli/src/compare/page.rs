@@ -16,6 +16,9 @@ use std::path::{Path, PathBuf};
 /// Results as columns, for programs that read some of them out of many rows.
 const PARQUET: &str = "results.parquet";
 
+/// Most failures that the head of the page tells.
+const TOLD: usize = 20;
+
 /// Where the results are, beside the pictures.
 pub fn files(folder: &Path) -> Vec<PathBuf> {
     let always = ["report.html", "results.json", "results.csv", "tables.md"];
@@ -181,8 +184,11 @@ impl Page<'_> {
             rayon::current_num_threads(),
             summary.seeds_told()
         ));
-        for (case, why) in summary.failed() {
+        for (case, why) in summary.failed().take(TOLD) {
             lines.push(format!("Failed: {}: {why}", case.name()));
+        }
+        if failed > TOLD {
+            lines.push(format!("{} more failed; the table of all cases has them.", failed - TOLD));
         }
         lines
     }

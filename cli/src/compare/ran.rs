@@ -29,6 +29,9 @@ fn at(settings: &toml::Table, key: &str) -> Option<String> {
     Some(value.as_str().map_or_else(|| value.to_string(), str::to_owned))
 }
 
+/// Most values of a setting that are told.
+const TOLD: usize = 20;
+
 fn settings(case: &Case) -> Option<toml::Table> {
     case.settings().ok()?.parse().ok()
 }
@@ -45,8 +48,13 @@ fn counted(values: impl Iterator<Item = String>) -> String {
     match all.as_slice() {
         [(value, _)] => value.clone(),
         many => {
-            let told = many.iter().map(|(value, count)| format!("{value} ({count} cases)"));
-            told.collect::<Vec<_>>().join(", ")
+            let told = many.iter().take(TOLD);
+            let told = told.map(|(value, count)| format!("{value} ({count} cases)"));
+            let mut told = told.collect::<Vec<_>>().join(", ");
+            if many.len() > TOLD {
+                told += &format!(" and {} more values", many.len() - TOLD);
+            }
+            told
         }
     }
 }

@@ -14,14 +14,20 @@ struct Order {
     values: Vec<Vec<String>>,
 }
 
+/// Most rows of a sentence.
+const TOLD: usize = 20;
+
 impl Order {
     fn sentence(&self, title: &str, unit: &str) -> String {
         let of = |k: usize| {
             let row: Vec<&str> = self.values.iter().map(|column| column[k].as_str()).collect();
             row.join(" / ")
         };
-        let rows: Vec<String> =
-            self.rows.iter().enumerate().map(|(k, name)| format!("{name} ({})", of(k))).collect();
+        let told = self.rows.iter().take(TOLD).enumerate();
+        let mut rows: Vec<String> = told.map(|(k, name)| format!("{name} ({})", of(k))).collect();
+        if self.rows.len() > TOLD {
+            rows.push(format!("{} more, which the table has", self.rows.len() - TOLD));
+        }
         let columns = self.columns.join(" / ");
         let what = if columns.is_empty() { columns } else { format!(", {columns}") };
         format!("{title}{what}, by {unit}: {}.", rows.join(" > "))

@@ -16,6 +16,7 @@ mod posterior;
 mod results;
 mod run;
 mod static_image;
+mod together;
 mod work;
 mod world_results;
 mod world_scan;
@@ -86,7 +87,7 @@ impl Fit {
         if self.stop_with_input {
             interrupt::follow_parent();
         }
-        if let Some((rank @ 1.., _)) = ranks::this() {
+        if let Some(rank @ (1.., _)) = ranks::this() {
             return self.help(rank, registry);
         }
         if let Some(data) = &self.init {
@@ -119,12 +120,7 @@ impl Fit {
         }
         let (prepared, read) = output::with_reads(|| work.prepared(&base_dir, registry));
         let prepared = prepared?;
-        // Settings of a run say so already.
-        let text = text
-            .strip_prefix(BASE_DIR)
-            .and_then(|t| t.split_once('\n'))
-            .map_or(text.as_str(), |(_, t)| t);
-        let text = format!("{BASE_DIR}{}\n{text}", self.shown(&base_dir).display());
+        let text = self.begun(&text, &base_dir);
         let folder = Folder::create(&folder, &text, Inputs::new(&text, read))?;
         self.run_all(&prepared, &text, &folder, false)
     }
@@ -150,21 +146,62 @@ impl Fit {
         // Other ranks know where the run is if that was said.
         let shared = self.samples.filter(|_| self.output.is_some() || self.resume.is_some());
         let lead = shared.map(|samples| posterior::lead(folder, samples)).transpose()?;
-        let answer = run::run(prepared, text, folder, resume)?;
+        let is_known = self.output.is_some() || self.resume.is_some();
+        let door = together::open(&prepared.file, text, folder, is_known)?;
+        let answer = run::run(prepared, text, folder, resume, door)?;
         recorder.write_into(folder.path())?;
         let Some(samples) = self.samples else { return Ok(answer) };
         Ok(answer.and("posterior", posterior::draw(prepared, folder, samples, lead.flatten())?))
     }
 
-    /// As a rank that is not the first, which fits: takes part in the draws after the fit, if there are any and it is known
-    /// where the run is.
-    fn help(&self, rank: u32, registry: &Registry) -> anyhow::Result<Answer> {
-        match (self.samples, self.resume.as_ref().or(self.output.as_ref())) {
-            (Some(samples), Some(run)) if !self.print && self.init.is_none() => {
-                posterior::help(run, samples, rank, registry)
-            }
-            _ => Ok(Answer::default()),
+    /// As a rank that is not the first: takes parts of the steps, if they are cut, and part in the draws after the fit, if
+    /// there are any, where it is known where the run is.
+    fn help(&self, rank: (u32, u32), registry: &Registry) -> anyhow::Result<Answer> {
+        let Some(run) = self.resume.as_ref().or(self.output.as_ref()) else {
+            return Ok(Answer::default());
+        };
+        if self.print || self.init.is_some() {
+            return Ok(Answer::default());
         }
+        self.take_parts(run, rank, registry)?;
+        match self.samples {
+            Some(samples) => posterior::help(run, samples, rank.0, registry),
+            None => Ok(Answer::default()),
+        }
+    }
+
+    /// Takes parts of the steps of the first rank's fit, which has read the same settings.
+    fn take_parts(&self, run: &Path, rank: (u32, u32), registry: &Registry) -> anyhow::Result<()> {
+        let (text, base_dir) = match &self.resume {
+            Some(path) => {
+                let text = output::read_text(&path.join(SETTINGS))?;
+                let base_dir = base_dir_of(&text);
+                (text, base_dir)
+            }
+            None => {
+                let guess = |data| init::guess(data, self.model);
+                let guess = self.data.as_deref().map(guess).transpose()?;
+                let (text, base_dir) = self.settings(guess.as_ref())?;
+                (self.begun(&text, &base_dir), base_dir)
+            }
+        };
+        // A static image is the first rank's alone.
+        let Work::Emission(file) = Work::read(&text).with_context(|| self.name())? else {
+            return Ok(());
+        };
+        if !together::is_divided(&file) {
+            return Ok(());
+        }
+        let prepared = run::Prepared::new(*file, &base_dir, registry)?;
+        run::help(&prepared, &text, run, rank)
+    }
+
+    /// The settings as a run has them.
+    fn begun(&self, text: &str, base_dir: &Path) -> String {
+        // Settings of a run say so already.
+        let text =
+            text.strip_prefix(BASE_DIR).and_then(|t| t.split_once('\n')).map_or(text, |(_, t)| t);
+        format!("{BASE_DIR}{}\n{text}", self.shown(base_dir).display())
     }
 
     /// For how long to wait for another process: the fit of a comparison that was killed a moment ago is about to end.

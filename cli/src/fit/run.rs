@@ -9,11 +9,13 @@ use super::held_out;
 use super::labels;
 use super::linear;
 use super::results::{self, Estimate};
+use super::together;
 use super::world_search;
 pub use super::world_search::Placed;
 use crate::answer::Answer;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
+use crate::ranks::Door;
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
 use kerrlight_tomo::fit::linear::Change;
@@ -67,6 +69,26 @@ impl<'a> Prepared<'a> {
         Ok(prepared)
     }
 
+    /// The world that is not known, once it is found.
+    fn placed(&self, folder: &Folder) -> anyhow::Result<Option<Placed>> {
+        let Self { file, instrument, measured, .. } = self;
+        match world_search::place(file, instrument, measured, folder)? {
+            None => band_search::place(file, measured, folder),
+            placed => Ok(placed),
+        }
+    }
+
+    /// Settings, rays and motion of the fit.
+    fn world<'b>(
+        &'b self,
+        placed: Option<&'b Placed>,
+    ) -> (&'b FitFile, &'b Instrument, &'b Motion) {
+        match placed {
+            Some(Placed { file, instrument, motion }) => (file, instrument, motion),
+            None => (&self.file, &self.instrument, &self.motion),
+        }
+    }
+
     fn objective(
         &self,
         instrument: &Instrument,
@@ -84,17 +106,12 @@ pub fn run(
     text: &str,
     folder: &Folder,
     resume: bool,
+    door: Option<Door>,
 ) -> anyhow::Result<Answer> {
-    let Prepared { file, registry, instrument, measured, motion } = prepared;
+    let Prepared { registry, measured, .. } = prepared;
     let begun = Instant::now();
-    let placed = match world_search::place(file, instrument, measured, folder)? {
-        None => band_search::place(file, measured, folder)?,
-        placed => placed,
-    };
-    let (file, instrument, motion) = match &placed {
-        Some(Placed { file, instrument, motion }) => (file, instrument, motion),
-        None => (file, instrument, motion),
-    };
+    let placed = prepared.placed(folder)?;
+    let (file, instrument, motion) = prepared.world(placed.as_ref());
     let objective = prepared.objective(instrument, motion)?;
     let times = setup::emission_times(instrument, motion);
     let representation = setup::representation(file, registry, times)?;
@@ -124,13 +141,49 @@ pub fn run(
             folder.save(&checkpoint::encode(&state, text)?)?;
         }
     }
+    if let Some(door) = door {
+        let bytes = checkpoint::encode(&state, text)?;
+        run.trainer.ranks = Some(together::begin(door, &bytes, folder.path())?);
+    }
     if file.representation.kind != Kind::LinearGrid {
         run.steps(&mut state)?;
     }
+    run.trainer.ranks = None;
     let Run { mut trainer, true_volume, .. } = run;
     let estimate = Estimate { file, folder, instrument, motion, measured, true_volume };
     let results = estimate.write(&mut trainer, &state, begun)?;
     Ok(answer(folder, results))
+}
+
+/// Takes parts of the steps of a fit as a rank that is not the first, until that has taken them all.
+pub fn help(
+    prepared: &Prepared<'_>,
+    text: &str,
+    run: &Path,
+    (rank, size): (u32, u32),
+) -> anyhow::Result<()> {
+    // The first rank decides when to stop.
+    let _keeper = Keeper::saving("");
+    let mut link = together::join((run, rank, size), text)?;
+    // What it has found of the world is there before its state comes.
+    let bytes = link.state()?;
+    let placed = prepared.placed(&Folder::look(run)?.0)?;
+    let (file, instrument, motion) = prepared.world(placed.as_ref());
+    let objective = prepared.objective(instrument, motion)?;
+    let times = setup::emission_times(instrument, motion);
+    let representation = setup::representation(file, prepared.registry, times)?;
+    let (axis, axis_rate) = setup::axis(file)?;
+    let training = setup::training(file, axis_rate)?;
+    let start = State::new(&*representation, axis, &training);
+    let mut state = checkpoint::decode(&bytes, &start)?;
+    let mut trainer = Trainer::new(objective, &*representation, training);
+    trainer.ranks = Some(Box::new(link));
+    while state.now.step < file.training.steps {
+        if trainer.step(&mut state)? == Outcome::Converged {
+            break;
+        }
+    }
+    Ok(())
 }
 
 /// The verdict and where to read it; the results for a script.

@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Where ranks say that they have come, and that they have left, in the folder.
+/// Where ranks of a job say that they have come, and that they have left, in the folder: behind these words is the job,
+/// since a rank may come to what an earlier one has left before the first rank does.
 const HERE: &str = "here";
 const LEFT: &str = "left";
 /// For so long ranks wait for each other.
@@ -19,6 +20,7 @@ const LOOK: Duration = Duration::from_millis(50);
 /// A rank among those that share pieces. Threads may take some at the same time.
 pub struct Team {
     folder: PathBuf,
+    job: String,
     rank: u32,
     inner: Mutex<Inner>,
 }
@@ -41,21 +43,30 @@ pub struct Lead {
 impl Lead {
     /// Makes the folder, unless an earlier job has left it, and is the first to work on `pieces`.
     pub fn start(folder: &Path, pieces: Vec<String>, size: u32) -> anyhow::Result<Self> {
-        for marks in [HERE, LEFT] {
-            // Of an earlier job.
-            let _ = std::fs::remove_dir_all(folder.join(marks));
+        Self::of_job(folder, pieces, size, super::job())
+    }
+
+    fn of_job(folder: &Path, pieces: Vec<String>, size: u32, job: String) -> anyhow::Result<Self> {
+        let own = [HERE, LEFT].map(|kind| [kind, &job].concat());
+        for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let is_mark = [HERE, LEFT].iter().any(|kind| name.starts_with(kind));
+            if is_mark && (job.is_empty() || !own.contains(&name)) {
+                // Of an earlier job.
+                let _ = std::fs::remove_dir_all(entry.path());
+            }
         }
-        Ok(Self { team: Team::new(folder, pieces, 0)?, size })
+        Ok(Self { team: Team::new(folder, pieces, 0, job)?, size })
     }
 
     /// Waits until the others have left, and removes the folder: one that came later would begin anew.
     pub fn end(self) {
-        let Team { folder, .. } = &self.team;
+        let Team { folder, job, .. } = &self.team;
         let (mut watch, clock) = (Watch::new(folder), Instant::now());
         let is_recorded =
             |worker: &str| workers(folder).iter().any(|record| record.worker == worker);
-        let is_over = |watch: &mut Watch, rank: &u32| match mark(folder, HERE, *rank) {
-            _ if folder.join(LEFT).join(rank.to_string()).exists() => true,
+        let is_over = |watch: &mut Watch, rank: &u32| match mark(folder, HERE, job, *rank) {
+            _ if mark(folder, LEFT, job, *rank).is_some() => true,
             // One that failed has removed its record.
             Some(worker) => !is_recorded(&worker) || watch.is_dead(&worker),
             None => clock.elapsed() > PATIENCE,
@@ -75,8 +86,8 @@ impl Lead {
 }
 
 /// Who has made a mark.
-fn mark(folder: &Path, kind: &str, rank: u32) -> Option<String> {
-    std::fs::read_to_string(folder.join(kind).join(rank.to_string())).ok()
+fn mark(folder: &Path, kind: &str, job: &str, rank: u32) -> Option<String> {
+    std::fs::read_to_string(folder.join([kind, job].concat()).join(rank.to_string())).ok()
 }
 
 impl Team {
@@ -96,18 +107,18 @@ impl Team {
             }
             std::thread::sleep(LOOK);
         }
-        Self::new(folder, pieces, rank)
+        Self::new(folder, pieces, rank, super::job())
     }
 
-    fn new(folder: &Path, pieces: Vec<String>, rank: u32) -> anyhow::Result<Self> {
+    fn new(folder: &Path, pieces: Vec<String>, rank: u32, job: String) -> anyhow::Result<Self> {
         let queue = Queue::join(folder, pieces)?;
-        for marks in [HERE, LEFT] {
-            let path = folder.join(marks);
+        for kind in [HERE, LEFT] {
+            let path = folder.join([kind, &job].concat());
             std::fs::create_dir_all(&path)
                 .with_context(|| format!("cannot make the folder {}", path.display()))?;
         }
         let inner = Inner { queue, taken: HashMap::new(), failure: None };
-        let team = Self { folder: folder.to_owned(), rank, inner: Mutex::new(inner) };
+        let team = Self { folder: folder.to_owned(), job, rank, inner: Mutex::new(inner) };
         team.sign(HERE)?;
         Ok(team)
     }
@@ -118,7 +129,8 @@ impl Team {
 
     fn sign(&self, kind: &str) -> anyhow::Result<()> {
         let name = self.inner().queue.claims.name().to_owned();
-        let path = self.folder.join(kind).join(self.rank.to_string());
+        let folder = self.folder.join([kind, &self.job].concat());
+        let path = folder.join(self.rank.to_string());
         std::fs::write(&path, name).with_context(|| format!("cannot write {}", path.display()))
     }
 
@@ -207,7 +219,7 @@ impl Team {
 
     /// Whether the first rank is at work or its end is not seen yet.
     pub fn is_led(&self, watch: &mut Watch) -> bool {
-        mark(&self.folder, HERE, 0).is_none_or(|worker| !watch.is_dead(&worker))
+        mark(&self.folder, HERE, &self.job, 0).is_none_or(|worker| !watch.is_dead(&worker))
     }
 }
 
@@ -246,6 +258,24 @@ mod tests {
         lead.end();
         assert_eq!(late.join().unwrap(), 5);
         assert!(!at.exists());
+    }
+
+    /// A rank that is faster than the first one, in what a killed job has left, is not taken for one of that job.
+    #[test]
+    fn exact_a_rank_that_comes_before_the_first_is_not_waited_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path().join("shared");
+        let of_job = |job: &str| Lead::of_job(&at, named("piece", 2), 2, job.to_owned()).unwrap();
+        drop(of_job("_killed"));
+        let early = Team::new(&at, named("piece", 2), 1, "_new".to_owned()).unwrap();
+        let done = std::iter::from_fn(|| early.take()).inspect(|k| early.done(*k).unwrap());
+        assert_eq!(done.count(), 2);
+        early.leave().unwrap();
+        let (lead, clock) = (of_job("_new"), Instant::now());
+        assert!(!at.join("here_killed").exists());
+        assert!(lead.team.take().is_none());
+        lead.end();
+        assert!(clock.elapsed() < Duration::from_secs(10) && !at.exists());
     }
 
     /// What a stopped rank had is free, and a rank that died keeps nobody waiting.

@@ -1,5 +1,6 @@
 //! The page around everything else. All text from outside goes through [`escape`].
 
+use super::paged;
 use super::{Drawing, Figure, LinePlot, Notice, Outcome, Part, Report, Setting, Table, Tone};
 use std::fmt::Write;
 
@@ -35,6 +36,7 @@ pub fn page(report: &Report) -> anyhow::Result<String> {
         section("plots", "Plots", &plots(&report.plots)?),
         section("details", "Details", &tables(&report.details)),
         section("settings", "Settings", &settings(&report.settings)),
+        paged::script(report.tables.iter().chain(&report.details)),
     ];
     let parts = [
         ("title", escape(&report.title)),
@@ -105,7 +107,9 @@ fn tables(all: &[Table]) -> String {
 
 fn one_table(shown: &Table) -> String {
     let head: Vec<String> = shown.head.iter().map(|name| escape(name)).collect();
-    let rows = shown.rows.iter().enumerate().map(|(k, row)| {
+    let is_long = paged::is_long(shown);
+    let there = if is_long { paged::ROWS } else { shown.rows.len() };
+    let rows = shown.rows.iter().take(there).enumerate().map(|(k, row)| {
         let mut cells: Vec<String> = row.iter().map(|cell| escape(cell)).collect();
         if let (Some(first), Some(link)) = (cells.first_mut(), shown.links.get(k)) {
             *first = format!("<a href=\"{}\">{first}</a>", escape(link));
@@ -113,7 +117,9 @@ fn one_table(shown: &Table) -> String {
         cells
     });
     let (title, caption) = (escape(&shown.title), escape(&shown.caption));
-    format!("<h3>{title}</h3>\n<p>{caption}</p>\n{}", table(&head, rows))
+    let body = table(&head, rows);
+    let body = if is_long { paged::wrap(shown, &body) } else { body };
+    format!("<h3>{title}</h3>\n<p>{caption}</p>\n{body}")
 }
 
 fn results(rows: &[Outcome]) -> String {

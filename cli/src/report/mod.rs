@@ -3,6 +3,7 @@
 
 mod grid_map;
 mod html;
+mod paged;
 mod panels;
 mod pictures;
 mod plot;

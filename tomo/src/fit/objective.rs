@@ -2,6 +2,7 @@
 
 use super::batch::Batch;
 use super::forward_model::{Field, ForwardModel};
+use super::selection::Selection;
 use super::terms::{FrameTerm, ImageTerm};
 use super::verdict::Statistics;
 use crate::dynamics::{Axis, Cotangents, Turned, pull_back_vjp};
@@ -24,15 +25,6 @@ pub struct Data<T> {
     pub image: Option<Weighted<ImageTerm<T>>>,
     /// All others, which need whole frames.
     pub others: Vec<Weighted<dyn FrameTerm<T>>>,
-}
-
-/// Which part of the data a step looks at.
-#[derive(Clone, Copy, Debug)]
-pub enum Selection<'a> {
-    /// (ray, frame) pairs of images.
-    Pixels(&'a [(u32, u32)]),
-    /// Whole frames, of all data.
-    Frames(&'a [usize]),
 }
 
 /// The loss of a selection, scaled to that of all data.
@@ -132,6 +124,17 @@ impl<T: Float> Objective<T> {
         &self,
         field: Field<'_, T>,
         selection: Selection<'_>,
+        gradients: Gradients<'_, T>,
+        buffers: &mut Buffers<T>,
+    ) -> Loss {
+        self.share(field, (selection, selection.len()), gradients, buffers)
+    }
+
+    /// The share of a selection in the loss of `whole` pairs or frames; adds its gradient.
+    pub(super) fn share(
+        &self,
+        field: Field<'_, T>,
+        (selection, whole): (Selection<'_>, usize),
         mut gradients: Gradients<'_, T>,
         buffers: &mut Buffers<T>,
     ) -> Loss {
@@ -140,8 +143,8 @@ impl<T: Float> Objective<T> {
             buffers.of_weights.resize(self.model.points(), 0.0);
         }
         let loss = match selection {
-            Selection::Pixels(pairs) => self.pixels(field, pairs, &mut gradients, buffers),
-            Selection::Frames(frames) => self.frames(field, frames, &mut gradients, buffers),
+            Selection::Pixels(pairs) => self.pixels(field, (pairs, whole), &mut gradients, buffers),
+            Selection::Frames(all) => self.frames(field, (all, whole), &mut gradients, buffers),
         };
         if let Some(axis) = gradients.axis
             && self.model.is_shifted()
@@ -155,14 +158,14 @@ impl<T: Float> Objective<T> {
     fn pixels(
         &self,
         field: Field<'_, T>,
-        pairs: &[(u32, u32)],
+        (pairs, whole): (&[(u32, u32)], usize),
         gradients: &mut Gradients<'_, T>,
         buffers: &mut Buffers<T>,
     ) -> Loss {
         let Some(Weighted { weight, term }) = &self.data.image else { return Loss::default() };
         // A mean over the pixels of the screen, of which those without a ray are zero for ever.
         let rays = self.model.rays() as f64 / self.model.pixels() as f64;
-        let scale = rays * term.inverse_variance().double() / pairs.len() as f64;
+        let scale = rays * term.inverse_variance().double() / whole as f64;
         let slope = T::of(2.0 * weight * scale);
         let Buffers { batch, workspace, of_points, of_weights, .. } = buffers;
         batch.set(pairs.iter().copied());
@@ -214,12 +217,12 @@ impl<T: Float> Objective<T> {
     fn frames(
         &self,
         field: Field<'_, T>,
-        frames: &[usize],
+        (frames, whole): (&[usize], usize),
         gradients: &mut Gradients<'_, T>,
         buffers: &mut Buffers<T>,
     ) -> Loss {
         let scales: Vec<f64> =
-            self.terms().map(|(term, _)| 1.0 / self.data_of(term, frames.len())).collect();
+            self.terms().map(|(term, _)| 1.0 / self.data_of(term, whole)).collect();
         let mut loss = Loss { terms: vec![0.0; scales.len()], ..Loss::default() };
         for &frame in frames {
             self.image_of(field, frame, buffers);

@@ -1,9 +1,11 @@
 //! Steps of a fit: what is drawn, what is learnt, what is done when it goes wrong.
 
 use super::Field;
-use super::objective::{Gradients, Loss, Selection};
+use super::objective::{Gradients, Loss};
 use super::occupancy::Occupancy;
+use super::parts::{Cut, nodes};
 use super::penalties::Draw;
+use super::selection::Selection;
 use super::train::{BatchSize, Diverged, Outcome, Progress, State, Trainer, Training};
 use crate::Error;
 use crate::dynamics::Axis;
@@ -102,36 +104,53 @@ impl<T: Float> Trainer<'_, T> {
     }
 
     fn of_data(&mut self, field: Field<'_, T>, step: u64, of_axis: &mut [f64; 3]) -> Loss {
+        self.choose(step);
         let learnt = self.training.learns_axis(self.representation);
-        let gradients =
-            Gradients { parameters: &mut self.gradient, axis: learnt.then_some(of_axis) };
+        let Self { objective, training, ranks, buffers, gradient, pairs, frames, spare, .. } = self;
+        let selection = match training.batch {
+            BatchSize::Pixels(_) => Selection::Pixels(pairs),
+            BatchSize::Frames(_) | BatchSize::All => Selection::Frames(frames),
+        };
+        if training.parts < 2 {
+            let gradients = Gradients { parameters: gradient, axis: learnt.then_some(of_axis) };
+            return objective.value_and_gradient(field, selection, gradients, buffers);
+        }
+        let parts = training.parts.min(selection.len());
+        let mut cut = Cut { objective, field, selection, learnt, parts, buffers, spare };
+        let sum = match ranks {
+            None => cut.sum(0..parts),
+            Some(ranks) => {
+                let mine = nodes(0..parts, &ranks.mine(parts));
+                let own = mine.into_iter().map(|range| cut.sum(range)).collect();
+                ranks.sum(parts, checksum(field.parameters, field.axis), own)
+            }
+        };
+        spare.push(core::mem::replace(gradient, sum.gradient));
+        of_axis.iter_mut().zip(sum.of_axis).for_each(|(axis, slope)| *axis += slope);
+        sum.loss
+    }
+
+    /// Draws the pairs or frames of a step.
+    fn choose(&mut self, step: u64) {
         let mut random = Pcg64::seed_from_u64(mix(self.training.seed, step, 0));
-        let observed = &self.observed;
-        let selection = match self.training.batch {
+        let Self { objective, training, observed, pairs, frames, .. } = self;
+        match training.batch {
             BatchSize::Pixels(count) => {
-                let rays = self.objective.model.rays();
-                self.pairs.clear();
-                self.pairs.extend((0..count).map(|_| {
+                let rays = objective.model.rays();
+                pairs.clear();
+                pairs.extend((0..count).map(|_| {
                     let frame = observed[random.random_range(0..observed.len())];
                     (random.random_range(0..rays) as u32, frame as u32)
                 }));
-                Selection::Pixels(&self.pairs)
             }
             BatchSize::Frames(count) => {
                 let count = count.min(observed.len());
                 let chosen = index::sample(&mut random, observed.len(), count);
-                let frames: Vec<usize> = chosen.into_iter().map(|k| observed[k]).collect();
-                let frames = Selection::Frames(&frames);
-                return self.objective.value_and_gradient(
-                    field,
-                    frames,
-                    gradients,
-                    &mut self.buffers,
-                );
+                frames.clear();
+                frames.extend(chosen.into_iter().map(|k| observed[k]));
             }
-            BatchSize::All => Selection::Frames(observed),
-        };
-        self.objective.value_and_gradient(field, selection, gradients, &mut self.buffers)
+            BatchSize::All => frames.clone_from(observed),
+        }
     }
 
     fn draw(&self, step: u64) -> Draw<T> {
@@ -167,6 +186,17 @@ fn step_back<T: Float>(state: &mut State<T>, loss: f64) -> Result<Outcome, Diver
     good.caution *= 0.5;
     state.now = (**good).clone();
     Ok(Outcome::SteppedBack { loss, to: good.step, caution: good.caution })
+}
+
+/// A checksum of what all ranks have in common before they add up their parts.
+fn checksum<T: Float>(parameters: &[T], axis: Axis) -> u32 {
+    let mut sum = crc32fast::Hasher::new();
+    for chunk in parameters.chunks(1024) {
+        let bytes: Vec<u8> = chunk.iter().flat_map(|x| (x.double() as f32).to_le_bytes()).collect();
+        sum.update(&bytes);
+    }
+    axis.vector().iter().for_each(|x| sum.update(&x.to_le_bytes()));
+    sum.finalize()
 }
 
 /// A seed for what a step draws.

@@ -4,6 +4,7 @@ use super::*;
 
 mod blobs;
 mod orbital;
+mod parts;
 mod penalised;
 mod quasi_newton;
 mod stokes;

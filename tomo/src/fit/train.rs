@@ -2,6 +2,7 @@
 
 use super::objective::{Buffers, Loss, Objective};
 use super::occupancy::{Occupancy, OccupancySettings};
+use super::parts::Ranks;
 use super::penalties::{Penalties, ProbeBuffers};
 use super::sightlines::Region;
 use super::{Field, Motion, is_turned};
@@ -54,6 +55,9 @@ pub struct Training {
     pub ramp: u64,
     /// Part of the data of a step.
     pub batch: BatchSize,
+    /// Parts that the data of a step are cut into: gradients of parts are summed in an order that does not depend on which
+    /// process has which ([`parts`](super::parts)). With 1 they are not cut.
+    pub parts: usize,
     /// Mask of what shines, if any.
     pub occupancy: Option<OccupancyPlan>,
     /// Penalties beside the data, if any.
@@ -165,11 +169,16 @@ pub struct Trainer<'a, T> {
     pub representation: &'a dyn Representation<T>,
     /// How it is run.
     pub training: Training,
+    /// Other processes that have parts of each step, if there are any.
+    pub ranks: Option<Box<dyn Ranks<T>>>,
     pub(super) observed: Vec<usize>,
     pub(super) buffers: Buffers<T>,
     pub(super) probe: ProbeBuffers<T>,
     pub(super) gradient: Vec<T>,
     pub(super) pairs: Vec<(u32, u32)>,
+    pub(super) frames: Vec<usize>,
+    /// Gradients of parts that are no longer used.
+    pub(super) spare: Vec<Vec<T>>,
 }
 
 impl Training {
@@ -188,8 +197,19 @@ impl<'a, T: Float> Trainer<'a, T> {
     ) -> Self {
         let (observed, gradient) =
             (objective.observed(), vec![T::zero(); representation.parameters()]);
-        let (buffers, probe, pairs) = (Buffers::default(), ProbeBuffers::default(), Vec::new());
-        Self { objective, representation, training, observed, buffers, probe, gradient, pairs }
+        Self {
+            objective,
+            representation,
+            training,
+            ranks: None,
+            observed,
+            buffers: Buffers::default(),
+            probe: ProbeBuffers::default(),
+            gradient,
+            pairs: Vec::new(),
+            frames: Vec::new(),
+            spare: Vec::new(),
+        }
     }
 
     /// The movie of these frames, with the mask of what shines or without.

@@ -26,6 +26,9 @@ pub struct Drawn {
     pub missing: Vec<String>,
 }
 
+/// Most pictures or plots of a figure: a page of thousands of cases should stay small.
+const MOST: usize = 12;
+
 /// All that figures are made of.
 pub struct Figures<'a> {
     /// What is shown.
@@ -41,13 +44,20 @@ impl Figures<'_> {
     pub fn draw(&self) -> anyhow::Result<Drawn> {
         let mut drawn = Drawn::default();
         for (k, asked) in self.experiment.figure.iter().enumerate() {
-            let before = drawn.figures.len() + drawn.plots.len();
+            let (figures, plots) = (drawn.figures.len(), drawn.plots.len());
             self.one(k, asked, &mut drawn).with_context(|| format!("figure {:?}", asked.title))?;
-            if drawn.figures.len() + drawn.plots.len() == before {
+            let count = drawn.figures.len() + drawn.plots.len() - figures - plots;
+            let title = &asked.title;
+            if count == 0 {
                 drawn.missing.push(format!(
-                    "Figure {:?}: no case that was run to its end has what it shows.",
-                    asked.title
+                    "Figure {title:?}: no case that was run to its end has what it shows."
                 ));
+            } else if count > MOST {
+                drawn.figures.truncate(figures + MOST);
+                drawn.plots.truncate(plots + MOST);
+                let told =
+                    format!("Figure {title:?}: the first {MOST} of {count} pictures are shown.");
+                drawn.missing.push(told);
             }
         }
         Ok(drawn)
@@ -62,7 +72,9 @@ impl Figures<'_> {
                 }
             }
             FigureKind::Axes => {
-                for (case, _) in self.chosen(asked).filter(|(case, _)| case.seed == 1) {
+                let cases = self.chosen(asked).filter(|(case, _)| case.seed == 1);
+                // One more says that there are more.
+                for (case, _) in cases.take(MOST + 1) {
                     let path = self.runner.run_of(case).join("axis_scan.png");
                     if path.exists() {
                         let caption = format!(

@@ -88,7 +88,7 @@ impl Figures<'_> {
             points.sort_by(|a, b| a[0].total_cmp(&b[0]));
             if !points.is_empty() {
                 let name = if row.is_empty() { factor.clone() } else { called(&row) };
-                series.push(Series { name, points, errors: Vec::new(), marks: Marks::Joined });
+                series.push(binned(name, points));
             }
         }
         let (unit, _) = described(value);
@@ -109,7 +109,8 @@ impl Figures<'_> {
     /// (u, v) of the first seed of each combination of rows, a plot each.
     pub(super) fn coverage(&self, asked: &FigureAsked) -> anyhow::Result<Vec<LinePlot>> {
         let mut plots = Vec::new();
-        for (case, _) in self.chosen(asked).filter(|(case, _)| case.seed == 1) {
+        let cases = self.chosen(asked).filter(|(case, _)| case.seed == 1);
+        for (case, _) in cases.take(super::MOST + 1) {
             let uv = fit::coverage(&case.settings().unwrap_or_default(), Path::new("/"))?;
             if uv.is_empty() {
                 continue;
@@ -172,6 +173,28 @@ impl Figures<'_> {
     }
 }
 
+/// Points of a curve; of more, means and standard deviations of equally many that lie next to each other.
+const POINTS: usize = 600;
+/// In so many groups, where they are too many.
+const BINS: usize = 100;
+
+/// A curve of points in order: as they are, or of too many their means in groups.
+fn binned(name: String, points: Vec<[f64; 2]>) -> Series {
+    if points.len() <= POINTS {
+        return Series { name, points, errors: Vec::new(), marks: Marks::Joined };
+    }
+    let group = |part: &[[f64; 2]]| {
+        let mean = |k: usize| part.iter().map(|point| point[k]).sum::<f64>() / part.len() as f64;
+        let (x, y) = (mean(0), mean(1));
+        let square: f64 = part.iter().map(|point| (point[1] - y).powi(2)).sum();
+        ([x, y], (square / (part.len().max(2) - 1) as f64).sqrt())
+    };
+    let name = format!("{name}: means and standard deviations of {} cases", points.len());
+    let each = points.len().div_ceil(BINS);
+    let (points, errors) = points.chunks(each).map(group).unzip();
+    Series { name, points, errors, marks: Marks::Joined }
+}
+
 /// As many plots as are needed for so many curves.
 fn series_of(series: Vec<Series>) -> Vec<Vec<Series>> {
     let mut parts = Vec::new();
@@ -181,4 +204,22 @@ fn series_of(series: Vec<Series>) -> Vec<Vec<Series>> {
     }
     parts.retain(|part| part.iter().any(|series| !series.points.is_empty()));
     parts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exact_many_points_are_means_of_neighbours() {
+        let points = |count: u32| (0..count).map(f64::from).map(|k| [k, k % 2.0]).collect();
+        let few = binned("a".to_owned(), points(600));
+        assert_eq!((few.points.len(), few.errors.len(), few.name.as_str()), (600, 0, "a"));
+        let many = binned("a".to_owned(), points(10_000));
+        assert_eq!((many.points.len(), many.errors.len()), (100, 100));
+        assert_eq!(many.points[1], [149.5, 0.5]);
+        // Of 50 zeros and 50 ones.
+        assert!((many.errors[1] - (25.0f64 / 99.0).sqrt()).abs() < 1e-15);
+        assert!(many.name.contains("10000 cases"), "{}", many.name);
+    }
 }

@@ -143,6 +143,7 @@ pub fn training(file: &FitFile, axis_rate: Option<Polynomial>) -> Result<Trainin
         axis_rate,
         ramp: chosen.ramp,
         batch: chosen.batch,
+        parts: chosen.parts as usize,
         occupancy,
         penalties: file.penalties()?,
         region: file.region.limits(),

@@ -14,6 +14,7 @@ pub(super) fn settings() -> Training {
         axis_rate: Some(rate),
         ramp: 3,
         batch: BatchSize::Pixels(30),
+        parts: 1,
         occupancy: Some(OccupancyPlan {
             settings: OccupancySettings { cells: 6, threshold: 0.3, memory: 0.5 },
             warm_up: 10,
@@ -26,20 +27,20 @@ pub(super) fn settings() -> Training {
     }
 }
 
-fn objective() -> Objective<f32> {
+pub(super) fn objective() -> Objective<f32> {
     let movie = movie().iter().map(|x| *x as f32).collect();
     let term = Box::new(ImageTerm::new(movie, SIDE * SIDE, 0.5).unwrap());
     let data = Data { image: Some(Weighted { weight: 1.0, term }), others: Vec::new() };
     Objective { model: forward_model(true, true), data }
 }
 
-fn network() -> Network {
+pub(super) fn network() -> Network {
     let settings =
         NetworkSettings { width: 16, shift: -1.0, length_scale: 6.0, ..NetworkSettings::bhnerf() };
     Network::new(settings).unwrap()
 }
 
-fn start(training: &Training) -> State<f32> {
+pub(super) fn start(training: &Training) -> State<f32> {
     State::new(&network(), Axis::new([0.1, 0.5, 0.8]).unwrap(), training)
 }
 

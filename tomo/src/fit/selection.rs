@@ -1,0 +1,35 @@
+//! What of the data a step looks at.
+
+use core::ops::Range;
+
+/// Which part of the data a step looks at.
+#[derive(Clone, Copy, Debug)]
+pub enum Selection<'a> {
+    /// (ray, frame) pairs of images.
+    Pixels(&'a [(u32, u32)]),
+    /// Whole frames, of all data.
+    Frames(&'a [usize]),
+}
+
+impl<'a> Selection<'a> {
+    /// How many pairs or frames.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Pixels(pairs) => pairs.len(),
+            Self::Frames(frames) => frames.len(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Some that follow one another.
+    pub fn part(&self, range: Range<usize>) -> Selection<'a> {
+        match self {
+            Self::Pixels(pairs) => Self::Pixels(&pairs[range]),
+            Self::Frames(frames) => Self::Frames(&frames[range]),
+        }
+    }
+}
