@@ -75,7 +75,7 @@ fn fail(what: &str, run: &Path) -> ! {
     if !IS_TOLD.swap(true, Ordering::Relaxed) {
         let run = run.display();
         eprintln!(
-            "\nerror: {what}: the fit has stopped; any number of ranks goes on from its last checkpoint with kerrlight fit --resume {run}"
+            "\nerror: {what}: the fit has stopped; resume it with any number of ranks: kerrlight fit --resume {run}"
         );
     }
     output::remove_unfinished();
