@@ -14,6 +14,7 @@ use crate::answer::Answer;
 use crate::checksum::sealed;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
+use anyhow::bail;
 use kerrlight_tomo::fit::FrameTerm;
 use kerrlight_tomo::fit::settings::{Loss, LossKind, StaticImageFile};
 use kerrlight_tomo::fit::setup::Measured;
@@ -51,6 +52,14 @@ struct Found<'a> {
 impl Prepared {
     /// Reads the data; relative paths start from `base_dir`.
     pub fn new(file: StaticImageFile, base_dir: &Path) -> anyhow::Result<Self> {
+        let knows_flux =
+            |loss: &Loss| matches!(loss.data, LossKind::Visibilities | LossKind::Amplitudes);
+        if file.image.draws.is_some() && !file.loss.iter().any(knows_flux) {
+            bail!(
+                "image.draws needs a loss of amplitudes or of visibilities: closure quantities alone do not tell how large \
+                 the noise of a measurement of the image would be beside it"
+            );
+        }
         let measured = data::of_static(&file, base_dir)?;
         let pixels = file.image.pixels * file.image.pixels;
         measured.visibility_terms::<f64>(&file.loss, pixels)?;
