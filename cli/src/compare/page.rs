@@ -94,7 +94,7 @@ impl Page<'_> {
     #[cfg(feature = "parquet")]
     fn parquet(&self, folder: &Path) -> anyhow::Result<()> {
         let bytes = crate::parquet_table::encode(&self.summary.columns())?;
-        Ok(Output::new(&folder.join(PARQUET), "")?.write(&bytes)?)
+        Output::new(&folder.join(PARQUET), "")?.write(&bytes)
     }
 
     /// Removes [`PARQUET`]: one that a program with the feature has left would be of other results.

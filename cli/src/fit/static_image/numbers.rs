@@ -5,8 +5,11 @@ use crate::usage::usage;
 use kerrlight_tomo::fit::static_image::{Candidate, Ring, Survey};
 use serde_json::{Map, Value, json};
 
+/// A number of a ring.
+type Number = fn(&Ring) -> f64;
+
 /// Numbers of a ring: name, unit in the name, and value. Errors have `_error` behind the name.
-pub const RING: [(&str, fn(&Ring) -> f64); 5] = [
+pub const RING: [(&str, Number); 5] = [
     ("ring_diameter_uas", |ring| ring.diameter_uas),
     ("ring_width_uas", |ring| ring.width_uas),
     ("ring_position_angle_deg", |ring| ring.position_angle_deg),
@@ -15,7 +18,7 @@ pub const RING: [(&str, fn(&Ring) -> f64); 5] = [
 ];
 
 /// The error of a number of the ring. Angles are compared the short way round.
-pub fn error(survey: &Survey, name: &str, number: fn(&Ring) -> f64) -> Option<f64> {
+pub fn error(survey: &Survey, name: &str, number: Number) -> Option<f64> {
     if name != "ring_position_angle_deg" {
         return survey.ring_error(number);
     }
