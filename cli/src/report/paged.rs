@@ -27,7 +27,7 @@ pub fn wrap(table: &Table, body: &str) -> String {
     let (count, title) = (table.rows.len(), escape(&table.title));
     format!(
         "<div class=\"paged\">\n<p class=\"turn\" hidden><label>Rows with <input type=\"search\" aria-label=\"Words that rows of {title} have\"></label> \
-         <button type=\"button\">Back</button> <button type=\"button\">On</button> <output></output></p>\n\
+         <button type=\"button\">Previous</button> <button type=\"button\">Next</button> <output></output></p>\n\
          <noscript><p>The first {ROWS} of {count} rows; results.csv has all.</p></noscript>\n{body}\
          <script type=\"application/json\">{data}</script>\n</div>\n"
     )
