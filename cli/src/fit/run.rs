@@ -15,7 +15,7 @@ pub use super::world_search::Placed;
 use crate::answer::Answer;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
-use crate::ranks::Door;
+use crate::ranks::Listener;
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
 use kerrlight_tomo::fit::linear::Change;
@@ -106,7 +106,7 @@ pub fn run(
     text: &str,
     folder: &Folder,
     resume: bool,
-    door: Option<Door>,
+    listener: Option<Listener>,
 ) -> anyhow::Result<Answer> {
     let Prepared { registry, measured, .. } = prepared;
     let begun = Instant::now();
@@ -141,9 +141,9 @@ pub fn run(
             folder.save(&checkpoint::encode(&state, text)?)?;
         }
     }
-    if let Some(door) = door {
+    if let Some(listener) = listener {
         let bytes = checkpoint::encode(&state, text)?;
-        run.trainer.ranks = Some(together::begin(door, &bytes, folder.path())?);
+        run.trainer.ranks = Some(together::begin(listener, &bytes, folder.path())?);
     }
     if file.representation.kind != Kind::LinearGrid {
         run.steps(&mut state)?;

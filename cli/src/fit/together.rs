@@ -3,7 +3,7 @@
 
 use super::folder::Folder;
 use crate::output;
-use crate::ranks::{self, Door, Wire};
+use crate::ranks::{self, Connection, Listener};
 use anyhow::Context;
 use kerrlight_tomo::fit::Loss;
 use kerrlight_tomo::fit::parts::{Part, Ranks, combine, nodes, share};
@@ -24,7 +24,7 @@ pub fn open(
     text: &str,
     folder: &Folder,
     is_known: bool,
-) -> anyhow::Result<Option<Door>> {
+) -> anyhow::Result<Option<Listener>> {
     let Some((0, size)) = ranks::this() else { return Ok(None) };
     if !is_divided(file) || !is_known {
         let need = match is_known {
@@ -34,7 +34,7 @@ pub fn open(
         eprintln!("note: rank 0 fits alone; for their share the other {} need {need}", size - 1);
         return Ok(None);
     }
-    Door::open(folder.path(), size, facts(text)).map(Some)
+    Listener::open(folder.path(), size, facts(text)).map(Some)
 }
 
 /// What decides the bits of a fit.
@@ -48,21 +48,21 @@ fn facts(text: &str) -> String {
 }
 
 /// Gives the state to all other ranks when they have come.
-pub fn begin(door: Door, state: &[u8], run: &Path) -> anyhow::Result<Box<dyn Ranks<f32>>> {
+pub fn begin(listener: Listener, state: &[u8], run: &Path) -> anyhow::Result<Box<dyn Ranks<f32>>> {
     let run = run.to_owned();
-    let mut wires = door.gather(|rank| {
+    let mut connections = listener.gather(|rank| {
         let run = run.clone();
         Box::new(move || gone(rank, &run))
     })?;
-    wires.iter_mut().try_for_each(|wire| wire.send(state))?;
-    Ok(Box::new(First { wires, run }))
+    connections.iter_mut().try_for_each(|connection| connection.send(state))?;
+    Ok(Box::new(First { connections, run }))
 }
 
 /// Comes to the first rank as another one, with the same settings.
 pub fn join((run, rank, size): (&Path, u32, u32), text: &str) -> anyhow::Result<Other> {
     // The first rank has said why, or was killed.
     let lost = Box::new(|| std::process::exit(1));
-    Ok(Other { wire: ranks::connect(run, rank, &facts(text), lost)?, rank, size })
+    Ok(Other { connection: ranks::connect(run, rank, &facts(text), lost)?, rank, size })
 }
 
 /// Ends the program for the loss of a rank: steps need all of them, and the last checkpoint has what was found.
@@ -84,13 +84,13 @@ fn fail(what: &str, run: &Path) -> ! {
 
 /// The first rank, which adds up.
 struct First {
-    wires: Vec<Wire>,
+    connections: Vec<Connection>,
     run: PathBuf,
 }
 
 impl First {
     fn size(&self) -> usize {
-        self.wires.len() + 1
+        self.connections.len() + 1
     }
 }
 
@@ -103,9 +103,9 @@ impl Ranks<f32> for First {
         let size = self.size();
         let ranges = (0..size).flat_map(|k| nodes(0..parts, &share(k, size, parts)));
         let mut all = own;
-        for (k, wire) in self.wires.iter_mut().enumerate() {
+        for (k, connection) in self.connections.iter_mut().enumerate() {
             // One that is gone ends the program.
-            let bytes = wire.receive().unwrap_or_default();
+            let bytes = connection.receive().unwrap_or_default();
             match decode(&bytes) {
                 Ok((theirs, found)) if theirs == state => all.extend(found),
                 Ok(_) => fail(
@@ -119,8 +119,8 @@ impl Ranks<f32> for First {
         }
         let sum = combine(0..parts, &mut ranges.zip(all));
         let bytes = encode(state, std::slice::from_ref(&sum));
-        for (k, wire) in self.wires.iter_mut().enumerate() {
-            if wire.send(&bytes).is_err() {
+        for (k, connection) in self.connections.iter_mut().enumerate() {
+            if connection.send(&bytes).is_err() {
                 gone(k as u32 + 1, &self.run);
             }
         }
@@ -130,13 +130,13 @@ impl Ranks<f32> for First {
 
 impl Drop for First {
     fn drop(&mut self) {
-        self.wires.iter_mut().for_each(Wire::end);
+        self.connections.iter_mut().for_each(Connection::end);
     }
 }
 
 /// Any other rank.
 pub struct Other {
-    wire: Wire,
+    connection: Connection,
     rank: u32,
     size: u32,
 }
@@ -144,7 +144,7 @@ pub struct Other {
 impl Other {
     /// The state that all begin with, as bytes, when the first rank has come so far.
     pub fn state(&mut self) -> anyhow::Result<Vec<u8>> {
-        self.wire.receive().context("rank 0 has stopped")
+        self.connection.receive().context("rank 0 has stopped")
     }
 }
 
@@ -155,8 +155,8 @@ impl Ranks<f32> for Other {
 
     fn sum(&mut self, _: usize, state: u32, own: Vec<Part<f32>>) -> Part<f32> {
         // If the first rank does not take it any more, it does not answer either.
-        let _ = self.wire.send(&encode(state, &own));
-        let found = self.wire.receive().map(|bytes| decode(&bytes));
+        let _ = self.connection.send(&encode(state, &own));
+        let found = self.connection.receive().map(|bytes| decode(&bytes));
         match found {
             Some(Ok((_, mut parts))) if parts.len() == 1 => parts.remove(0),
             // It was told to stop, and has said what there is to say.
@@ -167,7 +167,7 @@ impl Ranks<f32> for Other {
 
 impl Drop for Other {
     fn drop(&mut self) {
-        self.wire.end();
+        self.connection.end();
     }
 }
 

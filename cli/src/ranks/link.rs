@@ -1,7 +1,7 @@
 //! Connections of the ranks of one job: from every other rank to the first one, which writes where it listens into a
 //! folder that all of them see.
 
-use super::wire::{self, Lost, Wire};
+use super::connection::{self, Connection, OnLoss};
 use crate::output::Output;
 use anyhow::{Context, bail};
 use serde::{Deserialize, Serialize};
@@ -34,7 +34,7 @@ struct Address {
 }
 
 /// The first rank, to which others come.
-pub struct Door {
+pub struct Listener {
     path: PathBuf,
     size: u32,
     closed: Arc<AtomicBool>,
@@ -42,7 +42,7 @@ pub struct Door {
     thread: Option<JoinHandle<()>>,
 }
 
-impl Door {
+impl Listener {
     /// Listens, and says in the folder where; whoever comes must say `facts`, too.
     pub fn open(folder: &Path, size: u32, facts: String) -> anyhow::Result<Self> {
         // Nobody else needs to reach ranks of one machine.
@@ -62,7 +62,7 @@ impl Door {
             while !stop.load(Ordering::Relaxed) {
                 match listener.accept() {
                     Ok((stream, _)) => {
-                        if let Some(arrival) = greeted(stream, &token, &facts).transpose() {
+                        if let Some(arrival) = admitted(stream, &token, &facts).transpose() {
                             let _ = sender.send(arrival);
                         }
                     }
@@ -78,8 +78,8 @@ impl Door {
     ///
     /// # Errors
     /// If one has not come within a minute, or is of another program.
-    pub fn gather(self, lost: impl Fn(u32) -> Lost) -> anyhow::Result<Vec<Wire>> {
-        let mut all: Vec<Option<Wire>> = (1..self.size).map(|_| None).collect();
+    pub fn gather(self, lost: impl Fn(u32) -> OnLoss) -> anyhow::Result<Vec<Connection>> {
+        let mut all: Vec<Option<Connection>> = (1..self.size).map(|_| None).collect();
         let clock = Instant::now();
         while let Some(missing) = all.iter().position(Option::is_none) {
             let left = PATIENCE.saturating_sub(clock.elapsed());
@@ -90,13 +90,13 @@ impl Door {
             let Some(place) = all.get_mut((rank as usize).wrapping_sub(1)) else {
                 bail!("rank {rank} of {} has come", self.size);
             };
-            *place = Some(Wire::new(stream, lost(rank))?);
+            *place = Some(Connection::new(stream, lost(rank))?);
         }
         Ok(all.into_iter().flatten().collect())
     }
 }
 
-impl Drop for Door {
+impl Drop for Listener {
     fn drop(&mut self) {
         self.closed.store(true, Ordering::Relaxed);
         let _ = self.thread.take().map(JoinHandle::join);
@@ -106,7 +106,7 @@ impl Drop for Door {
 }
 
 /// The rank behind a connection, if it is one of this job's.
-fn greeted(
+fn admitted(
     mut stream: TcpStream,
     token: &str,
     facts: &str,
@@ -118,7 +118,7 @@ fn greeted(
         stream.read_exact(&mut known)?;
         let mut numbers = [0; 8];
         stream.read_exact(&mut numbers)?;
-        let [rank, length] = [0, 4].map(|k| wire::u32_at(&numbers, k));
+        let [rank, length] = [0, 4].map(|k| connection::u32_at(&numbers, k));
         if known != token.as_bytes() || length > 4096 {
             return Err(ErrorKind::InvalidData.into());
         }
@@ -140,11 +140,11 @@ fn greeted(
 ///
 /// # Errors
 /// If it does not within a minute.
-pub fn join(folder: &Path, rank: u32, facts: &str, lost: Lost) -> anyhow::Result<Wire> {
+pub fn join(folder: &Path, rank: u32, facts: &str, lost: OnLoss) -> anyhow::Result<Connection> {
     let (path, clock) = (folder.join(FILE), Instant::now());
     loop {
         if let Some(stream) = reached(&path, rank, facts) {
-            return Wire::new(stream, lost);
+            return Connection::new(stream, lost);
         }
         if clock.elapsed() > PATIENCE {
             bail!(
@@ -192,7 +192,7 @@ fn network_name() -> String {
 mod tests {
     use super::*;
 
-    fn quietly() -> Lost {
+    fn quietly() -> OnLoss {
         Box::new(|| ())
     }
 
@@ -208,23 +208,23 @@ mod tests {
             .map(|rank| {
                 let at = at.clone();
                 std::thread::spawn(move || {
-                    let mut wire = join(&at, rank, "same", quietly()).unwrap();
-                    wire.send(&vec![rank as u8; 3_000_000]).unwrap();
-                    [wire.receive(), wire.receive()]
+                    let mut connection = join(&at, rank, "same", quietly()).unwrap();
+                    connection.send(&vec![rank as u8; 3_000_000]).unwrap();
+                    [connection.receive(), connection.receive()]
                 })
             })
             .into();
         std::thread::sleep(Duration::from_millis(100));
-        let door = Door::open(&at, 3, "same".to_owned()).unwrap();
+        let listener = Listener::open(&at, 3, "same".to_owned()).unwrap();
         let address: Address =
             serde_json::from_slice(&std::fs::read(at.join(FILE)).unwrap()).unwrap();
         let mut stranger = TcpStream::connect(places(&address)[0]).unwrap();
         stranger.write_all(&[7; 64]).unwrap();
-        let mut wires = door.gather(|_| quietly()).unwrap();
-        for (k, wire) in wires.iter_mut().enumerate() {
-            assert_eq!(wire.receive(), Some(vec![k as u8 + 1; 3_000_000]));
-            wire.send(&[k as u8, 9]).unwrap();
-            wire.end();
+        let mut connections = listener.gather(|_| quietly()).unwrap();
+        for (k, connection) in connections.iter_mut().enumerate() {
+            assert_eq!(connection.receive(), Some(vec![k as u8 + 1; 3_000_000]));
+            connection.send(&[k as u8, 9]).unwrap();
+            connection.end();
         }
         let found: Vec<[Option<Vec<u8>>; 2]> =
             others.into_iter().map(|other| other.join().unwrap()).collect();
@@ -236,9 +236,9 @@ mod tests {
     fn exact_ranks_that_work_otherwise_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path().to_owned();
-        let door = Door::open(&at, 2, "Avx2".to_owned()).unwrap();
+        let listener = Listener::open(&at, 2, "Avx2".to_owned()).unwrap();
         let other = std::thread::spawn(move || join(&at, 1, "Avx512", quietly()).is_ok());
-        let error = door.gather(|_| quietly()).err().unwrap().to_string();
+        let error = listener.gather(|_| quietly()).err().unwrap().to_string();
         assert!(error.contains("Avx512") && error.contains("Avx2"), "{error}");
         assert!(other.join().unwrap());
     }
@@ -248,16 +248,16 @@ mod tests {
     fn exact_a_lost_connection_is_noticed() {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path().to_owned();
-        let door = Door::open(&at, 2, String::new()).unwrap();
+        let listener = Listener::open(&at, 2, String::new()).unwrap();
         let other = std::thread::spawn(move || join(&at, 1, "", quietly()).unwrap());
         let (sender, told) = channel();
-        let lost = move |rank| -> Lost {
+        let lost = move |rank| -> OnLoss {
             let sender = sender.clone();
             Box::new(move || sender.send(rank).unwrap())
         };
-        let wires = door.gather(lost).unwrap();
+        let connections = listener.gather(lost).unwrap();
         drop(other.join().unwrap());
         assert_eq!(told.recv_timeout(Duration::from_secs(5)), Ok(1));
-        drop(wires);
+        drop(connections);
     }
 }

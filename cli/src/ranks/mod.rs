@@ -1,14 +1,14 @@
 //! This process among those that `mpirun` or `srun` has started together.
 
+mod connection;
 mod link;
 mod silence;
 mod team;
-mod wire;
 
-pub use link::{Door, join as connect};
+pub use connection::Connection;
+pub use link::{Listener, join as connect};
 pub use silence::{Silence, hush};
 pub use team::{Lead, Team, named};
-pub use wire::Wire;
 
 use std::process::Command;
 

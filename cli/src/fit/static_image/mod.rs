@@ -1,5 +1,5 @@
-//! The run of a static image: no steps to go on from, so that a run that was stopped begins again and comes to the same
-//! bytes.
+//! The run of a static image. It takes seconds and keeps no intermediate state: a stopped run starts over and ends in the
+//! same bytes.
 
 mod numbers;
 mod page;
@@ -26,7 +26,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 const STOPPED: &str =
-    "stopped: nothing is kept of a static image; `kerrlight fit --resume` begins it again";
+    "stopped: a static image keeps no intermediate state; `kerrlight fit --resume` starts over";
 
 /// Settings and data.
 pub struct Prepared {

@@ -137,14 +137,18 @@ mod tests {
     use super::*;
     use crate::fit::world::{Parameter, Prior};
 
+    fn free() -> [Free; 2] {
+        let spin = Prior::Uniform { low: -0.9, high: 0.9 };
+        let inclination = Prior::Uniform { low: 0.0, high: 3.0 };
+        [
+            Free { parameter: Parameter::Spin, prior: spin },
+            Free { parameter: Parameter::Inclination, prior: inclination },
+        ]
+    }
+
     #[test]
     fn exact_covariance_of_a_paraboloid() {
-        let prior = Prior::Uniform { low: -0.9, high: 0.9 };
-        let turn = Prior::Uniform { low: 0.0, high: 3.0 };
-        let free = [
-            Free { parameter: Parameter::Spin, prior },
-            Free { parameter: Parameter::Inclination, prior: turn },
-        ];
+        let free = free();
         let center = World::new(0.31, 1.02, 2.0);
         // Inverse covariance.
         let (a, b, c) = (1.0 / 0.0025, 300.0, 1.0 / 0.0009);
@@ -174,12 +178,7 @@ mod tests {
     /// Values that do not depend on the spin.
     #[test]
     fn exact_what_is_not_seen_leaves_the_errors_of_the_rest() {
-        let prior = Prior::Uniform { low: -0.9, high: 0.9 };
-        let turn = Prior::Uniform { low: 0.0, high: 3.0 };
-        let free = [
-            Free { parameter: Parameter::Spin, prior },
-            Free { parameter: Parameter::Inclination, prior: turn },
-        ];
+        let free = free();
         let sample = |k: usize| {
             let (angle, r) = (2.4 * k as f64, 0.1 * ((k + 1) as f64 / 60.0).sqrt());
             let world = World::new(0.31 + 4.0 * r * angle.cos(), 1.02 + r * angle.sin(), 2.0);

@@ -10,17 +10,17 @@ use std::sync::mpsc::{Receiver, channel};
 const END: u64 = u64::MAX;
 
 /// What is done when a connection ends without a word, by the thread that reads.
-pub type Lost = Box<dyn FnOnce() + Send>;
+pub type OnLoss = Box<dyn FnOnce() + Send>;
 
 /// A connection.
-pub struct Wire {
+pub struct Connection {
     stream: TcpStream,
     inbox: Receiver<Vec<u8>>,
 }
 
-impl Wire {
+impl Connection {
     /// Of a stream.
-    pub fn new(stream: TcpStream, lost: Lost) -> anyhow::Result<Self> {
+    pub fn new(stream: TcpStream, lost: OnLoss) -> anyhow::Result<Self> {
         // A message is written at once: nothing comes that it could wait for.
         stream.set_nodelay(true).context("cannot talk to another rank")?;
         probe(&stream).context("cannot talk to another rank")?;
@@ -67,9 +67,9 @@ impl Wire {
     }
 }
 
-impl Drop for Wire {
+impl Drop for Connection {
     fn drop(&mut self) {
-        // Not the reader's side: what the other one says at last would come to a closed door.
+        // Not the reader's side: what the other one says at last would come to a closed listener.
         let _ = self.stream.shutdown(Shutdown::Write);
     }
 }
