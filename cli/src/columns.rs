@@ -3,7 +3,8 @@
 use anyhow::Context;
 use npyz::WriterBuilder;
 use serde_json::json;
-use std::io::{Cursor, Write};
+use std::fmt::Write;
+use std::io::{Cursor, Write as _};
 
 /// A named column of a table.
 #[derive(Debug, Clone)]
@@ -19,11 +20,6 @@ pub enum Column {
     Blocks(String, Vec<Vec<f64>>),
 }
 
-/// 17 significant digits: every double has its own. Nothing where there is none.
-fn digits(x: f64) -> String {
-    if x.is_nan() { String::new() } else { format!("{x:.16e}") }
-}
-
 impl Column {
     /// Its name, without the numbers of a block.
     pub fn name(&self) -> &str {
@@ -35,42 +31,63 @@ impl Column {
         }
     }
 
-    fn names(&self) -> Vec<String> {
+    /// Columns of the table that it takes.
+    fn width(&self) -> usize {
         match self {
-            Column::Numbers(name, _) | Column::Counts(name, _) | Column::Words(name, _) => {
-                vec![name.clone()]
-            }
-            Column::Blocks(name, rows) => {
-                let width = rows.first().map_or(0, Vec::len);
-                (1..=width).map(|k| format!("{name}_{k}")).collect()
-            }
+            Column::Blocks(_, rows) => rows.first().map_or(0, Vec::len),
+            _ => 1,
         }
     }
 
-    fn cells(&self, row: usize) -> Vec<String> {
+    /// Heading of its k-th column.
+    fn heading(&self, k: usize) -> String {
         match self {
-            Column::Numbers(_, values) => vec![digits(values[row])],
-            Column::Counts(_, counts) => vec![counts[row].to_string()],
-            Column::Words(_, words) => vec![words[row].clone()],
-            Column::Blocks(_, rows) => rows[row].iter().map(|x| digits(*x)).collect(),
+            Column::Blocks(name, _) => format!("{name}_{}", k + 1),
+            _ => self.name().to_owned(),
+        }
+    }
+
+    /// The cell of a row in its k-th column.
+    fn write_cell(&self, row: usize, k: usize, to: &mut String) {
+        to.clear();
+        match self {
+            Column::Numbers(_, values) => write_digits(values[row], to),
+            Column::Blocks(_, rows) => write_digits(rows[row][k], to),
+            // Writing to a string cannot fail.
+            Column::Counts(_, counts) => _ = write!(to, "{}", counts[row]),
+            Column::Words(_, words) => to.push_str(&words[row]),
         }
     }
 }
 
-/// The bytes of a CSV table of `rows` rows. Blocks of the same prefix are interleaved:
+/// 17 significant digits: every double has its own. Nothing where there is none.
+fn write_digits(x: f64, to: &mut String) {
+    if !x.is_nan() {
+        // Writing to a string cannot fail.
+        _ = write!(to, "{x:.16e}");
+    }
+}
+
+/// The bytes of a CSV table of `rows` rows. Blocks of the same group are interleaved:
 /// a_1, b_1, a_2, b_2, …
 pub fn csv(groups: &[Vec<Column>], rows: usize) -> anyhow::Result<Vec<u8>> {
+    let mut order = Vec::new();
+    for group in groups {
+        let most = group.iter().map(Column::width).max().unwrap_or(0);
+        for k in 0..most {
+            order
+                .extend(group.iter().filter(|column| k < column.width()).map(|column| (column, k)));
+        }
+    }
     let mut writer = csv::Writer::from_writer(Vec::new());
-    let interleave = |cells: Vec<Vec<String>>| -> Vec<String> {
-        let most = cells.iter().map(Vec::len).max().unwrap_or(0);
-        (0..most).flat_map(|k| cells.iter().filter_map(move |c| c.get(k).cloned())).collect()
-    };
-    let header = groups.iter().flat_map(|g| interleave(g.iter().map(Column::names).collect()));
-    writer.write_record(header)?;
+    writer.write_record(order.iter().map(|(column, k)| column.heading(*k)))?;
+    let mut cell = String::new();
     for row in 0..rows {
-        let cells =
-            groups.iter().flat_map(|g| interleave(g.iter().map(|c| c.cells(row)).collect()));
-        writer.write_record(cells)?;
+        for (column, k) in &order {
+            column.write_cell(row, *k, &mut cell);
+            writer.write_field(&cell)?;
+        }
+        writer.write_record(None::<&[u8]>)?;
     }
     writer.into_inner().map_err(|e| e.into_error().into())
 }

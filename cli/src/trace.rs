@@ -364,8 +364,8 @@ impl Table {
         let columns = [need("spin")?, inclination, need("alpha")?, need("beta")?];
         let mut rays = Vec::new();
         let mut counter = LineCounter { bytes, at: 0, line: 1 };
-        for record in reader.records() {
-            let record = record?;
+        let mut record = csv::StringRecord::new();
+        while reader.read_record(&mut record)? {
             let line = counter.line_of(&record);
             if record.len() != header.len() {
                 bail!("line {line}: {} fields, but {} in the header", record.len(), header.len());

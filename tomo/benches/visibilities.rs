@@ -79,7 +79,7 @@ fn single(criterion: &mut Criterion, pixels: usize, visibilities: usize) {
     run("direct, kept", &Dtft::<f64>::new(grid, Pulse::Triangle, &uv, usize::MAX));
     run("direct", &Dtft::<f64>::new(grid, Pulse::Triangle, &uv, 0));
     for accuracy in [1e-6, 1e-10] {
-        let fast = Nufft::<f64>::new(grid, Pulse::Triangle, &uv, accuracy).expect("an accuracy");
+        let fast = Nufft::new(grid, Pulse::Triangle, &uv, accuracy).expect("an accuracy");
         run(&format!("fast, {accuracy:e}"), &fast);
     }
 }

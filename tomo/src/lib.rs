@@ -21,6 +21,7 @@ pub mod render;
 pub mod representation;
 pub mod scene;
 mod simd;
+pub mod toml_file;
 pub mod transport;
 pub mod units;
 pub mod volume;

@@ -2,6 +2,7 @@
 
 use super::labels::{ONE_CHI2, RESULTS};
 use anyhow::{Context, bail};
+use kerrlight_tomo::toml_file;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -189,7 +190,7 @@ pub enum FigureKind {
 impl Experiment {
     /// Reads and checks.
     pub fn parse(text: &str) -> anyhow::Result<Self> {
-        let experiment: Self = toml::from_str(text)?;
+        let experiment: Self = toml_file::read(text)?;
         experiment.check()?;
         Ok(experiment)
     }

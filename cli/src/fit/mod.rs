@@ -272,7 +272,7 @@ fn parse(text: &str) -> anyhow::Result<FitFile> {
         bail!("there is a table [image]: a static image has no volume, and this needs one");
     }
     FitFile::parse(text).map_err(|error| match error {
-        Error::Fit(FitError::Syntax(text)) => init::explained(&text),
+        Error::Fit(FitError::Syntax(error)) => init::explained(&error.to_string()),
         other => other.into(),
     })
 }

@@ -5,6 +5,7 @@ use super::train::{Progress, State};
 use crate::Error;
 use crate::dynamics::Axis;
 use crate::optimise::{AdamState, LbfgsState};
+use crate::toml_file;
 use safetensors::tensor::{Dtype, SafeTensorError, TensorView};
 use safetensors::{SafeTensors, serialize};
 use serde::{Deserialize, Serialize};
@@ -74,7 +75,7 @@ pub fn encode(state: &State<f32>, settings: &str) -> Result<Vec<u8>, Error> {
         settings: settings.to_owned(),
     };
     let text =
-        toml::to_string(&header).map_err(|error| CheckpointError::Header(error.to_string()))?;
+        toml_file::write(&header).map_err(|error| CheckpointError::Header(error.to_string()))?;
     let mut tensors = vec![(CHECKSUM.to_owned(), Dtype::U32, vec![0; 4])];
     push("now", &state.now, &mut tensors);
     if let Some(good) = &state.good {
@@ -171,7 +172,7 @@ pub fn header(bytes: &[u8]) -> Result<Header, Error> {
     let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(CheckpointError::from)?;
     let missing = || CheckpointError::Header("its header is missing".to_owned());
     let text = metadata.metadata().as_ref().and_then(|map| map.get(KEY)).ok_or_else(missing)?;
-    Ok(toml::from_str(text).map_err(|error| CheckpointError::Header(error.to_string()))?)
+    Ok(toml_file::read(text).map_err(|error| CheckpointError::Header(error.to_string()))?)
 }
 
 /// The state of a checkpoint, for a fit that would start as `start`.

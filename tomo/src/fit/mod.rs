@@ -67,6 +67,7 @@ mod terms;
 #[cfg(test)]
 mod tests;
 mod train;
+mod trainer;
 pub mod verdict;
 pub mod world;
 

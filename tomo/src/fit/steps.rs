@@ -31,12 +31,7 @@ pub struct Place<'a, T> {
 }
 
 impl<T: Float> Trainer<'_, T> {
-    /// One step. It depends on the state and the settings alone: not on threads, and not on what
-    /// this trainer did before.
-    ///
-    /// # Errors
-    /// If the loss keeps diverging.
-    pub fn step(&mut self, state: &mut State<T>) -> Result<Outcome, Error> {
+    pub(super) fn advance(&mut self, state: &mut State<T>) -> Result<Outcome, Error> {
         let now = &mut state.now;
         self.refresh(now);
         if let Some(rule) = self.training.lbfgs {

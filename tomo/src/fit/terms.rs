@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::interferometry::data_terms::{DataTerm, Residual};
-use crate::interferometry::operator::{FourierNumber, Operator, Transform};
+use crate::interferometry::operator::{Operator, Transform};
 use crate::simd::Float;
 use num_complex::Complex;
 
@@ -194,7 +194,7 @@ impl<T: Float> FrameTerm<T> for LightCurveTerm {
 }
 
 /// What an array of telescopes measures of a frame.
-pub struct Scan<T: FourierNumber> {
+pub struct Scan<T> {
     /// From the frame to its visibilities.
     pub transform: Transform<T>,
     /// From visibilities to χ².
@@ -202,14 +202,14 @@ pub struct Scan<T: FourierNumber> {
 }
 
 /// Visibilities, or what is made of them, of the frames that were observed.
-pub struct ScanTerm<T: FourierNumber> {
+pub struct ScanTerm<T> {
     name: String,
     pixels: usize,
     quadratic: bool,
     scans: Vec<Option<Scan<T>>>,
 }
 
-impl<T: Float + FourierNumber> ScanTerm<T> {
+impl<T: Float> ScanTerm<T> {
     /// Of a scan a frame. `quadratic`: whether χ² is so in the visibilities.
     ///
     /// # Panics
@@ -223,7 +223,7 @@ impl<T: Float + FourierNumber> ScanTerm<T> {
     }
 }
 
-impl<T: Float + FourierNumber> FrameTerm<T> for ScanTerm<T> {
+impl<T: Float> FrameTerm<T> for ScanTerm<T> {
     fn name(&self) -> &str {
         &self.name
     }

@@ -1,14 +1,13 @@
 //! How a fit is run, and what it remembers from step to step.
 
+use super::is_turned;
 use super::objective::{Buffers, Loss, Objective};
 use super::occupancy::{Occupancy, OccupancySettings};
 use super::parts::Ranks;
 use super::penalties::{Penalties, ProbeBuffers};
 use super::sightlines::Region;
-use super::{Field, Motion, is_turned};
 use crate::dynamics::Axis;
 use crate::optimise::{Adam, AdamState, Lbfgs, LbfgsState, Polynomial};
-use crate::points::Coordinates;
 use crate::representation::Representation;
 use crate::simd::Float;
 use serde::{Deserialize, Serialize};
@@ -210,45 +209,5 @@ impl<'a, T: Float> Trainer<'a, T> {
             frames: Vec::new(),
             spare: Vec::new(),
         }
-    }
-
-    /// The movie of these frames, with the mask of what shines or without.
-    pub fn movie(&mut self, now: &Progress<T>, frames: &[usize], masked: bool) -> Vec<T> {
-        self.objective.model.weigh(now.axis);
-        let mut movie = vec![T::zero(); frames.len() * self.objective.model.pixels()];
-        let field = Field {
-            representation: self.representation,
-            parameters: &now.parameters,
-            axis: now.axis,
-            occupancy: now.occupancy.as_ref().filter(|_| masked),
-        };
-        self.objective.movie(field, frames, &mut self.buffers, &mut movie);
-        movie
-    }
-
-    /// Emission at points at the reference time.
-    pub fn emission(&mut self, now: &Progress<T>, points: [&[T]; 3]) -> Vec<T> {
-        self.buffers.emission(self.representation, &now.parameters, points)
-    }
-
-    /// Emission at points (M) at another time, M since the reference time; `motion` is that of the forward model.
-    pub fn emission_at(
-        &mut self,
-        now: &Progress<T>,
-        motion: &Motion,
-        time: f64,
-        points: [&[T]; 3],
-    ) -> Vec<T> {
-        let (x, y, z) = (points[0], points[1], points[2]);
-        let matter = motion.matter(now.axis, time, points);
-        let times = vec![T::of(time); x.len()];
-        let at = match self.representation.dimension() {
-            4 => Coordinates::txyz(&times, x, y, z),
-            _ => Coordinates::xyz(&matter[0], &matter[1], &matter[2]),
-        };
-        let mut values = vec![T::zero(); x.len()];
-        let workspace = self.buffers.workspace();
-        self.representation.eval(&now.parameters, at, &mut values, workspace);
-        values
     }
 }

@@ -1,6 +1,7 @@
 //! Errors in a scene text that point at the line, and the simplest ranges.
 
 use crate::Error;
+use crate::toml_file::ReadError;
 use toml_edit::{Document, Item};
 
 /// Why a scene text is not a scene.
@@ -8,8 +9,8 @@ use toml_edit::{Document, Item};
 #[non_exhaustive]
 pub enum SceneError {
     /// Not TOML, an unknown or missing key, or a wrong type.
-    #[error("{0}")]
-    Syntax(String),
+    #[error(transparent)]
+    Syntax(#[from] ReadError),
     /// A value out of its range.
     #[error("{}`{key}` = {value} is not allowed: {allowed}", line_prefix(*.line))]
     Range {
@@ -39,38 +40,14 @@ fn line_prefix(line: Option<usize>) -> String {
     line.map(|line| format!("line {line}: ")).unwrap_or_default()
 }
 
-/// Rust's types, of which the parser speaks, and what a value of each has to be.
-const TYPES: [(&str, &str); 9] = [
-    ("f64", "a number"),
-    ("f32", "a number"),
-    ("usize", "a whole number, 0 or more"),
-    ("u64", "a whole number, 0 or more"),
-    ("u32", "a whole number, 0 to 4294967295"),
-    ("u16", "a whole number, 0 to 65535"),
-    ("u8", "a whole number, 0 to 255"),
-    ("i64", "a whole number"),
-    ("i32", "a whole number, -2147483648 to 2147483647"),
-];
-
-/// The parser's message in the user's words.
-pub(crate) fn syntax(error: &toml::de::Error) -> String {
-    let plain = |text: String, (name, meaning): &(&str, &str)| {
-        text.replace(&format!("expected {name}"), &format!("expected {meaning}"))
-    };
-    TYPES.iter().fold(error.to_string().trim_end().to_owned(), plain)
-}
-
 impl SceneError {
-    pub(super) fn syntax(error: &toml::de::Error) -> Self {
-        SceneError::Syntax(syntax(error))
-    }
-
     /// The same without a line: that of a text which the user never saw.
     pub fn without_line(self) -> Self {
         match self {
             SceneError::Range { key, value, allowed, .. } => {
                 SceneError::Range { line: None, key, value, allowed }
             }
+            SceneError::Syntax(error) => SceneError::Syntax(error.without_line()),
             other => other,
         }
     }

@@ -15,7 +15,6 @@ mod sources;
 
 pub use crate::dynamics::{Perturbed, Velocity};
 pub use camera::{CameraConfig, CameraKey, CameraMotion, Pose};
-pub(crate) use invalid::syntax;
 pub use invalid::{SceneError, line_of, shown};
 pub use overrides::apply_override;
 pub use rotation::Rotation;
@@ -26,6 +25,7 @@ pub use sources::{
 
 use crate::Error;
 use crate::polarization::MagneticField;
+use crate::toml_file;
 pub use kerrlight_geodesic::Integrator;
 use kerrlight_geodesic::{Kerr, orbits};
 use serde::{Deserialize, Serialize};
@@ -325,7 +325,7 @@ impl Scene {
     /// On syntax, unknown or missing keys, wrong types and values out of range: with the
     /// line, the key and what is allowed.
     pub fn parse(text: &str) -> Result<Self, Error> {
-        let scene: Scene = toml::from_str(text).map_err(|e| SceneError::syntax(&e))?;
+        let scene: Scene = toml_file::read(text).map_err(SceneError::Syntax)?;
         check::check(&scene).map_err(|invalid| invalid.locate(text))?;
         Ok(scene)
     }
@@ -346,7 +346,7 @@ impl Scene {
             disc.inner_edge.get_or_insert_with(|| orbits::isco(&hole));
         }
         scene.screen.height = Some(scene.screen.rows());
-        toml::to_string(&scene).expect("plain tables always serialise") // no maps with odd keys
+        toml_file::write(&scene).expect("plain tables always serialise") // no maps with odd keys
     }
 
     /// Whether what shines changes with time.

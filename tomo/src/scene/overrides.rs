@@ -3,6 +3,7 @@
 
 use super::SceneError;
 use crate::Error;
+use crate::toml_file::ReadError;
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, Value};
 
 /// The scene text with `key.path=value` applied, e.g. `hole.spin=0.5`,
@@ -22,8 +23,9 @@ pub fn apply_override(text: &str, assignment: &str) -> Result<String, Error> {
     if keys.iter().any(|key| key.is_empty()) {
         return Err(fail("has an empty key".to_owned()).into());
     }
-    let mut document: DocumentMut =
-        text.parse().map_err(|e: toml_edit::TomlError| SceneError::Syntax(e.to_string()))?;
+    let mut document: DocumentMut = text
+        .parse()
+        .map_err(|e: toml_edit::TomlError| SceneError::Syntax(ReadError::syntax(&e)))?;
     assign(document.as_table_mut(), &keys, value.trim()).map_err(fail)?;
     Ok(document.to_string())
 }

@@ -2,7 +2,6 @@
 
 mod fields;
 pub mod gains;
-mod lensed;
 mod light_curve;
 mod numbers;
 mod over_time;
@@ -20,12 +19,11 @@ use super::folder::Folder;
 use crate::checksum::sealed;
 use gains::Gains;
 use kerrlight_tomo::fit::settings::FitFile;
-use kerrlight_tomo::fit::setup::{self, Instrument, Measured};
+use kerrlight_tomo::fit::setup::{self, Instrument, Measured, Still, StillView};
 use kerrlight_tomo::fit::{Loss, Motion, State, Trainer};
 use kerrlight_tomo::interferometry::files::images;
 use kerrlight_tomo::units::MICROARCSECOND;
 use kerrlight_tomo::volume::{Volume, VolumeFile, vti};
-use lensed::Still;
 use over_time::Changes;
 use serde_json::Value;
 use std::time::Instant;
@@ -69,7 +67,7 @@ impl Estimate<'_> {
             self.folder.file("emission.csv")?.write(changes.table().as_bytes())?;
         }
         self.scene(trainer, state, &movie)?;
-        let still = self.still(trainer, state)?;
+        let still = self.still_view().at(self.time_of_still(), trainer, state)?;
         let objective = &trainer.objective;
         let compared = (objective.names(), objective.statistics(&seen));
         let judged = self.evidence().judged(compared, &seen)?;
@@ -120,6 +118,21 @@ impl Estimate<'_> {
             lists.push(("field_uas", vec![sky.pixel_rad / MICROARCSECOND * n as f64]));
         }
         self.folder.file("movie.npz")?.write(&images::movie_archive(shape, &arrays, &lists))
+    }
+}
+
+impl Estimate<'_> {
+    fn still_view(&self) -> StillView<'_> {
+        let Self { file, instrument, motion, measured, .. } = *self;
+        StillView { file, instrument, motion, truth: measured.truth.as_ref() }
+    }
+
+    /// When the still image is seen, M: at the reference time, or in the middle of the data if that lies outside of them.
+    fn time_of_still(&self) -> f64 {
+        let (times, reference) = (&self.measured.times, self.motion.reference);
+        let within = times.first().is_some_and(|first| reference >= *first)
+            && times.last().is_some_and(|last| reference <= *last);
+        if within { reference } else { times[times.len() / 2] }
     }
 }
 

@@ -1,7 +1,6 @@
 //! The report.
 
 use super::gains::Gains;
-use super::lensed::Still;
 use super::numbers::outcomes;
 use super::over_time::Changes;
 use super::{Estimate, Found};
@@ -11,6 +10,8 @@ use crate::output;
 use crate::report::{self, LinePlot, Report, View3d};
 use anyhow::Context;
 use kerrlight_tomo::fit::settings::AxisSearch;
+use kerrlight_tomo::fit::setup::Still;
+use kerrlight_tomo::toml_file;
 use kerrlight_tomo::volume::Shown;
 use kerrlight_tomo::volume::projection::Surroundings;
 use kerrlight_tomo::volume::slices::Through;
@@ -207,7 +208,7 @@ impl Estimate<'_> {
 
 /// Every setting with its unit.
 pub fn settings(file: &impl serde::Serialize) -> anyhow::Result<Vec<report::Setting>> {
-    let table = toml::Table::try_from(file).context("settings")?;
+    let table = toml_file::table_of(file).context("settings")?;
     let mut all = Vec::new();
     flatten("", &toml::Value::Table(table), &mut all);
     Ok(all)

@@ -5,6 +5,7 @@ use anyhow::Context;
 use kerrlight_tomo::fit::{Sampling, setup};
 use kerrlight_tomo::fit::{State, Trainer};
 use kerrlight_tomo::scene::{Scene, VolumeRegion};
+use kerrlight_tomo::toml_file;
 use kerrlight_tomo::volume::VolumeFile;
 
 /// The scene, and the volume that it names.
@@ -132,10 +133,10 @@ impl Estimate<'_> {
     fn volume(&self, state: &State<f32>) -> anyhow::Result<String> {
         let (motion, region) = (&self.file.motion, &self.file.region);
         let law = motion.velocity.clone().seeded(self.file.seed).dragged(setup::drag(self.file)?);
-        let law = toml::Value::try_from(&law).context("motion.velocity")?;
+        let law = toml_file::inline(&law).context("motion.velocity")?;
         let region =
             VolumeRegion { r_min: region.r_min, r_max: region.r_max, z_width: region.z_width };
-        let region = toml::Value::try_from(region).context("region")?;
+        let region = toml_file::inline(&region).context("region")?;
         let mut text = format!(
             "[[volume]]\npath = \"{VOLUME}\"\nfactor = {:?}              # Jy in a pixel of the fit for 1 M of emission 1\naxis = {:?}\nrotation = {law}\nreference_time = {:?}\n",
             self.file.screen.jy_per_pixel,

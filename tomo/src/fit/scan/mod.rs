@@ -197,7 +197,15 @@ impl<T: Float + Default> Scanner<'_, T> {
 ///
 /// # Errors
 /// If a number is out of its range, data do not fit the rays, a χ² is not finite, or all axes have the same loss.
-pub fn scan_axis<T: Float + Default>(
+pub fn scan_axis(
+    problem: &AxisProblem<'_, f32>,
+    settings: &AxisSettings,
+    watch: &ScanWatch<'_>,
+) -> Result<Option<AxisScan>, Error> {
+    search(problem, settings, watch)
+}
+
+fn search<T: Float + Default>(
     problem: &AxisProblem<'_, T>,
     settings: &AxisSettings,
     watch: &ScanWatch<'_>,
@@ -251,8 +259,8 @@ fn told_apart(map: &[AxisLoss]) -> Result<(), Error> {
 ///
 /// # Errors
 /// If a number is out of its range, or data do not fit the rays.
-pub fn refine_axis<T: Float + Default>(
-    problem: &AxisProblem<'_, T>,
+pub fn refine_axis(
+    problem: &AxisProblem<'_, f32>,
     from: Axis,
     step: f64,
     (effort, halvings): (Effort, usize),

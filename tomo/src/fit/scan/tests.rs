@@ -29,7 +29,7 @@ fn scan_of(
         flux: None,
         priors: &[],
     };
-    scan_axis(&problem, settings, &|_, _| true)
+    search(&problem, settings, &|_, _| true)
 }
 
 const SMALL: AxisSettings = AxisSettings {
@@ -93,7 +93,7 @@ fn exact_axis_of_its_own_movie_on_any_number_of_threads() {
     };
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| scan_axis(&problem, &settings, &|_, _| true)).unwrap().unwrap()
+        pool.install(|| search(&problem, &settings, &|_, _| true)).unwrap().unwrap()
     };
     let scan = run(1);
     assert_eq!(scan, run(4));
@@ -101,8 +101,8 @@ fn exact_axis_of_its_own_movie_on_any_number_of_threads() {
     assert!(scan.best.axis.dot(truth) > 0.99, "{:?}", scan.best);
     assert!(scan.runner_up.axis.dot(scan.best.axis) < 0.0);
     assert!(scan.best.loss < scan.runner_up.loss);
-    assert_eq!(scan_axis(&problem, &settings, &|_, _| false).unwrap(), None);
+    assert_eq!(search(&problem, &settings, &|_, _| false).unwrap(), None);
     let none = AxisSettings { directions: 2, ..settings };
-    let text = scan_axis(&problem, &none, &|_, _| true).unwrap_err().to_string();
+    let text = search(&problem, &none, &|_, _| true).unwrap_err().to_string();
     assert!(text.contains("directions = 2 "), "{text}");
 }

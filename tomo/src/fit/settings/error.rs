@@ -3,14 +3,15 @@
 use crate::error::{Error, Parts};
 use crate::memory::TooLarge;
 use crate::scene::line_of;
+use crate::toml_file::ReadError;
 
 /// Why settings are not those of a fit.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FitError {
     /// Not TOML, an unknown or missing key, or a wrong type.
-    #[error("{0}")]
-    Syntax(String),
+    #[error(transparent)]
+    Syntax(#[from] ReadError),
     /// A value out of its range.
     #[error("{}{key} = {value} is not allowed: {allowed}", line_prefix(*.line))]
     Range {

@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     fn settings(text: &str) -> GainSettings {
-        toml::from_str(text).unwrap()
+        crate::toml_file::read(text).unwrap()
     }
 
     #[test]

@@ -43,7 +43,7 @@ pub use world::merge;
 
 use crate::Error;
 use crate::polarization::PolarizationLaw;
-use crate::scene::syntax;
+use crate::toml_file;
 use serde::{Deserialize, Serialize};
 
 /// The settings of a fit. Lengths and times in M = GM/c² unless a name says otherwise.
@@ -137,7 +137,7 @@ impl FitFile {
     /// assert!(error.to_string().contains("missing field `hole`"));
     /// ```
     pub fn parse(text: &str) -> Result<Self, Error> {
-        let file = toml::from_str(text).map_err(|error| FitError::Syntax(syntax(&error)))?;
+        let file = toml_file::read(text).map_err(FitError::Syntax)?;
         ranges::check(text)?;
         Ok(file)
     }

@@ -2,6 +2,7 @@
 
 use super::FitError;
 use crate::scene::shown;
+use crate::toml_file;
 use toml::Value;
 
 /// Key (`*` stands for the number of a list's element, `?` for any name), least and largest value, unit.
@@ -164,7 +165,7 @@ const OWN: &str = "representation.own";
 
 /// Refuses the first number of a fit's text that is out of its range, or not a number at all.
 pub fn check(text: &str) -> Result<(), FitError> {
-    let table: toml::Table = toml::from_str(text)?;
+    let table: toml::Table = toml_file::read(text)?;
     walk(&Value::Table(table), &mut String::new()).map_err(|error| error.located(text))
 }
 

@@ -7,7 +7,7 @@ use super::{ranges, refuse};
 use crate::Error;
 use crate::fit::linear::Prior;
 use crate::interferometry::operator::ImageGrid;
-use crate::scene::syntax;
+use crate::toml_file;
 use crate::units::MICROARCSECOND;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -196,7 +196,7 @@ impl StaticImageFile {
     /// assert!(error.to_string().contains("missing field `image`"));
     /// ```
     pub fn parse(text: &str) -> Result<Self, Error> {
-        let file: Self = toml::from_str(text).map_err(|error| FitError::Syntax(syntax(&error)))?;
+        let file: Self = toml_file::read(text).map_err(FitError::Syntax)?;
         ranges::check(text)?;
         file.check()?;
         Ok(file)

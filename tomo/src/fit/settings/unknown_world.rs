@@ -5,6 +5,7 @@ use super::{FitError, FitFile, Within};
 use crate::Error;
 use crate::dynamics::Velocity;
 use crate::fit::world::{Free, Parameter, Prior, Scanned};
+use crate::toml_file;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
@@ -289,7 +290,7 @@ impl FitFile {
         if table.is_empty() {
             return Ok(None);
         }
-        let world: UnknownWorld = table.try_into().within("world")?;
+        let world: UnknownWorld = toml_file::read_table(&table).within("world")?;
         world.check()?;
         let is_free = |parameter: &Parameter| world.prior(*parameter).is_some();
         let flow = Parameter::FLOW.into_iter().find(is_free);

@@ -1,6 +1,7 @@
 //! Settings that take the place of others.
 
 use super::{FitError, FitFile, Within};
+use crate::toml_file;
 use toml::{Table, Value};
 
 /// Tables that say which of several things they are by their only key: another key takes their place.
@@ -39,13 +40,13 @@ impl FitFile {
     /// If `world` has a key that is no part of what is simulated, or is no setting at all.
     pub fn simulated(&self) -> Result<Self, FitError> {
         let unknown = self.unknown_world()?;
-        let mut table = Table::try_from(self).within("settings")?;
+        let mut table = toml_file::table_of(self).within("settings")?;
         let simulated = |(key, value): (&String, &Value)| {
             SIMULATED.contains(&key.as_str()).then(|| (key.clone(), value.clone()))
         };
         merge(&mut table, &self.world.iter().filter_map(simulated).collect());
         table.remove("world");
-        let mut file: Self = table.try_into().within("world")?;
+        let mut file: Self = toml_file::read_table(&table).within("world")?;
         if let Some(unknown) = unknown.filter(|unknown| unknown.drawn) {
             unknown.draw(&mut file)?;
         }
@@ -75,7 +76,7 @@ mod tests {
     #[test]
     fn exact_a_world_changes_what_is_simulated() {
         let mut file: FitFile =
-            toml::from_str(include_str!("../../../../cli/src/fit/built_in.toml")).unwrap();
+            toml_file::read(include_str!("../../../../cli/src/fit/built_in.toml")).unwrap();
         assert_eq!(file.simulated().unwrap(), file);
         file.world = table("[hole]\nspin = 0.9\n[effects]\nslow_light = false");
         let world = file.simulated().unwrap();

@@ -10,7 +10,7 @@ use crate::interferometry::data_terms::{
     AmplitudeTerm, ClosureTerm, DataTerm, DataTermError, GainTerm, VisibilityTerm,
 };
 use crate::interferometry::observation::Observation;
-use crate::interferometry::operator::{Float, FourierNumber, Method, Pulse, Transform};
+use crate::interferometry::operator::{Float, Method, Pulse, Transform};
 use crate::interferometry::products::ClosureKind;
 
 impl Measured {
@@ -90,7 +90,7 @@ impl Measured {
     }
 
     /// The visibilities of all frames, or what is made of them, in any precision.
-    fn scans<T: Float + FourierNumber>(&self, loss: &Loss, pixels: usize) -> Result<ScanTerm<T>> {
+    fn scans<T: Float>(&self, loss: &Loss, pixels: usize) -> Result<ScanTerm<T>> {
         let (name, quadratic) = match loss.data {
             LossKind::Visibilities => ("visibilities", self.gains.is_none()),
             LossKind::Amplitudes => ("amplitudes", false),
@@ -109,7 +109,7 @@ impl Measured {
     ///
     /// # Errors
     /// If one has no data.
-    pub fn visibility_terms<T: Float + FourierNumber>(
+    pub fn visibility_terms<T: Float>(
         &self,
         losses: &[Loss],
         pixels: usize,
@@ -121,7 +121,7 @@ impl Measured {
         losses.iter().enumerate().map(one).collect()
     }
 
-    fn scan<T: Float + FourierNumber>(&self, frame: usize, loss: &Loss) -> Result<Option<Scan<T>>> {
+    fn scan<T: Float>(&self, frame: usize, loss: &Loss) -> Result<Option<Scan<T>>> {
         let missing = || {
             FitError::Conflict(format!(
                 "there are no visibilities: give {FILE}, or a truth and an [observation] of it (`kerrlight fit --init` \
@@ -145,11 +145,7 @@ impl Measured {
 
 impl Measured {
     /// The data of a scan that a loss compares; none where closure quantities have too few baselines.
-    fn scan_data<T: Float + FourierNumber>(
-        &self,
-        loss: &Loss,
-        part: &Observation,
-    ) -> Result<Option<ScanData<T>>> {
+    fn scan_data<T: Float>(&self, loss: &Loss, part: &Observation) -> Result<Option<ScanData<T>>> {
         let least = loss.least_snr.unwrap_or(0.0);
         let kind = match (loss.data, &self.gains) {
             (LossKind::Visibilities, Some(priors)) => {

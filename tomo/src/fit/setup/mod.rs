@@ -13,6 +13,7 @@ mod light_curve;
 mod linear_problem;
 mod losses;
 mod measured;
+mod still;
 mod truth;
 mod visibilities;
 mod world;
@@ -28,6 +29,7 @@ pub use light_curve::Curve;
 pub use linear_problem::solve_linear;
 pub use losses::forward_model;
 pub use measured::Measured;
+pub use still::{Still, StillView};
 pub use truth::Truth;
 pub use visibilities::{VisibilitySettings, frames_of, prepared};
 pub use world::{

@@ -8,6 +8,7 @@ pub use survey::{ChannelSurvey, Survey, survey};
 
 use super::{Channel, Picture};
 use crate::memory;
+use crate::toml_file;
 use exr::meta::MetaData;
 use exr::meta::header::LayerAttributes;
 use exr::prelude::{AttributeValue, Error, ReadChannels, ReadLayers, Text, Vec2, read};
@@ -84,7 +85,7 @@ fn attributes(layer: &LayerAttributes) -> exr::error::Result<Attributes> {
     match layer.other.get(&Text::from(ATTRIBUTE)) {
         Some(AttributeValue::Text(text)) => {
             let settings = String::from_utf8_lossy(text.as_slice());
-            toml::from_str(&settings).map_err(|e| Error::Invalid(e.to_string().into()))
+            toml_file::read(&settings).map_err(|e| Error::Invalid(e.to_string().into()))
         }
         _ => Ok(Attributes::new()),
     }

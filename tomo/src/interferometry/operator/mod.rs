@@ -9,7 +9,7 @@ mod transform;
 
 pub use dtft::Dtft;
 pub use grid::{ImageGrid, Pulse};
-pub use nufft::{FourierNumber, Nufft};
+pub use nufft::Nufft;
 pub use plain::{FullImage, LightCurve};
 pub use transform::{Method, Transform};
 

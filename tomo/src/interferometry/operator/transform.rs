@@ -1,7 +1,7 @@
 //! The Fourier transform that suits the numbers of pixels and visibilities.
 
 use super::nufft::{cells, check_accuracy, width_of};
-use super::{Dtft, Float, FourierNumber, ImageGrid, Nufft, Operator, Pulse};
+use super::{Dtft, Float, ImageGrid, Nufft, Operator, Pulse};
 use crate::Error;
 use num_complex::Complex;
 
@@ -18,14 +18,14 @@ pub enum Method {
 }
 
 /// The direct transform or the fast one.
-pub enum Transform<T: FourierNumber> {
+pub enum Transform<T> {
     /// The sum over pixels.
     Direct(Dtft<T>),
     /// By way of a fast transform.
-    Fast(Nufft<T>),
+    Fast(Nufft),
 }
 
-impl<T: Float + FourierNumber> Transform<T> {
+impl<T: Float> Transform<T> {
     /// The transform to `frames[k]`, the (u, v) in wavelengths that see frame k. The direct one
     /// keeps its exponentials if they fit into `memory_budget` bytes.
     ///
@@ -39,7 +39,7 @@ impl<T: Float + FourierNumber> Transform<T> {
         memory_budget: usize,
     ) -> Result<Self, Error> {
         let fast = |accuracy| Nufft::new(grid, pulse, frames, accuracy).map(Transform::Fast);
-        if let Method::Cheaper(accuracy) = method {
+        if let Method::Cheaper(accuracy) | Method::Fast(accuracy) = method {
             check_accuracy::<T>(accuracy)?;
         }
         match method {
@@ -89,27 +89,27 @@ fn is_fast_cheaper(grid: ImageGrid, frames: &[Vec<[f64; 2]>], accuracy: f64) -> 
     FAST_NS * seen * of_frame + CELL_NS * visibilities * (width * width) as f64 <= direct
 }
 
-impl<T: Float + FourierNumber> Operator<T> for Transform<T> {
+impl<T: Float> Operator<T> for Transform<T> {
     type Datum = Complex<T>;
 
     fn frames(&self) -> usize {
         match self {
             Transform::Direct(direct) => direct.frames(),
-            Transform::Fast(fast) => fast.frames(),
+            Transform::Fast(fast) => Operator::<T>::frames(fast),
         }
     }
 
     fn pixels(&self) -> usize {
         match self {
             Transform::Direct(direct) => direct.pixels(),
-            Transform::Fast(fast) => fast.pixels(),
+            Transform::Fast(fast) => Operator::<T>::pixels(fast),
         }
     }
 
     fn data(&self) -> usize {
         match self {
             Transform::Direct(direct) => direct.data(),
-            Transform::Fast(fast) => fast.data(),
+            Transform::Fast(fast) => Operator::<T>::data(fast),
         }
     }
 

@@ -3,9 +3,11 @@
 //! the cells around it, weighted by the kernel.
 //!
 //! Images are real, V(−u, −v) is the conjugate of V(u, v): half the columns of the grid suffice.
+//!
+//! Images and visibilities may be of either precision; between them all is in double precision. A planner of fast
+//! transforms compiles every algorithm that it may choose, and one is enough.
 
 mod kernel;
-mod plan;
 
 use super::{Float, ImageGrid, Operator, Pulse};
 use crate::Error;
@@ -15,22 +17,21 @@ use kernel::Kernel;
 use kernel::MOST_CELLS;
 pub(super) use kernel::{cells, width_of};
 use num_complex::Complex;
-pub use plan::FourierNumber;
 use rayon::prelude::*;
-use rustfft::Fft;
+use rustfft::{Fft, FftPlanner};
 use std::sync::Arc;
 
 /// Columns of the grid that a thread works on at a time.
 const STRIP: usize = 16;
 
 /// A visibility and the cells that it is a sum of.
-struct Site<T> {
+struct Site {
     /// First column among those kept, and first row.
     cell: [usize; 2],
     /// Values of the kernel: of columns, of rows.
-    weights: [[T; MOST_CELLS]; 2],
+    weights: [[f64; MOST_CELLS]; 2],
     /// Pixel pulse and the phase of the image's centre.
-    factor: Complex<T>,
+    factor: Complex<f64>,
     /// Whether the visibility is the conjugate of the sum.
     conjugate: bool,
     /// Where it is among the data.
@@ -39,7 +40,7 @@ struct Site<T> {
 
 /// Fast Fourier transform of the frames of a movie, each to visibilities of its own, with an error
 /// of at most `accuracy` × Σ|I| Jy. The adjoint is the transpose of the same map, exactly.
-pub struct Nufft<T: FourierNumber> {
+pub struct Nufft {
     grid: ImageGrid,
     kernel: Kernel,
     accuracy: f64,
@@ -48,12 +49,12 @@ pub struct Nufft<T: FourierNumber> {
     columns: usize,
     margin: usize,
     /// What image columns and rows are multiplied with.
-    correction: [Vec<T>; 2],
+    correction: [Vec<f64>; 2],
     /// Along a row and along a column, there and back.
-    along_row: [Arc<dyn Fft<T>>; 2],
-    along_column: [Arc<dyn Fft<T>>; 2],
+    along_row: [Arc<dyn Fft<f64>>; 2],
+    along_column: [Arc<dyn Fft<f64>>; 2],
     /// In the order of frames and, within, of columns.
-    sites: Vec<Site<T>>,
+    sites: Vec<Site>,
     frames: Vec<Range<usize>>,
 }
 
@@ -68,24 +69,30 @@ pub(super) fn check_accuracy<T: Float>(accuracy: f64) -> Result<(), Error> {
     Err(Error::out_of_range("accuracy", accuracy, allowed))
 }
 
-impl<T: Float + FourierNumber> Nufft<T> {
+/// The transforms of `n` numbers: forward and inverse, neither normalised.
+fn plans(n: usize) -> [Arc<dyn Fft<f64>>; 2] {
+    let mut planner = FftPlanner::new();
+    [planner.plan_fft_forward(n), planner.plan_fft_inverse(n)]
+}
+
+impl Nufft {
     /// The transform to `frames[k]`, the (u, v) in wavelengths that see frame k; data are in the
     /// order of frames and of their (u, v).
     ///
     /// # Errors
-    /// If the accuracy is not in [1e-13, 0.1] (in single precision [1e-6, 0.1]).
+    /// If the accuracy is not in [1e-13, 0.1].
     pub fn new(
         grid: ImageGrid,
         pulse: Pulse,
         frames: &[Vec<[f64; 2]>],
         accuracy: f64,
     ) -> Result<Self, Error> {
-        check_accuracy::<T>(accuracy)?;
+        check_accuracy::<f64>(accuracy)?;
         let kernel = Kernel::of_accuracy(accuracy);
         let [across, rows] = [grid.width, grid.height].map(|pixels| cells(pixels, kernel.width));
         let margin = kernel.width / 2 + 1;
         let correction = |pixels: usize, cells: usize| {
-            kernel.transform(pixels, cells).into_iter().map(|x| T::of(x.recip())).collect()
+            kernel.transform(pixels, cells).into_iter().map(f64::recip).collect()
         };
         let mut operator = Nufft {
             grid,
@@ -95,15 +102,15 @@ impl<T: Float + FourierNumber> Nufft<T> {
             columns: 0,
             margin,
             correction: [correction(grid.width, across), correction(grid.height, rows)],
-            along_row: T::plans(across),
-            along_column: T::plans(rows),
+            along_row: plans(across),
+            along_column: plans(rows),
             sites: Vec::new(),
             frames: Vec::new(),
         };
         let mut first = 0;
         for uv in frames {
             let site = |(k, uv): (usize, &[f64; 2])| operator.site(pulse, *uv, first + k);
-            let mut sites: Vec<Site<T>> = uv.par_iter().enumerate().map(site).collect();
+            let mut sites: Vec<Site> = uv.par_iter().enumerate().map(site).collect();
             sites.sort_by_key(|site| (site.cell, site.datum));
             operator.sites.extend(sites);
             operator.frames.push(first..first + uv.len());
@@ -121,12 +128,12 @@ impl<T: Float + FourierNumber> Nufft<T> {
 
     /// Bytes that are kept for the visibilities.
     pub fn memory_kept(&self) -> usize {
-        self.sites.len() * size_of::<Site<T>>()
+        self.sites.len() * size_of::<Site>()
     }
 
     /// Bytes that are needed while it works: grids of one frame, whatever the number of threads.
     pub fn memory_working(&self) -> usize {
-        self.columns * (self.column_length() + self.grid.height) * size_of::<Complex<T>>()
+        self.columns * (self.column_length() + self.grid.height) * size_of::<Complex<f64>>()
     }
 
     /// A column with its first cells repeated at its end.
@@ -134,20 +141,20 @@ impl<T: Float + FourierNumber> Nufft<T> {
         self.rows + self.kernel.width
     }
 
-    fn site(&self, pulse: Pulse, uv: [f64; 2], datum: usize) -> Site<T> {
+    fn site(&self, pulse: Pulse, uv: [f64; 2], datum: usize) -> Site {
         let ImageGrid { width, height, pixel_rad } = self.grid;
         let turns = uv.map(|x| x * pixel_rad);
         let whole = turns.map(|x| x - x.round());
         let conjugate = whole[0] < 0.0;
         let sign = if conjugate { -1.0 } else { 1.0 };
         let across = self.along_row[0].len() as f64;
-        let mut weights = [[T::zero(); MOST_CELLS]; 2];
+        let mut weights = [[0.0; MOST_CELLS]; 2];
         let mut first = [0.0; 2];
         let places = [sign * whole[0] * across, sign * whole[1] * self.rows as f64];
         for axis in 0..2 {
             let (start, values) = self.kernel.values(places[axis]);
             first[axis] = start;
-            weights[axis].iter_mut().zip(values).for_each(|(w, value)| *w = T::of(value));
+            weights[axis].iter_mut().zip(values).for_each(|(w, value)| *w = value);
         }
         // Pixel (width/2, height/2) is the origin of the fast transform.
         let offset = [self.grid.east(width / 2) * uv[0], self.grid.north(height / 2) * uv[1]];
@@ -162,7 +169,7 @@ impl<T: Float + FourierNumber> Nufft<T> {
                 (first[1] as i64).rem_euclid(self.rows as i64) as usize,
             ],
             weights,
-            factor: Complex::new(T::of(factor.re), T::of(factor.im)),
+            factor,
             conjugate,
             datum,
         }
@@ -180,8 +187,8 @@ impl<T: Float + FourierNumber> Nufft<T> {
     }
 
     /// Rows of an image, corrected and transformed: the columns that are kept, row after row.
-    fn transform_rows(&self, image: &[T]) -> Vec<Complex<T>> {
-        let zero = Complex::new(T::zero(), T::zero());
+    fn transform_rows<T: Float>(&self, image: &[T]) -> Vec<Complex<f64>> {
+        let zero = Complex::new(0.0, 0.0);
         let (width, fft) = (self.grid.width, &self.along_row[0]);
         let mut result = vec![zero; self.columns * self.grid.height];
         result
@@ -194,7 +201,8 @@ impl<T: Float + FourierNumber> Nufft<T> {
                     row.fill(zero);
                     for (k, (pixel, of_column)) in image.iter().zip(&self.correction[0]).enumerate()
                     {
-                        row[Self::place(k, width, fft.len())].re = *pixel * *of_column * *of_row;
+                        row[Self::place(k, width, fft.len())].re =
+                            pixel.double() * *of_column * *of_row;
                     }
                     fft.process_with_scratch(row, scratch);
                     for (k, cell) in result.iter_mut().enumerate() {
@@ -206,8 +214,8 @@ impl<T: Float + FourierNumber> Nufft<T> {
     }
 
     /// The transpose: adds to the image.
-    fn transform_rows_back(&self, rows: &[Complex<T>], image: &mut [T]) {
-        let zero = Complex::new(T::zero(), T::zero());
+    fn transform_rows_back<T: Float>(&self, rows: &[Complex<f64>], image: &mut [T]) {
+        let zero = Complex::new(0.0, 0.0);
         let (width, fft) = (self.grid.width, &self.along_row[1]);
         image
             .par_chunks_mut(width)
@@ -224,15 +232,16 @@ impl<T: Float + FourierNumber> Nufft<T> {
                     for (k, (pixel, of_column)) in
                         image.iter_mut().zip(&self.correction[0]).enumerate()
                     {
-                        *pixel += row[Self::place(k, width, fft.len())].re * *of_column * *of_row;
+                        let light = row[Self::place(k, width, fft.len())].re * *of_column * *of_row;
+                        *pixel += T::of(light);
                     }
                 },
             );
     }
 
     /// Columns of the finer grid, one after the other, from the rows' transforms.
-    fn transform_columns(&self, rows: &[Complex<T>]) -> Vec<Complex<T>> {
-        let zero = Complex::new(T::zero(), T::zero());
+    fn transform_columns(&self, rows: &[Complex<f64>]) -> Vec<Complex<f64>> {
+        let zero = Complex::new(0.0, 0.0);
         let (height, fft, length) = (self.grid.height, &self.along_column[0], self.column_length());
         let mut result = vec![zero; self.columns * length];
         result.par_chunks_mut(STRIP * length).enumerate().for_each_init(
@@ -255,8 +264,8 @@ impl<T: Float + FourierNumber> Nufft<T> {
     }
 
     /// The transpose; columns are used up.
-    fn transform_columns_back(&self, columns: &mut [Complex<T>]) -> Vec<Complex<T>> {
-        let zero = Complex::new(T::zero(), T::zero());
+    fn transform_columns_back(&self, columns: &mut [Complex<f64>]) -> Vec<Complex<f64>> {
+        let zero = Complex::new(0.0, 0.0);
         let (height, fft, length) = (self.grid.height, &self.along_column[1], self.column_length());
         columns.par_chunks_mut(length).for_each_init(
             || vec![zero; fft.get_inplace_scratch_len()],
@@ -279,12 +288,12 @@ impl<T: Float + FourierNumber> Nufft<T> {
     }
 
     /// The sum of the cells around a visibility.
-    fn gather(&self, site: &Site<T>, columns: &[Complex<T>]) -> Complex<T> {
+    fn gather(&self, site: &Site, columns: &[Complex<f64>]) -> Complex<f64> {
         let (width, length) = (self.kernel.width, self.column_length());
-        let mut total = Complex::new(T::zero(), T::zero());
+        let mut total = Complex::new(0.0, 0.0);
         for (k, across) in site.weights[0][..width].iter().enumerate() {
             let start = (site.cell[0] + k) * length + site.cell[1];
-            let mut sum = Complex::new(T::zero(), T::zero());
+            let mut sum = Complex::new(0.0, 0.0);
             for (cell, weight) in columns[start..start + width].iter().zip(&site.weights[1]) {
                 sum += cell.scale(*weight);
             }
@@ -294,15 +303,16 @@ impl<T: Float + FourierNumber> Nufft<T> {
     }
 
     /// The transpose: every strip of columns takes what the visibilities around it give, in order.
-    fn spread(&self, sites: &[Site<T>], data: &[Complex<T>]) -> Vec<Complex<T>> {
+    fn spread<T: Float>(&self, sites: &[Site], data: &[Complex<T>]) -> Vec<Complex<f64>> {
         let (width, length) = (self.kernel.width, self.column_length());
-        let mut columns = vec![Complex::new(T::zero(), T::zero()); self.columns * length];
+        let mut columns = vec![Complex::new(0.0, 0.0); self.columns * length];
         columns.par_chunks_mut(STRIP * length).enumerate().for_each(|(strip, cells)| {
             let start = strip * STRIP;
             let near = |column: usize| sites.partition_point(|site| site.cell[0] < column);
             let sites = &sites[near((start + 1).saturating_sub(width))..near(start + STRIP)];
             for site in sites {
-                let value = site.factor.conj() * data[site.datum];
+                let datum = data[site.datum];
+                let value = site.factor.conj() * Complex::new(datum.re.double(), datum.im.double());
                 let value = if site.conjugate { value.conj() } else { value };
                 for (k, across) in site.weights[0][..width].iter().enumerate() {
                     let Some(column) = (site.cell[0] + k).checked_sub(start) else { continue };
@@ -319,7 +329,7 @@ impl<T: Float + FourierNumber> Nufft<T> {
     }
 }
 
-impl<T: Float + FourierNumber> Operator<T> for Nufft<T> {
+impl<T: Float> Operator<T> for Nufft {
     type Datum = Complex<T>;
 
     fn frames(&self) -> usize {
@@ -337,27 +347,29 @@ impl<T: Float + FourierNumber> Operator<T> for Nufft<T> {
     fn forward(&self, movie: &[T], data: &mut [Complex<T>]) {
         assert_eq!(
             (movie.len(), data.len()),
-            (self.frames.len() * self.pixels(), self.sites.len())
+            (self.frames.len() * self.grid.pixels(), self.sites.len())
         );
         // Frame after frame, each on all threads: one grid is all the memory that is needed.
-        for (image, sites) in movie.chunks_exact(self.pixels()).zip(&self.frames) {
+        for (image, sites) in movie.chunks_exact(self.grid.pixels()).zip(&self.frames) {
             if sites.is_empty() {
                 continue;
             }
             let sites = &self.sites[sites.clone()];
             let columns = self.transform_columns(&self.transform_rows(image));
-            let sums: Vec<Complex<T>> =
+            let sums: Vec<Complex<f64>> =
                 sites.par_iter().map(|site| self.gather(site, &columns)).collect();
-            sites.iter().zip(sums).for_each(|(site, sum)| data[site.datum] = sum);
+            sites.iter().zip(sums).for_each(|(site, sum)| {
+                data[site.datum] = Complex::new(T::of(sum.re), T::of(sum.im));
+            });
         }
     }
 
     fn adjoint(&self, data: &[Complex<T>], movie: &mut [T]) {
         assert_eq!(
             (movie.len(), data.len()),
-            (self.frames.len() * self.pixels(), self.sites.len())
+            (self.frames.len() * self.grid.pixels(), self.sites.len())
         );
-        for (image, sites) in movie.chunks_exact_mut(self.pixels()).zip(&self.frames) {
+        for (image, sites) in movie.chunks_exact_mut(self.grid.pixels()).zip(&self.frames) {
             if sites.is_empty() {
                 continue;
             }

@@ -1,4 +1,4 @@
-use super::super::Dtft;
+use super::super::{Dtft, Method, Transform};
 use super::*;
 use crate::interferometry::conformance;
 use rand::{RngExt, SeedableRng};
@@ -28,17 +28,12 @@ fn movies(grid: ImageGrid) -> [Vec<f64>; 2] {
 }
 
 /// The largest error in units of accuracy × Σ|I|.
-fn worst<T: Float + FourierNumber>(
-    grid: ImageGrid,
-    pulse: Pulse,
-    accuracy: f64,
-    movie: &[f64],
-) -> f64 {
+fn worst<T: Float>(grid: ImageGrid, pulse: Pulse, accuracy: f64, movie: &[f64]) -> f64 {
     let frames = frames(grid);
     let single: Vec<T> = movie.iter().map(|x| T::of(*x)).collect();
-    let fast = Nufft::<T>::new(grid, pulse, &frames, accuracy).unwrap();
+    let fast = Nufft::new(grid, pulse, &frames, accuracy).unwrap();
     let direct = Dtft::<f64>::new(grid, pulse, &frames, 0);
-    let mut found = vec![Complex::new(T::zero(), T::zero()); fast.data()];
+    let mut found = vec![Complex::new(T::zero(), T::zero()); Operator::<T>::data(&fast)];
     let mut expected = vec![Complex::new(0.0, 0.0); direct.data()];
     fast.forward(&single, &mut found);
     direct.forward(movie, &mut expected);
@@ -68,11 +63,11 @@ fn exact_error_is_below_the_accuracy_asked_for() {
     }
 }
 
-fn conforms<T: Float + FourierNumber>(accuracy: f64, tolerance: f64) {
+fn conforms<T: Float>(accuracy: f64, tolerance: f64) {
     for (width, height) in [(13, 80), (64, 64)] {
         let grid = ImageGrid::new(width, height, 1e-9).unwrap();
-        let fast = Nufft::<T>::new(grid, Pulse::Triangle, &frames(grid), accuracy).unwrap();
-        conformance::operator("fast transform", &fast, tolerance);
+        let fast = Nufft::new(grid, Pulse::Triangle, &frames(grid), accuracy).unwrap();
+        conformance::operator::<T, _>("fast transform", &fast, tolerance);
     }
 }
 
@@ -87,7 +82,10 @@ fn exact_adjoint_in_both_precisions() {
 fn exact_accuracies_out_of_range_are_refused() {
     let grid = ImageGrid::new(4, 4, 1e-9).unwrap();
     for accuracy in [0.0, 1e-14, 0.2, f64::NAN, -1.0] {
-        assert!(Nufft::<f64>::new(grid, Pulse::Delta, &[], accuracy).is_err(), "{accuracy}");
+        assert!(Nufft::new(grid, Pulse::Delta, &[], accuracy).is_err(), "{accuracy}");
     }
-    assert!(Nufft::<f32>::new(grid, Pulse::Delta, &[], 1e-7).is_err());
+    for method in [Method::Fast(1e-7), Method::Cheaper(1e-7)] {
+        assert!(Transform::<f32>::new(grid, Pulse::Delta, &[], method, 0).is_err());
+        assert!(Transform::<f64>::new(grid, Pulse::Delta, &[], method, 0).is_ok());
+    }
 }

@@ -1,15 +1,15 @@
 //! One sharp image of the volume as the observer sees it, with more rays than the data have pixels and as many
 //! along photon rings as these take.
 
-use super::Estimate;
-use kerrlight_tomo::fit::setup::{self, Instrument};
-use kerrlight_tomo::fit::{
+use super::{Instrument, Result, Truth, observer, spacing};
+use crate::fit::settings::FitFile;
+use crate::fit::{
     Batch, Field, ForwardModel, Motion, PolarizedView, Sampling, Seen, SightlineRequest,
     Sightlines, State, Trainer,
 };
-use kerrlight_tomo::render::{RingStrata, Stratum};
-use kerrlight_tomo::representation::Workspace;
-use kerrlight_tomo::transport::View;
+use crate::render::{RingStrata, Stratum};
+use crate::representation::Workspace;
+use crate::transport::View;
 
 /// Pixels along each side: six times those of the fit, no more than this.
 const MOST: usize = 256;
@@ -31,19 +31,32 @@ pub struct Still {
     pub truth: Option<Vec<f32>>,
 }
 
-impl Estimate<'_> {
-    /// The recovered field and the true one at the reference time, or in the middle of the data if that lies outside
-    /// of them.
-    pub fn still(&self, trainer: &Trainer<'_, f32>, state: &State<f32>) -> anyhow::Result<Still> {
-        let time = self.time_of_still();
+/// What a still shows, and from where.
+pub struct StillView<'a> {
+    /// The settings.
+    pub file: &'a FitFile,
+    /// Hole, redshift and polarisation.
+    pub instrument: &'a Instrument,
+    /// How matter moves.
+    pub motion: &'a Motion,
+    /// The true field, if it is known.
+    pub truth: Option<&'a Truth>,
+}
+
+impl StillView<'_> {
+    /// The recovered field and the true one at a time, M.
+    ///
+    /// # Errors
+    /// If the memory for its rays is not there.
+    pub fn at(&self, time: f64, trainer: &Trainer<'_, f32>, state: &State<f32>) -> Result<Still> {
         let motion = Motion { times: vec![time], ..self.motion.clone() };
-        let side = self.side_of_still();
+        let side = self.side();
         let mut still = Still { side, time, recovered: Vec::new(), truth: None };
         for row in (0..side).step_by(ROWS) {
             let rays = self.rays(row)?;
             let mut model = self.forward_model(&rays, &motion)?;
             still.recovered.extend(rays.pixels(&recovered(&mut model, trainer, state)));
-            if let Some(truth) = &self.measured.truth {
+            if let Some(truth) = self.truth {
                 let image = truth.movie_through(&mut model);
                 let image: Vec<f32> = image.into_iter().map(|x| x as f32).collect();
                 still.truth.get_or_insert_default().extend(rays.pixels(&image));
@@ -52,24 +65,16 @@ impl Estimate<'_> {
         Ok(still)
     }
 
-    fn side_of_still(&self) -> usize {
+    fn side(&self) -> usize {
         (6 * self.file.screen.pixels).min(MOST)
     }
 
-    /// When it is seen, M.
-    pub(super) fn time_of_still(&self) -> f64 {
-        let (times, reference) = (&self.measured.times, self.motion.reference);
-        let within = times.first().is_some_and(|first| reference >= *first)
-            && times.last().is_some_and(|last| reference <= *last);
-        if within { reference } else { times[times.len() / 2] }
-    }
-
     /// The rays of some rows of pixels: one through the centre of each, or several along photon rings.
-    fn rays(&self, first: usize) -> anyhow::Result<Rays> {
-        let (screen, side) = (&self.file.screen, self.side_of_still());
-        let step = setup::spacing(screen)? * screen.pixels as f64 / side as f64;
+    fn rays(&self, first: usize) -> Result<Rays> {
+        let (screen, side) = (&self.file.screen, self.side());
+        let step = spacing(screen)? * screen.pixels as f64 / side as f64;
         let at = |k: usize| (k as f64 - 0.5 * (side as f64 - 1.0)) * step;
-        let view = View::Screen(setup::observer(&self.file.observer)?);
+        let view = View::Screen(observer(&self.file.observer)?);
         let strata = RingStrata::new(&self.instrument.hole, &view, SPACING);
         let mut rays = Rays::default();
         let mut ring = Vec::new();
@@ -86,7 +91,7 @@ impl Estimate<'_> {
     }
 
     /// Nodes of rays, with the weights of integrals along them.
-    fn forward_model(&self, rays: &Rays, motion: &Motion) -> anyhow::Result<ForwardModel<f32>> {
+    fn forward_model(&self, rays: &Rays, motion: &Motion) -> Result<ForwardModel<f32>> {
         let Instrument { hole, redshift, polarized, .. } = self.instrument;
         let request = SightlineRequest {
             region: self.file.region.limits(),
@@ -94,14 +99,14 @@ impl Estimate<'_> {
             delay: self.file.effects.slow_light,
             momentum: redshift.is_some() || polarized.is_some(),
         };
-        let observer = setup::observer(&self.file.observer)?;
+        let observer = observer(&self.file.observer)?;
         let lines = Sightlines::trace(hole, &observer, &rays.alpha, &rays.beta, &request)?;
         let model = ForwardModel::new(&lines, motion, hole, *redshift)?;
         let Some(view) = polarized else { return Ok(model) };
         let screen = [rays.alpha.clone(), rays.beta.clone()];
         let factors =
             PolarizedView { screen, ..view.clone() }.factors(&lines, hole, &motion.velocity)?;
-        Ok(model.seen(Some(&factors), &Seen::Images)?)
+        model.seen(Some(&factors), &Seen::Images)
     }
 }
 
