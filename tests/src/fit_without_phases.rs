@@ -32,6 +32,7 @@ fn text(folder: &Path, name: &str) -> String {
 
 /// From a dark field amplitudes led nowhere: χ² was that of nothing, and called converged.
 #[test]
+#[ignore = "long"]
 fn exact_amplitudes_light_every_representation_and_claim_no_certificate() {
     let folder = tempfile::tempdir().unwrap();
     for kind in ["linear-grid", "grid", "bhnerf"] {
@@ -123,6 +124,7 @@ fn exact_data_without_light_and_axes_that_are_all_alike_fail() {
 
 /// Every axis from lit fields.
 #[test]
+#[ignore = "long"]
 fn exact_amplitudes_find_an_axis() {
     let folder = tempfile::tempdir().unwrap();
     let both = r#"loss=[{data="amplitudes",weight=1.0},{data="closure-phases",weight=1.0}]"#;

@@ -20,6 +20,7 @@ fn file(name: &str) -> String {
 
 /// On an odd grid the central ray has α = β = 0, the central column λ = 0.
 #[test]
+#[ignore = "long"]
 fn exact_no_special_rays() {
     for (path, text) in scenes() {
         for inclination in [0, 90, 180] {

@@ -61,6 +61,7 @@ fn exact_draws_of_voxels_resume_to_the_same_bytes() {
 }
 
 #[test]
+#[ignore = "long"]
 fn exact_draws_of_an_unknown_world_have_worlds() {
     let folder = tempfile::tempdir().unwrap();
     let view = "{ worlds = 60, nodes = 16, iterations = 40, pixels = 20, frames = 12 }";

@@ -153,6 +153,7 @@ fn exact_the_experiment_of_m87_has_its_tables() {
 /// Public data: χ² of amplitudes and log closure amplitudes near 1 with a ring of the published size, bright in the south.
 /// Closure phases are fitted better than their errors allow for, whatever the strength of the penalties.
 #[test]
+#[ignore = "long"]
 fn paper_m87_is_a_ring_of_42_microarcseconds() {
     let name = "SR1_M87_2017_100_hi_hops_netcal_StokesI.uvfits";
     let Some(data) = static_sky::data(name) else { return };

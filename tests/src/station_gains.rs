@@ -31,6 +31,7 @@ fn number(found: &serde_json::Value, path: &[&str]) -> f64 {
 /// The built-in experiment: within 2 dB of a fit to data without errors of gains; the gains themselves to 2 %; χ² as noise
 /// alone would have it.
 #[test]
+#[ignore = "long"]
 fn exact_gains_are_found_with_the_flare() {
     let folder = tempfile::tempdir().unwrap();
     succeed(folder.path(), &["fit", "-o", "known"]);
@@ -51,6 +52,7 @@ fn exact_gains_are_found_with_the_flare() {
 
 /// What gains cannot touch gives the same volume as gains that are free.
 #[test]
+#[ignore = "long"]
 fn exact_closures_and_free_gains_agree() {
     let folder = tempfile::tempdir().unwrap();
     let closures = r#"loss=[{data="closure-phases",weight=1.0},{data="log-closure-amplitudes",weight=1.0},{data="light-curve",weight=1.0,sigma=0.01}]"#;

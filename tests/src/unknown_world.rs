@@ -27,6 +27,7 @@ fn read(path: &std::path::Path) -> Value {
 }
 
 #[test]
+#[ignore = "long"]
 fn exact_inclination_and_position_angle_are_found_from_visibilities() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("fit.toml"), settings(300)).unwrap();
@@ -52,6 +53,7 @@ fn exact_inclination_and_position_angle_are_found_from_visibilities() {
 
 /// Beside the grid over the inclination the position angle is searched for in each of its worlds.
 #[test]
+#[ignore = "long"]
 fn exact_a_scan_leaves_its_map() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("fit.toml"), settings(60)).unwrap();
