@@ -127,7 +127,7 @@ fn regress_the_reference_has_every_key_of_a_scene() {
 }
 
 /// Tables of a fit that the built-in fit does not have, each with a key that does not exist.
-const INNER_TABLES: [&str; 22] = [
+const INNER_TABLES: [&str; 23] = [
     "axis={scan={nonsense=1}}",
     "axis={from={nonsense=1}}",
     "data={visibilities={nonsense=1}}",
@@ -142,6 +142,7 @@ const INNER_TABLES: [&str; 22] = [
     "truth.tube=[{nonsense=1}]",
     "observation.gains={nonsense=1}",
     "instrument={gains={nonsense=1}}",
+    "instrument={leakage={nonsense=1}}",
     "world={spin={uniform=[0.0,0.5]},nonsense=1}",
     "world={search={nonsense=1}}",
     "world={search={starts=1,drag_is_spin=true,coarse={nonsense=1}}}",

@@ -11,6 +11,7 @@ mod held_out;
 mod init;
 mod inputs;
 mod labels;
+mod leakage;
 mod linear;
 mod posterior;
 mod results;
@@ -210,8 +211,12 @@ impl Fit {
     }
 
     fn name(&self) -> String {
-        let file = self.file.as_ref().or(self.data.as_ref());
-        file.map_or("built-in experiment".to_owned(), |f| f.display().to_string())
+        match (&self.file, &self.data) {
+            (Some(file), _) => file.display().to_string(),
+            // Lines that an error names are those of the settings, not of the data.
+            (None, Some(data)) => format!("settings guessed from {}", data.display()),
+            (None, None) => "built-in experiment".to_owned(),
+        }
     }
 
     /// The text of the settings and the folder that paths in it start from.

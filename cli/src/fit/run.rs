@@ -7,6 +7,7 @@ use super::failed;
 use super::folder::{self, Folder};
 use super::held_out;
 use super::labels;
+use super::leakage;
 use super::linear;
 use super::results::{self, Estimate};
 use super::together;
@@ -133,6 +134,7 @@ pub fn run(
     match checkpoint {
         Some(bytes) => {
             state = restored(&bytes, &state, text).with_context(|| unusable(folder))?;
+            leakage::restore(measured, folder)?;
             folder.cut_log(state.now.step)?;
         }
         None => {
@@ -142,6 +144,9 @@ pub fn run(
         }
     }
     if let Some(listener) = listener {
+        if measured.leakage.is_some() {
+            bail!("instrument.leakage is solved for by a single rank: start one");
+        }
         let bytes = checkpoint::encode(&state, text)?;
         run.trainer.ranks = Some(together::begin(listener, &bytes, folder.path())?);
     }
@@ -261,18 +266,16 @@ impl Run<'_> {
             let file =
                 held_out::place(self.file, self.folder, &mut trainer.objective, (axis, times))?;
             let change = setup::change(&file, times)?;
+            let whose = (self.measured, self.folder);
             let solution =
-                linear::solve(&file, &mut trainer.objective, (axis, change), (nodes, 1))?;
+                leakage::solve_linear(&file, whose, trainer, (axis, change), (nodes, 1))?;
             self.folder.log(&linear::solved(&solution))?;
             eprintln!("{}", linear::statement(&solution));
             state.now.parameters = solution.emission;
         } else if let Start::Linear { nodes, stride, steps } = self.file.training.start {
-            let solution = linear::solve(
-                self.file,
-                &mut trainer.objective,
-                (axis, Change::NONE),
-                (nodes, stride),
-            )?;
+            let (whose, about) = ((self.measured, self.folder), (axis, Change::NONE));
+            let solution =
+                leakage::solve_linear(self.file, whose, trainer, about, (nodes, stride))?;
             self.folder.log(&linear::solved(&solution))?;
             let imprinted = setup::imprint(
                 self.file,
@@ -295,6 +298,8 @@ impl Run<'_> {
         bar.set_position(state.now.step);
         let mut saved = Instant::now();
         while state.now.step < steps {
+            let whose = (self.measured, self.folder);
+            leakage::when_due((self.file, self.text), whose, &mut self.trainer, state)?;
             let outcome = match self.trainer.step(state) {
                 Ok(outcome) => outcome,
                 Err(error) => return Err(failed::diverged(&mut self.trainer, state, &error)),

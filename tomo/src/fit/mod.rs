@@ -83,5 +83,5 @@ pub use selection::Selection;
 pub use sightlines::{Region, Sampling, SightlineRequest, Sightlines};
 pub use steps::Place;
 pub use stokes::{PolarizedView, Seen};
-pub use terms::{FrameTerm, ImageTerm, LightCurveTerm, Scan, ScanTerm};
+pub use terms::{FrameTerm, ImageTerm, IntensityTerm, LightCurveTerm, Scan, ScanTerm};
 pub use train::{BatchSize, Diverged, OccupancyPlan, Outcome, Progress, State, Trainer, Training};

@@ -195,7 +195,7 @@ impl<T: Float> FrameTerm<T> for LightCurveTerm {
 
 /// What an array of telescopes measures of a frame.
 pub struct Scan<T> {
-    /// From the frame to its visibilities.
+    /// From the frame, an image or several for Stokes parameters, to its visibilities.
     pub transform: Transform<T>,
     /// From visibilities to χ².
     pub term: Box<dyn DataTerm<T> + Send>,
@@ -217,7 +217,7 @@ impl<T: Float> ScanTerm<T> {
     pub fn new(name: &str, pixels: usize, quadratic: bool, scans: Vec<Option<Scan<T>>>) -> Self {
         for scan in scans.iter().flatten() {
             assert_eq!(scan.transform.data(), scan.term.visibilities());
-            assert_eq!((scan.transform.frames(), scan.transform.pixels()), (1, pixels));
+            assert_eq!(scan.transform.frames() * scan.transform.pixels(), pixels);
         }
         Self { name: name.to_owned(), pixels, quadratic, scans }
     }
@@ -264,5 +264,52 @@ impl<T: Float> FrameTerm<T> for ScanTerm<T> {
         let mut model = vec![Complex::new(T::zero(), T::zero()); transform.data()];
         transform.forward(image, &mut model);
         term.residuals(&model)
+    }
+}
+
+/// Data of total intensity in a fit whose frames are images of several Stokes parameters, I first.
+pub struct IntensityTerm<T: Float> {
+    /// The data.
+    pub term: Box<dyn FrameTerm<T>>,
+    /// Images of a frame.
+    pub images: usize,
+}
+
+impl<T: Float> FrameTerm<T> for IntensityTerm<T> {
+    fn name(&self) -> &str {
+        self.term.name()
+    }
+
+    fn frames(&self) -> usize {
+        self.term.frames()
+    }
+
+    fn pixels(&self) -> usize {
+        self.term.pixels() * self.images
+    }
+
+    fn degrees_of_freedom(&self, frame: usize) -> usize {
+        self.term.degrees_of_freedom(frame)
+    }
+
+    fn is_quadratic(&self) -> bool {
+        self.term.is_quadratic()
+    }
+
+    fn is_convex(&self) -> bool {
+        self.term.is_convex()
+    }
+
+    fn is_scale_free(&self) -> bool {
+        self.term.is_scale_free()
+    }
+
+    fn value_and_gradient(&self, frame: usize, image: &[T], weight: T, gradient: &mut [T]) -> f64 {
+        let first = ..self.term.pixels();
+        self.term.value_and_gradient(frame, &image[first], weight, &mut gradient[first])
+    }
+
+    fn residuals(&self, frame: usize, image: &[T]) -> Vec<Residual> {
+        self.term.residuals(frame, &image[..self.term.pixels()])
     }
 }

@@ -3,6 +3,7 @@
 use super::*;
 
 mod blobs;
+mod leakage;
 mod orbital;
 mod parts;
 mod penalised;

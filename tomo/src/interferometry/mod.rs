@@ -3,7 +3,7 @@
 //! Data flow: [`mod@array`] (stations) → [`earth`] (sidereal time, projected baselines) →
 //! [`schedule`] (when, and which baselines) → [`observation`] (visibilities with errors) ↔ [`files`]. [`simulate`]
 //! fills them from images through an [`operator`], [`noise`] spoils them,
-//! [`products`] are what gains leave, [`data_terms`] compare them with a model.
+//! [`products`] are what gains leave, [`polarimetry`] is about circular feeds, [`data_terms`] compare them with a model.
 //! Units are those of the field: metres, Jy, hours of UTC, wavelengths, degrees where a name says
 //! so.
 
@@ -19,6 +19,7 @@ pub mod light_curve;
 pub mod noise;
 pub mod observation;
 pub mod operator;
+pub mod polarimetry;
 pub mod products;
 pub mod schedule;
 pub mod simulate;

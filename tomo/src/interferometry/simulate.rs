@@ -66,6 +66,35 @@ pub fn fill(
     Ok(operator.describe())
 }
 
+/// Sets the visibilities of linearly polarised emission from images of I, Q and U: RR = LL = I, RL = Q + iU, LR = Q − iU.
+/// Otherwise as [`fill`].
+///
+/// # Errors
+/// As [`fill`], or if the observation's products are not those of circular feeds.
+pub fn fill_polarized(
+    observation: &mut Observation,
+    [i, q, u]: [&Movie; 3],
+    pulse: Pulse,
+    times_h: &[f64],
+    method: Method,
+) -> Result<String, Error> {
+    if observation.basis != Basis::Circular {
+        let allowed = "those of circular feeds: RR, LL, RL, LR";
+        return Err(Error::out_of_range("products of the observation", 0.0, allowed));
+    }
+    let mut of = |movie: &Movie| -> Result<Vec<Complex64>, Error> {
+        fill(observation, movie, pulse, times_h, method)?;
+        Ok(observation.rows.iter().map(|row| row.products[0]).collect())
+    };
+    let (q, u) = (of(q)?, of(u)?);
+    let how = fill(observation, i, pulse, times_h, method)?;
+    for ((row, q), u) in observation.rows.iter_mut().zip(q).zip(u) {
+        let turned = Complex64::new(0.0, 1.0) * u;
+        (row.products[2], row.products[3]) = (q + turned, q - turned);
+    }
+    Ok(how)
+}
+
 fn check(movie: &Movie, times_h: &[f64]) -> Result<(), Error> {
     let range = |name, value, allowed| Err(Error::out_of_range(name, value, allowed));
     let frames = movie.frames();

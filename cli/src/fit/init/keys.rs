@@ -22,7 +22,7 @@ const fn key(
 }
 
 /// What a heading is about.
-pub const TABLES: [(&str, &str); 29] = [
+pub const TABLES: [(&str, &str); 30] = [
     ("envelope", "A Gaussian in the middle of the field that light is expected in."),
     ("image", "The static image: nothing is assumed of a hole, and nothing moves."),
     ("strength", "A factor on all penalties, which frames that are held out choose."),
@@ -43,6 +43,10 @@ pub const TABLES: [(&str, &str); 29] = [
     (
         "instrument.gains",
         "Complex gains of the stations, solved for in every frame beside the emission.",
+    ),
+    (
+        "instrument.leakage",
+        "Leakage between the feeds of the stations, the same in all frames, solved for in turn with the emission.",
     ),
     ("loss", "Terms of the loss, which is the weighted sum of each term's chi^2 per data point."),
     ("representation", "How the recovered emission is represented."),
@@ -211,6 +215,14 @@ pub const KEYS: &[Key] = &[
         "0.02",
         "systematic error, as a fraction of each amplitude, added in quadrature; 0 or above",
     ),
+    key("observation", "leakage", "", "root mean square of |d| of the feeds' leakage; 0 to 1"),
+    key("instrument.leakage", "amplitude", "", "root mean square of |d| that is expected; above 0"),
+    key(
+        "instrument.leakage",
+        "rounds",
+        "",
+        "times that emission and leakage are solved for in turn, at most",
+    ),
     key("observation", "first_time", "", "time of the first scan; M"),
     key(
         "data.visibilities",
@@ -241,7 +253,7 @@ pub const KEYS: &[Key] = &[
         "loss",
         "data",
         "",
-        "image, visibilities, amplitudes, closure-phases, log-closure-amplitudes or light-curve",
+        "image, visibilities, amplitudes, closure-phases, log-closure-amplitudes, polarized-visibilities or light-curve",
     ),
     key("loss", "weight", "", "weight of this term; above 0"),
     key(

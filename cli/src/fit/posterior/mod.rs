@@ -97,6 +97,9 @@ pub fn check(file: &FitFile) -> anyhow::Result<()> {
     if !matches!(file.axis, AxisSearch::Known {}) {
         bail!("a posterior needs [axis.known]: draws do not look for the axis of the motion");
     }
+    if file.instrument.as_ref().is_some_and(|instrument| instrument.leakage.is_some()) {
+        bail!("a posterior needs leakage that is known: draws do not solve for it");
+    }
     if file.band.is_some() {
         bail!(
             "a fit with [band] has the posterior of its world in band.json: nothing else is drawn around it"

@@ -4,6 +4,8 @@ use super::Estimate;
 use super::verdict::Evidence;
 use crate::fit::folder::Folder;
 use crate::report::{Axis, LinePlot, Marks, Series, Table};
+use kerrlight_tomo::fit::settings::LossKind;
+use kerrlight_tomo::fit::setup::Measured;
 use kerrlight_tomo::interferometry::Complex64;
 use kerrlight_tomo::interferometry::files;
 use kerrlight_tomo::interferometry::gains::{GainDistance, GainTable, StationGain};
@@ -36,9 +38,15 @@ struct Summary<'a> {
 }
 
 impl Estimate<'_> {
-    /// The gains of all stations and frames, beside these images, where they are solved for; writes their table.
-    pub fn gains(&self, movie: &[f32]) -> anyhow::Result<Option<Gains>> {
-        Gains::beside(&self.evidence(), movie, self.folder)
+    /// The gains of all stations and frames, beside these images and what data see of them, where they are solved for; writes their table.
+    pub fn gains(&self, movie: &[f32], seen: &[f32]) -> anyhow::Result<Option<Gains>> {
+        let is_polarized =
+            self.file.loss.iter().any(|loss| loss.data == LossKind::PolarizedVisibilities);
+        if !is_polarized || self.measured.gains.is_none() {
+            return Gains::beside(&self.evidence(), movie, self.folder);
+        }
+        let table = self.measured.polarized_gains(seen)?;
+        table.map(|table| Gains::written(table, self.measured, self.folder)).transpose()
     }
 }
 
@@ -52,9 +60,13 @@ impl Gains {
         let Evidence { measured, losses, .. } = *evidence;
         let Some(model) = evidence.model_visibilities(movie)? else { return Ok(None) };
         let Some(table) = measured.gains(losses, &model)? else { return Ok(None) };
+        Self::written(table, measured, folder).map(Some)
+    }
+
+    fn written(table: GainTable, measured: &Measured, folder: &Folder) -> anyhow::Result<Self> {
         folder.file(TABLE)?.write(files::gains_to_csv(&table).as_bytes())?;
         let distance = measured.true_gains.as_ref().and_then(|truth| table.distance(truth));
-        Ok(Some(Gains { table, distance }))
+        Ok(Gains { table, distance })
     }
 
     /// Multiplies visibilities of a model by g₁ ḡ₂ of their stations at their times; by 1 where a station has none.

@@ -1,8 +1,8 @@
-//! Light curves of unresolved sources: the model beside the data.
+//! Light curves of unresolved sources: the model beside the data; images where data see something else.
 
 use super::Estimate;
 use crate::report::{Axis, LinePlot, Marks, Series};
-use kerrlight_tomo::fit::{Batch, Field, FrameTerm, State, Trainer};
+use kerrlight_tomo::fit::{Batch, Field, FrameTerm, Seen, State, Trainer};
 use kerrlight_tomo::representation::Workspace;
 use std::fmt::Write;
 
@@ -17,7 +17,7 @@ impl Estimate<'_> {
         state: &State<f32>,
         seen: &[f32],
     ) -> anyhow::Result<Vec<f32>> {
-        if self.measured.curve.is_none() {
+        if self.instrument.seen == Seen::Images {
             return Ok(seen.to_vec());
         }
         let mut model = self.instrument.pictured::<f32>(self.motion)?;

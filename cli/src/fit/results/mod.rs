@@ -2,6 +2,7 @@
 
 mod fields;
 pub mod gains;
+mod leakage;
 mod light_curve;
 mod numbers;
 mod over_time;
@@ -24,6 +25,7 @@ use kerrlight_tomo::fit::{Loss, Motion, State, Trainer};
 use kerrlight_tomo::interferometry::files::images;
 use kerrlight_tomo::units::MICROARCSECOND;
 use kerrlight_tomo::volume::{Volume, VolumeFile, vti};
+use leakage::Leakage;
 use over_time::Changes;
 use serde_json::Value;
 use std::time::Instant;
@@ -57,6 +59,7 @@ impl Estimate<'_> {
         let frames: Vec<usize> = (0..self.measured.times.len()).collect();
         let seen = trainer.movie(&state.now, &frames, true);
         failed::check(self.file, &trainer.objective, &frames, &seen)?;
+        let leakage = self.leakage(&seen)?;
         let loss = trainer.objective.loss_of(&frames, &seen);
         let mask = numbers::mask_error(trainer, state, &seen);
         let movie = self.pictured(trainer, state, &seen)?;
@@ -70,11 +73,23 @@ impl Estimate<'_> {
         let still = self.still_view().at(self.time_of_still(), trainer, state)?;
         let objective = &trainer.objective;
         let compared = (objective.names(), objective.statistics(&seen));
-        let judged = self.evidence().judged(compared, &seen)?;
+        let judged = self.evidence().judged(compared, &movie)?;
         self.curve_table(&seen)?;
-        let gains = self.gains(&movie)?;
-        let found =
-            Found { volume, changes, still, loss, mask, judged, gains, seen, movie, state, begun };
+        let gains = self.gains(&movie, &seen)?;
+        let found = Found {
+            volume,
+            changes,
+            still,
+            loss,
+            mask,
+            judged,
+            gains,
+            leakage,
+            seen,
+            movie,
+            state,
+            begun,
+        };
         let results = self.results(trainer, &found)?;
         self.folder.file("results.json")?.write(sealed(results.clone()).as_bytes())?;
         self.report(&found, &results)?;
@@ -148,7 +163,9 @@ pub struct Found<'a> {
     judged: Judged,
     /// Gains of stations, where they are solved for.
     gains: Option<Gains>,
-    /// What data see of the movie: the movie itself, or its fluxes.
+    /// Leakage of stations, where it is solved for.
+    leakage: Option<Leakage>,
+    /// What data see of the movie: the movie itself, its images of Stokes parameters, or its fluxes.
     seen: Vec<f32>,
     movie: Vec<f32>,
     state: &'a State<f32>,

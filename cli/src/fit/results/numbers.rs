@@ -61,6 +61,9 @@ impl Estimate<'_> {
         if let Some(gains) = &found.gains {
             results["gains"] = gains.json();
         }
+        if let Some(leakage) = &found.leakage {
+            results["leakage"] = leakage.json();
+        }
         if let Some(mask) = found.mask {
             results["mask_error"] = json!(mask);
         }

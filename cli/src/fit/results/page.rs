@@ -1,6 +1,7 @@
 //! The report.
 
 use super::gains::Gains;
+use super::leakage::Leakage;
 use super::numbers::outcomes;
 use super::over_time::Changes;
 use super::{Estimate, Found};
@@ -33,13 +34,15 @@ impl Estimate<'_> {
         plots.extend(self.amplitudes(found)?);
         plots.extend(self.residual_plots(found));
         plots.extend(found.gains.iter().flat_map(Gains::plots));
+        plots.extend(found.leakage.as_ref().map(Leakage::plot));
         let details = found.gains.as_ref().map(Gains::details);
+        let leakage = found.leakage.as_ref().map(Leakage::details);
         let report = Report {
             title: self.file.title.clone(),
             notice: Some(found.judged.notice()),
             summary: self.summary(found, results),
             results: outcomes(results),
-            details: [Some(found.judged.table()), found.judged.by_station(), details]
+            details: [Some(found.judged.table()), found.judged.by_station(), details, leakage]
                 .into_iter()
                 .flatten()
                 .collect(),
@@ -186,6 +189,7 @@ impl Estimate<'_> {
             ));
         }
         lines.extend(found.gains.iter().flat_map(Gains::sentences));
+        lines.extend(found.leakage.iter().flat_map(Leakage::sentences));
         if let (Some(psnr), Some(nrmse)) = (number("psnr_db"), number("nrmse")) {
             lines.push(format!(
                 "Compared with the truth, the volume has a peak signal-to-noise ratio of {psnr:.2} dB and a relative error of {nrmse:.3} (1 for an empty volume)."

@@ -96,7 +96,7 @@ impl Evidence<'_> {
         let tested: Vec<Tested> = terms.iter().map(|(_, tested)| tested.clone()).collect();
         let flux = self.zero_spacing(movie);
         let knows_flux =
-            |loss: &Loss| matches!(loss.data, LossKind::Visibilities | LossKind::Amplitudes);
+            |loss: &Loss| loss.data.is_visibilities() || loss.data == LossKind::Amplitudes;
         // Gains that are free may be what is missing.
         let knows = self.measured.gains.is_none() && self.losses.iter().any(knows_flux);
         let judged = flux.filter(|_| knows);

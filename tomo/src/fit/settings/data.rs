@@ -65,18 +65,21 @@ pub enum LossKind {
     ClosurePhases,
     /// Log closure amplitudes.
     LogClosureAmplitudes,
+    /// RR, LL, RL and LR, or I, Q and U.
+    PolarizedVisibilities,
     /// Total flux.
     LightCurve,
 }
 
 impl LossKind {
     /// All kinds.
-    pub const ALL: [LossKind; 6] = [
+    pub const ALL: [LossKind; 7] = [
         LossKind::Image,
         LossKind::Visibilities,
         LossKind::Amplitudes,
         LossKind::ClosurePhases,
         LossKind::LogClosureAmplitudes,
+        LossKind::PolarizedVisibilities,
         LossKind::LightCurve,
     ];
 
@@ -88,6 +91,7 @@ impl LossKind {
             LossKind::Amplitudes => "amplitudes",
             LossKind::ClosurePhases => "closure-phases",
             LossKind::LogClosureAmplitudes => "log-closure-amplitudes",
+            LossKind::PolarizedVisibilities => "polarized-visibilities",
             LossKind::LightCurve => "light-curve",
         }
     }
@@ -100,13 +104,19 @@ impl LossKind {
             LossKind::Amplitudes => "amplitudes",
             LossKind::ClosurePhases => "closure phases",
             LossKind::LogClosureAmplitudes => "log closure amplitudes",
+            LossKind::PolarizedVisibilities => "polarized visibilities",
             LossKind::LightCurve => "the light curve",
         }
     }
 
     /// Whether χ² of it is convex in the emission, so that a minimum can be told from other stationary points.
     pub fn is_convex(self) -> bool {
-        matches!(self, LossKind::Image | LossKind::Visibilities | LossKind::LightCurve)
+        self.is_visibilities() || matches!(self, LossKind::Image | LossKind::LightCurve)
+    }
+
+    /// Whether they are complex visibilities, of total intensity or of all products.
+    pub fn is_visibilities(self) -> bool {
+        matches!(self, LossKind::Visibilities | LossKind::PolarizedVisibilities)
     }
 }
 

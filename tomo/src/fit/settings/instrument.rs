@@ -10,7 +10,21 @@ use std::collections::BTreeMap;
 #[serde(deny_unknown_fields)]
 pub struct InstrumentSettings {
     /// Complex gains of the stations, new ones in every frame.
-    pub gains: GainSettings,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gains: Option<GainSettings>,
+    /// Leakage between the feeds of the stations, the same in all frames.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub leakage: Option<LeakageSettings>,
+}
+
+/// Leakage that is solved for in turn with the emission.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LeakageSettings {
+    /// Root mean square of |d| that is expected of d_R and d_L of all stations.
+    pub amplitude: f64,
+    /// Times that emission and leakage are solved for in turn, at most.
+    pub rounds: usize,
 }
 
 /// Gains of stations that are solved for in every frame, beside every model.

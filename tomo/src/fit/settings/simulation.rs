@@ -159,6 +159,9 @@ pub struct Observation {
     /// Errors of station gains, none by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gains: Option<GainErrors>,
+    /// Root mean square of |d| of the leakage of the stations' feeds, drawn once for each; none by default.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub leakage: Option<f64>,
     /// Part of each amplitude that the fit adds to its error in quadrature, none by default: for errors of gains,
     /// or where errors are so small that a loss has minima everywhere.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -263,7 +263,8 @@ impl StaticImageFile {
 }
 
 fn loss_of_visibilities(loss: &Loss) -> Result<(), FitError> {
-    if matches!(loss.data, LossKind::Image | LossKind::LightCurve) {
+    if matches!(loss.data, LossKind::Image | LossKind::LightCurve | LossKind::PolarizedVisibilities)
+    {
         refuse!(
             "data = {:?} is not for a static image: visibilities, amplitudes, closure-phases or log-closure-amplitudes",
             loss.data.name()

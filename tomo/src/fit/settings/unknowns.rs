@@ -6,7 +6,8 @@ use crate::representation::Activation;
 impl FitFile {
     /// Whether a minimum over the emission of voxels can be told from other stationary points.
     pub fn is_convex(&self) -> bool {
-        self.instrument.is_none() && self.loss.iter().all(|loss| loss.data.is_convex())
+        self.instrument.as_ref().is_none_or(|i| i.gains.is_none())
+            && self.loss.iter().all(|loss| loss.data.is_convex())
     }
 
     /// Refuses what these data cannot decide.

@@ -1,10 +1,12 @@
 //! Gains of stations: priors of those that observe, and what a fit found.
 
+use super::leakage::observing;
+use super::polarized::is_polarized;
 use super::{Measured, Result};
 use crate::fit::settings::{InstrumentSettings, Loss, LossKind, refuse};
 use crate::interferometry::Complex64;
 use crate::interferometry::data_terms::GainTerm;
-use crate::interferometry::gains::{GainPriors, GainTable, StationGain};
+use crate::interferometry::gains::{GainPriors, GainTable, ScanGains, StationGain};
 use crate::interferometry::observation::Observation;
 
 /// Priors of the gains that a fit solves for, if it does.
@@ -16,27 +18,28 @@ pub(super) fn priors(
     losses: &[Loss],
     observation: &Observation,
 ) -> Result<Option<GainPriors>> {
-    let Some(instrument) = instrument else { return Ok(None) };
-    let has = |kind| losses.iter().any(|loss| loss.data == kind);
-    match (has(LossKind::Visibilities), has(LossKind::Amplitudes)) {
-        (true, true) => refuse!(
+    let Some(settings) = instrument.and_then(|instrument| instrument.gains.as_ref()) else {
+        return Ok(None);
+    };
+    let of_gains = |loss: &&Loss| loss.data.is_visibilities() || loss.data == LossKind::Amplitudes;
+    match losses.iter().filter(of_gains).count() {
+        0 => refuse!(
+            "instrument.gains needs a loss of visibilities or of amplitudes: closure quantities do not change with gains"
+        ),
+        1 => {}
+        _ => refuse!(
             "instrument.gains: losses of visibilities and of amplitudes would each have gains of their own; give one of \
              them"
         ),
-        (false, false) => refuse!(
-            "instrument.gains needs a loss of visibilities or of amplitudes: closure quantities do not change with gains"
-        ),
-        _ => {}
     }
     let names: Vec<String> = observation.stations.iter().map(|s| s.name.clone()).collect();
-    let observes = |k: usize| {
-        let is = |s: &u16| usize::from(*s) == k;
-        observation.stokes_i().any(|(row, _)| row.stations.iter().any(is))
+    let observing = match is_polarized(losses) {
+        true => observing(observation),
+        false => observing(&observation.total_intensity()),
     };
-    let observing: Vec<bool> = (0..names.len()).map(observes).collect();
     let kept = names.iter().zip(&observing).filter(|(_, observes)| **observes);
     let kept: Vec<String> = kept.map(|(name, _)| name.clone()).collect();
-    let some = instrument.gains.priors(&kept)?;
+    let some = settings.priors(&kept)?;
     let mut sigma = some.amplitude_sigma.iter();
     // Stations that do not observe have no gains.
     let of = |observes: &bool| observes.then(|| sigma.next().copied()).flatten().unwrap_or(0.0);
@@ -66,17 +69,35 @@ impl Measured {
                 false => GainTerm::amplitudes(&part, priors)?,
             };
             let model: Vec<Complex64> = scan.iter().map(|(.., v)| *v).collect();
-            add(&mut table, &term, &model, &part);
+            let (gains, errors) = term.gains(&model);
+            add(&mut table, (term.stations(), gains, errors), &part);
+        }
+        Ok(Some(table))
+    }
+
+    /// The gains of every frame that explain all products best beside images of I, Q and U of all frames, with the leakage
+    /// that was found last; none if gains are not solved for.
+    ///
+    /// # Errors
+    /// If data make no term.
+    pub fn polarized_gains(&self, movie: &[f32]) -> Result<Option<GainTable>> {
+        let mut table = GainTable::default();
+        for scan in self.beside(movie)? {
+            let Some(found) = scan.term.gains(&scan.model) else { return Ok(None) };
+            add(&mut table, found, &self.part(scan.frame)?.0);
         }
         Ok(Some(table))
     }
 }
 
-/// The gains of a scan.
-fn add(table: &mut GainTable, term: &GainTerm, model: &[Complex64], part: &Observation) {
-    let (gains, errors) = term.gains(model);
+/// The gains of the stations of a scan, with their errors.
+fn add(
+    table: &mut GainTable,
+    (stations, gains, errors): (&[u16], ScanGains, ScanGains),
+    part: &Observation,
+) {
     let span_s = part.rows.iter().fold(0.0f64, |most, row| most.max(row.integration_s));
-    for (k, station) in term.stations().iter().enumerate() {
+    for (k, station) in stations.iter().enumerate() {
         table.gains.push(StationGain {
             time_h: part.rows[0].time_h,
             span_s,

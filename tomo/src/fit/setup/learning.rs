@@ -1,7 +1,7 @@
 //! From settings to what is recovered and how it is learnt.
 
 use super::change::{self, change};
-use super::{Result, axis, linear, motion};
+use super::{Result, axis, linear, motion, polarized};
 use crate::fit::linear::Change;
 use crate::fit::settings;
 use crate::fit::settings::{
@@ -223,6 +223,7 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
     file.check_unknowns()?;
     let training = training(file, axis_rate)?;
     change::check(file)?;
+    polarized::check(file)?;
     if let Some(held_out) = &file.held_out {
         held_out.check(file)?;
     }

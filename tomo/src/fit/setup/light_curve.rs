@@ -1,5 +1,6 @@
 //! Light curves as the data of a fit: simulated, or measured.
 
+use super::polarized;
 use super::{Instrument, Measured, Result, Truth, hours_per_m, motion};
 use crate::fit::settings::{
     DataFiles, FitError, FitFile, Loss, LossKind, MeasuredCurve, Noise, PerStokes, SimulatedCurve,
@@ -65,7 +66,7 @@ pub(super) fn seen(file: &FitFile) -> Result<Seen> {
             Some(k) => refuse!(
                 "loss.{k}.stokes needs a light curve of its own: a table [light_curve] (to simulate) or [data.light-curve] (to read)"
             ),
-            None => Ok(Seen::Images),
+            None => Ok(polarized::seen(file)?.unwrap_or(Seen::Images)),
         };
     }
     let [Loss { data: LossKind::LightCurve, stokes, .. }] = &file.loss[..] else {
@@ -135,6 +136,8 @@ impl Measured {
             truth: None,
             gains: None,
             true_gains: None,
+            leakage: None,
+            true_leakage: None,
         }
     }
 }

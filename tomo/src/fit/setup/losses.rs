@@ -1,16 +1,18 @@
 //! The terms of the loss.
 
 use super::measured::FILE;
+use super::polarized::images;
 use super::{Instrument, Measured, Result};
 use crate::fit::settings::{FitError, Loss, LossKind, Within, refuse};
 use crate::fit::{
-    Data, ForwardModel, FrameTerm, ImageTerm, LightCurveTerm, Motion, Scan, ScanTerm, Weighted,
+    Data, ForwardModel, FrameTerm, ImageTerm, IntensityTerm, LightCurveTerm, Motion, Scan,
+    ScanTerm, Weighted,
 };
 use crate::interferometry::data_terms::{
     AmplitudeTerm, ClosureTerm, DataTerm, DataTermError, GainTerm, VisibilityTerm,
 };
 use crate::interferometry::observation::Observation;
-use crate::interferometry::operator::{Float, Method, Pulse, Transform};
+use crate::interferometry::operator::{Float, ImageGrid, Method, Pulse, Transform};
 use crate::interferometry::products::ClosureKind;
 
 impl Measured {
@@ -42,6 +44,11 @@ impl Measured {
                 }
                 _ => {
                     let term = self.other(loss, pixels).within(name())?;
+                    let term = match images(losses) {
+                        1 => term,
+                        _ if loss.data == LossKind::PolarizedVisibilities => term,
+                        images => Box::new(IntensityTerm { term, images }),
+                    };
                     data.others.push(Weighted { weight, term });
                 }
             }
@@ -95,6 +102,7 @@ impl Measured {
             LossKind::Visibilities => ("visibilities", self.gains.is_none()),
             LossKind::Amplitudes => ("amplitudes", false),
             LossKind::ClosurePhases => ("closure phases", false),
+            LossKind::PolarizedVisibilities => ("polarized visibilities", self.gains.is_none()),
             _ => ("log closure amplitudes", false),
         };
         let scans: Vec<Option<Scan<T>>> =
@@ -102,7 +110,8 @@ impl Measured {
         if scans.iter().all(Option::is_none) {
             refuse!("no frame has any {name}");
         }
-        Ok(ScanTerm::new(name, pixels, quadratic, scans))
+        let images = images(core::slice::from_ref(loss));
+        Ok(ScanTerm::new(name, images * pixels, quadratic, scans))
     }
 
     /// The terms of losses of visibilities, of images of so many pixels, in any precision.
@@ -122,17 +131,10 @@ impl Measured {
     }
 
     fn scan<T: Float>(&self, frame: usize, loss: &Loss) -> Result<Option<Scan<T>>> {
-        let missing = || {
-            FitError::Conflict(format!(
-                "there are no visibilities: give {FILE}, or a truth and an [observation] of it (`kerrlight fit --init` \
-                 writes an example)"
-            ))
-        };
-        let (observation, frames) = self.visibilities.as_ref().ok_or_else(missing)?;
-        let sky = self.sky.ok_or_else(missing)?;
-        let rows = observation.rows.iter().zip(frames).filter(|(_, of)| **of == frame);
-        let rows: Vec<_> = rows.map(|(row, _)| *row).collect();
-        let part = Observation { rows, ..observation.clone() };
+        if loss.data == LossKind::PolarizedVisibilities {
+            return self.polarized_scan(frame);
+        }
+        let (part, sky) = self.part(frame)?;
         if part.stokes_i().next().is_none() {
             return Ok(None);
         }
@@ -144,6 +146,21 @@ impl Measured {
 }
 
 impl Measured {
+    /// The rows of a frame, and where pixels are.
+    pub(super) fn part(&self, frame: usize) -> Result<(Observation, ImageGrid)> {
+        let missing = || {
+            FitError::Conflict(format!(
+                "there are no visibilities: give {FILE}, or a truth and an [observation] of it (`kerrlight fit --init` \
+                 writes an example)"
+            ))
+        };
+        let (observation, frames) = self.visibilities.as_ref().ok_or_else(missing)?;
+        let sky = self.sky.ok_or_else(missing)?;
+        let rows = observation.rows.iter().zip(frames).filter(|(_, of)| **of == frame);
+        let rows: Vec<_> = rows.map(|(row, _)| *row).collect();
+        Ok((Observation { rows, ..observation.clone() }, sky))
+    }
+
     /// The data of a scan that a loss compares; none where closure quantities have too few baselines.
     fn scan_data<T: Float>(&self, loss: &Loss, part: &Observation) -> Result<Option<ScanData<T>>> {
         let least = loss.least_snr.unwrap_or(0.0);

@@ -1,24 +1,24 @@
 //! The data of a fit: simulated, or measured.
 
 use super::gains;
+use super::leakage::{self, LeakageUnknown};
 use super::light_curve::{self, Curve};
+use super::observed::{Spoiled, add_systematic, schedule_of, spoil};
+use super::polarized::{self, is_polarized};
 use super::truth::SPOT;
-use super::visibilities::{VisibilitySettings, frames_of, prepared};
-use super::{Instrument, Result, Truth, hours_per_m, sky};
+use super::visibilities::{VisibilitySettings, all_products, frames_of, prepared};
+use super::{Instrument, Result, Truth, hours_per_m, motion, sky};
 use crate::fit::settings::{
-    DataFiles, FitError, FitFile, Loss, LossKind, Noise, Observation as Seen, Scattering,
-    StaticImageFile, Within, refuse,
+    DataFiles, FitError, FitFile, Loss, LossKind, Scattering, StaticImageFile, Within, refuse,
 };
 use crate::interferometry::Complex64;
 use crate::interferometry::array::Array;
-use crate::interferometry::earth::{Frame, Ut1};
 use crate::interferometry::gains::{GainPriors, GainTable};
-use crate::interferometry::noise::{ScatteringKernel, add_thermal_noise, apply_gains, unscatter};
+use crate::interferometry::noise::{ScatteringKernel, add_thermal_noise, unscatter};
 use crate::interferometry::observation::{Observation, Row};
 use crate::interferometry::operator::{ImageGrid, Method, Operator, Pulse, Transform};
-use crate::interferometry::schedule::{self, Clock, Schedule, Setup};
+use crate::interferometry::polarimetry::LeakageTable;
 use crate::interferometry::simulate::{self, Movie};
-use crate::interferometry::source::Source;
 use crate::memory;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -46,6 +46,10 @@ pub struct Measured {
     pub gains: Option<GainPriors>,
     /// The gains that were put on simulated data.
     pub true_gains: Option<GainTable>,
+    /// Leakage of the stations' feeds, where it is solved for.
+    pub leakage: Option<LeakageUnknown>,
+    /// The leakage that was put on simulated data.
+    pub true_leakage: Option<LeakageTable>,
 }
 
 impl Measured {
@@ -84,7 +88,7 @@ impl Measured {
                 )
             }
             _ if file.instrument.is_some() && !file.has_visibilities() => refuse!(
-                "instrument.gains needs visibilities: [data.visibilities], or an [observation] of the truth"
+                "instrument needs visibilities: [data.visibilities], or an [observation] of the truth"
             ),
             _ => Ok(()),
         }
@@ -120,14 +124,19 @@ impl Measured {
             refuse!("{name} holds visibilities, and there is no [data.visibilities]")
         };
         let settings = VisibilitySettings { average_s, uv_min };
-        let mut observation = prepared(observation, &settings).within(name)?;
-        add_systematic("data.visibilities.systematic", systematic, &mut observation)?;
+        let mut observation = match is_polarized(&file.loss) {
+            true => all_products(observation, &settings).within(name)?,
+            false => prepared(observation, &settings).within(name)?,
+        };
+        let losses = (&mut observation, &file.loss[..]);
+        add_systematic("data.visibilities.systematic", systematic, losses)?;
         let (hours, of_rows) = frames_of(&mut observation);
         let per_m = hours_per_m(file)?;
         let times = hours.iter().map(|h| first_time + (h - hours[0]) / per_m).collect();
         let gains = gains::priors(file.instrument.as_ref(), &file.loss, &observation)?;
+        let leakage = leakage::unknown(file.instrument.as_ref(), &observation)?;
         let (visibilities, sky) = (Some((observation, of_rows)), Some(sky(file)?));
-        Ok(Measured { times, visibilities, sky, gains, ..Measured::empty() })
+        Ok(Measured { times, visibilities, sky, gains, leakage, ..Measured::empty() })
     }
 
     /// Takes measured visibilities as the data of a static image, whose frames have hours of UTC for times. `name` is
@@ -136,10 +145,14 @@ impl Measured {
     /// # Errors
     /// If a visibility has no error, none is left, or the kernel of scattering needs a frequency that is not known.
     pub fn of_static(file: &StaticImageFile, observation: Observation, name: &str) -> Result<Self> {
+        if file.instrument.as_ref().is_some_and(|instrument| instrument.leakage.is_some()) {
+            refuse!("instrument.leakage is not for a static image of total intensity");
+        }
         let data = &file.data.visibilities;
         let settings = VisibilitySettings { average_s: data.average_s, uv_min: data.uv_min };
         let mut observation = prepared(observation, &settings).within(name)?;
-        add_systematic("data.visibilities.systematic", data.systematic, &mut observation)?;
+        let losses = (&mut observation, &file.loss[..]);
+        add_systematic("data.visibilities.systematic", data.systematic, losses)?;
         if data.scattering == Some(Scattering::SgrA) {
             unscatter(&mut observation, &ScatteringKernel::SGR_A).within(name)?;
         }
@@ -228,8 +241,10 @@ impl Measured {
             curve: self.curve.clone(),
             sky: self.sky,
             gains: self.gains.clone(),
+            leakage: self.leakage.clone(),
             truth: None,
             true_gains: None,
+            true_leakage: None,
         }
     }
 }
@@ -284,72 +299,50 @@ fn simulate(
     afford_movie(hours.len(), file.screen.pixels)?;
     let per_m = hours_per_m(file)?;
     let times: Vec<f64> = hours.iter().map(|h| seen.first_time + (h - hours[0]) / per_m).collect();
-    let movie = lit(&truth, truth.movie(file, instrument, &times)?)?;
-    let images = Movie { grid: sky, pixels: movie.clone() };
-    simulate::fill(&mut observation, &images, Pulse::Triangle, &hours, Method::Direct)?;
-    let true_gains = spoil(file, seen, &mut observation)?;
+    let movie = fill(&mut observation, (file, fit, instrument), &truth, (&hours, &times), sky)?;
+    let Spoiled { gains: true_gains, leakage: true_leakage } =
+        spoil((file, fit), seen, &mut observation)?;
     let gains = gains::priors(fit.instrument.as_ref(), &fit.loss, &observation)?;
+    let leakage = leakage::unknown(fit.instrument.as_ref(), &observation)?;
     let frame = |time: f64| hours.partition_point(|hour| *hour < time - 1e-9).min(hours.len() - 1);
     let of_rows = observation.rows.iter().map(|row| frame(row.time_h)).collect();
     let visibilities = Some((observation, of_rows));
     let (movie, sky, truth) = (Some(movie), Some(sky), Some(truth));
-    Ok(Measured { times, movie, visibilities, sky, truth, gains, true_gains, ..Measured::empty() })
+    Ok(Measured {
+        times,
+        movie,
+        visibilities,
+        sky,
+        truth,
+        gains,
+        true_gains,
+        leakage,
+        true_leakage,
+        ..Measured::empty()
+    })
 }
 
-/// Rows of the observation without values, and hours of UTC of its scans.
-fn schedule_of(seen: &Seen, array: Option<&Array>) -> Result<(Observation, Vec<f64>)> {
-    let source: Source = seen
-        .source
-        .parse()
-        .map_err(|error| FitError::Conflict(format!("observation.source: {error}")))?;
-    let (clock, [start_h, stop_h]) = clock(seen)?;
-    let schedule = Schedule { mjd: seen.mjd, clock, start_h, stop_h, scans: seen.scans };
-    let setup = Setup {
-        frequency_hz: seen.frequency_ghz * 1e9,
-        bandwidth_hz: seen.bandwidth_ghz * 1e9,
-        integration_s: seen.integration_s,
-        elevation_deg: seen.elevation_deg,
-        ut1: Ut1::Table,
-        frame: Frame::Catalogue,
-    };
-    let missing = || FitError::missing("observation.array", "an observation needs its stations");
-    let array = array.ok_or_else(missing)?;
-    let mut observation = schedule::observe_affordable(array, source.position, &schedule, &setup)
-        .within("observation")?;
-    observation.source = source.name;
-    Ok((observation, schedule.hours_utc(setup.ut1).within("observation")?))
-}
-
-/// The clock of the observation and its hours.
-fn clock(seen: &Seen) -> Result<(Clock, [f64; 2])> {
-    match (seen.utc, seen.gmst) {
-        (Some(hours), None) => Ok((Clock::Utc, hours)),
-        (None, Some(hours)) => Ok((Clock::Gmst, hours)),
-        (Some(_), Some(_)) => refuse!(
-            "observation.gmst is not allowed together with observation.utc"
-        ),
-        (None, None) => Err(FitError::missing(
-            "observation.utc",
-            "give `utc = [FROM, TO]`, hours of UTC of the first scan and of one after the last, or `gmst = [FROM, TO]`, \
-             the same in sidereal time, in [observation]",
-        ).into()),
+/// Fills an observation with the visibilities of a truth: its images of total intensity.
+fn fill(
+    observation: &mut Observation,
+    (file, fit, instrument): (&FitFile, &FitFile, &Instrument),
+    truth: &Truth,
+    (hours, times): (&[f64], &[f64]),
+    sky: ImageGrid,
+) -> Result<Vec<f64>> {
+    let of = |pixels: Vec<f64>| Movie { grid: sky, pixels };
+    if !is_polarized(&fit.loss) {
+        let images = of(lit(truth, truth.movie(file, instrument, times)?)?);
+        simulate::fill(observation, &images, Pulse::Triangle, hours, Method::Direct)?;
+        return Ok(images.pixels);
     }
-}
-
-/// Errors of gains, thermal noise and systematic errors, in the order of light's way.
-fn spoil(file: &FitFile, seen: &Seen, observation: &mut Observation) -> Result<Option<GainTable>> {
-    let gains = seen.gains.as_ref();
-    if let Some(name) = gains.and_then(|gains| gains.unknown_station(observation)) {
-        refuse!("observation.gains.stations.{name}: {} has no such station", seen.array);
-    }
-    let gains = gains.map(|gains| apply_gains(observation, gains, file.seed));
-    if seen.noise == Noise::Thermal {
-        add_thermal_noise(observation, file.seed);
-    }
-    if let Some(part) = seen.systematic {
-        add_systematic("observation.systematic", part, observation)?;
-    }
-    Ok(gains)
+    let mut model = instrument.forward::<f64>(&motion(file, times.to_vec())?)?;
+    let all = truth.movie_through(&mut model);
+    let [i, q, u] = polarized::split(&all, sky.pixels()).map(of);
+    let i = of(lit(truth, i.pixels)?);
+    let movies = [&i, &q, &u];
+    simulate::fill_polarized(observation, movies, Pulse::Triangle, hours, Method::Direct)?;
+    Ok(i.pixels)
 }
 
 /// A simulated movie, if any of its pixels shines: a dark one would be recovered as nothing, perfectly.
@@ -363,15 +356,4 @@ fn lit(truth: &Truth, movie: Vec<f64>) -> Result<Vec<f64>> {
         );
     }
     Ok(movie)
-}
-
-/// Adds a part of each amplitude to its error in quadrature.
-fn add_systematic(name: &str, part: f64, observation: &mut Observation) -> Result<()> {
-    if !(part >= 0.0 && part.is_finite()) {
-        return Err(FitError::range(name, part, "0 or above").into());
-    }
-    for row in &mut observation.rows {
-        row.noise_sigma[0] = row.noise_sigma[0].hypot(part * row.products[0].norm());
-    }
-    Ok(())
 }

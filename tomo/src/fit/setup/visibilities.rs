@@ -18,15 +18,31 @@ pub struct VisibilitySettings {
 /// # Errors
 /// If a visibility has no error, or none is left.
 pub fn prepared(observation: Observation, settings: &VisibilitySettings) -> Result<Observation> {
-    check_errors(&observation)?;
-    let observation = long_enough(observation, settings.uv_min)?;
-    let mut observation = if settings.average_s > 0.0 {
-        observation.averaged_in_scans(settings.average_s).total_intensity()
-    } else {
-        observation.total_intensity()
-    };
+    let mut observation = averaged(observation, settings)?.total_intensity();
     observation.sort();
     Ok(observation)
+}
+
+/// The same with all products, those of rows without parallel hands too.
+///
+/// # Errors
+/// As [`prepared`].
+pub(super) fn all_products(
+    observation: Observation,
+    settings: &VisibilitySettings,
+) -> Result<Observation> {
+    let mut observation = averaged(observation, settings)?;
+    observation.sort();
+    Ok(observation)
+}
+
+fn averaged(observation: Observation, settings: &VisibilitySettings) -> Result<Observation> {
+    check_errors(&observation)?;
+    let observation = long_enough(observation, settings.uv_min)?;
+    Ok(match settings.average_s > 0.0 {
+        true => observation.averaged_in_scans(settings.average_s),
+        false => observation,
+    })
 }
 
 fn long_enough(observation: Observation, uv_min: Option<f64>) -> Result<Observation> {

@@ -67,9 +67,9 @@ pub struct Station {
     /// Least and greatest elevation in degrees at which it observes, where it has limits of its
     /// own.
     pub elevation_deg: Option<[f64; 2]>,
-    /// Carried along for files; not simulated.
+    /// As a file has it; all zeros where it has none ([`feed_rotation`](super::polarimetry::feed_rotation)).
     pub feed_rotation: FeedRotation,
-    /// Leakage terms of the R and L feeds; carried along for files, not simulated.
+    /// Leakage terms of the R and L feeds; carried along for files; simulations draw their own.
     pub leakage: [Complex64; 2],
 }
 

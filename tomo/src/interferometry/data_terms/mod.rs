@@ -3,10 +3,12 @@
 
 mod closures;
 mod gains;
+mod polarized;
 mod visibilities;
 
 pub use closures::ClosureTerm;
 pub use gains::GainTerm;
+pub use polarized::PolarizedTerm;
 pub use visibilities::{AmplitudeTerm, VisibilityTerm};
 
 use super::observation::{Measured, Observation};
@@ -41,6 +43,11 @@ pub enum DataTermError {
     /// Nothing to compare with.
     #[error("there are no data for this term")]
     Empty,
+    /// Leakage is of feeds, and the data are Stokes parameters.
+    #[error(
+        "leakage needs the products of circular feeds (RR, LL, RL, LR): these data are I, Q, U, V"
+    )]
+    NoHands,
     /// Closure quantities that depend on each other.
     #[error("the covariance of closure quantities at {0} h UTC is singular")]
     Singular(f64),

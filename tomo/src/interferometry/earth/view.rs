@@ -115,12 +115,35 @@ impl View {
         let sine = dot(position, self.towards) / dot(position, position).sqrt();
         sine.clamp(-1.0, 1.0).asin() * 180.0 / PI
     }
+
+    /// Parallactic angle of the source in degrees: from north to the zenith, towards east, with the zenith along the
+    /// geocentric position. It is positive where the source is west of the meridian of a place north of it.
+    pub fn parallactic_deg(&self, position: [f64; 3]) -> f64 {
+        dot(position, self.east).atan2(dot(position, self.north)) * 180.0 / PI
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::units::SPEED_OF_LIGHT;
+
+    /// tan ψ = cos φ sin H/(sin φ cos δ − cos φ sin δ cos H), of a place at longitude 0 and latitude φ.
+    #[test]
+    fn exact_parallactic_angle_of_an_hour_angle() {
+        let source = SourcePosition::new(3.0, 12.4).unwrap();
+        let (latitude, dec) = (28f64.to_radians(), 12.4f64.to_radians());
+        for hour_angle in [-5.0f64, -1.0, 0.5, 4.0] {
+            // At longitude 0 the local sidereal time is that of Greenwich.
+            let view = View::at_gmst(source, 3.0 + hour_angle);
+            let (sin, cos) = (hour_angle * PI / 12.0).sin_cos();
+            let north = latitude.sin() * dec.cos() - latitude.cos() * dec.sin() * cos;
+            let expected = (latitude.cos() * sin).atan2(north).to_degrees();
+            let found = view.parallactic_deg([latitude.cos(), 0.0, latitude.sin()]);
+            assert!((found - expected).abs() < 1e-10, "{hour_angle} h: {found} {expected}");
+            assert!(found * hour_angle > 0.0);
+        }
+    }
 
     const FREQUENCY: f64 = 226_191_789_062.5;
 

@@ -1,15 +1,16 @@
-//! What happens to visibilities on their way: scattering, station gains, thermal noise. Each is
-//! its own step and nothing is done unless called. Leakage between the hands of a feed is not
-//! simulated.
+//! What happens to visibilities on their way: scattering, leakage, station gains, thermal noise. Each is
+//! its own step and nothing is done unless called.
 //!
 //! Random numbers come from PCG-64 (MCG, O'Neill 2014) seeded with a 64-bit number, and a stream
 //! of its own for each step: the same seed makes the same data on every machine.
 
 mod gains;
+mod leakage;
 mod scattering;
 mod thermal;
 
 pub use gains::{GainErrors, apply_gains};
+pub use leakage::apply_leakage;
 pub use scattering::{ScatteringKernel, scatter, unscatter};
 pub use thermal::add_thermal_noise;
 

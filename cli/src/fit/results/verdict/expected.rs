@@ -46,8 +46,8 @@ impl Evidence<'_> {
     pub(super) fn draws(&self, loss: &Loss, model: &[Complex<f64>]) -> Option<Vec<Statistics>> {
         let (observation, frames) = self.measured.visibilities.as_ref()?;
         let has_gains = self.measured.gains.is_some() && loss.data == LossKind::Amplitudes;
-        let kinds = [LossKind::Visibilities, LossKind::Image, LossKind::LightCurve];
-        if has_gains || kinds.contains(&loss.data) {
+        let kinds = [LossKind::Image, LossKind::LightCurve];
+        if has_gains || loss.data.is_visibilities() || kinds.contains(&loss.data) {
             return None;
         }
         let draw = |k: u64| {

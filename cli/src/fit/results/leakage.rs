@@ -1,0 +1,114 @@
+//! Leakage between the feeds of stations that a fit has solved for: a table, a picture and numbers.
+
+use super::Estimate;
+use crate::fit::leakage::TABLE;
+use crate::report::{Axis, LinePlot, Marks, Series, Table};
+use kerrlight_tomo::interferometry::files;
+use kerrlight_tomo::interferometry::polarimetry::{LeakageDistance, LeakageTable, StationLeakage};
+use serde_json::{Value, json};
+
+/// Leakage that was found.
+pub struct Leakage {
+    table: LeakageTable,
+    truth: Option<LeakageTable>,
+}
+
+impl Estimate<'_> {
+    /// The leakage of all stations beside images of I, Q and U of all frames, where it is solved for; writes its table. The
+    /// loss sees it from now on.
+    pub fn leakage(&self, seen: &[f32]) -> anyhow::Result<Option<Leakage>> {
+        let Some(found) = self.measured.solve_leakage(seen)? else { return Ok(None) };
+        let text = files::leakage_to_csv(&found.table);
+        self.folder.file(TABLE)?.write(text.as_bytes())?;
+        Ok(Some(Leakage { table: found.table, truth: self.measured.true_leakage.clone() }))
+    }
+}
+
+impl Leakage {
+    fn distance(&self) -> Option<LeakageDistance> {
+        self.table.distance(self.truth.as_ref()?)
+    }
+
+    /// For results.json.
+    pub fn json(&self) -> Value {
+        let station = |s: &StationLeakage| {
+            json!({
+                "station": s.station,
+                "d_r": [s.terms[0].re, s.terms[0].im], "d_r_error": s.errors[0],
+                "d_l": [s.terms[1].re, s.terms[1].im], "d_l_error": s.errors[1],
+            })
+        };
+        let stations: Vec<Value> = self.table.stations.iter().map(station).collect();
+        let mut all = json!({ "file": TABLE, "stations": stations });
+        if let Some(LeakageDistance { rms, largest, size, count }) = self.distance() {
+            all["beside_the_truth"] =
+                json!({ "rms": rms, "largest": largest, "size": size, "count": count });
+        }
+        all
+    }
+
+    /// Sentences for the report.
+    pub fn sentences(&self) -> Vec<String> {
+        let mut all = vec![format!(
+            "The leakage of {} stations was solved for in turn with the emission; {TABLE} has it.",
+            self.table.stations.len()
+        )];
+        if let Some(LeakageDistance { rms, largest, size, .. }) = self.distance() {
+            all.push(format!(
+                "Beside the true leakage, {:.2} % (root mean square of |d|), the recovered one is off by {:.2} % (root mean square; at most {:.2} %).",
+                100.0 * size,
+                100.0 * rms,
+                100.0 * largest
+            ));
+        }
+        all
+    }
+
+    /// A line for every station, in per cent.
+    pub fn details(&self) -> Table {
+        let row = |s: &StationLeakage| {
+            let number = |x: f64| format!("{:.2}", 100.0 * x);
+            let of = |k: usize| [s.terms[k].re, s.terms[k].im, s.errors[k]].map(number);
+            [vec![s.station.clone()], of(0).to_vec(), of(1).to_vec()].concat()
+        };
+        let head = ["station", "Re d_R", "Im d_R", "σ of d_R", "Re d_L", "Im d_L", "σ of d_L"];
+        Table {
+            title: "Leakage".to_owned(),
+            caption: "Leakage of the other hand into each feed, in per cent, with the standard deviation of each part that data and prior leave open, the model taken for granted.".to_owned(),
+            head: head.map(str::to_owned).to_vec(),
+            rows: self.table.stations.iter().map(row).collect(),
+            links: Vec::new(),
+        }
+    }
+
+    /// All terms in the complex plane, beside the true ones where these are known.
+    pub fn plot(&self) -> LinePlot {
+        let points = |table: &LeakageTable, hand: usize| {
+            let of = |s: &StationLeakage| [100.0 * s.terms[hand].re, 100.0 * s.terms[hand].im];
+            table.stations.iter().map(of).collect::<Vec<[f64; 2]>>()
+        };
+        let mut series = Vec::new();
+        for (hand, name) in ["d_R", "d_L"].into_iter().enumerate() {
+            let errors = self.table.stations.iter().map(|s| 100.0 * s.errors[hand]);
+            series.push(Series {
+                name: name.to_owned(),
+                points: points(&self.table, hand),
+                errors: errors.collect(),
+                marks: Marks::Points,
+            });
+            series.extend(self.truth.as_ref().map(|truth| Series {
+                name: format!("{name}, truth"),
+                points: points(truth, hand),
+                errors: Vec::new(),
+                marks: Marks::Points,
+            }));
+        }
+        LinePlot {
+            title: "Leakage of stations".to_owned(),
+            caption: "Leakage d_R and d_L of every station in the complex plane; 0 is a feed that is pure.".to_owned(),
+            x: Axis { label: "real part".to_owned(), unit: "%".to_owned(), log: false },
+            y: Axis { label: "imaginary part".to_owned(), unit: "%".to_owned(), log: false },
+            series,
+        }
+    }
+}

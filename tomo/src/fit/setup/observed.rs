@@ -1,0 +1,105 @@
+//! What an array sees of a simulation: its schedule, and what spoils the data.
+
+use super::Result;
+use super::leakage::observing;
+use super::polarized::is_polarized;
+use crate::fit::settings::{FitError, FitFile, Loss, Noise, Observation as Seen, Within, refuse};
+use crate::interferometry::array::Array;
+use crate::interferometry::earth::{Frame, Ut1};
+use crate::interferometry::gains::GainTable;
+use crate::interferometry::noise::{add_thermal_noise, apply_gains, apply_leakage};
+use crate::interferometry::observation::Observation;
+use crate::interferometry::polarimetry::LeakageTable;
+use crate::interferometry::schedule::{self, Clock, Schedule, Setup};
+use crate::interferometry::source::Source;
+
+/// Rows of the observation without values, and hours of UTC of its scans.
+pub(super) fn schedule_of(seen: &Seen, array: Option<&Array>) -> Result<(Observation, Vec<f64>)> {
+    let source: Source = seen
+        .source
+        .parse()
+        .map_err(|error| FitError::Conflict(format!("observation.source: {error}")))?;
+    let (clock, [start_h, stop_h]) = clock(seen)?;
+    let schedule = Schedule { mjd: seen.mjd, clock, start_h, stop_h, scans: seen.scans };
+    let setup = Setup {
+        frequency_hz: seen.frequency_ghz * 1e9,
+        bandwidth_hz: seen.bandwidth_ghz * 1e9,
+        integration_s: seen.integration_s,
+        elevation_deg: seen.elevation_deg,
+        ut1: Ut1::Table,
+        frame: Frame::Catalogue,
+    };
+    let missing = || FitError::missing("observation.array", "an observation needs its stations");
+    let array = array.ok_or_else(missing)?;
+    let mut observation = schedule::observe_affordable(array, source.position, &schedule, &setup)
+        .within("observation")?;
+    observation.source = source.name;
+    Ok((observation, schedule.hours_utc(setup.ut1).within("observation")?))
+}
+
+/// The clock of the observation and its hours.
+fn clock(seen: &Seen) -> Result<(Clock, [f64; 2])> {
+    match (seen.utc, seen.gmst) {
+        (Some(hours), None) => Ok((Clock::Utc, hours)),
+        (None, Some(hours)) => Ok((Clock::Gmst, hours)),
+        (Some(_), Some(_)) => refuse!(
+            "observation.gmst is not allowed together with observation.utc"
+        ),
+        (None, None) => Err(FitError::missing(
+            "observation.utc",
+            "give `utc = [FROM, TO]`, hours of UTC of the first scan and of one after the last, or `gmst = [FROM, TO]`, \
+             the same in sidereal time, in [observation]",
+        ).into()),
+    }
+}
+
+/// What was put on simulated data.
+#[derive(Default)]
+pub(super) struct Spoiled {
+    pub gains: Option<GainTable>,
+    pub leakage: Option<LeakageTable>,
+}
+
+/// Leakage, errors of gains, thermal noise and systematic errors, in the order of light's way.
+pub(super) fn spoil(
+    (file, fit): (&FitFile, &FitFile),
+    seen: &Seen,
+    observation: &mut Observation,
+) -> Result<Spoiled> {
+    let gains = seen.gains.as_ref();
+    if let Some(name) = gains.and_then(|gains| gains.unknown_station(observation)) {
+        refuse!("observation.gains.stations.{name}: {} has no such station", seen.array);
+    }
+    let drawn = seen.leakage.map(|amplitude| apply_leakage(observation, amplitude, file.seed));
+    let observes = observing(observation);
+    let leakage = drawn.transpose().within("observation.leakage")?.map(|leakage| {
+        let exact = vec![[0.0; 2]; leakage.len()];
+        LeakageTable::new(&observation.stations, &leakage, &exact, |k| observes[k])
+    });
+    let gains = gains.map(|gains| apply_gains(observation, gains, file.seed));
+    if seen.noise == Noise::Thermal {
+        add_thermal_noise(observation, file.seed);
+    }
+    if let Some(part) = seen.systematic {
+        add_systematic("observation.systematic", part, (observation, &fit.loss))?;
+    }
+    Ok(Spoiled { gains, leakage })
+}
+
+/// Adds a part of each amplitude to its error in quadrature; to that of each product where all are fitted.
+pub(super) fn add_systematic(
+    name: &str,
+    part: f64,
+    (observation, losses): (&mut Observation, &[Loss]),
+) -> Result<()> {
+    if !(part >= 0.0 && part.is_finite()) {
+        return Err(FitError::range(name, part, "0 or above").into());
+    }
+    let products = if is_polarized(losses) { 4 } else { 1 };
+    for row in &mut observation.rows {
+        for (sigma, product) in row.noise_sigma.iter_mut().zip(row.products).take(products) {
+            *sigma = sigma.hypot(part * product.norm());
+        }
+    }
+    Ok(())
+}

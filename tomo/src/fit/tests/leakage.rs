@@ -1,0 +1,86 @@
+//! A polarised flare seen through leaking feeds.
+
+use crate::fit::settings::FitFile;
+use crate::fit::setup::{self, Instrument, Measured};
+use crate::interferometry::array::built_in;
+use crate::scene::apply_override;
+
+const FLARE: &str = include_str!("../../../../scenes/fits/polarized_flare.toml");
+
+fn file(set: &[&str]) -> FitFile {
+    let small = [
+        "screen.pixels=16",
+        "representation.nodes=16",
+        "linear.iterations=25",
+        "observation.scans=24",
+        "observation.bandwidth_ghz=8.0",
+        "truth.spot.0.sigma=1.0",
+        "instrument.leakage.rounds=5",
+    ];
+    let text = small
+        .iter()
+        .chain(set)
+        .fold(FLARE.to_owned(), |text, assignment| apply_override(&text, assignment).unwrap());
+    FitFile::parse(&text).unwrap()
+}
+
+fn simulated(file: &FitFile) -> (Instrument, Measured) {
+    let instrument = Instrument::new(file).unwrap();
+    let array = built_in(&file.observation.as_ref().unwrap().array).unwrap();
+    let measured = Measured::simulated(file, &instrument, Some(&array)).unwrap();
+    (instrument, measured)
+}
+
+/// Gradients of the loss with respect to parameters, against central differences.
+#[test]
+fn exact_gradients_with_respect_to_emission() {
+    let file = file(&["observation.scans=3", "screen.pixels=12"]);
+    let (instrument, measured) = simulated(&file);
+    let motion = setup::motion(&file, measured.times.clone()).unwrap();
+    let model = instrument.forward::<f64>(&motion).unwrap();
+    measured.restore_leakage(measured.true_leakage.as_ref().unwrap());
+    let terms = measured.visibility_terms::<f64>(&file.loss, 144).unwrap();
+    let images = 3 * 144;
+    let mut image: Vec<f64> = (0..images).map(|k| 0.01 * (0.7 * k as f64).sin()).collect();
+    assert_eq!((model.pixels(), terms[0].term.pixels()), (images, images));
+    let value = |image: &[f64], gradient: &mut [f64]| {
+        terms[0].term.value_and_gradient(1, image, 1.0, gradient)
+    };
+    let mut gradient = vec![0.0; images];
+    value(&image, &mut gradient);
+    let largest = gradient.iter().fold(0.0f64, |most, g| most.max(g.abs()));
+    for k in (0..images).step_by(7) {
+        let mut at = |step: f64| {
+            let before = image[k];
+            image[k] += step;
+            let value = value(&image, &mut vec![0.0; images]);
+            image[k] = before;
+            value
+        };
+        let difference = (at(1e-3) - at(-1e-3)) / 2e-3;
+        assert!((difference - gradient[k]).abs() < 1e-6 * largest, "{k}");
+    }
+}
+
+/// What contradicts polarised visibilities and leakage is refused by name.
+#[test]
+fn exact_refusals() {
+    let refused = |set: &[&str], without_field: bool| {
+        let mut file = file(set);
+        if without_field {
+            file.polarization = None;
+        }
+        let registry = crate::representation::Registry::default();
+        let checked =
+            setup::check(&file, &registry).and_then(|()| Instrument::new(&file).map(drop));
+        checked.unwrap_err().to_string()
+    };
+    assert!(refused(&[], true).starts_with("polarization is missing"));
+    let intensity = "loss=[{data=\"visibilities\",weight=1.0}]";
+    assert!(refused(&[intensity], false).contains("instrument.leakage needs a loss"));
+    let both =
+        "loss=[{data=\"polarized-visibilities\",weight=1.0},{data=\"image\",weight=1.0,sigma=1.0}]";
+    assert!(refused(&[both], false).contains("a loss of images"));
+    let drawn = ["representation={kind=\"grid\",nodes=8,activation=\"linear\"}"];
+    assert!(!refused(&drawn, false).is_empty());
+}

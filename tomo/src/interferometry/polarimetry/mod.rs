@@ -1,0 +1,17 @@
+//! Correlations of circular feeds: what Stokes parameters give in each of them, how feeds turn on the sky, and leakage
+//! between them.
+
+mod feeds;
+mod jones;
+mod problem;
+mod products;
+mod table;
+
+pub use feeds::{feed_rotation, turns};
+pub use jones::{Leakage, SharedLeakage, jones, leaked, response};
+pub use problem::{LeakageDatum, LeakageProblem, LeakageSolution};
+pub use products::{Product, Products};
+pub use table::{LeakageDistance, LeakageTable, StationLeakage};
+
+/// Stokes parameters that a model has: I, Q and U, in this order. V is 0.
+pub const MODELLED: usize = 3;
