@@ -26,6 +26,7 @@ mod graphics_devices;
 mod held_out;
 mod interferometry;
 mod kerr_references;
+mod leakage;
 mod lensing;
 #[cfg(unix)]
 mod mpirun;

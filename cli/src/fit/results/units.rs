@@ -1,7 +1,7 @@
 //! Units of settings, as docs/reference/fit-file.md gives them.
 
 /// Keys as they end, without the numbers of lists, and their units; the first that fits counts.
-const UNITS: [(&str, &str); 55] = [
+const UNITS: [(&str, &str); 57] = [
     ("hole.spin", "M"),
     ("hole.mass_msun", "solar masses"),
     ("hole.distance_kpc", "kpc"),
@@ -30,6 +30,8 @@ const UNITS: [(&str, &str); 55] = [
     ("movie.to", "GM/c³"),
     ("center", "M"),
     ("spot.sigma", "M"),
+    ("gains.amplitude", ""),
+    ("leakage.amplitude", ""),
     ("amplitude", "model units"),
     ("wound_for", "GM/c³"),
     ("glyph.height", "M"),
