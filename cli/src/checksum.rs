@@ -1,6 +1,7 @@
 //! Checksums: of bytes, and of texts that carry their own.
 
 use serde::{Deserialize, Serialize};
+use std::io::BufRead;
 
 /// What tells bytes from others.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -15,6 +16,21 @@ impl Sum {
     /// Of these bytes.
     pub fn of(bytes: &[u8]) -> Self {
         Sum { bytes: bytes.len() as u64, crc32: format!("{:08x}", crc32fast::hash(bytes)) }
+    }
+
+    /// Of what is left of a file.
+    pub fn of_file(file: &mut impl BufRead) -> std::io::Result<Self> {
+        let (mut bytes, mut sum) = (0, crc32fast::Hasher::new());
+        loop {
+            let some = file.fill_buf()?;
+            if some.is_empty() {
+                return Ok(Sum { bytes, crc32: format!("{:08x}", sum.finalize()) });
+            }
+            sum.update(some);
+            let length = some.len();
+            bytes += length as u64;
+            file.consume(length);
+        }
     }
 }
 

@@ -2,7 +2,9 @@
 
 use crate::checksum::Sum;
 use crate::output;
+use anyhow::Context;
 use std::collections::BTreeMap;
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 /// Sums of files, each of which is read once.
@@ -15,7 +17,8 @@ impl FileSums {
         if let Some(sum) = self.0.get(path) {
             return Ok(sum.clone());
         }
-        let sum = Sum::of(&output::read(path)?);
+        let name = || format!("cannot read {}", path.display());
+        let sum = Sum::of_file(&mut BufReader::new(output::open(path)?)).with_context(name)?;
         self.0.insert(path.to_owned(), sum.clone());
         Ok(sum)
     }

@@ -1,10 +1,10 @@
 //! What memory there is, and an allocator that takes no more.
 
 use anyhow::bail;
-use kerrlight_tomo::memory::{self, shown};
+use kerrlight_tomo::memory::{self, Scratch, shown};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// `4GiB`, `500 MB`, `2g` or a number of bytes.
@@ -51,8 +51,35 @@ pub fn limit(given: Option<u64>) -> anyhow::Result<()> {
         bail!("no memory is left: {by}");
     }
     memory::set_limit(bytes);
+    memory::set_scratch(scratch);
     LIMIT.store(usize::try_from(bytes).unwrap_or(usize::MAX), Ordering::Relaxed);
     Ok(())
+}
+
+/// A file that nobody else sees and that is gone with the process: where TMPDIR says, else in the current folder, which
+/// is less often a disk in memory than the system's folder for such files.
+fn scratch(bytes: f64) -> std::io::Result<Box<dyn Scratch>> {
+    let folder = std::env::var_os("TMPDIR").map_or_else(|| PathBuf::from("."), PathBuf::from);
+    if let Some(free) = free(&folder).filter(|free| bytes > *free) {
+        let [needed, free] = [bytes, free].map(shown);
+        let folder = folder.display();
+        return Err(std::io::Error::other(format!(
+            "{needed} are needed, but {folder} has {free} left: let TMPDIR name another folder, or give more --memory"
+        )));
+    }
+    Ok(Box::new(tempfile::tempfile_in(&folder)?))
+}
+
+/// Bytes that are left where a folder is, if the system says so.
+#[cfg(unix)]
+fn free(folder: &Path) -> Option<f64> {
+    let all = nix::sys::statvfs::statvfs(folder).ok()?;
+    Some(all.blocks_available() as f64 * all.fragment_size() as f64)
+}
+
+#[cfg(not(unix))]
+fn free(_: &Path) -> Option<f64> {
+    None
 }
 
 /// Bytes that are left, and what leaves them: the least of all that says something.
@@ -235,6 +262,14 @@ mod tests {
         for wrong in ["", "GiB", "4 potatoes", "-1G", "nan", "0", "1e30", "1"] {
             assert!(parse(wrong).is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn exact_a_file_that_no_disk_holds_is_refused() {
+        let message = scratch(1e24).err().unwrap().to_string();
+        assert!(message.starts_with("867361.7 EiB are needed, but "), "{message}");
+        assert!(message.contains("TMPDIR") && message.contains("--memory"), "{message}");
     }
 
     #[test]

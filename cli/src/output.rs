@@ -6,7 +6,7 @@ use kerrlight_tomo::memory;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::fs::File;
-use std::io::{BufWriter, Read, Seek, Write};
+use std::io::{BufReader, BufWriter, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -282,6 +282,20 @@ fn bytes_of(path: &Path, mut file: File) -> anyhow::Result<Vec<u8>> {
         }
     });
     Ok(bytes)
+}
+
+/// The same file, read once from its beginning to its end for its checksum: what it holds need not fit into memory.
+pub fn read_through(path: &Path) -> anyhow::Result<BufReader<File>> {
+    let name = || format!("cannot read {}", path.display());
+    let mut file = BufReader::with_capacity(1 << 16, open(path)?);
+    let sum = Sum::of_file(&mut file).with_context(name)?;
+    file.rewind().with_context(name)?;
+    READ.with_borrow_mut(|read| {
+        if let Some(read) = read {
+            read.push((path.to_owned(), sum));
+        }
+    });
+    Ok(file)
 }
 
 thread_local! {

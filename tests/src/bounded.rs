@@ -132,3 +132,45 @@ fn exact_a_limit_of_the_shell_counts() {
     assert_eq!(output.status.code(), Some(2), "{message}");
     assert!(message.contains("screen.pixels = 4000"), "{message}");
 }
+
+/// A movie that is larger than its part of the memory is kept in a file, and nothing that comes out is another byte.
+#[test]
+fn exact_a_movie_in_a_file_gives_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let scene = crate::support::root().join("scenes/fits/flare_images.toml");
+    let set = [
+        "screen.pixels=16",
+        "movie.frames=17000",
+        "training.steps=4",
+        "output.nodes=12",
+        "representation=grid",
+        "representation.nodes=12",
+        "training.start={linear={nodes=12,stride=400,steps=4}}",
+    ];
+    let set: Vec<&str> = set.iter().flat_map(|change| ["--set", *change]).collect();
+    let words = ["fit", scene.to_str().unwrap(), "-o"];
+    for (run, memory) in [("all", "4GiB"), ("little", "256MiB")] {
+        succeed(at, &[&["--memory", memory][..], &words, &[run], &set].concat());
+    }
+    let names = ["checkpoint.safetensors", "volume.npz", "movie.npz", "movie.png", "truth.npz"];
+    for name in names {
+        let [a, b] = ["all", "little"].map(|run| std::fs::read(at.join(run).join(name)).unwrap());
+        assert!(a == b, "{name}");
+    }
+    // The same of its results as data.
+    let data = ["--set", "data.movie.path=all/movie.npz"];
+    let truth = std::fs::read_to_string(&scene).unwrap();
+    let (head, rest) = truth.split_once("[[truth.spot]]").unwrap();
+    let (_, tail) = rest.split_once("[movie]").unwrap();
+    std::fs::write(at.join("data.toml"), format!("{head}[movie]{tail}")).unwrap();
+    for (run, memory) in [("read", "4GiB"), ("read_little", "256MiB")] {
+        let words = ["--memory", memory, "fit", "data.toml", "-o", run];
+        succeed(at, &[&words[..], &set, &data].concat());
+    }
+    for name in &names[..4] {
+        let [a, b] =
+            ["read", "read_little"].map(|run| std::fs::read(at.join(run).join(name)).unwrap());
+        assert!(a == b, "{name}");
+    }
+}

@@ -71,7 +71,9 @@ fn ranks_of(job: &Child) -> Vec<String> {
     ours.filter_map(|line| Some(line.split_whitespace().next()?.to_owned())).collect()
 }
 
-/// A rank that is killed ends the job within 10 s; another number of ranks finishes the folder, to the same bytes.
+/// Of 20 jobs of 2 to 5 ranks, each of which goes on where the one before was killed, a rank is killed at any moment between
+/// the first and the last of a job that is left alone. Each ends within 10 s, and the next ones finish the folder, to the
+/// same bytes.
 #[test]
 #[ignore = "long"]
 fn exact_a_killed_rank_ends_the_job_and_loses_nothing() {
@@ -79,29 +81,35 @@ fn exact_a_killed_rank_ends_the_job_and_loses_nothing() {
     let at = folder.path();
     experiment(at, 10, 200);
     succeed(at, &["compare", "seeds.toml", "-o", "alone"]);
-    let mut kills = 0;
-    for moment in 0..20 {
-        let Some(mut job) = start(at, 2 + moment % 4, "out") else { return };
-        std::thread::sleep(Duration::from_millis(300 + 350 * moment as u64));
-        let ranks = ranks_of(&job);
-        let Some(rank) = ranks.get(moment % ranks.len().max(1)) else { continue };
-        Command::new("kill").args(["-9", rank]).status().unwrap();
-        let clock = Instant::now();
-        while job.try_wait().unwrap().is_none() {
-            assert!(clock.elapsed() < Duration::from_secs(10), "the job goes on");
-            std::thread::sleep(Duration::from_millis(20));
-        }
-        let said = job.wait_with_output().unwrap();
-        if !said.status.success() {
-            assert!(String::from_utf8_lossy(&said.stderr).contains("mpirun"), "a message");
+    let clock = Instant::now();
+    let Some(job) = start(at, 4, "out0") else { return };
+    assert!(job.wait_with_output().unwrap().status.success());
+    let (whole, mut kills, mut finished) = (clock.elapsed(), 0, 0);
+    let check = |output: &str| {
+        assert_eq!(claims(&at.join(output), ".done"), 10);
+        same(at, "alone", output);
+    };
+    check("out0");
+    let mut started = 0;
+    while kills < 20 {
+        assert!(started < 200, "{kills} kills in {started} jobs");
+        let job = start(at, 2 + started % 4, &format!("out{}", finished + 1)).unwrap();
+        // Parts of the golden ratio lie everywhere.
+        let moment = whole.mul_f64((0.618_034 * (started + 1) as f64).fract());
+        if ends_by_kill(job, started, moment) {
             kills += 1;
+        } else {
+            // It was done before: a new folder for the next.
+            finished += 1;
+            check(&format!("out{finished}"));
         }
+        started += 1;
     }
-    assert!(kills > 3, "{kills}");
-    let said = start(at, 3, "out").unwrap().wait_with_output().unwrap();
+    println!("{kills} kills in {started} jobs, {finished} folders finished in between");
+    let last = format!("out{}", finished + 1);
+    let said = start(at, 3, &last).unwrap().wait_with_output().unwrap();
     assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stderr));
-    assert_eq!(claims(&at.join("out"), ".done"), 10);
-    same(at, "alone", "out");
+    check(&last);
 }
 
 /// Names in a folder.
@@ -124,16 +132,23 @@ fn names_below(at: &Path) -> Vec<String> {
 /// Kills a rank of the jobs that `start` starts, each a little later than in the one before, until one ends before that;
 /// how many were killed. A job ends within 10 s of that, and mpirun says why.
 fn kill_ranks(start: impl Fn(usize) -> Option<Child>) -> usize {
-    let kills = (0..40).take_while(|k| start(2 + k % 4).is_some_and(|job| ends_by_kill(job, *k)));
+    let after = |k: usize| Duration::from_millis(200 + 70 * k as u64);
+    let kills = (0..40)
+        .take_while(|k| start(2 + k % 4).is_some_and(|job| ends_by_kill(job, *k, after(*k))));
     let kills = kills.count();
     println!("{kills} jobs with a killed rank");
     kills
 }
 
-/// Kills rank k of a job, which ends within seconds; whether the job had not been finished before.
-fn ends_by_kill(mut job: Child, k: usize) -> bool {
-    std::thread::sleep(Duration::from_millis(200 + 70 * k as u64));
-    let ranks = ranks_of(&job);
+/// Kills rank k of a job so long after its beginning, which ends within seconds; whether the job had not been finished
+/// before.
+fn ends_by_kill(mut job: Child, k: usize, after: Duration) -> bool {
+    std::thread::sleep(after);
+    let mut ranks = ranks_of(&job);
+    while ranks.is_empty() && job.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(5));
+        ranks = ranks_of(&job);
+    }
     if let Some(rank) = ranks.get(k % ranks.len().max(1)) {
         Command::new("kill").args(["-9", rank]).status().unwrap();
     }

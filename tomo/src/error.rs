@@ -7,6 +7,7 @@ use crate::fit::Diverged;
 use crate::fit::checkpoint::CheckpointError;
 use crate::fit::linear::LinearError;
 use crate::fit::settings::FitError;
+use crate::frames::ScratchError;
 use crate::image::animation::AnimationError;
 use crate::interferometry::array::ArrayError;
 use crate::interferometry::data_terms::DataTermError;
@@ -54,6 +55,8 @@ pub enum Error {
     Range(#[from] OutOfRange),
     /// More memory would be needed than may be taken.
     Memory(#[from] TooLarge),
+    /// A file for what does not fit into memory.
+    Scratch(#[from] ScratchError),
     /// A scene, or an override of one of its keys.
     Scene(#[from] SceneError),
     /// The text of a catalogue of stars.

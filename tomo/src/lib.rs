@@ -10,6 +10,7 @@ pub mod dynamics;
 pub mod emission;
 mod error;
 pub mod fit;
+pub mod frames;
 pub mod image;
 pub mod interferometry;
 pub mod memory;

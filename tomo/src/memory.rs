@@ -2,6 +2,8 @@
 //! allocated: nothing is begun that cannot end.
 
 use crate::Error;
+use std::io::{Read, Seek, Write};
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Bytes that may be taken.
@@ -27,6 +29,32 @@ pub fn set_limit(bytes: u64) {
 /// How many bytes may be taken.
 pub fn limit() -> u64 {
     LIMIT.load(Ordering::Relaxed)
+}
+
+/// A part of the bytes that may be taken, from 0 to 1.
+pub fn part(part: f64) -> f64 {
+    part * limit() as f64
+}
+
+/// A file for what does not fit into memory.
+pub trait Scratch: Read + Write + Seek + Send {}
+
+impl<F: Read + Write + Seek + Send> Scratch for F {}
+
+/// Makes an empty one that has room for so many bytes.
+pub type MakeScratch = fn(f64) -> std::io::Result<Box<dyn Scratch>>;
+
+static SCRATCH: OnceLock<MakeScratch> = OnceLock::new();
+
+/// Says how files are made for what does not fit into memory; without it, what does not fit is refused. The first call
+/// counts.
+pub fn set_scratch(make: MakeScratch) {
+    let _ = SCRATCH.set(make);
+}
+
+/// An empty file with room for so many bytes, if it was said how to make one.
+pub fn scratch(bytes: f64) -> Option<std::io::Result<Box<dyn Scratch>>> {
+    SCRATCH.get().map(|make| make(bytes))
 }
 
 /// Refuses what would take more bytes than may be taken.
@@ -66,11 +94,6 @@ pub fn array(bytes: f64, values: f64) -> f64 {
     bytes + 8.0 * values
 }
 
-/// Bytes of a movie in double precision.
-pub fn movie(frames: f64, pixels: f64) -> f64 {
-    8.0 * frames * pixels
-}
-
 /// Bands of a picture that are under way, one for each thread and two more: pixels of 130 bytes.
 pub fn bands(width: f64, threads: f64) -> f64 {
     130.0 * 16.0 * width * (threads + 2.0)
@@ -84,6 +107,11 @@ pub fn frames(frames: f64, pixels: f64, channels: f64) -> f64 {
 /// Bytes of rows of visibilities: when they are made, spoilt, and written.
 pub fn visibilities(rows: f64) -> f64 {
     2.0 * size_of::<crate::interferometry::observation::Row>() as f64 * rows
+}
+
+/// Bytes of a movie in double precision.
+pub fn movie(frames: f64, pixels: f64) -> f64 {
+    8.0 * frames * pixels
 }
 
 /// Nodes on the rays of a fit: as they are traced, and as the forward model keeps them in single precision;

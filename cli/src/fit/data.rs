@@ -7,10 +7,14 @@ use anyhow::{Context, bail};
 use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::settings::{DataFiles, FitFile, StaticImageFile};
 use kerrlight_tomo::fit::setup::{Instrument, Measured};
+use kerrlight_tomo::frames::Frames;
 use kerrlight_tomo::interferometry::files;
+use kerrlight_tomo::interferometry::files::images::{WithSize, npy_frames, npz_frames};
 use kerrlight_tomo::interferometry::observation::Observation;
 use kerrlight_tomo::interferometry::simulate::Movie;
-use std::path::Path;
+use kerrlight_tomo::numpy;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
 
 /// Simulates or reads the data; relative paths start from `base_dir`.
 pub fn measure(
@@ -29,7 +33,7 @@ pub fn measure(
         }
         Some(DataFiles::Movie { path }) => {
             let path = base_dir.join(path);
-            let movie = movie(file, &path)?;
+            let movie = images(file, &path)?;
             Ok(Measured::of_movie(file, movie, &path.display().to_string())?)
         }
         Some(DataFiles::LightCurve(settings)) => {
@@ -58,6 +62,59 @@ fn with_times(file: &FitFile, base_dir: &Path) -> anyhow::Result<FitFile> {
     let times = files::parse_times(&output::read_text(&path)?);
     curve.times_h = Some(times.with_context(|| path.display().to_string())?);
     Ok(file)
+}
+
+/// The images of a file or of a sequence of files, none of which need to be in memory together, with width and height.
+fn images(file: &FitFile, path: &Path) -> anyhow::Result<WithSize> {
+    let files = movie_files::files(path)?;
+    if files.len() > 1 {
+        return sequence(file, &files);
+    }
+    let name = || path.display().to_string();
+    let kind = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    match kind.as_str() {
+        "npz" => npz_frames(output::read_through(path)?).with_context(name),
+        "npy" if is_in_c_order(path)? => npy_frames(output::read_through(path)?).with_context(name),
+        _ => {
+            let Movie { grid, pixels } = movie(file, &files[0])?;
+            Ok((Frames::of(pixels, grid.pixels()), [grid.width, grid.height]))
+        }
+    }
+}
+
+/// Whether an array can be read image by image.
+fn is_in_c_order(path: &Path) -> anyhow::Result<bool> {
+    Ok(numpy::Stream::new(BufReader::new(output::open(path)?)).is_ok())
+}
+
+/// An image a file.
+fn sequence(file: &FitFile, files: &[PathBuf]) -> anyhow::Result<WithSize> {
+    let first = movie(file, &files[0])?.grid;
+    let size = [first.width, first.height];
+    let mut refused = None;
+    let frames = Frames::made((files.len(), first.pixels()), |sink| {
+        files.iter().try_for_each(|path| match one(file, path, size) {
+            Ok(pixels) => sink(&pixels),
+            Err(error) => {
+                refused = Some(error);
+                Err(std::io::Error::other("no image").into())
+            }
+        })
+    });
+    match refused {
+        Some(error) => Err(error),
+        None => Ok((frames?, size)),
+    }
+}
+
+/// The image of a file, of this width and height.
+fn one(file: &FitFile, path: &Path, [width, height]: [usize; 2]) -> anyhow::Result<Vec<f64>> {
+    let image = movie(file, path)?;
+    if [image.grid.width, image.grid.height] != [width, height] || image.frames() != 1 {
+        let path = path.display();
+        bail!("{path}: in a sequence every file is one image of {width} x {height} pixels");
+    }
+    Ok(image.pixels)
 }
 
 /// The movie of a file, which may know its field.

@@ -220,6 +220,9 @@ fn number<const N: usize>(rest: &mut &[u8]) -> anyhow::Result<[u8; N]> {
 }
 
 #[cfg(test)]
+mod network;
+
+#[cfg(test)]
 mod tests {
     use super::*;
 

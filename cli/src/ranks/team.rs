@@ -237,10 +237,12 @@ mod tests {
     fn exact_the_first_rank_waits_for_the_others() {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path().join("shared");
+        let (go, ready) = std::sync::mpsc::channel();
         let late = {
             let at = at.clone();
             std::thread::spawn(move || {
                 let team = Team::join(&at, named("piece", 9), 1).unwrap();
+                ready.recv().unwrap();
                 std::thread::sleep(Duration::from_millis(300));
                 let done = std::iter::from_fn(|| team.take()).inspect(|k| team.done(*k).unwrap());
                 let count = done.count();
@@ -253,6 +255,7 @@ mod tests {
         let mine: Vec<usize> = std::iter::from_fn(|| lead.team.take()).take(3).collect();
         assert_eq!(mine, [0, 1, 2]);
         mine.iter().for_each(|k| lead.team.done(*k).unwrap());
+        go.send(()).unwrap();
         let keeper = Keeper::brief("");
         while lead.team.wait(&keeper).unwrap() {}
         lead.end();

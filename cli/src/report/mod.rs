@@ -14,7 +14,7 @@ mod view;
 
 pub use grid_map::{GridAxis, GridMap};
 pub use pictures::{
-    Figure, encode, enlarged, frames, images, projections, residuals, slices, still,
+    Figure, Strip, encode, enlarged, frames, images, projections, residuals, slices, still,
 };
 pub use plot::{Axis, LinePlot, Marks, Series};
 pub use triangle::{Triangle, Variable};

@@ -1,7 +1,9 @@
 //! Pictures of volumes with the captions that belong to them.
 
 use anyhow::{Context, anyhow};
+use kerrlight_tomo::frames::Frames;
 use kerrlight_tomo::image::colormap::Colormap;
+use kerrlight_tomo::interferometry::operator::Float;
 use kerrlight_tomo::volume::Shown;
 use kerrlight_tomo::volume::projection::{self, Surroundings, VIEWS};
 use kerrlight_tomo::volume::slices::{self, Through};
@@ -125,23 +127,49 @@ impl Sheet {
     }
 }
 
+/// Some frames of a movie.
+pub struct Strip<'a> {
+    name: &'a str,
+    images: Vec<Vec<f32>>,
+    /// The largest pixel of all frames.
+    most: f32,
+}
+
+impl<'a> Strip<'a> {
+    /// Of a movie of this name.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    pub fn new<T: Float>(name: &'a str, movie: &Frames<T>) -> anyhow::Result<Self> {
+        let mut images = Vec::new();
+        for frame in chosen(movie.count()) {
+            images.push(movie.image(frame)?.iter().map(|x| x.double() as f32).collect());
+        }
+        Ok(Self { name, images, most: movie.largest()?.double() as f32 })
+    }
+}
+
+/// Frames of a strip, of so many.
+fn chosen(all: usize) -> Vec<usize> {
+    let count = all.min(STRIP);
+    (0..count).map(|k| k * (all - 1) / (count.max(2) - 1)).collect()
+}
+
 /// Some frames of movies of n × n pixels, a row each, on one scale of brightness; `times` in M.
 ///
 /// # Errors
 /// If it cannot be encoded.
-pub fn frames(movies: &[(&str, Vec<f32>)], n: usize, times: &[f64]) -> anyhow::Result<Figure> {
-    let count = times.len().min(STRIP);
-    let chosen: Vec<usize> =
-        (0..count).map(|k| k * (times.len() - 1) / (count.max(2) - 1)).collect();
-    let most = movies.iter().flat_map(|(_, movie)| movie).fold(0.0f32, |most, x| most.max(*x));
-    let mut sheet = Sheet::new([count, movies.len()], n, (160 / n).max(1), most);
-    for (row, (_, movie)) in movies.iter().enumerate() {
-        for (column, frame) in chosen.iter().enumerate() {
-            sheet.put([column, row], &movie[frame * n * n..(frame + 1) * n * n]);
+pub fn frames(movies: &[Strip<'_>], n: usize, times: &[f64]) -> anyhow::Result<Figure> {
+    let chosen = chosen(times.len());
+    let most = movies.iter().fold(0.0f32, |most, movie| most.max(movie.most));
+    let mut sheet = Sheet::new([chosen.len(), movies.len()], n, (160 / n).max(1), most);
+    for (row, movie) in movies.iter().enumerate() {
+        for (column, image) in movie.images.iter().enumerate() {
+            sheet.put([column, row], image);
         }
     }
     let at: Vec<String> = chosen.iter().map(|k| format!("{:.1}", times[*k])).collect();
-    let names = movies.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", below it ");
+    let names = movies.iter().map(|movie| movie.name).collect::<Vec<_>>().join(", below it ");
     let caption = format!(
         "Frames of the movie as the observer sees them, bent light included ({names}), at times {} GM/c³. \
          These pixels are what is compared with the data. All have one linear scale of brightness, from \

@@ -9,6 +9,7 @@ use super::sightlines::Sightlines;
 use super::stokes::{Planes, Seen};
 use crate::Error;
 use crate::dynamics::{AngularVelocity, Axis, Injection};
+use crate::frames::Sink;
 use crate::polarization::{Stokes, StokesParameter};
 use crate::representation::{Representation, Workspace};
 use crate::simd::Float;
@@ -282,14 +283,26 @@ impl<T: Float> ForwardModel<T> {
         field: &(dyn Fn([f64; 3]) -> f64 + Sync),
         batch: &mut Batch<T>,
     ) -> Vec<f64> {
-        self.summed(
-            batch,
-            |batch| batch.gather(self, axis, None),
-            |columns, k| {
-                let [x, y, z] = &columns.pulled;
-                field([x[k], y[k], z[k]].map(Float::double))
-            },
-        )
+        collected(|sink| self.images_of(axis, field, batch, sink))
+    }
+
+    /// The same, image by image.
+    ///
+    /// # Errors
+    /// Those of `sink`.
+    pub fn images_of(
+        &self,
+        axis: Axis,
+        field: &(dyn Fn([f64; 3]) -> f64 + Sync),
+        batch: &mut Batch<T>,
+        sink: &mut Sink<'_, f64>,
+    ) -> Result<(), Error> {
+        let gather = |batch: &mut Batch<T>| batch.gather(self, axis, None);
+        let emission = |columns: &Columns<T>, k: usize| {
+            let [x, y, z] = &columns.pulled;
+            field([x[k], y[k], z[k]].map(Float::double))
+        };
+        self.summed(batch, gather, emission, sink)
     }
 
     /// The same of a known field e(x, t) of places (M) and times since the reference time (M), whatever moves.
@@ -298,14 +311,25 @@ impl<T: Float> ForwardModel<T> {
         field: &(dyn Fn([f64; 3], f64) -> f64 + Sync),
         batch: &mut Batch<T>,
     ) -> Vec<f64> {
-        self.summed(
-            batch,
-            |batch| batch.gather_events(self),
-            |columns, k| {
-                let [x, y, z] = &columns.position;
-                field([x[k], y[k], z[k]].map(Float::double), columns.time[k].double())
-            },
-        )
+        collected(|sink| self.images_of_events(field, batch, sink))
+    }
+
+    /// The same, image by image.
+    ///
+    /// # Errors
+    /// Those of `sink`.
+    pub fn images_of_events(
+        &self,
+        field: &(dyn Fn([f64; 3], f64) -> f64 + Sync),
+        batch: &mut Batch<T>,
+        sink: &mut Sink<'_, f64>,
+    ) -> Result<(), Error> {
+        let gather = |batch: &mut Batch<T>| batch.gather_events(self);
+        let emission = |columns: &Columns<T>, k: usize| {
+            let [x, y, z] = &columns.position;
+            field([x[k], y[k], z[k]].map(Float::double), columns.time[k].double())
+        };
+        self.summed(batch, gather, emission, sink)
     }
 
     /// Images of the emission at each node of the batches that `gather` makes.
@@ -314,22 +338,26 @@ impl<T: Float> ForwardModel<T> {
         batch: &mut Batch<T>,
         gather: impl Fn(&mut Batch<T>),
         emission: impl Fn(&Columns<T>, usize) -> f64 + Sync,
-    ) -> Vec<f64> {
-        let mut movie = vec![0.0; self.frames() * self.pixels];
-        for (frame, image) in movie.chunks_exact_mut(self.pixels).enumerate() {
+        sink: &mut Sink<'_, f64>,
+    ) -> Result<(), Error> {
+        let mut image = vec![0.0; self.pixels];
+        for frame in 0..self.frames() {
+            image.fill(0.0);
             batch.set((0..self.rays()).map(|ray| (ray as u32, frame as u32)));
             gather(batch);
             let columns = &batch.columns;
             let light = |k: usize| columns.weight[k].double() * emission(columns, k);
             if let Some(planes) = &self.planes {
-                self.add_summed(planes, columns, &batch.starts, &light, image);
+                self.add_summed(planes, columns, &batch.starts, &light, &mut image);
+                sink(&image)?;
                 continue;
             }
             let sum = |range: &[usize]| (range[0]..range[1]).map(light).sum::<f64>();
             let fluxes: Vec<f64> = batch.starts.par_windows(2).map(sum).collect();
-            fluxes.into_iter().enumerate().for_each(|(ray, flux)| self.put(image, ray, flux));
+            fluxes.into_iter().enumerate().for_each(|(ray, flux)| self.put(&mut image, ray, flux));
+            sink(&image)?;
         }
-        movie
+        Ok(())
     }
 
     /// The light of all nodes into all images.
@@ -357,6 +385,17 @@ impl<T: Float> ForwardModel<T> {
             }
         }
     }
+}
+
+/// All images in memory.
+fn collected(make: impl FnOnce(&mut Sink<'_, f64>) -> Result<(), Error>) -> Vec<f64> {
+    let mut movie = Vec::new();
+    // Memory refuses nothing.
+    let _ = make(&mut |image: &[f64]| {
+        movie.extend_from_slice(image);
+        Ok(())
+    });
+    movie
 }
 
 /// An emission field: a representation with its parameters, and where it is worth evaluating.

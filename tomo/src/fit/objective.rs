@@ -5,7 +5,9 @@ use super::forward_model::{Field, ForwardModel};
 use super::selection::Selection;
 use super::terms::{FrameTerm, ImageTerm};
 use super::verdict::Statistics;
+use crate::Error;
 use crate::dynamics::{Axis, Cotangents, Turned, pull_back_vjp};
+use crate::frames::Frames;
 use crate::points::{Coordinates, CoordinatesMut};
 use crate::representation::{Gradient, Groups, Representation, Workspace};
 use crate::simd::Float;
@@ -301,48 +303,69 @@ impl<T: Float> Objective<T> {
         self.model.movie(field, frames, &mut buffers.batch, &mut buffers.workspace, movie);
     }
 
-    /// What the residuals of images of all frames, one after the other, are like: for each kind of data, in the order of
-    /// [`Self::names`].
-    pub fn statistics(&self, movie: &[T]) -> Vec<Statistics> {
-        let pixels = self.model.pixels();
+    /// What the residuals of images of all frames are like: for each kind of data, in the order of [`Self::names`].
+    ///
+    /// # Errors
+    /// If images cannot be read.
+    pub fn statistics(&self, movie: &Frames<T>) -> Result<Vec<Statistics>, Error> {
+        let width = self.model.pixels().isqrt();
         let of = |(term, _): (&dyn FrameTerm<T>, f64)| {
-            let images = movie.chunks_exact(pixels).enumerate();
-            let frames = images.map(|(frame, image)| term.residuals(frame, image));
-            Statistics::of(frames, pixels.isqrt())
+            let mut all = Statistics::default();
+            for (frame, image) in movie.images().enumerate() {
+                all.add(term.residuals(frame, &image?), width);
+            }
+            Ok(all.ended())
         };
         self.terms().map(of).collect()
     }
 
-    /// The loss of images of these frames, one after the other, without gradient.
-    pub fn loss_of(&self, frames: &[usize], movie: &[T]) -> Loss {
+    /// The loss of images of these frames, without gradient.
+    ///
+    /// # Errors
+    /// If images cannot be read.
+    pub fn loss_of(&self, frames: &[usize], movie: &Frames<T>) -> Result<Loss, Error> {
         let mut none = vec![T::zero(); self.model.pixels()];
         let mut loss = Loss::default();
         for (term, weight) in self.terms() {
             let scale = 1.0 / self.data_of(term, frames.len());
-            let images = frames.iter().zip(movie.chunks_exact(self.model.pixels()));
-            let chi2 = images
-                .map(|(frame, image)| term.value_and_gradient(*frame, image, T::zero(), &mut none));
-            let value = scale * chi2.sum::<f64>();
+            let mut chi2 = 0.0;
+            for (frame, image) in frames.iter().zip(movie.images()) {
+                chi2 += term.value_and_gradient(*frame, &image?, T::zero(), &mut none);
+            }
+            let value = scale * chi2;
             loss.terms.push(value);
             loss.total += weight * value;
         }
-        loss
+        Ok(loss)
     }
 }
 
 impl<T: Float> Objective<T> {
     /// The first data, with frame and χ², that are no finite number of images of these frames.
-    pub fn not_finite(&self, frames: &[usize], movie: &[T]) -> Option<(String, usize, f64)> {
+    ///
+    /// # Errors
+    /// If images cannot be read.
+    pub fn not_finite(
+        &self,
+        frames: &[usize],
+        movie: &Frames<T>,
+    ) -> Result<Option<(String, usize, f64)>, Error> {
         let mut none = vec![T::zero(); self.model.pixels()];
-        for (frame, image) in frames.iter().zip(movie.chunks_exact(self.model.pixels())) {
+        for (frame, image) in frames.iter().zip(movie.images()) {
+            let image = image?;
             for (term, _) in self.terms() {
-                let value = term.value_and_gradient(*frame, image, T::zero(), &mut none);
+                let value = term.value_and_gradient(*frame, &image, T::zero(), &mut none);
                 if !value.is_finite() {
-                    return Some((term.name().to_owned(), *frame, value));
+                    return Ok(Some((term.name().to_owned(), *frame, value)));
                 }
             }
         }
-        None
+        Ok(None)
+    }
+
+    /// Why data that were there at the beginning cannot be read any more, if any is so.
+    pub fn fault(&self) -> Option<&str> {
+        self.terms().find_map(|(term, _)| term.fault())
     }
 }
 

@@ -1,10 +1,13 @@
 //! Data of a movie, frame by frame: χ² of an image, and its gradient with respect to pixels.
 
 use crate::Error;
+use crate::frames::Frames;
 use crate::interferometry::data_terms::{DataTerm, Residual};
 use crate::interferometry::operator::{Operator, Transform};
 use crate::simd::Float;
 use num_complex::Complex;
+use std::borrow::Cow;
+use std::sync::OnceLock;
 
 /// χ² of the frames of a movie.
 ///
@@ -38,6 +41,11 @@ pub trait FrameTerm<T: Float>: Send + Sync {
         false
     }
 
+    /// Why data that were there at the beginning cannot be read any more: χ² is no number then.
+    fn fault(&self) -> Option<&str> {
+        None
+    }
+
     /// χ² of a frame; adds `weight` times its gradient.
     fn value_and_gradient(&self, frame: usize, image: &[T], weight: T, gradient: &mut [T]) -> f64;
 
@@ -53,9 +61,9 @@ pub(super) fn plain(model: f64, datum: f64, weight: f64) -> Residual {
 /// Every pixel of every frame: Σ (I − data)²/σ².
 #[derive(Clone, Debug)]
 pub struct ImageTerm<T> {
-    movie: Vec<T>,
-    pixels: usize,
+    movie: Frames<f64>,
     inverse_variance: T,
+    fault: OnceLock<String>,
 }
 
 impl<T: Float> ImageTerm<T> {
@@ -64,27 +72,50 @@ impl<T: Float> ImageTerm<T> {
     /// # Errors
     /// If σ is not positive, or the movie is not whole frames of finite numbers.
     pub fn new(movie: Vec<T>, pixels: usize, noise_sigma: f64) -> Result<Self, Error> {
+        if pixels == 0 || movie.is_empty() || !movie.len().is_multiple_of(pixels) {
+            let allowed = "whole frames, 1 or more";
+            return Err(Error::out_of_range("movie numbers", movie.len() as f64, allowed));
+        }
+        let movie = movie.into_iter().map(Float::double).collect();
+        Self::of(Frames::of(movie, pixels), noise_sigma)
+    }
+
+    /// Of images, which may be in a file, all pixels with the same standard deviation.
+    ///
+    /// # Errors
+    /// If σ is not positive, a pixel is not finite, or images cannot be read.
+    pub fn of(movie: Frames<f64>, noise_sigma: f64) -> Result<Self, Error> {
         let range = |field, value, allowed| Err(Error::out_of_range(field, value, allowed));
         if !(noise_sigma > 0.0 && noise_sigma.is_finite()) {
             return range("image sigma", noise_sigma, "above 0");
         }
-        if pixels == 0 || movie.is_empty() || !movie.len().is_multiple_of(pixels) {
-            return range("movie numbers", movie.len() as f64, "whole frames, 1 or more");
+        for image in movie.images() {
+            if let Some(bad) = image?.iter().find(|pixel| !T::of(**pixel).is_finite()) {
+                return range("movie pixel", *bad, "finite numbers");
+            }
         }
-        if let Some(bad) = movie.iter().find(|pixel| !pixel.is_finite()) {
-            return range("movie pixel", bad.double(), "finite numbers");
-        }
-        Ok(Self { movie, pixels, inverse_variance: T::of(noise_sigma.powi(-2)) })
+        let inverse_variance = T::of(noise_sigma.powi(-2));
+        Ok(Self { movie, inverse_variance, fault: OnceLock::new() })
     }
 
-    /// A datum.
+    /// A datum; no number, where it cannot be read ([`FrameTerm::fault`]).
     pub fn pixel(&self, frame: usize, pixel: usize) -> T {
-        self.movie[frame * self.pixels + pixel]
+        T::of(self.movie.pixel(frame, pixel).unwrap_or_else(|error| {
+            let _ = self.fault.set(error.to_string());
+            f64::NAN
+        }))
     }
 
     /// 1/σ².
     pub fn inverse_variance(&self) -> T {
         self.inverse_variance
+    }
+
+    fn image(&self, frame: usize) -> Cow<'_, [f64]> {
+        self.movie.image(frame).unwrap_or_else(|error| {
+            let _ = self.fault.set(error.to_string());
+            vec![f64::NAN; self.movie.pixels()].into()
+        })
     }
 }
 
@@ -94,27 +125,31 @@ impl<T: Float> FrameTerm<T> for ImageTerm<T> {
     }
 
     fn frames(&self) -> usize {
-        self.movie.len() / self.pixels
+        self.movie.count()
     }
 
     fn pixels(&self) -> usize {
-        self.pixels
+        self.movie.pixels()
     }
 
     fn degrees_of_freedom(&self, _frame: usize) -> usize {
-        self.pixels
+        self.movie.pixels()
     }
 
     fn is_quadratic(&self) -> bool {
         true
     }
 
+    fn fault(&self) -> Option<&str> {
+        self.fault.get().map(String::as_str)
+    }
+
     fn value_and_gradient(&self, frame: usize, image: &[T], weight: T, gradient: &mut [T]) -> f64 {
-        let data = &self.movie[frame * self.pixels..(frame + 1) * self.pixels];
+        let data = self.image(frame);
         let (scale, slope) = (self.inverse_variance, (weight + weight) * self.inverse_variance);
-        let pixels = image.iter().zip(data).zip(gradient);
-        let square = |((image, datum), gradient): ((&T, &T), &mut T)| {
-            let residual = *image - *datum;
+        let pixels = image.iter().zip(&*data).zip(gradient);
+        let square = |((image, datum), gradient): ((&T, &f64), &mut T)| {
+            let residual = *image - T::of(*datum);
             *gradient += slope * residual;
             (residual * residual).double()
         };
@@ -122,10 +157,10 @@ impl<T: Float> FrameTerm<T> for ImageTerm<T> {
     }
 
     fn residuals(&self, frame: usize, image: &[T]) -> Vec<Residual> {
-        let data = &self.movie[frame * self.pixels..(frame + 1) * self.pixels];
         let weight = self.inverse_variance.double().sqrt();
-        let pixels = image.iter().zip(data);
-        pixels.map(|(image, datum)| plain(image.double(), datum.double(), weight)).collect()
+        let data = self.image(frame);
+        let pixels = image.iter().zip(&*data);
+        pixels.map(|(image, x)| plain(image.double(), T::of(*x).double(), weight)).collect()
     }
 }
 

@@ -6,6 +6,7 @@
 use super::forward_model::{Field, Motion};
 use super::train::{Outcome, Progress, State, Trainer};
 use crate::Error;
+use crate::frames::Frames;
 use crate::points::Coordinates;
 use crate::simd::Float;
 
@@ -29,6 +30,21 @@ macro_rules! in_precision {
                 masked: bool,
             ) -> Vec<$number> {
                 self.predict(now, frames, masked)
+            }
+
+            /// The same, in memory or in a file.
+            ///
+            /// # Errors
+            /// If there is no room for it.
+            pub fn images(
+                &mut self,
+                now: &Progress<$number>,
+                frames: &[usize],
+                masked: bool,
+            ) -> Result<Frames<$number>, Error> {
+                Frames::made((frames.len(), self.objective.model.pixels()), |sink| {
+                    frames.iter().try_for_each(|frame| sink(&self.predict(now, &[*frame], masked)))
+                })
             }
 
             /// Emission at points at the reference time.

@@ -5,6 +5,10 @@ use super::Complex64;
 use super::observation::{Basis, Observation};
 use super::operator::{ImageGrid, Method, Operator, Pulse, Transform};
 use crate::Error;
+use crate::frames::Frames;
+use crate::memory;
+use core::ops::Range;
+use std::borrow::Cow;
 
 /// Exponentials up to this many bytes are kept while a movie is transformed.
 const MEMORY: usize = 256 << 20;
@@ -40,21 +44,80 @@ pub fn fill(
     times_h: &[f64],
     method: Method,
 ) -> Result<String, Error> {
-    check(movie, times_h)?;
-    let mut shares: Vec<Vec<(usize, f64)>> = vec![Vec::new(); movie.frames()];
+    let shares = shares(observation, movie.frames(), times_h)?;
+    let all = || Ok(Cow::Borrowed(&movie.pixels[..]));
+    let (operator, visibilities) = seen(observation, &shares, (movie.grid, pulse, method), all)?;
+    add(observation, &shares, visibilities);
+    Ok(operator.describe())
+}
+
+/// The same of images that need not be in memory, by direct sums.
+///
+/// # Errors
+/// As those of [`fill`], or if an image cannot be read.
+pub fn fill_from(
+    observation: &mut Observation,
+    (grid, movie): (ImageGrid, &Frames<f64>),
+    pulse: Pulse,
+    times_h: &[f64],
+) -> Result<(), Error> {
+    let shares = shares(observation, movie.count(), times_h)?;
+    let mut visibilities = Vec::new();
+    for first in (0..movie.count()).step_by(AT_A_TIME) {
+        let range = first..(first + AT_A_TIME).min(movie.count());
+        let some = || some_of(movie, range.clone());
+        let how = (grid, pulse, Method::Direct);
+        visibilities.extend(seen(observation, &shares[range.clone()], how, some)?.1);
+    }
+    add(observation, &shares, visibilities);
+    Ok(())
+}
+
+/// Images that are transformed together.
+const AT_A_TIME: usize = 16;
+
+fn some_of(movie: &Frames<f64>, range: Range<usize>) -> Result<Cow<'static, [f64]>, Error> {
+    let mut some = Vec::with_capacity(range.len() * movie.pixels());
+    for frame in range {
+        some.extend_from_slice(&movie.image(frame)?);
+    }
+    Ok(some.into())
+}
+
+/// Rows that see an image, each with its share.
+type Shares = Vec<(usize, f64)>;
+
+/// The shares of all images.
+fn shares(observation: &Observation, frames: usize, times_h: &[f64]) -> Result<Vec<Shares>, Error> {
+    check(frames, times_h)?;
+    let mut shares: Vec<Shares> = vec![Vec::new(); frames];
     for (index, row) in observation.rows.iter().enumerate() {
         for (frame, weight) in neighbours(times_h, row.time_h)? {
             shares[frame].push((index, weight));
         }
     }
-    let uv_of = |shares: &Vec<(usize, f64)>| {
-        shares.iter().map(|(row, _)| observation.rows[*row].uv).collect()
-    };
+    Ok(shares)
+}
+
+/// What the rows see of images, image after image.
+fn seen<'p>(
+    observation: &Observation,
+    shares: &[Shares],
+    (grid, pulse, method): (ImageGrid, Pulse, Method),
+    pixels: impl FnOnce() -> Result<Cow<'p, [f64]>, Error>,
+) -> Result<(Transform<f64>, Vec<Complex64>), Error> {
+    let uv_of = |shares: &Shares| shares.iter().map(|(row, _)| observation.rows[*row].uv).collect();
     let uv: Vec<Vec<[f64; 2]>> = shares.iter().map(uv_of).collect();
-    let operator = Transform::<f64>::new(movie.grid, pulse, &uv, method, MEMORY)?;
+    let memory = MEMORY.min(memory::part(1.0 / 8.0) as usize);
+    let operator = Transform::<f64>::new(grid, pulse, &uv, method, memory)?;
+    let mut visibilities = vec![Complex64::new(0.0, 0.0); operator.data()];
+    operator.forward(&pixels()?, &mut visibilities);
+    Ok((operator, visibilities))
+}
+
+/// Sets the rows to the sums of their shares.
+fn add(observation: &mut Observation, shares: &[Shares], visibilities: Vec<Complex64>) {
     let none = Complex64::new(0.0, 0.0);
-    let mut visibilities = vec![none; operator.data()];
-    operator.forward(&movie.pixels, &mut visibilities);
     observation.rows.iter_mut().for_each(|row| row.products = [none; 4]);
     for ((row, weight), v) in shares.iter().flatten().zip(visibilities) {
         let products = &mut observation.rows[*row].products;
@@ -63,7 +126,6 @@ pub fn fill(
             products[1] += v * weight;
         }
     }
-    Ok(operator.describe())
 }
 
 /// Sets the visibilities of linearly polarised emission from images of I, Q and U: RR = LL = I, RL = Q + iU, LR = Q − iU.
@@ -95,9 +157,8 @@ pub fn fill_polarized(
     Ok(how)
 }
 
-fn check(movie: &Movie, times_h: &[f64]) -> Result<(), Error> {
+fn check(frames: usize, times_h: &[f64]) -> Result<(), Error> {
     let range = |name, value, allowed| Err(Error::out_of_range(name, value, allowed));
-    let frames = movie.frames();
     if frames == 0 || frames != times_h.len() {
         return range("number of images", frames as f64, "1 at least, and as many as times");
     }

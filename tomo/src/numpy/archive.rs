@@ -1,22 +1,33 @@
 //! NPZ archives.
 
-use super::NumpyError;
+use super::{NumpyError, Stream};
 use crate::Error;
 use crate::memory;
-use std::io::{Cursor, Read, Write};
+use npyz::WriterBuilder;
+use std::io::{BufWriter, Cursor, Read, Seek, Write};
 use zip::result::ZipError;
 
-/// An NPZ archive in memory.
+/// An NPZ archive.
 #[derive(Debug)]
-pub struct Archive<'a>(zip::ZipArchive<Cursor<&'a [u8]>>);
+pub struct Archive<R>(zip::ZipArchive<R>);
 
-impl<'a> Archive<'a> {
+impl<'a> Archive<Cursor<&'a [u8]>> {
     /// The archive that these bytes are.
     ///
     /// # Errors
     /// If they are none.
     pub fn open(bytes: &'a [u8]) -> Result<Self, Error> {
-        let archive = zip::ZipArchive::new(Cursor::new(bytes));
+        Self::of(Cursor::new(bytes))
+    }
+}
+
+impl<R: Read + Seek> Archive<R> {
+    /// The archive that a file is.
+    ///
+    /// # Errors
+    /// If it is none.
+    pub fn of(file: R) -> Result<Self, Error> {
+        let archive = zip::ZipArchive::new(file);
         let not = |error| NumpyError::content(format!("not an npz archive: {error}"));
         Ok(archive.map(Archive).map_err(not)?)
     }
@@ -33,6 +44,16 @@ impl<'a> Archive<'a> {
         };
         let damaged = |error| NumpyError::content(format!("damaged npz archive: {error}"));
         Ok((0..count).map(name).collect::<Result<_, _>>().map_err(damaged)?)
+    }
+
+    /// An array that is read number by number; its checksum is compared at its end.
+    ///
+    /// # Errors
+    /// If there is none, or it is damaged.
+    pub fn stream(&mut self, name: &str) -> Result<Stream<impl Read>, Error> {
+        let failed = |error: Error| NumpyError::member(format!("{name}.npy"), error);
+        let file = self.0.by_name(&format!("{name}.npy")).map_err(std::io::Error::from);
+        Ok(Stream::new(file.map_err(|error| failed(error.into()))?).map_err(failed)?)
     }
 
     /// The bytes of an array, whose checksum must be right; `None` if there is no such array.
@@ -81,10 +102,65 @@ pub fn write_archive<'n>(arrays: impl IntoIterator<Item = (&'n str, Vec<u8>)>) -
     archive.finish().expect("memory").into_inner()
 }
 
+/// An archive of arrays that need not be in memory, array after array.
+pub struct ArchiveWriter<W: Write + Seek>(zip::ZipWriter<W>);
+
+impl<W: Write + Seek> ArchiveWriter<W> {
+    /// Into this file.
+    pub fn new(out: W) -> Self {
+        Self(zip::ZipWriter::new(out))
+    }
+
+    /// Adds an array of this shape, whose values `fill` hands over in C's order, some at a time.
+    ///
+    /// # Errors
+    /// Those of `fill`; if the file cannot be written, or there are not as many values as the shape says.
+    pub fn add<T: npyz::AutoSerialize + Copy>(
+        &mut self,
+        name: &str,
+        shape: &[u64],
+        fill: impl FnOnce(&mut dyn FnMut(&[T]) -> Result<(), Error>) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        let count = shape.iter().fold(size_of::<T>() as u64, |bytes, n| bytes.saturating_mul(*n));
+        let options = zip::write::SimpleFileOptions::default();
+        let options = options.large_file(count >= u64::from(u32::MAX) / 2);
+        self.0.start_file(format!("{name}.npy"), options).map_err(std::io::Error::from)?;
+        let mut buffer = BufWriter::with_capacity(1 << 16, &mut self.0);
+        let options = npyz::WriteOptions::new().default_dtype().shape(shape);
+        let mut array = options.writer(&mut buffer).begin_nd()?;
+        fill(&mut |values: &[T]| Ok(array.extend(values.iter().copied())?))?;
+        array.finish()?;
+        Ok(buffer.flush()?)
+    }
+
+    /// Ends the archive.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn finish(self) -> Result<W, Error> {
+        Ok(self.0.finish().map_err(std::io::Error::from)?)
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::write_array;
     use super::*;
-    use std::io::Write;
+
+    /// What is written piece by piece is what is written at once.
+    #[test]
+    fn exact_arrays_in_pieces() {
+        let values: Vec<f32> = (0..6000).map(|k| (k as f32).sin()).collect();
+        let mut pieces = ArchiveWriter::new(Cursor::new(Vec::new()));
+        let fill =
+            |sink: &mut dyn FnMut(&[f32]) -> Result<(), Error>| values.chunks(7).try_for_each(sink);
+        pieces.add("a", &[20, 300], fill).unwrap();
+        let pieces = pieces.finish().unwrap().into_inner();
+        let array = Archive::open(&pieces).unwrap().member("a").unwrap().unwrap();
+        assert_eq!(array, write_array(&[20, 300], values.iter().copied()));
+        let mut short = ArchiveWriter::new(Cursor::new(Vec::new()));
+        assert!(short.add::<f32>("a", &[2], |sink| sink(&[1.0])).is_err());
+    }
 
     fn archive(bytes: &[u8]) -> Vec<u8> {
         let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));

@@ -4,6 +4,7 @@ use super::NumpyError;
 use crate::Error;
 use crate::memory;
 use npyz::WriterBuilder;
+use std::io::Read;
 
 /// Shape of an array of numbers of any type, and its numbers in C's order.
 ///
@@ -48,34 +49,98 @@ fn in_c_order(shape: &[u64], values: &[f64]) -> Vec<f64> {
 
 /// The values of an array of any number type that does not depend on the machine.
 fn numbers(file: npyz::NpyFile<&[u8]>) -> Result<Vec<f64>, NumpyError> {
+    let mut all = Vec::with_capacity(file.len() as usize);
+    each_number(file, &mut |x| {
+        all.push(x);
+        Ok(())
+    })
+    .map_err(|error| NumpyError::content(error.to_string()))?;
+    Ok(all)
+}
+
+/// An array that is read number by number.
+pub struct Stream<R: Read>(npyz::NpyFile<R>);
+
+impl<R: Read> Stream<R> {
+    /// The array that these bytes are the beginning of.
+    ///
+    /// # Errors
+    /// If they are none, or its last index does not run fastest.
+    pub fn new(bytes: R) -> Result<Self, Error> {
+        let not = |error| NumpyError::content(format!("not an npy file: {error}"));
+        let file = npyz::NpyFile::new(bytes).map_err(not)?;
+        if file.order() == npyz::Order::Fortran && file.shape().len() > 1 {
+            let message = "is in Fortran's order: C's order is expected of arrays that are larger than memory";
+            return Err(NumpyError::content(message).into());
+        }
+        Ok(Self(file))
+    }
+
+    /// Numbers along each axis.
+    pub fn shape(&self) -> &[u64] {
+        self.0.shape()
+    }
+
+    /// Hands over all numbers, `length` at a time.
+    ///
+    /// # Errors
+    /// Those of `take`; if there are fewer numbers than the shape says.
+    pub fn chunks(
+        self,
+        length: usize,
+        mut take: impl FnMut(&[f64]) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        let mut some = Vec::with_capacity(length);
+        each_number(self.0, &mut |x| {
+            some.push(x);
+            if some.len() < length {
+                return Ok(());
+            }
+            let taken = take(&some);
+            some.clear();
+            taken
+        })
+    }
+}
+
+/// Hands over the values of an array of any number type that does not depend on the machine.
+fn each_number<R: Read>(
+    file: npyz::NpyFile<R>,
+    take: &mut dyn FnMut(f64) -> Result<(), Error>,
+) -> Result<(), Error> {
     use npyz::TypeChar::{Float, Int, Uint};
-    fn of<T: npyz::Deserialize>(
-        file: npyz::NpyFile<&[u8]>,
+    fn of<R: Read, T: npyz::Deserialize>(
+        file: npyz::NpyFile<R>,
         value: impl Fn(T) -> f64,
-    ) -> Result<Vec<f64>, NumpyError> {
-        let values = file.into_vec::<T>();
+        take: &mut dyn FnMut(f64) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        let values = file.data::<T>();
         let values = values.map_err(|error| NumpyError::content(error.to_string()))?;
-        Ok(values.into_iter().map(value).collect())
+        for x in values {
+            take(value(x.map_err(|error| NumpyError::content(error.to_string()))?))?;
+        }
+        Ok(())
     }
     let kind = match file.dtype() {
         npyz::DType::Plain(plain) => Some((plain.type_char(), plain.size_field())),
         _ => None,
     };
     match kind {
-        Some((Float, 4)) => of::<f32>(file, f64::from),
-        Some((Float, 8)) => of::<f64>(file, |x| x),
-        Some((Int, 1)) => of::<i8>(file, f64::from),
-        Some((Int, 2)) => of::<i16>(file, f64::from),
-        Some((Int, 4)) => of::<i32>(file, f64::from),
-        Some((Int, 8)) => of::<i64>(file, |n| n as f64),
-        Some((Uint, 1)) => of::<u8>(file, f64::from),
-        Some((Uint, 2)) => of::<u16>(file, f64::from),
-        Some((Uint, 4)) => of::<u32>(file, f64::from),
-        Some((Uint, 8)) => of::<u64>(file, |n| n as f64),
-        _ => Err(NumpyError::content(format!(
-            "values of type {}: whole numbers, float32 or float64 are expected",
-            file.dtype().descr()
-        ))),
+        Some((Float, 4)) => of::<R, f32>(file, f64::from, take),
+        Some((Float, 8)) => of::<R, f64>(file, |x| x, take),
+        Some((Int, 1)) => of::<R, i8>(file, f64::from, take),
+        Some((Int, 2)) => of::<R, i16>(file, f64::from, take),
+        Some((Int, 4)) => of::<R, i32>(file, f64::from, take),
+        Some((Int, 8)) => of::<R, i64>(file, |n| n as f64, take),
+        Some((Uint, 1)) => of::<R, u8>(file, f64::from, take),
+        Some((Uint, 2)) => of::<R, u16>(file, f64::from, take),
+        Some((Uint, 4)) => of::<R, u32>(file, f64::from, take),
+        Some((Uint, 8)) => of::<R, u64>(file, |n| n as f64, take),
+        _ => {
+            let kind = file.dtype().descr();
+            let wanted = "whole numbers, float32 or float64 are expected";
+            Err(NumpyError::content(format!("values of type {kind}: {wanted}")).into())
+        }
     }
 }
 

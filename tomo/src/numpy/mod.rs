@@ -4,8 +4,8 @@
 mod archive;
 mod array;
 
-pub use archive::{Archive, write_archive};
-pub use array::{read_array, write_array};
+pub use archive::{Archive, ArchiveWriter, write_archive};
+pub use array::{Stream, read_array, write_array};
 
 use crate::Error;
 

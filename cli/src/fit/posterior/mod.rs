@@ -253,13 +253,13 @@ impl<'a> Drawing<'a> {
         }
         let noise = seed(&file, number);
         let (Some(unknown), Some(worlds)) = (self.unknown, &self.worlds) else {
-            let data = measured.perturbed(&file.loss, self.factor, noise);
+            let data = measured.perturbed(&file.loss, self.factor, noise)?;
             let through = Through { file: &file, instrument, motion, registry };
             let drawn = sample::draw(&through, &data, keeper, told)?;
             return Ok(drawn.map(|drawn| (drawn, Value::Null)));
         };
         told("the world");
-        let data = worlds.data(noise);
+        let data = worlds.data(noise)?;
         let world = worlds.draw(&data, number)?;
         let Placed { file, instrument, motion } =
             world_search::placed(&file, unknown, instrument, measured, &world)?;

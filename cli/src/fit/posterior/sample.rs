@@ -56,8 +56,8 @@ pub fn draw(
         return Ok(None);
     }
     let frames: Vec<usize> = (0..measured.times.len()).collect();
-    let movie = trainer.movie(&state.now, &frames, true);
-    let chi2 = trainer.objective.loss_of(&frames, &movie).terms;
+    let movie = trainer.images(&state.now, &frames, true)?;
+    let chi2 = trainer.objective.loss_of(&frames, &movie)?.terms;
     let volume = super::super::results::recovered(file, &mut trainer, &state)?;
     Ok(Some(Drawn { volume, chi2 }))
 }

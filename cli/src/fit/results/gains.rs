@@ -6,6 +6,7 @@ use crate::fit::folder::Folder;
 use crate::report::{Axis, LinePlot, Marks, Series, Table};
 use kerrlight_tomo::fit::settings::LossKind;
 use kerrlight_tomo::fit::setup::Measured;
+use kerrlight_tomo::frames::Frames;
 use kerrlight_tomo::interferometry::Complex64;
 use kerrlight_tomo::interferometry::files;
 use kerrlight_tomo::interferometry::gains::{GainDistance, GainTable, StationGain};
@@ -39,13 +40,13 @@ struct Summary<'a> {
 
 impl Estimate<'_> {
     /// The gains of all stations and frames, beside these images and what data see of them, where they are solved for; writes their table.
-    pub fn gains(&self, movie: &[f32], seen: &[f32]) -> anyhow::Result<Option<Gains>> {
+    pub fn gains(&self, movie: &Frames<f32>, seen: &Frames<f32>) -> anyhow::Result<Option<Gains>> {
         let is_polarized =
             self.file.loss.iter().any(|loss| loss.data == LossKind::PolarizedVisibilities);
         if !is_polarized || self.measured.gains.is_none() {
             return Gains::beside(&self.evidence(), movie, self.folder);
         }
-        let table = self.measured.polarized_gains(seen)?;
+        let table = self.measured.polarized_gains(&seen.to_vec()?)?;
         table.map(|table| Gains::written(table, self.measured, self.folder)).transpose()
     }
 }
@@ -54,7 +55,7 @@ impl Gains {
     /// The gains of all stations and frames beside images of all frames, where they are solved for; writes their table.
     pub fn beside(
         evidence: &Evidence<'_>,
-        movie: &[f32],
+        movie: &Frames<f32>,
         folder: &Folder,
     ) -> anyhow::Result<Option<Self>> {
         let Evidence { measured, losses, .. } = *evidence;

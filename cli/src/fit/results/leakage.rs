@@ -3,6 +3,7 @@
 use super::Estimate;
 use crate::fit::leakage::TABLE;
 use crate::report::{Axis, LinePlot, Marks, Series, Table};
+use kerrlight_tomo::frames::Frames;
 use kerrlight_tomo::interferometry::files;
 use kerrlight_tomo::interferometry::polarimetry::{LeakageDistance, LeakageTable, StationLeakage};
 use serde_json::{Value, json};
@@ -16,8 +17,11 @@ pub struct Leakage {
 impl Estimate<'_> {
     /// The leakage of all stations beside images of I, Q and U of all frames, where it is solved for; writes its table. The
     /// loss sees it from now on.
-    pub fn leakage(&self, seen: &[f32]) -> anyhow::Result<Option<Leakage>> {
-        let Some(found) = self.measured.solve_leakage(seen)? else { return Ok(None) };
+    pub fn leakage(&self, seen: &Frames<f32>) -> anyhow::Result<Option<Leakage>> {
+        if self.measured.leakage.is_none() {
+            return Ok(None);
+        }
+        let Some(found) = self.measured.solve_leakage(&seen.to_vec()?)? else { return Ok(None) };
         let text = files::leakage_to_csv(&found.table);
         self.folder.file(TABLE)?.write(text.as_bytes())?;
         Ok(Some(Leakage { table: found.table, truth: self.measured.true_leakage.clone() }))

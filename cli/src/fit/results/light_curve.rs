@@ -3,6 +3,7 @@
 use super::Estimate;
 use crate::report::{Axis, LinePlot, Marks, Series};
 use kerrlight_tomo::fit::{Batch, Field, FrameTerm, Seen, State, Trainer};
+use kerrlight_tomo::frames::Frames;
 use kerrlight_tomo::representation::Workspace;
 use std::fmt::Write;
 
@@ -15,10 +16,10 @@ impl Estimate<'_> {
         &self,
         trainer: &Trainer<'_, f32>,
         state: &State<f32>,
-        seen: &[f32],
-    ) -> anyhow::Result<Vec<f32>> {
+        seen: &Frames<f32>,
+    ) -> anyhow::Result<Frames<f32>> {
         if self.instrument.seen == Seen::Images {
-            return Ok(seen.to_vec());
+            return Ok(seen.clone());
         }
         let mut model = self.instrument.pictured::<f32>(self.motion)?;
         let now = &state.now;
@@ -29,28 +30,33 @@ impl Estimate<'_> {
             axis: now.axis,
             occupancy: now.occupancy.as_ref(),
         };
-        let frames: Vec<usize> = (0..model.frames()).collect();
-        let mut movie = vec![0.0; frames.len() * model.pixels()];
-        model.movie(field, &frames, &mut Batch::default(), &mut Workspace::new(), &mut movie);
-        Ok(movie)
+        let (mut batch, mut workspace) = (Batch::default(), Workspace::new());
+        let mut image = vec![0.0; model.pixels()];
+        Ok(Frames::made((model.frames(), model.pixels()), |sink| {
+            (0..model.frames()).try_for_each(|frame| {
+                model.movie(field, &[frame], &mut batch, &mut workspace, &mut image);
+                sink(&image)
+            })
+        })?)
     }
 
     /// χ² per datum of the samples that were not fitted, if there are any.
-    pub fn validation(&self, seen: &[f32]) -> anyhow::Result<Option<f64>> {
+    pub fn validation(&self, seen: &Frames<f32>) -> anyhow::Result<Option<f64>> {
         let Some(curve) = &self.measured.curve else { return Ok(None) };
         let Some(term) = curve.validation()? else { return Ok(None) };
         let term: &dyn FrameTerm<f32> = &term;
         let (mut chi2, mut count) = (0.0, 0);
-        for (frame, image) in seen.chunks_exact(term.pixels()).enumerate() {
+        for (frame, image) in seen.images().enumerate() {
             count += term.degrees_of_freedom(frame);
-            chi2 += term.residuals(frame, image).iter().map(|r| r.value * r.value).sum::<f64>();
+            chi2 += term.residuals(frame, &image?).iter().map(|r| r.value * r.value).sum::<f64>();
         }
         Ok((count > 0).then(|| chi2 / count as f64))
     }
 
     /// Writes data and model, if the data are a light curve.
-    pub fn curve_table(&self, seen: &[f32]) -> anyhow::Result<()> {
+    pub fn curve_table(&self, seen: &Frames<f32>) -> anyhow::Result<()> {
         let Some(curve) = &self.measured.curve else { return Ok(()) };
+        let seen = seen.to_vec()?;
         let mut text = "time_utc_h,time_m,fitted".to_owned();
         for parameter in &curve.parameters {
             write!(text, ",{0},sigma_{0},model_{0}", parameter.name())?;
@@ -70,8 +76,9 @@ impl Estimate<'_> {
     }
 
     /// Data and model of each Stokes parameter over time, and the loop in Q and U.
-    pub fn light_curves(&self, seen: &[f32]) -> Vec<LinePlot> {
-        let Some(curve) = &self.measured.curve else { return Vec::new() };
+    pub fn light_curves(&self, seen: &Frames<f32>) -> anyhow::Result<Vec<LinePlot>> {
+        let Some(curve) = &self.measured.curve else { return Ok(Vec::new()) };
+        let seen = seen.to_vec()?;
         let count = curve.parameters.len();
         let mut series = Vec::new();
         for (plane, parameter) in curve.parameters.iter().enumerate() {
@@ -99,7 +106,7 @@ impl Estimate<'_> {
             ),
             None => String::new(),
         };
-        vec![LinePlot {
+        Ok(vec![LinePlot {
             title: "Stokes light curves".to_owned(),
             caption: format!(
                 "Fluxes of the unresolved source, data as points with their standard deviations, the recovered emission as lines.{held}"
@@ -107,6 +114,6 @@ impl Estimate<'_> {
             x: Axis { label: "time".to_owned(), unit: "h UTC".to_owned(), log: false },
             y: Axis { label: "flux density".to_owned(), unit: "Jy".to_owned(), log: false },
             series,
-        }]
+        }])
     }
 }

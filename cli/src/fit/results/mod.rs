@@ -22,6 +22,7 @@ use gains::Gains;
 use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::fit::setup::{self, Instrument, Measured, Still, StillView};
 use kerrlight_tomo::fit::{Loss, Motion, State, Trainer};
+use kerrlight_tomo::frames::Frames;
 use kerrlight_tomo::interferometry::files::images;
 use kerrlight_tomo::units::MICROARCSECOND;
 use kerrlight_tomo::volume::{Volume, VolumeFile, vti};
@@ -57,11 +58,11 @@ impl Estimate<'_> {
     ) -> anyhow::Result<(String, Value)> {
         let volume = recovered(self.file, trainer, state)?;
         let frames: Vec<usize> = (0..self.measured.times.len()).collect();
-        let seen = trainer.movie(&state.now, &frames, true);
+        let seen = trainer.images(&state.now, &frames, true)?;
         failed::check(self.file, &trainer.objective, &frames, &seen)?;
         let leakage = self.leakage(&seen)?;
-        let loss = trainer.objective.loss_of(&frames, &seen);
-        let mask = numbers::mask_error(trainer, state, &seen);
+        let loss = trainer.objective.loss_of(&frames, &seen)?;
+        let mask = numbers::mask_error(trainer, state, &seen)?;
         let movie = self.pictured(trainer, state, &seen)?;
         self.volumes(&volume, state)?;
         self.movies(&movie)?;
@@ -72,7 +73,7 @@ impl Estimate<'_> {
         self.scene(trainer, state, &movie)?;
         let still = self.still_view().at(self.time_of_still(), trainer, state)?;
         let objective = &trainer.objective;
-        let compared = (objective.names(), objective.statistics(&seen));
+        let compared = (objective.names(), objective.statistics(&seen)?);
         let judged = self.evidence().judged(compared, &movie)?;
         self.curve_table(&seen)?;
         let gains = self.gains(&movie, &seen)?;
@@ -116,13 +117,8 @@ impl Estimate<'_> {
         self.folder.file("volume.vti")?.write_with(write)
     }
 
-    fn movies(&self, movie: &[f32]) -> anyhow::Result<()> {
+    fn movies(&self, movie: &Frames<f32>) -> anyhow::Result<()> {
         let n = self.file.screen.pixels;
-        let shape = [self.measured.times.len(), n, n];
-        let mut arrays = vec![("recovered", movie.to_vec())];
-        if let Some(truth) = &self.measured.movie {
-            arrays.push(("data", truth.iter().map(|x| *x as f32).collect()));
-        }
         let times = &self.measured.times;
         let mut lists = vec![("time", times.clone())];
         // What `observe` needs to see it, where it is known.
@@ -132,7 +128,13 @@ impl Estimate<'_> {
         if let Ok(sky) = setup::sky(self.file) {
             lists.push(("field_uas", vec![sky.pixel_rad / MICROARCSECOND * n as f64]));
         }
-        self.folder.file("movie.npz")?.write(&images::movie_archive(shape, &arrays, &lists))
+        self.folder.file("movie.npz")?.write_with(|out| {
+            let mut archive = images::MovieWriter::new(out, n);
+            archive.add("recovered", movie)?;
+            self.measured.movie.iter().try_for_each(|truth| archive.add("data", truth))?;
+            lists.iter().try_for_each(|(name, list)| archive.list(name, list))?;
+            Ok(archive.finish()?)
+        })
     }
 }
 
@@ -166,8 +168,8 @@ pub struct Found<'a> {
     /// Leakage of stations, where it is solved for.
     leakage: Option<Leakage>,
     /// What data see of the movie: the movie itself, its images of Stokes parameters, or its fluxes.
-    seen: Vec<f32>,
-    movie: Vec<f32>,
+    seen: Frames<f32>,
+    movie: Frames<f32>,
     state: &'a State<f32>,
     begun: Instant,
 }

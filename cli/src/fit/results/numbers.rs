@@ -5,6 +5,7 @@ use crate::fit::{band_search, held_out, linear, world_results, world_search};
 use crate::report;
 use crate::usage::usage;
 use kerrlight_tomo::fit::{State, Trainer};
+use kerrlight_tomo::frames::Frames;
 use kerrlight_tomo::volume::metrics::{self, Mask};
 use serde_json::{Value, json};
 
@@ -16,21 +17,23 @@ pub const DARK: &str =
 pub fn mask_error(
     trainer: &mut Trainer<'_, f32>,
     state: &State<f32>,
-    masked: &[f32],
-) -> Option<f64> {
-    state.now.occupancy.as_ref()?;
+    masked: &Frames<f32>,
+) -> anyhow::Result<Option<f64>> {
+    if state.now.occupancy.is_none() {
+        return Ok(None);
+    }
     let model = &trainer.objective.model;
     let (all, pixels) = (model.frames(), model.pixels());
     let frames: Vec<usize> = [1, 3].map(|k| k * all / 4).to_vec();
     let whole = trainer.movie(&state.now, &frames, false);
     let mut sums = [0.0; 2];
     for (frame, image) in frames.iter().zip(whole.chunks_exact(pixels)) {
-        for (pixel, masked) in image.iter().zip(&masked[frame * pixels..]) {
+        for (pixel, masked) in image.iter().zip(&*masked.image(*frame)?) {
             sums[0] += f64::from((pixel - masked).abs());
             sums[1] += f64::from(pixel.abs());
         }
     }
-    (sums[1] > 0.0).then(|| sums[0] / sums[1])
+    Ok((sums[1] > 0.0).then(|| sums[0] / sums[1]))
 }
 
 impl Estimate<'_> {

@@ -28,8 +28,8 @@ impl Estimate<'_> {
         let mut plots: Vec<LinePlot> = loss_plot(&lines).into_iter().collect();
         plots.extend(psnr_plot(&lines));
         plots.extend(held_out::plot(&results["held_out"]));
-        plots.extend(self.light_curves(&found.seen));
-        plots.push(self.light_curve(&found.movie));
+        plots.extend(self.light_curves(&found.seen)?);
+        plots.push(self.light_curve(&found.movie)?);
         plots.extend(found.changes.as_ref().map(Changes::plot));
         plots.extend(self.amplitudes(found)?);
         plots.extend(self.residual_plots(found));
@@ -81,16 +81,10 @@ impl Estimate<'_> {
             report::slices(&shown, Through::Maximum, hole_radius, UNIT)?,
         ];
         let n = self.file.screen.pixels;
-        let rows: Vec<(&str, Vec<f32>)> = [
-            Some(("recovered", found.movie.clone())),
-            self.measured
-                .movie
-                .as_ref()
-                .map(|movie| (self.known_movie(), movie.iter().map(|x| *x as f32).collect())),
-        ]
-        .into_iter()
-        .flatten()
-        .collect();
+        let mut rows = vec![report::Strip::new("recovered", &found.movie)?];
+        if let Some(movie) = &self.measured.movie {
+            rows.push(report::Strip::new(self.known_movie(), movie)?);
+        }
         figures.push(report::frames(&rows, n, &self.measured.times)?);
         if let Some(figure) = self.residual_map(found)? {
             self.folder.file("residuals.png")?.write(&figure.png)?;

@@ -4,24 +4,23 @@ use super::gains::Gains;
 use super::verdict::Evidence;
 use super::{Estimate, Found};
 use crate::report::{Axis, LinePlot, Marks, Series};
+use kerrlight_tomo::frames::Frames;
 
 impl Estimate<'_> {
     /// Total flux of the model and of the true movie.
-    pub fn light_curve(&self, movie: &[f32]) -> LinePlot {
-        let n = self.file.screen.pixels;
-        let flux = |image: &[f32]| image.iter().map(|x| f64::from(*x)).sum::<f64>();
+    pub fn light_curve(&self, movie: &Frames<f32>) -> anyhow::Result<LinePlot> {
         let times = &self.measured.times;
         let points = |fluxes: Vec<f64>| times.iter().zip(fluxes).map(|(t, f)| [*t, f]).collect();
         let mut series = vec![Series {
             name: "recovered".to_owned(),
-            points: points(movie.chunks(n * n).map(flux).collect()),
+            points: points(movie.sums()?),
             errors: Vec::new(),
             marks: Marks::Line,
         }];
         if let Some(truth) = &self.measured.movie {
             series.push(Series {
                 name: self.known_movie().to_owned(),
-                points: points(truth.chunks(n * n).map(|image| image.iter().sum()).collect()),
+                points: points(truth.sums()?),
                 errors: Vec::new(),
                 marks: Marks::Points,
             });
@@ -31,13 +30,13 @@ impl Estimate<'_> {
             (Some(_), None) => " Points are the data, the line is the recovered movie.",
             (None, _) => " The data are no images: the line is the recovered movie.",
         };
-        LinePlot {
+        Ok(LinePlot {
             title: "Light curve".to_owned(),
             caption: format!("Total flux of each frame: all light of the movie, added up.{points}"),
             x: Axis { label: "time".to_owned(), unit: "GM/c³".to_owned(), log: false },
             y: Axis { label: "flux".to_owned(), unit: "Jy".to_owned(), log: false },
             series,
-        }
+        })
     }
 
     /// Amplitudes of the data and of the model, with the data's errors.
@@ -49,7 +48,7 @@ impl Estimate<'_> {
 /// Amplitudes of the data and of images of all frames with these gains.
 pub fn amplitudes(
     evidence: &Evidence<'_>,
-    movie: &[f32],
+    movie: &Frames<f32>,
     gains: Option<&Gains>,
 ) -> anyhow::Result<Option<LinePlot>> {
     let Some((observation, _)) = &evidence.measured.visibilities else { return Ok(None) };

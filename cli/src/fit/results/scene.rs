@@ -4,6 +4,7 @@ use super::{Estimate, fields};
 use anyhow::Context;
 use kerrlight_tomo::fit::{Sampling, setup};
 use kerrlight_tomo::fit::{State, Trainer};
+use kerrlight_tomo::frames::Frames;
 use kerrlight_tomo::scene::{Scene, VolumeRegion};
 use kerrlight_tomo::toml_file;
 use kerrlight_tomo::volume::VolumeFile;
@@ -20,7 +21,7 @@ impl Estimate<'_> {
         &self,
         trainer: &mut Trainer<'_, f32>,
         state: &State<f32>,
-        movie: &[f32],
+        movie: &Frames<f32>,
     ) -> anyhow::Result<()> {
         if trainer.representation.dimension() != 3 {
             return Ok(());
@@ -38,20 +39,16 @@ impl Estimate<'_> {
         self.folder.file(SCENE)?.write(text.as_bytes())
     }
 
-    fn scene_text(&self, state: &State<f32>, movie: &[f32]) -> anyhow::Result<String> {
+    fn scene_text(&self, state: &State<f32>, movie: &Frames<f32>) -> anyhow::Result<String> {
         let frame = self.frame_of_still();
         let parts = [
             self.heading(),
             self.place(frame)?,
-            self.screen(&movie[frame * self.pixels()..][..self.pixels()])?,
+            self.screen(&movie.image(frame)?)?,
             self.light(),
             self.volume(state)?,
         ];
         Ok(parts.join("\n"))
-    }
-
-    fn pixels(&self) -> usize {
-        self.file.screen.pixels * self.file.screen.pixels
     }
 
     /// The frame whose time is nearest to that of the still image.

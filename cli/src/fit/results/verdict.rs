@@ -6,11 +6,13 @@ mod parts;
 mod tests;
 mod words;
 
+use anyhow::Context;
 use kerrlight_tomo::fit::settings::{DataFiles, FitFile, Loss, LossKind, Noise};
 use kerrlight_tomo::fit::setup::Measured;
 use kerrlight_tomo::fit::verdict::{
     Errors, Outcome, Statistics, Tested, Verdict, ZeroSpacing, judge, worst,
 };
+use kerrlight_tomo::frames::Frames;
 use kerrlight_tomo::interferometry::products::debiased_amplitude;
 use serde_json::{Value, json};
 
@@ -78,7 +80,7 @@ impl Evidence<'_> {
     pub fn judged(
         &self,
         (names, statistics): Compared<'_>,
-        movie: &[f32],
+        movie: &Frames<f32>,
     ) -> anyhow::Result<Judged> {
         let model = self.model_visibilities(movie)?;
         let mut terms = Vec::new();
@@ -94,7 +96,7 @@ impl Evidence<'_> {
             terms.push((name.to_owned(), tested));
         }
         let tested: Vec<Tested> = terms.iter().map(|(_, tested)| tested.clone()).collect();
-        let flux = self.zero_spacing(movie);
+        let flux = self.zero_spacing(movie)?;
         let knows_flux =
             |loss: &Loss| loss.data.is_visibilities() || loss.data == LossKind::Amplitudes;
         // Gains that are free may be what is missing.
@@ -113,14 +115,14 @@ impl Evidence<'_> {
     }
 
     /// What baselines have measured that resolve nothing of the field of view.
-    fn zero_spacing(&self, movie: &[f32]) -> Option<ZeroSpacing> {
-        let (observation, frames) = self.measured.visibilities.as_ref()?;
-        let sky = self.measured.sky?;
+    fn zero_spacing(&self, movie: &Frames<f32>) -> anyhow::Result<Option<ZeroSpacing>> {
+        let (Some((observation, frames)), Some(sky)) =
+            (&self.measured.visibilities, self.measured.sky)
+        else {
+            return Ok(None);
+        };
         let shortest = SHORT / (sky.pixel_rad * sky.width as f64);
-        let flux: Vec<f64> = movie
-            .chunks_exact(sky.width * sky.height)
-            .map(|f| f.iter().copied().map(f64::from).sum())
-            .collect();
+        let flux = movie.sums()?;
         let (mut count, mut weights, mut sums) = (0, 0.0, [0.0; 2]);
         for (row, frame) in observation.rows.iter().zip(frames) {
             let Some(i) = row.stokes_i(observation.basis) else { continue };
@@ -131,11 +133,11 @@ impl Evidence<'_> {
             count += 1;
             weights += weight;
             sums[0] += weight * debiased_amplitude(&i);
-            sums[1] += weight * flux.get(*frame)?;
+            sums[1] += weight * flux.get(*frame).context("a frame without an image")?;
         }
         let [measured_jy, model_jy] = sums.map(|sum| sum / weights);
         let error_jy = weights.powf(-0.5);
-        (count > 0).then_some(ZeroSpacing { measured_jy, error_jy, model_jy, count })
+        Ok((count > 0).then_some(ZeroSpacing { measured_jy, error_jy, model_jy, count }))
     }
 }
 

@@ -20,6 +20,7 @@ use kerrlight_tomo::fit::settings::{Loss, LossKind, StaticImageFile};
 use kerrlight_tomo::fit::setup::Measured;
 use kerrlight_tomo::fit::static_image::{Stage, Survey, survey};
 use kerrlight_tomo::fit::verdict::Statistics;
+use kerrlight_tomo::frames::Frames;
 use kerrlight_tomo::interferometry::files::images;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -41,7 +42,7 @@ struct Found<'a> {
     folder: &'a Folder,
     survey: Survey,
     /// The image once a frame.
-    movie: Vec<f32>,
+    movie: Frames<f32>,
     judged: Judged,
     gains: Option<Gains>,
     /// Kinds of data that were not fitted, with χ² per datum.
@@ -74,7 +75,7 @@ pub fn run(prepared: &Prepared, folder: &Folder) -> anyhow::Result<Answer> {
     folder.file(folder::LOG)?.write(b"")?;
     let survey = searched(file, measured)?;
     let image: Vec<f32> = survey.found().solution.image.iter().map(|x| *x as f32).collect();
-    let movie = image.repeat(measured.times.len());
+    let movie = Frames::of(image.repeat(measured.times.len()), image.len());
     let evidence = Evidence { file: None, losses: &file.loss, seed: file.seed, measured };
     let judged = evidence.judged(compared(file, measured, &survey)?, &movie)?;
     let gains = Gains::beside(&evidence, &movie, folder)?;

@@ -1,10 +1,11 @@
 //! Rows of data to which all rays add: a number for every node.
 
-use super::operator::{NONE, Operator};
+use super::operator::{Held, NONE, Operator};
 use super::rows::Rows;
 use super::walk::Buffers;
 use crate::representation::spline::STENCIL;
 use crate::simd::Float;
+use std::borrow::Cow;
 
 impl<T: Float> Rows<T> {
     /// Adds a row of all columns.
@@ -48,8 +49,11 @@ impl<T: Float + Default> Operator<'_, T> {
     /// All rows with all columns: frame by frame, pixel by pixel.
     pub fn all_rows(&self) -> Vec<Vec<f64>> {
         let mut all = vec![vec![0.0; self.active.count()]; self.frames.len() * self.pixels];
-        for (frame, rows) in self.rows.iter().enumerate() {
-            let Some(rows) = rows else { continue };
+        for (frame, held) in self.rows.iter().enumerate() {
+            let rows = match held {
+                Held::Kept(rows) => Cow::Borrowed(rows),
+                Held::Made | Held::Walked => Cow::Owned(self.rows_of(self.frames[frame])),
+            };
             for (k, pixel) in rows.pixel.iter().enumerate() {
                 let range = rows.starts[k] as usize..rows.starts[k + 1] as usize;
                 let to = &mut all[frame * self.pixels + *pixel as usize];

@@ -74,7 +74,7 @@ pub(super) struct Objective<'a, 'b, T: Float> {
     pub operator: &'b Operator<'a, T>,
     pub data: &'b Data<'a, T>,
     pub terms: &'b Penalised<'b>,
-    dark: Vec<T>,
+    dark: Option<Vec<T>>,
     /// Values and gradients and products with second derivatives that were computed.
     pub evaluations: usize,
 }
@@ -85,7 +85,7 @@ impl<'a, 'b, T: Float + Default> Objective<'a, 'b, T> {
         data: &'b Data<'a, T>,
         terms: &'b Penalised<'b>,
     ) -> Self {
-        let dark = if data.is_quadratic() { operator.dark(data) } else { Vec::new() };
+        let dark = if data.is_quadratic() { operator.dark(data) } else { None };
         Self { operator, data, terms, dark, evaluations: 0 }
     }
 
@@ -168,7 +168,8 @@ impl<T: Float + Default> Convex for Objective<'_, '_, T> {
         // As long as an emission of one, so that the data's own slopes, which are subtracted, cost no digits.
         let largest = direction.iter().fold(0.0f64, |largest, x| largest.max(x.abs()));
         let scale = if largest > 0.0 { 1.0 / largest } else { 1.0 };
-        *out = self.operator.curvature(self.data, &self.dark, &rounded::<T>(direction, scale));
+        let (dark, along) = (self.dark.as_deref(), rounded::<T>(direction, scale));
+        *out = self.operator.curvature(self.data, dark, &along);
         out.iter_mut().for_each(|x| *x *= largest);
         if let Some(smoothness) = self.terms.smoothness() {
             let all = self.operator.active.expand(direction);

@@ -3,8 +3,10 @@
 use super::data::Data;
 use super::rows::Rows;
 use super::walk::{Buffers, Voxels, Walk};
+use crate::memory;
 use crate::representation::spline::STENCIL;
 use crate::simd::Float;
+use core::ops::Range;
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
 
@@ -12,6 +14,9 @@ use std::sync::{Mutex, PoisonError};
 pub(super) const NONE: u32 = u32::MAX;
 /// Pieces that frames are cut into, whatever the number of threads: each adds up its own gradient.
 const PIECES: usize = 16;
+/// What part of the memory rows may take, and slopes that are kept to be subtracted.
+const ROWS: f64 = 1.0 / 4.0;
+const SLOPES: f64 = 1.0 / 16.0;
 /// Frames whose rows are made at a time; memory is checked between them.
 const AT_A_TIME: usize = 8;
 
@@ -61,15 +66,26 @@ impl Active {
     }
 }
 
-/// The movie as a function of the values at the nodes that count. Rows that fit into the memory are
-/// kept, those of other frames made anew each time.
+/// The movie as a function of the values at the nodes that count. Rows of the first frames are made, as many as fit into a
+/// budget, and kept, as many as there is memory for; all other frames are walked through.
 pub(super) struct Operator<'a, T> {
     pub walk: Walk<'a, T>,
     pub active: Active,
     pub corners: Vec<usize>,
     pub frames: &'a [usize],
     pub pixels: usize,
-    pub rows: Vec<Option<Rows<T>>>,
+    pub rows: Vec<Held<T>>,
+}
+
+/// How a frame is passed through: rows add up in another order than a walk, so that this decides the last bits, and
+/// whether rows are kept or made again does not.
+pub(super) enum Held<T> {
+    /// By rows that are kept.
+    Kept(Rows<T>),
+    /// By rows that are made each time.
+    Made,
+    /// Node by node.
+    Walked,
 }
 
 /// Memory of a thread.
@@ -84,20 +100,22 @@ impl<'a, T: Float + Default> Operator<'a, T> {
     pub fn new(walk: Walk<'a, T>, active: Active, frames: &'a [usize], budget: usize) -> Self {
         let (corners, pixels) = (walk.voxels.corners(), walk.model.pixels());
         let mut all = Self { walk, active, corners, frames, pixels, rows: Vec::new() };
-        let mut kept = 0;
+        let (mut made, room) = (0, memory::part(ROWS) as usize);
         for some in frames.chunks(AT_A_TIME) {
-            if kept > budget {
-                all.rows.extend(some.iter().map(|_| None));
+            if made > budget {
+                all.rows.extend(some.iter().map(|_| Held::Walked));
                 continue;
             }
             let rows: Vec<_> = some.par_iter().map(|frame| all.rows_of(*frame)).collect();
-            kept += rows.iter().map(Rows::bytes).sum::<usize>();
-            all.rows.extend(rows.into_iter().map(Some));
+            let kept = made <= room;
+            made += rows.iter().map(Rows::bytes).sum::<usize>();
+            all.rows
+                .extend(rows.into_iter().map(|r| if kept { Held::Kept(r) } else { Held::Made }));
         }
         all
     }
 
-    fn rows_of(&self, frame: usize) -> Rows<T> {
+    pub fn rows_of(&self, frame: usize) -> Rows<T> {
         if self.walk.model.is_flux {
             return self.fluxes_of(frame);
         }
@@ -114,19 +132,28 @@ impl<'a, T: Float + Default> Operator<'a, T> {
 
     /// Bytes of the rows that are kept.
     pub fn bytes(&self) -> usize {
-        self.rows.iter().flatten().map(Rows::bytes).sum()
+        self.kept().map(Rows::bytes).sum()
     }
 
     /// Entries of the rows that are kept.
     pub fn entries(&self) -> usize {
-        self.rows.iter().flatten().map(|rows| rows.entries.len()).sum()
+        self.kept().map(|rows| rows.entries.len()).sum()
+    }
+
+    fn kept(&self) -> impl Iterator<Item = &Rows<T>> {
+        self.rows.iter().filter_map(|held| match held {
+            Held::Kept(rows) => Some(rows),
+            Held::Made | Held::Walked => None,
+        })
     }
 
     fn image(&self, k: usize, x: &[T], scratch: &mut Scratch<T>) {
         let Scratch { buffers, image, .. } = scratch;
         image.fill(T::zero());
-        if let Some(rows) = &self.rows[k] {
-            return rows.forward(x, image);
+        match &self.rows[k] {
+            Held::Kept(rows) => return rows.forward(x, image),
+            Held::Made => return self.rows_of(self.frames[k]).forward(x, image),
+            Held::Walked => {}
         }
         let (wanted, degree) = (Some(self.active.cells.as_slice()), self.walk.voxels.degree);
         let mut weights = [T::zero(); STENCIL];
@@ -146,8 +173,10 @@ impl<'a, T: Float + Default> Operator<'a, T> {
     }
 
     fn back(&self, k: usize, scratch: &mut Scratch<T>, sums: &mut [T]) {
-        if let Some(rows) = &self.rows[k] {
-            return rows.adjoint(&scratch.slopes, sums);
+        match &self.rows[k] {
+            Held::Kept(rows) => return rows.adjoint(&scratch.slopes, sums),
+            Held::Made => return self.rows_of(self.frames[k]).adjoint(&scratch.slopes, sums),
+            Held::Walked => {}
         }
         let (wanted, degree) = (Some(self.active.cells.as_slice()), self.walk.voxels.degree);
         let Scratch { buffers, slopes, .. } = scratch;
@@ -226,22 +255,38 @@ impl<'a, T: Float + Default> Operator<'a, T> {
     }
 
     /// Gradients with respect to the pixels of all frames where nothing shines.
-    pub fn dark(&self, data: &Data<'_, T>) -> Vec<T> {
+    pub fn dark(&self, data: &Data<'_, T>) -> Option<Vec<T>> {
+        let count = self.frames.len() * self.pixels;
+        if (count * size_of::<T>()) as f64 > memory::part(SLOPES) {
+            return None;
+        }
         let (dark, mut slopes) = (vec![T::zero(); self.pixels], vec![T::zero(); self.pixels]);
-        let mut all = Vec::with_capacity(self.frames.len() * self.pixels);
+        let mut all = Vec::with_capacity(count);
         for frame in self.frames {
             data.value(*frame, &dark, &mut slopes);
             all.extend_from_slice(&slopes);
         }
-        all
+        Some(all)
     }
 
-    /// Second derivative of quadratic data, times `direction`; `dark` are their slopes where nothing shines.
-    pub fn curvature(&self, data: &Data<'_, T>, dark: &[T], direction: &[T]) -> Vec<f64> {
+    /// Second derivative of quadratic data, times `direction`; `dark` are their slopes where nothing shines, if they are
+    /// kept.
+    pub fn curvature(&self, data: &Data<'_, T>, dark: Option<&[T]>, direction: &[T]) -> Vec<f64> {
+        let nothing = vec![T::zero(); if dark.is_none() { self.pixels } else { 0 }];
         let link = |k: usize, image: &[T], slopes: &mut [T]| {
-            data.value(self.frames[k], image, slopes);
-            let dark = &dark[k * self.pixels..(k + 1) * self.pixels];
-            slopes.iter_mut().zip(dark).for_each(|(slope, dark)| *slope -= *dark);
+            let frame = self.frames[k];
+            data.value(frame, image, slopes);
+            let subtract = |slopes: &mut [T], dark: &[T]| {
+                slopes.iter_mut().zip(dark).for_each(|(slope, dark)| *slope -= *dark);
+            };
+            match dark {
+                Some(dark) => subtract(slopes, &dark[k * self.pixels..(k + 1) * self.pixels]),
+                None => {
+                    let mut dark = nothing.clone();
+                    data.value(frame, &nothing, &mut dark);
+                    subtract(slopes, &dark);
+                }
+            }
             0.0
         };
         self.through(direction, false, link).1
@@ -249,7 +294,12 @@ impl<'a, T: Float + Default> Operator<'a, T> {
 
     /// The images of `x`, frame after frame.
     pub fn images(&self, x: &[T]) -> Vec<T> {
-        let indices: Vec<usize> = (0..self.frames.len()).collect();
+        self.some_images(x, 0..self.frames.len())
+    }
+
+    /// Those of some frames.
+    pub fn some_images(&self, x: &[T], frames: Range<usize>) -> Vec<T> {
+        let indices: Vec<usize> = frames.collect();
         let of = |scratch: &mut Scratch<T>, k: &usize| {
             self.image(*k, x, scratch);
             scratch.image.clone()
@@ -313,9 +363,16 @@ impl<'a, T: Float + Default> Operator<'a, T> {
     /// Sum of squares of each column.
     pub fn squares(&self) -> Vec<f64> {
         let mut sums = vec![0.0; self.active.count()];
-        for rows in self.rows.iter().flatten() {
+        let mut add = |rows: &Rows<T>| {
             for (column, entry) in rows.columns.iter().zip(&rows.entries) {
                 sums[*column as usize] += entry.double() * entry.double();
+            }
+        };
+        for (held, frame) in self.rows.iter().zip(self.frames) {
+            match held {
+                Held::Kept(rows) => add(rows),
+                Held::Made => add(&self.rows_of(*frame)),
+                Held::Walked => {}
             }
         }
         sums

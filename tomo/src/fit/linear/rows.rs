@@ -6,7 +6,7 @@ use crate::representation::spline::{Degree, STENCIL};
 use crate::simd::Float;
 
 /// The rows of a frame that are not empty.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Rows<T> {
     pub pixel: Vec<u32>,
     pub starts: Vec<u32>,

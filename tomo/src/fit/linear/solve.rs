@@ -90,6 +90,9 @@ impl Default for LinearSettings {
     }
 }
 
+/// Images that are made together.
+const TOGETHER: usize = 32;
+
 /// What is known while iterations go on.
 pub struct LinearProgress<'a> {
     /// 0: the coarse problem.
@@ -248,10 +251,14 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         let data = self.data()?;
         let operator = Operator::new(self.walk(), self.active(&shines), self.frames, 0);
         let x: Vec<T> = emission.iter().copied().filter(|x| *x != T::zero()).collect();
-        let images = operator.images(&x);
-        let mut slopes = vec![T::zero(); self.model.pixels()];
-        let frames = self.frames.iter().zip(images.chunks_exact(slopes.len()));
-        Ok(frames.map(|(frame, image)| data.value(*frame, image, &mut slopes)).sum())
+        let (mut slopes, mut sum) = (vec![T::zero(); self.model.pixels()], 0.0);
+        for (k, frames) in self.frames.chunks(TOGETHER).enumerate() {
+            let images = operator.some_images(&x, k * TOGETHER..k * TOGETHER + frames.len());
+            for (frame, image) in frames.iter().zip(images.chunks_exact(slopes.len())) {
+                sum += data.value(*frame, image, &mut slopes);
+            }
+        }
+        Ok(sum)
     }
 
     pub(super) fn data(&self) -> Result<Data<'_, T>, Error> {

@@ -5,6 +5,7 @@ use super::{Instrument, Measured, Result, forward_model, linear, priors, sky, sp
 use crate::fit::scan::AxisProblem;
 use crate::fit::settings::{FitFile, LossKind, Region, Screen, WidthOf};
 use crate::fit::{Motion, Objective, Sampling};
+use crate::frames::Frames;
 
 /// What a fit is seen through by a scan.
 pub struct CoarseView {
@@ -46,11 +47,11 @@ impl CoarseView {
         let region = fewer_nodes(file, every);
         let file = FitFile { region, ..file.clone() };
         let instrument = Instrument::of(&file, &kept)?;
-        let thin = |movie: &Vec<f64>| -> Vec<f64> {
-            movie.chunks(n * n).flat_map(|frame| kept.iter().map(|k| frame[*k])).collect()
+        let thin = |movie: &Frames<f64>| {
+            movie.mapped(kept.len(), |image| kept.iter().map(|k| image[*k]).collect())
         };
-        let measured =
-            Measured { movie: measured.movie.as_ref().map(thin), ..measured.without_truth() };
+        let movie = measured.movie.as_ref().map(thin).transpose()?;
+        let measured = Measured { movie, ..measured.without_truth() };
         let screen = Screen { pixels: places.len(), ..file.screen.clone() };
         Ok(Self { file: FitFile { screen, ..file }, instrument, measured })
     }

@@ -243,7 +243,7 @@ pub(super) fn simulate(
     }
     let fluxes = truth.movie_through(&mut instrument.summed(&motion, &parameters)?);
     let data = measure(&fluxes, &parameters, settings, file.seed)?;
-    let movie = Some(truth.movie_through(&mut instrument.pictured::<f64>(&motion)?));
+    let movie = Some(truth.movie(file, instrument, &times)?);
     let fitted = fitted(&hours, settings.validate_after_min)?;
     let curve = Some(Curve { parameters, hours, data, fitted });
     Ok(Measured { times, movie, curve, truth: Some(truth), ..Measured::empty() })

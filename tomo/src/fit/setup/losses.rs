@@ -8,12 +8,14 @@ use crate::fit::{
     Data, ForwardModel, FrameTerm, ImageTerm, IntensityTerm, LightCurveTerm, Motion, Scan,
     ScanTerm, Weighted,
 };
+use crate::frames::Frames;
 use crate::interferometry::data_terms::{
     AmplitudeTerm, ClosureTerm, DataTerm, DataTermError, GainTerm, VisibilityTerm,
 };
 use crate::interferometry::observation::Observation;
 use crate::interferometry::operator::{Float, ImageGrid, Method, Pulse, Transform};
 use crate::interferometry::products::ClosureKind;
+use crate::memory;
 
 impl Measured {
     /// The terms of the loss, of images of so many pixels.
@@ -56,15 +58,14 @@ impl Measured {
         Ok(data)
     }
 
-    fn movie(&self) -> Result<&[f64]> {
+    fn movie(&self) -> Result<&Frames<f64>> {
         let missing = || FitError::Conflict("there are no images, only visibilities".to_owned());
-        Ok(self.movie.as_deref().ok_or_else(missing)?)
+        Ok(self.movie.as_ref().ok_or_else(missing)?)
     }
 
     /// Flux of every frame, Jy.
     fn fluxes(&self) -> Result<Vec<f64>> {
-        let movie = self.movie()?;
-        Ok(movie.chunks(movie.len() / self.times.len()).map(|f| f.iter().sum()).collect())
+        self.movie()?.sums()
     }
 
     fn image(&self, loss: &Loss, pixels: usize) -> Result<ImageTerm<f32>> {
@@ -74,8 +75,11 @@ impl Measured {
                 "give `sigma = …`, the standard deviation of a pixel in Jy, beside `data = \"image\"`",
             )
         })?;
-        let movie = self.movie()?.iter().map(|x| *x as f32).collect();
-        ImageTerm::new(movie, pixels, sigma)
+        let movie = self.movie()?;
+        if movie.pixels() != pixels {
+            refuse!("images of {} pixels, where there are {pixels}", movie.pixels());
+        }
+        ImageTerm::of(movie.clone(), sigma)
     }
 
     fn other(&self, loss: &Loss, pixels: usize) -> Result<Box<dyn FrameTerm<f32>>> {
@@ -140,7 +144,10 @@ impl Measured {
         }
         let uv: Vec<[f64; 2]> = part.stokes_i().map(|(row, _)| row.uv).collect();
         let Some(term) = self.scan_data(loss, &part)? else { return Ok(None) };
-        let transform = Transform::new(sky, Pulse::Triangle, &[uv], Method::Direct, MEMORY)?;
+        // With the same result, whether they are kept or not.
+        let share = memory::part(1.0 / 8.0) / self.times.len() as f64;
+        let kept = MEMORY.min(share as usize);
+        let transform = Transform::new(sky, Pulse::Triangle, &[uv], Method::Direct, kept)?;
         Ok(Some(Scan { transform, term }))
     }
 }

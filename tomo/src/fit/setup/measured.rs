@@ -11,6 +11,7 @@ use super::{Instrument, Result, Truth, hours_per_m, motion, sky};
 use crate::fit::settings::{
     DataFiles, FitError, FitFile, Loss, LossKind, Scattering, StaticImageFile, Within, refuse,
 };
+use crate::frames::Frames;
 use crate::interferometry::Complex64;
 use crate::interferometry::array::Array;
 use crate::interferometry::gains::{GainPriors, GainTable};
@@ -19,7 +20,6 @@ use crate::interferometry::observation::{Observation, Row};
 use crate::interferometry::operator::{ImageGrid, Method, Operator, Pulse, Transform};
 use crate::interferometry::polarimetry::LeakageTable;
 use crate::interferometry::simulate::{self, Movie};
-use crate::memory;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
@@ -33,7 +33,7 @@ pub struct Measured {
     /// Times of the frames, M.
     pub times: Vec<f64>,
     /// The movie, where images are the data or are simulated.
-    pub movie: Option<Vec<f64>>,
+    pub movie: Option<Frames<f64>>,
     /// Visibilities, with the frame of each row.
     pub visibilities: Option<(Observation, Vec<usize>)>,
     /// The light curve of an unresolved source.
@@ -94,22 +94,24 @@ impl Measured {
         }
     }
 
-    /// Takes images as the data. `name` is what the movie is called in messages.
+    /// Takes images of this width and height as the data. `name` is what the movie is called in messages.
     ///
     /// # Errors
     /// If it has other frames or pixels than the settings.
-    pub fn of_movie(file: &FitFile, movie: Movie, name: &str) -> Result<Self> {
+    pub fn of_movie(
+        file: &FitFile,
+        (movie, [width, height]): (Frames<f64>, [usize; 2]),
+        name: &str,
+    ) -> Result<Self> {
         let (times, n) = (frames(file)?, file.screen.pixels);
-        if (movie.grid.width, movie.grid.height) != (n, n) || movie.frames() != times.len() {
+        if [width, height] != [n, n] || movie.count() != times.len() {
             refuse!(
-                "{name} has {} frames of {} x {} pixels, but movie.frames and screen.pixels say {} of {n} x {n}",
-                movie.frames(),
-                movie.grid.width,
-                movie.grid.height,
+                "{name} has {} frames of {width} x {height} pixels, but movie.frames and screen.pixels say {} of {n} x {n}",
+                movie.count(),
                 times.len()
             );
         }
-        let (movie, sky) = (Some(movie.pixels), sky(file).ok());
+        let (movie, sky) = (Some(movie), sky(file).ok());
         Ok(Measured { times, movie, sky, ..Measured::empty() })
     }
 
@@ -174,7 +176,10 @@ impl Measured {
 
     /// The data with noise once more, `factor` times as large as their errors: what might as well have been measured.
     /// Every frame's pixels get that of the loss that they are in; visibilities that of their rows.
-    pub fn perturbed(&self, losses: &[Loss], factor: f64, seed: u64) -> Self {
+    ///
+    /// # Errors
+    /// If there is no room for the movie.
+    pub fn perturbed(&self, losses: &[Loss], factor: f64, seed: u64) -> Result<Self> {
         let mut copy = self.without_truth();
         if let Some((observation, _)) = &mut copy.visibilities {
             let scale = |row: &mut Row, by: f64| row.noise_sigma.iter_mut().for_each(|s| *s *= by);
@@ -186,10 +191,12 @@ impl Measured {
         let sigma = losses.iter().filter(of_pixels).filter_map(|loss| loss.sigma).next();
         if let (Some(movie), Some(sigma)) = (&mut copy.movie, sigma) {
             let mut random = Pcg64::seed_from_u64(seed);
-            for pixel in movie {
+            let mut noisy = |pixel: &f64| {
                 let noise: f64 = random.sample(StandardNormal);
-                *pixel += factor * sigma * noise;
-            }
+                pixel + factor * sigma * noise
+            };
+            *movie =
+                movie.mapped(movie.pixels(), |image| image.iter().map(&mut noisy).collect())?;
         }
         if let Some(curve) = &mut copy.curve {
             let mut random = Pcg64::seed_from_u64(seed);
@@ -198,7 +205,7 @@ impl Measured {
                 *flux += factor * *sigma * noise;
             }
         }
-        copy
+        Ok(copy)
     }
 
     /// What would have been measured of a static image, with the gains that explain the data best beside it and with other
@@ -270,13 +277,6 @@ fn frames(file: &FitFile) -> Result<Vec<f64>> {
     Ok((0..n).map(|k| movie.from + step * k as f64).collect())
 }
 
-/// Refuses movies that there is no memory for: as they are simulated, as data, and as they are recovered.
-fn afford_movie(frames: usize, pixels: usize) -> Result<()> {
-    let what = || format!("movies of {frames} frames of {pixels} x {pixels} pixels");
-    let one = memory::movie(frames as f64, (pixels * pixels) as f64);
-    memory::afford(what, 2.0 * one)
-}
-
 fn simulate(
     file: &FitFile,
     fit: &FitFile,
@@ -289,14 +289,12 @@ fn simulate(
     let truth = Truth::new(file)?;
     let Some(seen) = &file.observation else {
         let times = frames(file)?;
-        afford_movie(times.len(), file.screen.pixels)?;
         let movie = Some(lit(&truth, truth.movie(file, instrument, &times)?)?);
         let sky = sky(file).ok();
         return Ok(Measured { times, movie, sky, truth: Some(truth), ..Measured::empty() });
     };
     let sky = sky(file)?;
     let (mut observation, hours) = schedule_of(seen, array)?;
-    afford_movie(hours.len(), file.screen.pixels)?;
     let per_m = hours_per_m(file)?;
     let times: Vec<f64> = hours.iter().map(|h| seen.first_time + (h - hours[0]) / per_m).collect();
     let movie = fill(&mut observation, (file, fit, instrument), &truth, (&hours, &times), sky)?;
@@ -329,26 +327,26 @@ fn fill(
     truth: &Truth,
     (hours, times): (&[f64], &[f64]),
     sky: ImageGrid,
-) -> Result<Vec<f64>> {
-    let of = |pixels: Vec<f64>| Movie { grid: sky, pixels };
+) -> Result<Frames<f64>> {
     if !is_polarized(&fit.loss) {
-        let images = of(lit(truth, truth.movie(file, instrument, times)?)?);
-        simulate::fill(observation, &images, Pulse::Triangle, hours, Method::Direct)?;
-        return Ok(images.pixels);
+        let images = lit(truth, truth.movie(file, instrument, times)?)?;
+        simulate::fill_from(observation, (sky, &images), Pulse::Triangle, hours)?;
+        return Ok(images);
     }
+    let of = |pixels: Vec<f64>| Movie { grid: sky, pixels };
     let mut model = instrument.forward::<f64>(&motion(file, times.to_vec())?)?;
     let all = truth.movie_through(&mut model);
     let [i, q, u] = polarized::split(&all, sky.pixels()).map(of);
-    let i = of(lit(truth, i.pixels)?);
+    let lit = lit(truth, Frames::of(i.pixels.clone(), sky.pixels()))?;
     let movies = [&i, &q, &u];
     simulate::fill_polarized(observation, movies, Pulse::Triangle, hours, Method::Direct)?;
-    Ok(i.pixels)
+    Ok(lit)
 }
 
 /// A simulated movie, if any of its pixels shines: a dark one would be recovered as nothing, perfectly.
 /// A truth of amplitude 0 is meant to be dark.
-fn lit(truth: &Truth, movie: Vec<f64>) -> Result<Vec<f64>> {
-    let brightest = movie.iter().fold(0.0f64, |most, x| most.max(*x));
+fn lit(truth: &Truth, movie: Frames<f64>) -> Result<Frames<f64>> {
+    let brightest = movie.largest()?;
     if brightest < 1e-30 && !truth.is_dark() {
         refuse!(
             "the truth is dark in every pixel of every frame (the brightest has {brightest:e} Jy): spots must lie in the region \

@@ -13,7 +13,7 @@ use crate::transport::View;
 
 /// Pixels along each side: six times those of the fit, no more than this.
 const MOST: usize = 256;
-/// Rows that are traced at a time: what they need goes like their number.
+/// Rows that are traced at a time: the memory that they need goes like their number.
 const ROWS: usize = 32;
 /// Of rays along photon rings, in the logarithm of their distance from the critical curve: less than a cell of
 /// a volume by its radius.

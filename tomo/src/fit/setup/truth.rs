@@ -5,6 +5,7 @@ use super::{AXIS, Instrument, Result, known_axis, motion};
 use crate::dynamics::{AngularVelocity, Axis};
 use crate::fit::settings::{FitError, FitFile, Shines, Spot, Tube, Within, refuse};
 use crate::fit::{Batch, ForwardModel};
+use crate::frames::{Frames, Sink};
 use crate::simd::Float;
 use kerrlight_geodesic::vector::distance;
 
@@ -115,6 +116,15 @@ impl Truth {
         }
     }
 
+    fn images<T: Float>(&self, model: &ForwardModel<T>, sink: &mut Sink<'_, f64>) -> Result<()> {
+        match self.is_carried() {
+            true => model.images_of(self.axis, &|x| self.at(x), &mut Batch::default(), sink),
+            false => {
+                model.images_of_events(&|x, t| self.seen_at(x, t), &mut Batch::default(), sink)
+            }
+        }
+    }
+
     /// Whether every amplitude is 0: data of noise alone.
     pub fn is_dark(&self) -> bool {
         self.spots.iter().all(|spot| spot.amplitude == 0.0)
@@ -134,14 +144,15 @@ impl Truth {
     /// Its movie at some times, in double precision: Jy per pixel, frame by frame, rows from the top.
     ///
     /// # Errors
-    /// If the motion is out of range.
+    /// If the motion is out of range, or there is no room for the movie.
     pub fn movie(
         &self,
         file: &FitFile,
         instrument: &Instrument,
         times: &[f64],
-    ) -> Result<Vec<f64>> {
-        let motion = motion(file, times.to_vec())?;
-        Ok(self.movie_through(&mut instrument.pictured::<f64>(&motion)?))
+    ) -> Result<Frames<f64>> {
+        let mut model = instrument.pictured::<f64>(&motion(file, times.to_vec())?)?;
+        model.weigh(self.axis);
+        Frames::made((model.frames(), model.pixels()), |sink| self.images(&model, sink))
     }
 }

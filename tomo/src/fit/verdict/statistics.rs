@@ -91,11 +91,17 @@ impl Statistics {
     pub fn of(frames: impl IntoIterator<Item = Vec<Residual>>, width: usize) -> Self {
         let mut all = Self::default();
         frames.into_iter().for_each(|frame| all.add(frame, width));
-        all.before = Frame::default();
-        all
+        all.ended()
     }
 
-    fn add(&mut self, residuals: Vec<Residual>, width: usize) {
+    /// When all frames were added.
+    #[must_use]
+    pub fn ended(self) -> Self {
+        Self { before: Frame::default(), ..self }
+    }
+
+    /// Adds the next frame; images have rows of `width` pixels.
+    pub fn add(&mut self, residuals: Vec<Residual>, width: usize) {
         let mut frame = Part::default();
         let mut now = Frame::default();
         let mut seen: HashMap<Vec<u16>, usize> = HashMap::new();

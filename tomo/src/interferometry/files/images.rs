@@ -2,12 +2,18 @@
 
 use super::FileError;
 use crate::Error;
+use crate::frames::Frames;
 use crate::image::exr;
 use crate::interferometry::operator::ImageGrid;
 use crate::interferometry::simulate::Movie;
-use crate::numpy::{Archive, NumpyError, read_array, write_archive, write_array};
+use crate::memory;
+use crate::numpy::{
+    Archive, ArchiveWriter, NumpyError, Stream, read_array, write_archive, write_array,
+};
 use crate::scene::Scene;
+use crate::simd::Float;
 use crate::units::MICROARCSECOND;
+use std::io::{Read, Seek, Write};
 
 type Result<T> = std::result::Result<T, FileError>;
 
@@ -51,12 +57,16 @@ impl Pixels {
     }
 
     fn all_finite(&self) -> Result<()> {
-        let bad = self.values.iter().position(|value| !value.is_finite());
-        let Some(k) = bad else { return Ok(()) };
-        let (row, column) = (k / self.width % self.height + 1, k % self.width + 1);
-        let message = format!("row {row}, column {column}: {} is not finite", self.values[k]);
-        Err(FileError::whole(message))
+        all_finite(&self.values, [self.width, self.height])
     }
+}
+
+/// Refuses pixels that are no numbers.
+fn all_finite(values: &[f64], [width, height]: [usize; 2]) -> Result<()> {
+    let bad = values.iter().position(|value| !value.is_finite());
+    let Some(k) = bad else { return Ok(()) };
+    let (row, column) = (k / width % height + 1, k % width + 1);
+    Err(FileError::whole(format!("row {row}, column {column}: {} is not finite", values[k])))
 }
 
 /// A row of pixels a line, separated by commas; lines that start with `#` are passed over.
@@ -137,6 +147,51 @@ pub fn npz_movie(bytes: &[u8]) -> std::result::Result<Pixels, Error> {
     Ok(Pixels { times, field_uas, ..pixels })
 }
 
+/// Images with their width and height.
+pub type WithSize = (Frames<f64>, [usize; 2]);
+
+/// Images of an NPY file as [`npy`] takes them, read one after the other: they need not fit into memory.
+///
+/// # Errors
+/// If it has another shape, or a number that is not finite.
+pub fn npy_frames(file: impl Read) -> std::result::Result<WithSize, Error> {
+    frames_of(Stream::new(file)?)
+}
+
+/// The same of an archive as [`npz_movie`] takes it.
+///
+/// # Errors
+/// As those of [`npy_frames`], or if there is no such array.
+pub fn npz_frames(file: impl Read + Seek) -> std::result::Result<WithSize, Error> {
+    let mut archive = Archive::of(file)?;
+    let names = archive.names()?;
+    let name = image_of(&names)?;
+    let frames = frames_of(archive.stream(name)?);
+    Ok(frames.map_err(|error| NumpyError::member(format!("{name}.npy"), error))?)
+}
+
+fn frames_of<R: Read>(array: Stream<R>) -> std::result::Result<WithSize, Error> {
+    let shape: Vec<usize> = array.shape().iter().map(|n| *n as usize).collect();
+    let (count, [height, width]) = match shape[..] {
+        [height, width] => (1, [height, width]),
+        [count, height, width] => (count, [height, width]),
+        _ => return Err(NumpyError::content(format!("shape {shape:?}: {IMAGE_SHAPES}")).into()),
+    };
+    let pixels = height.checked_mul(width).filter(|pixels| *pixels > 0 && count > 0);
+    let pixels = pixels.filter(|pixels| pixels.checked_mul(8 * count).is_some());
+    let pixels =
+        pixels.ok_or_else(|| NumpyError::content(format!("shape {shape:?}: no pixels")))?;
+    let what = || format!("an image of {width} x {height} pixels");
+    memory::afford(what, memory::movie(1.0, pixels as f64))?;
+    let frames = Frames::made((count, pixels), |sink| {
+        array.chunks(pixels, |image| {
+            all_finite(image, [width, height])?;
+            sink(image)
+        })
+    });
+    Ok((frames?, [width, height]))
+}
+
 /// The array of an archive that is images.
 fn image_of(names: &[String]) -> std::result::Result<&str, NumpyError> {
     let there = |wanted: &&&str| names.iter().any(|name| name == **wanted);
@@ -207,6 +262,53 @@ pub fn movie_archive(
         .iter()
         .map(|(name, list)| (*name, write_array(&[list.len() as u64], list.iter().copied())));
     write_archive(movies.chain(lists))
+}
+
+/// The same of movies that need not be in memory, one after the other.
+pub struct MovieWriter<W: Write + Seek> {
+    archive: ArchiveWriter<W>,
+    side: usize,
+}
+
+impl<W: Write + Seek> MovieWriter<W> {
+    /// Of images of `side` × `side` pixels, into this file.
+    pub fn new(out: W, side: usize) -> Self {
+        Self { archive: ArchiveWriter::new(out), side }
+    }
+
+    /// Adds a movie in single precision.
+    ///
+    /// # Errors
+    /// If it cannot be read or written.
+    pub fn add<T: Float>(
+        &mut self,
+        name: &str,
+        movie: &Frames<T>,
+    ) -> std::result::Result<(), Error> {
+        let shape = [movie.count(), self.side, self.side].map(|n| n as u64);
+        self.archive.add(name, &shape, |sink| {
+            movie.images().try_for_each(|image| {
+                let image: Vec<f32> = image?.iter().map(|x| x.double() as f32).collect();
+                sink(&image)
+            })
+        })
+    }
+
+    /// Adds a list of numbers.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn list(&mut self, name: &str, list: &[f64]) -> std::result::Result<(), Error> {
+        self.archive.add(name, &[list.len() as u64], |sink| sink(list))
+    }
+
+    /// Ends the file.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn finish(self) -> std::result::Result<(), Error> {
+        self.archive.finish().map(|_| ())
+    }
 }
 
 #[cfg(test)]

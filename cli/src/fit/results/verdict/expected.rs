@@ -4,6 +4,7 @@
 use super::Evidence;
 use kerrlight_tomo::fit::settings::{Loss, LossKind};
 use kerrlight_tomo::fit::verdict::Statistics;
+use kerrlight_tomo::frames::Frames;
 use kerrlight_tomo::interferometry::data_terms::{AmplitudeTerm, ClosureTerm, DataTerm};
 use kerrlight_tomo::interferometry::noise::add_thermal_noise;
 use kerrlight_tomo::interferometry::observation::Observation;
@@ -16,7 +17,10 @@ const DRAWS: u64 = 12;
 
 impl Evidence<'_> {
     /// Visibilities of a movie for all rows of the data that have Stokes I, in their order; none without any.
-    pub fn model_visibilities(&self, movie: &[f32]) -> anyhow::Result<Option<Vec<Complex<f64>>>> {
+    pub fn model_visibilities(
+        &self,
+        movie: &Frames<f32>,
+    ) -> anyhow::Result<Option<Vec<Complex<f64>>>> {
         let (Some((observation, frames)), Some(sky)) =
             (&self.measured.visibilities, self.measured.sky)
         else {
@@ -32,12 +36,17 @@ impl Evidence<'_> {
             uv[**frame].push(row.uv);
             places[**frame].push(at);
         }
-        let transform = Transform::<f32>::new(sky, Pulse::Triangle, &uv, Method::Direct, 64 << 20)?;
-        let mut model = vec![Complex::new(0.0, 0.0); transform.data()];
-        transform.forward(movie, &mut model);
         let mut all = vec![Complex::new(0.0, 0.0); seen.len()];
-        for (at, v) in places.iter().flatten().zip(&model) {
-            all[*at] = Complex::new(f64::from(v.re), f64::from(v.im));
+        for (frame, (uv, places)) in uv.into_iter().zip(&places).enumerate() {
+            if uv.is_empty() {
+                continue;
+            }
+            let transform = Transform::<f32>::new(sky, Pulse::Triangle, &[uv], Method::Direct, 0)?;
+            let mut model = vec![Complex::new(0.0, 0.0); transform.data()];
+            transform.forward(&movie.image(frame)?, &mut model);
+            for (at, v) in places.iter().zip(&model) {
+                all[*at] = Complex::new(f64::from(v.re), f64::from(v.im));
+            }
         }
         Ok(Some(all))
     }

@@ -19,11 +19,11 @@ fn of_truth(changes: &[&str], scale: f32) -> Judged {
     let motion = setup::motion(&file, measured.times.clone()).unwrap();
     let data = measured.terms(&file.loss, 400).unwrap();
     let objective = Objective { model: setup::forward_model(&instrument, &motion).unwrap(), data };
-    let movie: Vec<f32> =
-        measured.movie.as_ref().unwrap().iter().map(|x| scale * *x as f32).collect();
+    let scaled = |image: &[f64]| image.iter().map(|x| scale * *x as f32).collect();
+    let movie = measured.movie.as_ref().unwrap().mapped(400, scaled).unwrap();
     let evidence =
         Evidence { file: Some(&file), losses: &file.loss, seed: file.seed, measured: &measured };
-    evidence.judged((objective.names(), objective.statistics(&movie)), &movie).unwrap()
+    evidence.judged((objective.names(), objective.statistics(&movie).unwrap()), &movie).unwrap()
 }
 
 fn assert_explained(kind: &str, array: &str, flux: f64) {

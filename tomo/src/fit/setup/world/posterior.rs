@@ -160,7 +160,10 @@ impl<'a> WorldPosterior<'a> {
     }
 
     /// Data with noise once more.
-    pub fn data(&self, number: u64) -> Measured {
+    ///
+    /// # Errors
+    /// If there is no room for them.
+    pub fn data(&self, number: u64) -> Result<Measured> {
         self.measured.perturbed(&self.file.loss, self.factor, number)
     }
 }
