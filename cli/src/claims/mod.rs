@@ -69,7 +69,9 @@ impl Claims {
     pub fn take(&self, piece: &str, turn: u32) -> anyhow::Result<Option<Claim>> {
         let path = self.at(&format!("{piece}.{turn}"));
         let is_ours = self.create(&path).with_context(|| format!("cannot claim {piece}"))?;
-        Ok(is_ours.then(|| Claim { piece: piece.to_owned(), turn }))
+        // It may have been done since this process looked.
+        let is_open = is_ours && !self.at(&format!("{piece}.done")).exists();
+        Ok(is_open.then(|| Claim { piece: piece.to_owned(), turn }))
     }
 
     /// Whether nobody has taken a piece over from this process.
