@@ -121,6 +121,7 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 /// A film of a volume with slow light that is killed again and again ends in the same frames, and
 /// leaves nothing else. (Refined pixels: its frames come one by one.)
 #[test]
+#[ignore = "long"]
 fn exact_same_film_of_a_volume_after_kills() {
     let scene = root().join("scenes/volume.toml");
     let size = ["--set", "screen.width=24", "--set", "screen.height=16"];
