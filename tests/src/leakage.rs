@@ -16,7 +16,7 @@ fn exact_leakage_is_found_with_the_flare() {
     let number = |key: &str| beside[key].as_f64().unwrap();
     assert!((0.03..0.08).contains(&number("size")), "{beside}");
     assert!(number("rms") < 0.005 && number("count") == 36.0, "{beside}");
-    let chi2 = found["chi2_per_datum"]["polarized-visibilities"].as_f64().unwrap();
+    let chi2 = found["chi2_per_datum"]["polarized visibilities"].as_f64().unwrap();
     assert!((0.95..1.05).contains(&chi2), "{chi2}");
     assert!(found["psnr_db"].as_f64().unwrap() > 55.0, "{found}");
     let table = std::fs::read_to_string(folder.path().join("flare/leakage.csv")).unwrap();
