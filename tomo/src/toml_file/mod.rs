@@ -61,7 +61,7 @@ pub fn write<T: Serialize>(value: &T) -> Result<String, ReadError> {
 /// What would be written for a value, as a table.
 ///
 /// # Errors
-/// Those of [`write`].
+/// Those of [`write()`].
 pub fn table_of<T: Serialize>(value: &T) -> Result<Table, ReadError> {
     write(value)?.parse().map_err(|error: toml::de::Error| ReadError::syntax(&error))
 }
@@ -69,7 +69,7 @@ pub fn table_of<T: Serialize>(value: &T) -> Result<Table, ReadError> {
 /// A value as it stands behind `key = `, tables in braces.
 ///
 /// # Errors
-/// Those of [`write`].
+/// Those of [`write()`].
 pub fn inline<T: Serialize>(value: &T) -> Result<String, ReadError> {
     let item = value.serialize(serializer::Document)?;
     let value = item.and_then(|item| item.into_value().ok());
