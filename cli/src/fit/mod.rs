@@ -277,7 +277,7 @@ fn parse(text: &str) -> anyhow::Result<FitFile> {
         bail!("there is a table [image]: a static image has no volume, and this needs one");
     }
     FitFile::parse(text).map_err(|error| match error {
-        Error::Fit(FitError::Syntax(error)) => init::explained(&error.to_string()),
+        Error::Fit(FitError::Syntax(error)) => init::explained(&error),
         other => other.into(),
     })
 }

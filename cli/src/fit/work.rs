@@ -34,7 +34,7 @@ impl Work {
             return Ok(Work::Emission(Box::new(super::parse(text)?)));
         }
         let file = StaticImageFile::parse(text).map_err(|error| match error {
-            Error::Fit(FitError::Syntax(error)) => init::explained(&error.to_string()),
+            Error::Fit(FitError::Syntax(error)) => init::explained(&error),
             other => other.into(),
         })?;
         Ok(Work::Image(Box::new(file)))

@@ -8,6 +8,7 @@ use super::train::{Outcome, Progress, State, Trainer};
 use crate::Error;
 use crate::frames::Frames;
 use crate::points::Coordinates;
+use crate::representation::Representation;
 use crate::simd::Float;
 
 macro_rules! in_precision {
@@ -75,16 +76,20 @@ in_precision!(f32);
 #[cfg(test)]
 in_precision!(f64);
 
+impl<T: Float> Progress<T> {
+    /// The field that has been learnt so far.
+    pub fn field<'a>(&'a self, representation: &'a dyn Representation<T>) -> Field<'a, T> {
+        let Progress { parameters, axis, occupancy, .. } = self;
+        Field { representation, parameters, axis: *axis, occupancy: occupancy.as_ref() }
+    }
+}
+
 impl<T: Float> Trainer<'_, T> {
     fn predict(&mut self, now: &Progress<T>, frames: &[usize], masked: bool) -> Vec<T> {
         self.objective.model.weigh(now.axis);
         let mut movie = vec![T::zero(); frames.len() * self.objective.model.pixels()];
-        let field = Field {
-            representation: self.representation,
-            parameters: &now.parameters,
-            axis: now.axis,
-            occupancy: now.occupancy.as_ref().filter(|_| masked),
-        };
+        let mut field = now.field(self.representation);
+        field.occupancy = field.occupancy.filter(|_| masked);
         self.objective.movie(field, frames, &mut self.buffers, &mut movie);
         movie
     }

@@ -22,19 +22,22 @@ use kerrlight_tomo::interferometry::gains::prior_table;
 use kerrlight_tomo::interferometry::observation::Observation;
 use kerrlight_tomo::interferometry::products::ClosureKind;
 use kerrlight_tomo::interferometry::simulate::Movie;
+use kerrlight_tomo::toml_file::ReadError;
 use kerrlight_tomo::units::{MICROARCSECOND, gravitational_angle};
 use keys::{KEYS, TABLES};
 use sources::{SOURCES, Source};
 use std::path::{Path, PathBuf};
 
 /// An error in settings; of what is missing, with what to write.
-pub fn explained(text: &str) -> anyhow::Error {
+pub fn explained(error: &ReadError) -> anyhow::Error {
+    let text = error.to_string();
     let missing = text.split_once("missing field `").and_then(|(_, rest)| rest.split('`').next());
-    let advice = missing.map_or(String::new(), advice);
+    let advice = missing.map_or(String::new(), |missing| advice(missing, &error.key()));
     anyhow::anyhow!("{text}{advice}")
 }
 
-fn advice(missing: &str) -> String {
+/// What to write for a key that is missing in a table; `loss.0` is one of the tables `loss`.
+fn advice(missing: &str, table: &str) -> String {
     let one = |(table, text): &(&str, &str)| {
         (*table == missing).then(|| {
             format!("\nadd a table [{table}]: {text} `kerrlight fit --init` writes an example")
@@ -46,7 +49,12 @@ fn advice(missing: &str) -> String {
         "" => format!("\ngive `{missing} = …`: {}", key.note),
         table => format!("\ngive `{missing} = …` in [{table}]: {}", key.note),
     };
-    found.into_iter().chain(KEYS.iter().filter(key).map(of)).collect()
+    let place: Vec<&str> = table.split('.').filter(|part| part.parse::<u32>().is_err()).collect();
+    let place = place.join(".");
+    let (here, elsewhere): (Vec<_>, Vec<_>) =
+        KEYS.iter().filter(key).partition(|key| key.table == place);
+    let keys = if here.is_empty() { elsewhere } else { here };
+    found.into_iter().chain(keys.into_iter().map(of)).collect()
 }
 
 /// What is fitted to visibilities.

@@ -2,7 +2,7 @@
 
 use super::Estimate;
 use crate::report::{Axis, LinePlot, Marks, Series};
-use kerrlight_tomo::fit::{Batch, Field, FrameTerm, Seen, State, Trainer};
+use kerrlight_tomo::fit::{Batch, FrameTerm, Seen, State, Trainer};
 use kerrlight_tomo::frames::Frames;
 use kerrlight_tomo::representation::Workspace;
 use std::fmt::Write;
@@ -24,12 +24,7 @@ impl Estimate<'_> {
         let mut model = self.instrument.pictured::<f32>(self.motion)?;
         let now = &state.now;
         model.weigh(now.axis);
-        let field = Field {
-            representation: trainer.representation,
-            parameters: &now.parameters,
-            axis: now.axis,
-            occupancy: now.occupancy.as_ref(),
-        };
+        let field = now.field(trainer.representation);
         let (mut batch, mut workspace) = (Batch::default(), Workspace::new());
         let mut image = vec![0.0; model.pixels()];
         Ok(Frames::made((model.frames(), model.pixels()), |sink| {

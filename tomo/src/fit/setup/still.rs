@@ -4,8 +4,8 @@
 use super::{Instrument, Result, Truth, observer, spacing};
 use crate::fit::settings::FitFile;
 use crate::fit::{
-    Batch, Field, ForwardModel, Motion, PolarizedView, Sampling, Seen, SightlineRequest,
-    Sightlines, State, Trainer,
+    Batch, ForwardModel, Motion, PolarizedView, Sampling, Seen, SightlineRequest, Sightlines,
+    State, Trainer,
 };
 use crate::render::{RingStrata, Stratum};
 use crate::representation::Workspace;
@@ -146,12 +146,7 @@ fn recovered(
 ) -> Vec<f32> {
     let now = &state.now;
     model.weigh(now.axis);
-    let field = Field {
-        representation: trainer.representation,
-        parameters: &now.parameters,
-        axis: now.axis,
-        occupancy: now.occupancy.as_ref(),
-    };
+    let field = now.field(trainer.representation);
     let mut image = vec![0.0; model.pixels()];
     model.movie(field, &[0], &mut Batch::default(), &mut Workspace::new(), &mut image);
     image
