@@ -17,7 +17,7 @@ use kerrlight_tomo::fit::{
 };
 use kerrlight_tomo::optimise::{Adam, AdamState, Polynomial};
 use kerrlight_tomo::representation::{
-    Gradient, Groups, Network, NetworkSettings, Representation, Workspace,
+    Gradient, Groups, InstructionSet, Network, NetworkSettings, Representation, Workspace,
 };
 use support::{large_sgemm, least, wanted};
 
@@ -91,8 +91,8 @@ fn network_parameters(network: &Network) -> usize {
     Representation::<f32>::parameters(network)
 }
 
-fn measure(batch: BatchSize) {
-    let network = Network::new(NetworkSettings::bhnerf()).expect("the paper's sizes");
+fn measure(batch: BatchSize, set: InstructionSet) {
+    let network = Network::new(NetworkSettings::bhnerf()).expect("the paper's sizes").on(set);
     let training = training(batch);
     let mut state = State::new(&network, axis(), &training);
     let mut trainer = Trainer::new(objective(), &network, training);
@@ -124,7 +124,7 @@ fn measure(batch: BatchSize) {
     let rate = |points: usize, seconds: f64| (both * points) as f64 / seconds * 1e-9;
     let whole = rate(points, step);
     println!(
-        "{batch:?}: {points} points a step, {:.2} ms, {whole:.0} GFLOP/s, large SGEMM {sgemm:.0} ({:.0} %)",
+        "{batch:?}, {set:?}: {points} points a step, {:.2} ms, {whole:.0} GFLOP/s, large SGEMM {sgemm:.0} ({:.0} %)",
         step * 1e3,
         100.0 * whole / sgemm
     );
@@ -140,5 +140,8 @@ fn measure(batch: BatchSize) {
 fn main() {
     println!("{} threads", rayon::current_num_threads());
     let all = [BatchSize::Pixels(2048), BatchSize::Frames(4)];
-    all.into_iter().filter(|batch| wanted(&format!("{batch:?}"))).for_each(measure);
+    for set in InstructionSet::ALL.into_iter().filter(|set| set.available()) {
+        let chosen = all.iter().filter(|batch| wanted(&format!("{batch:?}, {set:?}")));
+        chosen.for_each(|batch| measure(*batch, set));
+    }
 }

@@ -248,7 +248,7 @@ impl<T: Float> Objective<T> {
     fn image_of(&self, field: Field<'_, T>, frame: usize, buffers: &mut Buffers<T>) {
         buffers.image.resize(self.model.pixels(), T::zero());
         let Buffers { batch, workspace, image, .. } = buffers;
-        self.model.movie(field, &[frame], batch, workspace, image);
+        self.model.image_recorded(field, frame, batch, workspace, image);
     }
 
     /// From the gradient with respect to the last image to the others.
@@ -286,7 +286,7 @@ impl<T: Float> Objective<T> {
         let coordinates = wanted(gradients.axis.is_some(), dimension, batch.points(), of_points);
         let into = Gradient { parameters: gradients.parameters, coordinates };
         let at = Batch::coordinates(&batch.columns, dimension);
-        field.representation.vjp(field.parameters, at, cotangents, into, workspace);
+        field.representation.vjp_recorded(field.parameters, at, cotangents, into, workspace);
         if let Some(axis) = gradients.axis.as_deref_mut() {
             add_axis(field.axis, batch, of_points, dimension, axis);
         }

@@ -73,6 +73,7 @@ pub fn check(subject: &Subject<'_>) {
     batches_and_order(subject);
     threads(subject);
     linked(subject);
+    recorded(subject);
     nothing_at_all(subject);
     extreme_coordinates(subject);
     projection(subject);
@@ -317,6 +318,30 @@ fn linked(subject: &Subject<'_>) {
         close(&product.parameters, &expected.parameters, "the gradient of both at once");
         for (a, b) in product.coordinates.iter().zip(&expected.coordinates).filter(|_| wanted) {
             same(a, b, "gradients of coordinates of both at once");
+        }
+    }
+}
+
+/// What is recorded on the way forward changes no bit on the way back, and nothing if other points came in between.
+fn recorded(subject: &Subject<'_>) {
+    let workspace = &mut Workspace::new();
+    for (seed, count) in [(11, 3_000), (12, 3_000), (13, 40)] {
+        let draw = subject.draw(count, seed);
+        let Draw { parameters, columns, cotangents } = &draw;
+        let expected = subject.vjp(&draw);
+        let mut values = vec![f64::NAN; count];
+        let representation = subject.representation;
+        representation.eval_recorded(parameters, coordinates(columns), &mut values, workspace);
+        same(&values, &subject.eval(parameters, columns), "recorded values");
+        // The second time without anything recorded.
+        for _ in 0..2 {
+            let (mut product, at) = (draw.zeros(), coordinates(columns));
+            let into = product.gradient();
+            representation.vjp_recorded(parameters, at, cotangents, into, workspace);
+            same(&product.parameters, &expected.parameters, "the recorded gradient");
+            for (a, b) in product.coordinates.iter().zip(&expected.coordinates) {
+                same(a, b, "recorded gradients of coordinates");
+            }
         }
     }
 }

@@ -143,6 +143,31 @@ pub trait Representation<T: Float>: Send + Sync {
         workspace: &mut Workspace,
     );
 
+    /// The same as [`eval`](Self::eval) for points whose [`vjp_recorded`](Self::vjp_recorded) comes next: a network
+    /// keeps its activations in the workspace.
+    fn eval_recorded(
+        &self,
+        parameters: &[T],
+        at: Coordinates<'_, T>,
+        values: &mut [T],
+        workspace: &mut Workspace,
+    ) {
+        self.eval(parameters, at, values, workspace);
+    }
+
+    /// The same as [`vjp`](Self::vjp), to the bit, after [`eval_recorded`](Self::eval_recorded) of the same
+    /// parameters and points and nothing else in the same workspace; a network does not pass forward again.
+    fn vjp_recorded(
+        &self,
+        parameters: &[T],
+        at: Coordinates<'_, T>,
+        cotangents: &[T],
+        gradient: Gradient<'_, T>,
+        workspace: &mut Workspace,
+    ) {
+        self.vjp(parameters, at, cotangents, gradient, workspace);
+    }
+
     /// Both at once, for cotangents that depend on the values of the same group only (the pixel at
     /// the end of a ray): overwrites `values`, and adds the product with the cotangents that the link
     /// makes of them.

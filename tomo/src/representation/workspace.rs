@@ -4,7 +4,8 @@ use core::any::Any;
 
 /// Memory of a representation: grows at the first batch of its size and is kept.
 ///
-/// What is in it carries no information from one call to the next; any workspace serves any
+/// What is in it carries no information from one call to the next, but from
+/// [`eval_recorded`](super::Representation::eval_recorded) to the call that follows; any workspace serves any
 /// representation.
 #[derive(Default)]
 pub struct Workspace {

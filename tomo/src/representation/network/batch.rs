@@ -7,7 +7,8 @@ use super::super::workspace::Lines;
 use super::super::{Coordinates, CoordinatesMut, Gradient, Link};
 use super::Network;
 use super::packed::Packed;
-use super::tile::{POINTS, Tile};
+use super::tile::{Activations, POINTS, Tile};
+use crate::memory;
 use crate::simd::Float;
 use core::ops::Range;
 use rayon::prelude::*;
@@ -15,6 +16,10 @@ use std::sync::{Mutex, PoisonError};
 
 /// The most chunks, each with a gradient of its own.
 const CHUNKS: usize = 32;
+/// Most bytes of activations that a recording keeps; points beyond pass through the layers once more.
+const RECORDED: usize = 256 << 20;
+/// The same as a part of the memory that may be taken.
+const PART: f64 = 1.0 / 16.0;
 /// Parameters of which one thread adds up the chunks at a time.
 const SUMMED: usize = 4096;
 
@@ -29,10 +34,16 @@ pub enum Cotangents<'a, T> {
 
 /// How far a batch goes.
 pub enum Way<'a, T> {
-    /// Values only.
-    Forward { values: &'a mut [T] },
+    /// Values only; what the way back needs is kept if `recorded`.
+    Forward { values: &'a mut [T], recorded: bool },
     /// Values, if wanted, and the gradient.
-    Both { cotangents: Cotangents<'a, T>, values: Option<&'a mut [T]>, gradient: Gradient<'a, T> },
+    /// Without a forward pass where the last batch was `recorded`.
+    Both {
+        cotangents: Cotangents<'a, T>,
+        values: Option<&'a mut [T]>,
+        gradient: Gradient<'a, T>,
+        recorded: bool,
+    },
 }
 
 /// What is kept from batch to batch.
@@ -40,11 +51,38 @@ pub struct Memory<T> {
     packed: Packed<T>,
     tiles: Mutex<Vec<Tile<T>>>,
     partial: Vec<Lines<T>>,
+    recording: Recording<T>,
+}
+
+/// Activations of a batch that went forward, for its way back.
+struct Recording<T> {
+    /// Points of the batch, until it is used up.
+    points: Option<usize>,
+    /// Of the first tiles of each chunk.
+    tiles: Vec<Vec<Activations<T>>>,
 }
 
 impl<T: Float + Default> Default for Memory<T> {
     fn default() -> Self {
-        Self { packed: Packed::default(), tiles: Mutex::default(), partial: Vec::new() }
+        let recording = Recording { points: None, tiles: Vec::new() };
+        let (packed, tiles, partial) = (Packed::default(), Mutex::default(), Vec::new());
+        Self { packed, tiles, partial, recording }
+    }
+}
+
+impl<T: Float + Default> Recording<T> {
+    /// Makes room for the tiles of so many chunks, as far as memory may be taken.
+    fn prepare(&mut self, network: &Network, cuts: &Cuts<'_>) {
+        let all = cuts.points.div_ceil(cuts.chunks).div_ceil(POINTS);
+        let most = memory::part(PART).min(RECORDED as f64) as usize;
+        let tile = Activations::<T>::bytes(network, cuts.largest);
+        let each = (most / (tile * cuts.chunks)).min(all);
+        self.tiles.resize_with(self.tiles.len().max(cuts.chunks), Vec::new);
+        self.tiles.iter_mut().for_each(|tiles| tiles.resize_with(each, Activations::default));
+        for tile in self.tiles[..cuts.chunks].iter_mut().flatten() {
+            tile.resize(network, cuts.largest);
+        }
+        self.points = Some(cuts.points);
     }
 }
 
@@ -65,12 +103,20 @@ impl<T: Float + Default> Memory<T> {
         }
         let cuts = Cuts::new(at.len(), groups);
         let backward = matches!(way, Way::Both { .. });
+        let passed = self.recording.points.take() == Some(at.len());
+        let recorded = match way {
+            Way::Forward { recorded, .. } => recorded,
+            Way::Both { recorded, .. } => recorded && passed,
+        };
+        if recorded && !backward {
+            self.recording.prepare(network, &cuts);
+        }
         let wanted = matches!(&way, Way::Both { gradient, .. } if gradient.coordinates.is_some());
         self.packed.pack(network, parameters, backward, wanted);
         self.prepare(network, &cuts, backward);
         let (cotangents, values, gradient) = match way {
-            Way::Forward { values } => (None, Some(values), None),
-            Way::Both { cotangents, values, gradient } => {
+            Way::Forward { values, .. } => (None, Some(values), None),
+            Way::Both { cotangents, values, gradient, .. } => {
                 (Some(cotangents), values, Some(gradient))
             }
         };
@@ -88,7 +134,8 @@ impl<T: Float + Default> Memory<T> {
             cuts: &cuts,
         };
         let partial = if backward { &mut self.partial[..cuts.chunks] } else { &mut [] };
-        batch.split(Job { chunks: 0..cuts.chunks, values, coordinates, partial });
+        let kept = if recorded { &mut self.recording.tiles[..cuts.chunks] } else { &mut [] };
+        batch.split(Job { chunks: 0..cuts.chunks, values, coordinates, partial, kept });
         if let Some(sums) = sums {
             add_up(&self.partial[..cuts.chunks], sums);
         }
@@ -190,6 +237,7 @@ struct Job<'a, T> {
     values: Option<&'a mut [T]>,
     coordinates: Option<CoordinatesMut<'a, T>>,
     partial: &'a mut [Lines<T>],
+    kept: &'a mut [Vec<Activations<T>>],
 }
 
 /// What all chunks share.
@@ -204,20 +252,22 @@ struct Batch<'a, T> {
 
 impl<T: Float + Default> Batch<'_, T> {
     fn split(&self, job: Job<'_, T>) {
-        let Job { chunks, values, coordinates, partial } = job;
-        if chunks.len() == 1 {
-            return self.chunk(Job { chunks, values, coordinates, partial });
+        if job.chunks.len() == 1 {
+            return self.chunk(job);
         }
+        let Job { chunks, values, coordinates, partial, kept } = job;
         let middle = chunks.start + chunks.len() / 2;
         let start = |chunk| self.cuts.point(self.cuts.group(chunk));
         let points = start(middle) - start(chunks.start);
         let (values, more_values) = values.map(|values| values.split_at_mut(points)).unzip();
         let (coordinates, more_coordinates) = coordinates.map(|all| all.split_at(points)).unzip();
         let count = (middle - chunks.start).min(partial.len());
-        let (partial, more) = partial.split_at_mut(count);
-        let left = Job { chunks: chunks.start..middle, values, coordinates, partial };
+        let (partial, more_partial) = partial.split_at_mut(count);
+        let (kept, more_kept) = kept.split_at_mut((middle - chunks.start).min(kept.len()));
+        let left = Job { chunks: chunks.start..middle, values, coordinates, partial, kept };
         let (values, coordinates) = (more_values, more_coordinates);
-        let right = Job { chunks: middle..chunks.end, values, coordinates, partial: more };
+        let (partial, kept) = (more_partial, more_kept);
+        let right = Job { chunks: middle..chunks.end, values, coordinates, partial, kept };
         rayon::join(|| self.split(left), || self.split(right));
     }
 
@@ -233,7 +283,7 @@ impl<T: Float + Default> Batch<'_, T> {
     }
 
     fn tiles_of(&self, job: Job<'_, T>, tile: &mut Tile<T>) {
-        let Job { chunks, mut values, mut coordinates, partial } = job;
+        let Job { chunks, mut values, mut coordinates, partial, kept } = job;
         let cuts = self.cuts;
         let (mut group, end) = (cuts.group(chunks.start), cuts.group(chunks.end));
         let points = cuts.point(end) - cuts.point(group);
@@ -244,16 +294,24 @@ impl<T: Float + Default> Batch<'_, T> {
             sums.fill(T::zero());
         }
         let mut overwrite = true;
+        let mut kept = kept.iter_mut().flatten();
         while group < end {
             let next = cuts.tile_end(group, wanted, end);
             let range = cuts.point(group)..cuts.point(next);
             let ours = values.take().map(|all| all.split_at_mut(range.len()));
             let (ours, rest) = ours.unzip();
             values = rest;
-            let at = self.at.range(range.clone());
-            let computed = tile.forward(self.network, self.packed, at, self.cotangents.is_some());
+            let mut kept = kept.next();
+            if let Some(kept) = &mut kept {
+                core::mem::swap(*kept, &mut tile.passed);
+            }
+            if kept.is_none() || self.cotangents.is_none() {
+                let (at, slopes) =
+                    (self.at.range(range.clone()), self.cotangents.is_some() || kept.is_some());
+                tile.passed.forward(self.network, self.packed, at, slopes);
+            }
             if let Some(ours) = ours {
-                ours.copy_from_slice(computed);
+                ours.copy_from_slice(tile.passed.values());
             }
             if let (Some(cotangents), Some(sums)) = (self.cotangents, &mut sums) {
                 let (ours, rest) = coordinates.take().map(|all| all.split_at(range.len())).unzip();
@@ -261,6 +319,9 @@ impl<T: Float + Default> Batch<'_, T> {
                 tile.cotangents(cotangents, group..next, range);
                 tile.backward(self.network, self.packed, sums, overwrite, ours);
                 overwrite = false;
+            }
+            if let Some(kept) = kept {
+                core::mem::swap(kept, &mut tile.passed);
             }
             group = next;
         }

@@ -97,7 +97,18 @@ impl<T: Float + Default> Representation<T> for Network {
         workspace: &mut Workspace,
     ) {
         let memory: &mut Memory<T> = workspace.of();
-        memory.run(self, parameters, at, &[], Way::Forward { values });
+        memory.run(self, parameters, at, &[], Way::Forward { values, recorded: false });
+    }
+
+    fn eval_recorded(
+        &self,
+        parameters: &[T],
+        at: Coordinates<'_, T>,
+        values: &mut [T],
+        workspace: &mut Workspace,
+    ) {
+        let memory: &mut Memory<T> = workspace.of();
+        memory.run(self, parameters, at, &[], Way::Forward { values, recorded: true });
     }
 
     fn vjp(
@@ -110,7 +121,21 @@ impl<T: Float + Default> Representation<T> for Network {
     ) {
         let memory: &mut Memory<T> = workspace.of();
         let cotangents = Cotangents::Given(cotangents);
-        let way = Way::Both { cotangents, values: None, gradient };
+        let way = Way::Both { cotangents, values: None, gradient, recorded: false };
+        memory.run(self, parameters, at, &[], way);
+    }
+
+    fn vjp_recorded(
+        &self,
+        parameters: &[T],
+        at: Coordinates<'_, T>,
+        cotangents: &[T],
+        gradient: Gradient<'_, T>,
+        workspace: &mut Workspace,
+    ) {
+        let memory: &mut Memory<T> = workspace.of();
+        let cotangents = Cotangents::Given(cotangents);
+        let way = Way::Both { cotangents, values: None, gradient, recorded: true };
         memory.run(self, parameters, at, &[], way);
     }
 
@@ -125,7 +150,7 @@ impl<T: Float + Default> Representation<T> for Network {
     ) {
         let memory: &mut Memory<T> = workspace.of();
         let cotangents = Cotangents::Linked(groups.link);
-        let way = Way::Both { cotangents, values: Some(values), gradient };
+        let way = Way::Both { cotangents, values: Some(values), gradient, recorded: false };
         memory.run(self, parameters, at, groups.starts, way);
     }
 }

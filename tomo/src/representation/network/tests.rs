@@ -166,3 +166,27 @@ fn sizes_out_of_range_are_named() {
     let text = of(NetworkSettings { skip_after: Some(5), ..NetworkSettings::bhnerf() });
     assert_eq!(text, "skip_after = 5 is not allowed: 1 to hidden_layers");
 }
+
+/// More points than a recording holds: the rest passes forward again, and no bit changes.
+#[test]
+fn regress_points_beyond_a_recording() {
+    let network = Network::new(NetworkSettings::bhnerf()).unwrap();
+    let field: &dyn Representation<f32> = &network;
+    let mut parameters = vec![0.0; field.parameters()];
+    field.initialise(3, &mut parameters);
+    let count = 120_000;
+    assert!(tile::Activations::<f32>::bytes(&network, count) > 300 << 20);
+    let column = |step: f32| -> Vec<f32> { (0..count).map(|k| (k as f32 * step).sin()).collect() };
+    let (x, y, z) = (column(0.1), column(0.37), column(0.73));
+    let at = || Coordinates::xyz(&x, &y, &z);
+    let workspace = &mut Workspace::new();
+    let (mut values, mut expected) = (vec![0.0; count], vec![0.0; field.parameters()]);
+    let into = Gradient { parameters: &mut expected, coordinates: None };
+    field.vjp(&parameters, at(), &x, into, workspace);
+    field.eval_recorded(&parameters, at(), &mut values, workspace);
+    let mut found = vec![0.0; field.parameters()];
+    let into = Gradient { parameters: &mut found, coordinates: None };
+    field.vjp_recorded(&parameters, at(), &x, into, workspace);
+    assert!(found.iter().any(|slope| *slope != 0.0));
+    assert_eq!(found, expected);
+}

@@ -19,26 +19,33 @@ pub const POINTS: usize = 120;
 /// A multiple of the rows of a block of every instruction set.
 const BLOCK: usize = 12;
 
+/// What a tile of points has passed through: all that the way back needs.
+#[derive(Default)]
+pub struct Activations<T> {
+    points: usize,
+    /// Of each layer, the encoded points first.
+    rows: Vec<Lines<T>>,
+    values: Lines<T>,
+    /// Of the activation; then times the cotangents.
+    slopes: Lines<T>,
+}
+
 /// Memory of one tile.
 #[derive(Default)]
 pub struct Tile<T> {
-    points: usize,
-    /// Activations of each layer, the encoded points first.
-    rows: Vec<Lines<T>>,
+    /// Of the points at hand.
+    pub passed: Activations<T>,
     /// Gradients with respect to what a layer gives and takes, in turns.
     cotangents: [Lines<T>; 2],
     /// Gradient with respect to the encoded points.
     encoded: Lines<T>,
-    values: Lines<T>,
-    /// Of the activation; then times the cotangents.
-    slopes: Lines<T>,
     /// Gradient of the output layer.
     output: Lines<T>,
 }
 
-impl<T: Float + Default> Tile<T> {
-    /// Makes room for `points`; of a forward pass alone, or both ways.
-    pub fn resize(&mut self, network: &Network, points: usize, backward: bool) {
+impl<T: Float + Default> Activations<T> {
+    /// Makes room for `points`.
+    pub fn resize(&mut self, network: &Network, points: usize) {
         let points = points.next_multiple_of(BLOCK);
         let layout = &network.layout;
         self.rows.resize_with(layout.rows.len(), Lines::default);
@@ -47,12 +54,17 @@ impl<T: Float + Default> Tile<T> {
         }
         self.values.resize(points);
         self.slopes.resize(points);
-        if backward {
-            let widest = layout.rows.iter().map(|rows| rows.stride).max().unwrap_or(0);
-            self.cotangents.iter_mut().for_each(|lines| lines.resize(points * widest));
-            self.encoded.resize(points * layout.rows[0].stride);
-            self.output.resize(layout.last_rows().stride);
-        }
+    }
+
+    /// Bytes that `points` take.
+    pub fn bytes(network: &Network, points: usize) -> usize {
+        let row: usize = network.layout.rows.iter().map(|rows| rows.stride).sum();
+        points.next_multiple_of(BLOCK) * (row + 2) * size_of::<T>()
+    }
+
+    /// Values of the points.
+    pub fn values(&self) -> &[T] {
+        &self.values.read()[..self.points]
     }
 
     /// Values of the points; slopes of the activation are kept if `backward`.
@@ -62,7 +74,7 @@ impl<T: Float + Default> Tile<T> {
         packed: &Packed<T>,
         at: Coordinates<'_, T>,
         backward: bool,
-    ) -> &[T] {
+    ) {
         let (set, layout, points) = (network.instruction_set, &network.layout, at.len());
         self.points = points;
         let output = MatrixMut { numbers: self.rows[0].all(), stride: layout.rows[0].stride };
@@ -81,22 +93,36 @@ impl<T: Float + Default> Tile<T> {
         let (activation, shift) = (network.settings.activation, T::of(network.settings.shift));
         let (weights, values) = (packed.output(), &mut self.values.all()[..points]);
         dispatch(set, Output { input, weights, activation, shift, values, slopes });
-        &self.values.read()[..points]
+    }
+}
+
+impl<T: Float + Default> Tile<T> {
+    /// Makes room for `points`; of a forward pass alone, or both ways.
+    pub fn resize(&mut self, network: &Network, points: usize, backward: bool) {
+        self.passed.resize(network, points);
+        if backward {
+            let (points, layout) = (points.next_multiple_of(BLOCK), &network.layout);
+            let widest = layout.rows.iter().map(|rows| rows.stride).max().unwrap_or(0);
+            self.cotangents.iter_mut().for_each(|lines| lines.resize(points * widest));
+            self.encoded.resize(points * layout.rows[0].stride);
+            self.output.resize(layout.last_rows().stride);
+        }
     }
 
-    /// After [`Self::forward`]: what the values are differentiated against.
+    /// After [`Activations::forward`]: what the values are differentiated against.
     pub fn cotangents(
         &mut self,
         cotangents: Cotangents<'_, T>,
         groups: Range<usize>,
         range: Range<usize>,
     ) {
-        let slopes = &mut self.slopes.all()[..self.points];
+        let Activations { points, values, slopes, .. } = &mut self.passed;
+        let slopes = &mut slopes.all()[..*points];
         let cotangents = match cotangents {
             Cotangents::Given(all) => &all[range],
             Cotangents::Linked(link) => {
-                let made = &mut self.cotangents[0].all()[..self.points];
-                link(groups, &self.values.read()[..self.points], made);
+                let made = &mut self.cotangents[0].all()[..*points];
+                link(groups, &values.read()[..*points], made);
                 &*made
             }
         };
@@ -122,7 +148,7 @@ impl<T: Float + Default> Tile<T> {
                 let stride = layout.rows[0].stride;
                 let output = MatrixMut { numbers: self.encoded.all(), stride };
                 let cotangent = matrix(&self.cotangents[0], layout.rows[k + 1]);
-                let (points, units) = (self.points, layout.hidden()[k].outputs);
+                let (points, units) = (self.passed.points, layout.hidden()[k].outputs);
                 let (panels, outputs, activations) = (packed.encoded(k), layout.encoded, None);
                 dispatch(
                     network.instruction_set,
@@ -134,7 +160,7 @@ impl<T: Float + Default> Tile<T> {
             }
         }
         if let Some(mut gradient) = coordinates {
-            let rows = matrix(&self.rows[0], layout.rows[0]);
+            let rows = matrix(&self.passed.rows[0], layout.rows[0]);
             let cotangents = matrix(&self.encoded, layout.rows[0]);
             let scales = &packed.scales()[..gradient.dimension()];
             encode_vjp(rows, cotangents, scales, network.settings.degree, &mut gradient);
@@ -144,8 +170,8 @@ impl<T: Float + Default> Tile<T> {
     /// Gradient of a hidden layer's parameters.
     fn weights(&mut self, network: &Network, k: usize, parameters: &mut [T], overwrite: bool) {
         let (layout, layer) = (&network.layout, network.layout.hidden()[k]);
-        let (points, inputs, outputs) = (self.points, layer.inputs, layer.outputs);
-        let input = matrix(&self.rows[k], layout.rows[k]);
+        let (points, inputs, outputs) = (self.passed.points, layer.inputs, layer.outputs);
+        let input = matrix(&self.passed.rows[k], layout.rows[k]);
         let cotangent = matrix(&self.cotangents[0], layout.rows[k + 1]);
         let gradient = &mut parameters[layer.offset..layer.offset + layer.size()];
         let task = Weights { points, input, inputs, cotangent, outputs, gradient, overwrite };
@@ -154,9 +180,9 @@ impl<T: Float + Default> Tile<T> {
 
     /// Gradient with respect to the units before a hidden layer, which is then the one at hand.
     fn units(&mut self, network: &Network, packed: &Packed<T>, k: usize) {
-        let (layout, points) = (&network.layout, self.points);
+        let (layout, points) = (&network.layout, self.passed.points);
         let (units, outputs) = (layout.hidden()[k].outputs, layout.rows[k].units);
-        let activations = Some(matrix(&self.rows[k], layout.rows[k]));
+        let activations = Some(matrix(&self.passed.rows[k], layout.rows[k]));
         let [from, to] = &mut self.cotangents;
         let cotangent = matrix(from, layout.rows[k + 1]);
         let output = MatrixMut { numbers: to.all(), stride: layout.rows[k].stride };
@@ -178,10 +204,11 @@ impl<T: Float + Default> Tile<T> {
         wanted: bool,
     ) {
         let (layout, last) = (&network.layout, network.layout.hidden().len());
-        let (weights, cotangents) = (packed.output(), &self.slopes.read()[..self.points]);
+        let (weights, cotangents) =
+            (packed.output(), &self.passed.slopes.read()[..self.passed.points]);
         let gradient = &mut self.output.all()[..weights.len()];
         gradient.fill(T::zero());
-        let input = matrix(&self.rows[last], layout.last_rows());
+        let input = matrix(&self.passed.rows[last], layout.last_rows());
         let output = MatrixMut { numbers: self.cotangents[0].all(), stride: input.stride };
         let task = OutputBackward { cotangents, input, weights, output, gradient };
         dispatch(network.instruction_set, task);
@@ -196,7 +223,7 @@ impl<T: Float + Default> Tile<T> {
         if wanted && layout.skip == Some(last) {
             let weights = &weights[layout.last_rows().units..][..layout.encoded];
             let rows = self.encoded.all().chunks_mut(layout.rows[0].stride);
-            for (row, cotangent) in rows.zip(&self.slopes.read()[..self.points]) {
+            for (row, cotangent) in rows.zip(&self.passed.slopes.read()[..self.passed.points]) {
                 row.iter_mut().zip(weights).for_each(|(x, w)| *x = *cotangent * *w);
             }
         }
