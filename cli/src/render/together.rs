@@ -100,8 +100,8 @@ impl<'a> Together<'a> {
             show();
             kept.map_err(|error| io::Error::other(format!("{error:#}")))
         };
-        let todo = std::iter::from_fn(|| team.take());
-        self.work.raster.fill_apart(self.identity, todo, &keep, &|_| !keeper.stopped())
+        let mut todo = std::iter::from_fn(|| team.take());
+        self.work.raster.fill_apart(self.identity, &mut todo, &keep, &|_| !keeper.stopped())
     }
 
     fn take_in(&self, journal: &mut Journal<std::fs::File>) -> anyhow::Result<()> {

@@ -11,9 +11,9 @@ use anyhow::Context;
 use kerrlight_tomo::Error;
 use kerrlight_tomo::image::Picture;
 use kerrlight_tomo::image::reduce::Reduction;
-use kerrlight_tomo::render::{Journal, Raster, RenderError, Summary};
+use kerrlight_tomo::render::{AnyJournal, Journal, Raster, RenderError, Summary};
 use kerrlight_tomo::scene::Scene;
-use std::io::{Cursor, Read, Seek, Write};
+use std::io::Cursor;
 
 /// What is rendered.
 pub struct Work<'a> {
@@ -92,11 +92,7 @@ impl Work<'_> {
     }
 
     /// Renders all bands that are missing; a signal ends that with `stopped`.
-    fn fill<F: Read + Write + Seek + Send>(
-        &self,
-        journal: &mut Journal<F>,
-        stopped: &str,
-    ) -> Result<Summary, Error> {
+    fn fill(&self, journal: &mut AnyJournal<'_>, stopped: &str) -> Result<Summary, Error> {
         let all = self.raster.bands();
         let bar = progress::bar(all as u64);
         bar.set_position((all - journal.missing().len()) as u64);

@@ -3,6 +3,7 @@
 pub mod animation;
 pub mod canvas;
 pub mod colormap;
+pub(crate) mod decode;
 pub mod exr;
 pub mod overlay;
 pub mod preview;

@@ -46,7 +46,7 @@ fn put(band: &Mutex<Parts>, tiles: usize, tile: usize, pixels: Tile) -> Option<P
 pub(super) fn render_bands(
     raster: &Raster,
     times: &[f64],
-    todo: impl Iterator<Item = usize> + Send,
+    todo: &mut (dyn Iterator<Item = usize> + Send),
     sink: &Sink<'_>,
     progress: &Progress<'_>,
 ) -> Result<(), Error> {

@@ -1,7 +1,7 @@
 //! From bands to files.
 
 use super::bands::{Band, render_bands};
-use super::journal::Journal;
+use super::journal::{AnyJournal, Journal};
 use super::tally::Summary;
 use super::{Progress, Raster};
 use crate::Error;
@@ -9,7 +9,7 @@ use crate::image::exr::{Attributes, Layout, Style};
 use crate::image::reduce::Reduction;
 use exr::error::Result;
 use rayon::prelude::*;
-use std::io::{Read, Seek, Write};
+use std::io::{Seek, Write};
 use std::sync::{Mutex, PoisonError};
 
 /// Pixels that are in memory at once while a file is written.
@@ -21,9 +21,9 @@ impl Raster {
     /// # Errors
     /// If a value is out of range or does not fit, the journal cannot be written, or
     /// `progress` returned false ([`RenderError::Stopped`](crate::render::RenderError::Stopped)). What is in the journal stays.
-    pub fn fill<F: Read + Write + Seek + Send>(
+    pub fn fill(
         &self,
-        journal: &mut Journal<F>,
+        journal: &mut AnyJournal<'_>,
         progress: &Progress<'_>,
     ) -> std::result::Result<(), Error> {
         let todo = journal.missing();
@@ -36,7 +36,7 @@ impl Raster {
                 Ok(())
             })
         };
-        render_bands(self, &[self.prepared.time()], todo.into_iter(), &keep, progress)
+        render_bands(self, &[self.prepared.time()], &mut todo.into_iter(), &keep, progress)
     }
 
     /// Renders the bands `todo` of the picture that `identity` describes, each of which is asked for when a thread is free
@@ -47,7 +47,7 @@ impl Raster {
     pub fn fill_apart(
         &self,
         identity: &str,
-        todo: impl Iterator<Item = usize> + Send,
+        todo: &mut (dyn Iterator<Item = usize> + Send),
         keep: &(dyn Fn(usize, Vec<u8>) -> std::io::Result<()> + Sync),
         progress: &Progress<'_>,
     ) -> std::result::Result<(), Error> {
@@ -67,10 +67,7 @@ impl Raster {
     ///
     /// # Errors
     /// If a flux is requested and there is no light, or a value does not fit after scaling.
-    pub fn summary<F: Read + Write + Seek>(
-        &self,
-        journal: &Journal<F>,
-    ) -> std::result::Result<Summary, Error> {
+    pub fn summary(&self, journal: &AnyJournal<'_>) -> std::result::Result<Summary, Error> {
         self.summarize(&journal.tally())
     }
 
@@ -78,9 +75,9 @@ impl Raster {
     ///
     /// # Errors
     /// If the journal is not complete, or on a failure to read or write.
-    pub fn write_exr<F: Read + Write + Seek>(
+    pub fn write_exr(
         &self,
-        journal: &mut Journal<F>,
+        journal: &mut AnyJournal<'_>,
         summary: &Summary,
         (attributes, style): (&Attributes, Style),
         out: impl Write + Seek,
@@ -96,9 +93,9 @@ impl Raster {
     ///
     /// # Errors
     /// If the journal is not complete, or on a failure to read.
-    pub fn reduce<F: Read + Write + Seek>(
+    pub fn reduce(
         &self,
-        journal: &mut Journal<F>,
+        journal: &mut AnyJournal<'_>,
         summary: &Summary,
         reduction: &mut Reduction,
     ) -> Result<()> {
@@ -107,9 +104,9 @@ impl Raster {
 
     /// Hands on the compressed bytes of each band in the file's units and layout, from the top, and its
     /// values to the reduction. Several bands are taken apart in parallel.
-    fn for_each_band<F: Read + Write + Seek>(
+    fn for_each_band(
         &self,
-        journal: &mut Journal<F>,
+        journal: &mut AnyJournal<'_>,
         summary: &Summary,
         layout: Option<&Layout>,
         mut reduction: Option<&mut Reduction>,

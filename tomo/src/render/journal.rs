@@ -3,6 +3,7 @@
 //! counts only with its checksum, so that a torn one is rendered again.
 
 use super::tally::Tally;
+use crate::memory::Scratch;
 use std::io::{Cursor, Error, ErrorKind, Read, Result, Seek, SeekFrom, Write};
 
 const MAGIC: &[u8; 20] = b"kerrlight journal 1\n";
@@ -12,15 +13,18 @@ const LARGEST_RECORD: u32 = 1 << 30;
 
 /// A journal in a file, or in memory.
 #[derive(Debug)]
-pub struct Journal<F> {
-    file: F,
+pub struct Journal<F: ?Sized> {
     /// Checksum of the head, from which those of the records go on: a record of another
     /// picture is never taken for one of this.
     salt: u32,
     records: Vec<Option<Record>>,
     /// Where the next record goes.
     end: u64,
+    file: F,
 }
+
+/// A journal in a file of any kind.
+pub type AnyJournal<'a> = Journal<dyn Scratch + 'a>;
 
 #[derive(Debug, Clone, Copy)]
 struct Record {
@@ -47,7 +51,7 @@ impl<F: Read + Write + Seek> Journal<F> {
     /// # Errors
     /// If the file holds anything but a journal, or on a failure to read or write.
     pub fn open(file: F, identity: &str, bands: usize) -> Result<(Self, Found)> {
-        let mut journal = Journal { file, salt: 0, records: vec![None; bands], end: 0 };
+        let mut journal = Journal { salt: 0, records: vec![None; bands], end: 0, file };
         let head = head(identity);
         journal.salt = crc32fast::hash(&head);
         journal.end = head.len() as u64;
@@ -69,7 +73,9 @@ impl<F: Read + Write + Seek> Journal<F> {
         journal.file.write_all(&head)?;
         Ok((journal, if length == 0 { Found::Nothing } else { Found::Other }))
     }
+}
 
+impl<F: Read + Write + Seek + ?Sized> Journal<F> {
     /// Takes in the record at the end, if it is a whole one; its band.
     fn scan(&mut self, length: u64) -> Result<Option<usize>> {
         let mut front = [0; FRONT];

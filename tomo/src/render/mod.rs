@@ -22,7 +22,7 @@ mod tally;
 pub use channels::{CHANNELS, ChannelKind};
 pub use choice::all_channels;
 pub use film::{Film, Frame};
-pub use journal::{Found, Journal};
+pub use journal::{AnyJournal, Found, Journal};
 pub use plan::{Plan, Step};
 pub use requested::REQUESTED;
 pub use rings::{RingStrata, Stratum};

@@ -50,7 +50,7 @@ impl Raster {
             }
             Ok(())
         };
-        render_bands(self, times, all.iter().copied(), &keep, progress)?;
+        render_bands(self, times, &mut all.iter().copied(), &keep, progress)?;
         let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
         let pixels = self.grid.width * self.grid.height;
         let picture = |bands: Vec<Option<Band>>| {

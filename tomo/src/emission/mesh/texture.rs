@@ -1,7 +1,7 @@
 //! Pictures on surfaces.
 
 use super::MeshError;
-use crate::emission::sky::{dimensions, srgb_to_linear};
+use crate::image::decode::{Colors, dimensions, linear_colors};
 use crate::memory;
 
 /// A picture in linear colour that repeats in both directions.
@@ -22,12 +22,10 @@ impl Texture {
         let what = || format!("a texture of {width} x {height} pixels");
         memory::afford(what, memory::colours(width.into(), height.into()))
             .map_err(|error| MeshError::Content(error.to_string()))?;
-        let picture = image::load_from_memory(bytes).map_err(unreadable)?.into_rgb32f();
-        let (width, height) = (picture.width() as usize, picture.height() as usize);
+        let Colors { width, height, pixels } = linear_colors(bytes).map_err(unreadable)?;
         if width == 0 || height == 0 {
             return Err(MeshError::Content("a texture has no pixels".to_owned()));
         }
-        let pixels = picture.pixels().map(|p| p.0.map(srgb_to_linear)).collect();
         Ok(Texture { width, height, pixels })
     }
 

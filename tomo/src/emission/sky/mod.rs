@@ -12,7 +12,6 @@ mod stars;
 pub use beam::Beam;
 pub use catalogue::{Catalogue, CatalogueError, CatalogueSky, CatalogueStar};
 pub use panorama::{Panorama, PanoramaError};
-pub(crate) use panorama::{dimensions, srgb_to_linear};
 pub use stars::StarField;
 
 use crate::scene::{Checker, Sky};

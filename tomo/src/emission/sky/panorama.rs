@@ -2,6 +2,7 @@
 
 use super::beam::Beam;
 use crate::Error;
+use crate::image::decode::{Colors, dimensions, linear_colors};
 use crate::image::exr;
 use crate::memory;
 use core::f64::consts::{PI, TAU};
@@ -64,11 +65,6 @@ impl PanoramaError {
     }
 }
 
-/// Columns and rows of a picture, as its header states them.
-pub(crate) fn dimensions(bytes: &[u8]) -> image::ImageResult<(u32, u32)> {
-    image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format()?.into_dimensions()
-}
-
 impl Panorama {
     /// Decodes a PNG, JPEG, Radiance HDR or OpenEXR picture; 8- and 16-bit colours are taken as sRGB,
     /// those of HDR and EXR (channels R, G, B, or Y) as linear.
@@ -89,15 +85,8 @@ impl Panorama {
             let (width, height, pixels) = exr_colors(bytes)?;
             return Ok(Self::new(width, height, pixels)?);
         }
-        let picture = image::load_from_memory(bytes).map_err(PanoramaError::Decode)?;
-        let linear = matches!(
-            picture,
-            image::DynamicImage::ImageRgb32F(_) | image::DynamicImage::ImageRgba32F(_)
-        );
-        let picture = picture.into_rgb32f();
-        let (width, height) = (picture.width() as usize, picture.height() as usize);
-        let decode = |c: f32| if linear { c } else { srgb_to_linear(c) };
-        let pixels: Vec<[f32; 3]> = picture.pixels().map(|p| p.0.map(decode)).collect();
+        let Colors { width, height, pixels } =
+            linear_colors(bytes).map_err(PanoramaError::Decode)?;
         Ok(Self::new(width, height, pixels)?)
     }
 
@@ -258,10 +247,6 @@ fn overlaps(k: usize, few: usize, many: usize) -> impl Iterator<Item = (usize, f
     (from as usize..last)
         .map(move |j| (j, (to.min(j as f64 + 1.0) - from.max(j as f64)).max(0.0)))
         .filter(|(_, share)| *share > 1e-9)
-}
-
-pub(crate) fn srgb_to_linear(c: f32) -> f32 {
-    if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
 }
 
 #[cfg(test)]

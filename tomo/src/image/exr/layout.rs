@@ -143,16 +143,11 @@ impl Part {
     }
 
     /// The compressed bytes of rows.
-    fn compress<V: AsRef<[f32]>>(
-        &self,
-        rows: usize,
-        width: usize,
-        channels: &[V],
-    ) -> Result<Vec<u8>> {
+    fn compress(&self, rows: usize, width: usize, channels: &[Vec<f32>]) -> Result<Vec<u8>> {
         let mut bytes = Vec::with_capacity(rows * width * self.order.len() * 4);
         for row in 0..rows {
             for (k, channel) in self.order.iter().zip(&self.header.channels.list) {
-                let line = &channels[*k].as_ref()[row * width..(row + 1) * width];
+                let line = &channels[*k][row * width..(row + 1) * width];
                 match channel.sample_type {
                     SampleType::F16 => {
                         bytes.extend(line.iter().flat_map(|x| half(*x).to_le_bytes()))
@@ -250,9 +245,9 @@ impl Layout {
     ///
     /// # Errors
     /// If the numbers of channels or values are not the layout's.
-    pub fn compress<V: AsRef<[f32]>>(&self, band: usize, channels: &[V]) -> Result<Vec<Vec<u8>>> {
+    pub fn compress(&self, band: usize, channels: &[Vec<f32>]) -> Result<Vec<Vec<u8>>> {
         let (rows, width) = (self.rows(band).len(), self.size().width());
-        let fits = |values: &V| values.as_ref().len() == rows * width;
+        let fits = |values: &Vec<f32>| values.len() == rows * width;
         if channels.len() != self.channels || !channels.iter().all(fits) || rows == 0 {
             return Err(Error::Invalid("a band of another size than its picture's".into()));
         }
