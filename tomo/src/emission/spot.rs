@@ -191,7 +191,8 @@ impl SpotModel {
     pub fn is_missed(&self, carried: [&Comoving; 2], length: f64) -> bool {
         let [a, b] = carried.map(|c| c.position);
         let middle = core::array::from_fn(|k| 0.5 * (a[k] + b[k]));
-        distance(middle, self.start) > CUT_OFF * self.sigma + length
+        // No point is farther from the middle of the ends than half the length; the length is that of chords.
+        distance(middle, self.start) > CUT_OFF * self.sigma + 0.6 * length
     }
 
     /// The shell of radii (M) outside of which it does not shine.

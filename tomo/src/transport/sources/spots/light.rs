@@ -8,8 +8,9 @@ use crate::transport::polarized::{PolarizedRay, share};
 use crate::transport::result::{Accumulator, Place};
 use crate::transport::sources::media::DepthProfile;
 use kerrlight_geodesic::flow::rotating_redshift;
-use kerrlight_geodesic::quadrature::gauss_4;
+use kerrlight_geodesic::quadrature::gauss_legendre;
 use kerrlight_geodesic::{PathOfRay, PathPoint};
+use std::sync::LazyLock;
 
 /// The ray along which spots are seen.
 #[derive(Debug, Clone, Copy)]
@@ -49,6 +50,20 @@ struct SpotNode {
 /// Largest angle in radians by which a piece of path may turn before it is compared with
 /// a spot.
 const LARGEST_TURN: f64 = 0.5;
+
+/// Longest piece that is summed by one rule, in units of σ.
+const LONGEST: f64 = 3.0;
+
+/// Gauss–Legendre rules for pieces of at most 1, 1.5, 2, 2.5 and 3 σ, with 4 to 8 nodes. The error of n nodes on a
+/// piece of h σ of a Gaussian is below (2n − 1)!! h^(2n + 1) (n!)⁴ / ((2n + 1) ((2n)!)³) of σ: 6e-8 or less.
+static RULES: LazyLock<[Vec<(f64, f64)>; 5]> =
+    LazyLock::new(|| [4, 5, 6, 7, 8].map(gauss_legendre));
+
+/// The rule for a piece of this length in units of σ.
+fn rule(length: f64) -> &'static [(f64, f64)] {
+    let steps = (2.0 * length).ceil() - 2.0;
+    &RULES[steps.clamp(0.0, 4.0) as usize]
+}
 
 impl<'a> SpotLight<'a> {
     /// The light of a spot, seen at a time of observation, on `pieces` of a ray.
@@ -122,14 +137,15 @@ impl<'a> SpotLight<'a> {
         if self.spot.is_missed(carried, length) {
             return;
         }
-        if length > self.spot.sigma() && depth < DEEPEST {
+        if length > LONGEST * self.spot.sigma() && depth < DEEPEST {
             let middle = self.node(0.5 * (from + to));
             self.add_piece([start, &middle], depth + 1, light);
             self.add_piece([&middle, end], depth + 1, light);
             return;
         }
-        for (mino_time, weight) in gauss_4(from, to) {
-            self.add_node(&self.node(mino_time), weight, light);
+        for (part, weight) in rule(length / self.spot.sigma()) {
+            let node = self.node(from + (to - from) * part);
+            self.add_node(&node, (to - from) * weight, light);
         }
     }
 
@@ -164,6 +180,29 @@ impl<'a> SpotLight<'a> {
         let density = boost * emissivity;
         if self.brightest.is_none_or(|(most, _)| density > most) {
             self.brightest = Some((density, *point));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A Gaussian in pieces of every length, against the error function: erf(6/√2) = 1 − 1.97e-9.
+    #[test]
+    fn exact_rules_sum_a_gaussian() {
+        for pieces in [4, 5, 6, 7, 9, 12, 16, 24] {
+            let h = 12.0 / f64::from(pieces);
+            let sum = |piece: i32| -> f64 {
+                let from = -6.0 + h * f64::from(piece);
+                let at = |(part, weight): &(f64, f64)| {
+                    let x = from + h * part;
+                    h * weight * (-0.5 * x * x).exp()
+                };
+                rule(h).iter().map(at).sum()
+            };
+            let sum: f64 = (0..pieces).map(sum).sum::<f64>() / core::f64::consts::TAU.sqrt();
+            assert!((sum - 1.0 + 1.97e-9).abs() < 6e-8, "{pieces} pieces: {sum}");
         }
     }
 }
