@@ -12,6 +12,7 @@ mod fits;
 mod fourier;
 mod lengths;
 mod model;
+mod model_settings;
 mod observation;
 mod observing;
 mod orbits;

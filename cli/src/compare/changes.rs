@@ -1,6 +1,8 @@
 //! What changed between two runs of an experiment.
 
 use super::labels::{described, result};
+use super::tables;
+use crate::answer::Answer;
 use crate::checksum::is_whole;
 use crate::output;
 use crate::report::Table;
@@ -10,6 +12,19 @@ use std::path::Path;
 
 /// Results that are held beside each other.
 const SHOWN: [&str; 4] = ["psnr_db", "axis_dot_truth", "chi2", "seconds"];
+
+/// What changed in the results at `path` since those before.
+///
+/// # Errors
+/// If they cannot be read, there are none before, or they are of another experiment.
+pub fn between(path: &Path, before: Option<&Value>) -> anyhow::Result<Answer> {
+    let Some(before) = before else {
+        bail!("{} are results: give others with --against", path.display());
+    };
+    let changed = table(&read(path)?, before)?;
+    let answer = Answer::text(tables::markdown(&changed)).with("note", changed.caption);
+    Ok(answer.with("head", changed.head).with("rows", changed.rows))
+}
 
 /// results.json of a run, or of the run in a folder.
 pub fn read(path: &Path) -> anyhow::Result<Value> {

@@ -104,26 +104,8 @@ impl Compare {
     ) -> anyhow::Result<Answer> {
         let Some(name) = &self.experiment else { return Ok(list_experiments()) };
         let before = self.against.as_deref().map(changes::read).transpose()?;
-        // A folder that is called like an experiment is meant by ./name.
-        let is_known = source::built_in().any(|(known, _)| Path::new(known) == name);
-        let is_file = name.extension().is_some_and(|e| e == "json");
-        let goes_on = self.resume
-            || self.sharing().is_some()
-            || self.status
-            || self.collect
-            || self.slurm.is_wanted();
-        if is_file
-            || (!is_known
-                && !goes_on
-                && self.output.is_none()
-                && name.join("results.json").is_file())
-        {
-            let Some(before) = before else {
-                bail!("{} are results: give others with --against", name.display());
-            };
-            let changed = changes::table(&changes::read(name)?, &before)?;
-            let answer = Answer::text(tables::markdown(&changed)).with("note", changed.caption);
-            return Ok(answer.with("head", changed.head).with("rows", changed.rows));
+        if self.are_results(name) {
+            return changes::between(name, before.as_ref());
         }
         let asked = self.asked(name, program)?;
         let folder = asked.folder.clone();
@@ -163,6 +145,19 @@ impl Compare {
         let tables = page.write(&runner, &folder, before.as_ref())?;
         recorder.write_into(&folder)?;
         Ok(end(&tables, &summary, &folder, self.collect))
+    }
+
+    /// Whether results of an earlier run are meant. A folder that is called like an experiment is meant by ./name.
+    fn are_results(&self, name: &Path) -> bool {
+        let is_known = source::built_in().any(|(known, _)| Path::new(known) == name);
+        let is_file = name.extension().is_some_and(|e| e == "json");
+        let goes_on = self.resume
+            || self.sharing().is_some()
+            || self.status
+            || self.collect
+            || self.slurm.is_wanted();
+        let is_new = goes_on || self.output.is_some();
+        is_file || (!is_known && !is_new && name.join("results.json").is_file())
     }
 
     /// Runs what is not done: alone, with others, or nothing at all where a report is wanted.

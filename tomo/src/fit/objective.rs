@@ -4,10 +4,7 @@ use super::batch::Batch;
 use super::forward_model::{Field, ForwardModel};
 use super::selection::Selection;
 use super::terms::{FrameTerm, ImageTerm};
-use super::verdict::Statistics;
-use crate::Error;
 use crate::dynamics::{Axis, Cotangents, Turned, pull_back_vjp};
-use crate::frames::Frames;
 use crate::points::{Coordinates, CoordinatesMut};
 use crate::representation::{Gradient, Groups, Representation, Workspace};
 use crate::simd::Float;
@@ -53,8 +50,8 @@ pub struct Gradients<'a, T> {
 /// Buffers that are kept from one step to the next.
 #[derive(Default)]
 pub struct Buffers<T> {
-    batch: Batch<T>,
-    workspace: Workspace,
+    pub(super) batch: Batch<T>,
+    pub(super) workspace: Workspace,
     image: Vec<T>,
     of_image: Vec<T>,
     cotangents: Vec<T>,
@@ -109,13 +106,13 @@ impl<T: Float> Objective<T> {
         (0..self.model.frames()).filter(seen).collect()
     }
 
-    fn terms(&self) -> impl Iterator<Item = (&dyn FrameTerm<T>, f64)> {
+    pub(super) fn terms(&self) -> impl Iterator<Item = (&dyn FrameTerm<T>, f64)> {
         let image = self.data.image.iter().map(|w| (&*w.term as &dyn FrameTerm<T>, w.weight));
         image.chain(self.data.others.iter().map(|w| (&*w.term, w.weight)))
     }
 
     /// Real data of each kind in a typical frame times `frames`: what χ² is divided by.
-    fn data_of(&self, term: &dyn FrameTerm<T>, frames: usize) -> f64 {
+    pub(super) fn data_of(&self, term: &dyn FrameTerm<T>, frames: usize) -> f64 {
         let all: usize = (0..term.frames()).map(|frame| term.degrees_of_freedom(frame)).sum();
         let observed = self.observed().len().max(1);
         (all as f64 / observed as f64 * frames as f64).max(1.0)
@@ -290,82 +287,6 @@ impl<T: Float> Objective<T> {
         if let Some(axis) = gradients.axis.as_deref_mut() {
             add_axis(field.axis, batch, of_points, dimension, axis);
         }
-    }
-
-    /// Images of these frames, one after the other.
-    pub fn movie(
-        &self,
-        field: Field<'_, T>,
-        frames: &[usize],
-        buffers: &mut Buffers<T>,
-        movie: &mut [T],
-    ) {
-        self.model.movie(field, frames, &mut buffers.batch, &mut buffers.workspace, movie);
-    }
-
-    /// What the residuals of images of all frames are like: for each kind of data, in the order of [`Self::names`].
-    ///
-    /// # Errors
-    /// If images cannot be read.
-    pub fn statistics(&self, movie: &Frames<T>) -> Result<Vec<Statistics>, Error> {
-        let width = self.model.pixels().isqrt();
-        let of = |(term, _): (&dyn FrameTerm<T>, f64)| {
-            let mut all = Statistics::default();
-            for (frame, image) in movie.images().enumerate() {
-                all.add(term.residuals(frame, &image?), width);
-            }
-            Ok(all.ended())
-        };
-        self.terms().map(of).collect()
-    }
-
-    /// The loss of images of these frames, without gradient.
-    ///
-    /// # Errors
-    /// If images cannot be read.
-    pub fn loss_of(&self, frames: &[usize], movie: &Frames<T>) -> Result<Loss, Error> {
-        let mut none = vec![T::zero(); self.model.pixels()];
-        let mut loss = Loss::default();
-        for (term, weight) in self.terms() {
-            let scale = 1.0 / self.data_of(term, frames.len());
-            let mut chi2 = 0.0;
-            for (frame, image) in frames.iter().zip(movie.images()) {
-                chi2 += term.value_and_gradient(*frame, &image?, T::zero(), &mut none);
-            }
-            let value = scale * chi2;
-            loss.terms.push(value);
-            loss.total += weight * value;
-        }
-        Ok(loss)
-    }
-}
-
-impl<T: Float> Objective<T> {
-    /// The first data, with frame and χ², that are no finite number of images of these frames.
-    ///
-    /// # Errors
-    /// If images cannot be read.
-    pub fn not_finite(
-        &self,
-        frames: &[usize],
-        movie: &Frames<T>,
-    ) -> Result<Option<(String, usize, f64)>, Error> {
-        let mut none = vec![T::zero(); self.model.pixels()];
-        for (frame, image) in frames.iter().zip(movie.images()) {
-            let image = image?;
-            for (term, _) in self.terms() {
-                let value = term.value_and_gradient(*frame, &image, T::zero(), &mut none);
-                if !value.is_finite() {
-                    return Ok(Some((term.name().to_owned(), *frame, value)));
-                }
-            }
-        }
-        Ok(None)
-    }
-
-    /// Why data that were there at the beginning cannot be read any more, if any is so.
-    pub fn fault(&self) -> Option<&str> {
-        self.terms().find_map(|(term, _)| term.fault())
     }
 }
 

@@ -1,0 +1,84 @@
+//! What a forward model is made with.
+
+use kerrlight_tomo::dynamics::{Axis, Velocity};
+use kerrlight_tomo::fit::{Motion, Region, Sampling, SightlineRequest};
+use kerrlight_tomo::polarization::{PolarizationLaw, StokesParameter};
+use pyo3::prelude::*;
+
+/// What a model is made with, beside hole, observer and screen.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Settings {
+    /// r_min, r_max and z_width, M.
+    pub region: (f64, f64, f64),
+    pub order: usize,
+    pub split: u32,
+    /// Nodes of a ray equidistant in Mino time, instead.
+    pub per_ray: Option<usize>,
+    pub slow_light: bool,
+    pub redshift_power: Option<f64>,
+    /// How matter moves, as JSON of what files say.
+    pub velocity: String,
+    pub axis: [f64; 3],
+    /// Times of the frames and of the field of emission, M.
+    pub times: Vec<f64>,
+    pub reference: f64,
+    pub injection: Option<f64>,
+    /// Flux of a pixel with an integral of 1.
+    pub scale: f64,
+    /// A law of polarised light as JSON, and the Stokes parameters that are wanted.
+    pub polarization: Option<(String, Vec<String>)>,
+}
+
+impl Settings {
+    pub fn request(&self) -> SightlineRequest {
+        let (r_min, r_max, z_width) = self.region;
+        let gauss = Sampling::Gauss { order: self.order, split: self.split };
+        SightlineRequest {
+            region: Region { r_min, r_max, z_width },
+            sampling: self.per_ray.map_or(gauss, |per_ray| Sampling::EqualMinoTime { per_ray }),
+            delay: self.slow_light,
+            momentum: self.redshift_power.is_some() || self.polarization.is_some(),
+        }
+    }
+
+    /// How matter moves about a hole of this spin.
+    pub fn motion(
+        &self,
+        spin: f64,
+        axis: Axis,
+    ) -> Result<Motion, Box<dyn std::error::Error + Send + Sync>> {
+        let law: Velocity =
+            serde_json::from_str(&self.velocity).map_err(|e| Refused(format!("velocity: {e}")))?;
+        Ok(Motion {
+            velocity: law.angular(0, spin * axis.vector()[2])?,
+            reference: self.reference,
+            injection: None,
+            times: self.times.clone(),
+        })
+    }
+
+    /// The law of polarised light with the wanted parameters.
+    pub fn stokes(&self) -> Result<Option<(PolarizationLaw, Vec<StokesParameter>)>, Refused> {
+        let Some((law, names)) = &self.polarization else { return Ok(None) };
+        if let Some(power) = self.redshift_power {
+            return Err(Refused(format!(
+                "redshift_power = {power} is not allowed together with polarization, whose redshift_power it is"
+            )));
+        }
+        let law = serde_json::from_str(law).map_err(|e| Refused(format!("polarization: {e}")))?;
+        Ok(Some((law, names.iter().map(|name| parameter(name)).collect::<Result<_, _>>()?)))
+    }
+}
+
+/// Settings that contradict each other, or say nothing.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct Refused(pub String);
+
+fn parameter(name: &str) -> Result<StokesParameter, Refused> {
+    let modelled = [StokesParameter::I, StokesParameter::Q, StokesParameter::U];
+    modelled.into_iter().find(|known| known.name() == name).ok_or_else(|| {
+        Refused(format!("stokes = \"{name}\" is not allowed: some of \"I\", \"Q\" and \"U\""))
+    })
+}

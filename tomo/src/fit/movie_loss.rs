@@ -1,0 +1,85 @@
+//! What whole movies are like beside the data: their loss without a gradient, and their residuals.
+
+use super::forward_model::Field;
+use super::objective::{Buffers, Loss, Objective};
+use super::terms::FrameTerm;
+use super::verdict::Statistics;
+use crate::Error;
+use crate::frames::Frames;
+use crate::simd::Float;
+
+impl<T: Float> Objective<T> {
+    /// Images of these frames, one after the other.
+    pub fn movie(
+        &self,
+        field: Field<'_, T>,
+        frames: &[usize],
+        buffers: &mut Buffers<T>,
+        movie: &mut [T],
+    ) {
+        self.model.movie(field, frames, &mut buffers.batch, &mut buffers.workspace, movie);
+    }
+
+    /// What the residuals of images of all frames are like: for each kind of data, in the order of [`Self::names`].
+    ///
+    /// # Errors
+    /// If images cannot be read.
+    pub fn statistics(&self, movie: &Frames<T>) -> Result<Vec<Statistics>, Error> {
+        let width = self.model.pixels().isqrt();
+        let of = |(term, _): (&dyn FrameTerm<T>, f64)| {
+            let mut all = Statistics::default();
+            for (frame, image) in movie.images().enumerate() {
+                all.add(term.residuals(frame, &image?), width);
+            }
+            Ok(all.ended())
+        };
+        self.terms().map(of).collect()
+    }
+
+    /// The loss of images of these frames, without gradient.
+    ///
+    /// # Errors
+    /// If images cannot be read.
+    pub fn loss_of(&self, frames: &[usize], movie: &Frames<T>) -> Result<Loss, Error> {
+        let mut none = vec![T::zero(); self.model.pixels()];
+        let mut loss = Loss::default();
+        for (term, weight) in self.terms() {
+            let scale = 1.0 / self.data_of(term, frames.len());
+            let mut chi2 = 0.0;
+            for (frame, image) in frames.iter().zip(movie.images()) {
+                chi2 += term.value_and_gradient(*frame, &image?, T::zero(), &mut none);
+            }
+            let value = scale * chi2;
+            loss.terms.push(value);
+            loss.total += weight * value;
+        }
+        Ok(loss)
+    }
+
+    /// The first data, with frame and χ², that are no finite number of images of these frames.
+    ///
+    /// # Errors
+    /// If images cannot be read.
+    pub fn not_finite(
+        &self,
+        frames: &[usize],
+        movie: &Frames<T>,
+    ) -> Result<Option<(String, usize, f64)>, Error> {
+        let mut none = vec![T::zero(); self.model.pixels()];
+        for (frame, image) in frames.iter().zip(movie.images()) {
+            let image = image?;
+            for (term, _) in self.terms() {
+                let value = term.value_and_gradient(*frame, &image, T::zero(), &mut none);
+                if !value.is_finite() {
+                    return Ok(Some((term.name().to_owned(), *frame, value)));
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// Why data that were there at the beginning cannot be read any more, if any is so.
+    pub fn fault(&self) -> Option<&str> {
+        self.terms().find_map(|(term, _)| term.fault())
+    }
+}
