@@ -253,7 +253,7 @@ pub const KEYS: &[Key] = &[
         "loss",
         "data",
         "",
-        "image, visibilities, amplitudes, closure-phases, log-closure-amplitudes, polarized-visibilities or light-curve",
+        "image, visibilities, amplitudes, closure-phases, log-closure-amplitudes, polarized-visibilities, polarimetric-ratios or light-curve",
     ),
     key("loss", "weight", "", "weight of this term; above 0"),
     key(
@@ -262,7 +262,12 @@ pub const KEYS: &[Key] = &[
         "",
         "standard deviation of each pixel (image) or of the flux (light-curve); Jy, above 0",
     ),
-    key("loss", "least_snr", "", "minimum signal-to-noise ratio of a baseline used in closures"),
+    key(
+        "loss",
+        "least_snr",
+        "",
+        "minimum signal-to-noise ratio of a baseline used in closures and ratios",
+    ),
     key(
         "representation",
         "kind",

@@ -67,19 +67,22 @@ pub enum LossKind {
     LogClosureAmplitudes,
     /// RR, LL, RL and LR, or I, Q and U.
     PolarizedVisibilities,
+    /// (Q ± iU)/I of baselines.
+    PolarimetricRatios,
     /// Total flux.
     LightCurve,
 }
 
 impl LossKind {
     /// All kinds.
-    pub const ALL: [LossKind; 7] = [
+    pub const ALL: [LossKind; 8] = [
         LossKind::Image,
         LossKind::Visibilities,
         LossKind::Amplitudes,
         LossKind::ClosurePhases,
         LossKind::LogClosureAmplitudes,
         LossKind::PolarizedVisibilities,
+        LossKind::PolarimetricRatios,
         LossKind::LightCurve,
     ];
 
@@ -92,6 +95,7 @@ impl LossKind {
             LossKind::ClosurePhases => "closure-phases",
             LossKind::LogClosureAmplitudes => "log-closure-amplitudes",
             LossKind::PolarizedVisibilities => "polarized-visibilities",
+            LossKind::PolarimetricRatios => "polarimetric-ratios",
             LossKind::LightCurve => "light-curve",
         }
     }
@@ -105,6 +109,7 @@ impl LossKind {
             LossKind::ClosurePhases => "closure phases",
             LossKind::LogClosureAmplitudes => "log closure amplitudes",
             LossKind::PolarizedVisibilities => "polarized visibilities",
+            LossKind::PolarimetricRatios => "polarimetric ratios",
             LossKind::LightCurve => "the light curve",
         }
     }
@@ -112,6 +117,11 @@ impl LossKind {
     /// Whether χ² of it is convex in the emission, so that a minimum can be told from other stationary points.
     pub fn is_convex(self) -> bool {
         self.is_visibilities() || matches!(self, LossKind::Image | LossKind::LightCurve)
+    }
+
+    /// Whether they compare Q and U of baselines too.
+    pub fn is_polarized(self) -> bool {
+        matches!(self, LossKind::PolarizedVisibilities | LossKind::PolarimetricRatios)
     }
 
     /// Whether they are complex visibilities, of total intensity or of all products.

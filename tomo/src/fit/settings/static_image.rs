@@ -263,8 +263,7 @@ impl StaticImageFile {
 }
 
 fn loss_of_visibilities(loss: &Loss) -> Result<(), FitError> {
-    if matches!(loss.data, LossKind::Image | LossKind::LightCurve | LossKind::PolarizedVisibilities)
-    {
+    if loss.data.is_polarized() || matches!(loss.data, LossKind::Image | LossKind::LightCurve) {
         refuse!(
             "data = {:?} is not for a static image: visibilities, amplitudes, closure-phases or log-closure-amplitudes",
             loss.data.name()

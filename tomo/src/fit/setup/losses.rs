@@ -48,7 +48,7 @@ impl Measured {
                     let term = self.other(loss, pixels).within(name())?;
                     let term = match images(losses) {
                         1 => term,
-                        _ if loss.data == LossKind::PolarizedVisibilities => term,
+                        _ if loss.data.is_polarized() => term,
                         images => Box::new(IntensityTerm { term, images }),
                     };
                     data.others.push(Weighted { weight, term });
@@ -107,6 +107,7 @@ impl Measured {
             LossKind::Amplitudes => ("amplitudes", false),
             LossKind::ClosurePhases => ("closure phases", false),
             LossKind::PolarizedVisibilities => ("polarized visibilities", self.gains.is_none()),
+            LossKind::PolarimetricRatios => ("polarimetric ratios", false),
             _ => ("log closure amplitudes", false),
         };
         let scans: Vec<Option<Scan<T>>> =
@@ -135,8 +136,8 @@ impl Measured {
     }
 
     fn scan<T: Float>(&self, frame: usize, loss: &Loss) -> Result<Option<Scan<T>>> {
-        if loss.data == LossKind::PolarizedVisibilities {
-            return self.polarized_scan(frame);
+        if loss.data.is_polarized() {
+            return self.polarized_scan(frame, loss);
         }
         let (part, sky) = self.part(frame)?;
         if part.stokes_i().next().is_none() {

@@ -3,7 +3,7 @@
 use super::{Measured, Result};
 use crate::fit::settings::{FitError, FitFile, Kind, Loss, LossKind, Start, refuse};
 use crate::fit::{Scan, Seen};
-use crate::interferometry::data_terms::{DataTerm, PolarizedTerm};
+use crate::interferometry::data_terms::{DataTerm, PolarizedTerm, RatioTerm};
 use crate::interferometry::operator::{Float, Method, Operator, Pulse, Transform};
 use crate::interferometry::polarimetry::MODELLED;
 use crate::polarization::StokesParameter;
@@ -13,9 +13,9 @@ use num_complex::Complex;
 pub(super) const PARAMETERS: [StokesParameter; MODELLED] =
     [StokesParameter::I, StokesParameter::Q, StokesParameter::U];
 
-/// Whether any of the data are polarised visibilities.
+/// Whether any of the data compare Q and U of baselines.
 pub(super) fn is_polarized(losses: &[Loss]) -> bool {
-    losses.iter().any(|loss| loss.data == LossKind::PolarizedVisibilities)
+    losses.iter().any(|loss| loss.data.is_polarized())
 }
 
 /// Images of a frame that these losses see.
@@ -38,7 +38,7 @@ pub(super) fn seen(file: &FitFile) -> Result<Option<Seen>> {
     let image = file.loss.iter().any(|loss| loss.data == LossKind::Image);
     if image || file.movie.is_some() {
         refuse!(
-            "a loss of polarized-visibilities stands with other visibilities alone: [movie] and a loss of images are not allowed"
+            "a loss of polarized-visibilities or polarimetric-ratios stands with other visibilities alone: [movie] and a loss of images are not allowed"
         );
     }
     Ok(Some(Seen::StokesImages(PARAMETERS.to_vec())))
@@ -50,13 +50,21 @@ pub(super) fn seen(file: &FitFile) -> Result<Option<Seen>> {
 /// Says what.
 pub(super) fn check(file: &FitFile) -> Result<()> {
     if is_polarized(&file.loss) && file.unknown_world()?.is_some() {
-        refuse!("parameters of [world] are not searched with polarized-visibilities");
+        refuse!(
+            "parameters of [world] are not searched with polarized-visibilities or polarimetric-ratios"
+        );
     }
     let solves = file.instrument.as_ref().is_some_and(|instrument| instrument.leakage.is_some());
     let draws = file.observation.as_ref().is_some_and(|seen| seen.leakage.is_some());
-    if (solves || draws) && !is_polarized(&file.loss) {
+    let has = |kind| file.loss.iter().any(|loss| loss.data == kind);
+    if (solves || draws) && !has(LossKind::PolarizedVisibilities) {
         let key = if solves { "instrument.leakage" } else { "observation.leakage" };
         refuse!("{key} needs a loss with data = \"polarized-visibilities\"");
+    }
+    if solves && has(LossKind::PolarimetricRatios) {
+        refuse!(
+            "instrument.leakage and a loss of polarimetric-ratios exclude each other: leakage does not cancel in ratios"
+        );
     }
     if solves && file.held_out.is_some() {
         refuse!("instrument.leakage and held_out exclude each other");
@@ -100,13 +108,32 @@ impl Measured {
         Ok(Some((transform, term)))
     }
 
-    /// The same as a scan of the loss.
-    pub(super) fn polarized_scan<T: Float>(&self, frame: usize) -> Result<Option<Scan<T>>> {
+    /// The data of a frame that such a loss compares, as a scan; none where nothing was measured.
+    pub(super) fn polarized_scan<T: Float>(
+        &self,
+        frame: usize,
+        loss: &Loss,
+    ) -> Result<Option<Scan<T>>> {
+        if loss.data == LossKind::PolarimetricRatios {
+            return self.ratios(frame, loss.least_snr.unwrap_or(0.0));
+        }
         let scan = |(transform, term)| {
             let term: Box<dyn DataTerm<T> + Send> = Box::new(term);
             Scan { transform, term }
         };
         Ok(self.products(frame)?.map(scan))
+    }
+
+    fn ratios<T: Float>(&self, frame: usize, least_snr: f64) -> Result<Option<Scan<T>>> {
+        let (part, sky) = self.part(frame)?;
+        let uv = RatioTerm::uv(&part, least_snr);
+        if uv.is_empty() {
+            return Ok(None);
+        }
+        let term = Box::new(RatioTerm::new(&part, least_snr)?);
+        let images = vec![uv; MODELLED];
+        let transform = Transform::new(sky, Pulse::Triangle, &images, Method::Direct, MEMORY)?;
+        Ok(Some(Scan { transform, term }))
     }
 
     /// The products of all frames beside those of images of I, Q and U, frame after frame.

@@ -4,11 +4,13 @@
 mod closures;
 mod gains;
 mod polarized;
+mod ratios;
 mod visibilities;
 
 pub use closures::ClosureTerm;
 pub use gains::GainTerm;
 pub use polarized::PolarizedTerm;
+pub use ratios::RatioTerm;
 pub use visibilities::{AmplitudeTerm, VisibilityTerm};
 
 use super::observation::{Measured, Observation};

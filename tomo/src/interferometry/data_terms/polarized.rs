@@ -182,4 +182,4 @@ impl<T: Float> DataTerm<T> for PolarizedTerm {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

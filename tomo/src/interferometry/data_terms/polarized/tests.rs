@@ -10,7 +10,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 /// A scan of the EHT with random visibilities of 1 Jy, their I, Q and U, and the leakage that was put on them.
-fn scan(leakage: f64, gains: bool) -> (Observation, Vec<Complex64>, SharedLeakage) {
+pub fn scan(leakage: f64, gains: bool) -> (Observation, Vec<Complex64>, SharedLeakage) {
     let schedule =
         Schedule { mjd: 57850, clock: Clock::Utc, start_h: 12.0, stop_h: 13.0, scans: 1 };
     let setup = Setup {
@@ -49,7 +49,7 @@ fn priors(data: &Observation) -> GainPriors {
     GainPriors { free_phases: true, amplitude_sigma: vec![0.1; data.stations.len()] }
 }
 
-fn off(truth: &[Complex64]) -> Vec<Complex64> {
+pub fn off(truth: &[Complex64]) -> Vec<Complex64> {
     let mut random = Pcg64Mcg::seed_from_u64(12);
     let mut part = || 0.1 * random.random_range(-1.0..1.0);
     truth.iter().map(|v| v + Complex64::new(part(), part())).collect()
