@@ -39,7 +39,7 @@ fn exact_numbers_that_would_take_too_much_are_named() {
     let at = folder.path();
     let set = |change: &'static str| ["fit", "-o", "run", "--set", change];
     for (change, said) in [
-        ("screen.pixels=4000", "screen.pixels = 4000: about"),
+        ("screen.pixels=4000", "screen.pixels = 4000"),
         ("observation.scans=1000000", "visibilities of 1000000 scans"),
         ("region.nodes={gauss={order=16,split=4000000}}", "region.nodes"),
         ("output.nodes=512", "output.nodes = 512"),
@@ -173,4 +173,94 @@ fn exact_a_movie_in_a_file_gives_the_same_bytes() {
             ["read", "read_little"].map(|run| std::fs::read(at.join(run).join(name)).unwrap());
         assert!(a == b, "{name}");
     }
+}
+
+/// A limit that is too small is refused before anything is written, with one that is enough; that is no more than what
+/// these fits are known to hold.
+#[test]
+fn exact_the_least_limit_that_is_said_is_enough() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let images = crate::support::root().join("scenes/fits/flare_images.toml");
+    let images = ["fit", images.to_str().unwrap()];
+    let few = ["training.steps=3", "output.nodes=16", "training.start=drawn"];
+    let linear = ["representation=linear-grid", "representation.nodes=20", "output.nodes=16"];
+    let fine = ["screen.pixels=96", "movie.frames=600"];
+    let grid = ["representation=grid", "representation.nodes=20"];
+    let cases: [(&[&str], Vec<&str>, f64); 4] = [
+        (&images, few.to_vec(), 120.0),
+        (&images, linear.to_vec(), 300.0),
+        (&images, [&few[..], &fine, &grid].concat(), 400.0),
+        (&["fit"], [&few[..], &["training.batch={frames=2}"]].concat(), 160.0),
+    ];
+    for (k, (words, set, most)) in cases.into_iter().enumerate() {
+        let set = set.iter().flat_map(|change| ["--set", *change]);
+        let run = format!("run_{k}");
+        let words: Vec<&str> = words.iter().copied().chain(["-o", &run]).chain(set).collect();
+        let message = fail(at, &[&["--memory", "20MiB"][..], &words].concat());
+        assert!(message.contains(" = ") && message.contains("the limit is 20.0 MiB"), "{message}");
+        assert!(!at.join(&run).exists(), "{message}");
+        let (_, needed) = message.split_once(" would take ").unwrap();
+        let (needed, _) = needed.split_once(" of memory").unwrap();
+        let number: f64 = needed.strip_suffix(" MiB").unwrap().parse().unwrap();
+        assert!(number < most, "{message}");
+        succeed(at, &[&["--memory", needed][..], &words].concat());
+    }
+}
+
+/// Images of one file each are the same data as a movie, by any name and within little memory.
+#[test]
+fn exact_a_sequence_of_images_is_a_movie() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let scene = crate::support::root().join("scenes/fits/flare_images.toml");
+    let text = std::fs::read_to_string(&scene).unwrap();
+    let (head, rest) = text.split_once("[[truth.spot]]").unwrap();
+    let (_, tail) = rest.split_once("[movie]").unwrap();
+    std::fs::write(at.join("data.toml"), format!("{head}[movie]{tail}")).unwrap();
+    let set = [
+        "screen.pixels=16",
+        "movie.frames=12",
+        "training.steps=4",
+        "output.nodes=12",
+        "representation=grid",
+        "representation.nodes=12",
+        "training.start={linear={nodes=12,stride=2,steps=4}}",
+    ];
+    let set: Vec<&str> = set.iter().flat_map(|change| ["--set", *change]).collect();
+    succeed(at, &[&["fit", scene.to_str().unwrap(), "-o", "simulated"][..], &set].concat());
+    let size = ["--set", "screen.width=16", "--set", "screen.height=16"];
+    let times = ["--frames", "12", "--from", "0", "--to", "120", "-o", "frames"];
+    succeed(at, &[&["movie", "simulated/scene.toml"][..], &times, &size].concat());
+    // Of the same numbers, a file for all and one for each.
+    std::fs::create_dir(at.join("arrays")).unwrap();
+    let bytes = std::fs::read(at.join("simulated/movie.npz")).unwrap();
+    let mut archive = kerrlight_tomo::numpy::Archive::open(&bytes).unwrap();
+    let movie = archive.member("data").unwrap().unwrap();
+    let (_, values) = kerrlight_tomo::numpy::read_array(&movie).unwrap();
+    std::fs::write(at.join("all.npy"), &movie).unwrap();
+    for (k, image) in values.chunks_exact(16 * 16).enumerate() {
+        let bytes = kerrlight_tomo::numpy::write_array(&[16, 16], image.iter().copied());
+        std::fs::write(at.join(format!("arrays/f_{k}.npy")), bytes).unwrap();
+    }
+    let read = |path: &str, memory: &str, run: &str| {
+        let path = format!("data.movie.path={path}");
+        let words = ["--memory", memory, "fit", "data.toml", "-o", run, "--set", &path];
+        succeed(at, &[&words[..], &set].concat());
+        std::fs::read(at.join(run).join("movie.npz")).unwrap()
+    };
+    let pictures = read("frames", "4GiB", "by_folder");
+    assert!(read("frames/frame_%04d.exr", "4GiB", "by_number") == pictures);
+    assert!(read("frames/*.exr", "120MiB", "by_star") == pictures);
+    let arrays = read("all.npy", "4GiB", "at_once");
+    assert!(read("arrays/f_%d.npy", "120MiB", "one_by_one") == arrays && arrays != pictures);
+    let inputs = std::fs::read_to_string(at.join("by_folder/inputs.json")).unwrap();
+    assert_eq!(inputs.matches("frame_0000.exr").count(), 1, "{inputs}");
+    std::fs::remove_file(at.join("frames/frame_0003.exr")).unwrap();
+    let path = "data.movie.path=frames/frame_%04d.exr";
+    let words = ["fit", "data.toml", "-o", "gap", "--set", path];
+    let message = fail(at, &[&words[..], &set].concat());
+    assert!(message.contains("frame_0002.exr is followed by frame_0004.exr"), "{message}");
+    let message = fail(at, &["fit", "--resume", "by_folder"]);
+    assert!(message.contains("frame_0003.exr"), "{message}");
 }

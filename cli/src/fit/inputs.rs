@@ -48,10 +48,17 @@ impl Inputs {
             let path = std::path::absolute(&path).unwrap_or(path);
             InputFile { path, sum }
         };
+        // The first image of a sequence is read once more for its size.
+        let mut files: Vec<InputFile> = Vec::new();
+        for file in read.into_iter().map(file) {
+            if !files.contains(&file) {
+                files.push(file);
+            }
+        }
         Inputs {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             settings: Sum::of(settings.as_bytes()),
-            files: read.into_iter().map(file).collect(),
+            files,
         }
     }
 

@@ -49,6 +49,7 @@ pub struct Prepared<'a> {
 impl<'a> Prepared<'a> {
     /// Checks settings, traces rays, simulates or reads data; relative paths start from `base_dir`.
     pub fn new(file: FitFile, base_dir: &Path, registry: &'a Registry) -> anyhow::Result<Self> {
+        setup::afford_all(&file, registry)?;
         setup::check(&file, registry)?;
         let instrument = Instrument::new(&file)?;
         let measured = data::measure(&file, &instrument, base_dir)?;

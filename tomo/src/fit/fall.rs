@@ -25,6 +25,11 @@ impl Fall {
         }
     }
 
+    /// Bytes of its nodes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.origins)
+    }
+
     /// What node number k is stretched by and turned by to where its matter was `elapsed` (M) before: no numbers where
     /// that is outside of the region, so that nothing shines.
     #[inline]

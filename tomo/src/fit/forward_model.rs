@@ -68,7 +68,7 @@ pub struct ForwardModel<T> {
     pub(super) planes: Option<Planes<T>>,
     /// Whether all rays add to the same pixel.
     pub(super) is_flux: bool,
-    factors: Vec<f64>,
+    pub(super) factors: Vec<f64>,
     weighted_for: Option<Axis>,
     /// Times of the frames since the reference time.
     pub(super) times: Vec<T>,

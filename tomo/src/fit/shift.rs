@@ -50,6 +50,11 @@ impl Shift {
         Self { nodes: (0..lines.points()).map(node).collect(), power }
     }
 
+    /// Bytes of its nodes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.nodes)
+    }
+
     /// factors[k] = g^power, 0 where the gas would be faster than light.
     pub fn factors(&self, axis: Axis, factors: &mut [f64]) {
         let axis = axis.vector();

@@ -143,6 +143,8 @@ impl Sightlines {
             // Rays that were traced step by step came last.
             all.sort_from(first);
         }
+        // They have grown, and are kept for long.
+        all.columns().into_iter().for_each(Vec::shrink_to_fit);
         Ok(all)
     }
 
@@ -242,6 +244,13 @@ impl Sightlines {
             }
             self.end_ray(pixels[ray] as usize);
         }
+    }
+
+    /// Bytes of its nodes.
+    pub fn bytes(&self) -> usize {
+        let scalars = [&self.weight, &self.delay, &self.radial];
+        let columns = self.position.iter().chain(&self.momentum).chain(scalars);
+        columns.map(|column| size_of_val(&**column)).sum()
     }
 
     /// What there is of each node.

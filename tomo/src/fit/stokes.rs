@@ -161,6 +161,11 @@ pub(super) struct Planes<T> {
 }
 
 impl<T: Float> Planes<T> {
+    /// Bytes of the factors of all nodes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.factors)
+    }
+
     /// Of the factors of all nodes.
     pub fn new(factors: &[Stokes], parameters: &[StokesParameter], stride: usize) -> Self {
         let mut all = Vec::with_capacity(factors.len() * parameters.len());

@@ -1,6 +1,7 @@
 //! Rows of data to which all rays add: a number for every node.
 
-use super::operator::{Held, NONE, Operator};
+use super::held::Held;
+use super::operator::{NONE, Operator};
 use super::rows::Rows;
 use super::walk::Buffers;
 use crate::representation::spline::STENCIL;
@@ -39,7 +40,7 @@ impl<T: Float + Default> Operator<'_, T> {
                 }
             }
         });
-        let mut rows = Rows { starts: vec![0], ..Rows::default() };
+        let mut rows = Rows::default();
         for (pixel, row) in sums.chunks_exact(columns.max(1)).enumerate() {
             rows.push_dense(pixel as u32, row);
         }

@@ -12,6 +12,7 @@ mod data;
 mod dense;
 mod descent;
 mod error;
+mod held;
 mod lit;
 mod nodes;
 mod objective;

@@ -1,6 +1,7 @@
 //! From values at some nodes of the grid to pixels, as a sparse matrix, and back.
 
 use super::data::Data;
+use super::held::Held;
 use super::rows::Rows;
 use super::walk::{Buffers, Voxels, Walk};
 use crate::memory;
@@ -14,11 +15,8 @@ use std::sync::{Mutex, PoisonError};
 pub(super) const NONE: u32 = u32::MAX;
 /// Pieces that frames are cut into, whatever the number of threads: each adds up its own gradient.
 const PIECES: usize = 16;
-/// What part of the memory rows may take, and slopes that are kept to be subtracted.
-const ROWS: f64 = 1.0 / 4.0;
+/// What part of the memory slopes may take that are kept to be subtracted.
 const SLOPES: f64 = 1.0 / 16.0;
-/// Frames whose rows are made at a time; memory is checked between them.
-const AT_A_TIME: usize = 8;
 
 /// The nodes that count, in the order of the grid.
 #[derive(Clone, Debug)]
@@ -77,17 +75,6 @@ pub(super) struct Operator<'a, T> {
     pub rows: Vec<Held<T>>,
 }
 
-/// How a frame is passed through: rows add up in another order than a walk, so that this decides the last bits, and
-/// whether rows are kept or made again does not.
-pub(super) enum Held<T> {
-    /// By rows that are kept.
-    Kept(Rows<T>),
-    /// By rows that are made each time.
-    Made,
-    /// Node by node.
-    Walked,
-}
-
 /// Memory of a thread.
 struct Scratch<T> {
     buffers: Buffers<T>,
@@ -96,63 +83,15 @@ struct Scratch<T> {
 }
 
 impl<'a, T: Float + Default> Operator<'a, T> {
-    /// Restricted to these nodes, with at most about `budget` bytes of rows (those of 8 frames more).
-    pub fn new(walk: Walk<'a, T>, active: Active, frames: &'a [usize], budget: usize) -> Self {
-        let (corners, pixels) = (walk.voxels.corners(), walk.model.pixels());
-        let mut all = Self { walk, active, corners, frames, pixels, rows: Vec::new() };
-        let (mut made, room) = (0, memory::part(ROWS) as usize);
-        for some in frames.chunks(AT_A_TIME) {
-            if made > budget {
-                all.rows.extend(some.iter().map(|_| Held::Walked));
-                continue;
-            }
-            let rows: Vec<_> = some.par_iter().map(|frame| all.rows_of(*frame)).collect();
-            let kept = made <= room;
-            made += rows.iter().map(Rows::bytes).sum::<usize>();
-            all.rows
-                .extend(rows.into_iter().map(|r| if kept { Held::Kept(r) } else { Held::Made }));
-        }
-        all
-    }
-
-    pub fn rows_of(&self, frame: usize) -> Rows<T> {
-        if self.walk.model.is_flux {
-            return self.fluxes_of(frame);
-        }
-        let mut rows = Rows { starts: vec![0], ..Rows::default() };
-        let mut place = vec![NONE; self.active.count()];
-        let (wanted, degree) = (Some(self.active.cells.as_slice()), self.walk.voxels.degree);
-        self.walk.frame(frame, wanted, &mut Buffers::default(), |pixel, places| {
-            rows.push(pixel, places, &self.active, (&self.corners, degree), &mut place);
-        });
-        rows.columns.shrink_to_fit();
-        rows.entries.shrink_to_fit();
-        rows
-    }
-
-    /// Bytes of the rows that are kept.
-    pub fn bytes(&self) -> usize {
-        self.kept().map(Rows::bytes).sum()
-    }
-
-    /// Entries of the rows that are kept.
-    pub fn entries(&self) -> usize {
-        self.kept().map(|rows| rows.entries.len()).sum()
-    }
-
-    fn kept(&self) -> impl Iterator<Item = &Rows<T>> {
-        self.rows.iter().filter_map(|held| match held {
-            Held::Kept(rows) => Some(rows),
-            Held::Made | Held::Walked => None,
-        })
-    }
-
     fn image(&self, k: usize, x: &[T], scratch: &mut Scratch<T>) {
         let Scratch { buffers, image, .. } = scratch;
         image.fill(T::zero());
         match &self.rows[k] {
             Held::Kept(rows) => return rows.forward(x, image),
-            Held::Made => return self.rows_of(self.frames[k]).forward(x, image),
+            Held::Made => {
+                let frame = self.frames[k];
+                return self.each_row(frame, buffers, |row| row.forward(x, image));
+            }
             Held::Walked => {}
         }
         let (wanted, degree) = (Some(self.active.cells.as_slice()), self.walk.voxels.degree);
@@ -173,13 +112,16 @@ impl<'a, T: Float + Default> Operator<'a, T> {
     }
 
     fn back(&self, k: usize, scratch: &mut Scratch<T>, sums: &mut [T]) {
+        let Scratch { buffers, slopes, .. } = scratch;
         match &self.rows[k] {
-            Held::Kept(rows) => return rows.adjoint(&scratch.slopes, sums),
-            Held::Made => return self.rows_of(self.frames[k]).adjoint(&scratch.slopes, sums),
+            Held::Kept(rows) => return rows.adjoint(slopes, sums),
+            Held::Made => {
+                let frame = self.frames[k];
+                return self.each_row(frame, buffers, |row| row.adjoint(slopes, sums));
+            }
             Held::Walked => {}
         }
         let (wanted, degree) = (Some(self.active.cells.as_slice()), self.walk.voxels.degree);
-        let Scratch { buffers, slopes, .. } = scratch;
         let mut weights = [T::zero(); STENCIL];
         self.walk.frame(self.frames[k], wanted, buffers, |pixel, places| {
             let slope = slopes[pixel as usize];
@@ -371,7 +313,7 @@ impl<'a, T: Float + Default> Operator<'a, T> {
         for (held, frame) in self.rows.iter().zip(self.frames) {
             match held {
                 Held::Kept(rows) => add(rows),
-                Held::Made => add(&self.rows_of(*frame)),
+                Held::Made => self.each_row(*frame, &mut Buffers::default(), &mut add),
                 Held::Walked => {}
             }
         }

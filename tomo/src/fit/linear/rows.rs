@@ -5,8 +5,8 @@ use super::walk::Place;
 use crate::representation::spline::{Degree, STENCIL};
 use crate::simd::Float;
 
-/// The rows of a frame that are not empty.
-#[derive(Clone, Default)]
+/// Rows of a frame that are not empty: `starts` of each, and where the last ends.
+#[derive(Clone)]
 pub(super) struct Rows<T> {
     pub pixel: Vec<u32>,
     pub starts: Vec<u32>,
@@ -14,7 +14,22 @@ pub(super) struct Rows<T> {
     pub entries: Vec<T>,
 }
 
+impl<T> Default for Rows<T> {
+    fn default() -> Self {
+        let (pixel, columns, entries) = (Vec::new(), Vec::new(), Vec::new());
+        Self { pixel, starts: vec![0], columns, entries }
+    }
+}
+
 impl<T: Float> Rows<T> {
+    /// Takes all rows away.
+    pub fn clear(&mut self) {
+        self.pixel.clear();
+        self.starts.truncate(1);
+        self.columns.clear();
+        self.entries.clear();
+    }
+
     /// Adds up what a ray's nodes take from each column; `place` remembers where in the row a column is.
     pub fn push(
         &mut self,

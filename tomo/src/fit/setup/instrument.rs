@@ -45,17 +45,8 @@ impl Instrument {
 
     /// Refuses rays that there is no memory for, as estimated from a few of them.
     fn afford(file: &FitFile, pixels: usize) -> Result<()> {
-        spacing(&file.screen)?;
-        let each = match file.region.nodes {
-            Sampling::Gauss { order, split } => order as f64 * f64::from(split),
-            Sampling::EqualMinoTime { per_ray } => per_ray as f64,
-        };
-        let block = || format!("region.nodes: {each} nodes or more on each ray of a block");
-        memory::afford(block, memory::nodes(each * TRIAL.min(pixels) as f64, 0.0))?;
-        let chosen: Vec<usize> = (0..pixels).step_by(pixels.div_ceil(TRIAL).max(1)).collect();
-        // What is wrong with them is told by those of all pixels.
-        let Ok(few) = Self::of(file, &chosen) else { return Ok(()) };
-        let nodes = few.lines.points() as f64 * pixels as f64 / chosen.len() as f64;
+        let Some((few, of_all)) = Self::trial(file)? else { return Ok(()) };
+        let nodes = few.lines.points() as f64 * of_all;
         let (momenta, delays) = (few.lines.momentum[0].len(), few.lines.delay.len());
         let columns = [(momenta, 3.0), (delays, 2.0)];
         let columns = columns.iter().map(|(count, n)| if *count > 0 { *n } else { 0.0 }).sum();
@@ -64,6 +55,22 @@ impl Instrument {
             format!("screen.pixels = {n}: about {nodes:.0} nodes on the rays of {pixels} pixels")
         };
         memory::afford(what, memory::nodes(nodes, columns))
+    }
+
+    /// Traces the rays of a few of all pixels, which are so many times as many; nothing if something is wrong with them,
+    /// which is told by those of all pixels.
+    pub(super) fn trial(file: &FitFile) -> Result<Option<(Self, f64)>> {
+        spacing(&file.screen)?;
+        let pixels = file.screen.pixels * file.screen.pixels;
+        let each = match file.region.nodes {
+            Sampling::Gauss { order, split } => order as f64 * f64::from(split),
+            Sampling::EqualMinoTime { per_ray } => per_ray as f64,
+        };
+        let block = || format!("region.nodes: {each} nodes or more on each ray of a block");
+        memory::afford(block, memory::nodes(each * TRIAL.min(pixels) as f64, 0.0))?;
+        let chosen = spread(file.screen.pixels);
+        let few = Self::of(file, &chosen).ok();
+        Ok(few.map(|few| (few, pixels as f64 / chosen.len() as f64)))
     }
 
     /// Traces the rays of some pixels, counted row by row from the top, each from the left.
@@ -142,6 +149,25 @@ impl Instrument {
     }
 }
 
+/// [`TRIAL`] of `side` × `side` pixels or a few hundred less, spread over rows and columns alike.
+fn spread(side: usize) -> Vec<usize> {
+    const GOLDEN: f64 = 0.618034;
+    fn common(a: usize, b: usize) -> usize {
+        if b == 0 { a } else { common(b, a % b) }
+    }
+    let pixels = side * side;
+    let least = pixels.div_ceil(TRIAL).max(1);
+    let mut step = least;
+    if 4 * least > side {
+        // Few of each row: every one by the golden section further on than the one before.
+        step += ((GOLDEN * side as f64) as usize + side - least % side) % side;
+    }
+    while common(step, side) > 1 {
+        step += 1;
+    }
+    (0..pixels).step_by(step).collect()
+}
+
 /// How polarised light arrives at these pixels, if any is modelled.
 fn polarized(file: &FitFile, screen: &[Vec<f64>; 2]) -> Result<Option<PolarizedView>> {
     let Some(law) = file.polarization else { return Ok(None) };
@@ -211,4 +237,25 @@ fn pixels(screen: &Screen, chosen: &[usize]) -> Result<(Vec<f64>, Vec<f64>)> {
     let (n, step) = (screen.pixels, spacing(screen)?);
     let at = |k: usize| (k as f64 - 0.5 * (n as f64 - 1.0)) * step;
     Ok(chosen.iter().map(|k| (at(k % n), -at(k / n))).unzip())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The part of pixels in a ring about the middle is that of its area.
+    #[test]
+    fn exact_a_few_pixels_are_of_all_parts() {
+        for side in [24, 40, 64, 99, 128, 256, 316, 512, 1000, 4096] {
+            let few = spread(side);
+            assert!(few.len() > 100 && few.len() <= TRIAL.max(side * side), "{side}");
+            let middle = 0.5 * (side as f64 - 1.0);
+            let radius = |k: usize| ((k % side) as f64 - middle).hypot((k / side) as f64 - middle);
+            let inside = few.iter().map(|k| radius(*k) / side as f64);
+            let inside = inside.filter(|r| (0.1..0.42).contains(r)).count() as f64;
+            let part = inside / few.len() as f64;
+            let expected = core::f64::consts::PI * (0.42f64.powi(2) - 0.1f64.powi(2));
+            assert!((part / expected - 1.0).abs() < 0.12, "{side}: {part} in place of {expected}");
+        }
+    }
 }

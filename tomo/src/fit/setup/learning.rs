@@ -41,7 +41,10 @@ pub fn representation(
 }
 
 /// What is recovered where matter carries emission unchanged.
-fn of_matter(file: &FitFile, registry: &Registry) -> Result<Box<dyn Representation<f32>>> {
+pub(super) fn of_matter(
+    file: &FitFile,
+    registry: &Registry,
+) -> Result<Box<dyn Representation<f32>>> {
     let chosen = &file.representation;
     let network = |settings: NetworkSettings| {
         Network::new(chosen_network(chosen, settings)).within("representation")

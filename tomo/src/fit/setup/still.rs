@@ -13,8 +13,8 @@ use crate::transport::View;
 
 /// Pixels along each side: six times those of the fit, no more than this.
 const MOST: usize = 256;
-/// Rows that are traced at a time: the memory that they need goes like their number.
-const ROWS: usize = 32;
+/// Rays that are traced at a time, about: the memory that they need goes like their number.
+pub(super) const AT_A_TIME: usize = 4096;
 /// Of rays along photon rings, in the logarithm of their distance from the critical curve: less than a cell of
 /// a volume by its radius.
 const SPACING: f64 = 0.1;
@@ -52,8 +52,10 @@ impl StillView<'_> {
         let motion = Motion { times: vec![time], ..self.motion.clone() };
         let side = self.side();
         let mut still = Still { side, time, recovered: Vec::new(), truth: None };
-        for row in (0..side).step_by(ROWS) {
-            let rays = self.rays(row)?;
+        let mut first = 0;
+        while first < side * side {
+            let rays = self.rays(first)?;
+            first += rays.count.len();
             let mut model = self.forward_model(&rays, &motion)?;
             still.recovered.extend(rays.pixels(&recovered(&mut model, trainer, state)));
             if let Some(truth) = self.truth {
@@ -69,7 +71,7 @@ impl StillView<'_> {
         (6 * self.file.screen.pixels).min(MOST)
     }
 
-    /// The rays of some rows of pixels: one through the centre of each, or several along photon rings.
+    /// The rays of pixels from the `first` on: one through the centre of each, or several along photon rings.
     fn rays(&self, first: usize) -> Result<Rays> {
         let (screen, side) = (&self.file.screen, self.side());
         let step = spacing(screen)? * screen.pixels as f64 / side as f64;
@@ -78,7 +80,10 @@ impl StillView<'_> {
         let strata = RingStrata::new(&self.instrument.hole, &view, SPACING);
         let mut rays = Rays::default();
         let mut ring = Vec::new();
-        for k in first * side..(first + ROWS).min(side) * side {
+        for k in first..side * side {
+            if rays.alpha.len() >= AT_A_TIME {
+                break;
+            }
             let (x, y) = (at(k % side), -at(k / side));
             ring.clear();
             strata.place((x, y), step, &mut ring);
