@@ -16,6 +16,8 @@ use crate::simd::Float;
 
 /// Nodes of a ray of the still image, about: most of its rays are those of the photon ring.
 const STILL_NODES: usize = 48;
+/// Bytes of a node of a frame on its way through the model: place, time, weight, value and slopes.
+const OF_BATCH: f64 = 64.0;
 /// Bytes of a node of a linear problem: numbers of its steps in double precision, and gradients of pieces.
 const OF_LINEAR: f64 = 512.0;
 /// What is taken beside all of this: the page, pictures, files that are read, blocks of threads.
@@ -82,9 +84,10 @@ fn nodes(file: &FitFile, few: &Instrument, of_all: f64) -> Result<Part> {
     let models = if images { seen } else { 2 * seen };
     let simulated = if file.truth.is_some() { simulated } else { 0 };
     // While they are traced, columns grow by doubling.
-    let each = (lines + models.max(simulated) as f64).max(2.0 * lines);
-    let (count, pixels) = (few.lines.points() as f64 * of_all, file.screen.pixels);
-    let still = each / few.lines.points() as f64 * (AT_A_TIME * STILL_NODES) as f64;
+    let points = few.lines.points() as f64;
+    let each = (lines + models.max(simulated) as f64 + OF_BATCH * points).max(2.0 * lines);
+    let (count, pixels) = (points * of_all, file.screen.pixels);
+    let still = each / points * (AT_A_TIME * STILL_NODES) as f64;
     let what = format!("for about {count:.0} nodes on rays (screen.pixels = {pixels})");
     Ok(Part { what, bytes: each * of_all + still })
 }
