@@ -45,9 +45,11 @@ fn assert_room_changes_no_bit(model: &ForwardModel<f64>, knots: Knots, degree: D
     };
     let kept = within(usize::MAX);
     assert_eq!(counts(&kept), [5, 0, 0]);
-    let some = within(kept.bytes() / 2);
-    let [few, rest, none] = counts(&some);
-    assert!(few >= 1 && rest >= 1 && none == 0, "{few} {rest} {none}");
+    let mixed = (1..20).map(|part| within(part * kept.bytes() / 10)).find(|operator| {
+        let [few, rest, none] = counts(operator);
+        few >= 1 && rest >= 1 && none == 0
+    });
+    let some = mixed.expect("a room for some of the frames");
     assert!(some.bytes() < kept.bytes());
     let made = within(0);
     assert_eq!((counts(&made), made.bytes()), ([0, 5, 0], 0));
