@@ -3,6 +3,8 @@
 use crate::answer::Answer;
 use clap::Args;
 use kerrlight_geodesic::RayDevice;
+use kerrlight_tomo::fit::{Objective, StepDevice, Training};
+use kerrlight_tomo::representation::Representation;
 use serde_json::{Value, json};
 use std::sync::Arc;
 
@@ -18,6 +20,31 @@ pub struct DeviceOption {
     #[arg(long = "device", value_name = "DEVICE")]
     name: Option<String>,
 }
+
+/// Where the steps of a fit are taken.
+#[derive(Debug, Args)]
+pub struct StepsOption {
+    /// Where steps are taken: `cpu`, `gpu` (the first graphics device), or a name or number of
+    /// `kerrlight devices` [default: cpu]
+    #[arg(long = "device", value_name = "DEVICE")]
+    name: Option<String>,
+}
+
+/// Refuses fits that a device does not do.
+pub type CheckSteps =
+    fn(&Objective<f32>, &dyn Representation<f32>, &Training) -> Result<(), kerrlight_tomo::Error>;
+
+/// Makes of an open device one that takes the steps of a fit.
+pub type TakeSteps = Box<
+    dyn FnOnce(
+        &Objective<f32>,
+        &dyn Representation<f32>,
+        &Training,
+    ) -> anyhow::Result<Box<dyn StepDevice<f32>>>,
+>;
+
+/// An open device for a fit.
+pub type FitDevice = (CheckSteps, TakeSteps);
 
 /// A graphics device as it is listed.
 struct Listed {
@@ -76,11 +103,23 @@ impl Listed {
 impl DeviceOption {
     /// The device, opened; `None` is this processor.
     pub fn open(&self) -> anyhow::Result<Option<Arc<dyn RayDevice>>> {
-        match self.name.as_deref() {
-            None | Some("cpu") => Ok(None),
-            Some("gpu") => graphics::open(None).map(Some),
-            Some(name) => graphics::open(Some(name)).map(Some),
-        }
+        chosen(self.name.as_deref()).map(graphics::open).transpose()
+    }
+}
+
+impl StepsOption {
+    /// The device, opened; `None` is this processor.
+    pub fn open(&self) -> anyhow::Result<Option<FitDevice>> {
+        chosen(self.name.as_deref()).map(graphics::open_for_fits).transpose()
+    }
+}
+
+/// The graphics device that is meant, if one is: the first one, or that of a name.
+fn chosen(name: Option<&str>) -> Option<Option<&str>> {
+    match name {
+        None | Some("cpu") => None,
+        Some("gpu") => Some(None),
+        name => Some(name),
     }
 }
 
@@ -95,10 +134,11 @@ pub fn announce(device: &dyn RayDevice, rest: &[&str]) {
 
 #[cfg(feature = "gpu")]
 mod graphics {
-    use super::Listed;
+    use super::{FitDevice, Listed};
     use anyhow::Context;
     use kerrlight_geodesic::RayDevice;
     use kerrlight_geodesic::gpu::{self, GpuError, GpuTracer};
+    use kerrlight_tomo::fit::graphics::{self, GraphicsFit};
     use std::sync::Arc;
 
     pub const ABSENT: &str = "no graphics device: install the driver of your card, or Mesa's \
@@ -122,11 +162,23 @@ mod graphics {
         let tracer = opened.with_context(|| format!("--device {}", name.unwrap_or("gpu")))?;
         Ok(Arc::new(tracer))
     }
+
+    pub fn open_for_fits(name: Option<&str>) -> anyhow::Result<FitDevice> {
+        let option = format!("--device {}", name.unwrap_or("gpu"));
+        let opened: Result<_, GpuError> =
+            gpu::adapter(name).and_then(|adapter| graphics::open(&adapter));
+        let device = opened.with_context(|| option.clone())?;
+        let take: super::TakeSteps = Box::new(move |objective, representation, training| {
+            let fit = GraphicsFit::new(device, objective, representation, training, None);
+            Ok(Box::new(fit.context(option)?))
+        });
+        Ok((graphics::check, take))
+    }
 }
 
 #[cfg(not(feature = "gpu"))]
 mod graphics {
-    use super::Listed;
+    use super::{FitDevice, Listed};
     use anyhow::bail;
     use kerrlight_geodesic::RayDevice;
     use std::sync::Arc;
@@ -139,6 +191,14 @@ mod graphics {
     }
 
     pub fn open(name: Option<&str>) -> anyhow::Result<Arc<dyn RayDevice>> {
+        absent(name)
+    }
+
+    pub fn open_for_fits(name: Option<&str>) -> anyhow::Result<FitDevice> {
+        absent(name)
+    }
+
+    fn absent<T>(name: Option<&str>) -> anyhow::Result<T> {
         bail!(
             "--device {}: this kerrlight was built without graphics devices, only `cpu` is there: \
              build it with `cargo build --release --features gpu`",

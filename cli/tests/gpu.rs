@@ -1,4 +1,4 @@
-//! Pictures with rays on whatever graphics device there is, against those of the processor.
+//! Pictures with rays, and fits with steps, on whatever graphics device there is, against those of the processor.
 //!
 //! `cargo test --release -p kerrlight --features gpu --test gpu -- --nocapture` prints the differences.
 
@@ -131,4 +131,99 @@ fn devices_that_are_not_there() {
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2));
     assert!(told.contains("--device abacus") && told.contains("there is"), "{told}");
+}
+
+/// Words of a fit that takes a moment: of a file of `scenes/fits`, or the built-in one, with changes.
+fn fit(file: Option<&str>, changes: &[&str]) -> Vec<String> {
+    let mut words = vec!["fit".to_owned()];
+    words.extend(file.map(|file| scene(&format!("fits/{file}")).to_str().unwrap().to_owned()));
+    for change in changes {
+        words.extend(["--set".to_owned(), (*change).to_owned()]);
+    }
+    words
+}
+
+/// BH-NeRF's first scene with fewer pixels, frames and units.
+fn scene_1(more: &[&str]) -> Vec<String> {
+    let small = [
+        "screen.pixels=20",
+        "region.nodes={equal-mino-time={per_ray=40}}",
+        "movie.frames=16",
+        "representation.width=32",
+        "training.steps=150",
+        "training.log_every=50",
+        "training.batch={pixels=200}",
+        "training.start={linear={nodes=16,stride=2,steps=300}}",
+        "output.nodes=24",
+    ];
+    fit(Some("scene_1.toml"), &[&small[..], more].concat())
+}
+
+fn fitted(folder: &Path, words: &[String], more: &[&str]) -> (String, serde_json::Value) {
+    let words: Vec<&str> = words.iter().map(String::as_str).chain(more.iter().copied()).collect();
+    let told = succeed(folder, &words);
+    let run = more[more.iter().position(|word| *word == "-o" || *word == "--resume").unwrap() + 1];
+    let text = std::fs::read(folder.join(run).join("results.json")).unwrap();
+    (told, serde_json::from_slice(&text).unwrap())
+}
+
+#[test]
+fn code_fits_of_images_are_those_of_the_processor() {
+    let Some(folder) = folder() else { return };
+    let words = scene_1(&[]);
+    let (_, cpu) = fitted(folder.path(), &words, &["-o", "cpu"]);
+    let (told, gpu) = fitted(folder.path(), &words, &["-o", "gpu", "--device", "gpu"]);
+    assert!(told.contains("steps on") && !told.contains("on this processor"), "{told}");
+    assert!(gpu["device"].is_string() && cpu.get("device").is_none());
+    let [of_cpu, of_gpu] = [&cpu, &gpu].map(|results| results["psnr_db"].as_f64().unwrap());
+    println!("PSNR {of_cpu} dB on the processor, {of_gpu} dB on {}", gpu["device"]);
+    assert!(of_cpu > 30.0 && (of_cpu - of_gpu).abs() < 0.1, "{of_cpu} {of_gpu}");
+    // A broken run goes on, here or there, and ends in the bytes of an unbroken one where the device is the same.
+    let read =
+        |run: &str| std::fs::read(folder.path().join(run).join("checkpoint.safetensors")).unwrap();
+    fitted(folder.path(), &words, &["-o", "again", "--device", "gpu"]);
+    assert!(read("gpu") == read("again") && read("gpu") != read("cpu"));
+    let (_, resumed) = fitted(folder.path(), &["fit".to_owned()], &["--resume", "again"]);
+    assert!(resumed["psnr_db"] == gpu["psnr_db"]);
+}
+
+#[test]
+fn code_fits_of_visibilities_are_those_of_the_processor() {
+    let Some(folder) = folder() else { return };
+    let words = fit(
+        None,
+        &[
+            "representation=bhnerf",
+            "representation.width=16",
+            "screen.pixels=12",
+            "observation.scans=6",
+            "training.steps=30",
+            "training.log_every=10",
+            "training.start={linear={nodes=10,stride=1,steps=100}}",
+            "output.nodes=16",
+        ],
+    );
+    let (_, cpu) = fitted(folder.path(), &words, &["-o", "cpu"]);
+    let (told, gpu) = fitted(folder.path(), &words, &["-o", "gpu", "--device", "gpu"]);
+    assert!(told.contains("on this processor: visibilities"), "{told}");
+    let [of_cpu, of_gpu] = [&cpu, &gpu].map(|results| results["loss"].as_f64().unwrap());
+    println!("loss {of_cpu} on the processor, {of_gpu} on {}", gpu["device"]);
+    assert!((of_gpu / of_cpu - 1.0).abs() < 1e-3, "{of_cpu} {of_gpu}");
+}
+
+#[test]
+fn fits_that_devices_do_not_do_are_refused() {
+    let Some(folder) = folder() else { return };
+    let refused = |words: &[String], more: &[&str], said: &str| {
+        let words: Vec<&str> =
+            words.iter().map(String::as_str).chain(more.iter().copied()).collect();
+        let output = kerrlight(folder.path(), &words);
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(2) && told.contains(said), "{told}");
+    };
+    let gpu = ["-o", "run", "--device", "gpu"];
+    refused(&scene_1(&["training.parts=2"]), &gpu, "training.parts");
+    refused(&scene_1(&["representation=linear-grid"]), &gpu, "representation.kind");
+    refused(&scene_1(&[]), &["-o", "run", "--device", "abacus"], "--device abacus");
+    assert!(!folder.path().join("run").exists());
 }

@@ -3,10 +3,10 @@
 use crate::dynamics::ZeroAxis;
 use crate::emission::mesh::MeshError;
 use crate::emission::sky::{CatalogueError, PanoramaError};
-use crate::fit::Diverged;
 use crate::fit::checkpoint::CheckpointError;
 use crate::fit::linear::LinearError;
 use crate::fit::settings::FitError;
+use crate::fit::{DeviceError, Diverged};
 use crate::frames::ScratchError;
 use crate::image::animation::AnimationError;
 use crate::interferometry::array::ArrayError;
@@ -101,6 +101,8 @@ pub enum Error {
     Linear(#[from] LinearError),
     /// A fit whose loss grows whatever the rate.
     Diverged(#[from] Diverged),
+    /// A device that takes the steps of a fit.
+    Device(#[from] DeviceError),
     /// A checkpoint of a fit.
     Checkpoint(#[from] CheckpointError),
     /// The encoder or decoder of OpenEXR.

@@ -5,6 +5,7 @@ mod axis_scan;
 mod band_search;
 mod curves;
 mod data;
+mod delegate;
 mod failed;
 mod folder;
 mod held_out;
@@ -24,6 +25,7 @@ mod world_scan;
 mod world_search;
 
 use crate::answer::Answer;
+use crate::devices::{FitDevice, StepsOption};
 use crate::record::Recorder;
 use crate::{interrupt, output, paths, ranks};
 use anyhow::{Context, bail};
@@ -64,6 +66,8 @@ pub struct Fit {
     /// Resume the run in this folder
     #[arg(long, value_name = "FOLDER", conflicts_with = "output")]
     resume: Option<PathBuf>,
+    #[command(flatten)]
+    device: StepsOption,
     /// Draw so many samples of volume and world when the fit is finished, as `kerrlight posterior` does
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
     samples: Option<u32>,
@@ -94,12 +98,14 @@ impl Fit {
         if let Some(data) = &self.init {
             return init::write(data.as_deref(), self.output.as_deref(), self.model);
         }
+        let device = self.device.open()?;
         if let Some(path) = &self.resume {
             let (folder, text) = Folder::open(path, self.patience())?;
             self.same(&text)?;
             let work = Work::read(&text).with_context(|| path.display().to_string())?;
             let work = work.prepared(&base_dir_of(&text), registry)?;
-            return self.run_all(&work, &text, &folder, true);
+            delegate::check(&work, device.as_ref())?;
+            return self.run_all(&work, &text, (&folder, true), device);
         }
         let guess = self.data.as_deref().map(|data| init::guess(data, self.model)).transpose()?;
         let (text, base_dir) = self.settings(guess.as_ref())?;
@@ -121,9 +127,10 @@ impl Fit {
         }
         let (prepared, read) = output::with_reads(|| work.prepared(&base_dir, registry));
         let prepared = prepared?;
+        delegate::check(&prepared, device.as_ref())?;
         let text = self.begun(&text, &base_dir);
         let folder = Folder::create(&folder, &text, Inputs::new(&text, read))?;
-        self.run_all(&prepared, &text, &folder, false)
+        self.run_all(&prepared, &text, (&folder, false), device)
     }
 
     /// The fit, and the draws that are wanted after it.
@@ -131,8 +138,8 @@ impl Fit {
         &self,
         work: &Prepared<'_>,
         text: &str,
-        folder: &Folder,
-        resume: bool,
+        (folder, resume): (&Folder, bool),
+        device: Option<FitDevice>,
     ) -> anyhow::Result<Answer> {
         let prepared = match work {
             Prepared::Emission(prepared) => prepared,
@@ -149,7 +156,7 @@ impl Fit {
         let lead = shared.map(|samples| posterior::lead(folder, samples)).transpose()?;
         let is_known = self.output.is_some() || self.resume.is_some();
         let door = together::open(&prepared.file, text, folder, is_known)?;
-        let answer = run::run(prepared, text, folder, resume, door)?;
+        let answer = run::run(prepared, text, (folder, resume), door, device)?;
         recorder.write_into(folder.path())?;
         let Some(samples) = self.samples else { return Ok(answer) };
         Ok(answer.and("posterior", posterior::draw(prepared, folder, samples, lead.flatten())?))

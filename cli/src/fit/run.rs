@@ -3,6 +3,7 @@
 use super::axis_scan;
 use super::band_search;
 use super::data;
+use super::delegate;
 use super::failed;
 use super::folder::{self, Folder};
 use super::held_out;
@@ -14,11 +15,13 @@ use super::together;
 use super::world_search;
 pub use super::world_search::Placed;
 use crate::answer::Answer;
+use crate::devices::{CheckSteps, FitDevice};
 use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
 use crate::ranks::Listener;
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
+use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::linear::Change;
 use kerrlight_tomo::fit::settings::{AxisSearch, FitFile, Kind, Start};
 use kerrlight_tomo::fit::setup::{self, Instrument, Measured};
@@ -91,6 +94,21 @@ impl<'a> Prepared<'a> {
         }
     }
 
+    /// Refuses a device that does not do this fit.
+    pub fn check_device(&self, check: CheckSteps) -> anyhow::Result<()> {
+        let Self { file, registry, instrument, measured, motion } = self;
+        if file.representation.kind == Kind::LinearGrid {
+            bail!("representation.kind: a linear-grid is solved on the processor");
+        }
+        if measured.leakage.is_some() {
+            bail!("instrument.leakage: the processor solves for it between steps");
+        }
+        let times = setup::emission_times(instrument, motion);
+        let representation = setup::representation(file, registry, times)?;
+        let training = setup::training(file, setup::axis(file)?.1)?;
+        Ok(check(&self.objective(instrument, motion)?, &*representation, &training)?)
+    }
+
     fn objective(
         &self,
         instrument: &Instrument,
@@ -106,9 +124,9 @@ impl<'a> Prepared<'a> {
 pub fn run(
     prepared: &Prepared<'_>,
     text: &str,
-    folder: &Folder,
-    resume: bool,
+    (folder, resume): (&Folder, bool),
     listener: Option<Listener>,
+    device: Option<FitDevice>,
 ) -> anyhow::Result<Answer> {
     let Prepared { registry, measured, .. } = prepared;
     let begun = Instant::now();
@@ -120,7 +138,10 @@ pub fn run(
     let (axis, axis_rate) = setup::axis(file)?;
     let training = setup::training(file, axis_rate)?;
     let mut state = State::new(&*representation, axis, &training);
-    let trainer = Trainer::new(objective, &*representation, training);
+    let mut trainer = Trainer::new(objective, &*representation, training);
+    if let Some(device) = device {
+        trainer.device = Some(delegate::delegate(device, file, &trainer)?);
+    }
     let truth = measured.truth.as_ref();
     let true_volume = truth.map(|truth| results::true_volume(file, truth)).transpose()?;
     let mut run = Run { file, text, folder, measured, true_volume, trainer, begun };
@@ -155,8 +176,9 @@ pub fn run(
         run.steps(&mut state)?;
     }
     run.trainer.ranks = None;
+    let device = run.trainer.device.take().map(|device| device.name().to_owned());
     let Run { mut trainer, true_volume, .. } = run;
-    let estimate = Estimate { file, folder, instrument, motion, measured, true_volume };
+    let estimate = Estimate { file, folder, instrument, motion, measured, true_volume, device };
     let results = estimate.write(&mut trainer, &state, begun)?;
     Ok(answer(folder, results))
 }
@@ -303,6 +325,11 @@ impl Run<'_> {
             leakage::when_due((self.file, self.text), whose, &mut self.trainer, state)?;
             let outcome = match self.trainer.step(state) {
                 Ok(outcome) => outcome,
+                Err(Error::Device(error)) => {
+                    self.folder.save(&checkpoint::encode(state, self.text)?)?;
+                    bar.abandon();
+                    return Err(delegate::failed(error, state.now.step, self.folder));
+                }
                 Err(error) => return Err(failed::diverged(&mut self.trainer, state, &error)),
             };
             let step = state.now.step;

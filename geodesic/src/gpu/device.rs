@@ -3,6 +3,7 @@
 use super::error::GpuError;
 use core::future::Future;
 use core::task::{Context, Poll, Waker};
+use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex};
 
 /// A graphics device of this computer.
@@ -98,6 +99,9 @@ impl Adapter {
     }
 }
 
+/// What became of a buffer that was to be mapped.
+pub(super) type Mapped = Result<(), wgpu::BufferAsyncError>;
+
 /// A device that is open.
 #[derive(Debug)]
 pub(super) struct Device {
@@ -109,24 +113,72 @@ pub(super) struct Device {
     lost: Arc<Mutex<Option<String>>>,
 }
 
-/// The smallest buffer that is any use.
-const LEAST_BUFFER: u64 = 1 << 20;
+/// What shaders ask of a device; every device that runs the tracer has the default.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Needs {
+    /// Invocations of a workgroup.
+    pub invocations: u32,
+    /// Bytes of a workgroup's memory.
+    pub workgroup_bytes: u32,
+    /// Buffers that a kernel sees.
+    pub buffers: u32,
+    /// Bytes of the largest buffer that it sees.
+    pub buffer_bytes: u64,
+}
 
-impl Device {
-    pub fn open(adapter: &Adapter) -> Result<Self, GpuError> {
-        let largest = adapter.largest_buffer();
-        if largest < LEAST_BUFFER || adapter.workgroup().0 < 64 {
-            let why = format!(
-                "its limits are too small (a buffer of {largest} bytes, workgroups of {})",
-                adapter.workgroup().0
-            );
-            return Err(GpuError::Refused(why));
+impl Default for Needs {
+    fn default() -> Self {
+        Needs { invocations: 64, workgroup_bytes: 0, buffers: 4, buffer_bytes: 1 << 20 }
+    }
+}
+
+impl Needs {
+    /// The limits to open a device with that has these.
+    fn within(self, has: &wgpu::Limits) -> Result<wgpu::Limits, GpuError> {
+        let largest = has.max_storage_buffer_binding_size.min(has.max_buffer_size);
+        let least = wgpu::Limits::downlevel_defaults();
+        for (what, needed, there) in [
+            ("bytes of a buffer", self.buffer_bytes, largest),
+            (
+                "invocations of a workgroup",
+                self.invocations.into(),
+                has.max_compute_invocations_per_workgroup.into(),
+            ),
+            (
+                "bytes of a workgroup's memory",
+                self.workgroup_bytes.into(),
+                has.max_compute_workgroup_storage_size.into(),
+            ),
+            (
+                "buffers of a kernel",
+                self.buffers.into(),
+                has.max_storage_buffers_per_shader_stage.into(),
+            ),
+        ] {
+            if there < needed {
+                let why =
+                    format!("its limits are too small ({what}: {there}, needed are {needed})");
+                return Err(GpuError::Refused(why));
+            }
         }
-        let limits = wgpu::Limits {
+        Ok(wgpu::Limits {
             max_storage_buffer_binding_size: largest,
             max_buffer_size: largest,
-            ..wgpu::Limits::downlevel_defaults()
-        };
+            max_compute_workgroup_storage_size: least
+                .max_compute_workgroup_storage_size
+                .max(self.workgroup_bytes),
+            max_storage_buffers_per_shader_stage: least
+                .max_storage_buffers_per_shader_stage
+                .max(self.buffers),
+            ..least
+        })
+    }
+}
+
+impl Device {
+    pub fn open(adapter: &Adapter, needs: Needs) -> Result<Self, GpuError> {
+        let largest = adapter.largest_buffer();
+        let limits = needs.within(&adapter.inner.limits())?;
         let descriptor = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
         let (inner, queue) = wait(adapter.inner.request_device(&descriptor))
             .map_err(|error| GpuError::Refused(error.to_string()))?;
@@ -150,12 +202,27 @@ impl Device {
         // Scopes end in the reverse of their order.
         let errors = scopes.into_iter().rev().filter_map(|scope| wait(scope.pop()));
         let error = errors.collect::<Vec<_>>().into_iter().next();
+        if error.is_some() {
+            // That it was lost may have to be asked for.
+            let _ = self.inner.poll(wgpu::PollType::Poll);
+        }
         self.alive()?;
         match error {
             None => Ok(done),
             Some(wgpu::Error::OutOfMemory { .. }) => Err(GpuError::OutOfMemory { bytes }),
             Some(error) => Err(GpuError::Failed(error.to_string())),
         }
+    }
+
+    /// Has buffers mapped for reading when what was submitted is done; `sent` then gets what became of each.
+    pub fn map(&self, buffers: &[wgpu::Buffer], sent: &Sender<Mapped>) -> Result<(), GpuError> {
+        self.attempt(0, || {
+            for buffer in buffers {
+                let sent = sent.clone();
+                let told = move |mapped| sent.send(mapped).unwrap_or(());
+                buffer.map_async(wgpu::MapMode::Read, .., told);
+            }
+        })
     }
 
     /// Waits until everything that was submitted is done.
@@ -180,5 +247,29 @@ fn wait<F: Future>(future: F) -> F::Output {
             Poll::Ready(done) => return done,
             Poll::Pending => std::thread::yield_now(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exact_limits_that_are_too_small_are_named() {
+        let has =
+            wgpu::Limits { max_compute_workgroup_storage_size: 8192, ..wgpu::Limits::default() };
+        let needs = Needs { workgroup_bytes: 16_384, buffers: 8, ..Needs::default() };
+        let error = needs.within(&has).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "the graphics device cannot be used: its limits are too small (bytes of a workgroup's \
+             memory: 8192, needed are 16384)"
+        );
+        let limits = Needs { workgroup_bytes: 8192, ..needs }.within(&has).unwrap();
+        assert_eq!(limits.max_storage_buffers_per_shader_stage, 8);
+        assert!(limits.max_compute_workgroup_storage_size >= 8192);
+        let none = wgpu::Limits { max_buffer_size: 1000, ..wgpu::Limits::default() };
+        let error = Needs::default().within(&none).unwrap_err().to_string();
+        assert!(error.contains("bytes of a buffer: 1000"), "{error}");
     }
 }

@@ -1,6 +1,6 @@
 //! A shader with its bindings, run on bytes.
 
-use super::device::Device;
+use super::device::{Device, Mapped};
 use super::error::GpuError;
 use std::borrow::Cow;
 
@@ -68,11 +68,7 @@ impl Program {
             outputs.into_iter().map(|(_, read)| read).collect::<Vec<_>>()
         })?;
         let (sent, came) = std::sync::mpsc::channel();
-        for buffer in &read {
-            let sent = sent.clone();
-            buffer
-                .map_async(wgpu::MapMode::Read, .., move |mapped| sent.send(mapped).unwrap_or(()));
-        }
+        device.map(&read, &sent)?;
         device.finish()?;
         read.iter().map(|buffer| copy(&came, buffer)).collect()
     }
@@ -194,7 +190,7 @@ fn buffer(device: &Device, binding: &Binding<'_>) -> wgpu::Buffer {
     made
 }
 
-fn readable(device: &Device, size: u64) -> wgpu::Buffer {
+pub(super) fn readable(device: &Device, size: u64) -> wgpu::Buffer {
     device.inner.create_buffer(&wgpu::BufferDescriptor {
         label: None,
         size,
@@ -203,9 +199,7 @@ fn readable(device: &Device, size: u64) -> wgpu::Buffer {
     })
 }
 
-type Mapped = Result<(), wgpu::BufferAsyncError>;
-
-fn copy(
+pub(super) fn copy(
     came: &std::sync::mpsc::Receiver<Mapped>,
     buffer: &wgpu::Buffer,
 ) -> Result<Vec<u8>, GpuError> {

@@ -4,11 +4,13 @@
 //! A software device serves as well, for tests: Mesa's llvmpipe, in the package `mesa-vulkan-drivers` of Debian, Ubuntu
 //! and Fedora. It is slower than the rest of this crate on the same processor.
 
+mod compute;
 mod device;
 mod error;
 mod kernel;
 mod tracer;
 
-pub use device::{Adapter, adapter, adapters};
+pub use compute::{Bound, Buffer, Commands, Compute, Kernel};
+pub use device::{Adapter, Needs, adapter, adapters};
 pub use error::GpuError;
 pub use tracer::GpuTracer;

@@ -1,6 +1,6 @@
 //! Rays of a picture, traced on a graphics device.
 
-use super::device::{Adapter, Device};
+use super::device::{Adapter, Device, Needs};
 use super::error::GpuError;
 use super::kernel::{Binding, Program, ROW};
 use crate::error::Error;
@@ -48,7 +48,7 @@ impl GpuTracer {
     /// # Errors
     /// If the device refuses, is too small, or if its driver does not keep sums of two floats as they are.
     pub fn open(adapter: &Adapter) -> Result<Self, GpuError> {
-        let device = Device::open(adapter)?;
+        let device = Device::open(adapter, Needs::default())?;
         test_sums(&device)?;
         let kinds = bindings(&[], &[], [0; 3]);
         let program =

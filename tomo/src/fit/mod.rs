@@ -44,8 +44,11 @@ pub mod band;
 mod batch;
 pub mod checkpoint;
 mod curve_term;
+mod device;
 mod fall;
 mod forward_model;
+#[cfg(feature = "wgpu")]
+pub mod graphics;
 mod known_field;
 pub mod linear;
 mod movie_loss;
@@ -75,6 +78,7 @@ pub mod world;
 
 pub use batch::{Batch, Columns};
 pub use curve_term::{FluxDatum, StokesCurveTerm};
+pub use device::{Delegate, DeviceError, Drawn, StepDevice, Stretch, Taken};
 pub use forward_model::{Field, ForwardModel, Motion, Redshift};
 pub use objective::{Buffers, Data, Gradients, Loss, Objective, Weighted, is_turned};
 pub use occupancy::{Occupancy, OccupancySettings};

@@ -61,6 +61,18 @@ impl Occupancy {
         self.occupied[cell]
     }
 
+    /// Cells along each axis, and half the width of the cube, M.
+    #[cfg(feature = "wgpu")]
+    pub(super) fn shape(&self) -> (u32, f32) {
+        (self.settings.cells as u32, self.half_width as f32)
+    }
+
+    /// Whether each cell may shine, z fastest.
+    #[cfg(feature = "wgpu")]
+    pub(super) fn cells(&self) -> impl Iterator<Item = bool> {
+        self.occupied.iter().copied()
+    }
+
     /// Looks at one random point of every cell, the same for the same seed.
     pub fn refresh<T: Float>(
         &mut self,

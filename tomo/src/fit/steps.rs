@@ -32,6 +32,11 @@ pub struct Place<'a, T> {
 
 impl<T: Float> Trainer<'_, T> {
     pub(super) fn advance(&mut self, state: &mut State<T>) -> Result<Outcome, Error> {
+        if let Some(mut delegate) = self.device.take() {
+            let outcome = self.delegated(&mut delegate, state);
+            self.device = Some(delegate);
+            return outcome;
+        }
         let now = &mut state.now;
         self.refresh(now);
         if let Some(rule) = self.training.lbfgs {
@@ -46,7 +51,8 @@ impl<T: Float> Trainer<'_, T> {
         let calm = state.good.as_ref().map_or(f64::INFINITY, |good| good.loss);
         let finite = loss.total.is_finite() && of_axis.iter().all(|slope| slope.is_finite());
         if !finite || loss.total > self.training.divergence * calm {
-            return Ok(step_back(state, loss.total)?);
+            let step = now.step;
+            return Ok(step_back(state, loss.total, step)?);
         }
         now.loss = loss.total;
         if now.step.is_multiple_of(self.training.keep_every.max(1)) {
@@ -56,7 +62,7 @@ impl<T: Float> Trainer<'_, T> {
         Ok(Outcome::Done(loss))
     }
 
-    fn refresh(&mut self, now: &mut Progress<T>) {
+    pub(super) fn refresh(&mut self, now: &mut Progress<T>) {
         let Some(plan) = self.training.occupancy else { return };
         let Some(mask) = &mut now.occupancy else { return };
         if now.step >= plan.warm_up && (now.step - plan.warm_up).is_multiple_of(plan.every.max(1)) {
@@ -126,7 +132,7 @@ impl<T: Float> Trainer<'_, T> {
     }
 
     /// Draws the pairs or frames of a step.
-    fn choose(&mut self, step: u64) {
+    pub(super) fn choose(&mut self, step: u64) {
         let mut random = Pcg64::seed_from_u64(mix(self.training.seed, step, 0));
         let Self { objective, training, observed, pairs, frames, .. } = self;
         match training.batch {
@@ -156,9 +162,8 @@ impl<T: Float> Trainer<'_, T> {
     }
 
     fn learn(&mut self, now: &mut Progress<T>, of_axis: [f64; 3]) {
-        let Training { adam, rate, axis_rate, ramp, .. } = &self.training;
-        let part = ((now.step + 1) as f64 / (ramp + 1) as f64).min(1.0) * now.caution;
-        let rate = part * rate.rate(now.step);
+        let Training { adam, axis_rate, .. } = &self.training;
+        let (part, rate) = (self.part(now, 0), self.rate(now, 0));
         adam.step(rate, &self.gradient, &mut now.adam, &mut now.parameters);
         self.representation.project(&mut now.parameters);
         if let Some(axis_rate) = axis_rate {
@@ -169,10 +174,26 @@ impl<T: Float> Trainer<'_, T> {
         }
         now.step += 1;
     }
+
+    /// Part of the rates that step number `ahead` from here takes.
+    fn part(&self, now: &Progress<T>, ahead: u64) -> f64 {
+        let step = now.step + ahead;
+        ((step + 1) as f64 / (self.training.ramp + 1) as f64).min(1.0) * now.caution
+    }
+
+    /// Learning rate of the parameters at step number `ahead` from here.
+    pub(super) fn rate(&self, now: &Progress<T>, ahead: u64) -> f64 {
+        self.part(now, ahead) * self.training.rate.rate(now.step + ahead)
+    }
 }
 
-fn step_back<T: Float>(state: &mut State<T>, loss: f64) -> Result<Outcome, Diverged> {
-    let diverged = Diverged { loss, step: state.now.step, setbacks: state.setbacks };
+/// Back to the last good state, for the loss of `step`.
+pub(super) fn step_back<T: Float>(
+    state: &mut State<T>,
+    loss: f64,
+    step: u64,
+) -> Result<Outcome, Diverged> {
+    let diverged = Diverged { loss, step, setbacks: state.setbacks };
     let Some(good) = &mut state.good else { return Err(diverged) };
     if state.setbacks >= MOST_SETBACKS {
         return Err(diverged);

@@ -1,5 +1,6 @@
 //! How a fit is run, and what it remembers from step to step.
 
+use super::device::Delegate;
 use super::is_turned;
 use super::objective::{Buffers, Loss, Objective};
 use super::occupancy::{Occupancy, OccupancySettings};
@@ -170,6 +171,8 @@ pub struct Trainer<'a, T> {
     pub training: Training,
     /// Other processes that have parts of each step, if there are any.
     pub ranks: Option<Box<dyn Ranks<T>>>,
+    /// A device that takes the steps in place of this processor, if there is one.
+    pub device: Option<Delegate<T>>,
     pub(super) observed: Vec<usize>,
     pub(super) buffers: Buffers<T>,
     pub(super) probe: ProbeBuffers<T>,
@@ -201,6 +204,7 @@ impl<'a, T: Float> Trainer<'a, T> {
             representation,
             training,
             ranks: None,
+            device: None,
             observed,
             buffers: Buffers::default(),
             probe: ProbeBuffers::default(),

@@ -45,6 +45,18 @@ pub struct Gradient<'a, T> {
 /// several threads, for every group once.
 pub type Link<'a, T> = dyn Fn(Range<usize>, &[T], &mut [T]) + Sync + 'a;
 
+/// One of the representations that are built in: devices that evaluate them have kernels of their own.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub enum BuiltIn<'a> {
+    /// A network.
+    Network(&'a Network),
+    /// Voxels.
+    Grid(&'a Grid),
+    /// Features on grids and a network.
+    FeatureGrid(&'a FeatureGrid),
+}
+
 /// What ties values to cotangents inside a batch: the points of a ray to its pixel.
 #[derive(Clone, Copy)]
 pub struct Groups<'a, T> {
@@ -120,6 +132,11 @@ pub trait Representation<T: Float>: Send + Sync {
 
     /// Parameters to start from; the same for the same seed on every machine.
     fn initialise(&self, seed: u64, parameters: &mut [T]);
+
+    /// Which of those that are built in it is, if it is one that devices may know.
+    fn built_in(&self) -> Option<BuiltIn<'_>> {
+        None
+    }
 
     /// Moves parameters to the nearest allowed ones, after each step of an optimiser.
     fn project(&self, _parameters: &mut [T]) {}

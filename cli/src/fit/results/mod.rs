@@ -46,6 +46,8 @@ pub struct Estimate<'a> {
     pub measured: &'a Measured,
     /// Emission that was simulated.
     pub true_volume: Option<Volume>,
+    /// The graphics device that took the last steps, if one did.
+    pub device: Option<String>,
 }
 
 impl Estimate<'_> {

@@ -58,6 +58,9 @@ impl Estimate<'_> {
             "inputs": self.folder.inputs().files,
             "verdict": found.judged.json(),
         });
+        if let Some(device) = &self.device {
+            results["device"] = json!(device);
+        }
         if let Some(validation) = self.validation(&found.seen)? {
             results["validation_chi2_per_datum"] = json!(validation);
         }

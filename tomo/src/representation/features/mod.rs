@@ -7,7 +7,9 @@ mod tests;
 
 use super::grid::cells::{Geometry, check_box};
 use super::grid::scatter::Scatter;
-use super::{Activation, Coordinates, CoordinatesMut, Gradient, Groups, Representation, Workspace};
+use super::{
+    Activation, BuiltIn, Coordinates, CoordinatesMut, Gradient, Groups, Representation, Workspace,
+};
 use crate::Error;
 use crate::simd::{Float, InstructionSet, dispatch};
 use core::ops::Range;
@@ -57,6 +59,11 @@ const BLOCK: usize = if cfg!(test) { 1000 } else { 32_768 };
 const FAINT: f64 = 1e-2;
 
 impl FeatureGrid {
+    /// Numbers on each node of a grid.
+    pub const FEATURES: usize = FEATURES;
+    /// Units of each of the two hidden layers.
+    pub const WIDTH: usize = WIDTH;
+
     /// Grids and a network of this shape.
     ///
     /// # Errors
@@ -286,6 +293,10 @@ fn share_of(share: usize, points: usize) -> Range<usize> {
 impl<T: Float + Default> Representation<T> for FeatureGrid {
     fn dimension(&self) -> usize {
         3
+    }
+
+    fn built_in(&self) -> Option<BuiltIn<'_>> {
+        Some(BuiltIn::FeatureGrid(self))
     }
 
     fn parameters(&self) -> usize {

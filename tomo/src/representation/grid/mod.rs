@@ -5,7 +5,9 @@ pub(super) mod scatter;
 #[cfg(test)]
 pub(in crate::representation) mod tests;
 
-use super::{Activation, Coordinates, CoordinatesMut, Gradient, Groups, Representation, Workspace};
+use super::{
+    Activation, BuiltIn, Coordinates, CoordinatesMut, Gradient, Groups, Representation, Workspace,
+};
 use crate::Error;
 use crate::simd::{Float, InstructionSet, dispatch};
 use cells::{Geometry, Products, Values, check_box};
@@ -205,6 +207,10 @@ impl<T: Float + Default> Memory<T> {
 impl<T: Float + Default> Representation<T> for Grid {
     fn dimension(&self) -> usize {
         3
+    }
+
+    fn built_in(&self) -> Option<BuiltIn<'_>> {
+        Some(BuiltIn::Grid(self))
     }
 
     fn parameters(&self) -> usize {

@@ -15,7 +15,7 @@ mod tile;
 
 pub use settings::{Initialisation, NetworkSettings};
 
-use super::{Coordinates, Gradient, Groups, Representation, Workspace};
+use super::{BuiltIn, Coordinates, Gradient, Groups, Representation, Workspace};
 use crate::Error;
 use crate::simd::{Float, InstructionSet};
 use batch::{Cotangents, Memory, Way};
@@ -77,6 +77,10 @@ impl Network {
 impl<T: Float + Default> Representation<T> for Network {
     fn dimension(&self) -> usize {
         self.settings.dimension
+    }
+
+    fn built_in(&self) -> Option<BuiltIn<'_>> {
+        Some(BuiltIn::Network(self))
     }
 
     fn parameters(&self) -> usize {

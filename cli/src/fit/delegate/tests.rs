@@ -1,0 +1,82 @@
+//! A device that fails in the middle of a run.
+
+use crate::fit::folder::Folder;
+use crate::fit::inputs::Inputs;
+use crate::fit::{Failed, assigned, parse, run};
+use kerrlight_tomo::Error;
+use kerrlight_tomo::fit::{DeviceError, Loss, Progress, StepDevice, Stretch, Taken, checkpoint};
+use kerrlight_tomo::representation::Registry;
+use std::path::Path;
+
+/// Learns nothing, and is unplugged after some steps.
+struct Unplugged {
+    left: usize,
+}
+
+impl StepDevice<f32> for Unplugged {
+    fn name(&self) -> &str {
+        "a card"
+    }
+    fn most(&self) -> usize {
+        1
+    }
+    fn take(
+        &mut self,
+        stretch: &Stretch<'_, f32>,
+        from: &Progress<f32>,
+    ) -> Result<Taken<f32>, Error> {
+        if self.left == 0 {
+            return Err(DeviceError("the graphics device was lost: unplugged".to_owned()).into());
+        }
+        self.left -= 1;
+        assert_eq!((stretch.draws.len(), stretch.rates.len()), (1, 1));
+        let loss = Loss { total: 1.0, terms: vec![1.0], ..Loss::default() };
+        let moments = [from.adam.first.clone(), from.adam.second.clone()];
+        Ok(Taken { parameters: from.parameters.clone(), moments, losses: vec![loss] })
+    }
+}
+
+fn settings() -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/fits/scene_1.toml");
+    let mut text = std::fs::read_to_string(path).unwrap();
+    for change in [
+        "screen.pixels=8",
+        "region.nodes={equal-mino-time={per_ray=10}}",
+        "movie.frames=4",
+        "representation.width=8",
+        "training.steps=12",
+        "training.batch={pixels=20}",
+        "training.start=drawn",
+        "training.log_every=4",
+        "output.nodes=8",
+    ] {
+        text = assigned(&text, change).unwrap();
+    }
+    text
+}
+
+#[test]
+fn exact_a_lost_device_leaves_a_checkpoint_that_the_processor_takes_up() {
+    let (text, registry) = (settings(), Registry::default());
+    let prepared = run::Prepared::new(parse(&text).unwrap(), Path::new("."), &registry).unwrap();
+    let at = tempfile::tempdir().unwrap();
+    let folder =
+        Folder::create(&at.path().join("run"), &text, Inputs::new(&text, Vec::new())).unwrap();
+    let device: crate::devices::FitDevice =
+        (|_, _, _| Ok(()), Box::new(|_, _, _| Ok(Box::new(Unplugged { left: 7 }))));
+    let error = run::run(&prepared, &text, (&folder, false), None, Some(device)).err().unwrap();
+    let told = error.to_string();
+    assert!(
+        told.contains("lost: unplugged; step 7 is kept") && told.contains("--resume"),
+        "{told}"
+    );
+    // Exit code 2, not that of a fit that has failed.
+    assert!(!error.is::<Failed>());
+    let bytes = folder.checkpoint().unwrap().unwrap();
+    assert_eq!(checkpoint::header(&bytes).unwrap().step, 7);
+    run::run(&prepared, &text, (&folder, true), None, None).unwrap();
+    let bytes = folder.checkpoint().unwrap().unwrap();
+    assert_eq!(checkpoint::header(&bytes).unwrap().step, 12);
+    let results = std::fs::read_to_string(folder.path().join("results.json")).unwrap();
+    assert!(!results.contains("\"device\""));
+}

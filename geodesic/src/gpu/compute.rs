@@ -1,0 +1,221 @@
+//! Shaders of other crates on an open device: buffers that stay there, kernels, and commands in their order.
+
+use super::device::{Adapter, Device, Mapped, Needs};
+use super::error::GpuError;
+use super::kernel::{copy, readable};
+use std::borrow::Cow;
+
+/// An open device for shaders of one's own.
+///
+/// ```no_run
+/// use kerrlight_geodesic::gpu::{self, Compute, Needs};
+///
+/// let device = Compute::open(&gpu::adapter(None)?, Needs::default())?;
+/// let source = "@group(0) @binding(0) var<storage, read_write> x: array<u32>;
+///     @compute @workgroup_size(64)
+///     fn double(@builtin(global_invocation_id) at: vec3<u32>) { x[at.x] *= 2u; }";
+/// let kernels = device.kernels(source, &["double"])?;
+/// let x = device.storage(4 * 64)?;
+/// device.write(&x, &[1; 256])?;
+/// let double = device.bind(&kernels[0], &[(0, &x)])?;
+/// device.run(|commands| commands.dispatch(&double, [1, 1]))?;
+/// assert_eq!(device.read(&[&x])?[0], [2; 256]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Compute {
+    device: Device,
+}
+
+/// Memory of the device.
+#[derive(Debug)]
+pub struct Buffer {
+    inner: wgpu::Buffer,
+}
+
+/// An entry point of a shader.
+#[derive(Debug)]
+pub struct Kernel {
+    pipeline: wgpu::ComputePipeline,
+}
+
+/// An entry point with the buffers that it works on.
+#[derive(Debug)]
+pub struct Bound {
+    pipeline: wgpu::ComputePipeline,
+    groups: wgpu::BindGroup,
+}
+
+/// Commands that the device does one after the other.
+#[derive(Debug)]
+pub struct Commands {
+    encoder: wgpu::CommandEncoder,
+}
+
+impl Commands {
+    /// Runs a kernel on so many workgroups, columns and rows; what it writes the next one sees.
+    pub fn dispatch(&mut self, bound: &Bound, groups: [u32; 2]) {
+        let mut pass = self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        pass.set_pipeline(&bound.pipeline);
+        pass.set_bind_group(0, &bound.groups, &[]);
+        pass.dispatch_workgroups(groups[0], groups[1], 1);
+    }
+
+    /// Makes all bytes of a buffer 0.
+    pub fn clear(&mut self, buffer: &Buffer) {
+        self.encoder.clear_buffer(&buffer.inner, 0, None);
+    }
+}
+
+impl Compute {
+    /// Opens a device that has what is needed.
+    ///
+    /// # Errors
+    /// If it refuses, or its limits are too small.
+    pub fn open(adapter: &Adapter, needs: Needs) -> Result<Self, GpuError> {
+        Ok(Self { device: Device::open(adapter, needs)? })
+    }
+
+    /// The name of the device.
+    pub fn name(&self) -> &str {
+        &self.device.name
+    }
+
+    /// Bytes of the largest buffer that a shader may see.
+    pub fn largest_buffer(&self) -> u64 {
+        self.device.largest
+    }
+
+    /// Memory that shaders read and write, zero at first.
+    ///
+    /// # Errors
+    /// If there is not so much.
+    pub fn storage(&self, bytes: u64) -> Result<Buffer, GpuError> {
+        self.made(bytes, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC)
+    }
+
+    /// A uniform with these bytes.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn uniform(&self, bytes: &[u8]) -> Result<Buffer, GpuError> {
+        let made = self.made(bytes.len() as u64, wgpu::BufferUsages::UNIFORM)?;
+        self.write(&made, bytes)?;
+        Ok(made)
+    }
+
+    fn made(&self, bytes: u64, usage: wgpu::BufferUsages) -> Result<Buffer, GpuError> {
+        // No binding may be empty.
+        let size = bytes.max(32).next_multiple_of(16);
+        if size > self.device.largest {
+            return Err(GpuError::OutOfMemory { bytes });
+        }
+        let inner = self.device.attempt(size, || {
+            self.device.inner.create_buffer(&wgpu::BufferDescriptor {
+                label: None,
+                size,
+                usage: usage | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        })?;
+        Ok(Buffer { inner })
+    }
+
+    /// Puts bytes (a multiple of 4) at the start of a buffer before what runs next; what runs already does not see them.
+    ///
+    /// # Errors
+    /// If they do not fit, or the device fails.
+    pub fn write(&self, buffer: &Buffer, bytes: &[u8]) -> Result<(), GpuError> {
+        self.device.attempt(0, || self.device.queue.write_buffer(&buffer.inner, 0, bytes))
+    }
+
+    /// Compiles the entry points of a shader.
+    ///
+    /// # Errors
+    /// What the compiler says.
+    pub fn kernels(&self, source: &str, entries: &[&str]) -> Result<Vec<Kernel>, GpuError> {
+        self.device.attempt(0, || {
+            let module = self.device.inner.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: None,
+                source: wgpu::ShaderSource::Wgsl(Cow::Borrowed(source)),
+            });
+            let kernel = |entry: &&str| {
+                let descriptor = wgpu::ComputePipelineDescriptor {
+                    label: Some(entry),
+                    layout: None,
+                    module: &module,
+                    entry_point: Some(entry),
+                    compilation_options: wgpu::PipelineCompilationOptions::default(),
+                    cache: None,
+                };
+                Kernel { pipeline: self.device.inner.create_compute_pipeline(&descriptor) }
+            };
+            entries.iter().map(kernel).collect()
+        })
+    }
+
+    /// A kernel with a buffer for each binding of group 0 that it uses.
+    ///
+    /// # Errors
+    /// If they do not fit.
+    pub fn bind(&self, kernel: &Kernel, buffers: &[(u32, &Buffer)]) -> Result<Bound, GpuError> {
+        self.device.attempt(0, || {
+            let entries: Vec<_> = buffers
+                .iter()
+                .map(|(binding, buffer)| wgpu::BindGroupEntry {
+                    binding: *binding,
+                    resource: buffer.inner.as_entire_binding(),
+                })
+                .collect();
+            let groups = self.device.inner.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: None,
+                layout: &kernel.pipeline.get_bind_group_layout(0),
+                entries: &entries,
+            });
+            Bound { pipeline: kernel.pipeline.clone(), groups }
+        })
+    }
+
+    /// Hands commands to the device, and does not wait for them.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn run(&self, record: impl FnOnce(&mut Commands)) -> Result<(), GpuError> {
+        self.device.attempt(0, || {
+            let descriptor = wgpu::CommandEncoderDescriptor::default();
+            let mut commands =
+                Commands { encoder: self.device.inner.create_command_encoder(&descriptor) };
+            record(&mut commands);
+            self.device.queue.submit([commands.encoder.finish()]);
+        })
+    }
+
+    /// The bytes of buffers once all commands are done.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn read(&self, buffers: &[&Buffer]) -> Result<Vec<Vec<u8>>, GpuError> {
+        let bytes = buffers.iter().map(|buffer| buffer.inner.size()).sum();
+        let copies = self.device.attempt(bytes, || {
+            let descriptor = wgpu::CommandEncoderDescriptor::default();
+            let mut encoder = self.device.inner.create_command_encoder(&descriptor);
+            let copied = buffers.iter().map(|Buffer { inner }| {
+                let to = readable(&self.device, inner.size());
+                encoder.copy_buffer_to_buffer(inner, 0, &to, 0, inner.size());
+                to
+            });
+            let copies: Vec<_> = copied.collect();
+            self.device.queue.submit([encoder.finish()]);
+            copies
+        })?;
+        let (sent, came) = std::sync::mpsc::channel::<Mapped>();
+        self.device.map(&copies, &sent)?;
+        self.device.finish()?;
+        copies.iter().map(|buffer| copy(&came, buffer)).collect()
+    }
+
+    /// Gives the device up: everything after that is [`GpuError::Lost`]. What a card that is unplugged does, for tests.
+    pub fn lose(&self) {
+        self.device.inner.destroy();
+    }
+}

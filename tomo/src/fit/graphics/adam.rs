@@ -1,0 +1,92 @@
+//! Adam on the device.
+
+use super::bytes::{floats, words};
+use kerrlight_geodesic::gpu::{Bound, Buffer, Commands, Compute, GpuError};
+
+/// Parameters, their gradient and what Adam remembers.
+#[derive(Debug)]
+pub struct Learning {
+    /// The parameters.
+    pub parameters: Buffer,
+    /// The gradient.
+    pub gradient: Buffer,
+    moments: [Buffer; 2],
+    rule: Buffer,
+    learn: Bound,
+    count: usize,
+    positive: bool,
+}
+
+/// The numbers of a step.
+#[derive(Clone, Copy, Debug)]
+pub struct Rule {
+    /// Decay rates.
+    pub beta: [f64; 2],
+    /// Added to the root of the mean square.
+    pub epsilon: f64,
+    /// Learning rate.
+    pub rate: f64,
+    /// Steps, this one counted.
+    pub steps: u64,
+}
+
+/// Invocations in a row of the grid, 64 a workgroup.
+const ROW: u32 = 64 * 32_768;
+
+impl Learning {
+    /// Of so many parameters; `positive`: they are held at zero or above.
+    ///
+    /// # Errors
+    /// If the device has no room, or fails.
+    pub fn new(device: &Compute, count: usize, positive: bool) -> Result<Self, GpuError> {
+        let storage = || device.storage(4 * count as u64);
+        let (parameters, gradient, moments) = (storage()?, storage()?, [storage()?, storage()?]);
+        let rule = device.uniform(&[0; 48])?;
+        let kernels = device.kernels(include_str!("shaders/adam.wgsl"), &["learn"])?;
+        let buffers = [&rule, &gradient, &moments[0], &moments[1], &parameters];
+        let buffers: Vec<_> = (0..).zip(buffers).collect();
+        let learn = device.bind(&kernels[0], &buffers)?;
+        Ok(Self { parameters, gradient, moments, rule, learn, count, positive })
+    }
+
+    /// Puts parameters and moments there.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn load(
+        &self,
+        device: &Compute,
+        parameters: &[f32],
+        moments: [&[f32]; 2],
+    ) -> Result<(), GpuError> {
+        device.write(&self.parameters, &floats(parameters))?;
+        device.write(&self.moments[0], &floats(moments[0]))?;
+        device.write(&self.moments[1], &floats(moments[1]))
+    }
+
+    /// Puts the numbers of the next step there.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn set(&self, device: &Compute, rule: Rule) -> Result<(), GpuError> {
+        let Rule { beta, epsilon, rate, steps } = rule;
+        let unbiased = beta.map(|beta| 1.0 / (1.0 - beta.powf(steps as f64)));
+        let rest = beta.map(|beta| 1.0 - beta);
+        let numbers = [beta, rest, unbiased, [rate, epsilon]];
+        let mut all: Vec<u32> =
+            numbers.as_flattened().iter().map(|x| (*x as f32).to_bits()).collect();
+        all.extend([self.count as u32, ROW, u32::from(self.positive), 0]);
+        device.write(&self.rule, &words(&all))
+    }
+
+    /// Takes the step.
+    pub fn learn(&self, commands: &mut Commands) {
+        let count = self.count as u32;
+        commands.dispatch(&self.learn, [count.min(ROW).div_ceil(64), count.div_ceil(ROW)]);
+    }
+
+    /// Parameters and moments.
+    pub fn buffers(&self) -> [&Buffer; 3] {
+        [&self.parameters, &self.moments[0], &self.moments[1]]
+    }
+}

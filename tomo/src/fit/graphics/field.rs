@@ -1,0 +1,158 @@
+//! Representations that have kernels.
+
+use super::adam::Learning;
+use super::grid::{Features, Level, Levels, Voxels};
+use super::network::{Front, Network, Shape};
+use super::pixels::Points;
+use crate::Error;
+use crate::fit::device::DeviceError;
+use crate::representation::{
+    Activation, BuiltIn, FeatureGrid, FeatureGridSettings, GridSettings, NetworkSettings,
+    Representation,
+};
+use kerrlight_geodesic::gpu::{Commands, Compute};
+
+/// A representation on the device.
+#[derive(Debug)]
+pub enum Field {
+    /// A network of the encoded point.
+    Network(Network),
+    /// Voxels.
+    Voxels(Voxels),
+    /// Features on grids and a network.
+    Features(Features),
+}
+
+impl Field {
+    /// Of a representation.
+    ///
+    /// # Errors
+    /// If it has no kernels, or the device fails.
+    pub fn new(
+        device: &Compute,
+        representation: &dyn Representation<f32>,
+        (points, learning): (&Points, &Learning),
+        most: Option<usize>,
+    ) -> Result<Self, Error> {
+        let buffers = (&learning.parameters, &learning.gradient);
+        Ok(match representation.built_in() {
+            Some(BuiltIn::Network(network)) => {
+                let shape = shape(network.settings());
+                Self::Network(Network::new(device, &shape, points, buffers, most)?)
+            }
+            Some(BuiltIn::Grid(grid)) => {
+                let levels = voxels(grid.settings());
+                Self::Voxels(Voxels::new(device, &levels, points, buffers)?)
+            }
+            Some(BuiltIn::FeatureGrid(grid)) => {
+                let levels = levels(grid.settings());
+                let shape = behind(grid.settings(), &levels);
+                let network = Network::new(device, &shape, points, buffers, most)?;
+                Self::Features(Features::new(device, &levels, network, points, buffers)?)
+            }
+            None => {
+                return Err(DeviceError("representation.kind: no kernels".to_owned()).into());
+            }
+        })
+    }
+
+    /// Emission of so many points at most.
+    pub fn forward(&self, commands: &mut Commands, points: usize) {
+        match self {
+            Self::Network(network) => network.forward(commands, points),
+            Self::Voxels(voxels) => voxels.forward(commands),
+            Self::Features(features) => features.forward(commands, points),
+        }
+    }
+
+    /// Adds the gradient of so many points at most.
+    pub fn backward(&self, commands: &mut Commands, points: usize) {
+        match self {
+            Self::Network(network) => network.backward(commands, points),
+            Self::Voxels(voxels) => voxels.backward(commands),
+            Self::Features(features) => features.backward(commands, points),
+        }
+    }
+}
+
+/// Whether parameters are held at zero or above.
+pub fn is_positive(representation: &dyn Representation<f32>) -> bool {
+    let Some(BuiltIn::Grid(grid)) = representation.built_in() else { return false };
+    grid.settings().activation == Activation::Linear
+}
+
+/// The number of a last function in shaders.
+fn number(activation: Activation) -> u32 {
+    match activation {
+        Activation::Sigmoid => 0,
+        Activation::Softplus => 1,
+        Activation::Linear => 2,
+    }
+}
+
+fn shape(settings: &NetworkSettings) -> Shape {
+    let length = (1.0 / settings.length_scale) as f32;
+    let first = match settings.dimension {
+        4 => (1.0 / settings.time_scale) as f32,
+        _ => length,
+    };
+    Shape {
+        front: Front::Encoded {
+            scales: [first, length, length, length],
+            dimension: settings.dimension,
+            degree: settings.degree,
+        },
+        start: 0,
+        width: settings.width,
+        hidden: settings.hidden_layers,
+        skip: settings.skip_after,
+        activation: number(settings.activation),
+        shift: settings.shift as f32,
+    }
+}
+
+/// Nodes of a box, so many along each axis.
+fn level(nodes: [usize; 3], (low, high): ([f64; 3], [f64; 3]), planes: usize) -> Level {
+    let per_length = |k: usize| ((nodes[k] - 1) as f64 / (high[k] - low[k])) as f32;
+    Level {
+        low: low.map(|x| x as f32),
+        nodes,
+        per_length: [0, 1, 2].map(per_length),
+        planes,
+        offset: 0,
+    }
+}
+
+fn voxels(settings: &GridSettings) -> Levels {
+    let all = vec![level(settings.nodes, (settings.low, settings.high), 1)];
+    Levels { all, activation: number(settings.activation) }
+}
+
+/// The grids of features, coarsest first, as parameters have them.
+fn levels(settings: &FeatureGridSettings) -> Levels {
+    let mut offset = 0;
+    let made = |k: usize| {
+        let nodes = [(settings.coarsest << k) + 1; 3];
+        let made =
+            Level { offset, ..level(nodes, (settings.low, settings.high), FeatureGrid::FEATURES) };
+        offset += FeatureGrid::FEATURES * nodes[0].pow(3);
+        made
+    };
+    Levels {
+        all: (0..settings.levels).map(made).collect(),
+        activation: number(settings.activation),
+    }
+}
+
+/// The network behind them.
+fn behind(settings: &FeatureGridSettings, levels: &Levels) -> Shape {
+    Shape {
+        front: Front::Given(levels.columns()),
+        start: levels.parameters(),
+        width: FeatureGrid::WIDTH,
+        hidden: 2,
+        skip: None,
+        activation: number(settings.activation),
+        shift: 0.0,
+    }
+}

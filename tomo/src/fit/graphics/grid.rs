@@ -1,0 +1,259 @@
+//! Grids on the device: voxels, and features that a network turns into emission.
+
+use super::bytes::words;
+use super::network::{Network, Task, run};
+use super::pixels::Points;
+use kerrlight_geodesic::gpu::{Buffer, Commands, Compute, GpuError, Kernel};
+
+/// Numbers on the nodes of a box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Level {
+    /// Coordinates of the first node, M.
+    pub low: [f32; 3],
+    /// Nodes along each axis.
+    pub nodes: [usize; 3],
+    /// Cells a unit of length.
+    pub per_length: [f32; 3],
+    /// Numbers on a node.
+    pub planes: usize,
+    /// Where they start in the parameters: plane after plane.
+    pub offset: usize,
+}
+
+/// Grids of several resolutions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Levels {
+    /// The grids.
+    pub all: Vec<Level>,
+    /// Of voxels: 0 sigmoid, 1 softplus, 2 none.
+    pub activation: u32,
+}
+
+/// Invocations in a row of the grid of workgroups, 64 each.
+const ROW: usize = 64 * 32_768;
+const SHADER: &str = include_str!("shaders/grid.wgsl");
+const ACTIVATIONS: &str = include_str!("shaders/activations.wgsl");
+const ENTRIES: [&str; 8] =
+    ["voxels", "voxels_back", "features", "gate", "begin", "largest", "scatter", "settle"];
+
+impl Levels {
+    /// Numbers of a point.
+    pub fn columns(&self) -> usize {
+        self.all.iter().map(|level| level.planes).sum()
+    }
+
+    /// Parameters.
+    pub fn parameters(&self) -> usize {
+        self.all.iter().map(|level| level.planes * level.nodes.iter().product::<usize>()).sum()
+    }
+
+    fn uniforms(&self, device: &Compute) -> Result<Vec<Buffer>, GpuError> {
+        let mut column = 0;
+        let uniform = |level: &Level| {
+            let Level { low, nodes, per_length, planes, offset } = *level;
+            let [x, y, z] = low.map(f32::to_bits);
+            let [a, b, c] = per_length.map(f32::to_bits);
+            let (columns, total) = (self.columns(), self.parameters());
+            let [i, j, k] = nodes.map(|n| n as u32);
+            let first = [x, y, z, planes as u32, a, b, c, offset as u32];
+            let then = [column as u32, columns as u32, total as u32, self.activation];
+            let rest = [i, j, k, ROW as u32];
+            column += planes;
+            device.uniform(&words(&[&first[..], &then, &rest].concat()))
+        };
+        self.all.iter().map(uniform).collect()
+    }
+}
+
+/// What kernels of a block of points are bound to.
+struct Binding<'a> {
+    device: &'a Compute,
+    kernels: &'a [Kernel],
+    block: &'a Buffer,
+    points: &'a Points,
+    rows: &'a Buffer,
+    slopes: &'a Buffer,
+    sums: [&'a Buffer; 2],
+    parameters: &'a Buffer,
+    gradient: &'a Buffer,
+}
+
+impl Binding<'_> {
+    fn bind(
+        &self,
+        entry: usize,
+        level: &Buffer,
+        bindings: &[u32],
+        invocations: usize,
+    ) -> Result<Task, GpuError> {
+        let Points { places, values, bends, cotangents, extent, .. } = self.points;
+        let all = [
+            self.block,
+            level,
+            extent,
+            places,
+            self.parameters,
+            self.rows,
+            values,
+            bends,
+            cotangents,
+            self.slopes,
+            self.sums[0],
+            self.sums[1],
+            self.gradient,
+        ];
+        let buffers: Vec<_> = bindings.iter().map(|k| (*k, all[*k as usize])).collect();
+        let bound = self.device.bind(&self.kernels[entry], &buffers)?;
+        let rows = invocations.div_ceil(ROW).max(1);
+        Ok((bound, [invocations.min(ROW).div_ceil(64) as u32, rows as u32]))
+    }
+
+    /// From slopes of so many points to the gradient.
+    fn scattered(
+        &self,
+        levels: &Levels,
+        uniforms: &[Buffer],
+        points: usize,
+    ) -> Result<Vec<Task>, GpuError> {
+        let first = &uniforms[0];
+        let mut tasks =
+            vec![self.bind(4, first, &[10], 1)?, self.bind(5, first, &[0, 1, 2, 9, 10], points)?];
+        for level in uniforms {
+            tasks.push(self.bind(6, level, &[0, 1, 2, 3, 9, 10, 11], points)?);
+        }
+        tasks.push(self.bind(7, first, &[0, 1, 10, 11, 12], levels.parameters())?);
+        Ok(tasks)
+    }
+}
+
+/// Voxels with an activation.
+#[derive(Debug)]
+pub struct Voxels {
+    forward: Vec<Task>,
+    backward: Vec<Task>,
+}
+
+impl Voxels {
+    /// Voxels that read these parameters and add to this gradient.
+    ///
+    /// # Errors
+    /// If the device has no room, or fails.
+    pub fn new(
+        device: &Compute,
+        levels: &Levels,
+        points: &Points,
+        (parameters, gradient): (&Buffer, &Buffer),
+    ) -> Result<Self, GpuError> {
+        let source = [ACTIVATIONS, SHADER].join("\n");
+        let kernels = &device.kernels(&source, &ENTRIES)?[..];
+        let block = &device.uniform(&words(&[0, points.room as u32, 0, 0]))?;
+        let (slopes, peak) = (&device.storage(4 * points.room as u64)?, &device.storage(4)?);
+        let sums = [peak, &device.storage(8 * levels.parameters() as u64)?];
+        let rows = slopes;
+        let binding =
+            Binding { device, kernels, block, points, rows, slopes, sums, parameters, gradient };
+        let uniforms = levels.uniforms(device)?;
+        let there = [0, 1, 2, 3, 4, 6, 7];
+        let forward = vec![binding.bind(0, &uniforms[0], &there, points.room)?];
+        let mut backward = vec![binding.bind(1, &uniforms[0], &[0, 1, 2, 7, 8, 9], points.room)?];
+        backward.extend(binding.scattered(levels, &uniforms, points.room)?);
+        Ok(Self { forward, backward })
+    }
+
+    /// Emission of all points, and its slopes.
+    pub fn forward(&self, commands: &mut Commands) {
+        run(commands, &self.forward);
+    }
+
+    /// Adds the gradient of all points.
+    pub fn backward(&self, commands: &mut Commands) {
+        run(commands, &self.backward);
+    }
+}
+
+/// Features on grids, and the network behind them.
+#[derive(Debug)]
+pub struct Features {
+    network: Network,
+    blocks: Vec<Layers>,
+}
+
+/// Of a block: before the network, behind it, and back.
+#[derive(Debug)]
+struct Layers {
+    features: Vec<Task>,
+    gate: Vec<Task>,
+    backward: Vec<Task>,
+}
+
+impl Features {
+    /// Features that read these parameters and add to this gradient, for a network that is given them.
+    ///
+    /// # Errors
+    /// If the device has no room, or fails.
+    pub fn new(
+        device: &Compute,
+        levels: &Levels,
+        network: Network,
+        points: &Points,
+        (parameters, gradient): (&Buffer, &Buffer),
+    ) -> Result<Self, GpuError> {
+        let source = [ACTIVATIONS, SHADER].join("\n");
+        let kernels = &device.kernels(&source, &ENTRIES)?[..];
+        let sums = [&device.storage(4)?, &device.storage(8 * levels.parameters() as u64)?];
+        let uniforms = levels.uniforms(device)?;
+        let (rows, slopes) = (&network.memory.rows, &network.memory.slopes[network.of_inputs]);
+        let blocks = network.blocks.iter().map(|block| {
+            let block = &block.uniform;
+            let binding = Binding {
+                device,
+                kernels,
+                block,
+                points,
+                rows,
+                slopes,
+                sums,
+                parameters,
+                gradient,
+            };
+            let features = uniforms
+                .iter()
+                .map(|level| binding.bind(2, level, &[0, 1, 2, 3, 4, 5], network.stride));
+            let gate = binding.bind(3, &uniforms[0], &[0, 1, 2, 3, 6, 7], network.stride)?;
+            Ok(Layers {
+                features: features.collect::<Result<_, _>>()?,
+                gate: vec![gate],
+                backward: binding.scattered(levels, &uniforms, network.stride)?,
+            })
+        });
+        let blocks = blocks.collect::<Result<_, GpuError>>()?;
+        Ok(Self { network, blocks })
+    }
+
+    /// Emission of so many points at most, and its slopes.
+    pub fn forward(&self, commands: &mut Commands, points: usize) {
+        self.used(points).for_each(|block| self.block(commands, block));
+    }
+
+    /// Adds the gradient of so many points at most.
+    pub fn backward(&self, commands: &mut Commands, points: usize) {
+        for block in self.used(points) {
+            if self.network.is_cut(points) {
+                self.block(commands, block);
+            }
+            self.network.blocks[block].backward(commands);
+            run(commands, &self.blocks[block].backward);
+        }
+    }
+
+    fn used(&self, points: usize) -> core::ops::Range<usize> {
+        0..points.div_ceil(self.network.stride)
+    }
+
+    fn block(&self, commands: &mut Commands, block: usize) {
+        let Layers { features, gate, .. } = &self.blocks[block];
+        run(commands, features);
+        self.network.blocks[block].forward(commands);
+        run(commands, gate);
+    }
+}

@@ -1,0 +1,359 @@
+//! Steps of a fit on a graphics device (feature `wgpu`).
+//!
+//! The device holds the nodes of all rays, parameters, gradient and Adam's moments. A step is a handful of commands:
+//! nodes of the drawn (ray, frame) pairs are turned back to the reference time and those that are dark left out, the
+//! representation goes forward, light is summed along rays, residuals go back to points, the representation goes back,
+//! Adam learns. Sums have a fixed order or are sums of whole numbers: the same steps on the same device give the same
+//! bytes. What is drawn is drawn by this processor, so that both devices take the same steps but for rounding.
+//!
+//! Residuals of images are made on the device, and nothing but losses comes back before the end of a stretch. For all
+//! other data the light of the rays comes back at each step, data terms make their gradient of it on this processor, and
+//! that goes to the device.
+
+mod adam;
+mod bytes;
+mod field;
+mod grid;
+mod network;
+mod pixels;
+mod rooms;
+mod terms;
+
+use super::device::{DeviceError, Drawn, StepDevice, Stretch, Taken};
+use super::objective::{Loss, Objective};
+use super::terms::ImageTerm;
+use super::train::{Progress, Training};
+use crate::Error;
+use crate::dynamics::Axis;
+use crate::representation::Representation;
+use adam::{Learning, Rule};
+use field::Field;
+use kerrlight_geodesic::gpu::{Adapter, Compute, GpuError, Needs};
+use pixels::{Gathering, Node, Pair, Pixels};
+use rooms::Pieces;
+
+impl From<GpuError> for Error {
+    fn from(error: GpuError) -> Self {
+        Self::Device(DeviceError(error.to_string()))
+    }
+}
+
+/// Opens a device that has what fits need.
+///
+/// # Errors
+/// If it refuses, or its limits are too small.
+pub fn open(adapter: &Adapter) -> Result<Compute, GpuError> {
+    let needs =
+        Needs { invocations: 256, workgroup_bytes: 8704, buffers: 8, buffer_bytes: 1 << 24 };
+    Compute::open(adapter, needs)
+}
+
+/// A fit on a graphics device.
+#[derive(Debug)]
+pub struct GraphicsFit {
+    device: Compute,
+    pixels: Pixels,
+    learning: Learning,
+    field: Field,
+    pieces: Pieces,
+    /// Whether the field is one of places and times.
+    events: bool,
+    /// Whether images are all the data, so that residuals are made on the device.
+    images_only: bool,
+    /// Pixels without a ray.
+    dark: Vec<usize>,
+    loaded_for: Option<Axis>,
+}
+
+/// The loss of a step, as far as it is known before the device is done.
+enum Pending {
+    /// Of images: factor on the sum of squares, squares of pixels without a ray, and weight of the term.
+    Squares { scale: f64, dark: f64, weight: f64 },
+    /// All of it.
+    Known(Loss),
+}
+
+/// The most steps of a stretch.
+const STEPS: usize = 256;
+
+impl GraphicsFit {
+    /// A fit of this objective, with all that does not change on the device. `most` is the most points of a block of the
+    /// network, if fewer than usual.
+    ///
+    /// # Errors
+    /// If the device has no room or fails, or something is asked for that it does not do.
+    pub fn new(
+        device: Compute,
+        objective: &Objective<f32>,
+        representation: &dyn Representation<f32>,
+        training: &Training,
+        most: Option<usize>,
+    ) -> Result<Self, Error> {
+        check(objective, representation, training)?;
+        let model = &objective.model;
+        let cells = training.occupancy.map_or(0, |plan| plan.settings.cells);
+        let pieces = Pieces::new(objective, training.batch);
+        let pixels = Pixels::new(&device, pieces.room(model.points(), cells, STEPS))?;
+        let positive = field::is_positive(representation);
+        let learning = Learning::new(&device, representation.parameters(), positive)?;
+        let field = Field::new(&device, representation, (&pixels.points, &learning), most)?;
+        let mut lit = vec![false; model.pixels()];
+        model.pixel().iter().for_each(|pixel| lit[*pixel as usize] = true);
+        let dark = (0..lit.len()).filter(|pixel| !lit[*pixel]).collect();
+        let images_only = objective.data.others.is_empty() && !model.is_flux;
+        let events = representation.dimension() == 4;
+        let loaded_for = None;
+        Ok(Self { device, pixels, learning, field, pieces, events, images_only, dark, loaded_for })
+    }
+
+    /// Loss and gradient of the first step of a stretch, which is not taken.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn gradient(
+        &mut self,
+        stretch: &Stretch<'_, f32>,
+        from: &Progress<f32>,
+    ) -> Result<(Loss, Vec<f32>), Error> {
+        self.load(stretch, from)?;
+        let pending = self.loss(stretch, 0)?;
+        let read = self.device.read(&[self.pixels.records(), &self.learning.gradient])?;
+        let loss = pending.ended(&bytes::read(&read[0], 2));
+        Ok((loss, bytes::read(&read[1], from.parameters.len())))
+    }
+
+    /// Gives the device up, as if it were unplugged: for tests.
+    pub fn lose(&self) {
+        self.device.lose();
+    }
+
+    /// Puts what a stretch starts from there.
+    fn load(&mut self, stretch: &Stretch<'_, f32>, from: &Progress<f32>) -> Result<(), GpuError> {
+        let Self { device, pixels, learning, .. } = self;
+        let model = &stretch.objective.model;
+        if self.loaded_for != Some(stretch.axis) {
+            let node = |k: usize| Node {
+                place: [0, 1, 2].map(|c| model.position[c][k]),
+                weight: model.weight[k],
+                motion: match model.delay.is_empty() {
+                    true => [model.rate[k], 0.0, 0.0],
+                    false => [model.rate[k], model.phase[k], model.delay[k]],
+                },
+            };
+            pixels.load(device, (0..model.points()).map(node))?;
+            self.loaded_for = Some(stretch.axis);
+        }
+        if let Some(mask) = stretch.occupancy {
+            pixels.load_mask(device, mask.cells())?;
+        }
+        learning.load(device, &from.parameters, [&from.adam.first, &from.adam.second])?;
+        device.run(|commands| pixels.forget(commands))
+    }
+
+    /// Has the device find loss and gradient of step number `k` of a stretch.
+    fn loss(&self, stretch: &Stretch<'_, f32>, k: usize) -> Result<Pending, GpuError> {
+        let Self { device, learning, .. } = self;
+        device.run(|commands| commands.clear(&learning.gradient))?;
+        match (&stretch.draws[k], &stretch.objective.data.image) {
+            (Drawn::Pixels(pairs), Some(image)) => {
+                let model = &stretch.objective.model;
+                let rays = model.rays() as f64 / model.pixels() as f64;
+                let variance = f64::from(image.term.inverse_variance());
+                let scale = rays * variance / pairs.len() as f64;
+                let slope = (2.0 * image.weight * scale) as f32;
+                for some in pairs.chunks(self.pieces.pairs) {
+                    self.images(stretch, some, (slope, k), &image.term)?;
+                }
+                Ok(Pending::Squares { scale, dark: 0.0, weight: image.weight })
+            }
+            (Drawn::Frames(frames), Some(image)) if self.images_only => {
+                let variance = image.term.inverse_variance();
+                let scale = 1.0 / stretch.objective.data_of(&*image.term, frames.len());
+                let factor = (image.weight * scale) as f32;
+                let slope = (factor + factor) * variance;
+                for some in frames.chunks(self.pieces.frames) {
+                    self.images(stretch, &pairs_of(stretch, some), (slope, k), &image.term)?;
+                }
+                let dark = frames.iter().map(|frame| self.in_the_dark(&image.term, *frame)).sum();
+                let scale = scale * f64::from(variance);
+                Ok(Pending::Squares { scale, dark, weight: image.weight })
+            }
+            (Drawn::Frames(frames), _) => self.frames(stretch, frames, k),
+            // Without images there are no pairs to draw.
+            (Drawn::Pixels(_), None) => Ok(Pending::Known(Loss::default())),
+        }
+    }
+
+    /// Some pairs, whose residuals are made on the device.
+    fn images(
+        &self,
+        stretch: &Stretch<'_, f32>,
+        pairs: &[(u32, u32)],
+        (slope, record): (f32, usize),
+        term: &ImageTerm<f32>,
+    ) -> Result<(), GpuError> {
+        let Self { device, pixels, field, .. } = self;
+        let model = &stretch.objective.model;
+        let datum =
+            |ray: u32, frame: u32| term.pixel(frame as usize, model.pixel[ray as usize] as usize);
+        let points = self.set(stretch, pairs, &datum, (slope, record))?;
+        device.run(|commands| {
+            pixels.gather(commands, pairs.len());
+            field.forward(commands, points);
+            pixels.sum(commands, pairs.len());
+            pixels.spread(commands, pairs.len());
+            field.backward(commands, points);
+        })
+    }
+
+    /// Whole frames, of which this processor makes what data say of their images.
+    fn frames(
+        &self,
+        stretch: &Stretch<'_, f32>,
+        frames: &[usize],
+        record: usize,
+    ) -> Result<Pending, GpuError> {
+        let Self { device, pixels, field, .. } = self;
+        let objective = stretch.objective;
+        let mut loss = objective.empty_loss();
+        for some in frames.chunks(self.pieces.frames) {
+            let pairs = pairs_of(stretch, some);
+            let points = self.set(stretch, &pairs, &|_, _| 0.0, (0.0, record))?;
+            device.run(|commands| {
+                pixels.gather(commands, pairs.len());
+                field.forward(commands, points);
+                pixels.sum(commands, pairs.len());
+            })?;
+            let fluxes = pixels.fluxes(device, pairs.len())?;
+            let rays = objective.model.rays();
+            let mut slopes = Vec::with_capacity(pairs.len());
+            for (frame, fluxes) in some.iter().zip(fluxes.chunks(rays)) {
+                slopes.extend(objective.of_rays((*frame, frames.len()), fluxes, &mut loss));
+            }
+            pixels.set_slopes(device, &slopes)?;
+            device.run(|commands| {
+                pixels.spread(commands, pairs.len());
+                field.backward(commands, points);
+            })?;
+        }
+        objective.add_terms(&mut loss);
+        Ok(Pending::Known(loss))
+    }
+
+    /// Puts pairs there; the most points that they can have.
+    fn set(
+        &self,
+        stretch: &Stretch<'_, f32>,
+        pairs: &[(u32, u32)],
+        datum: &dyn Fn(u32, u32) -> f32,
+        (slope, record): (f32, usize),
+    ) -> Result<usize, GpuError> {
+        let model = &stretch.objective.model;
+        let pair = |(ray, frame): &(u32, u32)| Pair {
+            nodes: [0, 1].map(|end| model.starts[*ray as usize + end] as u32),
+            time: model.times[*frame as usize],
+            datum: datum(*ray, *frame),
+        };
+        let pairs: Vec<Pair> = pairs.iter().map(pair).collect();
+        let how = Gathering {
+            axis: stretch.axis.vector().map(|x| x as f32),
+            earliest: model.earliest,
+            mask: stretch.occupancy.map(|mask| mask.shape()),
+            events: self.events,
+            slope,
+            record: record as u32,
+        };
+        self.pixels.set(&self.device, &pairs, &how)?;
+        Ok(pairs.iter().map(|pair| (pair.nodes[1] - pair.nodes[0]) as usize).sum())
+    }
+
+    /// Squares of the data where no ray is.
+    fn in_the_dark(&self, term: &ImageTerm<f32>, frame: usize) -> f64 {
+        self.dark.iter().map(|pixel| f64::from(term.pixel(frame, *pixel)).powi(2)).sum()
+    }
+}
+
+impl StepDevice<f32> for GraphicsFit {
+    fn name(&self) -> &str {
+        self.device.name()
+    }
+
+    fn most(&self) -> usize {
+        STEPS
+    }
+
+    fn take(
+        &mut self,
+        stretch: &Stretch<'_, f32>,
+        from: &Progress<f32>,
+    ) -> Result<Taken<f32>, Error> {
+        self.load(stretch, from)?;
+        let Self { device, pixels, learning, .. } = &*self;
+        let mut pending = Vec::with_capacity(stretch.draws.len());
+        for (k, rate) in stretch.rates.iter().enumerate() {
+            pending.push(self.loss(stretch, k)?);
+            let adam = stretch.adam;
+            let (beta, epsilon) = ([adam.beta1, adam.beta2], adam.epsilon);
+            let steps = from.adam.steps + k as u64 + 1;
+            learning.set(device, Rule { beta, epsilon, rate: *rate, steps })?;
+            device.run(|commands| learning.learn(commands))?;
+        }
+        let [parameters, first, second] = learning.buffers();
+        let read = device.read(&[parameters, first, second, pixels.records()])?;
+        let numbers = |k: usize| bytes::read(&read[k], from.parameters.len());
+        let records = bytes::read(&read[3], 2 * STEPS);
+        let losses = pending.into_iter().zip(records.chunks(2));
+        Ok(Taken {
+            parameters: numbers(0),
+            moments: [numbers(1), numbers(2)],
+            losses: losses.map(|(pending, record)| pending.ended(record)).collect(),
+        })
+    }
+}
+
+impl Pending {
+    /// With what the device has recorded: a sum of squares, and the bits of the number of points.
+    fn ended(self, record: &[f32]) -> Loss {
+        let points = record[1].to_bits() as usize;
+        match self {
+            Self::Known(loss) => Loss { points, ..loss },
+            Self::Squares { scale, dark, weight } => {
+                let term = scale * (f64::from(record[0]) + dark);
+                Loss { total: weight * term, terms: vec![term], points, ..Loss::default() }
+            }
+        }
+    }
+}
+
+fn pairs_of(stretch: &Stretch<'_, f32>, frames: &[usize]) -> Vec<(u32, u32)> {
+    let rays = stretch.objective.model.rays() as u32;
+    frames.iter().flat_map(|frame| (0..rays).map(|ray| (ray, *frame as u32))).collect()
+}
+
+/// Refuses what is not done on a device, with the key that asks for it.
+///
+/// # Errors
+/// Names the first such key.
+pub fn check(
+    objective: &Objective<f32>,
+    representation: &dyn Representation<f32>,
+    training: &Training,
+) -> Result<(), Error> {
+    let model = &objective.model;
+    for (asked, key, what) in [
+        (training.lbfgs.is_some(), "training.optimiser", "quasi-Newton steps are"),
+        (training.learns_axis(representation), "axis", "the gradient of the axis is"),
+        (training.penalties.is_some(), "penalty", "penalties are"),
+        (training.parts > 1, "training.parts", "steps in parts are"),
+        (model.planes.is_some(), "polarization", "Stokes parameters are"),
+        (model.fall.is_some(), "motion.velocity", "matter that changes its radius is"),
+        (representation.built_in().is_none(), "representation.kind", "this representation is"),
+    ] {
+        if asked {
+            let why =
+                format!("{key}: {what} not computed on graphics devices, the processor does it");
+            return Err(DeviceError(why).into());
+        }
+    }
+    Ok(())
+}

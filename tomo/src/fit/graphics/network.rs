@@ -1,0 +1,352 @@
+//! A fully connected network on the device, block of points by block of points.
+
+use super::bytes::words;
+use super::pixels::Points;
+use kerrlight_geodesic::gpu::{Bound, Buffer, Commands, Compute, GpuError, Kernel};
+use kerrlight_geodesic::wgsl;
+
+/// What a network looks like: parameters are layer after layer, each its kernel (inputs × outputs, row by row) and then
+/// its biases.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shape {
+    /// What it is given.
+    pub front: Front,
+    /// Where its parameters start.
+    pub start: usize,
+    /// Units of a hidden layer.
+    pub width: usize,
+    /// Hidden layers.
+    pub hidden: usize,
+    /// What it is given is appended to the units of this hidden layer, counted from 1.
+    pub skip: Option<usize>,
+    /// Of the output: 0 sigmoid, 1 softplus, 2 none.
+    pub activation: u32,
+    /// Added to the output before it.
+    pub shift: f32,
+}
+
+/// Inputs of a network.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Front {
+    /// The encoded point.
+    Encoded {
+        /// What x, y, z (or t, x, y, z) are multiplied with.
+        scales: [f32; 4],
+        /// Coordinates: 3 or 4.
+        dimension: usize,
+        /// Degree of the positional encoding.
+        degree: usize,
+    },
+    /// So many numbers that another kernel has made, and a one behind them; their slopes are wanted.
+    Given(usize),
+}
+
+/// A layer: columns of activations, and where its parameters are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Layer {
+    base: usize,
+    units: usize,
+    tail: usize,
+    inputs: usize,
+    outputs: usize,
+    into: usize,
+    offset: usize,
+}
+
+impl Shape {
+    fn encoded(&self) -> usize {
+        match self.front {
+            Front::Encoded { dimension, degree, .. } => dimension * (1 + 2 * degree),
+            Front::Given(inputs) => inputs,
+        }
+    }
+
+    fn is_given(&self) -> bool {
+        matches!(self.front, Front::Given(_))
+    }
+
+    /// Columns of activations: the encoded point, a one, and all units.
+    fn columns(&self) -> usize {
+        self.encoded() + 1 + self.hidden * self.width
+    }
+
+    /// Hidden layers, and at last the output.
+    fn layers(&self) -> Vec<Layer> {
+        let (encoded, width) = (self.encoded(), self.width);
+        let mut offset = self.start;
+        let layer = |k: usize| {
+            let skip = k > 0 && self.skip == Some(k);
+            let units = if k == 0 { encoded } else { width };
+            let made = Layer {
+                base: if k == 0 { 0 } else { encoded + 1 + (k - 1) * width },
+                units,
+                tail: if skip { 0 } else { encoded },
+                inputs: units + if skip { encoded } else { 0 } + 1,
+                outputs: if k == self.hidden { 1 } else { width },
+                into: encoded + 1 + k * width,
+                offset,
+            };
+            offset += made.inputs * made.outputs;
+            made
+        };
+        (0..=self.hidden).map(layer).collect()
+    }
+
+    /// Number of parameters.
+    pub fn parameters(&self) -> usize {
+        self.layers().iter().map(|layer| layer.inputs * layer.outputs).sum()
+    }
+}
+
+/// Sides of tiles and points of spans: those of the shader.
+const TILE: usize = 64;
+const SPAN: usize = 1024;
+/// The most points of a block.
+const BLOCK: usize = 1 << 16;
+
+const SHADER: &str = include_str!("shaders/network.wgsl");
+const ACTIVATIONS: &str = include_str!("shaders/activations.wgsl");
+const ENTRIES: [&str; 8] = [
+    "encode",
+    "forward",
+    "emit",
+    "emit_back",
+    "emit_weights",
+    "weights_back",
+    "units_back",
+    "add_up",
+];
+
+/// A network with its memory.
+#[derive(Debug)]
+pub struct Network {
+    /// Points of a block.
+    pub stride: usize,
+    /// Blocks of points.
+    pub blocks: Vec<Block>,
+    /// What the blocks share.
+    pub memory: Memory,
+    /// Which of the slopes those of given inputs are.
+    pub of_inputs: usize,
+}
+
+/// A kernel and how many workgroups it runs on.
+pub type Task = (Bound, [u32; 2]);
+
+/// The kernels of a block.
+#[derive(Debug)]
+pub struct Block {
+    /// Its points.
+    pub uniform: Buffer,
+    forward: Vec<Task>,
+    backward: Vec<Task>,
+}
+
+/// Buffers that all blocks share.
+#[derive(Debug)]
+pub struct Memory {
+    encoding: Buffer,
+    layers: Vec<Buffer>,
+    /// Activations.
+    pub rows: Buffer,
+    /// Slopes of what a layer gives and takes, by turns.
+    pub slopes: [Buffer; 2],
+    parts: Buffer,
+}
+
+/// What kernels are bound to, and where.
+struct Binding<'a> {
+    device: &'a Compute,
+    kernels: &'a [Kernel],
+    block: &'a Buffer,
+    memory: &'a Memory,
+    points: &'a Points,
+    parameters: &'a Buffer,
+    gradient: &'a Buffer,
+}
+
+impl Network {
+    /// A network that reads these parameters and adds to this gradient; `most` is the most points of a block, if fewer
+    /// than usual.
+    ///
+    /// # Errors
+    /// If the device has no room, or fails.
+    pub fn new(
+        device: &Compute,
+        shape: &Shape,
+        points: &Points,
+        (parameters, gradient): (&Buffer, &Buffer),
+        most: Option<usize>,
+    ) -> Result<Self, GpuError> {
+        let fits = device.largest_buffer() as usize / (4 * shape.columns()) / TILE * TILE;
+        if fits == 0 {
+            return Err(GpuError::OutOfMemory { bytes: 4 * (shape.columns() * TILE) as u64 });
+        }
+        let wanted = most.unwrap_or(BLOCK).min(points.room).next_multiple_of(TILE);
+        let stride = wanted.min(fits);
+        let source = [wgsl::FUNCTIONS, ACTIVATIONS, SHADER].join("\n");
+        let kernels = device.kernels(&source, &ENTRIES)?;
+        let memory = Memory::new(device, shape, stride)?;
+        let count = shape.parameters();
+        let blocks = (0..points.room.div_ceil(stride).max(1)).map(|k| {
+            let numbers = [k * stride, stride, shape.start, count].map(|x| x as u32);
+            let uniform = device.uniform(&words(&numbers))?;
+            let (memory, kernels, block) = (&memory, &kernels[..], &uniform);
+            let binding = Binding { device, kernels, block, memory, points, parameters, gradient };
+            let (forward, backward) =
+                (binding.forward(shape, stride)?, binding.backward(shape, stride)?);
+            Ok(Block { uniform, forward, backward })
+        });
+        let blocks = blocks.collect::<Result<_, GpuError>>()?;
+        Ok(Self { stride, blocks, memory, of_inputs: shape.hidden % 2 })
+    }
+
+    /// Emission of so many points at most, and its slopes.
+    pub fn forward(&self, commands: &mut Commands, points: usize) {
+        self.used(points).for_each(|block| block.forward(commands));
+    }
+
+    /// Adds the gradient of so many points at most, after [`forward`](Self::forward) and with cotangents.
+    pub fn backward(&self, commands: &mut Commands, points: usize) {
+        for block in self.used(points) {
+            if self.is_cut(points) {
+                block.forward(commands);
+            }
+            block.backward(commands);
+        }
+    }
+
+    /// Whether activations of all blocks but the last are gone after so many points went forward.
+    pub fn is_cut(&self, points: usize) -> bool {
+        points > self.stride
+    }
+
+    fn used(&self, points: usize) -> impl Iterator<Item = &Block> {
+        self.blocks.iter().take(points.div_ceil(self.stride))
+    }
+}
+
+impl Block {
+    /// Emission of its points.
+    pub fn forward(&self, commands: &mut Commands) {
+        run(commands, &self.forward);
+    }
+
+    /// Adds the gradient of its points.
+    pub fn backward(&self, commands: &mut Commands) {
+        run(commands, &self.backward);
+    }
+}
+
+/// Runs kernels one after the other.
+pub fn run(commands: &mut Commands, tasks: &[Task]) {
+    tasks.iter().for_each(|(bound, groups)| commands.dispatch(bound, *groups));
+}
+
+impl Memory {
+    fn new(device: &Compute, shape: &Shape, stride: usize) -> Result<Self, GpuError> {
+        let storage = |numbers: usize| device.storage(4 * numbers as u64);
+        let (scales, dimension, degree) = match shape.front {
+            Front::Encoded { scales, dimension, degree } => (scales, dimension, degree),
+            Front::Given(_) => ([0.0; 4], 0, 0),
+        };
+        let [x, y, z, t] = scales.map(f32::to_bits);
+        let (dimension, degree) = (dimension as u32, degree as u32);
+        let encoding = device.uniform(&words(&[x, y, z, t, dimension, degree, 0, 0]))?;
+        let layers = shape.layers().into_iter().enumerate().map(|(k, layer)| {
+            let Layer { base, units, tail, inputs, outputs, into, offset } = layer;
+            let numbers = [base, units, tail, inputs, outputs, into, offset].map(|x| x as u32);
+            let open = u32::from(k == 0);
+            let rest = [shape.activation, shape.shift.to_bits(), open, 0, 0];
+            device.uniform(&words(&[&numbers[..], &rest].concat()))
+        });
+        let widest = shape.width.max(shape.encoded()) * stride;
+        Ok(Self {
+            encoding,
+            layers: layers.collect::<Result<_, _>>()?,
+            rows: storage(shape.columns() * stride)?,
+            slopes: [storage(widest)?, storage(widest)?],
+            parts: storage(shape.parameters() * stride.div_ceil(SPAN))?,
+        })
+    }
+}
+
+impl Binding<'_> {
+    fn forward(&self, shape: &Shape, stride: usize) -> Result<Vec<Task>, GpuError> {
+        let layers = shape.layers();
+        let along = |size: usize| stride.div_ceil(size) as u32;
+        let mut tasks = Vec::new();
+        if !shape.is_given() {
+            tasks.push((self.bind(0, 0, 0, &[0, 2, 3, 4, 6])?, [along(64), 1]));
+        }
+        for (k, layer) in layers[..shape.hidden].iter().enumerate() {
+            let groups = [along(TILE), tiles(layer.outputs)];
+            tasks.push((self.bind(1, k, 0, &[0, 1, 3, 5, 6])?, groups));
+        }
+        let output = self.bind(2, shape.hidden, 0, &[0, 1, 3, 5, 6, 7, 8])?;
+        tasks.push((output, [along(64), 1]));
+        Ok(tasks)
+    }
+
+    fn backward(&self, shape: &Shape, stride: usize) -> Result<Vec<Task>, GpuError> {
+        let (layers, last) = (shape.layers(), shape.hidden);
+        let along = |size: usize| stride.div_ceil(size) as u32;
+        let output = layers[last];
+        let to_units = [along(64), output.units as u32];
+        let to_weights = [output.inputs as u32, along(SPAN)];
+        let mut tasks = vec![
+            (self.bind(3, last, 0, &[0, 1, 3, 5, 6, 8, 9, 10])?, to_units),
+            (self.bind(4, last, 0, &[0, 1, 3, 6, 8, 9, 12])?, to_weights),
+        ];
+        for (turn, (k, layer)) in layers[..last].iter().enumerate().rev().enumerate() {
+            let groups = [tiles(layer.outputs) * tiles(layer.inputs), along(SPAN)];
+            tasks.push((self.bind(5, k, turn, &[0, 1, 3, 6, 10, 12])?, groups));
+            if k > 0 || shape.is_given() {
+                let groups = [along(TILE), tiles(layer.units)];
+                tasks.push((self.bind(6, k, turn, &[0, 1, 3, 5, 6, 10, 11])?, groups));
+            }
+        }
+        tasks.push((self.add_up()?, [shape.parameters().div_ceil(64) as u32, 1]));
+        Ok(tasks)
+    }
+
+    /// An entry point about a layer; slopes go from one of two buffers to the other, by turns.
+    fn bind(
+        &self,
+        entry: usize,
+        layer: usize,
+        turn: usize,
+        bindings: &[u32],
+    ) -> Result<Bound, GpuError> {
+        let Memory { encoding, layers, rows, slopes, parts } = self.memory;
+        let Points { places, values, bends, cotangents, extent, .. } = self.points;
+        let [above, below] = [&slopes[turn % 2], &slopes[(turn + 1) % 2]];
+        let all = [
+            self.block,
+            &layers[layer],
+            encoding,
+            extent,
+            places,
+            self.parameters,
+            rows,
+            values,
+            bends,
+            cotangents,
+            above,
+            below,
+            parts,
+        ];
+        let buffers: Vec<_> = bindings.iter().map(|k| (*k, all[*k as usize])).collect();
+        self.device.bind(&self.kernels[entry], &buffers)
+    }
+
+    fn add_up(&self) -> Result<Bound, GpuError> {
+        let Binding { block, points, memory, gradient, .. } = self;
+        let buffers = [(0, *block), (3, &points.extent), (10, *gradient), (12, &memory.parts)];
+        self.device.bind(&self.kernels[7], &buffers)
+    }
+}
+
+fn tiles(numbers: usize) -> u32 {
+    numbers.div_ceil(TILE) as u32
+}

@@ -1,0 +1,267 @@
+//! From nodes on the device to points of a batch, and from their emission to pixels, residuals and back.
+
+use super::bytes::{floats, read, words};
+use kerrlight_geodesic::gpu::{Bound, Buffer, Commands, Compute, GpuError};
+use kerrlight_geodesic::wgsl;
+
+/// What a device has room for.
+#[derive(Clone, Copy, Debug)]
+pub struct Room {
+    /// Nodes of all rays.
+    pub nodes: usize,
+    /// (ray, frame) pairs at a time.
+    pub pairs: usize,
+    /// Their nodes.
+    pub points: usize,
+    /// Cells of the mask along each axis; 0 without one.
+    pub cells: usize,
+    /// Steps whose losses are kept.
+    pub records: usize,
+}
+
+/// A node as shaders see it.
+#[derive(Clone, Copy, Debug)]
+pub struct Node {
+    /// x, y, z, M.
+    pub place: [f32; 3],
+    /// What emission is multiplied by in its pixel.
+    pub weight: f32,
+    /// Angle that it is turned by in a unit of time, that of its delay, and the delay.
+    pub motion: [f32; 3],
+}
+
+/// A ray in a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pair {
+    /// Its nodes.
+    pub nodes: [u32; 2],
+    /// Time of the frame since the reference time, M.
+    pub time: f32,
+    /// The pixel in the data; 0 where residuals are made elsewhere.
+    pub datum: f32,
+}
+
+/// How pairs become points.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Gathering {
+    /// The axis that matter turns about.
+    pub axis: [f32; 3],
+    /// Nothing shines before, M since the reference time.
+    pub earliest: Option<f32>,
+    /// Cells and half the width (M) of the mask, if it is used.
+    pub mask: Option<(u32, f32)>,
+    /// Whether the field is one of places and times of emission.
+    pub events: bool,
+    /// dL/dpixel of a residual of 1.
+    pub slope: f32,
+    /// The record that squares and points are added to.
+    pub record: u32,
+}
+
+/// Points of a batch; fields read places and cotangents, and write values and slopes.
+#[derive(Debug)]
+pub struct Points {
+    /// x, y, z and t.
+    pub places: Buffer,
+    /// Emission.
+    pub values: Buffer,
+    /// Slopes of the last function.
+    pub bends: Buffer,
+    /// dL/demission.
+    pub cotangents: Buffer,
+    /// How many there are: known to the device alone.
+    pub extent: Buffer,
+    /// How many there may be.
+    pub room: usize,
+}
+
+/// The kernels about pixels, and what they work on.
+#[derive(Debug)]
+pub struct Pixels {
+    /// The points.
+    pub points: Points,
+    task: Buffer,
+    nodes: Buffer,
+    pairs: Buffer,
+    mask: Buffer,
+    fluxes: Buffer,
+    slopes: Buffer,
+    records: Buffer,
+    forward: [Bound; 3],
+    sums: [Bound; 2],
+    spread: Bound,
+}
+
+/// Workgroups in a row of the grid: fewer than any device allows.
+const ROW: u32 = 32_768;
+const SHADER: &str = include_str!("shaders/gather.wgsl");
+const ENTRIES: [&str; 6] = ["count", "scan", "collect", "sum_rays", "tally", "spread"];
+
+impl Pixels {
+    /// Room, and nothing in it.
+    ///
+    /// # Errors
+    /// If the device has no room, or fails.
+    pub fn new(device: &Compute, room: Room) -> Result<Self, GpuError> {
+        let all = buffers(device, room)?;
+        let source = [wgsl::FUNCTIONS, SHADER].join("\n");
+        let kernels = device.kernels(&source, &ENTRIES)?;
+        let bind = |entry: usize, bindings: &[u32]| {
+            let buffers: Vec<_> = bindings.iter().map(|k| (*k, &all[*k as usize])).collect();
+            device.bind(&kernels[entry], &buffers)
+        };
+        let forward = [
+            bind(0, &[0, 1, 2, 3, 4])?,
+            bind(1, &[0, 4, 5, 14])?,
+            bind(2, &[0, 1, 2, 3, 5, 6, 7])?,
+        ];
+        let sums = [bind(3, &[0, 2, 5, 7, 8, 9, 10, 11])?, bind(4, &[0, 10, 13, 14])?];
+        let spread = bind(5, &[0, 5, 7, 11, 12])?;
+        let [task, nodes, pairs, mask, _, _, places, _, values, fluxes, _, slopes, rest @ ..] = all;
+        let [cotangents, records, extent] = rest;
+        let bends = device.storage(4 * room.points as u64)?;
+        let points = Points { places, values, bends, cotangents, extent, room: room.points };
+        Ok(Self {
+            points,
+            task,
+            nodes,
+            pairs,
+            mask,
+            fluxes,
+            slopes,
+            records,
+            forward,
+            sums,
+            spread,
+        })
+    }
+
+    /// Puts the nodes of all rays there.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn load(
+        &self,
+        device: &Compute,
+        nodes: impl Iterator<Item = Node>,
+    ) -> Result<(), GpuError> {
+        let numbers = nodes.flat_map(|Node { place: [x, y, z], weight, motion: [a, b, c] }| {
+            [x, y, z, weight, a, b, c, 0.0]
+        });
+        device.write(&self.nodes, &floats(&numbers.collect::<Vec<f32>>()))
+    }
+
+    /// Puts the mask there: a bit a cell.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn load_mask(
+        &self,
+        device: &Compute,
+        cells: impl Iterator<Item = bool>,
+    ) -> Result<(), GpuError> {
+        let mut bits: Vec<u32> = Vec::new();
+        for (k, lit) in cells.enumerate() {
+            if k % 32 == 0 {
+                bits.push(0);
+            }
+            bits[k / 32] |= u32::from(lit) << (k % 32);
+        }
+        device.write(&self.mask, &words(&bits))
+    }
+
+    /// Puts the pairs of what runs next there.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn set(&self, device: &Compute, pairs: &[Pair], how: &Gathering) -> Result<(), GpuError> {
+        let each = |p: &Pair| [p.nodes[0], p.nodes[1], p.time.to_bits(), p.datum.to_bits()];
+        device.write(&self.pairs, &words(&pairs.iter().flat_map(each).collect::<Vec<u32>>()))?;
+        let [x, y, z] = how.axis.map(f32::to_bits);
+        let flag = |set: bool, flag: u32| if set { flag } else { 0 };
+        let flags =
+            flag(how.earliest.is_some(), 1) | flag(how.mask.is_some(), 2) | flag(how.events, 4);
+        let (cells, half) = how.mask.unwrap_or((1, 1.0));
+        let per_length = cells as f32 / (2.0 * half);
+        let task = [
+            [x, y, z, how.earliest.unwrap_or(0.0).to_bits()],
+            [pairs.len() as u32, flags, cells, half.to_bits()],
+            [per_length.to_bits(), how.slope.to_bits(), ROW, how.record],
+        ];
+        device.write(&self.task, &words(task.as_flattened()))
+    }
+
+    /// From so many pairs to points.
+    pub fn gather(&self, commands: &mut Commands, pairs: usize) {
+        let [count, scan, collect] = &self.forward;
+        commands.dispatch(count, grid(pairs));
+        commands.dispatch(scan, [1, 1]);
+        commands.dispatch(collect, grid(pairs));
+    }
+
+    /// From emission to pixels, and to the squares of their residuals.
+    pub fn sum(&self, commands: &mut Commands, pairs: usize) {
+        commands.dispatch(&self.sums[0], grid(pairs));
+        commands.dispatch(&self.sums[1], [1, 1]);
+    }
+
+    /// From dL/dpixel to dL/demission.
+    pub fn spread(&self, commands: &mut Commands, pairs: usize) {
+        commands.dispatch(&self.spread, grid(pairs));
+    }
+
+    /// Light of so many pairs.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn fluxes(&self, device: &Compute, pairs: usize) -> Result<Vec<f32>, GpuError> {
+        Ok(read(&device.read(&[&self.fluxes])?[0], pairs))
+    }
+
+    /// Puts dL/dpixel of each pair there.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn set_slopes(&self, device: &Compute, slopes: &[f32]) -> Result<(), GpuError> {
+        device.write(&self.slopes, &floats(slopes))
+    }
+
+    /// Forgets the records.
+    pub fn forget(&self, commands: &mut Commands) {
+        commands.clear(&self.records);
+    }
+
+    /// Records: sums of squares, and points.
+    pub fn records(&self) -> &Buffer {
+        &self.records
+    }
+}
+
+fn grid(workgroups: usize) -> [u32; 2] {
+    let count = workgroups as u32;
+    [count.min(ROW), count.div_ceil(ROW)]
+}
+
+/// The buffers of all bindings, in their order.
+fn buffers(device: &Compute, room: Room) -> Result<[Buffer; 15], GpuError> {
+    let Room { nodes, pairs, points, cells, records } = room;
+    let storage = |bytes: usize| device.storage(bytes as u64);
+    let of_pairs = || storage(4 * pairs);
+    Ok([
+        device.uniform(&[0; 64])?,
+        storage(32 * nodes)?,
+        storage(16 * pairs)?,
+        storage(4 * cells.pow(3).div_ceil(32))?,
+        of_pairs()?,
+        storage(4 * (pairs + 1))?,
+        storage(16 * points)?,
+        storage(4 * points)?,
+        storage(4 * points)?,
+        of_pairs()?,
+        of_pairs()?,
+        of_pairs()?,
+        storage(4 * points)?,
+        storage(8 * records)?,
+        storage(4)?,
+    ])
+}

@@ -1,0 +1,229 @@
+// Nodes of (ray, frame) pairs, turned back to the reference time, without those that are dark; light summed along rays.
+// A workgroup has a pair.
+
+struct Node {
+    place: vec4<f32>,  // x, y, z in M, and the weight in the pixel
+    motion: vec4<f32>, // turn a unit of time, turn that belongs to the delay, delay
+}
+
+struct Pair {
+    first: u32, // nodes first .. last
+    last: u32,
+    time: f32,  // of the frame since the reference time, M
+    datum: f32, // the pixel in the data
+}
+
+struct Task {
+    axis: vec3<f32>,
+    earliest: f32,   // nothing shines before, if FROM_A_TIME
+    pairs: u32,
+    flags: u32,
+    cells: u32,      // of the mask along each axis
+    half_width: f32, // of the mask's cube, M
+    per_length: f32, // its cells a unit of length
+    slope: f32,      // dloss/dpixel of a residual of 1
+    row: u32,        // workgroups in a row of the grid
+    into: u32,       // where the loss of this step is kept
+}
+
+const FROM_A_TIME = 1u;
+const MASKED = 2u;
+const EVENTS = 4u;
+
+@group(0) @binding(0) var<uniform> task: Task;
+@group(0) @binding(1) var<storage, read> nodes: array<Node>;
+@group(0) @binding(2) var<storage, read> pairs: array<Pair>;
+@group(0) @binding(3) var<storage, read> mask: array<u32>;
+@group(0) @binding(4) var<storage, read_write> counts: array<u32>;
+// Pair k has the points starts[k] .. starts[k + 1]; behind the last one, how many there are.
+@group(0) @binding(5) var<storage, read_write> starts: array<u32>;
+@group(0) @binding(6) var<storage, read_write> places: array<vec4<f32>>;
+@group(0) @binding(7) var<storage, read_write> weights: array<f32>;
+@group(0) @binding(8) var<storage, read_write> values: array<f32>;
+@group(0) @binding(9) var<storage, read_write> fluxes: array<f32>;
+@group(0) @binding(10) var<storage, read_write> squares: array<f32>;
+@group(0) @binding(11) var<storage, read_write> slopes: array<f32>;
+@group(0) @binding(12) var<storage, read_write> cotangents: array<f32>;
+// Of each step the sum of squares and the bits of the number of points.
+@group(0) @binding(13) var<storage, read_write> records: array<vec2<f32>>;
+@group(0) @binding(14) var<storage, read_write> extent: array<u32>;
+
+var<workgroup> shared_counts: array<u32, 256>;
+var<workgroup> shared_sums: array<f32, 256>;
+
+struct Seen {
+    place: vec4<f32>, // x, y, z at the reference time and t; of events where and when the light was emitted
+    shines: bool,
+}
+
+fn in_mask(place: vec3<f32>) -> bool {
+    let at = (place + task.half_width) * task.per_length;
+    let most = f32(task.cells);
+    if !(all(at >= vec3<f32>(0.0)) && all(at <= vec3<f32>(most))) {
+        return false;
+    }
+    let cell = min(vec3<u32>(at), vec3<u32>(task.cells - 1u));
+    let index = (cell.x * task.cells + cell.y) * task.cells + cell.z;
+    return ((mask[index / 32u] >> (index % 32u)) & 1u) == 1u;
+}
+
+fn seen(index: u32, frame: f32) -> Seen {
+    let node = nodes[index];
+    let time = frame - node.motion.z;
+    let x = node.place.xyz;
+    let turn = kerr_cos_sin(node.motion.x * frame + node.motion.y);
+    let along = (1.0 - turn.x) * dot(task.axis, x);
+    let pulled = turn.x * x + turn.y * cross(task.axis, x) + along * task.axis;
+    let in_time = (task.flags & FROM_A_TIME) == 0u || time >= task.earliest;
+    let unmasked = (task.flags & MASKED) == 0u || in_mask(pulled);
+    let place = select(pulled, x, (task.flags & EVENTS) != 0u);
+    return Seen(vec4<f32>(place, time), in_time && unmasked);
+}
+
+@compute @workgroup_size(64)
+fn count(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let pair = group.y * task.row + group.x;
+    if pair >= task.pairs {
+        return;
+    }
+    let its = pairs[pair];
+    var own = 0u;
+    for (var k = its.first + lane; k < its.last; k += 64u) {
+        own += select(0u, 1u, seen(k, its.time).shines);
+    }
+    shared_counts[lane] = own;
+    for (var half = 32u; half > 0u; half /= 2u) {
+        workgroupBarrier();
+        if lane < half {
+            shared_counts[lane] += shared_counts[lane + half];
+        }
+    }
+    if lane == 0u {
+        counts[pair] = shared_counts[0];
+    }
+}
+
+// Sums of the 256 counts up to each lane's own.
+fn sums_so_far(own: u32, lane: u32, lanes: u32) -> u32 {
+    shared_counts[lane] = own;
+    workgroupBarrier();
+    for (var reach = 1u; reach < lanes; reach *= 2u) {
+        var sum = shared_counts[lane];
+        if lane >= reach {
+            sum += shared_counts[lane - reach];
+        }
+        workgroupBarrier();
+        shared_counts[lane] = sum;
+        workgroupBarrier();
+    }
+    return shared_counts[lane];
+}
+
+// One workgroup for all pairs.
+@compute @workgroup_size(256)
+fn scan(@builtin(local_invocation_index) lane: u32) {
+    var before = 0u;
+    for (var begin = 0u; begin < task.pairs; begin += 256u) {
+        let pair = begin + lane;
+        var own = 0u;
+        if pair < task.pairs {
+            own = counts[pair];
+        }
+        let sum = sums_so_far(own, lane, 256u);
+        if pair < task.pairs {
+            starts[pair] = before + sum - own;
+        }
+        before += shared_counts[255];
+        workgroupBarrier();
+    }
+    if lane == 0u {
+        starts[task.pairs] = before;
+        extent[0] = before;
+    }
+}
+
+@compute @workgroup_size(64)
+fn collect(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let pair = group.y * task.row + group.x;
+    if pair >= task.pairs {
+        return;
+    }
+    let its = pairs[pair];
+    var to = starts[pair];
+    for (var begin = its.first; begin < its.last; begin += 64u) {
+        let k = begin + lane;
+        var point = Seen(vec4<f32>(0.0), false);
+        if k < its.last {
+            point = seen(k, its.time);
+        }
+        let own = select(0u, 1u, point.shines);
+        let sum = sums_so_far(own, lane, 64u);
+        if point.shines {
+            places[to + sum - 1u] = point.place;
+            weights[to + sum - 1u] = nodes[k].place.w;
+        }
+        to += shared_counts[63];
+        workgroupBarrier();
+    }
+}
+
+// The light of each pair, and how far it is from the data.
+@compute @workgroup_size(64)
+fn sum_rays(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let pair = group.y * task.row + group.x;
+    if pair >= task.pairs {
+        return;
+    }
+    let last = starts[pair + 1u];
+    var own = 0.0;
+    for (var k = starts[pair] + lane; k < last; k += 64u) {
+        own += weights[k] * values[k];
+    }
+    shared_sums[lane] = own;
+    for (var half = 32u; half > 0u; half /= 2u) {
+        workgroupBarrier();
+        if lane < half {
+            shared_sums[lane] += shared_sums[lane + half];
+        }
+    }
+    if lane == 0u {
+        let residual = shared_sums[0] - pairs[pair].datum;
+        fluxes[pair] = shared_sums[0];
+        squares[pair] = residual * residual;
+        slopes[pair] = task.slope * residual;
+    }
+}
+
+// From pixels back to points.
+@compute @workgroup_size(64)
+fn spread(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let pair = group.y * task.row + group.x;
+    if pair >= task.pairs {
+        return;
+    }
+    let last = starts[pair + 1u];
+    for (var k = starts[pair] + lane; k < last; k += 64u) {
+        cotangents[k] = slopes[pair] * weights[k];
+    }
+}
+
+// One workgroup adds the squares of all pairs, and their points, to the record of the task.
+@compute @workgroup_size(256)
+fn tally(@builtin(local_invocation_index) lane: u32) {
+    var own = 0.0;
+    for (var k = lane; k < task.pairs; k += 256u) {
+        own += squares[k];
+    }
+    shared_sums[lane] = own;
+    for (var half = 128u; half > 0u; half /= 2u) {
+        workgroupBarrier();
+        if lane < half {
+            shared_sums[lane] += shared_sums[lane + half];
+        }
+    }
+    if lane == 0u {
+        let before = records[task.into];
+        let points = bitcast<u32>(before.y) + extent[0];
+        records[task.into] = vec2<f32>(before.x + shared_sums[0], bitcast<f32>(points));
+    }
+}

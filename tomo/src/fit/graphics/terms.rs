@@ -1,0 +1,36 @@
+//! What data say of light that comes back from the device.
+
+use crate::fit::objective::{Loss, Objective};
+use crate::fit::terms::FrameTerm;
+
+impl Objective<f32> {
+    /// A loss to which frames are added.
+    pub(super) fn empty_loss(&self) -> Loss {
+        Loss { terms: vec![0.0; self.terms().count()], ..Loss::default() }
+    }
+
+    /// Adds the terms of a frame, one of `whole`, whose rays have this light; dL/dlight of each ray.
+    pub(super) fn of_rays(
+        &self,
+        (frame, whole): (usize, usize),
+        light: &[f32],
+        loss: &mut Loss,
+    ) -> Vec<f32> {
+        let model = &self.model;
+        let (mut image, mut of_image) = (vec![0.0; model.pixels()], vec![0.0; model.pixels()]);
+        light.iter().enumerate().for_each(|(ray, light)| model.put(&mut image, ray, *light));
+        for ((term, weight), sum) in self.terms().zip(&mut loss.terms) {
+            let scale = 1.0 / self.data_of(term, whole);
+            let factor = (weight * scale) as f32;
+            *sum +=
+                scale * FrameTerm::value_and_gradient(term, frame, &image, factor, &mut of_image);
+        }
+        model.pixel().iter().map(|pixel| of_image[*pixel as usize]).collect()
+    }
+
+    /// Makes the loss of its terms.
+    pub(super) fn add_terms(&self, loss: &mut Loss) {
+        let weights = self.terms().map(|(_, weight)| weight);
+        loss.total = loss.terms.iter().zip(weights).map(|(term, weight)| term * weight).sum();
+    }
+}

@@ -1,0 +1,227 @@
+//! Fits of a few steps.
+
+use super::device;
+use super::problem::{self, Kind, objective, start, training};
+use kerrlight_tomo::Error;
+use kerrlight_tomo::fit::graphics::GraphicsFit;
+use kerrlight_tomo::fit::{
+    BatchSize, Delegate, Outcome, State, StepDevice, Stretch, Taken, Trainer, Training, checkpoint,
+};
+use kerrlight_tomo::optimise::{Lbfgs, Polynomial};
+use kerrlight_tomo::representation::{Activation, Representation};
+
+/// A fit with its data, on the device or not.
+struct Fit<'a> {
+    representation: &'a dyn Representation<f32>,
+    training: Training,
+    kind: Kind,
+}
+
+impl Fit<'_> {
+    fn start(&self) -> State<f32> {
+        start(self.representation, &self.training)
+    }
+
+    /// Steps up to `until`, by the device with pauses at multiples of a number, or by the processor.
+    fn run(&self, state: &mut State<f32>, until: u64, pause: Option<u64>) -> Option<Vec<f64>> {
+        let mut trainer =
+            Trainer::new(objective(self.kind), self.representation, self.training.clone());
+        if let Some(pause) = pause {
+            let fit = self.graphics()?;
+            trainer.device = Some(Delegate::new(Box::new(fit), pause, until));
+        }
+        let mut losses = Vec::new();
+        while state.now.step < until {
+            match trainer.step(state).unwrap() {
+                Outcome::Done(loss) => losses.push(loss.total),
+                other => panic!("{other:?}"),
+            }
+        }
+        Some(losses)
+    }
+
+    fn graphics(&self) -> Option<GraphicsFit> {
+        let objective = objective(self.kind);
+        let fit =
+            GraphicsFit::new(device()?, &objective, self.representation, &self.training, None);
+        Some(fit.unwrap())
+    }
+}
+
+fn fits(representation: &dyn Representation<f32>) -> [Fit<'_>; 3] {
+    let fit = |batch, masked, kind| Fit { representation, training: training(batch, masked), kind };
+    [
+        fit(BatchSize::Pixels(30), true, Kind::Images),
+        fit(BatchSize::Frames(2), false, Kind::Images),
+        fit(BatchSize::All, true, Kind::ImagesAndFlux),
+    ]
+}
+
+fn apart(a: &[f32], b: &[f32]) -> f64 {
+    let pairs = || a.iter().zip(b).map(|(a, b)| (f64::from(*a), f64::from(*b)));
+    let differences: f64 = pairs().map(|(a, b)| (a - b).powi(2)).sum();
+    (differences / pairs().map(|(a, _)| a * a).sum::<f64>()).sqrt()
+}
+
+/// All kinds of batches with a network, and one with each of the others.
+fn all_fits<'a>(
+    network: &'a dyn Representation<f32>,
+    others: [&'a dyn Representation<f32>; 3],
+) -> Vec<Fit<'a>> {
+    let other = |representation| Fit {
+        representation,
+        training: training(BatchSize::Pixels(60), false),
+        kind: Kind::Images,
+    };
+    fits(network).into_iter().chain(others.map(other)).collect()
+}
+
+#[test]
+fn code_twenty_steps_are_those_of_the_processor() {
+    let (small, features) = (problem::small(), problem::features());
+    let [sigmoid, linear] = [Activation::Sigmoid, Activation::Linear].map(problem::voxels);
+    for fit in all_fits(&small, [&sigmoid, &linear, &features]) {
+        let (mut state, mut ours) = (fit.start(), fit.start());
+        let losses = fit.run(&mut state, 20, None).unwrap();
+        let Some(found) = fit.run(&mut ours, 20, Some(1)) else { return };
+        let pairs = losses.iter().zip(&found).map(|(a, b)| (b / a - 1.0).abs());
+        let most = pairs.fold(0.0, f64::max);
+        let moved = apart(&state.now.parameters, &ours.now.parameters);
+        let batch = fit.training.batch;
+        println!("{batch:?}: losses differ by {most:.1e}, parameters by {moved:.1e}");
+        assert!(losses.len() == 20 && found.len() == 20);
+        assert!(losses[19] < 0.9 * losses[0] || matches!(batch, BatchSize::Pixels(_)));
+        assert!(most < 1e-5 && moved < 1e-5, "{batch:?}: {most:e} {moved:e}");
+        assert!(state.good.is_some() && ours.good.as_ref().unwrap().step == 16);
+    }
+}
+
+/// Neither another time nor the lengths of stretches change a byte.
+#[test]
+fn exact_the_same_bytes_twice() {
+    let (small, features) = (problem::small(), problem::features());
+    let [sigmoid, linear] = [Activation::Sigmoid, Activation::Linear].map(problem::voxels);
+    for fit in all_fits(&small, [&sigmoid, &linear, &features]) {
+        let bytes = |pause| {
+            let mut state = fit.start();
+            fit.run(&mut state, 20, Some(pause))?;
+            Some(checkpoint::encode(&state, "").unwrap())
+        };
+        let Some(first) = bytes(1) else { return };
+        assert!(Some(&first) == bytes(1).as_ref() && Some(first) == bytes(20));
+    }
+}
+
+#[test]
+fn exact_checkpoints_go_from_device_to_processor_and_back() {
+    let small = problem::small();
+    for fit in fits(&small) {
+        let moved = |pauses: [Option<u64>; 3]| {
+            let mut state = fit.start();
+            for (pause, until) in pauses.into_iter().zip([7, 13, 20]) {
+                let bytes = checkpoint::encode(&state, "").unwrap();
+                state = checkpoint::decode(&bytes, &fit.start()).unwrap();
+                fit.run(&mut state, until, pause)?;
+            }
+            Some(state)
+        };
+        let Some(there_and_back) = moved([Some(5), None, Some(5)]) else { return };
+        let alone = moved([None; 3]).unwrap();
+        let apart = apart(&alone.now.parameters, &there_and_back.now.parameters);
+        println!("{:?}: parameters differ by {apart:.1e}", fit.training.batch);
+        assert!(apart > 0.0 && apart < 1e-5, "{apart:e}");
+        let mut whole = fit.start();
+        fit.run(&mut whole, 20, Some(5));
+        assert!(moved([Some(5); 3]).unwrap() == whole, "a break changes bytes");
+    }
+}
+
+/// A device that is lost after a few steps.
+struct Fragile {
+    fit: GraphicsFit,
+    left: usize,
+}
+
+impl StepDevice<f32> for Fragile {
+    fn name(&self) -> &str {
+        self.fit.name()
+    }
+    fn most(&self) -> usize {
+        1
+    }
+    fn take(
+        &mut self,
+        stretch: &Stretch<'_, f32>,
+        from: &kerrlight_tomo::fit::Progress<f32>,
+    ) -> Result<Taken<f32>, Error> {
+        if self.left == 0 {
+            self.fit.lose();
+        }
+        self.left = self.left.saturating_sub(1);
+        self.fit.take(stretch, from)
+    }
+}
+
+#[test]
+fn exact_after_a_lost_device_the_processor_goes_on() {
+    let small = problem::small();
+    let [fit, ..] = fits(&small);
+    let Some(graphics) = fit.graphics() else { return };
+    let mut state = fit.start();
+    let mut trainer = Trainer::new(objective(fit.kind), &small, fit.training.clone());
+    let fragile = Fragile { fit: graphics, left: 5 };
+    trainer.device = Some(Delegate::new(Box::new(fragile), 1, 20));
+    for _ in 0..5 {
+        trainer.step(&mut state).unwrap();
+    }
+    let before = state.clone();
+    let error = trainer.step(&mut state).unwrap_err();
+    assert!(matches!(error, Error::Device(_)), "{error}");
+    assert!(error.to_string().contains("lost"), "{error}");
+    assert!(state == before && state.now.step == 5);
+    fit.run(&mut state, 20, None).unwrap();
+    let mut alone = fit.start();
+    fit.run(&mut alone, 20, None).unwrap();
+    assert!(apart(&alone.now.parameters, &state.now.parameters) < 1e-5);
+}
+
+#[test]
+fn exact_a_divergence_is_stepped_back_from() {
+    let small = problem::small();
+    let absurd = Polynomial { from: 1e30, to: 1e30, steps: 40, power: 1.0 };
+    let training = Training { rate: absurd, ramp: 0, ..training(BatchSize::Pixels(30), false) };
+    let fit = Fit { representation: &small, training, kind: Kind::Images };
+    let Some(graphics) = fit.graphics() else { return };
+    let mut trainer = Trainer::new(objective(fit.kind), &small, fit.training.clone());
+    trainer.device = Some(Delegate::new(Box::new(graphics), 20, 20));
+    let mut state = fit.start();
+    let error = loop {
+        match trainer.step(&mut state) {
+            Ok(Outcome::SteppedBack { to, caution, .. }) => {
+                assert!(caution == 0.5f64.powi(state.setbacks as i32) && to == state.now.step);
+            }
+            Ok(other) => assert!(matches!(other, Outcome::Done(_)), "{other:?}"),
+            Err(error) => break error,
+        }
+        assert!(state.now.step < 20);
+    };
+    assert!(matches!(error, Error::Diverged(fail) if fail.setbacks == 12), "{error}");
+}
+
+#[test]
+fn what_is_not_done_is_named_with_its_key() {
+    let small = problem::small();
+    let training = training(BatchSize::All, false);
+    let rate = Some(training.rate);
+    for (key, training) in [
+        ("axis:", Training { axis_rate: rate, ..training.clone() }),
+        ("training.parts:", Training { parts: 2, ..training.clone() }),
+        ("training.optimiser:", Training { lbfgs: Some(Lbfgs::default()), ..training.clone() }),
+    ] {
+        let Some(device) = device() else { return };
+        let objective = objective(Kind::Images);
+        let refused = GraphicsFit::new(device, &objective, &small, &training, None);
+        let told = refused.unwrap_err().to_string();
+        assert!(told.starts_with(key) && told.contains("the processor does it"), "{told}");
+    }
+}

@@ -1,0 +1,170 @@
+//! Losses and gradients.
+
+use super::device;
+use super::problem::{self, Kind, axis, objective, start, training};
+use kerrlight_tomo::fit::graphics::GraphicsFit;
+use kerrlight_tomo::fit::{
+    BatchSize, Buffers, Drawn, Field, Gradients, Loss, Objective, Occupancy, Progress, Stretch,
+    Training,
+};
+use kerrlight_tomo::representation::{Activation, Representation, Workspace};
+
+/// A device with a fit, and what it is a fit of.
+struct Both<'a> {
+    graphics: GraphicsFit,
+    objective: Objective<f32>,
+    representation: &'a dyn Representation<f32>,
+    training: Training,
+    occupancy: Option<Occupancy>,
+    draw: Drawn,
+}
+
+impl<'a> Both<'a> {
+    fn new(
+        representation: &'a dyn Representation<f32>,
+        (kind, draw): (Kind, Drawn),
+        (masked, most): (bool, Option<usize>),
+    ) -> Option<Self> {
+        let batch = match &draw {
+            Drawn::Pixels(pairs) => BatchSize::Pixels(pairs.len()),
+            Drawn::Frames(frames) => BatchSize::Frames(frames.len()),
+        };
+        let training = training(batch, masked);
+        let mut objective = objective(kind);
+        objective.model.weigh(axis());
+        let (device, now) = (device()?, start(representation, &training).now);
+        let graphics =
+            GraphicsFit::new(device, &objective, representation, &training, most).unwrap();
+        let mut occupancy = now.occupancy.clone();
+        if let Some(mask) = &mut occupancy {
+            mask.refresh(representation, &now.parameters, 3, &mut Workspace::new());
+            assert!(mask.fraction() > 0.05 && mask.fraction() < 0.95, "{}", mask.fraction());
+        }
+        Some(Self { graphics, objective, representation, training, occupancy, draw })
+    }
+
+    fn now(&self) -> Progress<f32> {
+        start(self.representation, &self.training).now
+    }
+
+    fn processor(&self, parameters: &[f32]) -> (Loss, Vec<f32>) {
+        let occupancy = self.occupancy.as_ref();
+        let representation = self.representation;
+        let field = Field { representation, parameters, axis: axis(), occupancy };
+        let mut gradient = vec![0.0; parameters.len()];
+        let gradients = Gradients { parameters: &mut gradient, axis: None };
+        let selection = self.draw.selection();
+        let buffers = &mut Buffers::default();
+        let loss = self.objective.value_and_gradient(field, selection, gradients, buffers);
+        (loss, gradient)
+    }
+
+    fn device(&mut self, parameters: &[f32]) -> (Loss, Vec<f32>) {
+        let now = Progress { parameters: parameters.to_vec(), ..self.now() };
+        let stretch = Stretch {
+            objective: &self.objective,
+            adam: self.training.adam,
+            axis: axis(),
+            occupancy: self.occupancy.as_ref(),
+            draws: vec![self.draw.clone()],
+            rates: vec![0.0],
+        };
+        self.graphics.gradient(&stretch, &now).unwrap()
+    }
+}
+
+fn pixels(count: u32) -> Drawn {
+    let rays = problem::model().rays() as u32;
+    Drawn::Pixels((0..count).map(|k| ((k * 7) % rays, k % 4)).collect())
+}
+
+/// Loss, its terms and points, and the gradient relative to its largest number.
+fn agree(name: &str, both: &mut Both<'_>) {
+    let parameters = both.now().parameters;
+    let (loss, gradient) = both.processor(&parameters);
+    let (ours, found) = both.device(&parameters);
+    let apart = (ours.total / loss.total - 1.0).abs();
+    let largest = gradient.iter().fold(0.0f32, |most, g| most.max(g.abs()));
+    let pairs = gradient.iter().zip(&found);
+    let error = pairs.map(|(a, b)| (a - b).abs()).fold(0.0f32, f32::max) / largest;
+    println!(
+        "{name}: {} parameters, {} points; loss differs by {apart:.1e}, gradient by {error:.1e}",
+        gradient.len(),
+        loss.points
+    );
+    assert_eq!(ours.points, loss.points, "{name}");
+    assert_eq!(ours.terms.len(), loss.terms.len());
+    assert!(loss.points > 20 && largest > 0.0, "{name}");
+    assert!(apart < 2e-6, "{name}: {} {}", ours.total, loss.total);
+    assert!(error < 5e-6, "{name}: {error:e}");
+    let again = both.device(&parameters);
+    assert!(again.0 == ours && again.1 == found, "{name}: other bytes the second time");
+}
+
+#[test]
+fn code_networks_have_the_gradients_of_the_processor() {
+    let (small, bhnerf, mlp4d) = (problem::small(), problem::bhnerf(), problem::mlp4d());
+    let frames = || Drawn::Frames(vec![2, 0, 3]);
+    let cases: [(&str, &dyn Representation<f32>, _, _); 6] = [
+        ("bhnerf, pixels", &bhnerf, (Kind::Images, pixels(20)), (false, None)),
+        ("small, pixels", &small, (Kind::Images, pixels(90)), (false, None)),
+        ("small, masked", &small, (Kind::Images, pixels(90)), (true, None)),
+        ("small, frames in blocks", &small, (Kind::Images, frames()), (false, Some(128))),
+        ("small, frames and fluxes", &small, (Kind::ImagesAndFlux, frames()), (true, Some(128))),
+        ("mlp4d, frames", &mlp4d, (Kind::Images, frames()), (false, None)),
+    ];
+    for (name, representation, data, how) in cases {
+        let Some(mut both) = Both::new(representation, data, how) else { return };
+        agree(name, &mut both);
+    }
+}
+
+#[test]
+fn code_grids_have_the_gradients_of_the_processor() {
+    let [sigmoid, linear] = [Activation::Sigmoid, Activation::Linear].map(problem::voxels);
+    let features = problem::features();
+    let frames = || Drawn::Frames(vec![2, 0, 3]);
+    let cases: [(&str, &dyn Representation<f32>, _, _); 5] = [
+        ("grid, pixels", &sigmoid, (Kind::Images, pixels(90)), (false, None)),
+        ("linear grid, frames", &linear, (Kind::Images, frames()), (false, None)),
+        ("feature grid, pixels", &features, (Kind::Images, pixels(90)), (false, None)),
+        ("feature grid, blocks", &features, (Kind::Images, frames()), (false, Some(128))),
+        ("feature grid, fluxes", &features, (Kind::ImagesAndFlux, frames()), (false, Some(128))),
+    ];
+    for (name, representation, data, how) in cases {
+        let Some(mut both) = Both::new(representation, data, how) else { return };
+        agree(name, &mut both);
+    }
+}
+
+/// ⟨gradient, v⟩ is the slope of the loss along v, both on the device.
+#[test]
+fn exact_gradients_are_slopes_of_the_loss() {
+    let (small, voxels) = (problem::small(), problem::voxels(Activation::Sigmoid));
+    // Rectified units have kinks, so that steps are short; voxels have none.
+    let cases: [(&str, &dyn Representation<f32>, _, f32); 3] = [
+        ("images", &small, Kind::Images, 5e-4),
+        ("images, fluxes", &small, Kind::ImagesAndFlux, 5e-4),
+        ("grid", &voxels, Kind::Images, 2e-2),
+    ];
+    for (name, representation, kind, step) in cases {
+        let draw = Drawn::Frames(vec![1, 3]);
+        let Some(mut both) = Both::new(representation, (kind, draw), (false, None)) else {
+            return;
+        };
+        let parameters = both.now().parameters;
+        let (_, gradient) = both.device(&parameters);
+        let along: Vec<f32> =
+            (0..parameters.len()).map(|k| (k as f32 * 1.7).sin() * parameters[k].abs()).collect();
+        let product: f64 =
+            gradient.iter().zip(&along).map(|(g, v)| f64::from(*g) * f64::from(*v)).sum();
+        let mut loss = |step: f32| {
+            let moved: Vec<f32> =
+                parameters.iter().zip(&along).map(|(x, v)| x + step * v).collect();
+            both.device(&moved).0.total
+        };
+        let slope = (loss(step) - loss(-step)) / f64::from(2.0 * step);
+        println!("{name}: slope {slope:.6}, product {product:.6}");
+        assert!((slope / product - 1.0).abs() < 2e-3, "{name}: {slope} {product}");
+    }
+}
