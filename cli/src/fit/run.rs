@@ -1,5 +1,7 @@
 //! The run: steps, log, checkpoints, results.
 
+mod record;
+
 use super::axis_scan;
 use super::band_search;
 use super::data;
@@ -20,15 +22,14 @@ use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
 use crate::ranks::Listener;
 use anyhow::{Context, bail};
-use indicatif::ProgressBar;
 use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::linear::Change;
 use kerrlight_tomo::fit::settings::{AxisSearch, FitFile, Kind, Start};
 use kerrlight_tomo::fit::setup::{self, Instrument, Measured};
-use kerrlight_tomo::fit::{Loss, Motion, Objective, Outcome, State, Trainer, checkpoint};
+use kerrlight_tomo::fit::{Motion, Objective, Outcome, State, Trainer, checkpoint};
 use kerrlight_tomo::representation::Registry;
 use kerrlight_tomo::volume::Volume;
-use serde_json::{Value, json};
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -355,70 +356,5 @@ impl Run<'_> {
         }
         bar.finish_and_clear();
         Ok(())
-    }
-
-    /// Logs what a step has done, and tells of what is unusual.
-    fn record(
-        &mut self,
-        state: &mut State<f32>,
-        outcome: Outcome,
-        bar: &ProgressBar,
-    ) -> anyhow::Result<()> {
-        let (step, training) = (state.now.step, &self.file.training);
-        let line = match outcome {
-            Outcome::Done(loss)
-                if step.is_multiple_of(training.log_every) || step == training.steps =>
-            {
-                self.line(state, &loss)
-            }
-            Outcome::Done(_) => return Ok(()),
-            Outcome::SteppedBack { loss, to, caution } => {
-                bar.println(format!(
-                    "the loss rose to {loss:e}: back to step {to}, learning rates scaled by {caution}"
-                ));
-                json!({"step": step, "diverged_loss": loss.to_string(), "caution": caution})
-            }
-            Outcome::Converged => {
-                bar.println(format!("converged at step {step}: no further decrease of the loss"));
-                json!({"step": step, "converged": true, "loss": state.now.loss})
-            }
-        };
-        self.folder.log(&line)
-    }
-
-    fn line(&mut self, state: &State<f32>, loss: &Loss) -> Value {
-        let map = |names: Vec<&str>, values: &[f64]| -> serde_json::Map<String, Value> {
-            let pairs = names.into_iter().zip(values);
-            pairs.map(|(name, value)| (name.to_owned(), json!(value))).collect()
-        };
-        let chi2 = map(self.trainer.objective.names(), &loss.terms);
-        let now = &state.now;
-        let mut line = json!({
-            "step": now.step,
-            "seconds": self.begun.elapsed().as_secs_f64(),
-            "loss": now.loss,
-            "chi2_per_datum": chi2,
-            "evaluations": loss.points,
-        });
-        if let Some(penalties) = &self.trainer.training.penalties {
-            line["penalties"] = json!(map(penalties.names(), &loss.penalties));
-        }
-        if !matches!(self.file.axis, AxisSearch::Known {}) {
-            line["axis"] = json!(now.axis.vector());
-        }
-        if let Some(mask) = &now.occupancy {
-            line["occupied"] = json!(mask.fraction());
-        }
-        if let Some(truth) = &self.measured.truth {
-            line["axis_dot_truth"] = json!(now.axis.dot(truth.axis()));
-        }
-        if let Some(truth) = &self.true_volume
-            && let Some(found) = results::compare(self.file, &mut self.trainer, state, truth)
-        {
-            line["psnr_db"] = json!(found.psnr_db);
-            line["nrmse"] = json!(found.nrmse);
-            line["correlation"] = json!(found.correlation);
-        }
-        line
     }
 }

@@ -1,0 +1,74 @@
+//! What a run says of its steps.
+
+use super::{Run, results};
+use indicatif::ProgressBar;
+use kerrlight_tomo::fit::settings::AxisSearch;
+use kerrlight_tomo::fit::{Loss, Outcome, State};
+use serde_json::{Value, json};
+
+impl Run<'_> {
+    /// Logs what a step has done, and tells of what is unusual.
+    pub(super) fn record(
+        &mut self,
+        state: &mut State<f32>,
+        outcome: Outcome,
+        bar: &ProgressBar,
+    ) -> anyhow::Result<()> {
+        let (step, training) = (state.now.step, &self.file.training);
+        let line = match outcome {
+            Outcome::Done(loss)
+                if step.is_multiple_of(training.log_every) || step == training.steps =>
+            {
+                self.line(state, &loss)
+            }
+            Outcome::Done(_) => return Ok(()),
+            Outcome::SteppedBack { loss, to, caution } => {
+                bar.println(format!(
+                    "the loss rose to {loss:e}: back to step {to}, learning rates scaled by {caution}"
+                ));
+                json!({"step": step, "diverged_loss": loss.to_string(), "caution": caution})
+            }
+            Outcome::Converged => {
+                bar.println(format!("converged at step {step}: no further decrease of the loss"));
+                json!({"step": step, "converged": true, "loss": state.now.loss})
+            }
+        };
+        self.folder.log(&line)
+    }
+
+    fn line(&mut self, state: &State<f32>, loss: &Loss) -> Value {
+        let map = |names: Vec<&str>, values: &[f64]| -> serde_json::Map<String, Value> {
+            let pairs = names.into_iter().zip(values);
+            pairs.map(|(name, value)| (name.to_owned(), json!(value))).collect()
+        };
+        let chi2 = map(self.trainer.objective.names(), &loss.terms);
+        let now = &state.now;
+        let mut line = json!({
+            "step": now.step,
+            "seconds": self.begun.elapsed().as_secs_f64(),
+            "loss": now.loss,
+            "chi2_per_datum": chi2,
+            "evaluations": loss.points,
+        });
+        if let Some(penalties) = &self.trainer.training.penalties {
+            line["penalties"] = json!(map(penalties.names(), &loss.penalties));
+        }
+        if !matches!(self.file.axis, AxisSearch::Known {}) {
+            line["axis"] = json!(now.axis.vector());
+        }
+        if let Some(mask) = &now.occupancy {
+            line["occupied"] = json!(mask.fraction());
+        }
+        if let Some(truth) = &self.measured.truth {
+            line["axis_dot_truth"] = json!(now.axis.dot(truth.axis()));
+        }
+        if let Some(truth) = &self.true_volume
+            && let Some(found) = results::compare(self.file, &mut self.trainer, state, truth)
+        {
+            line["psnr_db"] = json!(found.psnr_db);
+            line["nrmse"] = json!(found.nrmse);
+            line["correlation"] = json!(found.correlation);
+        }
+        line
+    }
+}
