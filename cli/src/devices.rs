@@ -24,8 +24,7 @@ pub struct DeviceOption {
 /// Where the steps of a fit are taken.
 #[derive(Debug, Args)]
 pub struct StepsOption {
-    /// Where steps are taken: `cpu`, `gpu` (the first graphics device), or a name or number of
-    /// `kerrlight devices` [default: cpu]
+    /// Where steps are taken: cpu, gpu or a name of `devices` [default: cpu]
     #[arg(long = "device", value_name = "DEVICE")]
     name: Option<String>,
 }
