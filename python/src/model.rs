@@ -7,6 +7,7 @@ use kerrlight_geodesic::Kerr;
 use kerrlight_tomo::Error;
 use kerrlight_tomo::dynamics::Axis;
 use kerrlight_tomo::fit::{Batch, ForwardModel, PolarizedView, Redshift, Sightlines};
+use kerrlight_tomo::polarization::StokesParameter;
 use kerrlight_tomo::representation::{
     Activation, Coordinates, Float, Gradient, Grid, GridSettings, Representation, Workspace,
 };
