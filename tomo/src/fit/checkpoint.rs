@@ -1,7 +1,7 @@
 //! A fit's memory as bytes: safetensors, with a header in TOML that a person can read.
 
 use super::occupancy::Occupancy;
-use super::train::{Progress, State};
+use super::state::{Progress, State};
 use crate::Error;
 use crate::dynamics::Axis;
 use crate::optimise::{AdamState, LbfgsState};

@@ -1,7 +1,6 @@
-//! The forward model: from a field of emission at the reference time to the pixels of a movie. Representations
-//! and data terms share it.
+//! The forward model: all that stands between a field of emission at the reference time and the pixels of a movie,
+//! and does not change in a fit. Representations and data terms share it.
 
-use super::batch::Batch;
 use super::fall::Fall;
 use super::occupancy::Occupancy;
 use super::shift::Shift;
@@ -10,7 +9,7 @@ use super::stokes::{Planes, Seen};
 use crate::Error;
 use crate::dynamics::{AngularVelocity, Axis, Injection};
 use crate::polarization::{Stokes, StokesParameter};
-use crate::representation::{Representation, Workspace};
+use crate::representation::Representation;
 use crate::simd::Float;
 use kerrlight_geodesic::Kerr;
 use rayon::prelude::*;
@@ -206,86 +205,6 @@ impl<T: Float> ForwardModel<T> {
             *weight = T::of(plain * factor);
         }
         self.weighted_for = Some(axis);
-    }
-
-    /// Images of these frames, one after the other: `movie` is overwritten. [`weigh`](Self::weigh) comes first.
-    pub fn movie(
-        &self,
-        field: Field<'_, T>,
-        frames: &[usize],
-        batch: &mut Batch<T>,
-        workspace: &mut Workspace,
-        movie: &mut [T],
-    ) {
-        assert_eq!(movie.len(), frames.len() * self.pixels);
-        for (frame, image) in frames.iter().zip(movie.chunks_exact_mut(self.pixels)) {
-            self.gather_frame(field, *frame, batch);
-            let at = Batch::coordinates(&batch.columns, field.representation.dimension());
-            field.representation.eval(field.parameters, at, &mut batch.values, workspace);
-            self.sum_rays(batch, image);
-        }
-    }
-
-    /// The image of one frame, whose gradient ([`vjp_recorded`](Representation::vjp_recorded) of the batch) comes next: `image` is
-    /// overwritten.
-    pub fn image_recorded(
-        &self,
-        field: Field<'_, T>,
-        frame: usize,
-        batch: &mut Batch<T>,
-        workspace: &mut Workspace,
-        image: &mut [T],
-    ) {
-        self.gather_frame(field, frame, batch);
-        let at = Batch::coordinates(&batch.columns, field.representation.dimension());
-        field.representation.eval_recorded(field.parameters, at, &mut batch.values, workspace);
-        self.sum_rays(batch, image);
-    }
-
-    /// All nodes of a frame, and room for their values.
-    fn gather_frame(&self, field: Field<'_, T>, frame: usize, batch: &mut Batch<T>) {
-        batch.set((0..self.rays()).map(|ray| (ray as u32, frame as u32)));
-        batch.gather_field(self, field);
-        batch.values.resize(batch.points(), T::zero());
-    }
-
-    /// Values of all rays summed into their pixels.
-    fn sum_rays(&self, batch: &Batch<T>, image: &mut [T]) {
-        image.fill(T::zero());
-        for (ray, range) in batch.starts.windows(2).enumerate() {
-            let range = range[0]..range[1];
-            if let Some(planes) = &self.planes {
-                self.add_planes(planes, ray, range, batch, image);
-                continue;
-            }
-            let sum = batch.columns.weight[range.clone()].iter().zip(&batch.values[range]);
-            let sum: T = sum.map(|(w, e)| *w * *e).sum();
-            self.put(image, ray, sum);
-        }
-    }
-
-    /// A ray's light into its pixel.
-    pub(super) fn put<U: core::ops::AddAssign>(&self, image: &mut [U], ray: usize, light: U) {
-        let pixel = &mut image[self.pixel[ray] as usize];
-        if self.is_flux { *pixel += light } else { *pixel = light }
-    }
-
-    /// A ray's light into its pixels of all images.
-    fn add_planes(
-        &self,
-        planes: &Planes<T>,
-        ray: usize,
-        range: core::ops::Range<usize>,
-        batch: &Batch<T>,
-        image: &mut [T],
-    ) {
-        let pixel = self.pixel[ray] as usize;
-        for k in range {
-            let light = batch.columns.weight[k] * batch.values[k];
-            for (plane, factor) in planes.of(batch.columns.node[k]).iter().enumerate() {
-                image[pixel + plane * planes.stride] += light * *factor;
-            }
-        }
     }
 }
 

@@ -43,12 +43,15 @@
 pub mod band;
 mod batch;
 pub mod checkpoint;
+mod compiled;
 mod curve_term;
+mod delegated;
 mod device;
 mod fall;
 mod forward_model;
 #[cfg(feature = "wgpu")]
 pub mod graphics;
+mod images;
 mod known_field;
 pub mod linear;
 mod movie_loss;
@@ -65,14 +68,15 @@ pub mod settings;
 pub mod setup;
 mod shift;
 mod sightlines;
+mod state;
 pub mod static_image;
 mod steps;
 mod stokes;
 mod terms;
 #[cfg(test)]
 mod tests;
-mod train;
 mod trainer;
+mod training;
 pub mod verdict;
 pub mod world;
 
@@ -87,7 +91,9 @@ pub use pixel_rays::RingRays;
 pub use regulariser::{Regulariser, Shape};
 pub use selection::Selection;
 pub use sightlines::{Region, Sampling, SightlineRequest, Sightlines};
+pub use state::{Diverged, Outcome, Progress, State};
 pub use steps::Place;
 pub use stokes::{PolarizedView, Seen};
 pub use terms::{FrameTerm, ImageTerm, IntensityTerm, LightCurveTerm, Scan, ScanTerm};
-pub use train::{BatchSize, Diverged, OccupancyPlan, Outcome, Progress, State, Trainer, Training};
+pub use trainer::Trainer;
+pub use training::{BatchSize, OccupancyPlan, Training};

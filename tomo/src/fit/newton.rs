@@ -1,8 +1,9 @@
 //! Quasi-Newton steps of a fit, of its parameters and, where it is learnt, its axis.
 
 use super::objective::Loss;
+use super::state::{Outcome, Progress};
 use super::steps::Place;
-use super::train::{Outcome, Progress, Trainer};
+use super::trainer::Trainer;
 use crate::dynamics::Axis;
 use crate::optimise::{Lbfgs, LbfgsState, Step};
 use crate::simd::Float;

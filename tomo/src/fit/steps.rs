@@ -6,16 +6,15 @@ use super::occupancy::Occupancy;
 use super::parts::{Cut, nodes};
 use super::penalties::Draw;
 use super::selection::Selection;
-use super::train::{BatchSize, Diverged, Outcome, Progress, State, Trainer, Training};
+use super::state::{Diverged, Outcome, Progress, State, step_back};
+use super::trainer::Trainer;
+use super::training::{BatchSize, Training};
 use crate::Error;
 use crate::dynamics::Axis;
 use crate::simd::Float;
 use rand::seq::index;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-
-/// Most returns of a fit.
-const MOST_SETBACKS: u32 = 12;
 
 /// Where a loss is taken.
 #[derive(Clone, Copy)]
@@ -185,23 +184,6 @@ impl<T: Float> Trainer<'_, T> {
     pub(super) fn rate(&self, now: &Progress<T>, ahead: u64) -> f64 {
         self.part(now, ahead) * self.training.rate.rate(now.step + ahead)
     }
-}
-
-/// Back to the last good state, for the loss of `step`.
-pub(super) fn step_back<T: Float>(
-    state: &mut State<T>,
-    loss: f64,
-    step: u64,
-) -> Result<Outcome, Diverged> {
-    let diverged = Diverged { loss, step, setbacks: state.setbacks };
-    let Some(good) = &mut state.good else { return Err(diverged) };
-    if state.setbacks >= MOST_SETBACKS {
-        return Err(diverged);
-    }
-    state.setbacks += 1;
-    good.caution *= 0.5;
-    state.now = (**good).clone();
-    Ok(Outcome::SteppedBack { loss, to: good.step, caution: good.caution })
 }
 
 /// A checksum of what all ranks have in common before they add up their parts.

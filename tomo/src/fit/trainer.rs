@@ -1,115 +1,57 @@
-//! What programs ask of a fit.
-//!
-//! Fits run in single precision, tests of their derivatives in double. What is generic is compiled anew in every program that
-//! uses it; these methods are not, and are compiled here once.
+//! A fit with its memory.
 
-use super::forward_model::{Field, Motion};
-use super::train::{Outcome, Progress, State, Trainer};
-use crate::Error;
-use crate::frames::Frames;
-use crate::points::Coordinates;
+use super::device::Delegate;
+use super::objective::{Buffers, Objective};
+use super::parts::Ranks;
+use super::penalties::ProbeBuffers;
+use super::training::Training;
 use crate::representation::Representation;
 use crate::simd::Float;
 
-macro_rules! in_precision {
-    ($number:ty) => {
-        impl Trainer<'_, $number> {
-            /// One step. It depends on the state and the settings alone: not on threads, and not on what
-            /// this trainer did before.
-            ///
-            /// # Errors
-            /// If the loss keeps diverging.
-            pub fn step(&mut self, state: &mut State<$number>) -> Result<Outcome, Error> {
-                self.advance(state)
-            }
+/// A fit with its memory.
+pub struct Trainer<'a, T> {
+    /// What is minimised.
+    pub objective: Objective<T>,
+    /// The field.
+    pub representation: &'a dyn Representation<T>,
+    /// How it is run.
+    pub training: Training,
+    /// Other processes that have parts of each step, if there are any.
+    pub ranks: Option<Box<dyn Ranks<T>>>,
+    /// A device that takes the steps in place of this processor, if there is one.
+    pub device: Option<Delegate<T>>,
+    pub(super) observed: Vec<usize>,
+    pub(super) buffers: Buffers<T>,
+    pub(super) probe: ProbeBuffers<T>,
+    pub(super) gradient: Vec<T>,
+    pub(super) pairs: Vec<(u32, u32)>,
+    pub(super) frames: Vec<usize>,
+    /// Gradients of parts that are no longer used.
+    pub(super) spare: Vec<Vec<T>>,
+}
 
-            /// The movie of these frames, with the mask of what shines or without.
-            pub fn movie(
-                &mut self,
-                now: &Progress<$number>,
-                frames: &[usize],
-                masked: bool,
-            ) -> Vec<$number> {
-                self.predict(now, frames, masked)
-            }
-
-            /// The same, in memory or in a file.
-            ///
-            /// # Errors
-            /// If there is no room for it.
-            pub fn images(
-                &mut self,
-                now: &Progress<$number>,
-                frames: &[usize],
-                masked: bool,
-            ) -> Result<Frames<$number>, Error> {
-                Frames::made((frames.len(), self.objective.model.pixels()), |sink| {
-                    frames.iter().try_for_each(|frame| sink(&self.predict(now, &[*frame], masked)))
-                })
-            }
-
-            /// Emission at points at the reference time.
-            pub fn emission(
-                &mut self,
-                now: &Progress<$number>,
-                points: [&[$number]; 3],
-            ) -> Vec<$number> {
-                self.buffers.emission(self.representation, &now.parameters, points)
-            }
-
-            /// Emission at points (M) at another time, M since the reference time; `motion` is that of the forward
-            /// model.
-            pub fn emission_at(
-                &mut self,
-                now: &Progress<$number>,
-                motion: &Motion,
-                time: f64,
-                points: [&[$number]; 3],
-            ) -> Vec<$number> {
-                self.emitted(now, (motion, time), points)
-            }
+impl<'a, T: Float> Trainer<'a, T> {
+    /// A fit of a representation.
+    pub fn new(
+        objective: Objective<T>,
+        representation: &'a dyn Representation<T>,
+        training: Training,
+    ) -> Self {
+        let (observed, gradient) =
+            (objective.observed(), vec![T::zero(); representation.parameters()]);
+        Self {
+            objective,
+            representation,
+            training,
+            ranks: None,
+            device: None,
+            observed,
+            buffers: Buffers::default(),
+            probe: ProbeBuffers::default(),
+            gradient,
+            pairs: Vec::new(),
+            frames: Vec::new(),
+            spare: Vec::new(),
         }
-    };
-}
-
-in_precision!(f32);
-#[cfg(test)]
-in_precision!(f64);
-
-impl<T: Float> Progress<T> {
-    /// The field that has been learnt so far.
-    pub fn field<'a>(&'a self, representation: &'a dyn Representation<T>) -> Field<'a, T> {
-        let Progress { parameters, axis, occupancy, .. } = self;
-        Field { representation, parameters, axis: *axis, occupancy: occupancy.as_ref() }
-    }
-}
-
-impl<T: Float> Trainer<'_, T> {
-    fn predict(&mut self, now: &Progress<T>, frames: &[usize], masked: bool) -> Vec<T> {
-        self.objective.model.weigh(now.axis);
-        let mut movie = vec![T::zero(); frames.len() * self.objective.model.pixels()];
-        let mut field = now.field(self.representation);
-        field.occupancy = field.occupancy.filter(|_| masked);
-        self.objective.movie(field, frames, &mut self.buffers, &mut movie);
-        movie
-    }
-
-    fn emitted(
-        &mut self,
-        now: &Progress<T>,
-        (motion, time): (&Motion, f64),
-        points: [&[T]; 3],
-    ) -> Vec<T> {
-        let (x, y, z) = (points[0], points[1], points[2]);
-        let matter = motion.matter(now.axis, time, points);
-        let times = vec![T::of(time); x.len()];
-        let at = match self.representation.dimension() {
-            4 => Coordinates::txyz(&times, x, y, z),
-            _ => Coordinates::xyz(&matter[0], &matter[1], &matter[2]),
-        };
-        let mut values = vec![T::zero(); x.len()];
-        let workspace = self.buffers.workspace();
-        self.representation.eval(&now.parameters, at, &mut values, workspace);
-        values
     }
 }

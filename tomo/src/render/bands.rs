@@ -2,8 +2,9 @@
 //! a band puts the band together, so that only a few bands are in memory at any time.
 
 use super::adaptive::{self, Adaptive};
-use super::pixels::{Pixels, Workspace, uniform};
+use super::pixels::{Pixels, uniform};
 use super::tally::Tally;
+use super::workspace::Workspace;
 use super::{Progress, Raster, RenderError};
 use crate::Error;
 use crate::transport::Meter;

@@ -1,7 +1,13 @@
 //! Where rays go.
 
-use super::rings::Square;
 use crate::scene::Scene;
+
+/// A square of the picture, in the view's coordinates.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Square {
+    pub center: (f64, f64),
+    pub size: f64,
+}
 
 /// Pixel centres on a regular grid, rows from the top (largest β), square pixels, `side`² rays
 /// a pixel.

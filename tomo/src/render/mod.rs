@@ -18,6 +18,7 @@ mod raw;
 mod requested;
 mod rings;
 mod tally;
+mod workspace;
 
 pub use channels::{CHANNELS, ChannelKind};
 pub use choice::all_channels;
@@ -33,10 +34,10 @@ use crate::image::Picture;
 use crate::image::exr::Layout;
 use crate::scene::{Rings, Scene};
 use crate::transport::{Assets, Meter, PreparedScene, RayResult, Scratch, names};
-use grid::Grid;
+use grid::{Grid, Square};
 use kerrlight_geodesic::RayDevice;
 use rayon::prelude::*;
-use rings::{Resolver, Square};
+use rings::Resolver;
 use std::sync::{Arc, Mutex, PoisonError};
 use tally::{Tally, own_unit};
 

@@ -1,33 +1,10 @@
 //! What a mesh file holds, whatever its format.
 
+use super::MeshError;
 use super::texture::Texture;
-use crate::Error;
 
 /// Reads what a mesh file refers to by a relative name: materials, buffers, pictures.
 pub type Resources<'a> = dyn Fn(&str) -> Result<Vec<u8>, String> + 'a;
-
-/// Why bytes are no mesh.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum MeshError {
-    /// Not an OBJ file.
-    #[error("not a readable OBJ file: {0}")]
-    Obj(#[from] tobj::LoadError),
-    /// Not a glTF or GLB file.
-    #[error("not a readable glTF file: {0}")]
-    Gltf(#[from] gltf::Error),
-    /// A file that it refers to cannot be read.
-    #[error("`{name}`, to which it refers, cannot be read: {why}")]
-    Resource {
-        /// The name as it stands in the file.
-        name: String,
-        /// What went wrong.
-        why: String,
-    },
-    /// It is no mesh of triangles.
-    #[error("{0}")]
-    Content(String),
-}
 
 /// A triangle of a file.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,23 +57,8 @@ pub struct MeshFile {
 const MOST_TRIANGLES: usize = 10_000_000;
 
 impl MeshFile {
-    /// Decodes an OBJ, glTF or GLB file; `resources` reads what it refers to.
-    ///
-    /// # Errors
-    /// If the bytes are none of these, if something they refer to cannot be read, if there is no
-    /// triangle or a coordinate is no number.
-    pub fn decode(bytes: &[u8], resources: &Resources<'_>) -> Result<Self, Error> {
-        let first = bytes.iter().find(|byte| !byte.is_ascii_whitespace());
-        let file = if bytes.starts_with(b"glTF") || first == Some(&b'{') {
-            super::gltf_file::decode(bytes, resources)?
-        } else {
-            super::obj_file::decode(bytes, resources)?
-        };
-        file.check()?;
-        Ok(file)
-    }
-
-    fn check(&self) -> Result<(), MeshError> {
+    /// Whether its numbers make triangles and colours.
+    pub(super) fn check(&self) -> Result<(), MeshError> {
         let fail = |why: String| Err(MeshError::Content(why));
         if self.triangles.is_empty() {
             return fail("it holds no triangles".to_owned());

@@ -1,7 +1,8 @@
 //! glTF 2.0, as text or binary. Node transforms are applied; skins, morph targets and animations
 //! are not.
 
-use super::file::{Layer, Material, MeshError, MeshFile, RawTriangle, Resources, resource};
+use super::MeshError;
+use super::file::{Layer, Material, MeshFile, RawTriangle, Resources, resource};
 use super::texture::Texture;
 use crate::memory;
 use gltf::mesh::Mode;

@@ -1,12 +1,15 @@
 //! Triangle meshes as surfaces that shine, hide, or both. Positions are r n, Boyer–Lindquist
 //! coordinates taken as Cartesian, as everywhere in a scene.
 
+mod decode;
+mod error;
 mod file;
 mod gltf_file;
 mod obj_file;
 mod texture;
 
-pub use file::{Material, MeshError, MeshFile, RawTriangle, Resources};
+pub use error::MeshError;
+pub use file::{Material, MeshFile, RawTriangle, Resources};
 
 use crate::Error;
 use crate::scene::{Mesh, MeshVelocity};

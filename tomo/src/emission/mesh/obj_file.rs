@@ -1,6 +1,7 @@
 //! Wavefront OBJ with its MTL.
 
-use super::file::{Layer, Material, MeshError, MeshFile, RawTriangle, Resources, resource};
+use super::MeshError;
+use super::file::{Layer, Material, MeshFile, RawTriangle, Resources, resource};
 use super::texture::Texture;
 use std::cell::RefCell;
 

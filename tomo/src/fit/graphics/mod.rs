@@ -21,8 +21,9 @@ mod terms;
 
 use super::device::{DeviceError, Drawn, StepDevice, Stretch, Taken};
 use super::objective::{Loss, Objective};
+use super::state::Progress;
 use super::terms::ImageTerm;
-use super::train::{Progress, Training};
+use super::training::Training;
 use crate::Error;
 use crate::dynamics::Axis;
 use crate::representation::Representation;

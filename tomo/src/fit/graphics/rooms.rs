@@ -2,7 +2,7 @@
 
 use super::pixels::Room;
 use crate::fit::objective::Objective;
-use crate::fit::train::BatchSize;
+use crate::fit::training::BatchSize;
 
 /// The most points at a time, if a frame has no more.
 const POINTS: usize = 1 << 21;

@@ -3,7 +3,8 @@
 use super::training::{network, objective, settings, start};
 use super::*;
 use crate::fit::parts::{Part, Ranks, combine, nodes, share};
-use crate::fit::train::{Trainer, Training};
+use crate::fit::trainer::Trainer;
+use crate::fit::training::Training;
 use std::ops::Range;
 use std::sync::{Arc, Barrier, Mutex};
 

@@ -1,6 +1,5 @@
 //! The covariance of a world of which data may leave a part open.
 
-use super::polish::curve;
 use super::{Free, World};
 use nalgebra::{DMatrix, SymmetricEigen};
 
@@ -32,7 +31,7 @@ pub(super) fn covariance(
     }
     let of_prior = |k: usize| {
         let scale = free[k].parameter.scale();
-        let [_, bend] = curve(&free[k].prior, world.get(free[k].parameter), WIDTH * scale);
+        let [_, bend] = free[k].prior.curve(world.get(free[k].parameter), WIDTH * scale);
         bend * scale * scale
     };
     let likelihood = DMatrix::from_fn(n, n, |a, b| {

@@ -4,9 +4,9 @@
 //! Images are differentiated by differences as wide as the ripples that rays next to the critical curve make: exact
 //! derivatives are those of single ripples.
 
+use super::World;
 use super::covariance::covariance;
 use super::problem::{Estimate, WorldProblem};
-use super::{Prior, World};
 use crate::Error;
 use crate::fit::linear::Profile;
 use crate::fit::{Batch, Field, ForwardModel};
@@ -157,7 +157,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         };
         for (k, free) in self.free.iter().enumerate() {
             let scale = free.parameter.scale();
-            let [slope, bend] = curve(&free.prior, at.world.get(free.parameter), WIDTH * scale);
+            let [slope, bend] = free.prior.curve(at.world.get(free.parameter), WIDTH * scale);
             bowl.slopes[k] += slope * scale;
             bowl.bends[(k, k)] += bend * scale * scale;
         }
@@ -193,40 +193,5 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         let (mut batch, mut workspace) = (Batch::default(), Workspace::new());
         forward.movie(field, self.frames, &mut batch, &mut workspace, &mut movie);
         Ok(movie)
-    }
-}
-
-/// Slope and second derivative of a prior's penalty by differences inside its bounds.
-pub(super) fn curve(prior: &Prior, x: f64, width: f64) -> [f64; 2] {
-    let [low, high] = prior.bounds();
-    let x = x.clamp(low + width, high - width);
-    // Rounding must not lead across a bound.
-    let [before, here, after] =
-        [x - width, x, x + width].map(|x| prior.penalty(x.clamp(low, high)));
-    let slope = (after - before) / (2.0 * width);
-    [slope, ((after - 2.0 * here + before) / (width * width)).max(0.0)]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn exact_priors_curve_like_their_densities() {
-        let [slope, bend] = curve(&Prior::Normal { mean: 0.3, sigma: 0.2 }, 0.5, 1e-3);
-        assert!((slope - 5.0).abs() < 1e-9 && (bend - 25.0).abs() < 1e-6, "{slope} {bend}");
-        // 0.25 + 0.1 - 0.1 is below 0.25.
-        for (low, x) in [(0.0, 1.0), (0.25, 0.25)] {
-            assert_eq!(curve(&Prior::Uniform { low, high: 1.0 }, x, 0.1), [0.0, 0.0]);
-        }
-        for degrees in 1..90 {
-            let low = f64::from(degrees).to_radians();
-            let [slope, bend] = curve(&Prior::Isotropic { low, high: 3.0 }, low, 0.02);
-            assert!(slope.is_finite() && bend.is_finite(), "{degrees}");
-        }
-        let isotropic = Prior::Isotropic { low: 0.0, high: core::f64::consts::PI };
-        let [slope, bend] = curve(&isotropic, 1.0, 1e-3);
-        assert!((slope + 1.0 / 1f64.tan()).abs() < 1e-5);
-        assert!((bend - 1.0 / 1f64.sin().powi(2)).abs() < 1e-4);
     }
 }

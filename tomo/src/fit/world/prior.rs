@@ -62,6 +62,17 @@ impl Prior {
         }
     }
 
+    /// Slope and second derivative of its penalty by differences of half width `width` inside its bounds.
+    pub(super) fn curve(&self, x: f64, width: f64) -> [f64; 2] {
+        let [low, high] = self.bounds();
+        let x = x.clamp(low + width, high - width);
+        // Rounding must not lead across a bound.
+        let [before, here, after] =
+            [x - width, x, x + width].map(|x| self.penalty(x.clamp(low, high)));
+        let slope = (after - before) / (2.0 * width);
+        [slope, ((after - 2.0 * here + before) / (width * width)).max(0.0)]
+    }
+
     /// Its standard deviation.
     pub fn deviation(&self) -> f64 {
         match *self {
@@ -175,5 +186,24 @@ mod tests {
         assert!((whole.quantile(0.25) - 0.5f64.acos()).abs() < 1e-12);
         assert_eq!(Prior::Uniform { low: -1.0, high: 3.0 }.quantile(0.5), 1.0);
         assert!(whole.penalty(-0.1).is_infinite());
+    }
+
+    #[test]
+    fn exact_priors_curve_like_their_densities() {
+        let [slope, bend] = Prior::Normal { mean: 0.3, sigma: 0.2 }.curve(0.5, 1e-3);
+        assert!((slope - 5.0).abs() < 1e-9 && (bend - 25.0).abs() < 1e-6, "{slope} {bend}");
+        // 0.25 + 0.1 - 0.1 is below 0.25.
+        for (low, x) in [(0.0, 1.0), (0.25, 0.25)] {
+            assert_eq!(Prior::Uniform { low, high: 1.0 }.curve(x, 0.1), [0.0, 0.0]);
+        }
+        for degrees in 1..90 {
+            let low = f64::from(degrees).to_radians();
+            let [slope, bend] = Prior::Isotropic { low, high: 3.0 }.curve(low, 0.02);
+            assert!(slope.is_finite() && bend.is_finite(), "{degrees}");
+        }
+        let isotropic = Prior::Isotropic { low: 0.0, high: core::f64::consts::PI };
+        let [slope, bend] = isotropic.curve(1.0, 1e-3);
+        assert!((slope + 1.0 / 1f64.tan()).abs() < 1e-5);
+        assert!((bend - 1.0 / 1f64.sin().powi(2)).abs() < 1e-4);
     }
 }

@@ -1,5 +1,6 @@
 //! The turning Earth: sidereal time, and baselines as a source sees them.
 
+mod leap_seconds;
 mod sidereal;
 mod ut1;
 mod view;

@@ -1,10 +1,9 @@
 //! UTC and sidereal time, by the IAU's SOFA routines (the crate `sofars`).
 
+use super::leap_seconds::{MJD_ZERO, tai_minus_utc};
 use super::{EarthError, Ut1};
 use crate::Error;
 
-/// JD of MJD 0.
-const MJD_ZERO: f64 = 2_400_000.5;
 /// Mean solar over mean sidereal time, as eht-imaging rounds it.
 const SOLAR_PER_SIDEREAL: f64 = 0.997_269_560_184_8;
 
@@ -15,20 +14,6 @@ pub struct Moment {
     pub mjd: i32,
     /// Hours of UTC since then; may be negative or beyond 24.
     pub hours_utc: f64,
-}
-
-/// TAI − UTC in seconds on a day.
-pub(super) fn tai_minus_utc(mjd: i32) -> Result<f64, EarthError> {
-    let bad = || EarthError::Day(f64::from(mjd));
-    if !(41317..=90000).contains(&mjd) {
-        return Err(bad());
-    }
-    let (year, month, day, _) = sofars::cal::jd2cal(MJD_ZERO, f64::from(mjd)).map_err(|_| bad())?;
-    // A positive status warns of a year beyond the routine's table of leap seconds.
-    match sofars::ts::dat(year, month, day, 0.0) {
-        Ok(seconds) => Ok(seconds),
-        Err(_) => Err(bad()),
-    }
 }
 
 impl Moment {

@@ -1,7 +1,8 @@
 //! UT1 − UTC, from a built-in table of the International Earth Rotation and Reference Systems
 //! Service (series EOP 20 C04, daily since 1999) or as given.
 
-use super::{EarthError, sidereal};
+use super::EarthError;
+use super::leap_seconds::tai_minus_utc;
 use crate::Error;
 use std::sync::OnceLock;
 
@@ -72,7 +73,7 @@ pub fn ut1_minus_utc(mjd_utc: f64) -> Result<f64, Error> {
     let day = (mjd_utc.floor() as i32).min(last - 1);
     let seconds = |day: i32| f64::from(microseconds[(day - first) as usize]) * 1e-6;
     // Within a day UT1 − TAI is smooth; the leap second comes at its end.
-    let leap = sidereal::tai_minus_utc(day + 1)? - sidereal::tai_minus_utc(day)?;
+    let leap = tai_minus_utc(day + 1)? - tai_minus_utc(day)?;
     let change = seconds(day + 1) - leap - seconds(day);
     Ok(seconds(day) + (mjd_utc - f64::from(day)) * change)
 }

@@ -16,9 +16,10 @@ mod tolerance;
 
 pub(super) use tolerance::tolerance;
 
-use super::grid::Grid;
-use super::pixels::{Pixel, Workspace};
-use super::rings::{Counted, Resolver, Square};
+use super::grid::{Grid, Square};
+use super::pixels::Pixel;
+use super::rings::{Counted, Resolver};
+use super::workspace::Workspace;
 use crate::Error;
 use crate::transport::{PreparedScene, RayResult};
 use cell::Cell;

@@ -3,7 +3,7 @@
 use super::Adaptive;
 use crate::Error;
 use crate::render::grid::Grid;
-use crate::render::pixels::Workspace;
+use crate::render::workspace::Workspace;
 use crate::transport::PreparedScene;
 use rayon::prelude::*;
 

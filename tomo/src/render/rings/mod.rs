@@ -11,7 +11,7 @@
 mod resolve;
 mod square;
 
-pub(super) use resolve::{Counted, Resolver, Square};
+pub(super) use resolve::{Counted, Resolver};
 
 use crate::transport::View;
 use core::f64::consts::TAU;

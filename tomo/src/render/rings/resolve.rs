@@ -2,7 +2,8 @@
 
 use super::{RingStrata, Stratum};
 use crate::Error;
-use crate::render::pixels::Workspace;
+use crate::render::grid::Square;
+use crate::render::workspace::Workspace;
 use crate::transport::{Layers, Mixed, PreparedScene, RayResult};
 use kerrlight_geodesic::Outcome;
 use std::ops::Range;
@@ -13,13 +14,6 @@ pub struct Resolver {
     strata: RingStrata,
     /// Whether a disc may hide them.
     hides: bool,
-}
-
-/// A square of the picture, in the view's coordinates.
-#[derive(Debug, Clone, Copy)]
-pub struct Square {
-    pub center: (f64, f64),
-    pub size: f64,
 }
 
 /// Rays that a square got besides the one at its centre, at one time.

@@ -4,8 +4,9 @@
 //! depend on the batch alone, so that threads cannot change a bit of the result.
 
 use super::super::workspace::Lines;
-use super::super::{Coordinates, CoordinatesMut, Gradient, Link};
+use super::super::{Coordinates, CoordinatesMut, Gradient};
 use super::Network;
+use super::output::Cotangents;
 use super::packed::Packed;
 use super::tile::{Activations, POINTS, Tile};
 use crate::memory;
@@ -22,15 +23,6 @@ const RECORDED: usize = 256 << 20;
 const PART: f64 = 1.0 / 16.0;
 /// Parameters of which one thread adds up the chunks at a time.
 const SUMMED: usize = 4096;
-
-/// What the values are differentiated against.
-#[derive(Clone, Copy)]
-pub enum Cotangents<'a, T> {
-    /// One number a point.
-    Given(&'a [T]),
-    /// Made of the values, group by group.
-    Linked(&'a Link<'a, T>),
-}
 
 /// How far a batch goes.
 pub enum Way<'a, T> {

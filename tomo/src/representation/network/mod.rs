@@ -18,8 +18,9 @@ pub use settings::{Initialisation, NetworkSettings};
 use super::{BuiltIn, Coordinates, Gradient, Groups, Representation, Workspace};
 use crate::Error;
 use crate::simd::{Float, InstructionSet};
-use batch::{Cotangents, Memory, Way};
+use batch::{Memory, Way};
 use layout::Layout;
+use output::Cotangents;
 
 /// A network with positional encoding: `bhnerf` of (x, y, z), `mlp4d` of (t, x, y, z).
 ///

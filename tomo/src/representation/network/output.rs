@@ -1,8 +1,17 @@
 //! The output layer: one unit and the activation.
 
-use super::super::Activation;
+use super::super::{Activation, Link};
 use super::dense::{Matrix, MatrixMut};
 use crate::simd::{Float, Lanes, Task};
+
+/// What the values are differentiated against.
+#[derive(Clone, Copy)]
+pub enum Cotangents<'a, T> {
+    /// One number a point.
+    Given(&'a [T]),
+    /// Made of the values, group by group.
+    Linked(&'a Link<'a, T>),
+}
 
 /// values = activation(rows · weights + shift), and the activation's slopes.
 pub struct Output<'a, T> {

@@ -3,11 +3,10 @@
 use super::super::workspace::Lines;
 use super::super::{Coordinates, CoordinatesMut};
 use super::Network;
-use super::batch::Cotangents;
 use super::dense::{Backward, Forward, Matrix, MatrixMut, Weights};
 use super::encoding::{Encode, encode_vjp};
 use super::layout::Rows;
-use super::output::{Output, OutputBackward};
+use super::output::{Cotangents, Output, OutputBackward};
 use super::packed::Packed;
 use crate::simd::{Float, dispatch};
 use core::ops::Range;

@@ -1,0 +1,24 @@
+//! Why bytes are no mesh.
+
+/// Why bytes are no mesh.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeshError {
+    /// Not an OBJ file.
+    #[error("not a readable OBJ file: {0}")]
+    Obj(#[from] tobj::LoadError),
+    /// Not a glTF or GLB file.
+    #[error("not a readable glTF file: {0}")]
+    Gltf(#[from] gltf::Error),
+    /// A file that it refers to cannot be read.
+    #[error("`{name}`, to which it refers, cannot be read: {why}")]
+    Resource {
+        /// The name as it stands in the file.
+        name: String,
+        /// What went wrong.
+        why: String,
+    },
+    /// It is no mesh of triangles.
+    #[error("{0}")]
+    Content(String),
+}

@@ -1,0 +1,120 @@
+//! What a fit remembers from step to step, and how it goes back when its loss diverges.
+
+use super::objective::Loss;
+use super::occupancy::Occupancy;
+use super::training::{OccupancyPlan, Training};
+use crate::dynamics::Axis;
+use crate::optimise::{AdamState, LbfgsState};
+use crate::representation::Representation;
+use crate::simd::Float;
+
+/// Most returns of a fit.
+const MOST_SETBACKS: u32 = 12;
+
+/// What of a fit goes on from step to step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Progress<T> {
+    /// Steps taken.
+    pub step: u64,
+    /// Parameters of the representation.
+    pub parameters: Vec<T>,
+    /// What Adam remembers of them; nothing, with quasi-Newton steps.
+    pub adam: AdamState<T>,
+    /// What quasi-Newton steps remember of them, and of the axis behind them where it is learnt.
+    pub lbfgs: Option<LbfgsState<T>>,
+    /// The axis.
+    pub axis: Axis,
+    /// What Adam remembers of it.
+    pub axis_adam: AdamState<f64>,
+    /// Mask of what shines.
+    pub occupancy: Option<Occupancy>,
+    /// Factor on the rates: halved at each divergence.
+    pub caution: f64,
+    /// Loss of the last step, dimensionless.
+    pub loss: f64,
+}
+
+/// All that a fit remembers: what a checkpoint holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State<T> {
+    /// Where it is.
+    pub now: Progress<T>,
+    /// Where it goes back to when it diverges.
+    pub good: Option<Box<Progress<T>>>,
+    /// How often it has gone back.
+    pub setbacks: u32,
+}
+
+/// What a step did.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// It moved on.
+    Done(Loss),
+    /// It diverged, and goes on from an earlier step with half the rates.
+    SteppedBack {
+        /// The loss that showed it.
+        loss: f64,
+        /// The step it goes on from.
+        to: u64,
+        /// The factor on the rates from there.
+        caution: f64,
+    },
+    /// No quasi-Newton step makes the loss smaller: it has come to a minimum within rounding.
+    Converged,
+}
+
+/// Why a fit cannot go on.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "the loss is {loss} at step {step}, after {setbacks} returns to earlier steps with ever smaller learning rates"
+)]
+pub struct Diverged {
+    /// The last loss, dimensionless.
+    pub loss: f64,
+    /// The step.
+    pub step: u64,
+    /// Returns.
+    pub setbacks: u32,
+}
+
+impl<T: Float> State<T> {
+    /// The start of a fit.
+    pub fn new(representation: &dyn Representation<T>, axis: Axis, training: &Training) -> Self {
+        let count = representation.parameters();
+        let mut parameters = vec![T::zero(); count];
+        representation.initialise(training.seed, &mut parameters);
+        let mask = |plan: OccupancyPlan| Occupancy::new(plan.settings, training.region);
+        let learnt = training.learns_axis(representation);
+        let numbers = count + if learnt { 3 } else { 0 };
+        let lbfgs = training.lbfgs.map(|rule| LbfgsState::new(numbers, rule.memory));
+        let now = Progress {
+            step: 0,
+            parameters,
+            adam: AdamState::new(if lbfgs.is_some() { 0 } else { count }),
+            lbfgs,
+            axis,
+            axis_adam: AdamState::new(3),
+            occupancy: training.occupancy.map(mask),
+            caution: 1.0,
+            loss: f64::INFINITY,
+        };
+        Self { now, good: None, setbacks: 0 }
+    }
+}
+
+/// Back to the last good state, for the loss of `step`.
+pub(super) fn step_back<T: Float>(
+    state: &mut State<T>,
+    loss: f64,
+    step: u64,
+) -> Result<Outcome, Diverged> {
+    let diverged = Diverged { loss, step, setbacks: state.setbacks };
+    let Some(good) = &mut state.good else { return Err(diverged) };
+    if state.setbacks >= MOST_SETBACKS {
+        return Err(diverged);
+    }
+    state.setbacks += 1;
+    good.caution *= 0.5;
+    state.now = (**good).clone();
+    Ok(Outcome::SteppedBack { loss, to: good.step, caution: good.caution })
+}

@@ -1,0 +1,74 @@
+//! How a fit is run.
+
+use super::is_turned;
+use super::occupancy::OccupancySettings;
+use super::penalties::Penalties;
+use super::sightlines::Region;
+use crate::optimise::{Adam, Lbfgs, Polynomial};
+use crate::representation::Representation;
+use crate::simd::Float;
+use serde::{Deserialize, Serialize};
+
+/// What a step looks at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum BatchSize {
+    /// That many random (ray, frame) pairs; for images alone.
+    Pixels(usize),
+    /// That many random frames, whole.
+    Frames(usize),
+    /// All frames, whole: the same loss at every step.
+    All,
+}
+
+/// When a mask of what shines is used and renewed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OccupancyPlan {
+    /// The mask.
+    pub settings: OccupancySettings,
+    /// Steps without it.
+    pub warm_up: u64,
+    /// Steps from one refreshment to the next.
+    pub every: u64,
+}
+
+/// How a fit is run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Training {
+    /// Seed of the parameters and of all that is drawn.
+    pub seed: u64,
+    /// Rule of the steps.
+    pub adam: Adam,
+    /// Quasi-Newton steps instead of Adam's, for small problems: they have no rates, need [`BatchSize::All`], and their
+    /// draws are those of step 0, so that the loss is the same function at every step.
+    pub lbfgs: Option<Lbfgs>,
+    /// Rates of the parameters.
+    pub rate: Polynomial,
+    /// Rates of the axis; without them it is held.
+    pub axis_rate: Option<Polynomial>,
+    /// Steps over which rates grow to what they are: the first steps of Adam, whose memory is empty, are
+    /// as long as the rate allows, and would undo a good start.
+    pub ramp: u64,
+    /// Part of the data of a step.
+    pub batch: BatchSize,
+    /// Parts that the data of a step are cut into: gradients of parts are summed in an order that does not depend on which
+    /// process has which ([`parts`](super::parts)). With 1 they are not cut.
+    pub parts: usize,
+    /// Mask of what shines, if any.
+    pub occupancy: Option<OccupancyPlan>,
+    /// Penalties beside the data, if any.
+    pub penalties: Option<Penalties>,
+    /// Where emission is looked for.
+    pub region: Region,
+    /// Steps from one good state that is kept to the next.
+    pub keep_every: u64,
+    /// A loss larger than that of the kept state by this factor is a divergence.
+    pub divergence: f64,
+}
+
+impl Training {
+    /// Whether the axis is learnt, of a representation that knows of it.
+    pub fn learns_axis<T: Float>(&self, representation: &dyn Representation<T>) -> bool {
+        self.axis_rate.is_some() && is_turned(representation)
+    }
+}
