@@ -20,6 +20,23 @@ pub fn values<T: Elementary>(x: T) -> impl Iterator<Item = T> {
     })
 }
 
+/// P₀(x) to P_{N−1}(x). With the number known beforehand the recurrence multiplies where [`values`] divides.
+///
+/// ```
+/// assert_eq!(kerrlight_geodesic::legendre::first(0.5), [1.0, 0.5, -0.125]);
+/// ```
+pub fn first<T: Elementary, const N: usize>(x: T) -> [T; N] {
+    let mut p = [T::constant(1.0); N];
+    if N > 1 {
+        p[1] = x;
+    }
+    for n in 2..N {
+        let [a, b] = [(2 * n - 1) as f64 / n as f64, (n - 1) as f64 / n as f64];
+        p[n] = T::constant(a) * x * p[n - 1] - T::constant(b) * p[n - 2];
+    }
+    p
+}
+
 /// P_n(x) and its derivative, both dimensionless, for |x| < 1.
 ///
 /// ```

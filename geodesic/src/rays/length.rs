@@ -34,15 +34,29 @@ struct Part<T> {
     density: [T; NODES],
 }
 
+/// A node of the rule with the Legendre polynomials there.
+struct Node {
+    place: f64,
+    weight: f64,
+    basis: [f64; NODES],
+}
+
+impl Node {
+    fn new((place, weight): (f64, f64)) -> Self {
+        Node { place, weight, basis: legendre::first(2.0 * place - 1.0) }
+    }
+}
+
 impl<T: Elementary> Length<T> {
     /// Of the piece from `start` to `end`, by the rule with [`NODES`] nodes.
     pub fn new([start, end]: [T; 2], rule: &[(f64, f64)], density: impl Fn(T) -> T) -> Self {
         let zero = T::constant(0.0);
         let mut length = Length { start, whole: end - start, parts: Vec::new(), total: zero };
         let smallest = 0.5f64.powi(HALVINGS);
+        let nodes: Vec<Node> = rule.iter().copied().map(Node::new).collect();
         let mut next = vec![(0.5, 0.5, f64::INFINITY), (0.0, 0.5, f64::INFINITY)];
         while let Some((from, width, before)) = next.pop() {
-            let series = length.series(from, width, rule, &density);
+            let series = length.series(from, width, &nodes, &density);
             let size = |c: &T| c.value().abs();
             let last = (size(&series[NODES - 1]) + size(&series[NODES - 2])) / size(&series[0]);
             let is_noise = last < NOISY && last > 0.5 * before;
@@ -62,14 +76,13 @@ impl<T: Elementary> Length<T> {
         &self,
         from: f64,
         width: f64,
-        rule: &[(f64, f64)],
+        nodes: &[Node],
         density: impl Fn(T) -> T,
     ) -> [T; NODES] {
         let mut series = [T::constant(0.0); NODES];
-        for (node, weight) in rule {
-            let time = self.start + self.whole * T::constant(from + width * node);
+        for Node { place, weight, basis } in nodes {
+            let time = self.start + self.whole * T::constant(from + width * place);
             let value = density(time) * T::constant(*weight);
-            let basis = basis::<f64, NODES>(2.0 * node - 1.0);
             for (n, (sum, p)) in series.iter_mut().zip(basis).enumerate() {
                 *sum = *sum + value * T::constant(p * (2 * n + 1) as f64);
             }
@@ -114,7 +127,7 @@ impl<T: Elementary> Part<T> {
     /// ∫ from −1 to `x` of the density, and the density at `x`.
     fn within(&self, x: T) -> (T, T) {
         // ∫P_n = (P_{n+1} − P_{n−1})/(2n + 1).
-        let basis = basis::<T, { NODES + 1 }>(x);
+        let basis = legendre::first::<T, { NODES + 1 }>(x);
         let c = &self.density;
         let mut length = c[0] * (x + T::constant(1.0));
         let mut density = c[0];
@@ -125,12 +138,6 @@ impl<T: Elementary> Part<T> {
         }
         (length, density)
     }
-}
-
-/// P₀(x) to P_{N−1}(x).
-fn basis<T: Elementary, const N: usize>(x: T) -> [T; N] {
-    let mut values = legendre::values(x);
-    core::array::from_fn(|_| values.next().unwrap_or(x)) // there is no end to them
 }
 
 #[cfg(test)]
