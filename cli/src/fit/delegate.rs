@@ -1,22 +1,10 @@
 //! A fit whose steps a graphics device takes.
 
 use super::folder::Folder;
-use super::work::Prepared;
 use crate::devices::FitDevice;
-use anyhow::{Context, anyhow, bail};
+use anyhow::anyhow;
 use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::fit::{Delegate, DeviceError, Trainer};
-
-/// Refuses a device that does not do this fit, before anything is written.
-pub fn check(work: &Prepared<'_>, device: Option<&FitDevice>) -> anyhow::Result<()> {
-    let Some((check, _)) = device else { return Ok(()) };
-    match work {
-        Prepared::Image(_) => {
-            bail!("--device: a static image is fitted on the processor; leave it out")
-        }
-        Prepared::Emission(prepared) => prepared.check_device(*check).context("--device"),
-    }
-}
 
 /// The device, ready for this fit; says what it does.
 pub fn delegate(

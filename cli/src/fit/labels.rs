@@ -1,6 +1,7 @@
 //! What things are called in sentences.
 
 use kerrlight_tomo::fit::settings::{FitFile, Kind};
+use kerrlight_tomo::fit::world::Parameter;
 
 /// Kinds of representations, in a few words.
 pub fn representation(kind: &Kind) -> &str {
@@ -32,5 +33,22 @@ pub fn described(file: &FitFile) -> &str {
             "voxel values on a grid that moves with the matter, the solution of a convex problem"
         }
         Kind::Own(name) => name,
+    }
+}
+
+/// What a parameter is called in a sentence, and its unit.
+pub fn parameter(parameter: Parameter) -> (&'static str, &'static str) {
+    match parameter {
+        Parameter::Spin => ("spin", ""),
+        Parameter::Inclination => ("inclination", "°"),
+        Parameter::PositionAngle => ("position angle of the spin", "°"),
+        Parameter::OffsetX => ("horizontal position of the hole", " M"),
+        Parameter::OffsetY => ("vertical position of the hole", " M"),
+        Parameter::Mass => ("mass over the assumed one", ""),
+        Parameter::Rotation => ("angular velocity over the assumed one", ""),
+        Parameter::RedshiftPower => ("power of the redshift factor", ""),
+        Parameter::Xi => ("angular momentum over that of circular orbits", ""),
+        Parameter::BetaR => ("part of the radial velocity that is not free fall", ""),
+        Parameter::BetaPhi => ("part of the angular velocity that is not free fall", ""),
     }
 }

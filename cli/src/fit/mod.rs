@@ -104,7 +104,7 @@ impl Fit {
             self.same(&text)?;
             let work = Work::read(&text).with_context(|| path.display().to_string())?;
             let work = work.prepared(&base_dir_of(&text), registry)?;
-            delegate::check(&work, device.as_ref())?;
+            work.check_device(device.as_ref())?;
             return self.run_all(&work, &text, (&folder, true), device);
         }
         let guess = self.data.as_deref().map(|data| init::guess(data, self.model)).transpose()?;
@@ -127,7 +127,7 @@ impl Fit {
         }
         let (prepared, read) = output::with_reads(|| work.prepared(&base_dir, registry));
         let prepared = prepared?;
-        delegate::check(&prepared, device.as_ref())?;
+        prepared.check_device(device.as_ref())?;
         let text = self.begun(&text, &base_dir);
         let folder = Folder::create(&folder, &text, Inputs::new(&text, read))?;
         self.run_all(&prepared, &text, (&folder, false), device)

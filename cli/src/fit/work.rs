@@ -4,7 +4,8 @@ use super::init;
 use super::posterior;
 use super::run;
 use super::static_image;
-use anyhow::bail;
+use crate::devices::FitDevice;
+use anyhow::{Context, bail};
 use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::settings::{FitError, FitFile, StaticImageFile};
 use kerrlight_tomo::representation::Registry;
@@ -25,6 +26,19 @@ pub enum Prepared<'a> {
     Emission(Box<run::Prepared<'a>>),
     /// A static image.
     Image(Box<static_image::Prepared>),
+}
+
+impl Prepared<'_> {
+    /// Refuses a device that does not do this fit, before anything is written.
+    pub fn check_device(&self, device: Option<&FitDevice>) -> anyhow::Result<()> {
+        let Some((check, _)) = device else { return Ok(()) };
+        match self {
+            Prepared::Image(_) => {
+                bail!("--device: a static image is fitted on the processor; leave it out")
+            }
+            Prepared::Emission(prepared) => prepared.check_device(*check).context("--device"),
+        }
+    }
 }
 
 impl Work {

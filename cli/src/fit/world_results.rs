@@ -1,6 +1,6 @@
 //! What is said of a world that was found: lines, sentences, and distances from a known one.
 
-use super::world_scan;
+use super::{labels, world_scan};
 use kerrlight_tomo::fit::world::Parameter;
 use serde_json::{Value, json};
 
@@ -77,7 +77,7 @@ pub fn sentences(results: &Value) -> Vec<String> {
         let name = parameter.name();
         let number = |key: &str| results[key][name].as_f64();
         let value = number("world")?;
-        let (words, unit) = described(parameter);
+        let (words, unit) = labels::parameter(parameter);
         let truth =
             number("truth").map_or(String::new(), |truth| format!(" (truth: {truth:.3}{unit})"));
         let [from, to] = ends(results, "interval_95", name)?;
@@ -101,23 +101,6 @@ pub fn sentences(results: &Value) -> Vec<String> {
     all
 }
 
-/// What a parameter is called in a sentence, and its unit.
-pub fn described(parameter: Parameter) -> (&'static str, &'static str) {
-    match parameter {
-        Parameter::Spin => ("spin", ""),
-        Parameter::Inclination => ("inclination", "°"),
-        Parameter::PositionAngle => ("position angle of the spin", "°"),
-        Parameter::OffsetX => ("horizontal position of the hole", " M"),
-        Parameter::OffsetY => ("vertical position of the hole", " M"),
-        Parameter::Mass => ("mass over the assumed one", ""),
-        Parameter::Rotation => ("angular velocity over the assumed one", ""),
-        Parameter::RedshiftPower => ("power of the redshift factor", ""),
-        Parameter::Xi => ("angular momentum over that of circular orbits", ""),
-        Parameter::BetaR => ("part of the radial velocity that is not free fall", ""),
-        Parameter::BetaPhi => ("part of the angular velocity that is not free fall", ""),
-    }
-}
-
 /// χ²/2 above the best below which the coarse search does not tell another world from it.
 const ALIKE: f64 = 3.0;
 
@@ -131,7 +114,7 @@ fn rival(results: &Value) -> Option<String> {
     }
     let value = |parameter: Parameter| {
         let value = nearest["end"][parameter.name()].as_f64()?;
-        let (words, unit) = described(parameter);
+        let (words, unit) = labels::parameter(parameter);
         Some(format!("{words} {value:.3}{unit}"))
     };
     let values: Vec<String> = Parameter::ALL.into_iter().filter_map(value).collect();

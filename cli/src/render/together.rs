@@ -1,20 +1,19 @@
 //! A picture that ranks of one job render together: each renders the bands that it takes, and the first one writes the
 //! file. Bands lie in a folder beside the file until then, each a journal of its own.
 
-use super::work::Work;
 use crate::interrupt::Keeper;
 use crate::output::Output;
 use crate::progress;
 use crate::ranks::{self, Lead, Team};
 use anyhow::Context;
 use kerrlight_tomo::Error;
-use kerrlight_tomo::render::{Journal, RenderError};
+use kerrlight_tomo::render::{Journal, Raster, RenderError};
 use std::io;
 use std::path::{Path, PathBuf};
 
 /// Bands that lie beside a file.
 pub struct Together<'a> {
-    work: &'a Work<'a>,
+    raster: &'a Raster,
     /// All that decides the picture.
     identity: &'a str,
     /// Of all pictures of this name.
@@ -26,10 +25,10 @@ pub struct Together<'a> {
 
 impl<'a> Together<'a> {
     /// Of the file; nothing for standard output, beside which there is no place.
-    pub fn new(work: &'a Work<'a>, exr: &Output, identity: &'a str) -> Option<Self> {
+    pub fn new(raster: &'a Raster, exr: &Output, identity: &'a str) -> Option<Self> {
         let beside = exr.shared()?;
         let folder = beside.join(format!("{:08x}", crc32fast::hash(identity.as_bytes())));
-        Some(Self { work, identity, beside, folder, lead: None })
+        Some(Self { raster, identity, beside, folder, lead: None })
     }
 
     /// Renders bands as one of the ranks that do not write the file.
@@ -55,7 +54,7 @@ impl<'a> Together<'a> {
         let Some((_, size)) = ranks::this() else { return Ok(()) };
         let lead = Lead::start(&self.folder, self.bands(), size)?;
         let missing = journal.missing();
-        let all = self.work.raster.bands();
+        let all = self.raster.bands();
         (0..all).filter(|k| !missing.contains(k)).try_for_each(|k| lead.team.known(k))?;
         let (keeper, bar) = (Keeper::brief(stopped), progress::bar(all as u64));
         loop {
@@ -86,7 +85,7 @@ impl<'a> Together<'a> {
     }
 
     fn bands(&self) -> Vec<String> {
-        ranks::named("band", self.work.raster.bands())
+        ranks::named("band", self.raster.bands())
     }
 
     fn path(&self, band: usize) -> PathBuf {
@@ -101,7 +100,7 @@ impl<'a> Together<'a> {
             kept.map_err(|error| io::Error::other(format!("{error:#}")))
         };
         let mut todo = std::iter::from_fn(|| team.take());
-        self.work.raster.fill_apart(self.identity, &mut todo, &keep, &|_| !keeper.stopped())
+        self.raster.fill_apart(self.identity, &mut todo, &keep, &|_| !keeper.stopped())
     }
 
     fn take_in(&self, journal: &mut Journal<std::fs::File>) -> anyhow::Result<()> {

@@ -38,7 +38,7 @@ impl Work<'_> {
         mut look: Option<Reduction>,
     ) -> anyhow::Result<(Summary, Option<Picture>)> {
         let mut partial = Partial::open(exr, self.raster, identity)?;
-        let mut together = Together::new(self, exr, identity);
+        let mut together = Together::new(self.raster, exr, identity);
         let stopped = format!("stopped; {}", partial.kept());
         let others = together.as_mut().map(|all| all.fill(&mut partial.journal, &stopped));
         let filled =
@@ -73,7 +73,7 @@ impl Work<'_> {
 
     /// Renders some of the bands of an EXR file that another rank writes. What has no place beside it is rendered there.
     pub fn help(&self, exr: Option<&Output>, identity: &str, rank: u32) -> anyhow::Result<()> {
-        let together = exr.and_then(|exr| Together::new(self, exr, identity));
+        let together = exr.and_then(|exr| Together::new(self.raster, exr, identity));
         together.map_or(Ok(()), |all| all.help(rank)).with_context(|| self.name.to_owned())
     }
 

@@ -1,27 +1,12 @@
 //! The page around everything else. All text from outside goes through [`escape`].
 
+use super::escape::escape;
 use super::paged;
 use super::{Drawing, Figure, LinePlot, Notice, Outcome, Part, Report, Setting, Table, Tone};
 use std::fmt::Write;
 
 const PAGE: &str = include_str!("assets/page.html");
 const STYLE: &str = include_str!("assets/style.css");
-
-/// Text as it may stand between tags and in quoted attributes.
-pub fn escape(text: &str) -> String {
-    let mut safe = String::with_capacity(text.len());
-    for letter in text.chars() {
-        match letter {
-            '&' => safe.push_str("&amp;"),
-            '<' => safe.push_str("&lt;"),
-            '>' => safe.push_str("&gt;"),
-            '"' => safe.push_str("&quot;"),
-            '\'' => safe.push_str("&#39;"),
-            _ => safe.push(letter),
-        }
-    }
-    safe
-}
 
 pub fn page(report: &Report) -> anyhow::Result<String> {
     let sections = [

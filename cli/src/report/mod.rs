@@ -1,6 +1,7 @@
 //! One HTML page that says what a fit found: sentences, tables, pictures, plots and the emission in
 //! three dimensions. Nothing in it is loaded from anywhere else.
 
+mod escape;
 mod grid_map;
 mod html;
 mod paged;

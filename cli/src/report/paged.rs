@@ -2,7 +2,7 @@
 //! others.
 
 use super::Table;
-use super::html::escape;
+use super::escape::escape;
 use serde_json::json;
 
 const SCRIPT: &str = include_str!("assets/rows.js");

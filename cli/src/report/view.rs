@@ -1,6 +1,7 @@
 //! Emission in 3D: data for the page's viewer.
 
-use super::html::{escape, fill};
+use super::escape::escape;
+use super::html::fill;
 use super::pictures::encode;
 use anyhow::bail;
 use kerrlight_tomo::dynamics::AngularVelocity;
