@@ -60,6 +60,7 @@ mod usage;
 mod uv;
 mod view;
 mod volume_files;
+mod zarr;
 
 pub use memory::Bounded;
 pub use program::Program;
@@ -155,8 +156,8 @@ fn run(arguments: &Arguments, program: &Program) -> anyhow::Result<()> {
 impl Verb {
     /// Whether ranks of one job do it together. Of others each does it for itself.
     fn shares(&self) -> bool {
-        let pictures = matches!(self, Verb::Render(_) | Verb::Movie(_));
-        pictures || matches!(self, Verb::Fit(_) | Verb::Posterior(_) | Verb::Compare(_))
+        let rays = matches!(self, Verb::Render(_) | Verb::Movie(_) | Verb::Accuracy(_));
+        rays || matches!(self, Verb::Fit(_) | Verb::Posterior(_) | Verb::Compare(_))
     }
 
     /// Whether standard output carries a file, because a path is `-`.
