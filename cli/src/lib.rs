@@ -20,6 +20,22 @@
 //! From then on `representation.kind = "small"` with `representation.own.width = 32` works in every fit and every
 //! comparison of that program.
 
+/// As the standard library's, but a message that cannot be written, as into a file on a full disk, is no panic.
+macro_rules! eprintln {
+    ($($words:tt)*) => {{
+        use std::io::Write as _;
+        let _ = std::writeln!(std::io::stderr(), $($words)*);
+    }};
+}
+
+/// The same without an end of the line.
+macro_rules! eprint {
+    ($($words:tt)*) => {{
+        use std::io::Write as _;
+        let _ = std::write!(std::io::stderr(), $($words)*);
+    }};
+}
+
 mod accuracy;
 mod answer;
 mod assets;
