@@ -232,6 +232,7 @@ pub fn sweep(folder: &Path, prefix: &str) {
 }
 
 /// Makes a whole folder beside its place, into which `write` puts files, and moves it there; one that is there is replaced.
+#[cfg(feature = "zarr")]
 pub fn write_folder(
     path: &Path,
     write: impl FnOnce(&Path) -> anyhow::Result<()>,
@@ -255,6 +256,7 @@ pub fn write_folder(
 }
 
 /// Puts the files of a folder, and of those in it, on the disk.
+#[cfg(feature = "zarr")]
 fn sync(folder: &Path) -> std::io::Result<()> {
     for entry in std::fs::read_dir(folder)? {
         let path = entry?.path();
@@ -264,6 +266,7 @@ fn sync(folder: &Path) -> std::io::Result<()> {
 }
 
 /// Notes that the files of a folder were written.
+#[cfg(feature = "zarr")]
 fn note_folder(folder: &Path) {
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
         let path = entry.path();
