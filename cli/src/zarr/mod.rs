@@ -1,5 +1,5 @@
 //! Volumes and movies as stores of Zarr: folders of arrays in chunks, of which only those are read that are needed.
-//! [`read`] and [`write`] are in builds with the feature `zarr`; without it a store is refused by its name.
+//! Reading and writing are in builds with the feature `zarr`; without it a store is refused by its name.
 
 #[cfg(not(feature = "zarr"))]
 mod absent;
