@@ -49,8 +49,9 @@ fn ends(array: &Reading, nodes: usize) -> anyhow::Result<[f64; 2]> {
         bail!("array {name} has no coordinates");
     };
     let step = (high - low) / (nodes.max(2) - 1) as f64;
-    let off = |(k, x): (usize, &f64)| !((x - (low + k as f64 * step)).abs() <= 1e-5 * step.abs());
-    if let Some(k) = all.iter().enumerate().position(off) {
+    // What is not a number is off, too.
+    let fits = |(k, x): (usize, &f64)| (x - (low + k as f64 * step)).abs() <= 1e-5 * step.abs();
+    if let Some(k) = all.iter().enumerate().position(|one| !fits(one)) {
         bail!("array {name}: coordinate {} of node {k} is not allowed: equal distances", all[k]);
     }
     Ok([low, high])
