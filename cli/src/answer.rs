@@ -49,6 +49,16 @@ impl Answer {
         Answer { text: Body::Text(text.into()), ..Self::default() }
     }
 
+    /// With more text below.
+    #[cfg(feature = "zarr")]
+    #[must_use]
+    pub fn and_text(mut self, more: &str) -> Self {
+        if let Body::Text(text) = &mut self.text {
+            text.push_str(more);
+        }
+        self
+    }
+
     /// The last two lines of a command: a figure of merit, and where to look.
     pub fn lines(worth: &str, look_at: &str) -> Self {
         Self::text(format!("{worth}\n{look_at}\n"))

@@ -48,9 +48,7 @@ pub fn load(scene: &Scene, folder: &Path, outputs: &[&Output]) -> anyhow::Result
     let meshes = meshes.collect::<anyhow::Result<_>>()?;
     let volumes = scene.volume.iter().enumerate().map(|(k, volume)| {
         let path = folder.join(&volume.path);
-        let bytes = read(&path).with_context(|| format!("`volume.{k}.path`"))?;
-        volume_files::read(&path, &bytes, volume)
-            .with_context(|| format!("`volume.{k}.path` {}", path.display()))
+        volume_files::read(&path, volume, read).with_context(|| format!("`volume.{k}.path`"))
     });
     let volumes = volumes.collect::<anyhow::Result<_>>()?;
     let stars = match &scene.sky {

@@ -20,6 +20,22 @@
 //! From then on `representation.kind = "small"` with `representation.own.width = 32` works in every fit and every
 //! comparison of that program.
 
+/// As the standard library's, but a message that cannot be written, as into a file on a full disk, is no panic.
+macro_rules! eprintln {
+    ($($words:tt)*) => {{
+        use std::io::Write as _;
+        let _ = std::writeln!(std::io::stderr(), $($words)*);
+    }};
+}
+
+/// The same without an end of the line.
+macro_rules! eprint {
+    ($($words:tt)*) => {{
+        use std::io::Write as _;
+        let _ = std::write!(std::io::stderr(), $($words)*);
+    }};
+}
+
 mod accuracy;
 mod answer;
 mod assets;
@@ -60,6 +76,7 @@ mod usage;
 mod uv;
 mod view;
 mod volume_files;
+mod zarr;
 
 pub use memory::Bounded;
 pub use program::Program;
@@ -155,8 +172,8 @@ fn run(arguments: &Arguments, program: &Program) -> anyhow::Result<()> {
 impl Verb {
     /// Whether ranks of one job do it together. Of others each does it for itself.
     fn shares(&self) -> bool {
-        let pictures = matches!(self, Verb::Render(_) | Verb::Movie(_));
-        pictures || matches!(self, Verb::Fit(_) | Verb::Posterior(_) | Verb::Compare(_))
+        let rays = matches!(self, Verb::Render(_) | Verb::Movie(_) | Verb::Accuracy(_));
+        rays || matches!(self, Verb::Fit(_) | Verb::Posterior(_) | Verb::Compare(_))
     }
 
     /// Whether standard output carries a file, because a path is `-`.

@@ -90,16 +90,25 @@ impl Output {
 
     fn beside(&self) -> anyhow::Result<tempfile::NamedTempFile> {
         let mut builder = tempfile::Builder::new();
-        builder.prefix(BESIDE);
+        let prefix = prefix_of(&self.path);
+        builder.prefix(&prefix);
         // The permissions of any newly created file, which the process's mask narrows.
         #[cfg(unix)]
         let builder = {
             use std::os::unix::fs::PermissionsExt;
             builder.permissions(std::fs::Permissions::from_mode(0o666))
         };
-        builder
+        let file = builder
             .tempfile_in(&self.folder)
-            .with_context(|| format!("cannot write to {}", self.folder.display()))
+            .with_context(|| format!("cannot write to {}", self.folder.display()))?;
+        // It tells others that somebody writes here; not every file system has locks.
+        let _ = file.as_file().try_lock();
+        Ok(file)
+    }
+
+    /// Removes what processes have left beside its place that were killed in the middle of writing it.
+    pub fn sweep(&self) {
+        sweep(&self.folder, &prefix_of(&self.path));
     }
 
     /// Refuses to take the place of a file that is read.
@@ -195,7 +204,73 @@ pub fn remove_unfinished() {
     let all = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
     for path in all.iter() {
         // It may have been moved to its place.
-        let _ = std::fs::remove_file(path);
+        let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir_all(path));
+    }
+}
+
+/// How names begin of what is written beside a place.
+fn prefix_of(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    format!("{BESIDE}{name}-")
+}
+
+/// Removes what killed processes have left in a folder of files that they were writing and whose names begin so.
+pub fn sweep(folder: &Path, prefix: &str) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        if !entry.file_name().to_string_lossy().starts_with(prefix) {
+            continue;
+        }
+        let busy = || File::open(&path).is_ok_and(|file| file.try_lock().is_err());
+        // What is left behind does no harm.
+        let _ = match path.is_dir() {
+            true => std::fs::remove_dir_all(&path),
+            false if busy() => Ok(()),
+            false => std::fs::remove_file(&path),
+        };
+    }
+}
+
+/// Makes a whole folder beside its place, into which `write` puts files, and moves it there; one that is there is replaced.
+#[cfg(feature = "zarr")]
+pub fn write_folder(
+    path: &Path,
+    write: impl FnOnce(&Path) -> anyhow::Result<()>,
+) -> anyhow::Result<()> {
+    let name = || format!("cannot write {}", path.display());
+    let parent = path.parent().filter(|parent| *parent != Path::new(""));
+    let mut builder = tempfile::Builder::new();
+    let beside = builder.prefix(&prefix_of(path)).tempdir_in(parent.unwrap_or(Path::new(".")));
+    let beside = beside.with_context(name)?;
+    let _unfinished = Unfinished::new(beside.path());
+    let (new, old) = (beside.path().join("new"), beside.path().join("old"));
+    std::fs::create_dir(&new).with_context(name)?;
+    write(&new).with_context(name)?;
+    sync(&new).with_context(name)?;
+    if path.exists() {
+        std::fs::rename(path, &old).with_context(name)?;
+    }
+    std::fs::rename(&new, path).with_context(name)?;
+    note_folder(path);
+    beside.close().with_context(name)
+}
+
+/// Puts the files of a folder, and of those in it, on the disk.
+#[cfg(feature = "zarr")]
+fn sync(folder: &Path) -> std::io::Result<()> {
+    for entry in std::fs::read_dir(folder)? {
+        let path = entry?.path();
+        if path.is_dir() { sync(&path)? } else { File::open(&path)?.sync_all()? }
+    }
+    Ok(())
+}
+
+/// Notes that the files of a folder were written.
+#[cfg(feature = "zarr")]
+fn note_folder(folder: &Path) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        if path.is_dir() { note_folder(&path) } else { note(&path, |followed| &mut followed.1) }
     }
 }
 

@@ -1,6 +1,6 @@
-//! Volumes of emission in files: NPZ or NPY, by the name's ending.
+//! Volumes of emission in files: NPZ or NPY, by the name's ending, or a store of Zarr.
 
-use crate::output;
+use crate::{output, zarr};
 use anyhow::{Context, bail};
 use kerrlight_tomo::scene::VolumeSource;
 use kerrlight_tomo::volume::{VolumeArrays, VolumeFile};
@@ -11,13 +11,26 @@ fn decode(path: &Path, bytes: &[u8]) -> anyhow::Result<VolumeArrays> {
     match extension.to_ascii_lowercase().as_str() {
         "npy" => Ok(VolumeArrays::from_npy(bytes)?),
         "npz" => Ok(VolumeArrays::from_npz(bytes)?),
-        _ => bail!("a volume ends in .npz or .npy"),
+        _ => bail!("a volume ends in .npz, .npy or .zarr"),
     }
 }
 
-/// Reads the volume of a scene from `bytes`, the content of `path`.
-pub fn read(path: &Path, bytes: &[u8], source: &VolumeSource) -> anyhow::Result<VolumeFile> {
-    Ok(decode(path, bytes)?.placed(source)?)
+/// Reads the volume of a scene; `read` gives the content of a file.
+pub fn read(
+    path: &Path,
+    source: &VolumeSource,
+    read: impl Fn(&Path) -> anyhow::Result<Vec<u8>>,
+) -> anyhow::Result<VolumeFile> {
+    if !zarr::is_store(path) {
+        let bytes = read(path)?;
+        let arrays = decode(path, &bytes).with_context(|| path.display().to_string())?;
+        return arrays.placed(source).with_context(|| path.display().to_string());
+    }
+    // For their sums; chunks are read when they are decoded.
+    for file in zarr::files(path)? {
+        read(&file)?;
+    }
+    zarr::volume(path)?.placed(source).with_context(|| path.display().to_string())
 }
 
 /// Reads a volume that says itself where it is.
@@ -34,7 +47,7 @@ mod tests {
     #[test]
     fn exact_names_tell_the_format() {
         let error = decode(Path::new("v.txt"), &[]).unwrap_err();
-        assert_eq!(error.to_string(), "a volume ends in .npz or .npy");
+        assert_eq!(error.to_string(), "a volume ends in .npz, .npy or .zarr");
         assert!(decode(Path::new("v.NPZ"), b"PK").unwrap_err().to_string().contains("npz archive"));
     }
 }

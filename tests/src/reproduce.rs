@@ -73,6 +73,12 @@ fn exact_records_and_pictures_know_their_commands() {
     let line = again(at, "table.json");
     assert!(line.starts_with("cd ") && line.contains("trace --rays rays.csv"), "{line}");
     assert!(std::fs::read(at.join("table.csv")).unwrap() == first);
+    // The table itself finds its record, and what is not as it was made is said.
+    assert_eq!(again(at, "table.csv"), line);
+    std::fs::write(at.join("table.csv"), "mine").unwrap();
+    let told = kerrlight(at, &["reproduce", "table.csv"]);
+    assert!(told.status.success());
+    assert!(String::from_utf8_lossy(&told.stderr).contains("table.csv has changed"));
     let record = std::fs::read_to_string(at.join("table.json")).unwrap();
     let record: Value = serde_json::from_str(&record).unwrap();
     assert!(record["inputs"][0]["path"].as_str().unwrap().ends_with("rays.csv"));

@@ -46,6 +46,11 @@ impl Queue {
         Ok(clock.elapsed())
     }
 
+    /// From now on takes first what costs most, of the same cost in the order of the pieces.
+    pub fn prefer(&mut self, cost: impl Fn(usize) -> f64) {
+        self.open.sort_by(|a, b| cost(*a).total_cmp(&cost(*b)).then(b.cmp(a)));
+    }
+
     /// Takes a piece that nobody has or, if there is none, one whose worker is dead; its number among the pieces.
     pub fn next(&mut self) -> anyhow::Result<Option<(usize, Claim)>> {
         let mut lost = 0;

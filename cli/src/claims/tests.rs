@@ -43,6 +43,21 @@ fn exact_a_failure_has_its_reason() {
     assert!(queue.next().unwrap().is_none(), "what is taken is not taken again");
 }
 
+/// What costs most goes first; what is not known yet goes before it, in order.
+#[test]
+fn exact_pieces_of_the_highest_cost_are_taken_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let pieces = ["a", "b", "c", "d", "e", "f"].map(str::to_owned).to_vec();
+    let mut queue = Queue::join(folder.path(), pieces).unwrap();
+    let (at, claim) = queue.next().unwrap().unwrap();
+    queue.done((at, &claim), 1.0).unwrap();
+    let costs = [1.0, f64::INFINITY, 2.0, 1.0, 3.0, f64::INFINITY];
+    queue.prefer(|at| costs[at]);
+    let order: Vec<usize> =
+        std::iter::from_fn(|| queue.next().unwrap().map(|(at, _)| at)).collect();
+    assert_eq!(order, [1, 5, 4, 2, 3]);
+}
+
 /// A file system without hard links: claims are made and filled in two steps.
 #[test]
 fn exact_claims_without_links() {

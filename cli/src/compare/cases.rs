@@ -92,6 +92,11 @@ impl Case {
         }
     }
 
+    /// The numbers of its levels, which cases that differ in their seed have in common.
+    pub fn combination(&self) -> &[u32] {
+        &self.chosen
+    }
+
     /// Its level of a factor.
     pub fn level(&self, factor: &str) -> Option<&str> {
         self.levels.iter().find(|(name, _)| name == factor).map(|(_, level)| level.as_str())

@@ -44,6 +44,15 @@ pub struct Sharing<'a> {
     cases: Vec<&'a Case>,
     queue: Queue,
     folder: PathBuf,
+    costs: Costs<'a>,
+}
+
+/// What cases took this process, by their levels, seconds.
+struct Costs<'a> {
+    seconds: HashMap<&'a [u32], f64>,
+    /// When the queue was ordered by them, and how long that took.
+    ordered: Instant,
+    ordering: Duration,
 }
 
 impl<'a> Sharing<'a> {
@@ -54,7 +63,23 @@ impl<'a> Sharing<'a> {
         fs::create_dir_all(&work).with_context(|| format!("cannot make {}", work.display()))?;
         let cases: Vec<&Case> = cases.iter().filter(|case| case.error.is_none()).collect();
         let queue = Queue::join(&folder, cases.iter().map(|case| case.slug.clone()).collect())?;
-        Ok(Self { runner, cases, queue, folder })
+        let (seconds, ordered, ordering) = (HashMap::new(), Instant::now(), Duration::ZERO);
+        Ok(Self { runner, cases, queue, folder, costs: Costs { seconds, ordered, ordering } })
+    }
+
+    /// Takes the longest cases first, so that none is begun when all others end; before them those of unknown length, seed by
+    /// seed.
+    fn learn(&mut self, case: &'a Case, seconds: f64) {
+        let Costs { seconds: known, ordered, ordering } = &mut self.costs;
+        known.insert(case.combination(), seconds);
+        if ordered.elapsed() < 20 * *ordering {
+            return;
+        }
+        let clock = Instant::now();
+        let cost = |case: &&Case| known.get(case.combination()).copied().unwrap_or(f64::INFINITY);
+        let costs: Vec<f64> = self.cases.iter().map(cost).collect();
+        self.queue.prefer(|at| costs[at]);
+        (*ordered, *ordering) = (Instant::now(), clock.elapsed());
     }
 
     /// Runs cases until none is left to take; how many are open then, and how many this process has run.
@@ -95,7 +120,11 @@ impl<'a> Sharing<'a> {
         bar.tick();
         let clock = Instant::now();
         match self.status(case, claim, keeper)? {
-            Status::Done(_) => self.queue.done((at, claim), clock.elapsed().as_secs_f64())?,
+            Status::Done(_) => {
+                let seconds = clock.elapsed().as_secs_f64();
+                self.queue.done((at, claim), seconds)?;
+                self.learn(case, seconds);
+            }
             Status::Failed(why) if self.queue.claims.holds(claim) => {
                 bar.suspend(|| eprintln!("failed: {}: {why}", case.name()));
                 self.queue.failed((at, claim), &why)?;

@@ -34,9 +34,10 @@ pub fn describe(path: &Path, start: &[u8]) -> anyhow::Result<Answer> {
     Ok(answer(path, "NPZ", &lines))
 }
 
-fn answer(path: &Path, format: &str, lines: &[Line]) -> Answer {
+/// What arrays hold, a line each.
+pub fn answer(path: &Path, format: &str, lines: &[Line]) -> Answer {
     let name = path.display();
-    let holds = if format == "NPZ" { kind(lines) } else { None };
+    let holds = if format == "NPY" { None } else { kind(lines) };
     let what = holds.as_ref().map_or(String::new(), |what| format!(", {what}"));
     let text: String = lines.iter().map(|line| line.text.as_str()).collect();
     let arrays: Vec<Value> = lines.iter().map(|line| line.json.clone()).collect();
@@ -50,11 +51,40 @@ fn answer(path: &Path, format: &str, lines: &[Line]) -> Answer {
 const HEAD: &str = "array           shape                 type              least           most           mean  not finite\n";
 
 /// A line about an array.
-struct Line {
+pub struct Line {
     name: String,
     shape: Vec<u64>,
     text: String,
     json: Value,
+}
+
+impl Line {
+    /// About an array of this name, shape and type; `rest` is what else there is to say of it.
+    pub fn new(
+        (name, shape, kind): (&str, &[u64], &str),
+        found: Option<&Survey>,
+        rest: &str,
+    ) -> Self {
+        let lengths: Vec<String> = shape.iter().map(u64::to_string).collect();
+        let lengths = format!("({})", lengths.join(", "));
+        let counted = found.map_or("    no numbers".to_owned(), numbers);
+        let text = format!("{name:<16}{lengths:<22}{kind:<10}{counted}{rest}\n");
+        let mut json = json!({"name": name, "shape": shape, "type": kind});
+        if let Some(found) = found {
+            json["least"] = json!(found.least);
+            json["most"] = json!(found.most);
+            json["mean"] = json!(found.mean());
+            json["not_finite"] = json!(found.not_finite);
+        }
+        Line { name: name.to_owned(), shape: shape.to_vec(), text, json }
+    }
+
+    /// The same with more to say to programs.
+    #[cfg(feature = "zarr")]
+    pub fn with(mut self, key: &str, value: Value) -> Self {
+        self.json[key] = value;
+        self
+    }
 }
 
 /// What kerrlight takes an archive for.
@@ -75,7 +105,7 @@ fn kind(lines: &[Line]) -> Option<String> {
 
 /// Numbers of an array, one after the other; nothing is kept but these.
 #[derive(Default)]
-struct Survey {
+pub struct Survey {
     first: Vec<f64>,
     least: Option<f64>,
     most: Option<f64>,
@@ -93,7 +123,8 @@ impl Survey {
         (self.finite > 0).then(|| self.sum / self.finite as f64)
     }
 
-    fn add(&mut self, value: f64) {
+    /// Counts a number.
+    pub fn add(&mut self, value: f64) {
         if self.first.len() <= SHOWN {
             self.first.push(value);
         }
@@ -114,20 +145,8 @@ fn array(name: &str, file: impl Read) -> anyhow::Result<Line> {
     let order =
         if file.order() == Order::Fortran && shape.len() > 1 { ", Fortran order" } else { "" };
     let kind = file.dtype().descr().replace(['\'', ' '], "");
-    let lengths: Vec<String> = shape.iter().map(u64::to_string).collect();
-    let lengths = format!("({})", lengths.join(", "));
-    let head = format!("{name:<16}{lengths:<22}{kind:<10}");
     let found = survey(file)?;
-    let rest = found.as_ref().map_or("    no numbers".to_owned(), numbers);
-    let mut json = json!({"name": name, "shape": shape, "type": kind});
-    if let Some(found) = &found {
-        json["least"] = json!(found.least);
-        json["most"] = json!(found.most);
-        json["mean"] = json!(found.mean());
-        json["not_finite"] = json!(found.not_finite);
-    }
-    let text = format!("{head}{rest}{order}\n");
-    Ok(Line { name: name.to_owned(), shape, text, json })
+    Ok(Line::new((name, &shape, &kind), found.as_ref(), order))
 }
 
 fn numbers(found: &Survey) -> String {

@@ -24,13 +24,18 @@ pub fn hush() -> Silence {
 
 /// For so long the launcher may take to end a job whose first rank has failed.
 const PATIENCE: Duration = Duration::from_secs(3);
+/// By so much longer each rank waits than the one before: where several have failed, as with a full disk, the first to speak
+/// ends the job.
+const STEP: Duration = Duration::from_secs(1);
+/// So many ranks wait one after the other.
+const STEPS: u32 = 6;
 
 impl Silence {
     /// Tells why this rank ends the job, if it does: a failure of all ranks is told by the first.
     pub fn tell(&self, error: &anyhow::Error) {
         let Some(mut kept) = self.0.as_ref() else { return };
-        std::thread::sleep(PATIENCE);
         let rank = super::this().map_or(0, |(rank, _)| rank);
+        std::thread::sleep(PATIENCE + STEP * (rank % STEPS));
         let _ = writeln!(kept, "error: rank {rank}: {error:#}");
     }
 }

@@ -10,7 +10,8 @@ use std::path::PathBuf;
 /// Arguments of `kerrlight reproduce`.
 #[derive(Debug, Args)]
 pub struct Reproduce {
-    /// Folder of a fit or of a comparison, a file in it, a picture (EXR), or a record (.json)
+    /// Folder of a fit or of a comparison, a file in it, a picture (EXR), a record (.json), or a file whose
+    /// record lies beside it
     #[arg(value_name = "FILE")]
     file: PathBuf,
 }

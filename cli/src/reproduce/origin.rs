@@ -4,7 +4,7 @@ use crate::compare::Plan;
 use crate::fit::{Inputs, SETTINGS};
 use crate::record::{self, Record};
 use crate::render::source::Source;
-use crate::{assets, output};
+use crate::{assets, output, zarr};
 use anyhow::Context;
 use std::path::{Path, PathBuf};
 
@@ -29,13 +29,16 @@ impl Origin {
     /// If it does not tell, or cannot be read.
     pub fn of(path: &Path) -> anyhow::Result<Self> {
         let ends_in = |end: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(end));
-        if path.is_dir() {
+        // A store of Zarr belongs to the folder that it lies in.
+        if path.is_dir() && !zarr::is_store(path) {
             return Self::of_folder(path)?.with_context(|| nothing(path));
         }
         if ends_in("exr") {
             return Self::of_picture(path);
         }
-        output::open(path)?;
+        if !path.is_dir() {
+            output::open(path)?;
+        }
         if ends_in("json")
             && path.file_name().is_none_or(|name| name != record::FILE)
             && let Ok(record) = Record::load(path)
@@ -43,7 +46,30 @@ impl Origin {
             return Ok(Self::of_record(record));
         }
         let folder = path.parent().filter(|folder| *folder != Path::new(""));
-        Self::of_folder(folder.unwrap_or(Path::new(".")))?.with_context(|| nothing(path))
+        let folder = folder.unwrap_or(Path::new("."));
+        match Self::of_folder(folder)? {
+            Some(origin) => Ok(origin),
+            None => Self::of_output(path, folder).with_context(|| nothing(path)),
+        }
+    }
+
+    /// A file that a record in its folder says was written; the record of the file as it is now goes first.
+    fn of_output(path: &Path, folder: &Path) -> Option<Self> {
+        let full = path.canonicalize().ok()?;
+        let names = std::fs::read_dir(folder).ok()?.flatten().map(|entry| entry.path());
+        let mut names: Vec<PathBuf> =
+            names.filter(|name| name.extension().is_some_and(|e| e == "json")).collect();
+        names.sort();
+        let records = names.iter().filter_map(|name| Record::load(name).ok());
+        let writes = |record: &Record| record.outputs.iter().find(|out| out.path == full).cloned();
+        let mut all: Vec<_> =
+            records.filter_map(|record| Some((writes(&record)?.fault(), record))).collect();
+        all.sort_by_key(|(fault, _)| fault.is_some());
+        let (fault, record) = all.into_iter().next()?;
+        if let Some(fault) = fault {
+            eprintln!("note: since it was made, {fault}");
+        }
+        Some(Self::of_record(record))
     }
 
     /// The folder of a fit, of the draws about it, or of a comparison.
@@ -134,7 +160,7 @@ impl Origin {
 
 fn nothing(path: &Path) -> String {
     format!(
-        "{} does not tell what made it: give the folder of a fit or of a comparison, an EXR of kerrlight, or a record (--record)",
+        "{} does not tell what made it: give the folder of a fit or of a comparison, an EXR of kerrlight, a record (--record), or a file with its record beside it",
         path.display()
     )
 }

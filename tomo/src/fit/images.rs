@@ -25,7 +25,7 @@ impl<T: Float> ForwardModel<T> {
         }
     }
 
-    /// The image of one frame, whose gradient ([`vjp_recorded`](Representation::vjp_recorded) of the batch) comes next: `image` is
+    /// The image of one frame, whose gradient ([`vjp_recorded`](crate::representation::Representation::vjp_recorded) of the batch) comes next: `image` is
     /// overwritten.
     pub fn image_recorded(
         &self,

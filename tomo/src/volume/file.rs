@@ -33,13 +33,20 @@ fn emission(bytes: &[u8]) -> std::result::Result<([usize; 3], Vec<f32>), crate::
         );
     };
     let nodes = [x, y, z].map(|n| n as usize);
-    let single: Vec<f32> = values.iter().map(|value| *value as f32).collect();
-    if let Some(k) = single.iter().position(|value| !value.is_finite()) {
-        let (value, node) = (values[k], node(k, nodes));
-        let message = format!("value {value:e} of node {node:?} is not finite in 32 bits");
-        return Err(NumpyError::content(message).into());
-    }
+    let single = finite(nodes, &values).map_err(NumpyError::content)?;
     Ok((nodes, single))
+}
+
+/// The values in single precision, or which of them has none.
+fn finite(nodes: [usize; 3], values: &[f64]) -> std::result::Result<Vec<f32>, String> {
+    let single: Vec<f32> = values.iter().map(|value| *value as f32).collect();
+    match single.iter().position(|value| !value.is_finite()) {
+        None => Ok(single),
+        Some(k) => {
+            let (value, node) = (values[k], node(k, nodes));
+            Err(format!("value {value:e} of node {node:?} is not finite in 32 bits"))
+        }
+    }
 }
 
 /// Where the k-th value of an array in C's order stands.
@@ -58,6 +65,24 @@ fn three(bytes: &[u8]) -> std::result::Result<[f64; 3], crate::Error> {
 }
 
 impl VolumeArrays {
+    /// Emission of `nodes` along x, y and z, z fastest, between `corners` (M) and about `axis`, as far as a file tells.
+    ///
+    /// # Errors
+    /// If there are more or fewer values than nodes, or one is not finite in 32 bits.
+    pub fn new(
+        nodes: [usize; 3],
+        values: &[f64],
+        corners: [Option<[f64; 3]>; 2],
+        axis: Option<[f64; 3]>,
+    ) -> Result<Self> {
+        let (found, wanted) = (values.len(), nodes.iter().product());
+        if found != wanted {
+            return Err(super::VolumeError::Length { found, wanted }.into());
+        }
+        let values = finite(nodes, values).map_err(VolumeFileError::Content)?;
+        Ok(VolumeArrays { nodes, values, corners, axis })
+    }
+
     /// The only array of an NPY file: emission of shape (nx, ny, nz), which says nothing of where it is.
     ///
     /// # Errors

@@ -9,10 +9,12 @@ use kerrlight_geodesic::{
 use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::ops::Range;
 
 /// What kind of trouble a ray looks for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Kind {
     /// Impact parameters of the hole's size.
     Strong,
@@ -40,7 +42,7 @@ impl Kind {
 }
 
 /// What became of the rays of one kind.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Tally {
     /// The kind.
     pub kind: Kind,
@@ -120,9 +122,21 @@ pub fn run(
     seed: u64,
     progress: impl Fn(u64) -> bool + Sync,
 ) -> Result<Vec<Tally>, Error> {
-    let batches = rays.div_ceil(BATCH);
-    let nothing = || Kind::ALL.map(Tally::new).to_vec();
-    (0..batches)
+    let all = 0..rays.div_ceil(BATCH);
+    run_part((integrator, tolerance), (rays, seed), all, progress)
+}
+
+/// The same for some of the batches of `rays` random rays: [`add_up`] makes all of them.
+///
+/// # Errors
+/// If the tolerance is out of its range.
+pub fn run_part(
+    (integrator, tolerance): (Integrator, f64),
+    (rays, seed): (u64, u64),
+    batches: Range<u64>,
+    progress: impl Fn(u64) -> bool + Sync,
+) -> Result<Vec<Tally>, Error> {
+    batches
         .into_par_iter()
         .map_init(Oracle::default, |oracle, batch| {
             if !progress(0) {
@@ -139,7 +153,21 @@ pub fn run(
             progress(tallies.iter().map(|tally| tally.rays).sum());
             Ok(tallies)
         })
-        .try_reduce(nothing, |a, b| Ok(a.into_iter().zip(&b).map(|(a, b)| a.add(b)).collect()))
+        .try_reduce(nothing, |a, b| Ok(add(a, &b)))
+}
+
+/// Of no rays.
+fn nothing() -> Vec<Tally> {
+    Kind::ALL.map(Tally::new).to_vec()
+}
+
+fn add(all: Vec<Tally>, more: &[Tally]) -> Vec<Tally> {
+    all.into_iter().zip(more).map(|(a, b)| a.add(b)).collect()
+}
+
+/// What parts in the order of their batches come to together: the same as at once.
+pub fn add_up(parts: impl IntoIterator<Item = Vec<Tally>>) -> Vec<Tally> {
+    parts.into_iter().fold(nothing(), |all, part| add(all, &part))
 }
 
 fn any_of<T: Copy>(rng: &mut impl Rng, values: &[T]) -> T {

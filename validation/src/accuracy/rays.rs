@@ -3,6 +3,7 @@
 use kerrlight_geodesic::analytic::CriticalCurve;
 use kerrlight_geodesic::{Error, Inclination, Kerr, Observer};
 use rand::{Rng, RngExt};
+use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
 /// A kind of ray.
@@ -43,7 +44,7 @@ impl Class {
 }
 
 /// An angle as it was given.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Angle {
     /// In radians.
     Radians(f64),
@@ -65,7 +66,7 @@ impl Angle {
 }
 
 /// A ray by what the user gives.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Draw {
     /// Spin.
     pub spin: f64,

@@ -14,6 +14,7 @@ use crate::answer::Answer;
 use crate::checksum::{is_whole, sealed};
 use crate::interrupt::{Interrupted, Keeper};
 use crate::ranks::{self, Lead};
+use crate::record::Recorder;
 use crate::{output, progress, volume_files};
 use anyhow::{Context, bail};
 use clap::Args;
@@ -117,6 +118,7 @@ pub fn draw(
     lead: Option<Lead>,
 ) -> anyhow::Result<Answer> {
     check(&prepared.file)?;
+    let recorder = Recorder::of_process();
     let path = folder.path().join(FOLDER);
     std::fs::create_dir_all(&path).with_context(|| format!("cannot make {}", path.display()))?;
     let unknown = prepared.file.unknown_world()?;
@@ -140,6 +142,7 @@ pub fn draw(
     }
     bar.finish_and_clear();
     let answer = add_up(prepared, folder, &path, &all)?;
+    recorder.write_into(&path)?;
     together::end(lead, folder);
     Ok(answer)
 }
@@ -155,7 +158,7 @@ fn add_up(
     let truth = prepared.measured.truth.as_ref();
     let truth = truth.map(|t| super::results::true_volume(&prepared.file, t)).transpose()?;
     let found = summary::Summary::new(&prepared.file, world.as_ref(), all, truth)?;
-    page::write(&found, prepared, path)?;
+    page::write(&found, prepared, (folder, path))?;
     let numbers = found.numbers();
     output::Output::new(&path.join(NUMBERS), "")?.write(sealed(numbers.clone()).as_bytes())?;
     let files = [PAGE, NUMBERS, "mean.npz", "deviation.npz"].map(|name| path.join(name));

@@ -1,5 +1,7 @@
 //! The page of a posterior, its volumes and tables.
 
+use super::super::folder::Folder;
+use super::super::results::stores;
 use super::super::run::Prepared;
 use super::PAGE;
 use super::summary::{Interval, Summary};
@@ -9,8 +11,13 @@ use kerrlight_tomo::volume::slices::Through;
 use kerrlight_tomo::volume::{Shown, Volume, VolumeFile, vti};
 use std::path::Path;
 
-/// Writes mean.npz, deviation.npz, posterior.vti, worlds.csv, triangle.svg and the page.
-pub fn write(found: &Summary, prepared: &Prepared<'_>, folder: &Path) -> anyhow::Result<()> {
+/// Writes mean.npz, deviation.npz, posterior.vti, posterior.zarr, worlds.csv, triangle.svg and the page of draws about the
+/// run in `run`.
+pub fn write(
+    found: &Summary,
+    prepared: &Prepared<'_>,
+    (run, folder): (&Folder, &Path),
+) -> anyhow::Result<()> {
     let file = |name: &str| Output::new(&folder.join(name), "");
     let noise = found.ensemble.signal_to_noise()?;
     let volumes = [
@@ -25,6 +32,7 @@ pub fn write(found: &Summary, prepared: &Prepared<'_>, folder: &Path) -> anyhow:
     let fields = volumes.map(|(name, volume)| vti::Field { name, volume });
     let write = |out: &mut std::io::BufWriter<&std::fs::File>| Ok(vti::write(out, &fields)?);
     file("posterior.vti")?.write_with(write)?;
+    stores::write(run, &stores::of_draws(folder), &fields, None)?;
     let triangle = triangle(found);
     if let Some(triangle) = &triangle {
         file("worlds.csv")?.write(table(&found.world).as_bytes())?;

@@ -4,6 +4,7 @@ use super::{Drawing, Folder, Posterior};
 use crate::answer::Answer;
 use crate::claims::Watch;
 use crate::interrupt::Keeper;
+use crate::output;
 use crate::ranks::{self, Lead, Team};
 use indicatif::ProgressBar;
 use kerrlight_tomo::representation::Registry;
@@ -31,6 +32,7 @@ pub fn lead(folder: &Folder, samples: u32) -> anyhow::Result<Option<Lead>> {
 pub fn end(lead: Option<Lead>, folder: &Folder) {
     if let Some(lead) = lead {
         lead.end();
+        output::sweep(&folder.path().join(super::FOLDER), output::BESIDE);
         // What is left behind does no harm.
         let _ = std::fs::remove_dir_all(shared(folder.path()));
     }

@@ -10,6 +10,7 @@ pub mod page;
 pub mod plots;
 pub mod residuals;
 mod scene;
+pub mod stores;
 mod units;
 pub mod verdict;
 
@@ -116,7 +117,9 @@ impl Estimate<'_> {
             fields.push(vti::Field { name: "truth", volume });
         }
         let write = |out: &mut std::io::BufWriter<&std::fs::File>| Ok(vti::write(out, &fields)?);
-        self.folder.file("volume.vti")?.write_with(write)
+        self.folder.file("volume.vti")?.write_with(write)?;
+        let axis = Some(state.now.axis.vector());
+        stores::write(self.folder, &stores::of_run(self.folder), &fields, axis)
     }
 
     fn movies(&self, movie: &Frames<f32>) -> anyhow::Result<()> {

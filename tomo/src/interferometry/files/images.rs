@@ -2,7 +2,7 @@
 
 use super::FileError;
 use crate::Error;
-use crate::frames::Frames;
+use crate::frames::{Frames, Sink};
 use crate::image::exr;
 use crate::interferometry::operator::ImageGrid;
 use crate::interferometry::simulate::Movie;
@@ -171,20 +171,34 @@ pub fn npz_frames(file: impl Read + Seek) -> std::result::Result<WithSize, Error
 }
 
 fn frames_of<R: Read>(array: Stream<R>) -> std::result::Result<WithSize, Error> {
-    let shape: Vec<usize> = array.shape().iter().map(|n| *n as usize).collect();
+    let shape = array.shape().to_vec();
+    frames_with(&shape, |pixels, sink| array.chunks(pixels, sink))
+}
+
+/// Images of an array of this shape, (height, width) or (frames, height, width). `make` is given the number of pixels of
+/// an image, and hands over one image after the other: they need not fit into memory.
+///
+/// # Errors
+/// Those of `make`; if the array has another shape, or a number that is not finite.
+pub fn frames_with(
+    shape: &[u64],
+    make: impl FnOnce(usize, &mut Sink<'_, f64>) -> std::result::Result<(), Error>,
+) -> std::result::Result<WithSize, Error> {
     let (count, [height, width]) = match shape[..] {
         [height, width] => (1, [height, width]),
         [count, height, width] => (count, [height, width]),
         _ => return Err(NumpyError::content(format!("shape {shape:?}: {IMAGE_SHAPES}")).into()),
     };
+    let [count, height, width] = [count, height, width].map(|n| n as usize);
     let pixels = height.checked_mul(width).filter(|pixels| *pixels > 0 && count > 0);
-    let pixels = pixels.filter(|pixels| pixels.checked_mul(8 * count).is_some());
+    let bytes = |pixels: &usize| count.checked_mul(8).and_then(|all| pixels.checked_mul(all));
+    let pixels = pixels.filter(|pixels| bytes(pixels).is_some());
     let pixels =
         pixels.ok_or_else(|| NumpyError::content(format!("shape {shape:?}: no pixels")))?;
     let what = || format!("an image of {width} x {height} pixels");
     memory::afford(what, memory::movie(1.0, pixels as f64))?;
     let frames = Frames::made((count, pixels), |sink| {
-        array.chunks(pixels, |image| {
+        make(pixels, &mut |image: &[f64]| {
             all_finite(image, [width, height])?;
             sink(image)
         })
@@ -192,8 +206,11 @@ fn frames_of<R: Read>(array: Stream<R>) -> std::result::Result<WithSize, Error> 
     Ok((frames?, [width, height]))
 }
 
-/// The array of an archive that is images.
-fn image_of(names: &[String]) -> std::result::Result<&str, NumpyError> {
+/// The array that is images, of those with these names: the only one, or the one named `movie`, `image` or `recovered`.
+///
+/// # Errors
+/// If there is no such array.
+pub fn image_of(names: &[String]) -> std::result::Result<&str, NumpyError> {
     let there = |wanted: &&&str| names.iter().any(|name| name == **wanted);
     match (names, IMAGES.iter().find(there)) {
         ([only], _) => Ok(only),
