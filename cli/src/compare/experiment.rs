@@ -24,6 +24,8 @@ pub struct Experiment {
     pub reading: Vec<String>,
     /// Seeds 1 to this are run of every case.
     pub seeds: u64,
+    /// Draws around every fit, as `kerrlight posterior` makes them; none, without it.
+    pub samples: Option<u32>,
     /// The fit that all cases change, relative to this file; levels of factors may name others.
     pub fit: Option<PathBuf>,
     /// Settings of all cases.
@@ -52,6 +54,8 @@ pub struct Experiment {
 pub struct Quick {
     /// Seeds.
     pub seeds: Option<u64>,
+    /// Draws around every fit.
+    pub samples: Option<u32>,
     /// Settings of all cases, after everything else.
     #[serde(default)]
     pub set: Table,
@@ -195,9 +199,19 @@ impl Experiment {
         Ok(experiment)
     }
 
+    /// Draws around every fit, in a quick look or not.
+    pub fn samples(&self, quick: bool) -> Option<u32> {
+        self.quick.samples.filter(|_| quick).or(self.samples)
+    }
+
     fn check(&self) -> anyhow::Result<()> {
         if self.seeds == 0 {
             bail!("seeds = 0 is not allowed: 1 or more");
+        }
+        for (key, samples) in [("samples", self.samples), ("quick.samples", self.quick.samples)] {
+            if let Some(samples) = samples.filter(|n| !(2..=100_000).contains(n)) {
+                bail!("{key} = {samples} is not allowed: 2 to 100000");
+            }
         }
         for (k, factor) in self.factor.iter().enumerate() {
             factor.check()?;

@@ -247,7 +247,8 @@ impl<'a> Drawing<'a> {
         let Prepared { instrument, measured, motion, registry, .. } = self.prepared;
         let mut file = self.file.clone();
         file.seed = file.seed.wrapping_add(number);
-        if file.representation.kind == Kind::LinearGrid {
+        let has_prior = file.linear.as_ref().is_some_and(|linear| linear.prior.is_some());
+        if file.representation.kind == Kind::LinearGrid && !has_prior {
             let nodes = other_voxels(file.representation.grid_nodes(), number);
             file.representation.nodes = Some(nodes);
         }
