@@ -15,6 +15,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 mod changing;
+mod gaussian;
 mod kept;
 pub(in crate::fit) mod lit;
 mod profile;
