@@ -60,8 +60,7 @@ fn exact_draws_of_voxels_resume_to_the_same_bytes() {
     assert_eq!(first, of("sample_0001.json"));
 }
 
-const PRIOR: &str =
-    "linear.prior={mean=0.1,amplitude=0.2,correlation_length=2.0,matern=\"5/2\"}";
+const PRIOR: &str = "linear.prior={mean=0.1,amplitude=0.2,correlation_length=2.0,matern=\"5/2\"}";
 
 /// Draws have the fit's voxels and fields of the prior: another one for each, the same when it is drawn again.
 #[test]

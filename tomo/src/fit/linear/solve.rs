@@ -180,7 +180,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
                 Some(start) => start,
                 None => return Ok(run.cancelled(vec![0.0; self.unknowns()], 0)),
             },
-            None => (vec![0.0; self.unknowns()], vec![true; self.unknowns()]),
+            None => (self.start(), vec![true; self.unknowns()]),
         };
         if let Some(carried) = carried {
             if carried.ending == Ending::Cancelled {
@@ -266,6 +266,15 @@ impl<T: Float + Default> LinearProblem<'_, T> {
             }
         }
         Ok(sum)
+    }
+
+    /// Where a descent without a coarse problem begins: in the dark, or where the prior's density is highest.
+    fn start(&self) -> Vec<f64> {
+        let inside = |x: &f64| x.clamp(0.0, self.upper);
+        match self.gaussian {
+            Some(gaussian) => gaussian.center().iter().map(inside).collect(),
+            None => vec![0.0; self.unknowns()],
+        }
     }
 
     pub(super) fn data(&self) -> Result<Data<'_, T>, Error> {

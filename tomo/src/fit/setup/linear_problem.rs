@@ -17,6 +17,9 @@ const COARSE: usize = 24;
 /// Bytes of the sparse matrix of emission that changes: its rows take long to compute anew.
 const MANY_ROWS: usize = 2 << 30;
 
+/// What is left of the first gradient beside a prior: what data hardly tell is decided last.
+const SURE: f64 = 1e-7;
+
 /// All terms of the data, the image first.
 pub(super) fn terms(data: &Data<f32>) -> Vec<Weighted<'_, f32>> {
     let image = data.image.iter().map(|w| (w.weight, &*w.term as &dyn FrameTerm<f32>));
@@ -134,6 +137,7 @@ pub(super) fn solve_frames(
         false => coarse,
     };
     let memory = if change.is_any() { MANY_ROWS } else { usual.memory };
-    let how = LinearSettings { rounds, iterations, coarse, memory, ..usual };
+    let tolerance = if settings.prior.is_some() { SURE } else { usual.tolerance };
+    let how = LinearSettings { rounds, iterations, coarse, memory, tolerance, ..usual };
     of.with(frames, |problem| problem.solve(&how, watch))
 }

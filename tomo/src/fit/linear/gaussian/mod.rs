@@ -68,6 +68,11 @@ impl GaussianField {
         self.spread.len()
     }
 
+    /// Where its density is highest, emission at the nodes.
+    pub fn center(&self) -> &[f64] {
+        &self.center
+    }
+
     /// A field that it gives, the same for the same seed.
     pub fn drawn(&self, seed: u64) -> Vec<f64> {
         let mut random = Pcg64::seed_from_u64(seed);

@@ -96,8 +96,7 @@ fn exact_solutions_are_those_of_the_normal_equations() {
         let (a, q) = (simulated.matrix(&prior), precision(&prior));
         let bend = a.transpose() * &a / (SIGMA * SIGMA) + &q;
         let noise = normal(simulated.data.len(), 9);
-        let data: Vec<f64> =
-            simulated.data.iter().zip(noise).map(|(d, n)| d + SIGMA * n).collect();
+        let data: Vec<f64> = simulated.data.iter().zip(noise).map(|(d, n)| d + SIGMA * n).collect();
         let center = prior.drawn(10);
         let right = a.transpose() * DVector::from_vec(data.clone()) / (SIGMA * SIGMA)
             + &q * DVector::from_vec(center.clone());
@@ -123,8 +122,7 @@ fn exact_draws_have_the_covariance_of_the_posterior() {
     let mut squares = vec![0.0; n];
     for seed in 0..draws {
         let noise = normal(simulated.data.len(), 100 + seed);
-        let data: Vec<f64> =
-            simulated.data.iter().zip(noise).map(|(d, n)| d + SIGMA * n).collect();
+        let data: Vec<f64> = simulated.data.iter().zip(noise).map(|(d, n)| d + SIGMA * n).collect();
         let center = prior.drawn(1000 + seed);
         let draw = simulated.solution(&data, &prior.clone().about(center)).emission;
         for (square, (x, best)) in squares.iter_mut().zip(draw.iter().zip(&best)) {
