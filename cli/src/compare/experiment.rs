@@ -1,6 +1,7 @@
 //! What an experiment's file may say.
 
 use super::labels::{ONE_CHI2, RESULTS};
+use crate::fit::posterior::RANKED;
 use anyhow::{Context, bail};
 use kerrlight_tomo::toml_file;
 use serde::Deserialize;
@@ -204,15 +205,31 @@ impl Experiment {
         self.quick.samples.filter(|_| quick).or(self.samples)
     }
 
-    fn check(&self) -> anyhow::Result<()> {
-        if self.seeds == 0 {
-            bail!("seeds = 0 is not allowed: 1 or more");
-        }
+    /// Refuses numbers of draws that mean nothing, and results of draws where there are none.
+    fn check_draws(&self) -> anyhow::Result<()> {
         for (key, samples) in [("samples", self.samples), ("quick.samples", self.quick.samples)] {
             if let Some(samples) = samples.filter(|n| !(2..=100_000).contains(n)) {
                 bail!("{key} = {samples} is not allowed: 2 to 100000");
             }
         }
+        let tables = self.table.iter().map(|table| (&table.title, Some(&table.value)));
+        let figures = self.figure.iter().map(|figure| (&figure.title, figure.value.as_ref()));
+        let is_of_draws = |value: &String| RANKED.iter().any(|name| value.starts_with(name));
+        for (title, value) in tables.chain(figures) {
+            if let Some(value) = value.filter(|value| is_of_draws(value))
+                && self.samples.is_none()
+            {
+                bail!("{title:?}: value = {value:?} needs draws: give `samples = 20`");
+            }
+        }
+        Ok(())
+    }
+
+    fn check(&self) -> anyhow::Result<()> {
+        if self.seeds == 0 {
+            bail!("seeds = 0 is not allowed: 1 or more");
+        }
+        self.check_draws()?;
         for (k, factor) in self.factor.iter().enumerate() {
             factor.check()?;
             if self.factor[..k].iter().any(|other| other.name == factor.name) {

@@ -26,6 +26,7 @@ use sample::{Drawn, Through};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+pub use summary::RANKED;
 pub use together::{help, lead};
 
 /// Where draws and what follows from them are, in the folder of a run.
