@@ -109,7 +109,7 @@ fn exact_priors_that_mean_nothing_are_refused() {
             "linear.prior does not work together with [change]",
         ),
         (
-            "truth.field={mean=0.1,amplitude=0.2,correlation_length=2.0,matern=\"1/2\",nodes=3}",
+            "truth.field={mean=0.1,amplitude=0.2,correlation_length=2.0,matern=\"1/2\",negative=\"dark\",nodes=3}",
             "truth.field.nodes = 3 is not allowed",
         ),
     ] {

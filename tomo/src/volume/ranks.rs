@@ -100,14 +100,14 @@ mod tests {
     #[test]
     fn exact_ranks_tell_what_is_too_bright() {
         let volume = |value: f32| Volume::new([2; 3], [-1.0; 3], [1.0; 3], vec![value; 8]).unwrap();
-        let draws = [1.0, 2.0, 3.0, 4.0].map(volume);
+        let draws: Vec<Volume> = (1..=9).map(|k| volume(k as f32)).collect();
         let mut random = Pcg64::seed_from_u64(1);
         let mut of =
             |value| Ranks::of_nodes(&draws, &volume(value), &mut random, |node| node > 1).unwrap();
-        let (above, below) = (of(5.0), of(0.0));
+        let (above, below) = (of(9.5), of(0.0));
         assert_eq!((above.count, above.within_68), (6, 0.0));
-        assert_eq!(above.histogram[..8], [0; 8]);
-        assert_eq!(below.histogram[2..], [0; 8]);
-        assert_eq!(of(2.5).within_68, 1.0);
+        assert_eq!(above.histogram[..9], [0; 9]);
+        assert_eq!(below.histogram[1..], [0; 9]);
+        assert_eq!(of(5.5).within_68, 1.0);
     }
 }

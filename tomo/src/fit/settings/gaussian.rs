@@ -30,11 +30,23 @@ pub struct FieldSettings {
     pub correlation_length: f64,
     /// Its ν.
     pub matern: Roughness,
+    /// What becomes of what is negative.
+    pub negative: Negative,
     /// Nodes along each axis of the cube about the region.
     pub nodes: usize,
     /// What is between them.
     #[serde(default = "cubic")]
     pub degree: Degree,
+}
+
+/// What becomes of the negative parts of a field.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Negative {
+    /// The field is moved to the nearest one that is nowhere negative, in the metric of its covariance.
+    Lifted,
+    /// They are dark.
+    Dark,
 }
 
 fn cubic() -> Degree {

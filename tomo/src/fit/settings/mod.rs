@@ -26,7 +26,7 @@ pub use change::ChangeSettings;
 pub use data::{DataFiles, Loss, LossKind};
 pub use error::FitError;
 pub(crate) use error::{Within, refuse};
-pub use gaussian::{FieldSettings, GaussianSettings};
+pub use gaussian::{FieldSettings, GaussianSettings, Negative};
 pub use held_out::{HeldOutSettings, Weight};
 pub use instrument::{GainPhases, GainSettings, InstrumentSettings, LeakageSettings};
 pub use light_curve::{MeanFlux, MeasuredCurve, PerStokes, SimulatedCurve};

@@ -2,7 +2,7 @@
 
 use super::Result;
 use crate::fit::linear::{GaussianField, Voxels};
-use crate::fit::settings::{FieldSettings, FitFile, Within};
+use crate::fit::settings::{FieldSettings, FitFile, Negative, Within};
 use crate::representation::Spline;
 
 /// Of the random numbers of a truth.
@@ -23,7 +23,11 @@ impl RandomField {
     pub fn new(file: &FitFile, settings: &FieldSettings) -> Result<Self> {
         let voxels = Voxels::cube(settings.nodes, file.region.r_max, settings.degree);
         let field = GaussianField::new(settings.law(), &voxels).within("truth.field")?;
-        let factors = field.drawn_between(f64::INFINITY, file.seed ^ TRUTH);
+        let seed = file.seed ^ TRUTH;
+        let factors = match settings.negative {
+            Negative::Lifted => field.drawn_between(f64::INFINITY, seed),
+            Negative::Dark => field.drawn(seed).into_iter().map(|x| x.max(0.0)).collect(),
+        };
         Ok(Self { splines: voxels.field().within("truth.field")?, factors })
     }
 
