@@ -128,9 +128,9 @@ fn exact_slopes_and_second_derivatives_are_differences() {
         assert!((dot(&slopes) / difference - 1.0).abs() < 1e-6, "{difference}");
         let mut bent = vec![0.0; 125];
         field.add_curvature(&along, 0.7, &mut bent);
-        for k in 0..125 {
-            let difference = (up.1[k] - down.1[k]) / 2e-4;
-            assert!((difference - bent[k]).abs() < 1e-6 * bent[k].abs().max(1.0), "{k}");
+        for (bent, (up, down)) in bent.iter().zip(up.1.iter().zip(&down.1)) {
+            let difference = (up - down) / 2e-4;
+            assert!((difference - bent).abs() < 1e-6 * bent.abs().max(1.0), "{difference} {bent}");
         }
     }
 }
