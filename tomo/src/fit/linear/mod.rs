@@ -8,6 +8,7 @@
 
 mod certificate;
 mod change;
+mod convex;
 mod data;
 mod dense;
 mod descent;

@@ -1,6 +1,7 @@
 //! What is minimised: data and penalties as a function of the values at the nodes that count.
 
 use super::change::Change;
+use super::convex::Convex;
 use super::data::Data;
 use super::error::LinearError;
 use super::gaussian::GaussianField;
@@ -18,18 +19,6 @@ pub struct Prior {
     pub regulariser: Regulariser,
     /// What it is multiplied by.
     pub weight: f64,
-}
-
-/// A convex function of numbers in a box.
-pub(super) trait Convex {
-    /// Numbers.
-    fn count(&self) -> usize;
-    /// Its value; overwrites the gradient.
-    fn value_and_gradient(&mut self, x: &[f64], gradient: &mut Vec<f64>) -> f64;
-    /// Its second derivative times a direction, where it is quadratic.
-    fn curvature(&mut self, direction: &[f64], out: &mut Vec<f64>);
-    /// Positive numbers that are to the second derivatives as well as is known.
-    fn diagonal(&self) -> Vec<f64>;
 }
 
 /// Penalties on a field, and how it may change.

@@ -7,8 +7,9 @@
 //! second derivatives P of penalties, over the nodes that shine. Second derivatives of the images are left out
 //! (Gauss & Newton).
 
+use super::convex::Convex;
 use super::data::Data;
-use super::objective::{Convex, Objective};
+use super::objective::Objective;
 use super::operator::Operator;
 use super::scaled::{add, dot};
 use super::solve::LinearProblem;

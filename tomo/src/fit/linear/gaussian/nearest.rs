@@ -1,7 +1,7 @@
 //! The field that is nowhere negative and nearest to one that is.
 
+use super::super::convex::Convex;
 use super::super::descent::{Descent, Method, Stop};
-use super::super::objective::Convex;
 use super::super::scaled::Scaled;
 use super::GaussianField;
 use core::ops::ControlFlow;
