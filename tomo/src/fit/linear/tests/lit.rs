@@ -1,6 +1,7 @@
 //! Data that are not convex in the emission: amplitudes and closure quantities of a small array.
 
-use super::super::objective::{Convex, Objective, Penalised};
+use super::super::convex::Convex;
+use super::super::objective::{Objective, Penalised};
 use super::*;
 use crate::Error;
 use crate::fit::{Scan, ScanTerm};
