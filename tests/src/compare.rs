@@ -323,6 +323,40 @@ fn exact_a_quick_look_claims_nothing() {
     assert!(changed.contains("The run before is a quick look, not a result."), "{changed}");
 }
 
+/// Draws around every fit: their numbers are results, and a case is done with all of them.
+#[test]
+fn exact_draws_are_results_of_cases() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let value = ("value = \"psnr_db\"", "value = \"random_nodes_within_95\"");
+    experiment(at, &[value]);
+    let refused = fail(at, &["compare", "rates.toml", "-o", "out"]);
+    assert!(refused.contains("random_nodes_within_95\" needs draws"), "{refused}");
+    experiment(at, &[("seeds = 2", "samples = 1\nseeds = 2")]);
+    let refused = fail(at, &["compare", "rates.toml", "-o", "out"]);
+    assert!(refused.contains("samples = 1 is not allowed: 2 to 100000"), "{refused}");
+    let few = |samples| ("seeds = 2", samples);
+    experiment(at, &[value, few("samples = 2\nseeds = 1"), ("[0.1, 0.4]", "[0.1]")]);
+    succeed(at, &["compare", "rates.toml", "-o", "out"]);
+    let first = results(&at.join("out"));
+    let within = &cases(&first)[0]["results"]["random_nodes_within_95"];
+    assert!((0.0..=1.0).contains(&within.as_f64().unwrap()), "{within}");
+    let run = at.join("out").join(cases(&first)[0]["folder"].as_str().unwrap());
+    let numbers = std::fs::read(run.join("posterior/posterior.json")).unwrap();
+    let numbers: Value = serde_json::from_slice(&numbers).unwrap();
+    assert_eq!((&numbers["samples"], &numbers["random_nodes_within_95"]), (&2.into(), within));
+    // Without what follows from the draws the case is not done; with it nothing is done again.
+    std::fs::remove_file(run.join("posterior/posterior.json")).unwrap();
+    let told = |expected: &str| {
+        let output = kerrlight(at, &["compare", "rates.toml", "-o", "out", "--resume"]);
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(told.contains(expected), "{told}");
+    };
+    told("1 cases, 1 of them to be run");
+    told("1 cases, 0 of them to be run");
+    assert_eq!(&cases(&results(&at.join("out")))[0]["results"]["random_nodes_within_95"], within);
+}
+
 /// What no case can have is refused before anything runs.
 #[test]
 fn wrong_results_are_named_before_anything_runs() {

@@ -60,6 +60,69 @@ fn exact_draws_of_voxels_resume_to_the_same_bytes() {
     assert_eq!(first, of("sample_0001.json"));
 }
 
+const PRIOR: &str = "linear.prior={mean=0.1,amplitude=0.2,correlation_length=2.0,matern=\"5/2\"}";
+
+/// Draws have the fit's voxels and fields of the prior: another one for each, the same when it is drawn again.
+#[test]
+fn exact_draws_with_a_prior_resume_to_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("fit.toml"), settings()).unwrap();
+    let kind = ["--set", "representation=linear-grid", "--set", "representation.nodes=14"];
+    let kind = [&kind[..], &["--set", PRIOR]].concat();
+    run(folder.path(), &[&["fit", "fit.toml", "-o", "run", "--samples", "3"][..], &kind].concat());
+    let of = |name: &str| std::fs::read(folder.path().join("run/posterior").join(name)).unwrap();
+    assert_ne!(of("sample_0001.npz"), of("sample_0002.npz"));
+    let numbers = read(&folder.path().join("run/posterior/posterior.json"));
+    for name in ["random_nodes", "bright_nodes", "feature_radius"] {
+        let [one, two] = ["68", "95"].map(|part| numbers[format!("{name}_within_{part}")].as_f64());
+        assert!(one.unwrap() <= two.unwrap() && two.unwrap() <= 1.0, "{name} {one:?} {two:?}");
+        let tenths = numbers[format!("{name}_ranks")].as_array().unwrap().len();
+        assert_eq!(tenths, 10);
+    }
+    let page = String::from_utf8(of("report.html")).unwrap();
+    assert!(page.contains("Where the truth lies among the draws"));
+    let all = ["sample_0002.npz", "mean.npz", "posterior.json"].map(of);
+    for name in ["sample_0002.json", "sample_0002.npz", "mean.npz"] {
+        std::fs::remove_file(folder.path().join("run/posterior").join(name)).unwrap();
+    }
+    run(folder.path(), &["posterior", "run", "--samples", "3", "--threads", "1"]);
+    assert_eq!(all, ["sample_0002.npz", "mean.npz", "posterior.json"].map(of));
+}
+
+#[test]
+fn exact_priors_that_mean_nothing_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("fit.toml"), settings()).unwrap();
+    for (change, expected) in [
+        ("linear.prior={mean=0.1}", "missing field `amplitude`"),
+        (
+            "linear.prior={mean=0.1,amplitude=0.0,correlation_length=2.0,matern=\"5/2\"}",
+            "linear.prior.amplitude = 0 is not allowed",
+        ),
+        (
+            "linear.prior={mean=0.1,amplitude=0.2,correlation_length=2.0,matern=\"3/2\"}",
+            "unknown variant `3/2`, expected `1/2` or `5/2`",
+        ),
+        ("loss.0.weight=0.5", "loss.0.weight = 0.5 is not allowed: 1 with [linear.prior]"),
+        (
+            "change={allowed=\"any\",weight=0.01,spacing=10.0}",
+            "linear.prior does not work together with [change]",
+        ),
+        (
+            "truth.field={mean=0.1,amplitude=0.2,correlation_length=2.0,matern=\"1/2\",negative=\"dark\",nodes=3}",
+            "truth.field.nodes = 3 is not allowed",
+        ),
+    ] {
+        let kind = ["fit", "fit.toml", "-o", "run", "--set", "representation=linear-grid"];
+        let all = [&kind[..], &["--set", PRIOR, "--set", change]].concat();
+        let run = kerrlight(folder.path(), &all);
+        let told = String::from_utf8_lossy(&run.stderr).into_owned();
+        assert_eq!(run.status.code(), Some(2), "{change}: {told}");
+        assert!(told.contains(expected), "{change}: {told}");
+        assert!(!folder.path().join("run").exists(), "{change}");
+    }
+}
+
 #[test]
 #[ignore = "long"]
 fn exact_draws_of_an_unknown_world_have_worlds() {

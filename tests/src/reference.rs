@@ -127,7 +127,7 @@ fn regress_the_reference_has_every_key_of_a_scene() {
 }
 
 /// Tables of a fit that the built-in fit does not have, each with a key that does not exist.
-const INNER_TABLES: [&str; 23] = [
+const INNER_TABLES: [&str; 25] = [
     "axis={scan={nonsense=1}}",
     "axis={from={nonsense=1}}",
     "data={visibilities={nonsense=1}}",
@@ -148,6 +148,8 @@ const INNER_TABLES: [&str; 23] = [
     "world={search={starts=1,drag_is_spin=true,coarse={nonsense=1}}}",
     "world={spin={normal={nonsense=1}}}",
     "truth.glyph=[{nonsense=1}]",
+    "truth.field={nonsense=1}",
+    "linear.prior={nonsense=1}",
     "regulariser=[{nonsense=1}]",
     "probe={nonsense=1}",
     "held_out={nonsense=1}",

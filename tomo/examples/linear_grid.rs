@@ -108,6 +108,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         upper: 2.0,
         flux: None,
         priors: if weight > 0.0 { &smooth } else { &[] },
+        gaussian: None,
         change: Change::NONE,
     };
 

@@ -1,6 +1,7 @@
 //! What an experiment's file may say.
 
 use super::labels::{ONE_CHI2, RESULTS};
+use crate::fit::posterior::RANKED;
 use anyhow::{Context, bail};
 use kerrlight_tomo::toml_file;
 use serde::Deserialize;
@@ -24,6 +25,8 @@ pub struct Experiment {
     pub reading: Vec<String>,
     /// Seeds 1 to this are run of every case.
     pub seeds: u64,
+    /// Draws around every fit, as `kerrlight posterior` makes them; none, without it.
+    pub samples: Option<u32>,
     /// The fit that all cases change, relative to this file; levels of factors may name others.
     pub fit: Option<PathBuf>,
     /// Settings of all cases.
@@ -52,6 +55,8 @@ pub struct Experiment {
 pub struct Quick {
     /// Seeds.
     pub seeds: Option<u64>,
+    /// Draws around every fit.
+    pub samples: Option<u32>,
     /// Settings of all cases, after everything else.
     #[serde(default)]
     pub set: Table,
@@ -195,10 +200,36 @@ impl Experiment {
         Ok(experiment)
     }
 
+    /// Draws around every fit, in a quick look or not.
+    pub fn samples(&self, quick: bool) -> Option<u32> {
+        self.quick.samples.filter(|_| quick).or(self.samples)
+    }
+
+    /// Refuses numbers of draws that mean nothing, and results of draws where there are none.
+    fn check_draws(&self) -> anyhow::Result<()> {
+        for (key, samples) in [("samples", self.samples), ("quick.samples", self.quick.samples)] {
+            if let Some(samples) = samples.filter(|n| !(2..=100_000).contains(n)) {
+                bail!("{key} = {samples} is not allowed: 2 to 100000");
+            }
+        }
+        let tables = self.table.iter().map(|table| (&table.title, Some(&table.value)));
+        let figures = self.figure.iter().map(|figure| (&figure.title, figure.value.as_ref()));
+        let is_of_draws = |value: &String| RANKED.iter().any(|name| value.starts_with(name));
+        for (title, value) in tables.chain(figures) {
+            if let Some(value) = value.filter(|value| is_of_draws(value))
+                && self.samples.is_none()
+            {
+                bail!("{title:?}: value = {value:?} needs draws: give `samples = 20`");
+            }
+        }
+        Ok(())
+    }
+
     fn check(&self) -> anyhow::Result<()> {
         if self.seeds == 0 {
             bail!("seeds = 0 is not allowed: 1 or more");
         }
+        self.check_draws()?;
         for (k, factor) in self.factor.iter().enumerate() {
             factor.check()?;
             if self.factor[..k].iter().any(|other| other.name == factor.name) {

@@ -10,7 +10,7 @@ pub fn number(x: f64, digits: usize) -> String {
 }
 
 /// Results that are shown: their names in results.json, what they are called, their units and digits.
-pub const RESULTS: [(&str, &str, &str, usize); 41] = [
+pub const RESULTS: [(&str, &str, &str, usize); 47] = [
     ("psnr_db", "PSNR", "dB", 2),
     ("psnr_inside_db", "PSNR inside the region", "dB", 2),
     ("psnr_over_time_db", "PSNR over time", "dB", 2),
@@ -30,6 +30,22 @@ pub const RESULTS: [(&str, &str, &str, usize); 41] = [
     ("inclination_within_95", "inclination within its 95 % interval", "", 2),
     ("position_angle_within_68", "position angle within its 68 % interval", "", 2),
     ("position_angle_within_95", "position angle within its 95 % interval", "", 2),
+    ("random_nodes_within_68", "random nodes within the middle 68 % of the draws", "", 3),
+    ("random_nodes_within_95", "random nodes within the middle 95 % of the draws", "", 3),
+    ("bright_nodes_within_68", "bright nodes within the middle 68 % of the draws", "", 3),
+    ("bright_nodes_within_95", "bright nodes within the middle 95 % of the draws", "", 3),
+    (
+        "feature_radius_within_68",
+        "radius of the brightest feature within the middle 68 % of the draws",
+        "",
+        3,
+    ),
+    (
+        "feature_radius_within_95",
+        "radius of the brightest feature within the middle 95 % of the draws",
+        "",
+        3,
+    ),
     ("band_inclination_deg", "median of the inclination", "°", 1),
     ("band_inclination_low_deg", "2.5 % quantile of the inclination", "°", 1),
     ("band_inclination_high_deg", "97.5 % quantile of the inclination", "°", 1),

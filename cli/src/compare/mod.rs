@@ -129,7 +129,8 @@ impl Compare {
         }
         let recorder = Recorder::of_process();
         let lock = self.enter(&asked)?;
-        let runner = Runner::new(&folder, (threads, memory), program, lock)?;
+        let draws = experiment.samples(choice.quick);
+        let runner = Runner::new(&folder, (threads, memory), (program, draws), lock)?;
         let cases = if choice.is_restricted() && self.sharing().is_none() {
             let all = cases::expand(experiment, source, &choice.unrestricted())?;
             with_known(chosen, all, &runner)

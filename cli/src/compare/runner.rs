@@ -1,9 +1,10 @@
 //! One case after the other, each a process of its own: what one does wrong, or takes of memory, is its own.
 
 use super::cases::{Case, Status};
+use super::labels::RESULTS;
 use crate::checksum::is_whole;
 use crate::file_sums::FileSums;
-use crate::fit::Inputs;
+use crate::fit::{Inputs, posterior};
 use crate::interrupt::Keeper;
 use crate::lock::Lock;
 use crate::output::{self, Output};
@@ -21,6 +22,7 @@ pub struct Runner<'a> {
     program: &'a Program,
     threads: Option<u16>,
     memory: Option<u64>,
+    samples: Option<u32>,
     _lock: Option<Lock>,
 }
 
@@ -32,13 +34,13 @@ impl<'a> Runner<'a> {
     pub fn new(
         folder: &Path,
         (threads, memory): (Option<u16>, Option<u64>),
-        program: &'a Program,
+        (program, samples): (&'a Program, Option<u32>),
         lock: Option<Lock>,
     ) -> anyhow::Result<Self> {
         let folder = folder.join(CASES);
         std::fs::create_dir_all(&folder)
             .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-        Ok(Self { folder, program, threads, memory, _lock: lock })
+        Ok(Self { folder, program, threads, memory, samples, _lock: lock })
     }
 
     /// The run's folder of a case.
@@ -58,10 +60,26 @@ impl<'a> Runner<'a> {
         }
         match results(run) {
             Some((results, true)) if is_ours(&results) && run.join("report.html").exists() => {
-                Status::Done(results)
+                self.with_draws(results, run).map_or(Status::Open, Status::Done)
             }
             _ => Status::Open,
         }
+    }
+
+    /// Results with what follows from the draws, where these are wanted; none if they are not all there.
+    fn with_draws(&self, mut results: Value, run: &Path) -> Option<Value> {
+        let Some(samples) = self.samples else { return Some(results) };
+        let text = output::read_text(&run.join(posterior::FOLDER).join(posterior::NUMBERS)).ok()?;
+        let numbers: Value = serde_json::from_str(&text).ok()?;
+        if !is_whole(&text) || numbers["samples"] != samples {
+            return None;
+        }
+        for (key, ..) in RESULTS {
+            if let Some(number) = numbers.get(key) {
+                results[key] = number.clone();
+            }
+        }
+        Some(results)
     }
 
     /// Refuses cases that have read files which are no longer the same: others would be compared with them.
@@ -125,6 +143,9 @@ impl<'a> Runner<'a> {
                     .with_context(|| format!("cannot clear {}", run.display()))?;
             }
             command.arg(&settings).arg("-o").arg(run);
+        }
+        if let Some(samples) = self.samples {
+            command.args(["--samples", &samples.to_string()]);
         }
         if let Some(threads) = self.threads {
             command.args(["--threads", &threads.to_string()]);

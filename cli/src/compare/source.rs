@@ -36,6 +36,7 @@ const CARRIED: &[(&str, &str)] = &carried![
     "experiments/spin-mismatch.toml",
     "experiments/world.toml",
     "experiments/calibration.toml",
+    "experiments/coverage-of-volumes.toml",
     "experiments/soft-flow.toml",
     "experiments/orbital-polarimetry.toml",
     "experiments/m87-2017.toml",

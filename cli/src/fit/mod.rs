@@ -14,7 +14,7 @@ mod inputs;
 mod labels;
 mod leakage;
 mod linear;
-mod posterior;
+pub mod posterior;
 mod results;
 mod run;
 mod static_image;

@@ -27,6 +27,16 @@ pub struct Feature {
     pub light: [f64; 2],
     /// The mean at its peak.
     pub peak: f64,
+    /// Its nodes.
+    pub nodes: Vec<usize>,
+}
+
+impl Feature {
+    /// Distance from the hole of the centroid that a volume has at the feature's nodes, M.
+    pub fn radius_in(&self, volume: &Volume) -> f64 {
+        let [x, y, z, _] = centroid(volume, &self.nodes);
+        (x * x + y * y + z * z).sqrt()
+    }
 }
 
 /// How often a truth lies within standard deviations of the mean.
@@ -179,6 +189,7 @@ fn feature(volumes: &[Volume], nodes: &[usize], peak: f64) -> Feature {
         height: of(&|p| p[2]),
         light: of(&|p| p[3]),
         peak,
+        nodes: nodes.to_vec(),
     }
 }
 
@@ -239,6 +250,8 @@ mod tests {
         assert!(first.radius[1] > 0.1 && first.radius[1] < 0.35, "{first:?}");
         assert!(first.azimuth[0].abs() < 0.02 && (first.height[0] - 1.0).abs() < 0.05);
         assert!((second.radius[0] - 5.0).abs() < 0.1 && second.radius[1] < 1e-6, "{second:?}");
+        let [a, b] = [&volumes[0], &volumes[2]].map(|volume| first.radius_in(volume));
+        assert!((b - a - 2.0 * first.radius[1]).abs() < 1e-3, "{a} {b}");
         assert!((second.azimuth[0] - (-4f64).atan2(-3.0)).abs() < 0.02);
         assert!(first.peak > second.peak);
     }

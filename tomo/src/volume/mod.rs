@@ -8,6 +8,7 @@ mod panels;
 #[cfg(test)]
 mod paper;
 pub mod projection;
+pub mod ranks;
 pub mod slices;
 pub mod vti;
 

@@ -27,6 +27,7 @@ use sample::{Drawn, Through};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+pub use summary::RANKED;
 pub use together::{help, lead};
 
 /// Where draws and what follows from them are, in the folder of a run.
@@ -250,7 +251,8 @@ impl<'a> Drawing<'a> {
         let Prepared { instrument, measured, motion, registry, .. } = self.prepared;
         let mut file = self.file.clone();
         file.seed = file.seed.wrapping_add(number);
-        if file.representation.kind == Kind::LinearGrid {
+        let has_prior = file.linear.as_ref().is_some_and(|linear| linear.prior.is_some());
+        if file.representation.kind == Kind::LinearGrid && !has_prior {
             let nodes = other_voxels(file.representation.grid_nodes(), number);
             file.representation.nodes = Some(nodes);
         }

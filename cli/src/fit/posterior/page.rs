@@ -7,6 +7,7 @@ use super::PAGE;
 use super::summary::{Interval, Summary};
 use crate::output::Output;
 use crate::report::{self, Drawing, Report, Triangle, Variable};
+use kerrlight_tomo::volume::ranks::Ranks;
 use kerrlight_tomo::volume::slices::Through;
 use kerrlight_tomo::volume::{Shown, Volume, VolumeFile, vti};
 use std::path::Path;
@@ -101,6 +102,36 @@ fn table(world: &[Interval]) -> String {
 
 /// How often the truth lies inside, where it is known.
 fn coverage(found: &Summary) -> Vec<report::Table> {
+    let mut all = of_nodes(found);
+    all.extend(found.ranks.as_ref().map(ranks));
+    all
+}
+
+/// Ranks of the truth among the draws.
+fn ranks(found: &[Ranks; 3]) -> report::Table {
+    let row = |(name, ranks): (&str, &Ranks)| {
+        let percent = |part: f64| format!("{:.0} %", 100.0 * part);
+        let tenths: Vec<String> = ranks.histogram.iter().map(usize::to_string).collect();
+        let [one, two] = [ranks.within_68, ranks.within_95].map(percent);
+        vec![name.to_owned(), ranks.count.to_string(), one, two, tenths.join(" ")]
+    };
+    let names =
+        ["random nodes of the region", "nodes where the mean is bright", "radius of feature 1"];
+    report::Table {
+        title: "Where the truth lies among the draws".to_owned(),
+        caption: "Part of the nodes at which the simulated emission lies within the middle 68 % and 95 % of the draws, \
+                  and how many have their rank in each tenth, the lowest first: equally many, over many simulations, if the \
+                  draws are those of the posterior. Equal numbers, as dark nodes have, are in random order."
+            .to_owned(),
+        head: ["", "number", "middle 68 %", "middle 95 %", "ranks by tenths"]
+            .map(str::to_owned)
+            .to_vec(),
+        rows: names.into_iter().zip(found).map(row).collect(),
+        links: Vec::new(),
+    }
+}
+
+fn of_nodes(found: &Summary) -> Vec<report::Table> {
     let Some(coverage) = &found.coverage else { return Vec::new() };
     let row = |(name, c): (&str, &kerrlight_tomo::volume::Coverage)| {
         let percent = |part: f64| format!("{:.0} %", 100.0 * part);

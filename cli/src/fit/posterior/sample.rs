@@ -11,6 +11,9 @@ use kerrlight_tomo::representation::Registry;
 use kerrlight_tomo::volume::Volume;
 use std::ops::ControlFlow;
 
+/// Of the random numbers of a prior's field, for the seed of a draw.
+const PRIOR: u64 = 0x7072_696f_7200_0000;
+
 /// What a fit goes through.
 pub struct Through<'a> {
     /// Settings, with the world that the draw has.
@@ -82,8 +85,9 @@ fn begin(
         told(&format!("linear grid, round {}, loss {:.4e}", now.round, now.value));
         if keeper.stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let how = ((state.now.axis, change), (nodes, stride));
-    let solution = setup::solve_linear(file, &mut trainer.objective, how.0, how.1, &mut watch);
+    let grid = (nodes, stride, Some(file.seed ^ PRIOR));
+    let about = (state.now.axis, change);
+    let solution = setup::draw_linear(file, &mut trainer.objective, about, grid, &mut watch);
     let solution = solution.map_err(failed::linear).context("linear")?;
     if keeper.stopped() {
         return Ok(false);

@@ -5,6 +5,7 @@ use super::super::labels;
 use super::Kept;
 use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::fit::world::Parameter;
+use kerrlight_tomo::volume::ranks::{Ranks, rank};
 use kerrlight_tomo::volume::{Coverage, Ensemble, Feature, Volume};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -38,6 +39,8 @@ pub struct Summary {
     pub features: Vec<Feature>,
     /// How often the truth lies inside: at random nodes of the region, and at those that shine.
     pub coverage: Option<[Coverage; 2]>,
+    /// Ranks of the truth among the draws: at random nodes, where the mean is bright, and of the first feature's radius.
+    pub ranks: Option<[Ranks; 3]>,
     samples: usize,
     /// Noise of the draws over the errors of the data.
     factor: f64,
@@ -51,6 +54,11 @@ const WRONG: f64 = 1.1;
 const NODES: f64 = 1000.0;
 /// Nodes shine where the truth is brighter than this part of its maximum.
 const SHINES: f32 = 0.05;
+/// Nodes are bright where the mean of the draws is above this part of its maximum: which nodes these are must not depend
+/// on the truth.
+const BRIGHT: f32 = 0.25;
+/// What has ranks, as [`Summary::ranks`] and keys of the numbers.
+pub const RANKED: [&str; 3] = ["random_nodes", "bright_nodes", "feature_radius"];
 
 impl Summary {
     /// Of draws of a fit, with what its run has found of the world, and the truth where there is one.
@@ -64,11 +72,22 @@ impl Summary {
         let ensemble = Ensemble::of(&volumes)?;
         let features = ensemble.features(&volumes);
         let world = world.map_or(Vec::new(), |world| intervals(world, draws));
-        let coverage = truth.map(|truth| covered(file, &ensemble, &truth)).transpose()?;
+        let coverage = truth.as_ref().map(|truth| covered(file, &ensemble, truth)).transpose()?;
+        let ranked = |truth: &Volume| ranks(file, (&ensemble, &features), &volumes, truth);
+        let ranks = truth.as_ref().map(ranked).transpose()?;
         let certain = certain(&ensemble);
         let factors = draws.iter().filter_map(|draw| draw.numbers["noise_factor"].as_f64());
         let factor = factors.fold(1.0, f64::max);
-        Ok(Self { ensemble, world, features, coverage, samples: draws.len(), factor, certain })
+        Ok(Self {
+            ensemble,
+            world,
+            features,
+            coverage,
+            ranks,
+            samples: draws.len(),
+            factor,
+            certain,
+        })
     }
 
     /// Numbers for a script.
@@ -86,7 +105,7 @@ impl Summary {
             .coverage
             .as_ref()
             .map_or([Value::Null, Value::Null], |all| [coverage(&all[0]), coverage(&all[1])]);
-        json!({
+        let mut all = json!({
             "samples": self.samples,
             "effective_samples": self.samples,
             "noise_factor": self.factor,
@@ -95,7 +114,15 @@ impl Summary {
             "light_above_3_sigma": self.certain,
             "coverage_random_nodes": random,
             "coverage_bright_nodes": bright,
-        })
+        });
+        for (name, ranks) in RANKED.iter().zip(self.ranks.iter().flatten()) {
+            if ranks.count > 0 {
+                all[format!("{name}_within_68")] = json!(ranks.within_68);
+                all[format!("{name}_within_95")] = json!(ranks.within_95);
+                all[format!("{name}_ranks")] = json!(ranks.histogram);
+            }
+        }
+        all
     }
 
     /// What a person wants to know.
@@ -202,6 +229,32 @@ fn covered(file: &FitFile, ensemble: &Ensemble, truth: &Volume) -> anyhow::Resul
     let least = SHINES * truth.values().iter().fold(0.0f32, |most, x| most.max(*x));
     let of_bright = ensemble.coverage(truth, |x, value| value > least && region.holds(x))?;
     Ok([of_all, of_bright])
+}
+
+/// Ranks of the truth among the draws, of what is listed in [`RANKED`].
+fn ranks(
+    file: &FitFile,
+    (ensemble, features): (&Ensemble, &[Feature]),
+    draws: &[Volume],
+    truth: &Volume,
+) -> anyhow::Result<[Ranks; 3]> {
+    let (region, mean) = (file.region.limits(), &ensemble.mean);
+    let holds = |node: &usize| region.holds(truth.position(*node));
+    let inside = (0..truth.values().len()).filter(holds).count();
+    let [mut chosen, mut places] = [1, 2].map(|k| Pcg64::seed_from_u64(file.seed.wrapping_add(k)));
+    let part = NODES / inside.max(1) as f64;
+    let random = Ranks::of_nodes(draws, truth, &mut places, |node| {
+        chosen.random::<f64>() < part && holds(&node)
+    })?;
+    let least = BRIGHT * mean.values().iter().fold(0.0f32, |most, x| most.max(*x));
+    let bright = Ranks::of_nodes(draws, truth, &mut places, |node| {
+        mean.values()[node] > least && holds(&node)
+    })?;
+    let radius = |feature: &Feature| {
+        let drawn = draws.iter().map(|draw| feature.radius_in(draw));
+        rank(feature.radius_in(truth), drawn, &mut places)
+    };
+    Ok([random, bright, Ranks::of(features.first().map(radius).into_iter())])
 }
 
 fn certain(ensemble: &Ensemble) -> f64 {

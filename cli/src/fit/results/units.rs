@@ -1,7 +1,7 @@
 //! Units of settings, as docs/reference/fit-file.md gives them.
 
 /// Keys as they end, without the numbers of lists, and their units; the first that fits counts.
-const UNITS: [(&str, &str); 57] = [
+const UNITS: [(&str, &str); 59] = [
     ("hole.spin", "M"),
     ("hole.mass_msun", "solar masses"),
     ("hole.distance_kpc", "kpc"),
@@ -22,7 +22,9 @@ const UNITS: [(&str, &str); 57] = [
     ("table.radii", "M"),
     ("table.rates", "rad/(GM/c³)"),
     ("perturbed.deviation", "rad/(GM/c³)"),
-    ("perturbed.correlation_length", "M"),
+    ("correlation_length", "M"),
+    ("field.mean", "model units"),
+    ("prior.mean", "model units"),
     ("perturbed.radii", "M"),
     ("motion.reference_time", "GM/c³"),
     ("motion.injection_time", "GM/c³"),

@@ -16,6 +16,8 @@ pub struct Weighted<'a, T: Float> {
 /// Terms over some frames: Σ weight · χ²/(number of real data in those frames).
 pub(super) struct Data<'a, T: Float> {
     terms: Vec<Weighted<'a, T>>,
+    /// Real data in the frames.
+    pub count: usize,
 }
 
 impl<'a, T: Float> Data<'a, T> {
@@ -51,7 +53,17 @@ impl<'a, T: Float> Data<'a, T> {
         if terms.is_empty() {
             return range("data in the frames", 0.0, "1 or more");
         }
-        Ok(Self { terms })
+        let count = terms.iter().map(|data| count(data.term)).sum();
+        Ok(Self { terms, count })
+    }
+
+    /// The same terms over the number of all data: Σ weight · χ²/data, in which a datum counts as its error says.
+    pub fn together(mut self, frames: &[usize]) -> Self {
+        for Weighted { weight, term } in &mut self.terms {
+            let own: usize = frames.iter().map(|frame| term.degrees_of_freedom(*frame)).sum();
+            *weight *= own as f64 / self.count as f64;
+        }
+        self
     }
 
     pub fn is_quadratic(&self) -> bool {

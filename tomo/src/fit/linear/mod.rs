@@ -8,10 +8,12 @@
 
 mod certificate;
 mod change;
+mod convex;
 mod data;
 mod dense;
 mod descent;
 mod error;
+mod gaussian;
 mod held;
 mod lit;
 mod nodes;
@@ -33,6 +35,7 @@ pub use change::Change;
 pub use data::Weighted;
 pub use descent::{Ending, Method};
 pub use error::LinearError;
+pub use gaussian::{GaussianField, Matern, Roughness};
 pub use objective::Prior;
 pub use profile::Profile;
 pub use solve::{

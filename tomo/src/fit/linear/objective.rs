@@ -1,12 +1,16 @@
 //! What is minimised: data and penalties as a function of the values at the nodes that count.
 
 use super::change::Change;
+use super::convex::Convex;
 use super::data::Data;
 use super::error::LinearError;
+use super::gaussian::GaussianField;
 use super::operator::Operator;
 use crate::Error;
 use crate::fit::regulariser::{Regulariser, Shape};
 use crate::simd::Float;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 
 /// A penalty with its weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,18 +21,6 @@ pub struct Prior {
     pub weight: f64,
 }
 
-/// A convex function of numbers in a box.
-pub(super) trait Convex {
-    /// Numbers.
-    fn count(&self) -> usize;
-    /// Its value; overwrites the gradient.
-    fn value_and_gradient(&mut self, x: &[f64], gradient: &mut Vec<f64>) -> f64;
-    /// Its second derivative times a direction, where it is quadratic.
-    fn curvature(&mut self, direction: &[f64], out: &mut Vec<f64>);
-    /// Positive numbers that are to the second derivatives as well as is known.
-    fn diagonal(&self) -> Vec<f64>;
-}
-
 /// Penalties on a field, and how it may change.
 #[derive(Clone, Copy)]
 pub(super) struct Penalised<'a> {
@@ -36,6 +28,8 @@ pub(super) struct Penalised<'a> {
     pub priors: &'a [Prior],
     /// The nodes of the grid.
     pub shape: Shape,
+    /// Gaussian on the nodes, and one over the number of data that it is beside.
+    pub gaussian: Option<(&'a GaussianField, f64)>,
     /// Along the flow.
     pub change: Change,
     /// The largest emission that is allowed.
@@ -44,20 +38,38 @@ pub(super) struct Penalised<'a> {
 
 impl Penalised<'_> {
     fn is_empty(&self) -> bool {
-        self.priors.is_empty() && !(self.change.is_any() && self.change.weight > 0.0)
+        self.priors.is_empty()
+            && self.gaussian.is_none()
+            && !(self.change.is_any() && self.change.weight > 0.0)
     }
 
-    /// The quadratic one alone.
-    fn smoothness(&self) -> Option<Self> {
-        let at = self.priors.iter().position(|p| p.regulariser == Regulariser::Smoothness)?;
-        let change = Change { weight: 0.0, ..self.change };
-        Some(Self { priors: &self.priors[at..=at], change, ..*self })
+    /// Whether anything has second derivatives that are the same everywhere.
+    fn is_curved(&self) -> bool {
+        let is_smooth = |prior: &Prior| prior.regulariser == Regulariser::Smoothness;
+        self.gaussian.is_some() || self.priors.iter().any(is_smooth)
+    }
+
+    /// Adds second derivatives of what is quadratic, at all nodes, times a direction.
+    fn add_curvature(&self, direction: &[f64], out: &mut [f64]) {
+        if let Some(at) = self.priors.iter().position(|p| p.regulariser == Regulariser::Smoothness)
+        {
+            let change = Change { weight: 0.0, ..self.change };
+            let smoothness =
+                Self { priors: &self.priors[at..=at], gaussian: None, change, ..*self };
+            smoothness.value_and_gradient(direction, out);
+        }
+        if let Some((gaussian, share)) = self.gaussian {
+            gaussian.add_curvature(direction, share, out);
+        }
     }
 
     /// Of values at all nodes and knots; those on fields are the means over time of a field that changes, sums over what
     /// is born. Adds slopes.
     fn value_and_gradient(&self, x: &[f64], slopes: &mut [f64]) -> f64 {
         let mut value = self.change.penalty(x, (self.shape.cell(), self.upper), slopes);
+        if let Some((gaussian, share)) = self.gaussian {
+            value += gaussian.value_and_gradient(x, share, slopes);
+        }
         let (nodes, share) = (self.shape.count(), self.change.share());
         for (field, slopes) in x.chunks_exact(nodes).zip(slopes.chunks_exact_mut(nodes)) {
             for Prior { regulariser, weight } in self.priors {
@@ -130,6 +142,23 @@ impl<'a, 'b, T: Float + Default> Objective<'a, 'b, T> {
         (value, gradient.iter().fold(0.0f64, |most, g| most.max(g.abs())))
     }
 
+    /// The diagonal beside that of a Gaussian prior, where there is one: squares of the columns are as large then as their
+    /// part of the trace of the data's second derivatives, which a random direction tells (Hutchinson 1990).
+    fn beside_gaussian(&self, squares: Vec<f64>) -> Vec<f64> {
+        let Some((gaussian, share)) = self.terms.gaussian.filter(|_| self.data.is_quadratic())
+        else {
+            return squares;
+        };
+        let mut random = Pcg64::seed_from_u64(0);
+        let signs: Vec<T> =
+            squares.iter().map(|_| T::of(if random.random() { 1.0 } else { -1.0 })).collect();
+        let bent = self.operator.curvature(self.data, self.dark.as_deref(), &signs);
+        let trace: f64 = bent.iter().zip(&signs).map(|(bent, sign)| bent * sign.double()).sum();
+        let scale = trace.max(0.0) / squares.iter().sum::<f64>();
+        let prior = self.operator.active.gather(&gaussian.diagonal(share));
+        squares.iter().zip(prior).map(|(square, prior)| scale * square + prior).collect()
+    }
+
     fn penalties(&self, x: &[f64], add: impl FnOnce(&[f64])) -> f64 {
         if self.terms.is_empty() {
             return 0.0;
@@ -171,10 +200,10 @@ impl<T: Float + Default> Convex for Objective<'_, '_, T> {
         let (dark, along) = (self.dark.as_deref(), rounded::<T>(direction, scale));
         *out = self.operator.curvature(self.data, dark, &along);
         out.iter_mut().for_each(|x| *x *= largest);
-        if let Some(smoothness) = self.terms.smoothness() {
+        if self.terms.is_curved() {
             let all = self.operator.active.expand(direction);
             let mut slopes = vec![0.0; all.len()];
-            smoothness.value_and_gradient(&all, &mut slopes);
+            self.terms.add_curvature(&all, &mut slopes);
             let slopes = self.operator.active.gather(&slopes);
             out.iter_mut().zip(slopes).for_each(|(x, slope)| *x += slope);
         }
@@ -186,6 +215,6 @@ impl<T: Float + Default> Convex for Objective<'_, '_, T> {
         // Nodes that are hardly seen are not to be moved by more than the others can follow.
         let least = if largest > 0.0 { 1e-4 * largest } else { 1.0 };
         squares.iter_mut().for_each(|x| *x = x.max(least));
-        squares
+        self.beside_gaussian(squares)
     }
 }

@@ -7,8 +7,9 @@
 //! second derivatives P of penalties, over the nodes that shine. Second derivatives of the images are left out
 //! (Gauss & Newton).
 
+use super::convex::Convex;
 use super::data::Data;
-use super::objective::{Convex, Objective};
+use super::objective::Objective;
 use super::operator::Operator;
 use super::scaled::{add, dot};
 use super::solve::LinearProblem;
@@ -56,7 +57,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         let free: Vec<T> = operator.active.gather(x).into_iter().map(T::of).collect();
         let images = operator.images(&free);
         let moved = moved(&data, self.frames, &images, tangents);
-        let terms = self.penalised();
+        let terms = self.penalised(&data);
         let mut objective = Objective::new(&operator, &data, &terms);
         let taken: Vec<Vec<f64>> = moved.bent.iter().map(|bent| operator.adjoint(bent)).collect();
         let absorbed: Vec<Vec<f64>> =

@@ -105,11 +105,12 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
             (false, _) => coarse.stride.div_ceil(2),
         };
         let frames: Vec<usize> = self.problem.frames.iter().copied().step_by(stride).collect();
-        let problem = LinearProblem { voxels, frames: &frames, priors: &[], ..*self.problem };
+        let problem =
+            LinearProblem { voxels, frames: &frames, priors: &[], gaussian: None, ..*self.problem };
         let data = problem.data()?;
         let operator = Operator::new(problem.walk(), problem.all(), &frames, self.settings.memory);
         self.bytes = self.bytes.max(operator.bytes());
-        let terms = problem.penalised();
+        let terms = problem.penalised(&data);
         let mut objective = Objective::new(&operator, &data, &terms);
         let found = self.coarse_field(&mut objective, coarse.iterations)?;
         self.evaluations += objective.evaluations;
@@ -151,7 +152,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         }
         let problem = self.problem;
         let operator = Operator::new(problem.walk(), problem.all(), problem.frames, 0);
-        let terms = problem.penalised();
+        let terms = problem.penalised(data);
         let mut objective = Objective::new(&operator, data, &terms);
         let (value, gradient) = objective.everywhere(&self.lit);
         self.evaluations += 1;
@@ -172,7 +173,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         let active = problem.active(is_active);
         let operator = Operator::new(problem.walk(), active, problem.frames, settings.memory);
         self.bytes = self.bytes.max(operator.bytes());
-        let terms = problem.penalised();
+        let terms = problem.penalised(data);
         let mut objective = Objective::new(&operator, data, &terms);
         let (dark, dark_slope) = objective.nothing();
         let start = operator.active.gather(x);

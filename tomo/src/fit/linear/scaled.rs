@@ -1,7 +1,7 @@
 //! A convex function in coordinates in which its second derivatives are about as large along each axis,
 //! y = √D x; the box stays one.
 
-use super::objective::Convex;
+use super::convex::Convex;
 
 pub(super) struct Scaled<'a> {
     inner: &'a mut dyn Convex,

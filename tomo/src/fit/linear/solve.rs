@@ -4,6 +4,7 @@ use super::certificate::{Certificate, Stationarity};
 use super::change::Change;
 use super::data::{Data, Weighted};
 use super::descent::{Ending, Method};
+use super::gaussian::GaussianField;
 use super::objective::{Objective, Penalised, Prior};
 use super::operator::{Active, Operator};
 use super::run::{FEW, LIT, Run};
@@ -34,6 +35,10 @@ pub struct LinearProblem<'a, T: Float> {
     pub flux: Option<f64>,
     /// Penalties; none is the usual.
     pub priors: &'a [Prior],
+    /// A Gaussian prior of the numbers of the nodes, none is the usual. With it all data count as their errors say:
+    /// what is minimised is (Σ weight · χ² + |L (x − center)|²)/data, −2/data times the logarithm of a density if the
+    /// weights are 1.
+    pub gaussian: Option<&'a GaussianField>,
     /// How emission may change while matter carries it; [`Change::NONE`] is the usual.
     pub change: Change,
 }
@@ -167,13 +172,15 @@ impl<T: Float + Default> LinearProblem<'_, T> {
             false => None,
         };
         let mut run = Run::new(self, settings, watch);
-        let coarse = settings.coarse.or((!data.is_convex()).then_some(LIT));
+        // A prior has something to say of every node.
+        let coarse = settings.coarse.filter(|_| self.gaussian.is_none() || !data.is_convex());
+        let coarse = coarse.or((!data.is_convex()).then_some(LIT));
         let (mut x, mut is_active) = match coarse {
             Some(coarse) => match run.coarse(coarse)? {
                 Some(start) => start,
                 None => return Ok(run.cancelled(vec![0.0; self.unknowns()], 0)),
             },
-            None => (vec![0.0; self.unknowns()], vec![true; self.unknowns()]),
+            None => (self.start(), vec![true; self.unknowns()]),
         };
         if let Some(carried) = carried {
             if carried.ending == Ending::Cancelled {
@@ -215,7 +222,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         self.check(&settings)?;
         let data = self.data()?;
         let operator = Operator::new(self.walk(), self.all(), self.frames, settings.memory);
-        let terms = self.penalised();
+        let terms = self.penalised(&data);
         let mut objective = Objective::new(&operator, &data, &terms);
         let mut watch = |_: &LinearProgress<'_>| ControlFlow::Continue(());
         let mut run = Run::new(self, &settings, &mut watch);
@@ -261,8 +268,18 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         Ok(sum)
     }
 
+    /// Where a descent without a coarse problem begins: in the dark, or where the prior's density is highest.
+    fn start(&self) -> Vec<f64> {
+        let inside = |x: &f64| x.clamp(0.0, self.upper);
+        match self.gaussian {
+            Some(gaussian) => gaussian.center().iter().map(inside).collect(),
+            None => vec![0.0; self.unknowns()],
+        }
+    }
+
     pub(super) fn data(&self) -> Result<Data<'_, T>, Error> {
-        Data::new(self.terms, self.frames, self.model.pixels(), self.model.frames())
+        let data = Data::new(self.terms, self.frames, self.model.pixels(), self.model.frames())?;
+        Ok(if self.gaussian.is_some() { data.together(self.frames) } else { data })
     }
 
     pub(super) fn walk(&self) -> Walk<'_, T> {
@@ -284,9 +301,10 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         self.voxels.count() * self.change.knots.count
     }
 
-    pub(super) fn penalised(&self) -> Penalised<'_> {
+    pub(super) fn penalised(&self, data: &Data<'_, T>) -> Penalised<'_> {
         let (priors, change, upper) = (self.priors, self.change, self.upper);
-        Penalised { priors, shape: self.voxels.shape(), change, upper }
+        let gaussian = self.gaussian.map(|gaussian| (gaussian, 1.0 / data.count as f64));
+        Penalised { priors, shape: self.voxels.shape(), gaussian, change, upper }
     }
 
     fn check(&self, settings: &LinearSettings) -> Result<(), Error> {
@@ -296,6 +314,10 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         };
         self.voxels.field()?;
         self.change.checked()?;
+        if let Some(gaussian) = self.gaussian {
+            let (nodes, allowed) = (gaussian.count(), "those of the grid at one knot");
+            check("nodes of the prior", nodes as f64, nodes == self.unknowns(), allowed)?;
+        }
         let positive = |x: f64| x.is_finite() && x > 0.0;
         check("upper", upper, positive(upper), "above 0")?;
         check("flux", flux.unwrap_or(1.0), flux.is_none_or(positive), "above 0")?;

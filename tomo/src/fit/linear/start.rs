@@ -1,9 +1,10 @@
 //! Where a problem that is not convex begins: at lit fields, scaled to the data; the best after some iterations.
 
 use super::Ending;
+use super::convex::Convex;
 use super::error::LinearError;
 use super::lit::{Around, Spots};
-use super::objective::{Convex, Objective};
+use super::objective::Objective;
 use super::run::Run;
 use super::scaled::dot;
 use crate::Error;

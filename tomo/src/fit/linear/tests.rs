@@ -15,6 +15,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 mod changing;
+mod gaussian;
 mod kept;
 pub(in crate::fit) mod lit;
 mod profile;
@@ -178,6 +179,7 @@ fn exact_solution_and_gap_of_a_dense_problem() {
         upper,
         flux: None,
         priors: &[],
+        gaussian: None,
         change: Change::NONE,
     };
     let solve = |method, iterations, coarse| {
@@ -225,6 +227,7 @@ fn exact_threads_change_no_bit() {
             upper: 2.0,
             flux: None,
             priors: &[prior],
+            gaussian: None,
             change: Change::NONE,
         };
         let settings = LinearSettings { coarse: None, memory, ..LinearSettings::default() };
@@ -252,6 +255,7 @@ fn numbers_out_of_range_are_named_and_a_stop_is_heeded() {
         upper: 1.0,
         flux: None,
         priors: &[],
+        gaussian: None,
         change: Change::NONE,
     };
     let fail = |problem: LinearProblem<'_, f64>| {

@@ -160,8 +160,18 @@ impl<T: Float + Default> Scanner<'_, T> {
         let model = own.as_ref().unwrap_or(model);
         let voxels = Voxels::cube(effort.nodes, half_width, Degree::Linear);
         let change = Change::NONE;
-        let problem =
-            LinearProblem { model, axis, frames, terms, voxels, upper, flux, priors, change };
+        let problem = LinearProblem {
+            model,
+            axis,
+            frames,
+            terms,
+            voxels,
+            upper,
+            flux,
+            priors,
+            gaussian: None,
+            change,
+        };
         let loss = problem.least(effort.iterations)?.value;
         let solved = self.solved.fetch_add(1, Ordering::Relaxed) + 1;
         if !(self.watch)(solved, self.expected.max(solved)) {

@@ -1,6 +1,6 @@
 //! A setting that is chosen by data that are held out.
 
-use super::{FitError, FitFile, Kind};
+use super::{FitError, FitFile, Kind, Linear};
 use crate::Error;
 use serde::{Deserialize, Serialize};
 
@@ -28,6 +28,12 @@ pub enum Weight {
     /// How much light costs.
     #[serde(rename = "linear.sparsity")]
     Sparsity,
+    /// How bright the prior's fields are.
+    #[serde(rename = "linear.prior.amplitude")]
+    Amplitude,
+    /// How far they are alike.
+    #[serde(rename = "linear.prior.correlation_length")]
+    CorrelationLength,
 }
 
 impl Weight {
@@ -37,6 +43,8 @@ impl Weight {
             Weight::Change => "change.weight",
             Weight::Smoothness => "linear.smoothness",
             Weight::Sparsity => "linear.sparsity",
+            Weight::Amplitude => "linear.prior.amplitude",
+            Weight::CorrelationLength => "linear.prior.correlation_length",
         }
     }
 
@@ -47,6 +55,12 @@ impl Weight {
             (Weight::Change, Some(change), _) => change.weight = value,
             (Weight::Smoothness, _, Some(linear)) => linear.smoothness = value,
             (Weight::Sparsity, _, Some(linear)) => linear.sparsity = value,
+            (Weight::Amplitude, _, Some(Linear { prior: Some(prior), .. })) => {
+                prior.amplitude = value;
+            }
+            (Weight::CorrelationLength, _, Some(Linear { prior: Some(prior), .. })) => {
+                prior.correlation_length = value;
+            }
             _ => {}
         }
         file
@@ -62,11 +76,31 @@ impl HeldOutSettings {
                 FitError::range("length of held_out.values", self.values.len(), allowed).into()
             );
         }
-        let why = match (file.representation.kind == Kind::LinearGrid, self.setting, file.change) {
-            (false, ..) => "needs representation.kind = \"linear-grid\"",
-            (true, Weight::Change, None) => "chooses change.weight, and there is no [change]",
+        let has_prior = file.linear.as_ref().is_some_and(|linear| linear.prior.is_some());
+        let why = match (file.representation.kind == Kind::LinearGrid, self.setting) {
+            (false, _) => "needs representation.kind = \"linear-grid\"",
+            (true, Weight::Change) if file.change.is_none() => {
+                "chooses change.weight, and there is no [change]"
+            }
+            (true, Weight::Amplitude | Weight::CorrelationLength) if !has_prior => {
+                "chooses a number of the prior, and there is no [linear.prior]"
+            }
+            (true, Weight::Amplitude | Weight::CorrelationLength) => {
+                return self.positive();
+            }
             _ => return Ok(()),
         };
         Err(FitError::Conflict(format!("held_out {why}")).into())
+    }
+
+    /// Refuses values that a prior cannot have.
+    fn positive(&self) -> Result<(), Error> {
+        match self.values.iter().position(|value| *value <= 0.0) {
+            Some(k) => {
+                let key = format!("held_out.values.{k}");
+                Err(FitError::range(key, self.values[k], "above 0 with this setting").into())
+            }
+            None => Ok(()),
+        }
     }
 }

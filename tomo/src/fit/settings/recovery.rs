@@ -1,5 +1,6 @@
 //! What is recovered, and how.
 
+use super::GaussianSettings;
 use crate::fit::BatchSize;
 use crate::representation::Activation;
 use crate::representation::Degree;
@@ -149,6 +150,9 @@ pub struct Linear {
     /// Factor on ∫ e dV.
     #[serde(default)]
     pub sparsity: f64,
+    /// A Gaussian prior of the voxels; none, without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prior: Option<GaussianSettings>,
     /// What is between the nodes.
     #[serde(default = "cubic")]
     pub degree: Degree,

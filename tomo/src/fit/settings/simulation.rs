@@ -1,5 +1,6 @@
 //! What is simulated, and the array that sees it.
 
+use super::FieldSettings;
 use crate::interferometry::noise::GainErrors;
 use serde::{Deserialize, Serialize};
 
@@ -28,6 +29,9 @@ pub struct Truth {
     /// Letters and digits at the reference time, flat in the plane across the axis.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub glyph: Vec<GlyphShape>,
+    /// A random field at the reference time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub field: Option<FieldSettings>,
 }
 
 /// A Gaussian spot.

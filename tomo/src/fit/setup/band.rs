@@ -203,6 +203,7 @@ fn rows(
         upper: 1.0,
         flux: None,
         priors: &[],
+        gaussian: None,
         change: Change::NONE,
     };
     let over = |(mut row, datum): (Vec<f64>, &Option<[f64; 2]>)| {

@@ -77,7 +77,7 @@ pub fn hold_out(
                 false => ControlFlow::Break(()),
             };
             let nodes = file.representation.grid_nodes();
-            let problem = linear_problem::Of { file: &file, objective, how, nodes };
+            let problem = linear_problem::Of { file: &file, objective, how, nodes, seed: None };
             let solution = solve_frames(&problem, &part(true), &mut told)?;
             if solution.ending == Ending::Cancelled {
                 return Ok(None);

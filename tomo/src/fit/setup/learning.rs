@@ -240,8 +240,32 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
     if file.representation.kind == Kind::LinearGrid || file.training.start != Start::Drawn {
         linear(file)?;
     }
+    check_prior(file)?;
     enough_nodes(file)?;
     Ok(file.simulated().map(drop)?)
+}
+
+/// Refuses a prior of voxels where it would have no part, or where data do not count as their errors say.
+fn check_prior(file: &FitFile) -> Result<()> {
+    if file.linear.as_ref().is_none_or(|linear| linear.prior.is_none()) {
+        return Ok(());
+    }
+    let is_linear = file.representation.kind == Kind::LinearGrid;
+    if !is_linear && !matches!(file.training.start, Start::Linear { .. }) {
+        refuse!("linear.prior needs representation.kind = \"linear-grid\" or a linear start");
+    }
+    if is_linear && file.change.is_some() {
+        refuse!(
+            "linear.prior does not work together with [change]: it knows no covariance in time"
+        );
+    }
+    match file.loss.iter().position(|loss| loss.weight != 1.0) {
+        Some(k) => {
+            let allowed = "1 with [linear.prior], beside which data count as their errors say";
+            Err(FitError::range(format!("loss.{k}.weight"), file.loss[k].weight, allowed).into())
+        }
+        None => Ok(()),
+    }
 }
 
 /// Refuses grids with fewer nodes than a B-spline of the linear problem reaches over.

@@ -3,9 +3,10 @@
 use super::{Result, linear, priors};
 use crate::dynamics::Axis;
 use crate::fit::linear::{
-    Change, Coarse, LinearProblem, LinearSettings, LinearSolution, Voxels, Watch, Weighted,
+    Change, Coarse, GaussianField, LinearProblem, LinearSettings, LinearSolution, Voxels, Watch,
+    Weighted,
 };
-use crate::fit::settings::{FitFile, Kind};
+use crate::fit::settings::{FitFile, Kind, Within};
 use crate::fit::{Data, FrameTerm, Objective};
 
 /// Nodes along an axis from which on a coarser grid is solved first.
@@ -15,6 +16,9 @@ const FINE: usize = 40;
 const COARSE: usize = 24;
 /// Bytes of the sparse matrix of emission that changes: its rows take long to compute anew.
 const MANY_ROWS: usize = 2 << 30;
+
+/// What is left of the first gradient beside a prior: what data hardly tell is decided last.
+const SURE: f64 = 1e-7;
 
 /// All terms of the data, the image first.
 pub(super) fn terms(data: &Data<f32>) -> Vec<Weighted<'_, f32>> {
@@ -34,9 +38,25 @@ pub fn solve_linear(
     (nodes, stride): (usize, usize),
     watch: &mut Watch<'_>,
 ) -> Result<LinearSolution<f32>> {
-    objective.model.weigh(axis);
+    draw_linear(file, objective, (axis, change), (nodes, stride, None), watch)
+}
+
+/// The same about a field that the prior of the voxels gives with a seed, in place of its mean: with data that have noise
+/// once more, a draw of the posterior (randomise, then optimise: Bardsley et al. 2014). Without a seed or a prior that is
+/// [`solve_linear`].
+///
+/// # Errors
+/// As [`solve_linear`].
+pub fn draw_linear(
+    file: &FitFile,
+    objective: &mut Objective<f32>,
+    how: (Axis, Change),
+    (nodes, stride, seed): (usize, usize, Option<u64>),
+    watch: &mut Watch<'_>,
+) -> Result<LinearSolution<f32>> {
+    objective.model.weigh(how.0);
     let frames: Vec<usize> = objective.observed().into_iter().step_by(stride.max(1)).collect();
-    solve_frames(&Of { file, objective, how: (axis, change), nodes }, &frames, watch)
+    solve_frames(&Of { file, objective, how, nodes, seed }, &frames, watch)
 }
 
 /// What the linear problem of a fit is made of; its model is weighed for the axis.
@@ -46,30 +66,48 @@ pub(super) struct Of<'a> {
     pub how: (Axis, Change),
     /// Along each axis.
     pub nodes: usize,
+    /// Of the field that the prior's density is about; about its mean, without one.
+    pub seed: Option<u64>,
 }
 
 impl Of<'_> {
+    /// The prior of the voxels.
+    fn gaussian(&self, voxels: &Voxels) -> Result<Option<GaussianField>> {
+        let Some(prior) = linear(self.file)?.prior else { return Ok(None) };
+        let field = GaussianField::new(prior.law(), voxels).within("linear.prior")?;
+        Ok(Some(match self.seed {
+            Some(seed) => {
+                let center = field.drawn(seed);
+                field.about(center)
+            }
+            None => field,
+        }))
+    }
+
     /// The problem of some frames.
     fn with<R>(
         &self,
         frames: &[usize],
         solve: impl FnOnce(&LinearProblem<'_, f32>) -> Result<R>,
     ) -> Result<R> {
-        let Of { file, objective, how: (axis, change), nodes } = *self;
+        let Of { file, objective, how: (axis, change), nodes, .. } = *self;
         let settings = linear(file)?;
         let mut priors = priors(settings);
         if file.representation.kind == Kind::LinearGrid {
             priors.extend(file.priors()?);
         }
+        let voxels = Voxels::cube(nodes, file.region.r_max, settings.degree);
+        let gaussian = self.gaussian(&voxels)?;
         solve(&LinearProblem {
             model: &objective.model,
             axis,
             frames,
             terms: &terms(&objective.data),
-            voxels: Voxels::cube(nodes, file.region.r_max, settings.degree),
+            voxels,
             upper: settings.upper,
             flux: settings.flux_jy,
             priors: &priors,
+            gaussian: gaussian.as_ref(),
             change,
         })
     }
@@ -99,6 +137,7 @@ pub(super) fn solve_frames(
         false => coarse,
     };
     let memory = if change.is_any() { MANY_ROWS } else { usual.memory };
-    let how = LinearSettings { rounds, iterations, coarse, memory, ..usual };
+    let tolerance = if settings.prior.is_some() { SURE } else { usual.tolerance };
+    let how = LinearSettings { rounds, iterations, coarse, memory, tolerance, ..usual };
     of.with(frames, |problem| problem.solve(&how, watch))
 }

@@ -1,6 +1,7 @@
 //! Emission that is simulated.
 
 use super::glyph::Glyph;
+use super::random_field::RandomField;
 use super::{AXIS, Instrument, Result, known_axis, motion};
 use crate::dynamics::{AngularVelocity, Axis};
 use crate::fit::settings::{FitError, FitFile, Shines, Spot, Tube, Within, refuse};
@@ -16,6 +17,7 @@ pub(super) const SPOT: &str = "add a table [[truth.spot]] with `center = [x, y, 
 pub struct Truth {
     spots: Vec<Spot>,
     glyphs: Vec<Glyph>,
+    field: Option<RandomField>,
     axis: Axis,
     velocity: AngularVelocity,
     /// M.
@@ -39,7 +41,8 @@ impl Truth {
         let missing =
             || FitError::missing("truth", format!("there is nothing to simulate; {SPOT}"));
         let truth = file.truth.as_ref().ok_or_else(missing)?;
-        if truth.spot.is_empty() && truth.glyph.is_empty() && truth.tube.is_empty() {
+        let lists = truth.spot.len() + truth.glyph.len() + truth.tube.len();
+        if lists == 0 && truth.field.is_none() {
             refuse!("truth is empty; {SPOT}");
         }
         let mut spots = truth.spot.clone();
@@ -65,6 +68,7 @@ impl Truth {
         Ok(Self {
             spots,
             glyphs: truth.glyph.iter().enumerate().map(glyph).collect::<Result<_>>()?,
+            field: truth.field.map(|field| RandomField::new(file, &field)).transpose()?,
             axis,
             velocity: motion(file, Vec::new())?.velocity,
             reference: file.motion.reference_time,
@@ -104,7 +108,8 @@ impl Truth {
         };
         let of_spots: f64 = self.spots.iter().map(light).sum();
         let of_glyphs = self.glyphs.iter().map(|glyph| glyph.at(reference, 0.0)).sum::<f64>();
-        self.scale * (of_spots + of_glyphs)
+        let of_field = self.field.as_ref().map_or(0.0, |field| field.at(reference));
+        self.scale * (of_spots + of_glyphs + of_field)
     }
 
     /// Images in Jy per pixel of a forward model with the truth's motion, all frames one after the other.
@@ -129,6 +134,7 @@ impl Truth {
     pub fn is_dark(&self) -> bool {
         self.spots.iter().all(|spot| spot.amplitude == 0.0)
             && self.glyphs.iter().all(Glyph::is_dark)
+            && self.field.is_none()
     }
 
     /// Whether matter carries it unchanged.

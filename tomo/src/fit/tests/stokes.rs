@@ -299,6 +299,7 @@ fn exact_fluxes_are_sums_of_images() {
         upper: 1.0,
         flux: None,
         priors: &[],
+        gaussian: None,
         change: Change::NONE,
     };
     let settings = LinearSettings {

@@ -174,6 +174,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
             upper: self.upper,
             flux: self.flux,
             priors: self.penalties,
+            gaussian: None,
             change: Change::NONE,
         }
     }

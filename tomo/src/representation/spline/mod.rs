@@ -84,6 +84,11 @@ impl Spline {
         Self::new([nodes; 3], [-reach; 3], [reach; 3], degree)
     }
 
+    /// The value at a point, M.
+    pub(crate) fn at<T: Float>(&self, parameters: &[T], [x, y, z]: [T; 3]) -> T {
+        self.value(parameters, &Coordinates::xyz(&[x], &[y], &[z]), 0)
+    }
+
     fn place<T: Float>(&self, at: &Coordinates<'_, T>, point: usize) -> Option<Place<T>> {
         let (mut corner, mut within) = (0, [T::zero(); 3]);
         for (k, (within, column)) in within.iter_mut().zip(at.columns()).enumerate() {

@@ -109,6 +109,7 @@ fn solve(model: &ForwardModel<f64>, pixels: Vec<f64>, change: Change) -> LinearS
         upper: 2.0,
         flux: None,
         priors: &[],
+        gaussian: None,
         change,
     };
     let settings = LinearSettings {

@@ -1,6 +1,7 @@
 //! Data that are not convex in the emission: amplitudes and closure quantities of a small array.
 
-use super::super::objective::{Convex, Objective, Penalised};
+use super::super::convex::Convex;
+use super::super::objective::{Objective, Penalised};
 use super::*;
 use crate::Error;
 use crate::fit::{Scan, ScanTerm};
@@ -79,6 +80,7 @@ fn solve(terms: &[Weighted<'_, f64>], flux: Option<f64>) -> Result<LinearSolutio
         upper: 2.0,
         flux,
         priors: &[],
+        gaussian: None,
         change: Change::NONE,
     };
     let settings = LinearSettings { iterations: 60, rounds: 3, ..LinearSettings::default() };
@@ -96,7 +98,7 @@ fn exact_slopes_of_data_that_are_not_convex() {
         let data = Data::new(&terms, &FRAMES, model.pixels(), FRAMES.len()).unwrap();
         let operator = operator(&model, voxels, &vec![true; voxels.count()], usize::MAX);
         let (priors, change) = (&[], Change::NONE);
-        let terms = Penalised { priors, shape: voxels.shape(), change, upper: 2.0 };
+        let terms = Penalised { priors, shape: voxels.shape(), gaussian: None, change, upper: 2.0 };
         let mut objective = Objective::new(&operator, &data, &terms);
         let x: Vec<f64> = random(voxels.count(), 1).iter().map(|x| 0.5 + x).collect();
         let direction = random(voxels.count(), 2);

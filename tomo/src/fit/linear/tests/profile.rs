@@ -44,6 +44,7 @@ impl Case {
             upper: 1e3,
             flux: None,
             priors: &[Prior { regulariser: Regulariser::Smoothness, weight: SMOOTH }],
+            gaussian: None,
             change: Change::NONE,
         })
     }

@@ -1,0 +1,87 @@
+//! Matérn's covariance (Matérn 1960), which the prior of a field has.
+
+use crate::Error;
+use serde::{Deserialize, Serialize};
+
+/// How smooth a Matérn field is: its ν.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Roughness {
+    /// ν = 1/2, covariance exp(−r/ℓ): continuous, with kinks everywhere.
+    #[serde(rename = "1/2")]
+    Half,
+    /// ν = 5/2: twice differentiable in the mean square.
+    #[serde(rename = "5/2")]
+    FiveHalves,
+}
+
+impl Roughness {
+    /// ν.
+    pub fn nu(self) -> f64 {
+        match self {
+            Self::Half => 0.5,
+            Self::FiveHalves => 2.5,
+        }
+    }
+
+    /// How many times (κ² − Δ) makes white noise of the field: (ν + 3/2)/2 in three dimensions.
+    pub(super) fn times(self) -> usize {
+        match self {
+            Self::Half => 1,
+            Self::FiveHalves => 2,
+        }
+    }
+}
+
+/// A stationary and isotropic Gaussian field in three dimensions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Matern {
+    /// Mean, emission.
+    pub mean: f64,
+    /// Standard deviation at a point, emission.
+    pub amplitude: f64,
+    /// ℓ, M: with κ = √(2ν)/ℓ.
+    pub correlation_length: f64,
+    /// ν.
+    pub roughness: Roughness,
+}
+
+impl Matern {
+    /// Itself, if its numbers are in their ranges.
+    ///
+    /// # Errors
+    /// Names the number that is not.
+    pub fn checked(self) -> Result<Self, Error> {
+        let positive = |x: f64| x > 0.0 && x.is_finite();
+        for (field, value, ok, allowed) in [
+            ("mean", self.mean, self.mean.is_finite(), "a finite number"),
+            ("amplitude", self.amplitude, positive(self.amplitude), "above 0"),
+            (
+                "correlation_length",
+                self.correlation_length,
+                positive(self.correlation_length),
+                "M above 0",
+            ),
+        ] {
+            if !ok {
+                return Err(Error::out_of_range(field, value, allowed));
+            }
+        }
+        Ok(self)
+    }
+
+    /// κ, per M.
+    pub fn kappa(&self) -> f64 {
+        (2.0 * self.roughness.nu()).sqrt() / self.correlation_length
+    }
+
+    /// Covariance of two points this far apart (M), emission squared: σ² 2^(1−ν)/Γ(ν) (κ r)^ν K_ν(κ r), which is
+    /// elementary for these ν.
+    pub fn covariance(&self, distance: f64) -> f64 {
+        let x = self.kappa() * distance;
+        let polynomial = match self.roughness {
+            Roughness::Half => 1.0,
+            Roughness::FiveHalves => 1.0 + x + x * x / 3.0,
+        };
+        self.amplitude * self.amplitude * polynomial * (-x).exp()
+    }
+}

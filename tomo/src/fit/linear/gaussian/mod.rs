@@ -1,0 +1,159 @@
+//! A Gaussian prior of a grid's numbers, with amplitude and correlation length.
+//!
+//! The field u of (κ² − Δ)^m u = w with white noise w is a Matérn field with ν = 2 m − 3/2 in three dimensions (Whittle
+//! 1954; Lindgren, Rue & Lindström 2011). With second differences for Δ, the inverse of its covariance is a sparse matrix.
+//! Edges of the grid are mirrors. There such a field varies more; every node is divided by its own standard deviation, so
+//! that the amplitude is the same everywhere.
+
+mod matern;
+mod modes;
+mod nearest;
+#[cfg(test)]
+mod tests;
+
+pub use matern::{Matern, Roughness};
+
+use super::walk::Voxels;
+use crate::Error;
+use crate::fit::regulariser::Shape;
+use modes::Modes;
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+
+/// A Gaussian field on the nodes of a grid.
+///
+/// Its density is exp(−|L (x − center)|²/2) with L x = (1 − Δ/κ²)^m (x/s): s makes the standard deviation of the field
+/// between the nodes, on average over all points, what is wanted.
+#[derive(Clone, Debug)]
+pub struct GaussianField {
+    law: Matern,
+    shape: Shape,
+    /// s of each node.
+    spread: Vec<f64>,
+    /// Amplitude of each wave in a field of unit white noise.
+    amplitudes: Vec<f64>,
+    /// Where the density is highest, emission.
+    center: Vec<f64>,
+}
+
+impl GaussianField {
+    /// On the nodes of a grid.
+    ///
+    /// # Errors
+    /// If a number is out of its range.
+    pub fn new(law: Matern, voxels: &Voxels) -> Result<Self, Error> {
+        let (law, shape) = (law.checked()?, voxels.shape());
+        voxels.field()?;
+        let modes = Modes::new(shape);
+        let (square, times) = (law.kappa().powi(2), law.roughness.times() as i32);
+        let amplitude = |bend: f64| (1.0 + bend / square).powi(-times);
+        let amplitudes: Vec<f64> = modes.bends().into_iter().map(amplitude).collect();
+        let powers: Vec<f64> = amplitudes.iter().map(|a| a * a).collect();
+        let share = modes.between_nodes(voxels.degree, |bend| amplitude(bend).powi(2));
+        let spread = |variance: f64| law.amplitude / (share * variance).sqrt();
+        let spread: Vec<f64> = modes.sum_of_squares(&powers).into_iter().map(spread).collect();
+        let center = vec![law.mean; spread.len()];
+        Ok(Self { law, shape, spread, amplitudes, center })
+    }
+
+    /// Its law.
+    pub fn law(&self) -> Matern {
+        self.law
+    }
+
+    /// Number of nodes.
+    pub fn count(&self) -> usize {
+        self.spread.len()
+    }
+
+    /// Where its density is highest, emission at the nodes.
+    pub fn center(&self) -> &[f64] {
+        &self.center
+    }
+
+    /// A field that it gives, the same for the same seed.
+    pub fn drawn(&self, seed: u64) -> Vec<f64> {
+        let mut random = Pcg64::seed_from_u64(seed);
+        let mut noise = |amplitude: &f64| -> f64 {
+            let normal: f64 = random.sample(StandardNormal);
+            amplitude * normal
+        };
+        let waves: Vec<f64> = self.amplitudes.iter().map(&mut noise).collect();
+        let all = Modes::new(self.shape).sum(&waves);
+        all.iter().zip(&self.spread).map(|(x, spread)| self.law.mean + x * spread).collect()
+    }
+
+    /// The same density about another field.
+    ///
+    /// # Panics
+    /// If it has another number of values.
+    #[must_use]
+    pub fn about(self, center: Vec<f64>) -> Self {
+        assert!(center.len() == self.count());
+        Self { center, ..self }
+    }
+
+    /// `factor` times |L (x − center)|²; adds its slopes. In an order that does not depend on the number of threads.
+    ///
+    /// # Panics
+    /// If the lengths are not the number of nodes.
+    pub fn value_and_gradient(&self, x: &[f64], factor: f64, slopes: &mut [f64]) -> f64 {
+        let away: Vec<f64> = x.iter().zip(&self.center).map(|(x, center)| x - center).collect();
+        let white = self.whitened(&away);
+        self.add_back(&white, 2.0 * factor, slopes);
+        factor * white.iter().map(|x| x * x).sum::<f64>()
+    }
+
+    /// Adds `factor` times the second derivatives of |L x|² times a direction.
+    pub(super) fn add_curvature(&self, direction: &[f64], factor: f64, out: &mut [f64]) {
+        self.add_back(&self.whitened(direction), 2.0 * factor, out);
+    }
+
+    /// `factor` times the second derivative of |L x|² with respect to each number, away from the edges.
+    pub(super) fn diagonal(&self, factor: f64) -> Vec<f64> {
+        let mean = self.amplitudes.iter().map(|a| a.powi(-2)).sum::<f64>() / self.count() as f64;
+        self.spread.iter().map(|spread| 2.0 * factor * mean / (spread * spread)).collect()
+    }
+
+    /// L x.
+    fn whitened(&self, x: &[f64]) -> Vec<f64> {
+        assert!(x.len() == self.count());
+        self.differentiated(x.iter().zip(&self.spread).map(|(x, spread)| x / spread).collect())
+    }
+
+    /// Adds `factor` times Lᵀ of white numbers.
+    fn add_back(&self, white: &[f64], factor: f64, out: &mut [f64]) {
+        assert!(out.len() == self.count());
+        let back = self.differentiated(white.to_vec());
+        for ((out, x), spread) in out.iter_mut().zip(back).zip(&self.spread) {
+            *out += factor * x / spread;
+        }
+    }
+
+    /// (1 − Δ/κ²)^m x, a symmetric matrix.
+    fn differentiated(&self, x: Vec<f64>) -> Vec<f64> {
+        (0..self.law.roughness.times()).fold(x, |x, _| self.once(&x))
+    }
+
+    /// x − Δx/κ² with mirrors at the edges.
+    fn once(&self, x: &[f64]) -> Vec<f64> {
+        let ([nx, ny, nz], square) = (self.shape.nodes, self.law.kappa().powi(2));
+        let weights = self.shape.spacing.map(|h| 1.0 / (square * h * h));
+        let around = [(nx, ny * nz), (ny, nz), (nz, 1)];
+        let mut out = vec![0.0; x.len()];
+        out.par_chunks_mut(ny * nz).enumerate().for_each(|(i, plane)| {
+            for (k, out) in plane.iter_mut().enumerate() {
+                let (at, index) = ([i, k / nz, k % nz], i * ny * nz + k);
+                *out = x[index];
+                for ((at, (n, stride)), weight) in at.iter().zip(around).zip(weights) {
+                    let below = if *at > 0 { x[index] - x[index - stride] } else { 0.0 };
+                    let above = if at + 1 < n { x[index] - x[index + stride] } else { 0.0 };
+                    *out += weight * (below + above);
+                }
+            }
+        });
+        out
+    }
+}

@@ -1,0 +1,124 @@
+//! Standing waves of a grid whose edges are mirrors: the eigenvectors of second differences on it.
+
+use crate::fit::regulariser::Shape;
+use crate::representation::Degree;
+use core::f64::consts::PI;
+
+/// Waves along three axes.
+pub(super) struct Modes {
+    axes: [Waves; 3],
+}
+
+/// Waves along an axis.
+struct Waves {
+    count: usize,
+    /// Wave after wave: cos(π k (j + 1/2)/n) of norm 1.
+    values: Vec<f64>,
+    /// Minus the second difference's eigenvalue, per M².
+    bends: Vec<f64>,
+    /// From one node to the next, M.
+    spacing: f64,
+}
+
+impl Waves {
+    fn new(count: usize, spacing: f64) -> Self {
+        let n = count as f64;
+        let phase = |k: usize| PI * k as f64 / n;
+        let wave = |k: usize| {
+            let norm = if k == 0 { n.recip().sqrt() } else { (2.0 / n).sqrt() };
+            let phase = phase(k);
+            (0..count).map(move |j| norm * (phase * (j as f64 + 0.5)).cos()).collect::<Vec<f64>>()
+        };
+        let bend = |k: usize| (2.0 * (0.5 * phase(k)).sin() / spacing).powi(2);
+        Self {
+            count,
+            values: (0..count).flat_map(wave).collect(),
+            bends: (0..count).map(bend).collect(),
+            spacing,
+        }
+    }
+
+    /// Sums of waves at the nodes, for amplitudes along the last of three axes; the axes move on by one.
+    fn along_last(&self, amplitudes: &[f64], square: bool) -> Vec<f64> {
+        let (n, rows) = (self.count, amplitudes.len() / self.count);
+        let mut out = vec![0.0; amplitudes.len()];
+        for (row, amplitudes) in amplitudes.chunks_exact(n).enumerate() {
+            let mut sums = vec![0.0; n];
+            for (amplitude, wave) in amplitudes.iter().zip(self.values.chunks_exact(n)) {
+                let of = |x: &f64| if square { x * x } else { *x };
+                sums.iter_mut().zip(wave).for_each(|(sum, x)| *sum += amplitude * of(x));
+            }
+            sums.iter().enumerate().for_each(|(j, sum)| out[j * rows + row] = *sum);
+        }
+        out
+    }
+}
+
+impl Modes {
+    pub fn new(shape: Shape) -> Self {
+        let axis = |k: usize| Waves::new(shape.nodes[k], shape.spacing[k]);
+        Self { axes: [0, 1, 2].map(axis) }
+    }
+
+    /// One number for each wave, z fastest, from its numbers along the axes.
+    fn each(&self, of: impl Fn([usize; 3]) -> f64) -> Vec<f64> {
+        let [nx, ny, nz] = [0, 1, 2].map(|k| self.axes[k].count);
+        let wave = |k: usize| of([k / (ny * nz), k / nz % ny, k % nz]);
+        (0..nx * ny * nz).map(wave).collect()
+    }
+
+    /// −Δ of each wave, per M².
+    pub fn bends(&self) -> Vec<f64> {
+        self.each(|at| (0..3).map(|c| self.axes[c].bends[at[c]]).sum())
+    }
+
+    /// Mean square over all points of the B-splines about the nodes over that of the nodes themselves, far from edges, of a
+    /// field whose waves have these powers, by −Δ (per M²): a B-spline's autocorrelation is the B-spline of degree 2d + 1.
+    /// Waves half a step apart from those of the grid have no mirrors.
+    pub fn between_nodes(&self, degree: Degree, power: impl Fn(f64) -> f64) -> f64 {
+        let axis = |waves: &Waves| -> Vec<[f64; 2]> {
+            let phase = |k: usize| PI * (k as f64 + 0.5) / waves.count as f64;
+            let bend = |phase: f64| (2.0 * (0.5 * phase).sin() / waves.spacing).powi(2);
+            let of = |k: usize| [bend(phase(k)), autocorrelation(degree, phase(k))];
+            (0..waves.count).map(of).collect()
+        };
+        let [x, y, z] = [0, 1, 2].map(|k| axis(&self.axes[k]));
+        let (mut seen, mut all) = (0.0, 0.0);
+        for [a, of_a] in &x {
+            for [b, of_b] in &y {
+                for [c, of_c] in &z {
+                    let power = power(a + b + c);
+                    seen += power * of_a * of_b * of_c;
+                    all += power;
+                }
+            }
+        }
+        seen / all
+    }
+
+    /// Σ amplitude · wave at all nodes, z fastest.
+    pub fn sum(&self, amplitudes: &[f64]) -> Vec<f64> {
+        self.through_all(amplitudes, false)
+    }
+
+    /// Σ amplitude · wave² at all nodes.
+    pub fn sum_of_squares(&self, amplitudes: &[f64]) -> Vec<f64> {
+        self.through_all(amplitudes, true)
+    }
+
+    fn through_all(&self, amplitudes: &[f64], square: bool) -> Vec<f64> {
+        let along = |k: usize, all: &[f64]| self.axes[k].along_last(all, square);
+        along(0, &along(1, &along(2, amplitudes)))
+    }
+}
+
+/// Σ B_{2d+1}(m) cos(m θ) over whole numbers m.
+fn autocorrelation(degree: Degree, phase: f64) -> f64 {
+    let shares: &[f64] = match degree {
+        Degree::Linear => &[4.0 / 6.0, 1.0 / 6.0],
+        Degree::Quadratic => &[66.0 / 120.0, 26.0 / 120.0, 1.0 / 120.0],
+        Degree::Cubic => &[2416.0 / 5040.0, 1191.0 / 5040.0, 120.0 / 5040.0, 1.0 / 5040.0],
+    };
+    let beside = shares.iter().enumerate().skip(1);
+    shares[0] + beside.map(|(m, share)| 2.0 * share * (m as f64 * phase).cos()).sum::<f64>()
+}
