@@ -295,20 +295,14 @@ impl Run<'_> {
                 leakage::solve_linear(&file, whose, trainer, (axis, change), (nodes, 1))?;
             self.folder.log(&linear::solved(&solution))?;
             eprintln!("{}", linear::statement(&solution));
-            state.now.parameters = solution.emission;
+            state.now.parameters = solution.parameters();
         } else if let Start::Linear { nodes, stride, steps } = self.file.training.start {
             let (whose, about) = ((self.measured, self.folder), (axis, Change::NONE));
             let solution =
                 leakage::solve_linear(self.file, whose, trainer, about, (nodes, stride))?;
             self.folder.log(&linear::solved(&solution))?;
-            let imprinted = setup::imprint(
-                self.file,
-                trainer.representation,
-                &solution.emission,
-                nodes,
-                steps,
-                state,
-            )?;
+            let imprinted =
+                setup::imprint(self.file, trainer.representation, &solution, nodes, steps, state)?;
             self.folder.log(&linear::imprinted(&imprinted))?;
         }
         Ok(())

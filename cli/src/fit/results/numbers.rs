@@ -70,6 +70,9 @@ impl Estimate<'_> {
         if let Some(leakage) = &found.leakage {
             results["leakage"] = leakage.json();
         }
+        if let Some(quiescent) = &found.quiescent {
+            results["quiescent"] = quiescent.json();
+        }
         if let Some(mask) = found.mask {
             results["mask_error"] = json!(mask);
         }

@@ -4,6 +4,7 @@ use super::gains::Gains;
 use super::leakage::Leakage;
 use super::numbers::outcomes;
 use super::over_time::Changes;
+use super::quiescent::Quiescent;
 use super::{Estimate, Found};
 use crate::fit::curves::{loss_plot, psnr_plot};
 use crate::fit::{band_search, held_out, labels, world_results, world_scan};
@@ -89,6 +90,9 @@ impl Estimate<'_> {
         if let Some(figure) = self.residual_map(found)? {
             self.folder.file("residuals.png")?.write(&figure.png)?;
             figures.push(figure);
+        }
+        if let Some(quiescent) = &found.quiescent {
+            figures.extend(self.quiescent_figure(quiescent)?);
         }
         figures.extend(self.axes()?);
         Ok(figures)
@@ -184,6 +188,7 @@ impl Estimate<'_> {
         }
         lines.extend(found.gains.iter().flat_map(Gains::sentences));
         lines.extend(found.leakage.iter().flat_map(Leakage::sentences));
+        lines.extend(found.quiescent.iter().flat_map(Quiescent::sentences));
         if let (Some(psnr), Some(nrmse)) = (number("psnr_db"), number("nrmse")) {
             lines.push(format!(
                 "Compared with the truth, the volume has a peak signal-to-noise ratio of {psnr:.2} dB and a relative error of {nrmse:.3} (1 for an empty volume)."

@@ -5,6 +5,7 @@ use super::data::Data;
 use super::error::LinearError;
 use super::operator::Operator;
 use crate::Error;
+use crate::fit::quiescent::Quiescent;
 use crate::fit::regulariser::{Regulariser, Shape};
 use crate::simd::Float;
 
@@ -38,26 +39,33 @@ pub(super) struct Penalised<'a> {
     pub shape: Shape,
     /// Along the flow.
     pub change: Change,
+    /// Behind the values of nodes, with penalties of its own.
+    pub quiescent: Option<&'a Quiescent>,
     /// The largest emission that is allowed.
     pub upper: f64,
 }
 
 impl Penalised<'_> {
     fn is_empty(&self) -> bool {
-        self.priors.is_empty() && !(self.change.is_any() && self.change.weight > 0.0)
+        self.priors.is_empty()
+            && !(self.change.is_any() && self.change.weight > 0.0)
+            && self.quiescent.is_none_or(|image| image.priors.is_empty())
     }
 
     /// The quadratic one alone.
     fn smoothness(&self) -> Option<Self> {
         let at = self.priors.iter().position(|p| p.regulariser == Regulariser::Smoothness)?;
         let change = Change { weight: 0.0, ..self.change };
-        Some(Self { priors: &self.priors[at..=at], change, ..*self })
+        Some(Self { priors: &self.priors[at..=at], change, quiescent: None, ..*self })
     }
 
     /// Of values at all nodes and knots; those on fields are the means over time of a field that changes, sums over what
     /// is born. Adds slopes.
     fn value_and_gradient(&self, x: &[f64], slopes: &mut [f64]) -> f64 {
-        let mut value = self.change.penalty(x, (self.shape.cell(), self.upper), slopes);
+        let of_image = self.quiescent.map_or(0.0, |image| image.penalty(x, slopes));
+        let fields = self.shape.count() * self.change.knots.count;
+        let (x, slopes) = (&x[..fields], &mut slopes[..fields]);
+        let mut value = of_image + self.change.penalty(x, (self.shape.cell(), self.upper), slopes);
         let (nodes, share) = (self.shape.count(), self.change.share());
         for (field, slopes) in x.chunks_exact(nodes).zip(slopes.chunks_exact_mut(nodes)) {
             for Prior { regulariser, weight } in self.priors {
@@ -178,11 +186,15 @@ impl<T: Float + Default> Convex for Objective<'_, '_, T> {
             let slopes = self.operator.active.gather(&slopes);
             out.iter_mut().zip(slopes).for_each(|(x, slope)| *x += slope);
         }
+        if let Some(image) = self.terms.quiescent {
+            image.bend(direction, out);
+        }
     }
 
     fn diagonal(&self) -> Vec<f64> {
         let mut squares = self.operator.squares();
-        let largest = squares.iter().fold(0.0f64, |largest, x| largest.max(*x));
+        let nodes = squares.len() - self.operator.active.beside;
+        let largest = squares[..nodes].iter().fold(0.0f64, |largest, x| largest.max(*x));
         // Nodes that are hardly seen are not to be moved by more than the others can follow.
         let least = if largest > 0.0 { 1e-4 * largest } else { 1.0 };
         squares.iter_mut().for_each(|x| *x = x.max(least));

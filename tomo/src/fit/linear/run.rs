@@ -55,8 +55,11 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
     }
 
     pub fn cancelled(&self, x: Vec<f64>, nodes: usize) -> LinearSolution<T> {
+        let (fields, image) = x.split_at(x.len() - self.problem.beside());
+        let single = |x: &[f64]| x.iter().map(|x| T::of(*x)).collect();
         LinearSolution {
-            emission: x.iter().map(|x| T::of(*x)).collect(),
+            emission: single(fields),
+            quiescent: single(image),
             certificate: None,
             stationarity: None,
             ending: Ending::Cancelled,
@@ -116,15 +119,20 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         let Some((x, lit)) = found else { return Ok(None) };
         let refined = |x: &[f64]| -> Result<Vec<f64>, Error> {
             let all = operator.active.expand(x);
-            let knots = all.chunks_exact(voxels.count());
+            let (fields, image) = all.split_at(all.len() - operator.active.beside);
+            let knots = fields.chunks_exact(voxels.count());
             let fields = knots.map(|knot| refined(&voxels, knot, &fine));
-            Ok(fields.collect::<Result<Vec<_>, _>>()?.concat())
+            let mut all = fields.collect::<Result<Vec<_>, _>>()?.concat();
+            all.extend_from_slice(image);
+            Ok(all)
         };
         self.lit = lit.map_or(Ok(Vec::new()), |lit| refined(&lit))?;
         let x = refined(&x)?;
-        let least = self.settings.threshold * x.iter().fold(0.0f64, |most, x| most.max(*x));
-        let bright: Vec<bool> = x.iter().map(|x| *x > least).collect();
-        let is_active = dilated(bright, fine.nodes, self.settings.dilation);
+        let fields = &x[..x.len() - operator.active.beside];
+        let least = self.settings.threshold * fields.iter().fold(0.0f64, |most, x| most.max(*x));
+        let bright: Vec<bool> = fields.iter().map(|x| *x > least).collect();
+        let mut is_active = dilated(bright, fine.nodes, self.settings.dilation);
+        is_active.resize(x.len(), true);
         let x = x.iter().zip(&is_active).map(|(x, active)| if *active { *x } else { 0.0 });
         Ok(Some((x.collect(), is_active)))
     }
@@ -206,8 +214,10 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
                 operator.active.count(),
             )));
         }
-        let shining: Vec<bool> = x.iter().zip(&admitted).map(|(x, new)| *x > 0.0 || *new).collect();
-        *is_active = dilated(shining, problem.voxels.nodes, 1);
+        let fields = x.len() - problem.beside();
+        let shining = x[..fields].iter().zip(&admitted).map(|(x, new)| *x > 0.0 || *new);
+        *is_active = dilated(shining.collect(), problem.voxels.nodes, 1);
+        is_active.resize(x.len(), true);
         Ok(None)
     }
 

@@ -11,7 +11,7 @@ use super::start::{Lit, Trials};
 use super::walk::{Voxels, Walk};
 use crate::Error;
 use crate::dynamics::Axis;
-use crate::fit::ForwardModel;
+use crate::fit::{ForwardModel, Quiescent};
 use crate::simd::Float;
 use core::ops::ControlFlow;
 
@@ -112,7 +112,9 @@ pub struct LinearProgress<'a> {
 impl LinearProgress<'_> {
     /// Emission at all nodes of the grid (of the coarse one, in round 0), knot after knot.
     pub fn emission(&self) -> Vec<f64> {
-        self.active.expand(self.x)
+        let mut all = self.active.expand(self.x);
+        all.truncate(all.len() - self.active.beside);
+        all
     }
 }
 
@@ -121,6 +123,8 @@ impl LinearProgress<'_> {
 pub struct LinearSolution<T> {
     /// Emission at the nodes, parameters of the linear grid; knot after knot where it may change.
     pub emission: Vec<T>,
+    /// Parameters of what does not move ([`Quiescent`]), where that is recovered.
+    pub quiescent: Vec<T>,
     /// How far from the minimum it can be; none if it was cancelled, or the data are not convex in the pixels.
     pub certificate: Option<Certificate>,
     /// How flat the function is there, if the data are not convex: all that can be said then.
@@ -137,10 +141,17 @@ pub struct LinearSolution<T> {
     pub bytes: usize,
 }
 
+impl<T: Float> LinearSolution<T> {
+    /// All parameters: those of the linear grid, and behind them those of what does not move.
+    pub fn parameters(&self) -> Vec<T> {
+        [self.emission.as_slice(), &self.quiescent].concat()
+    }
+}
+
 /// What some iterations reached.
 #[derive(Clone, Debug)]
 pub struct Least {
-    /// Emission at all nodes of the grid.
+    /// Emission at all nodes of the grid, and parameters of what does not move behind it.
     pub x: Vec<f64>,
     /// What is minimised.
     pub value: f64,
@@ -182,6 +193,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
             // From a field that matter carries unchanged: no price is too high for it.
             let field: Vec<f64> = carried.emission.iter().map(|e| e.double()).collect();
             x = self.change.steady(&field);
+            x.extend(carried.quiescent.iter().map(|x| x.double()));
             is_active.iter_mut().zip(&x).for_each(|(active, x)| *active |= *x > 0.0);
         }
         run.reference(&data)?;
@@ -238,7 +250,8 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         operator.all_rows()
     }
 
-    /// The loss of the frames in a field at the nodes (knot after knot), without penalties.
+    /// The loss of the frames in a field at the nodes (knot after knot), with the parameters of what does not move behind
+    /// it where that is recovered; without penalties.
     ///
     /// # Errors
     /// If a number is out of its range, or the field has other nodes.
@@ -250,7 +263,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         let shines: Vec<bool> = emission.iter().map(|x| *x != T::zero()).collect();
         let data = self.data()?;
         let operator = Operator::new(self.walk(), self.active(&shines), self.frames, 0);
-        let x: Vec<T> = emission.iter().copied().filter(|x| *x != T::zero()).collect();
+        let x = operator.active.gather(emission);
         let (mut slopes, mut sum) = (vec![T::zero(); self.model.pixels()], 0.0);
         for (k, frames) in self.frames.chunks(TOGETHER).enumerate() {
             let images = operator.some_images(&x, k * TOGETHER..k * TOGETHER + frames.len());
@@ -276,17 +289,23 @@ impl<T: Float + Default> LinearProblem<'_, T> {
 
     /// These nodes, knot after knot.
     pub(super) fn active(&self, is_active: &[bool]) -> Active {
-        Active::new(is_active, &self.voxels.corners())
+        Active::new(is_active, &self.voxels.corners(), self.beside())
     }
 
-    /// Values at all nodes and knots.
+    /// Values at all nodes and knots, and parameters of what does not move.
     pub(super) fn unknowns(&self) -> usize {
-        self.voxels.count() * self.change.knots.count
+        self.voxels.count() * self.change.knots.count + self.beside()
+    }
+
+    /// Parameters of what does not move.
+    pub(super) fn beside(&self) -> usize {
+        self.model.quiescent.as_ref().map_or(0, Quiescent::columns)
     }
 
     pub(super) fn penalised(&self) -> Penalised<'_> {
         let (priors, change, upper) = (self.priors, self.change, self.upper);
-        Penalised { priors, shape: self.voxels.shape(), change, upper }
+        let quiescent = self.model.quiescent.as_ref();
+        Penalised { priors, shape: self.voxels.shape(), change, quiescent, upper }
     }
 
     fn check(&self, settings: &LinearSettings) -> Result<(), Error> {
@@ -298,6 +317,8 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         self.change.checked()?;
         let positive = |x: f64| x.is_finite() && x > 0.0;
         check("upper", upper, positive(upper), "above 0")?;
+        let of_image = self.model.quiescent.as_ref().map_or(upper, |image| image.most);
+        check("most of the quiescent image", of_image, of_image == upper, "upper")?;
         check("flux", flux.unwrap_or(1.0), flux.is_none_or(positive), "above 0")?;
         for Prior { regulariser, weight } in self.priors {
             regulariser.checked()?;

@@ -11,6 +11,7 @@ mod held_out;
 mod instrument;
 mod light_curve;
 mod penalties;
+mod quiescent;
 mod ranges;
 mod recovery;
 mod simulation;
@@ -29,10 +30,11 @@ pub use held_out::{HeldOutSettings, Weight};
 pub use instrument::{GainPhases, GainSettings, InstrumentSettings, LeakageSettings};
 pub use light_curve::{MeanFlux, MeasuredCurve, PerStokes, SimulatedCurve};
 pub use penalties::{PenaltyKind, PenaltySettings, ProbeSettings};
+pub use quiescent::QuiescentSettings;
 pub use recovery::{
     AxisScan, AxisSearch, Kind, Linear, Occupancy, Optimiser, Representation, Start, Training,
 };
-pub use simulation::{GlyphShape, Movie, Noise, Observation, Shines, Spot, Truth, Tube};
+pub use simulation::{GlyphShape, Movie, Noise, Observation, Ring, Shines, Spot, Truth, Tube};
 pub use static_image::{
     EnvelopeSettings, ImageSettings, RingSettings, Scattering, StartImage, StaticData,
     StaticImageFile, StaticVisibilities, StrengthSettings, Variability,
@@ -76,6 +78,9 @@ pub struct FitFile {
     /// How emission may change while matter carries it; not at all, without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub change: Option<ChangeSettings>,
+    /// What does not move, recovered beside the emission; nothing, without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quiescent: Option<QuiescentSettings>,
     /// Frames of a simulated movie, or of an observation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub movie: Option<Movie>,

@@ -17,6 +17,8 @@ mod losses;
 mod measured;
 mod observed;
 mod polarized;
+mod quiescent;
+mod ring;
 mod still;
 mod truth;
 mod visibilities;
