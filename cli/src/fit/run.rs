@@ -13,6 +13,7 @@ use super::labels;
 use super::leakage;
 use super::linear;
 use super::results::{self, Estimate};
+use super::rotation_search;
 use super::together;
 use super::world_search;
 pub use super::world_search::Placed;
@@ -79,7 +80,10 @@ impl<'a> Prepared<'a> {
     fn placed(&self, folder: &Folder) -> anyhow::Result<Option<Placed>> {
         let Self { file, instrument, measured, .. } = self;
         match world_search::place(file, instrument, measured, folder)? {
-            None => band_search::place(file, measured, folder),
+            None => match band_search::place(file, measured, folder)? {
+                None => rotation_search::place(file, (instrument, measured), folder),
+                placed => Ok(placed),
+            },
             placed => Ok(placed),
         }
     }

@@ -154,6 +154,21 @@ impl<T: Float> ForwardModel<T> {
         Ok(self)
     }
 
+    /// Turns all position angles, east of north, where `parameters` are those that it was made for.
+    ///
+    /// # Errors
+    /// If Q and U are not among them.
+    pub fn turn(&mut self, parameters: &[StokesParameter], radians: f64) -> Result<(), Error> {
+        let place = |wanted| parameters.iter().position(|parameter| *parameter == wanted);
+        let places = [StokesParameter::Q, StokesParameter::U].map(place);
+        let ([Some(q), Some(u)], Some(planes)) = (places, &mut self.planes) else {
+            let count = parameters.len() as f64;
+            return Err(Error::out_of_range("Stokes parameters", count, "with Q and U"));
+        };
+        planes.turn([q, u], radians);
+        Ok(())
+    }
+
     /// The same with an image beside the emission: fields then have its parameters behind their own
     /// ([`Beside`](super::Beside)).
     ///

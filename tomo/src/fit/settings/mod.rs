@@ -7,6 +7,7 @@ mod band;
 mod change;
 mod data;
 mod error;
+mod faraday;
 mod held_out;
 mod instrument;
 mod light_curve;
@@ -26,6 +27,7 @@ pub use change::ChangeSettings;
 pub use data::{DataFiles, Loss, LossKind};
 pub use error::FitError;
 pub(crate) use error::{Within, refuse};
+pub use faraday::FaradaySettings;
 pub use held_out::{HeldOutSettings, Weight};
 pub use instrument::{GainPhases, GainSettings, InstrumentSettings, LeakageSettings};
 pub use light_curve::{MeanFlux, MeasuredCurve, PerStokes, SimulatedCurve};
@@ -72,6 +74,9 @@ pub struct FitFile {
     /// The field of the gas and its polarised light; total intensity alone, without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub polarization: Option<PolarizationLaw>,
+    /// A rotation of all position angles that is looked for; none, without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub faraday: Option<FaradaySettings>,
     /// A weight that is chosen by data that are held out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out: Option<HeldOutSettings>,

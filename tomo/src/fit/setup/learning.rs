@@ -2,7 +2,7 @@
 
 use super::change::{self, change};
 use super::quiescent::{self, quiescent};
-use super::{Result, axis, linear, motion, polarized};
+use super::{Result, axis, faraday, linear, motion, polarized};
 use crate::fit::linear::Change;
 use crate::fit::settings;
 use crate::fit::settings::{
@@ -242,6 +242,7 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
     change::check(file)?;
     polarized::check(file)?;
     quiescent::check(file)?;
+    faraday::check(file)?;
     if let Some(held_out) = &file.held_out {
         held_out.check(file)?;
     }

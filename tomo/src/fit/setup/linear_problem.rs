@@ -50,7 +50,7 @@ pub(super) struct Of<'a> {
 
 impl Of<'_> {
     /// The problem of some frames.
-    fn with<R>(
+    pub fn with<R>(
         &self,
         frames: &[usize],
         solve: impl FnOnce(&LinearProblem<'_, f32>) -> Result<R>,

@@ -3,6 +3,7 @@
 mod band;
 mod change;
 mod coarse_view;
+mod faraday;
 mod gains;
 mod glyph;
 mod held_out;
@@ -27,6 +28,7 @@ mod world;
 pub use band::{BandScan, BandWatch, BandWorld, band_motion, in_band_world, scan_band};
 pub use change::{change, emission_times};
 pub use coarse_view::CoarseView;
+pub use faraday::{Rotation, RotationWatch, Tried, find_rotation};
 pub use held_out::{Held, HeldWatch, best as best_held, hold_out};
 pub use imprint::{Imprinted, imprint};
 pub use instrument::Instrument;
