@@ -61,7 +61,7 @@ impl Penalised<'_> {
 
     /// Of values at all nodes and knots; those on fields are the means over time of a field that changes, sums over what
     /// is born. Adds slopes.
-    fn value_and_gradient(&self, x: &[f64], slopes: &mut [f64]) -> f64 {
+    pub fn value_and_gradient(&self, x: &[f64], slopes: &mut [f64]) -> f64 {
         let of_image = self.quiescent.map_or(0.0, |image| image.penalty(x, slopes));
         let fields = self.shape.count() * self.change.knots.count;
         let (x, slopes) = (&x[..fields], &mut slopes[..fields]);

@@ -32,7 +32,10 @@ fn lit() -> Vec<f64> {
     let representation = beside();
     let mut parameters = start(&representation);
     let own = representation.parameters() - SIDE * SIDE;
-    parameters[own..].iter_mut().enumerate().for_each(|(k, x)| *x = (k as f64 * 0.3).sin().abs());
+    parameters[own..]
+        .iter_mut()
+        .enumerate()
+        .for_each(|(k, x)| *x = 0.1 + (k as f64 * 0.3).sin().abs());
     parameters
 }
 
@@ -79,7 +82,8 @@ fn exact_the_image_is_added_to_every_frame() {
     let mut plain = forward_model::<f64>(true, true);
     plain.weigh(axis);
     let own = parameters.len() - SIDE * SIDE;
-    let without = movie(&plain, &grid(), &parameters[..own]);
+    let grid = grid();
+    let without = movie(&plain, &grid, &parameters[..own]);
     let with = movie(&plain.clone().beside(image()).unwrap(), &representation, &parameters);
     for (k, (with, without)) in with.iter().zip(&without).enumerate() {
         let expected = without + parameters[own + k % (SIDE * SIDE)] * 4.0 / 1.5;
@@ -90,14 +94,15 @@ fn exact_the_image_is_added_to_every_frame() {
 /// Steps leave the image inside its box, from where it starts dark; a checkpoint goes on with the same bits.
 #[test]
 fn exact_steps_stay_inside_the_box() {
-    let inner = Box::new(super::training::network());
+    let inner = Box::new(training::network());
+    let image = || Quiescent { priors: Vec::new(), ..image() };
     let representation = Beside::<f32>::new(inner, &image());
     let training = Training { batch: BatchSize::Frames(2), occupancy: None, ..settings() };
     let axis = Axis::new([0.1, 0.5, 0.8]).unwrap();
     let mut state = State::new(&representation, axis, &training);
     let own = representation.parameters() - SIDE * SIDE;
     assert!(state.now.parameters[own..].iter().all(|x| *x == 0.0));
-    let mut objective = super::training::objective();
+    let mut objective = training::objective();
     objective.model = forward_model::<f32>(true, true).beside(image()).unwrap();
     let mut trainer = Trainer::new(objective, &representation, training);
     for _ in 0..12 {

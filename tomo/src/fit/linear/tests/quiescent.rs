@@ -3,7 +3,7 @@
 use super::super::objective::{Convex, Objective, Penalised};
 use super::lit::{Seen as Array, array, spot};
 use super::*;
-use crate::fit::{Quiescent, Seen};
+use crate::fit::{Beside, Quiescent, Seen};
 use crate::polarization::{Stokes, StokesParameter};
 
 const UPPER: f64 = 2.0;
@@ -54,6 +54,17 @@ fn problem<'a>(
     }
 }
 
+/// Images of values at all nodes, and of the image behind them, by way of the representation.
+fn images(model: &ForwardModel<f64>, x: &[f64]) -> Vec<f64> {
+    let grid = Box::new(Voxels::cube(6, 5.0, Degree::Linear).field().unwrap());
+    let representation = Beside::new(grid, model.quiescent().unwrap());
+    let representation = &representation;
+    let field = Field { representation, parameters: x, axis: axis(), occupancy: None };
+    let mut movie = vec![0.0; FRAMES.len() * model.pixels()];
+    model.movie(field, &FRAMES, &mut Batch::default(), &mut Workspace::new(), &mut movie);
+    movie
+}
+
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
@@ -71,11 +82,11 @@ fn exact_quiescent_columns_have_their_adjoint() {
             let operator = Operator::new(problem.walk(), active, &FRAMES, budget);
             let x = random(operator.active.count(), 1);
             let y = random(FRAMES.len() * model.pixels(), 2);
-            let images = operator.images(&x);
-            let (forward, back) = (dot(&images, &y), dot(&operator.adjoint(&y), &x));
+            let found = operator.images(&x);
+            let (forward, back) = (dot(&found, &y), dot(&operator.adjoint(&y), &x));
             assert!((back / forward - 1.0).abs() < 1e-12, "{back} {forward}");
-            let movie = movie_about(axis(), &model, &problem.voxels, &operator.active.expand(&x));
-            let worst = images.iter().zip(&movie).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let movie = images(&model, &operator.active.expand(&x));
+            let worst = found.iter().zip(&movie).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             assert!(worst < 1e-12 * movie.iter().fold(0.0f64, |most, x| most.max(x.abs())));
         }
     }
@@ -85,7 +96,7 @@ fn exact_quiescent_columns_have_their_adjoint() {
 #[test]
 fn exact_slopes_beside_a_quiescent_image() {
     let model = beside([0.3, 0.2], false);
-    let movie = movie(&model, &Voxels::cube(6, 5.0, Degree::Linear), &lit(0.7));
+    let movie = images(&model, &lit(0.7));
     for seen in [Array::Visibilities, Array::Amplitudes, Array::Phases, Array::LogAmplitudes] {
         let term = array(&movie, seen);
         let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
@@ -125,8 +136,7 @@ fn lit(brightness: f64) -> Vec<f64> {
 fn exact_certificates_beside_a_quiescent_image() {
     for polarized in [false, true] {
         let model = beside([1e-3, 1e-3], polarized);
-        let mut pixels =
-            movie(&model, &Voxels::cube(6, 5.0, Degree::Linear), &random_field(&model));
+        let mut pixels = images(&model, &random_field(&model));
         let noise = random(pixels.len(), 8);
         pixels.iter_mut().zip(noise).for_each(|(pixel, n)| *pixel += 0.4 * (n - 0.5));
         let term = ImageTerm::new(pixels, model.pixels(), 0.1).unwrap();
@@ -175,7 +185,7 @@ fn random_field(model: &ForwardModel<f64>) -> Vec<f64> {
 fn exact_what_does_not_move_is_told_apart() {
     let model = beside([0.0, 1e-6], false);
     let truth = lit(0.7);
-    let pixels = movie(&model, &Voxels::cube(6, 5.0, Degree::Linear), &truth);
+    let pixels = images(&model, &truth);
     let term = ImageTerm::new(pixels, model.pixels(), 0.1).unwrap();
     let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
     let priors = [Prior { regulariser: Regulariser::Sparsity, weight: 1e-5 }];
@@ -210,7 +220,8 @@ fn exact_another_box_is_refused() {
 #[test]
 fn exact_penalties_of_the_image_are_its_own() {
     let (model, priors) = (beside([0.5, 0.25], false), []);
-    let penalised = Penalised { priors: &priors, ..problem(&model, &[], &priors).penalised() };
+    let problem = problem(&model, &[], &priors);
+    let penalised = Penalised { priors: &priors, ..problem.penalised() };
     let x = lit(0.7);
     let mut slopes = vec![0.0; x.len()];
     // Brightness 0.7 · 5/2 Jy, over 1.3 Jy, M: three columns of nine pixels of 1.25 M, with an edge of nine.
