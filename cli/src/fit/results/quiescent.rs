@@ -58,12 +58,12 @@ impl Estimate<'_> {
         let truth = self.measured.truth.as_ref().and_then(of);
         let found = Quiescent { is_flux, images, truth };
         if !is_flux {
-            self.write(&found)?;
+            self.quiescent_files(&found)?;
         }
         Ok(Some(found))
     }
 
-    fn write(&self, found: &Quiescent) -> anyhow::Result<()> {
+    fn quiescent_files(&self, found: &Quiescent) -> anyhow::Result<()> {
         let n = self.file.screen.pixels;
         let flat = |images: Vec<&Vec<f32>>| images.into_iter().flatten().copied().collect();
         let recovered: Vec<f32> = flat(found.images.iter().map(|(_, image)| image).collect());

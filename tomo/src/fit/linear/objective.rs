@@ -197,7 +197,7 @@ impl<T: Float + Default> Convex for Objective<'_, '_, T> {
         let largest = squares[..nodes].iter().fold(0.0f64, |largest, x| largest.max(*x));
         // Nodes that are hardly seen are not to be moved by more than the others can follow.
         let least = if largest > 0.0 { 1e-4 * largest } else { 1.0 };
-        squares.iter_mut().for_each(|x| *x = x.max(least));
+        squares[..nodes].iter_mut().for_each(|x| *x = x.max(least));
         squares
     }
 }

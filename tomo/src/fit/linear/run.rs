@@ -42,6 +42,8 @@ pub(super) struct Run<'a, 'p, 'w, T: Float> {
     lit: Vec<f64>,
     /// Value and largest slope there.
     at_lit: [f64; 2],
+    /// The quiescent image that explains the data best without any emission; empty if none is recovered.
+    image: Vec<f64>,
 }
 
 impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
@@ -51,7 +53,33 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         watch: &'a mut Watch<'w>,
     ) -> Self {
         let (lit, at_lit) = (Vec::new(), [0.0; 2]);
-        Self { problem, settings, watch, evaluations: 0, bytes: 0, round: 0, lit, at_lit }
+        let image = Vec::new();
+        Self { problem, settings, watch, evaluations: 0, bytes: 0, round: 0, lit, at_lit, image }
+    }
+
+    /// Solves for the quiescent image alone, where there is one: what both can explain is to be the image's. Whether to
+    /// go on.
+    pub fn image_first(&mut self, data: &Data<'_, T>) -> bool {
+        let problem = self.problem;
+        if problem.beside() == 0 || !data.is_convex() {
+            return true;
+        }
+        let nodes = vec![false; problem.unknowns()];
+        let operator = Operator::new(problem.walk(), problem.active(&nodes), problem.frames, 0);
+        let terms = problem.penalised();
+        let mut objective = Objective::new(&operator, data, &terms);
+        let dark = vec![0.0; problem.beside()];
+        let found = self.minimise(&mut objective, &dark, self.settings.iterations);
+        self.evaluations += objective.evaluations;
+        self.image = found.x;
+        found.ending != Ending::Cancelled
+    }
+
+    /// No emission, and the image that was found first.
+    pub fn dark(&self, count: usize) -> Vec<f64> {
+        let mut dark = vec![0.0; count];
+        dark[count - self.image.len()..].copy_from_slice(&self.image);
+        dark
     }
 
     pub fn cancelled(&self, x: Vec<f64>, nodes: usize) -> LinearSolution<T> {
@@ -147,7 +175,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
             let lit = self.lit(objective, Trials { iterations: PATIENCE * iterations, ..MANY })?;
             return Ok(lit.map(|Lit { start, x, .. }| (x, Some(start))));
         }
-        let dark = vec![0.0; objective.operator.active.count()];
+        let dark = self.dark(objective.operator.active.count());
         let found = self.minimise(objective, &dark, iterations);
         Ok((found.ending != Ending::Cancelled).then_some((found.x, None)))
     }

@@ -178,13 +178,16 @@ impl<T: Float + Default> LinearProblem<'_, T> {
             false => None,
         };
         let mut run = Run::new(self, settings, watch);
+        if !run.image_first(&data) {
+            return Ok(run.cancelled(run.dark(self.unknowns()), 0));
+        }
         let coarse = settings.coarse.or((!data.is_convex()).then_some(LIT));
         let (mut x, mut is_active) = match coarse {
             Some(coarse) => match run.coarse(coarse)? {
                 Some(start) => start,
                 None => return Ok(run.cancelled(vec![0.0; self.unknowns()], 0)),
             },
-            None => (vec![0.0; self.unknowns()], vec![true; self.unknowns()]),
+            None => (run.dark(self.unknowns()), vec![true; self.unknowns()]),
         };
         if let Some(carried) = carried {
             if carried.ending == Ending::Cancelled {

@@ -16,6 +16,10 @@ const COARSE: usize = 24;
 /// Bytes of the sparse matrix of emission that changes: its rows take long to compute anew.
 const MANY_ROWS: usize = 2 << 30;
 
+/// Where a round ends beside a quiescent image: slopes with respect to its pixels, which add up over all frames, are large at
+/// first, and fall to a thousandth while the volume has hardly been found.
+const BESIDE: f64 = 1e-6;
+
 /// All terms of the data, the image first.
 pub(super) fn terms(data: &Data<f32>) -> Vec<Weighted<'_, f32>> {
     let image = data.image.iter().map(|w| (w.weight, &*w.term as &dyn FrameTerm<f32>));
@@ -99,6 +103,10 @@ pub(super) fn solve_frames(
         false => coarse,
     };
     let memory = if change.is_any() { MANY_ROWS } else { usual.memory };
-    let how = LinearSettings { rounds, iterations, coarse, memory, ..usual };
+    let tolerance = match of.objective.model.quiescent() {
+        Some(_) => BESIDE,
+        None => usual.tolerance,
+    };
+    let how = LinearSettings { rounds, iterations, coarse, memory, tolerance, ..usual };
     of.with(frames, |problem| problem.solve(&how, watch))
 }
