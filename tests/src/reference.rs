@@ -127,7 +127,7 @@ fn regress_the_reference_has_every_key_of_a_scene() {
 }
 
 /// Tables of a fit that the built-in fit does not have, each with a key that does not exist.
-const INNER_TABLES: [&str; 25] = [
+const INNER_TABLES: [&str; 28] = [
     "axis={scan={nonsense=1}}",
     "axis={from={nonsense=1}}",
     "data={visibilities={nonsense=1}}",
@@ -153,6 +153,9 @@ const INNER_TABLES: [&str; 25] = [
     "regulariser=[{nonsense=1}]",
     "probe={nonsense=1}",
     "held_out={nonsense=1}",
+    "quiescent={nonsense=1}",
+    "faraday={nonsense=1}",
+    "truth.ring=[{nonsense=1}]",
 ];
 
 #[test]

@@ -8,7 +8,7 @@ use kerrlight_tomo::dynamics::Axis;
 use kerrlight_tomo::fit::linear::{Change, LinearSolution, Voxels};
 use kerrlight_tomo::fit::settings::{FitFile, Kind};
 use kerrlight_tomo::fit::setup::{self, Measured, SolvedLeakage};
-use kerrlight_tomo::fit::{Batch, Field, State, Trainer, checkpoint};
+use kerrlight_tomo::fit::{Batch, Beside, Field, State, Trainer, checkpoint};
 use kerrlight_tomo::interferometry::files;
 use kerrlight_tomo::representation::{Representation, Workspace};
 use serde_json::json;
@@ -25,15 +25,19 @@ pub fn solve_linear(
     nodes: (usize, usize),
 ) -> anyhow::Result<LinearSolution<f32>> {
     let voxels = Voxels::cube(nodes.0, file.region.r_max, setup::linear(file)?.degree).field()?;
-    let grid: &dyn Representation<f32> = match file.representation.kind {
+    let voxels: Box<dyn Representation<f32>> = match trainer.objective.model.quiescent() {
+        Some(image) => Box::new(Beside::new(Box::new(voxels), image)),
+        None => Box::new(voxels),
+    };
+    let grid = match file.representation.kind {
         Kind::LinearGrid => trainer.representation,
-        _ => &voxels,
+        _ => &*voxels,
     };
     let objective = &mut trainer.objective;
     let mut solution = None;
     let images = || -> anyhow::Result<Vec<f32>> {
         let found = linear::solve(file, objective, about, nodes)?;
-        let parameters = &found.emission;
+        let parameters = &found.parameters();
         let field = Field { representation: grid, parameters, axis: about.0, occupancy: None };
         let frames: Vec<usize> = match measured.leakage {
             Some(_) => (0..measured.times.len()).collect(),

@@ -16,6 +16,7 @@ mod leakage;
 mod linear;
 pub mod posterior;
 mod results;
+mod rotation_search;
 mod run;
 mod static_image;
 mod together;

@@ -13,6 +13,7 @@ use super::labels;
 use super::leakage;
 use super::linear;
 use super::results::{self, Estimate};
+use super::rotation_search;
 use super::together;
 use super::world_search;
 pub use super::world_search::Placed;
@@ -79,7 +80,10 @@ impl<'a> Prepared<'a> {
     fn placed(&self, folder: &Folder) -> anyhow::Result<Option<Placed>> {
         let Self { file, instrument, measured, .. } = self;
         match world_search::place(file, instrument, measured, folder)? {
-            None => band_search::place(file, measured, folder),
+            None => match band_search::place(file, measured, folder)? {
+                None => rotation_search::place(file, (instrument, measured), folder),
+                placed => Ok(placed),
+            },
             placed => Ok(placed),
         }
     }
@@ -295,20 +299,14 @@ impl Run<'_> {
                 leakage::solve_linear(&file, whose, trainer, (axis, change), (nodes, 1))?;
             self.folder.log(&linear::solved(&solution))?;
             eprintln!("{}", linear::statement(&solution));
-            state.now.parameters = solution.emission;
+            state.now.parameters = solution.parameters();
         } else if let Start::Linear { nodes, stride, steps } = self.file.training.start {
             let (whose, about) = ((self.measured, self.folder), (axis, Change::NONE));
             let solution =
                 leakage::solve_linear(self.file, whose, trainer, about, (nodes, stride))?;
             self.folder.log(&linear::solved(&solution))?;
-            let imprinted = setup::imprint(
-                self.file,
-                trainer.representation,
-                &solution.emission,
-                nodes,
-                steps,
-                state,
-            )?;
+            let imprinted =
+                setup::imprint(self.file, trainer.representation, &solution, nodes, steps, state)?;
             self.folder.log(&linear::imprinted(&imprinted))?;
         }
         Ok(())

@@ -3,6 +3,7 @@
 
 use super::fall::Fall;
 use super::occupancy::Occupancy;
+use super::quiescent::Quiescent;
 use super::shift::Shift;
 use super::sightlines::Sightlines;
 use super::stokes::{Planes, Seen};
@@ -65,6 +66,8 @@ pub struct ForwardModel<T> {
     pub(super) fall: Option<Fall>,
     /// With which factors nodes enter several images; one image without.
     pub(super) planes: Option<Planes<T>>,
+    /// What does not move; its parameters are the last of a field's.
+    pub(super) quiescent: Option<Quiescent>,
     /// Whether all rays add to the same pixel.
     pub(super) is_flux: bool,
     pub(super) factors: Vec<f64>,
@@ -109,6 +112,7 @@ impl<T: Float> ForwardModel<T> {
             shift: redshift.map(|shift| Shift::new(lines, hole, velocity, shift.power)),
             fall: velocity.falling().map(|flow| Fall::new(flow, lines)),
             planes: None,
+            quiescent: None,
             is_flux: false,
             factors: Vec::new(),
             weighted_for: None,
@@ -148,6 +152,42 @@ impl<T: Float> ForwardModel<T> {
             }
         }
         Ok(self)
+    }
+
+    /// Turns all position angles, east of north, where `parameters` are those that it was made for.
+    ///
+    /// # Errors
+    /// If Q and U are not among them.
+    pub fn turn(&mut self, parameters: &[StokesParameter], radians: f64) -> Result<(), Error> {
+        let place = |wanted| parameters.iter().position(|parameter| *parameter == wanted);
+        let places = [StokesParameter::Q, StokesParameter::U].map(place);
+        let ([Some(q), Some(u)], Some(planes)) = (places, &mut self.planes) else {
+            let count = parameters.len() as f64;
+            return Err(Error::out_of_range("Stokes parameters", count, "with Q and U"));
+        };
+        planes.turn([q, u], radians);
+        Ok(())
+    }
+
+    /// The same with an image beside the emission: fields then have its parameters behind their own
+    /// ([`Beside`](super::Beside)).
+    ///
+    /// # Errors
+    /// If a number of the image is out of its range, or it has other pixels.
+    pub fn beside(mut self, image: Quiescent) -> Result<Self, Error> {
+        let image = image.checked()?;
+        let pixels = image.pixels * image.signed.len();
+        if pixels != self.pixels {
+            let allowed = "as many as the images of a frame have";
+            return Err(Error::out_of_range("quiescent pixels", pixels as f64, allowed));
+        }
+        self.quiescent = Some(image);
+        Ok(self)
+    }
+
+    /// What does not move, where it is recovered.
+    pub fn quiescent(&self) -> Option<&Quiescent> {
+        self.quiescent.as_ref()
     }
 
     /// Weights of total intensity.

@@ -22,6 +22,7 @@ impl<T: Float> ForwardModel<T> {
             let at = Batch::coordinates(&batch.columns, field.representation.dimension());
             field.representation.eval(field.parameters, at, &mut batch.values, workspace);
             self.sum_rays(batch, image);
+            self.add_quiescent(field, image);
         }
     }
 
@@ -39,6 +40,14 @@ impl<T: Float> ForwardModel<T> {
         let at = Batch::coordinates(&batch.columns, field.representation.dimension());
         field.representation.eval_recorded(field.parameters, at, &mut batch.values, workspace);
         self.sum_rays(batch, image);
+        self.add_quiescent(field, image);
+    }
+
+    /// What does not move, into the images of a frame.
+    fn add_quiescent(&self, field: Field<'_, T>, image: &mut [T]) {
+        if let Some(quiescent) = &self.quiescent {
+            quiescent.add(field.parameters, image);
+        }
     }
 
     /// All nodes of a frame, and room for their values.

@@ -61,6 +61,7 @@ mod occupancy;
 pub mod parts;
 mod penalties;
 mod pixel_rays;
+mod quiescent;
 mod regulariser;
 pub mod scan;
 mod selection;
@@ -88,6 +89,7 @@ pub use objective::{Buffers, Data, Gradients, Loss, Objective, Weighted, is_turn
 pub use occupancy::{Occupancy, OccupancySettings};
 pub use penalties::{Draw, Penalties, Probe, ProbeBuffers};
 pub use pixel_rays::RingRays;
+pub use quiescent::{Beside, Quiescent};
 pub use regulariser::{Regulariser, Shape};
 pub use selection::Selection;
 pub use sightlines::{Region, Sampling, SightlineRequest, Sightlines};

@@ -162,6 +162,7 @@ impl<T: Float> Objective<T> {
         buffers: &mut Buffers<T>,
     ) -> Loss {
         let Some(Weighted { weight, term }) = &self.data.image else { return Loss::default() };
+        assert!(self.model.quiescent.is_none(), "rays do not meet all pixels of a quiescent image");
         // A mean over the pixels of the screen, of which those without a ray are zero for ever.
         let rays = self.model.rays() as f64 / self.model.pixels() as f64;
         let scale = rays * term.inverse_variance().double() / whole as f64;
@@ -284,6 +285,9 @@ impl<T: Float> Objective<T> {
         let into = Gradient { parameters: gradients.parameters, coordinates };
         let at = Batch::coordinates(&batch.columns, dimension);
         field.representation.vjp_recorded(field.parameters, at, cotangents, into, workspace);
+        if let Some(quiescent) = &self.model.quiescent {
+            quiescent.back(of_image, gradients.parameters);
+        }
         if let Some(axis) = gradients.axis.as_deref_mut() {
             add_axis(field.axis, batch, of_points, dimension, axis);
         }

@@ -95,6 +95,9 @@ impl<T: Float> Trainer<'_, T> {
             loss.total += found.iter().sum::<f64>();
             loss.penalties = found;
         }
+        if let Some(quiescent) = self.objective.model.quiescent() {
+            loss.total += quiescent.penalty(parameters, &mut self.gradient);
+        }
         loss
     }
 

@@ -175,6 +175,16 @@ impl<T: Float> Planes<T> {
         Self { count: parameters.len(), stride, factors: all }
     }
 
+    /// Turns Q and U of all nodes, whose places among the planes are given.
+    pub fn turn(&mut self, [q, u]: [usize; 2], radians: f64) {
+        let (sin, cos) = (2.0 * radians).sin_cos();
+        for factors in self.factors.chunks_exact_mut(self.count) {
+            let (x, y) = (factors[q].double(), factors[u].double());
+            factors[q] = T::of(x * cos - y * sin);
+            factors[u] = T::of(x * sin + y * cos);
+        }
+    }
+
     /// Those of a node.
     #[inline(always)]
     pub fn of(&self, node: u32) -> &[T] {

@@ -8,6 +8,7 @@ mod orbital;
 mod parts;
 mod penalised;
 mod quasi_newton;
+mod quiescent;
 mod stokes;
 mod training;
 mod transport;

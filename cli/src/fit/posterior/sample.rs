@@ -93,9 +93,9 @@ fn begin(
         return Ok(false);
     }
     if is_linear {
-        state.now.parameters = solution.emission;
+        state.now.parameters = solution.parameters();
     } else {
-        setup::imprint(file, trainer.representation, &solution.emission, nodes, steps, state)?;
+        setup::imprint(file, trainer.representation, &solution, nodes, steps, state)?;
     }
     Ok(true)
 }

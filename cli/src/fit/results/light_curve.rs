@@ -27,9 +27,11 @@ impl Estimate<'_> {
         let field = now.field(trainer.representation);
         let (mut batch, mut workspace) = (Batch::default(), Workspace::new());
         let mut image = vec![0.0; model.pixels()];
+        let quiescent = self.quiescent_light(trainer, state);
         Ok(Frames::made((model.frames(), model.pixels()), |sink| {
             (0..model.frames()).try_for_each(|frame| {
                 model.movie(field, &[frame], &mut batch, &mut workspace, &mut image);
+                image.iter_mut().zip(&quiescent).for_each(|(pixel, light)| *pixel += light);
                 sink(&image)
             })
         })?)

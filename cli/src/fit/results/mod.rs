@@ -8,6 +8,7 @@ mod numbers;
 mod over_time;
 pub mod page;
 pub mod plots;
+mod quiescent;
 pub mod residuals;
 mod scene;
 pub mod stores;
@@ -29,6 +30,7 @@ use kerrlight_tomo::units::MICROARCSECOND;
 use kerrlight_tomo::volume::{Volume, VolumeFile, vti};
 use leakage::Leakage;
 use over_time::Changes;
+use quiescent::Quiescent;
 use serde_json::Value;
 use std::time::Instant;
 use verdict::{Evidence, Judged};
@@ -64,6 +66,7 @@ impl Estimate<'_> {
         let seen = trainer.images(&state.now, &frames, true)?;
         failed::check(self.file, &trainer.objective, &frames, &seen)?;
         let leakage = self.leakage(&seen)?;
+        let quiescent = self.quiescent(trainer, state)?;
         let loss = trainer.objective.loss_of(&frames, &seen)?;
         let mask = numbers::mask_error(trainer, state, &seen)?;
         let movie = self.pictured(trainer, state, &seen)?;
@@ -89,6 +92,7 @@ impl Estimate<'_> {
             judged,
             gains,
             leakage,
+            quiescent,
             seen,
             movie,
             state,
@@ -130,9 +134,7 @@ impl Estimate<'_> {
         if let Ok(hours) = setup::hours_per_m(self.file) {
             lists.push(("hours", times.iter().map(|time| (time - times[0]) * hours).collect()));
         }
-        if let Ok(sky) = setup::sky(self.file) {
-            lists.push(("field_uas", vec![sky.pixel_rad / MICROARCSECOND * n as f64]));
-        }
+        lists.extend(self.field());
         self.folder.file("movie.npz")?.write_with(|out| {
             let mut archive = images::MovieWriter::new(out, n);
             archive.add("recovered", movie)?;
@@ -144,6 +146,13 @@ impl Estimate<'_> {
 }
 
 impl Estimate<'_> {
+    /// The width of the field, where it is known.
+    fn field(&self) -> Option<(&'static str, Vec<f64>)> {
+        let sky = setup::sky(self.file).ok()?;
+        let n = self.file.screen.pixels as f64;
+        Some(("field_uas", vec![sky.pixel_rad / MICROARCSECOND * n]))
+    }
+
     fn still_view(&self) -> StillView<'_> {
         let Self { file, instrument, motion, measured, .. } = *self;
         StillView { file, instrument, motion, truth: measured.truth.as_ref() }
@@ -172,6 +181,8 @@ pub struct Found<'a> {
     gains: Option<Gains>,
     /// Leakage of stations, where it is solved for.
     leakage: Option<Leakage>,
+    /// What does not move, where it is recovered.
+    quiescent: Option<Quiescent>,
     /// What data see of the movie: the movie itself, its images of Stokes parameters, or its fluxes.
     seen: Frames<f32>,
     movie: Frames<f32>,

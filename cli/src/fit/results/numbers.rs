@@ -1,7 +1,7 @@
 //! What was found, in numbers.
 
 use super::{Estimate, Found};
-use crate::fit::{band_search, held_out, linear, world_results, world_search};
+use crate::fit::{band_search, held_out, linear, rotation_search, world_results, world_search};
 use crate::report;
 use crate::usage::usage;
 use kerrlight_tomo::fit::{State, Trainer};
@@ -70,6 +70,9 @@ impl Estimate<'_> {
         if let Some(leakage) = &found.leakage {
             results["leakage"] = leakage.json();
         }
+        if let Some(quiescent) = &found.quiescent {
+            results["quiescent"] = quiescent.json();
+        }
         if let Some(mask) = found.mask {
             results["mask_error"] = json!(mask);
         }
@@ -124,6 +127,9 @@ impl Estimate<'_> {
         if let Some(band) = band_search::found(self.folder)? {
             band_search::numbers(&band).into_iter().for_each(|(key, value)| results[key] = value);
             results["band"] = band;
+        }
+        if let Some(faraday) = rotation_search::found(self.folder)? {
+            results["faraday"] = faraday;
         }
         Ok(())
     }

@@ -4,9 +4,10 @@ use super::gains::Gains;
 use super::leakage::Leakage;
 use super::numbers::outcomes;
 use super::over_time::Changes;
+use super::quiescent::Quiescent;
 use super::{Estimate, Found};
 use crate::fit::curves::{loss_plot, psnr_plot};
-use crate::fit::{band_search, held_out, labels, world_results, world_scan};
+use crate::fit::{band_search, held_out, labels, rotation_search, world_results, world_scan};
 use crate::output;
 use crate::report::{self, LinePlot, Report, View3d};
 use anyhow::Context;
@@ -28,6 +29,7 @@ impl Estimate<'_> {
         let mut plots: Vec<LinePlot> = loss_plot(&lines).into_iter().collect();
         plots.extend(psnr_plot(&lines));
         plots.extend(held_out::plot(&results["held_out"]));
+        plots.extend(rotation_search::plot(&results["faraday"]));
         plots.extend(self.light_curves(&found.seen)?);
         plots.push(self.light_curve(&found.movie)?);
         plots.extend(found.changes.as_ref().map(Changes::plot));
@@ -89,6 +91,9 @@ impl Estimate<'_> {
         if let Some(figure) = self.residual_map(found)? {
             self.folder.file("residuals.png")?.write(&figure.png)?;
             figures.push(figure);
+        }
+        if let Some(quiescent) = &found.quiescent {
+            figures.extend(self.quiescent_figure(quiescent)?);
         }
         figures.extend(self.axes()?);
         Ok(figures)
@@ -167,6 +172,7 @@ impl Estimate<'_> {
         if results["band"].is_object() {
             lines.extend(band_search::sentences(&results["band"]));
         }
+        lines.extend(rotation_search::sentences(&results["faraday"]));
         lines.extend(held_out::sentence(&results["held_out"]));
         if let Some(statement) = results["linear"]["statement"].as_str() {
             lines.push(format!("The linear grid's solution: {statement}."));
@@ -184,6 +190,7 @@ impl Estimate<'_> {
         }
         lines.extend(found.gains.iter().flat_map(Gains::sentences));
         lines.extend(found.leakage.iter().flat_map(Leakage::sentences));
+        lines.extend(found.quiescent.iter().flat_map(Quiescent::sentences));
         if let (Some(psnr), Some(nrmse)) = (number("psnr_db"), number("nrmse")) {
             lines.push(format!(
                 "Compared with the truth, the volume has a peak signal-to-noise ratio of {psnr:.2} dB and a relative error of {nrmse:.3} (1 for an empty volume)."

@@ -1,7 +1,7 @@
 //! Units of settings, as docs/reference/fit-file.md gives them.
 
 /// Keys as they end, without the numbers of lists, and their units; the first that fits counts.
-const UNITS: [(&str, &str); 59] = [
+const UNITS: [(&str, &str); 66] = [
     ("hole.spin", "M"),
     ("hole.mass_msun", "solar masses"),
     ("hole.distance_kpc", "kpc"),
@@ -32,6 +32,13 @@ const UNITS: [(&str, &str); 59] = [
     ("movie.to", "GM/c³"),
     ("center", "M"),
     ("spot.sigma", "M"),
+    ("ring.radius", "M"),
+    ("ring.sigma", "M"),
+    ("flux_jy", "Jy"),
+    ("q_jy", "Jy"),
+    ("u_jy", "Jy"),
+    ("brightest_deg", "°"),
+    ("quiescent.upper", "M of emission; Jy of a light curve"),
     ("gains.amplitude", ""),
     ("leakage.amplitude", ""),
     ("amplitude", "model units"),

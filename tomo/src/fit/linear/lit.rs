@@ -39,6 +39,11 @@ impl Around {
         self.nodes.iter().map(|x| light(self.basis.map(|a| along(a, x)))).collect()
     }
 
+    /// No emission.
+    pub fn dark(&self) -> Vec<f64> {
+        vec![0.0; self.nodes.len()]
+    }
+
     /// Emission of 1 everywhere; a ring about the axis.
     pub fn wide(&self) -> [Vec<f64>; 2] {
         let ring = |[h, u, v]: [f64; 3]| bell((u.hypot(v) - RING[0]) / RING[1]) * bell(h / RING[2]);

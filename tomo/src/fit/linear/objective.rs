@@ -7,6 +7,7 @@ use super::error::LinearError;
 use super::gaussian::GaussianField;
 use super::operator::Operator;
 use crate::Error;
+use crate::fit::quiescent::Quiescent;
 use crate::fit::regulariser::{Regulariser, Shape};
 use crate::simd::Float;
 use rand::{RngExt, SeedableRng};
@@ -32,6 +33,8 @@ pub(super) struct Penalised<'a> {
     pub gaussian: Option<(&'a GaussianField, f64)>,
     /// Along the flow.
     pub change: Change,
+    /// Behind the values of nodes, with penalties of its own.
+    pub quiescent: Option<&'a Quiescent>,
     /// The largest emission that is allowed.
     pub upper: f64,
 }
@@ -41,6 +44,7 @@ impl Penalised<'_> {
         self.priors.is_empty()
             && self.gaussian.is_none()
             && !(self.change.is_any() && self.change.weight > 0.0)
+            && self.quiescent.is_none_or(|image| image.priors.is_empty())
     }
 
     /// Whether anything has second derivatives that are the same everywhere.
@@ -54,8 +58,13 @@ impl Penalised<'_> {
         if let Some(at) = self.priors.iter().position(|p| p.regulariser == Regulariser::Smoothness)
         {
             let change = Change { weight: 0.0, ..self.change };
-            let smoothness =
-                Self { priors: &self.priors[at..=at], gaussian: None, change, ..*self };
+            let smoothness = Self {
+                priors: &self.priors[at..=at],
+                gaussian: None,
+                change,
+                quiescent: None,
+                ..*self
+            };
             smoothness.value_and_gradient(direction, out);
         }
         if let Some((gaussian, share)) = self.gaussian {
@@ -65,8 +74,11 @@ impl Penalised<'_> {
 
     /// Of values at all nodes and knots; those on fields are the means over time of a field that changes, sums over what
     /// is born. Adds slopes.
-    fn value_and_gradient(&self, x: &[f64], slopes: &mut [f64]) -> f64 {
-        let mut value = self.change.penalty(x, (self.shape.cell(), self.upper), slopes);
+    pub fn value_and_gradient(&self, x: &[f64], slopes: &mut [f64]) -> f64 {
+        let of_image = self.quiescent.map_or(0.0, |image| image.penalty(x, slopes));
+        let fields = self.shape.count() * self.change.knots.count;
+        let (x, slopes) = (&x[..fields], &mut slopes[..fields]);
+        let mut value = of_image + self.change.penalty(x, (self.shape.cell(), self.upper), slopes);
         if let Some((gaussian, share)) = self.gaussian {
             value += gaussian.value_and_gradient(x, share, slopes);
         }
@@ -207,14 +219,18 @@ impl<T: Float + Default> Convex for Objective<'_, '_, T> {
             let slopes = self.operator.active.gather(&slopes);
             out.iter_mut().zip(slopes).for_each(|(x, slope)| *x += slope);
         }
+        if let Some(image) = self.terms.quiescent {
+            image.bend(direction, out);
+        }
     }
 
     fn diagonal(&self) -> Vec<f64> {
         let mut squares = self.operator.squares();
-        let largest = squares.iter().fold(0.0f64, |largest, x| largest.max(*x));
+        let nodes = squares.len() - self.operator.active.beside;
+        let largest = squares[..nodes].iter().fold(0.0f64, |largest, x| largest.max(*x));
         // Nodes that are hardly seen are not to be moved by more than the others can follow.
         let least = if largest > 0.0 { 1e-4 * largest } else { 1.0 };
-        squares.iter_mut().for_each(|x| *x = x.max(least));
+        squares[..nodes].iter_mut().for_each(|x| *x = x.max(least));
         self.beside_gaussian(squares)
     }
 }

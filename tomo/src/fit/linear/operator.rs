@@ -28,22 +28,29 @@ pub(super) struct Active {
     /// By its first node, whether any of a cell's nodes counts. Cells of nodes at the edge reach into the next row, plane
     /// or knot: no ray meets them.
     pub cells: Vec<bool>,
+    /// Columns of a quiescent image behind those of nodes: all of them count.
+    pub beside: usize,
 }
 
 impl Active {
-    /// These nodes.
-    pub fn new(is_active: &[bool], corners: &[usize]) -> Self {
+    /// These nodes, and all of so many columns behind them.
+    pub fn new(is_active: &[bool], corners: &[usize], beside: usize) -> Self {
+        let nodes = is_active.len() - beside;
         let mut column = vec![NONE; is_active.len()];
         let mut cells = vec![false; is_active.len()];
         let mut node = Vec::new();
-        for (k, _) in is_active.iter().enumerate().filter(|(_, active)| **active) {
+        let counts = |(k, active): &(usize, &bool)| *k >= nodes || **active;
+        for (k, _) in is_active.iter().enumerate().filter(counts) {
             column[k] = node.len() as u32;
             node.push(k as u32);
+            if k >= nodes {
+                continue;
+            }
             for corner in corners.iter().filter(|corner| **corner <= k) {
                 cells[k - corner] = true;
             }
         }
-        Self { node, column, cells }
+        Self { node, column, cells, beside }
     }
 
     /// Number of columns.
@@ -84,6 +91,14 @@ struct Scratch<T> {
 
 impl<'a, T: Float + Default> Operator<'a, T> {
     fn image(&self, k: usize, x: &[T], scratch: &mut Scratch<T>) {
+        self.carried(k, x, scratch);
+        if let Some(quiescent) = &self.walk.model.quiescent {
+            quiescent.add(x, &mut scratch.image);
+        }
+    }
+
+    /// The image of what matter carries.
+    fn carried(&self, k: usize, x: &[T], scratch: &mut Scratch<T>) {
         let Scratch { buffers, image, .. } = scratch;
         image.fill(T::zero());
         match &self.rows[k] {
@@ -173,6 +188,9 @@ impl<'a, T: Float + Default> Operator<'a, T> {
                     self.back_to_all(*k, scratch, &mut sums);
                 } else {
                     self.back(*k, scratch, &mut sums);
+                }
+                if let Some(quiescent) = &self.walk.model.quiescent {
+                    quiescent.back(&scratch.slopes, &mut sums);
                 }
             }
             (value, sums)
@@ -316,6 +334,10 @@ impl<'a, T: Float + Default> Operator<'a, T> {
                 Held::Made => self.each_row(*frame, &mut Buffers::default(), &mut add),
                 Held::Walked => {}
             }
+        }
+        if let Some(quiescent) = &self.walk.model.quiescent {
+            let square = self.frames.len() as f64 * quiescent.unit() * quiescent.unit();
+            quiescent.of_mut(&mut sums).fill(square);
         }
         sums
     }

@@ -42,6 +42,8 @@ pub(super) struct Run<'a, 'p, 'w, T: Float> {
     lit: Vec<f64>,
     /// Value and largest slope there.
     at_lit: [f64; 2],
+    /// The quiescent image that explains the data best without any emission; empty if none is recovered.
+    image: Vec<f64>,
 }
 
 impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
@@ -51,12 +53,41 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         watch: &'a mut Watch<'w>,
     ) -> Self {
         let (lit, at_lit) = (Vec::new(), [0.0; 2]);
-        Self { problem, settings, watch, evaluations: 0, bytes: 0, round: 0, lit, at_lit }
+        let image = Vec::new();
+        Self { problem, settings, watch, evaluations: 0, bytes: 0, round: 0, lit, at_lit, image }
+    }
+
+    /// Solves for the quiescent image alone, where there is one: what both can explain is to be the image's. Whether to
+    /// go on.
+    pub fn image_first(&mut self, data: &Data<'_, T>) -> bool {
+        let problem = self.problem;
+        if problem.beside() == 0 || !data.is_convex() {
+            return true;
+        }
+        let nodes = vec![false; problem.unknowns()];
+        let operator = Operator::new(problem.walk(), problem.active(&nodes), problem.frames, 0);
+        let terms = problem.penalised(data);
+        let mut objective = Objective::new(&operator, data, &terms);
+        let dark = vec![0.0; problem.beside()];
+        let found = self.minimise(&mut objective, &dark, self.settings.iterations);
+        self.evaluations += objective.evaluations;
+        self.image = found.x;
+        found.ending != Ending::Cancelled
+    }
+
+    /// No emission, and the image that was found first.
+    pub fn dark(&self, count: usize) -> Vec<f64> {
+        let mut dark = vec![0.0; count];
+        dark[count - self.image.len()..].copy_from_slice(&self.image);
+        dark
     }
 
     pub fn cancelled(&self, x: Vec<f64>, nodes: usize) -> LinearSolution<T> {
+        let (fields, image) = x.split_at(x.len() - self.problem.beside());
+        let single = |x: &[f64]| x.iter().map(|x| T::of(*x)).collect();
         LinearSolution {
-            emission: x.iter().map(|x| T::of(*x)).collect(),
+            emission: single(fields),
+            quiescent: single(image),
             certificate: None,
             stationarity: None,
             ending: Ending::Cancelled,
@@ -117,15 +148,20 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         let Some((x, lit)) = found else { return Ok(None) };
         let refined = |x: &[f64]| -> Result<Vec<f64>, Error> {
             let all = operator.active.expand(x);
-            let knots = all.chunks_exact(voxels.count());
+            let (fields, image) = all.split_at(all.len() - operator.active.beside);
+            let knots = fields.chunks_exact(voxels.count());
             let fields = knots.map(|knot| refined(&voxels, knot, &fine));
-            Ok(fields.collect::<Result<Vec<_>, _>>()?.concat())
+            let mut all = fields.collect::<Result<Vec<_>, _>>()?.concat();
+            all.extend_from_slice(image);
+            Ok(all)
         };
         self.lit = lit.map_or(Ok(Vec::new()), |lit| refined(&lit))?;
         let x = refined(&x)?;
-        let least = self.settings.threshold * x.iter().fold(0.0f64, |most, x| most.max(*x));
-        let bright: Vec<bool> = x.iter().map(|x| *x > least).collect();
-        let is_active = dilated(bright, fine.nodes, self.settings.dilation);
+        let fields = &x[..x.len() - operator.active.beside];
+        let least = self.settings.threshold * fields.iter().fold(0.0f64, |most, x| most.max(*x));
+        let bright: Vec<bool> = fields.iter().map(|x| *x > least).collect();
+        let mut is_active = dilated(bright, fine.nodes, self.settings.dilation);
+        is_active.resize(x.len(), true);
         let x = x.iter().zip(&is_active).map(|(x, active)| if *active { *x } else { 0.0 });
         Ok(Some((x.collect(), is_active)))
     }
@@ -140,7 +176,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
             let lit = self.lit(objective, Trials { iterations: PATIENCE * iterations, ..MANY })?;
             return Ok(lit.map(|Lit { start, x, .. }| (x, Some(start))));
         }
-        let dark = vec![0.0; objective.operator.active.count()];
+        let dark = self.dark(objective.operator.active.count());
         let found = self.minimise(objective, &dark, iterations);
         Ok((found.ending != Ending::Cancelled).then_some((found.x, None)))
     }
@@ -207,8 +243,10 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
                 operator.active.count(),
             )));
         }
-        let shining: Vec<bool> = x.iter().zip(&admitted).map(|(x, new)| *x > 0.0 || *new).collect();
-        *is_active = dilated(shining, problem.voxels.nodes, 1);
+        let fields = x.len() - problem.beside();
+        let shining = x[..fields].iter().zip(&admitted).map(|(x, new)| *x > 0.0 || *new);
+        *is_active = dilated(shining.collect(), problem.voxels.nodes, 1);
+        is_active.resize(x.len(), true);
         Ok(None)
     }
 

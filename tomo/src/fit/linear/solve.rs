@@ -12,7 +12,7 @@ use super::start::{Lit, Trials};
 use super::walk::{Voxels, Walk};
 use crate::Error;
 use crate::dynamics::Axis;
-use crate::fit::ForwardModel;
+use crate::fit::{ForwardModel, Quiescent};
 use crate::simd::Float;
 use core::ops::ControlFlow;
 
@@ -117,7 +117,9 @@ pub struct LinearProgress<'a> {
 impl LinearProgress<'_> {
     /// Emission at all nodes of the grid (of the coarse one, in round 0), knot after knot.
     pub fn emission(&self) -> Vec<f64> {
-        self.active.expand(self.x)
+        let mut all = self.active.expand(self.x);
+        all.truncate(all.len() - self.active.beside);
+        all
     }
 }
 
@@ -126,6 +128,8 @@ impl LinearProgress<'_> {
 pub struct LinearSolution<T> {
     /// Emission at the nodes, parameters of the linear grid; knot after knot where it may change.
     pub emission: Vec<T>,
+    /// Parameters of what does not move ([`Quiescent`]), where that is recovered.
+    pub quiescent: Vec<T>,
     /// How far from the minimum it can be; none if it was cancelled, or the data are not convex in the pixels.
     pub certificate: Option<Certificate>,
     /// How flat the function is there, if the data are not convex: all that can be said then.
@@ -142,10 +146,17 @@ pub struct LinearSolution<T> {
     pub bytes: usize,
 }
 
+impl<T: Float> LinearSolution<T> {
+    /// All parameters: those of the linear grid, and behind them those of what does not move.
+    pub fn parameters(&self) -> Vec<T> {
+        [self.emission.as_slice(), &self.quiescent].concat()
+    }
+}
+
 /// What some iterations reached.
 #[derive(Clone, Debug)]
 pub struct Least {
-    /// Emission at all nodes of the grid.
+    /// Emission at all nodes of the grid, and parameters of what does not move behind it.
     pub x: Vec<f64>,
     /// What is minimised.
     pub value: f64,
@@ -172,6 +183,9 @@ impl<T: Float + Default> LinearProblem<'_, T> {
             false => None,
         };
         let mut run = Run::new(self, settings, watch);
+        if !run.image_first(&data) {
+            return Ok(run.cancelled(run.dark(self.unknowns()), 0));
+        }
         // A prior has something to say of every node.
         let coarse = settings.coarse.filter(|_| self.gaussian.is_none() || !data.is_convex());
         let coarse = coarse.or((!data.is_convex()).then_some(LIT));
@@ -180,7 +194,10 @@ impl<T: Float + Default> LinearProblem<'_, T> {
                 Some(start) => start,
                 None => return Ok(run.cancelled(vec![0.0; self.unknowns()], 0)),
             },
-            None => (self.start(), vec![true; self.unknowns()]),
+            None => {
+                let dark = || run.dark(self.unknowns());
+                (self.center().unwrap_or_else(dark), vec![true; self.unknowns()])
+            }
         };
         if let Some(carried) = carried {
             if carried.ending == Ending::Cancelled {
@@ -189,6 +206,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
             // From a field that matter carries unchanged: no price is too high for it.
             let field: Vec<f64> = carried.emission.iter().map(|e| e.double()).collect();
             x = self.change.steady(&field);
+            x.extend(carried.quiescent.iter().map(|x| x.double()));
             is_active.iter_mut().zip(&x).for_each(|(active, x)| *active |= *x > 0.0);
         }
         run.reference(&data)?;
@@ -245,7 +263,8 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         operator.all_rows()
     }
 
-    /// The loss of the frames in a field at the nodes (knot after knot), without penalties.
+    /// The loss of the frames in a field at the nodes (knot after knot), with the parameters of what does not move behind
+    /// it where that is recovered; without penalties.
     ///
     /// # Errors
     /// If a number is out of its range, or the field has other nodes.
@@ -257,7 +276,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         let shines: Vec<bool> = emission.iter().map(|x| *x != T::zero()).collect();
         let data = self.data()?;
         let operator = Operator::new(self.walk(), self.active(&shines), self.frames, 0);
-        let x: Vec<T> = emission.iter().copied().filter(|x| *x != T::zero()).collect();
+        let x = operator.active.gather(emission);
         let (mut slopes, mut sum) = (vec![T::zero(); self.model.pixels()], 0.0);
         for (k, frames) in self.frames.chunks(TOGETHER).enumerate() {
             let images = operator.some_images(&x, k * TOGETHER..k * TOGETHER + frames.len());
@@ -268,13 +287,10 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         Ok(sum)
     }
 
-    /// Where a descent without a coarse problem begins: in the dark, or where the prior's density is highest.
-    fn start(&self) -> Vec<f64> {
+    /// Where a prior's density is highest: there a descent without a coarse problem begins.
+    fn center(&self) -> Option<Vec<f64>> {
         let inside = |x: &f64| x.clamp(0.0, self.upper);
-        match self.gaussian {
-            Some(gaussian) => gaussian.center().iter().map(inside).collect(),
-            None => vec![0.0; self.unknowns()],
-        }
+        self.gaussian.map(|gaussian| gaussian.center().iter().map(inside).collect())
     }
 
     pub(super) fn data(&self) -> Result<Data<'_, T>, Error> {
@@ -293,18 +309,24 @@ impl<T: Float + Default> LinearProblem<'_, T> {
 
     /// These nodes, knot after knot.
     pub(super) fn active(&self, is_active: &[bool]) -> Active {
-        Active::new(is_active, &self.voxels.corners())
+        Active::new(is_active, &self.voxels.corners(), self.beside())
     }
 
-    /// Values at all nodes and knots.
+    /// Values at all nodes and knots, and parameters of what does not move.
     pub(super) fn unknowns(&self) -> usize {
-        self.voxels.count() * self.change.knots.count
+        self.voxels.count() * self.change.knots.count + self.beside()
+    }
+
+    /// Parameters of what does not move.
+    pub(super) fn beside(&self) -> usize {
+        self.model.quiescent.as_ref().map_or(0, Quiescent::columns)
     }
 
     pub(super) fn penalised(&self, data: &Data<'_, T>) -> Penalised<'_> {
         let (priors, change, upper) = (self.priors, self.change, self.upper);
         let gaussian = self.gaussian.map(|gaussian| (gaussian, 1.0 / data.count as f64));
-        Penalised { priors, shape: self.voxels.shape(), gaussian, change, upper }
+        let quiescent = self.model.quiescent.as_ref();
+        Penalised { priors, shape: self.voxels.shape(), gaussian, change, quiescent, upper }
     }
 
     fn check(&self, settings: &LinearSettings) -> Result<(), Error> {
@@ -320,6 +342,8 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         }
         let positive = |x: f64| x.is_finite() && x > 0.0;
         check("upper", upper, positive(upper), "above 0")?;
+        let of_image = self.model.quiescent.as_ref().map_or(upper, |image| image.most);
+        check("most of the quiescent image", of_image, of_image == upper, "upper")?;
         check("flux", flux.unwrap_or(1.0), flux.is_none_or(positive), "above 0")?;
         for Prior { regulariser, weight } in self.priors {
             regulariser.checked()?;

@@ -67,14 +67,22 @@ impl<T: Float + Default> Run<'_, '_, '_, T> {
             true => f64::INFINITY,
             false => objective.nothing().0,
         };
-        let mut scaled = |shape: Vec<f64>| {
-            let shape = objective.terms.change.steady(&shape);
+        let quiescent = objective.terms.quiescent;
+        let beside = vec![0.0; objective.operator.active.beside];
+        let mut scaled = |shape: Vec<f64>, image: &[f64]| {
+            let mut shape = objective.terms.change.steady(&shape);
+            shape.extend_from_slice(image);
             let mut shape = objective.operator.active.gather(&shape);
             shape.iter_mut().zip(&seen).for_each(|(x, seen)| *x *= f64::from(u8::from(*seen)));
             self.scaled(objective, &shape)
         };
-        let wide = around.wide().into_iter().map(&mut scaled).collect::<Result<Vec<_>, _>>()?;
-        let spots = (0..trials.spots.count()).map(|k| scaled(around.spot(trials.spots, k)));
+        let wide = around.wide().into_iter().map(|shape| scaled(shape, &beside));
+        let mut wide = wide.collect::<Result<Vec<_>, _>>()?;
+        if let Some(image) = quiescent {
+            wide.push(scaled(around.dark(), &image.round())?);
+        }
+        let spot = |k: usize| scaled(around.spot(trials.spots, k), &beside);
+        let spots = (0..trials.spots.count()).map(spot);
         let spots = spots.collect::<Result<Vec<_>, _>>()?;
         let lit = |start: &(f64, Vec<f64>)| start.0 < dark || dark.is_nan();
         let mut spots: Vec<_> = spots.into_iter().flatten().filter(lit).collect();

@@ -19,6 +19,7 @@ mod gaussian;
 mod kept;
 pub(in crate::fit) mod lit;
 mod profile;
+mod quiescent;
 
 pub(in crate::fit) const FRAMES: [usize; 5] = [0, 1, 2, 3, 4];
 
@@ -86,7 +87,7 @@ fn operator<'a>(
     is_active: &[bool],
     budget: usize,
 ) -> Operator<'a, f64> {
-    let active = Active::new(is_active, &voxels.corners());
+    let active = Active::new(is_active, &voxels.corners(), 0);
     Operator::new(Walk::new(model, axis(), (voxels, Knots::STEADY)), active, &FRAMES, budget)
 }
 

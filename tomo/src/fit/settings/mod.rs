@@ -7,11 +7,13 @@ mod band;
 mod change;
 mod data;
 mod error;
+mod faraday;
 mod gaussian;
 mod held_out;
 mod instrument;
 mod light_curve;
 mod penalties;
+mod quiescent;
 mod ranges;
 mod recovery;
 mod simulation;
@@ -26,15 +28,17 @@ pub use change::ChangeSettings;
 pub use data::{DataFiles, Loss, LossKind};
 pub use error::FitError;
 pub(crate) use error::{Within, refuse};
+pub use faraday::FaradaySettings;
 pub use gaussian::{FieldSettings, GaussianSettings, Negative};
 pub use held_out::{HeldOutSettings, Weight};
 pub use instrument::{GainPhases, GainSettings, InstrumentSettings, LeakageSettings};
 pub use light_curve::{MeanFlux, MeasuredCurve, PerStokes, SimulatedCurve};
 pub use penalties::{PenaltyKind, PenaltySettings, ProbeSettings};
+pub use quiescent::QuiescentSettings;
 pub use recovery::{
     AxisScan, AxisSearch, Kind, Linear, Occupancy, Optimiser, Representation, Start, Training,
 };
-pub use simulation::{GlyphShape, Movie, Noise, Observation, Shines, Spot, Truth, Tube};
+pub use simulation::{GlyphShape, Movie, Noise, Observation, Ring, Shines, Spot, Truth, Tube};
 pub use static_image::{
     EnvelopeSettings, ImageSettings, RingSettings, Scattering, StartImage, StaticData,
     StaticImageFile, StaticVisibilities, StrengthSettings, Variability,
@@ -72,12 +76,18 @@ pub struct FitFile {
     /// The field of the gas and its polarised light; total intensity alone, without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub polarization: Option<PolarizationLaw>,
+    /// A rotation of all position angles that is looked for; none, without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub faraday: Option<FaradaySettings>,
     /// A weight that is chosen by data that are held out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out: Option<HeldOutSettings>,
     /// How emission may change while matter carries it; not at all, without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub change: Option<ChangeSettings>,
+    /// What does not move, recovered beside the emission; nothing, without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quiescent: Option<QuiescentSettings>,
     /// Frames of a simulated movie, or of an observation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub movie: Option<Movie>,

@@ -32,6 +32,9 @@ pub struct Truth {
     /// A random field at the reference time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub field: Option<FieldSettings>,
+    /// Rings on the screen that do not move.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ring: Vec<Ring>,
 }
 
 /// A Gaussian spot.
@@ -64,6 +67,30 @@ pub struct Tube {
     pub azimuth_deg: [f64; 2],
     /// Emission on the arc, far from its ends.
     pub amplitude: f64,
+}
+
+/// A ring on the screen about the hole, the same in every frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ring {
+    /// Its radius, M; 0 is a round spot.
+    pub radius: f64,
+    /// Standard deviation across it, M.
+    pub sigma: f64,
+    /// Its flux, Jy.
+    pub flux_jy: f64,
+    /// Its Q, Jy, with the same shape.
+    #[serde(default)]
+    pub q_jy: f64,
+    /// Its U, Jy.
+    #[serde(default)]
+    pub u_jy: f64,
+    /// By which part of its mean the brightest side is brighter.
+    #[serde(default)]
+    pub asymmetry: f64,
+    /// Where it is brightest, degrees east of north.
+    #[serde(default)]
+    pub brightest_deg: f64,
 }
 
 /// Spots on an arc are this many of their standard deviations apart: closer, nothing of a flat arc changes in double

@@ -82,7 +82,7 @@ pub fn hold_out(
             if solution.ending == Ending::Cancelled {
                 return Ok(None);
             }
-            losses.push(misfit(&problem, &part(false), &solution.emission)?);
+            losses.push(misfit(&problem, &part(false), &solution.parameters())?);
         }
         found.push(Held { value, losses });
     }

@@ -1,6 +1,7 @@
 //! A start of a representation from the solution of a linear problem.
 
 use super::{Result, linear};
+use crate::fit::linear::LinearSolution;
 use crate::fit::settings::{FitFile, Kind, refuse};
 use crate::fit::{Region, State};
 use crate::optimise::{Adam, AdamState};
@@ -32,18 +33,21 @@ pub struct Imprinted {
 }
 
 /// Fits a representation to the solution of a linear problem on a grid of `nodes` along each axis, at random points of
-/// the region: rounds of `steps` steps, until it is within a twentieth of the solution or four rounds are over.
+/// the region, with what does not move beside it: rounds of `steps` steps, until it is within a twentieth of the solution or four rounds are over.
 ///
 /// # Errors
 /// If there is no table `linear`, or the emission does not have `nodes`³ values.
 pub fn imprint(
     file: &FitFile,
     representation: &dyn Representation<f32>,
-    emission: &[f32],
+    found: &LinearSolution<f32>,
     nodes: usize,
     steps: u64,
     state: &mut State<f32>,
 ) -> Result<Imprinted> {
+    let emission = &*found.emission;
+    let own = state.now.parameters.len() - found.quiescent.len();
+    state.now.parameters[own..].copy_from_slice(&found.quiescent);
     let (r, region) = (file.region.r_max, file.region.limits());
     let spline = Spline::cube(nodes, r, linear(file)?.degree)?;
     let (given, wanted) = (emission.len(), nodes.pow(3));

@@ -1,12 +1,13 @@
 //! What a fit looks through: sight lines, traced once.
 
 use super::light_curve::seen;
+use super::quiescent::quiescent;
 use super::{AXIS, Result, known_axis, observer, spacing};
 use crate::fit::pixel_rays::PixelRays;
 use crate::fit::settings::{Absorption, AxisSearch, FitError, FitFile, Screen, Within, refuse};
 use crate::fit::{
-    ForwardModel, Motion, PolarizedView, Redshift, RingRays, Sampling, Seen, SightlineRequest,
-    Sightlines,
+    ForwardModel, Motion, PolarizedView, Quiescent, Redshift, RingRays, Sampling, Seen,
+    SightlineRequest, Sightlines,
 };
 use crate::memory;
 use crate::polarization::StokesParameter;
@@ -27,6 +28,8 @@ pub struct Instrument {
     pub polarized: Option<PolarizedView>,
     /// What data see.
     pub seen: Seen,
+    /// What does not move, where it is recovered.
+    pub quiescent: Option<Quiescent>,
 }
 
 /// Rays of the trial by which the nodes of all are estimated.
@@ -110,7 +113,8 @@ impl Instrument {
         let redshift = file.effects.redshift_power.map(|power| Redshift { power });
         let pixels = [alpha, beta];
         let polarized = polarized(file, &pixels)?;
-        Ok(Self { pixels, hole, lines, redshift, polarized, seen: seen(file)? })
+        let (seen, quiescent) = (seen(file)?, quiescent(file, chosen.len())?);
+        Ok(Self { pixels, hole, lines, redshift, polarized, seen, quiescent })
     }
 
     /// What data see of emission that moves like this.
@@ -118,7 +122,11 @@ impl Instrument {
     /// # Errors
     /// If the motion is out of range.
     pub fn forward<T: Float>(&self, motion: &Motion) -> Result<ForwardModel<T>> {
-        self.model(motion, &self.seen)
+        let model = self.model(motion, &self.seen)?;
+        match &self.quiescent {
+            Some(image) => model.beside(image.clone()),
+            None => Ok(model),
+        }
     }
 
     /// The same as images of total intensity, whatever data see.

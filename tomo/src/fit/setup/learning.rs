@@ -1,13 +1,14 @@
 //! From settings to what is recovered and how it is learnt.
 
 use super::change::{self, change};
-use super::{Result, axis, linear, motion, polarized};
+use super::quiescent::{self, quiescent};
+use super::{Result, axis, faraday, linear, motion, polarized};
 use crate::fit::linear::Change;
 use crate::fit::settings;
 use crate::fit::settings::{
     FitError, FitFile, Kind, LossKind, Occupancy, Optimiser, Start, Within, refuse,
 };
-use crate::fit::{BatchSize, OccupancyPlan, OccupancySettings, Region, Training};
+use crate::fit::{BatchSize, Beside, OccupancyPlan, OccupancySettings, Region, Training};
 use crate::memory;
 use crate::optimise::{Adam, Lbfgs, Polynomial};
 use crate::representation::{
@@ -15,13 +16,26 @@ use crate::representation::{
     Network, NetworkSettings, OwnSettings, Registry, Representation, Spline,
 };
 
-/// What is recovered; `registry` has what the program adds to kerrlight's own representations. Where emission
+/// What is recovered, with the parameters of what does not move behind its own; `registry` has what the program adds to kerrlight's own representations. Where emission
 /// may change, `times` are those of the first and the last emission, M since the reference time
 /// ([`emission_times`](super::emission_times)).
 ///
 /// # Errors
 /// If there is none of this kind, or a number is out of range.
 pub fn representation(
+    file: &FitFile,
+    registry: &Registry,
+    times: [f64; 2],
+) -> Result<Box<dyn Representation<f32>>> {
+    let inner = over_time(file, registry, times)?;
+    Ok(match quiescent(file, file.screen.pixels * file.screen.pixels)? {
+        Some(image) => Box::new(Beside::new(inner, &image)),
+        None => inner,
+    })
+}
+
+/// The emission, which may change.
+fn over_time(
     file: &FitFile,
     registry: &Registry,
     times: [f64; 2],
@@ -227,6 +241,8 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
     let training = training(file, axis_rate)?;
     change::check(file)?;
     polarized::check(file)?;
+    quiescent::check(file)?;
+    faraday::check(file)?;
     if let Some(held_out) = &file.held_out {
         held_out.check(file)?;
     }
@@ -258,6 +274,9 @@ fn check_prior(file: &FitFile) -> Result<()> {
         refuse!(
             "linear.prior does not work together with [change]: it knows no covariance in time"
         );
+    }
+    if file.quiescent.is_some() {
+        refuse!("linear.prior does not work together with [quiescent]: leave one of them out");
     }
     match file.loss.iter().position(|loss| loss.weight != 1.0) {
         Some(k) => {

@@ -241,7 +241,8 @@ pub(super) fn simulate(
         }
         truth.scale(mean.jy / now);
     }
-    let fluxes = truth.movie_through(&mut instrument.summed(&motion, &parameters)?);
+    let mut fluxes = truth.movie_through(&mut instrument.summed(&motion, &parameters)?);
+    truth.rings.add_to_fluxes(&mut fluxes, &parameters);
     let data = measure(&fluxes, &parameters, settings, file.seed)?;
     let movie = Some(truth.movie(file, instrument, &times)?);
     let fitted = fitted(&hours, settings.validate_after_min)?;

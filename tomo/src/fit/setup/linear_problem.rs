@@ -19,6 +19,9 @@ const MANY_ROWS: usize = 2 << 30;
 
 /// What is left of the first gradient beside a prior: what data hardly tell is decided last.
 const SURE: f64 = 1e-7;
+/// Where a round ends beside a quiescent image: slopes with respect to its pixels, which add up over all frames, are large at
+/// first, and fall to a thousandth while the volume has hardly been found.
+const BESIDE: f64 = 1e-6;
 
 /// All terms of the data, the image first.
 pub(super) fn terms(data: &Data<f32>) -> Vec<Weighted<'_, f32>> {
@@ -85,7 +88,7 @@ impl Of<'_> {
     }
 
     /// The problem of some frames.
-    fn with<R>(
+    pub fn with<R>(
         &self,
         frames: &[usize],
         solve: impl FnOnce(&LinearProblem<'_, f32>) -> Result<R>,
@@ -137,7 +140,11 @@ pub(super) fn solve_frames(
         false => coarse,
     };
     let memory = if change.is_any() { MANY_ROWS } else { usual.memory };
-    let tolerance = if settings.prior.is_some() { SURE } else { usual.tolerance };
+    let tolerance = match (settings.prior, of.objective.model.quiescent()) {
+        (Some(_), _) => SURE,
+        (None, Some(_)) => BESIDE,
+        (None, None) => usual.tolerance,
+    };
     let how = LinearSettings { rounds, iterations, coarse, memory, tolerance, ..usual };
     of.with(frames, |problem| problem.solve(&how, watch))
 }

@@ -335,7 +335,8 @@ fn fill(
     }
     let of = |pixels: Vec<f64>| Movie { grid: sky, pixels };
     let mut model = instrument.forward::<f64>(&motion(file, times.to_vec())?)?;
-    let all = truth.movie_through(&mut model);
+    let mut all = truth.movie_through(&mut model);
+    truth.rings.add_to(&mut all, &polarized::PARAMETERS);
     let [i, q, u] = polarized::split(&all, sky.pixels()).map(of);
     let lit = lit(truth, Frames::of(i.pixels.clone(), sky.pixels()))?;
     let movies = [&i, &q, &u];

@@ -2,11 +2,13 @@
 
 use super::glyph::Glyph;
 use super::random_field::RandomField;
+use super::ring::Rings;
 use super::{AXIS, Instrument, Result, known_axis, motion};
 use crate::dynamics::{AngularVelocity, Axis};
 use crate::fit::settings::{FitError, FitFile, Shines, Spot, Tube, Within, refuse};
 use crate::fit::{Batch, ForwardModel};
 use crate::frames::{Frames, Sink};
+use crate::polarization::StokesParameter;
 use crate::simd::Float;
 use kerrlight_geodesic::vector::distance;
 
@@ -18,6 +20,7 @@ pub struct Truth {
     spots: Vec<Spot>,
     glyphs: Vec<Glyph>,
     field: Option<RandomField>,
+    pub(super) rings: Rings,
     axis: Axis,
     velocity: AngularVelocity,
     /// M.
@@ -41,8 +44,8 @@ impl Truth {
         let missing =
             || FitError::missing("truth", format!("there is nothing to simulate; {SPOT}"));
         let truth = file.truth.as_ref().ok_or_else(missing)?;
-        let lists = truth.spot.len() + truth.glyph.len() + truth.tube.len();
-        if lists == 0 && truth.field.is_none() {
+        let moves = [truth.spot.len(), truth.glyph.len(), truth.tube.len()];
+        if moves == [0; 3] && truth.field.is_none() && truth.ring.is_empty() {
             refuse!("truth is empty; {SPOT}");
         }
         let mut spots = truth.spot.clone();
@@ -69,6 +72,7 @@ impl Truth {
             spots,
             glyphs: truth.glyph.iter().enumerate().map(glyph).collect::<Result<_>>()?,
             field: truth.field.map(|field| RandomField::new(file, &field)).transpose()?,
+            rings: Rings::new(file)?,
             axis,
             velocity: motion(file, Vec::new())?.velocity,
             reference: file.motion.reference_time,
@@ -147,7 +151,12 @@ impl Truth {
         self.axis
     }
 
-    /// Its movie at some times, in double precision: Jy per pixel, frame by frame, rows from the top.
+    /// What does not move, Jy per pixel, rows from the top; none without rings.
+    pub fn quiescent(&self, parameter: StokesParameter) -> Option<&[f64]> {
+        (!self.rings.is_empty()).then(|| self.rings.of(parameter))
+    }
+
+    /// Its movie at some times, rings included, in double precision: Jy per pixel, frame by frame, rows from the top.
     ///
     /// # Errors
     /// If the motion is out of range, or there is no room for the movie.
@@ -159,6 +168,15 @@ impl Truth {
     ) -> Result<Frames<f64>> {
         let mut model = instrument.pictured::<f64>(&motion(file, times.to_vec())?)?;
         model.weigh(self.axis);
-        Frames::made((model.frames(), model.pixels()), |sink| self.images(&model, sink))
+        Frames::made((model.frames(), model.pixels()), |sink| {
+            if self.rings.is_empty() {
+                return self.images(&model, sink);
+            }
+            self.images(&model, &mut |image| {
+                let mut image = image.to_vec();
+                self.rings.add_to(&mut image, &[StokesParameter::I]);
+                sink(&image)
+            })
+        })
     }
 }

@@ -78,7 +78,7 @@ fn compare_with_images(
     for (share, budget) in [(1.0, usize::MAX), (1.0, 0), (0.4, usize::MAX), (0.4, 0)] {
         let is_active: Vec<bool> =
             random(4 * voxels.count(), 4).iter().map(|x| *x < share).collect();
-        let active = Active::new(&is_active, &voxels.corners());
+        let active = Active::new(&is_active, &voxels.corners(), 0);
         let walk = Walk::new(model, axis(), (voxels, knots));
         let operator = Operator::new(walk, active, &FRAMES, budget);
         let x = random(operator.active.count(), 1);

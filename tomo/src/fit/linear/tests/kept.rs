@@ -39,7 +39,7 @@ fn assert_room_changes_no_bit(model: &ForwardModel<f64>, knots: Knots, degree: D
     let is_active: Vec<bool> =
         random(knots.count * voxels.count(), 4).iter().map(|x| *x < 0.6).collect();
     let within = |room| {
-        let active = Active::new(&is_active, &voxels.corners());
+        let active = Active::new(&is_active, &voxels.corners(), 0);
         let walk = Walk::new(model, axis(), (voxels, knots));
         Operator::within(walk, active, &FRAMES, [usize::MAX, room])
     };
@@ -80,11 +80,11 @@ fn exact_room_does_not_decide_what_is_walked() {
     let voxels = Voxels::cube(6, 5.0, Degree::Linear);
     let frames: Vec<usize> = FRAMES.iter().copied().cycle().take(40).collect();
     let walked = |room, budget| {
-        let active = Active::new(&vec![true; voxels.count()], &voxels.corners());
+        let active = Active::new(&vec![true; voxels.count()], &voxels.corners(), 0);
         let walk = Walk::new(&model, axis(), (voxels, Knots::STEADY));
         counts(&Operator::within(walk, active, &frames, [budget, room]))
     };
-    let active = Active::new(&vec![true; voxels.count()], &voxels.corners());
+    let active = Active::new(&vec![true; voxels.count()], &voxels.corners(), 0);
     let walk = Walk::new(&model, axis(), (voxels, Knots::STEADY));
     let all = Operator::new(walk, active, &frames, usize::MAX).bytes();
     assert_eq!(walked(usize::MAX, all / 2), [24, 0, 16]);

@@ -98,7 +98,9 @@ fn exact_slopes_of_data_that_are_not_convex() {
         let data = Data::new(&terms, &FRAMES, model.pixels(), FRAMES.len()).unwrap();
         let operator = operator(&model, voxels, &vec![true; voxels.count()], usize::MAX);
         let (priors, change) = (&[], Change::NONE);
-        let terms = Penalised { priors, shape: voxels.shape(), gaussian: None, change, upper: 2.0 };
+        let shape = voxels.shape();
+        let terms =
+            Penalised { priors, shape, gaussian: None, change, quiescent: None, upper: 2.0 };
         let mut objective = Objective::new(&operator, &data, &terms);
         let x: Vec<f64> = random(voxels.count(), 1).iter().map(|x| 0.5 + x).collect();
         let direction = random(voxels.count(), 2);

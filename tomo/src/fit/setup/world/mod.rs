@@ -47,6 +47,7 @@ pub fn in_world(
         redshift: instrument.redshift.map(|_| Redshift { power }),
         polarized: model.polarized(world),
         seen: instrument.seen.clone(),
+        quiescent: instrument.quiescent.clone(),
     };
     Ok((found, model.motion_of(world)?))
 }
