@@ -32,6 +32,7 @@ mod lensing;
 mod mpirun;
 mod pictures;
 mod posterior;
+mod quiescent;
 mod radiative_transfer;
 mod readme;
 mod reference;

@@ -41,6 +41,15 @@ pub enum Regulariser {
     },
 }
 
+/// A penalty with its weight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prior {
+    /// Which.
+    pub regulariser: Regulariser,
+    /// What it is multiplied by.
+    pub weight: f64,
+}
+
 impl Shape {
     /// Number of nodes.
     pub fn count(&self) -> usize {

@@ -30,13 +30,13 @@ mod start;
 pub(in crate::fit) mod tests;
 mod walk;
 
+pub use crate::fit::regulariser::Prior;
 pub use certificate::{Certificate, Stationarity};
 pub use change::Change;
 pub use data::Weighted;
 pub use descent::{Ending, Method};
 pub use error::LinearError;
 pub use gaussian::{GaussianField, Matern, Roughness};
-pub use objective::Prior;
 pub use profile::Profile;
 pub use solve::{
     Coarse, Least, LinearProblem, LinearProgress, LinearSettings, LinearSolution, Watch,

@@ -8,19 +8,10 @@ use super::gaussian::GaussianField;
 use super::operator::Operator;
 use crate::Error;
 use crate::fit::quiescent::Quiescent;
-use crate::fit::regulariser::{Regulariser, Shape};
+use crate::fit::regulariser::{Prior, Regulariser, Shape};
 use crate::simd::Float;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-
-/// A penalty with its weight.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Prior {
-    /// Which.
-    pub regulariser: Regulariser,
-    /// What it is multiplied by.
-    pub weight: f64,
-}
 
 /// Penalties on a field, and how it may change.
 #[derive(Clone, Copy)]

@@ -4,8 +4,7 @@ mod beside;
 
 pub use beside::Beside;
 
-use super::linear::Prior;
-use super::regulariser::{Regulariser, Shape};
+use super::regulariser::{Prior, Regulariser, Shape};
 use crate::Error;
 use crate::simd::Float;
 

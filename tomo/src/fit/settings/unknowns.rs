@@ -99,5 +99,14 @@ fn flux(file: &FitFile) -> Result<(), FitError> {
             data(file)
         );
     }
+    let pulls_image = file.quiescent.is_some_and(|image| {
+        [image.smoothness, image.sparsity].into_iter().flatten().any(|weight| weight > 0.0)
+    });
+    if pulls_image {
+        refuse!(
+            "quiescent.smoothness and quiescent.sparsity are not allowed with {} alone: these do not determine the flux, and penalties would drive it to 0; give 0, or add a loss of amplitudes or of the light curve",
+            data(file)
+        );
+    }
     Ok(())
 }

@@ -1,0 +1,127 @@
+//! `kerrlight fit` of a flare beside what does not move, and of a rotation of position angles that is not known.
+
+use crate::fit::results;
+use crate::support::{fail, kerrlight, root, succeed};
+use std::path::Path;
+
+/// The scene of docs/method/quiescent-emission.md with a few exact images in place of visibilities.
+fn scene(folder: &Path) -> String {
+    let text = std::fs::read_to_string(root().join("scenes/fits/flare_and_ring.toml")).unwrap();
+    let (before, rest) = text.split_once("[observation]").unwrap();
+    let (_, after) = rest.split_once("[[loss]]\ndata = \"visibilities\"").unwrap();
+    let movie =
+        "[movie]\nframes = 12\nfrom = 0.0\nto = 100.0\n\n[[loss]]\ndata = \"image\"\nsigma = 0.001";
+    let path = folder.join("scene.toml");
+    std::fs::write(&path, format!("{before}{movie}{after}")).unwrap();
+    path.display().to_string()
+}
+
+const SMALL: [&str; 10] = [
+    "--set",
+    "quiescent.smoothness=0.03",
+    "--set",
+    "screen.pixels=20",
+    "--set",
+    "truth.spot.0.sigma=1.2",
+    "--set",
+    "representation.nodes=16",
+    "--set",
+    "output.nodes=24",
+];
+
+/// Flare and ring are each found where they are, the files say so, and without the table the data are not explained.
+#[test]
+fn exact_a_ring_is_told_from_the_flare() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = scene(folder.path());
+    let run = |more: &[&str]| {
+        succeed(folder.path(), &[&["fit", &scene], &SMALL[..], more].concat());
+        results(&folder.path().join(more[more.len() - 1]))
+    };
+    let found = run(&["-o", "both"]);
+    let beside = &found["quiescent"]["I"]["beside_the_truth"];
+    let number = |of: &serde_json::Value| of.as_f64().unwrap();
+    assert!((number(&beside["flux_jy"]) - 2.0).abs() < 1e-6, "{beside}");
+    assert!(number(&beside["correlation"]) > 0.99, "{beside}");
+    assert!(number(&found["correlation"]) > 0.99, "{found}");
+    for name in ["quiescent.npz", "quiescent.exr", "quiescent.png"] {
+        assert!(folder.path().join("both").join(name).is_file(), "{name}");
+    }
+    let report = std::fs::read_to_string(folder.path().join("both/report.html")).unwrap();
+    assert!(report.contains("An image that does not move recovered beside the emission"));
+    let without = run(&["--set", "quiescent=", "-o", "one"]);
+    assert!(without["quiescent"].is_null());
+    let chi2 = |of: &serde_json::Value| number(&of["chi2_per_datum"]["image"]);
+    assert!(chi2(&without) > 100.0 * chi2(&found), "{without}");
+}
+
+/// What an image beside the emission does not go together with is refused with its key, and nothing is written.
+#[test]
+fn exact_what_excludes_a_quiescent_image_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = scene(folder.path());
+    let trained = "representation=feature-grid";
+    for (set, says) in [
+        (&["quiescent.upper=0.0"][..], "quiescent.upper = 0"),
+        (&["quiescent.smoothness=-1.0"], "quiescent.smoothness = -1"),
+        (&["quiescent={upper=1.0,sparsity=0.0}"], "quiescent.smoothness"),
+        (&[trained, "training.batch={pixels=9}"], "training.batch: pixels are drawn"),
+        (
+            &[trained, "training.optimiser=lbfgs", "training.batch=all"],
+            "lbfgs does not support bounds",
+        ),
+        (&["truth.ring.0.radius=900.0"], "truth.ring.0: no pixel of the screen sees it"),
+        (
+            &[
+                "loss=[{data=\"closure-phases\",weight=1.0}]",
+                "observation={array=\"ngEHT\",source=\"sgra\",mjd=57851,utc=[10.0,11.0],scans=4,integration_s=30.0,frequency_ghz=230.0,bandwidth_ghz=2.0,elevation_deg=[10.0,85.0],noise=\"none\",first_time=0.0}",
+                "linear.flux_jy=3.0",
+                "linear.sparsity=0.0",
+            ],
+            "quiescent.smoothness and quiescent.sparsity are not allowed",
+        ),
+        (&["faraday={angles=12,iterations=9}"], "faraday needs Q and U"),
+    ] {
+        let sets: Vec<&str> = set.iter().flat_map(|set| ["--set", *set]).collect();
+        let words = [&["fit", &scene], &sets[..], &["-o", "refused"]].concat();
+        assert_eq!(kerrlight(folder.path(), &words).status.code(), Some(2), "{set:?}");
+        let said = fail(folder.path(), &words);
+        assert!(said.contains(says), "{set:?}: {said}");
+        assert!(!folder.path().join("refused").exists());
+    }
+}
+
+/// A polarised light curve whose position angles are turned by 35° on the way, with and without fluxes that do not move.
+#[test]
+fn exact_a_rotation_of_position_angles_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = root().join("scenes/fits/orbital_polarimetry_textbook.toml");
+    let text = std::fs::read_to_string(text).unwrap();
+    let (before, rest) = text.split_once("# Worlds that are compared first").unwrap();
+    let (_, output) = rest.split_once("[output]").unwrap();
+    let turned = format!(
+        "{before}[output]{output}\n[world.polarization]\nturn_deg = 35.0\n[faraday]\nangles = 12\niterations = 100\n"
+    );
+    std::fs::write(folder.path().join("curve.toml"), turned).unwrap();
+    let set = "screen.pixels=32 representation.nodes=20 output.nodes=16 light_curve.sigma.I=0.01";
+    let set: Vec<&str> = set.split(' ').flat_map(|set| ["--set", set]).collect();
+    succeed(folder.path(), &[&["fit", "curve.toml"], &set[..], &["-o", "run"]].concat());
+    let found = results(&folder.path().join("run"));
+    let number = |key: &str| found["faraday"][key].as_f64().unwrap();
+    assert_eq!(number("truth_deg"), 35.0);
+    let (angle, sigma) = (number("angle_deg"), number("sigma_deg"));
+    assert!((angle - 35.0).abs() < 3.0 * sigma && sigma < 1.0, "{angle} {sigma}");
+    let steady = [
+        "loss.0.stokes=[\"I\",\"Q\",\"U\"]",
+        "quiescent={upper=1.0}",
+        "truth.ring=[{radius=5.0,sigma=1.0,flux_jy=0.5,q_jy=0.05,u_jy=-0.08}]",
+    ];
+    let steady: Vec<&str> = steady.iter().flat_map(|set| ["--set", *set]).collect();
+    let words = [&["fit", "curve.toml"], &set[..], &steady, &["-o", "steady"]].concat();
+    succeed(folder.path(), &words);
+    let found = results(&folder.path().join("steady"));
+    for (name, jy) in [("I", 0.5), ("Q", 0.05), ("U", -0.08)] {
+        let flux = found["quiescent"][name]["flux_jy"].as_f64().unwrap();
+        assert!((flux - jy).abs() < 0.05, "{name}: {flux}");
+    }
+}
