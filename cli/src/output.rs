@@ -1,5 +1,11 @@
 //! Files that appear whole or not at all.
 
+#[cfg(feature = "zarr")]
+mod folder;
+
+#[cfg(feature = "zarr")]
+pub use folder::write_folder;
+
 use crate::checksum::Sum;
 use anyhow::{Context, bail};
 use kerrlight_tomo::memory;
@@ -228,49 +234,6 @@ pub fn sweep(folder: &Path, prefix: &str) {
             false if busy() => Ok(()),
             false => std::fs::remove_file(&path),
         };
-    }
-}
-
-/// Makes a whole folder beside its place, into which `write` puts files, and moves it there; one that is there is replaced.
-#[cfg(feature = "zarr")]
-pub fn write_folder(
-    path: &Path,
-    write: impl FnOnce(&Path) -> anyhow::Result<()>,
-) -> anyhow::Result<()> {
-    let name = || format!("cannot write {}", path.display());
-    let parent = path.parent().filter(|parent| *parent != Path::new(""));
-    let mut builder = tempfile::Builder::new();
-    let beside = builder.prefix(&prefix_of(path)).tempdir_in(parent.unwrap_or(Path::new(".")));
-    let beside = beside.with_context(name)?;
-    let _unfinished = Unfinished::new(beside.path());
-    let (new, old) = (beside.path().join("new"), beside.path().join("old"));
-    std::fs::create_dir(&new).with_context(name)?;
-    write(&new).with_context(name)?;
-    sync(&new).with_context(name)?;
-    if path.exists() {
-        std::fs::rename(path, &old).with_context(name)?;
-    }
-    std::fs::rename(&new, path).with_context(name)?;
-    note_folder(path);
-    beside.close().with_context(name)
-}
-
-/// Puts the files of a folder, and of those in it, on the disk.
-#[cfg(feature = "zarr")]
-fn sync(folder: &Path) -> std::io::Result<()> {
-    for entry in std::fs::read_dir(folder)? {
-        let path = entry?.path();
-        if path.is_dir() { sync(&path)? } else { File::open(&path)?.sync_all()? }
-    }
-    Ok(())
-}
-
-/// Notes that the files of a folder were written.
-#[cfg(feature = "zarr")]
-fn note_folder(folder: &Path) {
-    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
-        let path = entry.path();
-        if path.is_dir() { note_folder(&path) } else { note(&path, |followed| &mut followed.1) }
     }
 }
 

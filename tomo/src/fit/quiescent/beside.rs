@@ -47,10 +47,16 @@ impl<T: Float> Representation<T> for Beside<T> {
     fn project(&self, parameters: &mut [T]) {
         let (own, image) = parameters.split_at_mut(self.inner.parameters());
         self.inner.project(own);
-        let most = T::of(self.most);
+        let (least, most) = (T::zero(), T::of(self.most));
         for x in image {
-            let held = if *x < most { *x } else { most };
-            *x = if held > T::zero() { held } else { T::zero() };
+            // In this order a NaN stays one.
+            *x = if *x < least {
+                least
+            } else if *x > most {
+                most
+            } else {
+                *x
+            };
         }
     }
 

@@ -117,6 +117,19 @@ fn exact_steps_stay_inside_the_box() {
 }
 
 /// Images of other sizes and numbers that mean nothing.
+/// Where a fit diverges its numbers show it.
+#[test]
+fn exact_the_box_hides_no_nan() {
+    let representation = beside();
+    let own = representation.parameters() - SIDE * SIDE;
+    let mut parameters = lit();
+    parameters[own..own + 4].copy_from_slice(&[-0.1, f64::NAN, 2.0, 0.7]);
+    representation.project(&mut parameters);
+    let [low, nan, high, inside] = [0, 1, 2, 3].map(|k| parameters[own + k]);
+    assert!(nan.is_nan());
+    assert_eq!([low, high, inside], [0.0, 1.5, 0.7]);
+}
+
 #[test]
 fn exact_images_that_do_not_fit_are_refused() {
     let refused =
