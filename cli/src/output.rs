@@ -1,10 +1,7 @@
 //! Files that appear whole or not at all.
 
 #[cfg(feature = "zarr")]
-mod folder;
-
-#[cfg(feature = "zarr")]
-pub use folder::write_folder;
+pub mod folder;
 
 use crate::checksum::Sum;
 use anyhow::{Context, bail};

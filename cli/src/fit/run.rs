@@ -150,25 +150,11 @@ pub fn run(
     let truth = measured.truth.as_ref();
     let true_volume = truth.map(|truth| results::true_volume(file, truth)).transpose()?;
     let mut run = Run { file, text, folder, measured, true_volume, trainer, begun };
-    eprintln!("{}", run.describe(instrument));
-    if let Some(note) = setup::caution(file) {
-        eprintln!("note: {note}");
-    }
-    for note in file.unknowns() {
-        eprintln!("note: {note}");
-    }
+    run.tell(instrument);
     let checkpoint = if resume { folder.checkpoint()? } else { None };
     match checkpoint {
-        Some(bytes) => {
-            state = restored(&bytes, &state, text).with_context(|| unusable(folder))?;
-            leakage::restore(measured, folder)?;
-            folder.cut_log(state.now.step)?;
-        }
-        None => {
-            folder.file(folder::LOG)?.write(b"")?;
-            run.start(&mut state, motion, times)?;
-            folder.save(&checkpoint::encode(&state, text)?)?;
-        }
+        Some(bytes) => run.resume(&mut state, &bytes)?,
+        None => run.start_over(&mut state, motion, times)?,
     }
     if let Some(listener) = listener {
         if measured.leakage.is_some() {
@@ -255,6 +241,34 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
+    /// What is fitted, and what to know of it beforehand.
+    fn tell(&self, instrument: &Instrument) {
+        eprintln!("{}", self.describe(instrument));
+        let caution = setup::caution(self.file).map(str::to_owned);
+        for note in caution.into_iter().chain(self.file.unknowns()) {
+            eprintln!("note: {note}");
+        }
+    }
+
+    /// Takes the state of a checkpoint and what was written beside it.
+    fn resume(&self, state: &mut State<f32>, bytes: &[u8]) -> anyhow::Result<()> {
+        *state = restored(bytes, state, self.text).with_context(|| unusable(self.folder))?;
+        leakage::restore(self.measured, self.folder)?;
+        self.folder.cut_log(state.now.step)
+    }
+
+    /// An empty log, the start that settings say, and the first checkpoint.
+    fn start_over(
+        &mut self,
+        state: &mut State<f32>,
+        motion: &Motion,
+        times: [f64; 2],
+    ) -> anyhow::Result<()> {
+        self.folder.file(folder::LOG)?.write(b"")?;
+        self.start(state, motion, times)?;
+        self.folder.save(&checkpoint::encode(state, self.text)?)
+    }
+
     fn describe(&self, instrument: &Instrument) -> String {
         let model = &self.trainer.objective.model;
         let names = self.trainer.objective.names().join(", ");

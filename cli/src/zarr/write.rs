@@ -1,6 +1,6 @@
 //! Writes volumes on the same nodes as a store.
 
-use crate::output;
+use crate::output::folder::write_folder;
 use anyhow::{Context, anyhow};
 use kerrlight_tomo::volume::Volume;
 use serde_json::{Map, Value, json};
@@ -40,7 +40,7 @@ pub fn write(
     fields: &[Field<'_>],
     attributes: Map<String, Value>,
 ) -> anyhow::Result<()> {
-    output::write_folder(path, |folder| {
+    write_folder(path, |folder| {
         let failed = |error: &dyn core::fmt::Display| anyhow!("{error}");
         let store = FilesystemStore::new(folder).map_err(|error| failed(&error))?;
         let into = Writing { store: Arc::new(store) };

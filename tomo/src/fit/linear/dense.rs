@@ -1,7 +1,8 @@
 //! Rows of data to which all rays add: a number for every node.
 
-use super::held::Held;
-use super::operator::{NONE, Operator};
+use super::active::NONE;
+use super::operator::Operator;
+use super::rows::Held;
 use super::rows::Rows;
 use super::walk::Buffers;
 use crate::representation::spline::STENCIL;

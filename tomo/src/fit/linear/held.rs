@@ -1,8 +1,9 @@
 //! How the frames of the matrix are passed through: by rows that are kept, by rows that are made each time, or node by
 //! node.
 
-use super::operator::{Active, NONE, Operator};
-use super::rows::Rows;
+use super::active::{Active, NONE};
+use super::operator::Operator;
+use super::rows::{Held, Rows};
 use super::walk::{Buffers, Walk};
 use crate::memory;
 use crate::simd::Float;
@@ -14,17 +15,6 @@ const ROWS: f64 = 1.0 / 4.0;
 const AT_A_TIME: usize = 8;
 /// Rows that grow take so many times their bytes.
 const GROWTH: usize = 2;
-
-/// How a frame is passed through: rows add up in another order than a walk, so that this decides the last bits, and
-/// whether rows are kept or made again does not.
-pub(super) enum Held<T> {
-    /// By rows that are kept.
-    Kept(Rows<T>),
-    /// By rows that are made each time, one after the other.
-    Made,
-    /// Node by node.
-    Walked,
-}
 
 impl<'a, T: Float + Default> Operator<'a, T> {
     /// Restricted to these nodes, with at most about `budget` bytes of rows (those of 8 frames more).

@@ -19,6 +19,27 @@ pub(super) struct Spots {
     pub on_each: usize,
 }
 
+/// A lit field and where the descent from it ended.
+pub(super) struct Lit {
+    /// The field that it began with, at the nodes that count.
+    pub start: Vec<f64>,
+    /// Where it ended.
+    pub x: Vec<f64>,
+    /// The value there.
+    pub value: f64,
+}
+
+/// How lit fields are tried.
+#[derive(Clone, Copy)]
+pub(super) struct Trials {
+    /// Number of candidate spots.
+    pub spots: Spots,
+    /// The best of them, from which descents begin, beside the wide fields.
+    pub best: usize,
+    /// Iterations of a descent.
+    pub iterations: usize,
+}
+
 /// Grid points in coordinates about an axis.
 pub(super) struct Around {
     basis: [[f64; 3]; 3],

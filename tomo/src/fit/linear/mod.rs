@@ -3,9 +3,10 @@
 //! Amplitudes and closure quantities are not convex: several lit fields are started from (`lit`, `start`), and what
 //! comes out is a stationary point without a certificate.
 //!
-//! `walk` (rays in the grid) → `operator` (sparse matrix over the nodes that count) → `objective` →
-//! `descent` → `certificate`.
+//! `walk` (rays in the grid) → `operator` (sparse matrix over the nodes that count, `active`) → `objective` → `descent` →
+//! `certificate`; `problem`, `settings` and `solution` are what goes in and comes out, `solve` and `run` the way between.
 
+mod active;
 mod certificate;
 mod change;
 mod convex;
@@ -19,11 +20,14 @@ mod lit;
 mod nodes;
 mod objective;
 mod operator;
+mod problem;
 mod profile;
 mod quasi_newton;
 mod rows;
 mod run;
 mod scaled;
+mod settings;
+mod solution;
 mod solve;
 mod start;
 #[cfg(test)]
@@ -37,8 +41,8 @@ pub use data::Weighted;
 pub use descent::{Ending, Method};
 pub use error::LinearError;
 pub use gaussian::{GaussianField, Matern, Roughness};
+pub use problem::LinearProblem;
 pub use profile::Profile;
-pub use solve::{
-    Coarse, Least, LinearProblem, LinearProgress, LinearSettings, LinearSolution, Watch,
-};
+pub use settings::{Coarse, LinearSettings};
+pub use solution::{Least, LinearProgress, LinearSolution, Watch};
 pub use walk::Voxels;

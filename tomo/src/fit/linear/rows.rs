@@ -1,6 +1,6 @@
 //! Rows of the sparse matrix from nodes to the pixels of a frame.
 
-use super::operator::{Active, NONE};
+use super::active::{Active, NONE};
 use super::walk::Place;
 use crate::representation::spline::{Degree, STENCIL};
 use crate::simd::Float;
@@ -90,4 +90,15 @@ impl<T: Float> Rows<T> {
     pub fn bytes(&self) -> usize {
         self.entries.len() * (size_of::<T>() + 4) + self.pixel.len() * 8
     }
+}
+
+/// How a frame is passed through: rows add up in another order than a walk, so that this decides the last bits, and
+/// whether rows are kept or made again does not.
+pub(super) enum Held<T> {
+    /// By rows that are kept.
+    Kept(Rows<T>),
+    /// By rows that are made each time, one after the other.
+    Made,
+    /// Node by node.
+    Walked,
 }

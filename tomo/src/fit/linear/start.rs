@@ -3,33 +3,12 @@
 use super::Ending;
 use super::convex::Convex;
 use super::error::LinearError;
-use super::lit::{Around, Spots};
+use super::lit::{Around, Lit, Trials};
 use super::objective::Objective;
 use super::run::Run;
 use super::scaled::dot;
 use crate::Error;
 use crate::simd::Float;
-
-/// A lit field and where the descent from it ended.
-pub(super) struct Lit {
-    /// The field that it began with, at the nodes that count.
-    pub start: Vec<f64>,
-    /// Where it ended.
-    pub x: Vec<f64>,
-    /// The value there.
-    pub value: f64,
-}
-
-/// How lit fields are tried.
-#[derive(Clone, Copy)]
-pub(super) struct Trials {
-    /// Number of candidate spots.
-    pub spots: Spots,
-    /// The best of them, from which descents begin, beside the wide fields.
-    pub best: usize,
-    /// Iterations of a descent.
-    pub iterations: usize,
-}
 
 /// Newton steps to the best scale: one is enough where χ² is quadratic in it, as that of amplitudes is.
 const SCALINGS: usize = 3;

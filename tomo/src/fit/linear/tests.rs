@@ -1,5 +1,6 @@
+use super::active::Active;
 use super::data::{Data, Weighted};
-use super::operator::{Active, Operator};
+use super::operator::Operator;
 use super::walk::Walk;
 use super::*;
 use crate::dynamics::{AngularVelocity, Axis, Velocity};

@@ -1,7 +1,7 @@
 //! What a fit looks through: sight lines, traced once.
 
-use super::light_curve::seen;
 use super::quiescent::quiescent;
+use super::seen::seen;
 use super::{AXIS, Result, known_axis, observer, spacing};
 use crate::fit::pixel_rays::PixelRays;
 use crate::fit::settings::{Absorption, AxisSearch, FitError, FitFile, Screen, Within, refuse};

@@ -1,104 +1,17 @@
 //! Light curves as the data of a fit: simulated, or measured.
 
-use super::polarized;
+use super::curve::Curve;
+use super::seen::seen;
 use super::{Instrument, Measured, Result, Truth, hours_per_m, motion};
 use crate::fit::settings::{
-    DataFiles, FitError, FitFile, Loss, LossKind, MeasuredCurve, Noise, PerStokes, SimulatedCurve,
-    Within, refuse,
+    DataFiles, FitError, FitFile, MeasuredCurve, Noise, PerStokes, SimulatedCurve, Within, refuse,
 };
-use crate::fit::{FluxDatum, Seen, StokesCurveTerm};
+use crate::fit::{FluxDatum, Seen};
 use crate::interferometry::light_curve::LightCurve;
 use crate::polarization::StokesParameter;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
-
-/// A light curve that a fit explains.
-#[derive(Clone, Debug)]
-pub struct Curve {
-    /// Which numbers each frame has.
-    pub parameters: Vec<StokesParameter>,
-    /// Hours of UTC of the frames.
-    pub hours: Vec<f64>,
-    /// Frame by frame, parameter by parameter: Jy and standard deviation.
-    pub data: Vec<Option<FluxDatum>>,
-    /// Frames that are fitted; the others judge the fit.
-    pub fitted: Vec<bool>,
-}
-
-impl Curve {
-    /// χ² of the frames that are fitted.
-    ///
-    /// # Errors
-    /// If a number is not finite, or a standard deviation not above 0.
-    pub fn fitted(&self) -> Result<StokesCurveTerm> {
-        self.term(true)
-    }
-
-    /// χ² of the other frames; none if there are none.
-    ///
-    /// # Errors
-    /// As [`Self::fitted`].
-    pub fn validation(&self) -> Result<Option<StokesCurveTerm>> {
-        match self.fitted.contains(&false) {
-            true => self.term(false).map(Some),
-            false => Ok(None),
-        }
-    }
-
-    fn term(&self, fitted: bool) -> Result<StokesCurveTerm> {
-        let count = self.parameters.len();
-        let of = |k: usize| self.data[k].filter(|_| self.fitted[k / count] == fitted);
-        StokesCurveTerm::new(count, (0..self.data.len()).map(of).collect())
-    }
-}
-
-/// What data see: fluxes, if they are a light curve of their own.
-///
-/// # Errors
-/// If other losses stand beside it, a Stokes parameter has no model, or settings are missing.
-pub(super) fn seen(file: &FitFile) -> Result<Seen> {
-    let is_curve =
-        file.light_curve.is_some() || matches!(file.data, Some(DataFiles::LightCurve(_)));
-    let named = file.loss.iter().position(|loss| loss.stokes.is_some());
-    if !is_curve {
-        return match named {
-            Some(k) => refuse!(
-                "loss.{k}.stokes needs a light curve of its own: a table [light_curve] (to simulate) or [data.light-curve] (to read)"
-            ),
-            None => Ok(polarized::seen(file)?.unwrap_or(Seen::Images)),
-        };
-    }
-    let [Loss { data: LossKind::LightCurve, stokes, .. }] = &file.loss[..] else {
-        refuse!("a light curve of an unresolved source has one loss, with data = \"light-curve\"");
-    };
-    let parameters = stokes.clone().unwrap_or_else(|| vec![StokesParameter::I]);
-    check(file, &parameters)?;
-    Ok(Seen::Fluxes(parameters))
-}
-
-fn check(file: &FitFile, parameters: &[StokesParameter]) -> Result<()> {
-    let mut sorted = parameters.to_vec();
-    sorted.sort();
-    sorted.dedup();
-    if sorted.len() < parameters.len() || parameters.is_empty() {
-        refuse!("loss.0.stokes: some of \"I\", \"Q\" and \"U\", each once");
-    }
-    if parameters.contains(&StokesParameter::V) {
-        refuse!("loss.0.stokes: V is not modelled; give some of \"I\", \"Q\" and \"U\"");
-    }
-    if file.polarization.is_none() && parameters != [StokesParameter::I] {
-        let why = "Q and U need the field of the gas: add a table [polarization]";
-        return Err(FitError::missing("polarization", why).into());
-    }
-    if file.loss[0].sigma.is_some() {
-        refuse!("loss.0.sigma is not allowed: the light curve has errors of its own");
-    }
-    if file.observation.is_some() || file.movie.is_some() {
-        refuse!("a light curve has times of its own: [observation] and [movie] are not allowed");
-    }
-    Ok(())
-}
 
 impl Measured {
     /// Takes a measured light curve as the data. `name` is what it is called in messages.
@@ -124,21 +37,6 @@ impl Measured {
         let times = times(file, &hours, settings.first_time)?;
         let curve = Curve { parameters, hours, data, fitted };
         Ok(Self { times, curve: Some(curve), ..Self::empty() })
-    }
-
-    pub(super) fn empty() -> Self {
-        Self {
-            times: Vec::new(),
-            movie: None,
-            visibilities: None,
-            curve: None,
-            sky: None,
-            truth: None,
-            gains: None,
-            true_gains: None,
-            leakage: None,
-            true_leakage: None,
-        }
     }
 }
 

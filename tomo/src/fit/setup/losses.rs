@@ -1,6 +1,6 @@
 //! The terms of the loss.
 
-use super::measured::FILE;
+use super::imported::FILE;
 use super::polarized::images;
 use super::{Instrument, Measured, Result};
 use crate::fit::settings::{FitError, Loss, LossKind, Within, refuse};

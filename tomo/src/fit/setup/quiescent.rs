@@ -1,6 +1,6 @@
 //! What does not move, as settings say.
 
-use super::light_curve::seen;
+use super::seen::seen;
 use super::{Result, spacing};
 use crate::fit::linear::Prior;
 use crate::fit::settings::{FitError, FitFile, Kind, Optimiser, QuiescentSettings, refuse};

@@ -1,6 +1,6 @@
 //! Rows that are made each time in place of being kept.
 
-use super::super::held::Held;
+use super::super::rows::Held;
 use super::*;
 use crate::fit::Seen;
 use crate::polarization::StokesParameter;

@@ -1,0 +1,117 @@
+//! A linear problem: what is minimised, and over what.
+
+use super::active::Active;
+use super::change::Change;
+use super::data::{Data, Weighted};
+use super::gaussian::GaussianField;
+use super::objective::Penalised;
+use super::settings::{Coarse, LinearSettings};
+use super::walk::{Voxels, Walk};
+use crate::Error;
+use crate::dynamics::Axis;
+use crate::fit::regulariser::Prior;
+use crate::fit::{ForwardModel, Quiescent};
+use crate::simd::Float;
+
+/// min Σ weight · χ²/data + priors over 0 ≤ e ≤ `upper` at the nodes of a grid.
+#[derive(Clone, Copy)]
+pub struct LinearProblem<'a, T: Float> {
+    /// Nodes of the rays, weighed for the axis ([`ForwardModel::weigh`]).
+    pub model: &'a ForwardModel<T>,
+    /// The axis that matter turns about.
+    pub axis: Axis,
+    /// The frames of the movie that count.
+    pub frames: &'a [usize],
+    /// The data.
+    pub terms: &'a [Weighted<'a, T>],
+    /// The grid.
+    pub voxels: Voxels,
+    /// The largest emission that is allowed; the certificate is about fields that are nowhere brighter.
+    pub upper: f64,
+    /// Mean flux of a frame (the sum of its pixels), for data none of which knows it; others do not look at it.
+    pub flux: Option<f64>,
+    /// Penalties; none is the usual.
+    pub priors: &'a [Prior],
+    /// A Gaussian prior of the numbers of the nodes, none is the usual. With it all data count as their errors say:
+    /// what is minimised is (Σ weight · χ² + |L (x − center)|²)/data, −2/data times the logarithm of a density if the
+    /// weights are 1.
+    pub gaussian: Option<&'a GaussianField>,
+    /// How emission may change while matter carries it; [`Change::NONE`] is the usual.
+    pub change: Change,
+}
+
+impl<T: Float + Default> LinearProblem<'_, T> {
+    /// Where a prior's density is highest: there a descent without a coarse problem begins.
+    pub(super) fn center(&self) -> Option<Vec<f64>> {
+        let inside = |x: &f64| x.clamp(0.0, self.upper);
+        self.gaussian.map(|gaussian| gaussian.center().iter().map(inside).collect())
+    }
+
+    pub(super) fn data(&self) -> Result<Data<'_, T>, Error> {
+        let data = Data::new(self.terms, self.frames, self.model.pixels(), self.model.frames())?;
+        Ok(if self.gaussian.is_some() { data.together(self.frames) } else { data })
+    }
+
+    pub(super) fn walk(&self) -> Walk<'_, T> {
+        Walk::new(self.model, self.axis, (self.voxels, self.change.knots))
+    }
+
+    /// All nodes at all knots.
+    pub(super) fn all(&self) -> Active {
+        self.active(&vec![true; self.unknowns()])
+    }
+
+    /// These nodes, knot after knot.
+    pub(super) fn active(&self, is_active: &[bool]) -> Active {
+        Active::new(is_active, &self.voxels.corners(), self.beside())
+    }
+
+    /// Values at all nodes and knots, and parameters of what does not move.
+    pub(super) fn unknowns(&self) -> usize {
+        self.voxels.count() * self.change.knots.count + self.beside()
+    }
+
+    /// Parameters of what does not move.
+    pub(super) fn beside(&self) -> usize {
+        self.model.quiescent.as_ref().map_or(0, Quiescent::columns)
+    }
+
+    pub(super) fn penalised(&self, data: &Data<'_, T>) -> Penalised<'_> {
+        let (priors, change, upper) = (self.priors, self.change, self.upper);
+        let gaussian = self.gaussian.map(|gaussian| (gaussian, 1.0 / data.count as f64));
+        let quiescent = self.model.quiescent.as_ref();
+        Penalised { priors, shape: self.voxels.shape(), gaussian, change, quiescent, upper }
+    }
+
+    pub(super) fn check(&self, settings: &LinearSettings) -> Result<(), Error> {
+        let LinearProblem { upper, flux, .. } = *self;
+        let check = |field, value: f64, ok, allowed| {
+            if ok { Ok(()) } else { Err(Error::out_of_range(field, value, allowed)) }
+        };
+        self.voxels.field()?;
+        self.change.checked()?;
+        if let Some(gaussian) = self.gaussian {
+            let (nodes, allowed) = (gaussian.count(), "those of the grid at one knot");
+            check("nodes of the prior", nodes as f64, nodes == self.unknowns(), allowed)?;
+        }
+        let positive = |x: f64| x.is_finite() && x > 0.0;
+        check("upper", upper, positive(upper), "above 0")?;
+        let of_image = self.model.quiescent.as_ref().map_or(upper, |image| image.most);
+        check("most of the quiescent image", of_image, of_image == upper, "upper")?;
+        check("flux", flux.unwrap_or(1.0), flux.is_none_or(positive), "above 0")?;
+        for Prior { regulariser, weight } in self.priors {
+            regulariser.checked()?;
+            check("prior weight", *weight, weight.is_finite() && *weight >= 0.0, "0 or above")?;
+        }
+        let LinearSettings { threshold, tolerance, admission, .. } = *settings;
+        check("threshold", threshold, (0.0..1.0).contains(&threshold), "0 to 1")?;
+        check("tolerance", tolerance, (0.0..1.0).contains(&tolerance), "0 to 1")?;
+        check("admission", admission, (0.0..1.0).contains(&admission), "0 to 1")?;
+        check("rounds", settings.rounds as f64, settings.rounds > 0, "1 or more")?;
+        if let Some(Coarse { nodes, stride, .. }) = settings.coarse {
+            check("coarse nodes", nodes as f64, nodes >= 2, "2 or more")?;
+            check("coarse stride", stride as f64, stride >= 1, "1 or more")?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,55 @@
+//! How a linear problem is solved.
+
+use super::descent::Method;
+
+/// Where a solution is first looked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coarse {
+    /// Nodes along each axis of the coarse grid.
+    pub nodes: usize,
+    /// Every how many-eth frame counts.
+    pub stride: usize,
+    /// Iterations there.
+    pub iterations: usize,
+}
+
+/// How a linear problem is solved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinearSettings {
+    /// By which steps; quasi-Newton ones in place of conjugate gradients where the problem is not quadratic.
+    pub method: Method,
+    /// The coarse problem whose solution says where to begin; all nodes of the grid count at once, without one.
+    pub coarse: Option<Coarse>,
+    /// Nodes count at first where the coarse solution exceeds this part of its maximum, or a node not farther than
+    /// `dilation` along each axis has it so.
+    pub threshold: f64,
+    /// In nodes of the grid.
+    pub dilation: usize,
+    /// Times that nodes may be admitted again.
+    pub rounds: usize,
+    /// Iterations in each round.
+    pub iterations: usize,
+    /// A round ends where the projected gradient has fallen to this part of what it began with.
+    pub tolerance: f64,
+    /// Nodes are admitted whose slope is below minus this part of the largest one where nothing shines, and
+    /// that violate the conditions for a minimum more than any that counts already.
+    pub admission: f64,
+    /// Bytes of the sparse matrix; frames beyond are computed anew in each iteration.
+    pub memory: usize,
+}
+
+impl Default for LinearSettings {
+    fn default() -> Self {
+        Self {
+            method: Method::QuasiNewton,
+            coarse: Some(Coarse { nodes: 32, stride: 8, iterations: 20 }),
+            threshold: 0.02,
+            dilation: 2,
+            rounds: 8,
+            iterations: 80,
+            tolerance: 1e-4,
+            admission: 1e-4,
+            memory: 768 << 20,
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! What a solution says while it is under way, and in the end.
+
+use super::active::Active;
+use super::certificate::{Certificate, Stationarity};
+use super::descent::Ending;
+use crate::simd::Float;
+use core::ops::ControlFlow;
+
+/// What is known while iterations go on.
+pub struct LinearProgress<'a> {
+    /// 0: the coarse problem.
+    pub round: usize,
+    /// Values, gradients and products so far.
+    pub evaluations: usize,
+    /// The loss, dimensionless (of the coarse problem, in round 0).
+    pub value: f64,
+    /// Nodes that count.
+    pub nodes: usize,
+    /// Entries of the sparse matrix.
+    pub entries: usize,
+    pub(super) active: &'a Active,
+    pub(super) x: &'a [f64],
+}
+
+impl LinearProgress<'_> {
+    /// Emission at all nodes of the grid (of the coarse one, in round 0), knot after knot.
+    pub fn emission(&self) -> Vec<f64> {
+        let mut all = self.active.expand(self.x);
+        all.truncate(all.len() - self.active.beside);
+        all
+    }
+}
+
+/// A solution.
+#[derive(Clone, Debug)]
+pub struct LinearSolution<T> {
+    /// Emission at the nodes, parameters of the linear grid; knot after knot where it may change.
+    pub emission: Vec<T>,
+    /// Parameters of what does not move ([`Quiescent`]), where that is recovered.
+    pub quiescent: Vec<T>,
+    /// How far from the minimum it can be; none if it was cancelled, or the data are not convex in the pixels.
+    pub certificate: Option<Certificate>,
+    /// How flat the function is there, if the data are not convex: all that can be said then.
+    pub stationarity: Option<Stationarity>,
+    /// Why the last round ended.
+    pub ending: Ending,
+    /// Rounds, the coarse problem not counted.
+    pub rounds: usize,
+    /// Nodes that counted in the last round.
+    pub nodes: usize,
+    /// Values, gradients and products with second derivatives, those over all nodes included.
+    pub evaluations: usize,
+    /// Largest bytes of a sparse matrix.
+    pub bytes: usize,
+}
+
+impl<T: Float> LinearSolution<T> {
+    /// All parameters: those of the linear grid, and behind them those of what does not move.
+    pub fn parameters(&self) -> Vec<T> {
+        [self.emission.as_slice(), &self.quiescent].concat()
+    }
+}
+
+/// What some iterations reached.
+#[derive(Clone, Debug)]
+pub struct Least {
+    /// Emission at all nodes of the grid, and parameters of what does not move behind it.
+    pub x: Vec<f64>,
+    /// What is minimised.
+    pub value: f64,
+}
+
+/// Told how it goes, says whether to go on.
+pub type Watch<'a> = dyn FnMut(&LinearProgress<'_>) -> ControlFlow<()> + 'a;

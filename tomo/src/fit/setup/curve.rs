@@ -1,0 +1,45 @@
+//! A light curve as the terms of a loss.
+
+use super::Result;
+use crate::fit::{FluxDatum, StokesCurveTerm};
+use crate::polarization::StokesParameter;
+
+/// A light curve that a fit explains.
+#[derive(Clone, Debug)]
+pub struct Curve {
+    /// Which numbers each frame has.
+    pub parameters: Vec<StokesParameter>,
+    /// Hours of UTC of the frames.
+    pub hours: Vec<f64>,
+    /// Frame by frame, parameter by parameter: Jy and standard deviation.
+    pub data: Vec<Option<FluxDatum>>,
+    /// Frames that are fitted; the others judge the fit.
+    pub fitted: Vec<bool>,
+}
+
+impl Curve {
+    /// χ² of the frames that are fitted.
+    ///
+    /// # Errors
+    /// If a number is not finite, or a standard deviation not above 0.
+    pub fn fitted(&self) -> Result<StokesCurveTerm> {
+        self.term(true)
+    }
+
+    /// χ² of the other frames; none if there are none.
+    ///
+    /// # Errors
+    /// As [`Self::fitted`].
+    pub fn validation(&self) -> Result<Option<StokesCurveTerm>> {
+        match self.fitted.contains(&false) {
+            true => self.term(false).map(Some),
+            false => Ok(None),
+        }
+    }
+
+    fn term(&self, fitted: bool) -> Result<StokesCurveTerm> {
+        let count = self.parameters.len();
+        let of = |k: usize| self.data[k].filter(|_| self.fitted[k / count] == fitted);
+        StokesCurveTerm::new(count, (0..self.data.len()).map(of).collect())
+    }
+}

@@ -1,0 +1,146 @@
+//! Data that were measured: what is taken from images and visibilities.
+
+use super::gains;
+use super::leakage;
+use super::observed::add_systematic;
+use super::polarized::is_polarized;
+use super::truth::SPOT;
+use super::visibilities::{VisibilitySettings, all_products, frames_of, prepared};
+use super::{Measured, Result, hours_per_m, sky};
+use crate::fit::settings::{
+    DataFiles, FitError, FitFile, Scattering, StaticImageFile, Within, refuse,
+};
+use crate::frames::Frames;
+use crate::interferometry::noise::{ScatteringKernel, unscatter};
+use crate::interferometry::observation::Observation;
+
+/// What to write where there are no data.
+pub(super) const FILE: &str = "a table [data.visibilities] or [data.movie] with `path = \"FILE\"` (`kerrlight fit --init FILE` writes \
+     all of it)";
+
+impl Measured {
+    /// Refuses settings that name both a truth and data, or neither.
+    ///
+    /// # Errors
+    /// Says what to write.
+    pub fn check_origin(file: &FitFile) -> Result<()> {
+        match (&file.data, &file.truth) {
+            (Some(_), Some(_)) => {
+                refuse!("truth and data exclude each other: give one of them")
+            }
+            (None, None) => refuse!(
+                "there is neither truth (to simulate) nor data (to read): {SPOT}; or {FILE}"
+            ),
+            (Some(_), None) if file.is_simulated_elsewhere() => {
+                refuse!(
+                    "world.hole, observer, region, effects and motion need simulated data: add a truth"
+                )
+            }
+            _ if file.instrument.is_some() && !file.has_visibilities() => refuse!(
+                "instrument needs visibilities: [data.visibilities], or an [observation] of the truth"
+            ),
+            _ => Ok(()),
+        }
+    }
+
+    /// Takes images of this width and height as the data. `name` is what the movie is called in messages.
+    ///
+    /// # Errors
+    /// If it has other frames or pixels than the settings.
+    pub fn of_movie(
+        file: &FitFile,
+        (movie, [width, height]): (Frames<f64>, [usize; 2]),
+        name: &str,
+    ) -> Result<Self> {
+        let (times, n) = (frames(file)?, file.screen.pixels);
+        if [width, height] != [n, n] || movie.count() != times.len() {
+            refuse!(
+                "{name} has {} frames of {width} x {height} pixels, but movie.frames and screen.pixels say {} of {n} x {n}",
+                movie.count(),
+                times.len()
+            );
+        }
+        let (movie, sky) = (Some(movie), sky(file).ok());
+        Ok(Measured { times, movie, sky, ..Measured::empty() })
+    }
+
+    /// Takes measured visibilities as the data. `name` is what they are called in messages.
+    ///
+    /// # Errors
+    /// If a visibility has no error, none is left, or mass or distance are missing.
+    pub fn of_visibilities(file: &FitFile, observation: Observation, name: &str) -> Result<Self> {
+        let Some(DataFiles::Visibilities { average_s, systematic, first_time, uv_min, .. }) =
+            file.data
+        else {
+            refuse!("{name} holds visibilities, and there is no [data.visibilities]")
+        };
+        let settings = VisibilitySettings { average_s, uv_min };
+        let mut observation = match is_polarized(&file.loss) {
+            true => all_products(observation, &settings).within(name)?,
+            false => prepared(observation, &settings).within(name)?,
+        };
+        let losses = (&mut observation, &file.loss[..]);
+        add_systematic("data.visibilities.systematic", systematic, losses)?;
+        let (hours, of_rows) = frames_of(&mut observation);
+        let per_m = hours_per_m(file)?;
+        let times = hours.iter().map(|h| first_time + (h - hours[0]) / per_m).collect();
+        let gains = gains::priors(file.instrument.as_ref(), &file.loss, &observation)?;
+        let leakage = leakage::unknown(file.instrument.as_ref(), &observation)?;
+        let (visibilities, sky) = (Some((observation, of_rows)), Some(sky(file)?));
+        Ok(Measured { times, visibilities, sky, gains, leakage, ..Measured::empty() })
+    }
+
+    /// Takes measured visibilities as the data of a static image, whose frames have hours of UTC for times. `name` is
+    /// what they are called in messages.
+    ///
+    /// # Errors
+    /// If a visibility has no error, none is left, or the kernel of scattering needs a frequency that is not known.
+    pub fn of_static(file: &StaticImageFile, observation: Observation, name: &str) -> Result<Self> {
+        if file.instrument.as_ref().is_some_and(|instrument| instrument.leakage.is_some()) {
+            refuse!("instrument.leakage is not for a static image of total intensity");
+        }
+        let data = &file.data.visibilities;
+        let settings = VisibilitySettings { average_s: data.average_s, uv_min: data.uv_min };
+        let mut observation = prepared(observation, &settings).within(name)?;
+        let losses = (&mut observation, &file.loss[..]);
+        add_systematic("data.visibilities.systematic", data.systematic, losses)?;
+        if data.scattering == Some(Scattering::SgrA) {
+            unscatter(&mut observation, &ScatteringKernel::SGR_A).within(name)?;
+        }
+        if let Some(variability) = &data.variability {
+            for row in &mut observation.rows {
+                let sigma = variability.sigma(row.uv[0].hypot(row.uv[1]));
+                row.noise_sigma[0] = row.noise_sigma[0].hypot(sigma);
+            }
+        }
+        let (times, of_rows) = frames_of(&mut observation);
+        if let Some(strength) = file.strength.as_ref().filter(|s| times.len() < 2 * s.folds) {
+            let allowed = format!("{} at most, half of the frames", times.len() / 2);
+            return Err(FitError::range("strength.folds", strength.folds, &allowed).into());
+        }
+        let gains = gains::priors(file.instrument.as_ref(), &file.loss, &observation)?;
+        let (visibilities, sky) = (Some((observation, of_rows)), Some(file.image.grid()?));
+        Ok(Measured { times, visibilities, sky, gains, ..Measured::empty() })
+    }
+}
+
+pub(super) fn frames(file: &FitFile) -> Result<Vec<f64>> {
+    let missing = || {
+        FitError::missing(
+            "movie",
+            "frames of images need times; add a table [movie] with `frames = …`, their number, and `from = …` and \
+             `to = …`, the times of the first and the last in M",
+        )
+    };
+    let movie = file.movie.as_ref().ok_or_else(missing)?;
+    let n = movie.frames;
+    if !(movie.from.is_finite() && movie.to.is_finite() && (n == 1 || movie.to > movie.from)) {
+        refuse!(
+            "movie: from = {}, to = {} are not allowed: from must be below to",
+            movie.from,
+            movie.to
+        );
+    }
+    let step = (movie.to - movie.from) / (n.max(2) - 1) as f64;
+    Ok((0..n).map(|k| movie.from + step * k as f64).collect())
+}
