@@ -27,19 +27,10 @@ from kerrlight._core import __version__
 if TYPE_CHECKING:
     from kerrlight.comparison import Comparison, compare
     from kerrlight.fit import Fit, FitError
+    from kerrlight.flow import Infall, Keplerian, PolarizationLaw, PowerLaw, Profile, Tabulated
     from kerrlight.fourier import Fourier
     from kerrlight.interferometry import Closures, Observation, Station
-    from kerrlight.model import (
-        ForwardModel,
-        Infall,
-        Keplerian,
-        PolarizationLaw,
-        PowerLaw,
-        Profile,
-        Tabulated,
-        VoxelModel,
-        screen,
-    )
+    from kerrlight.model import ForwardModel, VoxelModel, screen
     from kerrlight.observing import observe, stations
     from kerrlight.pictures import Movie, Picture, movie, render
     from kerrlight.posterior import Posterior
@@ -59,8 +50,8 @@ _MODULES = {
     "ForwardModel": "model",
     "Fourier": "fourier",
     "GaussLegendre": "rays",
-    "Infall": "model",
-    "Keplerian": "model",
+    "Infall": "flow",
+    "Keplerian": "flow",
     "Kerr": "rays",
     "MinoTime": "rays",
     "Movie": "pictures",
@@ -70,16 +61,16 @@ _MODULES = {
     "PathLength": "rays",
     "Picture": "pictures",
     "Points": "table",
-    "PolarizationLaw": "model",
+    "PolarizationLaw": "flow",
     "Posterior": "posterior",
-    "PowerLaw": "model",
-    "Profile": "model",
+    "PowerLaw": "flow",
+    "Profile": "flow",
     "Rays": "table",
     "Region": "representation",
     "Report": "report",
     "Representation": "representation",
     "Station": "interferometry",
-    "Tabulated": "model",
+    "Tabulated": "flow",
     "Volume": "volume",
     "VoxelModel": "model",
     "compare": "comparison",

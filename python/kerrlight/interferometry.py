@@ -18,7 +18,7 @@ __all__ = ["Closures", "Observation", "Station"]
 
 _ENDINGS = {".uvfits": "uvfits", ".fits": "uvfits", ".txt": "obs-text", ".csv": "csv"}
 _FORMATS = ("uvfits", "obs-text", "csv", "eht-csv", "eht-txt")
-_PRODUCTS = {False: ("", "q", "u", "v"), True: ("rr", "ll", "rl", "lr")}
+PRODUCTS = {False: ("", "q", "u", "v"), True: ("rr", "ll", "rl", "lr")}
 
 
 @dataclass(frozen=True)
@@ -297,81 +297,15 @@ class Observation:
     @staticmethod
     def from_ehtim(obs: Any) -> Observation:
         """From an ``ehtim.obsdata.Obsdata``; its noise may not be in amplitude-only columns of other bases."""
-        circular = {"stokes": False, "circ": True}.get(obs.polrep)
-        if circular is None:
-            raise ValueError(f'polrep = "{obs.polrep}" is not allowed: stokes or circ')
-        data = obs.data
-        names = _PRODUCTS[circular]
-        products = [np.asarray(data[f"{name}vis"], dtype=np.complex128) for name in names]
-        sigmas = [np.asarray(data[f"{name}sigma"], dtype=np.float64) for name in names]
-        # eht-imaging has NaN where there is no product.
-        missing = [~np.isfinite(product) for product in products]
-        for product, sigma, none in zip(products, sigmas, missing):
-            product[none] = 0.0
-            sigma[none] = np.nan
-        array = tuple(
-            Station(
-                str(row["site"]),
-                (float(row["x"]), float(row["y"]), float(row["z"])),
-                (float(row["sefdr"]), float(row["sefdl"])),
-                (float(row["fr_par"]), float(row["fr_elev"]), float(row["fr_off"])),
-                (complex(row["dr"]), complex(row["dl"])),
-            )
-            for row in obs.tarr
-        )
-        return Observation(
-            time=np.array(data["time"], dtype=np.float64),
-            stations=np.stack([data["t1"], data["t2"]], axis=-1).astype(str),
-            uv=np.stack([data["u"], data["v"]], axis=-1).astype(np.float64),
-            products=np.stack(products, axis=-1),
-            sigmas=np.stack(sigmas, axis=-1),
-            circular=circular,
-            integration=np.array(data["tint"], dtype=np.float64),
-            opacity=np.stack([data["tau1"], data["tau2"]], axis=-1).astype(np.float64),
-            array=array,
-            source=str(obs.source),
-            ra_hours=float(obs.ra),
-            dec_deg=float(obs.dec),
-            mjd=int(obs.mjd),
-            frequency_hz=float(obs.rf),
-            bandwidth_hz=float(obs.bw),
-            history=("from eht-imaging",),
-        )
+        from kerrlight import _ehtim
+
+        return _ehtim.read(obs)
 
     def to_ehtim(self) -> Any:
         """An ``ehtim.obsdata.Obsdata``; needs eht-imaging, one spectral channel, and stations with positions."""
-        import ehtim
+        from kerrlight import _ehtim
 
-        self._check_known()
-        names = _PRODUCTS[self.circular]
-        kind = "DTPOL_CIRC" if self.circular else "DTPOL_STOKES"
-        data = np.zeros(len(self), dtype=getattr(ehtim.const_def, kind))
-        data["time"], data["tint"] = self.time, self.integration
-        data["t1"], data["t2"] = self.stations.T
-        data["tau1"], data["tau2"] = np.asarray(self.opacity).T
-        data["u"], data["v"] = self.uv.T
-        for k, name in enumerate(names):
-            sigma = self.sigmas[:, k]
-            data[f"{name}vis"] = np.where(np.isnan(sigma), np.nan, self.products[:, k])
-            data[f"{name}sigma"] = sigma
-        tarr = np.zeros(len(self.array), dtype=ehtim.const_def.DTARR)
-        for row, station in zip(tarr, self.array):
-            row["site"] = station.name
-            row["x"], row["y"], row["z"] = station.position or (0.0, 0.0, 0.0)
-            row["sefdr"], row["sefdl"] = station.sefd
-            row["fr_par"], row["fr_elev"], row["fr_off"] = station.feed_rotation
-            row["dr"], row["dl"] = station.leakage
-        return ehtim.obsdata.Obsdata(
-            self.ra_hours,
-            self.dec_deg,
-            self.frequency_hz,
-            self.bandwidth_hz,
-            data,
-            tarr,
-            polrep="circ" if self.circular else "stokes",
-            source=self.source,
-            mjd=self.mjd,
-        )
+        return _ehtim.write(self)
 
     def _check_known(self) -> None:
         """Refuses data without what other packages want to know of them."""

@@ -23,7 +23,7 @@ from dataclasses import dataclass, field, fields, is_dataclass
 from os import PathLike
 from typing import Any, Literal, Mapping, Sequence, Union
 
-from kerrlight.model import Infall, Keplerian, PowerLaw, Profile, Tabulated, Velocity
+from kerrlight.flow import Infall, Keplerian, PowerLaw, Profile, Tabulated, Velocity
 
 __all__ = [
     "Camera",
