@@ -103,7 +103,7 @@ impl PreparedScene {
         } else {
             Vec::new()
         };
-        let sighted = !self.media.absorb() && self.spots.sight(&self.optics, times.len());
+        let sighted = self.spots.sight(&self.optics, times.len());
         let request = if sighted { &self.sighting } else { &self.request };
         let mut sum = Sum { scene: self, block, trees, sighted, sources, meter, seen, layers };
         let done = match (self.optics.view.observer(), self.optics.lensing) {
@@ -164,15 +164,14 @@ impl RayVisitor for Sum<'_> {
         if meets_mesh || media.need_path(ray) {
             return PathUse::Instead;
         }
-        if self.sighted || !spots.need_path(ray, &self.trees) {
-            return PathUse::None;
-        }
-        // The depth in front of a spot is that of the last ray whose nodes were taken.
-        if media.absorb() { PathUse::Instead } else { PathUse::Beside }
+        let may_meet = !self.sighted && spots.need_path(ray, &self.trees);
+        if may_meet { self.path_to_spots() } else { PathUse::None }
     }
 
-    fn needs_path_at(&self, ray: &TracedRay, nodes: &RayNodes<'_>) -> bool {
-        self.scene.spots.may_be_met(&self.scene.optics, ray, nodes, self.block.times)
+    fn needs_path_at(&self, ray: &TracedRay, nodes: &RayNodes<'_>) -> PathUse {
+        let PreparedScene { spots, optics, .. } = self.scene;
+        let may_meet = spots.may_be_met(optics, ray, nodes, self.block.times);
+        if may_meet { self.path_to_spots() } else { PathUse::None }
     }
 
     fn first_surface(&mut self, path: PathOfRay<'_>) -> Option<f64> {
@@ -240,6 +239,12 @@ impl RayVisitor for Sum<'_> {
 }
 
 impl<'a> Sum<'a> {
+    /// What the path of a ray that may meet a spot is needed for.
+    fn path_to_spots(&self) -> PathUse {
+        // The depth in front of a spot is that of the last ray whose nodes were taken.
+        if self.scene.media.absorb() { PathUse::Instead } else { PathUse::Beside }
+    }
+
     /// No light yet, along ray number `k`.
     #[inline(always)]
     fn accumulator(&self, k: usize, ray: &TracedRay, crossings: &[PlaneCrossing]) -> Accumulator {

@@ -156,3 +156,31 @@ fn exact_sighting_of_single_spots() {
     }
     assert!(lit > 2_000 && 3 * stepped < all, "{lit} lit, {stepped} of {all} stepped");
 }
+
+/// The same where gas dims the spot: rays that miss it keep the nodes of the closed form.
+#[test]
+fn exact_sighting_of_a_spot_in_gas_that_absorbs() {
+    let gas = "gas={profile=\"gaussian\",scale_radius=10.0,flatness=3.0,motion=\"keplerian\",\
+               emissivity=3e-18,absorptivity=1e5,outer_radius=60.0}";
+    let set =
+        ["effects.absorption=true", "tracer.integrator=\"elliptic\"", "tracer.tolerance=1e-10"];
+    let mut scene = scene(&[&[gas][..], &set].concat());
+    scene.spot = spots(1, None);
+    (scene.spot[0].sigma, scene.spot[0].peak_emissivity) = (0.2, 1e-6);
+    let prepared = PreparedScene::new(&scene, None).unwrap();
+    let times = [30.0];
+    let (found, expected) =
+        (observe(&prepared, &times), observe(&prepared.clone().one_by_one(), &times));
+    let largest = expected.iter().fold(0.0f64, |most, seen| most.max(seen.intensity));
+    let apart = found.iter().zip(&expected).map(|(a, b)| (a.intensity - b.intensity).abs());
+    let apart = apart.fold(0.0f64, f64::max);
+    // Panels along a path begin elsewhere than those of the closed form.
+    assert!(largest > 0.0 && apart < 1e-7 * largest, "{apart:e} of {largest:e}");
+    assert!(expected.iter().all(|seen| seen.optical_depth > 0.0));
+    let mut scratch = Scratch::default();
+    let (alpha, beta) = screen(24, 24.0);
+    let mut seen = vec![RayResult::default(); alpha.len()];
+    prepared.observe_block(&alpha, &beta, &times, &mut scratch, &mut seen).unwrap();
+    let stepped = scratch.rays.rays().iter().filter(|ray| ray.stepped).count();
+    assert!(stepped > 10 && 2 * stepped < alpha.len(), "{stepped} of {}", alpha.len());
+}

@@ -156,7 +156,7 @@ impl BlockTracer {
         Inspected { eta: ray.eta, until: self.until(ray, request.half_orbits), path }
     }
 
-    /// Finds the rays whose path is needed beside the closed form.
+    /// Finds the rays whose path is needed beside the closed form, or instead of it.
     pub(super) fn probe<V: RayVisitor>(
         &self,
         screen: ScreenRays<'_>,
@@ -171,7 +171,9 @@ impl BlockTracer {
         let until: Vec<f64> = open.iter().map(|k| rays[*k].last_time()).collect();
         nodes.trace_rays(set, screen.part(&alpha, &beta), Some(&until), probes)?;
         for (number, k) in open.into_iter().enumerate() {
-            rays[k].with_path = visitor.needs_path_at(&rays[k], &nodes.ray(number));
+            let path = visitor.needs_path_at(&rays[k], &nodes.ray(number));
+            rays[k].with_path = path == PathUse::Beside;
+            rays[k].stepped = path == PathUse::Instead;
         }
         Ok(())
     }

@@ -20,11 +20,11 @@ pub trait RayVisitor {
         PathUse::None
     }
 
-    /// Whether the path of a ray is needed beside the closed form, from coarse nodes along it: see
+    /// Whether the path of a ray is needed, and what for, from coarse nodes along it: see
     /// [`BlockRequest::probes`](crate::BlockRequest::probes).
-    fn needs_path_at(&self, ray: &TracedRay, nodes: &RayNodes<'_>) -> bool {
+    fn needs_path_at(&self, ray: &TracedRay, nodes: &RayNodes<'_>) -> PathUse {
         let _ = (ray, nodes);
-        false
+        PathUse::None
     }
 
     /// The Mino time at which a surface off the equatorial plane hides what is behind it.
