@@ -53,3 +53,5 @@ mod support;
 mod unknown_world;
 mod verdict;
 mod view;
+#[cfg(feature = "zarr")]
+mod zarr;

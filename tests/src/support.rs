@@ -25,6 +25,9 @@ pub fn binary() -> &'static Path {
                 "kerrlight-python/extension",
             ]);
         }
+        if cfg!(feature = "zarr") {
+            cargo.args(["--features", "kerrlight/zarr"]);
+        }
         if !cfg!(debug_assertions) {
             cargo.arg("--release");
         }

@@ -12,7 +12,8 @@ fn start(at: &Path, ranks: usize, output: &str) -> Option<Child> {
     start_with(at, ranks, &["compare", "seeds.toml", "-o", output, "--threads", "1"])
 }
 
-fn same(at: &Path, one: &str, other: &str) {
+/// Whether all cases of two folders have the same bytes.
+pub fn same(at: &Path, one: &str, other: &str) {
     for case in std::fs::read_dir(at.join(one).join("cases")).unwrap().flatten() {
         let other = at.join(other).join("cases").join(case.file_name());
         for name in ["fit.toml", "checkpoint.safetensors", "volume.npz", "movie.npz"] {

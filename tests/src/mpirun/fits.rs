@@ -41,6 +41,17 @@ fn exact_ranks_of_mpirun_draw_what_one_process_draws() {
     same("together");
 }
 
+/// The built-in fit, smaller, in parts and with many checkpoints.
+pub fn small() -> String {
+    let built_in = std::fs::read_to_string(root().join("cli/src/fit/built_in.toml")).unwrap();
+    built_in
+        .replace("steps = 600", "steps = 150\nparts = 8\ncheckpoint_seconds = 0.1")
+        .replace("pixels = 40", "pixels = 20")
+        .replace("scans = 64", "scans = 16")
+        .replace("rounds = 4", "rounds = 1")
+        .replace("nodes = 64", "nodes = 20")
+}
+
 /// Any number of ranks takes the steps of one process, also where jobs are killed and others go on.
 #[test]
 #[ignore = "long"]
@@ -50,14 +61,7 @@ fn exact_ranks_of_mpirun_take_parts_of_one_fit() {
     }
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let built_in = std::fs::read_to_string(root().join("cli/src/fit/built_in.toml")).unwrap();
-    let text = built_in
-        .replace("steps = 600", "steps = 150\nparts = 8\ncheckpoint_seconds = 0.1")
-        .replace("pixels = 40", "pixels = 20")
-        .replace("scans = 64", "scans = 16")
-        .replace("rounds = 4", "rounds = 1")
-        .replace("nodes = 64", "nodes = 20");
-    std::fs::write(at.join("fit.toml"), text).unwrap();
+    std::fs::write(at.join("fit.toml"), small()).unwrap();
     succeed(at, &words("alone"));
     let same = |other: &str| {
         for name in ["checkpoint.safetensors", "volume.npz", "movie.npz"] {

@@ -3,6 +3,7 @@
 mod accuracy;
 mod compare;
 mod fits;
+mod full_disk;
 mod pictures;
 
 use crate::support::{binary, succeed};
