@@ -7,7 +7,7 @@ use crate::interrupt::Keeper;
 use crate::lock::Lock;
 use crate::progress;
 use crate::ranks;
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::ValueEnum;
 use indicatif::ProgressBar;
 use std::collections::HashMap;
@@ -158,6 +158,8 @@ impl<'a> Sharing<'a> {
                 std::thread::sleep(Duration::from_secs(1));
                 Ok(Status::Failed(why))
             }
+            // Nothing more can be written by anybody: the case is not at fault.
+            Status::Failed(why) if is_full(&why) => bail!("{}: {why}", case.name()),
             Status::Done(results) => Ok(match publish(&work, &self.runner.run_of(case))? {
                 true => Status::Done(results),
                 // Another process has taken the run over, or published its own.
@@ -190,6 +192,14 @@ impl<'a> Sharing<'a> {
         }
         Ok(true)
     }
+}
+
+/// Codes of the system for a disk or a quota that is full, as messages have them.
+const FULL: [&str; 2] = ["(os error 28)", "(os error 122)"];
+
+/// Whether a case has failed for lack of room on the disk.
+fn is_full(why: &str) -> bool {
+    FULL.iter().any(|code| why.contains(code))
 }
 
 /// Moves a finished run to its place, which only one process can do; false if it is there, or not here.

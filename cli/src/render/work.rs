@@ -123,10 +123,7 @@ impl Work<'_> {
             Error::Render(RenderError::Stopped) => {
                 Interrupted(format!("stopped; {}", partial.kept())).into()
             }
-            Error::Exr(error) => {
-                let context = format!("cannot write {}; {}", partial.shown(), partial.kept());
-                anyhow::Error::new(error).context(context)
-            }
+            Error::Exr(error) => anyhow::anyhow!("{}; {}", cause(&error, &partial), partial.kept()),
             _ if self.device_failure().is_some() => {
                 self.told(&format!("{}, or with --device cpu to start over", partial.kept()))
             }
@@ -140,3 +137,12 @@ impl Work<'_> {
 }
 
 const STOPPED: &str = "stopped; nothing is kept";
+
+/// Why bands cannot be written: ranks name the file of theirs, errors of the system name none.
+fn cause(error: &dyn std::error::Error, partial: &Partial) -> String {
+    let io = error.source().and_then(|source| source.downcast_ref::<std::io::Error>());
+    match io {
+        Some(told) if told.get_ref().is_some() => told.to_string(),
+        _ => format!("cannot write {}: {error}", partial.shown()),
+    }
+}
