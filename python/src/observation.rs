@@ -88,15 +88,13 @@ impl Metadata {
 
 /// The station with these numbers.
 pub fn station((name, position, sefd, feed, leakage): Telescope) -> Station {
-    let [parallactic, elevation, offset_deg] = feed;
-    let feed_rotation = FeedRotation { parallactic, elevation, offset_deg };
+    let feed_rotation = FeedRotation::told(feed);
     Station { position, sefd, feed_rotation, leakage, ..Station::named(&name) }
 }
 
 /// Its numbers.
 pub fn telescope(station: &Station) -> Telescope {
-    let FeedRotation { parallactic, elevation, offset_deg } = station.feed_rotation;
-    let feed = [parallactic, elevation, offset_deg];
+    let feed = FeedRotation::numbers(station.feed_rotation);
     (station.name.clone(), station.position, station.sefd, feed, station.leakage)
 }
 

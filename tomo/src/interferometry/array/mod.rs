@@ -55,6 +55,20 @@ pub struct FeedRotation {
     pub offset_deg: f64,
 }
 
+impl FeedRotation {
+    /// Of its three numbers; `None` for three zeros, with which files and tables say that they do not know.
+    pub fn told([parallactic, elevation, offset_deg]: [f64; 3]) -> Option<Self> {
+        let rotation = Self { parallactic, elevation, offset_deg };
+        (rotation != Self::default()).then_some(rotation)
+    }
+
+    /// Its three numbers; zeros where it is not known.
+    pub fn numbers(rotation: Option<Self>) -> [f64; 3] {
+        let FeedRotation { parallactic, elevation, offset_deg } = rotation.unwrap_or_default();
+        [parallactic, elevation, offset_deg]
+    }
+}
+
 /// A telescope.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Station {
@@ -67,8 +81,8 @@ pub struct Station {
     /// Least and greatest elevation in degrees at which it observes, where it has limits of its
     /// own.
     pub elevation_deg: Option<[f64; 2]>,
-    /// As a file has it; all zeros where it has none ([`feed_rotation`](super::polarimetry::feed_rotation)).
-    pub feed_rotation: FeedRotation,
+    /// As a file has it ([`feed_rotation`](super::polarimetry::feed_rotation) knows more).
+    pub feed_rotation: Option<FeedRotation>,
     /// Leakage terms of the R and L feeds; carried along for files; simulations draw their own.
     pub leakage: [Complex64; 2],
 }
@@ -87,7 +101,7 @@ impl Station {
             position: None,
             sefd: [0.0; 2],
             elevation_deg: None,
-            feed_rotation: FeedRotation::default(),
+            feed_rotation: None,
             leakage: [Complex64::new(0.0, 0.0); 2],
         }
     }

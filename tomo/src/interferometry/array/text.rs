@@ -55,7 +55,7 @@ pub(in crate::interferometry) fn station(cells: &[&str]) -> Result<Station, Stri
         position: Some([x, y, z]),
         sefd,
         elevation_deg: None,
-        feed_rotation: FeedRotation { parallactic, elevation, offset_deg },
+        feed_rotation: FeedRotation::told([parallactic, elevation, offset_deg]),
         leakage: [Complex64::new(rr, ri), Complex64::new(lr, li)],
     })
 }
@@ -65,7 +65,7 @@ pub(in crate::interferometry) fn station(cells: &[&str]) -> Result<Station, Stri
 pub(in crate::interferometry) fn columns(station: &Station) -> String {
     let [x, y, z] = station.position.unwrap_or_default();
     let [r, l] = station.sefd;
-    let FeedRotation { parallactic, elevation, offset_deg } = station.feed_rotation;
+    let [parallactic, elevation, offset_deg] = FeedRotation::numbers(station.feed_rotation);
     let [dr, dl] = station.leakage;
     format!(
         "{:<8} {x:15} {y:15} {z:15} {r:8} {l:8} {parallactic:5} {elevation:5} {offset_deg:5} \
@@ -98,7 +98,7 @@ mod tests {
         let mut array = built_in("EHT2017").unwrap();
         array.stations[2].sefd = [5600.0, 5800.25];
         array.stations[2].leakage[1] = Complex64::new(0.01, -0.0625);
-        array.stations[3].feed_rotation.offset_deg = 45.0;
+        array.stations[3].feed_rotation = FeedRotation::told([0.0, 0.0, 45.0]);
         assert_eq!(parse(&to_text(&array)).unwrap(), array);
     }
 

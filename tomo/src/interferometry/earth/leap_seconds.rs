@@ -6,7 +6,10 @@ use super::EarthError;
 pub(super) const MJD_ZERO: f64 = 2_400_000.5;
 
 /// TAI − UTC in seconds on a day.
-pub(super) fn tai_minus_utc(mjd: i32) -> Result<f64, EarthError> {
+///
+/// # Errors
+/// Before 1972 and after 2105.
+pub fn tai_minus_utc(mjd: i32) -> Result<f64, EarthError> {
     let bad = || EarthError::Day(f64::from(mjd));
     if !(41317..=90000).contains(&mjd) {
         return Err(bad());

@@ -12,12 +12,14 @@ const FEEDS: &str = include_str!("feeds.csv");
 /// How the feeds of a station turn: what its file says; where that is nothing, as published for the stations of 2017, or
 /// with the parallactic angle.
 pub fn feed_rotation(station: &Station) -> FeedRotation {
-    if station.feed_rotation != FeedRotation::default() {
-        return station.feed_rotation;
-    }
     let with_sky = FeedRotation { parallactic: 1.0, ..FeedRotation::default() };
+    station.feed_rotation.or_else(|| published_rotation(&station.name)).unwrap_or(with_sky)
+}
+
+/// How the feeds of a station of 2017 turn, as published; `None` of other names.
+pub fn published_rotation(name: &str) -> Option<FeedRotation> {
     let lines = FEEDS.lines().filter(|line| !line.starts_with('#'));
-    lines.filter_map(|line| known(line, &station.name)).next().unwrap_or(with_sky)
+    lines.filter_map(|line| known(line, name)).next()
 }
 
 /// The rotation that a line of the table gives for a name.
@@ -87,8 +89,11 @@ mod tests {
         assert_eq!((of("AA"), of("lm")), (of("ALMA"), is(1.0, -1.0, 0.0)));
         assert_eq!(of("BAJA"), is(1.0, 0.0, 0.0));
         let mut own = Station::named("ALMA");
-        own.feed_rotation.elevation = 0.5;
-        assert_eq!(feed_rotation(&own), own.feed_rotation);
+        own.feed_rotation = FeedRotation::told([0.0, 0.5, 0.0]);
+        assert_eq!(feed_rotation(&own), is(0.0, 0.5, 0.0));
+        // A feed that does not turn is another thing than one of which nothing is known.
+        own.feed_rotation = Some(FeedRotation::default());
+        assert_eq!(feed_rotation(&own), is(0.0, 0.0, 0.0));
         for station in built_in("EHT2017").unwrap().stations {
             let listed = FEEDS.lines().any(|line| known(line, &station.name).is_some());
             assert!(listed, "{}", station.name);

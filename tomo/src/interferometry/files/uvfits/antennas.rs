@@ -2,7 +2,9 @@
 
 use super::super::fits::{Table, Unit};
 use super::super::{FileError, Names};
+use super::mounts::{self, Mount};
 use crate::interferometry::array::Station;
+use crate::interferometry::polarimetry::published_rotation;
 use std::collections::HashMap;
 
 /// Stations of all subarrays; those of the same name count once.
@@ -12,6 +14,8 @@ pub struct AntennaTables {
     numbers: HashMap<(i64, i64), u16>,
     /// Frequency in Hz that (u, v) refer to, if told.
     pub frequency_hz: Option<f64>,
+    /// Lines about mounts that are not known.
+    pub remarks: Vec<String>,
 }
 
 impl AntennaTables {
@@ -20,6 +24,7 @@ impl AntennaTables {
         let mut names = Names::new(Vec::new());
         let mut numbers = HashMap::new();
         let mut frequency_hz = None;
+        let mut remarks = Vec::new();
         for unit in units {
             if unit.header.text("EXTNAME").as_deref() != Some("AIPS AN") {
                 continue;
@@ -34,6 +39,7 @@ impl AntennaTables {
                 let number = number.ok_or_else(|| fail(row, "no antenna number (NOSTA)"))?;
                 let station = station(unit, &table, row)?
                     .ok_or_else(|| fail(row, "no name (ANNAME) or no finite position (STABXYZ)"))?;
+                remarks.extend(unknown_mount(&table, row, &station.name));
                 let k = names.number(&station.name).map_err(|message| fail(row, &message))?;
                 names.stations[usize::from(k)] = station;
                 if numbers.insert((subarray, number as i64), k).is_some() {
@@ -45,13 +51,23 @@ impl AntennaTables {
         if names.stations.is_empty() {
             return Err(FileError::whole("no station: the AIPS AN table is missing or empty"));
         }
-        Ok(AntennaTables { stations: names.stations, numbers, frequency_hz })
+        Ok(AntennaTables { stations: names.stations, numbers, frequency_hz, remarks })
     }
 
     /// The station of an antenna.
     pub fn station(&self, subarray: i64, number: i64) -> Option<u16> {
         self.numbers.get(&(subarray, number)).copied()
     }
+}
+
+/// A remark about a mount whose feeds turn in a way that its code does not tell.
+fn unknown_mount(table: &Table<'_>, row: usize, name: &str) -> Option<String> {
+    let code = table.number(row, "MNTSTA", 0).unwrap_or(0.0) as i32;
+    let told = published_rotation(name).map_or("with the parallactic angle", |_| "as published");
+    let remark = || {
+        format!("station {name}: MNTSTA {code} is not known; its feeds are taken to turn {told}")
+    };
+    (!mounts::is_known(code)).then(remark)
 }
 
 /// The station of a row. Positions are relative to the array's centre (0 for VLBI), y to the east
@@ -74,5 +90,8 @@ fn station(unit: &Unit<'_>, table: &Table<'_>, row: usize) -> Result<Option<Stat
     let right = sefd("SEFD").unwrap_or(0.0);
     let mut station = Station::new(&name, position, right);
     station.sefd[1] = sefd("SEFDL").unwrap_or(right);
+    let code = table.number(row, "MNTSTA", 0).unwrap_or(0.0) as i32;
+    let offset_deg = table.number(row, "POLAA", 0).filter(|angle| angle.is_finite()).unwrap_or(0.0);
+    station.feed_rotation = mounts::rotation(&name, Mount { code, offset_deg });
     Ok(Some(station))
 }

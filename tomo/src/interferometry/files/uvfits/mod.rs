@@ -1,12 +1,15 @@
 //! UVFITS: visibilities as random groups of a FITS file, stations in an `AIPS AN` table (AIPS
 //! memo 117, Greisen 2003/2020).
 
+mod antenna_table;
 mod antennas;
 mod frequencies;
 mod layout;
+mod mounts;
 mod read;
 #[cfg(test)]
 pub(super) mod tests;
+mod third_coordinate;
 mod write;
 
 pub use read::read;

@@ -69,6 +69,7 @@ pub fn read(bytes: &[u8]) -> Result<Observation, Error> {
     if left_out > 0 {
         observation.history.push(format!("{left_out} groups without valid data left out"));
     }
+    observation.history.extend(tables.remarks);
     observation.stations = tables.stations;
     Ok(observation)
 }

@@ -1,11 +1,10 @@
 //! Writing: an IF a channel, four products, as eht-imaging, AIPS and CASA read it.
 
 use super::super::FileError;
-use super::super::fits::{Cards, ColumnData, binary_table, padded};
-use super::frequencies;
+use super::super::fits::{Cards, padded};
+use super::{antenna_table, frequencies, third_coordinate};
 use crate::Error;
-use crate::interferometry::array::Station;
-use crate::interferometry::earth::{SourcePosition, ut1_minus_utc};
+use crate::interferometry::earth::SourcePosition;
 use crate::interferometry::observation::{Basis, Channel, Observation, Row, Unknown};
 use std::borrow::Cow;
 
@@ -75,9 +74,15 @@ pub fn write(observation: &Observation) -> Result<Vec<u8>, Error> {
         facts.uv_scale = facts.frequency_hz.recip();
     }
     let groups = groups(&observation.rows);
+    let w = third_coordinate::w_seconds(&observation, groups.iter().map(|rows| &rows[0]));
     let mut bytes = primary_header(&observation, groups.len(), &facts);
-    bytes.extend(group_bytes(&groups, &facts));
-    bytes.extend(antenna_table(&observation.stations, &facts));
+    bytes.extend(group_bytes(&groups, &w, &facts));
+    bytes.extend(antenna_table::table(
+        &observation.stations,
+        facts.mjd,
+        &facts.channels,
+        frequency_hz,
+    )?);
     bytes.extend(frequencies::table(&facts.channels, facts.frequency_hz));
     Ok(bytes)
 }
@@ -99,8 +104,12 @@ fn primary_header(observation: &Observation, groups: usize, facts: &Facts) -> Ve
     cards.value("GCOUNT", groups);
     let (ra, dec) = (facts.position.ra_hours * 15.0, facts.position.dec_deg);
     cards.number("OBSRA", ra).number("OBSDEC", dec).text("OBJECT", &observation.source);
-    cards.number("MJD", facts.mjd.into()).text("DATE-OBS", &calendar_date(facts.mjd));
-    cards.number("BSCALE", 1.0).number("BZERO", 0.0).text("BUNIT", "JY").text("EQUINOX", "J2000");
+    cards
+        .number("MJD", facts.mjd.into())
+        .text("DATE-OBS", &antenna_table::calendar_date(facts.mjd));
+    cards.number("BSCALE", 1.0).number("BZERO", 0.0).text("BUNIT", "JY");
+    // AIPS and Difmap ask for numbers; pyuvdata refuses the RADESYS of the FITS standard.
+    cards.number("EQUINOX", 2000.0).number("EPOCH", 2000.0);
     cards.text("TELESCOP", "VLBA").text("INSTRUME", "VLBA").text("OBSERVER", "EHT");
     let (first, step) = match observation.basis {
         Basis::Circular => (-1.0, -1.0),
@@ -131,13 +140,6 @@ fn primary_header(observation: &Observation, groups: usize, facts: &Facts) -> Ve
     cards.finish()
 }
 
-fn calendar_date(mjd: i32) -> String {
-    match sofars::cal::jd2cal(2_400_000.5, mjd.into()) {
-        Ok((year, month, day, _)) => format!("{year:04}-{month:02}-{day:02}"),
-        Err(_) => String::new(),
-    }
-}
-
 /// Rows that belong to one group: of the same time and baseline, each of a channel of its own.
 fn groups(rows: &[Row]) -> Vec<&[Row]> {
     let same = |a: &Row, b: &Row| {
@@ -146,17 +148,18 @@ fn groups(rows: &[Row]) -> Vec<&[Row]> {
     rows.chunk_by(same).collect()
 }
 
-fn group_bytes(groups: &[&[Row]], facts: &Facts) -> Vec<u8> {
+fn group_bytes(groups: &[&[Row]], w_seconds: &[f64], facts: &Facts) -> Vec<u8> {
     let numbers = PARAMETERS.len() + 12 * facts.channels.len();
     let mut bytes = Vec::with_capacity(4 * numbers * groups.len());
-    for rows in groups {
+    for (rows, w_seconds) in groups.iter().zip(w_seconds) {
         let row = &rows[0];
         let antennas = row.stations.map(|k| f64::from(k) + 1.0);
         let frequency_hz = facts.channels[usize::from(row.channel)].frequency_hz;
         let [u, v] = row.uv.map(|x| x / frequency_hz / facts.uv_scale);
         let baseline = 256.0 * antennas[0] + antennas[1];
         let day = 2_400_000.5 + f64::from(facts.mjd);
-        let parameters = [u, v, 0.0, baseline, day, row.time_h / 24.0, row.integration_s];
+        let w = w_seconds / facts.uv_scale;
+        let parameters = [u, v, w, baseline, day, row.time_h / 24.0, row.integration_s];
         let opacity = row.opacity.map(f64::from);
         let mut data = vec![[0.0; 3]; 4 * facts.channels.len()];
         for row in *rows {
@@ -173,46 +176,4 @@ fn group_bytes(groups: &[&[Row]], facts: &Facts) -> Vec<u8> {
 /// Real part, imaginary part, weight 1/σ²; all 0 where there is none.
 fn datum(row: &Row, k: usize) -> [f64; 3] {
     row.product(k).map_or([0.0; 3], |m| [m.visibility.re, m.visibility.im, m.noise_sigma.powi(-2)])
-}
-
-fn antenna_table(stations: &[Station], facts: &Facts) -> Vec<u8> {
-    let count = stations.len();
-    let same = |letter: &str| vec![letter.to_owned(); count];
-    let singles = |value: f32| ColumnData::Singles(1, vec![value; count]);
-    let width = stations.iter().map(|s| s.name.len()).max().unwrap_or(0).max(8);
-    let positions = stations.iter().flat_map(|s| s.position.unwrap_or_default()).collect();
-    let sefd = |feed: usize| stations.iter().map(|s| s.sefd[feed]).collect();
-    let columns = [
-        ("ANNAME", "", ColumnData::Text(width, stations.iter().map(|s| s.name.clone()).collect())),
-        ("STABXYZ", "METERS", ColumnData::Doubles(3, positions)),
-        ("ORBPARM", "", ColumnData::Doubles(0, Vec::new())),
-        ("NOSTA", "", ColumnData::Integers(1, (1..).take(count).collect())),
-        ("MNTSTA", "", ColumnData::Integers(1, vec![0; count])),
-        ("STAXOF", "METERS", singles(0.0)),
-        ("POLTYA", "", ColumnData::Text(1, same("R"))),
-        ("POLAA", "DEGREES", singles(0.0)),
-        ("POLCALA", "", ColumnData::Singles(3, vec![0.0; 3 * count])),
-        ("POLTYB", "", ColumnData::Text(1, same("L"))),
-        ("POLAB", "DEGREES", singles(90.0)),
-        ("POLCALB", "", ColumnData::Singles(3, vec![0.0; 3 * count])),
-        ("SEFD", "", ColumnData::Doubles(1, sefd(0))),
-        ("SEFDL", "", ColumnData::Doubles(1, sefd(1))),
-    ];
-    binary_table("AIPS AN", count, &columns, |cards| antenna_header(cards, facts))
-}
-
-fn antenna_header(cards: &mut Cards, facts: &Facts) {
-    let mjd = f64::from(facts.mjd);
-    let ut1_utc = ut1_minus_utc(mjd).unwrap_or(0.0);
-    // Terrestrial time would change the sidereal time by less than the format keeps.
-    let day = 2_400_000.5;
-    let sidereal = sofars::erst::gst06a(day, mjd + ut1_utc / 86400.0, day, mjd + 69.0 / 86400.0);
-    cards.number("ARRAYX", 0.0).number("ARRAYY", 0.0).number("ARRAYZ", 0.0);
-    cards.text("RDATE", &calendar_date(facts.mjd)).number("GSTIA0", sidereal.to_degrees());
-    cards.number("DEGPDY", 360.985_644_97).number("UT1UTC", ut1_utc).number("DATUTC", 0.0);
-    cards.text("TIMESYS", "UTC").number("FREQ", facts.frequency_hz);
-    cards.number("POLARX", 0.0).number("POLARY", 0.0).text("ARRNAM", "VLBA");
-    cards.text("XYZHAND", "RIGHT").text("FRAME", "????").value("NUMORB", 0);
-    cards.value("NO_IF", facts.channels.len());
-    cards.value("NOPCAL", 0).text("POLTYPE", "VLBI").value("FREQID", 1);
 }
