@@ -1,14 +1,15 @@
 //! `kerrlight convert`: visibilities from one format to another.
 
 use crate::answer::{self, Answer};
-use crate::interferometry::arguments;
+use crate::columns;
 use crate::interferometry::{self, ObservationFile, Written};
+use crate::interferometry::{arguments, traces};
 use crate::output::{self, Output};
 use anyhow::{Context, bail};
 use clap::Args;
 use kerrlight_tomo::interferometry::files;
 use kerrlight_tomo::interferometry::light_curve::LightCurve;
-use kerrlight_tomo::interferometry::observation::{Flags, Observation};
+use kerrlight_tomo::interferometry::observation::{Basis, Flags, Observation};
 use kerrlight_tomo::interferometry::source::Source;
 use std::path::PathBuf;
 
@@ -23,6 +24,10 @@ pub struct Convert {
     /// Write the light curve that baselines within a site (ALMA-APEX, JCMT-SMA) have measured: I, Q, U, V as CSV
     #[arg(long, conflicts_with_all = ["format", "comments", "stokes_i"])]
     light_curve: bool,
+    /// Write closure traces as CSV, of baselines whose Stokes I is stronger than this many times its noise
+    #[arg(long, value_name = "LEAST-SNR", allow_negative_numbers = true)]
+    #[arg(conflicts_with_all = ["format", "comments", "stokes_i", "light_curve"])]
+    closure_traces: Option<f64>,
     /// Format to write [default: by the name's ending]
     #[arg(long, value_name = "FORMAT")]
     format: Option<Written>,
@@ -80,6 +85,9 @@ impl Convert {
         if let Some(seconds) = self.average.filter(|s| !(*s > 0.0 && s.is_finite())) {
             bail!("--average {seconds} is not allowed: positive seconds");
         }
+        if let Some(snr) = self.closure_traces.filter(|snr| !(0.0..=1e9).contains(snr)) {
+            bail!("--closure-traces {snr} is not allowed: a signal-to-noise ratio in [0, 1e9]");
+        }
         let (_, mut observation) = interferometry::read(&self.input)?;
         self.complete(&mut observation)?;
         let flags = Flags {
@@ -102,13 +110,20 @@ impl Convert {
             observation = observation.averaged_over_channels();
         }
         if let Some(seconds) = self.average {
-            observation = observation.averaged(seconds);
+            observation = match self.closure_traces {
+                // Traces need one time for all baselines of a scan.
+                Some(_) => observation.averaged_in_scans(seconds),
+                None => observation.averaged(seconds),
+            };
         }
         if observation.rows.is_empty() {
             bail!("{}: no visibilities are left", self.input.display());
         }
         if self.light_curve {
             return self.write_light_curve(&observation);
+        }
+        if let Some(least_snr) = self.closure_traces {
+            return self.write_traces(&observation, least_snr);
         }
         output.write(&observation)?;
         let (rows, flagged) = (observation.rows.len(), selection.dropped);
@@ -131,6 +146,26 @@ impl Convert {
         Ok(())
     }
 
+    fn write_traces(&self, observation: &Observation, least_snr: f64) -> anyhow::Result<Answer> {
+        let input = self.input.display();
+        if observation.basis != Basis::Circular {
+            bail!(
+                "{input}: closure traces need RR, LL, RL and LR, and this file has Stokes parameters"
+            );
+        }
+        let (table, count) = traces::table(observation, least_snr);
+        if count == 0 {
+            bail!(
+                "{input}: at no time have four stations RR, LL, RL and LR with errors and Stokes I above {least_snr} times its noise"
+            );
+        }
+        let output = Output::or_pipe(&self.output, &["csv"])?;
+        output.spares(&self.input)?;
+        output.write(&columns::csv(&[table], count)?)?;
+        eprintln!("{count} independent numbers of closure traces");
+        Ok(written(&output).with("traces", count))
+    }
+
     fn write_light_curve(&self, observation: &Observation) -> anyhow::Result<Answer> {
         let curve = LightCurve::of_sites(observation);
         if curve.samples.is_empty() {
@@ -141,9 +176,7 @@ impl Convert {
         output.write(files::light_curve_to_csv(&curve).as_bytes())?;
         let count = curve.samples.len();
         eprintln!("{count} samples");
-        let written = answer::written([&output]);
-        let text: String = written.iter().map(|file| format!("{}\n", file.display())).collect();
-        Ok(Answer::text(text).files(written).with("samples", count))
+        Ok(written(&output).with("samples", count))
     }
 
     /// Whether standard output carries the visibilities.
@@ -201,4 +234,11 @@ impl Convert {
         }
         Ok(())
     }
+}
+
+/// The answer of a table that was written.
+fn written(output: &Output) -> Answer {
+    let files = answer::written([output]);
+    let text: String = files.iter().map(|file| format!("{}\n", file.display())).collect();
+    Answer::text(text).files(files)
 }

@@ -253,7 +253,7 @@ pub const KEYS: &[Key] = &[
         "loss",
         "data",
         "",
-        "image, visibilities, amplitudes, closure-phases, log-closure-amplitudes, polarized-visibilities, polarimetric-ratios or light-curve",
+        "image, visibilities, amplitudes, closure-phases, log-closure-amplitudes, polarized-visibilities, polarimetric-ratios, closure-traces or light-curve",
     ),
     key("loss", "weight", "", "weight of this term; above 0"),
     key(
@@ -266,7 +266,7 @@ pub const KEYS: &[Key] = &[
         "loss",
         "least_snr",
         "",
-        "minimum signal-to-noise ratio of a baseline used in closures and ratios",
+        "minimum signal-to-noise ratio of a baseline used in closures, ratios and traces",
     ),
     key(
         "representation",

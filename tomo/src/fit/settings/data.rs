@@ -69,13 +69,15 @@ pub enum LossKind {
     PolarizedVisibilities,
     /// (Q ± iU)/I of baselines.
     PolarimetricRatios,
+    /// Closure traces, which neither gains nor leakage change.
+    ClosureTraces,
     /// Total flux.
     LightCurve,
 }
 
 impl LossKind {
     /// All kinds.
-    pub const ALL: [LossKind; 8] = [
+    pub const ALL: [LossKind; 9] = [
         LossKind::Image,
         LossKind::Visibilities,
         LossKind::Amplitudes,
@@ -83,6 +85,7 @@ impl LossKind {
         LossKind::LogClosureAmplitudes,
         LossKind::PolarizedVisibilities,
         LossKind::PolarimetricRatios,
+        LossKind::ClosureTraces,
         LossKind::LightCurve,
     ];
 
@@ -96,6 +99,7 @@ impl LossKind {
             LossKind::LogClosureAmplitudes => "log-closure-amplitudes",
             LossKind::PolarizedVisibilities => "polarized-visibilities",
             LossKind::PolarimetricRatios => "polarimetric-ratios",
+            LossKind::ClosureTraces => "closure-traces",
             LossKind::LightCurve => "light-curve",
         }
     }
@@ -110,6 +114,7 @@ impl LossKind {
             LossKind::LogClosureAmplitudes => "log closure amplitudes",
             LossKind::PolarizedVisibilities => "polarized visibilities",
             LossKind::PolarimetricRatios => "polarimetric ratios",
+            LossKind::ClosureTraces => "closure traces",
             LossKind::LightCurve => "the light curve",
         }
     }
@@ -121,7 +126,23 @@ impl LossKind {
 
     /// Whether they compare Q and U of baselines too.
     pub fn is_polarized(self) -> bool {
-        matches!(self, LossKind::PolarizedVisibilities | LossKind::PolarimetricRatios)
+        let all = [
+            LossKind::PolarizedVisibilities,
+            LossKind::PolarimetricRatios,
+            LossKind::ClosureTraces,
+        ];
+        all.contains(&self)
+    }
+
+    /// Whether they know the flux of the source.
+    pub fn knows_flux(self) -> bool {
+        let all = [
+            LossKind::ClosurePhases,
+            LossKind::LogClosureAmplitudes,
+            LossKind::PolarimetricRatios,
+            LossKind::ClosureTraces,
+        ];
+        !all.contains(&self)
     }
 
     /// Whether they are complex visibilities, of total intensity or of all products.

@@ -54,8 +54,7 @@ impl FitFile {
 
 /// Whether any of the data knows the flux.
 fn knows_flux(file: &FitFile) -> bool {
-    let closure = |kind| matches!(kind, LossKind::ClosurePhases | LossKind::LogClosureAmplitudes);
-    file.loss.is_empty() || file.loss.iter().any(|loss| !closure(loss.data))
+    file.loss.is_empty() || file.loss.iter().any(|loss| loss.data.knows_flux())
 }
 
 fn knows_phase(file: &FitFile) -> bool {

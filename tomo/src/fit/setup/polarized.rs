@@ -26,15 +26,20 @@ pub(super) fn images(losses: &[Loss]) -> usize {
 pub(super) fn check(file: &FitFile) -> Result<()> {
     if is_polarized(&file.loss) && file.unknown_world()?.is_some() {
         refuse!(
-            "parameters of [world] are not searched with polarized-visibilities or polarimetric-ratios"
+            "parameters of [world] are not searched with polarized-visibilities, polarimetric-ratios or closure-traces"
         );
     }
     let solves = file.instrument.as_ref().is_some_and(|instrument| instrument.leakage.is_some());
     let draws = file.observation.as_ref().is_some_and(|seen| seen.leakage.is_some());
     let has = |kind| file.loss.iter().any(|loss| loss.data == kind);
-    if (solves || draws) && !has(LossKind::PolarizedVisibilities) {
-        let key = if solves { "instrument.leakage" } else { "observation.leakage" };
-        refuse!("{key} needs a loss with data = \"polarized-visibilities\"");
+    let products = has(LossKind::PolarizedVisibilities);
+    if solves && !products {
+        refuse!("instrument.leakage needs a loss with data = \"polarized-visibilities\"");
+    }
+    if draws && !products && !has(LossKind::ClosureTraces) {
+        refuse!(
+            "observation.leakage needs a loss with data = \"polarized-visibilities\" or \"closure-traces\""
+        );
     }
     if solves && has(LossKind::PolarimetricRatios) {
         refuse!(

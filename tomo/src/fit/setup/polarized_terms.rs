@@ -3,7 +3,9 @@
 use super::{Measured, Result};
 use crate::fit::Scan;
 use crate::fit::settings::{Loss, LossKind};
-use crate::interferometry::data_terms::{DataTerm, PolarizedTerm, RatioTerm};
+use crate::interferometry::data_terms::{
+    DataTerm, DataTermError, PolarizedTerm, RatioTerm, TraceTerm,
+};
 use crate::interferometry::operator::{Float, Method, Operator, Pulse, Transform};
 use crate::interferometry::polarimetry::MODELLED;
 use num_complex::Complex;
@@ -38,14 +40,28 @@ impl Measured {
         frame: usize,
         loss: &Loss,
     ) -> Result<Option<Scan<T>>> {
-        if loss.data == LossKind::PolarimetricRatios {
-            return self.ratios(frame, loss.least_snr.unwrap_or(0.0));
+        let least_snr = loss.least_snr.unwrap_or(0.0);
+        match loss.data {
+            LossKind::PolarimetricRatios => return self.ratios(frame, least_snr),
+            LossKind::ClosureTraces => return self.traces(frame, least_snr),
+            _ => {}
         }
         let scan = |(transform, term)| {
             let term: Box<dyn DataTerm<T> + Send> = Box::new(term);
             Scan { transform, term }
         };
         Ok(self.products(frame)?.map(scan))
+    }
+
+    fn traces<T: Float>(&self, frame: usize, least_snr: f64) -> Result<Option<Scan<T>>> {
+        let (part, sky) = self.part(frame)?;
+        let term = match TraceTerm::new(&part, least_snr) {
+            Err(crate::Error::DataTerm(DataTermError::Empty)) => return Ok(None),
+            term => Box::new(term?),
+        };
+        let images = vec![TraceTerm::uv(&part, least_snr); MODELLED];
+        let transform = Transform::new(sky, Pulse::Triangle, &images, Method::Direct, MEMORY)?;
+        Ok(Some(Scan { transform, term }))
     }
 
     fn ratios<T: Float>(&self, frame: usize, least_snr: f64) -> Result<Option<Scan<T>>> {

@@ -5,12 +5,14 @@ mod closures;
 mod gains;
 mod polarized;
 mod ratios;
+mod traces;
 mod visibilities;
 
 pub use closures::ClosureTerm;
 pub use gains::GainTerm;
 pub use polarized::PolarizedTerm;
 pub use ratios::RatioTerm;
+pub use traces::TraceTerm;
 pub use visibilities::{AmplitudeTerm, VisibilityTerm};
 
 use super::observation::{Measured, Observation};
@@ -50,6 +52,11 @@ pub enum DataTermError {
         "leakage needs the products of circular feeds (RR, LL, RL, LR): these data are I, Q, U, V"
     )]
     NoHands,
+    /// Closure traces are of products of feeds, whose errors are independent.
+    #[error(
+        "closure traces need the products of circular feeds (RR, LL, RL, LR): these data are I, Q, U, V"
+    )]
+    TracesOfStokes,
     /// Closure quantities that depend on each other.
     #[error("the covariance of closure quantities at {0} h UTC is singular")]
     Singular(f64),
