@@ -170,6 +170,45 @@ fn exact_convert_flags_and_averages() {
     assert!(tables.contains("eht-imaging text") && tables.contains("SPT"), "{tables}");
 }
 
+/// A source without polarisation has as many numbers of closure traces as it has closure quantities, and traces of its averages,
+/// whose baselines share one time; files without cross hands are refused.
+#[test]
+fn exact_closure_traces_as_a_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    write_image(path);
+    observe(path, "EHT2017", "a.uvfits", &[]);
+    succeed(path, &["convert", "a.uvfits", "traces.csv", "--closure-traces", "100"]);
+    let table = std::fs::read_to_string(path.join("traces.csv")).unwrap();
+    assert!(table.starts_with("time_utc_h,t1,t2,t3,t4,quantity,value,sigma\n"), "{table}");
+    let closures = |kind| {
+        let sets = ClosureSet::of(&read(path, "a.uvfits"), kind, 100.0);
+        let with_four = |set: &&ClosureSet| set.closures.len() > 1;
+        sets.iter().filter(with_four).map(|set| set.closures.len()).sum::<usize>()
+    };
+    let [phases, amplitudes] = [ClosureKind::Phase, ClosureKind::LogAmplitude].map(closures);
+    let of = |name: &str| table.lines().filter(|line| line.contains(name)).count();
+    assert!(of("log_amplitude") > 100 && of("log_amplitude") <= amplitudes, "{amplitudes}");
+    assert!(of("phase_rad") > 100 && of("phase_rad") <= phases, "{phases}");
+    succeed(
+        path,
+        &["convert", "a.uvfits", "mean.csv", "--closure-traces", "100", "--average", "600"],
+    );
+    let mean = std::fs::read_to_string(path.join("mean.csv")).unwrap();
+    assert!((20..of("log_amplitude")).contains(&mean.lines().count()), "{mean}");
+    succeed(path, &["convert", "a.uvfits", "i.csv", "--stokes-i"]);
+    for (input, snr, said) in [
+        ("i.csv", "0", "RR, LL, RL and LR"),
+        ("a.uvfits", "1e8", "at no time have four stations"),
+        ("a.uvfits", "-1", "--closure-traces -1 is not allowed"),
+    ] {
+        let output = kerrlight(path, &["convert", input, "none.csv", "--closure-traces", snr]);
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(message.contains(said) && !path.join("none.csv").exists(), "{message}");
+    }
+}
+
 #[test]
 fn exact_uv_writes_table_and_pictures() {
     let folder = tempfile::tempdir().unwrap();
