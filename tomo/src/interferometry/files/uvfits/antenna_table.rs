@@ -113,9 +113,9 @@ mod tests {
         write(&observe(&array, SourcePosition::SGR_A, &schedule, &setup).unwrap()).unwrap()
     }
 
-    /// What pyuvdata 3.2, Difmap 2.4, AIPS and the reviewers of the EHT's own writers have found wrong in files of this
-    /// kind: no frame, times without TIMSYS (taken for TAI), an equinox that is no number, repeat counts that are not
-    /// the numbers that the header states, mounts of 0 everywhere.
+    /// What pyuvdata 3.2 complains of, what Difmap's reader asks for, and what was found wrong in other writers for it: no frame,
+    /// times without TIMSYS (taken for TAI), an equinox that is no number, repeat counts that are not the numbers that the
+    /// header states, mounts of 0 everywhere.
     #[test]
     fn code_readers_find_what_they_ask_for() {
         let bytes = file(Frame::Catalogue);
