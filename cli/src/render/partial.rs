@@ -60,8 +60,8 @@ impl Partial {
     pub fn kept(&self) -> String {
         match &self.path {
             Some(path) => format!(
-                "finished bands are kept beside {}: run the same command again to resume",
-                path.with_extension("").display()
+                "finished bands are kept in {}: run the same command again to resume",
+                path.display()
             ),
             None => "nothing is kept".to_owned(),
         }

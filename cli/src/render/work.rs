@@ -123,7 +123,7 @@ impl Work<'_> {
             Error::Render(RenderError::Stopped) => {
                 Interrupted(format!("stopped; {}", partial.kept())).into()
             }
-            Error::Exr(error) => anyhow::anyhow!("{}; {}", cause(&error, &partial), partial.kept()),
+            Error::Exr(error) => anyhow::anyhow!(unwritten(&error, &partial)),
             _ if self.device_failure().is_some() => {
                 self.told(&format!("{}, or with --device cpu to start over", partial.kept()))
             }
@@ -138,11 +138,13 @@ impl Work<'_> {
 
 const STOPPED: &str = "stopped; nothing is kept";
 
-/// Why bands cannot be written: ranks name the file of theirs, errors of the system name none.
-fn cause(error: &dyn std::error::Error, partial: &Partial) -> String {
+/// Why bands cannot be written, and what is left: ranks name the file of theirs, errors of the system name none.
+fn unwritten(error: &dyn std::error::Error, partial: &Partial) -> String {
     let io = error.source().and_then(|source| source.downcast_ref::<std::io::Error>());
     match io {
-        Some(told) if told.get_ref().is_some() => told.to_string(),
-        _ => format!("cannot write {}: {error}", partial.shown()),
+        Some(told) if told.get_ref().is_some() => {
+            format!("{told}; finished bands are kept: run the same command again to resume")
+        }
+        _ => format!("cannot write {}: {error}; {}", partial.shown(), partial.kept()),
     }
 }
