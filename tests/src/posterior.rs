@@ -60,7 +60,8 @@ fn exact_draws_of_voxels_resume_to_the_same_bytes() {
     assert_eq!(first, of("sample_0001.json"));
 }
 
-const PRIOR: &str = "linear.prior={mean=0.1,amplitude=0.2,correlation_length=2.0,matern=\"5/2\"}";
+const PRIOR: &str =
+    "linear.prior={kind=\"gaussian\",mean=0.1,amplitude=0.2,correlation_length=2.0,matern=\"5/2\"}";
 
 /// Draws have the fit's voxels and fields of the prior: another one for each, the same when it is drawn again.
 #[test]
@@ -94,13 +95,18 @@ fn exact_priors_that_mean_nothing_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("fit.toml"), settings()).unwrap();
     for (change, expected) in [
-        ("linear.prior={mean=0.1}", "missing field `amplitude`"),
+        ("linear.prior={kind=\"gaussian\",mean=0.1}", "missing field `amplitude`"),
+        ("linear.prior={mean=0.1,amplitude=0.2,correlation_length=2.0}", "missing field `kind`"),
         (
-            "linear.prior={mean=0.1,amplitude=0.0,correlation_length=2.0,matern=\"5/2\"}",
+            "linear.prior.kind=\"normal\"",
+            "unknown variant `normal`, expected `gaussian` or `log-normal`",
+        ),
+        (
+            "linear.prior={kind=\"gaussian\",mean=0.1,amplitude=0.0,correlation_length=2.0,matern=\"5/2\"}",
             "linear.prior.amplitude = 0 is not allowed",
         ),
         (
-            "linear.prior={mean=0.1,amplitude=0.2,correlation_length=2.0,matern=\"3/2\"}",
+            "linear.prior={kind=\"gaussian\",mean=0.1,amplitude=0.2,correlation_length=2.0,matern=\"3/2\"}",
             "unknown variant `3/2`, expected `1/2` or `5/2`",
         ),
         ("loss.0.weight=0.5", "loss.0.weight = 0.5 is not allowed: 1 with [linear.prior]"),
@@ -109,8 +115,24 @@ fn exact_priors_that_mean_nothing_are_refused() {
             "linear.prior does not work together with [change]",
         ),
         (
-            "truth.field={mean=0.1,amplitude=0.2,correlation_length=2.0,matern=\"1/2\",negative=\"dark\",nodes=3}",
+            "truth.field={kind=\"gaussian\",mean=0.1,amplitude=0.2,correlation_length=2.0,matern=\"1/2\",negative=\"dark\",nodes=3}",
             "truth.field.nodes = 3 is not allowed",
+        ),
+        (
+            "truth.field={kind=\"gaussian\",mean=0.1,amplitude=0.2,correlation_length=2.0,matern=\"1/2\",nodes=8}",
+            "truth.field.negative is missing",
+        ),
+        (
+            "truth.field={kind=\"log-normal\",mean=0.1,amplitude=0.2,correlation_length=2.0,matern=\"1/2\",negative=\"dark\",nodes=8}",
+            "truth.field.negative is not allowed with kind = \"log-normal\"",
+        ),
+        (
+            "linear.prior={kind=\"log-normal\",mean=60.0,amplitude=0.2,correlation_length=2.0,matern=\"5/2\"}",
+            "linear.prior.mean = 60 is not allowed: -50 to 50 with kind = \"log-normal\"",
+        ),
+        (
+            "linear.prior={kind=\"log-normal\",mean=0.0,amplitude=21.0,correlation_length=2.0,matern=\"5/2\"}",
+            "linear.prior.amplitude = 21 is not allowed: at most 20 with kind = \"log-normal\"",
         ),
     ] {
         let kind = ["fit", "fit.toml", "-o", "run", "--set", "representation=linear-grid"];

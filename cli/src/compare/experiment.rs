@@ -1,7 +1,7 @@
 //! What an experiment's file may say.
 
 use super::labels::{ONE_CHI2, RESULTS};
-use crate::fit::posterior::RANKED;
+use crate::fit::posterior::{RANKED, WITHIN};
 use anyhow::{Context, bail};
 use kerrlight_tomo::toml_file;
 use serde::Deserialize;
@@ -214,7 +214,9 @@ impl Experiment {
         }
         let tables = self.table.iter().map(|table| (&table.title, Some(&table.value)));
         let figures = self.figure.iter().map(|figure| (&figure.title, figure.value.as_ref()));
-        let is_of_draws = |value: &String| RANKED.iter().any(|name| value.starts_with(name));
+        let is_of_draws = |value: &String| {
+            value.contains(WITHIN) || RANKED.iter().any(|name| value.starts_with(name))
+        };
         for (title, value) in tables.chain(figures) {
             if let Some(value) = value.filter(|value| is_of_draws(value))
                 && self.samples.is_none()

@@ -10,7 +10,7 @@ pub fn number(x: f64, digits: usize) -> String {
 }
 
 /// Results that are shown: their names in results.json, what they are called, their units and digits.
-pub const RESULTS: [(&str, &str, &str, usize); 47] = [
+pub const RESULTS: [(&str, &str, &str, usize); 57] = [
     ("psnr_db", "PSNR", "dB", 2),
     ("psnr_inside_db", "PSNR inside the region", "dB", 2),
     ("psnr_over_time_db", "PSNR over time", "dB", 2),
@@ -30,6 +30,16 @@ pub const RESULTS: [(&str, &str, &str, usize); 47] = [
     ("inclination_within_95", "inclination within its 95 % interval", "", 2),
     ("position_angle_within_68", "position angle within its 68 % interval", "", 2),
     ("position_angle_within_95", "position angle within its 95 % interval", "", 2),
+    ("xi_error", "error of ξ", "", 4),
+    ("xi_pull", "error of ξ over its standard deviation", "", 2),
+    ("xi_within_68", "ξ within its 68 % interval", "", 2),
+    ("xi_within_95", "ξ within its 95 % interval", "", 2),
+    ("inclination_drawn_within_68", "inclination within the middle 68 % of the draws", "", 2),
+    ("inclination_drawn_within_95", "inclination within the middle 95 % of the draws", "", 2),
+    ("position_angle_drawn_within_68", "position angle within the middle 68 % of the draws", "", 2),
+    ("position_angle_drawn_within_95", "position angle within the middle 95 % of the draws", "", 2),
+    ("xi_drawn_within_68", "ξ within the middle 68 % of the draws", "", 2),
+    ("xi_drawn_within_95", "ξ within the middle 95 % of the draws", "", 2),
     ("random_nodes_within_68", "random nodes within the middle 68 % of the draws", "", 3),
     ("random_nodes_within_95", "random nodes within the middle 95 % of the draws", "", 3),
     ("bright_nodes_within_68", "bright nodes within the middle 68 % of the draws", "", 3),

@@ -55,19 +55,19 @@ pub fn place(
     }
     let world = world_of(file, &unknown.free()?, &results)
         .with_context(|| format!("{} is damaged: remove it to look again", path.display()))?;
-    Ok(Some(placed(file, &unknown, instrument, measured, &world)?))
+    Ok(Some(placed(file, &unknown, instrument, measured, (&world, 0))?))
 }
 
-/// Settings, rays and motion in a world.
+/// Settings, rays (those of this number near the critical curve) and motion in a world.
 pub fn placed(
     file: &FitFile,
     unknown: &UnknownWorld,
     instrument: &Instrument,
     measured: &Measured,
-    world: &World,
+    world: (&World, u64),
 ) -> anyhow::Result<Placed> {
     let (instrument, motion) = setup::in_world(file, unknown, instrument, measured, world)?;
-    Ok(Placed { file: settled(file, unknown, world), instrument, motion })
+    Ok(Placed { file: settled(file, unknown, world.0), instrument, motion })
 }
 
 /// Names and values of the free parameters of a world, in their units.
@@ -194,8 +194,7 @@ fn results(
 
 /// The world of a simulation.
 fn true_world(file: &FitFile, measured: &Measured) -> anyhow::Result<Option<World>> {
-    let known = || anyhow::Ok(setup::known_world(&file.simulated()?));
-    measured.truth.as_ref().map(|_| known()).transpose()
+    Ok(measured.truth.as_ref().map(|_| setup::true_world(file)).transpose()?)
 }
 
 /// Whether a search ended where the best one did: within 1.5 of each parameter's scale, the width of a first population.

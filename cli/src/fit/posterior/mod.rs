@@ -27,7 +27,7 @@ use sample::{Drawn, Through};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-pub use summary::RANKED;
+pub use summary::{RANKED, WITHIN};
 pub use together::{help, lead};
 
 /// Where draws and what follows from them are, in the folder of a run.
@@ -265,9 +265,9 @@ impl<'a> Drawing<'a> {
         };
         told("the world");
         let data = worlds.data(noise)?;
-        let world = worlds.draw(&data, number)?;
+        let world = worlds.draw(&data, (number, sample::prior_seed(&file)))?;
         let Placed { file, instrument, motion } =
-            world_search::placed(&file, unknown, instrument, measured, &world)?;
+            world_search::placed(&file, unknown, instrument, measured, (&world, number))?;
         let through = Through { file: &file, instrument: &instrument, motion: &motion, registry };
         let drawn = sample::draw(&through, &data, keeper, told)?;
         let values = world_search::values_of(&unknown.free()?, &world);

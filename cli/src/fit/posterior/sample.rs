@@ -65,6 +65,11 @@ pub fn draw(
     Ok(Some(Drawn { volume, chi2 }))
 }
 
+/// The seed of the field that a prior of voxels gives a draw.
+pub fn prior_seed(file: &FitFile) -> u64 {
+    file.seed ^ PRIOR
+}
+
 /// The linear problem, where the representation is solved by it or starts from it; whether to go on.
 fn begin(
     file: &FitFile,
@@ -85,7 +90,7 @@ fn begin(
         told(&format!("linear grid, round {}, loss {:.4e}", now.round, now.value));
         if keeper.stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let grid = (nodes, stride, Some(file.seed ^ PRIOR));
+    let grid = (nodes, stride, Some(prior_seed(file)));
     let about = (state.now.axis, change);
     let solution = setup::draw_linear(file, &mut trainer.objective, about, grid, &mut watch);
     let solution = solution.map_err(failed::linear).context("linear")?;

@@ -27,6 +27,8 @@ pub struct Interval {
     pub open: bool,
     /// What was simulated.
     pub truth: Option<f64>,
+    /// Its rank among the draws, 0 to 1.
+    pub rank: Option<f64>,
 }
 
 /// What follows from draws.
@@ -59,6 +61,8 @@ const SHINES: f32 = 0.05;
 const BRIGHT: f32 = 0.25;
 /// What has ranks, as [`Summary::ranks`] and keys of the numbers.
 pub const RANKED: [&str; 3] = ["random_nodes", "bright_nodes", "feature_radius"];
+/// Between the name of a parameter of the world and a part, in keys that say whether the middle draws hold its truth.
+pub const WITHIN: &str = "_drawn_within_";
 
 impl Summary {
     /// Of draws of a fit, with what its run has found of the world, and the truth where there is one.
@@ -71,7 +75,7 @@ impl Summary {
         let volumes: Vec<Volume> = draws.iter().map(|draw| draw.volume.clone()).collect();
         let ensemble = Ensemble::of(&volumes)?;
         let features = ensemble.features(&volumes);
-        let world = world.map_or(Vec::new(), |world| intervals(world, draws));
+        let world = world.map_or(Vec::new(), |world| intervals(file, world, draws));
         let coverage = truth.as_ref().map(|truth| covered(file, &ensemble, truth)).transpose()?;
         let ranked = |truth: &Volume| ranks(file, (&ensemble, &features), &volumes, truth);
         let ranks = truth.as_ref().map(ranked).transpose()?;
@@ -115,6 +119,9 @@ impl Summary {
             "coverage_random_nodes": random,
             "coverage_bright_nodes": bright,
         });
+        for (key, within) in self.world.iter().flat_map(Interval::within) {
+            all[key] = json!(within);
+        }
         for (name, ranks) in RANKED.iter().zip(self.ranks.iter().flatten()) {
             if ranks.count > 0 {
                 all[format!("{name}_within_68")] = json!(ranks.within_68);
@@ -177,8 +184,18 @@ impl Interval {
             [0.025, 0.16, 0.5, 0.84, 0.975].iter().map(|share| self.quantile(*share)).collect();
         let value = json!({
             "mean": self.mean, "deviation": self.deviation, "quantiles": quantiles, "truth": self.truth,
+            "rank": self.rank,
         });
         (self.parameter.name().to_owned(), value)
+    }
+
+    /// Whether the truth lies within the middle 68 and 95 % of the draws, 0 or 1, with their keys.
+    fn within(&self) -> Vec<(String, f64)> {
+        let (name, ranks) = (self.parameter.name(), Ranks::of(self.rank.into_iter()));
+        let name = name.strip_suffix("_deg").unwrap_or(name);
+        let all = [(68, ranks.within_68), (95, ranks.within_95)];
+        let all = all.into_iter().filter(|_| ranks.count > 0);
+        all.map(|(part, within)| (format!("{name}{WITHIN}{part}"), within)).collect()
     }
 
     fn sentence(&self) -> String {
@@ -193,7 +210,8 @@ impl Interval {
     }
 }
 
-fn intervals(world: &Value, draws: &[Kept]) -> Vec<Interval> {
+fn intervals(file: &FitFile, world: &Value, draws: &[Kept]) -> Vec<Interval> {
+    let mut places = Pcg64::seed_from_u64(file.seed.wrapping_add(3));
     let one = |parameter: Parameter| {
         let name = parameter.name();
         let best = world["world"][name].as_f64()?;
@@ -206,14 +224,16 @@ fn intervals(world: &Value, draws: &[Kept]) -> Vec<Interval> {
         let mean = values.iter().sum::<f64>() / n;
         let squares: f64 = values.iter().map(|x| (x - mean).powi(2)).sum();
         let bound = |k: usize| world["bounds"][name][k].as_f64().unwrap_or(f64::NAN);
+        let truth = world["truth"][name].as_f64().map(near);
         Some(Interval {
+            rank: truth.map(|truth| rank(truth, values.iter().copied(), &mut places)),
             parameter,
             mean,
             deviation: (squares / (n - 1.0)).sqrt(),
             values,
             bounds: [bound(0), bound(1)],
             open: world["open"][name] == true,
-            truth: world["truth"][name].as_f64().map(near),
+            truth,
         })
     };
     Parameter::ALL.into_iter().filter_map(one).collect()

@@ -83,6 +83,15 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         Penalised { priors, shape: self.voxels.shape(), gaussian, change, quiescent, upper }
     }
 
+    /// Refuses a prior of other nodes.
+    pub(super) fn check_prior(&self, nodes: usize) -> Result<(), Error> {
+        if nodes == self.unknowns() {
+            return Ok(());
+        }
+        let allowed = "those of the grid at one knot";
+        Err(Error::out_of_range("nodes of the prior", nodes as f64, allowed))
+    }
+
     pub(super) fn check(&self, settings: &LinearSettings) -> Result<(), Error> {
         let LinearProblem { upper, flux, .. } = *self;
         let check = |field, value: f64, ok, allowed| {
@@ -90,10 +99,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         };
         self.voxels.field()?;
         self.change.checked()?;
-        if let Some(gaussian) = self.gaussian {
-            let (nodes, allowed) = (gaussian.count(), "those of the grid at one knot");
-            check("nodes of the prior", nodes as f64, nodes == self.unknowns(), allowed)?;
-        }
+        self.gaussian.map_or(Ok(()), |gaussian| self.check_prior(gaussian.count()))?;
         let positive = |x: f64| x.is_finite() && x > 0.0;
         check("upper", upper, positive(upper), "above 0")?;
         let of_image = self.model.quiescent.as_ref().map_or(upper, |image| image.most);

@@ -24,6 +24,8 @@ pub struct Profile {
     pub slopes: Vec<f64>,
     /// Row by row.
     pub bends: Vec<f64>,
+    /// By how much the best field moves with each number, at all nodes.
+    pub responses: Vec<Vec<f64>>,
 }
 
 /// Conjugate gradients end where a step adds less than this part of what the field has absorbed.
@@ -70,7 +72,13 @@ impl<T: Float + Default> LinearProblem<'_, T> {
             let (a, b) = (k / n, k % n);
             product(&tangents[a], &moved.bent[b]) - dot(&taken[a], &absorbed[b])
         };
-        Ok(Profile { slopes: moved.slopes, bends: (0..n * n).map(bend).collect() })
+        let bends = (0..n * n).map(bend).collect();
+        let response = |absorbed: &Vec<f64>| {
+            let moved: Vec<f64> = absorbed.iter().map(|x| -x).collect();
+            operator.active.expand(&moved)
+        };
+        let responses = absorbed.iter().map(response).collect();
+        Ok(Profile { slopes: moved.slopes, bends, responses })
     }
 }
 

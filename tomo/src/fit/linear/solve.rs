@@ -70,8 +70,8 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         }
     }
 
-    /// What some iterations over all nodes reach from a dark field, or from the best lit one where data are
-    /// not convex.
+    /// What some iterations over all nodes reach from a dark field, or from where a prior's density is highest, or from the
+    /// best lit field where data are not convex.
     ///
     /// # Errors
     /// As those of [`solve`](Self::solve).
@@ -100,7 +100,8 @@ impl<T: Float + Default> LinearProblem<'_, T> {
             let dark = || Least { x: vec![0.0; self.unknowns()], value: f64::INFINITY };
             return Ok(lit.map_or_else(dark, |Lit { x, value, .. }| Least { x, value }));
         }
-        let start = start.map_or_else(|| vec![0.0; self.unknowns()], <[f64]>::to_vec);
+        let dark = || self.center().unwrap_or_else(|| vec![0.0; self.unknowns()]);
+        let start = start.map_or_else(dark, <[f64]>::to_vec);
         assert!(start.len() == self.unknowns());
         let found = run.minimise(&mut objective, &start, iterations);
         let value = objective.finite(found.value, &found.x)?;

@@ -19,6 +19,7 @@ mod changing;
 mod gaussian;
 mod kept;
 pub(in crate::fit) mod lit;
+mod log_normal;
 mod profile;
 mod quiescent;
 

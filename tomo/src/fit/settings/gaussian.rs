@@ -1,16 +1,29 @@
-//! Settings of Gaussian fields: the prior of voxels, and truths that are drawn from it.
+//! Settings of random fields: the prior of voxels, and truths that are drawn from it.
 
+use super::{FitError, refuse};
 use crate::fit::linear::{Matern, Roughness};
 use crate::representation::Degree;
 use serde::{Deserialize, Serialize};
 
+/// What of a field is Gaussian.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FieldKind {
+    /// The emission.
+    Gaussian,
+    /// Its natural logarithm.
+    LogNormal,
+}
+
 /// The prior of the voxels of a linear problem.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct GaussianSettings {
-    /// Mean, emission.
+pub struct PriorOfVoxels {
+    /// What is Gaussian.
+    pub kind: FieldKind,
+    /// Its mean, emission or the logarithm of that.
     pub mean: f64,
-    /// Standard deviation at a point, emission.
+    /// Its standard deviation at a point.
     pub amplitude: f64,
     /// Of Matérn's covariance, M.
     pub correlation_length: f64,
@@ -22,16 +35,19 @@ pub struct GaussianSettings {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FieldSettings {
-    /// Mean, emission.
+    /// What is Gaussian.
+    pub kind: FieldKind,
+    /// Its mean, emission or the logarithm of that.
     pub mean: f64,
-    /// Standard deviation at a point, emission.
+    /// Its standard deviation at a point.
     pub amplitude: f64,
     /// Of Matérn's covariance, M.
     pub correlation_length: f64,
     /// Its ν.
     pub matern: Roughness,
-    /// What becomes of what is negative.
-    pub negative: Negative,
+    /// What becomes of what is negative; nothing is, where the logarithm is Gaussian.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub negative: Option<Negative>,
     /// Nodes along each axis of the cube about the region.
     pub nodes: usize,
     /// What is between them.
@@ -53,15 +69,60 @@ fn cubic() -> Degree {
     Degree::Cubic
 }
 
-impl GaussianSettings {
+/// Refuses a mean and a standard deviation whose exponentials are no emission.
+fn logarithms(table: &str, mean: f64, amplitude: f64) -> Result<(), FitError> {
+    let allowed = |range: &str| format!("{range} with kind = \"log-normal\": of a logarithm");
+    if !(-50.0..=50.0).contains(&mean) {
+        return Err(FitError::range(format!("{table}.mean"), mean, &allowed("-50 to 50")));
+    }
+    if amplitude > 20.0 {
+        return Err(FitError::range(
+            format!("{table}.amplitude"),
+            amplitude,
+            &allowed("at most 20"),
+        ));
+    }
+    Ok(())
+}
+
+impl PriorOfVoxels {
+    /// Refuses numbers that are no logarithms of emission, where they are to be.
+    ///
+    /// # Errors
+    /// Names the key.
+    pub(in crate::fit) fn check(&self) -> Result<(), FitError> {
+        match self.kind {
+            FieldKind::Gaussian => Ok(()),
+            FieldKind::LogNormal => logarithms("linear.prior", self.mean, self.amplitude),
+        }
+    }
+
     /// The covariance.
     pub fn law(&self) -> Matern {
-        let Self { mean, amplitude, correlation_length, matern: roughness } = *self;
+        let Self { mean, amplitude, correlation_length, matern: roughness, .. } = *self;
         Matern { mean, amplitude, correlation_length, roughness }
     }
 }
 
 impl FieldSettings {
+    /// Refuses settings that do not say what becomes of negative emission, or say so where there is none.
+    ///
+    /// # Errors
+    /// Names the key.
+    pub(in crate::fit) fn check(&self) -> Result<(), FitError> {
+        match (self.kind, self.negative) {
+            (FieldKind::Gaussian, None) => {
+                let why = "a Gaussian field has negative parts; give `negative = \"lifted\"` or `\"dark\"`";
+                Err(FitError::missing("truth.field.negative", why))
+            }
+            (FieldKind::LogNormal, Some(_)) => refuse!(
+                "truth.field.negative is not allowed with kind = \"log-normal\": such a field is positive"
+            ),
+            (FieldKind::Gaussian, Some(_)) => Ok(()),
+            (FieldKind::LogNormal, None) => logarithms("truth.field", self.mean, self.amplitude),
+        }
+    }
+
     /// The covariance.
     pub fn law(&self) -> Matern {
         let Self { mean, amplitude, correlation_length, matern: roughness, .. } = *self;

@@ -29,7 +29,7 @@ pub use data::{DataFiles, Loss, LossKind};
 pub use error::FitError;
 pub(crate) use error::{Within, refuse};
 pub use faraday::FaradaySettings;
-pub use gaussian::{FieldSettings, GaussianSettings, Negative};
+pub use gaussian::{FieldKind, FieldSettings, Negative, PriorOfVoxels};
 pub use held_out::{HeldOutSettings, Weight};
 pub use instrument::{GainPhases, GainSettings, InstrumentSettings, LeakageSettings};
 pub use light_curve::{MeanFlux, MeasuredCurve, PerStokes, SimulatedCurve};

@@ -1,6 +1,6 @@
 //! What is recovered, and how.
 
-use super::GaussianSettings;
+use super::{FieldKind, PriorOfVoxels};
 use crate::fit::BatchSize;
 use crate::representation::Activation;
 use crate::representation::Degree;
@@ -150,9 +150,9 @@ pub struct Linear {
     /// Factor on ∫ e dV.
     #[serde(default)]
     pub sparsity: f64,
-    /// A Gaussian prior of the voxels; none, without it.
+    /// A prior of the voxels; none, without it.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub prior: Option<GaussianSettings>,
+    pub prior: Option<PriorOfVoxels>,
     /// What is between the nodes.
     #[serde(default = "cubic")]
     pub degree: Degree,
@@ -160,6 +160,13 @@ pub struct Linear {
     pub rounds: usize,
     /// Iterations of each round.
     pub iterations: usize,
+}
+
+impl Linear {
+    /// The prior of the voxels, if it is of this kind.
+    pub fn prior_of(&self, kind: FieldKind) -> Option<&PriorOfVoxels> {
+        self.prior.as_ref().filter(|prior| prior.kind == kind)
+    }
 }
 
 /// From where parameters start.

@@ -194,12 +194,26 @@ impl UnknownWorld {
         Ok(())
     }
 
-    /// Puts values drawn from the priors into settings; the view's orientation, offsets and mass are no settings and
-    /// stay what they are.
+    /// Values drawn from the priors with the seed of a fit, in the units of [`World`](crate::fit::world::World).
+    fn drawn_values(&self, seed: u64) -> Result<Vec<(Parameter, f64)>, Error> {
+        let mut random = Pcg64::seed_from_u64(seed ^ DRAWN);
+        let mut drawn = |free: &Free| (free.parameter, free.prior.quantile(random.random()));
+        Ok(self.free()?.iter().map(&mut drawn).collect())
+    }
+
+    /// What is drawn of the view, and is no setting: orientation on the sky and offsets, in the same units. None if nothing
+    /// is drawn.
+    pub(in crate::fit) fn drawn_view(&self, seed: u64) -> Result<Vec<(Parameter, f64)>, Error> {
+        let of_view = [Parameter::PositionAngle, Parameter::OffsetX, Parameter::OffsetY];
+        let mut all = if self.drawn { self.drawn_values(seed)? } else { Vec::new() };
+        all.retain(|(parameter, _)| of_view.contains(parameter));
+        Ok(all)
+    }
+
+    /// Puts values drawn from the priors into settings; mass and rotation factor are no settings and stay what they are.
     pub(super) fn draw(&self, file: &mut FitFile) -> Result<(), Error> {
-        let mut random = Pcg64::seed_from_u64(file.seed ^ DRAWN);
-        for Free { parameter, prior } in self.free()? {
-            let value = prior.quantile(random.random()) / parameter.unit();
+        for (parameter, value) in self.drawn_values(file.seed)? {
+            let value = value / parameter.unit();
             match (parameter, &mut file.motion.velocity) {
                 (Parameter::Spin, _) => file.hole.spin = value,
                 (Parameter::Inclination, _) => file.observer.inclination_deg = value,

@@ -6,7 +6,7 @@ use super::{Result, axis, faraday, linear, motion, polarized};
 use crate::fit::linear::Change;
 use crate::fit::settings;
 use crate::fit::settings::{
-    FitError, FitFile, Kind, LossKind, Occupancy, Optimiser, Start, Within, refuse,
+    FieldKind, FitError, FitFile, Kind, LossKind, Occupancy, Optimiser, Start, Within, refuse,
 };
 use crate::fit::{BatchSize, Beside, OccupancyPlan, OccupancySettings, Region, Training};
 use crate::memory;
@@ -263,9 +263,10 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
 
 /// Refuses a prior of voxels where it would have no part, or where data do not count as their errors say.
 fn check_prior(file: &FitFile) -> Result<()> {
-    if file.linear.as_ref().is_none_or(|linear| linear.prior.is_none()) {
+    let Some((linear, prior)) = file.linear.as_ref().and_then(|l| Some((l, l.prior?))) else {
         return Ok(());
-    }
+    };
+    prior.check()?;
     let is_linear = file.representation.kind == Kind::LinearGrid;
     if !is_linear && !matches!(file.training.start, Start::Linear { .. }) {
         refuse!("linear.prior needs representation.kind = \"linear-grid\" or a linear start");
@@ -277,6 +278,12 @@ fn check_prior(file: &FitFile) -> Result<()> {
     }
     if file.quiescent.is_some() {
         refuse!("linear.prior does not work together with [quiescent]: leave one of them out");
+    }
+    if let Some(flux) = linear.flux_jy.filter(|_| prior.kind == FieldKind::LogNormal) {
+        refuse!(
+            "linear.flux_jy = {flux} and linear.prior.kind = \"log-normal\" exclude each other: such a prior says how \
+             bright the emission is"
+        );
     }
     match file.loss.iter().position(|loss| loss.weight != 1.0) {
         Some(k) => {

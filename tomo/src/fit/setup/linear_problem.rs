@@ -3,10 +3,10 @@
 use super::{Result, linear, priors};
 use crate::dynamics::Axis;
 use crate::fit::linear::{
-    Change, Coarse, GaussianField, LinearProblem, LinearSettings, LinearSolution, Voxels, Watch,
-    Weighted,
+    Change, Coarse, GaussianField, LinearProblem, LinearSettings, LinearSolution, LogNormalField,
+    Voxels, Watch, Weighted,
 };
-use crate::fit::settings::{FitFile, Kind, Within};
+use crate::fit::settings::{FieldKind, FitFile, Kind, Within};
 use crate::fit::{Data, FrameTerm, Objective};
 
 /// Nodes along an axis from which on a coarser grid is solved first.
@@ -74,15 +74,27 @@ pub(super) struct Of<'a> {
 }
 
 impl Of<'_> {
-    /// The prior of the voxels.
+    /// The prior of the voxels, if that of the emission is Gaussian.
     fn gaussian(&self, voxels: &Voxels) -> Result<Option<GaussianField>> {
-        let Some(prior) = linear(self.file)?.prior else { return Ok(None) };
+        let prior = linear(self.file)?.prior_of(FieldKind::Gaussian);
+        let Some(prior) = prior else { return Ok(None) };
         let field = GaussianField::new(prior.law(), voxels).within("linear.prior")?;
         Ok(Some(match self.seed {
             Some(seed) => {
                 let center = field.drawn(seed);
                 field.about(center)
             }
+            None => field,
+        }))
+    }
+
+    /// The prior of the voxels, if that of the logarithm of the emission is.
+    fn log_normal(&self, voxels: &Voxels) -> Result<Option<LogNormalField>> {
+        let prior = linear(self.file)?.prior_of(FieldKind::LogNormal);
+        let Some(prior) = prior else { return Ok(None) };
+        let field = LogNormalField::new(prior.law(), voxels).within("linear.prior")?;
+        Ok(Some(match self.seed {
+            Some(seed) => field.about(seed),
             None => field,
         }))
     }
@@ -146,5 +158,8 @@ pub(super) fn solve_frames(
         (None, None) => usual.tolerance,
     };
     let how = LinearSettings { rounds, iterations, coarse, memory, tolerance, ..usual };
-    of.with(frames, |problem| problem.solve(&how, watch))
+    of.with(frames, |problem| match of.log_normal(&problem.voxels)? {
+        Some(prior) => problem.solve_log_normal(&prior, &how, watch),
+        None => problem.solve(&how, watch),
+    })
 }

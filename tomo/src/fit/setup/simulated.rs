@@ -6,6 +6,7 @@ use super::leakage;
 use super::light_curve;
 use super::observed::{Spoiled, schedule_of, spoil};
 use super::polarized::{self, is_polarized};
+use super::world::seen_in_truth;
 use super::{Instrument, Measured, Result, Truth, hours_per_m, motion, sky};
 use crate::fit::settings::{FitFile, Within, refuse};
 use crate::frames::Frames;
@@ -29,6 +30,7 @@ impl Measured {
         }
         let world = file.simulated()?;
         let instrument = Instrument::new(&world).within("world")?;
+        let instrument = seen_in_truth(file, &world, instrument)?;
         simulate(&world, file, &instrument, array)
     }
 }

@@ -22,6 +22,8 @@ pub struct Polished {
     /// Covariance of the free parameters row by row, in their own units: the inverse of half the second derivatives of
     /// χ² with the volume solved for, and of those of the priors; the spread of the priors where the data do not decide.
     pub covariance: Vec<f64>,
+    /// By how much the best volume moves with each free parameter, per its scale.
+    pub responses: Vec<Vec<f64>>,
     /// Steps that lowered the value.
     pub steps: usize,
 }
@@ -54,6 +56,8 @@ const ENOUGH: f64 = 0.005;
 struct Bowl {
     slopes: DVector<f64>,
     bends: DMatrix<f64>,
+    /// Of the best volume.
+    responses: Vec<Vec<f64>>,
 }
 
 impl<T: Float + Default> WorldProblem<'_, T> {
@@ -72,7 +76,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
             bowl = self.bowl(&best, how.following)?;
         }
         let covariance = self.covariance(&best.world, &bowl);
-        Ok(Polished { best, covariance, steps })
+        Ok(Polished { best, covariance, responses: bowl.responses, steps })
     }
 
     /// Steps with known second derivatives to the best world of other data, or through other rays, near a world.
@@ -92,7 +96,9 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         let mut now = self.solve_from(polished.best.world, &polished.best.x, how.iterations)?;
         let Some(bends) = covariance.try_inverse() else { return Ok(now) };
         for _ in 0..steps {
-            let bowl = Bowl { slopes: self.bowl(&now, 0)?.slopes, bends: bends.clone() };
+            let slopes = self.bowl(&now, 0)?.slopes;
+            let responses = polished.responses.clone();
+            let bowl = Bowl { slopes, bends: bends.clone(), responses };
             let Some(lower) = self.descend(&now, &bowl, how.iterations)? else { break };
             now = lower;
         }
@@ -119,14 +125,25 @@ impl<T: Float + Default> WorldProblem<'_, T> {
             return Ok(None);
         }
         for part in PARTS {
-            let own = |k: usize| part * step[k] * self.free[k].parameter.scale();
-            let own: Vec<f64> = (0..step.len()).map(own).collect();
-            let there = self.solve_from(self.moved(&from.world, &own), &from.x, iterations)?;
+            let step: Vec<f64> = step.iter().map(|step| part * step).collect();
+            let own = self.free.iter().zip(&step).map(|(free, x)| x * free.parameter.scale());
+            let world = self.moved(&from.world, &own.collect::<Vec<f64>>());
+            let there = self.solve_from(world, &self.along(from, bowl, &step), iterations)?;
             if there.value < from.value {
                 return Ok(Some(there));
             }
         }
         Ok(None)
+    }
+
+    /// About the best volume at a distance from another world, in units of scales; bounds hold it.
+    fn along(&self, from: &Estimate, bowl: &Bowl, step: &[f64]) -> Vec<f64> {
+        let mut x = from.x.clone();
+        for (response, step) in bowl.responses.iter().zip(step) {
+            x.iter_mut().zip(response).for_each(|(x, moves)| *x += step * moves);
+        }
+        x.iter_mut().for_each(|x| *x = x.clamp(0.0, self.upper));
+        x
     }
 
     /// A world at a distance, in the parameters' own units; bounds hold it.
@@ -148,12 +165,14 @@ impl<T: Float + Default> WorldProblem<'_, T> {
     fn bowl(&self, at: &Estimate, following: usize) -> Result<Bowl, Error> {
         let forward: ForwardModel<T> = self.model.forward(&at.world)?;
         let moved = self.image_differences(at)?;
-        let Profile { slopes, bends } = self.linear(&forward).profile(&at.x, &moved, following)?;
+        let Profile { slopes, bends, responses } =
+            self.linear(&forward).profile(&at.x, &moved, following)?;
         let n = self.free.len();
-        let half = 0.5 * self.scale;
+        let half = 0.5 * self.scale * self.unit();
         let mut bowl = Bowl {
             slopes: DVector::from_vec(slopes) * half,
             bends: DMatrix::from_row_slice(n, n, &bends) * half,
+            responses,
         };
         for (k, free) in self.free.iter().enumerate() {
             let scale = free.parameter.scale();

@@ -3,7 +3,9 @@
 use super::{Parameter, Prior, World, WorldModel};
 use crate::Error;
 use crate::fit::ForwardModel;
-use crate::fit::linear::{Change, Least, LinearProblem, Prior as Penalty, Voxels, Weighted};
+use crate::fit::linear::{
+    Change, GaussianField, Least, LinearProblem, Prior as Penalty, Voxels, Weighted,
+};
 use crate::representation::Degree;
 use crate::simd::Float;
 use core::f64::consts::TAU;
@@ -87,7 +89,8 @@ pub struct WorldProblem<'a, T: Float> {
     pub free: &'a [Free],
     /// The frames of the movie that count.
     pub frames: &'a [usize],
-    /// The data, each with the factor on its χ² times its number of data: the loss is then a sum of χ².
+    /// The data, each with the factor on its χ² times its number of data: the loss is then a sum of χ². Beside a
+    /// Gaussian prior the factors are 1.
     pub terms: &'a [Weighted<'a, T>],
     /// Half the width of the grid of voxels, M.
     pub half_width: f64,
@@ -97,6 +100,8 @@ pub struct WorldProblem<'a, T: Float> {
     pub flux: Option<f64>,
     /// Penalties on the volume, in units of χ².
     pub penalties: &'a [Penalty],
+    /// A Gaussian prior of the voxels that are solved for, if there is one.
+    pub gaussian: Option<&'a GaussianField>,
     /// By what χ² is multiplied against the priors: 1 for data with errors.
     pub scale: f64,
     /// What is solved for each world.
@@ -121,7 +126,7 @@ pub struct Estimate {
     pub world: World,
     /// Emission at all voxels.
     pub x: Vec<f64>,
-    /// χ² and the volume's penalties.
+    /// χ² and the volume's penalties; −2 ln of a Gaussian prior's density, up to a constant, is one of them.
     pub chi2: f64,
     /// Half of that times the problem's scale, and −ln of the priors' densities.
     pub value: f64,
@@ -156,7 +161,24 @@ impl<T: Float + Default> WorldProblem<'_, T> {
 
     /// χ² over the number of data.
     pub fn reduced(&self, chi2: f64) -> f64 {
-        chi2 / self.terms.iter().map(|term| term.weight).sum::<f64>()
+        chi2 / self.data()
+    }
+
+    /// Number of data, each times the factor on its χ².
+    fn data(&self) -> f64 {
+        let count = |term: &Weighted<'_, T>| -> usize {
+            self.frames.iter().map(|frame| term.term.degrees_of_freedom(*frame)).sum()
+        };
+        let of = |term: &Weighted<'_, T>| match self.gaussian {
+            Some(_) => term.weight * count(term) as f64,
+            None => term.weight,
+        };
+        self.terms.iter().map(of).sum()
+    }
+
+    /// χ² of one that a linear problem minimises: a prior makes that a mean over the data.
+    pub(super) fn unit(&self) -> f64 {
+        self.gaussian.map_or(1.0, |_| self.data())
     }
 
     /// The voxels that are solved for.
@@ -174,12 +196,13 @@ impl<T: Float + Default> WorldProblem<'_, T> {
             upper: self.upper,
             flux: self.flux,
             priors: self.penalties,
-            gaussian: None,
+            gaussian: self.gaussian,
             change: Change::NONE,
         }
     }
 
     pub(super) fn estimate(&self, world: World, Least { x, value }: Least) -> Estimate {
+        let value = self.unit() * value;
         let penalty = |free: &Free| free.prior.penalty(world.get(free.parameter));
         let penalties: f64 = self.free.iter().map(penalty).sum();
         Estimate { world, x, chi2: value, value: 0.5 * self.scale * value + penalties }

@@ -273,6 +273,7 @@ fn of_hot_spot<'a>(
         upper: 3.0,
         flux: None,
         penalties: &[],
+        gaussian: None,
         scale: 1.0,
         effort: Effort { nodes: 16, degree: Degree::Linear, iterations: 30 },
     }

@@ -38,20 +38,42 @@ pub struct GaussianField {
     center: Vec<f64>,
 }
 
+/// Square of the amplitude of a wave in a field of unit white noise, by −Δ of the wave (per M²).
+fn power(law: &Matern, bend: f64) -> f64 {
+    (1.0 + bend / law.kappa().powi(2)).powi(-2 * law.roughness.times() as i32)
+}
+
 impl GaussianField {
     /// On the nodes of a grid.
     ///
     /// # Errors
     /// If a number is out of its range.
     pub fn new(law: Matern, voxels: &Voxels) -> Result<Self, Error> {
-        let (law, shape) = (law.checked()?, voxels.shape());
+        let law = law.checked()?;
+        let share = |modes: &Modes| modes.between_nodes(voxels.degree, |bend| power(&law, bend));
+        Self::with_share(law, voxels, share)
+    }
+
+    /// The same with the standard deviation that is wanted at the nodes themselves: of fields that are not what is
+    /// between the nodes.
+    ///
+    /// # Errors
+    /// If a number is out of its range.
+    pub fn at_nodes(law: Matern, voxels: &Voxels) -> Result<Self, Error> {
+        Self::with_share(law.checked()?, voxels, |_| 1.0)
+    }
+
+    fn with_share(
+        law: Matern,
+        voxels: &Voxels,
+        share: impl FnOnce(&Modes) -> f64,
+    ) -> Result<Self, Error> {
         voxels.field()?;
+        let shape = voxels.shape();
         let modes = Modes::new(shape);
-        let (square, times) = (law.kappa().powi(2), law.roughness.times() as i32);
-        let amplitude = |bend: f64| (1.0 + bend / square).powi(-times);
-        let amplitudes: Vec<f64> = modes.bends().into_iter().map(amplitude).collect();
-        let powers: Vec<f64> = amplitudes.iter().map(|a| a * a).collect();
-        let share = modes.between_nodes(voxels.degree, |bend| amplitude(bend).powi(2));
+        let powers: Vec<f64> = modes.bends().into_iter().map(|bend| power(&law, bend)).collect();
+        let amplitudes: Vec<f64> = powers.iter().map(|power| power.sqrt()).collect();
+        let share = share(&modes);
         let spread = |variance: f64| law.amplitude / (share * variance).sqrt();
         let spread: Vec<f64> = modes.sum_of_squares(&powers).into_iter().map(spread).collect();
         let center = vec![law.mean; spread.len()];
@@ -75,14 +97,27 @@ impl GaussianField {
 
     /// A field that it gives, the same for the same seed.
     pub fn drawn(&self, seed: u64) -> Vec<f64> {
+        self.of_white(&self.white(seed))
+    }
+
+    /// Independent normal numbers of variance 1, one for each wave, the same for the same seed.
+    pub(super) fn white(&self, seed: u64) -> Vec<f64> {
         let mut random = Pcg64::seed_from_u64(seed);
-        let mut noise = |amplitude: &f64| -> f64 {
-            let normal: f64 = random.sample(StandardNormal);
-            amplitude * normal
-        };
-        let waves: Vec<f64> = self.amplitudes.iter().map(&mut noise).collect();
+        (0..self.count()).map(|_| random.sample(StandardNormal)).collect()
+    }
+
+    /// The field that such numbers make, with the mean of the law.
+    pub(super) fn of_white(&self, white: &[f64]) -> Vec<f64> {
+        let waves: Vec<f64> = white.iter().zip(&self.amplitudes).map(|(z, a)| z * a).collect();
         let all = Modes::new(self.shape).sum(&waves);
         all.iter().zip(&self.spread).map(|(x, spread)| self.law.mean + x * spread).collect()
+    }
+
+    /// From slopes with respect to the field to those with respect to such numbers.
+    pub(super) fn to_white(&self, slopes: &[f64]) -> Vec<f64> {
+        let spread: Vec<f64> = slopes.iter().zip(&self.spread).map(|(x, s)| x * s).collect();
+        let waves = Modes::new(self.shape).project(&spread);
+        waves.iter().zip(&self.amplitudes).map(|(x, a)| x * a).collect()
     }
 
     /// The same density about another field.

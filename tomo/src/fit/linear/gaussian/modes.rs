@@ -9,6 +9,17 @@ pub(super) struct Modes {
     axes: [Waves; 3],
 }
 
+/// What is added up.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Sums {
+    /// Waves, at each node.
+    OfWaves,
+    /// Squares of waves, at each node.
+    OfSquares,
+    /// Numbers of nodes times a wave, for each wave.
+    OfNodes,
+}
+
 /// Waves along an axis.
 struct Waves {
     count: usize,
@@ -38,17 +49,26 @@ impl Waves {
         }
     }
 
-    /// Sums of waves at the nodes, for amplitudes along the last of three axes; the axes move on by one.
-    fn along_last(&self, amplitudes: &[f64], square: bool) -> Vec<f64> {
-        let (n, rows) = (self.count, amplitudes.len() / self.count);
-        let mut out = vec![0.0; amplitudes.len()];
-        for (row, amplitudes) in amplitudes.chunks_exact(n).enumerate() {
-            let mut sums = vec![0.0; n];
-            for (amplitude, wave) in amplitudes.iter().zip(self.values.chunks_exact(n)) {
-                let of = |x: &f64| if square { x * x } else { *x };
-                sums.iter_mut().zip(wave).for_each(|(sum, x)| *sum += amplitude * of(x));
-            }
+    /// Sums along the last of three axes; the axes move on by one.
+    fn along_last(&self, numbers: &[f64], sums: Sums) -> Vec<f64> {
+        let (n, rows) = (self.count, numbers.len() / self.count);
+        let mut out = vec![0.0; numbers.len()];
+        for (row, numbers) in numbers.chunks_exact(n).enumerate() {
+            let sums = self.summed(numbers, sums);
             sums.iter().enumerate().for_each(|(j, sum)| out[j * rows + row] = *sum);
+        }
+        out
+    }
+
+    fn summed(&self, numbers: &[f64], sums: Sums) -> Vec<f64> {
+        let waves = self.values.chunks_exact(self.count);
+        if sums == Sums::OfNodes {
+            return waves.map(|wave| wave.iter().zip(numbers).map(|(x, y)| x * y).sum()).collect();
+        }
+        let mut out = vec![0.0; self.count];
+        for (amplitude, wave) in numbers.iter().zip(waves) {
+            let of = |x: &f64| if sums == Sums::OfSquares { x * x } else { *x };
+            out.iter_mut().zip(wave).for_each(|(sum, x)| *sum += amplitude * of(x));
         }
         out
     }
@@ -98,17 +118,22 @@ impl Modes {
 
     /// Σ amplitude · wave at all nodes, z fastest.
     pub fn sum(&self, amplitudes: &[f64]) -> Vec<f64> {
-        self.through_all(amplitudes, false)
+        self.through_all(amplitudes, Sums::OfWaves)
     }
 
     /// Σ amplitude · wave² at all nodes.
     pub fn sum_of_squares(&self, amplitudes: &[f64]) -> Vec<f64> {
-        self.through_all(amplitudes, true)
+        self.through_all(amplitudes, Sums::OfSquares)
     }
 
-    fn through_all(&self, amplitudes: &[f64], square: bool) -> Vec<f64> {
-        let along = |k: usize, all: &[f64]| self.axes[k].along_last(all, square);
-        along(0, &along(1, &along(2, amplitudes)))
+    /// Σ number · wave over all nodes, for each wave: the transpose of [`sum`](Self::sum), and its inverse.
+    pub fn project(&self, numbers: &[f64]) -> Vec<f64> {
+        self.through_all(numbers, Sums::OfNodes)
+    }
+
+    fn through_all(&self, numbers: &[f64], sums: Sums) -> Vec<f64> {
+        let along = |k: usize, all: &[f64]| self.axes[k].along_last(all, sums);
+        along(0, &along(1, &along(2, numbers)))
     }
 }
 

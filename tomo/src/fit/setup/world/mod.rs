@@ -25,7 +25,43 @@ pub fn known_world(file: &FitFile) -> World {
     flow.fold(world, |world, (parameter, value)| world.with(parameter, value))
 }
 
-/// What a fit looks through in a world, and how matter moves there.
+/// The world that data are simulated in.
+///
+/// # Errors
+/// If a setting is missing or out of range.
+pub fn true_world(file: &FitFile) -> Result<World> {
+    let (world, view) = (known_world(&file.simulated()?), drawn_view(file)?);
+    Ok(view.into_iter().fold(world, |world, (parameter, value)| world.with(parameter, value)))
+}
+
+fn drawn_view(file: &FitFile) -> Result<Vec<(Parameter, f64)>> {
+    let view = file.unknown_world()?.map(|unknown| unknown.drawn_view(file.seed));
+    Ok(view.transpose()?.unwrap_or_default())
+}
+
+/// What the settings of a simulation look through, turned and shifted as the world that is drawn says, along other rays
+/// near the critical curve than a fit does.
+///
+/// # Errors
+/// As [`in_world`].
+pub(super) fn seen_in_truth(
+    file: &FitFile,
+    simulated: &FitFile,
+    instrument: Instrument,
+) -> Result<Instrument> {
+    let unknown = file.unknown_world()?.filter(|unknown| unknown.drawn);
+    let Some(unknown) = unknown else { return Ok(instrument) };
+    let world = (&true_world(file)?, OTHERS + file.seed % OTHERS);
+    let (seen, _) =
+        through(simulated, &unknown, &instrument, &motion(simulated, Vec::new())?, world)?;
+    Ok(seen)
+}
+
+/// Rays near the critical curve that a simulation of a drawn world has, from this number on: none that a fit looks along.
+const OTHERS: u64 = 1 << 20;
+
+/// What a fit looks through in a world, along the rays near the critical curve of this number, and how matter moves there.
+/// Rays of number 0 are the usual ones.
 ///
 /// # Errors
 /// If a setting is missing or out of range.
@@ -34,10 +70,19 @@ pub fn in_world(
     unknown: &UnknownWorld,
     instrument: &Instrument,
     measured: &Measured,
-    world: &World,
+    world: (&World, u64),
 ) -> Result<(Instrument, Motion)> {
-    let plain = motion(file, measured.times.clone())?;
-    let model = model(file, unknown, instrument, &plain)?;
+    through(file, unknown, instrument, &motion(file, measured.times.clone())?, world)
+}
+
+fn through(
+    file: &FitFile,
+    unknown: &UnknownWorld,
+    instrument: &Instrument,
+    plain: &Motion,
+    (world, rays): (&World, u64),
+) -> Result<(Instrument, Motion)> {
+    let model = model(file, unknown, instrument, plain)?.seen_along(rays);
     let power = world.get(Parameter::RedshiftPower);
     let hole = Kerr::new(world.get(Parameter::Spin))?;
     let found = Instrument {

@@ -15,6 +15,8 @@ const STEPS: usize = 3;
 const OPEN_DRAWS: u64 = 0x6f70_656e_0000_0000;
 /// Iterations of the first solution of a world, for each of a search.
 const PATIENCE: usize = 4;
+/// The number of a draw that has as many voxels as the fit.
+const SAME: u64 = 0;
 
 /// The best world near another one, and its χ²/N.
 pub(super) fn polished(
@@ -27,13 +29,16 @@ pub(super) fn polished(
 }
 
 /// A world's best volume with other voxels, and from there its best world through other rays: what is left of both
-/// where the data do not decide.
+/// where the data do not decide. Beside a prior, which says what is left, the voxels stay the same.
 fn otherwise(problem: &WorldProblem<'_, f32>, polished: &Polished, number: u64) -> Result<World> {
     let model = problem.model.seen_along(number);
-    let effort = other_voxels(problem.effort, number);
+    let effort = other_voxels(problem.effort, problem.gaussian.map_or(number, |_| SAME));
     let other = WorldProblem { model: &model, effort, ..*problem };
     let start = other.solve(polished.best.world)?;
-    let from = Polished { best: start, ..polished.clone() };
+    // Those of other voxels are not known.
+    let is_same = other.effort.nodes == problem.effort.nodes;
+    let responses = if is_same { polished.responses.clone() } else { Vec::new() };
+    let from = Polished { best: start, responses, ..polished.clone() };
     Ok(other.follow(&from, STEPS, &Polish::default())?.world)
 }
 
@@ -133,14 +138,17 @@ impl<'a> WorldPosterior<'a> {
         self.factor
     }
 
-    /// A draw: the same for the same data and number. What the data say nothing about is drawn from its prior first.
+    /// A draw: the same for the same data and number. What the data say nothing about is drawn from its prior first. A
+    /// prior of the voxels is about a field of its own, drawn with the seed `field`.
     ///
     /// # Errors
     /// As [`new`](Self::new).
-    pub fn draw(&self, measured: &Measured, number: u64) -> Result<World> {
+    pub fn draw(&self, measured: &Measured, (number, field): (u64, u64)) -> Result<World> {
         let seen = Seen::new(self.file, measured, &self.unknown.search.fine)?;
         seen.with(self.unknown, &self.unknown.search.fine, self.scale, |problem| {
-            otherwise(problem, &self.somewhere(problem, number), number)
+            let gaussian = problem.gaussian.map(|prior| prior.clone().about(prior.drawn(field)));
+            let problem = WorldProblem { gaussian: gaussian.as_ref(), ..*problem };
+            otherwise(&problem, &self.somewhere(&problem, number), number)
         })
     }
 

@@ -2,7 +2,7 @@
 
 use super::posterior::{polished, surely};
 use super::seen::Seen;
-use crate::fit::settings::{FitFile, UnknownWorld};
+use crate::fit::settings::{FieldKind, FitFile, Linear, UnknownWorld};
 use crate::fit::setup::{Measured, Result};
 use crate::fit::world::{
     Exploration, Explored, Scanned, Spread, World, WorldProblem, WorldScan, WorldWatch,
@@ -61,6 +61,10 @@ pub fn find_world(
 ) -> Result<Option<FoundWorld>> {
     let search = &unknown.search;
     let coarse = Seen::new(file, measured, &search.coarse)?;
+    let gaussian = |linear: &Linear| linear.prior_of(FieldKind::Gaussian).is_some();
+    let has_prior = file.linear.as_ref().is_some_and(gaussian);
+    // Beside a prior of the voxels data count as their errors say.
+    let scale = |reduced: f64| if has_prior { 1.0 } else { scale(reduced) };
     let first =
         coarse.with(unknown, &search.coarse, 1.0, |problem| least(problem, search.starts))?;
     let over = unknown.scanned();

@@ -2,8 +2,8 @@
 
 use super::{known_world, model};
 use crate::fit::Objective;
-use crate::fit::linear::{Prior as Penalty, Weighted};
-use crate::fit::settings::{FitFile, UnknownWorld, WorldView};
+use crate::fit::linear::{GaussianField, Prior as Penalty, Voxels, Weighted};
+use crate::fit::settings::{FieldKind, FitFile, PriorOfVoxels, UnknownWorld, Within, WorldView};
 use crate::fit::setup::linear_problem::terms;
 use crate::fit::setup::{CoarseView, Measured, Result, forward_model, linear, motion, priors};
 use crate::fit::world::{Effort, WorldProblem};
@@ -34,10 +34,20 @@ impl Seen {
         let all = objective.observed();
         let frames: Vec<usize> =
             all.iter().copied().step_by((all.len() / self.frames).max(1)).collect();
-        let terms: Vec<Weighted<'_, f32>> =
-            terms(&objective.data).into_iter().map(|term| counted(term, &frames)).collect();
-        let data: f64 = terms.iter().map(|term| term.weight).sum();
         let settings = linear(file)?;
+        let voxels = Voxels::cube(view.nodes, file.region.r_max, settings.degree);
+        let gaussian = settings.prior_of(FieldKind::Gaussian);
+        let gaussian = gaussian.map(|prior| self::gaussian(prior, &voxels)).transpose()?;
+        let terms = terms(&objective.data).into_iter();
+        // Beside a prior what is minimised is a mean over the data.
+        let (terms, data): (Vec<_>, f64) = match gaussian {
+            Some(_) => (terms.collect(), 1.0),
+            None => {
+                let terms: Vec<_> = terms.map(|term| counted(term, &frames)).collect();
+                let data = terms.iter().map(|term| term.weight).sum();
+                (terms, data)
+            }
+        };
         let scaled = |penalty: Penalty| Penalty { weight: data * penalty.weight, ..penalty };
         let penalties: Vec<Penalty> = priors(settings).into_iter().map(scaled).collect();
         search(&WorldProblem {
@@ -50,6 +60,7 @@ impl Seen {
             upper: settings.upper,
             flux: settings.flux_jy,
             penalties: &penalties,
+            gaussian: gaussian.as_ref(),
             scale,
             effort: Effort {
                 nodes: view.nodes,
@@ -58,6 +69,10 @@ impl Seen {
             },
         })
     }
+}
+
+fn gaussian(prior: &PriorOfVoxels, voxels: &Voxels) -> Result<GaussianField> {
+    GaussianField::new(prior.law(), voxels).within("linear.prior")
 }
 
 /// Data with their weight times their number in some frames.

@@ -1,0 +1,191 @@
+//! Voxels whose logarithm is a Gaussian field: positive without a bound, bright in few places.
+//!
+//! The numbers of the nodes are e = exp(m + S z) with white noise z and S Sᵀ the covariance of the field. In z the prior is
+//! |z|², so that what data do not tell costs no iterations. The problem is not convex: a descent from e = exp(m) ends at a
+//! stationary point.
+
+use super::convex::Convex;
+use super::gaussian::{GaussianField, Matern};
+use super::objective::Objective;
+use super::operator::Operator;
+use super::walk::Voxels;
+use super::{Ending, LinearProblem, LinearProgress, LinearSettings, LinearSolution};
+use super::{Stationarity, Watch};
+use crate::Error;
+use crate::optimise::{Lbfgs, LbfgsState, Step};
+use crate::simd::Float;
+
+/// A field on the nodes of a grid whose logarithm is Gaussian, with density exp(−|z − center|²/2).
+#[derive(Clone, Debug)]
+pub struct LogNormalField {
+    logarithm: GaussianField,
+    /// Where the density is highest, one number for each wave.
+    center: Vec<f64>,
+}
+
+impl LogNormalField {
+    /// With this law of the logarithm at the nodes.
+    ///
+    /// # Errors
+    /// If a number is out of its range.
+    pub fn new(law: Matern, voxels: &Voxels) -> Result<Self, Error> {
+        let logarithm = GaussianField::at_nodes(law, voxels)?;
+        let center = vec![0.0; logarithm.count()];
+        Ok(Self { logarithm, center })
+    }
+
+    /// Number of nodes.
+    pub fn count(&self) -> usize {
+        self.center.len()
+    }
+
+    /// A field that it gives, emission at the nodes, the same for the same seed.
+    pub fn drawn(&self, seed: u64) -> Vec<f64> {
+        self.logarithm.drawn(seed).into_iter().map(f64::exp).collect()
+    }
+
+    /// The same density about the field that [`drawn`](Self::drawn) gives for a seed.
+    #[must_use]
+    pub fn about(self, seed: u64) -> Self {
+        Self { center: self.logarithm.white(seed), ..self }
+    }
+}
+
+/// What is minimised over white numbers: −2/data times the logarithm of a density.
+pub(super) struct Posterior<'a, 'b, T: Float> {
+    pub objective: Objective<'a, 'b, T>,
+    pub prior: &'b LogNormalField,
+    /// Where emission stays.
+    pub upper: f64,
+}
+
+impl<T: Float + Default> Posterior<'_, '_, T> {
+    /// Emission at the nodes.
+    pub fn emission(&self, white: &[f64]) -> Vec<f64> {
+        let logarithm = self.prior.logarithm.of_white(white).into_iter();
+        logarithm.map(|x| x.exp().min(self.upper)).collect()
+    }
+
+    /// Its value; overwrites the gradient.
+    pub fn value_and_gradient(&mut self, white: &[f64], gradient: &mut [f64]) -> f64 {
+        let emission = self.emission(white);
+        let mut slopes = Vec::new();
+        let of_data = self.objective.value_and_gradient(&emission, &mut slopes);
+        for (slope, e) in slopes.iter_mut().zip(&emission) {
+            *slope *= if *e < self.upper { *e } else { 0.0 };
+        }
+        let share = 1.0 / self.objective.data.count as f64;
+        let mut of_prior = 0.0;
+        let slopes = self.prior.logarithm.to_white(&slopes);
+        let away = white.iter().zip(&self.prior.center).map(|(z, center)| z - center);
+        for ((g, slope), away) in gradient.iter_mut().zip(slopes).zip(away) {
+            *g = slope + 2.0 * share * away;
+            of_prior += share * away * away;
+        }
+        of_data + of_prior
+    }
+}
+
+const STEPS: Lbfgs = Lbfgs { memory: 16, evaluations: 20 };
+
+/// Where a descent is.
+struct Place {
+    white: Vec<f64>,
+    state: LbfgsState<f64>,
+    value: f64,
+}
+
+impl Place {
+    fn slope(&self) -> f64 {
+        self.state.numbers[..self.white.len()].iter().fold(0.0f64, |most, g| most.max(g.abs()))
+    }
+
+    fn violation(&self) -> f64 {
+        self.state.numbers[..self.white.len()].iter().map(|g| g * g).sum::<f64>().sqrt()
+    }
+}
+
+impl<T: Float + Default> LinearProblem<'_, T> {
+    /// The most probable field beside a log-normal prior, from its median. All threads take part; their number does not
+    /// change a bit.
+    ///
+    /// # Errors
+    /// If a number is out of its range, data do not fit the rays or none is in the frames, or χ² is not finite.
+    pub fn solve_log_normal(
+        &self,
+        prior: &LogNormalField,
+        settings: &LinearSettings,
+        watch: &mut Watch<'_>,
+    ) -> Result<LinearSolution<T>, Error> {
+        self.check(settings)?;
+        self.check_prior(prior.count())?;
+        let data = self.data()?.together(self.frames);
+        let operator = Operator::new(self.walk(), self.all(), self.frames, settings.memory);
+        let terms = self.penalised(&data);
+        let objective = Objective::new(&operator, &data, &terms);
+        let mut posterior = Posterior { objective, prior, upper: self.upper };
+        let count = prior.count();
+        let state = LbfgsState::new(count, STEPS.memory);
+        let mut place = Place { white: vec![0.0; count], state, value: f64::NAN };
+        place.value = posterior.value_and_gradient(&place.white, &mut place.state.numbers[..count]);
+        let (start, start_slope) = (place.value, place.slope());
+        posterior.objective.finite(start, &posterior.emission(&place.white))?;
+        place.state.value = Some(start);
+        let ending = posterior.descend(&mut place, settings, watch);
+        let emission = posterior.emission(&place.white);
+        let value = posterior.objective.finite(place.value, &emission)?;
+        let flatness =
+            Stationarity { value, start, violation: place.slope(), start_slope, upper: self.upper };
+        Ok(LinearSolution {
+            emission: emission.into_iter().map(T::of).collect(),
+            quiescent: Vec::new(),
+            certificate: None,
+            stationarity: Some(flatness),
+            ending,
+            rounds: 1,
+            nodes: count,
+            evaluations: posterior.objective.evaluations,
+            bytes: operator.bytes(),
+        })
+    }
+}
+
+impl<T: Float + Default> Posterior<'_, '_, T> {
+    /// Steps until the slope is small enough, none helps, or there have been as many as all rounds have.
+    fn descend(
+        &mut self,
+        place: &mut Place,
+        settings: &LinearSettings,
+        watch: &mut Watch<'_>,
+    ) -> Ending {
+        let enough = settings.tolerance * place.violation();
+        for _ in 0..settings.rounds * settings.iterations {
+            if place.violation() <= enough {
+                return Ending::Converged;
+            }
+            let mut of =
+                |white: &[f64], gradient: &mut [f64]| self.value_and_gradient(white, gradient);
+            match STEPS.step(&mut of, &mut place.state, &mut place.white) {
+                Step::Taken { value, .. } => place.value = value,
+                Step::NoDescent | Step::NotFinite => return Ending::Rounding,
+            }
+            if self.tell(place, watch).is_break() {
+                return Ending::Cancelled;
+            }
+        }
+        Ending::Exhausted
+    }
+
+    fn tell(&self, place: &Place, watch: &mut Watch<'_>) -> core::ops::ControlFlow<()> {
+        let (operator, x) = (self.objective.operator, self.emission(&place.white));
+        watch(&LinearProgress {
+            round: 1,
+            evaluations: self.objective.evaluations,
+            value: place.value,
+            nodes: x.len(),
+            entries: operator.entries(),
+            active: &operator.active,
+            x: &x,
+        })
+    }
+}
