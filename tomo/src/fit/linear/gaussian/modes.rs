@@ -13,11 +13,11 @@ pub(super) struct Modes {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Sums {
     /// Waves, at each node.
-    OfWaves,
+    Waves,
     /// Squares of waves, at each node.
-    OfSquares,
+    Squares,
     /// Numbers of nodes times a wave, for each wave.
-    OfNodes,
+    Nodes,
 }
 
 /// Waves along an axis.
@@ -62,12 +62,12 @@ impl Waves {
 
     fn summed(&self, numbers: &[f64], sums: Sums) -> Vec<f64> {
         let waves = self.values.chunks_exact(self.count);
-        if sums == Sums::OfNodes {
+        if sums == Sums::Nodes {
             return waves.map(|wave| wave.iter().zip(numbers).map(|(x, y)| x * y).sum()).collect();
         }
         let mut out = vec![0.0; self.count];
         for (amplitude, wave) in numbers.iter().zip(waves) {
-            let of = |x: &f64| if sums == Sums::OfSquares { x * x } else { *x };
+            let of = |x: &f64| if sums == Sums::Squares { x * x } else { *x };
             out.iter_mut().zip(wave).for_each(|(sum, x)| *sum += amplitude * of(x));
         }
         out
@@ -118,17 +118,17 @@ impl Modes {
 
     /// Σ amplitude · wave at all nodes, z fastest.
     pub fn sum(&self, amplitudes: &[f64]) -> Vec<f64> {
-        self.through_all(amplitudes, Sums::OfWaves)
+        self.through_all(amplitudes, Sums::Waves)
     }
 
     /// Σ amplitude · wave² at all nodes.
     pub fn sum_of_squares(&self, amplitudes: &[f64]) -> Vec<f64> {
-        self.through_all(amplitudes, Sums::OfSquares)
+        self.through_all(amplitudes, Sums::Squares)
     }
 
     /// Σ number · wave over all nodes, for each wave: the transpose of [`sum`](Self::sum), and its inverse.
     pub fn project(&self, numbers: &[f64]) -> Vec<f64> {
-        self.through_all(numbers, Sums::OfNodes)
+        self.through_all(numbers, Sums::Nodes)
     }
 
     fn through_all(&self, numbers: &[f64], sums: Sums) -> Vec<f64> {
