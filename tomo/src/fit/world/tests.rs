@@ -14,6 +14,8 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 
+mod beside_prior;
+
 fn model(law: Law) -> WorldModel {
     // Rays that stay where gas on circular orbits is slower than light: beyond, weights have a kink.
     let at = |k: usize| {

@@ -8,13 +8,15 @@ struct Case {
     model: ForwardModel<f64>,
     moved: Vec<Vec<f64>>,
     data: Vec<f64>,
+    /// A prior of the nodes, in place of a penalty on slopes.
+    gaussian: Option<GaussianField>,
 }
 
 const VOXELS: usize = 5;
-const SMOOTH: f64 = 0.02;
+const SMOOTHNESS: [Prior; 1] = [Prior { regulariser: Regulariser::Smoothness, weight: 0.02 }];
 
 impl Case {
-    fn new() -> Self {
+    fn new(gaussian: Option<GaussianField>) -> Self {
         let model = forward_model();
         let voxels = Voxels::cube(VOXELS, 5.0, Degree::Linear);
         let count = FRAMES.len() * model.pixels();
@@ -25,7 +27,7 @@ impl Case {
         let mut first = movie(&model, &voxels, &random(voxels.count(), 9));
         first.iter_mut().zip(random(count, 10)).for_each(|(pixel, n)| *pixel += n);
         let second = random(count, 11).iter().map(|n| n - 0.5).collect();
-        Self { model, moved: vec![first, second], data }
+        Self { model, moved: vec![first, second], data, gaussian }
     }
 
     /// Hands the problem of data less ω times the images to a function.
@@ -43,8 +45,8 @@ impl Case {
             voxels: Voxels::cube(VOXELS, 5.0, Degree::Linear),
             upper: 1e3,
             flux: None,
-            priors: &[Prior { regulariser: Regulariser::Smoothness, weight: SMOOTH }],
-            gaussian: None,
+            priors: if self.gaussian.is_some() { &[] } else { &SMOOTHNESS },
+            gaussian: self.gaussian.as_ref(),
             change: Change::NONE,
         })
     }
@@ -58,13 +60,32 @@ impl Case {
 /// Steps are small enough that no node goes dark or lights up.
 #[test]
 fn exact_slopes_and_bends_are_those_of_differences_of_the_minimum() {
-    let case = Case::new();
+    compare(&Case::new(None));
+}
+
+#[test]
+fn exact_beside_a_prior_they_are_too() {
+    let voxels = Voxels::cube(VOXELS, 5.0, Degree::Linear);
+    let (mean, amplitude, correlation_length) = (1.0, 0.4, 4.0);
+    let law = Matern { mean, amplitude, correlation_length, roughness: Roughness::Half };
+    compare(&Case::new(Some(GaussianField::new(law, &voxels).unwrap())));
+}
+
+fn compare(case: &Case) {
     let (x, _) = case.least([0.0; 2]);
     // Images move by −∂(data)/∂ω.
     let found = case.with([0.0; 2], |problem| problem.profile(&x, &case.moved, 4000)).unwrap();
     let h = 2e-3;
     let at = |a: f64, b: f64| case.least([a * h, b * h]).1;
     let middle = at(0.0, 0.0);
+    for (k, [a, b]) in [[h, 0.0], [0.0, h]].into_iter().enumerate() {
+        let (up, down) = (case.least([a, b]).0, case.least([-a, -b]).0);
+        let moves = up.iter().zip(&down).map(|(up, down)| (up - down) / (2.0 * h));
+        let most = found.responses[k].iter().fold(0.0f64, |most, x| most.max(x.abs()));
+        for (moves, response) in moves.zip(&found.responses[k]) {
+            assert!((moves - response).abs() < 5e-3 * most, "{k}: {moves} {response} {most}");
+        }
+    }
     for (k, [a, b]) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
         let (up, down) = (at(a, b), at(-a, -b));
         let slope = (up - down) / (2.0 * h);

@@ -39,8 +39,8 @@ fn drawn_view(file: &FitFile) -> Result<Vec<(Parameter, f64)>> {
     Ok(view.transpose()?.unwrap_or_default())
 }
 
-/// What the settings of a simulation look through, turned and shifted as the world that is drawn says, along other rays
-/// near the critical curve than a fit does.
+/// What the settings of a simulation look through, turned and shifted as the world that is drawn says, with more rays near
+/// the critical curve than a fit has.
 ///
 /// # Errors
 /// As [`in_world`].
@@ -51,14 +51,17 @@ pub(super) fn seen_in_truth(
 ) -> Result<Instrument> {
     let unknown = file.unknown_world()?.filter(|unknown| unknown.drawn);
     let Some(unknown) = unknown else { return Ok(instrument) };
-    let world = (&true_world(file)?, OTHERS + file.seed % OTHERS);
-    let (seen, _) =
-        through(simulated, &unknown, &instrument, &motion(simulated, Vec::new())?, world)?;
-    Ok(seen)
+    let plain = motion(simulated, Vec::new())?;
+    let mut dense = simulated.clone();
+    dense.screen.ring_rays = dense.screen.ring_rays.map(|rays| (DENSER * rays).min(MOST_RAYS));
+    Ok(through(&dense, &unknown, &instrument, &plain, (&true_world(file)?, 0))?.0)
 }
 
-/// Rays near the critical curve that a simulation of a drawn world has, from this number on: none that a fit looks along.
-const OTHERS: u64 = 1 << 20;
+/// So many times the rays near the critical curve of a fit are those of a simulation of a drawn world, up to
+/// [`MOST_RAYS`]: data do not know rays.
+const DENSER: usize = 16;
+/// Of a pixel.
+const MOST_RAYS: usize = 1024;
 
 /// What a fit looks through in a world, along the rays near the critical curve of this number, and how matter moves there.
 /// Rays of number 0 are the usual ones.
@@ -142,4 +145,70 @@ fn model(
         polarization: file.polarization,
         seen: instrument.seen.clone(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::toml_file;
+
+    const SIDE: usize = 12;
+
+    /// The built-in flare as a movie, with what is not known of its world.
+    fn settings(world: &str) -> FitFile {
+        let text = include_str!("../../../../../cli/src/fit/built_in.toml");
+        let mut file: FitFile = toml_file::read(text).unwrap();
+        let view = "{ worlds = 1, nodes = 8, iterations = 1, pixels = 12, frames = 2 }";
+        let text = format!(
+            "drawn = true\n{world}[search]\nstarts = 1\ndrag_is_spin = false\ncoarse = {view}\nfine = {view}\n"
+        );
+        file.world = text.parse().unwrap();
+        file.screen.pixels = SIDE;
+        file
+    }
+
+    fn simulated(world: &str) -> (World, Vec<f64>) {
+        let file = settings(world);
+        let instrument = Instrument::new(&file).unwrap();
+        let measured = Measured::simulated(&file, &instrument, None).unwrap();
+        let movie = measured.movie.unwrap();
+        let mut all = Vec::new();
+        for frame in 0..3 {
+            all.extend_from_slice(&movie.image(frame).unwrap());
+        }
+        (true_world(&file).unwrap(), all)
+    }
+
+    /// A position angle of 90 degrees turns images from north to east, anticlockwise.
+    #[test]
+    fn exact_drawn_views_turn_what_is_simulated() {
+        let (upright, images) = simulated("position_angle_deg = { uniform = [0.0, 1e-9] }\n");
+        let (turned, other) =
+            simulated("position_angle_deg = { uniform = [90.0, 90.000000001] }\n");
+        let angle = |world: &World| world.get(Parameter::PositionAngle).to_degrees();
+        assert!(angle(&upright).abs() < 1e-8 && (angle(&turned) - 90.0).abs() < 1e-8);
+        let brightest = images.iter().fold(0.0f64, |most, x| most.max(*x));
+        assert!(brightest > 0.0);
+        for (k, x) in other.iter().enumerate() {
+            let (frame, row, column) = (k / SIDE / SIDE, k / SIDE % SIDE, k % SIDE);
+            // What is in the last column comes to the first row.
+            let from = images[(frame * SIDE + column) * SIDE + SIDE - 1 - row];
+            assert!((x - from).abs() < 1e-6 * brightest, "{frame} {row} {column}: {x} {from}");
+        }
+    }
+
+    #[test]
+    fn exact_other_seeds_draw_other_worlds() {
+        let mut file = settings(
+            "inclination_deg = { uniform = [20.0, 70.0] }\nposition_angle_deg = { uniform = [-180.0, 180.0] }\n",
+        );
+        let first = true_world(&file).unwrap();
+        file.seed += 1;
+        let second = true_world(&file).unwrap();
+        for parameter in [Parameter::Inclination, Parameter::PositionAngle] {
+            assert_ne!(first.get(parameter), second.get(parameter));
+        }
+        let inclination = first.get(Parameter::Inclination).to_degrees();
+        assert!((20.0..=70.0).contains(&inclination) && inclination != 60.0);
+    }
 }
