@@ -63,13 +63,21 @@ fn exact_draws_of_voxels_resume_to_the_same_bytes() {
 const PRIOR: &str =
     "linear.prior={kind=\"gaussian\",mean=0.1,amplitude=0.2,correlation_length=2.0,matern=\"5/2\"}";
 
+const LOG_NORMAL: &str = "linear.prior={kind=\"log-normal\",mean=-4.0,amplitude=1.5,correlation_length=2.0,matern=\"5/2\"}";
+
 /// Draws have the fit's voxels and fields of the prior: another one for each, the same when it is drawn again.
 #[test]
 fn exact_draws_with_a_prior_resume_to_the_same_bytes() {
+    for prior in [PRIOR, LOG_NORMAL] {
+        same_again(prior);
+    }
+}
+
+fn same_again(prior: &str) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("fit.toml"), settings()).unwrap();
     let kind = ["--set", "representation=linear-grid", "--set", "representation.nodes=14"];
-    let kind = [&kind[..], &["--set", PRIOR]].concat();
+    let kind = [&kind[..], &["--set", prior]].concat();
     run(folder.path(), &[&["fit", "fit.toml", "-o", "run", "--samples", "3"][..], &kind].concat());
     let of = |name: &str| std::fs::read(folder.path().join("run/posterior").join(name)).unwrap();
     assert_ne!(of("sample_0001.npz"), of("sample_0002.npz"));
@@ -168,6 +176,11 @@ fn exact_draws_of_an_unknown_world_have_worlds() {
     let inclination = &numbers["world"]["inclination_deg"];
     assert!((inclination["mean"].as_f64().unwrap() - 60.0).abs() < 3.0, "{inclination}");
     assert_eq!(inclination["quantiles"].as_array().map(Vec::len), Some(5));
+    let rank = inclination["rank"].as_f64().unwrap();
+    assert!((0.0..=1.0).contains(&rank), "{rank}");
+    let inside = |part: &str| numbers[format!("inclination_drawn_within_{part}")].as_f64();
+    assert_eq!(inside("68"), Some(f64::from(u8::from((rank - 0.5).abs() <= 0.34))));
+    assert_eq!(inside("95"), Some(f64::from(u8::from((rank - 0.5).abs() <= 0.475))));
     let table = std::fs::read_to_string(folder.path().join("run/posterior/worlds.csv")).unwrap();
     assert!(table.starts_with("inclination_deg,position_angle_deg\n"), "{table}");
     assert_eq!(table.lines().count(), 4);

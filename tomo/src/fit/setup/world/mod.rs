@@ -150,6 +150,7 @@ fn model(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::interferometry::array::built_in;
     use crate::toml_file;
 
     const SIDE: usize = 12;
@@ -170,7 +171,8 @@ mod tests {
     fn simulated(world: &str) -> (World, Vec<f64>) {
         let file = settings(world);
         let instrument = Instrument::new(&file).unwrap();
-        let measured = Measured::simulated(&file, &instrument, None).unwrap();
+        let array = built_in("ngEHT");
+        let measured = Measured::simulated(&file, &instrument, array.as_ref()).unwrap();
         let movie = measured.movie.unwrap();
         let mut all = Vec::new();
         for frame in 0..3 {
