@@ -5,6 +5,7 @@ mod accuracy;
 mod architecture;
 mod bad_input;
 mod bounded;
+mod browser;
 mod changing_emission;
 mod closed_forms;
 mod command_line;

@@ -26,13 +26,18 @@ pub struct Source {
 }
 
 impl Source {
+    /// The built-in scene.
+    pub fn built_in() -> Self {
+        let name = "built-in scene".to_owned();
+        let (text, folder) = (BUILT_IN.to_owned(), PathBuf::from("."));
+        Source { text, name, folder, files: None, version: None }
+    }
+
     /// The scene of a file, or the built-in one.
     pub fn new(path: Option<&Path>) -> anyhow::Result<Self> {
         let Some(path) = path else {
             eprintln!("rendering the built-in scene: Sgr A* with a flare and a disc");
-            let name = "built-in scene".to_owned();
-            let (text, folder) = (BUILT_IN.to_owned(), PathBuf::from("."));
-            return Ok(Source { text, name, folder, files: None, version: None });
+            return Ok(Source::built_in());
         };
         let name = path.display().to_string();
         let folder = path.parent().unwrap_or(Path::new(".")).to_owned();

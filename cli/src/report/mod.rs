@@ -13,13 +13,15 @@ mod tests;
 mod triangle;
 mod view;
 
+pub use escape::escape;
 pub use grid_map::{GridAxis, GridMap};
+pub use html::fill;
 pub use pictures::{
     Figure, Strip, encode, enlarged, frames, images, projections, residuals, slices, still,
 };
 pub use plot::{Axis, LinePlot, Marks, Series};
 pub use triangle::{Triangle, Variable};
-pub use view::{Motion, View3d, rates};
+pub use view::{Motion, View3d, rates, thinned};
 
 use crate::output::Output;
 

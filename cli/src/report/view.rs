@@ -68,7 +68,7 @@ fn quantised(volume: &Volume, scale: f64) -> Vec<u8> {
 }
 
 /// The same volume with at most [`MOST_NODES`] nodes along each axis.
-fn thinned(volume: &Volume) -> anyhow::Result<Volume> {
+pub fn thinned(volume: &Volume) -> anyhow::Result<Volume> {
     let nodes = volume.nodes().map(|n| n.min(MOST_NODES));
     if nodes == volume.nodes() {
         return Ok(volume.clone());

@@ -1,0 +1,96 @@
+//! What the page is told of its subject, as one object.
+
+use super::matter::{self, Volumes};
+use super::run_folder::Measured;
+use super::subject::Subject;
+use super::{left_out, sky, still};
+use crate::render::preview::PreviewOptions;
+use anyhow::Context;
+use kerrlight_tomo::image::colormap::Colormap;
+use kerrlight_tomo::image::preview::Look;
+use kerrlight_tomo::scene::{CameraMotion, Scene};
+use serde_json::{Value, json};
+
+/// The object.
+pub fn of(subject: &Subject, volumes: &Volumes) -> anyhow::Result<Value> {
+    let scene = &subject.scene;
+    let [reach, piece, most] = matter::extent(subject, volumes);
+    let panorama = sky::panorama(subject)?;
+    let distance = scene.observer.radius;
+    Ok(json!({
+        "scene": scene,
+        "title": subject.title,
+        "words": subject.words,
+        "keys": keys(&subject.text)?,
+        "pose": scene.camera.as_ref().map(|camera| camera.pose(scene.observer.time).values),
+        "motion": motion(scene),
+        "distance": distance.is_finite().then_some(distance),
+        "field": scene.camera.is_none().then(|| scene.field_of_view_m()),
+        "times": times(subject, reach),
+        "index": scene.effects.index().unwrap_or(0.0),
+        "white": still::white(subject)?,
+        "colored": PreviewOptions::default().look(scene) == Look::Color,
+        "colors": base64::encode(colors()),
+        "sky": panorama.as_ref().map(|(png, _)| base64::encode(png)),
+        "sky_brightness": panorama.as_ref().map_or(0.0, |(_, brightness)| *brightness),
+        "volumes": volumes.described(),
+        "law": volumes.law(),
+        "spots": matter::spots(subject)?,
+        "reach": reach,
+        "piece": piece,
+        "most": most,
+        "data": subject.measured.as_ref().map(data),
+        "left_out": left_out::of(subject, volumes.falls),
+    }))
+}
+
+/// The keys of a scene's text, with the tables that they stand in.
+fn keys(text: &str) -> anyhow::Result<Vec<String>> {
+    let table: toml::Table = text.parse().context("the scene")?;
+    let mut keys: Vec<String> = table.keys().cloned().collect();
+    for (name, value) in &table {
+        let within = value.as_table().into_iter().flat_map(toml::Table::keys);
+        keys.extend(within.map(|key| format!("{name}.{key}")));
+    }
+    Ok(keys)
+}
+
+/// How a camera moves, as scenes write it; one on a path stands still where it is.
+fn motion(scene: &Scene) -> &'static str {
+    match scene.camera.as_ref().map(|camera| camera.motion) {
+        Some(CameraMotion::Zamo) => "zamo",
+        Some(CameraMotion::Keplerian) => "keplerian",
+        Some(CameraMotion::FreeFall) => "free-fall",
+        _ => "static",
+    }
+}
+
+/// First and last time of observation: of a fit's pictures, or one turn of the outermost spot, or at half the volume's
+/// radius; none where nothing changes.
+fn times(subject: &Subject, reach: f64) -> Option<[f64; 2]> {
+    let scene = &subject.scene;
+    if let Some(Measured { times, .. }) = &subject.measured
+        && times.len() > 1
+    {
+        return Some([times[0], times[times.len() - 1]]);
+    }
+    let orbits = scene.spot.iter().map(|spot| spot.radius);
+    let radius = orbits.fold(0.5 * reach * f64::from(u8::from(!scene.volume.is_empty())), f64::max);
+    let start = scene.observer.time;
+    scene.changes().then(|| [start, start + core::f64::consts::TAU * radius.powf(1.5)])
+}
+
+fn data(measured: &Measured) -> Value {
+    json!({ "times": measured.times, "side": measured.side, "field": measured.field, "scale": brightest(measured) })
+}
+
+/// The largest value of a fit's pictures.
+pub fn brightest(measured: &Measured) -> f32 {
+    measured.pixels.iter().copied().fold(f32::MIN_POSITIVE, f32::max)
+}
+
+/// 256 colours of the map that shows intensities.
+fn colors() -> Vec<u8> {
+    let table = Colormap::AfmhotUs.table();
+    (0..256).flat_map(|k| table[k * (table.len() - 1) / 255]).collect()
+}

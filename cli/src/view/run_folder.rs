@@ -1,0 +1,77 @@
+//! What the folder of a fit holds for the page.
+
+use crate::output;
+use crate::volume_files;
+use anyhow::{Context, bail, ensure};
+use kerrlight_tomo::scene::Scene;
+use kerrlight_tomo::volume::VolumeFile;
+use std::io::{Cursor, Read};
+use std::path::{Path, PathBuf};
+
+/// Pictures that a fit was made of.
+pub struct Measured {
+    /// When they were taken, M.
+    pub times: Vec<f64>,
+    /// Pixels along each side.
+    pub side: usize,
+    /// Width of their field, M.
+    pub field: f64,
+    /// Jy a pixel, row by row from above.
+    pub pixels: Vec<f32>,
+}
+
+/// The scene of what was recovered.
+pub fn scene_of(folder: &Path) -> anyhow::Result<PathBuf> {
+    let path = folder.join("scene.toml");
+    if !path.is_file() {
+        bail!(
+            "{}: no scene.toml in this folder: it is not that of a fit that has ended, or what it recovered has no scene",
+            folder.display()
+        );
+    }
+    Ok(path)
+}
+
+/// The true volume, if the fit knows it.
+pub fn truth_of(folder: &Path) -> anyhow::Result<Option<VolumeFile>> {
+    let path = folder.join("truth.npz");
+    path.is_file().then(|| volume_files::load(&path)).transpose()
+}
+
+/// The pictures of the data with their times, if the fit had pictures.
+pub fn measured_of(folder: &Path, scene: &Scene) -> anyhow::Result<Option<Measured>> {
+    let path = folder.join("movie.npz");
+    if !path.is_file() {
+        return Ok(None);
+    }
+    read(&path, scene.field_of_view_m()).with_context(|| path.display().to_string())
+}
+
+fn read(path: &Path, field: f64) -> anyhow::Result<Option<Measured>> {
+    let bytes = output::read(path)?;
+    let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).context("damaged NPZ archive")?;
+    let Some(data) = member(&mut archive, "data")? else { return Ok(None) };
+    let times = member(&mut archive, "time")?.context("no array named time")?;
+    let data = npyz::NpyFile::new(&data[..]).context("array data")?;
+    let shape = data.shape().to_vec();
+    let pixels = data.into_vec::<f32>().context("array data")?;
+    let times = npyz::NpyFile::new(&times[..]).and_then(npyz::NpyFile::into_vec::<f64>);
+    let times = times.context("array time")?;
+    let square = matches!(shape[..], [frames, height, width] if height == width && frames as usize == times.len());
+    ensure!(square && !times.is_empty(), "array data: shape {shape:?} with {} times", times.len());
+    Ok(Some(Measured { times, side: shape[1] as usize, field, pixels }))
+}
+
+/// An array of the archive, if it is there.
+fn member(
+    archive: &mut zip::ZipArchive<Cursor<Vec<u8>>>,
+    name: &str,
+) -> anyhow::Result<Option<Vec<u8>>> {
+    let mut file = match archive.by_name(&format!("{name}.npy")) {
+        Err(zip::result::ZipError::FileNotFound) => return Ok(None),
+        file => file.with_context(|| format!("array {name}"))?,
+    };
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes).with_context(|| format!("array {name}"))?;
+    Ok(Some(bytes))
+}
