@@ -114,7 +114,7 @@ enum Verb {
     Render(render::Render),
     /// Render a sequence of EXR frames, a GIF or an APNG
     Movie(movie::Movie),
-    /// Write a page to fly around a black hole in a browser
+    /// Show a scene or a fit on a page to fly around it in a browser
     View(view::View),
     /// Trace the rays of a table
     Trace(trace::Trace),

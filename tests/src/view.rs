@@ -3,12 +3,17 @@
 use crate::browser::{Browser, address};
 use crate::support::{binary, fail, root, succeed};
 use kerrlight_geodesic::wgsl;
+use kerrlight_geodesic::{
+    Camera, Inclination, Kerr, Motion, Observer, Outcome, Quantities, Tracer,
+};
 use kerrlight_tomo::image::Picture;
 use kerrlight_tomo::image::colormap::Colormap;
 use kerrlight_tomo::image::exr;
-use serde_json::Value;
+use serde_json::{Value, json};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 #[test]
 fn exact_the_page_has_the_tracer_and_loads_nothing() {
@@ -173,4 +178,176 @@ fn code_light_of_the_page_is_that_of_render() {
         [5e-4, 0.003],
     );
     compare(&[&scene("sky_checker.toml")], "", (1, "G"), [3e-2, 0.06]);
+}
+
+/// The ray of a picked place has the constants, the fate and the crossings of the tracer in doubles, and turns where its
+/// radial potential is 0.
+#[test]
+#[ignore = "long"]
+fn code_a_picked_ray_is_that_of_the_tracer() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = ["--set", "spot=", "--set", "hole.spin=0.9"];
+    let Some(mut browser) = opened(folder.path(), &words, "pick=8,2&curve=1") else { return };
+    let ray = browser.value("kerrlight.ray");
+    let number = |name: &str| ray[name].as_f64().unwrap();
+    let hole = Kerr::new(0.9).unwrap();
+    let observer = Observer::at_infinity(Inclination::from_degrees(67.0).unwrap());
+    let expected = observer.ray(&hole, 8.0, 2.0).unwrap();
+    let mut path = kerrlight_geodesic::Path::new();
+    Tracer::new(1e-12).unwrap().trace(&hole, &expected, Quantities::ALL, &mut path);
+    let close = |a: f64, b: f64| assert!((a - b).abs() < 2e-5 * b.abs().max(1.0), "{a} {b}");
+    close(number("lambda"), expected.lambda);
+    close(number("eta"), expected.eta);
+    assert!(path.outcome() == Outcome::Escaped && ray["outcome"] == 1);
+    let crossings: Vec<f64> = path.equatorial_crossings().collect();
+    assert_eq!(ray["crossings"].as_array().unwrap().len(), crossings.len());
+    for (found, time) in ray["crossings"].as_array().unwrap().iter().zip(crossings) {
+        let point = path.at(time);
+        close(found["r"].as_f64().unwrap(), point.radius());
+        let turn = found["azimuth"].as_f64().unwrap() - point.azimuth;
+        close(turn - std::f64::consts::TAU * (turn / std::f64::consts::TAU).round(), 0.0);
+        close(found["delay"].as_f64().unwrap(), point.delay);
+    }
+    let (r, lambda, eta) = (number("turning"), expected.lambda, expected.eta);
+    let potential = (r * r + 0.81 - 0.9 * lambda).powi(2)
+        - (r * r - 2.0 * r + 0.81) * (eta + (lambda - 0.9).powi(2));
+    assert!(potential.abs() < 1e-4 * r.powi(4), "{potential} at {r}");
+    assert!(ray["path"].as_array().unwrap().len() > 50);
+    let shown = browser.value("document.getElementById('numbers').textContent");
+    assert!(shown.as_str().unwrap().contains("escapes to the sky"), "{shown}");
+    // A click picks, a key takes it back, the address holds the view.
+    let click =
+        |kind: &str| json!({ "type": kind, "x": 400, "y": 160, "button": "left", "clickCount": 1 });
+    for kind in ["mousePressed", "mouseReleased"] {
+        browser.call("Input.dispatchMouseEvent", &click(kind));
+    }
+    browser.wait("kerrlight.rests() && state.pick !== '8,2' && location.hash.includes('pick=')");
+    browser.call("Input.dispatchKeyEvent", &json!({ "type": "keyDown", "key": "Escape" }));
+    browser.wait("kerrlight.rests() && kerrlight.ray === null && !location.hash.includes('pick=')");
+    assert!(browser.problems().is_empty(), "{:?}", browser.problems());
+}
+
+/// Rays a little inside of the page's critical curve fall, rays a little outside escape: on a screen and through a lens.
+#[test]
+#[ignore = "long"]
+fn exact_the_critical_curve_parts_rays() {
+    let folder = tempfile::tempdir().unwrap();
+    let Some(mut browser) = opened(folder.path(), &["--set", "spot="], "spin=0.8") else { return };
+    let hole = Kerr::new(0.8).unwrap();
+    let place = Inclination::from_degrees(67.0).unwrap();
+    let observer = Observer::at_infinity(place);
+    let camera = Camera::new(&hole, place, 9.0, Motion::Static).unwrap();
+    let setup = "{ motion: 'static', axes: cameraAxes(0, 0, 0) }";
+    let at = "{ radius: 9, theta: 67 * RADIANS }";
+    let fate = |ray: kerrlight_geodesic::Ray| {
+        let mut path = kerrlight_geodesic::Path::new();
+        Tracer::new(1e-10).unwrap().trace(&hole, &ray, Quantities::ALL, &mut path);
+        path.outcome()
+    };
+    for lens in [false, true] {
+        let camera_of_page = if lens { setup } else { "null" };
+        let curve = browser.value(&format!("criticalCurve(0.8, {at}, {camera_of_page})"));
+        let points: Vec<[f64; 2]> = serde_json::from_value(curve).unwrap();
+        assert!(points.len() > 800);
+        let mean = |k: usize| points.iter().map(|p| p[k]).sum::<f64>() / points.len() as f64;
+        let middle = [mean(0), mean(1)];
+        for (share, expected) in [(0.999, Outcome::Captured), (1.001, Outcome::Escaped)] {
+            for point in points.iter().step_by(7) {
+                let [x, y] = [0, 1].map(|k| middle[k] + share * (point[k] - middle[k]));
+                let ray = if lens { camera.ray(x, y) } else { observer.ray(&hole, x, y) };
+                assert_eq!(fate(ray.unwrap()), expected, "{share} of {point:?}, lens: {lens}");
+            }
+        }
+    }
+}
+
+/// A fit's folder: what was recovered, moving with its matter, beside the truth and the data.
+#[test]
+#[ignore = "long"]
+fn code_the_page_of_a_fit_has_volume_truth_and_data() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = [
+        "screen.pixels=12",
+        "movie.frames=6",
+        "representation=bhnerf",
+        "representation.width=16",
+        "training.steps=20",
+        "training.start={linear={nodes=10,stride=1,steps=60}}",
+        "output.nodes=20",
+    ];
+    let fit = root().join("scenes/fits/flare_images.toml");
+    let mut words = vec!["fit", fit.to_str().unwrap(), "-o", "run"];
+    words.extend(settings.iter().flat_map(|setting| ["--set", setting]));
+    succeed(folder.path(), &words);
+    let Some(mut browser) = opened(folder.path(), &["run"], "") else { return };
+    let files = ["index.html", "volumes.js"].map(|name| folder.path().join("page").join(name));
+    assert!(std::fs::metadata(&files[0]).unwrap().len() < 5_000_000 && files[1].is_file());
+    assert_eq!(browser.value("panels().join()"), "recovered,truth,data");
+    assert_eq!(browser.value("GIVEN.data.times.length"), 6);
+    let size = [40, 40];
+    let recovered = measured(&mut browser, "recovered", size);
+    let picture = rendered(folder.path(), &mut browser, size);
+    let of_page: Vec<f64> = recovered.chunks(4).map(|pixel| pixel[3]).collect();
+    let [apart, far] = difference(&of_page, picture.channel("intensity").unwrap());
+    eprintln!(
+        "of what was recovered, light differs by {apart:.1e}, {far:.1e} of the pixels are off"
+    );
+    assert!(apart < 1e-2 && far < 0.01, "{apart:e} {far:e}");
+    assert_ne!(measured(&mut browser, "truth", size), recovered);
+    // Playing moves the time, and matter with it.
+    let start = browser.value("state.time");
+    browser.value("document.getElementById('play').click()");
+    browser.wait(&format!("state.time > {start}"));
+    browser.value("document.getElementById('play').click()");
+    browser.wait("kerrlight.rests()");
+    assert_ne!(measured(&mut browser, "recovered", size), recovered);
+    assert!(browser.problems().is_empty(), "{:?}", browser.problems());
+}
+
+/// What Save EXR writes is a picture that this program reads.
+#[test]
+#[ignore = "long"]
+fn exact_the_page_writes_exr() {
+    let folder = tempfile::tempdir().unwrap();
+    let Some(mut browser) = opened(folder.path(), &["--set", "spot="], "") else { return };
+    let light = measured(&mut browser, "recovered", [20, 14]);
+    let asked = "kerrlight.gpu.measure('recovered', 20, 14).then(light => exrBytes(light, 20, 14, 'a command').arrayBuffer())\
+                 .then(bytes => [...new Uint8Array(bytes)])";
+    let bytes: Vec<u8> = serde_json::from_value(browser.value(asked)).unwrap();
+    let (picture, _) = exr::decode(&bytes).unwrap();
+    for (k, name) in ["R", "G", "B", "intensity"].into_iter().enumerate() {
+        let expected: Vec<f32> = light.chunks(4).map(|pixel| pixel[k] as f32).collect();
+        assert_eq!(picture.channel(name).unwrap(), expected, "{name}");
+    }
+}
+
+/// Without --web the page is served to this computer, until the program is ended.
+#[test]
+fn exact_the_page_is_served() {
+    let folder = tempfile::tempdir().unwrap();
+    succeed(folder.path(), &["view", "--web", "page"]);
+    let expected = std::fs::read_to_string(folder.path().join("page/index.html")).unwrap();
+    let mut server = Command::new(binary())
+        .args(["view", "--no-browser"])
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut told = String::new();
+    BufReader::new(server.stderr.take().unwrap()).read_line(&mut told).unwrap();
+    let address = told.strip_prefix("http://").unwrap().split('/').next().unwrap().to_owned();
+    let answer = |request: &str| {
+        let mut stream = TcpStream::connect(&address).unwrap();
+        stream
+            .write_all(format!("{request} HTTP/1.1\r\nHost: {address}\r\n\r\n").as_bytes())
+            .unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        answer
+    };
+    let page = answer("GET /?x#y");
+    let elsewhere = ["GET /../Cargo.toml", "POST /", "GET"].map(answer);
+    server.kill().unwrap();
+    server.wait().unwrap();
+    assert!(page.starts_with("HTTP/1.1 200 OK") && page.ends_with(&expected));
+    assert!(elsewhere.iter().all(|answer| answer.starts_with("HTTP/1.1 404")), "{elsewhere:?}");
 }

@@ -84,6 +84,7 @@ function command(width, height) {
   const remove = ["screen.total_flux_jy", "screen.image_error"];
   if (isCamera()) {
     set.camera = `{motion="${GIVEN.motion}",${Object.entries(pose).map(([key, x]) => `${key}=${x}`)}}`;
+    remove.push("observer.inclination_deg", "observer.azimuth_deg", "observer.radius", "screen.field_of_view_m", "screen.field_of_view_uas");
   } else {
     Object.assign(set, { "observer.inclination_deg": short(state.inclination), "observer.azimuth_deg": short(state.azimuth), "screen.field_of_view_m": short(across) });
     remove.push("camera", "screen.field_of_view_uas");
