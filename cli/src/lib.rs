@@ -114,7 +114,7 @@ enum Verb {
     Render(render::Render),
     /// Render a sequence of EXR frames, a GIF or an APNG
     Movie(movie::Movie),
-    /// Show a scene or a fit on a page to fly around it in a browser
+    /// Fly around a scene or a recovered volume in a browser
     View(view::View),
     /// Trace the rays of a table
     Trace(trace::Trace),
