@@ -36,7 +36,7 @@ impl LinearProgress<'_> {
 pub struct LinearSolution<T> {
     /// Emission at the nodes, parameters of the linear grid; knot after knot where it may change.
     pub emission: Vec<T>,
-    /// Parameters of what does not move ([`Quiescent`]), where that is recovered.
+    /// Parameters of what does not move ([`Quiescent`](crate::fit::Quiescent)), where that is recovered.
     pub quiescent: Vec<T>,
     /// How far from the minimum it can be; none if it was cancelled, or the data are not convex in the pixels.
     pub certificate: Option<Certificate>,
