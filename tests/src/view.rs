@@ -217,7 +217,7 @@ fn code_a_picked_ray_is_that_of_the_tracer() {
     assert!(shown.as_str().unwrap().contains("escapes to the sky"), "{shown}");
     // A click picks, a key takes it back, the address holds the view.
     let click =
-        |kind: &str| json!({ "type": kind, "x": 400, "y": 160, "button": "left", "clickCount": 1 });
+        |kind: &str| json!({ "type": kind, "x": 300, "y": 100, "button": "left", "clickCount": 1 });
     for kind in ["mousePressed", "mouseReleased"] {
         browser.call("Input.dispatchMouseEvent", &click(kind));
     }
