@@ -16,7 +16,7 @@ def observation(circular=False, times=(4.0, 5.0)):
     pairs = [(a, b) for i, a in enumerate(NAMES) for b in NAMES[i + 1 :]]
     count = len(pairs) * len(times)
     array = tuple(
-        Station(name, (1e6 * k + 0.5, 2e6, -3e6 * k), (100.0 * k, 90.0), (1.0, 0.5, 45.0), (0.1j, 0.2 + 0j))
+        Station(name, (1e6 * k + 0.5, 2e6, -3e6 * k), (100.0 * k, 90.0), (1.0, -1.0, 30.0), (0.1j, 0.2 + 0j))
         for k, name in enumerate(NAMES)
     )
     products = RNG.normal(size=(count, 4)) + 1j * RNG.normal(size=(count, 4))
@@ -51,6 +51,16 @@ def test_files(tmp_path, ending):
     np.testing.assert_allclose(after.uv[order[0]], before.uv[order[1]], rtol=1e-6)
     np.testing.assert_allclose(after.vis[order[0]], before.vis[order[1]], rtol=1e-5, atol=1e-6)
     np.testing.assert_allclose(after.sigma[order[0]], before.sigma[order[1]], rtol=1e-5, atol=1e-6)
+    if ending == ".uvfits":
+        assert {station.feed_rotation for station in after.array} == {(1.0, -1.0, 30.0)}
+
+
+def test_feeds_without_a_code_are_refused(tmp_path):
+    before = observation(circular=True)
+    odd = replace(before, array=tuple(replace(s, feed_rotation=(1.0, 0.5, 45.0)) for s in before.array))
+    with pytest.raises(ValueError, match="station AA: feeds that turn with 1 times the parallactic angle and 0.5"):
+        odd.write(tmp_path / "data.uvfits")
+    assert not (tmp_path / "data.uvfits").exists()
 
 
 def test_what_is_not_a_file_of_visibilities(tmp_path):
