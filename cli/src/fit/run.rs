@@ -64,7 +64,7 @@ impl<'a> Prepared<'a> {
         if let Some(unknown) = file.unknown_world()? {
             // What contradicts it is told before anything is written.
             let world = setup::known_world(&file);
-            setup::in_world(&file, &unknown, &instrument, &measured, (&world, 0))?;
+            setup::in_world(&file, &unknown, &instrument, &measured, &world, 0)?;
         }
         let prepared = Self { file, registry, instrument, measured, motion };
         let seen = prepared.objective(&prepared.instrument, &prepared.motion)?.observed().len();

@@ -55,7 +55,7 @@ pub fn place(
     }
     let world = world_of(file, &unknown.free()?, &results)
         .with_context(|| format!("{} is damaged: remove it to look again", path.display()))?;
-    Ok(Some(placed(file, &unknown, instrument, measured, (&world, 0))?))
+    Ok(Some(placed(file, &unknown, instrument, measured, &world, 0)?))
 }
 
 /// Settings, rays (those of this number near the critical curve) and motion in a world.
@@ -64,10 +64,11 @@ pub fn placed(
     unknown: &UnknownWorld,
     instrument: &Instrument,
     measured: &Measured,
-    world: (&World, u64),
+    world: &World,
+    rays: u64,
 ) -> anyhow::Result<Placed> {
-    let (instrument, motion) = setup::in_world(file, unknown, instrument, measured, world)?;
-    Ok(Placed { file: settled(file, unknown, world.0), instrument, motion })
+    let (instrument, motion) = setup::in_world(file, unknown, instrument, measured, world, rays)?;
+    Ok(Placed { file: settled(file, unknown, world), instrument, motion })
 }
 
 /// Names and values of the free parameters of a world, in their units.

@@ -126,13 +126,9 @@ impl Texture {
     }
 }
 
-/// The nearest half float of a number in [0, 1]; below 2^-14 they lie 2^-24 apart.
+/// The bits of the nearest half float of a number, 0 for those below.
 fn half(value: f32) -> u16 {
-    if value < f32::from_bits(0x3880_0000) {
-        return (value.max(0.0) * 16_777_216.0).round() as u16;
-    }
-    let bits = value.to_bits();
-    ((bits + 0x0fff + (bits >> 13 & 1)) >> 13) as u16 - (112 << 10)
+    half::f16::from_f32(value.max(0.0)).to_bits()
 }
 
 /// What the page is told of the spots.

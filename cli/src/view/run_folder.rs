@@ -3,9 +3,9 @@
 use crate::output;
 use crate::volume_files;
 use anyhow::{Context, bail, ensure};
+use kerrlight_tomo::numpy::{Archive, read_array};
 use kerrlight_tomo::scene::Scene;
 use kerrlight_tomo::volume::VolumeFile;
-use std::io::{Cursor, Read};
 use std::path::{Path, PathBuf};
 
 /// Pictures that a fit was made of.
@@ -49,29 +49,13 @@ pub fn measured_of(folder: &Path, scene: &Scene) -> anyhow::Result<Option<Measur
 
 fn read(path: &Path, field: f64) -> anyhow::Result<Option<Measured>> {
     let bytes = output::read(path)?;
-    let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).context("damaged NPZ archive")?;
-    let Some(data) = member(&mut archive, "data")? else { return Ok(None) };
-    let times = member(&mut archive, "time")?.context("no array named time")?;
-    let data = npyz::NpyFile::new(&data[..]).context("array data")?;
-    let shape = data.shape().to_vec();
-    let pixels = data.into_vec::<f32>().context("array data")?;
-    let times = npyz::NpyFile::new(&times[..]).and_then(npyz::NpyFile::into_vec::<f64>);
-    let times = times.context("array time")?;
+    let mut archive = Archive::open(&bytes)?;
+    let Some(data) = archive.member("data")? else { return Ok(None) };
+    let (shape, pixels) = read_array(&data).context("array data")?;
+    let times = archive.member("time")?.context("no array named time")?;
+    let (_, times) = read_array(&times).context("array time")?;
     let square = matches!(shape[..], [frames, height, width] if height == width && frames as usize == times.len());
     ensure!(square && !times.is_empty(), "array data: shape {shape:?} with {} times", times.len());
+    let pixels = pixels.into_iter().map(|x| x as f32).collect();
     Ok(Some(Measured { times, side: shape[1] as usize, field, pixels }))
-}
-
-/// An array of the archive, if it is there.
-fn member(
-    archive: &mut zip::ZipArchive<Cursor<Vec<u8>>>,
-    name: &str,
-) -> anyhow::Result<Option<Vec<u8>>> {
-    let mut file = match archive.by_name(&format!("{name}.npy")) {
-        Err(zip::result::ZipError::FileNotFound) => return Ok(None),
-        file => file.with_context(|| format!("array {name}"))?,
-    };
-    let mut bytes = Vec::new();
-    file.read_to_end(&mut bytes).with_context(|| format!("array {name}"))?;
-    Ok(Some(bytes))
 }

@@ -25,10 +25,13 @@ pub fn serve(page: &Page, port: Option<u16>, browser: bool) -> anyhow::Result<()
     if browser {
         open(&address);
     }
-    for stream in listener.incoming().flatten() {
-        // A browser that goes away is no failure.
-        let _ = answer(page, stream);
-    }
+    std::thread::scope(|scope| {
+        for stream in listener.incoming().flatten() {
+            // Browsers open connections ahead of need: a silent one must not hold up the others, and one that goes away is
+            // no failure.
+            scope.spawn(move || answer(page, stream));
+        }
+    });
     Ok(())
 }
 

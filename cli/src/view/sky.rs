@@ -5,6 +5,7 @@ use anyhow::Context;
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 use kerrlight_tomo::emission::sky::{Beam, SkyModel};
+use kerrlight_tomo::image::preview::srgb_of_linear;
 use rayon::prelude::*;
 
 const WIDTH: usize = 2048;
@@ -19,7 +20,7 @@ pub fn panorama(subject: &Subject) -> anyhow::Result<Option<(Vec<u8>, f64)>> {
         (0..WIDTH * HEIGHT).into_par_iter().map(|k| mean(&model, k)).collect();
     let most = light.iter().flatten().copied().fold(0.0, f32::max);
     let most = if most > 0.0 { most } else { 1.0 };
-    let bytes: Vec<u8> = light.iter().flatten().map(|x| encoded(x / most)).collect();
+    let bytes: Vec<u8> = light.iter().flatten().map(|x| srgb_of_linear(x / most)).collect();
     let mut png = Vec::new();
     let encoder = PngEncoder::new(&mut png);
     let size = (WIDTH as u32, HEIGHT as u32);
@@ -34,10 +35,4 @@ fn mean(model: &SkyModel, k: usize) -> [f32; 3] {
     let ((s, c), (y, x)) = (polar.sin_cos(), azimuth.sin_cos());
     let side = core::f64::consts::PI / HEIGHT as f64;
     model.mean_color(&Beam::of_circle([s * x, s * y, c], 0.4 * side))
-}
-
-/// sRGB of linear light (IEC 61966-2-1).
-fn encoded(x: f32) -> u8 {
-    let y = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
-    (255.0 * y).round().clamp(0.0, 255.0) as u8
 }

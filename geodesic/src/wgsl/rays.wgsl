@@ -145,25 +145,6 @@ fn kerr_cross(
     );
 }
 
-// Where in the step the radius turns, if it does; else its end.
-fn kerr_turning(series: ptr<function, KerrSeries>, x: f32) -> f32 {
-    let rises = (*series).v[1] > 0.0;
-    if (kerr_radial(series, x).y > 0.0) == rises {
-        return x;
-    }
-    var low = 0.0;
-    var high = x;
-    for (var i = 0u; i < 22u; i++) {
-        let middle = 0.5 * (low + high);
-        if (kerr_radial(series, middle).y > 0.0) == rises {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    return 0.5 * (low + high);
-}
-
 // Takes where the step turns, enters the sphere and leaves it.
 fn kerr_reach(ray: KerrRay, walk: KerrWalk, series: ptr<function, KerrSeries>, x: f32, end: ptr<function, KerrEnd>) {
     if kerr_task.sphere <= 0.0 {

@@ -181,6 +181,25 @@ fn kerr_solve(series: ptr<function, KerrSeries>, polar: bool, value: f32, start:
     return x;
 }
 
+// Where in the step the radius turns, if it does; else its end.
+fn kerr_turning(series: ptr<function, KerrSeries>, x: f32) -> f32 {
+    let rises = (*series).v[1] > 0.0;
+    if (kerr_radial(series, x).y > 0.0) == rises {
+        return x;
+    }
+    var low = 0.0;
+    var high = x;
+    for (var i = 0u; i < 22u; i++) {
+        let middle = 0.5 * (low + high);
+        if (kerr_radial(series, middle).y > 0.0) == rises {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return 0.5 * (low + high);
+}
+
 // The angle about the axis from one horizontal direction to another, in the sense of the ray.
 fn kerr_turn(sense: f32, from_: vec2<f32>, to: vec2<f32>) -> f32 {
     let angle = kerr_angle(from_.x * to.y - from_.y * to.x, dot(from_, to));

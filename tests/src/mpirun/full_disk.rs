@@ -21,7 +21,7 @@ cp -r disk/. kept/
 
 /// Runs a job of ranks on a disk of `kib`, which is too small, and another with room there; nothing where no disk can be
 /// mounted or there is no `mpirun`. The first ends with one message.
-fn twice(at: &Path, (kib, ranks): (u64, usize), [first, second]: [&[&str]; 2]) -> Option<()> {
+fn twice(at: &Path, kib: u64, ranks: usize, first: &[&str], second: &[&str]) -> Option<()> {
     start_with(at, 1, &["--version"])?.wait().unwrap();
     let mut command = Command::new("unshare");
     command.args(["--mount", "--map-root-user", "--user", "sh", "-c", SCRIPT]).current_dir(at);
@@ -73,7 +73,7 @@ fn exact_ranks_of_mpirun_render_on_after_a_full_disk() {
     let alone = whole(at, "input/out.exr");
     std::fs::remove_file(input.join("out.exr")).unwrap();
     let kib = alone.len() as u64 / 2048;
-    if twice(at, (kib, 3), [&words; 2]).is_some() {
+    if twice(at, kib, 3, &words, &words).is_some() {
         assert!(whole(at, "kept/out.exr") == alone);
     }
 }
@@ -87,7 +87,7 @@ fn exact_ranks_of_mpirun_compare_on_after_a_full_disk() {
     experiment(&input, 8, 10);
     let words = ["compare", "seeds.toml", "-o", "out", "--threads", "1"];
     succeed(at, &["compare", "input/seeds.toml", "-o", "alone"]);
-    if twice(at, (size(at, "alone") / 2, 4), [&words; 2]).is_some() {
+    if twice(at, size(at, "alone") / 2, 4, &words, &words).is_some() {
         assert_eq!(claims(&at.join("kept/out"), ".done"), 8);
         super::compare::same(at, "alone", "kept/out");
     }
@@ -106,7 +106,7 @@ fn exact_ranks_of_mpirun_fit_on_after_a_full_disk() {
     succeed(&at.join("disk"), &["fit", "fit.toml", "-o", "../alone", "--threads", "1"]);
     let first = ["fit", "fit.toml", "-o", "out", "--threads", "1"];
     let second = ["fit", "--resume", "out", "--threads", "1"];
-    if twice(at, (size(at, "alone") * 3 / 5, 3), [&first, &second]).is_some() {
+    if twice(at, size(at, "alone") * 3 / 5, 3, &first, &second).is_some() {
         for name in ["checkpoint.safetensors", "volume.npz", "movie.npz"] {
             let [a, b] = ["alone", "kept/out"].map(|run| whole(at, &format!("{run}/{name}")));
             assert!(a == b, "{name}: {} and {} bytes", a.len(), b.len());

@@ -116,12 +116,14 @@ fn mapped(values: &[f32], map: Colormap, stretch: Stretch, white: f32) -> Vec<u8
 fn colored(picture: &Picture, white: f32) -> Result<Vec<u8>, Error> {
     let [r, g, b] = ["R", "G", "B"].map(|name| channel(picture, name));
     let (r, g, b) = (r?, g?, b?);
-    let encode = |c: f32| {
-        let c = (c / white).clamp(0.0, 1.0);
-        let c = if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
-        (c * 255.0).round() as u8
-    };
-    Ok((0..r.len()).flat_map(|k| [r[k], g[k], b[k]].map(encode)).collect())
+    Ok((0..r.len()).flat_map(|k| [r[k], g[k], b[k]].map(|c| srgb_of_linear(c / white))).collect())
+}
+
+/// The byte that sRGB has for linear light, 1 being white (IEC 61966-2-1); light outside of 0 to 1 is cut off.
+pub fn srgb_of_linear(c: f32) -> u8 {
+    let c = c.clamp(0.0, 1.0);
+    let c = if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
+    (c * 255.0).round() as u8
 }
 
 #[cfg(test)]

@@ -265,9 +265,9 @@ impl<'a> Drawing<'a> {
         };
         told("the world");
         let data = worlds.data(noise)?;
-        let world = worlds.draw(&data, (number, sample::prior_seed(&file)))?;
+        let world = worlds.draw(&data, number, sample::prior_seed(&file))?;
         let Placed { file, instrument, motion } =
-            world_search::placed(&file, unknown, instrument, measured, (&world, number))?;
+            world_search::placed(&file, unknown, instrument, measured, &world, number)?;
         let through = Through { file: &file, instrument: &instrument, motion: &motion, registry };
         let drawn = sample::draw(&through, &data, keeper, told)?;
         let values = world_search::values_of(&unknown.free()?, &world);

@@ -34,7 +34,7 @@ fn follow() {
             trail[2u + crossings] = vec4<f32>(1.0 / p.inverse_radius, p.azimuth, p.delay + view.delay, p.mino_time);
             crossings++;
         }
-        nearest = max(nearest, (kerr_radial(&series, turning(&series, h)).x + ray.centre) / ray.b);
+        nearest = max(nearest, (kerr_radial(&series, kerr_turning(&series, h)).x + ray.centre) / ray.b);
         for (var k = 0.0; k < 12.0; k += 1.0) {
             take(kerr_point(view.hole, ray, walk, &series, h * k / 12.0), &points);
         }

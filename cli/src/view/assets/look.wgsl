@@ -79,32 +79,13 @@ fn inside(
     return between(ray, walk, series, start, stop);
 }
 
-// Where in a step the radius turns, if it does; else its end.
-fn turning(series: ptr<function, KerrSeries>, h: f32) -> f32 {
-    let rises = (*series).v[1] > 0.0;
-    if (kerr_radial(series, h).y > 0.0) == rises {
-        return h;
-    }
-    var low = 0.0;
-    var high = h;
-    for (var i = 0u; i < 22u; i++) {
-        let middle = 0.5 * (low + high);
-        if (kerr_radial(series, middle).y > 0.0) == rises {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    return 0.5 * (low + high);
-}
-
 // Light of what fills space, up to a place in a step.
 fn filled(ray: KerrRay, walk: KerrWalk, series: ptr<function, KerrSeries>, stop: f32) -> vec4<f32> {
     if view.march.x <= 0.0 {
         return vec4<f32>(0.0);
     }
     let edge = ray.b / view.march.x - ray.centre;
-    let turn = turning(series, stop);
+    let turn = kerr_turning(series, stop);
     return inside(ray, walk, series, edge, vec2<f32>(0.0, turn))
         + inside(ray, walk, series, edge, vec2<f32>(turn, stop));
 }

@@ -96,12 +96,18 @@ struct Place {
 }
 
 impl Place {
+    /// The largest number of the gradient.
     fn slope(&self) -> f64 {
-        self.state.numbers[..self.white.len()].iter().fold(0.0f64, |most, g| most.max(g.abs()))
+        self.gradient().iter().fold(0.0f64, |most, g| most.max(g.abs()))
     }
 
+    /// The length of the gradient.
     fn violation(&self) -> f64 {
-        self.state.numbers[..self.white.len()].iter().map(|g| g * g).sum::<f64>().sqrt()
+        self.gradient().iter().map(|g| g * g).sum::<f64>().sqrt()
+    }
+
+    fn gradient(&self) -> &[f64] {
+        &self.state.numbers[..self.white.len()]
     }
 }
 

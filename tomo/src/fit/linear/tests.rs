@@ -13,6 +13,7 @@ use crate::representation::{Knots, Workspace};
 use core::ops::ControlFlow;
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
 use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 
 mod changing;
@@ -58,6 +59,31 @@ fn forward_model_of(velocity: AngularVelocity, unit: f64) -> ForwardModel<f64> {
 
 fn axis() -> Axis {
     Axis::new([0.3, -0.2, 0.9]).unwrap()
+}
+
+fn normal(count: usize, seed: u64) -> Vec<f64> {
+    let mut random = Pcg64::seed_from_u64(seed);
+    (0..count).map(|_| random.sample::<f64, _>(StandardNormal)).collect()
+}
+
+/// A problem without penalties, priors or a bound that acts.
+fn of_images<'a>(
+    model: &'a ForwardModel<f64>,
+    terms: &'a [Weighted<'a, f64>],
+    voxels: Voxels,
+) -> LinearProblem<'a, f64> {
+    LinearProblem {
+        model,
+        axis: axis(),
+        frames: &FRAMES,
+        terms,
+        voxels,
+        upper: 1e3,
+        flux: None,
+        priors: &[],
+        gaussian: None,
+        change: Change::NONE,
+    }
 }
 
 fn random(count: usize, seed: u64) -> Vec<f64> {

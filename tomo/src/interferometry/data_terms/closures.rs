@@ -1,11 +1,11 @@
 //! Closure phases and log closure amplitudes, with the covariance of those that share baselines.
 
-use super::{DataTerm, DataTermError, Residual, faintest};
+use super::{DARK, DataTerm, DataTermError, Residual, faintest, wrapped};
 use crate::Error;
 use crate::interferometry::observation::Observation;
 use crate::interferometry::operator::Float;
 use crate::interferometry::products::{ClosureKind, ClosureSet};
-use core::f64::consts::{PI, TAU};
+use core::f64::consts::PI;
 use nalgebra::DMatrix;
 use num_complex::Complex;
 
@@ -119,17 +119,8 @@ impl<T: Float> Scan<T> {
     }
 }
 
-/// The residual of a log closure amplitude of a model without visibility.
-const DARK: f64 = 100.0;
-
 fn is_dark<T: Float>(visibility: Complex<T>) -> bool {
     visibility.norm() <= faintest()
-}
-
-/// The same angle in [−π, π].
-fn wrapped<T: Float>(angle: T) -> T {
-    let turns = (angle / T::of(TAU)).round();
-    (angle - turns * T::of(TAU)).max(T::of(-PI)).min(T::of(PI))
 }
 
 impl<T: Float> DataTerm<T> for ClosureTerm<T> {

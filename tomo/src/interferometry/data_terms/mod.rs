@@ -17,6 +17,7 @@ pub use visibilities::{AmplitudeTerm, VisibilityTerm};
 
 use super::observation::{Measured, Observation};
 use super::operator::Float;
+use core::f64::consts::{PI, TAU};
 use num_complex::Complex;
 
 /// Why data make no term.
@@ -72,6 +73,15 @@ pub struct Residual {
     pub datum: f64,
     /// Indices of the stations of the baseline, triangle or quadrangle; none for data that no stations measured.
     pub stations: Vec<u16>,
+}
+
+/// The residual of the logarithm of a closure quantity that a model has not: such a model is worse than one that shines.
+const DARK: f64 = 100.0;
+
+/// The same angle in [−π, π].
+fn wrapped<T: Float>(angle: T) -> T {
+    let turns = (angle / T::of(TAU)).round();
+    (angle - turns * T::of(TAU)).max(T::of(-PI)).min(T::of(PI))
 }
 
 /// A χ² of model visibilities.

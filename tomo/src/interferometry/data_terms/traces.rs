@@ -1,6 +1,6 @@
 //! Closure traces of a model with I, Q and U.
 
-use super::{DataTerm, DataTermError, Residual};
+use super::{DARK, DataTerm, DataTermError, Residual, wrapped};
 use crate::Error;
 use crate::interferometry::Complex64;
 use crate::interferometry::observation::{Basis, Observation};
@@ -9,7 +9,7 @@ use crate::interferometry::polarimetry::MODELLED;
 use crate::interferometry::products::{
     ClosureTrace, Coherency, LogTrace, TracePart, TraceQuantity, TraceSet,
 };
-use core::f64::consts::{PI, TAU};
+use core::f64::consts::PI;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex;
 
@@ -27,9 +27,6 @@ struct Scan {
     /// Lower triangle F of C⁻¹ = F Fᵀ: Fᵀ r are independent.
     factor: DMatrix<f64>,
 }
-
-/// The residual of ln|T| of a model that has no trace.
-const DARK: f64 = 100.0;
 
 impl TraceTerm {
     /// Of the rows of an observation that have all four products and whose Stokes I is stronger than `least_snr` times its
@@ -100,7 +97,7 @@ impl Scan {
             let difference = log.map(|log| quantity.part.of(log.value) - quantity.value);
             match quantity.part {
                 TracePart::LogAmplitude => difference.unwrap_or(DARK),
-                TracePart::Phase => difference.map_or(PI, |x| x - (x / TAU).round() * TAU),
+                TracePart::Phase => difference.map_or(PI, wrapped),
             }
         };
         DVector::from_iterator(logs.len(), self.quantities.iter().zip(logs).map(one))

@@ -2,7 +2,6 @@
 
 use super::*;
 use nalgebra::{DMatrix, DVector};
-use rand_distr::StandardNormal;
 
 const SIGMA: f64 = 0.4;
 const NODES: usize = 5;
@@ -15,11 +14,6 @@ fn prior(roughness: Roughness) -> GaussianField {
     // So far above 0 that no bound acts.
     let law = Matern { mean: 6.0, amplitude: 0.5, correlation_length: 4.0, roughness };
     GaussianField::new(law, &voxels()).unwrap()
-}
-
-fn normal(count: usize, seed: u64) -> Vec<f64> {
-    let mut random = Pcg64::seed_from_u64(seed);
-    (0..count).map(|_| random.sample::<f64, _>(StandardNormal)).collect()
 }
 
 /// The data of a field that the prior gives.
@@ -46,16 +40,8 @@ impl Simulated {
     ) -> R {
         let term = ImageTerm::new(data.to_vec(), self.model.pixels(), SIGMA).unwrap();
         f(&LinearProblem {
-            model: &self.model,
-            axis: axis(),
-            frames: &FRAMES,
-            terms: &[Weighted { weight: 1.0, term: &term }],
-            voxels: voxels(),
-            upper: 1e3,
-            flux: None,
-            priors: &[],
             gaussian: Some(prior),
-            change: Change::NONE,
+            ..of_images(&self.model, &[Weighted { weight: 1.0, term: &term }], voxels())
         })
     }
 

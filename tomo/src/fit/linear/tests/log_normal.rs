@@ -4,7 +4,6 @@ use super::super::log_normal::Posterior;
 use super::super::objective::Objective;
 use super::super::operator::Operator;
 use super::*;
-use rand_distr::StandardNormal;
 
 const NODES: usize = 6;
 
@@ -17,11 +16,6 @@ fn prior(roughness: Roughness) -> LogNormalField {
     LogNormalField::new(law, &voxels()).unwrap()
 }
 
-fn normal(count: usize, seed: u64) -> Vec<f64> {
-    let mut random = Pcg64::seed_from_u64(seed);
-    (0..count).map(|_| random.sample::<f64, _>(StandardNormal)).collect()
-}
-
 /// Hands the problem of data with a noise of `sigma` to a function.
 fn with<R>(sigma: f64, truth: &[f64], f: impl FnOnce(&LinearProblem<'_, f64>) -> R) -> R {
     let model = forward_model();
@@ -29,18 +23,7 @@ fn with<R>(sigma: f64, truth: &[f64], f: impl FnOnce(&LinearProblem<'_, f64>) ->
     let noise = normal(data.len(), 4);
     data.iter_mut().zip(noise).for_each(|(pixel, n)| *pixel += sigma * n);
     let term = ImageTerm::new(data, model.pixels(), sigma).unwrap();
-    f(&LinearProblem {
-        model: &model,
-        axis: axis(),
-        frames: &FRAMES,
-        terms: &[Weighted { weight: 1.0, term: &term }],
-        voxels: voxels(),
-        upper: 1e3,
-        flux: None,
-        priors: &[],
-        gaussian: None,
-        change: Change::NONE,
-    })
+    f(&of_images(&model, &[Weighted { weight: 1.0, term: &term }], voxels()))
 }
 
 fn solved(problem: &LinearProblem<'_, f64>, prior: &LogNormalField) -> LinearSolution<f64> {

@@ -54,7 +54,7 @@ pub(super) fn seen_in_truth(
     let plain = motion(simulated, Vec::new())?;
     let mut dense = simulated.clone();
     dense.screen.ring_rays = dense.screen.ring_rays.map(|rays| (DENSER * rays).min(MOST_RAYS));
-    Ok(through(&dense, &unknown, &instrument, &plain, (&true_world(file)?, 0))?.0)
+    Ok(through(&dense, &unknown, &instrument, &plain, &true_world(file)?, 0)?.0)
 }
 
 /// So many times the rays near the critical curve of a fit are those of a simulation of a drawn world, up to
@@ -73,9 +73,10 @@ pub fn in_world(
     unknown: &UnknownWorld,
     instrument: &Instrument,
     measured: &Measured,
-    world: (&World, u64),
+    world: &World,
+    rays: u64,
 ) -> Result<(Instrument, Motion)> {
-    through(file, unknown, instrument, &motion(file, measured.times.clone())?, world)
+    through(file, unknown, instrument, &motion(file, measured.times.clone())?, world, rays)
 }
 
 fn through(
@@ -83,7 +84,8 @@ fn through(
     unknown: &UnknownWorld,
     instrument: &Instrument,
     plain: &Motion,
-    (world, rays): (&World, u64),
+    world: &World,
+    rays: u64,
 ) -> Result<(Instrument, Motion)> {
     let model = model(file, unknown, instrument, plain)?.seen_along(rays);
     let power = world.get(Parameter::RedshiftPower);

@@ -143,7 +143,7 @@ impl<'a> WorldPosterior<'a> {
     ///
     /// # Errors
     /// As [`new`](Self::new).
-    pub fn draw(&self, measured: &Measured, (number, field): (u64, u64)) -> Result<World> {
+    pub fn draw(&self, measured: &Measured, number: u64, field: u64) -> Result<World> {
         let seen = Seen::new(self.file, measured, &self.unknown.search.fine)?;
         seen.with(self.unknown, &self.unknown.search.fine, self.scale, |problem| {
             let gaussian = problem.gaussian.map(|prior| prior.clone().about(prior.drawn(field)));

@@ -92,25 +92,13 @@ fn header(cards: &mut Cards, mjd: i32, frequency_hz: f64) {
 #[cfg(test)]
 mod tests {
     use super::super::super::fits::{self, Table};
+    use super::super::tests::observed;
     use super::super::write;
-    use crate::interferometry::array::built_in;
-    use crate::interferometry::earth::{Frame, SourcePosition, Ut1};
-    use crate::interferometry::schedule::{Clock, Schedule, Setup, observe};
+    use crate::interferometry::earth::Frame;
 
     /// The bytes of a file, one scan at 10 h of MJD 57850.
     fn file(frame: Frame) -> Vec<u8> {
-        let schedule =
-            Schedule { mjd: 57850, clock: Clock::Utc, start_h: 10.0, stop_h: 11.0, scans: 1 };
-        let setup = Setup {
-            frequency_hz: 230e9,
-            bandwidth_hz: 2e9,
-            integration_s: 60.0,
-            elevation_deg: [0.0, 90.0],
-            ut1: Ut1::Table,
-            frame,
-        };
-        let array = built_in("EHT2017").unwrap();
-        write(&observe(&array, SourcePosition::SGR_A, &schedule, &setup).unwrap()).unwrap()
+        write(&observed(frame, [10.0, 11.0], 1)).unwrap()
     }
 
     /// What pyuvdata 3.2 complains of, what Difmap's reader asks for, and what was found wrong in other writers for it: no frame,

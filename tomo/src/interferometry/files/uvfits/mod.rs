@@ -9,7 +9,7 @@ mod mounts;
 mod read;
 #[cfg(test)]
 pub(super) mod tests;
-mod third_coordinate;
+mod w_coordinate;
 mod write;
 
 pub use read::read;

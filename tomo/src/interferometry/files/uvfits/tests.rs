@@ -3,9 +3,10 @@
 use super::super::fits::{Cards, ColumnData, binary_table, padded};
 use super::*;
 use crate::interferometry::Complex64;
-use crate::interferometry::array::Station;
-use crate::interferometry::earth::SourcePosition;
+use crate::interferometry::array::{Station, built_in};
+use crate::interferometry::earth::{Frame, SourcePosition, Ut1};
 use crate::interferometry::observation::{Basis, Channel, Measured, Observation, Row};
+use crate::interferometry::schedule::{Clock, Schedule, Setup, observe};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -48,6 +49,20 @@ pub(in crate::interferometry::files) fn small() -> Observation {
         row(6.0, [1, 2], [zero, c(3.0, 0.25), zero, zero], [none, 0.125, none, none]),
     ];
     observation
+}
+
+/// Scans of Sgr A* by the array of 2017, between two hours of UTC of MJD 57850.
+pub(super) fn observed(frame: Frame, [start_h, stop_h]: [f64; 2], scans: u32) -> Observation {
+    let schedule = Schedule { mjd: 57850, clock: Clock::Utc, start_h, stop_h, scans };
+    let setup = Setup {
+        frequency_hz: 226_191_789_062.5,
+        bandwidth_hz: 1.856e9,
+        integration_s: 60.0,
+        elevation_deg: [0.0, 90.0],
+        ut1: Ut1::Table,
+        frame,
+    };
+    observe(&built_in("EHT2017").unwrap(), SourcePosition::SGR_A, &schedule, &setup).unwrap()
 }
 
 fn same(a: &Row, b: &Row) -> bool {

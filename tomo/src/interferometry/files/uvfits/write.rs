@@ -2,7 +2,7 @@
 
 use super::super::FileError;
 use super::super::fits::{Cards, padded};
-use super::{antenna_table, frequencies, third_coordinate};
+use super::{antenna_table, frequencies, w_coordinate};
 use crate::Error;
 use crate::interferometry::earth::SourcePosition;
 use crate::interferometry::observation::{Basis, Channel, Observation, Row, Unknown};
@@ -74,7 +74,7 @@ pub fn write(observation: &Observation) -> Result<Vec<u8>, Error> {
         facts.uv_scale = facts.frequency_hz.recip();
     }
     let groups = groups(&observation.rows);
-    let w = third_coordinate::w_seconds(&observation, groups.iter().map(|rows| &rows[0]));
+    let w = w_coordinate::w_seconds(&observation, groups.iter().map(|rows| &rows[0]));
     let mut bytes = primary_header(&observation, groups.len(), &facts);
     bytes.extend(group_bytes(&groups, &w, &facts));
     bytes.extend(antenna_table::table(

@@ -84,29 +84,17 @@ impl<'a> Baselines<'a> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::observed;
     use super::*;
-    use crate::interferometry::array::built_in;
-    use crate::interferometry::schedule::{Clock, Schedule, Setup, observe};
 
-    fn observed(frame: Frame) -> Observation {
-        let schedule =
-            Schedule { mjd: 57850, clock: Clock::Utc, start_h: 4.0, stop_h: 15.5, scans: 16 };
-        let setup = Setup {
-            frequency_hz: 226_191_789_062.5,
-            bandwidth_hz: 1.856e9,
-            integration_s: 60.0,
-            elevation_deg: [10.0, 85.0],
-            ut1: Ut1::Table,
-            frame,
-        };
-        observe(&built_in("EHT2017").unwrap(), SourcePosition::SGR_A, &schedule, &setup).unwrap()
-    }
+    /// Hours of UTC in which some stations see the source.
+    const NIGHT: [f64; 2] = [4.0, 15.5];
 
     /// The length of a baseline does not depend on where it is seen from.
     #[test]
     fn exact_lengths_of_baselines() {
         for frame in [Frame::Catalogue, Frame::OfDate] {
-            let observation = observed(frame);
+            let observation = observed(frame, NIGHT, 16);
             let w = w_seconds(&observation, observation.rows.iter());
             for (row, w) in observation.rows.iter().zip(w) {
                 let [u, v] = row.uv.map(|x| x / 226_191_789_062.5);
@@ -123,7 +111,7 @@ mod tests {
 
     #[test]
     fn exact_no_w_where_positions_do_not_make_the_uv() {
-        let mut observation = observed(Frame::Catalogue);
+        let mut observation = observed(Frame::Catalogue, NIGHT, 16);
         let w = |observation: &Observation| w_seconds(observation, observation.rows.iter());
         assert!(w(&observation).iter().any(|w| w.abs() > 0.01));
         for row in &mut observation.rows {
