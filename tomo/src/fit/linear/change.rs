@@ -5,6 +5,8 @@
 //! carries unchanged, a small one a field that is free at each time.
 
 use crate::Error;
+use crate::fit::Region;
+use crate::fit::regulariser::Shape;
 use crate::representation::{Allowed, Knots};
 
 /// How emission may change.
@@ -14,6 +16,12 @@ pub struct Change {
     pub knots: Knots,
     /// Factor on ∫∫ |∂ε/∂t| dV dt.
     pub weight: f64,
+    /// Where emission is born, and is at the start; anywhere, if none is given. What matter would carry in from elsewhere
+    /// has to be born at the edge then, at the price of all births. Fields that may also fade are not bound to it.
+    pub within: Option<Region>,
+    /// An emission s, if births that were found are to cost less in the rounds that follow: `weight` · s/(s + e) with e
+    /// around them in the round before.
+    pub sharpen: Option<f64>,
 }
 
 /// Differences are smoothed below this part of the largest emission.
@@ -21,7 +29,7 @@ const SMOOTH: f64 = 1e-3;
 
 impl Change {
     /// A field that does not change.
-    pub const NONE: Self = Self { knots: Knots::STEADY, weight: 0.0 };
+    pub const NONE: Self = Self { knots: Knots::STEADY, weight: 0.0, within: None, sharpen: None };
 
     /// Itself, if its numbers are in their ranges.
     ///
@@ -36,6 +44,8 @@ impl Change {
         check("spacing of knots", spacing, spacing > 0.0 && spacing.is_finite(), "above 0")?;
         let weight = self.weight;
         check("weight of change", weight, weight >= 0.0 && weight.is_finite(), "0 or above")?;
+        let sharpen = self.sharpen.unwrap_or(1.0);
+        check("sharpen", sharpen, sharpen > 0.0 && sharpen.is_finite(), "above 0")?;
         Ok(self)
     }
 
@@ -51,6 +61,14 @@ impl Change {
 
     fn is_born(&self) -> bool {
         self.is_any() && self.knots.allowed == Allowed::Births
+    }
+
+    /// Whether a node of a grid, at the time of its knot, is where emission may be; above and below that, whether some of
+    /// its cells are. Nodes beyond the largest radius would be a store that costs nothing: matter falls in from there.
+    pub(super) fn allows(&self, position: [f64; 3], spacing: f64) -> bool {
+        let within = self.within.filter(|_| self.is_born());
+        let higher = |region: Region| Region { z_width: region.z_width + 0.5 * spacing, ..region };
+        within.is_none_or(|region| higher(region).holds(position))
     }
 
     /// Whether the penalty is linear, or none.
@@ -70,11 +88,20 @@ impl Change {
         knots.flat_map(|share| field.iter().map(move |x| share * x)).collect()
     }
 
+    /// What births of all nodes and knots but the first cost beside `weight`, after a field was found; nothing, if all cost the same.
+    pub(super) fn prices(&self, x: &[f64], shape: Shape) -> Vec<f64> {
+        let Some(s) = self.sharpen.filter(|_| self.is_born()) else { return Vec::new() };
+        let born = x[..shape.count() * self.knots.count].chunks_exact(shape.count()).skip(1);
+        let price = |e: f64| s / (s + e);
+        born.flat_map(|field| around(field, shape.nodes)).map(price).collect()
+    }
+
     /// The penalty on values at the nodes of all knots, with cells of this volume (M³); adds its slopes.
     pub(super) fn penalty(
         &self,
         x: &[f64],
         (cell, upper): (f64, f64),
+        prices: &[f64],
         gradient: &mut [f64],
     ) -> f64 {
         let factor = self.weight * cell;
@@ -83,8 +110,7 @@ impl Change {
         }
         let nodes = x.len() / self.knots.count;
         if self.is_born() {
-            gradient[nodes..].iter_mut().for_each(|slope| *slope += factor);
-            return factor * x[nodes..].iter().sum::<f64>();
+            return births(factor, &x[nodes..], prices, &mut gradient[nodes..]);
         }
         let epsilon = SMOOTH * upper;
         let mut sum = 0.0;
@@ -99,12 +125,38 @@ impl Change {
     }
 }
 
+/// A field with a half of each number shared with its two neighbours, along each axis.
+fn around(field: &[f64], [nx, ny, nz]: [usize; 3]) -> Vec<f64> {
+    let mut field = field.to_vec();
+    for (stride, n) in [(1, nz), (nz, ny), (ny * nz, nx)] {
+        let shared = |k: usize| {
+            let place = k / stride % n;
+            let before = if place > 0 { field[k - stride] } else { 0.0 };
+            let after = if place + 1 < n { field[k + stride] } else { 0.0 };
+            0.5 * field[k] + 0.25 * (before + after)
+        };
+        field = (0..field.len()).map(shared).collect();
+    }
+    field
+}
+
+/// The sum of births times their prices, one without any; adds slopes.
+fn births(factor: f64, x: &[f64], prices: &[f64], slopes: &mut [f64]) -> f64 {
+    if prices.is_empty() {
+        slopes.iter_mut().for_each(|slope| *slope += factor);
+        return factor * x.iter().sum::<f64>();
+    }
+    slopes.iter_mut().zip(prices).for_each(|(slope, price)| *slope += factor * price);
+    factor * x.iter().zip(prices).map(|(x, price)| x * price).sum::<f64>()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn change(allowed: Allowed) -> Change {
-        Change { knots: Knots { first: 0.0, spacing: 2.0, count: 3, allowed }, weight: 0.7 }
+        let knots = Knots { first: 0.0, spacing: 2.0, count: 3, allowed };
+        Change { knots, weight: 0.7, within: None, sharpen: None }
     }
 
     #[test]
@@ -113,12 +165,12 @@ mod tests {
         for allowed in [Allowed::Births, Allowed::Any] {
             let change = change(allowed);
             let mut slopes = [0.0; 6];
-            change.penalty(&x, (0.1, 1.0), &mut slopes);
+            change.penalty(&x, (0.1, 1.0), &[], &mut slopes);
             for k in 0..6 {
                 let at = |step: f64| {
                     let mut x = x;
                     x[k] += step;
-                    change.penalty(&x, (0.1, 1.0), &mut [0.0; 6])
+                    change.penalty(&x, (0.1, 1.0), &[], &mut [0.0; 6])
                 };
                 let difference = (at(1e-6) - at(-1e-6)) / 2e-6;
                 assert!((difference - slopes[k]).abs() < 1e-8, "{allowed:?} {k}");
@@ -126,13 +178,34 @@ mod tests {
         }
     }
 
+    /// s/(s + e) where e is the emission of a node and, by a half along each axis, of its neighbours.
+    #[test]
+    fn exact_births_that_were_found_cost_less() {
+        let shape = Shape { nodes: [3, 3, 3], spacing: [1.0; 3] };
+        let change = Change { sharpen: Some(0.5), ..change(Allowed::Births) };
+        let mut x = vec![0.0; 81];
+        (x[13], x[27 + 13]) = (9.0, 4.0);
+        let prices = change.prices(&x, shape);
+        assert_eq!(prices.len(), 54);
+        assert!((prices[13] - 0.5 / (0.5 + 4.0 / 8.0)).abs() < 1e-15);
+        assert!((prices[14] - 0.5 / (0.5 + 4.0 / 16.0)).abs() < 1e-15);
+        assert!((prices[0] - 0.5 / (0.5 + 4.0 / 64.0)).abs() < 1e-15);
+        assert!(prices[27..].iter().all(|price| *price == 1.0));
+        let mut slopes = vec![0.0; 81];
+        let value = change.penalty(&x, (2.0, 1.0), &prices, &mut slopes);
+        assert!((value - 0.7 * 2.0 * 4.0 * 0.5).abs() < 1e-14);
+        assert!(slopes[..27].iter().all(|slope| *slope == 0.0) && (slopes[40] - 0.7).abs() < 1e-14);
+        assert!(Change { sharpen: None, ..change }.prices(&x, shape).is_empty());
+    }
+
     /// ∫∫ |∂ε/∂t| of emission that doubles is the emission that it has before.
     #[test]
     fn exact_penalties_are_total_variations_in_time() {
         let field = [1.0, 1.0, 2.0];
-        let found = change(Allowed::Any).penalty(&field, (3.0, 1e-9), &mut [0.0; 3]);
+        let found = change(Allowed::Any).penalty(&field, (3.0, 1e-9), &[], &mut [0.0; 3]);
         assert!((found - 0.7 * 3.0).abs() < 1e-9);
-        let births = change(Allowed::Births).penalty(&[1.0, 0.0, 1.0], (3.0, 1.0), &mut [0.0; 3]);
+        let births =
+            change(Allowed::Births).penalty(&[1.0, 0.0, 1.0], (3.0, 1.0), &[], &mut [0.0; 3]);
         assert!((births - 0.7 * 3.0).abs() < 1e-12);
     }
 }

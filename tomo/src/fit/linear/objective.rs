@@ -24,6 +24,8 @@ pub(super) struct Penalised<'a> {
     pub gaussian: Option<(&'a GaussianField, f64)>,
     /// Along the flow.
     pub change: Change,
+    /// Of births, at all knots but the first, beside the weight of the change; all are 1 if there are none.
+    pub prices: &'a [f64],
     /// Behind the values of nodes, with penalties of its own.
     pub quiescent: Option<&'a Quiescent>,
     /// The largest emission that is allowed.
@@ -69,7 +71,8 @@ impl Penalised<'_> {
         let of_image = self.quiescent.map_or(0.0, |image| image.penalty(x, slopes));
         let fields = self.shape.count() * self.change.knots.count;
         let (x, slopes) = (&x[..fields], &mut slopes[..fields]);
-        let mut value = of_image + self.change.penalty(x, (self.shape.cell(), self.upper), slopes);
+        let mut value =
+            of_image + self.change.penalty(x, (self.shape.cell(), self.upper), self.prices, slopes);
         if let Some((gaussian, share)) = self.gaussian {
             value += gaussian.value_and_gradient(x, share, slopes);
         }

@@ -56,14 +56,37 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         Walk::new(self.model, self.axis, (self.voxels, self.change.knots))
     }
 
-    /// All nodes at all knots.
+    /// All nodes at all knots where emission may be.
     pub(super) fn all(&self) -> Active {
         self.active(&vec![true; self.unknowns()])
     }
 
-    /// These nodes, knot after knot.
+    /// Those of these nodes, knot after knot, where emission may be.
     pub(super) fn active(&self, is_active: &[bool]) -> Active {
-        Active::new(is_active, &self.voxels.corners(), self.beside())
+        let allowed = self.allowed();
+        let mut is_active = is_active.to_vec();
+        let knots = is_active.chunks_exact_mut(allowed.len()).take(self.change.knots.count);
+        knots.flat_map(|knot| knot.iter_mut().zip(&allowed)).for_each(|(x, may)| *x &= *may);
+        Active::new(&is_active, &self.voxels.corners(), self.beside())
+    }
+
+    /// Which nodes of a knot are where emission may be.
+    fn allowed(&self) -> Vec<bool> {
+        let [.., spacing] = self.voxels.shape().spacing;
+        let allows = |node| self.change.allows(self.voxels.position(node), spacing);
+        (0..self.voxels.count()).map(allows).collect()
+    }
+
+    /// A gradient without slopes of nodes where no emission may be.
+    pub(super) fn only_allowed(&self, mut gradient: Vec<f64>) -> Vec<f64> {
+        let allowed = self.allowed();
+        let knots = gradient.chunks_exact_mut(allowed.len()).take(self.change.knots.count);
+        for (slope, _) in
+            knots.flat_map(|knot| knot.iter_mut().zip(&allowed)).filter(|(_, may)| !**may)
+        {
+            *slope = 0.0;
+        }
+        gradient
     }
 
     /// Values at all nodes and knots, and parameters of what does not move.
@@ -80,7 +103,15 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         let (priors, change, upper) = (self.priors, self.change, self.upper);
         let gaussian = self.gaussian.map(|gaussian| (gaussian, 1.0 / data.count as f64));
         let quiescent = self.model.quiescent.as_ref();
-        Penalised { priors, shape: self.voxels.shape(), gaussian, change, quiescent, upper }
+        Penalised {
+            priors,
+            shape: self.voxels.shape(),
+            gaussian,
+            change,
+            prices: &[],
+            quiescent,
+            upper,
+        }
     }
 
     /// Refuses a prior of other nodes.

@@ -6,7 +6,7 @@ use super::descent::{Descended, Descent, Each, Ending, Method, Stop};
 use super::error::LinearError;
 use super::lit::{Lit, Spots, Trials};
 use super::nodes::{dilated, refined};
-use super::objective::Objective;
+use super::objective::{Objective, Penalised};
 use super::operator::Operator;
 use super::problem::LinearProblem;
 use super::scaled::Scaled;
@@ -210,7 +210,11 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         let active = problem.active(is_active);
         let operator = Operator::new(problem.walk(), active, problem.frames, settings.memory);
         self.bytes = self.bytes.max(operator.bytes());
-        let terms = problem.penalised(data);
+        let prices = match self.round {
+            0 | 1 => Vec::new(),
+            _ => problem.change.prices(x, problem.voxels.shape()),
+        };
+        let terms = Penalised { prices: &prices, ..problem.penalised(data) };
         let mut objective = Objective::new(&operator, data, &terms);
         let (dark, dark_slope) = objective.nothing();
         let start = operator.active.gather(x);
@@ -224,6 +228,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         self.rescale(&objective, &mut inner)?;
         *x = operator.active.expand(&inner);
         let (value, gradient) = objective.everywhere(&inner);
+        let gradient = problem.only_allowed(gradient);
         self.evaluations += objective.evaluations;
         let (upper, value) = (problem.upper, objective.finite(value, &inner)?);
         let (gap, violation) = Certificate::bounds(x, &gradient, upper);

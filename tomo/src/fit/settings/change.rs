@@ -13,4 +13,7 @@ pub struct ChangeSettings {
     pub weight: f64,
     /// Times between which emission is linear in time are not farther apart than this, M.
     pub spacing: f64,
+    /// Births that were found cost less in the rounds that follow, by s/(s + e) where e is emitted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sharpen: Option<f64>,
 }

@@ -58,6 +58,7 @@ const RANGES: &[Range] = &[
     ("held_out.folds", 2.0, 1000.0, "parts of the frames"),
     ("change.weight", 0.0, 1e12, "a factor"),
     ("change.spacing", 1e-6, TIME, "M"),
+    ("change.sharpen", 1e-12, 1e12, "an emission"),
     ("faraday.angles", 4.0, 360.0, "rotations over 180 degrees"),
     ("faraday.iterations", 1.0, 1e5, "iterations"),
     ("quiescent.upper", 1e-15, 1e15, "M of emission; Jy, of a light curve"),

@@ -1,19 +1,21 @@
 //! From settings to how emission may change while matter carries it.
 
 use super::{Instrument, Result};
-use crate::fit::Motion;
 use crate::fit::linear::Change;
 use crate::fit::settings::{AxisSearch, ChangeSettings, FitFile, Kind, Within, refuse};
-use crate::representation::Knots;
+use crate::fit::{Motion, Region};
+use crate::representation::{Allowed, Knots};
 
 impl ChangeSettings {
-    /// The change with its knots over these times of emission, M since the reference time.
+    /// The change in a region with its knots over these times of emission, M since the reference time.
     ///
     /// # Errors
     /// If a number is out of range.
-    pub fn over(&self, times: [f64; 2]) -> Result<Change> {
+    pub fn over(&self, times: [f64; 2], region: Region) -> Result<Change> {
         let knots = Knots::between(times, self.spacing, self.allowed).within("change")?;
-        Change { knots, weight: self.weight }.checked().within("change")
+        Change { knots, weight: self.weight, within: Some(region), sharpen: self.sharpen }
+            .checked()
+            .within("change")
     }
 }
 
@@ -36,14 +38,15 @@ pub fn emission_times(instrument: &Instrument, motion: &Motion) -> [f64; 2] {
 /// # Errors
 /// If a number is out of range.
 pub fn change(file: &FitFile, times: [f64; 2]) -> Result<Change> {
-    file.change.map_or(Ok(Change::NONE), |change| change.over(times))
+    file.change.map_or(Ok(Change::NONE), |change| change.over(times, file.region.limits()))
 }
 
 /// Refuses what emission that changes does not go with.
 pub(super) fn check(file: &FitFile) -> Result<()> {
     let Some(change) = file.change else { return Ok(()) };
     // Of any length: the spacing against the data is told once rays are traced.
-    change.over([0.0, 0.0])?;
+    change.over([0.0, 0.0], file.region.limits())?;
+    check_sharpen(file, change)?;
     match file.representation.kind {
         Kind::LinearGrid => {}
         Kind::Mlp4d => refuse!("change does not apply to mlp4d, which is free at every time"),
@@ -54,6 +57,23 @@ pub(super) fn check(file: &FitFile) -> Result<()> {
     }
     if file.unknown_world()?.is_some() {
         refuse!("change does not work together with unknown parameters in [world]");
+    }
+    Ok(())
+}
+
+/// Refuses cheaper births where there are none, or no round that knows of them.
+fn check_sharpen(file: &FitFile, change: ChangeSettings) -> Result<()> {
+    if change.sharpen.is_none() {
+        return Ok(());
+    }
+    if change.allowed != Allowed::Births {
+        refuse!("change.sharpen needs change.allowed = \"births\"");
+    }
+    let rounds = file.linear.as_ref().map_or(0, |linear| linear.rounds);
+    if rounds < 2 {
+        refuse!(
+            "change.sharpen needs linear.rounds of 2 or more, not {rounds}: the first does not know yet where births are"
+        );
     }
     Ok(())
 }

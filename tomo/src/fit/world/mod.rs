@@ -5,6 +5,7 @@
 
 mod covariance;
 mod derivative;
+mod envelope;
 mod explore;
 mod fall;
 mod model;
@@ -15,10 +16,12 @@ mod redshift;
 mod scan;
 mod spread;
 mod tangents;
+
 #[cfg(test)]
 mod tests;
 
 pub use derivative::WorldBuffers;
+pub use envelope::Envelope;
 pub use explore::{Exploration, Explored, Sample, WorldWatch};
 pub use model::{Law, WorldModel};
 pub use polish::{Polish, Polished};

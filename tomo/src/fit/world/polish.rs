@@ -37,11 +37,13 @@ pub struct Polish {
     pub iterations: usize,
     /// Conjugate gradients by which the volume follows the world, at most.
     pub following: usize,
+    /// Iterations of the volume of a world beside the best one, from that of the best one.
+    pub around: usize,
 }
 
 impl Default for Polish {
     fn default() -> Self {
-        Self { steps: 8, iterations: 160, following: 300 }
+        Self { steps: 8, iterations: 160, following: 300, around: 80 }
     }
 }
 
@@ -79,34 +81,13 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         Ok(Polished { best, covariance, responses: bowl.responses, steps })
     }
 
-    /// Steps with known second derivatives to the best world of other data, or through other rays, near a world.
-    ///
-    /// # Errors
-    /// As those of [`polish`](Self::polish).
-    pub fn follow(
-        &self,
-        polished: &Polished,
-        steps: usize,
-        how: &Polish,
-    ) -> Result<Estimate, Error> {
-        let n = self.free.len();
-        let scale = |k: usize| self.free[k].parameter.scale();
-        let covariance =
-            DMatrix::from_fn(n, n, |a, b| polished.covariance[a * n + b] / (scale(a) * scale(b)));
-        let mut now = self.solve_from(polished.best.world, &polished.best.x, how.iterations)?;
-        let Some(bends) = covariance.try_inverse() else { return Ok(now) };
-        for _ in 0..steps {
-            let slopes = self.bowl(&now, 0)?.slopes;
-            let responses = polished.responses.clone();
-            let bowl = Bowl { slopes, bends: bends.clone(), responses };
-            let Some(lower) = self.descend(&now, &bowl, how.iterations)? else { break };
-            now = lower;
-        }
-        Ok(now)
-    }
-
     /// The best volume of a world, from that of another one.
-    fn solve_from(&self, world: World, x: &[f64], iterations: usize) -> Result<Estimate, Error> {
+    pub(super) fn solve_from(
+        &self,
+        world: World,
+        x: &[f64],
+        iterations: usize,
+    ) -> Result<Estimate, Error> {
         let forward: ForwardModel<T> = self.model.forward(&world)?;
         let least = self.linear(&forward).least_from(Some(x), iterations)?;
         Ok(self.estimate(world, least))
@@ -126,9 +107,9 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         }
         for part in PARTS {
             let step: Vec<f64> = step.iter().map(|step| part * step).collect();
-            let own = self.free.iter().zip(&step).map(|(free, x)| x * free.parameter.scale());
-            let world = self.moved(&from.world, &own.collect::<Vec<f64>>());
-            let there = self.solve_from(world, &self.along(from, bowl, &step), iterations)?;
+            let world = self.moved(&from.world, &step);
+            let x = self.along(from, &bowl.responses, &step);
+            let there = self.solve_from(world, &x, iterations)?;
             if there.value < from.value {
                 return Ok(Some(there));
             }
@@ -137,20 +118,32 @@ impl<T: Float + Default> WorldProblem<'_, T> {
     }
 
     /// About the best volume at a distance from another world, in units of scales; bounds hold it.
-    fn along(&self, from: &Estimate, bowl: &Bowl, step: &[f64]) -> Vec<f64> {
+    pub(super) fn along(&self, from: &Estimate, responses: &[Vec<f64>], step: &[f64]) -> Vec<f64> {
         let mut x = from.x.clone();
-        for (response, step) in bowl.responses.iter().zip(step) {
+        for (response, step) in responses.iter().zip(step) {
             x.iter_mut().zip(response).for_each(|(x, moves)| *x += step * moves);
         }
         x.iter_mut().for_each(|x| *x = x.clamp(0.0, self.upper));
         x
     }
 
-    /// A world at a distance, in the parameters' own units; bounds hold it.
-    fn moved(&self, from: &World, step: &[f64]) -> World {
+    /// A world at a distance, in units of the parameters' scales; bounds hold it.
+    pub(super) fn moved(&self, from: &World, step: &[f64]) -> World {
         self.free.iter().zip(step).fold(*from, |world, (free, step)| {
-            world.with(free.parameter, free.inside(from.get(free.parameter) + step))
+            let value = from.get(free.parameter) + step * free.parameter.scale();
+            world.with(free.parameter, free.inside(value))
         })
+    }
+
+    /// The largest part of a step, at most all of it, that no bound has to hold.
+    pub(super) fn part_within(&self, from: &World, step: &[f64]) -> f64 {
+        let part = |(free, step): (&super::Free, &f64)| {
+            let ([low, high], here) = (free.bounds(), from.get(free.parameter));
+            let step = step * free.parameter.scale();
+            let room = if step > 0.0 { high - here } else { here - low };
+            if free.is_circle() || step == 0.0 { 1.0 } else { room.max(0.0) / step.abs() }
+        };
+        self.free.iter().zip(step).map(part).fold(1.0, f64::min)
     }
 
     fn covariance(&self, world: &World, bowl: &Bowl) -> Vec<f64> {

@@ -72,7 +72,13 @@ impl Free {
         [-1.0, 1.0].map(|side| (value + side * span.deviations * sigma).clamp(low, high))
     }
 
-    fn is_circle(&self) -> bool {
+    /// A value with bounds as mirrors; a whole circle has none.
+    pub fn mirrored(&self, value: f64) -> f64 {
+        let [low, high] = self.bounds();
+        if self.is_circle() { self.inside(value) } else { mirrored(value, low, high) }
+    }
+
+    pub(super) fn is_circle(&self) -> bool {
         let [low, high] = self.bounds();
         self.parameter == Parameter::PositionAngle && high - low > TAU - 1e-6
     }
@@ -212,11 +218,8 @@ impl<T: Float + Default> WorldProblem<'_, T> {
     /// none.
     pub(super) fn place(&self, about: &World, u: &[f64]) -> World {
         let one = |world: World, (free, u): (&Free, &f64)| {
-            let [low, high] = free.bounds();
             let value = about.get(free.parameter) + u * free.parameter.scale();
-            let value =
-                if free.is_circle() { free.inside(value) } else { mirrored(value, low, high) };
-            world.with(free.parameter, value)
+            world.with(free.parameter, free.mirrored(value))
         };
         self.free.iter().zip(u).fold(*about, one)
     }

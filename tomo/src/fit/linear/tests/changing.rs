@@ -3,6 +3,7 @@
 use super::super::change::Change;
 use super::*;
 use crate::dynamics::{AngularVelocity, Velocity};
+use crate::fit::Region;
 use crate::representation::Degree;
 use crate::representation::{Allowed, Carrier, Changing};
 
@@ -98,6 +99,10 @@ fn compare_with_images(
     }
 }
 
+fn births() -> Change {
+    Change { knots: knots(Allowed::Births), weight: 0.0, within: None, sharpen: None }
+}
+
 fn solve(model: &ForwardModel<f64>, pixels: Vec<f64>, change: Change) -> LinearSolution<f64> {
     let term = ImageTerm::new(pixels, model.pixels(), 1e-3).unwrap();
     let problem = LinearProblem {
@@ -137,7 +142,7 @@ fn exact_between_a_field_that_is_carried_and_one_that_is_free() {
         let truth: Vec<f64> = shares.iter().flat_map(|s| spot.iter().map(move |e| s * e)).collect();
         let pixels = images(&model, &changing(&voxels, knots), &truth);
         let value = |weight: f64| {
-            let found = solve(&model, pixels.clone(), Change { knots, weight });
+            let found = solve(&model, pixels.clone(), Change { knots, weight, ..births() });
             let certificate = found.certificate.unwrap();
             assert!(certificate.gap >= 0.0 && certificate.value <= certificate.dark);
             (certificate.value / certificate.dark, found.emission)
@@ -156,5 +161,31 @@ fn exact_between_a_field_that_is_carried_and_one_that_is_free() {
                 .flat_map(|knot| knot.iter().zip(&emission).map(|(a, b)| (a - b).abs()));
             assert!(change.fold(0.0, f64::max) < 0.02);
         }
+    }
+}
+
+/// Births are found where emission may be and nowhere else, and the certificate is one of such fields.
+#[test]
+fn exact_births_are_within_their_region() {
+    let (model, voxels) = (model(false), Voxels::cube(9, 5.0, Degree::Linear));
+    let truth: Vec<f64> = [0.2, 0.0, 1.0, 0.0]
+        .iter()
+        .flat_map(|s| lit::spot(&voxels).into_iter().map(move |e| s * e))
+        .collect();
+    let pixels = images(&model, &changing(&voxels, knots(Allowed::Births)), &truth);
+    let region = Region { r_min: 3.0, r_max: 4.5, z_width: 1.0 };
+    for within in [None, Some(region)] {
+        let change = Change { weight: 0.0, within, ..births() };
+        let found = solve(&model, pixels.clone(), change);
+        let outside = |k: usize| {
+            let [x, y, z] = voxels.position(k % voxels.count());
+            let r = (x * x + y * y + z * z).sqrt();
+            !(3.0..4.5).contains(&r) || z.abs() > 1.625
+        };
+        let light: f64 =
+            (0..found.emission.len()).filter(|k| outside(*k)).map(|k| found.emission[k]).sum();
+        assert_eq!(light == 0.0, within.is_some(), "{light}");
+        let certificate = found.certificate.unwrap();
+        assert!(certificate.gap >= 0.0 && certificate.gap < 1e-2 * certificate.dark);
     }
 }

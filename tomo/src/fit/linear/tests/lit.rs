@@ -99,8 +99,15 @@ fn exact_slopes_of_data_that_are_not_convex() {
         let operator = operator(&model, voxels, &vec![true; voxels.count()], usize::MAX);
         let (priors, change) = (&[], Change::NONE);
         let shape = voxels.shape();
-        let terms =
-            Penalised { priors, shape, gaussian: None, change, quiescent: None, upper: 2.0 };
+        let terms = Penalised {
+            priors,
+            shape,
+            gaussian: None,
+            change,
+            prices: &[],
+            quiescent: None,
+            upper: 2.0,
+        };
         let mut objective = Objective::new(&operator, &data, &terms);
         let x: Vec<f64> = random(voxels.count(), 1).iter().map(|x| 0.5 + x).collect();
         let direction = random(voxels.count(), 2);

@@ -228,6 +228,7 @@ fn exact_penalties_of_the_image_are_its_own() {
         shape: Voxels::cube(6, 5.0, Degree::Linear).shape(),
         gaussian: None,
         change: Change::NONE,
+        prices: &[],
         quiescent: model.quiescent(),
         upper: UPPER,
     };

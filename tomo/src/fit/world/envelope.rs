@@ -1,0 +1,315 @@
+//! The bowl beneath the ripples of a value over worlds.
+//!
+//! Pixels and voxels are coarse: the value over worlds has ripples of a degree and of a few units, with a minimum in each. The
+//! second derivatives in one of them are those of the ripple. What the data say of the world is the bowl beneath: a
+//! quadratic form through values so far away that they have risen by more than the ripples are high, seen along several
+//! lattices of rays. Its middle is the world, and how far ripples and lattices move that is part of the error.
+
+use super::covariance::covariance;
+use super::polish::{Polish, Polished};
+use super::problem::{Estimate, WorldProblem};
+use super::{Free, World};
+use crate::Error;
+use crate::simd::Float;
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+/// A quadratic form over worlds.
+#[derive(Clone, Debug)]
+pub struct Envelope {
+    /// Its middle, the mean over the lattices.
+    pub world: World,
+    /// Covariance of the free parameters row by row, in their own units: the inverse of the form's second derivatives,
+    /// and what ripples and lattices move the middle by.
+    pub covariance: Vec<f64>,
+    /// Standard deviation of the ripples, in units of the value.
+    pub ripple: f64,
+    /// Worlds that were looked at.
+    pub worlds: usize,
+}
+
+/// Along each axis values are taken as far away as they have risen by this: more than ripples are high.
+const RISE: f64 = 8.0;
+/// How often a step is doubled that does not rise so far.
+const DOUBLINGS: usize = 4;
+/// A part of a step that is not worth taking.
+const NEXT_TO_NOTHING: f64 = 0.1;
+/// From how many lattices a scatter is known well enough to be used as it is; from few it is too small by chance.
+const FEW: f64 = 2.0;
+
+/// Where a form is fitted: ξ with |ξ| ≤ 1, whose columns are how far it reaches along each axis, in units of scales.
+struct Reach {
+    columns: DMatrix<f64>,
+}
+
+/// Values at places ξ, along one lattice of rays.
+struct Seen {
+    places: Vec<DVector<f64>>,
+    values: Vec<f64>,
+}
+
+/// What is fitted to the values of all lattices: a constant and a slope of each, and second derivatives of all.
+struct Form {
+    slopes: Vec<DVector<f64>>,
+    bends: DMatrix<f64>,
+    /// Covariance of a slope.
+    uncertain: DMatrix<f64>,
+    /// Standard deviation of what it leaves.
+    ripple: f64,
+}
+
+impl<T: Float + Default> WorldProblem<'_, T> {
+    /// The bowl about a world, along the rays of this problem and of others; second derivatives of the data count one over
+    /// `inflation`. None if values around do not have the shape of a bowl.
+    ///
+    /// # Errors
+    /// As those of [`polish`](Self::polish).
+    pub fn envelope(
+        &self,
+        polished: &Polished,
+        others: &[WorldProblem<'_, T>],
+        (inflation, how): (f64, &Polish),
+    ) -> Result<Option<Envelope>, Error> {
+        let Some(reach) = self.reach(polished, how.around)? else { return Ok(None) };
+        let about = polished.best.world;
+        let mut seen = vec![self.seen(&polished.best, &polished.responses, &reach, how.around)?];
+        for other in others {
+            // The volume's response is that of the same voxels.
+            let same = other.effort.nodes == self.effort.nodes;
+            let responses = if same { polished.responses.as_slice() } else { &[] };
+            let start = other.solve(about)?;
+            seen.push(other.seen(&start, responses, &reach, how.around)?);
+        }
+        let Some(form) = fitted(&seen, self.free.len()) else { return Ok(None) };
+        let worlds = seen.iter().map(|seen| seen.values.len()).sum();
+        Ok(self.middle(about, &form, &reach, inflation).map(|(world, covariance)| Envelope {
+            world,
+            covariance,
+            ripple: form.ripple,
+            worlds,
+        }))
+    }
+
+    /// How far to look along the principal axes of a covariance.
+    fn reach(&self, polished: &Polished, iterations: usize) -> Result<Option<Reach>, Error> {
+        let n = self.free.len();
+        let scale = |k: usize| self.free[k].parameter.scale();
+        let of = |a: usize, b: usize| polished.covariance[a * n + b] / (scale(a) * scale(b));
+        let covariance = DMatrix::from_fn(n, n, of);
+        if covariance.iter().any(|x| !x.is_finite()) {
+            return Ok(None);
+        }
+        let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(covariance);
+        let mut columns = eigenvectors;
+        for (k, square) in eigenvalues.iter().enumerate() {
+            let axis = columns.column(k) * square.max(0.0).sqrt();
+            let far = self.far(polished, &axis, iterations)?;
+            columns.set_column(k, &(axis * far));
+        }
+        Ok(Some(Reach { columns }))
+    }
+
+    /// How many steps along an axis raise the value enough, in the mean of both sides.
+    fn far(
+        &self,
+        polished: &Polished,
+        axis: &DVector<f64>,
+        iterations: usize,
+    ) -> Result<f64, Error> {
+        let (best, mut far) = (&polished.best, 1.0);
+        for doubling in 0..=DOUBLINGS {
+            far = f64::from(1u32 << doubling);
+            let mut rises = Vec::new();
+            for sign in [-1.0, 1.0] {
+                let beside =
+                    self.beside(best, &polished.responses, &(axis * (sign * far)), iterations)?;
+                // Where a bound is in between, as if the rise went on.
+                rises
+                    .extend(beside.map(|(there, part)| (there.value - best.value) / (part * part)));
+            }
+            if rises.iter().sum::<f64>() >= RISE * rises.len() as f64 {
+                break;
+            }
+        }
+        Ok(far)
+    }
+
+    /// The best volume of a world at a distance, or at that part of the distance which bounds leave; none if they leave
+    /// next to nothing.
+    fn beside(
+        &self,
+        from: &Estimate,
+        responses: &[Vec<f64>],
+        step: &DVector<f64>,
+        iterations: usize,
+    ) -> Result<Option<(Estimate, f64)>, Error> {
+        let part = self.part_within(&from.world, step.as_slice());
+        if part < NEXT_TO_NOTHING {
+            return Ok(None);
+        }
+        let step = step * part;
+        let x = self.along(from, responses, step.as_slice());
+        let there = self.solve_from(self.moved(&from.world, step.as_slice()), &x, iterations)?;
+        Ok(Some((there, part)))
+    }
+
+    fn seen(
+        &self,
+        from: &Estimate,
+        responses: &[Vec<f64>],
+        reach: &Reach,
+        iterations: usize,
+    ) -> Result<Seen, Error> {
+        let mut seen = Seen { places: Vec::new(), values: Vec::new() };
+        for place in places(self.free.len()) {
+            let there = self.beside(from, responses, &(&reach.columns * &place), iterations)?;
+            if let Some((there, part)) = there {
+                seen.places.push(place * part);
+                seen.values.push(there.value);
+            }
+        }
+        Ok(seen)
+    }
+
+    /// The middle of a form, and its covariance in the parameters' own units.
+    fn middle(
+        &self,
+        about: World,
+        form: &Form,
+        Reach { columns }: &Reach,
+        inflation: f64,
+    ) -> Option<(World, Vec<f64>)> {
+        let (inverse, outward) =
+            (form.bends.clone().try_inverse()?, columns.clone().try_inverse()?);
+        let middles: Vec<DVector<f64>> =
+            form.slopes.iter().map(|g| near(-(&inverse * g))).collect();
+        let count = middles.len() as f64;
+        let mean = middles.iter().fold(DVector::zeros(columns.ncols()), |sum, m| sum + m) / count;
+        let mut moved = &inverse * &form.uncertain * &inverse;
+        if middles.len() > 1 {
+            for middle in &middles {
+                let away = middle - &mean;
+                moved += &away * away.transpose() * (FEW / (count * (count - 1.0)));
+            }
+        }
+        let step = columns * &mean;
+        let world = self.moved(&about, step.as_slice());
+        let bends = outward.transpose() * &form.bends * &outward;
+        let whole = covariance(self.free, &world, &bends, inflation)?
+            + columns * moved * columns.transpose();
+        Some((world, in_own_units(self.free, &whole)))
+    }
+}
+
+/// Covariances in the parameters' own units, row by row.
+fn in_own_units(free: &[Free], whole: &DMatrix<f64>) -> Vec<f64> {
+    let (n, scale) = (free.len(), |k: usize| free[k].parameter.scale());
+    (0..n * n).map(|k| whole[(k / n, k % n)] * scale(k / n) * scale(k % n)).collect()
+}
+
+/// A place not farther away than values were taken.
+fn near(place: DVector<f64>) -> DVector<f64> {
+    let length = place.norm();
+    if length > 1.0 { place / length } else { place }
+}
+
+/// Both sides of each axis at its end and in the middle, and the diagonals between two axes.
+fn places(n: usize) -> Vec<DVector<f64>> {
+    let along = |k: usize, x: f64| {
+        let mut place = DVector::zeros(n);
+        place[k] = x;
+        place
+    };
+    let ends = (0..n).flat_map(|k| [-1.0, -0.5, 0.5, 1.0].map(|x| along(k, x)));
+    let pairs = (0..n).flat_map(|a| (0..a).map(move |b| (a, b)));
+    let root = 0.5f64.sqrt();
+    let diagonals = pairs.flat_map(|(a, b)| {
+        // Each pair has two of its four diagonals, one of each direction.
+        [(root, root), (-root, root)].map(|(x, y)| along(a, x) + along(b, y))
+    });
+    ends.chain(diagonals).collect()
+}
+
+/// The least squares form; none if there are too few values, or it is no bowl.
+fn fitted(seen: &[Seen], n: usize) -> Option<Form> {
+    let pairs: Vec<(usize, usize)> = (0..n).flat_map(|a| (0..=a).map(move |b| (a, b))).collect();
+    let lattices = seen.len();
+    let (first_bend, unknowns) = (lattices * (1 + n), lattices * (1 + n) + pairs.len());
+    let count: usize = seen.iter().map(|seen| seen.values.len()).sum();
+    if count < unknowns + 2 {
+        return None;
+    }
+    let (mut rows, mut values) = (DMatrix::zeros(count, unknowns), DVector::zeros(count));
+    let all = seen.iter().enumerate();
+    let all = all.flat_map(|(l, seen)| seen.places.iter().zip(&seen.values).map(move |at| (l, at)));
+    for (row, (l, (place, value))) in all.enumerate() {
+        values[row] = *value;
+        rows[(row, l * (1 + n))] = 1.0;
+        (0..n).for_each(|k| rows[(row, l * (1 + n) + 1 + k)] = place[k]);
+        for (j, (a, b)) in pairs.iter().enumerate() {
+            let share = if a == b { 0.5 } else { 1.0 };
+            rows[(row, first_bend + j)] = share * place[*a] * place[*b];
+        }
+    }
+    let inverse = (rows.transpose() * &rows).try_inverse()?;
+    let found = &inverse * (rows.transpose() * &values);
+    let left = (&values - &rows * &found).norm_squared() / (count - unknowns) as f64;
+    let mut bends = DMatrix::zeros(n, n);
+    for (j, (a, b)) in pairs.iter().enumerate() {
+        (bends[(*a, *b)], bends[(*b, *a)]) = (found[first_bend + j], found[first_bend + j]);
+    }
+    bends.clone().cholesky()?;
+    let slopes = (0..lattices).map(|l| found.rows(l * (1 + n) + 1, n).into_owned()).collect();
+    let uncertain = inverse.view((1, 1), (n, n)) * left;
+    Some(Form { slopes, bends, uncertain, ripple: left.sqrt() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A bowl with ripples in one lattice, and another lattice that is deeper and moved.
+    #[test]
+    fn exact_the_bowl_beneath_is_found() {
+        let bends = DMatrix::from_row_slice(2, 2, &[8.0, 1.5, 1.5, 6.0]);
+        let middles = [[0.2, -0.1], [0.3, 0.1]].map(|m| DVector::from_row_slice(&m));
+        let value = |l: usize, place: &DVector<f64>| {
+            let away = place - &middles[l];
+            700.0 - 5.0 * l as f64 + 0.5 * (away.transpose() * &bends * &away)[(0, 0)]
+        };
+        let seen: Vec<Seen> = (0..2)
+            .map(|l| Seen {
+                places: places(2),
+                values: places(2).iter().map(|p| value(l, p)).collect(),
+            })
+            .collect();
+        let form = fitted(&seen, 2).unwrap();
+        assert!((&form.bends - &bends).norm() < 1e-9 && form.ripple < 1e-6);
+        for (slope, middle) in form.slopes.iter().zip(&middles) {
+            assert!((&bends * middle + slope).norm() < 1e-9);
+        }
+        let upside_down = |seen: &Seen| Seen {
+            places: seen.places.clone(),
+            values: seen.values.iter().map(|x| -x).collect(),
+        };
+        assert!(fitted(&[upside_down(&seen[0]), upside_down(&seen[1])], 2).is_none());
+    }
+
+    /// Ripples of a known deviation that are independent of each other move the middle as often as stated.
+    #[test]
+    fn exact_ripples_move_the_middle_by_what_is_stated() {
+        use rand::{RngExt, SeedableRng};
+        let mut random = rand_pcg::Pcg64::seed_from_u64(3);
+        let (mut pulls, rounds) = (0.0, 4000);
+        for _ in 0..rounds {
+            let mut noise = || 1.7320508 * (2.0 * random.random::<f64>() - 1.0);
+            let values = |p: &DVector<f64>| 4.0 * p.norm_squared() + 0.3 * noise();
+            let places = places(2);
+            let values = places.iter().map(values).collect();
+            let form = fitted(&[Seen { places, values }], 2).unwrap();
+            pulls += form.slopes[0][0].powi(2) / form.uncertain[(0, 0)];
+        }
+        // F with 1 and 4 degrees of freedom has the mean 2.
+        let mean = pulls / f64::from(rounds);
+        assert!((mean - 2.0).abs() < 0.35, "{mean}");
+    }
+}
