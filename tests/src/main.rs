@@ -53,5 +53,6 @@ mod support;
 mod unknown_world;
 mod verdict;
 mod view;
+mod view_input;
 #[cfg(feature = "zarr")]
 mod zarr;

@@ -48,7 +48,7 @@ fn a_folder_without_a_fit() {
 const WINDOW: [u32; 2] = [660, 320];
 
 /// Writes the page of a scene and opens it; none where there is no browser.
-fn opened(folder: &Path, words: &[&str], fragment: &str) -> Option<Browser> {
+pub fn opened(folder: &Path, words: &[&str], fragment: &str) -> Option<Browser> {
     succeed(folder, &[&["view", "--web", "page"], words].concat());
     let page = format!("{}#{fragment}", address(&folder.join("page/index.html")));
     let mut browser = Browser::open(&page, WINDOW)?;
@@ -69,7 +69,7 @@ fn rendered(folder: &Path, browser: &mut Browser, [width, height]: [u32; 2]) -> 
 }
 
 /// Light of the page: R, G, B and intensity of each pixel.
-fn measured(browser: &mut Browser, panel: &str, [width, height]: [u32; 2]) -> Vec<f64> {
+pub fn measured(browser: &mut Browser, panel: &str, [width, height]: [u32; 2]) -> Vec<f64> {
     let asked = format!("kerrlight.gpu.measure('{panel}', {width}, {height}).then(x => [...x])");
     let Value::Array(light) = browser.value(&asked) else { panic!("no light") };
     light.iter().map(|x| x.as_f64().unwrap()).collect()
@@ -178,6 +178,44 @@ fn code_light_of_the_page_is_that_of_render() {
         [5e-4, 0.003],
     );
     compare(&[&scene("sky_checker.toml")], "", (1, "G"), [3e-2, 0.06]);
+}
+
+/// Matter that plunges, by its light and by its colours as a black body, from afar and from a camera that moves.
+#[test]
+#[ignore = "long"]
+fn code_discs_plunge_and_glow_as_those_of_render() {
+    let plunging = scene("disc_plunging.toml");
+    compare(&[&plunging], "", INTENSITY, [5e-4, 0.002]);
+    compare(&[&plunging], "spin=0.9&inclination=80", INTENSITY, [5e-4, 0.002]);
+    let hot = [&plunging, "--set", "disc.peak_temperature_k=6000"];
+    for channel in [(0, "R"), (2, "B")] {
+        compare(&hot, "", channel, [2e-3, 0.004]);
+        compare(&hot, "kind=camera&radius=20&inclination=70", channel, [2e-3, 0.004]);
+    }
+}
+
+/// Gas of every motion, thin and thick, and what shines in and behind it.
+#[test]
+#[ignore = "long"]
+fn code_gas_of_the_page_is_that_of_render() {
+    let [thin, thick] = ["test3", "test5"].map(|name| scene(&format!("gold2020/{name}.toml")));
+    // Scene units are not those of the picture's intensity, which has a unit.
+    let red = (0, "R");
+    compare(&[&thin], "", red, [2e-5, 0.0]);
+    compare(&[&thin], "kind=camera&radius=25&inclination=70", red, [2e-5, 0.0]);
+    for motion in ["keplerian", "free-fall"] {
+        compare(&[&thin, "--set", &format!("gas.motion={motion}")], "", red, [2e-5, 0.0]);
+    }
+    compare(&[&thick], "", red, [1e-4, 0.0]);
+    // Its light grows like 1/g towards the horizon.
+    compare(&[&scene("gold2020/test1.toml")], "", red, [3e-3, 0.002]);
+    let more = [
+        "gas.emissivity=1e-19",
+        "disc={outer_edge=12.0,peak_intensity=2e-5,opaque=true}",
+        "spot=[{radius=8.0,phase_deg=90.0,sigma=0.7,peak_emissivity=1e-5}]",
+    ];
+    let words: Vec<&str> = more.iter().flat_map(|change| ["--set", change]).collect();
+    compare(&[&[thick.as_str()], &words[..]].concat(), "", red, [2e-4, 0.002]);
 }
 
 /// The ray of a picked place has the constants, the fate and the crossings of the tracer in doubles, and turns where its

@@ -11,8 +11,10 @@ pub fn delegate(
     (_, take): FitDevice,
     file: &FitFile,
     trainer: &Trainer<'_, f32>,
+    folder: &Folder,
 ) -> anyhow::Result<Delegate<f32>> {
-    let device = take(&trainer.objective, trainer.representation, &trainer.training)?;
+    let taken = take(&trainer.objective, trainer.representation, &trainer.training);
+    let device = taken.map_err(|error| anyhow!("{error:#}; {}", elsewhere(folder)))?;
     let rest = match &trainer.objective.data.others[..] {
         [] => String::new(),
         others => {
@@ -26,10 +28,12 @@ pub fn delegate(
 
 /// What is told when a device fails, after the checkpoint.
 pub fn failed(error: DeviceError, step: u64, folder: &Folder) -> anyhow::Error {
-    let path = folder.path().display();
-    anyhow!(
-        "{error}; step {step} is kept, go on from there on the processor: kerrlight fit --resume {path}"
-    )
+    anyhow!("{error}; step {step} is kept; {}", elsewhere(folder))
+}
+
+/// How to go on without the device.
+fn elsewhere(folder: &Folder) -> String {
+    format!("on the processor: kerrlight fit --resume {}", folder.path().display())
 }
 
 #[cfg(test)]

@@ -145,7 +145,7 @@ pub fn run(
     let mut state = State::new(&*representation, axis, &training);
     let mut trainer = Trainer::new(objective, &*representation, training);
     if let Some(device) = device {
-        trainer.device = Some(delegate::delegate(device, file, &trainer)?);
+        trainer.device = Some(delegate::delegate(device, file, &trainer, folder)?);
     }
     let truth = measured.truth.as_ref();
     let true_volume = truth.map(|truth| results::true_volume(file, truth)).transpose()?;

@@ -160,7 +160,9 @@ impl<'a> Rendering<'a> {
             }
             Err(error) => {
                 let failure = self.film.device().and_then(RayDevice::failure);
-                let told = failure.map(|failure| format!("{failure}; {}", self.there()));
+                let told = failure.map(|failure| {
+                    format!("{failure}; {}, or with --device cpu into another folder", self.there())
+                });
                 Err(told.map_or(error.into(), anyhow::Error::msg))
             }
             Ok(frames) => Ok(frames),

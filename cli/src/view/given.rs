@@ -6,9 +6,11 @@ use super::subject::Subject;
 use super::{left_out, sky, still};
 use crate::render::preview::PreviewOptions;
 use anyhow::Context;
+use kerrlight_tomo::emission::black_body::BlackBody;
 use kerrlight_tomo::image::colormap::Colormap;
 use kerrlight_tomo::image::preview::Look;
 use kerrlight_tomo::scene::{CameraMotion, Scene};
+use kerrlight_tomo::units::SPEED_OF_LIGHT;
 use serde_json::{Value, json};
 
 /// The object.
@@ -31,6 +33,8 @@ pub fn of(subject: &Subject, volumes: &Volumes) -> anyhow::Result<Value> {
         "white": still::white(subject)?,
         "colored": PreviewOptions::default().look(scene) == Look::Color,
         "colors": base64::encode(colors()),
+        "gas": scene.gas.as_ref().map(|gas| gas.emissivity * centimetres(scene)),
+        "shades": shades(scene).map(base64::encode),
         "sky": panorama.as_ref().map(|(png, _)| base64::encode(png)),
         "sky_brightness": panorama.as_ref().map_or(0.0, |(_, brightness)| *brightness),
         "volumes": volumes.described(),
@@ -87,6 +91,22 @@ fn data(measured: &Measured) -> Value {
 /// The largest value of a fit's pictures.
 pub fn brightest(measured: &Measured) -> f32 {
     measured.pixels.iter().copied().fold(f32::MIN_POSITIVE, f32::max)
+}
+
+/// M in centimetres; gas needs a mass.
+fn centimetres(scene: &Scene) -> f64 {
+    100.0 * SPEED_OF_LIGHT * scene.hole.seconds().unwrap_or(f64::NAN)
+}
+
+/// Logarithms of red, green and blue of black bodies of intensity 1 whose temperatures are e⁻⁶ to e³ of that of the disc's
+/// peak, 512 each, as floats; none where the disc has one colour.
+fn shades(scene: &Scene) -> Option<Vec<u8>> {
+    let peak = scene.disc.as_ref()?.peak_temperature_k?;
+    let body = BlackBody::new(peak);
+    let temperature = |k: usize| peak * (9.0 * k as f64 / 511.0 - 6.0).exp();
+    let colors: Vec<[f32; 3]> = (0..512).map(|k| body.color(temperature(k))).collect();
+    let channels = (0..3).flat_map(|channel| colors.iter().map(move |color| color[channel]));
+    Some(channels.flat_map(|x| x.max(1e-30).ln().to_le_bytes()).collect())
 }
 
 /// 256 colours of the map that shows intensities.

@@ -8,18 +8,12 @@ pub const SPOTS: usize = 8;
 
 /// Names of what is left out, as scene files have them.
 pub fn of(subject: &Subject, falls: bool) -> Vec<String> {
-    let Scene { gas, disc, mesh, volume, spot, effects, .. } = &subject.scene;
+    let Scene { mesh, volume, spot, effects, .. } = &subject.scene;
     let parts = [
-        (gas.is_some(), "[gas]".to_owned()),
         (!mesh.is_empty(), "[[mesh]]".to_owned()),
         (falls, "[[volume]] number 0, whose matter falls".to_owned()),
         (volume.len() > 1, format!("[[volume]] but the first of {}", volume.len())),
         (spot.len() > SPOTS, format!("[[spot]] but the first {SPOTS} of {}", spot.len())),
-        (disc.as_ref().is_some_and(|disc| disc.plunging.is_some()), "[disc.plunging]".to_owned()),
-        (
-            disc.as_ref().is_some_and(|disc| disc.peak_temperature_k.is_some()),
-            "disc.peak_temperature_k: the disc has one colour".to_owned(),
-        ),
         (effects.half_orbits.is_some(), "effects.half_orbits: all images are there".to_owned()),
         (effects.polarization, "effects.polarization: light is that without it".to_owned()),
     ];

@@ -1,10 +1,12 @@
 //! The graphics devices of this computer.
 
 use super::error::GpuError;
+use core::cell::Cell;
 use core::future::Future;
 use core::task::{Context, Poll, Waker};
+use std::panic::{self, AssertUnwindSafe};
 use std::sync::mpsc::Sender;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, Once, PoisonError};
 
 /// A graphics device of this computer.
 #[derive(Debug, Clone)]
@@ -110,7 +112,8 @@ pub(super) struct Device {
     pub name: String,
     /// Bytes of the largest buffer.
     pub largest: u64,
-    lost: Arc<Mutex<Option<String>>>,
+    /// What it has reported by itself: it is of no use after that.
+    trouble: Arc<Mutex<Option<GpuError>>>,
 }
 
 /// What shaders ask of a device; every device that runs the tracer has the default.
@@ -171,7 +174,8 @@ impl Needs {
                 .max_storage_buffers_per_shader_stage
                 .max(self.buffers),
             ..least
-        })
+        }
+        .or_worse_values_from(has))
     }
 }
 
@@ -182,12 +186,13 @@ impl Device {
         let descriptor = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
         let (inner, queue) = wait(adapter.inner.request_device(&descriptor))
             .map_err(|error| GpuError::Refused(error.to_string()))?;
-        let lost = Arc::new(Mutex::new(None));
-        let note = Arc::clone(&lost);
-        inner.set_device_lost_callback(move |_, why| {
-            *note.lock().unwrap_or_else(|held| held.into_inner()) = Some(why);
-        });
-        Ok(Device { inner, queue, name: adapter.name().to_owned(), largest, lost })
+        let trouble = Arc::default();
+        let note = noted(&trouble);
+        inner.set_device_lost_callback(move |_, why| note(GpuError::Lost(why)));
+        let note = noted(&trouble);
+        let failed = move |error: wgpu::Error| note(GpuError::Failed(error.to_string()));
+        inner.on_uncaptured_error(Arc::new(failed));
+        Ok(Device { inner, queue, name: adapter.name().to_owned(), largest, trouble })
     }
 
     /// Does `work`, and reports what the device says of it; `bytes` is what it takes of memory.
@@ -204,7 +209,7 @@ impl Device {
         let error = errors.collect::<Vec<_>>().into_iter().next();
         if error.is_some() {
             // That it was lost may have to be asked for.
-            let _ = self.inner.poll(wgpu::PollType::Poll);
+            let _ = self.poll(wgpu::PollType::Poll);
         }
         self.alive()?;
         match error {
@@ -227,15 +232,55 @@ impl Device {
 
     /// Waits until everything that was submitted is done.
     pub fn finish(&self) -> Result<(), GpuError> {
-        let done = self.inner.poll(wgpu::PollType::wait_indefinitely());
+        let done = self.poll(wgpu::PollType::wait_indefinitely());
         self.alive()?;
-        done.map(|_| ()).map_err(|error| GpuError::Failed(error.to_string()))
+        done
+    }
+
+    fn poll(&self, until: wgpu::PollType) -> Result<(), GpuError> {
+        let polled = caught(|| self.inner.poll(until)).map_err(GpuError::Lost)?;
+        polled.map(|_| ()).map_err(|error| GpuError::Failed(error.to_string()))
     }
 
     fn alive(&self) -> Result<(), GpuError> {
-        let lost = self.lost.lock().unwrap_or_else(|held| held.into_inner());
-        lost.clone().map_or(Ok(()), |why| Err(GpuError::Lost(why)))
+        let trouble = self.trouble.lock().unwrap_or_else(PoisonError::into_inner);
+        trouble.clone().map_or(Ok(()), Err)
     }
+}
+
+/// Keeps the first trouble.
+fn noted(trouble: &Arc<Mutex<Option<GpuError>>>) -> impl Fn(GpuError) + Send + Sync + 'static {
+    let trouble = Arc::clone(trouble);
+    move |error| {
+        trouble.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+    }
+}
+
+thread_local! {
+    /// Whether a panic of this thread is one that is expected.
+    static EXPECTED: Cell<bool> = const { Cell::new(false) };
+}
+
+/// What wgpu does where a driver reports, while one waits for it, that a card is lost is panic: here it is an error, of
+/// which nothing is printed. Its words.
+fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let before = panic::take_hook();
+        panic::set_hook(Box::new(move |panic| {
+            if !EXPECTED.get() {
+                before(panic);
+            }
+        }));
+    });
+    EXPECTED.set(true);
+    let done = panic::catch_unwind(AssertUnwindSafe(work));
+    EXPECTED.set(false);
+    done.map_err(|panic| {
+        let words = panic.downcast_ref::<String>().map(String::as_str);
+        let words = words.or_else(|| panic.downcast_ref::<&str>().copied());
+        words.unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")
+    })
 }
 
 /// Waits for a future; those of a graphics device on this computer are ready at once, or after a moment.
@@ -255,6 +300,14 @@ mod tests {
     use super::*;
 
     #[test]
+    fn exact_panics_of_the_library_are_errors() {
+        assert_eq!(caught(|| 7), Ok(7));
+        let told = caught(|| panic!("Error in {}:\n  lost", "poll")).unwrap_err();
+        assert_eq!(told, "Error in poll: lost");
+        assert!(!EXPECTED.get());
+    }
+
+    #[test]
     fn exact_limits_that_are_too_small_are_named() {
         let has =
             wgpu::Limits { max_compute_workgroup_storage_size: 8192, ..wgpu::Limits::default() };
@@ -267,7 +320,8 @@ mod tests {
         );
         let limits = Needs { workgroup_bytes: 8192, ..needs }.within(&has).unwrap();
         assert_eq!(limits.max_storage_buffers_per_shader_stage, 8);
-        assert!(limits.max_compute_workgroup_storage_size >= 8192);
+        // Nothing is asked for that is not there.
+        assert_eq!(limits.max_compute_workgroup_storage_size, 8192);
         let none = wgpu::Limits { max_buffer_size: 1000, ..wgpu::Limits::default() };
         let error = Needs::default().within(&none).unwrap_err().to_string();
         assert!(error.contains("bytes of a buffer: 1000"), "{error}");

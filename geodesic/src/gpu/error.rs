@@ -21,7 +21,7 @@ pub enum GpuError {
     Inexact(String),
     /// There is not enough memory on the card.
     OutOfMemory {
-        /// Bytes of the largest buffers that were asked for.
+        /// Bytes of the largest buffers that were asked for; 0 for what the driver keeps for itself.
         bytes: u64,
     },
     /// The device was lost: unplugged, reset, or its driver crashed.
@@ -53,6 +53,7 @@ impl fmt::Display for GpuError {
                 "the driver of {name} reorders sums that must stay as they are: rays next to the \
                  critical curve would be wrong"
             ),
+            Self::OutOfMemory { bytes: 0 } => f.write_str("the graphics device has no memory left"),
             Self::OutOfMemory { bytes } => {
                 write!(f, "the graphics device has no memory for {} MB", bytes.div_ceil(1_000_000))
             }

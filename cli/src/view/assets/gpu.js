@@ -1,7 +1,8 @@
 // The graphics device: buffers, textures, and pictures of the view.
 "use strict";
 
-const FLOATS = 228; // of the uniform
+const FLOATS = 248; // of the uniform
+const TABLES = 1024 + 768 + 1536;
 
 // ln r of the first and the last angular velocity of the table.
 const rateRange = () => [Math.log(0.5), Math.log(Math.max(1.01 * GIVEN.reach, 1))];
@@ -19,11 +20,12 @@ function rateAt(r) {
 }
 
 function tables() {
-  const all = new Float32Array(1024 + 768);
+  const all = new Float32Array(TABLES);
   all.set(discFlux(Math.min(0.9999, Math.max(-0.9999, state.spin))), 0);
   const [first, last] = rateRange();
   if (GIVEN.law) for (let k = 0; k < 512; k++) all[512 + k] = rateAt(Math.exp(first + (last - first) * k / 511));
   bytesOf(GIVEN.colors).forEach((x, k) => { all[1024 + k] = x / 255; });
+  if (GIVEN.shades) all.set(new Float32Array(bytesOf(GIVEN.shades).buffer), 1792);
   return all;
 }
 
@@ -41,14 +43,27 @@ function placeWords(words) {
 function discWords(words) {
   const { disc } = SCENE, inner = isco(state.spin);
   if (!disc || !state.disc) return;
-  words.set([Math.max(disc.inner_edge ?? inner, inner), disc.outer_edge, disc.peak_intensity, disc.opaque ? 2 : 1, ...disc.color, inner], 56);
+  const { plunging } = disc, edge = plunging ? horizons(state.spin).outer : Math.max(disc.inner_edge ?? inner, inner);
+  words.set([edge, disc.outer_edge, disc.peak_intensity, disc.opaque ? 2 : 1, ...disc.color, inner], 56);
+  // Constants of the innermost stable orbit.
+  if (plunging) words.set([Math.sqrt(1 - 2 / (3 * inner)), 2 * (1 + 2 * Math.sqrt(3 * inner - 2)) / Math.sqrt(27), plunging.intensity, plunging.exponent], 100);
+}
+
+function gasWords(words, coarse) {
+  const { gas, effects } = SCENE;
+  if (!gas) return 0;
+  const slope = gas.profile["power-law"]?.slope ?? -1, fall = gas.motion["angular-momentum"];
+  const motion = fall ? 1 : gas.motion === "keplerian" ? 2 : 3, absorbed = effects.absorption ? gas.absorptivity * GIVEN.gas : 0;
+  words.set([GIVEN.gas, 1 / gas.scale_radius, 0.5 * gas.flatness ** 2, slope, motion, fall?.l0 ?? 0, absorbed, gas.outer_radius], 104);
+  words.set([...gas.color, coarse * 0.15 / (1 + 0.5 * gas.flatness)], 112);
+  return gas.outer_radius;
 }
 
 function spotWords(words) {
   const spots = (state.spots ? GIVEN.spots : []).slice(0, 8);
   spots.forEach((spot, k) => words.set([
     ...spot.start, spot.sigma, ...spot.axis, spot.peak, ...spot.color, spot.orbit, spot.since ?? 0, +(spot.since !== null), state.spin * spot.axis[2], 0,
-  ], 100 + 16 * k));
+  ], 120 + 16 * k));
   return spots.length;
 }
 
@@ -69,7 +84,8 @@ function uniform(panel, { x, y, width, height }, coarse) {
   discWords(words);
   words.set([state.lensing, +shifted, GIVEN.index, state.slow], 64);
   words.set([GIVEN.white / 2 ** state.exposure, +GIVEN.colored, state.sky * GIVEN.sky_brightness, +(panel === "data")], 68);
-  words.set([GIVEN.reach, GIVEN.piece * coarse, first, 1 / (last - first)], 72);
+  words[116] = GIVEN.reach;
+  words.set([Math.max(GIVEN.reach, gasWords(words, coarse)), GIVEN.piece * coarse, first, 1 / (last - first)], 72);
   volumeWords(words, panel);
   words[95] = spotWords(words);
   words.set([state.lensing ? 0 : slice, state.cut, panel === "data" ? GIVEN.data.scale : GIVEN.most, GIVEN.data?.field ?? 1], 96);
@@ -100,7 +116,7 @@ class Gpu {
       entry(3, { sampler: {} }), entry(4, { texture: {} }), entry(5, { texture: {} }),
     ] });
     await this.pipelines();
-    this.table = device.createBuffer({ size: 4 * (1024 + 768), usage: GPUBufferUsage.STORAGE | GPUBufferUsage.COPY_DST });
+    this.table = device.createBuffer({ size: 4 * TABLES, usage: GPUBufferUsage.STORAGE | GPUBufferUsage.COPY_DST });
     this.linear = device.createSampler({ magFilter: "linear", minFilter: "linear", addressModeU: "repeat" });
     await this.load();
     return this;

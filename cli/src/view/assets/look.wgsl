@@ -27,7 +27,20 @@ fn position(point: KerrPoint) -> vec3<f32> {
 fn spotted(point: KerrPoint, lambda: f32) -> Spotted {
     let late = (point.delay + view.delay) * view.effects.w;
     let r = 1.0 / point.inverse_radius;
-    return Spotted(position(point), r, lambda, point.velocity.z, view.time - late);
+    return Spotted(position(point), r, lambda, point.velocity.z, point.rate, view.time - late);
+}
+
+// What is seen: light with and without the sky, and the share of it that comes through what is in front.
+struct Seen {
+    light: vec4<f32>,  // R, G, B, intensity
+    sky: vec3<f32>,
+    through: f32,
+}
+
+// The longest piece at a radius.
+fn longest(r: f32) -> f32 {
+    let matter = select(1e30, view.march.y, r < view.reach.x);
+    return min(matter, select(1e30, view.gas_color.w * r, view.gas.x > 0.0));
 }
 
 // Light between two places of a step whose radius changes in one sense: two Gauss-Legendre nodes a piece.
@@ -37,23 +50,29 @@ fn between(
     series: ptr<function, KerrSeries>,
     start: f32,
     stop: f32,
-) -> vec4<f32> {
+    seen: ptr<function, Seen>,
+) {
     let a = view.hole.spin.x;
     let near = ray.b / (kerr_radial(series, start).x + ray.centre);
     let middle = ray.b / (kerr_radial(series, 0.5 * (start + stop)).x + ray.centre);
     let far = ray.b / (kerr_radial(series, stop).x + ray.centre);
-    let reach = (near * near + 4.0 * middle * middle + far * far) / 6.0 + a * a;
-    let pieces = clamp(ceil(reach * (stop - start) / ray.b / view.march.y), 1.0, 200.0);
+    let length = (near * near + 4.0 * middle * middle + far * far) / 6.0 + a * a;
+    let piece = longest(min(near, far));
+    let pieces = clamp(ceil(length * (stop - start) / ray.b / piece), 1.0, 200.0);
     let h = (stop - start) / pieces;
-    var light = vec4<f32>(0.0);
     for (var k = 0.0; k < pieces; k += 0.5) {
         let odd = fract(k) > 0.25;
         let part = floor(k) + select(0.2113248654, 0.7886751346, odd);
         let at = spotted(kerr_point(view.hole, ray, walk, series, start + h * part), ray.lambda);
         let u = at.x.z / at.r;
-        light += (at.r * at.r + a * a * u * u) * emitted(at);
+        let weight = (at.r * at.r + a * a * u * u) * (0.5 * h / ray.b);
+        let gas = gas_light(at);
+        let depth = gas.depth * weight;
+        // Of what shines evenly in something that absorbs (1 - exp(-depth))/depth comes out.
+        let out = select((1.0 - exp(-depth)) / max(depth, 1e-30), 1.0 - 0.5 * depth, depth < 1e-3);
+        (*seen).light += (*seen).through * out * weight * (emitted(at) + gas.light);
+        (*seen).through *= exp(-depth);
     }
-    return light * (0.5 * h / ray.b);
 }
 
 // The part of a piece that lies within the sphere, whose radius is v = edge.
@@ -63,11 +82,12 @@ fn inside(
     series: ptr<function, KerrSeries>,
     edge: f32,
     piece: vec2<f32>,
-) -> vec4<f32> {
+    seen: ptr<function, Seen>,
+) {
     let first = kerr_radial(series, piece.x).x;
     let last = kerr_radial(series, piece.y).x;
     if (piece.y <= piece.x) || ((first <= edge) && (last <= edge)) {
-        return vec4<f32>(0.0);
+        return;
     }
     var start = piece.x;
     var stop = piece.y;
@@ -76,30 +96,30 @@ fn inside(
     } else if last < edge {
         stop = kerr_solve(series, false, edge, piece.x, piece.y);
     }
-    return between(ray, walk, series, start, stop);
+    between(ray, walk, series, start, stop, seen);
 }
 
-// Light of what fills space, up to a place in a step.
-fn filled(ray: KerrRay, walk: KerrWalk, series: ptr<function, KerrSeries>, stop: f32) -> vec4<f32> {
+// Light of what fills space between two places of a step.
+fn filled(
+    ray: KerrRay,
+    walk: KerrWalk,
+    series: ptr<function, KerrSeries>,
+    piece: vec2<f32>,
+    seen: ptr<function, Seen>,
+) {
     if view.march.x <= 0.0 {
-        return vec4<f32>(0.0);
+        return;
     }
     let edge = ray.b / view.march.x - ray.centre;
-    let turn = kerr_turning(series, stop);
-    return inside(ray, walk, series, edge, vec2<f32>(0.0, turn))
-        + inside(ray, walk, series, edge, vec2<f32>(turn, stop));
-}
-
-// What is seen: light with and without the sky.
-struct Seen {
-    light: vec4<f32>,  // R, G, B, intensity
-    sky: vec3<f32>,
+    let turn = clamp(kerr_turning(series, piece.y), piece.x, piece.y);
+    inside(ray, walk, series, edge, vec2<f32>(piece.x, turn), seen);
+    inside(ray, walk, series, edge, vec2<f32>(turn, piece.y), seen);
 }
 
 fn curved(at: vec2<f32>) -> Seen {
     var walk: KerrWalk;
     var series: KerrSeries;
-    var seen = Seen(vec4<f32>(0.0), vec3<f32>(0.0));
+    var seen = Seen(vec4<f32>(0.0), vec3<f32>(0.0), 1.0);
     let ray = kerr_begin(view.hole, view.place, arriving(at), &walk);
     if ray.outcome == KERR_LOST {
         return seen;
@@ -108,23 +128,27 @@ fn curved(at: vec2<f32>) -> Seen {
         kerr_expand(ray, walk, true, &series);
         var h = 0.0;
         let done = kerr_ends(ray, walk, &series, &h);
+        var from_ = 0.0;
         if (view.disc.w > 0.5) && (kerr_above(walk.n, walk.dn) != (kerr_height(&series, h).x > 0.0)) {
             let x = kerr_solve(&series, true, 0.0, 0.0, h);
-            let r = 1.0 / kerr_point(view.hole, ray, walk, &series, x).inverse_radius;
+            let p = kerr_point(view.hole, ray, walk, &series, x);
+            let r = 1.0 / p.inverse_radius;
             if (r >= view.disc.x) && (r <= view.disc.y) {
-                seen.light += disc_light(r, ray.lambda);
+                filled(ray, walk, &series, vec2<f32>(0.0, x), &seen);
+                from_ = x;
+                let crossing = Crossing(r, ray.lambda, ray.eta, p.rate > 0.0, blueshift(at));
+                seen.light += seen.through * disc_light(crossing);
                 if view.disc.w > 1.5 {
-                    seen.light += filled(ray, walk, &series, x);
                     return seen;
                 }
             }
         }
-        seen.light += filled(ray, walk, &series, h);
+        filled(ray, walk, &series, vec2<f32>(from_, h), &seen);
         if done {
             if (ray.outcome == KERR_ESCAPED) && (view.look.z > 0.0) {
                 let last = kerr_point(view.hole, ray, walk, &series, h);
                 let across = kerr_cos_sin(last.azimuth) * length(last.n.xy);
-                seen.sky = sky_light(vec3<f32>(across, last.n.z));
+                seen.sky = seen.through * sky_light(vec3<f32>(across, last.n.z));
             }
             return seen;
         }
@@ -153,11 +177,11 @@ fn line(at: vec2<f32>) -> Line {
 
 // Without gravity, delays and shifts of frequency: a drawing of what shines.
 fn straight(at: vec2<f32>) -> Seen {
-    var seen = Seen(vec4<f32>(0.0), vec3<f32>(0.0));
+    var seen = Seen(vec4<f32>(0.0), vec3<f32>(0.0), 1.0);
     let ray = line(at);
     let middle = -dot(ray.from_, ray.along);
     let miss = ray.from_ + middle * ray.along;
-    let room = view.march.x * view.march.x - dot(miss, miss);
+    let room = view.reach.x * view.reach.x - dot(miss, miss);
     let ball = view.hole.outer * view.hole.outer - dot(miss, miss);
     if view.slice.x > 0.5 {
         seen.light = sliced(ray);
@@ -199,7 +223,7 @@ fn sliced(ray: Line) -> vec4<f32> {
     let distance = (view.slice.y - ray.from_[k]) / ray.along[k];
     let x = ray.from_ + distance * ray.along;
     let behind = (view.camera > 0.5) && (distance < 0.0);
-    if behind || (abs(ray.along[k]) < 1e-4) || (length(x) > view.march.x) {
+    if behind || (abs(ray.along[k]) < 1e-4) || (length(x) > view.reach.x) {
         return vec4<f32>(0.0);
     }
     if length(x) < view.hole.outer {
@@ -226,11 +250,11 @@ fn data(pixel: vec2<f32>) -> Seen {
     let place = (pixel - view.corner - 0.5 * view.size) * (2.0 * view.half / side) / view.slice.w;
     let at = place + 0.5;
     if any(at < vec2<f32>(0.0)) || any(at >= vec2<f32>(1.0)) {
-        return Seen(vec4<f32>(0.0), vec3<f32>(0.0));
+        return Seen(vec4<f32>(0.0), vec3<f32>(0.0), 1.0);
     }
     let pixels = vec2<f32>(textureDimensions(measured));
     let light = textureLoad(measured, vec2<i32>(at * pixels), 0).x * view.slice.z;
-    return Seen(vec4<f32>(light), vec3<f32>(0.0));
+    return Seen(vec4<f32>(light), vec3<f32>(0.0), 1.0);
 }
 
 fn shown(seen: Seen) -> vec3<f32> {

@@ -2,14 +2,24 @@
 //!
 //! `cargo test --release -p kerrlight --features gpu --test gpu -- --nocapture` prints the differences.
 
+#[cfg(target_os = "linux")]
+mod faults;
+
 use kerrlight_tomo::image::Picture;
 use kerrlight_tomo::image::exr;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 fn kerrlight(folder: &Path, arguments: &[&str]) -> Output {
+    kerrlight_in(folder, &[], arguments)
+}
+
+/// The same in an environment.
+fn kerrlight_in(folder: &Path, variables: &[(&str, &OsStr)], arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_kerrlight"));
-    command.current_dir(folder).args(arguments).output().expect("the program runs")
+    let command = command.current_dir(folder).envs(variables.iter().copied()).args(arguments);
+    command.output().expect("the program runs")
 }
 
 fn succeed(folder: &Path, arguments: &[&str]) -> String {
@@ -185,6 +195,35 @@ fn code_fits_of_images_are_those_of_the_processor() {
     assert!(read("gpu") == read("again") && read("gpu") != read("cpu"));
     let (_, resumed) = fitted(folder.path(), &["fit".to_owned()], &["--resume", "again"]);
     assert!(resumed["psnr_db"] == gpu["psnr_db"]);
+}
+
+/// Every representation that devices have learns there what it learns on the processor.
+#[test]
+fn code_each_representation_reaches_the_psnr_of_the_processor() {
+    let Some(folder) = folder() else { return };
+    let of_events = [
+        "representation=mlp4d",
+        "training.occupancy=",
+        "training.start=drawn",
+        "training.batch={pixels=50}",
+        "training.steps=20",
+    ];
+    let cases: [&[&str]; 3] = [
+        &of_events,
+        &["representation=grid", "training.start=drawn"],
+        &["representation=feature-grid"],
+    ];
+    for (k, changes) in cases.into_iter().enumerate() {
+        let words = scene_1(&[&["screen.pixels=14", "training.steps=60"], changes].concat());
+        let [cpu, gpu] = ["cpu", "gpu"].map(|device| {
+            let run = format!("{device}{k}");
+            let (_, results) = fitted(folder.path(), &words, &["-o", &run, "--device", device]);
+            ["psnr_db", "loss"].map(|name| results[name].as_f64().unwrap())
+        });
+        println!("{changes:?}: PSNR and loss {cpu:?} on the processor, {gpu:?} on the device");
+        assert!((cpu[0] - gpu[0]).abs() < 0.1 && (gpu[1] / cpu[1] - 1.0).abs() < 1e-3);
+        assert!(cpu[1] > 0.0 && cpu != gpu, "{changes:?}: the device did nothing");
+    }
 }
 
 #[test]
