@@ -10,7 +10,7 @@ pub fn number(x: f64, digits: usize) -> String {
 }
 
 /// Results that are shown: their names in results.json, what they are called, their units and digits.
-pub const RESULTS: [(&str, &str, &str, usize); 57] = [
+pub const RESULTS: [(&str, &str, &str, usize); 61] = [
     ("psnr_db", "PSNR", "dB", 2),
     ("psnr_inside_db", "PSNR inside the region", "dB", 2),
     ("psnr_over_time_db", "PSNR over time", "dB", 2),
@@ -60,7 +60,11 @@ pub const RESULTS: [(&str, &str, &str, usize); 57] = [
     ("band_inclination_low_deg", "2.5 % quantile of the inclination", "°", 1),
     ("band_inclination_high_deg", "97.5 % quantile of the inclination", "°", 1),
     ("band_radius", "radius of the flare", "M", 2),
+    ("band_radius_low", "2.5 % quantile of the radius", "M", 2),
+    ("band_radius_high", "97.5 % quantile of the radius", "M", 2),
     ("band_azimuth_deg", "azimuth of the flare", "°", 1),
+    ("band_azimuth_low_deg", "2.5 % quantile of the azimuth", "°", 1),
+    ("band_azimuth_high_deg", "97.5 % quantile of the azimuth", "°", 1),
     ("band_forward", "probability of the law's sense of rotation", "", 4),
     ("band_validation", "χ² per data point of samples that were not fitted", "", 3),
     ("ring_diameter_uas", "diameter of the ring", "µas", 1),

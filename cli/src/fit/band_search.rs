@@ -8,6 +8,7 @@ use crate::interrupt::{Interrupted, Keeper};
 use crate::output;
 use crate::progress;
 use anyhow::Context;
+use kerrlight_tomo::fit::band::Interval;
 use kerrlight_tomo::fit::settings::{BandSettings, FitFile};
 use kerrlight_tomo::fit::setup::{self, BandScan, BandWorld, Instrument, Measured};
 use serde_json::{Value, json};
@@ -121,6 +122,13 @@ fn interval(shares: &[[f64; 2]], best: Option<f64>) -> Value {
     json!({"best": best, "median": median, "low": low, "high": high})
 }
 
+/// An interval of azimuths in degrees, its median in [0°, 360°).
+fn azimuth(Interval { median, low, high }: Interval) -> Value {
+    let [median, low, high] = [median, low, high].map(f64::to_degrees);
+    let turns = median.rem_euclid(360.0) - median;
+    json!({"median": median + turns, "low": low + turns, "high": high + turns})
+}
+
 fn results(scan: &BandScan, file: &FitFile) -> anyhow::Result<Value> {
     let best = &scan.worlds[scan.best];
     let inclinations = shares(&scan.worlds, |world| world.inclination_deg);
@@ -145,9 +153,11 @@ fn results(scan: &BandScan, file: &FitFile) -> anyhow::Result<Value> {
             "radius": band.radius, "width": band.width, "height": band.height, "length": band.length,
             "power": band.power, "mean": band.mean,
         },
-        "emission_radius": scan.field.radius,
-        "azimuth_deg": scan.field.azimuth.to_degrees().rem_euclid(360.0),
-        "validation_chi2_per_datum": scan.field.validation,
+        "emission_radius": {
+            "median": scan.radius.median, "low": scan.radius.low, "high": scan.radius.high,
+        },
+        "azimuth_deg": azimuth(scan.azimuth),
+        "validation_chi2_per_datum": scan.validation,
         "truth": {"inclination_deg": truth},
         "worlds": scan.worlds.iter().map(row).collect::<Vec<_>>(),
     }))
@@ -176,8 +186,12 @@ pub fn numbers(results: &Value) -> Vec<(&'static str, Value)> {
         ("band_inclination_deg", inclination["median"].clone()),
         ("band_inclination_low_deg", inclination["low"].clone()),
         ("band_inclination_high_deg", inclination["high"].clone()),
-        ("band_radius", results["emission_radius"].clone()),
-        ("band_azimuth_deg", results["azimuth_deg"].clone()),
+        ("band_radius", results["emission_radius"]["median"].clone()),
+        ("band_radius_low", results["emission_radius"]["low"].clone()),
+        ("band_radius_high", results["emission_radius"]["high"].clone()),
+        ("band_azimuth_deg", results["azimuth_deg"]["median"].clone()),
+        ("band_azimuth_low_deg", results["azimuth_deg"]["low"].clone()),
+        ("band_azimuth_high_deg", results["azimuth_deg"]["high"].clone()),
         ("band_forward", json!(forward)),
         ("band_validation", results["validation_chi2_per_datum"].clone()),
     ]
@@ -197,9 +211,13 @@ pub fn sentences(results: &Value) -> Vec<String> {
             of("inclination_deg", "median")
         ),
         format!(
-            "The flare orbits at {:.1} M; at the reference time its middle is at an azimuth of {:.0}°.",
-            number(&results["emission_radius"]),
-            number(&results["azimuth_deg"])
+            "The flare orbits at {:.1} M ({:.1} to {:.1} at 95 %); at the reference time its middle is at an azimuth of {:.0}° ({:.0}° to {:.0}°).",
+            of("emission_radius", "median"),
+            of("emission_radius", "low"),
+            of("emission_radius", "high"),
+            of("azimuth_deg", "median"),
+            of("azimuth_deg", "low"),
+            of("azimuth_deg", "high")
         ),
     ];
     let turns = results["rotation_factor"]["probabilities"].as_array();

@@ -1,7 +1,7 @@
-//! The probability of data with the field integrated out, and the field that is expected with them.
+//! The probability of data with the field integrated out, and what it says of data that were not used.
 
 use super::field::{Seen, part, some};
-use super::{Band, BandPrior, CurveRows, Recovered};
+use super::{Band, BandPrior, CurveRows};
 use crate::Error;
 use nalgebra::{DMatrix, DVector};
 
@@ -16,7 +16,12 @@ pub struct Weighed {
     pub best: Band,
     /// Its ln.
     pub ln_best: f64,
+    /// Combinations that are nearly as probable, with their ln, radius by radius.
+    pub likely: Vec<(Band, f64)>,
 }
+
+/// Combinations with a ln this far below the best one are not likely.
+pub const UNLIKELY: f64 = 8.0;
 
 /// How probable each of some data sets (over their standard deviations) is: of light curves that differ in their values
 /// alone.
@@ -31,6 +36,7 @@ pub fn evidence(
     let prior = prior.clone().checked()?;
     let used = curve.numbers(true);
     let sets: Vec<DVector<f64>> = data.iter().map(|values| some(values, &used)).collect();
+    let sets = DMatrix::from_columns(&sets);
     let mut all: Vec<Vec<(usize, Band, f64)>> = vec![Vec::new(); data.len()];
     for (place, radius) in prior.radii.iter().enumerate() {
         for (width, length) in pairs(&prior.widths, &prior.lengths) {
@@ -63,21 +69,21 @@ fn pairs<'a>(a: &'a [f64], b: &'a [f64]) -> impl Iterator<Item = (f64, f64)> + '
 }
 
 /// The power with which the model's mean square is that of the first data.
-fn unit(covariance: &DMatrix<f64>, sets: &[DVector<f64>]) -> f64 {
-    let square = sets.first().map_or(1.0, DVector::norm_squared);
+fn unit(covariance: &DMatrix<f64>, sets: &DMatrix<f64>) -> f64 {
+    let square = sets.column(0).norm_squared();
     let trace = covariance.trace();
     if trace > 0.0 { square / trace } else { 1.0 }
 }
 
 /// The factor of 1 + power · covariance.
-struct Lower {
+pub(super) struct Lower {
     factor: DMatrix<f64>,
     power: f64,
     ln_determinant: f64,
 }
 
 impl Lower {
-    fn new(covariance: &DMatrix<f64>, power: f64) -> Option<Self> {
+    pub fn new(covariance: &DMatrix<f64>, power: f64) -> Option<Self> {
         let mut matrix = covariance * power;
         (0..matrix.nrows()).for_each(|k| matrix[(k, k)] += 1.0);
         let factor = matrix.cholesky()?.unpack();
@@ -85,22 +91,23 @@ impl Lower {
         Some(Self { factor, power, ln_determinant })
     }
 
-    fn solved(&self, vector: &DVector<f64>) -> DVector<f64> {
-        self.factor.solve_lower_triangular(vector).unwrap_or_else(|| vector * f64::NAN)
+    /// Columns over the factor: their products are those with the inverse of the covariance.
+    pub fn solved(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        self.factor.solve_lower_triangular(columns).unwrap_or_else(|| columns * f64::NAN)
     }
 
     /// Number of the data set, mean, and ln of the probability: the mean is a direction more.
     fn weigh(
         &self,
         uniform: &DVector<f64>,
-        sets: &[DVector<f64>],
+        sets: &DMatrix<f64>,
         means: &[f64],
     ) -> Vec<(usize, f64, f64)> {
-        let direction = self.solved(uniform);
+        let direction = self.solved(&DMatrix::from_columns(core::slice::from_ref(uniform)));
+        let (direction, sets) = (direction.column(0), self.solved(sets));
         let square = direction.norm_squared();
         let mut all = Vec::new();
-        for (set, values) in sets.iter().enumerate() {
-            let values = self.solved(values);
+        for (set, values) in sets.column_iter().enumerate() {
             let (chi2, along) = (values.norm_squared(), values.dot(&direction));
             for mean in means {
                 let strength = self.power * mean * mean;
@@ -133,67 +140,40 @@ fn weighed(all: &[(usize, Band, f64)], radii: usize) -> Result<Weighed, Error> {
         by_radius: (0..radii).map(of).collect(),
         best: *best,
         ln_best: *ln_best,
+        likely: all
+            .iter()
+            .filter(|one| one.2 > ln_best - UNLIKELY)
+            .map(|one| (one.1, one.2))
+            .collect(),
     })
 }
 
-/// The emission that is expected in a band with these data (over their standard deviations), and what it says of the
-/// data that were not used.
+/// χ² per datum of the data that were not used, with the values and the covariance that a band expects of them, given
+/// the others (all over their standard deviations); none if all were used.
 ///
 /// # Errors
-/// If the band has no voxel.
-pub fn recovered(curve: &CurveRows, data: &[f64], band: &Band) -> Result<Recovered, Error> {
-    let none = || Error::out_of_range("radius of the band", band.radius, "that of any voxel");
+/// If the band has no node.
+pub fn validation(curve: &CurveRows, data: &[f64], band: &Band) -> Result<Option<f64>, Error> {
+    let none = || Error::out_of_range("radius of the band", band.radius, "that of any node");
     let seen = curve.seen(band).ok_or_else(none)?;
     let (used, others) = (curve.numbers(true), curve.numbers(false));
+    if others.is_empty() {
+        return Ok(None);
+    }
     let full = full(&seen, band);
     let mut inner = part(&full, &used, &used);
     (0..used.len()).for_each(|k| inner[(k, k)] += 1.0);
     let factor = inner.cholesky().ok_or_else(none)?;
-    let weights = factor.solve(&some(data, &used));
-    let emission = emission(curve, &seen, band, (&used, &weights));
-    let validation = (!others.is_empty()).then(|| {
-        let across = part(&full, &others, &used);
-        let left = some(data, &others) - &across * &weights;
-        let mut outer = part(&full, &others, &others) - &across * factor.solve(&across.transpose());
-        (0..others.len()).for_each(|k| outer[(k, k)] += 1.0);
-        outer
-            .cholesky()
-            .map_or(f64::NAN, |outer| left.dot(&outer.solve(&left)) / others.len() as f64)
-    });
-    let [radius, azimuth] = middle(curve, &emission);
-    Ok(Recovered { emission, radius, azimuth, validation })
+    let across = part(&full, &others, &used);
+    let left = some(data, &others) - &across * factor.solve(&some(data, &used));
+    let mut outer = part(&full, &others, &others) - &across * factor.solve(&across.transpose());
+    (0..others.len()).for_each(|k| outer[(k, k)] += 1.0);
+    let chi2 = outer.cholesky().map_or(f64::NAN, |outer| left.dot(&outer.solve(&left)));
+    Ok(Some(chi2 / others.len() as f64))
 }
 
 /// The covariance of all data without noise.
 fn full(seen: &Seen, band: &Band) -> DMatrix<f64> {
     let mean = &seen.uniform * seen.uniform.transpose() * (band.mean * band.mean);
     (&seen.covariance + mean) * band.power
-}
-
-fn emission(
-    curve: &CurveRows,
-    seen: &Seen,
-    band: &Band,
-    (used, weights): (&[usize], &DVector<f64>),
-) -> Vec<f64> {
-    let mut all = vec![0.0; curve.voxels.count()];
-    let along = some(seen.uniform.as_slice(), used).dot(weights) * band.mean * band.mean;
-    for (row, voxel) in seen.inside.iter().enumerate() {
-        let field: f64 =
-            used.iter().zip(weights.iter()).map(|(k, w)| seen.spread[(row, *k)] * w).sum();
-        all[*voxel] = band.power * seen.envelope[row] * (field + along);
-    }
-    all
-}
-
-/// Mean distance from the axis and mean azimuth of what is positive.
-fn middle(curve: &CurveRows, emission: &[f64]) -> [f64; 2] {
-    let mut sums = [0.0; 4];
-    for (k, light) in emission.iter().enumerate().filter(|(_, light)| **light > 0.0) {
-        let [x, y, _] = curve.voxels.position(k);
-        let radius = x.hypot(y).max(f64::MIN_POSITIVE);
-        let add = [1.0, radius, x / radius, y / radius];
-        sums.iter_mut().zip(add).for_each(|(sum, x)| *sum += light * x);
-    }
-    [sums[1] / sums[0].max(f64::MIN_POSITIVE), sums[3].atan2(sums[2])]
 }

@@ -1,68 +1,132 @@
-//! Rows of a light curve in voxels, and the covariance that a random field in a band has in the data.
+//! The covariance that a random field in a band has in the data, and where its emission is.
 
-use super::Band;
-use crate::fit::linear::Voxels;
+use super::{Band, CurveRows};
+use core::f64::consts::TAU;
 use nalgebra::{DMatrix, DVector};
 
-/// A light curve as a linear function of voxels, all numbers over the standard deviations of the data.
-#[derive(Clone, Debug)]
-pub struct CurveRows {
-    /// The grid.
-    pub voxels: Voxels,
-    /// Datum by datum, voxel by voxel.
-    pub rows: Vec<Vec<f64>>,
-    /// Which of the data are used; the others judge.
-    pub used: Vec<bool>,
-}
-
-/// Voxels that are as dark as this part of the envelope's middle are left out.
+/// Bands whose envelope is as dark as this at all nodes are none.
 const DARK: f64 = 0.02;
+/// Parts of the field whose variance is below this part of the largest one are left out.
+const FAINT: f64 = 1e-6;
 
 /// A band as the data see it.
 pub(super) struct Seen {
-    /// Voxels in it.
-    pub inside: Vec<usize>,
-    /// The envelope there.
-    pub envelope: Vec<f64>,
-    /// Voxels × data: the field's correlation times the transpose of the rows.
-    pub spread: DMatrix<f64>,
     /// Data × data: the covariance of a field of unit variance.
     pub covariance: DMatrix<f64>,
     /// What a field of 1 gives.
     pub uniform: DVector<f64>,
+    /// Data × [moments](super::place): their covariance.
+    pub moments: DMatrix<f64>,
+    /// Moments × moments.
+    pub own: DMatrix<f64>,
 }
 
 impl CurveRows {
-    /// Rows, columns and covariance of a band; none where it has no voxel.
+    /// Covariances of a band; none where it has no node.
     pub(super) fn seen(&self, band: &Band) -> Option<Seen> {
-        let places: Vec<[f64; 3]> =
-            (0..self.voxels.count()).map(|k| self.voxels.position(k)).collect();
-        let bright = |x: &[f64; 3]| {
-            let [a, b] = [(x[0].hypot(x[1]) - band.radius) / band.width, x[2] / band.height];
-            (-0.5 * (a * a + b * b)).exp()
-        };
-        let inside: Vec<usize> = (0..places.len()).filter(|k| bright(&places[*k]) > DARK).collect();
-        if inside.is_empty() {
-            return None;
-        }
-        let envelope: Vec<f64> = inside.iter().map(|k| bright(&places[*k])).collect();
-        let entry = |row: usize, column: usize| self.rows[row][inside[column]] * envelope[column];
-        let rows = DMatrix::from_fn(self.rows.len(), inside.len(), entry);
-        let near = |a: usize, b: usize| {
-            let (p, q) = (places[inside[a]], places[inside[b]]);
-            let square: f64 = p.iter().zip(q).map(|(p, q)| (p - q) * (p - q)).sum();
-            (-0.5 * square / (band.length * band.length)).exp()
-        };
-        let correlation = DMatrix::from_fn(inside.len(), inside.len(), near);
-        let spread = correlation * rows.transpose();
-        let covariance = &rows * &spread;
-        let uniform = rows.column_sum();
-        Some(Seen { inside, envelope, spread, covariance, uniform })
+        let across = Profile::new(&self.grid.rings(), [band.radius, band.width], band.length)?;
+        let upright = Profile::new(&self.grid.layers(), [0.0, band.height], band.length)?;
+        let round = self.round(band);
+        let parts = self.parts(&across.parts, &upright.parts, &round);
+        let [moments, own] = self.moments(&parts, [&across, &upright], round[1]);
+        let uniform = self.uniform([&across, &upright]);
+        Some(Seen { covariance: &parts * parts.transpose(), uniform, moments, own })
     }
 
-    /// Numbers of the data that are used, or of the others.
-    pub(super) fn numbers(&self, used: bool) -> Vec<usize> {
-        (0..self.used.len()).filter(|k| self.used[*k] == used).collect()
+    /// Standard deviations of the functions of the azimuth, those that count and the first harmonic: exp(−d²/2ℓ²) of
+    /// the distance d between two points of the band's circle.
+    fn round(&self, band: &Band) -> Vec<f64> {
+        let (nodes, kappa) = (self.grid.azimuths, (band.radius / band.length).powi(2));
+        let near = |node: usize| (kappa * ((TAU * node as f64 / nodes as f64).cos() - 1.0)).exp();
+        let share = |harmonic: usize| {
+            let wave = |node: usize| (TAU * (harmonic * node % nodes) as f64 / nodes as f64).cos();
+            (0..nodes).map(|node| near(node) * wave(node)).sum::<f64>() / nodes as f64
+        };
+        let shares = (0..=self.grid.waves() / 2).map(share);
+        let all: Vec<f64> = shares.map(|share| share.max(0.0)).collect();
+        let most = all.iter().copied().fold(0.0, f64::max);
+        let count = all.iter().rposition(|share| *share > FAINT * most).unwrap_or(0).max(1);
+        (0..=2 * count).map(|wave| all[wave.div_ceil(2)].sqrt()).collect()
+    }
+
+    /// Data × parts of the field, each of unit variance: function of the azimuth by function, layer parts by ring parts.
+    fn parts(&self, across: &DMatrix<f64>, upright: &DMatrix<f64>, round: &[f64]) -> DMatrix<f64> {
+        let (data, layers) = (self.data(), self.grid.layers);
+        let waves = self.waves.columns(0, round.len() * data * layers);
+        let of_rings = across.tr_mul(&waves);
+        let each = across.ncols() * upright.ncols();
+        let mut parts = DMatrix::zeros(data, round.len() * each);
+        for (wave, deviation) in round.iter().enumerate() {
+            for datum in 0..data {
+                let of_layers = of_rings.columns((wave * data + datum) * layers, layers);
+                let both = of_layers * upright * *deviation;
+                for (k, part) in both.iter().enumerate() {
+                    parts[(datum, wave * each + k)] = *part;
+                }
+            }
+        }
+        parts
+    }
+
+    /// Covariances of the moments with the data and with each other.
+    fn moments(
+        &self,
+        parts: &DMatrix<f64>,
+        [across, upright]: [&Profile; 2],
+        first: f64,
+    ) -> [DMatrix<f64>; 2] {
+        let rings = DVector::from_vec(self.grid.rings());
+        let up = upright.parts.row_sum().transpose() * first;
+        let of_power = |power: i32| {
+            let ring = across.parts.tr_mul(&rings.map(|radius| radius.powi(power)));
+            let both = &ring * up.transpose();
+            DVector::from_column_slice(both.as_slice())
+        };
+        let (weights, each) = ([1, 2].map(of_power), across.parts.ncols() * up.len());
+        let of = |k: usize| (&weights[k / 2], k % 2);
+        let column = |k: usize| parts.columns((1 + of(k).1) * each, each) * of(k).0;
+        let moments = DMatrix::from_columns(&[0, 1, 2, 3].map(column));
+        let own = |a: usize, b: usize| match of(a).1 == of(b).1 {
+            true => of(a).0.dot(of(b).0),
+            false => 0.0,
+        };
+        [moments, DMatrix::from_fn(4, 4, own)]
+    }
+
+    /// What a field of 1 gives.
+    fn uniform(&self, [across, upright]: [&Profile; 2]) -> DVector<f64> {
+        let (data, layers) = (self.data(), self.grid.layers);
+        let of_rings = self.waves.columns(0, data * layers).tr_mul(&across.envelope);
+        let of = |datum: usize| of_rings.rows(datum * layers, layers).dot(&upright.envelope);
+        DVector::from_fn(data, |datum, _| of(datum))
+    }
+}
+
+/// A random field of one coordinate times an envelope.
+struct Profile {
+    /// exp(−½ ((x − middle)/width)²) at the nodes.
+    envelope: DVector<f64>,
+    /// Nodes × parts: the sum of their squares is the covariance.
+    parts: DMatrix<f64>,
+}
+
+impl Profile {
+    fn new(nodes: &[f64], [middle, width]: [f64; 2], length: f64) -> Option<Self> {
+        let bell = |x: f64| (-0.5 * x * x).exp();
+        let envelope =
+            DVector::from_iterator(nodes.len(), nodes.iter().map(|x| bell((x - middle) / width)));
+        if envelope.max() < DARK {
+            return None;
+        }
+        let entry =
+            |a: usize, b: usize| envelope[a] * envelope[b] * bell((nodes[a] - nodes[b]) / length);
+        let covariance = DMatrix::from_fn(nodes.len(), nodes.len(), entry).symmetric_eigen();
+        let most = covariance.eigenvalues.max();
+        let kept: Vec<DVector<f64>> = (0..nodes.len())
+            .filter(|k| covariance.eigenvalues[*k] > FAINT * most)
+            .map(|k| covariance.eigenvectors.column(k) * covariance.eigenvalues[k].sqrt())
+            .collect();
+        Some(Self { envelope, parts: DMatrix::from_columns(&kept) })
     }
 }
 

@@ -6,14 +6,20 @@
 //! is linear in it, so that the probability of the data, with g integrated out, is a Gaussian with a known covariance:
 //! worlds in which data could be explained by many fields, but need not, are not preferred for it. Fields may be
 //! negative here; μ is a standard deviation of their mean.
+//!
+//! Fields live on rings and layers, and their correlation is exp(−d²/2ℓ²) with d² = (ρ − ρ′)² + (z − z′)² +
+//! 4ρ₀² sin²((φ − φ′)/2): a product of one factor for each coordinate, whose parts are few.
 
 mod evidence;
 mod field;
+mod place;
+mod rows;
 #[cfg(test)]
 mod tests;
 
-pub use evidence::{Weighed, evidence, recovered};
-pub use field::CurveRows;
+pub use evidence::{Weighed, evidence, validation};
+pub use place::{Interval, Normal, Place, places, together};
+pub use rows::{CurveRows, PolarGrid};
 
 use crate::Error;
 
@@ -82,17 +88,4 @@ pub struct Band {
     pub power: f64,
     /// μ.
     pub mean: f64,
-}
-
-/// The emission that is expected, given the data.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Recovered {
-    /// At all voxels; may be negative.
-    pub emission: Vec<f64>,
-    /// Mean distance of what is positive from the axis, M.
-    pub radius: f64,
-    /// Mean azimuth of what is positive, radians.
-    pub azimuth: f64,
-    /// χ² per datum of the data that were not used, with the covariance that is expected of them; none without any.
-    pub validation: Option<f64>,
 }

@@ -41,6 +41,6 @@ pub struct BandSettings {
     pub height: f64,
     /// Correlation lengths of the emission, M.
     pub lengths: Vec<f64>,
-    /// Voxels along each axis.
+    /// Rings between the axis and the largest radius of the region.
     pub nodes: usize,
 }

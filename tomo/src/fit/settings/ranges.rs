@@ -161,7 +161,7 @@ const RANGES: &[Range] = &[
     ("band.widths.*", 1e-3, LENGTH, "M"),
     ("band.height", 1e-3, LENGTH, "M"),
     ("band.lengths.*", 1e-3, LENGTH, "M"),
-    ("band.nodes", 4.0, 64.0, "voxels along each axis"),
+    ("band.nodes", 4.0, 128.0, "rings between the axis and region.r_max"),
     ("output.nodes", 2.0, 512.0, "nodes along each axis"),
     ("image.pixels", 8.0, 512.0, "pixels along a side"),
     ("image.field_uas", 1e-6, 1e12, "microarcseconds"),

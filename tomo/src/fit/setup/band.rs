@@ -3,11 +3,12 @@
 use super::{Curve, Instrument, Measured, Result, axis, forward_model, motion};
 use crate::dynamics::AngularVelocity;
 use crate::fit::Motion;
-use crate::fit::band::{Band, BandPrior, CurveRows, Recovered, evidence, recovered};
-use crate::fit::linear::{Change, LinearProblem, Voxels};
+use crate::fit::band::{
+    Band, BandPrior, CurveRows, Interval, PolarGrid, Weighed, evidence, places, together,
+    validation,
+};
 use crate::fit::settings::{BandSettings, FitError, FitFile, refuse};
 use crate::polarization::StokesParameter;
-use crate::representation::Degree;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -26,6 +27,8 @@ pub struct BandWorld {
     pub by_radius: Vec<f64>,
     /// The most probable band.
     pub band: Band,
+    /// Bands that are nearly as probable, with the ln of the evidence of each.
+    pub likely: Vec<(Band, f64)>,
 }
 
 /// What was found.
@@ -37,11 +40,17 @@ pub struct BandScan {
     pub radii: Vec<f64>,
     /// Which world is the most probable.
     pub best: usize,
-    /// The emission that is expected there.
-    pub field: Recovered,
-    /// The grid that it is on.
-    pub voxels: Voxels,
+    /// Distance of the emission from the axis, M, in all worlds that are likely.
+    pub radius: Interval,
+    /// Its azimuth at the reference time, radians.
+    pub azimuth: Interval,
+    /// χ² per datum of the data that were not used, with the covariance that the best world expects of them; none without
+    /// any.
+    pub validation: Option<f64>,
 }
+
+/// Worlds with a ln this far below the best one do not say where the emission is.
+const UNLIKELY: f64 = 8.0;
 
 /// Told how many worlds are done; says whether to go on.
 pub type BandWatch<'a> = dyn Fn(usize) -> bool + Sync + 'a;
@@ -74,11 +83,45 @@ pub fn scan_band(
     let worlds: Vec<BandWorld> = all.into_iter().flatten().collect();
     let better = |a: &usize, b: &usize| worlds[*a].ln_posterior.total_cmp(&worlds[*b].ln_posterior);
     let best = (0..worlds.len()).max_by(better).unwrap_or(0);
-    let BandWorld { inclination_deg, rotation_factor, position_angle_deg, band, .. } = worlds[best];
-    let rows = rows(file, measured, (settings, curve), (inclination_deg, rotation_factor))?;
-    let field = recovered(&rows, &turned(curve, position_angle_deg), &band)?;
+    let [azimuth, radius] = placed(file, measured, (settings, curve), (&worlds, best))?;
+    let world = &worlds[best];
+    let rows = rows(file, measured, (settings, curve), world.flow())?;
+    let validation = validation(&rows, &turned(curve, world.position_angle_deg), &world.band)?;
     let radii = settings.radii.values();
-    Ok(Some(BandScan { worlds, radii, best, field, voxels: rows.voxels }))
+    Ok(Some(BandScan { worlds, radii, best, radius, azimuth, validation }))
+}
+
+/// Azimuth and radius of the emission, in all worlds that are likely.
+fn placed(
+    file: &FitFile,
+    measured: &Measured,
+    (settings, curve): (&BandSettings, &Curve),
+    (worlds, best): (&[BandWorld], usize),
+) -> Result<[Interval; 2]> {
+    let most = worlds[best].ln_posterior;
+    let likely: Vec<&BandWorld> =
+        worlds.iter().filter(|world| world.ln_posterior > most - UNLIKELY).collect();
+    let one = |world: &&BandWorld| {
+        let rows = rows(file, measured, (settings, curve), world.flow())?;
+        let of = |(band, ln): &(Band, f64)| (*band, ln + direction(world.inclination_deg));
+        let bands: Vec<(Band, f64)> = world.likely.iter().map(of).collect();
+        places(&rows, &turned(curve, world.position_angle_deg), &bands)
+    };
+    let all = likely.par_iter().map(one).collect::<Result<Vec<_>>>()?.concat();
+    let none = || FitError::Conflict("band: the data do not say where any emission is".to_owned());
+    Ok(together(&all).ok_or_else(none)?)
+}
+
+impl BandWorld {
+    /// Inclination and angular velocity.
+    fn flow(&self) -> (f64, f64) {
+        (self.inclination_deg, self.rotation_factor)
+    }
+}
+
+/// ln of the prior of an axis that points anywhere; just above the poles, where it is 0.
+fn direction(inclination_deg: f64) -> f64 {
+    inclination_deg.to_radians().sin().max(1e-6).ln()
 }
 
 fn check(file: &FitFile, settings: &BandSettings, curve: &Curve) -> Result<()> {
@@ -100,8 +143,8 @@ fn check(file: &FitFile, settings: &BandSettings, curve: &Curve) -> Result<()> {
     if let Some(bad) = settings.rotation_factors.iter().find(|x| !(-10.0..=10.0).contains(*x)) {
         return range("rotation_factors", *bad, "-10 to 10");
     }
-    if !(4..=64).contains(&settings.nodes) {
-        return range("nodes", settings.nodes as f64, "4 to 64");
+    if !(4..=128).contains(&settings.nodes) {
+        return range("nodes", settings.nodes as f64, "4 to 128");
     }
     if settings.rotation_factors.is_empty() || settings.position_angles_deg.is_empty() {
         refuse!("band: rotation_factors and position_angles_deg need one value or more");
@@ -147,15 +190,14 @@ fn weighed(
         settings.position_angles_deg.iter().map(|angle| turned(curve, *angle)).collect();
     let weighed = evidence(&rows, &data, &prior(settings))?;
     let (inclination_deg, rotation_factor) = world;
-    // Of an axis that points anywhere; just above the poles, where it is 0.
-    let direction = inclination_deg.to_radians().sin().max(1e-6).ln();
-    let one = |(angle, weighed): (&f64, crate::fit::band::Weighed)| BandWorld {
+    let one = |(angle, weighed): (&f64, Weighed)| BandWorld {
         inclination_deg,
         rotation_factor,
         position_angle_deg: *angle,
-        ln_posterior: weighed.ln_evidence + direction,
+        ln_posterior: weighed.ln_evidence + direction(inclination_deg),
         by_radius: weighed.by_radius,
         band: weighed.best,
+        likely: weighed.likely,
     };
     Ok(settings.position_angles_deg.iter().zip(weighed).map(one).collect())
 }
@@ -193,29 +235,21 @@ fn rows(
     let mut model = forward_model(&instrument, &band_motion(&file, measured, factor)?)?;
     let axis = axis(&file)?.0;
     model.weigh(axis);
-    let frames: Vec<usize> = (0..measured.times.len()).collect();
-    let problem = LinearProblem {
-        model: &model,
-        axis,
-        frames: &frames,
-        terms: &[],
-        voxels: Voxels::cube(settings.nodes, file.region.r_max, Degree::Linear),
-        upper: 1.0,
-        flux: None,
-        priors: &[],
-        gaussian: None,
-        change: Change::NONE,
-    };
-    let over = |(mut row, datum): (Vec<f64>, &Option<[f64; 2]>)| {
-        let scale = datum.map_or(0.0, |[_, sigma]| 1.0 / sigma);
-        row.iter_mut().for_each(|x| *x *= scale);
-        row
-    };
-    let rows = problem.rows().into_iter().zip(&curve.data).map(over).collect();
+    let scale = |datum: &Option<[f64; 2]>| datum.map_or(0.0, |[_, sigma]| 1.0 / sigma);
+    let scales: Vec<f64> = curve.data.iter().map(scale).collect();
     let count = curve.parameters.len();
     let used = |k: usize| curve.fitted[k / count] || curve.data[k].is_none();
     let used = (0..curve.data.len()).map(used).collect();
-    Ok(CurveRows { voxels: problem.voxels, rows, used })
+    Ok(CurveRows::of(&model, axis, grid(&file, settings), (&scales, used)))
+}
+
+/// Three times as many nodes round the axis as away from it, and layers twice as far apart.
+fn grid(file: &FitFile, settings: &BandSettings) -> PolarGrid {
+    let (radius, rings) = (file.region.r_max, settings.nodes);
+    let height = file.region.z_width.unwrap_or(radius).min(3.0 * settings.height).min(radius);
+    let apart = 2.0 * radius / (rings - 1) as f64;
+    let layers = (2.0 * height / apart).ceil() as usize + 1;
+    PolarGrid { radius, rings, azimuths: 3 * rings, height, layers }
 }
 
 /// The data over their errors, seen by who is turned by a position angle; 0 where there are none.

@@ -57,7 +57,7 @@ fn exact_simulated_light_curves() {
 /// The inclination, the sense of rotation, the radius and the azimuth of the tube are found.
 #[test]
 fn exact_worlds_of_the_published_test() {
-    let set = ["screen.pixels=48", "band.nodes=20", "band.widths=[1.0]", "band.lengths=[4.0]"];
+    let set = ["screen.pixels=48", "band.nodes=41", "band.widths=[1.0]", "band.lengths=[4.0]"];
     let mut file = file(PUBLISHED, &set);
     let band = file.band.as_mut().unwrap();
     band.inclinations_deg = Steps { from: 12.0, to: 40.0, step: 28.0 };
@@ -72,9 +72,11 @@ fn exact_worlds_of_the_published_test() {
         let worse = best.ln_posterior - world.ln_posterior;
         assert!(world == best || worse > 8.0, "{world:?}: {worse}");
     }
-    assert!((found.field.radius - 10.0).abs() < 1.0, "{}", found.field.radius);
-    let azimuth = found.field.azimuth.to_degrees().rem_euclid(360.0);
-    assert!((azimuth - 230.0).abs() < 10.0, "{azimuth}");
+    assert!((found.radius.median - 10.0).abs() < 0.3, "{:?}", found.radius);
+    let azimuth = found.azimuth.median.to_degrees().rem_euclid(360.0);
+    assert!((azimuth - 230.0).abs() < 8.0, "{azimuth}");
+    let degrees = [found.azimuth.low, found.azimuth.high].map(f64::to_degrees);
+    assert!((1.0..40.0).contains(&(degrees[1] - degrees[0])), "{degrees:?}");
     assert!(setup::scan_band(&file, &measured, &settings, &|_| false).unwrap().is_none());
 }
 
@@ -83,7 +85,7 @@ fn exact_worlds_of_the_published_test() {
 fn exact_position_angles_of_the_spin() {
     let set = [
         "screen.pixels=24",
-        "band.nodes=12",
+        "band.nodes=20",
         "band.widths=[2.0]",
         "band.lengths=[4.0]",
         "band.position_angles_deg=[0.0, 40.0, 80.0]",
