@@ -20,7 +20,7 @@ pub struct Weighed {
     pub likely: Vec<(Band, f64)>,
 }
 
-/// Combinations with a ln this far below the best one are not likely.
+/// Bands and worlds with a ln this far below the best one are not likely, and do not say where the emission is.
 pub const UNLIKELY: f64 = 8.0;
 
 /// How probable each of some data sets (over their standard deviations) is: of light curves that differ in their values

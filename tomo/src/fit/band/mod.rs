@@ -17,7 +17,7 @@ mod rows;
 #[cfg(test)]
 mod tests;
 
-pub use evidence::{Weighed, evidence, validation};
+pub use evidence::{UNLIKELY, Weighed, evidence, validation};
 pub use place::{Interval, Normal, Place, places, together};
 pub use rows::{CurveRows, PolarGrid};
 

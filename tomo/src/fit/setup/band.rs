@@ -4,7 +4,7 @@ use super::{Curve, Instrument, Measured, Result, axis, forward_model, motion};
 use crate::dynamics::AngularVelocity;
 use crate::fit::Motion;
 use crate::fit::band::{
-    Band, BandPrior, CurveRows, Interval, PolarGrid, Weighed, evidence, places, together,
+    Band, BandPrior, CurveRows, Interval, PolarGrid, UNLIKELY, Weighed, evidence, places, together,
     validation,
 };
 use crate::fit::settings::{BandSettings, FitError, FitFile, refuse};
@@ -48,9 +48,6 @@ pub struct BandScan {
     /// any.
     pub validation: Option<f64>,
 }
-
-/// Worlds with a ln this far below the best one do not say where the emission is.
-const UNLIKELY: f64 = 8.0;
 
 /// Told how many worlds are done; says whether to go on.
 pub type BandWatch<'a> = dyn Fn(usize) -> bool + Sync + 'a;

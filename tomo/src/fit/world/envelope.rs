@@ -1,4 +1,4 @@
-//! The bowl beneath the ripples of a value over worlds.
+//! The bowl beneath the ripples of a value over worlds: a Laplace approximation at the scale of the errors.
 //!
 //! Pixels and voxels are coarse: the value over worlds has ripples of a degree and of a few units, with a minimum in each. The
 //! second derivatives in one of them are those of the ripple. What the data say of the world is the bowl beneath: a
@@ -35,11 +35,6 @@ const DOUBLINGS: usize = 4;
 const NEXT_TO_NOTHING: f64 = 0.1;
 /// From how many lattices a scatter is known well enough to be used as it is; from few it is too small by chance.
 const FEW: f64 = 2.0;
-
-/// Where a form is fitted: ξ with |ξ| ≤ 1, whose columns are how far it reaches along each axis, in units of scales.
-struct Reach {
-    columns: DMatrix<f64>,
-}
 
 /// Values at places ξ, along one lattice of rays.
 struct Seen {
@@ -89,8 +84,9 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         }))
     }
 
-    /// How far to look along the principal axes of a covariance.
-    fn reach(&self, polished: &Polished, iterations: usize) -> Result<Option<Reach>, Error> {
+    /// How far to look along the principal axes of a covariance, axis by axis in columns, in units of scales: places are
+    /// these columns times ξ with |ξ| ≤ 1.
+    fn reach(&self, polished: &Polished, iterations: usize) -> Result<Option<DMatrix<f64>>, Error> {
         let n = self.free.len();
         let scale = |k: usize| self.free[k].parameter.scale();
         let of = |a: usize, b: usize| polished.covariance[a * n + b] / (scale(a) * scale(b));
@@ -105,7 +101,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
             let far = self.far(polished, &axis, iterations)?;
             columns.set_column(k, &(axis * far));
         }
-        Ok(Some(Reach { columns }))
+        Ok(Some(columns))
     }
 
     /// How many steps along an axis raise the value enough, in the mean of both sides.
@@ -156,12 +152,12 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         &self,
         from: &Estimate,
         responses: &[Vec<f64>],
-        reach: &Reach,
+        reach: &DMatrix<f64>,
         iterations: usize,
     ) -> Result<Seen, Error> {
         let mut seen = Seen { places: Vec::new(), values: Vec::new() };
         for place in places(self.free.len()) {
-            let there = self.beside(from, responses, &(&reach.columns * &place), iterations)?;
+            let there = self.beside(from, responses, &(reach * &place), iterations)?;
             if let Some((there, part)) = there {
                 seen.places.push(place * part);
                 seen.values.push(there.value);
@@ -175,7 +171,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         &self,
         about: World,
         form: &Form,
-        Reach { columns }: &Reach,
+        columns: &DMatrix<f64>,
         inflation: f64,
     ) -> Option<(World, Vec<f64>)> {
         let (inverse, outward) =

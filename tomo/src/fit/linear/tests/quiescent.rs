@@ -42,18 +42,8 @@ fn problem<'a>(
     terms: &'a [Weighted<'a, f64>],
     priors: &'a [Prior],
 ) -> LinearProblem<'a, f64> {
-    LinearProblem {
-        model,
-        axis: axis(),
-        frames: &FRAMES,
-        terms,
-        voxels: Voxels::cube(6, 5.0, Degree::Linear),
-        upper: UPPER,
-        flux: None,
-        priors,
-        gaussian: None,
-        change: Change::NONE,
-    }
+    let voxels = Voxels::cube(6, 5.0, Degree::Linear);
+    LinearProblem { upper: UPPER, priors, ..of_images(model, terms, voxels) }
 }
 
 /// Images of values at all nodes, and of the image behind them, by way of the representation.
