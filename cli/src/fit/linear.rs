@@ -73,7 +73,7 @@ pub fn imprinted(found: &Imprinted) -> Value {
 
 /// What may be claimed of a solution.
 pub fn statement(solution: &LinearSolution<f32>) -> String {
-    let stopped = matches!(solution.ending, Ending::Exhausted | Ending::Cancelled);
+    let stopped = !matches!(solution.ending, Ending::Converged | Ending::Rounding);
     if let Some(certificate) = solution.certificate {
         if !certificate.relative_gap().is_finite() {
             return "minimum of a convex problem: the dark field explains the data".to_owned();

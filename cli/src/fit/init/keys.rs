@@ -334,6 +334,6 @@ pub const KEYS: &[Key] = &[
     key("linear", "smoothness", "0.0", "weight of the integrated squared gradient; 0 or above"),
     key("linear", "sparsity", "0.0", "weight of the integrated emission; 0 or above"),
     key("linear", "rounds", "", "number of rounds in which nodes are added"),
-    key("linear", "iterations", "", "iterations per round"),
+    key("linear", "iterations", "", "iterations per round, at most"),
     key("output", "nodes", "", "nodes of the volume per axis; 2 to 512"),
 ];

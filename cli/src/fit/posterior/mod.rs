@@ -102,6 +102,11 @@ pub fn check(file: &FitFile) -> anyhow::Result<()> {
     if file.instrument.as_ref().is_some_and(|instrument| instrument.leakage.is_some()) {
         bail!("a posterior needs leakage that is known: draws do not solve for it");
     }
+    if file.change.is_some() && file.unknown_world()?.is_some() {
+        bail!(
+            "a posterior needs a known world where emission changes: nothing is drawn from [change] and [world] together"
+        );
+    }
     if file.band.is_some() {
         bail!(
             "a fit with [band] has the posterior of its world in band.json: nothing else is drawn around it"

@@ -9,6 +9,7 @@
 use super::quasi_newton::Pairs;
 use super::scaled::{Scaled, add, dot};
 use core::ops::ControlFlow;
+use std::collections::VecDeque;
 
 /// How the box-constrained problem is solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,6 +29,8 @@ pub enum Method {
 pub enum Ending {
     /// The projected gradient is small enough.
     Converged,
+    /// The value hardly falls any more, by less than noise would change it.
+    Settled,
     /// As many iterations as were allowed.
     Exhausted,
     /// No step helps: within rounding of the minimum.
@@ -42,6 +45,23 @@ pub(super) struct Stop {
     pub iterations: usize,
     /// Norm of the projected gradient (in scaled coordinates) against that where the iteration began.
     pub tolerance: f64,
+    /// Part of the value by which the last [`LATELY`] iterations must have lowered it.
+    pub settled: f64,
+}
+
+/// Iterations over which the fall of a value counts.
+const LATELY: usize = 10;
+
+/// The last values.
+struct Lately(VecDeque<f64>);
+
+impl Lately {
+    /// Whether the last iterations lowered the value by less than `part` of it.
+    fn is_settled(&mut self, value: f64, part: f64) -> bool {
+        self.0.push_back(value);
+        let before = if self.0.len() > LATELY { self.0.pop_front() } else { None };
+        before.is_some_and(|before| before - value < part * value.abs())
+    }
 }
 
 /// Told the value and the numbers after each iteration.
@@ -127,11 +147,14 @@ impl<'a, 'b> Descent<'a, 'b> {
     }
 
     fn quasi_newton(&mut self, stop: Stop) -> Ending {
-        let mut pairs = Pairs::default();
+        let (mut pairs, mut lately) = (Pairs::default(), Lately(VecDeque::new()));
         let enough = stop.tolerance * self.violation();
         for _ in 0..stop.iterations {
             if self.violation() <= enough {
                 return Ending::Converged;
+            }
+            if lately.is_settled(self.value, stop.settled) {
+                return Ending::Settled;
             }
             let Parts { free, leaving } = self.parts();
             let steepest: Vec<f64> = free.iter().zip(&leaving).map(|(a, b)| a + b).collect();

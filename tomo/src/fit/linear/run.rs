@@ -120,7 +120,10 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
             watch(&LinearProgress { round, evaluations, value, nodes, entries, active, x })
         };
         let each: &mut Each<'_> = &mut each;
-        let stop = Stop { iterations, tolerance: self.settings.tolerance };
+        let LinearSettings { tolerance, settled, .. } = *self.settings;
+        // A part of the standard deviation of χ².
+        let settled = settled * (2.0 / objective.data.count as f64).sqrt();
+        let stop = Stop { iterations, tolerance, settled };
         let scaled = Scaled::new(objective, self.problem.upper);
         Descent::new(scaled, x, each).run(method, stop)
     }

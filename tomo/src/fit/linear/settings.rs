@@ -31,6 +31,9 @@ pub struct LinearSettings {
     pub iterations: usize,
     /// A round ends where the projected gradient has fallen to this part of what it began with.
     pub tolerance: f64,
+    /// A round of quasi-Newton steps ends, too, where ten of them lower the function by less than this part of what noise
+    /// changes it by, √(2/data) of it.
+    pub settled: f64,
     /// Nodes are admitted whose slope is below minus this part of the largest one where nothing shines, and
     /// that violate the conditions for a minimum more than any that counts already.
     pub admission: f64,
@@ -48,6 +51,7 @@ impl Default for LinearSettings {
             rounds: 8,
             iterations: 80,
             tolerance: 1e-4,
+            settled: 0.0,
             admission: 1e-4,
             memory: 768 << 20,
         }

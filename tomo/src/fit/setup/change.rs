@@ -55,9 +55,6 @@ pub(super) fn check(file: &FitFile) -> Result<()> {
     if file.axis != (AxisSearch::Known {}) {
         refuse!("change needs a known axis; add `[axis.known]` and `axis` in [motion]");
     }
-    if file.unknown_world()?.is_some() {
-        refuse!("change does not work together with unknown parameters in [world]");
-    }
     Ok(())
 }
 

@@ -19,9 +19,13 @@ const MANY_ROWS: usize = 2 << 30;
 
 /// What is left of the first gradient beside a prior: what data hardly tell is decided last.
 const SURE: f64 = 1e-7;
-/// Where a round ends beside a quiescent image: slopes with respect to its pixels, which add up over all frames, are large at
-/// first, and fall to a thousandth while the volume has hardly been found.
-const BESIDE: f64 = 1e-6;
+/// What is left of the first gradient without one: slopes of bright data, or with respect to the pixels of a quiescent image,
+/// which add up over all frames, fall to a thousandth while the volume has hardly been found.
+const LEFT: f64 = 1e-6;
+/// Part of what noise changes χ² by that ten iterations must gain.
+const GAIN: f64 = 0.1;
+/// The same of a start, which other steps follow.
+const GAIN_OF_START: f64 = 1.0;
 
 /// All terms of the data, the image first.
 pub(super) fn terms(data: &Data<f32>) -> Vec<Weighted<'_, f32>> {
@@ -152,12 +156,16 @@ pub(super) fn solve_frames(
         false => coarse,
     };
     let memory = if change.is_any() { MANY_ROWS } else { usual.memory };
-    let tolerance = match (settings.prior, of.objective.model.quiescent()) {
-        (Some(_), _) => SURE,
-        (None, Some(_)) => BESIDE,
-        (None, None) => usual.tolerance,
+    let quiescent = of.objective.model.quiescent();
+    let (tolerance, settled) = match settings.prior {
+        // A draw of a posterior is to be as exact as the minimum.
+        Some(_) => (SURE, 0.0),
+        None if quiescent.is_some() => (LEFT, 0.0),
+        None if change.is_any() => (usual.tolerance, 0.0),
+        None if of.file.representation.kind == Kind::LinearGrid => (LEFT, GAIN),
+        None => (LEFT, GAIN_OF_START),
     };
-    let how = LinearSettings { rounds, iterations, coarse, memory, tolerance, ..usual };
+    let how = LinearSettings { rounds, iterations, coarse, memory, tolerance, settled, ..usual };
     of.with(frames, |problem| match of.log_normal(&problem.voxels)? {
         Some(prior) => problem.solve_log_normal(&prior, &how, watch),
         None => problem.solve(&how, watch),

@@ -106,6 +106,8 @@ pub struct WorldProblem<'a, T: Float> {
     pub flux: Option<f64>,
     /// Penalties on the volume, in units of χ².
     pub penalties: &'a [Penalty],
+    /// How emission may change while matter carries it, its weight in units of χ²; [`Change::NONE`] is the usual.
+    pub change: Change,
     /// A Gaussian prior of the voxels that are solved for, if there is one.
     pub gaussian: Option<&'a GaussianField>,
     /// By what χ² is multiplied against the priors: 1 for data with errors.
@@ -203,7 +205,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
             flux: self.flux,
             priors: self.penalties,
             gaussian: self.gaussian,
-            change: Change::NONE,
+            change: self.change,
         }
     }
 

@@ -3,7 +3,7 @@
 use super::*;
 use crate::dynamics::{AngularVelocity, Axis, Velocity};
 use crate::fit::RingRays;
-use crate::fit::linear::Weighted;
+use crate::fit::linear::{Change, Weighted};
 use crate::fit::pixel_rays::PixelRays;
 use crate::fit::tests::Blobs;
 use crate::fit::{Batch, Field, ForwardModel, FrameTerm, ImageTerm, Motion, Region, Seen};
@@ -14,6 +14,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 
+mod beside_births;
 mod beside_prior;
 
 fn model(law: Law) -> WorldModel {
@@ -275,6 +276,7 @@ fn of_hot_spot<'a>(
         upper: 3.0,
         flux: None,
         penalties: &[],
+        change: Change::NONE,
         gaussian: None,
         scale: 1.0,
         effort: Effort { nodes: 16, degree: Degree::Linear, iterations: 30 },

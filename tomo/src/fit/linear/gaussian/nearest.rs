@@ -7,7 +7,7 @@ use super::GaussianField;
 use core::ops::ControlFlow;
 
 /// Most iterations, and the part of the first gradient that may be left.
-const ENOUGH: Stop = Stop { iterations: 4000, tolerance: 1e-9 };
+const ENOUGH: Stop = Stop { iterations: 4000, tolerance: 1e-9, settled: 0.0 };
 
 impl Convex for &GaussianField {
     fn count(&self) -> usize {

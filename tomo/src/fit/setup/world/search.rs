@@ -85,7 +85,8 @@ pub fn find_world(
         let how = Exploration { width: width(&over), worlds: search.fine.worlds, seed: file.seed };
         let Some(explored) = problem.explore(start, &how, told)? else { return Ok(None) };
         let reduced = problem.scale * problem.reduced(explored.best.chi2);
-        if problem.model.ring.is_some() {
+        // Steps along differences of images know one volume.
+        if problem.model.ring.is_some() && !problem.change.is_any() {
             let (polished, reduced) = polished(problem, &explored.best)?;
             let spread = surely(problem, &polished, reduced)?;
             let world = spread.as_ref().map_or(polished.best.world, |spread| spread.world);

@@ -2,10 +2,12 @@
 
 use super::{known_world, model};
 use crate::fit::Objective;
-use crate::fit::linear::{GaussianField, Prior as Penalty, Voxels, Weighted};
+use crate::fit::linear::{Change, GaussianField, Prior as Penalty, Voxels, Weighted};
 use crate::fit::settings::{FieldKind, FitFile, PriorOfVoxels, UnknownWorld, Within, WorldView};
 use crate::fit::setup::linear_problem::terms;
-use crate::fit::setup::{CoarseView, Measured, Result, forward_model, linear, motion, priors};
+use crate::fit::setup::{
+    CoarseView, Measured, Result, change, emission_times, forward_model, linear, motion, priors,
+};
 use crate::fit::world::{Effort, WorldProblem};
 
 /// Data as a search looks at them.
@@ -50,6 +52,8 @@ impl Seen {
         };
         let scaled = |penalty: Penalty| Penalty { weight: data * penalty.weight, ..penalty };
         let penalties: Vec<Penalty> = priors(settings).into_iter().map(scaled).collect();
+        // Knots are the same in all worlds.
+        let change = change(file, emission_times(instrument, &plain))?;
         search(&WorldProblem {
             model: &model(file, unknown, instrument, &plain)?,
             known: known_world(file),
@@ -60,6 +64,7 @@ impl Seen {
             upper: settings.upper,
             flux: settings.flux_jy,
             penalties: &penalties,
+            change: Change { weight: data * change.weight, ..change },
             gaussian: gaussian.as_ref(),
             scale,
             effort: Effort {

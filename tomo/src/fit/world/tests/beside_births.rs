@@ -1,0 +1,40 @@
+//! The flow of matter whose emission appears while it is seen.
+
+use super::*;
+use crate::representation::{Allowed, Knots};
+
+/// Two spots, one of which begins to shine half-way: the angular velocity is found where births are allowed. Without them
+/// no flow explains the images.
+#[test]
+fn exact_flow_is_found_beside_births() {
+    let (mut model, side) = (screen(16, 12), 16);
+    model.slow_light = false;
+    let truth = World::new(0.3, 0.9, 2.0);
+    let forward: ForwardModel<f32> = model.forward(&truth).unwrap();
+    let opposite = |[x, y, z]: [f64; 3]| spot([-x, y, z]);
+    let movies = [&spot as &(dyn Fn([f64; 3]) -> f64 + Sync), &opposite]
+        .map(|of| forward.movie_of(model.axis, of, &mut Batch::default()));
+    let shines = |k: usize| if k / (side * side) < 6 { 0.0 } else { 1.0 };
+    let pairs = movies[0].iter().zip(&movies[1]).enumerate();
+    let movie: Vec<f32> = pairs.map(|(k, (a, b))| (a + shines(k) * b) as f32).collect();
+    let sigma = 0.02 * f64::from(movie.iter().fold(0.0f32, |most, x| most.max(*x)));
+    let count = movie.len() as f64;
+    let term = ImageTerm::new(movie, side * side, sigma).unwrap();
+    let terms = [Weighted { weight: count, term: &term as &dyn FrameTerm<f32> }];
+    let free =
+        [Free { parameter: Parameter::Rotation, prior: Prior::Uniform { low: 0.5, high: 1.5 } }];
+    let knots = Knots { first: 0.0, spacing: 10.0, count: 12, allowed: Allowed::Births };
+    let within = Some(model.region);
+    let change = Change { knots, weight: 0.01 * count, within, sharpen: None };
+    let effort = Effort { nodes: 14, degree: Degree::Linear, iterations: 60 };
+    let steady = WorldProblem { known: truth, effort, ..of_hot_spot(&model, &free, &terms) };
+    let over = [Scanned::even(Parameter::Rotation, [0.8, 1.2], 5)];
+    let how = Exploration { width: 1.0, worlds: 1, seed: 1 };
+    let scan = |problem: &WorldProblem<'_, f32>| {
+        let scan = problem.scan(&over, &how, &mut |_, _| true).unwrap().unwrap();
+        *scan.best().unwrap()
+    };
+    let (born, carried) = (scan(&WorldProblem { change, ..steady }), scan(&steady));
+    assert!((born.world.get(Parameter::Rotation) - 1.0).abs() < 1e-9, "{:?}", born.world);
+    assert!(2.0 * born.value < carried.value, "{} {}", born.value, carried.value);
+}
