@@ -251,7 +251,9 @@ fn experiments_are_listed_and_mistakes_are_named() {
 fn on_public_data(name: &str) -> Option<Vec<String>> {
     let file = match name {
         "m87-2017" => "SR1_M87_2017_100_hi_hops_netcal_StokesI.uvfits",
-        "sgra-2017" => "ER6_SGRA_2017_097_hi_hops_netcal-LMTcal-besttime_StokesI.uvfits",
+        "sgra-2017" | "sgra-2017-motion" => {
+            "ER6_SGRA_2017_097_hi_hops_netcal-LMTcal-besttime_StokesI.uvfits"
+        }
         _ => return Some(Vec::new()),
     };
     let path = static_sky::data(file)?;

@@ -10,7 +10,7 @@ pub fn number(x: f64, digits: usize) -> String {
 }
 
 /// Results that are shown: their names in results.json, what they are called, their units and digits.
-pub const RESULTS: [(&str, &str, &str, usize); 61] = [
+pub const RESULTS: [(&str, &str, &str, usize); 64] = [
     ("psnr_db", "PSNR", "dB", 2),
     ("psnr_inside_db", "PSNR inside the region", "dB", 2),
     ("psnr_over_time_db", "PSNR over time", "dB", 2),
@@ -40,6 +40,8 @@ pub const RESULTS: [(&str, &str, &str, usize); 61] = [
     ("position_angle_drawn_within_95", "position angle within the middle 95 % of the draws", "", 2),
     ("xi_drawn_within_68", "ξ within the middle 68 % of the draws", "", 2),
     ("xi_drawn_within_95", "ξ within the middle 95 % of the draws", "", 2),
+    ("beta_r_error", "error of β_r", "", 4),
+    ("beta_phi_error", "error of β_φ", "", 4),
     ("random_nodes_within_68", "random nodes within the middle 68 % of the draws", "", 3),
     ("random_nodes_within_95", "random nodes within the middle 95 % of the draws", "", 3),
     ("bright_nodes_within_68", "bright nodes within the middle 68 % of the draws", "", 3),
@@ -77,6 +79,7 @@ pub const RESULTS: [(&str, &str, &str, usize); 61] = [
     ("flux_jy", "flux", "Jy", 3),
     ("strength", "factor on the penalties", "", 3),
     ("chi2", "χ² per data point", "", 3),
+    ("held_out_loss", "loss of held-out frames, the best setting", "", 3),
     ("loss", "loss", "", 6),
     ("seconds", "wall time", "s", 1),
     ("cpu_seconds", "CPU time", "s", 1),
@@ -109,6 +112,11 @@ pub fn result(results: &Value, value: &str) -> Option<f64> {
         return results["chi2_per_datum"][name.replace('-', " ")]
             .as_f64()
             .filter(|x| x.is_finite());
+    }
+    if value == "held_out_loss" {
+        let held = &results["held_out"];
+        let values = held["values"].as_array()?;
+        return values.iter().find(|of| of["value"] == held["chosen"])?["loss"].as_f64();
     }
     results[value].as_f64().filter(|x| x.is_finite())
 }
@@ -187,6 +195,11 @@ mod tests {
         let two = json!({"chi2_per_datum": {"amplitudes": 1.5, "closure phases": 2.5}});
         assert_eq!(result(&two, "chi2"), None);
         assert_eq!(result(&two, "chi2.closure-phases"), Some(2.5));
+        let held = json!({"held_out": {"chosen": 2.0, "values": [
+            {"value": 1.0, "loss": 7.0}, {"value": 2.0, "loss": 5.0},
+        ]}});
+        assert_eq!(result(&held, "held_out_loss"), Some(5.0));
+        assert_eq!(result(&two, "held_out_loss"), None);
         assert_eq!(described("chi2.closure-phases").0, "χ² per data point of closure phases");
         assert_eq!(described("psnr_db"), ("PSNR (dB)".to_owned(), 2));
     }

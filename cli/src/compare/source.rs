@@ -41,6 +41,7 @@ const CARRIED: &[(&str, &str)] = &carried![
     "experiments/orbital-polarimetry.toml",
     "experiments/m87-2017.toml",
     "experiments/sgra-2017.toml",
+    "experiments/sgra-2017-motion.toml",
     "experiments/fits/first_pattern.toml",
     "experiments/fits/second_pattern.toml",
     "experiments/fits/digits.toml",
@@ -51,6 +52,7 @@ const CARRIED: &[(&str, &str)] = &carried![
     "scenes/fits/orbital_polarimetry.toml",
     "scenes/fits/m87_image.toml",
     "scenes/fits/sgra_image.toml",
+    "scenes/fits/sgra_motion.toml",
     "cli/src/fit/built_in.toml",
 ];
 
