@@ -4,6 +4,7 @@
 
 #[cfg(target_os = "linux")]
 mod faults;
+mod paths;
 
 use kerrlight_tomo::image::Picture;
 use kerrlight_tomo::image::exr;

@@ -203,13 +203,7 @@ impl PreparedScene {
         if !self.optics.lensing {
             return vec!["everything (lensing is off)"];
         }
-        let parts = [
-            (self.media.have_cells(), "rays through volumes"),
-            (self.meshes.is_some(), "rays that may meet meshes"),
-            (!self.spots.is_empty(), "paths that may meet spots"),
-            (self.request.beams, "ray bundles on the sky"),
-        ];
-        parts.into_iter().filter_map(|(needed, what)| needed.then_some(what)).collect()
+        if self.request.beams { vec!["ray bundles on the sky"] } else { Vec::new() }
     }
 
     /// The same scene with every spot and every triangle asked along every ray, without a hierarchy:
