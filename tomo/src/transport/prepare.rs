@@ -203,7 +203,14 @@ impl PreparedScene {
         if !self.optics.lensing {
             return vec!["everything (lensing is off)"];
         }
-        if self.request.beams { vec!["ray bundles on the sky"] } else { Vec::new() }
+        let wanted = self.optics.wanted;
+        let parts = [
+            (self.request.beams, "ray bundles on the sky"),
+            (wanted.depth, "the channel Z"),
+            (wanted.motion, "the channels motion"),
+            (wanted.footprint, "the channel footprint"),
+        ];
+        parts.into_iter().filter_map(|(needed, what)| needed.then_some(what)).collect()
     }
 
     /// The same scene with every spot and every triangle asked along every ray, without a hierarchy:
