@@ -119,3 +119,74 @@ impl Path {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Camera, Inclination, Motion, Observer, Quantities, Tracer, View};
+
+    /// The finest for which the tracer takes series of order 10.
+    const TOLERANCE: f64 = 2.4e-6;
+
+    /// The steps of a path, its series rounded to floats.
+    fn steps(path: &Path) -> Vec<TaylorStep> {
+        let step = |(k, segment): (usize, &Segment<f64>)| {
+            let row = |row: usize| {
+                let scaled = path.polynomial(k, row).0.iter().enumerate();
+                let rounded = scaled.map(|(n, c)| (c / segment.h.powi(n as i32)) as f32);
+                rounded.collect::<Vec<_>>().try_into().unwrap()
+            };
+            let last = k + 1 == path.segments.len();
+            let length = if last { path.end - segment.s } else { segment.h };
+            let series = core::array::from_fn(row);
+            TaylorStep { length, leg: segment.leg, centre: 0.0, series }
+        };
+        path.segments.iter().enumerate().map(step).collect()
+    }
+
+    /// A path that is taken apart and put together again is the same but for rounding to floats.
+    #[test]
+    fn exact_paths_come_back_from_their_steps() {
+        let inclination = Inclination::from_degrees(70.0).unwrap();
+        for spin in [0.0, 0.9, -1.0] {
+            let hole = Kerr::new(spin).unwrap();
+            let screen = Observer::at_infinity(inclination).with_azimuth(0.7);
+            let camera = Camera::new(&hole, inclination, 12.0, Motion::Static).unwrap();
+            let views = [View::Screen(screen), View::Camera(camera.with_pointing(1.5, 0.3, 0.0))];
+            for (view, reach) in views.iter().zip([9.0, 1.2]) {
+                for k in 0..60 {
+                    let (y, x) = (2.4 * f64::from(k)).sin_cos();
+                    let size = reach * f64::from(k + 1) / 60.0;
+                    let ray = view.ray(&hole, size * x, size * y).unwrap();
+                    come_back(&hole, &ray);
+                }
+            }
+        }
+    }
+
+    fn come_back(hole: &Kerr, ray: &Ray) {
+        let (mut exact, mut found) = (Path::new(), Path::new());
+        Tracer::new(TOLERANCE).unwrap().trace(hole, ray, Quantities::ALL, &mut exact);
+        let steps = steps(&exact);
+        let (scale, outcome) = (exact.scale, exact.outcome());
+        found.assemble(hole, ray, RaySteps { scale, outcome, error: 1e-6, steps: &steps });
+        assert_eq!((found.outcome(), found.steps()), (outcome, exact.steps()));
+        assert!((found.mino_total() / exact.mino_total() - 1.0).abs() < 1e-6);
+        let times = |path: &Path| -> Vec<f64> {
+            path.equatorial_crossings().chain(path.turning_point().map(|(t, _)| t)).collect()
+        };
+        let [own, theirs] = [&exact, &found].map(times);
+        assert_eq!(own.len(), theirs.len(), "{ray:?}");
+        let near = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-5 * exact.mino_total();
+        assert!(own.iter().zip(&theirs).all(near), "{own:?} {theirs:?}");
+        for k in 1..30 {
+            let [a, b] =
+                [&exact, &found].map(|path| path.at(path.mino_total() * f64::from(k) / 30.0));
+            let gap = 1.0 - hole.horizon() * a.inverse_radius;
+            assert!((a.radius() / b.radius() - 1.0).abs() < 1e-5, "{a:?} {b:?}");
+            assert!((a.cos_theta() - b.cos_theta()).abs() < 1e-5, "{a:?} {b:?}");
+            assert!((a.azimuth - b.azimuth).abs() * gap < 1e-5, "{a:?} {b:?}");
+            assert!((a.delay - b.delay).abs() * gap < 1e-5 * scale.max(a.radius()), "{a:?} {b:?}");
+        }
+    }
+}
