@@ -185,6 +185,7 @@ pub use spacetime::orbits;
 pub use error::Error;
 #[cfg(feature = "affine")]
 pub use integrate::affine::{AffinePath, AffineTracer};
+pub use integrate::assembly::TaylorStep;
 pub use integrate::outcome::{Outcome, Unresolved};
 pub use integrate::path::Path;
 pub use integrate::trace::{Method, Tracer, trace_series};
@@ -193,8 +194,9 @@ pub use numbers::compensated::Double;
 pub use numbers::dual::Dual;
 pub use numbers::scalar::{Elementary, Scalar};
 pub use rays::block::{
-    BlockRequest, BlockTracer, DeviceEnd, DeviceRays, DeviceRequest, DeviceSample, PathOfRay,
-    PathUse, PlaneCrossing, RayBlock, RayDevice, RayVisitor, SphereNodes, TracedRay, Work,
+    BlockRequest, BlockTracer, DeviceEnd, DevicePaths, DeviceRays, DeviceRequest, DeviceSample,
+    PathOfRay, PathUse, PlaneCrossing, RayBlock, RayDevice, RayVisitor, SphereNodes, TracedRay,
+    Work,
 };
 pub use rays::columns::{Points, RayTable};
 pub use rays::integrator::Integrator;

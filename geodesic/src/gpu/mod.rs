@@ -4,10 +4,13 @@
 //! A software device serves as well, for tests: Mesa's llvmpipe, in the package `mesa-vulkan-drivers` of Debian, Ubuntu
 //! and Fedora. It is slower than the rest of this crate on the same processor.
 
+mod bytes;
 mod compute;
 mod device;
 mod error;
 mod kernel;
+mod paths;
+mod sums;
 mod tracer;
 
 pub use compute::{Bound, Buffer, Commands, Compute, Kernel};

@@ -1,18 +1,21 @@
 //! Rays of a picture, traced on a graphics device.
 
+use super::bytes::{float, word};
 use super::device::{Adapter, Device, Needs};
 use super::error::GpuError;
 use super::kernel::{Binding, Program, ROW};
+use super::paths::PathKernel;
+use super::sums::test_sums;
 use crate::error::Error;
 use crate::integrate::outcome::{Outcome, Unresolved};
 use crate::rays::block::{
-    DeviceEnd, DeviceRays, DeviceRequest, DeviceSample, PlaneCrossing, RayDevice,
+    DeviceEnd, DevicePaths, DeviceRays, DeviceRequest, DeviceSample, PlaneCrossing, RayDevice,
 };
 use crate::rays::nodes::{Node, NodeColumns};
 use crate::screen::view::View;
 use crate::spacetime::kerr::Kerr;
 use crate::wgsl::{
-    self, CROSSING_BYTES, END_BYTES, NODE_BYTES, POINT_BYTES, SAMPLE_BYTES, TASK_BYTES, Task, flags,
+    self, CROSSING_BYTES, END_BYTES, NODE_BYTES, SAMPLE_BYTES, TASK_BYTES, Task, flags,
 };
 use core::ops::Range;
 use std::sync::{Mutex, PoisonError};
@@ -37,10 +40,9 @@ pub struct GpuTracer {
     device: Device,
     program: Program,
     places: Program,
+    paths: PathKernel,
     failure: Mutex<Option<GpuError>>,
 }
-
-const SHADER_SELF_TEST: &str = include_str!("self_test.wgsl");
 
 impl GpuTracer {
     /// Opens a device and compiles the shaders.
@@ -59,7 +61,8 @@ impl GpuTracer {
             &["kerr_place"],
             &node_bindings(&[], [&[]; 3], 0),
         )?;
-        Ok(GpuTracer { device, program, places, failure: Mutex::default() })
+        let paths = PathKernel::new(&device)?;
+        Ok(GpuTracer { device, program, places, paths, failure: Mutex::default() })
     }
 
     /// The name of the device.
@@ -129,6 +132,26 @@ impl GpuTracer {
             rest = &rest[count..];
         }
         Ok(())
+    }
+
+    /// Follows rays to their ends: see [`RayDevice::follow`].
+    ///
+    /// # Errors
+    /// If the device fails: [`GpuError`].
+    ///
+    /// # Panics
+    /// If the columns differ in length.
+    pub fn follow(
+        &self,
+        hole: &Kerr,
+        view: &View,
+        points: (&[f64], &[f64]),
+        paths: &mut DevicePaths,
+    ) -> Result<(), GpuError> {
+        let request = DeviceRequest { quadratures: true, ..DeviceRequest::default() };
+        let mut rays = DeviceRays::default();
+        self.trace(hole, view, points, &request, &mut rays)?;
+        self.paths.follow(&self.device, (hole, view), points, rays.ends(), paths)
     }
 
     fn place_some(
@@ -243,6 +266,16 @@ impl RayDevice for GpuTracer {
         GpuTracer::place(self, hole, view, points, spans, nodes).map_err(|why| self.note(why))
     }
 
+    fn follow(
+        &self,
+        hole: &Kerr,
+        view: &View,
+        points: (&[f64], &[f64]),
+        paths: &mut DevicePaths,
+    ) -> Result<(), Error> {
+        GpuTracer::follow(self, hole, view, points, paths).map_err(|why| self.note(why))
+    }
+
     fn failure(&self) -> Option<String> {
         let failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
         failure.as_ref().map(ToString::to_string)
@@ -257,14 +290,6 @@ fn bindings<'a>(uniform: &'a [u8], points: &'a [u8], sizes: [u64; 3]) -> [Bindin
 fn node_bindings<'a>(uniform: &'a [u8], inputs: [&'a [u8]; 3], nodes: u64) -> [Binding<'a>; 5] {
     let [points, spans, times] = inputs.map(Binding::Input);
     [Binding::Uniform(uniform), points, spans, times, Binding::Output(nodes)]
-}
-
-fn word(bytes: &[u8], at: usize) -> u32 {
-    u32::from_le_bytes(core::array::from_fn(|k| bytes[4 * at + k]))
-}
-
-fn float(bytes: &[u8], at: usize) -> f64 {
-    f64::from(f32::from_bits(word(bytes, at)))
 }
 
 fn end(bytes: &[u8]) -> DeviceEnd {
@@ -346,34 +371,6 @@ fn node(
         radial_velocity: float(bytes, 4),
         polar_velocity: float(bytes, 5),
     })
-}
-
-/// Sums and products of two floats on the device, against exact ones.
-fn test_sums(device: &Device) -> Result<(), GpuError> {
-    let source = [wgsl::TWO_FLOATS, SHADER_SELF_TEST].join("\n");
-    let pairs: Vec<[f32; 2]> = (1..=256u32).map(|k| pair(k.wrapping_mul(2_654_435_761))).collect();
-    let points: Vec<u8> = pairs.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
-    let uniform = [0; POINT_BYTES];
-    let bindings = [
-        Binding::Uniform(&uniform),
-        Binding::Input(&points),
-        Binding::Output(16 * pairs.len() as u64),
-    ];
-    let program = Program::new(device, &source, &["kerr_self_test"], &bindings)?;
-    let outputs = program.run(device, &[0], pairs.len() as u32, &bindings)?;
-    let exact = pairs.iter().zip(outputs[0].chunks_exact(16)).all(|([a, b], bytes)| {
-        let (a, b) = (f64::from(*a), f64::from(*b));
-        let [sum, product] = [0, 2].map(|k| float(bytes, k) + float(bytes, k + 1));
-        sum == a + b && product == a * b
-    });
-    if exact { Ok(()) } else { Err(GpuError::Inexact(device.name.clone())) }
-}
-
-/// Two floats with all their digits, of magnitudes up to 2⁸ apart.
-fn pair(bits: u32) -> [f32; 2] {
-    let digits = |x: u32| 1.0 + (x & 0x7f_ffff) as f32 / 8_388_608.0;
-    let sign = if bits & 1 == 0 { 1.0 } else { -1.0 };
-    [digits(bits), sign * digits(bits.rotate_left(13)) / f32::from(1u16 << (bits >> 29))]
 }
 
 const _: () = assert!(TASK_BYTES.is_multiple_of(16));

@@ -3,6 +3,7 @@
 
 #[cfg(feature = "affine")]
 pub(crate) mod affine;
+pub(crate) mod assembly;
 pub(crate) mod mino;
 pub(crate) mod outcome;
 pub(crate) mod path;

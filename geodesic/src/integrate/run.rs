@@ -41,11 +41,8 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
         path.width = stepper.width();
         let leg = if ray.inward { 1.0 } else { -1.0 };
         let y = system.start::<N>(ray, leg);
-        let (w, way) = (T::constant(ray.inverse_radius), T::constant(leg));
-        let azimuth = T::constant(ray.azimuth) - way * hole.azimuth_closed_form(w);
-        let time = if ray.inverse_radius > 0.0 { way * hole.tortoise(w) } else { T::constant(0.0) };
         let state = State { ray, system, tolerance, y, leg };
-        let constants = [azimuth, time];
+        let constants = start_constants(hole, ray, leg);
         let energy = start_error(ray);
         let budget = start_budget(&y, &system, energy);
         path.start = budget;
@@ -272,17 +269,32 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
         potential.captures() || !potential.barrier.is_some_and(|barrier| outside(barrier.w))
     }
 
-    /// On an outward leg g is written with −dw/dτ and the closed forms change sign; the
-    /// constants take up the difference.
     fn change_leg(&mut self) {
         let w = self.state.y[index::W] / T::constant(self.state.system.scale);
-        let hole = self.path.hole;
-        let twice = T::constant(2.0 * self.state.leg);
-        self.constants[0] = self.constants[0] + twice * hole.azimuth_closed_form(w);
-        self.constants[1] = self.constants[1] - twice * hole.tortoise(w);
+        self.constants = switch_leg(&self.path.hole, self.state.leg, w, self.constants);
         self.state.leg = -self.state.leg;
         self.stepper.restart(&self.state, &mut self.path.series);
     }
+}
+
+/// The constants that azimuth and time start with, on a leg that goes inwards (+1) or outwards (−1).
+pub(crate) fn start_constants<T: Elementary>(hole: &Kerr<T>, ray: &Ray<T>, leg: f64) -> [T; 2] {
+    let (w, way) = (T::constant(ray.inverse_radius), T::constant(leg));
+    let azimuth = T::constant(ray.azimuth) - way * hole.azimuth_closed_form(w);
+    let time = if ray.inverse_radius > 0.0 { way * hole.tortoise(w) } else { T::constant(0.0) };
+    [azimuth, time]
+}
+
+/// The constants of azimuth and time after `leg`, which ends at w. On an outward leg g is written with −dw/dτ and the
+/// closed forms change sign; the constants take up the difference.
+pub(crate) fn switch_leg<T: Elementary>(
+    hole: &Kerr<T>,
+    leg: f64,
+    w: T,
+    [azimuth, time]: [T; 2],
+) -> [T; 2] {
+    let twice = T::constant(2.0 * leg);
+    [azimuth + twice * hole.azimuth_closed_form(w), time - twice * hole.tortoise(w)]
 }
 
 /// Error of W at the start: its terms, made of constants of motion that are rounded, cancel in a
@@ -311,7 +323,7 @@ fn start_budget<T: Elementary, const N: usize>(
 }
 
 /// atan2(y, x) at the start; on the axis the direction in which the ray leaves it.
-fn start_angle<T: Elementary>(ray: &Ray<T>) -> T {
+pub(crate) fn start_angle<T: Elementary>(ray: &Ray<T>) -> T {
     let [x, y, _] = ray.position;
     let on_axis = x.value() == 0.0 && y.value() == 0.0;
     let [x, y] = if on_axis { [ray.velocity[0], ray.velocity[1]] } else { [x, y] };

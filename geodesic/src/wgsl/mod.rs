@@ -21,7 +21,8 @@
 //! ```
 //!
 //! [`program`] adds bindings and the kernels `kerr_trace` and `kerr_sample`, one invocation a ray; [`places`] adds
-//! `kerr_place`, which finds where rays are at given Mino times.
+//! `kerr_place`, which finds where rays are at given Mino times; [`paths`] adds `kerr_path`, which gives the series of every
+//! step.
 //!
 //! # Numbers
 //! Coordinates, constants and outcomes are those of the rest of the crate. Floats are enough for a ray but for two
@@ -72,6 +73,10 @@
 //! In [`places`], bindings 2 to 4 are the first time of each ray and their number (2 × u32), the Mino times (f32, ascending
 //! along each ray), and `KerrNode`, 32 bytes a time: 1/r, cos θ, φ, delay, dw/dτ, d cos θ/dτ (f32 at 0, 4, … 20).
 //!
+//! In [`paths`], bindings 2 and 3 are the first step of each ray and room for how many (2 × u32), and the steps, 72 × f32
+//! each: length in bτ, leg (+1 inwards, −1 outwards), b w₀ of the ray, b, 1 for its last step, one unused, then 11
+//! coefficients each of b/r − b w₀, cos θ, sin θ cos φ, sin θ sin φ, and the regular parts of azimuth and delay/b.
+//!
 //! `KerrEnd`: direction of escape (3 × f32 at 0), outcome (u32 at 12: 0 captured, 1 escaped, 3 lost), flags (u32 at 16),
 //! number of crossings (u32 at 20), Mino time of the whole ray (f32 at 24), estimated error (f32 at 28: relative in r,
 //! radians in φ), λ and η (f32 at 32 and 36), steps (u32 at 40), Mino times of the
@@ -105,6 +110,9 @@ pub const RAYS: &str = include_str!("rays.wgsl");
 /// The kernel of places on rays.
 pub const NODES: &str = include_str!("nodes.wgsl");
 
+/// The kernel of whole rays as the series of their steps.
+pub const PATHS: &str = include_str!("paths.wgsl");
+
 /// Flags of a ray: what of it cannot be trusted. The numbers are those of the shader.
 pub mod flags {
     /// W is 0 at its minimum within rounding: the ray circles on a photon orbit.
@@ -129,6 +137,8 @@ pub const END_BYTES: usize = 64;
 pub const CROSSING_BYTES: usize = 32;
 /// Bytes of `KerrNode`.
 pub const NODE_BYTES: usize = 32;
+/// Bytes of a step of a path.
+pub const STEP_BYTES: usize = 288;
 /// Bytes of a sample.
 pub const SAMPLE_BYTES: usize = 16;
 
@@ -145,6 +155,11 @@ pub fn program() -> String {
 /// The tracer with bindings and the kernel `kerr_place`, workgroups of 64.
 pub fn places() -> String {
     [TWO_FLOATS, FUNCTIONS, PHOTONS, STEPS, TASK, NODES].join("\n")
+}
+
+/// The tracer with bindings and the kernel `kerr_path`, workgroups of 64.
+pub fn paths() -> String {
+    [TWO_FLOATS, FUNCTIONS, PHOTONS, STEPS, TASK, PATHS].join("\n")
 }
 
 /// `x` as the sum of two floats.

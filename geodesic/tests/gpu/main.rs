@@ -5,6 +5,7 @@
 mod blocks;
 mod classes;
 mod compare;
+mod paths;
 
 use classes::{Class, classes, critical_factor};
 use compare::{Errors, compare, quantile};
@@ -49,6 +50,30 @@ fn code_errors_by_class() {
         assert!(errors.flagged as f64 <= class.flagged * errors.rays as f64, "{}", class.name);
         for (name, values) in errors.columns() {
             for (share, allowed) in [0.5, 0.99].into_iter().zip(class.allowed) {
+                let error = quantile(values, share);
+                assert!(error <= allowed, "{}: {name}, {share}: {error:e}", class.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn code_paths_are_those_of_the_processor() {
+    let Some(tracer) = device() else { return };
+    for class in classes() {
+        let mut errors = paths::compare(&tracer, &class);
+        println!(
+            "{}: {} rays, {} unknown, {} wrong",
+            class.name, errors.rays, errors.unknown, errors.wrong
+        );
+        for (name, values) in errors.columns() {
+            let [half, most, all] = [0.5, 0.99, 1.0].map(|share| quantile(values, share));
+            println!("    {name:8} {half:8.1e} {most:8.1e} {all:8.1e}");
+        }
+        assert_eq!(errors.wrong, 0, "{}: fates and events", class.name);
+        assert!(errors.unknown as f64 <= class.flagged * errors.rays as f64, "{}", class.name);
+        for (name, values) in errors.columns() {
+            for (share, allowed) in [(0.5, 2e-7), (0.99, 5e-6)] {
                 let error = quantile(values, share);
                 assert!(error <= allowed, "{}: {name}, {share}: {error:e}", class.name);
             }

@@ -185,7 +185,7 @@ fn how(prepared: &PreparedScene) -> &'static str {
     }
     if tracer.device().is_some() {
         return "on a graphics device in floats; step by step on this processor next to the critical \
-                curve and where a path is needed";
+                curve";
     }
     match (tracer.closed_form(), request.paths) {
         (Some(_), true) => {

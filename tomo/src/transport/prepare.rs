@@ -203,11 +203,12 @@ impl PreparedScene {
         if !self.optics.lensing {
             return vec!["everything (lensing is off)"];
         }
+        let wanted = self.optics.wanted;
         let parts = [
-            (self.media.have_cells(), "rays through volumes"),
-            (self.meshes.is_some(), "rays that may meet meshes"),
-            (!self.spots.is_empty(), "paths that may meet spots"),
             (self.request.beams, "ray bundles on the sky"),
+            (wanted.depth, "the channel Z"),
+            (wanted.motion, "the channels motion"),
+            (wanted.footprint, "the channel footprint"),
         ];
         parts.into_iter().filter_map(|(needed, what)| needed.then_some(what)).collect()
     }

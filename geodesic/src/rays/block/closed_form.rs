@@ -157,7 +157,7 @@ impl BlockTracer {
     }
 
     /// Finds the rays whose path is needed beside the closed form, or instead of it.
-    pub(super) fn probe<V: RayVisitor>(
+    fn probe<V: RayVisitor>(
         &self,
         screen: ScreenRays<'_>,
         probes: &NodeRequest,

@@ -1,5 +1,6 @@
 //! Devices that trace rays in place of this processor.
 
+use super::device_paths::DevicePaths;
 use super::traced::PlaneCrossing;
 use crate::error::Error;
 use crate::integrate::outcome::Outcome;
@@ -42,6 +43,19 @@ pub trait RayDevice: fmt::Debug + Send + Sync {
         points: (&[f64], &[f64]),
         spans: &[Range<usize>],
         nodes: &mut NodeColumns,
+    ) -> Result<(), Error>;
+
+    /// Follows rays to the horizon or to infinity and gives `paths`, cleared first, the steps of each. Rays that it cannot
+    /// vouch for are [unknown](DevicePaths::push_unknown).
+    ///
+    /// # Errors
+    /// If it fails; [`failure`](Self::failure) then says how.
+    fn follow(
+        &self,
+        hole: &Kerr,
+        view: &View,
+        points: (&[f64], &[f64]),
+        paths: &mut DevicePaths,
     ) -> Result<(), Error>;
 
     /// How it failed, if it did.

@@ -3,6 +3,7 @@
 
 mod closed_form;
 mod device;
+mod device_paths;
 mod on_device;
 mod request;
 mod samples;
@@ -12,6 +13,7 @@ mod tracer;
 mod visitor;
 
 pub use device::{DeviceEnd, DeviceRays, DeviceRequest, DeviceSample, RayDevice};
+pub use device_paths::DevicePaths;
 pub use request::{BlockRequest, SphereNodes};
 pub use traced::{PathOfRay, PlaneCrossing, TracedRay};
 pub use tracer::{BlockTracer, RayBlock};
@@ -40,6 +42,7 @@ impl BlockTracer {
         let job = Job { alpha, beta, request };
         block.rays.clear();
         block.plane.clear();
+        block.followed.clear();
         visitor.works_on(Work::Rays);
         match (&self.device, self.closed_form()) {
             (Some(device), _) => self.trace_on_device(&**device, job, block, visitor)?,

@@ -9,13 +9,14 @@ use crate::error::Error;
 use crate::integrate::outcome::Outcome;
 use crate::rays::blocks::check_columns;
 use crate::rays::nodes::{Node, NodeColumns};
-use crate::simd::{PanelRule, ScreenRays};
+use crate::simd::{NodeRequest, PanelRule};
+use core::ops::Range;
 
 /// The estimated error of a ray beyond which it is traced on this processor instead.
 const ROUGH: f64 = 1e-3;
 
 impl BlockTracer {
-    /// Outcomes, crossings, directions of escape and nodes of the rays that `device` vouches for.
+    /// Outcomes, crossings, directions of escape, paths and nodes of the rays that `device` vouches for.
     pub(super) fn trace_on_device<V: RayVisitor>(
         &self,
         device: &dyn RayDevice,
@@ -37,7 +38,15 @@ impl BlockTracer {
             let ray = self.judge(k, job, block, visitor)?;
             block.rays.push(ray);
         }
-        self.add_nodes(device, job, block, visitor)
+        if let Some(probes) = &job.request.probes {
+            self.probe_on_device(device, probes, job, block, visitor)?;
+        }
+        self.follow_on_device(device, job, block)?;
+        for (number, sphere) in job.request.nodes.iter().enumerate() {
+            visitor.works_on(Work::Nodes(number));
+            self.refine_on_device(device, (number, sphere), job, block, visitor)?;
+        }
+        Ok(())
     }
 
     /// What is known of ray `k` from the device, and whether it has to be traced step by step.
@@ -48,9 +57,10 @@ impl BlockTracer {
         block: &mut RayBlock,
         visitor: &V,
     ) -> Result<TracedRay, Error> {
-        let RayBlock { plane, device, .. } = block;
+        let RayBlock { plane, device, followed, .. } = block;
         let end = &device.ends()[k];
-        if !(end.is_trusted && end.error <= ROUGH) || self.needs_steps(job.request) {
+        // Samples are those of this processor.
+        if !(end.is_trusted && end.error <= ROUGH) || job.request.samples > 0 {
             return Ok(TracedRay { stepped: true, ..TracedRay::default() });
         }
         let BlockRequest { crossings, all_crossings, half_orbits, paths, .. } = *job.request;
@@ -63,6 +73,7 @@ impl BlockTracer {
             let ray = self.view.ray(&self.hole, job.alpha[k], job.beta[k])?;
             until = self.until(&ray, half_orbits);
             path = if paths { visitor.needs_path(&ray) } else { path };
+            followed.extend((path != PathUse::None).then_some(k));
         }
         let own = &plane[first..];
         let surface = first_opaque(own, until, visitor);
@@ -76,28 +87,76 @@ impl BlockTracer {
         Ok(TracedRay { until, surface, stepped, with_path, ..from_device(end, crossings, leaves) })
     }
 
-    /// Whether nothing of the request can be had of a device: where samples are wanted, or probes have no closed form.
-    fn needs_steps(&self, request: &BlockRequest) -> bool {
-        request.samples > 0 || request.probes.is_some() && self.closed_form().is_none()
+    /// Finds the rays whose path is needed, from nodes along them.
+    fn probe_on_device<V: RayVisitor>(
+        &self,
+        device: &dyn RayDevice,
+        probes: &NodeRequest,
+        job: Job<'_>,
+        block: &mut RayBlock,
+        visitor: &V,
+    ) -> Result<(), Error> {
+        let open: Vec<usize> = (0..block.rays.len()).filter(|k| !block.rays[*k].stepped).collect();
+        self.find_legs(device, probes.radius, job, block)?;
+        let spans = self.place(device, &open, (&probes.rule, probes.split), job, block)?;
+        let RayBlock { rays, columns, followed, .. } = block;
+        for (k, span) in open.into_iter().zip(spans) {
+            let path = visitor.needs_path_at(&rays[k], &columns.view(span));
+            rays[k].with_path |= path == PathUse::Beside;
+            rays[k].stepped = path == PathUse::Instead;
+            followed.extend((path != PathUse::None).then_some(k));
+        }
+        followed.sort_unstable();
+        followed.dedup();
+        Ok(())
     }
 
-    /// Probes in closed form, and nodes of all rays on the device.
-    fn add_nodes<V: RayVisitor>(
+    /// Follows the rays whose path is needed.
+    fn follow_on_device(
         &self,
         device: &dyn RayDevice,
         job: Job<'_>,
         block: &mut RayBlock,
-        visitor: &mut V,
     ) -> Result<(), Error> {
-        if let (Some(observer), Some(probes)) = (self.closed_form(), &job.request.probes) {
-            let screen = ScreenRays::new(&self.hole, observer, job.alpha, job.beta)?;
-            self.probe(screen, probes, job, block, visitor)?;
+        if block.followed.is_empty() {
+            return Ok(());
         }
-        for (number, sphere) in job.request.nodes.iter().enumerate() {
-            visitor.works_on(Work::Nodes(number));
-            self.refine_on_device(device, (number, sphere), job, block, visitor)?;
+        let [alpha, beta] = job.pick(&block.followed);
+        device.follow(&self.hole, &self.view, (&alpha, &beta), &mut block.paths)
+    }
+
+    /// Finds when rays are inside a sphere.
+    fn find_legs(
+        &self,
+        device: &dyn RayDevice,
+        radius: f64,
+        job: Job<'_>,
+        block: &mut RayBlock,
+    ) -> Result<(), Error> {
+        let end = self.end_on_device();
+        let sought = DeviceRequest { sphere: Some(radius), end, ..DeviceRequest::default() };
+        device.trace(&self.hole, &self.view, (job.alpha, job.beta), &sought, &mut block.device)
+    }
+
+    /// Places nodes on some rays inside the sphere: which of the block's columns are those of each.
+    fn place(
+        &self,
+        device: &dyn RayDevice,
+        some: &[usize],
+        (rule, split): (&PanelRule, u32),
+        job: Job<'_>,
+        RayBlock { rays, device: found, columns, .. }: &mut RayBlock,
+    ) -> Result<Vec<Range<usize>>, Error> {
+        let mut spans = Vec::with_capacity(some.len());
+        columns.clear();
+        for k in some {
+            let first = columns.len();
+            plan(&found.ends()[*k], rays[*k].last_time(), (rule, split), columns);
+            spans.push(first..columns.len());
         }
-        Ok(())
+        let [alpha, beta] = job.pick(some);
+        device.place(&self.hole, &self.view, (&alpha, &beta), &spans, columns)?;
+        Ok(spans)
     }
 
     /// Hands the nodes of all rays inside a sphere to the visitor, and finer ones of those rays that need them.
@@ -109,24 +168,13 @@ impl BlockTracer {
         block: &mut RayBlock,
         visitor: &mut V,
     ) -> Result<(), Error> {
-        let end = self.end_on_device();
-        let sought =
-            DeviceRequest { sphere: Some(sphere.request.radius), end, ..DeviceRequest::default() };
-        device.trace(&self.hole, &self.view, (job.alpha, job.beta), &sought, &mut block.device)?;
-        let RayBlock { rays, plane, device: found, columns, .. } = block;
-        let mut pending: Vec<usize> = (0..rays.len()).filter(|k| !rays[*k].stepped).collect();
+        self.find_legs(device, sphere.request.radius, job, block)?;
+        let open = |k: &usize| !block.rays[*k].stepped;
+        let mut pending: Vec<usize> = (0..block.rays.len()).filter(open).collect();
         let mut split = sphere.request.split;
         while !pending.is_empty() {
-            let mut spans = Vec::with_capacity(pending.len());
-            columns.clear();
-            for k in &pending {
-                let first = columns.len();
-                let (end, until) = (&found.ends()[*k], rays[*k].last_time());
-                plan(end, until, (&sphere.request.rule, split), columns);
-                spans.push(first..columns.len());
-            }
-            let [alpha, beta] = job.pick(&pending);
-            device.place(&self.hole, &self.view, (&alpha, &beta), &spans, columns)?;
+            let spans = self.place(device, &pending, (&sphere.request.rule, split), job, block)?;
+            let RayBlock { rays, plane, columns, .. } = &*block;
             let mut more = Vec::new();
             for (k, span) in pending.into_iter().zip(spans) {
                 let crossings = &plane[rays[k].crossings.clone()];
@@ -157,7 +205,7 @@ fn plan(end: &DeviceEnd, until: f64, (rule, split): (&PanelRule, u32), columns: 
     }
 }
 
-fn from_device(end: &DeviceEnd, crossings: core::ops::Range<usize>, leaves: bool) -> TracedRay {
+fn from_device(end: &DeviceEnd, crossings: Range<usize>, leaves: bool) -> TracedRay {
     TracedRay {
         lambda: end.lambda,
         eta: end.eta,

@@ -23,7 +23,8 @@ impl BlockTracer {
     ) -> Result<(), Error> {
         visitor.works_on(Work::Rays);
         let ray = self.view.ray(&self.hole, job.alpha[k], job.beta[k])?;
-        block.rays[k] = self.step(&ray, job.request, block, visitor);
+        let tolerance = self.find_path(k, &ray, block);
+        block.rays[k] = self.read(&ray, tolerance, job.request, block, visitor);
         if job.request.samples > 0 {
             self.sample_path(k, &ray, job.request.samples, block, visitor);
         }
@@ -32,12 +33,12 @@ impl BlockTracer {
             self.refine_on_path((sphere, k), job.request, block, visitor);
         }
         self.hand_beam(k, job, block, visitor)?;
-        let (RayBlock { rays, plane, path, .. }, tolerance) = (block, self.tracer.tolerance());
+        let RayBlock { rays, plane, path, .. } = block;
         let crossings = &plane[rays[k].crossings.clone()];
         visitor.take(k, &rays[k], crossings, Some(PathOfRay { ray: &ray, path, tolerance }))
     }
 
-    /// Hands a ray of the closed form to the visitor with its path.
+    /// Hands a ray of the closed form, or of a device, to the visitor with its path.
     #[inline(never)]
     pub(super) fn finish_with_path<V: RayVisitor>(
         &self,
@@ -49,8 +50,8 @@ impl BlockTracer {
         self.hand_beam(k, job, block, visitor)?;
         visitor.works_on(Work::Rays);
         let ray = self.view.ray(&self.hole, job.alpha[k], job.beta[k])?;
-        let (RayBlock { rays, plane, path, .. }, tolerance) = (block, self.tracer.tolerance());
-        self.tracer.trace(&self.hole, &ray, Quantities::ALL, path);
+        let tolerance = self.find_path(k, &ray, block);
+        let RayBlock { rays, plane, path, .. } = block;
         let crossings = &plane[rays[k].crossings.clone()];
         visitor.take(k, &rays[k], crossings, Some(PathOfRay { ray: &ray, path, tolerance }))
     }
@@ -79,16 +80,28 @@ impl BlockTracer {
         }
     }
 
-    /// Traces one ray step by step into the block's path.
-    fn step<V: RayVisitor>(
+    /// Makes the block's path that of a ray: the one that a device has followed, or else traced step by step here. What
+    /// it is known to.
+    fn find_path(&self, k: usize, ray: &Ray, block: &mut RayBlock) -> f64 {
+        let RayBlock { path, paths, followed, .. } = block;
+        let place = followed.binary_search(&k).ok();
+        let error = place.and_then(|place| paths.assemble(place, &self.hole, ray, path));
+        if error.is_none() {
+            self.tracer.trace(&self.hole, ray, Quantities::ALL, path);
+        }
+        error.unwrap_or(0.0).max(self.tracer.tolerance())
+    }
+
+    /// Reads all that is known of a ray from the block's path.
+    fn read<V: RayVisitor>(
         &self,
         ray: &Ray,
+        tolerance: f64,
         request: &BlockRequest,
         block: &mut RayBlock,
         visitor: &mut V,
     ) -> TracedRay {
         let RayBlock { path, plane, .. } = block;
-        self.tracer.trace(&self.hole, ray, Quantities::ALL, path);
         let first = plane.len();
         if request.crossings > 0 {
             let found = path.equatorial_crossings();
@@ -99,8 +112,7 @@ impl BlockTracer {
         }
         let exit = request.exit.then(|| path.at(path.mino_total()).direction);
         let until = self.until(ray, request.half_orbits);
-        let off_plane =
-            visitor.first_surface(PathOfRay { ray, path, tolerance: self.tracer.tolerance() });
+        let off_plane = visitor.first_surface(PathOfRay { ray, path, tolerance });
         let off_plane = off_plane.filter(|time| *time <= until);
         let in_plane = first_opaque(&plane[first..], until, visitor);
         TracedRay {

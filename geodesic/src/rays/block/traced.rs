@@ -91,14 +91,14 @@ impl TracedRay {
     }
 }
 
-/// The path of a ray that was traced step by step.
+/// The path of a ray that was traced step by step, here or on a device.
 #[derive(Debug, Clone, Copy)]
 pub struct PathOfRay<'a> {
     /// Its constants of motion.
     pub ray: &'a Ray,
     /// Its path, with all quantities.
     pub path: &'a Path,
-    /// The tolerance that it was traced with.
+    /// The tolerance that it was traced with, or the error of the device that traced it if that is larger.
     pub tolerance: f64,
 }
 

@@ -1,6 +1,7 @@
 //! The tracer of a view, and the memory of its blocks.
 
 use super::device::{DeviceRays, RayDevice};
+use super::device_paths::DevicePaths;
 use super::request::BlockRequest;
 use super::traced::{PlaneCrossing, SampleColumns, TracedRay};
 use crate::analytic::ClosedForm;
@@ -71,6 +72,9 @@ pub struct RayBlock {
     pub(super) crossings: Crossings,
     pub(super) nodes: Nodes,
     pub(super) device: DeviceRays,
+    /// Paths from a device, and the numbers of their rays, which ascend.
+    pub(super) paths: DevicePaths,
+    pub(super) followed: Vec<usize>,
     /// Ends of rays that escape.
     pub(super) exits: Samples,
     /// Samples of whole rays: of those that fall, or of all from a finite radius, and of the others.
@@ -143,8 +147,8 @@ impl BlockTracer {
         BlockTracer { view, ..self }
     }
 
-    /// The same rays, traced on a device: their outcomes, crossings, directions of escape and nodes inside spheres have its
-    /// digits. Rays that it does not vouch for are traced step by step on this processor, and so is whatever needs a path.
+    /// The same rays, traced on a device: their outcomes, crossings, directions of escape, nodes inside spheres and paths
+    /// have its digits. Rays that it does not vouch for are traced step by step on this processor, and so are samples.
     pub fn with_device(self, device: Arc<dyn RayDevice>) -> Self {
         BlockTracer { device: Some(device), ..self }
     }
