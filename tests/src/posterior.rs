@@ -12,6 +12,7 @@ pub fn settings() -> String {
         .replace("jy_per_pixel = 0.08", "jy_per_pixel = 0.32")
         .replace("scans = 64", "scans = 12")
         .replace("iterations = 40", "iterations = 25")
+        .replace("iterations = 200", "iterations = 25")
         .replace("rounds = 4", "rounds = 2")
         .replace("nodes = 64", "nodes = 20")
 }
@@ -204,6 +205,10 @@ fn exact_draws_without_a_finished_fit_are_refused() {
     for (change, expected) in [
         ("screen.ring_rays=0", "screen.ring_rays = 0 is not allowed: 1 to 1024"),
         ("linear.degree=quartic", "unknown variant `quartic`, expected"),
+        (
+            "training.start.linear.iterations=0",
+            "training.start.linear.iterations = 0 is not allowed: 1 or more",
+        ),
         (
             "training.start.linear.nodes=3",
             "training.start.linear.nodes = 3 is not allowed: 4 or more with this linear.degree",

@@ -314,7 +314,7 @@ impl Run<'_> {
             self.folder.log(&linear::solved(&solution))?;
             eprintln!("{}", linear::statement(&solution));
             state.now.parameters = solution.parameters();
-        } else if let Start::Linear { nodes, stride, steps } = self.file.training.start {
+        } else if let Start::Linear { nodes, stride, steps, .. } = self.file.training.start {
             let (whose, about) = ((self.measured, self.folder), (axis, Change::NONE));
             let solution =
                 leakage::solve_linear(self.file, whose, trainer, about, (nodes, stride))?;

@@ -82,7 +82,7 @@ fn begin(
     let change = setup::change(file, times)?;
     let (nodes, stride, steps) = match file.training.start {
         _ if is_linear => (file.representation.grid_nodes(), 1, 0),
-        Start::Linear { nodes, stride, steps } => (nodes, stride, steps),
+        Start::Linear { nodes, stride, steps, .. } => (nodes, stride, steps),
         _ => return Ok(true),
     };
     let change = if is_linear { change } else { kerrlight_tomo::fit::linear::Change::NONE };

@@ -185,6 +185,9 @@ pub enum Start {
         stride: usize,
         /// Steps of the fit to its solution.
         steps: u64,
+        /// Iterations of each round in place of those of the table `linear`: a start may be rough.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        iterations: Option<usize>,
     },
 }
 

@@ -257,7 +257,7 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
         linear(file)?;
     }
     check_prior(file)?;
-    enough_nodes(file)?;
+    enough_nodes_and_iterations(file)?;
     Ok(file.simulated().map(drop)?)
 }
 
@@ -294,11 +294,14 @@ fn check_prior(file: &FitFile) -> Result<()> {
     }
 }
 
-/// Refuses grids with fewer nodes than a B-spline of the linear problem reaches over.
-fn enough_nodes(file: &FitFile) -> Result<()> {
+/// Refuses grids with fewer nodes than a B-spline of the linear problem reaches over, and a start that takes no iteration.
+fn enough_nodes_and_iterations(file: &FitFile) -> Result<()> {
     let least = degree(file).taps();
     let mut grids = Vec::new();
-    if let Start::Linear { nodes, .. } = file.training.start {
+    if let Start::Linear { nodes, iterations, .. } = file.training.start {
+        if iterations == Some(0) {
+            return Err(FitError::range("training.start.linear.iterations", 0, "1 or more").into());
+        }
         grids.push(("training.start.linear.nodes", nodes));
     }
     if let Some(unknown) = file.unknown_world()? {

@@ -6,7 +6,7 @@ use crate::fit::linear::{
     Change, Coarse, GaussianField, LinearProblem, LinearSettings, LinearSolution, LogNormalField,
     Voxels, Watch, Weighted,
 };
-use crate::fit::settings::{FieldKind, FitFile, Kind, Within};
+use crate::fit::settings::{FieldKind, FitFile, Kind, Start, Within};
 use crate::fit::{Data, FrameTerm, Objective};
 
 /// Nodes along an axis from which on a coarser grid is solved first.
@@ -24,8 +24,6 @@ const SURE: f64 = 1e-7;
 const LEFT: f64 = 1e-6;
 /// Part of what noise changes χ² by that ten iterations must gain.
 const GAIN: f64 = 0.1;
-/// The same of a start, which other steps follow.
-const GAIN_OF_START: f64 = 1.0;
 
 /// All terms of the data, the image first.
 pub(super) fn terms(data: &Data<f32>) -> Vec<Weighted<'_, f32>> {
@@ -150,7 +148,12 @@ pub(super) fn solve_frames(
         stride: coarse.stride.min(frames.len().div_ceil(8)).max(1),
         ..coarse
     });
-    let (rounds, iterations) = (settings.rounds, settings.iterations);
+    let is_all = of.file.representation.kind == Kind::LinearGrid;
+    let of_start = match of.file.training.start {
+        Start::Linear { iterations, .. } if !is_all => iterations,
+        _ => None,
+    };
+    let (rounds, iterations) = (settings.rounds, of_start.unwrap_or(settings.iterations));
     let coarse = match change.is_any() {
         true => Some(Coarse { nodes: nodes.min(COARSE), stride: 1, iterations: 20 }),
         false => coarse,
@@ -161,9 +164,8 @@ pub(super) fn solve_frames(
         // A draw of a posterior is to be as exact as the minimum.
         Some(_) => (SURE, 0.0),
         None if quiescent.is_some() => (LEFT, 0.0),
-        None if change.is_any() => (usual.tolerance, 0.0),
-        None if of.file.representation.kind == Kind::LinearGrid => (LEFT, GAIN),
-        None => (LEFT, GAIN_OF_START),
+        None if is_all && !change.is_any() => (LEFT, GAIN),
+        None => (usual.tolerance, 0.0),
     };
     let how = LinearSettings { rounds, iterations, coarse, memory, tolerance, settled, ..usual };
     of.with(frames, |problem| match of.log_normal(&problem.voxels)? {

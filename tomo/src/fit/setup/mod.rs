@@ -135,7 +135,7 @@ const AXIS: &str = "give `axis = [0.0, 0.0, 1.0]`, the direction that matter tur
 
 /// What to write where the linear problem is missing.
 const LINEAR: &str = "add a table [linear] with `upper = 3.0` (the largest emission that is allowed: a few times what \
-     you expect), `rounds = 4` and `iterations = 40`";
+     you expect), `rounds = 4` and `iterations = 200`";
 
 /// Hours of one M.
 ///
