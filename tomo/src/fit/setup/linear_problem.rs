@@ -164,7 +164,8 @@ pub(super) fn solve_frames(
         // A draw of a posterior is to be as exact as the minimum.
         Some(_) => (SURE, 0.0),
         None if quiescent.is_some() => (LEFT, 0.0),
-        None if is_all && !change.is_any() => (LEFT, GAIN),
+        // What is not convex comes on slowly, and goes on for longer than it seems.
+        None if is_all && !change.is_any() && of.file.is_convex() => (LEFT, GAIN),
         None => (usual.tolerance, 0.0),
     };
     let how = LinearSettings { rounds, iterations, coarse, memory, tolerance, settled, ..usual };
