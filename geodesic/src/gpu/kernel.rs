@@ -2,6 +2,9 @@
 
 use super::device::{Device, Mapped};
 use super::error::GpuError;
+use crate::screen::view::View;
+use crate::spacetime::kerr::Kerr;
+use crate::wgsl::Task;
 use std::borrow::Cow;
 
 /// What a binding is.
@@ -27,6 +30,21 @@ pub(super) const WORKGROUP: u32 = 64;
 
 /// Invocations in a row of the grid: fewer than any device allows.
 pub(super) const ROW: u32 = WORKGROUP * 1024;
+
+/// The task of kernels that take rays from end to end, with all quantities.
+pub(super) fn whole_rays(hole: &Kerr, view: &View, rays: usize) -> Task {
+    Task {
+        hole: *hole,
+        view: *view,
+        rays: rays as u32,
+        crossings: 0,
+        samples: 0,
+        row: ROW,
+        quadratures: true,
+        end: 0.0,
+        sphere: 0.0,
+    }
+}
 
 impl Program {
     /// Compiles the entry points of `source`; `bindings` has a value of the kind of each binding.

@@ -3,12 +3,12 @@
 use super::bytes::{float, single};
 use super::device::Device;
 use super::error::GpuError;
-use super::kernel::{Binding, Program, ROW};
+use super::kernel::{Binding, Program, whole_rays};
 use crate::integrate::assembly::TaylorStep;
 use crate::rays::block::{DeviceEnd, DevicePaths};
 use crate::screen::view::View;
 use crate::spacetime::kerr::Kerr;
-use crate::wgsl::{self, STEP_BYTES, Task};
+use crate::wgsl::{self, STEP_BYTES};
 
 /// The kernel `kerr_path`.
 #[derive(Debug)]
@@ -60,17 +60,7 @@ impl PathKernel {
         ends: &[DeviceEnd],
         paths: &mut DevicePaths,
     ) -> Result<(), GpuError> {
-        let task = Task {
-            hole: *hole,
-            view: *view,
-            rays: ends.len() as u32,
-            crossings: 0,
-            samples: 0,
-            row: ROW,
-            quadratures: true,
-            end: 0.0,
-            sphere: 0.0,
-        };
+        let task = whole_rays(hole, view, ends.len());
         let (mut rooms, mut all) = (Vec::with_capacity(8 * ends.len()), 0);
         for end in ends {
             rooms.extend([all, room(end)].into_iter().flat_map(|word| (word as u32).to_le_bytes()));

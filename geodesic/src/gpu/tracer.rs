@@ -3,7 +3,7 @@
 use super::bytes::{float, word};
 use super::device::{Adapter, Device, Needs};
 use super::error::GpuError;
-use super::kernel::{Binding, Program, ROW};
+use super::kernel::{Binding, Program, ROW, whole_rays};
 use super::paths::PathKernel;
 use super::sums::test_sums;
 use crate::error::Error;
@@ -162,17 +162,7 @@ impl GpuTracer {
         nodes: &mut NodeColumns,
     ) -> Result<(), GpuError> {
         let all = pieces[0].1.start..pieces[pieces.len() - 1].1.end;
-        let task = Task {
-            hole: *hole,
-            view: *view,
-            rays: pieces.len() as u32,
-            crossings: 0,
-            samples: 0,
-            row: ROW,
-            quadratures: true,
-            end: 0.0,
-            sphere: 0.0,
-        };
+        let task = whole_rays(hole, view, pieces.len());
         let of_pieces =
             |column: &[f64]| -> Vec<f64> { pieces.iter().map(|(ray, _)| column[*ray]).collect() };
         let points = wgsl::point_bytes(&of_pieces(x), &of_pieces(y));

@@ -6,7 +6,7 @@ use crate::fit::linear::{
     Change, Coarse, GaussianField, LinearProblem, LinearSettings, LinearSolution, LogNormalField,
     Voxels, Watch, Weighted,
 };
-use crate::fit::settings::{FieldKind, FitFile, Kind, Start, Within};
+use crate::fit::settings::{FieldKind, FitFile, Kind, Linear, Start, Within};
 use crate::fit::{Data, FrameTerm, Objective};
 
 /// Nodes along an axis from which on a coarser grid is solved first.
@@ -135,6 +135,34 @@ pub(super) fn misfit(of: &Of<'_>, frames: &[usize], emission: &[f32]) -> Result<
     of.with(frames, |problem| problem.misfit(emission))
 }
 
+/// Iterations of each round: a start has its own if it says so.
+fn iterations(file: &FitFile, settings: &Linear) -> usize {
+    match file.training.start {
+        Start::Linear { iterations: Some(own), .. }
+            if file.representation.kind != Kind::LinearGrid =>
+        {
+            own
+        }
+        _ => settings.iterations,
+    }
+}
+
+/// When a round ends: what is left of the slopes, and the part of what noise changes χ² by that ten iterations must gain.
+fn enough(of: &Of<'_>, settings: &Linear) -> (f64, f64) {
+    let (file, usual) = (of.file, LinearSettings::default());
+    let is_steady = !of.how.1.is_any();
+    match settings.prior {
+        // A draw of a posterior is to be as exact as the minimum.
+        Some(_) => (SURE, 0.0),
+        None if of.objective.model.quiescent().is_some() => (LEFT, 0.0),
+        // What is not convex comes on slowly, and goes on for longer than it seems.
+        None if file.representation.kind == Kind::LinearGrid && is_steady && file.is_convex() => {
+            (LEFT, GAIN)
+        }
+        None => (usual.tolerance, 0.0),
+    }
+}
+
 /// The grid that fits some frames best.
 pub(super) fn solve_frames(
     of: &Of<'_>,
@@ -148,26 +176,13 @@ pub(super) fn solve_frames(
         stride: coarse.stride.min(frames.len().div_ceil(8)).max(1),
         ..coarse
     });
-    let is_all = of.file.representation.kind == Kind::LinearGrid;
-    let of_start = match of.file.training.start {
-        Start::Linear { iterations, .. } if !is_all => iterations,
-        _ => None,
-    };
-    let (rounds, iterations) = (settings.rounds, of_start.unwrap_or(settings.iterations));
     let coarse = match change.is_any() {
         true => Some(Coarse { nodes: nodes.min(COARSE), stride: 1, iterations: 20 }),
         false => coarse,
     };
     let memory = if change.is_any() { MANY_ROWS } else { usual.memory };
-    let quiescent = of.objective.model.quiescent();
-    let (tolerance, settled) = match settings.prior {
-        // A draw of a posterior is to be as exact as the minimum.
-        Some(_) => (SURE, 0.0),
-        None if quiescent.is_some() => (LEFT, 0.0),
-        // What is not convex comes on slowly, and goes on for longer than it seems.
-        None if is_all && !change.is_any() && of.file.is_convex() => (LEFT, GAIN),
-        None => (usual.tolerance, 0.0),
-    };
+    let (rounds, iterations) = (settings.rounds, iterations(of.file, settings));
+    let (tolerance, settled) = enough(of, settings);
     let how = LinearSettings { rounds, iterations, coarse, memory, tolerance, settled, ..usual };
     of.with(frames, |problem| match of.log_normal(&problem.voxels)? {
         Some(prior) => problem.solve_log_normal(&prior, &how, watch),
