@@ -21,7 +21,7 @@ pub fn of_data(path: &Path, base_dir: &Path) -> anyhow::Result<PathBuf> {
     let folder = folder.with_context(|| {
         format!(
             "{}: {EHT_DATA} is not set; set it to the folder with the public data of the Event Horizon Telescope, or give the \
-             file: --set data.visibilities.path=FILE",
+             file with --set, such as data.visibilities.path=FILE or data.light-curve.path=FILE",
             path.display()
         )
     })?;

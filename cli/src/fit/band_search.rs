@@ -41,7 +41,14 @@ pub fn place(
     }
     let motion = setup::band_motion(&found, measured, best("rotation_factor")?)?;
     let instrument = Instrument::new(&found)?;
-    Ok(Some(Placed { file: found, instrument, motion }))
+    let measured = match &results["background_jy"] {
+        Value::Null => None,
+        values => {
+            let values = serde_json::from_value(values.clone()).with_context(damaged)?;
+            Some(measured.before(values))
+        }
+    };
+    Ok(Some(Placed { file: found, instrument, motion, measured }))
 }
 
 fn search(
@@ -97,6 +104,20 @@ fn radii(scan: &BandScan) -> Vec<[f64; 2]> {
         scan.worlds.iter().map(of).sum::<f64>()
     };
     normalised(scan.radii.iter().enumerate().map(|(k, radius)| [*radius, share(k)]).collect())
+}
+
+/// Shares of the periods of the orbits of all worlds, minutes; where matter stands still there is none.
+fn periods(scan: &BandScan) -> Vec<[f64; 2]> {
+    let most = scan.worlds.iter().map(|world| world.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
+    let of = |(world, periods): (&BandWorld, &Vec<f64>)| {
+        let share = |(period, ln): (&f64, &f64)| {
+            let weight = world.inclination_deg.to_radians().sin().max(1e-6);
+            [*period, (ln - most).exp() * weight]
+        };
+        periods.iter().zip(&world.by_radius).map(share).collect::<Vec<_>>()
+    };
+    let all = scan.worlds.iter().zip(&scan.periods_min).flat_map(of);
+    normalised(all.filter(|[period, _]| period.is_finite()).collect())
 }
 
 /// The value below which a part of the probability lies, each share spread evenly half way to its neighbours.
@@ -157,6 +178,15 @@ fn results(scan: &BandScan, file: &FitFile) -> anyhow::Result<Value> {
             "median": scan.radius.median, "low": scan.radius.low, "high": scan.radius.high,
         },
         "azimuth_deg": azimuth(scan.azimuth),
+        "period_min": interval(&periods(scan), None),
+        "ln_bayes_factor": scan.ln_bayes_factor,
+        "background": scan.background.is_some().then(|| json!({
+            "constant_jy": band.background.constant,
+            "variation_jy": band.background.variation,
+            "correlation_min": band.background.minutes,
+            "matern": band.background.roughness,
+        })),
+        "background_jy": scan.background,
         "validation_chi2_per_datum": scan.validation,
         "truth": {"inclination_deg": truth},
         "worlds": scan.worlds.iter().map(row).collect::<Vec<_>>(),
@@ -174,13 +204,7 @@ pub fn found(folder: &Folder) -> anyhow::Result<Option<Value>> {
 
 /// Numbers for tables: of the 95 % interval, of the band, and the probability that matter turns as the law says.
 pub fn numbers(results: &Value) -> Vec<(&'static str, Value)> {
-    let forward = results["rotation_factor"]["probabilities"].as_array().map(|all| {
-        let share = |pair: &Value| match pair[0].as_f64() {
-            Some(factor) if factor > 0.0 => pair[1].as_f64().unwrap_or(0.0),
-            _ => 0.0,
-        };
-        all.iter().map(share).sum::<f64>()
-    });
+    let forward = forward(results);
     let inclination = &results["inclination_deg"];
     vec![
         ("band_inclination_deg", inclination["median"].clone()),
@@ -192,10 +216,41 @@ pub fn numbers(results: &Value) -> Vec<(&'static str, Value)> {
         ("band_azimuth_deg", results["azimuth_deg"]["median"].clone()),
         ("band_azimuth_low_deg", results["azimuth_deg"]["low"].clone()),
         ("band_azimuth_high_deg", results["azimuth_deg"]["high"].clone()),
+        ("band_period_min", results["period_min"]["median"].clone()),
+        ("band_period_low_min", results["period_min"]["low"].clone()),
+        ("band_period_high_min", results["period_min"]["high"].clone()),
+        ("band_ln_bayes_factor", results["ln_bayes_factor"].clone()),
         ("band_forward", json!(forward)),
         ("band_validation", results["validation_chi2_per_datum"].clone()),
     ]
 }
+
+/// The probability that matter turns as the law says.
+fn forward(results: &Value) -> Option<f64> {
+    let share = |pair: &Value| match pair[0].as_f64() {
+        Some(factor) if factor > 0.0 => pair[1].as_f64().unwrap_or(0.0),
+        _ => 0.0,
+    };
+    let all = results["rotation_factor"]["probabilities"].as_array()?;
+    Some(all.iter().map(share).sum())
+}
+
+/// Whether a flare is seen before a background.
+fn flare(ln: f64) -> String {
+    let factor = match ln.abs() < 30.0 {
+        true => format!("{:.2e}", ln.exp()),
+        false => format!("e^{ln:.0}"),
+    };
+    let what = match ln {
+        ln if ln > SEEN => "The data ask for a flare that orbits",
+        ln if ln < -SEEN => "The data speak against a flare that orbits",
+        _ => "The data do not tell whether a flare orbits",
+    };
+    format!("{what}: with one, they are {factor} times as probable as with the background alone.")
+}
+
+/// ln of 20, above which a Bayes factor is called strong (Kass & Raftery 1995).
+const SEEN: f64 = 3.0;
 
 /// What was found, in sentences.
 pub fn sentences(results: &Value) -> Vec<String> {
@@ -203,7 +258,13 @@ pub fn sentences(results: &Value) -> Vec<String> {
     let of = |key: &str, part: &str| number(&results[key][part]);
     let truth = results["truth"]["inclination_deg"].as_f64();
     let truth = truth.map_or(String::new(), |truth| format!(" (truth: {truth:.1}°)"));
-    let mut all = vec![
+    let mut all = Vec::new();
+    if let (Some(ln), true) =
+        (results["ln_bayes_factor"].as_f64(), results["background"].is_object())
+    {
+        all.push(flare(ln));
+    }
+    all.extend([
         format!(
             "The inclination is between {:.1}° and {:.1}° at 95 %, with a median of {:.1}°{truth}.",
             of("inclination_deg", "low"),
@@ -219,11 +280,20 @@ pub fn sentences(results: &Value) -> Vec<String> {
             of("azimuth_deg", "low"),
             of("azimuth_deg", "high")
         ),
-    ];
+        format!(
+            "Its period is {:.0} minutes ({:.0} to {:.0} at 95 %).",
+            of("period_min", "median"),
+            of("period_min", "low"),
+            of("period_min", "high")
+        ),
+    ]);
     let turns = results["rotation_factor"]["probabilities"].as_array();
     if turns.is_some_and(|turns| turns.len() > 1) {
         let best = of("rotation_factor", "best");
-        all.push(format!("It turns {best:.2} times as fast as the law of motion says."));
+        let forward = forward(results).unwrap_or(f64::NAN);
+        all.push(format!(
+            "Most probably it turns {best:.2} times as fast as the law of motion says, in the law's sense with a probability of {forward:.3}."
+        ));
     }
     if let Some(validation) = results["validation_chi2_per_datum"].as_f64() {
         all.push(format!(

@@ -10,6 +10,7 @@ use kerrlight_tomo::fit::setup::{Instrument, Measured};
 use kerrlight_tomo::frames::Frames;
 use kerrlight_tomo::interferometry::files;
 use kerrlight_tomo::interferometry::files::images::{WithSize, npy_frames, npz_frames};
+use kerrlight_tomo::interferometry::light_curve::LightCurve;
 use kerrlight_tomo::interferometry::observation::Observation;
 use kerrlight_tomo::interferometry::simulate::Movie;
 use kerrlight_tomo::numpy;
@@ -37,17 +38,29 @@ pub fn measure(
             Ok(Measured::of_movie(file, movie, &path.display().to_string())?)
         }
         Some(DataFiles::LightCurve(settings)) => {
-            let path = base_dir.join(&settings.path);
+            let path = paths::of_data(&settings.path, base_dir)?;
             let name = path.display().to_string();
-            let curve =
-                files::parse_light_curve(&output::read_text(&path)?).context(name.clone())?;
-            Ok(Measured::of_light_curve(file, curve, &name)?)
+            Ok(Measured::of_light_curve(file, light_curve(&path)?, &name)?)
         }
         Some(DataFiles::Visibilities { path, .. }) => {
             let of = |observation, name: &str| Measured::of_visibilities(file, observation, name);
             visibilities(&paths::of_data(path, base_dir)?, of)
         }
     }
+}
+
+/// A light curve of a table, or of the baselines within a site of a UVFITS file.
+fn light_curve(path: &Path) -> anyhow::Result<LightCurve> {
+    let name = || path.display().to_string();
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    if !matches!(extension.to_ascii_lowercase().as_str(), "uvfits" | "fits") {
+        return files::parse_light_curve(&output::read_text(path)?).with_context(name);
+    }
+    let curve = LightCurve::of_sites(&interferometry::read(path)?.1);
+    if curve.samples.is_empty() {
+        bail!("{}: no baseline lies within a site", name());
+    }
+    Ok(curve)
 }
 
 /// The settings with the times of a simulated light curve, where these are in a file.

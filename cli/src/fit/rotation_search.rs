@@ -43,7 +43,7 @@ pub fn place(
         law.turn_deg += angle;
     }
     let instrument = Instrument::new(&found)?;
-    Ok(Some(Placed { file: found, instrument, motion }))
+    Ok(Some(Placed { file: found, instrument, motion, measured: None }))
 }
 
 fn search(

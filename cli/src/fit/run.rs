@@ -67,7 +67,8 @@ impl<'a> Prepared<'a> {
             setup::in_world(&file, &unknown, &instrument, &measured, &world, 0)?;
         }
         let prepared = Self { file, registry, instrument, measured, motion };
-        let seen = prepared.objective(&prepared.instrument, &prepared.motion)?.observed().len();
+        let Self { instrument, motion, measured, .. } = &prepared;
+        let seen = prepared.objective(instrument, motion, measured)?.observed().len();
         if matches!(prepared.file.axis, AxisSearch::Scan(_)) && seen < 2 {
             bail!(
                 "axis.scan needs at least 2 frame times: a single frame does not constrain the axis"
@@ -88,14 +89,16 @@ impl<'a> Prepared<'a> {
         }
     }
 
-    /// Settings, rays and motion of the fit.
+    /// Settings, rays, motion and data of the fit.
     fn world<'b>(
         &'b self,
         placed: Option<&'b Placed>,
-    ) -> (&'b FitFile, &'b Instrument, &'b Motion) {
+    ) -> (&'b FitFile, &'b Instrument, &'b Motion, &'b Measured) {
         match placed {
-            Some(Placed { file, instrument, motion }) => (file, instrument, motion),
-            None => (&self.file, &self.instrument, &self.motion),
+            Some(Placed { file, instrument, motion, measured }) => {
+                (file, instrument, motion, measured.as_ref().unwrap_or(&self.measured))
+            }
+            None => (&self.file, &self.instrument, &self.motion, &self.measured),
         }
     }
 
@@ -111,16 +114,17 @@ impl<'a> Prepared<'a> {
         let times = setup::emission_times(instrument, motion);
         let representation = setup::representation(file, registry, times)?;
         let training = setup::training(file, setup::axis(file)?.1)?;
-        Ok(check(&self.objective(instrument, motion)?, &*representation, &training)?)
+        Ok(check(&self.objective(instrument, motion, measured)?, &*representation, &training)?)
     }
 
     fn objective(
         &self,
         instrument: &Instrument,
         motion: &Motion,
+        measured: &Measured,
     ) -> anyhow::Result<Objective<f32>> {
         let pixels = self.file.screen.pixels * self.file.screen.pixels;
-        let data = self.measured.terms(&self.file.loss, pixels)?;
+        let data = measured.terms(&self.file.loss, pixels)?;
         Ok(Objective { model: setup::forward_model(instrument, motion)?, data })
     }
 }
@@ -133,11 +137,11 @@ pub fn run(
     listener: Option<Listener>,
     device: Option<FitDevice>,
 ) -> anyhow::Result<Answer> {
-    let Prepared { registry, measured, .. } = prepared;
+    let registry = prepared.registry;
     let begun = Instant::now();
     let placed = prepared.placed(folder)?;
-    let (file, instrument, motion) = prepared.world(placed.as_ref());
-    let objective = prepared.objective(instrument, motion)?;
+    let (file, instrument, motion, measured) = prepared.world(placed.as_ref());
+    let objective = prepared.objective(instrument, motion, measured)?;
     let times = setup::emission_times(instrument, motion);
     let representation = setup::representation(file, registry, times)?;
     let (axis, axis_rate) = setup::axis(file)?;
@@ -187,8 +191,8 @@ pub fn help(
     // What it has found of the world is there before its state comes.
     let bytes = link.state()?;
     let placed = prepared.placed(&Folder::look(run)?.0)?;
-    let (file, instrument, motion) = prepared.world(placed.as_ref());
-    let objective = prepared.objective(instrument, motion)?;
+    let (file, instrument, motion, measured) = prepared.world(placed.as_ref());
+    let objective = prepared.objective(instrument, motion, measured)?;
     let times = setup::emission_times(instrument, motion);
     let representation = setup::representation(file, prepared.registry, times)?;
     let (axis, axis_rate) = setup::axis(file)?;

@@ -27,6 +27,8 @@ pub struct Placed {
     pub instrument: Instrument,
     /// Motion.
     pub motion: Motion,
+    /// The data, where they are not those that were read.
+    pub measured: Option<Measured>,
 }
 
 /// Finds the world of a fit, or reads it where an earlier run has found it; none if it is known.
@@ -68,7 +70,7 @@ pub fn placed(
     rays: u64,
 ) -> anyhow::Result<Placed> {
     let (instrument, motion) = setup::in_world(file, unknown, instrument, measured, world, rays)?;
-    Ok(Placed { file: settled(file, unknown, world), instrument, motion })
+    Ok(Placed { file: settled(file, unknown, world), instrument, motion, measured: None })
 }
 
 /// Names and values of the free parameters of a world, in their units.

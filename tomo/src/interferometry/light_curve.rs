@@ -66,6 +66,23 @@ impl LightCurve {
         Self { samples: self.samples.chunks_exact(count.max(1)).map(mean).collect() }
     }
 
+    /// Means over so many seconds: a sample begins a new one where it is as much as that later than the first of the last.
+    /// Gaps are never bridged by more.
+    #[must_use]
+    pub fn averaged_over(self, seconds: f64) -> Self {
+        let mut bins: Vec<Vec<Sample>> = Vec::new();
+        for sample in self.samples {
+            // Times of files are rounded: a millisecond early is in time.
+            let joins =
+                |bin: &&mut Vec<Sample>| (sample.time_h - bin[0].time_h) * 3600.0 < seconds - 1e-3;
+            match bins.last_mut().filter(joins) {
+                Some(bin) => bin.push(sample),
+                None => bins.push(vec![sample]),
+            }
+        }
+        Self { samples: bins.iter().map(|bin| mean(bin)).collect() }
+    }
+
     /// Without samples that are later than so many seconds after the one before.
     #[must_use]
     pub fn without_gaps(self, most_s: f64) -> Self {
@@ -233,6 +250,13 @@ mod tests {
         assert!((means.samples[1].stokes[2].unwrap().jy - 5.5).abs() < 1e-14);
         assert!((means.samples[1].time_h - 9.055).abs() < 1e-12);
         assert!((means.samples[0].stokes[1].unwrap().sigma_jy.unwrap() - 0.01).abs() < 1e-15);
+        let scans = [9.0, 9.003, 9.006, 9.5, 9.503].map(|t| sample(t, 0.3, t));
+        let scans = LightCurve { samples: scans.to_vec() }.averaged_over(21.6);
+        let times: Vec<f64> = scans.samples.iter().map(|sample| sample.time_h).collect();
+        assert_eq!(times.len(), 3, "{times:?}");
+        for (found, expected) in times.iter().zip([9.0015, 9.006, 9.5015]) {
+            assert!((found - expected).abs() < 1e-12, "{times:?}");
+        }
         let late =
             LightCurve { samples: [9.0, 9.02, 9.10, 9.12].map(|t| sample(t, 0.0, 0.0)).to_vec() };
         let times: Vec<f64> = late.without_gaps(100.0).samples.iter().map(|s| s.time_h).collect();

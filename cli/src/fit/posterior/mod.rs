@@ -271,7 +271,7 @@ impl<'a> Drawing<'a> {
         told("the world");
         let data = worlds.data(noise)?;
         let world = worlds.draw(number);
-        let Placed { file, instrument, motion } =
+        let Placed { file, instrument, motion, .. } =
             world_search::placed(&file, unknown, instrument, measured, &world, number)?;
         let through = Through { file: &file, instrument: &instrument, motion: &motion, registry };
         let drawn = sample::draw(&through, &data, keeper, told)?;

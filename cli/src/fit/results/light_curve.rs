@@ -57,15 +57,24 @@ impl Estimate<'_> {
         let mut text = "time_utc_h,time_m,fitted".to_owned();
         for parameter in &curve.parameters {
             write!(text, ",{0},sigma_{0},model_{0}", parameter.name())?;
+            if curve.background.is_some() {
+                write!(text, ",background_{}", parameter.name())?;
+            }
         }
         let count = curve.parameters.len();
         for (frame, hour) in curve.hours.iter().enumerate() {
             let (time, fitted) = (self.measured.times[frame], u8::from(curve.fitted[frame]));
             write!(text, "\n{hour},{time},{fitted}")?;
             let range = frame * count..(frame + 1) * count;
-            for (datum, model) in curve.data[range.clone()].iter().zip(&seen[range]) {
-                let [flux, sigma] = datum.unwrap_or([f64::NAN; 2]);
-                write!(text, ",{flux},{sigma},{model}")?;
+            for k in range {
+                let [flux, sigma] = curve.data[k].unwrap_or([f64::NAN; 2]);
+                match &curve.background {
+                    None => write!(text, ",{flux},{sigma},{}", seen[k])?,
+                    Some(background) => {
+                        let model = f64::from(seen[k]) + background[k];
+                        write!(text, ",{flux},{sigma},{model},{}", background[k])?;
+                    }
+                }
             }
         }
         text.push('\n');
@@ -79,13 +88,19 @@ impl Estimate<'_> {
         let count = curve.parameters.len();
         let mut series = Vec::new();
         for (plane, parameter) in curve.parameters.iter().enumerate() {
-            let of_model = curve.hours.iter().zip(seen[plane..].iter().step_by(count));
-            series.push(Series {
-                name: format!("{} of the model", parameter.name()),
-                points: of_model.map(|(hour, flux)| [*hour, f64::from(*flux)]).collect(),
-                errors: Vec::new(),
-                marks: Marks::Line,
-            });
+            let line = |what: &str, of: &dyn Fn(usize) -> f64| {
+                let hours = curve.hours.iter().enumerate();
+                Series {
+                    name: format!("{} of the {what}", parameter.name()),
+                    points: hours.map(|(k, hour)| [*hour, of(k * count + plane)]).collect(),
+                    errors: Vec::new(),
+                    marks: Marks::Line,
+                }
+            };
+            series.push(line("model", &|k| f64::from(seen[k]) + curve.background_at(k)));
+            if curve.background.is_some() {
+                series.push(line("background", &|k| curve.background_at(k)));
+            }
             let data = curve.hours.iter().zip(curve.data[plane..].iter().step_by(count));
             let measured: Vec<[f64; 3]> =
                 data.filter_map(|(h, datum)| datum.map(|[jy, sigma]| [*h, jy, sigma])).collect();
@@ -103,10 +118,16 @@ impl Estimate<'_> {
             ),
             None => String::new(),
         };
+        let background = match curve.background {
+            Some(_) => {
+                " with the background that is expected beside it, and that background alone,"
+            }
+            None => "",
+        };
         Ok(vec![LinePlot {
             title: "Stokes light curves".to_owned(),
             caption: format!(
-                "Fluxes of the unresolved source, data as points with their standard deviations, the recovered emission as lines.{held}"
+                "Fluxes of the unresolved source, data as points with their standard deviations, the recovered emission{background} as lines.{held}"
             ),
             x: Axis { label: "time".to_owned(), unit: "h UTC".to_owned(), log: false },
             y: Axis { label: "flux density".to_owned(), unit: "Jy".to_owned(), log: false },

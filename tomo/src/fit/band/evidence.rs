@@ -1,7 +1,12 @@
 //! The probability of data with the field integrated out, and what it says of data that were not used.
+//!
+//! Gaussian fields are as often negative as positive, and a field of the other sign turns position angles by 90°. Emission is
+//! not negative: of all fields those count whose emission is positive in sum. With y the data and t the sum,
+//! p(y | t > 0) = 2 p(y) P(t > 0 | y).
 
-use super::field::{Seen, part, some};
-use super::{Band, BandPrior, CurveRows};
+use super::background::Whitening;
+use super::field::{part, some};
+use super::{Background, Band, BandPrior, CurveRows};
 use crate::Error;
 use nalgebra::{DMatrix, DVector};
 
@@ -35,33 +40,99 @@ pub fn evidence(
 ) -> Result<Vec<Weighed>, Error> {
     let prior = prior.clone().checked()?;
     let used = curve.numbers(true);
-    let sets: Vec<DVector<f64>> = data.iter().map(|values| some(values, &used)).collect();
-    let sets = DMatrix::from_columns(&sets);
+    let views = View::all(curve, data, &prior.backgrounds)?;
     let mut all: Vec<Vec<(usize, Band, f64)>> = vec![Vec::new(); data.len()];
     for (place, radius) in prior.radii.iter().enumerate() {
         for (width, length) in pairs(&prior.widths, &prior.lengths) {
-            let band = Band {
-                radius: *radius,
-                width,
-                height: prior.height,
-                length,
-                power: 1.0,
-                mean: 0.0,
-            };
+            let (radius, height) = (*radius, prior.height);
+            let band = Band { radius, width, height, length, ..Band::DARK };
             let Some(seen) = curve.seen(&band) else { continue };
-            let (covariance, uniform) =
-                (part(&seen.covariance, &used, &used), some(seen.uniform.as_slice(), &used));
-            let unit = unit(&covariance, &sets);
-            for power in prior.powers.iter().map(|power| power * unit) {
-                let Some(lower) = Lower::new(&covariance, power) else { continue };
-                let weighed = lower.weigh(&uniform, &sets, &prior.means);
-                for (set, mean, ln) in weighed {
-                    all[set].push((place, Band { power, mean, ..band }, ln));
+            let columns = [&seen.uniform, &seen.total].map(|all| some(all.as_slice(), &used));
+            let field = Field {
+                covariance: part(&seen.covariance, &used, &used),
+                columns: DMatrix::from_columns(&columns),
+                total: seen.own_total,
+            };
+            for view in &views {
+                for (set, band, ln) in view.weigh(&field, &prior, band) {
+                    all[set].push((place, band, ln));
                 }
             }
         }
     }
     all.into_iter().map(|all| weighed(&all, prior.radii.len())).collect()
+}
+
+/// ln of the probability of each of some data sets without any flare, on the scale of [`Weighed::ln_evidence`]: the mean
+/// over all backgrounds.
+///
+/// # Errors
+/// If a background is out of its range.
+pub fn without_flare(
+    curve: &CurveRows,
+    data: &[Vec<f64>],
+    backgrounds: &[Background],
+) -> Result<Vec<f64>, Error> {
+    let views = View::all(curve, data, backgrounds)?;
+    let of = |set: usize| {
+        let one = |view: &View| {
+            -0.5 * (view.sets.column(set).norm_squared() + view.whitening.ln_determinant)
+        };
+        ln_sum(views.iter().map(one)) - (views.len() as f64).ln()
+    };
+    Ok((0..data.len()).map(of).collect())
+}
+
+/// What the data that are used see of a random field.
+struct Field {
+    covariance: DMatrix<f64>,
+    /// What a field of 1 gives, and the covariance with all emission.
+    columns: DMatrix<f64>,
+    /// The variance of all emission, and all emission of a field of 1.
+    total: [f64; 2],
+}
+
+/// The data that are used, as they are in front of a background.
+struct View {
+    background: Background,
+    whitening: Whitening,
+    /// A column for each data set.
+    sets: DMatrix<f64>,
+}
+
+impl View {
+    fn all(
+        curve: &CurveRows,
+        data: &[Vec<f64>],
+        backgrounds: &[Background],
+    ) -> Result<Vec<Self>, Error> {
+        let used = curve.numbers(true);
+        let sets: Vec<DVector<f64>> = data.iter().map(|values| some(values, &used)).collect();
+        let sets = DMatrix::from_columns(&sets);
+        let one = |background: &Background| {
+            let whitening = Whitening::new(curve, background, &used)?;
+            let sets = whitening.columns(sets.clone());
+            Ok(Self { background: *background, whitening, sets })
+        };
+        backgrounds.iter().map(one).collect()
+    }
+
+    /// Number of the data set, band and ln of the probability, for all powers and means of a band with this field.
+    fn weigh(&self, field: &Field, prior: &BandPrior, band: Band) -> Vec<(usize, Band, f64)> {
+        let covariance = self.whitening.covariance(&field.covariance);
+        let columns = self.whitening.columns(field.columns.clone());
+        let unit = unit(&covariance, &self.sets);
+        let mut all = Vec::new();
+        for power in prior.powers.iter().map(|power| power * unit) {
+            let Some(lower) = Lower::new(&covariance, power) else { continue };
+            let weighed = lower.weigh((&columns, field.total), &self.sets, &prior.means);
+            all.extend(weighed.into_iter().map(|(set, mean, ln)| {
+                let band = Band { power, mean, background: self.background, ..band };
+                (set, band, ln - 0.5 * self.whitening.ln_determinant)
+            }));
+        }
+        all
+    }
 }
 
 fn pairs<'a>(a: &'a [f64], b: &'a [f64]) -> impl Iterator<Item = (f64, f64)> + 'a {
@@ -96,27 +167,47 @@ impl Lower {
         self.factor.solve_lower_triangular(columns).unwrap_or_else(|| columns * f64::NAN)
     }
 
-    /// Number of the data set, mean, and ln of the probability: the mean is a direction more.
+    /// Number of the data set, mean, and ln of the probability, of all emission together above 0: the mean is a direction
+    /// more.
     fn weigh(
         &self,
-        uniform: &DVector<f64>,
+        (columns, total): (&DMatrix<f64>, [f64; 2]),
         sets: &DMatrix<f64>,
         means: &[f64],
     ) -> Vec<(usize, f64, f64)> {
-        let direction = self.solved(&DMatrix::from_columns(core::slice::from_ref(uniform)));
-        let (direction, sets) = (direction.column(0), self.solved(sets));
+        let (columns, sets) = (self.solved(columns), self.solved(sets));
+        let (direction, emission) = (columns.column(0), columns.column(1));
         let square = direction.norm_squared();
         let mut all = Vec::new();
         for (set, values) in sets.column_iter().enumerate() {
-            let (chi2, along) = (values.norm_squared(), values.dot(&direction));
+            let chi2 = values.norm_squared();
+            let products = [values.dot(&direction), values.dot(&emission)];
             for mean in means {
                 let strength = self.power * mean * mean;
                 let more = 1.0 + strength * square;
-                let form = chi2 - strength * along * along / more;
-                all.push((set, *mean, -0.5 * (form + self.ln_determinant + more.ln())));
+                let form = chi2 - strength * products[0] * products[0] / more;
+                // All emission given the data: its covariance with them is this column times the power.
+                let with = &emission + &direction * (mean * mean * total[1]);
+                let along = with.dot(&direction) * strength / more;
+                let expected = self.power * (with.dot(&values) - along * products[0]);
+                let seen = with.norm_squared() - along * with.dot(&direction);
+                let own = total[0] + (mean * total[1]).powi(2);
+                let variance = self.power * (own - self.power * seen);
+                let positive = ln_normal(expected / variance.max(f64::MIN_POSITIVE).sqrt());
+                let ln = -0.5 * (form + self.ln_determinant + more.ln());
+                all.push((set, *mean, ln + core::f64::consts::LN_2 + positive));
             }
         }
         all
+    }
+}
+
+/// ln of the normal distribution function.
+fn ln_normal(z: f64) -> f64 {
+    use core::f64::consts::{LN_2, SQRT_2, TAU};
+    match z < -30.0 {
+        true => -0.5 * (z * z + TAU.ln()) - (-z).ln(),
+        false => libm::erfc(-z / SQRT_2).ln() - LN_2,
     }
 }
 
@@ -160,7 +251,7 @@ pub fn validation(curve: &CurveRows, data: &[f64], band: &Band) -> Result<Option
     if others.is_empty() {
         return Ok(None);
     }
-    let full = full(&seen, band);
+    let full = seen.full(band) + curve.of_background(&band.background);
     let mut inner = part(&full, &used, &used);
     (0..used.len()).for_each(|k| inner[(k, k)] += 1.0);
     let factor = inner.cholesky().ok_or_else(none)?;
@@ -170,10 +261,4 @@ pub fn validation(curve: &CurveRows, data: &[f64], band: &Band) -> Result<Option
     (0..others.len()).for_each(|k| outer[(k, k)] += 1.0);
     let chi2 = outer.cholesky().map_or(f64::NAN, |outer| left.dot(&outer.solve(&left)));
     Ok(Some(chi2 / others.len() as f64))
-}
-
-/// The covariance of all data without noise.
-fn full(seen: &Seen, band: &Band) -> DMatrix<f64> {
-    let mean = &seen.uniform * seen.uniform.transpose() * (band.mean * band.mean);
-    (&seen.covariance + mean) * band.power
 }

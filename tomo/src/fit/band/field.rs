@@ -19,6 +19,18 @@ pub(super) struct Seen {
     pub moments: DMatrix<f64>,
     /// Moments × moments.
     pub own: DMatrix<f64>,
+    /// Covariance of the data with all emission of the field, in any unit.
+    pub total: DVector<f64>,
+    /// Variance of all emission of the field, and all emission of a field of 1, in that unit.
+    pub own_total: [f64; 2],
+}
+
+impl Seen {
+    /// The covariance of all data that the flare gives them, without noise.
+    pub fn full(&self, band: &Band) -> DMatrix<f64> {
+        let mean = &self.uniform * self.uniform.transpose() * (band.mean * band.mean);
+        (&self.covariance + mean) * band.power
+    }
 }
 
 impl CurveRows {
@@ -29,8 +41,10 @@ impl CurveRows {
         let round = self.round(band);
         let parts = self.parts(&across.parts, &upright.parts, &round);
         let [moments, own] = self.moments(&parts, [&across, &upright], round[1]);
+        let (total, own_total) = self.total(&parts, [&across, &upright], round[0]);
         let uniform = self.uniform([&across, &upright]);
-        Some(Seen { covariance: &parts * parts.transpose(), uniform, moments, own })
+        let covariance = &parts * parts.transpose();
+        Some(Seen { covariance, uniform, moments, own, total, own_total })
     }
 
     /// Standard deviations of the functions of the azimuth, those that count and the first harmonic: exp(−d²/2ℓ²) of
@@ -91,6 +105,21 @@ impl CurveRows {
             false => 0.0,
         };
         [moments, DMatrix::from_fn(4, 4, own)]
+    }
+
+    /// Of all emission: its covariance with the data; its variance, and what it is for a field of 1.
+    fn total(
+        &self,
+        parts: &DMatrix<f64>,
+        [across, upright]: [&Profile; 2],
+        first: f64,
+    ) -> (DVector<f64>, [f64; 2]) {
+        let rings = DVector::from_vec(self.grid.rings());
+        let ring = across.parts.tr_mul(&rings);
+        let up = upright.parts.row_sum().transpose() * first;
+        let weights = DVector::from_column_slice((&ring * up.transpose()).as_slice());
+        let of_one = across.envelope.dot(&rings) * upright.envelope.sum();
+        (parts.columns(0, weights.len()) * &weights, [weights.norm_squared(), of_one])
     }
 
     /// What a field of 1 gives.

@@ -10,6 +10,7 @@
 //! Fields live on rings and layers, and their correlation is exp(−d²/2ℓ²) with d² = (ρ − ρ′)² + (z − z′)² +
 //! 4ρ₀² sin²((φ − φ′)/2): a product of one factor for each coordinate, whose parts are few.
 
+mod background;
 mod evidence;
 mod field;
 mod place;
@@ -17,7 +18,8 @@ mod rows;
 #[cfg(test)]
 mod tests;
 
-pub use evidence::{UNLIKELY, Weighed, evidence, validation};
+pub use background::{Background, Sampling, expected_background};
+pub use evidence::{UNLIKELY, Weighed, evidence, validation, without_flare};
 pub use place::{Interval, Normal, Place, places, together};
 pub use rows::{CurveRows, PolarGrid};
 
@@ -38,13 +40,17 @@ pub struct BandPrior {
     pub powers: Vec<f64>,
     /// μ.
     pub means: Vec<f64>,
+    /// What else may shine.
+    pub backgrounds: Vec<Background>,
 }
 
 impl BandPrior {
-    /// Powers of amplitudes over two orders of magnitude to both sides, and means up to twice the field's deviation.
+    /// Powers of amplitudes over two orders of magnitude to both sides, and means up to twice the field's deviation;
+    /// nothing else shines.
     pub fn usual(radii: Vec<f64>, widths: Vec<f64>, lengths: Vec<f64>, height: f64) -> Self {
         let powers = [0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0].to_vec();
-        Self { radii, widths, height, lengths, powers, means: vec![0.0, 0.5, 1.0, 2.0] }
+        let (means, backgrounds) = (vec![0.0, 0.5, 1.0, 2.0], vec![Background::NONE]);
+        Self { radii, widths, height, lengths, powers, means, backgrounds }
     }
 
     /// Itself, if its numbers are in their ranges.
@@ -69,6 +75,9 @@ impl BandPrior {
         if self.means.is_empty() || self.means.iter().any(|x| !(*x >= 0.0 && x.is_finite())) {
             return Err(Error::out_of_range("means", f64::NAN, "0 or above, one or more"));
         }
+        if self.backgrounds.is_empty() {
+            return Err(Error::out_of_range("backgrounds", 0.0, "one or more"));
+        }
         Ok(self)
     }
 }
@@ -88,4 +97,19 @@ pub struct Band {
     pub power: f64,
     /// μ.
     pub mean: f64,
+    /// What else shines.
+    pub background: Background,
+}
+
+impl Band {
+    /// One that is nowhere and does not shine.
+    pub const DARK: Self = Self {
+        radius: 0.0,
+        width: 0.0,
+        height: 0.0,
+        length: 0.0,
+        power: 0.0,
+        mean: 0.0,
+        background: Background::NONE,
+    };
 }

@@ -4,6 +4,7 @@
 //! linear in e, hence Gaussian for every band; the angle and the quotient are taken to first order. Emission that goes round
 //! evenly has neither.
 
+use super::background::Whitening;
 use super::evidence::Lower;
 use super::field::{Seen, part, some};
 use super::{Band, CurveRows};
@@ -37,7 +38,7 @@ pub struct Interval {
 }
 
 /// Where bands have their emission, given the data that are used (over their standard deviations). Bands come with the ln of
-/// their weights; those of the same radius, width and length one after the other.
+/// their weights; those of the same radius, width, length and background one after the other.
 ///
 /// # Errors
 /// If a band has no node.
@@ -50,7 +51,9 @@ pub fn places(curve: &CurveRows, data: &[f64], bands: &[(Band, f64)]) -> Result<
     for bands in bands.chunk_by(alike) {
         let band = bands[0].0;
         let none = || Error::out_of_range("radius of the band", band.radius, "that of any node");
-        let seen = Used::new(&curve.seen(&band).ok_or_else(none)?, &used, &values);
+        let whitening = Whitening::new(curve, &band.background, &used)?;
+        let seen = curve.seen(&band).ok_or_else(none)?;
+        let seen = Used::new(&seen, (&used, &values), &whitening);
         for bands in bands.chunk_by(|a, b| a.0.power == b.0.power) {
             let lower = Lower::new(&seen.covariance, bands[0].0.power).ok_or_else(none)?;
             let columns = lower.solved(&seen.columns);
@@ -60,7 +63,7 @@ pub fn places(curve: &CurveRows, data: &[f64], bands: &[(Band, f64)]) -> Result<
     Ok(all)
 }
 
-/// What is needed of the data that are used.
+/// What is needed of the data that are used, in front of a background.
 struct Used {
     covariance: DMatrix<f64>,
     /// Moments, uniform emission, data.
@@ -69,14 +72,14 @@ struct Used {
 }
 
 impl Used {
-    fn new(seen: &Seen, used: &[usize], values: &DVector<f64>) -> Self {
+    fn new(seen: &Seen, (used, values): (&[usize], &DVector<f64>), whitening: &Whitening) -> Self {
         let moments = part(&seen.moments, used, &[0, 1, 2, 3]);
         let mut columns: Vec<DVector<f64>> =
             moments.column_iter().map(|column| column.into_owned()).collect();
         columns.extend([some(seen.uniform.as_slice(), used), values.clone()]);
         Self {
-            covariance: part(&seen.covariance, used, used),
-            columns: DMatrix::from_columns(&columns),
+            covariance: whitening.covariance(&part(&seen.covariance, used, used)),
+            columns: whitening.columns(DMatrix::from_columns(&columns)),
             own: Matrix4::from_fn(|a, b| seen.own[(a, b)]),
         }
     }

@@ -1,5 +1,6 @@
 //! Rows of a light curve on rings about the axis: what each ring and layer adds, by harmonics of the azimuth.
 
+use super::Sampling;
 use crate::dynamics::Axis;
 use crate::fit::ForwardModel;
 use crate::fit::batch::Batch;
@@ -75,13 +76,15 @@ pub struct CurveRows {
     pub grid: PolarGrid,
     /// Which of the data are used; the others judge.
     pub used: Vec<bool>,
+    /// When they were taken, and how well.
+    pub sampling: Sampling,
     /// A column for each layer of each datum of each function of the azimuth (the first slowest), ring by ring.
     pub(super) waves: DMatrix<f64>,
 }
 
 impl CurveRows {
-    /// Of numbers of all nodes of the grid for each datum.
-    pub fn new(grid: PolarGrid, rows: &[Vec<f64>], used: Vec<bool>) -> Self {
+    /// Of numbers of all nodes of the grid for each datum, over its standard deviation.
+    pub fn new(grid: PolarGrid, rows: &[Vec<f64>], used: Vec<bool>, sampling: Sampling) -> Self {
         let trigonometric = trigonometric(&grid);
         let mut waves = DMatrix::zeros(grid.rings, grid.waves() * rows.len() * grid.layers);
         for (datum, row) in rows.iter().enumerate() {
@@ -96,18 +99,18 @@ impl CurveRows {
                 }
             }
         }
-        Self { grid, used, waves }
+        Self { grid, used, sampling, waves }
     }
 
-    /// Of light curves of a model, whose pixels are the numbers of a frame; `scales` are factors on all of them, frame by
-    /// frame.
+    /// Of light curves of a model, whose pixels are the numbers of a frame and whose frames are the samples.
     pub fn of<T: Float>(
         model: &ForwardModel<T>,
         axis: Axis,
         grid: PolarGrid,
-        (scales, used): (&[f64], Vec<bool>),
+        (sampling, used): (Sampling, Vec<bool>),
     ) -> Self {
         let (count, mut batch) = (model.pixels(), Batch::default());
+        let scales = &sampling.scales;
         let mut rows = Vec::with_capacity(scales.len());
         for (frame, scales) in scales.chunks_exact(count).enumerate() {
             batch.set((0..model.rays()).map(|ray| (ray as u32, frame as u32)));
@@ -123,7 +126,7 @@ impl CurveRows {
             }
             rows.append(&mut of_frame);
         }
-        Self::new(grid, &rows, used)
+        Self::new(grid, &rows, used, sampling)
     }
 
     /// Number of data.

@@ -2,6 +2,7 @@
 
 use super::field::part;
 use super::*;
+use crate::fit::linear::Roughness;
 use core::f64::consts::TAU;
 use nalgebra::{DMatrix, DVector};
 
@@ -15,18 +16,24 @@ fn nodes() -> Vec<[f64; 3]> {
     layers.iter().flat_map(|z| GRID.rings().into_iter().flat_map(|rho| of_ring(rho, *z))).collect()
 }
 
-/// Light curves of rings that turn: each datum is the part of the emission ahead of a direction.
+/// Light curves of rings that turn: each datum is a part of all emission and that ahead of a direction.
 fn rows(data: usize) -> Vec<Vec<f64>> {
     let entry = |datum: usize, [radius, azimuth, _]: [f64; 3]| {
         let phase = 40.0 * datum as f64 / data as f64 * radius.max(0.5).powf(-1.5) * 8.0;
         let (sin, cos) = (phase - azimuth).sin_cos();
-        0.5 * radius * if datum.is_multiple_of(2) { cos } else { sin }
+        0.5 * radius * (0.3 + if datum.is_multiple_of(2) { cos } else { sin })
     };
     (0..data).map(|k| nodes().into_iter().map(|node| entry(k, node)).collect()).collect()
 }
 
+/// Two numbers every ten minutes, with standard deviations of 0.01 Jy.
+fn sampling(data: usize) -> Sampling {
+    let minutes = (0..data / 2).map(|k| 10.0 * k as f64).collect();
+    Sampling { minutes, scales: vec![100.0; data] }
+}
+
 fn curve(data: usize) -> CurveRows {
-    CurveRows::new(GRID, &rows(data), (0..data).map(|k| k < data - 10).collect())
+    CurveRows::new(GRID, &rows(data), (0..data).map(|k| k < data - 10).collect(), sampling(data))
 }
 
 fn prior() -> BandPrior {
@@ -34,21 +41,33 @@ fn prior() -> BandPrior {
 }
 
 fn band(radius: f64) -> Band {
-    Band { radius, width: 1.0, height: 1.0, length: 2.0, power: 0.4, mean: 0.5 }
+    Band { radius, width: 1.0, height: 1.0, length: 2.0, power: 0.4, mean: 0.5, ..Band::DARK }
 }
 
-/// A field that is drawn from the prior, as data with noise.
+/// A field that is drawn from the prior, its emission positive in sum, as data with noise.
 fn drawn(curve: &CurveRows, band: &Band, seed: u64) -> Vec<f64> {
     use rand::{RngExt, SeedableRng};
     let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(seed);
     let mut normal = || -> f64 { random.sample(rand_distr::StandardNormal) };
     let seen = curve.seen(band).unwrap();
     let n = curve.data();
-    let mut covariance = &seen.covariance * band.power
-        + &seen.uniform * seen.uniform.transpose() * (band.power * band.mean * band.mean);
-    (0..n).for_each(|k| covariance[(k, k)] += 1.0);
-    let white = DVector::from_fn(n, |_, _| normal());
-    (covariance.cholesky().unwrap().unpack() * white).as_slice().to_vec()
+    let mut rest = curve.of_background(&band.background);
+    (0..n).for_each(|k| rest[(k, k)] += 1.0);
+    let mut white = |n: usize| DVector::from_fn(n, |_, _| normal());
+    let noise = rest.cholesky().unwrap().unpack() * white(n);
+    if band.power == 0.0 {
+        return noise.as_slice().to_vec();
+    }
+    let [own, of_one] = seen.own_total;
+    let mean = band.mean * band.mean;
+    let mut joint = DMatrix::zeros(n + 1, n + 1);
+    joint[(0, 0)] = band.power * (own + mean * of_one * of_one);
+    let across = (&seen.total + &seen.uniform * (mean * of_one)) * band.power;
+    joint.view_mut((1, 0), (n, 1)).copy_from(&across);
+    joint.view_mut((1, 1), (n, n)).copy_from(&seen.full(band));
+    (1..=n).for_each(|k| joint[(k, k)] += 1e-6);
+    let field = joint.cholesky().unwrap().unpack() * white(n + 1);
+    (field.rows(1, n) * field[0].signum() + noise).as_slice().to_vec()
 }
 
 /// −½ (yᵀC⁻¹y + ln det C) with C written out.
@@ -63,6 +82,7 @@ fn exact_evidence_is_the_density_of_the_data() {
         lengths: vec![2.0],
         powers: vec![0.7],
         means: vec![0.5],
+        backgrounds: vec![Background::NONE],
     };
     let found = &evidence(&curve, core::slice::from_ref(&data), &one).unwrap()[0];
     let seen = curve.seen(&truth).unwrap();
@@ -72,8 +92,25 @@ fn exact_evidence_is_the_density_of_the_data() {
     (0..used.len()).for_each(|k| covariance[(k, k)] += 1.0);
     let values = DVector::from_iterator(used.len(), used.iter().map(|k| data[*k]));
     let factor = covariance.clone().cholesky().unwrap();
-    let expected = -0.5 * (values.dot(&factor.solve(&values)) + covariance.determinant().ln());
+    let expected = -0.5 * (values.dot(&factor.solve(&values)) + covariance.determinant().ln())
+        + positive(&seen, &found.best, &used, (&factor.inverse(), &values));
     assert!((found.ln_evidence - expected).abs() < 1e-8 * expected.abs(), "{found:?} {expected}");
+}
+
+/// ln of twice the probability that all emission is positive given the data, with the inverse of their covariance.
+fn positive(
+    seen: &field::Seen,
+    band: &Band,
+    used: &[usize],
+    (inverse, values): (&DMatrix<f64>, &DVector<f64>),
+) -> f64 {
+    let ([own, of_one], mean) = (seen.own_total, band.mean * band.mean);
+    let across = (&seen.total + &seen.uniform * (mean * of_one)) * band.power;
+    let across = DVector::from_iterator(used.len(), used.iter().map(|k| across[*k]));
+    let expected = across.dot(&(inverse * values));
+    let own = band.power * (own + mean * of_one * of_one);
+    let variance = own - across.dot(&(inverse * &across));
+    libm::erfc(-expected / (2.0 * variance).sqrt()).ln()
 }
 
 /// Of draws from the prior the radius is found, and the data that were left out have a χ² of 1.
@@ -97,7 +134,7 @@ fn exact_draws_from_the_prior_are_found_again() {
 #[test]
 fn exact_covariances_are_sums_over_pairs_of_nodes() {
     let (rows, nodes, band) = (rows(6), nodes(), band(5.0));
-    let seen = CurveRows::new(GRID, &rows, vec![true; 6]).seen(&band).unwrap();
+    let seen = CurveRows::new(GRID, &rows, vec![true; 6], sampling(6)).seen(&band).unwrap();
     let square = |x: f64| x * x;
     let envelope = |[rho, _, z]: &[f64; 3]| {
         let far = square((rho - band.radius) / band.width) + square(z / band.height);
@@ -112,6 +149,13 @@ fn exact_covariances_are_sums_over_pairs_of_nodes() {
     };
     let all = DMatrix::from_fn(nodes.len(), nodes.len(), near);
     let rows = DMatrix::from_fn(6, nodes.len(), |datum, node| rows[datum][node]);
+    let light = DVector::from_iterator(nodes.len(), nodes.iter().map(|[rho, ..]| *rho));
+    let round = GRID.azimuths as f64;
+    let [own, of_one] = seen.own_total;
+    let (total, square_of_all) = (&rows * &all * &light, light.dot(&(&all * &light)));
+    assert!((&seen.total * round - &total).amax() < 1e-5 * total.amax(), "{total}");
+    assert!((own * round * round / square_of_all - 1.0).abs() < 1e-5, "{own} {square_of_all}");
+    assert!((of_one * round / light.dot(&DVector::from_vec(lit.clone())) - 1.0).abs() < 1e-9);
     let expected = &rows * all * rows.transpose();
     let error = (&seen.covariance - &expected).amax() / expected.amax();
     assert!(error < 1e-5, "{error}");
@@ -171,7 +215,7 @@ fn exact_quantiles_of_mixtures() {
 /// Of a spot without noise: where it is.
 #[test]
 fn exact_a_spot_is_found_where_it_is() {
-    let curve = CurveRows::new(GRID, &rows(60), vec![true; 60]);
+    let curve = CurveRows::new(GRID, &rows(60), vec![true; 60], sampling(60));
     let spot = |[rho, azimuth, z]: &[f64; 3]| {
         let (sin, cos) = azimuth.sin_cos();
         let far = (rho * cos - 3.0).powi(2) + (rho * sin - 4.0).powi(2) + z * z;
@@ -197,4 +241,114 @@ fn impossible_priors_are_refused() {
     assert!(evidence(&curve, &[vec![0.0; 30]], &none).is_err());
     let far = BandPrior { radii: vec![1e6], ..prior() };
     assert!(evidence(&curve, &[vec![0.0; 30]], &far).is_err());
+}
+
+/// A constant of 0.2 Jy and a random walk of 0.05 Jy that forgets in 40 minutes.
+const BACKGROUND: Background =
+    Background { constant: 0.2, variation: 0.05, minutes: 40.0, roughness: Roughness::Half };
+
+/// −½ (yᵀC⁻¹y + ln det C) with the covariance of flare, background and noise written out.
+#[test]
+fn exact_evidence_before_a_background() {
+    let (curve, truth) = (curve(30), Band { background: BACKGROUND, ..band(5.0) });
+    let data = drawn(&curve, &truth, 3);
+    let one = BandPrior {
+        radii: vec![5.0],
+        powers: vec![0.7],
+        means: vec![0.5],
+        backgrounds: vec![BACKGROUND],
+        ..prior()
+    };
+    let found = &evidence(&curve, core::slice::from_ref(&data), &one).unwrap()[0];
+    let used = curve.numbers(true);
+    let density = |flare: DMatrix<f64>| {
+        let entry = |a: usize, b: usize| {
+            let apart = 10.0 * (a / 2).abs_diff(b / 2) as f64;
+            let walk = 0.05f64.powi(2) * (-apart / 40.0).exp();
+            let background = if a % 2 == b % 2 { 1e4 * (0.2f64.powi(2) + walk) } else { 0.0 };
+            background + f64::from(u8::from(a == b))
+        };
+        let whole = flare + DMatrix::from_fn(30, 30, entry);
+        let covariance = part(&whole, &used, &used);
+        let values = DVector::from_iterator(used.len(), used.iter().map(|k| data[*k]));
+        let factor = covariance.cholesky().unwrap();
+        let inverse = factor.inverse();
+        let form = values.dot(&(&inverse * &values));
+        (-0.5 * (form + factor.determinant().ln()), inverse, values)
+    };
+    let seen = curve.seen(&truth).unwrap();
+    let (with, inverse, values) = density(seen.full(&found.best));
+    let with = with + positive(&seen, &found.best, &used, (&inverse, &values));
+    let without = density(DMatrix::zeros(30, 30)).0;
+    assert!((found.ln_evidence - with).abs() < 1e-7 * with.abs(), "{found:?} {with}");
+    let alone = without_flare(&curve, core::slice::from_ref(&data), &[BACKGROUND]).unwrap()[0];
+    assert!((alone - without).abs() < 1e-7 * without.abs(), "{alone} {without}");
+}
+
+/// Flares before a background: the radius is found, data that were left out have a χ² of 1, the background is known to the
+/// errors that its distribution has, and no flare is seen where there is none.
+#[test]
+fn exact_flares_before_a_background_are_found_and_none_where_there_is_none() {
+    let curve = curve(80);
+    let backgrounds = [0.0, 0.05].map(|variation| Background { variation, ..BACKGROUND });
+    let prior = BandPrior { backgrounds: backgrounds.to_vec(), ..prior() };
+    let (mut right, mut sum, mut seen, mut false_alarms) = (0, 0.0, 0, 0);
+    for seed in 0..40 {
+        let truth = Band { background: BACKGROUND, ..band([3.0, 5.0, 7.0][seed as usize % 3]) };
+        let dark = Band { power: 0.0, ..truth };
+        let data = [drawn(&curve, &truth, seed), drawn(&curve, &dark, seed)];
+        let found = evidence(&curve, &data, &prior).unwrap();
+        let without = without_flare(&curve, &data, &prior.backgrounds).unwrap();
+        right += usize::from(found[0].best.radius == truth.radius);
+        sum += validation(&curve, &data[0], &truth).unwrap().unwrap();
+        seen += usize::from(found[0].ln_evidence > without[0] + 3.0);
+        false_alarms += usize::from(found[1].ln_evidence > without[1] + 3.0);
+    }
+    assert!(right > 30, "{right} of 40");
+    assert!((sum / 40.0 - 1.0).abs() < 0.3, "{}", sum / 40.0);
+    // e³ = 20: as often as once in 20 at most, were the prior not scaled by the data.
+    assert!(seen > 36 && false_alarms < 5, "{seen} {false_alarms}");
+}
+
+/// The expected background is off by as much as its distribution given the data says.
+#[test]
+fn exact_expected_background() {
+    use rand::{RngExt, SeedableRng};
+    let (curve, truth) = (curve(40), Band { background: BACKGROUND, ..band(5.0) });
+    let (own, n) = (curve.of_background(&BACKGROUND), 40);
+    let rest = curve.seen(&truth).unwrap().full(&truth) + DMatrix::identity(n, n);
+    let roots = [own.clone(), rest.clone()].map(|mut matrix| {
+        (0..n).for_each(|k| matrix[(k, k)] += 1e-9);
+        matrix.cholesky().unwrap().unpack()
+    });
+    let used = curve.numbers(true);
+    let all: Vec<usize> = (0..n).collect();
+    let across = part(&own, &all, &used);
+    let inverse = part(&(&own + &rest), &used, &used).try_inverse().unwrap();
+    let left = &own - &across * inverse * across.transpose();
+    let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(7);
+    let (mut sum, draws) = (0.0, 200);
+    for _ in 0..draws {
+        let mut white = || DVector::from_fn(n, |_, _| random.sample(rand_distr::StandardNormal));
+        let [background, other] = [&roots[0] * white(), &roots[1] * white()];
+        let data: Vec<f64> = (&background + other).as_slice().to_vec();
+        let expected = expected_background(&curve, &data, &truth).unwrap();
+        let off = |k: usize| (background[k] - expected[k]).powi(2) / left[(k, k)];
+        sum += (0..n).map(off).sum::<f64>() / n as f64;
+    }
+    assert!((sum / f64::from(draws) - 1.0).abs() < 0.1, "{}", sum / f64::from(draws));
+}
+
+#[test]
+fn impossible_backgrounds_are_refused() {
+    let curve = curve(30);
+    for bad in [
+        Background { constant: -0.1, ..BACKGROUND },
+        Background { variation: f64::NAN, ..BACKGROUND },
+        Background { minutes: 0.0, ..BACKGROUND },
+    ] {
+        assert!(without_flare(&curve, &[vec![0.0; 30]], &[bad]).is_err(), "{bad:?}");
+    }
+    let none = BandPrior { backgrounds: Vec::new(), ..prior() };
+    assert!(evidence(&curve, &[vec![0.0; 30]], &none).is_err());
 }

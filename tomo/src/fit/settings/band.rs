@@ -1,5 +1,6 @@
 //! The search for a world in which a light curve is that of a flare in an orbital band.
 
+use crate::fit::linear::Roughness;
 use serde::{Deserialize, Serialize};
 
 /// Numbers at equal distances.
@@ -43,4 +44,21 @@ pub struct BandSettings {
     pub lengths: Vec<f64>,
     /// Rings between the axis and the largest radius of the region.
     pub nodes: usize,
+    /// What shines beside the flare; nothing, without.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub background: Option<BackgroundSettings>,
+}
+
+/// Light that no flare explains, in Q and in U: all combinations of these, each as probable.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BackgroundSettings {
+    /// Standard deviation of what is constant, Jy.
+    pub constant_jy: f64,
+    /// Standard deviations of what varies about it, Jy.
+    pub variation_jy: Vec<f64>,
+    /// Its correlation times, minutes.
+    pub correlation_min: Vec<f64>,
+    /// ν of its Matérn covariance.
+    pub matern: Vec<Roughness>,
 }

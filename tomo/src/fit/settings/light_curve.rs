@@ -84,6 +84,9 @@ pub struct MeasuredCurve {
     /// Samples that are averaged; none, without.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub average: Option<usize>,
+    /// Seconds over which samples are averaged; not at all, without.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub average_s: Option<f64>,
     /// Averages later than this many seconds after the one before are left out: they bridge gaps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub most_gap_s: Option<f64>,

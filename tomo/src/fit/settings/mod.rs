@@ -23,7 +23,7 @@ mod unknowns;
 mod view;
 mod world;
 
-pub use band::{BandSettings, Steps};
+pub use band::{BackgroundSettings, BandSettings, Steps};
 pub use change::ChangeSettings;
 pub use data::{DataFiles, Loss, LossKind};
 pub use error::FitError;

@@ -1,13 +1,13 @@
 //! From settings to worlds that are weighed by the light curve of a flare in an orbital band.
 
-use super::{Curve, Instrument, Measured, Result, axis, forward_model, motion};
+use super::{Curve, Instrument, Measured, Result, axis, forward_model, hours_per_m, motion};
 use crate::dynamics::AngularVelocity;
 use crate::fit::Motion;
 use crate::fit::band::{
-    Band, BandPrior, CurveRows, Interval, PolarGrid, UNLIKELY, Weighed, evidence, places, together,
-    validation,
+    Background, Band, BandPrior, CurveRows, Interval, PolarGrid, Sampling, UNLIKELY, Weighed,
+    evidence, expected_background, places, together, validation, without_flare,
 };
-use crate::fit::settings::{BandSettings, FitError, FitFile, refuse};
+use crate::fit::settings::{BackgroundSettings, BandSettings, FitError, FitFile, refuse};
 use crate::polarization::StokesParameter;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -47,6 +47,12 @@ pub struct BandScan {
     /// χ² per datum of the data that were not used, with the covariance that the best world expects of them; none without
     /// any.
     pub validation: Option<f64>,
+    /// ln of the probability of the data with a flare, all worlds together, over that without one.
+    pub ln_bayes_factor: f64,
+    /// Periods of the orbit in minutes, world by world and radius by radius; infinite where matter stands still.
+    pub periods_min: Vec<Vec<f64>>,
+    /// What the background is expected to be at all data in the best world, Jy; none if there is none.
+    pub background: Option<Vec<f64>>,
 }
 
 /// Told how many worlds are done; says whether to go on.
@@ -83,9 +89,65 @@ pub fn scan_band(
     let [azimuth, radius] = placed(file, measured, (settings, curve), (&worlds, best))?;
     let world = &worlds[best];
     let rows = rows(file, measured, (settings, curve), world.flow())?;
-    let validation = validation(&rows, &turned(curve, world.position_angle_deg), &world.band)?;
+    let data = turned(curve, world.position_angle_deg);
+    let validation = validation(&rows, &data, &world.band)?;
+    let ln_bayes_factor = ln_bayes_factor(&rows, &data, &worlds, settings)?;
+    let background = settings.background.is_some();
+    let background = background.then(|| expected(&rows, curve, &data, world)).transpose()?;
     let radii = settings.radii.values();
-    Ok(Some(BandScan { worlds, radii, best, radius, azimuth, validation }))
+    let period = |world: &BandWorld| periods(file, measured, world, &radii);
+    let periods_min = worlds.iter().map(period).collect::<Result<_>>()?;
+    Ok(Some(BandScan {
+        worlds,
+        radii,
+        best,
+        radius,
+        azimuth,
+        validation,
+        ln_bayes_factor,
+        periods_min,
+        background,
+    }))
+}
+
+/// Periods of orbits at some radii in a world, minutes.
+fn periods(
+    file: &FitFile,
+    measured: &Measured,
+    world: &BandWorld,
+    radii: &[f64],
+) -> Result<Vec<f64>> {
+    let velocity = band_motion(file, measured, world.rotation_factor)?.velocity;
+    let minutes = 60.0 * hours_per_m(file)?;
+    let of = |radius: &f64| core::f64::consts::TAU / velocity.rate(*radius).abs() * minutes;
+    Ok(radii.iter().map(of).collect())
+}
+
+/// ln of the probability of the data with a flare over that without one: the mean over the prior of the worlds.
+fn ln_bayes_factor(
+    rows: &CurveRows,
+    data: &[f64],
+    worlds: &[BandWorld],
+    settings: &BandSettings,
+) -> Result<f64> {
+    let most = worlds.iter().map(|world| world.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
+    let (mut with, mut prior) = (0.0, 0.0);
+    for world in worlds {
+        with += (world.ln_posterior - most).exp();
+        prior += direction(world.inclination_deg).exp();
+    }
+    let without = without_flare(rows, &[data.to_vec()], &backgrounds(settings))?[0];
+    Ok(most + (with / prior).ln() - without)
+}
+
+/// What the background is expected to be in a world, Jy, as the data have it.
+fn expected(rows: &CurveRows, curve: &Curve, data: &[f64], world: &BandWorld) -> Result<Vec<f64>> {
+    let mut all = expected_background(rows, data, &world.band)?;
+    for (value, datum) in all.iter_mut().zip(&curve.data) {
+        *value *= datum.map_or(0.0, |[_, sigma]| sigma);
+    }
+    turn(&mut all, -world.position_angle_deg);
+    Ok(all)
 }
 
 /// Azimuth and radius of the emission, in all worlds that are likely.
@@ -152,7 +214,33 @@ fn check(file: &FitFile, settings: &BandSettings, curve: &Curve) -> Result<()> {
             "band.position_angles_deg needs loss.0.stokes = [\"Q\", \"U\"] with the same error of both"
         );
     }
+    if let Some(background) = &settings.background {
+        check_background(background, curve)?;
+    }
     axis(file).map(drop)
+}
+
+fn check_background(settings: &BackgroundSettings, curve: &Curve) -> Result<()> {
+    let range = |key: &str, value: f64, allowed| {
+        Err(FitError::range(format!("band.background.{key}"), value, allowed).into())
+    };
+    let BackgroundSettings { constant_jy, variation_jy, correlation_min, matern } = settings;
+    if !(0.0..=1e3).contains(constant_jy) {
+        return range("constant_jy", *constant_jy, "0 to 1000 Jy");
+    }
+    if let Some(bad) = variation_jy.iter().find(|x| !(0.0..=1e3).contains(*x)) {
+        return range("variation_jy", *bad, "0 to 1000 Jy");
+    }
+    if let Some(bad) = correlation_min.iter().find(|x| !(1e-3..=1e6).contains(*x)) {
+        return range("correlation_min", *bad, "0.001 to 1e6 minutes");
+    }
+    if variation_jy.is_empty() || correlation_min.is_empty() || matern.is_empty() {
+        refuse!("band.background: variation_jy, correlation_min and matern need one value or more");
+    }
+    if curve.parameters.contains(&StokesParameter::I) {
+        refuse!("band.background is that of Q and U: leave I out of loss.0.stokes");
+    }
+    Ok(())
 }
 
 /// Whether every frame has Q and U, in this order, with the same error: noise then has no direction.
@@ -166,7 +254,34 @@ fn can_turn(curve: &Curve) -> bool {
 
 fn prior(settings: &BandSettings) -> BandPrior {
     let BandSettings { radii, widths, lengths, height, .. } = settings;
-    BandPrior::usual(radii.values(), widths.clone(), lengths.clone(), *height)
+    let usual = BandPrior::usual(radii.values(), widths.clone(), lengths.clone(), *height);
+    BandPrior { backgrounds: backgrounds(settings), ..usual }
+}
+
+/// All combinations; what does not vary has no correlation time.
+fn backgrounds(settings: &BandSettings) -> Vec<Background> {
+    let Some(BackgroundSettings { constant_jy, variation_jy, correlation_min, matern }) =
+        &settings.background
+    else {
+        return vec![Background::NONE];
+    };
+    let constant = Background { constant: *constant_jy, ..Background::NONE };
+    let mut all = Vec::new();
+    for variation in variation_jy.iter().copied() {
+        if variation == 0.0 {
+            all.push(constant);
+            continue;
+        }
+        for minutes in correlation_min.iter().copied() {
+            all.extend(matern.iter().map(|roughness| Background {
+                variation,
+                minutes,
+                roughness: *roughness,
+                ..constant
+            }));
+        }
+    }
+    all
 }
 
 fn worlds(settings: &BandSettings) -> Vec<(f64, f64)> {
@@ -233,11 +348,13 @@ fn rows(
     let axis = axis(&file)?.0;
     model.weigh(axis);
     let scale = |datum: &Option<[f64; 2]>| datum.map_or(0.0, |[_, sigma]| 1.0 / sigma);
-    let scales: Vec<f64> = curve.data.iter().map(scale).collect();
+    let scales = curve.data.iter().map(scale).collect();
+    let minutes = curve.hours.iter().map(|hour| 60.0 * (hour - curve.hours[0])).collect();
+    let sampling = Sampling { minutes, scales };
     let count = curve.parameters.len();
     let used = |k: usize| curve.fitted[k / count] || curve.data[k].is_none();
     let used = (0..curve.data.len()).map(used).collect();
-    Ok(CurveRows::of(&model, axis, grid(&file, settings), (&scales, used)))
+    Ok(CurveRows::of(&model, axis, grid(&file, settings), (sampling, used)))
 }
 
 /// Three times as many nodes round the axis as away from it, and layers twice as far apart.
@@ -253,12 +370,18 @@ fn grid(file: &FitFile, settings: &BandSettings) -> PolarGrid {
 fn turned(curve: &Curve, angle_deg: f64) -> Vec<f64> {
     let value = |datum: &Option<[f64; 2]>| datum.map_or(0.0, |[flux, sigma]| flux / sigma);
     let mut all: Vec<f64> = curve.data.iter().map(value).collect();
-    if angle_deg != 0.0 {
-        let (sin, cos) = (2.0 * angle_deg.to_radians()).sin_cos();
-        for pair in all.chunks_exact_mut(2) {
-            let (q, u) = (pair[0], pair[1]);
-            (pair[0], pair[1]) = (q * cos + u * sin, u * cos - q * sin);
-        }
-    }
+    turn(&mut all, angle_deg);
     all
+}
+
+/// Pairs of Q and U, seen by who is turned by a position angle.
+fn turn(pairs: &mut [f64], angle_deg: f64) {
+    if angle_deg == 0.0 {
+        return;
+    }
+    let (sin, cos) = (2.0 * angle_deg.to_radians()).sin_cos();
+    for pair in pairs.chunks_exact_mut(2) {
+        let (q, u) = (pair[0], pair[1]);
+        (pair[0], pair[1]) = (q * cos + u * sin, u * cos - q * sin);
+    }
 }

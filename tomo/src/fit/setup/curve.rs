@@ -15,6 +15,8 @@ pub struct Curve {
     pub data: Vec<Option<FluxDatum>>,
     /// Frames that are fitted; the others judge the fit.
     pub fitted: Vec<bool>,
+    /// What shines beside the emission that is fitted, Jy, in the order of the data; none where nothing does.
+    pub background: Option<Vec<f64>>,
 }
 
 impl Curve {
@@ -39,7 +41,15 @@ impl Curve {
 
     fn term(&self, fitted: bool) -> Result<StokesCurveTerm> {
         let count = self.parameters.len();
-        let of = |k: usize| self.data[k].filter(|_| self.fitted[k / count] == fitted);
+        let of = |k: usize| {
+            let [flux, sigma] = self.data[k].filter(|_| self.fitted[k / count] == fitted)?;
+            Some([flux - self.background_at(k), sigma])
+        };
         StokesCurveTerm::new(count, (0..self.data.len()).map(of).collect())
+    }
+
+    /// What shines beside the emission that is fitted at a number of the data, Jy.
+    pub fn background_at(&self, k: usize) -> f64 {
+        self.background.as_ref().map_or(0.0, |background| background[k])
     }
 }

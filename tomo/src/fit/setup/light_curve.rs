@@ -35,7 +35,7 @@ impl Measured {
         }
         let fitted = fitted(&hours, settings.validate_after_min)?;
         let times = times(file, &hours, settings.first_time)?;
-        let curve = Curve { parameters, hours, data, fitted };
+        let curve = Curve { parameters, hours, data, fitted, background: None };
         Ok(Self { times, curve: Some(curve), ..Self::empty() })
     }
 }
@@ -59,12 +59,19 @@ fn datum(
 /// What is left of a file's light curve.
 fn prepared(mut curve: LightCurve, settings: &MeasuredCurve) -> Result<LightCurve> {
     check_positive("data.light-curve.average", settings.average.map(|count| count as f64))?;
+    check_positive("data.light-curve.average_s", settings.average_s)?;
     check_positive("data.light-curve.most_gap_s", settings.most_gap_s)?;
+    if settings.average.is_some() && settings.average_s.is_some() {
+        refuse!("average and average_s of [data.light-curve] exclude each other");
+    }
     if let Some(hours) = settings.utc_h {
         curve = curve.cropped(hours);
     }
     if let Some(count) = settings.average {
         curve = curve.averaged(count);
+    }
+    if let Some(seconds) = settings.average_s {
+        curve = curve.averaged_over(seconds);
     }
     if let Some(most) = settings.most_gap_s {
         curve = curve.without_gaps(most);
@@ -144,7 +151,7 @@ pub(super) fn simulate(
     let data = measure(&fluxes, &parameters, settings, file.seed)?;
     let movie = Some(truth.movie(file, instrument, &times)?);
     let fitted = fitted(&hours, settings.validate_after_min)?;
-    let curve = Some(Curve { parameters, hours, data, fitted });
+    let curve = Some(Curve { parameters, hours, data, fitted, background: None });
     Ok(Measured { times, movie, curve, truth: Some(truth), ..Measured::empty() })
 }
 

@@ -10,6 +10,7 @@ use crate::interferometry::operator::ImageGrid;
 use crate::interferometry::polarimetry::LeakageTable;
 
 /// The data of a fit, and what is known to be true.
+#[derive(Clone)]
 pub struct Measured {
     /// Times of the frames, M.
     pub times: Vec<f64>,
@@ -47,6 +48,16 @@ impl Measured {
             leakage: None,
             true_leakage: None,
         }
+    }
+
+    /// A light curve before a background (Jy, in the order of its data), which the emission does not explain.
+    #[must_use]
+    pub fn before(&self, background: Vec<f64>) -> Self {
+        let mut copy = self.clone();
+        if let Some(curve) = &mut copy.curve {
+            curve.background = Some(background);
+        }
+        copy
     }
 
     /// The data alone.

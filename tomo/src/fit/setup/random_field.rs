@@ -9,6 +9,7 @@ use crate::representation::Spline;
 const TRUTH: u64 = 0x7472_7574_6800_0000;
 
 /// A random field that is nowhere negative.
+#[derive(Clone)]
 pub(super) struct RandomField {
     splines: Spline,
     /// Factors of the B-splines, emission.

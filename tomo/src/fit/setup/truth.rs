@@ -16,6 +16,7 @@ use kerrlight_geodesic::vector::distance;
 pub(super) const SPOT: &str = "add a table [[truth.spot]] with `center = [x, y, z]` and `sigma = …` in M and `amplitude = 1.0`";
 
 /// The emission that is simulated.
+#[derive(Clone)]
 pub struct Truth {
     spots: Vec<Spot>,
     glyphs: Vec<Glyph>,

@@ -1,0 +1,158 @@
+//! What a source shines with beside the flare: in each Stokes parameter a constant and a stationary process, Gaussian and
+//! independent of each other, whose values no one knows and whose sizes are assumed.
+//!
+//! Dividing data and rows by the factor of its covariance leaves a problem with white noise. The data that are used come
+//! first, so that the others have no part in theirs.
+
+use super::field::{part, some};
+use super::{Band, CurveRows};
+use crate::Error;
+use crate::fit::linear::Roughness;
+use nalgebra::{DMatrix, DVector};
+
+/// Light that no flare explains, of the same size in each Stokes parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Background {
+    /// Standard deviation of what is constant, Jy.
+    pub constant: f64,
+    /// Standard deviation of what varies, Jy.
+    pub variation: f64,
+    /// Correlation time τ of what varies, minutes.
+    pub minutes: f64,
+    /// ν of the Matérn covariance of what varies: exp(−s) with s = |t − t′|/τ, a damped random walk, or
+    /// (1 + √5 s + 5 s²/3) exp(−√5 s).
+    pub roughness: Roughness,
+}
+
+impl Background {
+    /// Darkness.
+    pub const NONE: Self =
+        Self { constant: 0.0, variation: 0.0, minutes: 1.0, roughness: Roughness::Half };
+
+    fn is_none(&self) -> bool {
+        self.constant == 0.0 && self.variation == 0.0
+    }
+
+    /// Itself, if its numbers are in their ranges.
+    pub(super) fn checked(self) -> Result<Self, Error> {
+        let ok = |x: f64| x >= 0.0 && x.is_finite();
+        for (field, value) in [("constant", self.constant), ("variation", self.variation)] {
+            if !ok(value) {
+                return Err(Error::out_of_range(field, value, "0 or above"));
+            }
+        }
+        match self.minutes > 0.0 && self.minutes.is_finite() {
+            true => Ok(self),
+            false => Err(Error::out_of_range("minutes", self.minutes, "above 0")),
+        }
+    }
+
+    /// Covariance of two values that are so many minutes apart, Jy².
+    fn covariance(&self, apart: f64) -> f64 {
+        let s = apart.abs() / self.minutes;
+        let correlation = match self.roughness {
+            Roughness::Half => (-s).exp(),
+            Roughness::FiveHalves => {
+                let root = 5f64.sqrt() * s;
+                (1.0 + root + root * root / 3.0) * (-root).exp()
+            }
+        };
+        self.constant.powi(2) + self.variation.powi(2) * correlation
+    }
+}
+
+/// When the data of a light curve were taken, and how well.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sampling {
+    /// Minutes of the samples, from any time on.
+    pub minutes: Vec<f64>,
+    /// One over the standard deviation of each number, 1/Jy, sample by sample; 0 where there is none.
+    pub scales: Vec<f64>,
+}
+
+impl Sampling {
+    /// Numbers of a sample.
+    fn parameters(&self) -> usize {
+        self.scales.len() / self.minutes.len().max(1)
+    }
+
+    /// The covariance of all data over their standard deviations.
+    fn covariance(&self, background: &Background) -> DMatrix<f64> {
+        let (data, count) = (self.scales.len(), self.parameters());
+        DMatrix::from_fn(data, data, |a, b| match a % count == b % count {
+            true => {
+                let apart = self.minutes[a / count] - self.minutes[b / count];
+                background.covariance(apart) * self.scales[a] * self.scales[b]
+            }
+            false => 0.0,
+        })
+    }
+}
+
+/// Some data over the factor of the covariance that noise and background give them.
+pub(super) struct Whitening {
+    factor: Option<DMatrix<f64>>,
+    /// Of that covariance, over the standard deviations of the data.
+    pub ln_determinant: f64,
+}
+
+impl Whitening {
+    /// Of the data with these numbers.
+    pub fn new(curve: &CurveRows, background: &Background, used: &[usize]) -> Result<Self, Error> {
+        let background = background.checked()?;
+        if background.is_none() {
+            return Ok(Self { factor: None, ln_determinant: 0.0 });
+        }
+        let mut matrix = part(&curve.sampling.covariance(&background), used, used);
+        (0..used.len()).for_each(|k| matrix[(k, k)] += 1.0);
+        let wild = || Error::out_of_range("constant", background.constant, "smaller numbers");
+        let factor = matrix.cholesky().ok_or_else(wild)?.unpack();
+        let ln_determinant = 2.0 * factor.diagonal().iter().map(|x| x.ln()).sum::<f64>();
+        Ok(Self { factor: Some(factor), ln_determinant })
+    }
+
+    /// Columns over the factor.
+    pub fn columns(&self, columns: DMatrix<f64>) -> DMatrix<f64> {
+        match &self.factor {
+            None => columns,
+            Some(factor) => {
+                factor.solve_lower_triangular(&columns).unwrap_or_else(|| columns * f64::NAN)
+            }
+        }
+    }
+
+    /// A covariance over the factor from both sides.
+    pub fn covariance(&self, covariance: &DMatrix<f64>) -> DMatrix<f64> {
+        match &self.factor {
+            None => covariance.clone(),
+            Some(_) => self.columns(self.columns(covariance.clone()).transpose()),
+        }
+    }
+}
+
+impl CurveRows {
+    /// The covariance that the background of a band gives all data, over their standard deviations.
+    pub(super) fn of_background(&self, background: &Background) -> DMatrix<f64> {
+        self.sampling.covariance(background)
+    }
+}
+
+/// What the background is expected to be at all data (over their standard deviations), given those that are used and a
+/// band; 0 where the data have no standard deviation.
+///
+/// # Errors
+/// If the band has no node.
+pub fn expected_background(
+    curve: &CurveRows,
+    data: &[f64],
+    band: &Band,
+) -> Result<Vec<f64>, Error> {
+    let used = curve.numbers(true);
+    let all: Vec<usize> = (0..curve.data()).collect();
+    let own = curve.of_background(&band.background);
+    let none = || Error::out_of_range("radius of the band", band.radius, "that of any node");
+    let mut together = part(&(curve.seen(band).ok_or_else(none)?.full(band) + &own), &used, &used);
+    (0..used.len()).for_each(|k| together[(k, k)] += 1.0);
+    let solved: DVector<f64> = together.cholesky().ok_or_else(none)?.solve(&some(data, &used));
+    Ok((part(&own, &all, &used) * solved).as_slice().to_vec())
+}
