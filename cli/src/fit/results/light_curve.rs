@@ -58,7 +58,7 @@ impl Estimate<'_> {
         for parameter in &curve.parameters {
             write!(text, ",{0},sigma_{0},model_{0}", parameter.name())?;
             if curve.background.is_some() {
-                write!(text, ",background_{}", parameter.name())?;
+                write!(text, ",background_{0},sigma_background_{0}", parameter.name())?;
             }
         }
         let count = curve.parameters.len();
@@ -71,8 +71,9 @@ impl Estimate<'_> {
                 match &curve.background {
                     None => write!(text, ",{flux},{sigma},{}", seen[k])?,
                     Some(background) => {
-                        let model = f64::from(seen[k]) + background[k];
-                        write!(text, ",{flux},{sigma},{model},{}", background[k])?;
+                        let [value, deviation] = background[k];
+                        let model = f64::from(seen[k]) + value;
+                        write!(text, ",{flux},{sigma},{model},{value},{deviation}")?;
                     }
                 }
             }
@@ -97,9 +98,9 @@ impl Estimate<'_> {
                     marks: Marks::Line,
                 }
             };
-            series.push(line("model", &|k| f64::from(seen[k]) + curve.background_at(k)));
+            series.push(line("model", &|k| f64::from(seen[k]) + curve.background_at(k)[0]));
             if curve.background.is_some() {
-                series.push(line("background", &|k| curve.background_at(k)));
+                series.push(line("background", &|k| curve.background_at(k)[0]));
             }
             let data = curve.hours.iter().zip(curve.data[plane..].iter().step_by(count));
             let measured: Vec<[f64; 3]> =

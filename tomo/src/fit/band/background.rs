@@ -8,7 +8,7 @@ use super::field::{part, some};
 use super::{Band, CurveRows};
 use crate::Error;
 use crate::fit::linear::Roughness;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 /// Light that no flare explains, of the same size in each Stokes parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -137,8 +137,8 @@ impl CurveRows {
     }
 }
 
-/// What the background is expected to be at all data (over their standard deviations), given those that are used and a
-/// band; 0 where the data have no standard deviation.
+/// What the background is expected to be at all data, and its standard deviation (both over those of the data), given the
+/// data that are used and a band; 0 where the data have no standard deviation.
 ///
 /// # Errors
 /// If the band has no node.
@@ -146,13 +146,20 @@ pub fn expected_background(
     curve: &CurveRows,
     data: &[f64],
     band: &Band,
-) -> Result<Vec<f64>, Error> {
+) -> Result<Vec<[f64; 2]>, Error> {
     let used = curve.numbers(true);
     let all: Vec<usize> = (0..curve.data()).collect();
     let own = curve.of_background(&band.background);
     let none = || Error::out_of_range("radius of the band", band.radius, "that of any node");
     let mut together = part(&(curve.seen(band).ok_or_else(none)?.full(band) + &own), &used, &used);
     (0..used.len()).for_each(|k| together[(k, k)] += 1.0);
-    let solved: DVector<f64> = together.cholesky().ok_or_else(none)?.solve(&some(data, &used));
-    Ok((part(&own, &all, &used) * solved).as_slice().to_vec())
+    let together = together.cholesky().ok_or_else(none)?;
+    let across = part(&own, &used, &all);
+    let solved = together.solve(&across);
+    let expected = solved.tr_mul(&some(data, &used));
+    let deviation = |k: usize| {
+        let variance = own[(k, k)] - across.column(k).dot(&solved.column(k));
+        variance.max(0.0).sqrt()
+    };
+    Ok(all.iter().map(|k| [expected[*k], deviation(*k)]).collect())
 }

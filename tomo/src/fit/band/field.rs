@@ -43,7 +43,7 @@ impl CurveRows {
         let [moments, own] = self.moments(&parts, [&across, &upright], round[1]);
         let (total, own_total) = self.total(&parts, [&across, &upright], round[0]);
         let uniform = self.uniform([&across, &upright]);
-        let covariance = &parts * parts.transpose();
+        let covariance = parts.transpose() * &parts;
         Some(Seen { covariance, uniform, moments, own, total, own_total })
     }
 
@@ -63,23 +63,26 @@ impl CurveRows {
         (0..=2 * count).map(|wave| all[wave.div_ceil(2)].sqrt()).collect()
     }
 
-    /// Data × parts of the field, each of unit variance: function of the azimuth by function, layer parts by ring parts.
+    /// Parts of the field × data, each part of unit variance: function of the azimuth by function, layer parts by ring parts.
     fn parts(&self, across: &DMatrix<f64>, upright: &DMatrix<f64>, round: &[f64]) -> DMatrix<f64> {
-        let (data, layers) = (self.data(), self.grid.layers);
+        let (data, layers, rings) = (self.data(), self.grid.layers, across.ncols());
         let waves = self.waves.columns(0, round.len() * data * layers);
-        let of_rings = across.tr_mul(&waves);
-        let each = across.ncols() * upright.ncols();
-        let mut parts = DMatrix::zeros(data, round.len() * each);
-        for (wave, deviation) in round.iter().enumerate() {
-            for datum in 0..data {
-                let of_layers = of_rings.columns((wave * data + datum) * layers, layers);
-                let both = of_layers * upright * *deviation;
-                for (k, part) in both.iter().enumerate() {
-                    parts[(datum, wave * each + k)] = *part;
+        // `tr_mul` is a product of columns one by one, and slower than a transpose and a product.
+        let of_rings = across.transpose() * waves;
+        let (all, each) = (round.len() * rings * upright.ncols(), rings * upright.ncols());
+        let mut parts = vec![0.0; all * data];
+        // Matrices this small cost more to allocate than to multiply.
+        for (place, of_layers) in of_rings.as_slice().chunks_exact(rings * layers).enumerate() {
+            let (wave, datum) = (place / data, place % data);
+            let start = datum * all + wave * each;
+            for (column, part) in parts[start..start + each].chunks_exact_mut(rings).enumerate() {
+                for (layer, of_layer) in of_layers.chunks_exact(rings).enumerate() {
+                    let factor = upright[(layer, column)] * round[wave];
+                    part.iter_mut().zip(of_layer).for_each(|(sum, x)| *sum += factor * x);
                 }
             }
         }
-        parts
+        DMatrix::from_vec(all, data, parts)
     }
 
     /// Covariances of the moments with the data and with each other.
@@ -98,7 +101,7 @@ impl CurveRows {
         };
         let (weights, each) = ([1, 2].map(of_power), across.parts.ncols() * up.len());
         let of = |k: usize| (&weights[k / 2], k % 2);
-        let column = |k: usize| parts.columns((1 + of(k).1) * each, each) * of(k).0;
+        let column = |k: usize| parts.rows((1 + of(k).1) * each, each).tr_mul(of(k).0);
         let moments = DMatrix::from_columns(&[0, 1, 2, 3].map(column));
         let own = |a: usize, b: usize| match of(a).1 == of(b).1 {
             true => of(a).0.dot(of(b).0),
@@ -119,7 +122,7 @@ impl CurveRows {
         let up = upright.parts.row_sum().transpose() * first;
         let weights = DVector::from_column_slice((&ring * up.transpose()).as_slice());
         let of_one = across.envelope.dot(&rings) * upright.envelope.sum();
-        (parts.columns(0, weights.len()) * &weights, [weights.norm_squared(), of_one])
+        (parts.rows(0, weights.len()).tr_mul(&weights), [weights.norm_squared(), of_one])
     }
 
     /// What a field of 1 gives.

@@ -38,26 +38,30 @@ pub struct Interval {
 }
 
 /// Where bands have their emission, given the data that are used (over their standard deviations). Bands come with the ln of
-/// their weights; those of the same radius, width, length and background one after the other.
+/// their weights; those of the same radius, width and length one after the other, among these those of the same background.
 ///
 /// # Errors
 /// If a band has no node.
 pub fn places(curve: &CurveRows, data: &[f64], bands: &[(Band, f64)]) -> Result<Vec<Place>, Error> {
     let used = curve.numbers(true);
     let values = some(data, &used);
-    let alike =
-        |a: &(Band, f64), b: &(Band, f64)| Band { power: b.0.power, mean: b.0.mean, ..a.0 } == b.0;
+    let alike = |a: &(Band, f64), b: &(Band, f64)| {
+        let Band { radius, width, length, .. } = a.0;
+        Band { radius, width, length, ..b.0 } == b.0
+    };
     let mut all = Vec::new();
     for bands in bands.chunk_by(alike) {
-        let band = bands[0].0;
-        let none = || Error::out_of_range("radius of the band", band.radius, "that of any node");
-        let whitening = Whitening::new(curve, &band.background, &used)?;
-        let seen = curve.seen(&band).ok_or_else(none)?;
-        let seen = Used::new(&seen, (&used, &values), &whitening);
-        for bands in bands.chunk_by(|a, b| a.0.power == b.0.power) {
-            let lower = Lower::new(&seen.covariance, bands[0].0.power).ok_or_else(none)?;
-            let columns = lower.solved(&seen.columns);
-            all.extend(bands.iter().map(|(band, ln)| seen.place(&columns, band, *ln)));
+        let none =
+            || Error::out_of_range("radius of the band", bands[0].0.radius, "that of any node");
+        let field = curve.seen(&bands[0].0).ok_or_else(none)?;
+        for bands in bands.chunk_by(|a, b| a.0.background == b.0.background) {
+            let whitening = Whitening::new(curve, &bands[0].0.background, &used)?;
+            let seen = Used::new(&field, (&used, &values), &whitening);
+            for bands in bands.chunk_by(|a, b| a.0.power == b.0.power) {
+                let lower = Lower::new(&seen.covariance, bands[0].0.power).ok_or_else(none)?;
+                let columns = lower.solved(&seen.columns);
+                all.extend(bands.iter().map(|(band, ln)| seen.place(&columns, band, *ln)));
+            }
         }
     }
     Ok(all)

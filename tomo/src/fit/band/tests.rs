@@ -333,7 +333,10 @@ fn exact_expected_background() {
         let [background, other] = [&roots[0] * white(), &roots[1] * white()];
         let data: Vec<f64> = (&background + other).as_slice().to_vec();
         let expected = expected_background(&curve, &data, &truth).unwrap();
-        let off = |k: usize| (background[k] - expected[k]).powi(2) / left[(k, k)];
+        let off = |k: usize| (background[k] - expected[k][0]).powi(2) / left[(k, k)];
+        for (k, [_, deviation]) in expected.iter().enumerate() {
+            assert!((deviation.powi(2) / left[(k, k)] - 1.0).abs() < 1e-6);
+        }
         sum += (0..n).map(off).sum::<f64>() / n as f64;
     }
     assert!((sum / f64::from(draws) - 1.0).abs() < 0.1, "{}", sum / f64::from(draws));

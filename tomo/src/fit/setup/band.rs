@@ -2,12 +2,12 @@
 
 use super::{Curve, Instrument, Measured, Result, axis, forward_model, hours_per_m, motion};
 use crate::dynamics::AngularVelocity;
-use crate::fit::Motion;
 use crate::fit::band::{
     Background, Band, BandPrior, CurveRows, Interval, PolarGrid, Sampling, UNLIKELY, Weighed,
     evidence, expected_background, places, together, validation, without_flare,
 };
 use crate::fit::settings::{BackgroundSettings, BandSettings, FitError, FitFile, refuse};
+use crate::fit::{FluxDatum, Motion};
 use crate::polarization::StokesParameter;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -51,8 +51,9 @@ pub struct BandScan {
     pub ln_bayes_factor: f64,
     /// Periods of the orbit in minutes, world by world and radius by radius; infinite where matter stands still.
     pub periods_min: Vec<Vec<f64>>,
-    /// What the background is expected to be at all data in the best world, Jy; none if there is none.
-    pub background: Option<Vec<f64>>,
+    /// What the background is expected to be at all data in the best world and its standard deviation, Jy; none if there is
+    /// none.
+    pub background: Option<Vec<FluxDatum>>,
 }
 
 /// Told how many worlds are done; says whether to go on.
@@ -140,14 +141,19 @@ fn ln_bayes_factor(
     Ok(most + (with / prior).ln() - without)
 }
 
-/// What the background is expected to be in a world, Jy, as the data have it.
-fn expected(rows: &CurveRows, curve: &Curve, data: &[f64], world: &BandWorld) -> Result<Vec<f64>> {
-    let mut all = expected_background(rows, data, &world.band)?;
-    for (value, datum) in all.iter_mut().zip(&curve.data) {
-        *value *= datum.map_or(0.0, |[_, sigma]| sigma);
-    }
-    turn(&mut all, -world.position_angle_deg);
-    Ok(all)
+/// What the background is expected to be in a world and its standard deviation, Jy, as the data have it.
+fn expected(
+    rows: &CurveRows,
+    curve: &Curve,
+    data: &[f64],
+    world: &BandWorld,
+) -> Result<Vec<FluxDatum>> {
+    let all = expected_background(rows, data, &world.band)?;
+    let sigma = |datum: &Option<FluxDatum>| datum.map_or(0.0, |[_, sigma]| sigma);
+    let scaled = |part: usize| all.iter().zip(&curve.data).map(move |(x, d)| x[part] * sigma(d));
+    let mut values: Vec<f64> = scaled(0).collect();
+    turn(&mut values, -world.position_angle_deg);
+    Ok(values.into_iter().zip(scaled(1)).map(|(value, deviation)| [value, deviation]).collect())
 }
 
 /// Azimuth and radius of the emission, in all worlds that are likely.

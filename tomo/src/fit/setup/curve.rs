@@ -15,8 +15,9 @@ pub struct Curve {
     pub data: Vec<Option<FluxDatum>>,
     /// Frames that are fitted; the others judge the fit.
     pub fitted: Vec<bool>,
-    /// What shines beside the emission that is fitted, Jy, in the order of the data; none where nothing does.
-    pub background: Option<Vec<f64>>,
+    /// What shines beside the emission that is fitted and its standard deviation, Jy, in the order of the data; none where
+    /// nothing does.
+    pub background: Option<Vec<FluxDatum>>,
 }
 
 impl Curve {
@@ -43,13 +44,14 @@ impl Curve {
         let count = self.parameters.len();
         let of = |k: usize| {
             let [flux, sigma] = self.data[k].filter(|_| self.fitted[k / count] == fitted)?;
-            Some([flux - self.background_at(k), sigma])
+            let [background, deviation] = self.background_at(k);
+            Some([flux - background, sigma.hypot(deviation)])
         };
         StokesCurveTerm::new(count, (0..self.data.len()).map(of).collect())
     }
 
-    /// What shines beside the emission that is fitted at a number of the data, Jy.
-    pub fn background_at(&self, k: usize) -> f64 {
-        self.background.as_ref().map_or(0.0, |background| background[k])
+    /// What shines beside the emission that is fitted at a number of the data, and its standard deviation, Jy.
+    pub fn background_at(&self, k: usize) -> FluxDatum {
+        self.background.as_ref().map_or([0.0; 2], |background| background[k])
     }
 }

@@ -3,6 +3,7 @@
 use super::Truth;
 use super::curve::Curve;
 use super::leakage::LeakageUnknown;
+use crate::fit::FluxDatum;
 use crate::frames::Frames;
 use crate::interferometry::gains::{GainPriors, GainTable};
 use crate::interferometry::observation::Observation;
@@ -50,9 +51,10 @@ impl Measured {
         }
     }
 
-    /// A light curve before a background (Jy, in the order of its data), which the emission does not explain.
+    /// A light curve before a background (Jy with its standard deviation, in the order of its data), which the emission does
+    /// not explain.
     #[must_use]
-    pub fn before(&self, background: Vec<f64>) -> Self {
+    pub fn before(&self, background: Vec<FluxDatum>) -> Self {
         let mut copy = self.clone();
         if let Some(curve) = &mut copy.curve {
             curve.background = Some(background);
