@@ -247,12 +247,22 @@ fn experiments_are_listed_and_mistakes_are_named() {
     assert!(fail(at, &["compare", "rates.toml", "--only", "rate=3"]).contains("levels of rate"));
 }
 
+/// Q and U of a night.
+const POLARIZED: &str = "ER6_SGRA_2017_097_hi_hops_netcal_LMTcal_10s_ALMArot_dtermcal.uvfits";
+
 /// What an experiment with public data has to be told; none, and says so, where the data are not there.
 fn on_public_data(name: &str) -> Option<Vec<String>> {
     let file = match name {
         "m87-2017" => "SR1_M87_2017_100_hi_hops_netcal_StokesI.uvfits",
         "sgra-2017" | "sgra-2017-motion" => {
             "ER6_SGRA_2017_097_hi_hops_netcal-LMTcal-besttime_StokesI.uvfits"
+        }
+        "sgra-2017-polarimetry" => {
+            let path = static_sky::data(POLARIZED)?;
+            return Some(vec![
+                "--set".to_owned(),
+                format!("data.light-curve.path={}", path.display()),
+            ]);
         }
         _ => return Some(Vec::new()),
     };

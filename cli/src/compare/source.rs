@@ -42,6 +42,7 @@ const CARRIED: &[(&str, &str)] = &carried![
     "experiments/m87-2017.toml",
     "experiments/sgra-2017.toml",
     "experiments/sgra-2017-motion.toml",
+    "experiments/sgra-2017-polarimetry.toml",
     "experiments/fits/first_pattern.toml",
     "experiments/fits/second_pattern.toml",
     "experiments/fits/digits.toml",
@@ -53,6 +54,7 @@ const CARRIED: &[(&str, &str)] = &carried![
     "scenes/fits/m87_image.toml",
     "scenes/fits/sgra_image.toml",
     "scenes/fits/sgra_motion.toml",
+    "scenes/fits/sgra_polarimetry.toml",
     "cli/src/fit/built_in.toml",
 ];
 

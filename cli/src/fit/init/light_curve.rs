@@ -66,11 +66,33 @@ pub fn of_light_curve(curve: &LightCurve, path: &str, name: &str) -> anyhow::Res
         ("average", fitted.average.to_string()),
         ("errors", format!("sigma = {errors} #! {}", sigma.1)),
         ("steady", all(&mean)),
+        (
+            "steadiness",
+            match polarized {
+                true => "the middle of what may not move (band.background)",
+                false => "what does not move is taken to be as bright as that",
+            }
+            .to_owned(),
+        ),
+        ("background", if polarized { background(scatter) } else { String::new() }),
         ("stokes", format!("[{}]", names.join(", "))),
         ("upper", "10.0".to_owned()),
         ("angles", format!("[{}]", if polarized { turned.join(", ") } else { "0.0".to_owned() })),
     ];
     complete(include_str!("light_curve.toml"), &fields)
+}
+
+/// A background about as bright as what varies in the data, Jy.
+fn background(scatter: f64) -> String {
+    let [constant, variation] = [scatter, 0.4 * scatter].map(digits);
+    format!(
+        "
+[band.background]
+constant_jy = {constant} #! what does not move differs from the mean by as much as the data vary
+variation_jy = [{variation}] #! a part of what varies does not orbit
+correlation_min = [20.0, 80.0] #! the source varies within such times
+matern = [\"1/2\"] #! a damped random walk"
+    )
 }
 
 impl Fitted {

@@ -85,7 +85,12 @@ impl Evidence<'_> {
         let model = self.model_visibilities(movie)?;
         let mut terms = Vec::new();
         for ((loss, name), statistics) in ordered(self.losses).zip(names).zip(statistics) {
-            let errors = self.file.map_or(Errors::Stated, |file| errors(file, loss.data));
+            let shared = self.measured.curve.as_ref().is_some_and(|c| c.background.is_some());
+            let errors = match self.file {
+                _ if shared => Errors::Shared,
+                Some(file) => errors(file, loss.data),
+                None => Errors::Stated,
+            };
             let mut tested = Tested::gaussian(statistics, errors);
             if tested.errors != Errors::Weight
                 && let Some(model) = &model
@@ -173,6 +178,7 @@ impl Judged {
         let errors = match errors {
             Errors::Known => "noise",
             Errors::Stated => "stated",
+            Errors::Shared => "shared",
             Errors::Assumed => "assumed",
             Errors::Weight => "weight",
         };

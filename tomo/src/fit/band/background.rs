@@ -8,7 +8,7 @@ use super::field::{part, some};
 use super::{Band, CurveRows};
 use crate::Error;
 use crate::fit::linear::Roughness;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// Light that no flare explains, of the same size in each Stokes parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,6 +45,24 @@ impl Background {
             true => Ok(self),
             false => Err(Error::out_of_range("minutes", self.minutes, "above 0")),
         }
+    }
+
+    /// One that is drawn at some times (minutes), from numbers of a normal distribution: as many.
+    ///
+    /// # Errors
+    /// If a number of it is out of its range.
+    pub fn drawn(self, minutes: &[f64], normal: &[f64]) -> Result<Vec<f64>, Error> {
+        let background = self.checked()?;
+        let scale = background.constant.hypot(background.variation).max(f64::MIN_POSITIVE);
+        let entry = |a: usize, b: usize| {
+            // Smooth processes have covariances that are singular to rounding.
+            let own = if a == b { 1e-10 } else { 0.0 };
+            background.covariance(minutes[a] - minutes[b]) / scale.powi(2) + own
+        };
+        let factor = DMatrix::from_fn(minutes.len(), minutes.len(), entry).cholesky();
+        let wild = || Error::out_of_range("minutes", background.minutes, "times that differ");
+        let light = factor.ok_or_else(wild)?.unpack() * DVector::from_row_slice(normal) * scale;
+        Ok(light.as_slice().to_vec())
     }
 
     /// Covariance of two values that are so many minutes apart, Jy².

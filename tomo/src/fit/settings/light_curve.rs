@@ -1,6 +1,7 @@
 //! Light curves in Stokes parameters: simulated, or read from a file.
 
 use super::Noise;
+use crate::fit::linear::Roughness;
 use crate::polarization::StokesParameter;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -52,12 +53,29 @@ pub struct SimulatedCurve {
     pub sigma: PerStokes,
     /// Noise that is added.
     pub noise: Noise,
+    /// What shines beside the truth in Q and U; nothing, without.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub background: Option<SimulatedBackground>,
     /// What the truth is scaled to; as bright as its amplitudes say, without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_flux: Option<MeanFlux>,
     /// Samples later than this many minutes after the first are not fitted: they judge the fit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub validate_after_min: Option<f64>,
+}
+
+/// A background that is drawn, in Q and in U independent of each other.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SimulatedBackground {
+    /// Standard deviation of a constant, Jy.
+    pub constant_jy: f64,
+    /// Standard deviation of what varies about it, Jy.
+    pub variation_jy: f64,
+    /// Its correlation time, minutes.
+    pub correlation_min: f64,
+    /// ν of its Matérn covariance.
+    pub matern: Roughness,
 }
 
 /// A mean of I.

@@ -32,7 +32,7 @@ pub use faraday::FaradaySettings;
 pub use gaussian::{FieldKind, FieldSettings, Negative, PriorOfVoxels};
 pub use held_out::{HeldOutSettings, Weight};
 pub use instrument::{GainPhases, GainSettings, InstrumentSettings, LeakageSettings};
-pub use light_curve::{MeanFlux, MeasuredCurve, PerStokes, SimulatedCurve};
+pub use light_curve::{MeanFlux, MeasuredCurve, PerStokes, SimulatedBackground, SimulatedCurve};
 pub use penalties::{PenaltyKind, PenaltySettings, ProbeSettings};
 pub use quiescent::QuiescentSettings;
 pub use recovery::{

@@ -190,6 +190,9 @@ fn direction(inclination_deg: f64) -> f64 {
 }
 
 fn check(file: &FitFile, settings: &BandSettings, curve: &Curve) -> Result<()> {
+    if let Some(background) = &settings.background {
+        check_background(background, curve)?;
+    }
     prior(settings).checked()?;
     let range = |key: &str, value: f64, allowed| {
         Err(FitError::range(format!("band.{key}"), value, allowed).into())
@@ -219,9 +222,6 @@ fn check(file: &FitFile, settings: &BandSettings, curve: &Curve) -> Result<()> {
         refuse!(
             "band.position_angles_deg needs loss.0.stokes = [\"Q\", \"U\"] with the same error of both"
         );
-    }
-    if let Some(background) = &settings.background {
-        check_background(background, curve)?;
     }
     axis(file).map(drop)
 }

@@ -3,8 +3,10 @@
 use super::curve::Curve;
 use super::seen::seen;
 use super::{Instrument, Measured, Result, Truth, hours_per_m, motion};
+use crate::fit::band::Background;
 use crate::fit::settings::{
-    DataFiles, FitError, FitFile, MeasuredCurve, Noise, PerStokes, SimulatedCurve, Within, refuse,
+    DataFiles, FitError, FitFile, MeasuredCurve, Noise, PerStokes, SimulatedBackground,
+    SimulatedCurve, Within, refuse,
 };
 use crate::fit::{FluxDatum, Seen};
 use crate::interferometry::light_curve::LightCurve;
@@ -148,11 +150,42 @@ pub(super) fn simulate(
     }
     let mut fluxes = truth.movie_through(&mut instrument.summed(&motion, &parameters)?);
     truth.rings.add_to_fluxes(&mut fluxes, &parameters);
+    if let Some(background) = &settings.background {
+        add_background(&mut fluxes, (&parameters, &hours), background, file.seed)?;
+    }
     let data = measure(&fluxes, &parameters, settings, file.seed)?;
     let movie = Some(truth.movie(file, instrument, &times)?);
     let fitted = fitted(&hours, settings.validate_after_min)?;
     let curve = Some(Curve { parameters, hours, data, fitted, background: None });
     Ok(Measured { times, movie, curve, truth: Some(truth), ..Measured::empty() })
+}
+
+/// Adds a draw of a background to Q and U.
+fn add_background(
+    fluxes: &mut [f64],
+    (parameters, hours): (&[StokesParameter], &[f64]),
+    settings: &SimulatedBackground,
+    seed: u64,
+) -> Result<()> {
+    let SimulatedBackground { constant_jy, variation_jy, correlation_min, matern } = *settings;
+    let background = Background {
+        constant: constant_jy,
+        variation: variation_jy,
+        minutes: correlation_min,
+        roughness: matern,
+    };
+    let minutes: Vec<f64> = hours.iter().map(|hour| 60.0 * hour).collect();
+    let mut random = Pcg64Mcg::seed_from_u64(seed ^ 0xbac6_0d17);
+    for (place, parameter) in parameters.iter().enumerate() {
+        let normal: Vec<f64> = hours.iter().map(|_| random.sample(StandardNormal)).collect();
+        if !matches!(parameter, StokesParameter::Q | StokesParameter::U) {
+            continue;
+        }
+        let light = background.drawn(&minutes, &normal).within("light_curve.background")?;
+        let own = fluxes.iter_mut().skip(place).step_by(parameters.len());
+        own.zip(light).for_each(|(flux, light)| *flux += light);
+    }
+    Ok(())
 }
 
 fn hours(settings: &SimulatedCurve) -> Result<Vec<f64>> {

@@ -171,3 +171,78 @@ fn regress_light_curves_that_mean_nothing_are_refused() {
     let text = Instrument::new(&plain).err().unwrap().to_string();
     assert!(text.contains("polarization is missing: Q and U need the field"), "{text}");
 }
+
+/// A tube before a background that is drawn: the world is found, and data without a flare to speak of ask for none.
+#[test]
+fn exact_a_flare_before_a_background() {
+    let set = [
+        "screen.pixels=32",
+        "band.nodes=24",
+        "band.widths=[2.0]",
+        "band.lengths=[4.0]",
+        "light_curve.sigma={I=0.15, Q=0.004, U=0.004}",
+        "light_curve.background={constant_jy=0.2, variation_jy=0.02, correlation_min=60.0, matern=\"1/2\"}",
+        "band.background={constant_jy=0.2, variation_jy=[0.0, 0.02, 0.05], correlation_min=[20.0, 60.0], matern=[\"1/2\", \"5/2\"]}",
+    ];
+    let scan = |jy: f64| {
+        let flux = format!("light_curve.mean_flux.jy={jy}");
+        let mut file = file(PUBLISHED, &[&set[..], &[&flux]].concat());
+        let band = file.band.as_mut().unwrap();
+        band.inclinations_deg = Steps { from: 12.0, to: 52.0, step: 20.0 };
+        band.radii = Steps { from: 8.0, to: 12.0, step: 2.0 };
+        let (_, measured) = simulated(&file);
+        let settings = file.band.clone().unwrap();
+        let found = setup::scan_band(&file, &measured, &settings, &|_| true).unwrap().unwrap();
+        (measured, found)
+    };
+    let (measured, found) = scan(0.3);
+    let best = &found.worlds[found.best];
+    assert_eq!((best.inclination_deg, best.rotation_factor), (12.0, 1.0));
+    assert!(found.ln_bayes_factor > 20.0, "{}", found.ln_bayes_factor);
+    assert!((found.radius.low..found.radius.high).contains(&10.0), "{:?}", found.radius);
+    assert!(found.radius.high - found.radius.low < 5.0, "{:?}", found.radius);
+    // 2π 10^1.5 GM/c³, 20.46 s.
+    let of_ten = found.periods_min[found.best][1];
+    assert!((of_ten - 67.75).abs() < 0.1, "{of_ten}");
+    // Most of the light is the background's constant.
+    let background = found.background.unwrap();
+    let off = |k: usize| background[k][0] - measured.curve.as_ref().unwrap().data[k].unwrap()[0];
+    let spread = (0..background.len()).map(|k| off(k).powi(2)).sum::<f64>().sqrt();
+    let all = (background.len() as f64).sqrt();
+    assert!(spread / all < 0.2, "{}", spread / all);
+    let (_, none) = scan(0.001);
+    assert!(none.ln_bayes_factor < 3.0, "{}", none.ln_bayes_factor);
+}
+
+#[test]
+fn regress_backgrounds_that_mean_nothing_are_refused() {
+    let says = |set: &str| {
+        let file = file(PUBLISHED, &["screen.pixels=8", "band.nodes=8", set]);
+        let instrument = Instrument::new(&file).unwrap();
+        let measured = match Measured::simulated(&file, &instrument, None) {
+            Ok(measured) => measured,
+            Err(error) => return error.to_string(),
+        };
+        let settings = file.band.clone().unwrap();
+        setup::scan_band(&file, &measured, &settings, &|_| true).err().unwrap().to_string()
+    };
+    let of = |constant: &str, variation: &str, minutes: &str| {
+        says(&format!(
+            "band.background={{constant_jy={constant}, variation_jy={variation}, correlation_min={minutes}, matern=[\"1/2\"]}}"
+        ))
+    };
+    for (message, key) in [
+        (of("-1.0", "[0.1]", "[20.0]"), "band.background.constant_jy"),
+        (of("0.1", "[0.1, -0.1]", "[20.0]"), "band.background.variation_jy"),
+        (of("0.1", "[0.1]", "[0.0]"), "band.background.correlation_min"),
+        (of("0.1", "[]", "[20.0]"), "one value or more"),
+        (
+            says(
+                "light_curve.background={constant_jy=0.1, variation_jy=0.1, correlation_min=-1.0, matern=\"1/2\"}",
+            ),
+            "light_curve.background",
+        ),
+    ] {
+        assert!(message.contains(key), "{key}: {message}");
+    }
+}

@@ -36,6 +36,8 @@ pub enum Errors {
     Known,
     /// Errors that measured data state, with whatever was added for calibration.
     Stated,
+    /// Those of a background that was taken from the data: common to many data, so that χ² may well be small.
+    Shared,
     /// A number that the settings give.
     Assumed,
     /// A weight: the data have no noise.
@@ -210,7 +212,8 @@ fn judge_noisy(term: usize, tested: &Tested, chi2: f64, verdict: &mut Verdict) {
     } else {
         judge_structure(term, tested, verdict);
     }
-    if chi2 < mean - (CHANCE * spread).max(LACK * mean) {
+    let small = chi2 < mean - (CHANCE * spread).max(LACK * mean);
+    if small && tested.errors != Errors::Shared {
         verdict.add(Outcome::FitsNoise, Some(term), Fault::Small);
     }
 }
@@ -223,6 +226,9 @@ fn judge_structure(term: usize, tested: &Tested, verdict: &mut Verdict) {
         value.filter(|value| (value - expected).abs() > allowed)
     };
     let expected = tested.expected;
+    if tested.errors == Errors::Shared {
+        return;
+    }
     if let Some(mean) = beyond(tested.statistics.mean(), expected.mean, all.count) {
         verdict.add(Outcome::Unexplained, Some(term), Fault::Mean(mean));
     }

@@ -108,6 +108,16 @@ fn exact_calibration_may_be_correlated_in_time() {
     assert_eq!(verdict(slow, Errors::Known).outcome, Outcome::Unexplained);
 }
 
+/// Errors that many data share make χ² small, and residuals alike; they do not make it large.
+#[test]
+fn exact_shared_errors_are_judged_by_size_alone() {
+    let of = |size: f64| {
+        verdict(baselines(60, |frame, _, _| size * (0.3 * frame as f64).sin()), Errors::Shared)
+    };
+    assert_eq!(of(0.2).outcome, Outcome::Explained);
+    assert_eq!(of(3.0).outcome, Outcome::Unexplained);
+}
+
 /// σ of noise-free data is a weight: how much of the data is left over is what counts.
 #[test]
 fn exact_noise_free_data_are_judged_by_what_is_left_over() {

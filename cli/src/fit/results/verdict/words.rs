@@ -179,8 +179,12 @@ impl Judged {
 fn chi2_of(name: &str, tested: &Tested) -> String {
     let Expected { chi2: mean, spread, .. } = tested.expected;
     let chi2 = tested.statistics.chi2().map_or("–".to_owned(), short);
-    let assumed = if tested.errors == Errors::Assumed { " with the assumed σ" } else { "" };
-    format!("χ² {chi2} per data point of {name} ({mean:.2} ± {spread:.2} expected{assumed})")
+    let expected = match tested.errors {
+        Errors::Assumed => format!("{mean:.2} ± {spread:.2} expected with the assumed σ"),
+        Errors::Shared => format!("{mean:.2} at most expected with the errors of the background"),
+        _ => format!("{mean:.2} ± {spread:.2} expected"),
+    };
+    format!("χ² {chi2} per data point of {name} ({expected})")
 }
 
 /// Three digits.
