@@ -342,6 +342,7 @@ pub fn check(
 ) -> Result<(), Error> {
     let model = &objective.model;
     for (asked, key, what) in [
+        (training.muon.is_some(), "training.optimiser", "steps along orthogonal matrices are"),
         (training.lbfgs.is_some(), "training.optimiser", "quasi-Newton steps are"),
         (training.learns_axis(representation), "axis", "the gradient of the axis is"),
         (training.penalties.is_some(), "penalty", "penalties are"),

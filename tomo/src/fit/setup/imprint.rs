@@ -4,7 +4,7 @@ use super::{Result, linear};
 use crate::fit::linear::LinearSolution;
 use crate::fit::settings::{FitFile, Kind, refuse};
 use crate::fit::{Region, State};
-use crate::optimise::{Adam, AdamState};
+use crate::optimise::{AdamState, Muon};
 use crate::representation::{
     Activation, Coordinates, Gradient, Groups, Representation, Spline, Workspace,
 };
@@ -59,6 +59,7 @@ pub fn imprint(
         read_off(file, &solution, &mut state.now.parameters);
         return Ok(Imprinted { steps: 0, relative_error: 0.0 });
     }
+    let matrices = representation.matrices();
     let mut random = Pcg64::seed_from_u64(file.seed ^ 0x1157_a27e);
     let mut memory = AdamState::new(state.now.parameters.len());
     let (mut workspace, mut gradient) = (Workspace::new(), vec![0.0; state.now.parameters.len()]);
@@ -69,7 +70,8 @@ pub fn imprint(
             gradient.fill(0.0);
             draw.gradient(representation, &state.now.parameters, &mut gradient, &mut workspace);
             let rate = RATE * (1.0 - step as f64 / steps as f64);
-            Adam::default().step(rate, &gradient, &mut memory, &mut state.now.parameters);
+            let parameters = &mut state.now.parameters;
+            Muon::default().step(rate, &gradient, &matrices, &mut memory, parameters);
             representation.project(&mut state.now.parameters);
         }
         found.steps += steps;

@@ -9,6 +9,7 @@ pub(super) fn settings() -> Training {
     Training {
         seed: 11,
         adam: Adam::default(),
+        muon: None,
         lbfgs: None,
         rate,
         axis_rate: Some(rate),
