@@ -3,14 +3,14 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 const MUON: Muon =
-    Muon { beta: 0.95, scale: 2.0, adam: Adam { beta1: 0.9, beta2: 0.999, epsilon: 1e-8 } };
+    Muon { beta: 0.95, scale: 5.0, adam: Adam { beta1: 0.9, beta2: 0.999, epsilon: 1e-8 } };
 
 fn numbers(count: usize, seed: u64) -> Vec<f64> {
     let mut random = Pcg64::seed_from_u64(seed);
     (0..count).map(|_| random.random_range(-1.0..1.0)).collect()
 }
 
-/// Row by row; the second one transposed if asked.
+/// Of matrices that are row by row; `inner` columns of the first.
 fn product(a: &[f64], b: &[f64], rows: usize, inner: usize) -> Vec<f64> {
     let columns = b.len() / inner;
     let mut out = vec![0.0; rows * columns];
