@@ -134,10 +134,6 @@ fn bad_regularisers_and_optimisers_are_named() {
     let small = small();
     let error = fail(folder.path(), &with(&small, &["--set", "training.optimiser=lbfgs"]));
     assert!(error.contains("training.batch = \"all\""), "{error}");
-    let voxels =
-        with(&small, &["--set", "training.optimiser=muon", "--set", "representation=grid"]);
-    let error = fail(folder.path(), &voxels);
-    assert!(error.contains("muon is for the weight matrices of networks, and grid has"), "{error}");
     let bounded = ["training.optimiser=lbfgs", "training.batch=all", "representation=grid"];
     let mut words = with(&small, &["--set", "representation.activation=linear"]);
     bounded.iter().for_each(|change| words.extend(["--set", change]));

@@ -146,7 +146,7 @@ pub fn training(file: &FitFile, axis_rate: Option<Polynomial>) -> Result<Trainin
         refuse!("training.batch of 0 is not allowed: 1 or more");
     }
     let lbfgs = lbfgs(file)?;
-    let muon = muon(file)?;
+    let muon = (chosen.optimiser == Optimiser::Muon).then(Muon::default);
     let occupancy = chosen.occupancy.as_ref().map(occupancy).transpose()?;
     if occupancy.is_some() && file.representation.kind == Kind::Mlp4d {
         refuse!(
@@ -211,20 +211,6 @@ fn occupancy(chosen: &Occupancy) -> Result<OccupancyPlan> {
         warm_up,
         every: every.max(1),
     })
-}
-
-/// Steps along orthogonal matrices, if they are requested and there may be matrices.
-fn muon(file: &FitFile) -> Result<Option<Muon>> {
-    if file.training.optimiser != Optimiser::Muon {
-        return Ok(None);
-    }
-    match &file.representation.kind {
-        Kind::Bhnerf | Kind::Mlp4d | Kind::Own(_) => Ok(Some(Muon::default())),
-        other => refuse!(
-            "training.optimiser = muon is for the weight matrices of networks, and {} has none; use adam, or representation = bhnerf",
-            other.name()
-        ),
-    }
 }
 
 /// Quasi-Newton steps, if they are requested and the loss is the same at every step.
