@@ -41,6 +41,7 @@ fn training(batch: BatchSize) -> Training {
     Training {
         seed: 1,
         adam: Adam::default(),
+        muon: None,
         lbfgs: None,
         rate: Polynomial { from: 1e-3, to: 1e-5, steps: 400, power: 1.0 },
         axis_rate: None,

@@ -13,6 +13,7 @@ pub mod fit;
 pub mod frames;
 pub mod image;
 pub mod interferometry;
+mod matrix;
 pub mod memory;
 pub mod numpy;
 pub mod optimise;

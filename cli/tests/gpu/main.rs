@@ -237,6 +237,7 @@ fn code_fits_of_visibilities_are_those_of_the_processor() {
             "representation.width=16",
             "screen.pixels=12",
             "observation.scans=6",
+            "training.optimiser=adam",
             "training.steps=30",
             "training.log_every=10",
             "training.start={linear={nodes=10,stride=1,steps=100}}",

@@ -164,9 +164,13 @@ impl<T: Float> Trainer<'_, T> {
     }
 
     fn learn(&mut self, now: &mut Progress<T>, of_axis: [f64; 3]) {
-        let Training { adam, axis_rate, .. } = &self.training;
+        let Training { adam, muon, axis_rate, .. } = &self.training;
         let (part, rate) = (self.part(now, 0), self.rate(now, 0));
-        adam.step(rate, &self.gradient, &mut now.adam, &mut now.parameters);
+        let (gradient, parameters) = (&self.gradient, &mut now.parameters);
+        match muon {
+            Some(muon) => muon.step(rate, gradient, &self.matrices, &mut now.adam, parameters),
+            None => adam.step(rate, gradient, &mut now.adam, parameters),
+        }
         self.representation.project(&mut now.parameters);
         if let Some(axis_rate) = axis_rate {
             let mut moved = now.axis.vector();

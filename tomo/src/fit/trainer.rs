@@ -5,7 +5,7 @@ use super::objective::{Buffers, Objective};
 use super::parts::Ranks;
 use super::penalties::ProbeBuffers;
 use super::training::Training;
-use crate::representation::Representation;
+use crate::representation::{Representation, WeightMatrix};
 use crate::simd::Float;
 
 /// A fit with its memory.
@@ -24,6 +24,8 @@ pub struct Trainer<'a, T> {
     pub(super) buffers: Buffers<T>,
     pub(super) probe: ProbeBuffers<T>,
     pub(super) gradient: Vec<T>,
+    /// Which parameters are matrices.
+    pub(super) matrices: Vec<WeightMatrix>,
     pub(super) pairs: Vec<(u32, u32)>,
     pub(super) frames: Vec<usize>,
     /// Gradients of parts that are no longer used.
@@ -49,6 +51,7 @@ impl<'a, T: Float> Trainer<'a, T> {
             buffers: Buffers::default(),
             probe: ProbeBuffers::default(),
             gradient,
+            matrices: representation.matrices(),
             pairs: Vec::new(),
             frames: Vec::new(),
             spare: Vec::new(),

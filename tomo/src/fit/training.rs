@@ -4,7 +4,7 @@ use super::is_turned;
 use super::occupancy::OccupancySettings;
 use super::penalties::Penalties;
 use super::sightlines::Region;
-use crate::optimise::{Adam, Lbfgs, Polynomial};
+use crate::optimise::{Adam, Lbfgs, Muon, Polynomial};
 use crate::representation::Representation;
 use crate::simd::Float;
 use serde::{Deserialize, Serialize};
@@ -39,6 +39,8 @@ pub struct Training {
     pub seed: u64,
     /// Rule of the steps.
     pub adam: Adam,
+    /// Another rule for the weight matrices of networks.
+    pub muon: Option<Muon>,
     /// Quasi-Newton steps instead of Adam's, for small problems: they have no rates, need [`BatchSize::All`], and their
     /// draws are those of step 0, so that the loss is the same function at every step.
     pub lbfgs: Option<Lbfgs>,

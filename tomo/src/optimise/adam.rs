@@ -74,9 +74,22 @@ impl Adam {
         assert!(gradient.len() == count);
         assert!(state.first.len() == count && state.second.len() == count);
         state.steps += 1;
-        let constants = self.constants(rate, state.steps);
+        let moments = [&mut state.first[..], &mut state.second[..]];
+        self.update(rate, gradient, state.steps, moments, parameters);
+    }
+
+    /// Step number `steps`, counted from 1, of parameters with these moments.
+    pub(super) fn update<T: Float>(
+        &self,
+        rate: f64,
+        gradient: &[T],
+        steps: u64,
+        [first, second]: [&mut [T]; 2],
+        parameters: &mut [T],
+    ) {
+        let constants = self.constants(rate, steps);
         let set = InstructionSet::best();
-        let moments = state.first.par_chunks_mut(SHARE).zip(state.second.par_chunks_mut(SHARE));
+        let moments = first.par_chunks_mut(SHARE).zip(second.par_chunks_mut(SHARE));
         let all = parameters.par_chunks_mut(SHARE).zip(gradient.par_chunks(SHARE)).zip(moments);
         all.for_each(|((parameters, gradient), (first, second))| {
             dispatch(set, Update { constants, gradient, first, second, parameters });

@@ -6,8 +6,10 @@
 mod adam;
 mod lbfgs;
 mod line_search;
+mod muon;
 mod schedule;
 
 pub use adam::{Adam, AdamState};
 pub use lbfgs::{Lbfgs, LbfgsState, Objective, Step};
+pub use muon::Muon;
 pub use schedule::Polynomial;

@@ -41,6 +41,24 @@ pub struct Gradient<'a, T> {
     pub coordinates: Option<CoordinatesMut<'a, T>>,
 }
 
+/// Parameters that are a matrix: what a layer of a network multiplies its inputs with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WeightMatrix {
+    /// Place of its first number among the parameters; row lies behind row.
+    pub offset: usize,
+    /// Inputs, and a row of biases where there are any.
+    pub rows: usize,
+    /// Units.
+    pub columns: usize,
+}
+
+impl WeightMatrix {
+    /// Its place among the parameters.
+    pub fn range(&self) -> Range<usize> {
+        self.offset..self.offset + self.rows * self.columns
+    }
+}
+
 /// Given a range of groups and the values of their points, writes dL/dvalue of each point. Called from
 /// several threads, for every group once.
 pub type Link<'a, T> = dyn Fn(Range<usize>, &[T], &mut [T]) + Sync + 'a;
@@ -132,6 +150,12 @@ pub trait Representation<T: Float>: Send + Sync {
 
     /// Parameters to start from; the same for the same seed on every machine.
     fn initialise(&self, seed: u64, parameters: &mut [T]);
+
+    /// Which parameters are matrices that [`Muon`](crate::optimise::Muon) may take its steps of, in their order; all
+    /// others are learnt by Adam.
+    fn matrices(&self) -> Vec<WeightMatrix> {
+        Vec::new()
+    }
 
     /// Which of those that are built in it is, if it is one that devices may know.
     fn built_in(&self) -> Option<BuiltIn<'_>> {

@@ -7,7 +7,7 @@ use kerrlight_tomo::fit::graphics::GraphicsFit;
 use kerrlight_tomo::fit::{
     BatchSize, Delegate, Outcome, State, StepDevice, Stretch, Taken, Trainer, Training, checkpoint,
 };
-use kerrlight_tomo::optimise::{Lbfgs, Polynomial};
+use kerrlight_tomo::optimise::{Lbfgs, Muon, Polynomial};
 use kerrlight_tomo::representation::{Activation, Representation};
 
 /// A fit with its data, on the device or not.
@@ -216,6 +216,7 @@ fn what_is_not_done_is_named_with_its_key() {
     for (key, training) in [
         ("axis:", Training { axis_rate: rate, ..training.clone() }),
         ("training.parts:", Training { parts: 2, ..training.clone() }),
+        ("training.optimiser:", Training { muon: Some(Muon::default()), ..training.clone() }),
         ("training.optimiser:", Training { lbfgs: Some(Lbfgs::default()), ..training.clone() }),
     ] {
         let Some(device) = device() else { return };

@@ -69,6 +69,7 @@ pub fn training(batch: BatchSize, masked: bool) -> Training {
     Training {
         seed: 11,
         adam: Adam::default(),
+        muon: None,
         lbfgs: None,
         rate,
         axis_rate: None,

@@ -286,7 +286,12 @@ pub const KEYS: &[Key] = &[
     key("representation", "width", "128", "units per hidden layer"),
     key("representation", "hidden_layers", "4", "number of hidden layers"),
     key("training", "steps", "", "number of optimiser steps"),
-    key("training", "optimiser", "\"adam\"", "adam, or lbfgs, which needs batch = \"all\""),
+    key(
+        "training",
+        "optimiser",
+        "\"adam\"",
+        "adam, muon (networks), or lbfgs, which needs batch = \"all\"",
+    ),
     key("training", "rate", "", "initial learning rate of Adam; above 0"),
     key("training", "last_rate", "", "final learning rate, reached linearly"),
     key("training", "grid_rate", "5e-2", "initial learning rate of a grid; default: rate"),

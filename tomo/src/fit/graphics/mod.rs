@@ -341,7 +341,9 @@ pub fn check(
     training: &Training,
 ) -> Result<(), Error> {
     let model = &objective.model;
+    let turned = training.muon.is_some() && !representation.matrices().is_empty();
     for (asked, key, what) in [
+        (turned, "training.optimiser", "muon's steps of networks are"),
         (training.lbfgs.is_some(), "training.optimiser", "quasi-Newton steps are"),
         (training.learns_axis(representation), "axis", "the gradient of the axis is"),
         (training.penalties.is_some(), "penalty", "penalties are"),

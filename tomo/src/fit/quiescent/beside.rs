@@ -2,7 +2,7 @@
 
 use super::Quiescent;
 use crate::points::Coordinates;
-use crate::representation::{Gradient, Groups, Representation, Workspace};
+use crate::representation::{Gradient, Groups, Representation, WeightMatrix, Workspace};
 use crate::simd::Float;
 
 /// A field whose last parameters are those of a [`Quiescent`] image, which emission does not depend on.
@@ -35,6 +35,10 @@ impl<T: Float> Representation<T> for Beside<T> {
 
     fn parameters(&self) -> usize {
         self.inner.parameters() + self.columns
+    }
+
+    fn matrices(&self) -> Vec<WeightMatrix> {
+        self.inner.matrices()
     }
 
     /// The image starts dark.

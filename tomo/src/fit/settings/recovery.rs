@@ -293,6 +293,8 @@ pub enum Optimiser {
     /// Steps along the mean gradient of random parts of the data.
     #[default]
     Adam,
+    /// The same for all but the weight matrices of networks, which step along orthogonal matrices.
+    Muon,
     /// Quasi-Newton steps on all data, for small problems.
     Lbfgs,
 }

@@ -4,9 +4,9 @@ use super::{Result, linear};
 use crate::fit::linear::LinearSolution;
 use crate::fit::settings::{FitFile, Kind, refuse};
 use crate::fit::{Region, State};
-use crate::optimise::{Adam, AdamState};
+use crate::optimise::{AdamState, Muon};
 use crate::representation::{
-    Activation, Coordinates, Gradient, Groups, Representation, Spline, Workspace,
+    Activation, Coordinates, Gradient, Groups, Representation, Spline, WeightMatrix, Workspace,
 };
 use core::ops::Range;
 use rand::{RngExt, SeedableRng};
@@ -16,6 +16,8 @@ use rand_pcg::Pcg64;
 const POINTS: usize = 4096;
 /// Its first rate, which falls to nothing.
 const RATE: f64 = 2e-3;
+/// Steps over which the rate of networks grows to that.
+const RAMP: u64 = 30;
 /// Root mean square difference from the solution, over that of the solution, below which a start is good enough.
 const CLOSE: f64 = 0.05;
 /// Rounds of steps, at most: filaments take more of them than spots.
@@ -59,6 +61,7 @@ pub fn imprint(
         read_off(file, &solution, &mut state.now.parameters);
         return Ok(Imprinted { steps: 0, relative_error: 0.0 });
     }
+    let matrices = representation.matrices();
     let mut random = Pcg64::seed_from_u64(file.seed ^ 0x1157_a27e);
     let mut memory = AdamState::new(state.now.parameters.len());
     let (mut workspace, mut gradient) = (Workspace::new(), vec![0.0; state.now.parameters.len()]);
@@ -68,8 +71,10 @@ pub fn imprint(
             let draw = Draw::new(&mut random, r, &region, &solution);
             gradient.fill(0.0);
             draw.gradient(representation, &state.now.parameters, &mut gradient, &mut workspace);
-            let rate = RATE * (1.0 - step as f64 / steps as f64);
-            Adam::default().step(rate, &gradient, &mut memory, &mut state.now.parameters);
+            let fallen = RATE * (1.0 - step as f64 / steps as f64);
+            let rate = fallen * grown(found.steps + step, &matrices);
+            let parameters = &mut state.now.parameters;
+            Muon::default().step(rate, &gradient, &matrices, &mut memory, parameters);
             representation.project(&mut state.now.parameters);
         }
         found.steps += steps;
@@ -84,6 +89,12 @@ pub fn imprint(
         found.relative_error = if sums[1] > 0.0 { (sums[0] / sums[1]).sqrt() } else { 0.0 };
     }
     Ok(found)
+}
+
+/// Part of the rate at a step: matrices change as much by a small gradient as by a large one, and the first steps would
+/// turn a network off that starts in the dark.
+fn grown(step: u64, matrices: &[WeightMatrix]) -> f64 {
+    if matrices.is_empty() { 1.0 } else { ((step + 1) as f64 / RAMP as f64).min(1.0) }
 }
 
 /// What a linear problem has found.

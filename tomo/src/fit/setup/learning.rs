@@ -10,7 +10,7 @@ use crate::fit::settings::{
 };
 use crate::fit::{BatchSize, Beside, OccupancyPlan, OccupancySettings, Region, Training};
 use crate::memory;
-use crate::optimise::{Adam, Lbfgs, Polynomial};
+use crate::optimise::{Adam, Lbfgs, Muon, Polynomial};
 use crate::representation::{
     Activation, Carrier, Changing, Degree, FeatureGrid, FeatureGridSettings, Grid, GridSettings,
     Network, NetworkSettings, OwnSettings, Registry, Representation, Spline,
@@ -146,6 +146,7 @@ pub fn training(file: &FitFile, axis_rate: Option<Polynomial>) -> Result<Trainin
         refuse!("training.batch of 0 is not allowed: 1 or more");
     }
     let lbfgs = lbfgs(file)?;
+    let muon = (chosen.optimiser == Optimiser::Muon).then(Muon::default);
     let occupancy = chosen.occupancy.as_ref().map(occupancy).transpose()?;
     if occupancy.is_some() && file.representation.kind == Kind::Mlp4d {
         refuse!(
@@ -155,6 +156,7 @@ pub fn training(file: &FitFile, axis_rate: Option<Polynomial>) -> Result<Trainin
     Ok(Training {
         seed: file.seed,
         adam: Adam::default(),
+        muon,
         lbfgs,
         rate: rate.checked().within(name)?,
         axis_rate,
@@ -213,7 +215,7 @@ fn occupancy(chosen: &Occupancy) -> Result<OccupancyPlan> {
 
 /// Quasi-Newton steps, if they are requested and the loss is the same at every step.
 fn lbfgs(file: &FitFile) -> Result<Option<Lbfgs>> {
-    if file.training.optimiser == Optimiser::Adam {
+    if file.training.optimiser != Optimiser::Lbfgs {
         return Ok(None);
     }
     if file.training.batch != BatchSize::All {

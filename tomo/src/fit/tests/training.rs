@@ -1,7 +1,7 @@
 //! Steps: repeatable, resumable, and safe from divergence.
 
 use super::*;
-use crate::optimise::{Adam, Polynomial};
+use crate::optimise::{Adam, Muon, Polynomial};
 use crate::representation::{Network, NetworkSettings};
 
 pub(super) fn settings() -> Training {
@@ -9,6 +9,7 @@ pub(super) fn settings() -> Training {
     Training {
         seed: 11,
         adam: Adam::default(),
+        muon: None,
         lbfgs: None,
         rate,
         axis_rate: Some(rate),
@@ -56,8 +57,11 @@ fn run(training: &Training, state: &mut State<f32>, until: u64) -> Vec<Outcome> 
 
 #[test]
 fn regress_resumed_from_a_checkpoint_the_same_bits() {
-    for batch in [BatchSize::Pixels(30), BatchSize::Frames(2)] {
-        let training = Training { batch, ..settings() };
+    let muon = Some(Muon::default());
+    for (batch, muon) in
+        [(BatchSize::Pixels(30), None), (BatchSize::Frames(2), None), (BatchSize::Frames(2), muon)]
+    {
+        let training = Training { batch, muon, ..settings() };
         let (mut whole, mut broken) = (start(&training), start(&training));
         let losses = run(&training, &mut whole, 40);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
@@ -71,6 +75,24 @@ fn regress_resumed_from_a_checkpoint_the_same_bits() {
             (checkpoint::encode(&broken, "").unwrap(), checkpoint::encode(&whole, "").unwrap());
         assert!(again == all);
     }
+}
+
+#[test]
+fn exact_orthogonal_steps_lower_the_loss_of_whole_frames() {
+    let training = Training {
+        batch: BatchSize::Frames(4),
+        muon: Some(Muon::default()),
+        occupancy: None,
+        rate: Polynomial { from: 3e-3, to: 0.0, steps: 40, power: 1.0 },
+        ..settings()
+    };
+    let mut state = start(&training);
+    let outcomes = run(&training, &mut state, 40);
+    let loss = |k: usize| match &outcomes[k] {
+        Outcome::Done(loss) => loss.total,
+        other => panic!("{other:?}"),
+    };
+    assert!(loss(39) < 0.9 * loss(0), "{} {}", loss(0), loss(39));
 }
 
 #[test]

@@ -6,8 +6,8 @@
 //! sum over rows, V_k = Σ exp(2πi v_k m) A(row, k): as exact as the sum over pixels, and what is
 //! kept are 2(w + h) numbers a visibility instead of 2wh.
 
-use super::matrix::{Shape, multiply};
 use super::{Float, ImageGrid, Operator, Pulse};
+use crate::matrix::{Shape, multiply};
 use core::f64::consts::TAU;
 use core::ops::Range;
 use num_complex::Complex;

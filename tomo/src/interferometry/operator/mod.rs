@@ -2,7 +2,6 @@
 
 mod dtft;
 mod grid;
-mod matrix;
 mod nufft;
 mod plain;
 mod transform;

@@ -15,11 +15,11 @@ mod tile;
 
 pub use settings::{Initialisation, NetworkSettings};
 
-use super::{BuiltIn, Coordinates, Gradient, Groups, Representation, Workspace};
+use super::{BuiltIn, Coordinates, Gradient, Groups, Representation, WeightMatrix, Workspace};
 use crate::Error;
 use crate::simd::{Float, InstructionSet};
 use batch::{Memory, Way};
-use layout::Layout;
+use layout::{Layer, Layout};
 use output::Cotangents;
 
 /// A network with positional encoding: `bhnerf` of (x, y, z), `mlp4d` of (t, x, y, z).
@@ -86,6 +86,16 @@ impl<T: Float + Default> Representation<T> for Network {
 
     fn parameters(&self) -> usize {
         self.layout.parameters()
+    }
+
+    /// Of the hidden layers, each with its biases, the weights of an input that is always one.
+    fn matrices(&self) -> Vec<WeightMatrix> {
+        let of = |layer: &Layer| WeightMatrix {
+            offset: layer.offset,
+            rows: layer.inputs + 1,
+            columns: layer.outputs,
+        };
+        self.layout.hidden().iter().map(of).collect()
     }
 
     fn initialise(&self, seed: u64, parameters: &mut [T]) {

@@ -1,6 +1,6 @@
 //! Matrix products on slices.
 
-use super::Float;
+use crate::simd::Float;
 
 /// A matrix in a slice: shape and distances between neighbours down a column and along a row.
 #[derive(Clone, Copy)]
