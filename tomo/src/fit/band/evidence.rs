@@ -187,7 +187,7 @@ impl Lower {
                 let more = 1.0 + strength * square;
                 let form = chi2 - strength * products[0] * products[0] / more;
                 // All emission given the data: its covariance with them is this column times the power.
-                let with = &emission + &direction * (mean * mean * total[1]);
+                let with = emission + direction * (mean * mean * total[1]);
                 let along = with.dot(&direction) * strength / more;
                 let expected = self.power * (with.dot(&values) - along * products[0]);
                 let seen = with.norm_squared() - along * with.dot(&direction);

@@ -24,7 +24,7 @@ pub enum DataFiles {
         uv_min: Option<f64>,
     },
     /// The light curve of an unresolved source: CSV.
-    LightCurve(MeasuredCurve),
+    LightCurve(Box<MeasuredCurve>),
     /// A movie in Jy/pixel: .npz, .npy, .csv, .fits or .exr.
     Movie {
         /// The file, relative to the fit's.
