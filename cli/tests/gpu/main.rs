@@ -161,6 +161,7 @@ fn scene_1(more: &[&str]) -> Vec<String> {
         "region.nodes={equal-mino-time={per_ray=40}}",
         "movie.frames=16",
         "representation.width=32",
+        "training.optimiser=adam",
         "training.steps=150",
         "training.log_every=50",
         "training.batch={pixels=200}",
@@ -168,6 +169,17 @@ fn scene_1(more: &[&str]) -> Vec<String> {
         "output.nodes=24",
     ];
     fit(Some("scene_1.toml"), &[&small[..], more].concat())
+}
+
+/// In place of Muon's steps a device takes Adam's, and the run's settings say so: they resume anywhere.
+#[test]
+fn exact_networks_take_adams_steps_on_a_device() {
+    let Some(folder) = folder() else { return };
+    let words = scene_1(&["training.optimiser=muon", "training.steps=20"]);
+    let (told, _) = fitted(folder.path(), &words, &["-o", "run", "--device", "gpu"]);
+    assert!(told.contains("Adam's steps"), "{told}");
+    let settings = std::fs::read_to_string(folder.path().join("run/fit.toml")).unwrap();
+    assert!(settings.contains("optimiser = \"adam\""), "{settings}");
 }
 
 fn fitted(folder: &Path, words: &[String], more: &[&str]) -> (String, serde_json::Value) {
