@@ -111,7 +111,7 @@ impl Fit {
         let guess = self.data.as_deref().map(|data| init::guess(data, self.model)).transpose()?;
         let (mut text, base_dir) = self.settings(guess.as_ref())?;
         if device.is_some() {
-            text = delegate::settings(text)?;
+            text = work::on_device(text)?;
         }
         if self.print {
             let settings = serde_json::to_value(text.parse::<toml::Table>()?)?;
