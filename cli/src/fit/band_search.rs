@@ -90,34 +90,30 @@ fn normalised(mut all: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     all
 }
 
+/// How probable each radius is in each world, up to a factor.
+fn orbits(scan: &BandScan) -> Vec<Vec<f64>> {
+    let all = scan.worlds.iter().flat_map(|world| world.by_radius.iter().copied());
+    let most = all.fold(f64::NEG_INFINITY, f64::max);
+    let of = |world: &BandWorld| {
+        let prior = world.inclination_deg.to_radians().sin().max(1e-6);
+        world.by_radius.iter().map(|ln| (ln - most).exp() * prior).collect()
+    };
+    scan.worlds.iter().map(of).collect()
+}
+
 /// Shares of the radii of all worlds.
 fn radii(scan: &BandScan) -> Vec<[f64; 2]> {
-    let most = scan
-        .worlds
-        .iter()
-        .flat_map(|world| world.by_radius.iter().copied())
-        .fold(f64::NEG_INFINITY, f64::max);
-    let share = |k: usize| {
-        let of = |world: &BandWorld| {
-            (world.by_radius[k] - most).exp() * world.inclination_deg.to_radians().sin().max(1e-6)
-        };
-        scan.worlds.iter().map(of).sum::<f64>()
-    };
+    let orbits = orbits(scan);
+    let share = |k: usize| orbits.iter().map(|of_world| of_world[k]).sum::<f64>();
     normalised(scan.radii.iter().enumerate().map(|(k, radius)| [*radius, share(k)]).collect())
 }
 
 /// Shares of the periods of the orbits of all worlds, minutes; where matter stands still there is none.
 fn periods(scan: &BandScan) -> Vec<[f64; 2]> {
-    let most = scan.worlds.iter().map(|world| world.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
-    let of = |(world, periods): (&BandWorld, &Vec<f64>)| {
-        let share = |(period, ln): (&f64, &f64)| {
-            let weight = world.inclination_deg.to_radians().sin().max(1e-6);
-            [*period, (ln - most).exp() * weight]
-        };
-        periods.iter().zip(&world.by_radius).map(share).collect::<Vec<_>>()
-    };
-    let all = scan.worlds.iter().zip(&scan.periods_min).flat_map(of);
-    normalised(all.filter(|[period, _]| period.is_finite()).collect())
+    let shares = orbits(scan).into_iter().flatten();
+    let all = scan.periods_min.iter().flatten().copied().zip(shares);
+    let moving = all.filter(|(period, _)| period.is_finite());
+    normalised(moving.map(|(period, share)| [period, share]).collect())
 }
 
 /// The value below which a part of the probability lies, each share spread evenly half way to its neighbours.

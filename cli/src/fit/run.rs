@@ -58,6 +58,9 @@ impl<'a> Prepared<'a> {
         setup::check(&file, registry)?;
         let instrument = Instrument::new(&file)?;
         let measured = data::measure(&file, &instrument, base_dir)?;
+        if let Some(settings) = &file.band {
+            setup::check_band(&file, &measured, settings)?;
+        }
         let motion = setup::motion(&file, measured.times.clone())?;
         // Times at which emission may change are those of the rays.
         setup::representation(&file, registry, setup::emission_times(&instrument, &motion))?;

@@ -38,6 +38,18 @@ impl<T: Float> AdamState<T> {
     pub fn new(parameters: usize) -> Self {
         Self { steps: 0, first: vec![T::zero(); parameters], second: vec![T::zero(); parameters] }
     }
+
+    /// Counts a step and returns its number.
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    pub(super) fn begin(&mut self, gradient: &[T], parameters: &[T]) -> u64 {
+        let count = parameters.len();
+        assert!(gradient.len() == count);
+        assert!(self.first.len() == count && self.second.len() == count);
+        self.steps += 1;
+        self.steps
+    }
 }
 
 /// Parameters that one thread takes at a time.
@@ -70,12 +82,9 @@ impl Adam {
         state: &mut AdamState<T>,
         parameters: &mut [T],
     ) {
-        let count = parameters.len();
-        assert!(gradient.len() == count);
-        assert!(state.first.len() == count && state.second.len() == count);
-        state.steps += 1;
+        let steps = state.begin(gradient, parameters);
         let moments = [&mut state.first[..], &mut state.second[..]];
-        self.update(rate, gradient, state.steps, moments, parameters);
+        self.update(rate, gradient, steps, moments, parameters);
     }
 
     /// Step number `steps`, counted from 1, of parameters with these moments.

@@ -51,14 +51,9 @@ impl Muon {
         state: &mut AdamState<T>,
         parameters: &mut [T],
     ) {
-        let count = parameters.len();
-        assert!(gradient.len() == count);
-        assert!(state.first.len() == count && state.second.len() == count);
-        state.steps += 1;
-        for Range { start, end } in between(matrices, count) {
-            let of = start..end;
+        let steps = state.begin(gradient, parameters);
+        for of in between(matrices, parameters.len()) {
             let moments = [&mut state.first[of.clone()], &mut state.second[of.clone()]];
-            let steps = state.steps;
             self.adam.update(rate, &gradient[of.clone()], steps, moments, &mut parameters[of]);
         }
         let mean = &mut state.first;

@@ -67,14 +67,7 @@ impl Background {
 
     /// Covariance of two values that are so many minutes apart, Jy².
     fn covariance(&self, apart: f64) -> f64 {
-        let s = apart.abs() / self.minutes;
-        let correlation = match self.roughness {
-            Roughness::Half => (-s).exp(),
-            Roughness::FiveHalves => {
-                let root = 5f64.sqrt() * s;
-                (1.0 + root + root * root / 3.0) * (-root).exp()
-            }
-        };
+        let correlation = self.roughness.correlation(apart.abs() / self.minutes);
         self.constant.powi(2) + self.variation.powi(2) * correlation
     }
 }

@@ -1,14 +1,17 @@
 //! From settings to worlds that are weighed by the light curve of a flare in an orbital band.
 
+mod background;
+
 use super::{Curve, Instrument, Measured, Result, axis, forward_model, hours_per_m, motion};
 use crate::dynamics::AngularVelocity;
 use crate::fit::band::{
-    Background, Band, BandPrior, CurveRows, Interval, PolarGrid, Sampling, UNLIKELY, Weighed,
-    evidence, expected_background, places, together, validation, without_flare,
+    Band, BandPrior, CurveRows, Interval, PolarGrid, Sampling, UNLIKELY, Weighed, evidence, places,
+    together, validation, without_flare,
 };
-use crate::fit::settings::{BackgroundSettings, BandSettings, FitError, FitFile, refuse};
+use crate::fit::settings::{BandSettings, FitError, FitFile, refuse};
 use crate::fit::{FluxDatum, Motion};
 use crate::polarization::StokesParameter;
+use background::{backgrounds, expected};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -69,10 +72,7 @@ pub fn scan_band(
     settings: &BandSettings,
     watch: &BandWatch<'_>,
 ) -> Result<Option<BandScan>> {
-    let Some(curve) = &measured.curve else {
-        refuse!("band needs a light curve of its own: [light_curve] or [data.light-curve]");
-    };
-    check(file, settings, curve)?;
+    let curve = check_band(file, measured, settings)?;
     let worlds = worlds(settings);
     let done = std::sync::atomic::AtomicUsize::new(0);
     let one = |world: &(f64, f64)| -> Result<Option<Vec<BandWorld>>> {
@@ -141,21 +141,6 @@ fn ln_bayes_factor(
     Ok(most + (with / prior).ln() - without)
 }
 
-/// What the background is expected to be in a world and its standard deviation, Jy, as the data have it.
-fn expected(
-    rows: &CurveRows,
-    curve: &Curve,
-    data: &[f64],
-    world: &BandWorld,
-) -> Result<Vec<FluxDatum>> {
-    let all = expected_background(rows, data, &world.band)?;
-    let sigma = |datum: &Option<FluxDatum>| datum.map_or(0.0, |[_, sigma]| sigma);
-    let scaled = |part: usize| all.iter().zip(&curve.data).map(move |(x, d)| x[part] * sigma(d));
-    let mut values: Vec<f64> = scaled(0).collect();
-    turn(&mut values, -world.position_angle_deg);
-    Ok(values.into_iter().zip(scaled(1)).map(|(value, deviation)| [value, deviation]).collect())
-}
-
 /// Azimuth and radius of the emission, in all worlds that are likely.
 fn placed(
     file: &FitFile,
@@ -189,9 +174,20 @@ fn direction(inclination_deg: f64) -> f64 {
     inclination_deg.to_radians().sin().max(1e-6).ln()
 }
 
-fn check(file: &FitFile, settings: &BandSettings, curve: &Curve) -> Result<()> {
+/// The light curve, if worlds can be weighed by it with these settings.
+///
+/// # Errors
+/// If there is none, or a setting is out of range.
+pub fn check_band<'a>(
+    file: &FitFile,
+    measured: &'a Measured,
+    settings: &BandSettings,
+) -> Result<&'a Curve> {
+    let Some(curve) = &measured.curve else {
+        refuse!("band needs a light curve of its own: [light_curve] or [data.light-curve]");
+    };
     if let Some(background) = &settings.background {
-        check_background(background, curve)?;
+        background::check(background, curve)?;
     }
     prior(settings).checked()?;
     let range = |key: &str, value: f64, allowed| {
@@ -223,30 +219,8 @@ fn check(file: &FitFile, settings: &BandSettings, curve: &Curve) -> Result<()> {
             "band.position_angles_deg needs loss.0.stokes = [\"Q\", \"U\"] with the same error of both"
         );
     }
-    axis(file).map(drop)
-}
-
-fn check_background(settings: &BackgroundSettings, curve: &Curve) -> Result<()> {
-    let range = |key: &str, value: f64, allowed| {
-        Err(FitError::range(format!("band.background.{key}"), value, allowed).into())
-    };
-    let BackgroundSettings { constant_jy, variation_jy, correlation_min, matern } = settings;
-    if !(0.0..=1e3).contains(constant_jy) {
-        return range("constant_jy", *constant_jy, "0 to 1000 Jy");
-    }
-    if let Some(bad) = variation_jy.iter().find(|x| !(0.0..=1e3).contains(*x)) {
-        return range("variation_jy", *bad, "0 to 1000 Jy");
-    }
-    if let Some(bad) = correlation_min.iter().find(|x| !(1e-3..=1e6).contains(*x)) {
-        return range("correlation_min", *bad, "0.001 to 1e6 minutes");
-    }
-    if variation_jy.is_empty() || correlation_min.is_empty() || matern.is_empty() {
-        refuse!("band.background: variation_jy, correlation_min and matern need one value or more");
-    }
-    if curve.parameters.contains(&StokesParameter::I) {
-        refuse!("band.background is that of Q and U: leave I out of loss.0.stokes");
-    }
-    Ok(())
+    axis(file)?;
+    Ok(curve)
 }
 
 /// Whether every frame has Q and U, in this order, with the same error: noise then has no direction.
@@ -262,32 +236,6 @@ fn prior(settings: &BandSettings) -> BandPrior {
     let BandSettings { radii, widths, lengths, height, .. } = settings;
     let usual = BandPrior::usual(radii.values(), widths.clone(), lengths.clone(), *height);
     BandPrior { backgrounds: backgrounds(settings), ..usual }
-}
-
-/// All combinations; what does not vary has no correlation time.
-fn backgrounds(settings: &BandSettings) -> Vec<Background> {
-    let Some(BackgroundSettings { constant_jy, variation_jy, correlation_min, matern }) =
-        &settings.background
-    else {
-        return vec![Background::NONE];
-    };
-    let constant = Background { constant: *constant_jy, ..Background::NONE };
-    let mut all = Vec::new();
-    for variation in variation_jy.iter().copied() {
-        if variation == 0.0 {
-            all.push(constant);
-            continue;
-        }
-        for minutes in correlation_min.iter().copied() {
-            all.extend(matern.iter().map(|roughness| Background {
-                variation,
-                minutes,
-                roughness: *roughness,
-                ..constant
-            }));
-        }
-    }
-    all
 }
 
 fn worlds(settings: &BandSettings) -> Vec<(f64, f64)> {

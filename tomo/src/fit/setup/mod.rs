@@ -33,7 +33,7 @@ mod truth;
 mod visibilities;
 mod world;
 
-pub use band::{BandScan, BandWatch, BandWorld, band_motion, in_band_world, scan_band};
+pub use band::{BandScan, BandWatch, BandWorld, band_motion, check_band, in_band_world, scan_band};
 pub use change::{change, emission_times};
 pub use coarse_view::CoarseView;
 pub use curve::Curve;

@@ -23,6 +23,15 @@ impl Roughness {
         }
     }
 
+    /// Correlation of two values that are s correlation lengths apart, s = r/ℓ: exp(−s), or (1 + √5 s + 5 s²/3) exp(−√5 s).
+    pub fn correlation(self, s: f64) -> f64 {
+        let scaled = (2.0 * self.nu()).sqrt() * s;
+        match self {
+            Self::Half => (-scaled).exp(),
+            Self::FiveHalves => (1.0 + scaled + scaled * scaled / 3.0) * (-scaled).exp(),
+        }
+    }
+
     /// How many times (κ² − Δ) makes white noise of the field: (ν + 3/2)/2 in three dimensions.
     pub(super) fn times(self) -> usize {
         match self {
