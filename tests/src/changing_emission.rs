@@ -60,6 +60,84 @@ fn exact_onset_and_end_of_a_flare_are_found_within_one_frame() {
     assert_eq!(results["linear"]["relative_gap"].as_f64().map(|gap| gap < 0.1), Some(true));
 }
 
+/// Of a representation that is learnt, from voxels that change.
+const LEARNT: [&str; 8] = [
+    "training.steps=60",
+    "training.rate=5e-4",
+    "training.last_rate=5e-6",
+    "training.ramp=10",
+    "training.batch={frames=6}",
+    "training.start={linear={nodes=20,stride=1,steps=200}}",
+    "training.log_every=20",
+    "change.spacing=8.0",
+];
+
+#[test]
+fn exact_what_is_learnt_may_change_as_voxels_may() {
+    let voxels = tempfile::tempdir().unwrap();
+    let bound = 1.05 * fit(voxels.path(), &[])["nrmse_over_time"].as_f64().unwrap();
+    let mask = "training.occupancy={cells=16,threshold=0.003,memory=0.8,warm_up=0,every=20}";
+    let network = ["representation.width=48", "representation.length_scale=2.0", mask];
+    let network = [&network[..], &["representation.kind=bhnerf", "training.optimiser=muon"]];
+    let grid = ["representation.kind=grid", "representation.activation=softplus"];
+    let rate = ["training.rate=5e-2", "training.last_rate=5e-4", "change.spacing=4.0"];
+    let features = ["representation.kind=feature-grid", "representation.levels=2", mask];
+    let slower = ["training.rate=2.5e-3", "training.last_rate=1e-4"];
+    for kind in
+        [network.concat(), [grid.as_slice(), &rate].concat(), [&features[..], &slower].concat()]
+    {
+        let folder = tempfile::tempdir().unwrap();
+        let results = fit(folder.path(), &[&LEARNT[..], &kind].concat());
+        let error = results["nrmse_over_time"].as_f64().unwrap();
+        assert!(error < bound, "{kind:?}: {error} {bound}");
+        let curves = curves(folder.path());
+        let of = |k: usize| curves.iter().map(|row| [row[0], row[k]]).collect::<Vec<_>>();
+        let frame = curves[1][0] - curves[0][0];
+        for (found, truth) in halves(&of(1)).iter().zip(halves(&of(2))) {
+            assert!((found - truth).abs() < frame, "{kind:?}: {found} {truth}");
+        }
+        let log = std::fs::read_to_string(folder.path().join("run/log.jsonl")).unwrap();
+        let last: Value = serde_json::from_str(log.lines().last().unwrap()).unwrap();
+        assert!(last["penalties"]["change"].as_f64().unwrap() > 0.0, "{last}");
+    }
+}
+
+/// Frames that voxels have not seen choose the price that a network then pays.
+#[test]
+fn exact_held_out_frames_choose_the_price_of_a_network() {
+    let folder = tempfile::tempdir().unwrap();
+    let network = ["representation.kind=bhnerf", "representation.width=16"];
+    let held = "held_out={setting=\"change.weight\",values=[0.003,3.0],folds=2}";
+    let few = ["training.steps=2", "linear.iterations=10", held];
+    let results = fit(folder.path(), &[&LEARNT[..], &network, &few].concat());
+    assert_eq!(results["held_out"]["chosen"].as_f64(), Some(0.003));
+}
+
+/// Draws around an unknown world in which emission changes: each has a world of its own.
+#[test]
+fn exact_worlds_are_drawn_where_emission_changes() {
+    let folder = tempfile::tempdir().unwrap();
+    let world = "world={inclination_deg={uniform=[40.0,80.0]},search={starts=1,drag_is_spin=false,\
+        coarse={worlds=20,nodes=12,iterations=30,pixels=20,frames=15},\
+        fine={worlds=20,nodes=14,iterations=40,pixels=20,frames=15}}}";
+    fit(folder.path(), &[world, "linear.iterations=15", "linear.rounds=1"]);
+    let run = kerrlight(folder.path(), &["posterior", "run", "--samples", "3"]);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let read = |name: &str| -> Value {
+        serde_json::from_slice(&std::fs::read(folder.path().join("run").join(name)).unwrap())
+            .unwrap()
+    };
+    let known = read("world.json");
+    let sigma = known["sigma"]["inclination_deg"].as_f64().unwrap();
+    let best = known["world"]["inclination_deg"].as_f64().unwrap();
+    let drawn: Vec<f64> = (1..=3)
+        .map(|k| read(&format!("posterior/sample_000{k}.json")))
+        .map(|draw| draw["world"]["inclination_deg"].as_f64().unwrap())
+        .collect();
+    assert!(drawn.iter().all(|x| (x - best).abs() < 5.0 * sigma), "{drawn:?} {best} {sigma}");
+    assert!(drawn.windows(2).all(|pair| pair[0] != pair[1]), "{drawn:?}");
+}
+
 /// Without a change the same data are not explained, and the first line says so.
 #[test]
 fn exact_hard_motion_is_recognised_as_wrong() {
@@ -96,11 +174,16 @@ fn exact_what_cannot_change_is_refused_before_anything_is_written() {
         ("change.spacing=0.001", "with at most 10,000 in the time of the data"),
         ("change.allowed=deaths", "unknown variant `deaths`"),
         ("representation=mlp4d", "change does not apply to mlp4d"),
-        ("representation=grid", "linear-grid"),
+        ("change.allowed=births", "representation.kind = \"linear-grid\""),
         ("truth.spot.0.shines.rise=0.0", "truth.spot.0.shines.rise = 0"),
         ("axis={from={start=[0.0,0.0,1.0],rate=0.1,last_rate=0.1}}", "[axis.known]"),
+        ("held_out={setting=\"change.weight\",values=[0.1,1.0],folds=2}", "have a linear start"),
     ] {
-        let run = kerrlight(folder.path(), &["fit", "fit.toml", "-o", "run", "--set", change]);
+        let mut words = vec!["fit", "fit.toml", "-o", "run", "--set", change];
+        if change.contains("births") || change.contains("held_out") {
+            words.extend(["--set", "representation.kind=grid"]);
+        }
+        let run = kerrlight(folder.path(), &words);
         let told = String::from_utf8_lossy(&run.stderr).into_owned();
         assert_eq!(run.status.code(), Some(2), "{change}: {told}");
         assert!(told.contains(expected), "{change}: {told}");

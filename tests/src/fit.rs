@@ -149,6 +149,15 @@ fn exact_same_bytes_after_kills_of_quasi_newton_steps() {
     killed(&set, 8);
 }
 
+/// A mask that is looked at at several times, and a price that is drawn at each step.
+#[test]
+#[ignore = "long"]
+fn exact_same_bytes_after_kills_of_emission_that_changes() {
+    let change = "change={allowed=\"any\",weight=0.001,spacing=0.3}";
+    let mask = "training.occupancy={cells=12,threshold=0.003,memory=0.8,warm_up=0,every=5}";
+    killed(&["training.steps=60", change, mask], 8);
+}
+
 /// Kills a run with these settings at that many moments at least; what goes on ends like what was never killed.
 fn killed(set: &[&str], moments: u32) {
     let (small, folder) = (small(), tempfile::tempdir().unwrap());

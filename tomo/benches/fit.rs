@@ -51,6 +51,7 @@ fn training(batch: BatchSize) -> Training {
         // A step in twenty looks at every cell.
         occupancy: Some(OccupancyPlan { settings, warm_up: 60, every: 20 }),
         penalties: None,
+        change: None,
         region: REGION,
         keep_every: 50,
         divergence: 1e3,
@@ -78,7 +79,7 @@ fn parts(
     };
     let through = least(|| {
         gradient.fill(0.0);
-        let at = Batch::coordinates(&batch.columns, 3);
+        let at = Batch::coordinates(&batch.columns, network);
         let groups = Groups { starts: &batch.starts, link: &link };
         let into = Gradient { parameters: &mut gradient, coordinates: None };
         network.eval_vjp(&state.now.parameters, at, groups, &mut values, into, &mut workspace);

@@ -112,6 +112,7 @@ fn training(words: &Words, rate: f64) -> Result<Training, String> {
         parts: 1,
         occupancy: (warm_up > 0).then_some(plan),
         penalties: None,
+        change: None,
         region: REGION,
         keep_every: 50,
         divergence: 1e3,

@@ -10,7 +10,7 @@ use crate::report::{Axis, LinePlot, Marks, Series};
 use anyhow::Context;
 use kerrlight_tomo::dynamics;
 use kerrlight_tomo::fit::Objective;
-use kerrlight_tomo::fit::settings::{FitFile, HeldOutSettings};
+use kerrlight_tomo::fit::settings::{FitFile, HeldOutSettings, Kind};
 use kerrlight_tomo::fit::setup::{self, Held};
 use serde_json::{Value, json};
 
@@ -35,6 +35,20 @@ pub fn place(
         eprintln!("{line}");
     }
     settled(file, folder)
+}
+
+/// The same for a representation that is learnt in steps, whose price of change is part of every step. What a linear grid
+/// chooses is chosen where it is solved.
+pub fn before_steps(
+    file: &FitFile,
+    folder: &Folder,
+    objective: &mut Objective<f32>,
+    about: (dynamics::Axis, [f64; 2]),
+) -> anyhow::Result<FitFile> {
+    match file.representation.kind {
+        Kind::LinearGrid => Ok(file.clone()),
+        _ => place(file, folder, objective, about),
+    }
 }
 
 /// The settings with the weight that a run has chosen.

@@ -24,9 +24,8 @@ use crate::progress;
 use crate::ranks::Listener;
 use anyhow::{Context, bail};
 use kerrlight_tomo::Error;
-use kerrlight_tomo::fit::linear::Change;
 use kerrlight_tomo::fit::settings::{AxisSearch, FitFile, Kind, Start};
-use kerrlight_tomo::fit::setup::{self, Instrument, Measured};
+use kerrlight_tomo::fit::setup::{self, Given, Instrument, Measured};
 use kerrlight_tomo::fit::{Motion, Objective, Outcome, State, Trainer, checkpoint};
 use kerrlight_tomo::representation::Registry;
 use kerrlight_tomo::volume::Volume;
@@ -116,7 +115,7 @@ impl<'a> Prepared<'a> {
         }
         let times = setup::emission_times(instrument, motion);
         let representation = setup::representation(file, registry, times)?;
-        let training = setup::training(file, setup::axis(file)?.1)?;
+        let training = setup::training(file, setup::axis(file)?.1, times)?;
         Ok(check(&self.objective(instrument, motion, measured)?, &*representation, &training)?)
     }
 
@@ -144,11 +143,12 @@ pub fn run(
     let begun = Instant::now();
     let placed = prepared.placed(folder)?;
     let (file, instrument, motion, measured) = prepared.world(placed.as_ref());
-    let objective = prepared.objective(instrument, motion, measured)?;
+    let mut objective = prepared.objective(instrument, motion, measured)?;
     let times = setup::emission_times(instrument, motion);
-    let representation = setup::representation(file, registry, times)?;
     let (axis, axis_rate) = setup::axis(file)?;
-    let training = setup::training(file, axis_rate)?;
+    let file = &held_out::before_steps(file, folder, &mut objective, (axis, times))?;
+    let representation = setup::representation(file, registry, times)?;
+    let training = setup::training(file, axis_rate, times)?;
     let mut state = State::new(&*representation, axis, &training);
     let mut trainer = Trainer::new(objective, &*representation, training);
     if let Some(device) = device {
@@ -193,13 +193,15 @@ pub fn help(
     let mut link = together::join((run, rank, size), text)?;
     // What it has found of the world is there before its state comes.
     let bytes = link.state()?;
-    let placed = prepared.placed(&Folder::look(run)?.0)?;
+    let folder = Folder::look(run)?.0;
+    let placed = prepared.placed(&folder)?;
     let (file, instrument, motion, measured) = prepared.world(placed.as_ref());
+    let file = &held_out::settled(file, &folder)?;
     let objective = prepared.objective(instrument, motion, measured)?;
     let times = setup::emission_times(instrument, motion);
     let representation = setup::representation(file, prepared.registry, times)?;
     let (axis, axis_rate) = setup::axis(file)?;
-    let training = setup::training(file, axis_rate)?;
+    let training = setup::training(file, axis_rate, times)?;
     let start = State::new(&*representation, axis, &training);
     let mut state = checkpoint::decode(&bytes, &start)?;
     let mut trainer = Trainer::new(objective, &*representation, training);
@@ -322,12 +324,14 @@ impl Run<'_> {
             eprintln!("{}", linear::statement(&solution));
             state.now.parameters = solution.parameters();
         } else if let Start::Linear { nodes, stride, steps, .. } = self.file.training.start {
-            let (whose, about) = ((self.measured, self.folder), (axis, Change::NONE));
+            let change = setup::change(self.file, times)?;
+            let (whose, about) = ((self.measured, self.folder), (axis, change));
             let solution =
                 leakage::solve_linear(self.file, whose, trainer, about, (nodes, stride))?;
             self.folder.log(&linear::solved(&solution))?;
+            let given = Given { solution: &solution, nodes, knots: change.knots };
             let imprinted =
-                setup::imprint(self.file, trainer.representation, &solution, nodes, steps, state)?;
+                setup::imprint(self.file, trainer.representation, &given, steps, state)?;
             self.folder.log(&linear::imprinted(&imprinted))?;
         }
         Ok(())

@@ -6,12 +6,12 @@ use crate::checksum::sealed;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::output;
 use crate::progress;
-use anyhow::Context;
+use anyhow::{Context, bail};
 use kerrlight_tomo::dynamics::Velocity;
 use kerrlight_tomo::fit::Motion;
 use kerrlight_tomo::fit::settings::{FitFile, UnknownWorld};
 use kerrlight_tomo::fit::setup::{self, FoundWorld, Instrument, Measured, Trial};
-use kerrlight_tomo::fit::world::{Free, Parameter, Span, World};
+use kerrlight_tomo::fit::world::{Free, Parameter, Span, Spread, World};
 use serde_json::{Map, Value, json};
 
 /// What was found, in the folder of the run.
@@ -218,6 +218,27 @@ pub fn found(folder: &Folder) -> anyhow::Result<Option<Value>> {
         return Ok(None);
     }
     Ok(Some(serde_json::from_str(&output::read_text(&path)?)?))
+}
+
+/// How sure a run is of the world that it has found.
+pub fn spread_of(free: &[Free], world: World, results: &Value) -> anyhow::Result<Spread> {
+    let number = |value: &Value, name: &str| {
+        value.as_f64().with_context(|| format!("the search for the world has no {name}"))
+    };
+    let each = |free: &Free| -> anyhow::Result<(f64, bool)> {
+        let name = free.parameter.name();
+        let sigma = number(&results["sigma"][name], "errors")?;
+        Ok((sigma * free.parameter.unit(), results["open"][name].as_bool().unwrap_or(true)))
+    };
+    let known: Vec<(f64, bool)> = free.iter().map(each).collect::<anyhow::Result<_>>()?;
+    let (sigma, open): (Vec<f64>, Vec<bool>) = known.into_iter().unzip();
+    let correlation = results["correlation"].as_array().map_or(&[][..], Vec::as_slice);
+    let correlation: Vec<f64> =
+        correlation.iter().map(|x| number(x, "correlations")).collect::<anyhow::Result<_>>()?;
+    if correlation.len() != free.len() * free.len() {
+        bail!("the search for the world has no correlations");
+    }
+    Ok(Spread { world, sigma, open, correlation, ripple: 0.0, worlds: 0 })
 }
 
 /// The world that a run has found.

@@ -5,6 +5,7 @@ use super::forward_model::{Field, ForwardModel};
 use super::occupancy::Occupancy;
 use crate::dynamics::{Axis, Turned, pull_back};
 use crate::points::{Coordinates, CoordinatesMut};
+use crate::representation::Representation;
 use crate::simd::Float;
 use rayon::prelude::*;
 
@@ -121,7 +122,7 @@ impl<T: Float> Batch<T> {
 
     /// The same for a field. One of events is not carried along, and sees where light was emitted.
     pub fn gather_field(&mut self, model: &ForwardModel<T>, field: Field<'_, T>) {
-        let carried = field.representation.dimension() != 4;
+        let carried = field.representation.is_carried();
         let fall = model.fall.as_ref().filter(|_| carried);
         self.collect(model, (field.axis, fall), field.occupancy);
     }
@@ -187,10 +188,14 @@ impl<T: Float> Batch<T> {
         columns.truncate(to);
     }
 
-    /// What a representation of this dimension sees: points pulled back, or events.
-    pub fn coordinates(columns: &Columns<T>, dimension: usize) -> Coordinates<'_, T> {
-        let [x, y, z] = if dimension == 4 { &columns.position } else { &columns.pulled };
-        match dimension {
+    /// What a representation sees: points pulled back, or events.
+    pub fn coordinates<'a>(
+        columns: &'a Columns<T>,
+        representation: &dyn Representation<T>,
+    ) -> Coordinates<'a, T> {
+        let carried = representation.is_carried();
+        let [x, y, z] = if carried { &columns.pulled } else { &columns.position };
+        match representation.dimension() {
             4 => Coordinates::txyz(&columns.time, x, y, z),
             _ => Coordinates::xyz(x, y, z),
         }

@@ -101,12 +101,15 @@ impl<T: Float> Trainer<'_, T> {
         (motion, time): (&Motion, f64),
         points: [&[T]; 3],
     ) -> Vec<T> {
-        let (x, y, z) = (points[0], points[1], points[2]);
         let matter = motion.matter(now.axis, time, points);
+        let [x, y, z] = match self.representation.is_carried() {
+            true => [0, 1, 2].map(|c| matter[c].as_slice()),
+            false => points,
+        };
         let times = vec![T::of(time); x.len()];
         let at = match self.representation.dimension() {
             4 => Coordinates::txyz(&times, x, y, z),
-            _ => Coordinates::xyz(&matter[0], &matter[1], &matter[2]),
+            _ => Coordinates::xyz(x, y, z),
         };
         let mut values = vec![T::zero(); x.len()];
         let workspace = self.buffers.workspace();

@@ -19,7 +19,7 @@ impl<T: Float> ForwardModel<T> {
         assert_eq!(movie.len(), frames.len() * self.pixels);
         for (frame, image) in frames.iter().zip(movie.chunks_exact_mut(self.pixels)) {
             self.gather_frame(field, *frame, batch);
-            let at = Batch::coordinates(&batch.columns, field.representation.dimension());
+            let at = Batch::coordinates(&batch.columns, field.representation);
             field.representation.eval(field.parameters, at, &mut batch.values, workspace);
             self.sum_rays(batch, image);
             self.add_quiescent(field, image);
@@ -37,7 +37,7 @@ impl<T: Float> ForwardModel<T> {
         image: &mut [T],
     ) {
         self.gather_frame(field, frame, batch);
-        let at = Batch::coordinates(&batch.columns, field.representation.dimension());
+        let at = Batch::coordinates(&batch.columns, field.representation);
         field.representation.eval_recorded(field.parameters, at, &mut batch.values, workspace);
         self.sum_rays(batch, image);
         self.add_quiescent(field, image);

@@ -42,6 +42,7 @@
 
 pub mod band;
 mod batch;
+mod change_price;
 pub mod checkpoint;
 mod compiled;
 mod curve_term;
@@ -82,10 +83,11 @@ pub mod verdict;
 pub mod world;
 
 pub use batch::{Batch, Columns};
+pub use change_price::{ChangeBuffers, ChangePrice};
 pub use curve_term::{FluxDatum, StokesCurveTerm};
 pub use device::{Delegate, DeviceError, Drawn, StepDevice, Stretch, Taken};
 pub use forward_model::{Field, ForwardModel, Motion, Redshift};
-pub use objective::{Buffers, Data, Gradients, Loss, Objective, Weighted, is_turned};
+pub use objective::{Buffers, Data, Gradients, Loss, Objective, Weighted};
 pub use occupancy::{Occupancy, OccupancySettings};
 pub use penalties::{Draw, Penalties, Probe, ProbeBuffers};
 pub use pixel_rays::RingRays;

@@ -4,7 +4,7 @@ use super::batch::Batch;
 use super::forward_model::{Field, ForwardModel};
 use super::selection::Selection;
 use super::terms::{FrameTerm, ImageTerm};
-use crate::dynamics::{Axis, Cotangents, Turned, pull_back_vjp};
+use crate::dynamics::{Cotangents, Turned, pull_back_vjp};
 use crate::points::{Coordinates, CoordinatesMut};
 use crate::representation::{Gradient, Groups, Representation, Workspace};
 use crate::simd::Float;
@@ -191,7 +191,7 @@ impl<T: Float> Objective<T> {
         let dimension = field.representation.dimension();
         let coordinates = wanted(gradients.axis.is_some(), dimension, batch.points(), of_points);
         let into = Gradient { parameters: gradients.parameters, coordinates };
-        let at = Batch::coordinates(&batch.columns, dimension);
+        let at = Batch::coordinates(&batch.columns, field.representation);
         let groups = Groups { starts: &batch.starts, link: &link };
         field.representation.eval_vjp(field.parameters, at, groups, &mut values, into, workspace);
         let shifted = gradients.axis.is_some() && self.model.is_shifted();
@@ -207,7 +207,7 @@ impl<T: Float> Objective<T> {
         }
         batch.values = values;
         if let Some(axis) = gradients.axis.as_deref_mut() {
-            add_axis(field.axis, batch, of_points, dimension, axis);
+            add_axis(field, batch, of_points, axis);
         }
         let term = scale * total;
         let (total, points) = (weight * term, batch.points());
@@ -283,13 +283,13 @@ impl<T: Float> Objective<T> {
         let dimension = field.representation.dimension();
         let coordinates = wanted(gradients.axis.is_some(), dimension, batch.points(), of_points);
         let into = Gradient { parameters: gradients.parameters, coordinates };
-        let at = Batch::coordinates(&batch.columns, dimension);
+        let at = Batch::coordinates(&batch.columns, field.representation);
         field.representation.vjp_recorded(field.parameters, at, cotangents, into, workspace);
         if let Some(quiescent) = &self.model.quiescent {
             quiescent.back(of_image, gradients.parameters);
         }
         if let Some(axis) = gradients.axis.as_deref_mut() {
-            add_axis(field.axis, batch, of_points, dimension, axis);
+            add_axis(field, batch, of_points, axis);
         }
     }
 }
@@ -317,24 +317,18 @@ fn wanted<T: Float>(
 
 /// Adds the gradient of the axis by way of the points; a field of events has none.
 fn add_axis<T: Float>(
-    axis: Axis,
+    field: Field<'_, T>,
     batch: &Batch<T>,
     of_points: &[Vec<T>; 4],
-    dimension: usize,
     gradient: &mut [f64; 3],
 ) {
-    if dimension == 4 {
+    if !field.representation.is_carried() {
         return;
     }
     let [x, y, z] = &batch.columns.position;
     let turned = Turned { points: Coordinates::xyz(x, y, z), angles: &batch.columns.angle };
     let [a, b, c, _] = of_points;
     let none = Cotangents { angles: None, points: None };
-    let slope = pull_back_vjp(axis, turned, Coordinates::xyz(a, b, c), none);
+    let slope = pull_back_vjp(field.axis, turned, Coordinates::xyz(a, b, c), none);
     gradient.iter_mut().zip(slope).for_each(|(sum, slope)| *sum += slope);
-}
-
-/// Whether a representation knows of the axis.
-pub fn is_turned<T: Float>(representation: &dyn Representation<T>) -> bool {
-    representation.dimension() == 3
 }

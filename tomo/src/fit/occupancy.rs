@@ -19,6 +19,9 @@ pub struct OccupancySettings {
     pub memory: f64,
 }
 
+/// At how many times a field that changes is looked at, once it has been looked at at all of them.
+const LATER: usize = 4;
+
 /// Cells of a cube about the hole that shine, or may.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Occupancy {
@@ -73,17 +76,19 @@ impl Occupancy {
         self.occupied.iter().copied()
     }
 
-    /// Looks at one random point of every cell, the same for the same seed.
+    /// Looks at one random point of every cell, the same for the same seed. A field that changes while matter carries it is
+    /// looked at there at all of its `times` (M since the reference time) as long as nothing has been seen, and at some of
+    /// them later.
     pub fn refresh<T: Float>(
         &mut self,
         representation: &dyn Representation<T>,
         parameters: &[T],
-        seed: u64,
+        (seed, times): (u64, &[f64]),
         workspace: &mut Workspace,
     ) {
         let mut random = Pcg64::seed_from_u64(seed);
         let n = self.settings.cells;
-        let width = 2.0 * self.half_width / n as f64;
+        let width = self.cell_width();
         let mut points: [Vec<T>; 3] = Default::default();
         for cell in 0..n.pow(3) {
             for (column, k) in points.iter_mut().zip([cell / (n * n), cell / n % n, cell % n]) {
@@ -93,12 +98,39 @@ impl Occupancy {
         }
         let [x, y, z] = &points;
         let mut values = vec![T::zero(); n.pow(3)];
-        representation.eval(parameters, Coordinates::xyz(x, y, z), &mut values, workspace);
-        for (brightness, value) in self.brightness.iter_mut().zip(&values) {
-            let remembered = f64::from(*brightness) * self.settings.memory;
-            *brightness = remembered.max(value.double()) as f32;
+        let is_new = self.brightness.iter().all(|b| *b == 0.0);
+        let memory = self.settings.memory;
+        self.brightness.iter_mut().for_each(|b| *b = (f64::from(*b) * memory) as f32);
+        for time in looks(times, is_new, &mut random) {
+            let time = vec![T::of(time); x.len()];
+            let at = match representation.dimension() {
+                4 => Coordinates::txyz(&time, x, y, z),
+                _ => Coordinates::xyz(x, y, z),
+            };
+            representation.eval(parameters, at, &mut values, workspace);
+            let pairs = self.brightness.iter_mut().zip(&values);
+            pairs.for_each(|(b, value)| *b = b.max(value.double() as f32));
         }
         self.mark();
+    }
+
+    /// A random point of these cells, M.
+    pub(super) fn draw(&self, lit: &[usize], random: &mut Pcg64) -> [f64; 3] {
+        let n = self.settings.cells;
+        let width = self.cell_width();
+        let cell = lit[random.random_range(0..lit.len())];
+        let at = [cell / (n * n), cell / n % n, cell % n];
+        at.map(|k| (k as f64 + random.random::<f64>()) * width - self.half_width)
+    }
+
+    /// Which cells may shine.
+    pub(super) fn lit(&self) -> Vec<usize> {
+        (0..self.occupied.len()).filter(|cell| self.occupied[*cell]).collect()
+    }
+
+    /// M.
+    pub(super) fn cell_width(&self) -> f64 {
+        2.0 * self.half_width / self.settings.cells as f64
     }
 
     /// Marks cells that are bright enough, and their neighbours.
@@ -117,6 +149,16 @@ impl Occupancy {
             bright = (0..bright.len()).map(spread).collect();
         }
         self.occupied = bright;
+    }
+}
+
+/// Times at which a field is looked at: all of them at first, then [`LATER`] random ones, and the reference time where there
+/// are none.
+fn looks(times: &[f64], is_new: bool, random: &mut Pcg64) -> Vec<f64> {
+    match times {
+        [] => vec![0.0],
+        _ if is_new || times.len() <= LATER => times.to_vec(),
+        _ => (0..LATER).map(|_| times[random.random_range(0..times.len())]).collect(),
     }
 }
 
@@ -142,7 +184,7 @@ mod tests {
         let mut mask =
             Occupancy::new(OccupancySettings { cells: 10, threshold: 1e-4, memory: 0.9 }, region);
         assert!(mask.holds([-4.0, 4.0, 4.0]) && !mask.holds([5.1, 0.0, 0.0]));
-        mask.refresh(&grid, &parameters, 7, &mut Workspace::new());
+        mask.refresh(&grid, &parameters, (7, &[]), &mut Workspace::new());
         // Two cells along each axis shine, four are kept.
         assert!((mask.fraction() - 0.064).abs() < 1e-12, "{}", mask.fraction());
         assert!(mask.holds([3.0, 0.0, -3.0]) && mask.holds([4.9, 1.9, -1.1]));

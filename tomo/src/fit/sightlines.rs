@@ -51,6 +51,17 @@ impl Region {
         let r = norm(point);
         r >= self.r_min && r < self.r_max && point[2].abs() <= self.z_width
     }
+
+    /// Whether matter at a point (M) passes it, or comes nearer than `margin` (M), while it turns about an axis (a unit vector)
+    /// at the same radius.
+    pub fn is_passed(&self, axis: [f64; 3], point: [f64; 3], margin: f64) -> bool {
+        let r = norm(point);
+        let along: f64 = point.iter().zip(axis).map(|(x, axis)| x * axis).sum();
+        let across = (r * r - along * along).max(0.0).sqrt();
+        let reach = across * (1.0 - axis[2] * axis[2]).max(0.0).sqrt();
+        let least = (along * axis[2]).abs() - reach;
+        r > self.r_min - margin && r < self.r_max + margin && least <= self.z_width + margin
+    }
 }
 
 /// Where nodes lie on a ray.

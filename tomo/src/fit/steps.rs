@@ -67,7 +67,8 @@ impl<T: Float> Trainer<'_, T> {
         if now.step >= plan.warm_up && (now.step - plan.warm_up).is_multiple_of(plan.every.max(1)) {
             let seed = mix(self.training.seed, now.step, 1);
             let (representation, parameters) = (self.representation, &now.parameters);
-            mask.refresh(representation, parameters, seed, self.buffers.workspace());
+            let times = self.training.change.map_or(Vec::new(), |change| change.knots.times());
+            mask.refresh(representation, parameters, (seed, &times), self.buffers.workspace());
             // The loss is another one now.
             now.lbfgs.iter_mut().for_each(|memory| memory.value = None);
         }
@@ -94,6 +95,14 @@ impl<T: Float> Trainer<'_, T> {
                 penalties.value_and_gradient(field, &draw, &mut self.gradient, buffers, workspace);
             loss.total += found.iter().sum::<f64>();
             loss.penalties = found;
+        }
+        if let Some(change) = &self.training.change {
+            let seed = mix(self.training.seed, step, 3);
+            let (buffers, workspace) = (&mut self.changes, self.buffers.workspace());
+            let found =
+                change.value_and_gradient(field, seed, &mut self.gradient, buffers, workspace);
+            loss.total += found;
+            loss.penalties.push(found);
         }
         if let Some(quiescent) = self.objective.model.quiescent() {
             loss.total += quiescent.penalty(parameters, &mut self.gradient);

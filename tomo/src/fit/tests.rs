@@ -197,14 +197,12 @@ impl Case<'_> {
 
 #[test]
 fn exact_gradients_of_parameters_and_axis_by_differences() {
-    let (net, events) = (Blobs { dimension: 3 }, Blobs { dimension: 4 });
     for (delay, momentum) in [(false, false), (true, true)] {
-        for (representation, pixels, others) in [
-            (&net, true, false),
-            (&net, false, true),
-            (&events, true, false),
-            (&events, false, true),
-        ] {
+        let kinds = [Blobs::STEADY, Blobs::CHANGING, Blobs::EVENTS];
+        let data = [(true, false), (false, true)];
+        for (representation, (pixels, others)) in
+            kinds.iter().flat_map(|kind| data.map(|data| (kind, data)))
+        {
             let mut objective = objective(delay, momentum, others);
             Case { objective, representation, pixels }.check();
             objective = self::objective(delay, momentum, others);
@@ -250,7 +248,7 @@ fn exact_falling_matter_is_pulled_back_to_where_it_was() {
         }
     }
     assert!(lit < 3 * lines.points());
-    let field = Blobs { dimension: 4 };
+    let field = Blobs::EVENTS;
     let field = Field { representation: &field, parameters: &[], axis, occupancy: None };
     batch.gather_field(&model, field);
     let first = batch.columns.node[0] as usize;
@@ -275,7 +273,7 @@ fn exact_gradient_of_a_grid_is_that_of_its_values() {
 /// All pixels one by one are all frames as a whole, gradients included.
 #[test]
 fn exact_pixels_and_frames_agree() {
-    let net = Blobs { dimension: 3 };
+    let net = Blobs::STEADY;
     let axis = Axis::new([-0.2, 0.4, -0.8]).unwrap();
     let run = |pixels: bool| {
         let objective = objective(true, true, false);

@@ -1,5 +1,6 @@
 //! A fit with its memory.
 
+use super::change_price::ChangeBuffers;
 use super::device::Delegate;
 use super::objective::{Buffers, Objective};
 use super::parts::Ranks;
@@ -23,6 +24,7 @@ pub struct Trainer<'a, T> {
     pub(super) observed: Vec<usize>,
     pub(super) buffers: Buffers<T>,
     pub(super) probe: ProbeBuffers<T>,
+    pub(super) changes: ChangeBuffers<T>,
     pub(super) gradient: Vec<T>,
     /// Which parameters are matrices.
     pub(super) matrices: Vec<WeightMatrix>,
@@ -50,6 +52,7 @@ impl<'a, T: Float> Trainer<'a, T> {
             observed,
             buffers: Buffers::default(),
             probe: ProbeBuffers::default(),
+            changes: ChangeBuffers::default(),
             gradient,
             matrices: representation.matrices(),
             pairs: Vec::new(),

@@ -1,6 +1,6 @@
 //! How a fit is run.
 
-use super::is_turned;
+use super::change_price::ChangePrice;
 use super::occupancy::OccupancySettings;
 use super::penalties::Penalties;
 use super::sightlines::Region;
@@ -60,6 +60,8 @@ pub struct Training {
     pub occupancy: Option<OccupancyPlan>,
     /// Penalties beside the data, if any.
     pub penalties: Option<Penalties>,
+    /// What change costs while matter carries emission, where a representation allows it.
+    pub change: Option<ChangePrice>,
     /// Where emission is looked for.
     pub region: Region,
     /// Steps from one good state that is kept to the next.
@@ -69,8 +71,14 @@ pub struct Training {
 }
 
 impl Training {
+    /// Names of what is added to the loss of the data, in the order of [`Loss::penalties`](super::Loss::penalties).
+    pub fn penalty_names(&self) -> Vec<&'static str> {
+        let penalties = self.penalties.iter().flat_map(Penalties::names);
+        penalties.chain(self.change.iter().map(|_| "change")).collect()
+    }
+
     /// Whether the axis is learnt, of a representation that knows of it.
     pub fn learns_axis<T: Float>(&self, representation: &dyn Representation<T>) -> bool {
-        self.axis_rate.is_some() && is_turned(representation)
+        self.axis_rate.is_some() && representation.is_carried()
     }
 }

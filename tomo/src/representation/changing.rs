@@ -1,6 +1,6 @@
 //! Emission that changes while matter carries it: fields in space, each of which shines for a part of the time.
 
-use super::{Coordinates, CoordinatesMut, Gradient, Representation, Workspace};
+use super::{Coordinates, CoordinatesMut, Gradient, Representation, WeightMatrix, Workspace};
 use crate::Error;
 use crate::dynamics::{AngularVelocity, Axis, Cotangents, Turned, pull_back, pull_back_vjp};
 use crate::simd::Float;
@@ -66,6 +66,11 @@ impl Knots {
         if self.count > 1 && self.allowed == Allowed::Births { self.time(knot) } else { 0.0 }
     }
 
+    /// The last of them, M.
+    pub fn last(&self) -> f64 {
+        self.time(self.count - 1)
+    }
+
     /// The share of a knot's field in the emission at a time, 0 to 1, and by how much it grows per M.
     #[inline(always)]
     pub fn share<T: Float>(&self, knot: usize, time: T) -> (T, T) {
@@ -103,10 +108,13 @@ pub struct Carrier {
 
 /// Fields in space, one a knot, that matter carries: e(t, x) = Σ share_k(t) e_k(x_k), where x_k is the place that the
 /// matter at (t, x) has at the knot's label time. Parameters are those of the fields, one after the other.
+///
+/// Without a [`Carrier`] points are given by the places that their matter has at the reference time
+/// ([`Representation::is_carried`]), which are those of all knots.
 pub struct Changing<T> {
     inner: Box<dyn Representation<T>>,
     knots: Knots,
-    carrier: Carrier,
+    carrier: Option<Carrier>,
 }
 
 /// Points that one knot has a share in.
@@ -129,12 +137,17 @@ impl<T: Float> Changing<T> {
     /// Of fields in space and the motion that carries them.
     ///
     /// # Errors
-    /// If the inner representation is not one in space, or there is no knot.
+    /// If the inner representation is not one in space, there is no knot, or births have no carrier: each knot's are given at
+    /// places of another time.
     pub fn new(
         inner: Box<dyn Representation<T>>,
         knots: Knots,
-        carrier: Carrier,
+        carrier: Option<Carrier>,
     ) -> Result<Self, Error> {
+        if carrier.is_none() && knots.allowed == Allowed::Births {
+            let allowed = "a motion that carries births";
+            return Err(Error::out_of_range("carrier", f64::NAN, allowed));
+        }
         if inner.dimension() != 3 {
             let dimension = inner.dimension() as f64;
             return Err(Error::out_of_range("dimension of a changing field", dimension, "3"));
@@ -157,12 +170,21 @@ impl<T: Float> Changing<T> {
         let label = self.knots.label_time(knot);
         for (k, t) in time.iter().enumerate() {
             let share = self.knots.share(knot, *t);
-            if share != (T::zero(), T::zero()) {
-                let place = [x[k], y[k], z[k]].map(Float::double);
-                part.push((k, share), (place, t.double() - label), &self.carrier);
+            if share == (T::zero(), T::zero()) {
+                continue;
+            }
+            let place = [x[k], y[k], z[k]];
+            match &self.carrier {
+                Some(carrier) => {
+                    let event = (place.map(Float::double), t.double() - label);
+                    part.push((k, share), event, carrier);
+                }
+                None => part.push_carried((k, share), place),
             }
         }
-        part.pull(self.carrier.axis);
+        if let Some(carrier) = &self.carrier {
+            part.pull(carrier.axis);
+        }
         part
     }
 
@@ -174,18 +196,25 @@ impl<T: Float> Changing<T> {
         cotangents: &[T],
         into: &mut CoordinatesMut<'_, T>,
     ) {
-        let (angles, places) = part.pull_vjp(self.carrier.axis, slopes);
         let [time, to @ ..] = into.columns() else { panic!("points in time and space") };
+        let grown = |at: usize| cotangents[part.points[at]] * values[at] * part.share[at].1;
+        let Some(carrier) = &self.carrier else {
+            for (at, k) in part.points.iter().enumerate() {
+                time[*k] += grown(at);
+                to.iter_mut().zip(slopes).for_each(|(to, slope)| to[*k] += slope[at]);
+            }
+            return;
+        };
+        let (angles, places) = part.pull_vjp(carrier.axis, slopes);
         for (at, k) in part.points.iter().enumerate() {
             let (place, elapsed) = (part.place[at], part.elapsed[at]);
             let r = norm(place);
-            let [stretch, _] = self.carrier.velocity.step_back(r, elapsed);
-            let [by_radius, by_time] = self.carrier.velocity.step_back_slopes(r, elapsed);
+            let [stretch, _] = carrier.velocity.step_back(r, elapsed);
+            let [by_radius, by_time] = carrier.velocity.step_back_slopes(r, elapsed);
             let of_place = [0, 1, 2].map(|c| places[c][at].double());
             let of_stretch: f64 = (0..3).map(|c| of_place[c] * place[c]).sum();
             let along = |by: [f64; 2]| of_stretch * by[0] + angles[at].double() * by[1];
-            let grown = (cotangents[*k] * values[at] * part.share[at].1).double();
-            time[*k] += T::of(grown + along(by_time));
+            time[*k] += T::of(grown(at).double() + along(by_time));
             let of_radius = if r > 0.0 { along(by_radius) / r } else { 0.0 };
             for (c, to) in to.iter_mut().enumerate() {
                 to[*k] += T::of(stretch * of_place[c] + of_radius * place[c]);
@@ -232,6 +261,13 @@ impl<T: Float> Part<T> {
         columns.for_each(|(column, x)| column.push(T::of(stretch * x)));
     }
 
+    /// A point that is given by the place that its matter has at the label time, with its share.
+    fn push_carried(&mut self, (point, share): (usize, (T, T)), place: [T; 3]) {
+        self.points.push(point);
+        self.share.push(share);
+        self.pulled.iter_mut().zip(place).for_each(|(column, x)| column.push(x));
+    }
+
     fn turned(&self) -> Turned<'_, T> {
         let [x, y, z] = &self.stretched;
         Turned { points: Coordinates::xyz(x, y, z), angles: &self.angle }
@@ -264,6 +300,20 @@ impl<T: Float> Part<T> {
 impl<T: Float> Representation<T> for Changing<T> {
     fn dimension(&self) -> usize {
         4
+    }
+
+    fn is_carried(&self) -> bool {
+        self.carrier.is_none()
+    }
+
+    fn matrices(&self) -> Vec<WeightMatrix> {
+        let (inner, count) = (self.inner.matrices(), self.inner.parameters());
+        let of = |knot: usize| {
+            let behind =
+                move |m: &WeightMatrix| WeightMatrix { offset: m.offset + knot * count, ..*m };
+            inner.iter().map(behind)
+        };
+        (0..self.knots.count).flat_map(of).collect()
     }
 
     fn parameters(&self) -> usize {

@@ -1,7 +1,7 @@
 //! Emission as a function of coordinates and parameters.
 //!
-//! A [`Representation`] gets coordinates: it sees no metric, camera, flow or telescope. Those of
-//! space alone get points that the dynamics have pulled back to the reference time. Parameters
+//! A [`Representation`] gets coordinates: it sees no metric, camera, flow or telescope. Those that matter
+//! carries get points that the dynamics have pulled back to the reference time. Parameters
 //! are one flat slice that the caller owns; batches are columns of coordinates.
 //!
 //! [`conformance`] holds what every representation must pass.
@@ -144,6 +144,13 @@ impl<T> Groups<'_, T> {
 pub trait Representation<T: Float>: Send + Sync {
     /// Coordinates of a point: 3 (x, y, z) or 4 (t, x, y, z).
     fn dimension(&self) -> usize;
+
+    /// Whether a point is given by the place that its matter has at the reference time, rather than by where its light is
+    /// emitted: matter then carries the field along. Fields of space alone always are; those of (t, x, y, z) are fields of
+    /// events, unless they say so.
+    fn is_carried(&self) -> bool {
+        self.dimension() == 3
+    }
 
     /// Number of parameters.
     fn parameters(&self) -> usize;

@@ -37,7 +37,7 @@ impl<'a> Both<'a> {
             GraphicsFit::new(device, &objective, representation, &training, most).unwrap();
         let mut occupancy = now.occupancy.clone();
         if let Some(mask) = &mut occupancy {
-            mask.refresh(representation, &now.parameters, 3, &mut Workspace::new());
+            mask.refresh(representation, &now.parameters, (3, &[]), &mut Workspace::new());
             assert!(mask.fraction() > 0.05 && mask.fraction() < 0.95, "{}", mask.fraction());
         }
         Some(Self { graphics, objective, representation, training, occupancy, draw })

@@ -78,6 +78,7 @@ pub fn training(batch: BatchSize, masked: bool) -> Training {
         parts: 1,
         occupancy: masked.then_some(OccupancyPlan { settings, warm_up: 10, every: 7 }),
         penalties: None,
+        change: None,
         region: REGION,
         keep_every: 8,
         divergence: 1e3,

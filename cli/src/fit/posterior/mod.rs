@@ -102,11 +102,6 @@ pub fn check(file: &FitFile) -> anyhow::Result<()> {
     if file.instrument.as_ref().is_some_and(|instrument| instrument.leakage.is_some()) {
         bail!("a posterior needs leakage that is known: draws do not solve for it");
     }
-    if file.change.is_some() && file.unknown_world()?.is_some() {
-        bail!(
-            "a posterior needs a known world where emission changes: nothing is drawn from [change] and [world] together"
-        );
-    }
     if file.band.is_some() {
         bail!(
             "a fit with [band] has the posterior of its world in band.json: nothing else is drawn around it"
@@ -181,10 +176,17 @@ fn again(folder: &Folder, samples: u32) -> String {
 fn worlds<'a>(
     prepared: &'a Prepared<'_>,
     unknown: &'a UnknownWorld,
-    world: &Value,
+    (folder, world): (&Folder, &Value),
 ) -> anyhow::Result<WorldPosterior<'a>> {
+    let free = unknown.free()?;
+    let best = world_search::world_of(&prepared.file, &free, world)?;
+    if prepared.file.change.is_some() {
+        let spread = world_search::spread_of(&free, best, world)?;
+        let about = (&prepared.file, &prepared.measured);
+        let factor = noise_of(folder)?;
+        return Ok(WorldPosterior::around(about, unknown, (best, &spread), factor)?);
+    }
     eprintln!("the best world, once more");
-    let best = world_search::world_of(&prepared.file, &unknown.free()?, world)?;
     let noise = world["noise_factor"].as_f64().unwrap_or(1.0);
     let (file, measured) = (&prepared.file, &prepared.measured);
     Ok(WorldPosterior::new(file, measured, unknown, (best, noise))?)
@@ -220,7 +222,9 @@ impl<'a> Drawing<'a> {
         let world = world_search::found(folder)?;
         let complete = (1..=u64::from(samples)).all(|number| names(path, number)[1].is_file());
         let worlds = match (unknown, &world) {
-            (Some(unknown), Some(world)) if !complete => Some(worlds(prepared, unknown, world)?),
+            (Some(unknown), Some(world)) if !complete => {
+                Some(worlds(prepared, unknown, (folder, world))?)
+            }
             _ => None,
         };
         let factor = match &worlds {

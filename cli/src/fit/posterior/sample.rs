@@ -48,7 +48,7 @@ pub fn draw(
     let times = setup::emission_times(instrument, motion);
     let representation = setup::representation(file, registry, times)?;
     let (axis, rate) = setup::axis(file)?;
-    let training = setup::training(file, rate)?;
+    let training = setup::training(file, rate, times)?;
     let mut state = State::new(&*representation, axis, &training);
     let mut trainer = Trainer::new(objective, &*representation, training);
     if !begin(file, &mut trainer, &mut state, times, (keeper, told))? {
@@ -85,7 +85,6 @@ fn begin(
         Start::Linear { nodes, stride, steps, .. } => (nodes, stride, steps),
         _ => return Ok(true),
     };
-    let change = if is_linear { change } else { kerrlight_tomo::fit::linear::Change::NONE };
     let mut watch = |now: &LinearProgress<'_>| {
         told(&format!("linear grid, round {}, loss {:.4e}", now.round, now.value));
         if keeper.stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -100,7 +99,8 @@ fn begin(
     if is_linear {
         state.now.parameters = solution.parameters();
     } else {
-        setup::imprint(file, trainer.representation, &solution, nodes, steps, state)?;
+        let given = setup::Given { solution: &solution, nodes, knots: change.knots };
+        setup::imprint(file, trainer.representation, &given, steps, state)?;
     }
     Ok(true)
 }

@@ -1,6 +1,5 @@
 //! The recovered and the true emission on the nodes of a box, and how well they agree.
 
-use kerrlight_geodesic::vector::distance;
 use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::fit::setup::Truth;
 use kerrlight_tomo::fit::{Motion, State, Trainer};
@@ -50,15 +49,7 @@ pub fn carried(
     let nodes = Box3::new(file);
     // The diagonal of a cell: values between nodes of the region need their neighbours.
     let margin = 2.0 * nodes.half / (nodes.nodes[0] - 1) as f64 * 3f64.sqrt();
-    let passes = |x: [f64; 3]| {
-        let r = distance(x, [0.0; 3]);
-        let along: f64 = x.iter().zip(axis).map(|(x, axis)| x * axis).sum();
-        let across = (r * r - along * along).max(0.0).sqrt();
-        let reach = across * (1.0 - axis[2] * axis[2]).max(0.0).sqrt();
-        let least = (along * axis[2]).abs() - reach;
-        r > region.r_min - margin && r < region.r_max + margin && least <= region.z_width + margin
-    };
-    on_nodes(file, (trainer, None), state, &passes)
+    on_nodes(file, (trainer, None), state, &|x| region.is_passed(axis, x, margin))
 }
 
 /// The field at the reference time or another one, zero where nothing is wanted.

@@ -50,8 +50,9 @@ impl Run<'_> {
             "chi2_per_datum": chi2,
             "evaluations": loss.points,
         });
-        if let Some(penalties) = &self.trainer.training.penalties {
-            line["penalties"] = json!(map(penalties.names(), &loss.penalties));
+        let penalties = self.trainer.training.penalty_names();
+        if !penalties.is_empty() {
+            line["penalties"] = json!(map(penalties, &loss.penalties));
         }
         if !matches!(self.file.axis, AxisSearch::Known {}) {
             line["axis"] = json!(now.axis.vector());

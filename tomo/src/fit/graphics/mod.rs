@@ -102,7 +102,7 @@ impl GraphicsFit {
         model.pixel().iter().for_each(|pixel| lit[*pixel as usize] = true);
         let dark = (0..lit.len()).filter(|pixel| !lit[*pixel]).collect();
         let images_only = objective.data.others.is_empty() && !model.is_flux;
-        let events = representation.dimension() == 4;
+        let events = !representation.is_carried();
         let loaded_for = None;
         Ok(Self { device, pixels, learning, field, pieces, events, images_only, dark, loaded_for })
     }
@@ -347,6 +347,7 @@ pub fn check(
         (training.lbfgs.is_some(), "training.optimiser", "quasi-Newton steps are"),
         (training.learns_axis(representation), "axis", "the gradient of the axis is"),
         (training.penalties.is_some(), "penalty", "penalties are"),
+        (training.change.is_some(), "change", "emission that changes while matter carries it is"),
         (training.parts > 1, "training.parts", "steps in parts are"),
         (model.planes.is_some(), "polarization", "Stokes parameters are"),
         (model.fall.is_some(), "motion.velocity", "matter that changes its radius is"),

@@ -97,7 +97,7 @@ impl Change {
     }
 
     /// The penalty on values at the nodes of all knots, with cells of this volume (M³); adds its slopes.
-    pub(super) fn penalty(
+    pub(in crate::fit) fn penalty(
         &self,
         x: &[f64],
         (cell, upper): (f64, f64),

@@ -33,6 +33,10 @@ impl<T: Float> Representation<T> for Beside<T> {
         self.inner.dimension()
     }
 
+    fn is_carried(&self) -> bool {
+        self.inner.is_carried()
+    }
+
     fn parameters(&self) -> usize {
         self.inner.parameters() + self.columns
     }

@@ -1,6 +1,6 @@
 //! A setting that is chosen by data that are held out.
 
-use super::{FitError, FitFile, Kind, Linear};
+use super::{AxisSearch, FitError, FitFile, Kind, Linear, Start};
 use crate::Error;
 use serde::{Deserialize, Serialize};
 
@@ -67,6 +67,11 @@ impl Weight {
     }
 }
 
+/// Whether voxels are solved for, about an axis that is known, before anything is learnt.
+fn starts_linear(file: &FitFile) -> bool {
+    matches!(file.training.start, Start::Linear { .. }) && file.axis == (AxisSearch::Known {})
+}
+
 impl HeldOutSettings {
     /// Refuses what cannot be chosen.
     pub(in crate::fit) fn check(&self, file: &FitFile) -> Result<(), Error> {
@@ -77,8 +82,15 @@ impl HeldOutSettings {
             );
         }
         let has_prior = file.linear.as_ref().is_some_and(|linear| linear.prior.is_some());
-        let why = match (file.representation.kind == Kind::LinearGrid, self.setting) {
-            (false, _) => "needs representation.kind = \"linear-grid\"",
+        let is_linear = file.representation.kind == Kind::LinearGrid;
+        let why = match (is_linear, self.setting) {
+            (false, Weight::Change) if starts_linear(file) && file.change.is_some() => {
+                return Ok(());
+            }
+            (false, _) => {
+                "needs representation.kind = \"linear-grid\"; change.weight is also chosen for others that have a linear \
+                 start and a known axis"
+            }
             (true, Weight::Change) if file.change.is_none() => {
                 "chooses change.weight, and there is no [change]"
             }

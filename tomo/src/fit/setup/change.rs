@@ -48,12 +48,16 @@ pub(super) fn check(file: &FitFile) -> Result<()> {
     change.over([0.0, 0.0], file.region.limits())?;
     check_sharpen(file, change)?;
     match file.representation.kind {
+        Kind::LinearGrid if file.axis != (AxisSearch::Known {}) => refuse!(
+            "change with a linear-grid needs a known axis; add `[axis.known]` and `axis` in [motion]"
+        ),
         Kind::LinearGrid => {}
         Kind::Mlp4d => refuse!("change does not apply to mlp4d, which is free at every time"),
-        _ => refuse!("change needs representation.kind = \"linear-grid\""),
-    }
-    if file.axis != (AxisSearch::Known {}) {
-        refuse!("change needs a known axis; add `[axis.known]` and `axis` in [motion]");
+        _ if change.allowed == Allowed::Births => refuse!(
+            "change.allowed = \"births\" needs representation.kind = \"linear-grid\"; what is learnt in steps may appear \
+             and fade: \"any\""
+        ),
+        _ => {}
     }
     Ok(())
 }

@@ -6,7 +6,7 @@ use super::{Result, linear_problem};
 use crate::dynamics::Axis;
 use crate::fit::Objective;
 use crate::fit::linear::{Ending, LinearProgress};
-use crate::fit::settings::{FitError, FitFile, HeldOutSettings};
+use crate::fit::settings::{FitError, FitFile, HeldOutSettings, Kind, Start};
 use core::ops::ControlFlow;
 
 /// A value, and what frames that were held out say of it.
@@ -76,7 +76,7 @@ pub fn hold_out(
                 true => ControlFlow::Continue(()),
                 false => ControlFlow::Break(()),
             };
-            let nodes = file.representation.grid_nodes();
+            let nodes = nodes(&file);
             let problem = linear_problem::Of { file: &file, objective, how, nodes, seed: None };
             let solution = solve_frames(&problem, &part(true), &mut told)?;
             if solution.ending == Ending::Cancelled {
@@ -87,6 +87,14 @@ pub fn hold_out(
         found.push(Held { value, losses });
     }
     Ok(Some(found))
+}
+
+/// Nodes along each axis of the voxels that frames judge: those of the fit, or of its start.
+fn nodes(file: &FitFile) -> usize {
+    match file.training.start {
+        Start::Linear { nodes, .. } if file.representation.kind != Kind::LinearGrid => nodes,
+        _ => file.representation.grid_nodes(),
+    }
 }
 
 #[cfg(test)]

@@ -6,7 +6,8 @@ use crate::fit::settings::{FitFile, Kind, refuse};
 use crate::fit::{Region, State};
 use crate::optimise::{AdamState, Muon};
 use crate::representation::{
-    Activation, Coordinates, Gradient, Groups, Representation, Spline, WeightMatrix, Workspace,
+    Activation, Changing, Coordinates, Gradient, Groups, Knots, Representation, Spline,
+    WeightMatrix, Workspace,
 };
 use core::ops::Range;
 use rand::{RngExt, SeedableRng};
@@ -34,31 +35,37 @@ pub struct Imprinted {
     pub relative_error: f64,
 }
 
-/// Fits a representation to the solution of a linear problem on a grid of `nodes` along each axis, at random points of
-/// the region, with what does not move beside it: rounds of `steps` steps, until it is within a twentieth of the solution or four rounds are over.
+/// What a representation starts from.
+#[derive(Clone, Copy, Debug)]
+pub struct Given<'a> {
+    /// The solution of a linear problem.
+    pub solution: &'a LinearSolution<f32>,
+    /// Its nodes along each axis.
+    pub nodes: usize,
+    /// Times at which it has values.
+    pub knots: Knots,
+}
+
+/// Fits a representation to the solution of a linear problem, at random points of the region and, where emission changes, at
+/// random times, with what does not move beside it: rounds of `steps` steps, until it is within a twentieth of the solution
+/// or four rounds are over.
 ///
 /// # Errors
-/// If there is no table `linear`, or the emission does not have `nodes`³ values.
+/// If there is no table `linear`, or the emission does not have a value for each node and knot.
 pub fn imprint(
     file: &FitFile,
     representation: &dyn Representation<f32>,
-    found: &LinearSolution<f32>,
-    nodes: usize,
+    given: &Given<'_>,
     steps: u64,
     state: &mut State<f32>,
 ) -> Result<Imprinted> {
-    let emission = &*found.emission;
-    let own = state.now.parameters.len() - found.quiescent.len();
-    state.now.parameters[own..].copy_from_slice(&found.quiescent);
+    let quiescent = &given.solution.quiescent;
+    let own = state.now.parameters.len() - quiescent.len();
+    state.now.parameters[own..].copy_from_slice(quiescent);
     let (r, region) = (file.region.r_max, file.region.limits());
-    let spline = Spline::cube(nodes, r, linear(file)?.degree)?;
-    let (given, wanted) = (emission.len(), nodes.pow(3));
-    if given != wanted {
-        refuse!("the solution of the linear problem has {given} values; {wanted} are wanted");
-    }
-    let solution = Solution { spline, emission };
+    let solution = Solution::of(given, Spline::cube(given.nodes, r, linear(file)?.degree)?)?;
     if file.representation.kind == Kind::Grid {
-        read_off(file, &solution, &mut state.now.parameters);
+        read_off(file, &solution, &mut state.now.parameters[..own]);
         return Ok(Imprinted { steps: 0, relative_error: 0.0 });
     }
     let matrices = representation.matrices();
@@ -99,33 +106,54 @@ fn grown(step: u64, matrices: &[WeightMatrix]) -> f64 {
 
 /// What a linear problem has found.
 struct Solution<'a> {
-    spline: Spline,
+    /// Between the nodes, and between the knots.
+    field: Changing<f32>,
+    knots: Knots,
     emission: &'a [f32],
 }
 
-impl Solution<'_> {
-    fn at(&self, [x, y, z]: &[Vec<f32>; 3]) -> Vec<f32> {
+impl<'a> Solution<'a> {
+    fn of(given: &Given<'a>, spline: Spline) -> Result<Self> {
+        let Given { solution, nodes, knots } = *given;
+        let (has, wanted) = (solution.emission.len(), nodes.pow(3) * knots.count);
+        if has != wanted {
+            refuse!("the solution of the linear problem has {has} values; {wanted} are wanted");
+        }
+        let field = Changing::new(Box::new(spline), knots, None)?;
+        Ok(Self { field, knots, emission: &solution.emission })
+    }
+
+    fn at(&self, [time, x, y, z]: &[Vec<f32>; 4]) -> Vec<f32> {
         let mut values = vec![0.0; x.len()];
-        let at = Coordinates::xyz(x, y, z);
-        self.spline.eval(self.emission, at, &mut values, &mut Workspace::new());
+        let at = Coordinates::txyz(time, x, y, z);
+        self.field.eval(self.emission, at, &mut values, &mut Workspace::new());
         values
+    }
+
+    /// A time at which it shines.
+    fn time(&self, random: &mut Pcg64) -> f64 {
+        match self.knots.count {
+            1 => 0.0,
+            _ => random.random_range(self.knots.first..self.knots.last()),
+        }
     }
 }
 
 /// Random points of the region with what they should have.
 struct Draw {
-    /// x, y and z, M.
-    columns: [Vec<f32>; 3],
+    /// t, M since the reference time, and x, y and z, M.
+    columns: [Vec<f32>; 4],
     wanted: Vec<f32>,
 }
 
 impl Draw {
     fn new(random: &mut Pcg64, r: f64, region: &Region, solution: &Solution<'_>) -> Self {
-        let mut columns: [Vec<f32>; 3] = Default::default();
+        let mut columns: [Vec<f32>; 4] = Default::default();
         while columns[0].len() < POINTS {
-            let x: [f64; 3] = [0, 1, 2].map(|_| random.random_range(-r..r));
-            if region.holds(x) {
-                columns.iter_mut().zip(x).for_each(|(column, x)| column.push(x as f32));
+            let [x, y, z]: [f64; 3] = [0, 1, 2].map(|_| random.random_range(-r..r));
+            if region.holds([x, y, z]) {
+                let point = [solution.time(random), x, y, z];
+                columns.iter_mut().zip(point).for_each(|(column, x)| column.push(x as f32));
             }
         }
         let wanted = solution.at(&columns);
@@ -139,24 +167,19 @@ impl Draw {
         parameters: &[f32],
         workspace: &mut Workspace,
     ) -> [f64; 2] {
-        let zero = vec![0.0; POINTS];
         let mut values = vec![0.0; POINTS];
-        representation.eval(parameters, self.at(representation, &zero), &mut values, workspace);
+        representation.eval(parameters, self.at(representation), &mut values, workspace);
         let pairs = values.iter().zip(&self.wanted);
         pairs.fold([0.0; 2], |[apart, square], (e, wanted)| {
             [apart + f64::from(e - wanted).powi(2), square + f64::from(*wanted).powi(2)]
         })
     }
 
-    /// The points as a representation takes them, at time 0.
-    fn at<'a>(
-        &'a self,
-        representation: &dyn Representation<f32>,
-        zero: &'a [f32],
-    ) -> Coordinates<'a, f32> {
-        let [x, y, z] = &self.columns;
+    /// The points as a representation takes them.
+    fn at(&self, representation: &dyn Representation<f32>) -> Coordinates<'_, f32> {
+        let [time, x, y, z] = &self.columns;
         match representation.dimension() {
-            4 => Coordinates::txyz(zero, x, y, z),
+            4 => Coordinates::txyz(time, x, y, z),
             _ => Coordinates::xyz(x, y, z),
         }
     }
@@ -174,23 +197,34 @@ impl Draw {
             pairs.for_each(|((e, wanted), out)| *out = 2.0 * (e - wanted) / POINTS as f32);
         };
         let (starts, mut values): (Vec<usize>, _) = ((0..=POINTS).collect(), vec![0.0; POINTS]);
-        let zero = vec![0.0; POINTS];
-        let at = self.at(representation, &zero);
+        let at = self.at(representation);
         let into = Gradient { parameters: gradient, coordinates: None };
         let groups = Groups { starts: &starts, link: &link };
         representation.eval_vjp(parameters, at, groups, &mut values, into, workspace);
     }
 }
 
-/// The parameters of a grid whose nodes have these values.
+/// The parameters of a grid whose nodes have these values, knot after knot.
 fn read_off(file: &FitFile, solution: &Solution<'_>, parameters: &mut [f32]) {
     let (n, r) = (file.representation.grid_nodes(), file.region.r_max);
     let at = |k: usize| (-r + 2.0 * r * k as f64 / (n - 1) as f64) as f32;
-    let of = |node: fn(usize, usize) -> usize| (0..n * n * n).map(|k| at(node(k, n))).collect();
-    let values = solution.at(&[of(|k, n| k / (n * n)), of(|k, n| k / n % n), of(|k, n| k % n)]);
+    let of = |node: fn(usize, usize) -> usize| -> Vec<f32> {
+        (0..n * n * n).map(|k| at(node(k, n))).collect()
+    };
+    let [x, y, z] = [of(|k, n| k / (n * n)), of(|k, n| k / n % n), of(|k, n| k % n)];
+    let knots = solution.knots.times().into_iter().zip(parameters.chunks_exact_mut(n * n * n));
+    for (time, parameters) in knots {
+        let time = vec![time as f32; n * n * n];
+        let values = solution.at(&[time, x.clone(), y.clone(), z.clone()]);
+        set_nodes(file.representation.activation, &values, parameters);
+    }
+}
+
+/// The parameters of nodes that have these values.
+fn set_nodes(activation: Activation, values: &[f32], parameters: &mut [f32]) {
     for (parameter, value) in parameters.iter_mut().zip(values) {
-        let value = f64::from(value);
-        *parameter = match file.representation.activation {
+        let value = f64::from(*value);
+        *parameter = match activation {
             // As dark and as bright as a sigmoid is at ±10.
             Activation::Sigmoid => {
                 let held = value.clamp(4.54e-5, 1.0 - 4.54e-5);

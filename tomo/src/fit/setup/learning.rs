@@ -8,12 +8,14 @@ use crate::fit::settings;
 use crate::fit::settings::{
     FieldKind, FitError, FitFile, Kind, LossKind, Occupancy, Optimiser, Start, Within, refuse,
 };
-use crate::fit::{BatchSize, Beside, OccupancyPlan, OccupancySettings, Region, Training};
+use crate::fit::{
+    BatchSize, Beside, ChangePrice, OccupancyPlan, OccupancySettings, Region, Training,
+};
 use crate::memory;
 use crate::optimise::{Adam, Lbfgs, Muon, Polynomial};
 use crate::representation::{
     Activation, Carrier, Changing, Degree, FeatureGrid, FeatureGridSettings, Grid, GridSettings,
-    Network, NetworkSettings, OwnSettings, Registry, Representation, Spline,
+    Knots, Network, NetworkSettings, OwnSettings, Registry, Representation, Spline,
 };
 
 /// What is recovered, with the parameters of what does not move behind its own; `registry` has what the program adds to kerrlight's own representations. Where emission
@@ -45,13 +47,32 @@ fn over_time(
     if knots.count == 1 {
         return Ok(inner);
     }
-    let parameters = inner.parameters() as f64 * knots.count as f64;
-    let what = || format!("change.spacing: {} times of {} voxels", knots.count, inner.parameters());
-    memory::afford(what, memory::parameters(parameters))?;
-    let (axis, velocity) = (axis(file)?.0, motion(file, Vec::new())?.velocity);
-    let Region { r_min, r_max, .. } = file.region.limits();
-    let carrier = Carrier { axis, velocity, limits: [r_min, r_max] };
+    if file.representation.kind == Kind::Bhnerf {
+        return Ok(Box::new(changing_network(file, knots)?));
+    }
+    let (count, each) = (knots.count, inner.parameters());
+    let what = || format!("change.spacing: {count} times of {each} parameters");
+    memory::afford(what, memory::parameters(each as f64 * count as f64))?;
+    let carrier = match file.representation.kind {
+        Kind::LinearGrid => Some(carrier(file)?),
+        _ => None,
+    };
     Ok(Box::new(Changing::new(inner, knots, carrier)?))
+}
+
+/// A network of place and time, whatever `representation.time_scale` is.
+fn changing_network(file: &FitFile, knots: Knots) -> Result<Network> {
+    let paper = NetworkSettings::changing([knots.spacing, knots.last() - knots.first]);
+    let time_scale = paper.time_scale;
+    let settings = NetworkSettings { time_scale, ..chosen_network(&file.representation, paper) };
+    Network::new(settings).within("representation")
+}
+
+/// The motion that carries voxels, whose births are given at places of several times.
+fn carrier(file: &FitFile) -> Result<Carrier> {
+    let Region { r_min, r_max, .. } = file.region.limits();
+    let (axis, velocity) = (axis(file)?.0, motion(file, Vec::new())?.velocity);
+    Ok(Carrier { axis, velocity, limits: [r_min, r_max] })
 }
 
 /// What is recovered where matter carries emission unchanged.
@@ -135,11 +156,16 @@ fn own(name: &str, file: &FitFile, registry: &Registry) -> Result<Box<dyn Repres
     Err(FitError::range("representation.kind", format!("{name:?}"), &known.join(", ")).into())
 }
 
-/// How it is learnt.
+/// How it is learnt; where emission may change, `times` are those of the first and the last emission, M since the reference
+/// time ([`emission_times`](super::emission_times)).
 ///
 /// # Errors
 /// If a number is out of range, or settings contradict each other.
-pub fn training(file: &FitFile, axis_rate: Option<Polynomial>) -> Result<Training> {
+pub fn training(
+    file: &FitFile,
+    axis_rate: Option<Polynomial>,
+    times: [f64; 2],
+) -> Result<Training> {
     let chosen = &file.training;
     let (name, rate) = rates(file);
     if matches!(chosen.batch, BatchSize::Pixels(0) | BatchSize::Frames(0)) {
@@ -165,10 +191,22 @@ pub fn training(file: &FitFile, axis_rate: Option<Polynomial>) -> Result<Trainin
         parts: chosen.parts as usize,
         occupancy,
         penalties: file.penalties()?,
+        change: price(file, times)?,
         region: file.region.limits(),
         keep_every: 50,
         divergence: 1e3,
     })
+}
+
+/// What change costs in steps; the linear problem has its own price.
+fn price(file: &FitFile, times: [f64; 2]) -> Result<Option<ChangePrice>> {
+    let kind = &file.representation.kind;
+    if file.change.is_none() || *kind == Kind::LinearGrid {
+        return Ok(None);
+    }
+    let Change { knots, weight, .. } = change(file, times)?;
+    let linear = *kind != Kind::Bhnerf;
+    Ok(Some(ChangePrice { weight, knots, linear, region: file.region.limits() }))
 }
 
 /// What is allowed and most probably not meant.
@@ -240,7 +278,8 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
     let (_, axis_rate) = axis(file)?;
     afford(file, registry)?;
     file.check_unknowns()?;
-    let training = training(file, axis_rate)?;
+    // Of any length: those of the data are known once rays are traced.
+    let training = training(file, axis_rate, [0.0, 0.0])?;
     change::check(file)?;
     polarized::check(file)?;
     quiescent::check(file)?;

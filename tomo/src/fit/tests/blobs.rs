@@ -2,10 +2,21 @@
 
 use super::*;
 
-/// A field without kinks, so that differences converge: Σ a exp(−|x − c|²/8), four parameters and, of
-/// events, one for the time a blob.
+/// A field without kinks, so that differences converge: Σ a exp(−|x − c|²/8), four parameters and, where it has a
+/// time, one for that a blob.
+#[derive(Clone, Copy)]
 pub(in crate::fit) struct Blobs {
     pub dimension: usize,
+    pub carried: bool,
+}
+
+impl Blobs {
+    /// Carried along unchanged.
+    pub const STEADY: Self = Self { dimension: 3, carried: true };
+    /// Carried along, and changing on the way.
+    pub const CHANGING: Self = Self { dimension: 4, carried: true };
+    /// Of events.
+    pub const EVENTS: Self = Self { dimension: 4, carried: false };
 }
 
 const BLOBS: usize = 3;
@@ -32,6 +43,10 @@ impl Blobs {
 impl Representation<f64> for Blobs {
     fn dimension(&self) -> usize {
         self.dimension
+    }
+
+    fn is_carried(&self) -> bool {
+        self.carried
     }
 
     fn parameters(&self) -> usize {

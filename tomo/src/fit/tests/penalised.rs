@@ -4,6 +4,7 @@ use super::training::settings;
 use super::*;
 use crate::fit::linear::Prior;
 use crate::optimise::Polynomial;
+use crate::representation::{Allowed, Changing, Knots};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -17,14 +18,12 @@ fn region() -> Region {
 }
 
 /// A trainer whose loss is all frames with these penalties.
-fn penalised<'a>(
-    representation: &'a dyn Representation<f64>,
-    penalties: Penalties,
-) -> Trainer<'a, f64> {
+fn penalised(representation: &dyn Representation<f64>, penalties: Penalties) -> Trainer<'_, f64> {
     let training = Training {
         batch: BatchSize::All,
         occupancy: None,
         penalties: Some(penalties),
+        change: None,
         ..settings()
     };
     Trainer::new(objective(true, true, true), representation, training)
@@ -68,11 +67,27 @@ fn exact_gradient_of_the_whole_loss_by_differences() {
         check(&mut penalised(&grid, penalties), &start(&grid), 3, false);
     }
     // Fields that may be negative, where sparsity has a kink.
-    for dimension in [3, 4] {
-        let blobs = Blobs { dimension };
+    for blobs in [Blobs::STEADY, Blobs::CHANGING, Blobs::EVENTS] {
         let (priors, probe) = (priors(&all[..2]), Probe::Moved { nodes: 9 });
         let penalties = Penalties { priors, probe, region: region() };
-        check(&mut penalised(&blobs, penalties), &start(&blobs), 5, dimension == 3);
+        check(&mut penalised(&blobs, penalties), &start(&blobs), 5, blobs.carried);
+    }
+}
+
+/// Emission that changes while matter carries it has its price in the loss, with its gradient.
+#[test]
+fn exact_gradient_of_a_loss_with_change_by_differences() {
+    let knots = Knots { first: -20.0, spacing: 15.0, count: 4, allowed: Allowed::Any };
+    let steps = Changing::new(Box::new(grid()), knots, None).unwrap();
+    let of_time: [(&dyn Representation<f64>, bool); 2] =
+        [(&steps, true), (&Blobs::CHANGING, false)];
+    for (representation, linear) in of_time {
+        let change = ChangePrice { weight: 0.01, knots, linear, region: region() };
+        let (batch, change) = (BatchSize::All, Some(change));
+        let training = Training { batch, change, occupancy: None, penalties: None, ..settings() };
+        let mut trainer = Trainer::new(objective(true, true, true), representation, training);
+        check(&mut trainer, &start(representation), 5, !linear);
+        assert_eq!(trainer.training.penalty_names(), ["change"]);
     }
 }
 

@@ -12,7 +12,7 @@ fn training() -> Training {
 /// Data that a field makes with an axis are explained to the last digits, from elsewhere; the axis is found.
 #[test]
 fn exact_parameters_and_axis_are_found_again() {
-    let blobs = Blobs { dimension: 3 };
+    let blobs = Blobs::STEADY;
     let (known, axis) = (start(&blobs), Axis::new([0.3, -0.5, 0.8]).unwrap());
     let mut objective = objective(true, true, false);
     objective.model.weigh(axis);

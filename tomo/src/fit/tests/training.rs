@@ -22,6 +22,7 @@ pub(super) fn settings() -> Training {
             every: 7,
         }),
         penalties: None,
+        change: None,
         region: Region { r_min: 3.0, r_max: 6.0, z_width: 4.0 },
         keep_every: 8,
         divergence: 1e3,

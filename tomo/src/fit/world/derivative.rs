@@ -23,12 +23,12 @@ pub(crate) struct PointCotangents<T> {
 
 impl<T: Float> PointCotangents<T> {
     /// From pulled-back points to the points themselves, with their angles held, and to the angles.
-    fn pull(&mut self, batch: &Batch<T>, axis: Axis, dimension: usize) {
+    fn pull(&mut self, batch: &Batch<T>, axis: Axis, carried: bool) {
         let count = batch.points();
         let [a, b, c, _] = &self.coordinates;
         self.angles.clear();
         self.angles.resize(count, T::zero());
-        if dimension == 4 {
+        if !carried {
             for (place, coordinate) in self.places.iter_mut().zip([a, b, c]) {
                 place.clone_from(coordinate);
             }
@@ -53,12 +53,12 @@ impl<T: Float> PointCotangents<T> {
         &mut self,
         model: &ForwardModel<T>,
         batch: &Batch<T>,
-        (axis, dimension): (Axis, usize),
+        (axis, carried): (Axis, bool),
         tangents: &Tangents,
         mut pair: impl FnMut(usize, &[f64]),
     ) {
-        self.pull(batch, axis, dimension);
-        let falls = tangents.falls.as_ref().filter(|_| dimension == 3);
+        self.pull(batch, axis, carried);
+        let falls = tangents.falls.as_ref().filter(|_| carried);
         let free = tangents.free.len();
         let mut sums = vec![0.0; free];
         for (group, (_, frame)) in batch.pairs.iter().enumerate() {
@@ -75,6 +75,11 @@ impl<T: Float> PointCotangents<T> {
             }
             pair(group, &sums);
         }
+    }
+
+    /// With respect to the time at which emission is evaluated, of fields that have one.
+    fn of_time(&self, point: usize) -> f64 {
+        self.coordinates[3].get(point).map_or(0.0, |slope| slope.double())
     }
 
     /// The same as [`Self::point`] of matter that changes its radius.
@@ -100,12 +105,13 @@ impl<T: Float> PointCotangents<T> {
         let of_place = [0, 1, 2].map(|c| self.places[c][point].double());
         let along: f64 = (0..3).map(|c| of_place[c] * model.position[c][node].double()).sum();
         let (of_weight, of_angle) = (self.weights[point].double(), self.angles[point].double());
+        let of_time = self.of_time(point);
         for ((sum, by), parameter) in sums.iter_mut().zip(moves).zip(&tangents.free) {
             let [x, y, z] = by.position;
             let moved = of_place[0] * x + of_place[1] * y + of_place[2] * z;
             let k = parameter.index();
             *sum += stretch.value * moved + along * stretch.slope[k];
-            *sum += of_angle * angle.slope[k] + of_weight * by.weight;
+            *sum += of_angle * angle.slope[k] + of_weight * by.weight + of_time * elapsed.slope[k];
         }
     }
 
@@ -124,8 +130,7 @@ impl<T: Float> PointCotangents<T> {
         let of_angle = self.angles[point].double();
         let of_place = [0, 1, 2].map(|c| self.places[c][point].double());
         let of_rate = of_angle * batch.columns.time[point].double();
-        let of_time =
-            of_angle * rate + self.coordinates[3].get(point).map_or(0.0, |slope| slope.double());
+        let of_time = of_angle * rate + self.of_time(point);
         let moves = &tangents.moves[node * sums.len()..(node + 1) * sums.len()];
         for (sum, by) in sums.iter_mut().zip(moves) {
             let [x, y, z] = by.position;
@@ -164,7 +169,7 @@ impl<T: Float> ForwardModel<T> {
         batch.gather_field(self, field);
         let (count, dimension) = (batch.points(), field.representation.dimension());
         values.resize(count, T::zero());
-        let at = Batch::coordinates(&batch.columns, dimension);
+        let at = Batch::coordinates(&batch.columns, field.representation);
         field.representation.eval(field.parameters, at, values, workspace);
         for column in &mut cotangents.coordinates {
             column.clear();
@@ -185,7 +190,8 @@ impl<T: Float> ForwardModel<T> {
         cotangents.weights.clone_from(values);
         let mut images = vec![vec![T::zero(); self.pixels()]; tangents.free.len()];
         let pixels = self.pixel();
-        cotangents.contract(self, batch, (field.axis, dimension), tangents, |group, slopes| {
+        let how = (field.axis, field.representation.is_carried());
+        cotangents.contract(self, batch, how, tangents, |group, slopes| {
             let pixel = pixels[batch.pairs[group].0 as usize] as usize;
             for (image, slope) in images.iter_mut().zip(slopes) {
                 image[pixel] = T::of(*slope);

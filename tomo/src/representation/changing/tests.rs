@@ -27,7 +27,7 @@ fn field(count: usize, allowed: Allowed) -> Changing<f64> {
     let knots = Knots { first: -0.3, spacing: 0.25, count, allowed };
     let axis = Axis::new(AXIS).unwrap();
     let carrier = Carrier { axis, velocity: velocity(), limits: [0.0, 2.0] };
-    Changing::new(Box::new(Grid::new(settings()).unwrap()), knots, carrier).unwrap()
+    Changing::new(Box::new(Grid::new(settings()).unwrap()), knots, Some(carrier)).unwrap()
 }
 
 /// Shares of the knots at a time, and their growth: hat functions, or ramps that stay up.
@@ -125,7 +125,7 @@ fn exact_slopes_of_falling_fields_are_those_of_differences() {
         let axis = Axis::new(AXIS).unwrap();
         let carrier = Carrier { axis, velocity, limits: [2.0, 12.0] };
         let grid = Grid::new(settings.clone()).unwrap();
-        let field = Changing::<f64>::new(Box::new(grid), knots, carrier).unwrap();
+        let field = Changing::<f64>::new(Box::new(grid), knots, Some(carrier)).unwrap();
         let mut random = Pcg64::seed_from_u64(3);
         let mut draw = |low: f64, high: f64| random.random_range(low..high);
         let parameters: Vec<f64> = (0..field.parameters()).map(|_| draw(-1.0, 1.0)).collect();

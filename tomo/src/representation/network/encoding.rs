@@ -4,12 +4,14 @@ use super::super::{Coordinates, CoordinatesMut};
 use super::dense::{Matrix, MatrixMut};
 use crate::simd::{Float, Lanes, MAX_LANES, Task, math};
 
-/// Rows γ(x) = [x, sin 2ʲx, sin(2ʲx + π/2)] (for each j the coordinates one after the other), then a
+/// Rows γ(x) = [p x, sin 2ʲx, sin(2ʲx + π/2)] (for each j the coordinates one after the other), then a
 /// one.
 pub struct Encode<'a, T> {
     pub at: Coordinates<'a, T>,
     /// What coordinates are multiplied with, in their order.
     pub scales: &'a [T],
+    /// p, the part of the first that enters without sine and cosine; 1 of all others.
+    pub part: T,
     pub degree: usize,
     pub output: MatrixMut<'a, T>,
 }
@@ -24,7 +26,7 @@ impl<T: Float> Task<T> for Encode<'_, T> {
         for (block, rows) in rows.enumerate().take(self.at.len().div_ceil(V::LANES)) {
             for (d, (column, scale)) in self.at.columns().iter().zip(self.scales).enumerate() {
                 let x = V::load_or(&column[block * V::LANES..], T::zero()) * V::splat(*scale);
-                put(x, rows, stride, d);
+                put(if d == 0 { x * V::splat(self.part) } else { x }, rows, stride, d);
                 let mut x = x;
                 for j in 0..self.degree {
                     let (sin, cos) = math::sin_cos::<T, V>(x);
@@ -52,7 +54,7 @@ fn put<T: Float, V: Lanes<T>>(x: V, rows: &mut [T], stride: usize, column: usize
 pub fn encode_vjp<T: Float>(
     rows: Matrix<'_, T>,
     cotangents: Matrix<'_, T>,
-    scales: &[T],
+    (scales, part): (&[T], T),
     degree: usize,
     gradient: &mut CoordinatesMut<'_, T>,
 ) {
@@ -62,7 +64,8 @@ pub fn encode_vjp<T: Float>(
         let points = rows.numbers.chunks(rows.stride);
         let points = points.zip(cotangents.numbers.chunks(cotangents.stride));
         for (out, (row, cotangent)) in gradient.iter_mut().zip(points) {
-            let (mut sum, mut factor) = (cotangent[d], T::one());
+            let plain = if d == 0 { part * cotangent[d] } else { cotangent[d] };
+            let (mut sum, mut factor) = (plain, T::one());
             for j in 0..degree {
                 let sin = dimension * (1 + j) + d;
                 let cos = sin + dimension * degree;

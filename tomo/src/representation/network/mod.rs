@@ -22,7 +22,8 @@ use batch::{Memory, Way};
 use layout::{Layer, Layout};
 use output::Cotangents;
 
-/// A network with positional encoding: `bhnerf` of (x, y, z), `mlp4d` of (t, x, y, z).
+/// A network with positional encoding: `bhnerf` of (x, y, z), `mlp4d` of (t, x, y, z); where emission changes while
+/// matter carries it, `bhnerf` has the time as well.
 ///
 /// Parameters are layer after layer, each its kernel (inputs × outputs, row by row) and then its
 /// biases; a layer after the skip has the encoded point behind the units of the layer before.
@@ -80,8 +81,13 @@ impl<T: Float + Default> Representation<T> for Network {
         self.settings.dimension
     }
 
+    fn is_carried(&self) -> bool {
+        self.settings.dimension == 3 || self.settings.carried
+    }
+
     fn built_in(&self) -> Option<BuiltIn<'_>> {
-        Some(BuiltIn::Network(self))
+        // Kernels of devices know one scale of the time.
+        self.settings.time_span.is_none().then_some(BuiltIn::Network(self))
     }
 
     fn parameters(&self) -> usize {

@@ -12,6 +12,7 @@ pub struct Packed<T> {
     layers: Vec<Panels<T>>,
     output: Lines<T>,
     scales: [T; 4],
+    part: T,
 }
 
 #[derive(Default)]
@@ -48,6 +49,7 @@ impl<T: Float + Default> Packed<T> {
         let weights = &parameters[output.offset..output.offset + output.size()];
         self.output.all()[..weights.len()].copy_from_slice(weights);
         self.scales = network.scales();
+        self.part = T::of(network.settings.time_part());
     }
 
     /// Panels of a hidden layer with its bias.
@@ -73,6 +75,11 @@ impl<T: Float + Default> Packed<T> {
     /// What coordinates are multiplied with, in their order.
     pub fn scales(&self) -> &[T; 4] {
         &self.scales
+    }
+
+    /// The part of the first that enters without sine and cosine.
+    pub fn part(&self) -> T {
+        self.part
     }
 }
 

@@ -19,6 +19,9 @@ pub enum Initialisation {
 pub struct NetworkSettings {
     /// 3 for (x, y, z), 4 for (t, x, y, z).
     pub dimension: usize,
+    /// Whether (x, y, z) is the place that matter has at the reference time, rather than that of an event. Of space alone it
+    /// always is.
+    pub carried: bool,
     /// Positional encoding degree L: γ(x) = [x, sin 2ʲx, sin(2ʲx + π/2)], j = 0..L − 1.
     pub degree: usize,
     /// Units of a hidden layer.
@@ -31,6 +34,9 @@ pub struct NetworkSettings {
     pub length_scale: f64,
     /// Times are divided by it before they are encoded.
     pub time_scale: f64,
+    /// What times are divided by where they enter without sine and cosine, if it is not `time_scale`: far from 0 these inputs
+    /// drown the others.
+    pub time_span: Option<f64>,
     /// The last function, of the output plus `shift`.
     pub activation: Activation,
     /// See `activation`.
@@ -45,12 +51,14 @@ impl NetworkSettings {
     pub fn bhnerf() -> Self {
         Self {
             dimension: 3,
+            carried: true,
             degree: 3,
             width: 128,
             hidden_layers: 4,
             skip_after: Some(3),
             length_scale: 1.0,
             time_scale: 1.0,
+            time_span: None,
             activation: Activation::Sigmoid,
             shift: -10.0,
             initialisation: Initialisation::HeUniform,
@@ -59,7 +67,20 @@ impl NetworkSettings {
 
     /// The same of (t, x, y, z), without dynamics: 56,961 parameters.
     pub fn mlp4d() -> Self {
-        Self { dimension: 4, ..Self::bhnerf() }
+        Self { dimension: 4, carried: false, ..Self::bhnerf() }
+    }
+
+    /// The network of BH-NeRF with the time as one more input: emission that changes while matter carries it, in no less than
+    /// about `shortest` M, and for as long as `longest`.
+    pub fn changing([shortest, longest]: [f64; 2]) -> Self {
+        // A quarter of the shortest period, 2π time_scale/2^(L − 1), is 0.8 times the shortest time.
+        let (time_scale, time_span) = (2.0 * shortest, Some(0.25 * longest));
+        Self { dimension: 4, time_scale, time_span, ..Self::bhnerf() }
+    }
+
+    /// What the time is multiplied by after its division by `time_scale`, where it enters without sine and cosine.
+    pub(super) fn time_part(&self) -> f64 {
+        self.time_span.map_or(1.0, |span| self.time_scale / span)
     }
 
     /// Numbers of an encoded point.
@@ -82,6 +103,8 @@ impl NetworkSettings {
         let positive = |x: f64| x.is_finite() && x > 0.0;
         check("length_scale", self.length_scale, positive(self.length_scale), "above 0")?;
         check("time_scale", self.time_scale, positive(self.time_scale), "above 0")?;
+        let span = self.time_span.unwrap_or(1.0);
+        check("time_span", span, positive(span), "above 0")?;
         check("shift", self.shift, self.shift.is_finite(), "a finite number")
     }
 }

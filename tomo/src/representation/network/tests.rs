@@ -39,6 +39,9 @@ fn encode(settings: &NetworkSettings, at: &[f64], dat: &[f64]) -> (Vec<f64>, Vec
     let scaled = |v: &[f64]| v.iter().enumerate().map(|(k, v)| v / scale(k)).collect::<Vec<_>>();
     let (x, dx) = (scaled(at), scaled(dat));
     let (mut gamma, mut change) = (x.clone(), dx.clone());
+    if let (4, Some(span)) = (settings.dimension, settings.time_span) {
+        (gamma[0], change[0]) = (at[0] / span, dat[0] / span);
+    }
     for shift in [0.0, core::f64::consts::FRAC_PI_2] {
         for j in 0..settings.degree {
             let factor = f64::from(1 << j);
@@ -78,6 +81,7 @@ fn exact_bhnerf_conforms() {
 #[test]
 fn exact_mlp4d_conforms() {
     conforms(NetworkSettings { time_scale: 2.5, ..NetworkSettings::mlp4d() });
+    conforms(NetworkSettings::changing([1.5, 30.0]));
 }
 
 #[test]

@@ -34,7 +34,7 @@ fn changing(voxels: &Voxels, knots: Knots) -> Changing<f64> {
 
 fn changing_of(velocity: AngularVelocity, voxels: &Voxels, knots: Knots) -> Changing<f64> {
     let carrier = Carrier { axis: axis(), velocity, limits: [0.0, 5.0] };
-    Changing::new(Box::new(voxels.field().unwrap()), knots, carrier).unwrap()
+    Changing::new(Box::new(voxels.field().unwrap()), knots, Some(carrier)).unwrap()
 }
 
 fn images(model: &ForwardModel<f64>, field: &Changing<f64>, x: &[f64]) -> Vec<f64> {

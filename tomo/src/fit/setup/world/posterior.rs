@@ -86,6 +86,10 @@ fn enveloped(
     problem.envelope(polished, &others, (inflation, &Polish::default()))
 }
 
+/// Why there are no worlds to draw.
+const NO_BEST: &str =
+    "the data leave a parameter of the world open: there is no best world to draw others around";
+
 /// Worlds that the data leave possible: the volume of each is the best one of data with noise once more, in that world
 /// (its marginal distribution, then what is left of the volume: Rue & Held 2005, section 2.3).
 pub struct WorldPosterior<'a> {
@@ -120,18 +124,29 @@ impl<'a> WorldPosterior<'a> {
             let (polished, reduced) = polished(problem, &start)?;
             Ok((surely(problem, &polished, reduced)?, reduced))
         })?;
-        let Some(Spread { open, sigma, correlation, .. }) = spread else {
-            refuse!(
-                "the data leave a parameter of the world open: there is no best world to draw others around"
-            );
-        };
+        let Some(spread) = spread else { refuse!("{NO_BEST}") };
+        let factor = noise_factor * reduced.max(1.0).sqrt();
+        Self::around((file, measured), unknown, (world, &spread), factor)
+    }
+
+    /// About a world whose errors a search has found, in data whose noise is `factor` times their errors: for emission that
+    /// changes, whose best volume is another one in each world.
+    ///
+    /// # Errors
+    /// If a prior is out of its range.
+    pub fn around(
+        (file, measured): (&'a FitFile, &'a Measured),
+        unknown: &UnknownWorld,
+        (world, spread): (World, &Spread),
+        factor: f64,
+    ) -> Result<Self> {
+        let Spread { open, sigma, correlation, .. } = spread;
         let n = sigma.len();
         let covariance =
             DMatrix::from_fn(n, n, |a, b| correlation[a * n + b] * sigma[a] * sigma[b]);
-        let apart = || DMatrix::from_diagonal(&DVector::from_column_slice(&sigma));
+        let apart = || DMatrix::from_diagonal(&DVector::from_column_slice(sigma));
         let root = covariance.cholesky().map_or_else(apart, |factors| factors.l());
-        let factor = noise_factor * reduced.max(1.0).sqrt();
-        Ok(Self { file, measured, free: unknown.free()?, world, root, open, factor })
+        Ok(Self { file, measured, free: unknown.free()?, world, root, open: open.clone(), factor })
     }
 
     /// Noise of a draw over the data's errors.
