@@ -79,7 +79,9 @@ pub fn table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) -> 
     if lines.is_empty() {
         return Table {
             title: format!("{}: {unit}", asked.title),
-            caption: format!("Nothing to show: no case that was run to its end has a {unit}."),
+            caption: format!(
+                "Nothing to show: this value ({unit}) is missing in all cases that were run to their end."
+            ),
             head: Vec::new(),
             rows: Vec::new(),
             links: Vec::new(),

@@ -1,7 +1,7 @@
 //! What things are called in sentences.
 
 use kerrlight_tomo::fit::settings::{FitFile, Kind};
-use kerrlight_tomo::fit::world::Parameter;
+use kerrlight_tomo::fit::world::{KNOTS, Parameter};
 
 /// Kinds of representations, in a few words.
 pub fn representation(kind: &Kind) -> &str {
@@ -50,5 +50,25 @@ pub fn parameter(parameter: Parameter) -> (&'static str, &'static str) {
         Parameter::Xi => ("angular momentum over that of circular orbits", ""),
         Parameter::BetaR => ("part of the radial velocity that is not free fall", ""),
         Parameter::BetaPhi => ("part of the angular velocity that is not free fall", ""),
+        Parameter::Angular(knot) => (ANGULAR[usize::from(knot)], ""),
+        Parameter::Radial(knot) => (RADIAL[usize::from(knot)], ""),
     }
 }
+
+/// At the knots of a profile.
+const ANGULAR: [&str; KNOTS] = [
+    "angular velocity at the first radius over the assumed one",
+    "angular velocity at the second radius over the assumed one",
+    "angular velocity at the third radius over the assumed one",
+    "angular velocity at the fourth radius over the assumed one",
+    "angular velocity at the fifth radius over the assumed one",
+    "angular velocity at the sixth radius over the assumed one",
+];
+const RADIAL: [&str; KNOTS] = [
+    "radial velocity at the first radius over the assumed one",
+    "radial velocity at the second radius over the assumed one",
+    "radial velocity at the third radius over the assumed one",
+    "radial velocity at the fourth radius over the assumed one",
+    "radial velocity at the fifth radius over the assumed one",
+    "radial velocity at the sixth radius over the assumed one",
+];

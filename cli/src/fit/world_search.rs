@@ -122,6 +122,14 @@ fn settled(file: &FitFile, unknown: &UnknownWorld, world: &World) -> FitFile {
                 *drag = None;
             }
         }
+        Velocity::Profile { angular, radial, .. } if unknown.knots > 0 => {
+            let times = |values: &mut [f64], of: fn(u8) -> Parameter| {
+                let factors = (0..).map(|knot| world.get(of(knot)));
+                values.iter_mut().zip(factors).for_each(|(value, factor)| *value *= factor);
+            };
+            times(angular, Parameter::Angular);
+            times(radial, Parameter::Radial);
+        }
         _ => {}
     }
     file

@@ -94,8 +94,7 @@ impl Falling {
         if profile.is_circular() {
             return Err(Error::out_of_range("radial", 0.0, "not 0, where matter falls"));
         }
-        // To inside of any horizon.
-        let table = profile.trajectory(0.5);
+        let table = profile.trajectory();
         Ok(Self { law, factor: 1.0, flow: None, table, circular: f64::INFINITY })
     }
 
@@ -113,7 +112,7 @@ impl Falling {
     pub fn slopes(&self, r: f64) -> [Along<f64>; 2] {
         let r = Along::parameter(r, 0);
         let [fall, turn] = match (&self.law, &self.flow) {
-            (Law::Profile(profile), _) => profile.rates(r),
+            (Law::Profile(profile), _) => profile.rates(r, Along::constant),
             (Law::Family { .. }, Some(flow)) => flow.rates(outside(flow, r)),
             (Law::Family { .. }, None) => [Along::constant(0.0); 2],
         };

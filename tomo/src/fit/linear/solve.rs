@@ -76,18 +76,24 @@ impl<T: Float + Default> LinearProblem<'_, T> {
     /// # Errors
     /// As those of [`solve`](Self::solve).
     pub fn least(&self, iterations: usize) -> Result<Least, Error> {
-        self.least_from(None, iterations)
+        self.least_from(None, (iterations, 0.0))
     }
 
-    /// The same from a field at all nodes, where data are convex.
+    /// The same from a field at all nodes, where data are convex. Iterations may end earlier, where ten of them lower the
+    /// function by less than the second number times what noise changes it by ([`LinearSettings::settled`]).
     ///
     /// # Errors
     /// As those of [`solve`](Self::solve).
     ///
     /// # Panics
     /// If the field has another number of values.
-    pub fn least_from(&self, start: Option<&[f64]>, iterations: usize) -> Result<Least, Error> {
-        let settings = LinearSettings { coarse: None, tolerance: 0.0, ..LinearSettings::default() };
+    pub fn least_from(
+        &self,
+        start: Option<&[f64]>,
+        (iterations, settled): (usize, f64),
+    ) -> Result<Least, Error> {
+        let usual = LinearSettings::default();
+        let settings = LinearSettings { coarse: None, tolerance: 0.0, settled, ..usual };
         self.check(&settings)?;
         let data = self.data()?;
         let operator = Operator::new(self.walk(), self.all(), self.frames, settings.memory);

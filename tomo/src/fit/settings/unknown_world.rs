@@ -4,7 +4,7 @@ use super::world::SIMULATED;
 use super::{FitError, FitFile, Within};
 use crate::Error;
 use crate::dynamics::Velocity;
-use crate::fit::world::{Free, Parameter, Prior, Scanned};
+use crate::fit::world::{Free, KNOTS, Parameter, Prior, Scanned};
 use crate::toml_file;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -37,6 +37,13 @@ pub struct UnknownWorld {
     pub beta_r: Option<PriorSettings>,
     /// β_φ of the same.
     pub beta_phi: Option<PriorSettings>,
+    /// Ω at each knot of `motion.velocity.profile` over that of the file, dimensionless.
+    pub angular_factors: Option<PriorSettings>,
+    /// dr/dt at each of them over that of the file.
+    pub radial_factors: Option<PriorSettings>,
+    /// How many knots there are.
+    #[serde(skip)]
+    pub knots: usize,
     /// Whether what is simulated has values drawn from the priors, another draw for each seed: for calibration.
     #[serde(default)]
     pub drawn: bool,
@@ -128,6 +135,10 @@ const MOST_SCANNED: usize = 3;
 const MOST_POINTS: usize = 100_000;
 
 impl UnknownWorld {
+    fn has(&self, knot: u8) -> bool {
+        usize::from(knot) < self.knots
+    }
+
     fn prior(&self, parameter: Parameter) -> Option<PriorSettings> {
         match parameter {
             Parameter::Spin => self.spin,
@@ -141,6 +152,8 @@ impl UnknownWorld {
             Parameter::Xi => self.xi,
             Parameter::BetaR => self.beta_r,
             Parameter::BetaPhi => self.beta_phi,
+            Parameter::Angular(knot) => self.angular_factors.filter(|_| self.has(knot)),
+            Parameter::Radial(knot) => self.radial_factors.filter(|_| self.has(knot)),
         }
     }
 
@@ -152,7 +165,7 @@ impl UnknownWorld {
         let given = Parameter::ALL.into_iter().filter_map(|p| Some((p, self.prior(p)?)));
         let free: Vec<Free> = given.map(|(p, prior)| free(p, prior)).collect::<Result<_, _>>()?;
         if free.is_empty() {
-            let names = Parameter::ALL.map(Parameter::name).join(", ");
+            let names = parameter_keys().join(", ");
             let why = format!(
                 "world.search looks for parameters with a prior, and there is none; give one of {names}"
             );
@@ -221,6 +234,12 @@ impl UnknownWorld {
                 (Parameter::Xi, Velocity::Infall { xi, .. }) => *xi = value,
                 (Parameter::BetaR, Velocity::Infall { beta_r, .. }) => *beta_r = value,
                 (Parameter::BetaPhi, Velocity::Infall { beta_phi, .. }) => *beta_phi = value,
+                (Parameter::Angular(knot), Velocity::Profile { angular, .. }) => {
+                    angular[usize::from(knot)] *= value;
+                }
+                (Parameter::Radial(knot), Velocity::Profile { radial, .. }) => {
+                    radial[usize::from(knot)] *= value;
+                }
                 _ => {}
             }
         }
@@ -280,9 +299,15 @@ fn free(parameter: Parameter, settings: PriorSettings) -> Result<Free, Error> {
     Ok(Free { parameter, prior })
 }
 
+/// What settings call the parameters: those of all knots together have one prior.
+fn parameter_keys() -> Vec<&'static str> {
+    let single = Parameter::ALL.into_iter().filter(|parameter| !parameter.is_of_knots());
+    single.map(Parameter::name).chain(["angular_factors", "radial_factors"]).collect()
+}
+
 /// Refuses keys that are neither simulated nor parameters.
 fn check_keys(world: &Table) -> Result<(), Error> {
-    let names = Parameter::ALL.map(Parameter::name);
+    let names = parameter_keys();
     let known = || SIMULATED.iter().chain(&names).chain(&["search", "drawn"]);
     let Some(key) = world.keys().find(|key| !known().any(|name| name == key)) else {
         return Ok(());
@@ -304,7 +329,8 @@ impl FitFile {
         if table.is_empty() {
             return Ok(None);
         }
-        let world: UnknownWorld = toml_file::read_table(&table).within("world")?;
+        let mut world: UnknownWorld = toml_file::read_table(&table).within("world")?;
+        world.knots = self.knots_of(&world)?;
         world.check()?;
         let is_free = |parameter: &Parameter| world.prior(*parameter).is_some();
         let flow = Parameter::FLOW.into_iter().find(is_free);
@@ -320,6 +346,30 @@ impl FitFile {
         }
         self.check_drag(&world)?;
         Ok(Some(world))
+    }
+
+    /// Knots of the profile that the factors of a world are those of.
+    fn knots_of(&self, world: &UnknownWorld) -> Result<usize, Error> {
+        let (turns, falls) = (world.angular_factors.is_some(), world.radial_factors.is_some());
+        let key = if turns { "angular_factors" } else { "radial_factors" };
+        let velocity = &self.motion.velocity;
+        let why = match velocity {
+            _ if !turns && !falls => return Ok(0),
+            Velocity::Profile { radii, .. } if radii.len() > KNOTS => {
+                let allowed = format!("{KNOTS} at most beside world.{key}");
+                let key = "length of motion.velocity.profile.radii";
+                return Err(FitError::range(key, radii.len(), &allowed).into());
+            }
+            Velocity::Profile { .. } if falls && !velocity.falls() => {
+                "world.radial_factors: motion.velocity.profile.radial is 0 everywhere, times any factor".to_owned()
+            }
+            Velocity::Profile { radii, .. } => return Ok(radii.len()),
+            _ => format!(
+                "world.{key} is for `velocity = {{ profile = {{ radii, angular, radial }} }}` in [motion], which is \
+                 another law here"
+            ),
+        };
+        Err(FitError::Conflict(why).into())
     }
 
     /// Where the flow follows the hole, it does so in the file as well: a simulation would have another flow otherwise.

@@ -44,7 +44,7 @@ impl FitFile {
         }
         if !knows_phase(self) {
             all.push(format!(
-                "{} carry no phases: they cannot distinguish an image from itself rotated by 180°; only orbits, lensing and Doppler shifts can",
+                "data without phases ({}) cannot distinguish an image from itself rotated by 180°; only orbits, lensing and Doppler shifts can",
                 data(self)
             ));
         }

@@ -1,9 +1,10 @@
 //! How falling matter is carried along, for numbers that carry derivatives.
 
+use super::model::at_knots;
 use super::{Law, Number, Parameter, World, WorldModel};
 use crate::Error;
 use crate::dynamics::AngularVelocity;
-use crate::dynamics::infall::{Falling, Family, Flow, Trajectory};
+use crate::dynamics::infall::{Falling, Family, Flow, Profile, Trajectory};
 use kerrlight_geodesic::Scalar;
 use kerrlight_geodesic::infall::Mixture;
 
@@ -15,6 +16,8 @@ pub(super) enum Rates<'a> {
     Fixed(&'a Falling, Number),
     /// Of the family.
     Family(Box<Flow<Number>>),
+    /// Between knots.
+    Profile(Box<Profile<Number>>),
 }
 
 /// What of the flow the tangents of nodes take: rates, and the table of the fall.
@@ -49,6 +52,14 @@ impl<'a> Flowing<'a> {
                     rates: Rates::Family(Box::new(family.flowing()?)),
                 })
             }
+            Law::Profile(profile) => {
+                let profile = Box::new(at_knots(profile, numbers, factor));
+                Ok(Self {
+                    table: profile.falls().then(|| profile.trajectory()),
+                    circular: f64::INFINITY,
+                    rates: Rates::Profile(profile),
+                })
+            }
             _ => Ok(Self { rates: Rates::Circular, table: None, circular: 0.0 }),
         }
     }
@@ -65,6 +76,15 @@ impl<'a> Flowing<'a> {
                 Some([fall, turn * *factor])
             }
             Rates::Family(flow) => Some(flow.rates(r)),
+            Rates::Profile(profile) => profile.falls().then(|| profile.rates(r, |x| x)),
+        }
+    }
+
+    /// Ω at a radius of matter that stays there, where knots say it.
+    pub fn turning(&self, r: Number) -> Option<Number> {
+        match &self.rates {
+            Rates::Profile(profile) => Some(profile.rates(r, |x| x)[1]),
+            _ => None,
         }
     }
 

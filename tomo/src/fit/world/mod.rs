@@ -60,13 +60,38 @@ pub enum Parameter {
     BetaR,
     /// β_φ of the same: the same of the angular velocity.
     BetaPhi,
+    /// Ω at a knot of [`Law::Profile`] over that of the profile, dimensionless.
+    Angular(u8),
+    /// dr/dt at a knot of the same, over that of the profile.
+    Radial(u8),
 }
 
+/// Knots of a [`Law::Profile`], at most.
+pub const KNOTS: usize = 6;
+
 /// Number of parameters.
-pub const PARAMETERS: usize = 11;
+pub const PARAMETERS: usize = 11 + 2 * KNOTS;
 
 /// A number with its derivatives with respect to all parameters.
 pub(super) type Number = Dual<f64, PARAMETERS>;
+
+/// Names of the factors at the knots.
+const ANGULAR: [&str; KNOTS] = [
+    "angular_factor_0",
+    "angular_factor_1",
+    "angular_factor_2",
+    "angular_factor_3",
+    "angular_factor_4",
+    "angular_factor_5",
+];
+const RADIAL: [&str; KNOTS] = [
+    "radial_factor_0",
+    "radial_factor_1",
+    "radial_factor_2",
+    "radial_factor_3",
+    "radial_factor_4",
+    "radial_factor_5",
+];
 
 impl Parameter {
     /// All of them, in the order of [`World`].
@@ -82,6 +107,18 @@ impl Parameter {
         Parameter::Xi,
         Parameter::BetaR,
         Parameter::BetaPhi,
+        Parameter::Angular(0),
+        Parameter::Angular(1),
+        Parameter::Angular(2),
+        Parameter::Angular(3),
+        Parameter::Angular(4),
+        Parameter::Angular(5),
+        Parameter::Radial(0),
+        Parameter::Radial(1),
+        Parameter::Radial(2),
+        Parameter::Radial(3),
+        Parameter::Radial(4),
+        Parameter::Radial(5),
     ];
 
     /// Those of [`Law::Infall`] alone.
@@ -89,7 +126,26 @@ impl Parameter {
 
     /// Its place in [`World`].
     pub fn index(self) -> usize {
-        self as usize
+        match self {
+            Parameter::Spin => 0,
+            Parameter::Inclination => 1,
+            Parameter::PositionAngle => 2,
+            Parameter::OffsetX => 3,
+            Parameter::OffsetY => 4,
+            Parameter::Mass => 5,
+            Parameter::Rotation => 6,
+            Parameter::RedshiftPower => 7,
+            Parameter::Xi => 8,
+            Parameter::BetaR => 9,
+            Parameter::BetaPhi => 10,
+            Parameter::Angular(knot) => 11 + usize::from(knot),
+            Parameter::Radial(knot) => 11 + KNOTS + usize::from(knot),
+        }
+    }
+
+    /// Whether it is a factor at a knot of [`Law::Profile`].
+    pub fn is_of_knots(self) -> bool {
+        matches!(self, Parameter::Angular(_) | Parameter::Radial(_))
     }
 
     /// What settings and results call it.
@@ -106,6 +162,8 @@ impl Parameter {
             Parameter::Xi => "xi",
             Parameter::BetaR => "beta_r",
             Parameter::BetaPhi => "beta_phi",
+            Parameter::Angular(knot) => ANGULAR[usize::from(knot)],
+            Parameter::Radial(knot) => RADIAL[usize::from(knot)],
         }
     }
 
@@ -129,6 +187,7 @@ impl Parameter {
             Parameter::Rotation => [-10.0, 10.0],
             Parameter::RedshiftPower => [-10.0, 10.0],
             Parameter::Xi | Parameter::BetaR | Parameter::BetaPhi => [0.0, 1.0],
+            Parameter::Angular(_) | Parameter::Radial(_) => [1e-3, 1e3],
         }
     }
 
@@ -146,11 +205,12 @@ impl Parameter {
             Parameter::Spin => 0.3,
             Parameter::Inclination | Parameter::PositionAngle => 0.2,
             Parameter::OffsetX | Parameter::OffsetY => 0.5,
-            Parameter::Mass | Parameter::Rotation => 0.1,
+            Parameter::Mass | Parameter::Rotation | Parameter::Angular(_) => 0.1,
             Parameter::RedshiftPower => 0.5,
             Parameter::Xi => 0.15,
             Parameter::BetaR => 0.05,
             Parameter::BetaPhi => 0.1,
+            Parameter::Radial(_) => 0.3,
         }
     }
 }
@@ -160,10 +220,21 @@ impl Parameter {
 pub struct World([f64; PARAMETERS]);
 
 impl World {
-    /// A hole of the reference mass in the middle of the screen, its spin towards north, matter as fast as the law, and
-    /// on circular orbits where the law has three more parameters.
+    /// A hole of the reference mass in the middle of the screen, its spin towards north, matter as fast as the law or the
+    /// profile, and on circular orbits where the law has three more parameters.
     pub fn new(spin: f64, inclination: f64, redshift_power: f64) -> Self {
-        World([spin, inclination, 0.0, 0.0, 0.0, 1.0, 1.0, redshift_power, 1.0, 1.0, 1.0])
+        let mut world = World([1.0; PARAMETERS]);
+        for (parameter, value) in [
+            (Parameter::Spin, spin),
+            (Parameter::Inclination, inclination),
+            (Parameter::PositionAngle, 0.0),
+            (Parameter::OffsetX, 0.0),
+            (Parameter::OffsetY, 0.0),
+            (Parameter::RedshiftPower, redshift_power),
+        ] {
+            world = world.with(parameter, value);
+        }
+        world
     }
 
     /// Of a parameter.
@@ -193,6 +264,7 @@ impl World {
                     Parameter::Mass => "0.001 to 1000",
                     Parameter::Rotation | Parameter::RedshiftPower => "-10 to 10",
                     Parameter::Xi | Parameter::BetaR | Parameter::BetaPhi => "0 to 1",
+                    Parameter::Angular(_) | Parameter::Radial(_) => "0.001 to 1000",
                 };
                 return Err(Error::out_of_range(parameter.name(), value, allowed));
             }

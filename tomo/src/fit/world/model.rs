@@ -1,9 +1,9 @@
 //! From a world to the forward model of a fit.
 
 use super::tangents::Tangents;
-use super::{Number, Parameter, World};
+use super::{Number, PARAMETERS, Parameter, World};
 use crate::Error;
-use crate::dynamics::infall::{self, Falling};
+use crate::dynamics::infall::{self, Falling, Profile};
 use crate::dynamics::{AngularVelocity, Axis};
 use crate::fit::pixel_rays::PixelRays;
 use crate::fit::{
@@ -15,7 +15,7 @@ use crate::simd::Float;
 use kerrlight_geodesic::infall::Mixture;
 use kerrlight_geodesic::node_gradients;
 use kerrlight_geodesic::simd::{NodeRequest, PanelRule};
-use kerrlight_geodesic::{Inclination, Kerr, Observer, Quantities};
+use kerrlight_geodesic::{Elementary, Inclination, Kerr, Observer, Quantities};
 use std::sync::Arc;
 
 /// How matter moves before [`Parameter::Rotation`] is applied.
@@ -28,6 +28,8 @@ pub enum Law {
     /// The family between circular orbits and free fall that [`Parameter::Xi`], [`Parameter::BetaR`] and
     /// [`Parameter::BetaPhi`] say, about a spin (M) of the flow's own or, without one, that of each world along the axis.
     Infall(Option<f64>),
+    /// Ω and dr/dt at knots, each times its [`Parameter::Angular`] or [`Parameter::Radial`].
+    Profile(Profile),
 }
 
 impl Law {
@@ -36,6 +38,7 @@ impl Law {
         let factor = world.get(Parameter::Rotation);
         let law = match self {
             Law::Infall(drag) => infall(*drag, world, axis)?,
+            Law::Profile(profile) => profiled(&at_knots(profile, world.0, 1.0))?,
             _ => self.circular(world.get(Parameter::Spin) * axis.vector()[2]),
         };
         Ok(match law {
@@ -63,6 +66,30 @@ impl Law {
         let bend = core::array::from_fn(|k| slope * r.slope[k] + by_spin * spin.slope[k]);
         factor * Number { value: rate, slope: bend }
     }
+}
+
+/// A profile in a world, all its angular velocities times a factor.
+pub(super) fn at_knots<N: Elementary>(
+    profile: &Profile,
+    world: [N; PARAMETERS],
+    factor: N,
+) -> Profile<N> {
+    let knots = |of: fn(u8) -> Parameter| {
+        (0..profile.knots() as u8).map(move |knot| world[of(knot).index()])
+    };
+    let angular: Vec<N> = knots(Parameter::Angular).map(|by| by * factor).collect();
+    let radial: Vec<N> = knots(Parameter::Radial).collect();
+    profile.times(&angular, &radial)
+}
+
+fn profiled(profile: &Profile) -> Result<AngularVelocity, Error> {
+    Ok(match profile.is_circular() {
+        true => AngularVelocity::Profile(profile.clone()),
+        false => {
+            let law = infall::Law::Profile(profile.clone());
+            AngularVelocity::Falling(Arc::new(Falling::new(law)?))
+        }
+    })
 }
 
 /// The family's flow in a world.
@@ -247,11 +274,7 @@ impl WorldModel {
     }
 
     /// α and β of a place on the screen (M to the right and upwards), M: α across the spin's projection, β along it.
-    pub(super) fn place(
-        &self,
-        numbers: &[Number; super::PARAMETERS],
-        place: [f64; 2],
-    ) -> [Number; 2] {
+    pub(super) fn place(&self, numbers: &[Number; PARAMETERS], place: [f64; 2]) -> [Number; 2] {
         use kerrlight_geodesic::{Elementary, Scalar};
         let of = |parameter: Parameter| numbers[parameter.index()];
         let (sin, cos) = of(Parameter::PositionAngle).sin_cos();

@@ -122,8 +122,8 @@ impl Builder<'_> {
         let r = (x * x + y * y + z * z).sqrt();
         let spin = of(Parameter::Spin);
         let falling = self.flow.at(r);
-        let velocity = match falling {
-            Some([_, turn]) => turn,
+        let velocity = match falling.map(|[_, turn]| turn).or_else(|| self.flow.turning(r)) {
+            Some(turn) => turn,
             None => {
                 let along = Number::constant(self.model.axis.vector()[2]);
                 self.model.law.rate(r, spin * along, of(Parameter::Rotation))

@@ -3,6 +3,7 @@
 mod posterior;
 mod search;
 mod seen;
+mod sureness;
 
 pub use posterior::WorldPosterior;
 pub use search::{FoundWorld, SearchWatch, Trial, find_world};
@@ -10,8 +11,9 @@ pub use search::{FoundWorld, SearchWatch, Trial, find_world};
 use super::instrument::ring;
 use super::{Instrument, Measured, Result, axis, drag, motion};
 use crate::dynamics::Velocity;
+use crate::dynamics::infall::Profile;
 use crate::fit::settings::{AxisSearch, FitError, FitFile, UnknownWorld};
-use crate::fit::world::{Law, Parameter, World, WorldModel};
+use crate::fit::world::{KNOTS, Law, Parameter, World, WorldModel};
 use crate::fit::{Motion, Redshift, Sampling};
 use kerrlight_geodesic::Kerr;
 
@@ -30,8 +32,33 @@ pub fn known_world(file: &FitFile) -> World {
 /// # Errors
 /// If a setting is missing or out of range.
 pub fn true_world(file: &FitFile) -> Result<World> {
-    let (world, view) = (known_world(&file.simulated()?), drawn_view(file)?);
+    let simulated = file.simulated()?;
+    let (world, view) = (known_world(&simulated), drawn_view(file)?);
+    let world = relative(world, &simulated.motion.velocity, &file.motion.velocity);
     Ok(view.into_iter().fold(world, |world, (parameter, value)| world.with(parameter, value)))
+}
+
+/// With the factors by which a profile differs from the one that a fit knows.
+fn relative(world: World, truth: &Velocity, known: &Velocity) -> World {
+    let (
+        Velocity::Profile { radii, angular, radial },
+        Velocity::Profile { radii: known_radii, angular: known_angular, radial: known_radial },
+    ) = (truth, known)
+    else {
+        return world;
+    };
+    if radii != known_radii {
+        return world;
+    }
+    let pairs = |truth: &[f64], known: &[f64], of: fn(u8) -> Parameter| -> Vec<(Parameter, f64)> {
+        let ratios = truth.iter().zip(known).map(|(x, y)| if *y == 0.0 { 1.0 } else { x / y });
+        ratios.take(KNOTS).enumerate().map(|(k, ratio)| (of(k as u8), ratio)).collect()
+    };
+    let factors = [
+        pairs(angular, known_angular, Parameter::Angular),
+        pairs(radial, known_radial, Parameter::Radial),
+    ];
+    factors.concat().into_iter().fold(world, |world, (p, value)| world.with(p, value))
 }
 
 fn drawn_view(file: &FitFile) -> Result<Vec<(Parameter, f64)>> {
@@ -127,6 +154,9 @@ fn model(
         Velocity::Keplerian { .. } if follows => Law::CircularOrbits,
         Velocity::Infall { .. } if follows => Law::Infall(None),
         Velocity::Infall { drag: own, .. } => Law::Infall(Some(own.unwrap_or(drag(file)?))),
+        Velocity::Profile { ref radii, ref angular, ref radial } if unknown.knots > 0 => {
+            Law::Profile(Profile::new(radii.clone(), angular.clone(), radial.clone())?)
+        }
         _ => Law::Fixed(motion.velocity.clone()),
     };
     let [x, y] = instrument.pixels.clone();

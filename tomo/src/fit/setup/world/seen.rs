@@ -71,6 +71,7 @@ impl Seen {
                 nodes: view.nodes,
                 degree: settings.degree,
                 iterations: view.iterations,
+                settles: false,
             },
         })
     }
