@@ -80,7 +80,7 @@ pub fn table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) -> 
         return Table {
             title: format!("{}: {unit}", asked.title),
             caption: format!(
-                "Nothing to show: this value ({unit}) is missing in all cases that were run to their end."
+                "Nothing to show: no case that was run to its end has this value ({unit})."
             ),
             head: Vec::new(),
             rows: Vec::new(),

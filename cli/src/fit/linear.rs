@@ -71,6 +71,9 @@ pub fn imprinted(found: &Imprinted) -> Value {
     })
 }
 
+/// A gap, over the dark field's loss, that certifies nothing.
+const LOOSE: f64 = 0.5;
+
 /// What may be claimed of a solution.
 pub fn statement(solution: &LinearSolution<f32>) -> String {
     let stopped = !matches!(solution.ending, Ending::Converged | Ending::Rounding);
@@ -78,9 +81,15 @@ pub fn statement(solution: &LinearSolution<f32>) -> String {
         if !certificate.relative_gap().is_finite() {
             return "minimum of a convex problem: the dark field explains the data".to_owned();
         }
+        let gap = certificate.relative_gap();
+        if gap > LOOSE {
+            return format!(
+                "not a certified minimum: the global one of this convex problem may lie lower by {gap:.1e} of the dark \
+                 field's loss"
+            );
+        }
         return format!(
-            "certified minimum of a convex problem: at most {:.1e} of the dark field's loss above the global minimum",
-            certificate.relative_gap()
+            "certified minimum of a convex problem: at most {gap:.1e} of the dark field's loss above the global minimum"
         );
     }
     let slope = solution.stationarity.map_or(f64::NAN, |s| s.relative_violation());

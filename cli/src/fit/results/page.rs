@@ -107,8 +107,10 @@ impl Estimate<'_> {
     fn lensed(&self, still: &Still) -> anyhow::Result<report::Figure> {
         let mut images = vec![("recovered", &still.recovered)];
         images.extend(still.truth.as_ref().map(|truth| ("truth", truth)));
-        let (delay, shift) = (self.file.effects.slow_light, self.file.effects.redshift_power);
-        let with = match (delay, shift.is_some()) {
+        let delay = self.file.effects.slow_light;
+        // A law of polarised light has a power of g of its own.
+        let shift = self.file.effects.redshift_power.is_some() || self.file.polarization.is_some();
+        let with = match (delay, shift) {
             (true, true) => "delays and Doppler shifts included",
             (true, false) => "delays included, Doppler shifts left out as in the fit",
             (false, true) => "Doppler shifts included, delays left out as in the fit",

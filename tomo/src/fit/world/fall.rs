@@ -1,6 +1,6 @@
 //! How falling matter is carried along, for numbers that carry derivatives.
 
-use super::model::at_knots;
+use super::knots::at_knots;
 use super::{Law, Number, Parameter, World, WorldModel};
 use crate::Error;
 use crate::dynamics::AngularVelocity;

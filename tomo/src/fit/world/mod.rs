@@ -8,6 +8,7 @@ mod derivative;
 mod envelope;
 mod explore;
 mod fall;
+mod knots;
 mod model;
 mod polish;
 mod prior;

@@ -1,5 +1,6 @@
 //! From a world to the forward model of a fit.
 
+use super::knots::at_knots;
 use super::tangents::Tangents;
 use super::{Number, PARAMETERS, Parameter, World};
 use crate::Error;
@@ -15,7 +16,7 @@ use crate::simd::Float;
 use kerrlight_geodesic::infall::Mixture;
 use kerrlight_geodesic::node_gradients;
 use kerrlight_geodesic::simd::{NodeRequest, PanelRule};
-use kerrlight_geodesic::{Elementary, Inclination, Kerr, Observer, Quantities};
+use kerrlight_geodesic::{Inclination, Kerr, Observer, Quantities};
 use std::sync::Arc;
 
 /// How matter moves before [`Parameter::Rotation`] is applied.
@@ -66,20 +67,6 @@ impl Law {
         let bend = core::array::from_fn(|k| slope * r.slope[k] + by_spin * spin.slope[k]);
         factor * Number { value: rate, slope: bend }
     }
-}
-
-/// A profile in a world, all its angular velocities times a factor.
-pub(super) fn at_knots<N: Elementary>(
-    profile: &Profile,
-    world: [N; PARAMETERS],
-    factor: N,
-) -> Profile<N> {
-    let knots = |of: fn(u8) -> Parameter| {
-        (0..profile.knots() as u8).map(move |knot| world[of(knot).index()])
-    };
-    let angular: Vec<N> = knots(Parameter::Angular).map(|by| by * factor).collect();
-    let radial: Vec<N> = knots(Parameter::Radial).collect();
-    profile.times(&angular, &radial)
 }
 
 fn profiled(profile: &Profile) -> Result<AngularVelocity, Error> {
