@@ -28,6 +28,7 @@ pub fn lines(results: &Value) -> Vec<String> {
         .collect();
     lines.extend(small_residuals(results).map(|said| format!("note: {said}")));
     lines.extend(rival(results).map(|said| format!("note: {said}")));
+    lines.extend(unexplained(results).map(|said| format!("note: {said}")));
     let chi2 = reduced(results["chi2_per_datum"].as_f64().unwrap_or(f64::NAN));
     lines.push(match results["scan"]["worlds"].as_u64() {
         Some(worlds) => format!("world: a grid of {worlds} worlds was scanned; χ²/N = {chi2}"),
@@ -92,6 +93,7 @@ pub fn sentences(results: &Value) -> Vec<String> {
     let mut all: Vec<String> = Parameter::ALL.into_iter().filter_map(of).collect();
     all.extend(small_residuals(results).map(|said| format!("Note that {said}.")));
     all.extend(rival(results).map(|said| format!("Note that {said}.")));
+    all.extend(unexplained(results).map(|said| format!("Note that {said}.")));
     all.push(world_scan::sentence(&results["scan"]).unwrap_or_else(|| {
         format!(
             "The world was searched for from {} places; {} of the searches ended near the best one.",
@@ -123,6 +125,18 @@ fn rival(results: &Value) -> Option<String> {
          leave it out: {}",
         above(&nearest),
         values.join(", ")
+    ))
+}
+
+/// χ²/N of the best world above which its errors do not hold.
+const ROUGH: f64 = 1.2;
+
+/// Why errors of the world do not hold where its volume leaves data unexplained.
+fn unexplained(results: &Value) -> Option<String> {
+    let chi2 = results["chi2_per_datum"].as_f64().filter(|chi2| *chi2 > ROUGH)?;
+    Some(format!(
+        "the volume of the best world leaves χ²/N = {chi2:.2}, which pulls at the world more than its errors say: \
+         world.search.fine needs more iterations or nodes, or the model is wrong"
     ))
 }
 
@@ -187,6 +201,19 @@ mod tests {
         assert!(said[2].contains("between 176.060° and 181.940°"), "{}", said[2]);
         assert!(said[3].contains("from 4 places; 3 of the searches"), "{}", said[3]);
         assert!(lines(&found())[3].contains("3 of 4 starts"));
+    }
+
+    #[test]
+    fn exact_errors_that_do_not_hold_are_told() {
+        let mut results = found();
+        let says = |results: &Value| {
+            let all = [lines(results), sentences(results)];
+            all.map(|said| said.iter().any(|line| line.contains("more than its errors say")))
+        };
+        results["chi2_per_datum"] = json!(1.1);
+        assert_eq!(says(&results), [false; 2]);
+        results["chi2_per_datum"] = json!(3.3);
+        assert_eq!(says(&results), [true; 2]);
     }
 
     #[test]

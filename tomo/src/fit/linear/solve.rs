@@ -76,24 +76,18 @@ impl<T: Float + Default> LinearProblem<'_, T> {
     /// # Errors
     /// As those of [`solve`](Self::solve).
     pub fn least(&self, iterations: usize) -> Result<Least, Error> {
-        self.least_from(None, (iterations, 0.0))
+        self.least_from(None, iterations)
     }
 
-    /// The same from a field at all nodes, where data are convex. Iterations may end earlier, where ten of them lower the
-    /// function by less than the second number times what noise changes it by ([`LinearSettings::settled`]).
+    /// The same from a field at all nodes, where data are convex.
     ///
     /// # Errors
     /// As those of [`solve`](Self::solve).
     ///
     /// # Panics
     /// If the field has another number of values.
-    pub fn least_from(
-        &self,
-        start: Option<&[f64]>,
-        (iterations, settled): (usize, f64),
-    ) -> Result<Least, Error> {
-        let usual = LinearSettings::default();
-        let settings = LinearSettings { coarse: None, tolerance: 0.0, settled, ..usual };
+    pub fn least_from(&self, start: Option<&[f64]>, iterations: usize) -> Result<Least, Error> {
+        let settings = LinearSettings { coarse: None, tolerance: 0.0, ..LinearSettings::default() };
         self.check(&settings)?;
         let data = self.data()?;
         let operator = Operator::new(self.walk(), self.all(), self.frames, settings.memory);

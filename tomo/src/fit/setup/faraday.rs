@@ -138,7 +138,7 @@ impl Search<'_> {
         let of = Of { file, objective: self.objective, how, nodes, seed: None };
         let (iterations, start) = (self.settings.iterations, self.start.as_deref());
         let least = of.with(&frames, |problem| {
-            LinearProblem { model: &model, ..*problem }.least_from(start, (iterations, 0.0))
+            LinearProblem { model: &model, ..*problem }.least_from(start, iterations)
         })?;
         self.tried.push(Tried { angle_deg, loss: least.value });
         self.start = Some(least.x);

@@ -89,7 +89,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         iterations: usize,
     ) -> Result<Estimate, Error> {
         let forward: ForwardModel<T> = self.model.forward(&world)?;
-        let least = self.linear(&forward).least_from(Some(x), self.effort.stop(iterations))?;
+        let least = self.linear(&forward).least_from(Some(x), iterations)?;
         Ok(self.estimate(world, least))
     }
 

@@ -125,18 +125,6 @@ pub struct Effort {
     pub degree: Degree,
     /// Iterations from a dark field.
     pub iterations: usize,
-    /// Whether all solutions may end earlier: where ten iterations lower χ² by so little that worlds are told apart by more.
-    pub settles: bool,
-}
-
-/// Of what noise changes χ² by: a third of a unit, of fifteen thousand data.
-const NEXT_TO_NOTHING: f64 = 2e-3;
-
-impl Effort {
-    /// When solutions end.
-    pub(super) fn stop(&self, iterations: usize) -> (usize, f64) {
-        (iterations, if self.settles { NEXT_TO_NOTHING } else { 0.0 })
-    }
 }
 
 /// A world with the volume that explains the data best in it.
@@ -175,8 +163,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
     /// If a number is out of its range, or χ² is not finite.
     pub fn solve(&self, world: World) -> Result<Estimate, Error> {
         let forward: ForwardModel<T> = self.model.forward(&world)?;
-        let stop = self.effort.stop(self.effort.iterations);
-        let least = self.linear(&forward).least_from(None, stop)?;
+        let least = self.linear(&forward).least(self.effort.iterations)?;
         Ok(self.estimate(world, least))
     }
 

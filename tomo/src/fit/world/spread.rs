@@ -27,24 +27,6 @@ const PLENTY: usize = 2;
 const CLEAR: f64 = 4.0;
 
 impl Spread {
-    /// The same with another error beside, by which all free parameters are wrong together, in their own units.
-    #[must_use]
-    pub fn widened(mut self, free: &[Free], by: &[f64]) -> Self {
-        let n = self.sigma.len();
-        let of = |a: usize, b: usize| {
-            self.correlation[a * n + b] * self.sigma[a] * self.sigma[b] + by[a] * by[b]
-        };
-        let whole: Vec<f64> = (0..n).map(|k| of(k, k).sqrt()).collect();
-        let correlation =
-            (0..n * n).map(|k| of(k / n, k % n) / (whole[k / n] * whole[k % n])).collect();
-        // Nobody knows less than before the data.
-        let pairs = free.iter().zip(whole);
-        self.sigma = pairs.map(|(free, x)| x.min(free.prior.deviation())).collect();
-        self.open = free.iter().zip(&self.sigma).map(|(free, x)| free.is_open(*x)).collect();
-        self.correlation = correlation;
-        self
-    }
-
     /// Of worlds sorted by their values, of data with this χ²/N at the best; none if there are too few, or the values
     /// have no lowest point that is clear of their ripples.
     ///

@@ -314,7 +314,7 @@ fn of_hot_spot<'a>(
         change: Change::NONE,
         gaussian: None,
         scale: 1.0,
-        effort: Effort { nodes: 16, degree: Degree::Linear, iterations: 30, settles: false },
+        effort: Effort { nodes: 16, degree: Degree::Linear, iterations: 30 },
     }
 }
 
@@ -342,7 +342,7 @@ fn exact_steps_lead_to_the_best_world() {
         Free { parameter: Parameter::Inclination, prior: Prior::Isotropic { low: 0.0, high: PI } },
         Free { parameter: Parameter::PositionAngle, prior: Prior::Uniform { low: -PI, high: PI } },
     ];
-    let effort = Effort { nodes: 18, degree: Degree::Linear, iterations: 60, settles: false };
+    let effort = Effort { nodes: 18, degree: Degree::Linear, iterations: 60 };
     let problem = WorldProblem { known: truth, effort, ..of_hot_spot(&model, &free, &terms) };
     let away = truth.with(Parameter::Inclination, 1.13).with(Parameter::PositionAngle, 0.6);
     let start = problem.solve(away).unwrap();

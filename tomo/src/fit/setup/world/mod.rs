@@ -3,7 +3,6 @@
 mod posterior;
 mod search;
 mod seen;
-mod sureness;
 
 pub use posterior::WorldPosterior;
 pub use search::{FoundWorld, SearchWatch, Trial, find_world};

@@ -1,17 +1,90 @@
-//! Draws of worlds.
+//! How sure a world is: the bowl beneath the ripples, along other rays and with other voxels; and draws of worlds.
 
 use super::seen::Seen;
-use super::sureness::{PATIENCE, surest};
 use crate::fit::settings::{FitFile, UnknownWorld, refuse};
 use crate::fit::setup::{Measured, Result};
-use crate::fit::world::{Effort, Free, Spread, World, WorldProblem};
+use crate::fit::world::{
+    Effort, Envelope, Estimate, Free, Polish, Polished, Spread, World, WorldProblem,
+};
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 
+/// Other rays that the best world is looked for through.
+const LATTICES: u64 = 3;
 /// Of the random numbers of draws.
 const DRAWS: u64 = 0x6f70_656e_0000_0000;
+/// Iterations of the first solution of a world, for each of a search.
+const PATIENCE: usize = 4;
+/// The number of a draw that has as many voxels as the fit.
+const SAME: u64 = 0;
+
+/// The best world near another one, and its χ²/N.
+pub(super) fn polished(
+    problem: &WorldProblem<'_, f32>,
+    start: &Estimate,
+) -> Result<(Polished, f64)> {
+    let polished = problem.polish(start, &Polish::default())?;
+    let reduced = problem.scale * problem.reduced(polished.best.chi2);
+    Ok((polished, reduced))
+}
+
+/// A few voxels more or less, and as many iterations as a start from a dark field takes.
+fn other_voxels(effort: Effort, number: u64) -> Effort {
+    const MORE: [usize; 6] = [2, 5, 1, 4, 3, 6];
+    let nodes = effort.nodes + MORE[number as usize % MORE.len()] - 2;
+    let nodes = nodes.max(effort.degree.taps());
+    Effort { nodes, iterations: PATIENCE * effort.iterations, ..effort }
+}
+
+/// How sure a world is: the bowl beneath the ripples of the values around, seen along several lattices of rays and with
+/// several numbers of voxels; without one, the second derivatives at the best world alone. Errors grow with χ²/N where that is
+/// above 1.
+pub(super) fn surely(
+    problem: &WorldProblem<'_, f32>,
+    polished: &Polished,
+    reduced: f64,
+) -> Result<Option<Spread>> {
+    let n = problem.free.len();
+    if polished.covariance.iter().any(|x| !x.is_finite()) {
+        return Ok(None);
+    }
+    let inflation = reduced.max(1.0);
+    let envelope = enveloped(problem, polished, inflation)?.unwrap_or_else(|| Envelope {
+        world: polished.best.world,
+        covariance: polished.covariance.iter().map(|x| x * inflation).collect(),
+        ripple: 0.0,
+        worlds: 1,
+    });
+    let Envelope { world, covariance, ripple, worlds } = envelope;
+    let whole: Vec<f64> = (0..n).map(|k| covariance[k * n + k].sqrt()).collect();
+    let correlation = (0..n * n).map(|k| covariance[k] / (whole[k / n] * whole[k % n]));
+    let correlation = correlation.collect();
+    // Nobody knows less than before the data.
+    let sigma = problem.free.iter().zip(whole).map(|(free, x)| x.min(free.prior.deviation()));
+    let sigma: Vec<f64> = sigma.collect();
+    let open = problem.free.iter().zip(&sigma).map(|(free, sigma)| free.is_open(*sigma)).collect();
+    Ok(Some(Spread { world, sigma, open, correlation, ripple, worlds }))
+}
+
+/// The bowl beneath the ripples, along other lattices of rays too; with other voxels, where the data alone decide.
+fn enveloped(
+    problem: &WorldProblem<'_, f32>,
+    polished: &Polished,
+    inflation: f64,
+) -> Result<Option<Envelope>> {
+    let numbers = 1..=LATTICES;
+    let models: Vec<_> = numbers.clone().map(|number| problem.model.seen_along(number)).collect();
+    let others: Vec<WorldProblem<'_, f32>> = numbers
+        .zip(&models)
+        .map(|(number, model)| {
+            let effort = other_voxels(problem.effort, problem.gaussian.map_or(number, |_| SAME));
+            WorldProblem { model, effort, ..*problem }
+        })
+        .collect();
+    problem.envelope(polished, &others, (inflation, &Polish::default()))
+}
 
 /// Why there are no worlds to draw.
 const NO_BEST: &str =
@@ -48,8 +121,8 @@ impl<'a> WorldPosterior<'a> {
             let iterations = PATIENCE * problem.effort.iterations;
             let effort = Effort { iterations, ..problem.effort };
             let start = WorldProblem { effort, ..*problem }.solve(world)?;
-            let (_, reduced, spread) = surest(problem, &start)?;
-            Ok((spread, reduced))
+            let (polished, reduced) = polished(problem, &start)?;
+            Ok((surely(problem, &polished, reduced)?, reduced))
         })?;
         let Some(spread) = spread else { refuse!("{NO_BEST}") };
         let factor = noise_factor * reduced.max(1.0).sqrt();

@@ -1,7 +1,7 @@
 //! The search for a world: from many starts or over a grid with coarse voxels, then with fine ones.
 
+use super::posterior::{polished, surely};
 use super::seen::Seen;
-use super::sureness::surest;
 use crate::fit::settings::{FieldKind, FitFile, Linear, UnknownWorld};
 use crate::fit::setup::{Measured, Result};
 use crate::fit::world::{
@@ -87,7 +87,8 @@ pub fn find_world(
         let reduced = problem.scale * problem.reduced(explored.best.chi2);
         // Steps along differences of images know one volume.
         if problem.model.ring.is_some() && !problem.change.is_any() {
-            let (polished, reduced, spread) = surest(problem, &explored.best)?;
+            let (polished, reduced) = polished(problem, &explored.best)?;
+            let spread = surely(problem, &polished, reduced)?;
             let world = spread.as_ref().map_or(polished.best.world, |spread| spread.world);
             return Ok(Some((spread, reduced, world)));
         }

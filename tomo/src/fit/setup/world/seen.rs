@@ -71,7 +71,6 @@ impl Seen {
                 nodes: view.nodes,
                 degree: settings.degree,
                 iterations: view.iterations,
-                settles: false,
             },
         })
     }
