@@ -61,7 +61,8 @@ pub enum Parameter {
     BetaR,
     /// β_φ of the same: the same of the angular velocity.
     BetaPhi,
-    /// Ω at a knot of [`Law::Profile`] over that of the profile, dimensionless.
+    /// Ω at a knot of [`Law::Profile`], the first of which is 0 and the last below [`KNOTS`], over that of the profile,
+    /// dimensionless.
     Angular(u8),
     /// dr/dt at a knot of the same, over that of the profile.
     Radial(u8),
