@@ -63,7 +63,7 @@ fn exact_factors_of_a_profile_are_found() {
         format!("{{profile={{radii=[4.5,8.0],angular={angular},radial=[-0.02,-0.02]}}}}")
     };
     let coarse = "{worlds=40,nodes=12,iterations=30,pixels=20,frames=12}";
-    let fine = "{worlds=20,nodes=16,iterations=40,pixels=20,frames=12}";
+    let fine = "{worlds=20,nodes=20,iterations=40,pixels=20,frames=12}";
     let sets = [
         "screen.ring_rays=4".to_owned(),
         format!("motion.velocity={}", profile("[0.09,0.04]")),
