@@ -76,6 +76,9 @@ pub struct Convert {
     bandwidth: Option<f64>,
 }
 
+/// Part of the power on baselines within a site that may be imaginary.
+const INCOHERENT: f64 = 0.05;
+
 impl Convert {
     /// Converts.
     pub fn run(&self) -> anyhow::Result<Answer> {
@@ -125,6 +128,13 @@ impl Convert {
         if let Some(least_snr) = self.closure_traces {
             return self.write_traces(&observation, least_snr);
         }
+        if observation.is_polarized() && !output.keeps_polarization() {
+            eprintln!(
+                "warning: {} has Stokes I alone: the polarisation of {} is left out; .uvfits keeps it",
+                self.output.display(),
+                self.input.display()
+            );
+        }
         output.write(&observation)?;
         let (rows, flagged) = (observation.rows.len(), selection.dropped);
         eprintln!("{rows} rows, {flagged} flagged");
@@ -170,6 +180,14 @@ impl Convert {
         let curve = LightCurve::of_sites(observation);
         if curve.samples.is_empty() {
             bail!("{}: no baseline lies within a site", self.input.display());
+        }
+        if let Some(part) =
+            LightCurve::imaginary_part(observation).filter(|part| *part > INCOHERENT)
+        {
+            eprintln!(
+                "warning: {:.0} % of the power on baselines within a site is imaginary: their phases are not calibrated, or the source is not unresolved in the middle of the field; these fluxes are not those of the source",
+                100.0 * part
+            );
         }
         let output = Output::or_pipe(&self.output, &["csv"])?;
         output.spares(&self.input)?;

@@ -190,6 +190,10 @@ pub enum FigureKind {
     Coverage,
     /// Angular velocities: what was simulated and what was assumed.
     Velocities,
+    /// What light curves say of inclination, position angle, radius and period, a curve for each case of the first seed.
+    Worlds,
+    /// Loops in Q and U of data and model, a plot for each case of the first seed.
+    Loops,
 }
 
 impl Experiment {

@@ -10,7 +10,7 @@ pub fn number(x: f64, digits: usize) -> String {
 }
 
 /// Results that are shown: their names in results.json, what they are called, their units and digits.
-pub const RESULTS: [(&str, &str, &str, usize); 68] = [
+pub const RESULTS: [(&str, &str, &str, usize); 69] = [
     ("psnr_db", "PSNR", "dB", 2),
     ("psnr_inside_db", "PSNR inside the region", "dB", 2),
     ("psnr_over_time_db", "PSNR over time", "dB", 2),
@@ -72,6 +72,7 @@ pub const RESULTS: [(&str, &str, &str, usize); 68] = [
     ("band_period_high_min", "97.5 % quantile of the period", "min", 1),
     ("band_ln_bayes_factor", "ln of the Bayes factor of a flare", "", 1),
     ("band_forward", "probability of the law's sense of rotation", "", 4),
+    ("band_clockwise", "probability of clockwise motion on the sky", "", 4),
     ("band_validation", "χ² per data point of samples that were not fitted", "", 3),
     ("ring_diameter_uas", "diameter of the ring", "µas", 1),
     ("ring_diameter_uas_error", "error of the diameter", "µas", 1),

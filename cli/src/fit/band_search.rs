@@ -16,6 +16,9 @@ use serde_json::{Value, json};
 /// What was found, in the folder of the run.
 pub const FILE: &str = "band.json";
 
+/// Bins of periods.
+const BINS: usize = 24;
+
 const STOPPED: &str = "stopped while worlds were weighed: nothing is kept of that";
 
 /// Finds the world, or reads it where an earlier run has found it; none if it is not asked for.
@@ -116,6 +119,32 @@ fn periods(scan: &BandScan) -> Vec<[f64; 2]> {
     normalised(moving.map(|(period, share)| [period, share]).collect())
 }
 
+/// Shares in so many bins of the same width, each at its middle.
+fn binned(shares: &[[f64; 2]], bins: usize) -> Vec<[f64; 2]> {
+    let (Some([low, _]), Some([high, _])) = (shares.first(), shares.last()) else {
+        return Vec::new();
+    };
+    let width = (high - low).max(1e-9 * high.abs()) / bins as f64;
+    let mut all: Vec<[f64; 2]> = (0..bins).map(|k| [low + (k as f64 + 0.5) * width, 0.0]).collect();
+    for [value, share] in shares {
+        all[(((value - low) / width) as usize).min(bins - 1)][1] += share;
+    }
+    all
+}
+
+/// The probability that matter turns clockwise on the sky: the axis is that of the hole, right-handed about
+/// [`motion.axis`](kerrlight_tomo::fit::settings::MotionSettings).
+fn clockwise(scan: &BandScan, axis_z: f64) -> f64 {
+    let towards =
+        |world: &BandWorld| world.rotation_factor * world.inclination_deg.to_radians().cos();
+    // Seen edge-on there is no sense; standing matter has none.
+    let share = |towards: f64| match towards * axis_z {
+        x if x.abs() < 1e-9 => 0.5,
+        x => f64::from(u8::from(x < 0.0)),
+    };
+    shares(&scan.worlds, towards).iter().map(|[of, probability]| share(*of) * probability).sum()
+}
+
 /// The value below which a part of the probability lies, each share spread evenly half way to its neighbours.
 fn quantile(shares: &[[f64; 2]], part: f64) -> f64 {
     let edge = |k: usize| match (k.checked_sub(1).map(|k| shares[k][0]), shares.get(k)) {
@@ -165,7 +194,9 @@ fn results(scan: &BandScan, file: &FitFile) -> anyhow::Result<Value> {
         "inclinations": inclinations,
         "rotation_factor": probabilities(|world| world.rotation_factor, best.rotation_factor),
         "position_angle_deg": probabilities(|world| world.position_angle_deg, best.position_angle_deg),
+        "clockwise": clockwise(scan, file.motion.axis.map_or(1.0, |axis| axis[2])),
         "radius": interval(&radii(scan), Some(band.radius)),
+        "radii": radii(scan),
         "band": {
             "radius": band.radius, "width": band.width, "height": band.height, "length": band.length,
             "power": band.power, "mean": band.mean,
@@ -175,6 +206,7 @@ fn results(scan: &BandScan, file: &FitFile) -> anyhow::Result<Value> {
         },
         "azimuth_deg": azimuth(scan.azimuth),
         "period_min": interval(&periods(scan), None),
+        "periods": binned(&periods(scan), BINS),
         "ln_bayes_factor": scan.ln_bayes_factor,
         "background": scan.background.is_some().then(|| json!({
             "constant_jy": band.background.constant,
@@ -217,6 +249,7 @@ pub fn numbers(results: &Value) -> Vec<(&'static str, Value)> {
         ("band_period_high_min", results["period_min"]["high"].clone()),
         ("band_ln_bayes_factor", results["ln_bayes_factor"].clone()),
         ("band_forward", json!(forward)),
+        ("band_clockwise", results["clockwise"].clone()),
         ("band_validation", results["validation_chi2_per_datum"].clone()),
     ]
 }
@@ -233,20 +266,39 @@ fn forward(results: &Value) -> Option<f64> {
 
 /// Whether a flare is seen before a background.
 fn flare(ln: f64) -> String {
-    let factor = match ln.abs() < 30.0 {
-        true => format!("{:.2e}", ln.exp()),
-        false => format!("e^{ln:.0}"),
+    let factor = match ln.abs() {
+        size if size < 5.0 => format!("{:.2}", ln.exp()),
+        size if size < 30.0 => format!("{:.1e}", ln.exp()),
+        _ => format!("e^{ln:.0}"),
     };
     let what = match ln {
         ln if ln > SEEN => "The data ask for a flare that orbits",
         ln if ln < -SEEN => "The data speak against a flare that orbits",
         _ => "The data do not tell whether a flare orbits",
     };
-    format!("{what}: with one, they are {factor} times as probable as with the background alone.")
+    let then = if ln > SEEN { "" } else { " What follows holds if there is one." };
+    format!(
+        "{what}: with one, they are {factor} times as probable as with the background alone.{then}"
+    )
 }
 
 /// ln of 20, above which a Bayes factor is called strong (Kass & Raftery 1995).
 const SEEN: f64 = 3.0;
+
+/// From this width on an interval of azimuths is the whole circle, degrees: 95 % of it.
+const ROUND: f64 = 0.95 * 360.0 - 5.0;
+
+/// Where the middle of a flare is, from median and interval of its azimuth in degrees.
+fn place_of([median, low, high]: [f64; 3]) -> String {
+    if high - low > ROUND {
+        return "its middle may be at any azimuth".to_owned();
+    }
+    format!(
+        "its middle is at an azimuth of {median:.0}° (−{:.0}°, +{:.0}°)",
+        median - low,
+        high - median
+    )
+}
 
 /// What was found, in sentences.
 pub fn sentences(results: &Value) -> Vec<String> {
@@ -268,13 +320,11 @@ pub fn sentences(results: &Value) -> Vec<String> {
             of("inclination_deg", "median")
         ),
         format!(
-            "The flare orbits at {:.1} M ({:.1} to {:.1} at 95 %); at the reference time its middle is at an azimuth of {:.0}° ({:.0}° to {:.0}°).",
+            "The flare orbits at {:.1} M ({:.1} to {:.1} at 95 %); at the reference time {}.",
             of("emission_radius", "median"),
-            of("emission_radius", "low"),
+            of("emission_radius", "low").max(0.0),
             of("emission_radius", "high"),
-            of("azimuth_deg", "median"),
-            of("azimuth_deg", "low"),
-            of("azimuth_deg", "high")
+            place_of(["median", "low", "high"].map(|part| of("azimuth_deg", part)))
         ),
         format!(
             "Its period is {:.0} minutes ({:.0} to {:.0} at 95 %).",
@@ -290,6 +340,12 @@ pub fn sentences(results: &Value) -> Vec<String> {
         all.push(format!(
             "Most probably it turns {best:.2} times as fast as the law of motion says, in the law's sense with a probability of {forward:.3}."
         ));
+        if let Some(clockwise) = results["clockwise"].as_f64() {
+            all.push(format!(
+                "On the sky it turns clockwise with a probability of {clockwise:.3}, anticlockwise with {:.3}.",
+                1.0 - clockwise
+            ));
+        }
     }
     if let Some(validation) = results["validation_chi2_per_datum"].as_f64() {
         all.push(format!(
@@ -302,6 +358,21 @@ pub fn sentences(results: &Value) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn exact_azimuths_go_round() {
+        assert_eq!(place_of([273.0, 93.0, 453.0]), "its middle may be at any azimuth");
+        let near = place_of([350.0, 330.0, 375.0]);
+        assert_eq!(near, "its middle is at an azimuth of 350° (−20°, +25°)");
+    }
+
+    #[test]
+    fn exact_bins_hold_all_shares() {
+        let bins = binned(&[[1.0, 0.2], [1.5, 0.3], [3.0, 0.5]], 2);
+        assert_eq!(bins, [[1.5, 0.5], [2.5, 0.5]]);
+        assert_eq!(binned(&[[2.0, 1.0]], 3)[0][1], 1.0);
+        assert!(binned(&[], 3).is_empty());
+    }
 
     /// Quantiles of equal shares are those of a straight line.
     #[test]

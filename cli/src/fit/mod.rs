@@ -2,6 +2,7 @@
 
 mod api;
 mod axis_scan;
+mod band_plots;
 mod band_search;
 mod curves;
 mod data;
@@ -31,6 +32,8 @@ use crate::record::Recorder;
 use crate::{interrupt, output, paths, ranks};
 use anyhow::{Context, bail};
 pub use api::{assigned, check, coverage, sizes, turned, velocities};
+pub use band_plots::{loop_plot, of_runs as plots_of_bands};
+pub use band_search::FILE as BAND;
 use clap::Args;
 pub use failed::Failed;
 use folder::Folder;
@@ -39,6 +42,7 @@ use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::settings::{FitError, FitFile, StaticImageFile};
 use kerrlight_tomo::representation::Registry;
 pub use posterior::Posterior;
+pub use results::LIGHT_CURVE;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use work::{Prepared, Work};

@@ -61,12 +61,15 @@ fn string(table: &Table, keys: &[&str]) -> String {
 }
 
 fn data(table: &Table) -> String {
-    let file = ["visibilities", "movie"].into_iter().find_map(|kind| {
+    let kinds =
+        [("visibilities", "visibilities"), ("movie", "movie"), ("light-curve", "light curve")];
+    let file = kinds.into_iter().find_map(|(kind, name)| {
         let path = table.get("data")?.get(kind)?.get("path")?;
-        Some(format!("{kind} of {}", path.as_str().unwrap_or_default()))
+        Some(format!("{name} of {}", path.as_str().unwrap_or_default()))
     });
     let simulated = || match table.get("observation").and_then(|seen| seen.get("array")) {
         Some(array) => format!("simulated, seen by {}", array.as_str().unwrap_or_default()),
+        None if table.contains_key("light_curve") => "a simulated light curve".to_owned(),
         None => "simulated images".to_owned(),
     };
     file.unwrap_or_else(simulated)

@@ -77,6 +77,11 @@ impl ObservationFile {
         Ok(ObservationFile { output: Output::or_pipe(path, &[])?, format, comments })
     }
 
+    /// Whether more than Stokes I is written.
+    pub fn keeps_polarization(&self) -> bool {
+        matches!(self.format, Written::Uvfits | Written::ObsText)
+    }
+
     /// Refuses to take the place of a file that is read.
     pub fn spares(&self, input: &Path) -> anyhow::Result<()> {
         self.output.spares(input)

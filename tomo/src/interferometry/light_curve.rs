@@ -49,8 +49,22 @@ impl LightCurve {
             Sample { time_h: row.time_h, stokes: stokes(row, observation.basis), by }
         };
         let mut samples: Vec<Sample> = observation.rows.iter().filter(near).map(sample).collect();
+        // Files of Stokes I alone have it twice: their V is no measurement.
+        if samples.iter().all(|sample| sample.stokes[3].is_none_or(|v| v.jy == 0.0)) {
+            samples.iter_mut().for_each(|sample| sample.stokes[3] = None);
+        }
         samples.sort_by(|a, b| a.time_h.total_cmp(&b.time_h));
         Self { samples }
+    }
+
+    /// What part of the power of I on the baselines within a site is imaginary: next to nothing of an unresolved source in
+    /// the middle of the field, a half where phases are not calibrated. None if there is no such baseline.
+    pub fn imaginary_part(observation: &Observation) -> Option<f64> {
+        let near = observation.stokes_i().filter(|(row, _)| is_within_site(observation, row));
+        let (imaginary, all) = near.fold((0.0, 0.0), |(imaginary, all), (_, i)| {
+            (imaginary + i.visibility.im.powi(2), all + i.visibility.norm_sqr())
+        });
+        (all > 0.0).then(|| imaginary / all)
     }
 
     /// Samples from the first to the second hour.
@@ -239,6 +253,25 @@ mod tests {
         }
         let sigmas = curve.samples[0].stokes.map(|flux| flux.unwrap().sigma_jy.unwrap());
         assert_eq!(sigmas, [0.25, 0.5, 0.5, 0.25]);
+        assert_eq!(LightCurve::imaginary_part(&observation), Some(0.0));
+        assert!(observation.is_polarized());
+        for turned in &mut observation.rows[1].products {
+            *turned *= c(0.6, 0.8);
+        }
+        assert!((LightCurve::imaginary_part(&observation).unwrap() - 0.64).abs() < 1e-12);
+    }
+
+    /// Stokes I as RR and LL has no V.
+    #[test]
+    fn exact_total_intensity_alone_has_no_circular_polarisation() {
+        let c = |re: f64| Measured { visibility: Complex64::new(re, 0.0), noise_sigma: 0.1 };
+        let mut observation = Observation::empty(Basis::Circular);
+        observation.stations = ["AA", "AP"].map(Station::named).to_vec();
+        observation.rows = vec![Row::total_intensity(4.0, [0, 1], [1e6, 1e6], c(2.5))];
+        let curve = LightCurve::of_sites(&observation.as_equal_hands());
+        assert_eq!(curve.samples[0].stokes[0].unwrap().jy, 2.5);
+        assert_eq!(curve.samples[0].stokes[3], None);
+        assert!(!observation.is_polarized());
     }
 
     #[test]

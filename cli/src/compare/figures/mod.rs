@@ -1,6 +1,7 @@
 //! Pictures of an experiment.
 
 mod images;
+mod light_curves;
 mod plots;
 mod volumes;
 
@@ -103,6 +104,8 @@ impl Figures<'_> {
             FigureKind::Curve => drawn.plots.extend(self.curve(asked)),
             FigureKind::Coverage => drawn.plots.extend(self.coverage(asked)?),
             FigureKind::Velocities => drawn.plots.extend(self.velocities(asked)?),
+            FigureKind::Worlds => drawn.plots.extend(self.worlds(asked)?),
+            FigureKind::Loops => drawn.plots.extend(self.loops(asked)?),
         }
         Ok(())
     }

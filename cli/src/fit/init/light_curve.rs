@@ -1,13 +1,24 @@
 //! Settings for a light curve: what its numbers tell, and what has to be assumed.
 
+use super::sources::Source;
 use super::{complete, digits};
 use anyhow::bail;
-use kerrlight_tomo::interferometry::light_curve::LightCurve;
+use kerrlight_tomo::interferometry::light_curve::{LightCurve, Sample};
 use kerrlight_tomo::polarization::StokesParameter;
 use std::fmt::Write;
 
-/// Samples that are left, about.
-const SAMPLES: usize = 100;
+/// Samples that are left, at most about.
+const SAMPLES: f64 = 100.0;
+/// Hours that a flare is taken to last.
+const SPAN_H: f64 = 2.0;
+/// Hours of a curve that is taken as a whole.
+const WHOLE_H: f64 = 2.5;
+/// Part of the span's samples that is fitted; the rest judges the fit.
+const FITTED: f64 = 0.8;
+/// Part of the mean polarised flux that calibration and leakage are taken to leave as an error.
+const CALIBRATED: f64 = 0.02;
+/// Part of its flux by which a curve has to vary.
+const STEADY: f64 = 1e-9;
 
 /// Emission 1 in a flare of 0.3 Jy, with the pixels of the template.
 const JY_PER_PIXEL: f64 = 0.08 / 0.3;
@@ -27,20 +38,29 @@ turn_deg = 0.0 #! no Faraday rotation is left in the data";
 /// What is fitted of a curve.
 struct Fitted {
     parameters: Vec<StokesParameter>,
+    /// Samples of the span, averaged.
     curve: LightCurve,
-    average: usize,
+    samples: usize,
+    /// First and last hour, where the curve is longer.
+    span: Option<[f64; 2]>,
+    average_s: Option<f64>,
 }
 
-/// The plain settings of a fit of this curve; `path` is quoted.
+/// The plain settings of a fit of this curve; `path` is quoted, and `source` what the file or its name says of the source.
 ///
 /// # Errors
 /// If it has no fluxes to speak of.
-pub fn of_light_curve(curve: &LightCurve, path: &str, name: &str) -> anyhow::Result<String> {
+pub fn of_light_curve(
+    curve: &LightCurve,
+    (path, name): (&str, &str),
+    source: Option<&Source>,
+) -> anyhow::Result<String> {
     let fitted = Fitted::of(curve)?;
     let polarized = fitted.parameters.len() == 2;
     let (mean, scatter, sigma) = (fitted.means(), fitted.scatter(), fitted.sigma());
-    if scatter <= 0.0 || sigma.0 <= 0.0 {
-        bail!("the light curve does not vary: there is nothing to fit");
+    let most = mean.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+    if scatter <= STEADY * most || sigma.0 <= 0.0 {
+        bail!("{name}: the light curve does not vary: there is nothing to fit");
     }
     let all = |values: &[f64]| {
         let one = |(p, x): (&StokesParameter, &f64)| format!("{} = {}", p.name(), digits(*x));
@@ -55,6 +75,7 @@ pub fn of_light_curve(curve: &LightCurve, path: &str, name: &str) -> anyhow::Res
     let fields = [
         ("read", fitted.read(name)),
         ("title", super::plain_words(name)),
+        ("mass", mass(source)),
         ("jy", digits(flare * JY_PER_PIXEL)),
         (
             "redshift",
@@ -63,7 +84,8 @@ pub fn of_light_curve(curve: &LightCurve, path: &str, name: &str) -> anyhow::Res
         ),
         ("polarization", if polarized { POLARIZATION } else { "" }.to_owned()),
         ("path", path.to_owned()),
-        ("average", fitted.average.to_string()),
+        ("prepared", fitted.prepared()),
+        ("validate", digits(fitted.validate_after_min())),
         ("errors", format!("sigma = {errors} #! {}", sigma.1)),
         ("steady", all(&mean)),
         (
@@ -82,16 +104,25 @@ pub fn of_light_curve(curve: &LightCurve, path: &str, name: &str) -> anyhow::Res
     complete(include_str!("light_curve.toml"), &fields)
 }
 
-/// A background about as bright as what varies in the data, Jy.
+/// The mass of a source that is known, or that it is left to the user.
+fn mass(source: Option<&Source>) -> String {
+    match source {
+        Some(of) => format!("mass_msun = {:?} #! {}", of.mass_msun, of.mass),
+        None => "#? mass_msun = 4.154e6 # a light curve does not name its source; this is Sgr A* (GRAVITY Collaboration 2019, A&A 625, L10)".to_owned(),
+    }
+}
+
+/// Backgrounds about as bright as what varies in the data, Jy.
 fn background(scatter: f64) -> String {
-    let [constant, variation] = [scatter, 0.4 * scatter].map(digits);
+    let constant = digits(scatter);
+    let variations = [0.2, 0.5, 1.0].map(|part| digits(part * scatter)).join(", ");
     format!(
         "
 [band.background]
 constant_jy = {constant} #! what does not move differs from the mean by as much as the data vary
-variation_jy = [{variation}] #! a part of what varies does not orbit
-correlation_min = [20.0, 80.0] #! the source varies within such times
-matern = [\"1/2\"] #! a damped random walk"
+variation_jy = [{variations}] #! of what varies, a small part, half or all does not orbit
+correlation_min = [20.0, 60.0, 180.0] #! the source varies within such times
+matern = [\"1/2\", \"5/2\"] #! as a damped random walk, or smoothly"
     )
 }
 
@@ -106,14 +137,51 @@ impl Fitted {
             _ if count(StokesParameter::I) > 1 => vec![StokesParameter::I],
             _ => bail!("a fit needs two samples or more of Q and U, or of I"),
         };
-        let average = (curve.samples.len() / SAMPLES).max(1);
-        Ok(Self { parameters, curve: curve.clone().averaged(average), average })
+        let span = span(curve);
+        let cropped = span.map_or_else(|| curve.clone(), |span| curve.clone().cropped(span));
+        let samples = cropped.samples.len();
+        let average_s = average_s(&cropped);
+        let curve = match average_s {
+            Some(seconds) => cropped.averaged_over(seconds),
+            None => cropped,
+        };
+        Ok(Self { parameters, curve, samples, span, average_s })
+    }
+
+    /// What is done with the file's samples before they are fitted, line by line.
+    fn prepared(&self) -> String {
+        let mut lines = Vec::new();
+        if let Some([from, to]) = self.span {
+            lines.push(format!(
+                "utc_h = [{from:?}, {to:?}] #! the {SPAN_H:.0} hours with most samples: flares last about that long"
+            ));
+        }
+        if let Some(seconds) = self.average_s {
+            lines.push(format!(
+                "average_s = {seconds:?} #! at most about {SAMPLES:.0} samples are left"
+            ));
+        }
+        lines.iter().map(|line| format!("{line}\n")).collect()
+    }
+
+    fn validate_after_min(&self) -> f64 {
+        let hours = |sample: Option<&Sample>| sample.map_or(0.0, |sample| sample.time_h);
+        let (first, last) = (self.curve.samples.first(), self.curve.samples.last());
+        FITTED * 60.0 * (hours(last) - hours(first))
+    }
+
+    /// Mean of the root of Q² + U², Jy; 0 where these are not fitted.
+    fn polarized_flux(&self) -> f64 {
+        if self.parameters.len() < 2 {
+            return 0.0;
+        }
+        let [q, u] = [StokesParameter::Q, StokesParameter::U].map(|p| self.fluxes(p));
+        let all = q.iter().zip(&u).map(|(q, u)| q.hypot(*u));
+        all.sum::<f64>() / q.len().max(1) as f64
     }
 
     fn fluxes(&self, parameter: StokesParameter) -> Vec<f64> {
-        let flux = |s: &kerrlight_tomo::interferometry::light_curve::Sample| {
-            s.stokes[parameter.index()].map(|flux| flux.jy)
-        };
+        let flux = |s: &Sample| s.stokes[parameter.index()].map(|flux| flux.jy);
         self.curve.samples.iter().filter_map(flux).collect()
     }
 
@@ -135,27 +203,41 @@ impl Fitted {
     }
 
     /// One error for all samples, Jy, and where it comes from.
-    fn sigma(&self) -> (f64, &'static str) {
+    fn sigma(&self) -> (f64, String) {
         let errors = self
             .parameters
             .iter()
             .flat_map(|p| self.curve.samples.iter().filter_map(|s| s.stokes[p.index()]?.sigma_jy));
-        if let Some(sigma) = median(errors.collect()) {
-            return (sigma, "the median of the file's errors; Q and U have to have the same");
+        let (sigma, from) = match median(errors.collect()) {
+            Some(sigma) => (sigma, "the median of the file's errors"),
+            None => {
+                (self.jumps(), "the file has no errors: the scatter from one sample to the next")
+            }
+        };
+        let calibrated = CALIBRATED * self.polarized_flux();
+        if calibrated > sigma {
+            let percent = 100.0 * CALIBRATED;
+            let why =
+                format!("{percent:.0} % of the mean polarised flux, for calibration and leakage");
+            return (calibrated, why);
         }
+        (sigma, from.to_owned())
+    }
+
+    /// What the scatter from one sample to the next says of errors, Jy.
+    fn jumps(&self) -> f64 {
         let jumps = self.parameters.iter().flat_map(|p| {
             let fluxes = self.fluxes(*p);
             fluxes.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect::<Vec<_>>()
         });
         // The median of |x − y| of two normal numbers is 0.954 σ.
-        let sigma = median(jumps.collect()).unwrap_or(0.0) / 0.954;
-        (sigma, "the file has no errors: this is the scatter from one sample to the next")
+        median(jumps.collect()).unwrap_or(0.0) / 0.954
     }
 
     /// What the file says, in a line.
     fn read(&self, name: &str) -> String {
         let hours: Vec<f64> = self.curve.samples.iter().map(|sample| sample.time_h).collect();
-        let mut text = format!("{name}: {} samples", self.curve.samples.len() * self.average);
+        let mut text = format!("{name}: {} samples", self.samples);
         if let [first, .., last] = hours[..] {
             // Writing to a string does not fail.
             let _ = write!(text, " from {first:.3} h to {last:.3} h UTC");
@@ -163,6 +245,33 @@ impl Fitted {
         let names: Vec<&str> = self.parameters.iter().map(|p| p.name()).collect();
         text + &format!("; {} are fitted", names.join(" and "))
     }
+}
+
+/// The hours of a long curve with most samples.
+fn span(curve: &LightCurve) -> Option<[f64; 2]> {
+    let hours: Vec<f64> = curve.samples.iter().map(|sample| sample.time_h).collect();
+    let (first, last) = (*hours.first()?, *hours.last()?);
+    if last - first <= WHOLE_H {
+        return None;
+    }
+    let count = |from: f64| hours.iter().filter(|h| (from..=from + SPAN_H).contains(*h)).count();
+    let best = hours.iter().fold(first, |best, h| if count(*h) > count(best) { *h } else { best });
+    let inside = hours.iter().filter(|h| (best..=best + SPAN_H).contains(*h));
+    let end = inside.fold(best, |end, h| end.max(*h));
+    Some([(1e3 * best).floor() / 1e3, (1e3 * end).ceil() / 1e3])
+}
+
+/// Seconds over which samples are averaged so that not too many are left; none where there are few.
+fn average_s(curve: &LightCurve) -> Option<f64> {
+    let count = curve.samples.len() as f64;
+    if count < 1.2 * SAMPLES {
+        return None;
+    }
+    let steps = curve.samples.windows(2).map(|pair| pair[1].time_h - pair[0].time_h);
+    // Of one scan; gaps are longer, and several baselines have the same time.
+    let step = 3600.0 * median(steps.filter(|step| *step > 0.0).collect())?;
+    let rounded = 10.0 * (step * count / SAMPLES / 10.0).ceil();
+    (rounded > step).then_some(rounded)
 }
 
 fn median(mut values: Vec<f64>) -> Option<f64> {

@@ -129,9 +129,12 @@ fn of_data(data: &Path, toml: &Path, model: Option<Model>) -> anyhow::Result<Str
         Err(first) => first,
     };
     // A table may hold a light curve, and a FITS file or a table an image.
-    let text = crate::output::read_text(data);
-    if let Some(curve) = text.ok().and_then(|text| files::parse_light_curve(&text).ok()) {
-        return light_curve::of_light_curve(&curve, &path, name);
+    if let Some(text) =
+        crate::output::read_text(data).ok().filter(|text| files::is_light_curve(text))
+    {
+        let curve = files::parse_light_curve(&text).with_context(|| data.display().to_string())?;
+        let source = sources::named_in(name).or_else(|| sources::named_above(&text));
+        return light_curve::of_light_curve(&curve, (&path, name), source);
     }
     read_movie(data).map_or(Err(first), |movie| of_movie(&movie, &path))
 }
@@ -272,8 +275,12 @@ fn read(observation: &Observation, file: &str, name: &str, is_known: bool) -> St
     let day = observation.mjd.map_or(String::new(), |mjd| format!(", MJD {mjd}"));
     let frequency =
         observation.frequency_hz.map_or(String::new(), |hz| format!(" at {:.1} GHz", hz * 1e-9));
+    let polarized = match observation.is_polarized() {
+        true => "; its polarisation is not fitted without [polarization]",
+        false => "",
+    };
     format!(
-        "{file}: {source}{day}, {first:.2} h to {last:.2} h UTC, {} stations, {} visibilities of Stokes I{frequency}",
+        "{file}: {source}{day}, {first:.2} h to {last:.2} h UTC, {} stations, {} visibilities of Stokes I{frequency}{polarized}",
         observation.stations.len(),
         rows.len()
     )

@@ -65,3 +65,36 @@ pub const SOURCES: [Source; 2] = [
         inclination: "17 degrees from the jet's axis, with the hole turned away (EHT Collaboration 2019, ApJL 875, L5)",
     },
 ];
+
+/// The source that words of a file's name begin with.
+pub fn named_in(name: &str) -> Option<&'static Source> {
+    let upper = name.to_ascii_uppercase();
+    let starts = |word: &str| {
+        let before = |at: usize| upper[..at].chars().next_back();
+        upper.match_indices(word).any(|(at, _)| !before(at).is_some_and(char::is_alphanumeric))
+    };
+    SOURCES.iter().find(|source| source.words.iter().any(|word| starts(word)))
+}
+
+/// The source that a comment above a table names: `# source: SGRA`.
+pub fn named_above(text: &str) -> Option<&'static Source> {
+    let comments = text.lines().take_while(|line| line.starts_with('#'));
+    let mut names = comments.filter_map(|line| line.split_once("source:"));
+    names.find_map(|(_, name)| named_in(name.trim()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exact_sources_are_known_by_their_names() {
+        let name = |name: &str| named_in(name).map(|source| source.name);
+        assert_eq!(name("ER6_SGRA_2017_097_hi.csv"), Some("Sgr A*"));
+        assert_eq!(name("m87.csv"), Some("M87*"));
+        assert_eq!((name("curve.csv"), name("usagra.csv")), (None, None));
+        let above = |text: &str| named_above(text).map(|source| source.name);
+        assert_eq!(above("# light curve\n# source: SGRA\ntime,Q,U\n"), Some("Sgr A*"));
+        assert_eq!(above("time,Q,U\n# source: SGRA\n"), None);
+    }
+}

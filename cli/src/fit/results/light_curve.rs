@@ -1,6 +1,7 @@
 //! Light curves of unresolved sources: the model beside the data; images where data see something else.
 
 use super::Estimate;
+use crate::fit::band_plots;
 use crate::report::{Axis, LinePlot, Marks, Series};
 use kerrlight_tomo::fit::{Batch, FrameTerm, Seen, State, Trainer};
 use kerrlight_tomo::frames::Frames;
@@ -8,7 +9,7 @@ use kerrlight_tomo::representation::Workspace;
 use std::fmt::Write;
 
 /// The table of data and model.
-const TABLE: &str = "light_curve.csv";
+pub const TABLE: &str = "light_curve.csv";
 
 impl Estimate<'_> {
     /// Images of all frames, whatever data see of them.
@@ -52,7 +53,14 @@ impl Estimate<'_> {
 
     /// Writes data and model, if the data are a light curve.
     pub fn curve_table(&self, seen: &Frames<f32>) -> anyhow::Result<()> {
-        let Some(curve) = &self.measured.curve else { return Ok(()) };
+        match self.curve_text(seen)? {
+            Some(text) => self.folder.file(TABLE)?.write(text.as_bytes()),
+            None => Ok(()),
+        }
+    }
+
+    fn curve_text(&self, seen: &Frames<f32>) -> anyhow::Result<Option<String>> {
+        let Some(curve) = &self.measured.curve else { return Ok(None) };
         let seen = seen.to_vec()?;
         let mut text = "time_utc_h,time_m,fitted".to_owned();
         for parameter in &curve.parameters {
@@ -79,13 +87,13 @@ impl Estimate<'_> {
             }
         }
         text.push('\n');
-        self.folder.file(TABLE)?.write(text.as_bytes())
+        Ok(Some(text))
     }
 
     /// Data and model of each Stokes parameter over time, and the loop in Q and U.
-    pub fn light_curves(&self, seen: &Frames<f32>) -> anyhow::Result<Vec<LinePlot>> {
+    pub fn light_curves(&self, frames: &Frames<f32>) -> anyhow::Result<Vec<LinePlot>> {
         let Some(curve) = &self.measured.curve else { return Ok(Vec::new()) };
-        let seen = seen.to_vec()?;
+        let seen = frames.to_vec()?;
         let count = curve.parameters.len();
         let mut series = Vec::new();
         for (plane, parameter) in curve.parameters.iter().enumerate() {
@@ -125,7 +133,8 @@ impl Estimate<'_> {
             }
             None => "",
         };
-        Ok(vec![LinePlot {
+        let text = self.curve_text(frames)?.unwrap_or_default();
+        let mut plots = vec![LinePlot {
             title: "Stokes light curves".to_owned(),
             caption: format!(
                 "Fluxes of the unresolved source, data as points with their standard deviations, the recovered emission{background} as lines.{held}"
@@ -133,6 +142,8 @@ impl Estimate<'_> {
             x: Axis { label: "time".to_owned(), unit: "h UTC".to_owned(), log: false },
             y: Axis { label: "flux density".to_owned(), unit: "Jy".to_owned(), log: false },
             series,
-        }])
+        }];
+        plots.extend(band_plots::loop_plot(&text, ""));
+        Ok(plots)
     }
 }

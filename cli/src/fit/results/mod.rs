@@ -16,6 +16,7 @@ mod units;
 pub mod verdict;
 
 pub use fields::{compare, recovered, true_volume};
+pub use light_curve::TABLE as LIGHT_CURVE;
 
 use super::failed;
 use super::folder::Folder;

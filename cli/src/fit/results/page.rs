@@ -7,7 +7,9 @@ use super::over_time::Changes;
 use super::quiescent::Quiescent;
 use super::{Estimate, Found};
 use crate::fit::curves::{loss_plot, psnr_plot};
-use crate::fit::{band_search, held_out, labels, rotation_search, world_results, world_scan};
+use crate::fit::{
+    band_plots, band_search, held_out, labels, rotation_search, world_results, world_scan,
+};
 use crate::output;
 use crate::report::{self, LinePlot, Report, View3d};
 use anyhow::Context;
@@ -31,6 +33,9 @@ impl Estimate<'_> {
         plots.extend(held_out::plot(&results["held_out"]));
         plots.extend(rotation_search::plot(&results["faraday"]));
         plots.extend(self.light_curves(&found.seen)?);
+        if let Some(band) = band_search::found(self.folder)? {
+            plots.extend(band_plots::of_runs(&[("these data".to_owned(), band)], ""));
+        }
         plots.push(self.light_curve(&found.movie)?);
         plots.extend(found.changes.as_ref().map(Changes::plot));
         plots.extend(self.amplitudes(found)?);

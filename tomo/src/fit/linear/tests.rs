@@ -23,6 +23,7 @@ pub(in crate::fit) mod lit;
 mod log_normal;
 mod profile;
 mod quiescent;
+mod settled;
 
 pub(in crate::fit) const FRAMES: [usize; 5] = [0, 1, 2, 3, 4];
 

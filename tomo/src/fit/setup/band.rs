@@ -189,6 +189,13 @@ pub fn check_band<'a>(
     if let Some(background) = &settings.background {
         background::check(background, curve)?;
     }
+    for (key, steps) in [("inclinations_deg", settings.inclinations_deg), ("radii", settings.radii)]
+    {
+        if steps.values().is_empty() {
+            let allowed = format!("from ({}) or above", steps.from);
+            return Err(FitError::range(format!("band.{key}.to"), steps.to, &allowed).into());
+        }
+    }
     prior(settings).checked()?;
     let range = |key: &str, value: f64, allowed| {
         Err(FitError::range(format!("band.{key}"), value, allowed).into())
@@ -197,19 +204,13 @@ pub fn check_band<'a>(
     if let Some(bad) = inclinations.iter().find(|i| !(0.0..=180.0).contains(*i)) {
         return range("inclinations_deg", *bad, "0 to 180 degrees");
     }
-    if inclinations.is_empty() {
-        return range(
-            "inclinations_deg.step",
-            settings.inclinations_deg.step,
-            "one or more values",
-        );
-    }
     if let Some(bad) = settings.rotation_factors.iter().find(|x| !(-10.0..=10.0).contains(*x)) {
         return range("rotation_factors", *bad, "-10 to 10");
     }
     if !(4..=128).contains(&settings.nodes) {
         return range("nodes", settings.nodes as f64, "4 to 128");
     }
+    check_rings(file, settings)?;
     if settings.rotation_factors.is_empty() || settings.position_angles_deg.is_empty() {
         refuse!("band: rotation_factors and position_angles_deg need one value or more");
     }
@@ -221,6 +222,20 @@ pub fn check_band<'a>(
     }
     axis(file)?;
     Ok(curve)
+}
+
+/// Refuses rings that are farther apart than the narrowest band is wide.
+fn check_rings(file: &FitFile, settings: &BandSettings) -> Result<()> {
+    let narrowest = settings.widths.iter().copied().fold(f64::INFINITY, f64::min);
+    let apart = file.region.r_max / (settings.nodes as f64 - 1.0);
+    if apart > narrowest {
+        let least = (file.region.r_max / narrowest).ceil() + 1.0;
+        let allowed = format!(
+            "{least} or more: rings would be {apart:.2} M apart, and the narrowest band is {narrowest} M wide (band.widths)"
+        );
+        return Err(FitError::range("band.nodes", settings.nodes, &allowed).into());
+    }
+    Ok(())
 }
 
 /// Whether every frame has Q and U, in this order, with the same error: noise then has no direction.

@@ -67,6 +67,10 @@ fn prepared(mut curve: LightCurve, settings: &MeasuredCurve) -> Result<LightCurv
         refuse!("average and average_s of [data.light-curve] exclude each other");
     }
     if let Some(hours) = settings.utc_h {
+        if hours[0] > hours[1] {
+            let allowed = format!("the first hour ({}) or later", hours[0]);
+            return Err(FitError::range("data.light-curve.utc_h.1", hours[1], &allowed).into());
+        }
         curve = curve.cropped(hours);
     }
     if let Some(count) = settings.average {

@@ -6,12 +6,12 @@
 //! lattices of rays. Its middle is the world, and how far ripples and lattices move that is part of the error.
 
 use super::covariance::covariance;
-use super::polish::{Polish, Polished};
+use super::polish::Polished;
 use super::problem::{Estimate, WorldProblem};
 use super::{Free, World};
 use crate::Error;
 use crate::simd::Float;
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector};
 
 /// A quadratic form over worlds.
 #[derive(Clone, Debug)]
@@ -27,34 +27,31 @@ pub struct Envelope {
     pub worlds: usize,
 }
 
-/// Along each axis values are taken as far away as they have risen by this: more than ripples are high.
-const RISE: f64 = 8.0;
-/// How often a step is doubled that does not rise so far.
-const DOUBLINGS: usize = 4;
 /// A part of a step that is not worth taking.
 const NEXT_TO_NOTHING: f64 = 0.1;
 /// From how many lattices a scatter is known well enough to be used as it is; from few it is too small by chance.
 const FEW: f64 = 2.0;
 
 /// Values at places ξ, along one lattice of rays.
-struct Seen {
-    places: Vec<DVector<f64>>,
-    values: Vec<f64>,
+#[derive(Default)]
+pub(super) struct Seen {
+    pub places: Vec<DVector<f64>>,
+    pub values: Vec<f64>,
 }
 
 /// What is fitted to the values of all lattices: a constant and a slope of each, and second derivatives of all.
-struct Form {
-    slopes: Vec<DVector<f64>>,
-    bends: DMatrix<f64>,
+pub(super) struct Form {
+    pub slopes: Vec<DVector<f64>>,
+    pub bends: DMatrix<f64>,
     /// Covariance of a slope.
-    uncertain: DMatrix<f64>,
+    pub uncertain: DMatrix<f64>,
     /// Standard deviation of what it leaves.
-    ripple: f64,
+    pub ripple: f64,
 }
 
 impl<T: Float + Default> WorldProblem<'_, T> {
     /// The bowl about a world, along the rays of this problem and of others; second derivatives of the data count one over
-    /// `inflation`. None if values around do not have the shape of a bowl.
+    /// `inflation`. None if the covariance of the steps that led there is not finite.
     ///
     /// # Errors
     /// As those of [`polish`](Self::polish).
@@ -62,81 +59,36 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         &self,
         polished: &Polished,
         others: &[WorldProblem<'_, T>],
-        (inflation, how): (f64, &Polish),
+        inflation: f64,
     ) -> Result<Option<Envelope>, Error> {
-        let Some(reach) = self.reach(polished, how.around)? else { return Ok(None) };
-        let about = polished.best.world;
-        let mut seen = vec![self.seen(&polished.best, &polished.responses, &reach, how.around)?];
+        let Some(reach) = self.reach(polished)? else { return Ok(None) };
+        let (best, n, columns) = (&polished.best, self.free.len(), &reach.columns);
+        let mut seen = vec![reach.seen()];
+        self.look_at(best, &polished.responses, (columns, diagonals(n)), &mut seen[0])?;
         for other in others {
             // The volume's response is that of the same voxels.
             let same = other.effort.nodes == self.effort.nodes;
             let responses = if same { polished.responses.as_slice() } else { &[] };
-            let start = other.solve(about)?;
-            seen.push(other.seen(&start, responses, &reach, how.around)?);
+            let start = other.solve(best.world)?;
+            let mut there = Seen::default();
+            let places = [ends(n), diagonals(n)].concat();
+            other.look_at(&start, responses, (columns, places), &mut there)?;
+            seen.push(there);
         }
-        let Some(form) = fitted(&seen, self.free.len()) else { return Ok(None) };
+        let form = fitted(&seen, n).unwrap_or_else(|| reach.form());
         let worlds = seen.iter().map(|seen| seen.values.len()).sum();
-        Ok(self.middle(about, &form, &reach, inflation).map(|(world, covariance)| Envelope {
-            world,
-            covariance,
-            ripple: form.ripple,
-            worlds,
-        }))
-    }
-
-    /// How far to look along the principal axes of a covariance, axis by axis in columns, in units of scales: places are
-    /// these columns times ξ with |ξ| ≤ 1.
-    fn reach(&self, polished: &Polished, iterations: usize) -> Result<Option<DMatrix<f64>>, Error> {
-        let n = self.free.len();
-        let scale = |k: usize| self.free[k].parameter.scale();
-        let of = |a: usize, b: usize| polished.covariance[a * n + b] / (scale(a) * scale(b));
-        let covariance = DMatrix::from_fn(n, n, of);
-        if covariance.iter().any(|x| !x.is_finite()) {
-            return Ok(None);
-        }
-        let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(covariance);
-        let mut columns = eigenvectors;
-        for (k, square) in eigenvalues.iter().enumerate() {
-            let axis = columns.column(k) * square.max(0.0).sqrt();
-            let far = self.far(polished, &axis, iterations)?;
-            columns.set_column(k, &(axis * far));
-        }
-        Ok(Some(columns))
-    }
-
-    /// How many steps along an axis raise the value enough, in the mean of both sides.
-    fn far(
-        &self,
-        polished: &Polished,
-        axis: &DVector<f64>,
-        iterations: usize,
-    ) -> Result<f64, Error> {
-        let (best, mut far) = (&polished.best, 1.0);
-        for doubling in 0..=DOUBLINGS {
-            far = f64::from(1u32 << doubling);
-            let mut rises = Vec::new();
-            for sign in [-1.0, 1.0] {
-                let beside =
-                    self.beside(best, &polished.responses, &(axis * (sign * far)), iterations)?;
-                // Where a bound is in between, as if the rise went on.
-                rises
-                    .extend(beside.map(|(there, part)| (there.value - best.value) / (part * part)));
-            }
-            if rises.iter().sum::<f64>() >= RISE * rises.len() as f64 {
-                break;
-            }
-        }
-        Ok(far)
+        let found = self.middle(best.world, (&form, columns), inflation, reach.is_wide);
+        let ripple = form.ripple;
+        Ok(found.map(|(world, covariance)| Envelope { world, covariance, ripple, worlds }))
     }
 
     /// The best volume of a world at a distance, or at that part of the distance which bounds leave; none if they leave
     /// next to nothing.
-    fn beside(
+    pub(super) fn beside(
         &self,
         from: &Estimate,
         responses: &[Vec<f64>],
         step: &DVector<f64>,
-        iterations: usize,
     ) -> Result<Option<(Estimate, f64)>, Error> {
         let part = self.part_within(&from.world, step.as_slice());
         if part < NEXT_TO_NOTHING {
@@ -144,35 +96,35 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         }
         let step = step * part;
         let x = self.along(from, responses, step.as_slice());
-        let there = self.solve_from(self.moved(&from.world, step.as_slice()), &x, iterations)?;
+        let there = self.solve_from(self.moved(&from.world, step.as_slice()), &x)?;
         Ok(Some((there, part)))
     }
 
-    fn seen(
+    /// Looks at the worlds of some places.
+    fn look_at(
         &self,
         from: &Estimate,
         responses: &[Vec<f64>],
-        reach: &DMatrix<f64>,
-        iterations: usize,
-    ) -> Result<Seen, Error> {
-        let mut seen = Seen { places: Vec::new(), values: Vec::new() };
-        for place in places(self.free.len()) {
-            let there = self.beside(from, responses, &(reach * &place), iterations)?;
+        (columns, places): (&DMatrix<f64>, Vec<DVector<f64>>),
+        seen: &mut Seen,
+    ) -> Result<(), Error> {
+        for place in places {
+            let there = self.beside(from, responses, &(columns * &place))?;
             if let Some((there, part)) = there {
                 seen.places.push(place * part);
                 seen.values.push(there.value);
             }
         }
-        Ok(seen)
+        Ok(())
     }
 
     /// The middle of a form, and its covariance in the parameters' own units.
     fn middle(
         &self,
         about: World,
-        form: &Form,
-        columns: &DMatrix<f64>,
+        (form, columns): (&Form, &DMatrix<f64>),
         inflation: f64,
+        is_wide: bool,
     ) -> Option<(World, Vec<f64>)> {
         let (inverse, outward) =
             (form.bends.clone().try_inverse()?, columns.clone().try_inverse()?);
@@ -186,6 +138,10 @@ impl<T: Float + Default> WorldProblem<'_, T> {
                 let away = middle - &mean;
                 moved += &away * away.transpose() * (FEW / (count * (count - 1.0)));
             }
+        }
+        if is_wide {
+            // Far from the middle a form is not quadratic: the lowest world is as good a guess.
+            moved += &mean * mean.transpose();
         }
         let step = columns * &mean;
         let world = self.moved(&about, step.as_slice());
@@ -208,21 +164,24 @@ fn near(place: DVector<f64>) -> DVector<f64> {
     if length > 1.0 { place / length } else { place }
 }
 
-/// Both sides of each axis at its end and in the middle, and the diagonals between two axes.
-fn places(n: usize) -> Vec<DVector<f64>> {
-    let along = |k: usize, x: f64| {
-        let mut place = DVector::zeros(n);
-        place[k] = x;
-        place
-    };
-    let ends = (0..n).flat_map(|k| [-1.0, -0.5, 0.5, 1.0].map(|x| along(k, x)));
+/// A place along an axis.
+pub(super) fn along(n: usize, k: usize, x: f64) -> DVector<f64> {
+    let mut place = DVector::zeros(n);
+    place[k] = x;
+    place
+}
+
+/// Both ends of each axis.
+fn ends(n: usize) -> Vec<DVector<f64>> {
+    (0..n).flat_map(|k| [-1.0, 1.0].map(|x| along(n, k, x))).collect()
+}
+
+/// The diagonals between two axes: each pair has two of its four, one of each direction.
+fn diagonals(n: usize) -> Vec<DVector<f64>> {
     let pairs = (0..n).flat_map(|a| (0..a).map(move |b| (a, b)));
     let root = 0.5f64.sqrt();
-    let diagonals = pairs.flat_map(|(a, b)| {
-        // Each pair has two of its four diagonals, one of each direction.
-        [(root, root), (-root, root)].map(|(x, y)| along(a, x) + along(b, y))
-    });
-    ends.chain(diagonals).collect()
+    let of = |(a, b)| [root, -root].map(|x| along(n, a, x) + along(n, b, root));
+    pairs.flat_map(of).collect()
 }
 
 /// The least squares form; none if there are too few values, or it is no bowl.
@@ -262,6 +221,11 @@ fn fitted(seen: &[Seen], n: usize) -> Option<Form> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn places(n: usize) -> Vec<DVector<f64>> {
+        let middles = (0..n).flat_map(|k| [-0.5, 0.5].map(|x| along(n, k, x)));
+        ends(n).into_iter().chain(middles).chain(diagonals(n)).collect()
+    }
 
     /// A bowl with ripples in one lattice, and another lattice that is deeper and moved.
     #[test]

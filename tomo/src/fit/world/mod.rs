@@ -13,10 +13,12 @@ mod model;
 mod polish;
 mod prior;
 mod problem;
+mod reach;
 mod redshift;
 mod scan;
 mod spread;
 mod tangents;
+mod twin;
 
 #[cfg(test)]
 mod tests;

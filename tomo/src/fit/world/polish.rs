@@ -33,17 +33,13 @@ pub struct Polished {
 pub struct Polish {
     /// Steps, at most.
     pub steps: usize,
-    /// Iterations of each solution, from the last one.
-    pub iterations: usize,
     /// Conjugate gradients by which the volume follows the world, at most.
     pub following: usize,
-    /// Iterations of the volume of a world beside the best one, from that of the best one.
-    pub around: usize,
 }
 
 impl Default for Polish {
     fn default() -> Self {
-        Self { steps: 8, iterations: 160, following: 300, around: 80 }
+        Self { steps: 12, following: 300 }
     }
 }
 
@@ -68,11 +64,11 @@ impl<T: Float + Default> WorldProblem<'_, T> {
     /// # Errors
     /// If a number is out of its range, or χ² is not finite.
     pub fn polish(&self, start: &Estimate, how: &Polish) -> Result<Polished, Error> {
-        let mut best = self.solve_from(start.world, &start.x, how.iterations)?;
+        let mut best = self.solve_from(start.world, &start.x)?;
         let mut bowl = self.bowl(&best, how.following)?;
         let mut steps = 0;
         while steps < how.steps {
-            let Some(lower) = self.descend(&best, &bowl, how.iterations)? else { break };
+            let Some(lower) = self.descend(&best, &bowl)? else { break };
             best = lower;
             steps += 1;
             bowl = self.bowl(&best, how.following)?;
@@ -82,24 +78,14 @@ impl<T: Float + Default> WorldProblem<'_, T> {
     }
 
     /// The best volume of a world, from that of another one.
-    pub(super) fn solve_from(
-        &self,
-        world: World,
-        x: &[f64],
-        iterations: usize,
-    ) -> Result<Estimate, Error> {
+    pub(super) fn solve_from(&self, world: World, x: &[f64]) -> Result<Estimate, Error> {
         let forward: ForwardModel<T> = self.model.forward(&world)?;
-        let least = self.linear(&forward).least_from(Some(x), iterations)?;
+        let least = self.linear(&forward).settled(Some(x), self.effort.patience)?;
         Ok(self.estimate(world, least))
     }
 
     /// The first part of a Newton step that lowers the value; none if none does.
-    fn descend(
-        &self,
-        from: &Estimate,
-        bowl: &Bowl,
-        iterations: usize,
-    ) -> Result<Option<Estimate>, Error> {
+    fn descend(&self, from: &Estimate, bowl: &Bowl) -> Result<Option<Estimate>, Error> {
         let Some(inverse) = bowl.bends.clone().cholesky() else { return Ok(None) };
         let step = -inverse.solve(&bowl.slopes);
         if -0.5 * step.dot(&bowl.slopes) < ENOUGH {
@@ -109,7 +95,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
             let step: Vec<f64> = step.iter().map(|step| part * step).collect();
             let world = self.moved(&from.world, &step);
             let x = self.along(from, &bowl.responses, &step);
-            let there = self.solve_from(world, &x, iterations)?;
+            let there = self.solve_from(world, &x)?;
             if there.value < from.value {
                 return Ok(Some(there));
             }

@@ -4,7 +4,7 @@ use super::{Parameter, Prior, World, WorldModel};
 use crate::Error;
 use crate::fit::ForwardModel;
 use crate::fit::linear::{
-    Change, GaussianField, Least, LinearProblem, Prior as Penalty, Voxels, Weighted,
+    Change, GaussianField, Least, LinearProblem, Patience, Prior as Penalty, Voxels, Weighted,
 };
 use crate::representation::Degree;
 use crate::simd::Float;
@@ -123,8 +123,8 @@ pub struct Effort {
     pub nodes: usize,
     /// What is between them.
     pub degree: Degree,
-    /// Iterations from a dark field.
-    pub iterations: usize,
+    /// How long it is looked for.
+    pub patience: Patience,
 }
 
 /// A world with the volume that explains the data best in it.
@@ -163,7 +163,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
     /// If a number is out of its range, or χ² is not finite.
     pub fn solve(&self, world: World) -> Result<Estimate, Error> {
         let forward: ForwardModel<T> = self.model.forward(&world)?;
-        let least = self.linear(&forward).least(self.effort.iterations)?;
+        let least = self.linear(&forward).settled(None, self.effort.patience)?;
         Ok(self.estimate(world, least))
     }
 

@@ -4,7 +4,7 @@ use super::*;
 use crate::dynamics::infall::Profile;
 use crate::dynamics::{AngularVelocity, Axis, Velocity};
 use crate::fit::RingRays;
-use crate::fit::linear::{Change, Weighted};
+use crate::fit::linear::{Change, Patience, Weighted};
 use crate::fit::pixel_rays::PixelRays;
 use crate::fit::tests::Blobs;
 use crate::fit::{Batch, Field, ForwardModel, FrameTerm, ImageTerm, Motion, Region, Seen};
@@ -17,6 +17,7 @@ use rand_pcg::Pcg64;
 
 mod beside_births;
 mod beside_prior;
+mod twin;
 
 /// All that a family of flows depends on.
 const FAMILY: &[Parameter] = Parameter::ALL.split_at(11).0;
@@ -314,7 +315,7 @@ fn of_hot_spot<'a>(
         change: Change::NONE,
         gaussian: None,
         scale: 1.0,
-        effort: Effort { nodes: 16, degree: Degree::Linear, iterations: 30 },
+        effort: Effort { nodes: 16, degree: Degree::Linear, patience: Patience::looking(30) },
     }
 }
 
@@ -342,7 +343,8 @@ fn exact_steps_lead_to_the_best_world() {
         Free { parameter: Parameter::Inclination, prior: Prior::Isotropic { low: 0.0, high: PI } },
         Free { parameter: Parameter::PositionAngle, prior: Prior::Uniform { low: -PI, high: PI } },
     ];
-    let effort = Effort { nodes: 18, degree: Degree::Linear, iterations: 60 };
+    let patience = Patience { looking: 60, rounds: 1, settling: 200 };
+    let effort = Effort { nodes: 18, degree: Degree::Linear, patience };
     let problem = WorldProblem { known: truth, effort, ..of_hot_spot(&model, &free, &terms) };
     let away = truth.with(Parameter::Inclination, 1.13).with(Parameter::PositionAngle, 0.6);
     let start = problem.solve(away).unwrap();
@@ -358,14 +360,13 @@ fn exact_steps_lead_to_the_best_world() {
     // The bowl beneath the ripples, along other rays too, has its middle there, within what it says.
     let other_model = model.seen_along(2);
     let other = WorldProblem { model: &other_model, ..problem };
-    let how = Polish::default();
-    let envelope = problem.envelope(&found, &[other], (1.0, &how)).unwrap().unwrap();
+    let envelope = problem.envelope(&found, &[other], 1.0).unwrap().unwrap();
     for (k, free) in free.iter().enumerate() {
         let apart = envelope.world.get(free.parameter) - truth.get(free.parameter);
         let sigma = envelope.covariance[3 * k].sqrt();
         assert!(apart.abs() < 3.0 * sigma && sigma < 0.02, "{:?}: {apart} {sigma}", free.parameter);
     }
-    assert!(envelope.ripple >= 0.0 && envelope.worlds == 20);
+    assert!(envelope.ripple >= 0.0 && envelope.worlds >= 16);
 }
 
 /// Images of a hot spot with noise of 1 % of the brightest pixel: spin, inclination and position angle from starts all over.

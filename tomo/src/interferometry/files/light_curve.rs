@@ -40,6 +40,18 @@ impl Heading {
     }
 }
 
+/// Whether the first line that is no comment names columns as those of a light curve: then it is meant to be one.
+pub fn is_light_curve(text: &str) -> bool {
+    let is_data = |line: &&str| !line.trim().is_empty() && !line.starts_with('#');
+    let names: Vec<&str> = text
+        .lines()
+        .find(is_data)
+        .map_or(Vec::new(), |line| line.split(',').map(str::trim).take(64).collect());
+    let has = |name: &str| names.iter().any(|n| n.eq_ignore_ascii_case(name));
+    let stokes = StokesParameter::ALL.iter().filter(|parameter| has(parameter.name())).count();
+    stokes > 1 || Heading::find(&names).is_some()
+}
+
 /// Reads a table with a column of times (`time_utc_h`, `time` or `t`, hours of UTC) and any of I, Q, U and V in Jy, each
 /// with a column of its standard deviations (`sigma_I`, `I_err`), or one `sigma` for all. Other columns, lines that start
 /// with `#` and cells that are empty or `nan` are left out.

@@ -17,7 +17,9 @@ pub use eht_table::{EhtTable, to_eht_table};
 pub use fits_image::read as read_fits_image;
 pub use gains::{COLUMNS as GAIN_COLUMNS, parse as parse_gains, to_csv as gains_to_csv};
 pub use leakage::{parse as parse_leakage, to_csv as leakage_to_csv};
-pub use light_curve::{parse as parse_light_curve, parse_times, to_csv as light_curve_to_csv};
+pub use light_curve::{
+    is_light_curve, parse as parse_light_curve, parse_times, to_csv as light_curve_to_csv,
+};
 pub use obs_text::{parse as parse_obs_text, to_text as to_obs_text};
 pub use table::{COLUMNS as TABLE_COLUMNS, parse as parse_table, to_csv};
 pub use uvfits::{read as read_uvfits, write as write_uvfits};

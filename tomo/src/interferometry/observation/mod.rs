@@ -205,6 +205,15 @@ impl Observation {
         self.rows.sort_by(|a, b| a.time_h.total_cmp(&b.time_h).then(place(a).cmp(&place(b))));
     }
 
+    /// Whether more than total intensity was measured: RL and LR, or Q, U or V.
+    pub fn is_polarized(&self) -> bool {
+        let measured = |row: &Row, k: usize| row.product(k).is_some_and(|p| !p.is_placeholder());
+        self.rows.iter().any(|row| match self.basis {
+            Basis::Circular => measured(row, 2) || measured(row, 3),
+            Basis::Stokes => (1..4).any(|k| measured(row, k)),
+        })
+    }
+
     /// The data as Stokes I only, of every row that has it.
     #[must_use]
     pub fn total_intensity(&self) -> Self {

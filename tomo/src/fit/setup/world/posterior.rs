@@ -15,8 +15,6 @@ use rand_pcg::Pcg64;
 const LATTICES: u64 = 3;
 /// Of the random numbers of draws.
 const DRAWS: u64 = 0x6f70_656e_0000_0000;
-/// Iterations of the first solution of a world, for each of a search.
-const PATIENCE: usize = 4;
 /// The number of a draw that has as many voxels as the fit.
 const SAME: u64 = 0;
 
@@ -30,12 +28,12 @@ pub(super) fn polished(
     Ok((polished, reduced))
 }
 
-/// A few voxels more or less, and as many iterations as a start from a dark field takes.
+/// A few voxels more or less.
 fn other_voxels(effort: Effort, number: u64) -> Effort {
     const MORE: [usize; 6] = [2, 5, 1, 4, 3, 6];
     let nodes = effort.nodes + MORE[number as usize % MORE.len()] - 2;
     let nodes = nodes.max(effort.degree.taps());
-    Effort { nodes, iterations: PATIENCE * effort.iterations, ..effort }
+    Effort { nodes, ..effort }
 }
 
 /// How sure a world is: the bowl beneath the ripples of the values around, seen along several lattices of rays and with
@@ -83,7 +81,7 @@ fn enveloped(
             WorldProblem { model, effort, ..*problem }
         })
         .collect();
-    problem.envelope(polished, &others, (inflation, &Polish::default()))
+    problem.envelope(polished, &others, inflation)
 }
 
 /// Why there are no worlds to draw.
@@ -116,12 +114,9 @@ impl<'a> WorldPosterior<'a> {
         (world, noise_factor): (World, f64),
     ) -> Result<Self> {
         let scale = noise_factor.powi(-2);
-        let seen = Seen::new(file, measured, &unknown.search.fine)?;
+        let seen = Seen::finely(file, measured, &unknown.search.fine)?;
         let (spread, reduced) = seen.with(unknown, &unknown.search.fine, scale, |problem| {
-            let iterations = PATIENCE * problem.effort.iterations;
-            let effort = Effort { iterations, ..problem.effort };
-            let start = WorldProblem { effort, ..*problem }.solve(world)?;
-            let (polished, reduced) = polished(problem, &start)?;
+            let (polished, reduced) = polished(problem, &problem.solve(world)?)?;
             Ok((surely(problem, &polished, reduced)?, reduced))
         })?;
         let Some(spread) = spread else { refuse!("{NO_BEST}") };

@@ -2,10 +2,11 @@
 
 use super::posterior::{polished, surely};
 use super::seen::Seen;
+use crate::fit::linear::Patience;
 use crate::fit::settings::{FieldKind, FitFile, Linear, UnknownWorld};
 use crate::fit::setup::{Measured, Result};
 use crate::fit::world::{
-    Exploration, Explored, Scanned, Spread, World, WorldProblem, WorldScan, WorldWatch,
+    Effort, Exploration, Explored, Scanned, Spread, World, WorldProblem, WorldScan, WorldWatch,
 };
 
 /// Where one search ended, in [`World`]'s units.
@@ -49,6 +50,9 @@ pub type SearchWatch<'a> = dyn FnMut((usize, usize), usize, f64) -> bool + 'a;
 /// Width of the first population from a start, and of the one about the best end, in units of a parameter's scale.
 const WIDTHS: [f64; 2] = [1.5, 0.4];
 
+/// Worlds of a search for each of that from the twin of its end.
+const TWIN: usize = 6;
+
 /// Looks for the world from all starts, and again with finer voxels about the best end; none if it was cancelled.
 ///
 /// # Errors
@@ -60,7 +64,7 @@ pub fn find_world(
     watch: &mut SearchWatch<'_>,
 ) -> Result<Option<FoundWorld>> {
     let search = &unknown.search;
-    let coarse = Seen::new(file, measured, &search.coarse)?;
+    let coarse = Seen::coarsely(file, measured, &search.coarse)?;
     let gaussian = |linear: &Linear| linear.prior_of(FieldKind::Gaussian).is_some();
     let has_prior = file.linear.as_ref().is_some_and(gaussian);
     // Beside a prior of the voxels data count as their errors say.
@@ -75,15 +79,18 @@ pub fn find_world(
         on_grid(problem, &over, file.seed, unknown, watch)
     })?;
     let Some(Found { start, reduced_chi2, trials, scan }) = found else { return Ok(None) };
-    let fine = Seen::new(file, measured, &search.fine)?;
+    let fine = Seen::finely(file, measured, &search.fine)?;
     // The coarse search has left less than it began with.
     let scale = scale(reduced_chi2);
     let count = trials.len().max(1) + 1;
     let mut told = |worlds: usize, best: f64| watch((count - 1, count), worlds, best);
     let told: &mut WorldWatch<'_> = &mut told;
     let found = fine.with(unknown, &search.fine, scale, |problem| {
+        // Populations look for where to begin: steps with volumes that are solved for follow.
+        let patience = Patience::looking(search.fine.iterations);
+        let quick = WorldProblem { effort: Effort { patience, ..problem.effort }, ..*problem };
         let how = Exploration { width: width(&over), worlds: search.fine.worlds, seed: file.seed };
-        let Some(explored) = problem.explore(start, &how, told)? else { return Ok(None) };
+        let Some(explored) = quick.explore(start, &how, told)? else { return Ok(None) };
         let reduced = problem.scale * problem.reduced(explored.best.chi2);
         // Steps along differences of images know one volume.
         if problem.model.ring.is_some() && !problem.change.is_any() {
@@ -126,11 +133,29 @@ fn from_starts(
         let seed = seed.wrapping_add(k as u64);
         let how = Exploration { width: WIDTHS[0], worlds: search.coarse.worlds, seed };
         let Some(explored) = problem.explore(start, &how, &mut told)? else { return Ok(None) };
+        let Some(explored) = or_twin(problem, explored, &how, &mut told)? else { return Ok(None) };
         trials.push(trial(&explored, problem));
     }
     let best = trials.iter().min_by(|a, b| a.value.total_cmp(&b.value));
     let best = best.map(|best| (best.end, best.reduced_chi2));
     Ok(best.map(|(start, reduced_chi2)| Found { start, reduced_chi2, trials, scan: None }))
+}
+
+/// Where a search has ended, or a short one from the twin of that world, if that ends at a better one.
+fn or_twin(
+    problem: &WorldProblem<'_, f32>,
+    mut explored: Explored,
+    how: &Exploration,
+    watch: &mut WorldWatch<'_>,
+) -> Result<Option<Explored>> {
+    let Some(twin) = problem.twin(&explored.best.world) else { return Ok(Some(explored)) };
+    let short = Exploration { width: WIDTHS[1], worlds: how.worlds / TWIN, ..*how };
+    let Some(other) = problem.explore(twin, &short, watch)? else { return Ok(None) };
+    if other.best.value < explored.best.value {
+        (explored.best, explored.converged) = (other.best, other.converged);
+    }
+    explored.samples.extend(other.samples);
+    Ok(Some(explored))
 }
 
 fn on_grid(

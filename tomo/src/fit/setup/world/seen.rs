@@ -2,7 +2,7 @@
 
 use super::{known_world, model};
 use crate::fit::Objective;
-use crate::fit::linear::{Change, GaussianField, Prior as Penalty, Voxels, Weighted};
+use crate::fit::linear::{Change, GaussianField, Patience, Prior as Penalty, Voxels, Weighted};
 use crate::fit::settings::{FieldKind, FitFile, PriorOfVoxels, UnknownWorld, Within, WorldView};
 use crate::fit::setup::linear_problem::terms;
 use crate::fit::setup::{
@@ -14,11 +14,27 @@ use crate::fit::world::{Effort, WorldProblem};
 pub(super) struct Seen {
     view: CoarseView,
     frames: usize,
+    /// Rounds of each solution over the voxels that shine.
+    rounds: usize,
 }
 
+/// Iterations of a round, for each over all voxels.
+const SETTLING: usize = 6;
+
 impl Seen {
-    pub fn new(file: &FitFile, measured: &Measured, view: &WorldView) -> Result<Self> {
-        Ok(Self { view: CoarseView::new(file, measured, view.pixels)?, frames: view.frames })
+    /// For a search all over: volumes are told apart by a few iterations.
+    pub fn coarsely(file: &FitFile, measured: &Measured, view: &WorldView) -> Result<Self> {
+        Self::new(file, measured, view, 0)
+    }
+
+    /// For worlds that are much alike: their volumes are solved for nearly to the end.
+    pub fn finely(file: &FitFile, measured: &Measured, view: &WorldView) -> Result<Self> {
+        Self::new(file, measured, view, 1)
+    }
+
+    fn new(file: &FitFile, measured: &Measured, view: &WorldView, rounds: usize) -> Result<Self> {
+        let WorldView { pixels, frames, .. } = *view;
+        Ok(Self { view: CoarseView::new(file, measured, pixels)?, frames, rounds })
     }
 
     pub fn with<R>(
@@ -70,7 +86,11 @@ impl Seen {
             effort: Effort {
                 nodes: view.nodes,
                 degree: settings.degree,
-                iterations: view.iterations,
+                patience: Patience {
+                    looking: view.iterations,
+                    rounds: self.rounds,
+                    settling: self.rounds * SETTLING * view.iterations,
+                },
             },
         })
     }

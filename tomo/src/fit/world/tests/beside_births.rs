@@ -26,7 +26,7 @@ fn exact_flow_is_found_beside_births() {
     let knots = Knots { first: 0.0, spacing: 10.0, count: 12, allowed: Allowed::Births };
     let within = Some(model.region);
     let change = Change { knots, weight: 0.01 * count, within, sharpen: None };
-    let effort = Effort { nodes: 14, degree: Degree::Linear, iterations: 60 };
+    let effort = Effort { nodes: 14, degree: Degree::Linear, patience: Patience::looking(60) };
     let steady = WorldProblem { known: truth, effort, ..of_hot_spot(&model, &free, &terms) };
     let over = [Scanned::even(Parameter::Rotation, [0.8, 1.2], 5)];
     let how = Exploration { width: 1.0, worlds: 1, seed: 1 };
