@@ -71,7 +71,7 @@ pub fn loop_plot(table: &str, name: &str) -> Option<LinePlot> {
     let axis = |label: &str| Axis { label: label.to_owned(), unit: "Jy".to_owned(), log: false };
     (rows.len() > 1).then(|| LinePlot {
         title: format!("Loop in Q and U{name}"),
-        caption: "Linear polarisation of the unresolved source through the plane of Q and U, less what is steady: a flare that orbits in a field draws a loop, twice an orbit where the field is vertical and seen face-on. Data, and the model through the same times.".to_owned(),
+        caption: "Linear polarisation of the unresolved source through the plane of Q and U, less what is steady: a flare that orbits in a field draws a loop, twice an orbit where the field is vertical and seen face-on. Data, and the model through the same times, samples that were not fitted included.".to_owned(),
         x: axis("Q"),
         y: axis("U"),
         series: vec![model, data],

@@ -100,7 +100,7 @@ pub fn find_world(
             return Ok(Some((spread, reduced, world)));
         }
         let spread = Spread::of(problem.free, &explored.samples, reduced);
-        let world = lower(problem, &explored, spread.as_ref())?;
+        let world = lower(&quick, &explored, spread.as_ref())?;
         Ok(Some((spread, reduced, world)))
     })?;
     Ok(found.map(|(spread, reduced_chi2, world)| FoundWorld {

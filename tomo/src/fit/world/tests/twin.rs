@@ -5,7 +5,7 @@ use super::*;
 /// Seen from the other side of the orbit; what is known stays.
 #[test]
 fn exact_the_twin_of_a_world_is_seen_from_below() {
-    let (model, _) = screen(6, 2);
+    let model = screen(6, 2);
     let prior = |low: f64, high: f64| Prior::Uniform { low, high };
     let free = [
         Free { parameter: Parameter::Spin, prior: prior(-0.95, 0.95) },
