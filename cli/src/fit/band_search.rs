@@ -133,7 +133,7 @@ fn binned(shares: &[[f64; 2]], bins: usize) -> Vec<[f64; 2]> {
 }
 
 /// The probability that matter turns clockwise on the sky: the axis is that of the hole, right-handed about
-/// [`motion.axis`](kerrlight_tomo::fit::settings::MotionSettings).
+/// `motion.axis`.
 fn clockwise(scan: &BandScan, axis_z: f64) -> f64 {
     let towards =
         |world: &BandWorld| world.rotation_factor * world.inclination_deg.to_radians().cos();

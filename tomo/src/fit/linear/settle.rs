@@ -20,7 +20,7 @@ pub struct Patience {
     pub looking: usize,
     /// Rounds over the nodes that shine and their neighbours, at most.
     pub rounds: usize,
-    /// Iterations of a round, at most: it ends where ten of them lower the function by less than [`SETTLED`] of what
+    /// Iterations of a round, at most: it ends where ten of them lower the function by less than a hundredth of what
     /// noise changes it by.
     pub settling: usize,
 }
