@@ -102,11 +102,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         x: &[f64],
         iterations: usize,
     ) -> Result<Round, Error> {
-        let settings = LinearSettings {
-            settled: std::env::var("KS").ok().and_then(|x| x.parse().ok()).unwrap_or(SETTLED),
-            tolerance: 0.0,
-            ..Default::default()
-        };
+        let settings = LinearSettings { settled: SETTLED, tolerance: 0.0, ..Default::default() };
         let mut watch = |_: &LinearProgress<'_>| ControlFlow::Continue(());
         let mut run = Run::new(self, &settings, &mut watch);
         let active = self.active(is_active);
