@@ -23,7 +23,7 @@ fn exact_few_nodes_that_shine_are_as_good_as_all() {
     let how = Patience { looking: 20, rounds: 4, settling: 1000 };
     let settled = problem.settled(None, how).unwrap();
     let few = problem.least(20).unwrap();
-    // Among 405 pixels, ten iterations that lower χ² by less than a thousandth of what noise does end a round.
+    // Among 405 pixels, ten iterations that lower χ² by less than a hundredth of what noise does end a round.
     assert!(settled.value < 1.01 * least.value, "{} {}", settled.value, least.value);
     assert!(few.value > 1.05 * least.value, "{} {}", few.value, least.value);
     // From a field that is given: not even the nodes have to be the same.
