@@ -4,6 +4,7 @@ mod annotate;
 mod guess;
 mod keys;
 mod light_curve;
+mod quick_look;
 mod sources;
 mod static_image;
 
@@ -25,6 +26,7 @@ use kerrlight_tomo::interferometry::simulate::Movie;
 use kerrlight_tomo::toml_file::ReadError;
 use kerrlight_tomo::units::{MICROARCSECOND, gravitational_angle};
 use keys::{KEYS, TABLES};
+use quick_look::QuickLook;
 use sources::{SOURCES, Source};
 use std::path::{Path, PathBuf};
 
@@ -179,7 +181,8 @@ fn known(observation: &Observation) -> Option<&'static Source> {
     })
 }
 
-/// Of visibilities: a static image, if that is wanted or the source is known to stand still for a night.
+/// Of visibilities: a static image, if that is wanted, the source is known to stand still for a night, or what it varies is
+/// no more than is known of it.
 fn of_observation(
     observation: &Observation,
     (data, toml): (&Path, &Path),
@@ -188,13 +191,24 @@ fn of_observation(
     let path = toml::Value::String(seen_from(toml, data)?).to_string();
     let file = data.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let source = known(observation);
-    let stands_still = source.is_some_and(|source| !source.varies);
-    if model.map_or(stands_still, |model| model == Model::Image) {
-        let name = source.map_or(observation.source.trim(), |source| source.name);
-        let name = if name.is_empty() { "unnamed source" } else { name };
-        return static_image::of_visibilities(observation, source, name, (&path, file));
+    let name = source.map_or(observation.source.trim(), |source| source.name);
+    let name = if name.is_empty() { "unnamed source" } else { name };
+    let image = || static_image::of_visibilities(observation, source, name, (&path, file));
+    let volume = || of_visibilities(observation, &path, file);
+    match (model, source) {
+        (Some(Model::Image), _) => image(),
+        (Some(Model::Volume), _) | (None, None) => volume(),
+        (None, Some(source)) if !source.varies => image(),
+        (None, Some(_)) => {
+            let static_image = image().ok();
+            let look =
+                static_image.as_ref().and_then(|text| QuickLook::new(text, observation, file));
+            let (Some(text), Some(look)) = (static_image, look) else { return volume() };
+            let text = if look.explains() { text } else { volume()? };
+            let said = format!("\n{}{}\n", guess::READ, look.sentence());
+            Ok(text.replacen('\n', &said, 1))
+        }
     }
-    of_visibilities(observation, &path, file)
 }
 
 fn of_visibilities(observation: &Observation, path: &str, file: &str) -> anyhow::Result<String> {

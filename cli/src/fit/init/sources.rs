@@ -24,10 +24,22 @@ pub struct Source {
     pub varies: bool,
     /// Flux of what is compact and its standard deviation, Jy, where short baselines see more.
     pub compact_jy: Option<[f64; 2]>,
+    /// Field and width of the light in published images, µas, with their source; the longest baseline decides without it.
+    pub image: Option<PublishedImages>,
     /// Where mass and distance come from.
     pub mass: &'static str,
     /// Where the inclination comes from.
     pub inclination: &'static str,
+}
+
+/// What published images assume.
+pub struct PublishedImages {
+    /// Their field, µas.
+    pub field_uas: f64,
+    /// Full width at half maximum of the Gaussian in which light is expected, µas.
+    pub envelope_uas: f64,
+    /// Where.
+    pub source: &'static str,
 }
 
 /// Those that are recognised by position or name.
@@ -45,6 +57,11 @@ pub const SOURCES: [Source; 2] = [
         ),
         varies: true,
         compact_jy: None,
+        image: Some(PublishedImages {
+            field_uas: 150.0,
+            envelope_uas: 80.0,
+            source: "as in published images of Sgr A* (EHT Collaboration 2022, ApJL 930, L14)",
+        }),
         mass: "Sgr A* (GRAVITY Collaboration 2019, A&A 625, L10)",
         inclination: "the EHT's models prefer views of Sgr A* near face-on, 30 degrees or less from an axis (2022, ApJL 930, L16)",
     },
@@ -61,6 +78,7 @@ pub const SOURCES: [Source; 2] = [
         blur: None,
         varies: false,
         compact_jy: Some([0.6, 0.1]),
+        image: None,
         mass: "M87* (EHT Collaboration 2019, ApJL 875, L1)",
         inclination: "17 degrees from the jet's axis, with the hole turned away (EHT Collaboration 2019, ApJL 875, L5)",
     },

@@ -24,16 +24,7 @@ pub fn of_visibilities(
         None => (short, 0.1 * short, "the amplitude of the shortest baselines"),
     };
     let long_only = source.and_then(|source| source.uv_min);
-    let mut losses = String::new();
-    let kinds = ["amplitudes", "closure-phases", "log-closure-amplitudes"];
-    let kinds =
-        if has_closures(observation, long_only.is_some()) { &kinds[..] } else { &kinds[..1] };
-    for kind in kinds {
-        losses += &format!("[[loss]]\ndata = {kind:?}\nweight = 1.0\n");
-        if *kind != "amplitudes" {
-            losses += "least_snr = 3.0 #! weaker ones are not Gaussian\n";
-        }
-    }
+    let losses = losses(has_closures(observation, long_only.is_some()));
     let extra = [long_only, source.and_then(|source| source.blur)].into_iter().flatten();
     let mut extra: Vec<String> = extra.map(str::to_owned).collect();
     if source.is_some_and(|source| source.varies) {
@@ -44,19 +35,31 @@ pub fn of_visibilities(
         ));
     }
     let day = observation.mjd.map_or(String::new(), |mjd| format!(", MJD {mjd}"));
-    let scaled = |factor: f64| digits(factor * beam);
+    let published = source.and_then(|source| source.image.as_ref());
+    let field = published.map_or(5.0 * beam, |images| images.field_uas);
+    let (field_why, envelope_why) = match published {
+        Some(images) => (images.source, images.source),
+        None => (
+            "five times what the longest baseline resolves: all compact light lies in this field",
+            "light is expected within as much",
+        ),
+    };
+    let scaled = |part: f64| digits(part * field);
     let fields = [
         ("title", format!("{}{day}", plain_words(name))),
-        ("field", scaled(5.0)),
+        ("field", scaled(1.0)),
+        ("field_why", field_why.to_owned()),
+        ("envelope", published.map_or(scaled(0.48), |images| digits(images.envelope_uas))),
+        ("envelope_why", envelope_why.to_owned()),
         ("flux", digits(flux)),
         ("flux_sigma", digits(sigma)),
         ("flux_why", why.to_owned()),
-        ("wide", scaled(2.4)),
-        ("narrow", scaled(1.6)),
-        ("thick", scaled(1.2)),
-        ("thin", scaled(0.8)),
-        ("least", scaled(0.2)),
-        ("most", scaled(1.8)),
+        ("wide", scaled(0.48)),
+        ("narrow", scaled(0.32)),
+        ("thick", scaled(0.24)),
+        ("thin", scaled(0.16)),
+        ("least", scaled(0.04)),
+        ("most", scaled(0.36)),
         ("extra", extra.join("\n")),
         ("losses", losses.trim_end().to_owned()),
         ("gains", gains(observation)),
@@ -64,4 +67,18 @@ pub fn of_visibilities(
         ("path", path.to_owned()),
     ];
     complete(include_str!("image.toml"), &fields)
+}
+
+/// Amplitudes, and closure quantities where there are any.
+fn losses(has_closures: bool) -> String {
+    let kinds = ["amplitudes", "closure-phases", "log-closure-amplitudes"];
+    let kinds = if has_closures { &kinds[..] } else { &kinds[..1] };
+    let one = |kind: &&str| {
+        let weak = match *kind {
+            "amplitudes" => "",
+            _ => "least_snr = 3.0 #! weaker ones are not Gaussian\n",
+        };
+        format!("[[loss]]\ndata = {kind:?}\nweight = 1.0\n{weak}")
+    };
+    kinds.iter().map(one).collect()
 }

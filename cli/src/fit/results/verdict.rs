@@ -85,7 +85,9 @@ impl Evidence<'_> {
         let model = self.model_visibilities(movie)?;
         let mut terms = Vec::new();
         for ((loss, name), statistics) in ordered(self.losses).zip(names).zip(statistics) {
-            let shared = self.measured.curve.as_ref().is_some_and(|c| c.background.is_some());
+            let has_background =
+                self.measured.curve.as_ref().is_some_and(|curve| curve.background.is_some());
+            let shared = has_background || self.measured.varies;
             let errors = match self.file {
                 _ if shared => Errors::Shared,
                 Some(file) => errors(file, loss.data),

@@ -156,6 +156,13 @@ impl Found<'_> {
              penalties blur."
                 .to_owned(),
         ];
+        if self.file.data.visibilities.variability.is_some() {
+            text.push(
+                "That the source stands still: errors stand for what it varies, whatever way it moves. `kerrlight fit --data \
+                 FILE --model volume` fits emission that moves."
+                    .to_owned(),
+            );
+        }
         if !self.survey.found().solution.has_converged {
             text.push("The optimiser had not come to its end after image.iterations.".to_owned());
         }

@@ -1,6 +1,6 @@
 //! Files of data, and what of them is compared.
 
-use super::MeasuredCurve;
+use super::{MeasuredCurve, Scattering, Variability};
 use crate::polarization::StokesParameter;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -22,6 +22,12 @@ pub enum DataFiles {
         /// Baselines shorter than this many wavelengths are left out: those within a site see extended emission too.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         uv_min: Option<f64>,
+        /// The interstellar medium that the light has passed.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        scattering: Option<Scattering>,
+        /// Errors for what the source varies and the model does not.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        variability: Option<Variability>,
     },
     /// The light curve of an unresolved source: CSV.
     LightCurve(Box<MeasuredCurve>),

@@ -12,6 +12,7 @@ mod gaussian;
 mod held_out;
 mod instrument;
 mod light_curve;
+mod medium;
 mod penalties;
 mod quiescent;
 mod ranges;
@@ -33,6 +34,7 @@ pub use gaussian::{FieldKind, FieldSettings, Negative, PriorOfVoxels};
 pub use held_out::{HeldOutSettings, Weight};
 pub use instrument::{GainPhases, GainSettings, InstrumentSettings, LeakageSettings};
 pub use light_curve::{MeanFlux, MeasuredCurve, PerStokes, SimulatedBackground, SimulatedCurve};
+pub use medium::{Scattering, Variability};
 pub use penalties::{PenaltyKind, PenaltySettings, ProbeSettings};
 pub use quiescent::QuiescentSettings;
 pub use recovery::{
@@ -40,8 +42,8 @@ pub use recovery::{
 };
 pub use simulation::{GlyphShape, Movie, Noise, Observation, Ring, Shines, Spot, Truth, Tube};
 pub use static_image::{
-    EnvelopeSettings, ImageSettings, RingSettings, Scattering, StartImage, StaticData,
-    StaticImageFile, StaticVisibilities, StrengthSettings, Variability,
+    EnvelopeSettings, ImageSettings, RingSettings, StartImage, StaticData, StaticImageFile,
+    StaticVisibilities, StrengthSettings,
 };
 pub use unknown_world::{PriorSettings, UnknownWorld, WorldSearch, WorldView};
 pub use view::{Absorption, Effects, Hole, Motion, Observer, Region, Screen, WidthOf};

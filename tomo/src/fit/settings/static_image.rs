@@ -3,6 +3,7 @@
 
 use super::penalties::priors_of;
 use super::{FitError, InstrumentSettings, Loss, LossKind, PenaltyKind, PenaltySettings, Within};
+use super::{Scattering, Variability};
 use super::{ranges, refuse};
 use crate::Error;
 use crate::fit::linear::Prior;
@@ -119,33 +120,6 @@ pub struct StaticVisibilities {
     /// Errors for what the source does vary.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variability: Option<Variability>,
-}
-
-/// A known scattering screen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Scattering {
-    /// Diffractive scattering towards Sgr A* (Johnson et al. 2018).
-    #[serde(rename = "sgra")]
-    SgrA,
-}
-
-/// The scatter of visibilities of a source that varies about those of its mean image: σ = jy/(1 + (|u|/uv)²)^(power/2).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Variability {
-    /// On short baselines, Jy, per real and imaginary part.
-    pub jy: f64,
-    /// The length of baselines from which on it falls, wavelengths.
-    pub uv: f64,
-    /// How steeply it falls.
-    pub power: f64,
-}
-
-impl Variability {
-    /// Standard deviation on a baseline of this length (wavelengths), Jy.
-    pub fn sigma(&self, length: f64) -> f64 {
-        self.jy / (1.0 + (length / self.uv).powi(2)).powf(0.5 * self.power)
-    }
 }
 
 /// Factors on all penalties, from which frames that are held out choose.
@@ -332,13 +306,5 @@ most_radius_uas = 40.0
             let error = StaticImageFile::parse(&TEXT.replace(from, to)).unwrap_err().to_string();
             assert!(error.contains(says), "{to}: {error}");
         }
-    }
-
-    /// Half of a Gaussian's power on baselines as long as `uv`, for a power of 2.
-    #[test]
-    fn exact_variability_falls_with_the_length_of_baselines() {
-        let law = Variability { jy: 0.2, uv: 2e9, power: 2.0 };
-        assert_eq!(law.sigma(0.0), 0.2);
-        assert!((law.sigma(2e9) - 0.1).abs() < 1e-15);
     }
 }

@@ -2,16 +2,14 @@
 
 use super::gains;
 use super::leakage;
+use super::medium;
 use super::observed::add_systematic;
 use super::polarized::is_polarized;
 use super::truth::SPOT;
 use super::visibilities::{VisibilitySettings, all_products, frames_of, prepared};
 use super::{Measured, Result, hours_per_m, sky};
-use crate::fit::settings::{
-    DataFiles, FitError, FitFile, Scattering, StaticImageFile, Within, refuse,
-};
+use crate::fit::settings::{DataFiles, FitError, FitFile, StaticImageFile, Within, refuse};
 use crate::frames::Frames;
-use crate::interferometry::noise::{ScatteringKernel, unscatter};
 use crate::interferometry::observation::Observation;
 
 /// What to write where there are no data.
@@ -67,10 +65,17 @@ impl Measured {
     /// Takes measured visibilities as the data. `name` is what they are called in messages.
     ///
     /// # Errors
-    /// If a visibility has no error, none is left, or mass or distance are missing.
+    /// If a visibility has no error, none is left, or mass, distance or the frequency of scattered light are missing.
     pub fn of_visibilities(file: &FitFile, observation: Observation, name: &str) -> Result<Self> {
-        let Some(DataFiles::Visibilities { average_s, systematic, first_time, uv_min, .. }) =
-            file.data
+        let Some(DataFiles::Visibilities {
+            average_s,
+            systematic,
+            first_time,
+            uv_min,
+            scattering,
+            variability,
+            ..
+        }) = file.data
         else {
             refuse!("{name} holds visibilities, and there is no [data.visibilities]")
         };
@@ -81,13 +86,15 @@ impl Measured {
         };
         let losses = (&mut observation, &file.loss[..]);
         add_systematic("data.visibilities.systematic", systematic, losses)?;
+        medium::correct((&mut observation, &file.loss), (scattering, variability), name)?;
         let (hours, of_rows) = frames_of(&mut observation);
         let per_m = hours_per_m(file)?;
         let times = hours.iter().map(|h| first_time + (h - hours[0]) / per_m).collect();
         let gains = gains::priors(file.instrument.as_ref(), &file.loss, &observation)?;
         let leakage = leakage::unknown(file.instrument.as_ref(), &observation)?;
         let (visibilities, sky) = (Some((observation, of_rows)), Some(sky(file)?));
-        Ok(Measured { times, visibilities, sky, gains, leakage, ..Measured::empty() })
+        let varies = variability.is_some();
+        Ok(Measured { times, visibilities, varies, sky, gains, leakage, ..Measured::empty() })
     }
 
     /// Takes measured visibilities as the data of a static image, whose frames have hours of UTC for times. `name` is
@@ -104,15 +111,8 @@ impl Measured {
         let mut observation = prepared(observation, &settings).within(name)?;
         let losses = (&mut observation, &file.loss[..]);
         add_systematic("data.visibilities.systematic", data.systematic, losses)?;
-        if data.scattering == Some(Scattering::SgrA) {
-            unscatter(&mut observation, &ScatteringKernel::SGR_A).within(name)?;
-        }
-        if let Some(variability) = &data.variability {
-            for row in &mut observation.rows {
-                let sigma = variability.sigma(row.uv[0].hypot(row.uv[1]));
-                row.noise_sigma[0] = row.noise_sigma[0].hypot(sigma);
-            }
-        }
+        let sky = (data.scattering, data.variability);
+        medium::correct((&mut observation, &file.loss), sky, name)?;
         let (times, of_rows) = frames_of(&mut observation);
         if let Some(strength) = file.strength.as_ref().filter(|s| times.len() < 2 * s.folds) {
             let allowed = format!("{} at most, half of the frames", times.len() / 2);
@@ -120,7 +120,8 @@ impl Measured {
         }
         let gains = gains::priors(file.instrument.as_ref(), &file.loss, &observation)?;
         let (visibilities, sky) = (Some((observation, of_rows)), Some(file.image.grid()?));
-        Ok(Measured { times, visibilities, sky, gains, ..Measured::empty() })
+        let varies = data.variability.is_some();
+        Ok(Measured { times, visibilities, varies, sky, gains, ..Measured::empty() })
     }
 }
 

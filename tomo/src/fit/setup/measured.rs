@@ -19,6 +19,8 @@ pub struct Measured {
     pub movie: Option<Frames<f64>>,
     /// Visibilities, with the frame of each row.
     pub visibilities: Option<(Observation, Vec<usize>)>,
+    /// Whether errors of visibilities are those of a source that varies: common to many data, so that χ² may be small.
+    pub varies: bool,
     /// The light curve of an unresolved source.
     pub curve: Option<Curve>,
     /// Where pixels are on the sky, where that matters.
@@ -41,6 +43,7 @@ impl Measured {
             times: Vec::new(),
             movie: None,
             visibilities: None,
+            varies: false,
             curve: None,
             sky: None,
             truth: None,
@@ -68,6 +71,7 @@ impl Measured {
             times: self.times.clone(),
             movie: self.movie.clone(),
             visibilities: self.visibilities.clone(),
+            varies: self.varies,
             curve: self.curve.clone(),
             sky: self.sky,
             gains: self.gains.clone(),

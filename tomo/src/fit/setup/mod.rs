@@ -18,6 +18,7 @@ mod light_curve;
 mod linear_problem;
 mod losses;
 mod measured;
+mod medium;
 mod observed;
 mod polarized;
 mod polarized_terms;

@@ -42,8 +42,8 @@ struct Sky<'a> {
 }
 
 impl Ring {
-    /// The ring of an image; none where fewer than nine directions in ten have their brightest point between the radii,
-    /// whatever the centre.
+    /// The ring of an image: it encloses the centroid of the light. None where fewer than nine directions in ten have their
+    /// brightest point between the radii, whatever the centre.
     pub fn measure(pixels: &[f64], grid: ImageGrid, settings: &RingSettings) -> Option<Self> {
         let pixel = grid.pixel_rad / MICROARCSECOND;
         let (least, most) = (settings.least_radius_uas, settings.most_radius_uas);
@@ -113,9 +113,14 @@ impl Sky<'_> {
     }
 
     /// Relative scatter of the distances about a centre.
-    fn scatter(&self, centre: [f64; 2]) -> Option<f64> {
+    ///
+    /// None where the middle of the light lies outside: a dark place beside a bright one has light all around as well.
+    fn scatter(&self, centre: [f64; 2], middle: [f64; 2]) -> Option<f64> {
         let peaks = self.peaks(centre)?;
         let mean = peaks.iter().sum::<f64>() / peaks.len() as f64;
+        if (centre[0] - middle[0]).hypot(centre[1] - middle[1]) >= mean {
+            return None;
+        }
         let square: f64 = peaks.iter().map(|r| (r - mean).powi(2)).sum();
         // Directions without a ring count as scattered by all of their distance.
         let missing = (DIRECTIONS - peaks.len()) as f64;
@@ -124,7 +129,8 @@ impl Sky<'_> {
 
     /// Where distances scatter least: on a grid about the centroid of the light, which is then refined.
     fn centre(&self, pixel: f64, most: f64) -> Option<[f64; 2]> {
-        let mut centre = self.centroid();
+        let middle = self.centroid();
+        let mut centre = middle;
         let mut step = (0.1 * most).max(pixel);
         let mut reach = (0.5 * most / step).ceil() as i32;
         let mut found = None;
@@ -133,7 +139,7 @@ impl Sky<'_> {
             let places = offsets()
                 .flat_map(|x| offsets().map(move |y| [x, y]))
                 .map(|[x, y]| [centre[0] + x, centre[1] + y]);
-            let scores = places.filter_map(|place| Some((place, self.scatter(place)?)));
+            let scores = places.filter_map(|place| Some((place, self.scatter(place, middle)?)));
             found = scores.min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(place, _)| place);
             centre = found?;
             (step, reach) = (0.5 * step, 2);

@@ -1,11 +1,11 @@
 //! Static images: gradients, rings of known shape, and rings seen through an array with gains.
 
 use super::*;
-use crate::fit::settings::{RingSettings, StartImage, StaticImageFile};
+use crate::fit::settings::{RingSettings, StartImage, StaticImageFile, Variability};
 use crate::fit::setup::Measured;
 use crate::interferometry::array;
 use crate::interferometry::earth::{Frame, Ut1};
-use crate::interferometry::noise::{GainErrors, add_thermal_noise, apply_gains};
+use crate::interferometry::noise::{GainErrors, ScatteringKernel, add_thermal_noise, apply_gains};
 use crate::interferometry::observation::Observation;
 use crate::interferometry::operator::{ImageGrid, Method, Pulse};
 use crate::interferometry::schedule::{self, Clock, Schedule, Setup};
@@ -48,6 +48,21 @@ fn exact_numbers_of_a_ring() {
     assert!((found.asymmetry - 0.25).abs() < 0.01, "{found:?}");
     assert!((found.centre_uas[0] - 3.0).abs() < 0.2 && (found.centre_uas[1] + 5.0).abs() < 0.2);
     assert!(found.central_brightness < 0.01 && found.diameter_scatter_uas < 0.7, "{found:?}");
+}
+
+/// A dark place with faint light all around it beside a bright spot: every direction has a brightest point, and yet most of
+/// the light lies outside.
+#[test]
+fn exact_a_ring_encloses_the_middle_of_the_light() {
+    let grid = grid(90);
+    let faint = ring(grid, [20.0, 7.0], [-18.0, -8.0], [0.0, 0.0]);
+    let even = Ring::measure(&faint, grid, &RADII).unwrap();
+    assert!((even.centre_uas[0] + 18.0).abs() < 0.5, "{even:?}");
+    let spot = start::image(StartImage::Gaussian { fwhm_uas: 14.0 }, grid);
+    let most = spot.iter().copied().fold(0.0, f64::max);
+    let both: Vec<f64> = faint.iter().zip(&spot).map(|(a, b)| a + 6.0 * b / most).collect();
+    let found = Ring::measure(&both, grid, &RADII);
+    assert!(found.is_none_or(|ring| ring.centre_uas[0] > -10.0), "{found:?}");
 }
 
 #[test]
@@ -126,6 +141,28 @@ fn observed(seed: u64) -> Observation {
 
 fn measured(file: &StaticImageFile, seed: u64) -> Measured {
     Measured::of_static(file, observed(seed), "data").unwrap()
+}
+
+/// Errors are those of a source that varies, in quadrature; visibilities and errors are those before scattering.
+#[test]
+fn exact_scattering_and_variability_of_data() {
+    let with = |line: &str| {
+        let text = SETTINGS.replace("systematic = 0.01", &format!("systematic = 0.01\n{line}"));
+        measured(&StaticImageFile::parse(&text).unwrap(), 1)
+    };
+    let rows = |measured: &Measured| measured.visibilities.as_ref().unwrap().0.rows.clone();
+    let plain = with("");
+    let law = Variability { jy: 0.02, uv: 2e9, power: 1.25 };
+    let varying = with("variability = { jy = 0.02, uv = 2e9, power = 1.25 }");
+    let scattered = with("scattering = \"sgra\"");
+    assert!(varying.varies && !plain.varies && !scattered.varies);
+    for ((a, b), c) in rows(&plain).iter().zip(rows(&varying)).zip(rows(&scattered)) {
+        let expected = a.noise_sigma[0].hypot(law.sigma(a.uv[0].hypot(a.uv[1])));
+        assert!((b.noise_sigma[0] - expected).abs() < 1e-15 && a.products[0] == b.products[0]);
+        let factor = ScatteringKernel::SGR_A.transform(a.uv, 229.1e9);
+        assert!((c.products[0] * factor - a.products[0]).norm() < 1e-12, "{factor}");
+        assert!((c.noise_sigma[0] * factor - a.noise_sigma[0]).abs() < 1e-12 && factor <= 1.0);
+    }
 }
 
 /// The gradient of everything at once, with gains, beside central differences.

@@ -36,7 +36,8 @@ pub enum Errors {
     Known,
     /// Errors that measured data state, with whatever was added for calibration.
     Stated,
-    /// Those of a background that was taken from the data: common to many data, so that χ² may well be small.
+    /// Those of a background that was taken from the data, or of what the source varies: common to many data, so that χ² may
+    /// well be small.
     Shared,
     /// A number that the settings give.
     Assumed,

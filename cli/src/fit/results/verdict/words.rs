@@ -181,7 +181,7 @@ fn chi2_of(name: &str, tested: &Tested) -> String {
     let chi2 = tested.statistics.chi2().map_or("–".to_owned(), short);
     let expected = match tested.errors {
         Errors::Assumed => format!("{mean:.2} ± {spread:.2} expected with the assumed σ"),
-        Errors::Shared => format!("{mean:.2} at most expected with the errors of the background"),
+        Errors::Shared => format!("{mean:.2} at most expected with errors of what varies"),
         _ => format!("{mean:.2} ± {spread:.2} expected"),
     };
     format!("χ² {chi2} per data point of {name} ({expected})")

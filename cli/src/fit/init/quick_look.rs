@@ -1,0 +1,54 @@
+//! Whether data of a source that varies ask for motion: a quick static image of them, before settings are guessed.
+
+use kerrlight_tomo::fit::settings::StaticImageFile;
+use kerrlight_tomo::fit::setup::Measured;
+use kerrlight_tomo::fit::static_image::survey;
+use kerrlight_tomo::fit::verdict::CHANCE;
+use kerrlight_tomo::interferometry::observation::Observation;
+
+/// What a static image leaves of data.
+pub struct QuickLook {
+    /// Kinds of data with χ² per datum and how many data there are.
+    kinds: Vec<(&'static str, f64, usize)>,
+}
+
+impl QuickLook {
+    /// With the settings of a static image, from all of their starts; penalties are as strong as they stand there, and
+    /// nothing is drawn. None if these data have no static image.
+    pub fn new(settings: &str, observation: &Observation, name: &str) -> Option<Self> {
+        let mut file = StaticImageFile::parse(settings).ok()?;
+        (file.strength, file.ring, file.image.draws) = (None, None, None);
+        let measured = Measured::of_static(&file, observation.clone(), name).ok()?;
+        let survey = survey(&file, &measured, &|_, _| true).ok()??;
+        let terms = measured.visibility_terms::<f64>(&file.loss, file.image.pixels.pow(2)).ok()?;
+        let count = |frames: &dyn Fn(usize) -> usize| (0..measured.times.len()).map(frames).sum();
+        let counts = terms.iter().map(|term| count(&|frame| term.term.degrees_of_freedom(frame)));
+        let names = file.loss.iter().map(|loss| loss.data.label());
+        let kinds = names.zip(&survey.found().chi2).zip(counts);
+        Some(Self { kinds: kinds.map(|((name, chi2), n)| (name, *chi2, n)).collect() })
+    }
+
+    /// Whether χ² of each kind is what chance allows, or less.
+    pub fn explains(&self) -> bool {
+        let allowed = |count: usize| 1.0 + CHANCE * (2.0 / count.max(1) as f64).sqrt();
+        self.kinds.iter().all(|(_, chi2, count)| *chi2 <= allowed(*count))
+    }
+
+    /// What it says, in a sentence.
+    pub fn sentence(&self) -> String {
+        let one = |(name, chi2, _): &(&str, f64, usize)| format!("{chi2:.2} of {name}");
+        let all: Vec<String> = self.kinds.iter().map(one).collect();
+        let end = match self.explains() {
+            true => {
+                "no motion is needed, and a static image is fitted (emission that moves: --model volume)"
+            }
+            false => {
+                "too much for an image that stands still, and a volume is fitted, in which emission moves (a static image: --model image)"
+            }
+        };
+        format!(
+            "a quick static image, with errors for what the source varies, leaves χ² per data point {}: {end}",
+            all.join(", ")
+        )
+    }
+}

@@ -1,0 +1,35 @@
+//! What measured visibilities need besides errors of calibration: the scattering that the light has passed, and errors
+//! for what the source varies.
+
+use super::Result;
+use super::polarized::is_polarized;
+use crate::fit::settings::{Loss, Scattering, Variability, Within, refuse};
+use crate::interferometry::noise::{ScatteringKernel, unscatter};
+use crate::interferometry::observation::Observation;
+
+/// Undoes scattering, then adds to errors what the source varies. `name` is what the data are called in messages.
+///
+/// # Errors
+/// If the kernel of scattering needs a frequency that is not known, or errors of all products would need the
+/// variability of polarised light.
+pub(super) fn correct(
+    (observation, losses): (&mut Observation, &[Loss]),
+    (scattering, variability): (Option<Scattering>, Option<Variability>),
+    name: &str,
+) -> Result<()> {
+    if scattering == Some(Scattering::SgrA) {
+        unscatter(observation, &ScatteringKernel::SGR_A).within(name)?;
+    }
+    let Some(variability) = variability else { return Ok(()) };
+    if is_polarized(losses) {
+        refuse!(
+            "data.visibilities.variability is that of total intensity: it is not for polarized-visibilities, \
+             polarimetric-ratios or closure-traces"
+        );
+    }
+    for row in &mut observation.rows {
+        let sigma = variability.sigma(row.uv[0].hypot(row.uv[1]));
+        row.noise_sigma[0] = row.noise_sigma[0].hypot(sigma);
+    }
+    Ok(())
+}
