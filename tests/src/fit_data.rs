@@ -1,6 +1,7 @@
 //! `kerrlight fit --data FILE`: settings that are guessed from a file, with every guess told.
 
-use crate::support::{fail, kerrlight, root, succeed};
+use crate::eht_data::folder;
+use crate::support::{fail, kerrlight, succeed};
 use std::path::Path;
 
 const SEEN: &str = "observe image.csv --fov-uas 100 --array EHT2017 --mjd 57850 --utc 5-7 --frames 6 --tint 60 --noise thermal --seed 1";
@@ -107,8 +108,7 @@ fn bad_input_of_data_is_named() {
 /// The public files of the EHT: settings for each are complete.
 #[test]
 fn code_eht_data_need_nothing_more() {
-    let folder = std::env::var_os("KERRLIGHT_EHT_DATA")
-        .map_or_else(|| root().join("../shared/data/eht"), std::path::PathBuf::from);
+    let folder = folder();
     let Ok(entries) = std::fs::read_dir(&folder) else {
         return eprintln!("SKIPPED: no public EHT data in {}", folder.display());
     };

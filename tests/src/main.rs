@@ -15,6 +15,7 @@ mod critical_curve;
 mod data_files;
 mod documents;
 mod eht_data;
+mod eht_polarized;
 mod film;
 mod film_stars;
 mod fit;
