@@ -3,7 +3,7 @@
 use crate::fit::results;
 use crate::fit_start::array;
 use crate::static_sky;
-use crate::support::{fail, kerrlight, root, succeed};
+use crate::support::{binary, fail, kerrlight, root, succeed};
 use std::path::Path;
 
 /// Stations, times and errors of a night of M87* with gains of 10 % and random phases.
@@ -118,6 +118,21 @@ fn bad_input_of_a_static_image_is_named_and_nothing_is_begun() {
     assert!(error.contains("--samples is for emission"), "{error}");
     succeed(path, &["fit", "--init", "data.uvfits", "-o", "my.toml"]);
     assert!(std::fs::read_to_string(path.join("my.toml")).unwrap().contains("[image]"));
+}
+
+/// An experiment whose data are not there ends before it has written anything.
+#[test]
+fn exact_an_experiment_without_its_data_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, place) in [("m87-2017", "/nowhere"), ("sgra-2017-polarimetry", "")] {
+        let mut command = std::process::Command::new(binary());
+        command.current_dir(&folder).env("KERRLIGHT_EHT_DATA", place);
+        let output = command.args(["compare", name, "--quick", "-o", "out"]).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        let says = if place.is_empty() { "KERRLIGHT_EHT_DATA is not set" } else { "is not there" };
+        assert!(output.status.code() == Some(2) && said.contains(says), "{said}");
+        assert!(!folder.path().join("out").exists());
+    }
 }
 
 /// The experiment with data of a test in place of the public ones.

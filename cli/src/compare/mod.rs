@@ -5,6 +5,7 @@ mod changes;
 mod experiment;
 mod figures;
 mod labels;
+mod listing;
 mod map;
 mod page;
 mod plan;
@@ -102,7 +103,7 @@ impl Compare {
         (threads, memory): (Option<u16>, Option<u64>),
         program: &Program,
     ) -> anyhow::Result<Answer> {
-        let Some(name) = &self.experiment else { return Ok(list_experiments()) };
+        let Some(name) = &self.experiment else { return Ok(listing::experiments()) };
         let before = self.against.as_deref().map(changes::read).transpose()?;
         if self.are_results(name) {
             return changes::between(name, before.as_ref());
@@ -119,13 +120,16 @@ impl Compare {
             bail!("{}: no case can be run; {}: {why}", name.display(), first.name());
         }
         if self.list {
-            return Ok(list_cases(&chosen));
+            return Ok(listing::cases(&chosen));
         }
         if self.status {
             return status::show(&folder, &chosen);
         }
         if self.slurm.is_wanted() {
             return self.slurm.run(&asked, program, (threads, memory));
+        }
+        if !self.collect {
+            ran::check_data(&chosen)?;
         }
         let recorder = Recorder::of_process();
         let lock = self.enter(&asked)?;
@@ -274,24 +278,6 @@ enum Ended<'a> {
     Here(Summary<'a>),
     /// Others still run cases, and it does not wait for them.
     Left(Answer),
-}
-
-fn list_experiments() -> Answer {
-    let line = |(name, title): (&str, String)| format!("{name:20} {title}\n");
-    let all: String = source::built_in().map(line).collect();
-    let entries = source::built_in().map(|(name, title)| json!({"name": name, "title": title}));
-    Answer::text(format!("{all}\nRun one with: kerrlight compare NAME\n"))
-        .with("experiments", entries.collect::<Vec<_>>())
-}
-
-fn list_cases(cases: &[Case]) -> Answer {
-    let line = |case: &Case| match &case.error {
-        None => format!("{}\n", case.name()),
-        Some(error) => format!("{}: {error}\n", case.name()),
-    };
-    let entry = |case: &Case| json!({"name": case.name(), "error": case.error});
-    Answer::text(cases.iter().map(line).collect::<String>())
-        .with("cases", cases.iter().map(entry).collect::<Vec<_>>())
 }
 
 /// The chosen cases, and those that an earlier run of the same folder has done beside them.

@@ -4,8 +4,10 @@ use super::cases::Case;
 use super::experiment::{Experiment, FigureKind, QUALITIES};
 use super::labels::{ONE_CHI2, pairs};
 use super::summary::{Summary, is_at};
+use crate::paths;
 use crate::report::Table;
 use anyhow::bail;
+use std::path::Path;
 use toml::Value;
 
 /// Settings that decide how much is computed, and what they are called.
@@ -31,6 +33,27 @@ fn at(settings: &toml::Table, key: &str) -> Option<String> {
 
 /// Most values of a setting that are told.
 const TOLD: usize = 20;
+
+/// Cases whose files are looked for before any is run.
+const LOOKED_AT: usize = 1000;
+
+/// Refuses cases whose data are not there, before anything is written.
+pub fn check_data(cases: &[Case]) -> anyhow::Result<()> {
+    for case in cases.iter().take(LOOKED_AT) {
+        let Some(settings) = settings(case) else { continue };
+        for kind in ["visibilities", "light-curve"] {
+            let Some(path) = at(&settings, &format!("data.{kind}.path")) else { continue };
+            // Only a file of public data has a place of its own; the fit looks for others.
+            if path.starts_with('$') {
+                let place = paths::of_data(Path::new(&path), Path::new(""))?;
+                if !place.is_file() {
+                    bail!("data.{kind}.path: {} is not there", place.display());
+                }
+            }
+        }
+    }
+    Ok(())
+}
 
 fn settings(case: &Case) -> Option<toml::Table> {
     case.settings().ok()?.parse().ok()
