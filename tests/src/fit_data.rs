@@ -87,6 +87,12 @@ fn exact_light_curves_are_fitted_at_once() {
     );
     assert!(told.contains("the file has no errors"), "{told}");
     assert!(kept.contains("stokes = [\"Q\", \"U\"]"), "{kept}");
+    let report = std::fs::read_to_string(path.join("qu/report.html")).unwrap();
+    for sentence in
+        ["40 samples of Q and U", "Inclination: that of axes in any direction, 20 to 40°"]
+    {
+        assert!(report.contains(sentence), "{sentence}");
+    }
     std::fs::write(path.join("i.csv"), text.replace("I,Q,U", "I,x,y")).unwrap();
     let (told, _) = said(path, &[&["--data", "i.csv"], &quick[..]].concat(), "i");
     assert!(told.contains("I are fitted"), "{told}");

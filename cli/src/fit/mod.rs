@@ -4,6 +4,7 @@ mod api;
 mod axis_scan;
 mod band_plots;
 mod band_search;
+mod band_words;
 mod curves;
 mod data;
 mod delegate;

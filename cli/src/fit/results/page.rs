@@ -8,7 +8,8 @@ use super::quiescent::Quiescent;
 use super::{Estimate, Found};
 use crate::fit::curves::{loss_plot, psnr_plot};
 use crate::fit::{
-    band_plots, band_search, held_out, labels, rotation_search, world_results, world_scan,
+    band_plots, band_search, band_words, held_out, labels, rotation_search, world_results,
+    world_scan,
 };
 use crate::output;
 use crate::report::{self, LinePlot, Report, View3d};
@@ -48,6 +49,7 @@ impl Estimate<'_> {
             title: self.file.title.clone(),
             notice: Some(found.judged.notice()),
             summary: self.summary(found, results),
+            parts: band_words::parts(self.file, self.measured),
             results: outcomes(results),
             details: [Some(found.judged.table()), found.judged.by_station(), details, leakage]
                 .into_iter()
