@@ -393,4 +393,11 @@ fn wrong_results_are_named_before_anything_runs() {
         let said = fail(at, &["compare", "rates.toml", "-o", "out"]);
         assert!(said.contains("table \"Quality\"") && said.contains(message), "{said}");
     }
+    // What --set has divided is shown divided.
+    let batch = ("start = \"drawn\"", "start = \"drawn\", batch = { frames = 2 }");
+    experiment(at, &[(value, "value = \"chi2\""), batch]);
+    let set = two.replace("[set]\n", "").replace('\n', "");
+    succeed(at, &["compare", "rates.toml", "-o", "divided", "--set", &set]);
+    let tables = std::fs::read_to_string(at.join("divided/tables.md")).unwrap();
+    assert!(tables.contains("Quality: image") && tables.contains("Quality: light curve"));
 }

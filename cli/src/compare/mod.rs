@@ -108,10 +108,11 @@ impl Compare {
         if self.are_results(name) {
             return changes::between(name, before.as_ref());
         }
-        let asked = self.asked(name, program)?;
+        let mut asked = self.asked(name, program)?;
         let folder = asked.folder.clone();
+        let chosen = cases::expand(&asked.experiment, &asked.source, &asked.choice)?;
+        ran::split_chi2(&mut asked.experiment, &asked.choice.set, &chosen);
         let Asked { experiment, choice, source, .. } = &asked;
-        let chosen = cases::expand(experiment, source, choice)?;
         ran::check(experiment, &chosen).with_context(|| name.display().to_string())?;
         if let [first, ..] = &chosen[..]
             && let Some(why) = &first.error

@@ -1,7 +1,7 @@
 //! What really ran, from the settings of the cases, and what that can give.
 
 use super::cases::Case;
-use super::experiment::{Experiment, FigureKind, QUALITIES};
+use super::experiment::{Experiment, FigureKind, QUALITIES, TableAsked};
 use super::labels::{ONE_CHI2, pairs};
 use super::summary::{Summary, is_at};
 use crate::paths;
@@ -126,6 +126,28 @@ fn missing(settings: &toml::Table, value: &str) -> Option<String> {
     }
     let name = value.strip_prefix(ONE_CHI2)?;
     (!kinds().any(|kind| kind == name)).then(|| format!("no loss has data = {name:?}"))
+}
+
+/// Makes a table for each kind of data of one of χ², where `--set` has put several kinds in the place of one.
+pub fn split_chi2(experiment: &mut Experiment, set: &[String], cases: &[Case]) {
+    if !set.iter().any(|assignment| assignment.trim_start().starts_with("loss")) {
+        return;
+    }
+    let settings = cases.first().and_then(settings).unwrap_or_default();
+    let losses = settings.get("loss").and_then(Value::as_array).into_iter().flatten();
+    let kinds: Vec<&str> = losses.filter_map(|loss| loss.get("data")?.as_str()).collect();
+    if kinds.len() < 2 {
+        return;
+    }
+    let each = |table: TableAsked| -> Vec<TableAsked> {
+        let of = |kind: &&str| TableAsked {
+            title: format!("{}: {}", table.title, kind.replace('-', " ")),
+            value: format!("{ONE_CHI2}{kind}"),
+            ..table.clone()
+        };
+        if table.value == "chi2" { kinds.iter().map(of).collect() } else { vec![table] }
+    };
+    experiment.table = std::mem::take(&mut experiment.table).into_iter().flat_map(each).collect();
 }
 
 /// Refuses tables and figures of results that none of their cases can have.
