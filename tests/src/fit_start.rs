@@ -146,7 +146,7 @@ fn exact_starters_of_visibilities_run() {
         let (data, toml) = (format!("{name}.uvfits"), format!("{name}.toml"));
         let words: Vec<&str> = SEEN.split(' ').chain(["--source", source, "-o", &data]).collect();
         succeed(path, &words);
-        succeed(path, &["fit", "--init", &data, "-o", &toml]);
+        succeed(path, &["fit", "--init", &data, "--model", "volume", "-o", &toml]);
         let fit = [&["fit", &toml, "-o", name][..], &few].concat();
         if source == "sgra" {
             succeed(path, &fit);
