@@ -1,4 +1,4 @@
-//! What really ran, from the settings of the cases, and what that can give.
+//! What cases need and what they can give, from their settings; what really ran.
 
 use super::cases::Case;
 use super::experiment::{Experiment, FigureKind, QUALITIES, TableAsked};

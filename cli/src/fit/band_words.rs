@@ -73,7 +73,7 @@ fn law(law: &PolarizationLaw) -> String {
     let field = &law.field;
     format!(
         "Magnetic field: vertical {}, radial {}, toroidal {}. Light goes like g^{} |b|^{} sin^{} of the angle between field and \
-         ray; {:.0} % of it are linearly polarised.",
+         ray; {:.0} % of it is linearly polarised.",
         field.vertical,
         field.radial,
         field.toroidal,
@@ -98,14 +98,14 @@ fn priors(band: &BandSettings) -> Vec<String> {
     vec![
         format!(
             "Inclination: that of axes in any direction, {}. Position angle of the axis: {}. Angular velocity: {} times that of \
-             the law, below 0 the other way round. All that is listed is as probable.",
+             the law, below 0 the other way round. All listed values are equally probable.",
             steps(&band.inclinations_deg, "°"),
             degrees(&band.position_angles_deg),
             list(&band.rotation_factors)
         ),
         format!(
-            "Band: radii of {}, widths of {} M, a height of {} M, correlation lengths of {} M, each as probable; how bright it is, \
-             over three orders of magnitude.",
+            "Band: radii of {}, widths of {} M, a height of {} M, correlation lengths of {} M, all equally probable; a brightness \
+             within three orders of magnitude.",
             steps(&band.radii, " M"),
             list(&band.widths),
             band.height,
@@ -116,7 +116,8 @@ fn priors(band: &BandSettings) -> Vec<String> {
 
 fn not_concluded(file: &FitFile, band: &BandSettings) -> Vec<String> {
     let mut text = vec![
-        "The magnetic field and the law of emission: they are assumed, and with others the result may lie outside of these intervals. The shape of the emission: one curve tells where light turns, not what it looks like."
+        "The magnetic field and the law of emission: they are assumed, and with others the result may lie outside of these \
+         intervals. The shape of the emission: one curve tells where light turns, not what it looks like."
             .to_owned(),
         "Flares that appear or fade within the data, that leave their circle, or that are several at different radii: these are \
          outside of the model, and show only as samples that are predicted badly."

@@ -21,8 +21,10 @@ impl QuickLook {
         let measured = Measured::of_static(&file, observation.clone(), name).ok()?;
         let survey = survey(&file, &measured, &|_, _| true).ok()??;
         let terms = measured.visibility_terms::<f64>(&file.loss, file.image.pixels.pow(2)).ok()?;
-        let count = |frames: &dyn Fn(usize) -> usize| (0..measured.times.len()).map(frames).sum();
-        let counts = terms.iter().map(|term| count(&|frame| term.term.degrees_of_freedom(frame)));
+        let frames = 0..measured.times.len();
+        let counts = terms.iter().map(|weighted| {
+            frames.clone().map(|frame| weighted.term.degrees_of_freedom(frame)).sum()
+        });
         let names = file.loss.iter().map(|loss| loss.data.label());
         let kinds = names.zip(&survey.found().chi2).zip(counts);
         Some(Self { kinds: kinds.map(|((name, chi2), n)| (name, *chi2, n)).collect() })
