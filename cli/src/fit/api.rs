@@ -52,7 +52,7 @@ pub fn turned(text: &str, later: f64) -> anyhow::Result<[impl Fn(f64) -> f64; 2]
 pub fn coverage(text: &str, base_dir: &Path) -> anyhow::Result<Vec<[f64; 2]>> {
     let Measured { visibilities, .. } = match Work::read(text)? {
         Work::Emission(file) => data::measure(&file, &Instrument::new(&file)?, base_dir)?,
-        Work::Image(file) => data::of_static(&file, base_dir)?,
+        Work::Image(file) => data::of_static(&file, base_dir)?.0,
     };
     let rows = visibilities.into_iter().flat_map(|(observation, _)| observation.rows);
     Ok(rows.map(|row| row.uv).collect())

@@ -145,16 +145,22 @@ fn movie(file: &FitFile, path: &Path) -> anyhow::Result<Movie> {
     Ok(movie)
 }
 
-/// The data of a static image.
-pub fn of_static(file: &StaticImageFile, base_dir: &Path) -> anyhow::Result<Measured> {
+/// The data of a static image, and those of its polarisation, where that is asked for.
+pub fn of_static(
+    file: &StaticImageFile,
+    base_dir: &Path,
+) -> anyhow::Result<(Measured, Option<Measured>)> {
     let path = paths::of_data(&file.data.visibilities.path, base_dir)?;
-    visibilities(&path, |observation, name| Measured::of_static(file, observation, name))
+    visibilities(&path, |observation, name| {
+        let polarized = Measured::of_static_polarized(file, observation.clone(), name)?;
+        Ok((Measured::of_static(file, observation, name)?, polarized))
+    })
 }
 
-fn visibilities(
+fn visibilities<R>(
     path: &Path,
-    of: impl FnOnce(Observation, &str) -> Result<Measured, Error>,
-) -> anyhow::Result<Measured> {
+    of: impl FnOnce(Observation, &str) -> Result<R, Error>,
+) -> anyhow::Result<R> {
     let (_, observation) = interferometry::read(path)?;
     let (name, all) = (path.display().to_string(), observation.rows.len());
     let without = all - observation.stokes_i().count();

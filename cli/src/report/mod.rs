@@ -10,6 +10,7 @@ mod pictures;
 mod plot;
 #[cfg(test)]
 mod tests;
+mod ticked;
 mod triangle;
 mod view;
 
@@ -20,6 +21,7 @@ pub use pictures::{
     Figure, Strip, encode, enlarged, frames, images, projections, residuals, slices, still,
 };
 pub use plot::{Axis, LinePlot, Marks, Series};
+pub use ticked::ticked;
 pub use triangle::{Triangle, Variable};
 pub use view::{Motion, View3d, rates, thinned};
 

@@ -1,8 +1,10 @@
 //! Leakage between the feeds of stations that a fit has solved for: a table, a picture and numbers.
 
 use super::Estimate;
+use crate::fit::folder::Folder;
 use crate::fit::leakage::TABLE;
 use crate::report::{Axis, LinePlot, Marks, Series, Table};
+use kerrlight_tomo::fit::setup::Measured;
 use kerrlight_tomo::frames::Frames;
 use kerrlight_tomo::interferometry::files;
 use kerrlight_tomo::interferometry::polarimetry::{LeakageDistance, LeakageTable, StationLeakage};
@@ -22,13 +24,21 @@ impl Estimate<'_> {
             return Ok(None);
         }
         let Some(found) = self.measured.solve_leakage(&seen.to_vec()?)? else { return Ok(None) };
-        let text = files::leakage_to_csv(&found.table);
-        self.folder.file(TABLE)?.write(text.as_bytes())?;
-        Ok(Some(Leakage { table: found.table, truth: self.measured.true_leakage.clone() }))
+        Leakage::written(found.table, self.measured, self.folder).map(Some)
     }
 }
 
 impl Leakage {
+    /// Writes its table.
+    pub fn written(
+        table: LeakageTable,
+        measured: &Measured,
+        folder: &Folder,
+    ) -> anyhow::Result<Self> {
+        folder.file(TABLE)?.write(files::leakage_to_csv(&table).as_bytes())?;
+        Ok(Leakage { table, truth: measured.true_leakage.clone() })
+    }
+
     fn distance(&self) -> Option<LeakageDistance> {
         self.table.distance(self.truth.as_ref()?)
     }

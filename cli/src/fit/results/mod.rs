@@ -2,7 +2,7 @@
 
 mod fields;
 pub mod gains;
-mod leakage;
+pub mod leakage;
 mod light_curve;
 mod numbers;
 mod over_time;

@@ -77,10 +77,16 @@ pub type Compared<'a> = (Vec<&'a str>, Vec<Statistics>);
 
 impl Evidence<'_> {
     /// Of images of all frames.
-    pub fn judged(
+    pub fn judged(&self, compared: Compared<'_>, movie: &Frames<f32>) -> anyhow::Result<Judged> {
+        self.judged_beside(compared, movie, Vec::new())
+    }
+
+    /// The same with kinds of data that are not in the losses.
+    pub fn judged_beside(
         &self,
         (names, statistics): Compared<'_>,
         movie: &Frames<f32>,
+        others: Vec<(String, Tested)>,
     ) -> anyhow::Result<Judged> {
         let model = self.model_visibilities(movie)?;
         let mut terms = Vec::new();
@@ -102,6 +108,7 @@ impl Evidence<'_> {
             }
             terms.push((name.to_owned(), tested));
         }
+        terms.extend(others);
         let tested: Vec<Tested> = terms.iter().map(|(_, tested)| tested.clone()).collect();
         let flux = self.zero_spacing(movie)?;
         let knows_flux =

@@ -4,11 +4,13 @@
 mod numbers;
 mod page;
 mod pictures;
+mod polarized;
 mod words;
 
 use super::data;
 use super::folder::{self, Folder};
 use super::results::gains::Gains;
+use super::results::leakage::Leakage;
 use super::results::verdict::{Evidence, Judged};
 use crate::answer::Answer;
 use crate::checksum::sealed;
@@ -16,12 +18,13 @@ use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
 use anyhow::bail;
 use kerrlight_tomo::fit::FrameTerm;
-use kerrlight_tomo::fit::settings::{Loss, LossKind, StaticImageFile};
+use kerrlight_tomo::fit::settings::{Loss, LossKind, StaticImageFile, StrengthSettings};
 use kerrlight_tomo::fit::setup::Measured;
-use kerrlight_tomo::fit::static_image::{Stage, Survey, survey};
-use kerrlight_tomo::fit::verdict::Statistics;
+use kerrlight_tomo::fit::static_image::{PolarizedSurvey, Stage, Survey, survey, survey_polarized};
+use kerrlight_tomo::fit::verdict::{Statistics, Tested};
 use kerrlight_tomo::frames::Frames;
 use kerrlight_tomo::interferometry::files::images;
+use polarized::Polarized;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -33,6 +36,8 @@ const STOPPED: &str =
 pub struct Prepared {
     file: StaticImageFile,
     measured: Measured,
+    /// All products of the feeds, where polarisation is asked for.
+    polarized: Option<Measured>,
 }
 
 /// What was found.
@@ -45,6 +50,7 @@ struct Found<'a> {
     movie: Frames<f32>,
     judged: Judged,
     gains: Option<Gains>,
+    polarized: Option<Polarized>,
     /// Kinds of data that were not fitted, with χ² per datum.
     beside: Vec<(&'static str, f64)>,
     begun: Instant,
@@ -61,26 +67,32 @@ impl Prepared {
                  the noise of a measurement of the image would be beside it"
             );
         }
-        let measured = data::of_static(&file, base_dir)?;
+        let (measured, polarized) = data::of_static(&file, base_dir)?;
         let pixels = file.image.pixels * file.image.pixels;
         measured.visibility_terms::<f64>(&file.loss, pixels)?;
-        Ok(Self { file, measured })
+        if let (Some(measured), Some(polarization)) = (&polarized, &file.polarization) {
+            measured.visibility_terms::<f64>(&[polarization.loss()], pixels)?;
+        }
+        Ok(Self { file, measured, polarized })
     }
 }
 
 /// Finds the image, and writes all that was found.
 pub fn run(prepared: &Prepared, folder: &Folder) -> anyhow::Result<Answer> {
-    let Prepared { file, measured } = prepared;
+    let Prepared { file, measured, .. } = prepared;
     let begun = Instant::now();
     folder.file(folder::LOG)?.write(b"")?;
-    let survey = searched(file, measured)?;
+    let (survey, polarized) = searched(prepared)?;
     let image: Vec<f32> = survey.found().solution.image.iter().map(|x| *x as f32).collect();
     let movie = Frames::of(image.repeat(measured.times.len()), image.len());
     let evidence = Evidence { file: None, losses: &file.loss, seed: file.seed, measured };
-    let judged = evidence.judged(compared(file, measured, &survey)?, &movie)?;
+    let (polarized, tested) = told(prepared, polarized, folder)?.unzip();
+    let others = tested.into_iter().collect();
+    let judged = evidence.judged_beside(compared(file, measured, &survey)?, &movie, others)?;
     let gains = Gains::beside(&evidence, &movie, folder)?;
     let beside = beside(file, measured, &survey);
-    let found = Found { file, measured, folder, survey, movie, judged, gains, beside, begun };
+    let found =
+        Found { file, measured, folder, survey, movie, judged, gains, polarized, beside, begun };
     found.images()?;
     let results = found.results();
     folder.file("results.json")?.write(sealed(results.clone()).as_bytes())?;
@@ -93,8 +105,21 @@ pub fn run(prepared: &Prepared, folder: &Folder) -> anyhow::Result<Answer> {
         .files(files.iter().map(|path| path.as_path())))
 }
 
+/// What was found of polarisation, and its residuals; writes the leakage of stations, where it was solved for.
+fn told(
+    prepared: &Prepared,
+    survey: Option<PolarizedSurvey>,
+    folder: &Folder,
+) -> anyhow::Result<Option<(Polarized, (String, Tested))>> {
+    let (Some(measured), Some(survey)) = (&prepared.polarized, survey) else { return Ok(None) };
+    let table = survey.leakage.as_ref().map(|leakage| leakage.table.clone());
+    let leakage = table.map(|table| Leakage::written(table, measured, folder)).transpose()?;
+    Polarized::new(&prepared.file, measured, survey, leakage)
+}
+
 /// The search, with its progress; an error if a signal stops it.
-fn searched(file: &StaticImageFile, measured: &Measured) -> anyhow::Result<Survey> {
+fn searched(prepared: &Prepared) -> anyhow::Result<(Survey, Option<PolarizedSurvey>)> {
+    let Prepared { file, measured, polarized } = prepared;
     let (rows, frames) = (
         measured.visibilities.iter().flat_map(|(seen, _)| seen.stokes_i()).count(),
         measured.times.len(),
@@ -108,8 +133,10 @@ fn searched(file: &StaticImageFile, measured: &Measured) -> anyhow::Result<Surve
         file.image.pixels,
         file.image.field_uas / file.image.pixels as f64,
     );
-    let values = file.strength.as_ref().map_or(0, |s| s.values.len() * s.folds);
-    let all = file.image.starts.len() + values + file.image.draws.unwrap_or(0);
+    let values = |s: &Option<StrengthSettings>| s.as_ref().map_or(0, |s| s.values.len() * s.folds);
+    let draws = file.image.draws.unwrap_or(0);
+    let of_polarized = file.polarization.as_ref().map_or(0, |p| values(&p.strength) + 1 + draws);
+    let all = file.image.starts.len() + values(&file.strength) + draws + of_polarized;
     let keeper = Keeper::brief(STOPPED);
     let bar = progress::held_out(all as u64);
     let done = AtomicU64::new(0);
@@ -125,9 +152,16 @@ fn searched(file: &StaticImageFile, measured: &Measured) -> anyhow::Result<Surve
         }
         !keeper.stopped()
     };
-    let found = survey(file, measured, &watch)?;
+    let stopped = || Interrupted(STOPPED.to_owned());
+    let found = survey(file, measured, &watch)?.ok_or_else(stopped)?;
+    let of_polarized = match polarized {
+        None => None,
+        Some(measured) => {
+            Some(survey_polarized(file, measured, &found, &watch)?.ok_or_else(stopped)?)
+        }
+    };
     bar.finish_and_clear();
-    found.ok_or_else(|| Interrupted(STOPPED.to_owned()).into())
+    Ok((found, of_polarized))
 }
 
 /// Residuals of the data that were fitted.
@@ -186,7 +220,15 @@ impl Found<'_> {
         let field = ("field_uas", vec![self.file.image.field_uas]);
         let image = self.survey.found().solution.image.iter().map(|x| *x as f32).collect();
         let lists = [("time", vec![0.0]), ("hours", vec![0.0]), field.clone()];
-        let bytes = images::movie_archive([1, n, n], &[("recovered", image)], &lists);
+        let mut all = vec![("recovered", image)];
+        for (k, name) in [(1, "recovered_q"), (2, "recovered_u")] {
+            let stokes = self.polarized.iter().map(|polarized| &polarized.survey.found.images);
+            let pixels = |images: &Vec<f64>| {
+                images[k * n * n..(k + 1) * n * n].iter().map(|x| *x as f32).collect::<Vec<f32>>()
+            };
+            all.extend(stokes.map(|images| (name, pixels(images))));
+        }
+        let bytes = images::movie_archive([1, n, n], &all, &lists);
         self.folder.file("image.npz")?.write(&bytes)?;
         let draws = &self.survey.draws;
         if draws.is_empty() {
@@ -199,7 +241,8 @@ impl Found<'_> {
 
     /// The verdict and the ring in a line.
     fn worth(&self) -> String {
-        let ring = words::ring(&self.survey).map_or(String::new(), |ring| format!("\n{ring}"));
-        self.judged.worth() + &ring
+        let polarized = self.polarized.as_ref().map(Polarized::sentence);
+        let all = words::ring(&self.survey).into_iter().chain(polarized);
+        self.judged.worth() + &all.map(|sentence| format!("\n{sentence}")).collect::<String>()
     }
 }

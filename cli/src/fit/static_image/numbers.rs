@@ -79,6 +79,9 @@ impl Found<'_> {
         if let Some(gains) = &self.gains {
             results["gains"] = gains.json();
         }
+        if let Some(polarized) = &self.polarized {
+            results["polarization"] = polarized.json();
+        }
         self.add_ring(&mut results);
         results
     }

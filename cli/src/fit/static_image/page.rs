@@ -2,8 +2,10 @@
 
 use super::Found;
 use super::numbers::{RING, error};
+use super::polarized::Polarized;
 use super::words;
 use crate::fit::results::gains::Gains;
+use crate::fit::results::leakage::Leakage;
 use crate::fit::results::page::settings;
 use crate::fit::results::verdict::Evidence;
 use crate::fit::results::{plots, residuals};
@@ -50,20 +52,31 @@ impl Found<'_> {
     pub fn report(&self, evidence: &Evidence<'_>, results: &Value) -> anyhow::Result<()> {
         let figure = self.picture()?;
         self.folder.file("image.png")?.write(&figure.png)?;
+        let polarized = self.polarized_picture()?;
+        if let Some(polarized) = &polarized {
+            self.folder.file("polarized.png")?.write(&polarized.png)?;
+        }
         let mut all_plots: Vec<LinePlot> =
             plots::amplitudes(evidence, &self.movie, self.gains.as_ref())?.into_iter().collect();
         all_plots.extend(residuals::plots(&self.judged, self.measured));
         all_plots.extend(self.held_out());
+        all_plots.extend(self.polarized.as_ref().and_then(Polarized::held_out));
         all_plots.extend(self.gains.iter().flat_map(Gains::plots));
         let details = self.gains.as_ref().map(Gains::details);
-        let details = [Some(self.judged.table()), self.judged.by_station(), details];
+        let leakage = self.polarized.as_ref().and_then(|polarized| polarized.leakage.as_ref());
+        all_plots.extend(leakage.map(Leakage::plot));
+        let leakage = leakage.map(Leakage::details);
+        let details = [Some(self.judged.table()), self.judged.by_station(), details, leakage];
         let report = Report {
             title: self.file.title.clone(),
             notice: Some(self.judged.notice()),
-            summary: words::ring(&self.survey).into_iter().collect(),
+            summary: words::ring(&self.survey)
+                .into_iter()
+                .chain(self.polarized.as_ref().map(Polarized::sentence))
+                .collect(),
             parts: self.parts(),
             results: self.outcomes(results),
-            figures: vec![figure],
+            figures: [figure].into_iter().chain(polarized).collect(),
             plots: all_plots,
             details: details.into_iter().flatten().chain([self.images_table()]).collect(),
             settings: settings(self.file)?,
@@ -99,7 +112,8 @@ impl Found<'_> {
             unit: "s".to_owned(),
             meaning: "wall time of this run".to_owned(),
         };
-        of_ring.chain([flux, seconds]).collect()
+        let polarized = self.polarized.iter().flat_map(Polarized::outcomes);
+        of_ring.chain([flux]).chain(polarized).chain([seconds]).collect()
     }
 
     /// The loss of held-out frames against the strength.

@@ -2,7 +2,7 @@
 
 use super::Found;
 use crate::report::{Figure, enlarged, images};
-use kerrlight_tomo::fit::static_image::Candidate;
+use kerrlight_tomo::fit::static_image::{Candidate, blurred};
 
 /// Full width at half maximum of the beam of the published images of M87*, µas (EHT Collaboration 2019, ApJL 875, L4).
 const BEAM_UAS: f64 = 20.0;
@@ -45,33 +45,4 @@ fn scatter(draws: &[Candidate]) -> Vec<f64> {
         (values().map(|x| (x - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt()
     };
     (0..pixels).map(of).collect()
-}
-
-/// Convolved with a round Gaussian of this full width at half maximum, pixels; light that leaves the field is lost.
-fn blurred(image: &[f64], n: usize, fwhm: f64) -> Vec<f64> {
-    let sigma = fwhm / (8.0 * core::f64::consts::LN_2).sqrt();
-    let bell =
-        |x: f64| (-0.5 * (x / sigma).powi(2)).exp() / (sigma * core::f64::consts::TAU.sqrt());
-    let kernel: Vec<f64> = (0..n).map(|k| bell(k as f64)).collect();
-    let along = |value: &dyn Fn(usize) -> f64, at: usize| -> f64 {
-        (0..n).map(|k| kernel[k.abs_diff(at)] * value(k)).sum()
-    };
-    let rows: Vec<f64> = (0..n * n).map(|k| along(&|j| image[k / n * n + j], k % n)).collect();
-    (0..n * n).map(|k| along(&|i| rows[i * n + k % n], k / n)).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A point becomes a Gaussian whose flux stays and whose half width is that of the beam.
-    #[test]
-    fn exact_blurring_keeps_flux_and_has_the_width_of_the_beam() {
-        let mut image = vec![0.0; 41 * 41];
-        image[20 * 41 + 20] = 2.0;
-        let blurred = blurred(&image, 41, 8.0);
-        assert!((blurred.iter().sum::<f64>() - 2.0).abs() < 1e-6);
-        let half = blurred[20 * 41 + 24] / blurred[20 * 41 + 20];
-        assert!((half - 0.5).abs() < 1e-12, "{half}");
-    }
 }

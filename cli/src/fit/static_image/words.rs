@@ -2,6 +2,7 @@
 
 use super::Found;
 use super::numbers::{RING, error};
+use super::polarized::Polarized;
 use crate::report::Part;
 use kerrlight_tomo::fit::settings::StartImage;
 use kerrlight_tomo::fit::static_image::Survey;
@@ -117,6 +118,7 @@ impl Found<'_> {
             Some(gains) => text.extend(gains.sentences()),
             None => text.push("No gains are solved for.".to_owned()),
         }
+        text.extend(self.polarized.iter().flat_map(Polarized::model));
         text
     }
 
@@ -125,13 +127,15 @@ impl Found<'_> {
         if draws < 2 {
             return vec!["No draws were asked for: numbers have no errors.".to_owned()];
         }
-        vec![format!(
+        let mut text = vec![format!(
             "Errors add in quadrature how far {draws} images of measurements of this image with other noise, and of a flux drawn \
              from its prior, are from it (root mean square, what the method distorts included), and how far {others} images are \
              that the data do not tell from the best: of other starts with a loss within 1 %, and of other factors that predict \
              held-out frames as well. The kind of penalty, the field and the size of pixels stay what they are: what they \
              decide is in no error."
-        )]
+        )];
+        text.extend(self.polarized.as_ref().and_then(Polarized::errors));
+        text
     }
 
     fn concluded(&self) -> Vec<String> {
@@ -143,6 +147,7 @@ impl Found<'_> {
         if self.file.ring.is_some() && self.survey.found().ring.is_none() {
             text.push("The image has no ring between the radii that were asked for.".to_owned());
         }
+        text.extend(self.polarized.as_ref().map(Polarized::sentence));
         text
     }
 
@@ -163,6 +168,7 @@ impl Found<'_> {
                     .to_owned(),
             );
         }
+        text.extend(self.polarized.iter().flat_map(Polarized::not_concluded));
         if !self.survey.found().solution.has_converged {
             text.push("The optimiser had not come to its end after image.iterations.".to_owned());
         }

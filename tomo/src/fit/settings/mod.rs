@@ -19,6 +19,7 @@ mod ranges;
 mod recovery;
 mod simulation;
 mod static_image;
+mod static_polarization;
 mod unknown_world;
 mod unknowns;
 mod view;
@@ -45,6 +46,7 @@ pub use static_image::{
     EnvelopeSettings, ImageSettings, RingSettings, StartImage, StaticData, StaticImageFile,
     StaticVisibilities, StrengthSettings,
 };
+pub use static_polarization::StaticPolarization;
 pub use unknown_world::{PriorSettings, UnknownWorld, WorldSearch, WorldView};
 pub use view::{Absorption, Effects, Hole, Motion, Observer, Region, Screen, WidthOf};
 pub use world::merge;

@@ -2,8 +2,9 @@
 //! are assumed.
 
 use super::penalties::priors_of;
+use super::static_polarization::check_strength;
 use super::{FitError, InstrumentSettings, Loss, LossKind, PenaltyKind, PenaltySettings, Within};
-use super::{Scattering, Variability};
+use super::{Scattering, StaticPolarization, Variability};
 use super::{ranges, refuse};
 use crate::Error;
 use crate::fit::linear::Prior;
@@ -42,6 +43,9 @@ pub struct StaticImageFile {
     /// Measures a ring in the image; nothing is measured without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ring: Option<RingSettings>,
+    /// Finds the linear polarisation of the image; total intensity alone, without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub polarization: Option<StaticPolarization>,
 }
 
 /// Pixels of a static image, its flux, and how it is looked for.
@@ -198,7 +202,16 @@ impl StaticImageFile {
             }
         }
         self.check_penalties()?;
-        self.check_ring()
+        self.check_ring()?;
+        match &self.polarization {
+            Some(polarization) => polarization.check(self),
+            None if self.instrument.as_ref().is_some_and(|i| i.leakage.is_some()) => {
+                refuse!(
+                    "instrument.leakage needs a table [polarization]: total intensity does not know it"
+                )
+            }
+            None => Ok(()),
+        }
     }
 
     fn check_penalties(&self) -> Result<(), Error> {
@@ -211,10 +224,7 @@ impl StaticImageFile {
         }
         self.priors()?;
         let Some(strength) = &self.strength else { return Ok(()) };
-        if strength.values.len() < 2 {
-            let (key, count) = ("length of strength.values", strength.values.len());
-            return Err(FitError::range(key, count, "2 values or more").into());
-        }
+        check_strength("", strength)?;
         if self.regulariser.is_empty() && self.envelope.is_none() {
             refuse!(
                 "strength is a factor on penalties, and there is no [[regulariser]] and no [envelope]"

@@ -8,9 +8,12 @@ use super::polarized::is_polarized;
 use super::truth::SPOT;
 use super::visibilities::{VisibilitySettings, all_products, frames_of, prepared};
 use super::{Measured, Result, hours_per_m, sky};
-use crate::fit::settings::{DataFiles, FitError, FitFile, StaticImageFile, Within, refuse};
+use crate::fit::settings::{
+    DataFiles, FitError, FitFile, GainPhases, InstrumentSettings, LossKind, StaticImageFile,
+    StrengthSettings, Within, refuse,
+};
 use crate::frames::Frames;
-use crate::interferometry::observation::Observation;
+use crate::interferometry::observation::{Basis, Observation, Row};
 
 /// What to write where there are no data.
 pub(super) const FILE: &str = "a table [data.visibilities] or [data.movie] with `path = \"FILE\"` (`kerrlight fit --init FILE` writes \
@@ -103,9 +106,6 @@ impl Measured {
     /// # Errors
     /// If a visibility has no error, none is left, or the kernel of scattering needs a frequency that is not known.
     pub fn of_static(file: &StaticImageFile, observation: Observation, name: &str) -> Result<Self> {
-        if file.instrument.as_ref().is_some_and(|instrument| instrument.leakage.is_some()) {
-            refuse!("instrument.leakage is not for a static image of total intensity");
-        }
         let data = &file.data.visibilities;
         let settings = VisibilitySettings { average_s: data.average_s, uv_min: data.uv_min };
         let mut observation = prepared(observation, &settings).within(name)?;
@@ -114,15 +114,79 @@ impl Measured {
         let sky = (data.scattering, data.variability);
         medium::correct((&mut observation, &file.loss), sky, name)?;
         let (times, of_rows) = frames_of(&mut observation);
-        if let Some(strength) = file.strength.as_ref().filter(|s| times.len() < 2 * s.folds) {
-            let allowed = format!("{} at most, half of the frames", times.len() / 2);
-            return Err(FitError::range("strength.folds", strength.folds, &allowed).into());
-        }
+        check_folds("", file.strength.as_ref(), times.len())?;
         let gains = gains::priors(file.instrument.as_ref(), &file.loss, &observation)?;
         let (visibilities, sky) = (Some((observation, of_rows)), Some(file.image.grid()?));
         let varies = data.variability.is_some();
         Ok(Measured { times, visibilities, varies, sky, gains, ..Measured::empty() })
     }
+
+    /// The data of the polarisation of a static image, with all products of the feeds; none if no polarisation is asked for.
+    ///
+    /// # Errors
+    /// As [`of_static`](Self::of_static), or if Q and U were not measured.
+    pub fn of_static_polarized(
+        file: &StaticImageFile,
+        observation: Observation,
+        name: &str,
+    ) -> Result<Option<Self>> {
+        let Some(polarization) = &file.polarization else { return Ok(None) };
+        let (data, losses) = (&file.data.visibilities, [polarization.loss()]);
+        let settings = VisibilitySettings { average_s: data.average_s, uv_min: data.uv_min };
+        let mut observation = all_products(observation, &settings).within(name)?;
+        // The frames are those of total intensity.
+        let basis = observation.basis;
+        observation.rows.retain(|row| row.stokes_i(basis).is_some());
+        if !observation.rows.iter().any(|row| crossed(row, basis)) {
+            refuse!("{name}: there is no RL or LR (nor Q and U): remove the table [polarization]");
+        }
+        let seen = (&mut observation, &losses[..]);
+        add_systematic("data.visibilities.systematic", data.systematic, seen)?;
+        medium::correct((&mut observation, &losses), (data.scattering, None), name)?;
+        medium::polarized_errors(&mut observation, data.variability, polarization);
+        let (times, of_rows) = frames_of(&mut observation);
+        check_folds("polarization.", polarization.strength.as_ref(), times.len())?;
+        let instrument = file.instrument.clone().map(|instrument| with_phases(instrument, file));
+        let gains = match polarization.data {
+            // They cancel.
+            LossKind::PolarimetricRatios => None,
+            _ => gains::priors(instrument.as_ref(), &losses, &observation)?,
+        };
+        let leakage = leakage::unknown(instrument.as_ref(), &observation)?;
+        let (visibilities, sky) = (Some((observation, of_rows)), Some(file.image.grid()?));
+        let varies = data.variability.is_some() || polarization.variability.is_some();
+        let empty = Measured::empty();
+        Ok(Some(Measured { times, visibilities, varies, sky, gains, leakage, ..empty }))
+    }
+}
+
+/// Whether a row has products that know Q and U.
+fn crossed(row: &Row, basis: Basis) -> bool {
+    let products = match basis {
+        Basis::Circular => [2, 3],
+        Basis::Stokes => [1, 2],
+    };
+    let measured = |k: usize| row.product(k).is_some_and(|datum| !datum.is_placeholder());
+    products.into_iter().any(measured)
+}
+
+/// Phases that total intensity was fitted without are not known to polarisation either.
+fn with_phases(mut instrument: InstrumentSettings, file: &StaticImageFile) -> InstrumentSettings {
+    let knows = file.loss.iter().any(|loss| loss.data == LossKind::Visibilities);
+    if let (Some(gains), false) = (&mut instrument.gains, knows) {
+        gains.phases = GainPhases::Free;
+    }
+    instrument
+}
+
+/// Refuses more parts than half of the frames.
+fn check_folds(table: &str, strength: Option<&StrengthSettings>, frames: usize) -> Result<()> {
+    let Some(strength) = strength.filter(|strength| frames < 2 * strength.folds) else {
+        return Ok(());
+    };
+    let allowed = format!("{} at most, half of the frames", frames / 2);
+    let key = format!("{table}strength.folds");
+    Err(FitError::range(key, strength.folds, &allowed).into())
 }
 
 pub(super) fn frames(file: &FitFile) -> Result<Vec<f64>> {

@@ -2,8 +2,10 @@
 //! that are held out, gains solved for beside every image, and errors from measurements of the image with other noise.
 //!
 //! `start` → `problem` (loss and gradient) → `solve` (one minimum) → `survey` (all that is asked) → `ring` (what is
-//! measured).
+//! measured) → `polarized` (Q and U beside it).
 
+mod beam;
+mod polarized;
 mod problem;
 mod ring;
 mod solve;
@@ -12,6 +14,10 @@ mod survey;
 #[cfg(test)]
 mod tests;
 
+pub use beam::blurred;
+pub use polarized::{
+    LinearPolarization, PolarizedCandidate, PolarizedProblem, PolarizedSurvey, survey_polarized,
+};
 pub use problem::{FluxPrior, ImageProblem};
 pub use ring::Ring;
 pub use solve::Solution;

@@ -22,6 +22,14 @@ pub struct Solution {
 const SPAN: usize = 20;
 const FALL: f64 = 1e-4;
 
+/// Where L-BFGS came to.
+pub(super) struct Minimum {
+    pub parameters: Vec<f64>,
+    pub loss: f64,
+    pub iterations: usize,
+    pub has_converged: bool,
+}
+
 /// The minimum that L-BFGS comes to from these parameters; none if `go_on` said no.
 pub fn solve(
     problem: &ImageProblem<'_>,
@@ -29,10 +37,23 @@ pub fn solve(
     iterations: usize,
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Option<Solution> {
+    let mut objective = |x: &[f64], g: &mut [f64]| problem.value_and_gradient(x, g);
+    let Minimum { parameters, loss, iterations, has_converged } =
+        minimum(&mut objective, start, iterations, go_on)?;
+    let image = problem.image(&parameters);
+    Some(Solution { parameters, image, loss, iterations, has_converged })
+}
+
+/// The same of a function that returns its value and overwrites its gradient.
+pub(super) fn minimum(
+    mut objective: &mut dyn FnMut(&[f64], &mut [f64]) -> f64,
+    start: &[f64],
+    iterations: usize,
+    go_on: &(dyn Fn() -> bool + Sync),
+) -> Option<Minimum> {
     let lbfgs = Lbfgs::default();
     let mut parameters = start.to_vec();
     let mut state = LbfgsState::new(parameters.len(), lbfgs.memory);
-    let mut objective = |x: &[f64], g: &mut [f64]| problem.value_and_gradient(x, g);
     let mut losses: Vec<f64> = Vec::new();
     let mut has_converged = false;
     while losses.len() < iterations && !has_converged {
@@ -49,8 +70,7 @@ pub fn solve(
     }
     let ended = losses.len() < iterations;
     let loss = state.value.unwrap_or(f64::NAN);
-    Some(Solution {
-        image: problem.image(&parameters),
+    Some(Minimum {
         parameters,
         loss,
         iterations: losses.len(),

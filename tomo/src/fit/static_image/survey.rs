@@ -10,6 +10,7 @@ use crate::fit::settings::StaticImageFile;
 use crate::fit::setup::{Held, Measured, best_held};
 use crate::fit::{FrameTerm, Weighted};
 use crate::interferometry::operator::ImageGrid;
+use crate::units::MICROARCSECOND;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
@@ -67,6 +68,20 @@ impl Survey {
     /// The image.
     pub fn found(&self) -> &Candidate {
         &self.starts[self.best]
+    }
+
+    /// The centre of its ring, to the east and north of the middle of the field, µas; that of its light where it has no ring.
+    pub fn centre_uas(&self, grid: ImageGrid) -> [f64; 2] {
+        let found = self.found();
+        if let Some(ring) = &found.ring {
+            return ring.centre_uas;
+        }
+        let image = &found.solution.image;
+        let mean = |place: &dyn Fn(usize) -> f64| {
+            let moment: f64 = image.iter().enumerate().map(|(k, light)| light * place(k)).sum();
+            moment / image.iter().sum::<f64>() / MICROARCSECOND
+        };
+        [mean(&|k| grid.east(k % grid.width)), mean(&|k| grid.north(k / grid.width))]
     }
 
     /// Images that data do not tell from the best: those of other starts with a loss within 1 %, and of other strengths.
@@ -135,7 +150,7 @@ fn least(starts: &[Candidate]) -> usize {
 }
 
 /// Strengths that predict held-out frames as well as the best within a standard error of the difference, rising.
-fn allowed(held: &[Held]) -> Vec<f64> {
+pub(super) fn allowed(held: &[Held]) -> Vec<f64> {
     let Some(best) = best_held(held) else { return Vec::new() };
     let good = |one: &&Held| one.mean() <= best.mean() + one.error_beside(best);
     let mut values: Vec<f64> = held.iter().filter(good).map(|held| held.value).collect();

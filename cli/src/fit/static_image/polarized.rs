@@ -1,0 +1,284 @@
+//! The linear polarisation of a static image: numbers, sentences and a picture.
+
+use super::Found;
+use super::words::with_error;
+use crate::fit::results::leakage::Leakage;
+use crate::report::{Axis, Figure, LinePlot, Marks, Outcome, Series, enlarged, ticked};
+use kerrlight_tomo::fit::FrameTerm;
+use kerrlight_tomo::fit::settings::{LossKind, StaticImageFile, StaticPolarization};
+use kerrlight_tomo::fit::setup::{Measured, best_held};
+use kerrlight_tomo::fit::static_image::{LinearPolarization, PolarizedSurvey, blurred};
+use kerrlight_tomo::fit::verdict::{Errors, Statistics, Tested};
+use serde_json::{Map, Value, json};
+
+/// A number: its key and period in results.json, name, unit, digits, and meaning.
+struct Number {
+    key: &'static str,
+    of: fn(&LinearPolarization) -> f64,
+    period: Option<f64>,
+    name: &'static str,
+    unit: &'static str,
+    meaning: &'static str,
+}
+
+const NUMBERS: [Number; 7] = [
+    Number {
+        key: "net_fraction",
+        of: |p| p.net_fraction,
+        period: None,
+        name: "net polarisation",
+        unit: "",
+        meaning: "|ΣP|/ΣI: what an array sees that does not resolve the source",
+    },
+    Number {
+        key: "net_evpa_deg",
+        of: |p| p.net_evpa_deg,
+        period: Some(180.0),
+        name: "net position angle",
+        unit: "°",
+        meaning: "of the electric vector of all light together, east of north",
+    },
+    Number {
+        key: "mean_fraction",
+        of: |p| p.mean_fraction,
+        period: None,
+        name: "mean polarisation",
+        unit: "",
+        meaning: "Σ|P|/ΣI of the image as the beam sees it",
+    },
+    Number {
+        key: "brightest_fraction",
+        of: |p| p.brightest_fraction,
+        period: None,
+        name: "polarisation where it is brightest",
+        unit: "",
+        meaning: "|P|/I there, as the beam sees it",
+    },
+    Number {
+        key: "brightest_deg",
+        of: |p| p.brightest_deg,
+        period: Some(360.0),
+        name: "direction of that place",
+        unit: "°",
+        meaning: "from the centre, east of north: −90 is west",
+    },
+    Number {
+        key: "beta2",
+        of: |p| p.beta2,
+        period: None,
+        name: "|β₂|",
+        unit: "",
+        meaning: "modulus of Σ P e^(−2iφ)/ΣI: how much electric vectors turn with the direction φ from the centre",
+    },
+    Number {
+        key: "beta2_deg",
+        of: |p| p.beta2_deg,
+        period: Some(360.0),
+        name: "arg β₂",
+        unit: "°",
+        meaning: "0 for radial electric vectors, 180 for tangential ones, spirals between",
+    },
+];
+
+/// Polarisation that was found.
+pub struct Polarized {
+    /// The settings.
+    pub settings: StaticPolarization,
+    /// What was found.
+    pub survey: PolarizedSurvey,
+    /// Leakage of the stations, where it is solved for.
+    pub leakage: Option<Leakage>,
+    /// Data, and what is left of them.
+    count: usize,
+}
+
+/// What results and pages call a kind of data.
+fn name(kind: LossKind) -> &'static str {
+    match kind {
+        LossKind::PolarimetricRatios => "polarimetric ratios",
+        _ => "polarized visibilities",
+    }
+}
+
+impl Polarized {
+    /// Of what was found of these data, and its residuals to be judged.
+    pub fn new(
+        file: &StaticImageFile,
+        measured: &Measured,
+        survey: PolarizedSurvey,
+        leakage: Option<Leakage>,
+    ) -> anyhow::Result<Option<(Self, (String, Tested))>> {
+        let Some(settings) = file.polarization.clone() else { return Ok(None) };
+        let images = &survey.found.images;
+        let terms = measured.visibility_terms::<f64>(&[settings.loss()], images.len() / 3)?;
+        let term: &dyn FrameTerm<f64> = &*terms[0].term;
+        let frames = 0..measured.times.len();
+        let residuals = frames.map(|frame| term.residuals(frame, images));
+        let statistics = Statistics::of(residuals, 1);
+        let errors = if measured.varies { Errors::Shared } else { Errors::Stated };
+        let count = statistics.all.count;
+        let tested = (name(settings.data).to_owned(), Tested::gaussian(statistics, errors));
+        Ok(Some((Self { settings, survey, leakage, count }, tested)))
+    }
+
+    fn value(&self, number: &Number) -> (f64, Option<f64>) {
+        let value = (number.of)(&self.survey.found.numbers);
+        (value, self.survey.error(number.of, number.period))
+    }
+
+    /// For results.json.
+    pub fn json(&self) -> Value {
+        let found = &self.survey.found;
+        let mut all = Map::from_iter([
+            ("data".to_owned(), json!(name(self.settings.data))),
+            ("chi2_per_datum".to_owned(), json!(found.chi2)),
+            ("count".to_owned(), json!(self.count)),
+            ("strength".to_owned(), json!(found.strength)),
+            ("iterations".to_owned(), json!(found.iterations)),
+            ("has_converged".to_owned(), json!(found.has_converged)),
+            ("draws".to_owned(), json!(self.survey.draws.len())),
+            ("other_strengths".to_owned(), json!(self.survey.strengths.len())),
+        ]);
+        for number in &NUMBERS {
+            let (value, error) = self.value(number);
+            all.insert(number.key.to_owned(), json!(value));
+            all.insert(format!("{}_error", number.key), json!(error));
+        }
+        if let Some(leakage) = &self.leakage {
+            all.insert("leakage".to_owned(), leakage.json());
+        }
+        Value::Object(all)
+    }
+
+    /// The page's numbers.
+    pub fn outcomes(&self) -> Vec<Outcome> {
+        let one = |number: &Number| {
+            let (value, error) = self.value(number);
+            let digits = if number.unit.is_empty() { 3 } else { 0 };
+            Outcome {
+                name: number.name.to_owned(),
+                value: with_error(value, error, digits),
+                unit: number.unit.to_owned(),
+                meaning: number.meaning.to_owned(),
+            }
+        };
+        NUMBERS.iter().map(one).collect()
+    }
+
+    /// What was found, in a sentence.
+    pub fn sentence(&self) -> String {
+        let [net, _, mean, brightest, direction, beta, angle] =
+            NUMBERS.each_ref().map(|number| self.value(number));
+        let per_cent = |(value, error): (f64, Option<f64>)| {
+            with_error(100.0 * value, error.map(|error| 100.0 * error), 1)
+        };
+        format!(
+            "Seen with a beam of {} µas, {} % of the light are linearly polarised, {} % where polarised light is brightest ({}° east \
+             of north of the centre), and {} % of all light together; β₂ has the modulus {} and the argument {}°.",
+            self.settings.beam_uas,
+            per_cent(mean),
+            per_cent(brightest),
+            with_error(direction.0, direction.1, 0),
+            per_cent(net),
+            with_error(beta.0, beta.1, 3),
+            with_error(angle.0, angle.1, 0)
+        )
+    }
+
+    /// What was assumed.
+    pub fn model(&self) -> Vec<String> {
+        let StaticPolarization { leakage_left, smoothness, variability, .. } = &self.settings;
+        let mut text = vec![format!(
+            "Linear polarisation was found after total intensity, which was held: a fraction and a position angle in every pixel, \
+             from {} {}. {} % of Stokes I from each station were added to errors of RL and LR for leakage. Slopes of the \
+             fraction are penalised in proportion to light (weight {smoothness}, times {}).",
+            self.count,
+            name(self.settings.data),
+            100.0 * leakage_left,
+            self.survey.found.strength
+        )];
+        if let Some(law) = variability {
+            text.push(format!(
+                "What polarised light varies: {} Jy/(1 + (|u|/{:e})²)^{} was added to errors of RL and LR in quadrature.",
+                law.jy,
+                law.uv,
+                0.5 * law.power
+            ));
+        }
+        text.extend(self.leakage.iter().flat_map(Leakage::sentences));
+        text
+    }
+
+    /// What errors are made of.
+    pub fn errors(&self) -> Option<String> {
+        let (draws, others) = (self.survey.draws.len(), self.survey.strengths.len());
+        (draws > 1).then(|| {
+            format!(
+                "Errors of polarisation: {draws} images of the data with their noise once more, each beside a draw of total \
+                 intensity, and {others} images with other factors on the penalty that predict held-out frames as well. \
+                 Leakage, the kind of penalty and the frames' length are in no error."
+            )
+        })
+    }
+
+    /// What the data do not tell.
+    pub fn not_concluded(&self) -> Vec<String> {
+        let mut text = vec![
+            "Circular polarisation, and Faraday rotation: position angles are those that arrive here. Fractions are lower limits \
+             where the beam mixes directions."
+                .to_owned(),
+        ];
+        if !self.survey.found.has_converged {
+            let unfinished = "The optimiser of polarisation had not come to its end after polarization.iterations.";
+            text.push(unfinished.to_owned());
+        }
+        text
+    }
+
+    /// The loss of held-out frames against the strength.
+    pub fn held_out(&self) -> Option<LinePlot> {
+        let held = &self.survey.held;
+        let best = best_held(held)?;
+        Some(LinePlot {
+            title: "Held-out frames: polarisation".to_owned(),
+            caption: "χ² per data point of polarised frames that were not fitted, against the factor on the penalty; bars are \
+                      standard errors of the difference from the best. The least is taken."
+                .to_owned(),
+            x: Axis { label: "factor on the penalty".to_owned(), unit: String::new(), log: true },
+            y: Axis { label: "χ² of held-out data".to_owned(), unit: String::new(), log: false },
+            series: vec![Series {
+                name: "held out".to_owned(),
+                points: held.iter().map(|held| [held.value, held.mean()]).collect(),
+                errors: held.iter().map(|held| held.error_beside(best)).collect(),
+                marks: Marks::Joined,
+            }],
+        })
+    }
+}
+
+/// Pixels of a drawn image, about.
+const DRAWN: usize = 420;
+
+impl Found<'_> {
+    /// The image with ticks along its polarisation, and as the beam sees it.
+    pub fn polarized_picture(&self) -> anyhow::Result<Option<Figure>> {
+        let Some(polarized) = &self.polarized else { return Ok(None) };
+        let (n, beam) = (self.file.image.pixels, polarized.settings.beam_uas);
+        let pixel = self.file.image.field_uas / n as f64;
+        let zoom = (DRAWN / n).max(1);
+        let images = &polarized.survey.found.images;
+        let fine = |image: &[f64]| {
+            let single: Vec<f32> = image.iter().map(|x| *x as f32).collect();
+            enlarged(&single, n, zoom)
+        };
+        let stokes = |k: usize| &images[k * n * n..(k + 1) * n * n];
+        let sharp = [0, 1, 2].map(|k| fine(stokes(k)));
+        let wide = [0, 1, 2].map(|k| fine(&blurred(stokes(k), n, beam / pixel)));
+        let name = format!("the same with a beam of {beam} µas");
+        let what = format!(
+            "Total intensity, and ticks along the electric vector, as long as polarised light is bright; the field is {} µas wide.",
+            self.file.image.field_uas
+        );
+        ticked(&[("the image", sharp), (&name, wide)], n * zoom, &what).map(Some)
+    }
+}

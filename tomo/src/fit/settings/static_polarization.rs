@@ -1,0 +1,68 @@
+//! Settings of the linear polarisation of a static image.
+
+use super::{FitError, Loss, LossKind, StaticImageFile, StrengthSettings, Variability, refuse};
+use crate::Error;
+use serde::{Deserialize, Serialize};
+
+/// Linear polarisation, found beside the total intensity of a static image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StaticPolarization {
+    /// What is compared: polarimetric ratios, which gains leave as they are, or polarised visibilities.
+    pub data: LossKind,
+    /// Least signal-to-noise ratio in Stokes I of baselines whose ratios are compared.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub least_snr: Option<f64>,
+    /// Leakage that calibration has left: this part of Stokes I, in quadrature for both stations, is added to the errors of RL
+    /// and LR.
+    pub leakage_left: f64,
+    /// Errors of RL and LR for what polarised light varies; none, without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub variability: Option<Variability>,
+    /// Factor on the penalty of slopes of the fraction of polarisation.
+    pub smoothness: f64,
+    /// Iterations of the optimiser, at most.
+    pub iterations: usize,
+    /// Full width at half maximum of the beam with which the image is convolved before fractions are measured, µas.
+    pub beam_uas: f64,
+    /// Factors on the penalty, from which frames that are held out choose; 1, without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub strength: Option<StrengthSettings>,
+}
+
+impl StaticPolarization {
+    /// What is compared, as the loss of a fit.
+    pub fn loss(&self) -> Loss {
+        let Self { data, least_snr, .. } = *self;
+        Loss { data, weight: 1.0, sigma: None, stokes: None, least_snr }
+    }
+
+    pub(super) fn check(&self, file: &StaticImageFile) -> Result<(), Error> {
+        let is_ratio = self.data == LossKind::PolarimetricRatios;
+        if !is_ratio && self.data != LossKind::PolarizedVisibilities {
+            refuse!(
+                "polarization.data = {:?} is not for a static image: polarimetric-ratios or polarized-visibilities",
+                self.data.name()
+            );
+        }
+        if !is_ratio && self.least_snr.is_some() {
+            refuse!("polarization.least_snr is for data = \"polarimetric-ratios\"");
+        }
+        let leaks = file.instrument.as_ref().is_some_and(|instrument| instrument.leakage.is_some());
+        if leaks && is_ratio {
+            refuse!(
+                "instrument.leakage needs polarization.data = \"polarized-visibilities\": leakage does not cancel in ratios"
+            );
+        }
+        self.strength.as_ref().map_or(Ok(()), |strength| check_strength("polarization.", strength))
+    }
+}
+
+/// Refuses a choice of one.
+pub(super) fn check_strength(table: &str, strength: &StrengthSettings) -> Result<(), Error> {
+    if strength.values.len() < 2 {
+        let (key, count) = (format!("length of {table}strength.values"), strength.values.len());
+        return Err(FitError::range(key, count, "2 values or more").into());
+    }
+    Ok(())
+}

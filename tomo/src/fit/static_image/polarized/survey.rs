@@ -1,0 +1,218 @@
+//! All that is asked of the polarisation of a static image: the strength of its penalty, the image, and how noise scatters
+//! it.
+
+use super::{LinearPolarization, PolarizedProblem};
+use crate::Error;
+use crate::fit::settings::{StaticImageFile, StaticPolarization};
+use crate::fit::setup::{Held, Measured, SolvedLeakage, best_held};
+use crate::fit::static_image::solve::minimum;
+use crate::fit::static_image::survey::allowed;
+use crate::fit::static_image::{Stage, Survey, SurveyWatch};
+use crate::fit::{FrameTerm, Weighted};
+use crate::interferometry::operator::ImageGrid;
+use rayon::prelude::*;
+
+/// Images of I, Q and U with what they were made of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PolarizedCandidate {
+    /// Factor on the penalty.
+    pub strength: f64,
+    /// I, Q and U of all pixels, Jy, one after the other.
+    pub images: Vec<f64>,
+    /// The loss.
+    pub loss: f64,
+    /// Iterations that were made.
+    pub iterations: usize,
+    /// Whether the loss had ceased to fall.
+    pub has_converged: bool,
+    /// χ² per datum.
+    pub chi2: f64,
+    /// What is measured.
+    pub numbers: LinearPolarization,
+}
+
+/// What came out.
+#[derive(Clone, Debug)]
+pub struct PolarizedSurvey {
+    /// Strengths with the loss of frames that were held out.
+    pub held: Vec<Held>,
+    /// The images.
+    pub found: PolarizedCandidate,
+    /// Images with the other strengths that predict held-out frames as well.
+    pub strengths: Vec<PolarizedCandidate>,
+    /// Images of data with other noise, each beside a draw of total intensity.
+    pub draws: Vec<PolarizedCandidate>,
+    /// Leakage of the stations, where it is solved for.
+    pub leakage: Option<SolvedLeakage>,
+}
+
+impl PolarizedSurvey {
+    /// Error of a number: root mean square distance of the draws from it, and of the images with other strengths, added in
+    /// quadrature; none without draws. Angles have a `period`, and are compared the short way round.
+    pub fn error(
+        &self,
+        number: impl Fn(&LinearPolarization) -> f64,
+        period: Option<f64>,
+    ) -> Option<f64> {
+        let here = number(&self.found.numbers);
+        let square = |images: &[PolarizedCandidate]| {
+            let apart = images.iter().map(|image| number(&image.numbers) - here);
+            let short = apart.map(|x| match period {
+                Some(period) => (x + 0.5 * period).rem_euclid(period) - 0.5 * period,
+                None => x,
+            });
+            short.map(|x| x * x).sum::<f64>() / images.len().max(1) as f64
+        };
+        (self.draws.len() > 1).then(|| (square(&self.draws) + square(&self.strengths)).sqrt())
+    }
+}
+
+/// Finds the polarisation of the image that a survey of total intensity has found; none if `watch` said no, or if no
+/// polarisation is asked for. `measured` are the data of [`Measured::of_static_polarized`].
+///
+/// # Errors
+/// If there are no data.
+pub fn survey_polarized(
+    file: &StaticImageFile,
+    measured: &Measured,
+    survey: &Survey,
+    watch: &SurveyWatch<'_>,
+) -> Result<Option<PolarizedSurvey>, Error> {
+    let Some(settings) = &file.polarization else { return Ok(None) };
+    let grid = file.image.grid()?;
+    let light = &survey.found().solution.image;
+    let search = Search { file, settings, grid, watch };
+    let term = search.term(measured)?;
+    let frames: Vec<usize> = (0..measured.times.len()).collect();
+    let Some(held) = search.hold_out(&*term.term, light, survey, &frames) else {
+        return Ok(None);
+    };
+    let best = best_held(&held).map_or(1.0, |best| best.value);
+    let strength = |value: f64| {
+        let problem = search.problem(&*term.term, (light, value), frames.clone());
+        search.solved(Stage::Strengths, &problem, value, survey)
+    };
+    let mut found = strength(best);
+    // Rows see the leakage that was found last.
+    let leakage = measured.in_turn(
+        || {
+            found = strength(best);
+            let once: Vec<f32> =
+                found.iter().flat_map(|found| &found.images).map(|x| *x as f32).collect();
+            Ok::<_, Error>(once.repeat(measured.times.len()))
+        },
+        |_, _| {},
+    )?;
+    if leakage.is_some() {
+        found = strength(best);
+    }
+    let Some(found) = found else { return Ok(None) };
+    let others: Vec<f64> = allowed(&held).into_iter().filter(|value| *value != best).collect();
+    let Some(strengths) = others.into_par_iter().map(strength).collect() else { return Ok(None) };
+    let draws = search.draws(measured, survey, best)?;
+    Ok(draws.map(|draws| PolarizedSurvey { held, found, strengths, draws, leakage }))
+}
+
+struct Search<'a> {
+    file: &'a StaticImageFile,
+    settings: &'a StaticPolarization,
+    grid: ImageGrid,
+    watch: &'a SurveyWatch<'a>,
+}
+
+impl Search<'_> {
+    fn term(&self, measured: &Measured) -> Result<Weighted<dyn FrameTerm<f64>>, Error> {
+        let terms = measured.visibility_terms(&[self.settings.loss()], self.grid.pixels())?;
+        Ok(terms.into_iter().next().expect("a term for the loss"))
+    }
+
+    fn problem<'a>(
+        &self,
+        term: &'a dyn FrameTerm<f64>,
+        (light, strength): (&'a [f64], f64),
+        frames: Vec<usize>,
+    ) -> PolarizedProblem<'a> {
+        let smoothness = self.settings.smoothness * strength;
+        PolarizedProblem { term, frames, light, smoothness, side: self.file.image.pixels }
+    }
+
+    fn solved(
+        &self,
+        stage: Stage,
+        problem: &PolarizedProblem<'_>,
+        strength: f64,
+        survey: &Survey,
+    ) -> Option<PolarizedCandidate> {
+        let start = vec![0.0; problem.parameters()];
+        let mut objective = |x: &[f64], g: &mut [f64]| problem.value_and_gradient(x, g);
+        let go_on = || (self.watch)(stage, 0);
+        let least = minimum(&mut objective, &start, self.settings.iterations, &go_on)?;
+        (self.watch)(stage, 1).then_some(())?;
+        let images = problem.images(&least.parameters);
+        let centre = survey.centre_uas(self.grid);
+        Some(PolarizedCandidate {
+            strength,
+            chi2: problem.chi2(&images),
+            numbers: LinearPolarization::measure(
+                &images,
+                self.grid,
+                centre,
+                self.settings.beam_uas,
+            ),
+            images,
+            loss: least.loss,
+            iterations: least.iterations,
+            has_converged: least.has_converged,
+        })
+    }
+
+    /// χ² per datum of frames that were not fitted, for each strength; nothing where one is given.
+    fn hold_out(
+        &self,
+        term: &dyn FrameTerm<f64>,
+        light: &[f64],
+        survey: &Survey,
+        frames: &[usize],
+    ) -> Option<Vec<Held>> {
+        let Some(settings) = &self.settings.strength else { return Some(Vec::new()) };
+        let folds = settings.folds;
+        let part = |fold: usize, seen: bool| -> Vec<usize> {
+            let of = |frame: usize| frame * folds / frames.len();
+            frames.iter().copied().filter(|frame| (of(*frame) != fold) == seen).collect()
+        };
+        let cases: Vec<(f64, usize)> = settings
+            .values
+            .iter()
+            .flat_map(|value| (0..folds).map(move |fold| (*value, fold)))
+            .collect();
+        let loss = |(value, fold): &(f64, usize)| {
+            let seen = self.problem(term, (light, *value), part(*fold, true));
+            let found = self.solved(Stage::HeldOut, &seen, *value, survey)?;
+            Some(self.problem(term, (light, *value), part(*fold, false)).chi2(&found.images))
+        };
+        let losses: Vec<f64> = cases.par_iter().map(loss).collect::<Option<_>>()?;
+        let each = settings.values.iter().zip(losses.chunks(folds));
+        Some(each.map(|(value, losses)| Held { value: *value, losses: losses.to_vec() }).collect())
+    }
+
+    /// Images of the data with their noise once more, each beside the total intensity of a draw.
+    fn draws(
+        &self,
+        measured: &Measured,
+        survey: &Survey,
+        strength: f64,
+    ) -> Result<Option<Vec<PolarizedCandidate>>, Error> {
+        let frames: Vec<usize> = (0..measured.times.len()).collect();
+        let one = |k: usize| -> Result<Option<PolarizedCandidate>, Error> {
+            let seed = self.file.seed.wrapping_add(1 + k as u64);
+            let drawn = measured.perturbed(&[self.settings.loss()], 1.0, seed)?;
+            let term = self.term(&drawn)?;
+            let light = &survey.draws[k].solution.image;
+            let problem = self.problem(&*term.term, (light, strength), frames.clone());
+            Ok(self.solved(Stage::Draws, &problem, strength, survey))
+        };
+        let all: Result<Vec<Option<PolarizedCandidate>>, Error> =
+            (0..survey.draws.len()).into_par_iter().map(one).collect();
+        Ok(all?.into_iter().collect())
+    }
+}
