@@ -257,6 +257,7 @@ fn on_public_data(name: &str) -> Option<Vec<String>> {
         "sgra-2017" | "sgra-2017-motion" => {
             "ER6_SGRA_2017_097_hi_hops_netcal-LMTcal-besttime_StokesI.uvfits"
         }
+        "sgra-2017-polarization" => POLARIZED,
         "sgra-2017-polarimetry" => {
             let path = static_sky::data(POLARIZED)?;
             return Some(vec![

@@ -10,7 +10,7 @@ pub fn number(x: f64, digits: usize) -> String {
 }
 
 /// Results that are shown: their names in results.json, what they are called, their units and digits.
-pub const RESULTS: [(&str, &str, &str, usize); 69] = [
+pub const RESULTS: [(&str, &str, &str, usize); 79] = [
     ("psnr_db", "PSNR", "dB", 2),
     ("psnr_inside_db", "PSNR inside the region", "dB", 2),
     ("psnr_over_time_db", "PSNR over time", "dB", 2),
@@ -82,6 +82,16 @@ pub const RESULTS: [(&str, &str, &str, usize); 69] = [
     ("ring_asymmetry", "asymmetry of the ring", "", 3),
     ("ring_central_brightness", "brightness at the centre over that of the ring", "", 3),
     ("flux_jy", "flux", "Jy", 3),
+    ("polarization_net_fraction", "net polarisation", "", 3),
+    ("polarization_net_evpa_deg", "net position angle", "°", 0),
+    ("polarization_mean_fraction", "mean polarisation", "", 3),
+    ("polarization_mean_fraction_error", "error of the mean polarisation", "", 3),
+    ("polarization_brightest_fraction", "polarisation where it is brightest", "", 3),
+    ("polarization_brightest_fraction_error", "error of the polarisation there", "", 3),
+    ("polarization_beta2", "modulus of β₂", "", 3),
+    ("polarization_beta2_error", "error of the modulus of β₂", "", 3),
+    ("polarization_beta2_deg", "argument of β₂", "°", 0),
+    ("polarization_beta2_deg_error", "error of the argument of β₂", "°", 0),
     ("strength", "factor on the penalties", "", 3),
     ("chi2", "χ² per data point", "", 3),
     ("held_out_loss", "loss of held-out frames, the best setting", "", 3),

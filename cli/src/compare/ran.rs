@@ -115,7 +115,10 @@ pub fn table(summary: &Summary) -> Table {
 /// Why a fit with these settings has no such result.
 fn missing(settings: &toml::Table, value: &str) -> Option<String> {
     let losses = settings.get("loss").and_then(Value::as_array);
-    let kinds = || losses.into_iter().flatten().filter_map(|loss| loss.get("data")?.as_str());
+    // The polarisation of a static image has no loss among those of total intensity.
+    let of_image = settings.get("image").and(settings.get("polarization"));
+    let all = || losses.into_iter().flatten().chain(of_image);
+    let kinds = || all().filter_map(|loss| loss.get("data")?.as_str());
     let is_beside_truth = QUALITIES.contains(&value) || value == "nrmse";
     if is_beside_truth && !settings.contains_key("truth") {
         return Some(format!("{value} needs a truth, and data are measured"));

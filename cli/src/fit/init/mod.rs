@@ -4,6 +4,7 @@ mod annotate;
 mod guess;
 mod keys;
 mod light_curve;
+mod polarized;
 mod quick_look;
 mod sources;
 mod static_image;
@@ -253,7 +254,7 @@ fn of_visibilities(observation: &Observation, path: &str, file: &str) -> anyhow:
         ("losses", losses),
         ("uv_min", source.and_then(|source| source.uv_min).unwrap_or_default().to_owned()),
         ("gains", gains(observation)),
-        ("read", read(observation, file, name, source.is_some())),
+        ("read", read(observation, file, name, source.is_some()) + unfitted(observation)),
         ("path", path.to_owned()),
     ];
     complete(include_str!("visibilities.toml"), &fields)
@@ -289,15 +290,19 @@ fn read(observation: &Observation, file: &str, name: &str, is_known: bool) -> St
     let day = observation.mjd.map_or(String::new(), |mjd| format!(", MJD {mjd}"));
     let frequency =
         observation.frequency_hz.map_or(String::new(), |hz| format!(" at {:.1} GHz", hz * 1e-9));
-    let polarized = match observation.is_polarized() {
-        true => "; its polarisation is not fitted without [polarization]",
-        false => "",
-    };
     format!(
-        "{file}: {source}{day}, {first:.2} h to {last:.2} h UTC, {} stations, {} visibilities of Stokes I{frequency}{polarized}",
+        "{file}: {source}{day}, {first:.2} h to {last:.2} h UTC, {} stations, {} visibilities of Stokes I{frequency}",
         observation.stations.len(),
         rows.len()
     )
+}
+
+/// What a volume leaves of the data.
+fn unfitted(observation: &Observation) -> &'static str {
+    match observation.is_polarized() {
+        true => "; its polarisation is not fitted without [polarization]",
+        false => "",
+    }
 }
 
 /// Median amplitude of the shortest tenth of the baselines, Jy.

@@ -1,5 +1,6 @@
 //! Settings of a static image, guessed from visibilities.
 
+use super::polarized::Tables;
 use super::{Source, complete, digits, gains, has_closures, plain_words, read, short_baselines};
 use anyhow::Context;
 use kerrlight_tomo::interferometry::observation::Observation;
@@ -34,6 +35,7 @@ pub fn of_visibilities(
             digits(0.02 * short * 5f64.powf(0.625))
         ));
     }
+    let tables = Tables::of(observation, file, source.is_some_and(|source| source.varies));
     let day = observation.mjd.map_or(String::new(), |mjd| format!(", MJD {mjd}"));
     let published = source.and_then(|source| source.image.as_ref());
     let field = published.map_or(5.0 * beam, |images| images.field_uas);
@@ -63,6 +65,8 @@ pub fn of_visibilities(
         ("extra", extra.join("\n")),
         ("losses", losses.trim_end().to_owned()),
         ("gains", gains(observation)),
+        ("leakage", tables.leakage),
+        ("polarization", tables.polarization),
         ("read", read(observation, file, name, source.is_some())),
         ("path", path.to_owned()),
     ];

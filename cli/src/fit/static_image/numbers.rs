@@ -80,7 +80,7 @@ impl Found<'_> {
             results["gains"] = gains.json();
         }
         if let Some(polarized) = &self.polarized {
-            results["polarization"] = polarized.json();
+            polarized.add_to(&mut results);
         }
         self.add_ring(&mut results);
         results

@@ -9,7 +9,7 @@ use kerrlight_tomo::fit::settings::{LossKind, StaticImageFile, StaticPolarizatio
 use kerrlight_tomo::fit::setup::{Measured, best_held};
 use kerrlight_tomo::fit::static_image::{LinearPolarization, PolarizedSurvey, blurred};
 use kerrlight_tomo::fit::verdict::{Errors, Statistics, Tested};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 /// A number: its key and period in results.json, name, unit, digits, and meaning.
 struct Number {
@@ -126,28 +126,26 @@ impl Polarized {
         (value, self.survey.error(number.of, number.period))
     }
 
-    /// For results.json.
-    pub fn json(&self) -> Value {
+    /// Adds all numbers to results.json.
+    pub fn add_to(&self, results: &mut Value) {
         let found = &self.survey.found;
-        let mut all = Map::from_iter([
-            ("data".to_owned(), json!(name(self.settings.data))),
-            ("chi2_per_datum".to_owned(), json!(found.chi2)),
-            ("count".to_owned(), json!(self.count)),
-            ("strength".to_owned(), json!(found.strength)),
-            ("iterations".to_owned(), json!(found.iterations)),
-            ("has_converged".to_owned(), json!(found.has_converged)),
-            ("draws".to_owned(), json!(self.survey.draws.len())),
-            ("other_strengths".to_owned(), json!(self.survey.strengths.len())),
-        ]);
+        results["chi2_per_datum"][name(self.settings.data)] = json!(found.chi2);
         for number in &NUMBERS {
             let (value, error) = self.value(number);
-            all.insert(number.key.to_owned(), json!(value));
-            all.insert(format!("{}_error", number.key), json!(error));
+            results[format!("polarization_{}", number.key)] = json!(value);
+            results[format!("polarization_{}_error", number.key)] = json!(error);
         }
+        results["polarization"] = json!({
+            "count": self.count,
+            "strength": found.strength,
+            "iterations": found.iterations,
+            "has_converged": found.has_converged,
+            "draws": self.survey.draws.len(),
+            "other_strengths": self.survey.strengths.len(),
+        });
         if let Some(leakage) = &self.leakage {
-            all.insert("leakage".to_owned(), leakage.json());
+            results["leakage"] = leakage.json();
         }
-        Value::Object(all)
     }
 
     /// The page's numbers.

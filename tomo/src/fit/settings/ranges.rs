@@ -188,6 +188,7 @@ const RANGES: &[Range] = &[
     ("polarization.strength.folds", 2.0, 1000.0, "parts of the frames"),
     ("ring.least_radius_uas", 0.0, 1e12, "microarcseconds"),
     ("ring.most_radius_uas", 1e-6, 1e12, "microarcseconds"),
+    ("data.visibilities.utc_h.*", 0.0, 1000.0, "hours"),
     ("data.visibilities.variability.jy", 0.0, 1e9, "Jy"),
     ("data.visibilities.variability.uv", 1.0, f64::INFINITY, "wavelengths"),
     ("data.visibilities.variability.power", 0.0, 20.0, "an exponent"),

@@ -118,6 +118,9 @@ pub struct StaticVisibilities {
     /// Baselines shorter than this many wavelengths are left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub uv_min: Option<f64>,
+    /// The first and the last hour of UTC that count; all, without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub utc_h: Option<[f64; 2]>,
     /// The interstellar medium that the light has passed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scattering: Option<Scattering>,

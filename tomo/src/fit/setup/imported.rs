@@ -108,6 +108,7 @@ impl Measured {
     pub fn of_static(file: &StaticImageFile, observation: Observation, name: &str) -> Result<Self> {
         let data = &file.data.visibilities;
         let settings = VisibilitySettings { average_s: data.average_s, uv_min: data.uv_min };
+        let observation = cropped(observation, data.utc_h)?;
         let mut observation = prepared(observation, &settings).within(name)?;
         let losses = (&mut observation, &file.loss[..]);
         add_systematic("data.visibilities.systematic", data.systematic, losses)?;
@@ -133,6 +134,7 @@ impl Measured {
         let Some(polarization) = &file.polarization else { return Ok(None) };
         let (data, losses) = (&file.data.visibilities, [polarization.loss()]);
         let settings = VisibilitySettings { average_s: data.average_s, uv_min: data.uv_min };
+        let observation = cropped(observation, data.utc_h)?;
         let mut observation = all_products(observation, &settings).within(name)?;
         // The frames are those of total intensity.
         let basis = observation.basis;
@@ -158,6 +160,16 @@ impl Measured {
         let empty = Measured::empty();
         Ok(Some(Measured { times, visibilities, varies, sky, gains, leakage, ..empty }))
     }
+}
+
+/// Rows between two hours of UTC.
+fn cropped(mut observation: Observation, utc_h: Option<[f64; 2]>) -> Result<Observation> {
+    let Some([from, to]) = utc_h else { return Ok(observation) };
+    observation.rows.retain(|row| (from..=to).contains(&row.time_h));
+    if observation.rows.is_empty() {
+        refuse!("data.visibilities.utc_h = [{from}, {to}] leaves no visibilities");
+    }
+    Ok(observation)
 }
 
 /// Whether a row has products that know Q and U.

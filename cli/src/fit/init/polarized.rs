@@ -1,0 +1,68 @@
+//! Settings of the polarisation of a static image, guessed from visibilities.
+
+use super::digits;
+use kerrlight_tomo::interferometry::light_curve::LightCurve;
+use kerrlight_tomo::interferometry::observation::{Basis, Observation};
+
+/// Tables of a static image that polarised data add.
+#[derive(Default)]
+pub struct Tables {
+    /// `[instrument.leakage]`, where it is to be solved for.
+    pub leakage: String,
+    /// `[polarization]`.
+    pub polarization: String,
+}
+
+impl Tables {
+    /// Of these data; empty where they have no cross hands. Files whose name says that leakage was taken out (`dtermcal`) and
+    /// Stokes parameters are compared by ratios; of others leakage is solved for. `varies` says whether the source does.
+    pub fn of(observation: &Observation, file: &str, varies: bool) -> Self {
+        if !observation.is_polarized() {
+            return Self::default();
+        }
+        let calibrated = file.to_ascii_lowercase().contains("dterm");
+        let by_ratios = calibrated || observation.basis == Basis::Stokes;
+        let (data, leakage) = match by_ratios {
+            true => (
+                "data = \"polarimetric-ratios\"\nleast_snr = 3.0 #! weaker baselines tell nothing\nleakage_left = 0.01 #! what \
+                 calibration of leakage leaves of it: a per cent",
+                String::new(),
+            ),
+            false => (
+                "data = \"polarized-visibilities\"\nleakage_left = 0.0",
+                "[instrument.leakage]\namplitude = 0.05 #! nothing says that leakage was taken out of these data: 5 % are expected\nrounds = 8"
+                    .to_owned(),
+            ),
+        };
+        let scatter = if varies { scatter(observation) } else { None };
+        let variability = scatter.map_or(String::new(), |jy| {
+            format!(
+                "variability = {{ jy = {}, uv = 2e9, power = 1.25 }} #! the standard deviation of Q and U on the baselines within a site, and as total intensity with the length of baselines\n",
+                digits(jy)
+            )
+        });
+        let polarization = format!(
+            "[polarization]\n{data}\n{variability}smoothness = 0.01\niterations = 1000\nbeam_uas = 20.0 #! as published images of \
+             M87* and Sgr A* are seen\nstrength = {{ values = [0.01, 0.1, 1.0, 10.0, 100.0], folds = 4 }}"
+        );
+        Self { leakage, polarization }
+    }
+}
+
+/// Root mean square of the standard deviations of Q and U on the baselines within a site, Jy; none where there are too few.
+fn scatter(observation: &Observation) -> Option<f64> {
+    let curve = LightCurve::of_sites(observation);
+    let of = |stokes: usize| {
+        let values = curve.samples.iter().filter_map(|sample| Some(sample.stokes[stokes]?.jy));
+        let values: Vec<f64> = values.filter(|x| x.is_finite()).collect();
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let square: f64 = values.iter().map(|x| (x - mean).powi(2)).sum();
+        (values.len() > FEWEST).then(|| square / (count - 1.0))
+    };
+    let jy = (0.5 * (of(1)? + of(2)?)).sqrt();
+    (jy > 0.0).then_some(jy)
+}
+
+/// A scatter of so few samples says nothing.
+const FEWEST: usize = 9;
