@@ -4,6 +4,7 @@ mod fields;
 pub mod gains;
 pub mod leakage;
 mod light_curve;
+pub mod medium;
 mod numbers;
 mod over_time;
 pub mod page;

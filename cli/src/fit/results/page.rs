@@ -2,6 +2,7 @@
 
 use super::gains::Gains;
 use super::leakage::Leakage;
+use super::medium;
 use super::numbers::outcomes;
 use super::over_time::Changes;
 use super::quiescent::Quiescent;
@@ -14,7 +15,7 @@ use crate::fit::{
 use crate::output;
 use crate::report::{self, LinePlot, Report, View3d};
 use anyhow::Context;
-use kerrlight_tomo::fit::settings::AxisSearch;
+use kerrlight_tomo::fit::settings::{AxisSearch, DataFiles};
 use kerrlight_tomo::fit::setup::Still;
 use kerrlight_tomo::toml_file;
 use kerrlight_tomo::volume::Shown;
@@ -196,6 +197,9 @@ impl Estimate<'_> {
                 "{}. χ² per data point is the mean squared residual in units of the error bars: about 1 for the right model and errors, less for noise-free data.",
                 each.collect::<Vec<_>>().join("; ")
             ));
+        }
+        if let Some(DataFiles::Visibilities { scattering, variability, .. }) = file.data {
+            lines.extend(medium::sentences(scattering, variability));
         }
         lines.extend(found.gains.iter().flat_map(Gains::sentences));
         lines.extend(found.leakage.iter().flat_map(Leakage::sentences));

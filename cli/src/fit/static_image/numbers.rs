@@ -28,6 +28,14 @@ pub fn error(survey: &Survey, name: &str, number: Number) -> Option<f64> {
     })
 }
 
+/// `42.1 ± 0.8`, or the number alone where its error is not known.
+pub fn with_error(value: f64, error: Option<f64>, digits: usize) -> String {
+    match error {
+        Some(error) => format!("{value:.digits$} ± {error:.digits$}"),
+        None => format!("{value:.digits$}"),
+    }
+}
+
 fn candidate(image: &Candidate) -> Value {
     json!({
         "start": image.start + 1,

@@ -1,7 +1,7 @@
 //! The page of a static image.
 
 use super::Found;
-use super::numbers::{RING, error};
+use super::numbers::{RING, error, with_error};
 use super::polarized::Polarized;
 use super::words;
 use crate::fit::results::gains::Gains;
@@ -91,14 +91,14 @@ impl Found<'_> {
             let value = number(self.survey.found().ring.as_ref()?);
             Some(Outcome {
                 name: name.to_owned(),
-                value: words::with_error(value, error(&self.survey, key, *number), digits),
+                value: with_error(value, error(&self.survey, key, *number), digits),
                 unit: unit.to_owned(),
                 meaning: text.to_owned(),
             })
         });
         let flux = Outcome {
             name: "flux".to_owned(),
-            value: words::with_error(
+            value: with_error(
                 results["flux_jy"].as_f64().unwrap_or(f64::NAN),
                 results["flux_error_jy"].as_f64(),
                 3,

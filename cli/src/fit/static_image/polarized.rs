@@ -1,7 +1,7 @@
 //! The linear polarisation of a static image: numbers, sentences and a picture.
 
 use super::Found;
-use super::words::with_error;
+use super::numbers::with_error;
 use crate::fit::results::leakage::Leakage;
 use crate::report::{Axis, Figure, LinePlot, Marks, Outcome, Series, enlarged, ticked};
 use kerrlight_tomo::fit::FrameTerm;

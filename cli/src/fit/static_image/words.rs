@@ -1,19 +1,12 @@
 //! What is said of a static image: data, model, priors, and what may be concluded.
 
 use super::Found;
-use super::numbers::{RING, error};
+use super::numbers::{RING, error, with_error};
 use super::polarized::Polarized;
+use crate::fit::results::medium;
 use crate::report::Part;
 use kerrlight_tomo::fit::settings::StartImage;
 use kerrlight_tomo::fit::static_image::Survey;
-
-/// `42.1 ± 0.8`, or the number alone where its error is not known.
-pub fn with_error(value: f64, error: Option<f64>, digits: usize) -> String {
-    match error {
-        Some(error) => format!("{value:.digits$} ± {error:.digits$}"),
-        None => format!("{value:.digits$}"),
-    }
-}
 
 /// The ring in a sentence.
 pub fn ring(survey: &Survey) -> Option<String> {
@@ -57,18 +50,7 @@ impl Found<'_> {
         if let Some(least) = data.uv_min {
             text.push(format!("Baselines below {least:e} wavelengths are left out."));
         }
-        if data.scattering.is_some() {
-            text.push("Diffractive scattering towards Sgr A* (Johnson et al. 2018) is part of the model: visibilities and errors were divided by its kernel, so that amplitudes below are those of the source behind the screen. Refraction is left out.".to_owned());
-        }
-        if let Some(law) = &data.variability {
-            text.push(format!(
-                "The source varies: {} Jy/(1 + (|u|/{:e})²)^{} was added to all errors in quadrature. χ² is that of data with \
-                 these errors.",
-                law.jy,
-                law.uv,
-                0.5 * law.power
-            ));
-        }
+        text.extend(medium::sentences(data.scattering, data.variability));
         text
     }
 

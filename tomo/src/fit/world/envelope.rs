@@ -29,8 +29,6 @@ pub struct Envelope {
 
 /// A part of a step that is not worth taking.
 const NEXT_TO_NOTHING: f64 = 0.1;
-/// From how many lattices a scatter is known well enough to be used as it is; from few it is too small by chance.
-const FEW: f64 = 2.0;
 
 /// Values at places ξ, along one lattice of rays.
 #[derive(Default)]
@@ -136,7 +134,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         if middles.len() > 1 {
             for middle in &middles {
                 let away = middle - &mean;
-                moved += &away * away.transpose() * (FEW / (count * (count - 1.0)));
+                moved += &away * away.transpose() * (few(count) / (count * (count - 1.0)));
             }
         }
         if is_wide {
@@ -150,6 +148,11 @@ impl<T: Float + Default> WorldProblem<'_, T> {
             + columns * moved * columns.transpose();
         Some((world, in_own_units(self.free, &whole)))
     }
+}
+
+/// What the scatter of so few is too small by: the variance of Student's t with n − 1 degrees of freedom, where it has one.
+fn few(count: f64) -> f64 {
+    if count > 3.0 { (count - 1.0) / (count - 3.0) } else { 3.0 }
 }
 
 /// Covariances in the parameters' own units, row by row.
