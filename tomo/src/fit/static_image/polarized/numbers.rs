@@ -1,4 +1,5 @@
-//! What is measured of a polarised image, as the EHT Collaboration (2021, ApJL 910, L13, section 5) does.
+//! What is measured of a polarised image, as the EHT Collaboration (2021, ApJL 910, L13) does; β₂ is that of Palumbo, Wong &
+//! Prather (2020, ApJ 894, 156).
 
 use crate::fit::static_image::beam::blurred;
 use crate::interferometry::operator::ImageGrid;
