@@ -1,6 +1,7 @@
 //! Settings of the polarisation of a static image, guessed from visibilities.
 
 use super::digits;
+use kerrlight_tomo::fit::verdict::CHANCE;
 use kerrlight_tomo::interferometry::light_curve::LightCurve;
 use kerrlight_tomo::interferometry::observation::{Basis, Observation};
 
@@ -14,10 +15,10 @@ pub struct Tables {
 }
 
 impl Tables {
-    /// Of these data; empty where they have no cross hands. Files whose name says that leakage was taken out (`dtermcal`) and
+    /// Of these data; empty where RL and LR are no more than noise. Files whose name says that leakage was taken out (`dtermcal`) and
     /// Stokes parameters are compared by ratios; of others leakage is solved for. `varies` says whether the source does.
     pub fn of(observation: &Observation, file: &str, varies: bool) -> Self {
-        if !observation.is_polarized() {
+        if !is_polarized(observation) {
             return Self::default();
         }
         let calibrated = file.to_ascii_lowercase().contains("dterm");
@@ -47,6 +48,25 @@ impl Tables {
         );
         Self { leakage, polarization }
     }
+}
+
+/// Whether RL and LR, or Q and U, are more than noise: χ² of none is above what chance makes of it.
+fn is_polarized(observation: &Observation) -> bool {
+    let crossed = match observation.basis {
+        Basis::Circular => [2, 3],
+        Basis::Stokes => [1, 2],
+    };
+    let (mut chi2, mut count) = (0.0, 0.0f64);
+    for row in &observation.rows {
+        for datum in crossed.into_iter().filter_map(|k| row.product(k)) {
+            if datum.is_placeholder() || datum.noise_sigma <= 0.0 {
+                continue;
+            }
+            chi2 += datum.visibility.norm_sqr() / datum.noise_sigma.powi(2);
+            count += 2.0;
+        }
+    }
+    chi2 > count + CHANCE * (2.0 * count).sqrt()
 }
 
 /// Root mean square of the standard deviations of Q and U on the baselines within a site, Jy; none where there are too few.

@@ -4,6 +4,7 @@ use super::Found;
 use super::numbers::with_error;
 use crate::fit::results::leakage::Leakage;
 use crate::report::{Axis, Figure, LinePlot, Marks, Outcome, Series, enlarged, ticked};
+use anyhow::Context;
 use kerrlight_tomo::fit::FrameTerm;
 use kerrlight_tomo::fit::settings::{LossKind, StaticImageFile, StaticPolarization};
 use kerrlight_tomo::fit::setup::{Measured, best_held};
@@ -111,7 +112,7 @@ impl Polarized {
         let Some(settings) = file.polarization.clone() else { return Ok(None) };
         let images = &survey.found.images;
         let terms = measured.visibility_terms::<f64>(&[settings.loss()], images.len() / 3)?;
-        let term: &dyn FrameTerm<f64> = &*terms[0].term;
+        let term: &dyn FrameTerm<f64> = &*terms.first().context("no polarised data")?.term;
         let frames = 0..measured.times.len();
         let residuals = frames.map(|frame| term.residuals(frame, images));
         let statistics = Statistics::of(residuals, 1);

@@ -9,6 +9,7 @@ use crate::fit::static_image::solve::minimum;
 use crate::fit::static_image::survey::allowed;
 use crate::fit::static_image::{Stage, Survey, SurveyWatch};
 use crate::fit::{FrameTerm, Weighted};
+use crate::interferometry::data_terms::DataTermError;
 use crate::interferometry::operator::ImageGrid;
 use rayon::prelude::*;
 
@@ -123,7 +124,7 @@ struct Search<'a> {
 impl Search<'_> {
     fn term(&self, measured: &Measured) -> Result<Weighted<dyn FrameTerm<f64>>, Error> {
         let terms = measured.visibility_terms(&[self.settings.loss()], self.grid.pixels())?;
-        Ok(terms.into_iter().next().expect("a term for the loss"))
+        terms.into_iter().next().ok_or_else(|| DataTermError::Empty.into())
     }
 
     fn problem<'a>(
