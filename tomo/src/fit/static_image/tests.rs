@@ -72,7 +72,7 @@ fn exact_a_gaussian_has_no_ring() {
     assert_eq!(Ring::measure(&pixels, grid, &RADII), None);
 }
 
-const SETTINGS: &str = r#"
+pub(super) const SETTINGS: &str = r#"
 title = "a ring"
 seed = 1
 [image]
@@ -111,13 +111,8 @@ least_radius_uas = 5.0
 most_radius_uas = 45.0
 "#;
 
-/// A ring of 44 µas and 0.6 Jy, brighter in the south, through the array of 2017 with thermal noise, gains of 20 % in every
-/// scan and no phases at all.
-fn observed(seed: u64) -> Observation {
-    let grid = grid(96);
-    let mut pixels = ring(grid, [44.0, 16.0], [0.0, 0.0], [0.5, 170.0]);
-    let sum: f64 = pixels.iter().sum();
-    pixels.iter_mut().for_each(|x| *x *= 0.6 / sum);
+/// Rows without values of a night of M87* at the array of 2017, and hours of UTC of its scans.
+pub(super) fn night() -> (Observation, Vec<f64>) {
     let source: Source = "m87".parse().unwrap();
     let setup = Setup {
         frequency_hz: 229.1e9,
@@ -129,13 +124,28 @@ fn observed(seed: u64) -> Observation {
     };
     let plan = Schedule { mjd: 57853, clock: Clock::Utc, start_h: 0.5, stop_h: 8.0, scans: 16 };
     let array = array::built_in("EHT2017").unwrap();
-    let mut seen = schedule::observe_affordable(&array, source.position, &plan, &setup).unwrap();
-    let hours = plan.hours_utc(setup.ut1).unwrap();
+    let seen = schedule::observe_affordable(&array, source.position, &plan, &setup).unwrap();
+    (seen, plan.hours_utc(setup.ut1).unwrap())
+}
+
+/// Gains of 20 % in every scan and no phases at all, then thermal noise.
+pub(super) fn spoil(seen: &mut Observation, seed: u64) {
+    let gains = GainErrors { scan_amplitude: 0.2, random_phases: true, ..GainErrors::default() };
+    apply_gains(seen, &gains, seed);
+    add_thermal_noise(seen, seed);
+}
+
+/// A ring of 44 µas and 0.6 Jy, brighter in the south, through the array of 2017 with thermal noise, gains of 20 % in every
+/// scan and no phases at all.
+fn observed(seed: u64) -> Observation {
+    let grid = grid(96);
+    let mut pixels = ring(grid, [44.0, 16.0], [0.0, 0.0], [0.5, 170.0]);
+    let sum: f64 = pixels.iter().sum();
+    pixels.iter_mut().for_each(|x| *x *= 0.6 / sum);
+    let (mut seen, hours) = night();
     let movie = Movie { grid, pixels: pixels.repeat(hours.len()) };
     simulate::fill(&mut seen, &movie, Pulse::Triangle, &hours, Method::Direct).unwrap();
-    let gains = GainErrors { scan_amplitude: 0.2, random_phases: true, ..GainErrors::default() };
-    apply_gains(&mut seen, &gains, seed);
-    add_thermal_noise(&mut seen, seed);
+    spoil(&mut seen, seed);
     seen
 }
 

@@ -5,58 +5,22 @@ use super::*;
 use crate::fit::settings::StaticImageFile;
 use crate::fit::setup::Measured;
 use crate::fit::static_image::survey;
-use crate::interferometry::array;
-use crate::interferometry::earth::{Frame, Ut1};
-use crate::interferometry::noise::{GainErrors, add_thermal_noise, apply_gains, apply_leakage};
+use crate::fit::static_image::tests::{SETTINGS, night, spoil};
+use crate::interferometry::noise::apply_leakage;
 use crate::interferometry::observation::{Basis, Observation};
 use crate::interferometry::operator::{ImageGrid, Method, Operator, Pulse, Transform};
 use crate::interferometry::polarimetry::LeakageTable;
-use crate::interferometry::schedule::{self, Clock, Schedule, Setup};
-use crate::interferometry::source::Source;
 use crate::units::MICROARCSECOND;
 use num_complex::Complex;
 
-const SETTINGS: &str = r#"
-title = "a polarised ring"
-seed = 1
-[image]
-pixels = 32
-field_uas = 120.0
-flux_jy = 0.6
-flux_sigma_jy = 0.05
-starts = [{ ring = { diameter_uas = 50.0, width_uas = 25.0 } }]
-iterations = 200
-draws = 4
-[data.visibilities]
-path = "none"
-average_s = 0.0
-systematic = 0.01
-[instrument.gains]
-phases = "known"
-amplitude = 0.2
-[[loss]]
-data = "amplitudes"
-weight = 1.0
-[[loss]]
-data = "closure-phases"
-weight = 1.0
-[envelope]
-fwhm_uas = 60.0
-weight = 0.03
-[[regulariser]]
-kind = "total-variation"
-weight = 1e-3
-epsilon = 30.0
-[ring]
-least_radius_uas = 5.0
-most_radius_uas = 45.0
-[polarization]
-data = "polarimetric-ratios"
-leakage_left = 0.0
-smoothness = 0.01
-iterations = 200
-beam_uas = 10.0
-"#;
+/// The settings of a static image with those of its polarisation.
+fn settings() -> String {
+    let text = SETTINGS.replace("draws = 6", "draws = 4");
+    format!(
+        "{text}[polarization]\ndata = \"polarimetric-ratios\"\nleakage_left = 0.0\nsmoothness = 0.01\niterations = 200\n\
+         beam_uas = 10.0\n"
+    )
+}
 
 /// A ring of 44 µas, 16 µas wide and 0.6 Jy with m = 0.3 e^{i(2φ + 60°)} all around: I, Q and U, Jy.
 fn truth(grid: ImageGrid) -> Vec<f64> {
@@ -85,18 +49,7 @@ fn grid(side: usize) -> ImageGrid {
 /// What the array of 2017 measures of it in a night, with thermal noise, gains of 20 % and phases that are lost.
 fn observed(seed: u64, leakage: Option<f64>) -> Observation {
     let grid = grid(96);
-    let source: Source = "m87".parse().unwrap();
-    let setup = Setup {
-        frequency_hz: 229.1e9,
-        bandwidth_hz: 1.856e9,
-        integration_s: 120.0,
-        elevation_deg: [10.0, 85.0],
-        ut1: Ut1::Table,
-        frame: Frame::Catalogue,
-    };
-    let plan = Schedule { mjd: 57853, clock: Clock::Utc, start_h: 0.5, stop_h: 8.0, scans: 16 };
-    let array = array::built_in("EHT2017").unwrap();
-    let mut seen = schedule::observe_affordable(&array, source.position, &plan, &setup).unwrap();
+    let mut seen = night().0;
     assert!(seen.basis == Basis::Circular);
     let uv: Vec<[f64; 2]> = seen.rows.iter().map(|row| row.uv).collect();
     let images = vec![uv; 3];
@@ -111,9 +64,7 @@ fn observed(seed: u64, leakage: Option<f64>) -> Observation {
     if let Some(amplitude) = leakage {
         apply_leakage(&mut seen, amplitude, seed).unwrap();
     }
-    let gains = GainErrors { scan_amplitude: 0.2, random_phases: true, ..GainErrors::default() };
-    apply_gains(&mut seen, &gains, seed);
-    add_thermal_noise(&mut seen, seed);
+    spoil(&mut seen, seed);
     seen
 }
 
@@ -146,7 +97,8 @@ fn exact_numbers_of_known_patterns() {
 #[test]
 fn exact_gradients_of_the_polarised_loss() {
     for (kind, smoothness) in [("polarimetric-ratios", 0.3), ("polarized-visibilities", 0.0)] {
-        let file = StaticImageFile::parse(&SETTINGS.replace("polarimetric-ratios", kind)).unwrap();
+        let file =
+            StaticImageFile::parse(&settings().replace("polarimetric-ratios", kind)).unwrap();
         let measured = Measured::of_static_polarized(&file, observed(1, None), "data");
         let measured = measured.unwrap().unwrap();
         let loss = file.polarization.as_ref().unwrap().loss();
@@ -200,7 +152,7 @@ fn found(text: &str, seed: u64, leakage: Option<f64>) -> PolarizedSurvey {
 fn exact_a_spiral_is_found_through_gains() {
     let grid = grid(96);
     let expected = LinearPolarization::measure(&truth(grid), grid, [0.0, 0.0], 10.0);
-    let found = found(SETTINGS, 2, None);
+    let found = found(&settings(), 2, None);
     let numbers = found.found.numbers;
     let error = found.error(|numbers| numbers.beta2_deg, Some(360.0)).unwrap();
     let off = (numbers.beta2_deg - 60.0).abs();
@@ -214,7 +166,7 @@ fn exact_a_spiral_is_found_through_gains() {
 /// total intensity, which is held, ends in it.
 #[test]
 fn exact_a_spiral_is_found_beside_leakage() {
-    let text = SETTINGS.replace("polarimetric-ratios", "polarized-visibilities").replace(
+    let text = settings().replace("polarimetric-ratios", "polarized-visibilities").replace(
         "[[loss]]\ndata = \"amplitudes\"",
         "[instrument.leakage]\namplitude = 0.1\nrounds = 8\n[[loss]]\ndata = \"amplitudes\"",
     );
@@ -240,8 +192,8 @@ fn exact_errors_of_polarised_data() {
         let measured = Measured::of_static_polarized(&file, observed(1, None), "data");
         measured.unwrap().unwrap().visibilities.unwrap().0.rows
     };
-    let plain = rows(SETTINGS);
-    let more = rows(&SETTINGS.replace(
+    let plain = rows(&settings());
+    let more = rows(&settings().replace(
         "leakage_left = 0.0",
         "leakage_left = 0.02\nvariability = { jy = 0.01, uv = 2e9, power = 2.0 }",
     ));
@@ -253,7 +205,7 @@ fn exact_errors_of_polarised_data() {
         let expected = a.noise_sigma[2].hypot(0.02 * 2f64.sqrt() * light).hypot(varies);
         assert!((b.noise_sigma[2] - expected).abs() < 1e-14);
     }
-    let file = StaticImageFile::parse(SETTINGS).unwrap();
+    let file = StaticImageFile::parse(&settings()).unwrap();
     let intensity = observed(1, None).total_intensity();
     let error = Measured::of_static_polarized(&file, intensity, "data").err().unwrap();
     assert!(error.to_string().contains("there is no RL or LR"), "{error}");
@@ -276,8 +228,8 @@ fn bad_settings_of_polarisation_are_named() {
             "instrument.leakage needs polarization.data = \"polarized-visibilities\"",
         ),
     ] {
-        assert!(SETTINGS.contains(from));
-        let error = StaticImageFile::parse(&SETTINGS.replace(from, to)).unwrap_err().to_string();
+        assert!(settings().contains(from));
+        let error = StaticImageFile::parse(&settings().replace(from, to)).unwrap_err().to_string();
         assert!(error.contains(says), "{to}: {error}");
     }
 }
