@@ -98,14 +98,18 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         if !data.is_convex() {
             let lit = run.lit(&mut objective, Trials { iterations, ..FEW })?;
             let dark = || Least { x: vec![0.0; self.unknowns()], value: f64::INFINITY };
-            return Ok(lit.map_or_else(dark, |Lit { x, value, .. }| Least { x, value }));
+            let everywhere =
+                |Lit { x, value, .. }: Lit| Least { x: operator.active.expand(&x), value };
+            return Ok(lit.map_or_else(dark, everywhere));
         }
         let dark = || self.center().unwrap_or_else(|| vec![0.0; self.unknowns()]);
         let start = start.map_or_else(dark, <[f64]>::to_vec);
         assert!(start.len() == self.unknowns());
+        // Nodes where no emission may be are not among those that are solved for.
+        let start = operator.active.gather(&start);
         let found = run.minimise(&mut objective, &start, iterations);
         let value = objective.finite(found.value, &found.x)?;
-        Ok(Least { x: found.x, value })
+        Ok(Least { x: operator.active.expand(&found.x), value })
     }
 
     /// The matrix from voxels to pixels: frame by frame of [`frames`](Self::frames), pixel by pixel, a row of all voxels

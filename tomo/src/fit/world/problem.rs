@@ -172,6 +172,19 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         chi2 / self.data()
     }
 
+    /// χ² over the number of data in a world with its volume, without what changes of emission cost: that is no noise.
+    ///
+    /// # Errors
+    /// If a number is out of its range.
+    pub fn left(&self, estimate: &Estimate) -> Result<f64, Error> {
+        if !self.change.is_any() {
+            return Ok(self.reduced(estimate.chi2));
+        }
+        let forward: ForwardModel<T> = self.model.forward(&estimate.world)?;
+        let x: Vec<T> = estimate.x.iter().map(|x| T::of(*x)).collect();
+        Ok(self.reduced(self.unit() * self.linear(&forward).misfit(&x)?))
+    }
+
     /// Number of data, each times the factor on its χ².
     fn data(&self) -> f64 {
         let count = |term: &Weighted<'_, T>| -> usize {

@@ -129,17 +129,16 @@ impl<T: Float + Default> WorldProblem<'_, T> {
     ) -> Result<Option<ScanPoint>, Error> {
         if others.is_empty() {
             let found = self.solve(world)?;
-            let reduced_chi2 = self.reduced(found.chi2);
+            let reduced_chi2 = self.left(&found)?;
             return Ok(Some(ScanPoint { world, value: found.value, reduced_chi2 }));
         }
         let inner = WorldProblem { known: world, free: others, ..*self };
         let start = inner.starts(1)[0];
-        let explored = inner.explore(start, how, &mut |_, _| true)?;
-        Ok(explored.map(|Explored { best, .. }| ScanPoint {
-            world: best.world,
-            value: best.value,
-            reduced_chi2: self.reduced(best.chi2),
-        }))
+        let Some(Explored { best, .. }) = inner.explore(start, how, &mut |_, _| true)? else {
+            return Ok(None);
+        };
+        let reduced_chi2 = self.left(&best)?;
+        Ok(Some(ScanPoint { world: best.world, value: best.value, reduced_chi2 }))
     }
 }
 

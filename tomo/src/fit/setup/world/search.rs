@@ -91,7 +91,7 @@ pub fn find_world(
         let quick = WorldProblem { effort: Effort { patience, ..problem.effort }, ..*problem };
         let how = Exploration { width: width(&over), worlds: search.fine.worlds, seed: file.seed };
         let Some(explored) = quick.explore(start, &how, told)? else { return Ok(None) };
-        let reduced = problem.scale * problem.reduced(explored.best.chi2);
+        let reduced = problem.scale * problem.left(&explored.best)?;
         // Steps along differences of images know one volume.
         if problem.model.ring.is_some() && !problem.change.is_any() {
             let (polished, reduced) = polished(problem, &explored.best)?;
@@ -134,7 +134,7 @@ fn from_starts(
         let how = Exploration { width: WIDTHS[0], worlds: search.coarse.worlds, seed };
         let Some(explored) = problem.explore(start, &how, &mut told)? else { return Ok(None) };
         let Some(explored) = or_twin(problem, explored, &how, &mut told)? else { return Ok(None) };
-        trials.push(trial(&explored, problem));
+        trials.push(trial(&explored, problem)?);
     }
     let best = trials.iter().min_by(|a, b| a.value.total_cmp(&b.value));
     let best = best.map(|best| (best.end, best.reduced_chi2));
@@ -198,7 +198,7 @@ fn lower(
 /// The least χ²/N of the worlds where searches begin.
 fn least(problem: &WorldProblem<'_, f32>, starts: usize) -> Result<f64> {
     problem.starts(starts).into_iter().try_fold(f64::INFINITY, |least, start| {
-        Ok(least.min(problem.reduced(problem.solve(start)?.chi2)))
+        Ok(least.min(problem.left(&problem.solve(start)?)?))
     })
 }
 
@@ -211,13 +211,13 @@ fn scale(reduced_chi2: f64) -> f64 {
     if reduced_chi2 > 0.0 && reduced_chi2 < TOO_SMALL { 1.0 / reduced_chi2 } else { 1.0 }
 }
 
-fn trial(explored: &Explored, problem: &WorldProblem<'_, f32>) -> Trial {
-    Trial {
-        reduced_chi2: problem.reduced(explored.best.chi2),
+fn trial(explored: &Explored, problem: &WorldProblem<'_, f32>) -> Result<Trial> {
+    Ok(Trial {
+        reduced_chi2: problem.left(&explored.best)?,
         start: explored.start,
         end: explored.best.world,
         value: explored.best.value,
         worlds: explored.samples.len(),
         converged: explored.converged,
-    }
+    })
 }

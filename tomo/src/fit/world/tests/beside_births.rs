@@ -1,6 +1,7 @@
 //! The flow of matter whose emission appears while it is seen.
 
 use super::*;
+use crate::fit::linear::LinearProblem;
 use crate::representation::{Allowed, Knots};
 
 /// Two spots, one of which begins to shine half-way: the angular velocity is found where births are allowed. Without them
@@ -37,4 +38,20 @@ fn exact_flow_is_found_beside_births() {
     let (born, carried) = (scan(&WorldProblem { change, ..steady }), scan(&steady));
     assert!((born.world.get(Parameter::Rotation) - 1.0).abs() < 1e-9, "{:?}", born.world);
     assert!(2.0 * born.value < carried.value, "{} {}", born.value, carried.value);
+    // What births cost is no part of the residuals, which are those of images of the volume.
+    let problem = WorldProblem { change, ..steady };
+    let best = problem.solve(truth).unwrap();
+    let x: Vec<f32> = best.x.iter().map(|x| *x as f32).collect();
+    let linear = problem.linear(&forward);
+    let images: f64 = linear.misfit(&x).unwrap() / count;
+    let left = problem.left(&best).unwrap();
+    assert!((left - images).abs() < 1e-6 * images, "{left} {images}");
+    let cost = linear.change.penalty(&best.x, (cell(&linear), 1.0), &[], &mut vec![0.0; x.len()]);
+    let whole = problem.reduced(best.chi2);
+    assert!((whole - left - cost / count).abs() < 1e-3 * whole && cost > 0.01 * best.chi2);
+}
+
+/// Volume of a cell, M³.
+fn cell(problem: &LinearProblem<'_, f32>) -> f64 {
+    problem.voxels.shape().spacing.iter().product()
 }
