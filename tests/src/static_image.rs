@@ -230,7 +230,7 @@ fn exact_polarisation_of_a_ring_is_found() {
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.success(), "{said}");
         let told = String::from_utf8_lossy(&output.stdout);
-        assert!(told.contains("of the light are linearly polarised"), "{told}");
+        assert!(told.contains("of the light is linearly polarised"), "{told}");
         let found = results(&path.join(kind));
         for (key, truth) in [("net_fraction", 0.2), ("mean_fraction", 0.2), ("net_evpa_deg", 30.0)]
         {

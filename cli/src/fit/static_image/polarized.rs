@@ -172,7 +172,7 @@ impl Polarized {
             with_error(100.0 * value, error.map(|error| 100.0 * error), 1)
         };
         format!(
-            "Seen with a beam of {} µas, {} % of the light are linearly polarised, {} % where polarised light is brightest ({}° east \
+            "Seen with a beam of {} µas, {} % of the light is linearly polarised, {} % where polarised light is brightest ({}° east \
              of north of the centre), and {} % of all light together; β₂ has the modulus {} and the argument {}°.",
             self.settings.beam_uas,
             per_cent(mean),

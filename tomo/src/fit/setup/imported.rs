@@ -13,7 +13,7 @@ use crate::fit::settings::{
     StrengthSettings, Within, refuse,
 };
 use crate::frames::Frames;
-use crate::interferometry::observation::{Basis, Observation, Row};
+use crate::interferometry::observation::Observation;
 
 /// What to write where there are no data.
 pub(super) const FILE: &str = "a table [data.visibilities] or [data.movie] with `path = \"FILE\"` (`kerrlight fit --init FILE` writes \
@@ -139,7 +139,7 @@ impl Measured {
         // The frames are those of total intensity.
         let basis = observation.basis;
         observation.rows.retain(|row| row.stokes_i(basis).is_some());
-        if !observation.rows.iter().any(|row| crossed(row, basis)) {
+        if !observation.is_polarized() {
             refuse!("{name}: there is no RL or LR (nor Q and U): remove the table [polarization]");
         }
         let seen = (&mut observation, &losses[..]);
@@ -170,16 +170,6 @@ fn cropped(mut observation: Observation, utc_h: Option<[f64; 2]>) -> Result<Obse
         refuse!("data.visibilities.utc_h = [{from}, {to}] leaves no visibilities");
     }
     Ok(observation)
-}
-
-/// Whether a row has products that know Q and U.
-fn crossed(row: &Row, basis: Basis) -> bool {
-    let products = match basis {
-        Basis::Circular => [2, 3],
-        Basis::Stokes => [1, 2],
-    };
-    let measured = |k: usize| row.product(k).is_some_and(|datum| !datum.is_placeholder());
-    products.into_iter().any(measured)
 }
 
 /// Phases that total intensity was fitted without are not known to polarisation either.

@@ -6,7 +6,7 @@ use super::start;
 use super::{FluxPrior, ImageProblem, Ring};
 use crate::Error;
 use crate::fit::linear::Prior;
-use crate::fit::settings::StaticImageFile;
+use crate::fit::settings::{StaticImageFile, StrengthSettings};
 use crate::fit::setup::{Held, Measured, best_held};
 use crate::fit::{FrameTerm, Weighted};
 use crate::interferometry::operator::ImageGrid;
@@ -158,6 +158,20 @@ pub(super) fn allowed(held: &[Held]) -> Vec<f64> {
     values
 }
 
+/// What `loss` says of each strength and each part of the frames; none if it says nothing of one.
+pub(super) fn held(
+    settings: &StrengthSettings,
+    loss: impl Fn(f64, usize) -> Option<f64> + Sync,
+) -> Option<Vec<Held>> {
+    let StrengthSettings { values, folds } = settings;
+    let cases: Vec<(f64, usize)> =
+        values.iter().flat_map(|value| (0..*folds).map(move |fold| (*value, fold))).collect();
+    let losses: Vec<f64> =
+        cases.par_iter().map(|(value, fold)| loss(*value, *fold)).collect::<Option<_>>()?;
+    let each = values.iter().zip(losses.chunks(*folds));
+    Some(each.map(|(value, losses)| Held { value: *value, losses: losses.to_vec() }).collect())
+}
+
 struct Search<'a> {
     file: &'a StaticImageFile,
     grid: ImageGrid,
@@ -224,22 +238,12 @@ impl Search<'_> {
         let part = |fold: usize, seen: bool| -> Vec<usize> {
             frames.iter().copied().filter(|frame| (frame % folds != fold) == seen).collect()
         };
-        let cases: Vec<(usize, usize)> = (0..settings.values.len())
-            .flat_map(|value| (0..folds).map(move |fold| (value, fold)))
-            .collect();
-        let loss = |(value, fold): &(usize, usize)| {
-            let strength = settings.values[*value];
-            let how = (start, strength);
-            let found = self.solved(Stage::HeldOut, how, &part(*fold, true), self.flux())?;
-            let unseen = self.problem(strength, &part(*fold, false), self.flux());
+        held(settings, |strength, fold| {
+            let found =
+                self.solved(Stage::HeldOut, (start, strength), &part(fold, true), self.flux())?;
+            let unseen = self.problem(strength, &part(fold, false), self.flux());
             Some(unseen.misfit(&found.solution.image))
-        };
-        let losses: Option<Vec<f64>> = cases.par_iter().map(loss).collect();
-        let held = |losses: Vec<f64>| {
-            let each = settings.values.iter().zip(losses.chunks(folds));
-            each.map(|(value, losses)| Held { value: *value, losses: losses.to_vec() }).collect()
-        };
-        losses.map(held)
+        })
     }
 
     /// Images of the measurement of the best image with other noise, and of a flux drawn from its prior, each from the best

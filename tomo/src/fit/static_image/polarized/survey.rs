@@ -6,7 +6,7 @@ use crate::Error;
 use crate::fit::settings::{StaticImageFile, StaticPolarization};
 use crate::fit::setup::{Held, Measured, SolvedLeakage, best_held};
 use crate::fit::static_image::solve::minimum;
-use crate::fit::static_image::survey::allowed;
+use crate::fit::static_image::survey::{allowed, held};
 use crate::fit::static_image::{Stage, Survey, SurveyWatch};
 use crate::fit::{FrameTerm, Weighted};
 use crate::interferometry::data_terms::DataTermError;
@@ -85,10 +85,10 @@ pub fn survey_polarized(
     let search = Search { file, settings, grid, watch };
     let term = search.term(measured)?;
     let frames: Vec<usize> = (0..measured.times.len()).collect();
-    let Some(held) = search.hold_out(&*term.term, light, survey, &frames) else {
+    let Some(losses) = search.hold_out(&*term.term, light, survey, &frames) else {
         return Ok(None);
     };
-    let best = best_held(&held).map_or(1.0, |best| best.value);
+    let best = best_held(&losses).map_or(1.0, |best| best.value);
     let strength = |value: f64| {
         let problem = search.problem(&*term.term, (light, value), frames.clone());
         search.solved(Stage::Strengths, &problem, value, survey)
@@ -108,10 +108,10 @@ pub fn survey_polarized(
         found = strength(best);
     }
     let Some(found) = found else { return Ok(None) };
-    let others: Vec<f64> = allowed(&held).into_iter().filter(|value| *value != best).collect();
+    let others: Vec<f64> = allowed(&losses).into_iter().filter(|value| *value != best).collect();
     let Some(strengths) = others.into_par_iter().map(strength).collect() else { return Ok(None) };
     let draws = search.draws(measured, survey, best)?;
-    Ok(draws.map(|draws| PolarizedSurvey { held, found, strengths, draws, leakage }))
+    Ok(draws.map(|draws| PolarizedSurvey { held: losses, found, strengths, draws, leakage }))
 }
 
 struct Search<'a> {
@@ -181,19 +181,11 @@ impl Search<'_> {
             let of = |frame: usize| frame * folds / frames.len();
             frames.iter().copied().filter(|frame| (of(*frame) != fold) == seen).collect()
         };
-        let cases: Vec<(f64, usize)> = settings
-            .values
-            .iter()
-            .flat_map(|value| (0..folds).map(move |fold| (*value, fold)))
-            .collect();
-        let loss = |(value, fold): &(f64, usize)| {
-            let seen = self.problem(term, (light, *value), part(*fold, true));
-            let found = self.solved(Stage::HeldOut, &seen, *value, survey)?;
-            Some(self.problem(term, (light, *value), part(*fold, false)).chi2(&found.images))
-        };
-        let losses: Vec<f64> = cases.par_iter().map(loss).collect::<Option<_>>()?;
-        let each = settings.values.iter().zip(losses.chunks(folds));
-        Some(each.map(|(value, losses)| Held { value: *value, losses: losses.to_vec() }).collect())
+        held(settings, |value, fold| {
+            let seen = self.problem(term, (light, value), part(fold, true));
+            let found = self.solved(Stage::HeldOut, &seen, value, survey)?;
+            Some(self.problem(term, (light, value), part(fold, false)).chi2(&found.images))
+        })
     }
 
     /// Images of the data with their noise once more, each beside the total intensity of a draw.
