@@ -114,10 +114,7 @@ impl Fit {
             return self.run_all(&work, &text, (&folder, true), device);
         }
         let guess = self.data.as_deref().map(|data| init::guess(data, self.model)).transpose()?;
-        let (mut text, base_dir) = self.settings(guess.as_ref())?;
-        if device.is_some() {
-            text = work::on_device(text)?;
-        }
+        let (text, base_dir) = self.settings(guess.as_ref())?;
         if self.print {
             let settings = serde_json::to_value(text.parse::<toml::Table>()?)?;
             return Ok(Answer::text(text).with("settings", settings));

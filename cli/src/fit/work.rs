@@ -7,9 +7,8 @@ use super::static_image;
 use crate::devices::FitDevice;
 use anyhow::{Context, bail};
 use kerrlight_tomo::Error;
-use kerrlight_tomo::fit::settings::{FitError, FitFile, Kind, Optimiser, StaticImageFile};
+use kerrlight_tomo::fit::settings::{FitError, FitFile, StaticImageFile};
 use kerrlight_tomo::representation::Registry;
-use kerrlight_tomo::scene::apply_override;
 use std::path::Path;
 
 /// Settings of either.
@@ -19,21 +18,6 @@ pub enum Work {
     Emission(Box<FitFile>),
     /// A static image.
     Image(Box<StaticImageFile>),
-}
-
-/// Settings of a new run on a device, where networks take Adam's steps in place of Muon's; says so. They become the run's own,
-/// so that it may resume on a processor.
-pub fn on_device(text: String) -> anyhow::Result<String> {
-    // What is wrong with a text is told where it is read for good.
-    let Ok(Work::Emission(file)) = Work::read(&text) else { return Ok(text) };
-    let is_network = matches!(file.representation.kind, Kind::Bhnerf | Kind::Mlp4d);
-    if file.training.optimiser != Optimiser::Muon || !is_network {
-        return Ok(text);
-    }
-    eprintln!(
-        "note: training.optimiser = \"muon\" is for the processor: on a device, networks take Adam's steps"
-    );
-    Ok(apply_override(&text, "training.optimiser=adam")?)
 }
 
 /// The same with its data, and all that can be found wrong found.

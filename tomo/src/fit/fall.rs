@@ -30,6 +30,12 @@ impl Fall {
         size_of_val(&*self.origins)
     }
 
+    /// The flow, where its nodes are, and the least and largest radius of the region (M).
+    #[cfg(feature = "wgpu")]
+    pub fn parts(&self) -> (&Falling, &[Origin], [f64; 2]) {
+        (&self.flow, &self.origins, self.limits)
+    }
+
     /// What node number k is stretched by and turned by to where its matter was `elapsed` (M) before: no numbers where
     /// that is outside of the region, so that nothing shines.
     #[inline]

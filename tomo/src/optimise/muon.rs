@@ -30,13 +30,13 @@ impl Default for Muon {
     }
 }
 
-/// Coefficients (a, b, c) of an iteration X ← aX + bXXᵀX + c(XXᵀ)²X (Jordan et al. 2024): five of them bring singular
-/// values of 0.003 to 1 between 0.7 and 1.2.
-const QUINTIC: [f64; 3] = [3.4445, -4.7750, 2.0315];
-/// Iterations of a step.
-const ITERATIONS: usize = 5;
-
 impl Muon {
+    /// Coefficients (a, b, c) of an iteration X ← aX + bXXᵀX + c(XXᵀ)²X (Jordan et al. 2024): five of them bring singular
+    /// values of 0.003 to 1 between 0.7 and 1.2.
+    pub const QUINTIC: [f64; 3] = [3.4445, -4.7750, 2.0315];
+    /// Iterations of a step.
+    pub const ITERATIONS: usize = 5;
+
     /// One step with learning rate `rate` (in units of the parameters). The first moments of `state` are the mean
     /// gradient of all parameters, the second ones stay zero where there are matrices. `matrices` lie behind each other,
     /// in the order of their offsets. Without any this is [`Adam::step`], to the bit.
@@ -101,10 +101,10 @@ fn orthogonal<T: Float>(mut x: Vec<T>, rows: usize, columns: usize) -> Vec<T> {
     x.iter_mut().for_each(|x| *x = T::of(x.double() / norm));
     let (of, side) = (Shape::by_rows(rows, columns), rows.min(columns));
     let square = Shape::by_rows(side, side);
-    let [a, b, c] = QUINTIC.map(T::of);
+    let [a, b, c] = Muon::QUINTIC.map(T::of);
     let [mut gram, mut power] = [(); 2].map(|()| vec![T::zero(); side * side]);
     let mut next = x.clone();
-    for _ in 0..ITERATIONS {
+    for _ in 0..Muon::ITERATIONS {
         // XᵀX or XXᵀ, whichever is smaller: X(XᵀX) = (XXᵀ)X.
         if rows > columns {
             multiply(&x, of.transposed(), &x, of, &mut gram, false);

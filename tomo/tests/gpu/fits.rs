@@ -40,6 +40,12 @@ impl Fit<'_> {
         Some(losses)
     }
 
+    /// What rounding may move parameters by in 20 steps. Gradients of few pairs have few singular values that are more than
+    /// rounding, and Muon multiplies the others by up to 3.4⁵ = 480.
+    fn rounding(&self) -> f64 {
+        if self.training.muon.is_some() { 480.0 * 1e-5 } else { 1e-5 }
+    }
+
     fn graphics(&self) -> Option<GraphicsFit> {
         let objective = objective(self.kind);
         let fit =
@@ -48,12 +54,14 @@ impl Fit<'_> {
     }
 }
 
-fn fits(representation: &dyn Representation<f32>) -> [Fit<'_>; 3] {
+fn fits(representation: &dyn Representation<f32>) -> [Fit<'_>; 4] {
     let fit = |batch, masked, kind| Fit { representation, training: training(batch, masked), kind };
+    let pairs = || fit(BatchSize::Pixels(30), true, Kind::Images);
     [
-        fit(BatchSize::Pixels(30), true, Kind::Images),
+        pairs(),
         fit(BatchSize::Frames(2), false, Kind::Images),
         fit(BatchSize::All, true, Kind::ImagesAndFlux),
+        Fit { training: Training { muon: Some(Muon::default()), ..pairs().training }, ..pairs() },
     ]
 }
 
@@ -91,9 +99,39 @@ fn code_twenty_steps_are_those_of_the_processor() {
         println!("{batch:?}: losses differ by {most:.1e}, parameters by {moved:.1e}");
         assert!(losses.len() == 20 && found.len() == 20);
         assert!(losses[19] < 0.9 * losses[0] || matches!(batch, BatchSize::Pixels(_)));
-        assert!(most < 1e-5 && moved < 1e-5, "{batch:?}: {most:e} {moved:e}");
+        let allowed = fit.rounding();
+        assert!(most < allowed && moved < allowed, "{batch:?}: {most:e} {moved:e}");
         assert!(state.good.is_some() && ours.good.as_ref().unwrap().step == 16);
     }
+}
+
+/// Of a gradient with as many singular values as a matrix has, the first step by Muon is that of the processor.
+#[test]
+fn code_a_step_by_muon_is_that_of_the_processor() {
+    let bhnerf = problem::bhnerf();
+    let mut training = training(BatchSize::All, false);
+    (training.muon, training.ramp) = (Some(Muon::default()), 0);
+    let fit = Fit { representation: &bhnerf, training, kind: Kind::Images };
+    let before = fit.start().now.parameters;
+    let step = |pause| {
+        let mut state = fit.start();
+        fit.run(&mut state, 1, pause)?;
+        let moved = state.now.parameters.iter().zip(&before).map(|(after, before)| after - before);
+        Some((moved.collect::<Vec<f32>>(), state.now.adam))
+    };
+    let Some((ours, adam)) = step(Some(1)) else { return };
+    let (theirs, of_processor) = step(None).unwrap();
+    let matrices = Representation::<f32>::matrices(&bhnerf);
+    assert!(matrices.len() == 4 && matrices.iter().any(|matrix| matrix.rows > matrix.columns));
+    for matrix in matrices {
+        let of = matrix.range();
+        let apart = apart(&theirs[of.clone()], &ours[of.clone()]);
+        println!("{} x {}: steps differ by {apart:.1e}", matrix.rows, matrix.columns);
+        assert!(apart < 2e-4, "{apart:e}");
+        assert!(adam.second[of].iter().all(|x| *x == 0.0));
+    }
+    assert!(apart(&of_processor.first, &adam.first) < 1e-5);
+    assert!(apart(&of_processor.second, &adam.second) < 1e-5);
 }
 
 /// Neither another time nor the lengths of stretches change a byte.
@@ -129,7 +167,7 @@ fn exact_checkpoints_go_from_device_to_processor_and_back() {
         let alone = moved([None; 3]).unwrap();
         let apart = apart(&alone.now.parameters, &there_and_back.now.parameters);
         println!("{:?}: parameters differ by {apart:.1e}", fit.training.batch);
-        assert!(apart > 0.0 && apart < 1e-5, "{apart:e}");
+        assert!(apart > 0.0 && apart < fit.rounding(), "{apart:e}");
         let mut whole = fit.start();
         fit.run(&mut whole, 20, Some(5));
         assert!(moved([Some(5); 3]).unwrap() == whole, "a break changes bytes");
@@ -216,7 +254,6 @@ fn what_is_not_done_is_named_with_its_key() {
     for (key, training) in [
         ("axis:", Training { axis_rate: rate, ..training.clone() }),
         ("training.parts:", Training { parts: 2, ..training.clone() }),
-        ("training.optimiser:", Training { muon: Some(Muon::default()), ..training.clone() }),
         ("training.optimiser:", Training { lbfgs: Some(Lbfgs::default()), ..training.clone() }),
     ] {
         let Some(device) = device() else { return };

@@ -105,13 +105,17 @@ fn agree(name: &str, both: &mut Both<'_>) {
 fn code_networks_have_the_gradients_of_the_processor() {
     let (small, bhnerf, mlp4d) = (problem::small(), problem::bhnerf(), problem::mlp4d());
     let frames = || Drawn::Frames(vec![2, 0, 3]);
-    let cases: [(&str, &dyn Representation<f32>, _, _); 6] = [
+    let cases: [(&str, &dyn Representation<f32>, _, _); 10] = [
         ("bhnerf, pixels", &bhnerf, (Kind::Images, pixels(20)), (false, None)),
         ("small, pixels", &small, (Kind::Images, pixels(90)), (false, None)),
         ("small, masked", &small, (Kind::Images, pixels(90)), (true, None)),
         ("small, frames in blocks", &small, (Kind::Images, frames()), (false, Some(128))),
         ("small, frames and fluxes", &small, (Kind::ImagesAndFlux, frames()), (true, Some(128))),
         ("mlp4d, frames", &mlp4d, (Kind::Images, frames()), (false, None)),
+        ("small, falling", &small, (Kind::Falling, frames()), (false, None)),
+        ("small, falling, masked", &small, (Kind::Falling, pixels(90)), (true, None)),
+        ("small, plunging", &small, (Kind::Plunging, frames()), (false, None)),
+        ("mlp4d, falling", &mlp4d, (Kind::Falling, frames()), (false, None)),
     ];
     for (name, representation, data, how) in cases {
         let Some(mut both) = Both::new(representation, data, how) else { return };

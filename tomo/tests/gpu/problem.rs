@@ -1,7 +1,9 @@
 //! A small fit: nine by nine rays about a hole of spin 0.6, four frames, an orbiting field that is not lit from the
 //! beginning.
 
+use kerrlight_geodesic::infall::Mixture;
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
+use kerrlight_tomo::dynamics::infall::{Falling, Law};
 use kerrlight_tomo::dynamics::{AngularVelocity, Axis, Injection};
 use kerrlight_tomo::fit::{
     BatchSize, Data, ForwardModel, ImageTerm, LightCurveTerm, Motion, Objective, OccupancyPlan,
@@ -13,6 +15,7 @@ use kerrlight_tomo::representation::{
     Activation, FeatureGrid, FeatureGridSettings, Grid, GridSettings, Network, NetworkSettings,
     Representation,
 };
+use std::sync::Arc;
 
 pub const SIDE: usize = 9;
 const FRAMES: usize = 4;
@@ -22,8 +25,18 @@ pub fn axis() -> Axis {
     Axis::new([0.1, 0.5, 0.8]).unwrap()
 }
 
-/// The forward model with delays and redshift, and whether all rays are one flux.
+/// The forward model with delays and redshift.
 pub fn model() -> ForwardModel<f32> {
+    model_of(AngularVelocity::Keplerian { drag: 0.6 })
+}
+
+/// Between circular orbits and free fall; with β_r = 1 on circles down to the innermost stable one.
+fn falling(beta_r: f64) -> AngularVelocity {
+    let mixture = Mixture { xi: 0.8, beta_r, beta_phi: 0.9 };
+    AngularVelocity::Falling(Arc::new(Falling::new(Law::Family { spin: 0.6, mixture }).unwrap()))
+}
+
+fn model_of(velocity: AngularVelocity) -> ForwardModel<f32> {
     let hole = Kerr::new(0.6).unwrap();
     let observer = Observer::at_infinity(Inclination::from_degrees(55.0).unwrap());
     let at = |k: usize| -6.0 + 12.0 * k as f64 / (SIDE - 1) as f64;
@@ -33,7 +46,7 @@ pub fn model() -> ForwardModel<f32> {
     let request = SightlineRequest { region: REGION, sampling, delay: true, momentum: true };
     let lines = Sightlines::trace(&hole, &observer, &alpha, &beta, &request).unwrap();
     let motion = Motion {
-        velocity: AngularVelocity::Keplerian { drag: 0.6 },
+        velocity,
         reference: 3.0,
         injection: Some(Injection { time: 1.0 }),
         times: vec![0.0, 9.0, 17.0, 40.0],
@@ -48,6 +61,10 @@ pub enum Kind {
     Images,
     /// Images and a light curve.
     ImagesAndFlux,
+    /// Images of matter that falls.
+    Falling,
+    /// Images of matter on circles, and within the innermost stable one on its way to the horizon.
+    Plunging,
 }
 
 pub fn objective(kind: Kind) -> Objective<f32> {
@@ -60,7 +77,12 @@ pub fn objective(kind: Kind) -> Objective<f32> {
         let term = LightCurveTerm::new(flux, &sigma, SIDE * SIDE).unwrap();
         data.others.push(Weighted { weight: 0.4, term: Box::new(term) });
     }
-    Objective { model: model(), data }
+    let model = match kind {
+        Kind::Images | Kind::ImagesAndFlux => model(),
+        Kind::Falling => model_of(falling(0.8)),
+        Kind::Plunging => model_of(falling(1.0)),
+    };
+    Objective { model, data }
 }
 
 pub fn training(batch: BatchSize, masked: bool) -> Training {

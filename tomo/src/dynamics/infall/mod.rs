@@ -9,6 +9,8 @@ mod tests;
 mod trajectory;
 
 pub use profile::Profile;
+#[cfg(feature = "wgpu")]
+pub(crate) use trajectory::Table;
 pub(crate) use trajectory::Trajectory;
 
 use crate::Error;
@@ -68,6 +70,12 @@ impl Origin {
     /// Where it is, M.
     pub fn radius(&self) -> f64 {
         self.radius
+    }
+
+    /// When, by the table, and its azimuth; no number, and Ω, where matter stays at its radius.
+    #[cfg(feature = "wgpu")]
+    pub(crate) fn in_table(&self) -> [f64; 2] {
+        [self.time, self.azimuth]
     }
 }
 
@@ -134,6 +142,12 @@ impl Falling {
     /// The table, with a factor on all angular velocities that may have derivatives.
     pub(crate) fn lifted<N: Elementary>(&self, factor: N) -> Trajectory<N> {
         self.table.lift(factor)
+    }
+
+    /// The table, number by number.
+    #[cfg(feature = "wgpu")]
+    pub(crate) fn numbers(&self) -> Table {
+        self.table.numbers()
     }
 
     /// Matter at a radius (M), to be carried back.

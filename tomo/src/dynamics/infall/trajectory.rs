@@ -125,6 +125,30 @@ impl<N: Elementary> Trajectory<N> {
     }
 }
 
+/// The numbers of a [`Trajectory`], for devices.
+#[cfg(feature = "wgpu")]
+pub(crate) struct Table {
+    /// Of each cell: when it begins, cells per time, and coefficients of radius and azimuth.
+    pub cells: Vec<(f64, f64, [[f64; 6]; 2])>,
+    /// When the last cell ends.
+    pub last: f64,
+    /// Radius, azimuth and angular velocity at both ends.
+    pub ends: [[f64; 3]; 2],
+}
+
+#[cfg(feature = "wgpu")]
+impl Trajectory<f64> {
+    /// Its numbers.
+    pub fn numbers(&self) -> Table {
+        let numbers = |cell: &Cell<f64>| (cell.start, cell.per_time, [cell.radius, cell.azimuth]);
+        Table {
+            cells: self.cells.iter().map(numbers).collect(),
+            last: self.times.last().copied().unwrap_or(0.0),
+            ends: self.ends,
+        }
+    }
+}
+
 impl Trajectory<f64> {
     /// The same without derivatives, but for a factor on all angular velocities.
     pub fn lift<N: Elementary>(&self, factor: N) -> Trajectory<N> {

@@ -1,6 +1,7 @@
 //! Adam on the device.
 
 use super::bytes::{floats, words};
+use crate::representation::WeightMatrix;
 use kerrlight_geodesic::gpu::{Bound, Buffer, Commands, Compute, GpuError};
 
 /// Parameters, their gradient and what Adam remembers.
@@ -34,16 +35,24 @@ pub struct Rule {
 const ROW: u32 = 64 * 32_768;
 
 impl Learning {
-    /// Of so many parameters; `positive`: they are held at zero or above.
+    /// Of so many parameters but those of `others`, whose steps are not Adam's; `positive`: they are held at zero or
+    /// above.
     ///
     /// # Errors
     /// If the device has no room, or fails.
-    pub fn new(device: &Compute, count: usize, positive: bool) -> Result<Self, GpuError> {
+    pub fn new(
+        device: &Compute,
+        count: usize,
+        positive: bool,
+        others: &[WeightMatrix],
+    ) -> Result<Self, GpuError> {
         let storage = || device.storage(4 * count as u64);
         let (parameters, gradient, moments) = (storage()?, storage()?, [storage()?, storage()?]);
         let rule = device.uniform(&[0; 48])?;
         let kernels = device.kernels(include_str!("shaders/adam.wgsl"), &["learn"])?;
-        let buffers = [&rule, &gradient, &moments[0], &moments[1], &parameters];
+        let left_out = device.storage(4 * count.div_ceil(32) as u64)?;
+        device.write(&left_out, &words(&bits(count, others)))?;
+        let buffers = [&rule, &gradient, &moments[0], &moments[1], &parameters, &left_out];
         let buffers: Vec<_> = (0..).zip(buffers).collect();
         let learn = device.bind(&kernels[0], &buffers)?;
         Ok(Self { parameters, gradient, moments, rule, learn, count, positive })
@@ -85,8 +94,22 @@ impl Learning {
         commands.dispatch(&self.learn, [count.min(ROW).div_ceil(64), count.div_ceil(ROW)]);
     }
 
+    /// The mean gradient, or the means that Adam has of it.
+    pub fn means(&self) -> &Buffer {
+        &self.moments[0]
+    }
+
     /// Parameters and moments.
     pub fn buffers(&self) -> [&Buffer; 3] {
         [&self.parameters, &self.moments[0], &self.moments[1]]
     }
+}
+
+/// A bit for each parameter, set in matrices.
+fn bits(count: usize, matrices: &[WeightMatrix]) -> Vec<u32> {
+    let mut bits = vec![0; count.div_ceil(32)];
+    for k in matrices.iter().flat_map(WeightMatrix::range) {
+        bits[k / 32] |= 1 << (k % 32);
+    }
+    bits
 }

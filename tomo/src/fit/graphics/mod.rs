@@ -3,7 +3,7 @@
 //! The device holds the nodes of all rays, parameters, gradient and Adam's moments. A step is a handful of commands:
 //! nodes of the drawn (ray, frame) pairs are turned back to the reference time and those that are dark left out, the
 //! representation goes forward, light is summed along rays, residuals go back to points, the representation goes back,
-//! Adam learns. Sums have a fixed order or are sums of whole numbers: the same steps on the same device give the same
+//! Adam or Muon learns. Sums have a fixed order or are sums of whole numbers: the same steps on the same device give the same
 //! bytes. What is drawn is drawn by this processor, so that both devices take the same steps but for rounding.
 //!
 //! Residuals of images are made on the device, and nothing but losses comes back before the end of a stretch. For all
@@ -12,8 +12,10 @@
 
 mod adam;
 mod bytes;
+mod fall;
 mod field;
 mod grid;
+mod muon;
 mod network;
 mod pixels;
 mod rooms;
@@ -28,8 +30,10 @@ use crate::Error;
 use crate::dynamics::Axis;
 use crate::representation::Representation;
 use adam::{Learning, Rule};
+use fall::FallTable;
 use field::Field;
 use kerrlight_geodesic::gpu::{Adapter, Compute, GpuError, Needs};
+use muon::Turning;
 use pixels::{Gathering, Node, Pair, Pixels};
 use rooms::Pieces;
 
@@ -55,6 +59,7 @@ pub struct GraphicsFit {
     device: Compute,
     pixels: Pixels,
     learning: Learning,
+    turning: Option<Turning>,
     field: Field,
     pieces: Pieces,
     /// Whether the field is one of places and times.
@@ -94,17 +99,33 @@ impl GraphicsFit {
         let model = &objective.model;
         let cells = training.occupancy.map_or(0, |plan| plan.settings.cells);
         let pieces = Pieces::new(objective, training.batch);
-        let pixels = Pixels::new(&device, pieces.room(model.points(), cells, STEPS))?;
+        let events = !representation.is_carried();
+        // What is not carried does not fall.
+        let fall = model.fall.as_ref().filter(|_| !events).map(FallTable::new);
+        let pixels = Pixels::new(&device, pieces.room(model.points(), cells, STEPS), fall)?;
         let positive = field::is_positive(representation);
-        let learning = Learning::new(&device, representation.parameters(), positive)?;
+        let matrices = training.muon.map(|_| representation.matrices()).unwrap_or_default();
+        let count = representation.parameters();
+        let learning = Learning::new(&device, count, positive, &matrices)?;
+        let turning = training.muon.map(|muon| Turning::new(&device, muon, &matrices, &learning));
+        let turning = turning.transpose()?.flatten();
         let field = Field::new(&device, representation, (&pixels.points, &learning), most)?;
         let mut lit = vec![false; model.pixels()];
         model.pixel().iter().for_each(|pixel| lit[*pixel as usize] = true);
         let dark = (0..lit.len()).filter(|pixel| !lit[*pixel]).collect();
         let images_only = objective.data.others.is_empty() && !model.is_flux;
-        let events = !representation.is_carried();
-        let loaded_for = None;
-        Ok(Self { device, pixels, learning, field, pieces, events, images_only, dark, loaded_for })
+        Ok(Self {
+            device,
+            pixels,
+            learning,
+            turning,
+            field,
+            pieces,
+            events,
+            images_only,
+            dark,
+            loaded_for: None,
+        })
     }
 
     /// Loss and gradient of the first step of a stretch, which is not taken.
@@ -130,16 +151,22 @@ impl GraphicsFit {
 
     /// Puts what a stretch starts from there.
     fn load(&mut self, stretch: &Stretch<'_, f32>, from: &Progress<f32>) -> Result<(), GpuError> {
-        let Self { device, pixels, learning, .. } = self;
+        let Self { device, pixels, learning, events, .. } = self;
         let model = &stretch.objective.model;
         if self.loaded_for != Some(stretch.axis) {
+            let delay = |k: usize| model.delay.get(k).copied().unwrap_or(0.0);
+            let origins = model.fall.as_ref().filter(|_| !*events).map(|fall| fall.parts().1);
+            let motion = |k: usize| match origins {
+                Some(origins) => {
+                    let [high, low, azimuth] = fall::of_node(&origins[k]);
+                    [high, low, delay(k), azimuth]
+                }
+                None => [model.rate[k], model.phase.get(k).copied().unwrap_or(0.0), delay(k), 0.0],
+            };
             let node = |k: usize| Node {
                 place: [0, 1, 2].map(|c| model.position[c][k]),
                 weight: model.weight[k],
-                motion: match model.delay.is_empty() {
-                    true => [model.rate[k], 0.0, 0.0],
-                    false => [model.rate[k], model.phase[k], model.delay[k]],
-                },
+                motion: motion(k),
             };
             pixels.load(device, (0..model.points()).map(node))?;
             self.loaded_for = Some(stretch.axis);
@@ -289,7 +316,7 @@ impl StepDevice<f32> for GraphicsFit {
         from: &Progress<f32>,
     ) -> Result<Taken<f32>, Error> {
         self.load(stretch, from)?;
-        let Self { device, pixels, learning, .. } = &*self;
+        let Self { device, pixels, learning, turning, .. } = &*self;
         let mut pending = Vec::with_capacity(stretch.draws.len());
         for (k, rate) in stretch.rates.iter().enumerate() {
             pending.push(self.loss(stretch, k)?);
@@ -297,7 +324,11 @@ impl StepDevice<f32> for GraphicsFit {
             let (beta, epsilon) = ([adam.beta1, adam.beta2], adam.epsilon);
             let steps = from.adam.steps + k as u64 + 1;
             learning.set(device, Rule { beta, epsilon, rate: *rate, steps })?;
-            device.run(|commands| learning.learn(commands))?;
+            turning.as_ref().map_or(Ok(()), |turning| turning.set(device, *rate))?;
+            device.run(|commands| {
+                learning.learn(commands);
+                turning.iter().for_each(|turning| turning.learn(commands));
+            })?;
         }
         let [parameters, first, second] = learning.buffers();
         let read = device.read(&[parameters, first, second, pixels.records()])?;
@@ -341,16 +372,13 @@ pub fn check(
     training: &Training,
 ) -> Result<(), Error> {
     let model = &objective.model;
-    let turned = training.muon.is_some() && !representation.matrices().is_empty();
     for (asked, key, what) in [
-        (turned, "training.optimiser", "muon's steps of networks are"),
         (training.lbfgs.is_some(), "training.optimiser", "quasi-Newton steps are"),
         (training.learns_axis(representation), "axis", "the gradient of the axis is"),
         (training.penalties.is_some(), "penalty", "penalties are"),
         (training.change.is_some(), "change", "emission that changes while matter carries it is"),
         (training.parts > 1, "training.parts", "steps in parts are"),
         (model.planes.is_some(), "polarization", "Stokes parameters are"),
-        (model.fall.is_some(), "motion.velocity", "matter that changes its radius is"),
         (representation.built_in().is_none(), "representation.kind", "this representation is"),
     ] {
         if asked {

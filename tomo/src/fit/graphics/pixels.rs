@@ -1,6 +1,7 @@
 //! From nodes on the device to points of a batch, and from their emission to pixels, residuals and back.
 
 use super::bytes::{floats, read, words};
+use super::fall::FallTable;
 use kerrlight_geodesic::gpu::{Bound, Buffer, Commands, Compute, GpuError};
 use kerrlight_geodesic::wgsl;
 
@@ -26,8 +27,9 @@ pub struct Node {
     pub place: [f32; 3],
     /// What emission is multiplied by in its pixel.
     pub weight: f32,
-    /// Angle that it is turned by in a unit of time, that of its delay, and the delay.
-    pub motion: [f32; 3],
+    /// Angle that it is turned by in a unit of time, that of its delay, the delay and nothing; where matter falls, what
+    /// [`of_node`](super::fall::of_node) says of it about the delay.
+    pub motion: [f32; 4],
 }
 
 /// A ray in a frame.
@@ -84,6 +86,7 @@ pub struct Pixels {
     nodes: Buffer,
     pairs: Buffer,
     mask: Buffer,
+    fall: Option<FallTable>,
     fluxes: Buffer,
     slopes: Buffer,
     records: Buffer,
@@ -102,8 +105,10 @@ impl Pixels {
     ///
     /// # Errors
     /// If the device has no room, or fails.
-    pub fn new(device: &Compute, room: Room) -> Result<Self, GpuError> {
-        let all = buffers(device, room)?;
+    pub fn new(device: &Compute, room: Room, fall: Option<FallTable>) -> Result<Self, GpuError> {
+        let table = fall.as_ref().map_or(&[][..], |fall| &fall.numbers);
+        let all = buffers(device, room, table.len())?;
+        device.write(&all[15], &floats(table))?;
         let source = [wgsl::FUNCTIONS, SHADER].join("\n");
         let kernels = device.kernels(&source, &ENTRIES)?;
         let bind = |entry: usize, bindings: &[u32]| {
@@ -111,14 +116,14 @@ impl Pixels {
             device.bind(&kernels[entry], &buffers)
         };
         let forward = [
-            bind(0, &[0, 1, 2, 3, 4])?,
+            bind(0, &[0, 1, 2, 3, 4, 15])?,
             bind(1, &[0, 4, 5, 14])?,
-            bind(2, &[0, 1, 2, 3, 5, 6, 7])?,
+            bind(2, &[0, 1, 2, 3, 5, 6, 7, 15])?,
         ];
         let sums = [bind(3, &[0, 2, 5, 7, 8, 9, 10, 11])?, bind(4, &[0, 10, 13, 14])?];
         let spread = bind(5, &[0, 5, 7, 11, 12])?;
         let [task, nodes, pairs, mask, _, _, places, _, values, fluxes, _, slopes, rest @ ..] = all;
-        let [cotangents, records, extent] = rest;
+        let [cotangents, records, extent, _] = rest;
         let bends = device.storage(4 * room.points as u64)?;
         let points = Points { places, values, bends, cotangents, extent, room: room.points };
         Ok(Self {
@@ -127,6 +132,7 @@ impl Pixels {
             nodes,
             pairs,
             mask,
+            fall,
             fluxes,
             slopes,
             records,
@@ -145,8 +151,9 @@ impl Pixels {
         device: &Compute,
         nodes: impl Iterator<Item = Node>,
     ) -> Result<(), GpuError> {
-        let numbers = nodes.flat_map(|Node { place: [x, y, z], weight, motion: [a, b, c] }| {
-            [x, y, z, weight, a, b, c, 0.0]
+        let numbers = nodes.flat_map(|Node { place: [x, y, z], weight, motion }| {
+            let [a, b, c, d] = motion;
+            [x, y, z, weight, a, b, c, d]
         });
         device.write(&self.nodes, &floats(&numbers.collect::<Vec<f32>>()))
     }
@@ -179,14 +186,19 @@ impl Pixels {
         device.write(&self.pairs, &words(&pairs.iter().flat_map(each).collect::<Vec<u32>>()))?;
         let [x, y, z] = how.axis.map(f32::to_bits);
         let flag = |set: bool, flag: u32| if set { flag } else { 0 };
-        let flags =
-            flag(how.earliest.is_some(), 1) | flag(how.mask.is_some(), 2) | flag(how.events, 4);
+        let flags = flag(how.earliest.is_some(), 1)
+            | flag(how.mask.is_some(), 2)
+            | flag(how.events, 4)
+            | flag(self.fall.is_some(), 8);
+        let (falling, [least, largest]) =
+            self.fall.as_ref().map_or((0, [0.0; 2]), |fall| (fall.cells as u32, fall.limits));
         let (cells, half) = how.mask.unwrap_or((1, 1.0));
         let per_length = cells as f32 / (2.0 * half);
         let task = [
             [x, y, z, how.earliest.unwrap_or(0.0).to_bits()],
             [pairs.len() as u32, flags, cells, half.to_bits()],
             [per_length.to_bits(), how.slope.to_bits(), ROW, how.record],
+            [falling, least.to_bits(), largest.to_bits(), 0],
         ];
         device.write(&self.task, &words(task.as_flattened()))
     }
@@ -243,7 +255,7 @@ fn grid(workgroups: usize) -> [u32; 2] {
 }
 
 /// The buffers of all bindings, in their order.
-fn buffers(device: &Compute, room: Room) -> Result<[Buffer; 15], GpuError> {
+fn buffers(device: &Compute, room: Room, of_fall: usize) -> Result<[Buffer; 16], GpuError> {
     let Room { nodes, pairs, points, cells, records } = room;
     let storage = |bytes: usize| device.storage(bytes as u64);
     let of_pairs = || storage(4 * pairs);
@@ -263,5 +275,6 @@ fn buffers(device: &Compute, room: Room) -> Result<[Buffer; 15], GpuError> {
         storage(4 * points)?,
         storage(8 * records)?,
         storage(4)?,
+        storage(4 * of_fall)?,
     ])
 }

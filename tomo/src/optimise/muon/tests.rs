@@ -51,7 +51,7 @@ fn exact_singular_values_of_a_diagonal_follow_the_polynomial() {
         for (k, found) in found.iter().enumerate() {
             let (row, column) = (k / columns, k % columns);
             let mut s = if row == column { values[row] / norm } else { 0.0 };
-            for _ in 0..ITERATIONS {
+            for _ in 0..Muon::ITERATIONS {
                 s = 3.4445 * s - 4.7750 * s.powi(3) + 2.0315 * s.powi(5);
             }
             assert!((found - s).abs() < 1e-12, "{rows}x{columns}, {row}, {column}: {found} {s}");

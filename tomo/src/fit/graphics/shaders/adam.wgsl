@@ -16,11 +16,13 @@ struct Adam {
 @group(0) @binding(2) var<storage, read_write> means: array<f32>;
 @group(0) @binding(3) var<storage, read_write> mean_squares: array<f32>;
 @group(0) @binding(4) var<storage, read_write> parameters: array<f32>;
+// A bit for each parameter: 1 where something else takes the step.
+@group(0) @binding(5) var<storage, read> left_out: array<u32>;
 
 @compute @workgroup_size(64)
 fn learn(@builtin(global_invocation_id) at: vec3<u32>) {
     let k = at.y * rule.row + at.x;
-    if k >= rule.count {
+    if k >= rule.count || (left_out[k / 32u] >> (k % 32u) & 1u) == 1u {
         return;
     }
     let g = gradient[k];

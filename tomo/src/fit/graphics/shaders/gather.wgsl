@@ -3,7 +3,9 @@
 
 struct Node {
     place: vec4<f32>,  // x, y, z in M, and the weight in the pixel
-    motion: vec4<f32>, // turn a unit of time, turn that belongs to the delay, delay
+    // Turn a unit of time, turn that belongs to the delay, delay; of matter that falls when it is by the table (two floats),
+    // delay, azimuth.
+    motion: vec4<f32>,
 }
 
 struct Pair {
@@ -24,11 +26,16 @@ struct Task {
     slope: f32,      // dloss/dpixel of a residual of 1
     row: u32,        // workgroups in a row of the grid
     into: u32,       // where the loss of this step is kept
+    cells_of_fall: u32,
+    least: f32,      // radius of the region, M
+    largest: f32,
+    spare: u32,
 }
 
 const FROM_A_TIME = 1u;
 const MASKED = 2u;
 const EVENTS = 4u;
+const FALLS = 8u;
 
 @group(0) @binding(0) var<uniform> task: Task;
 @group(0) @binding(1) var<storage, read> nodes: array<Node>;
@@ -47,6 +54,9 @@ const EVENTS = 4u;
 // Of each step the sum of squares and the bits of the number of points.
 @group(0) @binding(13) var<storage, read_write> records: array<vec2<f32>>;
 @group(0) @binding(14) var<storage, read_write> extent: array<u32>;
+// Cells of a fall: when they begin (two floats), cells per time, nothing, coefficients of radius and azimuth; then radius,
+// azimuth and angular velocity at both ends, and when the last cell ends (two floats).
+@group(0) @binding(15) var<storage, read> fall: array<f32>;
 
 var<workgroup> shared_counts: array<u32, 256>;
 var<workgroup> shared_sums: array<f32, 256>;
@@ -67,17 +77,78 @@ fn in_mask(place: vec3<f32>) -> bool {
     return ((mask[index / 32u] >> (index % 32u)) & 1u) == 1u;
 }
 
+// How long after the time at a place of the table.
+fn since(at: vec2<f32>, elapsed: f32, place: u32) -> f32 {
+    return (at.x - fall[place]) + (at.y - fall[place + 1u]) - elapsed;
+}
+
+// Radius and azimuth at the end of a fall that begins at `place`, where matter stays on a circle.
+fn beyond(place: u32, time: f32) -> vec2<f32> {
+    return vec2<f32>(fall[place], fma(fall[place + 2u], time, fall[place + 1u]));
+}
+
+fn coefficients(place: u32, part: f32) -> f32 {
+    var sum = fall[place + 5u];
+    for (var k = 5u; k > 0u; k--) {
+        sum = fma(sum, part, fall[place + k - 1u]);
+    }
+    return sum;
+}
+
+// Radius and azimuth of matter a time before it was at a place of the table.
+fn fallen(at: vec2<f32>, elapsed: f32) -> vec2<f32> {
+    let ends = 16u * task.cells_of_fall;
+    if since(at, elapsed, 0u) < 0.0 {
+        return beyond(ends, since(at, elapsed, 0u));
+    }
+    if since(at, elapsed, ends + 8u) >= 0.0 {
+        return beyond(ends + 4u, since(at, elapsed, ends + 8u));
+    }
+    var low = 0u;
+    var high = task.cells_of_fall;
+    while high - low > 1u {
+        let middle = (low + high) / 2u;
+        if since(at, elapsed, 16u * middle) >= 0.0 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    let cell = 16u * low;
+    let part = since(at, elapsed, cell) * fall[cell + 2u];
+    return vec2<f32>(coefficients(cell + 4u, part), coefficients(cell + 10u, part));
+}
+
+// Later than any time.
+const NEVER: f32 = 1e29;
+
+// What a node is stretched by and turned by to where its matter was; a stretch of 0 where that is outside of the region.
+fn carried(node: Node, frame: f32) -> vec2<f32> {
+    if (task.flags & FALLS) == 0u {
+        return vec2<f32>(1.0, node.motion.x * frame + node.motion.y);
+    }
+    let elapsed = frame - node.motion.z;
+    let radius = length(node.place.xyz);
+    var before = vec2<f32>(radius, -node.motion.w * elapsed);
+    if node.motion.x < NEVER {
+        before = fallen(node.motion.xy, elapsed) - vec2<f32>(0.0, node.motion.w);
+    }
+    let inside = before.x >= task.least && before.x <= task.largest;
+    return select(vec2<f32>(0.0), vec2<f32>(before.x / radius, before.y), inside);
+}
+
 fn seen(index: u32, frame: f32) -> Seen {
     let node = nodes[index];
     let time = frame - node.motion.z;
-    let x = node.place.xyz;
-    let turn = kerr_cos_sin(node.motion.x * frame + node.motion.y);
+    let carry = carried(node, frame);
+    let x = node.place.xyz * carry.x;
+    let turn = kerr_cos_sin(carry.y);
     let along = (1.0 - turn.x) * dot(task.axis, x);
     let pulled = turn.x * x + turn.y * cross(task.axis, x) + along * task.axis;
     let in_time = (task.flags & FROM_A_TIME) == 0u || time >= task.earliest;
     let unmasked = (task.flags & MASKED) == 0u || in_mask(pulled);
     let place = select(pulled, x, (task.flags & EVENTS) != 0u);
-    return Seen(vec4<f32>(place, time), in_time && unmasked);
+    return Seen(vec4<f32>(place, time), in_time && unmasked && carry.x > 0.0);
 }
 
 @compute @workgroup_size(64)
