@@ -59,6 +59,10 @@ pub struct Convert {
     /// left out
     #[arg(long, value_name = "GAINS.csv")]
     gains: Option<PathBuf>,
+    /// Take leakage out of RR, LL, RL and LR: a table as a fit with [instrument.leakage] leaves it (leakage.csv); rows
+    /// without all four, or with another station, are left out
+    #[arg(long, value_name = "LEAKAGE.csv")]
+    leakage: Option<PathBuf>,
     /// The source, where the input does not tell where it is: sgra, m87, or hours and degrees
     #[arg(long, value_name = "sgra|m87|RA,DEC", value_parser = arguments::source)]
     source: Option<Source>,
@@ -84,7 +88,8 @@ impl Convert {
     pub fn run(&self) -> anyhow::Result<Answer> {
         let output = ObservationFile::new(&self.output, self.format, self.comments)?;
         output.spares(&self.input)?;
-        self.gains.iter().try_for_each(|gains| output.spares(gains))?;
+        let tables = self.gains.iter().chain(&self.leakage);
+        tables.into_iter().try_for_each(|table| output.spares(table))?;
         if let Some(seconds) = self.average.filter(|s| !(*s > 0.0 && s.is_finite())) {
             bail!("--average {seconds} is not allowed: positive seconds");
         }
@@ -106,6 +111,7 @@ impl Convert {
         let selection = flags.apply(&observation);
         let mut observation = selection.observation;
         self.calibrate(&mut observation)?;
+        self.clean(&mut observation)?;
         if self.stokes_i {
             observation = observation.total_intensity();
         }
@@ -152,6 +158,25 @@ impl Convert {
         }
         if lost > 0 {
             eprintln!("{name}: {lost} of {all} rows have no gain and are left out");
+        }
+        Ok(())
+    }
+
+    /// Takes the leakage of a table out.
+    fn clean(&self, observation: &mut Observation) -> anyhow::Result<()> {
+        let Some(path) = &self.leakage else { return Ok(()) };
+        let name = path.display().to_string();
+        let table = files::parse_leakage(&output::read_text(path)?).context(name.clone())?;
+        let all = observation.rows.len();
+        let input = self.input.display();
+        let lost = table.take_out(observation).with_context(|| input.to_string())?;
+        if lost == all {
+            bail!("{name} has no leakage for rows of {input} that have RR, LL, RL and LR");
+        }
+        if lost > 0 {
+            eprintln!(
+                "{name}: {lost} of {all} rows have no leakage or not all four products and are left out"
+            );
         }
         Ok(())
     }

@@ -63,6 +63,11 @@ impl Change {
         self.is_any() && self.knots.allowed == Allowed::Births
     }
 
+    /// Whether births that were found cost less than others.
+    pub(super) fn is_sharpened(&self) -> bool {
+        self.is_born() && self.sharpen.is_some()
+    }
+
     /// Whether a node of a grid, at the time of its knot, is where emission may be; above and below that, whether some of
     /// its cells are. Nodes beyond the largest radius would be a store that costs nothing: matter falls in from there.
     pub(super) fn allows(&self, position: [f64; 3], spacing: f64) -> bool {

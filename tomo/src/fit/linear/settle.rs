@@ -3,7 +3,7 @@
 use super::data::Data;
 use super::descent::{Descended, Ending};
 use super::nodes::dilated;
-use super::objective::Objective;
+use super::objective::{Objective, Penalised};
 use super::operator::Operator;
 use super::problem::LinearProblem;
 use super::run::Run;
@@ -31,6 +31,8 @@ const SETTLED: f64 = 1e-2;
 const SHINES: f64 = 1e-3;
 /// Iterations from a field that is given, for one from a dark field, where every node counts.
 const NEARBY: usize = 2;
+/// Rounds with prices of births.
+const SHARPER: usize = 6;
 
 impl Patience {
     /// Nothing but iterations over all nodes.
@@ -58,6 +60,9 @@ impl<T: Float + Default> LinearProblem<'_, T> {
     /// If a field is given that has another number of values.
     pub fn settled(&self, start: Option<&[f64]>, how: Patience) -> Result<Least, Error> {
         let data = self.data()?;
+        if self.change.is_sharpened() && data.is_convex() {
+            return self.sharpened(&data, start, how.looking);
+        }
         // A prior has something to say of every node.
         if how.rounds == 0 || self.gaussian.is_some() || !data.is_convex() {
             let iterations = if start.is_some() { NEARBY * how.looking } else { how.looking };
@@ -83,6 +88,36 @@ impl<T: Float + Default> LinearProblem<'_, T> {
             }
         }
         Ok(least)
+    }
+
+    /// The best field where births that were found cost less than others: what all cost in the first solution pulls the
+    /// field, and with it the world that is compared by it, towards few births.
+    fn sharpened(
+        &self,
+        data: &Data<'_, T>,
+        start: Option<&[f64]>,
+        iterations: usize,
+    ) -> Result<Least, Error> {
+        let first = self.least_from(start, iterations)?;
+        let most = first.x.iter().fold(0.0f64, |most, x| most.max(*x));
+        let shines = first.x.iter().map(|x| *x > SHINES * most).collect();
+        let active = self.active(&self.beside_those(shines));
+        let settings = LinearSettings { settled: SETTLED, tolerance: 0.0, ..Default::default() };
+        let operator = Operator::new(self.walk(), active, self.frames, settings.memory);
+        let mut watch = |_: &LinearProgress<'_>| ControlFlow::Continue(());
+        let mut run = Run::new(self, &settings, &mut watch);
+        let mut inner = operator.active.gather(&first.x);
+        let mut value = first.value;
+        for _ in 0..SHARPER {
+            let x = operator.active.expand(&inner);
+            let prices = self.change.prices(&x, self.voxels.shape());
+            let terms = Penalised { prices: &prices, ..self.penalised(data) };
+            let mut objective = Objective::new(&operator, data, &terms);
+            let found = run.minimise(&mut objective, &inner, iterations / 2);
+            value = objective.finite(found.value, &found.x)?;
+            inner = found.x;
+        }
+        Ok(Least { x: operator.active.expand(&inner), value })
     }
 
     /// Nodes that are not farther than one from those that are marked, and all parameters beside the nodes.

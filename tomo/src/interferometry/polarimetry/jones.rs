@@ -8,7 +8,8 @@ use std::sync::{Arc, PoisonError, RwLock};
 /// d_R and d_L of each station of an observation.
 pub type Leakage = Vec<[Complex64; 2]>;
 
-type Matrix = [[Complex64; 2]; 2];
+/// Of a station: rows and columns are R and L.
+pub type Matrix = [[Complex64; 2]; 2];
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 const ONE: Complex64 = Complex64::new(1.0, 0.0);

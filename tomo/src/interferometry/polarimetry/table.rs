@@ -1,8 +1,12 @@
 //! Tables of leakage.
 
-use super::Leakage;
+use super::jones::{Matrix, hands};
+use super::{Leakage, jones, leaked, turns};
+use crate::Error;
 use crate::interferometry::Complex64;
 use crate::interferometry::array::Station;
+use crate::interferometry::data_terms::DataTermError;
+use crate::interferometry::observation::{Basis, Observation, Row};
 
 /// Leakage of a station.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,6 +62,37 @@ impl LeakageTable {
         self.stations.iter().find(|s| s.station == station).map(|s| s.terms)
     }
 
+    /// Takes the leakage out of RR, LL, RL and LR, whose rotation of feeds has been taken out: V becomes J₁⁻¹ V J₂⁻†, and errors
+    /// are those of the sums. Rows without all four products, or with a station that is not in the table, are left out;
+    /// their number is returned.
+    ///
+    /// # Errors
+    /// If the products are Stokes parameters, or the observation does not hold what the rotation of feeds follows from.
+    pub fn take_out(&self, observation: &mut Observation) -> Result<usize, Error> {
+        if observation.basis != Basis::Circular {
+            return Err(DataTermError::NoHands.into());
+        }
+        let before = observation.rows.len();
+        let terms: Vec<_> = observation.stations.iter().map(|s| self.of(&s.name)).collect();
+        let known = |row: &Row| {
+            let has_terms = row.stations.iter().all(|k| terms[usize::from(*k)].is_some());
+            has_terms && (0..4).all(|k| row.product(k).is_some_and(|x| !x.is_placeholder()))
+        };
+        observation.rows.retain(known);
+        let turns = turns(observation)?;
+        for (row, turns) in observation.rows.iter_mut().zip(turns) {
+            let [first, second] = [0, 1].map(|k| {
+                let terms = terms[usize::from(row.stations[k])].unwrap_or_default();
+                inverse(&jones(terms, turns[k]))
+            });
+            let [rr, ll, rl, lr] = row.products;
+            row.noise_sigma = summed(row.noise_sigma, &first, &second);
+            row.products = leaked(&[[rr, rl], [lr, ll]], &first, &second);
+        }
+        observation.history.push("leakage of a table taken out".to_owned());
+        Ok(before - observation.rows.len())
+    }
+
     /// How far this leakage is from the true one; none if no station is in both.
     pub fn distance(&self, truth: &Self) -> Option<LeakageDistance> {
         let pairs = self.stations.iter().filter_map(|s| Some((s.terms, truth.of(&s.station)?)));
@@ -73,5 +108,85 @@ impl LeakageTable {
             size: rms(|(_, b)| b.norm()),
             count,
         })
+    }
+}
+
+/// The inverse of [[1, a], [b, 1]].
+fn inverse([[_, a], [b, _]]: &Matrix) -> Matrix {
+    let one = Complex64::new(1.0, 0.0);
+    let over = (one - a * b).inv();
+    [[over, -a * over], [-b * over, over]]
+}
+
+/// Standard deviations of [`leaked`] products whose parts have these and are independent.
+fn summed(sigma: [f64; 4], first: &Matrix, second: &Matrix) -> [f64; 4] {
+    [0, 1, 2, 3].map(|product| {
+        let [p, q] = hands(product);
+        let part = |k: usize| {
+            let [r, s] = hands(k);
+            (first[p][r].norm() * second[q][s].norm() * sigma[k]).powi(2)
+        };
+        (0..4).map(part).sum::<f64>().sqrt()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::interferometry::array::built_in;
+    use crate::interferometry::noise::apply_leakage;
+    use crate::interferometry::observation::Measured;
+    use crate::interferometry::source::Source;
+
+    fn observation() -> Observation {
+        let mut observation = Observation::empty(Basis::Circular);
+        observation.stations = built_in("EHT2017").unwrap().stations;
+        observation.position = Some("sgra".parse::<Source>().unwrap().position);
+        observation.mjd = Some(57850);
+        let products = [2.0, 2.1, 0.3, -0.2].map(|x| Complex64::new(x, 0.4 * x - 0.1));
+        let row = |time_h, stations| Row {
+            time_h,
+            stations,
+            products,
+            noise_sigma: [0.01, 0.02, 0.03, 0.04],
+            ..Row::total_intensity(
+                time_h,
+                stations,
+                [1e9, 2e9],
+                Measured { visibility: products[0], noise_sigma: 0.01 },
+            )
+        };
+        observation.rows = vec![row(10.0, [0, 1]), row(12.0, [1, 3]), row(12.0, [0, 3])];
+        observation
+    }
+
+    /// What is put on is taken out; errors grow by the squares of the leakage.
+    #[test]
+    fn exact_leakage_is_taken_out() {
+        let before = observation();
+        let mut after = before.clone();
+        let leakage = apply_leakage(&mut after, 0.05, 7).unwrap();
+        assert!((after.rows[1].products[2] - before.rows[1].products[2]).norm() > 0.01);
+        let table = LeakageTable::new(&after.stations, &leakage, &[], |_| true);
+        assert_eq!(table.take_out(&mut after).unwrap(), 0);
+        for (found, row) in after.rows.iter().zip(&before.rows) {
+            for k in 0..4 {
+                assert!((found.products[k] - row.products[k]).norm() < 1e-14);
+                let grown = found.noise_sigma[k] / row.noise_sigma[k];
+                assert!((grown - 1.0).abs() < 0.1 && grown != 1.0, "{grown}");
+            }
+        }
+    }
+
+    #[test]
+    fn exact_rows_without_leakage_are_left_out() {
+        let mut after = observation();
+        let leakage = vec![[Complex64::default(); 2]; after.stations.len()];
+        after.rows[0].noise_sigma[3] = f64::NAN;
+        let table = LeakageTable::new(&after.stations, &leakage, &[], |k| k != 1);
+        assert_eq!(table.take_out(&mut after).unwrap(), 2);
+        assert_eq!((after.rows.len(), after.rows[0].stations), (1, [0, 3]));
+        let mut stokes = Observation::empty(Basis::Stokes);
+        assert!(table.take_out(&mut stokes).unwrap_err().to_string().contains("circular feeds"));
     }
 }

@@ -4,6 +4,7 @@ use super::super::change::Change;
 use super::*;
 use crate::dynamics::{AngularVelocity, Velocity};
 use crate::fit::Region;
+use crate::fit::linear::Patience;
 use crate::representation::Degree;
 use crate::representation::{Allowed, Carrier, Changing};
 
@@ -162,6 +163,30 @@ fn exact_between_a_field_that_is_carried_and_one_that_is_free() {
             assert!(change.fold(0.0, f64::max) < 0.02);
         }
     }
+}
+
+/// A linear price takes light from births, so that flows with few births explain data best; where births that were found
+/// cost less, they keep it.
+#[test]
+fn exact_sharpened_births_keep_their_light() {
+    let (model, voxels) = (model(false), Voxels::cube(9, 5.0, Degree::Linear));
+    let spot = lit::spot(&voxels);
+    let truth: Vec<f64> =
+        [0.0, 0.0, 1.0, 0.0].iter().flat_map(|s| spot.iter().map(move |e| s * e)).collect();
+    let pixels = images(&model, &changing(&voxels, knots(Allowed::Births)), &truth);
+    let term = ImageTerm::new(pixels, model.pixels(), 1e-3).unwrap();
+    let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
+    let found = |sharpen| {
+        let change = Change { weight: 100.0, sharpen, ..births() };
+        let problem = LinearProblem { change, upper: 2.0, ..of_images(&model, &terms, voxels) };
+        let least = problem.settled(None, Patience::looking(150)).unwrap();
+        // What is there from the beginning has no price.
+        let light: f64 = least.x[voxels.count()..].iter().sum();
+        (light / truth.iter().sum::<f64>(), problem.misfit(&least.x).unwrap())
+    };
+    let ((plain, left), (sharp, rest)) = (found(None), found(Some(0.02)));
+    assert!(plain < 0.85 && sharp > 0.9 && sharp < 1.0, "{plain} {sharp}");
+    assert!(rest < 0.2 * left, "{rest} {left}");
 }
 
 /// Births are found where emission may be and nowhere else, and the certificate is one of such fields.
