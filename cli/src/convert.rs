@@ -22,7 +22,7 @@ pub struct Convert {
     #[arg(value_name = "OUTPUT.uvfits|.txt|.csv")]
     output: PathBuf,
     /// Write the light curve that baselines within a site (ALMA-APEX, JCMT-SMA) have measured: I, Q, U, V as CSV
-    #[arg(long, conflicts_with_all = ["format", "comments", "stokes_i"])]
+    #[arg(long, conflicts_with_all = ["format", "stokes_i"])]
     light_curve: bool,
     /// Write closure traces as CSV, of baselines whose Stokes I is stronger than this many times its noise
     #[arg(long, value_name = "LEAST-SNR", allow_negative_numbers = true)]
@@ -216,7 +216,9 @@ impl Convert {
         }
         let output = Output::or_pipe(&self.output, &["csv"])?;
         output.spares(&self.input)?;
-        output.write(files::light_curve_to_csv(&curve).as_bytes())?;
+        let comments =
+            if self.comments { files::observation_comments(observation) } else { String::new() };
+        output.write((comments + &files::light_curve_to_csv(&curve)).as_bytes())?;
         let count = curve.samples.len();
         eprintln!("{count} samples");
         Ok(written(&output).with("samples", count))

@@ -2,7 +2,7 @@
 //! [`crate::eht_data`] do: light curves beside numbers that another program reads, and data that survive being written.
 
 use crate::eht_data::folder;
-use crate::support::succeed;
+use crate::support::{kerrlight, succeed};
 use kerrlight_tomo::interferometry::files;
 
 const NIGHTS: [&str; 2] = ["096", "097"];
@@ -155,9 +155,53 @@ fn exact_polarized_nights_survive_a_round_trip() {
         for (a, b) in data.rows.iter().zip(&again.rows) {
             assert_eq!((a.stations, a.products), (b.stations, b.products));
             assert!((a.time_h - b.time_h).abs() < 1e-6, "{} {}", a.time_h, b.time_h);
+            let apart = (a.uv[0] - b.uv[0]).hypot(a.uv[1] - b.uv[1]);
+            assert!(apart <= 1e-6 * a.uv[0].hypot(a.uv[1]), "{:?} {:?}", a.uv, b.uv);
             for (a, b) in a.noise_sigma.iter().zip(b.noise_sigma) {
                 assert!(a.is_nan() && b.is_nan() || (a / b - 1.0).abs() < 1e-7, "{a} {b}");
             }
         }
+    }
+}
+
+/// The comments above a light curve tell `fit --data` the source.
+#[test]
+fn exact_a_light_curve_keeps_its_source() {
+    let Some(paths) = nights() else { return };
+    let here = tempfile::tempdir().unwrap();
+    let file = paths[1].to_str().unwrap();
+    succeed(here.path(), &["convert", file, "c.csv", "--light-curve", "--comments"]);
+    let told = succeed(here.path(), &["fit", "--data", "c.csv", "--print"]);
+    assert!(told.contains("mass_msun = 4154000.0"), "{told}");
+}
+
+/// No leakage changes nothing, and that of one station the products of its baselines alone; what has a station that is not in
+/// the table is left out and counted.
+#[test]
+fn exact_leakage_of_a_table_is_taken_out_of_a_night() {
+    let Some(paths) = nights() else { return };
+    let here = tempfile::tempdir().unwrap();
+    let file = paths[1].to_str().unwrap();
+    let read = |path: &std::path::Path| files::decode(&std::fs::read(path).unwrap()).unwrap().1;
+    let before = read(&paths[1]);
+    let station = |name: &str| before.stations.iter().position(|s| s.name == name).unwrap() as u16;
+    let (alma, lmt) = (station("AA"), station("LM"));
+    let cleaned = |of_alma: f64, name: &str| {
+        let heading = "station,d_r_re,d_r_im,d_r_error,d_l_re,d_l_im,d_l_error";
+        let others = ["AP", "AZ", "PV", "SM", "SP"].map(|name| format!("{name},0,0,,0,0,\n"));
+        let table = format!("{heading}\nAA,{of_alma},0,,0,0,\n{}", others.concat());
+        std::fs::write(here.path().join("leakage.csv"), table).unwrap();
+        let output = kerrlight(here.path(), &["convert", file, name, "--leakage", "leakage.csv"]);
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success() && told.contains("rows have no leakage"), "{told}");
+        read(&here.path().join(name))
+    };
+    let (same, moved) = (cleaned(0.0, "same.uvfits"), cleaned(0.05, "moved.uvfits"));
+    let kept: Vec<_> = before.rows.iter().filter(|row| !row.stations.contains(&lmt)).collect();
+    assert_eq!((same.rows.len(), moved.rows.len()), (kept.len(), kept.len()));
+    for ((before, same), moved) in kept.into_iter().zip(&same.rows).zip(&moved.rows) {
+        assert_eq!(before.products, same.products);
+        let change = (same.products[2] - moved.products[2]).norm();
+        assert_eq!(change > 0.0, before.stations.contains(&alma), "{before:?}");
     }
 }

@@ -108,7 +108,7 @@ pub fn of_light_curve(
 fn mass(source: Option<&Source>) -> String {
     match source {
         Some(of) => format!("mass_msun = {:?} #! {}", of.mass_msun, of.mass),
-        None => "#? mass_msun = 4.154e6 # a light curve does not name its source; this is Sgr A* (GRAVITY Collaboration 2019, A&A 625, L10)".to_owned(),
+        None => "#? mass_msun = 4.154e6 # neither the file's name nor a line `# source: SGRA` above its table names a source; this is Sgr A* (GRAVITY Collaboration 2019, A&A 625, L10)".to_owned(),
     }
 }
 

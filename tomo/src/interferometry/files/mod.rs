@@ -13,6 +13,7 @@ mod obs_text;
 mod table;
 mod uvfits;
 
+pub use comments::write as observation_comments;
 pub use eht_table::{EhtTable, to_eht_table};
 pub use fits_image::read as read_fits_image;
 pub use gains::{COLUMNS as GAIN_COLUMNS, parse as parse_gains, to_csv as gains_to_csv};
