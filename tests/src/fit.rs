@@ -158,15 +158,19 @@ fn exact_same_bytes_after_kills_of_emission_that_changes() {
     killed(&["training.steps=60", change, mask], 8);
 }
 
-/// Kills a run with these settings at that many moments at least; what goes on ends like what was never killed.
 fn killed(set: &[&str], moments: u32) {
-    let (small, folder) = (small(), tempfile::tempdir().unwrap());
+    killed_fit(&small(), set, moments);
+}
+
+/// Kills a run with these settings at that many moments at least; what goes on ends like what was never killed.
+pub fn killed_fit(words: &[String], set: &[&str], moments: u32) {
+    let folder = tempfile::tempdir().unwrap();
     let mut often = vec!["--set", "training.checkpoint_seconds=0.02"];
     set.iter().for_each(|change| often.extend(["--set", change]));
     let clock = Instant::now();
-    succeed(folder.path(), &with(&small, &[&often[..], &["-o", "whole"]].concat()));
+    succeed(folder.path(), &with(words, &[&often[..], &["-o", "whole"]].concat()));
     let taken = clock.elapsed();
-    let begin = with(&small, &[&often[..], &["-o", "killed"]].concat());
+    let begin = with(words, &[&often[..], &["-o", "killed"]].concat());
     let (mut gone_on, mut kills) = (0, 0);
     // A busy machine is slower than it was: more kills until enough of them hit a run that had gone on.
     while kills < moments || (gone_on < moments / 2 && kills < 200) {

@@ -1,5 +1,6 @@
 //! Fits that do not know the world.
 
+use crate::fit::killed_fit;
 use crate::support::{kerrlight, root, succeed};
 use serde_json::Value;
 
@@ -49,6 +50,17 @@ fn exact_inclination_and_position_angle_are_found_from_visibilities() {
     let again = kerrlight(folder.path(), &["fit", "--resume", "run"]);
     assert!(again.status.success(), "{}", String::from_utf8_lossy(&again.stderr));
     assert_eq!(first, std::fs::read(folder.path().join("run/world.json")).unwrap());
+}
+
+/// The search begins again, the fit goes on.
+#[test]
+#[ignore = "long"]
+fn exact_same_bytes_after_kills_of_an_unknown_world() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("fit.toml");
+    std::fs::write(&file, settings(12)).unwrap();
+    let words = vec!["fit".to_owned(), file.to_str().unwrap().to_owned()];
+    killed_fit(&words, &["training.steps=400"], 8);
 }
 
 /// Two flares in a flow that turns slower inside and faster outside than the profile of the settings says.
@@ -158,8 +170,19 @@ fn exact_impossible_priors_are_refused_before_anything_is_written() {
             "world.inclination_deg.scanned.points = 1 is not allowed: 2 to 1000",
         ),
         ("world.inclination_deg={scanned={from=80.0,to=40.0,points=5}}", "high"),
+        (
+            "linear= representation.kind=grid training.start=drawn",
+            "world.search: linear is missing",
+        ),
+        // Without a shift of frequencies its power is no parameter.
+        (
+            "world.redshift_power={uniform=[1.0,3.0]} effects.redshift_power=",
+            "world.redshift_power: no data depend on it",
+        ),
     ] {
-        let run = kerrlight(folder.path(), &["fit", "fit.toml", "-o", "run", "--set", change]);
+        let mut words = vec!["fit", "fit.toml", "-o", "run"];
+        change.split(' ').for_each(|change| words.extend(["--set", change]));
+        let run = kerrlight(folder.path(), &words);
         let told = String::from_utf8_lossy(&run.stderr).into_owned();
         assert_eq!(run.status.code(), Some(2), "{change}: {told}");
         assert!(told.contains(expected), "{change}: {told}");

@@ -344,6 +344,12 @@ impl FitFile {
             );
             return Err(FitError::Conflict(why).into());
         }
+        if is_free(&Parameter::RedshiftPower) && self.effects.redshift_power.is_none() {
+            let why = "world.redshift_power: no data depend on it without effects.redshift_power, which lets emission \
+                       shift"
+                .to_owned();
+            return Err(FitError::Conflict(why).into());
+        }
         self.check_drag(&world)?;
         Ok(Some(world))
     }

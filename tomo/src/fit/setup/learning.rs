@@ -297,6 +297,9 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
     if file.representation.kind == Kind::LinearGrid || file.training.start != Start::Drawn {
         linear(file)?;
     }
+    if file.unknown_world()?.is_some() {
+        linear(file).within("world.search")?;
+    }
     check_prior(file)?;
     enough_nodes_and_iterations(file)?;
     Ok(file.simulated().map(drop)?)

@@ -159,7 +159,9 @@ pub fn hours_per_m(file: &FitFile) -> Result<f64> {
 /// If they are missing.
 pub fn linear(file: &FitFile) -> Result<&Linear> {
     let missing = || {
-        let why = format!("linear-grid, a linear start and a scan of axes need it; {LINEAR}");
+        let why = format!(
+            "linear-grid, a linear start, and searches for axes and worlds need it; {LINEAR}"
+        );
         FitError::missing("linear", why)
     };
     let linear = file.linear.as_ref().ok_or_else(missing)?;
