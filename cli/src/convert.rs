@@ -88,8 +88,7 @@ impl Convert {
     pub fn run(&self) -> anyhow::Result<Answer> {
         let output = ObservationFile::new(&self.output, self.format, self.comments)?;
         output.spares(&self.input)?;
-        let tables = self.gains.iter().chain(&self.leakage);
-        tables.into_iter().try_for_each(|table| output.spares(table))?;
+        self.gains.iter().chain(&self.leakage).try_for_each(|table| output.spares(table))?;
         if let Some(seconds) = self.average.filter(|s| !(*s > 0.0 && s.is_finite())) {
             bail!("--average {seconds} is not allowed: positive seconds");
         }
@@ -111,7 +110,7 @@ impl Convert {
         let selection = flags.apply(&observation);
         let mut observation = selection.observation;
         self.calibrate(&mut observation)?;
-        self.clean(&mut observation)?;
+        self.correct_leakage(&mut observation)?;
         if self.stokes_i {
             observation = observation.total_intensity();
         }
@@ -163,7 +162,7 @@ impl Convert {
     }
 
     /// Takes the leakage of a table out.
-    fn clean(&self, observation: &mut Observation) -> anyhow::Result<()> {
+    fn correct_leakage(&self, observation: &mut Observation) -> anyhow::Result<()> {
         let Some(path) = &self.leakage else { return Ok(()) };
         let name = path.display().to_string();
         let table = files::parse_leakage(&output::read_text(path)?).context(name.clone())?;

@@ -102,7 +102,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         let most = first.x.iter().fold(0.0f64, |most, x| most.max(*x));
         let shines = first.x.iter().map(|x| *x > SHINES * most).collect();
         let active = self.active(&self.beside_those(shines));
-        let settings = LinearSettings { settled: SETTLED, tolerance: 0.0, ..Default::default() };
+        let settings = settling();
         let operator = Operator::new(self.walk(), active, self.frames, settings.memory);
         let mut watch = |_: &LinearProgress<'_>| ControlFlow::Continue(());
         let mut run = Run::new(self, &settings, &mut watch);
@@ -137,7 +137,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         x: &[f64],
         iterations: usize,
     ) -> Result<Round, Error> {
-        let settings = LinearSettings { settled: SETTLED, tolerance: 0.0, ..Default::default() };
+        let settings = settling();
         let mut watch = |_: &LinearProgress<'_>| ControlFlow::Continue(());
         let mut run = Run::new(self, &settings, &mut watch);
         let active = self.active(is_active);
@@ -151,6 +151,11 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         let gradient = self.only_allowed(objective.everywhere(&inner).1);
         Ok(Round { least: Least { x: operator.active.expand(&inner), value }, ending, gradient })
     }
+}
+
+/// Of iterations that end where they hardly lower the function.
+fn settling() -> LinearSettings {
+    LinearSettings { settled: SETTLED, tolerance: 0.0, ..LinearSettings::default() }
 }
 
 /// The largest violation of the conditions for a minimum among the nodes that count, or among the others.

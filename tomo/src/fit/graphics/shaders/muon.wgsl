@@ -35,6 +35,8 @@ struct Turn {
 
 const TILE: u32 = 16u;
 const GROUP: u32 = 256u;
+// One over a smaller number may be none.
+const SMALLEST = 1e-37;
 
 // Renews the mean gradient; X is where it will be after one more step of the same gradient.
 @compute @workgroup_size(64)
@@ -72,7 +74,7 @@ fn normalise(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     }
     largest = squares[0];
     workgroupBarrier();
-    let unit = select(1.0 / largest, 0.0, largest == 0.0);
+    let unit = select(1.0 / largest, 0.0, largest < SMALLEST);
     var sum = 0.0;
     for (var k = at; k < count; k += GROUP) {
         let x = work[matrix.places.x + k] * unit;
@@ -86,7 +88,7 @@ fn normalise(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
         }
         workgroupBarrier();
     }
-    let scale = select(unit / sqrt(squares[0]), 0.0, largest == 0.0);
+    let scale = select(unit / sqrt(squares[0]), 0.0, largest < SMALLEST);
     for (var k = at; k < count; k += GROUP) {
         work[matrix.places.x + k] *= scale;
     }
