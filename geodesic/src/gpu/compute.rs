@@ -2,8 +2,10 @@
 
 use super::device::{Adapter, Device, Mapped, Needs};
 use super::error::GpuError;
-use super::kernel::{copy, readable};
+use super::kernel::{copy, loops_that_end, readable};
+use super::times::{KernelTime, Stopwatch};
 use std::borrow::Cow;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// An open device for shaders of one's own.
 ///
@@ -25,6 +27,8 @@ use std::borrow::Cow;
 #[derive(Debug)]
 pub struct Compute {
     device: Device,
+    /// What kernels took, while they are timed.
+    times: Mutex<Option<Vec<KernelTime>>>,
 }
 
 /// Memory of the device.
@@ -37,12 +41,14 @@ pub struct Buffer {
 #[derive(Debug)]
 pub struct Kernel {
     pipeline: wgpu::ComputePipeline,
+    entry: Arc<str>,
 }
 
 /// An entry point with the buffers that it works on.
 #[derive(Debug)]
 pub struct Bound {
     pipeline: wgpu::ComputePipeline,
+    entry: Arc<str>,
     groups: wgpu::BindGroup,
 }
 
@@ -50,20 +56,57 @@ pub struct Bound {
 #[derive(Debug)]
 pub struct Commands {
     encoder: wgpu::CommandEncoder,
+    /// Kernels in a row share a pass.
+    pass: Option<wgpu::ComputePass<'static>>,
+    stopwatch: Option<Stopwatch>,
 }
 
 impl Commands {
+    fn new(device: &Device, is_timed: bool) -> Self {
+        let descriptor = wgpu::CommandEncoderDescriptor::default();
+        Self {
+            encoder: device.inner.create_command_encoder(&descriptor),
+            pass: None,
+            stopwatch: is_timed.then(|| Stopwatch::new(device)),
+        }
+    }
+
     /// Runs a kernel on so many workgroups, columns and rows; what it writes the next one sees.
     pub fn dispatch(&mut self, bound: &Bound, groups: [u32; 2]) {
-        let mut pass = self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-        pass.set_pipeline(&bound.pipeline);
-        pass.set_bind_group(0, &bound.groups, &[]);
-        pass.dispatch_workgroups(groups[0], groups[1], 1);
+        let Self { encoder, pass, stopwatch } = self;
+        if let Some(stopwatch) = stopwatch {
+            // A pass of its own for each, whose ends are timed.
+            let mut timed = stopwatch.begin(encoder, &bound.entry);
+            return bound.dispatch(&mut timed, groups);
+        }
+        let pass = pass.get_or_insert_with(|| {
+            encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()).forget_lifetime()
+        });
+        bound.dispatch(pass, groups);
     }
 
     /// Makes all bytes of a buffer 0.
     pub fn clear(&mut self, buffer: &Buffer) {
+        self.pass = None;
         self.encoder.clear_buffer(&buffer.inner, 0, None);
+    }
+
+    fn submit(mut self, device: &Device) -> Option<Stopwatch> {
+        // The end of a pass is written when it is dropped.
+        self.pass = None;
+        if let Some(stopwatch) = &self.stopwatch {
+            stopwatch.end(&mut self.encoder);
+        }
+        device.queue.submit([self.encoder.finish()]);
+        self.stopwatch
+    }
+}
+
+impl Bound {
+    fn dispatch(&self, pass: &mut wgpu::ComputePass<'_>, groups: [u32; 2]) {
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &self.groups, &[]);
+        pass.dispatch_workgroups(groups[0], groups[1], 1);
     }
 }
 
@@ -73,7 +116,7 @@ impl Compute {
     /// # Errors
     /// If it refuses, or its limits are too small.
     pub fn open(adapter: &Adapter, needs: Needs) -> Result<Self, GpuError> {
-        Ok(Self { device: Device::open(adapter, needs)? })
+        Ok(Self { device: Device::open(adapter, needs)?, times: Mutex::default() })
     }
 
     /// The name of the device.
@@ -134,11 +177,44 @@ impl Compute {
     /// # Errors
     /// What the compiler says.
     pub fn kernels(&self, source: &str, entries: &[&str]) -> Result<Vec<Kernel>, GpuError> {
+        let checks = wgpu::ShaderRuntimeChecks::checked();
+        // SAFETY: with all checks no shader can do harm.
+        unsafe { self.compiled(source, entries, checks) }
+    }
+
+    /// Like [`kernels`](Self::kernels), without the counter in each loop by which one that does not end is ended: a
+    /// network's kernels then take three quarters of the time.
+    ///
+    /// # Safety
+    /// All loops of the shader have to end.
+    ///
+    /// # Errors
+    /// What the compiler says.
+    pub unsafe fn kernels_whose_loops_end(
+        &self,
+        source: &str,
+        entries: &[&str],
+    ) -> Result<Vec<Kernel>, GpuError> {
+        // SAFETY: loops end, as the caller says.
+        unsafe { self.compiled(source, entries, loops_that_end()) }
+    }
+
+    /// # Safety
+    /// Without the checks that are not made, the shader does no harm.
+    unsafe fn compiled(
+        &self,
+        source: &str,
+        entries: &[&str],
+        checks: wgpu::ShaderRuntimeChecks,
+    ) -> Result<Vec<Kernel>, GpuError> {
         self.device.attempt(0, || {
-            let module = self.device.inner.create_shader_module(wgpu::ShaderModuleDescriptor {
+            let descriptor = wgpu::ShaderModuleDescriptor {
                 label: None,
                 source: wgpu::ShaderSource::Wgsl(Cow::Borrowed(source)),
-            });
+            };
+            // SAFETY: as the caller says.
+            let module =
+                unsafe { self.device.inner.create_shader_module_trusted(descriptor, checks) };
             let kernel = |entry: &&str| {
                 let descriptor = wgpu::ComputePipelineDescriptor {
                     label: Some(entry),
@@ -148,7 +224,8 @@ impl Compute {
                     compilation_options: wgpu::PipelineCompilationOptions::default(),
                     cache: None,
                 };
-                Kernel { pipeline: self.device.inner.create_compute_pipeline(&descriptor) }
+                let pipeline = self.device.inner.create_compute_pipeline(&descriptor);
+                Kernel { pipeline, entry: Arc::from(*entry) }
             };
             entries.iter().map(kernel).collect()
         })
@@ -172,7 +249,8 @@ impl Compute {
                 layout: &kernel.pipeline.get_bind_group_layout(0),
                 entries: &entries,
             });
-            Bound { pipeline: kernel.pipeline.clone(), groups }
+            let Kernel { pipeline, entry } = kernel;
+            Bound { pipeline: pipeline.clone(), entry: entry.clone(), groups }
         })
     }
 
@@ -181,13 +259,32 @@ impl Compute {
     /// # Errors
     /// If the device fails.
     pub fn run(&self, record: impl FnOnce(&mut Commands)) -> Result<(), GpuError> {
-        self.device.attempt(0, || {
-            let descriptor = wgpu::CommandEncoderDescriptor::default();
-            let mut commands =
-                Commands { encoder: self.device.inner.create_command_encoder(&descriptor) };
+        let mut times = self.times.lock().unwrap_or_else(PoisonError::into_inner);
+        let stopwatch = self.device.attempt(0, || {
+            let mut commands = Commands::new(&self.device, times.is_some());
             record(&mut commands);
-            self.device.queue.submit([commands.encoder.finish()]);
-        })
+            commands.submit(&self.device)
+        })?;
+        if let (Some(times), Some(stopwatch)) = (&mut *times, stopwatch) {
+            times.extend(stopwatch.read(&self.device)?);
+        }
+        Ok(())
+    }
+
+    /// From now on what kernels take is measured by the device's clock, up to [`times`](Self::times). Each
+    /// [`run`](Self::run) then waits until it is done.
+    ///
+    /// # Errors
+    /// If the device has no clock.
+    pub fn start_timing(&self) -> Result<(), GpuError> {
+        Stopwatch::check(&self.device)?;
+        *self.times.lock().unwrap_or_else(PoisonError::into_inner) = Some(Vec::new());
+        Ok(())
+    }
+
+    /// What kernels took since [`start_timing`](Self::start_timing), in their order; they are timed no longer.
+    pub fn times(&self) -> Vec<KernelTime> {
+        self.times.lock().unwrap_or_else(PoisonError::into_inner).take().unwrap_or_default()
     }
 
     /// The bytes of buffers once all commands are done.

@@ -183,7 +183,12 @@ impl Device {
     pub fn open(adapter: &Adapter, needs: Needs) -> Result<Self, GpuError> {
         let largest = adapter.largest_buffer();
         let limits = needs.within(&adapter.inner.limits())?;
-        let descriptor = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
+        let descriptor = wgpu::DeviceDescriptor {
+            required_limits: limits,
+            // A clock, where there is one.
+            required_features: adapter.inner.features() & wgpu::Features::TIMESTAMP_QUERY,
+            ..Default::default()
+        };
         let (inner, queue) = wait(adapter.inner.request_device(&descriptor))
             .map_err(|error| GpuError::Refused(error.to_string()))?;
         let trouble = Arc::default();

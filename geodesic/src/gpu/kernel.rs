@@ -25,6 +25,11 @@ pub(super) struct Program {
     entries: Vec<wgpu::ComputePipeline>,
 }
 
+/// What is checked in shaders whose loops end by themselves.
+pub(super) fn loops_that_end() -> wgpu::ShaderRuntimeChecks {
+    wgpu::ShaderRuntimeChecks { force_loop_bounding: false, ..wgpu::ShaderRuntimeChecks::checked() }
+}
+
 /// Invocations of a workgroup.
 pub(super) const WORKGROUP: u32 = 64;
 
@@ -55,10 +60,13 @@ impl Program {
         bindings: &[Binding<'_>],
     ) -> Result<Self, GpuError> {
         device.attempt(0, || {
-            let module = device.inner.create_shader_module(wgpu::ShaderModuleDescriptor {
+            let descriptor = wgpu::ShaderModuleDescriptor {
                 label: None,
                 source: wgpu::ShaderSource::Wgsl(Cow::Borrowed(source)),
-            });
+            };
+            // SAFETY: the shaders of this crate have loops over a counter alone.
+            let module =
+                unsafe { device.inner.create_shader_module_trusted(descriptor, loops_that_end()) };
             let layout = layout(device, bindings);
             let entries = entries.iter().map(|entry| pipeline(device, &module, &layout, entry));
             Program { entries: entries.collect(), layout }

@@ -11,9 +11,11 @@ mod error;
 mod kernel;
 mod paths;
 mod sums;
+mod times;
 mod tracer;
 
 pub use compute::{Bound, Buffer, Commands, Compute, Kernel};
 pub use device::{Adapter, Needs, adapter, adapters};
 pub use error::GpuError;
+pub use times::KernelTime;
 pub use tracer::GpuTracer;

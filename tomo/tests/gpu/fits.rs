@@ -193,7 +193,7 @@ impl StepDevice<f32> for Fragile {
         from: &kerrlight_tomo::fit::Progress<f32>,
     ) -> Result<Taken<f32>, Error> {
         if self.left == 0 {
-            self.fit.lose();
+            self.fit.device().lose();
         }
         self.left = self.left.saturating_sub(1);
         self.fit.take(stretch, from)

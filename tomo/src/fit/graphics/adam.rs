@@ -1,6 +1,7 @@
 //! Adam on the device.
 
 use super::bytes::{floats, words};
+use super::kernels::compiled;
 use crate::representation::WeightMatrix;
 use kerrlight_geodesic::gpu::{Bound, Buffer, Commands, Compute, GpuError};
 
@@ -49,7 +50,7 @@ impl Learning {
         let storage = || device.storage(4 * count as u64);
         let (parameters, gradient, moments) = (storage()?, storage()?, [storage()?, storage()?]);
         let rule = device.uniform(&[0; 48])?;
-        let kernels = device.kernels(include_str!("shaders/adam.wgsl"), &["learn"])?;
+        let kernels = compiled(device, include_str!("shaders/adam.wgsl"), &["learn"])?;
         let left_out = device.storage(4 * count.div_ceil(32) as u64)?;
         device.write(&left_out, &words(&bits(count, others)))?;
         let buffers = [&rule, &gradient, &moments[0], &moments[1], &parameters, &left_out];

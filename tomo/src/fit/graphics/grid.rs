@@ -1,6 +1,7 @@
 //! Grids on the device: voxels, and features that a network turns into emission.
 
 use super::bytes::words;
+use super::kernels::compiled;
 use super::network::{Network, Task, run};
 use super::pixels::Points;
 use kerrlight_geodesic::gpu::{Buffer, Commands, Compute, GpuError, Kernel};
@@ -145,7 +146,7 @@ impl Voxels {
         (parameters, gradient): (&Buffer, &Buffer),
     ) -> Result<Self, GpuError> {
         let source = [ACTIVATIONS, SHADER].join("\n");
-        let kernels = &device.kernels(&source, &ENTRIES)?[..];
+        let kernels = &compiled(device, &source, &ENTRIES)?[..];
         let block = &device.uniform(&words(&[0, points.room as u32, 0, 0]))?;
         let (slopes, peak) = (&device.storage(4 * points.room as u64)?, &device.storage(4)?);
         let sums = [peak, &device.storage(8 * levels.parameters() as u64)?];
@@ -199,7 +200,7 @@ impl Features {
         (parameters, gradient): (&Buffer, &Buffer),
     ) -> Result<Self, GpuError> {
         let source = [ACTIVATIONS, SHADER].join("\n");
-        let kernels = &device.kernels(&source, &ENTRIES)?[..];
+        let kernels = &compiled(device, &source, &ENTRIES)?[..];
         let sums = [&device.storage(4)?, &device.storage(8 * levels.parameters() as u64)?];
         let uniforms = levels.uniforms(device)?;
         let (rows, slopes) = (&network.memory.rows, &network.memory.slopes[network.of_inputs]);

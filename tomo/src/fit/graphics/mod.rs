@@ -15,9 +15,11 @@ mod bytes;
 mod fall;
 mod field;
 mod grid;
+mod kernels;
 mod muon;
 mod network;
 mod pixels;
+mod refusals;
 mod rooms;
 mod terms;
 
@@ -32,10 +34,11 @@ use crate::representation::Representation;
 use adam::{Learning, Rule};
 use fall::FallTable;
 use field::Field;
-use kerrlight_geodesic::gpu::{Adapter, Compute, GpuError, Needs};
+use kerrlight_geodesic::gpu::{Adapter, Commands, Compute, GpuError, Needs};
 use muon::Turning;
 use pixels::{Gathering, Node, Pair, Pixels};
-use rooms::Pieces;
+pub use refusals::check;
+use rooms::{Ends, Pieces, pieces};
 
 impl From<GpuError> for Error {
     fn from(error: GpuError) -> Self {
@@ -49,7 +52,7 @@ impl From<GpuError> for Error {
 /// If it refuses, or its limits are too small.
 pub fn open(adapter: &Adapter) -> Result<Compute, GpuError> {
     let needs =
-        Needs { invocations: 256, workgroup_bytes: 8704, buffers: 8, buffer_bytes: 1 << 24 };
+        Needs { invocations: 256, workgroup_bytes: 12288, buffers: 8, buffer_bytes: 1 << 24 };
     Compute::open(adapter, needs)
 }
 
@@ -138,15 +141,15 @@ impl GraphicsFit {
         from: &Progress<f32>,
     ) -> Result<(Loss, Vec<f32>), Error> {
         self.load(stretch, from)?;
-        let pending = self.loss(stretch, 0)?;
+        let pending = self.loss(stretch, 0, false)?;
         let read = self.device.read(&[self.pixels.records(), &self.learning.gradient])?;
         let loss = pending.ended(&bytes::read(&read[0], 2));
         Ok((loss, bytes::read(&read[1], from.parameters.len())))
     }
 
-    /// Gives the device up, as if it were unplugged: for tests.
-    pub fn lose(&self) {
-        self.device.lose();
+    /// The device.
+    pub fn device(&self) -> &Compute {
+        &self.device
     }
 
     /// Puts what a stretch starts from there.
@@ -178,10 +181,13 @@ impl GraphicsFit {
         device.run(|commands| pixels.forget(commands))
     }
 
-    /// Has the device find loss and gradient of step number `k` of a stretch.
-    fn loss(&self, stretch: &Stretch<'_, f32>, k: usize) -> Result<Pending, GpuError> {
-        let Self { device, learning, .. } = self;
-        device.run(|commands| commands.clear(&learning.gradient))?;
+    /// Has the device find loss and gradient of step number `k` of a stretch, and take the step if it `learns`.
+    fn loss(
+        &self,
+        stretch: &Stretch<'_, f32>,
+        k: usize,
+        learns: bool,
+    ) -> Result<Pending, GpuError> {
         match (&stretch.draws[k], &stretch.objective.data.image) {
             (Drawn::Pixels(pairs), Some(image)) => {
                 let model = &stretch.objective.model;
@@ -189,8 +195,8 @@ impl GraphicsFit {
                 let variance = f64::from(image.term.inverse_variance());
                 let scale = rays * variance / pairs.len() as f64;
                 let slope = (2.0 * image.weight * scale) as f32;
-                for some in pairs.chunks(self.pieces.pairs) {
-                    self.images(stretch, some, (slope, k), &image.term)?;
+                for (some, ends) in pieces(pairs, self.pieces.pairs, learns) {
+                    self.images(stretch, some, (slope, k), &image.term, ends)?;
                 }
                 Ok(Pending::Squares { scale, dark: 0.0, weight: image.weight })
             }
@@ -199,14 +205,14 @@ impl GraphicsFit {
                 let scale = 1.0 / stretch.objective.data_of(&*image.term, frames.len());
                 let factor = (image.weight * scale) as f32;
                 let slope = (factor + factor) * variance;
-                for some in frames.chunks(self.pieces.frames) {
-                    self.images(stretch, &pairs_of(stretch, some), (slope, k), &image.term)?;
+                for (some, ends) in pieces(frames, self.pieces.frames, learns) {
+                    self.images(stretch, &pairs_of(stretch, some), (slope, k), &image.term, ends)?;
                 }
                 let dark = frames.iter().map(|frame| self.in_the_dark(&image.term, *frame)).sum();
                 let scale = scale * f64::from(variance);
                 Ok(Pending::Squares { scale, dark, weight: image.weight })
             }
-            (Drawn::Frames(frames), _) => self.frames(stretch, frames, k),
+            (Drawn::Frames(frames), _) => self.frames(stretch, frames, k, learns),
             // Without images there are no pairs to draw.
             (Drawn::Pixels(_), None) => Ok(Pending::Known(Loss::default())),
         }
@@ -219,6 +225,7 @@ impl GraphicsFit {
         pairs: &[(u32, u32)],
         (slope, record): (f32, usize),
         term: &ImageTerm<f32>,
+        ends: Ends,
     ) -> Result<(), GpuError> {
         let Self { device, pixels, field, .. } = self;
         let model = &stretch.objective.model;
@@ -226,11 +233,13 @@ impl GraphicsFit {
             |ray: u32, frame: u32| term.pixel(frame as usize, model.pixel[ray as usize] as usize);
         let points = self.set(stretch, pairs, &datum, (slope, record))?;
         device.run(|commands| {
+            self.begin(commands, ends);
             pixels.gather(commands, pairs.len());
             field.forward(commands, points);
             pixels.sum(commands, pairs.len());
             pixels.spread(commands, pairs.len());
             field.backward(commands, points);
+            self.end(commands, ends);
         })
     }
 
@@ -240,14 +249,16 @@ impl GraphicsFit {
         stretch: &Stretch<'_, f32>,
         frames: &[usize],
         record: usize,
+        learns: bool,
     ) -> Result<Pending, GpuError> {
         let Self { device, pixels, field, .. } = self;
         let objective = stretch.objective;
         let mut loss = objective.empty_loss();
-        for some in frames.chunks(self.pieces.frames) {
+        for (some, ends) in pieces(frames, self.pieces.frames, learns) {
             let pairs = pairs_of(stretch, some);
             let points = self.set(stretch, &pairs, &|_, _| 0.0, (0.0, record))?;
             device.run(|commands| {
+                self.begin(commands, ends);
                 pixels.gather(commands, pairs.len());
                 field.forward(commands, points);
                 pixels.sum(commands, pairs.len());
@@ -262,10 +273,26 @@ impl GraphicsFit {
             device.run(|commands| {
                 pixels.spread(commands, pairs.len());
                 field.backward(commands, points);
+                self.end(commands, ends);
             })?;
         }
         objective.add_terms(&mut loss);
         Ok(Pending::Known(loss))
+    }
+
+    /// Before the first piece of a step.
+    fn begin(&self, commands: &mut Commands, ends: Ends) {
+        if ends.is_first {
+            commands.clear(&self.learning.gradient);
+        }
+    }
+
+    /// Behind the last piece of a step that is taken.
+    fn end(&self, commands: &mut Commands, ends: Ends) {
+        if ends.is_last_and_learns {
+            self.learning.learn(commands);
+            self.turning.iter().for_each(|turning| turning.learn(commands));
+        }
     }
 
     /// Puts pairs there; the most points that they can have.
@@ -319,16 +346,12 @@ impl StepDevice<f32> for GraphicsFit {
         let Self { device, pixels, learning, turning, .. } = &*self;
         let mut pending = Vec::with_capacity(stretch.draws.len());
         for (k, rate) in stretch.rates.iter().enumerate() {
-            pending.push(self.loss(stretch, k)?);
             let adam = stretch.adam;
             let (beta, epsilon) = ([adam.beta1, adam.beta2], adam.epsilon);
             let steps = from.adam.steps + k as u64 + 1;
             learning.set(device, Rule { beta, epsilon, rate: *rate, steps })?;
             turning.as_ref().map_or(Ok(()), |turning| turning.set(device, *rate))?;
-            device.run(|commands| {
-                learning.learn(commands);
-                turning.iter().for_each(|turning| turning.learn(commands));
-            })?;
+            pending.push(self.loss(stretch, k, true)?);
         }
         let [parameters, first, second] = learning.buffers();
         let read = device.read(&[parameters, first, second, pixels.records()])?;
@@ -360,32 +383,4 @@ impl Pending {
 fn pairs_of(stretch: &Stretch<'_, f32>, frames: &[usize]) -> Vec<(u32, u32)> {
     let rays = stretch.objective.model.rays() as u32;
     frames.iter().flat_map(|frame| (0..rays).map(|ray| (ray, *frame as u32))).collect()
-}
-
-/// Refuses what is not done on a device, with the key that asks for it.
-///
-/// # Errors
-/// Names the first such key.
-pub fn check(
-    objective: &Objective<f32>,
-    representation: &dyn Representation<f32>,
-    training: &Training,
-) -> Result<(), Error> {
-    let model = &objective.model;
-    for (asked, key, what) in [
-        (training.lbfgs.is_some(), "training.optimiser", "quasi-Newton steps are"),
-        (training.learns_axis(representation), "axis", "the gradient of the axis is"),
-        (training.penalties.is_some(), "penalty", "penalties are"),
-        (training.change.is_some(), "change", "emission that changes while matter carries it is"),
-        (training.parts > 1, "training.parts", "steps in parts are"),
-        (model.planes.is_some(), "polarization", "Stokes parameters are"),
-        (representation.built_in().is_none(), "representation.kind", "this representation is"),
-    ] {
-        if asked {
-            let why =
-                format!("{key}: {what} not computed on graphics devices, the processor does it");
-            return Err(DeviceError(why).into());
-        }
-    }
-    Ok(())
 }

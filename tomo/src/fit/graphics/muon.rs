@@ -2,6 +2,7 @@
 
 use super::adam::Learning;
 use super::bytes::words;
+use super::kernels::compiled;
 use super::network::{Task, run};
 use crate::optimise::Muon;
 use crate::representation::WeightMatrix;
@@ -71,7 +72,7 @@ impl Turning {
 
 impl Binding<'_> {
     fn tasks(&self, matrices: &[WeightMatrix]) -> Result<Vec<Task>, GpuError> {
-        let kernels = self.device.kernels(include_str!("shaders/muon.wgsl"), &ENTRIES)?;
+        let kernels = compiled(self.device, include_str!("shaders/muon.wgsl"), &ENTRIES)?;
         let most = |of: fn(&WeightMatrix) -> usize| matrices.iter().map(of).max().unwrap_or(0);
         let each = most(|matrix| matrix.rows * matrix.columns).div_ceil(64);
         let square = most(|matrix| matrix.rows.min(matrix.columns).div_ceil(TILE).pow(2));

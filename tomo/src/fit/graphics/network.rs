@@ -1,6 +1,7 @@
 //! A fully connected network on the device, block of points by block of points.
 
 use super::bytes::words;
+use super::kernels::compiled;
 use super::pixels::Points;
 use kerrlight_geodesic::gpu::{Bound, Buffer, Commands, Compute, GpuError, Kernel};
 use kerrlight_geodesic::wgsl;
@@ -53,6 +54,41 @@ struct Layer {
     offset: usize,
 }
 
+/// How 256 lanes share a tile of a product of matrices, four numbers of the left one by eight of the right one each.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Tiling {
+    left_lanes: usize,
+    right_lanes: usize,
+    slab: usize,
+}
+
+impl Tiling {
+    /// For layers so wide: no wider than they are, where that can be.
+    fn of(width: usize) -> Self {
+        let (right_lanes, slab) = match width {
+            0..=32 => (4, 8),
+            33..=64 => (8, 16),
+            _ => (16, 16),
+        };
+        Self { left_lanes: 256 / right_lanes, right_lanes, slab }
+    }
+
+    fn constants(self) -> String {
+        let Self { left_lanes, right_lanes, slab } = self;
+        format!(
+            "const LEFT_LANES = {left_lanes}u;\nconst RIGHT_LANES = {right_lanes}u;\nconst SLAB = {slab}u;\n"
+        )
+    }
+
+    fn left(self, numbers: usize) -> u32 {
+        numbers.div_ceil(4 * self.left_lanes) as u32
+    }
+
+    fn right(self, numbers: usize) -> u32 {
+        numbers.div_ceil(8 * self.right_lanes) as u32
+    }
+}
+
 impl Shape {
     fn encoded(&self) -> usize {
         match self.front {
@@ -98,9 +134,10 @@ impl Shape {
     }
 }
 
-/// Sides of tiles and points of spans: those of the shader.
-const TILE: usize = 64;
-const SPAN: usize = 1024;
+/// Points of spans: those of the shader.
+const SPAN: usize = 512;
+/// A multiple of the points of all tiles.
+const GRAIN: usize = 256;
 /// The most points of a block.
 const BLOCK: usize = 1 << 16;
 
@@ -178,14 +215,15 @@ impl Network {
         (parameters, gradient): (&Buffer, &Buffer),
         most: Option<usize>,
     ) -> Result<Self, GpuError> {
-        let fits = device.largest_buffer() as usize / (4 * shape.columns()) / TILE * TILE;
+        let fits = device.largest_buffer() as usize / (4 * shape.columns()) / GRAIN * GRAIN;
         if fits == 0 {
-            return Err(GpuError::OutOfMemory { bytes: 4 * (shape.columns() * TILE) as u64 });
+            return Err(GpuError::OutOfMemory { bytes: 4 * (shape.columns() * GRAIN) as u64 });
         }
-        let wanted = most.unwrap_or(BLOCK).min(points.room).next_multiple_of(TILE);
+        let wanted = most.unwrap_or(BLOCK).min(points.room).next_multiple_of(GRAIN);
         let stride = wanted.min(fits);
-        let source = [wgsl::FUNCTIONS, ACTIVATIONS, SHADER].join("\n");
-        let kernels = device.kernels(&source, &ENTRIES)?;
+        let constants = Tiling::of(shape.width).constants();
+        let source = [&constants, wgsl::FUNCTIONS, ACTIVATIONS, SHADER].join("\n");
+        let kernels = compiled(device, &source, &ENTRIES)?;
         let memory = Memory::new(device, shape, stride)?;
         let count = shape.parameters();
         let blocks = (0..points.room.div_ceil(stride).max(1)).map(|k| {
@@ -273,36 +311,34 @@ impl Memory {
 
 impl Binding<'_> {
     fn forward(&self, shape: &Shape, stride: usize) -> Result<Vec<Task>, GpuError> {
-        let layers = shape.layers();
-        let along = |size: usize| stride.div_ceil(size) as u32;
+        let (layers, tiling) = (shape.layers(), Tiling::of(shape.width));
+        let by_64 = stride.div_ceil(64) as u32;
         let mut tasks = Vec::new();
         if !shape.is_given() {
-            tasks.push((self.bind(0, 0, 0, &[0, 2, 3, 4, 6])?, [along(64), 1]));
+            tasks.push((self.bind(0, 0, 0, &[0, 2, 3, 4, 6])?, [by_64, 1]));
         }
         for (k, layer) in layers[..shape.hidden].iter().enumerate() {
-            let groups = [along(TILE), tiles(layer.outputs)];
+            let groups = [tiling.left(stride), tiling.right(layer.outputs)];
             tasks.push((self.bind(1, k, 0, &[0, 1, 3, 5, 6])?, groups));
         }
         let output = self.bind(2, shape.hidden, 0, &[0, 1, 3, 5, 6, 7, 8])?;
-        tasks.push((output, [along(64), 1]));
+        tasks.push((output, [by_64, 1]));
         Ok(tasks)
     }
 
     fn backward(&self, shape: &Shape, stride: usize) -> Result<Vec<Task>, GpuError> {
-        let (layers, last) = (shape.layers(), shape.hidden);
-        let along = |size: usize| stride.div_ceil(size) as u32;
-        let output = layers[last];
-        let to_units = [along(64), output.units as u32];
-        let to_weights = [output.inputs as u32, along(SPAN)];
+        let (layers, last, tiling) = (shape.layers(), shape.hidden, Tiling::of(shape.width));
+        let (output, spans) = (layers[last], stride.div_ceil(SPAN) as u32);
+        let to_units = [stride.div_ceil(4 * 64) as u32, output.units as u32];
         let mut tasks = vec![
             (self.bind(3, last, 0, &[0, 1, 3, 5, 6, 8, 9, 10])?, to_units),
-            (self.bind(4, last, 0, &[0, 1, 3, 6, 8, 9, 12])?, to_weights),
+            (self.bind(4, last, 0, &[0, 1, 3, 6, 8, 9, 12])?, [output.inputs as u32, spans]),
         ];
         for (turn, (k, layer)) in layers[..last].iter().enumerate().rev().enumerate() {
-            let groups = [tiles(layer.outputs) * tiles(layer.inputs), along(SPAN)];
-            tasks.push((self.bind(5, k, turn, &[0, 1, 3, 6, 10, 12])?, groups));
+            let tiles = tiling.right(layer.outputs) * tiling.left(layer.inputs - 1);
+            tasks.push((self.bind(5, k, turn, &[0, 1, 3, 6, 10, 12])?, [tiles, spans]));
             if k > 0 || shape.is_given() {
-                let groups = [along(TILE), tiles(layer.units)];
+                let groups = [tiling.left(stride), tiling.right(layer.units)];
                 tasks.push((self.bind(6, k, turn, &[0, 1, 3, 5, 6, 10, 11])?, groups));
             }
         }
@@ -345,8 +381,4 @@ impl Binding<'_> {
         let buffers = [(0, *block), (3, &points.extent), (10, *gradient), (12, &memory.parts)];
         self.device.bind(&self.kernels[7], &buffers)
     }
-}
-
-fn tiles(numbers: usize) -> u32 {
-    numbers.div_ceil(TILE) as u32
 }

@@ -2,6 +2,7 @@
 
 use super::bytes::{floats, read, words};
 use super::fall::FallTable;
+use super::kernels::compiled;
 use kerrlight_geodesic::gpu::{Bound, Buffer, Commands, Compute, GpuError};
 use kerrlight_geodesic::wgsl;
 
@@ -110,7 +111,7 @@ impl Pixels {
         let all = buffers(device, room, table.len())?;
         device.write(&all[15], &floats(table))?;
         let source = [wgsl::FUNCTIONS, SHADER].join("\n");
-        let kernels = device.kernels(&source, &ENTRIES)?;
+        let kernels = compiled(device, &source, &ENTRIES)?;
         let bind = |entry: usize, bindings: &[u32]| {
             let buffers: Vec<_> = bindings.iter().map(|k| (*k, &all[*k as usize])).collect();
             device.bind(&kernels[entry], &buffers)

@@ -40,3 +40,20 @@ impl Pieces {
         Room { nodes, pairs: self.pairs, points: self.points, cells, records }
     }
 }
+
+/// Where a piece of a step is in it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ends {
+    /// Whether it is the first.
+    pub is_first: bool,
+    /// Whether it is the last, of a step that is taken.
+    pub is_last_and_learns: bool,
+}
+
+/// The pieces of a step, so many of its pairs or frames each.
+pub fn pieces<T>(all: &[T], most: usize, learns: bool) -> impl Iterator<Item = (&[T], Ends)> {
+    let last = all.len().div_ceil(most).saturating_sub(1);
+    all.chunks(most).enumerate().map(move |(k, some)| {
+        (some, Ends { is_first: k == 0, is_last_and_learns: learns && k == last })
+    })
+}

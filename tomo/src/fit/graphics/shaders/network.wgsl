@@ -34,21 +34,28 @@ struct Encoding {
 @group(0) @binding(4) var<storage, read> places: array<vec4<f32>>;
 @group(0) @binding(5) var<storage, read> parameters: array<f32>;
 @group(0) @binding(6) var<storage, read_write> rows: array<f32>;
+@group(0) @binding(6) var<storage, read_write> rows_of_four: array<vec4<f32>>;
 @group(0) @binding(7) var<storage, read_write> values: array<f32>;
 @group(0) @binding(8) var<storage, read_write> bends: array<f32>;
 @group(0) @binding(9) var<storage, read> cotangents: array<f32>;
 @group(0) @binding(10) var<storage, read_write> above: array<f32>;
-@group(0) @binding(11) var<storage, read_write> below: array<f32>;
+@group(0) @binding(10) var<storage, read_write> above_of_four: array<vec4<f32>>;
+@group(0) @binding(11) var<storage, read_write> below_of_four: array<vec4<f32>>;
 @group(0) @binding(12) var<storage, read_write> parts: array<f32>;
 
-// Sides of a tile and depth of a slab; points of a partial sum of gradients.
-const TILE = 64u;
-const SLAB = 16u;
-const SPAN = 1024u;
+// Products of matrices: result[i][j] = sum over k of left[k][i] right[k][j]. A workgroup has a tile of the result, a lane
+// 4 i's by 8 j's of it. It goes through k in slabs, which lie in the workgroup's memory as vectors of four, side by side.
+// How many lanes share an i or a j, LEFT_LANES by RIGHT_LANES, and the depth of a SLAB stand before this text.
+const LANES = 256u;
+const LEFT = 4u * LEFT_LANES;
+const RIGHT = 8u * RIGHT_LANES;
+const FOURS = 2u * RIGHT_LANES;
+const START_OF_RIGHT = SLAB * LEFT_LANES;
+// Points of a partial sum of gradients.
+const SPAN = 512u;
 
-var<workgroup> left: array<vec4<f32>, 256>;
-var<workgroup> right: array<vec4<f32>, 256>;
-var<workgroup> sums: array<f32, 64>;
+var<workgroup> slabs: array<vec4<f32>, SLAB * (LEFT_LANES + FOURS)>;
+var<workgroup> sums: array<f32, LANES>;
 
 // Points in this block.
 fn here() -> u32 {
@@ -59,41 +66,59 @@ fn column(input: u32) -> u32 {
     return select(layer.tail + input - layer.units, layer.base + input, input < layer.units);
 }
 
-fn activation(input: u32, point: u32, points: u32) -> f32 {
-    if input >= layer.inputs || point >= points {
-        return 0.0;
-    }
+fn activation(input: u32, point: u32) -> f32 {
     return rows[column(input) * block.stride + point];
 }
 
-fn weight(input: u32, output: u32, inputs: u32) -> f32 {
-    if input >= inputs || output >= layer.outputs {
+// All inputs but the one, whose weights are biases.
+fn proper_inputs() -> u32 {
+    return layer.inputs - 1u;
+}
+
+fn weight(input: u32, output: u32) -> f32 {
+    if input >= proper_inputs() || output >= layer.outputs {
         return 0.0;
     }
     return parameters[layer.offset + input * layer.outputs + output];
 }
 
-fn slope(output: u32, point: u32, points: u32) -> f32 {
-    if output >= layer.outputs || point >= points {
-        return 0.0;
+fn bias(output: u32) -> vec4<f32> {
+    if output >= layer.outputs {
+        return vec4<f32>(0.0);
     }
-    return above[output * block.stride + point];
+    return vec4<f32>(parameters[layer.offset + proper_inputs() * layer.outputs + output]);
 }
 
-fn activations(input: u32, point: u32, points: u32) -> vec4<f32> {
-    return vec4<f32>(
-        activation(input, point, points), activation(input, point + 1u, points),
-        activation(input, point + 2u, points), activation(input, point + 3u, points),
-    );
+// Fours are turned about by k, so that lanes that differ in k write to other banks.
+fn place(k: u32, four: u32) -> u32 {
+    return four ^ (k & 7u);
 }
 
-// Four by four sums of a lane over a slab: component of `left` by column of the result.
-fn multiplied(lane: u32, so_far: mat4x4<f32>) -> mat4x4<f32> {
+fn lay_left(at: vec2<u32>, x: vec4<f32>) {
+    slabs[LEFT_LANES * at.x + place(at.x, at.y)] = x;
+}
+
+fn lay_right(at: vec2<u32>, x: vec4<f32>) {
+    slabs[START_OF_RIGHT + FOURS * at.x + place(at.x, at.y)] = x;
+}
+
+// A lane's sums: column j of `low` and `high` has its four i's.
+struct Sums {
+    low: mat4x4<f32>,
+    high: mat4x4<f32>,
+}
+
+// Adds a slab.
+fn multiplied(lane: u32, so_far: Sums) -> Sums {
     var result = so_far;
+    let i = lane % LEFT_LANES;
+    let j = lane / LEFT_LANES;
     for (var k = 0u; k < SLAB; k++) {
-        let a = left[16u * k + lane % 16u];
-        let b = right[16u * k + lane / 16u];
-        result += mat4x4<f32>(b.x * a, b.y * a, b.z * a, b.w * a);
+        let a = slabs[LEFT_LANES * k + place(k, i)];
+        let b = slabs[START_OF_RIGHT + FOURS * k + place(k, j)];
+        let c = slabs[START_OF_RIGHT + FOURS * k + place(k, j + RIGHT_LANES)];
+        result.low += mat4x4<f32>(b.x * a, b.y * a, b.z * a, b.w * a);
+        result.high += mat4x4<f32>(c.x * a, c.y * a, c.z * a, c.w * a);
     }
     return result;
 }
@@ -124,68 +149,105 @@ fn encode(@builtin(global_invocation_id) at: vec3<u32>) {
     rows[dimension * (1u + 2u * encoding.degree) * block.stride + point] = 1.0;
 }
 
-// Units of a hidden layer: workgroups are tiles of points by tiles of outputs.
+// The first of a lane's outputs (or units) in its tile; those of `high` are half a tile further.
+fn first_right(lane: u32) -> u32 {
+    return 4u * (lane / LEFT_LANES);
+}
+
+fn forward_left(k: u32, four: u32, p0: u32) -> vec4<f32> {
+    if k >= proper_inputs() {
+        return vec4<f32>(0.0);
+    }
+    return rows_of_four[(column(k) * block.stride + p0) / 4u + four];
+}
+
+fn forward_right(k: u32, four: u32, o0: u32) -> vec4<f32> {
+    let o = o0 + 4u * four;
+    return vec4<f32>(weight(k, o), weight(k, o + 1u), weight(k, o + 2u), weight(k, o + 3u));
+}
+
+// Units of a hidden layer: workgroups are tiles of points by tiles of outputs. The points of a tile beyond the last one
+// are computed like the others, and read by nobody.
 @compute @workgroup_size(256)
 fn forward(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let points = here();
-    let p0 = group.x * TILE;
-    let o0 = group.y * TILE;
-    if p0 >= points {
+    let p0 = group.x * LEFT;
+    let o0 = group.y * RIGHT;
+    if p0 >= here() {
         return;
     }
-    var result = mat4x4<f32>();
-    for (var k0 = 0u; k0 < layer.inputs; k0 += SLAB) {
-        let k = k0 + lane / 16u;
-        let p = p0 + 4u * (lane % 16u);
-        let o = o0 + 4u * (lane % 16u);
-        left[lane] = activations(k, p, points);
-        right[lane] = vec4<f32>(
-            weight(k, o, layer.inputs), weight(k, o + 1u, layer.inputs),
-            weight(k, o + 2u, layer.inputs), weight(k, o + 3u, layer.inputs),
-        );
+    let o = o0 + first_right(lane);
+    var result = Sums(
+        mat4x4<f32>(bias(o), bias(o + 1u), bias(o + 2u), bias(o + 3u)),
+        mat4x4<f32>(
+            bias(o + RIGHT / 2u), bias(o + RIGHT / 2u + 1u), bias(o + RIGHT / 2u + 2u), bias(o + RIGHT / 2u + 3u),
+        ),
+    );
+    for (var k0 = 0u; k0 < proper_inputs(); k0 += SLAB) {
+        for (var n = lane; n < SLAB * LEFT_LANES; n += LANES) {
+            let at = vec2<u32>(n / LEFT_LANES, n % LEFT_LANES);
+            lay_left(at, forward_left(k0 + at.x, at.y, p0));
+        }
+        for (var n = lane; n < SLAB * FOURS; n += LANES) {
+            let at = vec2<u32>(n / FOURS, n % FOURS);
+            lay_right(at, forward_right(k0 + at.x, at.y, o0));
+        }
         workgroupBarrier();
         result = multiplied(lane, result);
         workgroupBarrier();
     }
-    let p = p0 + 4u * (lane % 16u);
-    let o = o0 + 4u * (lane / 16u);
+    let p = p0 + 4u * (lane % LEFT_LANES);
     for (var j = 0u; j < 4u; j++) {
-        for (var i = 0u; i < 4u; i++) {
-            if o + j < layer.outputs && p + i < points {
-                let x = result[j][i];
-                // In this order a number that is none stays so.
-                rows[(layer.into + o + j) * block.stride + p + i] = select(x, 0.0, x <= 0.0);
-            }
+        keep_units(o + j, p, result.low[j]);
+        keep_units(o + RIGHT / 2u + j, p, result.high[j]);
+    }
+}
+
+fn keep_units(output: u32, point: u32, x: vec4<f32>) {
+    if output < layer.outputs {
+        // In this order a number that is none stays so.
+        let rectified = select(x, vec4<f32>(0.0), x <= vec4<f32>(0.0));
+        rows_of_four[((layer.into + output) * block.stride + point) / 4u] = rectified;
+    }
+}
+
+// The output layer: emission and its slope. Four lanes share a point.
+@compute @workgroup_size(256)
+fn emit(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let point = group.x * 64u + lane % 64u;
+    let is_there = point < here();
+    var sum = 0.0;
+    if is_there {
+        for (var k = lane / 64u; k < layer.inputs; k += 4u) {
+            sum = fma(activation(k, point), parameters[layer.offset + k], sum);
         }
     }
+    sums[lane] = sum;
+    workgroupBarrier();
+    if is_there && lane < 64u {
+        let all = (sums[lane] + sums[lane + 64u]) + (sums[lane + 128u] + sums[lane + 192u]);
+        let both = activate(layer.activation, all + layer.shift);
+        values[block.first + point] = both.x;
+        bends[block.first + point] = both.y;
+    }
 }
 
-// The output layer: emission and its slope.
-@compute @workgroup_size(64)
-fn emit(@builtin(global_invocation_id) at: vec3<u32>) {
-    let points = here();
-    if at.x >= points {
-        return;
-    }
-    var sum = 0.0;
-    for (var k = 0u; k < layer.inputs; k++) {
-        sum = fma(activation(k, at.x, points), parameters[layer.offset + k], sum);
-    }
-    let both = activate(layer.activation, sum + layer.shift);
-    values[block.first + at.x] = both.x;
-    bends[block.first + at.x] = both.y;
-}
-
-// Back through the output layer: rows of the grid are units.
+// Back through the output layer, four points a lane: rows of the grid are units.
 @compute @workgroup_size(64)
 fn emit_back(@builtin(global_invocation_id) at: vec3<u32>) {
     let points = here();
-    if at.x >= points || at.y >= layer.units {
+    let p = 4u * at.x;
+    if p >= points || at.y >= layer.units {
         return;
     }
-    let slope = cotangents[block.first + at.x] * bends[block.first + at.x];
-    let shines = activation(at.y, at.x, points) > 0.0;
-    above[at.y * block.stride + at.x] = select(0.0, slope * parameters[layer.offset + at.y], shines);
+    var slopes = vec4<f32>(0.0);
+    for (var k = 0u; k < 4u; k++) {
+        if p + k < points {
+            slopes[k] = cotangents[block.first + p + k] * bends[block.first + p + k];
+        }
+    }
+    let shines = rows_of_four[(column(at.y) * block.stride + p) / 4u] > vec4<f32>(0.0);
+    let back = slopes * parameters[layer.offset + at.y];
+    above_of_four[(at.y * block.stride + p) / 4u] = select(vec4<f32>(0.0), back, shines);
 }
 
 // Gradient of the output layer: columns of the grid are inputs, rows are spans.
@@ -199,7 +261,7 @@ fn emit_weights(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
     var own = 0.0;
     for (var p = first + lane; p < min(first + SPAN, points); p += 64u) {
         let slope = cotangents[block.first + p] * bends[block.first + p];
-        own = fma(activation(group.x, p, points), slope, own);
+        own = fma(activation(group.x, p), slope, own);
     }
     sums[lane] = own;
     for (var half = 32u; half > 0u; half /= 2u) {
@@ -213,7 +275,21 @@ fn emit_weights(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
     }
 }
 
-// Gradient of a hidden layer's parameters: columns of the grid are tiles of inputs by outputs, rows are spans.
+fn weights_left(k: u32, i: u32, last: u32) -> f32 {
+    if i >= proper_inputs() || k >= last {
+        return 0.0;
+    }
+    return activation(i, k);
+}
+
+fn weights_right(k: u32, o: u32, last: u32) -> f32 {
+    if o >= layer.outputs || k >= last {
+        return 0.0;
+    }
+    return above[o * block.stride + k];
+}
+
+// Gradient of a hidden layer's parameters: columns of the grid are tiles of inputs by tiles of outputs, rows are spans.
 @compute @workgroup_size(256)
 fn weights_back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let points = here();
@@ -221,88 +297,143 @@ fn weights_back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
     if first >= points {
         return;
     }
-    let across = (layer.outputs + TILE - 1u) / TILE;
-    let i0 = (group.x / across) * TILE;
-    let o0 = (group.x % across) * TILE;
+    let tiles = (layer.outputs + RIGHT - 1u) / RIGHT;
+    let i0 = (group.x / tiles) * LEFT;
+    let o0 = (group.x % tiles) * RIGHT;
     let last = min(first + SPAN, points);
-    var result = mat4x4<f32>();
-    for (var p0 = first; p0 < last; p0 += SLAB) {
-        let p = p0 + lane % 16u;
-        let to = 16u * (lane % 16u) + lane / 16u;
-        let o = o0 + 4u * (lane / 16u);
-        let i = i0 + 4u * (lane / 16u);
-        left[to] = vec4<f32>(
-            slope(o, p, last), slope(o + 1u, p, last), slope(o + 2u, p, last), slope(o + 3u, p, last),
-        );
-        right[to] = vec4<f32>(
-            activation(i, p, last), activation(i + 1u, p, last),
-            activation(i + 2u, p, last), activation(i + 3u, p, last),
-        );
+    var result = Sums(mat4x4<f32>(), mat4x4<f32>());
+    // What a lane has seen of slopes: their sum is the gradient of biases.
+    var seen = vec4<f32>(0.0);
+    var more_seen = vec4<f32>(0.0);
+    for (var k0 = first; k0 < last; k0 += SLAB) {
+        for (var n = lane; n < SLAB * LEFT_LANES; n += LANES) {
+            let at = vec2<u32>(n % SLAB, n / SLAB);
+            let k = k0 + at.x;
+            let i = i0 + 4u * at.y;
+            lay_left(at, vec4<f32>(
+                weights_left(k, i, last), weights_left(k, i + 1u, last),
+                weights_left(k, i + 2u, last), weights_left(k, i + 3u, last),
+            ));
+        }
+        for (var n = lane; n < SLAB * FOURS; n += LANES) {
+            let at = vec2<u32>(n % SLAB, n / SLAB);
+            let k = k0 + at.x;
+            let o = o0 + 4u * at.y;
+            let slopes = vec4<f32>(
+                weights_right(k, o, last), weights_right(k, o + 1u, last),
+                weights_right(k, o + 2u, last), weights_right(k, o + 3u, last),
+            );
+            lay_right(at, slopes);
+            if n < LANES { seen += slopes; } else { more_seen += slopes; }
+        }
         workgroupBarrier();
         result = multiplied(lane, result);
         workgroupBarrier();
     }
-    let o = o0 + 4u * (lane % 16u);
-    let i = i0 + 4u * (lane / 16u);
     let start = group.y * block.count + layer.offset - block.network;
-    for (var j = 0u; j < 4u; j++) {
-        for (var k = 0u; k < 4u; k++) {
-            if i + j < layer.inputs && o + k < layer.outputs {
-                parts[start + (i + j) * layer.outputs + o + k] = result[j][k];
+    for (var ii = 0u; ii < 4u; ii++) {
+        lay_rows(lane, ii, result);
+        workgroupBarrier();
+        for (var n = lane; n < LEFT_LANES * RIGHT; n += LANES) {
+            let i = i0 + 4u * (n / RIGHT) + ii;
+            let o = o0 + n % RIGHT;
+            if i < proper_inputs() && o < layer.outputs {
+                parts[start + i * layer.outputs + o] = slabs[n / 4u][n % 4u];
             }
         }
+        workgroupBarrier();
     }
+    if i0 == 0u {
+        keep_biases(lane, o0, seen, more_seen, start + proper_inputs() * layer.outputs);
+    }
+}
+
+// One of each lane's four inputs with its outputs, so that a row of results can be written by lanes side by side.
+fn lay_rows(lane: u32, ii: u32, x: Sums) {
+    let to = (lane % LEFT_LANES) * FOURS + lane / LEFT_LANES;
+    slabs[to] = vec4<f32>(x.low[0][ii], x.low[1][ii], x.low[2][ii], x.low[3][ii]);
+    slabs[to + RIGHT_LANES] = vec4<f32>(x.high[0][ii], x.high[1][ii], x.high[2][ii], x.high[3][ii]);
+}
+
+// Adds up what lanes have seen, over k; a slab of the right matrix has at most two fours a lane.
+fn keep_biases(lane: u32, o0: u32, seen: vec4<f32>, more_seen: vec4<f32>, start: u32) {
+    for (var n = lane; n < SLAB * FOURS; n += LANES) {
+        slabs[n] = select(more_seen, seen, n < LANES);
+    }
+    workgroupBarrier();
+    let o = o0 + lane;
+    if lane < RIGHT && o < layer.outputs {
+        var sum = 0.0;
+        for (var k = 0u; k < SLAB; k++) {
+            sum += slabs[(lane / 4u) * SLAB + k][lane % 4u];
+        }
+        parts[start + o] = sum;
+    }
+}
+
+fn units_left(k: u32, four: u32, p0: u32) -> vec4<f32> {
+    if k >= layer.outputs {
+        return vec4<f32>(0.0);
+    }
+    return above_of_four[(k * block.stride + p0) / 4u + four];
 }
 
 // From the slopes of a layer's outputs to those of the units before it.
 @compute @workgroup_size(256)
 fn units_back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let points = here();
-    let p0 = group.x * TILE;
-    let u0 = group.y * TILE;
-    if p0 >= points {
+    let p0 = group.x * LEFT;
+    let u0 = group.y * RIGHT;
+    if p0 >= here() {
         return;
     }
-    var result = mat4x4<f32>();
+    var result = Sums(mat4x4<f32>(), mat4x4<f32>());
     for (var k0 = 0u; k0 < layer.outputs; k0 += SLAB) {
-        let k = k0 + lane / 16u;
-        let p = p0 + 4u * (lane % 16u);
-        let u = u0 + 4u * (lane % 16u);
-        left[lane] = vec4<f32>(
-            slope(k, p, points), slope(k, p + 1u, points),
-            slope(k, p + 2u, points), slope(k, p + 3u, points),
-        );
-        right[lane] = vec4<f32>(
-            weight(u, k, layer.units), weight(u + 1u, k, layer.units),
-            weight(u + 2u, k, layer.units), weight(u + 3u, k, layer.units),
-        );
+        for (var n = lane; n < SLAB * LEFT_LANES; n += LANES) {
+            let at = vec2<u32>(n / LEFT_LANES, n % LEFT_LANES);
+            lay_left(at, units_left(k0 + at.x, at.y, p0));
+        }
+        for (var n = lane; n < SLAB * FOURS; n += LANES) {
+            let at = vec2<u32>(n % SLAB, n / SLAB);
+            let k = k0 + at.x;
+            let u = u0 + 4u * at.y;
+            lay_right(at, vec4<f32>(weight(u, k), weight(u + 1u, k), weight(u + 2u, k), weight(u + 3u, k)));
+        }
         workgroupBarrier();
         result = multiplied(lane, result);
         workgroupBarrier();
     }
-    let p = p0 + 4u * (lane % 16u);
-    let u = u0 + 4u * (lane / 16u);
+    let p = p0 + 4u * (lane % LEFT_LANES);
+    let u = u0 + first_right(lane);
     for (var j = 0u; j < 4u; j++) {
-        for (var i = 0u; i < 4u; i++) {
-            if u + j < layer.units && p + i < points {
-                let unit = rows[(layer.base + u + j) * block.stride + p + i];
-                let shines = layer.open == 1u || unit > 0.0;
-                below[(u + j) * block.stride + p + i] = select(0.0, result[j][i], shines);
-            }
-        }
+        keep_slopes(u + j, p, result.low[j]);
+        keep_slopes(u + RIGHT / 2u + j, p, result.high[j]);
     }
 }
 
-// Adds the partial sums of the spans to the gradient, in their order; `above` is the gradient of all parameters.
-@compute @workgroup_size(64)
-fn add_up(@builtin(global_invocation_id) at: vec3<u32>) {
-    if at.x >= block.count {
-        return;
+fn keep_slopes(unit: u32, point: u32, x: vec4<f32>) {
+    if unit < layer.units {
+        let units = rows_of_four[((layer.base + unit) * block.stride + point) / 4u];
+        let shines = (units > vec4<f32>(0.0)) | vec4<bool>(layer.open == 1u);
+        below_of_four[(unit * block.stride + point) / 4u] = select(vec4<f32>(0.0), x, shines);
     }
-    var sum = above[block.network + at.x];
+}
+
+// Adds the partial sums of the spans to the gradient, in their order, four lanes a parameter; `above` is the gradient of all
+// parameters.
+@compute @workgroup_size(256)
+fn add_up(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let k = group.x * 64u + lane % 64u;
     let spans = (here() + SPAN - 1u) / SPAN;
-    for (var span = 0u; span < spans; span++) {
-        sum += parts[span * block.count + at.x];
+    var sum = 0.0;
+    if k < block.count {
+        for (var span = lane / 64u; span < spans; span += 4u) {
+            sum += parts[span * block.count + k];
+        }
     }
-    above[block.network + at.x] = sum;
+    sums[lane] = sum;
+    workgroupBarrier();
+    if k < block.count && lane < 64u {
+        let all = (sums[lane] + sums[lane + 64u]) + (sums[lane + 128u] + sums[lane + 192u]);
+        above[block.network + k] += all;
+    }
 }

@@ -1,0 +1,35 @@
+//! What is not computed on graphics devices.
+
+use crate::Error;
+use crate::fit::device::DeviceError;
+use crate::fit::objective::Objective;
+use crate::fit::training::Training;
+use crate::representation::Representation;
+
+/// Refuses what is not done on a device, with the key that asks for it.
+///
+/// # Errors
+/// Names the first such key.
+pub fn check(
+    objective: &Objective<f32>,
+    representation: &dyn Representation<f32>,
+    training: &Training,
+) -> Result<(), Error> {
+    let model = &objective.model;
+    for (asked, key, what) in [
+        (training.lbfgs.is_some(), "training.optimiser", "quasi-Newton steps are"),
+        (training.learns_axis(representation), "axis", "the gradient of the axis is"),
+        (training.penalties.is_some(), "penalty", "penalties are"),
+        (training.change.is_some(), "change", "emission that changes while matter carries it is"),
+        (training.parts > 1, "training.parts", "steps in parts are"),
+        (model.planes.is_some(), "polarization", "Stokes parameters are"),
+        (representation.built_in().is_none(), "representation.kind", "this representation is"),
+    ] {
+        if asked {
+            let why =
+                format!("{key}: {what} not computed on graphics devices, the processor does it");
+            return Err(DeviceError(why).into());
+        }
+    }
+    Ok(())
+}
