@@ -3,7 +3,8 @@
 //!
 //! `cargo run --release -p kerrlight-tomo --features wgpu --example device_times -- representation=bhnerf`
 //!
-//! Settings, all optional: `representation` (bhnerf, feature-grid, grid), `points` (57344), `steps` (200), `device`.
+//! Settings, all optional: `representation` (bhnerf, feature-grid, grid), `optimiser` (adam, muon), `points` (57344), `steps`
+//! (200), `device`.
 
 // Other examples use more of it.
 #[allow(dead_code)]
@@ -16,7 +17,7 @@ use kerrlight_tomo::fit::{
     Batch, BatchSize, Data, Drawn, ImageTerm, Objective, Region, State, StepDevice, Stretch,
     Training, Weighted,
 };
-use kerrlight_tomo::optimise::{Adam, Polynomial};
+use kerrlight_tomo::optimise::{Adam, Muon, Polynomial};
 use kerrlight_tomo::representation::{
     Activation, FeatureGrid, FeatureGridSettings, Grid, GridSettings, Network, NetworkSettings,
     Representation,
@@ -38,7 +39,8 @@ fn main() -> Answer<()> {
     ceilings(&device)?;
     let field = representation(&word("representation", "bhnerf"))?;
     let (points, steps) = (word("points", "57344").parse()?, word("steps", "200").parse()?);
-    steps_of(&device, &*field, points, steps)
+    let muon = (word("optimiser", "adam") == "muon").then(Muon::default);
+    steps_of(&device, &*field, muon, (points, steps))
 }
 
 fn representation(name: &str) -> Answer<Box<dyn Representation<f32>>> {
@@ -156,8 +158,8 @@ fn training(batch: BatchSize, steps: u64) -> Training {
 fn steps_of(
     adapter: &Adapter,
     field: &dyn Representation<f32>,
-    points: usize,
-    steps: usize,
+    muon: Option<Muon>,
+    (points, steps): (usize, usize),
 ) -> Answer<()> {
     let (objective, axis) = objective()?;
     let model = &objective.model;
@@ -173,7 +175,7 @@ fn steps_of(
         pairs.push((ray as u32, (k % model.frames()) as u32));
         k += 1;
     }
-    let training = training(BatchSize::Pixels(pairs.len()), steps as u64);
+    let training = Training { muon, ..training(BatchSize::Pixels(pairs.len()), steps as u64) };
     let now = State::<f32>::new(field, axis, &training).now;
     let mut fit = GraphicsFit::new(open(adapter)?, &objective, field, &training, None)?;
     let stretch = |steps: usize| Stretch {
