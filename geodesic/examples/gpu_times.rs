@@ -60,10 +60,9 @@ fn rays(device: &Compute, spin: f64, side: usize, samples: u32) -> Answer<()> {
         room(4 * wgsl::CROSSING_BYTES)?,
         room(samples as usize * wgsl::SAMPLE_BYTES)?,
     ];
-    // SAFETY: loops of these shaders end.
-    let kernels = unsafe {
-        device.kernels_whose_loops_end(&wgsl::program(), &["kerr_trace", "kerr_sample"])?
-    };
+    // SAFETY: indices of the tracer are below the numbers of its task, and its loops count up.
+    let kernels =
+        unsafe { device.kernels_unchecked(&wgsl::program(), &["kerr_trace", "kerr_sample"])? };
     let bindings: Vec<_> = (0..).zip(&buffers).collect();
     let bound = [device.bind(&kernels[0], &bindings)?, device.bind(&kernels[1], &bindings)?];
     let groups = [(count as u32).min(row).div_ceil(64), (count as u32).div_ceil(row)];
@@ -109,8 +108,8 @@ fn disc(device: &Compute, width: u32, height: u32) -> Answer<()> {
     let edges = [0.55, orbits::isco(&hole) as f32, 16.0, 0.0, 0.0, 0.0f32];
     uniform.extend(edges.into_iter().flat_map(f32::to_le_bytes));
     let source = wgsl::library() + include_str!("gpu_disc.wgsl");
-    // SAFETY: loops of these shaders end.
-    let kernels = unsafe { device.kernels_whose_loops_end(&source, &["paint"])? };
+    // SAFETY: the tracer's loops count up, and the picture's index is below its size.
+    let kernels = unsafe { device.kernels_unchecked(&source, &["paint"])? };
     let buffers =
         [device.uniform(&uniform)?, device.storage(16 * u64::from(width) * u64::from(height))?];
     let bindings: Vec<_> = (0..).zip(&buffers).collect();

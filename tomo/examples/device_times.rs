@@ -4,7 +4,7 @@
 //! `cargo run --release -p kerrlight-tomo --features wgpu --example device_times -- representation=bhnerf`
 //!
 //! Settings, all optional: `representation` (bhnerf, feature-grid, grid), `optimiser` (adam, muon), `points` (57344), `steps`
-//! (200), `device`.
+//! (200), `stretch` (256: after so many the state comes back), `device`.
 
 // Other examples use more of it.
 #[allow(dead_code)]
@@ -38,9 +38,10 @@ fn main() -> Answer<()> {
     println!("{}, driver {}", device.name(), device.driver());
     ceilings(&device)?;
     let field = representation(&word("representation", "bhnerf"))?;
-    let (points, steps) = (word("points", "57344").parse()?, word("steps", "200").parse()?);
     let muon = (word("optimiser", "adam") == "muon").then(Muon::default);
-    steps_of(&device, &*field, muon, (points, steps))
+    let size = |name: &str, usual: &str| word(name, usual).parse::<usize>();
+    let sizes = [size("points", "57344")?, size("steps", "200")?, size("stretch", "256")?];
+    steps_of(&device, &*field, muon, sizes)
 }
 
 fn representation(name: &str) -> Answer<Box<dyn Representation<f32>>> {
@@ -94,7 +95,8 @@ fn multiplied(@builtin(global_invocation_id) at: vec3<u32>) {
 /// What the device multiplies, adds and copies in a second at most.
 fn ceilings(adapter: &Adapter) -> Result<(), GpuError> {
     let device = Compute::open(adapter, Needs { invocations: 256, ..Needs::default() })?;
-    let kernels = device.kernels(CEILINGS, &["copied", "multiplied"])?;
+    // SAFETY: there are as many invocations as vectors, and the loop counts up.
+    let kernels = unsafe { device.kernels_unchecked(CEILINGS, &["copied", "multiplied"])? };
     let bytes = (4 * u64::from(FLOATS)).min(device.largest_buffer());
     let (from, to) = (device.storage(bytes)?, device.storage(bytes)?);
     let tasks = [0, 1].map(|k| device.bind(&kernels[k], &[(0, &from), (1, &to)]));
@@ -159,7 +161,7 @@ fn steps_of(
     adapter: &Adapter,
     field: &dyn Representation<f32>,
     muon: Option<Muon>,
-    (points, steps): (usize, usize),
+    [points, steps, most]: [usize; 3],
 ) -> Answer<()> {
     let (objective, axis) = objective()?;
     let model = &objective.model;
@@ -195,7 +197,7 @@ fn steps_of(
         let network = 2.0 * held as f64 * counted as f64;
         matches!(entry, "forward" | "weights_back" | "units_back").then_some(network)
     });
-    let most = fit.most().min(steps);
+    let most = fit.most().min(steps).min(most);
     let (start, before) = (Instant::now(), processor_time());
     for _ in 0..steps / most {
         fit.take(&stretch(most), &now)?;

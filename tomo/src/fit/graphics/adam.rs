@@ -17,6 +17,8 @@ pub struct Learning {
     learn: Bound,
     count: usize,
     positive: bool,
+    /// What the device has, where it is known: parameters and moments.
+    held: [Vec<f32>; 3],
 }
 
 /// The numbers of a step.
@@ -56,22 +58,29 @@ impl Learning {
         let buffers = [&rule, &gradient, &moments[0], &moments[1], &parameters, &left_out];
         let buffers: Vec<_> = (0..).zip(buffers).collect();
         let learn = device.bind(&kernels[0], &buffers)?;
-        Ok(Self { parameters, gradient, moments, rule, learn, count, positive })
+        let held = Default::default();
+        Ok(Self { parameters, gradient, moments, rule, learn, count, positive, held })
     }
 
-    /// Puts parameters and moments there.
+    /// Puts parameters and moments there, if they are not there yet.
     ///
     /// # Errors
     /// If the device fails.
-    pub fn load(
-        &self,
-        device: &Compute,
-        parameters: &[f32],
-        moments: [&[f32]; 2],
-    ) -> Result<(), GpuError> {
-        device.write(&self.parameters, &floats(parameters))?;
-        device.write(&self.moments[0], &floats(moments[0]))?;
-        device.write(&self.moments[1], &floats(moments[1]))
+    pub fn load(&self, device: &Compute, numbers: [&[f32]; 3]) -> Result<(), GpuError> {
+        for ((numbers, held), buffer) in numbers.iter().zip(&self.held).zip(self.buffers()) {
+            if held != numbers {
+                device.write(buffer, &floats(numbers))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Notes what has come back from there; nothing before a step.
+    pub fn hold(&mut self, numbers: [&[f32]; 3]) {
+        for (held, numbers) in self.held.iter_mut().zip(numbers) {
+            held.clear();
+            held.extend_from_slice(numbers);
+        }
     }
 
     /// Puts the numbers of the next step there.

@@ -2,19 +2,24 @@
 
 /// The bytes of numbers.
 pub fn floats(numbers: &[f32]) -> Vec<u8> {
-    numbers.iter().flat_map(|x| x.to_le_bytes()).collect()
+    flat(numbers, f32::to_le_bytes)
 }
 
 /// The bytes of whole numbers.
 pub fn words(numbers: &[u32]) -> Vec<u8> {
-    numbers.iter().flat_map(|x| x.to_le_bytes()).collect()
+    flat(numbers, u32::to_le_bytes)
+}
+
+/// Written so that it is a copy of memory where that has the order of bytes that devices have.
+fn flat<N: Copy>(numbers: &[N], bytes_of: fn(N) -> [u8; 4]) -> Vec<u8> {
+    let mut bytes = vec![0; 4 * numbers.len()];
+    for (bytes, number) in bytes.as_chunks_mut().0.iter_mut().zip(numbers) {
+        *bytes = bytes_of(*number);
+    }
+    bytes
 }
 
 /// The first numbers of bytes.
 pub fn read(bytes: &[u8], count: usize) -> Vec<f32> {
-    bytes
-        .chunks_exact(4)
-        .take(count)
-        .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
-        .collect()
+    bytes.as_chunks().0[..count].iter().map(|bytes| f32::from_le_bytes(*bytes)).collect()
 }

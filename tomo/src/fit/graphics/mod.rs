@@ -177,7 +177,7 @@ impl GraphicsFit {
         if let Some(mask) = stretch.occupancy {
             pixels.load_mask(device, mask.cells())?;
         }
-        learning.load(device, &from.parameters, [&from.adam.first, &from.adam.second])?;
+        learning.load(device, [&from.parameters, &from.adam.first, &from.adam.second])?;
         device.run(|commands| pixels.forget(commands))
     }
 
@@ -343,6 +343,7 @@ impl StepDevice<f32> for GraphicsFit {
         from: &Progress<f32>,
     ) -> Result<Taken<f32>, Error> {
         self.load(stretch, from)?;
+        self.learning.hold([&[]; 3]);
         let Self { device, pixels, learning, turning, .. } = &*self;
         let mut pending = Vec::with_capacity(stretch.draws.len());
         for (k, rate) in stretch.rates.iter().enumerate() {
@@ -355,12 +356,14 @@ impl StepDevice<f32> for GraphicsFit {
         }
         let [parameters, first, second] = learning.buffers();
         let read = device.read(&[parameters, first, second, pixels.records()])?;
-        let numbers = |k: usize| bytes::read(&read[k], from.parameters.len());
+        let [parameters, first, second] =
+            [0, 1, 2].map(|k| bytes::read(&read[k], from.parameters.len()));
+        self.learning.hold([&parameters, &first, &second]);
         let records = bytes::read(&read[3], 2 * STEPS);
         let losses = pending.into_iter().zip(records.chunks(2));
         Ok(Taken {
-            parameters: numbers(0),
-            moments: [numbers(1), numbers(2)],
+            parameters,
+            moments: [first, second],
             losses: losses.map(|(pending, record)| pending.ended(record)).collect(),
         })
     }

@@ -89,17 +89,37 @@ fn bias(output: u32) -> vec4<f32> {
     return vec4<f32>(parameters[layer.offset + proper_inputs() * layer.outputs + output]);
 }
 
+// The fours of a slab that a lane fetches: every 256th one, at most two of each matrix.
+struct Part {
+    left: array<vec4<f32>, 2>,
+    right: array<vec4<f32>, 2>,
+}
+
+// k and four of the n-th one. Lanes side by side fetch what lies side by side: fours of a row, or `across` the rows.
+fn spot(n: u32, row: u32, across: bool) -> vec2<u32> {
+    if across {
+        return vec2<u32>(n % SLAB, n / SLAB);
+    }
+    return vec2<u32>(n / row, n % row);
+}
+
 // Fours are turned about by k, so that lanes that differ in k write to other banks.
 fn place(k: u32, four: u32) -> u32 {
     return four ^ (k & 7u);
 }
 
-fn lay_left(at: vec2<u32>, x: vec4<f32>) {
-    slabs[LEFT_LANES * at.x + place(at.x, at.y)] = x;
-}
-
-fn lay_right(at: vec2<u32>, x: vec4<f32>) {
-    slabs[START_OF_RIGHT + FOURS * at.x + place(at.x, at.y)] = x;
+fn lay(lane: u32, part: Part, left_across: bool, right_across: bool) {
+    for (var m = 0u; m < 2u; m++) {
+        let n = lane + LANES * m;
+        if n < SLAB * LEFT_LANES {
+            let at = spot(n, LEFT_LANES, left_across);
+            slabs[LEFT_LANES * at.x + place(at.x, at.y)] = part.left[m];
+        }
+        if n < SLAB * FOURS {
+            let at = spot(n, FOURS, right_across);
+            slabs[START_OF_RIGHT + FOURS * at.x + place(at.x, at.y)] = part.right[m];
+        }
+    }
 }
 
 // A lane's sums: column j of `low` and `high` has its four i's.
@@ -154,16 +174,22 @@ fn first_right(lane: u32) -> u32 {
     return 4u * (lane / LEFT_LANES);
 }
 
-fn forward_left(k: u32, four: u32, p0: u32) -> vec4<f32> {
-    if k >= proper_inputs() {
-        return vec4<f32>(0.0);
+fn forward_part(lane: u32, k0: u32, p0: u32, o0: u32) -> Part {
+    var part = Part();
+    for (var m = 0u; m < 2u; m++) {
+        let n = lane + LANES * m;
+        let a = spot(n, LEFT_LANES, false);
+        if n < SLAB * LEFT_LANES && k0 + a.x < proper_inputs() {
+            part.left[m] = rows_of_four[(column(k0 + a.x) * block.stride + p0) / 4u + a.y];
+        }
+        let b = spot(n, FOURS, false);
+        if n < SLAB * FOURS {
+            let k = k0 + b.x;
+            let o = o0 + 4u * b.y;
+            part.right[m] = vec4<f32>(weight(k, o), weight(k, o + 1u), weight(k, o + 2u), weight(k, o + 3u));
+        }
     }
-    return rows_of_four[(column(k) * block.stride + p0) / 4u + four];
-}
-
-fn forward_right(k: u32, four: u32, o0: u32) -> vec4<f32> {
-    let o = o0 + 4u * four;
-    return vec4<f32>(weight(k, o), weight(k, o + 1u), weight(k, o + 2u), weight(k, o + 3u));
+    return part;
 }
 
 // Units of a hidden layer: workgroups are tiles of points by tiles of outputs. The points of a tile beyond the last one
@@ -182,16 +208,12 @@ fn forward(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_in
             bias(o + RIGHT / 2u), bias(o + RIGHT / 2u + 1u), bias(o + RIGHT / 2u + 2u), bias(o + RIGHT / 2u + 3u),
         ),
     );
+    var part = forward_part(lane, 0u, p0, o0);
     for (var k0 = 0u; k0 < proper_inputs(); k0 += SLAB) {
-        for (var n = lane; n < SLAB * LEFT_LANES; n += LANES) {
-            let at = vec2<u32>(n / LEFT_LANES, n % LEFT_LANES);
-            lay_left(at, forward_left(k0 + at.x, at.y, p0));
-        }
-        for (var n = lane; n < SLAB * FOURS; n += LANES) {
-            let at = vec2<u32>(n / FOURS, n % FOURS);
-            lay_right(at, forward_right(k0 + at.x, at.y, o0));
-        }
+        lay(lane, part, false, false);
         workgroupBarrier();
+        // On its way while this slab is worked on.
+        part = forward_part(lane, k0 + SLAB, p0, o0);
         result = multiplied(lane, result);
         workgroupBarrier();
     }
@@ -275,18 +297,37 @@ fn emit_weights(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
     }
 }
 
-fn weights_left(k: u32, i: u32, last: u32) -> f32 {
-    if i >= proper_inputs() || k >= last {
+fn unit(i: u32, p: u32, last: u32) -> f32 {
+    if i >= proper_inputs() || p >= last {
         return 0.0;
     }
-    return activation(i, k);
+    return activation(i, p);
 }
 
-fn weights_right(k: u32, o: u32, last: u32) -> f32 {
-    if o >= layer.outputs || k >= last {
+fn slope(o: u32, p: u32, last: u32) -> f32 {
+    if o >= layer.outputs || p >= last {
         return 0.0;
     }
-    return above[o * block.stride + k];
+    return above[o * block.stride + p];
+}
+
+fn weights_part(lane: u32, k0: u32, last: u32, i0: u32, o0: u32) -> Part {
+    var part = Part();
+    for (var m = 0u; m < 2u; m++) {
+        let n = lane + LANES * m;
+        let at = spot(n, 0u, true);
+        let p = k0 + at.x;
+        let i = i0 + 4u * at.y;
+        let o = o0 + 4u * at.y;
+        if n < SLAB * LEFT_LANES {
+            part.left[m] = vec4<f32>(unit(i, p, last), unit(i + 1u, p, last), unit(i + 2u, p, last), unit(i + 3u, p, last));
+        }
+        if n < SLAB * FOURS {
+            part.right[m] =
+                vec4<f32>(slope(o, p, last), slope(o + 1u, p, last), slope(o + 2u, p, last), slope(o + 3u, p, last));
+        }
+    }
+    return part;
 }
 
 // Gradient of a hidden layer's parameters: columns of the grid are tiles of inputs by tiles of outputs, rows are spans.
@@ -303,30 +344,14 @@ fn weights_back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
     let last = min(first + SPAN, points);
     var result = Sums(mat4x4<f32>(), mat4x4<f32>());
     // What a lane has seen of slopes: their sum is the gradient of biases.
-    var seen = vec4<f32>(0.0);
-    var more_seen = vec4<f32>(0.0);
+    var seen = array<vec4<f32>, 2>();
+    var part = weights_part(lane, first, last, i0, o0);
     for (var k0 = first; k0 < last; k0 += SLAB) {
-        for (var n = lane; n < SLAB * LEFT_LANES; n += LANES) {
-            let at = vec2<u32>(n % SLAB, n / SLAB);
-            let k = k0 + at.x;
-            let i = i0 + 4u * at.y;
-            lay_left(at, vec4<f32>(
-                weights_left(k, i, last), weights_left(k, i + 1u, last),
-                weights_left(k, i + 2u, last), weights_left(k, i + 3u, last),
-            ));
-        }
-        for (var n = lane; n < SLAB * FOURS; n += LANES) {
-            let at = vec2<u32>(n % SLAB, n / SLAB);
-            let k = k0 + at.x;
-            let o = o0 + 4u * at.y;
-            let slopes = vec4<f32>(
-                weights_right(k, o, last), weights_right(k, o + 1u, last),
-                weights_right(k, o + 2u, last), weights_right(k, o + 3u, last),
-            );
-            lay_right(at, slopes);
-            if n < LANES { seen += slopes; } else { more_seen += slopes; }
-        }
+        lay(lane, part, true, true);
+        seen[0] += part.right[0];
+        seen[1] += part.right[1];
         workgroupBarrier();
+        part = weights_part(lane, k0 + SLAB, last, i0, o0);
         result = multiplied(lane, result);
         workgroupBarrier();
     }
@@ -344,7 +369,7 @@ fn weights_back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
         workgroupBarrier();
     }
     if i0 == 0u {
-        keep_biases(lane, o0, seen, more_seen, start + proper_inputs() * layer.outputs);
+        keep_biases(lane, o0, seen, start + proper_inputs() * layer.outputs);
     }
 }
 
@@ -355,10 +380,12 @@ fn lay_rows(lane: u32, ii: u32, x: Sums) {
     slabs[to + RIGHT_LANES] = vec4<f32>(x.high[0][ii], x.high[1][ii], x.high[2][ii], x.high[3][ii]);
 }
 
-// Adds up what lanes have seen, over k; a slab of the right matrix has at most two fours a lane.
-fn keep_biases(lane: u32, o0: u32, seen: vec4<f32>, more_seen: vec4<f32>, start: u32) {
-    for (var n = lane; n < SLAB * FOURS; n += LANES) {
-        slabs[n] = select(more_seen, seen, n < LANES);
+// Adds up over k what lanes have seen.
+fn keep_biases(lane: u32, o0: u32, seen: array<vec4<f32>, 2>, start: u32) {
+    for (var m = 0u; m < 2u; m++) {
+        if lane + LANES * m < SLAB * FOURS {
+            slabs[lane + LANES * m] = seen[m];
+        }
     }
     workgroupBarrier();
     let o = o0 + lane;
@@ -371,11 +398,22 @@ fn keep_biases(lane: u32, o0: u32, seen: vec4<f32>, more_seen: vec4<f32>, start:
     }
 }
 
-fn units_left(k: u32, four: u32, p0: u32) -> vec4<f32> {
-    if k >= layer.outputs {
-        return vec4<f32>(0.0);
+fn units_part(lane: u32, k0: u32, p0: u32, u0: u32) -> Part {
+    var part = Part();
+    for (var m = 0u; m < 2u; m++) {
+        let n = lane + LANES * m;
+        let a = spot(n, LEFT_LANES, false);
+        if n < SLAB * LEFT_LANES && k0 + a.x < layer.outputs {
+            part.left[m] = above_of_four[((k0 + a.x) * block.stride + p0) / 4u + a.y];
+        }
+        let b = spot(n, FOURS, true);
+        if n < SLAB * FOURS {
+            let k = k0 + b.x;
+            let u = u0 + 4u * b.y;
+            part.right[m] = vec4<f32>(weight(u, k), weight(u + 1u, k), weight(u + 2u, k), weight(u + 3u, k));
+        }
     }
-    return above_of_four[(k * block.stride + p0) / 4u + four];
+    return part;
 }
 
 // From the slopes of a layer's outputs to those of the units before it.
@@ -387,18 +425,11 @@ fn units_back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation
         return;
     }
     var result = Sums(mat4x4<f32>(), mat4x4<f32>());
+    var part = units_part(lane, 0u, p0, u0);
     for (var k0 = 0u; k0 < layer.outputs; k0 += SLAB) {
-        for (var n = lane; n < SLAB * LEFT_LANES; n += LANES) {
-            let at = vec2<u32>(n / LEFT_LANES, n % LEFT_LANES);
-            lay_left(at, units_left(k0 + at.x, at.y, p0));
-        }
-        for (var n = lane; n < SLAB * FOURS; n += LANES) {
-            let at = vec2<u32>(n % SLAB, n / SLAB);
-            let k = k0 + at.x;
-            let u = u0 + 4u * at.y;
-            lay_right(at, vec4<f32>(weight(u, k), weight(u + 1u, k), weight(u + 2u, k), weight(u + 3u, k)));
-        }
+        lay(lane, part, false, true);
         workgroupBarrier();
+        part = units_part(lane, k0 + SLAB, p0, u0);
         result = multiplied(lane, result);
         workgroupBarrier();
     }
