@@ -2,7 +2,7 @@
 
 use super::device::{Adapter, Device, Mapped, Needs};
 use super::error::GpuError;
-use super::kernel::{copy, readable};
+use super::kernel::{mapped, readable};
 use super::times::{KernelTime, Stopwatch};
 use std::borrow::Cow;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -205,8 +205,6 @@ impl Compute {
         unsafe { self.compiled(source, entries, wgpu::ShaderRuntimeChecks::unchecked()) }
     }
 
-    /// Compiles entry points side by side: drivers take their time.
-    ///
     /// # Safety
     /// Without the checks that are not made, the shader does no harm.
     unsafe fn compiled(
@@ -215,16 +213,15 @@ impl Compute {
         entries: &[&str],
         checks: wgpu::ShaderRuntimeChecks,
     ) -> Result<Vec<Kernel>, GpuError> {
-        let module = self.device.attempt(0, || {
+        self.device.attempt(0, || {
             let descriptor = wgpu::ShaderModuleDescriptor {
                 label: None,
                 source: wgpu::ShaderSource::Wgsl(Cow::Borrowed(source)),
             };
             // SAFETY: as the caller says.
-            unsafe { self.device.inner.create_shader_module_trusted(descriptor, checks) }
-        })?;
-        let kernel = |entry: &str| {
-            self.device.attempt(0, || {
+            let module =
+                unsafe { self.device.inner.create_shader_module_trusted(descriptor, checks) };
+            let kernel = |entry: &&str| {
                 let descriptor = wgpu::ComputePipelineDescriptor {
                     label: Some(entry),
                     layout: None,
@@ -234,14 +231,9 @@ impl Compute {
                     cache: None,
                 };
                 let pipeline = self.device.inner.create_compute_pipeline(&descriptor);
-                Kernel { pipeline, entry: Arc::from(entry) }
-            })
-        };
-        std::thread::scope(|scope| {
-            let compilers = entries.iter().map(|entry| scope.spawn(|| kernel(entry)));
-            let compilers: Vec<_> = compilers.collect();
-            let panicked = |_| Err(GpuError::Failed("its compiler panicked".to_owned()));
-            compilers.into_iter().map(|kernel| kernel.join().unwrap_or_else(panicked)).collect()
+                Kernel { pipeline, entry: Arc::from(*entry) }
+            };
+            entries.iter().map(kernel).collect()
         })
     }
 
@@ -306,6 +298,18 @@ impl Compute {
     /// # Errors
     /// If the device fails.
     pub fn read(&self, buffers: &[&Buffer]) -> Result<Vec<Vec<u8>>, GpuError> {
+        self.read_as(buffers, <[u8]>::to_vec)
+    }
+
+    /// What is made of the bytes of buffers once all commands are done.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn read_as<T>(
+        &self,
+        buffers: &[&Buffer],
+        made: impl Fn(&[u8]) -> T,
+    ) -> Result<Vec<T>, GpuError> {
         let bytes = buffers.iter().map(|buffer| buffer.inner.size()).sum();
         let copies = self.device.attempt(bytes, || {
             let descriptor = wgpu::CommandEncoderDescriptor::default();
@@ -322,10 +326,11 @@ impl Compute {
         let (sent, came) = std::sync::mpsc::channel::<Mapped>();
         self.device.map(&copies, &sent)?;
         self.device.finish()?;
-        let read = copies.iter().map(|buffer| copy(&came, buffer)).collect();
+        let read: Vec<T> =
+            copies.iter().map(|buffer| mapped(&came, buffer, &made)).collect::<Result<_, _>>()?;
         copies.iter().for_each(wgpu::Buffer::unmap);
         *self.readers.lock().unwrap_or_else(PoisonError::into_inner) = copies;
-        read
+        Ok(read)
     }
 
     /// Memory of this size to read through: some of the last time's, or new.

@@ -229,8 +229,17 @@ pub(super) fn copy(
     came: &std::sync::mpsc::Receiver<Mapped>,
     buffer: &wgpu::Buffer,
 ) -> Result<Vec<u8>, GpuError> {
+    mapped(came, buffer, <[u8]>::to_vec)
+}
+
+/// What is made of the bytes of a buffer, once it is mapped.
+pub(super) fn mapped<T>(
+    came: &std::sync::mpsc::Receiver<Mapped>,
+    buffer: &wgpu::Buffer,
+    made: impl Fn(&[u8]) -> T,
+) -> Result<T, GpuError> {
     let failed = |what: &dyn core::fmt::Display| GpuError::Failed(what.to_string());
     came.recv().map_err(|error| failed(&error))?.map_err(|error| failed(&error))?;
     let view = buffer.get_mapped_range(..).map_err(|error| failed(&error))?;
-    Ok(view.to_vec())
+    Ok(made(&view))
 }

@@ -19,7 +19,7 @@ fn flat<N: Copy>(numbers: &[N], bytes_of: fn(N) -> [u8; 4]) -> Vec<u8> {
     bytes
 }
 
-/// The first numbers of bytes.
-pub fn read(bytes: &[u8], count: usize) -> Vec<f32> {
-    bytes.as_chunks().0[..count].iter().map(|bytes| f32::from_le_bytes(*bytes)).collect()
+/// The numbers of bytes.
+pub fn read(bytes: &[u8]) -> Vec<f32> {
+    bytes.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect()
 }

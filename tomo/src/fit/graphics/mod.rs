@@ -142,9 +142,9 @@ impl GraphicsFit {
     ) -> Result<(Loss, Vec<f32>), Error> {
         self.load(stretch, from)?;
         let pending = self.loss(stretch, 0, false)?;
-        let read = self.device.read(&[self.pixels.records(), &self.learning.gradient])?;
-        let loss = pending.ended(&bytes::read(&read[0], 2));
-        Ok((loss, bytes::read(&read[1], from.parameters.len())))
+        let buffers = [self.pixels.records(), &self.learning.gradient];
+        let read = self.device.read_as(&buffers, bytes::read)?;
+        Ok((pending.ended(&read[0]), read[1][..from.parameters.len()].to_vec()))
     }
 
     /// The device.
@@ -355,11 +355,12 @@ impl StepDevice<f32> for GraphicsFit {
             pending.push(self.loss(stretch, k, true)?);
         }
         let [parameters, first, second] = learning.buffers();
-        let read = device.read(&[parameters, first, second, pixels.records()])?;
-        let [parameters, first, second] =
-            [0, 1, 2].map(|k| bytes::read(&read[k], from.parameters.len()));
+        let mut read =
+            device.read_as(&[parameters, first, second, pixels.records()], bytes::read)?;
+        let records = read.pop().unwrap_or_default();
+        read.iter_mut().for_each(|numbers| numbers.truncate(from.parameters.len()));
+        let [parameters, first, second] = [0, 1, 2].map(|k| core::mem::take(&mut read[k]));
         self.learning.hold([&parameters, &first, &second]);
-        let records = bytes::read(&read[3], 2 * STEPS);
         let losses = pending.into_iter().zip(records.chunks(2));
         Ok(Taken {
             parameters,

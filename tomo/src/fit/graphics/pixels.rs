@@ -228,7 +228,9 @@ impl Pixels {
     /// # Errors
     /// If the device fails.
     pub fn fluxes(&self, device: &Compute, pairs: usize) -> Result<Vec<f32>, GpuError> {
-        Ok(read(&device.read(&[&self.fluxes])?[0], pairs))
+        let mut fluxes = device.read_as(&[&self.fluxes], read)?.pop().unwrap_or_default();
+        fluxes.truncate(pairs);
+        Ok(fluxes)
     }
 
     /// Puts dL/dpixel of each pair there.
