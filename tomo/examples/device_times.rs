@@ -14,8 +14,8 @@ use kerrlight_geodesic::gpu::{Adapter, Compute, GpuError, KernelTime, Needs, ada
 use kerrlight_tomo::dynamics::Axis;
 use kerrlight_tomo::fit::graphics::{GraphicsFit, open};
 use kerrlight_tomo::fit::{
-    Batch, BatchSize, Data, Drawn, ImageTerm, Objective, Region, State, StepDevice, Stretch,
-    Training, Weighted,
+    Batch, BatchSize, Data, Drawn, ForwardModel, ImageTerm, Objective, Region, State, StepDevice,
+    Stretch, Training, Weighted,
 };
 use kerrlight_tomo::optimise::{Adam, Muon, Polynomial};
 use kerrlight_tomo::representation::{
@@ -41,24 +41,28 @@ fn main() -> Answer<()> {
     let muon = (word("optimiser", "adam") == "muon").then(Muon::default);
     let size = |name: &str, usual: &str| word(name, usual).parse::<usize>();
     let sizes = [size("points", "57344")?, size("steps", "200")?, size("stretch", "256")?];
-    steps_of(&device, &*field, muon, sizes)
+    steps_of(&device, field, muon, sizes)
 }
 
-fn representation(name: &str) -> Answer<Box<dyn Representation<f32>>> {
+/// A representation and, of a network, its operations a point: forward, and forward and back.
+type Chosen = (Box<dyn Representation<f32>>, Option<[usize; 2]>);
+
+fn representation(name: &str) -> Answer<Chosen> {
     let (low, high) = ([-5.0; 3], [5.0; 3]);
     Ok(match name {
-        "bhnerf" => Box::new(Network::new(NetworkSettings::bhnerf())?),
-        "feature-grid" => Box::new(FeatureGrid::new(FeatureGridSettings {
-            low,
-            high,
-            coarsest: 8,
-            levels: 4,
-            activation: Activation::Sigmoid,
-            initial: -1.0,
-        })?),
+        "bhnerf" => {
+            let network = Network::new(NetworkSettings::bhnerf())?;
+            let operations = network.operations();
+            (Box::new(network), Some(operations))
+        }
+        "feature-grid" => {
+            let (coarsest, levels, activation, initial) = (8, 4, Activation::Sigmoid, -1.0);
+            let settings = FeatureGridSettings { coarsest, levels, low, high, activation, initial };
+            (Box::new(FeatureGrid::new(settings)?), None)
+        }
         "grid" => {
             let (nodes, activation, initial) = ([64; 3], Activation::Sigmoid, -10.0);
-            Box::new(Grid::new(GridSettings { nodes, low, high, activation, initial })?)
+            (Box::new(Grid::new(GridSettings { nodes, low, high, activation, initial })?), None)
         }
         other => return Err(format!("{other}: bhnerf, feature-grid or grid").into()),
     })
@@ -159,24 +163,14 @@ fn training(batch: BatchSize, steps: u64) -> Training {
 /// Steps from rays that have so many points.
 fn steps_of(
     adapter: &Adapter,
-    field: &dyn Representation<f32>,
+    (field, operations): Chosen,
     muon: Option<Muon>,
     [points, steps, most]: [usize; 3],
 ) -> Answer<()> {
+    let field = &*field;
     let (objective, axis) = objective()?;
     let model = &objective.model;
-    let mut all = Batch::default();
-    all.set((0..model.rays()).map(|ray| (ray as u32, 0)));
-    all.gather(model, axis, None);
-    // A stride that visits all rays.
-    let mut pairs = Vec::new();
-    let (mut held, mut k) = (0, 0);
-    while held < points {
-        let ray = (k * 1009) % model.rays();
-        held += all.starts[ray + 1] - all.starts[ray];
-        pairs.push((ray as u32, (k % model.frames()) as u32));
-        k += 1;
-    }
+    let (pairs, held) = pairs_with(model, axis, points);
     let training = Training { muon, ..training(BatchSize::Pixels(pairs.len()), steps as u64) };
     let now = State::<f32>::new(field, axis, &training).now;
     let mut fit = GraphicsFit::new(open(adapter)?, &objective, field, &training, None)?;
@@ -191,11 +185,14 @@ fn steps_of(
     fit.take(&stretch(3), &now)?;
     fit.device().start_timing()?;
     fit.take(&stretch(10), &now)?;
-    let counted = field.parameters();
     table(&fit.device().times(), 10.0, |entry| {
-        // Multiplications and additions of a network in its forward and backward passes.
-        let network = 2.0 * held as f64 * counted as f64;
-        matches!(entry, "forward" | "weights_back" | "units_back").then_some(network)
+        let [forward, all] = operations?;
+        let a_point = match entry {
+            "forward" | "weights_back" => forward,
+            "units_back" => all - 2 * forward,
+            _ => return None,
+        };
+        Some(held as f64 * a_point as f64)
     });
     let most = fit.most().min(steps).min(most);
     let (start, before) = (Instant::now(), processor_time());
@@ -204,12 +201,29 @@ fn steps_of(
     }
     let taken = (steps / most * most) as f64;
     println!(
-        "{} pairs, {held} points, {counted} parameters: {:.3} ms a step in all, {:.3} ms of them this thread's work",
+        "{} pairs, {held} points, {} parameters: {:.3} ms a step in all, {:.3} ms of them this thread's work",
         pairs.len(),
+        field.parameters(),
         start.elapsed().as_secs_f64() * 1e3 / taken,
         (processor_time() - before) * 1e3 / taken
     );
     Ok(())
+}
+
+/// Rays in frames, all over the screen, that have so many points, and how many exactly.
+fn pairs_with(model: &ForwardModel<f32>, axis: Axis, points: usize) -> (Vec<(u32, u32)>, usize) {
+    let mut all = Batch::default();
+    all.set((0..model.rays()).map(|ray| (ray as u32, 0)));
+    all.gather(model, axis, None);
+    let (mut pairs, mut held) = (Vec::new(), 0);
+    while held < points {
+        // A stride that visits all rays.
+        let k = pairs.len();
+        let ray = (k * 1009) % model.rays();
+        held += all.starts[ray + 1] - all.starts[ray];
+        pairs.push((ray as u32, (k % model.frames()) as u32));
+    }
+    (pairs, held)
 }
 
 /// Seconds that this thread has computed for; 0 where Linux does not tell.

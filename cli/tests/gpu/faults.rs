@@ -147,7 +147,7 @@ fn exact_limits_that_are_too_small_are_named() {
         }
     }
     let told = faults.told(at.path(), "shared:8192", &steps());
-    assert!(told.contains("workgroup's memory: 8192, needed are 8704"), "{told}");
+    assert!(told.contains("workgroup's memory: 8192, needed are 12288"), "{told}");
     assert!(!at.path().join("run").exists());
     let output = kerrlight_in(at.path(), &variables, &borrowed(&render()));
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -1,7 +1,7 @@
 // A ray under way: Taylor series, points on them, crossings, the end.
 
-// The series about the present point, and the length of the step for which they hold. All is written out: numbers of a
-// loop's turn would lie in memory instead of registers, and rays take five times as long.
+// The series about the present point, and the length of the step for which they hold. All is written out: in
+// a loop the numbers would lie in memory instead of registers, and rays take eight times as long.
 fn kerr_expand(ray: KerrRay, walk: KerrWalk, quadratures: bool, series: ptr<function, KerrSeries>) {
     // Of v: the powers s = v^2 and c = v^3; of the direction n: z = cos^2 theta and b = z n.
     let radial = vec3<f32>(ray.radial.x, 1.5 * ray.radial.y, 2.0 * ray.radial.z);
