@@ -60,11 +60,12 @@ impl<T: Float> Trainer<'_, T> {
 
     /// Judges the losses as single steps do, and moves on.
     fn moved(&self, taken: Taken<T>, state: &mut State<T>) -> Result<Outcome, Error> {
-        let Taken { parameters, moments: [first, second], losses } = taken;
+        let Taken { parameters, moments: [first, second], losses, of_axis } = taken;
         let begin = state.now.step;
+        let turns = of_axis.iter().all(|slope| slope.is_finite());
         for (loss, step) in losses.iter().zip(begin..) {
             let calm = state.good.as_ref().map_or(f64::INFINITY, |good| good.loss);
-            if !loss.total.is_finite() || loss.total > self.training.divergence * calm {
+            if !loss.total.is_finite() || !turns || loss.total > self.training.divergence * calm {
                 return Ok(step_back(state, loss.total, step)?);
             }
             state.now.loss = loss.total;
@@ -73,6 +74,7 @@ impl<T: Float> Trainer<'_, T> {
             }
         }
         let now = &mut state.now;
+        self.turn(now, of_axis);
         now.step += losses.len() as u64;
         now.adam.steps += losses.len() as u64;
         (now.parameters, now.adam.first, now.adam.second) = (parameters, first, second);

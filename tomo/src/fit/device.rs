@@ -62,6 +62,8 @@ pub struct Taken<T> {
     pub moments: [Vec<T>; 2],
     /// Loss of each step, before it was taken.
     pub losses: Vec<Loss>,
+    /// Slope of the last loss along the sphere of axes, if the axis is learnt.
+    pub of_axis: [f64; 3],
 }
 
 /// Takes steps in place of this processor.
@@ -69,7 +71,7 @@ pub trait StepDevice<T>: Send {
     /// Its name.
     fn name(&self) -> &str;
 
-    /// The most steps of a stretch.
+    /// The most steps of a stretch: one if the axis is learnt.
     fn most(&self) -> usize;
 
     /// Takes these steps from where parameters and moments are.

@@ -259,6 +259,14 @@ impl<T: Float> ForwardModel<T> {
     }
 }
 
+impl ForwardModel<f32> {
+    /// Slope of each node's weight with respect to the axis, in the space around the sphere, and nothing; none without
+    /// redshift.
+    pub(super) fn slopes_of_weights(&self, axis: Axis) -> Vec<[f32; 4]> {
+        self.shift.as_ref().map_or(Vec::new(), |shift| shift.slopes(axis, &self.plain_weight))
+    }
+}
+
 /// An emission field: a representation with its parameters, and where it is worth evaluating.
 #[derive(Clone, Copy)]
 pub struct Field<'a, T> {

@@ -66,6 +66,17 @@ impl Shift {
         });
     }
 
+    /// scale dg^power/dξ of each node, in the space around the sphere, and nothing.
+    pub fn slopes(&self, axis: Axis, scale: &[f64]) -> Vec<[f32; 4]> {
+        let vector = axis.vector();
+        let of = |(scale, node): (&f64, &Node)| {
+            let Some((g, [x, y, z])) = node.shift(vector) else { return [0.0; 4] };
+            let factor = scale * self.power * g.powf(self.power - 1.0);
+            [x, y, z, 0.0].map(|slope| (factor * slope) as f32)
+        };
+        scale.par_iter().zip(&self.nodes).map(of).collect()
+    }
+
     /// Σ cotangent · dg^power/dξ, along the sphere.
     pub fn vjp(&self, axis: Axis, cotangents: &[f64]) -> [f64; 3] {
         let vector = axis.vector();

@@ -173,21 +173,25 @@ impl<T: Float> Trainer<'_, T> {
     }
 
     fn learn(&mut self, now: &mut Progress<T>, of_axis: [f64; 3]) {
-        let Training { adam, muon, axis_rate, .. } = &self.training;
-        let (part, rate) = (self.part(now, 0), self.rate(now, 0));
+        let Training { adam, muon, .. } = &self.training;
+        let rate = self.rate(now, 0);
         let (gradient, parameters) = (&self.gradient, &mut now.parameters);
         match muon {
             Some(muon) => muon.step(rate, gradient, &self.matrices, &mut now.adam, parameters),
             None => adam.step(rate, gradient, &mut now.adam, parameters),
         }
         self.representation.project(&mut now.parameters);
-        if let Some(axis_rate) = axis_rate {
-            let mut moved = now.axis.vector();
-            let rate = part * axis_rate.rate(now.step);
-            adam.step(rate, &of_axis, &mut now.axis_adam, &mut moved);
-            now.axis = Axis::new(moved).unwrap_or(now.axis);
-        }
+        self.turn(now, of_axis);
         now.step += 1;
+    }
+
+    /// Turns the axis, if it is learnt.
+    pub(super) fn turn(&self, now: &mut Progress<T>, of_axis: [f64; 3]) {
+        let Training { adam, axis_rate: Some(axis_rate), .. } = &self.training else { return };
+        let mut moved = now.axis.vector();
+        let rate = self.part(now, 0) * axis_rate.rate(now.step);
+        adam.step(rate, &of_axis, &mut now.axis_adam, &mut moved);
+        now.axis = Axis::new(moved).unwrap_or(now.axis);
     }
 
     /// Part of the rates that step number `ahead` from here takes.

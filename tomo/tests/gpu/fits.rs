@@ -54,14 +54,21 @@ impl Fit<'_> {
     }
 }
 
-fn fits(representation: &dyn Representation<f32>) -> [Fit<'_>; 4] {
+fn fits(representation: &dyn Representation<f32>) -> [Fit<'_>; 6] {
     let fit = |batch, masked, kind| Fit { representation, training: training(batch, masked), kind };
     let pairs = || fit(BatchSize::Pixels(30), true, Kind::Images);
+    let turning = |batch, kind| {
+        let training = training(batch, true);
+        let axis_rate = Some(training.rate);
+        Fit { representation, training: Training { axis_rate, ..training }, kind }
+    };
     [
         pairs(),
         fit(BatchSize::Frames(2), false, Kind::Images),
         fit(BatchSize::All, true, Kind::ImagesAndFlux),
         Fit { training: Training { muon: Some(Muon::default()), ..pairs().training }, ..pairs() },
+        turning(BatchSize::Pixels(60), Kind::Falling),
+        turning(BatchSize::Frames(2), Kind::ImagesAndFlux),
     ]
 }
 
@@ -96,7 +103,14 @@ fn code_twenty_steps_are_those_of_the_processor() {
         let most = pairs.fold(0.0, f64::max);
         let moved = apart(&state.now.parameters, &ours.now.parameters);
         let batch = fit.training.batch;
-        println!("{batch:?}: losses differ by {most:.1e}, parameters by {moved:.1e}");
+        let [axis, our_axis] = [&state, &ours].map(|state| state.now.axis.vector());
+        let turned = (0..3).map(|k| (axis[k] - our_axis[k]).powi(2)).sum::<f64>().sqrt();
+        println!(
+            "{batch:?}: losses differ by {most:.1e}, parameters by {moved:.1e}, axes by {turned:.1e}"
+        );
+        let learns = fit.training.axis_rate.is_some();
+        assert!((fit.start().now.axis != state.now.axis) == learns);
+        assert!(turned < 1e-5, "{batch:?}: {turned:e}");
         assert!(losses.len() == 20 && found.len() == 20);
         assert!(losses[19] < 0.9 * losses[0] || matches!(batch, BatchSize::Pixels(_)));
         let allowed = fit.rounding();
@@ -250,9 +264,7 @@ fn exact_a_divergence_is_stepped_back_from() {
 fn what_is_not_done_is_named_with_its_key() {
     let small = problem::small();
     let training = training(BatchSize::All, false);
-    let rate = Some(training.rate);
     for (key, training) in [
-        ("axis:", Training { axis_rate: rate, ..training.clone() }),
         ("training.parts:", Training { parts: 2, ..training.clone() }),
         ("training.optimiser:", Training { lbfgs: Some(Lbfgs::default()), ..training.clone() }),
     ] {

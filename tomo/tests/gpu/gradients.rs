@@ -2,6 +2,7 @@
 
 use super::device;
 use super::problem::{self, Kind, axis, objective, start, training};
+use kerrlight_tomo::dynamics::Axis;
 use kerrlight_tomo::fit::graphics::GraphicsFit;
 use kerrlight_tomo::fit::{
     BatchSize, Buffers, Drawn, Field, Gradients, Loss, Objective, Occupancy, Progress, Stretch,
@@ -24,12 +25,14 @@ impl<'a> Both<'a> {
         representation: &'a dyn Representation<f32>,
         (kind, draw): (Kind, Drawn),
         (masked, most): (bool, Option<usize>),
+        learns_axis: bool,
     ) -> Option<Self> {
         let batch = match &draw {
             Drawn::Pixels(pairs) => BatchSize::Pixels(pairs.len()),
             Drawn::Frames(frames) => BatchSize::Frames(frames.len()),
         };
-        let training = training(batch, masked);
+        let mut training = training(batch, masked);
+        training.axis_rate = learns_axis.then_some(training.rate);
         let mut objective = objective(kind);
         objective.model.weigh(axis());
         let (device, now) = (device()?, start(representation, &training).now);
@@ -47,24 +50,32 @@ impl<'a> Both<'a> {
         start(self.representation, &self.training).now
     }
 
-    fn processor(&self, parameters: &[f32]) -> (Loss, Vec<f32>) {
+    fn processor(&self, parameters: &[f32]) -> (Loss, Vec<f32>, [f64; 3]) {
         let occupancy = self.occupancy.as_ref();
         let representation = self.representation;
         let field = Field { representation, parameters, axis: axis(), occupancy };
         let mut gradient = vec![0.0; parameters.len()];
-        let gradients = Gradients { parameters: &mut gradient, axis: None };
+        let mut of_axis = [0.0; 3];
+        let learns = self.training.learns_axis(representation);
+        let gradients =
+            Gradients { parameters: &mut gradient, axis: learns.then_some(&mut of_axis) };
         let selection = self.draw.selection();
         let buffers = &mut Buffers::default();
         let loss = self.objective.value_and_gradient(field, selection, gradients, buffers);
-        (loss, gradient)
+        (loss, gradient, of_axis)
     }
 
-    fn device(&mut self, parameters: &[f32]) -> (Loss, Vec<f32>) {
+    fn device(&mut self, parameters: &[f32]) -> (Loss, Vec<f32>, [f64; 3]) {
+        self.device_about(axis(), parameters)
+    }
+
+    fn device_about(&mut self, axis: Axis, parameters: &[f32]) -> (Loss, Vec<f32>, [f64; 3]) {
+        self.objective.model.weigh(axis);
         let now = Progress { parameters: parameters.to_vec(), ..self.now() };
         let stretch = Stretch {
             objective: &self.objective,
             adam: self.training.adam,
-            axis: axis(),
+            axis,
             occupancy: self.occupancy.as_ref(),
             draws: vec![self.draw.clone()],
             rates: vec![0.0],
@@ -81,8 +92,8 @@ fn pixels(count: u32) -> Drawn {
 /// Loss, its terms and points, and the gradient relative to its largest number.
 fn agree(name: &str, both: &mut Both<'_>) {
     let parameters = both.now().parameters;
-    let (loss, gradient) = both.processor(&parameters);
-    let (ours, found) = both.device(&parameters);
+    let (loss, gradient, of_axis) = both.processor(&parameters);
+    let (ours, found, turned) = both.device(&parameters);
     let apart = (ours.total / loss.total - 1.0).abs();
     let largest = gradient.iter().fold(0.0f32, |most, g| most.max(g.abs()));
     let pairs = gradient.iter().zip(&found);
@@ -97,8 +108,15 @@ fn agree(name: &str, both: &mut Both<'_>) {
     assert!(loss.points > 20 && largest > 0.0, "{name}");
     assert!(apart < 2e-6, "{name}: {} {}", ours.total, loss.total);
     assert!(error < 5e-6, "{name}: {error:e}");
+    let length = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let off = length([0, 1, 2].map(|k| of_axis[k] - turned[k])) / length(of_axis).max(1e-30);
+    if both.training.learns_axis(both.representation) {
+        println!("{name}: slope along the axis differs by {off:.1e}");
+        assert!(length(of_axis) > 0.0);
+    }
+    assert!(off < 2e-5, "{name}: {of_axis:?} {turned:?}");
     let again = both.device(&parameters);
-    assert!(again.0 == ours && again.1 == found, "{name}: other bytes the second time");
+    assert!(again == (ours, found, turned), "{name}: other bytes the second time");
 }
 
 #[test]
@@ -118,8 +136,11 @@ fn code_networks_have_the_gradients_of_the_processor() {
         ("mlp4d, falling", &mlp4d, (Kind::Falling, frames()), (false, None)),
     ];
     for (name, representation, data, how) in cases {
-        let Some(mut both) = Both::new(representation, data, how) else { return };
-        agree(name, &mut both);
+        for learns_axis in [false, true] {
+            let both = Both::new(representation, data.clone(), how, learns_axis);
+            let Some(mut both) = both else { return };
+            agree(name, &mut both);
+        }
     }
 }
 
@@ -136,8 +157,11 @@ fn code_grids_have_the_gradients_of_the_processor() {
         ("feature grid, fluxes", &features, (Kind::ImagesAndFlux, frames()), (false, Some(128))),
     ];
     for (name, representation, data, how) in cases {
-        let Some(mut both) = Both::new(representation, data, how) else { return };
-        agree(name, &mut both);
+        for learns_axis in [false, true] {
+            let both = Both::new(representation, data.clone(), how, learns_axis);
+            let Some(mut both) = both else { return };
+            agree(name, &mut both);
+        }
     }
 }
 
@@ -153,11 +177,11 @@ fn exact_gradients_are_slopes_of_the_loss() {
     ];
     for (name, representation, kind, step) in cases {
         let draw = Drawn::Frames(vec![1, 3]);
-        let Some(mut both) = Both::new(representation, (kind, draw), (false, None)) else {
+        let Some(mut both) = Both::new(representation, (kind, draw), (false, None), true) else {
             return;
         };
         let parameters = both.now().parameters;
-        let (_, gradient) = both.device(&parameters);
+        let (_, gradient, of_axis) = both.device(&parameters);
         let along: Vec<f32> =
             (0..parameters.len()).map(|k| (k as f32 * 1.7).sin() * parameters[k].abs()).collect();
         let product: f64 =
@@ -170,5 +194,16 @@ fn exact_gradients_are_slopes_of_the_loss() {
         let slope = (loss(step) - loss(-step)) / f64::from(2.0 * step);
         println!("{name}: slope {slope:.6}, product {product:.6}");
         assert!((slope / product - 1.0).abs() < 2e-3, "{name}: {slope} {product}");
+        // Along the sphere of axes.
+        let across = axis().tangent([0.7, -0.4, 0.9]);
+        let product: f64 = of_axis.iter().zip(across).map(|(g, v)| g * v).sum();
+        let mut loss = |step: f64| {
+            let [x, y, z] = axis().vector();
+            let [u, v, w] = across.map(|c| step * c);
+            both.device_about(Axis::new([x + u, y + v, z + w]).unwrap(), &parameters).0.total
+        };
+        let slope = (loss(2e-3) - loss(-2e-3)) / 4e-3;
+        println!("{name}: slope of the axis {slope:.6}, product {product:.6}");
+        assert!((slope / product - 1.0).abs() < 2e-2, "{name}: {slope} {product}");
     }
 }

@@ -2,8 +2,9 @@
 
 use super::adam::Learning;
 use super::grid::{Features, Level, Levels, Voxels};
-use super::network::{Front, Network, Shape};
+use super::network::Network;
 use super::pixels::Points;
+use super::shape::{Front, Shape};
 use crate::Error;
 use crate::fit::device::DeviceError;
 use crate::representation::{
@@ -24,7 +25,7 @@ pub enum Field {
 }
 
 impl Field {
-    /// Of a representation.
+    /// Of a representation; with `of_places` it finds dL/dplace, too.
     ///
     /// # Errors
     /// If it has no kernels, or the device fails.
@@ -32,23 +33,23 @@ impl Field {
         device: &Compute,
         representation: &dyn Representation<f32>,
         (points, learning): (&Points, &Learning),
-        most: Option<usize>,
+        (most, of_places): (Option<usize>, bool),
     ) -> Result<Self, Error> {
         let buffers = (&learning.parameters, &learning.gradient);
         Ok(match representation.built_in() {
             Some(BuiltIn::Network(network)) => {
                 let shape = shape(network.settings());
-                Self::Network(Network::new(device, &shape, points, buffers, most)?)
+                Self::Network(Network::new(device, &shape, points, buffers, (most, of_places))?)
             }
             Some(BuiltIn::Grid(grid)) => {
                 let levels = voxels(grid.settings());
-                Self::Voxels(Voxels::new(device, &levels, points, buffers)?)
+                Self::Voxels(Voxels::new(device, &levels, points, buffers, of_places)?)
             }
             Some(BuiltIn::FeatureGrid(grid)) => {
                 let levels = levels(grid.settings());
                 let shape = behind(grid.settings(), &levels);
-                let network = Network::new(device, &shape, points, buffers, most)?;
-                Self::Features(Features::new(device, &levels, network, points, buffers)?)
+                let network = Network::new(device, &shape, points, buffers, (most, of_places))?;
+                Self::Features(Features::new(device, &levels, network, points, buffers, of_places)?)
             }
             None => {
                 return Err(DeviceError("representation.kind: no kernels".to_owned()).into());

@@ -34,8 +34,17 @@ pub struct Levels {
 const ROW: usize = 64 * 32_768;
 const SHADER: &str = include_str!("shaders/grid.wgsl");
 const ACTIVATIONS: &str = include_str!("shaders/activations.wgsl");
-const ENTRIES: [&str; 8] =
-    ["voxels", "voxels_back", "features", "gate", "begin", "largest", "scatter", "settle"];
+const ENTRIES: [&str; 9] = [
+    "voxels",
+    "voxels_back",
+    "features",
+    "gate",
+    "begin",
+    "largest",
+    "scatter",
+    "settle",
+    "places_back",
+];
 
 impl Levels {
     /// Numbers of a point.
@@ -77,6 +86,7 @@ struct Binding<'a> {
     sums: [&'a Buffer; 2],
     parameters: &'a Buffer,
     gradient: &'a Buffer,
+    of_places: bool,
 }
 
 impl Binding<'_> {
@@ -87,7 +97,7 @@ impl Binding<'_> {
         bindings: &[u32],
         invocations: usize,
     ) -> Result<Task, GpuError> {
-        let Points { places, values, bends, cotangents, extent, .. } = self.points;
+        let Points { places, values, bends, cotangents, extent, of_places, .. } = self.points;
         let all = [
             self.block,
             level,
@@ -102,6 +112,7 @@ impl Binding<'_> {
             self.sums[0],
             self.sums[1],
             self.gradient,
+            of_places,
         ];
         let buffers: Vec<_> = bindings.iter().map(|k| (*k, all[*k as usize])).collect();
         let bound = self.device.bind(&self.kernels[entry], &buffers)?;
@@ -121,6 +132,9 @@ impl Binding<'_> {
             vec![self.bind(4, first, &[10], 1)?, self.bind(5, first, &[0, 1, 2, 9, 10], points)?];
         for level in uniforms {
             tasks.push(self.bind(6, level, &[0, 1, 2, 3, 9, 10, 11], points)?);
+            if self.of_places {
+                tasks.push(self.bind(8, level, &[0, 1, 2, 3, 4, 9, 13], points)?);
+            }
         }
         tasks.push(self.bind(7, first, &[0, 1, 10, 11, 12], levels.parameters())?);
         Ok(tasks)
@@ -135,7 +149,7 @@ pub struct Voxels {
 }
 
 impl Voxels {
-    /// Voxels that read these parameters and add to this gradient.
+    /// Voxels that read these parameters and add to this gradient; with `of_places` they find dL/dplace, too.
     ///
     /// # Errors
     /// If the device has no room, or fails.
@@ -144,6 +158,7 @@ impl Voxels {
         levels: &Levels,
         points: &Points,
         (parameters, gradient): (&Buffer, &Buffer),
+        of_places: bool,
     ) -> Result<Self, GpuError> {
         let source = [ACTIVATIONS, SHADER].join("\n");
         let kernels = &compiled(device, &source, &ENTRIES)?[..];
@@ -151,8 +166,18 @@ impl Voxels {
         let (slopes, peak) = (&device.storage(4 * points.room as u64)?, &device.storage(4)?);
         let sums = [peak, &device.storage(8 * levels.parameters() as u64)?];
         let rows = slopes;
-        let binding =
-            Binding { device, kernels, block, points, rows, slopes, sums, parameters, gradient };
+        let binding = Binding {
+            device,
+            kernels,
+            block,
+            points,
+            rows,
+            slopes,
+            sums,
+            parameters,
+            gradient,
+            of_places,
+        };
         let uniforms = levels.uniforms(device)?;
         let there = [0, 1, 2, 3, 4, 6, 7];
         let forward = vec![binding.bind(0, &uniforms[0], &there, points.room)?];
@@ -188,7 +213,8 @@ struct Layers {
 }
 
 impl Features {
-    /// Features that read these parameters and add to this gradient, for a network that is given them.
+    /// Features that read these parameters and add to this gradient, for a network that is given them; with `of_places`
+    /// they find dL/dplace, too.
     ///
     /// # Errors
     /// If the device has no room, or fails.
@@ -198,6 +224,7 @@ impl Features {
         network: Network,
         points: &Points,
         (parameters, gradient): (&Buffer, &Buffer),
+        of_places: bool,
     ) -> Result<Self, GpuError> {
         let source = [ACTIVATIONS, SHADER].join("\n");
         let kernels = &compiled(device, &source, &ENTRIES)?[..];
@@ -216,6 +243,7 @@ impl Features {
                 sums,
                 parameters,
                 gradient,
+                of_places,
             };
             let features = uniforms
                 .iter()

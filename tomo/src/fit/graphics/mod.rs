@@ -11,6 +11,7 @@
 //! that goes to the device.
 
 mod adam;
+mod axis;
 mod bytes;
 mod fall;
 mod field;
@@ -18,9 +19,11 @@ mod grid;
 mod kernels;
 mod muon;
 mod network;
+mod nodes;
 mod pixels;
 mod refusals;
 mod rooms;
+mod shape;
 mod terms;
 
 use super::device::{DeviceError, Drawn, StepDevice, Stretch, Taken};
@@ -36,7 +39,7 @@ use fall::FallTable;
 use field::Field;
 use kerrlight_geodesic::gpu::{Adapter, Commands, Compute, GpuError, Needs};
 use muon::Turning;
-use pixels::{Gathering, Node, Pair, Pixels};
+use pixels::{Gathering, Pair, Pixels};
 pub use refusals::check;
 use rooms::{Ends, Pieces, pieces};
 
@@ -105,14 +108,17 @@ impl GraphicsFit {
         let events = !representation.is_carried();
         // What is not carried does not fall.
         let fall = model.fall.as_ref().filter(|_| !events).map(FallTable::new);
-        let pixels = Pixels::new(&device, pieces.room(model.points(), cells, STEPS), fall)?;
+        let axis = training.learns_axis(representation).then(|| model.is_shifted());
+        let room = pieces.room((model.points(), cells, STEPS), axis);
+        let pixels = Pixels::new(&device, room, fall)?;
         let positive = field::is_positive(representation);
         let matrices = training.muon.map(|_| representation.matrices()).unwrap_or_default();
         let count = representation.parameters();
         let learning = Learning::new(&device, count, positive, &matrices)?;
         let turning = training.muon.map(|muon| Turning::new(&device, muon, &matrices, &learning));
         let turning = turning.transpose()?.flatten();
-        let field = Field::new(&device, representation, (&pixels.points, &learning), most)?;
+        let (buffers, how) = ((&pixels.points, &learning), (most, axis.is_some()));
+        let field = Field::new(&device, representation, buffers, how)?;
         let mut lit = vec![false; model.pixels()];
         model.pixel().iter().for_each(|pixel| lit[*pixel as usize] = true);
         let dark = (0..lit.len()).filter(|pixel| !lit[*pixel]).collect();
@@ -131,7 +137,8 @@ impl GraphicsFit {
         })
     }
 
-    /// Loss and gradient of the first step of a stretch, which is not taken.
+    /// Loss of the first step of a stretch, which is not taken, and its gradient with respect to parameters and, if that is
+    /// learnt, the axis.
     ///
     /// # Errors
     /// If the device fails.
@@ -139,12 +146,19 @@ impl GraphicsFit {
         &mut self,
         stretch: &Stretch<'_, f32>,
         from: &Progress<f32>,
-    ) -> Result<(Loss, Vec<f32>), Error> {
+    ) -> Result<(Loss, Vec<f32>, [f64; 3]), Error> {
         self.load(stretch, from)?;
         let pending = self.loss(stretch, 0, false)?;
         let buffers = [self.pixels.records(), &self.learning.gradient];
         let read = self.device.read_as(&buffers, bytes::read)?;
-        Ok((pending.ended(&read[0]), read[1][..from.parameters.len()].to_vec()))
+        let gradient = read[1][..from.parameters.len()].to_vec();
+        Ok((pending.ended(&read[0]), gradient, self.of_axis(stretch.axis)?))
+    }
+
+    /// The slope of the last step's loss along the sphere of axes; zero if the axis is not learnt.
+    fn of_axis(&self, axis: Axis) -> Result<[f64; 3], GpuError> {
+        let sum = self.pixels.axis.as_ref().map(|slope| slope.sum(&self.device)).transpose()?;
+        Ok(axis.tangent(sum.unwrap_or_default()))
     }
 
     /// The device.
@@ -157,21 +171,10 @@ impl GraphicsFit {
         let Self { device, pixels, learning, events, .. } = self;
         let model = &stretch.objective.model;
         if self.loaded_for != Some(stretch.axis) {
-            let delay = |k: usize| model.delay.get(k).copied().unwrap_or(0.0);
-            let origins = model.fall.as_ref().filter(|_| !*events).map(|fall| fall.parts().1);
-            let motion = |k: usize| match origins {
-                Some(origins) => {
-                    let [high, low, azimuth] = fall::of_node(&origins[k]);
-                    [high, low, delay(k), azimuth]
-                }
-                None => [model.rate[k], model.phase.get(k).copied().unwrap_or(0.0), delay(k), 0.0],
-            };
-            let node = |k: usize| Node {
-                place: [0, 1, 2].map(|c| model.position[c][k]),
-                weight: model.weight[k],
-                motion: motion(k),
-            };
-            pixels.load(device, (0..model.points()).map(node))?;
+            pixels.load(device, nodes::nodes(model, !*events))?;
+            if let Some(axis) = &pixels.axis {
+                axis.load(device, &model.slopes_of_weights(stretch.axis))?;
+            }
             self.loaded_for = Some(stretch.axis);
         }
         if let Some(mask) = stretch.occupancy {
@@ -238,8 +241,7 @@ impl GraphicsFit {
             field.forward(commands, points);
             pixels.sum(commands, pairs.len());
             pixels.spread(commands, pairs.len());
-            field.backward(commands, points);
-            self.end(commands, ends);
+            self.back(commands, (pairs.len(), points), ends);
         })
     }
 
@@ -272,8 +274,7 @@ impl GraphicsFit {
             pixels.set_slopes(device, &slopes)?;
             device.run(|commands| {
                 pixels.spread(commands, pairs.len());
-                field.backward(commands, points);
-                self.end(commands, ends);
+                self.back(commands, (pairs.len(), points), ends);
             })?;
         }
         objective.add_terms(&mut loss);
@@ -284,11 +285,14 @@ impl GraphicsFit {
     fn begin(&self, commands: &mut Commands, ends: Ends) {
         if ends.is_first {
             commands.clear(&self.learning.gradient);
+            self.pixels.axis.iter().for_each(|axis| axis.begin(commands));
         }
     }
 
-    /// Behind the last piece of a step that is taken.
-    fn end(&self, commands: &mut Commands, ends: Ends) {
+    /// From the cotangents of a piece to the gradient; behind the last piece of a step that is taken, the step.
+    fn back(&self, commands: &mut Commands, (pairs, points): (usize, usize), ends: Ends) {
+        self.field.backward(commands, points);
+        self.pixels.axis.iter().for_each(|axis| axis.add(commands, pairs));
         if ends.is_last_and_learns {
             self.learning.learn(commands);
             self.turning.iter().for_each(|turning| turning.learn(commands));
@@ -334,7 +338,8 @@ impl StepDevice<f32> for GraphicsFit {
     }
 
     fn most(&self) -> usize {
-        STEPS
+        // The processor turns the axis.
+        if self.pixels.axis.is_some() { 1 } else { STEPS }
     }
 
     fn take(
@@ -366,6 +371,7 @@ impl StepDevice<f32> for GraphicsFit {
             parameters,
             moments: [first, second],
             losses: losses.map(|(pending, record)| pending.ended(record)).collect(),
+            of_axis: self.of_axis(stretch.axis)?,
         })
     }
 }

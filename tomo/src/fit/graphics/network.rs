@@ -3,136 +3,9 @@
 use super::bytes::words;
 use super::kernels::compiled;
 use super::pixels::Points;
+use super::shape::{Front, Layer, Shape, Tiling};
 use kerrlight_geodesic::gpu::{Bound, Buffer, Commands, Compute, GpuError, Kernel};
 use kerrlight_geodesic::wgsl;
-
-/// What a network looks like: parameters are layer after layer, each its kernel (inputs × outputs, row by row) and then
-/// its biases.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Shape {
-    /// What it is given.
-    pub front: Front,
-    /// Where its parameters start.
-    pub start: usize,
-    /// Units of a hidden layer.
-    pub width: usize,
-    /// Hidden layers.
-    pub hidden: usize,
-    /// What it is given is appended to the units of this hidden layer, counted from 1.
-    pub skip: Option<usize>,
-    /// Of the output: 0 sigmoid, 1 softplus, 2 none.
-    pub activation: u32,
-    /// Added to the output before it.
-    pub shift: f32,
-}
-
-/// Inputs of a network.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Front {
-    /// The encoded point.
-    Encoded {
-        /// What x, y, z (or t, x, y, z) are multiplied with.
-        scales: [f32; 4],
-        /// Coordinates: 3 or 4.
-        dimension: usize,
-        /// Degree of the positional encoding.
-        degree: usize,
-    },
-    /// So many numbers that another kernel has made, and a one behind them; their slopes are wanted.
-    Given(usize),
-}
-
-/// A layer: columns of activations, and where its parameters are.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Layer {
-    base: usize,
-    units: usize,
-    tail: usize,
-    inputs: usize,
-    outputs: usize,
-    into: usize,
-    offset: usize,
-}
-
-/// How 256 lanes share a tile of a product of matrices, four numbers of the left one by eight of the right one each.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Tiling {
-    left_lanes: usize,
-    right_lanes: usize,
-    slab: usize,
-}
-
-impl Tiling {
-    /// For layers so wide: no wider than they are, where that can be.
-    fn of(width: usize) -> Self {
-        let (right_lanes, slab) = match width {
-            0..=32 => (4, 8),
-            33..=64 => (8, 16),
-            _ => (16, 16),
-        };
-        Self { left_lanes: 256 / right_lanes, right_lanes, slab }
-    }
-
-    fn constants(self) -> String {
-        let Self { left_lanes, right_lanes, slab } = self;
-        format!(
-            "const LEFT_LANES = {left_lanes}u;\nconst RIGHT_LANES = {right_lanes}u;\nconst SLAB = {slab}u;\n"
-        )
-    }
-
-    fn left(self, numbers: usize) -> u32 {
-        numbers.div_ceil(4 * self.left_lanes) as u32
-    }
-
-    fn right(self, numbers: usize) -> u32 {
-        numbers.div_ceil(8 * self.right_lanes) as u32
-    }
-}
-
-impl Shape {
-    fn encoded(&self) -> usize {
-        match self.front {
-            Front::Encoded { dimension, degree, .. } => dimension * (1 + 2 * degree),
-            Front::Given(inputs) => inputs,
-        }
-    }
-
-    fn is_given(&self) -> bool {
-        matches!(self.front, Front::Given(_))
-    }
-
-    /// Columns of activations: the encoded point, a one, and all units.
-    fn columns(&self) -> usize {
-        self.encoded() + 1 + self.hidden * self.width
-    }
-
-    /// Hidden layers, and at last the output.
-    fn layers(&self) -> Vec<Layer> {
-        let (encoded, width) = (self.encoded(), self.width);
-        let mut offset = self.start;
-        let layer = |k: usize| {
-            let skip = k > 0 && self.skip == Some(k);
-            let units = if k == 0 { encoded } else { width };
-            let made = Layer {
-                base: if k == 0 { 0 } else { encoded + 1 + (k - 1) * width },
-                units,
-                tail: if skip { 0 } else { encoded },
-                inputs: units + if skip { encoded } else { 0 } + 1,
-                outputs: if k == self.hidden { 1 } else { width },
-                into: encoded + 1 + k * width,
-                offset,
-            };
-            offset += made.inputs * made.outputs;
-            made
-        };
-        (0..=self.hidden).map(layer).collect()
-    }
-
-    /// Number of parameters.
-    pub fn parameters(&self) -> usize {
-        self.layers().iter().map(|layer| layer.inputs * layer.outputs).sum()
-    }
-}
 
 /// Points of spans: those of the shader.
 const SPAN: usize = 512;
@@ -143,7 +16,7 @@ const BLOCK: usize = 1 << 16;
 
 const SHADER: &str = include_str!("shaders/network.wgsl");
 const ACTIVATIONS: &str = include_str!("shaders/activations.wgsl");
-const ENTRIES: [&str; 8] = [
+const ENTRIES: [&str; 9] = [
     "encode",
     "forward",
     "emit",
@@ -152,6 +25,7 @@ const ENTRIES: [&str; 8] = [
     "weights_back",
     "units_back",
     "add_up",
+    "encode_back",
 ];
 
 /// A network with its memory.
@@ -189,6 +63,8 @@ pub struct Memory {
     /// Slopes of what a layer gives and takes, by turns.
     pub slopes: [Buffer; 2],
     parts: Buffer,
+    /// If slopes of places are wanted: what a layer takes of the encoded point behind units, and its slopes.
+    behind_units: Option<(Buffer, Buffer)>,
 }
 
 /// What kernels are bound to, and where.
@@ -204,7 +80,7 @@ struct Binding<'a> {
 
 impl Network {
     /// A network that reads these parameters and adds to this gradient; `most` is the most points of a block, if fewer
-    /// than usual.
+    /// than usual. With `of_places` it finds dL/dplace of encoded points, too.
     ///
     /// # Errors
     /// If the device has no room, or fails.
@@ -213,7 +89,7 @@ impl Network {
         shape: &Shape,
         points: &Points,
         (parameters, gradient): (&Buffer, &Buffer),
-        most: Option<usize>,
+        (most, of_places): (Option<usize>, bool),
     ) -> Result<Self, GpuError> {
         let fits = device.largest_buffer() as usize / (4 * shape.columns()) / GRAIN * GRAIN;
         if fits == 0 {
@@ -224,7 +100,7 @@ impl Network {
         let constants = Tiling::of(shape.width).constants();
         let source = [&constants, wgsl::FUNCTIONS, ACTIVATIONS, SHADER].join("\n");
         let kernels = compiled(device, &source, &ENTRIES)?;
-        let memory = Memory::new(device, shape, stride)?;
+        let memory = Memory::new(device, shape, stride, of_places)?;
         let count = shape.parameters();
         let blocks = (0..points.room.div_ceil(stride).max(1)).map(|k| {
             let numbers = [k * stride, stride, shape.start, count].map(|x| x as u32);
@@ -282,7 +158,12 @@ pub fn run(commands: &mut Commands, tasks: &[Task]) {
 }
 
 impl Memory {
-    fn new(device: &Compute, shape: &Shape, stride: usize) -> Result<Self, GpuError> {
+    fn new(
+        device: &Compute,
+        shape: &Shape,
+        stride: usize,
+        of_places: bool,
+    ) -> Result<Self, GpuError> {
         let storage = |numbers: usize| device.storage(4 * numbers as u64);
         let (scales, dimension, degree) = match shape.front {
             Front::Encoded { scales, dimension, degree } => (scales, dimension, degree),
@@ -290,14 +171,16 @@ impl Memory {
         };
         let [x, y, z, t] = scales.map(f32::to_bits);
         let (dimension, degree) = (dimension as u32, degree as u32);
-        let encoding = device.uniform(&words(&[x, y, z, t, dimension, degree, 0, 0]))?;
-        let layers = shape.layers().into_iter().enumerate().map(|(k, layer)| {
-            let Layer { base, units, tail, inputs, outputs, into, offset } = layer;
-            let numbers = [base, units, tail, inputs, outputs, into, offset].map(|x| x as u32);
-            let open = u32::from(k == 0);
-            let rest = [shape.activation, shape.shift.to_bits(), open, 0, 0];
-            device.uniform(&words(&[&numbers[..], &rest].concat()))
+        let skips = u32::from(shape.skip.is_some());
+        let encoding = device.uniform(&words(&[x, y, z, t, dimension, degree, skips, 0]))?;
+        let layers = shape.layers();
+        let behind_units = (of_places && !shape.is_given()).then(|| {
+            let layer = layers[shape.skip.unwrap_or(0)].of_encoded(shape.encoded());
+            let room = if shape.skip.is_some() { shape.encoded() * stride } else { 0 };
+            Ok((uniform(device, shape, layer, true)?, storage(room)?))
         });
+        let layers = layers.into_iter().enumerate();
+        let layers = layers.map(|(k, layer)| uniform(device, shape, layer, k == 0));
         let widest = shape.width.max(shape.encoded()) * stride;
         Ok(Self {
             encoding,
@@ -305,8 +188,17 @@ impl Memory {
             rows: storage(shape.columns() * stride)?,
             slopes: [storage(widest)?, storage(widest)?],
             parts: storage(shape.parameters() * stride.div_ceil(SPAN))?,
+            behind_units: behind_units.transpose()?,
         })
     }
+}
+
+/// A layer as the shader sees it; `open`: what is before it is not rectified.
+fn uniform(device: &Compute, shape: &Shape, layer: Layer, open: bool) -> Result<Buffer, GpuError> {
+    let Layer { base, units, tail, inputs, outputs, into, offset } = layer;
+    let numbers = [base, units, tail, inputs, outputs, into, offset].map(|x| x as u32);
+    let rest = [shape.activation, shape.shift.to_bits(), u32::from(open), 0, 0];
+    device.uniform(&words(&[&numbers[..], &rest].concat()))
 }
 
 impl Binding<'_> {
@@ -329,6 +221,7 @@ impl Binding<'_> {
     fn backward(&self, shape: &Shape, stride: usize) -> Result<Vec<Task>, GpuError> {
         let (layers, last, tiling) = (shape.layers(), shape.hidden, Tiling::of(shape.width));
         let (output, spans) = (layers[last], stride.div_ceil(SPAN) as u32);
+        let skip = shape.skip.unwrap_or(last);
         let to_units = [stride.div_ceil(4 * 64) as u32, output.units as u32];
         let mut tasks = vec![
             (self.bind(3, last, 0, &[0, 1, 3, 5, 6, 8, 9, 10])?, to_units),
@@ -337,10 +230,42 @@ impl Binding<'_> {
         for (turn, (k, layer)) in layers[..last].iter().enumerate().rev().enumerate() {
             let tiles = tiling.right(layer.outputs) * tiling.left(layer.inputs - 1);
             tasks.push((self.bind(5, k, turn, &[0, 1, 3, 6, 10, 12])?, [tiles, spans]));
-            if k > 0 || shape.is_given() {
+            if k > 0 || shape.is_given() || self.memory.behind_units.is_some() {
                 let groups = [tiling.left(stride), tiling.right(layer.units)];
                 tasks.push((self.bind(6, k, turn, &[0, 1, 3, 5, 6, 10, 11])?, groups));
             }
+            if let (Some((encoded, slopes)), true) = (&self.memory.behind_units, k == skip) {
+                let groups = [tiling.left(stride), tiling.right(shape.encoded())];
+                let [above, _] = self.by_turns(turn);
+                let Self { block, points, parameters, memory, .. } = self;
+                let (extent, rows) = (&points.extent, &memory.rows);
+                let buffers = [
+                    (0, *block),
+                    (1, encoded),
+                    (3, extent),
+                    (5, *parameters),
+                    (6, rows),
+                    (10, above),
+                    (11, slopes),
+                ];
+                tasks.push((self.device.bind(&self.kernels[6], &buffers)?, groups));
+            }
+        }
+        if let Some((_, behind)) = &self.memory.behind_units {
+            let Self { block, points, memory, .. } = self;
+            let [_, below] = self.by_turns(last - 1);
+            let (extent, of_places) = (&points.extent, &points.of_places);
+            let buffers = [
+                (0, *block),
+                (2, &memory.encoding),
+                (3, extent),
+                (6, &memory.rows),
+                (11, below),
+                (13, behind),
+                (14, of_places),
+            ];
+            let task = self.device.bind(&self.kernels[8], &buffers)?;
+            tasks.push((task, [stride.div_ceil(64) as u32, 1]));
         }
         tasks.push((self.add_up()?, [shape.parameters().div_ceil(64) as u32, 1]));
         Ok(tasks)
@@ -354,9 +279,9 @@ impl Binding<'_> {
         turn: usize,
         bindings: &[u32],
     ) -> Result<Bound, GpuError> {
-        let Memory { encoding, layers, rows, slopes, parts } = self.memory;
+        let Memory { encoding, layers, rows, parts, .. } = self.memory;
         let Points { places, values, bends, cotangents, extent, .. } = self.points;
-        let [above, below] = [&slopes[turn % 2], &slopes[(turn + 1) % 2]];
+        let [above, below] = self.by_turns(turn);
         let all = [
             self.block,
             &layers[layer],
@@ -374,6 +299,11 @@ impl Binding<'_> {
         ];
         let buffers: Vec<_> = bindings.iter().map(|k| (*k, all[*k as usize])).collect();
         self.device.bind(&self.kernels[entry], &buffers)
+    }
+
+    /// Slopes of what a layer gives and of what it takes.
+    fn by_turns(&self, turn: usize) -> [&Buffer; 2] {
+        [turn, turn + 1].map(|turn| &self.memory.slopes[turn % 2])
     }
 
     fn add_up(&self) -> Result<Bound, GpuError> {

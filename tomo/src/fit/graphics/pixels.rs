@@ -1,5 +1,6 @@
 //! From nodes on the device to points of a batch, and from their emission to pixels, residuals and back.
 
+use super::axis::AxisSlope;
 use super::bytes::{floats, read, words};
 use super::fall::FallTable;
 use super::kernels::compiled;
@@ -19,6 +20,8 @@ pub struct Room {
     pub cells: usize,
     /// Steps whose losses are kept.
     pub records: usize,
+    /// If the axis is learnt: whether weights depend on it.
+    pub axis: Option<bool>,
 }
 
 /// A node as shaders see it.
@@ -74,6 +77,8 @@ pub struct Points {
     pub cotangents: Buffer,
     /// How many there are: known to the device alone.
     pub extent: Buffer,
+    /// If the axis is learnt, dL/dplace, which fields write.
+    pub of_places: Buffer,
     /// How many there may be.
     pub room: usize,
 }
@@ -83,6 +88,8 @@ pub struct Points {
 pub struct Pixels {
     /// The points.
     pub points: Points,
+    /// What is done where the axis is learnt.
+    pub axis: Option<AxisSlope>,
     task: Buffer,
     nodes: Buffer,
     pairs: Buffer,
@@ -119,16 +126,24 @@ impl Pixels {
         let forward = [
             bind(0, &[0, 1, 2, 3, 4, 15])?,
             bind(1, &[0, 4, 5, 14])?,
-            bind(2, &[0, 1, 2, 3, 5, 6, 7, 15])?,
+            bind(2, &[0, 1, 2, 3, 5, 6, 7, 15, 16])?,
         ];
         let sums = [bind(3, &[0, 2, 5, 7, 8, 9, 10, 11])?, bind(4, &[0, 10, 13, 14])?];
         let spread = bind(5, &[0, 5, 7, 11, 12])?;
-        let [task, nodes, pairs, mask, _, _, places, _, values, fluxes, _, slopes, rest @ ..] = all;
-        let [cotangents, records, extent, _] = rest;
         let bends = device.storage(4 * room.points as u64)?;
-        let points = Points { places, values, bends, cotangents, extent, room: room.points };
+        let of_places = device.storage(room.axis.map_or(0, |_| 16 * room.points as u64))?;
+        let axis = room.axis.map(|is_shifted| {
+            let size = (room.pairs, is_shifted.then_some(room.nodes));
+            AxisSlope::new(device, (&source, &all), &of_places, size)
+        });
+        let axis = axis.transpose()?;
+        let [task, nodes, pairs, mask, _, _, places, _, values, fluxes, _, slopes, rest @ ..] = all;
+        let [cotangents, records, extent, _, _] = rest;
+        let points =
+            Points { places, values, bends, cotangents, extent, of_places, room: room.points };
         Ok(Self {
             points,
+            axis,
             task,
             nodes,
             pairs,
@@ -190,7 +205,8 @@ impl Pixels {
         let flags = flag(how.earliest.is_some(), 1)
             | flag(how.mask.is_some(), 2)
             | flag(how.events, 4)
-            | flag(self.fall.is_some(), 8);
+            | flag(self.fall.is_some(), 8)
+            | flag(self.axis.is_some(), 16);
         let (falling, [least, largest]) =
             self.fall.as_ref().map_or((0, [0.0; 2]), |fall| (fall.cells as u32, fall.limits));
         let (cells, half) = how.mask.unwrap_or((1, 1.0));
@@ -252,14 +268,15 @@ impl Pixels {
     }
 }
 
-fn grid(workgroups: usize) -> [u32; 2] {
+/// So many workgroups.
+pub fn grid(workgroups: usize) -> [u32; 2] {
     let count = workgroups as u32;
     [count.min(ROW), count.div_ceil(ROW)]
 }
 
 /// The buffers of all bindings, in their order.
-fn buffers(device: &Compute, room: Room, of_fall: usize) -> Result<[Buffer; 16], GpuError> {
-    let Room { nodes, pairs, points, cells, records } = room;
+fn buffers(device: &Compute, room: Room, of_fall: usize) -> Result<[Buffer; 17], GpuError> {
+    let Room { nodes, pairs, points, cells, records, axis } = room;
     let storage = |bytes: usize| device.storage(bytes as u64);
     let of_pairs = || storage(4 * pairs);
     Ok([
@@ -279,5 +296,6 @@ fn buffers(device: &Compute, room: Room, of_fall: usize) -> Result<[Buffer; 16],
         storage(8 * records)?,
         storage(4)?,
         storage(4 * of_fall)?,
+        storage(axis.map_or(0, |_| 4 * points))?,
     ])
 }

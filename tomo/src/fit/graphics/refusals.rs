@@ -18,7 +18,6 @@ pub fn check(
     let model = &objective.model;
     for (asked, key, what) in [
         (training.lbfgs.is_some(), "training.optimiser", "quasi-Newton steps are"),
-        (training.learns_axis(representation), "axis", "the gradient of the axis is"),
         (training.penalties.is_some(), "penalty", "penalties are"),
         (training.change.is_some(), "change", "emission that changes while matter carries it is"),
         (training.parts > 1, "training.parts", "steps in parts are"),

@@ -36,8 +36,8 @@ impl Pieces {
     }
 
     /// The room that they take.
-    pub fn room(&self, nodes: usize, cells: usize, records: usize) -> Room {
-        Room { nodes, pairs: self.pairs, points: self.points, cells, records }
+    pub fn room(&self, (nodes, cells, records): (usize, usize, usize), axis: Option<bool>) -> Room {
+        Room { nodes, pairs: self.pairs, points: self.points, cells, records, axis }
     }
 }
 

@@ -36,6 +36,7 @@ const FROM_A_TIME = 1u;
 const MASKED = 2u;
 const EVENTS = 4u;
 const FALLS = 8u;
+const AXIS_IS_LEARNT = 16u;
 
 @group(0) @binding(0) var<uniform> task: Task;
 @group(0) @binding(1) var<storage, read> nodes: array<Node>;
@@ -57,6 +58,8 @@ const FALLS = 8u;
 // Cells of a fall: when they begin (two floats), cells per time, nothing, coefficients of radius and azimuth; then radius,
 // azimuth and angular velocity at both ends, and when the last cell ends (two floats).
 @group(0) @binding(15) var<storage, read> fall: array<f32>;
+// If the axis is learnt: of each point its node.
+@group(0) @binding(16) var<storage, read_write> origins: array<u32>;
 
 var<workgroup> shared_counts: array<u32, 256>;
 var<workgroup> shared_sums: array<f32, 256>;
@@ -232,6 +235,9 @@ fn collect(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_in
         if point.shines {
             places[to + sum - 1u] = point.place;
             weights[to + sum - 1u] = nodes[k].place.w;
+            if (task.flags & AXIS_IS_LEARNT) != 0u {
+                origins[to + sum - 1u] = k;
+            }
         }
         to += shared_counts[63];
         workgroupBarrier();

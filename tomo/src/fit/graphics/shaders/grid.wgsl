@@ -34,6 +34,7 @@ struct Level {
 @group(0) @binding(10) var<storage, read_write> peak: atomic<u32>;
 @group(0) @binding(11) var<storage, read_write> sums: array<atomic<u32>>;
 @group(0) @binding(12) var<storage, read_write> gradient: array<f32>;
+@group(0) @binding(13) var<storage, read_write> of_places: array<vec4<f32>>;
 
 struct Located {
     corner: u32,
@@ -135,6 +136,38 @@ fn gate(@builtin(global_invocation_id) at: vec3<u32>) {
     }
     values[block.first + point] = 0.0;
     bends[block.first + point] = 0.0;
+}
+
+// What interpolation gains along each axis, per cell.
+fn gain(at: Located, plane: u32) -> vec3<f32> {
+    let start = level.offset + plane * size();
+    var sum = vec3<f32>(0.0);
+    for (var k = 0u; k < 8u; k++) {
+        let upper = (vec3<u32>(k >> 2u, k >> 1u, k) & vec3<u32>(1u)) == vec3<u32>(1u);
+        let shares = select(1.0 - at.within, at.within, upper);
+        let signs = select(vec3<f32>(-1.0), vec3<f32>(1.0), upper);
+        sum += parameters[start + node(at, k)] * signs * shares.yxx * shares.zzy;
+    }
+    return sum;
+}
+
+// From the slopes of a level's numbers to those of places, which the first level begins.
+@compute @workgroup_size(64)
+fn places_back(@builtin(global_invocation_id) at: vec3<u32>) {
+    let point = at.y * level.row + at.x;
+    if point >= here() {
+        return;
+    }
+    let found = locate(places[block.first + point].xyz);
+    var sum = vec3<f32>(0.0);
+    for (var plane = 0u; plane < level.planes; plane++) {
+        sum += slopes[(level.column + plane) * block.stride + point] * gain(found, plane);
+    }
+    var before = vec4<f32>(0.0);
+    if level.column > 0u {
+        before = of_places[block.first + point];
+    }
+    of_places[block.first + point] = before + vec4<f32>(sum * level.per_length, 0.0);
 }
 
 // Before a sum.

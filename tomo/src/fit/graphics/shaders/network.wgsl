@@ -25,6 +25,7 @@ struct Encoding {
     scales: vec4<f32>,
     dimension: u32,
     degree: u32,
+    skips: u32,   // 1: a layer takes the encoded point behind units
 }
 
 @group(0) @binding(0) var<uniform> block: Block;
@@ -40,8 +41,11 @@ struct Encoding {
 @group(0) @binding(9) var<storage, read> cotangents: array<f32>;
 @group(0) @binding(10) var<storage, read_write> above: array<f32>;
 @group(0) @binding(10) var<storage, read_write> above_of_four: array<vec4<f32>>;
+@group(0) @binding(11) var<storage, read_write> below: array<f32>;
 @group(0) @binding(11) var<storage, read_write> below_of_four: array<vec4<f32>>;
 @group(0) @binding(12) var<storage, read_write> parts: array<f32>;
+@group(0) @binding(13) var<storage, read_write> behind_units: array<f32>;
+@group(0) @binding(14) var<storage, read_write> of_places: array<vec4<f32>>;
 
 // Products of matrices: result[i][j] = sum over k of left[k][i] right[k][j]. A workgroup has a tile of the result, a lane
 // 4 i's by 8 j's of it. It goes through k in slabs, which lie in the workgroup's memory as vectors of four, side by side.
@@ -467,4 +471,37 @@ fn add_up(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
         let all = (sums[lane] + sums[lane + 64u]) + (sums[lane + 128u] + sums[lane + 192u]);
         above[block.network + k] += all;
     }
+}
+
+// Slope of a number of the encoded point, where it stands at the front, and behind units.
+fn of_encoded(column: u32, point: u32) -> f32 {
+    let at = column * block.stride + point;
+    if encoding.skips == 1u {
+        return below[at] + behind_units[at];
+    }
+    return below[at];
+}
+
+// From the slopes of the encoded point to those of its place.
+@compute @workgroup_size(64)
+fn encode_back(@builtin(global_invocation_id) at: vec3<u32>) {
+    let point = at.x;
+    if point >= here() {
+        return;
+    }
+    let dimension = encoding.dimension;
+    var slopes = vec4<f32>(0.0);
+    for (var d = 0u; d < dimension; d++) {
+        var sum = of_encoded(d, point);
+        var rate = 1.0;
+        for (var j = 0u; j < encoding.degree; j++) {
+            let sine = dimension * (1u + j) + d;
+            let cosine = dimension * (1u + encoding.degree + j) + d;
+            sum += rate * rows[cosine * block.stride + point] * of_encoded(sine, point);
+            sum -= rate * rows[sine * block.stride + point] * of_encoded(cosine, point);
+            rate += rate;
+        }
+        slopes[d] = encoding.scales[d] * sum;
+    }
+    of_places[block.first + point] = slopes;
 }
