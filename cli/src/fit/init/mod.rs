@@ -56,7 +56,10 @@ fn advice(missing: &str, table: &str) -> String {
     let place = place.join(".");
     let (here, elsewhere): (Vec<_>, Vec<_>) =
         KEYS.iter().filter(key).partition(|key| key.table == place);
-    let keys = if here.is_empty() { elsewhere } else { here };
+    // A key of another table of that name is another key, unless one of the tables is in the other.
+    let is_near = |key: &&keys::Key| key.table.starts_with(&place) || place.starts_with(key.table);
+    let near = elsewhere.into_iter().filter(is_near).collect();
+    let keys = if here.is_empty() { near } else { here };
     found.into_iter().chain(keys.into_iter().map(of)).collect()
 }
 
