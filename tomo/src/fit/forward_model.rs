@@ -259,6 +259,7 @@ impl<T: Float> ForwardModel<T> {
     }
 }
 
+#[cfg(feature = "wgpu")]
 impl ForwardModel<f32> {
     /// Slope of each node's weight with respect to the axis, in the space around the sphere, and nothing; none without
     /// redshift.

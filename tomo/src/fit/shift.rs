@@ -66,7 +66,8 @@ impl Shift {
         });
     }
 
-    /// scale dg^power/dξ of each node, in the space around the sphere, and nothing.
+    /// `scale` dg^power/dξ of each node, in the space around the sphere, and nothing.
+    #[cfg(feature = "wgpu")]
     pub fn slopes(&self, axis: Axis, scale: &[f64]) -> Vec<[f32; 4]> {
         let vector = axis.vector();
         let of = |(scale, node): (&f64, &Node)| {

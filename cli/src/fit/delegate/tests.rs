@@ -32,7 +32,8 @@ impl StepDevice<f32> for Unplugged {
         assert_eq!((stretch.draws.len(), stretch.rates.len()), (1, 1));
         let loss = Loss { total: 1.0, terms: vec![1.0], ..Loss::default() };
         let moments = [from.adam.first.clone(), from.adam.second.clone()];
-        Ok(Taken { parameters: from.parameters.clone(), moments, losses: vec![loss] })
+        let (parameters, losses) = (from.parameters.clone(), vec![loss]);
+        Ok(Taken { parameters, moments, losses, of_axis: [0.0; 3] })
     }
 }
 
