@@ -121,11 +121,13 @@ fn agree(name: &str, both: &mut Both<'_>) {
 
 #[test]
 fn code_networks_have_the_gradients_of_the_processor() {
-    let (small, bhnerf, mlp4d) = (problem::small(), problem::bhnerf(), problem::mlp4d());
+    let (small, late) = (problem::small(), problem::late());
+    let (bhnerf, mlp4d) = (problem::bhnerf(), problem::mlp4d());
     let frames = || Drawn::Frames(vec![2, 0, 3]);
-    let cases: [(&str, &dyn Representation<f32>, _, _); 10] = [
+    let cases: [(&str, &dyn Representation<f32>, _, _); 11] = [
         ("bhnerf, pixels", &bhnerf, (Kind::Images, pixels(20)), (false, None)),
         ("small, pixels", &small, (Kind::Images, pixels(90)), (false, None)),
+        ("late, pixels", &late, (Kind::Images, pixels(90)), (false, None)),
         ("small, masked", &small, (Kind::Images, pixels(90)), (true, None)),
         ("small, frames in blocks", &small, (Kind::Images, frames()), (false, Some(128))),
         ("small, frames and fluxes", &small, (Kind::ImagesAndFlux, frames()), (true, Some(128))),

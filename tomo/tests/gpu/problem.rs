@@ -129,6 +129,19 @@ pub fn bhnerf() -> Network {
     Network::new(settings).unwrap()
 }
 
+/// Its last function takes the encoded point.
+pub fn late() -> Network {
+    let settings = NetworkSettings {
+        width: 40,
+        hidden_layers: 2,
+        skip_after: Some(2),
+        shift: -1.0,
+        length_scale: 6.0,
+        ..NetworkSettings::bhnerf()
+    };
+    Network::new(settings).unwrap()
+}
+
 /// Of places and times.
 pub fn mlp4d() -> Network {
     let settings = NetworkSettings {

@@ -221,12 +221,12 @@ impl Binding<'_> {
     fn backward(&self, shape: &Shape, stride: usize) -> Result<Vec<Task>, GpuError> {
         let (layers, last, tiling) = (shape.layers(), shape.hidden, Tiling::of(shape.width));
         let (output, spans) = (layers[last], stride.div_ceil(SPAN) as u32);
-        let skip = shape.skip.unwrap_or(last);
         let to_units = [stride.div_ceil(4 * 64) as u32, output.units as u32];
         let mut tasks = vec![
             (self.bind(3, last, 0, &[0, 1, 3, 5, 6, 8, 9, 10])?, to_units),
             (self.bind(4, last, 0, &[0, 1, 3, 6, 8, 9, 12])?, [output.inputs as u32, spans]),
         ];
+        tasks.extend(self.encoded_behind_units(shape, last, 0, stride)?);
         for (turn, (k, layer)) in layers[..last].iter().enumerate().rev().enumerate() {
             let tiles = tiling.right(layer.outputs) * tiling.left(layer.inputs - 1);
             tasks.push((self.bind(5, k, turn, &[0, 1, 3, 6, 10, 12])?, [tiles, spans]));
@@ -234,41 +234,51 @@ impl Binding<'_> {
                 let groups = [tiling.left(stride), tiling.right(layer.units)];
                 tasks.push((self.bind(6, k, turn, &[0, 1, 3, 5, 6, 10, 11])?, groups));
             }
-            if let (Some((encoded, slopes)), true) = (&self.memory.behind_units, k == skip) {
-                let groups = [tiling.left(stride), tiling.right(shape.encoded())];
-                let [above, _] = self.by_turns(turn);
-                let Self { block, points, parameters, memory, .. } = self;
-                let (extent, rows) = (&points.extent, &memory.rows);
-                let buffers = [
-                    (0, *block),
-                    (1, encoded),
-                    (3, extent),
-                    (5, *parameters),
-                    (6, rows),
-                    (10, above),
-                    (11, slopes),
-                ];
-                tasks.push((self.device.bind(&self.kernels[6], &buffers)?, groups));
-            }
+            tasks.extend(self.encoded_behind_units(shape, k, turn, stride)?);
         }
-        if let Some((_, behind)) = &self.memory.behind_units {
-            let Self { block, points, memory, .. } = self;
-            let [_, below] = self.by_turns(last - 1);
-            let (extent, of_places) = (&points.extent, &points.of_places);
-            let buffers = [
-                (0, *block),
-                (2, &memory.encoding),
-                (3, extent),
-                (6, &memory.rows),
-                (11, below),
-                (13, behind),
-                (14, of_places),
-            ];
-            let task = self.device.bind(&self.kernels[8], &buffers)?;
-            tasks.push((task, [stride.div_ceil(64) as u32, 1]));
-        }
+        tasks.extend(self.places(stride, last)?);
         tasks.push((self.add_up()?, [shape.parameters().div_ceil(64) as u32, 1]));
         Ok(tasks)
+    }
+
+    /// Slopes of the encoded point that this layer takes behind units, if it does and those of places are wanted.
+    fn encoded_behind_units(
+        &self,
+        shape: &Shape,
+        k: usize,
+        turn: usize,
+        stride: usize,
+    ) -> Result<Option<Task>, GpuError> {
+        let Self { device, kernels, block, points, parameters, memory, .. } = self;
+        let Points { bends, cotangents, extent, .. } = points;
+        let (rows, encoded) = (&memory.rows, shape.encoded());
+        let Some((layer, slopes)) = memory.behind_units.as_ref().filter(|_| shape.skip == Some(k))
+        else {
+            return Ok(None);
+        };
+        if k == shape.hidden {
+            let buffers = [block, layer, extent, parameters, rows, bends, cotangents, slopes];
+            let bindings: Vec<_> = [0, 1, 3, 5, 6, 8, 9, 10].into_iter().zip(buffers).collect();
+            let groups = [stride.div_ceil(4 * 64) as u32, encoded as u32];
+            return Ok(Some((device.bind(&kernels[3], &bindings)?, groups)));
+        }
+        let [above, _] = self.by_turns(turn);
+        let buffers = [block, layer, extent, parameters, rows, above, slopes];
+        let bindings: Vec<_> = [0, 1, 3, 5, 6, 10, 11].into_iter().zip(buffers).collect();
+        let tiling = Tiling::of(shape.width);
+        let groups = [tiling.left(stride), tiling.right(encoded)];
+        Ok(Some((device.bind(&kernels[6], &bindings)?, groups)))
+    }
+
+    /// Slopes of places, if they are wanted.
+    fn places(&self, stride: usize, hidden: usize) -> Result<Option<Task>, GpuError> {
+        let Self { device, kernels, block, points, memory, .. } = self;
+        let Some((_, behind)) = &memory.behind_units else { return Ok(None) };
+        let [_, encoded] = self.by_turns(hidden - 1);
+        let (encoding, rows) = (&memory.encoding, &memory.rows);
+        let buffers = [block, encoding, &points.extent, rows, encoded, behind, &points.of_places];
+        let bindings: Vec<_> = [0, 2, 3, 6, 11, 13, 14].into_iter().zip(buffers).collect();
+        Ok(Some((device.bind(&kernels[8], &bindings)?, [stride.div_ceil(64) as u32, 1])))
     }
 
     /// An entry point about a layer; slopes go from one of two buffers to the other, by turns.

@@ -271,7 +271,8 @@ fn emit_back(@builtin(global_invocation_id) at: vec3<u32>) {
             slopes[k] = cotangents[block.first + p + k] * bends[block.first + p + k];
         }
     }
-    let shines = rows_of_four[(column(at.y) * block.stride + p) / 4u] > vec4<f32>(0.0);
+    let units = rows_of_four[(column(at.y) * block.stride + p) / 4u];
+    let shines = (units > vec4<f32>(0.0)) | vec4<bool>(layer.open == 1u);
     let back = slopes * parameters[layer.offset + at.y];
     above_of_four[(at.y * block.stride + p) / 4u] = select(vec4<f32>(0.0), back, shines);
 }
