@@ -189,7 +189,7 @@ impl Compute {
     }
 
     /// Like [`kernels`](Self::kernels), without the checks of indices and the counter in each loop by which one that does
-    /// not end is ended: a network's kernels then take three fifths of the time.
+    /// not end is ended: a network's kernels then take a quarter less time.
     ///
     /// # Safety
     /// All indices have to be within their arrays, and all loops of the shader have to end.

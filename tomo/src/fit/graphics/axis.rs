@@ -1,8 +1,7 @@
 //! The slope of the loss along the axis that matter turns about, where that is learnt.
 
 use super::bytes::{floats, read};
-use super::kernels::compiled;
-use super::pixels::grid;
+use super::kernels::{compiled, grid};
 use kerrlight_geodesic::gpu::{Bound, Buffer, Commands, Compute, GpuError};
 
 const SHADER: &str = include_str!("shaders/axis.wgsl");

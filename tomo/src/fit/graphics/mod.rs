@@ -266,11 +266,7 @@ impl GraphicsFit {
                 pixels.sum(commands, pairs.len());
             })?;
             let fluxes = pixels.fluxes(device, pairs.len())?;
-            let rays = objective.model.rays();
-            let mut slopes = Vec::with_capacity(pairs.len());
-            for (frame, fluxes) in some.iter().zip(fluxes.chunks(rays)) {
-                slopes.extend(objective.of_rays((*frame, frames.len()), fluxes, &mut loss));
-            }
+            let slopes = objective.of_frames((some, frames.len()), &fluxes, &mut loss);
             pixels.set_slopes(device, &slopes)?;
             device.run(|commands| {
                 pixels.spread(commands, pairs.len());

@@ -3,7 +3,7 @@
 use super::axis::AxisSlope;
 use super::bytes::{floats, read, words};
 use super::fall::FallTable;
-use super::kernels::compiled;
+use super::kernels::{ROW, compiled, grid};
 use kerrlight_geodesic::gpu::{Bound, Buffer, Commands, Compute, GpuError};
 use kerrlight_geodesic::wgsl;
 
@@ -103,8 +103,6 @@ pub struct Pixels {
     spread: Bound,
 }
 
-/// Workgroups in a row of the grid: fewer than any device allows.
-const ROW: u32 = 32_768;
 const SHADER: &str = include_str!("shaders/gather.wgsl");
 const ENTRIES: [&str; 6] = ["count", "scan", "collect", "sum_rays", "tally", "spread"];
 
@@ -266,12 +264,6 @@ impl Pixels {
     pub fn records(&self) -> &Buffer {
         &self.records
     }
-}
-
-/// So many workgroups.
-pub fn grid(workgroups: usize) -> [u32; 2] {
-    let count = workgroups as u32;
-    [count.min(ROW), count.div_ceil(ROW)]
 }
 
 /// The buffers of all bindings, in their order.
