@@ -26,7 +26,7 @@ pub(super) struct Program {
 }
 
 /// What is checked in shaders whose loops end by themselves.
-pub(super) fn loops_that_end() -> wgpu::ShaderRuntimeChecks {
+fn loops_that_end() -> wgpu::ShaderRuntimeChecks {
     wgpu::ShaderRuntimeChecks { force_loop_bounding: false, ..wgpu::ShaderRuntimeChecks::checked() }
 }
 

@@ -62,10 +62,10 @@ impl<T: Float> Trainer<'_, T> {
     fn moved(&self, taken: Taken<T>, state: &mut State<T>) -> Result<Outcome, Error> {
         let Taken { parameters, moments: [first, second], losses, of_axis } = taken;
         let begin = state.now.step;
-        let turns = of_axis.iter().all(|slope| slope.is_finite());
+        let finite = of_axis.iter().all(|slope| slope.is_finite());
         for (loss, step) in losses.iter().zip(begin..) {
             let calm = state.good.as_ref().map_or(f64::INFINITY, |good| good.loss);
-            if !loss.total.is_finite() || !turns || loss.total > self.training.divergence * calm {
+            if !loss.total.is_finite() || !finite || loss.total > self.training.divergence * calm {
                 return Ok(step_back(state, loss.total, step)?);
             }
             state.now.loss = loss.total;

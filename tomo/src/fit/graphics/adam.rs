@@ -1,7 +1,7 @@
 //! Adam on the device.
 
 use super::bytes::{floats, words};
-use super::kernels::compiled;
+use super::kernels::{self, compiled};
 use crate::representation::WeightMatrix;
 use kerrlight_geodesic::gpu::{Bound, Buffer, Commands, Compute, GpuError};
 
@@ -35,7 +35,7 @@ pub struct Rule {
 }
 
 /// Invocations in a row of the grid, 64 a workgroup.
-const ROW: u32 = 64 * 32_768;
+const ROW: u32 = 64 * kernels::ROW;
 
 impl Learning {
     /// Of so many parameters but those of `others`, whose steps are not Adam's; `positive`: they are held at zero or

@@ -1,7 +1,7 @@
 //! Grids on the device: voxels, and features that a network turns into emission.
 
 use super::bytes::words;
-use super::kernels::compiled;
+use super::kernels::{self, compiled};
 use super::network::{Network, Task, run};
 use super::pixels::Points;
 use kerrlight_geodesic::gpu::{Buffer, Commands, Compute, GpuError, Kernel};
@@ -31,7 +31,7 @@ pub struct Levels {
 }
 
 /// Invocations in a row of the grid of workgroups, 64 each.
-const ROW: usize = 64 * 32_768;
+const ROW: usize = 64 * kernels::ROW as usize;
 const SHADER: &str = include_str!("shaders/grid.wgsl");
 const ACTIVATIONS: &str = include_str!("shaders/activations.wgsl");
 const ENTRIES: [&str; 9] = [
