@@ -16,11 +16,11 @@ pub fn delegate(
     let taken = take(&trainer.objective, trainer.representation, &trainer.training);
     let device = taken.map_err(|error| anyhow!("{error:#}; {}", elsewhere(folder)))?;
     let rest = match &trainer.objective.data.others[..] {
-        [] => String::new(),
-        others => {
+        others if !device.makes_residuals() => {
             let names: Vec<&str> = others.iter().map(|other| other.term.name()).collect();
             format!("; on this processor: {}", names.join(", "))
         }
+        _ => String::new(),
     };
     eprintln!("steps on {} in floats{rest}", device.name());
     Ok(Delegate::new(device, file.training.log_every, file.training.steps))

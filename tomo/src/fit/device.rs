@@ -71,6 +71,9 @@ pub trait StepDevice<T>: Send {
     /// Its name.
     fn name(&self) -> &str;
 
+    /// Whether it makes all residuals, so that nothing but losses comes back before the end of a stretch.
+    fn makes_residuals(&self) -> bool;
+
     /// The most steps of a stretch: one if the axis is learnt.
     fn most(&self) -> usize;
 

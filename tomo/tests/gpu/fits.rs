@@ -54,7 +54,7 @@ impl Fit<'_> {
     }
 }
 
-fn fits(representation: &dyn Representation<f32>) -> [Fit<'_>; 6] {
+fn fits(representation: &dyn Representation<f32>) -> [Fit<'_>; 8] {
     let fit = |batch, masked, kind| Fit { representation, training: training(batch, masked), kind };
     let pairs = || fit(BatchSize::Pixels(30), true, Kind::Images);
     let turning = |batch, kind| {
@@ -66,6 +66,8 @@ fn fits(representation: &dyn Representation<f32>) -> [Fit<'_>; 6] {
         pairs(),
         fit(BatchSize::Frames(2), false, Kind::Images),
         fit(BatchSize::All, true, Kind::ImagesAndFlux),
+        fit(BatchSize::Frames(3), false, Kind::Visibilities),
+        fit(BatchSize::All, true, Kind::Closures),
         Fit { training: Training { muon: Some(Muon::default()), ..pairs().training }, ..pairs() },
         turning(BatchSize::Pixels(60), Kind::Falling),
         turning(BatchSize::Frames(2), Kind::ImagesAndFlux),
@@ -197,6 +199,9 @@ struct Fragile {
 impl StepDevice<f32> for Fragile {
     fn name(&self) -> &str {
         self.fit.name()
+    }
+    fn makes_residuals(&self) -> bool {
+        self.fit.makes_residuals()
     }
     fn most(&self) -> usize {
         1

@@ -5,8 +5,8 @@ use super::problem::{self, Kind, axis, objective, start, training};
 use kerrlight_tomo::dynamics::Axis;
 use kerrlight_tomo::fit::graphics::GraphicsFit;
 use kerrlight_tomo::fit::{
-    BatchSize, Buffers, Drawn, Field, Gradients, Loss, Objective, Occupancy, Progress, Stretch,
-    Training,
+    BatchSize, Buffers, Drawn, Field, Gradients, Loss, Objective, Occupancy, Progress, StepDevice,
+    Stretch, Training,
 };
 use kerrlight_tomo::representation::{Activation, Representation, Workspace};
 
@@ -38,6 +38,7 @@ impl<'a> Both<'a> {
         let (device, now) = (device()?, start(representation, &training).now);
         let graphics =
             GraphicsFit::new(device, &objective, representation, &training, most).unwrap();
+        assert!(graphics.makes_residuals() == (kind != Kind::ImagesAndFlux));
         let mut occupancy = now.occupancy.clone();
         if let Some(mask) = &mut occupancy {
             mask.refresh(representation, &now.parameters, (3, &[]), &mut Workspace::new());
@@ -124,13 +125,16 @@ fn code_networks_have_the_gradients_of_the_processor() {
     let (small, late) = (problem::small(), problem::late());
     let (bhnerf, mlp4d) = (problem::bhnerf(), problem::mlp4d());
     let frames = || Drawn::Frames(vec![2, 0, 3]);
-    let cases: [(&str, &dyn Representation<f32>, _, _); 11] = [
+    let cases: [(&str, &dyn Representation<f32>, _, _); 14] = [
         ("bhnerf, pixels", &bhnerf, (Kind::Images, pixels(20)), (false, None)),
         ("small, pixels", &small, (Kind::Images, pixels(90)), (false, None)),
         ("late, pixels", &late, (Kind::Images, pixels(90)), (false, None)),
         ("small, masked", &small, (Kind::Images, pixels(90)), (true, None)),
         ("small, frames in blocks", &small, (Kind::Images, frames()), (false, Some(128))),
         ("small, frames and fluxes", &small, (Kind::ImagesAndFlux, frames()), (true, Some(128))),
+        ("small, visibilities", &small, (Kind::Visibilities, frames()), (true, None)),
+        ("small, closures", &small, (Kind::Closures, frames()), (false, Some(128))),
+        ("mlp4d, closures", &mlp4d, (Kind::Closures, frames()), (false, None)),
         ("mlp4d, frames", &mlp4d, (Kind::Images, frames()), (false, None)),
         ("small, falling", &small, (Kind::Falling, frames()), (false, None)),
         ("small, falling, masked", &small, (Kind::Falling, pixels(90)), (true, None)),
@@ -151,11 +155,12 @@ fn code_grids_have_the_gradients_of_the_processor() {
     let [sigmoid, linear] = [Activation::Sigmoid, Activation::Linear].map(problem::voxels);
     let features = problem::features();
     let frames = || Drawn::Frames(vec![2, 0, 3]);
-    let cases: [(&str, &dyn Representation<f32>, _, _); 5] = [
+    let cases: [(&str, &dyn Representation<f32>, _, _); 6] = [
         ("grid, pixels", &sigmoid, (Kind::Images, pixels(90)), (false, None)),
         ("linear grid, frames", &linear, (Kind::Images, frames()), (false, None)),
         ("feature grid, pixels", &features, (Kind::Images, pixels(90)), (false, None)),
         ("feature grid, blocks", &features, (Kind::Images, frames()), (false, Some(128))),
+        ("feature grid, visibilities", &features, (Kind::Visibilities, frames()), (false, None)),
         ("feature grid, fluxes", &features, (Kind::ImagesAndFlux, frames()), (false, Some(128))),
     ];
     for (name, representation, data, how) in cases {
@@ -167,13 +172,25 @@ fn code_grids_have_the_gradients_of_the_processor() {
     }
 }
 
+/// Phases and logarithms of a dark image mean nothing: closure quantities leave its gradient to the images.
+#[test]
+fn code_a_dark_field_has_the_gradient_of_the_processor() {
+    let (dark, draw) = (problem::dark(), Drawn::Frames(vec![2, 0, 3]));
+    let both = Both::new(&dark, (Kind::Closures, draw), (false, None), false);
+    if let Some(mut both) = both {
+        agree("dark grid, closures", &mut both);
+    }
+}
+
 /// ⟨gradient, v⟩ is the slope of the loss along v, both on the device.
 #[test]
 fn exact_gradients_are_slopes_of_the_loss() {
     let (small, voxels) = (problem::small(), problem::voxels(Activation::Sigmoid));
     // Rectified units have kinks, so that steps are short; voxels have none.
-    let cases: [(&str, &dyn Representation<f32>, _, f32); 3] = [
+    let cases: [(&str, &dyn Representation<f32>, _, f32); 5] = [
         ("images", &small, Kind::Images, 5e-4),
+        ("visibilities", &small, Kind::Visibilities, 5e-4),
+        ("closures", &small, Kind::Closures, 5e-4),
         ("images, fluxes", &small, Kind::ImagesAndFlux, 5e-4),
         ("grid", &voxels, Kind::Images, 2e-2),
     ];

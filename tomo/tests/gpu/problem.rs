@@ -6,19 +6,29 @@ use kerrlight_geodesic::{Inclination, Kerr, Observer};
 use kerrlight_tomo::dynamics::infall::{Falling, Law};
 use kerrlight_tomo::dynamics::{AngularVelocity, Axis, Injection};
 use kerrlight_tomo::fit::{
-    BatchSize, Data, ForwardModel, ImageTerm, LightCurveTerm, Motion, Objective, OccupancyPlan,
-    OccupancySettings, Redshift, Region, Sampling, SightlineRequest, Sightlines, State, Training,
-    Weighted,
+    BatchSize, Data, ForwardModel, FrameTerm, ImageTerm, LightCurveTerm, Motion, Objective,
+    OccupancyPlan, OccupancySettings, Redshift, Region, Sampling, Scan, ScanTerm, SightlineRequest,
+    Sightlines, State, Training, Weighted,
 };
+use kerrlight_tomo::interferometry::Complex64;
+use kerrlight_tomo::interferometry::data_terms::{
+    AmplitudeTerm, ClosureTerm, DataTerm, Residual, VisibilityTerm,
+};
+use kerrlight_tomo::interferometry::observation::{Basis, Measured, Observation, Row};
+use kerrlight_tomo::interferometry::operator::{ImageGrid, Method, Pulse, Transform};
+use kerrlight_tomo::interferometry::products::ClosureKind;
 use kerrlight_tomo::optimise::{Adam, Polynomial};
 use kerrlight_tomo::representation::{
     Activation, FeatureGrid, FeatureGridSettings, Grid, GridSettings, Network, NetworkSettings,
     Representation,
 };
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 pub const SIDE: usize = 9;
 const FRAMES: usize = 4;
+/// About the light of a frame before a fit, Jy.
+const LIGHT: f64 = 15.0;
 const REGION: Region = Region { r_min: 3.0, r_max: 6.0, z_width: 4.0 };
 
 pub fn axis() -> Axis {
@@ -59,12 +69,43 @@ fn model_of(velocity: AngularVelocity) -> ForwardModel<f32> {
 pub enum Kind {
     /// Images alone.
     Images,
-    /// Images and a light curve.
+    /// Images, and a light curve that the processor compares.
     ImagesAndFlux,
+    /// Visibilities of three frames, and a light curve.
+    Visibilities,
+    /// Images, and closure phases, log closure amplitudes and amplitudes of three frames.
+    Closures,
     /// Images of matter that falls.
     Falling,
     /// Images of matter on circles, and within the innermost stable one on its way to the horizon.
     Plunging,
+}
+
+/// Data that nobody else can compare.
+struct Private(LightCurveTerm);
+
+impl FrameTerm<f32> for Private {
+    fn name(&self) -> &str {
+        "fluxes"
+    }
+    fn frames(&self) -> usize {
+        FrameTerm::<f32>::frames(&self.0)
+    }
+    fn pixels(&self) -> usize {
+        FrameTerm::<f32>::pixels(&self.0)
+    }
+    fn degrees_of_freedom(&self, frame: usize) -> usize {
+        FrameTerm::<f32>::degrees_of_freedom(&self.0, frame)
+    }
+    fn is_quadratic(&self) -> bool {
+        true
+    }
+    fn value_and_gradient(&self, frame: usize, image: &[f32], weight: f32, to: &mut [f32]) -> f64 {
+        self.0.value_and_gradient(frame, image, weight, to)
+    }
+    fn residuals(&self, frame: usize, image: &[f32]) -> Vec<Residual> {
+        self.0.residuals(frame, image)
+    }
 }
 
 pub fn objective(kind: Kind) -> Objective<f32> {
@@ -72,17 +113,74 @@ pub fn objective(kind: Kind) -> Objective<f32> {
         (0..FRAMES * SIDE * SIDE).map(|k| (k as f32 * 0.37).sin().abs()).collect();
     let term = Box::new(ImageTerm::new(movie, SIDE * SIDE, 0.5).unwrap());
     let mut data = Data { image: Some(Weighted { weight: 0.7, term }), others: Vec::new() };
-    if kind == Kind::ImagesAndFlux {
-        let (flux, sigma) = (vec![1.0, 3.0, 2.0, 5.0], [0.5, 1.0, 2.0, 0.7]);
+    if kind == Kind::Visibilities {
+        data.image = None;
+        data.others.push(scans("visibilities"));
+    }
+    if kind == Kind::Closures {
+        let names = ["closure phases", "log closure amplitudes", "amplitudes"];
+        data.others.extend(names.map(scans));
+    }
+    if matches!(kind, Kind::ImagesAndFlux | Kind::Visibilities) {
+        let unit = if kind == Kind::Visibilities { LIGHT } else { 1.0 };
+        let flux = [1.0, 3.0, 2.0, 5.0].map(|flux| unit * flux).to_vec();
+        let sigma = [0.5, 1.0, 2.0, 0.7].map(|sigma| unit * sigma);
         let term = LightCurveTerm::new(flux, &sigma, SIDE * SIDE).unwrap();
-        data.others.push(Weighted { weight: 0.4, term: Box::new(term) });
+        let term: Box<dyn FrameTerm<f32>> =
+            if kind == Kind::Visibilities { Box::new(term) } else { Box::new(Private(term)) };
+        data.others.push(Weighted { weight: 0.4, term });
     }
     let model = match kind {
-        Kind::Images | Kind::ImagesAndFlux => model(),
         Kind::Falling => model_of(falling(0.8)),
         Kind::Plunging => model_of(falling(1.0)),
+        _ => model(),
     };
     Objective { model, data }
+}
+
+/// What six stations see of a frame.
+fn seen(frame: usize) -> Observation {
+    let mut observation = Observation::empty(Basis::Stokes);
+    for (a, b) in (0..6u16).flat_map(|a| (a + 1..6).map(move |b| (a, b))) {
+        let at = |station: u16| {
+            let turn = f64::from(station * station) * 1.3 + 0.2 * frame as f64;
+            [turn.cos(), turn.sin()].map(|x| x * (1.0 + f64::from(station)) * 1e9)
+        };
+        let (here, there, number) = (at(a), at(b), f64::from(7 * a + b) + frame as f64);
+        let uv = [here[0] - there[0], here[1] - there[1]];
+        // Two points and an error.
+        let points = [[1.0, 4e-11, 6e-11], [0.6, -9e-11, 1e-11], [0.2, number * 1e-10, 0.0]];
+        let wave = |[light, east, north]: [f64; 3]| {
+            Complex64::from_polar(LIGHT * light, TAU * (uv[0] * east + uv[1] * north))
+        };
+        let visibility = points.map(wave).iter().sum();
+        let i = Measured { visibility, noise_sigma: LIGHT * (0.2 + 0.1 * number.sin()) };
+        let row = Row::total_intensity(frame as f64, [a, b], uv, i);
+        observation.rows.push(if (a + b) % 3 == 0 { row.swapped(Basis::Stokes) } else { row });
+    }
+    observation
+}
+
+/// Data of visibilities of all frames but one.
+fn scans(name: &str) -> Weighted<dyn FrameTerm<f32>> {
+    let sky = ImageGrid::new(SIDE, SIDE, 4e-10).unwrap();
+    let scan = |frame: usize| {
+        let seen = seen(frame);
+        let uv = seen.rows.iter().map(|row| row.uv).collect();
+        let transform =
+            Transform::new(sky, Pulse::Triangle, &[uv], Method::Direct, usize::MAX).unwrap();
+        let closures = |kind| Box::new(ClosureTerm::new(&seen, kind, 0.0).unwrap());
+        let term: Box<dyn DataTerm<f32> + Send> = match name {
+            "visibilities" => Box::new(VisibilityTerm::new(&seen).unwrap()),
+            "amplitudes" => Box::new(AmplitudeTerm::new(&seen).unwrap()),
+            "closure phases" => closures(ClosureKind::Phase),
+            _ => closures(ClosureKind::LogAmplitude),
+        };
+        (frame != 2).then_some(Scan { transform, term })
+    };
+    let scans = (0..FRAMES).map(scan).collect();
+    let term = ScanTerm::new(name, SIDE * SIDE, name == "visibilities", scans);
+    Weighted { weight: 0.3, term: Box::new(term) }
 }
 
 pub fn training(batch: BatchSize, masked: bool) -> Training {
@@ -162,6 +260,12 @@ pub fn mlp4d() -> Network {
 pub fn voxels(activation: Activation) -> Grid {
     let (low, high) = ([-6.0, -6.0, -5.0], [6.0, 5.5, 6.0]);
     Grid::new(GridSettings { nodes: [9, 7, 8], low, high, activation, initial: 0.3 }).unwrap()
+}
+
+/// Voxels that are dark.
+pub fn dark() -> Grid {
+    let settings = GridSettings { initial: 0.0, ..*voxels(Activation::Linear).settings() };
+    Grid::new(settings).unwrap()
 }
 
 /// Features on three grids of such a box.

@@ -17,6 +17,9 @@ impl StepDevice<f32> for Unplugged {
     fn name(&self) -> &str {
         "a card"
     }
+    fn makes_residuals(&self) -> bool {
+        true
+    }
     fn most(&self) -> usize {
         1
     }

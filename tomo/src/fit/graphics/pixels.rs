@@ -255,6 +255,16 @@ impl Pixels {
         device.write(&self.slopes, &floats(slopes))
     }
 
+    /// Light of pairs.
+    pub fn fluxes_buffer(&self) -> &Buffer {
+        &self.fluxes
+    }
+
+    /// dL/dpixel of pairs.
+    pub fn slopes_buffer(&self) -> &Buffer {
+        &self.slopes
+    }
+
     /// Forgets the records.
     pub fn forget(&self, commands: &mut Commands) {
         commands.clear(&self.records);

@@ -1,6 +1,6 @@
 //! Closure phases and log closure amplitudes, with the covariance of those that share baselines.
 
-use super::{DARK, DataTerm, DataTermError, Residual, faintest, wrapped};
+use super::{ClosureScan, Comparison, DARK, DataTerm, DataTermError, Residual, faintest, wrapped};
 use crate::Error;
 use crate::interferometry::observation::Observation;
 use crate::interferometry::operator::Float;
@@ -78,6 +78,18 @@ impl<T: Float> Scan<T> {
         })
     }
 
+    fn single(&self) -> ClosureScan {
+        let singles = |numbers: &[T]| numbers.iter().map(|x| x.double() as f32).collect();
+        let legs = |legs: &Vec<(usize, T)>| {
+            legs.iter().map(|(visibility, sign)| (*visibility, sign.double() as f32)).collect()
+        };
+        ClosureScan {
+            legs: self.legs.iter().map(legs).collect(),
+            data: singles(&self.data),
+            precision: singles(&self.precision),
+        }
+    }
+
     /// Residuals of the quantities. Where the model has no visibility, its phase and logarithm are not defined: the
     /// residual is then as large as one can be (phases), or that of an amplitude that is wrong by a factor of e¹⁰⁰.
     fn residuals(&self, kind: ClosureKind, model: &[Complex<T>]) -> Vec<T> {
@@ -134,6 +146,12 @@ impl<T: Float> DataTerm<T> for ClosureTerm<T> {
 
     fn is_scale_free(&self) -> bool {
         true
+    }
+
+    fn comparison(&self) -> Option<Comparison> {
+        let (kind, visibilities) = (self.kind, self.visibilities);
+        let scans = self.scans.iter().map(Scan::single).collect();
+        Some(Comparison::Closures { kind, visibilities, scans })
     }
 
     /// Where a visibility of the model is 0 its phase and logarithm mean nothing: the residual is then π, or 100 for a

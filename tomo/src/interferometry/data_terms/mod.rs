@@ -2,6 +2,7 @@
 //! never images; an [`Operator`](super::operator::Operator) carries the gradient on.
 
 mod closures;
+mod comparison;
 mod gains;
 mod polarized;
 mod ratios;
@@ -9,6 +10,7 @@ mod traces;
 mod visibilities;
 
 pub use closures::ClosureTerm;
+pub use comparison::{ClosureScan, Comparison};
 pub use gains::GainTerm;
 pub use polarized::PolarizedTerm;
 pub use ratios::RatioTerm;
@@ -96,6 +98,11 @@ pub trait DataTerm<T: Float>: Sync {
     /// know the flux.
     fn is_scale_free(&self) -> bool {
         false
+    }
+
+    /// What is compared, for those who compute χ² on another device; none where only this processor computes it.
+    fn comparison(&self) -> Option<Comparison> {
+        None
     }
 
     /// χ², and adds `weight` times its gradient g to `gradient`, where dχ² = Re Σ ḡ dV: what

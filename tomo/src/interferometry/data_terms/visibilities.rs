@@ -1,11 +1,11 @@
 //! Complex visibilities, and amplitudes.
 
-use super::{DataTerm, Residual, checked, faintest, inverse_variances, stations_of};
+use super::{Comparison, DataTerm, Residual, checked, faintest, inverse_variances, stations_of};
 use crate::Error;
 use crate::interferometry::observation::Observation;
 use crate::interferometry::operator::Float;
 use crate::interferometry::products::debiased_amplitude;
-use num_complex::Complex;
+use num_complex::{Complex, Complex32};
 
 /// χ² = Σ |V − V_data|²/σ².
 #[derive(Debug, Clone)]
@@ -38,6 +38,15 @@ impl<T: Float> DataTerm<T> for VisibilityTerm<T> {
 
     fn degrees_of_freedom(&self) -> usize {
         2 * self.data.len()
+    }
+
+    fn comparison(&self) -> Option<Comparison> {
+        let single = |(v, weight): (&Complex<T>, &T)| {
+            (Complex32::new(v.re.double() as f32, v.im.double() as f32), weight.double() as f32)
+        };
+        Some(Comparison::Visibilities(
+            self.data.iter().zip(&self.inverse_variance).map(single).collect(),
+        ))
     }
 
     fn value_and_gradient(
@@ -103,6 +112,13 @@ impl<T: Float> DataTerm<T> for AmplitudeTerm<T> {
 
     fn degrees_of_freedom(&self) -> usize {
         self.data.len()
+    }
+
+    fn comparison(&self) -> Option<Comparison> {
+        let single = |(a, weight): (&T, &T)| (a.double() as f32, weight.double() as f32);
+        Some(Comparison::Amplitudes(
+            self.data.iter().zip(&self.inverse_variance).map(single).collect(),
+        ))
     }
 
     /// At V = 0, where |V| has a kink, the gradient is 0.

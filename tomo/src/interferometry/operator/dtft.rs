@@ -74,6 +74,12 @@ impl<T: Float> Dtft<T> {
         operator
     }
 
+    /// Where pixels are, what they look like, and the (u, v) of all data.
+    pub fn baselines(&self) -> (ImageGrid, Pulse, Vec<[f64; 2]>) {
+        let uv = self.blocks.iter().flat_map(|block| block.uv.iter().copied()).collect();
+        (self.grid, self.pulse, uv)
+    }
+
     /// Bytes that all exponentials take.
     pub fn memory_wanted(&self) -> usize {
         2 * (self.grid.width + self.grid.height) * self.data * size_of::<T>()

@@ -59,6 +59,14 @@ impl<T: Float> Transform<T> {
         }
     }
 
+    /// Where pixels are, what they look like, and the (u, v) of all data, where sums over pixels are direct.
+    pub fn direct(&self) -> Option<(ImageGrid, Pulse, Vec<[f64; 2]>)> {
+        match self {
+            Transform::Direct(direct) => Some(direct.baselines()),
+            Transform::Fast(_) => None,
+        }
+    }
+
     /// Bytes that are kept.
     pub fn memory_kept(&self) -> usize {
         match self {

@@ -1,0 +1,22 @@
+//! What frames are compared with, for those who compute χ² on another device.
+
+use crate::interferometry::data_terms::Comparison;
+use crate::interferometry::operator::ImageGrid;
+
+/// What a frame is compared with.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Compared {
+    /// Nothing.
+    Nothing,
+    /// The sum of all pixels: a flux (Jy) and 1/σ².
+    Flux(f32, f32),
+    /// Visibilities of the image.
+    Scan {
+        /// Where pixels are.
+        sky: ImageGrid,
+        /// (u, v) in wavelengths, and the Fourier transform of a pixel there.
+        seen: Vec<([f64; 2], f64)>,
+        /// What they are compared with.
+        with: Comparison,
+    },
+}
