@@ -52,6 +52,36 @@ fn exact_inclination_and_position_angle_are_found_from_visibilities() {
     assert_eq!(first, std::fs::read(folder.path().join("run/world.json")).unwrap());
 }
 
+/// Stations turn phases at random: worlds are compared by amplitudes and closure phases about the volume of each search
+/// before.
+#[test]
+#[ignore = "long"]
+fn exact_inclination_and_position_angle_are_found_without_phases() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("fit.toml"), settings(60)).unwrap();
+    let sets = [
+        "loss=[{data=\"amplitudes\",weight=1.0},{data=\"closure-phases\",weight=1.0}]",
+        "observation.gains={constant_amplitude=0.0,scan_amplitude=0.0,random_phases=true}",
+        "world.inclination_deg={isotropic=[40.0,80.0]}",
+        "world.position_angle_deg={uniform=[-30.0,30.0]}",
+        "world.search.starts=1",
+        "representation=linear-grid",
+        "linear.iterations=20",
+        "linear.rounds=1",
+    ];
+    let mut words = vec!["fit", "fit.toml", "-o", "run"];
+    words.extend(sets.iter().flat_map(|set| ["--set", set]));
+    succeed(folder.path(), &words);
+    let world = read(&folder.path().join("run/world.json"));
+    let [inclination, angle] = ["inclination_deg", "position_angle_deg"]
+        .map(|name| world["world"][name].as_f64().unwrap());
+    println!(
+        "inclination {inclination:.2}, position angle {angle:.2}, {}",
+        world["chi2_per_datum"]
+    );
+    assert!((inclination - 60.0).abs() < 4.0 && angle.abs() < 4.0, "{world}");
+}
+
 /// The search begins again, the fit goes on.
 #[test]
 #[ignore = "long"]

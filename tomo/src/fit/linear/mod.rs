@@ -44,6 +44,7 @@ pub use descent::{Ending, Method};
 pub use error::LinearError;
 pub use gaussian::{GaussianField, Matern, Roughness};
 pub use log_normal::LogNormalField;
+pub use nodes::refined;
 pub use problem::LinearProblem;
 pub use profile::Profile;
 pub use settings::{Coarse, LinearSettings};

@@ -6,7 +6,10 @@ use crate::points::Coordinates;
 use crate::representation::{Representation, Workspace};
 
 /// Values at the nodes of another grid.
-pub(super) fn refined(from: &Voxels, x: &[f64], to: &Voxels) -> Result<Vec<f64>, Error> {
+///
+/// # Errors
+/// If a grid has no nodes.
+pub fn refined(from: &Voxels, x: &[f64], to: &Voxels) -> Result<Vec<f64>, Error> {
     let nodes: Vec<[f64; 3]> = (0..to.count()).map(|k| to.position(k)).collect();
     let column = |c: usize| {
         // Nodes of the edge lie beyond the field.

@@ -79,7 +79,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         self.least_from(None, iterations)
     }
 
-    /// The same from a field at all nodes, where data are convex.
+    /// The same from a field at all nodes, if one is given.
     ///
     /// # Errors
     /// As those of [`solve`](Self::solve).
@@ -95,7 +95,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         let mut objective = Objective::new(&operator, &data, &terms);
         let mut watch = |_: &LinearProgress<'_>| ControlFlow::Continue(());
         let mut run = Run::new(self, &settings, &mut watch);
-        if !data.is_convex() {
+        if start.is_none() && !data.is_convex() {
             let lit = run.lit(&mut objective, Trials { iterations, ..FEW })?;
             let dark = || Least { x: vec![0.0; self.unknowns()], value: f64::INFINITY };
             let everywhere =

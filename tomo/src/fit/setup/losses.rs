@@ -144,17 +144,25 @@ impl Measured {
         if part.stokes_i().next().is_none() {
             return Ok(None);
         }
-        let uv: Vec<[f64; 2]> = part.stokes_i().map(|(row, _)| row.uv).collect();
         let Some(term) = self.scan_data(loss, &part)? else { return Ok(None) };
-        // With the same result, whether they are kept or not.
-        let share = memory::part(1.0 / 8.0) / self.times.len() as f64;
-        let kept = MEMORY.min(share as usize);
-        let transform = Transform::new(sky, Pulse::Triangle, &[uv], Method::Direct, kept)?;
+        let transform = self.transform(&part, sky)?;
         Ok(Some(Scan { transform, term }))
     }
 }
 
 impl Measured {
+    /// From an image of the sky to the visibilities of a frame's rows that have Stokes I.
+    pub(super) fn transform<T: Float>(
+        &self,
+        part: &Observation,
+        sky: ImageGrid,
+    ) -> Result<Transform<T>> {
+        let uv: Vec<[f64; 2]> = part.stokes_i().map(|(row, _)| row.uv).collect();
+        // With the same result, whether they are kept or not.
+        let share = memory::part(1.0 / 8.0) / self.times.len() as f64;
+        Transform::new(sky, Pulse::Triangle, &[uv], Method::Direct, MEMORY.min(share as usize))
+    }
+
     /// The rows of a frame, and where pixels are.
     pub(super) fn part(&self, frame: usize) -> Result<(Observation, ImageGrid)> {
         let missing = || {

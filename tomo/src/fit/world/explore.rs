@@ -7,7 +7,7 @@ use super::problem::{Estimate, WorldProblem};
 use crate::Error;
 use crate::simd::Float;
 use cmaes::{CMAESOptions, DVector, TerminationReason};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError, RwLock};
 
 /// A world that was evaluated.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,22 +55,37 @@ const ALIKE: f64 = 0.05;
 struct Log {
     samples: Vec<Sample>,
     error: Option<Error>,
+    /// Where data are not convex, the best world so far.
+    best: Option<Estimate>,
 }
 
 impl<T: Float + Default> WorldProblem<'_, T> {
     /// From a start to the best world that populations find; none if it was cancelled. The same for the same seed on
     /// any number of threads.
     ///
+    /// Where data are convex, the volume of each world is solved for from a dark one. Others have several minima, which only
+    /// many starts tell apart: there volumes follow, population by population, the best one so far, at first that of lit
+    /// fields in the first world, or one that is given.
+    ///
     /// # Errors
     /// If a number is out of its range, or a χ² is not finite.
     pub fn explore(
         &self,
-        start: World,
+        (start, volume): (World, Option<&[f64]>),
         how: &Exploration,
         watch: &mut WorldWatch<'_>,
     ) -> Result<Option<Explored>, Error> {
-        let log = Mutex::new(Log::default());
-        let look = |u: &DVector<f64>| self.look(self.place(&start, u.as_slice()), &log);
+        let followed = match (self.is_convex(), volume) {
+            (true, _) => None,
+            (false, Some(volume)) => Some(self.solve_from(start, volume)?),
+            (false, None) => Some(self.solve(start)?),
+        };
+        let log = Mutex::new(Log { best: followed.clone(), ..Log::default() });
+        let followed = RwLock::new(followed);
+        let look = |u: &DVector<f64>| {
+            let from = followed.read().unwrap_or_else(PoisonError::into_inner);
+            self.look(self.place(&start, u.as_slice()), from.as_ref(), &log)
+        };
         let options = CMAESOptions::new(vec![0.0; self.free.len()], how.width)
             .seed(how.seed)
             .max_function_evals(how.worlds)
@@ -85,6 +100,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
             if let Some(ended) = search.next_parallel() {
                 break ended;
             }
+            followed.write().unwrap_or_else(PoisonError::into_inner).clone_from(&best_of(&log));
             let best = search.overall_best_individual().map_or(f64::INFINITY, |best| best.value);
             if !watch(search.function_evals(), best) {
                 return Ok(None);
@@ -92,22 +108,33 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         };
         let converged = !ended.reasons.contains(&TerminationReason::MaxFunctionEvals);
         drop(search);
-        let Log { mut samples, error } = log.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let log = log.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let Log { mut samples, error, best } = log;
         if let Some(error) = error {
             return Err(error);
         }
         // Threads look in any order.
         samples.sort_by(|a, b| a.value.total_cmp(&b.value));
-        let best = self.solve(samples.first().map_or(start, |best| best.world))?;
+        let best = match best {
+            Some(best) => best,
+            None => self.solve(samples.first().map_or(start, |best| best.world))?,
+        };
         Ok(Some(Explored { start, best, samples, converged }))
     }
 
-    fn look(&self, world: World, log: &Mutex<Log>) -> f64 {
-        let solved = self.solve(world);
+    fn look(&self, world: World, from: Option<&Estimate>, log: &Mutex<Log>) -> f64 {
+        let solved = match from {
+            Some(from) => self.solve_from(world, &from.x),
+            None => self.solve(world),
+        };
         let mut log = log.lock().unwrap_or_else(PoisonError::into_inner);
         match solved {
-            Ok(Estimate { value, .. }) => {
+            Ok(found) => {
+                let value = found.value;
                 log.samples.push(Sample { world, value });
+                if log.best.as_ref().is_some_and(|best| value < best.value) {
+                    log.best = Some(found);
+                }
                 value
             }
             Err(error) => {
@@ -116,4 +143,8 @@ impl<T: Float + Default> WorldProblem<'_, T> {
             }
         }
     }
+}
+
+fn best_of(log: &Mutex<Log>) -> Option<Estimate> {
+    log.lock().unwrap_or_else(PoisonError::into_inner).best.clone()
 }

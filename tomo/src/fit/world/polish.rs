@@ -8,7 +8,7 @@ use super::World;
 use super::covariance::covariance;
 use super::problem::{Estimate, WorldProblem};
 use crate::Error;
-use crate::fit::linear::Profile;
+use crate::fit::linear::{Profile, Voxels};
 use crate::fit::{Batch, Field, ForwardModel};
 use crate::representation::Workspace;
 use crate::simd::Float;
@@ -78,7 +78,10 @@ impl<T: Float + Default> WorldProblem<'_, T> {
     }
 
     /// The best volume of a world, from that of another one.
-    pub(super) fn solve_from(&self, world: World, x: &[f64]) -> Result<Estimate, Error> {
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn solve_from(&self, world: World, x: &[f64]) -> Result<Estimate, Error> {
         let forward: ForwardModel<T> = self.model.forward(&world)?;
         let least = self.linear(&forward).settled(Some(x), self.effort.patience)?;
         Ok(self.estimate(world, least))
@@ -169,7 +172,8 @@ impl<T: Float + Default> WorldProblem<'_, T> {
             let width = WIDTH * free.parameter.scale();
             let ends = [(here - width).max(low), (here + width).min(high)];
             let [before, after] = ends.map(|value| at.world.with(free.parameter, value));
-            let (before, after) = (self.images(before, &at.x)?, self.images(after, &at.x)?);
+            let image = |world: World| self.images(world, (&self.voxels(), &at.x));
+            let (before, after) = (image(before)?, image(after)?);
             let factor = T::of(free.parameter.scale() / (ends[1] - ends[0]));
             Ok(after.iter().zip(&before).map(|(a, b)| (*a - *b) * factor).collect())
         };
@@ -177,9 +181,12 @@ impl<T: Float + Default> WorldProblem<'_, T> {
     }
 
     /// Images of a volume in a world, frame after frame.
-    fn images(&self, world: World, x: &[f64]) -> Result<Vec<T>, Error> {
+    ///
+    /// # Errors
+    /// If a number is out of its range.
+    pub fn images(&self, world: World, (voxels, x): (&Voxels, &[f64])) -> Result<Vec<T>, Error> {
         let forward: ForwardModel<T> = self.model.forward(&world)?;
-        let representation = self.voxels().field()?;
+        let representation = voxels.field()?;
         let parameters: Vec<T> = x.iter().map(|x| T::of(*x)).collect();
         let field = Field {
             representation: &representation,

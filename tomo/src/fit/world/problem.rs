@@ -167,6 +167,11 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         Ok(self.estimate(world, least))
     }
 
+    /// Whether χ² is convex in the volume of each world.
+    pub fn is_convex(&self) -> bool {
+        self.terms.iter().all(|data| data.term.is_convex())
+    }
+
     /// χ² over the number of data.
     pub fn reduced(&self, chi2: f64) -> f64 {
         chi2 / self.data()
@@ -203,7 +208,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
     }
 
     /// The voxels that are solved for.
-    pub(super) fn voxels(&self) -> Voxels {
+    pub fn voxels(&self) -> Voxels {
         Voxels::cube(self.effort.nodes, self.half_width, self.effort.degree)
     }
 

@@ -134,7 +134,8 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         }
         let inner = WorldProblem { known: world, free: others, ..*self };
         let start = inner.starts(1)[0];
-        let Some(Explored { best, .. }) = inner.explore(start, how, &mut |_, _| true)? else {
+        let Some(Explored { best, .. }) = inner.explore((start, None), how, &mut |_, _| true)?
+        else {
             return Ok(None);
         };
         let reduced_chi2 = self.left(&best)?;

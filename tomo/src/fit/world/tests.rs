@@ -398,11 +398,11 @@ fn exact_world_of_a_hot_spot_is_found_from_everywhere() {
     let mut ends = Vec::new();
     for (k, start) in problem.starts(3).into_iter().enumerate() {
         let how = Exploration { width: 1.5, worlds: 400, seed: k as u64 };
-        let found = problem.explore(start, &how, &mut |_, _| true).unwrap().unwrap();
+        let found = problem.explore((start, None), &how, &mut |_, _| true).unwrap().unwrap();
         let [_, inclination, angle] = apart(&found.best.world);
         assert!(inclination < 0.2 && angle < 0.2, "{k}: {:?}", found.best.world);
         if k == 0 {
-            let again = problem.explore(start, &how, &mut |_, _| true).unwrap().unwrap();
+            let again = problem.explore((start, None), &how, &mut |_, _| true).unwrap().unwrap();
             assert_eq!(found.best.world, again.best.world);
         }
         ends.push(found.best);
@@ -410,7 +410,10 @@ fn exact_world_of_a_hot_spot_is_found_from_everywhere() {
     // Voxels of 1.2 M represent a spot of 0.7 M only so well.
     let best = ends.iter().min_by(|a, b| a.value.total_cmp(&b.value)).unwrap();
     assert!(apart(&best.world).iter().all(|apart| *apart < 0.1), "{:?}", best.world);
-    let none =
-        problem.explore(truth, &Exploration { width: 1.0, worlds: 99, seed: 1 }, &mut |_, _| false);
+    let none = problem.explore(
+        (truth, None),
+        &Exploration { width: 1.0, worlds: 99, seed: 1 },
+        &mut |_, _| false,
+    );
     assert!(none.unwrap().is_none());
 }

@@ -1,5 +1,7 @@
 //! Visibilities, or amplitudes, with gains that are solved for beside every model.
 
+pub use tangent::TangentTerm;
+
 use super::{DataTerm, DataTermError, Residual, checked, stations_of};
 use crate::Error;
 use crate::interferometry::Complex64;
@@ -224,5 +226,6 @@ fn direction<T: Float>(v: Complex<T>) -> Complex64 {
     if v.norm() > super::faintest::<T>().double() { v / v.norm() } else { Complex64::default() }
 }
 
+mod tangent;
 #[cfg(test)]
 mod tests;

@@ -11,7 +11,7 @@ mod visibilities;
 
 pub use closures::ClosureTerm;
 pub use comparison::{ClosureScan, Comparison};
-pub use gains::GainTerm;
+pub use gains::{GainTerm, TangentTerm};
 pub use polarized::PolarizedTerm;
 pub use ratios::RatioTerm;
 pub use traces::TraceTerm;

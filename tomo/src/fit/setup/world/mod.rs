@@ -3,6 +3,7 @@
 mod posterior;
 mod search;
 mod seen;
+mod tangent;
 
 pub use posterior::WorldPosterior;
 pub use search::{FoundWorld, SearchWatch, Trial, find_world};

@@ -2,12 +2,16 @@
 
 use super::posterior::{polished, surely};
 use super::seen::Seen;
-use crate::fit::linear::Patience;
+use super::tangent::Anchor;
+use crate::fit::linear::{Patience, refined};
 use crate::fit::settings::{FieldKind, FitFile, Linear, UnknownWorld};
 use crate::fit::setup::{Measured, Result};
 use crate::fit::world::{
-    Effort, Exploration, Explored, Scanned, Spread, World, WorldProblem, WorldScan, WorldWatch,
+    Effort, Estimate, Exploration, Explored, Scanned, Spread, World, WorldProblem, WorldScan,
+    WorldWatch,
 };
+
+use rayon::prelude::*;
 
 /// Where one search ended, in [`World`]'s units.
 #[derive(Clone, Debug)]
@@ -74,34 +78,21 @@ pub fn find_world(
     let over = unknown.scanned();
     let found = coarse.with(unknown, &search.coarse, scale(first), |problem| {
         if over.is_empty() {
-            return from_starts(problem, file.seed, unknown, watch);
+            return from_starts(&coarse, problem, file.seed, unknown, watch);
         }
         on_grid(problem, &over, file.seed, unknown, watch)
     })?;
-    let Some(Found { start, reduced_chi2, trials, scan }) = found else { return Ok(None) };
+    let Some(Found { start, volume, reduced_chi2, trials, scan }) = found else {
+        return Ok(None);
+    };
     let fine = Seen::finely(file, measured, &search.fine)?;
     // The coarse search has left less than it began with.
     let scale = scale(reduced_chi2);
     let count = trials.len().max(1) + 1;
     let mut told = |worlds: usize, best: f64| watch((count - 1, count), worlds, best);
-    let told: &mut WorldWatch<'_> = &mut told;
+    let how = Exploration { width: width(&over), worlds: search.fine.worlds, seed: file.seed };
     let found = fine.with(unknown, &search.fine, scale, |problem| {
-        // Populations look for where to begin: steps with volumes that are solved for follow.
-        let patience = Patience::looking(search.fine.iterations);
-        let quick = WorldProblem { effort: Effort { patience, ..problem.effort }, ..*problem };
-        let how = Exploration { width: width(&over), worlds: search.fine.worlds, seed: file.seed };
-        let Some(explored) = quick.explore(start, &how, told)? else { return Ok(None) };
-        let reduced = problem.scale * problem.left(&explored.best)?;
-        // Steps along differences of images know one volume.
-        if problem.model.ring.is_some() && !problem.change.is_any() {
-            let (polished, reduced) = polished(problem, &explored.best)?;
-            let spread = surely(problem, &polished, reduced)?;
-            let world = spread.as_ref().map_or(polished.best.world, |spread| spread.world);
-            return Ok(Some((spread, reduced, world)));
-        }
-        let spread = Spread::of(problem.free, &explored.samples, reduced);
-        let world = lower(&quick, &explored, spread.as_ref())?;
-        Ok(Some((spread, reduced, world)))
+        finely(&fine, problem, (start, volume.as_ref()), &how, &mut told)
     })?;
     Ok(found.map(|(spread, reduced_chi2, world)| FoundWorld {
         world,
@@ -113,32 +104,190 @@ pub fn find_world(
     }))
 }
 
+/// How sure a world is, its χ²/N, and the world.
+type Sure = (Option<Spread>, f64, World);
+
+/// The search about the best end of the coarse one, and how sure it is.
+fn finely(
+    seen: &Seen,
+    problem: &WorldProblem<'_, f32>,
+    (start, volume): (World, Option<&Anchor>),
+    how: &Exploration,
+    watch: &mut WorldWatch<'_>,
+) -> Result<Option<Sure>> {
+    // Populations look for where to begin: steps with volumes that are solved for follow.
+    let patience = Patience::looking(problem.effort.patience.looking);
+    let effort = Effort { patience, ..problem.effort };
+    let volume = volume.filter(|_| !problem.is_convex());
+    let about = |problem: &WorldProblem<'_, f32>, watch: &mut WorldWatch<'_>| {
+        WorldProblem { effort, ..*problem }.explore((start, None), how, watch)
+    };
+    let Some(volume) = volume else {
+        let Some(explored) = about(problem, watch)? else { return Ok(None) };
+        return surely_about(problem, effort, &explored).map(Some);
+    };
+    let first = seen.about(problem, volume, |problem| {
+        Ok(Anchor::of(problem, &WorldProblem { effort, ..*problem }.solve(start)?))
+    })?;
+    let Some(first) = first else {
+        let x = refined(&volume.voxels, &volume.x, &problem.voxels())?;
+        let quick = WorldProblem { effort, ..*problem };
+        let Some(explored) = quick.explore((start, Some(&x)), how, watch)? else {
+            return Ok(None);
+        };
+        return surely_about(problem, effort, &explored).map(Some);
+    };
+    let explored = seen.about(problem, &first, |problem| about(problem, watch))?;
+    let Some(explored) = explored.flatten() else { return Ok(None) };
+    let short = Exploration { worlds: how.worlds / 2, ..*how };
+    let quick = WorldProblem { effort, ..*problem };
+    let Some(explored) = nearer(seen, &quick, explored, &short, watch)? else { return Ok(None) };
+    let anchor = Anchor::of(problem, &explored.best);
+    let found = seen.about(problem, &anchor, |problem| surely_about(problem, effort, &explored))?;
+    Ok(found.map(|(spread, reduced, world)| (spread.filter(|_| reduced < WAY), reduced, world)))
+}
+
+/// χ²/N above which a search about volumes is still on its way: the bowl there says nothing about where it leads.
+const WAY: f64 = 3.0;
+
+/// How sure the best of the worlds that were explored is.
+fn surely_about(
+    problem: &WorldProblem<'_, f32>,
+    effort: Effort,
+    explored: &Explored,
+) -> Result<Sure> {
+    let quick = WorldProblem { effort, ..*problem };
+    let reduced = problem.scale * problem.left(&explored.best)?;
+    // Steps along differences of images know one volume.
+    if problem.model.ring.is_some() && !problem.change.is_any() {
+        let (polished, reduced) = polished(problem, &explored.best)?;
+        let spread = surely(problem, &polished, reduced)?;
+        let world = spread.as_ref().map_or(polished.best.world, |spread| spread.world);
+        return Ok((spread, reduced, world));
+    }
+    let spread = Spread::of(problem.free, &explored.samples, reduced);
+    let world = lower(&quick, explored, spread.as_ref())?;
+    Ok((spread, reduced, world))
+}
+
 /// What the coarse search has found: where the fine one begins, with χ²/N there.
 struct Found {
     start: World,
+    /// The volume there, where it was looked for from several starts.
+    volume: Option<Anchor>,
     reduced_chi2: f64,
     trials: Vec<Trial>,
     scan: Option<WorldScan>,
 }
 
 fn from_starts(
+    seen: &Seen,
     problem: &WorldProblem<'_, f32>,
     seed: u64,
     UnknownWorld { search, .. }: &UnknownWorld,
     watch: &mut SearchWatch<'_>,
 ) -> Result<Option<Found>> {
     let mut trials: Vec<Trial> = Vec::new();
-    for (k, start) in problem.starts(search.starts).into_iter().enumerate() {
+    let mut best: Option<Estimate> = None;
+    let mut told = |worlds: usize, best: f64| watch((0, search.starts + 1), worlds, best);
+    let Some(beginnings) = beginnings(problem, search.starts, &mut told)? else { return Ok(None) };
+    for (k, (start, lit)) in beginnings.into_iter().enumerate() {
         let mut told = |worlds: usize, best: f64| watch((k, search.starts + 1), worlds, best);
         let seed = seed.wrapping_add(k as u64);
         let how = Exploration { width: WIDTHS[0], worlds: search.coarse.worlds, seed };
-        let Some(explored) = problem.explore(start, &how, &mut told)? else { return Ok(None) };
-        let Some(explored) = or_twin(problem, explored, &how, &mut told)? else { return Ok(None) };
+        let Some(explored) = searched(seen, problem, (start, lit), &how, &mut told)? else {
+            return Ok(None);
+        };
         trials.push(trial(&explored, problem)?);
+        if best.as_ref().is_none_or(|best| explored.best.value < best.value) {
+            best = Some(explored.best);
+        }
     }
-    let best = trials.iter().min_by(|a, b| a.value.total_cmp(&b.value));
-    let best = best.map(|best| (best.end, best.reduced_chi2));
-    Ok(best.map(|(start, reduced_chi2)| Found { start, reduced_chi2, trials, scan: None }))
+    let Some(best) = best else { return Ok(None) };
+    let (start, reduced_chi2) = (best.world, problem.left(&best)?);
+    let volume = Some(Anchor::of(problem, &best));
+    Ok(Some(Found { start, volume, reduced_chi2, trials, scan: None }))
+}
+
+/// Worlds whose lit fields are tried, for each from which a search begins.
+const LIT: usize = 16;
+/// So many of them at a time.
+const AT_A_TIME: usize = 8;
+
+/// Where searches begin: places all over the priors. Where data are not convex, the best of many such places, with their
+/// volumes: worlds far from the truth then lead to other minima, and lit fields tell them apart.
+fn beginnings(
+    problem: &WorldProblem<'_, f32>,
+    starts: usize,
+    watch: &mut WorldWatch<'_>,
+) -> Result<Option<Vec<(World, Option<Estimate>)>>> {
+    if problem.is_convex() {
+        return Ok(Some(problem.starts(starts).into_iter().map(|world| (world, None)).collect()));
+    }
+    let mut tried: Vec<Estimate> = Vec::new();
+    for worlds in problem.starts(LIT * starts).chunks(AT_A_TIME) {
+        let solved = worlds.par_iter().map(|world| problem.solve(*world));
+        tried.extend(solved.collect::<core::result::Result<Vec<_>, _>>()?);
+        tried.sort_by(|a, b| a.value.total_cmp(&b.value));
+        tried.truncate(starts);
+        if !watch(0, tried[0].value) {
+            return Ok(None);
+        }
+    }
+    Ok(Some(tried.into_iter().map(|lit| (lit.world, Some(lit))).collect()))
+}
+
+/// Searches of a part of the worlds, each about a nearer volume, at most, and that part.
+const NEARER: usize = 16;
+const PART: usize = 4;
+
+/// A search from a start. Where data are not convex, it is one about the volume there, and again about the volume of each
+/// search before, as long as that is a better one; where they have no such form, volumes follow the search.
+fn searched(
+    seen: &Seen,
+    problem: &WorldProblem<'_, f32>,
+    (start, lit): (World, Option<Estimate>),
+    how: &Exploration,
+    watch: &mut WorldWatch<'_>,
+) -> Result<Option<Explored>> {
+    let mut from = |problem: &WorldProblem<'_, f32>| -> Result<Option<Explored>> {
+        match problem.explore((start, None), how, watch)? {
+            Some(explored) => or_twin(problem, explored, how, watch),
+            None => Ok(None),
+        }
+    };
+    let Some(lit) = lit else { return from(problem) };
+    let about = seen.about(problem, &Anchor::of(problem, &lit), &mut from)?;
+    let Some(explored) = about else { return from(problem) };
+    let Some(explored) = explored else { return Ok(None) };
+    let short = Exploration { width: WIDTHS[1], worlds: how.worlds / PART, ..*how };
+    let nearer = nearer(seen, problem, explored, &short, watch)?;
+    Ok(nearer.map(|explored| Explored { start, ..explored }))
+}
+
+/// Short searches, each about the best volume so far, until none is better: their best world with the volume that explains
+/// the data as they are, which a last search about it has looked around.
+fn nearer(
+    seen: &Seen,
+    problem: &WorldProblem<'_, f32>,
+    mut explored: Explored,
+    short: &Exploration,
+    watch: &mut WorldWatch<'_>,
+) -> Result<Option<Explored>> {
+    explored.best = problem.solve_from(explored.best.world, &explored.best.x)?;
+    for _ in 0..NEARER {
+        let (anchor, world) = (Anchor::of(problem, &explored.best), explored.best.world);
+        let next = seen.about(problem, &anchor, |problem| {
+            Ok(problem.explore((world, None), short, watch)?)
+        })?;
+        let Some(mut next) = next.flatten() else { return Ok(None) };
+        next.best = problem.solve_from(next.best.world, &next.best.x)?;
+        if next.best.value >= explored.best.value {
+            break;
+        }
+        explored = next;
+    }
+    Ok(Some(explored))
 }
 
 /// Where a search has ended, or a short one from the twin of that world, if that ends at a better one.
@@ -150,7 +299,7 @@ fn or_twin(
 ) -> Result<Option<Explored>> {
     let Some(twin) = problem.twin(&explored.best.world) else { return Ok(Some(explored)) };
     let short = Exploration { width: WIDTHS[1], worlds: how.worlds / TWIN, ..*how };
-    let Some(other) = problem.explore(twin, &short, watch)? else { return Ok(None) };
+    let Some(other) = problem.explore((twin, None), &short, watch)? else { return Ok(None) };
     if other.best.value < explored.best.value {
         (explored.best, explored.converged) = (other.best, other.converged);
     }
@@ -171,6 +320,7 @@ fn on_grid(
     let best = scan.best().map(|best| (best.world, best.reduced_chi2));
     Ok(best.map(|(start, reduced_chi2)| Found {
         start,
+        volume: None,
         reduced_chi2,
         trials: Vec::new(),
         scan: Some(scan),
@@ -197,6 +347,10 @@ fn lower(
 
 /// The least χ²/N of the worlds where searches begin.
 fn least(problem: &WorldProblem<'_, f32>, starts: usize) -> Result<f64> {
+    // Data that are not convex have errors, and their volumes take long.
+    if !problem.is_convex() {
+        return Ok(1.0);
+    }
     problem.starts(starts).into_iter().try_fold(f64::INFINITY, |least, start| {
         Ok(least.min(problem.left(&problem.solve(start)?)?))
     })

@@ -12,7 +12,7 @@ use crate::fit::world::{Effort, WorldProblem};
 
 /// Data as a search looks at them.
 pub(super) struct Seen {
-    view: CoarseView,
+    pub(super) view: CoarseView,
     frames: usize,
     /// Rounds of each solution over the voxels that shine.
     rounds: usize,
@@ -101,7 +101,7 @@ fn gaussian(prior: &PriorOfVoxels, voxels: &Voxels) -> Result<GaussianField> {
 }
 
 /// Data with their weight times their number in some frames.
-fn counted<'a>(term: Weighted<'a, f32>, frames: &[usize]) -> Weighted<'a, f32> {
+pub(super) fn counted<'a>(term: Weighted<'a, f32>, frames: &[usize]) -> Weighted<'a, f32> {
     let data: usize = frames.iter().map(|frame| term.term.degrees_of_freedom(*frame)).sum();
     Weighted { weight: term.weight * data as f64, ..term }
 }

@@ -109,3 +109,76 @@ fn exact_data_that_make_no_term_are_refused() {
     data.rows.clear();
     assert!(GainTerm::amplitudes(&data, &priors(true)).is_err());
 }
+
+/// About a model χ² and its gradient are those of gains that are solved for.
+#[test]
+fn exact_tangents_touch_the_least_chi2() {
+    for priors in [priors(true), GainPriors { free_phases: true, amplitude_sigma: vec![0.0; 7] }] {
+        let (data, truth) = scan(1, 20.0);
+        let term = GainTerm::visibilities(&data, &priors).unwrap();
+        let model = off(&truth);
+        let tangent = term.clone().tangent(&model).unwrap();
+        let value = |term: &dyn DataTerm<f64>, model: &[Complex64]| {
+            let mut gradient = vec![Complex64::default(); model.len()];
+            (term.value_and_gradient(model, 1.0, &mut gradient), gradient)
+        };
+        let ((exact, slopes), (near, near_slopes)) =
+            (value(&term, &model), value(&tangent, &model));
+        assert!((near / exact - 1.0).abs() < 1e-9, "{exact} {near}");
+        let largest = slopes.iter().map(|g| g.norm()).fold(0.0, f64::max);
+        let apart =
+            slopes.iter().zip(&near_slopes).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        assert!(apart < 1e-6 * largest, "{apart:e} {largest:e}");
+        conformance::data_term::<f64>("tangent", &tangent, &off(&model), 1e-3, 1e-7);
+        let degrees = DataTerm::<f64>::degrees_of_freedom(&tangent);
+        let residuals = DataTerm::<f64>::residuals(&tangent, &model);
+        let sum: f64 = residuals.iter().map(|r| r.value * r.value).sum();
+        assert!((sum / near - 1.0).abs() < 1e-9 && residuals.len() == degrees, "{sum} {near}");
+    }
+}
+
+/// About a model that explains the data χ² is right up to third order: for half of a small distance an eighth is left.
+#[test]
+fn exact_tangents_are_right_about_what_explains_the_data() {
+    let (data, truth) = scan(1, 1e7);
+    let term = GainTerm::visibilities(&data, &priors(true)).unwrap();
+    let gains = term.gains(&truth).0;
+    // Data without noise, whose gains cost nothing.
+    let mut exact = data.clone();
+    for (k, row) in exact.rows.iter_mut().enumerate() {
+        let phases = ScanGains { log_amplitude: vec![0.0; 7], ..gains.clone() };
+        row.products[0] = phases.on(term.problem.pairs()[k]) * truth[k];
+        row.noise_sigma[0] = 0.05;
+    }
+    let term = GainTerm::visibilities(&exact, &priors(true)).unwrap();
+    let tangent = term.clone().tangent(&truth).unwrap();
+    let there = off(&truth);
+    let left = [0.04, 0.02, 0.01].map(|part: f64| {
+        let moved: Vec<Complex64> =
+            truth.iter().zip(&there).map(|(v, t)| v + part * (t - v)).collect();
+        let mut none = vec![Complex64::default(); moved.len()];
+        let exact = term.value_and_gradient(&moved, 1.0, &mut none);
+        (exact - tangent.value_and_gradient(&moved, 1.0, &mut none)).abs()
+    });
+    println!("left at 0.04, 0.02, 0.01 of the way: {left:?}");
+    assert!(left[0] > 0.0 && left[1] < left[0] / 6.0 && left[2] < left[1] / 6.0, "{left:?}");
+}
+
+/// Phases of stations change nothing: visibilities turned by any have the same χ² about the model turned alike.
+#[test]
+fn exact_tangents_do_not_know_phases() {
+    let (data, truth) = scan(3, 50.0);
+    let priors = GainPriors { free_phases: true, amplitude_sigma: vec![0.0; 7] };
+    let value = |turns: f64| {
+        let mut turned = data.clone();
+        for row in &mut turned.rows {
+            let [a, b] = row.stations.map(f64::from);
+            row.products[0] *= Complex64::cis(turns * (a * a - b * b));
+        }
+        let term = GainTerm::visibilities(&turned, &priors).unwrap();
+        let tangent = term.tangent(&truth).unwrap();
+        tangent.value_and_gradient(&off(&truth), 1.0, &mut vec![Complex64::default(); truth.len()])
+    };
+    let (plain, turned) = (value(0.0), value(0.7));
+    assert!((plain / turned - 1.0).abs() < 1e-6, "{plain} {turned}");
+}
