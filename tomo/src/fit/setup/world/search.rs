@@ -214,13 +214,16 @@ const LIT: usize = 16;
 /// So many of them at a time.
 const AT_A_TIME: usize = 8;
 
+/// Where a search begins, with its volume from lit fields where data are not convex.
+type Beginning = (World, Option<Estimate>);
+
 /// Where searches begin: places all over the priors. Where data are not convex, the best of many such places, with their
 /// volumes: worlds far from the truth then lead to other minima, and lit fields tell them apart.
 fn beginnings(
     problem: &WorldProblem<'_, f32>,
     starts: usize,
     watch: &mut WorldWatch<'_>,
-) -> Result<Option<Vec<(World, Option<Estimate>)>>> {
+) -> Result<Option<Vec<Beginning>>> {
     if problem.is_convex() {
         return Ok(Some(problem.starts(starts).into_iter().map(|world| (world, None)).collect()));
     }
@@ -277,9 +280,8 @@ fn nearer(
     explored.best = problem.solve_from(explored.best.world, &explored.best.x)?;
     for _ in 0..NEARER {
         let (anchor, world) = (Anchor::of(problem, &explored.best), explored.best.world);
-        let next = seen.about(problem, &anchor, |problem| {
-            Ok(problem.explore((world, None), short, watch)?)
-        })?;
+        let next =
+            seen.about(problem, &anchor, |problem| problem.explore((world, None), short, watch))?;
         let Some(mut next) = next.flatten() else { return Ok(None) };
         next.best = problem.solve_from(next.best.world, &next.best.x)?;
         if next.best.value >= explored.best.value {
