@@ -47,7 +47,7 @@ impl GraphicsFit {
         (slope, record): (f32, usize),
         (ends, frames): (Ends, usize),
     ) -> Result<(), GpuError> {
-        let Self { device, pixels, field, .. } = self;
+        let Self { device, pixels, .. } = self;
         let (model, image) = (&stretch.objective.model, &stretch.objective.data.image);
         let datum = |ray: u32, frame: u32| {
             let pixel = model.pixel[ray as usize] as usize;
@@ -55,10 +55,7 @@ impl GraphicsFit {
         };
         let points = self.set(stretch, pairs, &datum, (slope, record))?;
         device.run(|commands| {
-            self.begin(commands, ends);
-            pixels.gather(commands, pairs.len());
-            field.forward(commands, points);
-            pixels.sum(commands, pairs.len());
+            self.light(commands, (pairs.len(), points), ends);
             if let Some(visibilities) = self.visibilities.as_ref().filter(|_| frames > 0) {
                 visibilities.compare(commands, frames);
             }
@@ -105,18 +102,13 @@ impl GraphicsFit {
         record: usize,
         learns: bool,
     ) -> Result<Pending, GpuError> {
-        let Self { device, pixels, field, .. } = self;
+        let Self { device, pixels, .. } = self;
         let objective = stretch.objective;
         let mut loss = objective.empty_loss();
         for (some, ends) in pieces(frames, self.pieces.frames, learns) {
             let pairs = pairs_of(stretch, some);
             let points = self.set(stretch, &pairs, &|_, _| 0.0, (0.0, record))?;
-            device.run(|commands| {
-                self.begin(commands, ends);
-                pixels.gather(commands, pairs.len());
-                field.forward(commands, points);
-                pixels.sum(commands, pairs.len());
-            })?;
+            device.run(|commands| self.light(commands, (pairs.len(), points), ends))?;
             let fluxes = pixels.fluxes(device, pairs.len())?;
             let slopes = objective.of_frames((some, frames.len()), &fluxes, &mut loss);
             pixels.set_slopes(device, &slopes)?;
@@ -129,12 +121,15 @@ impl GraphicsFit {
         Ok(Pending::Known(loss))
     }
 
-    /// Before the first piece of a step.
-    fn begin(&self, commands: &mut Commands, ends: Ends) {
+    /// From pairs of a piece to the light of their rays; before the first piece of a step, a new gradient.
+    fn light(&self, commands: &mut Commands, (pairs, points): (usize, usize), ends: Ends) {
         if ends.is_first {
             commands.clear(&self.learning.gradient);
             self.pixels.axis.iter().for_each(|axis| axis.begin(commands));
         }
+        self.pixels.gather(commands, pairs);
+        self.field.forward(commands, points);
+        self.pixels.sum(commands, pairs);
     }
 
     /// From the cotangents of a piece to the gradient; behind the last piece of a step that is taken, the step.

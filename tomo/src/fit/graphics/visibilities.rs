@@ -46,21 +46,20 @@ impl Visibilities {
             return Ok(None);
         }
         let terms = objective.data.others.len();
-        let filled = |words: &[u32]| -> Result<Buffer, GpuError> {
-            let buffer = device.storage(4 * words.len() as u64)?;
-            device.write(&buffer, &super::bytes::words(words))?;
+        let filled = |bytes: Vec<u8>| -> Result<Buffer, GpuError> {
+            let buffer = device.storage(bytes.len() as u64)?;
+            device.write(&buffer, &bytes)?;
             Ok(buffer)
         };
-        let bits = |numbers: &[f32]| numbers.iter().map(|x| x.to_bits()).collect::<Vec<u32>>();
         let room = |numbers: usize| device.storage(4 * (frames * numbers) as u64);
         let task = device.uniform(&[0; 32])?;
         let piece = room(4)?;
         let factors = device.storage(4 * terms as u64)?;
         let losses = device.storage(4 * (records * terms) as u64)?;
-        let places = filled(&bits(&places(objective, &all)))?;
-        let [visibilities, quantities] = [filled(&all.seen)?, filled(&all.closures)?];
-        let [legs, uses] = [filled(&all.legs)?, filled(&all.uses)?];
-        let precision = filled(&bits(&all.precision))?;
+        let places = filled(floats(&places(objective, &all)))?;
+        let [visibilities, quantities] = [filled(words(&all.seen))?, filled(words(&all.closures))?];
+        let [legs, uses] = [filled(words(&all.legs))?, filled(words(&all.uses))?];
+        let precision = filled(floats(&all.precision))?;
         let [model, of_model] = [room(2 * seen)?, room(2 * seen)?];
         let squares = room(seen + closures)?;
         let [residuals, pulls] = [room(closures)?, room(closures)?];
