@@ -1,6 +1,6 @@
 //! Draws around a finished fit.
 
-use crate::support::{kerrlight, root};
+use crate::support::{binary, kerrlight, root};
 use serde_json::Value;
 use std::path::Path;
 
@@ -48,6 +48,14 @@ fn exact_draws_of_voxels_resume_to_the_same_bytes() {
     assert!(coverage["within_1.96_sigma"].as_f64() >= coverage["within_1_sigma"].as_f64());
     let page = String::from_utf8(of("report.html")).unwrap();
     assert!(page.contains("Signal over noise") && page.contains("How often the truth lies"));
+    // So few voxels do not make such data.
+    let check = &numbers["predicted"][0];
+    assert_eq!(check["data"], "visibilities");
+    for key in ["larger_chi2", "larger_on_a_baseline", "larger_in_a_frame"] {
+        assert!(check[key].as_f64().unwrap() < 1e-3, "{check}");
+    }
+    assert!(page.contains("Posterior predictive checks"));
+    assert!(page.contains("The visibilities are not what the draws predict"));
     // Two draws again, and the rest found: the same bytes.
     let all = ["mean.npz", "deviation.npz", "posterior.json"].map(of);
     for name in ["sample_0002.json", "sample_0003.npz", "sample_0003.json", "mean.npz"] {
@@ -59,6 +67,76 @@ fn exact_draws_of_voxels_resume_to_the_same_bytes() {
     let first = of("sample_0001.json");
     run(folder.path(), &["posterior", "run", "--samples", "5"]);
     assert_eq!(first, of("sample_0001.json"));
+}
+
+/// χ² of the measured data beside a draw is that of as many data, where the model is right: fitted parameters make it smaller, the
+/// spread of the draws larger again.
+#[test]
+fn exact_draws_of_a_right_model_predict_the_data() {
+    let folder = tempfile::tempdir().unwrap();
+    let field = "kind=\"gaussian\",mean=0.5,amplitude=0.5,correlation_length=4.0,matern=\"1/2\"";
+    let sets = [
+        "screen.pixels=12".to_owned(),
+        "screen.jy_per_pixel=0.007".to_owned(),
+        format!(
+            "truth={{spot=[],field={{{field},negative=\"lifted\",nodes=12,degree=\"linear\"}}}}"
+        ),
+        "observation.scans=5".to_owned(),
+        "representation=linear-grid".to_owned(),
+        "representation.nodes=12".to_owned(),
+        format!(
+            "linear={{upper=10.0,degree=\"linear\",rounds=3,iterations=300,prior={{{field}}}}}"
+        ),
+        "output.nodes=16".to_owned(),
+    ];
+    let mut arguments = vec!["fit", "-o", "run", "--samples", "12"];
+    sets.iter().for_each(|set| arguments.extend(["--set", set]));
+    run(folder.path(), &arguments);
+    let numbers = read(&folder.path().join("run/posterior/posterior.json"));
+    let check = &numbers["predicted"][0];
+    let chi2 = check["chi2_per_datum"].as_f64().unwrap();
+    assert!((chi2 - 1.0).abs() < 0.15, "{check}");
+    for key in ["larger_chi2", "larger_on_a_baseline", "larger_in_a_frame"] {
+        let p = check[key].as_f64().unwrap();
+        assert!((0.02..0.98).contains(&p), "{key} {check}");
+    }
+    let open = numbers["open_nodes"].as_f64().unwrap();
+    assert!((0.0..0.5).contains(&open), "{open}");
+    let page = std::fs::read_to_string(folder.path().join("run/posterior/report.html")).unwrap();
+    assert!(page.contains("The visibilities are such as the draws predict"));
+    assert!(page.contains("What the data leave open"));
+}
+
+/// A killed call leaves whole draws, and the next one the bytes of a call that was not.
+#[test]
+fn exact_draws_survive_a_kill() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("fit.toml"), settings()).unwrap();
+    let kind = ["--set", "representation=linear-grid", "--set", "representation.nodes=20"];
+    for name in ["run", "killed"] {
+        run(folder.path(), &[&["fit", "fit.toml", "-o", name][..], &kind[..]].concat());
+    }
+    run(folder.path(), &["posterior", "run", "--samples", "4"]);
+    for after in ["sample_0001.npz", "sample_0003.json"] {
+        let mut child = std::process::Command::new(binary())
+            .current_dir(folder.path())
+            .args(["posterior", "killed", "--samples", "4"])
+            .stderr(std::process::Stdio::null())
+            .spawn()
+            .unwrap();
+        let path = folder.path().join("killed/posterior").join(after);
+        while !path.exists() && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(std::time::Duration::from_millis(2));
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+    run(folder.path(), &["posterior", "killed", "--samples", "4"]);
+    for name in ["sample_0001.npz", "sample_0004.json", "mean.npz", "posterior.json"] {
+        let [whole, killed] = ["run", "killed"]
+            .map(|of| std::fs::read(folder.path().join(of).join("posterior").join(name)).unwrap());
+        assert!(whole == killed, "{name}");
+    }
 }
 
 const PRIOR: &str =

@@ -18,7 +18,8 @@ pub use escape::escape;
 pub use grid_map::{GridAxis, GridMap};
 pub use html::fill;
 pub use pictures::{
-    Figure, Strip, encode, enlarged, frames, images, projections, residuals, slices, still,
+    Figure, Strip, encode, enlarged, frames, images, projections, residuals, slices, slices_with,
+    still,
 };
 pub use plot::{Axis, LinePlot, Marks, Series};
 pub use ticked::ticked;

@@ -6,7 +6,7 @@ use kerrlight_tomo::image::colormap::Colormap;
 use kerrlight_tomo::interferometry::operator::Float;
 use kerrlight_tomo::volume::Shown;
 use kerrlight_tomo::volume::projection::{self, Surroundings, VIEWS};
-use kerrlight_tomo::volume::slices::{self, Through};
+use kerrlight_tomo::volume::slices::{self, Outlines, Through};
 use std::io::Cursor;
 
 /// A picture of the page.
@@ -46,6 +46,19 @@ pub fn slices(
     hole_radius: f64,
     unit: &str,
 ) -> anyhow::Result<Figure> {
+    slices_with(shown, through, (hole_radius, None), unit)
+}
+
+/// The same with outlines of another volume.
+///
+/// # Errors
+/// If there is no volume.
+pub fn slices_with(
+    shown: &[Shown],
+    through: Through,
+    (hole_radius, outlines): (f64, Option<Outlines<'_>>),
+    unit: &str,
+) -> anyhow::Result<Figure> {
     let last = shown.last().ok_or_else(|| anyhow!("there is nothing to draw"))?;
     let point = through.point(last.volume);
     let [x, y, z] = point.map(|x| format!("{x:.2}").replace('-', "−"));
@@ -57,7 +70,11 @@ pub fn slices(
          cut each other, a circle is the hole's horizon in that plane."
     );
     let alt = format!("Three orthogonal slices of the emission: {all}.");
-    Ok(Figure { png: encode(slices::sheet(shown, point, hole_radius, unit))?, caption, alt })
+    Ok(Figure {
+        png: encode(slices::sheet(shown, (point, hole_radius), outlines, unit))?,
+        caption,
+        alt,
+    })
 }
 
 /// Volumes from four sides; `unit` is that of the emission.
@@ -208,7 +225,9 @@ pub fn residuals(maps: &[(&str, &Vec<f32>)], n: usize, what: &str) -> anyhow::Re
     let names = maps.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", right of it ");
     let worst = format!("{worst:.1}").replace('-', "−");
     let caption = format!(
-        "{what} Shown: {names}. Red is below 0, white 0, blue above; the colours end at ±{most:.1}. The pixel          that is furthest off has {worst}. Noise alone gives a pale pattern without structure; what has the shape of          the source is light that the model puts elsewhere. North is up, east to the left."
+        "{what} Shown: {names}. Red is below 0, white 0, blue above; the colours end at ±{most:.1}. The pixel \
+         that is furthest off has {worst}. Noise alone gives a pale pattern without structure; what has the shape of \
+         the source is light that the model puts elsewhere. North is up, east to the left."
     );
     let alt = format!("Map of the residuals: {names}.");
     Ok(Figure { png: encode(Some(sheet.drawn))?, caption, alt })

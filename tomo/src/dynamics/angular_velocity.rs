@@ -1,7 +1,7 @@
 //! How matter moves: how fast it turns, and whether it falls.
 
 use super::Axis;
-use super::infall::{Falling, Profile};
+use super::infall::{Falling, Origin, Profile};
 use crate::Error;
 use kerrlight_geodesic::vector::rotate;
 use kerrlight_geodesic::{Dual, Scalar};
@@ -133,12 +133,18 @@ impl AngularVelocity {
 
     /// Where the matter at a point (M) was `elapsed` (M) before, if it moves like this about an axis.
     pub fn before(&self, axis: Axis, point: [f64; 3], elapsed: f64) -> [f64; 3] {
+        self.way_back(axis, point).before(elapsed)
+    }
+
+    /// The way that the matter at a point (M) has come, if it moves like this about an axis: what is the same for all
+    /// times is looked up once.
+    pub fn way_back(&self, axis: Axis, point: [f64; 3]) -> WayBack<'_> {
         let r = radius(point);
-        let Some(flow) = self.falling() else {
-            return rotate(axis.vector(), -self.rate(r) * elapsed, point);
+        let speed = match self.falling() {
+            None => Speed::Circular(self.rate(r)),
+            Some(flow) => Speed::Falling(flow, flow.origin(r)),
         };
-        let [stretch, angle] = flow.before(&flow.origin(r), elapsed);
-        rotate(axis.vector(), angle, point.map(|x| stretch * x))
+        WayBack { axis: axis.vector(), point, speed }
     }
 
     /// What a point at radius r (M) is stretched by, and turned by about the axis (radians, right-handed), to where its
@@ -189,6 +195,31 @@ impl AngularVelocity {
     /// Derivative of [`Self::angle`] with respect to the radius, in radians per M.
     pub fn angle_slope(&self, point: [f64; 3], time: f64, reference: f64) -> f64 {
         -self.slope(radius(point)) * (time - reference)
+    }
+}
+
+/// The way that the matter at a point has come.
+#[derive(Clone, Copy, Debug)]
+pub struct WayBack<'a> {
+    axis: [f64; 3],
+    point: [f64; 3],
+    speed: Speed<'a>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Speed<'a> {
+    Circular(f64),
+    Falling(&'a Falling, Origin),
+}
+
+impl WayBack<'_> {
+    /// Where it was `elapsed` (M) before, M.
+    pub fn before(&self, elapsed: f64) -> [f64; 3] {
+        let (stretch, angle) = match &self.speed {
+            Speed::Circular(rate) => (1.0, -rate * elapsed),
+            Speed::Falling(flow, origin) => flow.before(origin, elapsed).into(),
+        };
+        rotate(self.axis, angle, self.point.map(|x| stretch * x))
     }
 }
 

@@ -15,7 +15,7 @@ mod sphere;
 #[cfg(test)]
 mod tests;
 
-pub use angular_velocity::{AngularVelocity, Injection};
+pub use angular_velocity::{AngularVelocity, Injection, WayBack};
 pub use law::{Perturbed, Velocity};
 pub use perturbed::Perturbation;
 pub use pull_back::{Cotangents, Turned, pull_back, pull_back_vjp};

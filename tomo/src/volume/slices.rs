@@ -78,15 +78,33 @@ pub fn slice(volume: &Volume, plane: [usize; 3], point: [f64; 3], pixels: usize)
     (0..pixels * pixels).map(value).collect()
 }
 
+/// Outlines of where a volume is at least as large as each level.
+#[derive(Clone, Copy, Debug)]
+pub struct Outlines<'a> {
+    /// What the levels are of.
+    pub volume: &'a Volume,
+    /// Two levels: the line of the first is white, that of the second blue.
+    pub levels: [f32; 2],
+}
+
+/// Colours of the two levels of [`Outlines`].
+const OUTLINES: [Rgb; 2] = [[235, 235, 235], [90, 170, 255]];
+
 /// Three slices of each volume through one point, a row each, in one scale of colours, with the hole's
 /// outline where a plane cuts it; `unit` is that of the emission. `None` if there is nothing to draw.
-pub fn sheet(shown: &[Shown], point: [f64; 3], hole_radius: f64, unit: &str) -> Option<RgbImage> {
+pub fn sheet(
+    shown: &[Shown],
+    (point, hole_radius): ([f64; 3], f64),
+    outlines: Option<Outlines<'_>>,
+    unit: &str,
+) -> Option<RgbImage> {
     let cuts = |s: &Shown| PLANES.map(|plane| slice(s.volume, plane, point, PANEL as usize));
     let values: Vec<[Vec<f32>; 3]> = shown.iter().map(cuts).collect();
     let most = panels::largest(values.iter().flatten());
     let row = |(s, values): (&Shown, &[Vec<f32>; 3])| {
         let drawn = |(plane, values): ([usize; 3], &Vec<f32>)| {
-            panel(s.volume, plane, values, point, (hole_radius, most))
+            let pixels = colored(values, most, outlines.map(|lines| (lines, plane, point)));
+            panel(s.volume, plane, pixels, point, hole_radius)
         };
         let panels = PLANES.into_iter().zip(values).map(drawn).collect::<Option<Vec<Panel>>>()?;
         Some((s.name.to_owned(), panels))
@@ -95,15 +113,50 @@ pub fn sheet(shown: &[Shown], point: [f64; 3], hole_radius: f64, unit: &str) -> 
     Page { rows, most, quantity: format!("emission ({unit})") }.draw()
 }
 
+/// Colours of the pixels of a plane, three bytes each, with outlines.
+fn colored(
+    values: &[f32],
+    most: f64,
+    outlines: Option<(Outlines<'_>, [usize; 3], [f64; 3])>,
+) -> Vec<u8> {
+    let table = panels::colors();
+    let mut pixels: Vec<u8> =
+        values.iter().flat_map(|value| panels::shade(&table, *value, most)).collect();
+    if let Some((lines, plane, point)) = outlines {
+        let size = PANEL as usize;
+        let of = slice(lines.volume, plane, point, size);
+        for (level, color) in lines.levels.into_iter().zip(OUTLINES) {
+            for k in edge(&of, size, level) {
+                pixels[3 * k..3 * k + 3].copy_from_slice(&color);
+            }
+        }
+    }
+    pixels
+}
+
+/// Pixels at least as large as `level` beside one that is smaller, of rows of `size`.
+fn edge(values: &[f32], size: usize, level: f32) -> Vec<usize> {
+    let inside = |k: usize| values[k] >= level;
+    let is_edge = |k: &usize| {
+        let (row, column) = (k / size, k % size);
+        let beside = [
+            (column > 0).then(|| k - 1),
+            (column + 1 < size).then(|| k + 1),
+            (row > 0).then(|| k - size),
+            (k + size < values.len()).then(|| k + size),
+        ];
+        inside(*k) && beside.into_iter().flatten().any(|other| !inside(other))
+    };
+    (0..values.len()).filter(is_edge).collect()
+}
+
 fn panel(
     volume: &Volume,
     plane: [usize; 3],
-    values: &[f32],
+    pixels: Vec<u8>,
     point: [f64; 3],
-    (hole_radius, most): (f64, f64),
+    hole_radius: f64,
 ) -> Option<Panel> {
-    let table = panels::colors();
-    let pixels = values.iter().flat_map(|value| panels::shade(&table, *value, most)).collect();
     let mut canvas = Canvas::of(&RgbImage::from_raw(PANEL, PANEL, pixels)?)?;
     let [right, up, fixed] = plane;
     let ends = [right, up].map(|axis| [volume.low[axis], volume.high[axis]]);
@@ -177,8 +230,33 @@ mod tests {
     fn exact_size_of_the_sheet() {
         let scene = paper::scene_1(16);
         let shown = [Shown { name: "truth", volume: &scene }; 2];
-        let drawn = sheet(&shown, Through::Maximum.point(&scene), 2.0, "unit").unwrap();
+        let at = (Through::Maximum.point(&scene), 2.0);
+        let drawn = sheet(&shown, at, None, "unit").unwrap();
         assert_eq!(drawn.dimensions(), (3 * (58 + 300 + 14) + 14, 2 * (30 + 28 + 300 + 46) + 74));
-        assert!(sheet(&[], [0.0; 3], 2.0, "unit").is_none());
+        assert!(sheet(&[], ([0.0; 3], 2.0), None, "unit").is_none());
+    }
+
+    #[test]
+    fn exact_edges_of_a_square() {
+        // A block of 3 × 3 in 5 × 5: all of it but its middle, and nothing at a level that it does not reach.
+        let block = |k: usize| (1..4).contains(&(k / 5)) && (1..4).contains(&(k % 5));
+        let values: Vec<f32> = (0..25).map(|k| if block(k) { 3.0 } else { 0.0 }).collect();
+        assert_eq!(edge(&values, 5, 3.0), [6, 7, 8, 11, 13, 16, 17, 18]);
+        assert!(edge(&values, 5, 3.1).is_empty());
+    }
+
+    #[test]
+    fn exact_outlines_are_drawn_in_their_colours() {
+        let scene = paper::scene_1(33);
+        let shown = [Shown { name: "truth", volume: &scene }];
+        let at = (Through::Maximum.point(&scene), 0.0);
+        let lines = Outlines { volume: &scene, levels: [0.3, 0.6] };
+        let drawn = sheet(&shown, at, Some(lines), "unit").unwrap();
+        let count = |color: Rgb| drawn.pixels().filter(|pixel| pixel.0 == color).count();
+        // The line around the brighter part is the shorter one.
+        let [outer, inner] = OUTLINES.map(count);
+        assert!(inner > 30 && outer > inner, "{outer} {inner}");
+        let plain = sheet(&shown, at, None, "unit").unwrap();
+        assert!(plain.pixels().all(|pixel| pixel.0 != OUTLINES[1]));
     }
 }

@@ -2,6 +2,7 @@
 //! optimise: Bardsley et al. 2014), in a world of its own where the world is not known.
 
 mod page;
+mod predictive;
 mod sample;
 mod summary;
 mod together;
@@ -268,7 +269,7 @@ impl<'a> Drawing<'a> {
         let noise = seed(&file, number);
         let (Some(unknown), Some(worlds)) = (self.unknown, &self.worlds) else {
             let data = measured.perturbed(&file.loss, self.factor, noise)?;
-            let through = Through { file: &file, instrument, motion, registry };
+            let through = Through { file: &file, instrument, motion, registry, measured };
             let drawn = sample::draw(&through, &data, keeper, told)?;
             return Ok(drawn.map(|drawn| (drawn, Value::Null)));
         };
@@ -277,7 +278,8 @@ impl<'a> Drawing<'a> {
         let world = worlds.draw(number);
         let Placed { file, instrument, motion, .. } =
             world_search::placed(&file, unknown, instrument, measured, &world, number)?;
-        let through = Through { file: &file, instrument: &instrument, motion: &motion, registry };
+        let through =
+            Through { file: &file, instrument: &instrument, motion: &motion, registry, measured };
         let drawn = sample::draw(&through, &data, keeper, told)?;
         let values = world_search::values_of(&unknown.free()?, &world);
         Ok(drawn.map(|drawn| (drawn, values)))
@@ -324,6 +326,7 @@ fn keep(
     output::Output::new(&volume, "")?.write(&file.to_npz())?;
     let of_draw = json!({
         "world": world, "chi2_per_datum": drawn.chi2, "noise_factor": factor,
+        "predicted": drawn.predicted,
     });
     // Last: with it the draw is whole.
     let text = sealed(of_draw);

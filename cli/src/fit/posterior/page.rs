@@ -4,11 +4,12 @@ use super::super::folder::Folder;
 use super::super::results::stores;
 use super::super::run::Prepared;
 use super::PAGE;
+use super::predictive;
 use super::summary::{Interval, Summary};
 use crate::output::Output;
 use crate::report::{self, Drawing, Report, Triangle, Variable};
 use kerrlight_tomo::volume::ranks::Ranks;
-use kerrlight_tomo::volume::slices::Through;
+use kerrlight_tomo::volume::slices::{Outlines, Through};
 use kerrlight_tomo::volume::{Shown, Volume, VolumeFile, vti};
 use std::path::Path;
 
@@ -21,16 +22,18 @@ pub fn write(
 ) -> anyhow::Result<()> {
     let file = |name: &str| Output::new(&folder.join(name), "");
     let noise = found.ensemble.signal_to_noise()?;
-    let volumes = [
+    let mut volumes = vec![
         ("mean", &found.ensemble.mean),
         ("deviation", &found.ensemble.deviation),
         ("signal_to_noise", &noise),
     ];
+    volumes.extend(found.open.as_ref().map(|open| ("deviation_over_prior", open)));
     for (name, volume) in &volumes[..2] {
         let bytes = VolumeFile { volume: (*volume).clone(), axis: None }.to_npz();
         file(&format!("{name}.npz"))?.write(&bytes)?;
     }
-    let fields = volumes.map(|(name, volume)| vti::Field { name, volume });
+    let fields: Vec<vti::Field<'_>> =
+        volumes.into_iter().map(|(name, volume)| vti::Field { name, volume }).collect();
     let write = |out: &mut std::io::BufWriter<&std::fs::File>| Ok(vti::write(out, &fields)?);
     file("posterior.vti")?.write_with(write)?;
     stores::write(run, &stores::of_draws(folder), &fields, None)?;
@@ -43,13 +46,16 @@ pub fn write(
     let report = Report {
         title: format!("{}: how sure", prepared.file.title),
         summary: found.sentences(),
-        details: coverage(found),
+        details: details(found),
         figures: figures(found, &noise, hole_radius)?,
         drawings: triangle.iter().map(drawing).collect(),
         ..Report::default()
     };
     report.write(&file(PAGE)?)
 }
+
+/// Standard deviations that the outlines of slices show.
+const SIGMAS: [f32; 2] = [3.0, 10.0];
 
 fn figures(
     found: &Summary,
@@ -62,11 +68,28 @@ fn figures(
     ];
     // Where the mean is bright, not where a single dark node is sure to be dark.
     let at = Through::Point(Through::Maximum.point(&found.ensemble.mean));
-    let ratio = [Shown { name: "mean over standard deviation", volume: noise }];
-    let unit = "model units";
-    let mut second = report::slices(&ratio, at, hole_radius, "standard deviations")?;
-    second.caption = format!("Signal over noise. {}", second.caption);
-    Ok(vec![report::slices(&shown, Through::Maximum, hole_radius, unit)?, second])
+    let outlines = Some(Outlines { volume: noise, levels: SIGMAS });
+    let mut first =
+        report::slices_with(&shown, Through::Maximum, (hole_radius, outlines), "model units")?;
+    let [white, blue] = SIGMAS;
+    first.caption = format!(
+        "{} The mean is above {white} standard deviations inside the white line, above {blue} inside the blue one.",
+        first.caption
+    );
+    let mut all = vec![first];
+    let mut more = |name, volume, unit, what| -> anyhow::Result<()> {
+        let mut next = report::slices(&[Shown { name, volume }], at, hole_radius, unit)?;
+        next.caption = format!("{what} {}", next.caption);
+        all.push(next);
+        Ok(())
+    };
+    more("mean over standard deviation", noise, "standard deviations", "Signal over noise.")?;
+    if let Some(open) = &found.open {
+        let what = "What the data leave open: near 1 the draws are as far apart as the prior's, and the data say nothing \
+                    about that place; near 0 they decide.";
+        more("standard deviation over that of the prior", open, "ratio", what)?;
+    }
+    Ok(all)
 }
 
 fn triangle(found: &Summary) -> Option<Triangle> {
@@ -100,9 +123,10 @@ fn table(world: &[Interval]) -> String {
     format!("{}\n{}", names.join(","), (0..count).map(row).collect::<String>())
 }
 
-/// How often the truth lies inside, where it is known.
-fn coverage(found: &Summary) -> Vec<report::Table> {
-    let mut all = of_nodes(found);
+/// Whether the draws predict the data, and how often the truth lies inside, where it is known.
+fn details(found: &Summary) -> Vec<report::Table> {
+    let mut all: Vec<report::Table> = predictive::table(&found.predicted).into_iter().collect();
+    all.extend(of_nodes(found));
     all.extend(found.ranks.as_ref().map(ranks));
     all
 }

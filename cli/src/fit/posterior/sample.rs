@@ -1,14 +1,18 @@
 //! One draw from the posterior: the fit of data with noise once more.
 
 use super::super::failed;
+use super::super::results::verdict::Evidence;
 use crate::interrupt::Keeper;
 use anyhow::{Context, bail};
 use kerrlight_tomo::fit::linear::LinearProgress;
 use kerrlight_tomo::fit::settings::{FitFile, Kind, Start};
 use kerrlight_tomo::fit::setup::{self, Instrument, Measured};
+use kerrlight_tomo::fit::verdict::Tested;
 use kerrlight_tomo::fit::{Motion, Objective, Outcome, State, Trainer};
+use kerrlight_tomo::frames::Frames;
 use kerrlight_tomo::representation::Registry;
 use kerrlight_tomo::volume::Volume;
+use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
 /// Of the random numbers of a prior's field, for the seed of a draw.
@@ -24,14 +28,33 @@ pub struct Through<'a> {
     pub motion: &'a Motion,
     /// Representations of others.
     pub registry: &'a Registry,
+    /// The data as they were measured.
+    pub measured: &'a Measured,
 }
 
 /// What a draw found.
 pub struct Drawn {
     /// Emission at the reference time.
     pub volume: Volume,
-    /// χ² over the number of data, of each loss.
+    /// χ² over the number of data, of each loss, beside the data that were fitted.
     pub chi2: Vec<f64>,
+    /// How probable data are that are as far from it as the measured ones.
+    pub predicted: Vec<Predicted>,
+}
+
+/// Probabilities of one kind of data under a draw.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+pub struct Predicted {
+    /// The kind of data.
+    pub data: String,
+    /// χ² of the measured data over their number.
+    pub chi2_per_datum: f64,
+    /// Of a larger χ² of all data.
+    pub larger_chi2: f64,
+    /// Of a less probable χ² of any baseline, triangle or quadrangle.
+    pub larger_on_a_baseline: Option<f64>,
+    /// Of a less probable χ² of any frame.
+    pub larger_in_a_frame: Option<f64>,
 }
 
 /// Fits `measured` from the start, with draws of the representation's parameters of their own; none if it was stopped.
@@ -41,7 +64,7 @@ pub fn draw(
     keeper: &Keeper,
     told: &dyn Fn(&str),
 ) -> anyhow::Result<Option<Drawn>> {
-    let Through { file, instrument, motion, registry } = *through;
+    let Through { file, instrument, motion, registry, .. } = *through;
     let pixels = file.screen.pixels * file.screen.pixels;
     let data = measured.terms(&file.loss, pixels)?;
     let objective = Objective { model: setup::forward_model(instrument, motion)?, data };
@@ -62,7 +85,29 @@ pub fn draw(
     let movie = trainer.images(&state.now, &frames, true)?;
     let chi2 = trainer.objective.loss_of(&frames, &movie)?.terms;
     let volume = super::super::results::recovered(file, &mut trainer, &state)?;
-    Ok(Some(Drawn { volume, chi2 }))
+    let predicted = predicted(through, &movie)?;
+    Ok(Some(Drawn { volume, chi2, predicted }))
+}
+
+/// How probable data are that are as far from a draw's images as the measured ones.
+fn predicted(through: &Through<'_>, movie: &Frames<f32>) -> anyhow::Result<Vec<Predicted>> {
+    let Through { file, instrument, motion, measured, .. } = *through;
+    let pixels = file.screen.pixels * file.screen.pixels;
+    let data = measured.terms(&file.loss, pixels)?;
+    let objective = Objective { model: setup::forward_model(instrument, motion)?, data };
+    let compared = (objective.names(), objective.statistics(movie)?);
+    let evidence = Evidence { file: Some(file), losses: &file.loss, seed: file.seed, measured };
+    let of = |(data, tested): &(String, Tested)| {
+        let found = tested.predicted()?;
+        Some(Predicted {
+            data: data.clone(),
+            chi2_per_datum: tested.statistics.chi2()?,
+            larger_chi2: found.all,
+            larger_on_a_baseline: found.groups,
+            larger_in_a_frame: found.frames,
+        })
+    };
+    Ok(evidence.judged(compared, movie)?.terms.iter().filter_map(of).collect())
 }
 
 /// The seed of the field that a prior of voxels gives a draw.

@@ -3,7 +3,9 @@
 
 use super::super::labels;
 use super::Kept;
+use super::predictive::{self, Check};
 use kerrlight_tomo::fit::settings::FitFile;
+use kerrlight_tomo::fit::setup;
 use kerrlight_tomo::fit::world::Parameter;
 use kerrlight_tomo::volume::ranks::{Ranks, rank};
 use kerrlight_tomo::volume::{Coverage, Ensemble, Feature, Volume};
@@ -48,8 +50,16 @@ pub struct Summary {
     factor: f64,
     /// Part of the mean's light at nodes whose mean is above three standard deviations.
     certain: f64,
+    /// Posterior predictive checks, one for each kind of data with errors.
+    pub predicted: Vec<Check>,
+    /// Standard deviation over that of the prior, where there is one: 1 where the data say nothing.
+    pub open: Option<Volume>,
+    /// Part of the region's nodes of which the data say nothing.
+    open_part: Option<f64>,
 }
 
+/// Nodes are open where the draws have at least this part of the prior's standard deviation.
+const OPEN: f32 = 0.8;
 /// Noise over the errors of the data above which a model is wrong: χ² of 1.2 per data point.
 const WRONG: f64 = 1.1;
 /// Random nodes at which a truth is looked at.
@@ -80,6 +90,8 @@ impl Summary {
         let ranked = |truth: &Volume| ranks(file, (&ensemble, &features), &volumes, truth);
         let ranks = truth.as_ref().map(ranked).transpose()?;
         let certain = certain(&ensemble);
+        let open = open(file, &ensemble)?;
+        let open_part = open.as_ref().map(|open| part_of_region(file, open, |ratio| ratio > OPEN));
         let factors = draws.iter().filter_map(|draw| draw.numbers["noise_factor"].as_f64());
         let factor = factors.fold(1.0, f64::max);
         Ok(Self {
@@ -91,6 +103,9 @@ impl Summary {
             samples: draws.len(),
             factor,
             certain,
+            predicted: predictive::checks(draws),
+            open,
+            open_part,
         })
     }
 
@@ -116,6 +131,8 @@ impl Summary {
             "world": world,
             "features": self.features.iter().map(feature).collect::<Vec<_>>(),
             "light_above_3_sigma": self.certain,
+            "predicted": self.predicted,
+            "open_nodes": self.open_part,
             "coverage_random_nodes": random,
             "coverage_bright_nodes": bright,
         });
@@ -142,6 +159,7 @@ impl Summary {
                 self.factor
             ));
         }
+        all.extend(self.predicted.iter().map(Check::sentence));
         all.extend(self.world.iter().map(Interval::sentence));
         all.extend(self.features.iter().enumerate().map(|(k, f)| {
             let ([r, dr], [phi, dphi]) = (f.radius, f.azimuth.map(f64::to_degrees));
@@ -157,6 +175,12 @@ impl Summary {
             100.0 * self.certain,
             self.samples
         ));
+        all.extend(self.open_part.map(|part| match (100.0 * part).round() {
+            0.0 => "The data say something about all parts of the region.".to_owned(),
+            part => format!(
+                "The data say nothing about {part:.0} % of the region: emission there is as uncertain as before."
+            ),
+        }));
         all
     }
 }
@@ -275,6 +299,27 @@ fn ranks(
         rank(feature.radius_in(truth), drawn, &mut places)
     };
     Ok([random, bright, Ranks::of(features.first().map(radius).into_iter())])
+}
+
+/// The standard deviation of the draws over that of the prior.
+fn open(file: &FitFile, ensemble: &Ensemble) -> anyhow::Result<Option<Volume>> {
+    let Some(prior) = setup::deviation_of_prior(file)? else { return Ok(None) };
+    let drawn = &ensemble.deviation;
+    let ratio = drawn.values().iter().map(|x| x / prior as f32).collect();
+    Ok(Some(Volume::new(drawn.nodes(), drawn.low(), drawn.high(), ratio)?))
+}
+
+/// Part of the nodes of the region at which a volume is such.
+fn part_of_region(file: &FitFile, volume: &Volume, is: impl Fn(f32) -> bool) -> f64 {
+    let region = file.region.limits();
+    let (mut inside, mut such) = (0, 0);
+    for (node, value) in volume.values().iter().enumerate() {
+        if region.holds(volume.position(node)) {
+            inside += 1;
+            such += usize::from(is(*value));
+        }
+    }
+    such as f64 / f64::from(inside.max(1))
 }
 
 fn certain(ensemble: &Ensemble) -> f64 {

@@ -247,9 +247,13 @@ impl<N: Elementary> Cell<N> {
             } else {
                 to = time
             }
-            let next = time - miss / self.speed(time);
+            let speed = self.speed(time);
+            let next = time - miss / speed;
             let next = if next > from && next < to { next } else { 0.5 * (from + to) };
-            if (next - time).abs() <= f64::EPSILON * time.abs() {
+            // To the rounding of the time, or of the radius.
+            let of_radius = if speed == 0.0 { 0.0 } else { radius / speed.abs() };
+            let rounding = f64::EPSILON * time.abs().max(of_radius);
+            if (next - time).abs() <= rounding {
                 return next;
             }
             time = next;

@@ -48,6 +48,7 @@ pub use least_memory::afford_all;
 pub use linear_problem::{draw_linear, solve_linear};
 pub use losses::forward_model;
 pub use measured::Measured;
+pub use random_field::deviation_of_prior;
 pub use solved_leakage::SolvedLeakage;
 pub use still::{Still, StillView};
 pub use truth::Truth;

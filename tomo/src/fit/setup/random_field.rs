@@ -44,3 +44,40 @@ fn factors(settings: &FieldSettings, voxels: &Voxels, seed: u64) -> Result<Vec<f
         _ => field.drawn_between(f64::INFINITY, seed),
     })
 }
+
+/// Fields of which the spread is taken, at so many places along each axis of the inner half.
+const FIELDS: u64 = 8;
+const PLACES: usize = 12;
+/// Of their random numbers.
+const SPREAD: u64 = 0x7370_7265_6164_0000;
+
+/// Standard deviation of the emission at a voxel under `[linear.prior]`, before any data: none without a prior.
+///
+/// That of a Gaussian field is smaller than its amplitude, since emission is not negative and not above `linear.upper`; it is
+/// that of eight fields.
+///
+/// # Errors
+/// If a number is out of range.
+pub fn deviation_of_prior(file: &FitFile) -> Result<Option<f64>> {
+    let Some(linear) = &file.linear else { return Ok(None) };
+    let Some(prior) = &linear.prior else { return Ok(None) };
+    if prior.kind == FieldKind::LogNormal {
+        let variance = prior.amplitude.powi(2);
+        let mean = (prior.mean + 0.5 * variance).exp();
+        return Ok(Some(mean * variance.exp_m1().sqrt()));
+    }
+    let voxels = Voxels::cube(file.representation.grid_nodes(), file.region.r_max, linear.degree);
+    let field = GaussianField::new(prior.law(), &voxels).within("linear.prior")?;
+    let splines = voxels.field().within("linear.prior")?;
+    let place = |k: usize| (k as f64 / (PLACES - 1) as f64 - 0.5) * file.region.r_max;
+    let places = (0..PLACES.pow(3)).map(|k| [k / PLACES / PLACES, k / PLACES % PLACES, k % PLACES]);
+    let places: Vec<[f64; 3]> = places.map(|k| k.map(place)).collect();
+    let drawn = |k| {
+        let factors = field.drawn_between(linear.upper, SPREAD + k);
+        places.iter().map(|x| splines.at(&factors, *x)).collect::<Vec<f64>>()
+    };
+    let values: Vec<f64> = (0..FIELDS).flat_map(drawn).collect();
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    Ok(Some((values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt()))
+}

@@ -30,8 +30,8 @@ pub struct Truth {
     scale: f64,
 }
 
-/// Where a Gaussian is 0 in double precision, in its standard deviations.
-const DARK: f64 = 39.0;
+/// Where a Gaussian is 5e-32 of its peak, in its standard deviations: nothing beside any rounding.
+const DARK: f64 = 12.0;
 
 /// Of what does not change.
 const ALWAYS: Shines = Shines { from: None, until: None, rise: 1.0 };
@@ -93,14 +93,16 @@ impl Truth {
 
     /// Emission at a place (M) at a time since the reference time, M.
     pub fn seen_at(&self, x: [f64; 3], time: f64) -> f64 {
-        let before = |elapsed: f64| match elapsed == 0.0 {
-            true => x,
-            false => self.velocity.before(self.axis, x, elapsed),
-        };
+        let way = self.velocity.way_back(self.axis, x);
+        let before = |elapsed: f64| if elapsed == 0.0 { x } else { way.before(elapsed) };
         // Spots that were round at the same time share the way back.
         let mut moved = (time, before(time));
         let reference = moved.1;
         let light = |spot: &Spot| {
+            let shines = spot.shines.map_or(1.0, |shines| shines.at(self.reference + time));
+            if shines < f64::EPSILON {
+                return 0.0;
+            }
             if time + spot.wound_for != moved.0 {
                 moved = (time + spot.wound_for, before(time + spot.wound_for));
             }
@@ -108,7 +110,6 @@ impl Truth {
             if offset > DARK {
                 return 0.0;
             }
-            let shines = spot.shines.map_or(1.0, |shines| shines.at(self.reference + time));
             spot.amplitude * shines * (-0.5 * offset * offset).exp()
         };
         let of_spots: f64 = self.spots.iter().map(light).sum();

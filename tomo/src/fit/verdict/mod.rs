@@ -4,10 +4,12 @@
 //! data a network's parameters have used up nobody knows, so that 1 is where χ² may begin, not where it has to end:
 //! too large is judged closely, too small generously.
 
+mod predictive;
 mod statistics;
 #[cfg(test)]
 mod tests;
 
+pub use predictive::Predicted;
 pub use statistics::{Pairs, Part, PixelSum, Statistics};
 
 /// Standard deviations of χ² that chance is granted: 5 of them come about once in a million.

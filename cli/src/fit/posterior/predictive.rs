@@ -1,0 +1,102 @@
+//! Posterior predictive checks: means over the draws of the probabilities of data that are at least as far from them as the
+//! measured ones.
+
+use super::Kept;
+use super::sample::Predicted;
+use crate::report;
+use serde::Serialize;
+
+/// Probabilities below which data are not what the draws predict.
+const WRONG: f64 = 1e-3;
+
+/// One kind of data beside all draws.
+#[derive(Clone, Debug, Serialize)]
+pub struct Check {
+    /// The kind of data.
+    pub data: String,
+    /// χ² of the measured data over their number, mean over the draws.
+    pub chi2_per_datum: f64,
+    /// Probability of a larger χ² of all data.
+    pub larger_chi2: f64,
+    /// Of a less probable χ² of any baseline, triangle or quadrangle.
+    pub larger_on_a_baseline: Option<f64>,
+    /// Of a less probable χ² of any frame.
+    pub larger_in_a_frame: Option<f64>,
+}
+
+/// Of all kinds of data that every draw was compared with.
+pub fn checks(draws: &[Kept]) -> Vec<Check> {
+    let of = |draw: &Kept| -> Vec<Predicted> {
+        serde_json::from_value(draw.numbers["predicted"].clone()).unwrap_or_default()
+    };
+    let all: Vec<Vec<Predicted>> = draws.iter().map(of).collect();
+    let kinds = all.first().map_or(&[][..], Vec::as_slice);
+    kinds.iter().filter_map(|kind| check(&kind.data, &all)).collect()
+}
+
+fn check(data: &str, draws: &[Vec<Predicted>]) -> Option<Check> {
+    let find = |draw: &'_ Vec<Predicted>| draw.iter().find(|p| p.data == data).cloned();
+    let of: Vec<Predicted> = draws.iter().map(find).collect::<Option<_>>()?;
+    let mean = |value: &dyn Fn(&Predicted) -> Option<f64>| -> Option<f64> {
+        let values: Vec<f64> = of.iter().map(value).collect::<Option<_>>()?;
+        Some(values.iter().sum::<f64>() / values.len() as f64)
+    };
+    Some(Check {
+        data: data.to_owned(),
+        chi2_per_datum: mean(&|p| Some(p.chi2_per_datum))?,
+        larger_chi2: mean(&|p| Some(p.larger_chi2))?,
+        larger_on_a_baseline: mean(&|p| p.larger_on_a_baseline),
+        larger_in_a_frame: mean(&|p| p.larger_in_a_frame),
+    })
+}
+
+impl Check {
+    /// What it says, in words.
+    pub fn sentence(&self) -> String {
+        let name = self.data.replace('-', " ");
+        let least = [Some(self.larger_chi2), self.larger_on_a_baseline, self.larger_in_a_frame];
+        let least = least.into_iter().flatten().fold(1.0, f64::min);
+        let chi2 = self.chi2_per_datum;
+        if least < WRONG {
+            return format!(
+                "The {name} are not what the draws predict: data that are as far off come about with a probability of {} \
+                 (χ² {chi2:.2} per data point).",
+                probability(least)
+            );
+        }
+        format!(
+            "The {name} are such as the draws predict: a larger χ² has a probability of {} (χ² {chi2:.2} per data point).",
+            probability(self.larger_chi2)
+        )
+    }
+}
+
+fn probability(p: f64) -> String {
+    if p < 1e-300 {
+        return "less than 1e-300".to_owned();
+    }
+    if p < 0.01 { format!("{p:.0e}") } else { format!("{p:.2}") }
+}
+
+/// All of them for the page; none without any.
+pub fn table(checks: &[Check]) -> Option<report::Table> {
+    let row = |check: &Check| {
+        let cell = |p: Option<f64>| p.map_or("–".to_owned(), probability);
+        let chi2 = format!("{:.3}", check.chi2_per_datum);
+        let all = [Some(check.larger_chi2), check.larger_on_a_baseline, check.larger_in_a_frame];
+        [check.data.clone(), chi2].into_iter().chain(all.map(cell)).collect()
+    };
+    (!checks.is_empty()).then(|| report::Table {
+        title: "Posterior predictive checks".to_owned(),
+        caption: "Probability of data that are at least as far from a draw as the measured ones, if the model and the draw are \
+                  right: by χ² of all data, by the least probable baseline (triangle, quadrangle), and by the least \
+                  probable frame. Means over the draws. Near 0 the model cannot make such data; near 1 it follows their \
+                  noise, or their errors are overestimated."
+            .to_owned(),
+        head: ["data", "χ² per data point", "larger χ²", "on a baseline", "in a frame"]
+            .map(str::to_owned)
+            .to_vec(),
+        rows: checks.iter().map(row).collect(),
+        links: Vec::new(),
+    })
+}
