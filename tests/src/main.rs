@@ -42,6 +42,7 @@ mod reproduce;
 mod results;
 mod resume;
 mod resumed_fits;
+mod resumed_searches;
 mod shared_folder;
 #[cfg(unix)]
 mod signals;

@@ -2,6 +2,7 @@
 
 use super::failed;
 use super::folder::Folder;
+use super::journal::Journal;
 use super::world_search::Placed;
 use crate::checksum::sealed;
 use crate::interrupt::{Interrupted, Keeper};
@@ -19,8 +20,6 @@ pub const FILE: &str = "band.json";
 /// Bins of periods.
 const BINS: usize = 24;
 
-const STOPPED: &str = "stopped while worlds were weighed: nothing is kept of that";
-
 /// Finds the world, or reads it where an earlier run has found it; none if it is not asked for.
 pub fn place(
     file: &FitFile,
@@ -30,9 +29,11 @@ pub fn place(
     let Some(settings) = &file.band else { return Ok(None) };
     let path = folder.path().join(FILE);
     if !path.exists() {
-        let scan = search(file, measured, settings)?;
+        let journal = Journal::open(folder)?;
+        let scan = search((file, settings), measured, &journal, &folder.stopped())?;
         let results = results(&scan, file)?;
         folder.file(FILE)?.write(sealed(results).as_bytes())?;
+        journal.end();
     }
     let damaged = || format!("{} is damaged: remove it to look again", path.display());
     let results: Value = serde_json::from_str(&output::read_text(&path)?).with_context(damaged)?;
@@ -55,21 +56,22 @@ pub fn place(
 }
 
 fn search(
-    file: &FitFile,
+    (file, settings): (&FitFile, &BandSettings),
     measured: &Measured,
-    settings: &BandSettings,
+    journal: &Journal,
+    stopped: &str,
 ) -> anyhow::Result<BandScan> {
-    let keeper = Keeper::brief(STOPPED);
+    let keeper = Keeper::brief(stopped);
     let count = settings.inclinations_deg.values().len() * settings.rotation_factors.len();
     let bar = progress::worlds(count as u64);
     let watch = |_: usize| {
         bar.inc(1);
         !keeper.stopped()
     };
-    let scan = setup::scan_band(file, measured, settings, &watch)
+    let scan = setup::scan_band(file, measured, settings, journal, &watch)
         .map_err(|error| failed::linear(error).context("band"))?;
     bar.finish_and_clear();
-    scan.ok_or_else(|| Interrupted(STOPPED.to_owned()).into())
+    scan.ok_or_else(|| Interrupted(stopped.to_owned()).into())
 }
 
 /// Shares of the probability of values, in their order.

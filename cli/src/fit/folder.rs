@@ -104,6 +104,11 @@ impl Folder {
         file.write_all(format!("{line}\n").as_bytes()).with_context(name)
     }
 
+    /// What to do about work that was interrupted and is kept.
+    pub fn stopped(&self) -> String {
+        format!("stopped; resume with: kerrlight fit --resume {}", self.path.display())
+    }
+
     /// The lines of the log.
     pub fn lines(&self) -> anyhow::Result<Vec<Value>> {
         let path = self.path.join(LOG);

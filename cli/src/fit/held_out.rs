@@ -2,6 +2,7 @@
 
 use super::failed;
 use super::folder::Folder;
+use super::journal::Journal;
 use crate::checksum::sealed;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::output;
@@ -17,8 +18,6 @@ use serde_json::{Value, json};
 /// What was found, in the folder of the run.
 const FILE: &str = "held_out.json";
 
-const STOPPED: &str = "stopped while weights were compared: nothing is kept of that";
-
 /// The settings with the weight that held-out frames choose, or have chosen in an earlier run.
 pub fn place(
     file: &FitFile,
@@ -28,8 +27,10 @@ pub fn place(
 ) -> anyhow::Result<FitFile> {
     let Some(settings) = &file.held_out else { return Ok(file.clone()) };
     if found(folder)?.is_none() {
-        let held = compare(file, settings, objective, about)?;
+        let journal = Journal::open(folder)?;
+        let held = compare((file, settings), objective, about, (&journal, &folder.stopped()))?;
         folder.file(FILE)?.write(sealed(results(settings, &held)).as_bytes())?;
+        journal.end();
     }
     for line in found(folder)?.iter().filter_map(sentence) {
         eprintln!("{line}");
@@ -62,22 +63,22 @@ pub fn settled(file: &FitFile, folder: &Folder) -> anyhow::Result<FitFile> {
 }
 
 fn compare(
-    file: &FitFile,
-    settings: &HeldOutSettings,
+    (file, settings): (&FitFile, &HeldOutSettings),
     objective: &mut Objective<f32>,
     about: (dynamics::Axis, [f64; 2]),
+    (journal, stopped): (&Journal, &str),
 ) -> anyhow::Result<Vec<Held>> {
-    let keeper = Keeper::brief(STOPPED);
+    let keeper = Keeper::brief(stopped);
     let bar = progress::held_out((settings.values.len() * settings.folds) as u64);
     let mut watch = |value: usize, fold: usize| {
         bar.set_position((value * settings.folds + fold) as u64);
         bar.set_message(format!("{} = {}", settings.setting.name(), settings.values[value]));
         !keeper.stopped()
     };
-    let held = setup::hold_out(file, settings, objective, about, &mut watch)
+    let held = setup::hold_out(file, settings, objective, about, journal, &mut watch)
         .map_err(|error| failed::linear(error).context("held_out"))?;
     bar.finish_and_clear();
-    held.ok_or_else(|| Interrupted(STOPPED.to_owned()).into())
+    held.ok_or_else(|| Interrupted(stopped.to_owned()).into())
 }
 
 fn results(settings: &HeldOutSettings, held: &[Held]) -> Value {

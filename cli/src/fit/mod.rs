@@ -13,6 +13,7 @@ mod folder;
 mod held_out;
 mod init;
 mod inputs;
+mod journal;
 mod labels;
 mod leakage;
 mod linear;

@@ -1,6 +1,7 @@
 //! A world that is not known: it is found before the emission is fitted in it.
 
 use super::folder::Folder;
+use super::journal::Journal;
 use super::{failed, world_results, world_scan};
 use crate::checksum::sealed;
 use crate::interrupt::{Interrupted, Keeper};
@@ -16,8 +17,6 @@ use serde_json::{Map, Value, json};
 
 /// What was found, in the folder of the run.
 pub const FILE: &str = "world.json";
-
-const STOPPED: &str = "stopped while the world was looked for: nothing is kept of that";
 
 /// Settings, rays and motion in the world that was found.
 pub struct Placed {
@@ -41,13 +40,15 @@ pub fn place(
     let Some(unknown) = file.unknown_world()? else { return Ok(None) };
     let path = folder.path().join(FILE);
     if !path.exists() {
-        let found = search(file, measured, &unknown)?;
+        let journal = Journal::open(folder)?;
+        let found = search((file, &unknown), measured, &journal, &folder.stopped())?;
         if let Some(scan) = &found.scan {
             let truth = true_world(file, measured)?;
             world_scan::write(folder, scan, truth.as_ref())?;
         }
         let results = results(file, measured, &unknown, &found)?;
         folder.file(FILE)?.write(sealed(results).as_bytes())?;
+        journal.end();
     }
     // Read in any case, so that a run that goes on has the same bits.
     let results: Value = serde_json::from_str(&output::read_text(&path)?)
@@ -79,11 +80,12 @@ pub fn values_of(free: &[Free], world: &World) -> Value {
 }
 
 fn search(
-    file: &FitFile,
+    (file, unknown): (&FitFile, &UnknownWorld),
     measured: &Measured,
-    unknown: &UnknownWorld,
+    journal: &Journal,
+    stopped: &str,
 ) -> anyhow::Result<FoundWorld> {
-    let keeper = Keeper::brief(STOPPED);
+    let keeper = Keeper::brief(stopped);
     let search = &unknown.search;
     let scanned = unknown.scanned();
     let (searches, each) = match scanned.is_empty() {
@@ -96,10 +98,10 @@ fn search(
         bar.set_message(format!("search {} of {count}, least chi2/2 {best:.5e}", k + 1));
         !keeper.stopped()
     };
-    let found = setup::find_world(file, measured, unknown, &mut watch)
+    let found = setup::find_world(file, measured, unknown, journal, &mut watch)
         .map_err(|error| failed::linear(error).context("world.search"))?;
     bar.finish_and_clear();
-    found.ok_or_else(|| Interrupted(STOPPED.to_owned()).into())
+    found.ok_or_else(|| Interrupted(stopped.to_owned()).into())
 }
 
 /// The settings with what was found in place of what was assumed.

@@ -54,6 +54,7 @@ mod forward_model;
 #[cfg(feature = "wgpu")]
 pub mod graphics;
 mod images;
+pub mod journal;
 mod known_field;
 pub mod linear;
 mod movie_loss;

@@ -65,17 +65,19 @@ impl<'a> Value<'a> {
         if given == length { Ok(elements) } else { Err(ReadError::invalid_length(given, expected)) }
     }
 
-    /// Name of a variant and what it holds.
-    fn variant(self) -> Result<Variant<'a>, ReadError> {
+    /// Name of a variant, one of these, and what it holds.
+    fn variant(self, names: &[&str]) -> Result<Variant<'a>, ReadError> {
         if let DeValue::String(name) = self.0.get_ref() {
             return Ok(Variant { name, value: None, span: self.0.span() });
         }
         let mut entries = self.table(&"a string or a table of one key")?.rest;
         let Some((name, value)) = entries.next() else {
-            return Err(ReadError::custom("an empty table, expected one of one key"));
+            let names = names.join("`, `");
+            return Err(ReadError::custom(format!("an empty table, expected one of `{names}`")));
         };
         if entries.next().is_some() {
-            return Err(ReadError::custom("more than one key, expected one"));
+            let names = names.join("`, `");
+            return Err(ReadError::custom(format!("more than one key, expected one of `{names}`")));
         }
         Ok(Variant { name: name.get_ref(), value: Some(Value(value)), span: name.span() })
     }
@@ -222,10 +224,10 @@ impl<'de> Deserializer<'de> for Value<'_> {
     fn deserialize_enum<V: Visitor<'de>>(
         self,
         _: &'static str,
-        _: &'static [&'static str],
+        names: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, ReadError> {
-        visitor.visit_enum(self.variant()?)
+        visitor.visit_enum(self.variant(names)?)
     }
 
     fn deserialize_ignored_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ReadError> {

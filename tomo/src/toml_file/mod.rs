@@ -176,8 +176,11 @@ mod tests {
                 "center = [1, 2, 3, 4]",
                 "line 3: center: invalid length 4, expected an array of length 3",
             ),
-            ("shape = { disc = 2, ball = {} }", "line 3: shape: more than one key, expected one"),
-            ("shape = {}", "line 3: shape: an empty table, expected one of one key"),
+            (
+                "shape = { disc = 2, ball = {} }",
+                "line 3: shape: more than one key, expected one of `disc`, `ball`",
+            ),
+            ("shape = {}", "line 3: shape: an empty table, expected one of `disc`, `ball`"),
             ("shape = \"disc\"", "line 3: shape: `disc` needs values: a table of this key"),
             (
                 "shape = { ball = 1 }",

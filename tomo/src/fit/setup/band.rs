@@ -1,6 +1,7 @@
 //! From settings to worlds that are weighed by the light curve of a flare in an orbital band.
 
 mod background;
+mod kept;
 
 use super::{Curve, Instrument, Measured, Result, axis, forward_model, hours_per_m, motion};
 use crate::dynamics::AngularVelocity;
@@ -8,6 +9,7 @@ use crate::fit::band::{
     Band, BandPrior, CurveRows, Interval, PolarGrid, Sampling, UNLIKELY, Weighed, evidence, places,
     together, validation, without_flare,
 };
+use crate::fit::journal::{self, Journal};
 use crate::fit::settings::{BandSettings, FitError, FitFile, refuse};
 use crate::fit::{FluxDatum, Motion};
 use crate::polarization::StokesParameter;
@@ -62,7 +64,7 @@ pub struct BandScan {
 /// Told how many worlds are done; says whether to go on.
 pub type BandWatch<'a> = dyn Fn(usize) -> bool + Sync + 'a;
 
-/// Weighs all worlds; none if it was cancelled.
+/// Weighs all worlds; none if it was cancelled. Worlds that the journal knows of an earlier call are not weighed again.
 ///
 /// # Errors
 /// If there is no light curve, or a setting is out of range.
@@ -70,6 +72,7 @@ pub fn scan_band(
     file: &FitFile,
     measured: &Measured,
     settings: &BandSettings,
+    journal: &dyn Journal,
     watch: &BandWatch<'_>,
 ) -> Result<Option<BandScan>> {
     let curve = check_band(file, measured, settings)?;
@@ -80,7 +83,14 @@ pub fn scan_band(
         if !watch(count) {
             return Ok(None);
         }
-        weighed(file, measured, (settings, curve), *world).map(Some)
+        let key = journal::key(("band", world.0.to_bits(), world.1.to_bits()));
+        let kept = journal.recall(key).and_then(|numbers| BandWorld::of_numbers(&numbers));
+        if kept.is_some() {
+            return Ok(kept);
+        }
+        let found = weighed(file, measured, (settings, curve), *world)?;
+        journal.keep(key, &BandWorld::numbers(&found));
+        Ok(Some(found))
     };
     let all: Vec<Option<Vec<BandWorld>>> = worlds.par_iter().map(one).collect::<Result<_>>()?;
     let Some(all) = all.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };

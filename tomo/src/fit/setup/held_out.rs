@@ -5,6 +5,7 @@ use super::linear_problem::{misfit, solve_frames};
 use super::{Result, linear_problem};
 use crate::dynamics::Axis;
 use crate::fit::Objective;
+use crate::fit::journal::{self, Journal};
 use crate::fit::linear::{Ending, LinearProgress};
 use crate::fit::settings::{FitError, FitFile, HeldOutSettings, Kind, Start};
 use core::ops::ControlFlow;
@@ -44,7 +45,7 @@ pub type HeldWatch<'a> = dyn FnMut(usize, usize) -> bool + 'a;
 
 /// Solves the linear problem for each value without each part of the frames, and looks at that part: the loss of
 /// what was not fitted. `times` are those of the first and the last emission, M since the reference time. None if it
-/// was cancelled.
+/// was cancelled. Parts that the journal knows of an earlier call are not solved again.
 ///
 /// # Errors
 /// If a setting is out of range, there are fewer frames than parts, or a problem has no solution.
@@ -53,6 +54,7 @@ pub fn hold_out(
     held_out: &HeldOutSettings,
     objective: &mut Objective<f32>,
     (axis, times): (Axis, [f64; 2]),
+    journal: &dyn Journal,
     watch: &mut HeldWatch<'_>,
 ) -> Result<Option<Vec<Held>>> {
     let all = objective.observed();
@@ -76,13 +78,20 @@ pub fn hold_out(
                 true => ControlFlow::Continue(()),
                 false => ControlFlow::Break(()),
             };
+            let key = journal::key(("held out", value.to_bits(), fold));
+            if let Some(&[loss]) = journal.recall(key).as_deref() {
+                losses.push(loss);
+                continue;
+            }
             let nodes = nodes(&file);
             let problem = linear_problem::Of { file: &file, objective, how, nodes, seed: None };
             let solution = solve_frames(&problem, &part(true), &mut told)?;
             if solution.ending == Ending::Cancelled {
                 return Ok(None);
             }
-            losses.push(misfit(&problem, &part(false), &solution.parameters())?);
+            let loss = misfit(&problem, &part(false), &solution.parameters())?;
+            journal.keep(key, &[loss]);
+            losses.push(loss);
         }
         found.push(Held { value, losses });
     }

@@ -1,6 +1,7 @@
 //! Light curves as data, simulated and measured, and worlds weighed by them.
 
 use crate::fit::Seen;
+use crate::fit::journal::Forgetful;
 use crate::fit::settings::{DataFiles, FitFile, Steps};
 use crate::fit::setup::{self, Instrument, Measured};
 use crate::interferometry::files::{light_curve_to_csv, parse_light_curve};
@@ -64,7 +65,8 @@ fn exact_worlds_of_the_published_test() {
     band.radii = Steps { from: 8.0, to: 12.0, step: 2.0 };
     let (_, measured) = simulated(&file);
     let settings = file.band.clone().unwrap();
-    let found = setup::scan_band(&file, &measured, &settings, &|_| true).unwrap().unwrap();
+    let found =
+        setup::scan_band(&file, &measured, &settings, &Forgetful, &|_| true).unwrap().unwrap();
     assert_eq!(found.worlds.len(), 4);
     let best = &found.worlds[found.best];
     assert_eq!((best.inclination_deg, best.rotation_factor), (12.0, 1.0));
@@ -77,7 +79,9 @@ fn exact_worlds_of_the_published_test() {
     assert!((azimuth - 230.0).abs() < 8.0, "{azimuth}");
     let degrees = [found.azimuth.low, found.azimuth.high].map(f64::to_degrees);
     assert!((1.0..40.0).contains(&(degrees[1] - degrees[0])), "{degrees:?}");
-    assert!(setup::scan_band(&file, &measured, &settings, &|_| false).unwrap().is_none());
+    assert!(
+        setup::scan_band(&file, &measured, &settings, &Forgetful, &|_| false).unwrap().is_none()
+    );
 }
 
 /// Data whose position angles are turned are those of a spin whose position angle is.
@@ -101,7 +105,8 @@ fn exact_position_angles_of_the_spin() {
         law.turn_deg = 0.0;
     }
     let settings = file.band.clone().unwrap();
-    let found = setup::scan_band(&file, &measured, &settings, &|_| true).unwrap().unwrap();
+    let found =
+        setup::scan_band(&file, &measured, &settings, &Forgetful, &|_| true).unwrap().unwrap();
     assert_eq!(found.worlds[found.best].position_angle_deg, 40.0, "{:?}", found.worlds);
 }
 
@@ -192,7 +197,8 @@ fn exact_a_flare_before_a_background() {
         band.radii = Steps { from: 8.0, to: 12.0, step: 2.0 };
         let (_, measured) = simulated(&file);
         let settings = file.band.clone().unwrap();
-        let found = setup::scan_band(&file, &measured, &settings, &|_| true).unwrap().unwrap();
+        let found =
+            setup::scan_band(&file, &measured, &settings, &Forgetful, &|_| true).unwrap().unwrap();
         (measured, found)
     };
     let (measured, found) = scan(0.3);
@@ -224,7 +230,10 @@ fn regress_backgrounds_that_mean_nothing_are_refused() {
             Err(error) => return error.to_string(),
         };
         let settings = file.band.clone().unwrap();
-        setup::scan_band(&file, &measured, &settings, &|_| true).err().unwrap().to_string()
+        setup::scan_band(&file, &measured, &settings, &Forgetful, &|_| true)
+            .err()
+            .unwrap()
+            .to_string()
     };
     let of = |constant: &str, variation: &str, minutes: &str| {
         says(&format!(

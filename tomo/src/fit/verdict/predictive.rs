@@ -119,7 +119,9 @@ mod tests {
     fn exact_probabilities_are_uniform() {
         let all: Vec<Predicted> = (0..400).filter_map(|k| tested(k, 0.0).predicted()).collect();
         assert_eq!(all.len(), 400);
-        for of in [|p: &Predicted| p.all, |p| p.groups.unwrap(), |p| p.frames.unwrap()] {
+        let kinds: [fn(&Predicted) -> f64; 3] =
+            [|p| p.all, |p| p.groups.unwrap(), |p| p.frames.unwrap()];
+        for of in kinds {
             let mut sorted: Vec<f64> = all.iter().map(of).collect();
             sorted.sort_by(f64::total_cmp);
             let from = |(k, p): (usize, &f64)| (p - (k as f64 + 0.5) / 400.0).abs();
@@ -127,7 +129,7 @@ mod tests {
             let distance = sorted.iter().enumerate().map(from).fold(0.0, f64::max);
             assert!(distance < 0.098, "{distance}");
         }
-        let wrong = tested(1, 1.5).predicted().unwrap();
+        let wrong = tested(1, 2.5).predicted().unwrap();
         assert!(wrong.groups.unwrap() < 1e-6 && wrong.groups.unwrap() < wrong.all, "{wrong:?}");
         assert!(Tested { errors: Errors::Weight, ..tested(1, 0.0) }.predicted().is_none());
     }

@@ -123,17 +123,17 @@ impl<T: Float + Default> WorldProblem<'_, T> {
     }
 
     fn look(&self, world: World, from: Option<&Estimate>, log: &Mutex<Log>) -> f64 {
+        // Where volumes follow the search, they have to be known as well: nothing is recalled.
         let solved = match from {
-            Some(from) => self.solve_from(world, &from.x),
-            None => self.solve(world),
+            Some(from) => self.solve_from(world, &from.x).map(|found| (found.value, Some(found))),
+            None => self.recalled(world).map(|value| (value, None)),
         };
         let mut log = log.lock().unwrap_or_else(PoisonError::into_inner);
         match solved {
-            Ok(found) => {
-                let value = found.value;
+            Ok((value, found)) => {
                 log.samples.push(Sample { world, value });
                 if log.best.as_ref().is_some_and(|best| value < best.value) {
-                    log.best = Some(found);
+                    log.best = found;
                 }
                 value
             }
@@ -142,6 +142,16 @@ impl<T: Float + Default> WorldProblem<'_, T> {
                 f64::INFINITY
             }
         }
+    }
+}
+
+impl<T: Float + Default> WorldProblem<'_, T> {
+    /// The value of a world that is solved for, or was by an earlier search.
+    fn recalled(&self, world: World) -> Result<f64, Error> {
+        let free: Vec<_> = self.free.iter().map(|free| free.parameter.name()).collect();
+        let effort = format!("{:?}", self.effort);
+        let of = (world.bits(), free, effort, self.frames, self.scale.to_bits());
+        self.memory.number(of, || Ok(self.solve(world)?.value))
     }
 }
 

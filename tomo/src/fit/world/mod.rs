@@ -224,6 +224,11 @@ impl Parameter {
 pub struct World([f64; PARAMETERS]);
 
 impl World {
+    /// The bits of all its numbers.
+    pub(crate) fn bits(&self) -> Vec<u64> {
+        crate::fit::journal::bits(&self.0)
+    }
+
     /// A hole of the reference mass in the middle of the screen, its spin towards north, matter as fast as the law or the
     /// profile, and on circular orbits where the law has three more parameters.
     pub fn new(spin: f64, inclination: f64, redshift_power: f64) -> Self {

@@ -3,6 +3,7 @@
 use super::{Parameter, Prior, World, WorldModel};
 use crate::Error;
 use crate::fit::ForwardModel;
+use crate::fit::journal::Memory;
 use crate::fit::linear::{
     Change, GaussianField, Least, LinearProblem, Patience, Prior as Penalty, Voxels, Weighted,
 };
@@ -114,6 +115,8 @@ pub struct WorldProblem<'a, T: Float> {
     pub scale: f64,
     /// What is solved for each world.
     pub effort: Effort,
+    /// What an earlier search has found, where data are convex.
+    pub memory: Memory<'a>,
 }
 
 /// How a volume is solved for.

@@ -303,6 +303,7 @@ fn of_hot_spot<'a>(
     terms: &'a [Weighted<'a, f32>],
 ) -> WorldProblem<'a, f32> {
     WorldProblem {
+        memory: Default::default(),
         model,
         known: World::new(0.0, 0.5, 2.0),
         free,

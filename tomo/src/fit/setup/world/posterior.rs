@@ -1,6 +1,7 @@
 //! How sure a world is: the bowl beneath the ripples, along other rays and with other voxels; and draws of worlds.
 
 use super::seen::Seen;
+use crate::fit::journal::Memory;
 use crate::fit::settings::{FitFile, UnknownWorld, refuse};
 use crate::fit::setup::{Measured, Result};
 use crate::fit::world::{
@@ -115,10 +116,11 @@ impl<'a> WorldPosterior<'a> {
     ) -> Result<Self> {
         let scale = noise_factor.powi(-2);
         let seen = Seen::finely(file, measured, &unknown.search.fine)?;
-        let (spread, reduced) = seen.with(unknown, &unknown.search.fine, scale, |problem| {
-            let (polished, reduced) = polished(problem, &problem.solve(world)?)?;
-            Ok((surely(problem, &polished, reduced)?, reduced))
-        })?;
+        let (spread, reduced) =
+            seen.with(unknown, &unknown.search.fine, (scale, Memory::default()), |problem| {
+                let (polished, reduced) = polished(problem, &problem.solve(world)?)?;
+                Ok((surely(problem, &polished, reduced)?, reduced))
+            })?;
         let Some(spread) = spread else { refuse!("{NO_BEST}") };
         let factor = noise_factor * reduced.max(1.0).sqrt();
         Self::around((file, measured), unknown, (world, &spread), factor)

@@ -3,6 +3,7 @@
 use super::posterior::{polished, surely};
 use super::seen::Seen;
 use super::tangent::Anchor;
+use crate::fit::journal::{Journal, Memory};
 use crate::fit::linear::{Patience, refined};
 use crate::fit::settings::{FieldKind, FitFile, Linear, UnknownWorld};
 use crate::fit::setup::{Measured, Result};
@@ -57,7 +58,8 @@ const WIDTHS: [f64; 2] = [1.5, 0.4];
 /// Worlds of a search for each of that from the twin of its end.
 const TWIN: usize = 6;
 
-/// Looks for the world from all starts, and again with finer voxels about the best end; none if it was cancelled.
+/// Looks for the world from all starts, and again with finer voxels about the best end; none if it was cancelled. What the
+/// journal knows of an earlier search that was interrupted is not looked at again.
 ///
 /// # Errors
 /// If a setting is missing or out of range, or the linear problem of a world has no solution.
@@ -65,18 +67,19 @@ pub fn find_world(
     file: &FitFile,
     measured: &Measured,
     unknown: &UnknownWorld,
+    journal: &dyn Journal,
     watch: &mut SearchWatch<'_>,
 ) -> Result<Option<FoundWorld>> {
-    let search = &unknown.search;
+    let (search, memory) = (&unknown.search, Memory::new(journal));
     let coarse = Seen::coarsely(file, measured, &search.coarse)?;
     let gaussian = |linear: &Linear| linear.prior_of(FieldKind::Gaussian).is_some();
     let has_prior = file.linear.as_ref().is_some_and(gaussian);
     // Beside a prior of the voxels data count as their errors say.
     let scale = |reduced: f64| if has_prior { 1.0 } else { scale(reduced) };
-    let first =
-        coarse.with(unknown, &search.coarse, 1.0, |problem| least(problem, search.starts))?;
+    let first = coarse
+        .with(unknown, &search.coarse, (1.0, memory), |problem| least(problem, search.starts))?;
     let over = unknown.scanned();
-    let found = coarse.with(unknown, &search.coarse, scale(first), |problem| {
+    let found = coarse.with(unknown, &search.coarse, (scale(first), memory), |problem| {
         if over.is_empty() {
             return from_starts(&coarse, problem, file.seed, unknown, watch);
         }
@@ -91,7 +94,7 @@ pub fn find_world(
     let count = trials.len().max(1) + 1;
     let mut told = |worlds: usize, best: f64| watch((count - 1, count), worlds, best);
     let how = Exploration { width: width(&over), worlds: search.fine.worlds, seed: file.seed };
-    let found = fine.with(unknown, &search.fine, scale, |problem| {
+    let found = fine.with(unknown, &search.fine, (scale, memory), |problem| {
         finely(&fine, problem, (start, volume.as_ref()), &how, &mut told)
     })?;
     Ok(found.map(|(spread, reduced_chi2, world)| FoundWorld {

@@ -2,6 +2,7 @@
 
 use super::{known_world, model};
 use crate::fit::Objective;
+use crate::fit::journal::Memory;
 use crate::fit::linear::{Change, GaussianField, Patience, Prior as Penalty, Voxels, Weighted};
 use crate::fit::settings::{FieldKind, FitFile, PriorOfVoxels, UnknownWorld, Within, WorldView};
 use crate::fit::setup::linear_problem::terms;
@@ -41,7 +42,7 @@ impl Seen {
         &self,
         unknown: &UnknownWorld,
         view: &WorldView,
-        scale: f64,
+        (scale, memory): (f64, Memory<'_>),
         search: impl FnOnce(&WorldProblem<'_, f32>) -> Result<R>,
     ) -> Result<R> {
         let CoarseView { file, instrument, measured } = &self.view;
@@ -83,6 +84,7 @@ impl Seen {
             change: Change { weight: data * change.weight, ..change },
             gaussian: gaussian.as_ref(),
             scale,
+            memory,
             effort: Effort {
                 nodes: view.nodes,
                 degree: settings.degree,

@@ -6,6 +6,7 @@
 //! to start from.
 
 use super::seen::{Seen, counted};
+use crate::fit::journal::{bits, key};
 use crate::fit::linear::{Voxels, Weighted};
 use crate::fit::settings::{Loss, LossKind};
 use crate::fit::setup::{Measured, Result};
@@ -46,7 +47,9 @@ impl Seen {
         let Some(weight) = tangent_weight(measured, &self.view.file.loss) else { return Ok(None) };
         let Some(term) = measured.tangents(problem.frames, &images)? else { return Ok(None) };
         let term = counted(Weighted { weight, term: &term }, problem.frames);
-        work(&WorldProblem { terms: &[term], ..*problem }).map(Some)
+        let anchor = key((anchor.world.bits(), bits(&anchor.x)));
+        let memory = problem.memory.about(anchor);
+        work(&WorldProblem { terms: &[term], memory, ..*problem }).map(Some)
     }
 }
 

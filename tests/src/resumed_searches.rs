@@ -1,0 +1,106 @@
+//! Searches for what a fit does not know: killed, they resume where they were, to the same bytes.
+
+use crate::support::{binary, kerrlight, root, succeed};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Kills a fit once its search has so many results, and resumes it: what it says then.
+fn killed_and_resumed(at: &Path, words: &[&str], results: usize) -> String {
+    let mut command = Command::new(binary());
+    let all = [words, &["-o", "killed"]].concat();
+    command.current_dir(at).args(all).stdout(Stdio::null()).stderr(Stdio::null());
+    let mut child = command.spawn().unwrap();
+    let (log, clock) = (at.join("killed/search.log"), Instant::now());
+    while !std::fs::read_to_string(&log).is_ok_and(|text| text.lines().count() > results) {
+        assert!(clock.elapsed() < Duration::from_secs(240) && child.try_wait().unwrap().is_none());
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let resumed = kerrlight(at, &["fit", "--resume", "killed"]);
+    let told = String::from_utf8_lossy(&resumed.stderr).into_owned();
+    assert!(resumed.status.success(), "{told}");
+    assert!(!log.exists(), "nothing is left of the search but its result");
+    told
+}
+
+fn same(at: &Path, names: &[&str]) {
+    for name in names {
+        let [whole, killed] =
+            ["whole", "killed"].map(|run| std::fs::read(at.join(run).join(name)).unwrap());
+        assert!(whole == killed, "{name}");
+    }
+}
+
+#[test]
+fn exact_a_killed_search_for_a_world_resumes_to_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let view = "{ worlds = 30, nodes = 12, iterations = 20, pixels = 12, frames = 8 }";
+    let text = format!(
+        "{}\n[world.inclination_deg]\nuniform = [50.0, 70.0]\n[world.position_angle_deg]\nuniform = [-10.0, 10.0]\n\
+         [world.search]\nstarts = 2\ndrag_is_spin = true\ncoarse = {view}\nfine = {view}\n",
+        crate::posterior::settings()
+    );
+    std::fs::write(at.join("fit.toml"), text).unwrap();
+    let words = [
+        "fit",
+        "fit.toml",
+        "--set",
+        "representation=linear-grid",
+        "--set",
+        "representation.nodes=16",
+    ];
+    succeed(at, &[&words[..], &["-o", "whole"]].concat());
+    let told = killed_and_resumed(at, &words, 45);
+    assert!(told.contains("an interrupted search is resumed"), "{told}");
+    same(at, &["world.json", "volume.npz"]);
+}
+
+#[test]
+fn exact_a_killed_weighing_of_bands_resumes_to_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let scene = root().join("scenes/fits/orbital_polarimetry.toml");
+    let scene = scene.to_str().unwrap();
+    let sets = [
+        "band.radii={from=8.0,to=12.0,step=2.0}",
+        "band.inclinations_deg={from=8.0,to=32.0,step=2.0}",
+        "band.nodes=20",
+        "band.widths=[2.0]",
+        "band.lengths=[4.0]",
+        "screen.pixels=24",
+        "representation.nodes=12",
+        "linear.rounds=1",
+        "linear.iterations=10",
+        "output.nodes=16",
+    ];
+    let sets: Vec<&str> = sets.into_iter().flat_map(|set| ["--set", set]).collect();
+    let words = [&["fit", scene][..], &sets].concat();
+    succeed(at, &[&words[..], &["-o", "whole"]].concat());
+    let told = killed_and_resumed(at, &words, 2);
+    assert!(told.contains("an interrupted search is resumed"), "{told}");
+    same(at, &["band.json"]);
+}
+
+#[test]
+fn exact_killed_comparisons_of_weights_resume_to_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("fit.toml"), crate::posterior::settings()).unwrap();
+    let words = [
+        "fit",
+        "fit.toml",
+        "--set",
+        "representation=linear-grid",
+        "--set",
+        "representation.nodes=16",
+        "--set",
+        "held_out={setting=\"linear.smoothness\",values=[1e-4,1e-2,1.0],folds=3}",
+    ];
+    succeed(at, &[&words[..], &["-o", "whole"]].concat());
+    let told = killed_and_resumed(at, &words, 4);
+    assert!(told.contains("an interrupted search is resumed"), "{told}");
+    same(at, &["held_out.json", "volume.npz"]);
+}
