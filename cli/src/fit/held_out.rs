@@ -1,4 +1,4 @@
-//! A weight of the linear problem that is chosen by frames that are held out.
+//! A weight of the linear problem that is chosen by frames or baselines that are held out.
 
 use super::failed;
 use super::folder::Folder;
@@ -10,9 +10,8 @@ use crate::progress;
 use crate::report::{Axis, LinePlot, Marks, Series};
 use anyhow::Context;
 use kerrlight_tomo::dynamics;
-use kerrlight_tomo::fit::Objective;
 use kerrlight_tomo::fit::settings::{FitFile, HeldOutSettings, Kind};
-use kerrlight_tomo::fit::setup::{self, Held};
+use kerrlight_tomo::fit::setup::{self, Held, HeldData};
 use serde_json::{Value, json};
 
 /// What was found, in the folder of the run.
@@ -22,13 +21,13 @@ const FILE: &str = "held_out.json";
 pub fn place(
     file: &FitFile,
     folder: &Folder,
-    objective: &mut Objective<f32>,
+    data: HeldData<'_>,
     about: (dynamics::Axis, [f64; 2]),
 ) -> anyhow::Result<FitFile> {
     let Some(settings) = &file.held_out else { return Ok(file.clone()) };
     if found(folder)?.is_none() {
         let journal = Journal::open(folder)?;
-        let held = compare((file, settings), objective, about, (&journal, &folder.stopped()))?;
+        let held = compare((file, settings), data, about, (&journal, &folder.stopped()))?;
         folder.file(FILE)?.write(sealed(results(settings, &held)).as_bytes())?;
         journal.end();
     }
@@ -43,12 +42,12 @@ pub fn place(
 pub fn before_steps(
     file: &FitFile,
     folder: &Folder,
-    objective: &mut Objective<f32>,
+    data: HeldData<'_>,
     about: (dynamics::Axis, [f64; 2]),
 ) -> anyhow::Result<FitFile> {
     match file.representation.kind {
         Kind::LinearGrid => Ok(file.clone()),
-        _ => place(file, folder, objective, about),
+        _ => place(file, folder, data, about),
     }
 }
 
@@ -64,18 +63,18 @@ pub fn settled(file: &FitFile, folder: &Folder) -> anyhow::Result<FitFile> {
 
 fn compare(
     (file, settings): (&FitFile, &HeldOutSettings),
-    objective: &mut Objective<f32>,
+    data: HeldData<'_>,
     about: (dynamics::Axis, [f64; 2]),
     (journal, stopped): (&Journal, &str),
 ) -> anyhow::Result<Vec<Held>> {
     let keeper = Keeper::brief(stopped);
     let bar = progress::held_out((settings.values.len() * settings.folds) as u64);
     let mut watch = |value: usize, fold: usize| {
-        bar.set_position((value * settings.folds + fold) as u64);
+        bar.set_position((fold * settings.values.len() + value) as u64);
         bar.set_message(format!("{} = {}", settings.setting.name(), settings.values[value]));
         !keeper.stopped()
     };
-    let held = setup::hold_out(file, settings, objective, about, journal, &mut watch)
+    let held = setup::hold_out(file, settings, data, about, journal, &mut watch)
         .map_err(|error| failed::linear(error).context("held_out"))?;
     bar.finish_and_clear();
     held.ok_or_else(|| Interrupted(stopped.to_owned()).into())
@@ -93,6 +92,7 @@ fn results(settings: &HeldOutSettings, held: &[Held]) -> Value {
         "setting": settings.setting.name(),
         "chosen": best.map(|best| best.value),
         "folds": settings.folds,
+        "by": settings.by.name(),
         "values": held.iter().map(one).collect::<Vec<_>>(),
     })
 }
@@ -120,8 +120,9 @@ pub fn sentence(results: &Value) -> Option<String> {
         true => "; it is the first or the last of the list, a better one may lie beyond",
         false => "",
     };
+    let by = results["by"].as_str().unwrap_or("frames");
     Some(format!(
-        "{setting} = {chosen} was chosen from {} values: the frames that were held out have χ² {least:.3} per data \
+        "{setting} = {chosen} was chosen from {} values: the {by} that were held out have χ² {least:.3} per data \
          point with it{end}.",
         values.len()
     ))
@@ -134,11 +135,12 @@ pub fn plot(results: &Value) -> Option<LinePlot> {
     let points: Vec<[f64; 2]> = values.iter().filter_map(point).collect();
     let errors = values.iter().filter_map(|value| value["error"].as_f64()).collect();
     let log = points.iter().all(|[x, _]| *x > 0.0);
+    let by = results["by"].as_str().unwrap_or("frames");
     Some(LinePlot {
-        title: "Held-out frames".to_owned(),
+        title: format!("Held-out {by}"),
         caption: format!(
-            "χ² per data point of frames that were not fitted, against the weight: each of {} parts of the frames was \
-             held out once. Too small a weight fits noise, too large a one cannot fit the data; both predict frames badly \
+            "χ² per data point of {by} that were not fitted, against the weight: each of {} parts of the {by} was \
+             held out once. Too small a weight fits noise, too large a one cannot fit the data; both predict {by} badly \
              that they have not seen. Bars are standard errors of the difference from the best weight.",
             results["folds"]
         ),
@@ -151,12 +153,17 @@ pub fn plot(results: &Value) -> Option<LinePlot> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use kerrlight_tomo::fit::settings::HeldOutBy;
     use kerrlight_tomo::fit::settings::Weight;
 
     #[test]
     fn exact_the_best_value_is_told_with_its_place() {
-        let settings =
-            HeldOutSettings { setting: Weight::Smoothness, values: vec![0.1, 1.0, 10.0], folds: 2 };
+        let settings = HeldOutSettings {
+            setting: Weight::Smoothness,
+            values: vec![0.1, 1.0, 10.0],
+            folds: 2,
+            by: HeldOutBy::Frames,
+        };
         let held = |losses: [[f64; 2]; 3]| -> Vec<Held> {
             let pairs = settings.values.iter().zip(losses);
             pairs.map(|(value, losses)| Held { value: *value, losses: losses.to_vec() }).collect()

@@ -25,7 +25,7 @@ use crate::ranks::Listener;
 use anyhow::{Context, bail};
 use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::settings::{AxisSearch, FitFile, Kind, Start};
-use kerrlight_tomo::fit::setup::{self, Given, Instrument, Measured};
+use kerrlight_tomo::fit::setup::{self, Given, HeldData, Instrument, Measured};
 use kerrlight_tomo::fit::{Motion, Objective, Outcome, State, Trainer, checkpoint};
 use kerrlight_tomo::representation::Registry;
 use kerrlight_tomo::volume::Volume;
@@ -146,7 +146,8 @@ pub fn run(
     let mut objective = prepared.objective(instrument, motion, measured)?;
     let times = setup::emission_times(instrument, motion);
     let (axis, axis_rate) = setup::axis(file)?;
-    let file = &held_out::before_steps(file, folder, &mut objective, (axis, times))?;
+    let data = HeldData { objective: &mut objective, measured };
+    let file = &held_out::before_steps(file, folder, data, (axis, times))?;
     let representation = setup::representation(file, registry, times)?;
     let training = setup::training(file, axis_rate, times)?;
     let mut state = State::new(&*representation, axis, &training);
@@ -314,8 +315,8 @@ impl Run<'_> {
         let trainer = &mut self.trainer;
         if self.file.representation.kind == Kind::LinearGrid {
             let nodes = self.file.representation.grid_nodes();
-            let file =
-                held_out::place(self.file, self.folder, &mut trainer.objective, (axis, times))?;
+            let data = HeldData { objective: &mut trainer.objective, measured: self.measured };
+            let file = held_out::place(self.file, self.folder, data, (axis, times))?;
             let change = setup::change(&file, times)?;
             let whose = (self.measured, self.folder);
             let solution =

@@ -144,6 +144,12 @@ pub const KEYS: &[Key] = &[
     ),
     key(
         "screen",
+        "pulse",
+        "\"delta\"",
+        "what pixels are to visibilities: triangle (as eht-imaging simulates), rectangle, or delta: samples of a smooth image",
+    ),
+    key(
+        "screen",
         "jy_per_pixel",
         "",
         "pixel flux in Jy of a line of sight with unit emission over 1 M; sets the unit of emission; above 0",

@@ -12,8 +12,32 @@ pub struct HeldOutSettings {
     pub setting: Weight,
     /// Its values, from which one is chosen.
     pub values: Vec<f64>,
-    /// Parts of the frames, each of which is held out once: frame k belongs to part k modulo their number.
+    /// Parts of the data, each of which is held out once: frame, or baseline, k belongs to part k modulo their number.
     pub folds: usize,
+    /// What the data are divided by.
+    #[serde(default)]
+    pub by: HeldOutBy,
+}
+
+/// What is held out together.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum HeldOutBy {
+    /// All data of a frame.
+    #[default]
+    Frames,
+    /// All visibilities of a baseline.
+    Baselines,
+}
+
+impl HeldOutBy {
+    /// Its word.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Frames => "frames",
+            Self::Baselines => "baselines",
+        }
+    }
 }
 
 /// A weight of the linear problem.
@@ -80,6 +104,12 @@ impl HeldOutSettings {
             return Err(
                 FitError::range("length of held_out.values", self.values.len(), allowed).into()
             );
+        }
+        if self.by == HeldOutBy::Baselines
+            && file.loss.iter().any(|loss| !loss.data.has_baselines())
+        {
+            let why = "held_out.by = \"baselines\" needs losses of visibilities or what is made of them alone";
+            return Err(FitError::Conflict(why.to_owned()).into());
         }
         let has_prior = file.linear.as_ref().is_some_and(|linear| linear.prior.is_some());
         let is_linear = file.representation.kind == Kind::LinearGrid;

@@ -32,7 +32,7 @@ pub use error::FitError;
 pub(crate) use error::{Within, refuse};
 pub use faraday::FaradaySettings;
 pub use gaussian::{FieldKind, FieldSettings, Negative, PriorOfVoxels};
-pub use held_out::{HeldOutSettings, Weight};
+pub use held_out::{HeldOutBy, HeldOutSettings, Weight};
 pub use instrument::{GainPhases, GainSettings, InstrumentSettings, LeakageSettings};
 pub use light_curve::{MeanFlux, MeasuredCurve, PerStokes, SimulatedBackground, SimulatedCurve};
 pub use medium::{Scattering, Variability};
@@ -48,7 +48,7 @@ pub use static_image::{
 };
 pub use static_polarization::StaticPolarization;
 pub use unknown_world::{PriorSettings, UnknownWorld, WorldSearch, WorldView};
-pub use view::{Absorption, Effects, Hole, Motion, Observer, Region, Screen, WidthOf};
+pub use view::{Absorption, Effects, Hole, Motion, Observer, PixelShape, Region, Screen, WidthOf};
 pub use world::merge;
 
 use crate::Error;

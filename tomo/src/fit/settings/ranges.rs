@@ -55,7 +55,7 @@ const RANGES: &[Range] = &[
     ("motion.reference_time", -TIME, TIME, "M"),
     ("motion.injection_time", -TIME, TIME, "M"),
     ("held_out.values.*", 0.0, 1e12, "a factor"),
-    ("held_out.folds", 2.0, 1000.0, "parts of the frames"),
+    ("held_out.folds", 2.0, 1000.0, "parts of the data"),
     ("change.weight", 0.0, 1e12, "a factor"),
     ("change.spacing", 1e-6, TIME, "M"),
     ("change.sharpen", 1e-12, 1e12, "an emission"),

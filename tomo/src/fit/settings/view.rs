@@ -2,6 +2,7 @@
 
 use crate::dynamics::Velocity;
 use crate::fit::{Region as Limits, Sampling};
+use crate::interferometry::operator::Pulse;
 use serde::{Deserialize, Serialize};
 
 /// The hole.
@@ -47,6 +48,37 @@ pub struct Screen {
     /// Rays of each pixel near the critical curve, whose mean is its light; one in the middle, without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ring_rays: Option<usize>,
+    /// What a pixel is to visibilities.
+    #[serde(default, skip_serializing_if = "PixelShape::is_usual")]
+    pub pulse: PixelShape,
+}
+
+/// What a pixel is to visibilities.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PixelShape {
+    /// Two pixels wide, linear between centres, as eht-imaging simulates images.
+    #[default]
+    Triangle,
+    /// A square.
+    Rectangle,
+    /// A sample of a smooth image: the sum over pixels is the Fourier integral.
+    Delta,
+}
+
+impl PixelShape {
+    fn is_usual(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Its pulse.
+    pub fn pulse(self) -> Pulse {
+        match self {
+            Self::Triangle => Pulse::Triangle,
+            Self::Rectangle => Pulse::Rectangle,
+            Self::Delta => Pulse::Delta,
+        }
+    }
 }
 
 /// What a width is of.

@@ -6,6 +6,7 @@ use crate::fit::scan::AxisProblem;
 use crate::fit::settings::{FitFile, LossKind, Region, Screen, WidthOf};
 use crate::fit::{Motion, Objective, Sampling};
 use crate::frames::Frames;
+use crate::interferometry::operator::Pulse;
 
 /// What a fit is seen through by a scan.
 pub struct CoarseView {
@@ -69,7 +70,12 @@ impl CoarseView {
         let region = fewer_nodes(file, file.screen.pixels / pixels);
         let file = FitFile { screen, region, ..file.clone() };
         let instrument = Instrument::new(&file)?;
-        let measured = Measured { sky: sky(&file).ok(), ..measured.without_truth() };
+        let pulse = match (measured.pulse, measured.sky) {
+            // Data keep the pixels that they were made of.
+            (Pulse::Triangle, Some(own)) => Pulse::TriangleOf(own.pixel_rad),
+            (pulse, _) => pulse,
+        };
+        let measured = Measured { sky: sky(&file).ok(), pulse, ..measured.without_truth() };
         Ok(Self { file, instrument, measured })
     }
 

@@ -97,7 +97,17 @@ impl Measured {
         let leakage = leakage::unknown(file.instrument.as_ref(), &observation)?;
         let (visibilities, sky) = (Some((observation, of_rows)), Some(sky(file)?));
         let varies = variability.is_some();
-        Ok(Measured { times, visibilities, varies, sky, gains, leakage, ..Measured::empty() })
+        let pulse = file.screen.pulse.pulse();
+        Ok(Measured {
+            times,
+            visibilities,
+            varies,
+            sky,
+            pulse,
+            gains,
+            leakage,
+            ..Measured::empty()
+        })
     }
 
     /// Takes measured visibilities as the data of a static image, whose frames have hours of UTC for times. `name` is

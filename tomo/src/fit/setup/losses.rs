@@ -13,7 +13,7 @@ use crate::interferometry::data_terms::{
     AmplitudeTerm, ClosureTerm, DataTerm, DataTermError, GainTerm, VisibilityTerm,
 };
 use crate::interferometry::observation::Observation;
-use crate::interferometry::operator::{Float, ImageGrid, Method, Pulse, Transform};
+use crate::interferometry::operator::{Float, ImageGrid, Method, Transform};
 use crate::interferometry::products::ClosureKind;
 use crate::memory;
 
@@ -160,7 +160,7 @@ impl Measured {
         let uv: Vec<[f64; 2]> = part.stokes_i().map(|(row, _)| row.uv).collect();
         // With the same result, whether they are kept or not.
         let share = memory::part(1.0 / 8.0) / self.times.len() as f64;
-        Transform::new(sky, Pulse::Triangle, &[uv], Method::Direct, MEMORY.min(share as usize))
+        Transform::new(sky, self.pulse, &[uv], Method::Direct, MEMORY.min(share as usize))
     }
 
     /// The rows of a frame, and where pixels are.

@@ -7,7 +7,7 @@ use crate::fit::FluxDatum;
 use crate::frames::Frames;
 use crate::interferometry::gains::{GainPriors, GainTable};
 use crate::interferometry::observation::Observation;
-use crate::interferometry::operator::ImageGrid;
+use crate::interferometry::operator::{ImageGrid, Pulse};
 use crate::interferometry::polarimetry::LeakageTable;
 
 /// The data of a fit, and what is known to be true.
@@ -25,6 +25,8 @@ pub struct Measured {
     pub curve: Option<Curve>,
     /// Where pixels are on the sky, where that matters.
     pub sky: Option<ImageGrid>,
+    /// What those pixels are to visibilities.
+    pub pulse: Pulse,
     /// What is simulated.
     pub truth: Option<Truth>,
     /// Priors of the stations' gains, where these are solved for.
@@ -38,6 +40,31 @@ pub struct Measured {
 }
 
 impl Measured {
+    /// The visibilities of some baselines alone, which are numbered in the order of their stations.
+    #[must_use]
+    pub(super) fn of_baselines(&self, keep: impl Fn(usize) -> bool) -> Self {
+        let mut copy = self.without_truth();
+        let baselines = self.baselines();
+        if let Some((observation, frames)) = &mut copy.visibilities {
+            let kept = |stations: &[u16; 2]| baselines.binary_search(stations).is_ok_and(&keep);
+            let kept: Vec<bool> = observation.rows.iter().map(|row| kept(&row.stations)).collect();
+            let mut of_rows = kept.iter();
+            observation.rows.retain(|_| of_rows.next() == Some(&true));
+            let mut of_frames = kept.iter();
+            frames.retain(|_| of_frames.next() == Some(&true));
+        }
+        copy
+    }
+
+    /// Pairs of stations with visibilities, in their order.
+    pub(super) fn baselines(&self) -> Vec<[u16; 2]> {
+        let rows = self.visibilities.iter().flat_map(|(observation, _)| &observation.rows);
+        let mut all: Vec<[u16; 2]> = rows.map(|row| row.stations).collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+
     pub(super) fn empty() -> Self {
         Self {
             times: Vec::new(),
@@ -46,6 +73,7 @@ impl Measured {
             varies: false,
             curve: None,
             sky: None,
+            pulse: Pulse::Triangle,
             truth: None,
             gains: None,
             true_gains: None,
@@ -74,6 +102,7 @@ impl Measured {
             varies: self.varies,
             curve: self.curve.clone(),
             sky: self.sky,
+            pulse: self.pulse,
             gains: self.gains.clone(),
             leakage: self.leakage.clone(),
             truth: None,

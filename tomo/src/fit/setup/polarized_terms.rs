@@ -6,7 +6,7 @@ use crate::fit::settings::{Loss, LossKind};
 use crate::interferometry::data_terms::{
     DataTerm, DataTermError, PolarizedTerm, RatioTerm, TraceTerm,
 };
-use crate::interferometry::operator::{Float, Method, Operator, Pulse, Transform};
+use crate::interferometry::operator::{Float, Method, Operator, Transform};
 use crate::interferometry::polarimetry::MODELLED;
 use num_complex::Complex;
 
@@ -30,7 +30,7 @@ impl Measured {
         let leakage = self.leakage.as_ref().map(|leakage| &leakage.shared);
         let term = PolarizedTerm::new(&part, self.gains.as_ref(), leakage)?;
         let images = vec![uv; MODELLED];
-        let transform = Transform::new(sky, Pulse::Triangle, &images, Method::Direct, MEMORY)?;
+        let transform = Transform::new(sky, self.pulse, &images, Method::Direct, MEMORY)?;
         Ok(Some((transform, term)))
     }
 
@@ -60,7 +60,7 @@ impl Measured {
             term => Box::new(term?),
         };
         let images = vec![TraceTerm::uv(&part, least_snr); MODELLED];
-        let transform = Transform::new(sky, Pulse::Triangle, &images, Method::Direct, MEMORY)?;
+        let transform = Transform::new(sky, self.pulse, &images, Method::Direct, MEMORY)?;
         Ok(Some(Scan { transform, term }))
     }
 
@@ -72,7 +72,7 @@ impl Measured {
         }
         let term = Box::new(RatioTerm::new(&part, least_snr)?);
         let images = vec![uv; MODELLED];
-        let transform = Transform::new(sky, Pulse::Triangle, &images, Method::Direct, MEMORY)?;
+        let transform = Transform::new(sky, self.pulse, &images, Method::Direct, MEMORY)?;
         Ok(Some(Scan { transform, term }))
     }
 

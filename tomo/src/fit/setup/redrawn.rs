@@ -5,7 +5,7 @@ use crate::fit::settings::{Loss, LossKind};
 use crate::interferometry::Complex64;
 use crate::interferometry::noise::add_thermal_noise;
 use crate::interferometry::observation::Row;
-use crate::interferometry::operator::{Method, Operator, Pulse, Transform};
+use crate::interferometry::operator::{Method, Operator, Transform};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
@@ -56,7 +56,7 @@ impl Measured {
             return Ok(copy);
         };
         let uv: Vec<[f64; 2]> = observation.stokes_i().map(|(row, _)| row.uv).collect();
-        let transform = Transform::<f64>::new(sky, Pulse::Triangle, &[uv], Method::Direct, 0)?;
+        let transform = Transform::<f64>::new(sky, self.pulse, &[uv], Method::Direct, 0)?;
         let mut model = vec![Complex64::default(); transform.data()];
         transform.forward(image, &mut model);
         let gains = self.gains(losses, &model)?.unwrap_or_default();

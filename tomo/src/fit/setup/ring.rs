@@ -88,7 +88,15 @@ mod tests {
 
     fn screen() -> Screen {
         let (pixels, width, width_of) = (41, 20.0, WidthOf::Centers);
-        Screen { pixels, width, width_of, field_uas: None, ring_rays: None, jy_per_pixel: 1.0 }
+        Screen {
+            pixels,
+            width,
+            width_of,
+            field_uas: None,
+            ring_rays: None,
+            jy_per_pixel: 1.0,
+            pulse: Default::default(),
+        }
     }
 
     fn ring() -> Ring {

@@ -12,7 +12,7 @@ use crate::fit::settings::{FitFile, Within, refuse};
 use crate::frames::Frames;
 use crate::interferometry::array::Array;
 use crate::interferometry::observation::Observation;
-use crate::interferometry::operator::{ImageGrid, Method, Pulse};
+use crate::interferometry::operator::{ImageGrid, Method};
 use crate::interferometry::simulate::{self, Movie};
 
 impl Measured {
@@ -69,6 +69,7 @@ fn simulate(
         movie,
         visibilities,
         sky,
+        pulse: fit.screen.pulse.pulse(),
         truth,
         gains,
         true_gains,
@@ -86,9 +87,10 @@ fn fill(
     (hours, times): (&[f64], &[f64]),
     sky: ImageGrid,
 ) -> Result<Frames<f64>> {
+    let pulse = fit.screen.pulse.pulse();
     if !is_polarized(&fit.loss) {
         let images = lit(truth, truth.movie(file, instrument, times)?)?;
-        simulate::fill_from(observation, (sky, &images), Pulse::Triangle, hours)?;
+        simulate::fill_from(observation, (sky, &images), pulse, hours)?;
         return Ok(images);
     }
     let of = |pixels: Vec<f64>| Movie { grid: sky, pixels };
@@ -98,7 +100,7 @@ fn fill(
     let [i, q, u] = polarized::split(&all, sky.pixels()).map(of);
     let lit = lit(truth, Frames::of(i.pixels.clone(), sky.pixels()))?;
     let movies = [&i, &q, &u];
-    simulate::fill_polarized(observation, movies, Pulse::Triangle, hours, Method::Direct)?;
+    simulate::fill_polarized(observation, movies, pulse, hours, Method::Direct)?;
     Ok(lit)
 }
 

@@ -8,7 +8,7 @@ use kerrlight_tomo::frames::Frames;
 use kerrlight_tomo::interferometry::data_terms::{AmplitudeTerm, ClosureTerm, DataTerm};
 use kerrlight_tomo::interferometry::noise::add_thermal_noise;
 use kerrlight_tomo::interferometry::observation::Observation;
-use kerrlight_tomo::interferometry::operator::{Method, Operator, Pulse, Transform};
+use kerrlight_tomo::interferometry::operator::{Method, Operator, Transform};
 use kerrlight_tomo::interferometry::products::ClosureKind;
 use num_complex::Complex;
 
@@ -41,7 +41,8 @@ impl Evidence<'_> {
             if uv.is_empty() {
                 continue;
             }
-            let transform = Transform::<f32>::new(sky, Pulse::Triangle, &[uv], Method::Direct, 0)?;
+            let transform =
+                Transform::<f32>::new(sky, self.measured.pulse, &[uv], Method::Direct, 0)?;
             let mut model = vec![Complex::new(0.0, 0.0); transform.data()];
             transform.forward(&movie.image(frame)?, &mut model);
             for (at, v) in places.iter().zip(&model) {
