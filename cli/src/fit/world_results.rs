@@ -88,7 +88,11 @@ pub fn sentences(results: &Value) -> Vec<String> {
                  {from:.3}{unit} to {to:.3}{unit} at 95 %{truth}."
             ));
         }
-        Some(format!("The {words} is between {from:.3}{unit} and {to:.3}{unit} at 95 %{truth}."))
+        let interval = format!("between {from:.3}{unit} and {to:.3}{unit} at 95 %{truth}");
+        Some(match unexplained(results) {
+            None => format!("The {words} is {interval}."),
+            Some(_) => format!("If the model were right, the {words} would be {interval}."),
+        })
     };
     let mut all: Vec<String> = Parameter::ALL.into_iter().filter_map(of).collect();
     all.extend(small_residuals(results).map(|said| format!("Note that {said}.")));
@@ -136,7 +140,8 @@ fn unexplained(results: &Value) -> Option<String> {
     let chi2 = results["chi2_per_datum"].as_f64().filter(|chi2| *chi2 > ROUGH)?;
     Some(format!(
         "the volume of the best world leaves χ²/N = {chi2:.2}, which pulls at the world more than its errors say: \
-         world.search.fine needs more iterations or nodes, or the model is wrong"
+         world.search.fine needs more iterations or nodes, the screen more pixels (pulse = \"delta\" for data of finer \
+         ones), or the model is wrong"
     ))
 }
 
@@ -212,8 +217,14 @@ mod tests {
         };
         results["chi2_per_datum"] = json!(1.1);
         assert_eq!(says(&results), [false; 2]);
+        assert!(sentences(&results)[1].starts_with("The inclination is between"));
         results["chi2_per_datum"] = json!(3.3);
         assert_eq!(says(&results), [true; 2]);
+        let said = &sentences(&results)[1];
+        assert!(
+            said.starts_with("If the model were right, the inclination would be between"),
+            "{said}"
+        );
     }
 
     #[test]
