@@ -5,6 +5,10 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+/// A fit of few voxels.
+const VOXELS: [&str; 6] =
+    ["fit", "fit.toml", "--set", "representation=linear-grid", "--set", "representation.nodes=16"];
+
 /// Kills a fit once its search has so many results, and resumes it: what it says then.
 fn killed_and_resumed(at: &Path, words: &[&str], results: usize) -> String {
     let mut command = Command::new(binary());
@@ -25,7 +29,11 @@ fn killed_and_resumed(at: &Path, words: &[&str], results: usize) -> String {
     told
 }
 
-fn same(at: &Path, names: &[&str]) {
+/// A fit whose search is killed after so many results ends with the bytes of one that is not.
+fn resumes_to_the_same_bytes(at: &Path, words: &[&str], results: usize, names: &[&str]) {
+    succeed(at, &[words, &["-o", "whole"]].concat());
+    let told = killed_and_resumed(at, words, results);
+    assert!(told.contains("an interrupted search is resumed"), "{told}");
     for name in names {
         let [whole, killed] =
             ["whole", "killed"].map(|run| std::fs::read(at.join(run).join(name)).unwrap());
@@ -44,18 +52,7 @@ fn exact_a_killed_search_for_a_world_resumes_to_the_same_bytes() {
         crate::posterior::settings()
     );
     std::fs::write(at.join("fit.toml"), text).unwrap();
-    let words = [
-        "fit",
-        "fit.toml",
-        "--set",
-        "representation=linear-grid",
-        "--set",
-        "representation.nodes=16",
-    ];
-    succeed(at, &[&words[..], &["-o", "whole"]].concat());
-    let told = killed_and_resumed(at, &words, 45);
-    assert!(told.contains("an interrupted search is resumed"), "{told}");
-    same(at, &["world.json", "volume.npz"]);
+    resumes_to_the_same_bytes(at, &VOXELS, 45, &["world.json", "volume.npz"]);
 }
 
 #[test]
@@ -78,10 +75,7 @@ fn exact_a_killed_weighing_of_bands_resumes_to_the_same_bytes() {
     ];
     let sets: Vec<&str> = sets.into_iter().flat_map(|set| ["--set", set]).collect();
     let words = [&["fit", scene][..], &sets].concat();
-    succeed(at, &[&words[..], &["-o", "whole"]].concat());
-    let told = killed_and_resumed(at, &words, 2);
-    assert!(told.contains("an interrupted search is resumed"), "{told}");
-    same(at, &["band.json"]);
+    resumes_to_the_same_bytes(at, &words, 2, &["band.json"]);
 }
 
 #[test]
@@ -89,18 +83,7 @@ fn exact_killed_comparisons_of_weights_resume_to_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     std::fs::write(at.join("fit.toml"), crate::posterior::settings()).unwrap();
-    let words = [
-        "fit",
-        "fit.toml",
-        "--set",
-        "representation=linear-grid",
-        "--set",
-        "representation.nodes=16",
-        "--set",
-        "held_out={setting=\"linear.smoothness\",values=[1e-4,1e-2,1.0],folds=3}",
-    ];
-    succeed(at, &[&words[..], &["-o", "whole"]].concat());
-    let told = killed_and_resumed(at, &words, 4);
-    assert!(told.contains("an interrupted search is resumed"), "{told}");
-    same(at, &["held_out.json", "volume.npz"]);
+    let held_out = "held_out={setting=\"linear.smoothness\",values=[1e-4,1e-2,1.0],folds=3}";
+    let words = [&VOXELS[..], &["--set", held_out]].concat();
+    resumes_to_the_same_bytes(at, &words, 4, &["held_out.json", "volume.npz"]);
 }

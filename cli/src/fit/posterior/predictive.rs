@@ -2,19 +2,18 @@
 //! measured ones.
 
 use super::Kept;
-use super::sample::Predicted;
 use crate::report;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Probabilities below which data are not what the draws predict.
 const WRONG: f64 = 1e-3;
 
-/// One kind of data beside all draws.
-#[derive(Clone, Debug, Serialize)]
+/// Posterior predictive p-values of one kind of data, under a draw or in the mean over all.
+#[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct Check {
     /// The kind of data.
     pub data: String,
-    /// χ² of the measured data over their number, mean over the draws.
+    /// χ² of the measured data over their number.
     pub chi2_per_datum: f64,
     /// Probability of a larger χ² of all data.
     pub larger_chi2: f64,
@@ -24,20 +23,20 @@ pub struct Check {
     pub larger_in_a_frame: Option<f64>,
 }
 
-/// Of all kinds of data that every draw was compared with.
+/// Means over the draws, of all kinds of data that every one was compared with.
 pub fn checks(draws: &[Kept]) -> Vec<Check> {
-    let of = |draw: &Kept| -> Vec<Predicted> {
+    let of = |draw: &Kept| -> Vec<Check> {
         serde_json::from_value(draw.numbers["predicted"].clone()).unwrap_or_default()
     };
-    let all: Vec<Vec<Predicted>> = draws.iter().map(of).collect();
+    let all: Vec<Vec<Check>> = draws.iter().map(of).collect();
     let kinds = all.first().map_or(&[][..], Vec::as_slice);
     kinds.iter().filter_map(|kind| check(&kind.data, &all)).collect()
 }
 
-fn check(data: &str, draws: &[Vec<Predicted>]) -> Option<Check> {
-    let find = |draw: &'_ Vec<Predicted>| draw.iter().find(|p| p.data == data).cloned();
-    let of: Vec<Predicted> = draws.iter().map(find).collect::<Option<_>>()?;
-    let mean = |value: &dyn Fn(&Predicted) -> Option<f64>| -> Option<f64> {
+fn check(data: &str, draws: &[Vec<Check>]) -> Option<Check> {
+    let find = |draw: &'_ Vec<Check>| draw.iter().find(|p| p.data == data).cloned();
+    let of: Vec<Check> = draws.iter().map(find).collect::<Option<_>>()?;
+    let mean = |value: &dyn Fn(&Check) -> Option<f64>| -> Option<f64> {
         let values: Vec<f64> = of.iter().map(value).collect::<Option<_>>()?;
         Some(values.iter().sum::<f64>() / values.len() as f64)
     };

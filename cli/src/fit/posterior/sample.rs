@@ -2,6 +2,7 @@
 
 use super::super::failed;
 use super::super::results::verdict::Evidence;
+use super::predictive::Check;
 use crate::interrupt::Keeper;
 use anyhow::{Context, bail};
 use kerrlight_tomo::fit::linear::LinearProgress;
@@ -12,7 +13,6 @@ use kerrlight_tomo::fit::{Motion, Objective, Outcome, State, Trainer};
 use kerrlight_tomo::frames::Frames;
 use kerrlight_tomo::representation::Registry;
 use kerrlight_tomo::volume::Volume;
-use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
 /// Of the random numbers of a prior's field, for the seed of a draw.
@@ -39,22 +39,7 @@ pub struct Drawn {
     /// χ² over the number of data, of each loss, beside the data that were fitted.
     pub chi2: Vec<f64>,
     /// How probable data are that are as far from it as the measured ones.
-    pub predicted: Vec<Predicted>,
-}
-
-/// Probabilities of one kind of data under a draw.
-#[derive(Clone, Debug, Deserialize, Serialize)]
-pub struct Predicted {
-    /// The kind of data.
-    pub data: String,
-    /// χ² of the measured data over their number.
-    pub chi2_per_datum: f64,
-    /// Of a larger χ² of all data.
-    pub larger_chi2: f64,
-    /// Of a less probable χ² of any baseline, triangle or quadrangle.
-    pub larger_on_a_baseline: Option<f64>,
-    /// Of a less probable χ² of any frame.
-    pub larger_in_a_frame: Option<f64>,
+    pub predicted: Vec<Check>,
 }
 
 /// Fits `measured` from the start, with draws of the representation's parameters of their own; none if it was stopped.
@@ -90,7 +75,7 @@ pub fn draw(
 }
 
 /// How probable data are that are as far from a draw's images as the measured ones.
-fn predicted(through: &Through<'_>, movie: &Frames<f32>) -> anyhow::Result<Vec<Predicted>> {
+fn predicted(through: &Through<'_>, movie: &Frames<f32>) -> anyhow::Result<Vec<Check>> {
     let Through { file, instrument, motion, measured, .. } = *through;
     let pixels = file.screen.pixels * file.screen.pixels;
     let data = measured.terms(&file.loss, pixels)?;
@@ -99,7 +84,7 @@ fn predicted(through: &Through<'_>, movie: &Frames<f32>) -> anyhow::Result<Vec<P
     let evidence = Evidence { file: Some(file), losses: &file.loss, seed: file.seed, measured };
     let of = |(data, tested): &(String, Tested)| {
         let found = tested.predicted()?;
-        Some(Predicted {
+        Some(Check {
             data: data.clone(),
             chi2_per_datum: tested.statistics.chi2()?,
             larger_chi2: found.all,
