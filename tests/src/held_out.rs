@@ -83,6 +83,10 @@ fn bad_ways_to_hold_out_are_refused_before_anything_is_written() {
         ("held_out={setting=\"linear.smoothness\",values=[0.1,-1.0],folds=2}", "held_out.values"),
         ("held_out={setting=\"linear.smoothness\",values=[0.1,1.0],folds=1}", "held_out.folds = 1"),
         (
+            "held_out={setting=\"linear.smoothness\",values=[0.1,1.0],folds=900}",
+            "half of the frames",
+        ),
+        (
             "held_out={setting=\"linear.smoothness\",values=[0.1,1.0],folds=2,by=\"stations\"}",
             "expected `frames` or `baselines`",
         ),

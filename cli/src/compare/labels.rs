@@ -10,7 +10,7 @@ pub fn number(x: f64, digits: usize) -> String {
 }
 
 /// Results that are shown: their names in results.json, what they are called, their units and digits.
-pub const RESULTS: [(&str, &str, &str, usize); 79] = [
+pub const RESULTS: [(&str, &str, &str, usize); 80] = [
     ("psnr_db", "PSNR", "dB", 2),
     ("psnr_inside_db", "PSNR inside the region", "dB", 2),
     ("psnr_over_time_db", "PSNR over time", "dB", 2),
@@ -42,6 +42,7 @@ pub const RESULTS: [(&str, &str, &str, usize); 79] = [
     ("xi_drawn_within_95", "ξ within the middle 95 % of the draws", "", 2),
     ("beta_r_error", "error of β_r", "", 4),
     ("beta_phi_error", "error of β_φ", "", 4),
+    ("flow_error", "relative error of the velocity", "", 3),
     ("random_nodes_within_68", "random nodes within the middle 68 % of the draws", "", 3),
     ("random_nodes_within_95", "random nodes within the middle 95 % of the draws", "", 3),
     ("bright_nodes_within_68", "bright nodes within the middle 68 % of the draws", "", 3),

@@ -71,6 +71,9 @@ impl<'a> Prepared<'a> {
         let prepared = Self { file, registry, instrument, measured, motion };
         let Self { instrument, motion, measured, .. } = &prepared;
         let seen = prepared.objective(instrument, motion, measured)?.observed().len();
+        if let Some(held_out) = &prepared.file.held_out {
+            setup::check_folds(held_out, seen, measured)?;
+        }
         if matches!(prepared.file.axis, AxisSearch::Scan(_)) && seen < 2 {
             bail!(
                 "axis.scan needs at least 2 frame times: a single frame does not constrain the axis"

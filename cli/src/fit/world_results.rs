@@ -63,7 +63,8 @@ pub fn errors(results: &Value) -> Vec<(String, Value)> {
             (format!("{plain}_within_95"), json!(within("interval_95"))),
         ])
     };
-    Parameter::ALL.into_iter().filter_map(of).flatten().collect()
+    let flow = results["flow_error"].as_f64().map(|error| ("flow_error".to_owned(), json!(error)));
+    Parameter::ALL.into_iter().filter_map(of).flatten().chain(flow).collect()
 }
 
 /// The ends of a parameter's interval.

@@ -10,7 +10,7 @@ use crate::progress;
 use anyhow::{Context, bail};
 use kerrlight_tomo::dynamics::Velocity;
 use kerrlight_tomo::fit::Motion;
-use kerrlight_tomo::fit::settings::{FitFile, UnknownWorld};
+use kerrlight_tomo::fit::settings::{FitFile, Region, UnknownWorld};
 use kerrlight_tomo::fit::setup::{self, FoundWorld, Instrument, Measured, Trial};
 use kerrlight_tomo::fit::world::{Free, Parameter, Span, Spread, World};
 use serde_json::{Map, Value, json};
@@ -185,8 +185,13 @@ fn results(
     let priors = free.iter().map(|free| {
         (free.parameter.name().to_owned(), json!(free.bounds().map(|x| x / free.parameter.unit())))
     });
+    let flow = match true_world(file, measured)? {
+        Some(truth) => flow_error(file, unknown, [&found.world, &truth])?,
+        None => None,
+    };
     Ok(json!({
         "world": world(&found.world),
+        "flow_error": flow,
         "sigma": values(&free, |k, _| sigma(k)),
         "open": free.iter().enumerate().map(|(k, f)| (f.parameter.name().to_owned(), json!(open(k))))
             .collect::<Map<String, Value>>(),
@@ -203,6 +208,33 @@ fn results(
         "trials": trials,
         "scan": found.scan.as_ref().map(world_scan::json),
     }))
+}
+
+/// Radii at which velocities are compared.
+const RADII: usize = 64;
+
+/// How far a flow is from the true one: the root mean square difference of (dr/dt, r dφ/dt) over the radii of the region,
+/// over the root mean square of the true velocity.
+fn flow_error(
+    file: &FitFile,
+    unknown: &UnknownWorld,
+    worlds: [&World; 2],
+) -> anyhow::Result<Option<f64>> {
+    let laws = worlds.map(|world| setup::motion(&settled(file, unknown, world), Vec::new()));
+    let [found, truth] = laws;
+    let (found, truth) = (found?.velocity, truth?.velocity);
+    let [by, of] = worlds.map(|world| world.get(Parameter::Rotation));
+    let Region { r_min, r_max, .. } = file.region;
+    let (mut away, mut all) = (0.0, 0.0);
+    for k in 0..RADII {
+        let r = r_min + (r_max - r_min) * (k as f64 + 0.5) / RADII as f64;
+        let [found, truth] = [(&found, by), (&truth, of)]
+            .map(|(law, factor)| [factor * law.fall(r), factor * r * law.rate(r)]);
+        away += (found[0] - truth[0]).powi(2) + (found[1] - truth[1]).powi(2);
+        all += truth[0].powi(2) + truth[1].powi(2);
+    }
+    let error = (away / all).sqrt();
+    Ok(error.is_finite().then_some(error))
 }
 
 /// The world of a simulation.

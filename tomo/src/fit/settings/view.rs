@@ -48,17 +48,17 @@ pub struct Screen {
     /// Rays of each pixel near the critical curve, whose mean is its light; one in the middle, without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ring_rays: Option<usize>,
-    /// What a pixel is to visibilities.
-    #[serde(default, skip_serializing_if = "PixelShape::is_usual")]
-    pub pulse: PixelShape,
+    /// What a pixel is to visibilities; without it, [`PixelShape::Triangle`] to those that are simulated and
+    /// [`PixelShape::Delta`] to those that are read.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pulse: Option<PixelShape>,
 }
 
 /// What a pixel is to visibilities.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PixelShape {
     /// Two pixels wide, linear between centres, as eht-imaging simulates images.
-    #[default]
     Triangle,
     /// A square.
     Rectangle,
@@ -67,10 +67,6 @@ pub enum PixelShape {
 }
 
 impl PixelShape {
-    fn is_usual(&self) -> bool {
-        *self == Self::default()
-    }
-
     /// Its pulse.
     pub fn pulse(self) -> Pulse {
         match self {

@@ -1,4 +1,4 @@
-//! What a scan of axes looks through: fewer pixels and nodes.
+//! What searches look through: fewer pixels and nodes, or other ones.
 
 use super::linear_problem::terms;
 use super::{Instrument, Measured, Result, forward_model, linear, priors, sky, spacing};
@@ -8,7 +8,7 @@ use crate::fit::{Motion, Objective, Sampling};
 use crate::frames::Frames;
 use crate::interferometry::operator::Pulse;
 
-/// What a fit is seen through by a scan.
+/// What a fit is seen through by a search.
 pub struct CoarseView {
     pub(super) file: FitFile,
     pub(super) instrument: Instrument,
@@ -33,7 +33,8 @@ impl CoarseView {
         if images > 0 {
             Self::thinned(file, measured, every)
         } else {
-            Self::wide(file, measured, pixels)
+            let region = fewer_nodes(file, file.screen.pixels / pixels);
+            Self::sampled(&FitFile { region, ..file.clone() }, measured, pixels)
         }
     }
 
@@ -57,8 +58,11 @@ impl CoarseView {
         Ok(Self { file: FitFile { screen, ..file }, instrument, measured })
     }
 
-    /// Wider pixels over the same field.
-    fn wide(file: &FitFile, measured: &Measured, pixels: usize) -> Result<Self> {
+    /// Other pixels over the same field.
+    ///
+    /// # Errors
+    /// As [`Instrument::new`].
+    pub fn sampled(file: &FitFile, measured: &Measured, pixels: usize) -> Result<Self> {
         let n = file.screen.pixels as f64;
         let screen = Screen {
             pixels,
@@ -67,8 +71,7 @@ impl CoarseView {
             jy_per_pixel: file.screen.jy_per_pixel * (n / pixels as f64).powi(2),
             ..file.screen.clone()
         };
-        let region = fewer_nodes(file, file.screen.pixels / pixels);
-        let file = FitFile { screen, region, ..file.clone() };
+        let file = FitFile { screen, ..file.clone() };
         let instrument = Instrument::new(&file)?;
         let pulse = match (measured.pulse, measured.sky) {
             // Data keep the pixels that they were made of.

@@ -66,7 +66,7 @@ pub fn hold_out(
     watch: &mut HeldWatch<'_>,
 ) -> Result<Option<Vec<Held>>> {
     objective.model.weigh(axis);
-    check_parts(held_out, objective, measured)?;
+    check_folds(held_out, objective.observed().len(), measured)?;
     let mut found: Vec<Held> =
         held_out.values.iter().map(|value| Held { value: *value, losses: Vec::new() }).collect();
     for fold in 0..held_out.folds {
@@ -91,14 +91,13 @@ pub fn hold_out(
     Ok(Some(found))
 }
 
-/// Refuses more parts than there are data for.
-fn check_parts(
-    held_out: &HeldOutSettings,
-    objective: &Objective<f32>,
-    measured: &Measured,
-) -> Result<()> {
+/// Refuses more parts than there are data for, of which so many frames have some.
+///
+/// # Errors
+/// Names the most parts that data allow.
+pub fn check_folds(held_out: &HeldOutSettings, frames: usize, measured: &Measured) -> Result<()> {
     let (all, what) = match held_out.by {
-        HeldOutBy::Frames => (objective.observed().len(), "frames with data"),
+        HeldOutBy::Frames => (frames, "frames with data"),
         HeldOutBy::Baselines => (measured.baselines().len(), "baselines"),
     };
     if all < 2 * held_out.folds {

@@ -9,8 +9,8 @@ use super::truth::SPOT;
 use super::visibilities::{VisibilitySettings, all_products, frames_of, prepared};
 use super::{Measured, Result, hours_per_m, sky};
 use crate::fit::settings::{
-    DataFiles, FitError, FitFile, GainPhases, InstrumentSettings, LossKind, StaticImageFile,
-    StrengthSettings, Within, refuse,
+    DataFiles, FitError, FitFile, GainPhases, InstrumentSettings, LossKind, PixelShape,
+    StaticImageFile, StrengthSettings, Within, refuse,
 };
 use crate::frames::Frames;
 use crate::interferometry::observation::Observation;
@@ -97,7 +97,7 @@ impl Measured {
         let leakage = leakage::unknown(file.instrument.as_ref(), &observation)?;
         let (visibilities, sky) = (Some((observation, of_rows)), Some(sky(file)?));
         let varies = variability.is_some();
-        let pulse = file.screen.pulse.pulse();
+        let pulse = file.screen.pulse.unwrap_or(PixelShape::Delta).pulse();
         Ok(Measured {
             times,
             visibilities,

@@ -39,7 +39,7 @@ pub use change::{change, emission_times};
 pub use coarse_view::CoarseView;
 pub use curve::Curve;
 pub use faraday::{Rotation, RotationWatch, Tried, find_rotation};
-pub use held_out::{Held, HeldData, HeldWatch, best as best_held, hold_out};
+pub use held_out::{Held, HeldData, HeldWatch, best as best_held, check_folds, hold_out};
 pub use imprint::{Given, Imprinted, imprint};
 pub use instrument::Instrument;
 pub use leakage::LeakageUnknown;

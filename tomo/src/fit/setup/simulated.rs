@@ -8,11 +8,11 @@ use super::observed::{Spoiled, schedule_of, spoil};
 use super::polarized::{self, is_polarized};
 use super::world::seen_in_truth;
 use super::{Instrument, Measured, Result, Truth, hours_per_m, motion, sky};
-use crate::fit::settings::{FitFile, Within, refuse};
+use crate::fit::settings::{FitFile, PixelShape, Within, refuse};
 use crate::frames::Frames;
 use crate::interferometry::array::Array;
 use crate::interferometry::observation::Observation;
-use crate::interferometry::operator::{ImageGrid, Method};
+use crate::interferometry::operator::{ImageGrid, Method, Pulse};
 use crate::interferometry::simulate::{self, Movie};
 
 impl Measured {
@@ -69,7 +69,7 @@ fn simulate(
         movie,
         visibilities,
         sky,
-        pulse: fit.screen.pulse.pulse(),
+        pulse: pulse(fit),
         truth,
         gains,
         true_gains,
@@ -77,6 +77,11 @@ fn simulate(
         true_leakage,
         ..Measured::empty()
     })
+}
+
+/// What the pixels of a simulation are to its visibilities.
+fn pulse(fit: &FitFile) -> Pulse {
+    fit.screen.pulse.unwrap_or(PixelShape::Triangle).pulse()
 }
 
 /// Fills an observation with the visibilities of a truth: its images of total intensity.
@@ -87,7 +92,7 @@ fn fill(
     (hours, times): (&[f64], &[f64]),
     sky: ImageGrid,
 ) -> Result<Frames<f64>> {
-    let pulse = fit.screen.pulse.pulse();
+    let pulse = pulse(fit);
     if !is_polarized(&fit.loss) {
         let images = lit(truth, truth.movie(file, instrument, times)?)?;
         simulate::fill_from(observation, (sky, &images), pulse, hours)?;

@@ -3,7 +3,8 @@
 //! Pixels and voxels are coarse: the value over worlds has ripples of a degree and of a few units, with a minimum in each. The
 //! second derivatives in one of them are those of the ripple. What the data say of the world is the bowl beneath: a
 //! quadratic form through values so far away that they have risen by more than the ripples are high, seen along several
-//! lattices of rays. Its middle is the world, and how far ripples and lattices move that is part of the error.
+//! lattices of rays and, where pixels are samples only, through other pixels. Its middle is the world, and how far ripples,
+//! lattices and pixels move that is part of the error.
 
 use super::covariance::covariance;
 use super::polish::Polished;
@@ -48,38 +49,6 @@ pub(super) struct Form {
 }
 
 impl<T: Float + Default> WorldProblem<'_, T> {
-    /// The bowl about a world, along the rays of this problem and of others; second derivatives of the data count one over
-    /// `inflation`. None if the covariance of the steps that led there is not finite.
-    ///
-    /// # Errors
-    /// As those of [`polish`](Self::polish).
-    pub fn envelope(
-        &self,
-        polished: &Polished,
-        others: &[WorldProblem<'_, T>],
-        inflation: f64,
-    ) -> Result<Option<Envelope>, Error> {
-        let Some(reach) = self.reach(polished)? else { return Ok(None) };
-        let (best, n, columns) = (&polished.best, self.free.len(), &reach.columns);
-        let mut seen = vec![reach.seen()];
-        self.look_at(best, &polished.responses, (columns, diagonals(n)), &mut seen[0])?;
-        for other in others {
-            // The volume's response is that of the same voxels.
-            let same = other.effort.nodes == self.effort.nodes;
-            let responses = if same { polished.responses.as_slice() } else { &[] };
-            let start = other.solve(best.world)?;
-            let mut there = Seen::default();
-            let places = [ends(n), diagonals(n)].concat();
-            other.look_at(&start, responses, (columns, places), &mut there)?;
-            seen.push(there);
-        }
-        let form = fitted(&seen, n).unwrap_or_else(|| reach.form());
-        let worlds = seen.iter().map(|seen| seen.values.len()).sum();
-        let found = self.middle(best.world, (&form, columns), inflation, reach.is_wide);
-        let ripple = form.ripple;
-        Ok(found.map(|(world, covariance)| Envelope { world, covariance, ripple, worlds }))
-    }
-
     /// The best volume of a world at a distance, or at that part of the distance which bounds leave; none if they leave
     /// next to nothing.
     pub(super) fn beside(
@@ -99,7 +68,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
     }
 
     /// Looks at the worlds of some places.
-    fn look_at(
+    pub(super) fn look_at(
         &self,
         from: &Estimate,
         responses: &[Vec<f64>],
@@ -117,7 +86,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
     }
 
     /// The middle of a form, and its covariance in the parameters' own units.
-    fn middle(
+    pub(super) fn middle(
         &self,
         about: World,
         (form, columns): (&Form, &DMatrix<f64>),
@@ -175,12 +144,12 @@ pub(super) fn along(n: usize, k: usize, x: f64) -> DVector<f64> {
 }
 
 /// Both ends of each axis.
-fn ends(n: usize) -> Vec<DVector<f64>> {
+pub(super) fn ends(n: usize) -> Vec<DVector<f64>> {
     (0..n).flat_map(|k| [-1.0, 1.0].map(|x| along(n, k, x))).collect()
 }
 
 /// The diagonals between two axes: each pair has two of its four, one of each direction.
-fn diagonals(n: usize) -> Vec<DVector<f64>> {
+pub(super) fn diagonals(n: usize) -> Vec<DVector<f64>> {
     let pairs = (0..n).flat_map(|a| (0..a).map(move |b| (a, b)));
     let root = 0.5f64.sqrt();
     let of = |(a, b)| [root, -root].map(|x| along(n, a, x) + along(n, b, root));
@@ -188,7 +157,7 @@ fn diagonals(n: usize) -> Vec<DVector<f64>> {
 }
 
 /// The least squares form; none if there are too few values, or it is no bowl.
-fn fitted(seen: &[Seen], n: usize) -> Option<Form> {
+pub(super) fn fitted(seen: &[Seen], n: usize) -> Option<Form> {
     let pairs: Vec<(usize, usize)> = (0..n).flat_map(|a| (0..=a).map(move |b| (a, b))).collect();
     let lattices = seen.len();
     let (first_bend, unknowns) = (lattices * (1 + n), lattices * (1 + n) + pairs.len());

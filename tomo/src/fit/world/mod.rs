@@ -17,6 +17,7 @@ mod reach;
 mod redshift;
 mod scan;
 mod spread;
+mod surroundings;
 mod tangents;
 mod twin;
 
@@ -32,6 +33,7 @@ pub use prior::Prior;
 pub use problem::{Effort, Estimate, Free, Span, WorldProblem};
 pub use scan::{ScanPoint, Scanned, WorldScan};
 pub use spread::Spread;
+pub use surroundings::Surroundings;
 pub use tangents::Tangents;
 
 use crate::Error;

@@ -361,7 +361,9 @@ fn exact_steps_lead_to_the_best_world() {
     // The bowl beneath the ripples, along other rays too, has its middle there, within what it says.
     let other_model = model.seen_along(2);
     let other = WorldProblem { model: &other_model, ..problem };
-    let envelope = problem.envelope(&found, &[other], 1.0).unwrap().unwrap();
+    let mut surroundings = problem.around(&found).unwrap().unwrap();
+    surroundings.look(&other).unwrap();
+    let envelope = surroundings.envelope(&problem, 1.0).unwrap();
     for (k, free) in free.iter().enumerate() {
         let apart = envelope.world.get(free.parameter) - truth.get(free.parameter);
         let sigma = envelope.covariance[3 * k].sqrt();

@@ -29,19 +29,21 @@ pub(super) fn polished(
     Ok((polished, reduced))
 }
 
-/// A few voxels more or less.
+/// Voxels of a look over those of the search, along each side, by its number.
+const VOXELS: [f64; 4] = [1.0, 1.3, 1.15, 0.87];
+
+/// More voxels or fewer.
 fn other_voxels(effort: Effort, number: u64) -> Effort {
-    const MORE: [usize; 6] = [2, 5, 1, 4, 3, 6];
-    let nodes = effort.nodes + MORE[number as usize % MORE.len()] - 2;
-    let nodes = nodes.max(effort.degree.taps());
-    Effort { nodes, ..effort }
+    let nodes = (effort.nodes as f64 * VOXELS[number as usize % VOXELS.len()]).round() as usize;
+    Effort { nodes: nodes.max(effort.degree.taps()), ..effort }
 }
 
-/// How sure a world is: the bowl beneath the ripples of the values around, seen along several lattices of rays and with
-/// several numbers of voxels; without one, the second derivatives at the best world alone. Errors grow with χ²/N where that is
-/// above 1.
+/// How sure a world is: the bowl beneath the ripples of the values around, seen along several lattices of rays, with several
+/// numbers of voxels and through other pixels; without one, the second derivatives at the best world alone. Errors grow
+/// with χ²/N where that is above 1.
 pub(super) fn surely(
     problem: &WorldProblem<'_, f32>,
+    resampled: Resampled<'_>,
     polished: &Polished,
     reduced: f64,
 ) -> Result<Option<Spread>> {
@@ -50,7 +52,8 @@ pub(super) fn surely(
         return Ok(None);
     }
     let inflation = reduced.max(1.0);
-    let envelope = enveloped(problem, polished, inflation)?.unwrap_or_else(|| Envelope {
+    let envelope = enveloped(problem, resampled, polished, inflation)?;
+    let envelope = envelope.unwrap_or_else(|| Envelope {
         world: polished.best.world,
         covariance: polished.covariance.iter().map(|x| x * inflation).collect(),
         ripple: 0.0,
@@ -67,22 +70,38 @@ pub(super) fn surely(
     Ok(Some(Spread { world, sigma, open, correlation, ripple, worlds }))
 }
 
-/// The bowl beneath the ripples, along other lattices of rays too; with other voxels, where the data alone decide.
+/// Data through other pixels, and what of the world is not known; none where pixels are those of the data.
+pub(super) type Resampled<'a> = Option<(&'a Seen, &'a UnknownWorld)>;
+
+/// The bowl beneath the ripples, along other lattices of rays, each with other voxels, where the data alone decide, and with
+/// other pixels, where those are samples only.
 fn enveloped(
     problem: &WorldProblem<'_, f32>,
+    resampled: Resampled<'_>,
     polished: &Polished,
     inflation: f64,
 ) -> Result<Option<Envelope>> {
-    let numbers = 1..=LATTICES;
-    let models: Vec<_> = numbers.clone().map(|number| problem.model.seen_along(number)).collect();
-    let others: Vec<WorldProblem<'_, f32>> = numbers
-        .zip(&models)
-        .map(|(number, model)| {
-            let effort = other_voxels(problem.effort, problem.gaussian.map_or(number, |_| SAME));
-            WorldProblem { model, effort, ..*problem }
-        })
-        .collect();
-    problem.envelope(polished, &others, inflation)
+    let Some(mut surroundings) = problem.around(polished)? else { return Ok(None) };
+    let other_voxels = |effort: Effort, number: u64| {
+        other_voxels(effort, problem.gaussian.map_or(number, |_| SAME))
+    };
+    for number in 1..=LATTICES {
+        let mut look = |problem: &WorldProblem<'_, f32>| {
+            let model = &problem.model.seen_along(number);
+            let effort = other_voxels(problem.effort, number);
+            Ok(surroundings.look(&WorldProblem { model, effort, ..*problem })?)
+        };
+        let other = resampled
+            .and_then(|(seen, unknown)| Some((seen.resampled.get(number as usize - 1)?, unknown)));
+        match other {
+            None => look(problem)?,
+            Some((seen, unknown)) => {
+                let how = (problem.scale, problem.memory);
+                seen.with(unknown, &unknown.search.fine, how, look)?;
+            }
+        }
+    }
+    Ok(surroundings.envelope(problem, inflation))
 }
 
 /// Why there are no worlds to draw.
@@ -119,7 +138,8 @@ impl<'a> WorldPosterior<'a> {
         let (spread, reduced) =
             seen.with(unknown, &unknown.search.fine, (scale, Memory::default()), |problem| {
                 let (polished, reduced) = polished(problem, &problem.solve(world)?)?;
-                Ok((surely(problem, &polished, reduced)?, reduced))
+                let resampled = Some((&seen, unknown));
+                Ok((surely(problem, resampled, &polished, reduced)?, reduced))
             })?;
         let Some(spread) = spread else { refuse!("{NO_BEST}") };
         let factor = noise_factor * reduced.max(1.0).sqrt();

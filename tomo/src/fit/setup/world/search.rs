@@ -1,6 +1,6 @@
 //! The search for a world: from many starts or over a grid with coarse voxels, then with fine ones.
 
-use super::posterior::{polished, surely};
+use super::posterior::{Resampled, polished, surely};
 use super::seen::Seen;
 use super::tangent::Anchor;
 use crate::fit::journal::{Journal, Memory};
@@ -95,7 +95,7 @@ pub fn find_world(
     let mut told = |worlds: usize, best: f64| watch((count - 1, count), worlds, best);
     let how = Exploration { width: width(&over), worlds: search.fine.worlds, seed: file.seed };
     let found = fine.with(unknown, &search.fine, (scale, memory), |problem| {
-        finely(&fine, problem, (start, volume.as_ref()), &how, &mut told)
+        finely((&fine, unknown), problem, (start, volume.as_ref()), &how, &mut told)
     })?;
     Ok(found.map(|(spread, reduced_chi2, world)| FoundWorld {
         world,
@@ -112,7 +112,7 @@ type Sure = (Option<Spread>, f64, World);
 
 /// The search about the best end of the coarse one, and how sure it is.
 fn finely(
-    seen: &Seen,
+    (seen, unknown): (&Seen, &UnknownWorld),
     problem: &WorldProblem<'_, f32>,
     (start, volume): (World, Option<&Anchor>),
     how: &Exploration,
@@ -127,7 +127,7 @@ fn finely(
     };
     let Some(volume) = volume else {
         let Some(explored) = about(problem, watch)? else { return Ok(None) };
-        return surely_about(problem, effort, &explored).map(Some);
+        return surely_about(problem, Some((seen, unknown)), effort, &explored).map(Some);
     };
     let first = seen.about(problem, volume, |problem| {
         Ok(Anchor::of(problem, &WorldProblem { effort, ..*problem }.solve(start)?))
@@ -138,7 +138,7 @@ fn finely(
         let Some(explored) = quick.explore((start, Some(&x)), how, watch)? else {
             return Ok(None);
         };
-        return surely_about(problem, effort, &explored).map(Some);
+        return surely_about(problem, None, effort, &explored).map(Some);
     };
     let explored = seen.about(problem, &first, |problem| about(problem, watch))?;
     let Some(explored) = explored.flatten() else { return Ok(None) };
@@ -146,7 +146,8 @@ fn finely(
     let quick = WorldProblem { effort, ..*problem };
     let Some(explored) = nearer(seen, &quick, explored, &short, watch)? else { return Ok(None) };
     let anchor = Anchor::of(problem, &explored.best);
-    let found = seen.about(problem, &anchor, |problem| surely_about(problem, effort, &explored))?;
+    let found =
+        seen.about(problem, &anchor, |problem| surely_about(problem, None, effort, &explored))?;
     Ok(found.map(|(spread, reduced, world)| (spread.filter(|_| reduced < WAY), reduced, world)))
 }
 
@@ -156,6 +157,7 @@ const WAY: f64 = 3.0;
 /// How sure the best of the worlds that were explored is.
 fn surely_about(
     problem: &WorldProblem<'_, f32>,
+    resampled: Resampled<'_>,
     effort: Effort,
     explored: &Explored,
 ) -> Result<Sure> {
@@ -164,7 +166,7 @@ fn surely_about(
     // Steps along differences of images know one volume.
     if problem.model.ring.is_some() && !problem.change.is_any() {
         let (polished, reduced) = polished(problem, &explored.best)?;
-        let spread = surely(problem, &polished, reduced)?;
+        let spread = surely(problem, resampled, &polished, reduced)?;
         let world = spread.as_ref().map_or(polished.best.world, |spread| spread.world);
         return Ok((spread, reduced, world));
     }

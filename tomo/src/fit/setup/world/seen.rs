@@ -4,12 +4,15 @@ use super::{known_world, model};
 use crate::fit::Objective;
 use crate::fit::journal::Memory;
 use crate::fit::linear::{Change, GaussianField, Patience, Prior as Penalty, Voxels, Weighted};
-use crate::fit::settings::{FieldKind, FitFile, PriorOfVoxels, UnknownWorld, Within, WorldView};
+use crate::fit::settings::{
+    FieldKind, FitFile, LossKind, PriorOfVoxels, UnknownWorld, Within, WorldView,
+};
 use crate::fit::setup::linear_problem::terms;
 use crate::fit::setup::{
     CoarseView, Measured, Result, change, emission_times, forward_model, linear, motion, priors,
 };
 use crate::fit::world::{Effort, WorldProblem};
+use crate::interferometry::operator::Pulse;
 
 /// Data as a search looks at them.
 pub(super) struct Seen {
@@ -17,8 +20,12 @@ pub(super) struct Seen {
     frames: usize,
     /// Rounds of each solution over the voxels that shine.
     rounds: usize,
+    /// The same through other pixels, where those of the fit are only samples of a smooth image.
+    pub(super) resampled: Vec<Seen>,
 }
 
+/// Pixels of a look through others over those of the fit, along each side: finer and wider ones.
+const RESAMPLED: [f64; 3] = [1.15, 0.87, 1.25];
 /// Iterations of a round, for each over all voxels.
 const SETTLING: usize = 6;
 
@@ -30,12 +37,23 @@ impl Seen {
 
     /// For worlds that are much alike: their volumes are solved for nearly to the end.
     pub fn finely(file: &FitFile, measured: &Measured, view: &WorldView) -> Result<Self> {
-        Self::new(file, measured, view, 1)
+        let mut seen = Self::new(file, measured, view, 1)?;
+        let is_image = file.loss.iter().any(|loss| loss.data == LossKind::Image);
+        if measured.pulse == Pulse::Delta && !is_image {
+            let pixels = seen.view.file.screen.pixels as f64;
+            for share in RESAMPLED {
+                let pixels = (share * pixels).round() as usize;
+                let view = CoarseView::sampled(&seen.view.file, measured, pixels)?;
+                seen.resampled.push(Self { view, resampled: Vec::new(), ..seen });
+            }
+        }
+        Ok(seen)
     }
 
     fn new(file: &FitFile, measured: &Measured, view: &WorldView, rounds: usize) -> Result<Self> {
         let WorldView { pixels, frames, .. } = *view;
-        Ok(Self { view: CoarseView::new(file, measured, pixels)?, frames, rounds })
+        let view = CoarseView::new(file, measured, pixels)?;
+        Ok(Self { view, frames, rounds, resampled: Vec::new() })
     }
 
     pub fn with<R>(
