@@ -7,7 +7,6 @@
 //! lattices and pixels move that is part of the error.
 
 use super::covariance::covariance;
-use super::polish::Polished;
 use super::problem::{Estimate, WorldProblem};
 use super::{Free, World};
 use crate::Error;

@@ -89,7 +89,7 @@ fn enveloped(
         let mut look = |problem: &WorldProblem<'_, f32>| {
             let model = &problem.model.seen_along(number);
             let effort = other_voxels(problem.effort, number);
-            Ok(surroundings.look(&WorldProblem { model, effort, ..*problem })?)
+            surroundings.look(&WorldProblem { model, effort, ..*problem })
         };
         let other = resampled
             .and_then(|(seen, unknown)| Some((seen.resampled.get(number as usize - 1)?, unknown)));
