@@ -36,6 +36,23 @@ impl<T: Float> Objective<T> {
         self.terms().map(of).collect()
     }
 
+    /// How far two movies of some frames are apart for the data: the root mean square difference of what data are compared
+    /// with, over their errors; of the kind of data that tells them apart best.
+    pub fn apart(&self, frames: &[usize], [a, b]: [&[T]; 2]) -> f64 {
+        let pixels = self.model.pixels();
+        let of = |(term, _): (&dyn FrameTerm<T>, f64)| {
+            let (mut squares, mut count) = (0.0, 0usize);
+            let images = a.chunks_exact(pixels).zip(b.chunks_exact(pixels));
+            for (frame, (a, b)) in frames.iter().zip(images) {
+                let [a, b] = [a, b].map(|image| term.residuals(*frame, image));
+                count += a.len();
+                squares += a.iter().zip(&b).map(|(a, b)| (a.value - b.value).powi(2)).sum::<f64>();
+            }
+            (squares / count.max(1) as f64).sqrt()
+        };
+        self.terms().map(of).fold(0.0, f64::max)
+    }
+
     /// The loss of images of these frames, without gradient.
     ///
     /// # Errors

@@ -60,16 +60,12 @@ impl PixelRays {
         [x, y]: [&[f64]; 2],
         screen: impl Fn([f64; 2]) -> [f64; 2],
     ) -> Self {
-        let curve: Vec<[f64; 2]> = CriticalCurve::new(hole, observer.inclination())
-            .points(POINTS)
-            .map(|point| [point.alpha, point.beta])
-            .collect();
         let width = distance(screen([0.0, 0.0]), screen([ring.spacing, 0.0]));
-        let limit = HALF_DIAGONAL * width + BEYOND;
+        let places: Vec<[f64; 2]> = x.iter().zip(y).map(|(x, y)| screen([*x, *y])).collect();
+        let near = near_the_ring((hole, observer), &places, HALF_DIAGONAL * width + BEYOND);
         let mut all = Self { places: Vec::new(), starts: vec![0] };
-        for (x, y) in x.iter().zip(y) {
-            let here = screen([*x, *y]);
-            if curve.iter().any(|point| distance(*point, here) < limit) {
+        for ((x, y), near) in x.iter().zip(y).zip(near) {
+            if near {
                 let places = (0..ring.count).map(|k| ring.place(k));
                 all.places
                     .extend(places.map(|[u, v]| [x + u * ring.spacing, y + v * ring.spacing]));
@@ -90,6 +86,18 @@ impl PixelRays {
     pub fn share(&self, pixel: usize) -> f64 {
         1.0 / (self.starts[pixel + 1] - self.starts[pixel]) as f64
     }
+}
+
+/// Which places on the screen are nearer to the critical curve than a limit, M.
+pub(super) fn near_the_ring(
+    (hole, observer): (&Kerr, &Observer),
+    places: &[[f64; 2]],
+    limit: f64,
+) -> Vec<bool> {
+    let curve = CriticalCurve::new(hole, observer.inclination()).points(POINTS);
+    let curve: Vec<[f64; 2]> = curve.map(|point| [point.alpha, point.beta]).collect();
+    let is_near = |place: &[f64; 2]| curve.iter().any(|point| distance(*point, *place) < limit);
+    places.iter().map(is_near).collect()
 }
 
 impl RingRays {

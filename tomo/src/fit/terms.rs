@@ -68,6 +68,8 @@ pub(super) fn plain(model: f64, datum: f64, weight: f64) -> Residual {
 pub struct ImageTerm<T> {
     movie: Frames<f64>,
     inverse_variance: T,
+    /// Pixels that do not count; all do where it is empty.
+    left_out: Vec<bool>,
     fault: OnceLock<String>,
 }
 
@@ -100,7 +102,18 @@ impl<T: Float> ImageTerm<T> {
             }
         }
         let inverse_variance = T::of(noise_sigma.powi(-2));
-        Ok(Self { movie, inverse_variance, fault: OnceLock::new() })
+        Ok(Self { movie, inverse_variance, left_out: Vec::new(), fault: OnceLock::new() })
+    }
+
+    /// The same images without some of their pixels.
+    pub fn without(mut self, pixels: Vec<bool>) -> Self {
+        self.left_out = pixels;
+        self
+    }
+
+    /// Whether a pixel counts.
+    fn counts(&self, pixel: usize) -> bool {
+        !self.left_out.get(pixel).is_some_and(|out| *out)
     }
 
     /// A datum; no number, where it cannot be read ([`FrameTerm::fault`]).
@@ -138,7 +151,7 @@ impl<T: Float> FrameTerm<T> for ImageTerm<T> {
     }
 
     fn degrees_of_freedom(&self, _frame: usize) -> usize {
-        self.movie.pixels()
+        (0..self.movie.pixels()).filter(|pixel| self.counts(*pixel)).count()
     }
 
     fn is_quadratic(&self) -> bool {
@@ -152,8 +165,9 @@ impl<T: Float> FrameTerm<T> for ImageTerm<T> {
     fn value_and_gradient(&self, frame: usize, image: &[T], weight: T, gradient: &mut [T]) -> f64 {
         let data = self.image(frame);
         let (scale, slope) = (self.inverse_variance, (weight + weight) * self.inverse_variance);
-        let pixels = image.iter().zip(&*data).zip(gradient);
-        let square = |((image, datum), gradient): ((&T, &f64), &mut T)| {
+        let pixels = image.iter().zip(&*data).zip(gradient).enumerate();
+        let pixels = pixels.filter(|(pixel, _)| self.counts(*pixel));
+        let square = |(_, ((image, datum), gradient)): (_, ((&T, &f64), &mut T))| {
             let residual = *image - T::of(*datum);
             *gradient += slope * residual;
             (residual * residual).double()
@@ -164,8 +178,9 @@ impl<T: Float> FrameTerm<T> for ImageTerm<T> {
     fn residuals(&self, frame: usize, image: &[T]) -> Vec<Residual> {
         let weight = self.inverse_variance.double().sqrt();
         let data = self.image(frame);
-        let pixels = image.iter().zip(&*data);
-        pixels.map(|(image, x)| plain(image.double(), T::of(*x).double(), weight)).collect()
+        let pixels = image.iter().zip(&*data).enumerate();
+        let pixels = pixels.filter(|(pixel, _)| self.counts(*pixel));
+        pixels.map(|(_, (image, x))| plain(image.double(), T::of(*x).double(), weight)).collect()
     }
 }
 
@@ -234,5 +249,26 @@ impl<T: Float> FrameTerm<T> for LightCurveTerm {
     fn residuals(&self, frame: usize, image: &[T]) -> Vec<Residual> {
         let flux = image.iter().map(|pixel| pixel.double()).sum();
         vec![plain(flux, self.flux[frame], self.inverse_variance[frame].sqrt())]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exact_pixels_that_are_left_out_do_not_count() {
+        let whole = ImageTerm::<f64>::new(vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0], 3, 0.5).unwrap();
+        let term = whole.clone().without(vec![false, true, false]);
+        let few = ImageTerm::<f64>::new(vec![1.0, 3.0, 4.0, 6.0], 2, 0.5).unwrap();
+        assert_eq!((term.degrees_of_freedom(1), whole.degrees_of_freedom(1)), (2, 3));
+        let (mut gradient, mut expected) = ([0.0; 3], [0.0; 2]);
+        let value = term.value_and_gradient(1, &[7.0, 9.0, 8.0], 1.5, &mut gradient);
+        assert_eq!(value, few.value_and_gradient(1, &[7.0, 8.0], 1.5, &mut expected));
+        assert_eq!(gradient, [expected[0], 0.0, expected[1]]);
+        let squares = |term: &ImageTerm<f64>, image: &[f64]| -> Vec<f64> {
+            term.residuals(1, image).iter().map(|residual| residual.value).collect()
+        };
+        assert_eq!(squares(&term, &[7.0, 9.0, 8.0]), squares(&few, &[7.0, 8.0]));
     }
 }

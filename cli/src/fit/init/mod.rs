@@ -126,7 +126,8 @@ fn of_data(data: &Path, toml: &Path, model: Option<Model>) -> anyhow::Result<Str
     }
     let path = toml::Value::String(seen_from(toml, data)?).to_string();
     let extension = data.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    if matches!(extension.to_ascii_lowercase().as_str(), "npz" | "npy" | "exr") {
+    let is_sequence = data.is_dir() && !crate::zarr::is_store(data);
+    if is_sequence || matches!(extension.to_ascii_lowercase().as_str(), "npz" | "npy" | "exr") {
         return of_movie(&read_movie(data)?, &path);
     }
     let name = data.file_name().and_then(|name| name.to_str()).unwrap_or_default();
@@ -164,7 +165,7 @@ struct Images {
 }
 
 fn read_movie(path: &Path) -> anyhow::Result<Images> {
-    let files = [path.to_owned()];
+    let files = movie_files::files(path)?;
     let of = |(movie, times): (Movie, OwnTimes), known: bool| {
         let field = movie.grid.pixel_rad * movie.grid.width as f64 / MICROARCSECOND;
         Images { movie, times, field_uas: known.then_some(field) }

@@ -9,6 +9,7 @@ mod numbers;
 mod over_time;
 pub mod page;
 pub mod plots;
+mod quadrature;
 mod quiescent;
 pub mod residuals;
 mod scene;
@@ -71,6 +72,7 @@ impl Estimate<'_> {
         let quiescent = self.quiescent(trainer, state)?;
         let loss = trainer.objective.loss_of(&frames, &seen)?;
         let mask = numbers::mask_error(trainer, state, &seen)?;
+        let quadrature = self.quadrature_error(trainer, state)?;
         let movie = self.pictured(trainer, state, &seen)?;
         self.volumes(&volume, state)?;
         self.movies(&movie)?;
@@ -91,6 +93,7 @@ impl Estimate<'_> {
             still,
             loss,
             mask,
+            quadrature,
             judged,
             gains,
             leakage,
@@ -178,6 +181,8 @@ pub struct Found<'a> {
     loss: Loss,
     /// What the mask of what shines leaves out, of the flux; nothing without a mask.
     mask: Option<f64>,
+    /// What sums along rays are off by, over the errors of the data, where that is known.
+    quadrature: Option<f64>,
     judged: Judged,
     /// Gains of stations, where they are solved for.
     gains: Option<Gains>,

@@ -1,6 +1,6 @@
 //! What was found, in numbers.
 
-use super::{Estimate, Found};
+use super::{Estimate, Found, quadrature};
 use crate::fit::{band_search, held_out, linear, rotation_search, world_results, world_search};
 use crate::report;
 use crate::usage::usage;
@@ -76,6 +76,9 @@ impl Estimate<'_> {
         if let Some(mask) = found.mask {
             results["mask_error"] = json!(mask);
         }
+        if let Some(off) = found.quadrature {
+            results["quadrature_error"] = json!(off);
+        }
         if let Some(linear) = linear::outcome(self.file, &self.folder.lines()?) {
             results["linear"] = linear;
         }
@@ -135,8 +138,10 @@ impl Estimate<'_> {
     }
 }
 
-/// The verdict and, beside a truth, PSNR with that of an empty volume.
+/// The verdict, what is wrong with sums along rays and, beside a truth, PSNR with that of an empty volume.
 pub fn last_line(headline: &str, results: &Value) -> String {
+    let headline = [Some(headline.to_owned()), quadrature::sentence(results)];
+    let headline = headline.into_iter().flatten().collect::<Vec<_>>().join(" ");
     match (results["psnr_db"].as_f64(), results["nrmse"].as_f64()) {
         (Some(psnr), Some(nrmse)) => {
             let empty = psnr + 20.0 * nrmse.log10();
@@ -144,7 +149,7 @@ pub fn last_line(headline: &str, results: &Value) -> String {
                 "{headline} PSNR beside the truth: {psnr:.2} dB (an empty volume: {empty:.2} dB)."
             )
         }
-        _ => headline.to_owned(),
+        _ => headline,
     }
 }
 
@@ -167,7 +172,7 @@ const fn meaning(
     Meaning { key, name, digits, unit, text }
 }
 
-const MEANINGS: [Meaning; 14] = [
+const MEANINGS: [Meaning; 15] = [
     meaning("loss", "loss", 6, "", "what was minimised, of all data, without penalties"),
     meaning(
         "validation_chi2_per_datum",
@@ -232,6 +237,13 @@ const MEANINGS: [Meaning; 14] = [
         6,
         "",
         "light in places that were taken for empty and left out, as a part of all, in two frames",
+    ),
+    meaning(
+        "quadrature_error",
+        "sums along rays",
+        3,
+        "of the errors",
+        "root mean square difference of the model from the same with twice the nodes on rays, over the errors of the data",
     ),
     meaning("steps", "steps", 0, "", "steps of the optimiser"),
     meaning("seconds", "time", 1, "s", "wall time of this run, from its start to these results"),

@@ -2,7 +2,8 @@
 //! (Golub & Pereyra 1973).
 //!
 //! With F(ω) the minimum over fields of a function of images and fields, its slope is that at the minimising field held
-//! (the envelope theorem), and its second derivative the Schur complement
+//! (the envelope theorem); at a field near it, less what the field's own slope gains where the field follows. Its second
+//! derivative is the Schur complement
 //! `Iᵀ H I − (Aᵀ H I)ᵀ (Aᵀ H A + P)⁻¹ Aᵀ H I` of images' derivatives I, second derivatives H of the data, operator A and
 //! second derivatives P of penalties, over the nodes that shine. Second derivatives of the images are left out
 //! (Gauss & Newton).
@@ -40,7 +41,7 @@ struct Moved<T> {
 }
 
 impl<T: Float + Default> LinearProblem<'_, T> {
-    /// At a field (values at all nodes) that is the best one, with derivatives of the frames' images with respect to
+    /// At a field (values at all nodes) that is the best one or near it, with derivatives of the frames' images with respect to
     /// each number, frame after frame.
     ///
     /// `iterations` are those of the conjugate gradients by which the field follows; without any it is held.
@@ -56,7 +57,8 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         let data = self.data()?;
         let shines: Vec<bool> = x.iter().map(|x| *x > 0.0 && *x < self.upper).collect();
         let operator = Operator::new(self.walk(), self.active(&shines), self.frames, usize::MAX);
-        let free: Vec<T> = operator.active.gather(x).into_iter().map(T::of).collect();
+        let here = operator.active.gather(x);
+        let free: Vec<T> = here.iter().map(|x| T::of(*x)).collect();
         let images = operator.images(&free);
         let moved = moved(&data, self.frames, &images, tangents);
         let terms = self.penalised(&data);
@@ -64,6 +66,11 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         let taken: Vec<Vec<f64>> = moved.bent.iter().map(|bent| operator.adjoint(bent)).collect();
         let absorbed: Vec<Vec<f64>> =
             taken.iter().map(|b| solved(&mut objective, b, iterations)).collect();
+        // What a field that is not solved for to the end would still do as numbers move.
+        let mut downhill = Vec::new();
+        objective.value_and_gradient(&here, &mut downhill);
+        let slopes = moved.slopes.iter().zip(&absorbed).map(|(s, a)| s - dot(&downhill, a));
+        let slopes = slopes.collect();
         let n = tangents.len();
         let product = |a: &[T], b: &[T]| -> f64 {
             a.iter().zip(b).map(|(a, b)| a.double() * b.double()).sum()
@@ -78,7 +85,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
             operator.active.expand(&moved)
         };
         let responses = absorbed.iter().map(response).collect();
-        Ok(Profile { slopes: moved.slopes, bends, responses })
+        Ok(Profile { slopes, bends, responses })
     }
 }
 

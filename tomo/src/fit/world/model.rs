@@ -6,7 +6,7 @@ use super::{Number, PARAMETERS, Parameter, World};
 use crate::Error;
 use crate::dynamics::infall::{self, Falling, Profile};
 use crate::dynamics::{AngularVelocity, Axis};
-use crate::fit::pixel_rays::PixelRays;
+use crate::fit::pixel_rays::{PixelRays, near_the_ring};
 use crate::fit::{
     ForwardModel, Motion, PolarizedView, Redshift, Region, RingRays, Sampling, Seen,
     SightlineRequest, Sightlines,
@@ -250,6 +250,19 @@ impl WorldModel {
             times: self.motion.times.iter().map(since).collect(),
             ..self.motion.clone()
         })
+    }
+
+    /// Which pixels are nearer to the critical curve of a world than a limit, M.
+    ///
+    /// # Errors
+    /// If a parameter is out of its range.
+    pub fn ring_pixels(&self, world: &World, limit: f64) -> Result<Vec<bool>, Error> {
+        let (hole, observer) = self.observed(world)?;
+        let numbers = world.numbers();
+        let place =
+            |(x, y): (&f64, &f64)| self.place(&numbers, [*x, *y]).map(|number| number.value);
+        let places: Vec<[f64; 2]> = self.x.iter().zip(&self.y).map(place).collect();
+        Ok(near_the_ring((&hole, &observer), &places, limit))
     }
 
     /// The rays of all pixels of a world.

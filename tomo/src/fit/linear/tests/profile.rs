@@ -99,6 +99,18 @@ fn compare(case: &Case) {
     assert!((mixed - found.bends[1]).abs() < 2e-3 * scale, "{mixed} {:?}", found.bends);
     // Conjugate gradients end where squares change by 1e-9, products by its root.
     assert!((found.bends[1] - found.bends[2]).abs() < 1e-4 * scale);
+    // From a field that is not the best one, slopes are those of the best one as well.
+    let shines = |x: &f64| *x > 0.0;
+    let near = random(x.len(), 12);
+    let near = x.iter().zip(near).map(|(x, n)| if shines(x) { x * (0.8 + 0.4 * n) } else { 0.0 });
+    let near: Vec<f64> = near.collect();
+    let there = case.with([0.0; 2], |problem| problem.profile(&near, &case.moved, 4000)).unwrap();
+    let plain = case.with([0.0; 2], |problem| problem.profile(&near, &case.moved, 0)).unwrap();
+    for k in 0..2 {
+        let most = (plain.slopes[k] - found.slopes[k]).abs();
+        let off = (there.slopes[k] - found.slopes[k]).abs();
+        assert!(off < 1e-3 * most && most > 1e-3 * found.slopes[k].abs(), "{k}: {off} {most}");
+    }
     // A field that is held follows nothing: the data say more.
     let held = case.with([0.0; 2], |problem| problem.profile(&x, &case.moved, 0)).unwrap();
     assert!(held.bends[0] > 1.05 * found.bends[0], "{held:?} {found:?}");

@@ -1,6 +1,6 @@
 //! How sure a world is: the bowl beneath the ripples, along other rays and with other voxels; and draws of worlds.
 
-use super::seen::Seen;
+use super::seen::{BESIDE_THE_RING, Seen};
 use crate::fit::journal::Memory;
 use crate::fit::settings::{FitFile, UnknownWorld, refuse};
 use crate::fit::setup::{Measured, Result};
@@ -137,9 +137,11 @@ impl<'a> WorldPosterior<'a> {
         let seen = Seen::finely(file, measured, &unknown.search.fine)?;
         let (spread, reduced) =
             seen.with(unknown, &unknown.search.fine, (scale, Memory::default()), |problem| {
-                let (polished, reduced) = polished(problem, &problem.solve(world)?)?;
-                let resampled = Some((&seen, unknown));
-                Ok((surely(problem, resampled, &polished, reduced)?, reduced))
+                seen.smoothly(problem, (world, BESIDE_THE_RING[1]), |problem| {
+                    let (polished, reduced) = polished(problem, &problem.solve(world)?)?;
+                    let resampled = Some((&seen, unknown));
+                    Ok((surely(problem, resampled, &polished, reduced)?, reduced))
+                })
             })?;
         let Some(spread) = spread else { refuse!("{NO_BEST}") };
         let factor = noise_factor * reduced.max(1.0).sqrt();

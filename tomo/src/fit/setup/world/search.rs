@@ -1,7 +1,7 @@
 //! The search for a world: from many starts or over a grid with coarse voxels, then with fine ones.
 
 use super::posterior::{Resampled, polished, surely};
-use super::seen::Seen;
+use super::seen::{BESIDE_THE_RING, Seen};
 use super::tangent::Anchor;
 use crate::fit::journal::{Journal, Memory};
 use crate::fit::linear::{Patience, refined};
@@ -126,8 +126,19 @@ fn finely(
         WorldProblem { effort, ..*problem }.explore((start, None), how, watch)
     };
     let Some(volume) = volume else {
-        let Some(explored) = about(problem, watch)? else { return Ok(None) };
-        return surely_about(problem, Some((seen, unknown)), effort, &explored).map(Some);
+        let beside = (start, BESIDE_THE_RING[0]);
+        let explored = seen.smoothly(problem, beside, |problem| about(problem, watch))?;
+        let Some(explored) = explored else { return Ok(None) };
+        // Values of worlds that are compared are those of the same pixels.
+        let beside = match is_stepped(seen, problem) {
+            true => (explored.best.world, BESIDE_THE_RING[1]),
+            false => beside,
+        };
+        return seen
+            .smoothly(problem, beside, |problem| {
+                surely_about((seen, problem), Some((seen, unknown)), effort, &explored)
+            })
+            .map(Some);
     };
     let first = seen.about(problem, volume, |problem| {
         Ok(Anchor::of(problem, &WorldProblem { effort, ..*problem }.solve(start)?))
@@ -138,7 +149,7 @@ fn finely(
         let Some(explored) = quick.explore((start, Some(&x)), how, watch)? else {
             return Ok(None);
         };
-        return surely_about(problem, None, effort, &explored).map(Some);
+        return surely_about((seen, problem), None, effort, &explored).map(Some);
     };
     let explored = seen.about(problem, &first, |problem| about(problem, watch))?;
     let Some(explored) = explored.flatten() else { return Ok(None) };
@@ -146,9 +157,15 @@ fn finely(
     let quick = WorldProblem { effort, ..*problem };
     let Some(explored) = nearer(seen, &quick, explored, &short, watch)? else { return Ok(None) };
     let anchor = Anchor::of(problem, &explored.best);
-    let found =
-        seen.about(problem, &anchor, |problem| surely_about(problem, None, effort, &explored))?;
+    let found = seen.about(problem, &anchor, |problem| {
+        surely_about((seen, problem), None, effort, &explored)
+    })?;
     Ok(found.map(|(spread, reduced, world)| (spread.filter(|_| reduced < WAY), reduced, world)))
+}
+
+/// Whether steps along differences of images follow a search: χ² has to be smooth, and they know one volume.
+fn is_stepped(seen: &Seen, problem: &WorldProblem<'_, f32>) -> bool {
+    (problem.model.ring.is_some() || seen.is_images()) && !problem.change.is_any()
 }
 
 /// χ²/N above which a search about volumes is still on its way: the bowl there says nothing about where it leads.
@@ -156,15 +173,14 @@ const WAY: f64 = 3.0;
 
 /// How sure the best of the worlds that were explored is.
 fn surely_about(
-    problem: &WorldProblem<'_, f32>,
+    (seen, problem): (&Seen, &WorldProblem<'_, f32>),
     resampled: Resampled<'_>,
     effort: Effort,
     explored: &Explored,
 ) -> Result<Sure> {
     let quick = WorldProblem { effort, ..*problem };
     let reduced = problem.scale * problem.left(&explored.best)?;
-    // Steps along differences of images know one volume.
-    if problem.model.ring.is_some() && !problem.change.is_any() {
+    if is_stepped(seen, problem) {
         let (polished, reduced) = polished(problem, &explored.best)?;
         let spread = surely(problem, resampled, &polished, reduced)?;
         let world = spread.as_ref().map_or(polished.best.world, |spread| spread.world);

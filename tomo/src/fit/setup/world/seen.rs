@@ -1,8 +1,7 @@
 //! Data as a search looks at them.
 
 use super::{known_world, model};
-use crate::fit::Objective;
-use crate::fit::journal::Memory;
+use crate::fit::journal::{Memory, key};
 use crate::fit::linear::{Change, GaussianField, Patience, Prior as Penalty, Voxels, Weighted};
 use crate::fit::settings::{
     FieldKind, FitFile, LossKind, PriorOfVoxels, UnknownWorld, Within, WorldView,
@@ -11,7 +10,8 @@ use crate::fit::setup::linear_problem::terms;
 use crate::fit::setup::{
     CoarseView, Measured, Result, change, emission_times, forward_model, linear, motion, priors,
 };
-use crate::fit::world::{Effort, WorldProblem};
+use crate::fit::world::{Effort, World, WorldProblem};
+use crate::fit::{Objective, Weighted as Imaged};
 use crate::interferometry::operator::Pulse;
 
 /// Data as a search looks at them.
@@ -23,6 +23,11 @@ pub(super) struct Seen {
     /// The same through other pixels, where those of the fit are only samples of a smooth image.
     pub(super) resampled: Vec<Seen>,
 }
+
+/// Pixels of single rays do not count where they are nearer to the critical curve, M: to that of the coarse search's world,
+/// about which populations spread, and to that of the world where steps begin. Second images of matter at 3 to 9 M are
+/// within 0.7 M.
+pub(super) const BESIDE_THE_RING: [f64; 2] = [1.0, 0.8];
 
 /// Pixels of a look through others over those of the fit, along each side: finer and wider ones.
 const RESAMPLED: [f64; 3] = [1.15, 0.87, 1.25];
@@ -113,6 +118,39 @@ impl Seen {
                 },
             },
         })
+    }
+}
+
+impl Seen {
+    /// Does something with data that change smoothly with the world. Single rays meet the narrow images near the critical
+    /// curve or miss them: images of such rays are compared without the pixels that are nearer than `limit`, M, to the
+    /// critical curve of a world near by. Other data are compared as they are.
+    pub fn smoothly<R>(
+        &self,
+        problem: &WorldProblem<'_, f32>,
+        (world, limit): (World, f64),
+        work: impl FnOnce(&WorldProblem<'_, f32>) -> Result<R>,
+    ) -> Result<R> {
+        let CoarseView { file, measured, .. } = &self.view;
+        if problem.model.ring.is_some() || !self.is_images() {
+            return work(problem);
+        }
+        let mut data = measured.terms(&file.loss, problem.model.x.len())?;
+        let ring = problem.model.ring_pixels(&world, limit)?;
+        data.image =
+            data.image.map(|image| Imaged { term: Box::new(image.term.without(ring)), ..image });
+        let terms = terms(&data).into_iter();
+        let terms: Vec<_> = match problem.gaussian {
+            Some(_) => terms.collect(),
+            None => terms.map(|term| counted(term, problem.frames)).collect(),
+        };
+        let memory = problem.memory.about(key((world.bits(), limit.to_bits())));
+        work(&WorldProblem { terms: &terms, memory, ..*problem })
+    }
+
+    /// Whether images are all that is compared.
+    pub fn is_images(&self) -> bool {
+        self.view.file.loss.iter().all(|loss| loss.data == LossKind::Image)
     }
 }
 

@@ -1,0 +1,66 @@
+//! What the sums along rays are off by, beside the errors of the data.
+
+use super::Estimate;
+use crate::fit::world_search;
+use kerrlight_tomo::fit::setup::Imaged;
+use kerrlight_tomo::fit::{State, Trainer};
+use serde_json::Value;
+
+/// Frames that are looked at.
+const FRAMES: usize = 4;
+/// Off by this part of the errors of the data, sums begin to count.
+const LIMIT: f64 = 0.3;
+
+impl Estimate<'_> {
+    /// The root mean square difference of what data are compared with from the same with twice the nodes on rays, over
+    /// the errors of the data, in a few frames. None where that cannot be told, and where data are simulated by the same
+    /// sums.
+    pub fn quadrature_error(
+        &self,
+        trainer: &mut Trainer<'_, f32>,
+        state: &State<f32>,
+    ) -> anyhow::Result<Option<f64>> {
+        if self.file.data.is_none() {
+            return Ok(None);
+        }
+        let observed = trainer.objective.observed();
+        let every = observed.len().div_ceil(FRAMES).max(1);
+        let frames: Vec<usize> = observed.into_iter().skip(every / 2).step_by(every).collect();
+        let unknown = self.file.unknown_world()?;
+        let world = match (&unknown, world_search::found(self.folder)?) {
+            (Some(unknown), Some(found)) => {
+                Some((unknown, world_search::world_of(self.file, &unknown.free()?, &found)?))
+            }
+            _ => None,
+        };
+        let found = world.as_ref().map(|(unknown, world)| (*unknown, world));
+        let Self { file, motion, measured, .. } = *self;
+        let imaged = Imaged { file, measured, motion, found };
+        let field = state.now.field(trainer.representation);
+        let Some(finer) = imaged.finer(field, &frames)? else { return Ok(None) };
+        let plain = trainer.movie(&state.now, &frames, true);
+        Ok(Some(trainer.objective.apart(&frames, [&plain, &finer])))
+    }
+}
+
+/// A sentence where they count.
+pub fn sentence(results: &Value) -> Option<String> {
+    let off = results["quadrature_error"].as_f64().filter(|off| *off > LIMIT)?;
+    Some(format!(
+        "Sums along rays are off by {off:.1} of the errors of the data: region.nodes needs a higher order or split."
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn exact_only_what_counts_is_said() {
+        assert_eq!(sentence(&json!({})), None);
+        assert_eq!(sentence(&json!({ "quadrature_error": 0.29 })), None);
+        let said = sentence(&json!({ "quadrature_error": 1.44 })).unwrap();
+        assert!(said.contains("1.4 of the errors") && said.contains("region.nodes"), "{said}");
+    }
+}

@@ -1,0 +1,68 @@
+//! The images of a fit with twice the nodes on rays: what its sums along rays are off by.
+
+use super::{Instrument, Measured, Result, in_world};
+use crate::fit::settings::{FitFile, Region, UnknownWorld};
+use crate::fit::world::World;
+use crate::fit::{Batch, Field, Motion, Sampling, Seen};
+use crate::representation::Workspace;
+
+/// Pixels whose rays are held at a time.
+const BLOCK: usize = 2048;
+
+/// What images are made of.
+#[derive(Clone, Copy)]
+pub struct Imaged<'a> {
+    /// Settings.
+    pub file: &'a FitFile,
+    /// Data.
+    pub measured: &'a Measured,
+    /// Motion in the world that was found.
+    pub motion: &'a Motion,
+    /// The world that was found, where it was not known.
+    pub found: Option<(&'a UnknownWorld, &'a World)>,
+}
+
+impl Imaged<'_> {
+    /// Images of some frames, one after the other, with twice the panels on each ray. None where nodes are those of other
+    /// sums by intention, or more than the total intensity of what moves is seen.
+    ///
+    /// # Errors
+    /// If a setting is out of range.
+    pub fn finer(&self, field: Field<'_, f32>, frames: &[usize]) -> Result<Option<Vec<f32>>> {
+        let Sampling::Gauss { order, split } = self.file.region.nodes else { return Ok(None) };
+        let nodes = Sampling::Gauss { order, split: 2 * split };
+        let file =
+            FitFile { region: Region { nodes, ..self.file.region.clone() }, ..self.file.clone() };
+        let pixels = file.screen.pixels * file.screen.pixels;
+        let mut movie = vec![0.0; frames.len() * pixels];
+        let (mut batch, mut workspace) = (Batch::default(), Workspace::new());
+        // Pixels of a block are spread over the screen.
+        let blocks = pixels.div_ceil(BLOCK);
+        for first in 0..blocks {
+            let block: Vec<usize> = (first..pixels).step_by(blocks).collect();
+            let Some(instrument) = self.looking(&file, &block)? else { return Ok(None) };
+            let mut model = instrument.forward::<f32>(self.motion)?;
+            model.weigh(field.axis);
+            let mut part = vec![0.0; frames.len() * block.len()];
+            model.movie(field, frames, &mut batch, &mut workspace, &mut part);
+            for (image, part) in movie.chunks_exact_mut(pixels).zip(part.chunks_exact(block.len()))
+            {
+                block.iter().zip(part).for_each(|(pixel, value)| image[*pixel] = *value);
+            }
+        }
+        Ok(Some(movie))
+    }
+
+    /// The rays of some pixels; none where something else than the total intensity of what moves is seen.
+    fn looking(&self, file: &FitFile, block: &[usize]) -> Result<Option<Instrument>> {
+        let instrument = Instrument::of(file, block)?;
+        if instrument.seen != Seen::Images
+            || instrument.polarized.is_some()
+            || instrument.quiescent.is_some()
+        {
+            return Ok(None);
+        }
+        let Some((unknown, world)) = self.found else { return Ok(Some(instrument)) };
+        Ok(Some(in_world(file, unknown, &instrument, self.measured, world, 0)?.0))
+    }
+}
