@@ -129,11 +129,7 @@ fn finely(
         let beside = (start, BESIDE_THE_RING[0]);
         let explored = seen.smoothly(problem, beside, |problem| about(problem, watch))?;
         let Some(explored) = explored else { return Ok(None) };
-        // Values of worlds that are compared are those of the same pixels.
-        let beside = match is_stepped(seen, problem) {
-            true => (explored.best.world, BESIDE_THE_RING[1]),
-            false => beside,
-        };
+        let beside = (explored.best.world, BESIDE_THE_RING[1]);
         return seen
             .smoothly(problem, beside, |problem| {
                 surely_about((seen, problem), Some((seen, unknown)), effort, &explored)

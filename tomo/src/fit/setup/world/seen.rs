@@ -124,7 +124,7 @@ impl Seen {
 impl Seen {
     /// Does something with data that change smoothly with the world. Single rays meet the narrow images near the critical
     /// curve or miss them: images of such rays are compared without the pixels that are nearer than `limit`, M, to the
-    /// critical curve of a world near by. Other data are compared as they are.
+    /// critical curve of a world near by. Other data, and emission that changes, are compared as they are.
     pub fn smoothly<R>(
         &self,
         problem: &WorldProblem<'_, f32>,
@@ -132,7 +132,7 @@ impl Seen {
         work: impl FnOnce(&WorldProblem<'_, f32>) -> Result<R>,
     ) -> Result<R> {
         let CoarseView { file, measured, .. } = &self.view;
-        if problem.model.ring.is_some() || !self.is_images() {
+        if problem.model.ring.is_some() || problem.change.is_any() || !self.is_images() {
             return work(problem);
         }
         let mut data = measured.terms(&file.loss, problem.model.x.len())?;
