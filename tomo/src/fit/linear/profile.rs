@@ -41,8 +41,8 @@ struct Moved<T> {
 }
 
 impl<T: Float + Default> LinearProblem<'_, T> {
-    /// At a field (values at all nodes) that is the best one or near it, with derivatives of the frames' images with respect to
-    /// each number, frame after frame.
+    /// At a field (values at all nodes) that is the best one or near it, with derivatives of the frames' images with
+    /// respect to each number, frame after frame.
     ///
     /// `iterations` are those of the conjugate gradients by which the field follows; without any it is held.
     ///

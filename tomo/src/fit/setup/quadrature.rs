@@ -1,5 +1,6 @@
 //! The images of a fit with twice the nodes on rays: what its sums along rays are off by.
 
+use super::seen::seen;
 use super::{Instrument, Measured, Result, in_world};
 use crate::fit::settings::{FitFile, Region, UnknownWorld};
 use crate::fit::world::World;
@@ -30,6 +31,10 @@ impl Imaged<'_> {
     /// If a setting is out of range.
     pub fn finer(&self, field: Field<'_, f32>, frames: &[usize]) -> Result<Option<Vec<f32>>> {
         let Sampling::Gauss { order, split } = self.file.region.nodes else { return Ok(None) };
+        let is_plain = self.file.polarization.is_none() && self.file.quiescent.is_none();
+        if !is_plain || seen(self.file)? != Seen::Images {
+            return Ok(None);
+        }
         let nodes = Sampling::Gauss { order, split: 2 * split };
         let file =
             FitFile { region: Region { nodes, ..self.file.region.clone() }, ..self.file.clone() };
@@ -40,7 +45,7 @@ impl Imaged<'_> {
         let blocks = pixels.div_ceil(BLOCK);
         for first in 0..blocks {
             let block: Vec<usize> = (first..pixels).step_by(blocks).collect();
-            let Some(instrument) = self.looking(&file, &block)? else { return Ok(None) };
+            let instrument = self.looking(&file, &block)?;
             let mut model = instrument.forward::<f32>(self.motion)?;
             model.weigh(field.axis);
             let mut part = vec![0.0; frames.len() * block.len()];
@@ -53,16 +58,10 @@ impl Imaged<'_> {
         Ok(Some(movie))
     }
 
-    /// The rays of some pixels; none where something else than the total intensity of what moves is seen.
-    fn looking(&self, file: &FitFile, block: &[usize]) -> Result<Option<Instrument>> {
+    /// The rays of some pixels.
+    fn looking(&self, file: &FitFile, block: &[usize]) -> Result<Instrument> {
         let instrument = Instrument::of(file, block)?;
-        if instrument.seen != Seen::Images
-            || instrument.polarized.is_some()
-            || instrument.quiescent.is_some()
-        {
-            return Ok(None);
-        }
-        let Some((unknown, world)) = self.found else { return Ok(Some(instrument)) };
-        Ok(Some(in_world(file, unknown, &instrument, self.measured, world, 0)?.0))
+        let Some((unknown, world)) = self.found else { return Ok(instrument) };
+        Ok(in_world(file, unknown, &instrument, self.measured, world, 0)?.0)
     }
 }
