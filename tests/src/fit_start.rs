@@ -1,5 +1,6 @@
 //! What a fit starts from (`--init`) and what it leaves for other verbs: a scene, and a movie that telescopes see.
 
+use crate::fit::results;
 use crate::support::{fail, root, succeed};
 use kerrlight_tomo::image::exr;
 use std::path::Path;
@@ -191,4 +192,16 @@ fn exact_starters_of_images_ask_for_what_is_missing() {
     }
     assert_eq!(filled, 10);
     succeed(path, &fit);
+    // Sums of higher order are nearer to those of twice the nodes, and what counts is said.
+    let errors = [2, 4, 12].map(|order| {
+        let set = format!("region.nodes={{gauss={{order={order},split=1}}}}");
+        let name = format!("order_{order}");
+        let words =
+            ["fit", "images.toml", "-o", &name, "--set", &set, "--set", "loss.0.sigma=2e-7"];
+        let told = succeed(path, &[&words[..], &few].concat());
+        let error = results(&path.join(&name))["quadrature_error"].as_f64().unwrap();
+        assert_eq!(told.contains("Sums along rays are off by"), error > 0.3, "{error}: {told}");
+        error
+    });
+    assert!(errors[0] > 2.0 * errors[1] && errors[1] > 2.0 * errors[2], "{errors:?}");
 }

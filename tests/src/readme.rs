@@ -67,6 +67,9 @@ fn shorter(line: &str) -> &'static str {
         return " --set training.steps=5 --set world.search.starts=1 --set world.search.coarse.worlds=40 \
                 --set 'world.search.fine={worlds=20,nodes=16,iterations=30,pixels=20,frames=12}'";
     }
+    if line.contains(" fit") && line.contains("linear") {
+        return " --set training.steps=5 --set output.nodes=24 --set screen.pixels=12 --set linear.iterations=10";
+    }
     if line.contains(" fit") && !is_whole {
         return " --set training.steps=5 --set output.nodes=24";
     }

@@ -181,14 +181,16 @@ fn worlds<'a>(
 ) -> anyhow::Result<WorldPosterior<'a>> {
     let free = unknown.free()?;
     let best = world_search::world_of(&prepared.file, &free, world)?;
-    if prepared.file.change.is_some() {
+    let noise = world["noise_factor"].as_f64().unwrap_or(1.0);
+    let is_finer = unknown.search.finest.is_some();
+    if prepared.file.change.is_some() || is_finer {
         let spread = world_search::spread_of(&free, best, world)?;
         let about = (&prepared.file, &prepared.measured);
-        let factor = noise_of(folder)?;
+        let left = world["chi2_per_datum"].as_f64().unwrap_or(1.0);
+        let factor = if is_finer { noise.max(left.sqrt()) } else { noise_of(folder)? };
         return Ok(WorldPosterior::around(about, unknown, (best, &spread), factor)?);
     }
     eprintln!("the best world, once more");
-    let noise = world["noise_factor"].as_f64().unwrap_or(1.0);
     let (file, measured) = (&prepared.file, &prepared.measured);
     Ok(WorldPosterior::new(file, measured, unknown, (best, noise))?)
 }

@@ -24,6 +24,7 @@ mod unknown_world;
 mod unknowns;
 mod view;
 mod world;
+mod world_search;
 
 pub use band::{BackgroundSettings, BandSettings, Steps};
 pub use change::ChangeSettings;
@@ -47,9 +48,10 @@ pub use static_image::{
     StaticVisibilities, StrengthSettings,
 };
 pub use static_polarization::StaticPolarization;
-pub use unknown_world::{PriorSettings, UnknownWorld, WorldSearch, WorldView};
+pub use unknown_world::{PriorSettings, UnknownWorld};
 pub use view::{Absorption, Effects, Hole, Motion, Observer, PixelShape, Region, Screen, WidthOf};
 pub use world::merge;
+pub use world_search::{WorldSearch, WorldSteps, WorldView};
 
 use crate::Error;
 use crate::polarization::PolarizationLaw;

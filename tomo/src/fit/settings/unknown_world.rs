@@ -1,7 +1,7 @@
-//! What of the world is not known, and how it is looked for.
+//! What of the world is not known.
 
 use super::world::SIMULATED;
-use super::{FitError, FitFile, Within};
+use super::{FitError, FitFile, LossKind, Within, WorldSearch};
 use crate::Error;
 use crate::dynamics::Velocity;
 use crate::fit::world::{Free, KNOTS, Parameter, Prior, Scanned};
@@ -82,36 +82,6 @@ pub enum PriorSettings {
         /// Values of the grid, both ends included.
         points: usize,
     },
-}
-
-/// How the world is looked for.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct WorldSearch {
-    /// Places to begin, all over the priors.
-    pub starts: usize,
-    /// The search from each of them.
-    pub coarse: WorldView,
-    /// The search about the best of their ends.
-    pub fine: WorldView,
-    /// Whether the drag of a Keplerian velocity and of `infall` is the spin of each world along the axis.
-    pub drag_is_spin: bool,
-}
-
-/// How worlds are evaluated.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct WorldView {
-    /// Worlds, at most.
-    pub worlds: usize,
-    /// Voxels along each axis of the volume that is solved for.
-    pub nodes: usize,
-    /// Iterations of each solution over all voxels; the fine search adds up to six times as many over those that shine.
-    pub iterations: usize,
-    /// Pixels along each side, about.
-    pub pixels: usize,
-    /// Frames, about.
-    pub frames: usize,
 }
 
 impl PriorSettings {
@@ -254,27 +224,14 @@ impl UnknownWorld {
     fn check(&self) -> Result<(), Error> {
         self.free()?;
         self.check_scan()?;
-        let WorldSearch { starts, coarse, fine, .. } = &self.search;
-        let within = |key: &str, value: usize, [low, high]: [usize; 2]| {
-            let allowed = format!("{low} to {high}");
-            let key = format!("world.search.{key}");
-            if (low..=high).contains(&value) {
-                Ok(())
-            } else {
-                Err(Error::from(FitError::range(key, value, &allowed)))
-            }
-        };
-        within("starts", *starts, [1, 1000])?;
-        for (name, view) in [("coarse", coarse), ("fine", fine)] {
-            within(&format!("{name}.worlds"), view.worlds, [1, 1_000_000])?;
-            within(&format!("{name}.nodes"), view.nodes, [2, 128])?;
-            within(&format!("{name}.iterations"), view.iterations, [1, 10_000])?;
-            within(&format!("{name}.pixels"), view.pixels, [2, 4096])?;
-            within(&format!("{name}.frames"), view.frames, [2, 1_000_000])?;
-        }
-        Ok(())
+        self.search.check()
     }
 }
+
+/// Why finer steps are refused.
+const NO_STEPS: &str = "world.search.finest is what the last steps look at, and no steps are taken here: they need \
+                        screen.ring_rays or images, data in which the volume is a convex problem, and emission that \
+                        does not change";
 
 /// Sets draws of the world apart from those of the noise.
 const DRAWN: u64 = 0x77a1_d5ee_d000_0001;
@@ -350,8 +307,18 @@ impl FitFile {
                 .to_owned();
             return Err(FitError::Conflict(why).into());
         }
+        if world.search.finest.is_some() && !self.is_stepped() {
+            return Err(FitError::Conflict(NO_STEPS.to_owned()).into());
+        }
         self.check_drag(&world)?;
         Ok(Some(world))
+    }
+
+    /// Whether steps along differences of images follow a search.
+    fn is_stepped(&self) -> bool {
+        let are_smooth = self.screen.ring_rays.is_some()
+            || self.loss.iter().all(|loss| loss.data == LossKind::Image);
+        are_smooth && self.is_convex() && self.change.is_none()
     }
 
     /// Knots of the profile that the factors of a world are those of.

@@ -44,6 +44,28 @@ impl Spread {
         counts.filter_map(|count| Self::through(free, best, &samples[..count], reduced_chi2)).next()
     }
 
+    /// About another world near by: how far it is from this one is part of its error.
+    #[must_use]
+    pub fn moved(&self, free: &[Free], world: World) -> Self {
+        let n = free.len();
+        let step: Vec<f64> = free
+            .iter()
+            .map(|Free { parameter, .. }| {
+                parameter.difference(world.get(*parameter), self.world.get(*parameter))
+            })
+            .collect();
+        let covariance = |a: usize, b: usize| {
+            self.correlation[a * n + b] * self.sigma[a] * self.sigma[b] + step[a] * step[b]
+        };
+        let whole: Vec<f64> = (0..n).map(|k| covariance(k, k).sqrt()).collect();
+        let correlation =
+            (0..n * n).map(|k| covariance(k / n, k % n) / (whole[k / n] * whole[k % n])).collect();
+        let sigma: Vec<f64> =
+            free.iter().zip(&whole).map(|(free, x)| x.min(free.prior.deviation())).collect();
+        let open = free.iter().zip(&sigma).map(|(free, sigma)| free.is_open(*sigma)).collect();
+        Self { world, sigma, open, correlation, ..*self }
+    }
+
     fn through(free: &[Free], best: &Sample, taken: &[Sample], reduced_chi2: f64) -> Option<Self> {
         let n = free.len();
         let form = Form::fit(free, best, taken)?;
@@ -136,6 +158,29 @@ impl Form {
 mod tests {
     use super::*;
     use crate::fit::world::{Parameter, Prior};
+
+    /// A step along the first parameter widens it alone; one along both makes errors that are nearly those of the step.
+    #[test]
+    fn exact_a_step_is_part_of_the_error() {
+        let free = free();
+        let world = World::new(0.1, 1.0, 0.0);
+        let spread = Spread {
+            world,
+            sigma: vec![0.03, 0.02],
+            open: vec![false, false],
+            correlation: vec![1.0, 0.5, 0.5, 1.0],
+            ripple: 0.0,
+            worlds: 1,
+        };
+        let names = free.map(|free| free.parameter);
+        let first = spread.moved(&free, world.with(names[0], world.get(names[0]) + 0.04));
+        assert!((first.sigma[0] - 0.05).abs() < 1e-12 && (first.sigma[1] - 0.02).abs() < 1e-12);
+        let before = 0.5 * 0.03 * 0.02;
+        assert!((first.correlation[1] * 0.05 * 0.02 - before).abs() < 1e-12);
+        let far = names.into_iter().fold(world, |far, name| far.with(name, far.get(name) + 0.2));
+        let both = spread.moved(&free, far);
+        assert!(both.correlation[1] > 0.98 && both.world == far, "{both:?}");
+    }
 
     fn free() -> [Free; 2] {
         let spin = Prior::Uniform { low: -0.9, high: 0.9 };

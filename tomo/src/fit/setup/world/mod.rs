@@ -1,5 +1,6 @@
 //! From settings to a world that is not known: its model, its parameters, the search for them and how sure they are.
 
+mod fine;
 mod posterior;
 mod search;
 mod seen;

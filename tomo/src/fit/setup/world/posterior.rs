@@ -149,7 +149,7 @@ impl<'a> WorldPosterior<'a> {
     }
 
     /// About a world whose errors a search has found, in data whose noise is `factor` times their errors: for emission that
-    /// changes, whose best volume is another one in each world.
+    /// changes, whose best volume is another one in each world, and after finer steps.
     ///
     /// # Errors
     /// If a prior is out of its range.

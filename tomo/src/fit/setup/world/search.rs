@@ -1,15 +1,13 @@
 //! The search for a world: from many starts or over a grid with coarse voxels, then with fine ones.
 
-use super::posterior::{Resampled, polished, surely};
-use super::seen::{BESIDE_THE_RING, Seen};
+use super::fine::{Detail, PART, nearer};
+use super::seen::Seen;
 use super::tangent::Anchor;
 use crate::fit::journal::{Journal, Memory};
-use crate::fit::linear::{Patience, refined};
 use crate::fit::settings::{FieldKind, FitFile, Linear, UnknownWorld};
 use crate::fit::setup::{Measured, Result};
 use crate::fit::world::{
-    Effort, Estimate, Exploration, Explored, Scanned, Spread, World, WorldProblem, WorldScan,
-    WorldWatch,
+    Estimate, Exploration, Explored, Scanned, Spread, World, WorldProblem, WorldScan, WorldWatch,
 };
 
 use rayon::prelude::*;
@@ -88,103 +86,20 @@ pub fn find_world(
     let Some(Found { start, volume, reduced_chi2, trials, scan }) = found else {
         return Ok(None);
     };
-    let fine = Seen::finely(file, measured, &search.fine)?;
-    // The coarse search has left less than it began with.
-    let scale = scale(reduced_chi2);
+    let how = Exploration { width: width(&over), worlds: search.fine.worlds, seed: file.seed };
     let count = trials.len().max(1) + 1;
     let mut told = |worlds: usize, best: f64| watch((count - 1, count), worlds, best);
-    let how = Exploration { width: width(&over), worlds: search.fine.worlds, seed: file.seed };
-    let found = fine.with(unknown, &search.fine, (scale, memory), |problem| {
-        finely((&fine, unknown), problem, (start, volume.as_ref()), &how, &mut told)
-    })?;
-    Ok(found.map(|(spread, reduced_chi2, world)| FoundWorld {
+    // The coarse search has left less than it began with.
+    let detail = Detail { file, measured, unknown, memory, scale: &scale };
+    let found = detail.search((start, volume.as_ref()), reduced_chi2, &how, &mut told)?;
+    Ok(found.map(|((spread, reduced, world), errors)| FoundWorld {
         world,
-        reduced_chi2: reduced_chi2 / scale,
-        noise_factor: scale.powf(-0.5),
+        reduced_chi2: reduced / errors,
+        noise_factor: errors.powf(-0.5),
         spread,
         trials,
         scan,
     }))
-}
-
-/// How sure a world is, its χ²/N, and the world.
-type Sure = (Option<Spread>, f64, World);
-
-/// The search about the best end of the coarse one, and how sure it is.
-fn finely(
-    (seen, unknown): (&Seen, &UnknownWorld),
-    problem: &WorldProblem<'_, f32>,
-    (start, volume): (World, Option<&Anchor>),
-    how: &Exploration,
-    watch: &mut WorldWatch<'_>,
-) -> Result<Option<Sure>> {
-    // Populations look for where to begin: steps with volumes that are solved for follow.
-    let patience = Patience::looking(problem.effort.patience.looking);
-    let effort = Effort { patience, ..problem.effort };
-    let volume = volume.filter(|_| !problem.is_convex());
-    let about = |problem: &WorldProblem<'_, f32>, watch: &mut WorldWatch<'_>| {
-        WorldProblem { effort, ..*problem }.explore((start, None), how, watch)
-    };
-    let Some(volume) = volume else {
-        let beside = (start, BESIDE_THE_RING[0]);
-        let explored = seen.smoothly(problem, beside, |problem| about(problem, watch))?;
-        let Some(explored) = explored else { return Ok(None) };
-        let beside = (explored.best.world, BESIDE_THE_RING[1]);
-        return seen
-            .smoothly(problem, beside, |problem| {
-                surely_about((seen, problem), Some((seen, unknown)), effort, &explored)
-            })
-            .map(Some);
-    };
-    let first = seen.about(problem, volume, |problem| {
-        Ok(Anchor::of(problem, &WorldProblem { effort, ..*problem }.solve(start)?))
-    })?;
-    let Some(first) = first else {
-        let x = refined(&volume.voxels, &volume.x, &problem.voxels())?;
-        let quick = WorldProblem { effort, ..*problem };
-        let Some(explored) = quick.explore((start, Some(&x)), how, watch)? else {
-            return Ok(None);
-        };
-        return surely_about((seen, problem), None, effort, &explored).map(Some);
-    };
-    let explored = seen.about(problem, &first, |problem| about(problem, watch))?;
-    let Some(explored) = explored.flatten() else { return Ok(None) };
-    let short = Exploration { worlds: how.worlds / 2, ..*how };
-    let quick = WorldProblem { effort, ..*problem };
-    let Some(explored) = nearer(seen, &quick, explored, &short, watch)? else { return Ok(None) };
-    let anchor = Anchor::of(problem, &explored.best);
-    let found = seen.about(problem, &anchor, |problem| {
-        surely_about((seen, problem), None, effort, &explored)
-    })?;
-    Ok(found.map(|(spread, reduced, world)| (spread.filter(|_| reduced < WAY), reduced, world)))
-}
-
-/// Whether steps along differences of images follow a search: χ² has to be smooth, and they know one volume.
-fn is_stepped(seen: &Seen, problem: &WorldProblem<'_, f32>) -> bool {
-    (problem.model.ring.is_some() || seen.is_images()) && !problem.change.is_any()
-}
-
-/// χ²/N above which a search about volumes is still on its way: the bowl there says nothing about where it leads.
-const WAY: f64 = 3.0;
-
-/// How sure the best of the worlds that were explored is.
-fn surely_about(
-    (seen, problem): (&Seen, &WorldProblem<'_, f32>),
-    resampled: Resampled<'_>,
-    effort: Effort,
-    explored: &Explored,
-) -> Result<Sure> {
-    let quick = WorldProblem { effort, ..*problem };
-    let reduced = problem.scale * problem.left(&explored.best)?;
-    if is_stepped(seen, problem) {
-        let (polished, reduced) = polished(problem, &explored.best)?;
-        let spread = surely(problem, resampled, &polished, reduced)?;
-        let world = spread.as_ref().map_or(polished.best.world, |spread| spread.world);
-        return Ok((spread, reduced, world));
-    }
-    let spread = Spread::of(problem.free, &explored.samples, reduced);
-    let world = lower(&quick, explored, spread.as_ref())?;
-    Ok((spread, reduced, world))
 }
 
 /// What the coarse search has found: where the fine one begins, with χ²/N there.
@@ -257,10 +172,6 @@ fn beginnings(
     Ok(Some(tried.into_iter().map(|lit| (lit.world, Some(lit))).collect()))
 }
 
-/// Searches of a part of the worlds, each about a nearer volume, at most, and that part.
-const NEARER: usize = 16;
-const PART: usize = 4;
-
 /// A search from a start. Where data are not convex, it is one about the volume there, and again about the volume of each
 /// search before, as long as that is a better one; where they have no such form, volumes follow the search.
 fn searched(
@@ -283,30 +194,6 @@ fn searched(
     let short = Exploration { width: WIDTHS[1], worlds: how.worlds / PART, ..*how };
     let nearer = nearer(seen, problem, explored, &short, watch)?;
     Ok(nearer.map(|explored| Explored { start, ..explored }))
-}
-
-/// Short searches, each about the best volume so far, until none is better: their best world with the volume that explains
-/// the data as they are, which a last search about it has looked around.
-fn nearer(
-    seen: &Seen,
-    problem: &WorldProblem<'_, f32>,
-    mut explored: Explored,
-    short: &Exploration,
-    watch: &mut WorldWatch<'_>,
-) -> Result<Option<Explored>> {
-    explored.best = problem.solve_from(explored.best.world, &explored.best.x)?;
-    for _ in 0..NEARER {
-        let (anchor, world) = (Anchor::of(problem, &explored.best), explored.best.world);
-        let next =
-            seen.about(problem, &anchor, |problem| problem.explore((world, None), short, watch))?;
-        let Some(mut next) = next.flatten() else { return Ok(None) };
-        next.best = problem.solve_from(next.best.world, &next.best.x)?;
-        if next.best.value >= explored.best.value {
-            break;
-        }
-        explored = next;
-    }
-    Ok(Some(explored))
 }
 
 /// Where a search has ended, or a short one from the twin of that world, if that ends at a better one.
@@ -350,18 +237,6 @@ fn on_grid(
 fn width(over: &[Scanned]) -> f64 {
     let cell = |scanned: &Scanned| 0.5 * scanned.step() / scanned.parameter.scale();
     over.iter().map(cell).fold(WIDTHS[1], f64::max)
-}
-
-/// The lowest point of the quadratic form, if it explains the data better than the best world that was evaluated.
-fn lower(
-    problem: &WorldProblem<'_, f32>,
-    explored: &Explored,
-    spread: Option<&Spread>,
-) -> Result<World> {
-    let Some(spread) = spread else { return Ok(explored.best.world) };
-    let lowest = problem.solve(spread.world)?;
-    let better = lowest.value < explored.best.value;
-    Ok(if better { lowest.world } else { explored.best.world })
 }
 
 /// The least χ²/N of the worlds where searches begin.

@@ -40,7 +40,19 @@ impl Seen {
         Self::new(file, measured, view, 0)
     }
 
-    /// For worlds that are much alike: their volumes are solved for nearly to the end.
+    /// For steps between worlds that are much alike: their volumes are solved for nearly to the end. Visibilities are seen
+    /// through as many pixels as are asked for, were they more than those of the fit.
+    pub fn closely(file: &FitFile, measured: &Measured, view: &WorldView) -> Result<Self> {
+        let has_images = file.loss.iter().any(|loss| loss.data == LossKind::Image);
+        if has_images || view.pixels == file.screen.pixels {
+            return Self::new(file, measured, view, 1);
+        }
+        let frames = view.frames;
+        let view = CoarseView::sampled(file, measured, view.pixels)?;
+        Ok(Self { view, frames, rounds: 1, resampled: Vec::new() })
+    }
+
+    /// The same as coarse searches see, and through other pixels.
     pub fn finely(file: &FitFile, measured: &Measured, view: &WorldView) -> Result<Self> {
         let mut seen = Self::new(file, measured, view, 1)?;
         let is_image = file.loss.iter().any(|loss| loss.data == LossKind::Image);
