@@ -141,8 +141,8 @@ fn unexplained(results: &Value) -> Option<String> {
     let chi2 = results["chi2_per_datum"].as_f64().filter(|chi2| *chi2 > ROUGH)?;
     Some(format!(
         "the volume of the best world leaves χ²/N = {chi2:.2}, which pulls at the world more than its errors say: \
-         world.search.fine needs more iterations or nodes, region.nodes a higher order, or the screen more pixels (of \
-         visibilities; pulse = \"delta\" where data are of finer ones), or the model is wrong"
+         world.search.finest or linear.degree = \"quadratic\" may help, as may a higher order of region.nodes, and pulse = \
+         \"delta\" where data are of finer pixels, or the model is wrong"
     ))
 }
 
