@@ -186,6 +186,7 @@ fn worlds<'a>(
     if prepared.file.change.is_some() || is_finer {
         let spread = world_search::spread_of(&free, best, world)?;
         let about = (&prepared.file, &prepared.measured);
+        // Residuals at the end of the finer steps, but no less than the errors that these assumed.
         let left = world["chi2_per_datum"].as_f64().unwrap_or(1.0);
         let factor = if is_finer { noise.max(left.sqrt()) } else { noise_of(folder)? };
         return Ok(WorldPosterior::around(about, unknown, (best, &spread), factor)?);

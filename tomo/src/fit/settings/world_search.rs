@@ -14,7 +14,7 @@ pub struct WorldSearch {
     pub coarse: WorldView,
     /// The search about the best of their ends.
     pub fine: WorldView,
-    /// The last steps from the world that this search has found; none if there is nothing finer.
+    /// What the last steps look at, from the world that the fine search has found; none if there are no finer ones.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub finest: Option<WorldSteps>,
     /// Whether the drag of a Keplerian velocity and of `infall` is the spin of each world along the axis.
@@ -52,7 +52,8 @@ pub struct WorldSteps {
 }
 
 impl WorldSearch {
-    /// How the last steps look at worlds, where that is not how the search before them does.
+    /// What the last steps look at, if it is finer than what the search before them does. They count no worlds: the number
+    /// is that of this search.
     pub(crate) fn finest(&self) -> Option<WorldView> {
         let WorldView { worlds, .. } = self.fine;
         let view = |WorldSteps { nodes, iterations, pixels, frames }| WorldView {
@@ -65,8 +66,10 @@ impl WorldSearch {
         self.finest.map(view)
     }
 
+    /// Refuses numbers out of their ranges.
+    ///
     /// # Errors
-    /// If a number is out of its range.
+    /// The first one.
     pub(super) fn check(&self) -> Result<(), Error> {
         let within = |key: &str, value: usize, [low, high]: [usize; 2]| {
             let allowed = format!("{low} to {high}");

@@ -52,7 +52,8 @@ impl Seen {
         Ok(Self { view, frames, rounds: 1, resampled: Vec::new() })
     }
 
-    /// The same as coarse searches see, and through other pixels.
+    /// For a search among worlds that are much alike, whose volumes are solved for nearly to the end too; and the same
+    /// through other pixels.
     pub fn finely(file: &FitFile, measured: &Measured, view: &WorldView) -> Result<Self> {
         let mut seen = Self::new(file, measured, view, 1)?;
         let is_image = file.loss.iter().any(|loss| loss.data == LossKind::Image);
