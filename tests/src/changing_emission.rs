@@ -73,6 +73,7 @@ const LEARNT: [&str; 8] = [
 ];
 
 #[test]
+#[ignore = "long"]
 fn exact_what_is_learnt_may_change_as_voxels_may() {
     let voxels = tempfile::tempdir().unwrap();
     let bound = 1.05 * fit(voxels.path(), &[])["nrmse_over_time"].as_f64().unwrap();
@@ -115,6 +116,7 @@ fn exact_held_out_frames_choose_the_price_of_a_network() {
 
 /// Draws around an unknown world in which emission changes: each has a world of its own.
 #[test]
+#[ignore = "long"]
 fn exact_worlds_are_drawn_where_emission_changes() {
     let folder = tempfile::tempdir().unwrap();
     let world = "world={inclination_deg={uniform=[40.0,80.0]},search={starts=1,drag_is_spin=false,\

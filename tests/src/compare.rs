@@ -1,6 +1,5 @@
 //! `kerrlight compare`: cases that are whole, cached, gone on with, or failed and named.
 
-use crate::static_sky;
 use crate::support::{cramped, fail, kerrlight, root, succeed};
 use serde_json::Value;
 use std::path::Path;
@@ -56,11 +55,11 @@ fn experiment(folder: &Path, changes: &[(&str, &str)]) {
     std::fs::write(folder.join("rates.toml"), text).unwrap();
 }
 
-fn results(folder: &Path) -> Value {
+pub(crate) fn results(folder: &Path) -> Value {
     serde_json::from_slice(&std::fs::read(folder.join("results.json")).unwrap()).unwrap()
 }
 
-fn cases(results: &Value) -> &Vec<Value> {
+pub(crate) fn cases(results: &Value) -> &Vec<Value> {
     results["cases"].as_array().unwrap()
 }
 
@@ -247,55 +246,6 @@ fn experiments_are_listed_and_mistakes_are_named() {
     assert!(fail(at, &["compare", "rates.toml", "--only", "rate=3"]).contains("levels of rate"));
 }
 
-/// Q and U of a night.
-const POLARIZED: &str = "ER6_SGRA_2017_097_hi_hops_netcal_LMTcal_10s_ALMArot_dtermcal.uvfits";
-
-/// What an experiment with public data has to be told; none, and says so, where the data are not there.
-fn on_public_data(name: &str) -> Option<Vec<String>> {
-    let file = match name {
-        "m87-2017" => "SR1_M87_2017_100_hi_hops_netcal_StokesI.uvfits",
-        "sgra-2017" | "sgra-2017-motion" => {
-            "ER6_SGRA_2017_097_hi_hops_netcal-LMTcal-besttime_StokesI.uvfits"
-        }
-        "sgra-2017-polarization" => POLARIZED,
-        "sgra-2017-polarimetry" => {
-            let path = static_sky::data(POLARIZED)?;
-            return Some(vec![
-                "--set".to_owned(),
-                format!("data.light-curve.path={}", path.display()),
-            ]);
-        }
-        _ => return Some(Vec::new()),
-    };
-    let path = static_sky::data(file)?;
-    Some(vec!["--set".to_owned(), format!("data.visibilities.path={}", path.display())])
-}
-
-/// A look at every experiment that the program carries: all cases are done, every table is filled, the page is whole.
-#[test]
-#[ignore = "long"]
-fn exact_quick_variants_of_all_experiments_run() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    let listed = succeed(at, &["compare"]);
-    let names = listed.lines().take_while(|line| !line.is_empty());
-    let names: Vec<&str> = names.filter_map(|line| line.split_whitespace().next()).collect();
-    assert!(names.len() >= 9, "{listed}");
-    for name in names {
-        let Some(set) = on_public_data(name) else { continue };
-        let words = ["compare", name, "--quick", "-o", name];
-        let words = words.into_iter().chain(set.iter().map(String::as_str));
-        let printed = succeed(at, &words.collect::<Vec<_>>());
-        assert!(printed.contains("| ") && !printed.contains("NaN"), "{name}: {printed}");
-        let results = results(&at.join(name));
-        assert!(cases(&results).iter().all(|case| case["status"] == "done"), "{name}");
-        let page = std::fs::read_to_string(at.join(name).join("report.html")).unwrap();
-        for word in ["What was asked", "What was run", "</html>"] {
-            assert!(page.contains(word), "{name}: {word}");
-        }
-    }
-}
-
 /// A quick look says that it is one, shows what ran and not what should have, and concludes nothing.
 #[test]
 fn exact_a_quick_look_claims_nothing() {
@@ -375,30 +325,46 @@ fn exact_draws_are_results_of_cases() {
 fn wrong_results_are_named_before_anything_runs() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let two = "[set]\nloss = [{ data = \"image\", weight = 1.0, sigma = 1.0 }, \
-               { data = \"light-curve\", weight = 1.0, sigma = 1.0 }]";
     let value = "value = \"psnr_db\"";
     for (changes, message) in [
         (vec![(value, "value = \"nosuch\"")], "value = \"nosuch\" is not allowed: psnr_db, "),
-        (
-            vec![
-                (value, "value = \"chi2\""),
-                ("[set]", two),
-                ("start = \"drawn\"", "start = \"drawn\", batch = { frames = 2 }"),
-            ],
-            "chi2 is one of several losses: take chi2.image or chi2.light-curve",
-        ),
         (vec![(value, "value = \"chi2.amplitudes\"")], "no loss has data = \"amplitudes\""),
     ] {
         experiment(at, &changes);
         let said = fail(at, &["compare", "rates.toml", "-o", "out"]);
         assert!(said.contains("table \"Quality\"") && said.contains(message), "{said}");
     }
-    // What --set has divided is shown divided.
+}
+
+/// Tables of χ² have a part for each kind of data where cases compare several, whatever has put them there.
+#[test]
+fn exact_chi2_of_several_kinds_of_data_has_tables_of_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let one = "{ data = \"image\", weight = 1.0, sigma = 1.0 }";
+    let two = format!("[{one}, {{ data = \"light-curve\", weight = 1.0, sigma = 1.0 }}]");
+    let rate = "name = \"rate\"\n        key = \"training.grid_rate\"\n        values = [0.1, 0.4]";
+    let levels = format!(
+        "name = \"rate\"\n[[factor.level]]\nname = \"one\"\nset.loss = [{one}]\n[[factor.level]]\nname = \"both\"\n\
+         set.loss = {two}"
+    );
+    let chi2 = ("value = \"psnr_db\"", "value = \"chi2\"");
     let batch = ("start = \"drawn\"", "start = \"drawn\", batch = { frames = 2 }");
-    experiment(at, &[(value, "value = \"chi2\""), batch]);
-    let set = two.replace("[set]\n", "").replace('\n', "");
-    succeed(at, &["compare", "rates.toml", "-o", "divided", "--set", &set]);
-    let tables = std::fs::read_to_string(at.join("divided/tables.md")).unwrap();
-    assert!(tables.contains("Quality: image") && tables.contains("Quality: light curve"));
+    let tables = |words: &[&str], name: &str| {
+        succeed(at, &[&["compare", "rates.toml", "--seeds", "1", "-o", name], words].concat());
+        std::fs::read_to_string(at.join(name).join("tables.md")).unwrap()
+    };
+    let is_divided =
+        |text: &str| text.contains("Quality: image") && text.contains("Quality: light curve");
+    experiment(at, &[chi2, batch]);
+    let set = format!("loss={two}");
+    let text = tables(&["--set", &set], "set");
+    assert!(is_divided(&text) && !text.contains("Quality: χ² per data point\n"), "{text}");
+    experiment(at, &[chi2, batch, (rate, &levels)]);
+    let text = tables(&[], "mixed");
+    assert!(is_divided(&text) && text.contains("Quality: χ² per data point\n"), "{text}");
+    let text = tables(&["--only", "rate=both"], "chosen");
+    assert!(is_divided(&text) && !text.contains("Quality: χ² per data point\n"), "{text}");
+    let text = tables(&["--only", "rate=one"], "other");
+    assert!(!is_divided(&text) && text.contains("Quality: χ² per data point\n"), "{text}");
 }

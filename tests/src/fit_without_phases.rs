@@ -62,6 +62,7 @@ fn exact_amplitudes_light_every_representation_and_claim_no_certificate() {
 
 /// They do not know the flux: it is given, and the volume has it.
 #[test]
+#[ignore = "long"]
 fn exact_closures_alone_take_the_flux_that_is_given() {
     let folder = tempfile::tempdir().unwrap();
     let sets = [CLOSURES, "representation=linear-grid"];

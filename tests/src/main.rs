@@ -34,6 +34,7 @@ mod lensing;
 mod mpirun;
 mod pictures;
 mod posterior;
+mod quick_looks;
 mod quiescent;
 mod radiative_transfer;
 mod readme;

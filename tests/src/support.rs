@@ -25,6 +25,11 @@ pub fn binary() -> &'static Path {
                 "kerrlight-python/extension",
             ]);
         }
+        if cfg!(feature = "beside-graphics") {
+            for package in ["kerrlight-geodesic", "kerrlight-tomo"] {
+                cargo.args(["--package", package, "--features", &format!("{package}/wgpu")]);
+            }
+        }
         if cfg!(feature = "zarr") {
             cargo.args(["--features", "kerrlight/zarr"]);
         }

@@ -111,7 +111,7 @@ impl Compare {
         let mut asked = self.asked(name, program)?;
         let folder = asked.folder.clone();
         let chosen = cases::expand(&asked.experiment, &asked.source, &asked.choice)?;
-        ran::split_chi2(&mut asked.experiment, &asked.choice.set, &chosen);
+        ran::split_chi2(&mut asked.experiment, &chosen);
         let Asked { experiment, choice, source, .. } = &asked;
         ran::check(experiment, &chosen).with_context(|| name.display().to_string())?;
         if let [first, ..] = &chosen[..]

@@ -7,6 +7,7 @@ use super::summary::{Summary, is_at};
 use crate::paths;
 use crate::report::Table;
 use anyhow::bail;
+use std::collections::BTreeSet;
 use std::path::Path;
 use toml::Value;
 
@@ -131,24 +132,32 @@ fn missing(settings: &toml::Table, value: &str) -> Option<String> {
     (!kinds().any(|kind| kind == name)).then(|| format!("no loss has data = {name:?}"))
 }
 
-/// Makes a table for each kind of data of one of χ², where `--set` has put several kinds in the place of one.
-pub fn split_chi2(experiment: &mut Experiment, set: &[String], cases: &[Case]) {
-    if !set.iter().any(|assignment| assignment.trim_start().starts_with("loss")) {
-        return;
-    }
-    let settings = cases.first().and_then(settings).unwrap_or_default();
+/// Kinds of data that a fit with these settings compares.
+fn kinds(settings: &toml::Table) -> Vec<String> {
     let losses = settings.get("loss").and_then(Value::as_array).into_iter().flatten();
-    let kinds: Vec<&str> = losses.filter_map(|loss| loss.get("data")?.as_str()).collect();
-    if kinds.len() < 2 {
+    losses.filter_map(|loss| loss.get("data")?.as_str()).map(str::to_owned).collect()
+}
+
+/// Makes a table for each kind of data beside one of χ², where cases compare several kinds: in its place, where all do.
+pub fn split_chi2(experiment: &mut Experiment, cases: &[Case]) {
+    if experiment.table.iter().all(|table| table.value != "chi2") {
         return;
     }
+    let all: Vec<Vec<String>> = cases.iter().filter_map(settings).map(|s| kinds(&s)).collect();
+    let several = all.iter().filter(|kinds| kinds.len() > 1);
+    let divided: BTreeSet<&String> = several.flatten().collect();
+    let is_whole = all.iter().any(|kinds| kinds.len() == 1);
     let each = |table: TableAsked| -> Vec<TableAsked> {
-        let of = |kind: &&str| TableAsked {
+        if table.value != "chi2" || divided.is_empty() {
+            return vec![table];
+        }
+        let of = |kind: &&String| TableAsked {
             title: format!("{}: {}", table.title, kind.replace('-', " ")),
             value: format!("{ONE_CHI2}{kind}"),
             ..table.clone()
         };
-        if table.value == "chi2" { kinds.iter().map(of).collect() } else { vec![table] }
+        let parts: Vec<TableAsked> = divided.iter().map(of).collect();
+        is_whole.then_some(table).into_iter().chain(parts).collect()
     };
     experiment.table = std::mem::take(&mut experiment.table).into_iter().flat_map(each).collect();
 }

@@ -40,24 +40,16 @@ impl Seen {
         Self::new(file, measured, view, 0)
     }
 
-    /// For steps between worlds that are much alike: their volumes are solved for nearly to the end. Visibilities are seen
-    /// through as many pixels as are asked for, were they more than those of the fit.
+    /// For steps between worlds that are much alike: their volumes are solved for nearly to the end.
     pub fn closely(file: &FitFile, measured: &Measured, view: &WorldView) -> Result<Self> {
-        let has_images = file.loss.iter().any(|loss| loss.data == LossKind::Image);
-        if has_images || view.pixels == file.screen.pixels {
-            return Self::new(file, measured, view, 1);
-        }
-        let frames = view.frames;
-        let view = CoarseView::sampled(file, measured, view.pixels)?;
-        Ok(Self { view, frames, rounds: 1, resampled: Vec::new() })
+        Self::exactly(file, measured, view, 0)
     }
 
     /// For a search among worlds that are much alike, whose volumes are solved for nearly to the end too; and the same
     /// through other pixels.
     pub fn finely(file: &FitFile, measured: &Measured, view: &WorldView) -> Result<Self> {
-        let mut seen = Self::new(file, measured, view, 1)?;
-        let is_image = file.loss.iter().any(|loss| loss.data == LossKind::Image);
-        if measured.pulse == Pulse::Delta && !is_image {
+        let mut seen = Self::exactly(file, measured, view, file.screen.pixels / 2)?;
+        if measured.pulse == Pulse::Delta && !has_images(file) {
             let pixels = seen.view.file.screen.pixels as f64;
             for share in RESAMPLED {
                 let pixels = (share * pixels).round() as usize;
@@ -66,6 +58,17 @@ impl Seen {
             }
         }
         Ok(seen)
+    }
+
+    /// Visibilities are seen through as many pixels as are asked for, were they more than those of the fit, with all nodes on
+    /// rays; through `few` pixels or fewer, and where there are images, as a coarse search sees them.
+    fn exactly(file: &FitFile, measured: &Measured, view: &WorldView, few: usize) -> Result<Self> {
+        let WorldView { pixels, frames, .. } = *view;
+        if has_images(file) || pixels == file.screen.pixels || pixels <= few {
+            return Self::new(file, measured, view, 1);
+        }
+        let view = CoarseView::sampled(file, measured, pixels)?;
+        Ok(Self { view, frames, rounds: 1, resampled: Vec::new() })
     }
 
     fn new(file: &FitFile, measured: &Measured, view: &WorldView, rounds: usize) -> Result<Self> {
@@ -165,6 +168,10 @@ impl Seen {
     pub fn is_images(&self) -> bool {
         self.view.file.loss.iter().all(|loss| loss.data == LossKind::Image)
     }
+}
+
+fn has_images(file: &FitFile) -> bool {
+    file.loss.iter().any(|loss| loss.data == LossKind::Image)
 }
 
 fn gaussian(prior: &PriorOfVoxels, voxels: &Voxels) -> Result<GaussianField> {

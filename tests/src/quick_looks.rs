@@ -1,0 +1,76 @@
+//! `kerrlight compare --quick` of every experiment that the program carries.
+
+use crate::compare::{cases, results};
+use crate::static_sky;
+use crate::support::succeed;
+
+/// Q and U of a night.
+const POLARIZED: &str = "ER6_SGRA_2017_097_hi_hops_netcal_LMTcal_10s_ALMArot_dtermcal.uvfits";
+
+/// What an experiment with public data has to be told; none, and says so, where the data are not there.
+fn on_public_data(name: &str) -> Option<Vec<String>> {
+    let file = match name {
+        "m87-2017" => "SR1_M87_2017_100_hi_hops_netcal_StokesI.uvfits",
+        "sgra-2017" | "sgra-2017-motion" => {
+            "ER6_SGRA_2017_097_hi_hops_netcal-LMTcal-besttime_StokesI.uvfits"
+        }
+        "sgra-2017-polarization" => POLARIZED,
+        "sgra-2017-polarimetry" => {
+            let path = static_sky::data(POLARIZED)?;
+            return Some(vec![
+                "--set".to_owned(),
+                format!("data.light-curve.path={}", path.display()),
+            ]);
+        }
+        _ => return Some(Vec::new()),
+    };
+    let path = static_sky::data(file)?;
+    Some(vec!["--set".to_owned(), format!("data.visibilities.path={}", path.display())])
+}
+
+/// Experiments of what the gate looks at: holes, flows and matter that are not known.
+const WORLDS: [&str; 3] = ["world", "soft-flow", "calibration"];
+
+#[test]
+#[ignore = "long"]
+fn exact_quick_variants_of_worlds_run() {
+    let all = experiments();
+    assert!(WORLDS.iter().all(|name| all.iter().any(|known| known == name)), "{all:?}");
+    quick_looks(WORLDS.map(str::to_owned).to_vec());
+}
+
+#[test]
+#[ignore = "long"]
+fn exact_quick_variants_of_all_other_experiments_run() {
+    let mut names = experiments();
+    names.retain(|name| !WORLDS.contains(&name.as_str()));
+    assert!(names.len() >= 9, "{names:?}");
+    quick_looks(names);
+}
+
+/// Names of the experiments that the program carries.
+fn experiments() -> Vec<String> {
+    let folder = tempfile::tempdir().unwrap();
+    let listed = succeed(folder.path(), &["compare"]);
+    let names = listed.lines().take_while(|line| !line.is_empty());
+    names.filter_map(|line| line.split_whitespace().next()).map(str::to_owned).collect()
+}
+
+/// A look at each of these experiments: all cases are done, every table is filled, the page is whole.
+fn quick_looks(names: Vec<String>) {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for name in &names {
+        let Some(set) = on_public_data(name) else { continue };
+        let words = ["compare", name, "--quick", "-o", name];
+        let words = words.into_iter().chain(set.iter().map(String::as_str));
+        let printed = succeed(at, &words.collect::<Vec<_>>());
+        assert!(printed.contains("| ") && !printed.contains("NaN"), "{name}: {printed}");
+        let results = results(&at.join(name));
+        assert!(cases(&results).iter().all(|case| case["status"] == "done"), "{name}");
+        let page = std::fs::read_to_string(at.join(name).join("report.html")).unwrap();
+        for word in ["What was asked", "What was run", "</html>"] {
+            assert!(page.contains(word), "{name}: {word}");
+        }
+    }
+}
