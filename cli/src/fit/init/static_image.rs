@@ -62,6 +62,7 @@ pub fn of_visibilities(
         ("thin", scaled(0.16)),
         ("least", scaled(0.04)),
         ("most", scaled(0.36)),
+        ("average", average(source).to_owned()),
         ("extra", extra.join("\n")),
         ("losses", losses.trim_end().to_owned()),
         ("gains", gains(observation)),
@@ -71,6 +72,12 @@ pub fn of_visibilities(
         ("path", path.to_owned()),
     ];
     complete(include_str!("image.toml"), &fields)
+}
+
+/// Seconds of an average. The longer they are, the fewer closure quantities are left; a source that varies asks for frames in
+/// which all baselines see the same.
+fn average(source: Option<&Source>) -> &'static str {
+    if source.is_some_and(|source| !source.varies) { "60.0" } else { "300.0" }
 }
 
 /// Amplitudes, and closure quantities where there are any.

@@ -242,7 +242,8 @@ impl Found<'_> {
     /// The verdict and the ring in a line.
     fn worth(&self) -> String {
         let polarized = self.polarized.as_ref().map(Polarized::sentence);
-        let all = words::ring(&self.survey).into_iter().chain(polarized);
+        let draws = words::draws(&self.survey, &self.file.loss);
+        let all = draws.into_iter().chain(words::ring(&self.survey)).chain(polarized);
         self.judged.worth() + &all.map(|sentence| format!("\n{sentence}")).collect::<String>()
     }
 }

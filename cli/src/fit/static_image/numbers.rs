@@ -36,6 +36,20 @@ pub fn with_error(value: f64, error: Option<f64>, digits: usize) -> String {
     }
 }
 
+/// χ² per datum of fits of the image with other noise, kind by kind: mean and standard deviation; empty with less than two of
+/// them.
+pub fn chi2_of_draws(survey: &Survey) -> Vec<[f64; 2]> {
+    let draws = &survey.draws;
+    let count = draws.len() as f64;
+    let of = |kind: usize| {
+        let mean = draws.iter().map(|draw| draw.chi2[kind]).sum::<f64>() / count;
+        let square = draws.iter().map(|draw| (draw.chi2[kind] - mean).powi(2)).sum::<f64>();
+        [mean, (square / (count - 1.0)).sqrt()]
+    };
+    let kinds = if draws.len() < 2 { 0 } else { survey.found().chi2.len() };
+    (0..kinds).map(of).collect()
+}
+
 fn candidate(image: &Candidate) -> Value {
     json!({
         "start": image.start + 1,
@@ -56,6 +70,11 @@ impl Found<'_> {
         let kinds = self.file.loss.iter().map(|loss| super::name(loss.data));
         let chi2: Map<String, Value> =
             kinds.zip(&found.chi2).map(|(name, chi2)| (name.to_owned(), json!(chi2))).collect();
+        let drawn = |[mean, deviation]: [f64; 2]| json!({"mean": mean, "deviation": deviation});
+        let of_draws: Map<String, Value> = (self.file.loss.iter())
+            .zip(chi2_of_draws(&self.survey))
+            .map(|(loss, chi2)| (super::name(loss.data).to_owned(), drawn(chi2)))
+            .collect();
         let beside: Map<String, Value> =
             self.beside.iter().map(|(name, chi2)| ((*name).to_owned(), json!(chi2))).collect();
         let all = |images: &[Candidate]| images.iter().map(candidate).collect::<Vec<_>>();
@@ -69,6 +88,7 @@ impl Found<'_> {
             "loss": found.solution.loss,
             "chi2_per_datum": chi2,
             "chi2_not_fitted": beside,
+            "chi2_of_draws": of_draws,
             "inputs": self.folder.inputs().files,
             "verdict": self.judged.json(),
             "flux_jy": found.solution.image.iter().sum::<f64>(),

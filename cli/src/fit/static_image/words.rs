@@ -1,11 +1,11 @@
 //! What is said of a static image: data, model, priors, and what may be concluded.
 
 use super::Found;
-use super::numbers::{RING, error, with_error};
+use super::numbers::{RING, chi2_of_draws, error, with_error};
 use super::polarized::Polarized;
 use crate::fit::results::medium;
 use crate::report::Part;
-use kerrlight_tomo::fit::settings::StartImage;
+use kerrlight_tomo::fit::settings::{Loss, StartImage};
 use kerrlight_tomo::fit::static_image::Survey;
 
 /// The ring in a sentence.
@@ -19,6 +19,18 @@ pub fn ring(survey: &Survey) -> Option<String> {
         with_error(width.0, width.1, 1),
         with_error(angle.0, angle.1, 0)
     ))
+}
+
+/// What fits of the image with other noise leave: an image and gains take up a part of the noise of the data.
+pub fn draws(survey: &Survey, losses: &[Loss]) -> Option<String> {
+    let kinds = losses.iter().zip(chi2_of_draws(survey));
+    let kinds: Vec<String> = kinds
+        .map(|(loss, [mean, deviation])| {
+            format!("{mean:.2} ± {deviation:.2} for {}", super::name(loss.data))
+        })
+        .collect();
+    (!kinds.is_empty())
+        .then(|| format!("Fits of this image with other noise have χ² {}.", kinds.join(", ")))
 }
 
 impl Found<'_> {

@@ -127,7 +127,7 @@ pub fn survey(
     let frames: Vec<usize> = (0..measured.times.len()).collect();
     let middle = file.strength.as_ref().map_or(1.0, |s| s.values[s.values.len() / 2]);
     let Some(starts) = search.starts(middle, &frames) else { return Ok(None) };
-    let Some(held) = search.hold_out(least(&starts), &frames) else { return Ok(None) };
+    let Some(held) = search.hold_out(least(&starts), &measured.times) else { return Ok(None) };
     let allowed = allowed(&held);
     let strength = best_held(&held).map_or(1.0, |best| best.value);
     let starts = match strength == middle {
@@ -170,6 +170,27 @@ pub(super) fn held(
         cases.par_iter().map(|(value, fold)| loss(*value, *fold)).collect::<Option<_>>()?;
     let each = values.iter().zip(losses.chunks(*folds));
     Some(each.map(|(value, losses)| Held { value: *value, losses: losses.to_vec() }).collect())
+}
+
+/// Distance of frames over the least one, from which on there is a gap between scans.
+const GAP: f64 = 1.5;
+
+/// The part that each frame is held out with. Frames of a scan see the sky through nearly the same baselines, and would tell
+/// the fit what it is to predict: scans are held out whole, where there are two of them for each part.
+fn parts(times: &[f64], folds: usize) -> Vec<usize> {
+    let apart = times.windows(2).map(|pair| pair[1] - pair[0]);
+    let least = apart.clone().fold(f64::INFINITY, f64::min);
+    let mut scan = 0;
+    let begins = apart.map(|apart| usize::from(apart > GAP * least));
+    let scans: Vec<usize> = std::iter::once(0)
+        .chain(begins)
+        .map(|next| {
+            scan += next;
+            scan
+        })
+        .collect();
+    let of = |frame: usize| if scan + 1 >= 2 * folds { scans[frame] } else { frame };
+    (0..times.len()).map(|frame| of(frame) % folds).collect()
 }
 
 struct Search<'a> {
@@ -232,11 +253,12 @@ impl Search<'_> {
     }
 
     /// The loss of frames that were not fitted, for each strength; nothing where one is given.
-    fn hold_out(&self, start: usize, frames: &[usize]) -> Option<Vec<Held>> {
+    fn hold_out(&self, start: usize, times: &[f64]) -> Option<Vec<Held>> {
         let Some(settings) = &self.file.strength else { return Some(Vec::new()) };
         let folds = settings.folds;
+        let parts = parts(times, folds);
         let part = |fold: usize, seen: bool| -> Vec<usize> {
-            frames.iter().copied().filter(|frame| (frame % folds != fold) == seen).collect()
+            (0..times.len()).filter(|frame| (parts[*frame] != fold) == seen).collect()
         };
         held(settings, |strength, fold| {
             let found =
@@ -274,5 +296,18 @@ impl Search<'_> {
         let all: Result<Vec<Option<Candidate>>, Error> =
             (0..draws).into_par_iter().map(one).collect();
         Ok(all?.into_iter().collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exact_scans_are_held_out_whole() {
+        let times = [0.0, 1.0, 2.0, 9.0, 10.0, 20.0, 21.0, 30.0];
+        assert_eq!(parts(&times, 2), [0, 0, 0, 1, 1, 0, 0, 1]);
+        assert_eq!(parts(&times, 3), [0, 1, 2, 0, 1, 2, 0, 1], "too few scans: frame by frame");
+        assert_eq!(parts(&[0.0, 5.0, 10.0, 15.0], 2), [0, 1, 0, 1], "frames without a gap");
     }
 }
