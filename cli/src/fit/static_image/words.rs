@@ -134,6 +134,7 @@ impl Found<'_> {
 
     fn concluded(&self) -> Vec<String> {
         let mut text = vec![self.judged.headline()];
+        text.extend(draws(&self.survey, &self.file.loss));
         for (name, chi2) in &self.beside {
             text.push(format!("χ² {chi2:.2} per data point of {name}, which were not fitted."));
         }
