@@ -113,29 +113,28 @@ pub fn table(summary: &Summary) -> Table {
     }
 }
 
-/// Why a fit with these settings has no such result.
-fn missing(settings: &toml::Table, value: &str) -> Option<String> {
-    let losses = settings.get("loss").and_then(Value::as_array);
+/// Kinds of data that a fit with these settings compares.
+fn kinds(settings: &toml::Table) -> Vec<String> {
+    let losses = settings.get("loss").and_then(Value::as_array).into_iter().flatten();
     // The polarisation of a static image has no loss among those of total intensity.
     let of_image = settings.get("image").and(settings.get("polarization"));
-    let all = || losses.into_iter().flatten().chain(of_image);
-    let kinds = || all().filter_map(|loss| loss.get("data")?.as_str());
+    let all = losses.chain(of_image).filter_map(|loss| loss.get("data")?.as_str());
+    all.map(str::to_owned).collect()
+}
+
+/// Why a fit with these settings has no such result.
+fn missing(settings: &toml::Table, value: &str) -> Option<String> {
+    let kinds = kinds(settings);
     let is_beside_truth = QUALITIES.contains(&value) || value == "nrmse";
     if is_beside_truth && !settings.contains_key("truth") {
         return Some(format!("{value} needs a truth, and data are measured"));
     }
-    if value == "chi2" && kinds().count() > 1 {
-        let all: Vec<String> = kinds().map(|kind| format!("{ONE_CHI2}{kind}")).collect();
+    if value == "chi2" && kinds.len() > 1 {
+        let all: Vec<String> = kinds.iter().map(|kind| format!("{ONE_CHI2}{kind}")).collect();
         return Some(format!("chi2 is one of several losses: take {}", all.join(" or ")));
     }
     let name = value.strip_prefix(ONE_CHI2)?;
-    (!kinds().any(|kind| kind == name)).then(|| format!("no loss has data = {name:?}"))
-}
-
-/// Kinds of data that a fit with these settings compares.
-fn kinds(settings: &toml::Table) -> Vec<String> {
-    let losses = settings.get("loss").and_then(Value::as_array).into_iter().flatten();
-    losses.filter_map(|loss| loss.get("data")?.as_str()).map(str::to_owned).collect()
+    (!kinds.iter().any(|kind| kind == name)).then(|| format!("no loss has data = {name:?}"))
 }
 
 /// Makes a table for each kind of data beside one of χ², where cases compare several kinds: in its place, where all do.

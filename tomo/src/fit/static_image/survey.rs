@@ -178,18 +178,14 @@ const GAP: f64 = 1.5;
 /// The part that each frame is held out with. Frames of a scan see the sky through nearly the same baselines, and would tell
 /// the fit what it is to predict: scans are held out whole, where there are two of them for each part.
 fn parts(times: &[f64], folds: usize) -> Vec<usize> {
-    let apart = times.windows(2).map(|pair| pair[1] - pair[0]);
-    let least = apart.clone().fold(f64::INFINITY, f64::min);
-    let mut scan = 0;
-    let begins = apart.map(|apart| usize::from(apart > GAP * least));
-    let scans: Vec<usize> = std::iter::once(0)
-        .chain(begins)
-        .map(|next| {
-            scan += next;
-            scan
-        })
-        .collect();
-    let of = |frame: usize| if scan + 1 >= 2 * folds { scans[frame] } else { frame };
+    let apart: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let least = apart.iter().copied().fold(f64::INFINITY, f64::min);
+    let mut scans = vec![0; times.len()];
+    for (frame, apart) in apart.iter().enumerate() {
+        scans[frame + 1] = scans[frame] + usize::from(*apart > GAP * least);
+    }
+    let count = scans.last().map_or(0, |last| last + 1);
+    let of = |frame: usize| if count >= 2 * folds { scans[frame] } else { frame };
     (0..times.len()).map(|frame| of(frame) % folds).collect()
 }
 
