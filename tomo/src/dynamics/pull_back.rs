@@ -129,13 +129,25 @@ fn cross<T: Float, V: Lanes<T>>(a: [V; 3], b: [V; 3]) -> [V; 3] {
 fn rotate<T: Float, V: Lanes<T>>(axis: [V; 3], sin: V, cos: V, x: [V; 3]) -> [V; 3] {
     let along = (V::splat(T::one()) - cos) * dot(axis, x);
     let swirl = cross(axis, x);
-    core::array::from_fn(|k| cos.mul_add(x[k], sin.mul_add(swirl[k], along * axis[k])))
+    let mut rotated = [along; 3];
+    for k in 0..3 {
+        rotated[k] = cos.mul_add(x[k], sin.mul_add(swirl[k], along * axis[k]));
+    }
+    rotated
 }
 
 #[inline(always)]
 fn load<T: Float, V: Lanes<T>>(points: &Coordinates<'_, T>, from: usize) -> [V; 3] {
-    let columns = points.columns();
-    core::array::from_fn(|k| V::load_or(&columns[k][from..], T::zero()))
+    let mut lanes = [V::splat(T::zero()); 3];
+    for (lanes, column) in lanes.iter_mut().zip(points.columns()) {
+        *lanes = V::load_or(&column[from..], T::zero());
+    }
+    lanes
+}
+
+#[inline(always)]
+fn splat<T: Float, V: Lanes<T>>(x: [T; 3]) -> [V; 3] {
+    [V::splat(x[0]), V::splat(x[1]), V::splat(x[2])]
 }
 
 struct Forward<'a, T> {
@@ -148,7 +160,7 @@ impl<T: Float> Task<T> for Forward<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<T>>(mut self) {
-        let axis = self.axis.map(V::splat);
+        let axis: [V; 3] = splat(self.axis);
         for (k, angles) in self.turned.angles.chunks(V::LANES).enumerate() {
             let from = k * V::LANES;
             let (sin, cos) = math::sin_cos(V::load_or(angles, T::zero()));
@@ -171,7 +183,7 @@ impl<T: Float> Task<T> for Backward<'_, T> {
     type Output = [f64; 3];
     #[inline(always)]
     fn run<V: Lanes<T>>(mut self) -> [f64; 3] {
-        let (axis, zero, one) = (self.axis.map(V::splat), V::splat(T::zero()), V::splat(T::one()));
+        let (axis, zero, one) = (splat(self.axis), V::splat(T::zero()), V::splat(T::one()));
         let mut sum = [0.0; 3];
         for (k, angles) in self.turned.angles.chunks(V::LANES).enumerate() {
             let from = k * V::LANES;

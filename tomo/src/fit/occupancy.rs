@@ -50,6 +50,7 @@ impl Occupancy {
     }
 
     /// Whether a point lies in a cell that may shine; none does outside the cube.
+    #[inline]
     pub fn holds(&self, point: [f64; 3]) -> bool {
         let n = self.settings.cells;
         let per_length = n as f64 / (2.0 * self.half_width);

@@ -10,7 +10,11 @@ use super::{Lanes, MAX_LANES};
 #[inline(always)]
 fn polynomial<T: Float, V: Lanes<T>>(c: &[T], x: V) -> V {
     let Some((last, rest)) = c.split_last() else { return V::splat(T::zero()) };
-    rest.iter().rev().fold(V::splat(*last), |sum, c| sum.mul_add(x, V::splat(*c)))
+    let mut sum = V::splat(*last);
+    for c in rest.iter().rev() {
+        sum = sum.mul_add(x, V::splat(*c));
+    }
+    sum
 }
 
 /// The nearest integer, for |x| below 2^22 (f32), 2^51 (f64).
@@ -33,7 +37,10 @@ fn near_sin_cos<T: Float, V: Lanes<T>>(x: V) -> (V, V) {
     let far = s(T::FAR);
     let x = far.min(s(-T::FAR).max(x));
     let quarter = round(x * s(T::TWO_OVER_PI));
-    let r = T::HALF_PI.iter().fold(x, |r, piece| quarter.mul_add(s(-*piece), r));
+    let mut r = x;
+    for piece in T::HALF_PI {
+        r = quarter.mul_add(s(-piece), r);
+    }
     let z = r * r;
     let sin = (polynomial(T::SIN, z) * z).mul_add(r, r);
     let cos = (z * z).mul_add(polynomial(T::COS, z), z.mul_add(s(T::of(-0.5)), s(T::one())));
@@ -79,7 +86,10 @@ pub fn exp<T: Float, V: Lanes<T>>(x: V) -> V {
     let s = V::splat;
     let x = s(T::HELD).min(s(-T::HELD).max(x)); // a NaN stays one
     let n = round(x * s(T::LOG2_E));
-    let r = T::LN_2.iter().fold(x, |r, piece| n.mul_add(s(-*piece), r));
+    let mut r = x;
+    for piece in T::LN_2 {
+        r = n.mul_add(s(-piece), r);
+    }
     let e = (r * r).mul_add(polynomial(T::EXP, r), r) + s(T::one());
     e * V::two_to_the(n)
 }

@@ -26,6 +26,9 @@
 //! assert_eq!(dispatch(InstructionSet::best(), Norm(&[3.0, 4.0])), 5.0);
 //! ```
 //!
+//! Kernels and what they call are `#[inline(always)]`, and they loop: a closure given to `map`, `fold` or
+//! `from_fn` is a function of its own, compiled without the instruction set, where each intrinsic is a call.
+//!
 //! # Soundness
 //! The register types of x86-64 have no name outside this module. Code meets them only as the type
 //! parameter of [`Task::run`], which [`dispatch`] calls after it has found the instruction set: the

@@ -34,14 +34,19 @@ impl<'a, T: Float> Network<'a, T> {
     /// Rectified units of a layer.
     #[inline(always)]
     fn layer<V: Lanes<T>>(weights: &[T], biases: &[T], inputs: &[V]) -> [V; WIDTH] {
-        let mut units: [V; WIDTH] = core::array::from_fn(|h| V::splat(biases[h]));
+        let mut units = [V::splat(T::zero()); WIDTH];
+        for (unit, bias) in units.iter_mut().zip(biases) {
+            *unit = V::splat(*bias);
+        }
         for (input, row) in inputs.iter().zip(weights.chunks_exact(WIDTH)) {
             for (unit, weight) in units.iter_mut().zip(row) {
                 *unit = V::splat(*weight).mul_add(*input, *unit);
             }
         }
-        // In this order a NaN stays one.
-        units.map(|unit| V::splat(T::zero()).max(unit))
+        for unit in &mut units {
+            *unit = V::splat(T::zero()).max(*unit); // in this order a NaN stays one
+        }
+        units
     }
 
     #[inline(always)]
@@ -95,7 +100,9 @@ impl<V: Copy> Sums<V> {
         let first = self.first[..inputs].iter().flatten().chain(&self.first_biases);
         let second = self.second.iter().flatten().chain(&self.second_biases);
         let all = first.chain(second).chain(&self.last).chain([&self.last_bias]);
-        out.iter_mut().zip(all).for_each(|(out, lanes)| *out = lanes.sum());
+        for (out, lanes) in out.iter_mut().zip(all) {
+            *out = lanes.sum();
+        }
     }
 
     /// Adds a gradient of the output; returns that of the inputs.
@@ -207,7 +214,9 @@ impl<T: Float> Task<T> for Forward<'_, T> {
                 let kept = kept[from * self.layout.kept()..].chunks_exact_mut(V::LANES);
                 let slope = keep_inside(inside, slope);
                 let all = inputs.iter().chain(&units.first).chain(&units.second).chain([&slope]);
-                kept.zip(all).for_each(|(kept, lanes)| lanes.store(kept));
+                for (kept, lanes) in kept.zip(all) {
+                    lanes.store(kept);
+                }
             }
         }
     }
@@ -240,14 +249,15 @@ impl<T: Float> Task<T> for Backward<'_, T> {
         let mut sums = Sums::new(zero);
         for (k, out) in self.slopes.chunks_mut(V::LANES * count).enumerate() {
             let from = k * V::LANES;
-            let mut kept = self.kept[from * self.layout.kept()..]
-                .chunks_exact(V::LANES)
-                .map(|lanes| V::load_or(lanes, T::zero()));
-            let mut next = || kept.next().unwrap_or(zero);
+            let mut kept = self.kept[from * self.layout.kept()..].chunks_exact(V::LANES);
             let mut inputs = [zero; MAX_INPUTS];
-            inputs[..count].fill_with(&mut next);
-            let units = [(); 2].map(|()| [(); WIDTH].map(|()| next()));
-            let slope = V::load_or(&self.cotangents[from..], T::zero()) * next();
+            let mut units = [[zero; WIDTH]; 2];
+            let mut slope = zero;
+            let all = inputs[..count].iter_mut().chain(units.as_flattened_mut()).chain([&mut slope]);
+            for (lanes, kept) in all.zip(&mut kept) {
+                *lanes = V::load_or(kept, T::zero());
+            }
+            let slope = V::load_or(&self.cotangents[from..], T::zero()) * slope;
             let slopes = sums.backward(&network, &inputs[..count], &units, slope);
             let mut lanes = [T::zero(); MAX_LANES];
             for (input, slopes) in slopes.iter().take(count).enumerate() {

@@ -95,7 +95,11 @@ impl<T: Float> Geometry<T> {
                 numbers[2 * k + 1][lane] = pair[1];
             }
         }
-        numbers.map(|lanes| V::load_or(&lanes, T::zero()))
+        let mut corners = [V::splat(T::zero()); 8];
+        for (corner, lanes) in corners.iter_mut().zip(&numbers) {
+            *corner = V::load_or(lanes, T::zero());
+        }
+        corners
     }
 }
 
@@ -108,13 +112,17 @@ fn between<T: Float, V: Lanes<T>>(from: V, to: V, part: V) -> V {
 #[inline(always)]
 pub fn interpolate<T: Float, V: Lanes<T>>(c: &[V; 8], within: &[V; 3]) -> (V, [V; 3]) {
     let [x, y, z] = *within;
-    let along_z: [V; 4] = core::array::from_fn(|k| between(c[2 * k], c[2 * k + 1], z));
+    let mut along_z = [z; 4];
+    let mut of_z = [z; 4];
+    for k in 0..4 {
+        along_z[k] = between(c[2 * k], c[2 * k + 1], z);
+        of_z[k] = c[2 * k + 1] - c[2 * k];
+    }
     let along_y = [between(along_z[0], along_z[1], y), between(along_z[2], along_z[3], y)];
     let value = between(along_y[0], along_y[1], x);
     let of_x = along_y[1] - along_y[0];
     let of_y = between(along_z[1] - along_z[0], along_z[3] - along_z[2], x);
-    let step = |k: usize| c[2 * k + 1] - c[2 * k];
-    let of_z = between(between(step(0), step(1), y), between(step(2), step(3), y), x);
+    let of_z = between(between(of_z[0], of_z[1], y), between(of_z[2], of_z[3], y), x);
     (value, [of_x, of_y, of_z])
 }
 
