@@ -5,9 +5,12 @@ use crate::columns;
 use crate::interferometry::{self, ObservationFile, Written};
 use crate::interferometry::{arguments, traces};
 use crate::output::{self, Output};
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use clap::Args;
-use kerrlight_tomo::interferometry::files;
+use kerrlight_tomo::Error;
+use kerrlight_tomo::interferometry::array::Station;
+use kerrlight_tomo::interferometry::files::{self, FileError};
+use kerrlight_tomo::interferometry::gains::is_same_station;
 use kerrlight_tomo::interferometry::light_curve::LightCurve;
 use kerrlight_tomo::interferometry::observation::{Basis, Flags, Observation};
 use kerrlight_tomo::interferometry::source::Source;
@@ -140,7 +143,7 @@ impl Convert {
                 self.input.display()
             );
         }
-        output.write(&observation)?;
+        output.write(&observation).map_err(told)?;
         let (rows, flagged) = (observation.rows.len(), selection.dropped);
         eprintln!("{rows} rows, {flagged} flagged");
         Ok(output.answer().with("rows", rows).with("flagged", flagged))
@@ -271,12 +274,27 @@ impl Convert {
         let Some(array) = &self.array else { return Ok(()) };
         let array = arguments::array_of(array)?;
         for station in observation.stations.iter_mut().filter(|s| s.position.is_none()) {
-            let known = array.stations.iter().find(|known| known.name == station.name);
-            if let Some(known) = known {
-                station.clone_from(known);
+            let same = |known: &&Station| is_same_station(&known.name, &station.name);
+            if let Some(known) = array.stations.iter().find(same) {
+                *station = Station { name: station.name.clone(), ..known.clone() };
             }
         }
+        let lost = observation.stations.iter().filter(|station| station.position.is_none());
+        let lost: Vec<&str> = lost.map(|station| station.name.as_str()).collect();
+        if !lost.is_empty() {
+            bail!("--array has no station {}", lost.join(", "));
+        }
         Ok(())
+    }
+}
+
+/// An error, with the options that give what the data lack where that is the error.
+fn told(error: anyhow::Error) -> anyhow::Error {
+    match error.downcast_ref() {
+        Some(Error::Unknown(_) | Error::File(FileError::Unknown(_))) => {
+            anyhow!("{error:#} with --source, --array, --mjd, --frequency or --bandwidth")
+        }
+        _ => error,
     }
 }
 

@@ -4,15 +4,23 @@ use super::NumpyError;
 use crate::Error;
 use crate::memory;
 use npyz::WriterBuilder;
-use std::io::Read;
+use std::io::{Chain, Cursor, Read};
+
+/// Brackets of a header: types of fields within fields. Its parser takes twice as long for each more.
+const MOST_BRACKETS: usize = 8;
+
+/// Bytes of a header that are looked at.
+const LONGEST: u64 = 1 << 20;
+
+/// The bytes of an array, of which the header was looked at.
+type Headed<R> = Chain<Cursor<Vec<u8>>, R>;
 
 /// Shape of an array of numbers of any type, and its numbers in C's order.
 ///
 /// # Errors
 /// If the bytes are no array of numbers, or fewer than its shape says.
 pub fn read_array(bytes: &[u8]) -> Result<(Vec<u64>, Vec<f64>), Error> {
-    let not = |error| NumpyError::content(format!("not an npy file: {error}"));
-    let file = npyz::NpyFile::new(bytes).map_err(not)?;
+    let file = open(bytes)?;
     let in_fortran = file.order() == npyz::Order::Fortran;
     let shape = file.shape().to_vec();
     let count = shape.iter().try_fold(1u64, |product, n| product.checked_mul(*n));
@@ -26,6 +34,28 @@ pub fn read_array(bytes: &[u8]) -> Result<(Vec<u64>, Vec<f64>), Error> {
     let values = numbers(file)?;
     let values = if in_fortran { in_c_order(&shape, &values) } else { values };
     Ok((shape, values))
+}
+
+fn open<R: Read>(mut bytes: R) -> Result<npyz::NpyFile<Headed<R>>, NumpyError> {
+    let not = |error| NumpyError::content(format!("not an npy file: {error}"));
+    let mut header = Vec::new();
+    // The length of the header is behind the name of the format and its version, in two bytes of the first and four of others.
+    bytes.by_ref().take(12).read_to_end(&mut header).map_err(not)?;
+    let rest = match *header.as_slice() {
+        [_, _, _, _, _, _, 1, _, a, b, ..] => {
+            u64::from(u16::from_le_bytes([a, b])).saturating_sub(2)
+        }
+        [_, _, _, _, _, _, _, _, a, b, c, d] => u64::from(u32::from_le_bytes([a, b, c, d])),
+        _ => 0,
+    };
+    bytes.by_ref().take(rest.min(LONGEST)).read_to_end(&mut header).map_err(not)?;
+    let brackets = header.iter().skip(10).filter(|byte| **byte == b'[').count();
+    if brackets > MOST_BRACKETS {
+        let message =
+            format!("a header with {brackets} brackets is not read: at most {MOST_BRACKETS}");
+        return Err(NumpyError::content(message));
+    }
+    npyz::NpyFile::new(Cursor::new(header).chain(bytes)).map_err(not)
 }
 
 /// Values whose first index runs fastest, with the last running fastest.
@@ -48,7 +78,7 @@ fn in_c_order(shape: &[u64], values: &[f64]) -> Vec<f64> {
 }
 
 /// The values of an array of any number type that does not depend on the machine.
-fn numbers(file: npyz::NpyFile<&[u8]>) -> Result<Vec<f64>, NumpyError> {
+fn numbers(file: npyz::NpyFile<impl Read>) -> Result<Vec<f64>, NumpyError> {
     let mut all = Vec::with_capacity(file.len() as usize);
     each_number(file, &mut |x| {
         all.push(x);
@@ -59,7 +89,7 @@ fn numbers(file: npyz::NpyFile<&[u8]>) -> Result<Vec<f64>, NumpyError> {
 }
 
 /// An array that is read number by number.
-pub struct Stream<R: Read>(npyz::NpyFile<R>);
+pub struct Stream<R: Read>(npyz::NpyFile<Headed<R>>);
 
 impl<R: Read> Stream<R> {
     /// The array that these bytes are the beginning of.
@@ -67,8 +97,7 @@ impl<R: Read> Stream<R> {
     /// # Errors
     /// If they are none, or its last index does not run fastest.
     pub fn new(bytes: R) -> Result<Self, Error> {
-        let not = |error| NumpyError::content(format!("not an npy file: {error}"));
-        let file = npyz::NpyFile::new(bytes).map_err(not)?;
+        let file = open(bytes)?;
         if file.order() == npyz::Order::Fortran && file.shape().len() > 1 {
             let message = "is in Fortran's order: C's order is expected of arrays that are larger than memory";
             return Err(NumpyError::content(message).into());
@@ -163,6 +192,18 @@ pub fn write_array<T: npyz::AutoSerialize>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A header of 200 brackets would take the parser longer than anybody waits.
+    #[test]
+    fn exact_nested_headers_are_errors() {
+        let text = format!("{{'descr': {}", "[".repeat(200));
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend((text.len() as u16).to_le_bytes());
+        bytes.extend(text.as_bytes());
+        let error = read_array(&bytes).unwrap_err().to_string();
+        assert!(error.contains("200 brackets"), "{error}");
+        assert!(Stream::new(bytes.as_slice()).is_err());
+    }
 
     /// An array and its transpose in the other order are the same bytes of numbers.
     #[test]

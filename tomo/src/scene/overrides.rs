@@ -6,6 +6,9 @@ use crate::Error;
 use crate::toml_file::ReadError;
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, Value};
 
+/// Most keys of a path: no table lies deeper, and each is a step of a recursion.
+const MOST_KEYS: usize = 32;
+
 /// The scene text with `key.path=value` applied, e.g. `hole.spin=0.5`,
 /// `spot.0.phase_deg=90`. A value that is no TOML is taken as a string; an empty one removes
 /// the key; `{a=1, b={c=2}}` takes the place of a whole table, and so does a string. The element after the last one of a
@@ -22,6 +25,11 @@ pub fn apply_override(text: &str, assignment: &str) -> Result<String, Error> {
     let keys: Vec<&str> = path.trim().split('.').map(str::trim).collect();
     if keys.iter().any(|key| key.is_empty()) {
         return Err(fail("has an empty key".to_owned()).into());
+    }
+    if keys.len() > MOST_KEYS {
+        return Err(
+            fail(format!("has {} keys: at most {MOST_KEYS} are allowed", keys.len())).into()
+        );
     }
     let mut document: DocumentMut = text
         .parse()

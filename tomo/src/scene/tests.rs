@@ -120,6 +120,9 @@ fn redshift_needs_a_spectral_index() {
 
 #[test]
 fn overrides_change_the_text() {
+    let deep = format!("{}=1", vec!["a"; 50_000].join("."));
+    let error = apply_override(SCENE, &deep).unwrap_err().to_string();
+    assert!(error.contains("50000 keys: at most 32"), "{}", error.len());
     let text = apply_override(SCENE, "hole.spin = -0.5").unwrap();
     let text = apply_override(&text, "spot.1.phase_deg=90").unwrap();
     let text = apply_override(&text, "sky.checker.field_deg=15").unwrap();

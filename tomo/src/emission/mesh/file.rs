@@ -57,15 +57,23 @@ pub struct MeshFile {
 const MOST_TRIANGLES: usize = 10_000_000;
 
 impl MeshFile {
+    /// Refuses so many triangles more than it has.
+    pub(super) fn affords(&self, more: usize) -> Result<(), MeshError> {
+        match self.triangles.len() + more > MOST_TRIANGLES {
+            true => {
+                Err(MeshError::Content(format!("it holds more than {MOST_TRIANGLES} triangles")))
+            }
+            false => Ok(()),
+        }
+    }
+
     /// Whether its numbers make triangles and colours.
     pub(super) fn check(&self) -> Result<(), MeshError> {
         let fail = |why: String| Err(MeshError::Content(why));
         if self.triangles.is_empty() {
             return fail("it holds no triangles".to_owned());
         }
-        if self.triangles.len() > MOST_TRIANGLES {
-            return fail(format!("it holds more than {MOST_TRIANGLES} triangles"));
-        }
+        self.affords(0)?;
         let broken = |t: &RawTriangle| {
             let corners = t.corners.iter().flatten().all(|x| x.is_finite());
             !corners || !t.texture.iter().flatten().all(|x| x.is_finite())

@@ -1,10 +1,9 @@
 //! glTF 2.0, as text or binary. Node transforms are applied; skins, morph targets and animations
 //! are not.
 
-use super::MeshError;
 use super::file::{Layer, Material, MeshFile, RawTriangle, Resources, resource};
 use super::texture::Texture;
-use crate::memory;
+use super::{MeshError, gltf_checks};
 use gltf::mesh::Mode;
 
 type Matrix = [[f64; 4]; 4];
@@ -27,7 +26,7 @@ pub(super) fn decode(bytes: &[u8], resources: &Resources<'_>) -> Result<MeshFile
             Ok(bytes)
         })
         .collect::<Result<Vec<_>, MeshError>>()?;
-    check_views(&document, &buffers)?;
+    gltf_checks::check(&document, &buffers)?;
     let materials = document
         .materials()
         .map(|m| material(&m, &buffers, resources))
@@ -37,8 +36,16 @@ pub(super) fn decode(bytes: &[u8], resources: &Resources<'_>) -> Result<MeshFile
     let Some(scene) = scene else {
         return Err(MeshError::Content("it holds no scene".to_owned()));
     };
-    for node in scene.nodes() {
-        add_node(&node, IDENTITY, &buffers, &mut file)?;
+    let mut nodes: Vec<_> = scene.nodes().map(|node| (node, IDENTITY)).collect();
+    nodes.reverse();
+    while let Some((node, parent)) = nodes.pop() {
+        let own = node.transform().matrix().map(|column| column.map(f64::from));
+        let matrix = product(parent, own);
+        for primitive in node.mesh().iter().flat_map(|mesh| mesh.primitives()) {
+            add_primitive(&primitive, matrix, &buffers, &mut file)?;
+        }
+        let children: Vec<_> = node.children().map(|child| (child, matrix)).collect();
+        nodes.extend(children.into_iter().rev());
     }
     Ok(file)
 }
@@ -46,54 +53,9 @@ pub(super) fn decode(bytes: &[u8], resources: &Resources<'_>) -> Result<MeshFile
 const IDENTITY: Matrix =
     [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
 
-/// The crate's readers trust the sizes that the file states.
-fn check_views(document: &gltf::Document, buffers: &[Vec<u8>]) -> Result<(), MeshError> {
-    let fail = |what: &str, k: usize| {
-        Err(MeshError::Content(format!("{what} {k} (counted from 0) reaches beyond its buffer")))
-    };
-    for view in document.views() {
-        let size = buffers.get(view.buffer().index()).map_or(0, Vec::len);
-        if view.offset().checked_add(view.length()).is_none_or(|end| end > size) {
-            return fail("buffer view", view.index());
-        }
-    }
-    for accessor in document.accessors() {
-        let Some(view) = accessor.view() else {
-            // Zeros, as many as it states, of which some are replaced.
-            let count = accessor.count();
-            let what = || format!("accessor {} of {count} points", accessor.index());
-            memory::afford(what, 64.0 * count as f64)
-                .map_err(|error| MeshError::Content(error.to_string()))?;
-            continue;
-        };
-        let step = view.stride().unwrap_or(accessor.size());
-        let reach = accessor.count().saturating_sub(1).checked_mul(step);
-        let end =
-            reach.and_then(|r| r.checked_add(accessor.offset())?.checked_add(accessor.size()));
-        if step < accessor.size() || end.is_none_or(|end| end > view.length()) {
-            return fail("accessor", accessor.index());
-        }
-    }
-    Ok(())
-}
-
 fn product(a: Matrix, b: Matrix) -> Matrix {
     // Column-major, as in the file.
     core::array::from_fn(|c| core::array::from_fn(|r| (0..4).map(|k| a[k][r] * b[c][k]).sum()))
-}
-
-fn add_node(
-    node: &gltf::Node<'_>,
-    parent: Matrix,
-    buffers: &[Vec<u8>],
-    file: &mut MeshFile,
-) -> Result<(), MeshError> {
-    let own = node.transform().matrix().map(|column| column.map(f64::from));
-    let matrix = product(parent, own);
-    for primitive in node.mesh().iter().flat_map(|mesh| mesh.primitives()) {
-        add_primitive(&primitive, matrix, buffers, file)?;
-    }
-    node.children().try_for_each(|child| add_node(&child, matrix, buffers, file))
 }
 
 fn add_primitive(
@@ -127,6 +89,7 @@ fn add_primitive(
         Some(indices) => indices.into_u32().collect(),
         None => (0..positions.len() as u32).collect(),
     };
+    file.affords(indices.len() / 3)?;
     let material = primitive.material().index().map_or(u32::MAX, |k| k as u32);
     for corners in indices.chunks_exact(3) {
         let corners = [corners[0], corners[1], corners[2]].map(|k| k as usize);

@@ -4,6 +4,7 @@
 mod decode;
 mod error;
 mod file;
+mod gltf_checks;
 mod gltf_file;
 mod obj_file;
 mod texture;

@@ -6,6 +6,7 @@ use super::texture::Texture;
 use std::cell::RefCell;
 
 pub(super) fn decode(bytes: &[u8], resources: &Resources<'_>) -> Result<MeshFile, MeshError> {
+    check_numbers(bytes)?;
     let options = tobj::LoadOptions { triangulate: true, single_index: true, ..Default::default() };
     // The crate drops what went wrong with a material file.
     let failed = RefCell::new(None);
@@ -23,6 +24,20 @@ pub(super) fn decode(bytes: &[u8], resources: &Resources<'_>) -> Result<MeshFile
     let materials = materials?.iter().map(|m| material(m, resources)).collect::<Result<_, _>>()?;
     let triangles = models.iter().flat_map(|model| triangles(&model.mesh)).collect();
     Ok(MeshFile { triangles, materials })
+}
+
+/// Refuses vertices of faces and lines whose numbers the crate would take beyond its own: more than ten digits.
+fn check_numbers(bytes: &[u8]) -> Result<(), MeshError> {
+    for (k, line) in bytes.split(|byte| *byte == b'\n').enumerate() {
+        let [b'f' | b'l', b' ' | b'\t', rest @ ..] = line.trim_ascii_start() else { continue };
+        if rest.split(|byte| !byte.is_ascii_digit()).any(|digits| digits.len() > 10) {
+            return Err(MeshError::Content(format!(
+                "line {}: the number of a vertex has more than ten digits",
+                k + 1
+            )));
+        }
+    }
+    Ok(())
 }
 
 fn triangles(mesh: &tobj::Mesh) -> impl Iterator<Item = RawTriangle> + '_ {

@@ -65,6 +65,10 @@ impl Prior {
     /// Slope and second derivative of its penalty by differences of half width `width` inside its bounds.
     pub(super) fn curve(&self, x: f64, width: f64) -> [f64; 2] {
         let [low, high] = self.bounds();
+        let width = width.min(0.25 * (high - low));
+        if width <= 1e-9 * (1.0 + x.abs()) {
+            return [0.0; 2]; // as good as fixed
+        }
         let x = x.clamp(low + width, high - width);
         // Rounding must not lead across a bound.
         let [before, here, after] =
@@ -154,6 +158,22 @@ fn normal(share: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// ln sin θ has the slope cot θ and the second derivative −1/sin²θ, however narrow the bounds are.
+    #[test]
+    fn exact_curves_of_narrow_priors() {
+        for range in [1.0, 0.03, 1e-3] {
+            let prior = Prior::Isotropic { low: 0.5, high: 0.5 + range };
+            let x = 0.5 + 0.5 * range;
+            let [slope, second] = prior.curve(x, 0.02);
+            assert!((slope * x.tan() + 1.0).abs() < 1e-3, "{range}: {slope}");
+            assert!((second * x.sin().powi(2) - 1.0).abs() < 1e-2, "{range}: {second}");
+            assert_eq!(Prior::Uniform { low: 0.5, high: 0.5 + range }.curve(x, 0.03), [0.0; 2]);
+        }
+        assert_eq!(Prior::Uniform { low: 0.5, high: 0.5 }.curve(0.5, 0.03), [0.0; 2]);
+        let normal = Prior::Normal { mean: 0.0, sigma: 2.0 }.curve(1.0, 0.02);
+        assert!((normal[0] - 0.25).abs() < 1e-9 && (normal[1] - 0.25).abs() < 1e-9, "{normal:?}");
+    }
 
     /// Shares of the probability by a sum over the density.
     #[test]

@@ -5,6 +5,6 @@ mod priors;
 mod problem;
 mod table;
 
-pub use priors::{GainPriors, TABLES as PRIOR_TABLES, table as prior_table};
+pub use priors::{GainPriors, TABLES as PRIOR_TABLES, is_same_station, table as prior_table};
 pub use problem::{GainProblem, ScanGains};
 pub use table::{GainDistance, GainTable, GainsByStation, StationGain};

@@ -30,18 +30,42 @@ impl GainPriors {
 /// Standard deviation of ln|g| of a station in one of the [`TABLES`] (upper and lower case count the same); none of
 /// a station or a table that is not known.
 pub fn table(name: &str, station: &str) -> Option<f64> {
-    STATIONS.lines().filter(|line| !line.starts_with('#')).find_map(|line| {
-        let mut cells = line.split(',');
-        let (names, sigma, tables) = (cells.next()?, cells.next()?, cells.next()?);
-        let is = |words: &str, word: &str| words.split(' ').any(|w| w.eq_ignore_ascii_case(word));
-        (is(names, station) && is(tables, name)).then(|| sigma.parse().ok()).flatten()
+    rows().find_map(|[names, sigma, tables]| {
+        (has(names, station) && has(tables, name)).then(|| sigma.parse().ok()).flatten()
     })
+}
+
+/// Whether two names are those of one station: the same, or the code of published files (`AA`) and the name of the
+/// arrays (`ALMA`); upper and lower case count the same.
+pub fn is_same_station(a: &str, b: &str) -> bool {
+    a.eq_ignore_ascii_case(b) || rows().any(|[names, ..]| has(names, a) && has(names, b))
+}
+
+fn rows() -> impl Iterator<Item = [&'static str; 3]> {
+    STATIONS.lines().filter(|line| !line.starts_with('#')).filter_map(|line| {
+        let mut cells = line.split(',');
+        Some([cells.next()?, cells.next()?, cells.next()?])
+    })
+}
+
+fn has(words: &str, word: &str) -> bool {
+    words.split(' ').any(|w| w.eq_ignore_ascii_case(word))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::interferometry::array::built_in;
+
+    #[test]
+    fn exact_codes_of_published_files_name_stations_of_the_arrays() {
+        for [code, name] in
+            [["AA", "ALMA"], ["AZ", "SMT"], ["JC", "JCMT"], ["SR", "SMA"], ["pv", "PV"]]
+        {
+            assert!(is_same_station(code, name) && is_same_station(name, code), "{code} {name}");
+        }
+        assert!(!is_same_station("AA", "APEX") && !is_same_station("XX", "ALMA"));
+    }
 
     #[test]
     fn exact_every_station_of_the_arrays_has_a_prior() {

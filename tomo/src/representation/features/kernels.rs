@@ -253,7 +253,8 @@ impl<T: Float> Task<T> for Backward<'_, T> {
             let mut inputs = [zero; MAX_INPUTS];
             let mut units = [[zero; WIDTH]; 2];
             let mut slope = zero;
-            let all = inputs[..count].iter_mut().chain(units.as_flattened_mut()).chain([&mut slope]);
+            let all =
+                inputs[..count].iter_mut().chain(units.as_flattened_mut()).chain([&mut slope]);
             for (lanes, kept) in all.zip(&mut kept) {
                 *lanes = V::load_or(kept, T::zero());
             }
