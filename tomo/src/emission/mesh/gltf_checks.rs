@@ -61,9 +61,9 @@ fn check_accessor(accessor: &Accessor<'_>) -> Result<(), MeshError> {
         gltf::accessor::sparse::IndexType::U16 => 2,
         gltf::accessor::sparse::IndexType::U32 => 4,
     };
-    let count = sparse.count() as usize;
-    let holds_all = holds(&indices.view(), indices.offset() as usize, count, of_index)
-        && holds(&values.view(), values.offset() as usize, count, size);
+    let count = sparse.count();
+    let holds_all = holds(&indices.view(), indices.offset(), count, of_index)
+        && holds(&values.view(), values.offset(), count, size);
     if holds_all { Ok(()) } else { beyond("sparse accessor", accessor.index()) }
 }
 
