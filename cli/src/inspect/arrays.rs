@@ -3,6 +3,7 @@
 use crate::answer::Answer;
 use crate::output;
 use anyhow::Context;
+use kerrlight_tomo::numpy;
 use npyz::{DType, NpyFile, Order, TypeChar};
 use serde_json::{Value, json};
 use std::io::{BufReader, Read};
@@ -140,7 +141,7 @@ impl Survey {
 }
 
 fn array(name: &str, file: impl Read) -> anyhow::Result<Line> {
-    let file = NpyFile::new(file).context("not an array of NumPy")?;
+    let file = numpy::open(file).context("not an array of NumPy")?;
     let shape = file.shape().to_vec();
     let order =
         if file.order() == Order::Fortran && shape.len() > 1 { ", Fortran order" } else { "" };

@@ -13,7 +13,7 @@ const MOST_BRACKETS: usize = 8;
 const LONGEST: u64 = 1 << 20;
 
 /// The bytes of an array, of which the header was looked at.
-type Headed<R> = Chain<Cursor<Vec<u8>>, R>;
+pub type Headed<R> = Chain<Cursor<Vec<u8>>, R>;
 
 /// Shape of an array of numbers of any type, and its numbers in C's order.
 ///
@@ -36,7 +36,11 @@ pub fn read_array(bytes: &[u8]) -> Result<(Vec<u64>, Vec<f64>), Error> {
     Ok((shape, values))
 }
 
-fn open<R: Read>(mut bytes: R) -> Result<npyz::NpyFile<Headed<R>>, NumpyError> {
+/// An array, if its header is one that the parser reads in no time.
+///
+/// # Errors
+/// If the bytes are no array, or the header has more than eight brackets.
+pub fn open<R: Read>(mut bytes: R) -> Result<npyz::NpyFile<Headed<R>>, NumpyError> {
     let not = |error| NumpyError::content(format!("not an npy file: {error}"));
     let mut header = Vec::new();
     // The length of the header is behind the name of the format and its version, in two bytes of the first and four of others.

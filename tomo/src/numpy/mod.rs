@@ -5,7 +5,7 @@ mod archive;
 mod array;
 
 pub use archive::{Archive, ArchiveWriter, write_archive};
-pub use array::{Stream, read_array, write_array};
+pub use array::{Headed, Stream, open, read_array, write_array};
 
 use crate::Error;
 
