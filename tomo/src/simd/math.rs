@@ -17,6 +17,16 @@ fn polynomial<T: Float, V: Lanes<T>>(c: &[T], x: V) -> V {
     sum
 }
 
+/// x − n Σ pieces, the pieces one after the other so that no digits are lost.
+#[inline(always)]
+fn reduced<T: Float, V: Lanes<T>>(x: V, n: V, pieces: &[T]) -> V {
+    let mut r = x;
+    for piece in pieces {
+        r = n.mul_add(V::splat(-*piece), r);
+    }
+    r
+}
+
 /// The nearest integer, for |x| below 2^22 (f32), 2^51 (f64).
 #[inline(always)]
 pub fn round<T: Float, V: Lanes<T>>(x: V) -> V {
@@ -37,10 +47,7 @@ fn near_sin_cos<T: Float, V: Lanes<T>>(x: V) -> (V, V) {
     let far = s(T::FAR);
     let x = far.min(s(-T::FAR).max(x));
     let quarter = round(x * s(T::TWO_OVER_PI));
-    let mut r = x;
-    for piece in T::HALF_PI {
-        r = quarter.mul_add(s(-piece), r);
-    }
+    let r = reduced(x, quarter, &T::HALF_PI);
     let z = r * r;
     let sin = (polynomial(T::SIN, z) * z).mul_add(r, r);
     let cos = (z * z).mul_add(polynomial(T::COS, z), z.mul_add(s(T::of(-0.5)), s(T::one())));
@@ -86,10 +93,7 @@ pub fn exp<T: Float, V: Lanes<T>>(x: V) -> V {
     let s = V::splat;
     let x = s(T::HELD).min(s(-T::HELD).max(x)); // a NaN stays one
     let n = round(x * s(T::LOG2_E));
-    let mut r = x;
-    for piece in T::LN_2 {
-        r = n.mul_add(s(-piece), r);
-    }
+    let r = reduced(x, n, &T::LN_2);
     let e = (r * r).mul_add(polynomial(T::EXP, r), r) + s(T::one());
     e * V::two_to_the(n)
 }
