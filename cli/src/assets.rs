@@ -3,10 +3,10 @@
 use crate::output::{self, Output};
 use crate::volume_files;
 use anyhow::Context;
-use kerrlight_tomo::emission::mesh::MeshFile;
-use kerrlight_tomo::emission::sky::{Catalogue, Panorama};
-use kerrlight_tomo::scene::{Scene, Sky};
-use kerrlight_tomo::transport::Assets;
+use kerrlight_render::emission::mesh::MeshFile;
+use kerrlight_render::emission::sky::{Catalogue, Panorama};
+use kerrlight_render::scene::{Scene, Sky};
+use kerrlight_render::transport::Assets;
 use std::cell::RefCell;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

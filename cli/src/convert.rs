@@ -7,13 +7,13 @@ use crate::interferometry::{arguments, traces};
 use crate::output::{self, Output};
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
-use kerrlight_tomo::Error;
-use kerrlight_tomo::interferometry::array::Station;
-use kerrlight_tomo::interferometry::files::{self, FileError};
-use kerrlight_tomo::interferometry::gains::is_same_station;
-use kerrlight_tomo::interferometry::light_curve::LightCurve;
-use kerrlight_tomo::interferometry::observation::{Basis, Flags, Observation};
-use kerrlight_tomo::interferometry::source::Source;
+use kerrlight_vlbi::Error;
+use kerrlight_vlbi::array::Station;
+use kerrlight_vlbi::files::{self, FileError};
+use kerrlight_vlbi::gains::is_same_station;
+use kerrlight_vlbi::light_curve::LightCurve;
+use kerrlight_vlbi::observation::{Basis, Flags, Observation};
+use kerrlight_vlbi::source::Source;
 use std::path::PathBuf;
 
 /// Arguments of `kerrlight convert`.

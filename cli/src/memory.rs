@@ -1,7 +1,7 @@
 //! What memory there is, and an allocator that takes no more.
 
 use anyhow::bail;
-use kerrlight_tomo::memory::{self, Scratch, shown};
+use kerrlight_common::memory::{self, Scratch, shown};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

@@ -7,13 +7,13 @@ use crate::interferometry::{ObservationFile, scene_movie};
 use crate::output;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
-use kerrlight_tomo::interferometry::noise::{
+use kerrlight_vlbi::noise::{
     GainErrors, ScatteringKernel, add_thermal_noise, apply_gains, scatter,
 };
-use kerrlight_tomo::interferometry::observation::Observation;
-use kerrlight_tomo::interferometry::operator::{Method, Pulse};
-use kerrlight_tomo::interferometry::schedule;
-use kerrlight_tomo::interferometry::simulate::{self, Movie};
+use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::operator::{Method, Pulse};
+use kerrlight_vlbi::schedule;
+use kerrlight_vlbi::simulate::{self, Movie};
 use std::path::PathBuf;
 
 /// Arguments of `kerrlight observe`.

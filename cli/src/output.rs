@@ -5,7 +5,7 @@ pub mod folder;
 
 use crate::checksum::Sum;
 use anyhow::{Context, bail};
-use kerrlight_tomo::memory;
+use kerrlight_common::memory;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::fs::File;

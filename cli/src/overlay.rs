@@ -3,11 +3,11 @@
 use anyhow::{Context, bail};
 use clap::Args;
 use image::RgbImage;
-use kerrlight_tomo::image::Picture;
-use kerrlight_tomo::image::canvas::Canvas;
-use kerrlight_tomo::image::preview::{self, Look};
-use kerrlight_tomo::image::{overlay, ticks};
-use kerrlight_tomo::scene::Scene;
+use kerrlight_render::image::Picture;
+use kerrlight_render::image::canvas::Canvas;
+use kerrlight_render::image::preview::{self, Look};
+use kerrlight_render::image::{overlay, ticks};
+use kerrlight_render::scene::Scene;
 
 /// Options of what is drawn over a picture.
 #[derive(Debug, Args)]

@@ -6,11 +6,11 @@ use crate::render::preview::PreviewOptions;
 use crate::render::report;
 use crate::render::source::{BUILT_IN, Source};
 use anyhow::Context;
-use kerrlight_tomo::image::exr::{self, Attributes, CameraMatrices, Style};
-use kerrlight_tomo::image::preview::{Look, encode_png};
-use kerrlight_tomo::memory;
-use kerrlight_tomo::render::{Film, Progress, Raster, Rendered};
-use kerrlight_tomo::scene::Scene;
+use kerrlight_common::memory;
+use kerrlight_render::image::exr::{self, Attributes, CameraMatrices, Style};
+use kerrlight_render::image::preview::{Look, encode_png};
+use kerrlight_render::picture::{Film, Progress, Raster, Rendered};
+use kerrlight_render::scene::Scene;
 use std::path::Path;
 
 /// A scene to be rendered.

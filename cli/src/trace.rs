@@ -7,11 +7,11 @@ use anyhow::{Context, bail};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use clap::builder::TypedValueParser;
+use kerrlight_common::memory;
 use kerrlight_geodesic::{
     Inclination, Integrator, Kerr, Observer, Placement, Points, RayTable, Request, Tracer,
     Uncertainty,
 };
-use kerrlight_tomo::memory;
 use rayon::prelude::*;
 use std::ops::Range;
 use std::path::PathBuf;

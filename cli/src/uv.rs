@@ -7,8 +7,8 @@ use crate::interferometry::plots::{self, PlotFile};
 use crate::output::{self, Output};
 use anyhow::bail;
 use clap::Args;
-use kerrlight_tomo::interferometry::observation::Observation;
-use kerrlight_tomo::interferometry::schedule;
+use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::schedule;
 use std::path::PathBuf;
 
 /// Arguments of `kerrlight uv`.
@@ -67,10 +67,9 @@ impl Uv {
 
 fn table(observation: &Observation) -> Vec<Column> {
     let rows = &observation.rows;
-    let numbers =
-        |name: &str, value: fn(&kerrlight_tomo::interferometry::observation::Row) -> f64| {
-            Column::Numbers(name.to_owned(), rows.iter().map(value).collect())
-        };
+    let numbers = |name: &str, value: fn(&kerrlight_vlbi::observation::Row) -> f64| {
+        Column::Numbers(name.to_owned(), rows.iter().map(value).collect())
+    };
     let station = |name: &str, k: usize| {
         let names = rows.iter().map(|row| observation.names(row)[k].to_owned());
         Column::Words(name.to_owned(), names.collect())

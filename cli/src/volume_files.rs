@@ -2,8 +2,8 @@
 
 use crate::{output, zarr};
 use anyhow::{Context, bail};
-use kerrlight_tomo::scene::VolumeSource;
-use kerrlight_tomo::volume::{VolumeArrays, VolumeFile};
+use kerrlight_render::scene::VolumeSource;
+use kerrlight_render::volume::{VolumeArrays, VolumeFile};
 use std::path::Path;
 
 fn decode(path: &Path, bytes: &[u8]) -> anyhow::Result<VolumeArrays> {

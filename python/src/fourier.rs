@@ -1,9 +1,9 @@
 //! From images to visibilities, and back.
 
 use crate::call::{detached, refused};
-use kerrlight_tomo::interferometry::Complex64;
-use kerrlight_tomo::interferometry::operator::{ImageGrid, Method, Operator, Pulse, Transform};
-use kerrlight_tomo::units::MICROARCSECOND;
+use kerrlight_common::units::MICROARCSECOND;
+use kerrlight_vlbi::Complex64;
+use kerrlight_vlbi::operator::{ImageGrid, Method, Operator, Pulse, Transform};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use std::convert::Infallible;

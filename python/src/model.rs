@@ -4,10 +4,10 @@ use crate::call::{detached, refused};
 use crate::model_settings::Settings;
 use crate::rays::Place;
 use kerrlight_geodesic::Kerr;
+use kerrlight_render::dynamics::Axis;
+use kerrlight_render::polarization::StokesParameter;
 use kerrlight_tomo::Error;
-use kerrlight_tomo::dynamics::Axis;
 use kerrlight_tomo::fit::{Batch, ForwardModel, PolarizedView, Redshift, Sightlines};
-use kerrlight_tomo::polarization::StokesParameter;
 use kerrlight_tomo::representation::{
     Activation, Coordinates, Float, Gradient, Grid, GridSettings, Representation, Workspace,
 };

@@ -1,8 +1,8 @@
 //! What a forward model is made with.
 
-use kerrlight_tomo::dynamics::{Axis, Velocity};
+use kerrlight_render::dynamics::{Axis, Velocity};
+use kerrlight_render::polarization::{PolarizationLaw, StokesParameter};
 use kerrlight_tomo::fit::{Motion, Region, Sampling, SightlineRequest};
-use kerrlight_tomo::polarization::{PolarizationLaw, StokesParameter};
 use pyo3::prelude::*;
 
 /// What a model is made with, beside hole, observer and screen.

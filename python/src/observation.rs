@@ -1,15 +1,13 @@
 //! Observations: files to columns, columns to files, closure quantities.
 
 use crate::call::{detached, refused};
-use kerrlight_tomo::Error;
-use kerrlight_tomo::interferometry::Complex64;
-use kerrlight_tomo::interferometry::array::{FeedRotation, MOST_STATIONS, Station};
-use kerrlight_tomo::interferometry::earth::SourcePosition;
-use kerrlight_tomo::interferometry::files::{
-    EhtTable, decode, to_csv, to_eht_table, to_obs_text, write_uvfits,
-};
-use kerrlight_tomo::interferometry::observation::{Basis, Channel, Observation, Row};
-use kerrlight_tomo::interferometry::products::{ClosureKind, ClosureSet};
+use kerrlight_vlbi::Complex64;
+use kerrlight_vlbi::Error;
+use kerrlight_vlbi::array::{FeedRotation, MOST_STATIONS, Station};
+use kerrlight_vlbi::earth::SourcePosition;
+use kerrlight_vlbi::files::{EhtTable, decode, to_csv, to_eht_table, to_obs_text, write_uvfits};
+use kerrlight_vlbi::observation::{Basis, Channel, Observation, Row};
+use kerrlight_vlbi::products::{ClosureKind, ClosureSet};
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};

@@ -3,18 +3,18 @@
 use crate::call::{detached, refused};
 use crate::fourier::pulse;
 use crate::observation::{Telescope, Visibilities, station};
-use kerrlight_tomo::Error;
-use kerrlight_tomo::interferometry::array::{Array, BUILT_IN, built_in, parse};
-use kerrlight_tomo::interferometry::earth::{Frame, Ut1};
-use kerrlight_tomo::interferometry::noise::{
+use kerrlight_common::units::MICROARCSECOND;
+use kerrlight_vlbi::Error;
+use kerrlight_vlbi::array::{Array, BUILT_IN, built_in, parse};
+use kerrlight_vlbi::earth::{Frame, Ut1};
+use kerrlight_vlbi::noise::{
     GainErrors, ScatteringKernel, add_thermal_noise, apply_gains, scatter,
 };
-use kerrlight_tomo::interferometry::observation::Observation;
-use kerrlight_tomo::interferometry::operator::{ImageGrid, Method, Pulse};
-use kerrlight_tomo::interferometry::schedule::{Clock, Schedule, Setup, observe_affordable};
-use kerrlight_tomo::interferometry::simulate::{Movie, fill};
-use kerrlight_tomo::interferometry::source::Source;
-use kerrlight_tomo::units::MICROARCSECOND;
+use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::operator::{ImageGrid, Method, Pulse};
+use kerrlight_vlbi::schedule::{Clock, Schedule, Setup, observe_affordable};
+use kerrlight_vlbi::simulate::{Movie, fill};
+use kerrlight_vlbi::source::Source;
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 

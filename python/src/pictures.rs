@@ -2,7 +2,7 @@
 
 use crate::call::{detached, interruptible, refused};
 use kerrlight_cli::pictures::{Shot, Shown};
-use kerrlight_tomo::render::Summary;
+use kerrlight_render::picture::Summary;
 use numpy::{IntoPyArray, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};

@@ -1,8 +1,8 @@
 //! Drawings of volumes in flat space.
 
 use crate::call::{detached, refused};
-use kerrlight_tomo::volume::Volume;
-use kerrlight_tomo::volume::projection::{Surroundings, View, project};
+use kerrlight_render::volume::Volume;
+use kerrlight_render::volume::projection::{Surroundings, View, project};
 use numpy::{IntoPyArray, PyReadonlyArray1};
 use pyo3::prelude::*;
 use std::convert::Infallible;

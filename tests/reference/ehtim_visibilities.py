@@ -20,7 +20,7 @@ N, FIELD_UAS = 64, 160.0
 
 def arrays():
     """The tables of the Rust source, so that both sides use the same digits."""
-    source = open(os.path.join(HERE, "../../tomo/src/interferometry/array/built_in.rs")).read()
+    source = open(os.path.join(HERE, "../../vlbi/src/array/built_in.rs")).read()
     source = re.sub(r"\bboth\(([\d.]+)\)", r"[\1, \1]", source)
     number = r"(-?[\d.]+)"
     single = dict(re.findall(r"const (\w+): \[f64; 3\] = \[(.*?)\];", source))

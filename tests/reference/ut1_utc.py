@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes tomo/src/interferometry/earth/ut1_utc.txt from the IERS series EOP 20 C04.
+"""Makes vlbi/src/earth/ut1_utc.txt from the IERS series EOP 20 C04.
 
     python3 ut1_utc.py eopc04.1962-now > ut1_utc.txt
 

@@ -56,7 +56,7 @@ fn scenes_that_are_none() {
     );
     // Truncated anywhere, a scene is an error or a scene, never a panic.
     for end in (0..good.len()).step_by(17).filter(|end| good.is_char_boundary(*end)) {
-        let _ = kerrlight_tomo::scene::Scene::parse(&good[..end]);
+        let _ = kerrlight_render::scene::Scene::parse(&good[..end]);
     }
 }
 

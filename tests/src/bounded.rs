@@ -83,15 +83,15 @@ fn exact_files_that_unpack_to_too_much_are_named() {
     std::fs::write(at.join("scene.toml"), scene).unwrap();
     let message = fail(at, &["--memory", "200MiB", "render", "scene.toml", "-o", "a.exr"]);
     assert!(message.contains("volume") && message.contains("would take"), "{message}");
-    let picture = kerrlight_tomo::image::Picture {
+    let picture = kerrlight_render::image::Picture {
         width: 3000,
         height: 3000,
-        channels: vec![kerrlight_tomo::image::Channel {
+        channels: vec![kerrlight_render::image::Channel {
             name: "intensity".to_owned(),
             values: vec![0.0; 9_000_000],
         }],
     };
-    let bytes = kerrlight_tomo::image::exr::encode(&picture, &Default::default()).unwrap();
+    let bytes = kerrlight_render::image::exr::encode(&picture, &Default::default()).unwrap();
     std::fs::write(at.join("large.exr"), bytes).unwrap();
     refused(at, "64MiB", &observe("large.exr"), "3000 x 3000 pixels");
     image::GrayImage::new(6000, 6000).save(at.join("sky.png")).unwrap();
@@ -236,12 +236,12 @@ fn exact_a_sequence_of_images_is_a_movie() {
     // Of the same numbers, a file for all and one for each.
     std::fs::create_dir(at.join("arrays")).unwrap();
     let bytes = std::fs::read(at.join("simulated/movie.npz")).unwrap();
-    let mut archive = kerrlight_tomo::numpy::Archive::open(&bytes).unwrap();
+    let mut archive = kerrlight_common::numpy::Archive::open(&bytes).unwrap();
     let movie = archive.member("data").unwrap().unwrap();
-    let (_, values) = kerrlight_tomo::numpy::read_array(&movie).unwrap();
+    let (_, values) = kerrlight_common::numpy::read_array(&movie).unwrap();
     std::fs::write(at.join("all.npy"), &movie).unwrap();
     for (k, image) in values.chunks_exact(16 * 16).enumerate() {
-        let bytes = kerrlight_tomo::numpy::write_array(&[16, 16], image.iter().copied());
+        let bytes = kerrlight_common::numpy::write_array(&[16, 16], image.iter().copied());
         std::fs::write(at.join(format!("arrays/f_{k}.npy")), bytes).unwrap();
     }
     let read = |path: &str, memory: &str, run: &str| {

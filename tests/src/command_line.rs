@@ -1,7 +1,7 @@
 //! The binary as a user runs it.
 
 use crate::support::{kerrlight, root, succeed};
-use kerrlight_tomo::image::exr;
+use kerrlight_render::image::exr;
 
 const SIZE: [&str; 4] = ["--set", "screen.width=48", "--set", "screen.height=40"];
 

@@ -1,11 +1,11 @@
 //! Channels on request, against closed forms and against other pictures.
 
 use crate::support::scene;
-use kerrlight_tomo::emission::sky::{Catalogue, Panorama};
-use kerrlight_tomo::image::{Channel, Picture, exr};
-use kerrlight_tomo::render::render;
-use kerrlight_tomo::scene::Scene;
-use kerrlight_tomo::transport::Assets;
+use kerrlight_render::emission::sky::{Catalogue, Panorama};
+use kerrlight_render::image::{Channel, Picture, exr};
+use kerrlight_render::picture::render;
+use kerrlight_render::scene::Scene;
+use kerrlight_render::transport::Assets;
 
 /// A disc that absorbing gas surrounds, and a spot, with light of all images.
 const WORLD: &str = r#"
@@ -323,7 +323,7 @@ fn exact_motion_between_two_pictures() {
 /// Numbers of the sources, and what is refused.
 #[test]
 fn exact_identifiers_and_refusals() {
-    let raster = |scene: &Scene| kerrlight_tomo::render::Raster::new(scene, None);
+    let raster = |scene: &Scene| kerrlight_render::picture::Raster::new(scene, None);
     let scene = asking(WORLD, r#""id""#, &[]);
     let names = raster(&scene).unwrap().identifiers().unwrap();
     assert_eq!(names, "0 sky\n1 hole\n2 disc\n3 gas\n4 spot.0\n");

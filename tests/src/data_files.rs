@@ -2,12 +2,12 @@
 //! pictures of the sky, empty files; and where paths of settings start.
 
 use crate::support::{fail, kerrlight, root, succeed};
-use kerrlight_tomo::interferometry::Complex64;
-use kerrlight_tomo::interferometry::array::built_in;
-use kerrlight_tomo::interferometry::earth::{Frame, SourcePosition, Ut1};
-use kerrlight_tomo::interferometry::files::{self, EhtTable};
-use kerrlight_tomo::interferometry::observation::Observation;
-use kerrlight_tomo::interferometry::schedule::{Clock, Schedule, Setup, observe};
+use kerrlight_vlbi::Complex64;
+use kerrlight_vlbi::array::built_in;
+use kerrlight_vlbi::earth::{Frame, SourcePosition, Ut1};
+use kerrlight_vlbi::files::{self, EhtTable};
+use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::schedule::{Clock, Schedule, Setup, observe};
 use std::path::Path;
 
 /// What a fit of visibilities needs, as small as can be.

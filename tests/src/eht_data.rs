@@ -3,8 +3,8 @@
 //! where KERRLIGHT_EHT_DATA says.
 
 use crate::support::root;
-use kerrlight_tomo::interferometry::files::{self, EhtTable, Format};
-use kerrlight_tomo::interferometry::observation::{Measured, Observation};
+use kerrlight_vlbi::files::{self, EhtTable, Format};
+use kerrlight_vlbi::observation::{Measured, Observation};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 

@@ -3,7 +3,7 @@
 
 use crate::eht_data::folder;
 use crate::support::{kerrlight, succeed};
-use kerrlight_tomo::interferometry::files;
+use kerrlight_vlbi::files;
 
 const NIGHTS: [&str; 2] = ["096", "097"];
 

@@ -1,9 +1,9 @@
 //! Films: frames that are those of `render`, that are kept, and that do not flicker.
 
 use crate::support::{fail, kerrlight, succeed};
-use kerrlight_tomo::Error;
-use kerrlight_tomo::image::exr;
-use kerrlight_tomo::scene::Scene;
+use kerrlight_render::Error;
+use kerrlight_render::image::exr;
+use kerrlight_render::scene::Scene;
 use std::path::Path;
 
 const SPOT: &str = r#"

@@ -4,9 +4,9 @@ use crate::film::STARS;
 use crate::support::{root, scene};
 use kerrlight_geodesic::vector::dot;
 use kerrlight_geodesic::{Camera, Kerr, footprint};
-use kerrlight_tomo::emission::sky::SkyModel;
-use kerrlight_tomo::render::Film;
-use kerrlight_tomo::scene::Scene;
+use kerrlight_render::emission::sky::SkyModel;
+use kerrlight_render::picture::Film;
+use kerrlight_render::scene::Scene;
 /// An image of a star: which one, with which parity, where in pixels, and its exact flux on the
 /// picture plane.
 struct Image {

@@ -290,7 +290,7 @@ fn exact_visibilities_and_closures_together() {
 }
 
 /// A sheared spot on a tilted orbit, on 24 × 24 pixels of 1 M.
-fn sheared_spot() -> kerrlight_tomo::scene::Scene {
+fn sheared_spot() -> kerrlight_render::scene::Scene {
     let text = std::fs::read_to_string(root().join("scenes/hot_spots.toml")).unwrap();
     let text = text.split("[[spot]]").next().unwrap().to_owned()
         + "[[spot]]\nradius = 7.0\nphase_deg = 200.0\naxis = [0.6, 0.0, 0.8]\nsigma = 0.6\npeak_emissivity = 1.0\nsheared_since = 0.0\n";
@@ -313,13 +313,13 @@ fn sheared_spot() -> kerrlight_tomo::scene::Scene {
 fn code_pixels_are_those_of_the_renderer() {
     use kerrlight_geodesic::vector::distance;
     use kerrlight_geodesic::{Inclination, Kerr, Observer};
-    use kerrlight_tomo::dynamics::{AngularVelocity, Axis, Injection};
-    use kerrlight_tomo::emission::spot::SpotModel;
+    use kerrlight_render::dynamics::{AngularVelocity, Axis, Injection};
+    use kerrlight_render::emission::spot::SpotModel;
     use kerrlight_tomo::fit::{
         Batch, ForwardModel, Motion, Redshift, Region, Sampling, SightlineRequest, Sightlines,
     };
     let scene = sheared_spot();
-    let seen = kerrlight_tomo::render::render(&scene, None, &|_| true).unwrap().picture;
+    let seen = kerrlight_render::picture::render(&scene, None, &|_| true).unwrap().picture;
     let hole = Kerr::new(0.5).unwrap();
     let observer = Observer::at_infinity(Inclination::from_degrees(60.0).unwrap());
     let at = |k: usize| k as f64 - 11.5;

@@ -2,7 +2,7 @@
 
 use crate::fit::results;
 use crate::support::{fail, root, succeed};
-use kerrlight_tomo::image::exr;
+use kerrlight_render::image::exr;
 use std::path::Path;
 
 /// A fit of few rays with many nodes on each, so that its own sums are as good as a scene's; the axis is tilted, light

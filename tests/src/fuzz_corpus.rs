@@ -2,7 +2,7 @@
 //! an error, never a panic.
 
 use crate::support::root;
-use kerrlight_tomo::interferometry::{array, files};
+use kerrlight_vlbi::{array, files};
 
 fn corpus(target: &str) -> Vec<(String, Vec<u8>)> {
     let folder = root().join("tests/fuzz/corpus").join(target);

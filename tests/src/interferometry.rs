@@ -2,10 +2,10 @@
 //! tests/reference/ehtim_visibilities.py) and against itself.
 
 use crate::support::{kerrlight, root, succeed};
-use kerrlight_tomo::interferometry::Complex64;
-use kerrlight_tomo::interferometry::files;
-use kerrlight_tomo::interferometry::observation::Observation;
-use kerrlight_tomo::interferometry::products::{ClosureKind, ClosureSet, TraceSet};
+use kerrlight_vlbi::Complex64;
+use kerrlight_vlbi::files;
+use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::products::{ClosureKind, ClosureSet, TraceSet};
 use std::path::Path;
 
 const WHEN: [&str; 10] =
@@ -230,7 +230,7 @@ fn write_scene(folder: &Path) {
         "screen.total_flux_jy=2.5",
     ]
     .iter()
-    .fold(scene, |text, change| kerrlight_tomo::scene::apply_override(&text, change).unwrap());
+    .fold(scene, |text, change| kerrlight_render::scene::apply_override(&text, change).unwrap());
     std::fs::write(folder.join("scene.toml"), scene).unwrap();
 }
 
@@ -272,7 +272,7 @@ fn write_frames(path: &Path) {
     write_scene(path);
     std::fs::create_dir(path.join("frames")).unwrap();
     let text = std::fs::read_to_string(path.join("scene.toml")).unwrap();
-    let scene = kerrlight_tomo::scene::Scene::parse(&text).unwrap();
+    let scene = kerrlight_render::scene::Scene::parse(&text).unwrap();
     let seconds = scene.hole.seconds().unwrap();
     for k in 0..3 {
         let time = scene.observer.time + f64::from(k) * 600.0 / seconds;

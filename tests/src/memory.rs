@@ -1,7 +1,7 @@
 //! Parsers on files that are cut, absurd or damaged: what they hold at once is at most 20 times the
 //! file and a little, whatever its header says.
 
-use kerrlight_tomo::interferometry::{array, files};
+use kerrlight_vlbi::{array, files};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::path::Path;
 use std::sync::Mutex;

@@ -3,9 +3,9 @@
 use crate::support::{render, root, scene, scenes};
 use kerrlight_geodesic::analytic::CriticalCurve;
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
-use kerrlight_tomo::image::Picture;
-use kerrlight_tomo::render::{RingStrata, Stratum};
-use kerrlight_tomo::transport::View;
+use kerrlight_render::image::Picture;
+use kerrlight_render::picture::{RingStrata, Stratum};
+use kerrlight_render::transport::View;
 
 const SMALL: [&str; 3] = ["screen.width=65", "screen.height=65", "screen.samples_per_pixel=1"];
 
@@ -137,7 +137,7 @@ fn exact_same_picture_on_any_number_of_threads() {
 fn exact_total_flux() {
     let scene = scene(&file("hot_spots.toml"), &SMALL);
     let picture = render(&scene);
-    let m = kerrlight_tomo::units::gravitational_angle(4.154e6, 8.178);
+    let m = kerrlight_common::units::gravitational_angle(4.154e6, 8.178);
     let sum: f64 = picture.channel("intensity").unwrap().iter().map(|v| f64::from(*v)).sum();
     assert!((sum * (scene.pixel_size() * m).powi(2) / 2.4 - 1.0).abs() < 1e-5);
 }
@@ -207,7 +207,8 @@ fn exact_image_error_is_met() {
         let reference = render(&sized(&["screen.samples_per_pixel=256", plain]));
         let asked = format!("screen.image_error={error}");
         let scene = sized(&["screen.samples_per_pixel=1", &asked]);
-        let rendered = kerrlight_tomo::render::render(&scene, None, &|_| true).expect("a picture");
+        let rendered =
+            kerrlight_render::picture::render(&scene, None, &|_| true).expect("a picture");
         let (picture, summary) = (rendered.picture, rendered.summary);
         assert!(summary.image_error < error, "{name}: {}", summary.image_error);
         let refined = distance(&picture, &reference);
@@ -236,7 +237,7 @@ fn exact_stated_error_of_thin_images() {
     let plain = "screen.rings=\"regular-grid\"";
     let reference = render(&sized(&["screen.samples_per_pixel=1024", plain]));
     let refined = sized(&["screen.samples_per_pixel=1", "screen.image_error=0.003"]);
-    let rendered = kerrlight_tomo::render::render(&refined, None, &|_| true).expect("a picture");
+    let rendered = kerrlight_render::picture::render(&refined, None, &|_| true).expect("a picture");
     let stated = rendered.summary.image_error;
     let found = distance(&rendered.picture, &reference);
     assert!(stated < 0.003 && found < 0.6 * stated && found > 0.05 * stated, "{found} {stated}");
@@ -302,13 +303,13 @@ fn exact_regular_grid_is_one_ray_a_pixel() {
     let grid = of("screen.rings=\"regular-grid\"");
     let resolved = of("screen.rings=\"resolved\"");
     let scene = scene(&text, &[&SMALL[..], &flux].concat());
-    let prepared = kerrlight_tomo::transport::PreparedScene::new(&scene, None).unwrap();
+    let prepared = kerrlight_render::transport::PreparedScene::new(&scene, None).unwrap();
     let at = |k: usize| (k as f64 - 32.0) * 24.0 / 65.0;
     for name in ["redshift", "crossings", "radius", "azimuth", "delay", "outcome"] {
         assert_eq!(grid.channel(name), resolved.channel(name), "{name}");
     }
     let [one, many] = [&grid, &resolved].map(|p| p.channel("intensity").unwrap());
-    let mut scratch = kerrlight_tomo::transport::Scratch::default();
+    let mut scratch = kerrlight_render::transport::Scratch::default();
     let mut changed = 0;
     for k in (0..65 * 65).step_by(7) {
         let (x, y) = (at(k % 65), -at(k / 65));
@@ -328,17 +329,17 @@ fn exact_rings_do_not_depend_on_tiles_or_batches() {
     let flux = ["screen.total_flux_jy=", "screen.width=40", "screen.height=40"];
     let mut scene = scene(&text, &flux);
     let raster = |tile: usize| {
-        let raster = kerrlight_tomo::render::Raster::new(&scene, None).unwrap().with_tile(tile);
+        let raster = kerrlight_render::picture::Raster::new(&scene, None).unwrap().with_tile(tile);
         raster.render(&|_| true).unwrap().picture
     };
     let whole = raster(64);
     assert_eq!(whole, raster(7));
-    let mut film = kerrlight_tomo::render::Film::new(&scene, None).unwrap();
+    let mut film = kerrlight_render::picture::Film::new(&scene, None).unwrap();
     let times = [40.0, 55.0];
     let frames = film.frames(&times, &|_| true).unwrap();
     for (frame, time) in frames.into_iter().zip(times) {
         scene.observer.time = time;
-        let single = kerrlight_tomo::render::render(&scene, None, &|_| true).unwrap().picture;
+        let single = kerrlight_render::picture::render(&scene, None, &|_| true).unwrap().picture;
         assert_eq!(film.rendered(frame, 1.0).unwrap().picture, single, "{time}");
     }
     assert!(whole.channel("intensity").unwrap().iter().any(|light| *light > 0.0));

@@ -1,10 +1,10 @@
 //! Light that gas sends and absorbs along rays.
 
 use crate::support::{root, scene};
-use kerrlight_tomo::image::Picture;
-use kerrlight_tomo::render::{Rendered, render};
-use kerrlight_tomo::scene::Scene;
-use kerrlight_tomo::transport::{PreparedScene, RayResult, Scratch};
+use kerrlight_render::image::Picture;
+use kerrlight_render::picture::{Rendered, render};
+use kerrlight_render::scene::Scene;
+use kerrlight_render::transport::{PreparedScene, RayResult, Scratch};
 
 fn gold(test: u32, overrides: &[&str]) -> Scene {
     let path = root().join(format!("scenes/gold2020/test{test}.toml"));

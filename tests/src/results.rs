@@ -2,7 +2,7 @@
 //! command line's own help, completions and manual pages.
 
 use crate::support::{fail, kerrlight, root, succeed};
-use kerrlight_tomo::image::exr;
+use kerrlight_render::image::exr;
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::Command;

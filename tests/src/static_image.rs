@@ -4,9 +4,9 @@ use crate::fit::results;
 use crate::fit_start::array;
 use crate::static_sky;
 use crate::support::{binary, fail, kerrlight, root, succeed};
-use kerrlight_tomo::interferometry::Complex64;
-use kerrlight_tomo::interferometry::files;
-use kerrlight_tomo::interferometry::noise::add_thermal_noise;
+use kerrlight_vlbi::Complex64;
+use kerrlight_vlbi::files;
+use kerrlight_vlbi::noise::add_thermal_noise;
 use std::path::Path;
 
 /// Stations, times and errors of a night of M87* with gains of 10 % and random phases.

@@ -2,7 +2,7 @@
 
 use crate::fit::{results, with};
 use crate::support::{fail, succeed};
-use kerrlight_tomo::volume::VolumeArrays;
+use kerrlight_render::volume::VolumeArrays;
 use std::path::Path;
 
 /// Gains of 15 %, of 60 % at the LMT, and random phases, all of them new in every scan.
@@ -65,7 +65,7 @@ fn exact_closures_and_free_gains_agree() {
         VolumeArrays::from_npz(&bytes).unwrap().located().unwrap().volume
     };
     let (a, b) = (found("closures"), found("free"));
-    let alike = kerrlight_tomo::volume::metrics::compare(&a, &b, None).unwrap().correlation;
+    let alike = kerrlight_render::volume::metrics::compare(&a, &b, None).unwrap().correlation;
     assert!(alike.unwrap() > 0.95, "{alike:?}");
 }
 

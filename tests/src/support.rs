@@ -1,7 +1,7 @@
 //! What several tests need.
 
-use kerrlight_tomo::image::Picture;
-use kerrlight_tomo::scene::{Scene, apply_override};
+use kerrlight_render::image::Picture;
+use kerrlight_render::scene::{Scene, apply_override};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
@@ -93,7 +93,7 @@ pub fn scene(text: &str, overrides: &[&str]) -> Scene {
 }
 
 /// The volume of an NPZ archive with all its arrays.
-fn volume(bytes: &[u8]) -> kerrlight_tomo::volume::VolumeFile {
+fn volume(bytes: &[u8]) -> kerrlight_render::volume::VolumeFile {
     use std::io::Read;
     let mut archive = zip::ZipArchive::new(std::io::Cursor::new(bytes)).expect("an archive");
     let mut member = |name: &str| {
@@ -112,16 +112,16 @@ fn volume(bytes: &[u8]) -> kerrlight_tomo::volume::VolumeFile {
     };
     let (low, high) = (three("low.npy"), three("high.npy"));
     let nodes = nodes.try_into().expect("three dimensions");
-    let volume = kerrlight_tomo::volume::Volume::new(nodes, low, high, values).expect("a volume");
-    kerrlight_tomo::volume::VolumeFile { volume, axis: Some(three("axis.npy")) }
+    let volume = kerrlight_render::volume::Volume::new(nodes, low, high, values).expect("a volume");
+    kerrlight_render::volume::VolumeFile { volume, axis: Some(three("axis.npy")) }
 }
 
 /// Renders a scene whose files, if any, lie in the folder of scenes.
 pub fn render(scene: &Scene) -> Picture {
-    use kerrlight_tomo::emission::mesh::MeshFile;
-    use kerrlight_tomo::emission::sky::{Catalogue, Panorama};
-    use kerrlight_tomo::scene::Sky;
-    use kerrlight_tomo::transport::Assets;
+    use kerrlight_render::emission::mesh::MeshFile;
+    use kerrlight_render::emission::sky::{Catalogue, Panorama};
+    use kerrlight_render::scene::Sky;
+    use kerrlight_render::transport::Assets;
     let read = |path: &str| std::fs::read(root().join("scenes").join(path)).expect(path);
     let sky = match &scene.sky {
         Some(Sky::Image(image)) => Some(Panorama::decode(&read(&image.path)).expect("a picture")),
@@ -135,7 +135,7 @@ pub fn render(scene: &Scene) -> Picture {
     let mesh = |path: &str| MeshFile::decode(&read(path), &resource).expect("a mesh");
     let meshes = scene.mesh.iter().map(|one| mesh(&one.path)).collect();
     let volumes = scene.volume.iter().map(|one| volume(&read(&one.path))).collect();
-    kerrlight_tomo::render::render(scene, Assets { sky, stars, meshes, volumes }, &|_| true)
+    kerrlight_render::picture::render(scene, Assets { sky, stars, meshes, volumes }, &|_| true)
         .expect("a picture")
         .picture
 }

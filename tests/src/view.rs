@@ -6,9 +6,9 @@ use kerrlight_geodesic::wgsl;
 use kerrlight_geodesic::{
     Camera, Inclination, Kerr, Motion, Observer, Outcome, Quantities, Tracer,
 };
-use kerrlight_tomo::image::Picture;
-use kerrlight_tomo::image::colormap::Colormap;
-use kerrlight_tomo::image::exr;
+use kerrlight_render::image::Picture;
+use kerrlight_render::image::colormap::Colormap;
+use kerrlight_render::image::exr;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;

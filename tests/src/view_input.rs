@@ -2,7 +2,7 @@
 
 use crate::browser::Browser;
 use crate::view::{measured, opened};
-use kerrlight_tomo::image::exr;
+use kerrlight_render::image::exr;
 use serde_json::{Value, json};
 use std::path::Path;
 use std::time::{Duration, Instant};

@@ -66,9 +66,9 @@ fn exact_stores_through_the_program() {
     let (_, tail) = rest.split_once("[movie]").unwrap();
     std::fs::write(at.join("data.toml"), format!("{head}[movie]{tail}")).unwrap();
     let bytes = std::fs::read(at.join("run/movie.npz")).unwrap();
-    let mut archive = kerrlight_tomo::numpy::Archive::open(&bytes).unwrap();
+    let mut archive = kerrlight_common::numpy::Archive::open(&bytes).unwrap();
     let movie = archive.member("data").unwrap().unwrap();
-    let (_, values) = kerrlight_tomo::numpy::read_array(&movie).unwrap();
+    let (_, values) = kerrlight_common::numpy::read_array(&movie).unwrap();
     std::fs::write(at.join("movie.npy"), &movie).unwrap();
     let frames: Vec<Vec<f64>> = values.chunks_exact(16 * 16).map(<[f64]>::to_vec).collect();
     store(&at.join("movie.zarr"), &frames, 16);

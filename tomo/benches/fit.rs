@@ -10,7 +10,7 @@ mod paper;
 #[path = "support/mod.rs"]
 mod support;
 
-use kerrlight_tomo::dynamics::Axis;
+use kerrlight_render::dynamics::Axis;
 use kerrlight_tomo::fit::{
     Batch, BatchSize, Data, ImageTerm, Objective, OccupancyPlan, OccupancySettings, Outcome,
     Region, State, Trainer, Training, Weighted,

@@ -8,19 +8,19 @@
 
 mod paper;
 
-use kerrlight_tomo::dynamics::Axis;
+use kerrlight_render::dynamics::Axis;
+use kerrlight_render::image::colormap::Colormap;
 use kerrlight_tomo::fit::linear::Weighted;
 use kerrlight_tomo::fit::scan::{AxisLoss, AxisProblem, AxisSettings, scan_axis};
 use kerrlight_tomo::fit::{ForwardModel, FrameTerm, ImageTerm, Scan, ScanTerm};
-use kerrlight_tomo::image::colormap::Colormap;
-use kerrlight_tomo::interferometry::array::built_in;
-use kerrlight_tomo::interferometry::data_terms::VisibilityTerm;
-use kerrlight_tomo::interferometry::earth::{Frame, SourcePosition, Ut1};
-use kerrlight_tomo::interferometry::noise::add_thermal_noise;
-use kerrlight_tomo::interferometry::observation::Observation;
-use kerrlight_tomo::interferometry::operator::{ImageGrid, Method, Pulse, Transform};
-use kerrlight_tomo::interferometry::schedule::{Clock, Schedule, Setup, observe};
-use kerrlight_tomo::interferometry::simulate::{Movie, fill};
+use kerrlight_vlbi::array::built_in;
+use kerrlight_vlbi::data_terms::VisibilityTerm;
+use kerrlight_vlbi::earth::{Frame, SourcePosition, Ut1};
+use kerrlight_vlbi::noise::add_thermal_noise;
+use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::operator::{ImageGrid, Method, Pulse, Transform};
+use kerrlight_vlbi::schedule::{Clock, Schedule, Setup, observe};
+use kerrlight_vlbi::simulate::{Movie, fill};
 use paper::{FRAMES, Truth, forward_model, lines, processor_time, screen};
 use std::error::Error;
 use std::time::Instant;
@@ -93,7 +93,7 @@ fn visibilities(movie: &[f32], array: &str) -> Result<Seen, Box<dyn Error>> {
     Ok((model, Box::new(ScanTerm::new("visibilities", SIDE * SIDE, true, scans))))
 }
 
-fn same_time(row: &kerrlight_tomo::interferometry::observation::Row, time: f64) -> bool {
+fn same_time(row: &kerrlight_vlbi::observation::Row, time: f64) -> bool {
     (row.time_h - time).abs() < 1e-6
 }
 

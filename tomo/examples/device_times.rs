@@ -11,7 +11,7 @@
 mod paper;
 
 use kerrlight_geodesic::gpu::{Adapter, Compute, GpuError, KernelTime, Needs, adapter};
-use kerrlight_tomo::dynamics::Axis;
+use kerrlight_render::dynamics::Axis;
 use kerrlight_tomo::fit::graphics::{GraphicsFit, open};
 use kerrlight_tomo::fit::{
     Batch, BatchSize, Data, Drawn, ForwardModel, ImageTerm, Objective, Region, State, StepDevice,

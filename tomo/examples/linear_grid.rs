@@ -8,7 +8,7 @@
 
 mod paper;
 
-use kerrlight_tomo::dynamics::Axis;
+use kerrlight_render::dynamics::Axis;
 use kerrlight_tomo::fit::linear::{
     Change, Coarse, LinearProblem, LinearProgress, LinearSettings, Method, Prior, Voxels, Weighted,
 };

@@ -8,7 +8,7 @@
 use kerrlight_geodesic::{
     Inclination, Kerr, Observer, Path, Quantities, ScreenPoint, Tracer, ZamoFrame,
 };
-use kerrlight_tomo::polarization::{Gas, MagneticField, PowerLaw, Stokes, view};
+use kerrlight_render::polarization::{Gas, MagneticField, PowerLaw, Stokes, view};
 use std::error::Error;
 
 const SIDE: u32 = 64;

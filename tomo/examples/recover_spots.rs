@@ -11,7 +11,7 @@
 #[allow(dead_code)]
 mod paper;
 
-use kerrlight_tomo::dynamics::Axis;
+use kerrlight_render::dynamics::Axis;
 use kerrlight_tomo::fit::{
     BatchSize, Data, ImageTerm, Objective, OccupancyPlan, OccupancySettings, Outcome, Region,
     State, Trainer, Training, Weighted,

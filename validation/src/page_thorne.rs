@@ -3,7 +3,7 @@
 
 use crate::report::Case;
 use kerrlight_geodesic::{Kerr, orbits};
-use kerrlight_tomo::emission::page_thorne::PageThorne;
+use kerrlight_render::emission::page_thorne::PageThorne;
 
 const ORBITS: &str = "Bardeen, Press & Teukolsky 1972";
 const DISC: &str = "Page & Thorne 1974";

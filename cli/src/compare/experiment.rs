@@ -3,7 +3,7 @@
 use super::labels::{ONE_CHI2, RESULTS};
 use crate::fit::posterior::{RANKED, WITHIN};
 use anyhow::{Context, bail};
-use kerrlight_tomo::toml_file;
+use kerrlight_common::toml_file;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;

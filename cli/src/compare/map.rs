@@ -1,8 +1,8 @@
 //! A table as colours with its numbers.
 
 use image::RgbImage;
-use kerrlight_tomo::image::canvas::{Align, BLACK, Canvas, WHITE};
-use kerrlight_tomo::image::colormap::Colormap;
+use kerrlight_render::image::canvas::{Align, BLACK, Canvas, WHITE};
+use kerrlight_render::image::colormap::Colormap;
 
 /// Means over two factors.
 pub struct Map {

@@ -4,10 +4,10 @@ use super::data;
 use super::parse;
 use super::work::Work;
 use anyhow::Context;
+use kerrlight_render::scene::apply_override;
 use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::fit::setup::{self, Instrument, Measured};
 use kerrlight_tomo::representation::Registry;
-use kerrlight_tomo::scene::apply_override;
 use std::path::Path;
 
 /// Settings with one `key=value` changed; `representation=grid` is short for representation.kind=grid.

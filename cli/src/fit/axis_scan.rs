@@ -3,15 +3,15 @@
 use super::failed;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
+use kerrlight_render::dynamics::Axis;
+use kerrlight_render::image::colormap::Colormap;
 use kerrlight_tomo::Error;
-use kerrlight_tomo::dynamics::Axis;
 use kerrlight_tomo::fit::Motion;
 use kerrlight_tomo::fit::scan::{
     AxisLoss, AxisProblem, AxisScan, AxisSettings, Effort, refine_axis, scan_axis,
 };
 use kerrlight_tomo::fit::settings::{AxisScan as AxisScanSettings, FitFile};
 use kerrlight_tomo::fit::setup::{CoarseView, Measured};
-use kerrlight_tomo::image::colormap::Colormap;
 use serde_json::{Value, json};
 use std::io::Cursor;
 

@@ -1,9 +1,9 @@
 //! What is said of a light curve and of a flare in a band: data, model, priors, and what may not be concluded.
 
 use crate::report::Part;
+use kerrlight_render::polarization::PolarizationLaw;
 use kerrlight_tomo::fit::settings::{BackgroundSettings, BandSettings, DataFiles, FitFile, Steps};
 use kerrlight_tomo::fit::setup::Measured;
-use kerrlight_tomo::polarization::PolarizationLaw;
 
 /// Paragraphs under headings, of a fit that compares worlds.
 pub fn parts(file: &FitFile, measured: &Measured) -> Vec<Part> {

@@ -1,10 +1,10 @@
 //! Fits that fail while they run: exit code 1.
 
+use kerrlight_common::frames::Frames;
 use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::linear::LinearError;
 use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::fit::{Objective, State, Trainer};
-use kerrlight_tomo::frames::Frames;
 
 /// What went wrong.
 #[derive(Debug, thiserror::Error)]

@@ -9,7 +9,7 @@ use crate::output;
 use crate::progress;
 use crate::report::{Axis, LinePlot, Marks, Series};
 use anyhow::Context;
-use kerrlight_tomo::dynamics;
+use kerrlight_render::dynamics;
 use kerrlight_tomo::fit::settings::{FitFile, HeldOutSettings, Kind};
 use kerrlight_tomo::fit::setup::{self, Held, HeldData};
 use serde_json::{Value, json};

@@ -4,13 +4,13 @@ use super::folder::Folder;
 use super::linear;
 use crate::output;
 use anyhow::Context;
-use kerrlight_tomo::dynamics::Axis;
+use kerrlight_render::dynamics::Axis;
 use kerrlight_tomo::fit::linear::{Change, LinearSolution, Voxels};
 use kerrlight_tomo::fit::settings::{FitFile, Kind};
 use kerrlight_tomo::fit::setup::{self, Measured, SolvedLeakage};
 use kerrlight_tomo::fit::{Batch, Beside, Field, State, Trainer, checkpoint};
-use kerrlight_tomo::interferometry::files;
 use kerrlight_tomo::representation::{Representation, Workspace};
+use kerrlight_vlbi::files;
 use serde_json::json;
 
 /// The table of what was found last.

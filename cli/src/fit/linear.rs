@@ -4,7 +4,7 @@ use super::failed;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
 use anyhow::Context;
-use kerrlight_tomo::dynamics::Axis;
+use kerrlight_render::dynamics::Axis;
 use kerrlight_tomo::fit::linear::{Change, Ending, LinearProgress, LinearSolution};
 use kerrlight_tomo::fit::settings::{FitFile, Kind};
 use kerrlight_tomo::fit::setup::Imprinted;

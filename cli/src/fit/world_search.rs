@@ -8,7 +8,7 @@ use crate::interrupt::{Interrupted, Keeper};
 use crate::output;
 use crate::progress;
 use anyhow::{Context, bail};
-use kerrlight_tomo::dynamics::Velocity;
+use kerrlight_render::dynamics::Velocity;
 use kerrlight_tomo::fit::Motion;
 use kerrlight_tomo::fit::settings::{FitFile, Region, UnknownWorld};
 use kerrlight_tomo::fit::setup::{self, FoundWorld, Instrument, Measured, Trial};

@@ -3,7 +3,7 @@
 use crate::answer::Answer;
 use crate::output;
 use anyhow::Context;
-use kerrlight_tomo::numpy;
+use kerrlight_common::numpy;
 use npyz::{DType, NpyFile, Order, TypeChar};
 use serde_json::{Value, json};
 use std::io::{BufReader, Read};

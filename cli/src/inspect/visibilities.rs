@@ -1,8 +1,8 @@
 //! What an observation holds.
 
 use crate::answer::Answer;
-use kerrlight_tomo::interferometry::files::Format;
-use kerrlight_tomo::interferometry::observation::{Basis, Observation, Row};
+use kerrlight_vlbi::files::Format;
+use kerrlight_vlbi::observation::{Basis, Observation, Row};
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
 

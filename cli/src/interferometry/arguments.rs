@@ -3,10 +3,10 @@
 use crate::output;
 use anyhow::{Context, anyhow, bail};
 use clap::{Args, ValueEnum};
-use kerrlight_tomo::interferometry::array::{self, Array};
-use kerrlight_tomo::interferometry::earth::{Frame, SourcePosition, Ut1};
-use kerrlight_tomo::interferometry::schedule::{Clock, Schedule, Setup};
-use kerrlight_tomo::interferometry::source::Source;
+use kerrlight_vlbi::array::{self, Array};
+use kerrlight_vlbi::earth::{Frame, SourcePosition, Ut1};
+use kerrlight_vlbi::schedule::{Clock, Schedule, Setup};
+use kerrlight_vlbi::source::Source;
 use std::path::Path;
 
 /// `sgra`, `m87`, or right ascension in hours and declination in degrees.

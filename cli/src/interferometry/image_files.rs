@@ -3,8 +3,8 @@
 
 use crate::output;
 use anyhow::{Context, anyhow, bail};
-use kerrlight_tomo::interferometry::files::{self, images};
-use kerrlight_tomo::interferometry::simulate::Movie;
+use kerrlight_vlbi::files::{self, images};
+use kerrlight_vlbi::simulate::Movie;
 use std::path::Path;
 
 pub use images::OwnTimes;
@@ -27,7 +27,7 @@ pub fn read(path: &Path, fov_uas: Option<f64>) -> anyhow::Result<(Movie, OwnTime
         "csv" | "txt" => images::csv_grid(&bytes).with_context(name)?,
         "npy" => images::npy(&bytes).with_context(name)?,
         "npz" => images::npz_movie(&bytes).with_context(name)?,
-        "exr" => images::exr_picture(&bytes).with_context(name)?,
+        "exr" => kerrlight_tomo::exr_picture::read(&bytes).with_context(name)?,
         _ => {
             bail!("{}: an image ends in .csv, .npy, .npz, .fits or .exr, a scene in .toml", name())
         }

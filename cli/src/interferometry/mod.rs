@@ -11,8 +11,8 @@ use crate::answer::{self, Answer};
 use crate::output::{self, Output};
 use anyhow::{Context, bail};
 use clap::ValueEnum;
-use kerrlight_tomo::interferometry::files::{self, EhtTable, Format};
-use kerrlight_tomo::interferometry::observation::Observation;
+use kerrlight_vlbi::files::{self, EhtTable, Format};
+use kerrlight_vlbi::observation::Observation;
 use std::path::Path;
 
 /// Reads visibilities in any format.

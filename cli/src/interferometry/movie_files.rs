@@ -4,7 +4,7 @@ use super::arguments;
 use super::image_files::{self, OwnTimes};
 use crate::output;
 use anyhow::{Context, bail};
-use kerrlight_tomo::interferometry::simulate::Movie;
+use kerrlight_vlbi::simulate::Movie;
 use std::path::{Path, PathBuf};
 
 /// How the times of a movie's images are given.

@@ -2,8 +2,8 @@
 
 use crate::output::Output;
 use anyhow::{anyhow, bail};
-use kerrlight_tomo::image::colormap::Colormap;
-use kerrlight_tomo::interferometry::observation::Observation;
+use kerrlight_render::image::colormap::Colormap;
+use kerrlight_vlbi::observation::Observation;
 use kuva::plot::scatter::ScatterPlot;
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;

@@ -4,12 +4,12 @@ use crate::assets;
 use crate::output;
 use crate::progress;
 use anyhow::{Context, bail};
-use kerrlight_tomo::interferometry::operator::ImageGrid;
-use kerrlight_tomo::interferometry::simulate::Movie;
-use kerrlight_tomo::memory;
-use kerrlight_tomo::render::render;
-use kerrlight_tomo::scene::Scene;
-use kerrlight_tomo::units::MICROARCSECOND;
+use kerrlight_common::memory;
+use kerrlight_common::units::MICROARCSECOND;
+use kerrlight_render::picture::render;
+use kerrlight_render::scene::Scene;
+use kerrlight_vlbi::operator::ImageGrid;
+use kerrlight_vlbi::simulate::Movie;
 use std::path::Path;
 
 /// Renders a scene at `times_h` (hours), the first being the scene's own time of observation.

@@ -1,8 +1,8 @@
 //! Closure traces as a table.
 
 use crate::columns::Column;
-use kerrlight_tomo::interferometry::observation::Observation;
-use kerrlight_tomo::interferometry::products::{TracePart, TraceQuantity, TraceSet};
+use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::products::{TracePart, TraceQuantity, TraceSet};
 
 /// A line a number of a trace, from baselines stronger than `least_snr` times their noise: time, stations, which number,
 /// value and error; how many lines there are.

@@ -7,8 +7,8 @@ use crate::render::exr_options::ExrOptions;
 use crate::{output, progress};
 use indicatif::ProgressBar;
 use kerrlight_geodesic::RayDevice;
-use kerrlight_tomo::Error;
-use kerrlight_tomo::render::{Film, Frame, RenderError};
+use kerrlight_render::Error;
+use kerrlight_render::picture::{Film, Frame, RenderError};
 use std::path::Path;
 use std::time::{Duration, Instant};
 

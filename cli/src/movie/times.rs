@@ -2,7 +2,7 @@
 
 use anyhow::{Context, bail};
 use clap::Args;
-use kerrlight_tomo::scene::Scene;
+use kerrlight_render::scene::Scene;
 use std::fmt;
 use std::str::FromStr;
 

@@ -6,9 +6,9 @@ use crate::progress;
 use anyhow::{Context, bail};
 use clap::Args;
 use image::RgbImage;
-use kerrlight_tomo::image::Picture;
-use kerrlight_tomo::image::animation::{Apng, Gif, Palette};
-use kerrlight_tomo::image::preview::{self, Look};
+use kerrlight_render::image::Picture;
+use kerrlight_render::image::animation::{Apng, Gif, Palette};
+use kerrlight_render::image::preview::{self, Look};
 use std::path::PathBuf;
 
 /// Options of images and animations for viewing.

@@ -1,11 +1,11 @@
 //! What a scene calls for, what that is going to cost, and what it did cost.
 
 use crate::answer::Answer;
-use kerrlight_tomo::Error;
-use kerrlight_tomo::emission::medium::Part;
-use kerrlight_tomo::render::Raster;
-use kerrlight_tomo::scene::Scene;
-use kerrlight_tomo::transport::Meter;
+use kerrlight_render::Error;
+use kerrlight_render::emission::medium::Part;
+use kerrlight_render::picture::Raster;
+use kerrlight_render::scene::Scene;
+use kerrlight_render::transport::Meter;
 use serde_json::json;
 use std::time::{Duration, Instant};
 

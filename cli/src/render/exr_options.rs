@@ -1,7 +1,7 @@
 //! How EXR files are written.
 
 use clap::Args;
-use kerrlight_tomo::image::exr::{CameraMatrices, Style};
+use kerrlight_render::image::exr::{CameraMatrices, Style};
 
 /// Options of EXR files.
 #[derive(Debug, Default, Args)]

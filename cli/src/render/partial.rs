@@ -2,7 +2,7 @@
 
 use crate::output::Output;
 use anyhow::{Context, bail};
-use kerrlight_tomo::render::{Found, Journal, Raster};
+use kerrlight_render::picture::{Found, Journal, Raster};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::path::PathBuf;
 

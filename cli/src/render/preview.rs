@@ -2,10 +2,10 @@
 
 use anyhow::bail;
 use clap::{Args, ValueEnum};
-use kerrlight_tomo::image::colormap::Colormap;
-use kerrlight_tomo::image::preview::{Look, Stretch};
-use kerrlight_tomo::image::reduce::Reduction;
-use kerrlight_tomo::scene::Scene;
+use kerrlight_render::image::colormap::Colormap;
+use kerrlight_render::image::preview::{Look, Stretch};
+use kerrlight_render::image::reduce::Reduction;
+use kerrlight_render::scene::Scene;
 
 /// Options of the PNG.
 #[derive(Debug, Default, Args)]
@@ -104,7 +104,7 @@ pub fn check_sheet(scene: &Scene) -> anyhow::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kerrlight_tomo::scene::apply_override;
+    use kerrlight_render::scene::apply_override;
 
     /// Black bodies have colours of their own, which a map of the intensity would hide.
     #[test]

@@ -1,8 +1,8 @@
 //! What is told about a picture: in the file and on the terminal.
 
-use kerrlight_tomo::image::exr::Attributes;
-use kerrlight_tomo::render::Summary;
-use kerrlight_tomo::scene::Scene;
+use kerrlight_render::image::exr::Attributes;
+use kerrlight_render::picture::Summary;
+use kerrlight_render::scene::Scene;
 use serde_json::{Value, json};
 
 /// What decided the picture, and what it amounts to: `text` is the scene as it was given,

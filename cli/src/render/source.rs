@@ -3,9 +3,9 @@
 use crate::output;
 use crate::paths;
 use anyhow::Context;
-use kerrlight_tomo::Error;
-use kerrlight_tomo::image::exr;
-use kerrlight_tomo::scene::{Scene, SceneError, apply_override};
+use kerrlight_render::Error;
+use kerrlight_render::image::exr;
+use kerrlight_render::scene::{Scene, SceneError, apply_override};
 use std::path::{Path, PathBuf};
 
 /// The scene that is rendered when none is given.

@@ -6,8 +6,8 @@ use crate::output::Output;
 use crate::progress;
 use crate::ranks::{self, Lead, Team};
 use anyhow::Context;
-use kerrlight_tomo::Error;
-use kerrlight_tomo::render::{Journal, Raster, RenderError};
+use kerrlight_render::Error;
+use kerrlight_render::picture::{Journal, Raster, RenderError};
 use std::io;
 use std::path::{Path, PathBuf};
 

@@ -8,11 +8,11 @@ use crate::interrupt::{Interrupted, Keeper};
 use crate::output::Output;
 use crate::progress;
 use anyhow::Context;
-use kerrlight_tomo::Error;
-use kerrlight_tomo::image::Picture;
-use kerrlight_tomo::image::reduce::Reduction;
-use kerrlight_tomo::render::{AnyJournal, Journal, Raster, RenderError, Summary};
-use kerrlight_tomo::scene::Scene;
+use kerrlight_render::Error;
+use kerrlight_render::image::Picture;
+use kerrlight_render::image::reduce::Reduction;
+use kerrlight_render::picture::{AnyJournal, Journal, Raster, RenderError, Summary};
+use kerrlight_render::scene::Scene;
 use std::io::Cursor;
 
 /// What is rendered.

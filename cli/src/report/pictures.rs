@@ -1,12 +1,12 @@
 //! Pictures of volumes with the captions that belong to them.
 
 use anyhow::{Context, anyhow};
-use kerrlight_tomo::frames::Frames;
-use kerrlight_tomo::image::colormap::Colormap;
-use kerrlight_tomo::interferometry::operator::Float;
-use kerrlight_tomo::volume::Shown;
-use kerrlight_tomo::volume::projection::{self, Surroundings, VIEWS};
-use kerrlight_tomo::volume::slices::{self, Outlines, Through};
+use kerrlight_common::frames::Frames;
+use kerrlight_render::image::colormap::Colormap;
+use kerrlight_render::volume::Shown;
+use kerrlight_render::volume::projection::{self, Surroundings, VIEWS};
+use kerrlight_render::volume::slices::{self, Outlines, Through};
+use kerrlight_vlbi::operator::Float;
 use std::io::Cursor;
 
 /// A picture of the page.

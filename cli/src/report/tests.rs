@@ -3,10 +3,10 @@
 mod browser;
 
 use super::*;
-use kerrlight_tomo::dynamics::AngularVelocity;
-use kerrlight_tomo::volume::projection::Surroundings;
-use kerrlight_tomo::volume::slices::Through;
-use kerrlight_tomo::volume::{Shown, Volume};
+use kerrlight_render::dynamics::AngularVelocity;
+use kerrlight_render::volume::projection::Surroundings;
+use kerrlight_render::volume::slices::Through;
+use kerrlight_render::volume::{Shown, Volume};
 use std::f64::consts::TAU;
 
 const XI: [f64; 3] = [0.5, 0.0, -0.866_025_403_784_438_6];

@@ -2,9 +2,9 @@
 
 use super::pictures::{Figure, Sheet, encode};
 use anyhow::Context;
-use kerrlight_tomo::image::canvas::Canvas;
-use kerrlight_tomo::image::ticks::{self, Tick};
-use kerrlight_tomo::image::{Channel, Picture};
+use kerrlight_render::image::canvas::Canvas;
+use kerrlight_render::image::ticks::{self, Tick};
+use kerrlight_render::image::{Channel, Picture};
 
 /// Ticks from left to right of an image.
 const ACROSS: usize = 22;

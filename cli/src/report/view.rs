@@ -4,10 +4,10 @@ use super::escape::escape;
 use super::html::fill;
 use super::pictures::encode;
 use anyhow::bail;
-use kerrlight_tomo::dynamics::AngularVelocity;
-use kerrlight_tomo::image::colormap::Colormap;
-use kerrlight_tomo::volume::projection::{self, Surroundings, View};
-use kerrlight_tomo::volume::{Shown, Volume};
+use kerrlight_render::dynamics::AngularVelocity;
+use kerrlight_render::image::colormap::Colormap;
+use kerrlight_render::volume::projection::{self, Surroundings, View};
+use kerrlight_render::volume::{Shown, Volume};
 use serde_json::json;
 
 const VIEWER: &str = include_str!("assets/viewer.html");

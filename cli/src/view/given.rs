@@ -6,11 +6,11 @@ use super::subject::Subject;
 use super::{left_out, sky, still};
 use crate::render::preview::PreviewOptions;
 use anyhow::Context;
-use kerrlight_tomo::emission::black_body::BlackBody;
-use kerrlight_tomo::image::colormap::Colormap;
-use kerrlight_tomo::image::preview::Look;
-use kerrlight_tomo::scene::{CameraMotion, Scene};
-use kerrlight_tomo::units::SPEED_OF_LIGHT;
+use kerrlight_common::units::SPEED_OF_LIGHT;
+use kerrlight_render::emission::black_body::BlackBody;
+use kerrlight_render::image::colormap::Colormap;
+use kerrlight_render::image::preview::Look;
+use kerrlight_render::scene::{CameraMotion, Scene};
 use serde_json::{Value, json};
 
 /// The object.

@@ -1,7 +1,7 @@
 //! What of a scene the page does not show.
 
 use super::subject::Subject;
-use kerrlight_tomo::scene::Scene;
+use kerrlight_render::scene::Scene;
 
 /// Spots that the page has room for.
 pub const SPOTS: usize = 8;

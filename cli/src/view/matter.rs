@@ -3,10 +3,10 @@
 use super::left_out::SPOTS;
 use super::subject::Subject;
 use kerrlight_geodesic::Kerr;
-use kerrlight_tomo::dynamics::{AngularVelocity, Axis, Velocity};
-use kerrlight_tomo::emission::spot::SpotModel;
-use kerrlight_tomo::scene::{Rotation, Spot, VolumeSource};
-use kerrlight_tomo::volume::{Volume, VolumeFile};
+use kerrlight_render::dynamics::{AngularVelocity, Axis, Velocity};
+use kerrlight_render::emission::spot::SpotModel;
+use kerrlight_render::scene::{Rotation, Spot, VolumeSource};
+use kerrlight_render::volume::{Volume, VolumeFile};
 use serde_json::{Value, json};
 
 /// A volume as a texture of half floats.

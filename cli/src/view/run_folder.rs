@@ -3,9 +3,9 @@
 use crate::output;
 use crate::volume_files;
 use anyhow::{Context, bail, ensure};
-use kerrlight_tomo::numpy::{Archive, read_array};
-use kerrlight_tomo::scene::Scene;
-use kerrlight_tomo::volume::VolumeFile;
+use kerrlight_common::numpy::{Archive, read_array};
+use kerrlight_render::scene::Scene;
+use kerrlight_render::volume::VolumeFile;
 use std::path::{Path, PathBuf};
 
 /// Pictures that a fit was made of.

@@ -4,8 +4,8 @@ use super::subject::Subject;
 use anyhow::Context;
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
-use kerrlight_tomo::emission::sky::{Beam, SkyModel};
-use kerrlight_tomo::image::preview::srgb_of_linear;
+use kerrlight_render::emission::sky::{Beam, SkyModel};
+use kerrlight_render::image::preview::srgb_of_linear;
 use rayon::prelude::*;
 
 const WIDTH: usize = 2048;

@@ -3,9 +3,9 @@
 use super::subject::Subject;
 use crate::interrupt::Keeper;
 use anyhow::Context;
-use kerrlight_tomo::render::Raster;
-use kerrlight_tomo::scene::{Rings, Scene};
-use kerrlight_tomo::transport::Assets;
+use kerrlight_render::picture::Raster;
+use kerrlight_render::scene::{Rings, Scene};
+use kerrlight_render::transport::Assets;
 
 /// Pixels of the longer side.
 const SIDE: u32 = 64;

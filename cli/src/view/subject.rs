@@ -4,9 +4,9 @@ use super::run_folder::{self, Measured};
 use crate::assets;
 use crate::render::source::Source;
 use anyhow::Context;
-use kerrlight_tomo::scene::Scene;
-use kerrlight_tomo::transport::Assets;
-use kerrlight_tomo::volume::VolumeFile;
+use kerrlight_render::scene::Scene;
+use kerrlight_render::transport::Assets;
+use kerrlight_render::volume::VolumeFile;
 use std::path::Path;
 
 /// A scene with everything that the page needs of it.

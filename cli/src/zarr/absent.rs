@@ -1,8 +1,8 @@
 //! What a program without Zarr says of stores.
 
 use anyhow::bail;
-use kerrlight_tomo::interferometry::files::images::WithSize;
-use kerrlight_tomo::volume::VolumeArrays;
+use kerrlight_render::volume::VolumeArrays;
+use kerrlight_vlbi::files::images::WithSize;
 use std::path::Path;
 
 /// Refuses to read a volume.

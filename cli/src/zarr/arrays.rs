@@ -2,7 +2,7 @@
 
 use super::has_metadata;
 use anyhow::{Context, anyhow, bail};
-use kerrlight_tomo::memory;
+use kerrlight_common::memory;
 use serde_json::{Map, Value};
 use std::path::Path;
 use std::sync::Arc;

@@ -3,8 +3,8 @@
 use super::{Reading, Store, files};
 use crate::output;
 use anyhow::{Context, bail};
-use kerrlight_tomo::interferometry::files::images::{WithSize, frames_with, image_of};
-use kerrlight_tomo::volume::VolumeArrays;
+use kerrlight_render::volume::VolumeArrays;
+use kerrlight_vlbi::files::images::{WithSize, frames_with, image_of};
 use std::path::Path;
 
 /// Reads a volume: the array `emission` of a group, or an array, of shape (nx, ny, nz). Corners are the first and the last

@@ -1,5 +1,5 @@
 use super::*;
-use kerrlight_tomo::volume::{Volume, VolumeArrays};
+use kerrlight_render::volume::{Volume, VolumeArrays};
 use serde_json::{Map, Value, json};
 use std::sync::Arc;
 use zarrs::array::codec::GzipCodec;

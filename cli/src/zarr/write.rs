@@ -2,7 +2,7 @@
 
 use crate::output::folder::write_folder;
 use anyhow::{Context, anyhow};
-use kerrlight_tomo::volume::Volume;
+use kerrlight_render::volume::Volume;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 use std::sync::Arc;

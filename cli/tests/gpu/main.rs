@@ -6,8 +6,8 @@
 mod faults;
 mod paths;
 
-use kerrlight_tomo::image::Picture;
-use kerrlight_tomo::image::exr;
+use kerrlight_render::image::Picture;
+use kerrlight_render::image::exr;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

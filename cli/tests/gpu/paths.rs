@@ -1,7 +1,7 @@
 //! Pictures of volumes, spots and meshes, whose light is summed along paths of the device.
 
 use super::{decoded, difference, folder, scene, succeed};
-use kerrlight_tomo::image::Picture;
+use kerrlight_render::image::Picture;
 use std::path::Path;
 
 /// Changes of a scene, and how far some channels may be from those of the processor: the sum of the differences by the

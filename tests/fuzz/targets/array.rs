@@ -1,6 +1,6 @@
 #![no_main]
 
-use kerrlight_tomo::interferometry::array::{parse, to_text};
+use kerrlight_vlbi::array::{parse, to_text};
 use libfuzzer_sys::fuzz_target;
 
 // An array that has been read is the same when written and read again.

@@ -1,6 +1,6 @@
 #![no_main]
 
-use kerrlight_tomo::interferometry::files::{parse_obs_text, to_obs_text};
+use kerrlight_vlbi::files::{parse_obs_text, to_obs_text};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|text: &str| {

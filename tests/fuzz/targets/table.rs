@@ -1,6 +1,6 @@
 #![no_main]
 
-use kerrlight_tomo::interferometry::files::{parse_table, to_csv};
+use kerrlight_vlbi::files::{parse_table, to_csv};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|text: &str| {

@@ -1,6 +1,6 @@
 #![no_main]
 
-use kerrlight_tomo::interferometry::files::{read_uvfits, write_uvfits};
+use kerrlight_vlbi::files::{read_uvfits, write_uvfits};
 use libfuzzer_sys::fuzz_target;
 
 // What can be read can be written, if it has all that the format needs, and read again.

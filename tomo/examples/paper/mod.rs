@@ -1,11 +1,11 @@
 //! Scenes "1", "4" and "8" of BH-NeRF (Levis et al. 2022): hot spots that orbit at 3.5 M.
 
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
-use kerrlight_tomo::dynamics::{AngularVelocity, Axis, Turned, pull_back};
+use kerrlight_render::dynamics::{AngularVelocity, Axis, Turned, pull_back};
+use kerrlight_render::points::{Coordinates, CoordinatesMut};
 use kerrlight_tomo::fit::{
     Batch, ForwardModel, Motion, Region, Sampling, SightlineRequest, Sightlines,
 };
-use kerrlight_tomo::points::{Coordinates, CoordinatesMut};
 use std::error::Error;
 
 /// Frames of the movie.

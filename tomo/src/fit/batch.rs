@@ -3,10 +3,10 @@
 use super::fall::Fall;
 use super::forward_model::{Field, ForwardModel};
 use super::occupancy::Occupancy;
-use crate::dynamics::{Axis, Turned, pull_back};
-use crate::points::{Coordinates, CoordinatesMut};
 use crate::representation::Representation;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
+use kerrlight_render::dynamics::{Axis, Turned, pull_back};
+use kerrlight_render::points::{Coordinates, CoordinatesMut};
 use rayon::prelude::*;
 
 /// Points of matter that falls, which one thread carries at a time.

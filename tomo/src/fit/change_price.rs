@@ -3,9 +3,9 @@
 
 use super::Field;
 use super::sightlines::Region;
-use crate::points::Coordinates;
 use crate::representation::{Gradient, Knots, Workspace};
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
+use kerrlight_render::points::Coordinates;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 

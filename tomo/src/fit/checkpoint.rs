@@ -3,9 +3,9 @@
 use super::occupancy::Occupancy;
 use super::state::{Progress, State};
 use crate::Error;
-use crate::dynamics::Axis;
 use crate::optimise::{AdamState, LbfgsState};
-use crate::toml_file;
+use kerrlight_common::toml_file;
+use kerrlight_render::dynamics::Axis;
 use safetensors::tensor::{Dtype, SafeTensorError, TensorView};
 use safetensors::{SafeTensors, serialize};
 use serde::{Deserialize, Serialize};

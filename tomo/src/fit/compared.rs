@@ -1,7 +1,7 @@
 //! What frames are compared with, for those who compute χ² on another device.
 
-use crate::interferometry::data_terms::Comparison;
-use crate::interferometry::operator::ImageGrid;
+use kerrlight_vlbi::data_terms::Comparison;
+use kerrlight_vlbi::operator::ImageGrid;
 
 /// What a frame is compared with.
 #[derive(Clone, Debug, PartialEq)]

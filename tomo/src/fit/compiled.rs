@@ -7,10 +7,10 @@ use super::forward_model::{Field, Motion};
 use super::state::{Outcome, Progress, State};
 use super::trainer::Trainer;
 use crate::Error;
-use crate::frames::Frames;
-use crate::points::Coordinates;
 use crate::representation::Representation;
-use crate::simd::Float;
+use kerrlight_common::frames::Frames;
+use kerrlight_common::simd::Float;
+use kerrlight_render::points::Coordinates;
 
 macro_rules! in_precision {
     ($number:ty) => {
@@ -47,6 +47,7 @@ macro_rules! in_precision {
                 Frames::made((frames.len(), self.objective.model.pixels()), |sink| {
                     frames.iter().try_for_each(|frame| sink(&self.predict(now, &[*frame], masked)))
                 })
+                .map_err(Error::Common)
             }
 
             /// Emission at points at the reference time.

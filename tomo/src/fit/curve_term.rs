@@ -3,8 +3,8 @@
 use super::FrameTerm;
 use super::terms::plain;
 use crate::Error;
-use crate::interferometry::data_terms::Residual;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
+use kerrlight_vlbi::data_terms::Residual;
 
 /// A flux and its standard deviation, Jy.
 pub type FluxDatum = [f64; 2];

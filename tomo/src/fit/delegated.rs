@@ -5,7 +5,7 @@ use super::state::{Outcome, State, step_back};
 use super::trainer::Trainer;
 use super::training::BatchSize;
 use crate::Error;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 use std::time::Instant;
 
 /// Time after which a stretch should be over, so that signals are heard.

@@ -9,9 +9,9 @@ use super::occupancy::Occupancy;
 use super::selection::Selection;
 use super::state::Progress;
 use crate::Error;
-use crate::dynamics::Axis;
 use crate::optimise::Adam;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
+use kerrlight_render::dynamics::Axis;
 
 /// Why a device does not take the steps of a fit: it failed, or it does not do what settings ask for.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

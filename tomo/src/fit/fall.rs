@@ -1,8 +1,8 @@
 //! Where matter that changes its radius was at the reference time.
 
 use super::sightlines::Sightlines;
-use crate::dynamics::infall::{Falling, Origin};
 use kerrlight_geodesic::vector::norm;
+use kerrlight_render::dynamics::infall::{Falling, Origin};
 use rayon::prelude::*;
 use std::sync::Arc;
 

@@ -8,11 +8,11 @@ use super::shift::Shift;
 use super::sightlines::Sightlines;
 use super::stokes::{Planes, Seen};
 use crate::Error;
-use crate::dynamics::{AngularVelocity, Axis, Injection};
-use crate::polarization::{Stokes, StokesParameter};
 use crate::representation::Representation;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 use kerrlight_geodesic::Kerr;
+use kerrlight_render::dynamics::{AngularVelocity, Axis, Injection};
+use kerrlight_render::polarization::{Stokes, StokesParameter};
 use rayon::prelude::*;
 
 /// How the matter moves, and when it is seen.

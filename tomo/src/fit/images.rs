@@ -4,7 +4,7 @@ use super::batch::Batch;
 use super::forward_model::{Field, ForwardModel};
 use super::stokes::Planes;
 use crate::representation::Workspace;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 
 impl<T: Float> ForwardModel<T> {
     /// Images of these frames, one after the other: `movie` is overwritten. [`weigh`](Self::weigh) comes first.

@@ -4,9 +4,9 @@ use super::batch::{Batch, Columns};
 use super::forward_model::ForwardModel;
 use super::stokes::Planes;
 use crate::Error;
-use crate::dynamics::Axis;
-use crate::frames::Sink;
-use crate::simd::Float;
+use kerrlight_common::frames::Sink;
+use kerrlight_common::simd::Float;
+use kerrlight_render::dynamics::Axis;
 use rayon::prelude::*;
 
 impl<T: Float> ForwardModel<T> {

@@ -8,7 +8,7 @@
 //!
 //! ```
 //! use kerrlight_geodesic::{Inclination, Kerr, Observer};
-//! use kerrlight_tomo::dynamics::{AngularVelocity, Axis};
+//! use kerrlight_render::dynamics::{AngularVelocity, Axis};
 //! use kerrlight_tomo::fit::{
 //!     Batch, ForwardModel, Motion, Region, Sampling, SightlineRequest, Sightlines,
 //! };

@@ -5,8 +5,8 @@ use super::objective::{Buffers, Loss, Objective};
 use super::terms::FrameTerm;
 use super::verdict::Statistics;
 use crate::Error;
-use crate::frames::Frames;
-use crate::simd::Float;
+use kerrlight_common::frames::Frames;
+use kerrlight_common::simd::Float;
 
 impl<T: Float> Objective<T> {
     /// Images of these frames, one after the other.

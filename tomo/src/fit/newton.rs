@@ -4,9 +4,9 @@ use super::objective::Loss;
 use super::state::{Outcome, Progress};
 use super::steps::Place;
 use super::trainer::Trainer;
-use crate::dynamics::Axis;
 use crate::optimise::{Lbfgs, LbfgsState, Step};
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
+use kerrlight_render::dynamics::Axis;
 
 /// The axis of a vector behind the parameters, and the vector's length.
 fn axis_of<T: Float>(vector: &[T]) -> Option<(Axis, f64)> {

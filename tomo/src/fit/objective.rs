@@ -4,11 +4,11 @@ use super::batch::Batch;
 use super::forward_model::{Field, ForwardModel};
 use super::selection::Selection;
 use super::terms::{FrameTerm, ImageTerm};
-use crate::dynamics::{Cotangents, Turned, pull_back_vjp};
-use crate::points::{Coordinates, CoordinatesMut};
 use crate::representation::{Gradient, Groups, Representation, Workspace};
-use crate::simd::Float;
 use core::ops::Range;
+use kerrlight_common::simd::Float;
+use kerrlight_render::dynamics::{Cotangents, Turned, pull_back_vjp};
+use kerrlight_render::points::{Coordinates, CoordinatesMut};
 
 /// Data with their share in the loss: weight · χ²/(number of data).
 pub struct Weighted<D: ?Sized> {

@@ -1,9 +1,9 @@
 //! Where in co-rotating coordinates anything shines: what is empty is not evaluated.
 
 use super::sightlines::Region;
-use crate::points::Coordinates;
 use crate::representation::{Representation, Workspace};
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
+use kerrlight_render::points::Coordinates;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 

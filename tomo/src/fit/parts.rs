@@ -7,8 +7,8 @@
 use super::forward_model::Field;
 use super::objective::{Buffers, Gradients, Loss, Objective};
 use super::selection::Selection;
-use crate::simd::Float;
 use core::ops::Range;
+use kerrlight_common::simd::Float;
 
 /// Loss and gradient of some parts of a step.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -5,9 +5,9 @@ use super::Field;
 use super::linear::Prior;
 use super::regulariser::Shape;
 use super::sightlines::Region;
-use crate::points::Coordinates;
 use crate::representation::{Gradient, Workspace};
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
+use kerrlight_render::points::Coordinates;
 
 /// Where a field is evaluated.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,7 +5,7 @@
 //! the same on a finer grid.
 
 use crate::Error;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 use rayon::prelude::*;
 
 /// Nodes of a regular grid, z fastest.

@@ -2,9 +2,9 @@
 
 use super::compared::Compared;
 use super::terms::FrameTerm;
-use crate::interferometry::data_terms::{DataTerm, Residual};
-use crate::interferometry::operator::{Operator, Transform};
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
+use kerrlight_vlbi::data_terms::{DataTerm, Residual};
+use kerrlight_vlbi::operator::{Operator, Transform};
 use num_complex::Complex;
 
 /// What an array of telescopes measures of a frame.

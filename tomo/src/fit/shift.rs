@@ -1,9 +1,9 @@
 //! The redshift factor of gas that turns about any axis, and its derivative with respect to the axis.
 
 use super::sightlines::Sightlines;
-use crate::dynamics::{AngularVelocity, Axis};
 use kerrlight_geodesic::Kerr;
 use kerrlight_geodesic::vector::norm;
+use kerrlight_render::dynamics::{AngularVelocity, Axis};
 use rayon::prelude::*;
 
 /// What g of one node depends on: g = √N/(1 − Ω ξ·L), N = −u·u of the gas per (dt)².

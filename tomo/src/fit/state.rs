@@ -3,10 +3,10 @@
 use super::objective::Loss;
 use super::occupancy::Occupancy;
 use super::training::{OccupancyPlan, Training};
-use crate::dynamics::Axis;
 use crate::optimise::{AdamState, LbfgsState};
 use crate::representation::Representation;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
+use kerrlight_render::dynamics::Axis;
 
 /// Most returns of a fit.
 const MOST_SETBACKS: u32 = 12;

@@ -3,13 +3,13 @@
 
 use super::sightlines::Sightlines;
 use crate::Error;
-use crate::dynamics::{AngularVelocity, Axis};
-use crate::polarization::{
-    Gas, Normalisation, PolarizationLaw, Stokes, StokesParameter, SynchrotronView,
-};
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 use kerrlight_geodesic::vector::norm;
 use kerrlight_geodesic::{Kerr, ScreenPoint, ZamoFrame};
+use kerrlight_render::dynamics::{AngularVelocity, Axis};
+use kerrlight_render::polarization::{
+    Gas, Normalisation, PolarizationLaw, Stokes, StokesParameter, SynchrotronView,
+};
 use rayon::prelude::*;
 
 /// How polarised light of a fit is seen.

@@ -2,9 +2,9 @@
 
 use super::compared::Compared;
 use crate::Error;
-use crate::frames::Frames;
-use crate::interferometry::data_terms::Residual;
-use crate::simd::Float;
+use kerrlight_common::frames::Frames;
+use kerrlight_common::simd::Float;
+use kerrlight_vlbi::data_terms::Residual;
 use std::borrow::Cow;
 use std::sync::OnceLock;
 

@@ -3,6 +3,7 @@
 use super::*;
 
 mod blobs;
+mod falling_volume;
 mod leakage;
 mod orbital;
 mod parts;
@@ -13,16 +14,16 @@ mod stokes;
 mod training;
 mod transport;
 
-use crate::dynamics::{AngularVelocity, Axis, Injection, Velocity};
-use crate::interferometry::data_terms::{DataTerm, Residual};
-use crate::interferometry::operator::{Dtft, ImageGrid, Pulse, Transform};
 use crate::representation::{
     Activation, Coordinates, Gradient, Grid, GridSettings, Groups, Representation, Workspace,
 };
-use crate::simd::Float;
 pub(super) use blobs::Blobs;
+use kerrlight_common::simd::Float;
 use kerrlight_geodesic::vector::{distance, norm};
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
+use kerrlight_render::dynamics::{AngularVelocity, Axis, Injection, Velocity};
+use kerrlight_vlbi::data_terms::{DataTerm, Residual};
+use kerrlight_vlbi::operator::{Dtft, ImageGrid, Pulse, Transform};
 use num_complex::Complex;
 
 const SIDE: usize = 9;

@@ -7,7 +7,7 @@ use super::parts::Ranks;
 use super::penalties::ProbeBuffers;
 use super::training::Training;
 use crate::representation::{Representation, WeightMatrix};
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 
 /// A fit with its memory.
 pub struct Trainer<'a, T> {

@@ -6,7 +6,7 @@ use super::penalties::Penalties;
 use super::sightlines::Region;
 use crate::optimise::{Adam, Lbfgs, Muon, Polynomial};
 use crate::representation::Representation;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 use serde::{Deserialize, Serialize};
 
 /// What a step looks at.

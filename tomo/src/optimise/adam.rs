@@ -1,7 +1,7 @@
 //! Adam (Kingma & Ba 2015, arXiv:1412.6980, algorithm 1).
 
 use crate::Error;
-use crate::simd::{Float, InstructionSet, Lanes, Task, dispatch};
+use kerrlight_common::simd::{Float, InstructionSet, Lanes, Task, dispatch};
 use rayon::prelude::*;
 
 /// Decay rates of the moments and the number that keeps the division safe.

@@ -4,7 +4,7 @@
 //! f64, and none can be stopped and continued with the same bits.
 
 use super::line_search::{Point, Wolfe};
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 
 /// Value at the parameters; overwrites the gradient.
 pub type Objective<'a, T> = dyn FnMut(&[T], &mut [T]) -> f64 + 'a;

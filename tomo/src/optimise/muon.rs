@@ -5,10 +5,10 @@
 //! fine structure, is learnt slowly. Muon steps along U Vᵀ, in which all count alike.
 
 use super::{Adam, AdamState};
-use crate::matrix::{Shape, multiply};
 use crate::representation::WeightMatrix;
-use crate::simd::Float;
 use core::ops::Range;
+use kerrlight_common::matrix::{Shape, multiply};
+use kerrlight_common::simd::Float;
 use rayon::prelude::*;
 
 /// Steps of weight matrices along orthogonal matrices, and of all other parameters by Adam.

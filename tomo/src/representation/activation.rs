@@ -1,6 +1,6 @@
 //! From an unbounded number to an emissivity.
 
-use crate::simd::{Float, Lanes, math};
+use kerrlight_common::simd::{Float, Lanes, math};
 use serde::{Deserialize, Serialize};
 
 /// The last function of a representation.

@@ -2,9 +2,11 @@
 
 use super::{Coordinates, CoordinatesMut, Gradient, Representation, WeightMatrix, Workspace};
 use crate::Error;
-use crate::dynamics::{AngularVelocity, Axis, Cotangents, Turned, pull_back, pull_back_vjp};
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 use kerrlight_geodesic::vector::norm;
+use kerrlight_render::dynamics::{
+    AngularVelocity, Axis, Cotangents, Turned, pull_back, pull_back_vjp,
+};
 use serde::{Deserialize, Serialize};
 
 /// Which changes are allowed.

@@ -27,8 +27,8 @@ pub use registry::{
 pub use spline::{Degree, Spline};
 pub use workspace::Workspace;
 
-pub use crate::points::{Coordinates, CoordinatesMut};
-pub use crate::simd::{Float, InstructionSet};
+pub use kerrlight_common::simd::{Float, InstructionSet};
+pub use kerrlight_render::points::{Coordinates, CoordinatesMut};
 
 use core::ops::Range;
 

@@ -2,7 +2,7 @@
 
 use super::device;
 use super::problem::{self, Kind, axis, objective, start, training};
-use kerrlight_tomo::dynamics::Axis;
+use kerrlight_render::dynamics::Axis;
 use kerrlight_tomo::fit::graphics::GraphicsFit;
 use kerrlight_tomo::fit::{
     BatchSize, Buffers, Drawn, Field, Gradients, Loss, Objective, Occupancy, Progress, StepDevice,

@@ -3,25 +3,23 @@
 
 use kerrlight_geodesic::infall::Mixture;
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
-use kerrlight_tomo::dynamics::infall::{Falling, Law};
-use kerrlight_tomo::dynamics::{AngularVelocity, Axis, Injection};
+use kerrlight_render::dynamics::infall::{Falling, Law};
+use kerrlight_render::dynamics::{AngularVelocity, Axis, Injection};
 use kerrlight_tomo::fit::{
     BatchSize, Data, ForwardModel, FrameTerm, ImageTerm, LightCurveTerm, Motion, Objective,
     OccupancyPlan, OccupancySettings, Redshift, Region, Sampling, Scan, ScanTerm, SightlineRequest,
     Sightlines, State, Training, Weighted,
 };
-use kerrlight_tomo::interferometry::Complex64;
-use kerrlight_tomo::interferometry::data_terms::{
-    AmplitudeTerm, ClosureTerm, DataTerm, Residual, VisibilityTerm,
-};
-use kerrlight_tomo::interferometry::observation::{Basis, Measured, Observation, Row};
-use kerrlight_tomo::interferometry::operator::{ImageGrid, Method, Pulse, Transform};
-use kerrlight_tomo::interferometry::products::ClosureKind;
 use kerrlight_tomo::optimise::{Adam, Polynomial};
 use kerrlight_tomo::representation::{
     Activation, FeatureGrid, FeatureGridSettings, Grid, GridSettings, Network, NetworkSettings,
     Representation,
 };
+use kerrlight_vlbi::Complex64;
+use kerrlight_vlbi::data_terms::{AmplitudeTerm, ClosureTerm, DataTerm, Residual, VisibilityTerm};
+use kerrlight_vlbi::observation::{Basis, Measured, Observation, Row};
+use kerrlight_vlbi::operator::{ImageGrid, Method, Pulse, Transform};
+use kerrlight_vlbi::products::ClosureKind;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 

@@ -10,10 +10,10 @@ use crate::fit;
 use crate::report::{Figure, encode};
 use crate::volume_files;
 use anyhow::Context;
-use kerrlight_tomo::dynamics::Axis;
-use kerrlight_tomo::volume::metrics;
-use kerrlight_tomo::volume::projection::{Surroundings, Tile, View, mosaic};
-use kerrlight_tomo::volume::{Volume, VolumeFile};
+use kerrlight_render::dynamics::Axis;
+use kerrlight_render::volume::metrics;
+use kerrlight_render::volume::projection::{Surroundings, Tile, View, mosaic};
+use kerrlight_render::volume::{Volume, VolumeFile};
 use serde_json::Value;
 
 impl Figures<'_> {

@@ -3,8 +3,8 @@
 use super::sources::Source;
 use super::{complete, digits};
 use anyhow::bail;
-use kerrlight_tomo::interferometry::light_curve::{LightCurve, Sample};
-use kerrlight_tomo::polarization::StokesParameter;
+use kerrlight_render::polarization::StokesParameter;
+use kerrlight_vlbi::light_curve::{LightCurve, Sample};
 use std::fmt::Write;
 
 /// Samples that are left, at most about.

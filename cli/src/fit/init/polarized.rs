@@ -2,8 +2,8 @@
 
 use super::digits;
 use kerrlight_tomo::fit::verdict::CHANCE;
-use kerrlight_tomo::interferometry::light_curve::LightCurve;
-use kerrlight_tomo::interferometry::observation::{Basis, Observation};
+use kerrlight_vlbi::light_curve::LightCurve;
+use kerrlight_vlbi::observation::{Basis, Observation};
 
 /// Tables of a static image that polarised data add.
 #[derive(Default)]

@@ -4,7 +4,7 @@ use kerrlight_tomo::fit::settings::StaticImageFile;
 use kerrlight_tomo::fit::setup::Measured;
 use kerrlight_tomo::fit::static_image::survey;
 use kerrlight_tomo::fit::verdict::CHANCE;
-use kerrlight_tomo::interferometry::observation::Observation;
+use kerrlight_vlbi::observation::Observation;
 
 /// What a static image leaves of data.
 pub struct QuickLook {

@@ -1,6 +1,6 @@
 //! Sources whose numbers are published.
 
-use kerrlight_tomo::interferometry::earth::SourcePosition;
+use kerrlight_vlbi::earth::SourcePosition;
 
 /// A source whose mass and distance are known.
 pub struct Source {

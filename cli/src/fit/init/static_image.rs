@@ -3,8 +3,8 @@
 use super::polarized::Tables;
 use super::{Source, complete, digits, gains, has_closures, plain_words, read, short_baselines};
 use anyhow::Context;
-use kerrlight_tomo::interferometry::observation::Observation;
-use kerrlight_tomo::units::MICROARCSECOND;
+use kerrlight_common::units::MICROARCSECOND;
+use kerrlight_vlbi::observation::Observation;
 
 /// The plain settings of a static image of these data, for annotation.
 pub fn of_visibilities(

@@ -8,9 +8,9 @@ use super::predictive;
 use super::summary::{Interval, Summary};
 use crate::output::Output;
 use crate::report::{self, Drawing, Report, Triangle, Variable};
-use kerrlight_tomo::volume::ranks::Ranks;
-use kerrlight_tomo::volume::slices::{Outlines, Through};
-use kerrlight_tomo::volume::{Shown, Volume, VolumeFile, vti};
+use kerrlight_render::volume::ranks::Ranks;
+use kerrlight_render::volume::slices::{Outlines, Through};
+use kerrlight_render::volume::{Shown, Volume, VolumeFile, vti};
 use std::path::Path;
 
 /// Writes mean.npz, deviation.npz, posterior.vti, posterior.zarr, worlds.csv, triangle.svg and the page of draws about the
@@ -157,7 +157,7 @@ fn ranks(found: &[Ranks; 3]) -> report::Table {
 
 fn of_nodes(found: &Summary) -> Vec<report::Table> {
     let Some(coverage) = &found.coverage else { return Vec::new() };
-    let row = |(name, c): (&str, &kerrlight_tomo::volume::Coverage)| {
+    let row = |(name, c): (&str, &kerrlight_render::volume::Coverage)| {
         let percent = |part: f64| format!("{:.0} %", 100.0 * part);
         vec![name.to_owned(), c.nodes.to_string(), percent(c.one), percent(c.two)]
     };

@@ -5,14 +5,14 @@ use super::super::results::verdict::Evidence;
 use super::predictive::Check;
 use crate::interrupt::Keeper;
 use anyhow::{Context, bail};
+use kerrlight_common::frames::Frames;
+use kerrlight_render::volume::Volume;
 use kerrlight_tomo::fit::linear::LinearProgress;
 use kerrlight_tomo::fit::settings::{FitFile, Kind, Start};
 use kerrlight_tomo::fit::setup::{self, Instrument, Measured};
 use kerrlight_tomo::fit::verdict::Tested;
 use kerrlight_tomo::fit::{Motion, Objective, Outcome, State, Trainer};
-use kerrlight_tomo::frames::Frames;
 use kerrlight_tomo::representation::Registry;
-use kerrlight_tomo::volume::Volume;
 use std::ops::ControlFlow;
 
 /// Of the random numbers of a prior's field, for the seed of a draw.

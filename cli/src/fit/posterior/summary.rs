@@ -4,11 +4,11 @@
 use super::super::labels;
 use super::Kept;
 use super::predictive::{self, Check};
+use kerrlight_render::volume::ranks::{Ranks, rank};
+use kerrlight_render::volume::{Coverage, Ensemble, Feature, Volume};
 use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::fit::setup;
 use kerrlight_tomo::fit::world::Parameter;
-use kerrlight_tomo::volume::ranks::{Ranks, rank};
-use kerrlight_tomo::volume::{Coverage, Ensemble, Feature, Volume};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde_json::{Map, Value, json};

@@ -1,10 +1,10 @@
 //! The recovered and the true emission on the nodes of a box, and how well they agree.
 
+use kerrlight_render::volume::Volume;
+use kerrlight_render::volume::metrics::{self, Comparison};
 use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::fit::setup::Truth;
 use kerrlight_tomo::fit::{Motion, State, Trainer};
-use kerrlight_tomo::volume::Volume;
-use kerrlight_tomo::volume::metrics::{self, Comparison};
 
 /// The nodes of the volume.
 struct Box3 {

@@ -4,13 +4,13 @@ use super::Estimate;
 use super::verdict::Evidence;
 use crate::fit::folder::Folder;
 use crate::report::{Axis, LinePlot, Marks, Series, Table};
+use kerrlight_common::frames::Frames;
 use kerrlight_tomo::fit::settings::LossKind;
 use kerrlight_tomo::fit::setup::Measured;
-use kerrlight_tomo::frames::Frames;
-use kerrlight_tomo::interferometry::Complex64;
-use kerrlight_tomo::interferometry::files;
-use kerrlight_tomo::interferometry::gains::{GainDistance, GainTable, StationGain};
-use kerrlight_tomo::interferometry::observation::{Observation, Row};
+use kerrlight_vlbi::Complex64;
+use kerrlight_vlbi::files;
+use kerrlight_vlbi::gains::{GainDistance, GainTable, StationGain};
+use kerrlight_vlbi::observation::{Observation, Row};
 use serde_json::{Value, json};
 
 /// The table of all gains.

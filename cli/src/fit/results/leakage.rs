@@ -4,10 +4,10 @@ use super::Estimate;
 use crate::fit::folder::Folder;
 use crate::fit::leakage::TABLE;
 use crate::report::{Axis, LinePlot, Marks, Series, Table};
+use kerrlight_common::frames::Frames;
 use kerrlight_tomo::fit::setup::Measured;
-use kerrlight_tomo::frames::Frames;
-use kerrlight_tomo::interferometry::files;
-use kerrlight_tomo::interferometry::polarimetry::{LeakageDistance, LeakageTable, StationLeakage};
+use kerrlight_vlbi::files;
+use kerrlight_vlbi::polarimetry::{LeakageDistance, LeakageTable, StationLeakage};
 use serde_json::{Value, json};
 
 /// Leakage that was found.

@@ -3,8 +3,8 @@
 use super::Estimate;
 use crate::fit::band_plots;
 use crate::report::{Axis, LinePlot, Marks, Series};
+use kerrlight_common::frames::Frames;
 use kerrlight_tomo::fit::{Batch, FrameTerm, Seen, State, Trainer};
-use kerrlight_tomo::frames::Frames;
 use kerrlight_tomo::representation::Workspace;
 use std::fmt::Write;
 

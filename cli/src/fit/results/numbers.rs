@@ -4,9 +4,9 @@ use super::{Estimate, Found, quadrature};
 use crate::fit::{band_search, held_out, linear, rotation_search, world_results, world_search};
 use crate::report;
 use crate::usage::usage;
+use kerrlight_common::frames::Frames;
+use kerrlight_render::volume::metrics::{self, Mask};
 use kerrlight_tomo::fit::{State, Trainer};
-use kerrlight_tomo::frames::Frames;
-use kerrlight_tomo::volume::metrics::{self, Mask};
 use serde_json::{Value, json};
 
 /// What is said of a truth without emission.

@@ -2,8 +2,8 @@
 
 use super::{Estimate, fields};
 use crate::report::{Axis, LinePlot, Marks, Series};
+use kerrlight_render::volume::{OverTime, Volume};
 use kerrlight_tomo::fit::{State, Trainer};
-use kerrlight_tomo::volume::{OverTime, Volume};
 
 /// Emission in the region over time.
 pub struct Changes {

@@ -15,12 +15,12 @@ use crate::fit::{
 use crate::output;
 use crate::report::{self, LinePlot, Report, View3d};
 use anyhow::Context;
+use kerrlight_common::toml_file;
+use kerrlight_render::volume::Shown;
+use kerrlight_render::volume::projection::Surroundings;
+use kerrlight_render::volume::slices::Through;
 use kerrlight_tomo::fit::settings::{AxisSearch, DataFiles};
 use kerrlight_tomo::fit::setup::Still;
-use kerrlight_tomo::toml_file;
-use kerrlight_tomo::volume::Shown;
-use kerrlight_tomo::volume::projection::Surroundings;
-use kerrlight_tomo::volume::slices::Through;
 use serde_json::Value;
 
 /// Emission in Jy/pixel a M would mean little: 1 M of emission 1 gives `screen.jy_per_pixel`.

@@ -4,7 +4,7 @@ use super::gains::Gains;
 use super::verdict::Evidence;
 use super::{Estimate, Found};
 use crate::report::{Axis, LinePlot, Marks, Series};
-use kerrlight_tomo::frames::Frames;
+use kerrlight_common::frames::Frames;
 
 impl Estimate<'_> {
     /// Total flux of the model and of the true movie.

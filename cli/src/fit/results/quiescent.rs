@@ -2,11 +2,11 @@
 
 use super::Estimate;
 use crate::report::{self, Figure, enlarged};
+use kerrlight_render::image::{Channel, Picture, exr};
+use kerrlight_render::polarization::StokesParameter;
 use kerrlight_tomo::fit::setup::Truth;
 use kerrlight_tomo::fit::{Seen, State, Trainer};
-use kerrlight_tomo::image::{Channel, Picture, exr};
-use kerrlight_tomo::interferometry::files::images;
-use kerrlight_tomo::polarization::StokesParameter;
+use kerrlight_vlbi::files::images;
 use serde_json::{Value, json};
 
 /// The images as arrays, as channels, and as a picture.

@@ -6,7 +6,7 @@ use crate::report::{self, Figure, LinePlot};
 use kerrlight_tomo::fit::settings::LossKind;
 use kerrlight_tomo::fit::setup::Measured;
 use kerrlight_tomo::fit::verdict::Tested;
-use kerrlight_tomo::interferometry::dirty_image;
+use kerrlight_vlbi::dirty_image;
 use num_complex::Complex;
 use std::collections::HashMap;
 

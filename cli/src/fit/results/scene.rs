@@ -2,12 +2,12 @@
 
 use super::{Estimate, fields};
 use anyhow::Context;
+use kerrlight_common::frames::Frames;
+use kerrlight_common::toml_file;
+use kerrlight_render::scene::{Scene, VolumeRegion};
+use kerrlight_render::volume::VolumeFile;
 use kerrlight_tomo::fit::{Sampling, setup};
 use kerrlight_tomo::fit::{State, Trainer};
-use kerrlight_tomo::frames::Frames;
-use kerrlight_tomo::scene::{Scene, VolumeRegion};
-use kerrlight_tomo::toml_file;
-use kerrlight_tomo::volume::VolumeFile;
 
 /// The scene, and the volume that it names.
 const SCENE: &str = "scene.toml";

@@ -1,7 +1,7 @@
 //! Recovered volumes as stores of Zarr, in builds with the feature `zarr`.
 
 use super::super::folder::Folder;
-use kerrlight_tomo::volume::vti;
+use kerrlight_render::volume::vti;
 use std::path::{Path, PathBuf};
 
 /// The store of the recovered volume and, if it is known, the true one.

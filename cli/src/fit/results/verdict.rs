@@ -7,13 +7,13 @@ mod tests;
 mod words;
 
 use anyhow::Context;
+use kerrlight_common::frames::Frames;
 use kerrlight_tomo::fit::settings::{DataFiles, FitFile, Loss, LossKind, Noise};
 use kerrlight_tomo::fit::setup::Measured;
 use kerrlight_tomo::fit::verdict::{
     Errors, Outcome, Statistics, Tested, Verdict, ZeroSpacing, judge, worst,
 };
-use kerrlight_tomo::frames::Frames;
-use kerrlight_tomo::interferometry::products::debiased_amplitude;
+use kerrlight_vlbi::products::debiased_amplitude;
 use serde_json::{Value, json};
 
 /// A verdict with all that it is made of.

@@ -3,10 +3,10 @@
 use super::{XI, report, spots};
 use crate::output::Output;
 use crate::report::{Report, View3d};
-use kerrlight_tomo::dynamics::{self, AngularVelocity, Turned, pull_back};
-use kerrlight_tomo::points::{Coordinates, CoordinatesMut};
-use kerrlight_tomo::volume::Volume;
-use kerrlight_tomo::volume::vti::{self, Field};
+use kerrlight_render::dynamics::{self, AngularVelocity, Turned, pull_back};
+use kerrlight_render::points::{Coordinates, CoordinatesMut};
+use kerrlight_render::volume::Volume;
+use kerrlight_render::volume::vti::{self, Field};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};

@@ -1,11 +1,11 @@
 //! Rows of a light curve on rings about the axis: what each ring and layer adds, by harmonics of the azimuth.
 
 use super::Sampling;
-use crate::dynamics::Axis;
 use crate::fit::ForwardModel;
 use crate::fit::batch::Batch;
-use crate::simd::Float;
 use core::f64::consts::TAU;
+use kerrlight_common::simd::Float;
+use kerrlight_render::dynamics::Axis;
 use nalgebra::DMatrix;
 
 /// Nodes of emission in distance from the axis, azimuth and z; linear between them.

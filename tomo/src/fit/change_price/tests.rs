@@ -1,10 +1,10 @@
 //! The price of change against that of the linear problem, and of spheres.
 
 use super::*;
-use crate::dynamics::Axis;
 use crate::fit::linear::Change;
 use crate::fit::{Occupancy, OccupancySettings};
 use crate::representation::{Activation, Allowed, Changing, Grid, GridSettings, Representation};
+use kerrlight_render::dynamics::Axis;
 
 const KNOTS: Knots = Knots { first: -3.0, spacing: 2.0, count: 4, allowed: Allowed::Any };
 const R: f64 = 5.0;

@@ -2,10 +2,10 @@
 
 use crate::fit::compared::Compared;
 use crate::fit::objective::Objective;
-use crate::interferometry::data_terms::{ClosureScan, Comparison};
-use crate::interferometry::operator::ImageGrid;
-use crate::interferometry::products::ClosureKind;
 use core::ops::Range;
+use kerrlight_vlbi::data_terms::{ClosureScan, Comparison};
+use kerrlight_vlbi::operator::ImageGrid;
+use kerrlight_vlbi::products::ClosureKind;
 
 /// What is compared of a visibility.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! The fall of matter as the device reads it.
 
-use crate::dynamics::infall::{Origin, Table};
 use crate::fit::fall::Fall;
+use kerrlight_render::dynamics::infall::{Origin, Table};
 
 /// Floats of a cell of the table.
 const CELL: usize = 16;

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::fit::FrameTerm;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 
 /// Data with the weight of their reduced χ².
 #[derive(Clone, Copy)]

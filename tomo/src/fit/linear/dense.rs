@@ -6,7 +6,7 @@ use super::rows::Held;
 use super::rows::Rows;
 use super::walk::Buffers;
 use crate::representation::spline::STENCIL;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 use std::borrow::Cow;
 
 impl<T: Float> Rows<T> {

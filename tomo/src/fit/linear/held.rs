@@ -5,8 +5,8 @@ use super::active::{Active, NONE};
 use super::operator::Operator;
 use super::rows::{Held, Rows};
 use super::walk::{Buffers, Walk};
-use crate::memory;
-use crate::simd::Float;
+use kerrlight_common::memory;
+use kerrlight_common::simd::Float;
 use rayon::prelude::*;
 
 /// What part of the memory rows may take.

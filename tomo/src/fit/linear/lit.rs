@@ -2,8 +2,8 @@
 //! defined.
 
 use super::walk::Voxels;
-use crate::dynamics::Axis;
 use core::f64::consts::TAU;
+use kerrlight_render::dynamics::Axis;
 
 /// Radius of the ring, its width and its thickness (standard deviations), in half-widths of the grid.
 const RING: [f64; 3] = [0.6, 0.25, 0.15];

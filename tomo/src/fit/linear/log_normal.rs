@@ -13,7 +13,7 @@ use super::{Ending, LinearProblem, LinearProgress, LinearSettings, LinearSolutio
 use super::{Stationarity, Watch};
 use crate::Error;
 use crate::optimise::{Lbfgs, LbfgsState, Step};
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 
 /// A field on the nodes of a grid whose logarithm is Gaussian, with density exp(−|z − center|²/2).
 #[derive(Clone, Debug)]

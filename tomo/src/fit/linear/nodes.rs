@@ -2,8 +2,8 @@
 
 use super::walk::Voxels;
 use crate::Error;
-use crate::points::Coordinates;
 use crate::representation::{Representation, Workspace};
+use kerrlight_render::points::Coordinates;
 
 /// Values at the nodes of another grid.
 ///

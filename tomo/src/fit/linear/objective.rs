@@ -9,7 +9,7 @@ use super::operator::Operator;
 use crate::Error;
 use crate::fit::quiescent::Quiescent;
 use crate::fit::regulariser::{Prior, Regulariser, Shape};
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 

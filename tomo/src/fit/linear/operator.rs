@@ -4,10 +4,10 @@ use super::active::{Active, NONE};
 use super::data::Data;
 use super::rows::{Held, Rows};
 use super::walk::{Buffers, Voxels, Walk};
-use crate::memory;
 use crate::representation::spline::STENCIL;
-use crate::simd::Float;
 use core::ops::Range;
+use kerrlight_common::memory;
+use kerrlight_common::simd::Float;
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
 

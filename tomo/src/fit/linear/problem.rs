@@ -8,10 +8,10 @@ use super::objective::Penalised;
 use super::settings::{Coarse, LinearSettings};
 use super::walk::{Voxels, Walk};
 use crate::Error;
-use crate::dynamics::Axis;
 use crate::fit::regulariser::Prior;
 use crate::fit::{ForwardModel, Quiescent};
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
+use kerrlight_render::dynamics::Axis;
 
 /// min Σ weight · χ²/data + priors over 0 ≤ e ≤ `upper` at the nodes of a grid.
 #[derive(Clone, Copy)]

@@ -15,7 +15,7 @@ use super::operator::Operator;
 use super::problem::LinearProblem;
 use super::scaled::{add, dot};
 use crate::Error;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 use rayon::prelude::*;
 
 /// Slope and second derivatives of the minimum over fields.

@@ -3,7 +3,7 @@
 use super::active::{Active, NONE};
 use super::walk::Place;
 use crate::representation::spline::{Degree, STENCIL};
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 
 /// Rows of a frame that are not empty: `starts` of each, and where the last ends.
 #[derive(Clone)]

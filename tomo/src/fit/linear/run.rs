@@ -14,7 +14,7 @@ use super::settings::{Coarse, LinearSettings};
 use super::solution::{LinearProgress, LinearSolution, Watch};
 use super::walk::Voxels;
 use crate::Error;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 
 /// Values at the nodes, and which of them count.
 type Start = (Vec<f64>, Vec<bool>);

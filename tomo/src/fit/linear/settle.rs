@@ -10,8 +10,8 @@ use super::run::Run;
 use super::settings::LinearSettings;
 use super::solution::{Least, LinearProgress};
 use crate::Error;
-use crate::simd::Float;
 use core::ops::ControlFlow;
+use kerrlight_common::simd::Float;
 
 /// How long the best field of one of many problems is looked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

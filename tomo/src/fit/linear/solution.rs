@@ -3,8 +3,8 @@
 use super::active::Active;
 use super::certificate::{Certificate, Stationarity};
 use super::descent::Ending;
-use crate::simd::Float;
 use core::ops::ControlFlow;
+use kerrlight_common::simd::Float;
 
 /// What is known while iterations go on.
 pub struct LinearProgress<'a> {

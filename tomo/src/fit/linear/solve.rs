@@ -10,8 +10,8 @@ use super::run::{FEW, LIT, Run};
 use super::settings::LinearSettings;
 use super::solution::{Least, LinearProgress, LinearSolution, Watch};
 use crate::Error;
-use crate::simd::Float;
 use core::ops::ControlFlow;
+use kerrlight_common::simd::Float;
 
 /// Images that are made together.
 const TOGETHER: usize = 32;

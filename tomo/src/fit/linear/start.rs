@@ -8,7 +8,7 @@ use super::objective::Objective;
 use super::run::Run;
 use super::scaled::dot;
 use crate::Error;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 
 /// Newton steps to the best scale: one is enough where χ² is quadratic in it, as that of amplitudes is.
 const SCALINGS: usize = 3;

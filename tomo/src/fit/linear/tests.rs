@@ -3,7 +3,6 @@ use super::data::{Data, Weighted};
 use super::operator::Operator;
 use super::walk::Walk;
 use super::*;
-use crate::dynamics::{AngularVelocity, Axis, Velocity};
 use crate::fit::{
     Batch, Field, ForwardModel, FrameTerm, ImageTerm, Motion, Region, Regulariser, Sampling,
     SightlineRequest, Sightlines,
@@ -12,6 +11,7 @@ use crate::representation::Degree;
 use crate::representation::{Knots, Workspace};
 use core::ops::ControlFlow;
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
+use kerrlight_render::dynamics::{AngularVelocity, Axis, Velocity};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;

@@ -1,13 +1,13 @@
 //! Where the nodes of a frame's rays come to lie in a grid of voxels.
 
 use crate::Error;
-use crate::dynamics::{Axis, Turned, pull_back};
 use crate::fit::ForwardModel;
 use crate::fit::regulariser::Shape;
-use crate::points::{Coordinates, CoordinatesMut};
 use crate::representation::spline::{Degree, STENCIL, Spline};
 use crate::representation::{Allowed, Knots};
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
+use kerrlight_render::dynamics::{Axis, Turned, pull_back};
+use kerrlight_render::points::{Coordinates, CoordinatesMut};
 
 /// A grid of voxels, z fastest, zero outside.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,9 +1,9 @@
 //! An emission field with the parameters of a quiescent image behind its own.
 
 use super::Quiescent;
-use crate::points::Coordinates;
 use crate::representation::{Gradient, Groups, Representation, WeightMatrix, Workspace};
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
+use kerrlight_render::points::Coordinates;
 
 /// A field whose last parameters are those of a [`Quiescent`] image, which emission does not depend on.
 pub struct Beside<T: Float> {

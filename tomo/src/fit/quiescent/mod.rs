@@ -6,7 +6,7 @@ pub use beside::Beside;
 
 use super::regulariser::{Prior, Regulariser, Shape};
 use crate::Error;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 
 /// An image that is added to every frame: one of each Stokes parameter where frames have several, a number of each
 /// where they are fluxes.

@@ -2,11 +2,11 @@
 
 use super::AxisScan;
 use crate::Error;
-use crate::dynamics::Axis;
-use crate::image::canvas::{Align, BLACK, Canvas, Rgb, WHITE};
-use crate::image::colormap::Colormap;
 use core::f64::consts::{FRAC_PI_2, PI, SQRT_2};
 use image::RgbImage;
+use kerrlight_render::dynamics::Axis;
+use kerrlight_render::image::canvas::{Align, BLACK, Canvas, Rgb, WHITE};
+use kerrlight_render::image::colormap::Colormap;
 
 /// Points of the lattice that a pixel's loss is the weighted mean of.
 const NEAREST: usize = 4;

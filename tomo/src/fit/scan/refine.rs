@@ -2,8 +2,8 @@
 
 use super::{AxisLoss, Effort, Scanner};
 use crate::Error;
-use crate::dynamics::Axis;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
+use kerrlight_render::dynamics::Axis;
 
 /// A pattern search: six directions about the best one so far, half as far away when none is better; at the end
 /// the lowest point of the paraboloid through the last seven.

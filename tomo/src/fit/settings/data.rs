@@ -1,7 +1,7 @@
 //! Files of data, and what of them is compared.
 
 use super::{MeasuredCurve, Scattering, Variability};
-use crate::polarization::StokesParameter;
+use kerrlight_render::polarization::StokesParameter;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 

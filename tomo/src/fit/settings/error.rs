@@ -1,9 +1,12 @@
 //! Errors in settings, which name the key and, where there is a text, its line.
 
-use crate::error::{Error, Parts};
-use crate::memory::TooLarge;
-use crate::scene::line_of;
-use crate::toml_file::ReadError;
+use crate::Error;
+use kerrlight_common::Error as Common;
+use kerrlight_common::memory::TooLarge;
+use kerrlight_common::toml_file::ReadError;
+use kerrlight_render::scene::line_of;
+use kerrlight_render::{Error as RenderError, Parts};
+use kerrlight_vlbi::Error as VlbiError;
 
 /// Why settings are not those of a fit.
 #[derive(Debug, thiserror::Error)]
@@ -94,11 +97,26 @@ impl From<Error> for FitError {
     fn from(error: Error) -> Self {
         match error {
             Error::Fit(error) => error,
-            Error::Memory(error) => FitError::Memory(error),
+            Error::Common(Common::Memory(error))
+            | Error::Render(RenderError::Common(Common::Memory(error)))
+            | Error::Vlbi(VlbiError::Common(Common::Memory(error))) => FitError::Memory(error),
             other => FitError::Other(Box::new(other)),
         }
     }
 }
+
+/// Errors of the crates that settings are handed to.
+macro_rules! through {
+    ($($error:ty),* $(,)?) => {
+        $(impl From<$error> for FitError {
+            fn from(error: $error) -> Self {
+                Error::from(error).into()
+            }
+        })*
+    };
+}
+
+through!(Common, RenderError, VlbiError);
 
 /// Errors of what numbers of settings are handed to.
 macro_rules! other {

@@ -1,7 +1,7 @@
 //! What of the instrument is solved for.
 
 use super::{FitError, refuse};
-use crate::interferometry::gains::{GainPriors, PRIOR_TABLES, prior_table};
+use kerrlight_vlbi::gains::{GainPriors, PRIOR_TABLES, prior_table};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -97,7 +97,7 @@ mod tests {
     use super::*;
 
     fn settings(text: &str) -> GainSettings {
-        crate::toml_file::read(text).unwrap()
+        kerrlight_common::toml_file::read(text).unwrap()
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::Noise;
 use crate::fit::linear::Roughness;
-use crate::polarization::StokesParameter;
+use kerrlight_render::polarization::StokesParameter;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 

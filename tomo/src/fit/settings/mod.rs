@@ -54,8 +54,8 @@ pub use world::merge;
 pub use world_search::{WorldSearch, WorldSteps, WorldView};
 
 use crate::Error;
-use crate::polarization::PolarizationLaw;
-use crate::toml_file;
+use kerrlight_common::toml_file;
+use kerrlight_render::polarization::PolarizationLaw;
 use serde::{Deserialize, Serialize};
 
 /// The settings of a fit. Lengths and times in M = GM/c² unless a name says otherwise.

@@ -1,8 +1,8 @@
 //! Ranges of a fit's numbers, by key: a number outside of them gives a fit that means nothing.
 
 use super::FitError;
-use crate::scene::shown;
-use crate::toml_file;
+use kerrlight_common::toml_file;
+use kerrlight_render::scene::shown;
 use toml::Value;
 
 /// Key (`*` stands for the number of a list's element, `?` for any name), least and largest value, unit.
@@ -267,7 +267,7 @@ fn matches(pattern: &str, key: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::apply_override;
+    use kerrlight_render::scene::apply_override;
 
     const BUILT_IN: &str = include_str!("../../../../cli/src/fit/built_in.toml");
 

@@ -1,7 +1,7 @@
 //! What is simulated, and the array that sees it.
 
 use super::FieldSettings;
-use crate::interferometry::noise::GainErrors;
+use kerrlight_vlbi::noise::GainErrors;
 use serde::{Deserialize, Serialize};
 
 /// Frames of a movie.

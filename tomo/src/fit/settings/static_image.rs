@@ -8,9 +8,9 @@ use super::{Scattering, StaticPolarization, Variability};
 use super::{ranges, refuse};
 use crate::Error;
 use crate::fit::linear::Prior;
-use crate::interferometry::operator::ImageGrid;
-use crate::toml_file;
-use crate::units::MICROARCSECOND;
+use kerrlight_common::toml_file;
+use kerrlight_common::units::MICROARCSECOND;
+use kerrlight_vlbi::operator::ImageGrid;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -155,7 +155,7 @@ impl ImageSettings {
     /// # Errors
     /// If their number or the field is out of range.
     pub fn grid(&self) -> Result<ImageGrid, Error> {
-        ImageGrid::new(self.pixels, self.pixels, self.field_uas * MICROARCSECOND)
+        Ok(ImageGrid::new(self.pixels, self.pixels, self.field_uas * MICROARCSECOND)?)
     }
 }
 

@@ -3,9 +3,9 @@
 use super::world::SIMULATED;
 use super::{FitError, FitFile, LossKind, Within, WorldSearch};
 use crate::Error;
-use crate::dynamics::Velocity;
 use crate::fit::world::{Free, KNOTS, Parameter, Prior, Scanned};
-use crate::toml_file;
+use kerrlight_common::toml_file;
+use kerrlight_render::dynamics::Velocity;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};

@@ -1,8 +1,8 @@
 //! The hole, the view of it, what happens to light, and how matter turns.
 
-use crate::dynamics::Velocity;
 use crate::fit::{Region as Limits, Sampling};
-use crate::interferometry::operator::Pulse;
+use kerrlight_render::dynamics::Velocity;
+use kerrlight_vlbi::operator::Pulse;
 use serde::{Deserialize, Serialize};
 
 /// The hole.

@@ -1,7 +1,7 @@
 //! Settings that take the place of others.
 
 use super::{FitError, FitFile, Within};
-use crate::toml_file;
+use kerrlight_common::toml_file;
 use toml::{Table, Value};
 
 /// Tables that say which of several things they are by their only key: another key takes their place.

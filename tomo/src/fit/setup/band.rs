@@ -4,7 +4,6 @@ mod background;
 mod kept;
 
 use super::{Curve, Instrument, Measured, Result, axis, forward_model, hours_per_m, motion};
-use crate::dynamics::AngularVelocity;
 use crate::fit::band::{
     Band, BandPrior, CurveRows, Interval, PolarGrid, Sampling, UNLIKELY, Weighed, evidence, places,
     together, validation, without_flare,
@@ -12,8 +11,9 @@ use crate::fit::band::{
 use crate::fit::journal::{self, Journal};
 use crate::fit::settings::{BandSettings, FitError, FitFile, refuse};
 use crate::fit::{FluxDatum, Motion};
-use crate::polarization::StokesParameter;
 use background::{backgrounds, expected};
+use kerrlight_render::dynamics::AngularVelocity;
+use kerrlight_render::polarization::StokesParameter;
 use rayon::prelude::*;
 use std::sync::Arc;
 

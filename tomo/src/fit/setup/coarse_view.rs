@@ -5,8 +5,8 @@ use super::{Instrument, Measured, Result, forward_model, linear, priors, sky, sp
 use crate::fit::scan::AxisProblem;
 use crate::fit::settings::{FitFile, LossKind, Region, Screen, WidthOf};
 use crate::fit::{Motion, Objective, Sampling};
-use crate::frames::Frames;
-use crate::interferometry::operator::Pulse;
+use kerrlight_common::frames::Frames;
+use kerrlight_vlbi::operator::Pulse;
 
 /// What a fit is seen through by a search.
 pub struct CoarseView {

@@ -2,7 +2,7 @@
 
 use super::Result;
 use crate::fit::{FluxDatum, StokesCurveTerm};
-use crate::polarization::StokesParameter;
+use kerrlight_render::polarization::StokesParameter;
 
 /// A light curve that a fit explains.
 #[derive(Clone, Debug)]

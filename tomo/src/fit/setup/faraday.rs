@@ -3,11 +3,11 @@
 
 use super::linear_problem::Of;
 use super::{Result, linear};
-use crate::dynamics::Axis;
 use crate::fit::linear::{Change, LinearProblem};
 use crate::fit::settings::{FaradaySettings, FitError, FitFile, Kind, LossKind, Start, refuse};
 use crate::fit::{ForwardModel, Objective, Seen};
-use crate::polarization::StokesParameter;
+use kerrlight_render::dynamics::Axis;
+use kerrlight_render::polarization::StokesParameter;
 
 /// Times that the distance of angles is halved about the best one.
 const HALVINGS: usize = 3;

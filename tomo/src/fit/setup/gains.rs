@@ -4,10 +4,10 @@ use super::leakage::observing;
 use super::polarized::is_polarized;
 use super::{Measured, Result};
 use crate::fit::settings::{InstrumentSettings, Loss, LossKind, refuse};
-use crate::interferometry::Complex64;
-use crate::interferometry::data_terms::GainTerm;
-use crate::interferometry::gains::{GainPriors, GainTable, ScanGains, StationGain};
-use crate::interferometry::observation::Observation;
+use kerrlight_vlbi::Complex64;
+use kerrlight_vlbi::data_terms::GainTerm;
+use kerrlight_vlbi::gains::{GainPriors, GainTable, ScanGains, StationGain};
+use kerrlight_vlbi::observation::Observation;
 
 /// Priors of the gains that a fit solves for, if it does.
 ///

@@ -2,8 +2,8 @@
 
 use crate::Error;
 use crate::fit::settings::GlyphShape;
-use crate::image::canvas::coverage;
 use kerrlight_geodesic::vector::{cross, dot, rotate};
+use kerrlight_render::image::canvas::coverage;
 
 /// Pixels of a letter's height.
 const RESOLUTION: usize = 96;

@@ -3,12 +3,12 @@
 use super::change::change;
 use super::linear_problem::{Of, misfit, solve_frames};
 use super::{Measured, Result};
-use crate::dynamics::Axis;
 use crate::fit::journal::{self, Journal};
 use crate::fit::linear::{Change, Ending, LinearProgress, Watch};
 use crate::fit::settings::{FitError, FitFile, HeldOutBy, HeldOutSettings, Kind, Start};
 use crate::fit::{Data, Objective};
 use core::ops::ControlFlow;
+use kerrlight_render::dynamics::Axis;
 
 /// A value, and what data that were held out say of it.
 #[derive(Clone, Debug, PartialEq)]

@@ -12,8 +12,8 @@ use crate::fit::settings::{
     DataFiles, FitError, FitFile, GainPhases, InstrumentSettings, LossKind, PixelShape,
     StaticImageFile, StrengthSettings, Within, refuse,
 };
-use crate::frames::Frames;
-use crate::interferometry::observation::Observation;
+use kerrlight_common::frames::Frames;
+use kerrlight_vlbi::observation::Observation;
 
 /// What to write where there are no data.
 pub(super) const FILE: &str = "a table [data.visibilities] or [data.movie] with `path = \"FILE\"` (`kerrlight fit --init FILE` writes \

@@ -9,10 +9,10 @@ use crate::fit::{
     ForwardModel, Motion, PolarizedView, Quiescent, Redshift, RingRays, Sampling, Seen,
     SightlineRequest, Sightlines,
 };
-use crate::memory;
-use crate::polarization::StokesParameter;
-use crate::simd::Float;
+use kerrlight_common::memory;
+use kerrlight_common::simd::Float;
 use kerrlight_geodesic::Kerr;
+use kerrlight_render::polarization::StokesParameter;
 
 /// What a fit looks through: the same for all data and representations.
 pub struct Instrument {
@@ -57,7 +57,7 @@ impl Instrument {
         let what = || {
             format!("screen.pixels = {n}: about {nodes:.0} nodes on the rays of {pixels} pixels")
         };
-        memory::afford(what, memory::nodes(nodes, columns))
+        Ok(memory::afford(what, memory::nodes(nodes, columns))?)
     }
 
     /// Traces the rays of a few of all pixels, which are so many times as many; nothing if something is wrong with them,

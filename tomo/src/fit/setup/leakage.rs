@@ -2,8 +2,8 @@
 
 use super::Result;
 use crate::fit::settings::{InstrumentSettings, LeakageSettings, refuse};
-use crate::interferometry::observation::{Basis, Observation};
-use crate::interferometry::polarimetry::SharedLeakage;
+use kerrlight_vlbi::observation::{Basis, Observation};
+use kerrlight_vlbi::polarimetry::SharedLeakage;
 
 /// Leakage that is not known.
 #[derive(Clone, Debug)]

@@ -11,12 +11,12 @@ use crate::fit::settings::{
 use crate::fit::{
     BatchSize, Beside, ChangePrice, OccupancyPlan, OccupancySettings, Region, Training,
 };
-use crate::memory;
 use crate::optimise::{Adam, Lbfgs, Muon, Polynomial};
 use crate::representation::{
     Activation, Carrier, Changing, Degree, FeatureGrid, FeatureGridSettings, Grid, GridSettings,
     Knots, Network, NetworkSettings, OwnSettings, Registry, Representation, Spline,
 };
+use kerrlight_common::memory;
 
 /// What is recovered, with the parameters of what does not move behind its own; `registry` has what the program adds to kerrlight's own representations. Where emission
 /// may change, `times` are those of the first and the last emission, M since the reference time

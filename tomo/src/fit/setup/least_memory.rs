@@ -9,10 +9,10 @@ use crate::fit::fall::Fall;
 use crate::fit::settings::{FitFile, Kind, LossKind, Start};
 use crate::fit::shift::Shift;
 use crate::fit::stokes::Planes;
-use crate::memory::{self, TooLarge, shown};
 use crate::representation::Registry;
 use crate::representation::spline::STENCIL;
-use crate::simd::Float;
+use kerrlight_common::memory::{self, TooLarge, shown};
+use kerrlight_common::simd::Float;
 
 /// Nodes of a ray of the still image, about: most of its rays are those of the photon ring.
 const STILL_NODES: usize = 48;

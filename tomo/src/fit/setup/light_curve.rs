@@ -9,8 +9,8 @@ use crate::fit::settings::{
     SimulatedCurve, Within, refuse,
 };
 use crate::fit::{FluxDatum, Seen};
-use crate::interferometry::light_curve::LightCurve;
-use crate::polarization::StokesParameter;
+use kerrlight_render::polarization::StokesParameter;
+use kerrlight_vlbi::light_curve::LightCurve;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
@@ -44,7 +44,7 @@ impl Measured {
 
 /// The flux of a parameter with its error, if it was measured.
 fn datum(
-    sample: &crate::interferometry::light_curve::Sample,
+    sample: &kerrlight_vlbi::light_curve::Sample,
     parameter: StokesParameter,
 ) -> Result<Option<FluxDatum>> {
     let Some(flux) = sample.stokes[parameter.index()] else { return Ok(None) };

@@ -1,13 +1,13 @@
 //! The linear problem of a fit: the grid that fits its data best about a known axis.
 
 use super::{Result, linear, priors};
-use crate::dynamics::Axis;
 use crate::fit::linear::{
     Change, Coarse, GaussianField, LinearProblem, LinearSettings, LinearSolution, LogNormalField,
     Voxels, Watch, Weighted,
 };
 use crate::fit::settings::{FieldKind, FitFile, Kind, Linear, Start, Within};
 use crate::fit::{Data, FrameTerm, Objective};
+use kerrlight_render::dynamics::Axis;
 
 /// Nodes along an axis from which on a coarser grid is solved first.
 const FINE: usize = 40;

@@ -8,14 +8,15 @@ use crate::fit::{
     Data, ForwardModel, FrameTerm, ImageTerm, IntensityTerm, LightCurveTerm, Motion, Scan,
     ScanTerm, Weighted,
 };
-use crate::frames::Frames;
-use crate::interferometry::data_terms::{
+use kerrlight_common::frames::Frames;
+use kerrlight_common::memory;
+use kerrlight_vlbi::Error as VlbiError;
+use kerrlight_vlbi::data_terms::{
     AmplitudeTerm, ClosureTerm, DataTerm, DataTermError, GainTerm, VisibilityTerm,
 };
-use crate::interferometry::observation::Observation;
-use crate::interferometry::operator::{Float, ImageGrid, Method, Transform};
-use crate::interferometry::products::ClosureKind;
-use crate::memory;
+use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::operator::{Float, ImageGrid, Method, Transform};
+use kerrlight_vlbi::products::ClosureKind;
 
 impl Measured {
     /// The terms of the loss, of images of so many pixels.
@@ -65,7 +66,7 @@ impl Measured {
 
     /// Flux of every frame, Jy.
     fn fluxes(&self) -> Result<Vec<f64>> {
-        self.movie()?.sums()
+        Ok(self.movie()?.sums()?)
     }
 
     fn image(&self, loss: &Loss, pixels: usize) -> Result<ImageTerm<f32>> {
@@ -160,7 +161,8 @@ impl Measured {
         let uv: Vec<[f64; 2]> = part.stokes_i().map(|(row, _)| row.uv).collect();
         // With the same result, whether they are kept or not.
         let share = memory::part(1.0 / 8.0) / self.times.len() as f64;
-        Transform::new(sky, self.pulse, &[uv], Method::Direct, MEMORY.min(share as usize))
+        let memory = MEMORY.min(share as usize);
+        Ok(Transform::new(sky, self.pulse, &[uv], Method::Direct, memory)?)
     }
 
     /// The rows of a frame, and where pixels are.
@@ -196,7 +198,7 @@ impl Measured {
             _ => ClosureKind::LogAmplitude,
         };
         match ClosureTerm::new(part, kind, least) {
-            Err(crate::Error::DataTerm(DataTermError::Empty)) => Ok(None),
+            Err(VlbiError::DataTerm(DataTermError::Empty)) => Ok(None),
             term => Ok(Some(Box::new(term?))),
         }
     }

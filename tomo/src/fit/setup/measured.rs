@@ -4,11 +4,11 @@ use super::Truth;
 use super::curve::Curve;
 use super::leakage::LeakageUnknown;
 use crate::fit::FluxDatum;
-use crate::frames::Frames;
-use crate::interferometry::gains::{GainPriors, GainTable};
-use crate::interferometry::observation::Observation;
-use crate::interferometry::operator::{ImageGrid, Pulse};
-use crate::interferometry::polarimetry::LeakageTable;
+use kerrlight_common::frames::Frames;
+use kerrlight_vlbi::gains::{GainPriors, GainTable};
+use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::operator::{ImageGrid, Pulse};
+use kerrlight_vlbi::polarimetry::LeakageTable;
 
 /// The data of a fit, and what is known to be true.
 #[derive(Clone)]

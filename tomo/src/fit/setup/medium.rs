@@ -4,9 +4,9 @@
 use super::Result;
 use super::polarized::is_polarized;
 use crate::fit::settings::{Loss, Scattering, StaticPolarization, Variability, Within, refuse};
-use crate::interferometry::noise::{ScatteringKernel, unscatter};
-use crate::interferometry::observation::{Basis, Observation};
 use core::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
+use kerrlight_vlbi::noise::{ScatteringKernel, unscatter};
+use kerrlight_vlbi::observation::{Basis, Observation};
 
 /// Undoes scattering, then adds to errors what the source varies. `name` is what the data are called in messages.
 ///

@@ -65,11 +65,11 @@ use super::settings::{
 };
 use super::settings::{WidthOf, Within};
 use super::{Motion, Regulariser};
-use crate::dynamics::{Axis, Injection};
-use crate::interferometry::operator::ImageGrid;
 use crate::optimise::Polynomial;
-use crate::units::{MICROARCSECOND, gravitational_angle, gravitational_time};
+use kerrlight_common::units::{MICROARCSECOND, gravitational_angle, gravitational_time};
 use kerrlight_geodesic::{Inclination, Observer};
+use kerrlight_render::dynamics::{Axis, Injection};
+use kerrlight_vlbi::operator::ImageGrid;
 
 type Result<T> = std::result::Result<T, crate::Error>;
 
@@ -126,7 +126,7 @@ pub fn sky(file: &FitFile) -> Result<ImageGrid> {
             ).into());
         }
     };
-    ImageGrid::new(n, n, field_uas * MICROARCSECOND)
+    Ok(ImageGrid::new(n, n, field_uas * MICROARCSECOND)?)
 }
 
 /// What to write where the mass is missing.

@@ -4,14 +4,14 @@ use super::Result;
 use super::leakage::observing;
 use super::polarized::is_polarized;
 use crate::fit::settings::{FitError, FitFile, Loss, Noise, Observation as Seen, Within, refuse};
-use crate::interferometry::array::Array;
-use crate::interferometry::earth::{Frame, Ut1};
-use crate::interferometry::gains::GainTable;
-use crate::interferometry::noise::{add_thermal_noise, apply_gains, apply_leakage};
-use crate::interferometry::observation::Observation;
-use crate::interferometry::polarimetry::LeakageTable;
-use crate::interferometry::schedule::{self, Clock, Schedule, Setup};
-use crate::interferometry::source::Source;
+use kerrlight_vlbi::array::Array;
+use kerrlight_vlbi::earth::{Frame, Ut1};
+use kerrlight_vlbi::gains::GainTable;
+use kerrlight_vlbi::noise::{add_thermal_noise, apply_gains, apply_leakage};
+use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::polarimetry::LeakageTable;
+use kerrlight_vlbi::schedule::{self, Clock, Schedule, Setup};
+use kerrlight_vlbi::source::Source;
 
 /// Rows of the observation without values, and hours of UTC of its scans.
 pub(super) fn schedule_of(seen: &Seen, array: Option<&Array>) -> Result<(Observation, Vec<f64>)> {

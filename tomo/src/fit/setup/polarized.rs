@@ -2,8 +2,8 @@
 
 use super::Result;
 use crate::fit::settings::{FitFile, Kind, Loss, LossKind, Start, refuse};
-use crate::interferometry::polarimetry::MODELLED;
-use crate::polarization::StokesParameter;
+use kerrlight_render::polarization::StokesParameter;
+use kerrlight_vlbi::polarimetry::MODELLED;
 
 /// Stokes parameters that polarised visibilities are made of, in the order of a frame's images.
 pub(super) const PARAMETERS: [StokesParameter; MODELLED] =

@@ -3,11 +3,10 @@
 use super::{Measured, Result};
 use crate::fit::Scan;
 use crate::fit::settings::{Loss, LossKind};
-use crate::interferometry::data_terms::{
-    DataTerm, DataTermError, PolarizedTerm, RatioTerm, TraceTerm,
-};
-use crate::interferometry::operator::{Float, Method, Operator, Transform};
-use crate::interferometry::polarimetry::MODELLED;
+use kerrlight_vlbi::Error as VlbiError;
+use kerrlight_vlbi::data_terms::{DataTerm, DataTermError, PolarizedTerm, RatioTerm, TraceTerm};
+use kerrlight_vlbi::operator::{Float, Method, Operator, Transform};
+use kerrlight_vlbi::polarimetry::MODELLED;
 use num_complex::Complex;
 
 /// Exponentials of a frame up to this many bytes are kept.
@@ -56,7 +55,7 @@ impl Measured {
     fn traces<T: Float>(&self, frame: usize, least_snr: f64) -> Result<Option<Scan<T>>> {
         let (part, sky) = self.part(frame)?;
         let term = match TraceTerm::new(&part, least_snr) {
-            Err(crate::Error::DataTerm(DataTermError::Empty)) => return Ok(None),
+            Err(VlbiError::DataTerm(DataTermError::Empty)) => return Ok(None),
             term => Box::new(term?),
         };
         let images = vec![TraceTerm::uv(&part, least_snr); MODELLED];

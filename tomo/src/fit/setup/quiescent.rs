@@ -5,7 +5,7 @@ use super::{Result, spacing};
 use crate::fit::linear::Prior;
 use crate::fit::settings::{FitError, FitFile, Kind, Optimiser, QuiescentSettings, refuse};
 use crate::fit::{BatchSize, Quiescent, Regulariser, Seen};
-use crate::polarization::StokesParameter;
+use kerrlight_render::polarization::StokesParameter;
 
 /// The image beside the emission of so many pixels, where settings have one.
 ///

@@ -2,10 +2,10 @@
 
 use super::{Measured, Result};
 use crate::fit::settings::{Loss, LossKind};
-use crate::interferometry::Complex64;
-use crate::interferometry::noise::add_thermal_noise;
-use crate::interferometry::observation::Row;
-use crate::interferometry::operator::{Method, Operator, Transform};
+use kerrlight_vlbi::Complex64;
+use kerrlight_vlbi::noise::add_thermal_noise;
+use kerrlight_vlbi::observation::Row;
+use kerrlight_vlbi::operator::{Method, Operator, Transform};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;

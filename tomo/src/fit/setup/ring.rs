@@ -2,7 +2,7 @@
 
 use super::{Result, spacing};
 use crate::fit::settings::{FitFile, Ring, Screen, refuse};
-use crate::polarization::StokesParameter;
+use kerrlight_render::polarization::StokesParameter;
 
 /// Light of the rings of a truth, the same in every frame.
 #[derive(Clone, Debug, Default)]

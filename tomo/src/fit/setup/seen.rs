@@ -4,7 +4,7 @@ use super::Result;
 use super::polarized::{PARAMETERS, is_polarized};
 use crate::fit::Seen;
 use crate::fit::settings::{DataFiles, FitError, FitFile, Loss, LossKind, refuse};
-use crate::polarization::StokesParameter;
+use kerrlight_render::polarization::StokesParameter;
 
 /// What data see: fluxes, if they are a light curve of their own.
 ///

@@ -9,11 +9,11 @@ use super::polarized::{self, is_polarized};
 use super::world::seen_in_truth;
 use super::{Instrument, Measured, Result, Truth, hours_per_m, motion, sky};
 use crate::fit::settings::{FitFile, PixelShape, Within, refuse};
-use crate::frames::Frames;
-use crate::interferometry::array::Array;
-use crate::interferometry::observation::Observation;
-use crate::interferometry::operator::{ImageGrid, Method, Pulse};
-use crate::interferometry::simulate::{self, Movie};
+use kerrlight_common::frames::Frames;
+use kerrlight_vlbi::array::Array;
+use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::operator::{ImageGrid, Method, Pulse};
+use kerrlight_vlbi::simulate::{self, Movie};
 
 impl Measured {
     /// Simulates the data of settings that have a truth, seen by `array` where they have an observation.

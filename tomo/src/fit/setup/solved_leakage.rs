@@ -2,8 +2,8 @@
 
 use super::leakage::{LeakageUnknown, observing};
 use super::{Measured, Result};
-use crate::interferometry::Complex64;
-use crate::interferometry::polarimetry::{Leakage, LeakageProblem, LeakageTable, SharedLeakage};
+use kerrlight_vlbi::Complex64;
+use kerrlight_vlbi::polarimetry::{Leakage, LeakageProblem, LeakageTable, SharedLeakage};
 
 /// Leakage beside a model.
 #[derive(Clone, Debug)]
@@ -90,7 +90,7 @@ impl Measured {
     pub fn restore_leakage(&self, table: &LeakageTable) {
         if let (Some(unknown), Some((observation, _))) = (&self.leakage, &self.visibilities) {
             let known = unknown.shared.get();
-            let of = |(k, station): (usize, &crate::interferometry::array::Station)| {
+            let of = |(k, station): (usize, &kerrlight_vlbi::array::Station)| {
                 table.of(&station.name).unwrap_or(known[k])
             };
             unknown.shared.set(observation.stations.iter().enumerate().map(of).collect());

@@ -7,9 +7,9 @@ use crate::fit::{
     Batch, ForwardModel, Motion, PolarizedView, Sampling, Seen, SightlineRequest, Sightlines,
     State, Trainer,
 };
-use crate::render::{RingStrata, Stratum};
 use crate::representation::Workspace;
-use crate::transport::View;
+use kerrlight_render::picture::{RingStrata, Stratum};
+use kerrlight_render::transport::View;
 
 /// Pixels along each side: six times those of the fit, no more than this.
 const MOST: usize = 256;

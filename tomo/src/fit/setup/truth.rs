@@ -4,13 +4,13 @@ use super::glyph::Glyph;
 use super::random_field::RandomField;
 use super::ring::Rings;
 use super::{AXIS, Instrument, Result, known_axis, motion};
-use crate::dynamics::{AngularVelocity, Axis};
 use crate::fit::settings::{FitError, FitFile, Shines, Spot, Tube, Within, refuse};
 use crate::fit::{Batch, ForwardModel};
-use crate::frames::{Frames, Sink};
-use crate::polarization::StokesParameter;
-use crate::simd::Float;
+use kerrlight_common::frames::{Frames, Sink};
+use kerrlight_common::simd::Float;
 use kerrlight_geodesic::vector::distance;
+use kerrlight_render::dynamics::{AngularVelocity, Axis};
+use kerrlight_render::polarization::StokesParameter;
 
 /// What to write where there is no truth.
 pub(super) const SPOT: &str = "add a table [[truth.spot]] with `center = [x, y, z]` and `sigma = …` in M and `amplitude = 1.0`";

@@ -2,7 +2,7 @@
 
 use super::Result;
 use crate::fit::settings::refuse;
-use crate::interferometry::observation::{Flags, Observation, Row};
+use kerrlight_vlbi::observation::{Flags, Observation, Row};
 
 /// What a fit does with the rows of a file.
 #[derive(Debug, Clone, Copy, PartialEq)]

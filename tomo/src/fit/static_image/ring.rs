@@ -1,9 +1,9 @@
 //! A ring in an image, as the EHT Collaboration (2019, ApJL 875, L4, section 9.1) measures it.
 
 use crate::fit::settings::RingSettings;
-use crate::interferometry::operator::ImageGrid;
-use crate::units::MICROARCSECOND;
 use core::f64::consts::{PI, TAU};
+use kerrlight_common::units::MICROARCSECOND;
+use kerrlight_vlbi::operator::ImageGrid;
 
 /// What is measured of a ring. Angles on the sky in µas, position angles in degrees east of north.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,9 +1,9 @@
 //! Images to start from.
 
 use crate::fit::settings::StartImage;
-use crate::interferometry::operator::ImageGrid;
-use crate::units::MICROARCSECOND;
 use core::f64::consts::LN_2;
+use kerrlight_common::units::MICROARCSECOND;
+use kerrlight_vlbi::operator::ImageGrid;
 
 /// Brightness of the darkest pixel over that of the brightest: a pixel without light would stay so.
 const FLOOR: f64 = 0.02;

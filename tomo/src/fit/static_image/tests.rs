@@ -3,15 +3,15 @@
 use super::*;
 use crate::fit::settings::{RingSettings, StartImage, StaticImageFile, Variability};
 use crate::fit::setup::Measured;
-use crate::interferometry::array;
-use crate::interferometry::earth::{Frame, Ut1};
-use crate::interferometry::noise::{GainErrors, ScatteringKernel, add_thermal_noise, apply_gains};
-use crate::interferometry::observation::Observation;
-use crate::interferometry::operator::{ImageGrid, Method, Pulse};
-use crate::interferometry::schedule::{self, Clock, Schedule, Setup};
-use crate::interferometry::simulate::{self, Movie};
-use crate::interferometry::source::Source;
-use crate::units::MICROARCSECOND;
+use kerrlight_common::units::MICROARCSECOND;
+use kerrlight_vlbi::array;
+use kerrlight_vlbi::earth::{Frame, Ut1};
+use kerrlight_vlbi::noise::{GainErrors, ScatteringKernel, add_thermal_noise, apply_gains};
+use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::operator::{ImageGrid, Method, Pulse};
+use kerrlight_vlbi::schedule::{self, Clock, Schedule, Setup};
+use kerrlight_vlbi::simulate::{self, Movie};
+use kerrlight_vlbi::source::Source;
 
 const RADII: RingSettings = RingSettings { least_radius_uas: 5.0, most_radius_uas: 40.0 };
 

@@ -2,8 +2,8 @@
 
 use crate::fit::settings::FitFile;
 use crate::fit::setup::{self, Instrument, Measured};
-use crate::interferometry::array::built_in;
-use crate::scene::apply_override;
+use kerrlight_render::scene::apply_override;
+use kerrlight_vlbi::array::built_in;
 
 const FLARE: &str = include_str!("../../../../scenes/fits/polarized_flare.toml");
 

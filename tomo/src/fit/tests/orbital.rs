@@ -4,10 +4,10 @@ use crate::fit::Seen;
 use crate::fit::journal::Forgetful;
 use crate::fit::settings::{DataFiles, FitFile, Steps};
 use crate::fit::setup::{self, Instrument, Measured};
-use crate::interferometry::files::{light_curve_to_csv, parse_light_curve};
-use crate::interferometry::light_curve::{Flux, LightCurve, Sample};
-use crate::polarization::StokesParameter;
-use crate::scene::apply_override;
+use kerrlight_render::polarization::StokesParameter;
+use kerrlight_render::scene::apply_override;
+use kerrlight_vlbi::files::{light_curve_to_csv, parse_light_curve};
+use kerrlight_vlbi::light_curve::{Flux, LightCurve, Sample};
 
 const PUBLISHED: &str = include_str!("../../../../scenes/fits/orbital_polarimetry.toml");
 const TEXTBOOK: &str = include_str!("../../../../scenes/fits/orbital_polarimetry_textbook.toml");

@@ -4,13 +4,13 @@ use super::*;
 use crate::fit::linear::{
     Change, LinearProblem, LinearProgress, LinearSettings, Method, Voxels, Weighted,
 };
-use crate::polarization::{
+use crate::representation::Degree;
+use core::f64::consts::{PI, TAU};
+use kerrlight_render::polarization::{
     Components, FieldFrame, MixedField, Normalisation, PolarizationLaw, Stokes, StokesParameter,
 };
-use crate::representation::Degree;
-use crate::scene::Scene;
-use crate::transport::{PreparedScene, RayResult, Scratch};
-use core::f64::consts::{PI, TAU};
+use kerrlight_render::scene::Scene;
+use kerrlight_render::transport::{PreparedScene, RayResult, Scratch};
 
 /// The textbook's exponents, a field of these components (vertical, radial, toroidal).
 pub fn law(frame: FieldFrame, [vertical, radial, toroidal]: [f64; 3]) -> PolarizationLaw {
@@ -199,8 +199,8 @@ fn compare_stokes(found: &[f64], seen: &[RayResult]) {
 /// and what moving gas measures is b with b·u = 0 and b² of its invariant.
 #[test]
 fn exact_fields_of_ideal_magnetohydrodynamics() {
-    use crate::polarization::Gas;
     use kerrlight_geodesic::ZamoFrame;
+    use kerrlight_render::polarization::Gas;
     let (hole, [r, u]) = (Kerr::new(0.7).unwrap(), [6.0f64, 0.3f64]);
     let s = (1.0 - u * u).sqrt();
     let frame = ZamoFrame::at(&hole, r, s, u).unwrap();
@@ -226,8 +226,8 @@ fn exact_fields_of_ideal_magnetohydrodynamics() {
 /// The rule of Levis et al. 2024 without spin, component by component: b_r, b_θ and b_φ of gas that circles.
 #[test]
 fn code_lowered_rule_of_circular_orbits() {
-    use crate::polarization::Gas;
     use kerrlight_geodesic::ZamoFrame;
+    use kerrlight_render::polarization::Gas;
     let (hole, [r, u]) = (Kerr::new(0.0).unwrap(), [9.0f64, 0.2f64]);
     let s = (1.0 - u * u).sqrt();
     let frame = ZamoFrame::at(&hole, r, s, u).unwrap();

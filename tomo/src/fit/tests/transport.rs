@@ -1,11 +1,11 @@
 //! Polarised light of a fit's nodes against parallel transport that is integrated step by step.
 
 use super::stokes::{apart, evpa, law, traced, view};
-use crate::dynamics::AngularVelocity;
 use crate::fit::Sightlines;
-use crate::polarization::{FieldFrame, MagneticField};
 use kerrlight_geodesic::vector::cross;
 use kerrlight_geodesic::{Dual, Kerr, Scalar};
+use kerrlight_render::dynamics::AngularVelocity;
+use kerrlight_render::polarization::{FieldFrame, MagneticField};
 
 /// g_μν of Kerr–Schild coordinates with its derivatives, F and l_μ.
 fn metric(a: f64, place: [f64; 3]) -> ([[Dual<f64, 3>; 4]; 4], f64, [f64; 4]) {

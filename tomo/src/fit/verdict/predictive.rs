@@ -63,7 +63,7 @@ fn least(all: impl Iterator<Item = f64>) -> Option<f64> {
 mod tests {
     use super::super::Statistics;
     use super::*;
-    use crate::interferometry::data_terms::Residual;
+    use kerrlight_vlbi::data_terms::Residual;
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
     use rand_pcg::Pcg64;

@@ -1,6 +1,6 @@
 //! What the residuals of one kind of data are like.
 
-use crate::interferometry::data_terms::Residual;
+use kerrlight_vlbi::data_terms::Residual;
 use std::collections::{BTreeMap, HashMap};
 
 /// Sums over some residuals.

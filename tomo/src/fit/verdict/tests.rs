@@ -1,7 +1,7 @@
 //! Residuals whose law is known.
 
 use super::*;
-use crate::interferometry::data_terms::Residual;
+use kerrlight_vlbi::data_terms::Residual;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;

@@ -2,13 +2,13 @@
 
 use super::fall::Falls;
 use super::{Number, Parameter, Tangents};
-use crate::dynamics::{Axis, Cotangents, Turned, pull_back_vjp};
 use crate::fit::batch::Batch;
 use crate::fit::{Field, ForwardModel};
-use crate::points::{Coordinates, CoordinatesMut};
 use crate::representation::{Gradient, Workspace};
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 use kerrlight_geodesic::Scalar;
+use kerrlight_render::dynamics::{Axis, Cotangents, Turned, pull_back_vjp};
+use kerrlight_render::points::{Coordinates, CoordinatesMut};
 
 /// What a loss changes by where the points of a batch change.
 #[derive(Default)]

@@ -10,7 +10,7 @@ use super::covariance::covariance;
 use super::problem::{Estimate, WorldProblem};
 use super::{Free, World};
 use crate::Error;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 use nalgebra::{DMatrix, DVector};
 
 /// A quadratic form over worlds.

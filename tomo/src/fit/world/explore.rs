@@ -5,8 +5,8 @@
 use super::World;
 use super::problem::{Estimate, WorldProblem};
 use crate::Error;
-use crate::simd::Float;
 use cmaes::{CMAESOptions, DVector, TerminationReason};
+use kerrlight_common::simd::Float;
 use std::sync::{Mutex, PoisonError, RwLock};
 
 /// A world that was evaluated.

@@ -3,10 +3,10 @@
 use super::knots::at_knots;
 use super::{Law, Number, Parameter, World, WorldModel};
 use crate::Error;
-use crate::dynamics::AngularVelocity;
-use crate::dynamics::infall::{Falling, Family, Flow, Profile, Trajectory};
 use kerrlight_geodesic::Scalar;
 use kerrlight_geodesic::infall::Mixture;
+use kerrlight_render::dynamics::AngularVelocity;
+use kerrlight_render::dynamics::infall::{Falling, Family, Flow, Profile, Trajectory};
 
 /// dr/dt and Ω as functions of the radius.
 pub(super) enum Rates<'a> {

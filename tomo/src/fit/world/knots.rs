@@ -1,8 +1,8 @@
 //! Profiles of the flow whose values at the knots are not known.
 
 use super::{PARAMETERS, Parameter};
-use crate::dynamics::infall::Profile;
 use kerrlight_geodesic::Elementary;
+use kerrlight_render::dynamics::infall::Profile;
 
 /// A profile in a world, all its angular velocities times a factor.
 pub(super) fn at_knots<N: Elementary>(

@@ -4,19 +4,19 @@ use super::knots::at_knots;
 use super::tangents::Tangents;
 use super::{Number, PARAMETERS, Parameter, World};
 use crate::Error;
-use crate::dynamics::infall::{self, Falling, Profile};
-use crate::dynamics::{AngularVelocity, Axis};
 use crate::fit::pixel_rays::{PixelRays, near_the_ring};
 use crate::fit::{
     ForwardModel, Motion, PolarizedView, Redshift, Region, RingRays, Sampling, Seen,
     SightlineRequest, Sightlines,
 };
-use crate::polarization::PolarizationLaw;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 use kerrlight_geodesic::infall::Mixture;
 use kerrlight_geodesic::node_gradients;
 use kerrlight_geodesic::simd::{NodeRequest, PanelRule};
 use kerrlight_geodesic::{Inclination, Kerr, Observer, Quantities};
+use kerrlight_render::dynamics::infall::{self, Falling, Profile};
+use kerrlight_render::dynamics::{AngularVelocity, Axis};
+use kerrlight_render::polarization::PolarizationLaw;
 use std::sync::Arc;
 
 /// How matter moves before [`Parameter::Rotation`] is applied.

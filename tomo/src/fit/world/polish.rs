@@ -11,7 +11,7 @@ use crate::Error;
 use crate::fit::linear::{Profile, Voxels};
 use crate::fit::{Batch, Field, ForwardModel};
 use crate::representation::Workspace;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 use nalgebra::{DMatrix, DVector};
 
 /// Where Gauss–Newton steps ended.

@@ -8,8 +8,8 @@ use crate::fit::linear::{
     Change, GaussianField, Least, LinearProblem, Patience, Prior as Penalty, Voxels, Weighted,
 };
 use crate::representation::Degree;
-use crate::simd::Float;
 use core::f64::consts::TAU;
+use kerrlight_common::simd::Float;
 
 /// From this part of its prior's deviation on, the data say nothing about a parameter.
 const OPEN: f64 = 0.8;

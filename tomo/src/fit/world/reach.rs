@@ -4,7 +4,7 @@ use super::envelope::{Form, Seen, along};
 use super::polish::Polished;
 use super::problem::WorldProblem;
 use crate::Error;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen, Vector3};
 
 /// Along each axis values are taken as far away as they have risen by this, in units of −ln of the density.

@@ -5,7 +5,7 @@ use super::explore::{Exploration, Explored};
 use super::problem::{Free, WorldProblem};
 use super::{Parameter, World, WorldWatch};
 use crate::Error;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 use rayon::prelude::*;
 
 /// A parameter with the values that are tried.

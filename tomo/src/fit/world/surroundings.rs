@@ -5,7 +5,7 @@ use super::polish::Polished;
 use super::problem::WorldProblem;
 use super::reach::Reach;
 use crate::Error;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 
 /// What is looked at around a world.
 pub struct Surroundings<'a> {

@@ -1,8 +1,6 @@
 //! Derivatives of images with respect to the world against central differences, in double precision.
 
 use super::*;
-use crate::dynamics::infall::Profile;
-use crate::dynamics::{AngularVelocity, Axis, Velocity};
 use crate::fit::RingRays;
 use crate::fit::linear::{Change, Patience, Weighted};
 use crate::fit::pixel_rays::PixelRays;
@@ -11,6 +9,8 @@ use crate::fit::{Batch, Field, ForwardModel, FrameTerm, ImageTerm, Motion, Regio
 use crate::representation::Degree;
 use crate::representation::{Representation, Workspace};
 use core::f64::consts::{FRAC_PI_2, PI};
+use kerrlight_render::dynamics::infall::Profile;
+use kerrlight_render::dynamics::{AngularVelocity, Axis, Velocity};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;

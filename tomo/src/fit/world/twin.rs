@@ -5,8 +5,8 @@
 
 use super::problem::WorldProblem;
 use super::{Parameter, World};
-use crate::simd::Float;
 use core::f64::consts::PI;
+use kerrlight_common::simd::Float;
 
 impl<T: Float + Default> WorldProblem<'_, T> {
     /// The twin of a world; none if its inclination is not free.

@@ -1,9 +1,9 @@
 use super::*;
-use crate::dynamics::Velocity;
 use crate::representation::conformance::{Subject, check};
 use crate::representation::grid::tests::plain;
 use crate::representation::{Activation, Grid, GridSettings};
 use kerrlight_geodesic::vector::{cross, rotate};
+use kerrlight_render::dynamics::Velocity;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 

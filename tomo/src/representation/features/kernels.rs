@@ -4,7 +4,7 @@ use super::super::grid::cells::{Geometry, Located, interpolate, keep_inside};
 use super::super::grid::scatter::Contribution;
 use super::super::{Activation, Coordinates};
 use super::layout::{FEATURES, Layout, MAX_INPUTS, WIDTH};
-use crate::simd::{Float, Lanes, MAX_LANES, Task};
+use kerrlight_common::simd::{Float, Lanes, MAX_LANES, Task};
 
 /// Weights and biases of the network.
 struct Network<'a, T> {

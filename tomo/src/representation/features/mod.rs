@@ -11,9 +11,9 @@ use super::{
     Activation, BuiltIn, Coordinates, CoordinatesMut, Gradient, Groups, Representation, Workspace,
 };
 use crate::Error;
-use crate::simd::{Float, InstructionSet, dispatch};
 use core::ops::Range;
 use kernels::{Backward, Corners, Forward};
+use kerrlight_common::simd::{Float, InstructionSet, dispatch};
 use layout::{FEATURES, Layout, MAX_LEVELS, WIDTH};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;

@@ -4,7 +4,7 @@ use super::super::{Activation, Coordinates};
 use super::Share;
 use super::scatter::{Contribution, NOWHERE};
 use crate::Error;
-use crate::simd::{Float, Lanes, MAX_LANES, Task, math};
+use kerrlight_common::simd::{Float, Lanes, MAX_LANES, Task, math};
 
 /// One axis of the box.
 #[derive(Clone, Copy)]

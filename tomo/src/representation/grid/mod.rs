@@ -9,8 +9,8 @@ use super::{
     Activation, BuiltIn, Coordinates, CoordinatesMut, Gradient, Groups, Representation, Workspace,
 };
 use crate::Error;
-use crate::simd::{Float, InstructionSet, dispatch};
 use cells::{Geometry, Products, Values, check_box};
+use kerrlight_common::simd::{Float, InstructionSet, dispatch};
 use scatter::{Contribution, Scatter};
 
 /// Shape of a grid.
@@ -112,7 +112,7 @@ impl Grid {
 
 /// A multiple of all lanes near the middle.
 fn halfway(points: usize) -> usize {
-    (points / 2).next_multiple_of(crate::simd::MAX_LANES)
+    (points / 2).next_multiple_of(kerrlight_common::simd::MAX_LANES)
 }
 
 /// What one thread turns into contributions to nodes.

@@ -4,7 +4,7 @@
 //! next; so the even slabs can be worked on at the same time, and then the odd ones, straight into the
 //! gradient.
 
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 use rayon::prelude::*;
 
 /// The most slabs.

@@ -9,9 +9,9 @@ use super::Network;
 use super::output::Cotangents;
 use super::packed::Packed;
 use super::tile::{Activations, POINTS, Tile};
-use crate::memory;
-use crate::simd::Float;
 use core::ops::Range;
+use kerrlight_common::memory;
+use kerrlight_common::simd::Float;
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
 

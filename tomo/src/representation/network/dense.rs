@@ -4,7 +4,7 @@
 //! sums runs over the common index, with one operand broadcast and the other loaded from a panel two
 //! registers wide; `ROWS` is 6 where there are 16 registers and 12 where there are 32. ReLU, its derivative and the biases are part of loading and storing a block.
 
-use crate::simd::{Float, Lanes, Task};
+use kerrlight_common::simd::{Float, Lanes, Task};
 
 /// Numbers row by row with a distance between rows.
 #[derive(Clone, Copy)]

@@ -2,7 +2,7 @@
 
 use super::super::{Coordinates, CoordinatesMut};
 use super::dense::{Matrix, MatrixMut};
-use crate::simd::{Float, Lanes, MAX_LANES, Task, math};
+use kerrlight_common::simd::{Float, Lanes, MAX_LANES, Task, math};
 
 /// Rows γ(x) = [p x, sin 2ʲx, sin(2ʲx + π/2)] (for each j the coordinates one after the other), then a
 /// one.

@@ -2,7 +2,7 @@
 
 use super::layout::Layer;
 use super::settings::Initialisation;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;

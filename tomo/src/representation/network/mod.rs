@@ -17,8 +17,8 @@ pub use settings::{Initialisation, NetworkSettings};
 
 use super::{BuiltIn, Coordinates, Gradient, Groups, Representation, WeightMatrix, Workspace};
 use crate::Error;
-use crate::simd::{Float, InstructionSet};
 use batch::{Memory, Way};
+use kerrlight_common::simd::{Float, InstructionSet};
 use layout::{Layer, Layout};
 use output::Cotangents;
 

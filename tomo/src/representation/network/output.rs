@@ -2,7 +2,7 @@
 
 use super::super::{Activation, Link};
 use super::dense::{Matrix, MatrixMut};
-use crate::simd::{Float, Lanes, Task};
+use kerrlight_common::simd::{Float, Lanes, Task};
 
 /// What the values are differentiated against.
 #[derive(Clone, Copy)]

@@ -4,7 +4,7 @@ use super::super::workspace::Lines;
 use super::Network;
 use super::dense::{pack_kernel, pack_transposed, packed_kernel};
 use super::layout::LINE;
-use crate::simd::{Float, panel};
+use kerrlight_common::simd::{Float, panel};
 
 /// Packed weights of all layers.
 #[derive(Default)]

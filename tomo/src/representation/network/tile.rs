@@ -8,8 +8,8 @@ use super::encoding::{Encode, encode_vjp};
 use super::layout::Rows;
 use super::output::{Cotangents, Output, OutputBackward};
 use super::packed::Packed;
-use crate::simd::{Float, dispatch};
 use core::ops::Range;
+use kerrlight_common::simd::{Float, dispatch};
 
 /// Points of a tile. Activations of four layers of 128 and their gradients then take half a
 /// megabyte, the second-level cache of a core.

@@ -1,6 +1,6 @@
 //! Uniform B-splines: how much of each node's number a point takes.
 
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 use serde::{Deserialize, Serialize};
 
 /// What is between the nodes of a grid: a sum of B-splines, one about each node (de Boor 1978).

@@ -9,7 +9,7 @@ pub(crate) use basis::{STENCIL, TAPS};
 
 use super::{Coordinates, Gradient, Representation, Workspace};
 use crate::Error;
-use crate::simd::Float;
+use kerrlight_common::simd::Float;
 use rayon::prelude::*;
 
 /// A sum of B-splines about the nodes of a grid.

@@ -5,8 +5,8 @@
 mod off;
 
 use anyhow::Context;
-use kerrlight_tomo::scene::{Scene, apply_override};
-use kerrlight_tomo::transport::{PreparedScene, RayResult, Scratch};
+use kerrlight_render::scene::{Scene, apply_override};
+use kerrlight_render::transport::{PreparedScene, RayResult, Scratch};
 use std::fmt::Write as _;
 use std::io::Write;
 use std::path::Path;

@@ -3,9 +3,9 @@
 
 use kerrlight_geodesic::simd::Crossings;
 use kerrlight_geodesic::{Inclination, Kerr, Observer, Outcome};
-use kerrlight_tomo::emission::disc::DiscModel;
-use kerrlight_tomo::scene::Scene;
-use kerrlight_tomo::transport::{PreparedScene, RayResult, Scratch};
+use kerrlight_render::emission::disc::DiscModel;
+use kerrlight_render::scene::Scene;
+use kerrlight_render::transport::{PreparedScene, RayResult, Scratch};
 use std::time::Instant;
 
 /// An opaque disc and nothing else.

@@ -2,14 +2,14 @@
 //! low signal to noise, closure quantities more so. Noise is drawn anew about the model, and data are made of that.
 
 use super::Evidence;
+use kerrlight_common::frames::Frames;
 use kerrlight_tomo::fit::settings::{Loss, LossKind};
 use kerrlight_tomo::fit::verdict::Statistics;
-use kerrlight_tomo::frames::Frames;
-use kerrlight_tomo::interferometry::data_terms::{AmplitudeTerm, ClosureTerm, DataTerm};
-use kerrlight_tomo::interferometry::noise::add_thermal_noise;
-use kerrlight_tomo::interferometry::observation::Observation;
-use kerrlight_tomo::interferometry::operator::{Method, Operator, Transform};
-use kerrlight_tomo::interferometry::products::ClosureKind;
+use kerrlight_vlbi::data_terms::{AmplitudeTerm, ClosureTerm, DataTerm};
+use kerrlight_vlbi::noise::add_thermal_noise;
+use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::operator::{Method, Operator, Transform};
+use kerrlight_vlbi::products::ClosureKind;
 use num_complex::Complex;
 
 /// Draws of the noise.

@@ -2,11 +2,11 @@
 
 use super::super::change::Change;
 use super::*;
-use crate::dynamics::{AngularVelocity, Velocity};
 use crate::fit::Region;
 use crate::fit::linear::Patience;
 use crate::representation::Degree;
 use crate::representation::{Allowed, Carrier, Changing};
+use kerrlight_render::dynamics::{AngularVelocity, Velocity};
 
 const ALLOWED: [Allowed; 2] = [Allowed::Any, Allowed::Births];
 

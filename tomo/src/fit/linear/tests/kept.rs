@@ -3,8 +3,8 @@
 use super::super::rows::Held;
 use super::*;
 use crate::fit::Seen;
-use crate::polarization::StokesParameter;
 use crate::representation::Allowed;
+use kerrlight_render::polarization::StokesParameter;
 
 /// How many frames are kept, made each time and walked through.
 fn counts(operator: &Operator<'_, f64>) -> [usize; 3] {

@@ -5,12 +5,10 @@ use super::super::objective::{Objective, Penalised};
 use super::*;
 use crate::Error;
 use crate::fit::{Scan, ScanTerm};
-use crate::interferometry::data_terms::{
-    AmplitudeTerm, ClosureTerm, DataTerm, Residual, VisibilityTerm,
-};
-use crate::interferometry::observation::{Basis, Measured, Observation, Row};
-use crate::interferometry::operator::{Dtft, ImageGrid, Pulse, Transform};
-use crate::interferometry::products::ClosureKind;
+use kerrlight_vlbi::data_terms::{AmplitudeTerm, ClosureTerm, DataTerm, Residual, VisibilityTerm};
+use kerrlight_vlbi::observation::{Basis, Measured, Observation, Row};
+use kerrlight_vlbi::operator::{Dtft, ImageGrid, Pulse, Transform};
+use kerrlight_vlbi::products::ClosureKind;
 use num_complex::Complex;
 
 /// Kinds of data of an array.
@@ -47,7 +45,7 @@ pub(in crate::fit) fn array(movie: &[f64], seen: Seen) -> ScanTerm<f64> {
             pairs.iter().map(|[a, b]| [0, 1].map(|c| place(*b)[c] - place(*a)[c])).collect();
         let transform = Dtft::new(grid, Pulse::Triangle, core::slice::from_ref(&uv), usize::MAX);
         let mut visibilities = vec![Complex::new(0.0, 0.0); uv.len()];
-        crate::interferometry::operator::Operator::forward(&transform, image, &mut visibilities);
+        kerrlight_vlbi::operator::Operator::forward(&transform, image, &mut visibilities);
         let largest = visibilities.iter().map(|v| v.norm()).fold(1e-3, f64::max);
         let mut observation = Observation::empty(Basis::Stokes);
         for ((pair, uv), visibility) in pairs.iter().zip(&uv).zip(visibilities) {
@@ -154,7 +152,10 @@ fn exact_closures_alone_need_a_flux_and_dark_data_have_no_light() {
     let closures = array(&movie, Seen::LogAmplitudes);
     let terms = [Weighted { weight: 1.0, term: &closures as &dyn FrameTerm<f64> }];
     assert!(matches!(solve(&terms, None), Err(Error::Linear(LinearError::NoFlux(_)))));
-    assert!(matches!(solve(&terms, Some(-1.0)), Err(Error::Range(_))));
+    assert!(matches!(
+        solve(&terms, Some(-1.0)),
+        Err(Error::Render(kerrlight_render::Error::Range(_)))
+    ));
     let error = solve(&terms, Some(1e6)).unwrap_err();
     assert!(matches!(error, Error::Linear(LinearError::TooBright { .. })), "{error}");
     let none = array(&vec![0.0; movie.len()], Seen::Amplitudes);

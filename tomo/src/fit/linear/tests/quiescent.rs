@@ -5,7 +5,7 @@ use super::super::objective::{Objective, Penalised};
 use super::lit::{Seen as Array, array, spot};
 use super::*;
 use crate::fit::{Beside, Quiescent, Seen};
-use crate::polarization::{Stokes, StokesParameter};
+use kerrlight_render::polarization::{Stokes, StokesParameter};
 
 const UPPER: f64 = 2.0;
 

@@ -5,7 +5,7 @@ use crate::fit::FluxDatum;
 use crate::fit::band::{Background, CurveRows, expected_background};
 use crate::fit::settings::{BackgroundSettings, BandSettings, FitError, refuse};
 use crate::fit::setup::{Curve, Result};
-use crate::polarization::StokesParameter;
+use kerrlight_render::polarization::StokesParameter;
 
 /// Refuses numbers that mean nothing, and light curves of I.
 pub(super) fn check(settings: &BackgroundSettings, curve: &Curve) -> Result<()> {

@@ -11,12 +11,12 @@ pub use search::{FoundWorld, SearchWatch, Trial, find_world};
 
 use super::instrument::ring;
 use super::{Instrument, Measured, Result, axis, drag, motion};
-use crate::dynamics::Velocity;
-use crate::dynamics::infall::Profile;
 use crate::fit::settings::{AxisSearch, FitError, FitFile, UnknownWorld};
 use crate::fit::world::{KNOTS, Law, Parameter, World, WorldModel};
 use crate::fit::{Motion, Redshift, Sampling};
 use kerrlight_geodesic::Kerr;
+use kerrlight_render::dynamics::Velocity;
+use kerrlight_render::dynamics::infall::Profile;
 
 /// The world that the settings say, for parameters that are known, and for data that are simulated.
 pub fn known_world(file: &FitFile) -> World {
@@ -183,8 +183,8 @@ fn model(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interferometry::array::built_in;
-    use crate::toml_file;
+    use kerrlight_common::toml_file;
+    use kerrlight_vlbi::array::built_in;
 
     const SIDE: usize = 12;
 

@@ -12,7 +12,7 @@ use crate::fit::setup::{
 };
 use crate::fit::world::{Effort, World, WorldProblem};
 use crate::fit::{Objective, Weighted as Imaged};
-use crate::interferometry::operator::Pulse;
+use kerrlight_vlbi::operator::Pulse;
 
 /// Data as a search looks at them.
 pub(super) struct Seen {

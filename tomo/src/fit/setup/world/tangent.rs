@@ -12,10 +12,10 @@ use crate::fit::settings::{Loss, LossKind};
 use crate::fit::setup::{Measured, Result};
 use crate::fit::world::{Estimate, World, WorldProblem};
 use crate::fit::{Scan, ScanTerm};
-use crate::interferometry::data_terms::GainTerm;
-use crate::interferometry::gains::GainPriors;
-use crate::interferometry::observation::Observation;
-use crate::interferometry::operator::Operator;
+use kerrlight_vlbi::data_terms::GainTerm;
+use kerrlight_vlbi::gains::GainPriors;
+use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::operator::Operator;
 use num_complex::Complex32;
 
 /// A volume in a world.

@@ -2,8 +2,8 @@
 //! Prather (2020, ApJ 894, 156).
 
 use crate::fit::static_image::beam::blurred;
-use crate::interferometry::operator::ImageGrid;
-use crate::units::MICROARCSECOND;
+use kerrlight_common::units::MICROARCSECOND;
+use kerrlight_vlbi::operator::ImageGrid;
 use num_complex::Complex;
 
 /// Numbers of the linear polarisation of an image. Position angles in degrees east of north.

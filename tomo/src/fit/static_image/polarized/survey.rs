@@ -9,8 +9,8 @@ use crate::fit::static_image::solve::minimum;
 use crate::fit::static_image::survey::{allowed, held};
 use crate::fit::static_image::{Stage, Survey, SurveyWatch};
 use crate::fit::{FrameTerm, Weighted};
-use crate::interferometry::data_terms::DataTermError;
-use crate::interferometry::operator::ImageGrid;
+use kerrlight_vlbi::data_terms::DataTermError;
+use kerrlight_vlbi::operator::ImageGrid;
 use rayon::prelude::*;
 
 /// Images of I, Q and U with what they were made of.

@@ -6,11 +6,11 @@ use crate::fit::settings::StaticImageFile;
 use crate::fit::setup::Measured;
 use crate::fit::static_image::survey;
 use crate::fit::static_image::tests::{SETTINGS, night, spoil};
-use crate::interferometry::noise::apply_leakage;
-use crate::interferometry::observation::{Basis, Observation};
-use crate::interferometry::operator::{ImageGrid, Method, Operator, Pulse, Transform};
-use crate::interferometry::polarimetry::LeakageTable;
-use crate::units::MICROARCSECOND;
+use kerrlight_common::units::MICROARCSECOND;
+use kerrlight_vlbi::noise::apply_leakage;
+use kerrlight_vlbi::observation::{Basis, Observation};
+use kerrlight_vlbi::operator::{ImageGrid, Method, Operator, Pulse, Transform};
+use kerrlight_vlbi::polarimetry::LeakageTable;
 use num_complex::Complex;
 
 /// The settings of a static image with those of its polarisation.

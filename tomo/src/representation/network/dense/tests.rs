@@ -1,5 +1,5 @@
 use super::*;
-use crate::simd::Array;
+use kerrlight_common::simd::Array;
 
 const POINTS: usize = 24;
 

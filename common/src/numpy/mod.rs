@@ -1,0 +1,40 @@
+//! Arrays of NumPy (NPY) and archives of them (NPZ), as bytes. Files state sizes that need not be true: nothing is
+//! allocated before it is checked against the bytes that are there.
+
+mod archive;
+mod array;
+
+pub use archive::{Archive, ArchiveWriter, write_archive};
+pub use array::{Headed, Stream, open, read_array, write_array};
+
+/// Why bytes are not the arrays that are expected.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum NumpyError {
+    /// What is wrong with them.
+    #[error("{0}")]
+    Content(String),
+    /// What is wrong with a member of an archive.
+    #[error("{member}: {error}")]
+    Member {
+        /// The member.
+        member: String,
+        /// What is wrong with it.
+        error: Box<dyn core::error::Error + Send + Sync>,
+    },
+}
+
+impl NumpyError {
+    /// Refusal of what an array or an archive holds.
+    pub fn content(message: impl Into<String>) -> Self {
+        NumpyError::Content(message.into())
+    }
+
+    /// With the member of an archive that it is about.
+    pub fn member(
+        member: impl Into<String>,
+        error: impl core::error::Error + Send + Sync + 'static,
+    ) -> Self {
+        NumpyError::Member { member: member.into(), error: Box::new(error) }
+    }
+}

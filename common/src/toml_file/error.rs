@@ -1,0 +1,104 @@
+//! What is wrong with a TOML text.
+
+use serde::de;
+use std::fmt::Display;
+use std::ops::Range;
+
+/// Why a TOML text is not what was to be read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ReadError {
+    message: String,
+    /// Keys from the innermost to the outermost.
+    keys: Vec<String>,
+    /// Bytes of the text.
+    span: Option<Range<usize>>,
+    line: Option<usize>,
+}
+
+/// Rust's types, of which serde speaks, and what a value of each has to be.
+const TYPES: [(&str, &str); 9] = [
+    ("f64", "a number"),
+    ("f32", "a number"),
+    ("usize", "a whole number, 0 or more"),
+    ("u64", "a whole number, 0 or more"),
+    ("u32", "a whole number, 0 to 4294967295"),
+    ("u16", "a whole number, 0 to 65535"),
+    ("u8", "a whole number, 0 to 255"),
+    ("i64", "a whole number"),
+    ("i32", "a whole number, -2147483648 to 2147483647"),
+];
+
+impl ReadError {
+    fn new(message: String) -> Self {
+        ReadError { message, keys: Vec::new(), span: None, line: None }
+    }
+
+    /// What the parser says, which shows the line.
+    pub fn syntax(error: &dyn Display) -> Self {
+        ReadError::new(error.to_string().trim_end().to_owned())
+    }
+
+    /// The same of the value at a key.
+    pub(super) fn under(mut self, key: String, span: Range<usize>) -> Self {
+        self.keys.push(key);
+        self.at(span)
+    }
+
+    /// The same at a place, where none is known yet.
+    pub(super) fn at(mut self, span: Range<usize>) -> Self {
+        self.span.get_or_insert(span);
+        self
+    }
+
+    /// The same with its line.
+    pub(super) fn in_text(mut self, text: &str) -> Self {
+        let before = self.span.as_ref().map(|span| &text.as_bytes()[..span.start.min(text.len())]);
+        self.line = before.map(|bytes| 1 + bytes.iter().filter(|byte| **byte == b'\n').count());
+        self
+    }
+
+    /// The same without a line: that of a text which the user never saw.
+    pub fn without_line(mut self) -> Self {
+        self.line = None;
+        self
+    }
+
+    /// Dotted path of the key, empty for the whole text.
+    pub fn key(&self) -> String {
+        self.keys.iter().rev().map(String::as_str).collect::<Vec<_>>().join(".")
+    }
+
+    /// Line of the text, counted from 1.
+    pub fn line(&self) -> Option<usize> {
+        self.line
+    }
+}
+
+impl Display for ReadError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if let Some(line) = self.line {
+            write!(f, "line {line}: ")?;
+        }
+        if !self.keys.is_empty() {
+            write!(f, "{}: ", self.key())?;
+        }
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for ReadError {}
+
+impl de::Error for ReadError {
+    fn custom<T: Display>(message: T) -> Self {
+        let plain = |text: String, (name, meaning): &(&str, &str)| {
+            text.replace(&format!("expected {name}"), &format!("expected {meaning}"))
+        };
+        ReadError::new(TYPES.iter().fold(message.to_string(), plain))
+    }
+}
+
+impl serde::ser::Error for ReadError {
+    fn custom<T: Display>(message: T) -> Self {
+        ReadError::new(message.to_string())
+    }
+}

@@ -1,0 +1,122 @@
+//! What the readers of glTF take for granted: sizes, types, sources of pictures, and that nodes are trees.
+
+use super::MeshError;
+use gltf::accessor::{DataType, Dimensions};
+use gltf::{Accessor, Document, Semantic};
+use kerrlight_common::memory;
+
+/// Refuses a file that its readers would not bear.
+pub(super) fn check(document: &Document, buffers: &[Vec<u8>]) -> Result<(), MeshError> {
+    check_views(document, buffers)?;
+    document.accessors().try_for_each(|accessor| check_accessor(&accessor))?;
+    check_types(document)?;
+    check_pictures(document)?;
+    check_trees(document)
+}
+
+fn fail(why: String) -> Result<(), MeshError> {
+    Err(MeshError::Content(why))
+}
+
+fn check_views(document: &Document, buffers: &[Vec<u8>]) -> Result<(), MeshError> {
+    for view in document.views() {
+        let size = buffers.get(view.buffer().index()).map_or(0, Vec::len);
+        if view.offset().checked_add(view.length()).is_none_or(|end| end > size) {
+            return beyond("buffer view", view.index());
+        }
+    }
+    Ok(())
+}
+
+fn beyond(what: &str, k: usize) -> Result<(), MeshError> {
+    fail(format!("{what} {k} (counted from 0) reaches beyond its buffer"))
+}
+
+/// Whether so many items of this size lie in a view.
+fn holds(view: &gltf::buffer::View<'_>, offset: usize, count: usize, size: usize) -> bool {
+    let step = view.stride().unwrap_or(size);
+    let reach = count.saturating_sub(1).checked_mul(step);
+    let end = reach.and_then(|reach| reach.checked_add(offset)?.checked_add(size));
+    step >= size && end.is_some_and(|end| end <= view.length())
+}
+
+fn check_accessor(accessor: &Accessor<'_>) -> Result<(), MeshError> {
+    let (count, size) = (accessor.count(), accessor.size());
+    match accessor.view() {
+        Some(view) if !holds(&view, accessor.offset(), count, size) => {
+            return beyond("accessor", accessor.index());
+        }
+        Some(_) => {}
+        // Zeros, as many as it states, of which some are replaced.
+        None => {
+            let what = || format!("accessor {} of {count} points", accessor.index());
+            memory::afford(what, 64.0 * count as f64)
+                .map_err(|error| MeshError::Content(error.to_string()))?;
+        }
+    }
+    let Some(sparse) = accessor.sparse() else { return Ok(()) };
+    let (indices, values) = (sparse.indices(), sparse.values());
+    let of_index = match indices.index_type() {
+        gltf::accessor::sparse::IndexType::U8 => 1,
+        gltf::accessor::sparse::IndexType::U16 => 2,
+        gltf::accessor::sparse::IndexType::U32 => 4,
+    };
+    let count = sparse.count();
+    let holds_all = holds(&indices.view(), indices.offset(), count, of_index)
+        && holds(&values.view(), values.offset(), count, size);
+    if holds_all { Ok(()) } else { beyond("sparse accessor", accessor.index()) }
+}
+
+/// Positions, coordinates in textures and indices have the types that glTF allows.
+fn check_types(document: &Document) -> Result<(), MeshError> {
+    use DataType::{F32, U8, U16, U32};
+    let is = |accessor: &Accessor<'_>, dimensions, types: &[DataType]| {
+        if accessor.dimensions() == dimensions && types.contains(&accessor.data_type()) {
+            return Ok(());
+        }
+        let (k, own, of) = (accessor.index(), accessor.dimensions(), accessor.data_type());
+        fail(format!(
+            "accessor {k} (counted from 0) is {own:?} of {of:?}: {dimensions:?} of {types:?} is expected"
+        ))
+    };
+    for primitive in document.meshes().flat_map(|mesh| mesh.primitives()) {
+        if let Some(positions) = primitive.get(&Semantic::Positions) {
+            is(&positions, Dimensions::Vec3, &[F32])?;
+        }
+        if let Some(places) = primitive.get(&Semantic::TexCoords(0)) {
+            is(&places, Dimensions::Vec2, &[F32, U8, U16])?;
+        }
+        if let Some(indices) = primitive.indices() {
+            is(&indices, Dimensions::Scalar, &[U8, U16, U32])?;
+        }
+    }
+    Ok(())
+}
+
+fn check_pictures(document: &Document) -> Result<(), MeshError> {
+    for (k, image) in document.as_json().images.iter().enumerate() {
+        if image.uri.is_none() && (image.buffer_view.is_none() || image.mime_type.is_none()) {
+            return fail(format!(
+                "image {k} (counted from 0) has neither a uri nor a bufferView with its mimeType"
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// No node has two parents, and those of a scene have none: what hangs from them is finite.
+fn check_trees(document: &Document) -> Result<(), MeshError> {
+    let mut has_parent = vec![false; document.nodes().len()];
+    for child in document.nodes().flat_map(|node| node.children()) {
+        if core::mem::replace(&mut has_parent[child.index()], true) {
+            return fail(format!("node {} (counted from 0) has two parents", child.index()));
+        }
+    }
+    match document.scenes().flat_map(|scene| scene.nodes()).find(|node| has_parent[node.index()]) {
+        Some(node) => fail(format!(
+            "node {} (counted from 0) of a scene is the child of another node or of itself",
+            node.index()
+        )),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,76 @@
+//! What single rays see, and whether two of them see the same piece of the picture.
+
+use crate::picture::rings::Counted;
+use crate::transport::RayResult;
+use kerrlight_geodesic::Outcome;
+
+/// What a ray, or several along photon rings, adds to its cell.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Light {
+    pub(super) intensity: f64,
+    pub(super) rgb: [f32; 3],
+    pub(super) stokes: [f64; 3],
+    pub(super) kind: Kind,
+    /// Rays that it took, and those of them that were given up.
+    pub(super) rays: u32,
+    pub(super) unresolved: u32,
+    /// Estimated error of the intensity where it is a mean over rays along photon rings.
+    pub(super) mean: Option<f64>,
+}
+
+/// What rays of one smooth piece of the picture have in common.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Kind {
+    /// Lensing band and outcome.
+    pub(super) band: (u32, Outcome),
+    /// Images of the disc that are seen.
+    pub(super) disc_images: u32,
+    /// Whether there is emission.
+    pub(super) lit: bool,
+}
+
+impl Light {
+    /// Whether a lensing band or the end of rays lies between two rays.
+    pub(super) fn other_band(&self, other: &Light) -> bool {
+        self.kind.band != other.kind.band && self.mean.is_none() && other.mean.is_none()
+    }
+
+    /// Whether two rays see different pieces of the picture; a mean over the rays of a photon ring sees
+    /// all of them.
+    pub(super) fn other_piece(&self, other: &Light) -> bool {
+        self.kind != other.kind && self.mean.is_none() && other.mean.is_none()
+    }
+
+    /// What a ray sees.
+    pub(super) fn of_ray(seen: &RayResult) -> Self {
+        let band = (seen.crossings, seen.outcome);
+        let (disc_images, lit) = (seen.disc_images, seen.radius > 0.0);
+        Light {
+            intensity: seen.intensity,
+            rgb: seen.rgb,
+            stokes: seen.stokes,
+            kind: Kind { band, disc_images, lit },
+            rays: 1,
+            unresolved: u32::from(seen.outcome.is_unresolved()),
+            mean: None,
+        }
+    }
+
+    /// What a ray sees, or the mean around it.
+    pub(super) fn new((seen, counted): (&RayResult, &Counted)) -> Self {
+        let ray = Light::of_ray(seen);
+        Light {
+            rays: ray.rays + counted.rays,
+            unresolved: ray.unresolved + counted.unresolved,
+            mean: (counted.rays > 0).then_some(counted.error),
+            ..ray
+        }
+    }
+}
+
+/// Largest less least.
+pub(super) fn range(values: impl Iterator<Item = f64>) -> f64 {
+    let (low, high) =
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    high - low
+}

@@ -1,0 +1,323 @@
+//! From a scene to a picture: bands of rows, tile by tile on all cores, kept in a journal until
+//! the whole picture is there. Every pixel is computed on its own, so the picture depends
+//! neither on the number of threads nor on the size of tiles nor on interruptions.
+
+mod adaptive;
+mod bands;
+mod channels;
+mod choice;
+mod film;
+mod finish;
+mod grid;
+mod journal;
+mod layers;
+mod pixels;
+mod placement;
+mod plan;
+mod raw;
+mod requested;
+mod rings;
+mod tally;
+mod workspace;
+
+pub use channels::{CHANNELS, ChannelKind};
+pub use choice::all_channels;
+pub use film::{Film, Frame};
+pub use journal::{AnyJournal, Found, Journal};
+pub use plan::{Plan, Step};
+pub use requested::REQUESTED;
+pub use rings::{RingStrata, Stratum};
+pub use tally::Summary;
+
+use crate::Error;
+use crate::image::Picture;
+use crate::image::exr::Layout;
+use crate::scene::{Rings, Scene};
+use crate::transport::{Assets, Meter, PreparedScene, RayResult, Scratch, names};
+use grid::{Grid, Square};
+use kerrlight_geodesic::RayDevice;
+use rayon::prelude::*;
+use rings::Resolver;
+use std::sync::{Arc, Mutex, PoisonError};
+use tally::{Tally, own_unit};
+
+/// Told how many more rows of pixels are done; returns whether to go on.
+pub type Progress<'a> = dyn Fn(usize) -> bool + Sync + 'a;
+
+/// Why there is no picture.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RenderError {
+    /// There is no light to scale.
+    #[error("`screen.total_flux_jy` cannot be met: the picture's own flux is {0:e} scene units")]
+    NoFlux(f64),
+    /// A value does not fit the picture's 32-bit channels.
+    #[error("channel {channel}: a value is too large for a 32-bit float; lower the brightness")]
+    NotFinite {
+        /// The channel.
+        channel: &'static str,
+    },
+    /// A channel that the scene does not have.
+    #[error("`screen.channels`: this scene has no channel `{name}`; it has {there}")]
+    Channel {
+        /// The name that was requested.
+        name: String,
+        /// The channels that there are.
+        there: String,
+    },
+    /// A channel that pictures with refined pixels do not have.
+    #[error(
+        "`screen.channels`: {channel} is not there with `screen.image_error`: give samples_per_pixel in its place"
+    )]
+    Refined {
+        /// The channel.
+        channel: &'static str,
+    },
+    /// The caller asked to stop.
+    #[error("stopped")]
+    Stopped,
+}
+
+/// A picture to be rendered: what is seen, where rays go, and what is kept of it.
+#[derive(Debug)]
+pub struct Raster {
+    scene: Scene,
+    prepared: PreparedScene,
+    grid: Grid,
+    rings: Option<Resolver>,
+    channels: Vec<&'static ChannelKind>,
+    layout: Layout,
+    /// Factor from the scene's unit of intensity to that in which bands are kept: the file's,
+    /// unless it is to be found from the whole picture.
+    unit: f64,
+    /// Columns of a tile.
+    tile: usize,
+    /// Where the time goes, if that is asked.
+    meter: Option<Mutex<Meter>>,
+}
+
+/// Rays of a block of a trial.
+const TRIAL: usize = 64;
+
+/// Columns of a tile: with the rows of a band a block of rays.
+const TILE: usize = 64;
+
+/// The same for devices, which take many rays at a time.
+const DEVICE_TILE: usize = 2048;
+
+/// What resolves photon rings, if the scene has them resolved.
+fn resolver(scene: &Scene, prepared: &PreparedScene) -> Option<Resolver> {
+    match scene.screen.rings {
+        Rings::Resolved => Resolver::new(prepared, scene.screen.image_error.is_some()),
+        Rings::RegularGrid => None,
+    }
+}
+
+impl Raster {
+    /// The picture of `scene` with the decoded files that it names.
+    ///
+    /// # Errors
+    /// If a value is out of range.
+    pub fn new(scene: &Scene, assets: impl Into<Assets>) -> Result<Self, Error> {
+        let prepared = PreparedScene::new(scene, assets)?;
+        let grid = Grid::new(scene);
+        let refined = scene.screen.image_error.is_some();
+        let channels = choice::chosen(&prepared, refined, scene.screen.channels.as_deref())?;
+        let rings = resolver(scene, &prepared);
+        let names: Vec<&str> = channels.iter().map(|kind| kind.name).collect();
+        let layout = Layout::new(grid.width, grid.height, &names)?;
+        let unit = if scene.screen.total_flux_jy.is_none() { own_unit(scene) } else { 1.0 };
+        let scene = scene.clone();
+        Ok(Raster { scene, prepared, grid, rings, channels, layout, unit, tile: TILE, meter: None })
+    }
+
+    /// The same with tiles of `columns` pixels; no pixel depends on it.
+    pub fn with_tile(self, columns: usize) -> Self {
+        Raster { tile: columns.max(1), ..self }
+    }
+
+    /// The same with rays traced on a device, in its precision, and with tiles wide enough for it. Rays that it does not
+    /// vouch for, and what [`beside_device`](Self::beside_device) lists, are traced on this processor.
+    pub fn with_device(self, device: Arc<dyn RayDevice>) -> Self {
+        let prepared = self.prepared.with_device(device);
+        Raster { prepared, tile: self.tile.max(DEVICE_TILE), ..self }
+    }
+
+    /// The device on which rays are traced, if it is not this processor.
+    pub fn device(&self) -> Option<&dyn RayDevice> {
+        self.prepared.tracer().device()
+    }
+
+    /// What of the scene is traced on this processor even so.
+    pub fn beside_device(&self) -> Vec<&'static str> {
+        self.prepared.beside_device()
+    }
+
+    /// The same with a meter of the time that its parts take.
+    pub fn with_meter(self) -> Self {
+        Raster { meter: Some(Mutex::new(Meter::running())), ..self }
+    }
+
+    /// What the meter has read, over all threads; nothing without one.
+    pub fn meter(&self) -> Meter {
+        let read = |meter: &Mutex<Meter>| *meter.lock().unwrap_or_else(PoisonError::into_inner);
+        self.meter.as_ref().map(read).unwrap_or_default()
+    }
+
+    /// Time of all parts on one thread for `rays` rays spread over the picture.
+    ///
+    /// # Errors
+    /// If a value is out of range.
+    pub fn trial(&self, rays: usize) -> Result<Meter, Error> {
+        let mut scratch = Scratch::default();
+        scratch.meter = Meter::running();
+        let (width, height) = (self.grid.width, self.grid.height);
+        // Blocks of neighbours, as in the picture, on a sequence that fills the plane evenly
+        // (Roberts 2018: powers of the reciprocal of the plastic number).
+        let blocks = rays.div_ceil(TRIAL);
+        for k in 0..blocks {
+            let place =
+                |ratio: f64, size: usize| ((k as f64 * ratio).fract() * size as f64) as usize;
+            let (column, row) =
+                (place(0.754_877_666_246_692_7, width), place(0.569_840_290_998_053_2, height));
+            let points = (0..TRIAL).map(|j| {
+                self.grid.inside(
+                    (column + j % 8).min(width - 1),
+                    (row + j / 8).min(height - 1),
+                    [0.0; 2],
+                )
+            });
+            let (alpha, beta): (Vec<f64>, Vec<f64>) = points.unzip();
+            let mut seen = vec![RayResult::default(); TRIAL];
+            self.prepared.observe_block(
+                &alpha,
+                &beta,
+                &[self.prepared.time()],
+                &mut scratch,
+                &mut seen,
+            )?;
+        }
+        Ok(scratch.meter)
+    }
+
+    /// About how many rays photon rings take besides those of the regular grid, what hides them left out
+    /// of account: counted in up to 256 rows.
+    pub fn ring_rays(&self) -> u64 {
+        let Some(rings) = &self.rings else { return 0 };
+        let Grid { width, height, side, size } = self.grid;
+        let step = height.div_ceil(256);
+        let of_row = |row: usize| {
+            let places = (0..width * side * side).map(|k| (k / (side * side), k % (side * side)));
+            let square = |(column, k): (usize, usize)| {
+                let center = self.grid.screen(column, row, k % side, k / side);
+                rings.count(Square { center, size: size / side as f64 }) as u64
+            };
+            places.map(square).sum::<u64>()
+        };
+        let rows: Vec<usize> = (0..height).step_by(step).collect();
+        let found: u64 = rows.par_iter().map(|row| of_row(*row)).sum();
+        found * height as u64 / rows.len() as u64
+    }
+
+    /// Number of bands.
+    pub fn bands(&self) -> usize {
+        self.layout.bands()
+    }
+
+    /// Everything about the scene that decides the picture, as a text. The contents of files
+    /// that the scene names are not in it.
+    pub fn identity(&self) -> String {
+        let version = env!("CARGO_PKG_VERSION");
+        let (scene, names) = (self.scene.to_toml(), self.names());
+        let device =
+            self.device().map_or(String::new(), |device| format!("on {}\n", device.name()));
+        let unit = self.unit;
+        format!("kerrlight {version}\n{scene}\n{names:?}\nin {unit:e} scene units\n{device}")
+    }
+
+    /// Names of the channels.
+    pub fn names(&self) -> Vec<&'static str> {
+        self.channels.iter().map(|kind| kind.name).collect()
+    }
+
+    /// What the channels hold.
+    pub fn legend(&self) -> String {
+        choice::legend(&self.channels)
+    }
+
+    /// What the numbers in the channel `id` stand for, a line for each; nothing without that channel.
+    pub fn identifiers(&self) -> Option<String> {
+        self.names().contains(&"id").then_some(())?;
+        let names = names(&self.scene).into_iter().enumerate();
+        Some(names.map(|(k, name)| format!("{k} {name}\n")).collect())
+    }
+
+    fn summarize(&self, tally: &Tally) -> Result<Summary, Error> {
+        let factor = Summary::factor(&self.scene, tally).map_err(RenderError::NoFlux)?;
+        Summary::new(&self.scene, tally, factor)
+    }
+}
+
+/// The picture of a scene and its summary.
+#[derive(Debug, Clone)]
+pub struct Rendered {
+    /// The picture.
+    pub picture: Picture,
+    /// Its summary.
+    pub summary: Summary,
+}
+
+/// Renders a picture that fits into memory.
+///
+/// `assets` are the decoded files that the scene names (`None` without any); `progress` is told
+/// of finished rows and returns whether to go on. All threads of the current rayon pool work, and
+/// their number does not change a bit of the picture. [`Raster`] renders band by band into a
+/// journal instead, for pictures that are larger than memory or that must survive a crash.
+///
+/// ```
+/// use crate::picture::render;
+/// use crate::scene::Scene;
+///
+/// let scene = Scene::parse(r#"
+///     hole = { spin = 0.0, mass_msun = 6.5e9, distance_kpc = 16800.0 }
+///     observer = { inclination_deg = 0.0 }
+///     screen = { field_of_view_m = 30.0, width = 16, total_flux_jy = 0.5 }
+///     tracer = { integrator = "elliptic", tolerance = 1e-8 }
+///     disc = { outer_edge = 12.0, peak_intensity = 1.0, opaque = true }
+/// "#)?;
+/// let rendered = render(&scene, None, &|_rows| true)?;
+///
+/// let intensity = rendered.picture.channel("intensity").unwrap(); // Jy/µas²
+/// assert_eq!(intensity.len(), 16 * 16);
+/// let side = scene.pixel_size() * scene.hole.angle_uas().unwrap(); // µas
+/// let flux: f64 = intensity.iter().map(|x| f64::from(*x) * side * side).sum();
+/// assert!((flux - 0.5).abs() < 1e-5 && rendered.summary.flux_unit == "Jy");
+/// // Seen along the axis of a hole without spin, the picture is symmetric.
+/// let at = |row: usize, column: usize| intensity[16 * row + column];
+/// assert!((at(4, 7) - at(7, 4)).abs() < 1e-5 * at(4, 7) && at(4, 7) > 0.0);
+/// # Ok::<(), kerrlight_tomo::Error>(())
+/// ```
+///
+/// # Errors
+/// If a value is out of range or does not fit, or `progress` returned false.
+pub fn render(
+    scene: &Scene,
+    assets: impl Into<Assets>,
+    progress: &Progress<'_>,
+) -> Result<Rendered, Error> {
+    Raster::new(scene, assets)?.render(progress)
+}
+
+impl Raster {
+    /// Renders a picture that fits into memory.
+    ///
+    /// # Errors
+    /// If a value is out of range or does not fit, or `progress` returned false.
+    pub fn render(&self, progress: &Progress<'_>) -> Result<Rendered, Error> {
+        let mut raw = self.raw(&[self.prepared.time()], progress)?;
+        // One for each time.
+        let raw = raw.pop().unwrap_or_default();
+        let factor = self.unit_factor(&self.scene, &raw)?;
+        self.rendered(&self.scene, raw, factor)
+    }
+}

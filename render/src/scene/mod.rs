@@ -1,0 +1,377 @@
+//! Scenes: the black hole, the observer, the screen and the sources of light.
+//!
+//! A scene is a TOML text; [`Scene::parse`] checks every key, type and range, and
+//! [`Scene::to_toml`] writes the resolved scene with every default spelled out.
+
+mod camera;
+mod check;
+mod check_sources;
+mod check_volume;
+mod integrator;
+mod invalid;
+mod overrides;
+mod rotation;
+mod sources;
+
+pub use crate::dynamics::{Perturbed, Velocity};
+pub use camera::{CameraConfig, CameraKey, CameraMotion, Pose};
+pub use invalid::{SceneError, line_of, shown};
+pub use overrides::apply_override;
+pub use rotation::Rotation;
+pub use sources::{
+    Checker, Disc, Gas, GasMotion, GasProfile, Mesh, MeshVelocity, Plunging, Sky, SkyImage, Spot,
+    StarCatalogue, Stars, VolumeRegion, VolumeSource,
+};
+
+use crate::Error;
+use crate::polarization::MagneticField;
+use kerrlight_common::toml_file;
+pub use kerrlight_geodesic::Integrator;
+use kerrlight_geodesic::{Kerr, orbits};
+use serde::{Deserialize, Serialize};
+
+/// A complete scene: the hole, who looks at it, what shines, and how rays are traced.
+///
+/// Lengths and times are in M = GM/c² unless a name says otherwise. A scene comes from TOML
+/// ([`Scene::parse`], the format of the program's scene files) or from code; both are checked
+/// when a picture is made of them. It is plain data: [`render`](crate::picture::render()) makes the
+/// picture, [`PreparedScene`](crate::transport::PreparedScene) answers for single rays.
+///
+/// ```
+/// use crate::scene::{Scene, apply_override};
+///
+/// let text = r#"
+///     hole = { spin = 0.9 }
+///     observer = { inclination_deg = 60.0 }
+///     screen = { field_of_view_m = 30.0, width = 64 }
+///     tracer = { integrator = "elliptic", tolerance = 1e-8 }
+///     disc = { outer_edge = 20.0, peak_intensity = 1.0, opaque = true }
+/// "#;
+/// let scene = Scene::parse(text)?;
+/// assert_eq!(scene.pixel_size(), 30.0 / 64.0); // M
+/// assert!(scene.has_emission());
+/// // Written out with its defaults it is the same scene.
+/// assert_eq!(Scene::parse(&scene.to_toml())?.to_toml(), scene.to_toml());
+/// let tilted = Scene::parse(&apply_override(text, "observer.inclination_deg=17")?)?;
+/// assert_eq!(tilted.observer.inclination_deg, 17.0);
+/// # Ok::<(), kerrlight_tomo::Error>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// The black hole.
+    pub hole: Hole,
+    /// Where it is seen from, and when.
+    #[serde(default)]
+    pub observer: ObserverConfig,
+    /// A camera at a finite radius, in place of the observer's screen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<CameraConfig>,
+    /// What part of the sky is rendered, on which pixels.
+    pub screen: Screen,
+    /// Which effects are simulated.
+    #[serde(default)]
+    pub effects: Effects,
+    /// How rays are traced.
+    pub tracer: TracerConfig,
+    /// A thin equatorial disc.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub disc: Option<Disc>,
+    /// The field of the gas, for polarised light.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub magnetic_field: Option<MagneticField>,
+    /// A volumetric flow.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gas: Option<Gas>,
+    /// Hot spots on Keplerian orbits.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub spot: Vec<Spot>,
+    /// Emission on the nodes of boxes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub volume: Vec<VolumeSource>,
+    /// Triangle meshes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub mesh: Vec<Mesh>,
+    /// What the rays that escape see.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sky: Option<Sky>,
+}
+
+/// The black hole.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Hole {
+    /// Spin a/M ∈ \[−1, 1\]; negative: the hole turns against +z.
+    pub spin: f64,
+    /// Mass in solar masses; needed where anything is in seconds, µas, Jy or physical units.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mass_msun: Option<f64>,
+    /// Distance in kiloparsecs; needed where anything is in µas or Jy.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distance_kpc: Option<f64>,
+}
+
+impl Hole {
+    /// GM/c³ in seconds, where the mass is known.
+    pub fn seconds(&self) -> Option<f64> {
+        self.mass_msun.map(kerrlight_common::units::gravitational_time)
+    }
+
+    /// The angle of 1 M in µas, where mass and distance are known.
+    pub fn angle_uas(&self) -> Option<f64> {
+        Some(kerrlight_common::units::gravitational_angle(self.mass_msun?, self.distance_kpc?))
+    }
+}
+
+/// Where the scene is seen from, and when.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObserverConfig {
+    /// Angle between +z (the spin axis for a > 0) and the line of sight, degrees in \[0, 180\];
+    /// NaN in a scene with a camera, which has a place of its own.
+    #[serde(default = "nowhere", skip_serializing_if = "is_nowhere")]
+    pub inclination_deg: f64,
+    /// Azimuth of the observer in degrees.
+    #[serde(default)]
+    pub azimuth_deg: f64,
+    /// Boyer–Lindquist radius in M (screen coordinates stay constants of motion), or `inf`.
+    #[serde(default = "infinity")]
+    pub radius: f64,
+    /// Time of observation in M.
+    #[serde(default)]
+    pub time: f64,
+}
+
+fn infinity() -> f64 {
+    f64::INFINITY
+}
+
+fn nowhere() -> f64 {
+    f64::NAN
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde's signature
+fn is_nowhere(degrees: &f64) -> bool {
+    degrees.is_nan()
+}
+
+impl Default for ObserverConfig {
+    fn default() -> Self {
+        let (inclination_deg, radius) = (nowhere(), infinity());
+        ObserverConfig { inclination_deg, azimuth_deg: 0.0, radius, time: 0.0 }
+    }
+}
+
+/// What part of the sky is rendered. Exactly one of the two fields of view must be given.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Screen {
+    /// Width of the field of view in M.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub field_of_view_m: Option<f64>,
+    /// Width of the field of view in microarcseconds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub field_of_view_uas: Option<f64>,
+    /// Pixels from left to right.
+    pub width: u32,
+    /// Pixels from top to bottom, which are square; as many as from left to right without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub height: Option<u32>,
+    /// Rays per pixel, a square number: a regular grid inside the pixel.
+    #[serde(default = "one")]
+    pub samples_per_pixel: u32,
+    /// What becomes of photon rings that are narrower than a pixel.
+    #[serde(default)]
+    pub rings: Rings,
+    /// Flux density to which the emission is scaled, in Jy.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub total_flux_jy: Option<f64>,
+    /// Relative L1 error of the intensity image below which pixels are refined, in place of
+    /// `samples_per_pixel`; off without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub image_error: Option<f64>,
+    /// Names of the channels or layers that are kept, [`DEFAULT_CHANNELS`] for those that are kept without this key: all
+    /// that cost nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub channels: Option<Vec<String>>,
+}
+
+/// What `screen.channels` calls the channels that are kept without it.
+pub const DEFAULT_CHANNELS: &str = "default";
+
+fn one() -> u32 {
+    1
+}
+
+/// How images of higher order, next to the critical curve, are sampled.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rings {
+    /// Pixels next to the critical curve have more rays, placed along the images.
+    #[default]
+    Resolved,
+    /// Every pixel has `samples_per_pixel` rays on a regular grid.
+    RegularGrid,
+}
+
+/// Which effects are simulated. What is off is not computed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Effects {
+    /// Gravitational lensing, the one effect that is on unless switched off: off, rays are
+    /// straight lines r n in the same coordinates, for comparison.
+    #[serde(default = "on")]
+    pub lensing: bool,
+    /// Gravitational redshift and Doppler shift: I = g^{3+α} I_em of a surface,
+    /// dI = g^{2+α} j ds of a volume, with the spectral index α.
+    #[serde(default)]
+    pub redshift: bool,
+    /// Spectral index α (dimensionless) of the emitted spectrum ν^{−α}; 1 is the law of bolometric intensity. Needed
+    /// when `redshift` is on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spectral_index: Option<f64>,
+    /// 2 + α, as fits have it, in place of α: dI = g^power j ds of a volume.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub redshift_power: Option<f64>,
+    /// Emission at each point is that of the moment when the light passed it; off: of the
+    /// time of observation everywhere.
+    #[serde(default)]
+    pub slow_light: bool,
+    /// Whether gas absorbs what is behind it.
+    #[serde(default)]
+    pub absorption: bool,
+    /// The last lensed image that is seen, by its number n of half-orbits: 0 leaves the direct
+    /// image alone. Light is taken from a ray up to half-way in Mino time between its crossings
+    /// number n + 1 and n + 2 of the equatorial plane. All of them without this key.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub half_orbits: Option<u32>,
+    /// Polarised synchrotron light of electrons with the power law of `spectral_index` in the
+    /// field `[magnetic_field]`: emissivities become those across a field of unit strength.
+    #[serde(default)]
+    pub polarization: bool,
+    /// Lorentz factor of the electrons that radiate at the observed frequency, by which circular
+    /// polarisation falls; without it V is 0 and not computed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub circular_polarization_lorentz_factor: Option<f64>,
+    /// The sky is averaged over what the bundle of rays between neighbouring rays covers of it.
+    #[serde(default)]
+    pub ray_bundles: bool,
+}
+
+impl Default for Effects {
+    fn default() -> Self {
+        Effects {
+            lensing: true,
+            redshift: false,
+            spectral_index: None,
+            redshift_power: None,
+            slow_light: false,
+            absorption: false,
+            half_orbits: None,
+            polarization: false,
+            circular_polarization_lorentz_factor: None,
+            ray_bundles: false,
+        }
+    }
+}
+
+fn on() -> bool {
+    true
+}
+
+impl Effects {
+    /// Spectral index α (dimensionless) of the emitted spectrum, if redshift is simulated.
+    pub fn index(&self) -> Option<f64> {
+        let given = self.spectral_index.or(self.redshift_power.map(|power| power - 2.0));
+        self.redshift.then_some(given).flatten()
+    }
+}
+
+/// How rays are traced.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TracerConfig {
+    /// Which integrator.
+    #[serde(with = "integrator")]
+    pub integrator: Integrator,
+    /// Largest local error of a step, relative.
+    pub tolerance: f64,
+}
+
+impl Screen {
+    /// Pixels from top to bottom.
+    pub fn rows(&self) -> u32 {
+        self.height.unwrap_or(self.width)
+    }
+
+    /// Whether the picture keeps a channel that is kept unless others are requested.
+    pub fn keeps(&self, channel: &str) -> bool {
+        let all = |names: &Vec<String>| names.iter().any(|name| name == DEFAULT_CHANNELS);
+        self.channels.as_ref().is_none_or(all) || self.asks(channel)
+    }
+
+    /// Whether a channel is requested, by its name or with its layer.
+    pub fn asks(&self, channel: &str) -> bool {
+        let layer = channel.split_once('.').map(|(layer, _)| layer);
+        let named = |name: &String| name == channel || layer.is_some_and(|layer| name == layer);
+        self.channels.as_ref().is_some_and(|names| names.iter().any(named))
+    }
+}
+
+impl Scene {
+    /// The scene in a TOML text.
+    ///
+    /// # Errors
+    /// On syntax, unknown or missing keys, wrong types and values out of range: with the
+    /// line, the key and what is allowed.
+    pub fn parse(text: &str) -> Result<Self, Error> {
+        let scene: Scene = toml_file::read(text).map_err(SceneError::Syntax)?;
+        check::check(&scene).map_err(|invalid| invalid.locate(text))?;
+        Ok(scene)
+    }
+
+    /// Whether it has a source whose light counts for `intensity`: any but a sky.
+    pub fn has_emission(&self) -> bool {
+        let lists = [self.spot.is_empty(), self.volume.is_empty(), self.mesh.is_empty()];
+        self.disc.is_some() || self.gas.is_some() || lists.contains(&false)
+    }
+
+    /// The resolved scene as TOML, defaults included: the disc's inner edge too.
+    ///
+    /// # Panics
+    /// If a program has set a seed above 2^63 − 1, which TOML cannot hold; a scene that was read has none.
+    pub fn to_toml(&self) -> String {
+        let mut scene = self.clone();
+        if let (Some(disc), Ok(hole)) = (&mut scene.disc, Kerr::new(self.hole.spin)) {
+            disc.inner_edge.get_or_insert_with(|| orbits::isco(&hole));
+        }
+        scene.screen.height = Some(scene.screen.rows());
+        toml_file::write(&scene).expect("plain tables always serialise") // no maps with odd keys
+    }
+
+    /// Whether what shines changes with time.
+    pub fn changes(&self) -> bool {
+        let moves = |volume: &VolumeSource| {
+            volume.rotation != Rotation::None || volume.injection_time.is_some()
+        };
+        !self.spot.is_empty() || self.volume.iter().any(moves)
+    }
+
+    /// Width of a pixel in M; with a camera, on its picture plane at distance 1.
+    pub fn pixel_size(&self) -> f64 {
+        let width = match &self.camera {
+            Some(camera) => camera.pose(self.observer.time).plane_width(),
+            None => self.field_of_view_m(),
+        };
+        width / f64::from(self.screen.width)
+    }
+
+    /// Width of the field of view in M.
+    pub fn field_of_view_m(&self) -> f64 {
+        let of_angle = || Some(self.screen.field_of_view_uas? / self.hole.angle_uas()?);
+        self.screen.field_of_view_m.or_else(of_angle).unwrap_or(f64::NAN) // excluded by `parse`
+    }
+}
+
+#[cfg(test)]
+mod tests;

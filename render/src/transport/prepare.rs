@@ -1,0 +1,341 @@
+//! From a scene to everything that can be computed before any ray.
+
+use super::layers::{Numbering, Wanted};
+use super::optics::Optics;
+use super::polarized::Polarization;
+use super::sources::disc::Disc;
+use super::sources::media::Media;
+use super::sources::meshes::Meshes;
+use super::sources::sky::Sky;
+use super::sources::spots::Spots;
+use crate::Error;
+use crate::emission::medium::Medium;
+use crate::emission::mesh::MeshFile;
+use crate::emission::sky::{Catalogue, Panorama, SkyModel};
+use crate::scene::Scene;
+use crate::volume::VolumeFile;
+use kerrlight_geodesic::{
+    BlockRequest, BlockTracer, Inclination, Kerr, Observer, Quantities, RayDevice, View,
+};
+use std::sync::Arc;
+
+/// A scene with everything computed that does not depend on the ray.
+///
+/// Use it to ask what single rays see, or to drive a renderer of your own: preparing costs what the
+/// scene's files and tables need (milliseconds for a disc), [`observe_block`](Self::observe_block)
+/// a few microseconds a ray where the closed form applies. It is `Sync`: each thread brings its own
+/// [`Scratch`](super::Scratch). Intensities are in scene units, radii and delays in M.
+///
+/// ```
+/// use crate::scene::Scene;
+/// use crate::transport::{PreparedScene, Scratch};
+///
+/// let scene = Scene::parse(r#"
+///     hole = { spin = 0.9 }
+///     observer = { inclination_deg = 60.0 }
+///     screen = { field_of_view_m = 30.0, width = 64 }
+///     effects = { redshift = true, spectral_index = 0.0 }
+///     tracer = { integrator = "elliptic", tolerance = 1e-8 }
+///     disc = { outer_edge = 20.0, peak_intensity = 1.0, opaque = true }
+/// "#)?;
+/// let prepared = PreparedScene::new(&scene, None)?;
+/// // α = −6 M, β = 2 M, at the scene's own time of observation.
+/// let seen = prepared.observe(-6.0, 2.0, &mut Scratch::default())?;
+/// assert!(seen.intensity > 0.0 && seen.redshift > 1.0); // the side that approaches
+/// # Ok::<(), kerrlight_tomo::Error>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct PreparedScene {
+    pub(super) optics: Optics,
+    pub(super) tracer: BlockTracer,
+    pub(super) request: BlockRequest,
+    /// The request for blocks in which spots are sighted.
+    pub(super) sighting: BlockRequest,
+    /// Time of observation, in M.
+    pub(super) time: f64,
+    pub(super) disc: Option<Disc>,
+    pub(super) media: Media,
+    pub(super) meshes: Option<Meshes>,
+    pub(super) spots: Spots,
+    pub(super) sky: Option<Sky>,
+}
+
+/// The decoded files that a scene names.
+#[derive(Debug, Clone, Default)]
+pub struct Assets {
+    /// The picture of a `[sky.image]`.
+    pub sky: Option<Panorama>,
+    /// The stars of a `[sky.catalogue]`.
+    pub stars: Option<Catalogue>,
+    /// A file for each `[[mesh]]`, in their order.
+    pub meshes: Vec<MeshFile>,
+    /// A file for each `[[volume]]`, in their order.
+    pub volumes: Vec<VolumeFile>,
+}
+
+impl From<Option<Panorama>> for Assets {
+    fn from(sky: Option<Panorama>) -> Self {
+        Assets { sky, ..Assets::default() }
+    }
+}
+
+/// Relative size of features with sharp edges, as far as photon rings go: the error of a ring with two
+/// edges is a few hundredths of it.
+const SHARP: f64 = 0.1;
+
+/// Photon rings of what is smaller are sampled as if it were as large as this, of what is larger, as this.
+const FINEST: f64 = 0.03;
+const SMOOTH: f64 = 0.5;
+
+/// The view of a scene.
+///
+/// # Errors
+/// If a value is outside its range.
+pub(crate) fn view(scene: &Scene, hole: &Kerr) -> Result<View, Error> {
+    if let Some(camera) = &scene.camera {
+        return Ok(View::Camera(camera.camera(hole, scene.observer.time)?));
+    }
+    let observer = &scene.observer;
+    let inclination = Inclination::from_degrees(observer.inclination_deg)?;
+    let placed = if observer.radius.is_finite() {
+        Observer::at_radius(inclination, observer.radius)?
+    } else {
+        Observer::at_infinity(inclination)
+    };
+    Ok(View::Screen(placed.with_azimuth(observer.azimuth_deg.to_radians())))
+}
+
+impl Optics {
+    fn new(scene: &Scene) -> Result<Self, Error> {
+        let hole = Kerr::new(scene.hole.spin)?;
+        let kept = |name: &str| scene.screen.keeps(name);
+        Ok(Optics {
+            view: view(scene, &hole)?,
+            hole,
+            tolerance: scene.tracer.tolerance,
+            spectral_index: scene.effects.index(),
+            slow_light: scene.effects.slow_light,
+            lensing: scene.effects.lensing,
+            one_by_one: false,
+            recorded: Quantities { azimuth: kept("azimuth"), time: kept("delay"), velocity: false },
+            polarization: Polarization::new(scene)?,
+            wanted: Wanted::new(scene),
+            numbering: Numbering::new(scene),
+        })
+    }
+}
+
+impl PreparedScene {
+    /// Prepares a scene with the files that it names.
+    ///
+    /// # Errors
+    /// If a value is outside its range (a parsed [`Scene`] never is), if there is not one file for
+    /// each mesh and each volume, or if a mesh's vertex comes to lie too far out.
+    pub fn new(scene: &Scene, assets: impl Into<Assets>) -> Result<Self, Error> {
+        let assets: Assets = assets.into();
+        let optics = Optics::new(scene)?;
+        let (hole, settings) = (optics.hole, &scene.tracer);
+        let tracer = BlockTracer::new(hole, optics.view, settings.integrator, settings.tolerance)?;
+        let mut prepared = PreparedScene {
+            tracer,
+            request: BlockRequest::default(),
+            sighting: BlockRequest::default(),
+            time: scene.observer.time,
+            disc: Disc::new(scene, &hole),
+            media: Media::new(scene, &assets.volumes, &hole)?,
+            meshes: Meshes::new(scene, &assets.meshes, &hole)?,
+            spots: Spots::new(scene, &hole),
+            sky: Sky::new(scene, assets.sky, assets.stars),
+            optics,
+        };
+        prepared.request = prepared.needs(scene.effects.half_orbits);
+        prepared.sighting = prepared.sighting();
+        Ok(prepared)
+    }
+
+    /// What is needed of each ray.
+    fn needs(&self, half_orbits: Option<u32>) -> BlockRequest {
+        BlockRequest {
+            crossings: self.disc.as_ref().map_or(0, Disc::crossings),
+            all_crossings: self.disc.is_some(),
+            rates: self.optics.polarization.is_some() || self.has_plunging_disc(),
+            exit: self.sky.is_some() || self.optics.wanted.exit || self.optics.wanted.footprint,
+            beams: self.optics.lensing && self.sky.as_ref().is_some_and(Sky::is_averaged),
+            half_orbits,
+            paths: self.meshes.is_some() || self.media.have_cells() || !self.spots.is_empty(),
+            probes: None,
+            samples: 0,
+            nodes: self.media.nodes(&self.optics),
+        }
+    }
+
+    /// The same where spots are sighted: see [`Spots::sight`].
+    fn sighting(&self) -> BlockRequest {
+        BlockRequest {
+            paths: self.meshes.is_some() || self.media.have_cells(),
+            probes: Some(self.spots.probes(&self.optics)),
+            ..self.request.clone()
+        }
+    }
+
+    /// Moves to another time of observation, and with it a camera that moves; `scene` is the one
+    /// that this was made of, but for its time of observation.
+    ///
+    /// # Errors
+    /// If the camera is impossible there.
+    pub fn move_to(&mut self, scene: &Scene) -> Result<(), Error> {
+        self.optics.view = view(scene, &self.optics.hole)?;
+        self.tracer = self.tracer.clone().with_view(self.optics.view);
+        if let Some(sky) = &mut self.sky {
+            sky.respace(scene);
+        }
+        self.time = scene.observer.time;
+        Ok(())
+    }
+
+    /// The same scene with rays traced on a device: see [`BlockTracer::with_device`].
+    pub fn with_device(self, device: Arc<dyn RayDevice>) -> Self {
+        PreparedScene { tracer: self.tracer.with_device(device), ..self }
+    }
+
+    /// What is traced on this processor where rays are traced on a device.
+    pub fn beside_device(&self) -> Vec<&'static str> {
+        if !self.optics.lensing {
+            return vec!["everything (lensing is off)"];
+        }
+        let wanted = self.optics.wanted;
+        let parts = [
+            (self.request.beams, "ray bundles on the sky"),
+            (wanted.depth, "the channel Z"),
+            (wanted.motion, "the channels motion"),
+            (wanted.footprint, "the channel footprint"),
+        ];
+        parts.into_iter().filter_map(|(needed, what)| needed.then_some(what)).collect()
+    }
+
+    /// The same scene with every spot and every triangle asked along every ray, without a hierarchy:
+    /// for comparisons.
+    pub fn one_by_one(mut self) -> Self {
+        self.optics.one_by_one = true;
+        self
+    }
+
+    /// The hole.
+    pub fn hole(&self) -> &Kerr {
+        &self.optics.hole
+    }
+
+    /// The screen or the camera.
+    pub fn view(&self) -> &View {
+        &self.optics.view
+    }
+
+    /// The scene's own time of observation, in M.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// What traces its rays.
+    pub fn tracer(&self) -> &BlockTracer {
+        &self.tracer
+    }
+
+    /// What is traced of each ray.
+    pub fn request(&self) -> &BlockRequest {
+        &self.request
+    }
+
+    /// Whether rays are bent.
+    pub fn has_lensing(&self) -> bool {
+        self.optics.lensing
+    }
+
+    /// Whether light is seen as it was when it passed, not as it is at the time of observation.
+    pub fn has_slow_light(&self) -> bool {
+        self.optics.slow_light
+    }
+
+    /// What fills space: gas and volumes.
+    pub fn media(&self) -> impl Iterator<Item = &dyn Medium> {
+        self.media.iter()
+    }
+
+    /// What is computed at the nodes in a medium besides r and cos θ.
+    pub fn quantities_of(&self, medium: &dyn Medium) -> Quantities {
+        self.optics.quantities_of(medium)
+    }
+
+    /// Whether there is a disc.
+    pub fn has_disc(&self) -> bool {
+        self.disc.is_some()
+    }
+
+    /// Whether there is a disc some of whose matter plunges.
+    pub fn has_plunging_disc(&self) -> bool {
+        self.disc.as_ref().is_some_and(Disc::plunges)
+    }
+
+    /// Whether there are triangle meshes.
+    pub fn has_meshes(&self) -> bool {
+        self.meshes.is_some()
+    }
+
+    /// Number of hot spots.
+    pub fn spots(&self) -> usize {
+        self.spots.len()
+    }
+
+    /// The sky.
+    pub fn sky(&self) -> Option<&SkyModel> {
+        self.sky.as_ref().map(Sky::model)
+    }
+
+    /// Whether the sky is averaged over the beams of rays.
+    pub fn averages_sky(&self) -> bool {
+        self.sky.as_ref().is_some_and(Sky::is_averaged)
+    }
+
+    /// Whether g is computed.
+    pub fn has_redshift(&self) -> bool {
+        self.optics.spectral_index.is_some()
+    }
+
+    /// Whether light is polarised, and whether circularly too.
+    pub fn polarization(&self) -> [bool; 2] {
+        let circular = self.optics.polarization.as_ref().map(Polarization::is_circular);
+        [circular.is_some(), circular == Some(true)]
+    }
+
+    /// What is kept of rays besides their light.
+    pub(crate) fn wanted(&self) -> Wanted {
+        self.optics.wanted
+    }
+
+    /// Whether anything shines or is opaque but the hole.
+    pub fn has_sources(&self) -> bool {
+        let solid = self.disc.is_some() || self.meshes.is_some();
+        solid || self.media.len() > 0 || !self.spots.is_empty()
+    }
+
+    /// Whether anything absorbs.
+    pub fn absorbs(&self) -> bool {
+        self.media.absorb()
+    }
+
+    /// Whether there is a disc that hides what is behind it.
+    pub fn has_opaque_disc(&self) -> bool {
+        self.disc.as_ref().is_some_and(Disc::is_opaque)
+    }
+
+    /// Spacing of rays, in the logarithm of their distance from the critical curve, that resolves what
+    /// shines in its images of higher order; none where there are no such images.
+    pub fn ring_spacing(&self) -> Option<f64> {
+        if !self.optics.lensing || self.request.half_orbits == Some(0) {
+            return None;
+        }
+        let edges = self.disc.is_some() || self.meshes.is_some();
+        let media = self.media.iter().map(|medium| medium.relative_size());
+        let sizes = self.spots.relative_sizes().chain(media).chain(edges.then_some(SHARP));
+        Some(sizes.reduce(f64::min)?.clamp(FINEST, SMOOTH))
+    }
+}

@@ -1,0 +1,149 @@
+//! Products of feeds with leakage and gains.
+
+use super::*;
+use crate::array::built_in;
+use crate::conformance;
+use crate::earth::{Frame, SourcePosition, Ut1};
+use crate::noise::{GainErrors, add_thermal_noise, apply_gains, apply_leakage};
+use crate::schedule::{Clock, Schedule, Setup, observe};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+/// A scan of the EHT with random visibilities of 1 Jy, their I, Q and U, and the leakage that was put on them.
+pub fn scan(leakage: f64, gains: bool) -> (Observation, Vec<Complex64>, SharedLeakage) {
+    let schedule =
+        Schedule { mjd: 57850, clock: Clock::Utc, start_h: 12.0, stop_h: 13.0, scans: 1 };
+    let setup = Setup {
+        frequency_hz: 230e9,
+        bandwidth_hz: 2e9,
+        integration_s: 60.0,
+        elevation_deg: [10.0, 85.0],
+        ut1: Ut1::Table,
+        frame: Frame::Catalogue,
+    };
+    let array = built_in("EHT2017").unwrap();
+    let mut data = observe(&array, SourcePosition::SGR_A, &schedule, &setup).unwrap();
+    let mut random = Pcg64Mcg::seed_from_u64(8);
+    let mut draw = |size: f64| Complex64::new(1.0, 0.0) * size * random.random_range(0.5..1.5);
+    let rows = data.rows.len();
+    assert!(rows >= 10);
+    let truth: Vec<Complex64> =
+        (0..3 * rows).map(|k| draw(if k < rows { 1.0 } else { 0.3 })).collect();
+    let i = Complex64::new(0.0, 1.0);
+    for (k, row) in data.rows.iter_mut().enumerate() {
+        let [flux, q, u] = [truth[k], truth[rows + k], truth[2 * rows + k]];
+        row.products = [flux, flux, q + i * u, q - i * u];
+    }
+    let shared = SharedLeakage::none(data.stations.len());
+    if leakage > 0.0 {
+        shared.set(apply_leakage(&mut data, leakage, 3).unwrap());
+    }
+    if gains {
+        let errors = GainErrors { scan_amplitude: 0.1, random_phases: true, ..Default::default() };
+        apply_gains(&mut data, &errors, 3);
+    }
+    (data, truth, shared)
+}
+
+fn priors(data: &Observation) -> GainPriors {
+    GainPriors { free_phases: true, amplitude_sigma: vec![0.1; data.stations.len()] }
+}
+
+pub fn off(truth: &[Complex64]) -> Vec<Complex64> {
+    let mut random = Pcg64Mcg::seed_from_u64(12);
+    let mut part = || 0.1 * random.random_range(-1.0..1.0);
+    truth.iter().map(|v| v + Complex64::new(part(), part())).collect()
+}
+
+/// Central differences in both precisions, with gains and without.
+#[test]
+fn exact_gradients_of_products() {
+    let (data, truth, leakage) = scan(0.05, true);
+    let model = off(&truth);
+    let held = PolarizedTerm::new(&data, None, Some(&leakage)).unwrap();
+    conformance::data_term::<f64>("leakage", &held, &model, 1e-3, 1e-7);
+    let priors = priors(&data);
+    let free = PolarizedTerm::new(&data, Some(&priors), Some(&leakage)).unwrap();
+    conformance::data_term::<f64>("leakage and gains", &free, &model, 1e-3, 1e-7);
+    let single: Vec<Complex<f32>> =
+        model.iter().map(|v| Complex::new(v.re as f32, v.im as f32)).collect();
+    conformance::data_term::<f32>("in single precision", &held, &single, 1e-2, 2e-3);
+}
+
+/// ⟨R x, y⟩ = ⟨x, R† y⟩: the slope of χ² about a model that fits is 2 R†R dx/σ².
+#[test]
+fn exact_adjoint_of_responses() {
+    let (data, truth, leakage) = scan(0.05, false);
+    let term = PolarizedTerm::new(&data, None, Some(&leakage)).unwrap();
+    let (x, y) = (off(&truth), off(&off(&truth)));
+    let responses = term.responses();
+    let forward = term.products(&responses, &x);
+    let cotangent: Vec<Complex64> = (0..forward.len())
+        .map(|k| Complex64::new((k as f64).sin(), (3.0 * k as f64).cos()))
+        .collect();
+    let left: f64 = forward.iter().zip(&cotangent).map(|(a, b)| (a.conj() * b).re).sum();
+    let mut back = vec![Complex64::default(); x.len()];
+    for ((at, response), c) in term.all.iter().zip(&responses).zip(&cotangent) {
+        for (k, factor) in response.iter().enumerate() {
+            back[k * term.rows + at.row] += factor.conj() * c;
+        }
+    }
+    let right: f64 = x.iter().zip(&back).map(|(a, b)| (a.conj() * b).re).sum();
+    assert!((left - right).abs() < 1e-12 * left.abs().max(1.0), "{left} {right}");
+    // The gradient is that map applied to weighted residuals: differences of it are linear in the model.
+    let gradient = |model: &[Complex64]| {
+        let mut gradient = vec![Complex64::default(); model.len()];
+        DataTerm::<f64>::value_and_gradient(&term, model, 1.0, &mut gradient);
+        gradient
+    };
+    let (at_x, at_y) = (gradient(&x), gradient(&y));
+    let dot = |a: &[Complex64], b: &[Complex64]| -> f64 {
+        a.iter().zip(b).map(|(a, b)| (a.conj() * b).re).sum()
+    };
+    let difference: Vec<Complex64> = at_x.iter().zip(&at_y).map(|(a, b)| a - b).collect();
+    let step: Vec<Complex64> = x.iter().zip(&y).map(|(a, b)| a - b).collect();
+    let value = |model: &[Complex64]| {
+        DataTerm::<f64>::value_and_gradient(
+            &term,
+            model,
+            0.0,
+            &mut vec![Complex64::default(); x.len()],
+        )
+    };
+    // Exact for a quadratic: χ²(x) − χ²(y) = ½ ⟨∇(x) + ∇(y), x − y⟩.
+    let sum: Vec<Complex64> = at_x.iter().zip(&at_y).map(|(a, b)| a + b).collect();
+    let change = value(&x) - value(&y);
+    assert!((0.5 * dot(&sum, &step) - change).abs() < 1e-10 * (value(&x) + value(&y)));
+    assert!(dot(&difference, &step) > 0.0);
+}
+
+/// The truth explains data without noise to rounding with its leakage and its gains, and not without; with noise χ² has
+/// the mean that degrees of freedom say.
+#[test]
+fn exact_chi_squared_of_the_truth() {
+    let (mut data, truth, leakage) = scan(0.05, true);
+    let priors = priors(&data);
+    let value = |data: &Observation, leakage: Option<&SharedLeakage>| {
+        let term = PolarizedTerm::new(data, Some(&priors), leakage).unwrap();
+        let n = DataTerm::<f64>::degrees_of_freedom(&term);
+        let mut gradient = vec![Complex64::default(); truth.len()];
+        let squares: f64 = term.residuals(&truth).iter().map(|r| r.value * r.value).sum();
+        let value = term.value_and_gradient(&truth, 1.0, &mut gradient);
+        assert!((value / squares - 1.0).abs() < 1e-9, "{value} {squares}");
+        assert_eq!(term.residuals(&truth).len(), n);
+        value / n as f64
+    };
+    // What is left is the prior of gains that are off by as much as it allows.
+    assert!(value(&data, Some(&leakage)) < 1.0);
+    assert!(value(&data, None) > 20.0, "{}", value(&data, None));
+    let mean = (0..20).map(|seed| {
+        let mut noisy = data.clone();
+        add_thermal_noise(&mut noisy, seed);
+        value(&noisy, Some(&leakage))
+    });
+    let mean = mean.sum::<f64>() / 20.0;
+    assert!((0.85..1.15).contains(&mean), "{mean}");
+    data.basis = Basis::Stokes;
+    let refused = PolarizedTerm::new(&data, None, Some(&leakage));
+    assert!(refused.err().unwrap().to_string().contains("RR, LL, RL, LR"));
+}

@@ -1,0 +1,108 @@
+//! What kerrlight's CSV says in lines that start with `#`: `key: value`, one a line. Lines of other
+//! keys are passed over.
+
+use super::{Names, number};
+use crate::array;
+use crate::earth::SourcePosition;
+use crate::observation::{Channel, Observation};
+use core::fmt::Write;
+
+/// All that is known besides the rows.
+pub fn write(observation: &Observation) -> String {
+    let mut text = String::new();
+    let mut line = |key: &str, value: &str| {
+        // A value of several lines would end the comment.
+        let value = value.replace(['\n', '\r'], " ");
+        let _ = writeln!(text, "# {key}: {value}");
+    };
+    let mut number = |key: &str, value: Option<f64>| {
+        if let Some(value) = value {
+            line(key, &value.to_string());
+        }
+    };
+    number("ra_h", observation.position.map(|p| p.ra_hours));
+    number("dec_deg", observation.position.map(|p| p.dec_deg));
+    number("mjd", observation.mjd.map(f64::from));
+    number("frequency_hz", observation.frequency_hz);
+    number("bandwidth_hz", observation.bandwidth_hz);
+    if !observation.source.is_empty() {
+        line("source", &observation.source);
+    }
+    for (k, channel) in observation.channels.iter().enumerate() {
+        line("channel", &format!("{k} {} {}", channel.frequency_hz, channel.bandwidth_hz));
+    }
+    for station in observation.stations.iter().filter(|s| s.position.is_some()) {
+        line("station", &array::columns(station));
+    }
+    observation.history.iter().for_each(|entry| line("history", entry));
+    text
+}
+
+/// Takes in a line of comment, without its `#`; tells whether it is one of these.
+pub fn read(line: &str, observation: &mut Observation, names: &mut Names) -> Result<bool, String> {
+    let Some((key, value)) = line.trim().split_once(": ") else { return Ok(false) };
+    let position = observation.position;
+    let place = |ra_hours: f64, dec_deg: f64| {
+        SourcePosition::new(ra_hours, dec_deg).map(Some).map_err(|error| error.to_string())
+    };
+    let hertz = |name: &str| match number(value, name)? {
+        hertz if hertz > 0.0 => Ok(Some(hertz)),
+        hertz => Err(format!("{name} = {hertz} must be positive")),
+    };
+    match key {
+        "source" => value.clone_into(&mut observation.source),
+        "ra_h" => {
+            observation.position =
+                place(number(value, "ra_h")?, position.map_or(0.0, |p| p.dec_deg))?;
+        }
+        "dec_deg" => {
+            observation.position =
+                place(position.map_or(0.0, |p| p.ra_hours), number(value, "dec_deg")?)?;
+        }
+        "mjd" => {
+            let mjd = number(value, "mjd")?;
+            if !(-1e6..=1e6).contains(&mjd) || mjd.fract() != 0.0 {
+                return Err(format!("mjd = {mjd} is not allowed: a whole number near our time"));
+            }
+            observation.mjd = Some(mjd as i32);
+        }
+        "frequency_hz" => observation.frequency_hz = hertz("frequency_hz")?,
+        "bandwidth_hz" => observation.bandwidth_hz = hertz("bandwidth_hz")?,
+        "channel" => observation.channels.push(channel(value, observation.channels.len())?),
+        "station" => station(value, names)?,
+        "history" => observation.history.push(value.to_owned()),
+        _ => return Ok(false),
+    }
+    Ok(true)
+}
+
+/// `number frequency bandwidth`, numbers in order.
+fn channel(value: &str, expected: usize) -> Result<Channel, String> {
+    let words: Vec<&str> = value.split_whitespace().take(4).collect();
+    let [index, frequency, bandwidth] = words[..] else {
+        return Err("a channel is number, frequency and bandwidth in Hz".to_owned());
+    };
+    if index.parse() != Ok(expected) || expected >= usize::from(u16::MAX) {
+        return Err(format!("channel {}: {expected} was expected", super::shortened(index)));
+    }
+    let frequency_hz = number(frequency, "channel's frequency")?;
+    if frequency_hz <= 0.0 {
+        return Err(format!("channel's frequency = {frequency_hz} Hz must be positive"));
+    }
+    Ok(Channel { frequency_hz, bandwidth_hz: number(bandwidth, "channel's bandwidth")? })
+}
+
+/// A station in the columns of eht-imaging.
+fn station(value: &str, names: &mut Names) -> Result<(), String> {
+    let words: Vec<&str> = value.split_whitespace().take(40).collect();
+    if !matches!(words.len(), 5 | 13) {
+        return Err(format!("a station has 5 or 13 columns, here are {}", words.len()));
+    }
+    let station = array::station(&words)?;
+    if names.known(&station.name).is_some() {
+        return Err(format!("station {} is listed twice", station.name));
+    }
+    let k = usize::from(names.number(&station.name)?);
+    names.stations[k] = station;
+    Ok(())
+}

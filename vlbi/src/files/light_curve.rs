@@ -1,0 +1,341 @@
+//! Tables of light curves: a time a line, columns separated by commas or blanks and told by a line of names.
+
+use super::{FileError, number, sigma};
+use crate::Error;
+use crate::light_curve::{Flux, LightCurve, Sample};
+use core::fmt::Write;
+use kerrlight_common::stokes::StokesParameter;
+
+/// Names of the column of times, hours of UTC.
+const TIMES: [&str; 10] =
+    ["time_utc_h", "time", "t", "utc", "ut", "utc_h", "time_h", "time_hr", "hour", "hours"];
+/// Names of a column of times in days, of which the part of the first day counts.
+const DAYS: [&str; 4] = ["mjd", "time_mjd", "jd", "time_jd"];
+/// Days of a Julian date and what is left of it at midnight.
+const JULIAN: f64 = 2_400_000.5;
+/// Columns that are looked at.
+const MOST_COLUMNS: usize = 64;
+
+/// Where times are, and what they are.
+#[derive(Clone, Copy)]
+struct TimeColumn {
+    at: usize,
+    /// Whether they are days.
+    days: bool,
+}
+
+/// Where the columns are.
+struct Heading {
+    time: TimeColumn,
+    values: [Option<usize>; 4],
+    sigmas: [Option<usize>; 4],
+    by: Option<usize>,
+}
+
+impl TimeColumn {
+    fn find(names: &[String]) -> Option<Self> {
+        let of = |all: &[&str], days| {
+            let at = |name: &&str| names.iter().position(|n| n == name);
+            all.iter().find_map(at).map(|at| TimeColumn { at, days })
+        };
+        of(&TIMES, false).or_else(|| of(&DAYS, true))
+    }
+}
+
+impl Heading {
+    fn find(names: &[String]) -> Option<Self> {
+        let at = |name: &str| names.iter().position(|n| n == name);
+        let any = |names: &[String]| names.iter().find_map(|name| at(name));
+        let value = |parameter: StokesParameter| {
+            let name = parameter.name().to_ascii_lowercase();
+            let fluxes = [name.clone(), format!("{name}_jy"), format!("stokes_{name}")];
+            let is_i = parameter == StokesParameter::I;
+            any(&fluxes).or_else(|| at("flux").or_else(|| at("flux_jy")).filter(|_| is_i))
+        };
+        let error = |parameter: StokesParameter| {
+            let name = parameter.name().to_ascii_lowercase();
+            let around = ["sigma", "sig", "err", "error", "std", "e"];
+            let mut all: Vec<String> = around
+                .iter()
+                .flat_map(|word| [format!("{word}_{name}"), format!("{name}_{word}")])
+                .collect();
+            all.extend([format!("d{name}"), format!("{name}sigma"), format!("{name}err")]);
+            let shared = ["sigma", "err", "error", "flux_err", "flux_error"];
+            any(&all).or_else(|| shared.iter().find_map(|name| at(name)))
+        };
+        let values = StokesParameter::ALL.map(value);
+        values.iter().any(Option::is_some).then_some(())?;
+        Some(Heading {
+            time: TimeColumn::find(names)?,
+            values,
+            sigmas: StokesParameter::ALL.map(error),
+            by: at("baseline"),
+        })
+    }
+}
+
+/// A name in small letters, its words joined by underscores.
+fn plain(name: &str) -> String {
+    let name = name.to_ascii_lowercase();
+    let words = name.split(|c: char| c.is_whitespace() || c == '-' || c == '_');
+    words.filter(|word| !word.is_empty()).collect::<Vec<_>>().join("_")
+}
+
+/// The cells of a line: between commas, or between blanks where there is none.
+fn cells(line: &str) -> Vec<&str> {
+    match line.contains(',') {
+        true => line.split(',').map(str::trim).take(MOST_COLUMNS).collect(),
+        false => line.split_whitespace().take(MOST_COLUMNS).collect(),
+    }
+}
+
+/// The names in a line, a comment or not, as above tables of numpy, without units in brackets: `time(hr)` and
+/// `Time [UTC h]` are `time`.
+fn names(line: &str) -> Vec<String> {
+    let mut depth = 0;
+    let is_outside = |c: &char| {
+        depth += i32::from(matches!(c, '(' | '['));
+        let outside = depth <= 0;
+        depth -= i32::from(matches!(c, ')' | ']'));
+        outside
+    };
+    let outside: String = line.trim_start_matches('#').chars().filter(is_outside).collect();
+    cells(&outside).into_iter().map(plain).collect()
+}
+
+/// Whether the first line that is no comment, or the last comment above it, names columns as those of a light curve: then
+/// it is meant to be one.
+pub fn is_light_curve(text: &str) -> bool {
+    let mut comment = Vec::new();
+    for line in text.lines().filter(|line| !line.trim().is_empty()) {
+        if line.starts_with('#') {
+            comment = names(line);
+            continue;
+        }
+        let here = names(line);
+        let has = |p: &&StokesParameter| here.iter().any(|n| n.eq_ignore_ascii_case(p.name()));
+        let stokes = StokesParameter::ALL.iter().filter(has).count();
+        return stokes > 1 || [here, comment].iter().any(|names| Heading::find(names).is_some());
+    }
+    false
+}
+
+/// Reads a table with a column of times (`time_utc_h`, `time`, `t`, `UTC` or `hour`, hours of UTC; `MJD` or `JD`, days) and
+/// any of I, Q, U and V in Jy, each with a column of its standard deviations (`sigma_I`, `I_err`, `dI`), or one `sigma`
+/// for all. Names may have units in brackets. Other columns, lines that start with `#` and cells that are empty or `nan` are
+/// left out; the last comment above the numbers may name the columns.
+///
+/// # Errors
+/// If no line names the columns, a line has too few of them or no number where one belongs: with line, column and value.
+pub fn parse(text: &str) -> Result<LightCurve, Error> {
+    let (mut heading, mut comment) = (None, Vec::new());
+    let mut samples: Vec<Sample> = Vec::new();
+    let mut first_day = None;
+    for (index, line) in text.lines().enumerate() {
+        let located = |message: String| FileError::line(index + 1, message);
+        if line.trim().is_empty() {
+            continue;
+        }
+        if line.starts_with('#') {
+            comment = names(line);
+            continue;
+        }
+        let cells = cells(line);
+        if heading.is_none() {
+            let here = Heading::find(&names(line));
+            let is_names = here.is_some();
+            let why = || located(format!("`{}` names no {}", shown(line), wanted()));
+            heading = Some(here.or_else(|| Heading::find(&comment)).ok_or_else(why)?);
+            if is_names {
+                continue;
+            }
+        }
+        let Some(columns) = &heading else { continue };
+        samples.push(sample(&cells, columns, &mut first_day).map_err(located)?);
+    }
+    if heading.is_none() {
+        return Err(FileError::whole(format!("no line names {}", wanted())).into());
+    }
+    if samples.is_empty() {
+        return Err(FileError::whole("no fluxes").into());
+    }
+    samples.sort_by(|a: &Sample, b: &Sample| a.time_h.total_cmp(&b.time_h));
+    Ok(LightCurve { samples })
+}
+
+fn wanted() -> &'static str {
+    "columns time_utc_h (hours of UTC) and any of I, Q, U, V (Jy)"
+}
+
+fn shown(line: &str) -> String {
+    line.chars().take(40).collect()
+}
+
+/// Hours of UTC of a cell. Days count from the midnight before the first of them.
+fn hours(cell: &str, days: bool, first_day: &mut Option<f64>) -> Result<f64, String> {
+    let time = number(cell, "column time:")?;
+    let hours = match days {
+        true => {
+            let mjd = if time > JULIAN { time - JULIAN } else { time };
+            24.0 * (mjd - *first_day.get_or_insert(mjd.floor()))
+        }
+        false => time,
+    };
+    match (-1e4..=1e4).contains(&hours) {
+        true => Ok(hours),
+        false => Err(format!("column time: {time} h is not allowed: hours of UTC")),
+    }
+}
+
+fn sample(
+    cells: &[&str],
+    columns: &Heading,
+    first_day: &mut Option<f64>,
+) -> Result<Sample, String> {
+    let cell = |at: usize, name: &str| {
+        let count = cells.len();
+        cells.get(at).copied().ok_or_else(|| format!("column {name} is missing: {count} cells"))
+    };
+    let TimeColumn { at, days } = columns.time;
+    let time_h = hours(cell(at, "time")?, days, first_day)?;
+    let mut stokes = [None; 4];
+    for parameter in StokesParameter::ALL {
+        let k = parameter.index();
+        let Some(at) = columns.values[k] else { continue };
+        let name = parameter.name();
+        let text = cell(at, name)?;
+        if text.is_empty() || text.eq_ignore_ascii_case("nan") {
+            continue;
+        }
+        let jy = number(text, &format!("column {name}:"))?;
+        let error = |at: usize| sigma(cell(at, "sigma")?, &format!("column sigma of {name}:"));
+        let sigma_jy = columns.sigmas[k].map(error).transpose()?;
+        stokes[k] = Some(Flux { jy, sigma_jy: sigma_jy.filter(|sigma| *sigma > 0.0) });
+    }
+    let by = columns.by.and_then(|at| cells.get(at)).map_or("", |by| by);
+    Ok(Sample { time_h, stokes, by: by.to_owned() })
+}
+
+/// Reads hours of UTC from the column of times of a table, as [`parse`] finds it; of one with a single column, whatever it
+/// is called.
+///
+/// # Errors
+/// If there is no such column, or a cell of it is no number: with line, column and value.
+pub fn parse_times(text: &str) -> Result<Vec<f64>, Error> {
+    let (mut column, mut times, mut first_day) = (None, Vec::new(), None);
+    for (index, line) in text.lines().enumerate() {
+        let located = |message: String| FileError::line(index + 1, message);
+        if line.trim().is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let cells = cells(line);
+        let Some(TimeColumn { at, days }) = column else {
+            let only = || (cells.len() == 1).then_some(TimeColumn { at: 0, days: false });
+            let why = || located(format!("`{}` names no column time_utc_h", shown(line)));
+            column = Some(TimeColumn::find(&names(line)).or_else(only).ok_or_else(why)?);
+            continue;
+        };
+        let cell = cells.get(at).copied().unwrap_or_default();
+        times.push(hours(cell, days, &mut first_day).map_err(located)?);
+    }
+    if times.is_empty() {
+        return Err(FileError::whole("no times").into());
+    }
+    Ok(times)
+}
+
+/// The table that [`parse`] reads, with the columns that there are.
+pub fn to_csv(curve: &LightCurve) -> String {
+    let is_any = |k: usize| curve.samples.iter().any(|sample| sample.stokes[k].is_some());
+    let kept: Vec<StokesParameter> =
+        StokesParameter::ALL.into_iter().filter(|p| is_any(p.index())).collect();
+    let by = curve.samples.iter().any(|sample| !sample.by.is_empty());
+    let mut text = "time_utc_h".to_owned();
+    kept.iter().for_each(|p| _ = write!(text, ",{0},sigma_{0}", p.name()));
+    text.push_str(if by { ",baseline\n" } else { "\n" });
+    for sample in &curve.samples {
+        _ = write!(text, "{}", sample.time_h);
+        for parameter in &kept {
+            let flux = sample.stokes[parameter.index()];
+            let (jy, sigma) = (flux.map(|f| f.jy), flux.and_then(|f| f.sigma_jy));
+            _ = write!(text, ",{},{}", jy.unwrap_or(f64::NAN), sigma.unwrap_or(f64::NAN));
+        }
+        if by {
+            _ = write!(text, ",{}", sample.by);
+        }
+        text.push('\n');
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exact_tables_come_back() {
+        let flux = |jy: f64, sigma: f64| Some(Flux { jy, sigma_jy: Some(sigma) });
+        let curve = LightCurve {
+            samples: vec![
+                Sample {
+                    time_h: 9.25,
+                    stokes: [flux(2.5, 0.1), flux(0.1, 0.01), None, None],
+                    by: "A-B".into(),
+                },
+                Sample {
+                    time_h: 9.5,
+                    stokes: [flux(2.4, 0.1), None, None, None],
+                    by: "A-B".into(),
+                },
+            ],
+        };
+        assert_eq!(parse(&to_csv(&curve)).unwrap(), curve);
+    }
+
+    #[test]
+    fn exact_columns_of_others() {
+        let text = "# ALMA\n,time,I,Q,U,V\n0,9.3,2.1,-0.1,0.2,0.0\n1,9.4,nan,-0.2,0.1,\n";
+        let curve = parse(text).unwrap();
+        assert_eq!(curve.samples[0].stokes[2], Some(Flux { jy: 0.2, sigma_jy: None }));
+        assert_eq!((curve.samples[1].stokes[0], curve.samples[1].stokes[3]), (None, None));
+        let shared = parse("t,Q,U,sigma\n1,0.1,0.2,0.01\n").unwrap();
+        assert_eq!(shared.samples[0].stokes[1].unwrap().sigma_jy, Some(0.01));
+        assert_eq!(parse_times("# hours\ntime_utc_h\n9.3\n9.4\n").unwrap(), [9.3, 9.4]);
+    }
+
+    /// Headings of other programs: units in brackets, blanks between columns, names in a comment, days.
+    #[test]
+    fn exact_headings_of_others() {
+        let flux =
+            |curve: &LightCurve, k: usize, stokes: usize| curve.samples[k].stokes[stokes].unwrap();
+        let blanks =
+            parse("# Time [UTC h]  Q [Jy]  U [Jy]  dQ  dU\n9.3 0.1 0.2 0.01 0.02\n").unwrap();
+        assert_eq!(blanks.samples[0].time_h, 9.3);
+        assert_eq!(flux(&blanks, 0, 2), Flux { jy: 0.2, sigma_jy: Some(0.02) });
+        let days = parse("MJD,flux,flux_err\n57850.25,2.4,0.1\n57851.5,2.5,0.1\n").unwrap();
+        assert_eq!((days.samples[0].time_h, days.samples[1].time_h), (6.0, 36.0));
+        assert_eq!(flux(&days, 1, 0), Flux { jy: 2.5, sigma_jy: Some(0.1) });
+        let julian = parse("JD\tI(Jy)\tI_err(Jy)\n2457851.25\t2.4\t0.1\n").unwrap();
+        assert_eq!(julian.samples[0].time_h, 18.0);
+        let hours = parse("time(hr),Stokes I,Isigma(Jy)\n4.0,2.4,0.1\n").unwrap();
+        assert_eq!(flux(&hours, 0, 0).sigma_jy, Some(0.1));
+        assert!(is_light_curve("# t Q U\n1 2 3\n") && is_light_curve("UTC,I\n1,2\n"));
+        assert!(!is_light_curve("# an image\n1,2,3\n") && !is_light_curve("1 2 3\n"));
+    }
+
+    #[test]
+    fn exact_errors_name_line_column_and_value() {
+        for (text, says) in [
+            ("time,I\n1,2\n2,much\n", "line 3: column I: `much` is not a number"),
+            ("time,I\n1,2\nlate,2\n", "line 3: column time: `late` is not a number"),
+            ("time,I,sigma_I\n1,2,-1\n", "line 2: column sigma of I: = -1 Jy is not allowed"),
+            ("when,I\n1,2\n", "line 1: `when,I` names no columns time_utc_h"),
+            ("time,I,Q\n1,2\n", "line 2: column Q is missing"),
+            ("time,I\n1e9,2\n", "line 2: column time: 1000000000 h is not allowed"),
+            ("", "no line names columns time_utc_h"),
+        ] {
+            let error = parse(text).unwrap_err().to_string();
+            assert!(error.contains(says), "{text}: {error}");
+        }
+    }
+}

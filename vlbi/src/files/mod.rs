@@ -1,0 +1,236 @@
+//! Files of visibilities (UVFITS, eht-imaging's text, tables of total intensity) and FITS images. Codecs work
+//! on bytes; what they hold in memory is a small multiple of the file.
+
+mod comments;
+mod eht_table;
+mod fits;
+mod fits_image;
+mod gains;
+pub mod images;
+mod leakage;
+mod light_curve;
+mod obs_text;
+mod table;
+mod uvfits;
+
+pub use comments::write as observation_comments;
+pub use eht_table::{EhtTable, to_eht_table};
+pub use fits_image::read as read_fits_image;
+pub use gains::{COLUMNS as GAIN_COLUMNS, parse as parse_gains, to_csv as gains_to_csv};
+pub use leakage::{parse as parse_leakage, to_csv as leakage_to_csv};
+pub use light_curve::{
+    is_light_curve, parse as parse_light_curve, parse_times, to_csv as light_curve_to_csv,
+};
+pub use obs_text::{parse as parse_obs_text, to_text as to_obs_text};
+pub use table::{COLUMNS as TABLE_COLUMNS, parse as parse_table, to_csv};
+pub use uvfits::{read as read_uvfits, write as write_uvfits};
+
+use super::array::{MOST_STATIONS, Station};
+use super::observation::{Observation, Unknown};
+use crate::Error;
+use std::collections::HashMap;
+
+/// Why a file cannot be read, or data not be written.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FileError {
+    /// At a line of a text.
+    #[error("line {line}: {message}")]
+    Line {
+        /// Counted from 1.
+        line: usize,
+        /// What is wrong.
+        message: String,
+    },
+    /// At a byte of a binary file.
+    #[error("byte {offset}: {message}")]
+    Byte {
+        /// Counted from 0.
+        offset: usize,
+        /// What is wrong.
+        message: String,
+    },
+    /// With the file as a whole.
+    #[error("{0}")]
+    Whole(String),
+    /// The data lack what the format needs.
+    #[error(transparent)]
+    Unknown(#[from] Unknown),
+}
+
+impl FileError {
+    /// Refusal of the file as a whole.
+    pub fn whole(message: impl Into<String>) -> Self {
+        FileError::Whole(message.into())
+    }
+
+    fn line(line: usize, message: impl Into<String>) -> Self {
+        FileError::Line { line, message: message.into() }
+    }
+
+    fn byte(offset: usize, message: impl Into<String>) -> Self {
+        FileError::Byte { offset, message: message.into() }
+    }
+}
+
+/// The formats that [`decode`] tells apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Format {
+    /// Random groups with an antenna table.
+    Uvfits,
+    /// eht-imaging's text: a heading with all that is known, 20 columns.
+    ObsText,
+    /// A table of total intensity: kerrlight's CSV, or the EHT's public csv and txt.
+    Table,
+}
+
+impl core::fmt::Display for Format {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Format::Uvfits => "UVFITS",
+            Format::ObsText => "eht-imaging text",
+            Format::Table => "table of visibilities",
+        })
+    }
+}
+
+/// Reads an observation from a file in any of the formats, told apart by how it begins.
+///
+/// # Errors
+/// If it begins like none of them, or is damaged.
+pub fn decode(bytes: &[u8]) -> Result<(Format, Observation), Error> {
+    if bytes.starts_with(b"SIMPLE  =") {
+        return Ok((Format::Uvfits, read_uvfits(bytes)?));
+    }
+    let text = core::str::from_utf8(bytes).map_err(|error| {
+        FileError::byte(error.valid_up_to(), "neither UVFITS nor a text of visibilities")
+    })?;
+    if obs_text::is_obs_text(text) {
+        return Ok((Format::ObsText, parse_obs_text(text)?));
+    }
+    Ok((Format::Table, parse_table(text)?))
+}
+
+/// Refuses several spectral channels, for which a format has no column.
+fn one_channel(observation: &Observation) -> Result<(), FileError> {
+    match observation.channels.len() {
+        0 | 1 => Ok(()),
+        n => Err(FileError::whole(format!(
+            "this format has no column for {n} spectral channels: average them first"
+        ))),
+    }
+}
+
+/// Numbers for station names, in order of appearance.
+struct Names {
+    stations: Vec<Station>,
+    numbers: HashMap<String, u16>,
+}
+
+impl Names {
+    fn new(stations: Vec<Station>) -> Self {
+        let numbers = stations.iter().zip(0..).map(|(s, k)| (s.name.clone(), k)).collect();
+        Names { stations, numbers }
+    }
+
+    fn known(&self, name: &str) -> Option<u16> {
+        self.numbers.get(name).copied()
+    }
+
+    /// The number of a name, a new one if need be.
+    fn number(&mut self, name: &str) -> Result<u16, String> {
+        if let Some(number) = self.known(name) {
+            return Ok(number);
+        }
+        if self.stations.len() >= MOST_STATIONS {
+            return Err(format!("more than {MOST_STATIONS} stations"));
+        }
+        // Fewer than 2^16.
+        let number = self.stations.len() as u16;
+        self.stations.push(Station::named(name));
+        self.numbers.insert(name.to_owned(), number);
+        Ok(number)
+    }
+}
+
+/// How many rows a text may hold: as many as lines, which are 16 bytes at least.
+fn rows_at_most(text: &str) -> usize {
+    text.lines().count().min(text.len() / 16)
+}
+
+/// A finite number, or what to call it in a complaint.
+fn number(cell: &str, name: &str) -> Result<f64, String> {
+    let value =
+        cell.parse().map_err(|_| format!("{name} `{}` is not a number", shortened(cell)))?;
+    if f64::is_finite(value) { Ok(value) } else { Err(format!("{name} = {value} is not finite")) }
+}
+
+/// A standard deviation: not negative; NaN where there is none.
+fn sigma(cell: &str, name: &str) -> Result<f64, String> {
+    let value =
+        cell.parse().map_err(|_| format!("{name} `{}` is not a number", shortened(cell)))?;
+    if value < 0.0 || f64::is_infinite(value) {
+        return Err(format!("{name} = {value} Jy is not allowed: 0 or positive, or nan for none"));
+    }
+    Ok(value)
+}
+
+/// At most 20 characters of a cell.
+fn shortened(cell: &str) -> String {
+    cell.chars().take(20).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64Mcg;
+
+    fn texts() -> Vec<String> {
+        let small = uvfits::tests::small();
+        let eht = "#SRC:M87,DATE(MJD):57853,FREQ:229.0707GHz\n\
+            #time(UTC),T1,T2,U(lambda),V(lambda),Iamp(Jy),Iphase(d),Isigma(Jy)\n\
+            02.15138894,AA,LM,1868288384.0,-3689129984.0,0.01103669,-122.7523,0.00446794\n";
+        let csv = to_csv(&small, true);
+        vec![to_obs_text(&small).unwrap(), csv, eht.to_owned()]
+    }
+
+    #[test]
+    fn exact_formats_are_told_apart() {
+        let format = |bytes: &[u8]| decode(bytes).unwrap().0;
+        let [obs, csv, eht] = &texts()[..] else { unreachable!("three texts") };
+        assert_eq!(format(obs.as_bytes()), Format::ObsText);
+        assert_eq!(
+            (format(csv.as_bytes()), format(eht.as_bytes())),
+            (Format::Table, Format::Table)
+        );
+        let uvfits = write_uvfits(&uvfits::tests::small()).unwrap();
+        assert_eq!(format(&uvfits), Format::Uvfits);
+        let message = decode(&[0x89, b'P', b'N', b'G', 0xff]).unwrap_err().to_string();
+        assert!(message.contains("neither UVFITS"), "{message}");
+    }
+
+    /// Cut anywhere, or with bytes changed, a text is an error or data, never a panic.
+    #[test]
+    fn exact_damaged_texts_do_not_panic() {
+        let mut random = Pcg64Mcg::seed_from_u64(6);
+        for text in texts() {
+            assert!(decode(text.as_bytes()).is_ok());
+            for end in 0..text.len() {
+                let _ = decode(&text.as_bytes()[..end]);
+            }
+            let mut errors = 0;
+            for _ in 0..10_000 {
+                let mut bytes = text.clone().into_bytes();
+                for _ in 0..random.random_range(1..4) {
+                    let at = random.random_range(0..bytes.len());
+                    let characters = b"0-.,e# \n\tx9";
+                    bytes[at] = characters[random.random_range(0..characters.len())];
+                }
+                errors += usize::from(decode(&bytes).is_err());
+            }
+            assert!(errors > 500, "{errors}");
+        }
+    }
+}

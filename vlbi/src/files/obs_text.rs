@@ -1,0 +1,293 @@
+//! eht-imaging's text format of observations: a heading with source, date, frequency and
+//! stations, then 20 columns, amplitudes in Jy and phases in degrees.
+
+use super::{FileError, Names, number, sigma};
+use crate::Complex64;
+use crate::Error;
+use crate::array;
+use crate::earth::SourcePosition;
+use crate::observation::{Basis, Observation, Row, Unknown};
+use core::fmt::Write;
+
+/// Columns of the data.
+const COLUMNS: usize = 20;
+
+/// Whether a text begins as these do.
+pub(super) fn is_obs_text(text: &str) -> bool {
+    let mut words = text.split_whitespace();
+    words.next() == Some("#") && words.next() == Some("SRC:") && text.contains("\n# RA:")
+}
+
+/// Reads an observation.
+///
+/// # Errors
+/// If a line of the heading is missing, or a line of data has another number of columns, an
+/// unknown station, or no number where one belongs.
+pub fn parse(text: &str) -> Result<Observation, Error> {
+    let mut observation = Observation::empty(Basis::Stokes);
+    let mut names = Names::new(Vec::new());
+    let mut has_columns = false;
+    observation.rows = Vec::with_capacity(super::rows_at_most(text));
+    for (index, line) in text.lines().enumerate() {
+        let located = |message: String| FileError::line(index + 1, message);
+        if let Some(heading) = line.strip_prefix('#') {
+            let found = read_heading(heading, &mut observation, &mut names).map_err(located)?;
+            has_columns |= found;
+        } else if !line.trim().is_empty() {
+            if !has_columns {
+                return Err(located("data before the heading `# time (hr) ...`".to_owned()).into());
+            }
+            let row = row(line, &names).map_err(located)?;
+            observation.rows.push(row);
+        }
+    }
+    if observation.rows.is_empty() {
+        return Err(FileError::whole("no visibilities").into());
+    }
+    let complete = observation.position.is_some()
+        && observation.mjd.is_some()
+        && observation.frequency_hz.is_some();
+    if !complete {
+        return Err(FileError::whole("the heading lacks RA, DEC, MJD or RF").into());
+    }
+    observation.stations = names.stations;
+    Ok(observation)
+}
+
+/// Takes in a line of the heading; tells whether it is the one that names the columns.
+fn read_heading(
+    line: &str,
+    observation: &mut Observation,
+    names: &mut Names,
+) -> Result<bool, String> {
+    let words: Vec<&str> = line.split_whitespace().take(40).collect();
+    let first = || words.get(1).copied().unwrap_or_default();
+    match words.first().copied().unwrap_or_default() {
+        "SRC:" => observation.source = words[1..].join(" "),
+        "RA:" => {
+            let ra_hours = sexagesimal(&words, "RA")?;
+            let dec_deg = observation.position.map_or(0.0, |p| p.dec_deg);
+            observation.position = Some(checked(ra_hours, dec_deg)?);
+        }
+        "DEC:" => {
+            let ra_hours = observation.position.map_or(0.0, |p| p.ra_hours);
+            observation.position = Some(checked(ra_hours, sexagesimal(&words, "DEC")?)?);
+        }
+        "MJD:" => {
+            let mjd = number(first(), "MJD")?;
+            if !(0.0..=1e6).contains(&mjd) || mjd.fract() != 0.0 {
+                return Err(format!("MJD = {mjd} is not allowed: a whole number in [0, 1e6]"));
+            }
+            observation.mjd = Some(mjd as i32);
+        }
+        "RF:" => observation.frequency_hz = Some(positive(first(), "RF")? * 1e9),
+        "BW:" => observation.bandwidth_hz = Some(positive(first(), "BW")? * 1e9),
+        "time" => {
+            observation.basis = match words.get(11) {
+                Some(&"Iamp") => Basis::Stokes,
+                Some(&"RRamp") => Basis::Circular,
+                _ => return Err("neither Iamp nor RRamp follows V (lambda)".to_owned()),
+            };
+            return Ok(true);
+        }
+        _ => read_station(&words, names)?,
+    }
+    Ok(false)
+}
+
+/// Takes in a station; lines of other headings are passed over.
+fn read_station(words: &[&str], names: &mut Names) -> Result<(), String> {
+    let is_station =
+        matches!(words.len(), 5 | 13) && words[1..].iter().all(|w| w.parse::<f64>().is_ok());
+    if !is_station {
+        return Ok(());
+    }
+    let station = array::station(words)?;
+    let known = names.stations.len();
+    let k = usize::from(names.number(&station.name)?);
+    if k < known {
+        return Err(format!("station {} is listed twice", station.name));
+    }
+    names.stations[k] = station;
+    Ok(())
+}
+
+fn checked(ra_hours: f64, dec_deg: f64) -> Result<SourcePosition, String> {
+    SourcePosition::new(ra_hours, dec_deg).map_err(|error| error.to_string())
+}
+
+fn positive(cell: &str, name: &str) -> Result<f64, String> {
+    let value = number(cell, name)?;
+    if value > 0.0 { Ok(value) } else { Err(format!("{name} = {value} GHz must be positive")) }
+}
+
+/// `17 h 45 m 40.036 s`, `-29 deg 0 m 28.2 s`.
+fn sexagesimal(words: &[&str], name: &str) -> Result<f64, String> {
+    let part = |k: usize| number(words.get(k).copied().unwrap_or_default(), name);
+    let (whole, minutes, seconds) = (part(1)?, part(3)?, part(5)?);
+    let size = whole.abs() + minutes / 60.0 + seconds / 3600.0;
+    // Of `-0` the sign counts too.
+    Ok(if whole.is_sign_negative() { -size } else { size })
+}
+
+fn row(line: &str, names: &Names) -> Result<Row, String> {
+    let mut cells = [""; COLUMNS];
+    let mut count = 0;
+    for cell in line.split_whitespace() {
+        if count < COLUMNS {
+            cells[count] = cell;
+        }
+        count += 1;
+    }
+    if count != COLUMNS {
+        return Err(format!("{count} columns: {COLUMNS} are expected"));
+    }
+    let value = |k: usize, name| number(cells[k], name);
+    let station = |k: usize| {
+        names.known(cells[k]).ok_or_else(|| {
+            format!("station `{}` is not in the heading", super::shortened(cells[k]))
+        })
+    };
+    let mut products = [Complex64::new(0.0, 0.0); 4];
+    let mut noise_sigma = [f64::NAN; 4];
+    for k in 0..4 {
+        let amplitude = cells[8 + 2 * k];
+        let phase = cells[9 + 2 * k];
+        let error = sigma(cells[16 + k], "sigma")?;
+        // eht-imaging writes products that are not there as `nan`.
+        if error.is_nan() || amplitude.eq_ignore_ascii_case("nan") {
+            continue;
+        }
+        let phase = number(phase, "phase")?.to_radians();
+        products[k] = Complex64::from_polar(number(amplitude, "amplitude")?, phase);
+        noise_sigma[k] = error;
+    }
+    if noise_sigma.iter().all(|sigma| sigma.is_nan()) {
+        return Err("none of the four products has a visibility and an error".to_owned());
+    }
+    Ok(Row {
+        time_h: value(0, "time")?,
+        integration_s: value(1, "tint")?,
+        stations: [station(2)?, station(3)?],
+        uv: [value(6, "u")?, value(7, "v")?],
+        products,
+        noise_sigma,
+        opacity: [value(4, "tau1")? as f32, value(5, "tau2")? as f32],
+        channel: 0,
+    })
+}
+
+/// The observation as eht-imaging's text, numbers with all their digits.
+///
+/// # Errors
+/// If the source's position, the date or the frequency is not known, or there are several spectral
+/// channels.
+pub fn to_text(observation: &Observation) -> Result<String, Error> {
+    super::one_channel(observation)?;
+    let position =
+        observation.position.ok_or(Unknown("the source's right ascension and declination"))?;
+    let mjd = observation.mjd.ok_or(Unknown("the date (MJD)"))?;
+    let frequency = observation.frequency_hz.ok_or(Unknown("the frequency"))?;
+    let bandwidth = observation.bandwidth_hz.ok_or(Unknown("the bandwidth"))?;
+    let mut text = format!(
+        "# SRC: {}\n# RA: {}\n# DEC: {}\n# MJD: {mjd}\n# RF: {} GHz\n# BW: {} GHz\n",
+        observation.source,
+        parts(position.ra_hours, "h"),
+        parts(position.dec_deg, "deg"),
+        frequency / 1e9,
+        bandwidth / 1e9
+    );
+    for flag in ["PHASECAL", "AMPCAL", "OPACITYCAL", "DCAL", "FRCAL"] {
+        let _ = writeln!(text, "# {flag}: 1");
+    }
+    let rule = "-".repeat(136);
+    let _ = writeln!(text, "# {rule}\n# {}", array::HEADING);
+    for station in &observation.stations {
+        let _ = writeln!(text, "# {}", array::columns(station));
+    }
+    let hands = match observation.basis {
+        Basis::Stokes => ["I", "Q", "U", "V"],
+        Basis::Circular => ["RR", "LL", "RL", "LR"],
+    };
+    let _ = write!(text, "# {rule}\n# time (hr) tint T1 T2 Tau1 Tau2 U (lambda) V (lambda)");
+    hands.iter().for_each(|hand| {
+        let _ = write!(text, " {hand}amp (Jy) {hand}phase(d)");
+    });
+    hands.iter().for_each(|hand| {
+        let _ = write!(text, " {hand}sigma (Jy)");
+    });
+    text.push('\n');
+    observation.rows.iter().for_each(|row| write_row(&mut text, observation, row));
+    Ok(text)
+}
+
+fn write_row(text: &mut String, observation: &Observation, row: &Row) {
+    let [t1, t2] = observation.names(row);
+    let [tau1, tau2] = row.opacity;
+    let Row { time_h, integration_s, uv: [u, v], .. } = *row;
+    // Writing into a string cannot fail.
+    let _ = write!(text, "{time_h} {integration_s} {t1} {t2} {tau1} {tau2} {u} {v}");
+    for k in 0..4 {
+        let _ = match row.product(k) {
+            Some(m) => {
+                let (amplitude, phase) = m.visibility.to_polar();
+                write!(text, " {amplitude} {}", phase.to_degrees())
+            }
+            None => write!(text, " nan nan"),
+        };
+    }
+    for sigma in row.noise_sigma {
+        let _ =
+            write!(text, " {}", if sigma.is_nan() { "nan".to_owned() } else { sigma.to_string() });
+    }
+    text.push('\n');
+}
+
+/// Whole, minutes and seconds of hours or degrees.
+fn parts(value: f64, unit: &str) -> String {
+    let size = value.abs();
+    let whole = size.trunc();
+    let minutes = ((size - whole) * 60.0).trunc();
+    let seconds = ((size - whole) * 60.0 - minutes) * 60.0;
+    let sign = if value < 0.0 { "-" } else { "" };
+    format!("{sign}{whole} {unit} {minutes} m {seconds:.10} s")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::uvfits::tests::small;
+
+    #[test]
+    fn exact_round_trip() {
+        let observation = small();
+        let text = to_text(&observation).unwrap();
+        let back = parse(&text).unwrap();
+        assert!((back.position.unwrap().ra_hours - 17.76).abs() < 1e-13);
+        assert!((back.position.unwrap().dec_deg + 0.25).abs() < 1e-13);
+        assert_eq!(back.stations, observation.stations);
+        assert_eq!((back.mjd, back.basis), (observation.mjd, observation.basis));
+        for (a, b) in observation.rows.iter().zip(&back.rows) {
+            assert_eq!((a.time_h, a.uv, a.stations), (b.time_h, b.uv, b.stations));
+            for k in 0..4 {
+                assert_eq!(a.noise_sigma[k].to_bits(), b.noise_sigma[k].to_bits());
+                assert!((a.products[k] - b.products[k]).norm() < 1e-15);
+            }
+        }
+    }
+
+    #[test]
+    fn exact_errors_name_the_line() {
+        let good = to_text(&small()).unwrap();
+        let last = good.lines().count();
+        let fail = |text: &str| parse(text).unwrap_err().to_string();
+        assert!(
+            fail(&good.replace("# MJD: 57850", "# MJD: soon")).starts_with("line 4: MJD `soon`")
+        );
+        assert!(fail(&good.replace("# MJD: 57850\n", "")).contains("lacks"));
+        let message = fail(&format!("{good}1 2 3\n"));
+        assert!(message.starts_with(&format!("line {}: 3 columns", last + 1)), "{message}");
+        assert!(fail(&good.replace(" AA CC ", " AA XX ")).contains("station `XX`"));
+        assert!(fail(&good.replace("time (hr)", "times (hr)")).contains("before the heading"));
+    }
+}

@@ -1,0 +1,77 @@
+//! Frequencies of spectral channels: of the `FREQ` axis, and of the `AIPS FQ` table where there are
+//! several IFs (AIPS memo 117, section 4.4).
+
+use super::super::FileError;
+use super::super::fits::{ColumnData, Table, Unit, binary_table};
+use super::layout::Layout;
+use crate::observation::Channel;
+
+/// Frequencies of the channels of a layout, in its order, and whether IFs are without any of their
+/// own. None for a single channel, whose (u, v) count wavelengths of `reference_hz` as they are in
+/// eht-imaging.
+pub fn channels(
+    units: &[Unit<'_>],
+    layout: &Layout,
+    reference_hz: f64,
+) -> Result<(Vec<Channel>, bool), FileError> {
+    let places = &layout.channels;
+    if places.len() < 2 {
+        return Ok((Vec::new(), false));
+    }
+    let header = &units[0].header;
+    if places.len() > usize::from(u16::MAX) {
+        return Err(header.error("NAXIS4", format!("{} channels are too many", places.len())));
+    }
+    let named = |unit: &&Unit<'_>| unit.header.text("EXTNAME").as_deref() == Some("AIPS FQ");
+    let unit = units.iter().find(named);
+    let table = unit.map(Table::new).transpose()?;
+    let bands = places.iter().map(|place| place.band + 1).max().unwrap_or(1);
+    let cell = |name: &str, band: usize| table.as_ref().and_then(|t| t.number(0, name, band));
+    if let (Some(table), Some(unit)) = (&table, unit)
+        && (table.rows() != 1 || (0..bands).any(|band| cell("IF FREQ", band).is_none()))
+    {
+        let message = format!(
+            "AIPS FQ table: one row with IF FREQ of {bands} IFs is expected, {} rows found",
+            table.rows()
+        );
+        return Err(FileError::byte(unit.offset, message));
+    }
+    let channel = |place: &super::layout::Place| {
+        let width = cell("CH WIDTH", place.band).filter(|width| *width != 0.0);
+        // Of a lower sideband frequencies fall.
+        let lower = cell("SIDEBAND", place.band).is_some_and(|sideband| sideband < 0.0);
+        let step = match width {
+            Some(width) if lower => -width.abs(),
+            Some(width) => width,
+            None => layout.channel_width_hz,
+        };
+        let offset = (place.channel as f64 + 1.0 - layout.reference_channel) * step;
+        let band = cell("IF FREQ", place.band).unwrap_or(0.0);
+        Channel { frequency_hz: reference_hz + band + offset, bandwidth_hz: step.abs() }
+    };
+    let channels: Vec<Channel> = places.iter().map(channel).collect();
+    match channels.iter().find(|c| !(1e6..=1e15).contains(&c.frequency_hz)) {
+        Some(channel) => {
+            let message = format!("a channel of {} Hz: not in [1e6, 1e15]", channel.frequency_hz);
+            Err(header.error("CRVAL4", message))
+        }
+        None => Ok((channels, bands > 1 && table.is_none())),
+    }
+}
+
+/// The `AIPS FQ` table of channels, each an IF of its own.
+pub fn table(channels: &[Channel], reference_hz: f64) -> Vec<u8> {
+    let n = channels.len();
+    let widths = || channels.iter().map(|c| c.bandwidth_hz as f32).collect();
+    let offsets = channels.iter().map(|c| c.frequency_hz - reference_hz).collect();
+    let columns = [
+        ("FRQSEL", "", ColumnData::Integers(1, vec![1])),
+        ("IF FREQ", "HZ", ColumnData::Doubles(n, offsets)),
+        ("CH WIDTH", "HZ", ColumnData::Singles(n, widths())),
+        ("TOTAL BANDWIDTH", "HZ", ColumnData::Singles(n, widths())),
+        ("SIDEBAND", "", ColumnData::Integers(n, vec![1; n])),
+    ];
+    binary_table("AIPS FQ", 1, &columns, |cards| {
+        cards.value("NO_IF", n);
+    })
+}

@@ -1,0 +1,284 @@
+//! Where things are in a random group.
+
+use super::super::FileError;
+use super::super::fits::Header;
+use crate::observation::Basis;
+
+/// A random parameter: value = stored·scale + zero.
+#[derive(Debug, Clone, Copy)]
+pub struct Parameter {
+    index: usize,
+    scale: f64,
+    zero: f64,
+}
+
+/// What tells the stations of a baseline.
+#[derive(Debug, Clone, Copy)]
+pub enum Antennas {
+    /// 256·first + second + (subarray − 1)/100, or 65536 + 2048·first + second.
+    Baseline(Parameter),
+    /// Two parameters, and perhaps one for the subarray.
+    Pair(Parameter, Parameter, Option<Parameter>),
+}
+
+/// The layout of groups.
+#[derive(Debug)]
+pub struct Layout {
+    /// Bytes of a stored number.
+    pub number_size: usize,
+    float: bool,
+    /// Numbers of a group, parameters first.
+    pub group_size: usize,
+    parameters: usize,
+    pub groups: usize,
+    pub u: Parameter,
+    pub v: Parameter,
+    pub antennas: Antennas,
+    /// Parts of the date, to be added.
+    pub date: Vec<Parameter>,
+    pub integration: Option<Parameter>,
+    pub opacity: Option<[Parameter; 2]>,
+    scale: f64,
+    zero: f64,
+    /// Distance in numbers between real part, imaginary part and weight.
+    complex_stride: usize,
+    /// Whether there are weights.
+    pub weighted: bool,
+    /// For each of the four products, where it is; `None` where there is none.
+    pub products: [Option<usize>; 4],
+    pub basis: Basis,
+    /// Where spectral channels of all IFs are.
+    pub channels: Vec<Place>,
+    /// Frequency in Hz at the reference channel, that channel (counted from 1), distance of channels.
+    pub frequency_hz: f64,
+    pub reference_channel: f64,
+    pub channel_width_hz: f64,
+}
+
+/// A spectral channel's place in a group.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Place {
+    /// Relative to the first one's.
+    pub offset: usize,
+    /// Its IF, counted from 0.
+    pub band: usize,
+    /// Its number in the IF, counted from 0.
+    pub channel: usize,
+}
+
+/// An axis of the data, with its position in memory.
+struct Axis {
+    keyword: usize,
+    name: String,
+    length: usize,
+    stride: usize,
+}
+
+impl Layout {
+    /// The layout that a primary header tells.
+    pub fn new(header: &Header<'_>) -> Result<Self, FileError> {
+        if !header.is_true("GROUPS") || header.axes()?.first() != Some(&0) {
+            let message =
+                "a FITS file, but not of random groups (GROUPS = T, NAXIS1 = 0): no UVFITS";
+            return Err(FileError::whole(message));
+        }
+        let parameters = header.count("PCOUNT", 1, 10_000)?;
+        let axes = axes(header)?;
+        let numbers = header.group_size()?;
+        let bits = header.integer("BITPIX")?;
+        if !matches!(bits, Some(16 | 32 | -32 | -64)) {
+            return Err(header.error("BITPIX", "16, 32, -32 or -64 in UVFITS"));
+        }
+        let complex = find(&axes, "COMPLEX", header)?;
+        if complex.length != 2 && complex.length != 3 {
+            return Err(header.error(&format!("NAXIS{}", complex.keyword), "2 or 3 (COMPLEX)"));
+        }
+        let (products, basis) = products(header, find(&axes, "STOKES", header)?)?;
+        let frequency = find(&axes, "FREQ", header)?;
+        let at = |name: &str| header.number(&format!("{name}{}", frequency.keyword));
+        let parameter = Parameters::read(header, parameters)?;
+        Ok(Layout {
+            number_size: header.number_size()?,
+            float: bits < Some(0),
+            group_size: numbers + parameters,
+            parameters,
+            groups: header.count("GCOUNT", 1, usize::MAX)?,
+            u: parameter.one("UU")?,
+            v: parameter.one("VV")?,
+            antennas: parameter.antennas()?,
+            date: parameter.date()?,
+            integration: parameter.optional("INTTIM"),
+            opacity: parameter
+                .optional("TAU1")
+                .zip(parameter.optional("TAU2"))
+                .map(|(a, b)| [a, b]),
+            scale: header.number("BSCALE")?.unwrap_or(1.0),
+            zero: header.number("BZERO")?.unwrap_or(0.0),
+            complex_stride: complex.stride,
+            weighted: complex.length == 3,
+            products,
+            basis,
+            channels: channels(&axes, header)?,
+            frequency_hz: at("CRVAL")?.unwrap_or(0.0),
+            reference_channel: at("CRPIX")?.unwrap_or(1.0),
+            channel_width_hz: at("CDELT")?.unwrap_or(0.0),
+        })
+    }
+
+    /// Number `index` of a group.
+    fn stored(&self, group: &[u8], index: usize) -> f64 {
+        let cell = &group[index * self.number_size..(index + 1) * self.number_size];
+        match (self.float, cell) {
+            (false, &[a, b]) => i16::from_be_bytes([a, b]).into(),
+            (false, &[a, b, c, d]) => i32::from_be_bytes([a, b, c, d]).into(),
+            (true, &[a, b, c, d]) => f32::from_be_bytes([a, b, c, d]).into(),
+            (_, cell) => f64::from_be_bytes(cell.try_into().unwrap_or([0; 8])),
+        }
+    }
+
+    /// A parameter of a group.
+    pub fn parameter(&self, group: &[u8], parameter: Parameter) -> f64 {
+        self.stored(group, parameter.index) * parameter.scale + parameter.zero
+    }
+
+    /// Real part, imaginary part and weight of the datum at `index` of a group.
+    pub fn datum(&self, group: &[u8], index: usize) -> [f64; 3] {
+        let value = |k: usize| {
+            let stored = self.stored(group, self.parameters + index + k * self.complex_stride);
+            stored * self.scale + self.zero
+        };
+        [value(0), value(1), if self.weighted { value(2) } else { 1.0 }]
+    }
+}
+
+fn axes(header: &Header<'_>) -> Result<Vec<Axis>, FileError> {
+    let lengths = header.axes()?;
+    let mut stride = 1usize;
+    let mut axes = Vec::new();
+    for (keyword, length) in (2..).zip(lengths.into_iter().skip(1)) {
+        let name = header.text(&format!("CTYPE{keyword}")).unwrap_or_default();
+        axes.push(Axis { keyword, name, length, stride });
+        // No overflow: `Header::group_size` has multiplied them all.
+        stride = stride.saturating_mul(length);
+    }
+    match axes.iter().find(|axis| axis.length == 0) {
+        Some(axis) => Err(header.error(&format!("NAXIS{}", axis.keyword), "positive")),
+        None => Ok(axes),
+    }
+}
+
+fn find<'a>(axes: &'a [Axis], name: &str, header: &Header<'_>) -> Result<&'a Axis, FileError> {
+    axes.iter()
+        .find(|axis| axis.name == name)
+        .ok_or_else(|| header.error("CTYPE2", format!("no axis is named {name}")))
+}
+
+/// Where the four products are along the axis of polarisations.
+fn products(header: &Header<'_>, axis: &Axis) -> Result<([Option<usize>; 4], Basis), FileError> {
+    let k = axis.keyword;
+    let value = |name: &str, default: f64| -> Result<f64, FileError> {
+        Ok(header.number(&format!("{name}{k}"))?.unwrap_or(default))
+    };
+    let (first, step, reference) =
+        (value("CRVAL", f64::NAN)?, value("CDELT", 1.0)?, value("CRPIX", 1.0)?);
+    let circular = first < 0.0;
+    let mut products = [None; 4];
+    for index in 0..axis.length.min(8) {
+        let code = first + (index as f64 + 1.0 - reference) * step;
+        let code = if circular { -code } else { code };
+        let product = (1..=4).find(|k| f64::from(*k) == code);
+        let Some(product) = product else {
+            let message = "Stokes I, Q, U, V (1 to 4) or circular RR, LL, RL, LR (-1 to -4)";
+            return Err(header.error(&format!("CRVAL{k}"), message));
+        };
+        products[product as usize - 1] = Some(index * axis.stride);
+    }
+    Ok((products, if circular { Basis::Circular } else { Basis::Stokes }))
+}
+
+/// Where channels of all IFs are; other axes must not be longer than 1.
+fn channels(axes: &[Axis], header: &Header<'_>) -> Result<Vec<Place>, FileError> {
+    let mut channels = vec![Place::default()];
+    for axis in axes {
+        match axis.name.as_str() {
+            "COMPLEX" | "STOKES" => {}
+            "FREQ" | "IF" => {
+                let is_band = axis.name == "IF";
+                let at = |k: usize, place: &Place| Place {
+                    offset: place.offset + k * axis.stride,
+                    band: if is_band { k } else { place.band },
+                    channel: if is_band { place.channel } else { k },
+                };
+                // As many as a group has numbers at most, which the file has.
+                channels = (0..axis.length)
+                    .flat_map(|k| channels.iter().map(move |place| at(k, place)))
+                    .collect();
+            }
+            _ if axis.length == 1 => {}
+            _ => return Err(header.error(&format!("NAXIS{}", axis.keyword), "1 of this axis")),
+        }
+    }
+    Ok(channels)
+}
+
+/// The random parameters by name.
+struct Parameters<'a, 'b> {
+    header: &'a Header<'b>,
+    named: Vec<(String, Parameter)>,
+}
+
+impl<'a, 'b> Parameters<'a, 'b> {
+    fn read(header: &'a Header<'b>, count: usize) -> Result<Self, FileError> {
+        let mut named = Vec::new();
+        for k in 1..=count {
+            // Later parts of a date may be named `_DATE`.
+            let Some(name) = header.text(&format!("PTYPE{k}")) else { continue };
+            let name = name.trim_start_matches('_').to_owned();
+            let scale = header.number(&format!("PSCAL{k}"))?.unwrap_or(1.0);
+            let zero = header.number(&format!("PZERO{k}"))?.unwrap_or(0.0);
+            named.push((name, Parameter { index: k - 1, scale, zero }));
+        }
+        Ok(Parameters { header, named })
+    }
+
+    fn optional(&self, name: &str) -> Option<Parameter> {
+        self.named.iter().find(|(n, _)| n == name).map(|(_, p)| *p)
+    }
+
+    /// A parameter whose name starts so: `UU` may be `UU---SIN`, `UU-L`, ….
+    fn one(&self, start: &str) -> Result<Parameter, FileError> {
+        let found = self.named.iter().find(|(n, _)| n.starts_with(start)).map(|(_, p)| *p);
+        found.ok_or_else(|| self.missing(start))
+    }
+
+    fn missing(&self, name: &str) -> FileError {
+        self.header.error("PTYPE1", format!("no random parameter is named {name}"))
+    }
+
+    fn antennas(&self) -> Result<Antennas, FileError> {
+        if let Some(baseline) = self.optional("BASELINE") {
+            return Ok(Antennas::Baseline(baseline));
+        }
+        let pair = self.optional("ANTENNA1").zip(self.optional("ANTENNA2"));
+        let (first, second) = pair.ok_or_else(|| self.missing("BASELINE"))?;
+        Ok(Antennas::Pair(first, second, self.optional("SUBARRAY")))
+    }
+
+    fn date(&self) -> Result<Vec<Parameter>, FileError> {
+        let parts: Vec<_> =
+            self.named.iter().filter(|(n, _)| n == "DATE").map(|(_, p)| *p).collect();
+        if parts.is_empty() { Err(self.missing("DATE")) } else { Ok(parts) }
+    }
+}
+
+impl Parameter {
+    /// What is added to every stored value.
+    pub fn zero(self) -> f64 {
+        self.zero
+    }
+
+    /// The same without what is added.
+    pub fn without_zero(self) -> Self {
+        Parameter { zero: 0.0, ..self }
+    }
+}

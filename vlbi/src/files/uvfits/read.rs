@@ -1,0 +1,264 @@
+//! Reading.
+
+use super::super::FileError;
+use super::super::fits;
+use super::antennas::AntennaTables;
+use super::frequencies;
+use super::layout::{Antennas, Layout};
+use crate::Complex64;
+use crate::Error;
+use crate::earth::SourcePosition;
+use crate::observation::{Observation, Row};
+
+/// JD of MJD 0.
+const MJD_ZERO: f64 = 2_400_000.5;
+
+/// Reads UVFITS.
+///
+/// Several spectral channels or IFs are rows of their own, with (u, v) in wavelengths of their own
+/// frequency; (u, v) of a single one are counted in wavelengths of the antenna table's frequency (as
+/// in eht-imaging). σ = 1/√weight; a weight that is not positive, or a visibility that is no number,
+/// means no datum. Rows without any datum, and correlations of a station with itself, are left
+/// out; the history says how many groups have none but such.
+///
+/// # Errors
+/// If the file is damaged, no UVFITS, or holds no datum; if rows of many channels would take more
+/// memory than `MOST_MEMORY` times the file.
+pub fn read(bytes: &[u8]) -> Result<Observation, Error> {
+    let units = fits::units(bytes)?;
+    let header = &units[0].header;
+    let layout = Layout::new(header)?;
+    let count = layout.channels.len();
+    let rows = layout.groups.checked_mul(count).and_then(|n| n.checked_mul(size_of::<Row>()));
+    if rows.is_none_or(|size| size > MOST_MEMORY * bytes.len()) {
+        let message = format!("{count} channels of so few bytes that rows would be too large");
+        return Err(header.error("BITPIX", message).into());
+    }
+    let tables = AntennaTables::read(&units)?;
+    let frequency_hz = tables.frequency_hz.unwrap_or(layout.frequency_hz);
+    if !(1e6..=1e15).contains(&frequency_hz) {
+        return Err(header
+            .error("CRVAL4", "no frequency in [1e6, 1e15] Hz in AN table or header")
+            .into());
+    }
+    let (channels, unknown) = frequencies::channels(&units, &layout, frequency_hz)?;
+    let wavelengths = match channels.as_slice() {
+        [] => vec![frequency_hz],
+        channels => channels.iter().map(|c| c.frequency_hz).collect(),
+    };
+    let reader = Reader { layout: &layout, tables: &tables, wavelengths, offset: units[0].offset };
+    let (mjd, rows, left_out) = reader.rows(units[0].data)?;
+    let bandwidth = match channels.as_slice() {
+        [] => layout.channel_width_hz.abs(),
+        channels => channels.iter().map(|c| c.bandwidth_hz).sum(),
+    };
+    let mut observation = Observation {
+        source: header.text("OBJECT").unwrap_or_default(),
+        position: position(header)?,
+        mjd: Some(mjd),
+        frequency_hz: Some(frequency_hz),
+        bandwidth_hz: Some(bandwidth).filter(|bandwidth| *bandwidth > 0.0),
+        channels,
+        rows,
+        ..Observation::empty(layout.basis)
+    };
+    if unknown {
+        let line = "no AIPS FQ table: all IFs counted at the reference frequency";
+        observation.history.push(line.to_owned());
+    }
+    if left_out > 0 {
+        observation.history.push(format!("{left_out} groups without valid data left out"));
+    }
+    observation.history.extend(tables.remarks);
+    observation.stations = tables.stations;
+    Ok(observation)
+}
+
+/// Rows take at most this many times the bytes of the file.
+pub const MOST_MEMORY: usize = 16;
+
+/// Right ascension and declination from OBSRA and OBSDEC or the axes named so, in degrees.
+fn position(header: &fits::Header<'_>) -> Result<Option<SourcePosition>, FileError> {
+    let axis = |name: &str| {
+        (2..=9)
+            .find(|k| header.text(&format!("CTYPE{k}")).is_some_and(|t| t == name))
+            .map(|k| format!("CRVAL{k}"))
+    };
+    let value = |keyword: &str, name: &str| match header.number(keyword)? {
+        Some(value) => Ok(Some(value)),
+        None => axis(name).map_or(Ok(None), |keyword| header.number(&keyword)),
+    };
+    let (Some(ra), Some(dec)) = (value("OBSRA", "RA")?, value("OBSDEC", "DEC")?) else {
+        return Ok(None);
+    };
+    let position = SourcePosition::new(ra.rem_euclid(360.0) / 15.0, dec);
+    position.map(Some).map_err(|error| header.error("OBSRA", error))
+}
+
+struct Reader<'a> {
+    layout: &'a Layout,
+    tables: &'a AntennaTables,
+    /// Frequencies in Hz that (u, v) of each channel count wavelengths of.
+    wavelengths: Vec<f64>,
+    /// Where the data start in the file.
+    offset: usize,
+}
+
+impl Reader<'_> {
+    /// The day, the rows, and how many groups hold nothing.
+    fn rows(&self, data: &[u8]) -> Result<(i32, Vec<Row>, usize), FileError> {
+        let size = self.layout.group_size * self.layout.number_size;
+        let groups = || data.chunks_exact(size).enumerate();
+        let day = groups().map(|(_, group)| self.date(group)).filter(|d| d[0].is_finite());
+        let day = day.map(|[day, fraction]| (day + fraction).floor()).fold(f64::NAN, f64::min);
+        if !(-1e6..=1e6).contains(&day) {
+            let message = format!("{} groups, none with a date near our time", self.layout.groups);
+            return Err(FileError::byte(self.offset, message));
+        }
+        // As many as `read` has seen to be in proportion.
+        let mut rows = Vec::with_capacity(data.len() / size * self.wavelengths.len());
+        let mut left_out = 0;
+        for (index, group) in groups() {
+            let located = |message: String| {
+                let at = self.offset + index * size;
+                FileError::byte(at, format!("group {}: {message}", index + 1))
+            };
+            let before = rows.len();
+            self.group(group, day, &mut rows).map_err(located)?;
+            left_out += usize::from(rows.len() == before);
+        }
+        if rows.is_empty() {
+            let message = format!("{} groups, none with valid data", self.layout.groups);
+            return Err(FileError::byte(self.offset, message));
+        }
+        Ok((day as i32, rows, left_out))
+    }
+
+    /// Date as MJD in two parts, whose sum would lose digits.
+    fn date(&self, group: &[u8]) -> [f64; 2] {
+        let parts = &self.layout.date;
+        let stored = |k: usize| self.layout.parameter(group, parts[k].without_zero());
+        let zero: f64 = parts.iter().map(|part| part.zero()).sum();
+        let rest: f64 = (1..parts.len()).map(stored).sum();
+        // Whole days may be in the stored part, in what is added, or in both.
+        let day = stored(0).floor() + zero.floor() - MJD_ZERO.floor();
+        let rest = rest + (stored(0) - stored(0).floor()) + (zero - zero.floor());
+        let rest = rest - (MJD_ZERO - MJD_ZERO.floor());
+        [day, rest]
+    }
+
+    fn stations(&self, group: &[u8]) -> Result<[u16; 2], String> {
+        let value = |parameter| self.layout.parameter(group, parameter);
+        let (subarray, numbers) = match self.layout.antennas {
+            Antennas::Baseline(parameter) => decode_baseline(value(parameter)),
+            Antennas::Pair(first, second, subarray) => {
+                let subarray = subarray.map_or(1.0, value);
+                (subarray as i64, [value(first) as i64, value(second) as i64])
+            }
+        };
+        let station = |number| {
+            self.tables.station(subarray, number).ok_or_else(|| {
+                format!("antenna {number} of subarray {subarray} is not in the AIPS AN table")
+            })
+        };
+        Ok([station(numbers[0])?, station(numbers[1])?])
+    }
+
+    /// The rows of a group: a channel each, where there is anything in it.
+    fn group(&self, group: &[u8], day: f64, rows: &mut Vec<Row>) -> Result<(), String> {
+        let layout = self.layout;
+        let before = rows.len();
+        for (channel, (place, frequency)) in
+            (0..).zip(layout.channels.iter().zip(&self.wavelengths))
+        {
+            let data = |start: &Option<usize>| match start {
+                Some(start) => self.datum(group, start + place.offset),
+                None => (Complex64::new(0.0, 0.0), f64::NAN),
+            };
+            let data = [0, 1, 2, 3].map(|k| data(&layout.products[k]));
+            if data.iter().all(|(_, sigma)| sigma.is_nan()) {
+                continue;
+            }
+            let mut row = match rows.get(before..).and_then(<[Row]>::first) {
+                Some(first) => *first,
+                None => match self.empty_row(group, day)? {
+                    Some(row) => row,
+                    None => return Ok(()),
+                },
+            };
+            let seconds = [layout.u, layout.v].map(|p| layout.parameter(group, p));
+            row.uv = seconds.map(|x| x * frequency);
+            if row.uv.iter().any(|x| !x.is_finite()) {
+                return Err(format!("(u, v) {:?}: not finite", row.uv));
+            }
+            row.products = data.map(|(value, _)| value);
+            row.noise_sigma = data.map(|(_, sigma)| sigma);
+            row.channel = channel;
+            rows.push(row);
+        }
+        Ok(())
+    }
+
+    /// What all channels of a group have in common, unless it is of a station with itself.
+    fn empty_row(&self, group: &[u8], day: f64) -> Result<Option<Row>, String> {
+        let layout = self.layout;
+        let stations = self.stations(group)?;
+        if stations[0] == stations[1] {
+            return Ok(None);
+        }
+        let value = |parameter| layout.parameter(group, parameter);
+        let [date, fraction] = self.date(group);
+        let time_h = ((date - day) + fraction) * 24.0;
+        if !time_h.is_finite() {
+            return Err(format!("time {time_h} h: not finite"));
+        }
+        let positive = |x: f64| if x.is_finite() && x > 0.0 { x } else { 0.0 };
+        let opacity = layout.opacity.map_or([0.0; 2], |both| both.map(|p| positive(value(p))));
+        Ok(Some(Row {
+            time_h,
+            integration_s: positive(layout.integration.map_or(0.0, value)),
+            stations,
+            uv: [0.0; 2],
+            products: [Complex64::new(0.0, 0.0); 4],
+            noise_sigma: [f64::NAN; 4],
+            opacity: opacity.map(|tau| tau as f32),
+            channel: 0,
+        }))
+    }
+
+    /// A visibility and its σ = 1/√weight; NaN where there is none.
+    fn datum(&self, group: &[u8], index: usize) -> (Complex64, f64) {
+        let [re, im, weight] = self.layout.datum(group, index);
+        if re.is_finite() && im.is_finite() && weight > 0.0 {
+            (Complex64::new(re, im), weight.sqrt().recip())
+        } else {
+            (Complex64::new(0.0, 0.0), f64::NAN)
+        }
+    }
+}
+
+/// Subarray and antenna numbers of a baseline's number (AIPS memo 117, section 3.1.2).
+fn decode_baseline(baseline: f64) -> (i64, [i64; 2]) {
+    let whole = baseline.floor();
+    let subarray = ((baseline - whole) * 100.0).round() as i64 + 1;
+    let whole = whole as i64;
+    if whole < 65536 {
+        (subarray, [whole / 256, whole % 256])
+    } else {
+        (subarray, [(whole - 65536) / 2048, (whole - 65536) % 2048])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paper_aips_memo_117_baselines() {
+        assert_eq!(decode_baseline(260.0), (1, [1, 4]));
+        assert_eq!(decode_baseline(f64::from(258.01f32)), (2, [1, 2]));
+        assert_eq!(decode_baseline(65536.0 + 2048.0 * 300.0 + 301.0), (1, [300, 301]));
+        decode_baseline(f64::NAN);
+        decode_baseline(-1e300);
+    }
+}

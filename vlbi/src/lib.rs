@@ -1,0 +1,32 @@
+//! What an array of radio telescopes sees of an image, and the files that arrays left.
+//!
+//! Data flow: [`mod@array`] (stations) → [`earth`] (sidereal time, projected baselines) →
+//! [`schedule`] (when, and which baselines) → [`observation`] (visibilities with errors) ↔ [`files`]. [`simulate`]
+//! fills them from images through an [`operator`], [`noise`] spoils them,
+//! [`products`] are what gains leave, [`polarimetry`] is about circular feeds, [`data_terms`] compare them with a model.
+//! Units are those of the field: metres, Jy, hours of UTC, wavelengths, degrees where a name says
+//! so.
+
+pub mod array;
+#[cfg(test)]
+mod conformance;
+pub mod data_terms;
+pub mod dirty_image;
+pub mod earth;
+mod error;
+pub mod files;
+pub mod gains;
+pub mod light_curve;
+pub mod noise;
+pub mod observation;
+pub mod operator;
+pub mod polarimetry;
+pub mod products;
+pub mod schedule;
+pub mod simulate;
+pub mod source;
+
+pub use error::Error;
+
+/// Complex number of double precision, as visibilities are kept.
+pub type Complex64 = num_complex::Complex<f64>;

@@ -1,0 +1,225 @@
+//! Coherent averages over time.
+
+use super::{Basis, Observation, Row};
+use crate::Complex64;
+use std::collections::BTreeMap;
+
+impl Observation {
+    /// Averages every baseline and channel over intervals of `seconds`, which start at multiples of their
+    /// length since 0 h UTC.
+    ///
+    /// Products are means weighted by 1/σ², so that σ of a mean is 1/√(Σ 1/σ²); times and (u, v)
+    /// are means weighted by integration time, which adds up. Products that were not measured
+    /// ([`Measured::is_placeholder`](super::Measured::is_placeholder)) do not count; where other errors are zero, means are plain and
+    /// σ is √(Σσ²)/n.
+    #[must_use]
+    pub fn averaged(&self, seconds: f64) -> Self {
+        let mut bins: BTreeMap<(i64, [u16; 2], u16), Vec<Row>> = BTreeMap::new();
+        for row in self.rows.iter().map(|row| self.ordered(row)) {
+            // Saturates for times beyond reason.
+            let bin = (row.time_h * 3600.0 / seconds).floor() as i64;
+            bins.entry((bin, row.stations, row.channel)).or_default().push(row);
+        }
+        let mut observation = self.clone_without_rows();
+        observation.rows = bins.values().map(|rows| mean(rows)).collect();
+        observation.history.push(format!("coherent averages over {seconds} s"));
+        observation
+    }
+
+    /// The same, with one time for all rows of an interval, the mean of theirs: baselines that were
+    /// measured in different parts of an interval belong to one scan, and close.
+    #[must_use]
+    pub fn averaged_in_scans(&self, seconds: f64) -> Self {
+        let mut observation = self.averaged(seconds);
+        // Means lie in their interval but for rounding, which must not tear a scan.
+        let bin = |row: &Row| (row.time_h * 3600.0 / seconds + 1e-6).floor() as i64;
+        for scan in observation.rows.chunk_by_mut(|a, b| bin(a) == bin(b)) {
+            let time_h = scan.iter().map(|row| row.time_h).sum::<f64>() / scan.len() as f64;
+            scan.iter_mut().for_each(|row| row.time_h = time_h);
+        }
+        observation
+    }
+
+    /// A row with its stations in the array's order.
+    fn ordered(&self, row: &Row) -> Row {
+        if row.stations[0] <= row.stations[1] { *row } else { row.swapped(self.basis) }
+    }
+
+    /// Averages every baseline and time over all spectral channels, with the same weights; (u, v)
+    /// are those of `frequency_hz`, as in eht-imaging. Without channels nothing changes.
+    #[must_use]
+    pub fn averaged_over_channels(&self) -> Self {
+        let mut observation = self.clone_without_rows();
+        let (Some(reference), false) = (self.frequency_hz, self.channels.is_empty()) else {
+            return self.clone();
+        };
+        // Bits of positive doubles are ordered as they are, those of negative ones consistently.
+        let mut bins: BTreeMap<(u64, [u16; 2]), Vec<Row>> = BTreeMap::new();
+        for mut row in self.rows.iter().map(|row| self.ordered(row)) {
+            let scale = self.frequency_of(&row).map_or(1.0, |frequency| reference / frequency);
+            row.uv = row.uv.map(|x| x * scale);
+            row.channel = 0;
+            bins.entry((row.time_h.to_bits(), row.stations)).or_default().push(row);
+        }
+        let mean_of = |rows: &Vec<Row>| {
+            let Row { time_h, integration_s, .. } = rows[0];
+            Row { time_h, integration_s, ..mean(rows) }
+        };
+        observation.rows = bins.values().map(mean_of).collect();
+        observation.channels.clear();
+        let count = self.channels.len();
+        observation.history.push(format!("mean of {count} spectral channels"));
+        observation.sort();
+        observation
+    }
+
+    /// The data with Stokes I as both parallel hands, RR = LL = I, each with σ√2: how the EHT
+    /// publishes total intensity. There are no cross hands.
+    #[must_use]
+    pub fn as_equal_hands(&self) -> Self {
+        let mut observation = self.clone_without_rows();
+        observation.basis = Basis::Circular;
+        let none = Complex64::new(0.0, 0.0);
+        observation.rows = self
+            .stokes_i()
+            .map(|(row, i)| {
+                let sigma = i.noise_sigma * core::f64::consts::SQRT_2;
+                Row {
+                    products: [i.visibility, i.visibility, none, none],
+                    noise_sigma: [sigma, sigma, f64::NAN, f64::NAN],
+                    ..*row
+                }
+            })
+            .collect();
+        observation
+    }
+}
+
+/// The mean of rows of one baseline.
+fn mean(rows: &[Row]) -> Row {
+    let total: f64 = rows.iter().map(|row| row.integration_s).sum();
+    let weight = |row: &Row| {
+        if total > 0.0 { row.integration_s / total } else { 1.0 / rows.len() as f64 }
+    };
+    let over_time = |value: fn(&Row) -> f64| rows.iter().map(|r| weight(r) * value(r)).sum::<f64>();
+    let mut result = Row {
+        time_h: over_time(|r| r.time_h),
+        integration_s: total,
+        uv: [over_time(|r| r.uv[0]), over_time(|r| r.uv[1])],
+        ..rows[0]
+    };
+    for k in 0..4 {
+        (result.products[k], result.noise_sigma[k]) = mean_product(rows, k);
+    }
+    result
+}
+
+fn mean_product(rows: &[Row], k: usize) -> (Complex64, f64) {
+    let all = || rows.iter().filter_map(|row| row.product(k));
+    // A mean of nothing but placeholders is one.
+    let only_placeholders = all().all(|m| m.is_placeholder());
+    let present = || all().filter(|m| only_placeholders || !m.is_placeholder());
+    let count = present().count();
+    if count == 0 {
+        return (Complex64::new(0.0, 0.0), f64::NAN);
+    }
+    if present().all(|m| m.noise_sigma > 0.0) {
+        let weight: f64 = present().map(|m| m.noise_sigma.powi(-2)).sum();
+        let sum: Complex64 = present().map(|m| m.visibility * m.noise_sigma.powi(-2)).sum();
+        return (sum / weight, weight.sqrt().recip());
+    }
+    let sum: Complex64 = present().map(|m| m.visibility).sum();
+    let variance: f64 = present().map(|m| m.noise_sigma.powi(2)).sum();
+    (sum / count as f64, variance.sqrt() / count as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Measured;
+    use super::*;
+
+    #[test]
+    fn exact_means_and_errors() {
+        let row = |time_h: f64, re: f64, noise_sigma: f64, stations: [u16; 2]| Row {
+            integration_s: 10.0,
+            ..Row::total_intensity(
+                time_h,
+                stations,
+                if stations[0] < stations[1] { [time_h, 0.0] } else { [-time_h, 0.0] },
+                Measured { visibility: Complex64::new(re, 1.0), noise_sigma },
+            )
+        };
+        let mut observation = Observation::empty(Basis::Stokes);
+        // Two rows of one minute, one of them with its stations exchanged; then the next minute.
+        observation.rows = vec![
+            row(1.001, 3.0, 1.0, [0, 1]),
+            row(1.003, 6.0, 0.5, [1, 0]),
+            row(1.02, 9.0, 1.0, [0, 1]),
+        ];
+        let rows = observation.averaged(60.0).rows;
+        assert_eq!(rows.len(), 2);
+        let i = rows[0].product(0).unwrap();
+        assert!((i.visibility - Complex64::new(27.0 / 5.0, -3.0 / 5.0)).norm() < 1e-15);
+        assert!((i.noise_sigma - 0.2f64.sqrt()).abs() < 1e-15);
+        assert!((rows[0].time_h - 1.002).abs() < 1e-15 && (rows[0].uv[0] - 1.002).abs() < 1e-15);
+        assert_eq!((rows[0].integration_s, rows[0].stations), (20.0, [0, 1]));
+        assert!(rows[0].noise_sigma[1].is_nan());
+    }
+
+    /// Of two scans, whose baselines were measured in different parts of them.
+    #[test]
+    fn exact_one_time_a_scan() {
+        let i = Measured { visibility: Complex64::new(1.0, 0.0), noise_sigma: 0.1 };
+        let row = |seconds: f64, stations| {
+            Row::total_intensity(seconds / 3600.0, stations, [1.0, 0.0], i)
+        };
+        let mut observation = Observation::empty(Basis::Stokes);
+        observation.rows =
+            vec![row(301.0, [0, 1]), row(590.0, [0, 2]), row(599.0, [1, 2]), row(601.0, [0, 1])];
+        let rows = observation.averaged_in_scans(300.0).rows;
+        let seconds: Vec<f64> = rows.iter().map(|row| row.time_h * 3600.0).collect();
+        let mean = (301.0 + 590.0 + 599.0) / 3.0;
+        for (found, expected) in seconds.iter().zip([mean, mean, mean, 601.0]) {
+            assert!((found - expected).abs() < 1e-9, "{seconds:?}");
+        }
+        assert!(rows[..3].iter().all(|row| row.time_h == rows[0].time_h));
+    }
+
+    /// Hands that were not measured change neither Stokes I nor a mean.
+    #[test]
+    fn exact_placeholders_do_not_count() {
+        let hand = |re: f64| Complex64::new(re, 0.0);
+        let row = |time_h: f64, rr: (f64, f64), ll: (f64, f64)| Row {
+            products: [hand(rr.0), hand(ll.0), hand(0.0), hand(0.0)],
+            noise_sigma: [rr.1, ll.1, 0.0, f64::NAN],
+            ..Row::total_intensity(
+                time_h,
+                [0, 1],
+                [1.0, 0.0],
+                Measured { visibility: hand(0.0), noise_sigma: 1.0 },
+            )
+        };
+        let one = row(1.001, (3.0, 0.3), (0.0, 0.0)).stokes_i(Basis::Circular).unwrap();
+        assert_eq!((one.visibility.re, one.noise_sigma), (3.0, 0.3));
+        assert!(row(1.0, (0.0, 0.0), (0.0, 0.0)).stokes_i(Basis::Circular).is_none());
+        let mut observation = Observation::empty(Basis::Circular);
+        observation.rows =
+            vec![row(1.001, (3.0, 0.3), (0.0, 0.0)), row(1.002, (3.0, 0.3), (1.0, 0.4))];
+        let mean = observation.averaged(60.0).rows[0];
+        let [rr, ll] = mean.parts_of_i(Basis::Circular).map(Option::unwrap);
+        assert!((rr.noise_sigma - 0.3 / 2f64.sqrt()).abs() < 1e-15);
+        assert_eq!((ll.visibility.re, ll.noise_sigma), (1.0, 0.4));
+        assert!(mean.product(2).unwrap().is_placeholder() && mean.product(3).is_none());
+    }
+
+    #[test]
+    fn exact_equal_hands_give_stokes_i_back() {
+        let mut observation = Observation::empty(Basis::Stokes);
+        let i = Measured { visibility: Complex64::new(0.25, -0.5), noise_sigma: 0.03 };
+        observation.rows = vec![Row::total_intensity(1.0, [0, 1], [1.0, 2.0], i)];
+        let hands = observation.as_equal_hands();
+        let back = hands.rows[0].stokes_i(hands.basis).unwrap();
+        assert_eq!(back.visibility, i.visibility);
+        assert!((back.noise_sigma - 0.03).abs() < 1e-16);
+    }
+}

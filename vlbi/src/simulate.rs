@@ -1,0 +1,224 @@
+//! A movie through an array: what [`schedule::observe`](super::schedule::observe) lays out, filled
+//! with the visibilities of images.
+
+use super::Complex64;
+use super::observation::{Basis, Observation};
+use super::operator::{ImageGrid, Method, Operator, Pulse, Transform};
+use crate::Error;
+use core::ops::Range;
+use kerrlight_common::frames::Frames;
+use kerrlight_common::memory;
+use std::borrow::Cow;
+
+/// Exponentials up to this many bytes are kept while a movie is transformed.
+const MEMORY: usize = 256 << 20;
+
+/// Images in Jy/pixel that follow each other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Movie {
+    /// Where pixels are.
+    pub grid: ImageGrid,
+    /// Jy per pixel: image after image, row by row from the north, each row from the east.
+    pub pixels: Vec<f64>,
+}
+
+impl Movie {
+    /// How many images.
+    pub fn frames(&self) -> usize {
+        self.pixels.len() / self.grid.pixels().max(1)
+    }
+}
+
+/// Sets the visibilities of unpolarised emission. Image k shows the source at `times_h[k]` (hours
+/// of UTC, increasing); between two images it is the linear interpolation of both, which is that of
+/// their visibilities. An only image is seen always, and its time does not matter. Says which
+/// transform it has taken.
+///
+/// # Errors
+/// If the accuracy of the transform is out of range, the number of images is not that of times, times do not increase, or a row lies before the
+/// first or after the last image.
+pub fn fill(
+    observation: &mut Observation,
+    movie: &Movie,
+    pulse: Pulse,
+    times_h: &[f64],
+    method: Method,
+) -> Result<String, Error> {
+    let shares = shares(observation, movie.frames(), times_h)?;
+    let all = || Ok(Cow::Borrowed(&movie.pixels[..]));
+    let (operator, visibilities) = seen(observation, &shares, (movie.grid, pulse, method), all)?;
+    add(observation, &shares, visibilities);
+    Ok(operator.describe())
+}
+
+/// The same of images that need not be in memory, by direct sums.
+///
+/// # Errors
+/// As those of [`fill`], or if an image cannot be read.
+pub fn fill_from(
+    observation: &mut Observation,
+    (grid, movie): (ImageGrid, &Frames<f64>),
+    pulse: Pulse,
+    times_h: &[f64],
+) -> Result<(), Error> {
+    let shares = shares(observation, movie.count(), times_h)?;
+    let mut visibilities = Vec::new();
+    for first in (0..movie.count()).step_by(AT_A_TIME) {
+        let range = first..(first + AT_A_TIME).min(movie.count());
+        let some = || some_of(movie, range.clone());
+        let how = (grid, pulse, Method::Direct);
+        visibilities.extend(seen(observation, &shares[range.clone()], how, some)?.1);
+    }
+    add(observation, &shares, visibilities);
+    Ok(())
+}
+
+/// Images that are transformed together.
+const AT_A_TIME: usize = 16;
+
+fn some_of(movie: &Frames<f64>, range: Range<usize>) -> Result<Cow<'static, [f64]>, Error> {
+    let mut some = Vec::with_capacity(range.len() * movie.pixels());
+    for frame in range {
+        some.extend_from_slice(&movie.image(frame)?);
+    }
+    Ok(some.into())
+}
+
+/// Rows that see an image, each with its share.
+type Shares = Vec<(usize, f64)>;
+
+/// The shares of all images.
+fn shares(observation: &Observation, frames: usize, times_h: &[f64]) -> Result<Vec<Shares>, Error> {
+    check(frames, times_h)?;
+    let mut shares: Vec<Shares> = vec![Vec::new(); frames];
+    for (index, row) in observation.rows.iter().enumerate() {
+        for (frame, weight) in neighbours(times_h, row.time_h)? {
+            shares[frame].push((index, weight));
+        }
+    }
+    Ok(shares)
+}
+
+/// What the rows see of images, image after image.
+fn seen<'p>(
+    observation: &Observation,
+    shares: &[Shares],
+    (grid, pulse, method): (ImageGrid, Pulse, Method),
+    pixels: impl FnOnce() -> Result<Cow<'p, [f64]>, Error>,
+) -> Result<(Transform<f64>, Vec<Complex64>), Error> {
+    let uv_of = |shares: &Shares| shares.iter().map(|(row, _)| observation.rows[*row].uv).collect();
+    let uv: Vec<Vec<[f64; 2]>> = shares.iter().map(uv_of).collect();
+    let memory = MEMORY.min(memory::part(1.0 / 8.0) as usize);
+    let operator = Transform::<f64>::new(grid, pulse, &uv, method, memory)?;
+    let mut visibilities = vec![Complex64::new(0.0, 0.0); operator.data()];
+    operator.forward(&pixels()?, &mut visibilities);
+    Ok((operator, visibilities))
+}
+
+/// Sets the rows to the sums of their shares.
+fn add(observation: &mut Observation, shares: &[Shares], visibilities: Vec<Complex64>) {
+    let none = Complex64::new(0.0, 0.0);
+    observation.rows.iter_mut().for_each(|row| row.products = [none; 4]);
+    for ((row, weight), v) in shares.iter().flatten().zip(visibilities) {
+        let products = &mut observation.rows[*row].products;
+        products[0] += v * weight;
+        if observation.basis == Basis::Circular {
+            products[1] += v * weight;
+        }
+    }
+}
+
+/// Sets the visibilities of linearly polarised emission from images of I, Q and U: RR = LL = I, RL = Q + iU, LR = Q − iU.
+/// Otherwise as [`fill`].
+///
+/// # Errors
+/// As [`fill`], or if the observation's products are not those of circular feeds.
+pub fn fill_polarized(
+    observation: &mut Observation,
+    [i, q, u]: [&Movie; 3],
+    pulse: Pulse,
+    times_h: &[f64],
+    method: Method,
+) -> Result<String, Error> {
+    if observation.basis != Basis::Circular {
+        let allowed = "those of circular feeds: RR, LL, RL, LR";
+        return Err(Error::out_of_range("products of the observation", 0.0, allowed));
+    }
+    let mut of = |movie: &Movie| -> Result<Vec<Complex64>, Error> {
+        fill(observation, movie, pulse, times_h, method)?;
+        Ok(observation.rows.iter().map(|row| row.products[0]).collect())
+    };
+    let (q, u) = (of(q)?, of(u)?);
+    let how = fill(observation, i, pulse, times_h, method)?;
+    for ((row, q), u) in observation.rows.iter_mut().zip(q).zip(u) {
+        let turned = Complex64::new(0.0, 1.0) * u;
+        (row.products[2], row.products[3]) = (q + turned, q - turned);
+    }
+    Ok(how)
+}
+
+fn check(frames: usize, times_h: &[f64]) -> Result<(), Error> {
+    let range = |name, value, allowed| Err(Error::out_of_range(name, value, allowed));
+    if frames == 0 || frames != times_h.len() {
+        return range("number of images", frames as f64, "1 at least, and as many as times");
+    }
+    if let Some(time) = times_h.iter().find(|time| !time.is_finite()) {
+        return range("time of an image", *time, "finite");
+    }
+    if let Some(pair) = times_h.windows(2).find(|pair| pair[0] >= pair[1]) {
+        return range("time of an image", pair[1], "hours later than the image before");
+    }
+    Ok(())
+}
+
+/// The images that a time lies between, with their weights; one where it is that of an image.
+fn neighbours(times_h: &[f64], time_h: f64) -> Result<impl Iterator<Item = (usize, f64)>, Error> {
+    let after = times_h.partition_point(|time| *time <= time_h);
+    let weight = match (times_h.get(after.wrapping_sub(1)), times_h.get(after)) {
+        _ if times_h.len() == 1 => 0.0,
+        (Some(before), Some(after)) => (time_h - before) / (after - before),
+        (Some(last), None) if *last == time_h => 0.0,
+        _ => {
+            let allowed = "hours from the first image to the last";
+            return Err(Error::out_of_range("time of a scan", time_h, allowed));
+        }
+    };
+    let before = after.saturating_sub(1);
+    Ok([(before, 1.0 - weight), (before + 1, weight)].into_iter().filter(|(_, w)| *w > 0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observation::{Measured, Row};
+
+    #[test]
+    fn exact_images_go_to_their_scans() {
+        let grid = ImageGrid::new(1, 1, 1e-10).unwrap();
+        let i = Measured { visibility: Complex64::new(0.0, 0.0), noise_sigma: 1.0 };
+        let rows = [2.0, 1.0, 2.0].map(|time| Row::total_intensity(time, [0, 1], [1e9, 0.0], i));
+        let mut observation =
+            Observation { rows: rows.to_vec(), ..Observation::empty(Basis::Stokes) };
+        let mut movie = Movie { grid, pixels: vec![3.0, 5.0] };
+        fill(&mut observation, &movie, Pulse::Delta, &[1.0, 2.0], Method::Direct).unwrap();
+        let found: Vec<f64> = observation.rows.iter().map(|row| row.products[0].re).collect();
+        assert_eq!(found, [5.0, 3.0, 5.0]);
+        fill(&mut observation, &movie, Pulse::Delta, &[0.0, 4.0], Method::Fast(1e-12)).unwrap();
+        let found: Vec<f64> = observation.rows.iter().map(|row| row.products[0].re).collect();
+        let error = |(a, b): (&f64, f64)| (a - b).abs();
+        assert!(found.iter().zip([4.0, 3.5, 4.0]).map(error).all(|e| e < 1e-11), "{found:?}");
+        let mut fail = |times: &[f64]| {
+            fill(&mut observation, &movie, Pulse::Delta, times, Method::Direct)
+                .unwrap_err()
+                .to_string()
+        };
+        assert!(fail(&[1.0, 1.5]).contains("time of a scan = 2 "));
+        assert!(fail(&[1.5, 2.0]).contains("time of a scan = 1 "));
+        assert!(fail(&[2.0, 1.0]).contains("time of an image = 1 "));
+        assert!(fail(&[1.0, f64::NAN]).contains("time of an image = NaN"));
+        assert!(fail(&[1.0]).contains("number of images = 2"));
+        movie.pixels.truncate(1);
+        fill(&mut observation, &movie, Pulse::Delta, &[99.0], Method::Direct).unwrap();
+        assert_eq!(observation.rows[0].products[0].re, 3.0);
+    }
+}
