@@ -135,9 +135,9 @@ fn hand_sigmas(first: [f64; 2], second: [f64; 2], setup: &Setup) -> [f64; 4] {
 /// [`noise`](super::noise) spoils them.
 ///
 /// ```
-/// use crate::array::built_in;
-/// use crate::earth::{Frame, SourcePosition, Ut1};
-/// use crate::schedule::{Clock, Schedule, Setup, observe};
+/// use kerrlight_vlbi::array::built_in;
+/// use kerrlight_vlbi::earth::{Frame, SourcePosition, Ut1};
+/// use kerrlight_vlbi::schedule::{Clock, Schedule, Setup, observe};
 ///
 /// let array = built_in("EHT2017").unwrap();
 /// let schedule =

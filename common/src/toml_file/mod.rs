@@ -24,7 +24,7 @@ use toml_edit::{DocumentMut, Item};
 ///
 /// # Examples
 /// ```
-/// # use crate::toml_file;
+/// # use kerrlight_common::toml_file;
 /// #[derive(Debug, serde::Deserialize)]
 /// struct Hole { spin: f64 }
 /// #[derive(Debug, serde::Deserialize)]

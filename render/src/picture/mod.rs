@@ -275,8 +275,8 @@ pub struct Rendered {
 /// journal instead, for pictures that are larger than memory or that must survive a crash.
 ///
 /// ```
-/// use crate::picture::render;
-/// use crate::scene::Scene;
+/// use kerrlight_render::picture::render;
+/// use kerrlight_render::scene::Scene;
 ///
 /// let scene = Scene::parse(r#"
 ///     hole = { spin = 0.0, mass_msun = 6.5e9, distance_kpc = 16800.0 }

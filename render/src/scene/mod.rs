@@ -38,7 +38,7 @@ use serde::{Deserialize, Serialize};
 /// picture, [`PreparedScene`](crate::transport::PreparedScene) answers for single rays.
 ///
 /// ```
-/// use crate::scene::{Scene, apply_override};
+/// use kerrlight_render::scene::{Scene, apply_override};
 ///
 /// let text = r#"
 ///     hole = { spin = 0.9 }

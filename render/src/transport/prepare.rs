@@ -27,8 +27,8 @@ use std::sync::Arc;
 /// [`Scratch`](super::Scratch). Intensities are in scene units, radii and delays in M.
 ///
 /// ```
-/// use crate::scene::Scene;
-/// use crate::transport::{PreparedScene, Scratch};
+/// use kerrlight_render::scene::Scene;
+/// use kerrlight_render::transport::{PreparedScene, Scratch};
 ///
 /// let scene = Scene::parse(r#"
 ///     hole = { spin = 0.9 }

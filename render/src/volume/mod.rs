@@ -27,7 +27,7 @@ pub use panels::Shown;
 /// per unit of affine parameter at single precision, 4 bytes a node; z varies fastest.
 ///
 /// ```
-/// use crate::volume::{Volume, metrics};
+/// use kerrlight_render::volume::{Volume, metrics};
 ///
 /// // e = x + 2 on 3 × 3 × 3 nodes from −1 M to 1 M.
 /// let values: Vec<f32> = (0..27).map(|k| (k / 9) as f32 + 1.0).collect();

@@ -24,8 +24,8 @@ pub use kerrlight_common::simd::Float;
 /// Lengths that do not fit together are bugs and panic.
 ///
 /// ```
-/// use crate::operator::{Dtft, ImageGrid, Operator, Pulse};
-/// use crate::Complex64;
+/// use kerrlight_vlbi::operator::{Dtft, ImageGrid, Operator, Pulse};
+/// use kerrlight_vlbi::Complex64;
 /// use kerrlight_common::units::MICROARCSECOND;
 ///
 /// // A source of 0.6 Jy in the middle pixel, seen on two baselines (u, v in wavelengths).
