@@ -357,5 +357,7 @@ pub fn read_log(path: &Path) -> anyhow::Result<String> {
 
 fn text_of(path: &Path, file: File) -> anyhow::Result<String> {
     let text = String::from_utf8(bytes_of(path, file)?);
-    text.with_context(|| format!("{} is not UTF-8 text", path.display()))
+    let text = text.with_context(|| format!("{} is not UTF-8 text", path.display()))?;
+    // Spreadsheets and editors of Windows put a byte order mark before it.
+    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }

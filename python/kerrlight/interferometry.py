@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, field, replace
 from os import PathLike, fspath
 from typing import Any, Union
@@ -257,11 +258,27 @@ class Observation:
         """Standard deviation of the real, and of the imaginary part of :attr:`vis` (Jy)."""
         return self._core.stokes_i()[1]
 
-    def averaged(self, seconds: float, *, in_scans: bool = False) -> Observation:
-        """Averages over intervals of so many seconds: of the clock, or from the start of each scan."""
-        if not (seconds > 0 and math.isfinite(seconds)):
-            raise ValueError(f"seconds = {seconds} is not allowed: above 0")
-        return Observation._of(self._core.averaged(float(seconds), in_scans))
+    def averaged(
+        self, seconds: float | None = None, *, in_scans: bool = False, weighted: bool = True
+    ) -> Observation:
+        """Coherent averages of every baseline, one time for all baselines of an interval, so that closure quantities are
+        kept.
+
+        Intervals start at multiples of ``seconds`` since 0 h UTC. ``in_scans`` averages whole scans, which end where
+        nothing was measured for a minute; with ``seconds``, pieces of at most that length from the start of each scan.
+
+        ``weighted`` means count by 1/σ²; otherwise they are plain, with σ = √(Σσ²)/n, which is what eht-imaging's
+        ``avg_coherent`` does. The time is the mean of those of the rows, where eht-imaging has the middle of the interval.
+
+        Raises ``ValueError`` where ``seconds`` is neither in [1e-3, 1e9] nor left out with ``in_scans``.
+        """
+        if seconds is None:
+            if not in_scans:
+                raise ValueError("seconds is missing: give it, or in_scans=True for averages of whole scans")
+            seconds = math.inf
+        elif seconds == math.inf:
+            raise ValueError("seconds = inf is not allowed: [1e-3, 1e9]")
+        return Observation._of(self._core.averaged(float(seconds), bool(in_scans), bool(weighted)))
 
     def total_intensity(self) -> Observation:
         """The same data as Stokes I alone."""
@@ -276,7 +293,19 @@ class Observation:
     def _closures(self, phases: bool, least_snr: float) -> Closures:
         found = self._core.closures(phases, float(least_snr))
         names = np.array([station.name for station in self.array] or [""], dtype=str)
-        return Closures(**{**found, "stations": names[found["stations"]]})
+        closures = Closures(**{**found, "stations": names[found["stations"]]})
+        what = "closure phases" if phases else "closure amplitudes"
+        repeats, of_scans = self._core.rows_that_do_not_close(phases)
+        if repeats:
+            text = f"{repeats} rows have the baseline, channel and time of another and make {what} of their own"
+            warnings.warn(f"{text}: averaged() merges them", stacklevel=3)
+        if of_scans is not None:
+            text = f"{len(closures)} {what}, where averages of scans have {of_scans}: baselines have times of their own"
+            warnings.warn(f"{text}, which averaged(in_scans=True) makes one", stacklevel=3)
+        elif not len(closures):
+            why = f"too few baselines are above {least_snr:g} sigma" if least_snr > 0 else "too few baselines share a time"
+            warnings.warn(f"there are no {what}: {why}", stacklevel=3)
+        return closures
 
     def closure_phases(self, least_snr: float = 0.0) -> Closures:
         """A largest set of independent closure phases of every scan, the least noisy first; baselines weaker than

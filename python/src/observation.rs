@@ -8,8 +8,8 @@ use kerrlight_tomo::interferometry::earth::SourcePosition;
 use kerrlight_tomo::interferometry::files::{
     EhtTable, decode, to_csv, to_eht_table, to_obs_text, write_uvfits,
 };
-use kerrlight_tomo::interferometry::observation::{Basis, Channel, Observation, Row};
-use kerrlight_tomo::interferometry::products::{ClosureKind, ClosureSet};
+use kerrlight_tomo::interferometry::observation::{Averaging, Basis, Channel, Observation, Row};
+use kerrlight_tomo::interferometry::products::{ClosureCount, ClosureKind, ClosureSet};
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -164,7 +164,7 @@ impl Visibilities {
                 "obs-text" => to_obs_text(observation).map(text),
                 "eht-csv" => to_eht_table(observation, EhtTable::Csv).map(text),
                 "eht-txt" => to_eht_table(observation, EhtTable::Txt).map(text),
-                _ => Ok(text(to_csv(observation, true))),
+                _ => to_csv(observation, true).map(text),
             }
         };
         Ok(PyBytes::new(py, &detached(py, work)?))
@@ -217,15 +217,34 @@ impl Visibilities {
         Ok((values.into_pyarray(py).into_any(), sigmas.into_pyarray(py).into_any()))
     }
 
-    /// Averaged over intervals of so many seconds, of the clock or of each scan.
-    fn averaged(&self, py: Python<'_>, seconds: f64, in_scans: bool) -> PyResult<Self> {
+    /// Averaged over intervals of so many seconds, of the clock or of each scan, weighted by 1/σ² or plain.
+    fn averaged(
+        &self,
+        py: Python<'_>,
+        seconds: f64,
+        in_scans: bool,
+        weighted: bool,
+    ) -> PyResult<Self> {
+        let averaging = Averaging { seconds, in_scans, weighted };
+        if !averaging.is_allowed() {
+            return Err(refused(format!("seconds = {seconds} is not allowed: [1e-3, 1e9]")));
+        }
         let of = &self.observation;
-        let work = || {
-            let average =
-                if in_scans { of.averaged_in_scans(seconds) } else { of.averaged(seconds) };
-            Ok::<_, Infallible>(average)
-        };
+        let work = || Ok::<_, Infallible>(of.averaged(averaging));
         Ok(Visibilities { observation: detached(py, work)? })
+    }
+
+    /// How many rows repeat the baseline, channel and time of another, and how many closure quantities averages of scans
+    /// have, if these are more.
+    fn rows_that_do_not_close(
+        &self,
+        py: Python<'_>,
+        phases: bool,
+    ) -> PyResult<(usize, Option<usize>)> {
+        let kind = if phases { ClosureKind::Phase } else { ClosureKind::LogAmplitude };
+        let of = &self.observation;
+        let count = || Ok::<_, Infallible>(ClosureCount::of(of, kind, 0.0).of_scans);
+        Ok((of.repeats().rows, detached(py, count)?))
     }
 
     /// As Stokes I alone.

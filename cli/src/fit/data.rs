@@ -164,6 +164,7 @@ fn visibilities<R>(
     let (_, observation) = interferometry::read(path)?;
     let (name, all) = (path.display().to_string(), observation.rows.len());
     let without = all - observation.stokes_i().count();
+    interferometry::warn_of_repeats(&name, &observation);
     let measured = of(observation, &name)?;
     if without > 0 {
         eprintln!("{name}: {without} of {all} rows have no parallel hands and are dropped");

@@ -5,6 +5,7 @@ mod axis_scan;
 mod band_plots;
 mod band_search;
 mod band_words;
+mod closures;
 mod curves;
 mod data;
 mod delegate;

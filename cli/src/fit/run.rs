@@ -4,6 +4,7 @@ mod record;
 
 use super::axis_scan;
 use super::band_search;
+use super::closures;
 use super::data;
 use super::delegate;
 use super::failed;
@@ -257,6 +258,9 @@ impl Run<'_> {
     /// What is fitted, and what to know of it beforehand.
     fn tell(&self, instrument: &Instrument) {
         eprintln!("{}", self.describe(instrument));
+        for used in closures::sentences(self.measured, &self.file.loss) {
+            eprintln!("{used}");
+        }
         let caution = setup::caution(self.file).map(str::to_owned);
         for note in caution.into_iter().chain(self.file.unknowns()) {
             eprintln!("note: {note}");

@@ -14,7 +14,7 @@ use crate::interferometry::data_terms::{
 };
 use crate::interferometry::observation::Observation;
 use crate::interferometry::operator::{Float, ImageGrid, Method, Transform};
-use crate::interferometry::products::ClosureKind;
+use crate::interferometry::products::{ClosureCount, ClosureKind};
 use crate::memory;
 
 impl Measured {
@@ -114,10 +114,27 @@ impl Measured {
         let scans: Vec<Option<Scan<T>>> =
             (0..self.times.len()).map(|frame| self.scan(frame, loss)).collect::<Result<_>>()?;
         if scans.iter().all(Option::is_none) {
-            refuse!("no frame has any {name}");
+            refuse!("no frame has any {name}{}", self.torn(loss));
         }
         let images = images(core::slice::from_ref(loss));
         Ok(ScanTerm::new(name, images * pixels, quadratic, scans))
+    }
+
+    /// Why there are no closure quantities where averages of scans have them.
+    fn torn(&self, loss: &Loss) -> String {
+        let kind = match loss.data {
+            LossKind::ClosurePhases => ClosureKind::Phase,
+            LossKind::LogClosureAmplitudes => ClosureKind::LogAmplitude,
+            _ => return String::new(),
+        };
+        let seen = self.visibilities.as_ref();
+        let count = seen.map(|(seen, _)| ClosureCount::of(seen, kind, 0.0));
+        let of_scans = count.and_then(|count| count.of_scans);
+        of_scans.map_or(String::new(), |of_scans| {
+            format!(
+                ", while averages of scans have {of_scans}: baselines of a scan have different times; set average_s"
+            )
+        })
     }
 
     /// The terms of losses of visibilities, of images of so many pixels, in any precision.

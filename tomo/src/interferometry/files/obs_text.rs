@@ -180,10 +180,11 @@ fn row(line: &str, names: &Names) -> Result<Row, String> {
 /// The observation as eht-imaging's text, numbers with all their digits.
 ///
 /// # Errors
-/// If the source's position, the date or the frequency is not known, or there are several spectral
-/// channels.
+/// If the source's position, the date or the frequency is not known, there are several spectral
+/// channels, or something is not a finite number.
 pub fn to_text(observation: &Observation) -> Result<String, Error> {
     super::one_channel(observation)?;
+    super::check_numbers(observation)?;
     let position =
         observation.position.ok_or(Unknown("the source's right ascension and declination"))?;
     let mjd = observation.mjd.ok_or(Unknown("the date (MJD)"))?;

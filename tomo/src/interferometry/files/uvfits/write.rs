@@ -1,7 +1,7 @@
 //! Writing: an IF a channel, four products, as eht-imaging, AIPS and CASA read it.
 
-use super::super::FileError;
 use super::super::fits::{Cards, padded};
+use super::super::{FileError, check_numbers};
 use super::{antenna_table, frequencies, w_coordinate};
 use crate::Error;
 use crate::interferometry::earth::SourcePosition;
@@ -54,6 +54,8 @@ pub fn write(observation: &Observation) -> Result<Vec<u8>, Error> {
     if observation.rows.iter().any(|row| usize::from(row.channel) >= listed) {
         return Err(FileError::whole("a row of a spectral channel that is not listed").into());
     }
+    check_numbers(observation)?;
+    check_precision(observation)?;
     let only_i = |row: &Row| row.noise_sigma[1..].iter().all(|sigma| sigma.is_nan());
     let mut observation = match observation.basis {
         Basis::Stokes if observation.rows.iter().all(only_i) => {
@@ -85,6 +87,25 @@ pub fn write(observation: &Observation) -> Result<Vec<u8>, Error> {
     )?);
     bytes.extend(frequencies::table(&facts.channels, facts.frequency_hz));
     Ok(bytes)
+}
+
+/// Refuses what single precision would turn into infinity, or into no datum: a weight 1/σ² of 0.
+fn check_precision(observation: &Observation) -> Result<(), FileError> {
+    let fits = |value: f64| (value as f32).is_finite();
+    for row in &observation.rows {
+        for (k, product) in (0..4).filter_map(|k| Some((k, row.product(k)?))) {
+            let [re, im, weight] = datum(row, k);
+            let sigma = product.noise_sigma;
+            if !(fits(re) && fits(im) && (sigma == 0.0 || fits(weight) && weight as f32 > 0.0)) {
+                let [a, b] = observation.names(row);
+                return Err(FileError::whole(format!(
+                    "{a}-{b} at {} h: visibility {:e} Jy with sigma {sigma:e} Jy: UVFITS has single precision",
+                    row.time_h, product.visibility
+                )));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Whether (u, v) came from single precision numbers in wavelengths, as some files have them: then
