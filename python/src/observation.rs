@@ -4,7 +4,7 @@ use crate::call::{detached, refused};
 use kerrlight_tomo::Error;
 use kerrlight_tomo::interferometry::Complex64;
 use kerrlight_tomo::interferometry::array::{FeedRotation, MOST_STATIONS, Station};
-use kerrlight_tomo::interferometry::earth::SourcePosition;
+use kerrlight_tomo::interferometry::earth::{self, SourcePosition, Ut1};
 use kerrlight_tomo::interferometry::files::{
     EhtTable, decode, to_csv, to_eht_table, to_obs_text, write_uvfits,
 };
@@ -17,7 +17,21 @@ use std::convert::Infallible;
 
 /// Adds the class of this module.
 pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(hours_utc_of_gmst, module)?)?;
     module.add_class::<Visibilities>()
+}
+
+/// Hours of UTC since 0 h of a day, of hours of Greenwich mean sidereal time of which `first` is the first one.
+#[pyfunction]
+fn hours_utc_of_gmst<'py>(
+    py: Python<'py>,
+    mjd: i32,
+    hours: PyReadonlyArray1<'py, f64>,
+    first: f64,
+) -> PyResult<Bound<'py, PyAny>> {
+    let utc = |hour: &f64| earth::hours_utc_of_gmst(mjd, *hour, first, Ut1::Table);
+    let all: Result<Vec<f64>, Error> = hours.as_slice()?.iter().map(utc).collect();
+    Ok(all.map_err(refused)?.into_pyarray(py).into_any())
 }
 
 /// An observation.
