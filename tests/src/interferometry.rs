@@ -383,3 +383,24 @@ fn bad_input_is_refused_and_nothing_is_written() {
     assert!(fail(&["convert", "image.csv", "b.uvfits"]).contains("time_utc_h"));
     assert!(fail(&["convert", "nothing.uvfits", "b.uvfits"]).contains("No such file"));
 }
+
+/// Baselines that begin one after the other: averages have one time, and close.
+#[test]
+fn regress_averages_of_staggered_baselines_close() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let mut text = "time_utc_h,t1,t2,u,v,re,im,sigma\n".to_owned();
+    for (k, pair) in ["A,B", "A,C", "A,D", "B,C", "B,D", "C,D"].into_iter().enumerate() {
+        for time in 0..5 {
+            let hours = 4.0 + (10.0 * f64::from(time) + k as f64) / 3600.0;
+            text += &format!("{hours},{pair},1e9,2e9,0.5,0.1,0.01\n");
+        }
+    }
+    std::fs::write(path.join("a.csv"), text).unwrap();
+    succeed(path, &["convert", "a.csv", "mean.csv", "--average", "600"]);
+    let mean = read(path, "mean.csv");
+    assert!(mean.rows.len() == 6 && mean.rows.iter().all(|row| row.time_h == mean.rows[0].time_h));
+    let closures = |kind| ClosureSet::of(&mean, kind, 0.0)[0].closures.len();
+    assert_eq!([ClosureKind::Phase, ClosureKind::LogAmplitude].map(closures), [3, 2]);
+    assert!((mean.rows[0].noise_sigma[0] - 0.01 / 5f64.sqrt()).abs() < 1e-15);
+}

@@ -87,7 +87,7 @@ impl Observation {
         };
         // Bits of positive doubles are ordered as they are, those of negative ones consistently.
         let mut bins: BTreeMap<(u64, [u16; 2]), Vec<Row>> = BTreeMap::new();
-        for mut row in self.rows.iter().map(|row| self.ordered(row)) {
+        for mut row in self.with_repeats_merged().rows.iter().map(|row| self.ordered(row)) {
             let scale = self.frequency_of(&row).map_or(1.0, |frequency| reference / frequency);
             row.uv = row.uv.map(|x| x * scale);
             row.channel = 0;
