@@ -101,12 +101,14 @@ pub fn frames_of(observation: &mut Observation) -> (Vec<f64>, Vec<usize>) {
 mod tests {
     use super::*;
     use crate::interferometry::Complex64;
+    use crate::interferometry::array::Station;
     use crate::interferometry::observation::{Basis, Measured};
     use crate::interferometry::products::{ClosureKind, ClosureSet};
 
     /// Three stations that see 1 Jy at these seconds, baselines a hundredth of a second apart.
     fn triangles(seconds: &[f64]) -> Observation {
         let mut observation = Observation::empty(Basis::Stokes);
+        observation.stations = ["A", "B", "C"].map(Station::named).to_vec();
         let i = Measured { visibility: Complex64::new(1.0, 0.0), noise_sigma: 0.1 };
         for time in seconds {
             for (k, stations) in [[0, 1], [2, 0], [1, 2]].into_iter().enumerate() {
@@ -138,7 +140,7 @@ mod tests {
             let mut observation = prepared(twice.clone(), &settings).unwrap();
             let (hours, _) = frames_of(&mut observation);
             assert_eq!((hours.len(), observation.rows.len()), (2, 6));
-            assert!(observation.rows.iter().all(|row| row.noise_sigma[0] == 0.1));
+            assert!(observation.rows.iter().all(|row| (row.noise_sigma[0] - 0.1).abs() < 1e-15));
             assert_eq!(ClosureSet::of(&observation, ClosureKind::Phase, 0.0).len(), 2);
         }
     }
