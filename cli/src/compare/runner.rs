@@ -9,6 +9,7 @@ use crate::interrupt::Keeper;
 use crate::lock::Lock;
 use crate::output::{self, Output};
 use crate::program::Program;
+use crate::threads;
 use anyhow::Context;
 use serde_json::Value;
 use std::fs::File;
@@ -157,7 +158,7 @@ impl<'a> Runner<'a> {
         let file =
             File::create(&said).with_context(|| format!("cannot write {}", said.display()))?;
         let child = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(file).spawn();
-        let status = wait(child.context("cannot start the fit")?, keeper)?;
+        let status = wait(child.map_err(|error| threads::no_process("the fit", &error))?, keeper)?;
         Ok((status, output::read_text(&said).unwrap_or_default()))
     }
 }

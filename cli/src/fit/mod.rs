@@ -97,7 +97,7 @@ impl Fit {
     /// Fits.
     pub fn run(&self, registry: &Registry) -> anyhow::Result<Answer> {
         if self.stop_with_input {
-            interrupt::follow_parent();
+            interrupt::follow_parent()?;
         }
         if let Some(rank @ (1.., _)) = ranks::this() {
             return self.help(rank, registry);
