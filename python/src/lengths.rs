@@ -3,7 +3,7 @@
 use crate::call::{detached, refused};
 use crate::rays::Place;
 use kerrlight_geodesic::quadrature::gauss_legendre;
-use kerrlight_geodesic::{Error, Kerr, Observer, Path, Quantities, Tracer};
+use kerrlight_geodesic::{Error, Kerr, Observer, Path, Quantities, Tracer, interrupt};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use rayon::prelude::*;
@@ -28,6 +28,9 @@ fn path_lengths<'py>(
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let (hole, observer) = (Kerr::new(spin).map_err(refused)?, place.observer()?);
     let (alpha, beta) = (screen.0.as_slice()?, screen.1.as_slice()?);
+    if alpha.len() != beta.len() {
+        return Err(refused(format!("{} of beta for {} of alpha", beta.len(), alpha.len())));
+    }
     let work = || along(&hole, &observer, alpha, beta, samples);
     Ok(detached(py, work)?.into_pyarray(py))
 }
@@ -45,6 +48,7 @@ fn along(
     rows.try_for_each_init(Path::new, |path, (row, (alpha, beta))| {
         let ray = observer.ray(hole, *alpha, *beta)?;
         tracer.trace(hole, &ray, Quantities::POLAR, path);
+        interrupt::check();
         if !path.outcome().is_unresolved() {
             fill(hole, path, observer.inverse_radius(), &rule, row);
         }
