@@ -4,7 +4,7 @@ use super::cases::{Case, Status};
 use super::labels::RESULTS;
 use crate::checksum::is_whole;
 use crate::file_sums::FileSums;
-use crate::fit::{Inputs, posterior};
+use crate::fit::{Inputs, from_folder, posterior};
 use crate::interrupt::Keeper;
 use crate::lock::Lock;
 use crate::output::{self, Output};
@@ -129,7 +129,8 @@ impl<'a> Runner<'a> {
     ) -> anyhow::Result<(ExitStatus, String)> {
         // Paths in it start from the root.
         let settings = self.folder.join(format!("{}.toml", case.slug));
-        let text = case.settings().unwrap_or_default();
+        // Paths start from the root: a case is the same bytes in any folder.
+        let text = from_folder(&case.settings().unwrap_or_default(), Path::new("/"));
         Output::new(&settings, "toml")?.write(text.as_bytes())?;
         let mut command = self.program.again()?;
         command.args(["fit", "--stop-with-input"]);
