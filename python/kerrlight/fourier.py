@@ -34,6 +34,7 @@ class Fourier(_Linear):
     """
 
     is_complex = True
+    _again = _core.Fourier
 
     def __init__(
         self,
@@ -51,7 +52,8 @@ class Fourier(_Linear):
         counts = [len(frame) for frame in frames]
         flat = np.ascontiguousarray(np.concatenate(frames)).reshape(-1)
         screen = (width, height, float(field_uas))
-        self._core = _core.Fourier(screen, pulse, flat, counts, accuracy)
+        self._made = (screen, pulse, flat, counts, accuracy)
+        self._core = self._again(*self._made)
         self.input_shape = (height, width) if alone else (len(frames), height, width)
         self.output_shape = (sum(counts),)
 

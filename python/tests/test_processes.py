@@ -1,7 +1,9 @@
 """Forks, signals, and copies that go to other processes."""
 
+import copy
 import multiprocessing
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -11,7 +13,7 @@ import time
 import numpy as np
 import pytest
 
-from kerrlight import ForwardModel, Infall, Kerr, render, screen
+from kerrlight import ForwardModel, Fourier, Infall, Kerr, Observation, render, screen
 
 OBSERVER = Kerr(0.9).observer(inclination_deg=60, radius=1000)
 ALPHA = np.linspace(-8, 8, 3000)
@@ -55,6 +57,28 @@ def test_exact_ctrl_c_stops_long_calls_within_a_second(kind):
         calls[kind]()
     assert time.monotonic() - pressed[0] < 1.0
     assert OBSERVER.trace(8.0, 0.0).escaped  # and later calls go on
+
+
+@pytest.mark.parametrize("how", [copy.copy, copy.deepcopy, lambda of: pickle.loads(pickle.dumps(of))])
+def test_exact_copies_give_the_same_results(how):
+    drawn = np.random.default_rng(1)
+    model = ForwardModel(OBSERVER, *screen(8, 20.0), r_min=3.0, r_max=8.0, times=[0.0, 10.0])
+    fourier = Fourier((8, 8), 100.0, [[1e9, 2e9], [3e9, -1e9]])
+    for linear in (model, model.at([1]), model.voxels(6, 8.0), fourier):
+        values = drawn.uniform(size=linear.input_shape)
+        np.testing.assert_array_equal(how(linear).apply(values), linear.apply(values))
+    names = [["AA", "LM"], ["AA", "PV"], ["LM", "PV"]]
+    uv = [[1e9, 2e9], [3e9, -1e9], [2e9, -3e9]]
+    obs = Observation.of_stokes_i([4.0] * 3, names, uv, [1 + 1j, 0.5, -0.2j], 0.01, mjd=57850)
+    copied = how(obs)
+    assert (copied.mjd, copied.array) == (obs.mjd, obs.array)
+    np.testing.assert_array_equal(copied.products, obs.products)
+    np.testing.assert_array_equal(copied.closure_phases().value, obs.closure_phases().value)
+    picture = render(set=SMALL)
+    copied = how(picture)
+    assert list(copied) == list(picture) and copied.summary == picture.summary
+    np.testing.assert_array_equal(copied["intensity"], picture["intensity"])
+    assert copied._core.exr() == picture._core.exr() and copied._core.png() == picture._core.png()
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of Linux")
