@@ -25,6 +25,11 @@ def real(name: str, value: Any) -> Floats:
     return np.asarray(array, dtype=np.float64)
 
 
+def flat(array: NDArray[Any]) -> NDArray[Any]:
+    """All elements as a column for the compiled half. Arrays of other processes may lie across words of memory."""
+    return np.require(array, requirements=["C", "A"]).reshape(-1)
+
+
 def finite(name: str, value: Any) -> Floats:
     """The same without infinities and what is no number."""
     array = real(name, value)
@@ -85,4 +90,4 @@ def together(**values: Any) -> tuple[tuple[int, ...], list[Floats]]:
     except ValueError:
         shapes = " and ".join(str(array.shape) for array in arrays.values())
         raise ValueError(f"{' and '.join(arrays)} have shapes {shapes}, which do not broadcast") from None
-    return broad[0].shape, [np.ascontiguousarray(array).reshape(-1) for array in broad]
+    return broad[0].shape, [flat(array) for array in broad]

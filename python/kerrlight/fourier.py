@@ -64,7 +64,7 @@ class Fourier(_Linear):
 
     def vjp(self, cotangent: ArrayLike) -> Floats:
         """The adjoint under the inner product Re Σ x̄ y: from dL/dRe V + i dL/dIm V to dL/dpixel."""
-        data = np.ascontiguousarray(cotangent, dtype=np.complex128)
+        data = np.require(cotangent, np.complex128, ["C", "A"])
         if data.shape != self.output_shape:
             raise ValueError(f"cotangent has the shape {data.shape}, not {self.output_shape}")
         return self._core.vjp(data).reshape(self.input_shape)

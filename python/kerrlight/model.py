@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from kerrlight import _core
-from kerrlight._arrays import Floats, finite, real, together, whole
+from kerrlight._arrays import Floats, finite, flat, real, together, whole
 from kerrlight.flow import Keplerian, Law, PolarizationLaw, Velocity
 from kerrlight.rays import Observer
 
@@ -51,7 +51,7 @@ def precision(name: str, value: Any, shape: tuple[int, ...]) -> NDArray[Any]:
         array = real(name, value)
     if array.shape != shape:
         raise ValueError(f"{name} has the shape {array.shape}, not {shape}")
-    return np.ascontiguousarray(array).reshape(-1)
+    return flat(array)
 
 
 class _Linear:

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerrlight import _core
-from kerrlight._arrays import Floats, degrees, radians, together, whole
+from kerrlight._arrays import Floats, degrees, flat, radians, together, whole
+from kerrlight._arrays import flat as flatten
 from kerrlight.table import Outcome, Points, Rays
 
 __all__ = [
@@ -299,7 +300,7 @@ class Observer:
                 raise ValueError(f"points = {points} is not allowed: 1 to 1000000")
             return Curve(**_core.critical_curve(self.hole.spin, self._place, points))
         column = radians("angles", angles)
-        flat = np.ascontiguousarray(column).reshape(-1)
+        flat = flatten(column)
         columns = _core.critical_points(self.hole.spin, self._place, flat)
         return Curve(**{name: values.reshape(column.shape) for name, values in columns.items()})
 
@@ -317,7 +318,7 @@ class Observer:
         if not 0 <= order <= 65535:
             raise ValueError(f"order = {order} is not allowed: 0 to 65535")
         column = radians("angles", angles)
-        flat = np.ascontiguousarray(column).reshape(-1)
+        flat = flatten(column)
         edges = _core.band(self.hole.spin, self._place, order, flat)
 
         def edge(name: str) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kerrlight import _core
-from kerrlight._arrays import Floats, degrees, whole
+from kerrlight._arrays import Floats, degrees, flat, whole
 
 __all__ = ["Volume"]
 
@@ -90,7 +90,7 @@ class Volume:
         if not all(map(math.isfinite, numbers)):
             raise ValueError(f"azimuth_deg, elevation_deg, hole_radius = {numbers} is not allowed: finite numbers")
         corners = (list(self.emission.shape), self.low.tolist(), self.high.tolist())
-        emission = np.ascontiguousarray(self.emission, dtype=np.float32).reshape(-1)
+        emission = flat(np.asarray(self.emission, dtype=np.float32))
         image = _core.view(corners, emission, numbers[:2], (side, numbers[2]), int(pixels))
         return image.reshape(pixels, pixels)
 

@@ -227,3 +227,12 @@ def test_exact_angles_in_the_other_unit_are_told():
 def test_exact_crossings_are_checked():
     with pytest.raises(ValueError, match="crossings = 1000000000"):
         Kerr(0.5).observer(inclination_deg=30).trace(1.0, 1.0, crossings=10**9)
+
+
+def test_exact_arrays_that_lie_across_words_are_taken():
+    # As dask hands over what came from another process.
+    alpha = np.frombuffer(b"\0" + np.linspace(-8, 8, 5).tobytes(), offset=1)
+    assert not alpha.flags.aligned
+    observer = Kerr(0.5).observer(inclination_deg=30)
+    np.testing.assert_array_equal(observer.trace(alpha, 1.0).outcome, observer.trace(alpha.copy(), 1.0).outcome)
+    observer.critical_curve(angles=alpha), observer.band(1, alpha)

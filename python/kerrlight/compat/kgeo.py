@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerrlight import _core
-from kerrlight._arrays import Floats, column, radians, together, whole
+from kerrlight._arrays import Floats, column, flat, radians, together, whole
 from kerrlight.rays import MOST_CROSSINGS, Kerr, Observer
 
 __all__ = ["Geodesics", "r_equatorial", "raytrace_ana", "rho_of_req", "u_kep"]
@@ -246,8 +246,8 @@ def raytrace_ana(
     ngeo = whole("ngeo", ngeo, 1, 10**6)
     if maxtaufrac < MAXTAUFRAC:
         spacing = (ngeo, float(maxtaufrac))
-        flat = _core.path_points(observer.hole.spin, observer._place, (alpha, beta), spacing)
-        mino, r, theta, phi, delay = np.moveaxis(flat.reshape(len(alpha), ngeo, 5), -1, 0)
+        rows = _core.path_points(observer.hole.spin, observer._place, (alpha, beta), spacing)
+        mino, r, theta, phi, delay = np.moveaxis(rows.reshape(len(alpha), ngeo, 5), -1, 0)
     else:
         points = observer.trace(
             alpha, beta, crossings=0, samples=ngeo, integrator="elliptic", tolerance=1e-10
@@ -358,5 +358,5 @@ def u_kep(
     radius = column("r", r)
     spin = abs(hole.spin) * (-1.0 if retrograde else 1.0)
     sense = (-1.0 if hole.spin < 0.0 else 1.0) * (-1.0 if retrograde else 1.0)
-    time, inward, _, turn = _core.velocity(spin, np.ascontiguousarray(radius)).reshape(-1, 4).T
+    time, inward, _, turn = _core.velocity(spin, flat(radius)).reshape(-1, 4).T
     return time, inward, 0, sense * turn
