@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 
 from kerrlight import _core
 from kerrlight._arrays import Floats, degrees, flat, radians, together, whole
-from kerrlight._arrays import flat as flatten
 from kerrlight.table import Outcome, Points, Rays
 
 __all__ = [
@@ -300,8 +299,7 @@ class Observer:
                 raise ValueError(f"points = {points} is not allowed: 1 to 1000000")
             return Curve(**_core.critical_curve(self.hole.spin, self._place, points))
         column = radians("angles", angles)
-        flat = flatten(column)
-        columns = _core.critical_points(self.hole.spin, self._place, flat)
+        columns = _core.critical_points(self.hole.spin, self._place, flat(column))
         return Curve(**{name: values.reshape(column.shape) for name, values in columns.items()})
 
     def band(self, order: int, angles: ArrayLike) -> tuple[Floats, Floats]:
@@ -318,8 +316,7 @@ class Observer:
         if not 0 <= order <= 65535:
             raise ValueError(f"order = {order} is not allowed: 0 to 65535")
         column = radians("angles", angles)
-        flat = flatten(column)
-        edges = _core.band(self.hole.spin, self._place, order, flat)
+        edges = _core.band(self.hole.spin, self._place, order, flat(column))
 
         def edge(name: str) -> Floats:
             pair = [edges[f"{name}_{axis}"].reshape(column.shape) for axis in ("alpha", "beta")]
