@@ -31,7 +31,7 @@ fn regress_no_more_threads_is_an_error_that_says_what_to_do() {
     // Threads that would not help are not started.
     let many = [&CURVE[..], &["--threads", "1024"]].concat();
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    if cores <= 16 {
+    if cores <= 4 {
         let ended = after(folder.path(), &cramped(""), &many);
         assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
     }
