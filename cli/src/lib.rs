@@ -71,6 +71,7 @@ mod record;
 mod render;
 mod report;
 mod reproduce;
+pub mod threads;
 mod trace;
 mod usage;
 mod uv;
@@ -94,8 +95,8 @@ use std::path::PathBuf;
 struct Arguments {
     #[command(subcommand)]
     verb: Verb,
-    /// Threads, which change no result [default: one a core]
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    /// Threads, which change no result [default: one a core, most: four]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=threads::MOST))]
     threads: Option<u16>,
     /// Memory limit, e.g. 4GiB [default: what the system leaves]
     #[arg(long, global = true, value_name = "SIZE", value_parser = memory::parse)]
@@ -148,9 +149,7 @@ enum Verb {
 
 fn run(arguments: &Arguments, program: &Program) -> anyhow::Result<()> {
     memory::limit(arguments.memory)?;
-    if let Some(threads) = arguments.threads {
-        rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
-    }
+    threads::start(arguments.threads)?;
     let form = match (arguments.json, arguments.verb.pipes()) {
         (true, true) => bail!("--json and `-` both ask for standard output: give a file's name"),
         (true, false) => Form::Json,

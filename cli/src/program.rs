@@ -1,6 +1,6 @@
 //! The program with what others add to it.
 
-use super::{Arguments, compare, fit, help, interrupt, ranks, run};
+use super::{Arguments, compare, fit, help, interrupt, output, ranks, run};
 use crate::ranks::Silence;
 use anyhow::Context;
 use clap::FromArgMatches;
@@ -68,11 +68,11 @@ impl Program {
     /// The same for a command line of the caller's, whose first word is the program's name; returns the exit code.
     /// Help, and what is wrong with the words themselves, end the process.
     pub fn run_with(self, words: impl IntoIterator<Item = OsString>) -> u8 {
-        let matches = help::command().get_matches_from(words);
-        let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
-        interrupt::listen();
+        let matches = help::command().try_get_matches_from(words);
+        let arguments = matches.and_then(|matches| Arguments::from_arg_matches(&matches));
+        let arguments = arguments.unwrap_or_else(|error| output::exit(&error));
         let silence = if arguments.verb.shares() { ranks::hush() } else { Silence::default() };
-        match run(&arguments, &self) {
+        match interrupt::listen().and_then(|()| run(&arguments, &self)) {
             Ok(()) => 0,
             Err(error) if error.is::<interrupt::Interrupted>() => {
                 eprintln!("{error:#}");

@@ -152,6 +152,7 @@ mod readme {}
 
 // In the order of the flow of data: a module imports from those above it.
 mod error;
+pub mod interrupt;
 
 mod numbers;
 

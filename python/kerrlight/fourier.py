@@ -34,6 +34,7 @@ class Fourier(_Linear):
     """
 
     is_complex = True
+    _again = _core.Fourier
 
     def __init__(
         self,
@@ -51,7 +52,8 @@ class Fourier(_Linear):
         counts = [len(frame) for frame in frames]
         flat = np.ascontiguousarray(np.concatenate(frames)).reshape(-1)
         screen = (width, height, float(field_uas))
-        self._core = _core.Fourier(screen, pulse, flat, counts, accuracy)
+        self._made = (screen, pulse, flat, counts, accuracy)
+        self._core = self._again(*self._made)
         self.input_shape = (height, width) if alone else (len(frames), height, width)
         self.output_shape = (sum(counts),)
 
@@ -62,7 +64,7 @@ class Fourier(_Linear):
 
     def vjp(self, cotangent: ArrayLike) -> Floats:
         """The adjoint under the inner product Re Σ x̄ y: from dL/dRe V + i dL/dIm V to dL/dpixel."""
-        data = np.ascontiguousarray(cotangent, dtype=np.complex128)
+        data = np.require(cotangent, np.complex128, ["C", "A"])
         if data.shape != self.output_shape:
             raise ValueError(f"cotangent has the shape {data.shape}, not {self.output_shape}")
         return self._core.vjp(data).reshape(self.input_shape)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from os import PathLike, fspath
 from typing import Any, Union
 
@@ -106,7 +106,10 @@ class Observation:
 
     def __post_init__(self) -> None:
         count = len(np.atleast_1d(real("time", self.time)))
-        names = np.asarray(self.stations, dtype=str).reshape(-1, 2)
+        names = np.asarray(self.stations, dtype=str)
+        names = names.reshape(0, 2) if names.size == 0 else names
+        if names.shape != (count, 2):
+            raise ValueError(f"stations have the shape {names.shape}, not {(count, 2)}")
         known = {station.name for station in self.array}
         missing = [name for name in dict.fromkeys(names.ravel().tolist()) if name not in known]
         columns = {
@@ -122,17 +125,21 @@ class Observation:
             raise ValueError(f"sigmas = {columns['sigmas'].min()} is not allowed: 0 or above, or NaN")
         for name, column in columns.items():
             object.__setattr__(self, name, _frozen(column))
-        if names.shape != (count, 2):
-            raise ValueError(f"stations have the shape {names.shape}, not {(count, 2)}")
         object.__setattr__(self, "stations", _frozen(names))
         object.__setattr__(self, "array", (*self.array, *map(Station, missing)))
         products = np.ascontiguousarray(self.products, dtype=np.complex128)
         if products.shape != (count, 4):
             raise ValueError(f"products have the shape {products.shape}, not {(count, 4)}")
         object.__setattr__(self, "products", _frozen(products))
-        channel = np.zeros(count) if self.channel is None else np.asarray(self.channel)
-        object.__setattr__(self, "channel", _frozen(np.asarray(channel, dtype=np.int64)))
+        channel = _column("channel", _or_zero(self.channel, (count,)), (count,))
+        if (channel != np.floor(channel)).any():
+            raise ValueError("channel has an element that is no whole number")
+        object.__setattr__(self, "channel", _frozen(channel.astype(np.int64)))
         object.__setattr__(self, "_core", self._visibilities())
+
+    def __reduce__(self) -> Any:
+        given = {part.name: getattr(self, part.name) for part in fields(self) if part.init}
+        return (_observation, (type(self), given))
 
     def _visibilities(self) -> Any:
         numbers = {station.name: k for k, station in enumerate(self.array)}
@@ -203,10 +210,14 @@ class Observation:
     ) -> Observation:
         """An observation of Stokes I alone, from columns of its rows; ``more`` are other fields of the class."""
         values = np.atleast_1d(np.asarray(vis, dtype=np.complex128))
+        if values.ndim != 1:
+            raise ValueError(f"vis has the shape {values.shape}, not (rows,)")
         products = np.zeros((len(values), 4), dtype=np.complex128)
         products[:, 0] = values
         sigmas = np.full((len(values), 4), np.nan)
-        sigmas[:, 0] = real("sigma", sigma)
+        error = real("sigma", sigma)
+        error = np.full(values.shape, error) if error.ndim == 0 else error
+        sigmas[:, 0] = _column("sigma", error, values.shape)
         return Observation(
             np.atleast_1d(real("time", time)), np.asarray(stations), real("uv", uv), products, sigmas, **more
         )
@@ -370,6 +381,10 @@ class Observation:
     def __repr__(self) -> str:
         basis = "RR, LL, RL, LR" if self.circular else "I, Q, U, V"
         return f"<Observation of {self.source or 'no name'}: {len(self)} rows of {basis}, {len(self.array)} stations>"
+
+
+def _observation(kind: type[Observation], given: dict[str, Any]) -> Observation:
+    return kind(**given)
 
 
 def _frozen(column: Any) -> Any:

@@ -142,5 +142,5 @@ def observe(
         "seed": 0 if seed is None else int(seed),
     }
     height, width = movie.shape[-2:]
-    flat = np.ascontiguousarray(movie).reshape(-1)
+    flat = np.require(movie, requirements=["C", "A"]).reshape(-1)
     return Observation._of(_core.observe(flat, (width, height, float(field_uas)), plan))

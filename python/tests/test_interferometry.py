@@ -307,3 +307,19 @@ def test_pyuvdata_writes_uvfits(tmp_path):
     path = tmp_path / "a.uvfits"
     of.to_pyuvdata().write_uvfits(path)
     np.testing.assert_allclose(Observation.read(path).vis, of.vis, rtol=1e-6)
+
+
+def test_exact_columns_are_not_reshaped():
+    names = np.array([["AA", "LM"], ["AA", "PV"], ["LM", "PV"]])
+    uv, vis = np.ones((3, 2)), np.ones(3)
+    for wrong, words in [
+        ((names.T, uv, vis, 0.1), "stations"),
+        ((names, uv.T, vis, 0.1), "uv"),
+        ((names, uv, vis[:, None], 0.1), "vis"),
+        ((names, uv, vis, [0.1, 0.1]), "sigma"),
+    ]:
+        with pytest.raises(ValueError, match=f"{words} ha.* the shape"):
+            Observation.of_stokes_i([4.0] * 3, *wrong)
+    for channel in ([0, 0], [0, 0.5, 0]):
+        with pytest.raises(ValueError, match="channel"):
+            Observation.of_stokes_i([4.0] * 3, names, uv, vis, 0.1, channel=channel)

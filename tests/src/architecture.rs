@@ -191,6 +191,7 @@ fn regress_geodesic_imports_from_what_stands_before() {
     let house = House::of("geodesic");
     let expected = [
         "error",
+        "interrupt",
         "numbers",
         "spacetime",
         "screen",

@@ -53,6 +53,7 @@ mod static_image;
 mod static_sky;
 mod station_gains;
 mod support;
+mod system_limits;
 mod unknown_world;
 mod verdict;
 mod view;

@@ -4,7 +4,6 @@ use super::Accuracy;
 use super::together::Together;
 use crate::answer::Answer;
 use crate::interrupt::{Interrupted, Keeper};
-use crate::output::Output;
 use crate::{progress, ranks};
 use anyhow::anyhow;
 use kerrlight_validation::accuracy::hard::{self, Tally};
@@ -105,7 +104,6 @@ pub fn run(arguments: &Accuracy, rays: u64) -> anyhow::Result<Answer> {
     csv.write(&writer.into_inner()?)?;
     if let Some(together) = together.filter(|_| done == rays) {
         together.end();
-        [&csv, &json].into_iter().for_each(Output::sweep);
     }
     let answer = Answer::text(table(&document)).outputs([&csv, &json]);
     let answer = answer.with_all(serde_json::to_value(&document)?);

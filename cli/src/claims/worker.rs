@@ -1,6 +1,7 @@
 //! This process as a worker: a record that a thread renews for as long as the process works.
 
 use super::record::{EXTENSION, Process, Record, host};
+use crate::threads;
 use anyhow::{Context, bail};
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::path::{Path, PathBuf};
@@ -38,9 +39,12 @@ impl Worker {
         let (now, wanted) = channel();
         let thread = {
             let (path, record) = (path.clone(), Arc::clone(&record));
-            std::thread::spawn(move || renew(&path, &record, every_s, &wanted))
+            threads::spawn(move || renew(&path, &record, every_s, &wanted))
         };
-        Ok(Self { path, record, now: Some(now), thread: Some(thread) })
+        // Its record goes with it if it cannot be renewed.
+        let mut worker = Self { path, record, now: Some(now), thread: None };
+        worker.thread = Some(thread?);
+        Ok(worker)
     }
 
     /// Its name.

@@ -144,8 +144,11 @@ fn appear(plan: &Plan, experiment: &str, folder: &Path) -> anyhow::Result<bool> 
     let place = std::path::absolute(folder).with_context(name)?;
     let parent = place.parent().with_context(name)?;
     fs::create_dir_all(parent).with_context(name)?;
+    let name_of = place.file_name().unwrap_or_default().to_string_lossy();
+    output::sweep(parent, |meant| meant == name_of);
     let mut builder = tempfile::Builder::new();
-    builder.prefix(output::BESIDE);
+    let prefix = output::prefix_of(&place);
+    builder.prefix(&prefix);
     // Those of any newly made folder, which the process's mask narrows.
     #[cfg(unix)]
     let builder = {
@@ -153,6 +156,7 @@ fn appear(plan: &Plan, experiment: &str, folder: &Path) -> anyhow::Result<bool> 
         builder.permissions(fs::Permissions::from_mode(0o777))
     };
     let beside = builder.tempdir_in(parent).with_context(name)?;
+    let _lock = fs::File::open(beside.path()).ok().filter(output::lock);
     plan.write(beside.path(), experiment)?;
     Ok(fs::rename(beside.path(), &place).is_ok())
 }

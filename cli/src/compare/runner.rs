@@ -4,11 +4,12 @@ use super::cases::{Case, Status};
 use super::labels::RESULTS;
 use crate::checksum::is_whole;
 use crate::file_sums::FileSums;
-use crate::fit::{Inputs, posterior};
+use crate::fit::{Inputs, from_folder, posterior};
 use crate::interrupt::Keeper;
 use crate::lock::Lock;
 use crate::output::{self, Output};
 use crate::program::Program;
+use crate::threads;
 use anyhow::Context;
 use serde_json::Value;
 use std::fs::File;
@@ -128,7 +129,8 @@ impl<'a> Runner<'a> {
     ) -> anyhow::Result<(ExitStatus, String)> {
         // Paths in it start from the root.
         let settings = self.folder.join(format!("{}.toml", case.slug));
-        let text = case.settings().unwrap_or_default();
+        // Paths start from the root: a case is the same bytes in any folder.
+        let text = from_folder(&case.settings().unwrap_or_default(), Path::new("/"));
         Output::new(&settings, "toml")?.write(text.as_bytes())?;
         let mut command = self.program.again()?;
         command.args(["fit", "--stop-with-input"]);
@@ -157,7 +159,7 @@ impl<'a> Runner<'a> {
         let file =
             File::create(&said).with_context(|| format!("cannot write {}", said.display()))?;
         let child = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(file).spawn();
-        let status = wait(child.context("cannot start the fit")?, keeper)?;
+        let status = wait(child.map_err(|error| threads::no_process("the fit", &error))?, keeper)?;
         Ok((status, output::read_text(&said).unwrap_or_default()))
     }
 }

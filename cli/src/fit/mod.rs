@@ -98,7 +98,7 @@ impl Fit {
     /// Fits.
     pub fn run(&self, registry: &Registry) -> anyhow::Result<Answer> {
         if self.stop_with_input {
-            interrupt::follow_parent();
+            interrupt::follow_parent()?;
         }
         if let Some(rank @ (1.., _)) = ranks::this() {
             return self.help(rank, registry);
@@ -136,7 +136,7 @@ impl Fit {
         let (prepared, read) = output::with_reads(|| work.prepared(&base_dir, registry));
         let prepared = prepared?;
         prepared.check_device(device.as_ref())?;
-        let text = self.begun(&text, &base_dir);
+        let text = Self::begun(&text, &base_dir);
         let folder = Folder::create(&folder, &text, Inputs::new(&text, read))?;
         self.run_all(&prepared, &text, (&folder, false), device)
     }
@@ -198,7 +198,7 @@ impl Fit {
                 let guess = |data| init::guess(data, self.model);
                 let guess = self.data.as_deref().map(guess).transpose()?;
                 let (text, base_dir) = self.settings(guess.as_ref())?;
-                (self.begun(&text, &base_dir), base_dir)
+                (Self::begun(&text, &base_dir), base_dir)
             }
         };
         // A static image is the first rank's alone.
@@ -213,11 +213,11 @@ impl Fit {
     }
 
     /// The settings as a run has them.
-    fn begun(&self, text: &str, base_dir: &Path) -> String {
+    fn begun(text: &str, base_dir: &Path) -> String {
         // Settings of a run say so already.
         let text =
             text.strip_prefix(BASE_DIR).and_then(|t| t.split_once('\n')).map_or(text, |(_, t)| t);
-        format!("{BASE_DIR}{}\n{text}", self.shown(base_dir).display())
+        from_folder(text, base_dir)
     }
 
     /// For how long to wait for another process: the fit of a comparison that was killed a moment ago is about to end.
@@ -256,12 +256,6 @@ impl Fit {
         Ok((text, base_dir))
     }
 
-    /// The folder that the run's settings name. Paths in those of a comparison start from the root: a case is the same
-    /// bytes in any folder.
-    fn shown<'a>(&self, base_dir: &'a Path) -> &'a Path {
-        if self.stop_with_input { Path::new("/") } else { base_dir }
-    }
-
     /// Refuses to resume a run with settings other than its own.
     fn same(&self, text: &str) -> anyhow::Result<()> {
         if !self.set.is_empty() {
@@ -280,6 +274,11 @@ impl Fit {
 
 /// The first line of a run's settings.
 const BASE_DIR: &str = "# Paths start from ";
+
+/// Settings that say from which folder their paths start.
+pub fn from_folder(settings: &str, folder: &Path) -> String {
+    format!("{BASE_DIR}{}\n{settings}", folder.display())
+}
 
 /// The folder that paths in a run's settings start from.
 fn base_dir_of(text: &str) -> PathBuf {

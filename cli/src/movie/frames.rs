@@ -78,6 +78,8 @@ impl Sequence {
         let folder = self.folder.display().to_string();
         std::fs::create_dir_all(&self.folder).with_context(|| format!("cannot make {folder}"))?;
         self.refuse_others()?;
+        let is_frame = |name: &str| number_of(name, "exr").or(number_of(name, "png")).is_some();
+        output::sweep(&self.folder, is_frame);
         for k in 0..self.plans.len() {
             let path = self.path(k, "exr");
             if !path.exists() {
@@ -107,8 +109,7 @@ impl Sequence {
         let shown = || format!("cannot read {}", self.folder.display());
         for entry in std::fs::read_dir(&self.folder).with_context(shown)? {
             let name = entry.with_context(shown)?.file_name();
-            let number = name.to_str().and_then(|n| n.strip_prefix("frame_"));
-            let number = number.and_then(|n| n.strip_suffix(".exr")?.parse::<usize>().ok());
+            let number = name.to_str().and_then(|name| number_of(name, "exr"));
             if number.is_some_and(|k| k >= self.plans.len()) {
                 bail!(
                     "{} holds {}, but this film has {} frames: give another folder or remove it",
@@ -268,6 +269,12 @@ impl Sequence {
         }
         settings
     }
+}
+
+/// The number of the frame that a name stands for.
+fn number_of(name: &str, extension: &str) -> Option<usize> {
+    let number = name.strip_prefix("frame_")?.strip_suffix(extension)?.strip_suffix('.')?;
+    number.parse().ok()
 }
 
 /// The first setting that a file does not have or has otherwise.

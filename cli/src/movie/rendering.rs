@@ -2,9 +2,9 @@
 
 use super::frames::Sequence;
 use crate::interrupt::{Interrupted, Keeper};
+use crate::progress;
 use crate::ranks::{self, Lead, Team};
 use crate::render::exr_options::ExrOptions;
-use crate::{output, progress};
 use indicatif::ProgressBar;
 use kerrlight_geodesic::RayDevice;
 use kerrlight_tomo::Error;
@@ -91,7 +91,6 @@ impl<'a> Rendering<'a> {
         // Frames that somebody has removed since.
         self.rest()?;
         lead.end();
-        output::sweep(self.folder, output::BESIDE);
         // What is left behind does no harm.
         let _ = std::fs::remove_dir_all(at);
         Ok(())

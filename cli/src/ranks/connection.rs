@@ -1,6 +1,7 @@
 //! A connection between two ranks. A thread of its own reads: the death of the other side is seen at once, whatever this
 //! process does.
 
+use crate::threads;
 use anyhow::Context;
 use std::io::{ErrorKind, Read, Write};
 use std::net::{Shutdown, TcpStream};
@@ -38,8 +39,7 @@ impl Connection {
             }
         };
         // It ends with the connection.
-        let thread = std::thread::Builder::new().stack_size(1 << 18).spawn(read);
-        thread.context("cannot start a thread")?;
+        threads::spawn(read)?;
         Ok(Self { stream, inbox })
     }
 

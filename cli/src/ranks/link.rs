@@ -3,6 +3,7 @@
 
 use super::connection::{self, Connection, OnLoss};
 use crate::output::Output;
+use crate::threads;
 use anyhow::{Context, bail};
 use serde::{Deserialize, Serialize};
 use std::hash::{BuildHasher, Hasher, RandomState};
@@ -70,7 +71,7 @@ impl Listener {
                 }
             }
         };
-        let thread = Some(std::thread::spawn(listen));
+        let thread = Some(threads::spawn(listen)?);
         Ok(Self { path, size, closed, arrivals, thread })
     }
 

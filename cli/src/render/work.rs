@@ -64,7 +64,6 @@ impl Work<'_> {
             Ok(self.raster.write_exr(journal, &summary, (&attributes, style), file, look)?)
         })
         .with_context(|| partial.kept())?;
-        exr.sweep();
         partial.remove();
         if let Some(together) = together {
             together.end();

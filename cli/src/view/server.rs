@@ -2,6 +2,7 @@
 
 use super::page::Page;
 use crate::interrupt::Keeper;
+use crate::threads;
 use anyhow::Context;
 use std::io::{BufRead, BufReader, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
@@ -29,7 +30,10 @@ pub fn serve(page: &Page, port: Option<u16>, browser: bool) -> anyhow::Result<()
         for stream in listener.incoming().flatten() {
             // Browsers open connections ahead of need: a silent one must not hold up the others, and one that goes away is
             // no failure.
-            scope.spawn(move || answer(page, stream));
+            let same = stream.try_clone();
+            if threads::spawn_in(scope, move || answer(page, stream)).is_err() {
+                let _ = same.and_then(|stream| answer(page, stream));
+            }
         }
     });
     Ok(())

@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::integrate::path::Path;
 use crate::integrate::trace::Tracer;
+use crate::interrupt;
 #[cfg(feature = "affine")]
 use crate::rays::affine_pair::AffinePair;
 use crate::rays::block::{BlockRequest, BlockTracer};
@@ -94,6 +95,7 @@ impl Integrator {
         let Some(method) = self.method() else {
             #[cfg(feature = "affine")]
             for (alpha, beta) in rays {
+                interrupt::check();
                 let ray = observer.ray(hole, *alpha, *beta)?;
                 let pair = AffinePair::trace(hole, observer, [*alpha, *beta], tolerance, request)?;
                 sampler.take(&pair, ray.lambda);
@@ -103,6 +105,7 @@ impl Integrator {
         let tracer = Tracer::with_method(method, tolerance)?;
         let mut path = Path::new();
         for (alpha, beta) in rays {
+            interrupt::check();
             let ray = observer.ray(hole, *alpha, *beta)?;
             tracer.trace(hole, &ray, request.quantities(), &mut path);
             sampler.take(&MinoPath { path: &path, ray: &ray }, ray.lambda);

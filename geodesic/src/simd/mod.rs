@@ -63,6 +63,7 @@ pub use ray_nodes::RayNodes;
 pub use samples::{RaySamples, Samples};
 
 use crate::error::{Error, check};
+use crate::interrupt;
 use crate::screen::observer::Observer;
 use crate::spacetime::kerr::Kerr;
 use motion::Motion;
@@ -73,6 +74,10 @@ const BLOCK: usize = 512;
 /// Works on blocks of rays, each on its own: neither the number of threads nor their order changes a
 /// bit.
 fn each<B: Send>(blocks: Vec<B>, work: impl Fn(B) + Send + Sync) {
+    let work = |block| {
+        interrupt::check();
+        work(block);
+    };
     #[cfg(feature = "rayon")]
     {
         use rayon::prelude::*;

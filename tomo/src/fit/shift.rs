@@ -2,8 +2,8 @@
 
 use super::sightlines::Sightlines;
 use crate::dynamics::{AngularVelocity, Axis};
-use kerrlight_geodesic::Kerr;
 use kerrlight_geodesic::vector::norm;
+use kerrlight_geodesic::{Kerr, interrupt};
 use rayon::prelude::*;
 
 /// What g of one node depends on: g = √N/(1 − Ω ξ·L), N = −u·u of the gas per (dt)².
@@ -38,6 +38,7 @@ impl Shift {
     /// Of gas on the spheres of a hole, or falling in; the sightlines must have momenta.
     pub fn new(lines: &Sightlines, hole: &Kerr, velocity: &AngularVelocity, power: f64) -> Self {
         let node = |k| {
+            interrupt::check();
             let at = |columns: &[Vec<f64>; 3]| [0, 1, 2].map(|c| columns[c][k]);
             let mut node =
                 Node::new(at(&lines.position), at(&lines.momentum), hole.spin(), velocity);

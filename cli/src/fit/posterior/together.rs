@@ -32,7 +32,7 @@ pub fn lead(folder: &Folder, samples: u32) -> anyhow::Result<Option<Lead>> {
 pub fn end(lead: Option<Lead>, folder: &Folder) {
     if let Some(lead) = lead {
         lead.end();
-        output::sweep(&folder.path().join(super::FOLDER), output::BESIDE);
+        output::sweep(&folder.path().join(super::FOLDER), |_| true);
         // What is left behind does no harm.
         let _ = std::fs::remove_dir_all(shared(folder.path()));
     }

@@ -21,6 +21,7 @@ impl BlockTracer {
         block: &mut RayBlock,
         visitor: &mut V,
     ) -> Result<(), Error> {
+        crate::interrupt::check();
         visitor.works_on(Work::Rays);
         let ray = self.view.ray(&self.hole, job.alpha[k], job.beta[k])?;
         let tolerance = self.find_path(k, &ray, block);
