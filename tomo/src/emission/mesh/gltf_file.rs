@@ -179,7 +179,7 @@ fn picture(
         gltf::image::Source::Uri { uri, .. } => Texture::decode(&beside(resources, uri)?),
     }?;
     let mut placement = transform.map_or_else(Placement::default, |transform| {
-        // Offset · rotation · scale, as KHR_texture_transform defines them.
+        // Offset · rotation · scale of KHR_texture_transform, counterclockwise where v grows downwards.
         let ([sx, sy], [ox, oy]) = (transform.scale(), transform.offset());
         let (sin, cos) = f64::from(transform.rotation()).sin_cos();
         let [sx, sy, ox, oy] = [sx, sy, ox, oy].map(f64::from);

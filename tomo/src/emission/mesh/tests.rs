@@ -248,6 +248,9 @@ fn exact_textures_of_gltf() {
     near(shade(r#""wrapS":33071"#, "", 1.25), 1.0);
     near(shade("", r#""offset":[0.5,0]"#, 1.25), 1.0);
     near(shade("", r#""scale":[3,1]"#, 0.25), 1.0);
+    // The extension's own example: the lower left quarter, where u is half of v.
+    let quarter = r#""offset":[0,1],"rotation":1.57079632679,"scale":[0.5,0.5]"#;
+    near(shade("", quarter, 0.3), 0.0);
     // By 180 degrees: u becomes -u.
     near(shade("", r#""rotation":3.14159265"#, 0.25), 1.0);
 }
