@@ -9,6 +9,7 @@ use gltf::texture::WrappingMode;
 type Matrix = [[f64; 4]; 4];
 
 pub(super) fn decode(bytes: &[u8], resources: &Resources<'_>) -> Result<MeshFile, MeshError> {
+    gltf_checks::check_positions(&gltf::Gltf::from_slice_without_validation(bytes)?.document)?;
     let gltf::Gltf { document, mut blob } = gltf::Gltf::from_slice(bytes)?;
     let buffers = document
         .buffers()
