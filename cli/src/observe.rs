@@ -1,6 +1,7 @@
 //! `kerrlight observe`: what an array of telescopes would see.
 
 use crate::answer::Answer;
+use crate::assets::Reach;
 use crate::interferometry::arguments::{self, Observing};
 use crate::interferometry::movie_files::{self, FrameTimes};
 use crate::interferometry::{ObservationFile, scene_movie};
@@ -25,6 +26,8 @@ pub struct Observe {
     /// files), or a scene (.toml)
     #[arg(required = true, value_name = "INPUT")]
     inputs: Vec<PathBuf>,
+    #[command(flatten)]
+    reach: Reach,
     /// When the images of a movie show the source: `scans` (image k at scan k; needed only where the
     /// images' own times disagree), `own` (EXR of kerrlight: the scene's times, the first being the
     /// first scan; .npz: hours of UTC named `times`), hours of UTC of the first and of the last, or
@@ -181,7 +184,7 @@ impl Observe {
             bail!("--fov-uas and --frame-times are not for scenes, which have field and times");
         }
         let [scene] = files else { bail!("a scene is observed alone, without other files") };
-        let movie = scene_movie::read(scene, scans_h)?;
+        let movie = scene_movie::read(scene, scans_h, self.reach)?;
         let times = scans_h[..movie.frames()].to_vec();
         Ok((movie, times, "rendered at the time of each scan".to_owned()))
     }

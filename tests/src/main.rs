@@ -44,6 +44,7 @@ mod results;
 mod resume;
 mod resumed_fits;
 mod resumed_searches;
+mod scene_files;
 mod shared_folder;
 #[cfg(unix)]
 mod signals;

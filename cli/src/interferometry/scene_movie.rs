@@ -1,6 +1,6 @@
 //! A scene, rendered at the times of scans.
 
-use crate::assets;
+use crate::assets::{self, Reach};
 use crate::output;
 use crate::progress;
 use anyhow::{Context, bail};
@@ -14,7 +14,7 @@ use std::path::Path;
 
 /// Renders a scene at `times_h` (hours), the first being the scene's own time of observation.
 /// The factor to Jy is that of the first frame, in which the flux is `screen.total_flux_jy`.
-pub fn read(path: &Path, times_h: &[f64]) -> anyhow::Result<Movie> {
+pub fn read(path: &Path, times_h: &[f64], reach: Reach) -> anyhow::Result<Movie> {
     let name = || path.display().to_string();
     let mut scene = Scene::parse(&output::read_text(path)?).with_context(name)?;
     if scene.screen.total_flux_jy.is_none() {
@@ -28,7 +28,7 @@ pub fn read(path: &Path, times_h: &[f64]) -> anyhow::Result<Movie> {
         bail!("{}: a sky has no flux in Jy: remove `sky`", name());
     }
     let folder = path.parent().unwrap_or(Path::new("."));
-    let assets = assets::load(&scene, folder, &[]).with_context(name)?.decoded;
+    let assets = assets::load(&scene, folder, &[], reach).with_context(name)?.decoded;
     // A scene with a flux in Jy has both.
     let seconds = scene.hole.seconds().context("`hole.mass_msun` is missing")?;
     let angle = scene.hole.angle_uas().context("`hole.distance_kpc` is missing")?;

@@ -10,7 +10,7 @@ mod together;
 mod work;
 
 use crate::answer::{self, Answer};
-use crate::assets;
+use crate::assets::{self, Reach};
 use crate::devices::{self, DeviceOption};
 use crate::output::{self, Output};
 use crate::overlay::OverlayOptions;
@@ -71,6 +71,8 @@ pub struct Render {
     exr: ExrOptions,
     #[command(flatten)]
     device: DeviceOption,
+    #[command(flatten)]
+    reach: Reach,
     /// Columns of pixels that are traced together; the picture does not depend on it
     #[arg(long, value_name = "N", default_value = "64", hide_short_help = true)]
     #[arg(value_parser = clap::value_parser!(u16).range(1..))]
@@ -83,7 +85,7 @@ impl Render {
         let source = Source::new(self.scene.as_deref())?;
         let (text, scene) = source.scene(&self.all_overrides())?;
         let outputs = self.checked_outputs(&source)?;
-        let files = assets::load(&scene, &source.folder, &outputs.all())?;
+        let files = assets::load(&scene, &source.folder, &outputs.all(), self.reach)?;
         source.compare(&files.identity);
         afford(&scene)?;
         let device = self.device.open()?;

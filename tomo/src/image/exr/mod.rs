@@ -10,6 +10,7 @@ use super::{Channel, Picture};
 use crate::memory;
 use crate::toml_file;
 use exr::meta::MetaData;
+use exr::meta::attribute::EnvironmentMap;
 use exr::meta::header::LayerAttributes;
 use exr::prelude::{AttributeValue, Error, ReadChannels, ReadLayers, Text, Vec2, read};
 use rayon::prelude::*;
@@ -112,6 +113,40 @@ pub fn is_whole(bytes: &[u8]) -> Result<bool, crate::Error> {
         let window = header.shared_attributes.display_window;
         (window.position, window.size) == (header.own_attributes.layer_position, header.layer_size)
     }))
+}
+
+/// What the header of the first layer says of the meaning of its pixels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Header {
+    /// Whether it is the six faces of a cube.
+    pub cube: bool,
+    /// Chromaticities of red, green, blue and white, where they are not those of Rec. 709.
+    pub foreign_primaries: Option<[[f32; 2]; 4]>,
+}
+
+/// Chromaticities (CIE x, y) of red, green, blue and white of Rec. 709, which an EXR has unless it says otherwise.
+const REC_709: [[f32; 2]; 4] = [[0.64, 0.33], [0.3, 0.6], [0.15, 0.06], [0.3127, 0.329]];
+
+impl Header {
+    /// The header of the first layer.
+    ///
+    /// # Errors
+    /// If the bytes are no EXR file.
+    pub fn of(bytes: &[u8]) -> Result<Self, crate::Error> {
+        let data = MetaData::read_from_unbuffered(Cursor::new(bytes), true)?;
+        let header = data.headers.first().ok_or(Error::Invalid("no layer".into()))?;
+        let (shared, own) = (&header.shared_attributes, &header.own_attributes);
+        let primaries = shared
+            .chromaticities
+            .map(|c| [c.red, c.green, c.blue, c.white].map(|Vec2(x, y)| [x, y]));
+        let same = |given: &[[f32; 2]; 4]| {
+            given.iter().flatten().zip(REC_709.iter().flatten()).all(|(a, b)| (a - b).abs() < 2e-3)
+        };
+        Ok(Header {
+            cube: matches!(own.environment_map, Some(EnvironmentMap::Cube)),
+            foreign_primaries: primaries.filter(|given| !same(given)),
+        })
+    }
 }
 
 /// The channels and kerrlight's settings of an EXR file: of all parts that are as large as the first, and of those with the
