@@ -305,7 +305,7 @@ pub fn trace(
             let [alpha, beta] = [Number::parameter(*alpha, 2), Number::parameter(*beta, 3)];
             let ray = observer.ray(&hole, alpha, beta)?;
             trace_series(tolerance, &hole, &ray, request.quantities(), &mut path)?;
-            sampler.take(&MinoPath { path: &path, ray: &ray }, ray.lambda);
+            sampler.take(&MinoPath::new(&path, &ray), ray.lambda);
         }
         Ok(sampler.sink)
     });

@@ -104,10 +104,11 @@ impl RayVisitor for Collector<'_> {
         path: Option<PathOfRay<'_>>,
     ) -> Result<(), Error> {
         if let Some(PathOfRay { ray, path, .. }) = path {
-            self.sampler.take(&MinoPath { path, ray }, ray.lambda);
-            // Steps lose digits of the whole next to the critical curve.
-            if let Some(total) = self.sampler.sink.mino_total.last_mut().filter(|t| !t.is_nan()) {
-                *total = whole(self.hole, ray);
+            self.sampler.take(&MinoPath::new(path, ray), ray.lambda);
+            // Steps lose digits of the whole next to the critical curve; on it the closed form has none.
+            let total = self.sampler.sink.mino_total.last_mut().filter(|total| !total.is_nan());
+            if let (Some(total), Some(whole)) = (total, whole(self.hole, ray)) {
+                *total = whole;
             }
             return Ok(());
         }
@@ -169,9 +170,10 @@ fn turning_radius(photon: &Ray) -> f64 {
     photon.potential.outer_turning_point().map_or(f64::NAN, |w| 1.0 / w)
 }
 
-/// Mino time of a whole ray.
-fn whole(hole: &Kerr, photon: &Ray) -> f64 {
+/// Mino time of a whole ray, if it is finite.
+fn whole(hole: &Kerr, photon: &Ray) -> Option<f64> {
     let form = ClosedForm::new(hole, photon);
     let returns = photon.inverse_radius > 0.0 && photon.potential.outer_turning_point().is_some();
-    if returns { form.time_back() } else { form.mino_total() }
+    let total = if returns { form.time_back() } else { form.mino_total() };
+    Some(total).filter(|total| total.is_finite())
 }

@@ -105,7 +105,7 @@ impl Integrator {
         for (alpha, beta) in rays {
             let ray = observer.ray(hole, *alpha, *beta)?;
             tracer.trace(hole, &ray, request.quantities(), &mut path);
-            sampler.take(&MinoPath { path: &path, ray: &ray }, ray.lambda);
+            sampler.take(&MinoPath::new(&path, &ray), ray.lambda);
         }
         Ok(sampler.sink)
     }

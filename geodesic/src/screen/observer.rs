@@ -7,6 +7,10 @@ use crate::numbers::scalar::{Elementary, Scalar};
 use crate::spacetime::kerr::Kerr;
 use crate::spacetime::radial::RadialPotential;
 
+/// The farthest place of an observer or a camera that is not at infinity, in M: squares of squares of the radius have to
+/// be numbers.
+pub(crate) const FARTHEST: f64 = 1e30;
+
 /// The angle between the spin axis and the line of sight.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Inclination<T: Elementary = f64> {
@@ -147,14 +151,14 @@ impl<T: Elementary> Observer<T> {
         Observer { inclination, azimuth: 0.0, inverse_radius: 0.0 }
     }
 
-    /// An observer at Boyer–Lindquist radius `radius` > 2 M (outside the ergosphere of every spin), at
+    /// An observer at Boyer–Lindquist radius `radius` in (2, 1e30\] M (outside the ergosphere of every spin), at
     /// azimuth 0.
     ///
     /// # Errors
-    /// If `radius` is not finite or not above 2 M.
+    /// If `radius` is out of that range.
     pub fn at_radius(inclination: Inclination<T>, radius: f64) -> Result<Self, Error> {
-        let ok = radius > 2.0 && radius.is_finite();
-        check("observer radius", radius, ok, "a finite number above 2 (M)")?;
+        let ok = radius > 2.0 && radius <= FARTHEST;
+        check("observer radius", radius, ok, "above 2 and at most 1e30 (M)")?;
         Ok(Observer { inclination, azimuth: 0.0, inverse_radius: 1.0 / radius })
     }
 

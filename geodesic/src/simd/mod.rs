@@ -63,7 +63,7 @@ pub use ray_nodes::RayNodes;
 pub use samples::{RaySamples, Samples};
 
 use crate::error::{Error, check};
-use crate::screen::observer::Observer;
+use crate::screen::observer::{FARTHEST, Observer};
 use crate::spacetime::kerr::Kerr;
 use motion::Motion;
 
@@ -85,9 +85,6 @@ fn each<B: Send>(blocks: Vec<B>, work: impl Fn(B) + Send + Sync) {
 /// The nearest observer, in M: outside every photon orbit, so that rays come from outside the
 /// barrier.
 pub(crate) const NEAREST: f64 = 5.0;
-
-/// The farthest one that is not at infinity: squares of squares of the radius have to be numbers.
-const FARTHEST: f64 = 1e30;
 
 /// The least W = (dw/dτ)² at the observer: rays that pass it nearly tangentially would lose
 /// digits in its root.

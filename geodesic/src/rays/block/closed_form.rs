@@ -132,7 +132,7 @@ impl BlockTracer {
                 until,
                 surface,
                 exit: None,
-                stepped: !all || path == PathUse::Instead || self.loses_digits(ends.error),
+                stepped: !all || path == PathUse::Instead || self.loses_digits(&ends),
                 with_path: path == PathUse::Beside,
             });
         }
@@ -178,10 +178,11 @@ impl BlockTracer {
         Ok(())
     }
 
-    /// Whether the closed form has an error above the tolerance.
+    /// Whether the closed form has an error above the tolerance, or no end.
     #[inline]
-    fn loses_digits(&self, error: f64) -> bool {
-        error.is_nan() || error > self.tracer.tolerance().max(FINEST)
+    fn loses_digits(&self, ends: &RayEnds) -> bool {
+        let known = ends.error <= self.tracer.tolerance().max(FINEST);
+        !(known && ends.mino_total.is_finite())
     }
 
     /// Finds where the rays go that meet no surface and escape.

@@ -112,11 +112,11 @@ pub(super) struct SampleColumns {
 }
 
 impl SampleColumns {
-    /// Those of a path at some Mino times.
-    pub fn fill(&mut self, path: &Path, times: impl Iterator<Item = f64>) {
+    /// Those of some points.
+    pub fn fill(&mut self, points: impl Iterator<Item = PathPoint>) {
         let Self { delay, radius, theta, azimuth } = self;
         [&mut *delay, &mut *radius, &mut *theta, &mut *azimuth].into_iter().for_each(Vec::clear);
-        for point in times.map(|time| path.at(time)) {
+        for point in points {
             delay.push(point.delay);
             radius.push(point.radius());
             theta.push(point.theta());
