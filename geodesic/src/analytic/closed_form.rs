@@ -57,7 +57,9 @@ impl ClosedForm {
         } else {
             0.0
         };
-        let end = if ray.potential.captures() {
+        let end = if ray.is_from_horizon {
+            start
+        } else if ray.potential.captures() {
             // At the horizon √W = |r₊² + a² − aλ|/r₊².
             let (w, a) = (ray.potential.horizon, hole.spin());
             radial.time_inwards(w, (2.0 / w - a * ray.lambda).abs() * w * w)

@@ -169,7 +169,8 @@ impl<T: Elementary> Path<T> {
     /// The position at Mino time `mino_time` ∈ \[0, [`mino_total`](Self::mino_total)\]
     /// (clamped to it). At the horizon, where azimuth and time diverge logarithmically, it
     /// is that of the last float outside. All NaN on a path without a step: one that has not
-    /// been traced, or by a tracer that may make none.
+    /// been traced, or by a tracer that may make none, or of a photon that [comes from the
+    /// horizon](Ray::is_from_horizon).
     pub fn at(&self, mino_time: T) -> PathPoint<T> {
         if self.segments.is_empty() {
             return PathPoint::nowhere();

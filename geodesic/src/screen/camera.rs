@@ -16,11 +16,15 @@ pub enum Motion {
     Static,
     /// Zero angular momentum (Bardeen 1970): carried along with the rotation of space.
     Zamo,
-    /// Turning about +z with Ω = 1/(r^{3/2} + a), a geodesic in the equatorial plane.
+    /// Turning about +z with Ω = 1/(r^{3/2} + a): a geodesic in the equatorial plane, and in no other place, where
+    /// something has to hold the camera up.
     Keplerian,
     /// Falling from rest at infinity without angular momentum: E = 1, L = Q = 0.
     FreeFall,
 }
+
+/// Roundings of a photon's energy at infinity, a difference of two terms inside the ergosphere.
+const ROUNDINGS: f64 = 16.0;
 
 /// A camera at a finite radius.
 ///
@@ -158,11 +162,11 @@ impl Camera {
     }
 
     /// The photon that arrives at the point (x, y) of the picture plane; of
-    /// [`Dual`](crate::Dual) numbers, with its derivatives with respect to them.
+    /// [`Dual`](crate::Dual) numbers, with its derivatives with respect to them. In some directions inside the
+    /// ergosphere its energy at infinity is not positive: see [`Ray::is_from_horizon`].
     ///
     /// # Errors
-    /// If x or y is not in \[−1e12, 1e12\], or if the photon has no positive energy at infinity (some
-    /// directions inside the ergosphere).
+    /// If x or y is not in \[−1e12, 1e12\].
     pub fn ray<T: Elementary>(&self, x: T, y: T) -> Result<Ray<T>, Error> {
         for (field, value) in [("x", x.value()), ("y", y.value())] {
             check(field, value, value.abs() <= 1e12, "a number in [-1e12, 1e12]")?;
@@ -204,9 +208,12 @@ impl Camera {
         // p_φ/sin θ and p_θ, for unit energy in the frame of zero angular momentum.
         let sigma = self.hole.sigma(self.radius, self.inclination.cos());
         let (around, polar) = (k_phi * of(self.girth), k_theta * of(sigma.sqrt()));
-        let energy = of(self.lapse) + of(self.drag) * s * around;
-        let allowed = "a direction from which light of positive energy arrives";
-        check("energy at infinity", energy.value(), energy.value() > 0.0, allowed)?;
+        let dragged = of(self.drag) * s * around;
+        let energy = of(self.lapse) + dragged;
+        // Within its rounding it is 0.
+        let rounding = ROUNDINGS * T::EPSILON * (self.lapse + dragged.value().abs());
+        let is_from_horizon = energy.value() <= rounding;
+        let energy = if is_from_horizon { of(1.0) } else { energy };
         let (around, polar) = (around / energy, polar / energy);
         let angular = around * around + polar * polar - a * a * c * c;
         let tilt = around - a * s;
@@ -225,6 +232,7 @@ impl Camera {
             azimuth: self.azimuth,
             inverse_radius: 1.0 / self.radius,
             inward: k_r.value() > 0.0,
+            is_from_horizon,
             potential: RadialPotential::new(coefficients, horizon).narrow(T::narrow),
         })
     }
@@ -283,7 +291,8 @@ impl Camera {
     }
 
     /// ν in the camera's frame over ν at infinity, for the photon that arrives from
-    /// `direction`: multiplies every redshift factor g that is written for infinity.
+    /// `direction`: multiplies every redshift factor g that is written for infinity. Negative or infinite for light
+    /// whose energy at infinity is not positive ([`Ray::is_from_horizon`]).
     pub fn blueshift(&self, direction: [f64; 3]) -> f64 {
         let along: f64 = self.velocity.iter().zip(direction).map(|(v, d)| v * d).sum();
         let zamo = (1.0 - along) / (1.0 - square(self.velocity)).sqrt();

@@ -232,6 +232,7 @@ impl<T: Elementary> Observer<T> {
             azimuth: self.azimuth,
             inverse_radius: w,
             inward: true,
+            is_from_horizon: false,
             potential,
         })
     }
@@ -273,6 +274,10 @@ pub struct Ray<T = f64> {
     pub inverse_radius: f64,
     /// Whether the backward ray starts towards the hole.
     pub inward: bool,
+    /// Whether the photon has no positive energy at infinity, which there is inside the ergosphere alone: it comes from
+    /// the horizon. Its path is [captured](crate::Outcome::Captured) where it starts, and not followed through the
+    /// ergosphere; the constants above are those for unit energy in the frame of zero angular momentum.
+    pub is_from_horizon: bool,
     /// The radial potential W(w).
     pub potential: RadialPotential<T>,
 }

@@ -65,11 +65,15 @@ impl View {
     }
 
     /// Ratio of the frequency of light that arrives at (x, y) to its frequency at infinity; `None` for
-    /// a screen, where the two are equal.
+    /// a screen, where the two are equal, and for light that cannot come from there
+    /// ([`Ray::is_from_horizon`]).
     pub fn blueshift(&self, x: f64, y: f64) -> Option<f64> {
         match self {
             View::Screen(_) => None,
-            View::Camera(camera) => Some(camera.blueshift(camera.direction(x, y))),
+            View::Camera(camera) => {
+                let shift = camera.blueshift(camera.direction(x, y));
+                Some(shift).filter(|shift| *shift > 0.0 && shift.is_finite())
+            }
         }
     }
 
