@@ -115,7 +115,9 @@ impl<T: Elementary> Path<T> {
         self.outcome
     }
 
-    /// Mino time from the observer to the horizon or back to infinity.
+    /// Mino time from the start to the end of the path: the horizon or infinity, wherever the observer is. Tables and
+    /// blocks of rays ([`RayTable`](crate::RayTable), [`TracedRay`](crate::TracedRay)) end a ray where it is back at the
+    /// radius of a finite observer.
     pub fn mino_total(&self) -> T {
         self.end / T::constant(self.scale)
     }
@@ -277,10 +279,9 @@ impl<T: Elementary> Path<T> {
             point.azimuth =
                 segment.turned + turn(self.rotation_sign, start, [n[0], n[1]]) + dragged;
         } else {
-            let square = T::constant(1.0) - u * u;
-            let sin = if square.value() > 0.0 { square.sqrt() } else { zero };
-            point.direction = [sin, zero, u];
-            point.velocity[2] = v;
+            let unknown = T::constant(f64::NAN);
+            point.direction = [unknown, unknown, u];
+            point.velocity = [unknown, unknown, v];
         }
         if self.has_time {
             let regular = self.polynomial(k, self.rows - 1).value(x) * scale;

@@ -116,7 +116,7 @@ impl Budget {
         let eps = T::EPSILON;
         let rates = Rates::at(hole, lambda, point);
         let w = point.inverse_radius.value();
-        let [x, y, _] = point.direction.map(T::value);
+        let sin = point.sin_theta().value();
         // Mino time by which the ray may be early or late, and what the interpolation adds.
         let late = self.late() / scale;
         // An error of W takes w off the true orbit by δW/|∇W| in the plane of w and dw/dτ.
@@ -127,7 +127,7 @@ impl Budget {
         let lost = stretch(relative);
         let radius = relative * lost;
         let theta = self.direction + 4.0 * eps;
-        let azimuth = self.direction / x.hypot(y).max(self.direction).max(1e-300)
+        let azimuth = self.direction / sin.max(self.direction).max(1e-300)
             + self.azimuth
             + rates.drag * late
             + hole.spin().value().abs() * local / rates.gap

@@ -39,10 +39,11 @@ pub(crate) fn trace_block(
     wanted: &BlockRequest,
     request: &Request,
 ) -> Result<RayTable, Error> {
-    let (hole, at_infinity) = (tracer.hole(), observer.is_at_infinity());
+    let (hole, at_infinity) = (tracer.hole(), [observer.is_at_infinity(); 2]);
     let mut table = RayTable::default();
     table.samples.reserve(request, wanted.samples * alpha.len());
-    let sampler = Sampler::new(request, hole, at_infinity, &[], table);
+    let mut sampler = Sampler::new(request, hole, at_infinity, &[], table);
+    sampler.exit = wanted.exit;
     let worst = Uncertainty::default();
     let mut table = Collector { hole, observer, alpha, beta, request, sampler, worst };
     tracer.trace(alpha, beta, wanted, &mut RayBlock::default(), &mut table)?;
@@ -122,6 +123,8 @@ impl RayVisitor for Collector<'_> {
         table.mino_total.push(ray.mino_total);
         table.turning_radius.push(turning);
         table.crossing_count.push(ray.crossing_count);
+        let exit = ray.exit.unwrap_or([f64::NAN; 3]);
+        table.exit.extend(self.sampler.exit.then_some(exit));
         for crossing in crossings {
             table.crossings.push_crossing(self.request, crossing);
         }

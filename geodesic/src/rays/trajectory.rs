@@ -6,9 +6,10 @@ use crate::integrate::uncertainty::Uncertainty;
 use crate::numbers::scalar::Elementary;
 use crate::rays::sampling::Trajectory;
 use crate::screen::observer::Ray;
+use crate::screen::view::View;
 use crate::spacetime::point::PathPoint;
 
-/// A path in Mino time, ended at the radius of a finite observer.
+/// A path in Mino time; that of a finite observer's ray, ended at its radius.
 pub(crate) struct MinoPath<'a, T> {
     path: &'a Path<T>,
     pub ray: &'a Ray<T>,
@@ -21,13 +22,26 @@ pub(crate) struct MinoPath<'a, T> {
 const CLOSE: f64 = 1e-6;
 
 impl<'a, T: Elementary> MinoPath<'a, T> {
-    /// The path of `ray`.
+    /// The path of a camera's ray: to infinity, or to the horizon.
+    pub fn whole(path: &'a Path<T>, ray: &'a Ray<T>) -> Self {
+        MinoPath { path, ray, total: path.mino_total(), end: None }
+    }
+
+    /// The path of `ray`, which arrives at a point of `view`, and whether its ends are at infinity if it escapes.
+    pub fn seen_by(view: &View, path: &'a Path<T>, ray: &'a Ray<T>) -> (Self, [bool; 2]) {
+        match view {
+            View::Screen(observer) => (Self::new(path, ray), [observer.is_at_infinity(); 2]),
+            View::Camera(_) => (Self::whole(path, ray), [false, true]),
+        }
+    }
+
+    /// The path of an observer's ray.
     pub fn new(path: &'a Path<T>, ray: &'a Ray<T>) -> Self {
         let w = ray.inverse_radius;
         // A ray that starts inwards is back where it started after twice the time to its turning point.
         let turning = path.turning_point().filter(|_| w > 0.0 && ray.inward);
         let Some((turning, _)) = turning else {
-            return MinoPath { path, ray, total: path.mino_total(), end: None };
+            return Self::whole(path, ray);
         };
         let twice = turning + turning;
         if (path.inverse_radius_at(twice) / w - 1.0).abs() <= CLOSE {
@@ -60,6 +74,11 @@ impl<T: Elementary> Trajectory<T> for MinoPath<'_, T> {
     fn crossings(&self, found: &mut Vec<T>) {
         let total = self.total();
         found.extend(self.path.equatorial_crossings().filter(|time| time.value() <= total.value()));
+    }
+
+    fn exit(&self) -> Option<[T; 3]> {
+        let escapes = self.path.outcome() == Outcome::Escaped;
+        escapes.then(|| self.path.at(self.path.mino_total()).direction)
     }
 
     fn at(&self, mino_time: T) -> PathPoint<T> {

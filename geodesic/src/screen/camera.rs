@@ -2,7 +2,7 @@
 
 use crate::error::{Error, check};
 use crate::numbers::scalar::Elementary;
-use crate::screen::observer::{Inclination, Ray};
+use crate::screen::observer::{FARTHEST, Inclination, Ray};
 use crate::spacetime::frame::ZamoFrame;
 use crate::spacetime::kerr::Kerr;
 use crate::spacetime::orbits;
@@ -55,7 +55,7 @@ impl Camera {
     /// A camera around `hole` at `radius` > r₊ in M, polar angle `inclination` and azimuth 0.
     ///
     /// # Errors
-    /// If the radius is not finite or not outside the horizon, or if nothing can move as
+    /// If the radius is not outside the horizon and at most 1e30 M, or if nothing can move as
     /// requested at this place (a static camera in the ergosphere, a Keplerian one inside
     /// the photon orbit).
     pub fn new(
@@ -91,6 +91,9 @@ impl Camera {
         rates: [f64; 3],
     ) -> Result<Self, Error> {
         let at_rest = Self::at_rest(hole, inclination, radius)?;
+        for (field, rate) in ["dr/dt", "dtheta/dt", "dphi/dt"].into_iter().zip(rates) {
+            check(field, rate, rate.is_finite(), "a finite number (M⁻¹, that of r without unit)")?;
+        }
         let velocity = at_rest.local_velocity(rates);
         let speed = square(velocity).sqrt();
         check("camera speed", speed, speed < 1.0, "slower than light, below 1")?;
@@ -99,11 +102,12 @@ impl Camera {
 
     /// The camera of zero angular momentum.
     fn at_rest(hole: &Kerr, inclination: Inclination, radius: f64) -> Result<Self, Error> {
+        let near = radius <= FARTHEST;
         let frame = ZamoFrame::at(hole, radius, inclination.sin(), inclination.cos());
-        let frame = frame.ok_or(Error::out_of_range(
+        let frame = frame.filter(|_| near).ok_or(Error::out_of_range(
             "camera radius",
             radius,
-            "a finite number outside the horizon",
+            "outside the horizon and at most 1e30 (M)",
         ))?;
         let ZamoFrame { lapse, drag, girth, .. } = frame;
         Ok(Camera {
@@ -166,11 +170,13 @@ impl Camera {
     /// ergosphere its energy at infinity is not positive: see [`Ray::is_from_horizon`].
     ///
     /// # Errors
-    /// If x or y is not in \[−1e12, 1e12\].
+    /// If x or y is not in \[−1e12, 1e12\], or an angle of the camera is not finite.
     pub fn ray<T: Elementary>(&self, x: T, y: T) -> Result<Ray<T>, Error> {
         for (field, value) in [("x", x.value()), ("y", y.value())] {
             check(field, value, value.abs() <= 1e12, "a number in [-1e12, 1e12]")?;
         }
+        let [forward, ..] = self.axes[2];
+        check("yaw, pitch or roll", forward, forward.is_finite(), "finite angles (radians)")?;
         self.arriving_from(self.direction(x, y))
     }
 
@@ -199,6 +205,12 @@ impl Camera {
     /// If the vector's length is not 1 within 1e-6, or as for [`ray`](Self::ray).
     pub fn arriving_from<T: Elementary>(&self, direction: [T; 3]) -> Result<Ray<T>, Error> {
         let length = direction.iter().map(|d| d.value() * d.value()).sum::<f64>().sqrt();
+        check(
+            "camera azimuth",
+            self.azimuth,
+            self.azimuth.is_finite(),
+            "a finite angle (radians)",
+        )?;
         let allowed = "1 (the direction is a unit vector)";
         check("length of the direction", length, (length - 1.0).abs() < 1e-6, allowed)?;
         let [k_r, k_theta, k_phi] = self.momentum(direction);
@@ -234,6 +246,7 @@ impl Camera {
             inward: k_r.value() > 0.0,
             is_from_horizon,
             potential: RadialPotential::new(coefficients, horizon).narrow(T::narrow),
+            spin: self.hole.spin(),
         })
     }
 

@@ -201,12 +201,13 @@ impl<T: Elementary> Observer<T> {
     /// The photon that arrives at (α, β), followed backward in time.
     ///
     /// # Errors
-    /// If α or β is not in \[−1e12, 1e12\], or if no photon with these constants reaches the
+    /// If α or β is not in \[−1e12, 1e12\], if the azimuth is not finite, or if no photon with these constants reaches the
     /// observer's radius (a finite observer inside the turning point).
     pub fn ray(&self, hole: &Kerr<T>, alpha: T, beta: T) -> Result<Ray<T>, Error> {
         let (x, y) = (alpha.value(), beta.value());
         check("alpha", x, x.abs() <= 1e12, "a number in [-1e12, 1e12] (M)")?;
         check("beta", y, y.abs() <= 1e12, "a number in [-1e12, 1e12] (M)")?;
+        check("observer azimuth", self.azimuth, self.azimuth.is_finite(), "a finite angle")?;
         let (sin, cos) = (self.inclination.sin, self.inclination.cos);
         let a = hole.spin();
         let wide = [a, alpha, beta].map(T::widen);
@@ -234,6 +235,7 @@ impl<T: Elementary> Observer<T> {
             inward: true,
             is_from_horizon: false,
             potential,
+            spin: a.value(),
         })
     }
 }
@@ -280,6 +282,21 @@ pub struct Ray<T = f64> {
     pub is_from_horizon: bool,
     /// The radial potential W(w).
     pub potential: RadialPotential<T>,
+    /// Spin of the hole that the photon passes.
+    pub(crate) spin: f64,
+}
+
+impl<T: Elementary> Ray<T> {
+    /// Checks that this ray was made for `hole`.
+    pub(crate) fn check_hole(&self, hole: &Kerr<T>) -> Result<(), Error> {
+        check_hole(self.spin, hole.spin().value())
+    }
+}
+
+/// Checks that what was made for a hole of spin `own` is used with one of spin `given`.
+pub(crate) fn check_hole(own: f64, given: f64) -> Result<(), Error> {
+    check("spin", given, own == given, "the spin that the ray or the camera was made for")?;
+    Ok(())
 }
 
 #[cfg(test)]

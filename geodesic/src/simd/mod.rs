@@ -115,12 +115,14 @@ impl<'a> ScreenRays<'a> {
         let w = observer.inverse_radius();
         let within = w == 0.0 || (1.0 / FARTHEST..=1.0 / NEAREST).contains(&w);
         check("observer radius", 1.0 / w, within, "infinity, or a number in [5, 1e30] (M)")?;
+        let azimuth = observer.azimuth();
+        check("observer azimuth", azimuth, azimuth.is_finite(), "a finite angle (radians)")?;
         let same = alpha.len() == beta.len();
         check("number of beta", beta.len() as f64, same, "as many as of alpha")?;
         let camera = motion::Camera::new(hole, observer);
         let mut points = alpha.iter().zip(beta);
         points.try_for_each(|(alpha, beta)| check_point(&camera, *alpha, *beta))?;
-        Ok(ScreenRays { camera, azimuth: observer.azimuth(), alpha, beta })
+        Ok(ScreenRays { camera, azimuth, alpha, beta })
     }
 
     /// Some of these points, in any order.

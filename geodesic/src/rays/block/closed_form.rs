@@ -97,7 +97,8 @@ impl BlockTracer {
         block: &mut RayBlock,
         visitor: &V,
     ) -> Result<(), Error> {
-        let BlockRequest { crossings, all_crossings, rates, half_orbits, paths, .. } = *job.request;
+        let BlockRequest { crossings, all_crossings, rates, half_orbits, paths, exit, .. } =
+            *job.request;
         let with_ray = rates || paths || half_orbits.is_some();
         let most = half_orbits.map_or(usize::MAX, |n| n as usize + 1);
         let RayBlock { rays, plane, crossings: found, .. } = block;
@@ -119,6 +120,8 @@ impl BlockTracer {
                 Inspected { eta: f64::NAN, until: f64::INFINITY, path: PathUse::None }
             };
             let surface = first_opaque(own, until, visitor);
+            // The closed form ends at the observer's radius, where it is not yet known where a ray goes.
+            let goes_on = exit && ends.escapes && surface.is_none() && !observer.is_at_infinity();
             let all = !all_crossings
                 || surface.is_some()
                 || own.len() >= (ends.crossings as usize).min(most);
@@ -132,7 +135,7 @@ impl BlockTracer {
                 until,
                 surface,
                 exit: None,
-                stepped: !all || path == PathUse::Instead || self.loses_digits(&ends),
+                stepped: !all || goes_on || path == PathUse::Instead || self.loses_digits(&ends),
                 with_path: path == PathUse::Beside,
             });
         }

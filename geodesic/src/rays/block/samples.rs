@@ -62,12 +62,12 @@ impl BlockTracer {
         RayBlock { rays, path, sampled, .. }: &mut RayBlock,
         visitor: &mut V,
     ) {
-        let trajectory = MinoPath::new(path, ray);
+        let (trajectory, at_infinity) = MinoPath::seen_by(&self.view, path, ray);
         if path.outcome().is_unresolved() {
             return;
         }
         let (total, escapes) = (trajectory.total(), path.outcome() == Outcome::Escaped);
-        let times = mino_times(n, ray.inverse_radius == 0.0, !escapes);
+        let times = mino_times(n, at_infinity, !escapes);
         sampled.fill(times.map(|share| trajectory.at(total * share)));
         let SampleColumns { delay, radius, theta, azimuth } = sampled;
         let error = trajectory.uncertainty(total).theta;
