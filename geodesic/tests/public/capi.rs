@@ -406,8 +406,8 @@ fn misuse_of_sky_functions_returns_a_code_and_a_message() {
         let [alpha, beta] = curve.each_mut().map(|column| column.as_mut_ptr());
         assert_eq!(kerrlight_critical_curve(2.0, 60.0, 8, alpha, beta), capi::OUT_OF_RANGE);
         assert_eq!(kerrlight_critical_curve(0.0, 60.0, 8, alpha, beta), capi::OK);
-        for k in 0..8 {
-            assert!((curve[0][k].hypot(curve[1][k]) - 27f64.sqrt()).abs() < 1e-12);
+        for (alpha, beta) in curve[0].iter().zip(curve[1]) {
+            assert!((alpha.hypot(beta) - 27f64.sqrt()).abs() < 1e-12);
         }
     }
     // A screen's directions: unit vectors, or no numbers.

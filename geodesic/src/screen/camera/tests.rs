@@ -215,7 +215,7 @@ fn exact_blocks_from_inside_the_ergosphere_agree_with_single_rays() {
             Ok(())
         }
     }
-    let camera = camera(0.95, 90.0, 1.7, Motion::Zamo).with_pointing(3.14, 0.0, 0.0);
+    let camera = camera(0.95, 90.0, 1.7, Motion::Zamo).with_pointing(3.1, 0.0, 0.0);
     let (x, y): (Vec<f64>, Vec<f64>) =
         (0..400).map(|k| (0.17 * f64::from(k % 20) - 1.6, 0.17 * f64::from(k / 20) - 1.6)).unzip();
     let request = BlockRequest {
