@@ -170,7 +170,7 @@ class Kerr:
         """An observer of this hole.
 
         The inclination, the angle between spin axis and line of sight, is given in degrees in [0, 180] (of which 0,
-        90 and 180 are exact) or in radians. ``radius`` is infinite or above 2 (M); ``azimuth`` is in radians. Angles
+        90 and 180 are exact) or in radians. ``radius`` is infinite or in (2, 1e30] (M); ``azimuth`` is in radians. Angles
         that look as if they were in the other unit, such as ``inclination_deg=np.pi / 3``, give a warning.
         """
         if (inclination_deg is None) == (inclination_rad is None):

@@ -11,7 +11,7 @@ pub enum Placement {
     #[default]
     None,
     /// At this many points equidistant in Mino time, from the observer to the ray's end: the
-    /// horizon, or back at the observer's radius. For an observer at infinity the points at
+    /// horizon, or back at the observer's radius; infinity for an observer who is there and for a camera. Points at
     /// infinity are left out.
     MinoTime(usize),
     /// At the middles of this many pieces of equal length ∫Σ dτ (the affine parameter, for unit
