@@ -3,8 +3,8 @@
 use crate::support::{binary, fail, kerrlight, root, succeed};
 use serde_json::Value;
 use std::collections::BTreeMap;
-use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 /// Small fits: as many as there are seeds.
@@ -126,4 +126,118 @@ fn exact_a_case_has_one_process_and_survives_kills() {
     assert!(clock.elapsed() < Duration::from_secs(5));
     let error = fail(at, &["compare", "seeds.toml", "-o", "out", "--case", "rate_seed1_00000000"]);
     assert!(error.contains("there is no such case"), "{error}");
+}
+
+/// A Slurm of one node that ends with the test.
+struct Slurm(PathBuf);
+
+impl Slurm {
+    /// Nothing where it is not installed.
+    fn start(folder: &Path) -> Option<Self> {
+        let slurm = Slurm(folder.join("slurm"));
+        let output = slurm.script("start.sh");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        if output.status.code() == Some(77) {
+            eprintln!("SLURM IS NOT TESTED: {said}");
+            return None;
+        }
+        assert!(output.status.success(), "{said}");
+        Some(slurm)
+    }
+
+    fn script(&self, name: &str) -> Output {
+        let path = root().join("tests/slurm").join(name);
+        Command::new("sh").arg(path).arg(&self.0).output().unwrap()
+    }
+
+    fn says(&self, folder: &Path, script: &str) -> String {
+        let output = shell(folder, script).env("SLURM_CONF", self.0.join("slurm.conf")).output();
+        let output = output.unwrap();
+        assert!(output.status.success(), "{script}: {}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8_lossy(&output.stdout).trim().to_owned()
+    }
+}
+
+impl Drop for Slurm {
+    fn drop(&mut self) {
+        self.script("stop.sh");
+    }
+}
+
+/// The script of the page.
+fn documented_array() -> String {
+    let page = std::fs::read_to_string(root().join("docs/reference/cluster.md")).unwrap();
+    let from = page.find("#!/bin/sh\n#SBATCH").unwrap();
+    page[from..].split("```").next().unwrap().to_owned()
+}
+
+/// The array of the page: a task that is killed by `scancel` in the middle is put back into the queue and finishes its case.
+#[test]
+#[ignore = "minutes, and needs Slurm"]
+fn exact_an_array_of_slurm_runs_each_case_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let Some(slurm) = Slurm::start(at) else { return };
+    experiment(at, 4, 2000);
+    let array =
+        documented_array().replace("--cpus-per-task=4\n#SBATCH --mem=4G", "--cpus-per-task=1");
+    std::fs::write(at.join("cases.sh"), array).unwrap();
+    slurm.says(at, "kerrlight compare seeds.toml -o out --list --threads 1 | cut -f 3 > commands");
+    let job = slurm.says(at, "sbatch --parsable --array=1-$(wc -l < commands)%2 cases.sh");
+    let clock = Instant::now();
+    while counts_if_begun(at)[1] == 0 {
+        assert!(clock.elapsed() < Duration::from_secs(120));
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    slurm.says(at, &format!("scancel --full -s KILL {job}_1; scontrol requeue {job}_1 || true"));
+    while !slurm.says(at, &format!("squeue -h -j {job}")).is_empty() {
+        assert!(clock.elapsed() < Duration::from_secs(500));
+        std::thread::sleep(Duration::from_millis(500));
+    }
+    slurm.says(at, "sh -c \"$(head -n 1 commands)\"");
+    assert_eq!(counts(at, "out"), [4, 0, 0, 0]);
+    succeed(at, &["compare", "seeds.toml", "-o", "alone"]);
+    assert_eq!(volumes(&at.join("out")), volumes(&at.join("alone")));
+}
+
+fn counts_if_begun(at: &Path) -> [u64; 4] {
+    if at.join("out/plan.json").is_file() { counts(at, "out") } else { [0; 4] }
+}
+
+/// The rules of `cluster/Snakefile`: one process is killed in the middle, and Snakemake runs the case once more.
+#[test]
+#[ignore = "minutes, and needs Snakemake"]
+fn exact_snakemake_runs_each_case_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    if shell(at, "snakemake --version").output().is_ok_and(|output| !output.status.success()) {
+        eprintln!("SNAKEMAKE IS NOT TESTED: there is none; pip install snakemake");
+        return;
+    }
+    experiment(at, 4, 2000);
+    let snakefile = root().join("cluster/Snakefile");
+    let script = format!(
+        "exec snakemake --snakefile {snakefile:?} --cores 2 --retries 3 \
+         --config experiment=seeds.toml folder=out 'options=--threads 1'"
+    );
+    let mut engine =
+        shell(at, &script).stderr(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
+    let clock = Instant::now();
+    while counts_if_begun(at)[1] == 0 {
+        assert!(clock.elapsed() < Duration::from_secs(120) && engine.try_wait().unwrap().is_none());
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    // The command line of the first case that runs, of this folder alone.
+    shell(
+        at,
+        "for p in /proc/[0-9]*; do [ \"$(readlink $p/cwd)\" = \"$PWD\" ] && \
+               tr '\\0' ' ' < $p/cmdline | grep -q '^kerrlight compare .*--case' && \
+               kill -9 ${p#/proc/} && break; done",
+    )
+    .status()
+    .unwrap();
+    assert!(engine.wait().unwrap().success());
+    assert_eq!(counts(at, "out"), [4, 0, 0, 0]);
+    succeed(at, &["compare", "seeds.toml", "-o", "alone"]);
+    assert_eq!(volumes(&at.join("out")), volumes(&at.join("alone")));
 }
