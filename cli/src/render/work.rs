@@ -123,7 +123,7 @@ impl Work<'_> {
 
 const STOPPED: &str = "stopped; nothing is kept";
 
-/// Why bands cannot be written, and what is left: ranks name the file of theirs, errors of the system name none.
+/// Why bands cannot be written, and what is left.
 fn unwritten(error: &dyn std::error::Error, partial: &Partial) -> String {
     let io = error.source().and_then(|source| source.downcast_ref::<std::io::Error>());
     match io {
