@@ -40,7 +40,6 @@ mod accuracy;
 mod answer;
 mod assets;
 mod checksum;
-mod claims;
 mod columns;
 mod compare;
 mod completions;
@@ -66,7 +65,6 @@ mod paths;
 pub mod pictures;
 mod program;
 mod progress;
-mod ranks;
 mod record;
 mod render;
 mod report;
@@ -156,10 +154,7 @@ fn run(arguments: &Arguments, program: &Program) -> anyhow::Result<()> {
         (false, true) => Form::Aside,
         (false, false) => Form::Text,
     };
-    let is_silent = arguments.verb.shares() && ranks::is_silent();
-    let form = if is_silent { Form::Silent } else { form };
-    let to = arguments.record.as_deref().filter(|_| !is_silent);
-    let to = to.map(|path| Output::new(path, "json")).transpose()?;
+    let to = arguments.record.as_deref().map(|path| Output::new(path, "json")).transpose()?;
     let Some(to) = to else { return arguments.verb.run(arguments, program)?.print(form) };
     output::follow();
     let recorder = Recorder::of_process();
@@ -169,12 +164,6 @@ fn run(arguments: &Arguments, program: &Program) -> anyhow::Result<()> {
 }
 
 impl Verb {
-    /// Whether ranks of one job do it together. Of others each does it for itself.
-    fn shares(&self) -> bool {
-        let rays = matches!(self, Verb::Render(_) | Verb::Movie(_) | Verb::Accuracy(_));
-        rays || matches!(self, Verb::Fit(_) | Verb::Posterior(_) | Verb::Compare(_))
-    }
-
     /// Whether standard output carries a file, because a path is `-`.
     fn pipes(&self) -> bool {
         match self {

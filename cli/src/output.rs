@@ -177,17 +177,8 @@ impl Output {
     /// Where an interrupted run keeps what it needs to be resumed: beside the file itself. Standard output has no such
     /// place.
     pub fn partial(&self) -> Option<PathBuf> {
-        self.ending(".partial")
-    }
-
-    /// Where processes that make it together share what they have, beside the file itself.
-    pub fn shared(&self) -> Option<PathBuf> {
-        self.ending(".shared")
-    }
-
-    fn ending(&self, ending: &str) -> Option<PathBuf> {
         let mut name = self.path.clone().into_os_string();
-        name.push(ending);
+        name.push(".partial");
         (!self.piped).then(|| name.into())
     }
 

@@ -116,7 +116,7 @@ impl Plan {
         }
         if self != other {
             bail!(
-                "{shown} has other cases: join it with `kerrlight compare {shown} --share`, or give another folder with -o"
+                "{shown} has other cases: run them with `kerrlight compare {shown} --case ID`, or give another folder with -o"
             );
         }
         Ok(())

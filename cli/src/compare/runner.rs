@@ -51,11 +51,7 @@ impl<'a> Runner<'a> {
 
     /// What is known of a case without running it.
     pub fn known(&self, case: &Case) -> Status {
-        self.known_in(case, &self.run_of(case))
-    }
-
-    /// The same where the case is worked on elsewhere.
-    fn known_in(&self, case: &Case, run: &Path) -> Status {
+        let run = &self.run_of(case);
         if let Some(error) = &case.error {
             return Status::Failed(error.clone());
         }
@@ -98,17 +94,13 @@ impl<'a> Runner<'a> {
 
     /// Runs a case to its end, from where it is; `Open` if a signal has stopped it.
     pub fn run(&self, case: &Case, keeper: &Keeper) -> Status {
-        self.run_in(case, &self.run_of(case), keeper)
-    }
-
-    /// The same in another folder than its own.
-    pub fn run_in(&self, case: &Case, run: &Path, keeper: &Keeper) -> Status {
-        match self.known_in(case, run) {
+        let run = &self.run_of(case);
+        match self.known(case) {
             Status::Open => {}
             known => return known,
         }
         match self.child(case, run, keeper) {
-            Ok((status, _)) if status.success() => match self.known_in(case, run) {
+            Ok((status, _)) if status.success() => match self.known(case) {
                 Status::Open => Status::Failed("it ended without results".to_owned()),
                 known => known,
             },
@@ -180,7 +172,7 @@ fn wait(mut child: Child, keeper: &Keeper) -> anyhow::Result<ExitStatus> {
 }
 
 /// Where the messages of a run go: beside it.
-pub fn said(run: &Path) -> PathBuf {
+fn said(run: &Path) -> PathBuf {
     let mut name = run.as_os_str().to_owned();
     name.push(".txt");
     name.into()

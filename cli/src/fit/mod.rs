@@ -23,7 +23,6 @@ mod results;
 mod rotation_search;
 mod run;
 mod static_image;
-mod together;
 mod work;
 mod world_results;
 mod world_scan;
@@ -32,7 +31,7 @@ mod world_search;
 use crate::answer::Answer;
 use crate::devices::{FitDevice, StepsOption};
 use crate::record::Recorder;
-use crate::{interrupt, output, paths, ranks};
+use crate::{interrupt, output, paths};
 use anyhow::{Context, bail};
 pub use api::{assigned, check, coverage, sizes, turned, velocities};
 pub use band_plots::{loop_plot, of_runs as plots_of_bands};
@@ -100,9 +99,6 @@ impl Fit {
         if self.stop_with_input {
             interrupt::follow_parent()?;
         }
-        if let Some(rank @ (1.., _)) = ranks::this() {
-            return self.help(rank, registry);
-        }
         if let Some(data) = &self.init {
             return init::write(data.as_deref(), self.output.as_deref(), self.model);
         }
@@ -159,57 +155,10 @@ impl Fit {
             }
         };
         let recorder = Recorder::of_process();
-        // Other ranks know where the run is if that was said.
-        let shared = self.samples.filter(|_| self.output.is_some() || self.resume.is_some());
-        let lead = shared.map(|samples| posterior::lead(folder, samples)).transpose()?;
-        let is_known = self.output.is_some() || self.resume.is_some();
-        let door = together::open(&prepared.file, text, folder, is_known)?;
-        let answer = run::run(prepared, text, (folder, resume), door, device)?;
+        let answer = run::run(prepared, text, (folder, resume), device)?;
         recorder.write_into(folder.path())?;
         let Some(samples) = self.samples else { return Ok(answer) };
-        Ok(answer.and("posterior", posterior::draw(prepared, folder, samples, lead.flatten())?))
-    }
-
-    /// As a rank that is not the first: takes parts of the steps, if they are cut, and part in the draws after the fit, if
-    /// there are any, where it is known where the run is.
-    fn help(&self, rank: (u32, u32), registry: &Registry) -> anyhow::Result<Answer> {
-        let Some(run) = self.resume.as_ref().or(self.output.as_ref()) else {
-            return Ok(Answer::default());
-        };
-        if self.print || self.init.is_some() {
-            return Ok(Answer::default());
-        }
-        self.take_parts(run, rank, registry)?;
-        match self.samples {
-            Some(samples) => posterior::help(run, samples, rank.0, registry),
-            None => Ok(Answer::default()),
-        }
-    }
-
-    /// Takes parts of the steps of the first rank's fit, which has read the same settings.
-    fn take_parts(&self, run: &Path, rank: (u32, u32), registry: &Registry) -> anyhow::Result<()> {
-        let (text, base_dir) = match &self.resume {
-            Some(path) => {
-                let text = output::read_text(&path.join(SETTINGS))?;
-                let base_dir = base_dir_of(&text);
-                (text, base_dir)
-            }
-            None => {
-                let guess = |data| init::guess(data, self.model);
-                let guess = self.data.as_deref().map(guess).transpose()?;
-                let (text, base_dir) = self.settings(guess.as_ref())?;
-                (Self::begun(&text, &base_dir), base_dir)
-            }
-        };
-        // A static image is the first rank's alone.
-        let Work::Emission(file) = Work::read(&text).with_context(|| self.name())? else {
-            return Ok(());
-        };
-        if !together::is_divided(&file) {
-            return Ok(());
-        }
-        let prepared = run::Prepared::new(*file, &base_dir, registry)?;
-        run::help(&prepared, &text, run, rank)
+        Ok(answer.and("posterior", posterior::draw(prepared, folder, samples)?))
     }
 
     /// The settings as a run has them.

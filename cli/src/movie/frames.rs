@@ -161,26 +161,6 @@ impl Sequence {
         frames.iter().map(|k| self.unresolved[*k]).sum()
     }
 
-    /// All that decides the film.
-    pub fn identity(&self) -> String {
-        let times: Vec<f64> = (0..self.len()).map(|k| self.time(k)).collect();
-        let text = self.plans.first().map_or("", |plan| plan.text.as_str());
-        format!("{} {text} {times:?} {} {}", env!("CARGO_PKG_VERSION"), self.files, self.device)
-    }
-
-    /// Whether frames have the scale of the first one, which is not there yet.
-    pub fn lacks_scale(&mut self) -> anyhow::Result<bool> {
-        let is_shared =
-            self.plans.first().is_some_and(|plan| plan.scene.screen.total_flux_jy.is_some());
-        let first = self.path(0, "exr");
-        if self.factor.is_none() && is_shared && first.exists() {
-            let attributes = exr::decode_attributes(output::open(&first)?);
-            let name = || first.display().to_string();
-            self.factor = number(&attributes.with_context(name)?, FACTOR);
-        }
-        Ok(is_shared && self.factor.is_none())
-    }
-
     /// Gives all frames the scale of this one.
     pub fn scale_like(&mut self, film: &Film, first: &Frame) -> anyhow::Result<()> {
         self.factor = Some(film.unit_factor(first)?);

@@ -110,9 +110,6 @@ impl Movie {
         let style = (&self.exr, self.viewing.frames_per_second());
         let rendering = Rendering::new(&mut film, &mut sequence, &self.output, style);
         let rendered = rendering.run().with_context(|| source.name.clone())?;
-        if ranks::is_silent() {
-            return Ok(Answer::default());
-        }
         animations.write(&sequence, self.look.look(&scene), |picture, look, white| {
             self.overlay.draw(&scene, (picture, 1), look, white)
         })?;

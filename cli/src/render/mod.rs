@@ -6,7 +6,6 @@ mod partial;
 pub mod preview;
 pub mod report;
 pub mod source;
-mod together;
 mod work;
 
 use crate::answer::{self, Answer};
@@ -14,7 +13,6 @@ use crate::assets::{self, Reach};
 use crate::devices::{self, DeviceOption};
 use crate::output::{self, Output};
 use crate::overlay::OverlayOptions;
-use crate::ranks;
 use anyhow::{Context, bail};
 use clap::Args;
 use exr_options::ExrOptions;
@@ -108,10 +106,6 @@ impl Render {
         let (name, files) = (source.name.as_str(), files.identity.as_str());
         let work =
             Work { raster: &raster, scene: &scene, text: &text, name, files, style: &self.exr };
-        if let Some((rank @ 1.., _)) = ranks::this() {
-            let identity = raster.identity() + work.files;
-            return work.help(outputs.exr.as_ref(), &identity, rank).map(|()| Answer::default());
-        }
         let summary = self.render(&work, look, &outputs)?;
         let seconds = start.elapsed().as_secs_f64();
         report::warn(&scene, &summary);

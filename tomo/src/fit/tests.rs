@@ -5,7 +5,6 @@ use super::*;
 mod blobs;
 mod leakage;
 mod orbital;
-mod parts;
 mod penalised;
 mod quasi_newton;
 mod quiescent;
