@@ -233,7 +233,7 @@ impl Observe {
     /// In the order of light's way.
     fn spoil(&self, observation: &mut Observation, seed: u64) -> anyhow::Result<()> {
         if self.scatter_sgra {
-            scatter(observation, &ScatteringKernel::SGR_A)?;
+            scatter(observation, &ScatteringKernel::sgr_a())?;
         }
         if self.gains() != GainErrors::default() {
             apply_gains(observation, &self.gains(), seed);

@@ -103,7 +103,7 @@ impl Plan {
     /// In the order of light's way.
     fn spoil(&self, observation: &mut Observation) -> Result<(), Error> {
         if self.scattering {
-            scatter(observation, &ScatteringKernel::SGR_A)?;
+            scatter(observation, &ScatteringKernel::sgr_a())?;
         }
         let (constant_amplitude, scan_amplitude, random_phases) = self.gains;
         let gains = GainErrors {
