@@ -144,6 +144,12 @@ def test_refusals():
         (lambda: Fourier((4, 4), 100.0, [[1.0, 2.0]], pulse="round"), 'pulse = "round"'),
         (lambda: Fourier((4, 4), -1.0, [[1.0, 2.0]]), "field of view"),
         (lambda: Fourier((4, 4), 1.0, [[1.0, 2.0]]).apply(np.zeros((3, 3))), "image has the shape"),
+        (lambda: Fourier((4, 4), 1.0, [np.zeros(3), np.ones(3)]), "uv has the shape (2, 3), not (n, 2)"),
+        (lambda: Fourier((4, 4), 1.0, np.zeros((3, 5, 2))), "uv has the shape (3, 5, 2)"),
+        (lambda: Fourier((4, 4), 1.0, np.zeros(4)), "uv has the shape (4,)"),
+        (lambda: Fourier((4, 4), 1.0, [np.zeros((5, 2)), np.zeros((2, 5))]), "uv[1] has the shape (2, 5)"),
+        (lambda: Fourier((4, 4), 1.0, []), "uv is empty"),
+        (lambda: Fourier((4, 4, 4), 1.0, [[1.0, 2.0]]), "(rows, columns)"),
         (lambda: Observation.of_stokes_i([1.0], [["A", "B"]], [[1.0]], [1.0], [0.1]), "uv has the shape"),
     ]:
         with pytest.raises(ValueError) as refused:

@@ -142,7 +142,7 @@ fn movie(file: &FitFile, path: &Path) -> anyhow::Result<Movie> {
         let knows = path.extension().is_some_and(|e| e != "csv" && e != "npz" && e != "npy");
         movie_files::read(&files, None).map_err(|second| if knows { second } else { first })
     })?;
-    Ok(movie)
+    Ok(movie.i)
 }
 
 /// The data of a static image, and those of its polarisation, where that is asked for.

@@ -23,7 +23,7 @@ use kerrlight_tomo::interferometry::files;
 use kerrlight_tomo::interferometry::gains::prior_table;
 use kerrlight_tomo::interferometry::observation::Observation;
 use kerrlight_tomo::interferometry::products::ClosureKind;
-use kerrlight_tomo::interferometry::simulate::Movie;
+use kerrlight_tomo::interferometry::simulate::{Movie, StokesMovie};
 use kerrlight_tomo::toml_file::ReadError;
 use kerrlight_tomo::units::{MICROARCSECOND, gravitational_angle};
 use keys::{KEYS, TABLES};
@@ -166,7 +166,7 @@ struct Images {
 
 fn read_movie(path: &Path) -> anyhow::Result<Images> {
     let files = movie_files::files(path)?;
-    let of = |(movie, times): (Movie, OwnTimes), known: bool| {
+    let of = |(StokesMovie { i: movie, .. }, times): (StokesMovie, OwnTimes), known: bool| {
         let field = movie.grid.pixel_rad * movie.grid.width as f64 / MICROARCSECOND;
         Images { movie, times, field_uas: known.then_some(field) }
     };

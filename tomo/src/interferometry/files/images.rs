@@ -1,11 +1,12 @@
 //! Images and movies as grids of numbers, arrays of NumPy, and pictures in EXR.
 
 use super::FileError;
+pub use super::text_image::{is_text_image, parse as text_image};
 use crate::Error;
 use crate::frames::{Frames, Sink};
 use crate::image::exr;
 use crate::interferometry::operator::ImageGrid;
-use crate::interferometry::simulate::Movie;
+use crate::interferometry::simulate::{Movie, StokesMovie};
 use crate::memory;
 use crate::numpy::{
     Archive, ArchiveWriter, NumpyError, Stream, read_array, write_archive, write_array,
@@ -24,8 +25,10 @@ pub struct Pixels {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Jy/pixel, image after image, rows from the north.
+    /// Stokes I in Jy/pixel, image after image, rows from the north.
     pub values: Vec<f64>,
+    /// Q, U and V, as far as the file has them.
+    pub polarized: [Option<Vec<f64>>; 3],
     /// Width of the field in µas, where the file tells.
     pub field_uas: Option<f64>,
     /// When the images show the source.
@@ -48,16 +51,21 @@ impl Pixels {
     /// The movie on a field of this width in microarcseconds.
     ///
     /// # Errors
-    /// If the field is out of range, or a pixel is not finite.
-    pub fn movie(self, field_uas: f64) -> Result<Movie> {
+    /// If the field is out of range, a pixel is not finite, or there is one of Q and U.
+    pub fn movie(self, field_uas: f64) -> Result<StokesMovie> {
         let grid = ImageGrid::new(self.width, self.height, field_uas * MICROARCSECOND);
         let grid = grid.map_err(|error| FileError::whole(error.to_string()))?;
-        self.all_finite()?;
-        Ok(Movie { grid, pixels: self.values })
-    }
-
-    fn all_finite(&self) -> Result<()> {
-        all_finite(&self.values, [self.width, self.height])
+        let size = [self.width, self.height];
+        all_finite(&self.values, size)?;
+        for (name, values) in ["Q", "U", "V"].iter().zip(&self.polarized) {
+            let named = |error: FileError| FileError::whole(format!("Stokes {name}: {error}"));
+            values.iter().try_for_each(|values| all_finite(values, size).map_err(named))?;
+        }
+        if self.polarized[0].is_some() != self.polarized[1].is_some() {
+            return Err(FileError::whole("has one of Stokes Q and U: both are needed, or none"));
+        }
+        let i = Movie { grid, pixels: self.values };
+        Ok(StokesMovie { i, polarized: self.polarized })
     }
 }
 
@@ -225,24 +233,39 @@ pub fn image_of(names: &[String]) -> std::result::Result<&str, NumpyError> {
 /// Names of arrays that are images, the first that is there counts.
 const IMAGES: [&str; 3] = ["movie", "image", "recovered"];
 
-/// The channel `intensity` of a picture in EXR. One of kerrlight in Jy/µas² knows its field and its scale; one that is
-/// not of kerrlight knows no field and is taken as Jy/pixel.
+/// The channels `intensity`, `Q`, `U` and `V` of a picture in EXR, which is its display window: pixels outside its data
+/// window are dark. One of kerrlight in Jy/µas² knows its field and its scale; one that is not of kerrlight knows no field
+/// and is taken as Jy/pixel.
 ///
 /// # Errors
-/// If there is no such channel, or its unit is none of the sky.
+/// If there is no such channel, its unit is none of the sky, pixels are not square, or some lie outside the display
+/// window.
 pub fn exr_picture(bytes: &[u8]) -> Result<Pixels> {
-    let (picture, attributes) = exr::decode(bytes)
-        .map_err(|error| FileError::whole(format!("damaged or unusual EXR: {error}")))?;
+    let unusual = |error| FileError::whole(format!("damaged or unusual EXR: {error}"));
+    let window = exr::window(bytes).map_err(unusual)?;
+    let (picture, attributes) = exr::decode(bytes).map_err(unusual)?;
     let lacks = |what: &str| FileError::whole(what.to_owned());
-    let channel = picture.channel("intensity");
-    let channel = channel.ok_or_else(|| lacks("has no channel named intensity"))?;
-    let (width, height) = (picture.width, picture.height);
+    let [width, height] = window.display;
+    let plane = |name: &str, factor: f64| {
+        let channel = picture.channel(name)?;
+        let mut values = vec![0.0; width * height];
+        let rows = values.chunks_exact_mut(width).skip(window.top);
+        for (row, from) in rows.zip(channel.chunks_exact(picture.width)) {
+            let row = &mut row[window.left..][..picture.width];
+            row.iter_mut().zip(from).for_each(|(to, value)| *to = f64::from(*value) * factor);
+        }
+        Some(values)
+    };
     let attribute = |name: &str| attributes.get(name).map(String::as_str);
-    let in_pixels = |factor: f64| Pixels {
-        width,
-        height,
-        values: channel.iter().map(|value| f64::from(*value) * factor).collect(),
-        ..Pixels::default()
+    let in_pixels = |factor: f64| {
+        let values = plane("intensity", factor);
+        Ok(Pixels {
+            width,
+            height,
+            values: values.ok_or_else(|| lacks("has no channel named intensity"))?,
+            polarized: ["Q", "U", "V"].map(|name| plane(name, factor)),
+            ..Pixels::default()
+        })
     };
     match attribute("intensity_unit") {
         Some("Jy/uas^2") => {
@@ -252,16 +275,23 @@ pub fn exr_picture(bytes: &[u8]) -> Result<Pixels> {
             let angle = scene.hole.angle_uas();
             let angle = angle.ok_or_else(|| lacks("its scene has no mass or distance"))?;
             let seconds = scene.hole.seconds().ok_or_else(|| lacks("its scene has no mass"))?;
+            if (scene.screen.width as usize, scene.screen.rows() as usize) != (width, height) {
+                return Err(FileError::whole(format!(
+                    "is {width} x {height} pixels large, its scene {} x {}: give the picture as it was rendered",
+                    scene.screen.width,
+                    scene.screen.rows()
+                )));
+            }
             let pixel_uas = scene.pixel_size() * angle;
             let hours = scene.observer.time * seconds / 3600.0;
             let field_uas = Some(pixel_uas * width as f64);
             let times = OwnTimes::Since(vec![hours]);
-            Ok(Pixels { field_uas, times, ..in_pixels(pixel_uas * pixel_uas) })
+            Ok(Pixels { field_uas, times, ..in_pixels(pixel_uas * pixel_uas)? })
         }
         Some(_) => {
             Err(lacks("its intensity has no unit of the sky: render it with screen.total_flux_jy"))
         }
-        None => Ok(in_pixels(1.0)),
+        None => in_pixels(1.0),
     }
 }
 
@@ -331,6 +361,7 @@ impl<W: Write + Seek> MovieWriter<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::image::{Channel, Picture};
 
     #[test]
     fn exact_grids_of_numbers() {
@@ -341,5 +372,52 @@ mod tests {
         assert!(fail("1,2\n3\n").contains("line 2: 1 pixels"));
         assert!(fail("#\n1,x\n").contains("line 2, column 2: `x`"));
         assert!(fail("# nothing\n").contains("no pixels"));
+    }
+
+    /// An EXR of 2 x 1 pixels, 1 and 2, with the same in Q and U, whose attribute holds other numbers.
+    fn exr_with(attribute: &str, numbers: &[[u8; 4]]) -> Result<Pixels> {
+        let channel = |name: &str| Channel { name: name.to_owned(), values: vec![1.0, 2.0] };
+        let channels = ["intensity", "Q", "U"].map(channel).to_vec();
+        let picture = Picture { width: 2, height: 1, channels };
+        let mut bytes = exr::encode(&picture, &exr::Attributes::new()).unwrap();
+        let name = format!("{attribute}\0");
+        let at = bytes.windows(name.len()).position(|w| w == name.as_bytes()).unwrap();
+        // The name, the name of its type, and the size of the value in four bytes.
+        let kind = bytes[at + name.len()..].iter().position(|b| *b == 0).unwrap() + 1;
+        let value = at + name.len() + kind + 4;
+        bytes[value..value + 4 * numbers.len()].copy_from_slice(numbers.as_flattened());
+        exr_picture(&bytes)
+    }
+
+    /// The picture is the display window, in which pixels lie where the data window is.
+    #[test]
+    fn exact_exr_data_window_inside_its_display_window() {
+        let display = |window: [i32; 4]| exr_with("displayWindow", &window.map(i32::to_le_bytes));
+        let pixels = display([-1, -2, 2, 0]).unwrap();
+        assert_eq!((pixels.width, pixels.height), (4, 3));
+        let values = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 0.0];
+        assert_eq!(pixels.values, values);
+        assert_eq!(pixels.polarized, [Some(values.to_vec()), Some(values.to_vec()), None]);
+        assert_eq!(display([0, 0, 1, 0]).unwrap().values, [1.0, 2.0]);
+        for beyond in [[0, 0, 0, 0], [1, 0, 4, 4], [0, 1, 4, 4]] {
+            let message = display(beyond).unwrap_err().to_string();
+            assert!(message.contains("display window"), "{message}");
+        }
+        let message = exr_with("pixelAspectRatio", &[2.0f32.to_le_bytes()]).unwrap_err();
+        assert!(message.to_string().contains("pixelAspectRatio = 2"), "{message}");
+    }
+
+    /// Planes of numbers that are not finite, and Q without U, are refused by name.
+    #[test]
+    fn exact_polarised_pixels_are_checked() {
+        let of = |polarized| {
+            let pixels =
+                Pixels { width: 1, height: 1, values: vec![1.0], polarized, ..Pixels::default() };
+            pixels.movie(10.0)
+        };
+        assert!(of([Some(vec![0.5]), Some(vec![0.25]), None]).is_ok());
+        let message = of([Some(vec![0.5]), Some(vec![f64::NAN]), None]).unwrap_err().to_string();
+        assert!(message.contains("Stokes U: row 1, column 1"), "{message}");
+        assert!(of([Some(vec![0.5]), None, None]).unwrap_err().to_string().contains("Q and U"));
     }
 }

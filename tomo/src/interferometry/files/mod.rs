@@ -4,6 +4,7 @@
 mod comments;
 mod eht_table;
 mod fits;
+mod fits_axes;
 mod fits_image;
 mod gains;
 pub mod images;
@@ -11,6 +12,7 @@ mod leakage;
 mod light_curve;
 mod obs_text;
 mod table;
+mod text_image;
 mod uvfits;
 
 pub use comments::write as observation_comments;
