@@ -1,6 +1,5 @@
 //! Bars with the time left on a terminal; of pictures and films, a line a minute in a pipe.
 
-use crate::ranks;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::thread;
@@ -9,7 +8,7 @@ use std::time::Duration;
 /// A bar that shows how much of the work is done.
 pub fn bar(length: u64) -> ProgressBar {
     let bar = styled(length, "{bar:40} {percent:>3} %  {elapsed} gone, {eta} left");
-    if !std::io::stderr().is_terminal() && !ranks::is_silent() {
+    if !std::io::stderr().is_terminal() {
         tell(&bar, Duration::from_secs(60), |line| eprintln!("{line}"));
     }
     bar

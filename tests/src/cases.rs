@@ -8,7 +8,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 /// Small fits: as many as there are seeds.
-fn experiment(folder: &Path, seeds: usize, steps: usize) {
+pub fn experiment(folder: &Path, seeds: usize, steps: usize) {
     let fit = root().join("scenes/fits/scene_1.toml");
     let text = format!(
         r#"

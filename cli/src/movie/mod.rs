@@ -10,7 +10,6 @@ use crate::assets::{self, Reach};
 use crate::devices::{self, DeviceOption};
 use crate::output::Output;
 use crate::overlay::OverlayOptions;
-use crate::ranks;
 use crate::render::exr_options::ExrOptions;
 use crate::render::preview::PreviewOptions;
 use crate::render::report;
