@@ -144,8 +144,6 @@ fn appear(plan: &Plan, experiment: &str, folder: &Path) -> anyhow::Result<bool> 
     let place = std::path::absolute(folder).with_context(name)?;
     let parent = place.parent().with_context(name)?;
     fs::create_dir_all(parent).with_context(name)?;
-    let name_of = place.file_name().unwrap_or_default().to_string_lossy();
-    output::sweep(parent, |meant| meant == name_of);
     let mut builder = tempfile::Builder::new();
     let prefix = output::prefix_of(&place);
     builder.prefix(&prefix);

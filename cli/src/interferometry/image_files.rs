@@ -20,11 +20,11 @@ pub fn read(path: &Path, fov_uas: Option<f64>) -> anyhow::Result<(StokesMovie, O
         "fits" | "fit" if fov_uas.is_some() => {
             bail!("--fov-uas is not for FITS images, which have a field of view")
         }
-        "csv" | "txt" if images::is_text_image(&bytes) => {
+        "csv" | "txt" if files::is_text_image(&bytes) => {
             if fov_uas.is_some() {
                 bail!("--fov-uas is not for text images of eht-imaging, which have a field of view")
             }
-            images::text_image(&bytes).with_context(name)?
+            files::parse_text_image(&bytes).with_context(name)?
         }
         "fits" | "fit" => {
             let movie = files::read_fits_image(&bytes).with_context(name)?;

@@ -1,6 +1,6 @@
 //! The colours of an EXR that is to be the sky.
 
-use super::panorama::PanoramaError;
+use super::PanoramaError;
 use crate::image::{Picture, exr};
 
 /// Width, height and linear colours of an EXR.

@@ -1,7 +1,6 @@
 //! Images and movies as grids of numbers, arrays of NumPy, and pictures in EXR.
 
 use super::FileError;
-pub use super::text_image::{is_text_image, parse as text_image};
 use crate::Error;
 use crate::frames::{Frames, Sink};
 use crate::image::exr;

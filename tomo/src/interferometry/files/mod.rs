@@ -25,6 +25,7 @@ pub use light_curve::{
 };
 pub use obs_text::{parse as parse_obs_text, to_text as to_obs_text};
 pub use table::{COLUMNS as TABLE_COLUMNS, parse as parse_table, to_csv};
+pub use text_image::{is_text_image, parse as parse_text_image};
 pub use uvfits::{read as read_uvfits, write as write_uvfits};
 
 use super::array::{MOST_STATIONS, Station};

@@ -1,6 +1,6 @@
 //! Scans, told by the gaps between them, and intervals of time.
 
-use super::average::Averaging;
+use super::Averaging;
 use super::{Observation, Row};
 
 /// A scan ends where nothing was measured for longer than this, seconds; a minute, but for rounded times.

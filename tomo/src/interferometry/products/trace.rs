@@ -118,6 +118,9 @@ const MOST_CANDIDATES: usize = 16;
 /// errors of second order, which are the square of the error of each number in it.
 const LEAST_OWN_VARIANCE: f64 = 30.0;
 
+/// Stations of a row in its order, and its index.
+type Oriented = ([u16; 2], usize);
+
 impl TraceSet {
     /// Rows that have all four products of circular feeds with errors above 0, and a Stokes I above `least_snr` times its noise.
     pub fn rows(observation: &Observation, least_snr: f64) -> Vec<&Row> {
@@ -139,7 +142,7 @@ impl TraceSet {
     pub fn of(observation: &Observation, least_snr: f64) -> Vec<TraceSet> {
         let rows = Self::rows(observation, least_snr);
         let coherencies: Vec<Coherency> = rows.iter().map(|r| Coherency::of(r.products)).collect();
-        let mut scans: HashMap<(u64, u16), Layers<([u16; 2], usize)>> = HashMap::new();
+        let mut scans: HashMap<(u64, u16), Layers<Oriented>> = HashMap::new();
         for (k, row) in rows.iter().enumerate() {
             let [a, b] = row.stations;
             let layers = scans.entry((row.time_h.to_bits(), row.channel)).or_default();

@@ -2,8 +2,16 @@
 
 use super::super::FileError;
 use super::super::fits::Header;
-use super::selectors::SELECTORS;
 use crate::interferometry::observation::Basis;
+
+/// The parameters, and what they number (AIPS memo 117, table 5).
+pub const SELECTORS: [(&str, &str); 5] = [
+    ("SOURCE", "sources"),
+    ("FREQSEL", "frequency setups"),
+    ("GATEID", "pulsar gates"),
+    ("FILTER", "filters"),
+    ("CORR-ID", "correlations"),
+];
 
 /// A random parameter: value = stored·scale + zero.
 #[derive(Debug, Clone, Copy)]

@@ -4,7 +4,7 @@ use super::super::FileError;
 use super::super::fits;
 use super::antennas::AntennaTables;
 use super::frequencies;
-use super::layout::{Antennas, Layout, is_measured};
+use super::layout::{Antennas, Layout, SELECTORS, is_measured};
 use super::selectors;
 use crate::Error;
 use crate::interferometry::Complex64;
@@ -29,25 +29,16 @@ pub fn read(bytes: &[u8]) -> Result<Observation, Error> {
     let units = fits::units(bytes)?;
     let header = &units[0].header;
     let layout = Layout::new(header)?;
-    let count = layout.channels.len();
-    let rows = layout.groups.checked_mul(count).and_then(|n| n.checked_mul(size_of::<Row>()));
-    if rows.is_none_or(|size| size > MOST_MEMORY * bytes.len()) {
-        let message = format!("{count} channels of so few bytes that rows would be too large");
-        return Err(header.error("BITPIX", message).into());
-    }
+    check_memory(header, &layout, bytes.len())?;
     selectors::check_header(header)?;
     let uncalibrated = selectors::check_tables(&units)?;
     let source = selectors::source(&units, &layout)?;
-    for (name, _) in selectors::SELECTORS {
+    for (name, _) in SELECTORS {
         selectors::only(&units[0], &layout, name)?;
     }
     let tables = AntennaTables::read(&units)?;
-    let reference_hz = tables.frequency_hz.unwrap_or(layout.frequency_hz);
-    if !(1e6..=1e15).contains(&reference_hz) {
-        return Err(header
-            .error("CRVAL4", "no frequency in [1e6, 1e15] Hz in AN table or header")
-            .into());
-    }
+    let reference_hz =
+        reference_frequency(header, tables.frequency_hz.unwrap_or(layout.frequency_hz))?;
     let (mut channels, unknown) = frequencies::channels(&units, &layout, reference_hz)?;
     let mut frequency_hz = reference_hz;
     if let [only] = channels[..] {
@@ -85,16 +76,7 @@ pub fn read(bytes: &[u8]) -> Result<Observation, Error> {
         rows,
         ..Observation::empty(layout.basis)
     };
-    if unknown {
-        let line = "no AIPS FQ table: all IFs counted at the reference frequency";
-        observation.history.push(line.to_owned());
-    }
-    if ahead_h != 0.0 {
-        observation.history.push(format!("times of TAI less {} s", (ahead_h * 3600.0).round()));
-    }
-    if !layout.weighted {
-        observation.history.push("no weights: errors of 1 Jy".to_owned());
-    }
+    observation.history = remarks(unknown, ahead_h, layout.weighted);
     observation.history.extend(uncalibrated);
     if left_out > 0 {
         observation.history.push(format!("{left_out} groups without valid data left out"));
@@ -102,6 +84,40 @@ pub fn read(bytes: &[u8]) -> Result<Observation, Error> {
     observation.history.extend(tables.remarks);
     observation.stations = tables.stations;
     Ok(observation)
+}
+
+/// Refuses headers whose rows would take too many times the memory of the file.
+fn check_memory(header: &fits::Header<'_>, layout: &Layout, bytes: usize) -> Result<(), FileError> {
+    let count = layout.channels.len();
+    let rows = layout.groups.checked_mul(count).and_then(|n| n.checked_mul(size_of::<Row>()));
+    if rows.is_none_or(|size| size > MOST_MEMORY * bytes) {
+        let message = format!("{count} channels of so few bytes that rows would be too large");
+        return Err(header.error("BITPIX", message));
+    }
+    Ok(())
+}
+
+/// The frequency in Hz that channels count from.
+fn reference_frequency(header: &fits::Header<'_>, hertz: f64) -> Result<f64, FileError> {
+    if (1e6..=1e15).contains(&hertz) {
+        return Ok(hertz);
+    }
+    Err(header.error("CRVAL4", "no frequency in [1e6, 1e15] Hz in AN table or header"))
+}
+
+/// Lines of the history about what the file does not tell, and what was done with its times.
+fn remarks(without_fq: bool, ahead_h: f64, weighted: bool) -> Vec<String> {
+    let mut lines = Vec::new();
+    if without_fq {
+        lines.push("no AIPS FQ table: all IFs counted at the reference frequency".to_owned());
+    }
+    if ahead_h != 0.0 {
+        lines.push(format!("times of TAI less {} s", (ahead_h * 3600.0).round()));
+    }
+    if !weighted {
+        lines.push("no weights: errors of 1 Jy".to_owned());
+    }
+    lines
 }
 
 /// Baselines of interferometers in space are shorter than this, seconds of light.

@@ -2,18 +2,9 @@
 
 use super::super::FileError;
 use super::super::fits::{Header, Table, Unit};
-use super::layout::{Layout, Parameter};
+use super::layout::{Layout, Parameter, SELECTORS};
 use crate::interferometry::earth::SourcePosition;
 use std::collections::BTreeSet;
-
-/// The parameters, and what they number (AIPS memo 117, table 5).
-pub const SELECTORS: [(&str, &str); 5] = [
-    ("SOURCE", "sources"),
-    ("FREQSEL", "frequency setups"),
-    ("GATEID", "pulsar gates"),
-    ("FILTER", "filters"),
-    ("CORR-ID", "correlations"),
-];
 
 /// As many values are listed.
 const SHOWN: usize = 16;
