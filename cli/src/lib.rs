@@ -93,7 +93,7 @@ use std::path::PathBuf;
 struct Arguments {
     #[command(subcommand)]
     verb: Verb,
-    /// Threads, which change no result [default: one a core, most: four]
+    /// Threads; results are the same [default: one a core]
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=threads::MOST))]
     threads: Option<u16>,
     /// Memory limit, e.g. 4GiB [default: what the system leaves]
