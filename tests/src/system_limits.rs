@@ -1,6 +1,6 @@
 //! What the system refuses: threads, an open standard output; and what is left behind by kills.
 
-use crate::support::{binary, succeed};
+use crate::support::{binary, root, succeed};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -76,8 +76,10 @@ fn exact_what_cannot_be_printed_is_an_error() {
 fn exact_leftovers_of_a_killed_film_are_removed_by_the_next() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
+    let scene = root().join("scenes/disc_face_on.toml");
+    let scene = scene.to_str().unwrap();
     let words =
-        ["movie", "--frames", "2", "--duration", "60", "-o", "m", "--gif", "m.gif", "--png"];
+        ["movie", scene, "--frames", "2", "--duration", "60", "-o", "m", "--gif", "m.gif", "--png"];
     let words = [&words[..], &["--set", "screen.width=8", "--set", "screen.height=8"]].concat();
     succeed(folder.path(), &words);
     let ours = [
