@@ -270,7 +270,8 @@ mod tests {
             let found = at(q, angle, frequency);
             assert!((found - closed).abs() < 2e-6, "{q} at {angle}: {found}");
             let found = (-integrated(q, angle, frequency)).exp();
-            assert!((found - integral).abs() < 1e-7, "{q} at {angle}: {found}");
+            // Both are sums of a numerical quadrature.
+            assert!((found - integral).abs() < 1e-6, "{q} at {angle}: {found}");
         }
         let (six, eight) = (at(6e9, 0.0, 226.191_789_062_5e9), at(8e9, 0.0, 226.191_789_062_5e9));
         assert!((six - 0.341_37).abs() < 1e-5 && (eight - 0.188_96).abs() < 1e-5);
