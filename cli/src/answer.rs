@@ -39,8 +39,6 @@ pub enum Form {
     Json,
     /// Text on standard error: standard output carries a file.
     Aside,
-    /// Not at all: another process speaks for this one.
-    Silent,
 }
 
 impl Answer {
@@ -125,7 +123,6 @@ impl Answer {
             Form::Json => output::print(&format!("{:#}\n", self.into_json()))?,
             Form::Text => output::print(&self.into_text()?)?,
             Form::Aside => eprint!("{}", self.into_text()?),
-            Form::Silent => {}
         }
         failure.map_or(Ok(()), Err)
     }

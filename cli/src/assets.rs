@@ -3,6 +3,7 @@
 use crate::output::{self, Output};
 use crate::volume_files;
 use anyhow::Context;
+use clap::Args;
 use kerrlight_render::emission::mesh::MeshFile;
 use kerrlight_render::emission::sky::{Catalogue, Panorama};
 use kerrlight_render::scene::{Scene, Sky};
@@ -21,9 +22,37 @@ pub struct Files {
     pub paths: Vec<PathBuf>,
 }
 
+/// How far the files may lie that a mesh of a scene refers to. The scene is the user's own text and names any file; a
+/// mesh may come from anywhere.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub struct Reach {
+    /// Let meshes refer to files outside of their own folders (materials, textures, buffers)
+    #[arg(long, hide_short_help = true)]
+    pub allow_outside: bool,
+}
+
+impl Reach {
+    /// What a mesh in the folder `beside` refers to; `None` if there is no such file.
+    fn find(self, beside: &Path, name: &str) -> Result<Option<PathBuf>, String> {
+        let path = beside.join(name);
+        // Links are followed: what counts is where the file itself lies.
+        let Ok(found) = path.canonicalize() else { return Ok(None) };
+        let home = beside.canonicalize().map_err(|error| error.to_string())?;
+        if self.allow_outside || found.starts_with(home) {
+            return Ok(Some(path));
+        }
+        Err("it lies outside of the folder of the mesh: if you trust the mesh, give --allow-outside".to_owned())
+    }
+}
+
 /// Reads and decodes the files of a scene, whose names are relative to `folder`. None of them,
 /// nor what they refer to, may be one of `outputs`.
-pub fn load(scene: &Scene, folder: &Path, outputs: &[&Output]) -> anyhow::Result<Files> {
+pub fn load(
+    scene: &Scene,
+    folder: &Path,
+    outputs: &[&Output],
+    reach: Reach,
+) -> anyhow::Result<Files> {
     let identity = RefCell::new(String::new());
     let paths = RefCell::new(Vec::new());
     let read = |path: &Path| {
@@ -40,10 +69,15 @@ pub fn load(scene: &Scene, folder: &Path, outputs: &[&Output]) -> anyhow::Result
         let path = folder.join(&mesh.path);
         let name = || format!("`mesh.{k}.path` {}", path.display());
         let bytes = read(&path).with_context(|| format!("`mesh.{k}.path`"))?;
-        // What a mesh refers to lies beside it.
-        let beside = path.parent().unwrap_or(Path::new("."));
-        let resources = |name: &str| read(&beside.join(name)).map_err(|error| format!("{error:#}"));
-        MeshFile::decode(&bytes, &resources).with_context(name)
+        let beside = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let beside = beside.unwrap_or(Path::new("."));
+        let resources = |name: &str| {
+            let found = reach.find(beside, name)?;
+            found.map(|path| read(&path)).transpose().map_err(|error| format!("{error:#}"))
+        };
+        let file = MeshFile::decode(&bytes, &resources).with_context(name)?;
+        warn(&name(), &file.warnings);
+        anyhow::Ok(file)
     });
     let meshes = meshes.collect::<anyhow::Result<_>>()?;
     let volumes = scene.volume.iter().enumerate().map(|(k, volume)| {
@@ -59,6 +93,11 @@ pub fn load(scene: &Scene, folder: &Path, outputs: &[&Output]) -> anyhow::Result
     Ok(Files { decoded, identity: identity.into_inner(), paths: paths.into_inner() })
 }
 
+/// Tells what of a file is not shown as it says.
+fn warn(name: &str, warnings: &[String]) {
+    warnings.iter().for_each(|what| eprintln!("warning: {name}: {what}"));
+}
+
 /// Where the picture of a `[sky.image]` lies.
 fn sky_path(scene: &Scene, folder: &Path) -> Option<PathBuf> {
     match &scene.sky {
@@ -72,7 +111,10 @@ fn load_stars(
     read: &dyn Fn(&Path) -> anyhow::Result<Vec<u8>>,
 ) -> anyhow::Result<Catalogue> {
     let bytes = read(path).context("`sky.catalogue.path`")?;
-    Catalogue::decode(&bytes).with_context(|| format!("`sky.catalogue.path` {}", path.display()))
+    let name = format!("`sky.catalogue.path` {}", path.display());
+    let stars = Catalogue::decode(&bytes).with_context(|| name.clone())?;
+    warn(&name, stars.warnings());
+    Ok(stars)
 }
 
 fn load_sky(
@@ -80,5 +122,8 @@ fn load_sky(
     read: &dyn Fn(&Path) -> anyhow::Result<Vec<u8>>,
 ) -> anyhow::Result<Panorama> {
     let bytes = read(path).context("`sky.image.path`")?;
-    Panorama::decode(&bytes).with_context(|| format!("`sky.image.path` {}", path.display()))
+    let name = format!("`sky.image.path` {}", path.display());
+    let sky = Panorama::decode(&bytes).with_context(|| name.clone())?;
+    warn(&name, sky.warnings());
+    Ok(sky)
 }

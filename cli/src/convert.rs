@@ -12,7 +12,7 @@ use kerrlight_vlbi::array::Station;
 use kerrlight_vlbi::files::{self, FileError};
 use kerrlight_vlbi::gains::is_same_station;
 use kerrlight_vlbi::light_curve::LightCurve;
-use kerrlight_vlbi::observation::{Basis, Flags, Observation};
+use kerrlight_vlbi::observation::{Averaging, Basis, Flags, Observation};
 use kerrlight_vlbi::source::Source;
 use std::path::PathBuf;
 
@@ -92,8 +92,8 @@ impl Convert {
         let output = ObservationFile::new(&self.output, self.format, self.comments)?;
         output.spares(&self.input)?;
         self.gains.iter().chain(&self.leakage).try_for_each(|table| output.spares(table))?;
-        if let Some(seconds) = self.average.filter(|s| !(*s > 0.0 && s.is_finite())) {
-            bail!("--average {seconds} is not allowed: positive seconds");
+        if let Some(seconds) = self.average.filter(|s| !Averaging::over(*s).is_allowed()) {
+            bail!("--average {seconds} is not allowed: seconds in [1e-3, 1e9]");
         }
         if let Some(snr) = self.closure_traces.filter(|snr| !(0.0..=1e9).contains(snr)) {
             bail!("--closure-traces {snr} is not allowed: a signal-to-noise ratio in [0, 1e9]");
@@ -121,11 +121,8 @@ impl Convert {
             observation = observation.averaged_over_channels();
         }
         if let Some(seconds) = self.average {
-            observation = match self.closure_traces {
-                // Traces need one time for all baselines of a scan.
-                Some(_) => observation.averaged_in_scans(seconds),
-                None => observation.averaged(seconds),
-            };
+            interferometry::warn_of_repeats(&self.input.display().to_string(), &observation);
+            observation = observation.averaged(Averaging::over(seconds));
         }
         if observation.rows.is_empty() {
             bail!("{}: no visibilities are left", self.input.display());

@@ -1,6 +1,6 @@
 //! Ctrl-C, and the system's requests to end. Work that keeps what it has is told to stop; anything else ends at once.
 
-use crate::output;
+use crate::{output, threads};
 use std::io::Read;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -92,12 +92,16 @@ fn raise(signal: u8) {
     match keeper {
         Some(Kept::Waits(words)) if is_first => tell(words),
         Some(Kept::Ends(words)) if is_first => {
-            std::thread::spawn(move || {
+            let said = words.clone();
+            let late = threads::spawn(move || {
                 std::thread::sleep(MOMENT);
                 if self::now().keeper.is_some() {
-                    end(signal, &words);
+                    end(signal, &said);
                 }
             });
+            if late.is_err() {
+                end(signal, &words);
+            }
         }
         _ => end(signal, "interrupted"),
     }
@@ -121,8 +125,11 @@ fn tell(text: &str) {
 }
 
 /// Listens to signals: before any other thread starts, as all of them must leave signals to this one.
+///
+/// # Errors
+/// If the system has no more threads.
 #[cfg(unix)]
-pub fn listen() {
+pub fn listen() -> anyhow::Result<()> {
     use nix::sys::signal::{SigSet, Signal};
     let mut signals = SigSet::empty();
     signals.add(Signal::SIGINT);
@@ -132,12 +139,13 @@ pub fn listen() {
     }
     // If signals cannot be blocked, they end the program as usual.
     if signals.thread_block().is_ok() {
-        std::thread::spawn(move || {
+        threads::spawn(move || {
             while let Ok(signal) = signals.wait() {
                 raise(signal as u8);
             }
-        });
+        })?;
     }
+    Ok(())
 }
 
 /// Whether the program was started by `nohup`.
@@ -158,15 +166,21 @@ fn is_hangup_ignored() -> bool {
 }
 
 /// Listens to Ctrl-C.
+///
+/// # Errors
+/// None: without a handler Ctrl-C ends the program, as everywhere.
 #[cfg(not(unix))]
-pub fn listen() {
-    // Without a handler Ctrl-C ends the program, as everywhere.
+pub fn listen() -> anyhow::Result<()> {
     let _ = ctrlc::set_handler(|| raise(INTERRUPT));
+    Ok(())
 }
 
 /// Takes the end of standard input for a request to end: of a parent that closes it, or is no more.
-pub fn follow_parent() {
-    std::thread::spawn(|| {
+///
+/// # Errors
+/// If the system has no more threads.
+pub fn follow_parent() -> anyhow::Result<()> {
+    threads::spawn(|| {
         let mut bytes = [0; 64];
         let mut input = std::io::stdin();
         while input.read(&mut bytes).is_ok_and(|count| count > 0) {}
@@ -174,5 +188,6 @@ pub fn follow_parent() {
         if !STOP.load(Ordering::Relaxed) {
             raise(TERMINATE);
         }
-    });
+    })?;
+    Ok(())
 }

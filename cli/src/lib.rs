@@ -40,7 +40,6 @@ mod accuracy;
 mod answer;
 mod assets;
 mod checksum;
-mod claims;
 mod columns;
 mod compare;
 mod completions;
@@ -66,11 +65,11 @@ mod paths;
 pub mod pictures;
 mod program;
 mod progress;
-mod ranks;
 mod record;
 mod render;
 mod report;
 mod reproduce;
+pub mod threads;
 mod trace;
 mod usage;
 mod uv;
@@ -94,8 +93,8 @@ use std::path::PathBuf;
 struct Arguments {
     #[command(subcommand)]
     verb: Verb,
-    /// Threads, which change no result [default: one a core]
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    /// Threads; results are the same [default: one a core]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=threads::MOST))]
     threads: Option<u16>,
     /// Memory limit, e.g. 4GiB [default: what the system leaves]
     #[arg(long, global = true, value_name = "SIZE", value_parser = memory::parse)]
@@ -148,19 +147,14 @@ enum Verb {
 
 fn run(arguments: &Arguments, program: &Program) -> anyhow::Result<()> {
     memory::limit(arguments.memory)?;
-    if let Some(threads) = arguments.threads {
-        rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
-    }
+    threads::start(arguments.threads)?;
     let form = match (arguments.json, arguments.verb.pipes()) {
         (true, true) => bail!("--json and `-` both ask for standard output: give a file's name"),
         (true, false) => Form::Json,
         (false, true) => Form::Aside,
         (false, false) => Form::Text,
     };
-    let is_silent = arguments.verb.shares() && ranks::is_silent();
-    let form = if is_silent { Form::Silent } else { form };
-    let to = arguments.record.as_deref().filter(|_| !is_silent);
-    let to = to.map(|path| Output::new(path, "json")).transpose()?;
+    let to = arguments.record.as_deref().map(|path| Output::new(path, "json")).transpose()?;
     let Some(to) = to else { return arguments.verb.run(arguments, program)?.print(form) };
     output::follow();
     let recorder = Recorder::of_process();
@@ -170,12 +164,6 @@ fn run(arguments: &Arguments, program: &Program) -> anyhow::Result<()> {
 }
 
 impl Verb {
-    /// Whether ranks of one job do it together. Of others each does it for itself.
-    fn shares(&self) -> bool {
-        let rays = matches!(self, Verb::Render(_) | Verb::Movie(_) | Verb::Accuracy(_));
-        rays || matches!(self, Verb::Fit(_) | Verb::Posterior(_) | Verb::Compare(_))
-    }
-
     /// Whether standard output carries a file, because a path is `-`.
     fn pipes(&self) -> bool {
         match self {

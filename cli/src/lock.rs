@@ -22,13 +22,29 @@ impl Lock {
         Self::by(File::try_lock, folder, busy, patience)
     }
 
+    /// Takes the lock of a file, which is made if there is none; nothing if another process has it.
+    pub fn of_file(path: &Path) -> anyhow::Result<Option<Self>> {
+        let file = open(path)?;
+        Ok(match file.try_lock() {
+            Err(TryLockError::WouldBlock) => None,
+            // Not every file system has locks.
+            Ok(()) | Err(TryLockError::Error(_)) => Some(Lock(file)),
+        })
+    }
+
+    /// Whether a process has the lock of a file.
+    pub fn is_held(path: &Path) -> bool {
+        let file = File::open(path);
+        file.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+    }
+
     fn by(
         lock: fn(&File) -> Result<(), TryLockError>,
         folder: &Path,
         busy: &str,
         patience: Duration,
     ) -> anyhow::Result<Self> {
-        let file = open(folder)?;
+        let file = open(&folder.join(NAME))?;
         let clock = Instant::now();
         loop {
             match lock(&file) {
@@ -43,10 +59,9 @@ impl Lock {
     }
 }
 
-fn open(folder: &Path) -> anyhow::Result<File> {
-    let path = folder.join(NAME);
+fn open(path: &Path) -> anyhow::Result<File> {
     let mut options = OpenOptions::new();
-    let file = options.read(true).write(true).create(true).truncate(false).open(&path);
+    let file = options.read(true).write(true).create(true).truncate(false).open(path);
     file.with_context(|| format!("cannot open {}", path.display()))
 }
 

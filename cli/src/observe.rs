@@ -1,6 +1,7 @@
 //! `kerrlight observe`: what an array of telescopes would see.
 
 use crate::answer::Answer;
+use crate::assets::Reach;
 use crate::interferometry::arguments::{self, Observing};
 use crate::interferometry::movie_files::{self, FrameTimes};
 use crate::interferometry::{ObservationFile, scene_movie};
@@ -13,7 +14,7 @@ use kerrlight_vlbi::noise::{
 use kerrlight_vlbi::observation::Observation;
 use kerrlight_vlbi::operator::{Method, Pulse};
 use kerrlight_vlbi::schedule;
-use kerrlight_vlbi::simulate::{self, Movie};
+use kerrlight_vlbi::simulate::{self, StokesMovie};
 use std::path::PathBuf;
 
 /// Arguments of `kerrlight observe`.
@@ -25,6 +26,8 @@ pub struct Observe {
     /// files), or a scene (.toml)
     #[arg(required = true, value_name = "INPUT")]
     inputs: Vec<PathBuf>,
+    #[command(flatten)]
+    reach: Reach,
     /// When the images of a movie show the source: `scans` (image k at scan k; needed only where the
     /// images' own times disagree), `own` (EXR of kerrlight: the scene's times, the first being the
     /// first scan; .npz: hours of UTC named `times`), hours of UTC of the first and of the last, or
@@ -126,10 +129,11 @@ impl Observe {
         }
         let times_h = schedule.hours_utc(setup.ut1)?;
         let (movie, frames_h, said) = self.movie(&files, &times_h)?;
-        if let Some(warning) = odd(&movie.pixels) {
+        if let Some(warning) = odd(&movie.i.pixels) {
             eprintln!("warning: {}: {warning}", self.shown());
         }
-        let fill = simulate::fill(&mut observation, &movie, self.pulse(), &frames_h, self.method());
+        let fill =
+            simulate::fill_stokes(&mut observation, &movie, self.pulse(), &frames_h, self.method());
         let transform = fill.with_context(|| self.shown())?;
         self.spoil(&mut observation, seed)?;
         observation.history = self.history(said, transform);
@@ -167,13 +171,13 @@ impl Observe {
         &self,
         files: &[PathBuf],
         scans_h: &[f64],
-    ) -> anyhow::Result<(Movie, Vec<f64>, String)> {
+    ) -> anyhow::Result<(StokesMovie, Vec<f64>, String)> {
         let is_scene =
             |path: &PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
         if !files.iter().any(is_scene) {
             let (movie, own) = movie_files::read(files, self.fov_uas)?;
             let choice = self.frame_times.as_ref();
-            let (times, said) = movie_files::times(movie.frames(), &own, choice, scans_h)
+            let (times, said) = movie_files::times(movie.i.frames(), &own, choice, scans_h)
                 .with_context(|| self.shown())?;
             return Ok((movie, times, said));
         }
@@ -181,8 +185,8 @@ impl Observe {
             bail!("--fov-uas and --frame-times are not for scenes, which have field and times");
         }
         let [scene] = files else { bail!("a scene is observed alone, without other files") };
-        let movie = scene_movie::read(scene, scans_h)?;
-        let times = scans_h[..movie.frames()].to_vec();
+        let movie = scene_movie::read(scene, scans_h, self.reach)?;
+        let times = scans_h[..movie.i.frames()].to_vec();
         Ok((movie, times, "rendered at the time of each scan".to_owned()))
     }
 
@@ -233,7 +237,7 @@ impl Observe {
     /// In the order of light's way.
     fn spoil(&self, observation: &mut Observation, seed: u64) -> anyhow::Result<()> {
         if self.scatter_sgra {
-            scatter(observation, &ScatteringKernel::SGR_A)?;
+            scatter(observation, &ScatteringKernel::sgr_a())?;
         }
         if self.gains() != GainErrors::default() {
             apply_gains(observation, &self.gains(), seed);

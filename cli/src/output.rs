@@ -2,6 +2,12 @@
 
 #[cfg(feature = "zarr")]
 pub mod folder;
+mod leftovers;
+mod standard;
+
+pub use leftovers::{BESIDE, lock, prefix_of, sweep};
+use standard::pour;
+pub use standard::{exit, print};
 
 use crate::checksum::Sum;
 use anyhow::{Context, bail};
@@ -22,9 +28,6 @@ pub struct Output {
     /// Whether the bytes go to standard output once they are whole.
     piped: bool,
 }
-
-/// How names begin of what is written beside its place.
-pub const BESIDE: &str = ".kerrlight-";
 
 /// The name of standard output and of standard input.
 pub const PIPE: &str = "-";
@@ -81,7 +84,7 @@ impl Output {
         if !is_pipe(path) {
             return Self::ending_in(path, extensions);
         }
-        // The bytes are kept in a temporary file until they are whole.
+        standard::check()?;
         let (given, folder) = (path.to_owned(), std::env::temp_dir());
         Ok(Output { path: given.clone(), given, folder, piped: true })
     }
@@ -101,17 +104,22 @@ impl Output {
             use std::os::unix::fs::PermissionsExt;
             builder.permissions(std::fs::Permissions::from_mode(0o666))
         };
-        let file = builder
-            .tempfile_in(&self.folder)
-            .with_context(|| format!("cannot write to {}", self.folder.display()))?;
-        // It tells others that somebody writes here; not every file system has locks.
-        let _ = file.as_file().try_lock();
-        Ok(file)
+        loop {
+            let file = builder
+                .tempfile_in(&self.folder)
+                .with_context(|| format!("cannot write to {}", self.folder.display()))?;
+            // It tells others that somebody writes here. One that came before the lock has removed the file.
+            if lock(file.as_file()) {
+                return Ok(file);
+            }
+        }
     }
 
     /// Removes what processes have left beside its place that were killed in the middle of writing it.
-    pub fn sweep(&self) {
-        sweep(&self.folder, &prefix_of(&self.path));
+    fn sweep(&self) {
+        if let Some(name) = self.path.file_name().filter(|_| !self.piped) {
+            leftovers::sweep_once(&self.folder, &name.to_string_lossy());
+        }
     }
 
     /// Refuses to take the place of a file that is read.
@@ -144,15 +152,22 @@ impl Output {
         write: impl FnOnce(&mut BufWriter<&File>) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
         let name = || format!("cannot write {}", self.path.display());
+        if self.piped {
+            // The bytes are kept in a file without a name until they are whole.
+            let file = tempfile::tempfile_in(&self.folder).with_context(name)?;
+            let mut buffer = BufWriter::new(&file);
+            write(&mut buffer).with_context(name)?;
+            buffer.flush().with_context(name)?;
+            drop(buffer);
+            return pour(&file);
+        }
+        self.sweep();
         let file = self.beside()?;
         let _unfinished = Unfinished::new(file.path());
         let mut buffer = BufWriter::new(file.as_file());
         write(&mut buffer).with_context(name)?;
         buffer.flush().with_context(name)?;
         drop(buffer);
-        if self.piped {
-            return pour(file.as_file());
-        }
         file.as_file().sync_all().with_context(name)?;
         file.persist(&self.path).with_context(name)?;
         note(&self.path, |followed| &mut followed.1);
@@ -162,17 +177,8 @@ impl Output {
     /// Where an interrupted run keeps what it needs to be resumed: beside the file itself. Standard output has no such
     /// place.
     pub fn partial(&self) -> Option<PathBuf> {
-        self.ending(".partial")
-    }
-
-    /// Where processes that make it together share what they have, beside the file itself.
-    pub fn shared(&self) -> Option<PathBuf> {
-        self.ending(".shared")
-    }
-
-    fn ending(&self, ending: &str) -> Option<PathBuf> {
         let mut name = self.path.clone().into_os_string();
-        name.push(ending);
+        name.push(".partial");
         (!self.piped).then(|| name.into())
     }
 
@@ -208,48 +214,6 @@ pub fn remove_unfinished() {
     for path in all.iter() {
         // It may have been moved to its place.
         let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir_all(path));
-    }
-}
-
-/// How names begin of what is written beside a place.
-fn prefix_of(path: &Path) -> String {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    format!("{BESIDE}{name}-")
-}
-
-/// Removes what killed processes have left in a folder of files that they were writing and whose names begin so.
-pub fn sweep(folder: &Path, prefix: &str) {
-    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
-        let path = entry.path();
-        if !entry.file_name().to_string_lossy().starts_with(prefix) {
-            continue;
-        }
-        let busy = || File::open(&path).is_ok_and(|file| file.try_lock().is_err());
-        // What is left behind does no harm.
-        let _ = match path.is_dir() {
-            true => std::fs::remove_dir_all(&path),
-            false if busy() => Ok(()),
-            false => std::fs::remove_file(&path),
-        };
-    }
-}
-
-/// Prints to standard output; a reader who has closed the pipe has seen enough.
-pub fn print(text: &str) -> anyhow::Result<()> {
-    printed(std::io::stdout().write_all(text.as_bytes()))
-}
-
-/// Copies a whole file to standard output.
-fn pour(mut file: &File) -> anyhow::Result<()> {
-    file.rewind().context("cannot read the temporary file")?;
-    let mut out = std::io::stdout();
-    printed(std::io::copy(&mut file, &mut out).and_then(|_| out.flush()))
-}
-
-fn printed(result: std::io::Result<()>) -> anyhow::Result<()> {
-    match result {
-        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
-        result => result.context("cannot write to standard output"),
     }
 }
 
@@ -357,5 +321,7 @@ pub fn read_log(path: &Path) -> anyhow::Result<String> {
 
 fn text_of(path: &Path, file: File) -> anyhow::Result<String> {
     let text = String::from_utf8(bytes_of(path, file)?);
-    text.with_context(|| format!("{} is not UTF-8 text", path.display()))
+    let text = text.with_context(|| format!("{} is not UTF-8 text", path.display()))?;
+    // Spreadsheets and editors of Windows put a byte order mark before it.
+    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }

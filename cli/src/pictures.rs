@@ -1,7 +1,7 @@
 //! Pictures and films for programs that keep them in memory: what `kerrlight render` and `kerrlight movie` do, without
 //! their files.
 
-use crate::assets;
+use crate::assets::{self, Reach};
 use crate::render::preview::PreviewOptions;
 use crate::render::report;
 use crate::render::source::{BUILT_IN, Source};
@@ -72,7 +72,7 @@ impl Shot {
     /// If a file or a value is at fault, there is no memory for it, or `progress` returned false.
     pub fn render(&self, progress: &Progress<'_>) -> anyhow::Result<Shown> {
         self.afford(1)?;
-        let files = assets::load(&self.scene, &self.source.folder, &[])?;
+        let files = assets::load(&self.scene, &self.source.folder, &[], Reach::default())?;
         let raster = Raster::new(&self.scene, files.decoded);
         let raster = raster.with_context(|| self.source.name.clone())?;
         let rendered = raster.render(progress)?;
@@ -90,7 +90,7 @@ impl Shot {
     /// As for [`Self::render`].
     pub fn film(&self, times: &[f64], progress: &Progress<'_>) -> anyhow::Result<Vec<Shown>> {
         self.afford(times.len())?;
-        let files = assets::load(&self.scene, &self.source.folder, &[])?;
+        let files = assets::load(&self.scene, &self.source.folder, &[], Reach::default())?;
         let film = Film::new(&self.scene, files.decoded);
         let mut film = film.with_context(|| self.source.name.clone())?;
         let common = Common {

@@ -1,12 +1,14 @@
 //! The program with what others add to it.
 
-use super::{Arguments, compare, fit, help, interrupt, ranks, run};
-use crate::ranks::Silence;
+use super::{Arguments, compare, fit, help, interrupt, output, run};
 use anyhow::Context;
 use clap::FromArgMatches;
 use kerrlight_tomo::representation::{BuildRepresentation, FindRepresentation, Registry};
 use std::ffi::OsString;
 use std::process::{Command, ExitCode};
+
+/// The exit code of a case that another process runs: EX_TEMPFAIL of sysexits.h, to try again.
+const BUSY: u8 = 75;
 
 /// `kerrlight` with representations of one's own.
 #[derive(Default)]
@@ -45,7 +47,7 @@ impl Program {
 
     /// A command that starts the program once more.
     pub(crate) fn again(&self) -> anyhow::Result<Command> {
-        let mut command = match self.launcher.split_first() {
+        Ok(match self.launcher.split_first() {
             Some((program, first)) => {
                 let mut command = Command::new(program);
                 command.args(first);
@@ -54,13 +56,11 @@ impl Program {
             None => {
                 Command::new(std::env::current_exe().context("cannot find the program itself")?)
             }
-        };
-        ranks::forget(&mut command);
-        Ok(command)
+        })
     }
 
     /// Does what the command line says; 0 is success, 2 an error, 1 a fit that failed while it ran or a comparison of which
-    /// a part did, 128 and the number of the signal what a signal has stopped: 130 after Ctrl-C, 143 after SIGTERM.
+    /// a part did, 75 a case that another process runs, 128 and the number of the signal what a signal has stopped: 130 after Ctrl-C, 143 after SIGTERM.
     pub fn run(self) -> ExitCode {
         ExitCode::from(self.run_with(std::env::args_os()))
     }
@@ -68,11 +68,10 @@ impl Program {
     /// The same for a command line of the caller's, whose first word is the program's name; returns the exit code.
     /// Help, and what is wrong with the words themselves, end the process.
     pub fn run_with(self, words: impl IntoIterator<Item = OsString>) -> u8 {
-        let matches = help::command().get_matches_from(words);
-        let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
-        interrupt::listen();
-        let silence = if arguments.verb.shares() { ranks::hush() } else { Silence::default() };
-        match run(&arguments, &self) {
+        let matches = help::command().try_get_matches_from(words);
+        let arguments = matches.and_then(|matches| Arguments::from_arg_matches(&matches));
+        let arguments = arguments.unwrap_or_else(|error| output::exit(&error));
+        match interrupt::listen().and_then(|()| run(&arguments, &self)) {
             Ok(()) => 0,
             Err(error) if error.is::<interrupt::Interrupted>() => {
                 eprintln!("{error:#}");
@@ -80,7 +79,9 @@ impl Program {
             }
             Err(error) => {
                 eprintln!("error: {error:#}");
-                silence.tell(&error);
+                if error.is::<compare::Busy>() {
+                    return BUSY;
+                }
                 let failed = error.downcast_ref::<compare::Failed>().is_some()
                     || error.downcast_ref::<fit::Failed>().is_some();
                 if failed { 1 } else { 2 }

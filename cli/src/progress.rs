@@ -1,10 +1,32 @@
-//! Bars with the time left on a terminal, nothing in a pipe.
+//! Bars with the time left on a terminal; of pictures and films, a line a minute in a pipe.
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
+use std::io::IsTerminal;
+use std::thread;
+use std::time::Duration;
 
 /// A bar that shows how much of the work is done.
 pub fn bar(length: u64) -> ProgressBar {
-    styled(length, "{bar:40} {percent:>3} %  {elapsed} gone, {eta} left")
+    let bar = styled(length, "{bar:40} {percent:>3} %  {elapsed} gone, {eta} left");
+    if !std::io::stderr().is_terminal() {
+        tell(&bar, Duration::from_secs(60), |line| eprintln!("{line}"));
+    }
+    bar
+}
+
+/// Tells every so often how much of the work is done, until the bar is finished or gone.
+fn tell(bar: &ProgressBar, every: Duration, say: impl Fn(&str) + Send + 'static) {
+    let bar = bar.downgrade();
+    let lines = move || {
+        loop {
+            thread::sleep(every);
+            let Some(bar) = bar.upgrade().filter(|bar| !bar.is_finished()) else { return };
+            let percent = 100 * bar.position() / bar.length().unwrap_or(1).max(1);
+            say(&format!("{percent} %  {} gone", HumanDuration(bar.elapsed())));
+        }
+    };
+    // Without a thread for it there are no lines.
+    let _ = thread::Builder::new().spawn(lines);
 }
 
 /// A bar that counts frames.
@@ -57,4 +79,26 @@ pub fn waiting(what: &str) -> ProgressBar {
     let style = ProgressStyle::with_template("{prefix}: {msg}  {elapsed} gone");
     let style = style.unwrap_or(ProgressStyle::default_spinner());
     ProgressBar::new_spinner().with_style(style).with_prefix(what.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::mpsc;
+
+    /// Lines come while the work goes on, and end with it.
+    #[test]
+    fn regress_lines_in_a_pipe() {
+        let (bar, (send, lines)) = (ProgressBar::hidden(), mpsc::channel());
+        bar.set_length(8);
+        bar.inc(2);
+        tell(&bar, Duration::from_millis(2), move |line| {
+            let _ = send.send(line.to_owned());
+        });
+        let line = lines.recv().unwrap();
+        assert!(line.starts_with("25 %  ") && line.ends_with(" gone"), "{line}");
+        bar.finish_and_clear();
+        // The sender goes with the thread.
+        while lines.recv().is_ok() {}
+    }
 }

@@ -3,7 +3,6 @@
 
 use crate::checksum::{Sum, sealed};
 use crate::output::{self, Output};
-use crate::{claims, ranks};
 use anyhow::{Context, bail};
 use serde::{Deserialize, Serialize};
 use std::ffi::OsString;
@@ -28,8 +27,6 @@ pub struct Record {
     system: String,
     /// Threads of the pool.
     threads: usize,
-    /// Rank and number of ranks, if several were started together.
-    rank: Option<(u32, u32)>,
     /// Seconds since 1970, UTC.
     started: f64,
     /// Until the record was written.
@@ -94,16 +91,24 @@ impl Recorder {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             command: self.command(),
             folder: std::path::absolute(".").context("the current folder")?,
-            host: claims::host(),
+            host: host(),
             system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
             threads: rayon::current_num_threads(),
-            rank: ranks::this(),
             started: self.started,
             seconds: self.begun.elapsed().as_secs_f64(),
             inputs,
             outputs,
         })
     }
+}
+
+/// The name of this machine.
+fn host() -> String {
+    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
+    let name = name.or_else(|| std::env::var("HOSTNAME").ok()).unwrap_or_default();
+    let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '-' };
+    let name: String = name.trim().chars().take(40).map(plain).collect();
+    if name.is_empty() { "host".to_owned() } else { name }
 }
 
 /// Files that are still there.

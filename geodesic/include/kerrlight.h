@@ -64,7 +64,7 @@ enum {
 typedef struct kerrlight_scene {
     double spin;                 /* [-1, 1] */
     double inclination_degrees;  /* [0, 180]; 0, 90 and 180 are exact */
-    double observer_radius;      /* above 2, or INFINITY */
+    double observer_radius;      /* above 2 and up to 1e30, or INFINITY */
     double tolerance;            /* [1e-14, 1e-2] */
     int32_t integrator;          /* KERRLIGHT_TAYLOR_MINO, ... */
 } kerrlight_scene;
@@ -117,6 +117,53 @@ typedef struct kerrlight_rays {
 int32_t kerrlight_trace(const kerrlight_scene *scene, size_t rays, const double *alpha,
                         const double *beta, const kerrlight_placement *placement,
                         const kerrlight_rays *out);
+
+/* How a camera moves. */
+enum {
+    KERRLIGHT_STATIC = 0,        /* at rest; outside the ergosphere only */
+    KERRLIGHT_ZAMO = 1,          /* zero angular momentum */
+    KERRLIGHT_KEPLERIAN = 2,     /* turning about the axis; a geodesic in the equatorial plane only */
+    KERRLIGHT_FREE_FALL = 3      /* falling from rest at infinity */
+};
+
+/* A camera near the hole: all zero but for radius and inclination, it looks at the hole. */
+typedef struct kerrlight_camera {
+    double radius;               /* Boyer-Lindquist radius, outside the horizon, up to 1e30 */
+    double inclination_degrees;  /* polar angle, [0, 180] */
+    double azimuth;              /* radians */
+    double yaw, pitch, roll;     /* to the right, then upwards, then clockwise; radians */
+    int32_t motion;              /* KERRLIGHT_STATIC, ... */
+} kerrlight_camera;
+
+/* What a sky shader takes of rays, in the caller's arrays; NULL for what is not wanted. */
+typedef struct kerrlight_sky_rays {
+    int32_t *outcome;            /* [rays] KERRLIGHT_CAPTURED, ... */
+    double *direction;           /* [rays*3] unit vector, z along the spin axis, of where on the sky
+                                    the light comes from; NaN unless it escapes */
+    double *blueshift;           /* [rays] frequency at the camera over that at infinity, 1 for a
+                                    screen; NaN for light that comes from the horizon inside the
+                                    ergosphere (captured) */
+} kerrlight_sky_rays;
+
+/*
+ * Traces the rays that arrive at (x[k], y[k]), k < rays, of a camera's picture plane at distance 1
+ * (x to the right, y upwards), and fills the arrays of `out`. Of `scene` a camera takes spin,
+ * tolerance and integrator; with a NULL camera (x, y) are the (alpha, beta) of the scene's observer.
+ * Returns KERRLIGHT_OK, or an error after which no array has been touched.
+ */
+int32_t kerrlight_sky(const kerrlight_scene *scene, const kerrlight_camera *camera, size_t rays,
+                      const double *x, const double *y, const kerrlight_sky_rays *out);
+
+/*
+ * Frequency at infinity over that in the frame of matter on a circular equatorial orbit about +z,
+ * for light with angular momentum lambda = L/E (that of a screen is -alpha sin i; p_phi of
+ * kerrlight_points' momentum). Returns KERRLIGHT_OUT_OF_RANGE where there is no such orbit.
+ */
+int32_t kerrlight_keplerian_redshift(double spin, double radius, double lambda, double *factor);
+
+/* `points` points of the critical curve, the edge of the shadow, on the screen at infinity. */
+int32_t kerrlight_critical_curve(double spin, double inclination_degrees, size_t points,
+                                 double *alpha, double *beta);
 
 /*
  * Copies the message of this thread's last error into buffer[0..size-1], cut and ended by 0 as

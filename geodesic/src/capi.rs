@@ -18,6 +18,12 @@ use std::cell::RefCell;
 use std::ffi::{c_char, c_int};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+mod sky;
+
+pub use sky::{
+    CameraPlace, SkyColumns, kerrlight_critical_curve, kerrlight_keplerian_redshift, kerrlight_sky,
+};
+
 /// `KERRLIGHT_OK`.
 pub const OK: i32 = 0;
 /// `KERRLIGHT_NULL_POINTER`: a pointer that must not be is null or misaligned.
@@ -134,10 +140,14 @@ pub unsafe extern "C" fn kerrlight_trace(
     placement: *const SamplePlacement,
     out: *const RayColumns,
 ) -> i32 {
-    let work = || {
+    guarded(|| {
         // SAFETY: the caller's promise.
         unsafe { trace(scene, rays, alpha, beta, placement, out) }
-    };
+    })
+}
+
+/// The code of what `work` returns; its message is kept for [`kerrlight_last_error`].
+fn guarded(work: impl FnOnce() -> Result<(), Failure>) -> i32 {
     let Failure(code, message) = match catch_unwind(AssertUnwindSafe(work)) {
         Ok(Ok(())) => return OK,
         Ok(Err(failure)) => failure,
@@ -180,6 +190,16 @@ unsafe fn trace(
     check_columns(out, rays)?;
     // SAFETY: each has as many numbers as there are rays.
     let (alpha, beta) = unsafe { (many(alpha, rays, "alpha")?, many(beta, rays, "beta")?) };
+    let (hole, observer) = placed_observer(scene)?;
+    let request = request(out, placement);
+    let table =
+        integrator(*scene)?.trace(&hole, &observer, alpha, beta, scene.tolerance, &request)?;
+    // SAFETY: the arrays of `out` are null or have the lengths that the header says.
+    unsafe { fill(out, &table, rays) };
+    Ok(())
+}
+
+fn placed_observer(scene: &Scene) -> Result<(Kerr, Observer), Failure> {
     let hole = Kerr::new(scene.spin)?;
     let inclination = Inclination::from_degrees(scene.inclination_degrees)?;
     let observer = if scene.observer_radius == f64::INFINITY {
@@ -187,12 +207,7 @@ unsafe fn trace(
     } else {
         Observer::at_radius(inclination, scene.observer_radius)?
     };
-    let request = request(out, placement);
-    let table =
-        integrator(*scene)?.trace(&hole, &observer, alpha, beta, scene.tolerance, &request)?;
-    // SAFETY: the arrays of `out` are null or have the lengths that the header says.
-    unsafe { fill(out, &table, rays) };
-    Ok(())
+    Ok((hole, observer))
 }
 
 fn placed(placement: SamplePlacement) -> Result<Placement, Failure> {

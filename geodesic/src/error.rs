@@ -50,7 +50,12 @@ impl Error {
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} = {} is not allowed: {}", self.field, self.value, self.allowed)
+        let Error { field, value, allowed } = self;
+        // In full, 1e300 has three hundred zeros.
+        if value.is_finite() && value.abs() >= 1e16 {
+            return write!(f, "{field} = {value:e} is not allowed: {allowed}");
+        }
+        write!(f, "{field} = {value} is not allowed: {allowed}")
     }
 }
 

@@ -101,8 +101,8 @@
 //! ```
 //!
 //! # Cameras
-//! A [`Camera`] has a place, a [`Motion`] and a lens; its rays are traced like others, and
-//! [`Camera::blueshift`] is what its motion does to light.
+//! A [`Camera`] has a place, a [`Motion`] and a lens; its rays are traced like others, in tables by
+//! [`Integrator::trace_view`], and [`Camera::blueshift`] is what its motion does to light.
 //!
 //! ```
 //! use kerrlight_geodesic::{Camera, Inclination, Kerr, Motion, Outcome, Path, Tracer, Quantities};
@@ -152,6 +152,7 @@ mod readme {}
 
 // In the order of the flow of data: a module imports from those above it.
 mod error;
+pub mod interrupt;
 
 mod numbers;
 

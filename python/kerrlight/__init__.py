@@ -123,13 +123,16 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> object:
-    module = _MODULES.get(name)
-    if module is None:
-        raise AttributeError(f"module 'kerrlight' has no attribute {name!r}")
-    value = getattr(import_module(f"kerrlight.{module}"), name)
-    globals()[name] = value
-    return value
+# Not seen by type checkers, which know the names above and refuse others.
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> object:
+        module = _MODULES.get(name)
+        if module is None:
+            raise AttributeError(f"module 'kerrlight' has no attribute {name!r}")
+        value = getattr(import_module(f"kerrlight.{module}"), name)
+        globals()[name] = value
+        return value
 
 
 def __dir__() -> list[str]:

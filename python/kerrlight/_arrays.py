@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import operator
+import warnings
 from typing import Any
 
 import numpy as np
@@ -23,12 +25,49 @@ def real(name: str, value: Any) -> Floats:
     return np.asarray(array, dtype=np.float64)
 
 
+def flat(array: NDArray[Any]) -> NDArray[Any]:
+    """All elements as a column for the compiled half. Arrays of other processes may lie across words of memory."""
+    return np.require(array, requirements=["C", "A"]).reshape(-1)
+
+
 def finite(name: str, value: Any) -> Floats:
     """The same without infinities and what is no number."""
     array = real(name, value)
     wrong = array[~np.isfinite(array)]
     if wrong.size:
         raise ValueError(f"{name} = {wrong.flat[0]} is not allowed: finite numbers")
+    return array
+
+
+def degrees(name: str, value: Any) -> float:
+    """``value`` in degrees; a warning where it is a round angle in radians, such as π/3 or 17π/180."""
+    number = float(value)
+    turned = math.degrees(number)
+    is_round = abs(turned - round(turned)) < 1e-9 * abs(turned)
+    if is_round and 0 < abs(number) <= 2 * math.pi and round(number, 6) != number:
+        warnings.warn(
+            f"{name} = {number} are {number} degrees, and would be {round(turned)} degrees in radians: did you mean these?",
+            stacklevel=3,
+        )
+    return number
+
+
+def radians(name: str, value: Any) -> Floats:
+    """``value`` in radians, finite; a warning where it is more than two turns, as degrees are."""
+    array = finite(name, value)
+    most = float(np.abs(array).max(initial=0.0))
+    if most > 4 * math.pi:
+        warnings.warn(
+            f"{name} goes to {most:g} radians, more than two turns: did you give degrees?", stacklevel=3
+        )
+    return array
+
+
+def column(name: str, value: Any) -> Floats:
+    """``value`` as a list of real numbers; one number is a list of one."""
+    array = np.atleast_1d(real(name, value))
+    if array.ndim != 1:
+        raise ValueError(f"{name} has the shape {array.shape}: give a list of numbers")
     return array
 
 
@@ -51,4 +90,4 @@ def together(**values: Any) -> tuple[tuple[int, ...], list[Floats]]:
     except ValueError:
         shapes = " and ".join(str(array.shape) for array in arrays.values())
         raise ValueError(f"{' and '.join(arrays)} have shapes {shapes}, which do not broadcast") from None
-    return broad[0].shape, [np.ascontiguousarray(array).reshape(-1) for array in broad]
+    return broad[0].shape, [flat(array) for array in broad]

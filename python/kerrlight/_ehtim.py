@@ -6,7 +6,28 @@ from typing import Any
 
 import numpy as np
 
+from kerrlight import _core
 from kerrlight.interferometry import PRODUCTS, Observation, Station
+
+
+CALIBRATIONS = ("ampcal", "phasecal", "opacitycal", "dcal", "frcal")
+"""What an ``Obsdata`` says of its calibration."""
+
+
+def _hours(obs: Any) -> Any:
+    """Hours of UTC. Sidereal ones begin after their longest gap, on the day ``obs.mjd``, unless they span a day."""
+    hours = np.array(obs.data["time"], dtype=np.float64)
+    kind = getattr(obs, "timetype", "UTC")
+    if kind == "UTC":
+        return hours
+    if kind != "GMST":
+        raise ValueError(f'timetype = "{kind}" is not allowed: UTC or GMST')
+    first = hours.min()
+    if hours.max() - first < 24.0:
+        clock = np.unique(hours % 24.0)
+        first = clock[np.argmax((clock - np.roll(clock, 1)) % 24.0)] if len(clock) > 1 else clock[0]
+        hours = first + (hours - first) % 24.0
+    return _core.hours_utc_of_gmst(int(obs.mjd), hours, float(first))
 
 
 def read(obs: Any) -> Observation:
@@ -34,7 +55,7 @@ def read(obs: Any) -> Observation:
         for row in obs.tarr
     )
     return Observation(
-        time=np.array(data["time"], dtype=np.float64),
+        time=_hours(obs),
         stations=np.stack([data["t1"], data["t2"]], axis=-1).astype(str),
         uv=np.stack([data["u"], data["v"]], axis=-1).astype(np.float64),
         products=np.stack(products, axis=-1),
@@ -49,7 +70,7 @@ def read(obs: Any) -> Observation:
         mjd=int(obs.mjd),
         frequency_hz=float(obs.rf),
         bandwidth_hz=float(obs.bw),
-        history=("from eht-imaging",),
+        history=("from eht-imaging", *(f"{name} = False" for name in CALIBRATIONS if not getattr(obs, name, True))),
     )
 
 

@@ -43,6 +43,12 @@ def _center(data: Any) -> Mapping[str, Any]:
     if len(catalog) != 1:
         raise ValueError(f"{len(catalog)} phase centres are not allowed: 1")
     (center,) = catalog.values()
+    kind = center.get("cat_type", "sidereal")
+    if kind != "sidereal":
+        raise ValueError(f'cat_type = "{kind}" is not allowed: sidereal')
+    frame, epoch = center.get("cat_frame") or "icrs", center.get("cat_epoch")
+    if frame not in ("icrs", "fk5") or frame == "fk5" and epoch not in (None, 2000.0, "J2000", "J2000.0"):
+        raise ValueError(f'cat_frame = "{frame}" with cat_epoch = {epoch} is not allowed: icrs, or fk5 of 2000.0')
     return center
 
 
@@ -137,10 +143,13 @@ def write(obs: Observation) -> Any:
             "cat_type": "sidereal",
             "cat_lon": np.radians(15.0 * float(obs.ra_hours or 0.0)),
             "cat_lat": np.radians(float(obs.dec_deg or 0.0)),
-            "cat_frame": "icrs",
+            # Writers of files ask for an epoch, which icrs has none of.
+            "cat_frame": "fk5",
+            "cat_epoch": 2000.0,
         }
     }
-    is_there = ~np.isnan(obs.sigmas)
+    # Exactly 0 with an error of 0 stands for what was not measured.
+    is_there = ~np.isnan(obs.sigmas) & ~((obs.sigmas == 0.0) & (obs.products == 0.0))
     samples = np.where(is_there, 1.0 / np.where(is_there, obs.sigmas, 1.0) ** 2, 0.0)
     metres = np.column_stack([-obs.uv * (LIGHT / float(obs.frequency_hz or 1.0)), np.zeros(len(obs))])
     return UVData.new(

@@ -6,6 +6,7 @@ import json
 import signal
 import subprocess
 import tempfile
+import time
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any, Mapping, Sequence, Union
@@ -83,6 +84,7 @@ def compare(
     progress: bool = True,
     threads: int | None = None,
     memory: str | None = None,
+    client: Any = None,
 ) -> Comparison:
     """Runs a comparison, or continues the one in its folder.
 
@@ -96,6 +98,7 @@ def compare(
     :param progress: whether to show a bar, if tqdm is installed.
     :param threads: threads of each fit.
     :param memory: limit of each fit, such as ``"4GiB"``.
+    :param client: a ``dask.distributed.Client`` whose workers run the cases, each by itself; they see the same files.
     :raises ValueError: for what the program refuses, with its words.
     :raises kerrlight.FitError: if cases failed; the others are whole.
 
@@ -120,6 +123,12 @@ def compare(
     place = Path(folder) if folder is not None else _folder(name, file)
     words += ["-o", str(place), "--resume"]
     try:
+        if client is not None:
+            name = str(Path(name).absolute()) if Path(name).suffix == ".toml" else name
+            place = place.absolute()
+            words = [*words[:-2], str(place), *_program.limits(threads, memory)]
+            _run_on(client, [name, *words], file)
+            return Comparison(place)
         _run([*_program.LAUNCHER, "compare", name], words, place, progress, _program.limits(threads, memory), file)
     finally:
         if file is not None:
@@ -143,16 +152,7 @@ def _words(
 def _run(
     command: list[str], words: Sequence[str], place: Path, progress: bool, limits: list[str], file: Any
 ) -> None:
-    chosen = [word for word in words if word != "--resume"]
-    listed = subprocess.run(
-        [*command, *chosen, "--list", "--json"],
-        capture_output=True,
-        text=True,
-        stdin=subprocess.DEVNULL,
-    )
-    if listed.returncode != 0:
-        raise ValueError(_program.said(listed.stderr, file))
-    total = len(json.loads(listed.stdout)["cases"])
+    total = len(_listed([*command, *(word for word in words if word != "--resume")], file))
 
     def done() -> int:
         return min(total, len(list(place.glob("cases/*/report.html"))))
@@ -163,3 +163,46 @@ def _run(
         _program.follow([*command, *words, *limits], counter, stop, file)
     finally:
         counter.close()
+
+
+def _listed(command: list[str], file: Any) -> list[dict[str, Any]]:
+    listed = subprocess.run([*command, "--list", "--json"], capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    if listed.returncode != 0:
+        raise ValueError(_program.said(listed.stderr, file))
+    return json.loads(listed.stdout)["cases"]
+
+
+def run_case(words: list[str]) -> None:
+    """Runs one case, on a worker of Dask.
+
+    :param words: what follows ``kerrlight compare``.
+    :raises kerrlight.FitError: if it failed.
+    """
+    while True:
+        command = [*_program.LAUNCHER, "compare", *words]
+        ended = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+        if ended.returncode != 75:
+            break
+        # A worker that was killed has left its process behind, which finishes the case.
+        time.sleep(1.0)
+    if ended.returncode != 0:
+        raise _program.FitError(_program.said(ended.stderr))
+
+
+def _run_on(client: Any, words: list[str], file: Any) -> None:
+    """Runs all cases on the workers of a client, those that take long first, and writes the report."""
+    cases = _listed([*_program.LAUNCHER, "compare", *words], file)
+    cases.sort(key=lambda case: -case["cost"])
+    tasks = client.map(run_case, [[*words, "--case", case["id"]] for case in cases], pure=False, retries=3)
+    errors = []
+    for task in tasks:
+        try:
+            task.result()
+        except _program.FitError as error:
+            errors.append(str(error))
+    collect = [*_program.LAUNCHER, "compare", *words, "--collect"]
+    ended = subprocess.run(collect, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    if ended.returncode != 0:
+        raise ValueError(_program.said(ended.stderr, file))
+    if errors:
+        raise _program.FitError("; ".join(errors))

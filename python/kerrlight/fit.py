@@ -223,6 +223,13 @@ class Fit:
         with np.load(self._written("movie.npz")) as arrays:
             return {name: arrays[name] for name in arrays}
 
+    @property
+    def image(self) -> dict[str, NDArray[Any]]:
+        """The static image of settings with a table ``[image]``: ``recovered`` over (1, y, x) in Jy/pixel, rows from the
+        north, with ``field_uas``, and ``recovered_q`` and ``recovered_u`` where they were fitted."""
+        with np.load(self._written("image.npz")) as arrays:
+            return {name: arrays[name] for name in arrays}
+
     def posterior(
         self,
         samples: int,

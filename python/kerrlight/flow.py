@@ -24,6 +24,8 @@ class Law:
 
 
 def _numbers(value: Any) -> Any:
+    if np.ndim(value) > 1:
+        raise ValueError(f"an array of shape {np.shape(value)} is not allowed: a number or a list")
     return float(value) if np.ndim(value) == 0 else [float(x) for x in value]
 
 

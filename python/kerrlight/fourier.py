@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kerrlight import _core
-from kerrlight._arrays import Floats, finite
+from kerrlight._arrays import Floats, finite, whole
 from kerrlight.model import _Linear, precision
 
 __all__ = ["Fourier"]
@@ -34,6 +34,7 @@ class Fourier(_Linear):
     """
 
     is_complex = True
+    _again = _core.Fourier
 
     def __init__(
         self,
@@ -44,14 +45,26 @@ class Fourier(_Linear):
         pulse: str = "triangle",
         accuracy: float | None = None,
     ) -> None:
-        height, width = (int(n) for n in shape)
+        if np.shape(shape) != (2,):
+            raise ValueError(f"shape = {shape} is not allowed: (rows, columns)")
+        height, width = (whole("shape", n, 1, 2**31) for n in shape)
+        if len(uv) == 0:  # type: ignore[arg-type]
+            raise ValueError("uv is empty: at least one (u, v), or the (u, v) of one image, is needed")
         alone = isinstance(uv, np.ndarray) or np.ndim(uv[0]) == 1  # type: ignore[index]
         lists: list[Any] = [uv] if alone else list(uv)  # type: ignore[arg-type]
-        frames = [finite("uv", each).reshape(-1, 2) for each in lists]
-        counts = [len(frame) for frame in frames]
-        flat = np.ascontiguousarray(np.concatenate(frames)).reshape(-1)
+        frames = [finite("uv", each) for each in lists]
+        for k, frame in enumerate(frames):
+            if frame.size > 0 and (frame.ndim != 2 or frame.shape[1] != 2):
+                name = "uv" if alone else f"uv[{k}]"
+                raise ValueError(
+                    f"{name} has the shape {frame.shape}, not (n, 2): a row (u, v) for every visibility; "
+                    "np.column_stack([u, v]) makes it of two lists"
+                )
+        counts = [frame.size // 2 for frame in frames]
+        flat = np.concatenate([frame.ravel() for frame in frames])
         screen = (width, height, float(field_uas))
-        self._core = _core.Fourier(screen, pulse, flat, counts, accuracy)
+        self._made = (screen, pulse, flat, counts, accuracy)
+        self._core = self._again(*self._made)
         self.input_shape = (height, width) if alone else (len(frames), height, width)
         self.output_shape = (sum(counts),)
 
@@ -62,7 +75,7 @@ class Fourier(_Linear):
 
     def vjp(self, cotangent: ArrayLike) -> Floats:
         """The adjoint under the inner product Re Σ x̄ y: from dL/dRe V + i dL/dIm V to dL/dpixel."""
-        data = np.ascontiguousarray(cotangent, dtype=np.complex128)
+        data = np.require(cotangent, np.complex128, ["C", "A"])
         if data.shape != self.output_shape:
             raise ValueError(f"cotangent has the shape {data.shape}, not {self.output_shape}")
         return self._core.vjp(data).reshape(self.input_shape)

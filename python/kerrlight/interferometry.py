@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+import warnings
+from dataclasses import dataclass, field, fields, replace
 from os import PathLike, fspath
 from typing import Any, Union
 
@@ -105,7 +106,10 @@ class Observation:
 
     def __post_init__(self) -> None:
         count = len(np.atleast_1d(real("time", self.time)))
-        names = np.asarray(self.stations, dtype=str).reshape(-1, 2)
+        names = np.asarray(self.stations, dtype=str)
+        names = names.reshape(0, 2) if names.size == 0 else names
+        if names.shape != (count, 2):
+            raise ValueError(f"stations have the shape {names.shape}, not {(count, 2)}")
         known = {station.name for station in self.array}
         missing = [name for name in dict.fromkeys(names.ravel().tolist()) if name not in known]
         columns = {
@@ -121,17 +125,21 @@ class Observation:
             raise ValueError(f"sigmas = {columns['sigmas'].min()} is not allowed: 0 or above, or NaN")
         for name, column in columns.items():
             object.__setattr__(self, name, _frozen(column))
-        if names.shape != (count, 2):
-            raise ValueError(f"stations have the shape {names.shape}, not {(count, 2)}")
         object.__setattr__(self, "stations", _frozen(names))
         object.__setattr__(self, "array", (*self.array, *map(Station, missing)))
         products = np.ascontiguousarray(self.products, dtype=np.complex128)
         if products.shape != (count, 4):
             raise ValueError(f"products have the shape {products.shape}, not {(count, 4)}")
         object.__setattr__(self, "products", _frozen(products))
-        channel = np.zeros(count) if self.channel is None else np.asarray(self.channel)
-        object.__setattr__(self, "channel", _frozen(np.asarray(channel, dtype=np.int64)))
+        channel = _column("channel", _or_zero(self.channel, (count,)), (count,))
+        if (channel != np.floor(channel)).any():
+            raise ValueError("channel has an element that is no whole number")
+        object.__setattr__(self, "channel", _frozen(channel.astype(np.int64)))
         object.__setattr__(self, "_core", self._visibilities())
+
+    def __reduce__(self) -> Any:
+        given = {part.name: getattr(self, part.name) for part in fields(self) if part.init}
+        return (_observation, (type(self), given))
 
     def _visibilities(self) -> Any:
         numbers = {station.name: k for k, station in enumerate(self.array)}
@@ -202,10 +210,14 @@ class Observation:
     ) -> Observation:
         """An observation of Stokes I alone, from columns of its rows; ``more`` are other fields of the class."""
         values = np.atleast_1d(np.asarray(vis, dtype=np.complex128))
+        if values.ndim != 1:
+            raise ValueError(f"vis has the shape {values.shape}, not (rows,)")
         products = np.zeros((len(values), 4), dtype=np.complex128)
         products[:, 0] = values
         sigmas = np.full((len(values), 4), np.nan)
-        sigmas[:, 0] = real("sigma", sigma)
+        error = real("sigma", sigma)
+        error = np.full(values.shape, error) if error.ndim == 0 else error
+        sigmas[:, 0] = _column("sigma", error, values.shape)
         return Observation(
             np.atleast_1d(real("time", time)), np.asarray(stations), real("uv", uv), products, sigmas, **more
         )
@@ -257,11 +269,27 @@ class Observation:
         """Standard deviation of the real, and of the imaginary part of :attr:`vis` (Jy)."""
         return self._core.stokes_i()[1]
 
-    def averaged(self, seconds: float, *, in_scans: bool = False) -> Observation:
-        """Averages over intervals of so many seconds: of the clock, or from the start of each scan."""
-        if not (seconds > 0 and math.isfinite(seconds)):
-            raise ValueError(f"seconds = {seconds} is not allowed: above 0")
-        return Observation._of(self._core.averaged(float(seconds), in_scans))
+    def averaged(
+        self, seconds: float | None = None, *, in_scans: bool = False, weighted: bool = True
+    ) -> Observation:
+        """Coherent averages of every baseline, one time for all baselines of an interval, so that closure quantities are
+        kept.
+
+        Intervals start at multiples of ``seconds`` since 0 h UTC. ``in_scans`` averages whole scans, which end where
+        nothing was measured for a minute; with ``seconds``, pieces of at most that length from the start of each scan.
+
+        ``weighted`` means count by 1/σ²; otherwise they are plain, with σ = √(Σσ²)/n, which is what eht-imaging's
+        ``avg_coherent`` does. The time is the mean of those of the rows, where eht-imaging has the middle of the interval.
+
+        Raises ``ValueError`` where ``seconds`` is neither in [1e-3, 1e9] nor left out with ``in_scans``.
+        """
+        if seconds is None:
+            if not in_scans:
+                raise ValueError("seconds is missing: give it, or in_scans=True for averages of whole scans")
+            seconds = math.inf
+        elif seconds == math.inf:
+            raise ValueError("seconds = inf is not allowed: [1e-3, 1e9]")
+        return Observation._of(self._core.averaged(float(seconds), bool(in_scans), bool(weighted)))
 
     def total_intensity(self) -> Observation:
         """The same data as Stokes I alone."""
@@ -276,7 +304,19 @@ class Observation:
     def _closures(self, phases: bool, least_snr: float) -> Closures:
         found = self._core.closures(phases, float(least_snr))
         names = np.array([station.name for station in self.array] or [""], dtype=str)
-        return Closures(**{**found, "stations": names[found["stations"]]})
+        closures = Closures(**{**found, "stations": names[found["stations"]]})
+        what = "closure phases" if phases else "closure amplitudes"
+        repeats, of_scans = self._core.rows_that_do_not_close(phases)
+        if repeats:
+            text = f"{repeats} rows have the baseline, channel and time of another and make {what} of their own"
+            warnings.warn(f"{text}: averaged() merges them", stacklevel=3)
+        if of_scans is not None:
+            text = f"{len(closures)} {what}, where averages of scans have {of_scans}: baselines have times of their own"
+            warnings.warn(f"{text}, which averaged(in_scans=True) makes one", stacklevel=3)
+        elif not len(closures):
+            why = f"too few baselines are above {least_snr:g} sigma" if least_snr > 0 else "too few baselines share a time"
+            warnings.warn(f"there are no {what}: {why}", stacklevel=3)
+        return closures
 
     def closure_phases(self, least_snr: float = 0.0) -> Closures:
         """A largest set of independent closure phases of every scan, the least noisy first; baselines weaker than
@@ -341,6 +381,10 @@ class Observation:
     def __repr__(self) -> str:
         basis = "RR, LL, RL, LR" if self.circular else "I, Q, U, V"
         return f"<Observation of {self.source or 'no name'}: {len(self)} rows of {basis}, {len(self.array)} stations>"
+
+
+def _observation(kind: type[Observation], given: dict[str, Any]) -> Observation:
+    return kind(**given)
 
 
 def _frozen(column: Any) -> Any:

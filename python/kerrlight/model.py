@@ -7,6 +7,7 @@ networks and optimisers of your own (:mod:`kerrlight.torch`, :mod:`kerrlight.jax
 
 from __future__ import annotations
 
+import copy
 import json
 import math
 from functools import cached_property
@@ -16,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from kerrlight import _core
-from kerrlight._arrays import Floats, finite, real, together, whole
+from kerrlight._arrays import Floats, finite, flat, real, together, whole
 from kerrlight.flow import Keplerian, Law, PolarizationLaw, Velocity
 from kerrlight.rays import Observer
 
@@ -50,7 +51,7 @@ def precision(name: str, value: Any, shape: tuple[int, ...]) -> NDArray[Any]:
         array = real(name, value)
     if array.shape != shape:
         raise ValueError(f"{name} has the shape {array.shape}, not {shape}")
-    return np.ascontiguousarray(array).reshape(-1)
+    return flat(array)
 
 
 class _Linear:
@@ -60,6 +61,33 @@ class _Linear:
     """Shape of what it takes."""
     output_shape: tuple[int, ...]
     """Shape of what it gives."""
+
+    _made: tuple[Any, ...]
+    """What its compiled half is made of."""
+
+    def __copy__(self) -> Any:
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        return other
+
+    def __deepcopy__(self, memo: Any) -> Any:
+        # Its compiled half does not change.
+        other = self.__copy__()
+        kept = {key: value for key, value in self.__dict__.items() if key not in ("_core", "_made")}
+        other.__dict__.update(copy.deepcopy(kept, memo))
+        return other
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {key: value for key, value in self.__dict__.items() if key not in ("_core", "_columns")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        if "_made" in state:
+            self._core = self._again(*state["_made"])
+
+    @staticmethod
+    def _again(*made: Any) -> Any:
+        raise NotImplementedError
 
     def apply(self, values: ArrayLike) -> NDArray[Any]:
         """The map."""
@@ -174,10 +202,12 @@ class ForwardModel(_Linear):
             "scale": float(scale),
             "polarization": (polarization._json(), list(stokes)) if polarization else None,
         }
-        self._core = _core.Model(
-            observer.hole.spin, observer._place, (columns[0], columns[1]), settings
-        )
+        screen = (columns[0].copy(), columns[1].copy())
+        self._made = (observer.hole.spin, observer._place, screen, settings)
+        self._core = self._again(*self._made)
         self._frames = list(range(len(self.times)))
+
+    _again = _core.Model
 
     @property
     def nodes(self) -> int:

@@ -44,6 +44,9 @@ def observe(
     field_uas: float,
     array: Telescopes = "EHT2017",
     *,
+    q: ArrayLike | None = None,
+    u: ArrayLike | None = None,
+    v: ArrayLike | None = None,
     source: str,
     mjd: int,
     utc: tuple[float, float] | None = None,
@@ -67,7 +70,12 @@ def observe(
 ) -> Observation:
     """Visibilities of an image, or of a movie over (t, y, x), in Jy/pixel; rows from the north, each from the east.
 
-    :param images: the image, or the movie.
+    RL and LR are there if Stokes Q and U are given; otherwise they are not measured.
+
+    :param images: the image, or the movie, of Stokes I.
+    :param q: Stokes Q, of the shape of ``images``; together with ``u``.
+    :param u: Stokes U.
+    :param v: Stokes V; without it, RR and LL are I.
     :param field_uas: width of the field (µas).
     :param array: what :func:`stations` takes, or stations.
     :param source: ``"sgra"``, ``"m87"``, or right ascension in hours and declination in degrees: ``"12.5,-29.25"``.
@@ -108,6 +116,12 @@ def observe(
     seed = None if seed is None else whole("seed", seed, 0, 2**64 - 1)
     if movie.ndim not in (2, 3):
         raise ValueError(f"images have the shape {movie.shape}: (y, x) or (t, y, x) are needed")
+    polarized = [None if given is None else finite(name, given) for name, given in (("q", q), ("u", u), ("v", v))]
+    for name, given in zip("quv", polarized):
+        if given is not None and given.shape != movie.shape:
+            raise ValueError(f"{name} has the shape {given.shape}, images {movie.shape}: they must be the same")
+    if (q is None) != (u is None):
+        raise ValueError("give q and u, or none of them: RL and LR are Q ± iU")
     if (utc is None) == (gmst is None):
         raise ValueError("give utc or gmst, one of them")
     is_random = noise or random_phases or gain_constant != 0 or gain_scan != 0
@@ -116,6 +130,16 @@ def observe(
     for name, value in (("gain_constant", gain_constant), ("gain_scan", gain_scan)):
         if not 0 <= value <= 3:
             raise ValueError(f"{name} = {value} is not allowed: 0 to 3")
+    hours = None
+    if frame_hours is not None:
+        times = real("frame_hours", frame_hours)
+        frames = movie.shape[0] if movie.ndim == 3 else 1
+        if times.shape != (frames,):
+            raise ValueError(f"frame_hours has the shape {times.shape}, not ({frames},): an hour for every image")
+        hours = times.tolist()
+    for name, given in (("utc", utc), ("gmst", gmst), ("elevation_deg", elevation_deg)):
+        if given is not None and np.shape(given) != (2,):
+            raise ValueError(f"{name} has the shape {np.shape(given)}, not (2,): from and to")
     chosen = stations(array) if isinstance(array, (str, PathLike)) else tuple(array)
     plan = {
         "stations": [
@@ -133,7 +157,7 @@ def observe(
         "elevation_deg": [float(limit) for limit in elevation_deg],
         "of_date": of_date,
         "ut1_utc": ut1_utc,
-        "frame_hours": None if frame_hours is None else real("frame_hours", frame_hours).tolist(),
+        "frame_hours": hours,
         "pulse": pulse,
         "accuracy": accuracy,
         "scattering": scattering,
@@ -142,5 +166,8 @@ def observe(
         "seed": 0 if seed is None else int(seed),
     }
     height, width = movie.shape[-2:]
-    flat = np.ascontiguousarray(movie).reshape(-1)
-    return Observation._of(_core.observe(flat, (width, height, float(field_uas)), plan))
+    flat = [
+        None if given is None else np.require(given, requirements=["C", "A"]).reshape(-1)
+        for given in (movie, *polarized)
+    ]
+    return Observation._of(_core.observe(flat[0], flat[1:], (width, height, float(field_uas)), plan))

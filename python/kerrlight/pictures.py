@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kerrlight import _core
-from kerrlight._arrays import Floats, finite
+from kerrlight._arrays import Floats, degrees, finite
 
 if TYPE_CHECKING:
     from kerrlight.scene import Scene
@@ -57,6 +57,8 @@ def _without_none(value: Any, name: str = "") -> Any:
         if math.isnan(value):
             raise ValueError(f"{name} = nan is not allowed: a number")
         return INFINITE if value > 0 else f"-{INFINITE}"
+    if isinstance(value, (int, float, np.number)) and name.endswith("_deg"):
+        degrees(name, value)
     return value
 
 
@@ -90,8 +92,13 @@ def text_of(settings: Settings, folder: Union[None, str, PathLike[str]]) -> tupl
         return _core.scene_of_exr(name), fspath(folder or os.path.dirname(name) or ".")
     if isinstance(settings, str) and ("\n" in name or "=" in name):
         return name, fspath(folder or ".")
-    with open(name, encoding="utf-8") as file:
-        return file.read(), fspath(folder or os.path.dirname(name) or ".")
+    with open(name, "rb") as opened:
+        data = opened.read()
+    try:
+        return data.decode("utf-8"), fspath(folder or os.path.dirname(name) or ".")
+    except UnicodeDecodeError:
+        words = "is no text of settings: give a TOML file, and name data in it"
+        raise ValueError(f"{name} {words} (`kerrlight fit --init {name}` writes one for data)") from None
 
 
 def _flat(changes: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
@@ -121,6 +128,42 @@ def overrides_of(changes: Mapping[str, Any] | None) -> list[str]:
     return [f"{key}=" if of is None else f"{key}={value(key, of)}" for key, of in flat]
 
 
+class _Kept:
+    """What a picture shows of itself, as it goes to another process."""
+
+    def __init__(self, core: Any) -> None:
+        names = core.names()
+        self._channels = {name: core.channel(name) for name in names}
+        self._facts = (core.shape(), core.summary(), core.attributes(), core.exr())
+        try:
+            self._png: bytes | str = core.png()
+        except ValueError as error:  # its channels were left out
+            self._png = str(error)
+
+    def names(self) -> list[str]:
+        return list(self._channels)
+
+    def channel(self, name: str) -> NDArray[np.float32] | None:
+        return self._channels.get(name)
+
+    def shape(self) -> tuple[int, int]:
+        return self._facts[0]
+
+    def summary(self) -> dict[str, Any]:
+        return dict(self._facts[1])
+
+    def attributes(self) -> dict[str, str]:
+        return dict(self._facts[2])
+
+    def exr(self) -> bytes:
+        return self._facts[3]
+
+    def png(self) -> bytes:
+        if isinstance(self._png, str):
+            raise ValueError(self._png)
+        return self._png
+
+
 class Picture(Mapping[str, "NDArray[np.float32]"]):
     """A rendered picture: a mapping from names of channels to arrays, rows from the top.
 
@@ -131,6 +174,17 @@ class Picture(Mapping[str, "NDArray[np.float32]"]):
         self._core = core
         self._names: list[str] = core.names()
         self._channels: dict[str, NDArray[np.float32]] = {}
+
+    def __reduce__(self) -> Any:
+        return (Picture, (self._core if isinstance(self._core, _Kept) else _Kept(self._core),))
+
+    def __copy__(self) -> Picture:
+        return Picture(self._core)
+
+    def __deepcopy__(self, memo: Any) -> Picture:
+        copied = Picture(self._core)
+        copied._channels = {name: values.copy() for name, values in self._channels.items()}
+        return copied
 
     def __getitem__(self, name: str) -> NDArray[np.float32]:
         if name not in self._names:
@@ -295,5 +349,7 @@ def movie(
     moments = np.atleast_1d(finite("times", times)).copy()
     if moments.size == 0:
         raise ValueError("times is empty: give one or more")
+    if moments.ndim != 1:
+        raise ValueError(f"times have the shape {moments.shape}: give a list")
     frames: Sequence[Any] = _core.film(text, base, overrides_of(set), moments.tolist())
     return Movie([Picture(frame) for frame in frames], moments)

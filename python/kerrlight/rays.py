@@ -7,6 +7,7 @@ shape of the screen coordinates that were given.
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Union
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerrlight import _core
-from kerrlight._arrays import Floats, finite, together, whole
+from kerrlight._arrays import Floats, degrees, flat, radians, together, whole
 from kerrlight.table import Outcome, Points, Rays
 
 __all__ = [
@@ -56,6 +57,9 @@ class GaussLegendre:
     start: float
     stop: float
 
+
+MOST_CROSSINGS = 1000
+"""The most crossings that can be asked for."""
 
 Placement = Union[int, MinoTime, PathLength, GaussLegendre]
 
@@ -128,16 +132,32 @@ class Kerr:
         """Radius of the photon orbit over the poles (M)."""
         return self._radii["polar_photon_orbit"]
 
-    def keplerian_redshift(self, r: ArrayLike, lam: ArrayLike) -> Floats:
-        """Redshift factor g = E(observed)/E(emitted) of matter on circular orbits in the equatorial plane.
+    def keplerian_redshift(
+        self, r: ArrayLike, lam: ArrayLike, p_r: ArrayLike | None = None
+    ) -> Floats:
+        """Redshift factor g = E(observed)/E(emitted) of matter in the equatorial plane that turns about +z.
 
-        ``r`` is the radius (M), ``lam`` the photon's L/E (M); they broadcast. NaN where there is no such orbit.
+        :param r: radius (M).
+        :param lam: the photon's L/E (M).
+        :param p_r: the photon's covariant radial momentum for unit energy at infinity,
+            ``rays.crossings.momentum[..., 1]``. With it matter inside of the innermost stable orbit plunges, with the
+            energy and angular momentum that it had there (Cunningham 1975). Without it all matter is on circular
+            orbits, stable or not, down to the photon orbit: a warning says where these are not stable.
+
+        The arguments broadcast. NaN where there is no such orbit, at and inside the horizon.
 
         >>> float(Kerr(0.0).keplerian_redshift(6.0, 0.0).round(12)) == round(0.5**0.5, 12)
         True
         """
-        shape, columns = together(r=r, lam=lam)
-        return _core.keplerian_redshift(self.spin, *columns).reshape(shape)
+        if p_r is None:
+            shape, (radius, moment) = together(r=r, lam=lam)
+            if ((radius > self.horizon) & (radius < self.isco)).any():
+                words = f"r lies inside of the innermost stable orbit at {self.isco:.6g} M, where matter plunges"
+                warnings.warn(f"{words}: give p_r, or leave these radii out", stacklevel=2)
+            return _core.keplerian_redshift(self.spin, radius, moment).reshape(shape)
+        shape, (radius, moment, radial) = together(r=r, lam=lam, p_r=p_r)
+        time, inward, _, turn = _core.velocity(self.spin, radius).reshape(-1, 4).T
+        return np.asarray(1.0 / (time - moment * turn - radial * inward)).reshape(shape)
 
     def observer(
         self,
@@ -150,14 +170,17 @@ class Kerr:
         """An observer of this hole.
 
         The inclination, the angle between spin axis and line of sight, is given in degrees in [0, 180] (of which 0,
-        90 and 180 are exact) or in radians. ``radius`` is infinite or above 2 (M); ``azimuth`` is in radians.
+        90 and 180 are exact) or in radians. ``radius`` is infinite or in (2, 1e30] (M); ``azimuth`` is in radians. Angles
+        that look as if they were in the other unit, such as ``inclination_deg=np.pi / 3``, give a warning.
         """
         if (inclination_deg is None) == (inclination_rad is None):
             raise ValueError("give inclination_deg or inclination_rad, one of them")
+        turned = float(radians("azimuth", azimuth))
         if inclination_deg is not None:
-            return Observer(self, float(inclination_deg), True, float(radius), float(azimuth))
+            angle = degrees("inclination_deg", inclination_deg)
+            return Observer(self, angle, True, float(radius), turned)
         assert inclination_rad is not None
-        return Observer(self, float(inclination_rad), False, float(radius), float(azimuth))
+        return Observer(self, float(inclination_rad), False, float(radius), turned)
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,7 +275,7 @@ class Observer:
         """
         shape, (a, b) = together(alpha=alpha, beta=beta)
         placed, width = _placement(samples)
-        crossings = whole("crossings", crossings, 0, 10**9)
+        crossings = whole("crossings", crossings, 0, MOST_CROSSINGS)
         asked = {"momentum": momentum, "weight": weights, "errors": errors}
         wanted = _wanted(crossings, placed, asked)
         if not derivatives:
@@ -275,9 +298,8 @@ class Observer:
             if not 1 <= points <= 1_000_000:
                 raise ValueError(f"points = {points} is not allowed: 1 to 1000000")
             return Curve(**_core.critical_curve(self.hole.spin, self._place, points))
-        column = finite("angles", angles)
-        flat = np.ascontiguousarray(column).reshape(-1)
-        columns = _core.critical_points(self.hole.spin, self._place, flat)
+        column = radians("angles", angles)
+        columns = _core.critical_points(self.hole.spin, self._place, flat(column))
         return Curve(**{name: values.reshape(column.shape) for name, values in columns.items()})
 
     def band(self, order: int, angles: ArrayLike) -> tuple[Floats, Floats]:
@@ -293,9 +315,8 @@ class Observer:
         """
         if not 0 <= order <= 65535:
             raise ValueError(f"order = {order} is not allowed: 0 to 65535")
-        column = finite("angles", angles)
-        flat = np.ascontiguousarray(column).reshape(-1)
-        edges = _core.band(self.hole.spin, self._place, order, flat)
+        column = radians("angles", angles)
+        edges = _core.band(self.hole.spin, self._place, order, flat(column))
 
         def edge(name: str) -> Floats:
             pair = [edges[f"{name}_{axis}"].reshape(column.shape) for axis in ("alpha", "beta")]

@@ -28,6 +28,8 @@ from typing import Any, Union
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kerrlight._arrays import flat
+
 __all__ = ["Region", "Representation"]
 
 Singles = NDArray[np.float32]
@@ -92,7 +94,7 @@ class _Checked:
             raise TypeError(f"{self._name}.{method} gives {array.dtype}, not real numbers")
         if array.shape != shape:
             raise ValueError(f"{self._name}.{method} gives the shape {array.shape}, not {shape}")
-        return np.ascontiguousarray(array, dtype=np.float32).reshape(-1)
+        return flat(np.asarray(array, dtype=np.float32))
 
     def initialise(self, seed: int) -> Singles:
         return self._array("initialise", self._own.initialise(seed), (self.parameters,))

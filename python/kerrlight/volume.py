@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kerrlight import _core
-from kerrlight._arrays import Floats, whole
+from kerrlight._arrays import Floats, degrees, flat, whole
 
 __all__ = ["Volume"]
 
@@ -26,6 +26,9 @@ class Volume:
             """Coordinates of the first node (M)."""
             self.high: Floats = arrays["high"]
             """Coordinates of the last node (M)."""
+            if self.emission.ndim != 3 or self.low.shape != (3,) or self.high.shape != (3,):
+                shapes = [self.emission.shape, self.low.shape, self.high.shape]
+                raise ValueError(f"{path}: emission, low and high have the shapes {shapes}, not (x, y, z), (3,) and (3,)")
             self.axis: Floats | None = arrays["axis"] if "axis" in arrays else None
             """What matter turns about, where the file tells."""
 
@@ -78,6 +81,8 @@ class Volume:
         :param hole_radius: radius (M) of a ball about the origin that hides what is behind it.
         """
         pixels = whole("pixels", pixels, 1, 8192)
+        azimuth_deg = degrees("azimuth_deg", azimuth_deg)
+        elevation_deg = degrees("elevation_deg", elevation_deg)
         side = float(np.max(self.high - self.low)) if width is None else float(width)
         if not (side > 0 and math.isfinite(side)):
             raise ValueError(f"width = {width} is not allowed: above 0 (M)")
@@ -85,7 +90,7 @@ class Volume:
         if not all(map(math.isfinite, numbers)):
             raise ValueError(f"azimuth_deg, elevation_deg, hole_radius = {numbers} is not allowed: finite numbers")
         corners = (list(self.emission.shape), self.low.tolist(), self.high.tolist())
-        emission = np.ascontiguousarray(self.emission, dtype=np.float32).reshape(-1)
+        emission = flat(np.asarray(self.emission, dtype=np.float32))
         image = _core.view(corners, emission, numbers[:2], (side, numbers[2]), int(pixels))
         return image.reshape(pixels, pixels)
 

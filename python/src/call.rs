@@ -1,6 +1,8 @@
 //! How calls cross the border: what is refused is a `ValueError` with the same words, a bug a `RuntimeError`.
 
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use crate::threads::{Pool, stay_on_this_thread};
+use kerrlight_geodesic::interrupt::Stopped;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use std::any::Any;
 use std::fmt::Display;
@@ -14,79 +16,83 @@ pub fn refused(error: impl Display) -> PyErr {
     PyValueError::new_err(format!("{error:#}"))
 }
 
-/// Does long work without the interpreter lock.
+/// What work comes to, or what it panicked with.
+type Ended<T, E> = Result<Result<T, E>, Box<dyn Any + Send>>;
+
+/// Does long work without the interpreter lock. A signal stops work of Python's main thread within moments, as Ctrl-C.
 ///
 /// # Errors
-/// `ValueError` for what the work refuses, `RuntimeError` if it panics, which is a bug.
+/// `ValueError` for what the work refuses, what the handler of a signal raises, `RuntimeError` if it panics, which is a
+/// bug.
 pub fn detached<T: Send, E: Display + Send>(
     py: Python<'_>,
     work: impl FnOnce() -> Result<T, E> + Send,
 ) -> PyResult<T> {
-    let work = || {
-        stay_on_this_thread();
-        work()
-    };
-    match py.detach(|| catch_unwind(AssertUnwindSafe(work))) {
-        Ok(result) => result.map_err(refused),
-        Err(panic) => Err(PyRuntimeError::new_err(format!("internal error: {}", message(&*panic)))),
+    match Pool::of_call(py)? {
+        Some(pool) => watched(py, pool, work),
+        None => finished(py.detach(|| catch_unwind(AssertUnwindSafe(work)))),
     }
 }
 
-thread_local! {
-    /// Whether this thread is the only one of a pool of its own; the pool lives as long as the process.
-    static IS_ALONE: bool = {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
-        pool.map(std::mem::forget).is_ok()
-    };
-}
-
-/// Where there is one thread for all work (`RAYON_NUM_THREADS=1`), calls from several threads of Python, such as those
-/// of dask or joblib, would wait for one another: each then works on the thread that it comes from.
-fn stay_on_this_thread() {
-    if rayon::current_thread_index().is_none() && rayon::current_num_threads() == 1 {
-        IS_ALONE.with(|_| ());
-    }
+/// Does work that takes less time than to wake another thread.
+///
+/// # Errors
+/// As [`detached`].
+pub fn at_once<T: Send, E: Display + Send>(
+    py: Python<'_>,
+    work: impl FnOnce() -> Result<T, E> + Send,
+) -> PyResult<T> {
+    stay_on_this_thread();
+    finished(py.detach(|| catch_unwind(AssertUnwindSafe(work))))
 }
 
 /// How long a signal may wait to be seen.
 const MOMENT: Duration = Duration::from_millis(50);
 
-/// Does long work that looks at the flag whether to stop, which a signal raises: Python's handler of the signal runs,
-/// and what it raises is returned. The work is on a thread of its own, as signals reach Python's main thread alone.
-///
-/// # Errors
-/// As [`detached`], and what the handler of a signal raises.
-pub fn interruptible<T: Send, E: Display + Send>(
+/// Does work in a pool, since signals reach Python's main thread alone, which looks for them.
+fn watched<T: Send, E: Display + Send>(
     py: Python<'_>,
-    work: impl FnOnce(&AtomicBool) -> Result<T, E> + Send,
+    pool: &Pool,
+    work: impl FnOnce() -> Result<T, E> + Send,
 ) -> PyResult<T> {
-    let [stop, done] = [false, false].map(AtomicBool::new);
-    let caller = thread::current();
-    thread::scope(|scope| {
-        let worker = scope.spawn(|| {
-            let result = catch_unwind(AssertUnwindSafe(|| work(&stop)));
-            done.store(true, Ordering::Release);
-            caller.unpark();
-            result
-        });
-        let mut raised = None;
-        while !done.load(Ordering::Acquire) {
-            py.detach(|| thread::park_timeout(MOMENT));
-            if let (None, Err(error)) = (&raised, py.check_signals()) {
-                stop.store(true, Ordering::Relaxed);
+    let (ended, caller) = (AtomicBool::new(false), thread::current());
+    let work = || {
+        let result = catch_unwind(AssertUnwindSafe(work));
+        ended.store(true, Ordering::Release);
+        caller.unpark();
+        result
+    };
+    let mut raised = None;
+    let wait = || {
+        while !ended.load(Ordering::Acquire) {
+            thread::park_timeout(MOMENT);
+            if raised.is_none()
+                && !ended.load(Ordering::Acquire)
+                && let Err(error) = Python::attach(|py| py.check_signals())
+            {
+                pool.stop(true);
                 raised = Some(error);
             }
         }
-        let result = py.detach(|| worker.join()).and_then(|result| result);
-        raised.map_or_else(|| finished(result), Err)
-    })
+    };
+    let result = py.detach(|| pool.work(work, wait));
+    match (raised, result) {
+        (Some(error), _) => {
+            pool.stop(false);
+            Err(error)
+        }
+        (None, Some(result)) => finished(result),
+        (None, None) => Err(PyRuntimeError::new_err("internal error: no result")),
+    }
 }
 
 /// What is told of work that has ended.
-fn finished<T, E: Display>(result: Result<Result<T, E>, Box<dyn Any + Send>>) -> PyResult<T> {
-    let text = |panic: &(dyn Any + Send)| format!("internal error: {}", message(panic));
-    let result = result.map_err(|panic| PyRuntimeError::new_err(text(&*panic)))?;
-    result.map_err(refused)
+fn finished<T, E: Display>(result: Ended<T, E>) -> PyResult<T> {
+    let told = |panic: Box<dyn Any + Send>| match panic.is::<Stopped>() {
+        true => PyKeyboardInterrupt::new_err(""),
+        false => PyRuntimeError::new_err(format!("internal error: {}", message(&*panic))),
+    };
+    result.map_err(told)?.map_err(refused)
 }
 
 /// What a panic said.

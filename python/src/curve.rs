@@ -3,7 +3,7 @@
 use crate::call::{detached, refused};
 use crate::rays::Place;
 use kerrlight_geodesic::analytic::{CriticalCurve, CriticalPoint, HalfOrbit, LensingBand};
-use kerrlight_geodesic::{Inclination, Kerr};
+use kerrlight_geodesic::{Inclination, Kerr, interrupt};
 use numpy::{IntoPyArray, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -65,7 +65,11 @@ fn critical_points<'py>(
     let angles = angles.as_slice()?;
     let work = || {
         let curve = CriticalCurve::new(&hole, inclination);
-        Ok::<_, Infallible>(angles.iter().map(|angle| values(curve.point(*angle))).collect())
+        let point = |angle: &f64| {
+            interrupt::check();
+            values(curve.point(*angle))
+        };
+        Ok::<_, Infallible>(angles.iter().map(point).collect())
     };
     columns(py, detached(py, work)?)
 }
@@ -84,7 +88,10 @@ fn band<'py>(
     let none = (f64::NAN, f64::NAN);
     let work = || {
         let band = LensingBand::new(&hole, inclination, order);
-        let edges = angles.iter().map(|angle| (band.inner(*angle), band.outer(*angle)));
+        let edges = angles.iter().map(|angle| {
+            interrupt::check();
+            (band.inner(*angle), band.outer(*angle))
+        });
         Ok::<_, Infallible>(edges.map(|(inner, outer)| [inner, outer.unwrap_or(none)]).collect())
     };
     let rows: Vec<[(f64, f64); 2]> = detached(py, work)?;

@@ -2,7 +2,7 @@
 
 use crate::call::{detached, refused};
 use crate::representation;
-use kerrlight_tomo::fit::settings::FitFile;
+use kerrlight_tomo::fit::settings::{FitFile, StaticImageFile};
 use kerrlight_tomo::fit::setup;
 use kerrlight_tomo::representation::Registry;
 use pyo3::prelude::*;
@@ -12,10 +12,13 @@ pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(check_fit, module)?)
 }
 
-/// Steps of training of a fit's settings, which it refuses if they make no sense, as far as can be told without
+/// Steps of training of a fit's settings, or iterations of a static image's, which it refuses if they make no sense, as far as can be told without
 /// tracing rays.
 #[pyfunction]
 fn check_fit(py: Python<'_>, text: &str) -> PyResult<u64> {
+    if StaticImageFile::is_meant(text) {
+        return Ok(StaticImageFile::parse(text).map_err(refused)?.image.iterations as u64);
+    }
     let file = FitFile::parse(text).map_err(refused)?;
     let mut registry = Registry::new();
     registry.find_others(representation::find);

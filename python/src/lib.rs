@@ -20,6 +20,7 @@ mod pictures;
 mod program;
 mod rays;
 mod representation;
+mod threads;
 mod volume;
 
 use pyo3::prelude::*;

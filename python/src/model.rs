@@ -3,7 +3,7 @@
 use crate::call::{detached, refused};
 use crate::model_settings::Settings;
 use crate::rays::Place;
-use kerrlight_geodesic::Kerr;
+use kerrlight_geodesic::{Kerr, interrupt};
 use kerrlight_render::dynamics::Axis;
 use kerrlight_render::polarization::StokesParameter;
 use kerrlight_tomo::Error;
@@ -136,6 +136,7 @@ impl Model {
 
     fn image<T: Float>(&self, frame: usize, emission: &[T], images: &mut [T]) {
         for (plane, image) in images.chunks_mut(self.model.pixels()).enumerate() {
+            interrupt::check();
             for (pixel, nodes) in self.rays() {
                 let light = nodes.map(|k| self.light(plane, frame, k) * emission[k].double());
                 image[pixel] = T::of(light.sum());
@@ -144,6 +145,7 @@ impl Model {
     }
 
     fn back<T: Float>(&self, frame: usize, images: &[T], cotangents: &mut [T]) {
+        interrupt::check();
         let cotangent =
             |plane: usize, pixel: usize| images[plane * self.model.pixels() + pixel].double();
         for (pixel, nodes) in self.rays() {
@@ -171,6 +173,7 @@ impl Model {
 
     /// Where the matter of a frame's nodes was at the reference time: x, y and z, no numbers outside of the region.
     fn carried(&self, frame: usize) -> [Vec<f64>; 3] {
+        interrupt::check();
         let mut batch = Batch::default();
         batch.set((0..self.model.rays()).map(|ray| (ray as u32, frame as u32)));
         batch.gather_whole(&self.model, self.axis);

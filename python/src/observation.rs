@@ -4,10 +4,10 @@ use crate::call::{detached, refused};
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::Error;
 use kerrlight_vlbi::array::{FeedRotation, MOST_STATIONS, Station};
-use kerrlight_vlbi::earth::SourcePosition;
+use kerrlight_vlbi::earth::{self, SourcePosition, Ut1};
 use kerrlight_vlbi::files::{EhtTable, decode, to_csv, to_eht_table, to_obs_text, write_uvfits};
-use kerrlight_vlbi::observation::{Basis, Channel, Observation, Row};
-use kerrlight_vlbi::products::{ClosureKind, ClosureSet};
+use kerrlight_vlbi::observation::{Averaging, Basis, Channel, Observation, Row};
+use kerrlight_vlbi::products::{ClosureCount, ClosureKind, ClosureSet};
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -15,7 +15,21 @@ use std::convert::Infallible;
 
 /// Adds the class of this module.
 pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(hours_utc_of_gmst, module)?)?;
     module.add_class::<Visibilities>()
+}
+
+/// Hours of UTC since 0 h of a day, of hours of Greenwich mean sidereal time of which `first` is the first one.
+#[pyfunction]
+fn hours_utc_of_gmst<'py>(
+    py: Python<'py>,
+    mjd: i32,
+    hours: PyReadonlyArray1<'py, f64>,
+    first: f64,
+) -> PyResult<Bound<'py, PyAny>> {
+    let utc = |hour: &f64| earth::hours_utc_of_gmst(mjd, *hour, first, Ut1::Table);
+    let all: Result<Vec<f64>, Error> = hours.as_slice()?.iter().map(utc).collect();
+    Ok(all.map_err(refused)?.into_pyarray(py).into_any())
 }
 
 /// An observation.
@@ -162,7 +176,7 @@ impl Visibilities {
                 "obs-text" => to_obs_text(observation).map(text),
                 "eht-csv" => to_eht_table(observation, EhtTable::Csv).map(text),
                 "eht-txt" => to_eht_table(observation, EhtTable::Txt).map(text),
-                _ => Ok(text(to_csv(observation, true))),
+                _ => to_csv(observation, true).map(text),
             }
         };
         Ok(PyBytes::new(py, &detached(py, work)?))
@@ -215,15 +229,34 @@ impl Visibilities {
         Ok((values.into_pyarray(py).into_any(), sigmas.into_pyarray(py).into_any()))
     }
 
-    /// Averaged over intervals of so many seconds, of the clock or of each scan.
-    fn averaged(&self, py: Python<'_>, seconds: f64, in_scans: bool) -> PyResult<Self> {
+    /// Averaged over intervals of so many seconds, of the clock or of each scan, weighted by 1/σ² or plain.
+    fn averaged(
+        &self,
+        py: Python<'_>,
+        seconds: f64,
+        in_scans: bool,
+        weighted: bool,
+    ) -> PyResult<Self> {
+        let averaging = Averaging { seconds, in_scans, weighted };
+        if !averaging.is_allowed() {
+            return Err(refused(format!("seconds = {seconds} is not allowed: [1e-3, 1e9]")));
+        }
         let of = &self.observation;
-        let work = || {
-            let average =
-                if in_scans { of.averaged_in_scans(seconds) } else { of.averaged(seconds) };
-            Ok::<_, Infallible>(average)
-        };
+        let work = || Ok::<_, Infallible>(of.averaged(averaging));
         Ok(Visibilities { observation: detached(py, work)? })
+    }
+
+    /// How many rows repeat the baseline, channel and time of another, and how many closure quantities averages of scans
+    /// have, if these are more.
+    fn rows_that_do_not_close(
+        &self,
+        py: Python<'_>,
+        phases: bool,
+    ) -> PyResult<(usize, Option<usize>)> {
+        let kind = if phases { ClosureKind::Phase } else { ClosureKind::LogAmplitude };
+        let of = &self.observation;
+        let count = || Ok::<_, Infallible>(ClosureCount::of(of, kind, 0.0).of_scans);
+        Ok((of.repeats().rows, detached(py, count)?))
     }
 
     /// As Stokes I alone.

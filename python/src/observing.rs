@@ -13,7 +13,7 @@ use kerrlight_vlbi::noise::{
 use kerrlight_vlbi::observation::Observation;
 use kerrlight_vlbi::operator::{ImageGrid, Method, Pulse};
 use kerrlight_vlbi::schedule::{Clock, Schedule, Setup, observe_affordable};
-use kerrlight_vlbi::simulate::{Movie, fill};
+use kerrlight_vlbi::simulate::{Movie, StokesMovie, fill_stokes};
 use kerrlight_vlbi::source::Source;
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
@@ -81,18 +81,23 @@ impl Plan {
         }
     }
 
-    fn observe(&self, source: &Source, movie: &Movie, pulse: Pulse) -> Result<Observation, Error> {
+    fn observe(
+        &self,
+        source: &Source,
+        movie: &StokesMovie,
+        pulse: Pulse,
+    ) -> Result<Observation, Error> {
         let array = Array::new(self.stations.iter().cloned().map(station).collect())?;
         let (schedule, setup) = (self.schedule(), self.setup());
         let mut observation = observe_affordable(&array, source.position, &schedule, &setup)?;
         observation.source.clone_from(&source.name);
-        let hours = match (&self.frame_hours, movie.frames()) {
+        let hours = match (&self.frame_hours, movie.i.frames()) {
             (Some(hours), _) => hours.clone(),
             (None, 1) => vec![0.0],
             (None, _) => schedule.hours_utc(setup.ut1)?,
         };
         let method = self.accuracy.map_or(Method::Direct, Method::Cheaper);
-        let transform = fill(&mut observation, movie, pulse, &hours, method)?;
+        let transform = fill_stokes(&mut observation, movie, pulse, &hours, method)?;
         self.spoil(&mut observation)?;
         let version = env!("CARGO_PKG_VERSION");
         observation.history = vec![format!("kerrlight {version} observe, from Python"), transform];
@@ -103,7 +108,7 @@ impl Plan {
     /// In the order of light's way.
     fn spoil(&self, observation: &mut Observation) -> Result<(), Error> {
         if self.scattering {
-            scatter(observation, &ScatteringKernel::SGR_A)?;
+            scatter(observation, &ScatteringKernel::sgr_a())?;
         }
         let (constant_amplitude, scan_amplitude, random_phases) = self.gains;
         let gains = GainErrors {
@@ -122,17 +127,23 @@ impl Plan {
     }
 }
 
-/// What an array sees of a movie of `frames` images of width × height pixels over a field (µas).
+/// What an array sees of a movie of images of width × height pixels over a field (µas), of Stokes I, and of Q, U and V
+/// where they are given.
 #[pyfunction]
 fn observe(
     py: Python<'_>,
     movie: PyReadonlyArray1<'_, f64>,
+    polarized: [Option<PyReadonlyArray1<'_, f64>>; 3],
     screen: (usize, usize, f64),
     plan: Plan,
 ) -> PyResult<Visibilities> {
     let (width, height, field_uas) = screen;
     let grid = ImageGrid::new(width, height, field_uas * MICROARCSECOND).map_err(refused)?;
-    let movie = Movie { grid, pixels: movie.as_slice()?.to_vec() };
+    let i = Movie { grid, pixels: movie.as_slice()?.to_vec() };
+    let mut movie = StokesMovie::from(i);
+    for (stokes, given) in movie.polarized.iter_mut().zip(polarized) {
+        *stokes = given.map(|given| given.as_slice().map(<[f64]>::to_vec)).transpose()?;
+    }
     let source: Source = plan.source.parse().map_err(refused)?;
     let pulse = pulse(&plan.pulse)?;
     let observation = detached(py, || plan.observe(&source, &movie, pulse))?;

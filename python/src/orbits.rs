@@ -1,15 +1,18 @@
 //! Special radii of a hole, and the redshift of matter on circular orbits.
 
-use crate::call::refused;
-use kerrlight_geodesic::{Kerr, flow, orbits};
+use crate::call::{detached, refused};
+use kerrlight_geodesic::plunge::Plunge;
+use kerrlight_geodesic::{Kerr, flow, interrupt, orbits};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::convert::Infallible;
 
 /// Adds the functions of this module.
 pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(radii, module)?)?;
-    module.add_function(wrap_pyfunction!(keplerian_redshift, module)?)
+    module.add_function(wrap_pyfunction!(keplerian_redshift, module)?)?;
+    module.add_function(wrap_pyfunction!(velocity, module)?)
 }
 
 /// Special radii in M, by name. Refuses spins out of range.
@@ -27,6 +30,25 @@ fn radii(py: Python<'_>, spin: f64) -> PyResult<Bound<'_, PyDict>> {
     Ok(dict)
 }
 
+/// Four-velocities in the equatorial plane, four numbers a radius: of circular orbits about +z, and of what plunges from
+/// the innermost stable one with its energy and angular momentum. NaN at and inside the horizon.
+#[pyfunction]
+fn velocity<'py>(
+    py: Python<'py>,
+    spin: f64,
+    r: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let hole = Kerr::new(spin).map_err(refused)?;
+    let (plunge, r) = (Plunge::new(&hole), r.as_slice()?);
+    let of = |r: &f64| {
+        interrupt::check();
+        let inside = plunge.velocity(*r);
+        inside.or_else(|| flow::keplerian_velocity(&hole, *r)).unwrap_or([f64::NAN; 4])
+    };
+    let work = || Ok::<_, Infallible>(r.iter().flat_map(of).collect::<Vec<f64>>());
+    Ok(detached(py, work)?.into_pyarray(py))
+}
+
 /// Redshift factors g of circular orbits in the equatorial plane; NaN where there is no orbit.
 #[pyfunction]
 fn keplerian_redshift<'py>(
@@ -36,8 +58,11 @@ fn keplerian_redshift<'py>(
     lam: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let hole = Kerr::new(spin).map_err(refused)?;
-    let pairs = r.as_slice()?.iter().zip(lam.as_slice()?);
-    let factor = |(r, lam): (&f64, &f64)| flow::keplerian_redshift(&hole, *r, *lam);
-    let factors = pairs.map(|pair| factor(pair).unwrap_or(f64::NAN));
-    Ok(factors.collect::<Vec<f64>>().into_pyarray(py))
+    let (r, lam) = (r.as_slice()?, lam.as_slice()?);
+    let factor = |(r, lam): (&f64, &f64)| {
+        interrupt::check();
+        flow::keplerian_redshift(&hole, *r, *lam).unwrap_or(f64::NAN)
+    };
+    let work = || Ok::<_, Infallible>(r.iter().zip(lam).map(factor).collect::<Vec<f64>>());
+    Ok(detached(py, work)?.into_pyarray(py))
 }

@@ -1,13 +1,13 @@
 //! Pictures and films of scenes.
 
-use crate::call::{detached, interruptible, refused};
+use crate::call::{detached, refused};
 use kerrlight_cli::pictures::{Shot, Shown};
+use kerrlight_geodesic::interrupt;
 use kerrlight_render::picture::Summary;
 use numpy::{IntoPyArray, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
 
 /// Adds the functions of this module.
 pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -65,10 +65,11 @@ fn render(
     folder: PathBuf,
     overrides: Vec<String>,
 ) -> PyResult<Picture> {
-    let shot = Shot::new(text.as_deref(), &folder, &overrides).map_err(refused)?;
-    let work =
-        |stop: &std::sync::atomic::AtomicBool| shot.render(&|_| !stop.load(Ordering::Relaxed));
-    Ok(Picture { shown: interruptible(py, work)? })
+    let work = || {
+        let shot = Shot::new(text.as_deref(), &folder, &overrides)?;
+        shot.render(&|_| !interrupt::is_wanted())
+    };
+    Ok(Picture { shown: detached(py, work)? })
 }
 
 /// Its pictures at times in M.
@@ -80,11 +81,11 @@ fn film(
     overrides: Vec<String>,
     times: Vec<f64>,
 ) -> PyResult<Vec<Picture>> {
-    let shot = Shot::new(text.as_deref(), &folder, &overrides).map_err(refused)?;
-    let work = |stop: &std::sync::atomic::AtomicBool| {
-        shot.film(&times, &|_| !stop.load(Ordering::Relaxed))
+    let work = || {
+        let shot = Shot::new(text.as_deref(), &folder, &overrides)?;
+        shot.film(&times, &|_| !interrupt::is_wanted())
     };
-    Ok(interruptible(py, work)?.into_iter().map(|shown| Picture { shown }).collect())
+    Ok(detached(py, work)?.into_iter().map(|shown| Picture { shown }).collect())
 }
 
 #[pymethods]

@@ -1,6 +1,6 @@
 //! Tables of rays, and their derivatives.
 
-use crate::call::{detached, refused};
+use crate::call::{at_once, detached, refused};
 use kerrlight_geodesic::derivatives::{self, Differentiated, Gradient, Gradients};
 use kerrlight_geodesic::{
     Inclination, Integrator, Kerr, Observer, Placement, Points, RayTable, Request, Uncertainty,
@@ -99,11 +99,17 @@ fn trace<'py>(
     wanted: Wanted,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (hole, observer) = (Kerr::new(spin).map_err(refused)?, place.observer()?);
+    let points = wanted.samples.1.saturating_add(wanted.crossings);
     let (integrator, tolerance, request) = (named(&how.0)?, how.1, wanted.request());
     let (alpha, beta) = (screen.0.as_slice()?, screen.1.as_slice()?);
     let work = || integrator.trace(&hole, &observer, alpha, beta, tolerance, &request);
-    table(py, detached(py, work)?)
+    let is_brief = alpha.len().saturating_mul(points.saturating_add(1)) <= FEW;
+    let rays = if is_brief { at_once(py, work)? } else { detached(py, work)? };
+    table(py, rays)
 }
+
+/// Rays and points that take less time than to wake another thread.
+const FEW: usize = 32;
 
 /// Rays as those of `trace` with `taylor-mino`, and their derivatives.
 #[pyfunction]

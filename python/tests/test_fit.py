@@ -10,6 +10,7 @@ import time
 import numpy as np
 import pytest
 
+import kerrlight
 from kerrlight import Fit
 from kerrlight.fit import FitError
 
@@ -123,3 +124,48 @@ def test_a_folder_keeps_its_settings(tmp_path):
 def test_bar(tmp_path):
     pytest.importorskip("tqdm")
     assert Fit(folder=tmp_path / "run", set={**QUICK, "training.steps": 4}).run().results["steps"] == 4
+
+
+IMAGE = """title = "an image"
+seed = 1
+[image]
+pixels = 8
+field_uas = 100.0
+flux_jy = 1.0
+flux_sigma_jy = 0.1
+starts = [{ gaussian = { fwhm_uas = 40.0 } }]
+iterations = 40
+[data.visibilities]
+path = "data.uvfits"
+average_s = 60.0
+systematic = 0.0
+[[loss]]
+data = "visibilities"
+weight = 1.0
+"""
+
+
+def measured(path):
+    x = np.arange(-8, 8) + 0.5
+    image = np.exp(-(x**2 + x[:, None] ** 2) / 18)
+    kerrlight.observe(
+        image / image.sum(), 100.0, "EHT2017", source="m87", mjd=57850, utc=(0.0, 6.0), scans=4, integration=60, seed=1
+    ).write(path)
+
+
+def test_exact_images_and_relative_paths(tmp_path, monkeypatch):
+    (tmp_path / "data").mkdir()
+    measured(tmp_path / "data" / "data.uvfits")
+    (tmp_path / "data" / "image.toml").write_text(IMAGE)
+    monkeypatch.chdir(tmp_path)
+    fit = Fit("data/image.toml", folder=tmp_path / "run").run(progress=False)
+    assert fit.image["recovered"].shape == (1, 8, 8) and "model" in fit.verdict
+    # From another folder, as one that was stopped.
+    (fit.folder / "results.json").unlink()
+    monkeypatch.chdir(tmp_path / "data")
+    again = Fit.open(tmp_path / "run").run(progress=False)
+    np.testing.assert_array_equal(again.image["recovered"], fit.image["recovered"])
+    with pytest.raises(ValueError, match="data.uvfits is no text of settings.*--init"):
+        Fit("data.uvfits")
+    with pytest.raises(ValueError, match="pixels"):
+        Fit(IMAGE.replace("pixels = 8", "pixels = 0"))

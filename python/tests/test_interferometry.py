@@ -144,6 +144,12 @@ def test_refusals():
         (lambda: Fourier((4, 4), 100.0, [[1.0, 2.0]], pulse="round"), 'pulse = "round"'),
         (lambda: Fourier((4, 4), -1.0, [[1.0, 2.0]]), "field of view"),
         (lambda: Fourier((4, 4), 1.0, [[1.0, 2.0]]).apply(np.zeros((3, 3))), "image has the shape"),
+        (lambda: Fourier((4, 4), 1.0, [np.zeros(3), np.ones(3)]), "uv has the shape (2, 3), not (n, 2)"),
+        (lambda: Fourier((4, 4), 1.0, np.zeros((3, 5, 2))), "uv has the shape (3, 5, 2)"),
+        (lambda: Fourier((4, 4), 1.0, np.zeros(4)), "uv has the shape (4,)"),
+        (lambda: Fourier((4, 4), 1.0, [np.zeros((5, 2)), np.zeros((2, 5))]), "uv[1] has the shape (2, 5)"),
+        (lambda: Fourier((4, 4), 1.0, []), "uv is empty"),
+        (lambda: Fourier((4, 4, 4), 1.0, [[1.0, 2.0]]), "(rows, columns)"),
         (lambda: Observation.of_stokes_i([1.0], [["A", "B"]], [[1.0]], [1.0], [0.1]), "uv has the shape"),
     ]:
         with pytest.raises(ValueError) as refused:
@@ -233,3 +239,93 @@ def test_an_observation_does_not_change():
     for wrong in ({"sigmas": -obs.sigmas}, {"time": obs.time * np.nan}):
         with pytest.raises(ValueError, match="|".join(wrong)):
             replace(obs, **wrong)
+
+
+def scans():
+    """Three stations in two scans of three times 10 s, each baseline two seconds after the one before."""
+    pairs = [("AA", "LM"), ("AA", "PV"), ("LM", "PV")]
+    rows = [(4.0 + 0.5 * scan + (10 * k + 2 * b) / 3600, b) for scan in (0, 1) for k in range(3) for b in range(3)]
+    time = [t for t, _ in rows]
+    names = [pairs[b] for _, b in rows]
+    uv = [[(1e9, 2e9), (3e9, -1e9), (2e9, -3e9)][b] for _, b in rows]
+    sigma = np.where(np.arange(len(rows)) % 2 == 0, 0.01, 0.02)
+    return Observation.of_stokes_i(time, names, uv, np.exp(1j * np.arange(len(rows))), sigma)
+
+
+def test_averages_keep_closures():
+    of = scans()
+    with pytest.warns(UserWarning, match="0 closure phases, where averages of scans have 2"):
+        assert len(of.closure_phases()) == 0
+    for averaged in (of.averaged(3600.0), of.averaged(in_scans=True), of.averaged(1e5, in_scans=True)):
+        count = 1 if averaged.history[-1].endswith("over 3600 s") else 2
+        assert len(np.unique(averaged.time)) == len(averaged.closure_phases()) == count
+    first = (of.time < 4.1) & (of.stations[:, 1] == "LM")
+    plain = of.averaged(in_scans=True, weighted=False)
+    weighted = of.averaged(in_scans=True)
+    weights = of.sigma[first] ** -2
+    np.testing.assert_allclose(plain.vis[0], of.vis[first].mean())
+    np.testing.assert_allclose(plain.sigma[0], np.sqrt((of.sigma[first] ** 2).sum()) / first.sum())
+    np.testing.assert_allclose(weighted.vis[0], (of.vis[first] * weights).sum() / weights.sum())
+    for bad in (1e-9, np.inf, np.nan, -1.0):
+        with pytest.raises(ValueError, match="seconds"):
+            of.averaged(bad, in_scans=True)
+    with pytest.raises(ValueError, match="in_scans=True"):
+        of.averaged()
+
+
+def test_repeated_rows_are_told():
+    of = observation()
+    twice = of.where(np.tile(np.arange(len(of)), 2))
+    with pytest.warns(UserWarning, match=f"{len(of)} rows have the baseline, channel and time of another"):
+        assert len(twice.closure_phases()) == 2 * len(of.closure_phases())
+    np.testing.assert_array_equal(twice.averaged(1.0).sigma, of.averaged(1.0).sigma)
+
+
+def test_sidereal_times_of_ehtim():
+    """GMST was 13.0308 h at 0 h UTC of MJD 57850 (astropy); a sidereal hour is 0.99727 hours."""
+    obs = fake_obsdata(observation(times=(23.9, 0.1, 12.9)))
+    obs.timetype, obs.opacitycal = "GMST", False
+    of = Observation.from_ehtim(obs)
+    # The longest gap is that before 12.9 h, which is before midnight's sidereal time: 23.8 h UTC of the day.
+    first = (12.9 - 13.0308) * 0.99727 + 23.93447
+    expected = [first + 11.0 * 0.99727, first + 11.2 * 0.99727, first]
+    np.testing.assert_allclose(of.time, np.repeat(expected, 6), atol=1e-4)
+    assert of.history == ("from eht-imaging", "opacitycal = False")
+    obs.timetype = "LST"
+    with pytest.raises(ValueError, match='timetype = "LST" is not allowed'):
+        Observation.from_ehtim(obs)
+
+
+def test_other_frames_of_pyuvdata_are_refused():
+    from kerrlight import _pyuvdata
+
+    center = {"cat_name": "M87", "cat_lon": 0.0, "cat_lat": 0.0}
+    for bad in ({"cat_type": "unprojected"}, {"cat_frame": "fk4"}, {"cat_frame": "fk5", "cat_epoch": 1975.0}):
+        with pytest.raises(ValueError, match="is not allowed"):
+            _pyuvdata._center(types.SimpleNamespace(phase_center_catalog={0: {**center, **bad}}))
+    for good in ({}, {"cat_frame": "icrs"}, {"cat_frame": "fk5", "cat_epoch": 2000.0}):
+        _pyuvdata._center(types.SimpleNamespace(phase_center_catalog={0: {**center, **good}}))
+
+
+def test_pyuvdata_writes_uvfits(tmp_path):
+    pytest.importorskip("pyuvdata")
+    of = observation(circular=True)
+    path = tmp_path / "a.uvfits"
+    of.to_pyuvdata().write_uvfits(path)
+    np.testing.assert_allclose(Observation.read(path).vis, of.vis, rtol=1e-6)
+
+
+def test_exact_columns_are_not_reshaped():
+    names = np.array([["AA", "LM"], ["AA", "PV"], ["LM", "PV"]])
+    uv, vis = np.ones((3, 2)), np.ones(3)
+    for wrong, words in [
+        ((names.T, uv, vis, 0.1), "stations"),
+        ((names, uv.T, vis, 0.1), "uv"),
+        ((names, uv, vis[:, None], 0.1), "vis"),
+        ((names, uv, vis, [0.1, 0.1]), "sigma"),
+    ]:
+        with pytest.raises(ValueError, match=f"{words} ha.* the shape"):
+            Observation.of_stokes_i([4.0] * 3, *wrong)
+    for channel in ([0, 0], [0, 0.5, 0]):
+        with pytest.raises(ValueError, match="channel"):
+            Observation.of_stokes_i([4.0] * 3, names, uv, vis, 0.1, channel=channel)

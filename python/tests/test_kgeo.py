@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from kerrlight.compat.kgeo import raytrace_ana
+from kerrlight import Kerr
+from kerrlight.compat.kgeo import r_equatorial, raytrace_ana, rho_of_req, u_kep
 
 # (spin, inclination in degrees, alpha, beta): x and y where the ray first crosses the equatorial plane.
 PUBLISHED = {
@@ -79,3 +80,62 @@ def test_dataset_of_bhnerf():
     norm = norm + 4 * data.spin * data.r * data.lam / data.Delta
     scale = abs(data.Xi / data.Delta)
     assert float((abs(norm) / scale).isel(geo=slice(0, 15)).max()) < 1e-10
+
+
+def test_paper_radii_of_crossings():
+    for (spin, inclination, alpha, beta), (x, y) in PUBLISHED.items():
+        radius, mino, total, last = r_equatorial(spin, 1000.0, np.radians(inclination), 0, alpha, beta)
+        np.testing.assert_allclose(radius, np.hypot(x, y), rtol=1e-5)
+        assert 0 < mino < total and last >= 0
+    assert r_equatorial(0.9, np.inf, 1.0, 3, 10.0, 10.0)[0] == 0.0
+
+
+@pytest.mark.parametrize("mbar, req", [(0, 6.0), (0, "horizon"), (1, 4.0)])
+def test_exact_rings_are_seen_where_rays_cross(mbar, req):
+    radius = Kerr(0.9).horizon if req == "horizon" else req
+    angles, rho, alpha, beta = rho_of_req(0.9, 0.4, radius, mbar)
+    assert len(angles) == 360 and np.isfinite(rho).all()
+    np.testing.assert_allclose(np.hypot(alpha, beta), rho)
+    if req != "horizon":
+        np.testing.assert_allclose(r_equatorial(0.9, np.inf, 0.4, mbar, alpha, beta)[0], radius, rtol=1e-8)
+    with pytest.raises(ValueError, match="horizon"):
+        rho_of_req(0.9, 0.4, 1.0)
+
+
+@pytest.mark.parametrize("spin, retrograde", [(0.0, False), (0.9, False), (0.9, True), (-0.7, False), (-0.7, True)])
+def test_exact_orbits_keep_their_norm_and_plunges_their_energy(spin, retrograde):
+    hole = Kerr(spin)
+    against = -abs(spin) if retrograde else abs(spin)
+    r = np.linspace(hole.horizon + 0.05, 14.0, 300)
+    time, inward, still, turn = u_kep(spin, r, retrograde)
+    tt, tp, pp = -(1 - 2 / r), -2 * spin / r, r**2 + spin**2 + 2 * spin**2 / r
+    rr = r**2 / (r**2 - 2 * r + spin**2)
+    norm = tt * time**2 + 2 * tp * time * turn + pp * turn**2 + rr * inward**2
+    np.testing.assert_allclose(norm, -1.0, atol=1e-9)
+    inside = r < Kerr(against).isco
+    energy = -(tt * time + tp * turn)[inside]
+    np.testing.assert_allclose(energy, np.sqrt(1 - 2 / (3 * Kerr(against).isco)), rtol=1e-9)
+    assert still == 0 and (inward[inside] < 0).all() and (inward[~inside] == 0).all()
+    assert (np.sign(turn[~inside]) == (1 if (spin >= 0) != retrograde else -1)).all()
+
+
+def test_exact_a_part_of_a_ray_has_the_points_of_the_whole():
+    screen = [np.array([-6.0, 0.5, 7.0]), np.array([2.0, 0.5, -3.0])]
+    whole = raytrace_ana(0.9, [0, 1000.0, 1.0, 0], screen, ngeo=41)
+    half = raytrace_ana(0.9, [0, 1000.0, 1.0, 0], screen, ngeo=21, maxtaufrac=0.5)
+    # The whole of a captured ray ends a relative 1e-8 outside the horizon.
+    escaping = [0, 2]
+    for of, tolerance in ((escaping, 1e-9), (slice(None), 2e-8)):
+        np.testing.assert_allclose(half.tautot[of], whole.tautot[of], rtol=tolerance)
+        for name in ("r_s", "th_s", "ph_s", "t_s", "affinesteps"):
+            part, all_ = getattr(half, name)[:, of], getattr(whole, name)[:21, of]
+            np.testing.assert_allclose(part, all_, rtol=10 * tolerance, atol=tolerance)
+    for wrong in (0.0, 1.1, np.nan):
+        with pytest.raises(ValueError, match="maxtaufrac"):
+            raytrace_ana(0.9, maxtaufrac=wrong)
+
+
+def test_exact_screens_are_not_reshaped():
+    for wrong in (np.zeros((5, 2)), np.zeros((2, 5, 5)), [[1.0]]):
+        with pytest.raises(ValueError, match="alpha"):
+            raytrace_ana(0.9, image_coords=wrong)

@@ -39,6 +39,21 @@ def test_without_noise_it_is_the_transform():
     np.testing.assert_array_equal(again.vis, noisy.vis)
 
 
+def test_all_stokes_parameters():
+    q, u, v = (0.2 * RNG.normal(size=MOVIE.shape[1:]) / 144 for _ in range(3))
+    plan = {**PLAN, "noise": False}
+    i = observe(MOVIE[0], 120.0, **plan)
+    assert np.isnan(i.sigmas[:, 2:]).all() and not np.isnan(i.sigmas[:, :2]).any()
+    every = observe(MOVIE[0], 120.0, q=q, u=u, v=v, **plan)
+    of = [i.fourier((12, 12), 120.0).apply(plane) for plane in (MOVIE[0], q, u, v)]
+    right = [of[0] + of[3], of[0] - of[3], of[1] + 1j * of[2], of[1] - 1j * of[2]]
+    np.testing.assert_allclose(every.products, np.transpose(right), atol=1e-13)
+    assert not np.isnan(every.sigmas).any()
+    for given, words in [({"q": q}, "q and u"), ({"q": q, "u": u[1:]}, "u has the shape")]:
+        with pytest.raises(ValueError, match=words):
+            observe(MOVIE[0], 120.0, **given, **plan)
+
+
 def test_gains_leave_closures():
     plain = observe(MOVIE[0], 120.0, **PLAN, noise=False)
     spoiled = observe(MOVIE[0], 120.0, **PLAN, noise=False, random_phases=True, gain_scan=0.2, seed=2)
@@ -55,6 +70,8 @@ def test_refusals(tmp_path):
         (lambda: observe(MOVIE, 120.0, **PLAN), "give seed"),
         (lambda: observe(MOVIE[0, 0], 120.0, **PLAN, noise=False), "images have the shape"),
         (lambda: observe(MOVIE[:3], 120.0, **PLAN, noise=False), "number of images = 3"),
+        (lambda: observe(MOVIE, 120.0, **PLAN, noise=False, frame_hours=[[4.0, 14.0]]), "frame_hours has the shape"),
+        (lambda: observe(MOVIE, 120.0, **{**PLAN, "utc": (4.0, 9.0, 14.0)}, noise=False), "utc has the shape"),
         (lambda: observe(MOVIE, 120.0, "VLA", **PLAN, noise=False), "neither EHT2017 nor ngEHT"),
         (lambda: observe(MOVIE, 120.0, **{**PLAN, "source": "venus"}, noise=False), "expected sgra"),
         (lambda: observe(MOVIE, 120.0, **{**PLAN, "utc": None}, noise=False), "utc or gmst"),

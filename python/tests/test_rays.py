@@ -6,6 +6,7 @@ import math
 import subprocess
 import sys
 import threading
+import warnings
 
 import numpy as np
 import pytest
@@ -197,3 +198,41 @@ def test_angles_are_finite_and_numbers_whole():
             call()
     with pytest.raises(ValueError, match="masked"):
         observer.trace(np.ma.masked_array([1.0, 2.0], [0, 1]), 1.0)
+
+
+def test_exact_matter_plunges_inside_of_the_innermost_stable_orbit():
+    # Light straight away from matter that falls from 6 M of a hole without spin.
+    r = np.linspace(2.2, 6.0, 20)
+    falling = (6 / r - 1) ** 1.5 / 3
+    expected = (1 - 2 / r) / (np.sqrt(8 / 9) + falling)
+    found = Kerr(0.0).keplerian_redshift(r, 0.0, p_r=1 / (1 - 2 / r))
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    with pytest.warns(UserWarning, match="innermost stable orbit at 6 M"):
+        Kerr(0.0).keplerian_redshift([5.0, 9.0], 1.0)
+
+
+def test_exact_angles_in_the_other_unit_are_told():
+    hole = Kerr(0.5)
+    for degrees in (60, 17, 90):
+        with pytest.warns(UserWarning, match=f"{degrees} degrees in radians"):
+            hole.observer(inclination_deg=np.radians(degrees))
+    with pytest.warns(UserWarning, match="two turns"):
+        hole.observer(inclination_deg=30, azimuth=90)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for plausible in (0, 0.5, 1, 3.14, 17.5, 180):
+            hole.observer(inclination_deg=plausible, azimuth=-np.pi)
+
+
+def test_exact_crossings_are_checked():
+    with pytest.raises(ValueError, match="crossings = 1000000000"):
+        Kerr(0.5).observer(inclination_deg=30).trace(1.0, 1.0, crossings=10**9)
+
+
+def test_exact_arrays_that_lie_across_words_are_taken():
+    # As dask hands over what came from another process.
+    alpha = np.frombuffer(b"\0" + np.linspace(-8, 8, 5).tobytes(), offset=1)
+    assert not alpha.flags.aligned
+    observer = Kerr(0.5).observer(inclination_deg=30)
+    np.testing.assert_array_equal(observer.trace(alpha, 1.0).outcome, observer.trace(alpha.copy(), 1.0).outcome)
+    observer.critical_curve(angles=alpha), observer.band(1, alpha)

@@ -191,6 +191,7 @@ fn regress_geodesic_imports_from_what_stands_before() {
     let house = House::of("geodesic");
     let expected = [
         "error",
+        "interrupt",
         "numbers",
         "spacetime",
         "screen",
@@ -245,5 +246,30 @@ fn regress_fits_and_the_program_have_no_circle_of_imports() {
         let arrows: usize = house.arrows.values().map(BTreeSet::len).sum();
         assert!(arrows > least, "only {arrows} imports found in {name}");
         assert_eq!(house.circular(), [""; 0], "{name}");
+    }
+}
+
+/// The manifest of the geodesic crate inherits nothing, so that a copy of its folder builds; what it repeats is that of
+/// the workspace.
+#[test]
+fn exact_the_geodesic_crate_stands_alone() {
+    let read = |file: &str| -> toml::Table {
+        std::fs::read_to_string(root().join(file)).unwrap().parse().unwrap()
+    };
+    let (own, all) = (read("geodesic/Cargo.toml"), read("Cargo.toml"));
+    let text = own.to_string();
+    assert!(!text.contains("workspace") && !text.contains("path = \"..\""), "{text}");
+    let workspace = all["workspace"].as_table().unwrap();
+    for (key, value) in workspace["package"].as_table().unwrap() {
+        assert_eq!(&own["package"][key], value, "{key}");
+    }
+    assert_eq!(own["lints"], workspace["lints"]);
+    let version = |table: &toml::Value| table.get("version").unwrap_or(table).clone();
+    for kind in ["dependencies", "dev-dependencies"] {
+        for (name, dependency) in own[kind].as_table().unwrap() {
+            if let Some(shared) = workspace["dependencies"].get(name) {
+                assert_eq!(version(dependency), version(shared), "{name}");
+            }
+        }
     }
 }

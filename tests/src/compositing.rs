@@ -367,3 +367,22 @@ fn paper_stars_are_magnified() {
         assert!((magnified / expected - 1.0).abs() < 0.02, "{u}: {magnified} {expected}");
     }
 }
+
+/// Beside the ring, where the image of a faint disc's light runs around the hole, no motion leaves the picture within
+/// 1 M, and with 9 and 25 rays a pixel alpha does not exceed 1.
+#[test]
+fn exact_motion_and_alpha_have_bounds() {
+    let side = 31.0;
+    for rays in [9, 25] {
+        let rays = format!("screen.samples_per_pixel={rays}");
+        let more = ["observer.inclination_deg=80", "screen.field_of_view_m=11", &rays];
+        let base = scene(FACE_ON, &more);
+        let scene = asking(&base.to_toml(), r#""A","coverage","motion""#, &[]);
+        let seen = picture(&scene, None);
+        let [u, v, alpha] = ["motion.u", "motion.v", "A"].map(|name| seen.channel(name).unwrap());
+        let longest = u.iter().zip(v).map(|(u, v)| u.hypot(*v)).fold(0.0, f32::max);
+        assert!((0.9 * side..=side * (1.0 + 1e-6)).contains(&longest), "{longest}");
+        let most = alpha.iter().copied().fold(0.0, f32::max);
+        assert!(most == 1.0, "{most:e}");
+    }
+}

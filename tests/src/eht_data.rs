@@ -4,7 +4,8 @@
 
 use crate::support::root;
 use kerrlight_vlbi::files::{self, EhtTable, Format};
-use kerrlight_vlbi::observation::{Measured, Observation};
+use kerrlight_vlbi::observation::{Averaging, Measured, Observation};
+use kerrlight_vlbi::products::{ClosureCount, ClosureKind};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -128,4 +129,29 @@ fn exact_eht_files_survive_a_round_trip() {
             }
         }
     }
+}
+
+/// eht-imaging 1.3.2 of M87*, 2017 April 10: `avg_coherent(300)` and `add_scans()` with `avg_coherent(0, scan_avg=True)`,
+/// then `c_phases` and `c_amplitudes(ctype="logcamp")` with `count="min"`. 86 of the averages of scans are not of baselines
+/// within a site.
+#[test]
+fn code_ehtim_averages_keep_closures() {
+    let path = folder().join("SR1_M87_2017_100_hi_hops_netcal_StokesI.uvfits");
+    if !path.exists() {
+        eprintln!("SKIPPED: there is no {}", path.display());
+        return;
+    }
+    let data = decode(&path).1;
+    let clock = Averaging::over(300.0);
+    let scans = Averaging { seconds: f64::INFINITY, in_scans: true, weighted: true };
+    for (averaging, expected) in [(clock, [167, 12, 110, 98]), (scans, [96, 7, 63, 56])] {
+        let mean = data.averaged(averaging);
+        let mut times: Vec<u64> = mean.rows.iter().map(|row| row.time_h.to_bits()).collect();
+        times.dedup();
+        let count = |kind| ClosureCount::of(&mean, kind, 0.0).used;
+        let [phases, amplitudes] = [ClosureKind::Phase, ClosureKind::LogAmplitude].map(count);
+        assert_eq!([mean.rows.len(), times.len(), phases, amplitudes], expected);
+    }
+    let lengths = data.averaged(scans).rows.into_iter().map(|row| row.uv[0].hypot(row.uv[1]));
+    assert_eq!(lengths.filter(|length| *length > 1e8).count(), 86);
 }

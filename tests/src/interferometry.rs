@@ -11,21 +11,34 @@ use std::path::Path;
 const WHEN: [&str; 10] =
     ["--source", "sgra", "--mjd", "57850", "--utc", "4.0-15.5", "--frames", "128", "--tint", "60"];
 
-/// The image of the recipe, as a grid of Jy/pixel.
+/// The image of the recipe in Jy/pixel, rows from the north.
+fn pixel(row: i32, column: i32) -> f64 {
+    let (x, y) = ((f64::from(column) - 31.5) / 31.5, (f64::from(row) - 31.5) / 31.5);
+    let ring = (-((x.hypot(y) - 0.4) / 0.1).powi(2)).exp();
+    let waves = 0.01 * f64::from((7 * row + 3 * column) % 5);
+    (ring * (1.0 + 0.5 * x - 0.3 * y) + waves) / 150.0
+}
+
+/// The image as a grid.
 fn write_image(folder: &Path) {
     let mut text = "# Jy/pixel\n".to_owned();
     for row in 0..64 {
-        let cells: Vec<String> = (0..64)
-            .map(|column| {
-                let (x, y) = ((f64::from(column) - 31.5) / 31.5, (f64::from(row) - 31.5) / 31.5);
-                let ring = (-((x.hypot(y) - 0.4) / 0.1).powi(2)).exp();
-                let waves = 0.01 * f64::from((7 * row + 3 * column) % 5);
-                ((ring * (1.0 + 0.5 * x - 0.3 * y) + waves) / 150.0).to_string()
-            })
-            .collect();
+        let cells: Vec<String> = (0..64).map(|column| pixel(row, column).to_string()).collect();
         text += &(cells.join(",") + "\n");
     }
     std::fs::write(folder.join("image.csv"), text).unwrap();
+}
+
+/// The image with Q = 0.1 I and U = −0.2 I everywhere, as eht-imaging's text.
+fn write_polarized_image(folder: &Path) {
+    let mut text =
+        "# SRC: SgrA\n# FOVX: 64 pix 0.000160 as\n# FOVY: 64 pix 0.000160 as\n".to_owned();
+    for (row, column) in (0..64).flat_map(|row| (0..64).map(move |column| (row, column))) {
+        let [x, y] = [column, row].map(|k| (31.5 - f64::from(k)) * 2.5e-6);
+        let i = pixel(row, column);
+        text += &format!("{x:.10} {y:.10} {i} {} {}\n", 0.1 * i, -0.2 * i);
+    }
+    std::fs::write(folder.join("image.txt"), text).unwrap();
 }
 
 fn observe(folder: &Path, array: &str, output: &str, more: &[&str]) {
@@ -170,14 +183,37 @@ fn exact_convert_flags_and_averages() {
     assert!(tables.contains("eht-imaging text") && tables.contains("SPT"), "{tables}");
 }
 
+/// Q and U of the input are in RL and LR; without them RL and LR are not measured, and all else is the same.
+#[test]
+fn exact_cross_hands_are_those_of_the_input() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    write_image(path);
+    write_polarized_image(path);
+    observe(path, "EHT2017", "plain.txt", &[]);
+    let start = ["observe", "image.txt", "--array", "EHT2017", "-o", "polarized.txt"];
+    succeed(path, &[&start[..], &WHEN[..]].concat());
+    let [plain, polarized] = ["plain.txt", "polarized.txt"].map(|name| read(path, name));
+    assert!(plain.rows.len() > 1000 && plain.rows.len() == polarized.rows.len());
+    for (a, b) in plain.rows.iter().zip(&polarized.rows) {
+        assert!(a.product(2).is_none() && a.product(3).is_none());
+        let i = b.products[0];
+        assert!((a.products[0] - i).norm() < 1e-9 && (b.products[1] - i).norm() < 1e-9);
+        let (rl, lr) = (Complex64::new(0.1, -0.2) * i, Complex64::new(0.1, 0.2) * i);
+        assert!((b.products[2] - rl).norm() < 1e-9 && (b.products[3] - lr).norm() < 1e-9);
+        assert!(b.noise_sigma.iter().all(|sigma| *sigma > 0.0));
+    }
+}
+
 /// The table has the numbers of the library, of averages too, whose baselines share one time; files without cross hands are
 /// refused.
 #[test]
 fn exact_closure_traces_as_a_table() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    write_image(path);
-    observe(path, "EHT2017", "a.uvfits", &[]);
+    write_polarized_image(path);
+    let start = ["observe", "image.txt", "--array", "EHT2017", "-o", "a.uvfits"];
+    succeed(path, &[&start[..], &WHEN[..]].concat());
     succeed(path, &["convert", "a.uvfits", "traces.csv", "--closure-traces", "100"]);
     let table = std::fs::read_to_string(path.join("traces.csv")).unwrap();
     assert!(table.starts_with("time_utc_h,t1,t2,t3,t4,quantity,value,sigma\n"), "{table}");
@@ -382,4 +418,25 @@ fn bad_input_is_refused_and_nothing_is_written() {
     assert!(fail(&["inspect", "image.csv"]).contains("image.csv"));
     assert!(fail(&["convert", "image.csv", "b.uvfits"]).contains("time_utc_h"));
     assert!(fail(&["convert", "nothing.uvfits", "b.uvfits"]).contains("No such file"));
+}
+
+/// Baselines that begin one after the other: averages have one time, and close.
+#[test]
+fn regress_averages_of_staggered_baselines_close() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let mut text = "time_utc_h,t1,t2,u,v,re,im,sigma\n".to_owned();
+    for (k, pair) in ["A,B", "A,C", "A,D", "B,C", "B,D", "C,D"].into_iter().enumerate() {
+        for time in 0..5 {
+            let hours = 4.0 + (10.0 * f64::from(time) + k as f64) / 3600.0;
+            text += &format!("{hours},{pair},1e9,2e9,0.5,0.1,0.01\n");
+        }
+    }
+    std::fs::write(path.join("a.csv"), text).unwrap();
+    succeed(path, &["convert", "a.csv", "mean.csv", "--average", "600"]);
+    let mean = read(path, "mean.csv");
+    assert!(mean.rows.len() == 6 && mean.rows.iter().all(|row| row.time_h == mean.rows[0].time_h));
+    let closures = |kind| ClosureSet::of(&mean, kind, 0.0)[0].closures.len();
+    assert_eq!([ClosureKind::Phase, ClosureKind::LogAmplitude].map(closures), [3, 2]);
+    assert!((mean.rows[0].noise_sigma[0] - 0.01 / 5f64.sqrt()).abs() < 1e-15);
 }

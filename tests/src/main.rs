@@ -6,6 +6,8 @@ mod architecture;
 mod bad_input;
 mod bounded;
 mod browser;
+#[cfg(unix)]
+mod cases;
 mod changing_emission;
 mod closed_forms;
 mod command_line;
@@ -31,7 +33,6 @@ mod kerr_references;
 mod leakage;
 mod lensing;
 #[cfg(unix)]
-mod mpirun;
 mod pictures;
 mod posterior;
 mod quick_looks;
@@ -44,15 +45,15 @@ mod results;
 mod resume;
 mod resumed_fits;
 mod resumed_searches;
-mod shared_folder;
+mod scene_files;
 #[cfg(unix)]
 mod signals;
 #[cfg(unix)]
-mod slurm;
 mod static_image;
 mod static_sky;
 mod station_gains;
 mod support;
+mod system_limits;
 mod unknown_world;
 mod verdict;
 mod view;

@@ -1,6 +1,6 @@
 //! `kerrlight reproduce`: its commands make the same bytes, and changed inputs are named.
 
-use crate::shared_folder::experiment;
+use crate::cases::experiment;
 use crate::support::{binary, fail, kerrlight, succeed};
 use serde_json::Value;
 use std::path::Path;

@@ -131,7 +131,7 @@ pub fn render(scene: &Scene) -> Picture {
         Some(Sky::Catalogue(stars)) => Some(Catalogue::decode(&read(&stars.path)).expect("stars")),
         _ => None,
     };
-    let resource = |name: &str| Ok(read(name));
+    let resource = |name: &str| Ok(Some(read(name)));
     let mesh = |path: &str| MeshFile::decode(&read(path), &resource).expect("a mesh");
     let meshes = scene.mesh.iter().map(|one| mesh(&one.path)).collect();
     let volumes = scene.volume.iter().map(|one| volume(&read(&one.path))).collect();

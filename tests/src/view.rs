@@ -384,8 +384,20 @@ fn exact_the_page_is_served() {
     };
     let page = answer("GET /?x#y");
     let elsewhere = ["GET /../Cargo.toml", "POST /", "GET"].map(answer);
+    // A name of another's that leads to this computer (DNS rebinding), and none.
+    let named = |host: &str| {
+        let mut stream = TcpStream::connect(&address).unwrap();
+        stream.write_all(format!("GET / HTTP/1.1\r\n{host}\r\n").as_bytes()).unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        answer
+    };
+    let foreign = ["Host: evil.example:80\r\n", "Host: 127.0.0.1.evil.example\r\n", ""].map(named);
+    let local = ["host: LOCALHOST:9\r\n", "Host: [::1]:80\r\n"].map(named);
     server.kill().unwrap();
     server.wait().unwrap();
+    assert!(foreign.iter().all(|answer| answer.starts_with("HTTP/1.1 403")), "{foreign:?}");
+    assert!(local.iter().all(|answer| answer.starts_with("HTTP/1.1 200")), "{local:?}");
     assert!(page.starts_with("HTTP/1.1 200 OK") && page.ends_with(&expected));
     assert!(elsewhere.iter().all(|answer| answer.starts_with("HTTP/1.1 404")), "{elsewhere:?}");
 }

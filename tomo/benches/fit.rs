@@ -47,7 +47,6 @@ fn training(batch: BatchSize) -> Training {
         axis_rate: None,
         ramp: 0,
         batch,
-        parts: 1,
         // A step in twenty looks at every cell.
         occupancy: Some(OccupancyPlan { settings, warm_up: 60, every: 20 }),
         penalties: None,

@@ -150,7 +150,6 @@ fn training(batch: BatchSize, steps: u64) -> Training {
         axis_rate: None,
         ramp: 0,
         batch,
-        parts: 1,
         occupancy: None,
         penalties: None,
         change: None,

@@ -13,7 +13,8 @@ use kerrlight_common::units::SPEED_OF_LIGHT;
 pub enum Clock {
     /// Coordinated Universal Time.
     Utc,
-    /// Greenwich mean sidereal time; the source is seen in [`Frame::Catalogue`] at exactly these.
+    /// Greenwich mean sidereal time; the source is seen in [`Frame::Catalogue`] at exactly these. The first scan, modulo
+    /// 24 h, lies between 0 h and 24 h UTC of the day.
     Gmst,
 }
 
@@ -80,7 +81,7 @@ impl Schedule {
     pub fn hours_utc(&self, ut1: Ut1) -> Result<Vec<f64>, Error> {
         let utc = |hours| match self.clock {
             Clock::Utc => Ok(hours),
-            Clock::Gmst => hours_utc_of_gmst(self.mjd, hours, ut1),
+            Clock::Gmst => hours_utc_of_gmst(self.mjd, hours, self.start_h, ut1),
         };
         self.hours().map(utc).collect()
     }
@@ -213,7 +214,7 @@ fn view_at(
             Ok((hours, View::new(source, moment, setup.ut1, setup.frame)?))
         }
         Clock::Gmst => {
-            let time_h = hours_utc_of_gmst(schedule.mjd, hours, setup.ut1)?;
+            let time_h = hours_utc_of_gmst(schedule.mjd, hours, schedule.start_h, setup.ut1)?;
             Ok((time_h, View::at_gmst(source, hours)))
         }
     }

@@ -29,14 +29,29 @@ impl Movie {
     }
 }
 
+/// Images of Stokes I, and of Q, U and V as far as they are known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StokesMovie {
+    /// Total intensity.
+    pub i: Movie,
+    /// Q, U and V in Jy per pixel, each as the pixels of I are.
+    pub polarized: [Option<Vec<f64>>; 3],
+}
+
+impl From<Movie> for StokesMovie {
+    fn from(i: Movie) -> Self {
+        StokesMovie { i, polarized: [None, None, None] }
+    }
+}
+
 /// Sets the visibilities of unpolarised emission. Image k shows the source at `times_h[k]` (hours
 /// of UTC, increasing); between two images it is the linear interpolation of both, which is that of
 /// their visibilities. An only image is seen always, and its time does not matter. Says which
 /// transform it has taken.
 ///
 /// # Errors
-/// If the accuracy of the transform is out of range, the number of images is not that of times, times do not increase, or a row lies before the
-/// first or after the last image.
+/// If the accuracy of the transform is out of range, the number of images is not that of times, times do not increase, a row lies before the
+/// first or after the last image, or a visibility overflows.
 pub fn fill(
     observation: &mut Observation,
     movie: &Movie,
@@ -44,11 +59,9 @@ pub fn fill(
     times_h: &[f64],
     method: Method,
 ) -> Result<String, Error> {
-    let shares = shares(observation, movie.frames(), times_h)?;
-    let all = || Ok(Cow::Borrowed(&movie.pixels[..]));
-    let (operator, visibilities) = seen(observation, &shares, (movie.grid, pulse, method), all)?;
-    add(observation, &shares, visibilities);
-    Ok(operator.describe())
+    let (how, seen) = all_seen(observation, (movie.grid, &movie.pixels), pulse, times_h, method)?;
+    set(observation, &seen);
+    Ok(how)
 }
 
 /// The same of images that need not be in memory, by direct sums.
@@ -69,7 +82,8 @@ pub fn fill_from(
         let how = (grid, pulse, Method::Direct);
         visibilities.extend(seen(observation, &shares[range.clone()], how, some)?.1);
     }
-    add(observation, &shares, visibilities);
+    let seen = summed(observation.rows.len(), &shares, visibilities)?;
+    set(observation, &seen);
     Ok(())
 }
 
@@ -115,44 +129,97 @@ fn seen<'p>(
     Ok((operator, visibilities))
 }
 
-/// Sets the rows to the sums of their shares.
-fn add(observation: &mut Observation, shares: &[Shares], visibilities: Vec<Complex64>) {
-    let none = Complex64::new(0.0, 0.0);
-    observation.rows.iter_mut().for_each(|row| row.products = [none; 4]);
+/// What every row sees of a movie, and how it was transformed.
+fn all_seen(
+    observation: &Observation,
+    (grid, pixels): (ImageGrid, &[f64]),
+    pulse: Pulse,
+    times_h: &[f64],
+    method: Method,
+) -> Result<(String, Vec<Complex64>), Error> {
+    let shares = shares(observation, pixels.len() / grid.pixels().max(1), times_h)?;
+    let all = || Ok(Cow::Borrowed(pixels));
+    let (operator, visibilities) = seen(observation, &shares, (grid, pulse, method), all)?;
+    Ok((operator.describe(), summed(observation.rows.len(), &shares, visibilities)?))
+}
+
+/// The sums of the shares of every row.
+fn summed(
+    rows: usize,
+    shares: &[Shares],
+    visibilities: Vec<Complex64>,
+) -> Result<Vec<Complex64>, Error> {
+    let mut sums = vec![Complex64::new(0.0, 0.0); rows];
     for ((row, weight), v) in shares.iter().flatten().zip(visibilities) {
-        let products = &mut observation.rows[*row].products;
-        products[0] += v * weight;
-        if observation.basis == Basis::Circular {
-            products[1] += v * weight;
+        sums[*row] += v * weight;
+    }
+    let size = |v: &Complex64| v.re.abs() + v.im.abs();
+    match sums.iter().map(size).find(|size| !size.is_finite()) {
+        Some(size) => {
+            let allowed = "finite: the sum of so bright pixels overflows";
+            Err(Error::out_of_range("visibility", size, allowed))
         }
+        None => Ok(sums),
     }
 }
 
-/// Sets the visibilities of linearly polarised emission from images of I, Q and U: RR = LL = I, RL = Q + iU, LR = Q − iU.
-/// Otherwise as [`fill`].
+/// Sets the rows to these visibilities of Stokes I.
+fn set(observation: &mut Observation, seen: &[Complex64]) {
+    let none = Complex64::new(0.0, 0.0);
+    let circular = observation.basis == Basis::Circular;
+    for (row, i) in observation.rows.iter_mut().zip(seen) {
+        row.products = [*i, if circular { *i } else { none }, none, none];
+    }
+}
+
+/// Sets the visibilities of all Stokes parameters that are known: RR = I + V, LL = I − V, RL = Q + iU, LR = Q − iU.
+/// Without V, both parallel hands are I; without Q and U, RL and LR are marked as not measured (σ = NaN). Otherwise as
+/// [`fill`].
 ///
 /// # Errors
-/// As [`fill`], or if the observation's products are not those of circular feeds.
-pub fn fill_polarized(
+/// As [`fill`], if Q is known without U or the other way round, or if there is polarised light and the observation's
+/// products are not those of circular feeds.
+pub fn fill_stokes(
     observation: &mut Observation,
-    [i, q, u]: [&Movie; 3],
+    movie: &StokesMovie,
     pulse: Pulse,
     times_h: &[f64],
     method: Method,
 ) -> Result<String, Error> {
-    if observation.basis != Basis::Circular {
+    let [q, u, v] = &movie.polarized;
+    let circular = observation.basis == Basis::Circular;
+    if !circular && movie.polarized.iter().any(Option::is_some) {
         let allowed = "those of circular feeds: RR, LL, RL, LR";
         return Err(Error::out_of_range("products of the observation", 0.0, allowed));
     }
-    let mut of = |movie: &Movie| -> Result<Vec<Complex64>, Error> {
-        fill(observation, movie, pulse, times_h, method)?;
-        Ok(observation.rows.iter().map(|row| row.products[0]).collect())
+    if q.is_some() != u.is_some() {
+        let known = f64::from(u8::from(q.is_some()) + u8::from(u.is_some()));
+        let allowed = "both or none: RL and LR are Q ± iU";
+        return Err(Error::out_of_range("images of Stokes Q and U", known, allowed));
+    }
+    let of = |pixels: &Option<Vec<f64>>| {
+        let grid = movie.i.grid;
+        let seen =
+            |pixels: &Vec<f64>| all_seen(observation, (grid, pixels), pulse, times_h, method);
+        pixels.as_ref().map(seen).transpose()
     };
-    let (q, u) = (of(q)?, of(u)?);
-    let how = fill(observation, i, pulse, times_h, method)?;
-    for ((row, q), u) in observation.rows.iter_mut().zip(q).zip(u) {
-        let turned = Complex64::new(0.0, 1.0) * u;
-        (row.products[2], row.products[3]) = (q + turned, q - turned);
+    let (linear, v) = (of(q)?.zip(of(u)?), of(v)?);
+    let how = fill(observation, &movie.i, pulse, times_h, method)?;
+    match linear {
+        Some(((_, q), (_, u))) => {
+            for ((row, q), u) in observation.rows.iter_mut().zip(q).zip(u) {
+                let turned = Complex64::new(0.0, 1.0) * u;
+                (row.products[2], row.products[3]) = (q + turned, q - turned);
+            }
+        }
+        None if circular => {
+            observation.rows.iter_mut().for_each(|row| row.noise_sigma[2..].fill(f64::NAN));
+        }
+        None => {}
+    }
+    for (row, v) in observation.rows.iter_mut().zip(v.map(|(_, v)| v).unwrap_or_default()) {
+        row.products[0] += v;
+        row.products[1] -= v;
     }
     Ok(how)
 }
@@ -220,5 +287,43 @@ mod tests {
         movie.pixels.truncate(1);
         fill(&mut observation, &movie, Pulse::Delta, &[99.0], Method::Direct).unwrap();
         assert_eq!(observation.rows[0].products[0].re, 3.0);
+    }
+
+    /// A point of I = 2, Q = 0.3, U = −0.4, V = 0.1 Jy in the middle: the same on every baseline.
+    #[test]
+    fn exact_all_stokes_parameters_of_a_point() {
+        let grid = ImageGrid::new(1, 1, 1e-10).unwrap();
+        let i = Measured { visibility: Complex64::new(0.0, 0.0), noise_sigma: 1.0 };
+        let row = Row { noise_sigma: [1.0; 4], ..Row::total_intensity(1.0, [0, 1], [1e9, 0.0], i) };
+        let mut observation =
+            Observation { rows: vec![row], ..Observation::empty(Basis::Circular) };
+        let mut see = |polarized: [Option<f64>; 3]| {
+            observation.rows[0].noise_sigma = [1.0; 4];
+            let i = Movie { grid, pixels: vec![2.0] };
+            let polarized = polarized.map(|value| value.map(|value| vec![value]));
+            let movie = StokesMovie { i, polarized };
+            fill_stokes(&mut observation, &movie, Pulse::Delta, &[0.0], Method::Direct)
+                .map(|_| [0, 1, 2, 3].map(|k| observation.rows[0].product(k).map(|p| p.visibility)))
+                .map_err(|error| error.to_string())
+        };
+        let c = |re, im| Some(Complex64::new(re, im));
+        let all = see([Some(0.3), Some(-0.4), Some(0.1)]).unwrap();
+        assert_eq!(all, [c(2.1, 0.0), c(1.9, 0.0), c(0.3, -0.4), c(0.3, 0.4)]);
+        let linear = see([Some(0.3), Some(-0.4), None]).unwrap();
+        assert_eq!(linear, [c(2.0, 0.0), c(2.0, 0.0), c(0.3, -0.4), c(0.3, 0.4)]);
+        assert_eq!(see([None; 3]).unwrap(), [c(2.0, 0.0), c(2.0, 0.0), None, None]);
+        assert_eq!(see([None, None, Some(0.1)]).unwrap(), [c(2.1, 0.0), c(1.9, 0.0), None, None]);
+        assert!(see([Some(0.3), None, None]).unwrap_err().contains("Stokes Q and U = 1 "));
+    }
+
+    #[test]
+    fn exact_overflow_is_an_error() {
+        let grid = ImageGrid::new(4, 4, 1e-10).unwrap();
+        let i = Measured { visibility: Complex64::new(0.0, 0.0), noise_sigma: 1.0 };
+        let row = Row::total_intensity(1.0, [0, 1], [1e3, 0.0], i);
+        let mut observation = Observation { rows: vec![row], ..Observation::empty(Basis::Stokes) };
+        let movie = Movie { grid, pixels: vec![1e308; 16] };
+        let error = fill(&mut observation, &movie, Pulse::Delta, &[0.0], Method::Direct);
+        assert!(error.unwrap_err().to_string().contains("visibility"));
     }
 }

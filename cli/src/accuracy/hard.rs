@@ -1,11 +1,9 @@
 //! Millions of random rays that look for trouble.
 
 use super::Accuracy;
-use super::together::Together;
 use crate::answer::Answer;
 use crate::interrupt::{Interrupted, Keeper};
-use crate::output::Output;
-use crate::{progress, ranks};
+use crate::progress;
 use anyhow::anyhow;
 use kerrlight_validation::accuracy::hard::{self, Tally};
 use kerrlight_validation::accuracy::rays::{Angle, Draw};
@@ -80,14 +78,8 @@ pub fn run(arguments: &Accuracy, rays: u64) -> anyhow::Result<Answer> {
         bar.inc(done);
         !keeper.stopped()
     };
-    let mut together = ranks::this().map(|ranks| Together::new(arguments, rays, &json, ranks));
-    let tallies = match &mut together {
-        Some(together) => together.run(&keeper, &progress)?,
-        None => Some(hard::run(integrator, tolerance, rays, arguments.seed, progress)?),
-    };
+    let tallies = hard::run(integrator, tolerance, rays, arguments.seed, progress)?;
     bar.finish_and_clear();
-    // The first rank writes.
-    let Some(tallies) = tallies else { return Ok(Answer::default()) };
     let done = tallies.iter().map(|tally| tally.rays).sum();
     let document = Document {
         version: env!("CARGO_PKG_VERSION"),
@@ -103,10 +95,6 @@ pub fn run(arguments: &Accuracy, rays: u64) -> anyhow::Result<Answer> {
         writer.serialize(line)?;
     }
     csv.write(&writer.into_inner()?)?;
-    if let Some(together) = together.filter(|_| done == rays) {
-        together.end();
-        [&csv, &json].into_iter().for_each(Output::sweep);
-    }
     let answer = Answer::text(table(&document)).outputs([&csv, &json]);
     let answer = answer.with_all(serde_json::to_value(&document)?);
     if done < rays {

@@ -92,11 +92,6 @@ impl Case {
         }
     }
 
-    /// The numbers of its levels, which cases that differ in their seed have in common.
-    pub fn combination(&self) -> &[u32] {
-        &self.chosen
-    }
-
     /// Its level of a factor.
     pub fn level(&self, factor: &str) -> Option<&str> {
         self.levels.iter().find(|(name, _)| name == factor).map(|(_, level)| level.as_str())
@@ -126,6 +121,48 @@ pub fn expand(
     source: &Source,
     choice: &Choice,
 ) -> anyhow::Result<Vec<Case>> {
+    let (recipe, seeds, wanted) = chosen(experiment, source, choice)?;
+    let all: Vec<(u64, &Vec<u32>)> =
+        (1..=seeds).flat_map(|seed| wanted.iter().map(move |chosen| (seed, chosen))).collect();
+    if all.is_empty() {
+        bail!("no case is left");
+    }
+    Ok(all.into_par_iter().map(|(seed, chosen)| case(&recipe, chosen, seed)).collect())
+}
+
+/// The case of a name, for which settings are made of no others.
+///
+/// # Errors
+/// If there is none.
+pub fn find(
+    experiment: &Experiment,
+    source: &Source,
+    choice: &Choice,
+    id: &str,
+) -> anyhow::Result<Case> {
+    let (recipe, seeds, wanted) = chosen(experiment, source, choice)?;
+    let known = || {
+        let (before, sum) = id.rsplit_once('_')?;
+        let (words, seed) = before.rsplit_once("seed")?;
+        let seed: u64 = seed.parse().ok().filter(|seed| (1..=seeds).contains(seed))?;
+        let is_named = |chosen: &&Vec<u32>| {
+            sum.len() == 8
+                && recipe.words(chosen).iter().map(|w| format!("{w}_")).collect::<String>() == words
+        };
+        let named = wanted.iter().filter(is_named);
+        named.map(|chosen| case(&recipe, chosen, seed)).find(|case| case.slug == id)
+    };
+    known().ok_or_else(|| {
+        anyhow!("--case {id:?}: there is no such case with these settings; --list has all that are")
+    })
+}
+
+/// The recipe of all cases, seeds, and combinations of levels.
+fn chosen(
+    experiment: &Experiment,
+    source: &Source,
+    choice: &Choice,
+) -> anyhow::Result<(Arc<Recipe>, u64, Vec<Vec<u32>>)> {
     let quick = choice.quick.then_some(&experiment.quick);
     let seeds = choice.seeds.or(quick.and_then(|q| q.seeds)).unwrap_or(experiment.seeds);
     if !(1..=1_000_000).contains(&seeds) {
@@ -151,12 +188,7 @@ pub fn expand(
     };
     let mut wanted = combinations(&recipe.levels);
     wanted.retain(is_wanted);
-    let all: Vec<(u64, &Vec<u32>)> =
-        (1..=seeds).flat_map(|seed| wanted.iter().map(move |chosen| (seed, chosen))).collect();
-    if all.is_empty() {
-        bail!("no case is left");
-    }
-    Ok(all.into_par_iter().map(|(seed, chosen)| case(&recipe, chosen, seed)).collect())
+    Ok((recipe, seeds, wanted))
 }
 
 type Kept = Vec<(String, Vec<String>)>;
@@ -204,8 +236,8 @@ fn case(recipe: &Arc<Recipe>, chosen: &[u32], seed: u64) -> Case {
         Ok(text)
     });
     let sum = crc32fast::hash(settings.as_deref().unwrap_or_default().as_bytes());
-    let words: Vec<String> = levels.iter().map(|level| plain(&level.name)).collect();
-    let words = words.into_iter().chain([format!("seed{seed}"), format!("{sum:08x}")]);
+    let words =
+        recipe.words(chosen).into_iter().chain([format!("seed{seed}"), format!("{sum:08x}")]);
     Case {
         levels: named,
         numbers: levels.iter().map(|level| level.number).collect(),
@@ -236,6 +268,11 @@ impl Recipe {
 
     fn levels_of(&self, chosen: &[u32]) -> impl Iterator<Item = &Level> {
         self.levels.iter().zip(chosen).filter_map(|(levels, k)| levels.get(*k as usize))
+    }
+
+    /// Names of levels as a file system likes them.
+    fn words(&self, chosen: &[u32]) -> Vec<String> {
+        self.levels_of(chosen).map(|level| plain(&level.name)).collect()
     }
 
     /// The name of the level of a factor.

@@ -7,13 +7,12 @@ mod figures;
 mod labels;
 mod listing;
 mod map;
+mod one;
 mod page;
 mod plan;
 mod quick;
 mod ran;
 mod runner;
-mod share;
-mod slurm;
 mod source;
 mod status;
 mod summary;
@@ -25,18 +24,16 @@ use crate::interrupt::{Interrupted, Keeper};
 use crate::lock::{self, Lock};
 use crate::program::Program;
 use crate::progress;
-use crate::ranks;
 use crate::record::Recorder;
 use anyhow::{Context, bail};
 use cases::{Case, Choice, Status};
 use clap::Args;
 use experiment::Experiment;
+pub use one::Busy;
 use page::Page;
 pub use plan::Plan;
 use runner::Runner;
 use serde_json::{Value, json};
-use share::{Share, Sharing};
-use slurm::Slurm;
 use source::Source;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -68,22 +65,20 @@ pub struct Compare {
     /// Resume in an existing folder: finished cases are not run again
     #[arg(long)]
     resume: bool,
-    /// Run the cases together with others who share the folder, new or not
-    #[arg(long, value_name = "THEN", value_enum, num_args = 0..=1, require_equals = true, default_missing_value = "wait", hide_possible_values = true)]
-    share: Option<Share>,
-    /// Show how a folder's cases stand, and who runs them
-    #[arg(long, conflicts_with_all = ["resume", "share", "list"])]
+    /// Run this case alone, as --list names it, in a folder that other processes may use too
+    #[arg(long, value_name = "ID", conflicts_with = "resume")]
+    case: Option<String>,
+    /// Count the cases of a folder that are done, running, failed and open
+    #[arg(long, conflicts_with_all = ["resume", "case", "list"])]
     status: bool,
     /// Write the report of the cases that are done so far
-    #[arg(long, conflicts_with_all = ["resume", "share", "list", "status"])]
+    #[arg(long, conflicts_with_all = ["resume", "case", "list", "status"])]
     collect: bool,
-    #[command(flatten)]
-    slurm: Slurm,
     /// Show what changed since an earlier run
     #[arg(long, value_name = "RESULTS")]
     against: Option<PathBuf>,
-    /// List the cases and stop
-    #[arg(long)]
+    /// List the cases, one a line: ID, expected cost, and the command that runs it
+    #[arg(long, conflicts_with = "case")]
     list: bool,
 }
 
@@ -110,6 +105,9 @@ impl Compare {
         }
         let mut asked = self.asked(name, program)?;
         let folder = asked.folder.clone();
+        if let Some(id) = &self.case {
+            return self.one(id, &asked, (threads, memory), program);
+        }
         let chosen = cases::expand(&asked.experiment, &asked.source, &asked.choice)?;
         ran::split_chi2(&mut asked.experiment, &chosen);
         let Asked { experiment, choice, source, .. } = &asked;
@@ -121,13 +119,10 @@ impl Compare {
             bail!("{}: no case can be run; {}: {why}", name.display(), first.name());
         }
         if self.list {
-            return Ok(listing::cases(&chosen));
+            return Ok(listing::cases(&chosen, &self.command(&asked, (threads, memory))));
         }
         if self.status {
             return status::show(&folder, &chosen);
-        }
-        if self.slurm.is_wanted() {
-            return self.slurm.run(&asked, program, (threads, memory));
         }
         if !self.collect {
             ran::check_data(&chosen)?;
@@ -136,17 +131,15 @@ impl Compare {
         let lock = self.enter(&asked)?;
         let draws = experiment.samples(choice.quick);
         let runner = Runner::new(&folder, (threads, memory), (program, draws), lock)?;
-        let cases = if choice.is_restricted() && self.sharing().is_none() {
+        let cases = if choice.is_restricted() {
             let all = cases::expand(experiment, source, &choice.unrestricted())?;
             with_known(chosen, all, &runner)
         } else {
             chosen
         };
         runner.check_inputs(&cases)?;
-        let summary = match self.work(&cases, &runner, &folder)? {
-            Ended::Here(summary) => summary,
-            Ended::Left(answer) => return Ok(answer),
-        };
+        let summary =
+            if self.collect { collected(&cases, &runner, &folder) } else { run(&cases, &runner) };
         let page = Page { experiment, choice, summary: &summary };
         let tables = page.write(&runner, &folder, before.as_ref())?;
         recorder.write_into(&folder)?;
@@ -157,39 +150,45 @@ impl Compare {
     fn are_results(&self, name: &Path) -> bool {
         let is_known = source::built_in().any(|(known, _)| Path::new(known) == name);
         let is_file = name.extension().is_some_and(|e| e == "json");
-        let goes_on = self.resume
-            || self.sharing().is_some()
-            || self.status
-            || self.collect
-            || self.slurm.is_wanted();
-        let is_new = goes_on || self.output.is_some();
+        let goes_on = self.resume || self.case.is_some() || self.status || self.collect;
+        let is_new = goes_on || self.list || self.output.is_some();
         is_file || (!is_known && !is_new && name.join("results.json").is_file())
     }
 
-    /// Runs what is not done: alone, with others, or nothing at all where a report is wanted.
-    fn work<'a>(
+    /// Runs one case of a folder in which others may run others.
+    fn one(
         &self,
-        cases: &'a [Case],
-        runner: &Runner<'_>,
-        folder: &Path,
-    ) -> anyhow::Result<Ended<'a>> {
-        if self.collect {
-            return Ok(Ended::Here(collected(cases, runner, folder)));
+        id: &str,
+        asked: &Asked,
+        limits: (Option<u16>, Option<u64>),
+        program: &Program,
+    ) -> anyhow::Result<Answer> {
+        let Asked { plan, text, experiment, source, choice, folder } = asked;
+        let case = cases::find(experiment, source, choice, id)?;
+        if let Some(error) = &case.error {
+            bail!("{}: {error}", case.name());
         }
-        if let Some(share) = self.sharing() {
-            return shared(cases, runner, folder, share);
-        }
-        share::end(folder, &folder.join(runner::CASES))?;
-        Ok(Ended::Here(run(cases, runner)))
+        ran::check_data(std::slice::from_ref(&case))?;
+        let lock = plan::join(plan, text, folder)?;
+        let draws = experiment.samples(choice.quick);
+        let runner = Runner::new(folder, limits, (program, draws), Some(lock))?;
+        one::run(&case, &runner, folder)
     }
 
-    /// How the folder is shared, if it is: ranks of one job do so unasked, and all but the first leave.
-    fn sharing(&self) -> Option<Share> {
-        match ranks::this() {
-            Some((0, _)) => Some(self.share.unwrap_or(Share::Wait)),
-            Some(_) => Some(Share::Leave),
-            None => self.share,
-        }
+    /// The command that runs the same cases in the same folder.
+    fn command(&self, asked: &Asked, (threads, memory): (Option<u16>, Option<u64>)) -> Vec<String> {
+        let name = self.experiment.iter().map(|name| name.display().to_string());
+        let mut words: Vec<String> = ["kerrlight".to_owned(), "compare".to_owned()].into();
+        words.extend(name);
+        words.extend(["-o".to_owned(), asked.folder.display().to_string()]);
+        let mut add = |option: &str, value: String| words.extend([option.to_owned(), value]);
+        self.seeds.iter().for_each(|seeds| add("--seeds", seeds.to_string()));
+        self.only.iter().for_each(|only| add("--only", only.clone()));
+        self.set.iter().for_each(|set| add("--set", set.clone()));
+        threads.iter().for_each(|threads| add("--threads", threads.to_string()));
+        memory.iter().for_each(|memory| add("--memory", memory.to_string()));
+        words.extend(self.quick.then(|| "--quick".to_owned()));
+        words
     }
 
     /// What is asked for: by an experiment, or by a folder in which one was begun.
@@ -238,7 +237,7 @@ impl Compare {
         self.output.clone().unwrap_or_else(|| PathBuf::from(format!("kerrlight-{stem}")))
     }
 
-    /// Enters the folder: new, resumed, or shared with others. A report takes no lock.
+    /// Enters the folder: new or resumed. A report takes no lock.
     fn enter(&self, asked: &Asked) -> anyhow::Result<Option<Lock>> {
         let folder = &asked.folder;
         let shown = folder.display();
@@ -246,9 +245,6 @@ impl Compare {
         if self.collect {
             let Some(_) = begun else { return Err(status::no_comparison(folder)) };
             return Ok(None);
-        }
-        if self.sharing().is_some() {
-            return plan::join(&asked.plan, &asked.text, folder).map(Some);
         }
         if !lock::is_free(folder) && !self.resume {
             bail!(
@@ -273,14 +269,6 @@ struct Asked {
     folder: PathBuf,
 }
 
-/// How the work of a process ends.
-enum Ended<'a> {
-    /// There is a report to be made.
-    Here(Summary<'a>),
-    /// Others still run cases, and it does not wait for them.
-    Left(Answer),
-}
-
 /// The chosen cases, and those that an earlier run of the same folder has done beside them.
 fn with_known(chosen: Vec<Case>, all: Vec<Case>, runner: &Runner<'_>) -> Vec<Case> {
     let is_done = |case: &Case| matches!(runner.known(case), Status::Done(_));
@@ -294,35 +282,11 @@ fn with_known(chosen: Vec<Case>, all: Vec<Case>, runner: &Runner<'_>) -> Vec<Cas
 
 /// How all cases stand, of which others may still run some.
 fn collected<'a>(cases: &'a [Case], runner: &Runner<'_>, folder: &Path) -> Summary<'a> {
-    let failures = share::failures(folder, cases);
-    let status = |case: &Case| match (runner.known(case), failures.get(&case.slug)) {
-        (Status::Open, Some(why)) => Status::Failed(why.clone()),
-        (status, _) => status,
+    let status = |case: &Case| match runner.known(case) {
+        Status::Open => one::failure(folder, case).map_or(Status::Open, Status::Failed),
+        status => status,
     };
     Summary::new(cases.iter().map(|case| (case, status(case))).collect())
-}
-
-/// Runs what is left of a folder together with others.
-fn shared<'a>(
-    cases: &'a [Case],
-    runner: &Runner<'_>,
-    folder: &Path,
-    share: Share,
-) -> anyhow::Result<Ended<'a>> {
-    let keeper = Keeper::saving("stopping after the fit's step; a second signal ends at once");
-    let (open, run) = Sharing::join(folder, runner, cases)?.run(share, &keeper)?;
-    if open == 0 && !ranks::is_silent() {
-        return Ok(Ended::Here(collected(cases, runner, folder)));
-    }
-    let shown = folder.display();
-    if keeper.stopped() {
-        let how = format!("resume with: kerrlight compare {shown} --share");
-        let text = format!("stopped: {run} cases were run here, {open} are open; {how}");
-        return Err(Interrupted(text).into());
-    }
-    let text = format!("{run} cases were run here; others run the last {open}");
-    let answer = Answer::lines(&text, &shown.to_string());
-    Ok(Ended::Left(answer.with("folder", shown.to_string()).with("run", run).with("open", open)))
 }
 
 /// Runs what is not done yet, until a signal.

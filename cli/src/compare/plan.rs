@@ -116,7 +116,7 @@ impl Plan {
         }
         if self != other {
             bail!(
-                "{shown} has other cases: join it with `kerrlight compare {shown} --share`, or give another folder with -o"
+                "{shown} has other cases: run them with `kerrlight compare {shown} --case ID`, or give another folder with -o"
             );
         }
         Ok(())
@@ -145,7 +145,8 @@ fn appear(plan: &Plan, experiment: &str, folder: &Path) -> anyhow::Result<bool> 
     let parent = place.parent().with_context(name)?;
     fs::create_dir_all(parent).with_context(name)?;
     let mut builder = tempfile::Builder::new();
-    builder.prefix(output::BESIDE);
+    let prefix = output::prefix_of(&place);
+    builder.prefix(&prefix);
     // Those of any newly made folder, which the process's mask narrows.
     #[cfg(unix)]
     let builder = {
@@ -153,6 +154,7 @@ fn appear(plan: &Plan, experiment: &str, folder: &Path) -> anyhow::Result<bool> 
         builder.permissions(fs::Permissions::from_mode(0o777))
     };
     let beside = builder.tempdir_in(parent).with_context(name)?;
+    let _lock = fs::File::open(beside.path()).ok().filter(output::lock);
     plan.write(beside.path(), experiment)?;
     Ok(fs::rename(beside.path(), &place).is_ok())
 }

@@ -170,10 +170,10 @@ pub fn check(experiment: &Experiment, cases: &[Case]) -> anyhow::Result<()> {
     });
     for (what, title, value, fixed) in tables.chain(figures) {
         let chosen = cases.iter().filter(|case| is_at(case, &pairs(fixed)));
-        let found: Vec<Option<String>> =
-            chosen.filter_map(settings).map(|settings| missing(&settings, value)).collect();
-        if let Some(Some(why)) = found.first()
-            && found.iter().all(Option::is_some)
+        // To the first that has it: there may be a hundred thousand.
+        let mut found = chosen.filter_map(settings).map(|settings| missing(&settings, value));
+        if let Some(Some(why)) = found.next()
+            && found.all(|missing| missing.is_some())
         {
             bail!("{what} {title:?}: value = {value:?} is not allowed: {why}");
         }

@@ -4,11 +4,12 @@ use super::cases::{Case, Status};
 use super::labels::RESULTS;
 use crate::checksum::is_whole;
 use crate::file_sums::FileSums;
-use crate::fit::{Inputs, posterior};
+use crate::fit::{Inputs, from_folder, posterior};
 use crate::interrupt::Keeper;
 use crate::lock::Lock;
 use crate::output::{self, Output};
 use crate::program::Program;
+use crate::threads;
 use anyhow::Context;
 use serde_json::Value;
 use std::fs::File;
@@ -50,11 +51,7 @@ impl<'a> Runner<'a> {
 
     /// What is known of a case without running it.
     pub fn known(&self, case: &Case) -> Status {
-        self.known_in(case, &self.run_of(case))
-    }
-
-    /// The same where the case is worked on elsewhere.
-    fn known_in(&self, case: &Case, run: &Path) -> Status {
+        let run = &self.run_of(case);
         if let Some(error) = &case.error {
             return Status::Failed(error.clone());
         }
@@ -97,17 +94,13 @@ impl<'a> Runner<'a> {
 
     /// Runs a case to its end, from where it is; `Open` if a signal has stopped it.
     pub fn run(&self, case: &Case, keeper: &Keeper) -> Status {
-        self.run_in(case, &self.run_of(case), keeper)
-    }
-
-    /// The same in another folder than its own.
-    pub fn run_in(&self, case: &Case, run: &Path, keeper: &Keeper) -> Status {
-        match self.known_in(case, run) {
+        let run = &self.run_of(case);
+        match self.known(case) {
             Status::Open => {}
             known => return known,
         }
         match self.child(case, run, keeper) {
-            Ok((status, _)) if status.success() => match self.known_in(case, run) {
+            Ok((status, _)) if status.success() => match self.known(case) {
                 Status::Open => Status::Failed("it ended without results".to_owned()),
                 known => known,
             },
@@ -128,7 +121,8 @@ impl<'a> Runner<'a> {
     ) -> anyhow::Result<(ExitStatus, String)> {
         // Paths in it start from the root.
         let settings = self.folder.join(format!("{}.toml", case.slug));
-        let text = case.settings().unwrap_or_default();
+        // Paths start from the root: a case is the same bytes in any folder.
+        let text = from_folder(&case.settings().unwrap_or_default(), Path::new("/"));
         Output::new(&settings, "toml")?.write(text.as_bytes())?;
         let mut command = self.program.again()?;
         command.args(["fit", "--stop-with-input"]);
@@ -157,7 +151,7 @@ impl<'a> Runner<'a> {
         let file =
             File::create(&said).with_context(|| format!("cannot write {}", said.display()))?;
         let child = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(file).spawn();
-        let status = wait(child.context("cannot start the fit")?, keeper)?;
+        let status = wait(child.map_err(|error| threads::no_process("the fit", &error))?, keeper)?;
         Ok((status, output::read_text(&said).unwrap_or_default()))
     }
 }
@@ -178,7 +172,7 @@ fn wait(mut child: Child, keeper: &Keeper) -> anyhow::Result<ExitStatus> {
 }
 
 /// Where the messages of a run go: beside it.
-pub fn said(run: &Path) -> PathBuf {
+fn said(run: &Path) -> PathBuf {
     let mut name = run.as_os_str().to_owned();
     name.push(".txt");
     name.into()

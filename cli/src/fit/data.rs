@@ -142,7 +142,7 @@ fn movie(file: &FitFile, path: &Path) -> anyhow::Result<Movie> {
         let knows = path.extension().is_some_and(|e| e != "csv" && e != "npz" && e != "npy");
         movie_files::read(&files, None).map_err(|second| if knows { second } else { first })
     })?;
-    Ok(movie)
+    Ok(movie.i)
 }
 
 /// The data of a static image, and those of its polarisation, where that is asked for.
@@ -164,6 +164,7 @@ fn visibilities<R>(
     let (_, observation) = interferometry::read(path)?;
     let (name, all) = (path.display().to_string(), observation.rows.len());
     let without = all - observation.stokes_i().count();
+    interferometry::warn_of_repeats(&name, &observation);
     let measured = of(observation, &name)?;
     if without > 0 {
         eprintln!("{name}: {without} of {all} rows have no parallel hands and are dropped");

@@ -49,7 +49,7 @@ impl Folder {
     pub fn open(path: &Path, patience: Duration) -> anyhow::Result<(Self, String)> {
         is_run(path)?;
         let lock = Lock::take(path, BUSY, patience)?;
-        output::sweep(path, output::BESIDE);
+        output::sweep(path, |_| true);
         Self::held(path, Some(lock))
     }
 

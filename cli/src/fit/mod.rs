@@ -5,6 +5,7 @@ mod axis_scan;
 mod band_plots;
 mod band_search;
 mod band_words;
+mod closures;
 mod curves;
 mod data;
 mod delegate;
@@ -22,7 +23,6 @@ mod results;
 mod rotation_search;
 mod run;
 mod static_image;
-mod together;
 mod work;
 mod world_results;
 mod world_scan;
@@ -31,7 +31,7 @@ mod world_search;
 use crate::answer::Answer;
 use crate::devices::{FitDevice, StepsOption};
 use crate::record::Recorder;
-use crate::{interrupt, output, paths, ranks};
+use crate::{interrupt, output, paths};
 use anyhow::{Context, bail};
 pub use api::{assigned, check, coverage, sizes, turned, velocities};
 pub use band_plots::{loop_plot, of_runs as plots_of_bands};
@@ -97,10 +97,7 @@ impl Fit {
     /// Fits.
     pub fn run(&self, registry: &Registry) -> anyhow::Result<Answer> {
         if self.stop_with_input {
-            interrupt::follow_parent();
-        }
-        if let Some(rank @ (1.., _)) = ranks::this() {
-            return self.help(rank, registry);
+            interrupt::follow_parent()?;
         }
         if let Some(data) = &self.init {
             return init::write(data.as_deref(), self.output.as_deref(), self.model);
@@ -135,7 +132,7 @@ impl Fit {
         let (prepared, read) = output::with_reads(|| work.prepared(&base_dir, registry));
         let prepared = prepared?;
         prepared.check_device(device.as_ref())?;
-        let text = self.begun(&text, &base_dir);
+        let text = Self::begun(&text, &base_dir);
         let folder = Folder::create(&folder, &text, Inputs::new(&text, read))?;
         self.run_all(&prepared, &text, (&folder, false), device)
     }
@@ -158,65 +155,18 @@ impl Fit {
             }
         };
         let recorder = Recorder::of_process();
-        // Other ranks know where the run is if that was said.
-        let shared = self.samples.filter(|_| self.output.is_some() || self.resume.is_some());
-        let lead = shared.map(|samples| posterior::lead(folder, samples)).transpose()?;
-        let is_known = self.output.is_some() || self.resume.is_some();
-        let door = together::open(&prepared.file, text, folder, is_known)?;
-        let answer = run::run(prepared, text, (folder, resume), door, device)?;
+        let answer = run::run(prepared, text, (folder, resume), device)?;
         recorder.write_into(folder.path())?;
         let Some(samples) = self.samples else { return Ok(answer) };
-        Ok(answer.and("posterior", posterior::draw(prepared, folder, samples, lead.flatten())?))
-    }
-
-    /// As a rank that is not the first: takes parts of the steps, if they are cut, and part in the draws after the fit, if
-    /// there are any, where it is known where the run is.
-    fn help(&self, rank: (u32, u32), registry: &Registry) -> anyhow::Result<Answer> {
-        let Some(run) = self.resume.as_ref().or(self.output.as_ref()) else {
-            return Ok(Answer::default());
-        };
-        if self.print || self.init.is_some() {
-            return Ok(Answer::default());
-        }
-        self.take_parts(run, rank, registry)?;
-        match self.samples {
-            Some(samples) => posterior::help(run, samples, rank.0, registry),
-            None => Ok(Answer::default()),
-        }
-    }
-
-    /// Takes parts of the steps of the first rank's fit, which has read the same settings.
-    fn take_parts(&self, run: &Path, rank: (u32, u32), registry: &Registry) -> anyhow::Result<()> {
-        let (text, base_dir) = match &self.resume {
-            Some(path) => {
-                let text = output::read_text(&path.join(SETTINGS))?;
-                let base_dir = base_dir_of(&text);
-                (text, base_dir)
-            }
-            None => {
-                let guess = |data| init::guess(data, self.model);
-                let guess = self.data.as_deref().map(guess).transpose()?;
-                let (text, base_dir) = self.settings(guess.as_ref())?;
-                (self.begun(&text, &base_dir), base_dir)
-            }
-        };
-        // A static image is the first rank's alone.
-        let Work::Emission(file) = Work::read(&text).with_context(|| self.name())? else {
-            return Ok(());
-        };
-        if !together::is_divided(&file) {
-            return Ok(());
-        }
-        let prepared = run::Prepared::new(*file, &base_dir, registry)?;
-        run::help(&prepared, &text, run, rank)
+        Ok(answer.and("posterior", posterior::draw(prepared, folder, samples)?))
     }
 
     /// The settings as a run has them.
-    fn begun(&self, text: &str, base_dir: &Path) -> String {
+    fn begun(text: &str, base_dir: &Path) -> String {
         // Settings of a run say so already.
         let text =
             text.strip_prefix(BASE_DIR).and_then(|t| t.split_once('\n')).map_or(text, |(_, t)| t);
-        format!("{BASE_DIR}{}\n{text}", self.shown(base_dir).display())
+        from_folder(text, base_dir)
     }
 
     /// For how long to wait for another process: the fit of a comparison that was killed a moment ago is about to end.
@@ -255,12 +205,6 @@ impl Fit {
         Ok((text, base_dir))
     }
 
-    /// The folder that the run's settings name. Paths in those of a comparison start from the root: a case is the same
-    /// bytes in any folder.
-    fn shown<'a>(&self, base_dir: &'a Path) -> &'a Path {
-        if self.stop_with_input { Path::new("/") } else { base_dir }
-    }
-
     /// Refuses to resume a run with settings other than its own.
     fn same(&self, text: &str) -> anyhow::Result<()> {
         if !self.set.is_empty() {
@@ -279,6 +223,11 @@ impl Fit {
 
 /// The first line of a run's settings.
 const BASE_DIR: &str = "# Paths start from ";
+
+/// Settings that say from which folder their paths start.
+pub fn from_folder(settings: &str, folder: &Path) -> String {
+    format!("{BASE_DIR}{}\n{settings}", folder.display())
+}
 
 /// The folder that paths in a run's settings start from.
 fn base_dir_of(text: &str) -> PathBuf {

@@ -4,6 +4,7 @@ mod record;
 
 use super::axis_scan;
 use super::band_search;
+use super::closures;
 use super::data;
 use super::delegate;
 use super::failed;
@@ -14,14 +15,12 @@ use super::leakage;
 use super::linear;
 use super::results::{self, Estimate};
 use super::rotation_search;
-use super::together;
 use super::world_search;
 pub use super::world_search::Placed;
 use crate::answer::Answer;
 use crate::devices::{CheckSteps, FitDevice};
 use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
-use crate::ranks::Listener;
 use anyhow::{Context, bail};
 use kerrlight_render::volume::Volume;
 use kerrlight_tomo::Error;
@@ -139,7 +138,6 @@ pub fn run(
     prepared: &Prepared<'_>,
     text: &str,
     (folder, resume): (&Folder, bool),
-    listener: Option<Listener>,
     device: Option<FitDevice>,
 ) -> anyhow::Result<Answer> {
     let registry = prepared.registry;
@@ -167,55 +165,14 @@ pub fn run(
         Some(bytes) => run.resume(&mut state, &bytes)?,
         None => run.start_over(&mut state, motion, times)?,
     }
-    if let Some(listener) = listener {
-        if measured.leakage.is_some() {
-            bail!("instrument.leakage is solved for by a single rank: start one");
-        }
-        let bytes = checkpoint::encode(&state, text)?;
-        run.trainer.ranks = Some(together::begin(listener, &bytes, folder.path())?);
-    }
     if file.representation.kind != Kind::LinearGrid {
         run.steps(&mut state)?;
     }
-    run.trainer.ranks = None;
     let device = run.trainer.device.take().map(|device| device.name().to_owned());
     let Run { mut trainer, true_volume, .. } = run;
     let estimate = Estimate { file, folder, instrument, motion, measured, true_volume, device };
     let results = estimate.write(&mut trainer, &state, begun)?;
     Ok(answer(folder, results))
-}
-
-/// Takes parts of the steps of a fit as a rank that is not the first, until that has taken them all.
-pub fn help(
-    prepared: &Prepared<'_>,
-    text: &str,
-    run: &Path,
-    (rank, size): (u32, u32),
-) -> anyhow::Result<()> {
-    // The first rank decides when to stop.
-    let _keeper = Keeper::saving("");
-    let mut link = together::join((run, rank, size), text)?;
-    // What it has found of the world is there before its state comes.
-    let bytes = link.state()?;
-    let folder = Folder::look(run)?.0;
-    let placed = prepared.placed(&folder)?;
-    let (file, instrument, motion, measured) = prepared.world(placed.as_ref());
-    let file = &held_out::settled(file, &folder)?;
-    let objective = prepared.objective(instrument, motion, measured)?;
-    let times = setup::emission_times(instrument, motion);
-    let representation = setup::representation(file, prepared.registry, times)?;
-    let (axis, axis_rate) = setup::axis(file)?;
-    let training = setup::training(file, axis_rate, times)?;
-    let start = State::new(&*representation, axis, &training);
-    let mut state = checkpoint::decode(&bytes, &start)?;
-    let mut trainer = Trainer::new(objective, &*representation, training);
-    trainer.ranks = Some(Box::new(link));
-    while state.now.step < file.training.steps {
-        if trainer.step(&mut state)? == Outcome::Converged {
-            break;
-        }
-    }
-    Ok(())
 }
 
 /// The verdict and where to read it; the results for a script.
@@ -257,6 +214,9 @@ impl Run<'_> {
     /// What is fitted, and what to know of it beforehand.
     fn tell(&self, instrument: &Instrument) {
         eprintln!("{}", self.describe(instrument));
+        for used in closures::sentences(self.measured, &self.file.loss) {
+            eprintln!("{used}");
+        }
         let caution = setup::caution(self.file).map(str::to_owned);
         for note in caution.into_iter().chain(self.file.unknowns()) {
             eprintln!("note: {note}");

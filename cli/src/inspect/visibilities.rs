@@ -2,7 +2,7 @@
 
 use crate::answer::Answer;
 use kerrlight_vlbi::files::Format;
-use kerrlight_vlbi::observation::{Basis, Observation, Row};
+use kerrlight_vlbi::observation::{Basis, Observation, Repeats, Row};
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -24,6 +24,8 @@ pub fn describe(name: &str, format: Format, observation: &Observation) -> Answer
         "channels_hz": channels,
         "baselines": baselines,
         "rows": observation.rows.len(),
+        "repeated_rows": observation.repeats().rows,
+        "scans": observation.scans(),
         "products": product_counts(observation).into_iter().collect::<BTreeMap<_, _>>(),
         "amplitude_jy": amplitudes(observation),
         "stations": observation.stations.iter().enumerate().map(|(k, s)| json!({
@@ -77,7 +79,16 @@ fn text(name: &str, format: Format, observation: &Observation) -> String {
         let count = observation.channels.len();
         line("channels", format!("{count}: {}{rest} GHz", shown.join(", ")));
     }
-    line("baselines", format!("{baselines}, {} rows", rows.len()));
+    let repeats = match observation.repeats() {
+        Repeats { rows: 0, .. } => String::new(),
+        Repeats { rows, copies } => {
+            format!(
+                ", {rows} of them with the baseline, channel and time of another ({copies} copies)"
+            )
+        }
+    };
+    line("baselines", format!("{baselines}, {} rows{repeats}", rows.len()));
+    line("scans", observation.scans().to_string());
     line("products", products(observation));
     text + &station_table(observation) + &history(observation)
 }

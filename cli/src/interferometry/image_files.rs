@@ -4,14 +4,14 @@
 use crate::output;
 use anyhow::{Context, anyhow, bail};
 use kerrlight_vlbi::files::{self, images};
-use kerrlight_vlbi::simulate::Movie;
+use kerrlight_vlbi::simulate::StokesMovie;
 use std::path::Path;
 
 pub use images::OwnTimes;
 
 /// Reads an image or a movie; `fov_uas` is the width of the field in µas, which FITS and an EXR of
 /// kerrlight know themselves.
-pub fn read(path: &Path, fov_uas: Option<f64>) -> anyhow::Result<(Movie, OwnTimes)> {
+pub fn read(path: &Path, fov_uas: Option<f64>) -> anyhow::Result<(StokesMovie, OwnTimes)> {
     let name = || path.display().to_string();
     let bytes = output::read(path)?;
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
@@ -19,6 +19,12 @@ pub fn read(path: &Path, fov_uas: Option<f64>) -> anyhow::Result<(Movie, OwnTime
     let pixels = match extension.as_str() {
         "fits" | "fit" if fov_uas.is_some() => {
             bail!("--fov-uas is not for FITS images, which have a field of view")
+        }
+        "csv" | "txt" if files::is_text_image(&bytes) => {
+            if fov_uas.is_some() {
+                bail!("--fov-uas is not for text images of eht-imaging, which have a field of view")
+            }
+            files::parse_text_image(&bytes).with_context(name)?
         }
         "fits" | "fit" => {
             let movie = files::read_fits_image(&bytes).with_context(name)?;

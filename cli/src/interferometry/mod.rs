@@ -12,12 +12,23 @@ use crate::output::{self, Output};
 use anyhow::{Context, bail};
 use clap::ValueEnum;
 use kerrlight_vlbi::files::{self, EhtTable, Format};
-use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::observation::{Observation, Repeats};
 use std::path::Path;
 
 /// Reads visibilities in any format.
 pub fn read(path: &Path) -> anyhow::Result<(Format, Observation)> {
     files::decode(&output::read(path)?).with_context(|| path.display().to_string())
+}
+
+/// Says of rows that are there more than once what becomes of them where times are compared.
+pub fn warn_of_repeats(name: &str, observation: &Observation) {
+    let Repeats { rows, copies } = observation.repeats();
+    if rows > 0 {
+        eprintln!(
+            "warning: {name}: {rows} rows have the baseline, channel and time of another: {copies} copies are dropped, {} are averaged with it",
+            rows - copies
+        );
+    }
 }
 
 /// Formats in which visibilities are written.
@@ -93,7 +104,7 @@ impl ObservationFile {
         let bytes = match self.format {
             Written::Uvfits => files::write_uvfits(observation),
             Written::ObsText => files::to_obs_text(observation).map(text),
-            Written::Csv => Ok(text(files::to_csv(observation, self.comments))),
+            Written::Csv => files::to_csv(observation, self.comments).map(text),
             Written::EhtCsv => files::to_eht_table(observation, EhtTable::Csv).map(text),
             Written::EhtTxt => files::to_eht_table(observation, EhtTable::Txt).map(text),
         };

@@ -4,7 +4,7 @@ use super::arguments;
 use super::image_files::{self, OwnTimes};
 use crate::output;
 use anyhow::{Context, bail};
-use kerrlight_vlbi::simulate::Movie;
+use kerrlight_vlbi::simulate::StokesMovie;
 use std::path::{Path, PathBuf};
 
 /// How the times of a movie's images are given.
@@ -125,20 +125,31 @@ fn numbered(name: &str) -> Vec<(u128, String)> {
 }
 
 /// Reads a movie from its only file, or from one image a file.
-pub fn read(files: &[PathBuf], fov_uas: Option<f64>) -> anyhow::Result<(Movie, OwnTimes)> {
+pub fn read(files: &[PathBuf], fov_uas: Option<f64>) -> anyhow::Result<(StokesMovie, OwnTimes)> {
     let [first, rest @ ..] = files else { bail!("no image is given") };
     let (mut movie, mut times) = image_files::read(first, fov_uas)?;
     for path in rest {
         let (image, time) = image_files::read(path, fov_uas)?;
-        let (a, b) = (movie.grid, image.grid);
+        let (a, b) = (movie.i.grid, image.i.grid);
         let same_field = (a.pixel_rad - b.pixel_rad).abs() <= 1e-9 * a.pixel_rad;
         if (a.width, a.height) != (b.width, b.height) || !same_field {
             bail!("{} differs from {} in pixels or field", path.display(), first.display());
         }
-        if movie.frames() != 1 && movie.pixels.len() == a.pixels() || image.frames() != 1 {
+        if movie.i.frames() != 1 && movie.i.pixels.len() == a.pixels() || image.i.frames() != 1 {
             bail!("{} is a movie: in a sequence every file is one image", path.display());
         }
-        movie.pixels.extend(image.pixels);
+        movie.i.pixels.extend(image.i.pixels);
+        for (all, one) in movie.polarized.iter_mut().zip(image.polarized) {
+            match (all, one) {
+                (Some(all), Some(one)) => all.extend(one),
+                (None, None) => {}
+                _ => bail!(
+                    "{} and {} have not the same Stokes parameters",
+                    path.display(),
+                    first.display()
+                ),
+            }
+        }
         times = match (times, time) {
             (OwnTimes::Since(mut all), OwnTimes::Since(one)) => {
                 all.extend(one);
@@ -147,7 +158,7 @@ pub fn read(files: &[PathBuf], fov_uas: Option<f64>) -> anyhow::Result<(Movie, O
             _ => OwnTimes::Unknown,
         };
     }
-    if movie.frames() < files.len() {
+    if movie.i.frames() < files.len() {
         bail!("{} is a movie: in a sequence every file is one image", first.display());
     }
     Ok((movie, times))

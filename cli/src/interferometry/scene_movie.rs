@@ -1,6 +1,6 @@
 //! A scene, rendered at the times of scans.
 
-use crate::assets;
+use crate::assets::{self, Reach};
 use crate::output;
 use crate::progress;
 use anyhow::{Context, bail};
@@ -9,12 +9,12 @@ use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_render::picture::render;
 use kerrlight_render::scene::Scene;
 use kerrlight_vlbi::operator::ImageGrid;
-use kerrlight_vlbi::simulate::Movie;
+use kerrlight_vlbi::simulate::{Movie, StokesMovie};
 use std::path::Path;
 
 /// Renders a scene at `times_h` (hours), the first being the scene's own time of observation.
 /// The factor to Jy is that of the first frame, in which the flux is `screen.total_flux_jy`.
-pub fn read(path: &Path, times_h: &[f64]) -> anyhow::Result<Movie> {
+pub fn read(path: &Path, times_h: &[f64], reach: Reach) -> anyhow::Result<StokesMovie> {
     let name = || path.display().to_string();
     let mut scene = Scene::parse(&output::read_text(path)?).with_context(name)?;
     if scene.screen.total_flux_jy.is_none() {
@@ -28,7 +28,7 @@ pub fn read(path: &Path, times_h: &[f64]) -> anyhow::Result<Movie> {
         bail!("{}: a sky has no flux in Jy: remove `sky`", name());
     }
     let folder = path.parent().unwrap_or(Path::new("."));
-    let assets = assets::load(&scene, folder, &[]).with_context(name)?.decoded;
+    let assets = assets::load(&scene, folder, &[], reach).with_context(name)?.decoded;
     // A scene with a flux in Jy has both.
     let seconds = scene.hole.seconds().context("`hole.mass_msun` is missing")?;
     let angle = scene.hole.angle_uas().context("`hole.distance_kpc` is missing")?;
@@ -42,6 +42,7 @@ pub fn read(path: &Path, times_h: &[f64]) -> anyhow::Result<Movie> {
     let start = scene.observer.time;
     let bar = progress::frames(frames.len() as u64);
     let mut pixels = Vec::with_capacity(frames.len() * grid.pixels());
+    let mut polarized = [None, None, None];
     let mut first_factor = None;
     for time in frames {
         scene.observer.time = start + (time - times_h[0]) * 3600.0 / seconds;
@@ -51,8 +52,15 @@ pub fn read(path: &Path, times_h: &[f64]) -> anyhow::Result<Movie> {
         // Every picture has been scaled to the same flux: only the first is to be.
         let scale = factor / rendered.summary.unit_factor * pixel_uas * pixel_uas;
         pixels.extend(channel.iter().map(|value| f64::from(*value) * scale));
+        for (all, name) in polarized.iter_mut().zip(["Q", "U", "V"]) {
+            // Every frame has the channels of the first.
+            if let Some(channel) = rendered.picture.channel(name) {
+                let all = all.get_or_insert_with(Vec::new);
+                all.extend(channel.iter().map(|value| f64::from(*value) * scale));
+            }
+        }
         bar.inc(1);
     }
     bar.finish_and_clear();
-    Ok(Movie { grid, pixels })
+    Ok(StokesMovie { i: Movie { grid, pixels }, polarized })
 }

@@ -78,6 +78,8 @@ impl Sequence {
         let folder = self.folder.display().to_string();
         std::fs::create_dir_all(&self.folder).with_context(|| format!("cannot make {folder}"))?;
         self.refuse_others()?;
+        let is_frame = |name: &str| number_of(name, "exr").or(number_of(name, "png")).is_some();
+        output::sweep(&self.folder, is_frame);
         for k in 0..self.plans.len() {
             let path = self.path(k, "exr");
             if !path.exists() {
@@ -107,8 +109,7 @@ impl Sequence {
         let shown = || format!("cannot read {}", self.folder.display());
         for entry in std::fs::read_dir(&self.folder).with_context(shown)? {
             let name = entry.with_context(shown)?.file_name();
-            let number = name.to_str().and_then(|n| n.strip_prefix("frame_"));
-            let number = number.and_then(|n| n.strip_suffix(".exr")?.parse::<usize>().ok());
+            let number = name.to_str().and_then(|name| number_of(name, "exr"));
             if number.is_some_and(|k| k >= self.plans.len()) {
                 bail!(
                     "{} holds {}, but this film has {} frames: give another folder or remove it",
@@ -158,26 +159,6 @@ impl Sequence {
     /// Rays of some frames that were given up.
     pub fn unresolved(&self, frames: &[usize]) -> u64 {
         frames.iter().map(|k| self.unresolved[*k]).sum()
-    }
-
-    /// All that decides the film.
-    pub fn identity(&self) -> String {
-        let times: Vec<f64> = (0..self.len()).map(|k| self.time(k)).collect();
-        let text = self.plans.first().map_or("", |plan| plan.text.as_str());
-        format!("{} {text} {times:?} {} {}", env!("CARGO_PKG_VERSION"), self.files, self.device)
-    }
-
-    /// Whether frames have the scale of the first one, which is not there yet.
-    pub fn lacks_scale(&mut self) -> anyhow::Result<bool> {
-        let is_shared =
-            self.plans.first().is_some_and(|plan| plan.scene.screen.total_flux_jy.is_some());
-        let first = self.path(0, "exr");
-        if self.factor.is_none() && is_shared && first.exists() {
-            let attributes = exr::decode_attributes(output::open(&first)?);
-            let name = || first.display().to_string();
-            self.factor = number(&attributes.with_context(name)?, FACTOR);
-        }
-        Ok(is_shared && self.factor.is_none())
     }
 
     /// Gives all frames the scale of this one.
@@ -268,6 +249,12 @@ impl Sequence {
         }
         settings
     }
+}
+
+/// The number of the frame that a name stands for.
+fn number_of(name: &str, extension: &str) -> Option<usize> {
+    let number = name.strip_prefix("frame_")?.strip_suffix(extension)?.strip_suffix('.')?;
+    number.parse().ok()
 }
 
 /// The first setting that a file does not have or has otherwise.

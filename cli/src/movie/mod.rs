@@ -6,6 +6,7 @@ mod times;
 mod viewing;
 
 use crate::answer::{self, Answer};
+use crate::assets::{self, Reach};
 use crate::devices::{self, DeviceOption};
 use crate::output::Output;
 use crate::overlay::OverlayOptions;
@@ -13,7 +14,6 @@ use crate::render::exr_options::ExrOptions;
 use crate::render::preview::PreviewOptions;
 use crate::render::report;
 use crate::render::source::Source;
-use crate::{assets, ranks};
 use anyhow::{Context, bail};
 use clap::Args;
 use frames::{Origin, Sequence};
@@ -49,6 +49,8 @@ pub struct Movie {
     #[command(flatten)]
     device: DeviceOption,
     #[command(flatten)]
+    reach: Reach,
+    #[command(flatten)]
     viewing: viewing::Viewing,
     #[command(flatten)]
     look: PreviewOptions,
@@ -74,7 +76,7 @@ impl Movie {
         memory::afford(|| format!("the settings of {} frames", self.frames), plans)?;
         let times = self.span.times(self.frames, &scene)?;
         let animations = self.viewing.outputs(self.frames)?;
-        let files = assets::load(&scene, &source.folder, &animations.files())?;
+        let files = assets::load(&scene, &source.folder, &animations.files(), self.reach)?;
         animations.files().iter().try_for_each(|output| output.spares(&self.scene))?;
         let mut film = Film::new(&scene, files.decoded).with_context(|| source.name.clone())?;
         if animations.any() {
@@ -107,9 +109,6 @@ impl Movie {
         let style = (&self.exr, self.viewing.frames_per_second());
         let rendering = Rendering::new(&mut film, &mut sequence, &self.output, style);
         let rendered = rendering.run().with_context(|| source.name.clone())?;
-        if ranks::is_silent() {
-            return Ok(Answer::default());
-        }
         animations.write(&sequence, self.look.look(&scene), |picture, look, white| {
             self.overlay.draw(&scene, (picture, 1), look, white)
         })?;

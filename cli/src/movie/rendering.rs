@@ -1,21 +1,15 @@
-//! The frames that are missing, batch by batch: all of them, or with other ranks of one job those that this one takes.
+//! The frames that are missing, batch by batch.
 
 use super::frames::Sequence;
 use crate::interrupt::{Interrupted, Keeper};
-use crate::ranks::{self, Lead, Team};
+use crate::progress;
 use crate::render::exr_options::ExrOptions;
-use crate::{output, progress};
 use indicatif::ProgressBar;
 use kerrlight_geodesic::RayDevice;
 use kerrlight_render::Error;
 use kerrlight_render::picture::{Film, Frame, RenderError};
 use std::path::Path;
-use std::time::{Duration, Instant};
-
-/// So many pieces a rank has at least, if there are as many frames: the last ones end at about the same time.
-const PIECES: usize = 4;
-/// How often to look whether the first frame is there.
-const LOOK: Duration = Duration::from_millis(50);
+use std::time::Instant;
 
 /// A film under way.
 pub struct Rendering<'a> {
@@ -40,14 +34,11 @@ impl<'a> Rendering<'a> {
         Self { film, sequence, folder, style, bar }
     }
 
-    /// Renders what is missing and counts it; a rank that is not the first counts nothing.
+    /// Renders what is missing and counts it.
     pub fn run(mut self) -> anyhow::Result<usize> {
         let (missing, start) = (self.sequence.missing(), Instant::now());
-        match ranks::this() {
-            None => self.rest()?,
-            Some((0, size)) => self.lead(size)?,
-            Some((rank, size)) => return self.help(rank, size).map(|()| 0),
-        }
+        let most = self.film.batch();
+        missing.chunks(most).try_for_each(|batch| self.batch(batch))?;
         self.bar.finish_and_clear();
         let (count, seconds) = (missing.len(), start.elapsed().as_secs_f64());
         let there = self.sequence.len() - count;
@@ -59,91 +50,10 @@ impl<'a> Rendering<'a> {
         Ok(count)
     }
 
-    /// All that is missing.
-    fn rest(&mut self) -> anyhow::Result<()> {
-        let missing = self.sequence.missing();
-        let most = self.film.batch();
-        missing.chunks(most).try_for_each(|batch| self.batch(batch, None))
-    }
-
-    /// With others, for whom this rank waits.
-    fn lead(&mut self, size: u32) -> anyhow::Result<()> {
-        let pieces = self.pieces(size);
-        let at = self.folder.join("shared");
-        let lead = Lead::start(&at.join(self.key(size)), names(&pieces), size)?;
-        for (k, piece) in pieces.iter().enumerate() {
-            if self.open(piece).is_empty() {
-                lead.team.known(k)?;
-            }
-        }
-        let keeper = Keeper::brief(self.there());
-        loop {
-            self.share(&lead.team, &pieces)?;
-            if !lead.team.wait(&keeper)? {
-                break;
-            }
-        }
-        if keeper.stopped() {
-            return Err(Interrupted(self.there()).into());
-        }
-        drop(keeper);
-        self.sequence.find()?;
-        // Frames that somebody has removed since.
-        self.rest()?;
-        lead.end();
-        output::sweep(self.folder, output::BESIDE);
-        // What is left behind does no harm.
-        let _ = std::fs::remove_dir_all(at);
-        Ok(())
-    }
-
-    fn help(&mut self, rank: u32, size: u32) -> anyhow::Result<()> {
-        let pieces = self.pieces(size);
-        let folder = self.folder.join("shared").join(self.key(size));
-        let team = Team::join(&folder, names(&pieces), rank)?;
-        self.share(&team, &pieces)?;
-        team.leave()
-    }
-
-    /// Renders pieces until none is free.
-    fn share(&mut self, team: &Team, pieces: &[Vec<usize>]) -> anyhow::Result<()> {
-        while let Some(k) = team.take() {
-            let batch = self.open(&pieces[k]);
-            self.batch(&batch, Some(team))?;
-            team.done(k)?;
-        }
-        team.check()
-    }
-
-    /// Frames that are rendered by one rank, the same for all ranks.
-    fn pieces(&self, size: u32) -> Vec<Vec<usize>> {
-        let all: Vec<usize> = (0..self.sequence.len()).collect();
-        let even = all.len().div_ceil(PIECES * size as usize).max(1);
-        all.chunks(self.film.batch().min(even)).map(<[usize]>::to_vec).collect()
-    }
-
-    /// What tells the pieces of this film from others.
-    fn key(&self, size: u32) -> String {
-        let decides = format!("{size} {}", self.sequence.identity());
-        format!("{:08x}", crc32fast::hash(decides.as_bytes()))
-    }
-
-    /// Those of some frames that are not there.
-    fn open(&self, piece: &[usize]) -> Vec<usize> {
-        let is_there = |k: &usize| self.sequence.path(*k, "exr").exists();
-        piece.iter().copied().filter(|k| !is_there(k)).collect()
-    }
-
-    fn batch(&mut self, batch: &[usize], team: Option<&Team>) -> anyhow::Result<()> {
-        if batch.is_empty() {
-            return Ok(());
-        }
+    fn batch(&mut self, batch: &[usize]) -> anyhow::Result<()> {
         let keeper = Keeper::brief(self.there());
         let times: Vec<f64> = batch.iter().map(|k| self.sequence.time(*k)).collect();
         let frames = self.frames(&times, &keeper)?;
-        if let Some(team) = team.filter(|_| batch[0] != 0) {
-            self.await_scale(team, &keeper)?;
-        }
         self.sequence.write(self.film, self.style, batch, frames)
     }
 
@@ -169,22 +79,6 @@ impl<'a> Rendering<'a> {
         }
     }
 
-    /// Waits for the frame whose scale all others share, where there is one; it is rendered once more if whoever had it
-    /// is dead.
-    fn await_scale(&mut self, team: &Team, keeper: &Keeper) -> anyhow::Result<()> {
-        while self.sequence.lacks_scale()? {
-            if keeper.stopped() {
-                return Err(Interrupted(self.there()).into());
-            }
-            if team.is_abandoned(0) {
-                let first = self.frames(&[self.sequence.time(0)], keeper)?;
-                return self.sequence.scale_like(self.film, &first[0]);
-            }
-            std::thread::sleep(LOOK);
-        }
-        Ok(())
-    }
-
     /// How far it is, and how to resume.
     fn there(&self) -> String {
         let (done, all) =
@@ -194,8 +88,4 @@ impl<'a> Rendering<'a> {
             "stopped: {done} of {all} frames are in {folder}; run the same command again to resume"
         )
     }
-}
-
-fn names(pieces: &[Vec<usize>]) -> Vec<String> {
-    pieces.iter().map(|piece| format!("frame_{:04}", piece[0])).collect()
 }

@@ -1,6 +1,6 @@
 //! Whole folders, which appear at once.
 
-use super::{Unfinished, note, prefix_of};
+use super::{Unfinished, leftovers, lock, note, prefix_of};
 use anyhow::Context;
 use std::fs::File;
 use std::path::Path;
@@ -12,9 +12,11 @@ pub fn write_folder(
 ) -> anyhow::Result<()> {
     let name = || format!("cannot write {}", path.display());
     let parent = path.parent().filter(|parent| *parent != Path::new(""));
-    let mut builder = tempfile::Builder::new();
-    let beside = builder.prefix(&prefix_of(path)).tempdir_in(parent.unwrap_or(Path::new(".")));
+    let parent = parent.unwrap_or(Path::new("."));
+    let beside = tempfile::Builder::new().prefix(&prefix_of(path)).tempdir_in(parent);
     let beside = beside.with_context(name)?;
+    // It tells others that somebody writes here.
+    let _lock = File::open(beside.path()).ok().filter(lock);
     let _unfinished = Unfinished::new(beside.path());
     let (new, old) = (beside.path().join("new"), beside.path().join("old"));
     std::fs::create_dir(&new).with_context(name)?;
@@ -25,6 +27,9 @@ pub fn write_folder(
     }
     std::fs::rename(&new, path).with_context(name)?;
     note_folder(path);
+    if let Some(name) = path.file_name() {
+        leftovers::sweep_once(parent, &name.to_string_lossy());
+    }
     beside.close().with_context(name)
 }
 

@@ -6,15 +6,13 @@ mod partial;
 pub mod preview;
 pub mod report;
 pub mod source;
-mod together;
 mod work;
 
 use crate::answer::{self, Answer};
-use crate::assets;
+use crate::assets::{self, Reach};
 use crate::devices::{self, DeviceOption};
 use crate::output::{self, Output};
 use crate::overlay::OverlayOptions;
-use crate::ranks;
 use anyhow::{Context, bail};
 use clap::Args;
 use exr_options::ExrOptions;
@@ -71,6 +69,8 @@ pub struct Render {
     exr: ExrOptions,
     #[command(flatten)]
     device: DeviceOption,
+    #[command(flatten)]
+    reach: Reach,
     /// Columns of pixels that are traced together; the picture does not depend on it
     #[arg(long, value_name = "N", default_value = "64", hide_short_help = true)]
     #[arg(value_parser = clap::value_parser!(u16).range(1..))]
@@ -83,7 +83,7 @@ impl Render {
         let source = Source::new(self.scene.as_deref())?;
         let (text, scene) = source.scene(&self.all_overrides())?;
         let outputs = self.checked_outputs(&source)?;
-        let files = assets::load(&scene, &source.folder, &outputs.all())?;
+        let files = assets::load(&scene, &source.folder, &outputs.all(), self.reach)?;
         source.compare(&files.identity);
         afford(&scene)?;
         let device = self.device.open()?;
@@ -106,10 +106,6 @@ impl Render {
         let (name, files) = (source.name.as_str(), files.identity.as_str());
         let work =
             Work { raster: &raster, scene: &scene, text: &text, name, files, style: &self.exr };
-        if let Some((rank @ 1.., _)) = ranks::this() {
-            let identity = raster.identity() + work.files;
-            return work.help(outputs.exr.as_ref(), &identity, rank).map(|()| Answer::default());
-        }
         let summary = self.render(&work, look, &outputs)?;
         let seconds = start.elapsed().as_secs_f64();
         report::warn(&scene, &summary);

@@ -3,7 +3,6 @@
 use super::exr_options::ExrOptions;
 use super::partial::Partial;
 use super::report;
-use super::together::Together;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::output::Output;
 use crate::progress;
@@ -38,15 +37,10 @@ impl Work<'_> {
         mut look: Option<Reduction>,
     ) -> anyhow::Result<(Summary, Option<Picture>)> {
         let mut partial = Partial::open(exr, self.raster, identity)?;
-        let mut together = Together::new(self.raster, exr, identity);
         let stopped = format!("stopped; {}", partial.kept());
-        let others = together.as_mut().map(|all| all.fill(&mut partial.journal, &stopped));
-        let filled =
-            others.transpose().and_then(|_| Ok(self.fill(&mut partial.journal, &stopped)?));
-        let summary = match filled.map_err(anyhow::Error::downcast::<Error>) {
+        let summary = match self.fill(&mut partial.journal, &stopped) {
             Ok(summary) => summary,
-            Err(Ok(error)) => return Err(self.failed(error, partial)),
-            Err(Err(error)) => return Err(error.context(partial.kept())),
+            Err(error) => return Err(self.failed(error, partial)),
         };
         let mut attributes =
             report::attributes(self.scene, self.text, self.raster.legend(), &summary);
@@ -64,18 +58,8 @@ impl Work<'_> {
             Ok(self.raster.write_exr(journal, &summary, (&attributes, style), file, look)?)
         })
         .with_context(|| partial.kept())?;
-        exr.sweep();
         partial.remove();
-        if let Some(together) = together {
-            together.end();
-        }
         Ok((summary, look.map(Reduction::picture)))
-    }
-
-    /// Renders some of the bands of an EXR file that another rank writes. What has no place beside it is rendered there.
-    pub fn help(&self, exr: Option<&Output>, identity: &str, rank: u32) -> anyhow::Result<()> {
-        let together = exr.and_then(|exr| Together::new(self.raster, exr, identity));
-        together.map_or(Ok(()), |all| all.help(rank)).with_context(|| self.name.to_owned())
     }
 
     /// Renders what a preview needs.
@@ -138,7 +122,7 @@ impl Work<'_> {
 
 const STOPPED: &str = "stopped; nothing is kept";
 
-/// Why bands cannot be written, and what is left: ranks name the file of theirs, errors of the system name none.
+/// Why bands cannot be written, and what is left.
 fn unwritten(error: &dyn std::error::Error, partial: &Partial) -> String {
     let io = error.source().and_then(|source| source.downcast_ref::<std::io::Error>());
     match io {

@@ -127,7 +127,7 @@ impl Origin {
     fn of_picture(path: &Path) -> anyhow::Result<Self> {
         let source = Source::new(Some(path))?;
         let (_, scene) = source.scene(&[])?;
-        let files = assets::load(&scene, &source.folder, &[]);
+        let files = assets::load(&scene, &source.folder, &[], assets::Reach::default());
         let before = source.files.as_deref().unwrap_or_default();
         let faults = match &files {
             Err(error) => vec![format!("{error:#}")],

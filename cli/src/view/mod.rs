@@ -11,6 +11,7 @@ mod still;
 mod subject;
 
 use crate::answer::Answer;
+use crate::assets::Reach;
 use crate::output::Output;
 use anyhow::Context;
 use clap::Args;
@@ -31,6 +32,8 @@ pub struct View {
     /// Change a value of the scene, e.g. hole.spin=0.5 or sky.checker={field_deg=15,brightness=0.1}
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     overrides: Vec<String>,
+    #[command(flatten)]
+    reach: Reach,
     /// Port of this computer at which the page is served [default: one that is free]
     #[arg(long, value_name = "PORT", conflicts_with = "web")]
     port: Option<u16>,
@@ -42,7 +45,7 @@ pub struct View {
 impl View {
     /// Writes the page, or serves it.
     pub fn run(&self) -> anyhow::Result<Answer> {
-        let subject = Subject::open(self.scene.as_deref(), &self.overrides)?;
+        let subject = Subject::open(self.scene.as_deref(), &self.overrides, self.reach)?;
         let page = Page::of(&subject)?;
         match &self.web {
             Some(folder) => write(&page, folder),

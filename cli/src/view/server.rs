@@ -2,6 +2,7 @@
 
 use super::page::Page;
 use crate::interrupt::Keeper;
+use crate::threads;
 use anyhow::Context;
 use std::io::{BufRead, BufReader, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
@@ -29,7 +30,10 @@ pub fn serve(page: &Page, port: Option<u16>, browser: bool) -> anyhow::Result<()
         for stream in listener.incoming().flatten() {
             // Browsers open connections ahead of need: a silent one must not hold up the others, and one that goes away is
             // no failure.
-            scope.spawn(move || answer(page, stream));
+            let same = stream.try_clone();
+            if threads::spawn_in(scope, move || answer(page, stream)).is_err() {
+                let _ = same.and_then(|stream| answer(page, stream));
+            }
         }
     });
     Ok(())
@@ -42,19 +46,38 @@ fn answer(page: &Page, mut stream: TcpStream) -> std::io::Result<()> {
     let mut lines =
         BufReader::new(std::io::Read::take(stream.try_clone()?, LONGEST_REQUEST)).lines();
     let request = lines.next().transpose()?.unwrap_or_default();
-    // The rest of the request, so that closing the connection is orderly.
+    // To the end of the request, so that closing the connection is orderly.
+    let mut is_meant = false;
     for line in lines {
-        if line?.is_empty() {
+        let line = line?;
+        if line.is_empty() {
             break;
         }
+        is_meant |= line.split_once(':').is_some_and(|(name, value)| {
+            name.eq_ignore_ascii_case("host") && is_loopback(value.trim())
+        });
     }
-    let (status, kind, content) = found(page, &request);
+    let (status, kind, content) = if is_meant {
+        found(page, &request)
+    } else {
+        ("403 Forbidden", "text/plain", "this page is served to this computer alone")
+    };
     let length = content.len();
     write!(
         stream,
         "HTTP/1.1 {status}\r\nContent-Type: {kind}; charset=utf-8\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n"
     )?;
     stream.write_all(content.as_bytes())
+}
+
+/// Whether a request names this computer as its host, at any port, which may be forwarded. Another name that leads here is
+/// that of a page that would read what is served (DNS rebinding).
+fn is_loopback(host: &str) -> bool {
+    let name = match host.rsplit_once(':') {
+        Some((name, port)) if port.bytes().all(|digit| digit.is_ascii_digit()) => name,
+        _ => host,
+    };
+    name.eq_ignore_ascii_case("localhost") || ["127.0.0.1", "[::1]"].contains(&name)
 }
 
 /// Status, kind and content of what a request asks for.

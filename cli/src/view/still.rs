@@ -10,7 +10,8 @@ use kerrlight_render::transport::Assets;
 /// Pixels of the longer side.
 const SIDE: u32 = 64;
 
-/// The largest intensity in scene units, or the largest light of a sky without anything in front of it.
+/// The largest intensity in scene units, or of a sky without anything in front of it the light that one in a hundred of
+/// its lit pixels exceeds: a sun would leave the rest black.
 pub fn white(subject: &Subject) -> anyhow::Result<f64> {
     let scene = small(&subject.scene);
     let Assets { sky, stars, meshes, volumes } = &subject.assets;
@@ -23,10 +24,17 @@ pub fn white(subject: &Subject) -> anyhow::Result<f64> {
     let raster = Raster::new(&scene, assets).context("the scene")?;
     let keeper = Keeper::brief("stopped; nothing is written");
     let picture = raster.render(&|_| !keeper.stopped())?.picture;
-    let largest =
-        |name: &str| picture.channel(name).into_iter().flatten().copied().fold(0.0, f32::max);
-    let found = ["intensity", "R", "G", "B"].map(largest).into_iter().find(|x| *x > 0.0);
-    Ok(f64::from(found.unwrap_or(1.0)))
+    let lit = |name: &str| {
+        let values = picture.channel(name).into_iter().flatten().copied();
+        let mut lit: Vec<f32> = values.filter(|x| *x > 0.0).collect();
+        lit.sort_unstable_by(f32::total_cmp);
+        lit
+    };
+    if let Some(most) = lit("intensity").last() {
+        return Ok(f64::from(*most));
+    }
+    let sky = ["R", "G", "B"].map(lit).into_iter().find(|values| !values.is_empty());
+    Ok(sky.map_or(1.0, |values| f64::from(values[(values.len() - 1) * 99 / 100])))
 }
 
 /// The same scene with few pixels, in scene units.

@@ -1,7 +1,7 @@
 //! What the page shows: a scene with its files, or the folder of a fit.
 
 use super::run_folder::{self, Measured};
-use crate::assets;
+use crate::assets::{self, Reach};
 use crate::render::source::Source;
 use anyhow::Context;
 use kerrlight_render::scene::Scene;
@@ -27,7 +27,7 @@ pub struct Subject {
 
 impl Subject {
     /// The scene of a file or of the folder of a fit, or the built-in one, with changes.
-    pub fn open(path: Option<&Path>, overrides: &[String]) -> anyhow::Result<Self> {
+    pub fn open(path: Option<&Path>, overrides: &[String], reach: Reach) -> anyhow::Result<Self> {
         let run = path.filter(|path| path.is_dir());
         let within = run.map(run_folder::scene_of).transpose()?;
         let file = within.as_deref().or(path);
@@ -36,7 +36,7 @@ impl Subject {
             None => Source::built_in(),
         };
         let (text, scene) = source.scene(overrides)?;
-        let assets = assets::load(&scene, &source.folder, &[])?.decoded;
+        let assets = assets::load(&scene, &source.folder, &[], reach)?.decoded;
         let mut words: Vec<String> = file.map(shown).transpose()?.into_iter().collect();
         for change in overrides {
             words.extend(["--set".to_owned(), change.clone()]);

@@ -37,7 +37,7 @@ pub struct Crossing {
 }
 
 impl ClosedForm {
-    /// Prepares the ray's motion.
+    /// Prepares the ray's motion. All that follows is NaN, and there is no crossing, if `ray` was made for another hole.
     ///
     /// # Examples
     /// ```
@@ -57,7 +57,9 @@ impl ClosedForm {
         } else {
             0.0
         };
-        let end = if ray.potential.captures() {
+        let end = if ray.is_from_horizon {
+            start
+        } else if ray.potential.captures() {
             // At the horizon √W = |r₊² + a² − aλ|/r₊².
             let (w, a) = (ray.potential.horizon, hole.spin());
             radial.time_inwards(w, (2.0 / w - a * ray.lambda).abs() * w * w)
@@ -66,11 +68,12 @@ impl ClosedForm {
         };
         // The tip of an extremal hole's critical curve has coinciding infinities.
         let total = if end.is_nan() { f64::INFINITY } else { end - start };
+        let total = if ray.check_hole(hole).is_ok() { total } else { f64::NAN };
         ClosedForm { radial, polar: Polar::new(hole, ray), start, total }
     }
 
-    /// Mino time in M⁻¹ from the observer to the end of the ray: the horizon, or infinity. Infinite
-    /// on the critical curve.
+    /// Mino time in M⁻¹ from the observer to the end of the ray: the horizon, or infinity, as
+    /// [`Path::mino_total`](crate::Path::mino_total). Infinite on the critical curve.
     pub fn mino_total(&self) -> f64 {
         self.total
     }

@@ -21,6 +21,8 @@ pub enum Unresolved {
     PhotonOrbit,
     /// The limit on the number of steps was reached.
     StepLimit,
+    /// It was made for a hole of another spin: a misuse.
+    OtherHole,
 }
 
 impl Default for Outcome {
@@ -37,7 +39,7 @@ impl Outcome {
     }
 
     /// The number that tables of C and Python use: 0 captured, 1 escaped, 2 on a photon orbit, 3 out of steps, 4 on a
-    /// surface.
+    /// surface, 5 made for another hole.
     pub fn code(self) -> i8 {
         match self {
             Outcome::Captured => 0,
@@ -45,6 +47,7 @@ impl Outcome {
             Outcome::Unresolved(Unresolved::PhotonOrbit) => 2,
             Outcome::Unresolved(Unresolved::StepLimit) => 3,
             Outcome::Surface => 4,
+            Outcome::Unresolved(Unresolved::OtherHole) => 5,
         }
     }
 

@@ -115,7 +115,9 @@ impl<T: Elementary> Path<T> {
         self.outcome
     }
 
-    /// Mino time from the observer to the horizon or back to infinity.
+    /// Mino time from the start to the end of the path: the horizon or infinity, wherever the observer is. Tables and
+    /// blocks of rays ([`RayTable`](crate::RayTable), [`TracedRay`](crate::TracedRay)) end a ray where it is back at the
+    /// radius of a finite observer.
     pub fn mino_total(&self) -> T {
         self.end / T::constant(self.scale)
     }
@@ -169,14 +171,40 @@ impl<T: Elementary> Path<T> {
     /// The position at Mino time `mino_time` ∈ \[0, [`mino_total`](Self::mino_total)\]
     /// (clamped to it). At the horizon, where azimuth and time diverge logarithmically, it
     /// is that of the last float outside. All NaN on a path without a step: one that has not
-    /// been traced, or by a tracer that may make none.
+    /// been traced, or by a tracer that may make none, or of a photon that [comes from the
+    /// horizon](Ray::is_from_horizon).
     pub fn at(&self, mino_time: T) -> PathPoint<T> {
         if self.segments.is_empty() {
             return PathPoint::nowhere();
         }
         let s = self.clamped(mino_time);
         let (k, x) = self.find(s);
-        self.interpolate(k, x, s)
+        self.interpolate(k, x, s, None)
+    }
+
+    /// The position at a Mino time at which w = 1/r is known better than the time, with its estimated errors.
+    pub(crate) fn at_inverse_radius(&self, mino_time: T, w: T) -> (PathPoint<T>, Uncertainty) {
+        let (point, budget) = self.with_budget(mino_time, Some(w));
+        (point, budget.at_inverse_radius(&self.hole, self.lambda, self.scale, &point))
+    }
+
+    /// Mino time at which the ray, which has turned, is back at w = 1/r.
+    pub(crate) fn time_back_at(&self, w: f64) -> T {
+        let w = T::constant(w * self.scale);
+        let start = |k: usize| self.polynomial(k, 0).0[0].value();
+        let turning = self.turning.map_or(0.0, T::value);
+        let after = |k: &usize| self.segments[*k].s.value() > turning && start(*k) >= w.value();
+        let last = (0..self.segments.len()).rev().find(after);
+        let k = last.unwrap_or(self.find(T::constant(turning)).0);
+        let Segment { s, h, .. } = self.segments[k];
+        let first = ((turning - s.value()) / h).max(0.0);
+        (s + T::constant(h) * self.polynomial(k, 0).solve(w, first, 1.0)) / T::constant(self.scale)
+    }
+
+    /// w = 1/r at a Mino time.
+    pub(crate) fn inverse_radius_at(&self, mino_time: T) -> f64 {
+        let (k, x) = self.find(self.clamped(mino_time));
+        self.polynomial(k, 0).value(x).value() / self.scale
     }
 
     /// The estimated errors of [`at`](Self::at): see [`Uncertainty`]. Infinite on a path without
@@ -185,7 +213,7 @@ impl<T: Elementary> Path<T> {
         if self.segments.is_empty() {
             return Uncertainty::UNKNOWN;
         }
-        let (point, budget) = self.with_budget(mino_time);
+        let (point, budget) = self.with_budget(mino_time, None);
         budget.at(&self.hole, self.lambda, self.scale, &point)
     }
 
@@ -197,27 +225,28 @@ impl<T: Elementary> Path<T> {
         if self.segments.is_empty() {
             return Uncertainty::UNKNOWN;
         }
-        let (point, budget) = self.with_budget(mino_time);
+        let (point, budget) = self.with_budget(mino_time, None);
         budget.at_crossing(&self.hole, self.lambda, self.scale, &point)
     }
 
-    fn with_budget(&self, mino_time: T) -> (PathPoint<T>, Budget) {
+    fn with_budget(&self, mino_time: T, known: Option<T>) -> (PathPoint<T>, Budget) {
         let s = self.clamped(mino_time);
         let (k, x) = self.find(s);
         // In the first step little has gone wrong yet at the observer.
         let part = if k == 0 { x.value() } else { 1.0 };
         let budget = self.start.towards(&self.segments[k].budget, part);
-        (self.interpolate(k, x, s), budget)
+        (self.interpolate(k, x, s, known), budget)
     }
 
-    fn interpolate(&self, k: usize, x: T, s: T) -> PathPoint<T> {
+    /// The position at `x` in segment `k`, scaled time `s`; `known` is its w, if that is not the segment's.
+    fn interpolate(&self, k: usize, x: T, s: T, known: Option<T>) -> PathPoint<T> {
         let segment = &self.segments[k];
         let scale = T::constant(self.scale);
         let rate = T::constant(1.0 / segment.h);
         let radial = self.polynomial(k, 0);
         let horizon = (T::constant(1.0 - f64::EPSILON)) / self.hole.horizon();
         let (value, slope) = radial.both(x);
-        let mut w = value / scale;
+        let mut w = known.unwrap_or(value / scale);
         if w.value() <= 0.0 {
             w = T::constant(0.0);
         } else if w.value() > horizon.value() {
@@ -250,10 +279,9 @@ impl<T: Elementary> Path<T> {
             point.azimuth =
                 segment.turned + turn(self.rotation_sign, start, [n[0], n[1]]) + dragged;
         } else {
-            let square = T::constant(1.0) - u * u;
-            let sin = if square.value() > 0.0 { square.sqrt() } else { zero };
-            point.direction = [sin, zero, u];
-            point.velocity[2] = v;
+            let unknown = T::constant(f64::NAN);
+            point.direction = [unknown, unknown, u];
+            point.velocity = [unknown, unknown, v];
         }
         if self.has_time {
             let regular = self.polynomial(k, self.rows - 1).value(x) * scale;

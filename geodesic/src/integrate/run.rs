@@ -60,6 +60,14 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
 
     /// To the end, or until the ray is given up after `max_steps` steps.
     pub fn go(mut self, max_steps: u32) {
+        if self.state.ray.check_hole(&self.path.hole).is_err() {
+            self.path.outcome = Outcome::Unresolved(Unresolved::OtherHole);
+            return;
+        }
+        if self.state.ray.is_from_horizon {
+            self.path.outcome = Outcome::Captured;
+            return;
+        }
         self.stepper.restart(&self.state, &mut self.path.series);
         for _ in 0..max_steps {
             let made = self.stepper.step(&self.state, &mut self.path.series);

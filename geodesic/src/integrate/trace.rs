@@ -94,7 +94,8 @@ impl Tracer {
         self.method
     }
 
-    /// Follows `ray` backward to the horizon or to infinity, into `path`.
+    /// Follows `ray` backward to the horizon or to infinity, into `path`. A ray that was made for another hole is
+    /// [given up](crate::Unresolved::OtherHole).
     pub fn trace(&self, hole: &Kerr, ray: &Ray, quantities: Quantities, path: &mut Path) {
         match (quantities.azimuth, quantities.time) {
             (false, false) => self.run::<4>(hole, ray, path),
@@ -143,8 +144,8 @@ impl Tracer {
 /// ```
 ///
 /// # Errors
-/// If `tolerance` is not in \[1e-30, 1e-2\]; below the number's own rounding it counts as
-/// that.
+/// If the ray was made for another hole, or `tolerance` is not in \[1e-30, 1e-2\]; below the number's own rounding it
+/// counts as that.
 pub fn trace_series<T: Elementary>(
     tolerance: f64,
     hole: &Kerr<T>,
@@ -152,6 +153,7 @@ pub fn trace_series<T: Elementary>(
     quantities: Quantities,
     path: &mut Path<T>,
 ) -> Result<(), Error> {
+    ray.check_hole(hole)?;
     let ok = (1e-30..=1e-2).contains(&tolerance);
     check("tolerance", tolerance, ok, "a number in [1e-30, 1e-2]")?;
     let tolerance = TAYLOR_MARGIN * tolerance;

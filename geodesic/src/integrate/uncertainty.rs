@@ -11,6 +11,7 @@
 use crate::numbers::scalar::Elementary;
 use crate::spacetime::kerr::Kerr;
 use crate::spacetime::point::PathPoint;
+use core::f64::consts::SQRT_2;
 
 /// Estimated errors of a position: each bounds the true one for at least 99 % of rays, and is
 /// usually a few times larger (docs/measurements/geodesics.md of the repository has the figures).
@@ -115,28 +116,48 @@ impl Budget {
         let eps = T::EPSILON;
         let rates = Rates::at(hole, lambda, point);
         let w = point.inverse_radius.value();
-        let [x, y, _] = point.direction.map(T::value);
+        let sin = point.sin_theta().value();
         // Mino time by which the ray may be early or late, and what the interpolation adds.
-        let late = (self.phase + ROUNDINGS * self.rounding.sqrt()) / scale;
+        let late = self.late() / scale;
         // An error of W takes w off the true orbit by δW/|∇W| in the plane of w and dw/dτ.
         let steep = rates.w.hypot(self.pull).max(1e-300);
         let off = 0.5 * self.energy * self.pull / (steep * steep * scale);
         let local = self.local * w + off;
-        let radius = if w > 0.0 { (rates.w * late + local) / w + 4.0 * eps } else { 0.0 };
+        let relative = if w > 0.0 { (rates.w * late + local) / w + 4.0 * eps } else { 0.0 };
+        let lost = stretch(relative);
+        let radius = relative * lost;
         let theta = self.direction + 4.0 * eps;
-        let azimuth = self.direction / x.hypot(y).max(self.direction).max(1e-300)
+        let azimuth = self.direction / sin.max(self.direction).max(1e-300)
             + self.azimuth
             + rates.drag * late
             + hole.spin().value().abs() * local / rates.gap
             + 4.0 * eps * (1.0 + point.azimuth.value().abs());
         let delay = if w > 0.0 {
             self.delay * scale
-                + rates.lift * (rates.energy * late + local) / (w * w)
+                + lost * rates.lift * (rates.energy * late + local) / (w * w)
                 + 4.0 * eps * (point.delay.value().abs() + 1.0 / w)
         } else {
             0.0
         };
         Uncertainty { radius, theta, azimuth, delay }
+    }
+
+    /// Scaled time by which the ray may be early or late.
+    fn late(&self) -> f64 {
+        self.phase + ROUNDINGS * self.rounding.sqrt()
+    }
+
+    /// What it means where the path has a given radius: it is there earlier or later, elsewhere on the sphere.
+    pub fn at_inverse_radius<T: Elementary>(
+        &self,
+        hole: &Kerr<T>,
+        lambda: f64,
+        scale: f64,
+        point: &PathPoint<T>,
+    ) -> Uncertainty {
+        // The direction changes by at most √(1 + a²/b²) in a unit of scaled time.
+        let direction = self.direction + SQRT_2 * self.late();
+        Budget { direction, ..*self }.at(hole, lambda, scale, point)
     }
 
     /// What it means where the path crosses the equatorial plane: there θ is known, but an error
@@ -166,6 +187,13 @@ impl Budget {
                 },
         }
     }
+}
+
+/// By how much more r may be off than 1/r, whose estimated error is `relative`: once several times that may
+/// reach 1/r itself, nothing is known about r. Below a thousandth it makes no difference.
+fn stretch(relative: f64) -> f64 {
+    const SEVERAL: f64 = 8.0;
+    if relative < 1e-3 { 1.0 } else { 1.0 / (1.0 - SEVERAL * relative).max(f64::EPSILON) }
 }
 
 /// How fast a ray moves at a point, per Mino time.

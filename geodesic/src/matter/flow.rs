@@ -18,13 +18,22 @@ use crate::spacetime::point::PathPoint;
 /// assert!((keplerian_redshift(&hole, 6.0, lambda).unwrap() - 2f64.sqrt()).abs() < 1e-14);
 /// ```
 pub fn keplerian_redshift(hole: &Kerr, r: f64, lambda: f64) -> Option<f64> {
+    let (cube, root) = orbit(hole, r)?;
+    Some(root / (cube + hole.spin() - lambda))
+}
+
+/// Boyer–Lindquist components (uᵗ, uʳ, u^θ, u^φ) of a circular equatorial geodesic that turns about +z at radius r
+/// (in M); `None` at and inside the photon orbit.
+pub fn keplerian_velocity(hole: &Kerr, r: f64) -> Option<[f64; 4]> {
+    let (cube, root) = orbit(hole, r)?;
+    Some([(cube + hole.spin()) / root, 0.0, 0.0, 1.0 / root])
+}
+
+/// r^{3/2} and the root N with uᵗ = (r^{3/2} + a)/N and Ω = 1/(r^{3/2} + a).
+fn orbit(hole: &Kerr, r: f64) -> Option<(f64, f64)> {
     let cube = r * r.sqrt();
     let norm = cube * orbits::photon_orbit_distance(hole, r);
-    if norm <= 0.0 || r <= hole.horizon() {
-        return None;
-    }
-    // uᵗ = (r^{3/2} + a)/√norm and Ω = 1/(r^{3/2} + a).
-    Some(norm.sqrt() / (cube + hole.spin() - lambda))
+    (norm > 0.0 && r > hole.horizon()).then(|| (cube, norm.sqrt()))
 }
 
 /// g of matter that moves rigidly at constant r with angular velocity vector `omega`

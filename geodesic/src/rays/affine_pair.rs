@@ -109,6 +109,10 @@ impl Trajectory<f64> for AffinePair {
         found.extend(self.fine.equatorial_crossings());
     }
 
+    fn exit(&self) -> Option<[f64; 3]> {
+        None
+    }
+
     fn at(&self, mino_time: f64) -> PathPoint {
         self.fine.at(mino_time)
     }

@@ -1,6 +1,7 @@
 //! Rays in blocks, on all cores where there are threads.
 
 use crate::error::{Error, check};
+use crate::interrupt;
 
 /// Rays that one task works on step by step.
 pub(crate) const BLOCK: usize = 64;
@@ -12,6 +13,10 @@ pub(crate) fn in_blocks<T: Send>(
     beta: &[f64],
     work: impl Fn(&[f64], &[f64]) -> T + Sync + Send,
 ) -> Vec<T> {
+    let work = |alpha: &[f64], beta: &[f64]| {
+        interrupt::check();
+        work(alpha, beta)
+    };
     #[cfg(feature = "rayon")]
     {
         use rayon::prelude::*;

@@ -146,12 +146,15 @@ pub struct RayTable {
     /// What became of each ray.
     pub outcome: Vec<Outcome>,
     /// Mino time of each whole ray in M⁻¹: to the horizon, to infinity, or back to a finite
-    /// observer's radius. NaN where unresolved.
+    /// observer's radius; of cameras' rays to infinity. NaN where unresolved.
     pub mino_total: Vec<f64>,
     /// Smallest radius in M of each ray that turns; NaN of others.
     pub turning_radius: Vec<f64>,
     /// How many times each ray crosses the equatorial plane.
     pub crossing_count: Vec<u32>,
+    /// Unit vector of the direction in which each ray escapes, NaN of those that do not: of
+    /// [`Integrator::trace_view`](crate::Integrator::trace_view) alone.
+    pub exit: Vec<[f64; 3]>,
     /// The first crossings, as many as were requested.
     pub crossings: Points,
     /// The samples.
@@ -189,6 +192,7 @@ impl RayTable {
         self.mino_total.extend(other.mino_total);
         self.turning_radius.extend(other.turning_radius);
         self.crossing_count.extend(other.crossing_count);
+        self.exit.extend(other.exit);
         self.crossings.append(other.crossings);
         self.samples.append(other.samples);
         self.uncertainty.extend(other.uncertainty);
@@ -201,6 +205,7 @@ impl Sink<f64> for RayTable {
         self.mino_total.push(summary.total.unwrap_or(f64::NAN));
         self.turning_radius.push(summary.turning_radius.unwrap_or(f64::NAN));
         self.crossing_count.push(summary.crossing_count);
+        self.exit.extend(summary.exit);
     }
 
     fn crossing(&mut self, request: &Request, hole: &Kerr, lambda: f64, point: &PathPoint) {

@@ -236,6 +236,7 @@ impl Sink<Number> for Differentiated {
             total: summary.total.map(|total| total.value),
             turning_radius: summary.turning_radius.map(|radius| radius.value),
             crossing_count: summary.crossing_count,
+            exit: summary.exit,
         });
     }
 
@@ -299,13 +300,13 @@ pub fn trace(
     let rule = sampling::rule(request);
     let pieces = in_blocks(BLOCK, alpha, beta, |alpha, beta| -> Result<Differentiated, Error> {
         let sink = Differentiated::default();
-        let mut sampler = Sampler::new(request, &hole, observer.is_at_infinity(), &rule, sink);
+        let mut sampler = Sampler::new(request, &hole, [observer.is_at_infinity(); 2], &rule, sink);
         let mut path = Path::empty();
         for (alpha, beta) in alpha.iter().zip(beta) {
             let [alpha, beta] = [Number::parameter(*alpha, 2), Number::parameter(*beta, 3)];
             let ray = observer.ray(&hole, alpha, beta)?;
             trace_series(tolerance, &hole, &ray, request.quantities(), &mut path)?;
-            sampler.take(&MinoPath { path: &path, ray: &ray }, ray.lambda);
+            sampler.take(&MinoPath::new(&path, &ray), ray.lambda);
         }
         Ok(sampler.sink)
     });

@@ -39,10 +39,11 @@ pub(crate) fn trace_block(
     wanted: &BlockRequest,
     request: &Request,
 ) -> Result<RayTable, Error> {
-    let (hole, at_infinity) = (tracer.hole(), observer.is_at_infinity());
+    let (hole, at_infinity) = (tracer.hole(), [observer.is_at_infinity(); 2]);
     let mut table = RayTable::default();
     table.samples.reserve(request, wanted.samples * alpha.len());
-    let sampler = Sampler::new(request, hole, at_infinity, &[], table);
+    let mut sampler = Sampler::new(request, hole, at_infinity, &[], table);
+    sampler.exit = wanted.exit;
     let worst = Uncertainty::default();
     let mut table = Collector { hole, observer, alpha, beta, request, sampler, worst };
     tracer.trace(alpha, beta, wanted, &mut RayBlock::default(), &mut table)?;
@@ -104,10 +105,11 @@ impl RayVisitor for Collector<'_> {
         path: Option<PathOfRay<'_>>,
     ) -> Result<(), Error> {
         if let Some(PathOfRay { ray, path, .. }) = path {
-            self.sampler.take(&MinoPath { path, ray }, ray.lambda);
-            // Steps lose digits of the whole next to the critical curve.
-            if let Some(total) = self.sampler.sink.mino_total.last_mut().filter(|t| !t.is_nan()) {
-                *total = whole(self.hole, ray);
+            self.sampler.take(&MinoPath::new(path, ray), ray.lambda);
+            // Steps lose digits of the whole next to the critical curve; on it the closed form has none.
+            let total = self.sampler.sink.mino_total.last_mut().filter(|total| !total.is_nan());
+            if let (Some(total), Some(whole)) = (total, whole(self.hole, ray)) {
+                *total = whole;
             }
             return Ok(());
         }
@@ -121,6 +123,8 @@ impl RayVisitor for Collector<'_> {
         table.mino_total.push(ray.mino_total);
         table.turning_radius.push(turning);
         table.crossing_count.push(ray.crossing_count);
+        let exit = ray.exit.unwrap_or([f64::NAN; 3]);
+        table.exit.extend(self.sampler.exit.then_some(exit));
         for crossing in crossings {
             table.crossings.push_crossing(self.request, crossing);
         }
@@ -169,9 +173,10 @@ fn turning_radius(photon: &Ray) -> f64 {
     photon.potential.outer_turning_point().map_or(f64::NAN, |w| 1.0 / w)
 }
 
-/// Mino time of a whole ray.
-fn whole(hole: &Kerr, photon: &Ray) -> f64 {
+/// Mino time of a whole ray, if it is finite.
+fn whole(hole: &Kerr, photon: &Ray) -> Option<f64> {
     let form = ClosedForm::new(hole, photon);
     let returns = photon.inverse_radius > 0.0 && photon.potential.outer_turning_point().is_some();
-    if returns { form.time_back() } else { form.mino_total() }
+    let total = if returns { form.time_back() } else { form.mino_total() };
+    Some(total).filter(|total| total.is_finite())
 }

@@ -160,7 +160,7 @@ impl DualRays<'_> {
                 let ray = self.observer.ray(&self.hole, alpha, beta)?;
                 let quantities = self.request.quantities;
                 trace_series(self.tolerance, &self.hole, &ray, quantities, &mut path)?;
-                self.nodes(layout, &MinoPath { path: &path, ray: &ray }, &mut found.nodes);
+                self.nodes(layout, &MinoPath::new(&path, &ray), &mut found.nodes);
             }
             found.ends.push(found.nodes.len());
         }

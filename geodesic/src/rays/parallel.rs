@@ -2,6 +2,7 @@
 
 use crate::integrate::path::Path;
 use crate::integrate::trace::Tracer;
+use crate::interrupt;
 use crate::screen::observer::Ray;
 use crate::spacetime::kerr::Kerr;
 use crate::spacetime::quantities::Quantities;
@@ -31,6 +32,7 @@ impl Tracer {
     ) -> Vec<T> {
         rays.par_iter()
             .map_init(Path::new, |path, ray| {
+                interrupt::check();
                 self.trace(hole, ray, quantities, path);
                 keep(path)
             })

@@ -11,7 +11,7 @@ pub enum Placement {
     #[default]
     None,
     /// At this many points equidistant in Mino time, from the observer to the ray's end: the
-    /// horizon, or back at the observer's radius. For an observer at infinity the points at
+    /// horizon, or back at the observer's radius; infinity for an observer who is there and for a camera. Points at
     /// infinity are left out.
     MinoTime(usize),
     /// At the middles of this many pieces of equal length ∫Σ dτ (the affine parameter, for unit
@@ -61,6 +61,9 @@ pub struct Request {
     pub uncertainty: bool,
 }
 
+/// The most crossings that can be asked for: a ray whose numbers tell it from the critical curve has some dozens.
+const MOST_CROSSINGS: usize = 1000;
+
 impl Request {
     /// Everything about this many crossings.
     pub fn crossings(n: usize) -> Self {
@@ -84,6 +87,8 @@ impl Request {
         let count = |field, n: usize| {
             check(field, n as f64, (1..=1_000_000).contains(&n), "a number in [1, 1000000]")
         };
+        let ok = self.crossings <= MOST_CROSSINGS;
+        check("crossings", self.crossings as f64, ok, "a number in [0, 1000]")?;
         match self.samples {
             Placement::None => {}
             Placement::MinoTime(points) => {

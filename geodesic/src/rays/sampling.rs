@@ -17,6 +17,8 @@ pub(crate) trait Trajectory<T> {
     fn total(&self) -> T;
     fn turning_radius(&self) -> Option<T>;
     fn crossings(&self, found: &mut Vec<T>);
+    /// The direction in which it escapes, if that is known.
+    fn exit(&self) -> Option<[T; 3]>;
     fn at(&self, mino_time: T) -> PathPoint<T>;
     fn uncertainty(&self, mino_time: T) -> Uncertainty;
     /// That of crossing number `k`, at `mino_time`.
@@ -32,6 +34,8 @@ pub(crate) struct Summary<T> {
     pub total: Option<T>,
     pub turning_radius: Option<T>,
     pub crossing_count: u32,
+    /// The direction in which it escapes, if wanted; NaN if it does not.
+    pub exit: Option<[f64; 3]>,
 }
 
 /// Takes what a [`Sampler`] finds: of each ray first its summary, then its crossings, then its
@@ -55,9 +59,11 @@ pub(crate) trait Sink<T> {
 pub(crate) struct Sampler<'a, T, S> {
     request: &'a Request,
     hole: &'a Kerr<T>,
-    at_infinity: bool,
+    at_infinity: [bool; 2],
     rule: &'a [(f64, f64)],
     pub sink: S,
+    /// Whether the direction in which rays escape is wanted.
+    pub exit: bool,
     times: Vec<T>,
     pieces: Vec<[T; 2]>,
     worst: Uncertainty,
@@ -77,33 +83,43 @@ fn at_horizon<T: Elementary>(ray: &impl Trajectory<T>, mino_time: T) -> bool {
     ray.outcome() == Outcome::Captured && mino_time.value() >= ray.total().value()
 }
 
-/// The first and last of `n` samples equidistant in Mino time, in units of the whole ray's: at infinity itself there
-/// is no finite position.
-fn mino_ends(n: usize, at_infinity: bool, captured: bool) -> (f64, f64) {
-    match (at_infinity, captured) {
-        (true, true) => (1.0 / n as f64, 1.0),
-        (true, false) => (1.0 / (n + 1) as f64, n as f64 / (n + 1) as f64),
-        (false, _) => (0.0, 1.0),
+/// The direction in which a ray escapes; NaN if it does not.
+fn direction<T: Elementary>(ray: &impl Trajectory<T>) -> [f64; 3] {
+    ray.exit().map_or([f64::NAN; 3], |direction| direction.map(T::value))
+}
+
+/// The first and last of `n` samples equidistant in Mino time, in units of the whole ray's. `at_infinity`: whether the
+/// ray starts there, and whether it ends there unless it is captured; at infinity itself there is no finite position.
+fn mino_ends(n: usize, at_infinity: [bool; 2], captured: bool) -> (f64, f64) {
+    match (at_infinity[0], at_infinity[1] && !captured) {
+        (true, false) => (1.0 / n as f64, 1.0),
+        (true, true) => (1.0 / (n + 1) as f64, n as f64 / (n + 1) as f64),
+        (false, false) => (0.0, 1.0),
+        (false, true) => (0.0, (n - 1) as f64 / n as f64),
     }
 }
 
 /// The Mino times of samples, in units of the whole ray's.
-pub(crate) fn mino_times(n: usize, at_infinity: bool, captured: bool) -> impl Iterator<Item = f64> {
+pub(crate) fn mino_times(
+    n: usize,
+    at_infinity: [bool; 2],
+    captured: bool,
+) -> impl Iterator<Item = f64> {
     let (from, to) = mino_ends(n, at_infinity, captured);
     equidistant(from, to, n)
 }
 
 impl<'a, T: Elementary, S: Sink<T>> Sampler<'a, T, S> {
-    /// `rule` is that of the request.
+    /// `rule` is that of the request; `at_infinity` says of both ends of rays that escape whether they are there.
     pub fn new(
         request: &'a Request,
         hole: &'a Kerr<T>,
-        at_infinity: bool,
+        at_infinity: [bool; 2],
         rule: &'a [(f64, f64)],
         sink: S,
     ) -> Self {
         let (times, pieces, worst) = (Vec::new(), Vec::new(), Uncertainty::default());
-        Sampler { request, hole, at_infinity, rule, sink, times, pieces, worst }
+        Sampler { request, hole, at_infinity, rule, sink, exit: false, times, pieces, worst }
     }
 
     /// Takes a ray with angular momentum `lambda`.
@@ -118,6 +134,7 @@ impl<'a, T: Elementary, S: Sink<T>> Sampler<'a, T, S> {
             total,
             turning_radius: ray.turning_radius(),
             crossing_count: times.len() as u32,
+            exit: self.exit.then(|| direction(ray)),
         });
         self.worst = Uncertainty::default();
         for (k, time) in times.iter().enumerate().take(self.request.crossings) {
@@ -181,8 +198,8 @@ impl<'a, T: Elementary, S: Sink<T>> Sampler<'a, T, S> {
         let (from, to) = mino_ends(n, self.at_infinity, captured);
         let step = if n > 1 { (to - from) / (n - 1) as f64 } else { to - from };
         for (k, share) in equidistant(from, to, n).enumerate() {
-            let first = k == 0 && !self.at_infinity;
-            let last = k + 1 == n && (captured || !self.at_infinity);
+            let first = k == 0 && !self.at_infinity[0];
+            let last = k + 1 == n && (captured || !self.at_infinity[1]);
             let part = if first || last { 0.5 * step } else { step };
             let step = total * T::constant(part);
             self.sample(ray, lambda, total * T::constant(share), |sigma| step * sigma);

@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::integrate::path::Path;
 use crate::integrate::trace::Tracer;
+use crate::interrupt;
 #[cfg(feature = "affine")]
 use crate::rays::affine_pair::AffinePair;
 use crate::rays::block::{BlockRequest, BlockTracer};
@@ -16,15 +17,18 @@ use crate::rays::trajectory::MinoPath;
 use crate::screen::observer::Observer;
 use crate::screen::view::View;
 use crate::spacetime::kerr::Kerr;
+use crate::spacetime::quantities::Quantities;
 
 /// What all rays have in common.
 #[derive(Clone, Copy)]
 struct Job<'a> {
     hole: &'a Kerr,
-    observer: &'a Observer,
+    view: &'a View,
     tolerance: f64,
     request: &'a Request,
     rule: &'a [(f64, f64)],
+    /// Whether directions of escape are wanted.
+    exit: bool,
 }
 
 /// Rays in closed form that one task works on: many registers' worth.
@@ -60,16 +64,57 @@ impl Integrator {
         tolerance: f64,
         request: &Request,
     ) -> Result<RayTable, Error> {
-        check_columns(alpha, beta)?;
+        let view = &View::Screen(*observer);
+        self.trace_job(Job { hole, view, tolerance, request, rule: &[], exit: false }, alpha, beta)
+    }
+
+    /// The same for the rays that arrive at the points (`x[k]`, `y[k]`) of a view, (α, β) of an observer's screen or (x, y)
+    /// of a camera's picture plane, with the direction in which each escapes. Rays of cameras are followed to infinity, and
+    /// step by step.
+    ///
+    /// ```
+    /// use kerrlight_geodesic::{Camera, Inclination, Integrator, Kerr, Motion, Outcome, Request, View};
+    /// let hole = Kerr::new(0.9)?;
+    /// let camera = Camera::new(&hole, Inclination::from_degrees(80.0)?, 12.0, Motion::Static)?;
+    /// let (view, request) = (View::Camera(camera), Request::default());
+    /// let rays =
+    ///     Integrator::TaylorMino.trace_view(&hole, &view, &[0.0, 1.2], &[0.0, 0.3], 1e-10, &request)?;
+    /// assert_eq!(rays.outcome, [Outcome::Captured, Outcome::Escaped]);
+    /// let [x, y, z] = rays.exit[1]; // where on the sky this light comes from
+    /// assert!((x * x + y * y + z * z - 1.0).abs() < 1e-9 && rays.exit[0][0].is_nan());
+    /// # Ok::<(), kerrlight_geodesic::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As for [`trace`](Self::trace), with [`View::ray`], or if the integrator does not work in Mino time.
+    pub fn trace_view(
+        self,
+        hole: &Kerr,
+        view: &View,
+        x: &[f64],
+        y: &[f64],
+        tolerance: f64,
+        request: &Request,
+    ) -> Result<RayTable, Error> {
+        self.trace_job(Job { hole, view, tolerance, request, rule: &[], exit: true }, x, y)
+    }
+
+    fn trace_job(self, job: Job<'_>, x: &[f64], y: &[f64]) -> Result<RayTable, Error> {
+        let Job { hole, view, request, .. } = job;
+        check_columns(x, y)?;
         request.check()?;
+        view.check_hole(hole)?;
         let rule = sampling::rule(request);
-        let job = Job { hole, observer, tolerance, request, rule: &rule };
+        let job = Job { rule: &rule, ..job };
         let closed = self.closed_form(job)?;
-        let pieces = match &closed {
-            Some((tracer, wanted)) => in_blocks(TOGETHER, alpha, beta, |alpha, beta| {
-                elliptic_rays::trace_block(tracer, observer, [alpha, beta], wanted, request)
+        let closed = closed.as_ref().and_then(|(tracer, wanted)| {
+            tracer.closed_form().map(|observer| (tracer, observer, wanted))
+        });
+        let pieces = match closed {
+            Some((tracer, observer, wanted)) => in_blocks(TOGETHER, x, y, |x, y| {
+                elliptic_rays::trace_block(tracer, observer, [x, y], wanted, request)
             }),
-            None => in_blocks(BLOCK, alpha, beta, |alpha, beta| self.step_block(job, alpha, beta)),
+            None => in_blocks(BLOCK, x, y, |x, y| self.step_block(job, x, y)),
         };
         let pieces = pieces.into_iter().collect::<Result<Vec<_>, _>>()?;
         Ok(RayTable::joined(pieces, request))
@@ -80,32 +125,45 @@ impl Integrator {
         if self != Integrator::Elliptic {
             return Ok(None);
         }
-        let view = View::Screen(*job.observer);
-        let tracer = BlockTracer::new(*job.hole, view, self, job.tolerance)?;
+        let tracer = BlockTracer::new(*job.hole, *job.view, self, job.tolerance)?;
         let wanted = elliptic_rays::in_closed_form(job.request);
-        Ok(wanted.filter(|_| tracer.closed_form().is_some()).map(|wanted| (tracer, wanted)))
+        Ok(wanted.map(|wanted| (tracer, BlockRequest { exit: job.exit, ..wanted })))
     }
 
-    fn step_block(self, job: Job<'_>, alpha: &[f64], beta: &[f64]) -> Result<RayTable, Error> {
-        let Job { hole, observer, tolerance, request, rule } = job;
-        let at_infinity = observer.is_at_infinity();
+    fn step_block(self, job: Job<'_>, x: &[f64], y: &[f64]) -> Result<RayTable, Error> {
+        let Job { hole, view, tolerance, request, rule, exit } = job;
+        let at_infinity = match view {
+            View::Screen(observer) => [observer.is_at_infinity(); 2],
+            View::Camera(_) => [false, true],
+        };
         let mut sampler = Sampler::new(request, hole, at_infinity, rule, RayTable::default());
-        let rays = alpha.iter().zip(beta);
+        sampler.exit = exit;
+        let points = x.iter().zip(y);
         let Some(method) = self.method() else {
             #[cfg(feature = "affine")]
-            for (alpha, beta) in rays {
-                let ray = observer.ray(hole, *alpha, *beta)?;
-                let pair = AffinePair::trace(hole, observer, [*alpha, *beta], tolerance, request)?;
-                sampler.take(&pair, ray.lambda);
+            {
+                let allowed = "an integrator in Mino time, for cameras and directions of escape";
+                let observer = view.observer().filter(|_| !exit);
+                let observer =
+                    observer.ok_or(Error::out_of_range("integrator", f64::NAN, allowed))?;
+                for (x, y) in points {
+                    interrupt::check();
+                    let ray = observer.ray(hole, *x, *y)?;
+                    let pair = AffinePair::trace(hole, observer, [*x, *y], tolerance, request)?;
+                    sampler.take(&pair, ray.lambda);
+                }
             }
             return Ok(sampler.sink);
         };
         let tracer = Tracer::with_method(method, tolerance)?;
         let mut path = Path::new();
-        for (alpha, beta) in rays {
-            let ray = observer.ray(hole, *alpha, *beta)?;
-            tracer.trace(hole, &ray, request.quantities(), &mut path);
-            sampler.take(&MinoPath { path: &path, ray: &ray }, ray.lambda);
+        let own = request.quantities();
+        let quantities = Quantities { azimuth: own.azimuth || exit, ..own };
+        for (x, y) in points {
+            interrupt::check();
+            let ray = view.ray(hole, *x, *y)?;
+            tracer.trace(hole, &ray, quantities, &mut path);
+            sampler.take(&MinoPath::seen_by(view, &path, &ray).0, ray.lambda);
         }
         Ok(sampler.sink)
     }

@@ -6,12 +6,56 @@ use crate::integrate::uncertainty::Uncertainty;
 use crate::numbers::scalar::Elementary;
 use crate::rays::sampling::Trajectory;
 use crate::screen::observer::Ray;
+use crate::screen::view::View;
 use crate::spacetime::point::PathPoint;
 
-/// A path in Mino time, ended at the radius of a finite observer.
+/// A path in Mino time; that of a finite observer's ray, ended at its radius.
 pub(crate) struct MinoPath<'a, T> {
-    pub path: &'a Path<T>,
+    path: &'a Path<T>,
     pub ray: &'a Ray<T>,
+    total: T,
+    /// w = 1/r at the end, where the Mino time does not tell.
+    end: Option<T>,
+}
+
+/// The relative error of w up to which a ray is back at the observer after twice the time to its turning point.
+const CLOSE: f64 = 1e-6;
+
+impl<'a, T: Elementary> MinoPath<'a, T> {
+    /// The path of a camera's ray: to infinity, or to the horizon.
+    pub fn whole(path: &'a Path<T>, ray: &'a Ray<T>) -> Self {
+        MinoPath { path, ray, total: path.mino_total(), end: None }
+    }
+
+    /// The path of `ray`, which arrives at a point of `view`, and whether its ends are at infinity if it escapes.
+    pub fn seen_by(view: &View, path: &'a Path<T>, ray: &'a Ray<T>) -> (Self, [bool; 2]) {
+        match view {
+            View::Screen(observer) => (Self::new(path, ray), [observer.is_at_infinity(); 2]),
+            View::Camera(_) => (Self::whole(path, ray), [false, true]),
+        }
+    }
+
+    /// The path of an observer's ray.
+    pub fn new(path: &'a Path<T>, ray: &'a Ray<T>) -> Self {
+        let w = ray.inverse_radius;
+        // A ray that starts inwards is back where it started after twice the time to its turning point.
+        let turning = path.turning_point().filter(|_| w > 0.0 && ray.inward);
+        let Some((turning, _)) = turning else {
+            return Self::whole(path, ray);
+        };
+        let twice = turning + turning;
+        if (path.inverse_radius_at(twice) / w - 1.0).abs() <= CLOSE {
+            return MinoPath { path, ray, total: twice, end: None };
+        }
+        // Unless that time is lost next to the critical curve, or the way out to a far observer takes less
+        // time than the turning point is known to: where the path itself is back.
+        MinoPath { path, ray, total: path.time_back_at(w), end: Some(T::constant(w)) }
+    }
+
+    /// w, if the ray is at its end and that is not known from the time.
+    fn end_at(&self, mino_time: T) -> Option<T> {
+        self.end.filter(|_| mino_time.value() >= self.total.value())
+    }
 }
 
 impl<T: Elementary> Trajectory<T> for MinoPath<'_, T> {
@@ -20,13 +64,7 @@ impl<T: Elementary> Trajectory<T> for MinoPath<'_, T> {
     }
 
     fn total(&self) -> T {
-        match self.path.turning_point() {
-            // A ray that starts inwards is back where it started after twice the time.
-            Some((turning, _)) if self.ray.inverse_radius > 0.0 && self.ray.inward => {
-                turning + turning
-            }
-            _ => self.path.mino_total(),
-        }
+        self.total
     }
 
     fn turning_radius(&self) -> Option<T> {
@@ -38,12 +76,23 @@ impl<T: Elementary> Trajectory<T> for MinoPath<'_, T> {
         found.extend(self.path.equatorial_crossings().filter(|time| time.value() <= total.value()));
     }
 
+    fn exit(&self) -> Option<[T; 3]> {
+        let escapes = self.path.outcome() == Outcome::Escaped;
+        escapes.then(|| self.path.at(self.path.mino_total()).direction)
+    }
+
     fn at(&self, mino_time: T) -> PathPoint<T> {
-        self.path.at(mino_time)
+        match self.end_at(mino_time) {
+            Some(w) => self.path.at_inverse_radius(mino_time, w).0,
+            None => self.path.at(mino_time),
+        }
     }
 
     fn uncertainty(&self, mino_time: T) -> Uncertainty {
-        self.path.uncertainty_at(mino_time)
+        match self.end_at(mino_time) {
+            Some(w) => self.path.at_inverse_radius(mino_time, w).1,
+            None => self.path.uncertainty_at(mino_time),
+        }
     }
 
     fn uncertainty_at_crossing(&self, _: usize, mino_time: T) -> Uncertainty {

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, check};
 use crate::numbers::scalar::Elementary;
-use crate::screen::observer::{Inclination, Ray};
+use crate::screen::observer::{FARTHEST, Inclination, Ray};
 use crate::spacetime::frame::ZamoFrame;
 use crate::spacetime::kerr::Kerr;
 use crate::spacetime::orbits;
@@ -16,11 +16,15 @@ pub enum Motion {
     Static,
     /// Zero angular momentum (Bardeen 1970): carried along with the rotation of space.
     Zamo,
-    /// Turning about +z with Ω = 1/(r^{3/2} + a), a geodesic in the equatorial plane.
+    /// Turning about +z with Ω = 1/(r^{3/2} + a): a geodesic in the equatorial plane, and in no other place, where
+    /// something has to hold the camera up.
     Keplerian,
     /// Falling from rest at infinity without angular momentum: E = 1, L = Q = 0.
     FreeFall,
 }
+
+/// Roundings of a photon's energy at infinity, a difference of two terms inside the ergosphere.
+const ROUNDINGS: f64 = 16.0;
 
 /// A camera at a finite radius.
 ///
@@ -51,7 +55,7 @@ impl Camera {
     /// A camera around `hole` at `radius` > r₊ in M, polar angle `inclination` and azimuth 0.
     ///
     /// # Errors
-    /// If the radius is not finite or not outside the horizon, or if nothing can move as
+    /// If the radius is not outside the horizon and at most 1e30 M, or if nothing can move as
     /// requested at this place (a static camera in the ergosphere, a Keplerian one inside
     /// the photon orbit).
     pub fn new(
@@ -87,6 +91,9 @@ impl Camera {
         rates: [f64; 3],
     ) -> Result<Self, Error> {
         let at_rest = Self::at_rest(hole, inclination, radius)?;
+        for (field, rate) in ["dr/dt", "dtheta/dt", "dphi/dt"].into_iter().zip(rates) {
+            check(field, rate, rate.is_finite(), "a finite number (M⁻¹, that of r without unit)")?;
+        }
         let velocity = at_rest.local_velocity(rates);
         let speed = square(velocity).sqrt();
         check("camera speed", speed, speed < 1.0, "slower than light, below 1")?;
@@ -95,11 +102,12 @@ impl Camera {
 
     /// The camera of zero angular momentum.
     fn at_rest(hole: &Kerr, inclination: Inclination, radius: f64) -> Result<Self, Error> {
+        let near = radius <= FARTHEST;
         let frame = ZamoFrame::at(hole, radius, inclination.sin(), inclination.cos());
-        let frame = frame.ok_or(Error::out_of_range(
+        let frame = frame.filter(|_| near).ok_or(Error::out_of_range(
             "camera radius",
             radius,
-            "a finite number outside the horizon",
+            "outside the horizon and at most 1e30 (M)",
         ))?;
         let ZamoFrame { lapse, drag, girth, .. } = frame;
         Ok(Camera {
@@ -158,15 +166,17 @@ impl Camera {
     }
 
     /// The photon that arrives at the point (x, y) of the picture plane; of
-    /// [`Dual`](crate::Dual) numbers, with its derivatives with respect to them.
+    /// [`Dual`](crate::Dual) numbers, with its derivatives with respect to them. In some directions inside the
+    /// ergosphere its energy at infinity is not positive: see [`Ray::is_from_horizon`].
     ///
     /// # Errors
-    /// If x or y is not in \[−1e12, 1e12\], or if the photon has no positive energy at infinity (some
-    /// directions inside the ergosphere).
+    /// If x or y is not in \[−1e12, 1e12\], or an angle of the camera is not finite.
     pub fn ray<T: Elementary>(&self, x: T, y: T) -> Result<Ray<T>, Error> {
         for (field, value) in [("x", x.value()), ("y", y.value())] {
             check(field, value, value.abs() <= 1e12, "a number in [-1e12, 1e12]")?;
         }
+        let [forward, ..] = self.axes[2];
+        check("yaw, pitch or roll", forward, forward.is_finite(), "finite angles (radians)")?;
         self.arriving_from(self.direction(x, y))
     }
 
@@ -195,6 +205,12 @@ impl Camera {
     /// If the vector's length is not 1 within 1e-6, or as for [`ray`](Self::ray).
     pub fn arriving_from<T: Elementary>(&self, direction: [T; 3]) -> Result<Ray<T>, Error> {
         let length = direction.iter().map(|d| d.value() * d.value()).sum::<f64>().sqrt();
+        check(
+            "camera azimuth",
+            self.azimuth,
+            self.azimuth.is_finite(),
+            "a finite angle (radians)",
+        )?;
         let allowed = "1 (the direction is a unit vector)";
         check("length of the direction", length, (length - 1.0).abs() < 1e-6, allowed)?;
         let [k_r, k_theta, k_phi] = self.momentum(direction);
@@ -204,9 +220,12 @@ impl Camera {
         // p_φ/sin θ and p_θ, for unit energy in the frame of zero angular momentum.
         let sigma = self.hole.sigma(self.radius, self.inclination.cos());
         let (around, polar) = (k_phi * of(self.girth), k_theta * of(sigma.sqrt()));
-        let energy = of(self.lapse) + of(self.drag) * s * around;
-        let allowed = "a direction from which light of positive energy arrives";
-        check("energy at infinity", energy.value(), energy.value() > 0.0, allowed)?;
+        let dragged = of(self.drag) * s * around;
+        let energy = of(self.lapse) + dragged;
+        // Within its rounding it is 0.
+        let rounding = ROUNDINGS * T::EPSILON * (self.lapse + dragged.value().abs());
+        let is_from_horizon = energy.value() <= rounding;
+        let energy = if is_from_horizon { of(1.0) } else { energy };
         let (around, polar) = (around / energy, polar / energy);
         let angular = around * around + polar * polar - a * a * c * c;
         let tilt = around - a * s;
@@ -225,7 +244,9 @@ impl Camera {
             azimuth: self.azimuth,
             inverse_radius: 1.0 / self.radius,
             inward: k_r.value() > 0.0,
+            is_from_horizon,
             potential: RadialPotential::new(coefficients, horizon).narrow(T::narrow),
+            spin: self.hole.spin(),
         })
     }
 
@@ -283,7 +304,8 @@ impl Camera {
     }
 
     /// ν in the camera's frame over ν at infinity, for the photon that arrives from
-    /// `direction`: multiplies every redshift factor g that is written for infinity.
+    /// `direction`: multiplies every redshift factor g that is written for infinity. Negative or infinite for light
+    /// whose energy at infinity is not positive ([`Ray::is_from_horizon`]).
     pub fn blueshift(&self, direction: [f64; 3]) -> f64 {
         let along: f64 = self.velocity.iter().zip(direction).map(|(v, d)| v * d).sum();
         let zamo = (1.0 - along) / (1.0 - square(self.velocity)).sqrt();

@@ -7,6 +7,10 @@ use crate::numbers::scalar::{Elementary, Scalar};
 use crate::spacetime::kerr::Kerr;
 use crate::spacetime::radial::RadialPotential;
 
+/// The farthest place of an observer or a camera that is not at infinity, in M: squares of squares of the radius have to
+/// be numbers.
+pub(crate) const FARTHEST: f64 = 1e30;
+
 /// The angle between the spin axis and the line of sight.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Inclination<T: Elementary = f64> {
@@ -147,14 +151,14 @@ impl<T: Elementary> Observer<T> {
         Observer { inclination, azimuth: 0.0, inverse_radius: 0.0 }
     }
 
-    /// An observer at Boyer–Lindquist radius `radius` > 2 M (outside the ergosphere of every spin), at
+    /// An observer at Boyer–Lindquist radius `radius` in (2, 1e30\] M (outside the ergosphere of every spin), at
     /// azimuth 0.
     ///
     /// # Errors
-    /// If `radius` is not finite or not above 2 M.
+    /// If `radius` is out of that range.
     pub fn at_radius(inclination: Inclination<T>, radius: f64) -> Result<Self, Error> {
-        let ok = radius > 2.0 && radius.is_finite();
-        check("observer radius", radius, ok, "a finite number above 2 (M)")?;
+        let ok = radius > 2.0 && radius <= FARTHEST;
+        check("observer radius", radius, ok, "above 2 and at most 1e30 (M)")?;
         Ok(Observer { inclination, azimuth: 0.0, inverse_radius: 1.0 / radius })
     }
 
@@ -197,12 +201,13 @@ impl<T: Elementary> Observer<T> {
     /// The photon that arrives at (α, β), followed backward in time.
     ///
     /// # Errors
-    /// If α or β is not in \[−1e12, 1e12\], or if no photon with these constants reaches the
+    /// If α or β is not in \[−1e12, 1e12\], if the azimuth is not finite, or if no photon with these constants reaches the
     /// observer's radius (a finite observer inside the turning point).
     pub fn ray(&self, hole: &Kerr<T>, alpha: T, beta: T) -> Result<Ray<T>, Error> {
         let (x, y) = (alpha.value(), beta.value());
         check("alpha", x, x.abs() <= 1e12, "a number in [-1e12, 1e12] (M)")?;
         check("beta", y, y.abs() <= 1e12, "a number in [-1e12, 1e12] (M)")?;
+        check("observer azimuth", self.azimuth, self.azimuth.is_finite(), "a finite angle")?;
         let (sin, cos) = (self.inclination.sin, self.inclination.cos);
         let a = hole.spin();
         let wide = [a, alpha, beta].map(T::widen);
@@ -228,7 +233,9 @@ impl<T: Elementary> Observer<T> {
             azimuth: self.azimuth,
             inverse_radius: w,
             inward: true,
+            is_from_horizon: false,
             potential,
+            spin: a.value(),
         })
     }
 }
@@ -269,8 +276,27 @@ pub struct Ray<T = f64> {
     pub inverse_radius: f64,
     /// Whether the backward ray starts towards the hole.
     pub inward: bool,
+    /// Whether the photon has no positive energy at infinity, which there is inside the ergosphere alone: it comes from
+    /// the horizon. Its path is [captured](crate::Outcome::Captured) where it starts, and not followed through the
+    /// ergosphere; the constants above are those for unit energy in the frame of zero angular momentum.
+    pub is_from_horizon: bool,
     /// The radial potential W(w).
     pub potential: RadialPotential<T>,
+    /// Spin of the hole that the photon passes.
+    pub(crate) spin: f64,
+}
+
+impl<T: Elementary> Ray<T> {
+    /// Checks that this ray was made for `hole`.
+    pub(crate) fn check_hole(&self, hole: &Kerr<T>) -> Result<(), Error> {
+        check_hole(self.spin, hole.spin().value())
+    }
+}
+
+/// Checks that what was made for a hole of spin `own` is used with one of spin `given`.
+pub(crate) fn check_hole(own: f64, given: f64) -> Result<(), Error> {
+    check("spin", given, own == given, "the spin that the ray or the camera was made for")?;
+    Ok(())
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::numbers::dual::Dual;
 use crate::screen::camera::Camera;
-use crate::screen::observer::{Observer, Ray};
+use crate::screen::observer::{Observer, Ray, check_hole};
 use crate::spacetime::kerr::Kerr;
 
 /// Where a picture is taken from: a distant observer's screen or a camera near the hole.
@@ -40,8 +40,9 @@ impl View {
     /// the line of sight of a camera.
     ///
     /// # Errors
-    /// If no photon arrives there: see [`Observer::ray`] and [`Camera::ray`].
+    /// If no photon arrives there, see [`Observer::ray`] and [`Camera::ray`], or a camera was made for another hole.
     pub fn ray(&self, hole: &Kerr, x: f64, y: f64) -> Result<Ray, Error> {
+        self.check_hole(hole)?;
         match self {
             View::Screen(observer) => observer.ray(hole, x, y),
             View::Camera(camera) => camera.ray(x, y),
@@ -54,6 +55,7 @@ impl View {
     /// # Errors
     /// As for [`ray`](Self::ray).
     pub fn beam(&self, hole: &Kerr, x: f64, y: f64) -> Result<Ray<Dual<f64, 2>>, Error> {
+        self.check_hole(hole)?;
         let (x, y) = (Dual::parameter(x, 0), Dual::parameter(y, 1));
         match self {
             View::Screen(observer) => {
@@ -64,12 +66,24 @@ impl View {
         }
     }
 
+    /// Checks that it looks at `hole`: a camera was made for one.
+    pub(crate) fn check_hole(&self, hole: &Kerr) -> Result<(), Error> {
+        match self {
+            View::Screen(_) => Ok(()),
+            View::Camera(camera) => check_hole(camera.hole().spin(), hole.spin()),
+        }
+    }
+
     /// Ratio of the frequency of light that arrives at (x, y) to its frequency at infinity; `None` for
-    /// a screen, where the two are equal.
+    /// a screen, where the two are equal, and for light that cannot come from there
+    /// ([`Ray::is_from_horizon`]).
     pub fn blueshift(&self, x: f64, y: f64) -> Option<f64> {
         match self {
             View::Screen(_) => None,
-            View::Camera(camera) => Some(camera.blueshift(camera.direction(x, y))),
+            View::Camera(camera) => {
+                let shift = camera.blueshift(camera.direction(x, y));
+                Some(shift).filter(|shift| *shift > 0.0 && shift.is_finite())
+            }
         }
     }
 

@@ -63,7 +63,8 @@ pub use ray_nodes::RayNodes;
 pub use samples::{RaySamples, Samples};
 
 use crate::error::{Error, check};
-use crate::screen::observer::Observer;
+use crate::interrupt;
+use crate::screen::observer::{FARTHEST, Observer};
 use crate::spacetime::kerr::Kerr;
 use motion::Motion;
 
@@ -73,6 +74,10 @@ const BLOCK: usize = 512;
 /// Works on blocks of rays, each on its own: neither the number of threads nor their order changes a
 /// bit.
 fn each<B: Send>(blocks: Vec<B>, work: impl Fn(B) + Send + Sync) {
+    let work = |block| {
+        interrupt::check();
+        work(block);
+    };
     #[cfg(feature = "rayon")]
     {
         use rayon::prelude::*;
@@ -85,9 +90,6 @@ fn each<B: Send>(blocks: Vec<B>, work: impl Fn(B) + Send + Sync) {
 /// The nearest observer, in M: outside every photon orbit, so that rays come from outside the
 /// barrier.
 pub(crate) const NEAREST: f64 = 5.0;
-
-/// The farthest one that is not at infinity: squares of squares of the radius have to be numbers.
-const FARTHEST: f64 = 1e30;
 
 /// The least W = (dw/dτ)² at the observer: rays that pass it nearly tangentially would lose
 /// digits in its root.
@@ -118,12 +120,14 @@ impl<'a> ScreenRays<'a> {
         let w = observer.inverse_radius();
         let within = w == 0.0 || (1.0 / FARTHEST..=1.0 / NEAREST).contains(&w);
         check("observer radius", 1.0 / w, within, "infinity, or a number in [5, 1e30] (M)")?;
+        let azimuth = observer.azimuth();
+        check("observer azimuth", azimuth, azimuth.is_finite(), "a finite angle (radians)")?;
         let same = alpha.len() == beta.len();
         check("number of beta", beta.len() as f64, same, "as many as of alpha")?;
         let camera = motion::Camera::new(hole, observer);
         let mut points = alpha.iter().zip(beta);
         points.try_for_each(|(alpha, beta)| check_point(&camera, *alpha, *beta))?;
-        Ok(ScreenRays { camera, azimuth: observer.azimuth(), alpha, beta })
+        Ok(ScreenRays { camera, azimuth, alpha, beta })
     }
 
     /// Some of these points, in any order.

@@ -214,18 +214,27 @@ impl<V: Lanes<f64>> Journey<V> {
         Self {
             duration: V::select(escapes, inward + inward, inward),
             escapes: V::select(escapes, s(1.0), s(0.0)),
-            condition: V::select(e.lt(s(0.0)), near_critical(m.stiffness(), e, gap), s(1.0)),
+            condition: condition(m.stiffness(), e, gap),
             r_turn,
         }
     }
 }
 
-/// [`Journey::condition`] of a ray from the isolated root e < 0 of the cubic. The two others
-/// nearly coincide next to the critical curve, and the Mino time is the logarithm of their
+/// [`Journey::condition`] of a ray from the isolated root e of the cubic and the square of half the difference of the two
+/// others. With e < 0 these nearly coincide next to the critical curve, and the Mino time is the logarithm of their
 /// difference over √(3|e|/2). Scaled to be 1/(distance) for a hole without spin.
+///
+/// At the tips of the straight part of an extremal hole's critical curve all three coincide, whatever the sign of e: they
+/// then lose as many more digits as they are smaller than η + λ².
 #[inline(always)]
-fn near_critical<V: Lanes<f64>>(b2: V, e: V, gap: V) -> V {
+fn condition<V: Lanes<f64>>(b2: V, e: V, gap: V) -> V {
+    /// The largest root below which a ray passes a tip: no photon orbit of a spin up to 0.9999 has one as small.
+    const TIP: f64 = 0.05;
     let s = V::splat;
-    let rate = (e.abs() / b2).max(s(1e-12)) * s(6.0);
-    b2 * b2 / (gap.abs().max(s(1e-300)) * rate.sqrt() * s(36.0))
+    let amplified = |rate: V| b2 * b2 / (gap.abs().max(s(1e-300)) * rate.sqrt() * s(36.0));
+    let rate = |root: V| (root / b2).max(s(1e-12)) * s(6.0);
+    let near_critical = V::select(e.lt(s(0.0)), amplified(rate(e.abs())), s(1.0));
+    let largest = rate(e.abs() + gap.abs().sqrt());
+    let at_tip = V::both(largest.lt(s(TIP)), s(1.0).lt(b2));
+    V::select(at_tip, amplified(largest) / largest, near_critical)
 }

@@ -378,9 +378,8 @@ fn rays_that_cannot_be_are_refused() {
     assert!(both(&far, &[1.0], &[], 10).unwrap().contains("number of beta"));
     assert!(both(&near, &[1.0], &[1.0], 0).unwrap().contains("per ray"));
     assert!(both(&near, &[1.0; 3], &[1.0; 3], usize::MAX / 2).unwrap().contains("memory"));
-    for radius in [3.0, 1e40] {
-        assert!(both(&observer(60.0, radius), &[1.0], &[1.0], 10).unwrap().contains("[5, 1e30]"));
-    }
+    assert!(both(&observer(60.0, 3.0), &[1.0], &[1.0], 10).unwrap().contains("[5, 1e30]"));
+    assert!(Observer::at_radius(Inclination::from_degrees(60.0).unwrap(), 1e40).is_err());
     assert!(both(&observer(60.0, 0.99e30), &[1.0], &[1.0], 10).is_none());
     assert!(samples.ray(0).azimuth.iter().all(|phi| phi.is_finite()));
     assert!(samples.trace(&hole, &near, &[1.0], &[1.0], 1).is_err());

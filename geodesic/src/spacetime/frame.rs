@@ -57,8 +57,7 @@ impl ZamoFrame {
     /// The frame at a point of a ray; `None` at the horizon.
     #[inline]
     pub fn of(hole: &Kerr, point: &PathPoint) -> Option<Self> {
-        let [x, y, u] = point.direction;
-        Self::at(hole, point.radius(), x.hypot(y), u)
+        Self::at(hole, point.radius(), point.sin_theta(), point.cos_theta())
     }
 
     /// Boyer–Lindquist radius, in M.

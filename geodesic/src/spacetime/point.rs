@@ -12,10 +12,11 @@ pub struct PathPoint<T = f64> {
     pub inverse_radius: T,
     /// dw/dτ of the backward ray: positive on the way in.
     pub inverse_radius_rate: T,
-    /// n = (sin θ cos φ, sin θ sin φ, cos θ). Without azimuth: (sin θ, 0, cos θ).
+    /// n = (sin θ cos φ, sin θ sin φ, cos θ). Without azimuth: (NaN, NaN, cos θ), and NaN is what follows from it:
+    /// places in space, momenta, redshifts.
     pub direction: [T; 3],
     /// dn/dτ of the backward ray less its frame dragging, so that the photon's covariant
-    /// momentum on the sphere is p·v = −velocity·v. Without azimuth: (0, 0, d cos θ/dτ).
+    /// momentum on the sphere is p·v = −velocity·v. Without azimuth: (NaN, NaN, d cos θ/dτ).
     pub velocity: [T; 3],
     /// Azimuth, unwrapped from the observer on; 0 unless requested.
     pub azimuth: T,
@@ -35,13 +36,18 @@ impl<T: Elementary> PathPoint<T> {
         self.direction[2]
     }
 
-    /// Polar angle θ, accurate at the poles.
+    /// Polar angle θ; with azimuth accurate at the poles.
     pub fn theta(&self) -> T {
+        self.sin_theta().atan2(self.direction[2])
+    }
+
+    /// sin θ.
+    pub(crate) fn sin_theta(&self) -> T {
         let [x, y, u] = self.direction;
+        let across = x * x + y * y;
+        let square = if x.value().is_nan() { T::constant(1.0) - u * u } else { across };
         // On the axis itself the square root has no derivative.
-        let square = x * x + y * y;
-        let sin = if square.value() == 0.0 { T::constant(0.0) } else { square.sqrt() };
-        sin.atan2(u)
+        if square.value() > 0.0 { square.sqrt() } else { T::constant(0.0) }
     }
 
     /// Covariant Boyer–Lindquist momentum (p_t, p_r, p_θ, p_φ) of the photon on its way to
@@ -96,8 +102,11 @@ impl<T: Elementary> PathPoint<T> {
         }
     }
 
-    /// r n: the point in the coordinates in which a = 0 is flat-looking.
+    /// r n, in M: the point in the coordinates in which a = 0 is flat-looking. Infinite at infinity, so that a line to be
+    /// drawn begins where [`Path::intervals_within`](crate::Path::intervals_within) says that the ray enters a sphere.
     pub fn cartesian(&self) -> [T; 3] {
-        self.direction.map(|x| x / self.inverse_radius)
+        let w = self.inverse_radius;
+        let at_infinity = |x: T| if x.value() == 0.0 { x } else { x / w };
+        self.direction.map(|x| if w.value() > 0.0 { x / w } else { at_infinity(x) })
     }
 }

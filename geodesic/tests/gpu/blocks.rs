@@ -120,7 +120,11 @@ pub fn compare(device: Arc<dyn RayDevice>) {
                 let tracer = BlockTracer::new(hole, view, integrator, 1e-10).unwrap();
                 let exact = see(&tracer);
                 let found = see(&tracer.with_device(Arc::clone(&device)));
-                assert!(found.stepped < 10, "{view:?}: {} step by step", found.stepped);
+                // Where a ray goes beyond the radius of its observer is found step by step.
+                let goes_on = view.observer().is_some_and(|observer| !observer.is_at_infinity());
+                let escaped = found.exit.iter().flatten().count();
+                let most = if goes_on { escaped + 10 } else { 10 };
+                assert!(found.stepped < most, "{view:?}: {} step by step", found.stepped);
                 agree((&view, integrator), &exact, &found);
             }
         }

@@ -1,9 +1,11 @@
 //! The functions for C, called from Rust where misuse is concerned, and from a compiled C program.
 #![cfg(feature = "capi")]
 
+use kerrlight_geodesic::analytic::CriticalCurve;
 use kerrlight_geodesic::capi::{self, PointColumns, RayColumns, SamplePlacement, Scene};
 use kerrlight_geodesic::{
-    Inclination, Integrator, Kerr, Observer, Outcome, Placement, RayTable, Request,
+    Camera, Inclination, Integrator, Kerr, Motion, Observer, Outcome, Placement, Quantities,
+    RayTable, Request, Tracer,
 };
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -306,5 +308,112 @@ fn exact_c_example_prints_what_rust_finds() {
         for (number, expected) in numbers.iter().zip(row) {
             assert!((number - expected).abs() <= 1e-14 * expected.abs().max(1.0), "{line}");
         }
+    }
+}
+
+/// What examples/c/sky.c prints: the picture, the shift ahead, the width of the shadow, and the redshift of an orbit.
+fn expected_sky() -> (String, [f64; 3]) {
+    let hole = Kerr::new(0.9).unwrap();
+    let place = Inclination::from_degrees(85.0).unwrap();
+    let camera = Camera::new(&hole, place, 12.0, Motion::FreeFall).unwrap();
+    let point = |k: i32| (0.04 * f64::from(k % 61 - 30), 0.08 * f64::from(10 - k / 61));
+    let (x, y): (Vec<f64>, Vec<f64>) = (0..21 * 61).map(point).unzip();
+    let mut picture = String::new();
+    let mut path = kerrlight_geodesic::Path::new();
+    for (k, (x, y)) in x.iter().zip(&y).enumerate() {
+        let ray = camera.ray(*x, *y).unwrap();
+        Tracer::new(1e-8).unwrap().trace(&hole, &ray, Quantities::ALL, &mut path);
+        let [a, b, _] = path.at(path.mino_total()).direction;
+        let even = (b.atan2(a) / 0.3).floor() as i64 % 2 == 0;
+        let escapes = path.outcome() == Outcome::Escaped;
+        picture.push(if escapes { ['#', '.'][usize::from(even)] } else { ' ' });
+        picture.push_str(if k % 61 == 60 { "\n" } else { "" });
+    }
+    let curve = CriticalCurve::new(&hole, place);
+    let alpha = |k: u32| curve.point(std::f64::consts::TAU * f64::from(k) / 360.0).alpha;
+    let (left, right) =
+        (0..360).map(alpha).fold((0.0f64, 0.0f64), |(l, r), a| (l.min(a), r.max(a)));
+    // Ω = 1/(r^{3/2} + a) and u^t by the metric.
+    let (r, a) = (6.0f64, 0.9f64);
+    let rate = 1.0 / (r.powf(1.5) + a);
+    let norm = 1.0 - 2.0 / r + 4.0 * a * rate / r - (r * r + a * a + 2.0 * a * a / r) * rate * rate;
+    let shift = camera.blueshift(camera.direction(0.0, 0.0));
+    (picture, [shift, right - left, norm.sqrt() / (1.0 - 4.0 * rate)])
+}
+
+#[test]
+fn exact_c_sky_prints_what_rust_finds() {
+    let Some(cc) = compiler() else { return };
+    let program = folder().join("sky");
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/c/sky.c");
+    compile(&cc, &source, Some(&library()), &program);
+    let printed = output(&mut Command::new(program));
+    let (picture, numbers) = expected_sky();
+    let rest = printed.strip_prefix(&picture).expect("the same picture");
+    assert!(["  ", "#", "."].iter().all(|mark| picture.contains(mark)), "{picture}");
+    for (line, expected) in rest.lines().zip(numbers) {
+        let number =
+            line.split(' ').find_map(|word| word.parse::<f64>().ok().filter(|x| x.fract() != 0.0));
+        assert!((number.unwrap() - expected).abs() < 1e-4, "{line}: {expected}");
+    }
+    assert_eq!(rest.lines().count(), 3);
+}
+
+#[test]
+fn misuse_of_sky_functions_returns_a_code_and_a_message() {
+    use kerrlight_geodesic::capi::{
+        CameraPlace, SkyColumns, kerrlight_critical_curve, kerrlight_keplerian_redshift,
+        kerrlight_sky,
+    };
+    let place = CameraPlace {
+        radius: 12.0,
+        inclination_degrees: 80.0,
+        azimuth: 0.0,
+        yaw: 0.0,
+        pitch: 0.0,
+        roll: 0.0,
+        motion: 1,
+    };
+    let (mut outcome, mut direction) = ([7i32; 3], [7.0; 9]);
+    let out = SkyColumns {
+        outcome: outcome.as_mut_ptr(),
+        direction: direction.as_mut_ptr(),
+        blueshift: null_mut(),
+    };
+    let (a, b) = (ALPHA.as_ptr(), BETA.as_ptr());
+    for (camera, field) in [
+        (CameraPlace { radius: 1.0, ..place }, "camera radius"),
+        (CameraPlace { motion: 9, ..place }, "motion"),
+        (CameraPlace { yaw: f64::NAN, ..place }, "yaw"),
+        (CameraPlace { azimuth: f64::INFINITY, ..place }, "azimuth"),
+        (CameraPlace { inclination_degrees: 200.0, ..place }, "inclination"),
+    ] {
+        // SAFETY: columns of three rays.
+        let code = unsafe { kerrlight_sky(&SCENE, &camera, 3, a, b, &out) };
+        assert_eq!((code, message().contains(field)), (capi::OUT_OF_RANGE, true), "{}", message());
+    }
+    assert_eq!((outcome, direction), ([7; 3], [7.0; 9]));
+    // SAFETY: null pointers are what is tested; the others are valid.
+    unsafe {
+        assert_eq!(kerrlight_sky(&SCENE, null(), 3, a, null(), &out), capi::NULL_POINTER);
+        assert_eq!(kerrlight_sky(&SCENE, null(), 3, a, b, null()), capi::NULL_POINTER);
+        assert_eq!(kerrlight_sky(&SCENE, null(), 3, a, b, &out), capi::OK);
+        let mut g = 7.0;
+        assert_eq!(kerrlight_keplerian_redshift(0.9, 1.2, 0.0, &mut g), capi::OUT_OF_RANGE);
+        assert_eq!(kerrlight_keplerian_redshift(0.9, 6.0, 0.0, null_mut()), capi::NULL_POINTER);
+        assert_eq!((g, kerrlight_keplerian_redshift(0.9, 6.0, 0.0, &mut g)), (7.0, capi::OK));
+        let mut curve = [[0.0; 8]; 2];
+        let [alpha, beta] = curve.each_mut().map(|column| column.as_mut_ptr());
+        assert_eq!(kerrlight_critical_curve(2.0, 60.0, 8, alpha, beta), capi::OUT_OF_RANGE);
+        assert_eq!(kerrlight_critical_curve(0.0, 60.0, 8, alpha, beta), capi::OK);
+        for (alpha, beta) in curve[0].iter().zip(curve[1]) {
+            assert!((alpha.hypot(beta) - 27f64.sqrt()).abs() < 1e-12);
+        }
+    }
+    // A screen's directions: unit vectors, or no numbers.
+    assert_eq!(outcome, [1, 0, 1]);
+    for (ray, outcome) in direction.chunks(3).zip(outcome) {
+        let length = ray.iter().map(|x| x * x).sum::<f64>();
+        assert!(if outcome == 1 { (length - 1.0).abs() < 1e-9 } else { length.is_nan() });
     }
 }

@@ -2,7 +2,10 @@
 //! coordinates of 0 and of a million, rays next to the critical curve.
 
 use kerrlight_geodesic::derivatives::{self, Gradient};
-use kerrlight_geodesic::{Inclination, Kerr, Observer, Placement, Request, footprint};
+use kerrlight_geodesic::{
+    Double, Inclination, Integrator, Kerr, Observer, Outcome, Path, Placement, Quantities,
+    RayTable, Request, footprint, trace_series,
+};
 
 const SPINS: [f64; 9] =
     [0.0, 1e-12, -1e-6, 0.5, -0.94, 0.998, 1.0 - 1e-12, -1.0 + 1e-9, 1.0 - f64::EPSILON / 2.0];
@@ -99,4 +102,106 @@ fn exact_footprints_are_numbers_everywhere() {
             }
         }
     }
+}
+
+/// Samples of one ray with their errors; everything that has an outcome is a number.
+fn sampled(
+    integrator: Integrator,
+    (hole, observer): (&Kerr, &Observer),
+    [alpha, beta]: [f64; 2],
+) -> RayTable {
+    let samples = Request::samples(Placement::MinoTime(7));
+    let request = Request { crossings: 3, uncertainty: true, weight: true, ..samples };
+    let rays = integrator
+        .trace(hole, observer, &[alpha], &[beta], 1e-12, &request)
+        .expect("a ray arrives");
+    if !rays.outcome[0].is_unresolved() {
+        let place = format!("{integrator:?} {hole:?} {observer:?} ({alpha}, {beta})");
+        assert!(rays.mino_total[0].is_finite(), "{place}");
+        for points in [&rays.samples, &rays.crossings] {
+            let columns = [&points.radius, &points.theta, &points.azimuth, &points.delay];
+            let all = columns.into_iter().chain([&points.mino_time, &points.weight]).flatten();
+            assert!(all.copied().all(f64::is_finite), "{place}: {points:?}");
+        }
+    }
+    rays
+}
+
+/// A ray that escapes is back at its observer's radius.
+fn returns(rays: &RayTable, radius: f64, context: &str) {
+    let (last, error) = (rays.samples.radius[6], rays.uncertainty[0].radius);
+    let miss = (last / radius - 1.0).abs();
+    assert!(miss <= 1e-6_f64.min(error + 1e-14), "{context}: {last} ± {error}");
+}
+
+const METHODS: [Integrator; 3] =
+    [Integrator::TaylorMino, Integrator::Elliptic, Integrator::Dop853Mino];
+
+/// λ ≈ 2a around extremal holes: every number is one, and fate and radii are those of 28 digits.
+#[test]
+fn exact_rays_on_the_straight_part_of_an_extremal_critical_curve_are_numbers() {
+    let inclination = Inclination::from_degrees(90.0).unwrap();
+    let betas = [-0.5528916854514749, 0.8994698741176206, 1.3246097831865098, 1.7547873481341332];
+    let distances = [0.0, -4e-16, 5e-16, -3e-14, 1.6e-14, 3.3775e-13, 9e-13];
+    for (beta, distance) in betas.iter().flat_map(|b| distances.iter().map(move |d| (*b, *d))) {
+        let spin = if beta > 1.0 { -1.0 } else { 1.0 };
+        let hole = Kerr::new(spin).unwrap();
+        let alpha = -2.0 * spin * (1.0 + distance);
+        let [spin, wide_alpha, wide_beta] = [spin, alpha, beta].map(Double::from);
+        let wide = Observer::at_infinity(inclination.widen());
+        let ray = wide.ray(&Kerr::from_spin(spin).unwrap(), wide_alpha, wide_beta).unwrap();
+        let mut truth = Path::empty();
+        trace_series(1e-24, &Kerr::from_spin(spin).unwrap(), &ray, Quantities::POLAR, &mut truth)
+            .unwrap();
+        for integrator in METHODS {
+            let far = Observer::at_infinity(inclination);
+            let rays = sampled(integrator, (&hole, &far), [alpha, beta]);
+            let context = format!("{integrator:?} ({alpha}, {beta})");
+            if !rays.outcome[0].is_unresolved() {
+                assert_eq!(rays.outcome[0], truth.outcome(), "{context}");
+                for k in rays.samples.of(0) {
+                    let at = truth.at(Double::from(rays.samples.mino_time[k]));
+                    let miss = (rays.samples.radius[k] * at.inverse_radius.hi - 1.0).abs();
+                    assert!(miss <= 10.0 * rays.uncertainty[0].radius, "{context}: {k} {miss:e}");
+                }
+            }
+            let near = Observer::at_radius(inclination, 200.0).unwrap();
+            let rays = sampled(integrator, (&hole, &near), [alpha, beta]);
+            if rays.outcome[0] == Outcome::Escaped {
+                returns(&rays, 200.0, &context);
+            }
+        }
+    }
+}
+
+/// The way out to a far observer takes less Mino time than that of a near-critical turning point is known to.
+#[test]
+fn exact_near_critical_rays_return_to_far_observers() {
+    for (spin, degrees) in [(0.0, 17.0), (0.5, 1.0), (-0.7, 60.0), (0.998, 90.0)] {
+        let hole = Kerr::new(spin).unwrap();
+        let inclination = Inclination::from_degrees(degrees).unwrap();
+        let screen = Observer::at_infinity(inclination);
+        for k in 0..4 {
+            let (y, x) = (0.4 + 1.6 * f64::from(k)).sin_cos();
+            let falls = |b: f64| screen.ray(&hole, b * x, b * y).unwrap().potential.captures();
+            let (mut inside, mut outside) = (0.0, 12.0);
+            for _ in 0..60 {
+                let middle = 0.5 * (inside + outside);
+                *(if falls(middle) { &mut inside } else { &mut outside }) = middle;
+            }
+            for radius in [1e6, 1e9, 1e12, 1e20, 1e30] {
+                let far = Observer::at_radius(inclination, radius).unwrap();
+                for integrator in METHODS {
+                    let rays = sampled(integrator, (&hole, &far), [outside * x, outside * y]);
+                    let context = format!("{integrator:?} a = {spin}, {radius}, {k}");
+                    if rays.outcome[0] == Outcome::Escaped {
+                        returns(&rays, radius, &context);
+                    }
+                }
+            }
+        }
+    }
+    let inclination = Inclination::from_degrees(60.0).unwrap();
+    let error = Observer::at_radius(inclination, 1e300).unwrap_err().to_string();
+    assert_eq!(error, "observer radius = 1e300 is not allowed: above 2 and at most 1e30 (M)");
 }

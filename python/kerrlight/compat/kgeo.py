@@ -18,16 +18,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerrlight import _core
-from kerrlight._arrays import Floats, real, together
-from kerrlight.rays import Kerr
+from kerrlight._arrays import Floats, column, flat, radians, together, whole
+from kerrlight.rays import MOST_CROSSINGS, Kerr, Observer
 
-__all__ = ["Geodesics", "raytrace_ana"]
+__all__ = ["Geodesics", "r_equatorial", "raytrace_ana", "rho_of_req", "u_kep"]
 
 SPIN = 0.94
 INC = 20 * np.pi / 180.0
 ROUT = 100000.0
 NGEO = 250
 NPIX = 1000
+MAXTAUFRAC = 1.0 - 1e-10
 
 
 class Geodesics:
@@ -43,12 +44,14 @@ class Geodesics:
         image_coords: Sequence[Floats],
         mino_times: Floats,
         geo_coords: list[Floats],
+        maxtaufrac: float = MAXTAUFRAC,
     ) -> None:
         self.a = a
         self.observer_coords = list(observer_coords)
         self.image_coords = list(image_coords)
         self.mino_times = mino_times
         self.geo_coords = geo_coords
+        self.maxtaufrac = maxtaufrac
 
     @cached_property
     def affine_times(self) -> Floats:
@@ -56,8 +59,12 @@ class Geodesics:
         place = (float(self.th_o), False, float(self.r_o), 0.0)
         ngeo = self.mino_times.shape[0]
         screen = (self.alpha, self.beta)
-        lengths = _core.path_lengths(self.a, place, screen, ngeo)
+        lengths = _core.path_lengths(self.a, place, screen, (ngeo, self._part))
         return -lengths.reshape(self.npix, ngeo).T
+
+    @property
+    def _part(self) -> float:
+        return 1.0 if self.maxtaufrac >= MAXTAUFRAC else self.maxtaufrac
 
     @property
     def t_o(self) -> float:
@@ -112,7 +119,7 @@ class Geodesics:
     @property
     def tautot(self) -> Floats:
         """Mino time of each whole ray (1/M)."""
-        return self.mino_times[-1]
+        return self.mino_times[-1] / self._part
 
     @property
     def affinesteps(self) -> Floats:
@@ -206,6 +213,7 @@ def raytrace_ana(
     savedata: bool = False,
     plotdata: bool = False,
     verbose: bool = False,
+    maxtaufrac: float = MAXTAUFRAC,
 ) -> Geodesics:
     """Traces rays at ``ngeo`` points equidistant in Mino time.
 
@@ -218,6 +226,8 @@ def raytrace_ana(
     :param savedata: not served: the arrays are there to be saved.
     :param plotdata: not served: the arrays are there to be drawn.
     :param verbose: without effect: nothing is printed.
+    :param maxtaufrac: which part of a ray's Mino time its points cover, above 0 and up to 1; from 1 - 1e-10 on all of it,
+        where the last point of a captured ray lies a relative 1e-8 outside the horizon.
 
     >>> geos = raytrace_ana(0.42, [0, 1000.0, np.pi / 3, 0], [-17.0, 0.0], ngeo=10000)
     >>> z = geos.r_s[:, 0] * np.cos(geos.th_s[:, 0])
@@ -227,17 +237,126 @@ def raytrace_ana(
     """
     if savedata or plotdata:
         raise NotImplementedError("savedata and plotdata are not served: save or draw the arrays")
+    if not 0.0 < maxtaufrac <= 1.0:
+        raise ValueError(f"maxtaufrac = {maxtaufrac} is not allowed: above 0, up to 1")
     if image_coords is None:
         image_coords = (np.linspace(-6.0, 6.0, NPIX), np.zeros(NPIX))
-    alpha, beta = (np.atleast_1d(real(name, v)) for name, v in zip(("alpha", "beta"), image_coords))
+    alpha, beta = _screen(image_coords)
+    observer = _observer(a, observer_coords)
+    ngeo = whole("ngeo", ngeo, 1, 10**6)
+    if maxtaufrac < MAXTAUFRAC:
+        spacing = (ngeo, float(maxtaufrac))
+        rows = _core.path_points(observer.hole.spin, observer._place, (alpha, beta), spacing)
+        mino, r, theta, phi, delay = np.moveaxis(rows.reshape(len(alpha), ngeo, 5), -1, 0)
+    else:
+        points = observer.trace(
+            alpha, beta, crossings=0, samples=ngeo, integrator="elliptic", tolerance=1e-10
+        ).samples
+        mino, r, theta, phi, delay = points.mino, points.r, points.theta, points.phi, points.delay
+    if do_phi_and_t:
+        np.negative(delay, out=delay)
+    else:
+        phi = delay = np.zeros_like(r)
+    coords = [delay.T, r.T, theta.T, phi.T]
+    return Geodesics(observer.hole.spin, observer_coords, [alpha, beta], mino.T, coords, maxtaufrac)
+
+
+def _screen(image_coords: Sequence[ArrayLike]) -> tuple[Floats, Floats]:
+    """α and β as flat arrays of one length."""
+    if len(image_coords) != 2:
+        raise ValueError(f"image_coords has {len(image_coords)} arrays: alpha and beta are needed")
+    alpha, beta = (column(name, value) for name, value in zip(("alpha", "beta"), image_coords))
     _, (alpha, beta) = together(alpha=alpha, beta=beta)
-    hole = Kerr(a)
-    observer = hole.observer(inclination_rad=observer_coords[2], radius=observer_coords[1])
-    rays = observer.trace(
-        alpha, beta, crossings=0, samples=int(ngeo), integrator="elliptic", tolerance=1e-10
+    return alpha, beta
+
+
+def _observer(a: float, observer_coords: Sequence[float]) -> Observer:
+    if len(observer_coords) != 4:
+        raise ValueError(f"observer_coords has {len(observer_coords)} numbers: time, radius, inclination and azimuth")
+    return Kerr(a).observer(inclination_rad=observer_coords[2], radius=observer_coords[1])
+
+
+def r_equatorial(
+    a: float, r_o: float, th_o: float, mbar: int, alpha: ArrayLike, beta: ArrayLike
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Where rays cross the equatorial plane for the time number ``mbar``, counted from 0 backward from the observer.
+
+    Returns the radius there (M; 0 without such a crossing), the Mino time to there (1/M; NaN without), that of the
+    whole ray, and the number of the last crossing, -1 without any; arrays with the shape of ``alpha`` and ``beta`` (M).
+
+    :param r_o: radius of the observer (M), above 2 or infinite.
+    :param th_o: inclination (radians).
+
+    >>> radius, mino, total, last = r_equatorial(0.94, 1e4, 0.3, 0, [6.0, 0.5], [1.0, 0.5])
+    >>> bool(abs(radius[0] - 5.15) < 0.01), last.tolist()
+    (True, [0.0, -1.0])
+    """
+    mbar = whole("mbar", mbar, 0, MOST_CROSSINGS - 1)
+    rays = Kerr(a).observer(inclination_rad=th_o, radius=r_o).trace(
+        alpha, beta, crossings=mbar + 1, integrator="elliptic", tolerance=1e-10
     )
-    points = rays.samples
-    nothing = np.zeros_like(points.r)
-    phi, delay = (points.phi, points.delay) if do_phi_and_t else (nothing, nothing)
-    coords = [-delay.T, points.r.T, points.theta.T, phi.T]
-    return Geodesics(hole.spin, observer_coords, [alpha, beta], points.mino.T, coords)
+    radius, mino = (values[..., mbar] for values in (rays.crossings.r, rays.crossings.mino))
+    last = rays.crossing_count.astype(np.float64) - 1.0
+    return np.where(np.isnan(radius), 0.0, radius), mino, rays.mino_total, last
+
+
+def rho_of_req(
+    a: float, th0: float, req: float, mbar: int = 0, varphis: ArrayLike | None = None
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """The image of order ``mbar`` of the ring r = ``req`` (M) of the equatorial plane, for an observer at infinity.
+
+    Returns the directions on the screen (radians; by default a degree apart from -180°), the distances from its centre
+    (M), and the points (alpha, beta). NaN where the image has no point, or the centre lies outside of it.
+
+    :param th0: inclination (radians).
+    :param req: radius (M), from the horizon on, whose image is the edge of the inner shadow.
+
+    >>> angles, rho, alpha, beta = rho_of_req(0.9, 0.3, 6.0, varphis=[0.0, 1.0])
+    >>> bool(np.allclose(r_equatorial(0.9, np.inf, 0.3, 0, alpha, beta)[0], 6.0))
+    True
+    """
+    mbar = whole("mbar", mbar, 0, MOST_CROSSINGS - 1)
+    observer = Kerr(a).observer(inclination_rad=th0)
+    if not observer.hole.horizon <= req < np.inf:
+        raise ValueError(f"req = {req} is not allowed: {observer.hole.horizon} (the horizon) or above (M)")
+    degrees = np.arange(-180.0, 180.0)
+    angles = radians("varphis", np.radians(degrees) if varphis is None else column("varphis", varphis))
+    cos, sin = np.cos(angles), np.sin(angles)
+    curve = observer.critical_curve(angles=angles)
+    critical = np.hypot(curve.alpha, curve.beta)
+
+    def is_beyond(rho: Floats) -> Any:
+        rays = observer.trace(
+            rho * cos, rho * sin, crossings=mbar + 1, integrator="elliptic", tolerance=1e-10
+        )
+        radius = rays.crossings.r[..., mbar]
+        return np.where(np.isnan(radius), rho > critical, radius > req)
+
+    low, high = np.zeros_like(angles), critical + req + 10.0
+    found = is_beyond(high) & ~is_beyond(low)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        beyond = is_beyond(middle)
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+    rho = np.where(found, 0.5 * (low + high), np.nan)
+    return angles, rho, rho * cos, rho * sin
+
+
+def u_kep(
+    a: float, r: ArrayLike, retrograde: bool = False
+) -> tuple[Floats, Floats, int, Floats]:
+    """Boyer–Lindquist components (uᵗ, uʳ, u^θ, u^φ) of matter on circular orbits in the equatorial plane, which plunges
+    inside of the innermost stable one with the energy and angular momentum that it had there (Cunningham 1975).
+
+    ``r`` are radii (M); NaN at and inside the horizon. Matter turns with the hole, or against it if ``retrograde``.
+
+    >>> time, inward, _, turn = u_kep(0.0, [6.0, 3.0])
+    >>> print(f"{time[0]:.6f} {inward[1]:.6f}")
+    1.414214 -0.333333
+    """
+    hole = Kerr(a)
+    radius = column("r", r)
+    spin = abs(hole.spin) * (-1.0 if retrograde else 1.0)
+    sense = (-1.0 if hole.spin < 0.0 else 1.0) * (-1.0 if retrograde else 1.0)
+    time, inward, _, turn = _core.velocity(spin, flat(radius)).reshape(-1, 4).T
+    return time, inward, 0, sense * turn

@@ -1,7 +1,7 @@
 //! From bands to files.
 
 use super::bands::{Band, render_bands};
-use super::journal::{AnyJournal, Journal};
+use super::journal::AnyJournal;
 use super::tally::Summary;
 use super::{Progress, Raster};
 use crate::Error;
@@ -37,30 +37,6 @@ impl Raster {
             })
         };
         render_bands(self, &[self.prepared.time()], &mut todo.into_iter(), &keep, progress)
-    }
-
-    /// Renders the bands `todo` of the picture that `identity` describes, each of which is asked for when a thread is free
-    /// for it, and hands each as a [`Journal`] of its own to `keep`: for pictures that several processes render together.
-    ///
-    /// # Errors
-    /// If a value is out of range or does not fit, `keep` fails, or `progress` returned false.
-    pub fn fill_apart(
-        &self,
-        identity: &str,
-        todo: &mut (dyn Iterator<Item = usize> + Send),
-        keep: &(dyn Fn(usize, Vec<u8>) -> std::io::Result<()> + Sync),
-        progress: &Progress<'_>,
-    ) -> std::result::Result<(), Error> {
-        let sink = |bands: Vec<Band>| {
-            bands.iter().try_for_each(|band| {
-                let bytes = self.layout.compress(band.index, &band.channels)?.concat();
-                let alone =
-                    Journal::of_band(identity, self.bands(), (band.index, band.tally), &bytes);
-                alone.and_then(|alone| keep(band.index, alone)).map_err(exr::error::Error::from)?;
-                Ok(())
-            })
-        };
-        render_bands(self, &[self.prepared.time()], todo, &sink, progress)
     }
 
     /// Summary of the whole picture.

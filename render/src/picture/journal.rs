@@ -4,7 +4,7 @@
 
 use super::tally::Tally;
 use kerrlight_common::memory::Scratch;
-use std::io::{Cursor, Error, ErrorKind, Read, Result, Seek, SeekFrom, Write};
+use std::io::{Error, ErrorKind, Read, Result, Seek, SeekFrom, Write};
 
 const MAGIC: &[u8; 20] = b"kerrlight journal 1\n";
 
@@ -109,26 +109,6 @@ impl<F: Read + Write + Seek + ?Sized> Journal<F> {
         hasher.finalize()
     }
 
-    /// Takes the bands that are missing here from another journal of the same picture, whose bytes are given; how many.
-    ///
-    /// # Errors
-    /// On a failure to write. What is torn, or of another picture, holds no band.
-    pub fn absorb(&mut self, identity: &str, bytes: Vec<u8>) -> Result<usize> {
-        let mut taken = 0;
-        let Ok((mut other, Found::Bands(1..))) =
-            Journal::open(Cursor::new(bytes), identity, self.records.len())
-        else {
-            return Ok(0);
-        };
-        for band in self.missing() {
-            if let Some(record) = other.records[band] {
-                self.append(band, record.tally, &other.read(band)?)?;
-                taken += 1;
-            }
-        }
-        Ok(taken)
-    }
-
     /// The bands that are not there yet, in order.
     pub fn missing(&self) -> Vec<usize> {
         (0..self.records.len()).filter(|band| self.records[*band].is_none()).collect()
@@ -180,20 +160,6 @@ impl<F: Read + Write + Seek + ?Sized> Journal<F> {
     }
 }
 
-impl Journal<Cursor<Vec<u8>>> {
-    /// The bytes of a journal that has one band.
-    pub(super) fn of_band(
-        identity: &str,
-        bands: usize,
-        (band, tally): (usize, Tally),
-        bytes: &[u8],
-    ) -> Result<Vec<u8>> {
-        let (mut journal, _) = Journal::open(Cursor::new(Vec::new()), identity, bands)?;
-        journal.append(band, tally, bytes)?;
-        Ok(journal.file.into_inner())
-    }
-}
-
 /// Bytes before those of a record's band: its number, length and sums.
 const FRONT: usize = 8 + Tally::BYTES;
 
@@ -213,6 +179,7 @@ fn head(identity: &str) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io::Cursor;
 
     fn tally(k: usize) -> Tally {
         Tally { rays: 7, unresolved: k as u64, intensity: 0.1 * k as f64, ..Tally::default() }
@@ -249,23 +216,6 @@ mod tests {
         flipped[last] ^= 1;
         assert_eq!(open(flipped).1, Found::Bands(2));
         assert_eq!(open(whole).1, Found::Bands(3));
-    }
-
-    #[test]
-    fn exact_bands_of_other_journals_are_taken_in() {
-        let of = |band: usize| {
-            Journal::of_band("picture A", 5, (band, tally(band)), &[band as u8; 3]).unwrap()
-        };
-        let (mut journal, _) =
-            Journal::open(Cursor::new(filled("picture A")), "picture A", 5).unwrap();
-        assert_eq!(journal.absorb("picture A", of(4)).unwrap(), 1);
-        assert_eq!(journal.absorb("picture A", of(3)).unwrap(), 0, "it is there");
-        assert_eq!(journal.absorb("picture A", of(2)[..60].to_vec()).unwrap(), 0, "torn");
-        assert_eq!(journal.absorb("picture A", Vec::new()).unwrap(), 0);
-        let other = Journal::of_band("picture B", 5, (2, tally(2)), &[2; 3]).unwrap();
-        assert_eq!(journal.absorb("picture A", other).unwrap(), 0, "of another picture");
-        assert_eq!((journal.missing(), journal.read(4).unwrap()), (vec![2], vec![4; 3]));
-        assert_eq!(journal.absorb("picture A", filled("picture A")).unwrap(), 0);
     }
 
     #[test]

@@ -20,9 +20,16 @@ pub(super) fn add_central(
     for (k, layers) in layers.iter_mut().enumerate() {
         if k % samples == central(grid.side) {
             prepared.add_central((alpha[k % rays], beta[k % rays]), grid.size, scratch, layers)?;
+            layers.motion = within(grid.width.max(grid.height) as f64, layers.motion);
         }
     }
     Ok(())
+}
+
+/// A motion no longer than `most`: images next to the critical curve are infinitely fast where they appear.
+fn within(most: f64, [x, y]: [f64; 2]) -> [f64; 2] {
+    let length = x.hypot(y);
+    if length > most { [x, y].map(|part| part * (most / length)) } else { [x, y] }
 }
 
 /// One pixel from its rays, row by row.

@@ -56,8 +56,8 @@ const fn channel(
 
 /// The channels that pictures have only where `screen.channels` names them or their layers.
 pub static REQUESTED: [ChannelKind; 25] = [
-    channel("A", "", OPACITY, always, |l| f64::from(l.mixed.opacity)),
-    channel("coverage", "", COVERAGE, always, |l| f64::from(l.mixed.coverage)),
+    channel("A", "", OPACITY, always, |l| f64::from(l.mixed.opacity.min(1.0))),
+    channel("coverage", "", COVERAGE, always, |l| f64::from(l.mixed.coverage.min(1.0))),
     channel("Z", "M", DEPTH, lensed, |l| l.depth.unwrap_or(NOTHING)),
     channel("id", "", ID, always, |l| l.origin.map_or(0.0, |origin| f64::from(origin.source))),
     channel("emission.R", "scene unit", EMISSION, shining, |l| f64::from(l.mixed.emission()[0])),

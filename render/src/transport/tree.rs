@@ -194,6 +194,9 @@ const FINE: f64 = 0.25;
 /// A long piece that comes near more leaves than this is halved before they are tested.
 const MANY: usize = 32;
 
+/// Leaves that are taken as they are where a chord says nothing; more are held against its parts.
+const FEW: usize = 8;
+
 /// The walk of one ray through a tree.
 pub struct Walk<'a> {
     /// The tree.
@@ -211,6 +214,7 @@ pub struct Walk<'a> {
 pub struct WalkScratch {
     intervals: Vec<[f64; 2]>,
     leaves: Vec<u32>,
+    near: Vec<u32>,
 }
 
 impl Walk<'_> {
@@ -304,8 +308,37 @@ impl Walk<'_> {
             self.tree.near(ends.map(|node| node.position), epsilon, found);
         } else {
             self.tree.inside(reach + self.bound.error(reach), found);
+            if scratch.leaves.len() > FEW {
+                scratch.near.clear();
+                self.gather(ends, 0, &mut scratch.near);
+                scratch.near.sort_unstable();
+                scratch.leaves.retain(|leaf| scratch.near.binary_search(leaf).is_ok());
+            }
         }
         count <= most
+    }
+
+    /// The leaves that the parts of a piece may meet whose chord says nothing of the whole: one that ends next to the
+    /// horizon is straight where it begins.
+    fn gather(&self, [start, end]: [&Node; 2], depth: u32, leaves: &mut Vec<u32>) {
+        let points = [&start.point, &end.point];
+        let length = distance(start.position, end.position);
+        let reach = self.bound.reach(points);
+        let found = |leaf| {
+            leaves.push(leaf);
+            true
+        };
+        if self.bound.sagitta(points) <= FINE * length {
+            let positions = [start.position, end.position];
+            return self.tree.near(positions, self.bound.distance(points), found);
+        }
+        let inner = 1.0 / start.point.inverse_radius.max(end.point.inverse_radius);
+        if depth >= DEEPEST || self.bound.winds(points) && reach <= 1.5 * inner {
+            return self.tree.inside(reach + self.bound.error(reach), found);
+        }
+        let middle = Node::at(self.path, 0.5 * (start.point.mino_time + end.point.mino_time));
+        self.gather([start, &middle], depth + 1, leaves);
+        self.gather([&middle, end], depth + 1, leaves);
     }
 
     fn smallest(&self, leaves: &[u32]) -> Option<f64> {

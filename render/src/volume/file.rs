@@ -112,6 +112,25 @@ impl VolumeArrays {
         Ok(VolumeArrays { nodes, values, corners, axis: vector("axis")? })
     }
 
+    /// Corners and axis of the file, by the ranges of scenes.
+    fn check_place(&self) -> Result<()> {
+        let refuse = |message: String| Err(VolumeFileError::Content(message).into());
+        for (name, corner) in ["low", "high"].into_iter().zip(self.corners) {
+            if let Some(corner) = corner.filter(|corner| !corner.iter().all(|x| x.abs() <= 1e6)) {
+                return refuse(format!(
+                    "array {name}: {corner:?} is not allowed: three numbers in [-1e6, 1e6] (M)"
+                ));
+            }
+        }
+        let length = |axis: [f64; 3]| axis.iter().map(|x| x * x).sum::<f64>();
+        match self.axis.filter(|axis| !(1e-30..=1e30).contains(&length(*axis))) {
+            Some(axis) => refuse(format!(
+                "array axis: {axis:?} is not allowed: three numbers that are not all 0, with a length in [1e-15, 1e15]"
+            )),
+            None => Ok(()),
+        }
+    }
+
     /// The volume where the file says that it is.
     ///
     /// # Errors
@@ -122,6 +141,7 @@ impl VolumeArrays {
                 VolumeFileError::Content("arrays low and high are missing".to_owned()).into()
             );
         };
+        self.check_place()?;
         let volume = Volume::new(self.nodes, low, high, self.values)?;
         Ok(VolumeFile { volume, axis: self.axis })
     }
@@ -132,6 +152,7 @@ impl VolumeArrays {
     /// If neither says where it is, or about what it turns; if its emission is below 0.
     pub fn placed(self, source: &VolumeSource) -> Result<VolumeFile> {
         let [low, high] = self.corners;
+        self.check_place()?;
         let refuse = |message: String| Err(VolumeFileError::Content(message).into());
         let missing = |name: &str| {
             VolumeFileError::Content(format!(
@@ -150,9 +171,22 @@ impl VolumeArrays {
                 "value {value:e} of node {place:?} is not allowed: emission is 0 or more"
             ));
         }
+        if let Some(k) =
+            self.values.iter().position(|value| !shines(source.factor * f64::from(*value)))
+        {
+            let (place, value, factor) = (node(k, self.nodes), self.values[k], source.factor);
+            return refuse(format!(
+                "value {value:e} of node {place:?} is not allowed: times factor = {factor:e} it is a number in [0, 1e12]"
+            ));
+        }
         let volume = Volume::new(self.nodes, low, high, self.values)?;
         Ok(VolumeFile { volume, axis: self.axis })
     }
+}
+
+/// Whether a scene may have such an emission.
+fn shines(value: f64) -> bool {
+    (0.0..=1e12).contains(&value)
 }
 
 impl VolumeFile {

@@ -1,6 +1,7 @@
 //! Where matter that changes its radius was at the reference time.
 
 use super::sightlines::Sightlines;
+use kerrlight_geodesic::interrupt;
 use kerrlight_geodesic::vector::norm;
 use kerrlight_render::dynamics::infall::{Falling, Origin};
 use rayon::prelude::*;
@@ -17,7 +18,10 @@ pub(super) struct Fall {
 impl Fall {
     /// Of nodes.
     pub fn new(flow: &Arc<Falling>, lines: &Sightlines) -> Self {
-        let origin = |k: usize| flow.origin(norm([0, 1, 2].map(|c| lines.position[c][k])));
+        let origin = |k: usize| {
+            interrupt::check();
+            flow.origin(norm([0, 1, 2].map(|c| lines.position[c][k])))
+        };
         Self {
             flow: flow.clone(),
             origins: (0..lines.points()).into_par_iter().map(origin).collect(),

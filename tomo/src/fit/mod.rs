@@ -61,7 +61,6 @@ mod movie_loss;
 mod newton;
 mod objective;
 mod occupancy;
-pub mod parts;
 mod penalties;
 mod pixel_rays;
 mod quiescent;

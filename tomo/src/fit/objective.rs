@@ -123,17 +123,6 @@ impl<T: Float> Objective<T> {
         &self,
         field: Field<'_, T>,
         selection: Selection<'_>,
-        gradients: Gradients<'_, T>,
-        buffers: &mut Buffers<T>,
-    ) -> Loss {
-        self.share(field, (selection, selection.len()), gradients, buffers)
-    }
-
-    /// The share of a selection in the loss of `whole` pairs or frames; adds its gradient.
-    pub(super) fn share(
-        &self,
-        field: Field<'_, T>,
-        (selection, whole): (Selection<'_>, usize),
         mut gradients: Gradients<'_, T>,
         buffers: &mut Buffers<T>,
     ) -> Loss {
@@ -142,8 +131,8 @@ impl<T: Float> Objective<T> {
             buffers.of_weights.resize(self.model.points(), 0.0);
         }
         let loss = match selection {
-            Selection::Pixels(pairs) => self.pixels(field, (pairs, whole), &mut gradients, buffers),
-            Selection::Frames(all) => self.frames(field, (all, whole), &mut gradients, buffers),
+            Selection::Pixels(pairs) => self.pixels(field, pairs, &mut gradients, buffers),
+            Selection::Frames(all) => self.frames(field, all, &mut gradients, buffers),
         };
         if let Some(axis) = gradients.axis
             && self.model.is_shifted()
@@ -157,7 +146,7 @@ impl<T: Float> Objective<T> {
     fn pixels(
         &self,
         field: Field<'_, T>,
-        (pairs, whole): (&[(u32, u32)], usize),
+        pairs: &[(u32, u32)],
         gradients: &mut Gradients<'_, T>,
         buffers: &mut Buffers<T>,
     ) -> Loss {
@@ -165,7 +154,7 @@ impl<T: Float> Objective<T> {
         assert!(self.model.quiescent.is_none(), "rays do not meet all pixels of a quiescent image");
         // A mean over the pixels of the screen, of which those without a ray are zero for ever.
         let rays = self.model.rays() as f64 / self.model.pixels() as f64;
-        let scale = rays * term.inverse_variance().double() / whole as f64;
+        let scale = rays * term.inverse_variance().double() / pairs.len() as f64;
         let slope = T::of(2.0 * weight * scale);
         let Buffers { batch, workspace, of_points, of_weights, .. } = buffers;
         batch.set(pairs.iter().copied());
@@ -217,12 +206,12 @@ impl<T: Float> Objective<T> {
     fn frames(
         &self,
         field: Field<'_, T>,
-        (frames, whole): (&[usize], usize),
+        frames: &[usize],
         gradients: &mut Gradients<'_, T>,
         buffers: &mut Buffers<T>,
     ) -> Loss {
         let scales: Vec<f64> =
-            self.terms().map(|(term, _)| 1.0 / self.data_of(term, whole)).collect();
+            self.terms().map(|(term, _)| 1.0 / self.data_of(term, frames.len())).collect();
         let mut loss = Loss { terms: vec![0.0; scales.len()], ..Loss::default() };
         for &frame in frames {
             self.image_of(field, frame, buffers);

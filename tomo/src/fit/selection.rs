@@ -1,7 +1,5 @@
 //! What of the data a step looks at.
 
-use core::ops::Range;
-
 /// Which part of the data a step looks at.
 #[derive(Clone, Copy, Debug)]
 pub enum Selection<'a> {
@@ -11,7 +9,7 @@ pub enum Selection<'a> {
     Frames(&'a [usize]),
 }
 
-impl<'a> Selection<'a> {
+impl Selection<'_> {
     /// How many pairs or frames.
     pub fn len(&self) -> usize {
         match self {
@@ -23,13 +21,5 @@ impl<'a> Selection<'a> {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
-    }
-
-    /// Some that follow one another.
-    pub fn part(&self, range: Range<usize>) -> Selection<'a> {
-        match self {
-            Self::Pixels(pairs) => Self::Pixels(&pairs[range]),
-            Self::Frames(frames) => Self::Frames(&frames[range]),
-        }
     }
 }

@@ -1,8 +1,8 @@
 //! The redshift factor of gas that turns about any axis, and its derivative with respect to the axis.
 
 use super::sightlines::Sightlines;
-use kerrlight_geodesic::Kerr;
 use kerrlight_geodesic::vector::norm;
+use kerrlight_geodesic::{Kerr, interrupt};
 use kerrlight_render::dynamics::{AngularVelocity, Axis};
 use rayon::prelude::*;
 
@@ -38,6 +38,7 @@ impl Shift {
     /// Of gas on the spheres of a hole, or falling in; the sightlines must have momenta.
     pub fn new(lines: &Sightlines, hole: &Kerr, velocity: &AngularVelocity, power: f64) -> Self {
         let node = |k| {
+            interrupt::check();
             let at = |columns: &[Vec<f64>; 3]| [0, 1, 2].map(|c| columns[c][k]);
             let mut node =
                 Node::new(at(&lines.position), at(&lines.momentum), hole.spin(), velocity);

@@ -3,7 +3,6 @@
 use super::Field;
 use super::objective::{Gradients, Loss};
 use super::occupancy::Occupancy;
-use super::parts::{Cut, nodes};
 use super::penalties::Draw;
 use super::selection::Selection;
 use super::state::{Diverged, Outcome, Progress, State, step_back};
@@ -118,28 +117,13 @@ impl<T: Float> Trainer<'_, T> {
     fn of_data(&mut self, field: Field<'_, T>, step: u64, of_axis: &mut [f64; 3]) -> Loss {
         self.choose(step);
         let learnt = self.training.learns_axis(self.representation);
-        let Self { objective, training, ranks, buffers, gradient, pairs, frames, spare, .. } = self;
+        let Self { objective, training, buffers, gradient, pairs, frames, .. } = self;
         let selection = match training.batch {
             BatchSize::Pixels(_) => Selection::Pixels(pairs),
             BatchSize::Frames(_) | BatchSize::All => Selection::Frames(frames),
         };
-        if training.parts < 2 {
-            let gradients = Gradients { parameters: gradient, axis: learnt.then_some(of_axis) };
-            return objective.value_and_gradient(field, selection, gradients, buffers);
-        }
-        let parts = training.parts.min(selection.len());
-        let mut cut = Cut { objective, field, selection, learnt, parts, buffers, spare };
-        let sum = match ranks {
-            None => cut.sum(0..parts),
-            Some(ranks) => {
-                let mine = nodes(0..parts, &ranks.mine(parts));
-                let own = mine.into_iter().map(|range| cut.sum(range)).collect();
-                ranks.sum(parts, checksum(field.parameters, field.axis), own)
-            }
-        };
-        spare.push(core::mem::replace(gradient, sum.gradient));
-        of_axis.iter_mut().zip(sum.of_axis).for_each(|(axis, slope)| *axis += slope);
-        sum.loss
+        let gradients = Gradients { parameters: gradient, axis: learnt.then_some(of_axis) };
+        objective.value_and_gradient(field, selection, gradients, buffers)
     }
 
     /// Draws the pairs or frames of a step.
@@ -204,17 +188,6 @@ impl<T: Float> Trainer<'_, T> {
     pub(super) fn rate(&self, now: &Progress<T>, ahead: u64) -> f64 {
         self.part(now, ahead) * self.training.rate.rate(now.step + ahead)
     }
-}
-
-/// A checksum of what all ranks have in common before they add up their parts.
-fn checksum<T: Float>(parameters: &[T], axis: Axis) -> u32 {
-    let mut sum = crc32fast::Hasher::new();
-    for chunk in parameters.chunks(1024) {
-        let bytes: Vec<u8> = chunk.iter().flat_map(|x| (x.double() as f32).to_le_bytes()).collect();
-        sum.update(&bytes);
-    }
-    axis.vector().iter().for_each(|x| sum.update(&x.to_le_bytes()));
-    sum.finalize()
 }
 
 /// A seed for what a step draws.

@@ -6,7 +6,6 @@ mod blobs;
 mod falling_volume;
 mod leakage;
 mod orbital;
-mod parts;
 mod penalised;
 mod quasi_newton;
 mod quiescent;

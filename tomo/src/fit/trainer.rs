@@ -3,7 +3,6 @@
 use super::change_price::ChangeBuffers;
 use super::device::Delegate;
 use super::objective::{Buffers, Objective};
-use super::parts::Ranks;
 use super::penalties::ProbeBuffers;
 use super::training::Training;
 use crate::representation::{Representation, WeightMatrix};
@@ -17,8 +16,6 @@ pub struct Trainer<'a, T> {
     pub representation: &'a dyn Representation<T>,
     /// How it is run.
     pub training: Training,
-    /// Other processes that have parts of each step, if there are any.
-    pub ranks: Option<Box<dyn Ranks<T>>>,
     /// A device that takes the steps in place of this processor, if there is one.
     pub device: Option<Delegate<T>>,
     pub(super) observed: Vec<usize>,
@@ -30,8 +27,6 @@ pub struct Trainer<'a, T> {
     pub(super) matrices: Vec<WeightMatrix>,
     pub(super) pairs: Vec<(u32, u32)>,
     pub(super) frames: Vec<usize>,
-    /// Gradients of parts that are no longer used.
-    pub(super) spare: Vec<Vec<T>>,
 }
 
 impl<'a, T: Float> Trainer<'a, T> {
@@ -47,7 +42,6 @@ impl<'a, T: Float> Trainer<'a, T> {
             objective,
             representation,
             training,
-            ranks: None,
             device: None,
             observed,
             buffers: Buffers::default(),
@@ -57,7 +51,6 @@ impl<'a, T: Float> Trainer<'a, T> {
             matrices: representation.matrices(),
             pairs: Vec::new(),
             frames: Vec::new(),
-            spare: Vec::new(),
         }
     }
 }

@@ -53,9 +53,6 @@ pub struct Training {
     pub ramp: u64,
     /// Part of the data of a step.
     pub batch: BatchSize,
-    /// Parts that the data of a step are cut into: gradients of parts are summed in an order that does not depend on which
-    /// process has which ([`parts`](super::parts)). With 1 they are not cut.
-    pub parts: usize,
     /// Mask of what shines, if any.
     pub occupancy: Option<OccupancyPlan>,
     /// Penalties beside the data, if any.

@@ -282,15 +282,12 @@ fn exact_a_divergence_is_stepped_back_from() {
 #[test]
 fn what_is_not_done_is_named_with_its_key() {
     let small = problem::small();
-    let training = training(BatchSize::All, false);
-    for (key, training) in [
-        ("training.parts:", Training { parts: 2, ..training.clone() }),
-        ("training.optimiser:", Training { lbfgs: Some(Lbfgs::default()), ..training.clone() }),
-    ] {
-        let Some(device) = device() else { return };
-        let objective = objective(Kind::Images);
-        let refused = GraphicsFit::new(device, &objective, &small, &training, None);
-        let told = refused.unwrap_err().to_string();
-        assert!(told.starts_with(key) && told.contains("the processor does it"), "{told}");
-    }
+    let settings = training(BatchSize::All, false);
+    let training = Training { lbfgs: Some(Lbfgs::default()), ..settings };
+    let Some(device) = device() else { return };
+    let objective = objective(Kind::Images);
+    let refused = GraphicsFit::new(device, &objective, &small, &training, None);
+    let told = refused.unwrap_err().to_string();
+    assert!(told.starts_with("training.optimiser:"), "{told}");
+    assert!(told.contains("the processor does it"), "{told}");
 }

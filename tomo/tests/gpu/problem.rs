@@ -193,7 +193,6 @@ pub fn training(batch: BatchSize, masked: bool) -> Training {
         axis_rate: None,
         ramp: 3,
         batch,
-        parts: 1,
         occupancy: masked.then_some(OccupancyPlan { settings, warm_up: 10, every: 7 }),
         penalties: None,
         change: None,

@@ -242,7 +242,7 @@ fn judge(
         Outcome::Escaped => tally.fates[1] += 1,
         Outcome::Unresolved(Unresolved::PhotonOrbit) => tally.unresolved[0] += 1,
         Outcome::Unresolved(Unresolved::StepLimit) => tally.unresolved[1] += 1,
-        Outcome::Surface => {}
+        Outcome::Surface | Outcome::Unresolved(Unresolved::OtherHole) => {}
     }
     let unresolved = table.outcome[0].is_unresolved();
     let wrong_fate = !unresolved && table.outcome[0] != oracle.outcome();

@@ -47,15 +47,19 @@ pub fn gmst_hours(moment: Moment, ut1: Ut1) -> Result<f64, Error> {
     Ok((radians * 12.0 / core::f64::consts::PI).rem_euclid(24.0))
 }
 
-/// Hours of UTC on a day at which Greenwich mean sidereal time is `gmst` hours, counted from the
-/// sidereal time of the day's 0 h (eht-imaging's rule: a sidereal time before that one is of the
-/// day before).
+/// A mean sidereal day in hours, as a multiple of 2⁻⁴⁰, so that adding it keeps the last digits of differences of hours.
+const SIDEREAL_DAY_H: f64 = 23.934469444435308;
+
+/// Hours of UTC at which Greenwich mean sidereal time is `gmst` hours, in an observation whose first time is `first`
+/// hours, taken modulo 24: that one lies between 0 h and 24 h UTC of the day `mjd`.
 ///
 /// # Errors
 /// If the day is out of range or its UT1 − UTC not known.
-pub fn hours_utc_of_gmst(mjd: i32, gmst: f64, ut1: Ut1) -> Result<f64, Error> {
+pub fn hours_utc_of_gmst(mjd: i32, gmst: f64, first: f64, ut1: Ut1) -> Result<f64, Error> {
     let midnight = gmst_hours(Moment { mjd, hours_utc: 0.0 }, ut1)?;
-    Ok((gmst - midnight) * SOLAR_PER_SIDEREAL)
+    let is_before = first.rem_euclid(24.0) < midnight;
+    let day = if is_before { SIDEREAL_DAY_H } else { 0.0 };
+    Ok((gmst - midnight) * SOLAR_PER_SIDEREAL + day)
 }
 
 #[cfg(test)]
@@ -75,12 +79,23 @@ mod tests {
         assert!((table - 17.041_752_810_209).abs() < 3e-10, "{table}");
     }
 
+    /// Also where the day's 0 h UTC has a later sidereal time: the first time lies in the day that is asked for.
     #[test]
     fn exact_gmst_and_back() {
-        let utc = hours_utc_of_gmst(57851, 20.0, Ut1::Table).unwrap();
-        let gmst = gmst_hours(Moment { mjd: 57851, hours_utc: utc }, Ut1::Table).unwrap();
-        // Eleven digits of the ratio, and the drift of UT1 over the day.
-        assert!((gmst - 20.0).abs() < 1e-6, "{gmst}");
+        for mjd in [57850, 57851, 57950, 58100] {
+            for first in 0..24 {
+                let gmst = |later: f64| f64::from(first) + later;
+                let utc = |later: f64| {
+                    hours_utc_of_gmst(mjd, gmst(later), gmst(0.0), Ut1::Table).unwrap()
+                };
+                assert!((0.0..24.0).contains(&utc(0.0)), "{mjd}, {first}: {}", utc(0.0));
+                assert!((utc(4.0) - utc(0.0) - 4.0 * SOLAR_PER_SIDEREAL).abs() < 1e-13);
+                let back = gmst_hours(Moment { mjd, hours_utc: utc(4.0) }, Ut1::Table).unwrap();
+                // Eleven digits of the ratio, and the drift of UT1 over the day.
+                let miss = (back - gmst(4.0) + 12.0).rem_euclid(24.0) - 12.0;
+                assert!(miss.abs() < 1e-6, "{mjd}, {first}: {miss}");
+            }
+        }
     }
 
     #[test]

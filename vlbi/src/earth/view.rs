@@ -48,7 +48,8 @@ pub enum Frame {
     #[default]
     Catalogue,
     /// Precession and nutation to date (IAU 2006/2000A) and the annual aberration, u and v along east
-    /// and north of the ICRS; without polar motion (below 0.5″).
+    /// and north of the ICRS; without polar motion (below 0.5″) and without the aberration's change of scale
+    /// (1 − v·s/c, up to 1e-4 of u and v).
     OfDate,
 }
 

@@ -19,9 +19,20 @@ pub enum EhtTable {
 /// and σ to 8 decimals, (u, v) and phase (degrees) to 4, the frequency of the heading to 0.1 MHz.
 ///
 /// # Errors
-/// If the date or the frequency is not known, or there are several spectral channels.
+/// If the date or the frequency is not known, there are several spectral channels, something is not a finite number, or an
+/// error has no digit of these.
 pub fn to_eht_table(observation: &Observation, style: EhtTable) -> Result<String, Error> {
     super::one_channel(observation)?;
+    super::check_numbers(observation)?;
+    let is_lost = |sigma: f64| sigma > 0.0 && sigma < 5e-9;
+    if let Some((row, i)) = observation.stokes_i().find(|(_, i)| is_lost(i.noise_sigma)) {
+        let ([a, b], sigma) = (observation.names(row), i.noise_sigma);
+        let message = format!(
+            "sigma of {a}-{b} at {} h = {sigma:e} Jy: this format has 8 decimals",
+            row.time_h
+        );
+        return Err(super::FileError::whole(message).into());
+    }
     let mjd = observation.mjd.ok_or(Unknown("the date (MJD)"))?;
     let frequency = observation.frequency_hz.ok_or(Unknown("the frequency"))? / 1e9;
     let source = observation.source.replace([' ', ','], "_");

@@ -2,58 +2,85 @@
 
 use super::FileError;
 use super::fits::{Header, Unit};
+use super::fits_axes::{self, Place};
 use crate::Error;
 use crate::operator::ImageGrid;
-use crate::simulate::Movie;
+use crate::simulate::{Movie, StokesMovie};
 
-/// Reads the image of a file's first unit: two axes longer than 1 (right ascension and
-/// declination, square pixels given in degrees by CDELT1 and CDELT2), of Jy/pixel, the first
-/// polarisation and frequency. Rows are brought from south up to north first.
+/// Reads the images of a file: two axes longer than 1 (right ascension and declination, square pixels given in degrees
+/// by CDELT1 and CDELT2), of Jy/pixel, of one frequency. Stokes parameters are planes of an axis STOKES, or units of their
+/// own that are named Q, U and V; an image that does not say is Stokes I. Rows are brought from south up to north first.
 ///
 /// # Errors
-/// If the file is damaged, no image, of another unit, or holds values that are not finite.
-pub fn read(bytes: &[u8]) -> Result<Movie, Error> {
-    let unit = Unit::read(bytes, 0)?;
-    let header = &unit.header;
-    let axes = header.axes()?;
-    let (Some(&width), Some(&height)) = (axes.first(), axes.get(1)) else {
-        return Err(header.error("NAXIS", "2 or more: an image").into());
+/// If the file is damaged, no image, of another unit, without Stokes I, holds values that are not finite, or a card says
+/// of the image what is not read: rotation, a reference pixel off the middle, further axes.
+pub fn read(bytes: &[u8]) -> Result<StokesMovie, Error> {
+    let first = Unit::read(bytes, 0)?;
+    let place = fits_axes::place(&first.header)?;
+    let mut planes = [None, None, None, None];
+    take(&first, &place, &mut planes)?;
+    let mut next = first.next;
+    // What follows the units and begins otherwise is allowed, and means nothing.
+    while bytes[next..].starts_with(b"XTENSION") {
+        let unit = Unit::read(bytes, next)?;
+        next = unit.next;
+        if !is_image(&unit.header) {
+            continue;
+        }
+        let other = fits_axes::place(&unit.header)?;
+        if other.grid != place.grid || other.east_to_west != place.east_to_west {
+            let message = "other pixels than the file's first image";
+            return Err(unit.header.error("NAXIS1", message).into());
+        }
+        if other.stokes.is_none() {
+            let message =
+                "an image named I, Q, U or V (EXTNAME or STOKES): what this one is it does not say";
+            return Err(unit.header.error("EXTNAME", message).into());
+        }
+        take(&unit, &other, &mut planes)?;
+    }
+    let [i, q, u, v] = planes;
+    let Some(i) = i else {
+        return Err(
+            FileError::whole("holds no Stokes I (CRVAL of the axis STOKES, or STOKES)").into()
+        );
     };
-    if header.is_true("GROUPS") || width == 0 {
-        return Err(FileError::whole("visibilities (UVFITS), not an image").into());
+    if q.is_some() != u.is_some() {
+        return Err(
+            FileError::whole("holds one of Stokes Q and U: both are needed, or none").into()
+        );
     }
-    let unit_name = header.text("BUNIT").unwrap_or_default().to_ascii_uppercase();
-    if unit_name.trim() != "JY/PIXEL" {
-        return Err(header.error("BUNIT", "JY/PIXEL").into());
-    }
-    let (east_to_west, pixel_rad) = pixel(header)?;
-    let field_rad = pixel_rad * width as f64;
-    if !(field_rad > 0.0 && field_rad < 1.0) {
-        let degrees = field_rad.to_degrees();
-        let message = format!("{width} pixels span {degrees} degrees, in (0, 57.29) is expected");
-        return Err(header.error("CDELT1", message).into());
-    }
-    let grid =
-        ImageGrid::new(width, height, field_rad).map_err(|error| header.error("NAXIS1", error))?;
-    let values = values(&unit, grid.pixels())?;
-    let pixels = (0..height)
-        .rev()
-        .flat_map(|row| {
-            let row = &values[row * width..(row + 1) * width];
-            (0..width).map(move |k| if east_to_west { row[k] } else { row[width - 1 - k] })
-        })
-        .collect();
-    Ok(Movie { grid, pixels })
+    Ok(StokesMovie { i: Movie { grid: place.grid, pixels: i }, polarized: [q, u, v] })
 }
 
-/// Whether columns run from east to west, and the side of a pixel in radians.
-fn pixel(header: &Header<'_>) -> Result<(bool, f64), FileError> {
-    let step = |keyword| header.number(keyword).map(|step| step.unwrap_or(0.0));
-    let (east, north) = (step("CDELT1")?, step("CDELT2")?);
-    if (east.abs() - north.abs()).abs() > 1e-6 * north.abs() || north <= 0.0 {
-        return Err(header.error("CDELT2", "positive degrees, and square pixels with CDELT1"));
+/// Whether an extension is an image with pixels, rather than a table.
+fn is_image(header: &Header<'_>) -> bool {
+    let is_image = header.text("XTENSION").is_some_and(|kind| kind.trim() == "IMAGE");
+    is_image && header.axes().is_ok_and(|axes| axes.len() >= 2)
+}
+
+/// Reads all planes of a unit into those of I, Q, U and V.
+fn take(
+    unit: &Unit<'_>,
+    place: &Place,
+    planes: &mut [Option<Vec<f64>>; 4],
+) -> Result<(), FileError> {
+    let ImageGrid { width, height, .. } = place.grid;
+    let only = [0];
+    let stokes = place.stokes.as_deref().unwrap_or(&only);
+    let values = values(unit, place.grid.pixels() * stokes.len())?;
+    for (k, values) in stokes.iter().zip(values.chunks_exact(place.grid.pixels())) {
+        let row = |row: usize| {
+            let row = &values[row * width..(row + 1) * width];
+            (0..width).map(move |k| if place.east_to_west { row[k] } else { row[width - 1 - k] })
+        };
+        let there = planes[*k].replace((0..height).rev().flat_map(row).collect());
+        if there.is_some() {
+            let name = fits_axes::STOKES[*k];
+            return Err(FileError::whole(format!("holds two images of Stokes {name}")));
+        }
     }
-    Ok((east < 0.0, east.abs().to_radians()))
+    Ok(())
 }
 
 /// The first `count` numbers of the data.
@@ -66,6 +93,7 @@ fn values(unit: &Unit<'_>, count: usize) -> Result<Vec<f64>, FileError> {
         return Err(header.error("BITPIX", "16, 32, -32 or -64 in an image"));
     }
     let float = header.integer("BITPIX")? < Some(0);
+    let blank = if float { None } else { header.number("BLANK")? };
     // `Unit` has seen to it that all axes' data are there; one of length 0 leaves none.
     let data = unit.data.get(..count * size);
     let data = data.ok_or_else(|| header.error("NAXIS", "axes of positive length"))?;
@@ -76,7 +104,7 @@ fn values(unit: &Unit<'_>, count: usize) -> Result<Vec<f64>, FileError> {
             (true, &[a, b, c, d]) => f32::from_be_bytes([a, b, c, d]).into(),
             (_, cell) => f64::from_be_bytes(cell.try_into().unwrap_or([0; 8])),
         };
-        let value = stored * scale + zero;
+        let value = if blank == Some(stored) { f64::NAN } else { stored * scale + zero };
         if f64::is_finite(value) {
             Ok(value)
         } else {
@@ -87,50 +115,4 @@ fn values(unit: &Unit<'_>, count: usize) -> Result<Vec<f64>, FileError> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::fits::{Cards, padded};
-    use super::*;
-
-    /// Two rows of three pixels, the southern row first.
-    fn file(east_step: f64) -> Vec<u8> {
-        let mut cards = Cards::default();
-        cards.value("SIMPLE", "T").value("BITPIX", -64).value("NAXIS", 3);
-        cards.value("NAXIS1", 3).value("NAXIS2", 2).value("NAXIS3", 1).text("BUNIT", "JY/PIXEL");
-        cards.number("CDELT1", east_step).number("CDELT2", 1e-9);
-        let mut bytes = cards.finish();
-        let values = [4.0, 5.0, 6.0, 1.0, 2.0, 3.0f64];
-        bytes.extend(padded(values.iter().flat_map(|x| x.to_be_bytes()).collect(), 0));
-        bytes
-    }
-
-    #[test]
-    fn exact_north_comes_first_and_east_is_left() {
-        let movie = read(&file(-1e-9)).unwrap();
-        assert_eq!(movie.pixels, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
-        assert!((movie.grid.pixel_rad / 1e-9f64.to_radians() - 1.0).abs() < 1e-15);
-        assert_eq!(read(&file(1e-9)).unwrap().pixels, [3.0, 2.0, 1.0, 6.0, 5.0, 4.0]);
-        assert!(read(&file(-2e-9)).unwrap_err().to_string().contains("square"));
-    }
-
-    #[test]
-    fn exact_damaged_files_are_errors() {
-        let good = file(-1e-9);
-        for end in 0..good.len() {
-            assert!(read(&good[..end]).is_err(), "{end}");
-        }
-        let text = |from: &str, to: &str| {
-            let at = good.windows(from.len()).position(|w| w == from.as_bytes()).unwrap();
-            let mut bytes = good.clone();
-            bytes[at..at + to.len()].copy_from_slice(to.as_bytes());
-            read(&bytes).unwrap_err().to_string()
-        };
-        assert!(text("JY/PIXEL", "JY/BEAM ").contains("JY/PIXEL"));
-        assert!(
-            text("NAXIS1  =                    3", "NAXIS1  = 99999999999999999999")
-                .contains("NAXIS1")
-        );
-        let mut nan = good.clone();
-        nan[2880..2888].copy_from_slice(&f64::NAN.to_be_bytes());
-        assert!(read(&nan).unwrap_err().to_string().contains("byte 2880: a pixel is NaN"));
-    }
-}
+mod tests;

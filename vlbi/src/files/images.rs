@@ -3,7 +3,7 @@
 use super::FileError;
 use crate::Error;
 use crate::operator::ImageGrid;
-use crate::simulate::Movie;
+use crate::simulate::{Movie, StokesMovie};
 use kerrlight_common::frames::{Frames, Sink};
 use kerrlight_common::memory;
 use kerrlight_common::numpy::{
@@ -22,8 +22,10 @@ pub struct Pixels {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Jy/pixel, image after image, rows from the north.
+    /// Stokes I in Jy/pixel, image after image, rows from the north.
     pub values: Vec<f64>,
+    /// Q, U and V, as far as the file has them.
+    pub polarized: [Option<Vec<f64>>; 3],
     /// Width of the field in µas, where the file tells.
     pub field_uas: Option<f64>,
     /// When the images show the source.
@@ -46,16 +48,21 @@ impl Pixels {
     /// The movie on a field of this width in microarcseconds.
     ///
     /// # Errors
-    /// If the field is out of range, or a pixel is not finite.
-    pub fn movie(self, field_uas: f64) -> Result<Movie> {
+    /// If the field is out of range, a pixel is not finite, or there is one of Q and U.
+    pub fn movie(self, field_uas: f64) -> Result<StokesMovie> {
         let grid = ImageGrid::new(self.width, self.height, field_uas * MICROARCSECOND);
         let grid = grid.map_err(|error| FileError::whole(error.to_string()))?;
-        self.all_finite()?;
-        Ok(Movie { grid, pixels: self.values })
-    }
-
-    fn all_finite(&self) -> Result<()> {
-        all_finite(&self.values, [self.width, self.height])
+        let size = [self.width, self.height];
+        all_finite(&self.values, size)?;
+        for (name, values) in ["Q", "U", "V"].iter().zip(&self.polarized) {
+            let named = |error: FileError| FileError::whole(format!("Stokes {name}: {error}"));
+            values.iter().try_for_each(|values| all_finite(values, size).map_err(named))?;
+        }
+        if self.polarized[0].is_some() != self.polarized[1].is_some() {
+            return Err(FileError::whole("has one of Stokes Q and U: both are needed, or none"));
+        }
+        let i = Movie { grid, pixels: self.values };
+        Ok(StokesMovie { i, polarized: self.polarized })
     }
 }
 
@@ -301,5 +308,19 @@ mod tests {
         assert!(fail("1,2\n3\n").contains("line 2: 1 pixels"));
         assert!(fail("#\n1,x\n").contains("line 2, column 2: `x`"));
         assert!(fail("# nothing\n").contains("no pixels"));
+    }
+
+    /// Planes of numbers that are not finite, and Q without U, are refused by name.
+    #[test]
+    fn exact_polarised_pixels_are_checked() {
+        let of = |polarized| {
+            let pixels =
+                Pixels { width: 1, height: 1, values: vec![1.0], polarized, ..Pixels::default() };
+            pixels.movie(10.0)
+        };
+        assert!(of([Some(vec![0.5]), Some(vec![0.25]), None]).is_ok());
+        let message = of([Some(vec![0.5]), Some(vec![f64::NAN]), None]).unwrap_err().to_string();
+        assert!(message.contains("Stokes U: row 1, column 1"), "{message}");
+        assert!(of([Some(vec![0.5]), None, None]).unwrap_err().to_string().contains("Q and U"));
     }
 }

@@ -4,6 +4,7 @@
 mod comments;
 mod eht_table;
 mod fits;
+mod fits_axes;
 mod fits_image;
 mod gains;
 pub mod images;
@@ -11,6 +12,7 @@ mod leakage;
 mod light_curve;
 mod obs_text;
 mod table;
+mod text_image;
 mod uvfits;
 
 pub use comments::write as observation_comments;
@@ -23,6 +25,7 @@ pub use light_curve::{
 };
 pub use obs_text::{parse as parse_obs_text, to_text as to_obs_text};
 pub use table::{COLUMNS as TABLE_COLUMNS, parse as parse_table, to_csv};
+pub use text_image::{is_text_image, parse as parse_text_image};
 pub use uvfits::{read as read_uvfits, write as write_uvfits};
 
 use super::array::{MOST_STATIONS, Station};
@@ -106,10 +109,40 @@ pub fn decode(bytes: &[u8]) -> Result<(Format, Observation), Error> {
     let text = core::str::from_utf8(bytes).map_err(|error| {
         FileError::byte(error.valid_up_to(), "neither UVFITS nor a text of visibilities")
     })?;
+    let text = without_mark(text);
     if obs_text::is_obs_text(text) {
         return Ok((Format::ObsText, parse_obs_text(text)?));
     }
     Ok((Format::Table, parse_table(text)?))
+}
+
+/// Refuses to write what is no number, and names it.
+fn check_numbers(observation: &Observation) -> Result<(), FileError> {
+    for row in &observation.rows {
+        let [a, b] = observation.names(row);
+        let refuse = |what: &str, value: String| {
+            let message =
+                format!("{what} of {a}-{b} at {} h = {value} is not a finite number", row.time_h);
+            Err(FileError::whole(message))
+        };
+        if !(row.time_h.is_finite() && row.uv.iter().all(|x| x.is_finite())) {
+            return refuse("(u, v)", format!("{:?}", row.uv));
+        }
+        for product in (0..4).filter_map(|k| row.product(k)) {
+            if !product.visibility.is_finite() {
+                return refuse("the visibility", product.visibility.to_string());
+            }
+            if !product.noise_sigma.is_finite() {
+                return refuse("sigma", product.noise_sigma.to_string());
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A text without the byte order mark that spreadsheets and editors of Windows put before it.
+pub(crate) fn without_mark(text: &str) -> &str {
+    text.strip_prefix('\u{feff}').unwrap_or(text)
 }
 
 /// Refuses several spectral channels, for which a format has no column.
@@ -192,7 +225,7 @@ mod tests {
         let eht = "#SRC:M87,DATE(MJD):57853,FREQ:229.0707GHz\n\
             #time(UTC),T1,T2,U(lambda),V(lambda),Iamp(Jy),Iphase(d),Isigma(Jy)\n\
             02.15138894,AA,LM,1868288384.0,-3689129984.0,0.01103669,-122.7523,0.00446794\n";
-        let csv = to_csv(&small, true);
+        let csv = to_csv(&small, true).unwrap();
         vec![to_obs_text(&small).unwrap(), csv, eht.to_owned()]
     }
 
@@ -205,10 +238,47 @@ mod tests {
             (format(csv.as_bytes()), format(eht.as_bytes())),
             (Format::Table, Format::Table)
         );
+        for text in [obs, csv, eht] {
+            let marked = format!("\u{feff}{text}");
+            let all = |text: &str| format!("{:?}", decode(text.as_bytes()).unwrap());
+            assert_eq!(all(&marked), all(text));
+        }
         let uvfits = write_uvfits(&uvfits::tests::small()).unwrap();
         assert_eq!(format(&uvfits), Format::Uvfits);
         let message = decode(&[0x89, b'P', b'N', b'G', 0xff]).unwrap_err().to_string();
         assert!(message.contains("neither UVFITS"), "{message}");
+    }
+
+    /// No format holds what is no number, or what its digits cannot tell from nothing.
+    #[test]
+    fn exact_numbers_that_are_none_are_not_written() {
+        let written = |value: f64, sigma: f64| {
+            let mut observation = uvfits::tests::small();
+            observation.rows[1].products[0].re = value;
+            observation.rows[1].noise_sigma[0] = sigma;
+            let texts = [
+                to_csv(&observation, false),
+                to_obs_text(&observation),
+                to_eht_table(&observation, EhtTable::Csv),
+            ];
+            let texts = texts.into_iter().map(|text| text.map(String::into_bytes));
+            let all = texts.chain([write_uvfits(&observation)]);
+            all.map(|bytes| bytes.err().map(|error| error.to_string())).collect::<Vec<_>>()
+        };
+        for (value, sigma) in [(f64::NAN, 0.1), (f64::INFINITY, 0.1), (1.0, f64::INFINITY)] {
+            for message in written(value, sigma) {
+                let message = message.expect("it is no number");
+                assert!(message.contains("not a finite number"), "{message}");
+            }
+        }
+        let tiny = written(1.0, 1e-300);
+        assert!(tiny[0].is_none() && tiny[1].is_none(), "{tiny:?}");
+        assert!(tiny[2].as_ref().unwrap().contains("8 decimals"), "{tiny:?}");
+        assert!(tiny[3].as_ref().unwrap().contains("single precision"), "{tiny:?}");
+        let huge = written(1.0, 1e300);
+        assert!(huge[..3].iter().all(Option::is_none), "{huge:?}");
+        assert!(huge[3].as_ref().unwrap().contains("single precision"), "{huge:?}");
+        assert!(written(1e39, 0.1)[3].as_ref().unwrap().contains("single precision"));
     }
 
     /// Cut anywhere, or with bytes changed, a text is an error or data, never a panic.

@@ -80,8 +80,13 @@ fn read_heading(
             }
             observation.mjd = Some(mjd as i32);
         }
-        "RF:" => observation.frequency_hz = Some(positive(first(), "RF")? * 1e9),
-        "BW:" => observation.bandwidth_hz = Some(positive(first(), "BW")? * 1e9),
+        "RF:" => observation.frequency_hz = Some(gigahertz(&words, "RF")?),
+        "BW:" => observation.bandwidth_hz = Some(gigahertz(&words, "BW")?),
+        key @ ("PHASECAL:" | "AMPCAL:" | "OPACITYCAL:" | "DCAL:" | "FRCAL:") => {
+            if matches!(first(), "0" | "False") {
+                observation.history.push(format!("{key} 0"));
+            }
+        }
         "time" => {
             observation.basis = match words.get(11) {
                 Some(&"Iamp") => Basis::Stokes,
@@ -116,9 +121,16 @@ fn checked(ra_hours: f64, dec_deg: f64) -> Result<SourcePosition, String> {
     SourcePosition::new(ra_hours, dec_deg).map_err(|error| error.to_string())
 }
 
-fn positive(cell: &str, name: &str) -> Result<f64, String> {
-    let value = number(cell, name)?;
-    if value > 0.0 { Ok(value) } else { Err(format!("{name} = {value} GHz must be positive")) }
+/// `230.0 GHz`, in Hz.
+fn gigahertz(words: &[&str], name: &str) -> Result<f64, String> {
+    let value = number(words.get(1).copied().unwrap_or_default(), name)?;
+    match words.get(2) {
+        Some(unit) if *unit != "GHz" => {
+            Err(format!("{name} in `{}` is not allowed: GHz", super::shortened(unit)))
+        }
+        _ if value > 0.0 => Ok(value * 1e9),
+        _ => Err(format!("{name} = {value} GHz must be positive")),
+    }
 }
 
 /// `17 h 45 m 40.036 s`, `-29 deg 0 m 28.2 s`.
@@ -165,9 +177,13 @@ fn row(line: &str, names: &Names) -> Result<Row, String> {
     if noise_sigma.iter().all(|sigma| sigma.is_nan()) {
         return Err("none of the four products has a visibility and an error".to_owned());
     }
+    let integration_s = value(1, "tint")?;
+    if !(0.0..=1e9).contains(&integration_s) {
+        return Err(format!("tint = {integration_s} s is not allowed: [0, 1e9]"));
+    }
     Ok(Row {
         time_h: value(0, "time")?,
-        integration_s: value(1, "tint")?,
+        integration_s,
         stations: [station(2)?, station(3)?],
         uv: [value(6, "u")?, value(7, "v")?],
         products,
@@ -180,10 +196,11 @@ fn row(line: &str, names: &Names) -> Result<Row, String> {
 /// The observation as eht-imaging's text, numbers with all their digits.
 ///
 /// # Errors
-/// If the source's position, the date or the frequency is not known, or there are several spectral
-/// channels.
+/// If the source's position, the date or the frequency is not known, there are several spectral
+/// channels, or something is not a finite number.
 pub fn to_text(observation: &Observation) -> Result<String, Error> {
     super::one_channel(observation)?;
+    super::check_numbers(observation)?;
     let position =
         observation.position.ok_or(Unknown("the source's right ascension and declination"))?;
     let mjd = observation.mjd.ok_or(Unknown("the date (MJD)"))?;
@@ -285,6 +302,15 @@ mod tests {
             fail(&good.replace("# MJD: 57850", "# MJD: soon")).starts_with("line 4: MJD `soon`")
         );
         assert!(fail(&good.replace("# MJD: 57850\n", "")).contains("lacks"));
+        assert!(fail(&good.replace("230 GHz", "230 MHz")).contains("RF in `MHz` is not allowed"));
+        let row = good.lines().last().unwrap();
+        let cells: Vec<&str> = row.split_whitespace().collect();
+        for tint in ["1e300", "-1"] {
+            let changed = [&cells[..1], &[tint], &cells[2..]].concat().join(" ");
+            assert!(fail(&good.replace(row, &changed)).contains("tint = "), "{tint}");
+        }
+        let history = parse(&good.replace("FRCAL: 1", "FRCAL: 0")).unwrap().history;
+        assert_eq!(history, ["FRCAL: 0"]);
         let message = fail(&format!("{good}1 2 3\n"));
         assert!(message.starts_with(&format!("line {}: 3 columns", last + 1)), "{message}");
         assert!(fail(&good.replace(" AA CC ", " AA XX ")).contains("station `XX`"));

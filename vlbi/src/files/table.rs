@@ -165,7 +165,11 @@ fn row(cells: &[&str], heading: &Heading, names: &mut Names) -> Result<Option<Ro
 /// `comments`, lines that start with `#` stand before it and tell source, date, frequencies,
 /// stations and history. Several spectral channels have a further column `channel`, and comments
 /// in any case.
-pub fn to_csv(observation: &Observation, comments: bool) -> String {
+///
+/// # Errors
+/// If a time, (u, v), visibility or error is not a finite number.
+pub fn to_csv(observation: &Observation, comments: bool) -> Result<String, Error> {
+    super::check_numbers(observation)?;
     let several = !observation.channels.is_empty();
     let mut text = if comments || several { comments::write(observation) } else { String::new() };
     text += &COLUMNS.join(",");
@@ -178,7 +182,7 @@ pub fn to_csv(observation: &Observation, comments: bool) -> String {
         let _ = write!(text, "{time_h},{t1},{t2},{u},{v},{re},{im},{noise_sigma}");
         let _ = if several { writeln!(text, ",{}", row.channel) } else { writeln!(text) };
     }
-    text
+    Ok(text)
 }
 
 #[cfg(test)]
@@ -208,7 +212,7 @@ mod tests {
     #[test]
     fn exact_round_trip() {
         let observation = parse(EHT).unwrap();
-        let back = parse(&to_csv(&observation, true)).unwrap();
+        let back = parse(&to_csv(&observation, true).unwrap()).unwrap();
         assert_eq!(format!("{back:?}"), format!("{observation:?}"));
     }
 
@@ -224,7 +228,7 @@ mod tests {
         for row in &mut observation.rows {
             (row.integration_s, row.opacity) = (0.0, [0.0; 2]);
         }
-        let text = to_csv(&observation, true);
+        let text = to_csv(&observation, true).unwrap();
         let back = parse(&text).unwrap();
         assert_eq!(format!("{back:?}"), format!("{observation:?}"));
         assert!(text.contains("\ntime_utc_h,t1,t2,u,v,re,im,sigma,channel\n"), "{text}");

@@ -1,47 +1,79 @@
-//! Coherent averages over time.
+//! Coherent averages over time and channels.
 
-use super::{Basis, Observation, Row};
+use super::scans::{Intervals, SHORTEST_S};
+use super::{Basis, Measured, Observation, Row};
 use crate::Complex64;
 use std::collections::BTreeMap;
 
-impl Observation {
-    /// Averages every baseline and channel over intervals of `seconds`, which start at multiples of their
+/// How rows are averaged over time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Averaging {
+    /// Length of an interval in seconds; with `in_scans` it may be infinite: whole scans.
+    pub seconds: f64,
+    /// Whether intervals count from the start of each scan and end with it. Otherwise they start at multiples of their
     /// length since 0 h UTC.
+    pub in_scans: bool,
+    /// Whether products count by 1/σ². Otherwise means are plain, as in eht-imaging.
+    pub weighted: bool,
+}
+
+impl Averaging {
+    /// Weighted by 1/σ², over intervals of the clock.
+    pub fn over(seconds: f64) -> Self {
+        Averaging { seconds, in_scans: false, weighted: true }
+    }
+
+    /// The range of lengths, or infinity for whole scans: shorter ones would be below the resolution of times.
+    pub fn is_allowed(&self) -> bool {
+        (SHORTEST_S..=1e9).contains(&self.seconds) || self.in_scans && self.seconds == f64::INFINITY
+    }
+
+    /// What it did, in a line.
+    fn told(&self) -> String {
+        let length = match self.seconds.is_finite() {
+            true => format!(" over {} s", self.seconds),
+            false => String::new(),
+        };
+        let of = if self.in_scans { " of scans" } else { "" };
+        let plain = if self.weighted { "" } else { ", plain" };
+        format!("coherent averages{of}{length}{plain}")
+    }
+}
+
+impl Observation {
+    /// Averages every baseline and channel over intervals. All rows of an interval get one time, the mean of those of
+    /// their baselines, so that baselines that were measured in different parts of an interval close.
     ///
     /// Products are means weighted by 1/σ², so that σ of a mean is 1/√(Σ 1/σ²); times and (u, v)
     /// are means weighted by integration time, which adds up. Products that were not measured
-    /// ([`Measured::is_placeholder`](super::Measured::is_placeholder)) do not count; where other errors are zero, means are plain and
-    /// σ is √(Σσ²)/n.
+    /// ([`Measured::is_placeholder`](super::Measured::is_placeholder)) do not count; where other errors are zero, or
+    /// without weights, means are plain and σ is √(Σσ²)/n. Rows that repeat others count as in
+    /// [`with_repeats_merged`](Self::with_repeats_merged).
     #[must_use]
-    pub fn averaged(&self, seconds: f64) -> Self {
-        let mut bins: BTreeMap<(i64, [u16; 2], u16), Vec<Row>> = BTreeMap::new();
-        for row in self.rows.iter().map(|row| self.ordered(row)) {
-            // Saturates for times beyond reason.
-            let bin = (row.time_h * 3600.0 / seconds).floor() as i64;
-            bins.entry((bin, row.stations, row.channel)).or_default().push(row);
+    pub fn averaged(&self, averaging: Averaging) -> Self {
+        let merged = self.with_repeats_merged();
+        let intervals = Intervals::of(&merged.rows, averaging);
+        let mut bins: BTreeMap<([i64; 2], [u16; 2], u16), Vec<Row>> = BTreeMap::new();
+        for row in merged.rows.iter().map(|row| merged.ordered(row)) {
+            bins.entry((intervals.at(row.time_h), row.stations, row.channel))
+                .or_default()
+                .push(row);
         }
-        let mut observation = self.clone_without_rows();
-        observation.rows = bins.values().map(|rows| mean(rows)).collect();
-        observation.history.push(format!("coherent averages over {seconds} s"));
-        observation
-    }
-
-    /// The same, with one time for all rows of an interval, the mean of theirs: baselines that were
-    /// measured in different parts of an interval belong to one scan, and close.
-    #[must_use]
-    pub fn averaged_in_scans(&self, seconds: f64) -> Self {
-        let mut observation = self.averaged(seconds);
-        // Means lie in their interval but for rounding, which must not tear a scan.
-        let bin = |row: &Row| (row.time_h * 3600.0 / seconds + 1e-6).floor() as i64;
-        for scan in observation.rows.chunk_by_mut(|a, b| bin(a) == bin(b)) {
-            let time_h = scan.iter().map(|row| row.time_h).sum::<f64>() / scan.len() as f64;
-            scan.iter_mut().for_each(|row| row.time_h = time_h);
+        let mut observation = merged.clone_without_rows();
+        let all: Vec<_> = bins.iter().collect();
+        for interval in all.chunk_by(|((a, ..), _), ((b, ..), _)| a == b) {
+            let mut rows: Vec<Row> =
+                interval.iter().map(|(_, rows)| mean(rows, averaging.weighted)).collect();
+            let time_h = rows.iter().map(|row| row.time_h).sum::<f64>() / rows.len() as f64;
+            rows.iter_mut().for_each(|row| row.time_h = time_h);
+            observation.rows.extend(rows);
         }
+        observation.history.push(averaging.told());
         observation
     }
 
     /// A row with its stations in the array's order.
-    fn ordered(&self, row: &Row) -> Row {
+    pub(super) fn ordered(&self, row: &Row) -> Row {
         if row.stations[0] <= row.stations[1] { *row } else { row.swapped(self.basis) }
     }
 
@@ -55,7 +87,7 @@ impl Observation {
         };
         // Bits of positive doubles are ordered as they are, those of negative ones consistently.
         let mut bins: BTreeMap<(u64, [u16; 2]), Vec<Row>> = BTreeMap::new();
-        for mut row in self.rows.iter().map(|row| self.ordered(row)) {
+        for mut row in self.with_repeats_merged().rows.iter().map(|row| self.ordered(row)) {
             let scale = self.frequency_of(&row).map_or(1.0, |frequency| reference / frequency);
             row.uv = row.uv.map(|x| x * scale);
             row.channel = 0;
@@ -63,7 +95,7 @@ impl Observation {
         }
         let mean_of = |rows: &Vec<Row>| {
             let Row { time_h, integration_s, .. } = rows[0];
-            Row { time_h, integration_s, ..mean(rows) }
+            Row { time_h, integration_s, ..mean(rows, true) }
         };
         observation.rows = bins.values().map(mean_of).collect();
         observation.channels.clear();
@@ -96,7 +128,7 @@ impl Observation {
 }
 
 /// The mean of rows of one baseline.
-fn mean(rows: &[Row]) -> Row {
+pub(super) fn mean(rows: &[Row], weighted: bool) -> Row {
     let total: f64 = rows.iter().map(|row| row.integration_s).sum();
     let weight = |row: &Row| {
         if total > 0.0 { row.integration_s / total } else { 1.0 / rows.len() as f64 }
@@ -109,33 +141,57 @@ fn mean(rows: &[Row]) -> Row {
         ..rows[0]
     };
     for k in 0..4 {
-        (result.products[k], result.noise_sigma[k]) = mean_product(rows, k);
+        (result.products[k], result.noise_sigma[k]) = mean_product(rows, k, weighted);
     }
     result
 }
 
-fn mean_product(rows: &[Row], k: usize) -> (Complex64, f64) {
+fn mean_product(rows: &[Row], k: usize, weighted: bool) -> (Complex64, f64) {
     let all = || rows.iter().filter_map(|row| row.product(k));
     // A mean of nothing but placeholders is one.
     let only_placeholders = all().all(|m| m.is_placeholder());
-    let present = || all().filter(|m| only_placeholders || !m.is_placeholder());
-    let count = present().count();
-    if count == 0 {
+    let present: Vec<Measured> =
+        all().filter(|m| only_placeholders || !m.is_placeholder()).collect();
+    if present.is_empty() {
         return (Complex64::new(0.0, 0.0), f64::NAN);
     }
-    if present().all(|m| m.noise_sigma > 0.0) {
-        let weight: f64 = present().map(|m| m.noise_sigma.powi(-2)).sum();
-        let sum: Complex64 = present().map(|m| m.visibility * m.noise_sigma.powi(-2)).sum();
+    let weighted = weighted && present.iter().all(|m| m.noise_sigma > 0.0);
+    if weighted { weighted_mean(&present) } else { plain_mean(&present) }
+}
+
+/// Errors and amplitudes whose squares are within the range of numbers, however many there are.
+fn have_squares(data: &[Measured]) -> bool {
+    let is_usual = |x: f64| x == 0.0 || (1e-100..=1e100).contains(&x);
+    data.iter().all(|m| is_usual(m.noise_sigma) && m.visibility.norm() <= 1e100)
+}
+
+fn weighted_mean(data: &[Measured]) -> (Complex64, f64) {
+    if have_squares(data) {
+        let weight: f64 = data.iter().map(|m| m.noise_sigma.powi(-2)).sum();
+        let sum: Complex64 = data.iter().map(|m| m.visibility * m.noise_sigma.powi(-2)).sum();
         return (sum / weight, weight.sqrt().recip());
     }
-    let sum: Complex64 = present().map(|m| m.visibility).sum();
-    let variance: f64 = present().map(|m| m.noise_sigma.powi(2)).sum();
-    (sum / count as f64, variance.sqrt() / count as f64)
+    let least = data.iter().fold(f64::INFINITY, |least, m| least.min(m.noise_sigma));
+    let share = |m: &Measured| (least / m.noise_sigma).powi(2);
+    let weight: f64 = data.iter().map(share).sum();
+    let mean = data.iter().map(|m| m.visibility * (share(m) / weight)).sum();
+    (mean, least / weight.sqrt())
+}
+
+fn plain_mean(data: &[Measured]) -> (Complex64, f64) {
+    let count = data.len() as f64;
+    if have_squares(data) {
+        let sum: Complex64 = data.iter().map(|m| m.visibility).sum();
+        let variance: f64 = data.iter().map(|m| m.noise_sigma.powi(2)).sum();
+        return (sum / count, variance.sqrt() / count);
+    }
+    let most = data.iter().fold(f64::MIN_POSITIVE, |most, m| most.max(m.noise_sigma));
+    let squares: f64 = data.iter().map(|m| (m.noise_sigma / most).powi(2)).sum();
+    (data.iter().map(|m| m.visibility / count).sum(), most * (squares.sqrt() / count))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::Measured;
     use super::*;
 
     #[test]
@@ -156,7 +212,7 @@ mod tests {
             row(1.003, 6.0, 0.5, [1, 0]),
             row(1.02, 9.0, 1.0, [0, 1]),
         ];
-        let rows = observation.averaged(60.0).rows;
+        let rows = observation.averaged(Averaging::over(60.0)).rows;
         assert_eq!(rows.len(), 2);
         let i = rows[0].product(0).unwrap();
         assert!((i.visibility - Complex64::new(27.0 / 5.0, -3.0 / 5.0)).norm() < 1e-15);
@@ -176,7 +232,7 @@ mod tests {
         let mut observation = Observation::empty(Basis::Stokes);
         observation.rows =
             vec![row(301.0, [0, 1]), row(590.0, [0, 2]), row(599.0, [1, 2]), row(601.0, [0, 1])];
-        let rows = observation.averaged_in_scans(300.0).rows;
+        let rows = observation.averaged(Averaging::over(300.0)).rows;
         let seconds: Vec<f64> = rows.iter().map(|row| row.time_h * 3600.0).collect();
         let mean = (301.0 + 590.0 + 599.0) / 3.0;
         for (found, expected) in seconds.iter().zip([mean, mean, mean, 601.0]) {
@@ -205,11 +261,33 @@ mod tests {
         let mut observation = Observation::empty(Basis::Circular);
         observation.rows =
             vec![row(1.001, (3.0, 0.3), (0.0, 0.0)), row(1.002, (3.0, 0.3), (1.0, 0.4))];
-        let mean = observation.averaged(60.0).rows[0];
+        let mean = observation.averaged(Averaging::over(60.0)).rows[0];
         let [rr, ll] = mean.parts_of_i(Basis::Circular).map(Option::unwrap);
         assert!((rr.noise_sigma - 0.3 / 2f64.sqrt()).abs() < 1e-15);
         assert_eq!((ll.visibility.re, ll.noise_sigma), (1.0, 0.4));
         assert!(mean.product(2).unwrap().is_placeholder() && mean.product(3).is_none());
+    }
+
+    /// Errors whose squares no double holds give means as others do, in units of their own.
+    #[test]
+    fn exact_means_of_any_size() {
+        let row = |time_h: f64, size: f64, re: f64, sigma: f64| {
+            let i =
+                Measured { visibility: Complex64::new(re * size, 0.0), noise_sigma: sigma * size };
+            Row::total_intensity(time_h, [0, 1], [1.0, 0.0], i)
+        };
+        for size in [1e-300, 1e-160, 1.0, 1e160, 1e300] {
+            for weighted in [true, false] {
+                let mut observation = Observation::empty(Basis::Stokes);
+                observation.rows = vec![row(1.0, size, 3.0, 1.0), row(1.001, size, 6.0, 0.5)];
+                let averaging = Averaging { weighted, ..Averaging::over(60.0) };
+                let mean = observation.averaged(averaging).rows[0].product(0).unwrap();
+                let [value, sigma] =
+                    if weighted { [5.4, 0.2f64.sqrt()] } else { [4.5, 1.25f64.sqrt() / 2.0] };
+                assert!((mean.visibility.re / size / value - 1.0).abs() < 1e-14, "{size} {mean:?}");
+                assert!((mean.noise_sigma / size / sigma - 1.0).abs() < 1e-14, "{size} {mean:?}");
+            }
+        }
     }
 
     #[test]

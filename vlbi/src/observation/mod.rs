@@ -1,8 +1,12 @@
 //! Visibilities with their errors: what an array has measured, or would.
 
 mod average;
+mod repeats;
+mod scans;
 mod select;
 
+pub use average::Averaging;
+pub use repeats::Repeats;
 pub use select::{Flags, Selection};
 
 use super::Complex64;
@@ -104,7 +108,8 @@ impl Row {
     pub fn stokes_i(&self, basis: Basis) -> Option<Measured> {
         match self.parts_of_i(basis) {
             [Some(rr), Some(ll)] => Some(Measured {
-                visibility: 0.5 * (rr.visibility + ll.visibility),
+                // Halves first: their sum has the range of a double.
+                visibility: 0.5 * rr.visibility + 0.5 * ll.visibility,
                 noise_sigma: 0.5 * rr.noise_sigma.hypot(ll.noise_sigma),
             }),
             [one, other] => one.or(other),

@@ -10,6 +10,7 @@ use super::{Float, ImageGrid, Operator, Pulse};
 use core::f64::consts::TAU;
 use core::ops::Range;
 use kerrlight_common::matrix::{Shape, multiply};
+use kerrlight_geodesic::interrupt;
 use num_complex::Complex;
 use rayon::prelude::*;
 
@@ -207,6 +208,7 @@ impl<T: Float> Operator<T> for Dtft<T> {
         self.blocks.par_iter().zip(pieces).zip(images).for_each_init(
             Vec::new,
             |a, ((block, data), image)| {
+                interrupt::check();
                 self.with_factors(block, |factors| self.forward_block(factors, image, data, a));
             },
         );
@@ -224,6 +226,7 @@ impl<T: Float> Operator<T> for Dtft<T> {
                 |z, (k, strip)| {
                     let rows = k * rows..k * rows + strip.len() / width;
                     for block in &self.blocks[blocks.clone()] {
+                        interrupt::check();
                         let data = &data[block.data.clone()];
                         self.with_factors(block, |factors| {
                             self.adjoint_block(factors, data, rows.clone(), strip, z);

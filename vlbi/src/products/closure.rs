@@ -1,6 +1,7 @@
 //! Closure phases and log closure amplitudes of scans.
 
 use super::independent::keep_independent;
+use super::layers::Layers;
 use crate::observation::{Measured, Observation};
 use std::collections::HashMap;
 
@@ -76,9 +77,9 @@ impl ClosureSet {
     /// closure quantities, chosen with the least noisy first, so that weak baselines are in as few
     /// of them as possible. Visibility indices count rows that have Stokes I, in the order of
     /// [`Observation::stokes_i`]. Baselines weaker than `least_snr` times their noise are left
-    /// out, and those without error.
+    /// out, and those without error. Rows that repeat a baseline of their scan make sets of their own.
     pub fn of(observation: &Observation, kind: ClosureKind, least_snr: f64) -> Vec<ClosureSet> {
-        let mut scans: HashMap<(u64, u16), Vec<Baseline>> = HashMap::new();
+        let mut scans: HashMap<(u64, u16), Layers<Baseline>> = HashMap::new();
         for (visibility, (row, measured)) in observation.stokes_i().enumerate() {
             let strong = measured.visibility.norm() > least_snr * measured.noise_sigma;
             if !strong || measured.noise_sigma <= 0.0 {
@@ -88,20 +89,21 @@ impl ClosureSet {
             let [a, b] = row.stations;
             let (stations, sense) = if ascending { ([a, b], 1) } else { ([b, a], -1) };
             let baseline = Baseline { stations, visibility, sense, measured };
-            scans.entry((row.time_h.to_bits(), row.channel)).or_default().push(baseline);
+            let layers = scans.entry((row.time_h.to_bits(), row.channel)).or_default();
+            layers.add(stations, baseline);
         }
-        let mut sets: Vec<(u16, ClosureSet)> = scans
-            .into_iter()
-            .map(|((time, channel), rows)| (channel, scan(f64::from_bits(time), &rows, kind)))
-            .filter(|(_, set)| !set.closures.is_empty())
-            .collect();
+        let sets = scans.into_iter().flat_map(|((time, channel), layers)| {
+            let set = move |rows: Vec<Baseline>| (channel, scan(f64::from_bits(time), &rows, kind));
+            layers.all().map(set)
+        });
+        let mut sets: Vec<(u16, ClosureSet)> =
+            sets.filter(|(_, set)| !set.closures.is_empty()).collect();
         sets.sort_by(|(j, a), (k, b)| a.time_h.total_cmp(&b.time_h).then(j.cmp(k)));
         sets.into_iter().map(|(_, set)| set).collect()
     }
 }
 
 fn scan(time_h: f64, baselines: &[Baseline], kind: ClosureKind) -> ClosureSet {
-    // A later row of the same baseline and time replaces the earlier one.
     let index: HashMap<[u16; 2], usize> =
         baselines.iter().enumerate().map(|(k, b)| (b.stations, k)).collect();
     let mut stations: Vec<u16> = index.keys().flatten().copied().collect();

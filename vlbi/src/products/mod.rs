@@ -4,11 +4,14 @@
 
 mod closure;
 mod coherency;
+mod count;
 mod independent;
+mod layers;
 mod trace;
 
 pub use closure::{Closure, ClosureKind, ClosureSet, Leg};
 pub use coherency::Coherency;
+pub use count::ClosureCount;
 pub use trace::{ClosureTrace, LogTrace, TraceLeg, TracePart, TraceQuantity, TraceSet};
 
 use super::observation::Measured;

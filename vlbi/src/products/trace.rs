@@ -2,6 +2,7 @@
 //! 904, 126).
 
 use super::coherency::{Coherency, HANDS};
+use super::layers::Layers;
 use crate::Complex64;
 use crate::observation::{Basis, Observation, Row};
 use std::collections::HashMap;
@@ -117,6 +118,9 @@ const MOST_CANDIDATES: usize = 16;
 /// errors of second order, which are the square of the error of each number in it.
 const LEAST_OWN_VARIANCE: f64 = 30.0;
 
+/// Stations of a row in its order, and its index.
+type Oriented = ([u16; 2], usize);
+
 impl TraceSet {
     /// Rows that have all four products of circular feeds with errors above 0, and a Stokes I above `least_snr` times its noise.
     pub fn rows(observation: &Observation, least_snr: f64) -> Vec<&Row> {
@@ -134,20 +138,21 @@ impl TraceSet {
     }
 
     /// For every scan (rows of the same time and channel) a set of independent numbers, chosen with the least noisy first.
+    /// Rows that repeat a baseline of their scan make sets of their own.
     pub fn of(observation: &Observation, least_snr: f64) -> Vec<TraceSet> {
         let rows = Self::rows(observation, least_snr);
         let coherencies: Vec<Coherency> = rows.iter().map(|r| Coherency::of(r.products)).collect();
-        let mut scans: HashMap<(u64, u16), HashMap<[u16; 2], usize>> = HashMap::new();
+        let mut scans: HashMap<(u64, u16), Layers<Oriented>> = HashMap::new();
         for (k, row) in rows.iter().enumerate() {
-            let scan = scans.entry((row.time_h.to_bits(), row.channel)).or_default();
-            // A later row of the same baseline and time replaces the earlier one.
             let [a, b] = row.stations;
-            scan.remove(&[b, a]);
-            scan.insert([a, b], k);
+            let layers = scans.entry((row.time_h.to_bits(), row.channel)).or_default();
+            layers.add([a.min(b), a.max(b)], (row.stations, k));
         }
-        let mut sets: Vec<(u16, TraceSet)> = scans
-            .into_iter()
-            .map(|((time, channel), index)| {
+        let layers = scans.into_iter().flat_map(|((time, channel), layers)| {
+            layers.all().map(move |layer| (time, channel, layer.into_iter().collect()))
+        });
+        let mut sets: Vec<(u16, TraceSet)> = layers
+            .map(|(time, channel, index)| {
                 let quantities = choose(&quadrangles(&index), &coherencies, &rows);
                 (channel, set(f64::from_bits(time), quantities))
             })

@@ -19,12 +19,12 @@ impl Figures<'_> {
                 continue;
             }
             let (movie, _) = movie_files::read(&[path], None)?;
-            let n = movie.grid.width;
+            let n = movie.i.grid.width;
             if side != 0 && n != side {
                 anyhow::bail!("images have {side} and {n} pixels a side: `where` can choose some");
             }
             side = n;
-            images.push((case.name(), movie.pixels.iter().map(|x| *x as f32).collect()));
+            images.push((case.name(), movie.i.pixels.iter().map(|x| *x as f32).collect()));
         }
         if images.is_empty() {
             return Ok(None);

@@ -324,7 +324,6 @@ pub const KEYS: &[Key] = &[
         "",
         "data per step: { frames = N }, { pixels = N } (images only), or \"all\"",
     ),
-    key("training", "parts", "16", "parts of a step, for ranks of mpirun; 1 to 65536"),
     key(
         "training",
         "start",

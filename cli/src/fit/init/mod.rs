@@ -25,7 +25,7 @@ use kerrlight_vlbi::files;
 use kerrlight_vlbi::gains::prior_table;
 use kerrlight_vlbi::observation::Observation;
 use kerrlight_vlbi::products::ClosureKind;
-use kerrlight_vlbi::simulate::Movie;
+use kerrlight_vlbi::simulate::{Movie, StokesMovie};
 use keys::{KEYS, TABLES};
 use quick_look::QuickLook;
 use sources::{SOURCES, Source};
@@ -166,7 +166,7 @@ struct Images {
 
 fn read_movie(path: &Path) -> anyhow::Result<Images> {
     let files = movie_files::files(path)?;
-    let of = |(movie, times): (Movie, OwnTimes), known: bool| {
+    let of = |(StokesMovie { i: movie, .. }, times): (StokesMovie, OwnTimes), known: bool| {
         let field = movie.grid.pixel_rad * movie.grid.width as f64 / MICROARCSECOND;
         Images { movie, times, field_uas: known.then_some(field) }
     };

@@ -5,7 +5,6 @@ mod page;
 mod predictive;
 mod sample;
 mod summary;
-mod together;
 
 use super::folder::Folder;
 use super::held_out;
@@ -14,7 +13,6 @@ use super::world_search;
 use crate::answer::Answer;
 use crate::checksum::{is_whole, sealed};
 use crate::interrupt::{Interrupted, Keeper};
-use crate::ranks::{self, Lead};
 use crate::record::Recorder;
 use crate::{output, progress, volume_files};
 use anyhow::{Context, bail};
@@ -26,10 +24,10 @@ use kerrlight_tomo::fit::setup::WorldPosterior;
 use kerrlight_tomo::representation::Registry;
 use sample::{Drawn, Through};
 use serde_json::{Value, json};
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 pub use summary::{RANKED, WITHIN};
-pub use together::{help, lead};
 
 /// Where draws and what follows from them are, in the folder of a run.
 pub const FOLDER: &str = "posterior";
@@ -45,20 +43,22 @@ pub struct Posterior {
     #[arg(value_name = "RUN")]
     run: PathBuf,
     /// Draws, those of an earlier call included
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
-    samples: u32,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000), required_unless_present = "draws")]
+    samples: Option<u32>,
+    /// Draw numbers A to B alone, beside other processes that draw others; --samples adds up later
+    #[arg(long, value_name = "A..B", conflicts_with = "samples", value_parser = numbers)]
+    draws: Option<Numbers>,
 }
 
 impl Posterior {
     /// Draws, and writes what follows from the draws.
     pub fn run(&self, registry: &Registry) -> anyhow::Result<Answer> {
-        if let Some((rank @ 1.., _)) = ranks::this() {
-            return help(&self.run, self.samples, rank, registry);
+        if let Some(Numbers(first, last)) = self.draws {
+            return self.some(registry, first..=last);
         }
         let (folder, text) = Folder::open(&self.run, Duration::ZERO)?;
         let prepared = self.prepared(&text, registry)?;
-        let lead = lead(&folder, self.samples)?;
-        draw(&prepared, &folder, self.samples, lead)
+        draw(&prepared, &folder, self.samples.unwrap_or(2))
     }
 
     fn prepared<'a>(&self, text: &str, registry: &'a Registry) -> anyhow::Result<Prepared<'a>> {
@@ -72,19 +72,47 @@ impl Posterior {
         Prepared::new(file, &super::base_dir_of(text), registry)
     }
 
-    /// Hands what draws are made of, and the folder they go to, to `work` while another process holds the run.
-    fn with(
-        &self,
-        registry: &Registry,
-        work: impl FnOnce(&Drawing<'_>, &Path) -> anyhow::Result<()>,
-    ) -> anyhow::Result<()> {
+    /// Draws some, each a file of its own, and adds nothing up. Others may draw around the same run: a draw is the same
+    /// bytes whoever writes it.
+    fn some(&self, registry: &Registry, numbers: RangeInclusive<u32>) -> anyhow::Result<Answer> {
         let (folder, text) = Folder::look(&self.run)?;
         let prepared = self.prepared(&text, registry)?;
+        check(&prepared.file)?;
         let unknown = prepared.file.unknown_world()?;
         let path = folder.path().join(FOLDER);
-        let drawing = Drawing::new(&prepared, &folder, (unknown.as_ref(), self.samples), &path)?;
-        work(&drawing, &path)
+        std::fs::create_dir_all(&path)
+            .with_context(|| format!("cannot make {}", path.display()))?;
+        let drawing = Drawing::new(&prepared, &folder, (unknown.as_ref(), *numbers.end()), &path)?;
+        let bar = progress::samples(numbers.clone().count() as u64);
+        let keeper = Keeper::brief("stopping; the same command continues");
+        for number in numbers.clone() {
+            if drawing.kept_or_drawn(&path, number.into(), &keeper, &bar)?.is_none() {
+                bar.abandon();
+                let text = format!("stopped at draw {number}; the same command continues");
+                return Err(Interrupted(text).into());
+            }
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        let (first, last) = numbers.into_inner();
+        let text = format!("draws {first} to {last} are there");
+        Ok(Answer::lines(&text, &path.display().to_string())
+            .with("draws", [first, last])
+            .with("folder", path.display().to_string()))
     }
+}
+
+/// First and last number of a range of draws.
+#[derive(Debug, Clone, Copy)]
+struct Numbers(u32, u32);
+
+/// `A..B`, both included.
+fn numbers(text: &str) -> Result<Numbers, String> {
+    let ends = text
+        .split_once("..")
+        .and_then(|(first, last)| Some(Numbers(first.parse().ok()?, last.parse().ok()?)));
+    let allowed = |Numbers(first, last): &Numbers| 1 <= *first && first <= last && *last <= 100_000;
+    ends.filter(allowed).ok_or_else(|| "A..B with 1 <= A <= B <= 100000 is allowed".to_owned())
 }
 
 /// One draw as it is kept.
@@ -111,14 +139,8 @@ pub fn check(file: &FitFile) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Draws so many times, those that are there included, and writes what follows. Where other ranks wait for `lead`, all
-/// draw.
-pub fn draw(
-    prepared: &Prepared<'_>,
-    folder: &Folder,
-    samples: u32,
-    lead: Option<Lead>,
-) -> anyhow::Result<Answer> {
+/// Draws so many times, those that are there included, and writes what follows.
+pub fn draw(prepared: &Prepared<'_>, folder: &Folder, samples: u32) -> anyhow::Result<Answer> {
     check(&prepared.file)?;
     let recorder = Recorder::of_process();
     let path = folder.path().join(FOLDER);
@@ -127,10 +149,6 @@ pub fn draw(
     let drawing = Drawing::new(prepared, folder, (unknown.as_ref(), samples), &path)?;
     let bar = progress::samples(u64::from(samples));
     let keeper = Keeper::brief(format!("stopping; resume with: {}", again(folder, samples)));
-    if let Some(lead) = &lead {
-        drawing.share_all(&lead.team, &path, (samples, &keeper), &bar)?;
-        bar.set_position(0);
-    }
     let mut all = Vec::new();
     for number in 1..=u64::from(samples) {
         let Some(kept) = drawing.kept_or_drawn(&path, number, &keeper, &bar)? else {
@@ -145,7 +163,6 @@ pub fn draw(
     bar.finish_and_clear();
     let answer = add_up(prepared, folder, &path, &all)?;
     recorder.write_into(&path)?;
-    together::end(lead, folder);
     Ok(answer)
 }
 

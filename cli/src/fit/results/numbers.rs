@@ -1,7 +1,9 @@
 //! What was found, in numbers.
 
 use super::{Estimate, Found, quadrature};
-use crate::fit::{band_search, held_out, linear, rotation_search, world_results, world_search};
+use crate::fit::{
+    band_search, closures, held_out, linear, rotation_search, world_results, world_search,
+};
 use crate::report;
 use crate::usage::usage;
 use kerrlight_common::frames::Frames;
@@ -84,6 +86,9 @@ impl Estimate<'_> {
         }
         if let Some(held_out) = held_out::found(self.folder)? {
             results["held_out"] = held_out;
+        }
+        if let Some(closures) = closures::json(self.measured, &self.file.loss) {
+            results["closures"] = closures;
         }
         self.add_worlds(&mut results)?;
         let unknown = self.file.unknowns();

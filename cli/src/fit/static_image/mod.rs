@@ -7,6 +7,7 @@ mod pictures;
 mod polarized;
 mod words;
 
+use super::closures;
 use super::data;
 use super::folder::{self, Folder};
 use super::results::gains::Gains;
@@ -133,6 +134,9 @@ fn searched(prepared: &Prepared) -> anyhow::Result<(Survey, Option<PolarizedSurv
         file.image.pixels,
         file.image.field_uas / file.image.pixels as f64,
     );
+    for used in closures::sentences(measured, &file.loss) {
+        eprintln!("{used}");
+    }
     let values = |s: &Option<StrengthSettings>| s.as_ref().map_or(0, |s| s.values.len() * s.folds);
     let draws = file.image.draws.unwrap_or(0);
     let of_polarized = file.polarization.as_ref().map_or(0, |p| values(&p.strength) + 1 + draws);

@@ -1,6 +1,7 @@
 //! results.json of a static image.
 
 use super::Found;
+use crate::fit::closures;
 use crate::usage::usage;
 use kerrlight_tomo::fit::static_image::{Candidate, Ring, Survey};
 use serde_json::{Map, Value, json};
@@ -99,6 +100,9 @@ impl Found<'_> {
             "draws": all(&self.survey.draws),
             "has_converged": found.solution.has_converged,
         });
+        if let Some(closures) = closures::json(self.measured, &self.file.loss) {
+            results["closures"] = closures;
+        }
         if !self.survey.held.is_empty() {
             let held = self.survey.held.iter();
             let one = |held: &kerrlight_tomo::fit::setup::Held| json!({"value": held.value, "loss": held.mean(), "losses": held.losses});

@@ -3,6 +3,7 @@
 use super::Found;
 use super::numbers::{RING, chi2_of_draws, error, with_error};
 use super::polarized::Polarized;
+use crate::fit::closures;
 use crate::fit::results::medium;
 use crate::report::Part;
 use kerrlight_tomo::fit::settings::{Loss, StartImage};
@@ -62,6 +63,8 @@ impl Found<'_> {
         if let Some(least) = data.uv_min {
             text.push(format!("Baselines below {least:e} wavelengths are left out."));
         }
+        let closures = closures::sentences(self.measured, &self.file.loss);
+        text.extend(closures.into_iter().map(|sentence| sentence + "."));
         text.extend(medium::sentences(data.scattering, data.variability));
         text
     }

@@ -158,12 +158,17 @@ class Gpu {
   }
 
   async loadSky() {
-    const flags = GPUTextureUsage.RENDER_ATTACHMENT;
-    if (!GIVEN.sky) return this.texture([1, 1], "rgba8unorm-srgb", "2d", flags);
+    if (!GIVEN.sky) return this.texture([1, 1], "rgb9e5ufloat");
     const blob = new Blob([bytesOf(GIVEN.sky)], { type: "image/png" });
     const source = await createImageBitmap(blob, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
-    const size = [source.width, source.height], texture = this.texture(size, "rgba8unorm-srgb", "2d", flags);
-    this.device.queue.copyExternalImageToTexture({ source }, { texture }, size);
+    const width = source.width, height = source.height / 2, count = width * height;
+    const canvas = new OffscreenCanvas(width, 2 * height), context = canvas.getContext("2d", { willReadFrequently: true });
+    context.drawImage(source, 0, 0);
+    // The last byte of a pixel is in the lower half of the picture.
+    const bytes = context.getImageData(0, 0, width, 2 * height).data;
+    for (let k = 0; k < count; k++) bytes[4 * k + 3] = bytes[4 * (count + k)];
+    const texture = this.texture([width, height], "rgb9e5ufloat");
+    this.device.queue.writeTexture({ texture }, bytes.subarray(0, 4 * count), { bytesPerRow: 4 * width }, [width, height]);
     return texture;
   }
 

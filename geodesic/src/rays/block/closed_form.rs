@@ -97,7 +97,8 @@ impl BlockTracer {
         block: &mut RayBlock,
         visitor: &V,
     ) -> Result<(), Error> {
-        let BlockRequest { crossings, all_crossings, rates, half_orbits, paths, .. } = *job.request;
+        let BlockRequest { crossings, all_crossings, rates, half_orbits, paths, exit, .. } =
+            *job.request;
         let with_ray = rates || paths || half_orbits.is_some();
         let most = half_orbits.map_or(usize::MAX, |n| n as usize + 1);
         let RayBlock { rays, plane, crossings: found, .. } = block;
@@ -119,6 +120,8 @@ impl BlockTracer {
                 Inspected { eta: f64::NAN, until: f64::INFINITY, path: PathUse::None }
             };
             let surface = first_opaque(own, until, visitor);
+            // The closed form ends at the observer's radius, where it is not yet known where a ray goes.
+            let goes_on = exit && ends.escapes && surface.is_none() && !observer.is_at_infinity();
             let all = !all_crossings
                 || surface.is_some()
                 || own.len() >= (ends.crossings as usize).min(most);
@@ -132,7 +135,7 @@ impl BlockTracer {
                 until,
                 surface,
                 exit: None,
-                stepped: !all || path == PathUse::Instead || self.loses_digits(ends.error),
+                stepped: !all || goes_on || path == PathUse::Instead || self.loses_digits(&ends),
                 with_path: path == PathUse::Beside,
             });
         }
@@ -178,10 +181,11 @@ impl BlockTracer {
         Ok(())
     }
 
-    /// Whether the closed form has an error above the tolerance.
+    /// Whether the closed form has an error above the tolerance, or no end.
     #[inline]
-    fn loses_digits(&self, error: f64) -> bool {
-        error.is_nan() || error > self.tracer.tolerance().max(FINEST)
+    fn loses_digits(&self, ends: &RayEnds) -> bool {
+        let known = ends.error <= self.tracer.tolerance().max(FINEST);
+        !(known && ends.mino_total.is_finite())
     }
 
     /// Finds where the rays go that meet no surface and escape.

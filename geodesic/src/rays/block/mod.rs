@@ -20,6 +20,7 @@ pub use tracer::{BlockTracer, RayBlock};
 pub use visitor::{PathUse, RayVisitor, Work};
 
 use crate::error::Error;
+use crate::interrupt;
 use crate::rays::blocks::check_columns;
 use crate::rays::footprint;
 use tracer::Job;
@@ -44,6 +45,7 @@ impl BlockTracer {
         block.plane.clear();
         block.followed.clear();
         visitor.works_on(Work::Rays);
+        interrupt::check();
         match (&self.device, self.closed_form()) {
             (Some(device), _) => self.trace_on_device(&**device, job, block, visitor)?,
             (None, Some(observer)) => self.trace_in_closed_form(observer, job, block, visitor)?,

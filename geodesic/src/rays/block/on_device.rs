@@ -81,7 +81,9 @@ impl BlockTracer {
         let all =
             !all_crossings || surface.is_some() || own.len() >= (end.crossings as usize).min(most);
         let leaves = job.request.exit && end.outcome == Outcome::Escaped && surface.is_none();
-        let stepped = !all || path == PathUse::Instead;
+        // It is not yet known where a ray goes that a device ends at a finite observer.
+        let goes_on = leaves && self.end_on_device() > 0.0;
+        let stepped = !all || goes_on || path == PathUse::Instead;
         let with_path = path == PathUse::Beside;
         let crossings = first..plane.len();
         Ok(TracedRay { until, surface, stepped, with_path, ..from_device(end, crossings, leaves) })
@@ -190,9 +192,9 @@ impl BlockTracer {
         Ok(())
     }
 
-    /// 1/r at which rays that escape end: at the observer's radius in closed form, else at infinity.
+    /// 1/r at which rays that escape end: at the radius of an observer, else at infinity.
     fn end_on_device(&self) -> f64 {
-        self.closed_form().map_or(0.0, |observer| observer.inverse_radius())
+        self.view.observer().map_or(0.0, |observer| observer.inverse_radius())
     }
 }
 

@@ -62,15 +62,15 @@ impl BlockTracer {
         RayBlock { rays, path, sampled, .. }: &mut RayBlock,
         visitor: &mut V,
     ) {
-        let trajectory = MinoPath { path, ray };
+        let (trajectory, at_infinity) = MinoPath::seen_by(&self.view, path, ray);
         if path.outcome().is_unresolved() {
             return;
         }
         let (total, escapes) = (trajectory.total(), path.outcome() == Outcome::Escaped);
-        let times = mino_times(n, ray.inverse_radius == 0.0, !escapes);
-        sampled.fill(path, times.map(|share| total * share));
+        let times = mino_times(n, at_infinity, !escapes);
+        sampled.fill(times.map(|share| trajectory.at(total * share)));
         let SampleColumns { delay, radius, theta, azimuth } = sampled;
-        let error = path.uncertainty_at(total).theta;
+        let error = trajectory.uncertainty(total).theta;
         let samples =
             RaySamples { delay, radius, theta, azimuth, mino_total: total, escapes, error };
         visitor.take_samples(k, &rays[k], &samples);

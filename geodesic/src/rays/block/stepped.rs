@@ -7,6 +7,8 @@ use super::visitor::{RayVisitor, Work, first_opaque};
 use crate::error::Error;
 use crate::integrate::outcome::Outcome;
 use crate::rays::nodes;
+use crate::rays::sampling::Trajectory;
+use crate::rays::trajectory::MinoPath;
 use crate::screen::observer::Ray;
 use crate::simd::NodeRequest;
 use crate::spacetime::quantities::Quantities;
@@ -21,6 +23,7 @@ impl BlockTracer {
         block: &mut RayBlock,
         visitor: &mut V,
     ) -> Result<(), Error> {
+        crate::interrupt::check();
         visitor.works_on(Work::Rays);
         let ray = self.view.ray(&self.hole, job.alpha[k], job.beta[k])?;
         let tolerance = self.find_path(k, &ray, block);
@@ -112,6 +115,7 @@ impl BlockTracer {
         }
         let exit = request.exit.then(|| path.at(path.mino_total()).direction);
         let until = self.until(ray, request.half_orbits);
+        let (whole, _) = MinoPath::seen_by(&self.view, path, ray);
         let off_plane = visitor.first_surface(PathOfRay { ray, path, tolerance });
         let off_plane = off_plane.filter(|time| *time <= until);
         let in_plane = first_opaque(&plane[first..], until, visitor);
@@ -121,7 +125,7 @@ impl BlockTracer {
             outcome: path.outcome(),
             crossing_count: path.equatorial_crossings().len() as u32,
             crossings: first..plane.len(),
-            mino_total: path.mino_total(),
+            mino_total: whole.total(),
             until,
             surface: in_plane.into_iter().chain(off_plane).reduce(f64::min),
             exit: exit.filter(|_| path.outcome() == Outcome::Escaped),

@@ -50,7 +50,8 @@ pub struct TracedRay {
     pub crossing_count: u32,
     /// Which of the block's crossings are its own.
     pub crossings: Range<usize>,
-    /// Mino time of the whole ray, M⁻¹.
+    /// Mino time of the whole ray, M⁻¹: to the horizon, or back at the radius of an observer; to infinity for one that is
+    /// there and for cameras. (A [`Path`] goes on to infinity, and so does its `mino_total`.)
     pub mino_total: f64,
     /// Mino time in M⁻¹ after which no light is taken: see [`BlockRequest::half_orbits`](crate::BlockRequest::half_orbits).
     pub until: f64,
@@ -112,11 +113,11 @@ pub(super) struct SampleColumns {
 }
 
 impl SampleColumns {
-    /// Those of a path at some Mino times.
-    pub fn fill(&mut self, path: &Path, times: impl Iterator<Item = f64>) {
+    /// Those of some points.
+    pub fn fill(&mut self, points: impl Iterator<Item = PathPoint>) {
         let Self { delay, radius, theta, azimuth } = self;
         [&mut *delay, &mut *radius, &mut *theta, &mut *azimuth].into_iter().for_each(Vec::clear);
-        for point in times.map(|time| path.at(time)) {
+        for point in points {
             delay.push(point.delay);
             radius.push(point.radius());
             theta.push(point.theta());

@@ -117,13 +117,15 @@ impl BlockTracer {
     /// series elsewhere: for cameras, for observers nearer than 5 M, and next to the critical curve.
     ///
     /// # Errors
-    /// If `tolerance` is not in \[1e-14, 1e-2\], or the integrator does not work in Mino time.
+    /// If `tolerance` is not in \[1e-14, 1e-2\], the integrator does not work in Mino time, or a camera was made for another
+    /// hole.
     pub fn new(
         hole: Kerr,
         view: View,
         integrator: Integrator,
         tolerance: f64,
     ) -> Result<Self, Error> {
+        view.check_hole(&hole)?;
         let closed_form = integrator == Integrator::Elliptic;
         let allowed = "an integrator in Mino time";
         let method =

@@ -163,3 +163,84 @@ fn impossible_cameras_are_refused() {
     assert!(Camera::new(&hole, equator, 1.5, Motion::Keplerian).is_err());
     assert!(Camera::new(&hole, equator, f64::NAN, Motion::Zamo).is_err());
 }
+
+/// E = α + ω√g_φφ k_φ in the frame of zero angular momentum (Bardeen, Press & Teukolsky 1972): where it is not positive
+/// light comes from the horizon, as light of little energy does.
+#[test]
+fn exact_light_without_energy_at_infinity_comes_from_the_horizon() {
+    let (spin, r) = (0.95f64, 1.7f64);
+    let hole = Kerr::new(spin).unwrap();
+    let camera = camera(spin, 90.0, r, Motion::Zamo);
+    let delta = r * r - 2.0 * r + spin * spin;
+    let area = (r * r + spin * spin).powi(2) - spin * spin * delta;
+    let (lapse, drag) = (r * (delta / area).sqrt(), 2.0 * spin / area.sqrt());
+    let (mut dark, mut path) = (0, Path::new());
+    let mut beams = crate::footprint::Beams::default();
+    let mut look = |direction: [f64; 3]| {
+        let ray = camera.arriving_from(direction).unwrap();
+        Tracer::new(1e-10).unwrap().trace(&hole, &ray, Quantities::ALL, &mut path);
+        let (x, y) = (direction[2] / -direction[0], -direction[1] / -direction[0]);
+        beams = crate::footprint::of_camera(&camera, &[x], &[y], 1e-10, 1).unwrap();
+        (ray.is_from_horizon, path.outcome())
+    };
+    // k = −direction.
+    for energy in [-0.2, -1e-3, -1e-9, 0.0, 1e-12, 1e-9, 1e-6, 1e-3] {
+        let around = (lapse - energy) / drag;
+        let rest = (1.0 - around * around).sqrt();
+        for k in 0..12 {
+            let (y, x) = (0.1 + 0.5 * f64::from(k)).sin_cos();
+            let (from_horizon, outcome) = look([rest * x, rest * y, around]);
+            assert_eq!(from_horizon, energy <= 0.0, "{energy} {k}");
+            assert_eq!(outcome, Outcome::Captured, "{energy} {k}");
+            dark += usize::from(from_horizon);
+        }
+    }
+    assert_eq!(dark, 48);
+    assert!(beams.sky.iter().all(Option::is_none));
+}
+
+/// A picture from inside the ergosphere has light and darkness, traced in blocks of any kind.
+#[test]
+fn exact_blocks_from_inside_the_ergosphere_agree_with_single_rays() {
+    use crate::{BlockRequest, BlockTracer, Integrator, RayBlock, View};
+    struct Nothing;
+    impl crate::RayVisitor for Nothing {
+        fn take(
+            &mut self,
+            _: usize,
+            _: &crate::TracedRay,
+            _: &[crate::PlaneCrossing],
+            _: Option<crate::PathOfRay<'_>>,
+        ) -> Result<(), Error> {
+            Ok(())
+        }
+    }
+    let camera = camera(0.95, 90.0, 1.7, Motion::Zamo).with_pointing(3.1, 0.0, 0.0);
+    let (x, y): (Vec<f64>, Vec<f64>) =
+        (0..400).map(|k| (0.17 * f64::from(k % 20) - 1.6, 0.17 * f64::from(k / 20) - 1.6)).unzip();
+    let request = BlockRequest {
+        crossings: 2,
+        exit: true,
+        beams: true,
+        half_orbits: Some(1),
+        ..BlockRequest::default()
+    };
+    for integrator in [Integrator::TaylorMino, Integrator::Elliptic] {
+        let tracer = BlockTracer::new(camera.hole, View::Camera(camera), integrator, 1e-8).unwrap();
+        let mut block = RayBlock::default();
+        tracer.trace(&x, &y, &request, &mut block, &mut Nothing).unwrap();
+        let mut seen = [0; 2];
+        for (ray, (x, y)) in block.rays().iter().zip(x.iter().zip(&y)) {
+            if camera.ray(*x, *y).unwrap().is_from_horizon {
+                assert_eq!(
+                    (ray.outcome, ray.crossing_count, ray.exit),
+                    (Outcome::Captured, 0, None)
+                );
+                assert_eq!(View::Camera(camera).blueshift(*x, *y), None);
+                seen[0] += 1;
+            }
+            seen[1] += usize::from(ray.outcome == Outcome::Escaped);
+        }
+        assert!(seen[0] > 20 && seen[1] > 20, "{seen:?}");
+    }
+}

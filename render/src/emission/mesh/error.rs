@@ -4,9 +4,22 @@
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {
-    /// Not an OBJ file.
-    #[error("not a readable OBJ file: {0}")]
-    Obj(#[from] tobj::LoadError),
+    /// A line of a text that is not understood.
+    #[error("line {line}: {why}")]
+    Line {
+        /// Its number, from 1.
+        line: usize,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// A fault of a file that it refers to.
+    #[error("`{name}`, to which it refers: {error}")]
+    Within {
+        /// The name as it stands in the file.
+        name: String,
+        /// The fault.
+        error: Box<MeshError>,
+    },
     /// Not a glTF or GLB file.
     #[error("not a readable glTF file: {0}")]
     Gltf(#[from] gltf::Error),

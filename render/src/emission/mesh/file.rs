@@ -3,8 +3,9 @@
 use super::MeshError;
 use super::texture::Texture;
 
-/// Reads what a mesh file refers to by a relative name: materials, buffers, pictures.
-pub type Resources<'a> = dyn Fn(&str) -> Result<Vec<u8>, String> + 'a;
+/// Reads what a mesh file refers to by a relative name: materials, buffers, pictures. `Ok(None)` where there is no such
+/// file, an error where it cannot or may not be read.
+pub type Resources<'a> = dyn Fn(&str) -> Result<Option<Vec<u8>>, String> + 'a;
 
 /// A triangle of a file.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,12 +52,19 @@ pub struct MeshFile {
     pub triangles: Vec<RawTriangle>,
     /// Materials.
     pub materials: Vec<Material>,
+    /// What of the file is not shown as it says.
+    pub warnings: Vec<String>,
 }
 
 /// Most triangles of a file: 4 GiB of them.
 const MOST_TRIANGLES: usize = 10_000_000;
 
 impl MeshFile {
+    /// Notes something that is not shown as the file says.
+    pub(super) fn warn(&mut self, what: String) {
+        self.warnings.push(what);
+    }
+
     /// Refuses so many triangles more than it has.
     pub(super) fn affords(&self, more: usize) -> Result<(), MeshError> {
         match self.triangles.len() + more > MOST_TRIANGLES {
@@ -92,6 +100,17 @@ impl MeshFile {
 }
 
 /// Asks for something the file refers to.
-pub(super) fn resource(resources: &Resources<'_>, name: &str) -> Result<Vec<u8>, MeshError> {
-    resources(name).map_err(|why| MeshError::Resource { name: name.to_owned(), why })
+pub(super) fn resource(
+    resources: &Resources<'_>,
+    name: &str,
+) -> Result<Option<Vec<u8>>, MeshError> {
+    // As Windows writes folders.
+    let found = resources(&name.replace('\\', "/"));
+    found.map_err(|why| MeshError::Resource { name: name.to_owned(), why })
+}
+
+/// The same where it must be there.
+pub(super) fn needed(resources: &Resources<'_>, name: &str) -> Result<Vec<u8>, MeshError> {
+    let why = "there is no such file".to_owned();
+    resource(resources, name)?.ok_or_else(|| MeshError::Resource { name: name.to_owned(), why })
 }

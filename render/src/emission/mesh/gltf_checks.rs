@@ -14,6 +14,18 @@ pub(super) fn check(document: &Document, buffers: &[Vec<u8>]) -> Result<(), Mesh
     check_trees(document)
 }
 
+/// Refuses positions that are nowhere, which the crate looks up before it checks them.
+pub(super) fn check_positions(document: &Document) -> Result<(), MeshError> {
+    let json = document.as_json();
+    let count = json.accessors.len();
+    let primitives = json.meshes.iter().flat_map(|mesh| &mesh.primitives);
+    let accessors = primitives.flat_map(|primitive| primitive.attributes.values());
+    match accessors.map(|index| index.value()).find(|k| *k >= count) {
+        Some(k) => fail(format!("accessor {k} of an attribute is not there: the file has {count}")),
+        None => Ok(()),
+    }
+}
+
 fn fail(why: String) -> Result<(), MeshError> {
     Err(MeshError::Content(why))
 }

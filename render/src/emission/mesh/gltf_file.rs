@@ -1,21 +1,22 @@
-//! glTF 2.0, as text or binary. Node transforms are applied; skins, morph targets and animations
-//! are not.
+//! glTF 2.0, as text or binary, in the state of rest that its nodes describe.
 
-use super::file::{Layer, Material, MeshFile, RawTriangle, Resources, resource};
-use super::texture::Texture;
-use super::{MeshError, gltf_checks};
+use super::file::{Layer, Material, MeshFile, RawTriangle, Resources, needed, resource};
+use super::texture::{Placement, Texture, Wrap};
+use super::{MeshError, gltf_checks, gltf_unread};
 use gltf::mesh::Mode;
+use gltf::texture::WrappingMode;
 
 type Matrix = [[f64; 4]; 4];
 
 pub(super) fn decode(bytes: &[u8], resources: &Resources<'_>) -> Result<MeshFile, MeshError> {
+    gltf_checks::check_positions(&gltf::Gltf::from_slice_without_validation(bytes)?.document)?;
     let gltf::Gltf { document, mut blob } = gltf::Gltf::from_slice(bytes)?;
     let buffers = document
         .buffers()
         .map(|buffer| {
             let bytes = match buffer.source() {
                 gltf::buffer::Source::Uri(uri) if !uri.starts_with("data:") => {
-                    resource(resources, uri)?
+                    beside(resources, uri)?
                 }
                 source => gltf::buffer::Data::from_source_and_blob(source, None, &mut blob)?.0,
             };
@@ -31,7 +32,8 @@ pub(super) fn decode(bytes: &[u8], resources: &Resources<'_>) -> Result<MeshFile
         .materials()
         .map(|m| material(&m, &buffers, resources))
         .collect::<Result<_, _>>()?;
-    let mut file = MeshFile { triangles: Vec::new(), materials };
+    let mut file = MeshFile { materials, ..MeshFile::default() };
+    file.warnings = gltf_unread::of(&document);
     let scene = document.default_scene().or_else(|| document.scenes().next());
     let Some(scene) = scene else {
         return Err(MeshError::Content("it holds no scene".to_owned()));
@@ -41,6 +43,7 @@ pub(super) fn decode(bytes: &[u8], resources: &Resources<'_>) -> Result<MeshFile
     while let Some((node, parent)) = nodes.pop() {
         let own = node.transform().matrix().map(|column| column.map(f64::from));
         let matrix = product(parent, own);
+        gltf_unread::refuse(&node)?;
         for primitive in node.mesh().iter().flat_map(|mesh| mesh.primitives()) {
             add_primitive(&primitive, matrix, &buffers, &mut file)?;
         }
@@ -89,6 +92,9 @@ fn add_primitive(
         Some(indices) => indices.into_u32().collect(),
         None => (0..positions.len() as u32).collect(),
     };
+    if !indices.len().is_multiple_of(3) {
+        return fail("a primitive has indices that are no whole number of triangles");
+    }
     file.affords(indices.len() / 3)?;
     let material = primitive.material().index().map_or(u32::MAX, |k| k as u32);
     for corners in indices.chunks_exact(3) {
@@ -126,16 +132,41 @@ fn material(
     })
 }
 
+/// A file that a URI names (RFC 3986), or one that is named so without its escapes.
+fn beside(resources: &Resources<'_>, uri: &str) -> Result<Vec<u8>, MeshError> {
+    match unescaped(uri).filter(|name| name != uri) {
+        None => needed(resources, uri),
+        Some(name) => match resource(resources, &name)? {
+            Some(bytes) => Ok(bytes),
+            None => needed(resources, uri),
+        },
+    }
+}
+
+/// A URI with its escapes, a percent sign and two hexadecimal digits, replaced; `None` if that is no text.
+fn unescaped(uri: &str) -> Option<String> {
+    let (mut bytes, mut rest) = (Vec::with_capacity(uri.len()), uri.as_bytes());
+    while let [first, after @ ..] = rest {
+        let digit = |k: usize| after.get(k).and_then(|c| char::from(*c).to_digit(16));
+        let escaped = (*first == b'%').then(|| Some(16 * digit(0)? + digit(1)?)).flatten();
+        bytes.push(escaped.map_or(*first, |byte| byte as u8));
+        rest = &after[if escaped.is_some() { 2 } else { 0 }..];
+    }
+    String::from_utf8(bytes).ok()
+}
+
 fn picture(
     info: &gltf::texture::Info<'_>,
     buffers: &[Vec<u8>],
     resources: &Resources<'_>,
 ) -> Result<Texture, MeshError> {
-    if info.tex_coord() != 0 {
+    let transform = info.texture_transform();
+    let set = transform.as_ref().and_then(gltf::texture::TextureTransform::tex_coord);
+    if set.unwrap_or(info.tex_coord()) != 0 {
         let why = "a texture uses a second set of coordinates, which is not read".to_owned();
         return Err(MeshError::Content(why));
     }
-    match info.texture().source().source() {
+    let texture = match info.texture().source().source() {
         gltf::image::Source::View { view, .. } => {
             let bytes = buffers
                 .get(view.buffer().index())
@@ -146,6 +177,20 @@ fn picture(
             let source = gltf::buffer::Source::Uri(uri);
             Texture::decode(&gltf::buffer::Data::from_source(source, None)?.0)
         }
-        gltf::image::Source::Uri { uri, .. } => Texture::decode(&resource(resources, uri)?),
-    }
+        gltf::image::Source::Uri { uri, .. } => Texture::decode(&beside(resources, uri)?),
+    }?;
+    let mut placement = transform.map_or_else(Placement::default, |transform| {
+        // Offset · rotation · scale of KHR_texture_transform, counterclockwise where v grows downwards.
+        let ([sx, sy], [ox, oy]) = (transform.scale(), transform.offset());
+        let (sin, cos) = f64::from(transform.rotation()).sin_cos();
+        let [sx, sy, ox, oy] = [sx, sy, ox, oy].map(f64::from);
+        Placement::affine([[cos * sx, sin * sy, ox], [-sin * sx, cos * sy, oy]])
+    });
+    let sampler = info.texture().sampler();
+    placement.wrap = [sampler.wrap_s(), sampler.wrap_t()].map(|mode| match mode {
+        WrappingMode::Repeat => Wrap::Repeat,
+        WrappingMode::MirroredRepeat => Wrap::Mirror,
+        WrappingMode::ClampToEdge => Wrap::Clamp,
+    });
+    Ok(texture.placed(placement))
 }

@@ -6,7 +6,11 @@ mod error;
 mod file;
 mod gltf_checks;
 mod gltf_file;
+mod gltf_unread;
+mod mtl_file;
 mod obj_file;
+mod polygon;
+mod text;
 mod texture;
 
 pub use error::MeshError;

@@ -1,80 +1,234 @@
-//! Wavefront OBJ with its MTL.
+//! Wavefront OBJ: vertices, texture coordinates, faces, and the names of their materials.
 
 use super::MeshError;
-use super::file::{Layer, Material, MeshFile, RawTriangle, Resources, resource};
-use super::texture::Texture;
-use std::cell::RefCell;
+use super::file::{MeshFile, RawTriangle, Resources, resource};
+use super::mtl_file::{self, Materials};
+use super::polygon;
+use super::text::{Line, lines};
+use std::collections::HashMap;
+
+/// Statements that bring no surface and no light of their own.
+const WITHOUT_EFFECT: [&str; 28] = [
+    "vn",
+    "vp",
+    "g",
+    "o",
+    "s",
+    "l",
+    "p",
+    "mg",
+    "bevel",
+    "c_interp",
+    "d_interp",
+    "lod",
+    "shadow_obj",
+    "trace_obj",
+    "cstype",
+    "deg",
+    "bmat",
+    "step",
+    "parm",
+    "trim",
+    "hole",
+    "scrv",
+    "sp",
+    "end",
+    "con",
+    "curv",
+    "curv2",
+    "maplib",
+];
+
+/// Statements that bring surfaces, pictures or files which are not read.
+const REFUSED: [&str; 9] = ["surf", "ctech", "stech", "bsp", "bzp", "cdc", "res", "usemap", "call"];
+
+#[derive(Default)]
+struct Reader {
+    positions: Vec<[f64; 3]>,
+    places: Vec<[f32; 2]>,
+    normals: usize,
+    /// Numbers of the names of materials; their names.
+    named: HashMap<String, u32>,
+    names: Vec<String>,
+    current: Option<u32>,
+    bent: Vec<usize>,
+    colored: Vec<usize>,
+    unknown: Vec<(usize, String)>,
+    materials: Materials,
+    file: MeshFile,
+}
 
 pub(super) fn decode(bytes: &[u8], resources: &Resources<'_>) -> Result<MeshFile, MeshError> {
-    check_numbers(bytes)?;
-    let options = tobj::LoadOptions { triangulate: true, single_index: true, ..Default::default() };
-    // The crate drops what went wrong with a material file.
-    let failed = RefCell::new(None);
-    let load = |path: &std::path::Path| {
-        let bytes = resource(resources, &path.to_string_lossy()).map_err(|error| {
-            failed.borrow_mut().get_or_insert(error);
-            tobj::LoadError::OpenFileFailed
-        })?;
-        tobj::load_mtl_buf(&mut bytes.as_slice())
-    };
-    let (models, materials) = tobj::load_obj_buf(&mut &*bytes, &options, load)?;
-    if let Some(error) = failed.into_inner() {
-        return Err(error);
+    let mut reader = Reader::default();
+    for line in lines(bytes)? {
+        reader.statement(&line, resources)?;
     }
-    let materials = materials?.iter().map(|m| material(m, resources)).collect::<Result<_, _>>()?;
-    let triangles = models.iter().flat_map(|model| triangles(&model.mesh)).collect();
-    Ok(MeshFile { triangles, materials })
+    Ok(reader.finish())
 }
 
-/// Refuses vertices of faces and lines whose numbers the crate would take beyond its own: more than ten digits.
-fn check_numbers(bytes: &[u8]) -> Result<(), MeshError> {
-    for (k, line) in bytes.split(|byte| *byte == b'\n').enumerate() {
-        let [b'f' | b'l', b' ' | b'\t', rest @ ..] = line.trim_ascii_start() else { continue };
-        if rest.split(|byte| !byte.is_ascii_digit()).any(|digits| digits.len() > 10) {
-            return Err(MeshError::Content(format!(
-                "line {}: the number of a vertex has more than ten digits",
-                k + 1
-            )));
+impl Reader {
+    fn statement(&mut self, line: &Line<'_>, resources: &Resources<'_>) -> Result<(), MeshError> {
+        match line.keyword() {
+            "v" => self.vertex(line)?,
+            "vt" => {
+                let [u, v] = line.numbers_up_to("texture coordinates", 1..=3, [0.0; 2])?;
+                // v grows upwards in OBJ.
+                self.places.push([u as f32, 1.0 - v as f32]);
+            }
+            "f" | "fo" => self.face(line)?,
+            "usemtl" => self.current = Some(self.material(line.rest())),
+            "mtllib" => self.library(line, resources)?,
+            known if REFUSED.contains(&known) => {
+                return Err(
+                    line.fails(format!("`{known}` is not read: export triangles or polygons"))
+                );
+            }
+            known if WITHOUT_EFFECT.contains(&known) => self.normals += usize::from(known == "vn"),
+            other => self.unknown.push((line.number, other.chars().take(20).collect())),
+        }
+        Ok(())
+    }
+
+    /// Coordinates, perhaps with a weight of 1 or with a colour behind them.
+    fn vertex(&mut self, line: &Line<'_>) -> Result<(), MeshError> {
+        let [x, y, z, weight] = line.numbers_up_to("coordinates", 3..=7, [0.0, 0.0, 0.0, 1.0])?;
+        let count = line.words().count();
+        if matches!(count, 4 | 5) && weight != 1.0 {
+            return Err(line.fails(format!("the weight {weight} of a vertex is not allowed: 1")));
+        }
+        if count > 4 {
+            self.colored.push(line.number);
+        }
+        self.positions.push([x, y, z]);
+        Ok(())
+    }
+
+    fn material(&mut self, name: &str) -> u32 {
+        let next = self.names.len() as u32;
+        let names = &mut self.names;
+        *self.named.entry(name.to_owned()).or_insert_with(|| {
+            names.push(name.to_owned());
+            next
+        })
+    }
+
+    fn face(&mut self, line: &Line<'_>) -> Result<(), MeshError> {
+        let corners = line.words().map(|word| self.corner(line, word));
+        let corners = corners.collect::<Result<Vec<_>, _>>()?;
+        if corners.len() < 3 {
+            return Err(
+                line.fails(format!("a face of {} corners: 3 or more are needed", corners.len()))
+            );
+        }
+        self.file.affords(corners.len() - 2)?;
+        let places: Vec<[f64; 3]> = corners.iter().map(|(k, _)| self.positions[*k]).collect();
+        let cut = polygon::cut(&places).map_err(|why| line.fails(why.to_string()))?;
+        if !cut.flat {
+            self.bent.push(line.number);
+        }
+        let material = self.current.unwrap_or(u32::MAX);
+        let place = |k: Option<usize>| k.map_or([0.0; 2], |k| self.places[k]);
+        self.file.triangles.extend(cut.triangles.iter().map(|triangle| RawTriangle {
+            corners: triangle.map(|k| places[k]),
+            texture: triangle.map(|k| place(corners[k].1)),
+            material,
+        }));
+        Ok(())
+    }
+
+    /// Vertex and texture coordinates of a corner, `v/vt/vn`, counted from 0.
+    fn corner(&self, line: &Line<'_>, word: &str) -> Result<(usize, Option<usize>), MeshError> {
+        let mut parts = word.split('/');
+        let index = |part: &str, what: &str, count: usize| {
+            let index: Option<i64> = part.parse().ok();
+            let found = index.and_then(|k| match k {
+                1.. => usize::try_from(k - 1).ok(),
+                _ => count.checked_sub(usize::try_from(k.unsigned_abs()).ok()?),
+            });
+            found.filter(|k| *k < count).ok_or_else(|| {
+                line.fails(format!(
+                    "{what} {part} of a face is not allowed: 1 to {count}, or -{count} to -1"
+                ))
+            })
+        };
+        let vertex = index(parts.next().unwrap_or_default(), "vertex", self.positions.len())?;
+        let filled =
+            |part: Option<&'_ str>| part.filter(|part| !part.is_empty()).map(str::to_owned);
+        let place = filled(parts.next());
+        let place =
+            place.map(|part| index(&part, "texture coordinate", self.places.len())).transpose()?;
+        filled(parts.next()).map(|part| index(&part, "normal", self.normals)).transpose()?;
+        match parts.next() {
+            Some(_) => Err(line.fails(format!(
+                "corner {word} of a face is not allowed: v, v/vt, v//vn or v/vt/vn"
+            ))),
+            None => Ok((vertex, place)),
         }
     }
-    Ok(())
-}
 
-fn triangles(mesh: &tobj::Mesh) -> impl Iterator<Item = RawTriangle> + '_ {
-    let material = mesh.material_id.map_or(u32::MAX, |id| id as u32);
-    mesh.indices.chunks_exact(3).filter_map(move |corners| {
-        // Indices were checked by the crate; a file without texture coordinates has none.
-        let position = |k: usize| {
-            let at = 3 * corners[k] as usize;
-            mesh.positions.get(at..at + 3).map(|p| [p[0], p[1], p[2]])
-        };
-        let place = |k: usize| {
-            let at = 2 * corners[k] as usize;
-            // v grows upwards in OBJ.
-            mesh.texcoords.get(at..at + 2).map_or([0.0; 2], |t| [t[0] as f32, 1.0 - t[1] as f32])
-        };
-        let corners = [position(0)?, position(1)?, position(2)?];
-        Some(RawTriangle { corners, texture: [place(0), place(1), place(2)], material })
-    })
-}
+    /// Reads material files: one name, or several with blanks between them.
+    fn library(&mut self, line: &Line<'_>, resources: &Resources<'_>) -> Result<(), MeshError> {
+        let whole = line.rest();
+        let found = resource(resources, whole)?;
+        if let (None, true) = (&found, whole.contains(char::is_whitespace)) {
+            return whole.split_whitespace().try_for_each(|name| {
+                let found = resource(resources, name)?;
+                self.read_library(line, name, found, resources)
+            });
+        }
+        self.read_library(line, whole, found, resources)
+    }
 
-fn material(material: &tobj::Material, resources: &Resources<'_>) -> Result<Material, MeshError> {
-    let single = |c: [f64; 3]| c.map(|c| c as f32);
-    let emissive_texture = material.unknown_param.get("map_Ke");
-    let picture = |name: Option<&String>| {
-        name.map(|name| Texture::decode(&resource(resources, name)?)).transpose()
-    };
-    // A picture of light without a colour is that light.
-    let emission = match (material.emissive, emissive_texture) {
-        (Some(color), _) => single(color),
-        (None, Some(_)) => [1.0; 3],
-        (None, None) => [0.0; 3],
-    };
-    Ok(Material {
-        emission: Layer { color: emission, texture: picture(emissive_texture)? },
-        base: Layer {
-            color: material.diffuse.map_or([1.0; 3], single),
-            texture: picture(material.diffuse_texture.as_ref())?,
-        },
-    })
+    fn read_library(
+        &mut self,
+        line: &Line<'_>,
+        name: &str,
+        bytes: Option<Vec<u8>>,
+        resources: &Resources<'_>,
+    ) -> Result<(), MeshError> {
+        let Some(bytes) = bytes else {
+            let number = line.number;
+            self.file.warn(format!(
+                "line {number}: there is no `{name}`: the materials that it describes are white"
+            ));
+            return Ok(());
+        };
+        let read = mtl_file::decode(&bytes, resources, &mut self.materials);
+        read.map_err(|error| MeshError::Within { name: name.to_owned(), error: Box::new(error) })
+    }
+
+    /// Names become numbers of materials; what was not read is told.
+    fn finish(mut self) -> MeshFile {
+        let known: Vec<u32> = self.names.iter().map(|name| self.materials.number(name)).collect();
+        for triangle in &mut self.file.triangles {
+            triangle.material = known.get(triangle.material as usize).copied().unwrap_or(u32::MAX);
+        }
+        let without = self.names.iter().zip(&known).filter(|(_, k)| **k == u32::MAX);
+        let without: Vec<&str> = without.map(|(name, _)| name.as_str()).collect();
+        if let ([first, ..], false) = (&without[..], self.materials.all.is_empty()) {
+            let count = without.len();
+            self.file.warn(format!(
+                "materials that no MTL file describes are white: {count}, the first is `{first}`"
+            ));
+        }
+        if let [first, ..] = self.bent[..] {
+            let count = self.bent.len();
+            self.file.warn(format!(
+                "polygons that are not flat are cut as seen along their mean normal: {count}, the first on line {first}"
+            ));
+        }
+        if let [first, ..] = self.colored[..] {
+            let count = self.colored.len();
+            self.file.warn(format!(
+                "colours of vertices are not read: {count}, the first on line {first}"
+            ));
+        }
+        if let [(first, word), ..] = &self.unknown[..] {
+            let count = self.unknown.len();
+            self.file.warn(format!("lines that are no statements of OBJ are left out: {count}, the first is line {first}, `{word}`"));
+        }
+        self.file.warnings.extend(self.materials.warnings);
+        self.file.materials = self.materials.all;
+        self.file
+    }
 }

@@ -15,8 +15,15 @@ f 1/1 2/2 3/3 4/4
 
 const MTL: &str = "newmtl lamp\nKd 0.1 0.2 0.3\nKe 2 1 0\n";
 
-fn none(name: &str) -> Result<Vec<u8>, String> {
+fn none(name: &str) -> Result<Option<Vec<u8>>, String> {
     Err(format!("no {name} here"))
+}
+
+/// Bytes of the files of these names.
+fn files<'a>(
+    list: &'a [(&'a str, &'a [u8])],
+) -> impl Fn(&str) -> Result<Option<Vec<u8>>, String> + 'a {
+    |name| Ok(list.iter().find(|(own, _)| *own == name).map(|(_, bytes)| bytes.to_vec()))
 }
 
 fn scene_mesh(color: Option<[f32; 3]>) -> Mesh {
@@ -35,11 +42,7 @@ fn scene_mesh(color: Option<[f32; 3]>) -> Mesh {
 
 #[test]
 fn exact_obj_with_material_in_its_place() {
-    let file = MeshFile::decode(OBJ.as_bytes(), &|name| {
-        assert_eq!(name, "paint.mtl");
-        Ok(MTL.as_bytes().to_vec())
-    })
-    .unwrap();
+    let file = MeshFile::decode(OBJ.as_bytes(), &files(&[("paint.mtl", MTL.as_bytes())])).unwrap();
     assert_eq!(file.triangles.len(), 2);
     let model = MeshModel::new(&scene_mesh(None), &file).unwrap();
     // (1, 0, 0) becomes twice as long, points to +y, and is moved by 10 along x.
@@ -114,9 +117,12 @@ fn files_that_are_no_meshes_say_why() {
     assert!(error(OBJ.as_bytes()).contains("`paint.mtl`"));
     assert!(error(b"v 0 0 0\n").contains("no triangles"));
     assert!(error(b"v 0 0 0\nv 1 0 0\nv nan 1 0\nf 1 2 3\n").contains("not a finite number"));
-    assert!(error(b"v 0 0 0\nf 1 2 3\n").contains("OBJ"));
+    assert_eq!(
+        error(b"v 0 0 0\nf 1 2 3\n"),
+        "line 2: vertex 2 of a face is not allowed: 1 to 1, or -1 to -1"
+    );
     let wraps = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//-6148914691236517207 2//1 3//1\n";
-    assert!(error(wraps).contains("line 5: the number of a vertex"));
+    assert!(error(wraps).starts_with("line 5: normal -6148914691236517207"));
     assert!(error(b"glTF\x02\0\0\0").contains("glTF"));
     assert!(error(b"{\"asset\":").contains("glTF"));
     assert!(error(&[0xff, 0xfe, 0x00]).contains("OBJ"));
@@ -131,11 +137,9 @@ fn exact_textures_by_coordinates() {
     let mut png = Vec::new();
     let mut cursor = std::io::Cursor::new(&mut png);
     picture.write_to(&mut cursor, image::ImageFormat::Png).unwrap();
-    let file = MeshFile::decode(OBJ.as_bytes(), &|name| match name {
-        "paint.mtl" => Ok(b"newmtl lamp\nmap_Ke columns.png\n".to_vec()),
-        _ => Ok(png.clone()),
-    })
-    .unwrap();
+    let library = b"newmtl lamp\nmap_Ke columns.png\n";
+    let beside = [("paint.mtl", &library[..]), ("columns.png", &png[..])];
+    let file = MeshFile::decode(OBJ.as_bytes(), &files(&beside)).unwrap();
     let flat = Mesh { scale: 1.0, position: [0.0; 3], rotation_deg: 0.0, ..scene_mesh(None) };
     let model = MeshModel::new(&flat, &file).unwrap();
     let light = |x, y| {
@@ -144,4 +148,155 @@ fn exact_textures_by_coordinates() {
     };
     assert!(light(0.25, 0.1) < 1e-6 && light(0.25, 0.8) < 1e-6);
     assert!((light(0.75, 0.1) - 0.5).abs() < 1e-6 && (light(0.75, 0.9) - 0.5).abs() < 1e-6);
+}
+
+fn error(bytes: &[u8], beside: &[(&str, &[u8])]) -> String {
+    MeshFile::decode(bytes, &files(beside)).unwrap_err().to_string()
+}
+
+/// Continued lines, a byte order mark, Windows' ends of lines, indices from behind.
+#[test]
+fn exact_lines_of_obj_as_other_programs_write_them() {
+    let plain =
+        MeshFile::decode(b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n", &none).unwrap();
+    let odd = "\u{feff}v 0 0 0\r\nv 1 \\\r\n 0 0 # corner\r\nv 1 1 0 1.0\r\nv 0 1 0\r\nf -4 2 \\\r\n-2 4\r\n";
+    let odd = MeshFile::decode(odd.as_bytes(), &none).unwrap();
+    assert_eq!(odd.triangles, plain.triangles);
+    assert!(odd.warnings.is_empty() && plain.warnings.is_empty());
+    let told = b"v 0 0 0 1 0 0\nv 1 0 0\nv 1 1 0\nwhat is this\nusemtl x\nf 1 2 3\nmtllib no.mtl\n";
+    let told = MeshFile::decode(told, &files(&[])).unwrap();
+    let all = told.warnings.join("\n");
+    for part in ["there is no `no.mtl`", "colours of vertices", "line 4, `what`"] {
+        assert!(all.contains(part), "{all}");
+    }
+}
+
+#[test]
+fn exact_statements_of_obj_that_are_not_read_say_where() {
+    let start = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    for (line, said) in [
+        ("surf 0 1 0 1 1 2 3", "line 4: `surf` is not read"),
+        ("f 1 2", "line 4: a face of 2 corners"),
+        ("f 1 2 0", "line 4: vertex 0 of a face is not allowed: 1 to 3"),
+        ("f 1 2 3/1", "line 4: texture coordinate 1 of a face"),
+        ("f 1 2 99999999999999999999", "line 4: vertex 99999999999999999999"),
+        ("f 1 2 3/1/1/1", "line 4: texture coordinate 1"),
+        ("v 1 2", "line 4: 2 coordinates: 3 to 7 are allowed"),
+        ("v 1 2 3 2", "line 4: the weight 2 of a vertex"),
+        ("v 1 2 three", "line 4: coordinates: `three` is no number"),
+        ("v 1 1 0\nf 1 4 2 3", "line 5: the outline of the polygon crosses itself"),
+    ] {
+        let found = error(format!("{start}{line}\n").as_bytes(), &[]);
+        assert!(found.starts_with(said), "{found}");
+    }
+    let library = |text: &str| error(OBJ.as_bytes(), &[("paint.mtl", text.as_bytes())]);
+    assert!(
+        library("newmtl a\nKd spectral x.rfl\n")
+            .contains("`paint.mtl`, to which it refers: line 2: Kd spectral")
+    );
+    assert!(library("newmtl a\nmap_Kd -mm 0 2 x.png\n").contains("option -mm 0 2 is not read"));
+    assert!(library("newmtl a\nmap_Kd no.png\n").contains("`no.png`, to which it refers"));
+    assert!(error(b"ply\nformat ascii 1.0\n", &[]).contains("PLY files are not read"));
+}
+
+/// A picture of two columns, dark and light.
+fn columns() -> Vec<u8> {
+    let mut picture = image::RgbImage::new(2, 1);
+    picture.put_pixel(1, 0, image::Rgb([255, 255, 255]));
+    let mut png = std::io::Cursor::new(Vec::new());
+    picture.write_to(&mut png, image::ImageFormat::Png).unwrap();
+    png.into_inner()
+}
+
+/// Options -s and -o of a texture scale and move coordinates whose v grows upwards.
+#[test]
+fn exact_scale_and_offset_of_textures() {
+    let png = columns();
+    let shade = |options: &str, u: f64| {
+        let library = format!("newmtl lamp\nmap_Kd {options}a b.png\n");
+        let beside = [("paint.mtl", library.as_bytes()), ("a b.png", &png[..])];
+        let file = MeshFile::decode(OBJ.as_bytes(), &files(&beside)).unwrap();
+        file.materials[0].base.at(|| [u as f32, 0.5])[0]
+    };
+    assert!(shade("", 0.25) < 1e-6 && shade("", 0.75) > 1.0 - 1e-6);
+    assert!(shade("-s 2 ", 0.375) > 1.0 - 1e-6 && shade("-s 2 1 1 -blendu on ", 0.625) < 1e-6);
+    assert!(shade("-o 0.5 0 0 ", 0.25) > 1.0 - 1e-6);
+}
+
+/// What glTF says of a texture: wrap modes of its sampler, KHR_texture_transform; names with escapes.
+#[test]
+fn exact_textures_of_gltf() {
+    let png = columns();
+    let shade = |sampler: &str, transform: &str, u: f32| {
+        let info =
+            format!(r#"{{"index":0,"extensions":{{"KHR_texture_transform":{{{transform}}}}}}}"#);
+        let material = format!(r#""emissiveFactor":[1,1,1],"emissiveTexture":{info}"#);
+        let text = gltf(36).replace(r#""emissiveFactor":[0.5,0.5,0.25]"#, &material).replace(
+            r#""accessors""#,
+            &format!(
+                r#""extensionsUsed":["KHR_texture_transform"],"samplers":[{{{sampler}}}],
+                "textures":[{{"source":0,"sampler":0}}],"images":[{{"uri":"a%20b.png"}}],"accessors""#
+            ),
+        );
+        let file = MeshFile::decode(text.as_bytes(), &files(&[("a b.png", &png)])).unwrap();
+        assert!(file.warnings.is_empty(), "{:?}", file.warnings);
+        file.materials[0].emission.at(|| [u, 0.5])[0]
+    };
+    let near = |found: f32, expected: f32| assert!((found - expected).abs() < 1e-6, "{found}");
+    near(shade("", "", 1.25), 0.0);
+    near(shade(r#""wrapS":33648"#, "", 1.25), 1.0);
+    near(shade(r#""wrapS":33071"#, "", 1.25), 1.0);
+    near(shade("", r#""offset":[0.5,0]"#, 1.25), 1.0);
+    near(shade("", r#""scale":[3,1]"#, 0.25), 1.0);
+    // The extension's own example: the lower left quarter, where u is half of v.
+    let quarter = r#""offset":[0,1],"rotation":1.57079632679,"scale":[0.5,0.5]"#;
+    near(shade("", quarter, 0.3), 0.0);
+    // By 180 degrees: u becomes -u.
+    near(shade("", r#""rotation":3.14159265"#, 0.25), 1.0);
+}
+
+#[test]
+fn exact_what_gltf_moves_is_refused_and_the_rest_told() {
+    let with = |from: &str, to: &str| {
+        let text = gltf(36).replace(from, to);
+        assert!(text != gltf(36), "{from}");
+        MeshFile::decode(text.as_bytes(), &none)
+    };
+    let primitive = r#"[{"primitives":[{"attributes":{"POSITION":0},"material":0}]"#;
+    let morph = r#"[{"primitives":[{"attributes":{"POSITION":0},"targets":[{"POSITION":0}],"material":0}],"weights":[0.5]"#;
+    let said = with(primitive, morph).unwrap_err().to_string();
+    assert!(said.contains("node 0 (counted from 0) has morph targets"), "{said}");
+    assert!(with(primitive, &morph.replace("0.5", "0")).is_ok());
+    let skin = with(r#"{"mesh":0"#, r#"{"skin":0,"mesh":0"#);
+    assert!(skin.is_err(), "a skin that is not there");
+    let skinned = gltf(36)
+        .replace(r#"{"mesh":0"#, r#"{"skin":0,"mesh":0"#)
+        .replace(r#""materials""#, r#""skins":[{"joints":[0]}],"materials""#);
+    let said = MeshFile::decode(skinned.as_bytes(), &none).unwrap_err().to_string();
+    assert!(said.contains("has a skin, which is not read"), "{said}");
+    let clear = with(r#""emissiveFactor""#, r#""alphaMode":"BLEND","emissiveFactor""#).unwrap();
+    assert!(clear.warnings[0].contains("transparent materials"), "{:?}", clear.warnings);
+    let used =
+        with(r#""accessors""#, r#""extensionsUsed":["EXT_mesh_gpu_instancing"],"accessors""#);
+    assert_eq!(used.unwrap().warnings, ["extension EXT_mesh_gpu_instancing is not read"]);
+}
+
+/// Files cut short or with a byte changed give a mesh or an error, never a panic.
+#[test]
+fn regress_damaged_files_are_refused() {
+    let mtl = "newmtl lamp\nKd 0.1 0.2 0.3\nmap_Kd -s 1 1 1 -o 2 x.png\nKe 2 1 0\n";
+    let bent = "v 0 0 0\nv 9 0 1\nv 9 9 0\nv 4 1 \\\n 0\nv 0 9 0 1\nvt 0\nf -1 -2//  3 4/1 5\n";
+    for text in [OBJ, mtl, bent, &gltf(36)] {
+        for at in 0..text.len() {
+            for byte in [None, Some(b'-'), Some(b'9'), Some(b' '), Some(b'/'), Some(0xff)] {
+                let mut bytes = text.as_bytes().to_vec();
+                match byte {
+                    None => bytes.truncate(at),
+                    Some(byte) => bytes[at] = byte,
+                }
+                let _ = MeshFile::decode(&bytes, &files(&[("paint.mtl", MTL.as_bytes())]));
+                let _ = MeshFile::decode(OBJ.as_bytes(), &files(&[("paint.mtl", &bytes)]));
+            }
+        }
+    }
 }

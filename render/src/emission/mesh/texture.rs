@@ -4,13 +4,46 @@ use super::MeshError;
 use crate::image::decode::{Colors, dimensions, linear_colors};
 use kerrlight_common::memory;
 
-/// A picture in linear colour that repeats in both directions.
+/// A picture in linear colour.
 #[derive(Debug, Clone)]
 pub struct Texture {
     width: usize,
     height: usize,
     pixels: Vec<[f32; 3]>,
+    placement: Placement,
 }
+
+/// What a picture shows outside of its edges, along one coordinate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Wrap {
+    /// The same again.
+    #[default]
+    Repeat,
+    /// Its mirror image.
+    Mirror,
+    /// The pixels of its edge.
+    Clamp,
+}
+
+/// How coordinates of a mesh become those of a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Placement {
+    /// Rows of a matrix on (u, v, 1); none where nothing is changed.
+    affine: Option<[[f64; 3]; 2]>,
+    /// Along u and v.
+    pub wrap: [Wrap; 2],
+}
+
+impl Placement {
+    /// Coordinates through a matrix on (u, v, 1), and a picture that repeats.
+    pub fn affine(rows: [[f64; 3]; 2]) -> Self {
+        let same = rows == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        Placement { affine: (!same).then_some(rows), wrap: [Wrap::Repeat; 2] }
+    }
+}
+
+/// Largest value of a picture's colour, as of a material's.
+const BRIGHTEST: f32 = 1e6;
 
 impl Texture {
     /// Decodes a PNG or JPEG picture in sRGB.
@@ -26,22 +59,56 @@ impl Texture {
         if width == 0 || height == 0 {
             return Err(MeshError::Content("a texture has no pixels".to_owned()));
         }
-        Ok(Texture { width, height, pixels })
+        let is_color = |c: &f32| (0.0..=BRIGHTEST).contains(c);
+        if let Some(k) = pixels.iter().position(|pixel| !pixel.iter().all(is_color)) {
+            let (row, column, pixel) = (k / width + 1, k % width + 1, pixels[k]);
+            return Err(MeshError::Content(format!(
+                "a texture, row {row}, column {column}: R, G, B = {pixel:?} are not allowed: [0, {BRIGHTEST:e}]"
+            )));
+        }
+        Ok(Texture { width, height, pixels, placement: Placement::default() })
+    }
+
+    /// The same with coordinates of its own.
+    pub fn placed(self, placement: Placement) -> Self {
+        Texture { placement, ..self }
     }
 
     /// Bilinear look-up at texture coordinates, v growing downwards.
-    pub fn color_at(&self, [u, v]: [f32; 2]) -> [f32; 3] {
-        let split = |x: f32, size: usize| {
-            let at = f64::from(x).rem_euclid(1.0) * size as f64 - 0.5;
-            let cell = at.floor();
-            let wrap = |k: f64| k.rem_euclid(size as f64) as usize % size;
-            (wrap(cell), wrap(cell + 1.0), (at - cell) as f32)
+    pub fn color_at(&self, place: [f32; 2]) -> [f32; 3] {
+        let [u, v] = match self.placement.affine {
+            None => place.map(f64::from),
+            Some(rows) => {
+                let [u, v] = place.map(f64::from);
+                rows.map(|[a, b, c]| a * u + b * v + c)
+            }
         };
-        let ((x0, x1, tx), (y0, y1, ty)) = (split(u, self.width), split(v, self.height));
+        let [across, down] = self.placement.wrap;
+        let (x0, x1, tx) = across.neighbours(u, self.width);
+        let (y0, y1, ty) = down.neighbours(v, self.height);
         let at = |x: usize, y: usize| self.pixels[y * self.width + x];
         let (a, b, c, d) = (at(x0, y0), at(x1, y0), at(x0, y1), at(x1, y1));
         core::array::from_fn(|k| {
             (1.0 - ty) * ((1.0 - tx) * a[k] + tx * b[k]) + ty * ((1.0 - tx) * c[k] + tx * d[k])
         })
+    }
+}
+
+impl Wrap {
+    /// The pixels on both sides of a coordinate, and the weight of the second.
+    fn neighbours(self, x: f64, size: usize) -> (usize, usize, f32) {
+        let inside = match self {
+            Wrap::Repeat => x.rem_euclid(1.0),
+            Wrap::Mirror => 1.0 - (x.rem_euclid(2.0) - 1.0).abs(),
+            Wrap::Clamp => x.clamp(0.0, 1.0),
+        };
+        let at = inside * size as f64 - 0.5;
+        let cell = at.floor();
+        let pixel = |k: f64| match self {
+            Wrap::Repeat => k.rem_euclid(size as f64) as usize % size,
+            // Beyond the edge there is the edge again.
+            Wrap::Mirror | Wrap::Clamp => (k.max(0.0) as usize).min(size - 1),
+        };
+        (pixel(cell), pixel(cell + 1.0), (at - cell) as f32)
     }
 }

@@ -19,6 +19,7 @@ pub struct CatalogueStar {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Catalogue {
     stars: Vec<CatalogueStar>,
+    warnings: Vec<String>,
 }
 
 /// Why a text is no catalogue.
@@ -94,15 +95,39 @@ impl Line<'_> {
         CatalogueError::Value { line, column, value, allowed }
     }
 
-    fn star(&self) -> Result<CatalogueStar, CatalogueError> {
+    /// The star of a line; what is odd about it where it has no light that is known.
+    fn star(&self) -> Result<Result<CatalogueStar, Odd>, CatalogueError> {
         let lon = self.needed(0, [-360.0, 360.0], "an angle in [-360, 360]")?.to_radians();
         let lat = self.needed(1, [-90.0, 90.0], "an angle in [-90, 90]")?.to_radians();
-        let magnitude = self.needed(2, [-30.0, 40.0], "a magnitude in [-30, 40]")?;
-        let index = self.number(3, [-0.6, 6.0], "a colour index B - V in [-0.6, 6]")?;
+        let magnitude = self.number(2, [-30.0, 40.0], "a magnitude in [-30, 40]")?;
+        let Some(magnitude) = magnitude else { return Ok(Err(Odd::Magnitude)) };
+        let index = self.number(3, [f64::MIN, f64::MAX], "a colour index B - V")?;
+        if index.is_some_and(|index| !COLOR_INDEX.contains(&index)) {
+            return Ok(Err(Odd::ColorIndex));
+        }
         let direction = [lat.cos() * lon.cos(), lat.cos() * lon.sin(), lat.sin()];
         let light = 10f64.powf(-0.4 * magnitude);
         let tint = index.map_or([1.0; 3], tint);
-        Ok(CatalogueStar { direction, light: tint.map(|c| (light * f64::from(c)) as f32) })
+        Ok(Ok(CatalogueStar { direction, light: tint.map(|c| (light * f64::from(c)) as f32) }))
+    }
+}
+
+/// Colour indices B − V for which a temperature is known.
+const COLOR_INDEX: core::ops::RangeInclusive<f64> = -0.6..=6.0;
+
+/// Why a star is left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Odd {
+    Magnitude,
+    ColorIndex,
+}
+
+impl Odd {
+    fn describe(self) -> &'static str {
+        match self {
+            Odd::Magnitude => "have no magnitude",
+            Odd::ColorIndex => "have a colour index B - V outside of [-0.6, 6]",
+        }
     }
 }
 
@@ -115,12 +140,13 @@ fn tint(index: f64) -> [f32; 3] {
 
 impl Catalogue {
     /// Reads a table with commas between its columns, whose first line names them; lines that are empty or begin with #
-    /// are left out.
+    /// are left out, as are stars without a magnitude or with a colour index for which there is no temperature.
     ///
     /// # Errors
     /// If a column is missing or a value is no number in its range.
     pub fn decode(bytes: &[u8]) -> Result<Self, Error> {
         let text = core::str::from_utf8(bytes).map_err(|_| CatalogueError::Text)?;
+        let text = text.trim_start_matches('\u{feff}');
         let lines = text.lines().enumerate().map(|(k, line)| (k + 1, line.trim()));
         let mut lines = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
         let (_, names) = lines.next().unwrap_or_default();
@@ -133,7 +159,28 @@ impl Catalogue {
             let fields = line.split(',').map(str::trim).collect();
             Line { number, fields, places }.star()
         };
-        Ok(Catalogue { stars: lines.map(star).collect::<Result<_, _>>()? })
+        let (mut catalogue, mut odd) = (Catalogue::default(), Vec::new());
+        for (number, line) in lines {
+            match star((number, line))? {
+                Ok(star) => catalogue.stars.push(star),
+                Err(why) => odd.push((number, why)),
+            }
+        }
+        for kind in [Odd::Magnitude, Odd::ColorIndex] {
+            let mut lines = odd.iter().filter(|(_, why)| *why == kind);
+            if let Some((first, _)) = lines.next() {
+                let (count, why) = (1 + lines.count(), kind.describe());
+                let told =
+                    format!("stars that {why} are left out: {count}, the first on line {first}");
+                catalogue.warnings.push(told);
+            }
+        }
+        Ok(catalogue)
+    }
+
+    /// Which stars are left out.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 
     /// The stars, in the order of the file.
@@ -154,7 +201,7 @@ pub struct CatalogueSky {
 }
 
 impl CatalogueSky {
-    pub(super) fn new(settings: &StarCatalogue, Catalogue { mut stars }: Catalogue) -> Self {
+    pub(super) fn new(settings: &StarCatalogue, Catalogue { mut stars, .. }: Catalogue) -> Self {
         let cells = Cells::about((stars.len() as f64).clamp(32.0, 1e6));
         stars.sort_by_key(|star| cells.holding(star.direction));
         let before = |k| stars.partition_point(|star| cells.holding(star.direction) < k);
@@ -203,8 +250,21 @@ mod tests {
         assert!(fail("lon,lat\n1,2\n").contains("no column magnitude"));
         let said = fail("lon,lat,mag\n1,2,3\n4,95,6\n");
         assert!(said.starts_with("line 3: lat = \"95\" is not allowed"), "{said}");
+        assert!(fail("lon,lat,mag,bv\n1,2,3,nan\n").contains("color_index = \"nan\""));
         assert!(fail("lon,lat,mag\n1,2,bright\n").contains("magnitude = \"bright\""));
         assert!(Catalogue::decode(&[0xff, 0xfe]).is_err());
+    }
+
+    #[test]
+    fn exact_odd_stars_are_left_out_and_counted() {
+        let text = "\u{feff}lon,lat,mag,bv\n1,2,3,0.5\n1,2,,0.5\n3,4,5,-7\n1,2,,\n";
+        let catalogue = Catalogue::decode(text.as_bytes()).unwrap();
+        assert_eq!(catalogue.stars.len(), 1);
+        let expected = [
+            "stars that have no magnitude are left out: 2, the first on line 3",
+            "stars that have a colour index B - V outside of [-0.6, 6] are left out: 1, the first on line 4",
+        ];
+        assert_eq!(catalogue.warnings(), expected);
     }
 
     /// Every star is found, wherever beams lie: side by side they have all of its light.

@@ -6,6 +6,7 @@
 mod beam;
 mod catalogue;
 mod cells;
+mod exr_sky;
 mod panorama;
 mod stars;
 

@@ -1,8 +1,9 @@
 //! An equirectangular picture of the whole sky.
 
 use super::beam::Beam;
+use super::exr_sky;
 use crate::Error;
-use crate::image::decode::{Colors, dimensions, linear_colors};
+use crate::image::decode::{Colors, dimensions, linear_colors, other_than_srgb};
 use crate::image::exr;
 use core::f64::consts::{PI, TAU};
 use kerrlight_common::memory;
@@ -16,30 +17,11 @@ pub struct Panorama {
     pixels: Vec<[f32; 3]>,
     /// The same with half as many pixels a side, again and again; only where beams ask for it.
     coarser: Vec<Panorama>,
+    warnings: Vec<String>,
 }
 
 /// How an OpenEXR file begins.
 const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
-
-/// Width, height and linear colours of an EXR.
-fn exr_colors(bytes: &[u8]) -> Result<(usize, usize, Vec<[f32; 3]>), PanoramaError> {
-    if !exr::is_whole(bytes).map_err(PanoramaError::exr)? {
-        let message = "an EXR of part of its display window, which would not fit the sky";
-        return Err(PanoramaError::Content(message.to_owned()));
-    }
-    let (picture, _) = exr::decode(bytes).map_err(PanoramaError::exr)?;
-    let named = |names: [&str; 3]| {
-        let [r, g, b] = names.map(|name| picture.channel(name));
-        Some([r?, g?, b?])
-    };
-    let Some([r, g, b]) = named(["R", "G", "B"]).or_else(|| named(["Y"; 3])) else {
-        let names: Vec<&str> = picture.channels.iter().map(|c| c.name.as_str()).collect();
-        let message = format!("channels {}: R, G, B or Y are expected", names.join(", "));
-        return Err(PanoramaError::Content(message));
-    };
-    let pixels = r.iter().zip(g).zip(b).map(|((r, g), b)| [*r, *g, *b]).collect();
-    Ok((picture.width, picture.height, pixels))
-}
 
 /// Why a picture cannot be the sky.
 #[derive(Debug, thiserror::Error)]
@@ -60,7 +42,7 @@ pub enum PanoramaError {
 }
 
 impl PanoramaError {
-    fn exr(error: Error) -> Self {
+    pub(super) fn exr(error: Error) -> Self {
         PanoramaError::Exr(Box::new(error))
     }
 }
@@ -82,27 +64,44 @@ impl Panorama {
         let what = || format!("a sky of {width} x {height} pixels");
         memory::afford(what, memory::colours(width.into(), height.into()))?;
         if is_exr {
-            let (width, height, pixels) = exr_colors(bytes)?;
+            let (width, height, pixels) = exr_sky::colors(bytes)?;
             return Ok(Self::new(width, height, pixels)?);
         }
         let Colors { width, height, pixels } =
             linear_colors(bytes).map_err(PanoramaError::Decode)?;
-        Ok(Self::new(width, height, pixels)?)
+        let mut sky = Self::new(width, height, pixels)?;
+        let other = other_than_srgb(bytes);
+        sky.warnings.extend(other.map(|says| format!("taken as sRGB, though it has {says}")));
+        Ok(sky)
     }
 
-    fn new(width: usize, height: usize, pixels: Vec<[f32; 3]>) -> Result<Self, PanoramaError> {
+    fn new(width: usize, height: usize, mut pixels: Vec<[f32; 3]>) -> Result<Self, PanoramaError> {
         if width == 0 || height == 0 {
             return Err(PanoramaError::Content("the picture has no pixels".to_owned()));
         }
-        let is_color = |c: &f32| c.is_finite() && *c >= 0.0;
+        let most = pixels.iter().flatten().copied().fold(0.0, f32::max);
+        let least = -SMALL * most;
+        let is_color = |c: &f32| (least..=BRIGHTEST).contains(c);
         if let Some(k) = pixels.iter().position(|pixel| !pixel.iter().all(is_color)) {
             let (row, column, pixel) = (k / width + 1, k % width + 1, pixels[k]);
             let message = format!(
-                "row {row}, column {column}: R, G, B = {pixel:?} are not allowed: finite, 0 or more"
+                "row {row}, column {column}: R, G, B = {pixel:?} are not allowed: numbers in [0, {BRIGHTEST:e}], or below 0 by at \
+                 most {SMALL} of the largest"
             );
             return Err(PanoramaError::Content(message));
         }
-        Ok(Panorama { width, height, pixels, coarser: Vec::new() })
+        let mut warnings = Vec::new();
+        let negative = pixels.iter().filter(|pixel| pixel.iter().any(|c| *c < 0.0)).count();
+        if negative > 0 {
+            pixels.iter_mut().flatten().for_each(|c| *c = c.max(0.0));
+            warnings.push(format!("colours below 0 are taken for 0: {negative} pixels"));
+        }
+        Ok(Panorama { width, height, pixels, coarser: Vec::new(), warnings })
+    }
+
+    /// What of the picture is not shown as it says.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 
     /// Bilinear look-up; azimuth wraps around.
@@ -158,7 +157,7 @@ impl Panorama {
                 pixels.push(sum.map(|c| (c / total) as f32));
             }
         }
-        Panorama { width, height, pixels, coarser: Vec::new() }
+        Panorama { width, height, pixels, coarser: Vec::new(), warnings: Vec::new() }
     }
 
     /// sin θ at the middle of a row.
@@ -233,6 +232,12 @@ impl Panorama {
     }
 }
 
+/// Largest colour, as the brightness of a scene.
+const BRIGHTEST: f32 = 1e12;
+
+/// Colours below 0 by no more than this part of the largest are what lossy compression and changes of primaries leave.
+const SMALL: f32 = 0.01;
+
 /// Rows of the coarsest picture of a pyramid.
 const SMALLEST: usize = 8;
 
@@ -277,9 +282,30 @@ mod tests {
         assert_eq!(said, "channels depth, intensity: R, G, B or Y are expected");
         let said = fail(&picture(&["R", "G", "B"], f32::NAN));
         assert!(said.starts_with("row 1, column 1: R, G, B = [NaN, NaN, NaN]"), "{said}");
+        // Blender's layers, and lower case.
+        let layers = ["ViewLayer.Combined.R", "ViewLayer.Combined.G", "ViewLayer.Combined.B"];
+        let others = ["ViewLayer.Emit.R", "ViewLayer.Emit.G", "ViewLayer.Emit.B"];
+        let v = f32::from(b'V');
+        assert_eq!(color(&picture(&layers, 1.0)), [v; 3]);
+        assert_eq!(color(&picture(&[layers, others].concat(), 1.0)), [v; 3]);
+        assert_eq!(color(&picture(&["r", "g", "b"], 1.0)), [b'r', b'g', b'b'].map(f32::from));
+        let unclear = ["A.R", "A.G", "A.B", "B.R", "B.G", "B.B"];
+        assert!(fail(&picture(&unclear, 1.0)).contains(r#"layers ["A", "B"] have colours"#));
+        assert!(fail(&picture(&["Y", "RY", "BY"], 1.0)).contains("R, G, B or Y are expected"));
+        assert!(fail(&picture(&["Y"], 1e12)).contains("numbers in [0, 1e12]"));
+        assert!(fail(&picture(&["Y"], -1.0)).contains("numbers in [0, 1e12]"));
         let whole = picture(&["Y"], 1.0);
         assert!(fail(&whole[..whole.len() - 9]).contains("damaged"));
         assert!(fail(b"\x89PNG\r\n\x1a\n garbage").starts_with("not a readable PNG"));
+    }
+
+    #[test]
+    fn exact_small_negative_colors_are_dark() {
+        let pixels = vec![[1.0, 0.5, -1.2e-7], [0.0; 3]];
+        let sky = Panorama::new(2, 1, pixels).unwrap();
+        assert_eq!(sky.pixels[0], [1.0, 0.5, 0.0]);
+        assert_eq!(sky.warnings(), ["colours below 0 are taken for 0: 1 pixels"]);
+        assert!(Panorama::new(2, 1, vec![[1.0, 0.5, -0.02], [0.0; 3]]).is_err());
     }
 
     /// Seen from inside, facing −x (azimuth 180°) is at the left and right edges, azimuth 90°
@@ -313,7 +339,8 @@ mod tests {
         };
         let of = |f: &dyn Fn([f64; 3]) -> [f64; 3]| {
             let pixels = (0..width * height).map(|k| f(direction(k)).map(|c| c as f32)).collect();
-            Panorama { width, height, pixels, coarser: Vec::new() }.with_pyramid()
+            Panorama { width, height, pixels, coarser: Vec::new(), warnings: Vec::new() }
+                .with_pyramid()
         };
         let square = of(&|d| d.map(|x| x * x));
         let coarsest = square.coarser.last().unwrap();

@@ -8,6 +8,7 @@ pub use survey::{ChannelSurvey, Survey, survey};
 
 use super::{Channel, Picture};
 use exr::meta::MetaData;
+use exr::meta::attribute::EnvironmentMap;
 use exr::meta::header::LayerAttributes;
 use exr::prelude::{AttributeValue, Error, ReadChannels, ReadLayers, Text, Vec2, read};
 use kerrlight_common::memory;
@@ -112,6 +113,92 @@ pub fn is_whole(bytes: &[u8]) -> Result<bool, crate::Error> {
         let window = header.shared_attributes.display_window;
         (window.position, window.size) == (header.own_attributes.layer_position, header.layer_size)
     }))
+}
+
+/// What the header of the first layer says of the meaning of its pixels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Header {
+    /// Whether it is the six faces of a cube.
+    pub cube: bool,
+    /// Chromaticities of red, green, blue and white, where they are not those of Rec. 709.
+    pub foreign_primaries: Option<[[f32; 2]; 4]>,
+}
+
+/// Chromaticities (CIE x, y) of red, green, blue and white of Rec. 709, which an EXR has unless it says otherwise.
+const REC_709: [[f32; 2]; 4] = [[0.64, 0.33], [0.3, 0.6], [0.15, 0.06], [0.3127, 0.329]];
+
+impl Header {
+    /// The header of the first layer.
+    ///
+    /// # Errors
+    /// If the bytes are no EXR file.
+    pub fn of(bytes: &[u8]) -> Result<Self, crate::Error> {
+        let data = MetaData::read_from_unbuffered(Cursor::new(bytes), true)?;
+        let header = data.headers.first().ok_or(Error::Invalid("no layer".into()))?;
+        let (shared, own) = (&header.shared_attributes, &header.own_attributes);
+        let primaries = shared
+            .chromaticities
+            .map(|c| [c.red, c.green, c.blue, c.white].map(|Vec2(x, y)| [x, y]));
+        let same = |given: &[[f32; 2]; 4]| {
+            given.iter().flatten().zip(REC_709.iter().flatten()).all(|(a, b)| (a - b).abs() < 2e-3)
+        };
+        Ok(Header {
+            cube: matches!(own.environment_map, Some(EnvironmentMap::Cube)),
+            foreign_primaries: primaries.filter(|given| !same(given)),
+        })
+    }
+}
+
+/// Where the pixels of an EXR file are in the picture, its display window.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Window {
+    /// Columns and rows of the picture.
+    pub display: [usize; 2],
+    /// Columns to the left of the pixels.
+    pub left: usize,
+    /// Rows above them.
+    pub top: usize,
+}
+
+/// The place of the pixels of the first layer.
+///
+/// # Errors
+/// If the bytes are no EXR file, pixels are not square or lie outside the display window, or layers of the same size lie
+/// elsewhere.
+pub fn window(bytes: &[u8]) -> Result<Window, crate::Error> {
+    check_size(bytes)?;
+    let data = MetaData::read_from_unbuffered(Cursor::new(bytes), true)?;
+    let refuse = |what: String| crate::Error::from(Error::NotSupported(what.into()));
+    let first = data.headers.first().ok_or_else(|| refuse("no layer".to_owned()))?;
+    let (shared, size) = (&first.shared_attributes, first.layer_size);
+    if shared.pixel_aspect != 1.0 {
+        return Err(refuse(format!(
+            "pixelAspectRatio = {}: square pixels are read",
+            shared.pixel_aspect
+        )));
+    }
+    let (display, at) = (shared.display_window, first.own_attributes.layer_position);
+    let elsewhere = |header: &exr::meta::header::Header| {
+        header.layer_size == size && header.own_attributes.layer_position != at
+    };
+    if data.headers.iter().any(elsewhere) {
+        return Err(refuse("layers with other data windows".to_owned()));
+    }
+    let before = |at: i32, start: i32, size: usize, whole: usize| {
+        let before = usize::try_from(i64::from(at) - i64::from(start)).ok()?;
+        (before.checked_add(size)? <= whole).then_some(before)
+    };
+    let left = before(at.0, display.position.0, size.0, display.size.0);
+    let top = before(at.1, display.position.1, size.1, display.size.1);
+    let (Some(left), Some(top)) = (left, top) else {
+        return Err(refuse("a data window beyond the display window: crop the picture".to_owned()));
+    };
+    let needed = memory::channels(display.size.0 as f64, display.size.1 as f64, 4.0);
+    memory::afford(
+        || format!("a picture of {} x {} pixels", display.size.0, display.size.1),
+        needed,
+    )?;
+    Ok(Window { display: [display.size.0, display.size.1], left, top })
 }
 
 /// The channels and kerrlight's settings of an EXR file: of all parts that are as large as the first, and of those with the

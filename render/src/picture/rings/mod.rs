@@ -152,7 +152,9 @@ impl RingStrata {
     /// without a barrier, NaN where none arrives from the hole's side.
     fn height(&self, x: f64, y: f64) -> f64 {
         match self.view.ray(&self.hole, x, y) {
-            Ok(ray) if ray.inward => ray.potential.barrier.map_or(1.0, |barrier| barrier.height),
+            Ok(ray) if ray.inward && !ray.is_from_horizon => {
+                ray.potential.barrier.map_or(1.0, |barrier| barrier.height)
+            }
             _ => f64::NAN,
         }
     }

@@ -6,7 +6,7 @@ use kerrlight_geodesic::Outcome;
 
 fn file(triangles: impl IntoIterator<Item = [[f64; 3]; 3]>) -> MeshFile {
     let raw = |corners| RawTriangle { corners, texture: [[0.0; 2]; 3], material: u32::MAX };
-    MeshFile { triangles: triangles.into_iter().map(raw).collect(), materials: Vec::new() }
+    MeshFile { triangles: triangles.into_iter().map(raw).collect(), ..MeshFile::default() }
 }
 
 fn quad([a, b, c, d]: [[f64; 3]; 4]) -> [[[f64; 3]; 3]; 2] {

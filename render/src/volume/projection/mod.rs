@@ -7,6 +7,7 @@ mod drawing;
 
 use super::Volume;
 pub use drawing::{Tile, mosaic, sheet};
+use kerrlight_geodesic::interrupt;
 use rayon::prelude::*;
 
 /// From where a volume is seen, by a viewer far away.
@@ -64,6 +65,7 @@ pub fn project(volume: &Volume, view: View, around: &Surroundings, pixels: usize
     let at = |k: usize| around.half_width * ((2 * k + 1) as f64 / pixels as f64 - 1.0);
     let mut light = vec![0.0; pixels * pixels];
     light.par_chunks_mut(pixels.max(1)).enumerate().for_each(|(row, line)| {
+        interrupt::check();
         for (column, pixel) in line.iter_mut().enumerate() {
             *pixel = marcher.light(at(column), -at(row));
         }

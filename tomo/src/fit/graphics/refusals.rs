@@ -20,7 +20,6 @@ pub fn check(
         (training.lbfgs.is_some(), "training.optimiser", "quasi-Newton steps are"),
         (training.penalties.is_some(), "penalty", "penalties are"),
         (training.change.is_some(), "change", "emission that changes while matter carries it is"),
-        (training.parts > 1, "training.parts", "steps in parts are"),
         (model.planes.is_some(), "polarization", "Stokes parameters are"),
         (representation.built_in().is_none(), "representation.kind", "this representation is"),
     ] {

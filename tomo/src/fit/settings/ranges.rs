@@ -131,7 +131,6 @@ const RANGES: &[Range] = &[
     ("training.feature_last_rate", 0.0, 10.0, "a learning rate"),
     ("training.batch.pixels", 1.0, 1e9, "pixels"),
     ("training.batch.frames", 1.0, f64::INFINITY, "frames"),
-    ("training.parts", 1.0, 65536.0, "parts of a step"),
     ("training.log_every", 1.0, f64::INFINITY, "steps"),
     ("training.occupancy.cells", 2.0, 256.0, "cells along each axis"),
     ("training.checkpoint_seconds", 0.0, 1e9, "seconds"),

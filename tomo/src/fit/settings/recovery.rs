@@ -119,9 +119,6 @@ pub struct Training {
     pub ramp: u64,
     /// What a step looks at.
     pub batch: BatchSize,
-    /// Parts that the data of a step are cut into, for ranks to take.
-    #[serde(default = "one_part", skip_serializing_if = "is_one_part")]
-    pub parts: u32,
     /// From where parameters start.
     #[serde(default)]
     pub start: Start,
@@ -271,14 +268,6 @@ fn degree() -> usize {
 }
 fn one() -> f64 {
     1.0
-}
-
-fn one_part() -> u32 {
-    1
-}
-
-fn is_one_part(parts: &u32) -> bool {
-    *parts == 1
 }
 
 fn checkpoint_seconds() -> f64 {

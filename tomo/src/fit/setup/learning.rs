@@ -188,7 +188,6 @@ pub fn training(
         axis_rate,
         ramp: chosen.ramp,
         batch: chosen.batch,
-        parts: chosen.parts as usize,
         occupancy,
         penalties: file.penalties()?,
         change: price(file, times)?,

@@ -16,7 +16,7 @@ use kerrlight_vlbi::data_terms::{
 };
 use kerrlight_vlbi::observation::Observation;
 use kerrlight_vlbi::operator::{Float, ImageGrid, Method, Transform};
-use kerrlight_vlbi::products::ClosureKind;
+use kerrlight_vlbi::products::{ClosureCount, ClosureKind};
 
 impl Measured {
     /// The terms of the loss, of images of so many pixels.
@@ -115,10 +115,27 @@ impl Measured {
         let scans: Vec<Option<Scan<T>>> =
             (0..self.times.len()).map(|frame| self.scan(frame, loss)).collect::<Result<_>>()?;
         if scans.iter().all(Option::is_none) {
-            refuse!("no frame has any {name}");
+            refuse!("no frame has any {name}{}", self.torn(loss));
         }
         let images = images(core::slice::from_ref(loss));
         Ok(ScanTerm::new(name, images * pixels, quadratic, scans))
+    }
+
+    /// Why there are no closure quantities where averages of scans have them.
+    fn torn(&self, loss: &Loss) -> String {
+        let kind = match loss.data {
+            LossKind::ClosurePhases => ClosureKind::Phase,
+            LossKind::LogClosureAmplitudes => ClosureKind::LogAmplitude,
+            _ => return String::new(),
+        };
+        let seen = self.visibilities.as_ref();
+        let count = seen.map(|(seen, _)| ClosureCount::of(seen, kind, 0.0));
+        let of_scans = count.and_then(|count| count.of_scans);
+        of_scans.map_or(String::new(), |of_scans| {
+            format!(
+                ", while averages of scans have {of_scans}: baselines of a scan have different times; set average_s"
+            )
+        })
     }
 
     /// The terms of losses of visibilities, of images of so many pixels, in any precision.

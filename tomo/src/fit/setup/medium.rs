@@ -19,7 +19,7 @@ pub(super) fn correct(
     name: &str,
 ) -> Result<()> {
     if scattering == Some(Scattering::SgrA) {
-        unscatter(observation, &ScatteringKernel::SGR_A).within(name)?;
+        unscatter(observation, &ScatteringKernel::sgr_a()).within(name)?;
     }
     let Some(variability) = variability else { return Ok(()) };
     if is_polarized(losses) {

@@ -13,7 +13,7 @@ use kerrlight_common::frames::Frames;
 use kerrlight_vlbi::array::Array;
 use kerrlight_vlbi::observation::Observation;
 use kerrlight_vlbi::operator::{ImageGrid, Method, Pulse};
-use kerrlight_vlbi::simulate::{self, Movie};
+use kerrlight_vlbi::simulate::{self, Movie, StokesMovie};
 
 impl Measured {
     /// Simulates the data of settings that have a truth, seen by `array` where they have an observation.
@@ -98,14 +98,14 @@ fn fill(
         simulate::fill_from(observation, (sky, &images), pulse, hours)?;
         return Ok(images);
     }
-    let of = |pixels: Vec<f64>| Movie { grid: sky, pixels };
     let mut model = instrument.forward::<f64>(&motion(file, times.to_vec())?)?;
     let mut all = truth.movie_through(&mut model);
     truth.rings.add_to(&mut all, &polarized::PARAMETERS);
-    let [i, q, u] = polarized::split(&all, sky.pixels()).map(of);
-    let lit = lit(truth, Frames::of(i.pixels.clone(), sky.pixels()))?;
-    let movies = [&i, &q, &u];
-    simulate::fill_polarized(observation, movies, pulse, hours, Method::Direct)?;
+    let [i, q, u] = polarized::split(&all, sky.pixels());
+    let lit = lit(truth, Frames::of(i.clone(), sky.pixels()))?;
+    let i = Movie { grid: sky, pixels: i };
+    let movie = StokesMovie { i, polarized: [Some(q), Some(u), None] };
+    simulate::fill_stokes(observation, &movie, pulse, hours, Method::Direct)?;
     Ok(lit)
 }
 

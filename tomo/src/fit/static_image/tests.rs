@@ -169,7 +169,7 @@ fn exact_scattering_and_variability_of_data() {
     for ((a, b), c) in rows(&plain).iter().zip(rows(&varying)).zip(rows(&scattered)) {
         let expected = a.noise_sigma[0].hypot(law.sigma(a.uv[0].hypot(a.uv[1])));
         assert!((b.noise_sigma[0] - expected).abs() < 1e-15 && a.products[0] == b.products[0]);
-        let factor = ScatteringKernel::SGR_A.transform(a.uv, 229.1e9);
+        let factor = ScatteringKernel::sgr_a().transform(a.uv, 229.1e9);
         assert!((c.products[0] * factor - a.products[0]).norm() < 1e-12, "{factor}");
         assert!((c.noise_sigma[0] * factor - a.noise_sigma[0]).abs() < 1e-12 && factor <= 1.0);
     }

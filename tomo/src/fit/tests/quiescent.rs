@@ -21,8 +21,8 @@ fn beside() -> Beside<f64> {
     Beside::new(Box::new(grid()), &image())
 }
 
-fn trainer(representation: &dyn Representation<f64>, parts: usize) -> Trainer<'_, f64> {
-    let training = Training { batch: BatchSize::All, occupancy: None, parts, ..settings() };
+fn trainer(representation: &dyn Representation<f64>) -> Trainer<'_, f64> {
+    let training = Training { batch: BatchSize::All, occupancy: None, ..settings() };
     let mut objective = objective(true, true, true);
     objective.model = forward_model::<f64>(true, true).beside(image()).unwrap();
     Trainer::new(objective, representation, training)
@@ -39,30 +39,28 @@ fn lit() -> Vec<f64> {
     parameters
 }
 
-/// The whole loss along the field, the image and the axis, whole and cut into parts.
+/// The whole loss along the field and the image.
 #[test]
 fn exact_gradient_beside_a_quiescent_image_by_differences() {
     let (representation, parameters) = (beside(), lit());
     let axis = Axis::new([0.3, -0.5, 0.8]).unwrap();
-    for parts in [1, 3] {
-        let mut trainer = trainer(&representation, parts);
-        let mut of_axis = [0.0; 3];
-        let place = Place { parameters: &parameters, axis, occupancy: None, step: 2 };
-        trainer.loss(place, &mut of_axis);
-        let slopes = trainer.gradient().to_vec();
-        let own = parameters.len() - SIDE * SIDE;
-        for range in [0..own, own..parameters.len()] {
-            let way = |k: usize| if range.contains(&k) { (k as f64 * 0.7).cos() } else { 0.0 };
-            let mut at = |h: f64| {
-                let moved: Vec<f64> =
-                    parameters.iter().enumerate().map(|(k, x)| x + h * way(k)).collect();
-                let place = Place { parameters: &moved, axis, occupancy: None, step: 2 };
-                trainer.loss(place, &mut [0.0; 3]).total
-            };
-            let difference = (at(1e-5) - at(-1e-5)) / 2e-5;
-            let product: f64 = slopes.iter().enumerate().map(|(k, g)| g * way(k)).sum();
-            assert!((difference / product - 1.0).abs() < 1e-6, "{difference} {product}");
-        }
+    let mut trainer = trainer(&representation);
+    let mut of_axis = [0.0; 3];
+    let place = Place { parameters: &parameters, axis, occupancy: None, step: 2 };
+    trainer.loss(place, &mut of_axis);
+    let slopes = trainer.gradient().to_vec();
+    let own = parameters.len() - SIDE * SIDE;
+    for range in [0..own, own..parameters.len()] {
+        let way = |k: usize| if range.contains(&k) { (k as f64 * 0.7).cos() } else { 0.0 };
+        let mut at = |h: f64| {
+            let moved: Vec<f64> =
+                parameters.iter().enumerate().map(|(k, x)| x + h * way(k)).collect();
+            let place = Place { parameters: &moved, axis, occupancy: None, step: 2 };
+            trainer.loss(place, &mut [0.0; 3]).total
+        };
+        let difference = (at(1e-5) - at(-1e-5)) / 2e-5;
+        let product: f64 = slopes.iter().enumerate().map(|(k, g)| g * way(k)).sum();
+        assert!((difference / product - 1.0).abs() < 1e-6, "{difference} {product}");
     }
 }
 

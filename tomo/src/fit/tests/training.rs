@@ -15,7 +15,6 @@ pub(super) fn settings() -> Training {
         axis_rate: Some(rate),
         ramp: 3,
         batch: BatchSize::Pixels(30),
-        parts: 1,
         occupancy: Some(OccupancyPlan {
             settings: OccupancySettings { cells: 6, threshold: 0.3, memory: 0.5 },
             warm_up: 10,

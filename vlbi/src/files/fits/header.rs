@@ -145,8 +145,9 @@ impl<'a> Header<'a> {
         };
         let (parameters, groups) = (count("PCOUNT", 0)?, count("GCOUNT", 1)?);
         let numbers = self.group_size()?.checked_add(parameters);
+        let number_size = self.number_size()?;
         numbers
-            .and_then(|numbers| numbers.checked_mul(groups)?.checked_mul(self.number_size().ok()?))
+            .and_then(|numbers| numbers.checked_mul(groups)?.checked_mul(number_size))
             .ok_or_else(|| self.error("GCOUNT", "sizes multiply to more than fits into memory"))
     }
 }
@@ -199,5 +200,10 @@ mod tests {
         assert!(sizes(&["NAXIS   = 1", "NAXIS1  = -3"]).is_err());
         assert!(sizes(&["NAXIS   = 1"]).is_err());
         assert!(sizes(&["NAXIS   = 1e9"]).is_err());
+        for bits in ["0", "x", "nan", "1", "-33"] {
+            let bytes = block(&["SIMPLE  = T", &format!("BITPIX  = {bits}"), "NAXIS   = 0", "END"]);
+            let message = Header::read(&bytes, 0).unwrap().0.data_size().unwrap_err().to_string();
+            assert!(message.contains(&format!("BITPIX = {bits} is not allowed")), "{message}");
+        }
     }
 }

@@ -46,7 +46,14 @@ impl AntennaTables {
                     return Err(fail(row, "this antenna number is taken"));
                 }
             }
-            frequency_hz = frequency_hz.or(unit.header.number("FREQ")?.filter(|f| *f > 0.0));
+            let own = unit.header.number("FREQ")?.filter(|f| *f > 0.0);
+            match (frequency_hz, own) {
+                (Some(known), Some(own)) if known != own => {
+                    let allowed = format!("{known} as in the AIPS AN table before");
+                    return Err(unit.header.error("FREQ", allowed));
+                }
+                _ => frequency_hz = frequency_hz.or(own),
+            }
         }
         if names.stations.is_empty() {
             return Err(FileError::whole("no station: the AIPS AN table is missing or empty"));

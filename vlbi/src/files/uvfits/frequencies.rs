@@ -4,20 +4,17 @@
 use super::super::FileError;
 use super::super::fits::{ColumnData, Table, Unit, binary_table};
 use super::layout::Layout;
+use super::selectors;
 use crate::observation::Channel;
 
 /// Frequencies of the channels of a layout, in its order, and whether IFs are without any of their
-/// own. None for a single channel, whose (u, v) count wavelengths of `reference_hz` as they are in
-/// eht-imaging.
+/// own.
 pub fn channels(
     units: &[Unit<'_>],
     layout: &Layout,
     reference_hz: f64,
 ) -> Result<(Vec<Channel>, bool), FileError> {
     let places = &layout.channels;
-    if places.len() < 2 {
-        return Ok((Vec::new(), false));
-    }
     let header = &units[0].header;
     if places.len() > usize::from(u16::MAX) {
         return Err(header.error("NAXIS4", format!("{} channels are too many", places.len())));
@@ -25,13 +22,16 @@ pub fn channels(
     let named = |unit: &&Unit<'_>| unit.header.text("EXTNAME").as_deref() == Some("AIPS FQ");
     let unit = units.iter().find(named);
     let table = unit.map(Table::new).transpose()?;
+    let setup = selectors::only(&units[0], layout, "FREQSEL")?;
+    let row = table.as_ref().and_then(|table| setup_row(table, setup));
     let bands = places.iter().map(|place| place.band + 1).max().unwrap_or(1);
-    let cell = |name: &str, band: usize| table.as_ref().and_then(|t| t.number(0, name, band));
+    let cell = |name: &str, band: usize| table.as_ref().and_then(|t| t.number(row?, name, band));
     if let (Some(table), Some(unit)) = (&table, unit)
-        && (table.rows() != 1 || (0..bands).any(|band| cell("IF FREQ", band).is_none()))
+        && (places.len() > 1 || table.rows() > 1)
+        && (row.is_none() || (0..bands).any(|band| cell("IF FREQ", band).is_none()))
     {
         let message = format!(
-            "AIPS FQ table: one row with IF FREQ of {bands} IFs is expected, {} rows found",
+            "AIPS FQ table: a row with IF FREQ of {bands} IFs for the data's FREQSEL is expected, {} rows found",
             table.rows()
         );
         return Err(FileError::byte(unit.offset, message));
@@ -57,6 +57,12 @@ pub fn channels(
         }
         None => Ok((channels, bands > 1 && table.is_none())),
     }
+}
+
+/// The row of the setup that the data have, or the only one.
+fn setup_row(table: &Table<'_>, setup: Option<i64>) -> Option<usize> {
+    let is_setup = |row: &usize| table.number(*row, "FRQSEL", 0) == setup.map(|k| k as f64);
+    (0..table.rows()).find(is_setup).or((table.rows() == 1).then_some(0))
 }
 
 /// The `AIPS FQ` table of channels, each an IF of its own.

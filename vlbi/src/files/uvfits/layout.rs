@@ -4,6 +4,15 @@ use super::super::FileError;
 use super::super::fits::Header;
 use crate::observation::Basis;
 
+/// The parameters, and what they number (AIPS memo 117, table 5).
+pub const SELECTORS: [(&str, &str); 5] = [
+    ("SOURCE", "sources"),
+    ("FREQSEL", "frequency setups"),
+    ("GATEID", "pulsar gates"),
+    ("FILTER", "filters"),
+    ("CORR-ID", "correlations"),
+];
+
 /// A random parameter: value = stored·scale + zero.
 #[derive(Debug, Clone, Copy)]
 pub struct Parameter {
@@ -33,6 +42,8 @@ pub struct Layout {
     pub groups: usize,
     pub u: Parameter,
     pub v: Parameter,
+    /// Those of [`SELECTORS`] that there are.
+    pub selectors: Vec<(&'static str, Parameter)>,
     pub antennas: Antennas,
     /// Parts of the date, to be added.
     pub date: Vec<Parameter>,
@@ -40,6 +51,8 @@ pub struct Layout {
     pub opacity: Option<[Parameter; 2]>,
     scale: f64,
     zero: f64,
+    /// The whole number that stands for no value.
+    blank: Option<i64>,
     /// Distance in numbers between real part, imaginary part and weight.
     complex_stride: usize,
     /// Whether there are weights.
@@ -97,6 +110,8 @@ impl Layout {
         let frequency = find(&axes, "FREQ", header)?;
         let at = |name: &str| header.number(&format!("{name}{}", frequency.keyword));
         let parameter = Parameters::read(header, parameters)?;
+        parameter.check_projection()?;
+        let selector = |(name, _)| Some((name, parameter.optional(name)?));
         Ok(Layout {
             number_size: header.number_size()?,
             float: bits < Some(0),
@@ -105,6 +120,7 @@ impl Layout {
             groups: header.count("GCOUNT", 1, usize::MAX)?,
             u: parameter.one("UU")?,
             v: parameter.one("VV")?,
+            selectors: SELECTORS.into_iter().filter_map(selector).collect(),
             antennas: parameter.antennas()?,
             date: parameter.date()?,
             integration: parameter.optional("INTTIM"),
@@ -114,6 +130,7 @@ impl Layout {
                 .map(|(a, b)| [a, b]),
             scale: header.number("BSCALE")?.unwrap_or(1.0),
             zero: header.number("BZERO")?.unwrap_or(0.0),
+            blank: header.integer("BLANK")?.filter(|_| bits > Some(0)),
             complex_stride: complex.stride,
             weighted: complex.length == 3,
             products,
@@ -145,10 +162,26 @@ impl Layout {
     pub fn datum(&self, group: &[u8], index: usize) -> [f64; 3] {
         let value = |k: usize| {
             let stored = self.stored(group, self.parameters + index + k * self.complex_stride);
-            stored * self.scale + self.zero
+            match self.blank {
+                Some(blank) if stored == blank as f64 => f64::NAN,
+                _ => stored * self.scale + self.zero,
+            }
         };
         [value(0), value(1), if self.weighted { value(2) } else { 1.0 }]
     }
+
+    /// Whether any product of any channel was measured.
+    pub fn has_datum(&self, group: &[u8]) -> bool {
+        let starts = || self.products.iter().flatten();
+        self.channels
+            .iter()
+            .any(|place| starts().any(|start| is_measured(self.datum(group, start + place.offset))))
+    }
+}
+
+/// Whether real part, imaginary part and weight are those of a datum.
+pub fn is_measured([re, im, weight]: [f64; 3]) -> bool {
+    re.is_finite() && im.is_finite() && weight > 0.0
 }
 
 fn axes(header: &Header<'_>) -> Result<Vec<Axis>, FileError> {
@@ -249,6 +282,20 @@ impl<'a, 'b> Parameters<'a, 'b> {
     fn one(&self, start: &str) -> Result<Parameter, FileError> {
         let found = self.named.iter().find(|(n, _)| n.starts_with(start)).map(|(_, p)| *p);
         found.ok_or_else(|| self.missing(start))
+    }
+
+    /// Refuses projections other than the orthographic one: (u, v) of `UU---NCP` are others.
+    fn check_projection(&self) -> Result<(), FileError> {
+        for (name, Parameter { index, .. }) in &self.named {
+            let Some(rest) = name.strip_prefix("UU").or(name.strip_prefix("VV")) else { continue };
+            if !rest.split('-').all(|part| matches!(part, "" | "L" | "SIN")) {
+                let keyword = format!("PTYPE{}", index + 1);
+                return Err(self
+                    .header
+                    .error(&keyword, "UU, UU---SIN or UU-L-SIN, and the same of VV"));
+            }
+        }
+        Ok(())
     }
 
     fn missing(&self, name: &str) -> FileError {

@@ -8,6 +8,9 @@ mod layout;
 mod mounts;
 mod read;
 #[cfg(test)]
+mod selector_tests;
+mod selectors;
+#[cfg(test)]
 pub(super) mod tests;
 mod w_coordinate;
 mod write;

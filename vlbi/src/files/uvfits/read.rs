@@ -4,7 +4,8 @@ use super::super::FileError;
 use super::super::fits;
 use super::antennas::AntennaTables;
 use super::frequencies;
-use super::layout::{Antennas, Layout};
+use super::layout::{Antennas, Layout, SELECTORS, is_measured};
+use super::selectors;
 use crate::Complex64;
 use crate::Error;
 use crate::earth::SourcePosition;
@@ -16,45 +17,58 @@ const MJD_ZERO: f64 = 2_400_000.5;
 /// Reads UVFITS.
 ///
 /// Several spectral channels or IFs are rows of their own, with (u, v) in wavelengths of their own
-/// frequency; (u, v) of a single one are counted in wavelengths of the antenna table's frequency (as
-/// in eht-imaging). σ = 1/√weight; a weight that is not positive, or a visibility that is no number,
+/// frequency, which counts from that of the antenna table (as in eht-imaging). σ = 1/√weight; a weight that is not positive, or a visibility that is no number,
 /// means no datum. Rows without any datum, and correlations of a station with itself, are left
 /// out; the history says how many groups have none but such.
 ///
 /// # Errors
-/// If the file is damaged, no UVFITS, or holds no datum; if rows of many channels would take more
+/// If the file is damaged, no UVFITS, or holds no datum; if it holds several sources or frequency setups, flags, or
+/// coordinates that would have to be converted; if rows of many channels would take more
 /// memory than `MOST_MEMORY` times the file.
 pub fn read(bytes: &[u8]) -> Result<Observation, Error> {
     let units = fits::units(bytes)?;
     let header = &units[0].header;
     let layout = Layout::new(header)?;
-    let count = layout.channels.len();
-    let rows = layout.groups.checked_mul(count).and_then(|n| n.checked_mul(size_of::<Row>()));
-    if rows.is_none_or(|size| size > MOST_MEMORY * bytes.len()) {
-        let message = format!("{count} channels of so few bytes that rows would be too large");
-        return Err(header.error("BITPIX", message).into());
+    check_memory(header, &layout, bytes.len())?;
+    selectors::check_header(header)?;
+    let uncalibrated = selectors::check_tables(&units)?;
+    let source = selectors::source(&units, &layout)?;
+    for (name, _) in SELECTORS {
+        selectors::only(&units[0], &layout, name)?;
     }
     let tables = AntennaTables::read(&units)?;
-    let frequency_hz = tables.frequency_hz.unwrap_or(layout.frequency_hz);
-    if !(1e6..=1e15).contains(&frequency_hz) {
-        return Err(header
-            .error("CRVAL4", "no frequency in [1e6, 1e15] Hz in AN table or header")
-            .into());
+    let reference_hz =
+        reference_frequency(header, tables.frequency_hz.unwrap_or(layout.frequency_hz))?;
+    let (mut channels, unknown) = frequencies::channels(&units, &layout, reference_hz)?;
+    let mut frequency_hz = reference_hz;
+    if let [only] = channels[..] {
+        frequency_hz = only.frequency_hz;
+        channels.clear();
     }
-    let (channels, unknown) = frequencies::channels(&units, &layout, frequency_hz)?;
     let wavelengths = match channels.as_slice() {
         [] => vec![frequency_hz],
         channels => channels.iter().map(|c| c.frequency_hz).collect(),
     };
-    let reader = Reader { layout: &layout, tables: &tables, wavelengths, offset: units[0].offset };
-    let (mjd, rows, left_out) = reader.rows(units[0].data)?;
+    let offset = units[0].offset;
+    let reader = Reader { layout: &layout, tables: &tables, wavelengths, offset };
+    let (mjd, mut rows, left_out) = reader.rows(units[0].data)?;
+    let ahead_h = selectors::ahead_h(&units, mjd)?;
+    if ahead_h != 0.0 {
+        rows.iter_mut().for_each(|row| row.time_h -= ahead_h);
+    }
     let bandwidth = match channels.as_slice() {
         [] => layout.channel_width_hz.abs(),
         channels => channels.iter().map(|c| c.bandwidth_hz).sum(),
     };
     let mut observation = Observation {
-        source: header.text("OBJECT").unwrap_or_default(),
-        position: position(header)?,
+        source: match &source {
+            Some(source) => source.name.clone(),
+            None => header.text("OBJECT").unwrap_or_default(),
+        },
+        position: match source {
+            Some(source) => Some(source.position),
+            None => position(header)?,
+        },
         mjd: Some(mjd),
         frequency_hz: Some(frequency_hz),
         bandwidth_hz: Some(bandwidth).filter(|bandwidth| *bandwidth > 0.0),
@@ -62,10 +76,8 @@ pub fn read(bytes: &[u8]) -> Result<Observation, Error> {
         rows,
         ..Observation::empty(layout.basis)
     };
-    if unknown {
-        let line = "no AIPS FQ table: all IFs counted at the reference frequency";
-        observation.history.push(line.to_owned());
-    }
+    observation.history = remarks(unknown, ahead_h, layout.weighted);
+    observation.history.extend(uncalibrated);
     if left_out > 0 {
         observation.history.push(format!("{left_out} groups without valid data left out"));
     }
@@ -74,22 +86,65 @@ pub fn read(bytes: &[u8]) -> Result<Observation, Error> {
     Ok(observation)
 }
 
+/// Refuses headers whose rows would take too many times the memory of the file.
+fn check_memory(header: &fits::Header<'_>, layout: &Layout, bytes: usize) -> Result<(), FileError> {
+    let count = layout.channels.len();
+    let rows = layout.groups.checked_mul(count).and_then(|n| n.checked_mul(size_of::<Row>()));
+    if rows.is_none_or(|size| size > MOST_MEMORY * bytes) {
+        let message = format!("{count} channels of so few bytes that rows would be too large");
+        return Err(header.error("BITPIX", message));
+    }
+    Ok(())
+}
+
+/// The frequency in Hz that channels count from.
+fn reference_frequency(header: &fits::Header<'_>, hertz: f64) -> Result<f64, FileError> {
+    if (1e6..=1e15).contains(&hertz) {
+        return Ok(hertz);
+    }
+    Err(header.error("CRVAL4", "no frequency in [1e6, 1e15] Hz in AN table or header"))
+}
+
+/// Lines of the history about what the file does not tell, and what was done with its times.
+fn remarks(without_fq: bool, ahead_h: f64, weighted: bool) -> Vec<String> {
+    let mut lines = Vec::new();
+    if without_fq {
+        lines.push("no AIPS FQ table: all IFs counted at the reference frequency".to_owned());
+    }
+    if ahead_h != 0.0 {
+        lines.push(format!("times of TAI less {} s", (ahead_h * 3600.0).round()));
+    }
+    if !weighted {
+        lines.push("no weights: errors of 1 Jy".to_owned());
+    }
+    lines
+}
+
+/// Baselines of interferometers in space are shorter than this, seconds of light.
+const LONGEST_S: f64 = 1e4;
+
 /// Rows take at most this many times the bytes of the file.
 pub const MOST_MEMORY: usize = 16;
 
-/// Right ascension and declination from OBSRA and OBSDEC or the axes named so, in degrees.
+/// Where the axes RA and DEC are, which (u, v) belong to; OBSRA and OBSDEC, where antennas point, where these are not told.
 fn position(header: &fits::Header<'_>) -> Result<Option<SourcePosition>, FileError> {
     let axis = |name: &str| {
-        (2..=9)
-            .find(|k| header.text(&format!("CTYPE{k}")).is_some_and(|t| t == name))
-            .map(|k| format!("CRVAL{k}"))
+        let named = |k: &i32| header.text(&format!("CTYPE{k}")).is_some_and(|text| text == name);
+        let keyword = (2..=9).find(named).map(|k| format!("CRVAL{k}"));
+        keyword.map_or(Ok(None), |keyword| header.number(&keyword))
     };
-    let value = |keyword: &str, name: &str| match header.number(keyword)? {
-        Some(value) => Ok(Some(value)),
-        None => axis(name).map_or(Ok(None), |keyword| header.number(&keyword)),
-    };
-    let (Some(ra), Some(dec)) = (value("OBSRA", "RA")?, value("OBSDEC", "DEC")?) else {
-        return Ok(None);
+    let pointing = header.number("OBSRA")?.zip(header.number("OBSDEC")?);
+    // Writers that do not know the axes have zeros there.
+    let centre = axis("RA")?.zip(axis("DEC")?).filter(|centre| *centre != (0.0, 0.0));
+    let is_same = |(a, b): (f64, f64), (c, d): (f64, f64)| (a - c).abs().max((b - d).abs()) < 1e-6;
+    let (ra, dec) = match (pointing, centre) {
+        (None, None) => match axis("RA")?.zip(axis("DEC")?) {
+            Some(zeros) => zeros,
+            None => return Ok(None),
+        },
+        (Some(pointing), Some(centre)) if is_same(pointing, centre) => pointing,
+        (_, Some(centre)) => centre,
+        (Some(pointing), None) => pointing,
     };
     let position = SourcePosition::new(ra.rem_euclid(360.0) / 15.0, dec);
     position.map(Some).map_err(|error| header.error("OBSRA", error))
@@ -187,10 +242,10 @@ impl Reader<'_> {
                 },
             };
             let seconds = [layout.u, layout.v].map(|p| layout.parameter(group, p));
-            row.uv = seconds.map(|x| x * frequency);
-            if row.uv.iter().any(|x| !x.is_finite()) {
-                return Err(format!("(u, v) {:?}: not finite", row.uv));
+            if !seconds.iter().all(|x| x.abs() <= LONGEST_S) {
+                return Err(format!("(u, v) = {seconds:?} s is not allowed: up to {LONGEST_S} s"));
             }
+            row.uv = seconds.map(|x| x * frequency);
             row.products = data.map(|(value, _)| value);
             row.noise_sigma = data.map(|(_, sigma)| sigma);
             row.channel = channel;
@@ -229,7 +284,7 @@ impl Reader<'_> {
     /// A visibility and its σ = 1/√weight; NaN where there is none.
     fn datum(&self, group: &[u8], index: usize) -> (Complex64, f64) {
         let [re, im, weight] = self.layout.datum(group, index);
-        if re.is_finite() && im.is_finite() && weight > 0.0 {
+        if is_measured([re, im, weight]) {
             (Complex64::new(re, im), weight.sqrt().recip())
         } else {
             (Complex64::new(0.0, 0.0), f64::NAN)

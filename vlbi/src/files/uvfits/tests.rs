@@ -5,7 +5,7 @@ use super::*;
 use crate::Complex64;
 use crate::array::{Station, built_in};
 use crate::earth::{Frame, SourcePosition, Ut1};
-use crate::observation::{Basis, Channel, Measured, Observation, Row};
+use crate::observation::{Averaging, Basis, Channel, Measured, Observation, Row};
 use crate::schedule::{Clock, Schedule, Setup, observe};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -247,7 +247,7 @@ fn exact_channels_are_rows_of_their_own() {
     }
     assert_eq!(write(&back).unwrap(), write(&read(&write(&back).unwrap()).unwrap()).unwrap());
     // Averaged in time every channel stays alone; over channels (u, v) are those of the reference.
-    assert_eq!(observation.averaged(60.0).rows.len(), 11);
+    assert_eq!(observation.averaged(Averaging::over(60.0)).rows.len(), 11);
     let mean = back.averaged_over_channels();
     assert_eq!((mean.rows.len(), mean.rows[0].uv), (3, mean.rows[1].uv));
     assert!((mean.rows[0].uv[0] / (1.5e9 * 229.0 / 230.0) - 1.0).abs() < 1e-7);

@@ -1,7 +1,7 @@
 //! Writing: an IF a channel, four products, as eht-imaging, AIPS and CASA read it.
 
-use super::super::FileError;
 use super::super::fits::{Cards, padded};
+use super::super::{FileError, check_numbers};
 use super::{antenna_table, frequencies, w_coordinate};
 use crate::Error;
 use crate::earth::SourcePosition;
@@ -28,7 +28,8 @@ struct Facts {
 ///
 /// # Errors
 /// If the source's position, date, frequency, bandwidth or a station's position is not known, or
-/// there are no rows, more than 255 stations, or rows of a channel that is not listed.
+/// there are no rows, more than 255 stations, rows of a channel that is not listed, or visibilities
+/// beyond single precision.
 pub fn write(observation: &Observation) -> Result<Vec<u8>, Error> {
     let frequency_hz = observation.frequency_hz.ok_or(Unknown("the frequency"))?;
     let bandwidth_hz = observation.bandwidth_hz.ok_or(Unknown("the bandwidth"))?;
@@ -54,6 +55,8 @@ pub fn write(observation: &Observation) -> Result<Vec<u8>, Error> {
     if observation.rows.iter().any(|row| usize::from(row.channel) >= listed) {
         return Err(FileError::whole("a row of a spectral channel that is not listed").into());
     }
+    check_numbers(observation)?;
+    check_precision(observation)?;
     let only_i = |row: &Row| row.noise_sigma[1..].iter().all(|sigma| sigma.is_nan());
     let mut observation = match observation.basis {
         Basis::Stokes if observation.rows.iter().all(only_i) => {
@@ -63,6 +66,10 @@ pub fn write(observation: &Observation) -> Result<Vec<u8>, Error> {
     };
     if observation.rows.is_empty() {
         return Err(FileError::whole("there are no visibilities to write").into());
+    }
+    if let Some(value) = observation.rows.iter().find_map(too_large) {
+        let message = format!("a visibility of {value:e} Jy: UVFITS holds numbers up to 3.4e38");
+        return Err(FileError::whole(message).into());
     }
     let ordered = |row: &Row| row.stations[0] < row.stations[1];
     let sorted = observation.rows.is_sorted_by(|a, b| a.time_h <= b.time_h);
@@ -85,6 +92,25 @@ pub fn write(observation: &Observation) -> Result<Vec<u8>, Error> {
     )?);
     bytes.extend(frequencies::table(&facts.channels, facts.frequency_hz));
     Ok(bytes)
+}
+
+/// Refuses what single precision would turn into infinity, or into no datum: a weight 1/σ² of 0.
+fn check_precision(observation: &Observation) -> Result<(), FileError> {
+    let fits = |value: f64| (value as f32).is_finite();
+    for row in &observation.rows {
+        for (k, product) in (0..4).filter_map(|k| Some((k, row.product(k)?))) {
+            let [re, im, weight] = datum(row, k);
+            let sigma = product.noise_sigma;
+            if !(fits(re) && fits(im) && (sigma == 0.0 || fits(weight) && weight as f32 > 0.0)) {
+                let [a, b] = observation.names(row);
+                return Err(FileError::whole(format!(
+                    "{a}-{b} at {} h: visibility {:e} Jy with sigma {sigma:e} Jy: UVFITS has single precision",
+                    row.time_h, product.visibility
+                )));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Whether (u, v) came from single precision numbers in wavelengths, as some files have them: then
@@ -171,6 +197,13 @@ fn group_bytes(groups: &[&[Row]], w_seconds: &[f64], facts: &Facts) -> Vec<u8> {
         }
     }
     padded(bytes, 0)
+}
+
+/// A part of a visibility that single precision does not hold.
+fn too_large(row: &Row) -> Option<f64> {
+    let parts =
+        (0..4).filter_map(|k| row.product(k)).flat_map(|m| [m.visibility.re, m.visibility.im]);
+    parts.into_iter().find(|part| part.is_finite() && (*part as f32).is_infinite())
 }
 
 /// Real part, imaginary part, weight 1/σ²; all 0 where there is none.

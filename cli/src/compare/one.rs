@@ -1,0 +1,59 @@
+//! One case by itself: engines of clusters run each as a command of its own.
+
+use super::cases::{Case, Status};
+use super::runner::Runner;
+use super::{Failed, runner};
+use crate::answer::Answer;
+use crate::interrupt::{Interrupted, Keeper};
+use crate::lock::Lock;
+use crate::output::{self, Output};
+use std::path::{Path, PathBuf};
+
+/// Another process runs the same case.
+#[derive(Debug, thiserror::Error)]
+#[error("{0} is being run by another kerrlight")]
+pub struct Busy(String);
+
+/// Runs a case to its end, from where it is; one that is done is not run again.
+pub fn run(case: &Case, runner: &Runner<'_>, folder: &Path) -> anyhow::Result<Answer> {
+    let Some(lock) = Lock::of_file(&lock_of(folder, case))? else {
+        return Err(Busy(case.slug.clone()).into());
+    };
+    let keeper = Keeper::saving("stopping after the fit's step; a second signal ends at once");
+    let failure = failure_of(folder, case);
+    match runner.run(case, &keeper) {
+        Status::Done(results) => {
+            // What is left behind does no harm: results count.
+            let _ = std::fs::remove_file(failure);
+            drop(lock);
+            let _ = std::fs::remove_file(lock_of(folder, case));
+            let run = runner.run_of(case).display().to_string();
+            Ok(Answer::lines(&format!("{} is done", case.name()), &run)
+                .with("case", case.slug.clone())
+                .with("folder", run)
+                .with("results", results))
+        }
+        Status::Failed(why) => {
+            Output::new(&failure, "")?.write(why.as_bytes())?;
+            Err(Failed { failed: 1, all: 1, names: format!("{}: {why}", case.name()) }.into())
+        }
+        Status::Open => {
+            let how = "the same command resumes it";
+            Err(Interrupted(format!("stopped: {} is not done; {how}", case.name())).into())
+        }
+    }
+}
+
+/// Why a case has failed when it was run last.
+pub fn failure(folder: &Path, case: &Case) -> Option<String> {
+    output::read_text(&failure_of(folder, case)).ok()
+}
+
+/// The file that is locked while a case is run; beside its folder, which a fit may make anew.
+pub fn lock_of(folder: &Path, case: &Case) -> PathBuf {
+    folder.join(runner::CASES).join(format!("{}.lock", case.slug))
+}
+
+fn failure_of(folder: &Path, case: &Case) -> PathBuf {
+    folder.join(runner::CASES).join(format!("{}.failed", case.slug))
+}

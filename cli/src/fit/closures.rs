@@ -1,0 +1,53 @@
+//! How many of the closure quantities of the data a fit uses.
+
+use kerrlight_tomo::fit::settings::{Loss, LossKind};
+use kerrlight_tomo::fit::setup::Measured;
+use kerrlight_vlbi::products::{ClosureCount, ClosureKind};
+use serde_json::{Value, json};
+
+/// The counts of every loss of closure quantities.
+fn counts<'a>(measured: &Measured, losses: &'a [Loss]) -> Vec<(&'a Loss, ClosureCount)> {
+    let Some((observation, _)) = &measured.visibilities else { return Vec::new() };
+    let count = |loss: &'a Loss| {
+        let kind = match loss.data {
+            LossKind::ClosurePhases => ClosureKind::Phase,
+            LossKind::LogClosureAmplitudes => ClosureKind::LogAmplitude,
+            _ => return None,
+        };
+        Some((loss, ClosureCount::of(observation, kind, loss.least_snr.unwrap_or(0.0))))
+    };
+    losses.iter().filter_map(count).collect()
+}
+
+/// A sentence for each of them.
+pub fn sentences(measured: &Measured, losses: &[Loss]) -> Vec<String> {
+    let sentence = |(loss, count): &(&Loss, ClosureCount)| {
+        let ClosureCount { used, possible, of_scans } = count;
+        let label = loss.data.label();
+        let least = match loss.least_snr {
+            Some(least) if used < possible => format!(" (baselines above {least} σ)"),
+            _ => String::new(),
+        };
+        let torn = of_scans.map_or(String::new(), |of_scans| {
+            format!(
+                "; averages of scans have {of_scans}: here baselines of a scan have different times, which average_s makes one"
+            )
+        });
+        format!("{used} of {possible} independent {label} are used{least}{torn}")
+    };
+    counts(measured, losses).iter().map(sentence).collect()
+}
+
+/// The same for results.json.
+pub fn json(measured: &Measured, losses: &[Loss]) -> Option<Value> {
+    let one = |(loss, count): &(&Loss, ClosureCount)| {
+        json!({
+            "data": loss.data.name(),
+            "used": count.used,
+            "possible": count.possible,
+            "of_scans": count.of_scans,
+        })
+    };
+    let all: Vec<Value> = counts(measured, losses).iter().map(one).collect();
+    (!all.is_empty()).then(|| json!(all))
+}

@@ -1,0 +1,243 @@
+//! Cases of a comparison as commands of their own, run by an engine: each once, none lost, the same bytes.
+
+use crate::support::{binary, fail, kerrlight, root, succeed};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// Small fits: as many as there are seeds.
+pub fn experiment(folder: &Path, seeds: usize, steps: usize) {
+    let fit = root().join("scenes/fits/scene_1.toml");
+    let text = format!(
+        r#"
+        title = "Seeds"
+        question = "Which?"
+        seeds = {seeds}
+        fit = {fit:?}
+        [set]
+        screen.pixels = 6
+        screen.width = 30.0
+        region.r_min = 3.0
+        region.r_max = 4.2
+        movie.frames = 2
+        output.nodes = 6
+        representation = {{ kind = "grid", nodes = 6 }}
+        region.nodes = {{ equal-mino-time = {{ per_ray = 8 }} }}
+        training = {{ steps = {steps}, log_every = 10, start = "drawn", checkpoint_seconds = 0.1 }}
+        [[factor]]
+        name = "rate"
+        key = "training.grid_rate"
+        values = [0.1]
+        "#
+    );
+    std::fs::write(folder.join("seeds.toml"), text).unwrap();
+}
+
+/// A command of the shell that finds the program by its name.
+fn shell(folder: &Path, script: &str) -> Command {
+    let folders = binary().parent().into_iter().map(Path::to_owned);
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let path = std::env::join_paths(folders.chain(std::env::split_paths(&path))).unwrap();
+    let mut command = Command::new("sh");
+    command.current_dir(folder).args(["-c", script]).env("PATH", path);
+    command
+}
+
+/// Volumes that cases have found, by their names.
+fn volumes(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let cases = std::fs::read_dir(folder.join("cases")).unwrap().flatten();
+    let volume = |case: std::fs::DirEntry| {
+        let bytes = std::fs::read(case.path().join("volume.npz")).ok()?;
+        Some((case.file_name().into_string().unwrap(), bytes))
+    };
+    cases.filter_map(volume).collect()
+}
+
+fn counts(folder: &Path, name: &str) -> [u64; 4] {
+    let status: Value =
+        serde_json::from_str(&succeed(folder, &["compare", name, "--status", "--json"])).unwrap();
+    let failed = status["failed"].as_array().unwrap().len() as u64;
+    let count = |key: &str| status[key].as_u64().unwrap();
+    [count("done"), count("running"), failed, count("open")]
+}
+
+/// The commands of --list, four at a time, find what one process finds; once more they run nothing.
+#[test]
+fn exact_xargs_runs_each_case_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    experiment(at, 6, 20);
+    succeed(at, &["compare", "seeds.toml", "-o", "alone"]);
+    let script = "kerrlight compare seeds.toml -o out --list --threads 1 | cut -f 3 \
+                  | xargs -d '\\n' -P 4 -n 1 sh -c";
+    let written = [(); 2].map(|()| {
+        let output = shell(at, script).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let entries = std::fs::read_dir(at.join("out/cases")).unwrap().flatten();
+        let time = |entry: std::fs::DirEntry| {
+            let record = entry.path().join("record.json").metadata().ok()?;
+            Some((entry.file_name(), record.modified().ok()?))
+        };
+        entries.filter_map(time).collect::<BTreeMap<_, _>>()
+    });
+    assert!(written[0].len() == 6 && written[0] == written[1]);
+    assert_eq!(counts(at, "out"), [6, 0, 0, 0]);
+    assert_eq!(volumes(&at.join("out")), volumes(&at.join("alone")));
+    succeed(at, &["compare", "out", "--collect"]);
+    let table = |name: &str| std::fs::read_to_string(at.join(name).join("results.csv")).unwrap();
+    assert_eq!(table("out").lines().count(), table("alone").lines().count());
+}
+
+fn start(folder: &Path, words: &[&str]) -> Child {
+    let mut command = Command::new(binary());
+    command.current_dir(folder).args(words).stdin(Stdio::null());
+    command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+}
+
+/// Of two with one case the second is sent away; a killed one continues to the same bytes.
+#[test]
+fn exact_a_case_has_one_process_and_survives_kills() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    experiment(at, 1, 3000);
+    let listed = succeed(at, &["compare", "seeds.toml", "-o", "out", "--list"]);
+    let id = listed.split('\t').next().unwrap();
+    let words = ["compare", "seeds.toml", "-o", "out", "--case", id];
+    let mut first = start(at, &words);
+    let (clock, log) = (Instant::now(), at.join("out/cases").join(id).join("log.jsonl"));
+    while log.metadata().map_or(0, |log| log.len()) == 0 {
+        assert!(clock.elapsed() < Duration::from_secs(120) && first.try_wait().unwrap().is_none());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert_eq!(kerrlight(at, &words).status.code(), Some(75));
+    assert_eq!(counts(at, "out"), [0, 1, 0, 0]);
+    first.kill().unwrap();
+    first.wait().unwrap();
+    assert_eq!(counts(at, "out"), [0, 0, 0, 1]);
+    succeed(at, &words);
+    assert_eq!(counts(at, "out"), [1, 0, 0, 0]);
+    succeed(at, &["compare", "seeds.toml", "-o", "alone"]);
+    assert_eq!(volumes(&at.join("out")), volumes(&at.join("alone")));
+    // What is done is done at once, and another name is refused.
+    let clock = Instant::now();
+    succeed(at, &words);
+    assert!(clock.elapsed() < Duration::from_secs(5));
+    let error = fail(at, &["compare", "seeds.toml", "-o", "out", "--case", "rate_seed1_00000000"]);
+    assert!(error.contains("there is no such case"), "{error}");
+}
+
+/// A Slurm of one node that ends with the test.
+struct Slurm(PathBuf);
+
+impl Slurm {
+    /// Nothing where it is not installed.
+    fn start(folder: &Path) -> Option<Self> {
+        let slurm = Slurm(folder.join("slurm"));
+        let output = slurm.script("start.sh");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        if output.status.code() == Some(77) {
+            eprintln!("SLURM IS NOT TESTED: {said}");
+            return None;
+        }
+        assert!(output.status.success(), "{said}");
+        Some(slurm)
+    }
+
+    fn script(&self, name: &str) -> Output {
+        let path = root().join("tests/slurm").join(name);
+        Command::new("sh").arg(path).arg(&self.0).output().unwrap()
+    }
+
+    fn says(&self, folder: &Path, script: &str) -> String {
+        let output = shell(folder, script).env("SLURM_CONF", self.0.join("slurm.conf")).output();
+        let output = output.unwrap();
+        assert!(output.status.success(), "{script}: {}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8_lossy(&output.stdout).trim().to_owned()
+    }
+}
+
+impl Drop for Slurm {
+    fn drop(&mut self) {
+        self.script("stop.sh");
+    }
+}
+
+/// The script of the page.
+fn documented_array() -> String {
+    let page = std::fs::read_to_string(root().join("docs/reference/cluster.md")).unwrap();
+    let from = page.find("#!/bin/sh\n#SBATCH").unwrap();
+    page[from..].split("```").next().unwrap().to_owned()
+}
+
+/// The array of the page: a task that is killed by `scancel` in the middle is put back into the queue and finishes its case.
+#[test]
+#[ignore = "minutes, and needs Slurm"]
+fn exact_an_array_of_slurm_runs_each_case_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let Some(slurm) = Slurm::start(at) else { return };
+    experiment(at, 4, 2000);
+    let array =
+        documented_array().replace("--cpus-per-task=4\n#SBATCH --mem=4G", "--cpus-per-task=1");
+    std::fs::write(at.join("cases.sh"), array).unwrap();
+    slurm.says(at, "kerrlight compare seeds.toml -o out --list --threads 1 | cut -f 3 > commands");
+    let job = slurm.says(at, "sbatch --parsable --array=1-$(wc -l < commands)%2 cases.sh");
+    let clock = Instant::now();
+    while counts_if_begun(at)[1] == 0 {
+        assert!(clock.elapsed() < Duration::from_secs(120));
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    slurm.says(at, &format!("scancel --full -s KILL {job}_1; scontrol requeue {job}_1 || true"));
+    while !slurm.says(at, &format!("squeue -h -j {job}")).is_empty() {
+        assert!(clock.elapsed() < Duration::from_secs(500));
+        std::thread::sleep(Duration::from_millis(500));
+    }
+    slurm.says(at, "sh -c \"$(head -n 1 commands)\"");
+    assert_eq!(counts(at, "out"), [4, 0, 0, 0]);
+    succeed(at, &["compare", "seeds.toml", "-o", "alone"]);
+    assert_eq!(volumes(&at.join("out")), volumes(&at.join("alone")));
+}
+
+fn counts_if_begun(at: &Path) -> [u64; 4] {
+    if at.join("out/plan.json").is_file() { counts(at, "out") } else { [0; 4] }
+}
+
+/// The rules of `cluster/Snakefile`: one process is killed in the middle, and Snakemake runs the case once more.
+#[test]
+#[ignore = "minutes, and needs Snakemake"]
+fn exact_snakemake_runs_each_case_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    if shell(at, "snakemake --version").output().is_ok_and(|output| !output.status.success()) {
+        eprintln!("SNAKEMAKE IS NOT TESTED: there is none; pip install snakemake");
+        return;
+    }
+    experiment(at, 4, 2000);
+    let snakefile = root().join("cluster/Snakefile");
+    let script = format!(
+        "exec snakemake --snakefile {snakefile:?} --cores 2 --retries 3 \
+         --config experiment=seeds.toml folder=out 'options=--threads 1'"
+    );
+    let mut engine =
+        shell(at, &script).stderr(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
+    let clock = Instant::now();
+    while counts_if_begun(at)[1] == 0 {
+        assert!(clock.elapsed() < Duration::from_secs(120) && engine.try_wait().unwrap().is_none());
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    // The command line of the first case that runs, of this folder alone.
+    shell(
+        at,
+        "for p in /proc/[0-9]*; do [ \"$(readlink $p/cwd)\" = \"$PWD\" ] && \
+               tr '\\0' ' ' < $p/cmdline | grep -q '^kerrlight compare .*--case' && \
+               kill -9 ${p#/proc/} && break; done",
+    )
+    .status()
+    .unwrap();
+    assert!(engine.wait().unwrap().success());
+    assert_eq!(counts(at, "out"), [4, 0, 0, 0]);
+    succeed(at, &["compare", "seeds.toml", "-o", "alone"]);
+    assert_eq!(volumes(&at.join("out")), volumes(&at.join("alone")));
+}

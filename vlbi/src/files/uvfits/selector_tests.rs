@@ -1,0 +1,210 @@
+//! What a file says of its data and is not read: refused, with its name and value.
+
+use super::super::fits::{Cards, ColumnData, binary_table, padded};
+use super::*;
+use crate::observation::Observation;
+
+/// How a made-up file differs from a plain one.
+struct Made {
+    /// Random parameters besides those of a baseline, with their values in both groups.
+    parameters: Vec<(&'static str, [f32; 2])>,
+    /// Lines of the header that replace or follow others.
+    header: Vec<(&'static str, String)>,
+    /// What PTYPE1 is.
+    u: &'static str,
+    /// (u, v) in seconds.
+    seconds: f32,
+    /// Weights of the groups.
+    weights: [f32; 2],
+    /// `TIMSYS` of the antenna table.
+    time_system: &'static str,
+    /// Tables.
+    tables: Vec<Vec<u8>>,
+}
+
+fn plain() -> Made {
+    Made {
+        parameters: Vec::new(),
+        header: Vec::new(),
+        u: "UU---SIN",
+        seconds: 1e-3,
+        weights: [4.0, 4.0],
+        time_system: "UTC",
+        tables: Vec::new(),
+    }
+}
+
+/// Two groups of LL of one baseline, at 6 h and 12 h of MJD 57850, 230 GHz.
+fn bytes(made: &Made) -> Vec<u8> {
+    let mut cards = Cards::default();
+    cards.value("SIMPLE", "T").value("BITPIX", -32).value("NAXIS", 6).value("NAXIS1", 0);
+    let axes = [
+        ("COMPLEX", 3, 1.0),
+        ("STOKES", 1, -2.0),
+        ("FREQ", 1, 230e9),
+        ("RA", 1, 180.0),
+        ("DEC", 1, 12.0),
+    ];
+    for (k, (name, length, value)) in (2..).zip(axes) {
+        cards.value(&format!("NAXIS{k}"), length).text(&format!("CTYPE{k}"), name);
+        cards.number(&format!("CRVAL{k}"), value).number(&format!("CDELT{k}"), 1e9);
+        if !(name == "FREQ" && made.header.iter().any(|(key, _)| *key == "CRPIX4")) {
+            cards.number(&format!("CRPIX{k}"), 1.0);
+        }
+    }
+    let fixed = [made.u, "VV---SIN", "BASELINE", "DATE", "DATE"];
+    let names = fixed.into_iter().chain(made.parameters.iter().map(|(name, _)| *name));
+    for (k, name) in (1..).zip(names) {
+        cards.text(&format!("PTYPE{k}"), name);
+    }
+    cards.value("GROUPS", "T").value("PCOUNT", 5 + made.parameters.len()).value("GCOUNT", 2);
+    cards.text("OBJECT", "MULTI");
+    for (key, value) in &made.header {
+        cards.value(key, value);
+    }
+    let mut bytes = cards.finish();
+    let mut data = Vec::new();
+    for group in 0..2 {
+        let hour = [0.25, 0.5][group];
+        let mut numbers = vec![made.seconds, 2e-3, 258.0, 2_457_850.5, hour];
+        numbers.extend(made.parameters.iter().map(|(_, values)| values[group]));
+        numbers.extend([1.0, -1.0, made.weights[group]]);
+        data.extend(numbers.into_iter().flat_map(f32::to_be_bytes));
+    }
+    bytes.extend(padded(data, 0));
+    let columns = [
+        ("ANNAME", "", ColumnData::Text(8, vec!["A".into(), "B".into()])),
+        ("STABXYZ", "METERS", ColumnData::Doubles(3, vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0])),
+        ("NOSTA", "", ColumnData::Integers(1, vec![1, 2])),
+    ];
+    bytes.extend(binary_table("AIPS AN", 2, &columns, |cards| {
+        cards.text("TIMSYS", made.time_system);
+    }));
+    made.tables.iter().for_each(|table| bytes.extend(table));
+    bytes
+}
+
+fn read_made(made: &Made) -> Observation {
+    read(&bytes(made)).unwrap()
+}
+
+fn refused(made: &Made) -> String {
+    read(&bytes(made)).unwrap_err().to_string()
+}
+
+fn sources(epoch: f64) -> Vec<u8> {
+    let columns = [
+        ("ID. NO.", "", ColumnData::Integers(1, vec![1, 2])),
+        ("SOURCE", "", ColumnData::Text(16, vec!["M87".into(), "3C279".into()])),
+        ("RAEPO", "DEGREES", ColumnData::Doubles(1, vec![187.5, 195.0])),
+        ("DECEPO", "DEGREES", ColumnData::Doubles(1, vec![12.4, -5.8])),
+        ("EPOCH", "YEARS", ColumnData::Doubles(1, vec![epoch; 2])),
+    ];
+    binary_table("AIPS SU", 2, &columns, |_| ())
+}
+
+fn setups() -> Vec<u8> {
+    let columns = [
+        ("FRQSEL", "", ColumnData::Integers(1, vec![1, 2])),
+        ("IF FREQ", "HZ", ColumnData::Doubles(1, vec![0.0, 2e9])),
+    ];
+    binary_table("AIPS FQ", 2, &columns, |_| ())
+}
+
+#[test]
+fn exact_several_sources_are_refused_and_one_is_named() {
+    let made = |values: [f32; 2], weights: [f32; 2]| Made {
+        parameters: vec![("SOURCE", values)],
+        weights,
+        tables: vec![sources(2000.0)],
+        ..plain()
+    };
+    let message = refused(&made([1.0, 2.0], [4.0; 2]));
+    assert!(message.contains("2 sources in one file, SOURCE = 1, 2"), "{message}");
+    assert!(message.contains("1 is M87, 2 is 3C279"), "{message}");
+    // The other source has no data: what is left is one, of the table.
+    for (values, weights) in [([2.0, 2.0], [4.0; 2]), ([1.0, 2.0], [0.0, 4.0])] {
+        let one = read_made(&made(values, weights));
+        let place = one.position.unwrap();
+        assert_eq!((one.source.as_str(), place.ra_hours, place.dec_deg), ("3C279", 13.0, -5.8));
+    }
+    let old = Made { tables: vec![sources(1950.0)], ..made([1.0; 2], [4.0; 2]) };
+    assert!(refused(&old).contains("EPOCH = 1950 is not allowed"));
+}
+
+#[test]
+fn exact_several_setups_are_refused_and_one_tells_the_frequency() {
+    let made =
+        |name, values| Made { parameters: vec![(name, values)], tables: vec![setups()], ..plain() };
+    assert!(refused(&made("FREQSEL", [1.0, 2.0])).contains("2 frequency setups in one file"));
+    let second = read_made(&made("FREQSEL", [2.0; 2]));
+    assert_eq!(second.frequency_hz, Some(232e9));
+    assert!((second.rows[0].uv[0] / (f64::from(1e-3f32) * 232e9) - 1.0).abs() < 1e-12);
+    // Two rows of the table, and no one tells which.
+    assert!(refused(&Made { tables: vec![setups()], ..plain() }).contains("AIPS FQ table"));
+    for name in ["GATEID", "FILTER", "CORR-ID"] {
+        let made = |values| Made { parameters: vec![(name, values)], ..plain() };
+        assert!(refused(&made([1.0, 2.0])).contains(&format!("{name} = 1, 2")));
+        assert_eq!(read_made(&made([2.0; 2])).rows.len(), 2);
+    }
+    // The only channel is half a width above the reference.
+    let made = Made { header: vec![("CRPIX4", "0.5".into())], ..plain() };
+    assert_eq!(read_made(&made).frequency_hz, Some(230.5e9));
+}
+
+#[test]
+fn exact_coordinates_and_units_of_others_are_refused() {
+    let with =
+        |key: &'static str, value: &str| Made { header: vec![(key, value.into())], ..plain() };
+    for (key, value) in [
+        ("BUNIT", "'UNCALIB '"),
+        ("EQUINOX", "1950.0"),
+        ("EPOCH", "1950.0"),
+        ("EQUINOX", "'B1950   '"),
+        ("RADESYS", "'FK4     '"),
+        ("CROTA5", "30.0"),
+        ("TIMESYS", "'TDB     '"),
+    ] {
+        let message = refused(&with(key, value));
+        assert!(message.contains(&format!("{key} = {value} is not allowed")), "{message}");
+    }
+    for (key, value) in
+        [("BUNIT", "'Jy      '"), ("EQUINOX", "'J2000   '"), ("EPOCH", "2000.0"), ("CROTA5", "0.0")]
+    {
+        assert_eq!(read_made(&with(key, value)).rows.len(), 2, "{key}");
+    }
+    assert!(refused(&Made { u: "UU---NCP", ..plain() }).contains("PTYPE1 = 'UU---NCP'"));
+    // Wavelengths where seconds belong.
+    assert!(refused(&Made { seconds: 1e9, ..plain() }).contains("up to 10000 s"));
+    let flags =
+        binary_table("AIPS FG", 1, &[("SOURCE", "", ColumnData::Integers(1, vec![1]))], |_| ());
+    assert!(refused(&Made { tables: vec![flags], ..plain() }).contains("AIPS FG table: 1 flags"));
+    let gains =
+        binary_table("AIPS SN", 1, &[("SOURCE", "", ColumnData::Integers(1, vec![1]))], |_| ());
+    let history = read_made(&Made { tables: vec![gains], ..plain() }).history;
+    assert_eq!(history, ["AIPS SN: calibration that is not applied"]);
+}
+
+/// TAI was 37 s ahead of UTC in 2017 (IERS Bulletin C 52).
+#[test]
+fn paper_times_of_tai_become_utc() {
+    for system in ["IAT", "TAI"] {
+        let hours = read_made(&Made { time_system: system, ..plain() }).rows[0].time_h;
+        assert!((hours - (6.0 - 37.0 / 3600.0)).abs() < 1e-9, "{hours}");
+    }
+    assert_eq!(read_made(&plain()).rows[0].time_h, 6.0);
+    assert!(refused(&Made { time_system: "GPS", ..plain() }).contains("TIMSYS = 'GPS"));
+}
+
+/// Where antennas point is not where (u, v) belong to.
+#[test]
+fn exact_the_phase_centre_is_the_position() {
+    let made = |ra: &str, dec: &str| Made {
+        header: vec![("OBSRA", ra.into()), ("OBSDEC", dec.into())],
+        ..plain()
+    };
+    for (ra, dec) in [("181.0", "12.0"), ("180.0", "12.0")] {
+        let place = read_made(&made(ra, dec)).position.unwrap();
+        assert_eq!((place.ra_hours, place.dec_deg), (12.0, 12.0));
+    }
+}

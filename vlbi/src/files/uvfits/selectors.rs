@@ -1,0 +1,193 @@
+//! Parameters that tell groups of several sources, receivers' setups and the like apart. A file that is read has one of each.
+
+use super::super::FileError;
+use super::super::fits::{Header, Table, Unit};
+use super::layout::{Layout, Parameter, SELECTORS};
+use crate::earth::SourcePosition;
+use std::collections::BTreeSet;
+
+/// As many values are listed.
+const SHOWN: usize = 16;
+
+/// The one value that groups with data have of a parameter; none where there is no such parameter.
+///
+/// # Errors
+/// If there are several.
+pub fn only(unit: &Unit<'_>, layout: &Layout, name: &str) -> Result<Option<i64>, FileError> {
+    let Some((_, parameter)) = layout.selectors.iter().find(|(known, _)| *known == name) else {
+        return Ok(None);
+    };
+    let values = values(unit, layout, *parameter);
+    if values.len() > 1 {
+        let what = SELECTORS.iter().find(|(known, _)| *known == name).map_or("", |(_, what)| what);
+        let shown: Vec<String> = values.iter().take(SHOWN).map(i64::to_string).collect();
+        return Err(FileError::byte(
+            unit.offset,
+            format!(
+                "{} {what} in one file, {name} = {}: write the one that is meant to a file of its own",
+                values.len(),
+                shown.join(", ")
+            ),
+        ));
+    }
+    Ok(values.first().copied())
+}
+
+/// All values of groups that hold a datum.
+fn values(unit: &Unit<'_>, layout: &Layout, parameter: Parameter) -> BTreeSet<i64> {
+    let groups = unit.data.chunks_exact(layout.group_size * layout.number_size);
+    let with_data = groups.filter(|group| layout.has_datum(group));
+    with_data.map(|group| layout.parameter(group, parameter) as i64).collect()
+}
+
+/// A source of the `AIPS SU` table.
+pub struct TableSource {
+    /// Its name.
+    pub name: String,
+    /// Where it is.
+    pub position: SourcePosition,
+}
+
+/// The source that groups with data have, as the `AIPS SU` table tells it; none where groups or tables do not tell.
+///
+/// # Errors
+/// If there are several, each with its name, or coordinates are not of J2000.
+pub fn source(units: &[Unit<'_>], layout: &Layout) -> Result<Option<TableSource>, FileError> {
+    let named = |unit: &&Unit<'_>| unit.header.text("EXTNAME").as_deref() == Some("AIPS SU");
+    let unit = units.iter().find(named);
+    let table = unit.map(Table::new).transpose()?;
+    let row_of = |number: i64| {
+        let table = table.as_ref()?;
+        let row = (0..table.rows()).find(|row| {
+            ["ID. NO.", "ID_NO."].iter().any(|id| table.number(*row, id, 0) == Some(number as f64))
+        });
+        row.map(|row| (table, row))
+    };
+    let name = |number: i64| {
+        let (table, row) = row_of(number)?;
+        table.text(row, "SOURCE")
+    };
+    let number = only(&units[0], layout, "SOURCE").map_err(|error| {
+        let values = layout.selectors.iter().find(|(known, _)| *known == "SOURCE");
+        let values = values.map(|(_, parameter)| values_named(&units[0], layout, *parameter, name));
+        match (values, error) {
+            (Some(names), FileError::Byte { offset, message }) if !names.is_empty() => {
+                FileError::byte(offset, format!("{message} ({})", names.join(", ")))
+            }
+            (_, error) => error,
+        }
+    })?;
+    let (Some(number), Some(unit)) = (number, unit) else { return Ok(None) };
+    let Some((table, row)) = row_of(number) else { return Ok(None) };
+    let fail = |message: String| {
+        FileError::byte(unit.offset, format!("AIPS SU table, row {}: {message}", row + 1))
+    };
+    let equinox = table.number(row, "EPOCH", 0).unwrap_or(2000.0);
+    if equinox != 2000.0 {
+        return Err(fail(format!("EPOCH = {equinox} is not allowed: 2000")));
+    }
+    let shift = table.number(row, "FREQOFF", 0).unwrap_or(0.0);
+    if shift != 0.0 {
+        return Err(fail(format!("FREQOFF = {shift} Hz is not allowed: 0")));
+    }
+    let place = table.number(row, "RAEPO", 0).zip(table.number(row, "DECEPO", 0));
+    let (ra, dec) = place.ok_or_else(|| fail("no RAEPO or DECEPO".to_owned()))?;
+    let position = SourcePosition::new(ra.rem_euclid(360.0) / 15.0, dec);
+    let position = position.map_err(|error| fail(error.to_string()))?;
+    Ok(Some(TableSource { name: name(number).unwrap_or_default(), position }))
+}
+
+/// `number name` of the sources that there are.
+fn values_named(
+    unit: &Unit<'_>,
+    layout: &Layout,
+    parameter: Parameter,
+    name: impl Fn(i64) -> Option<String>,
+) -> Vec<String> {
+    let values = values(unit, layout, parameter).into_iter().take(SHOWN);
+    values.filter_map(|k| Some(format!("{k} is {}", name(k)?))).collect()
+}
+
+/// Refuses a header whose coordinates or times are others than those that are read.
+pub fn check_header(header: &Header<'_>) -> Result<(), FileError> {
+    if let Some(unit) = header.text("BUNIT").filter(|unit| !unit.is_empty())
+        && !unit.eq_ignore_ascii_case("JY")
+    {
+        return Err(header.error("BUNIT", "JY"));
+    }
+    for keyword in ["EQUINOX", "EPOCH"] {
+        let value = match header.text(keyword) {
+            Some(text) if text.is_empty() => None,
+            Some(text) => Some(text.trim_start_matches(['J', 'j']).parse().unwrap_or(f64::NAN)),
+            None => header.number(keyword)?,
+        };
+        // Writers that do not know it write 0.
+        if value.is_some_and(|equinox: f64| equinox != 2000.0 && equinox != 0.0) {
+            return Err(header.error(keyword, "2000: other equinoxes are not converted"));
+        }
+    }
+    if header.text("RADESYS").is_some_and(|system| system.starts_with("FK4")) {
+        return Err(header.error("RADESYS", "ICRS or FK5: FK4 is not converted"));
+    }
+    for k in 2..=9 {
+        let name = header.text(&format!("CTYPE{k}")).unwrap_or_default();
+        let keyword = format!("CROTA{k}");
+        let is_place = name.starts_with("RA") || name.starts_with("DEC");
+        if is_place && header.number(&keyword)?.unwrap_or(0.0) != 0.0 {
+            return Err(header.error(&keyword, "0: (u, v) are of north and east"));
+        }
+    }
+    Ok(())
+}
+
+/// Tables that change what data mean and are not applied: those of flags are refused where they hold any, others are named.
+pub fn check_tables(units: &[Unit<'_>]) -> Result<Option<String>, FileError> {
+    let mut others = BTreeSet::new();
+    for unit in units {
+        let name = unit.header.text("EXTNAME").unwrap_or_default();
+        match name.as_str() {
+            "AIPS FG" => {
+                let rows = Table::new(unit)?.rows();
+                if rows > 0 {
+                    let message = format!(
+                        "AIPS FG table: {rows} flags that are not applied: apply them first"
+                    );
+                    return Err(FileError::byte(unit.offset, message));
+                }
+            }
+            "AIPS SN" | "AIPS CL" | "AIPS BP" | "AIPS BL" | "AIPS PD" | "AIPS TY" | "AIPS GC" => {
+                others.insert(name);
+            }
+            _ => {}
+        }
+    }
+    let names: Vec<String> = others.into_iter().collect();
+    Ok((!names.is_empty())
+        .then(|| format!("{}: calibration that is not applied", names.join(", "))))
+}
+
+/// Hours that the times of a file are ahead of UTC.
+///
+/// # Errors
+/// If a header names a time system other than UTC and TAI.
+pub fn ahead_h(units: &[Unit<'_>], mjd: i32) -> Result<f64, FileError> {
+    let mut ahead = 0.0;
+    for unit in units {
+        let name = unit.header.text("EXTNAME").unwrap_or_default();
+        if !(name.is_empty() || name == "AIPS AN") {
+            continue;
+        }
+        for keyword in ["TIMESYS", "TIMSYS"] {
+            let system = unit.header.text(keyword).unwrap_or_default();
+            match system.to_ascii_uppercase().as_str() {
+                "" | "UTC" => {}
+                "TAI" | "IAT" => {
+                    let seconds = crate::earth::tai_minus_utc(mjd);
+                    ahead = seconds.map_err(|error| unit.header.error(keyword, error))? / 3600.0;
+                }
+                _ => return Err(unit.header.error(keyword, "UTC, TAI or IAT")),
+            }
+        }
+    }
+    Ok(ahead)
+}
