@@ -1,14 +1,9 @@
 //! The program with what others add to it.
 
-use super::{Arguments, compare, fit, help, interrupt, output, run};
 use anyhow::Context;
-use clap::FromArgMatches;
 use kerrlight_tomo::representation::{BuildRepresentation, FindRepresentation, Registry};
 use std::ffi::OsString;
-use std::process::{Command, ExitCode};
-
-/// The exit code of a case that another process runs: EX_TEMPFAIL of sysexits.h, to try again.
-const BUSY: u8 = 75;
+use std::process::Command;
 
 /// `kerrlight` with representations of one's own.
 #[derive(Default)]
@@ -57,35 +52,5 @@ impl Program {
                 Command::new(std::env::current_exe().context("cannot find the program itself")?)
             }
         })
-    }
-
-    /// Does what the command line says; 0 is success, 2 an error, 1 a fit that failed while it ran or a comparison of which
-    /// a part did, 75 a case that another process runs, 128 and the number of the signal what a signal has stopped: 130 after Ctrl-C, 143 after SIGTERM.
-    pub fn run(self) -> ExitCode {
-        ExitCode::from(self.run_with(std::env::args_os()))
-    }
-
-    /// The same for a command line of the caller's, whose first word is the program's name; returns the exit code.
-    /// Help, and what is wrong with the words themselves, end the process.
-    pub fn run_with(self, words: impl IntoIterator<Item = OsString>) -> u8 {
-        let matches = help::command().try_get_matches_from(words);
-        let arguments = matches.and_then(|matches| Arguments::from_arg_matches(&matches));
-        let arguments = arguments.unwrap_or_else(|error| output::exit(&error));
-        match interrupt::listen().and_then(|()| run(&arguments, &self)) {
-            Ok(()) => 0,
-            Err(error) if error.is::<interrupt::Interrupted>() => {
-                eprintln!("{error:#}");
-                interrupt::code()
-            }
-            Err(error) => {
-                eprintln!("error: {error:#}");
-                if error.is::<compare::Busy>() {
-                    return BUSY;
-                }
-                let failed = error.downcast_ref::<compare::Failed>().is_some()
-                    || error.downcast_ref::<fit::Failed>().is_some();
-                if failed { 1 } else { 2 }
-            }
-        }
     }
 }

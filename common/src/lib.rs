@@ -2,14 +2,23 @@
 //! memory ([`frames`]), arrays of NumPy ([`numpy`]), TOML that names lines ([`toml_file`]), elementary functions on
 //! SIMD lanes ([`simd`]), Stokes parameters ([`stokes`]) and [`units`].
 
-mod error;
-pub mod frames;
-pub mod matrix;
+// In the order of the flow of data: a module imports from those above it.
 pub mod memory;
-pub mod numpy;
+
 pub mod simd;
+
 pub mod stokes;
+
 pub mod toml_file;
+
 pub mod units;
+
+pub mod frames;
+
+pub mod matrix;
+
+pub mod numpy;
+
+mod error;
 
 pub use error::Error;

@@ -4,15 +4,25 @@
 //! [`picture`] → [`image`]. Volumes of emission are in [`volume`]. Nothing here knows a path or a terminal: codecs work on
 //! bytes.
 
-pub mod dynamics;
-pub mod emission;
-mod error;
+// In the order of the flow of data: a module imports from those above it.
 pub mod image;
-pub mod picture;
+
 pub mod points;
+
 pub mod polarization;
+
+pub mod dynamics;
+
 pub mod scene;
-pub mod transport;
+
 pub mod volume;
+
+pub mod emission;
+
+pub mod transport;
+
+pub mod picture;
+
+mod error;
 
 pub use error::{Error, Parts};

@@ -4,10 +4,15 @@
 //! visibilities ([`kerrlight_vlbi`]) → loss → gradient → [`optimise`]; [`fit`] puts them together. Nothing here knows a path
 //! or a terminal: codecs work on bytes.
 
-mod error;
+// In the order of the flow of data: a module imports from those above it.
 pub mod exr_picture;
-pub mod fit;
-pub mod optimise;
+
 pub mod representation;
+
+pub mod optimise;
+
+pub mod fit;
+
+mod error;
 
 pub use error::Error;

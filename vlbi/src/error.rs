@@ -5,6 +5,7 @@ use crate::data_terms::DataTermError;
 use crate::earth::EarthError;
 use crate::files::FileError;
 use crate::observation::Unknown;
+use crate::polarimetry::NoFeeds;
 use crate::schedule::ScheduleError;
 use kerrlight_common::numpy::NumpyError;
 
@@ -24,6 +25,8 @@ pub enum Error {
     File(#[from] FileError),
     /// Metadata that the data lack.
     Unknown(#[from] Unknown),
+    /// Products that are not of feeds.
+    Feeds(#[from] NoFeeds),
     /// Data that make no χ².
     DataTerm(#[from] DataTermError),
     /// Memory, or bytes that cannot be read or written.

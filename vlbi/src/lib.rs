@@ -7,24 +7,41 @@
 //! Units are those of the field: metres, Jy, hours of UTC, wavelengths, degrees where a name says
 //! so.
 
+// In the order of the flow of data: a module imports from those above it.
 pub mod array;
+
+pub mod earth;
+
+pub mod operator;
+
+pub mod dirty_image;
+
+pub mod observation;
+
+pub mod source;
+
+pub mod gains;
+
+pub mod light_curve;
+
+pub mod products;
+
+pub mod schedule;
+
+pub mod simulate;
+
+pub mod polarimetry;
+
+pub mod data_terms;
+
+pub mod noise;
+
+pub mod files;
+
 #[cfg(test)]
 mod conformance;
-pub mod data_terms;
-pub mod dirty_image;
-pub mod earth;
+
 mod error;
-pub mod files;
-pub mod gains;
-pub mod light_curve;
-pub mod noise;
-pub mod observation;
-pub mod operator;
-pub mod polarimetry;
-pub mod products;
-pub mod schedule;
-pub mod simulate;
-pub mod source;
 
 pub use error::Error;
 

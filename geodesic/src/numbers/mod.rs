@@ -4,6 +4,7 @@
 pub(crate) mod compensated;
 pub(crate) mod dual;
 pub mod legendre;
+mod plain;
 pub(crate) mod polynomial;
 pub mod quadrature;
 pub(crate) mod scalar;

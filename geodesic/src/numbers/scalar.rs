@@ -1,7 +1,6 @@
 //! The arithmetic that the equations of motion need, so that one source serves floats of
 //! single, double and twice double precision, and dual numbers of them.
 
-use crate::numbers::compensated::Double;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A real number, or several of them side by side.
@@ -55,61 +54,6 @@ pub trait Elementary: Scalar + PartialEq + core::fmt::Debug + Send + Sync {
 
     /// The angle of the point (`x`, `self`), in \[−π, π\].
     fn atan2(self, x: Self) -> Self;
-}
-
-impl Scalar for f64 {
-    #[inline(always)]
-    fn constant(x: f64) -> Self {
-        x
-    }
-
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        f64::sqrt(self)
-    }
-}
-
-impl Elementary for f64 {
-    const IS_PLAIN: bool = true;
-
-    type Wide = Double;
-
-    fn widen(self) -> Double {
-        Double::from(self)
-    }
-
-    fn narrow(wide: Double) -> Self {
-        wide.value()
-    }
-
-    fn pi() -> Self {
-        core::f64::consts::PI
-    }
-
-    #[inline(always)]
-    fn value(self) -> f64 {
-        self
-    }
-
-    #[inline(always)]
-    fn ln_1p(self) -> Self {
-        f64::ln_1p(self)
-    }
-
-    #[inline(always)]
-    fn ln(self) -> Self {
-        f64::ln(self)
-    }
-
-    #[inline(always)]
-    fn sin_cos(self) -> (Self, Self) {
-        f64::sin_cos(self)
-    }
-
-    #[inline(always)]
-    fn atan2(self, x: Self) -> Self {
-        f64::atan2(self, x)
-    }
 }
 
 impl Scalar for f32 {

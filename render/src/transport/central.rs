@@ -2,6 +2,7 @@
 //! the pixel covers of the sky. These rays are traced once more, step by step.
 
 use super::layers::{Kind, Layers, Origin};
+use super::optics::in_cartesian;
 use super::prepare::PreparedScene;
 use kerrlight_geodesic::footprint::{self, Number};
 use kerrlight_geodesic::vector::{cross, dot};
@@ -118,14 +119,6 @@ fn rates(hole: &Kerr, point: &PathPoint<Number>, lambda: f64) -> ([f64; 3], f64)
     let (u, azimuth) = (point.cos_theta().value, point.azimuth.value);
     let place = [point.radius().value, u, azimuth];
     (in_cartesian(place, [fall, polar, turn]), delay)
-}
-
-/// Rates of r, θ and φ at (r, cos θ, φ) as those of the coordinates r n.
-pub(super) fn in_cartesian([r, u, azimuth]: [f64; 3], [fall, polar, turn]: [f64; 3]) -> [f64; 3] {
-    let ((sin, cos), s) = (azimuth.sin_cos(), ((1.0 - u) * (1.0 + u)).sqrt());
-    let outward = fall * s + r * u * polar;
-    let around = r * s * turn;
-    [outward * cos - around * sin, outward * sin + around * cos, fall * u - r * s * polar]
 }
 
 /// The first two unknowns of three linear equations, by Cramer's rule; 0 where there is no solution.

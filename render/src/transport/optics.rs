@@ -57,3 +57,11 @@ impl Optics {
         self.spectral_index.and_then(|_| self.view.blueshift(x, y))
     }
 }
+
+/// Rates of r, θ and φ at (r, cos θ, φ) as those of the coordinates r n.
+pub(super) fn in_cartesian([r, u, azimuth]: [f64; 3], [fall, polar, turn]: [f64; 3]) -> [f64; 3] {
+    let ((sin, cos), s) = (azimuth.sin_cos(), ((1.0 - u) * (1.0 + u)).sqrt());
+    let outward = fall * s + r * u * polar;
+    let around = r * s * turn;
+    [outward * cos - around * sin, outward * sin + around * cos, fall * u - r * s * polar]
+}

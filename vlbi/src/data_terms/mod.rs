@@ -50,11 +50,6 @@ pub enum DataTermError {
     /// Nothing to compare with.
     #[error("there are no data for this term")]
     Empty,
-    /// Leakage is of feeds, and the data are Stokes parameters.
-    #[error(
-        "leakage needs the products of circular feeds (RR, LL, RL, LR): these data are I, Q, U, V"
-    )]
-    NoHands,
     /// Closure traces are of products of feeds, whose errors are independent.
     #[error(
         "closure traces need the products of circular feeds (RR, LL, RL, LR): these data are I, Q, U, V"

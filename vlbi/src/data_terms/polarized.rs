@@ -1,14 +1,14 @@
 //! Products of circular feeds, or Stokes parameters, of a model with I, Q and U; with leakage that is held, and gains that
 //! are solved for beside every model.
 
-use super::{DataTerm, DataTermError, GainTerm, Residual, VisibilityTerm};
+use super::{DataTerm, GainTerm, Residual, VisibilityTerm};
 use crate::Complex64;
 use crate::Error;
 use crate::gains::{GainPriors, ScanGains};
 use crate::observation::{Basis, Observation};
 use crate::operator::Float;
 use crate::polarimetry::{
-    LeakageDatum, MODELLED, Product, Products, SharedLeakage, jones, response, turns,
+    LeakageDatum, MODELLED, NoFeeds, Product, Products, SharedLeakage, jones, response, turns,
 };
 use num_complex::Complex;
 
@@ -56,7 +56,7 @@ impl PolarizedTerm {
         leakage: Option<&SharedLeakage>,
     ) -> Result<Self, Error> {
         if leakage.is_some() && observation.basis != Basis::Circular {
-            return Err(DataTermError::NoHands.into());
+            return Err(NoFeeds.into());
         }
         let Products { rows, all, data } = Products::of(observation);
         let compared = match gains {

@@ -1,11 +1,11 @@
 //! Tables of leakage.
 
+use super::NoFeeds;
 use super::jones::{Matrix, hands};
 use super::{Leakage, jones, leaked, turns};
 use crate::Complex64;
 use crate::Error;
 use crate::array::Station;
-use crate::data_terms::DataTermError;
 use crate::observation::{Basis, Observation, Row};
 
 /// Leakage of a station.
@@ -70,7 +70,7 @@ impl LeakageTable {
     /// If the products are Stokes parameters, or the observation does not hold what the rotation of feeds follows from.
     pub fn take_out(&self, observation: &mut Observation) -> Result<usize, Error> {
         if observation.basis != Basis::Circular {
-            return Err(DataTermError::NoHands.into());
+            return Err(NoFeeds.into());
         }
         let before = observation.rows.len();
         let terms: Vec<_> = observation.stations.iter().map(|s| self.of(&s.name)).collect();
